@@ -21,7 +21,10 @@ from gensig.dynamics._vector import LANES, PRECISIONS
 
 RECORD = "import gensig; gensig.load_system('solver.precision={}').simulate()"
 PER_CORE = "simulated s per core-s"
-SCALAR, RK45 = "scalar Numba RK4 x5, the same law", "solve_ivp RK45, right-hand side compiled"
+SCALAR, RK45 = (
+    "scalar Numba RK4 x5, the same law",
+    "solve_ivp RK45, right-hand side compiled",
+)
 RK45_NUMPY, KERNEL, RECORDS = (
     "solve_ivp RK45, NumPy around the compiled law",
     "compiled core {} x5",
@@ -45,7 +48,9 @@ def kernels(runs: int) -> dict[str, float]:
         f"compiled core float64 x{oversampling}": _rates.kernel(eight, oversampling)
         for oversampling in (4, 5, 8)
     }
-    works["compiled core float64 x5, one of the lanes in use"] = _rates.kernel(eight[:1], 5)
+    works["compiled core float64 x5, one of the lanes in use"] = _rates.kernel(
+        eight[:1], 5
+    )
     works[KERNEL.format("float32")] = _rates.kernel(lanes, 5, "float32")
     works[SCALAR] = _rates.scalar(eight, 5)
     works |= _rates.scipy_works(eight[0])
@@ -53,7 +58,9 @@ def kernels(runs: int) -> dict[str, float]:
         works, 4 * runs
     )  # they are short: many turns cost little, and one of them is undisturbed
     if (ross := stored_rate()) is not None:
-        found["ROSS run_time_response x1, as stored, by way of scalar Numba"] = ross * found[SCALAR]
+        found["ROSS run_time_response x1, as stored, by way of scalar Numba"] = (
+            ross * found[SCALAR]
+        )
     return found
 
 
@@ -73,7 +80,9 @@ def start_up(runs: int) -> dict[str, float]:
 
     def wall(code: str, **variables: str) -> float:
         start = time.perf_counter()
-        subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ, **variables})
+        subprocess.run(
+            [sys.executable, "-c", code], check=True, env={**os.environ, **variables}
+        )
         return time.perf_counter() - start
 
     found = {
@@ -90,7 +99,9 @@ def start_up(runs: int) -> dict[str, float]:
     return found
 
 
-def ratios(rates: dict[str, float], ends: dict[str, dict[str, float]]) -> dict[str, float]:
+def ratios(
+    rates: dict[str, float], ends: dict[str, dict[str, float]]
+) -> dict[str, float]:
     """What compares between machines."""
     found = {
         f"kernel {precision} over scalar Numba": rates[KERNEL.format(precision)]
@@ -99,8 +110,12 @@ def ratios(rates: dict[str, float], ends: dict[str, dict[str, float]]) -> dict[s
     found = {name: value / rates[SCALAR] for name, value in found.items()}
     end = ends["float64"][RECORDS]
     found["float32 over float64, end to end"] = ends["float32"][RECORDS] / end
-    found["end to end over solve_ivp RK45, right-hand side compiled"] = end / rates[RK45]
-    found["end to end over solve_ivp RK45, NumPy around the law"] = end / rates[RK45_NUMPY]
+    found["end to end over solve_ivp RK45, right-hand side compiled"] = (
+        end / rates[RK45]
+    )
+    found["end to end over solve_ivp RK45, NumPy around the law"] = (
+        end / rates[RK45_NUMPY]
+    )
     for precision, values in ends.items():
         found[f"share of the kernel's rate reached, {precision}"] = (
             values[RECORDS] / rates[KERNEL.format(precision)]
@@ -115,7 +130,9 @@ def ratios(rates: dict[str, float], ends: dict[str, dict[str, float]]) -> dict[s
 
 def _goal(name: str, value: float) -> str:
     goal = GOALS.get(name)
-    return "" if goal is None else f"{'reached' if value >= goal else 'missed'}: {goal:g}"
+    return (
+        "" if goal is None else f"{'reached' if value >= goal else 'missed'}: {goal:g}"
+    )
 
 
 def main() -> None:
@@ -127,7 +144,9 @@ def main() -> None:
         sections[section] = values
         over = values.get(SCALAR)
         print_figures(
-            section, values, *([lambda value: f"{value / over:.4g} x scalar"] if over else [])
+            section,
+            values,
+            *([lambda value: f"{value / over:.4g} x scalar"] if over else []),
         )
 
     show("difference of scalar code and compiled core", same_law())
@@ -140,7 +159,10 @@ def main() -> None:
     for precision in PRECISIONS:
         values = _end_to_end.by_stage(precision, arguments.runs)
         ends[precision] = values | _end_to_end.wall_rates(precision, 2, arguments.runs)
-        show(f"gensig generate, {precision}, records of 1 s and four channels", ends[precision])
+        show(
+            f"gensig generate, {precision}, records of 1 s and four channels",
+            ends[precision],
+        )
     show("start-up, wall s", start_up(arguments.runs))
     sections["ratios"] = ratios(rates, ends)
     print("\nratios (goal)")

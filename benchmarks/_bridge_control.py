@@ -21,7 +21,12 @@ from diagnose.networks.adaptation import HEALTHY, METHODS, adapt_domain, adapt_n
 from diagnose.networks.domain import distances
 from diagnose.recordings.machine import together
 from diagnose.training.classes import predict_windows
-from diagnose.training.store import ModelDescription, load_domain, load_model, load_statistics
+from diagnose.training.store import (
+    ModelDescription,
+    load_domain,
+    load_model,
+    load_statistics,
+)
 from gensig.cli import main as gensig_main
 from gensig.errors import ConfigError
 from gensig.systems.registry import SIDES
@@ -29,9 +34,16 @@ from gensig.systems.registry import SIDES
 FloatArray = NDArray[np.floating]
 
 NAME = "negative_control_*.npz"
-RATE, TEETH, SPEED = 12800.0, ("32", "80"), "1800"  # of its description; the first stage
+RATE, TEETH, SPEED = (
+    12800.0,
+    ("32", "80"),
+    "1800",
+)  # of its description; the first stage
 FOUND_SPEED = 1781.0  # r/min; what `gensig twin` finds
-TORQUES = (3, 28)  # N m; up to what the twin assumes as rated: what the loads are is not known
+TORQUES = (
+    3,
+    28,
+)  # N m; up to what the twin assumes as rated: what the loads are is not known
 STATES = ("healthy", "broken_tooth")
 LOADS = (0, 50, 90)  # %
 SCORED = 3  # the channel in which both states have the same path; the others are only reported
@@ -68,15 +80,30 @@ def training_sets(file: Path, twin: Path) -> dict[str, tuple[list[str], Path | N
     twin : folder of the twin's options, made where it is not there
     """
     if not twin.is_dir():
-        words = ["--array", TWIN_OF, "--channels", f"channel_{SCORED}", "--rate", f"{RATE:g}"]
+        words = [
+            "--array",
+            TWIN_OF,
+            "--channels",
+            f"channel_{SCORED}",
+            "--rate",
+            f"{RATE:g}",
+        ]
         status = gensig_main(
-            ["twin", str(file), *words, "--teeth", *TEETH, "--speed", SPEED, "--out", str(twin)]
+            [
+                "twin",
+                str(file),
+                *words,
+                "--teeth",
+                *TEETH,
+                "--speed",
+                SPEED,
+                "--out",
+                str(twin),
+            ]
         )
         if status != 0:
             raise ConfigError(f"gensig twin ended with status {status}")
-    torque = (
-        f"operating.torque_nm: {{distribution: uniform, low: {TORQUES[0]}, high: {TORQUES[1]}}}"
-    )
+    torque = f"operating.torque_nm: {{distribution: uniform, low: {TORQUES[0]}, high: {TORQUES[1]}}}"
     common = [
         f"plan.classes=[{','.join(CLASSES)}]",
         "plan.n_records=320",
@@ -91,7 +118,11 @@ def training_sets(file: Path, twin: Path) -> dict[str, tuple[list[str], Path | N
         "plan.n_gearboxes=20",
         f"plan.vary={{{torque}, sensing.snr_db: {{distribution: uniform, low: 10, high: 30}}}}",
         *(f"gear.{side}.n_teeth={n}" for side, n in zip(SIDES, TEETH, strict=True)),
-        *(f"gear.{side}.{key}=null" for side in SIDES for key in ("mass_kg", "inertia_kg_m2")),
+        *(
+            f"gear.{side}.{key}=null"
+            for side in SIDES
+            for key in ("mass_kg", "inertia_kg_m2")
+        ),
         f"operating.speed_rpm={FOUND_SPEED:g}",
         f"sensing.sampling_rate_hz={RATE:g}",
         "sensing.sensors=[housing]",
@@ -106,7 +137,9 @@ def judge_control(file: Path, models: Sequence[Path]) -> list[dict[str, Any]]:
     """One row for each channel, load and variant: how much more of a fault the broken state is said to have."""
     with np.load(file, allow_pickle=False) as held:
         recorded = {
-            (state, load): held[f"{state}__load{load}"] for state in STATES for load in LOADS
+            (state, load): held[f"{state}__load{load}"]
+            for state in STATES
+            for load in LOADS
         }
     n_channels = len(recorded[STATES[0], LOADS[0]])
     loaded = [
@@ -152,7 +185,8 @@ def _judge(
     assert statistics is not None
     healthy = description.class_names.index(HEALTHY)
     halves = {
-        key: _halves(signal[channel : channel + 1], description) for key, signal in recorded.items()
+        key: _halves(signal[channel : channel + 1], description)
+        for key, signal in recorded.items()
     }
     found: dict[tuple[str, int], list[tuple[FloatArray, FloatArray]]] = {
         key: [] for key in recorded
@@ -165,7 +199,9 @@ def _judge(
             region = adapt_domain(domain, statistics, given)
         for key, parts in halves.items():
             said = 1.0 - np.exp(predict_windows(network, parts[judged])[:, healthy])
-            found[key].append((said, distances(region, parts[judged]) > region.threshold))
+            found[key].append(
+                (said, distances(region, parts[judged]) > region.threshold)
+            )
     return {
         key: (
             np.concatenate([said for said, _ in parts]),
@@ -175,7 +211,9 @@ def _judge(
     }
 
 
-def _halves(signal: NDArray[Any], description: ModelDescription) -> tuple[WindowSet, WindowSet]:
+def _halves(
+    signal: NDArray[Any], description: ModelDescription
+) -> tuple[WindowSet, WindowSet]:
     n_samples = signal.shape[-1]
     first, second = (
         _windows(part, description)
@@ -185,8 +223,12 @@ def _halves(signal: NDArray[Any], description: ModelDescription) -> tuple[Window
 
 
 def _windows(signal: NDArray[Any], description: ModelDescription) -> WindowSet:
-    whole = Segments(record=np.array([0]), start=np.array([0]), stop=np.array([signal.shape[-1]]))
-    segment, start = plan_windows(whole, description.window_samples, description.stride_samples)
+    whole = Segments(
+        record=np.array([0]), start=np.array([0]), stop=np.array([signal.shape[-1]])
+    )
+    segment, start = plan_windows(
+        whole, description.window_samples, description.stride_samples
+    )
     return WindowSet(
         signals=(signal.astype(np.float32),),
         segment=segment,
@@ -199,7 +241,9 @@ def _windows(signal: NDArray[Any], description: ModelDescription) -> WindowSet:
 
 
 def _row(
-    fault: dict[str, FloatArray], beyond: dict[str, FloatArray], rng: np.random.Generator
+    fault: dict[str, FloatArray],
+    beyond: dict[str, FloatArray],
+    rng: np.random.Generator,
 ) -> dict[str, Any]:
     """Difference of the mean probabilities with a 95 % interval by bootstrap over blocks of each recording."""
     drawn = {state: _block_means(values, rng) for state, values in fault.items()}
@@ -222,4 +266,6 @@ def _row(
 def _block_means(values: FloatArray, rng: np.random.Generator) -> FloatArray:
     """(draw,) means over blocks drawn again."""
     blocks = values[: values.size // BLOCK * BLOCK].reshape(-1, BLOCK).mean(axis=1)
-    return blocks[rng.integers(blocks.size, size=(N_BOOTSTRAP, blocks.size))].mean(axis=1)
+    return blocks[rng.integers(blocks.size, size=(N_BOOTSTRAP, blocks.size))].mean(
+        axis=1
+    )

@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 from torch import nn
 
 from benchmarks._realism_sets import kept
-from diagnose.data.windows import Segments, Task, WindowSet, load_windows, subset_segments, task_of
+from diagnose.data.windows import (
+    Segments,
+    Task,
+    WindowSet,
+    load_windows,
+    subset_segments,
+    task_of,
+)
 from diagnose.networks.adaptation import (
     HEALTHY,
     METHODS,
@@ -81,8 +88,13 @@ def judge_world(source: Dataset, world: Dataset, models: Sequence[Path]) -> Judg
     for folder in models:
         model, description = load_model(folder)
         own, other = (_task(description, dataset) for dataset in (source, world))
-        adapting = load_windows(other, _healthy(other, subset_segments(other, PROTOCOL, "train")))
-        parts = [subset_segments(other, PROTOCOL, subset) for subset in ("validation", "test")]
+        adapting = load_windows(
+            other, _healthy(other, subset_segments(other, PROTOCOL, "train"))
+        )
+        parts = [
+            subset_segments(other, PROTOCOL, subset)
+            for subset in ("validation", "test")
+        ]
         judged = load_windows(other, _joined(parts))
         trained = load_windows(own, subset_segments(own, PROTOCOL, "train"))
         healthy = load_statistics(folder)
@@ -94,17 +106,26 @@ def judge_world(source: Dataset, world: Dataset, models: Sequence[Path]) -> Judg
                 found[f"{name}, {scope}"] = _adapted(
                     model, statistics, method, adapting, judged, _groups(world, scope)
                 )
-        seeds.append({name: over_records(value, judged.record)[1] for name, value in found.items()})
+        seeds.append(
+            {
+                name: over_records(value, judged.record)[1]
+                for name, value in found.items()
+            }
+        )
     record = np.unique(judged.record)
     return Judged(
         label=other.labels()[record],
         unit=np.asarray(world.column("unit_id"))[record],
-        log_probability={name: np.stack([seed[name] for seed in seeds]) for name in seeds[0]},
+        log_probability={
+            name: np.stack([seed[name] for seed in seeds]) for name in seeds[0]
+        },
         n_windows=len(adapting),
     )
 
 
-def _variants(healthy: Statistics, mixture: Statistics) -> Iterator[tuple[str, Statistics, str]]:
+def _variants(
+    healthy: Statistics, mixture: Statistics
+) -> Iterator[tuple[str, Statistics, str]]:
     for method in METHODS:
         yield method, healthy, method
         yield f"naive {method}", mixture, method
@@ -112,7 +133,11 @@ def _variants(healthy: Statistics, mixture: Statistics) -> Iterator[tuple[str, S
 
 def _groups(world: Dataset, scope: str) -> NDArray[Any]:
     """(record,) what is adapted to together."""
-    return np.zeros(world.n_records) if scope == "world" else np.asarray(world.column("gearbox_id"))
+    return (
+        np.zeros(world.n_records)
+        if scope == "world"
+        else np.asarray(world.column("gearbox_id"))
+    )
 
 
 def _adapted(
@@ -126,7 +151,9 @@ def _adapted(
     """(window, class) log-probabilities, each group of records by the network adapted to its healthy ones."""
     found = np.empty((len(judged), 0))
     for name in np.unique(group[judged.record]):
-        mine, theirs = (np.flatnonzero(group[part.record] == name) for part in (adapting, judged))
+        mine, theirs = (
+            np.flatnonzero(group[part.record] == name) for part in (adapting, judged)
+        )
         network = adapt_network(model, source, chosen_windows(adapting, mine), method)
         said = predict_windows(network, _subset(judged, theirs))
         if not found.size:
@@ -147,11 +174,16 @@ def scores(judged: Judged, class_names: Sequence[str]) -> dict[str, dict[str, An
     seeds = rng.integers(n_seeds, size=(N_BOOTSTRAP, n_seeds))
     healthy = list(class_names).index(HEALTHY)
     table: dict[str, dict[str, Any]] = {}
-    base, base_drawn = 0.0, np.zeros(N_BOOTSTRAP)  # of the first variant, the network as trained
+    base, base_drawn = (
+        0.0,
+        np.zeros(N_BOOTSTRAP),
+    )  # of the first variant, the network as trained
     for name, log_probability in judged.log_probability.items():
         confusion = np.stack(
             [
-                confusion_by_unit(judged.label, rows.argmax(axis=1), judged.unit, n_classes)
+                confusion_by_unit(
+                    judged.label, rows.argmax(axis=1), judged.unit, n_classes
+                )
                 for rows in log_probability
             ]
         )
@@ -168,7 +200,9 @@ def scores(judged: Judged, class_names: Sequence[str]) -> dict[str, dict[str, An
             "gain": mean - base,
             "gain_interval": _interval(drawn - base_drawn),
             "auroc": float(
-                np.mean([_auroc(judged.label, rows, healthy) for rows in log_probability])
+                np.mean(
+                    [_auroc(judged.label, rows, healthy) for rows in log_probability]
+                )
             ),
             "recall": dict(zip(class_names, share.tolist(), strict=True)),
         }
@@ -201,9 +235,13 @@ def _healthy(task: Task, segments: Segments) -> Segments:
     return _joined([segments], kept_rows)
 
 
-def _joined(parts: Sequence[Segments], mask: NDArray[np.bool_] | None = None) -> Segments:
+def _joined(
+    parts: Sequence[Segments], mask: NDArray[np.bool_] | None = None
+) -> Segments:
     columns = {
-        name: np.concatenate([getattr(part, name) for part in parts])[... if mask is None else mask]
+        name: np.concatenate([getattr(part, name) for part in parts])[
+            ... if mask is None else mask
+        ]
         for name in ("record", "start", "stop")
     }
     return Segments(**columns)

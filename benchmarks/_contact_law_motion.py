@@ -65,7 +65,9 @@ def mesh_at_loads(table: PairTable, loads: Array) -> Mesh:
 def _between(table, kind, j, x):
     """Linear between the nodes of one row of a table (kind, load, node)."""
     cell = min(max(int(x), 0), table.shape[2] - 2)
-    return table[kind, j, cell] + (x - cell) * (table[kind, j, cell + 1] - table[kind, j, cell])
+    return table[kind, j, cell] + (x - cell) * (
+        table[kind, j, cell + 1] - table[kind, j, cell]
+    )
 
 
 @_compiled
@@ -73,8 +75,18 @@ def _bent(table, slope, kind, j, x, per_meter):
     """A value between the nodes of one row: slopes go straight there, values follow their integral."""
     cell = min(max(int(x), 0), table.shape[2] - 2)
     part = x - cell
-    bend = 0.5 * part * (1.0 - part) / per_meter * (slope[kind, j, cell + 1] - slope[kind, j, cell])
-    return table[kind, j, cell] + part * (table[kind, j, cell + 1] - table[kind, j, cell]) - bend
+    bend = (
+        0.5
+        * part
+        * (1.0 - part)
+        / per_meter
+        * (slope[kind, j, cell + 1] - slope[kind, j, cell])
+    )
+    return (
+        table[kind, j, cell]
+        + part * (table[kind, j, cell + 1] - table[kind, j, cell])
+        - bend
+    )
 
 
 @_compiled
@@ -189,7 +201,9 @@ def _rates(mesh, m, direction, mass, spring, damper, force, time, state, work):
         gap_slope = _between(mesh.gap_slope, kind, 0, x)
         # the slope of the energy, the integral of compliance(load) load over load, is what work balance asks for
         slope, growth = _slope(mesh, kind, x, elastic)
-        load = max(0.0, elastic * (1.0 + m.damping * (approach_rate - gap_slope * roll_rate)))
+        load = max(
+            0.0, elastic * (1.0 + m.damping * (approach_rate - gap_slope * roll_rate))
+        )
         normal += load
         n_loaded += load > 0.0
         along += load * gap_slope + elastic**2 * (0.5 * slope - 0.25 * growth)
@@ -202,7 +216,9 @@ def _rates(mesh, m, direction, mass, spring, damper, force, time, state, work):
     rates = np.empty(2 * N_DOF)
     for i in range(N_DOF):
         rates[i] = v[i]
-        rates[N_DOF + i] = force[i] - spring[i] * q[i] - damper[i] * v[i] - direction[i] * normal
+        rates[N_DOF + i] = (
+            force[i] - spring[i] * q[i] - damper[i] * v[i] - direction[i] * normal
+        )
     rates[N_DOF] += friction
     rates[N_DOF + 3] -= friction
     rates[N_DOF + 2] += moment_p + m.consistent * m.pinion_radius * along
@@ -212,7 +228,9 @@ def _rates(mesh, m, direction, mass, spring, damper, force, time, state, work):
 
 
 @_compiled
-def _integrate(mesh, m, direction, mass, spring, damper, force, state, step, first_step, velocity):
+def _integrate(
+    mesh, m, direction, mass, spring, damper, force, state, step, first_step, velocity
+):
     """Classical RK4; a step in which a pair takes up or lets go of its load is taken again in parts.
 
     Fills ``velocity`` and returns the lowest approach.
@@ -230,7 +248,16 @@ def _integrate(mesh, m, direction, mass, spring, damper, force, state, step, fir
             for stage in range(4):
                 ahead = h * (0.0 if stage == 0 else 1.0 if stage == 3 else 0.5)
                 rates, approach, bearing = _rates(
-                    mesh, m, direction, mass, spring, damper, force, time + ahead, trial, work
+                    mesh,
+                    m,
+                    direction,
+                    mass,
+                    spring,
+                    damper,
+                    force,
+                    time + ahead,
+                    trial,
+                    work,
                 )
                 if stage == 0:
                     loaded = bearing

@@ -26,9 +26,7 @@ from gensig.production.folder import begin_folder, run_folder
 from gensig.record import simulate as records
 from gensig.systems import spur_pair
 
-RECORDING_SHARE = (
-    "share of the records' own integration"  # of the kernel's rate, where that would be the same
-)
+RECORDING_SHARE = "share of the records' own integration"  # of the kernel's rate, where that would be the same
 SHARD = 24  # records, as in the experiment
 N_SHARDS, SHARDS_A_WORKER = 2, 3
 
@@ -36,7 +34,9 @@ N_SHARDS, SHARDS_A_WORKER = 2, 3
 def data_set(precision: str, n_shards: int) -> dict[str, Any]:
     """Configuration of a quickstart data set: 1 s, four channels, a fault, speed, load and noise of its own each."""
     config, _ = quickstart(
-        n_shards * SHARD, f"solver.precision={precision}", f"dataset.records_per_shard={SHARD}"
+        n_shards * SHARD,
+        f"solver.precision={precision}",
+        f"dataset.records_per_shard={SHARD}",
     )
     return config
 
@@ -45,7 +45,9 @@ def by_stage(precision: str, runs: int) -> dict[str, float]:
     """CPU milliseconds of a record by stage and in all, and rates of one process; the best of several runs."""
     config = data_set(precision, N_SHARDS)
     n_records = N_SHARDS * SHARD
-    n_samples = round(config["operating"]["duration_s"] * config["sensing"]["sampling_rate_hz"])
+    n_samples = round(
+        config["operating"]["duration_s"] * config["sensing"]["sampling_rate_hz"]
+    )
     found: list[Stages] = []
     wall: list[float] = []
     for _ in range(runs):
@@ -64,7 +66,9 @@ def by_stage(precision: str, runs: int) -> dict[str, float]:
     best.separate_low_pass(precision, len(config["sensing"]["channels"]), runs)
     spent = {name: best.seconds[name] / n_records * 1e3 for name in STAGES}
     total, integration = sum(spent.values()), sum(spent[name] for name in INTEGRATION)
-    for_twins = (1.0 - n_records / best.n_runs) * (spent[EQUATIONS] + integration + spent[LOW_PASS])
+    for_twins = (1.0 - n_records / best.n_runs) * (
+        spent[EQUATIONS] + integration + spent[LOW_PASS]
+    )
     return {
         **{f"{name}, ms a record": value for name, value in spent.items()},
         "all, ms a record": total,
@@ -85,7 +89,9 @@ def by_stage(precision: str, runs: int) -> dict[str, float]:
 
 def wall_name(workers: int) -> str:
     """Name of the figure of so many workers."""
-    return f"records a second of wall time, {workers} worker{'s' if workers > 1 else ''}"
+    return (
+        f"records a second of wall time, {workers} worker{'s' if workers > 1 else ''}"
+    )
 
 
 def wall_rates(precision: str, workers: int, runs: int) -> dict[str, float]:
@@ -99,7 +105,10 @@ def wall_rates(precision: str, workers: int, runs: int) -> dict[str, float]:
             ends = _complete(Path(folder) / "set", workers=workers)
             whole.append(n_shards * SHARD / (time.perf_counter() - start))
         running.append((n_shards - workers) * SHARD / (ends[-1] - ends[workers - 1]))
-    return {wall_name(workers): max(running), f"{wall_name(workers)}, with their start": max(whole)}
+    return {
+        wall_name(workers): max(running),
+        f"{wall_name(workers)}, with their start": max(whole),
+    }
 
 
 def _complete(out: Path, *, workers: int) -> list[float]:

@@ -77,7 +77,9 @@ def engine_line(*, lateral: bool = True, linear: bool = False) -> GearedLine:
     for i, (node, weight) in enumerate(MASS.items() if lateral else ()):
         x = len(nodes) + 4 * i  # gear x, gear y, bearing x, bearing y
         side_of[node] = x
-        names += [f"{part}_{node}_{axis}" for part in ("gear", "bearing") for axis in "xy"]
+        names += [
+            f"{part}_{node}_{axis}" for part in ("gear", "bearing") for axis in "xy"
+        ]
         for axis in range(2):
             gear, bearing = x + axis, x + 2 + axis
             mass[gear, gear], mass[bearing, bearing] = weight, HOUSING_MASS
@@ -141,29 +143,50 @@ def engine_torques(mean: float = 5e3, pulse: float = 30.0) -> list[ShaftTorque]:
     )
     gas *= 0.1 * mean / gas.mean()
     torques = [
-        ShaftTorque(dof=3 + i, table=gas, period=4.0 * math.pi, phase=(7 * i % 10) * 0.4 * math.pi)
+        ShaftTorque(
+            dof=3 + i,
+            table=gas,
+            period=4.0 * math.pi,
+            phase=(7 * i % 10) * 0.4 * math.pi,
+        )
         for i in range(10)
     ]
     cam = (
         -pulse
-        * np.clip(np.sin(np.linspace(0.0, 2.0 * math.pi, 360, endpoint=False)), 0.0, None) ** 2
+        * np.clip(
+            np.sin(np.linspace(0.0, 2.0 * math.pi, 360, endpoint=False)), 0.0, None
+        )
+        ** 2
     )
     for i, dof in enumerate([*range(19, 29), *range(30, 40), *range(43, 63)]):
         torques.append(ShaftTorque(dof=dof, table=cam, phase=0.3 * math.pi * i))
-    return [*torques, ShaftTorque(dof=16, table=np.array([-mean + 40 * 0.5 * 0.25 * pulse]))]
+    return [
+        *torques,
+        ShaftTorque(dof=16, table=np.array([-mean + 40 * 0.5 * 0.25 * pulse])),
+    ]
 
 
 def _mesh(
-    name: str, direction: Array, a: int, n_teeth: tuple[int, int], stiffness: float, linear: bool
+    name: str,
+    direction: Array,
+    a: int,
+    n_teeth: tuple[int, int],
+    stiffness: float,
+    linear: bool,
 ) -> LineMesh:
     u = np.arange(64) / 64
-    ripple = sum(share * np.cos(2.0 * math.pi * (i + 1) * u + i) for i, share in enumerate(RIPPLE))
+    ripple = sum(
+        share * np.cos(2.0 * math.pi * (i + 1) * u + i)
+        for i, share in enumerate(RIPPLE)
+    )
     return phase_mesh(
         name,
         direction=direction,
         roll_dof=a,
         n_teeth=n_teeth,
-        stiffness=stiffness * np.ones((1, 64)) if linear else stiffness * (1.0 + ripple)[None],
+        stiffness=stiffness * np.ones((1, 64))
+        if linear
+        else stiffness * (1.0 + ripple)[None],
         backlash=0.0 if linear else BACKLASH,
         damping=0.0 if linear else MESH_DAMPING,
     )

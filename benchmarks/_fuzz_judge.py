@@ -64,7 +64,8 @@ def judge(folder: Path, mutant: Mutant, whole: dict[str, Any]) -> tuple[str, boo
     if mutant.refused and read:
         faults.append("read without complaint what must be refused")
     if any(
-        (folder / name).exists() or (folder.parent / name).exists() for name in ("evil", "evil.wav")
+        (folder / name).exists() or (folder.parent / name).exists()
+        for name in ("evil", "evil.wav")
     ):
         faults.append("wrote a file")
     noticed = bool(lines) or not checked
@@ -78,7 +79,9 @@ def _read_all(folder: Path) -> None:
         for name in data.column_names:
             values = data.column(name)
             if len(values) != data.n_records or values.dtype.kind not in "Uif":
-                raise TypeError(f"column {name} has type {values.dtype} and {len(values)} rows")
+                raise TypeError(
+                    f"column {name} has type {values.dtype} and {len(values)} rows"
+                )
         for index in range(data.n_records):
             for name in data.signal_names:
                 block = data.signals(index, name=name)
@@ -86,7 +89,9 @@ def _read_all(folder: Path) -> None:
                     len(data.channel_names),
                     data.n_samples,
                 ):
-                    raise TypeError(f"{name} has type {block.dtype} and shape {block.shape}")
+                    raise TypeError(
+                        f"{name} has type {block.dtype} and shape {block.shape}"
+                    )
         len(data.where(speed_rpm=(0, 1e4)))
         if len(data.plan_table) != data.n_records:
             raise TypeError("the plan has another length")

@@ -16,7 +16,10 @@ from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import healthy_tooth
 from gensig.geometry.tooth_profile import involute_point, load_angle
 from gensig.mesh.compliance import tooth_compliance
-from gensig.mesh.fillet_foundation import body_coefficients, fillet_foundation_compliance
+from gensig.mesh.fillet_foundation import (
+    body_coefficients,
+    fillet_foundation_compliance,
+)
 from gensig.plan.request import read_request
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair
@@ -62,7 +65,10 @@ def positions(pair: GearPair) -> dict[str, float]:
 
 def phases() -> list[tuple[str, float]]:
     """Names and shares of a base pitch at which the mesh stiffness is compared."""
-    return [(f"cycle {share:.3f}", share) for share in (np.arange(N_PHASES) + 0.5) / N_PHASES]
+    return [
+        (f"cycle {share:.3f}", share)
+        for share in (np.arange(N_PHASES) + 0.5) / N_PHASES
+    ]
 
 
 def job(system: SpurPair) -> dict[str, Any]:
@@ -70,19 +76,28 @@ def job(system: SpurPair) -> dict[str, Any]:
     pair, material = system.pair, system.material
 
     def contact(position: float, point: str = "") -> dict[str, Any]:
-        radii = {"pinion": pair.pinion_curvature(position), "wheel": pair.wheel_curvature(position)}
+        radii = {
+            "pinion": pair.pinion_curvature(position),
+            "wheel": pair.wheel_curvature(position),
+        }
         return {"point": point, **radii, "share": position / pair.path_of_contact}
 
     def contacts(share: float) -> list[dict[str, Any]]:
         newest = share * pair.base_pitch
-        return [contact(s) for s in (newest, newest + pair.base_pitch) if s <= pair.path_of_contact]
+        return [
+            contact(s)
+            for s in (newest, newest + pair.base_pitch)
+            if s <= pair.path_of_contact
+        ]
 
     return {
         "gears": {gear.name: _gear_job(gear) for gear in (pair.pinion, pair.wheel)},
         "youngs_modulus": material.youngs_modulus,
         "poisson_ratio": material.poisson_ratio,
         "density": material.density_kg_per_m3,
-        "points": [contact(position, point) for point, position in positions(pair).items()],
+        "points": [
+            contact(position, point) for point, position in positions(pair).items()
+        ],
         "phases": [
             {"point": point, "share_of_pitch": share, "contacts": contacts(share)}
             for point, share in phases()
@@ -122,7 +137,9 @@ def gensig_values(system: SpurPair) -> Values:
                 points,
                 at_points(curves.compliance[gear.name][term]),
             )
-        values |= {(f"{gear.name}_{angle}", ""): gear.root_half_angle for angle in ROOT_ANGLES}
+        values |= {
+            (f"{gear.name}_{angle}", ""): gear.root_half_angle for angle in ROOT_ANGLES
+        }
         if options.body == "sainsot":
             values |= _coefficient_values(gear, gear.root_half_angle)
     contact = at_points(
@@ -135,7 +152,9 @@ def gensig_values(system: SpurPair) -> Values:
         values |= _by_point(
             f"pair_stiffness{path}", points, at_points(curves.single_pair_stiffness)
         )
-        values |= _by_point(f"mesh_stiffness{path}", names, curves.mesh_stiffness[:N_PHASES])
+        values |= _by_point(
+            f"mesh_stiffness{path}", names, curves.mesh_stiffness[:N_PHASES]
+        )
     return values
 
 
@@ -149,7 +168,11 @@ def ross_choices(system: SpurPair) -> Values:
     for gear, curvature in sides(pair, position):
         parts = tooth_compliance(healthy_tooth(gear), curvature, material)
         body = foundation(
-            gear, curvature, system, half_angle=ross_half_angle(gear), height=contact_height
+            gear,
+            curvature,
+            system,
+            half_angle=ross_half_angle(gear),
+            height=contact_height,
         )
         for term in TERMS:
             found = body if term == "foundation" else getattr(parts, term)
@@ -158,14 +181,22 @@ def ross_choices(system: SpurPair) -> Values:
         values |= _coefficient_values(gear, ross_half_angle(gear))
     true, own = sides(pair, position), ross_path(pair, shares)
     values |= _by_point(
-        "pair_stiffness", points, ross_pair_stiffness(system, *(radii for _, radii in true))
+        "pair_stiffness",
+        points,
+        ross_pair_stiffness(system, *(radii for _, radii in true)),
     )
-    values |= _by_point("pair_stiffness_own_path", points, ross_pair_stiffness(system, *own))
+    values |= _by_point(
+        "pair_stiffness_own_path", points, ross_pair_stiffness(system, *own)
+    )
     for point, share in phases():
-        inside = np.array([s for s in (share, share + 1.0) if s <= pair.transverse_contact_ratio])
+        inside = np.array(
+            [s for s in (share, share + 1.0) if s <= pair.transverse_contact_ratio]
+        )
         radii = [curvature for _, curvature in sides(pair, inside * pair.base_pitch)]
         own_radii = ross_path(pair, inside / pair.transverse_contact_ratio)
-        values["mesh_stiffness", point] = float(ross_pair_stiffness(system, *radii).sum())
+        values["mesh_stiffness", point] = float(
+            ross_pair_stiffness(system, *radii).sum()
+        )
         values["mesh_stiffness_own_path", point] = float(
             ross_pair_stiffness(system, *own_radii).sum()
         )
@@ -181,7 +212,9 @@ def foundation(
         angle
     )  # the function takes u_f = reach/cos - r_f
     stand_in = _stand_in(gear, root_half_angle=half_angle, base_radius=reach)
-    return fillet_foundation_compliance(stand_in, angle, system.material, allow_extrapolation=True)
+    return fillet_foundation_compliance(
+        stand_in, angle, system.material, allow_extrapolation=True
+    )
 
 
 def centerline_height(gear: Gear, curvature: Array) -> Array:
@@ -198,14 +231,19 @@ def ross_half_angle(gear: Gear) -> float:
     """ROSS's theta_f: b1 / r without the clearance c* in b1."""
     return (
         gear.root_half_angle
-        - 2.0 * gear.clearance_coefficient * math.tan(gear.pressure_angle) / gear.n_teeth
+        - 2.0
+        * gear.clearance_coefficient
+        * math.tan(gear.pressure_angle)
+        / gear.n_teeth
     )
 
 
 def ross_rounding(pair: GearPair) -> GearPair:
     """The pair with ROSS's cutter tip, r_rho = c* m / (1 - sin(alpha))."""
     return replace(
-        pair, pinion=_with_ross_rounding(pair.pinion), wheel=_with_ross_rounding(pair.wheel)
+        pair,
+        pinion=_with_ross_rounding(pair.pinion),
+        wheel=_with_ross_rounding(pair.wheel),
     )
 
 
@@ -236,7 +274,11 @@ def ross_pair_stiffness(system: SpurPair, pinion: Array, wheel: Array) -> Array:
     for gear, curvature in ((system.pair.pinion, pinion), (system.pair.wheel, wheel)):
         total = total + tooth_compliance(healthy_tooth(gear), curvature, material).total
         total = total + foundation(
-            gear, curvature, system, half_angle=ross_half_angle(gear), height=contact_height
+            gear,
+            curvature,
+            system,
+            half_angle=ross_half_angle(gear),
+            height=contact_height,
         )
     return 1.0 / total
 
@@ -250,8 +292,13 @@ def sides(pair: GearPair, position: Array) -> list[tuple[Gear, Array]]:
 
 
 def _coefficient_values(gear: Gear, half_angle: float) -> Values:
-    found = body_coefficients(_stand_in(gear, root_half_angle=half_angle), allow_extrapolation=True)
-    return {(f"{gear.name}_coefficient_{letter}", ""): value for letter, value in found.items()}
+    found = body_coefficients(
+        _stand_in(gear, root_half_angle=half_angle), allow_extrapolation=True
+    )
+    return {
+        (f"{gear.name}_coefficient_{letter}", ""): value
+        for letter, value in found.items()
+    }
 
 
 def _with_ross_rounding(gear: Gear) -> Gear:
@@ -261,9 +308,19 @@ def _with_ross_rounding(gear: Gear) -> Gear:
 
 def _stand_in(gear: Gear, **changes: Any) -> Any:
     """What the body term asks of a gear, with derived quantities replaced."""
-    asked = ("name", "root_radius", "bore_radius", "face_width", "root_half_angle", "base_radius")
+    asked = (
+        "name",
+        "root_radius",
+        "bore_radius",
+        "face_width",
+        "root_half_angle",
+        "base_radius",
+    )
     return SimpleNamespace(**{key: getattr(gear, key) for key in asked} | changes)
 
 
 def _by_point(quantity: str, points: Sequence[str], values: Array) -> Values:
-    return {(quantity, point): float(value) for point, value in zip(points, values, strict=True)}
+    return {
+        (quantity, point): float(value)
+        for point, value in zip(points, values, strict=True)
+    }

@@ -20,7 +20,11 @@ Figures = Mapping[str, Mapping[str, float]]  # section: name: value
 
 def machine() -> dict[str, Any]:
     """Processor, cores, how busy they are already, and the versions of what runs."""
-    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    usable = (
+        len(os.sched_getaffinity(0))
+        if hasattr(os, "sched_getaffinity")
+        else os.cpu_count()
+    )
     load = round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else None
     return {
         **environment(),
@@ -42,7 +46,9 @@ def print_machine(found: Mapping[str, Any]) -> None:
         )
     )
     if (found["load_at_start"] or 0.0) > 0.5:
-        print("This machine is busy with something else: all rates are too low, ratios are rough.")
+        print(
+            "This machine is busy with something else: all rates are too low, ratios are rough."
+        )
 
 
 def least(work: Callable[[], Any], runs: int) -> float:
@@ -52,8 +58,12 @@ def least(work: Callable[[], Any], runs: int) -> float:
 
 def begin(program: str, about: str) -> tuple[argparse.Namespace, dict[str, Any], float]:
     """``--runs`` and ``--json`` as given, the machine, which is printed, and when it began."""
-    parser = argparse.ArgumentParser(prog=f"python -m {program}", description=about.split("\n")[0])
-    parser.add_argument("--runs", type=int, default=3, help="the least of so many (default 3)")
+    parser = argparse.ArgumentParser(
+        prog=f"python -m {program}", description=about.split("\n")[0]
+    )
+    parser.add_argument(
+        "--runs", type=int, default=3, help="the least of so many (default 3)"
+    )
     parser.add_argument("--json", help="also write the figures to this file")
     arguments = parser.parse_args()
     named, begun = machine(), time.perf_counter()

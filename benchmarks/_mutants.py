@@ -76,9 +76,13 @@ def forge(folder: Path) -> None:
 def forge_checksums(folder: Path) -> None:
     """Make `SHA256SUMS` fit the files again, whatever they are."""
     path = folder / "SHA256SUMS"
-    names = [line.partition("  ")[2] for line in path.read_text(encoding="utf-8").splitlines()]
+    names = [
+        line.partition("  ")[2]
+        for line in path.read_text(encoding="utf-8").splitlines()
+    ]
     path.write_text(
-        "".join(f"{sha256_file(folder / name)}  {name}\n" for name in names), encoding="utf-8"
+        "".join(f"{sha256_file(folder / name)}  {name}\n" for name in names),
+        encoding="utf-8",
     )
 
 
@@ -88,12 +92,18 @@ def _file(folder: Path, rng: np.random.Generator) -> Path:
         *sorted(path.name for path in (folder / "splits").iterdir()),
     ]  # fmt: skip
     name = str(rng.choice(names))
-    other = folder / "splits" / name if (folder / "splits" / name).exists() else folder / name
+    other = (
+        folder / "splits" / name
+        if (folder / "splits" / name).exists()
+        else folder / name
+    )
     return _shard(folder, rng) if rng.random() < 0.75 else other
 
 
 def _shard(folder: Path, rng: np.random.Generator) -> Path:
-    return Path(str(rng.choice([str(path) for path in sorted((folder / "shards").iterdir())])))
+    return Path(
+        str(rng.choice([str(path) for path in sorted((folder / "shards").iterdir())]))
+    )
 
 
 def _damage(folder: Path, path: Path, rng: np.random.Generator) -> Mutant:
@@ -183,17 +193,24 @@ def _external_storage(file: h5py.File, folder: Path) -> None:
     shape = file["acceleration"].shape
     del file["acceleration"]
     file.create_dataset(
-        "acceleration", shape, "f4", external=[("../../outside.bin", 0, h5py.h5f.UNLIMITED)]
+        "acceleration",
+        shape,
+        "f4",
+        external=[("../../outside.bin", 0, h5py.h5f.UNLIMITED)],
     )
 
 
 def _unwritten(file: h5py.File, name: str) -> None:
-    file.create_dataset(name, (file["record_id"].shape[0], 2, 10**11), "f4", chunks=(1, 2, 1000))
+    file.create_dataset(
+        name, (file["record_id"].shape[0], 2, 10**11), "f4", chunks=(1, 2, 1000)
+    )
 
 
 def _gzip_bomb(file: h5py.File, name: str) -> None:
     n = file["record_id"].shape[0]
-    data = file.create_dataset(name, (n, 2, 10**9), "f4", chunks=(1, 2, 10**6), compression="gzip")
+    data = file.create_dataset(
+        name, (n, 2, 10**9), "f4", chunks=(1, 2, 10**6), compression="gzip"
+    )
     data[0, :, : 10**6] = 0.0
 
 
@@ -213,7 +230,9 @@ def _loop(file: h5py.File, _folder: Path) -> None:
 
 
 def _typed(name: str, dtype: Any) -> Shard:
-    return _replaced(name, lambda file, key: file.create_dataset(key, (_rows(file), 2), dtype))
+    return _replaced(
+        name, lambda file, key: file.create_dataset(key, (_rows(file), 2), dtype)
+    )
 
 
 def _rows(file: h5py.File) -> int:
@@ -236,10 +255,13 @@ def _more(name: str, **options: Any) -> Shard:
 
 STRUCTURES: dict[str, Shard] = {
     "soft link": _replaced(
-        "label", lambda file, name: file.__setitem__(name, h5py.SoftLink("/fault_tooth"))
+        "label",
+        lambda file, name: file.__setitem__(name, h5py.SoftLink("/fault_tooth")),
     ),
     "soft link one level down": _link_names,
-    "dangling soft link": lambda file, _folder: file.__setitem__("more", h5py.SoftLink("/nowhere")),
+    "dangling soft link": lambda file, _folder: file.__setitem__(
+        "more", h5py.SoftLink("/nowhere")
+    ),
     "external link": _external_link,
     "virtual source outside": _virtual,
     "external storage": _external_storage,
@@ -258,7 +280,9 @@ STRUCTURES: dict[str, Shard] = {
     "empty": _replaced(
         "label", lambda file, name: file.create_dataset(name, data=h5py.Empty("i2"))
     ),
-    "no rows": _replaced("record_id", lambda file, name: file.create_dataset(name, (0,), "S32")),
+    "no rows": _replaced(
+        "record_id", lambda file, name: file.create_dataset(name, (0,), "S32")
+    ),
     "other rows": _replaced(
         "label", lambda file, name: file.create_dataset(name, (_rows(file) + 1,), "i2")
     ),
@@ -275,11 +299,14 @@ STRUCTURES: dict[str, Shard] = {
         "label", lambda f, n: f.create_dataset(n, (10**12,), "i2", chunks=(1000,))
     ),
     "bomb in width": _replaced(
-        "label_name", lambda f, n: f.create_dataset(n, (_rows(f),), "S2000000", chunks=(1,))
+        "label_name",
+        lambda f, n: f.create_dataset(n, (_rows(f),), "S2000000", chunks=(1,)),
     ),
     "unknown filter": _replaced(
         "label",
-        lambda f, n: f.create_dataset(n, data=np.zeros(_rows(f), "i2"), chunks=(1,), scaleoffset=2),
+        lambda f, n: f.create_dataset(
+            n, data=np.zeros(_rows(f), "i2"), chunks=(1,), scaleoffset=2
+        ),
     ),
     "another version": _attribute("schema_version", 99),
     "version as text": _attribute("schema_version", "1"),
@@ -297,7 +324,9 @@ def _manifest(folder: Path, number: int, rng: np.random.Generator) -> Mutant:
     path = folder / "manifest.json"
     content = json.loads(path.read_text(encoding="utf-8"))
     forgeries: dict[str, Callable[[], Any]] = {
-        "traversal in a shard's name": lambda: content["shards"][0].update(name="../../outside.h5"),
+        "traversal in a shard's name": lambda: content["shards"][0].update(
+            name="../../outside.h5"
+        ),
         "absolute shard name": lambda: content["shards"][0].update(name="/etc/passwd"),
         "device as shard": lambda: content["shards"][1].update(name="/dev/zero"),
         "traversal in a file's name": lambda: content["files"].update(
@@ -321,7 +350,9 @@ def _manifest(folder: Path, number: int, rng: np.random.Generator) -> Mutant:
         "huge number": lambda: content.update(n_records=10**400),
         "another seed": lambda: content.update(seed=content["seed"] + 1),
         "plan not listed": lambda: content["files"].pop("plan.csv"),
-        "split not listed": lambda: content["files"].pop("splits/random_window_leaky.csv"),
+        "split not listed": lambda: content["files"].pop(
+            "splits/random_window_leaky.csv"
+        ),
         "overrides not listed": lambda: content["files"].pop("overrides.yaml"),
         "index not listed": lambda: content["files"].pop("index.h5"),
         "another version": lambda: content.update(schema_version=2),
@@ -360,7 +391,14 @@ def _manifest(folder: Path, number: int, rng: np.random.Generator) -> Mutant:
 def _text(folder: Path, rng: np.random.Generator) -> Mutant:
     """Plan, configuration or split changed, with a manifest that agrees."""
     name = str(
-        rng.choice(["plan.csv", "config.yaml", "overrides.yaml", "splits/random_window_leaky.csv"])
+        rng.choice(
+            [
+                "plan.csv",
+                "config.yaml",
+                "overrides.yaml",
+                "splits/random_window_leaky.csv",
+            ]
+        )
     )
     path = folder / name
     text = path.read_text(encoding="utf-8")

@@ -40,7 +40,9 @@ def _chains(numbers, rounds):
 def peak(runs: int, precision: str = "float64") -> float:
     """Additions and multiplications of one core without memory, 1e9 a CPU second; the most of several runs."""
     n = n_lanes(precision)
-    numbers = np.concatenate([np.full(n, 0.999), np.full(n, 1e-3), np.zeros(n)]).astype(precision)
+    numbers = np.concatenate([np.full(n, 0.999), np.full(n, 1e-3), np.zeros(n)]).astype(
+        precision
+    )
     _chains(numbers, 10)
     best = np.inf
     for _ in range(runs):

@@ -24,21 +24,30 @@ from gensig.record.inputs import InputReader
 from gensig.systems.pair_machine import pair_dynamics
 
 Array = NDArray[np.float64]
-Work = tuple[Callable[[], Any], float]  # what to time, and the seconds that it simulates
+Work = tuple[
+    Callable[[], Any], float
+]  # what to time, and the seconds that it simulates
 RightHandSide = Callable[[float, Array], Array]
 
 SAMPLING_RATE = 51200.0
 CHANNELS = np.arange(4)  # x and y of both gears
 SETTLING, TIMED = 0.02, 0.1  # s
 PER_CALL = 1280  # steps, so that what is stored stays in the cache
-SAME_OVERSAMPLING, SAME = 16, 1e-3  # steps per sample at which both codes must agree, and how well
+SAME_OVERSAMPLING, SAME = (
+    16,
+    1e-3,
+)  # steps per sample at which both codes must agree, and how well
 SCIPY = ("RK45", "DOP853", "LSODA")
 SCIPY_SECONDS, SCIPY_RTOL, SCIPY_ATOL = 0.01, 1e-6, 1e-12
 
 
-def quickstart(n_records: int, *words: str) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+def quickstart(
+    n_records: int, *words: str
+) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """Configuration and first rows of the quickstart experiment: four classes, each record its own fault and load."""
-    config = read_request(["experiment=quickstart", f"plan.n_records={n_records}", *words]).config
+    config = read_request(
+        ["experiment=quickstart", f"plan.n_records={n_records}", *words]
+    ).config
     plan = make_plan(config)
     return config, [plan.record(place) for place in range(n_records)]
 
@@ -56,7 +65,9 @@ def rates(works: dict[str, Work], runs: int) -> dict[str, float]:
     return {name: seconds / spent[name] for name, (_, seconds) in works.items()}
 
 
-def kernel(lanes: list[PairDynamics], oversampling: int, precision: str = "float64") -> Work:
+def kernel(
+    lanes: list[PairDynamics], oversampling: int, precision: str = "float64"
+) -> Work:
     """The product's integrator with the mean accelerations of four channels, tables already packed."""
     step = 1.0 / (SAMPLING_RATE * oversampling)
     group, n_settling = pack(lanes, step, precision), round(SETTLING / step)
@@ -83,7 +94,9 @@ def kernel(lanes: list[PairDynamics], oversampling: int, precision: str = "float
     return work, len(lanes) * n_calls * PER_CALL * step
 
 
-def scalar_run(dynamics: PairDynamics, oversampling: int, seconds: float) -> tuple[Array, Array]:
+def scalar_run(
+    dynamics: PairDynamics, oversampling: int, seconds: float
+) -> tuple[Array, Array]:
     """State (2, dof) and mean accelerations (step, channel) of the scalar code, from rest at time 0."""
     step = 1.0 / (SAMPLING_RATE * oversampling)
     state = np.array([dynamics.static_start(0.0), np.zeros(len(dynamics.dofs))])
@@ -100,12 +113,20 @@ def scalar_run(dynamics: PairDynamics, oversampling: int, seconds: float) -> tup
 def scalar(all_of: list[PairDynamics], oversampling: int) -> Work:
     """Scalar Numba, one settled record after the other, with the same four channels."""
     step = 1.0 / (SAMPLING_RATE * oversampling)
-    means, first = np.empty((round(TIMED / step), len(CHANNELS))), round(SETTLING / step)
-    settled = [(_scalar.machine(one), scalar_run(one, oversampling, SETTLING)[0]) for one in all_of]
+    means, first = (
+        np.empty((round(TIMED / step), len(CHANNELS))),
+        round(SETTLING / step),
+    )
+    settled = [
+        (_scalar.machine(one), scalar_run(one, oversampling, SETTLING)[0])
+        for one in all_of
+    ]
 
     def work() -> None:
         for machine, state in settled:
-            _scalar.integrate(machine, state.copy(), step, first, len(means), CHANNELS, means)
+            _scalar.integrate(
+                machine, state.copy(), step, first, len(means), CHANNELS, means
+            )
 
     return work, len(all_of) * len(means) * step
 
@@ -122,8 +143,12 @@ def difference(all_of: list[PairDynamics], oversampling: int) -> float:
         group, run.state.ravel(), run.lost, run.fresh, step, 0, n_steps, CHANNELS, ours.ravel(), 0,
         np.empty(0), -1, 1, np.empty(0), run.work, run.wide, run.near,
     )  # fmt: skip
-    theirs = np.stack([scalar_run(one, oversampling, n_steps * step)[1] for one in all_of], axis=-1)
-    return float(in_band_error(low_pass.apply(theirs), low_pass.apply(ours), SAMPLING_RATE).max())
+    theirs = np.stack(
+        [scalar_run(one, oversampling, n_steps * step)[1] for one in all_of], axis=-1
+    )
+    return float(
+        in_band_error(low_pass.apply(theirs), low_pass.apply(ours), SAMPLING_RATE).max()
+    )
 
 
 def check_same_law(all_of: list[PairDynamics]) -> float:
@@ -147,7 +172,9 @@ def scipy_works(dynamics: PairDynamics) -> dict[str, Work]:
         _scalar.right_hand_side(_scalar.machine(dynamics)),
         _numpy_right_hand_side(dynamics),
     )
-    if not np.allclose(compiled(SETTLING, settled), plain(SETTLING, settled), rtol=1e-6, atol=1e-6):
+    if not np.allclose(
+        compiled(SETTLING, settled), plain(SETTLING, settled), rtol=1e-6, atol=1e-6
+    ):
         raise AssertionError("the right-hand sides given to solve_ivp differ: two laws")
 
     def solve(slope: RightHandSide, method: str) -> Work:
@@ -156,9 +183,13 @@ def scipy_works(dynamics: PairDynamics) -> dict[str, Work]:
         return lambda: solve_ivp(slope, span, settled, **given), SCIPY_SECONDS
 
     found = {
-        f"solve_ivp {method}, right-hand side compiled": solve(compiled, method) for method in SCIPY
+        f"solve_ivp {method}, right-hand side compiled": solve(compiled, method)
+        for method in SCIPY
     }
-    return {**found, "solve_ivp RK45, NumPy around the compiled law": solve(plain, "RK45")}
+    return {
+        **found,
+        "solve_ivp RK45, NumPy around the compiled law": solve(plain, "RK45"),
+    }
 
 
 def _numpy_right_hand_side(dynamics: PairDynamics) -> RightHandSide:
@@ -174,10 +205,17 @@ def _numpy_right_hand_side(dynamics: PairDynamics) -> RightHandSide:
     def slope(time: float, state: Array) -> Array:
         q, v = state[:n_dof], state[n_dof:]
         roll = dynamics.start_roll + radius * (speed * time + q[2])
-        motion[:] = np.array([roll, direction @ q, direction @ v, radius * (speed + v[2])])[:, None]
+        motion[:] = np.array(
+            [roll, direction @ q, direction @ v, radius * (speed + v[2])]
+        )[:, None]
         _kernels.law_at(group, motion.ravel(), *scratch, found.ravel())
         normal, friction, moment_p, moment_w, along = found[:5, 0]
-        force = system.force - system.stiffness @ q - system.damping @ v - normal * direction
+        force = (
+            system.force
+            - system.stiffness @ q
+            - system.damping @ v
+            - normal * direction
+        )
         force[:6] += friction, 0.0, moment_p + radius * along, -friction, 0.0, moment_w
         return np.concatenate([v, force / system.mass])
 

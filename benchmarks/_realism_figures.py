@@ -21,7 +21,9 @@ LEAST = 0.05  # shown at this where a value is 0 or less: the axis is logarithmi
 
 def plot_yardstick(found: Sequence[Comparison], path: Path) -> None:
     """Every quantity on one logarithmic axis: measured ranges as bands, simulated medians with their 5 to 95 %."""
-    figure, axes = pyplot.subplots(figsize=(10, 1.2 + 0.3 * len(found)), layout="constrained")
+    figure, axes = pyplot.subplots(
+        figsize=(10, 1.2 + 0.3 * len(found)), layout="constrained"
+    )
     top = (
         max(
             [one.p95 for one in found if one.n]
@@ -31,17 +33,27 @@ def plot_yardstick(found: Sequence[Comparison], path: Path) -> None:
     )
     for place, one in enumerate(found):
         if one.low is not None or one.high is not None:
-            low, high = max(one.low or LEAST, LEAST), top if one.high is None else one.high
+            low, high = (
+                max(one.low or LEAST, LEAST),
+                top if one.high is None else one.high,
+            )
             axes.barh(place, high - low, left=low, height=0.7, color=GREY, alpha=0.35)
         if one.n:
             _interval(
-                axes, place, max(one.p5, LEAST), max(one.median, LEAST), max(one.p95, LEAST), SOUND
+                axes,
+                place,
+                max(one.p5, LEAST),
+                max(one.median, LEAST),
+                max(one.p95, LEAST),
+                SOUND,
             )
     axes.set(
         xscale="log",
         xlim=(LEAST, top),
         yticks=range(len(found)),
-        yticklabels=[f"{one.id}{f', {one.unit}' if one.unit else ''} ({one.at})" for one in found],
+        yticklabels=[
+            f"{one.id}{f', {one.unit}' if one.unit else ''} ({one.at})" for one in found
+        ],
         title="Simulated: median and 5 to 95 %, lines; measured ranges, bands",
     )
     axes.invert_yaxis()
@@ -72,18 +84,28 @@ def plot_recording(
                 markeredgewidth=1.8,
             )
         names = ["recording, channels" if recorded is not None else "", *CONTROLS]
-        axes.set(yticks=range(len(names)), yticklabels=names, ylim=(len(names) - 0.4, -0.6))
+        axes.set(
+            yticks=range(len(names)), yticklabels=names, ylim=(len(names) - 0.4, -0.6)
+        )
         axes.set_title(
-            f"{name.replace('_', ' ')}{f', {unit}' if unit else ''}", fontsize="medium", loc="left"
+            f"{name.replace('_', ' ')}{f', {unit}' if unit else ''}",
+            fontsize="medium",
+            loc="left",
         )
         axes.tick_params(axis="y", labelsize="x-small")
         axes.grid(axis="x", alpha=0.3)
-    figure.suptitle("Healthy 23/46 pair at 2000 r/min: simulated 5 to 95 % over units and sensors")
+    figure.suptitle(
+        "Healthy 23/46 pair at 2000 r/min: simulated 5 to 95 % over units and sensors"
+    )
     _save(figure, path)
 
 
-def _interval(axes: Any, place: float, low: float, median: float, high: float, colour: str) -> None:
-    axes.plot([low, high], [place, place], color=colour, linewidth=2.2, solid_capstyle="butt")
+def _interval(
+    axes: Any, place: float, low: float, median: float, high: float, colour: str
+) -> None:
+    axes.plot(
+        [low, high], [place, place], color=colour, linewidth=2.2, solid_capstyle="butt"
+    )
     axes.plot([median], [place], "o", color=colour, markersize=5)
 
 

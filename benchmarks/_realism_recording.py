@@ -26,7 +26,11 @@ from gensig.dataset.reader import Dataset
 from gensig.errors import DatasetError
 from gensig.signals.averaging import resample_to_angle, samples_per_turn_for
 from gensig.signals.indicators import crest_factor, fm4, kurtosis, rms, sideband_ratio
-from gensig.signals.rotation import find_mesh_frequency, mesh_phase_angle, resample_by_angle
+from gensig.signals.rotation import (
+    find_mesh_frequency,
+    mesh_phase_angle,
+    resample_by_angle,
+)
 from gensig.signals.synchronous import mesh_harmonics
 from gensig.validation.realism import (
     NOT_TOLD,
@@ -105,11 +109,15 @@ def indicators(
         "sideband_ratio": _decibel(sideband_ratio(average, n_teeth)),
         "harmonic_2_over_1": _decibel(harmonics[..., 1] / harmonics[..., 0]),
         "harmonic_3_over_1": _decibel(harmonics[..., 2] / harmonics[..., 0]),
-        "mesh_share": _decibel(np.sqrt(0.5 * np.sum(np.square(harmonics), axis=-1)) / whole),
+        "mesh_share": _decibel(
+            np.sqrt(0.5 * np.sum(np.square(harmonics), axis=-1)) / whole
+        ),
     }
 
 
-def _turns(x: FloatArray, sampling_rate: float, n_teeth: int, mesh_frequency: float) -> FloatArray:
+def _turns(
+    x: FloatArray, sampling_rate: float, n_teeth: int, mesh_frequency: float
+) -> FloatArray:
     """Whole turns by the angle under which the mesh stands out most: steady, or by the phase of a mesh harmonic.
 
     The phase of each harmonic is taken from the channel that holds most of it; where no line stands out it is left out.
@@ -133,7 +141,10 @@ def _mesh_power(turns: FloatArray, n_teeth: int) -> float:
     """Power of the first mesh harmonics in the average turn over that of the turns, mean over the channels."""
     harmonics = mesh_harmonics(turns.mean(axis=-2), n_teeth, 3)
     return float(
-        np.mean(np.sum(np.square(harmonics), axis=-1) / np.mean(np.square(turns), axis=(-2, -1)))
+        np.mean(
+            np.sum(np.square(harmonics), axis=-1)
+            / np.mean(np.square(turns), axis=(-2, -1))
+        )
     )
 
 
@@ -161,12 +172,16 @@ def recording_indicators(
     """(channel,) indicators of the recording, of its first part where less is simulated."""
     length = min(recording.shape[-1], round(duration * RECORDING_RATE))
     return indicators(
-        recording[:, :length], RECORDING_RATE, RECORDING_TEETH[0], RECORDING_SPEED / 60.0
+        recording[:, :length],
+        RECORDING_RATE,
+        RECORDING_TEETH[0],
+        RECORDING_SPEED / 60.0,
     )
 
 
 def recording_comparisons(
-    simulated: Mapping[str, Mapping[str, FloatArray]], recorded: Mapping[str, FloatArray] | None
+    simulated: Mapping[str, Mapping[str, FloatArray]],
+    recorded: Mapping[str, FloatArray] | None,
 ) -> list[Comparison]:
     """Rows of the second table: the right simulation beside the recording, its width, and the wrong ones beside it.
 
@@ -201,7 +216,11 @@ def recording_comparisons(
         for control in CONTROLS[1:]:
             wrong = points(simulated[control][name])
             told = TOLD if wrong[0] < right[1] or wrong[0] > right[2] else NOT_TOLD
-            found.append(_row(row, control, (right[1], right[2]), "right simulation", wrong, told))
+            found.append(
+                _row(
+                    row, control, (right[1], right[2]), "right simulation", wrong, told
+                )
+            )
     return found
 
 

@@ -23,7 +23,11 @@ from gensig.options.configuration import Configuration
 from gensig.plan.request import read_request
 from gensig.systems.registry import SIDES, read_system
 
-SPEED, TORQUE, GRADE = "operating.speed_rpm", "operating.torque_nm", "quality.iso1328_grade"
+SPEED, TORQUE, GRADE = (
+    "operating.speed_rpm",
+    "operating.torque_nm",
+    "quality.iso1328_grade",
+)
 CLASSES = ("healthy", "crack", "missing_tooth", "distributed_pitting")
 CRACK_SHARES = (0.25, 0.5)  # of the root chord, as asked
 
@@ -36,7 +40,9 @@ RECORDING_TEETH, RECORDING_SPEED, RECORDING_RATE, RECORDING_DURATION = (
 )
 WRONG_TEETH = (27, 42)  # the same sum, so the same center distance
 ERROR_FACTOR = 3.0
-GRADE_STEPS = 2.0 * math.log2(ERROR_FACTOR)  # ISO 1328-1: a grade is a factor of sqrt(2)
+GRADE_STEPS = 2.0 * math.log2(
+    ERROR_FACTOR
+)  # ISO 1328-1: a grade is a factor of sqrt(2)
 CONTROLS = ("right", "wrong teeth", "errors / 3", "errors x 3")
 
 
@@ -51,7 +57,9 @@ class Size:
     n_gearboxes: int = 8
     speeds: tuple[float, ...] = (1 / 3, 2 / 3, 1.0)
     torques: tuple[float, ...] = (0.1, 1.0)
-    n_turns: float = 10.5  # of the slowest record; ten whole ones at a speed that drifts
+    n_turns: float = (
+        10.5  # of the slowest record; ten whole ones at a speed that drifts
+    )
     recording_duration: float = RECORDING_DURATION
 
     def __post_init__(self) -> None:
@@ -109,7 +117,11 @@ def recording_words(base: Sequence[str], size: Size, control: str) -> list[str]:
         f"plan.n_gearboxes={size.n_gearboxes}",
         f"gear.pinion.n_teeth={teeth[0]}",
         f"gear.wheel.n_teeth={teeth[1]}",
-        *(f"gear.{side}.{key}=null" for side in SIDES for key in ("mass_kg", "inertia_kg_m2")),
+        *(
+            f"gear.{side}.{key}=null"
+            for side in SIDES
+            for key in ("mass_kg", "inertia_kg_m2")
+        ),
         f"{SPEED}={RECORDING_SPEED:g}",
         f"{GRADE}={middle_grade(config) + step:.4f}",
     ]
@@ -138,9 +150,13 @@ def root_chord(base: Sequence[str]) -> float:
     """Thickness of the sound tooth where the experiment's crack starts, m."""
     config = base_config(tuple(base))
     system = read_system(config)
-    (crack,) = read_faults({key: value for key, value in config["fault"].items() if key != "vary"})
+    (crack,) = read_faults(
+        {key: value for key, value in config["fault"].items() if key != "vary"}
+    )
     assert isinstance(crack, Crack)
-    return crack.root_chord(system.pair.pinion if crack.gear == "pinion" else system.pair.wheel)
+    return crack.root_chord(
+        system.pair.pinion if crack.gear == "pinion" else system.pair.wheel
+    )
 
 
 def kept(folder: Path, words: Sequence[str]) -> Dataset:
@@ -164,7 +180,9 @@ def _steady_length(config: Configuration, duration: float) -> list[str]:
     """A length in seconds, whatever the base says about turns."""
     words = [f"operating.duration_s={duration:.6g}"]
     return (
-        [*words, "operating.turns=null"] if config["operating"].get("turns") is not None else words
+        [*words, "operating.turns=null"]
+        if config["operating"].get("turns") is not None
+        else words
     )
 
 

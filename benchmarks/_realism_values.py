@@ -15,7 +15,11 @@ from gensig.signals.averaging import samples_per_turn_for
 from gensig.signals.impacts import impact_decay, impacts_per_turn, peak_over_rms
 from gensig.signals.indicators import fm4, kurtosis, rms
 from gensig.signals.rotation import resample_by_angle
-from gensig.signals.synchronous import mesh_harmonics, nonsynchronous_share, residual_turns
+from gensig.signals.synchronous import (
+    mesh_harmonics,
+    nonsynchronous_share,
+    residual_turns,
+)
 from gensig.validation.realism import Place
 
 FloatArray = NDArray[np.floating]
@@ -110,18 +114,24 @@ def read_table(data: Dataset) -> Table:
     columns = {name: np.asarray(data.column(name))[usable] for name in names}
     rows = [_values_at(data, index) for index in usable.tolist()]
     indicators = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    return Table(columns=columns, indicators=indicators, n_failed=data.n_records - usable.size)
+    return Table(
+        columns=columns, indicators=indicators, n_failed=data.n_records - usable.size
+    )
 
 
 def _values_at(data: Dataset, index: int) -> dict[str, FloatArray]:
-    teeth = {gear: int(data.attributes[f"n_teeth_{gear}"]) for gear in ("pinion", "wheel")}
+    teeth = {
+        gear: int(data.attributes[f"n_teeth_{gear}"]) for gear in ("pinion", "wheel")
+    }
     gear = str(data.column("fault_gear")[index]) or "pinion"
     slower = (
         teeth["pinion"] / teeth[gear]
     )  # turns of the faulted gear for one of the driving pinion
     angle = slower * np.asarray(data.trace(index, "shaft_angle"))
     rotation = slower * float(data.column("speed_rpm")[index]) / 60.0
-    return record_values(data.signals(index), angle, data.sampling_rate, rotation, teeth[gear])
+    return record_values(
+        data.signals(index), angle, data.sampling_rate, rotation, teeth[gear]
+    )
 
 
 def quantities(table: Table) -> dict[Place, FloatArray]:
@@ -165,7 +175,11 @@ def _quantities(table: Table) -> Iterator[tuple[str, str, FloatArray]]:
         for another, suffix in ((True, ""), (False, "_same_unit")):
             for one, other in _pairs(columns, faulty, healthy, another=another):
                 for indicator, of in RATIOS.items():
-                    yield f"{name}.{indicator}{suffix}", ALL, values[of][one] / values[of][other]
+                    yield (
+                        f"{name}.{indicator}{suffix}",
+                        ALL,
+                        values[of][one] / values[of][other],
+                    )
 
 
 RATIOS = {
@@ -206,7 +220,10 @@ def _pairs(
 ) -> Iterator[tuple[int, int]]:
     """Faulty and healthy records of one gearbox at one set-point, of another specimen or of the same."""
     groups: dict[tuple[Any, ...], list[int]] = {}
-    keys, specimen = ("gearbox_id", "speed_set_rpm", "torque_nm"), columns["specimen_id"]
+    keys, specimen = (
+        ("gearbox_id", "speed_set_rpm", "torque_nm"),
+        columns["specimen_id"],
+    )
     for other in healthy.tolist():
         groups.setdefault(tuple(columns[key][other] for key in keys), []).append(other)
     for one in faulty.tolist():

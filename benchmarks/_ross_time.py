@@ -16,7 +16,15 @@ from benchmarks._measure import machine
 
 STORED = Path(__file__).with_name("ross_time.json")
 PAIR, DURATION, RUNS = "23/84", 0.02, 3  # s
-MACHINE = ("cpu_model", "cpu_target", "load_at_start", "created", "python", "numpy", "numba")
+MACHINE = (
+    "cpu_model",
+    "cpu_target",
+    "load_at_start",
+    "created",
+    "python",
+    "numpy",
+    "numba",
+)
 OVERSAMPLING = 5  # of the scalar code; ROSS takes one step a sample
 
 
@@ -35,7 +43,10 @@ def job() -> dict[str, Any]:
     }
     values = ours.job(system)
     return {
-        **{key: values[key] for key in ("gears", "youngs_modulus", "poisson_ratio", "density")},
+        **{
+            key: values[key]
+            for key in ("gears", "youngs_modulus", "poisson_ratio", "density")
+        },
         "supports": supports,
         "torque": system.operating.torque,
         "wheel_torque": system.operating.torque * system.pair.ratio,
@@ -48,7 +59,9 @@ def job() -> dict[str, Any]:
 
 def store(told: dict[str, Any]) -> None:
     """Keep what ROSS took, with what the scalar code takes here and now."""
-    scalar = _rates.rates({"": _rates.scalar(_rates.machines(n=8), OVERSAMPLING)}, 5 * RUNS)[""]
+    scalar = _rates.rates(
+        {"": _rates.scalar(_rates.machines(n=8), OVERSAMPLING)}, 5 * RUNS
+    )[""]
     found = {
         **told,
         "ross_simulated_s_per_core_s": told["simulated_s"] / told["cpu_s"],
@@ -69,7 +82,8 @@ def stored_rate() -> float | None:
     return (
         None
         if found is None
-        else found["ross_simulated_s_per_core_s"] / found["scalar_simulated_s_per_core_s"]
+        else found["ross_simulated_s_per_core_s"]
+        / found["scalar_simulated_s_per_core_s"]
     )
 
 
@@ -78,7 +92,10 @@ def lines() -> list[str]:
     found = stored()
     if found is None:
         return ["ROSS's time response was never timed here."]
-    rate, scalar = found["ross_simulated_s_per_core_s"], found["scalar_simulated_s_per_core_s"]
+    rate, scalar = (
+        found["ross_simulated_s_per_core_s"],
+        found["scalar_simulated_s_per_core_s"],
+    )
     return [
         f"ROSS {found['ross_version']}, run_time_response with TVMS gears: {found['n_dof']} degrees of freedom, "
         f"Newmark's method, one step a sample at 51.2 kHz",

@@ -37,10 +37,14 @@ def main() -> None:
 def two_shafts(job: dict[str, Any]) -> Any:
     """Both rotors and their mesh, whose stiffness varies."""
     steel = ross.Material(
-        name="steel", rho=job["density"], E=job["youngs_modulus"], Poisson=job["poisson_ratio"]
+        name="steel",
+        rho=job["density"],
+        E=job["youngs_modulus"],
+        Poisson=job["poisson_ratio"],
     )
     driving, driven = (
-        rotor(job["gears"][name], job["supports"][name], steel) for name in ("pinion", "wheel")
+        rotor(job["gears"][name], job["supports"][name], steel)
+        for name in ("pinion", "wheel")
     )
     return ross.MultiRotor(
         driving, driven, coupled_nodes=(MIDDLE, MIDDLE), update_mesh_stiffness=True
@@ -51,12 +55,15 @@ def rotor(gear: dict[str, Any], support: dict[str, float], steel: Any) -> Any:
     """A shaft as thick as the bore, with its gear; either bearing has half of the support."""
     bore = 2.0 * gear["bore_radius"]
     shaft = [
-        ross.ShaftElement(L=gear["width"], idl=0.0, odl=bore, material=steel) for _ in range(2)
+        ross.ShaftElement(L=gear["width"], idl=0.0, odl=bore, material=steel)
+        for _ in range(2)
     ]
     values = {name: value for name, value in gear.items() if name != "bore_radius"}
     disk = ross.GearElementTVMS(n=MIDDLE, material=steel, bore_diameter=bore, **values)
     half = {name: 0.5 * value for name, value in support.items()}
-    return ross.Rotor(shaft, [disk], [ross.BearingElement(n=node, **half) for node in ENDS])
+    return ross.Rotor(
+        shaft, [disk], [ross.BearingElement(n=node, **half) for node in ENDS]
+    )
 
 
 def response(pair: Any, job: dict[str, Any], n_steps: int) -> Any:
@@ -76,7 +83,10 @@ def timed(pair: Any, job: dict[str, Any], n_steps: int) -> float:
     start = time.process_time()
     found = response(pair, job, n_steps).yout
     spent = time.process_time() - start
-    if not (np.all(np.isfinite(found)) and np.ptp(found[:, pair.number_dof * MIDDLE + 1]) > 0.0):
+    if not (
+        np.all(np.isfinite(found))
+        and np.ptp(found[:, pair.number_dof * MIDDLE + 1]) > 0.0
+    ):
         raise ArithmeticError("ROSS's response is not finite, or nothing moves")
     return spent
 

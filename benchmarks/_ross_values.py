@@ -27,7 +27,12 @@ HEADER = (
     "unit",
     "ross_version",
 )
-TERMS = {"bending": "_inv_kb", "shear": "_inv_ks", "axial": "_inv_ka", "foundation": "_inv_kf"}
+TERMS = {
+    "bending": "_inv_kb",
+    "shear": "_inv_ks",
+    "axial": "_inv_ka",
+    "foundation": "_inv_kf",
+}
 
 Row = tuple[
     str, str, float | None, float | None, float, str
@@ -46,15 +51,22 @@ def main() -> None:
                 "" if radius is None else f"{radius * 1e3:.9g}",
                 "" if share is None else f"{share:.9g}",
             ]
-            writer.writerow([name, quantity, point, *place, f"{value:.9g}", unit, ross.__version__])
+            writer.writerow(
+                [name, quantity, point, *place, f"{value:.9g}", unit, ross.__version__]
+            )
 
 
 def pair_rows(pair: dict[str, Any]) -> Iterator[Row]:
     """Every quantity that ROSS computes for one pair."""
     material = ross.Material(
-        name="steel", rho=pair["density"], E=pair["youngs_modulus"], Poisson=pair["poisson_ratio"]
+        name="steel",
+        rho=pair["density"],
+        E=pair["youngs_modulus"],
+        Poisson=pair["poisson_ratio"],
     )
-    gears = {name: read_gear(pair["gears"][name], material) for name in ("pinion", "wheel")}
+    gears = {
+        name: read_gear(pair["gears"][name], material) for name in ("pinion", "wheel")
+    }
     mesh = ross.Mesh(gears["pinion"], gears["wheel"])
     yield "contact_ratio", "", None, None, mesh.contact_ratio, "1"
     yield "contact_compliance", "", None, None, 1.0 / mesh.hertzian_stiffness, "m/N"
@@ -64,10 +76,21 @@ def pair_rows(pair: dict[str, Any]) -> Iterator[Row]:
     for contact in pair["points"]:
         yield from point_rows(contact, gears, mesh)
     for phase in pair["phases"]:
-        place = (phase["point"], phase["contacts"][0]["pinion"], phase["contacts"][0]["share"])
+        place = (
+            phase["point"],
+            phase["contacts"][0]["pinion"],
+            phase["contacts"][0]["share"],
+        )
         roll = phase["share_of_pitch"] * 2.0 * math.pi / gears["pinion"].n_teeth
-        yield "mesh_stiffness_own_path", *place, mesh.get_variable_stiffness(roll), "N/m"
-        total = sum(pair_stiffness(contact, gears, mesh) for contact in phase["contacts"])
+        yield (
+            "mesh_stiffness_own_path",
+            *place,
+            mesh.get_variable_stiffness(roll),
+            "N/m",
+        )
+        total = sum(
+            pair_stiffness(contact, gears, mesh) for contact in phase["contacts"]
+        )
         yield "mesh_stiffness", *place, total, "N/m"
 
 
@@ -81,7 +104,14 @@ def read_gear(values: dict[str, Any], material: Any) -> Any:
 def body_rows(name: str, gear: Any) -> Iterator[Row]:
     """Half angles of the root, as the body term and as the root curve have it, and L*, M*, P*, Q*."""
     y, x, _, _ = gear._compute_transition_curve(0.5 * math.pi)
-    yield f"{name}_root_half_angle", "", None, None, gear.tooth_dict["root_angle"], "rad"
+    yield (
+        f"{name}_root_half_angle",
+        "",
+        None,
+        None,
+        gear.tooth_dict["root_angle"],
+        "rad",
+    )
     yield f"{name}_root_curve_half_angle", "", None, None, math.atan2(x, y), "rad"
     for letter, value in body_coefficients(gear).items():
         yield f"{name}_coefficient_{letter}", "", None, None, value, "1"
@@ -95,24 +125,41 @@ def body_coefficients(gear: Any) -> dict[str, float]:
     def bracket(lever: float, angle: float) -> float:
         place = (root + lever * chord, 0.0, 0.0, 0.0)
         with mock.patch.object(gear, "_compute_involute_curve", return_value=place):
-            return float(gear._inv_kf(angle) * gear.material.E * gear.width / math.cos(angle) ** 2)
+            return float(
+                gear._inv_kf(angle)
+                * gear.material.E
+                * gear.width
+                / math.cos(angle) ** 2
+            )
 
     p, up, down = bracket(0.0, 0.0), bracket(1.0, 0.0), bracket(-1.0, 0.0)
     q = bracket(0.0, 0.25 * math.pi) / p - 1.0
     return {"L": 0.5 * (up + down) - p, "M": 0.5 * (up - down), "P": p, "Q": q}
 
 
-def point_rows(contact: dict[str, Any], gears: dict[str, Any], mesh: Any) -> Iterator[Row]:
+def point_rows(
+    contact: dict[str, Any], gears: dict[str, Any], mesh: Any
+) -> Iterator[Row]:
     """Terms and single-pair stiffness at one contact; the pair also where ROSS itself puts this share of the path."""
     place = (contact["point"], contact["pinion"], contact["share"])
     for name, gear in gears.items():
         beta = gear._to_tau(contact_angle(contact[name], gear))
         for term, method in TERMS.items():
-            yield f"{name}_{term}_compliance", *place, float(getattr(gear, method)(beta)), "m/N"
+            yield (
+                f"{name}_{term}_compliance",
+                *place,
+                float(getattr(gear, method)(beta)),
+                "m/N",
+            )
     yield "pair_stiffness", *place, pair_stiffness(contact, gears, mesh), "N/m"
     angles = gears["pinion"].pr_angles_dict
     advance = contact["share"] * (angles["addendum"] - angles["start_point"])
-    yield "pair_stiffness_own_path", *place, mesh._angular_equivalent_stiffness(advance), "N/m"
+    yield (
+        "pair_stiffness_own_path",
+        *place,
+        mesh._angular_equivalent_stiffness(advance),
+        "N/m",
+    )
 
 
 def contact_angle(curvature: float, gear: Any) -> float:

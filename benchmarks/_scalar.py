@@ -46,7 +46,9 @@ def machine(dynamics: PairDynamics) -> Machine:
     """The numbers of one machine of six degrees of freedom."""
     table, system = dynamics.table, dynamics.system()
     if len(system.mass) != N_DOF:
-        raise ValueError(f"{len(system.mass)} degrees of freedom; {N_DOF} are written out here")
+        raise ValueError(
+            f"{len(system.mass)} degrees of freedom; {N_DOF} are written out here"
+        )
     pinion, wheel = _columns(table.pinion), _columns(table.wheel)
     return Machine(
         mesh=mesh_numbers(dynamics),
@@ -65,7 +67,9 @@ def machine(dynamics: PairDynamics) -> Machine:
 
 
 def _columns(side: GearTable) -> Array:
-    return np.stack([side.compliance, side.compliance_slope, side.gap, side.gap_slope], axis=-1)
+    return np.stack(
+        [side.compliance, side.compliance_slope, side.gap, side.gap_slope], axis=-1
+    )
 
 
 def _kinds(side: GearTable) -> NDArray[np.int64]:
@@ -97,7 +101,10 @@ def accelerations(m, time, q, v, work, a):
         part = x - cell
         # slopes go straight between the nodes, values follow their integral
         bend = 0.5 * part * (1.0 - part) / mesh.nodes_per_meter
-        low, step = m.table[kind_p, kind_w, cell, 3], m.table[kind_p, kind_w, cell + 1, 3]
+        low, step = (
+            m.table[kind_p, kind_w, cell, 3],
+            m.table[kind_p, kind_w, cell + 1, 3],
+        )
         step -= low
         tilt = m.pinion_tilt[tooth_p] + m.wheel_tilt[tooth_w]
         gap_slope = low + part * step + tilt
@@ -110,12 +117,23 @@ def accelerations(m, time, q, v, work, a):
         bite = approach - gap - m.pinion_error[tooth_p] - m.wheel_error[tooth_w]
         if bite > 0.0:
             first, last = min(first, k), k + 1
-            low, step = m.table[kind_p, kind_w, cell, 1], m.table[kind_p, kind_w, cell + 1, 1]
+            low, step = (
+                m.table[kind_p, kind_w, cell, 1],
+                m.table[kind_p, kind_w, cell + 1, 1],
+            )
             step -= low
             work[k, OWN_SLOPE], work[k, GAP_SLOPE] = low + part * step, gap_slope
             own = m.table[kind_p, kind_w, cell, 0]
-            own += part * (m.table[kind_p, kind_w, cell + 1, 0] - own) - bend * step - mesh.shared
-            work[k, BITE], work[k, POSITION], work[k, STIFFNESS] = bite, position, 1.0 / own
+            own += (
+                part * (m.table[kind_p, kind_w, cell + 1, 0] - own)
+                - bend * step
+                - mesh.shared
+            )
+            work[k, BITE], work[k, POSITION], work[k, STIFFNESS] = (
+                bite,
+                position,
+                1.0 / own,
+            )
     total, lifted = 0.0, True
     while lifted:  # pairs that the deflection of the bodies lifts off
         stiffness, force, lifted = 0.0, 0.0, False
@@ -136,7 +154,9 @@ def accelerations(m, time, q, v, work, a):
         load = max(0.0, elastic * (1.0 + mesh.damping * (rate - slope * roll_rate)))
         normal += load
         along += load * slope + 0.5 * elastic * elastic * work[k, OWN_SLOPE]
-        side = min(max((position - mesh.pitch_point) / mesh.friction_half_width, -1.0), 1.0)
+        side = min(
+            max((position - mesh.pitch_point) / mesh.friction_half_width, -1.0), 1.0
+        )
         sliding = mesh.friction * load * side * (1.5 - 0.5 * side * side)
         arm = mesh.start_curvature + min(max(position, 0.0), mesh.path)
         friction += sliding
@@ -149,7 +169,9 @@ def accelerations(m, time, q, v, work, a):
     )
     a[3], a[4], a[5] = -friction, -normal, moment_w + mesh.wheel_radius * normal
     for i in range(N_DOF):
-        a[i] = (a[i] + m.force[i] - m.stiffness[i] * q[i] - m.damper[i] * v[i]) * m.inverse_mass[i]
+        a[i] = (
+            a[i] + m.force[i] - m.stiffness[i] * q[i] - m.damper[i] * v[i]
+        ) * m.inverse_mass[i]
     return approach
 
 
@@ -161,7 +183,12 @@ def integrate(m, state, step, first_step, n_steps, channels, means):
     """
     work, a = np.zeros((N_PAIRS, N_KEPT)), np.empty(N_DOF)
     q, v = state[0], state[1]
-    q_now, v_now, q_sum, v_sum = np.empty(N_DOF), np.empty(N_DOF), np.empty(N_DOF), np.empty(N_DOF)
+    q_now, v_now, q_sum, v_sum = (
+        np.empty(N_DOF),
+        np.empty(N_DOF),
+        np.empty(N_DOF),
+        np.empty(N_DOF),
+    )
     lowest = np.inf
     for n in range(n_steps):
         time = (first_step + n) * step
@@ -193,7 +220,12 @@ def right_hand_side(m: Machine) -> Callable[[float, Array], Array]:
         rates = np.empty(2 * N_DOF)
         rates[:N_DOF] = state[N_DOF:]
         accelerations(
-            m, time, state[:N_DOF], state[N_DOF:], np.empty((N_PAIRS, N_KEPT)), rates[N_DOF:]
+            m,
+            time,
+            state[:N_DOF],
+            state[N_DOF:],
+            np.empty((N_PAIRS, N_KEPT)),
+            rates[N_DOF:],
         )
         return rates
 

@@ -28,9 +28,16 @@ SETTLING, RECORDING, CHECKING = (
     "integration: recording",
     "integration: error check",
 )
-LOW_PASS, NOISE, WRITING, OTHER = "low-pass", "noise and labels", "HDF5 writing", "other"
+LOW_PASS, NOISE, WRITING, OTHER = (
+    "low-pass",
+    "noise and labels",
+    "HDF5 writing",
+    "other",
+)
 INTEGRATION = (SETTLING, RECORDING, CHECKING)
-CLOSING = "closing the folder"  # index, card and pictures: once a data set, whatever its size
+CLOSING = (
+    "closing the folder"  # index, card and pictures: once a data set, whatever its size
+)
 STAGES = (PLAN, TABLES, EQUATIONS, *INTEGRATION, LOW_PASS, NOISE, WRITING, OTHER)
 CLOCKED: tuple[tuple[Any, str, str], ...] = (
     (generation, "_folder_inputs", PLAN),
@@ -87,7 +94,9 @@ class Stages:
         """Clock the product's functions; recordings of fewer samples than ``n_whole`` are those of the error check."""
         counted = self._counted(pair_machine.simulate_pairs)
         with ExitStack() as patches:
-            patches.enter_context(mock.patch.object(pair_machine, "simulate_pairs", counted))
+            patches.enter_context(
+                mock.patch.object(pair_machine, "simulate_pairs", counted)
+            )
             for owner, name, stage in CLOCKED:
                 clocked = self._clocked(getattr(owner, name), stage, n_whole)
                 patches.enter_context(mock.patch.object(owner, name, clocked))
@@ -130,7 +139,9 @@ class Stages:
     def separate_low_pass(self, precision: str, n_channels: int, runs: int) -> None:
         """Move what the low-pass costs from the integration, in which it is compiled, to its own stage."""
         for (oversampling, stage), n_samples in self.n_samples.items():
-            spent = n_samples * low_pass_seconds(oversampling, precision, n_channels, runs)
+            spent = n_samples * low_pass_seconds(
+                oversampling, precision, n_channels, runs
+            )
             self.seconds[stage] -= spent
             self.seconds[LOW_PASS] += spent
 
@@ -141,12 +152,16 @@ def _low_pass_of(
     return low_pass, n_samples
 
 
-def low_pass_seconds(oversampling: int, precision: str, n_channels: int, runs: int) -> float:
+def low_pass_seconds(
+    oversampling: int, precision: str, n_channels: int, runs: int
+) -> float:
     """CPU seconds of the low-pass for one output sample of a whole group, block by block as in the product."""
     low_pass, block = decimator(oversampling), _kernels.BLOCK
     width = n_channels * _kernels.n_lanes(precision)
     taps = low_pass.padded(precision)
-    means = np.zeros(_kernels.mean_rows(len(taps), oversampling) * width, dtype=precision)
+    means = np.zeros(
+        _kernels.mean_rows(len(taps), oversampling) * width, dtype=precision
+    )
     out, again = np.empty(block * width, dtype=precision), 50
 
     def work() -> None:

@@ -27,7 +27,14 @@ from gensig.systems.registry import read_system
 from gensig.systems.run import CleanRecord, Run
 
 FAULTS = ("healthy", "crack", "pitting", "chipped", "missing_tooth", "broken", "wear")
-CONDITIONS = ((600, 20), (1800, 20), (1800, 2), (3000, 20), (6000, 20), (6000, 60))  # r/min, N m
+CONDITIONS = (
+    (600, 20),
+    (1800, 20),
+    (1800, 2),
+    (3000, 20),
+    (6000, 20),
+    (6000, 60),
+)  # r/min, N m
 REFERENCE = 128
 
 
@@ -42,7 +49,12 @@ def runs(overrides: Sequence[str], duration: float) -> list[tuple[str, Run]]:
                 f"operating.torque_nm={torque}",
             ]
             config = read_request(
-                [*words, f"operating.duration_s={duration}", "solver.max_error=null", *overrides]
+                [
+                    *words,
+                    f"operating.duration_s={duration}",
+                    "solver.max_error=null",
+                    *overrides,
+                ]
             ).config
             system, rng = read_system(config), np.random.default_rng(1)
             n_channels = len(system.sensing.channels)
@@ -53,8 +65,12 @@ def runs(overrides: Sequence[str], duration: float) -> list[tuple[str, Run]]:
                     for part in fault_parts(config["fault"])
                     for one in read_faults(part, "fault")
                 ),
-                specimen=draw_specimen(rng, system.pair.pinion, system.pair.wheel, system.quality),
-                gearbox=draw_gearbox(rng, n_channels, system.quality, system.sensing.gain_scatter),
+                specimen=draw_specimen(
+                    rng, system.pair.pinion, system.pair.wheel, system.quality
+                ),
+                gearbox=draw_gearbox(
+                    rng, n_channels, system.quality, system.sensing.gain_scatter
+                ),
             )
             found.append((f"{fault}, {speed} r/min, {torque} N m", run))
     return found
@@ -66,10 +82,14 @@ def finely(run: Run, oversampling: int, precision: str) -> Run:
     return replace(run, system=replace(run.system, solver=solver))
 
 
-def records(all_runs: Sequence[Run], oversampling: int, precision: str) -> list[CleanRecord]:
+def records(
+    all_runs: Sequence[Run], oversampling: int, precision: str
+) -> list[CleanRecord]:
     """One record a run; the first that fails raises."""
     found = []
-    for record in simulate_together([finely(run, oversampling, precision) for run in all_runs]):
+    for record in simulate_together(
+        [finely(run, oversampling, precision) for run in all_runs]
+    ):
         if not isinstance(record, CleanRecord):
             raise record
         found.append(record)
@@ -80,13 +100,19 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
-        "overrides", nargs="*", help="configuration overrides, such as quality.iso1328_grade=null"
+        "overrides",
+        nargs="*",
+        help="configuration overrides, such as quality.iso1328_grade=null",
     )
     parser.add_argument(
         "--duration", type=float, default=0.2, help="s of each record (default 0.2)"
     )
     parser.add_argument(
-        "--steps", type=int, nargs="+", default=[4, 5, 8], help="steps a sample (default 4 5 8)"
+        "--steps",
+        type=int,
+        nargs="+",
+        default=[4, 5, 8],
+        help="steps a sample (default 4 5 8)",
     )
     parser.add_argument("--json", help="also write the figures to this file")
     arguments = parser.parse_args()
@@ -116,7 +142,9 @@ def main() -> None:
     )
     for name, row in table.items():
         levels = "   " + " ".join(
-            f"{row[f'{c} dB']:.3f},{row[f'{c} %']:.2f}" for c in columns if f"{c} dB" in row
+            f"{row[f'{c} dB']:.3f},{row[f'{c} %']:.2f}"
+            for c in columns
+            if f"{c} dB" in row
         )
         print(
             f"{name:<38}{100.0 * row['contact_loss']:>8.2f}"
@@ -124,12 +152,16 @@ def main() -> None:
             + levels
         )
     for column in columns:
-        steady = [row[column] for row in table.values() if row["contact_loss"] <= BOUNCING]
+        steady = [
+            row[column] for row in table.values() if row["contact_loss"] <= BOUNCING
+        ]
         print(
             f"{column}: largest error with contact lost for at most 1 % of the time {max(steady):.1e}"
         )
     if arguments.json:
-        Path(arguments.json).write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
+        Path(arguments.json).write_text(
+            json.dumps(table, indent=1) + "\n", encoding="utf-8"
+        )
 
 
 if __name__ == "__main__":

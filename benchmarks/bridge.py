@@ -29,7 +29,13 @@ from gensig.errors import ConfigError, GensigError
 
 TRAINING = ("protocols=[by_unit]", "baselines=false", "shuffle_control=false")
 SEEDS = (0, 1, 2)
-TOLD = ("cpu_model", "python", "numpy", "gensig", "created")  # of the machine, in the file
+TOLD = (
+    "cpu_model",
+    "python",
+    "numpy",
+    "gensig",
+    "created",
+)  # of the machine, in the file
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -40,7 +46,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     place = nullcontext(options.data) if options.data else tempfile.TemporaryDirectory()
     try:
         with place as folder, _one_thread():
-            found = {"worlds": judge_worlds(Path(folder)), "control": judge_control(Path(folder))}
+            found = {
+                "worlds": judge_worlds(Path(folder)),
+                "control": judge_control(Path(folder)),
+            }
     except (GensigError, OSError) as error:
         print(f"benchmarks.bridge: {error}", file=sys.stderr)
         return 1
@@ -74,7 +83,9 @@ def judge_worlds(folder: Path) -> dict[str, Any]:
                 f"  {variant:<24}{_said(row)}  gain {gain}  auroc {row['auroc']:.3f}  "
                 f"healthy found {row['recall'][worlds.HEALTHY]:.2f}"
             )
-        print(f"  {'trained there':<24}{_said(there)} on its own test units", flush=True)
+        print(
+            f"  {'trained there':<24}{_said(there)} on its own test units", flush=True
+        )
         found[name] = {
             "n_records": judged.label.size,
             "n_units": n_units,
@@ -88,7 +99,9 @@ def judge_control(folder: Path) -> dict[str, Any]:
     """Rows of the negative control for each set trained on; none where the recordings are not there."""
     file = control.find_control()
     if file is None:
-        print(f"\nThe negative control is left out: ${VARIABLE} names no folder that holds it.")
+        print(
+            f"\nThe negative control is left out: ${VARIABLE} names no folder that holds it."
+        )
         return {}
     found = {}
     for name, (words, options) in control.training_sets(file, folder / "twin").items():
@@ -99,7 +112,9 @@ def judge_control(folder: Path) -> dict[str, Any]:
         own = _own_score(folder / f"model_{data.name}")
         rows = control.judge_control(file, models)
         found[name] = {"own": own, "rows": rows}
-        print(f"\nnegative control, trained on {name}; on its own unseen units {_said(own)}")
+        print(
+            f"\nnegative control, trained on {name}; on its own unseen units {_said(own)}"
+        )
         print(
             "P(fault): channel, load %, variant: healthy, broken, difference; windows unlike the training"
         )
@@ -130,7 +145,9 @@ def trained(folder: Path, data: Path, *words: str) -> list[Path]:
     """Folders of the networks, one a seed, trained on a data set where they are not there yet."""
     if not (folder / "metrics.json").is_file():
         seeds = f"seeds=[{','.join(map(str, SEEDS))}]"
-        status = diagnose_main(["train", f"data={data}", f"out={folder}", *TRAINING, seeds, *words])
+        status = diagnose_main(
+            ["train", f"data={data}", f"out={folder}", *TRAINING, seeds, *words]
+        )
         if status != 0:
             raise ConfigError(f"diagnose train ended with status {status}")
     return [folder / "models" / f"{worlds.PROTOCOL}-seed{seed}" for seed in SEEDS]
@@ -171,7 +188,9 @@ def _parser() -> argparse.ArgumentParser:
         help="folder of data sets and models: read where they are there, else made",
     )
     parser.add_argument(
-        "--json", type=Path, help="also write all figures, with the machine, to this file"
+        "--json",
+        type=Path,
+        help="also write all figures, with the machine, to this file",
     )
     return parser
 

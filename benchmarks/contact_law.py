@@ -41,13 +41,14 @@ TORQUES = (5, 20, 50, 100)  # N m on the pinion
 FAULTS = ("healthy", "missing_tooth", "pitting")
 CHANNEL = "pinion_y"
 DURATION = 0.2  # s; six turns of the pinion
-N_TURNS = (
-    3  # of which are compared, the last ones; whole turns: every mesh harmonic has its own line
-)
+N_TURNS = 3  # of which are compared, the last ones; whole turns: every mesh harmonic has its own line
 N_HARMONICS = 6
 MOST_SHIFT = 5.0  # samples
 N_LOADS, MORE_LOADS = 41, 81
-LEAST_LOAD, MOST_LOAD = 1e-3, 10.0  # shares of the mesh force between which faces are shared anew
+LEAST_LOAD, MOST_LOAD = (
+    1e-3,
+    10.0,
+)  # shares of the mesh force between which faces are shared anew
 POINTS_PER_PITCH = 64
 
 
@@ -121,15 +122,17 @@ def mesh_of(this: Case, law: str, n_loads: int = N_LOADS) -> Mesh:
     )
 
 
-def change_with_load(this: Case, table: PairTable, loads: Array, *, resharing: bool) -> Array:
+def change_with_load(
+    this: Case, table: PairTable, loads: Array, *, resharing: bool
+) -> Array:
     """Contact compliance at loads, (load, 1) N, less that at the table's, (kind, load, node) m/N, by pinion tooth."""
     system = this.system
     arguments = system.pair, table.position, system.material, system.mesh
     width, force = system.pair.pinion.face_width, system.mesh_force
     law = flank_sides(*arguments, force)["pinion"].law
-    at_force = pair_table(system.pair, system.material, system.mesh, load=force).pinion.compliance[
-        0
-    ]
+    at_force = pair_table(
+        system.pair, system.material, system.mesh, load=force
+    ).pinion.compliance[0]
     # the load at which the secant was taken, from what it costs
     own = force * np.exp(
         (at_force - table.pinion.compliance[0]) * width / law.factor * law.log_weight
@@ -147,28 +150,40 @@ def change_with_load(this: Case, table: PairTable, loads: Array, *, resharing: b
         if resharing:
             order = np.argsort(gaps, axis=0, kind="stable")
             widths = tooth.slice_width[order]
-            moments = np.cumsum(widths * np.take_along_axis(gaps, order, axis=0), axis=0)
-            carried = loads * law.compliance(bearing, loads) * bearing  # load x unit compliance
+            moments = np.cumsum(
+                widths * np.take_along_axis(gaps, order, axis=0), axis=0
+            )
+            carried = (
+                loads * law.compliance(bearing, loads) * bearing
+            )  # load x unit compliance
             # the approach at which the first n slices would carry the load; the least of them is the true one
             pressed = np.min(
-                [(carried + m) / w for m, w in zip(moments, widths.cumsum(axis=0), strict=True)],
+                [
+                    (carried + m) / w
+                    for m, w in zip(moments, widths.cumsum(axis=0), strict=True)
+                ],
                 axis=0,
             )
             change[table.pinion.kind[number]] = pressed / loads - secant
         else:
-            change[table.pinion.kind[number]] = law.compliance(bearing, loads) - law.compliance(
-                bearing, own
-            )
+            change[table.pinion.kind[number]] = law.compliance(
+                bearing, loads
+            ) - law.compliance(bearing, own)
     return change
 
 
 @lru_cache(maxsize=128)
-def record(this: Case, law: str, *, oversampling: int = 8, n_loads: int = N_LOADS) -> Array:
+def record(
+    this: Case, law: str, *, oversampling: int = 8, n_loads: int = N_LOADS
+) -> Array:
     """Acceleration along the line of action over the last turns of the pinion, decimated, (sample,) m/s2."""
     dynamics, low_pass = this.dynamics, decimator(oversampling)
     rate = this.system.sensing.sampling_rate
     step = 1.0 / (rate * oversampling)
-    n_samples, n_settle = round(DURATION * rate), math.ceil(settling_time(dynamics) * rate)
+    n_samples, n_settle = (
+        round(DURATION * rate),
+        math.ceil(settling_time(dynamics) * rate),
+    )
     first = -(low_pass.margin + n_settle)
     velocity = motion(
         mesh_of(this, law, n_loads),
@@ -210,14 +225,22 @@ def static(this: Case, law: str) -> tuple[Array, Array]:
     )
     numbers = mesh_numbers(dynamics)
     static_approach(
-        mesh_of(this, law), numbers, roll, dynamics.mesh_force, highest, approach, stiffness
+        mesh_of(this, law),
+        numbers,
+        roll,
+        dynamics.mesh_force,
+        highest,
+        approach,
+        stiffness,
     )
     return approach, stiffness
 
 
 def resonance(this: Case, stiffness: float) -> float:
     """Natural frequency of the mesh mode, Hz."""
-    values = eigenvalues(this.dynamics.system(), this.dynamics.approach_direction(), stiffness)
+    values = eigenvalues(
+        this.dynamics.system(), this.dynamics.approach_direction(), stiffness
+    )
     return float(np.abs(values.imag).max() / (2.0 * math.pi))
 
 
@@ -253,7 +276,11 @@ def delayed(signal: Array, reference: Array) -> tuple[float, float]:
 def harmonics(signal: Array) -> Array:
     """Amplitudes of the first mesh harmonics of whole turns of the 23-tooth pinion, (harmonic,) m/s2."""
     n_meshes = N_TURNS * case(TORQUES[0], FAULTS[0]).system.pair.pinion.n_teeth
-    return np.abs(np.fft.rfft(signal))[n_meshes * np.arange(1, N_HARMONICS + 1)] * 2.0 / len(signal)
+    return (
+        np.abs(np.fft.rfft(signal))[n_meshes * np.arange(1, N_HARMONICS + 1)]
+        * 2.0
+        / len(signal)
+    )
 
 
 def static_rows() -> Iterator[Sequence[str]]:
@@ -280,7 +307,9 @@ def static_rows() -> Iterator[Sequence[str]]:
 def dynamic_rows() -> Iterator[Sequence[str]]:
     """Records of the secant and the full law; for a pit also with its face shared anew."""
     for torque in TORQUES:
-        for fault, law in [(fault, "full") for fault in FAULTS] + [("pitting", "reshared")]:
+        for fault, law in [(fault, "full") for fault in FAULTS] + [
+            ("pitting", "reshared")
+        ]:
             this = case(torque, fault)
             secant, full = record(this, "secant"), record(this, law)
             left, shift = delayed(secant, full)
@@ -289,7 +318,10 @@ def dynamic_rows() -> Iterator[Sequence[str]]:
                 fault + (", face shared anew" if law == "reshared" else ""),
                 f"{rms(secant):.2f} {rms(full):.2f}",
                 percent(rms(full) / rms(secant) - 1.0),
-                " ".join(percent(value) for value in harmonics(full) / harmonics(secant) - 1.0),
+                " ".join(
+                    percent(value)
+                    for value in harmonics(full) / harmonics(secant) - 1.0
+                ),
                 f"{100 * away(secant, full):.2f} {100 * left:.2f}",
                 f"{shift / this.system.sensing.sampling_rate * 1e6:+.2f}",
             )
@@ -299,9 +331,12 @@ def check_rows() -> Iterator[Sequence[str]]:
     """How far the reference itself can be trusted: relative differences that should be none."""
     for fault in FAULTS:
         own = [case(torque, fault) for torque in TORQUES]
-        gensigs = [last_turns(c, c.system.simulate(c.faults).acceleration[0]) for c in own]
+        gensigs = [
+            last_turns(c, c.system.simulate(c.faults).acceleration[0]) for c in own
+        ]
         simulated = [
-            away(record(c, "secant"), theirs) for c, theirs in zip(own, gensigs, strict=True)
+            away(record(c, "secant"), theirs)
+            for c, theirs in zip(own, gensigs, strict=True)
         ]
         this, linear = own[1], case(20, fault, "mesh.contact=linear")
         theirs = static_mesh(
@@ -310,10 +345,14 @@ def check_rows() -> Iterator[Sequence[str]]:
             this.dynamics.mesh_force,
         )
         approach, stiffness = static(this, "secant")
-        finer = [away(*(record(c, "full", oversampling=n) for n in (8, 16))) for c in own[1::2]]
+        finer = [
+            away(*(record(c, "full", oversampling=n) for n in (8, 16)))
+            for c in own[1::2]
+        ]
         pitted = own[1::2] if fault == "pitting" else []
         loads = [
-            away(*(record(c, "reshared", n_loads=n) for n in (N_LOADS, MORE_LOADS))) for c in pitted
+            away(*(record(c, "reshared", n_loads=n) for n in (N_LOADS, MORE_LOADS)))
+            for c in pitted
         ]
         yield (
             fault,
@@ -346,7 +385,8 @@ def main() -> None:
         "Static, secant and full law: approach in um, tangent stiffness in 1e8 N/m, mesh resonance in Hz\n"
     )
     table(
-        "| N m | fault | mean | peak to peak | mean stiffness | % | resonance | % |", static_rows()
+        "| N m | fault | mean | peak to peak | mean stiffness | % | resonance | % |",
+        static_rows(),
     )
     print(
         f"{CHANNEL} in m/s2, secant and full law; changes from the secant; difference over the full law's RMS\n"

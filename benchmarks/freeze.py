@@ -45,7 +45,8 @@ def freeze(name: str, data: Path, reports: Sequence[Path]) -> Benchmark:
         generator_version=str(dataset.manifest.generator_version),
         plan_sha256=sha256(data / "plan.csv"),
         split_sha256={
-            protocol: sha256(data / "splits" / f"{protocol}.csv") for protocol in results
+            protocol: sha256(data / "splits" / f"{protocol}.csv")
+            for protocol in results
         },
         signal_rms={
             str(dataset.column("record_id")[record]): [
@@ -63,7 +64,8 @@ def _results(report: Path) -> dict[str, dict[str, dict[str, float]]]:
     return {
         protocol: {
             method: {
-                key: round(values["balanced_accuracy"][key], 4) for key in ("mean", "low", "high")
+                key: round(values["balanced_accuracy"][key], 4)
+                for key in ("mean", "low", "high")
             }
             for method, values in result["methods"].items()
             if isinstance(values["balanced_accuracy"], dict) and method not in CONTROLS

@@ -52,7 +52,10 @@ def main() -> int:
             noticed[verdict.noticed] += 1
             if verdict.fault:
                 harmful.append(verdict)
-                print(f"mutant {verdict.seed} ({verdict.kind}): {verdict.fault}", flush=True)
+                print(
+                    f"mutant {verdict.seed} ({verdict.kind}): {verdict.fault}",
+                    flush=True,
+                )
             if sum(noticed.values()) % 500 == 0:
                 print(
                     f"{sum(noticed.values())} of {len(seeds)}, {time.monotonic() - begin:.0f} s",
@@ -72,7 +75,9 @@ def main() -> int:
     }
     print(json.dumps(figures, indent=1))
     if arguments.json:
-        arguments.json.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+        arguments.json.write_text(
+            json.dumps(figures, indent=1) + "\n", encoding="utf-8"
+        )
     return 1 if harmful else 0
 
 

@@ -87,7 +87,9 @@ class Fork(Run):
     """The same in a copy of this process, which has imported everything."""
 
     def __init__(self, *words: str) -> None:
-        self._process = multiprocessing.get_context("fork").Process(target=_quiet, args=(words,))
+        self._process = multiprocessing.get_context("fork").Process(
+            target=_quiet, args=(words,)
+        )
         self._process.start()
 
     @property
@@ -142,7 +144,11 @@ def kill_once(run: Run, out: Path, seconds: float, rng: random.Random) -> str:
     before, limit = signature(out), time.monotonic() + LONGEST
     # Half the kills come after the next shard, in the thick of writing; the others at any moment, imports included.
     if rng.random() < 0.5:
-        while signature(out) == before and run.wait(0.002) is None and time.monotonic() < limit:
+        while (
+            signature(out) == before
+            and run.wait(0.002) is None
+            and time.monotonic() < limit
+        ):
             pass
         wait = rng.uniform(0.0, 0.2 * seconds)
     else:
@@ -158,7 +164,9 @@ def kill_once(run: Run, out: Path, seconds: float, rng: random.Random) -> str:
         return "parent"
     with suppress(ProcessLookupError):
         os.kill(rng.choice(workers), signal.SIGKILL)
-    if rng.random() < 0.5 or run.wait(LONGEST) is None:  # else the run goes on with another worker
+    if (
+        rng.random() < 0.5 or run.wait(LONGEST) is None
+    ):  # else the run goes on with another worker
         run.kill()
     return "worker"
 
@@ -177,7 +185,15 @@ def is_whole(out: Path) -> bool:
 def durations(folder: Path) -> dict[bool, float]:
     """Time of an undisturbed run: of the command (True) and of a fork (False), everything being compiled."""
     (folder / "reference").parent.mkdir(exist_ok=True)
-    if gensig(["generate", "--quiet", *SET, "executor.n_workers=1", f"out={folder / 'reference'}"]):
+    if gensig(
+        [
+            "generate",
+            "--quiet",
+            *SET,
+            "executor.n_workers=1",
+            f"out={folder / 'reference'}",
+        ]
+    ):
         raise SystemExit("an undisturbed run failed")
     found = {}
     for command in (True, False):
@@ -206,16 +222,27 @@ def campaign(n_kills: int, seed: int, folder: Path) -> tuple[Counter[str], list[
         for _ in range(KILLS_PER_SET):
             if is_whole(out) or n_kills_of(outcome) >= n_kills:
                 break
-            command = (n_kills_of(outcome) + outcome["ended first"]) % COMMAND_EVERY == 0
-            outcome[kill_once(start(out, command=command), out, seconds[command], rng)] += 1
+            command = (
+                n_kills_of(outcome) + outcome["ended first"]
+            ) % COMMAND_EVERY == 0
+            outcome[
+                kill_once(start(out, command=command), out, seconds[command], rng)
+            ] += 1
             if (out / "manifest.json").is_file():
                 found = verify(out)
                 if found.complete != is_whole(out):
-                    problems.append(f"set {number}: looks whole and is not: {found.problems[0]}")
+                    problems.append(
+                        f"set {number}: looks whole and is not: {found.problems[0]}"
+                    )
             elif out.exists():
                 outcome["of these before the manifest"] += 1
-        for attempt in ("first", "second"):  # a folder without a manifest is begun first
-            if not is_whole(out) and (status := start(out, command=False).wait(LONGEST)):
+        for attempt in (
+            "first",
+            "second",
+        ):  # a folder without a manifest is begun first
+            if not is_whole(out) and (
+                status := start(out, command=False).wait(LONGEST)
+            ):
                 problems.append(
                     f"set {number}: the {attempt} run after the kills ended with {status}"
                 )
@@ -230,7 +257,9 @@ def campaign(n_kills: int, seed: int, folder: Path) -> tuple[Counter[str], list[
             problems += [f"set {number}: {line}" for line in verify(out).problems[:3]]
             continue
         made = contents(out)
-        different = sorted(name for name in {*wanted, *made} if wanted.get(name) != made.get(name))
+        different = sorted(
+            name for name in {*wanted, *made} if wanted.get(name) != made.get(name)
+        )
         problems += [f"set {number}: {name} differs" for name in different]
     return outcome, problems
 

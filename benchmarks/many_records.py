@@ -28,7 +28,9 @@ def family(process: int) -> list[int]:
     found = [process]
     for task in Path(f"/proc/{process}/task").glob("*/children"):
         try:
-            found += [one for child in task.read_text().split() for one in family(int(child))]
+            found += [
+                one for child in task.read_text().split() for one in family(int(child))
+            ]
         except OSError:
             continue
     return found
@@ -48,7 +50,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.many_records", description=__doc__.split("\n")[0]
     )
-    parser.add_argument("--records", type=int, default=100_000, help="(default 100,000)")
+    parser.add_argument(
+        "--records", type=int, default=100_000, help="(default 100,000)"
+    )
     parser.add_argument(
         "--minutes", type=float, default=240.0, help="stop after so many (default 240)"
     )
@@ -67,7 +71,10 @@ def main() -> int:
             f"plan.n_records={arguments.records}",
         ]
         with subprocess.Popen([*command, f"out={out}"]) as run:
-            while run.poll() is None and time.monotonic() - begun < 60.0 * arguments.minutes:
+            while (
+                run.poll() is None
+                and time.monotonic() - begun < 60.0 * arguments.minutes
+            ):
                 peak = max(peak, sum(memory(one) for one in family(run.pid)))
                 time.sleep(EVERY_S)
             if run.poll() is None:

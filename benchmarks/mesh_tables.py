@@ -39,7 +39,9 @@ def least_seconds(words: list[str], runs: int, *, cold: bool) -> float:
                 kept.cache_clear()
         start = time.process_time()
         teeth = faulty_teeth(system.pair, faults)
-        loaded_pair_table(system.pair, system.material, system.mesh, teeth, force=system.mesh_force)
+        loaded_pair_table(
+            system.pair, system.material, system.mesh, teeth, force=system.mesh_force
+        )
         least = min(least, time.process_time() - start)
     return least
 
@@ -47,13 +49,17 @@ def least_seconds(words: list[str], runs: int, *, cold: bool) -> float:
 def main() -> None:
     """One line a fault option."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=10, help="the least of so many (default 10)")
+    parser.add_argument(
+        "--runs", type=int, default=10, help="the least of so many (default 10)"
+    )
     runs = parser.parse_args().runs
     print(f"{'fault':<40}{'cold ms':>10}{'warm ms':>10}")
     for name in (*options("fault"), "distributed_pitting fault.tooth=0"):
         words = f"fault={name}".split()
         least_seconds(words, 1, cold=False)
-        cold, warm = (1e3 * least_seconds(words, runs, cold=state) for state in (True, False))
+        cold, warm = (
+            1e3 * least_seconds(words, runs, cold=state) for state in (True, False)
+        )
         print(f"{name:<40}{cold:>10.1f}{warm:>10.1f}")
 
 

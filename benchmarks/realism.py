@@ -31,7 +31,14 @@ from benchmarks._realism_recording import (
     recording_indicators,
     simulated_indicators,
 )
-from benchmarks._realism_sets import CONTROLS, QUICK, Size, kept, recording_words, yardstick_words
+from benchmarks._realism_sets import (
+    CONTROLS,
+    QUICK,
+    Size,
+    kept,
+    recording_words,
+    yardstick_words,
+)
 from benchmarks._realism_values import quantities, read_table
 from gensig.errors import GensigError
 from gensig.validation.realism import (
@@ -84,10 +91,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         f"{' '.join(base)}, gensig {__version__}, {size.n_units} units in {size.n_gearboxes} gearboxes; "
         f"ranges frozen in commit {options.frozen or '(none named)'}"
     )
-    print("\n".join(["", heading, "", *table(found), "", f"{time.perf_counter() - begun:.0f} s"]))
+    print(
+        "\n".join(
+            ["", heading, "", *table(found), "", f"{time.perf_counter() - begun:.0f} s"]
+        )
+    )
     if options.json:
-        rows = [{key: _plain(value) for key, value in asdict(one).items()} for one in found]
-        text = json.dumps({"machine": named, "compared": heading, "rows": rows}, indent=1)
+        rows = [
+            {key: _plain(value) for key, value in asdict(one).items()} for one in found
+        ]
+        text = json.dumps(
+            {"machine": named, "compared": heading, "rows": rows}, indent=1
+        )
         options.json.write_text(text + "\n", encoding="utf-8")
     if options.stored:
         write_results(RESULTS, heading, found)
@@ -111,9 +126,13 @@ def compare_all(
     yardstick = yardstick_comparisons(base, size, folder)
     recording = find_recording()
     if recording is None:
-        print(f"The real recording is left out: ${VARIABLE} names no folder that holds it.")
+        print(
+            f"The real recording is left out: ${VARIABLE} names no folder that holds it."
+        )
     recorded = (
-        None if recording is None else recording_indicators(recording, size.recording_duration)
+        None
+        if recording is None
+        else recording_indicators(recording, size.recording_duration)
     )
     simulated = {}
     for control in CONTROLS:
@@ -127,7 +146,9 @@ def compare_all(
     return yardstick + recording_comparisons(simulated, recorded)
 
 
-def yardstick_comparisons(base: Sequence[str], size: Size, folder: Path) -> list[Comparison]:
+def yardstick_comparisons(
+    base: Sequence[str], size: Size, folder: Path
+) -> list[Comparison]:
     """Rows of the first table."""
     with kept(folder / "yardstick", yardstick_words(base, size)) as data:
         found = read_table(data)
@@ -136,7 +157,8 @@ def yardstick_comparisons(base: Sequence[str], size: Size, folder: Path) -> list
     print(f"yardstick: {told}", flush=True)
     values = quantities(found)
     return [
-        compare(measured, values.get(place, math.nan)) for place, measured in read_ranges().items()
+        compare(measured, values.get(place, math.nan))
+        for place, measured in read_ranges().items()
     ]
 
 
@@ -149,7 +171,9 @@ def _parser() -> argparse.ArgumentParser:
         prog="python -m benchmarks.realism", description=(__doc__ or "").split("\n")[0]
     )
     parser.add_argument(
-        "--base", default=BASE, help="overrides to start from, quoted (default: %(default)s)"
+        "--base",
+        default=BASE,
+        help="overrides to start from, quoted (default: %(default)s)",
     )
     parser.add_argument("--quick", action="store_true", help="8 units instead of 40")
     parser.add_argument(
@@ -162,10 +186,13 @@ def _parser() -> argparse.ArgumentParser:
         "--json", type=Path, help="also write the table, with the machine, to this file"
     )
     parser.add_argument(
-        "--stored", action="store_true", help="store the results and figures for docs/validation.md"
+        "--stored",
+        action="store_true",
+        help="store the results and figures for docs/validation.md",
     )
     parser.add_argument(
-        "--frozen", help="commit that froze all ranges of the simulation; --stored needs it"
+        "--frozen",
+        help="commit that froze all ranges of the simulation; --stored needs it",
     )
     return parser
 

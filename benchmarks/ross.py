@@ -38,7 +38,12 @@ STEPS = (
     "mesh.pair_coupling=coupled",
     "mesh.law=one_sided",
 )
-SCALES = {"m/N": (1e12, "1e-12 m/N"), "N/m": (1e-8, "1e8 N/m"), "rad": (1.0, "rad"), "1": (1.0, "")}
+SCALES = {
+    "m/N": (1e12, "1e-12 m/N"),
+    "N/m": (1e-8, "1e8 N/m"),
+    "rad": (1.0, "rad"),
+    "1": (1.0, ""),
+}
 
 StoredValues = dict[
     str, dict[tuple[str, str], tuple[float, str]]
@@ -69,7 +74,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     print(f"\nROSS {version}; ratios are gensig over ROSS\n")
     for pair, values in stored.items():
-        print("\n".join([f"### {pair}", "", *comparison(pair, values, every=options.all), ""]))
+        print(
+            "\n".join(
+                [f"### {pair}", "", *comparison(pair, values, every=options.all), ""]
+            )
+        )
         print(
             "\n".join(
                 [
@@ -105,8 +114,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def make_environment(folder: Path, version: str, pip_args: Sequence[str]) -> Path:
     """Interpreter of an environment that holds ROSS, made or completed where needed."""
-    python = folder / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
-    if folder.exists() and any(folder.iterdir()) and not (folder / "pyvenv.cfg").exists():
+    python = folder / (
+        "Scripts/python.exe" if sys.platform == "win32" else "bin/python"
+    )
+    if (
+        folder.exists()
+        and any(folder.iterdir())
+        and not (folder / "pyvenv.cfg").exists()
+    ):
         raise PeerError(
             f"{folder} is not empty and no virtual environment; choose another folder with --env"
         )
@@ -118,10 +133,19 @@ def make_environment(folder: Path, version: str, pip_args: Sequence[str]) -> Pat
     asked = f"{DISTRIBUTION}=={version}"
     check = f"import importlib.metadata as m; assert m.version('{DISTRIBUTION}') == '{version}'"
     if (
-        subprocess.run([python, "-I", "-c", check], capture_output=True, check=False).returncode
+        subprocess.run(
+            [python, "-I", "-c", check], capture_output=True, check=False
+        ).returncode
         != 0
     ):
-        pip = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+        pip = [
+            str(python),
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "--disable-pip-version-check",
+        ]
         _run(
             [*pip, *pip_args, asked, BESIDE],
             f"pip could not install {asked}; see --pip-args, --ross-version",
@@ -136,7 +160,10 @@ def run_ross(python: Path, output: Path) -> None:
         asked, answered = Path(folder) / "job.json", Path(folder) / "values.csv"
         asked.write_text(json.dumps(job))
         script = Path(__file__).with_name("_ross_values.py")
-        _run([str(python), "-I", str(script), str(asked), str(answered)], "ROSS gave no values")
+        _run(
+            [str(python), "-I", str(script), str(asked), str(answered)],
+            "ROSS gave no values",
+        )
         output.parent.mkdir(parents=True, exist_ok=True)
         output.write_bytes(answered.read_bytes())
 
@@ -177,7 +204,14 @@ def comparison(
         ours.ross_choices(paper),
         ours.gensig_values(ours.machine(pair)),
     )
-    names = ("paper's terms", "ratio", "with ROSS's choices", "ratio", "default", "ratio")
+    names = (
+        "paper's terms",
+        "ratio",
+        "with ROSS's choices",
+        "ratio",
+        "default",
+        "ratio",
+    )
     yield from _head("quantity", "at", "unit", "ROSS", *names)
     for (quantity, point), (value, unit) in ross.items():
         if not every and point not in SHOWN:
@@ -186,7 +220,11 @@ def comparison(
         cells = [quantity, point, unit_name, f"{value * scale:.5g}"]
         for column in columns:
             found = column.get((quantity, point))
-            cells += ["", ""] if found is None else [f"{found * scale:.5g}", f"{found / value:.4f}"]
+            cells += (
+                ["", ""]
+                if found is None
+                else [f"{found * scale:.5g}", f"{found / value:.4f}"]
+            )
         yield _line(cells)
     for quantity in ("mesh_stiffness", "mesh_stiffness_own_path"):
         keys = [(quantity, point) for point, _ in ours.phases()]
@@ -198,7 +236,9 @@ def comparison(
         yield _line(cells)
 
 
-def body_evidence(pair: str, ross: dict[tuple[str, str], tuple[float, str]]) -> Iterator[str]:
+def body_evidence(
+    pair: str, ross: dict[tuple[str, str], tuple[float, str]]
+) -> Iterator[str]:
     """Body term of the paper over ROSS's: as it stands, with ROSS's theta_f, with ROSS's u_f, with both."""
     system = ours.machine(pair, ours.PAPER)
     points = ours.positions(system.pair)
@@ -206,7 +246,9 @@ def body_evidence(pair: str, ross: dict[tuple[str, str], tuple[float, str]]) -> 
     yield from _head("gear", "at", *choices)
     for gear, curvature in ours.sides(system.pair, np.array(list(points.values()))):
         found = [
-            ours.foundation(gear, curvature, system, half_angle=half_angle, height=height)
+            ours.foundation(
+                gear, curvature, system, half_angle=half_angle, height=height
+            )
             for height in (ours.centerline_height, ours.contact_height)
             for half_angle in (gear.root_half_angle, ours.ross_half_angle(gear))
         ]
@@ -214,7 +256,11 @@ def body_evidence(pair: str, ross: dict[tuple[str, str], tuple[float, str]]) -> 
             if point in SHOWN:
                 value = ross[f"{gear.name}_foundation_compliance", point][0]
                 yield _line(
-                    [gear.name, point, *(f"{values[index] / value:.4f}" for values in found)]
+                    [
+                        gear.name,
+                        point,
+                        *(f"{values[index] / value:.4f}" for values in found),
+                    ]
                 )
 
 
@@ -228,28 +274,39 @@ def path_evidence(pair: str) -> Iterator[str]:
         ours.ross_rounding(gears), position / gears.path_of_contact
     )
     yield from _head(
-        "at", "pinion, mm", "ROSS's pinion, mm", "wheel, mm", "ROSS's wheel, mm", "sum off by, mm"
+        "at",
+        "pinion, mm",
+        "ROSS's pinion, mm",
+        "wheel, mm",
+        "ROSS's wheel, mm",
+        "sum off by, mm",
     )
     for index, point in enumerate(points):
         radii = (pinion[index], own_pinion[index], wheel[index], own_wheel[index])
         off = own_pinion[index] + own_wheel[index] - gears.tangent_length
-        yield _line([point, *(f"{radius * 1e3:.3f}" for radius in radii), f"{off * 1e3:+.3f}"])
+        yield _line(
+            [point, *(f"{radius * 1e3:.3f}" for radius in radii), f"{off * 1e3:+.3f}"]
+        )
 
 
 def steps(pair: str) -> Iterator[str]:
     """Stiffness at C and mid in the double zone while the paper's choices give way to the default's."""
     yield from _head(
-        "choice", "pair_stiffness at C, 1e8 N/m", "mesh_stiffness at cycle 0.375, 1e8 N/m"
+        "choice",
+        "pair_stiffness at C, 1e8 N/m",
+        "mesh_stiffness at cycle 0.375, 1e8 N/m",
     )
     chosen = list(ours.PAPER)
     for change in ("", *STEPS):
         key = change.partition("=")[0]
-        chosen = [word for word in chosen if not word.startswith(f"{key}=")] + [change] * bool(
+        chosen = [word for word in chosen if not word.startswith(f"{key}=")] + [
             change
-        )
+        ] * bool(change)
         values = ours.gensig_values(ours.machine(pair, chosen))
         found = (values["pair_stiffness", "C"], values["mesh_stiffness", "cycle 0.375"])
-        yield _line([change or "the paper's", *(f"{value * 1e-8:.4f}" for value in found)])
+        yield _line(
+            [change or "the paper's", *(f"{value * 1e-8:.4f}" for value in found)]
+        )
 
 
 def _head(*names: str) -> Iterator[str]:
@@ -263,12 +320,16 @@ def _line(cells: Iterable[str]) -> str:
 
 def _run(command: Sequence[str], complaint: str) -> None:
     one_thread = {**os.environ, **dict.fromkeys(THREAD_VARIABLES, "1")}
-    result = subprocess.run(command, capture_output=True, text=True, check=False, env=one_thread)
+    result = subprocess.run(
+        command, capture_output=True, text=True, check=False, env=one_thread
+    )
     if result.returncode != 0:
-        lines = [line.strip() for line in result.stderr.splitlines() if line.strip()] or [
-            "no message"
-        ]
-        said = next((line for line in reversed(lines) if line.startswith("ERROR")), lines[-1])
+        lines = [
+            line.strip() for line in result.stderr.splitlines() if line.strip()
+        ] or ["no message"]
+        said = next(
+            (line for line in reversed(lines) if line.startswith("ERROR")), lines[-1]
+        )
         raise PeerError(f"{complaint} ({said})")
 
 
@@ -283,16 +344,25 @@ def _parser() -> argparse.ArgumentParser:
         help="folder of ROSS's virtual environment, about 1.5 GB (default: %(default)s)",
     )
     parser.add_argument(
-        "--pip-args", default="", help='options for pip, for instance --pip-args="--no-cache-dir"'
+        "--pip-args",
+        default="",
+        help='options for pip, for instance --pip-args="--no-cache-dir"',
     )
     parser.add_argument(
-        "--ross-version", default=VERSION, help="release to install (default: %(default)s)"
+        "--ross-version",
+        default=VERSION,
+        help="release to install (default: %(default)s)",
     )
     parser.add_argument(
-        "--output", type=Path, default=VALUES, help="where ROSS's values are stored and read"
+        "--output",
+        type=Path,
+        default=VALUES,
+        help="where ROSS's values are stored and read",
     )
     parser.add_argument(
-        "--stored", action="store_true", help="compare with the stored values, without ROSS"
+        "--stored",
+        action="store_true",
+        help="compare with the stored values, without ROSS",
     )
     parser.add_argument(
         "--time-only",

@@ -56,11 +56,11 @@ ALONE = "import sys; from benchmarks import scaling; scaling.{}(*sys.argv[1:])"
 def peak_memory() -> int:
     """Most bytes of memory that this process ever held."""
     status = Path("/proc/self/status")
-    if (
-        status.exists()
-    ):  # what getrusage tells is that of the process that started this one, if it held more
+    if status.exists():  # what getrusage tells is that of the process that started this one, if it held more
         lines = status.read_text(encoding="utf-8").splitlines()
-        return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM:"))
+        return next(
+            int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM:")
+        )
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (
         1 if sys.platform == "darwin" else 1024
     )
@@ -116,7 +116,9 @@ def side_by_side(*words: str, channels: str = "[pinion_y]") -> list[Run]:
     """A group's records of one machine, each from a start of its own."""
     config = read_request([f"sensing.channels={channels}", *words]).config
     system, faults = read_system(config), tuple(read_faults(config["fault"]))
-    starts = [Start(tooth_pinion=lane, tooth_wheel=lane, phase=0.0) for lane in range(LANES)]
+    starts = [
+        Start(tooth_pinion=lane, tooth_wheel=lane, phase=0.0) for lane in range(LANES)
+    ]
     return [Run(system=system, faults=faults, start=start) for start in starts]
 
 
@@ -132,7 +134,10 @@ def against_duration(runs: int) -> dict[str, float]:
     group, works = side_by_side(), {}
     for duration in DURATIONS:
         operating = replace(group[0].system.operating, duration=duration)
-        timed = [replace(run, system=replace(run.system, operating=operating)) for run in group]
+        timed = [
+            replace(run, system=replace(run.system, operating=operating))
+            for run in group
+        ]
         works[f"{duration:g} s"] = partial(simulate, timed)
     simulate(group)
     found = in_turn(works, runs)
@@ -164,7 +169,10 @@ def against_number(runs: int) -> dict[str, float]:
             for _ in range(runs if n_records < 1000 else 1)
         ]
         found.append(min(spent for spent, _ in told))
-    values = {f"{n} short records": spent / n * 1e3 for n, spent in zip(COUNTS, found, strict=True)}
+    values = {
+        f"{n} short records": spent / n * 1e3
+        for n, spent in zip(COUNTS, found, strict=True)
+    }
     return {**values, **straight("record", COUNTS, found)}
 
 
@@ -179,7 +187,10 @@ def memory(_runs: int) -> dict[str, float]:
                 alone(make_shard, out),
             )
         name = f"{n_records} records of 1 s and four channels"
-        found |= {f"{name}: planning": planning[1] / 1e6, f"{name}: worker": working[1] / 1e6}
+        found |= {
+            f"{name}: planning": planning[1] / 1e6,
+            f"{name}: worker": working[1] / 1e6,
+        }
     return found
 
 
@@ -195,7 +206,9 @@ def against_teeth(runs: int) -> tuple[dict[str, float], dict[str, float]]:
     for n_teeth in TEETH:
         teeth = list(range(n_teeth))
         group = side_by_side(
-            "operating.duration_s=0.2", "fault=distributed_pitting", f"fault.tooth={teeth}"
+            "operating.duration_s=0.2",
+            "fault=distributed_pitting",
+            f"fault.tooth={teeth}",
         )
         name = f"{n_teeth} distinct pitted {'tooth' if n_teeth == 1 else 'teeth'}"
         tables[name], motions[name] = partial(table, group[0]), partial(simulate, group)
@@ -203,7 +216,9 @@ def against_teeth(runs: int) -> tuple[dict[str, float], dict[str, float]]:
     spent = in_turn(tables, runs)
     for motion in motions.values():
         motion()
-    found = {name: value / LANES * 1e3 for name, value in in_turn(motions, runs).items()}
+    found = {
+        name: value / LANES * 1e3 for name, value in in_turn(motions, runs).items()
+    }
     line = straight("tooth", TEETH, list(spent.values()))
     return {**{name: value * 1e3 for name, value in spent.items()}, **line}, found
 
@@ -213,7 +228,9 @@ def against_freedom(runs: int) -> dict[str, float]:
     works = {}
     for n_dof, words in ROTORS.items():
         group = side_by_side(
-            "operating.duration_s=1", *words, channels="[pinion_x,pinion_y,wheel_x,wheel_y]"
+            "operating.duration_s=1",
+            *words,
+            channels="[pinion_x,pinion_y,wheel_x,wheel_y]",
         )
         simulate(group[:1])
         works[f"{n_dof} degrees of freedom"] = partial(simulate, group)
@@ -226,7 +243,8 @@ def main() -> None:
     sections: dict[str, dict[str, float]] = {}
 
     def show(
-        measure: Callable[[int], dict[str, float] | tuple[dict[str, float], ...]], *titles: str
+        measure: Callable[[int], dict[str, float] | tuple[dict[str, float], ...]],
+        *titles: str,
     ) -> None:
         found = measure(arguments.runs)
         for title, values in zip(

@@ -20,7 +20,10 @@ from gensig.dynamics.decimation import in_band_error
 
 SPEED = 1688.0 * math.pi / 30.0
 RATE = 10240.0
-CALM = 500.0, 5.0  # N m of the engine and of a pump cam, with loads on the ends of all branches
+CALM = (
+    500.0,
+    5.0,
+)  # N m of the engine and of a pump cam, with loads on the ends of all branches
 LEAD_IN = 0.02  # s, so that all steps begin in the same state
 CHANNELS = [
     ("speed", 13),
@@ -30,7 +33,9 @@ CHANNELS = [
 ]
 
 
-def engine_run(oversampling: int, duration: float, *, loaded: bool) -> tuple[LineMotion, float]:
+def engine_run(
+    oversampling: int, duration: float, *, loaded: bool
+) -> tuple[LineMotion, float]:
     """A motion of the engine, and the CPU seconds that it took; ``loaded`` teeth stay together, others rattle."""
     line, torques = engine_line(), engine_torques()
     if loaded:
@@ -42,7 +47,9 @@ def engine_run(oversampling: int, duration: float, *, loaded: bool) -> tuple[Lin
         line,
         constant_speed(SPEED),
         torques,
-        LineSolver(sampling_rate=RATE, oversampling=oversampling, max_energy_residual=1e-3),
+        LineSolver(
+            sampling_rate=RATE, oversampling=oversampling, max_energy_residual=1e-3
+        ),
         duration=duration,
         channels=CHANNELS,
         lead_in=LEAD_IN,
@@ -54,13 +61,23 @@ def main() -> None:
     """Print one line a step."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(
-        "--duration", type=float, default=10.0, help="simulated seconds of the timed runs"
+        "--duration",
+        type=float,
+        default=10.0,
+        help="simulated seconds of the timed runs",
     )
     parser.add_argument(
-        "--checked", type=float, default=0.3, help="simulated seconds of the runs for the errors"
+        "--checked",
+        type=float,
+        default=0.3,
+        help="simulated seconds of the runs for the errors",
     )
     parser.add_argument(
-        "--oversampling", type=int, nargs="+", default=[5, 10, 20], help="steps per sample"
+        "--oversampling",
+        type=int,
+        nargs="+",
+        default=[5, 10, 20],
+        help="steps per sample",
     )
     words = parser.parse_args()
     engine_run(2, 0.01, loaded=False)  # compiles
@@ -76,17 +93,24 @@ def main() -> None:
         )
     finest = 4 * max(words.oversampling)
     exact, _ = engine_run(finest, words.checked, loaded=True)
-    print("step us | energy residual | error of", " ".join(f"{kind} {i}" for kind, i in CHANNELS))
+    print(
+        "step us | energy residual | error of",
+        " ".join(f"{kind} {i}" for kind, i in CHANNELS),
+    )
     for oversampling in words.oversampling:
         found, _ = engine_run(oversampling, words.checked, loaded=True)
         errors = [
             float(
-                in_band_error(found.signals[c][None, None], exact.signals[c][None, None], RATE)[0]
+                in_band_error(
+                    found.signals[c][None, None], exact.signals[c][None, None], RATE
+                )[0]
             )
             for c in CHANNELS
         ]
         told = " ".join(f"{error:.1e}" for error in errors)
-        print(f"{1e6 / RATE / oversampling:7.2f} | {found.energy_residual:.1e} | {told}")
+        print(
+            f"{1e6 / RATE / oversampling:7.2f} | {found.energy_residual:.1e} | {told}"
+        )
 
 
 if __name__ == "__main__":

@@ -55,21 +55,30 @@ def simulated(config: Configuration) -> list[Record]:
         noisy = clean + 0.1 * rms * rng.standard_normal(clean.shape, np.float32)
         values = {
             **record.values,
-            **{name: value for name, value in row.items() if name not in ("shard", "row")},
+            **{
+                name: value
+                for name, value in row.items()
+                if name not in ("shard", "row")
+            },
         }
         records.append(
             Record(
-                signals={**record.signals, "acceleration": noisy.astype(np.float32)}, values=values
+                signals={**record.signals, "acceleration": noisy.astype(np.float32)},
+                values=values,
             )
         )
     return records
 
 
-def shard(config: Configuration, records: list[Record], out: Path, runs: int) -> dict[str, float]:
+def shard(
+    config: Configuration, records: list[Record], out: Path, runs: int
+) -> dict[str, float]:
     """Figures of one way to store."""
     begin_folder(config, [], out)
     params = [
-        name.removeprefix("params/") for name in records[0].values if name.startswith("params/")
+        name.removeprefix("params/")
+        for name in records[0].values
+        if name.startswith("params/")
     ]
     path, digests = shard_path(out, 0), []
 
@@ -126,10 +135,17 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
-        "--records", type=int, default=64, help="records of 1 s with 4 channels (default 64)"
+        "--records",
+        type=int,
+        default=64,
+        help="records of 1 s with 4 channels (default 64)",
     )
-    parser.add_argument("--runs", type=int, default=3, help="the least of so many (default 3)")
-    parser.add_argument("--folder", help="where to write (default: the folder for temporary files)")
+    parser.add_argument(
+        "--runs", type=int, default=3, help="the least of so many (default 3)"
+    )
+    parser.add_argument(
+        "--folder", help="where to write (default: the folder for temporary files)"
+    )
     parser.add_argument("--json", help="also write the figures to this file")
     arguments = parser.parse_args()
     words = [
@@ -138,7 +154,9 @@ def main() -> None:
         "sensing.snr_db=null",
         "plan.vary={}",
     ]
-    config = read_request([*words, f"dataset.records_per_shard={arguments.records}"]).config
+    config = read_request(
+        [*words, f"dataset.records_per_shard={arguments.records}"]
+    ).config
     records = simulated(config)
     found: dict[str, dict[str, float]] = {}
     with tempfile.TemporaryDirectory(dir=arguments.folder) as name:
@@ -151,7 +169,9 @@ def main() -> None:
                     "dataset", compression=compression, sample_type=sample_type
                 )
                 out = Path(name) / f"{sample_type}-{compression}"
-                found[f"{sample_type}, {compression}"] = shard(stored, records, out, arguments.runs)
+                found[f"{sample_type}, {compression}"] = shard(
+                    stored, records, out, arguments.runs
+                )
     header = ("stored as", "write MB/s", "ratio", "read 1 record ms", "error dB")
     print("{:<32}{:>12}{:>8}{:>18}{:>10}".format(*header))
     for way, (write, ratio, read, error) in (

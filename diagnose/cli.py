@@ -47,7 +47,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     from gensig.terminal.completion import answer, is_asked
 
     if is_asked():
-        verbs = {name: (summary, _module(name).add_arguments) for name, summary in VERBS.items()}
+        verbs = {
+            name: (summary, _module(name).add_arguments)
+            for name, summary in VERBS.items()
+        }
         answer(PROGRAM, verbs, primary="train")
     words = list(sys.argv[1:] if argv is None else argv)
     return guarded(PROGRAM, lambda: _dispatch(words), interrupted="interrupted")
@@ -82,7 +85,9 @@ def _module(verb: str) -> Any:
 
 def _help() -> str:
     width = max(map(len, VERBS))
-    verbs = "\n".join(f"  {name:<{width}}  {summary}" for name, summary in VERBS.items())
+    verbs = "\n".join(
+        f"  {name:<{width}}  {summary}" for name, summary in VERBS.items()
+    )
     statuses = exit_text({3: "predict: the recording is unlike the training data"})
     return (
         "usage: diagnose COMMAND [ARGUMENTS]\n\n"

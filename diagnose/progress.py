@@ -22,7 +22,9 @@ def progress(n_steps: int, what: str = "training") -> Iterator[Callable[[str], N
         nonlocal done
         done += 1
         elapsed = time.perf_counter() - started
-        print(f"[{done}/{n_steps}] {elapsed:.0f} s  {line}", file=sys.stderr, flush=True)
+        print(
+            f"[{done}/{n_steps}] {elapsed:.0f} s  {line}", file=sys.stderr, flush=True
+        )
 
     yield write
 

@@ -17,7 +17,9 @@ from gensig.options.configuration import Configuration, Section
 DEVICES = ("auto", "cpu", "cuda")
 HEADS = ("severity", "gear")
 TASKS = ("classes", "remaining_life")
-BOTH = "both"  # of normalise: without the level, and beside it a second training with it
+BOTH = (
+    "both"  # of normalise: without the level, and beside it a second training with it
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +36,9 @@ class LifeSettings:
 
     def __post_init__(self) -> None:
         if self.early_life_h is not None:
-            _check_between("remaining_life.early_life_h", self.early_life_h, most=float("inf"))
+            _check_between(
+                "remaining_life.early_life_h", self.early_life_h, most=float("inf")
+            )
         _check_between("remaining_life.early_life_share", self.early_life_share, most=1)
         _check_between("remaining_life.coverage", self.coverage, most=1)
         if not isinstance(self.with_age, bool):
@@ -83,14 +87,18 @@ class TrainSettings:
 
     def __post_init__(self) -> None:
         if self.task not in TASKS:
-            raise ConfigError(f"task must be one of {', '.join(TASKS)}, not {self.task!r}")
+            raise ConfigError(
+                f"task must be one of {', '.join(TASKS)}, not {self.task!r}"
+            )
         for name in ("epochs", "patience", "n_seeds_control", "n_bootstrap"):
             _check_whole(name, getattr(self, name), least=1)
         for name in ("window_samples", "stride_samples"):
             if getattr(self, name) is not None:
                 _check_whole(name, getattr(self, name), least=1)
         _check_whole("batch_size", self.batch_size, least=2)
-        _check_whole("minirocket_features", self.minirocket_features, least=len(KERNELS))
+        _check_whole(
+            "minirocket_features", self.minirocket_features, least=len(KERNELS)
+        )
         if self.n_threads is not None:
             _check_whole("n_threads", self.n_threads, least=1)
         if self.sampling_rate_hz is not None:
@@ -100,12 +108,16 @@ class TrainSettings:
         for name in ("protocols", "classes", "channels", "test_channels", "seeds"):
             values = getattr(self, name)
             if values is not None and (not values or len(set(values)) < len(values)):
-                raise ConfigError(f"{name} must be a list of different values, at least one")
+                raise ConfigError(
+                    f"{name} must be a list of different values, at least one"
+                )
         for seed in self.seeds:
             _check_whole("seeds", seed, least=0)
         for name in ("shuffle_control", "tensorboard", "metadata_probe"):
             if not isinstance(getattr(self, name), bool):
-                raise ConfigError(f"{name} must be true or false, not {getattr(self, name)!r}")
+                raise ConfigError(
+                    f"{name} must be true or false, not {getattr(self, name)!r}"
+                )
         if self.oracle not in ("auto", False):
             raise ConfigError(f"oracle must be auto or false, not {self.oracle!r}")
         if self.sham is not None and (not isinstance(self.sham, str) or not self.sham):
@@ -115,9 +127,13 @@ class TrainSettings:
         self._check_list("baselines", baseline_names(Role.RIVAL))
         self._check_list("heads", HEADS)
         if self.features not in tuple(FEATURES):
-            raise ConfigError(f"features must be {' or '.join(FEATURES)}, not {self.features!r}")
+            raise ConfigError(
+                f"features must be {' or '.join(FEATURES)}, not {self.features!r}"
+            )
         if self.device not in DEVICES:
-            raise ConfigError(f"device must be one of {', '.join(DEVICES)}, not {self.device!r}")
+            raise ConfigError(
+                f"device must be one of {', '.join(DEVICES)}, not {self.device!r}"
+            )
 
     def _check_list(self, key: str, allowed: Sequence[str]) -> None:
         """Refuse a list with a name twice or one that is not allowed."""
@@ -146,9 +162,13 @@ def settings_from(config: Configuration) -> TrainSettings:
     if values["seeds"] is None:
         raise ConfigError("seeds must be a list of different values, at least one")
     values["baselines"] = (
-        () if values["baselines"] is False else _as_tuple("baselines", values["baselines"]) or ()
+        ()
+        if values["baselines"] is False
+        else _as_tuple("baselines", values["baselines"]) or ()
     )
-    values["heads"] = () if values["heads"] is False else _as_tuple("heads", values["heads"]) or ()
+    values["heads"] = (
+        () if values["heads"] is False else _as_tuple("heads", values["heads"]) or ()
+    )
     values["remaining_life"] = _life_settings(values["remaining_life"])
     values["data"], values["out"] = str(values["data"]), str(values["out"])
     return TrainSettings(**values)
@@ -157,7 +177,9 @@ def settings_from(config: Configuration) -> TrainSettings:
 def _life_settings(value: Any) -> LifeSettings:
     known = [field.name for field in dataclasses.fields(LifeSettings)]
     if not isinstance(value, Mapping) or set(value) != set(known):
-        raise ConfigError(f"remaining_life must hold {', '.join(known)} and nothing else")
+        raise ConfigError(
+            f"remaining_life must hold {', '.join(known)} and nothing else"
+        )
     return LifeSettings(**{str(key): given for key, given in value.items()})
 
 
@@ -172,7 +194,9 @@ def _as_tuple(name: str, value: Any) -> tuple[Any, ...] | None:
 
 def _check_whole(name: str, value: Any, *, least: int) -> None:
     if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        raise ConfigError(f"{name} must be a whole number of at least {least}, not {value!r}")
+        raise ConfigError(
+            f"{name} must be a whole number of at least {least}, not {value!r}"
+        )
 
 
 def _check_rate(name: str, value: Any) -> None:
@@ -181,17 +205,27 @@ def _check_rate(name: str, value: Any) -> None:
         or not isinstance(value, int | float)
         or not 0 < value < float("inf")
     ):
-        raise ConfigError(f"{name} must be null or a number of samples a second, not {value!r}")
+        raise ConfigError(
+            f"{name} must be null or a number of samples a second, not {value!r}"
+        )
 
 
 def _check_number(name: str, value: Any) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1:
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, int | float)
+        or not 0 <= value <= 1
+    ):
         raise ConfigError(f"{name} must be a number from 0 to 1, not {value!r}")
 
 
 def _check_between(name: str, value: Any, *, most: float) -> None:
     """Refuse what is not above 0 and below `most`; for 1 that is a share."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < most:
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, int | float)
+        or not 0 < value < most
+    ):
         raise ConfigError(
             f"{name} must be a number above 0{' and below 1' if most == 1 else ''}, not {value!r}"
         )

@@ -58,7 +58,9 @@ def load_system(*overrides: str, config_dir: str | Path | None = None) -> Machin
     return read_machine(read_request(overrides, config_dir=config_dir).config)
 
 
-def load_faults(*overrides: str, config_dir: str | Path | None = None) -> tuple[Fault, ...]:
+def load_faults(
+    *overrides: str, config_dir: str | Path | None = None
+) -> tuple[Fault, ...]:
     """The faults that overrides describe, for the methods of a machine; none for ``fault=healthy``.
 
     >>> import gensig
@@ -77,7 +79,9 @@ def load_faults(*overrides: str, config_dir: str | Path | None = None) -> tuple[
     return read_faults(read_request(overrides, config_dir=config_dir).config["fault"])
 
 
-def generate(*overrides: str, out: str | Path, config_dir: str | Path | None = None) -> Dataset:
+def generate(
+    *overrides: str, out: str | Path, config_dir: str | Path | None = None
+) -> Dataset:
     """Make a data set and open it.
 
     Raises
@@ -96,13 +100,17 @@ def generate(*overrides: str, out: str | Path, config_dir: str | Path | None = N
             "a task of an array job makes its share of a folder only; run it as `gensig generate`"
         )
     begin_folder(request.config, request.overrides, Path(out))
-    _, problems = run_folder(Path(out), executor=executor, on_shard=lambda _progress: None)
+    _, problems = run_folder(
+        Path(out), executor=executor, on_shard=lambda _progress: None
+    )
     if problems:
         raise SimulationError(f"{out} is incomplete: {problems[0]}")
     return open_dataset(out)
 
 
-def stream(*overrides: str, epoch: int = 0, config_dir: str | Path | None = None) -> RecordStream:
+def stream(
+    *overrides: str, epoch: int = 0, config_dir: str | Path | None = None
+) -> RecordStream:
     """The records that ``generate`` would write, made while one iterates and never stored.
 
     Parameters
@@ -123,7 +131,9 @@ def stream(*overrides: str, epoch: int = 0, config_dir: str | Path | None = None
         raise ConfigError(
             "a stream is one data set: give one value a key, and make a stream for each"
         )
-    return open_stream(read_request(overrides, config_dir=config_dir).config, epoch=epoch)
+    return open_stream(
+        read_request(overrides, config_dir=config_dir).config, epoch=epoch
+    )
 
 
 def fault_pairs(

@@ -29,7 +29,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         verbs = {name: (verb.summary, verb.arguments) for name, verb in VERBS.items()}
         answer(PROGRAM, verbs, primary="generate")
     words = list(sys.argv[1:] if argv is None else argv)
-    interrupted = "interrupted; a data set begun is incomplete, and gensig resume DIR finishes it"
+    interrupted = (
+        "interrupted; a data set begun is incomplete, and gensig resume DIR finishes it"
+    )
     return guarded(PROGRAM, lambda: _run(words), interrupted=interrupted)
 
 
@@ -70,7 +72,9 @@ def verb_parser(name: str) -> Parser:
         "" if verb.summary.endswith("?") else "."
     )
     heading = "examples" if "\n" in verb.example else "example"
-    parser = Parser(f"{PROGRAM} {name}", summary, f"{heading}:\n  {verb.example}", exits)
+    parser = Parser(
+        f"{PROGRAM} {name}", summary, f"{heading}:\n  {verb.example}", exits
+    )
     verb.arguments(parser)
     parser.set_defaults(verb=name)
     return parser
@@ -78,8 +82,12 @@ def verb_parser(name: str) -> Parser:
 
 def _help() -> str:
     width = max(map(len, VERBS))
-    statuses = exit_text({1: "partial, damaged or other results: each COMMAND --help says which"})
-    verbs = "\n".join(f"  {name:<{width}}  {verb.summary}" for name, verb in VERBS.items())
+    statuses = exit_text(
+        {1: "partial, damaged or other results: each COMMAND --help says which"}
+    )
+    verbs = "\n".join(
+        f"  {name:<{width}}  {verb.summary}" for name, verb in VERBS.items()
+    )
     return (
         "usage: gensig COMMAND [ARGUMENTS]\n\n"
         "Labelled gear-fault vibration data sets from physics.\n\n"

@@ -42,7 +42,9 @@ class MovedFinder(MetaPathFinder, Loader):
     The same module object as under the new one.
     """
 
-    def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
+    def find_spec(
+        self, fullname: str, path: Any = None, target: Any = None
+    ) -> ModuleSpec | None:
         """The spec of a moved module; None for any other name."""
         return ModuleSpec(fullname, self) if fullname in MOVED else None
 

@@ -109,10 +109,16 @@ def read(cls: type[T], values: Mapping[str, Any], where: str, **given: Any) -> T
     ------
     ConfigError    for an unknown or missing key, a wrong suffix or a value of the wrong type
     """
-    names = {key: field for key, field in _boundary_fields(cls).items() if field.name not in given}  # type: ignore[arg-type]
+    names = {
+        key: field
+        for key, field in _boundary_fields(cls).items()
+        if field.name not in given
+    }  # type: ignore[arg-type]
     hints = _hints(cls)  # type: ignore[arg-type]
     if not isinstance(values, Mapping):
-        raise ConfigError(f"{where} = {values!r} must be a group of keys, not one value")
+        raise ConfigError(
+            f"{where} = {values!r} must be a group of keys, not one value"
+        )
     result = dict(given)
     for key, value in values.items():
         if key not in names:
@@ -171,7 +177,11 @@ def _convert(place: str, key: str, value: Any, hint: Any) -> Any:
             return None
         raise ConfigError(f"{place} is null; give a value")
     if isinstance(value, list | tuple):
-        items = {typing.get_args(kind)[0] for kind in kinds if typing.get_origin(kind) is tuple}
+        items = {
+            typing.get_args(kind)[0]
+            for kind in kinds
+            if typing.get_origin(kind) is tuple
+        }
         for item in items & {str, int, float}:
             if item is float and all(
                 type(entry) is float and math.isfinite(entry) for entry in value
@@ -184,7 +194,8 @@ def _convert(place: str, key: str, value: Any, hint: Any) -> Any:
                 )
             if all(_is_a(item, entry) for entry in value):
                 return tuple(
-                    to_si(key, float(entry)) if item is float else entry for entry in value
+                    to_si(key, float(entry)) if item is float else entry
+                    for entry in value
                 )
     for kind in (float, int, bool, str):
         if kind in kinds and _is_a(kind, value):
@@ -210,9 +221,14 @@ def _is_a(kind: type, value: Any, *, finite: bool = True) -> bool:
 def _named(kind: Any) -> str:
     """What a user calls a type."""
     if typing.get_origin(kind) is tuple:
-        return {str: "a list of names", int: "a list of whole numbers", float: "a list of numbers"}[
-            typing.get_args(kind)[0]
-        ]
-    return {float: "a number", int: "a whole number", bool: "true or false", str: "text"}.get(
-        kind, "null"
-    )
+        return {
+            str: "a list of names",
+            int: "a list of whole numbers",
+            float: "a list of numbers",
+        }[typing.get_args(kind)[0]]
+    return {
+        float: "a number",
+        int: "a whole number",
+        bool: "true or false",
+        str: "text",
+    }.get(kind, "null")

@@ -15,7 +15,9 @@ BEGIN, END = "<!-- made by tests/api_pages.py -->", "<!-- end of what is made --
 def page(path: Path) -> str:
     """The page with what each of its ``::: name`` stands for, and the public names of those that are modules."""
     text = path.read_text(encoding="utf-8")
-    lines = [line for name in re.findall(r"^::: (\S+)$", text, re.M) for line in _lines(name)]
+    lines = [
+        line for name in re.findall(r"^::: (\S+)$", text, re.M) for line in _lines(name)
+    ]
     head, rest = text.split(BEGIN, 1)
     return "\n".join([head + BEGIN, "", *lines, "", END + rest.split(END, 1)[1]])
 

@@ -48,21 +48,33 @@ class Slices:
     def __init__(
         self, system, helix_angle: float, n_slices: int = 24, crowning: float = 8e-6
     ) -> None:
-        self.pair, self.force = helical_pair(system.pair, helix_angle), system.mesh_force
-        self.spur = loaded_pair_table(self.pair, system.material, system.mesh, force=self.force)
+        self.pair, self.force = (
+            helical_pair(system.pair, helix_angle),
+            system.mesh_force,
+        )
+        self.spur = loaded_pair_table(
+            self.pair, system.material, system.mesh, force=self.force
+        )
         across = (np.arange(n_slices) + 0.5) / n_slices
         self.lag = across * self.pair.face_width * math.tan(self.pair.base_helix_angle)
         self.crowned, self.shared = (
             crowning * (2.0 * across - 1.0) ** 2,
             self.spur.shared_compliance,
         )
-        own = self.spur.pinion.compliance[0] + self.spur.wheel.compliance[0] - self.shared
-        self.own, self.gap = own * n_slices, self.spur.pinion.gap[0] + self.spur.wheel.gap[0]
+        own = (
+            self.spur.pinion.compliance[0] + self.spur.wheel.compliance[0] - self.shared
+        )
+        self.own, self.gap = (
+            own * n_slices,
+            self.spur.pinion.gap[0] + self.spur.wheel.gap[0],
+        )
 
     def at(self, position):
         """Compliance and gap of every slice of pairs at positions s of the first, (..., slice)."""
         place = np.asarray(position)[..., None] - self.lag
-        gap = np.interp(place, self.spur.position, self.gap, left=FARTHEST, right=FARTHEST)
+        gap = np.interp(
+            place, self.spur.position, self.gap, left=FARTHEST, right=FARTHEST
+        )
         return np.interp(place, self.spur.position, self.own), gap + self.crowned
 
     def force_at(self, position, within):
@@ -78,7 +90,9 @@ class Slices:
         """Chords between depths (chord,) m, the last of which goes on as from there to once and a half as deep."""
         per_pitch, pitch = self.spur.options.points_per_pitch, self.pair.base_pitch
         position = (
-            pitch / per_pitch * np.arange(FIRST_PITCH * per_pitch, self.last_pitch * per_pitch + 1)
+            pitch
+            / per_pitch
+            * np.arange(FIRST_PITCH * per_pitch, self.last_pitch * per_pitch + 1)
         )
         first = np.minimum(self.at(position)[1].min(axis=-1), FARTHEST)
         knots = np.append(depth, 1.5 * depth[-1] if len(depth) > 1 else 2e-5)
@@ -98,7 +112,9 @@ class Slices:
         )  # fmt: skip
 
 
-def on_axial_supports(body: Body, stiffness_z=2e8, stiffness_tilt=1e5, damping_ratio=0.03) -> Body:
+def on_axial_supports(
+    body: Body, stiffness_z=2e8, stiffness_tilt=1e5, damping_ratio=0.03
+) -> Body:
     """A gear that is held along its axis and against tilting too."""
     tilt_inertia = 0.6 * body.inertia
     support = replace(

@@ -5,7 +5,15 @@ from pathlib import Path
 
 import diagnose.cli
 import gensig.cli
-from diagnose.commands import adapt, detectability, evaluate, export, predict, score, train
+from diagnose.commands import (
+    adapt,
+    detectability,
+    evaluate,
+    export,
+    predict,
+    score,
+    train,
+)
 from gensig.commands.verbs import VERBS
 from gensig.terminal.program import EXITS
 
@@ -65,7 +73,8 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
     """The parser of every verb of both commands, by 'command verb'."""
     mine = {f"gensig {name}": gensig.cli.verb_parser(name) for name in VERBS}
     return mine | {
-        f"diagnose {name}": diagnose.cli.verb_parser(name) for name in diagnose.cli.VERBS
+        f"diagnose {name}": diagnose.cli.verb_parser(name)
+        for name in diagnose.cli.VERBS
     }
 
 
@@ -101,7 +110,12 @@ def page() -> str:
         lines += ["", f"## {command}"]
         for name, summary in verbs.items():
             shown = examples(by_name[f"{command} {name}"].epilog)
-            lines += ["", f"**{name}**: {summary}", "", *(f"    {example}" for example in shown)]
+            lines += [
+                "",
+                f"**{name}**: {summary}",
+                "",
+                *(f"    {example}" for example in shown),
+            ]
     return "\n".join(lines) + "\n"
 
 

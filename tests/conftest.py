@@ -35,7 +35,8 @@ FIRST = (
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(
         key=lambda item: next(
-            (k for k, name in enumerate(FIRST) if item.nodeid.startswith(name)), len(FIRST)
+            (k for k, name in enumerate(FIRST) if item.nodeid.startswith(name)),
+            len(FIRST),
         )
     )
 
@@ -49,7 +50,11 @@ def compositions() -> Iterator[Any]:
     """
     Plugins.instance()  # registers the sources
     source = SourcesRegistry.instance().resolve("pkg")
-    parse, parsed, compose = source._read_config, {}, gensig.options.compose.hydra_compose
+    parse, parsed, compose = (
+        source._read_config,
+        {},
+        gensig.options.compose.hydra_compose,
+    )
 
     def read(self: Any, path: Any) -> Any:
         if str(path) not in parsed:
@@ -109,7 +114,9 @@ def xiamen(machine) -> SpurPair:
 @pytest.fixture(scope="session")
 def paper_machine(machine) -> SpurPair:
     """Every convention of the spur paper."""
-    return machine({"mesh.law": "paper", "mesh.pair_coupling": "sum", "mesh.contact": "linear"})
+    return machine(
+        {"mesh.law": "paper", "mesh.pair_coupling": "sum", "mesh.contact": "linear"}
+    )
 
 
 @pytest.fixture(scope="session")
@@ -128,9 +135,14 @@ def dynamics_of() -> Callable[..., PairDynamics]:
     """Equations of motion of a machine with perfect teeth, or with the given tooth errors."""
 
     def make(system: SpurPair, faults=(), *, phase=0.3, **errors: Any) -> PairDynamics:
-        counts = {"pinion": system.pair.pinion.n_teeth, "wheel": system.pair.wheel.n_teeth}
+        counts = {
+            "pinion": system.pair.pinion.n_teeth,
+            "wheel": system.pair.wheel.n_teeth,
+        }
         perfect = {
-            f"{gear}_{key}": np.zeros(n) for gear, n in counts.items() for key in ("error", "tilt")
+            f"{gear}_{key}": np.zeros(n)
+            for gear, n in counts.items()
+            for key in ("error", "tilt")
         }
         return PairDynamics(
             table=system.mesh_table(faults),

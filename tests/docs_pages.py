@@ -65,7 +65,9 @@ def without_blocks(text: str) -> str:
     hidden: set[int] = set()
     for block in blocks(text):
         hidden |= set(range(block.line, block.line + block.code.count("\n") + 3))
-    kept = [line for number, line in enumerate(text.split("\n"), 1) if number not in hidden]
+    kept = [
+        line for number, line in enumerate(text.split("\n"), 1) if number not in hidden
+    ]
     return re.sub(r"`[^`]*`", "", "\n".join(kept))
 
 
@@ -80,7 +82,11 @@ def command_lines(text: str) -> Iterator[tuple[int, list[str]]]:
             words = shlex.split(line, comments=True)
             while words:
                 end = next(
-                    (k for k, word in enumerate(words) if word in ("&&", "||", "|", ">", "&")),
+                    (
+                        k
+                        for k, word in enumerate(words)
+                        if word in ("&&", "||", "|", ">", "&")
+                    ),
                     len(words),
                 )
                 if words[0] in COMMANDS:
@@ -97,11 +103,15 @@ def anchors(text: str) -> set[str]:
             fenced = not fenced
         if heading := re.match(r"#{1,6} (.*)", line) if not fenced else None:
             plain = (
-                re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading[1]).replace("`", "").strip().lower()
+                re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading[1])
+                .replace("`", "")
+                .strip()
+                .lower()
             )
             slug = re.sub(r"[^\w\- ]", "", plain).replace(" ", "-")
             n_before = sum(
-                name == slug or re.fullmatch(rf"{re.escape(slug)}-\d+", name) is not None
+                name == slug
+                or re.fullmatch(rf"{re.escape(slug)}-\d+", name) is not None
                 for name in found
             )
             found.add(f"{slug}-{n_before}" if n_before else slug)

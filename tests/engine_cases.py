@@ -47,7 +47,9 @@ def option(**changes):
 @lru_cache(maxsize=1)
 def rows():
     with TABLE.open(encoding="utf-8") as stream:
-        return tuple(csv.DictReader(line for line in stream if not line.startswith("#")))
+        return tuple(
+            csv.DictReader(line for line in stream if not line.startswith("#"))
+        )
 
 
 def ratios():
@@ -60,7 +62,11 @@ def ratio_of_teeth():
     for row in rows():
         if row["edge_from"]:
             first, second = int(row["edge_from"]), int(row["edge_to"])
-            teeth = int(row["teeth_from"]) / int(row["teeth_to"]) if row["teeth_from"] else 1.0
+            teeth = (
+                int(row["teeth_from"]) / int(row["teeth_to"])
+                if row["teeth_from"]
+                else 1.0
+            )
             found[second] = found[first] * teeth
     return {node: found[node] for node in ratios()}
 
@@ -80,7 +86,9 @@ def engine_line(damper="as_printed"):
         ends.append((first, second))
     stiffness = np.array([1e6 * float(row["stiffness_mnm_per_rad"]) for row in joints])
     loss = np.array([LOSS[row["edge_kind"]] for row in joints])
-    elements = Elements(directions=directions, stiffness=stiffness, loss=loss * stiffness)
+    elements = Elements(
+        directions=directions, stiffness=stiffness, loss=loss * stiffness
+    )
     line = LinearLine(
         mass=np.diag(inertia),
         stiffness=elements.stiffness_matrix(),
@@ -97,7 +105,9 @@ def with_throws(values, throws_of_bank_a):
     fires = {slot[throw]: f"A{throw}" for throw in slot} | {
         (slot[throw] + 2) % 20: f"B{throw}" for throw in slot
     }
-    values["layout"]["throw_angles_deg"] = [36 * slot[throw] % 360 for throw in sorted(slot)]
+    values["layout"]["throw_angles_deg"] = [
+        36 * slot[throw] % 360 for throw in sorted(slot)
+    ]
     values["layout"]["firing_order"] = [fires[place] for place in range(20)]
     return values
 
@@ -109,4 +119,6 @@ def torques_of(values, speed=SPEED, torque=TORQUE):
 def response_of(values, damper="as_printed", speed=SPEED, torque=TORQUE):
     """Steady vibration of the whole line; fluctuation in rad/s by node number through ``node - 1``."""
     line, _, _ = engine_line(damper)
-    return steady_response(line, torques_of(values, speed, torque).on(tuple(ratios())), speed)
+    return steady_response(
+        line, torques_of(values, speed, torque).on(tuple(ratios())), speed
+    )

@@ -51,16 +51,32 @@ def case(
     **fixed: Any,
 ):
     return Case(
-        kind=kind, key=key, nothing=nothing, rising=rising, fixed=fixed, grows=grows, slack=slack
+        kind=kind,
+        key=key,
+        nothing=nothing,
+        rising=rising,
+        fixed=fixed,
+        grows=grows,
+        slack=slack,
     )
 
 
 CASES = {
     "crack_depth": case("crack", "crack_depth_mm", 0.3, 1.0, 2.0, 2.5),
-    "crack_gamma": case("crack", "crack_depth_mm", 0.3, 1.0, 2.0, 2.5, crack_start="gamma_mid"),
-    "crack_width": case("crack", "crack_width_mm", 2.0, 7.0, 15.0, FULL, crack_depth_mm=2.0),
+    "crack_gamma": case(
+        "crack", "crack_depth_mm", 0.3, 1.0, 2.0, 2.5, crack_start="gamma_mid"
+    ),
+    "crack_width": case(
+        "crack", "crack_width_mm", 2.0, 7.0, 15.0, FULL, crack_depth_mm=2.0
+    ),
     "crack_front": case(
-        "crack", "crack_width_mm", 5.0, 15.0, FULL, crack_depth_mm=2.0, crack_front="parabolic"
+        "crack",
+        "crack_width_mm",
+        5.0,
+        15.0,
+        FULL,
+        crack_depth_mm=2.0,
+        crack_front="parabolic",
     ),
     "crack_compression": case(
         "crack", "crack_depth_mm", 0.3, 1.0, 2.0, 2.5, crack_side="compression"
@@ -76,21 +92,33 @@ CASES = {
     "broken": case("broken", "broken_height_mm", 0.1, 1.0, 2.0, 3.0, 4.5, slack=2e-3),
     "chip_height": case("chipped", "chip_height_mm", 0.5, 1.5, 3.0),
     "chip_width": case("chipped", "chip_width_mm", 1, 8, FULL),
-    "chip_rectangular": case("chipped", "chip_width_mm", 1, 8, 19, chip_shape="rectangular"),
+    "chip_rectangular": case(
+        "chipped", "chip_width_mm", 1, 8, 19, chip_shape="rectangular"
+    ),
     "wear": case("wear", "wear_depth_um", 1, 20, 100),
     "wear_uniform": case("wear", "wear_depth_um", 1, 20, 100, wear_profile=None),
     "misalignment": case("misalignment", "misalignment_um", 1, 15, 60),
     "misalignment_other_end": case("misalignment", "misalignment_um", -1, -15, -60),
     "tip_relief": case("tip_relief", "relief_um", 1, 15, 50),
     "tip_relief_parabolic": case(
-        "tip_relief", "relief_um", 1, 15, 50, relief_length_mm=8.0, relief_curve="parabolic"
+        "tip_relief",
+        "relief_um",
+        1,
+        15,
+        50,
+        relief_length_mm=8.0,
+        relief_curve="parabolic",
     ),
-    "profile_form": case("profile_error", "profile_form_um", 5, 20, 50, profile_slope_um=0.0),
+    "profile_form": case(
+        "profile_error", "profile_form_um", 5, 20, 50, profile_slope_um=0.0
+    ),
     "profile_slope": case(
         "profile_error", "profile_slope_um", 5, 20, 50, profile_form_um=0.0, grows=False
     ),
     "pitch_error": case("pitch_error", "pitch_error_um", 1, 20, 50),
-    "pitch_error_proud": case("pitch_error", "pitch_error_um", -1, -20, -50, grows=False),
+    "pitch_error_proud": case(
+        "pitch_error", "pitch_error_um", -1, -20, -50, grows=False
+    ),
     "runout": case("runout", "eccentricity_um", 5, 40, 80),
 }
 # every kind, each at the size that its option has
@@ -115,7 +143,9 @@ def one(kind: str, **changes: Any) -> Fault:
 def heavy_table(system: SpurPair, *faults: Fault) -> PairTable:
     """The table for pairs that carry the whole load alone, wherever they are."""
     teeth = faulty_teeth(system.pair, faults)
-    return pair_table(system.pair, system.material, system.mesh, teeth, load=system.mesh_force)
+    return pair_table(
+        system.pair, system.material, system.mesh, teeth, load=system.mesh_force
+    )
 
 
 def side_of(table: PairTable, gear: str) -> GearTable:
@@ -130,12 +160,16 @@ def deflection(system: SpurPair, *faults: Fault, tooth: int = 0) -> np.ndarray:
     gear = faults[0].gear if faults else "pinion"
     table = heavy_table(system, *faults)
     side, mate = (
-        side_of(table, name) for name in (gear, "wheel" if gear == "pinion" else "pinion")
+        side_of(table, name)
+        for name in (gear, "wheel" if gear == "pinion" else "pinion")
     )
     row = side.kind[tooth]
     if not side.present[row]:
         return np.full(np.count_nonzero(on_path(table)), np.inf)
-    gap, compliance = side.gap[row] + mate.gap[0], side.compliance[row] + mate.compliance[0]
+    gap, compliance = (
+        side.gap[row] + mate.gap[0],
+        side.compliance[row] + mate.compliance[0],
+    )
     return (gap + compliance * system.mesh_force)[on_path(table)]
 
 

@@ -13,7 +13,16 @@ from gensig.dynamics._vector import LANES
 from gensig.dynamics.lanes import pack
 from gensig.dynamics.pair import PairDynamics
 
-LAW = ("normal", "friction", "moment_p", "moment_w", "along", "stored", "lost", "loaded")
+LAW = (
+    "normal",
+    "friction",
+    "moment_p",
+    "moment_w",
+    "along",
+    "stored",
+    "lost",
+    "loaded",
+)
 BRIEF = 1e-11  # s; the square of what changes over such a step is nothing, the slopes of gaps over it are not
 
 
@@ -29,9 +38,9 @@ def group_laws(group: Group, motions: np.ndarray) -> np.ndarray:
     """The same for a group: instant k is asked of lane k % LANES."""
     motions = np.atleast_2d(np.asarray(motions, dtype=np.float64))
     n = len(motions)
-    padded = np.concatenate([motions, np.repeat(motions[-1:], -n % LANES, axis=0)]).reshape(
-        -1, LANES, 4
-    )
+    padded = np.concatenate(
+        [motions, np.repeat(motions[-1:], -n % LANES, axis=0)]
+    ).reshape(-1, LANES, 4)
     found = np.empty((len(padded), N_LAW, LANES))
     scratch = _kernels.scratch(len(group.force) // LANES, 0)
     for some, law in zip(padded, found, strict=True):
@@ -76,7 +85,9 @@ def _advance(group, q, v, step, first_step, n_steps, channels=()):
         group, state.ravel(), np.zeros(LANES), np.ones(LANES), step, first_step, n_steps, index, means.ravel(), 0,
         np.empty(0), -1, 1, np.empty(0), work, wide, near,
     )  # fmt: skip
-    center = wide.reshape(-1, LANES)[CENTER, 0] * group.rotation.reshape(-1, LANES)[:, 0]
+    center = (
+        wide.reshape(-1, LANES)[CENTER, 0] * group.rotation.reshape(-1, LANES)[:, 0]
+    )
     return (
         state[0, :, 0] + group.rest[:, 0] + center,
         state[1, :, 0].copy(),

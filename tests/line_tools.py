@@ -67,7 +67,9 @@ def chain(n: int, *, loss: float = 2e-5, seed: int = 0) -> GearedLine:
 
 
 def constant_torques(values: np.ndarray) -> list[ShaftTorque]:
-    return [ShaftTorque(dof=i, table=np.array([value])) for i, value in enumerate(values)]
+    return [
+        ShaftTorque(dof=i, table=np.array([value])) for i, value in enumerate(values)
+    ]
 
 
 def state_after(
@@ -91,7 +93,11 @@ def state_after(
 
 
 def law_at(
-    mesh: LineMesh, turned: float, approach: float, rate: float = 0.0, roll_rate: float = 0.0
+    mesh: LineMesh,
+    turned: float,
+    approach: float,
+    rate: float = 0.0,
+    roll_rate: float = 0.0,
 ) -> np.ndarray:
     """What a mesh does, (N_LAW,), when it has rolled so many pitches beyond its start phase."""
     n = len(mesh.direction)

@@ -19,7 +19,11 @@ LIKELY = np.repeat([1e-6, 1e-2], 6) * np.tile(
 
 def equations(dynamics: PairDynamics) -> tuple[Slope, np.ndarray]:
     """y' as a function of t and y = (q, q'), and the matrix of its linear part without the mesh."""
-    system, direction, law = dynamics.system(), dynamics.approach_direction(), law_of(dynamics)
+    system, direction, law = (
+        dynamics.system(),
+        dynamics.approach_direction(),
+        law_of(dynamics),
+    )
     radius, speed = dynamics.table.pair.pinion.base_radius, dynamics.operating.speed
     free = np.eye(12, k=6)
     free[6:] = -np.hstack([system.stiffness, system.damping]) / system.mass[:, None]

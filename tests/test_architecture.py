@@ -17,7 +17,9 @@ MOST_MODULES = 20
 
 
 def run(*command: str, folder: Path = ROOT) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    return subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, check=False
+    )
 
 
 @pytest.mark.parametrize(
@@ -47,8 +49,14 @@ def test_house_rule(command: tuple[str, ...]) -> None:
     [
         ("import gensig", ("numpy", "h5py", "hydra", "numba", "torch", "scipy")),
         ("import gensig.cli", ("numpy", "h5py", "hydra", "numba", "torch", "scipy")),
-        ("import gensig.production.folder", ("torch", "sklearn", "hydra", "matplotlib")),
-        ("import gensig.production.streaming", ("torch", "sklearn", "hydra", "matplotlib")),
+        (
+            "import gensig.production.folder",
+            ("torch", "sklearn", "hydra", "matplotlib"),
+        ),
+        (
+            "import gensig.production.streaming",
+            ("torch", "sklearn", "hydra", "matplotlib"),
+        ),
         # half a second each, which the first record of a session would wait for
         (
             "import gensig.record.simulate",
@@ -115,7 +123,9 @@ def graph() -> grimp.ImportGraph:
     return grimp.build_graph("gensig", "diagnose", cache_dir=None)
 
 
-def folder_imports(graph: grimp.ImportGraph, package: str, imported: str) -> dict[str, set[str]]:
+def folder_imports(
+    graph: grimp.ImportGraph, package: str, imported: str
+) -> dict[str, set[str]]:
     """Folder of ``package`` -> folders of ``imported`` that its modules import, type-only imports included."""
     arrows: dict[str, set[str]] = {}
     for module in sorted(graph.modules):
@@ -131,15 +141,23 @@ def folder_imports(graph: grimp.ImportGraph, package: str, imported: str) -> dic
     return arrows
 
 
-@pytest.mark.parametrize(("package", "allowed"), [("gensig", GENSIG), ("diagnose", DIAGNOSE)])
+@pytest.mark.parametrize(
+    ("package", "allowed"), [("gensig", GENSIG), ("diagnose", DIAGNOSE)]
+)
 def test_folders_import_what_they_may(graph, package, allowed) -> None:
     arrows = folder_imports(graph, package, package)
-    found = {folder: others - {folder} for folder, others in arrows.items() if others - {folder}}
+    found = {
+        folder: others - {folder}
+        for folder, others in arrows.items()
+        if others - {folder}
+    }
     assert found == {folder: set(names.split()) for folder, names in allowed.items()}
 
 
 def test_diagnose_imports_no_physics(graph) -> None:
-    assert set().union(*folder_imports(graph, "diagnose", "gensig").values()) == OF_GENSIG
+    assert (
+        set().union(*folder_imports(graph, "diagnose", "gensig").values()) == OF_GENSIG
+    )
 
 
 def test_hydra_is_imported_by_the_options_alone(graph) -> None:
@@ -153,7 +171,10 @@ def test_hydra_is_imported_by_the_options_alone(graph) -> None:
 
 
 def test_no_import_runs_in_a_circle(graph) -> None:
-    arrows = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
+    arrows = {
+        module: graph.find_modules_directly_imported_by(module)
+        for module in graph.modules
+    }
     assert len(list(TopologicalSorter(arrows).static_order())) == len(
         graph.modules
     )  # raises for a circle
@@ -161,7 +182,9 @@ def test_no_import_runs_in_a_circle(graph) -> None:
 
 def python_files() -> list[Path]:
     return [
-        path for folder in ("gensig", "diagnose") for path in sorted((ROOT / folder).rglob("*.py"))
+        path
+        for folder in ("gensig", "diagnose")
+        for path in sorted((ROOT / folder).rglob("*.py"))
     ]
 
 
@@ -178,14 +201,18 @@ def test_no_file_is_too_long_to_hold() -> None:
 
 @pytest.mark.parametrize("package", ["gensig", "diagnose", "tests"])
 def test_folders_are_small(package: str) -> None:
-    folders = Counter(path.parent.relative_to(ROOT) for path in (ROOT / package).rglob("*.py"))
+    folders = Counter(
+        path.parent.relative_to(ROOT) for path in (ROOT / package).rglob("*.py")
+    )
     assert folders
     assert {str(folder): n for folder, n in folders.items() if n > MOST_MODULES} == {}
 
 
 @pytest.mark.parametrize("package", ["gensig", "diagnose"])
 def test_module_names_are_unique(package: str) -> None:
-    files = [path for path in (ROOT / package).rglob("*.py") if "commands" not in path.parts]
+    files = [
+        path for path in (ROOT / package).rglob("*.py") if "commands" not in path.parts
+    ]
     names = Counter(path.stem for path in files)
     assert {name for name, n in names.items() if n > 1} <= SHARED_NAMES
 
@@ -207,13 +234,13 @@ NAMED_IN_THE_DOCS = (
 def test_imports_of_0_9_keep_working() -> None:
     """In a process of its own: a module that is loaded already would be found."""
     result = run(
-        sys.executable, "-c", "; ".join((*NAMED_IN_THE_DOCS, *(f"import {name}" for name in MOVED)))
+        sys.executable,
+        "-c",
+        "; ".join((*NAMED_IN_THE_DOCS, *(f"import {name}" for name in MOVED))),
     )
     assert result.returncode == 0, result.stderr
 
 
 def test_a_moved_module_is_the_same_object() -> None:
-    code = (
-        "import diagnose.metrics, diagnose.scoring.metrics as new; assert diagnose.metrics is new"
-    )
+    code = "import diagnose.metrics, diagnose.scoring.metrics as new; assert diagnose.metrics is new"
     assert run(sys.executable, "-c", code).returncode == 0

@@ -31,7 +31,9 @@ OF_THE_TREE = (
 )
 # gensig is that of the wheel, and the cache of Numba lies beside its files, wherever those of this run lie
 ENVIRONMENT = {
-    key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "NUMBA_CACHE_DIR")
+    key: value
+    for key, value in os.environ.items()
+    if key not in ("PYTHONPATH", "NUMBA_CACHE_DIR")
 }
 BACKEND = "import sys; from setuptools import build_meta; print(getattr(build_meta, sys.argv[1])(sys.argv[2]))"
 
@@ -44,7 +46,11 @@ def files_of_the_tree() -> list[str]:
             command, cwd=ROOT, capture_output=True, text=True, check=True
         ).stdout.split("\n")
     else:
-        names = (ROOT / "gensig.egg-info" / "SOURCES.txt").read_text(encoding="utf-8").split("\n")
+        names = (
+            (ROOT / "gensig.egg-info" / "SOURCES.txt")
+            .read_text(encoding="utf-8")
+            .split("\n")
+        )
         names = [name for name in names if not name.startswith("gensig.egg-info")]
     return sorted(name for name in names if name and (ROOT / name).is_file())
 
@@ -73,7 +79,9 @@ def build_wheel(source: Path, folder: Path) -> Path:
 def build(kind: str, source: Path, folder: Path) -> Path:
     """What setuptools, that of this environment, makes of a source tree."""
     command = [sys.executable, "-c", BACKEND, kind, str(folder)]
-    done = subprocess.run(command, cwd=source, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        command, cwd=source, capture_output=True, text=True, check=False
+    )
     if done.returncode:
         raise RuntimeError(f"{kind} failed:\n{done.stdout}{done.stderr}")
     return folder / done.stdout.split()[-1]

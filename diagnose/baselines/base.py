@@ -24,7 +24,9 @@ class Role(Enum):
     """Purpose of a baseline; it decides when it runs and in which table of the page it is."""
 
     RIVAL = "the network must beat it"  # runs where the key `baselines` names it
-    AT_CHANCE = "it must be at chance, else something leaks"  # runs with metadata_probe=true
+    AT_CHANCE = (
+        "it must be at chance, else something leaks"  # runs with metadata_probe=true
+    )
     FOLLOWER = "it is at chance unless faults change its input"  # runs with metadata_probe=true
     BOUND = "its input tells more than the network's"  # runs with oracle=auto
 

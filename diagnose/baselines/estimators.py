@@ -28,7 +28,9 @@ class ChosenModel:
 
     def probability(self, table: FeatureTable) -> FloatArray:
         """Probabilities (row, class)."""
-        return class_probability(self.model, table.values[:, self.columns], self.n_classes)
+        return class_probability(
+            self.model, table.values[:, self.columns], self.n_classes
+        )
 
 
 def choose_model(
@@ -48,11 +50,15 @@ def choose_model(
     """
     columns = known_columns(train)
     if without is not None:
-        columns = [index for index in columns if not train.names[index].endswith(without)]
+        columns = [
+            index for index in columns if not train.names[index].endswith(without)
+        ]
     best, best_accuracy = None, -1.0
     for name, make in _candidates().items():
         model = make().fit(train.values[:, columns], train.label)
-        chosen = ChosenModel(name=name, model=model, columns=columns, n_classes=n_classes)
+        chosen = ChosenModel(
+            name=name, model=model, columns=columns, n_classes=n_classes
+        )
         accuracy = record_accuracy(chosen.probability(validation), validation)
         if accuracy > best_accuracy:
             best, best_accuracy = chosen, accuracy
@@ -64,12 +70,16 @@ def boosted_trees(train: FeatureTable, n_classes: int) -> ChosenModel:
     """Gradient boosting without a choice."""
     columns = known_columns(train)
     model = _boosting().fit(train.values[:, columns], train.label)
-    return ChosenModel(name="gradient boosting", model=model, columns=columns, n_classes=n_classes)
+    return ChosenModel(
+        name="gradient boosting", model=model, columns=columns, n_classes=n_classes
+    )
 
 
 def known_columns(table: FeatureTable) -> list[int]:
     """Columns with a finite value; the bins of the boosting need one."""
-    return [int(index) for index in np.flatnonzero(np.isfinite(table.values).any(axis=0))]
+    return [
+        int(index) for index in np.flatnonzero(np.isfinite(table.values).any(axis=0))
+    ]
 
 
 def class_probability(model: Any, values: FloatArray, n_classes: int) -> FloatArray:
@@ -79,7 +89,9 @@ def class_probability(model: Any, values: FloatArray, n_classes: int) -> FloatAr
     return probability
 
 
-def record_scores(probability: FloatArray, record: IntArray) -> tuple[IntArray, FloatArray]:
+def record_scores(
+    probability: FloatArray, record: IntArray
+) -> tuple[IntArray, FloatArray]:
     """Records (record,) and the means (record, class) of the log-probabilities of their rows."""
     return over_records(np.log(np.maximum(probability, LEAST_PROBABILITY)), record)
 
@@ -112,7 +124,9 @@ def _logistic(strength: float) -> Any:
     from sklearn.preprocessing import StandardScaler
 
     model = LogisticRegression(C=strength, max_iter=2000, class_weight="balanced")
-    return make_pipeline(SimpleImputer(keep_empty_features=True), StandardScaler(), model)
+    return make_pipeline(
+        SimpleImputer(keep_empty_features=True), StandardScaler(), model
+    )
 
 
 def _boosting() -> Any:

@@ -50,7 +50,9 @@ FURTHER = (
     ),
 )
 FEATURES = {"basic": INDICATORS, "all": INDICATORS + FURTHER}
-BURST_WINDOW = 0.005  # s, assumed: shorter than a turn, longer than a gearbox mode rings
+BURST_WINDOW = (
+    0.005  # s, assumed: shorter than a turn, longer than a gearbox mode rings
+)
 Cache = dict[
     tuple[tuple[str, ...], int, int, int], FloatArray
 ]  # channels, record, first and last sample
@@ -101,7 +103,10 @@ def indicators(
                 x, sampling_rate, rotation_frequency[gear], min_turns=min_turns
             )
             averages[gear] = average
-            columns += [fm4(average, n_teeth[gear]), sideband_ratio(average, n_teeth[gear])]
+            columns += [
+                fm4(average, n_teeth[gear]),
+                sideband_ratio(average, n_teeth[gear]),
+            ]
         except ValueError:
             columns += [np.full(x.shape[0], np.nan)] * 2
     if features == "all":
@@ -123,14 +128,18 @@ def _further(
             columns.append(_or_unknown(indicator, averages[gear], n_teeth[gear]))
         for of_history in (na4, nb4):
             columns.append(
-                _or_unknown(of_history, averages[gear][:, None], n_teeth[gear]).reshape(-1)
+                _or_unknown(of_history, averages[gear][:, None], n_teeth[gear]).reshape(
+                    -1
+                )
             )
     return columns
 
 
 def _bursts(x: FloatArray, sampling_rate: float) -> FloatArray:
     """(channel,) largest line of the spectral kurtosis."""
-    return spectral_kurtosis(x, sampling_rate, round(BURST_WINDOW * sampling_rate))[1].max(axis=-1)
+    return spectral_kurtosis(x, sampling_rate, round(BURST_WINDOW * sampling_rate))[
+        1
+    ].max(axis=-1)
 
 
 def _or_unknown(
@@ -163,13 +172,22 @@ def feature_table(
     known: Cache = {} if cache is None else cache
     speed, n_teeth = known_rotation(task)
     keys = list(
-        zip(segments.record.tolist(), segments.start.tolist(), segments.stop.tolist(), strict=True)
+        zip(
+            segments.record.tolist(),
+            segments.start.tolist(),
+            segments.stop.tolist(),
+            strict=True,
+        )
     )
 
     def compute(key: tuple[int, int, int]) -> FloatArray:
         frequency = {gear: values[key[0]] for gear, values in speed.items()}
         return indicators(
-            signals[key], task.dataset.sampling_rate, frequency, n_teeth, features=features
+            signals[key],
+            task.dataset.sampling_rate,
+            frequency,
+            n_teeth,
+            features=features,
         ).ravel()
 
     missing = [key for key in keys if (task.channel_names, *key) not in known]
@@ -182,7 +200,9 @@ def feature_table(
     return FeatureTable(
         values=np.stack([known[(task.channel_names, *key)] for key in keys]),
         names=tuple(
-            f"{channel}/{name}" for channel in task.channel_names for name in FEATURES[features]
+            f"{channel}/{name}"
+            for channel in task.channel_names
+            for name in FEATURES[features]
         ),
         label=task.labels()[segments.record],
         record=segments.record,
@@ -193,7 +213,10 @@ def known_rotation(task: Task) -> tuple[dict[str, FloatArray], dict[str, int]]:
     """Rotation frequency in Hz, (record,), and number of teeth of each of `GEARS`."""
     pinion = np.asarray(task.dataset.column("speed_rpm"), dtype=float) / 60
     n_teeth = {gear: _n_teeth(task.dataset.attributes, gear) for gear in GEARS}
-    return {"pinion": pinion, "wheel": pinion * n_teeth["pinion"] / n_teeth["wheel"]}, n_teeth
+    return {
+        "pinion": pinion,
+        "wheel": pinion * n_teeth["pinion"] / n_teeth["wheel"],
+    }, n_teeth
 
 
 def _n_teeth(attributes: Mapping[str, Any], gear: str) -> int:

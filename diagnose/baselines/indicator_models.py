@@ -21,9 +21,13 @@ def indicator_tables(source: Source) -> Parts:
     def table(subset: str) -> FeatureTable:
         segments = source.segments(subset)
         features = source.features
-        return feature_table(source.part(subset), segments, features=features, cache=cache)
+        return feature_table(
+            source.part(subset), segments, features=features, cache=cache
+        )
 
-    return Parts(train=table("train"), validation=table("validation"), test=table("test"))
+    return Parts(
+        train=table("train"), validation=table("validation"), test=table("test")
+    )
 
 
 INDICATOR_INPUT = Input(name="indicators", make=indicator_tables)

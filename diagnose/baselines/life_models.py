@@ -18,7 +18,10 @@ from diagnose.data.windows import Segments, Task
 
 FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
-OPERATING = ("speed_rpm", "torque_nm")  # read off the machine, as far as the data set has them
+OPERATING = (
+    "speed_rpm",
+    "torque_nm",
+)  # read off the machine, as far as the data set has them
 PENALTIES = (1.0, 10.0, 100.0, 1000.0)
 
 
@@ -38,7 +41,8 @@ def operating_names(task: Task) -> tuple[str, ...]:
 def operating_values(task: Task, record: IntArray) -> FloatArray:
     """(record, column) of `OPERATING`."""
     columns = [
-        np.asarray(task.dataset.column(name), dtype=float)[record] for name in operating_names(task)
+        np.asarray(task.dataset.column(name), dtype=float)[record]
+        for name in operating_names(task)
     ]
     return np.stack(columns, axis=1) if columns else np.zeros((record.size, 0))
 
@@ -62,7 +66,8 @@ def indicator_table(
     change = table.values - table.values[first]
     operating = operating_values(task, segments.record)
     return Table(
-        values=np.concatenate([table.values, change, operating], axis=1), record=segments.record
+        values=np.concatenate([table.values, change, operating], axis=1),
+        record=segments.record,
     )
 
 
@@ -106,13 +111,17 @@ def fit_regression(
     known = np.flatnonzero(
         np.isfinite(train.values).any(axis=0)
     )  # the boosting's bins need a value
-    weight, held_out = (balanced_weights(lives.name[table.record]) for table in (train, validation))
+    weight, held_out = (
+        balanced_weights(lives.name[table.record]) for table in (train, validation)
+    )
     scored = []
     for name, make in _candidates().items():
         model = make()
         step = {} if name == "gradient boosting" else {"model__sample_weight": weight}
         model.fit(
-            train.values[:, known], target[train.record], **(step or {"sample_weight": weight})
+            train.values[:, known],
+            target[train.record],
+            **(step or {"sample_weight": weight}),
         )
         error = model.predict(validation.values[:, known]) - target[validation.record]
         scored.append((float(np.average(error**2, weights=held_out)), name, model))
@@ -133,7 +142,10 @@ def _candidates() -> dict[str, Callable[[], Any]]:
     from sklearn.preprocessing import StandardScaler
 
     def ridge(penalty: float) -> Any:
-        steps = [("impute", SimpleImputer(keep_empty_features=True)), ("scale", StandardScaler())]
+        steps = [
+            ("impute", SimpleImputer(keep_empty_features=True)),
+            ("scale", StandardScaler()),
+        ]
         return Pipeline([*steps, ("model", Ridge(alpha=penalty))])
 
     def boosting() -> Any:

@@ -55,7 +55,9 @@ class Bank:
     padded: NDArray[np.bool_]
 
 
-def fit_minirocket(windows: FloatArray, *, n_features: int, rng: np.random.Generator) -> list[Bank]:
+def fit_minirocket(
+    windows: FloatArray, *, n_features: int, rng: np.random.Generator
+) -> list[Bank]:
     """Choose dilations, channels and thresholds.
 
     Parameters
@@ -84,9 +86,14 @@ def fit_minirocket(windows: FloatArray, *, n_features: int, rng: np.random.Gener
             padding=4 * dilation,
             groups=len(KERNELS),
         )[0]
-        share = quantile[used : used + len(KERNELS) * count].reshape(len(KERNELS), count)
+        share = quantile[used : used + len(KERNELS) * count].reshape(
+            len(KERNELS), count
+        )
         bias = np.stack(
-            [np.quantile(row, part) for row, part in zip(output.numpy(), share, strict=True)]
+            [
+                np.quantile(row, part)
+                for row, part in zip(output.numpy(), share, strict=True)
+            ]
         )
         banks.append(
             Bank(
@@ -111,7 +118,10 @@ def minirocket_features(windows: FloatArray, banks: list[Bank]) -> FloatArray:
 
     blocks = torch.from_numpy(windows).split(2)
     return np.concatenate(
-        [np.concatenate([_shares(block, bank) for bank in banks], axis=1) for block in blocks]
+        [
+            np.concatenate([_shares(block, bank) for bank in banks], axis=1)
+            for block in blocks
+        ]
     )
 
 
@@ -121,15 +131,22 @@ def _shares(windows: torch.Tensor, bank: Bank) -> FloatArray:
 
     n_samples, margin = windows.shape[-1], 4 * bank.dilation
     padded = torch.nn.functional.pad(windows, (margin, margin))
-    taps = [padded[..., tap * bank.dilation :][..., :n_samples] for tap in range(KERNEL_LENGTH)]
-    output = torch.matmul(bank.weight.flatten(1), torch.stack(taps, dim=2).flatten(1, 2)).numpy()
+    taps = [
+        padded[..., tap * bank.dilation :][..., :n_samples]
+        for tap in range(KERNEL_LENGTH)
+    ]
+    output = torch.matmul(
+        bank.weight.flatten(1), torch.stack(taps, dim=2).flatten(1, 2)
+    ).numpy()
     shares = np.empty((len(windows), *bank.bias.shape), dtype=np.float32)
     for ends, span in ((True, slice(None)), (False, slice(margin, n_samples - margin))):
         kernels = np.flatnonzero(bank.padded == ends)
         part = output[:, kernels, span]
         for index, bias in enumerate(bank.bias[kernels].T):
             above = (part > bias[:, None]).view(np.uint8)
-            shares[:, kernels, index] = above.sum(axis=-1, dtype=np.uint32) / part.shape[-1]
+            shares[:, kernels, index] = (
+                above.sum(axis=-1, dtype=np.uint32) / part.shape[-1]
+            )
     return shares.reshape(len(windows), -1)
 
 
@@ -173,7 +190,9 @@ def rocket_tables(
     banks = fit_minirocket(train.cut(examples), n_features=n_features, rng=rng)
 
     def table(windows: WindowSet) -> FeatureTable:
-        return over_stretches(windows, lambda block: minirocket_features(block, banks), "rocket")
+        return over_stretches(
+            windows, lambda block: minirocket_features(block, banks), "rocket"
+        )
 
     return Parts(train=table(train), validation=table(validation), test=table(test))
 
@@ -230,4 +249,6 @@ def _ridge(penalty: float) -> Any:
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler
 
-    return make_pipeline(StandardScaler(), RidgeClassifier(alpha=penalty, class_weight="balanced"))
+    return make_pipeline(
+        StandardScaler(), RidgeClassifier(alpha=penalty, class_weight="balanced")
+    )

@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from sklearn.neighbors import KNeighborsClassifier
 
 FloatArray = NDArray[np.floating]
-SPECTRUM_FLOOR = 0.01  # 40 dB below white noise of the same RMS, as in configs/model/spectrum.yaml
+SPECTRUM_FLOOR = (
+    0.01  # 40 dB below white noise of the same RMS, as in configs/model/spectrum.yaml
+)
 
 
 def spectrum_table(windows: WindowSet, scale: Sequence[float]) -> FeatureTable:
@@ -46,8 +48,12 @@ def spectrum_tables(source: Source) -> Parts:
     """Spectra of the windows of every subset, divided alike."""
     sets = source.windows()
     scale = input_scale(sets["train"])
-    tables = {subset: spectrum_table(windows, scale) for subset, windows in sets.items()}
-    return Parts(train=tables["train"], validation=tables["validation"], test=tables["test"])
+    tables = {
+        subset: spectrum_table(windows, scale) for subset, windows in sets.items()
+    }
+    return Parts(
+        train=tables["train"], validation=tables["validation"], test=tables["test"]
+    )
 
 
 SPECTRUM_INPUT = Input(name="spectra", make=spectrum_tables)

@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 
 from diagnose.baselines.base import Input, MethodText, Parts, Role, Source
 from diagnose.baselines.chosen_model import ChosenModelBaseline
-from diagnose.baselines.features import INDICATORS, Cache, FeatureTable, indicators, known_rotation
+from diagnose.baselines.features import (
+    INDICATORS,
+    Cache,
+    FeatureTable,
+    indicators,
+    known_rotation,
+)
 from diagnose.data.inputs import NetworkInput
 from diagnose.data.windows import Segments, Task, WindowSet, read_signal
 from diagnose.networks.domain import band_levels
@@ -39,19 +45,26 @@ def oracle_windows(
     Under ``normalise=rms`` that is the twin's RMS over the stretch, channel by channel. Record
     and difference say what record and twin say; no kernel has to learn to subtract.
     """
-    windows = inputs.load(task, segments, training=training, read=_record_and_difference)
+    windows = inputs.load(
+        task, segments, training=training, read=_record_and_difference
+    )
     return replace(windows, normalise="none")
 
 
-def _record_and_difference(task: Task, record: int, start: int, stop: int) -> NDArray[np.float32]:
+def _record_and_difference(
+    task: Task, record: int, start: int, stop: int
+) -> NDArray[np.float32]:
     signal, twin = (
-        read_signal(task, record, start, stop, name=name) for name in ("acceleration", TWIN)
+        read_signal(task, record, start, stop, name=name)
+        for name in ("acceleration", TWIN)
     )
     both = np.concatenate([signal, signal - twin])
     if task.normalise == "none":
         return both
     level = np.std(twin, axis=-1, keepdims=True)
-    return both * np.tile(np.divide(1, level, out=np.zeros_like(level), where=level > 0), (2, 1))
+    return both * np.tile(
+        np.divide(1, level, out=np.zeros_like(level), where=level > 0), (2, 1)
+    )
 
 
 def oracle_table(task: Task, segments: Segments, cache: Cache) -> FeatureTable:
@@ -82,14 +95,20 @@ def oracle_table(task: Task, segments: Segments, cache: Cache) -> FeatureTable:
         cache[key] = np.concatenate([*columns, rest, faulty - sound], axis=1).ravel()
     n_bands = cache[keys[0]].size // len(task.channel_names) - 3 * len(INDICATORS)
     of_channel = [
-        f"{part}/{name}" for part in ("record", "twin", "difference") for name in INDICATORS
+        f"{part}/{name}"
+        for part in ("record", "twin", "difference")
+        for name in INDICATORS
     ]
     of_channel += [
-        f"{part}/band_{band}" for part in ("difference", "ratio") for band in range(n_bands // 2)
+        f"{part}/band_{band}"
+        for part in ("difference", "ratio")
+        for band in range(n_bands // 2)
     ]
     return FeatureTable(
         values=np.stack([cache[key] for key in keys]),
-        names=tuple(f"{channel}/{name}" for channel in task.channel_names for name in of_channel),
+        names=tuple(
+            f"{channel}/{name}" for channel in task.channel_names for name in of_channel
+        ),
         label=task.labels()[segments.record],
         record=segments.record,
     )
@@ -102,7 +121,9 @@ def twin_tables(source: Source) -> Parts:
     def table(subset: str) -> FeatureTable:
         return oracle_table(source.part(subset), source.segments(subset), cache)
 
-    return Parts(train=table("train"), validation=table("validation"), test=table("test"))
+    return Parts(
+        train=table("train"), validation=table("validation"), test=table("test")
+    )
 
 
 TWIN_INPUT = Input(name="with_twins", make=twin_tables)

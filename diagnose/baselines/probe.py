@@ -67,17 +67,29 @@ def probe_values(
     All records are of one length, so that length tells nothing.
     """
     place = np.arange(dataset.n_records)
-    parts: dict[str, NDArray] = {"place": place, "place_modulo_classes": place % n_classes}
+    parts: dict[str, NDArray] = {
+        "place": place,
+        "place_modulo_classes": place % n_classes,
+    }
     if "condition_id" in dataset.column_names:
-        parts["place_in_condition"] = _count_before(np.asarray(dataset.column("condition_id")))
+        parts["place_in_condition"] = _count_before(
+            np.asarray(dataset.column("condition_id"))
+        )
     for name in probed_columns(dataset, results=results):
         values = np.asarray(dataset.column(name))
-        numbers = np.unique(values, return_inverse=True)[1] if values.dtype.kind in "US" else values
+        numbers = (
+            np.unique(values, return_inverse=True)[1]
+            if values.dtype.kind in "US"
+            else values
+        )
         rows = numbers.reshape(dataset.n_records, -1)
         parts |= {
-            name if rows.shape[1] == 1 else f"{name}/{k}": rows[:, k] for k in range(rows.shape[1])
+            name if rows.shape[1] == 1 else f"{name}/{k}": rows[:, k]
+            for k in range(rows.shape[1])
         }
-    return np.stack([part.astype(float) for part in parts.values()], axis=1), tuple(parts)
+    return np.stack([part.astype(float) for part in parts.values()], axis=1), tuple(
+        parts
+    )
 
 
 def _count_before(names: NDArray) -> NDArray[np.integer]:
@@ -98,9 +110,13 @@ def _probe_tables(source: Source, *, results: bool) -> Parts:
     def table(subset: str) -> FeatureTable:
         record = np.unique(source.segments(subset).record)
         label = task.labels()[record]
-        return FeatureTable(values=values[record], names=names, label=label, record=record)
+        return FeatureTable(
+            values=values[record], names=names, label=label, record=record
+        )
 
-    return Parts(train=table("train"), validation=table("validation"), test=table("test"))
+    return Parts(
+        train=table("train"), validation=table("validation"), test=table("test")
+    )
 
 
 METADATA_INPUT = Input(name="metadata", make=partial(_probe_tables, results=False))

@@ -29,9 +29,18 @@ BANDS = (
     (0.25, 0.5),
     (0.5, 0.999),
 )  # of what the recorder passes, `PASS_SHARE` of the rate
-OF_CHANNEL = ("rise", "fall")  # largest and smallest change of a tooth, in standard deviations
+OF_CHANNEL = (
+    "rise",
+    "fall",
+)  # largest and smallest change of a tooth, in standard deviations
 OF_ALL = "outstanding"  # of the channels' mean square changes: logarithm of the largest tooth over the median one
-NEEDED = ("unit_id", "fault_gear", "start_phase", "start_tooth_pinion", "start_tooth_wheel")
+NEEDED = (
+    "unit_id",
+    "fault_gear",
+    "start_phase",
+    "start_tooth_pinion",
+    "start_tooth_wheel",
+)
 _BANDS = range(len(BANDS))
 Levels = dict[
     tuple[tuple[str, ...], int, int, int], dict[str, FloatArray]
@@ -85,7 +94,10 @@ def reference_table(task: Task, segments: Segments, known: Levels) -> FeatureTab
         )
     rows = []
     for key in zip(
-        segments.record.tolist(), segments.start.tolist(), segments.stop.tolist(), strict=True
+        segments.record.tolist(),
+        segments.start.tolist(),
+        segments.stop.tolist(),
+        strict=True,
     ):
         other = int(reference[key[0]])
         own = _levels(task, known, *key)
@@ -94,7 +106,9 @@ def reference_table(task: Task, segments: Segments, known: Levels) -> FeatureTab
             continue
         whole = _levels(task, known, other, 0, int(task.dataset.n_samples))
         rows.append(
-            np.concatenate([_measures(changed_teeth(own[gear], whole[gear])) for gear in GEARS])
+            np.concatenate(
+                [_measures(changed_teeth(own[gear], whole[gear])) for gear in GEARS]
+            )
         )
     return FeatureTable(
         values=np.array(rows),
@@ -111,7 +125,9 @@ def reference_tables(source: Source) -> Parts:
     def table(subset: str) -> FeatureTable:
         return reference_table(source.part(subset), source.segments(subset), known)
 
-    return Parts(train=table("train"), validation=table("validation"), test=table("test"))
+    return Parts(
+        train=table("train"), validation=table("validation"), test=table("test")
+    )
 
 
 TOOTH_INPUT = Input(name="tooth_changes", make=reference_tables)
@@ -159,7 +175,9 @@ def _measures(changes: FloatArray) -> FloatArray:
     return np.where(np.isfinite(columns), columns, np.nan)
 
 
-def _levels(task: Task, known: Levels, record: int, start: int, stop: int) -> dict[str, FloatArray]:
+def _levels(
+    task: Task, known: Levels, record: int, start: int, stop: int
+) -> dict[str, FloatArray]:
     """Levels (channel, band, tooth) of either gear, tooth 0 first.
 
     NaN for one that makes no turn in the stretch.
@@ -168,7 +186,10 @@ def _levels(task: Task, known: Levels, record: int, start: int, stop: int) -> di
     if key not in known:
         column = {name: float(task.dataset.column(name)[record]) for name in NEEDED[2:]}
         speed, n_teeth = known_rotation(task)
-        rate, signal = float(task.dataset.sampling_rate), read_signal(task, record, start, stop)
+        rate, signal = (
+            float(task.dataset.sampling_rate),
+            read_signal(task, record, start, stop),
+        )
         passed = (
             column["start_phase"]
             + start / rate * float(speed["pinion"][record]) * n_teeth["pinion"]
@@ -189,10 +210,13 @@ def _levels(task: Task, known: Levels, record: int, start: int, stop: int) -> di
 def _of_gear(
     signal: FloatArray, rate: float, rotation: float, n_teeth: int, start: float
 ) -> FloatArray:
-    shares = [(low * PASS_SHARE * rate, high * PASS_SHARE * rate) for low, high in BANDS]
+    shares = [
+        (low * PASS_SHARE * rate, high * PASS_SHARE * rate) for low, high in BANDS
+    ]
     try:
         levels = [
-            tooth_levels(signal, rate, rotation, n_teeth, band=band, start=start) for band in shares
+            tooth_levels(signal, rate, rotation, n_teeth, band=band, start=start)
+            for band in shares
         ]
     except ValueError:
         return np.full((len(signal), len(BANDS), n_teeth), np.nan)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from diagnose.baselines.base import Baseline, Role
-from diagnose.baselines.indicator_models import IndicatorModel, IndicatorModelWithoutLevel
+from diagnose.baselines.indicator_models import (
+    IndicatorModel,
+    IndicatorModelWithoutLevel,
+)
 from diagnose.baselines.minirocket import MiniRocket
 from diagnose.baselines.nearest_spectrum import NearestSpectrum
 from diagnose.baselines.oracle import OracleIndicators

@@ -46,8 +46,12 @@ class RmsThreshold(Baseline):
         )
         self._tree.fit(_level(train), train.label)
         nodes = self._tree.tree_
-        thresholds = sorted(float(np.exp(cut)) for cut in nodes.threshold[nodes.feature >= 0])
-        return "thresholds " + ", ".join(f"{value:.3g}" for value in thresholds) + " m/s^2"
+        thresholds = sorted(
+            float(np.exp(cut)) for cut in nodes.threshold[nodes.feature >= 0]
+        )
+        return (
+            "thresholds " + ", ".join(f"{value:.3g}" for value in thresholds) + " m/s^2"
+        )
 
     def predict_proba(self, table: FeatureTable) -> FloatArray:
         """Shares (row, class) of the training rows in the interval of each row."""

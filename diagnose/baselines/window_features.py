@@ -27,7 +27,9 @@ def over_stretches(
     features : returns (window, feature) of windows (window, channel, sample)
     name : of the columns, before their number
     """
-    stretch, first, position = np.unique(windows.segment, return_index=True, return_inverse=True)
+    stretch, first, position = np.unique(
+        windows.segment, return_index=True, return_inverse=True
+    )
     every = np.arange(len(windows))
     total: FloatArray | None = None
     for block in np.array_split(every, -(-every.size // BLOCK)):

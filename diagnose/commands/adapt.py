@@ -37,16 +37,29 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="folder that diagnose train wrote below models/",
     )
     parser.add_argument(
-        "--healthy", required=True, nargs="+", metavar="RECORDING", help="as diagnose predict takes"
+        "--healthy",
+        required=True,
+        nargs="+",
+        metavar="RECORDING",
+        help="as diagnose predict takes",
     )
     parser.add_argument(
-        "--method", required=True, choices=("adabn", "coral"), help="see docs/howto/bridge.md"
+        "--method",
+        required=True,
+        choices=("adabn", "coral"),
+        help="see docs/howto/bridge.md",
     )
     parser.add_argument(
-        "--out", required=True, metavar="DIR", help="folder to write; must not exist or be empty"
+        "--out",
+        required=True,
+        metavar="DIR",
+        help="folder to write; must not exist or be empty",
     )
     parser.add_argument(
-        "--sampling-rate", type=float, metavar="HZ", help="samples a second, where files are silent"
+        "--sampling-rate",
+        type=float,
+        metavar="HZ",
+        help="samples a second, where files are silent",
     )
     parser.add_argument(
         "--speed-rpm",
@@ -55,13 +68,20 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="of the driving shaft; one not trained is refused",
     )
     parser.add_argument(
-        "--channels", nargs="+", metavar="NAME", help="for the model's channels, in their order"
+        "--channels",
+        nargs="+",
+        metavar="NAME",
+        help="for the model's channels, in their order",
     )
     parser.add_argument(
-        "--unit", default="m/s2", help="m/s2 or g, where the column does not say (default: m/s2)"
+        "--unit",
+        default="m/s2",
+        help="m/s2 or g, where the column does not say (default: m/s2)",
     )
     parser.add_argument(
-        "--array", metavar="NAME", help="array of .npz, .h5 or .mat files (default: acceleration)"
+        "--array",
+        metavar="NAME",
+        help="array of .npz, .h5 or .mat files (default: acceleration)",
     )
 
 
@@ -96,5 +116,7 @@ def run(words: Sequence[str]) -> int:
             f"unlike the training data: {before['n_windows_beyond']} of {n_windows} windows before, "
             f"{after['n_windows_beyond']} after"
         )
-    print("Healthy recordings cannot show whether faults are still found: docs/howto/bridge.md")
+    print(
+        "Healthy recordings cannot show whether faults are still found: docs/howto/bridge.md"
+    )
     return 0

@@ -46,10 +46,17 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--config-dir", metavar="DIR", help="folder with groups and options of your own"
     )
     shares = "of the driving pinion (default: shares of the set-point,"
-    parser.add_argument("--speeds", nargs="+", metavar="RPM", help=f"{shares} a quarter to twice)")
-    parser.add_argument("--torques", nargs="+", metavar="NM", help=f"{shares} a quarter to twice)")
     parser.add_argument(
-        "--bandwidths", nargs="+", metavar="HZ", help="upper frequencies (default: 1000 to 20000)"
+        "--speeds", nargs="+", metavar="RPM", help=f"{shares} a quarter to twice)"
+    )
+    parser.add_argument(
+        "--torques", nargs="+", metavar="NM", help=f"{shares} a quarter to twice)"
+    )
+    parser.add_argument(
+        "--bandwidths",
+        nargs="+",
+        metavar="HZ",
+        help="upper frequencies (default: 1000 to 20000)",
     )
     parser.add_argument(
         "--n-units",
@@ -60,9 +67,13 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     fixed = "the noise of the set-point everywhere, as a sensor's own is (default: the same snr_db everywhere)"
     parser.add_argument("--fixed-noise", action="store_true", help=fixed)
-    parser.add_argument("--workers", type=int, metavar="N", help="processes (default: one a core)")
+    parser.add_argument(
+        "--workers", type=int, metavar="N", help="processes (default: one a core)"
+    )
     parser.add_argument("--json", metavar="FILE", help="write every number")
-    parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
+    parser.add_argument(
+        "--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)"
+    )
 
 
 def run(words: Sequence[str]) -> int:
@@ -97,7 +108,9 @@ def run(words: Sequence[str]) -> int:
     pairs = make_pairs()
     edges = read_bandwidths(bandwidths, pairs)
     with progress(pairs.n_cells, "simulating") as on_done:
-        maps = make_maps(pairs, edges, n_workers=arguments.workers or _n_cores(), on_done=on_done)
+        maps = make_maps(
+            pairs, edges, n_workers=arguments.workers or _n_cores(), on_done=on_done
+        )
     again = confirm_best(maps, make_pairs(epoch=1))
     print("\n".join(summary(maps, again)))
     if maps.n_failed:
@@ -106,7 +119,8 @@ def run(words: Sequence[str]) -> int:
         import json
 
         table.write_text(
-            json.dumps(content(maps, again), indent=1, allow_nan=False) + "\n", encoding="utf-8"
+            json.dumps(content(maps, again), indent=1, allow_nan=False) + "\n",
+            encoding="utf-8",
         )
     if figure is not None:
         from diagnose.detectability.figure import detectability_figure
@@ -121,16 +135,23 @@ def _say_unread(overrides: Sequence[str]) -> None:
 
     for key in override_keys(overrides):
         flag = next(
-            (flag for name, flag in NOT_READ.items() if key == name or key.startswith(f"{name}.")),
+            (
+                flag
+                for name, flag in NOT_READ.items()
+                if key == name or key.startswith(f"{name}.")
+            ),
             None,
         )
         if flag is not None and key not in READ_OF_PLAN:
             print(
-                f"diagnose: note: {key} is not read by detectability; use {flag}", file=sys.stderr
+                f"diagnose: note: {key} is not read by detectability; use {flag}",
+                file=sys.stderr,
             )
 
 
-def _numbers(flag: str, given: Sequence[str] | None, overrides: list[str]) -> list[float] | None:
+def _numbers(
+    flag: str, given: Sequence[str] | None, overrides: list[str]
+) -> list[float] | None:
     """The numbers of a flag; overrides that were typed behind them join the others."""
     if given is None:
         return None
@@ -150,11 +171,17 @@ def _file(flag: str, name: str | None, types: tuple[str, ...]) -> Path | None:
     if path.suffix not in types:
         raise ConfigError(f"{flag} {name}: the name must end in {', '.join(types)}")
     if not path.parent.is_dir():
-        raise ConfigError(f"{flag} {name}: there is no folder {path.parent}; make it first")
+        raise ConfigError(
+            f"{flag} {name}: there is no folder {path.parent}; make it first"
+        )
     return path
 
 
 def _n_cores() -> int:
     import os
 
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return (
+        len(os.sched_getaffinity(0))
+        if hasattr(os, "sched_getaffinity")
+        else os.cpu_count() or 1
+    )

@@ -84,7 +84,9 @@ def _key_values(words: Sequence[str]) -> dict[str, str]:
             raise ConfigError(f"'{word}' is not of the form key=value")
         if key not in KEYS:
             close = difflib.get_close_matches(key, KEYS, n=1)
-            hint = f"did you mean {close[0]}?" if close else f"there is {', '.join(KEYS)}"
+            hint = (
+                f"did you mean {close[0]}?" if close else f"there is {', '.join(KEYS)}"
+            )
             raise ConfigError(f"unknown key '{key}'; {hint}")
         if key in values:
             raise ConfigError(f"{key} is given twice")

@@ -30,7 +30,10 @@ def parser() -> Parser:
 def add_arguments(parser: ArgumentParser) -> None:
     """What can be typed behind the verb."""
     parser.add_argument(
-        "--to", required=True, choices=["onnx"], help="format; needs pip install 'gensig[onnx]'"
+        "--to",
+        required=True,
+        choices=["onnx"],
+        help="format; needs pip install 'gensig[onnx]'",
     )
     parser.add_argument(
         "--model",
@@ -39,7 +42,10 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="folder that diagnose train wrote below models/",
     )
     parser.add_argument(
-        "--out", required=True, metavar="FILE", help="file to write, .onnx; must not exist"
+        "--out",
+        required=True,
+        metavar="FILE",
+        help="file to write, .onnx; must not exist",
     )
 
 

@@ -62,13 +62,23 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="of the driving shaft: was it trained at such?",
     )
     parser.add_argument(
-        "--teeth", nargs=2, type=int, metavar=("DRIVING", "DRIVEN"), help="was it trained at such?"
+        "--teeth",
+        nargs=2,
+        type=int,
+        metavar=("DRIVING", "DRIVEN"),
+        help="was it trained at such?",
     )
     parser.add_argument(
-        "--tacho", metavar="CHANNEL", help="pulses of the driving shaft, to follow its speed"
+        "--tacho",
+        metavar="CHANNEL",
+        help="pulses of the driving shaft, to follow its speed",
     )
     parser.add_argument(
-        "--pulses-per-turn", type=int, default=1, metavar="N", help="of --tacho (default: 1)"
+        "--pulses-per-turn",
+        type=int,
+        default=1,
+        metavar="N",
+        help="of --tacho (default: 1)",
     )
     parser.add_argument(
         "--to-speed",
@@ -77,25 +87,42 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="play it at this speed of the training instead",
     )
     parser.add_argument(
-        "--as-recorded", action="store_true", help="no order tracking, even with --teeth or --tacho"
+        "--as-recorded",
+        action="store_true",
+        help="no order tracking, even with --teeth or --tacho",
     )
     parser.add_argument(
-        "--channels", nargs="+", metavar="NAME", help="for the model's channels, in their order"
+        "--channels",
+        nargs="+",
+        metavar="NAME",
+        help="for the model's channels, in their order",
     )
     parser.add_argument(
-        "--unit", default="m/s2", help="m/s2 or g, where the column does not say (default: m/s2)"
+        "--unit",
+        default="m/s2",
+        help="m/s2 or g, where the column does not say (default: m/s2)",
     )
     parser.add_argument(
-        "--array", metavar="NAME", help="array of a .npz, .h5 or .mat file (default: acceleration)"
+        "--array",
+        metavar="NAME",
+        help="array of a .npz, .h5 or .mat file (default: acceleration)",
     )
     parser.add_argument(
-        "--torque-nm", type=float, metavar="NM", help="of the driving shaft, for remaining lives"
+        "--torque-nm",
+        type=float,
+        metavar="NM",
+        help="of the driving shaft, for remaining lives",
     )
     parser.add_argument(
-        "--life-time-h", type=float, metavar="H", help="since new, for remaining lives with the age"
+        "--life-time-h",
+        type=float,
+        metavar="H",
+        help="since new, for remaining lives with the age",
     )
     parser.add_argument(
-        "--json", action="store_true", help="print everything, window by window, as JSON"
+        "--json",
+        action="store_true",
+        help="print everything, window by window, as JSON",
     )
 
 
@@ -136,5 +163,13 @@ def run(words: Sequence[str]) -> int:
     if arguments.json:
         import json
 
-        print(json.dumps(results[0] if len(results) == 1 else results, indent=2, allow_nan=False))
-    return OUT_OF_DISTRIBUTION if any(result["out_of_distribution"] for result in results) else 0
+        print(
+            json.dumps(
+                results[0] if len(results) == 1 else results, indent=2, allow_nan=False
+            )
+        )
+    return (
+        OUT_OF_DISTRIBUTION
+        if any(result["out_of_distribution"] for result in results)
+        else 0
+    )

@@ -35,10 +35,15 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--data", required=True, metavar="DIR", help="data set made by gensig generate"
     )
     parser.add_argument(
-        "--predictions", required=True, metavar="FILE", help="CSV: record_id, predicted, ..."
+        "--predictions",
+        required=True,
+        metavar="FILE",
+        help="CSV: record_id, predicted, ...",
     )
     parser.add_argument(
-        "--protocol", metavar="NAME", help="of a file without that column (default: by_unit)"
+        "--protocol",
+        metavar="NAME",
+        help="of a file without that column (default: by_unit)",
     )
     parser.add_argument("--json", action="store_true", help="print everything as JSON")
 
@@ -53,7 +58,9 @@ def run(words: Sequence[str]) -> int:
     from gensig.dataset.reader import open_dataset
 
     dataset = open_dataset(arguments.data)
-    result = score_file(dataset, Path(arguments.predictions), protocol=arguments.protocol)
+    result = score_file(
+        dataset, Path(arguments.predictions), protocol=arguments.protocol
+    )
     if arguments.json:
         print(json.dumps(result, indent=2, allow_nan=False))
         return 0
@@ -61,7 +68,8 @@ def run(words: Sequence[str]) -> int:
     if benchmark is not None:
         for difference in benchmark["differences"]:
             print(
-                f"diagnose: not comparable with {benchmark['name']}: {difference}", file=sys.stderr
+                f"diagnose: not comparable with {benchmark['name']}: {difference}",
+                file=sys.stderr,
             )
         if not benchmark["differences"]:
             print(f"{benchmark['name']}: plan, splits and signals are the frozen ones")

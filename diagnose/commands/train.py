@@ -66,11 +66,15 @@ def run(words: Sequence[str]) -> int:
 
     if not arguments.multirun:
         override_keys(arguments.overrides)
-        _train_one(compose("train", arguments.overrides, config_dir=arguments.config_dir))
+        _train_one(
+            compose("train", arguments.overrides, config_dir=arguments.config_dir)
+        )
         return 0
     jobs = _expand(arguments.overrides, arguments.config_dir)
     for number, config in enumerate(jobs, start=1):
-        print(f"run {number} of {len(jobs)}: {config['out']}", file=sys.stderr, flush=True)
+        print(
+            f"run {number} of {len(jobs)}: {config['out']}", file=sys.stderr, flush=True
+        )
         _train_one(config)
     return 0
 
@@ -86,11 +90,16 @@ def _expand(overrides: Sequence[str], config_dir: str | None) -> list[Configurat
     configs = [compose("train", job, config_dir=config_dir) for job in jobs]
     parents = {str(config["out"]) for config in configs}
     if len(parents) > 1:
-        raise ConfigError("out must be one folder; with -m each run gets a folder below it")
+        raise ConfigError(
+            "out must be one folder; with -m each run gets a folder below it"
+        )
     parent = Path(parents.pop())
     refuse_existing(parent)
     folders = [str(parent / name) for name in job_folders(jobs)]
-    return [config.with_entries(out=out) for config, out in zip(configs, folders, strict=True)]
+    return [
+        config.with_entries(out=out)
+        for config, out in zip(configs, folders, strict=True)
+    ]
 
 
 def _train_one(config: Configuration) -> None:
@@ -114,8 +123,12 @@ def _study_classes(settings: TrainSettings, out: Path) -> tuple[Path, list[str]]
 
     task, settings = _opened(settings)
     protocols, jobs = plan_study(task, settings)
-    with _started(out, len(jobs), choose_protocols(task, settings.protocols)[1]) as on_done:
-        metrics = run_study(task, settings, out, protocols=protocols, jobs=jobs, on_done=on_done)
+    with _started(
+        out, len(jobs), choose_protocols(task, settings.protocols)[1]
+    ) as on_done:
+        metrics = run_study(
+            task, settings, out, protocols=protocols, jobs=jobs, on_done=on_done
+        )
     page = write_report(out, metrics)
     tables = [*result_table(metrics), *novelty_tables(metrics["novelty"])]
     return page, tables + without_interval(metrics)
@@ -125,13 +138,19 @@ def _study_lives(settings: TrainSettings, out: Path) -> tuple[Path, list[str]]:
     """Page and tables of a study of remaining lives."""
     from diagnose.data.lives import lives_of
     from diagnose.report.life_report import life_tables, write_life_report
-    from diagnose.studies.life_study import check_life_settings, plan_life_study, run_life_study
+    from diagnose.studies.life_study import (
+        check_life_settings,
+        plan_life_study,
+        run_life_study,
+    )
 
     check_life_settings(settings)
     task, settings = _opened(settings)
     plan = plan_life_study(task, settings)
     with _started(out, len(plan.jobs), plan.left_out) as on_done:
-        metrics, predictions = run_life_study(task, settings, out, plan, on_done=on_done)
+        metrics, predictions = run_life_study(
+            task, settings, out, plan, on_done=on_done
+        )
     page = write_life_report(out, metrics, lives_of(task), predictions)
     return page, life_tables(metrics)
 

@@ -66,7 +66,9 @@ def at_rate(dataset: Dataset, sampling_rate: float | None) -> Dataset:
 
 def at_rate_of(dataset: Dataset, other: Dataset) -> Dataset:
     """A data set read at a lower rate where the other one is; else as it is."""
-    return at_rate(dataset, other.sampling_rate) if isinstance(other, _Slower) else dataset
+    return (
+        at_rate(dataset, other.sampling_rate) if isinstance(other, _Slower) else dataset
+    )
 
 
 class _Slower:
@@ -96,8 +98,12 @@ class _Slower:
         """
 
         def read(first: int, last: int) -> np.ndarray:
-            return np.asarray(self._dataset.signals(record_index, first, last, channels, **which))
+            return np.asarray(
+                self._dataset.signals(record_index, first, last, channels, **which)
+            )
 
         last = self.n_samples if stop is None else stop
-        part = self._change.apply_to_part(read, int(self._dataset.n_samples), start, last)
+        part = self._change.apply_to_part(
+            read, int(self._dataset.n_samples), start, last
+        )
         return part.astype(np.float32)

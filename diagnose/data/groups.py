@@ -33,7 +33,11 @@ class Group:
         """The group in words."""
         if self.name is not None:
             return self.name
-        return f"{self.low:.4g}" if self.low == self.high else f"{self.low:.4g} to {self.high:.4g}"
+        return (
+            f"{self.low:.4g}"
+            if self.low == self.high
+            else f"{self.low:.4g} to {self.high:.4g}"
+        )
 
 
 def groups_of(values: NDArray[Any], *, most: int) -> list[Group]:
@@ -61,6 +65,11 @@ def groups_of(values: NDArray[Any], *, most: int) -> list[Group]:
         member = place == index
         inside = values[member]
         groups.append(
-            Group(member=member, low=float(inside.min()), high=float(inside.max()), name=None)
+            Group(
+                member=member,
+                low=float(inside.min()),
+                high=float(inside.max()),
+                name=None,
+            )
         )
     return groups

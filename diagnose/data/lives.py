@@ -59,11 +59,17 @@ def lives_of(task: Task) -> Lives:
             f"{dataset.folder} has no column {missing[0]}: its records are no snapshots of lives, which "
             "task=remaining_life needs; make one with gensig generate experiment=run_to_failure"
         )
-    name, age, remaining, failed = (np.asarray(dataset.column(column)) for column in COLUMNS)
+    name, age, remaining, failed = (
+        np.asarray(dataset.column(column)) for column in COLUMNS
+    )
     age, remaining = age.astype(float), remaining.astype(float)
-    used = (task.labels() >= 0) & (name != "") & np.isfinite(age) & np.isfinite(remaining)
+    used = (
+        (task.labels() >= 0) & (name != "") & np.isfinite(age) & np.isfinite(remaining)
+    )
     if not used.any():
-        raise DatasetError(f"{dataset.folder}: no usable record is a snapshot of a life")
+        raise DatasetError(
+            f"{dataset.folder}: no usable record is a snapshot of a life"
+        )
     if (wrong := np.flatnonzero(used & ((age < 0) | (remaining < 0)))).size:
         raise DatasetError(
             f"{dataset.folder}, record {dataset.column('record_id')[wrong[0]]}: life_time_h {age[wrong[0]]:g} and "
@@ -74,7 +80,9 @@ def lives_of(task: Task) -> Lives:
             raise DatasetError(
                 f"{dataset.folder}: life {life} has failed in some of its records and not in others",
             )
-    return Lives(name=np.where(used, name, ""), age=age, remaining=remaining, failed=failed == 1)
+    return Lives(
+        name=np.where(used, name, ""), age=age, remaining=remaining, failed=failed == 1
+    )
 
 
 def life_segments(task: Task, lives: Lives, protocol: str, subset: str) -> Segments:
@@ -133,9 +141,18 @@ def choose_life_protocols(
 def _why_not(task: Task, lives: Lives, protocol: str) -> str | None:
     if protocol in OPEN_PROTOCOLS or protocol == CROSS_SENSOR:
         return "it is of no use for remaining lives"
-    records = {subset: life_segments(task, lives, protocol, subset).record for subset in SUBSETS}
-    names = {subset: set(lives.name[record].tolist()) for subset, record in records.items()}
-    for one, other in (("train", "validation"), ("train", "test"), ("validation", "test")):
+    records = {
+        subset: life_segments(task, lives, protocol, subset).record
+        for subset in SUBSETS
+    }
+    names = {
+        subset: set(lives.name[record].tolist()) for subset, record in records.items()
+    }
+    for one, other in (
+        ("train", "validation"),
+        ("train", "test"),
+        ("validation", "test"),
+    ):
         if both := sorted(names[one] & names[other]):
             return f"life {both[0]} is in its {one} and its {other} part"
     for subset, record in records.items():
@@ -144,7 +161,9 @@ def _why_not(task: Task, lives: Lives, protocol: str) -> str | None:
     return None
 
 
-def early_level(lives: Lives, record: IntArray, *, level_h: float | None, share: float) -> float:
+def early_level(
+    lives: Lives, record: IntArray, *, level_h: float | None, share: float
+) -> float:
     """Level in h at which the remaining life is cut: long before its failure a machine shows
     nothing of it.
 
@@ -168,7 +187,9 @@ def early_level(lives: Lives, record: IntArray, *, level_h: float | None, share:
     _, first = np.unique(lives.name[chosen], return_index=True)
     level = share * float(np.median((lives.age + lives.remaining)[chosen[first]]))
     if level <= 0:
-        raise DatasetError("the training lives have no length; give remaining_life.early_life_h")
+        raise DatasetError(
+            "the training lives have no length; give remaining_life.early_life_h"
+        )
     return level
 
 

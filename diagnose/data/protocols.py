@@ -56,7 +56,9 @@ def choose_protocols(
         wanted = offered
     check_names("protocol", wanted, [*offered, *left_out])
     left_out |= {
-        name: why for name in wanted if name in offered and (why := _why_no_window(task, name))
+        name: why
+        for name in wanted
+        if name in offered and (why := _why_no_window(task, name))
     }
     absent = {name: left_out[name] for name in wanted if name in left_out}
     found = tuple(name for name in wanted if name not in absent)
@@ -69,7 +71,9 @@ def choose_protocols(
 
 
 def channels_to_cross(
-    available: Sequence[str], channels: Sequence[str] | None, test_channels: Sequence[str] | None
+    available: Sequence[str],
+    channels: Sequence[str] | None,
+    test_channels: Sequence[str] | None,
 ) -> tuple[tuple[str, ...], tuple[str, ...]] | str:
     """Channels that `CROSS_SENSOR` trains and tests on, the same number, or in one line why there
     are none.
@@ -90,12 +94,12 @@ def channels_to_cross(
         if n == 0:
             return f"the data set has {len(available)} channel, and 2 are needed"
         if len(others) < n:
-            return (
-                f"{len(others)} channel(s) are left beside channels={','.join(trained)}; name fewer"
-            )
+            return f"{len(others)} channel(s) are left beside channels={','.join(trained)}; name fewer"
         return trained, tuple(others[:n])
     if channels is None or len(channels) != len(test_channels):
-        raise ConfigError("test_channels needs channels beside it, the same number of them")
+        raise ConfigError(
+            "test_channels needs channels beside it, the same number of them"
+        )
     check_names("channel", [*channels, *test_channels], available)
     if both := sorted(set(channels) & set(test_channels)):
         raise ConfigError(
@@ -109,7 +113,11 @@ def _why_no_window(task: Task, name: str) -> str | None:
     if name == CROSS_SENSOR:
         return None  # whole records
     longest = max(
-        (stop - start for rows in task.dataset.split(name).values() for _, start, stop in rows),
+        (
+            stop - start
+            for rows in task.dataset.split(name).values()
+            for _, start, stop in rows
+        ),
         default=1.0,
     )
     held = int(longest * n_samples(task.dataset) + 1e-6)

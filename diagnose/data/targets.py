@@ -11,7 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch.nn.functional import binary_cross_entropy_with_logits, cross_entropy, log_softmax
+from torch.nn.functional import (
+    binary_cross_entropy_with_logits,
+    cross_entropy,
+    log_softmax,
+)
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
@@ -28,7 +32,9 @@ BEFORE, AFTER = (
 NEVER = -30.0  # log-probability of places that are not the fault's
 
 
-def record_targets(dataset: Dataset, record: NDArray[np.integer]) -> dict[str, NDArray[Any]]:
+def record_targets(
+    dataset: Dataset, record: NDArray[np.integer]
+) -> dict[str, NDArray[Any]]:
     """Severity and gear of each window's record, as far as the data set has them.
 
     Returns
@@ -49,7 +55,10 @@ def record_targets(dataset: Dataset, record: NDArray[np.integer]) -> dict[str, N
 
 
 def fault_places(
-    dataset: Dataset, record: NDArray[np.integer], passages: FloatArray, n_teeth: Sequence[int]
+    dataset: Dataset,
+    record: NDArray[np.integer],
+    passages: FloatArray,
+    n_teeth: Sequence[int],
 ) -> FloatArray:
     """Where on its gear's turn a fault comes into mesh, in teeth from the first sample of the
     window.
@@ -65,7 +74,13 @@ def fault_places(
     (window,) from 0 to the gear's teeth; NaN without a fault of one tooth, or if the data set does not tell
     """
     place = np.full(len(record), np.nan)
-    needed = ("fault_gear", "fault_tooth", "start_phase", "start_tooth_pinion", "start_tooth_wheel")
+    needed = (
+        "fault_gear",
+        "fault_tooth",
+        "start_phase",
+        "start_tooth_pinion",
+        "start_tooth_wheel",
+    )
     if not set(needed) <= set(dataset.column_names):
         return place
     column = {name: np.asarray(dataset.column(name))[record] for name in needed}
@@ -77,7 +92,9 @@ def fault_places(
 
 
 def further_loss(
-    answers: Mapping[str, torch.Tensor], label: torch.Tensor, targets: Mapping[str, torch.Tensor]
+    answers: Mapping[str, torch.Tensor],
+    label: torch.Tensor,
+    targets: Mapping[str, torch.Tensor],
 ) -> torch.Tensor:
     """Loss of the severity and gear heads of a batch, those that there are, each weighing as much
     as the other.
@@ -93,7 +110,9 @@ def further_loss(
         known = ~torch.isnan(targets["severity"])
         if known.any():
             said = answers["severity"][known, label[known]]
-            loss = loss + binary_cross_entropy_with_logits(said, targets["severity"][known])
+            loss = loss + binary_cross_entropy_with_logits(
+                said, targets["severity"][known]
+            )
     if "gear" in answers and "gear" in targets:
         loss = loss + cross_entropy(answers["gear"], targets["gear"])
     return loss
@@ -133,6 +152,11 @@ def place_loss(
     for index, teeth in turns:
         at = torch.arange(round(teeth * per_tooth), device=places.device) / per_tooth
         since = torch.remainder(at[None] - place[counted, None], teeth)
-        inside.append(((since < AFTER) | (since > teeth - BEFORE)) & (gear[counted, None] == index))
+        inside.append(
+            ((since < AFTER) | (since > teeth - BEFORE))
+            & (gear[counted, None] == index)
+        )
     share = log_softmax(places[counted, label[counted]], dim=1)
-    return -torch.logsumexp(share.masked_fill(~torch.cat(inside, dim=1), NEVER), dim=1).mean()
+    return -torch.logsumexp(
+        share.masked_fill(~torch.cat(inside, dim=1), NEVER), dim=1
+    ).mean()

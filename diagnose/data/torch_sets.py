@@ -86,9 +86,14 @@ class VibrationDataset(torch.utils.data.Dataset[tuple[torch.Tensor, int]]):
     def __getitem__(self, index: int) -> tuple[torch.Tensor, int]:
         start = int(self.start[index])
         signal = read_signal(
-            self._task, int(self.record[index]), start, start + self._task.window_samples
+            self._task,
+            int(self.record[index]),
+            start,
+            start + self._task.window_samples,
         )
-        return torch.from_numpy(normalised(signal, self._task.normalise)), int(self.label[index])
+        return torch.from_numpy(normalised(signal, self._task.normalise)), int(
+            self.label[index]
+        )
 
 
 Item = tuple[torch.Tensor, int]
@@ -139,7 +144,9 @@ class StreamingDataset(torch.utils.data.IterableDataset[Item]):
         if (protocol is None) != (subset is None):
             raise ConfigError("give protocol and subset, or neither of them")
         if (n_epochs is not None and n_epochs < 1) or shuffle_buffer < 0:
-            raise ConfigError("n_epochs must be at least 1 or None, shuffle_buffer at least 0")
+            raise ConfigError(
+                "n_epochs must be at least 1 or None, shuffle_buffer at least 0"
+            )
         self._stream, self._part = stream, (protocol, subset)
         self._options: dict[str, Any] = {
             "window_samples": window_samples,
@@ -191,7 +198,9 @@ class StreamingDataset(torch.utils.data.IterableDataset[Item]):
             if self.n_epochs is None and not len(mine):
                 return  # fewer conditions than workers: nothing will ever come
             record_of = dict(
-                zip(stream.column("record_id").tolist(), range(len(stream)), strict=True)
+                zip(
+                    stream.column("record_id").tolist(), range(len(stream)), strict=True
+                )
             )
             labels = task.labels()
             for record in mine:
@@ -210,10 +219,14 @@ class StreamingDataset(torch.utils.data.IterableDataset[Item]):
             segments = _whole_records(task)
         else:
             segments = subset_segments(task, protocol, subset)
-        segment, start = plan_windows(segments, task.window_samples, task.stride_samples)
+        segment, start = plan_windows(
+            segments, task.window_samples, task.stride_samples
+        )
         order = np.argsort(segments.record[segment], kind="stable")
         records, first = np.unique(segments.record[segment][order], return_index=True)
-        return task, dict(zip(records.tolist(), np.split(start[order], first[1:]), strict=True))
+        return task, dict(
+            zip(records.tolist(), np.split(start[order], first[1:]), strict=True)
+        )
 
 
 def _whole_records(task: Task) -> Segments:
@@ -245,7 +258,9 @@ def _cut(task: Task, record: Any, starts: IntArray) -> Iterator[torch.Tensor]:
         yield torch.from_numpy(normalised(window, task.normalise))
 
 
-def _shuffled(items: Iterable[Item], n_held: int, rng: np.random.Generator) -> Iterator[Item]:
+def _shuffled(
+    items: Iterable[Item], n_held: int, rng: np.random.Generator
+) -> Iterator[Item]:
     """The same items, each drawn at random from those held back, ``n_held`` of them."""
     held: list[Item] = []
     for item in items:

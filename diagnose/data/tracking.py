@@ -109,13 +109,20 @@ def track_by_mesh(recording: Recording, teeth: Teeth, speed_rpm: float) -> Track
         np.arange(FINER * (turned.size - 1) + 1) / FINER, np.arange(turned.size), turned
     )
     turns = resample_by_angle(_finer(recording)[:, : fine.size], 2.0 * np.pi * fine)
-    passed = np.interp(np.arange(turns.shape[-2] + 1), turned, np.arange(turned.size) / rate)
+    passed = np.interp(
+        np.arange(turns.shape[-2] + 1), turned, np.arange(turned.size) / rate
+    )
     return _tracked(
-        "mesh", turns, float(60.0 * turned[-1] / (turned.size - 1) * rate), 60.0 / np.diff(passed)
+        "mesh",
+        turns,
+        float(60.0 * turned[-1] / (turned.size - 1) * rate),
+        60.0 / np.diff(passed),
     )
 
 
-def at_constant_speed(tracked: Tracked, sampling_rate: float, speed_rpm: float) -> FloatArray:
+def at_constant_speed(
+    tracked: Tracked, sampling_rate: float, speed_rpm: float
+) -> FloatArray:
     """What the machine would have given at one speed, if nothing but the gears' orders were in it.
 
     Parameters
@@ -137,7 +144,9 @@ def _finer(recording: Recording) -> FloatArray:
     return resample_poly(recording.acceleration, FINER, 1, axis=-1)
 
 
-def _tracked(by: str, turns: FloatArray, mean_rpm: float, turn_rpm: FloatArray) -> Tracked:
+def _tracked(
+    by: str, turns: FloatArray, mean_rpm: float, turn_rpm: FloatArray
+) -> Tracked:
     return Tracked(
         by=by,
         signal=turns.reshape(turns.shape[0], -1),

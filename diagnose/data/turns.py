@@ -61,8 +61,12 @@ class Turns(NetworkInput):
 
     def check(self, task: Task, segments: Segments, network: str) -> None:
         """Refuse stretches that hold no turn of the driving gear, with the shortest one."""
-        speed = np.asarray(task.dataset.column("speed_rpm"), dtype=float)[segments.record]
-        turns = (segments.stop - segments.start) / task.dataset.sampling_rate * speed / 60
+        speed = np.asarray(task.dataset.column("speed_rpm"), dtype=float)[
+            segments.record
+        ]
+        turns = (
+            (segments.stop - segments.start) / task.dataset.sampling_rate * speed / 60
+        )
         if turns.min() < 1:
             raise ConfigError(
                 f"a stretch holds {turns.min():.2g} turns of the pinion, and model {network} "
@@ -110,8 +114,12 @@ class Turns(NetworkInput):
                 passages.append((start + first) * passages_per_sample)
         record_of = np.array(records)
         targets = record_targets(task.dataset, record_of)
-        targets["place"] = fault_places(task.dataset, record_of, np.array(passages), self.n_teeth)
-        windows = _turn_set(tuple(turns), task.labels()[record_of], record_of, task.normalise)
+        targets["place"] = fault_places(
+            task.dataset, record_of, np.array(passages), self.n_teeth
+        )
+        windows = _turn_set(
+            tuple(turns), task.labels()[record_of], record_of, task.normalise
+        )
         return replace(windows, targets=targets)
 
     def of_recording(self, recording: RecordedSignal) -> WindowSet:
@@ -170,12 +178,18 @@ class Turns(NetworkInput):
         return packed.astype(np.float32)
 
 
-def _parts(signal: NDArray[np.float32], *, halves: bool) -> list[tuple[int, NDArray[np.float32]]]:
+def _parts(
+    signal: NDArray[np.float32], *, halves: bool
+) -> list[tuple[int, NDArray[np.float32]]]:
     """First sample and signal of the whole and, where wanted, of its two halves."""
     if not halves:
         return [(0, signal)]
     middle = signal.shape[-1] // 2
-    return [(0, signal), (0, signal[:, :middle]), (middle, signal[:, middle : 2 * middle])]
+    return [
+        (0, signal),
+        (0, signal[:, :middle]),
+        (middle, signal[:, middle : 2 * middle]),
+    ]
 
 
 def _turn_set(

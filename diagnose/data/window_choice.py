@@ -63,10 +63,18 @@ def _slowest_turn(dataset: Dataset) -> tuple[str, float]:
     ]
     slowest = 60.0 / float(speed.min()) if speed.size and speed.min() > 0 else 0.0
     faulty = (
-        {str(name) for name in dataset.column("fault_gear")} if "fault_gear" in names else set()
+        {str(name) for name in dataset.column("fault_gear")}
+        if "fault_gear" in names
+        else set()
     )
-    teeth = {gear: dataset.attributes.get(f"n_teeth_{gear}") for gear in ("pinion", "wheel")}
+    teeth = {
+        gear: dataset.attributes.get(f"n_teeth_{gear}") for gear in ("pinion", "wheel")
+    }
     if "wheel" not in faulty or not (teeth["pinion"] and teeth["wheel"]):
         return NO_FAULT, slowest
     of_wheel = slowest * float(teeth["wheel"]) / float(teeth["pinion"])
-    return ("pinion", slowest) if "pinion" in faulty and slowest > of_wheel else ("wheel", of_wheel)
+    return (
+        ("pinion", slowest)
+        if "pinion" in faulty and slowest > of_wheel
+        else ("wheel", of_wheel)
+    )

@@ -80,7 +80,9 @@ class Windows(NetworkInput):
             )
         start, stop = np.array([0]), np.array([n_samples])
         whole = Segments(record=np.array([0]), start=start, stop=stop)
-        segment, start = plan_windows(whole, recording.window_samples, recording.stride_samples)
+        segment, start = plan_windows(
+            whole, recording.window_samples, recording.stride_samples
+        )
         return WindowSet(
             signals=(recording.signal,),
             segment=segment,

@@ -84,7 +84,10 @@ class Task:
     def labels(self) -> IntArray:
         """(record,) index into `class_names`; -1 for another class and for a record that failed."""
         order = {name: index for index, name in enumerate(self.class_names)}
-        names = [self.dataset.class_names[int(label)] for label in self.dataset.column("label")]
+        names = [
+            self.dataset.class_names[int(label)]
+            for label in self.dataset.column("label")
+        ]
         labels = np.array([order.get(name, -1) for name in names], dtype=np.int64)
         return np.where(np.asarray(self.dataset.usable, dtype=bool), labels, -1)
 
@@ -132,7 +135,11 @@ def subset_segments(task: Task, protocol: str, subset: str) -> Segments:
     check_names("subset", (subset,), SUBSETS)
     labels, length = task.labels(), n_samples(task.dataset)
     rows = [
-        (record, int(np.ceil(start * length - 1e-6)), int(np.floor(stop * length + 1e-6)))
+        (
+            record,
+            int(np.ceil(start * length - 1e-6)),
+            int(np.floor(stop * length + 1e-6)),
+        )
         for record, start, stop in task.dataset.split(stored).get(subset, [])
         if labels[record] >= 0
     ]
@@ -152,7 +159,9 @@ def all_segments(task: Task) -> Segments:
             f"{task.dataset.folder}: no usable record of {', '.join(task.class_names)}"
         )
     length = n_samples(task.dataset)
-    return Segments(record=record, start=np.zeros_like(record), stop=np.full_like(record, length))
+    return Segments(
+        record=record, start=np.zeros_like(record), stop=np.full_like(record, length)
+    )
 
 
 def plan_windows(
@@ -205,7 +214,9 @@ class WindowSet:
     def __len__(self) -> int:
         return int(self.segment.size)
 
-    def cut(self, windows: IntArray, rng: np.random.Generator | None = None) -> NDArray[np.float32]:
+    def cut(
+        self, windows: IntArray, rng: np.random.Generator | None = None
+    ) -> NDArray[np.float32]:
         """Cut windows, at their planned start or, with `rng`, anywhere in their segment.
 
         Returns
@@ -213,12 +224,15 @@ class WindowSet:
         (window, channel, sample) float32, normalised
         """
         chosen = np.empty(
-            (len(windows), self.signals[0].shape[0], self.window_samples), dtype=np.float32
+            (len(windows), self.signals[0].shape[0], self.window_samples),
+            dtype=np.float32,
         )
         for row, window in enumerate(windows):
             signal = self.signals[self.segment[window]]
             last = signal.shape[-1] - self.window_samples
-            start = int(self.start[window]) if rng is None else int(rng.integers(last + 1))
+            start = (
+                int(self.start[window]) if rng is None else int(rng.integers(last + 1))
+            )
             chosen[row] = signal[:, start : start + self.window_samples]
         return normalised(chosen, self.normalise)
 
@@ -226,7 +240,9 @@ class WindowSet:
 Read = Callable[["Task", int, int, int], NDArray[np.float32]]
 
 
-def load_windows(task: Task, segments: Segments, *, read: Read | None = None) -> WindowSet:
+def load_windows(
+    task: Task, segments: Segments, *, read: Read | None = None
+) -> WindowSet:
     """Read the stretches into memory (4 bytes a sample), by `read_signal` or ``read``, and plan
     their windows.
 
@@ -236,7 +252,10 @@ def load_windows(task: Task, segments: Segments, *, read: Read | None = None) ->
     """
     segment, start = plan_windows(segments, task.window_samples, task.stride_samples)
     used, segment = np.unique(segment, return_inverse=True)
-    rows = [(int(segments.record[i]), int(segments.start[i]), int(segments.stop[i])) for i in used]
+    rows = [
+        (int(segments.record[i]), int(segments.start[i]), int(segments.stop[i]))
+        for i in used
+    ]
     record = segments.record[used][segment]
     return WindowSet(
         signals=tuple((read or read_signal)(task, *row) for row in rows),
@@ -254,7 +273,8 @@ def read_signal(
 ) -> NDArray[np.float32]:
     """(channel, sample) m/s^2 of the task's channels; refuses values that are not finite."""
     signal = np.asarray(
-        task.dataset.signals(record, start, stop, task.channels, name=name), dtype=np.float32
+        task.dataset.signals(record, start, stop, task.channels, name=name),
+        dtype=np.float32,
     )
     if not np.isfinite(signal).all():
         which = task.dataset.column("record_id")[record]
@@ -271,7 +291,9 @@ def normalised(windows: NDArray[np.float32], how: str) -> NDArray[np.float32]:
     centered = windows - windows.mean(axis=-1, keepdims=True)
     if how == "none":
         return centered
-    level = np.sqrt(np.einsum("...s,...s->...", centered, centered) / centered.shape[-1])[..., None]
+    level = np.sqrt(
+        np.einsum("...s,...s->...", centered, centered) / centered.shape[-1]
+    )[..., None]
     centered *= np.divide(1, level, out=np.zeros_like(level), where=level > 0)
     return centered
 

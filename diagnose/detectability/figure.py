@@ -19,9 +19,7 @@ FloatArray = NDArray[np.floating]
 
 COLORS = "cividis"  # even steps for every kind of colour vision, and in print
 DARK = 0.55  # of the colour scale: below it white letters are read best
-LEAST_TOP = (
-    1.0  # d' at the top of the scale of indicators, so that next to nothing does not look like much
-)
+LEAST_TOP = 1.0  # d' at the top of the scale of indicators, so that next to nothing does not look like much
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,18 +44,25 @@ def detectability_figure(path: Path, maps: Maps) -> None:
     n_channels, n_bands = len(maps.channels), len(maps.bandwidths)
     small = max(4.6, 1.25 * n_bands)
     figure = Figure(
-        figsize=(1.2 * len(maps.torques_nm) + 3.0 + small, 2.0 * max(4.0, 1.15 * n_channels)),
+        figsize=(
+            1.2 * len(maps.torques_nm) + 3.0 + small,
+            2.0 * max(4.0, 1.15 * n_channels),
+        ),
         dpi=130,
     )
     figure.set_layout_engine("constrained", hspace=0.03)
     FigureCanvasAgg(figure)
-    parts: Any = figure.subfigures(2, 2, width_ratios=(1.2 * len(maps.torques_nm) + 3.0, small))
+    parts: Any = figure.subfigures(
+        2, 2, width_ratios=(1.2 * len(maps.torques_nm) + 3.0, small)
+    )
     for (large, many), row in zip(parts, _rows(maps), strict=True):
         image = _large(large, maps, row)
         axes = _many(many, maps, row)
         many.colorbar(image, ax=axes, label=row.label, fraction=0.05, pad=0.02)
     noise = f"{maps.n_units} machines, records of {maps.duration:g} s"
-    figure.suptitle(f"Which test shows the fault? {fault_text(maps.fault)}; {noise}", fontsize=13)
+    figure.suptitle(
+        f"Which test shows the fault? {fault_text(maps.fault)}; {noise}", fontsize=13
+    )
     figure.savefig(path, metadata={"Software": None} if path.suffix == ".png" else None)
 
 
@@ -73,7 +78,9 @@ def _part_text(part: dict[str, Any]) -> str:
         for key, value in part.items()
         if isinstance(value, int | float) and key != "tooth"
     ]
-    told = ", ".join(f"{' '.join(words[:-1])} {value:g} {words[-1]}" for words, value in sizes[:3])
+    told = ", ".join(
+        f"{' '.join(words[:-1])} {value:g} {words[-1]}" for words, value in sizes[:3]
+    )
     return f"{str(part['kind']).replace('_', ' ')} on the {part['gear']}" + (
         f" ({told})" if told else ""
     )
@@ -83,8 +90,14 @@ def _rows(maps: Maps) -> list[_Row]:
     from matplotlib.colors import LogNorm, Normalize
 
     known = np.where(maps.known > 0.0, maps.known, np.nan)
-    low, high = (np.nanmin(known), np.nanmax(known)) if np.isfinite(known).any() else (0.1, 1.0)
-    top = max(LEAST_TOP, float(np.nanmax(maps.seen))) if np.isfinite(maps.seen).any() else LEAST_TOP
+    low, high = (
+        (np.nanmin(known), np.nanmax(known)) if np.isfinite(known).any() else (0.1, 1.0)
+    )
+    top = (
+        max(LEAST_TOP, float(np.nanmax(maps.seen)))
+        if np.isfinite(maps.seen).any()
+        else LEAST_TOP
+    )
     return [
         _Row(
             title="Physically there",
@@ -127,8 +140,12 @@ def _large(figure: Any, maps: Maps, row: _Row) -> Any:
             fontsize=9.5,
             fontweight=weight,
         )
-    axes.set_xticks(range(len(maps.torques_nm)), [f"{one:g}" for one in maps.torques_nm])
-    axes.set_yticks(range(len(maps.speeds_rpm)), [f"{one:g}" for one in maps.speeds_rpm])
+    axes.set_xticks(
+        range(len(maps.torques_nm)), [f"{one:g}" for one in maps.torques_nm]
+    )
+    axes.set_yticks(
+        range(len(maps.speeds_rpm)), [f"{one:g}" for one in maps.speeds_rpm]
+    )
     inside = "d'" if row.texts is None else "d' (AUROC)"
     axes.set(xlabel="torque of the pinion, N m", ylabel="speed of the pinion, r/min")
     test = f"{maps.channels[channel]}, up to {maps.bandwidths[band] / 1e3:.3g} kHz"
@@ -152,12 +169,18 @@ def _many(figure: Any, maps: Maps, row: _Row) -> Any:
         if (channel, band) == (best_channel, best_band):
             for edge in panel.spines.values():
                 edge.set(color="#D55E00", linewidth=2.5)
-    figure.suptitle("every channel and bandwidth: speed upwards, torque to the right", fontsize=10)
+    figure.suptitle(
+        "every channel and bandwidth: speed upwards, torque to the right", fontsize=10
+    )
     return axes
 
 
 def _image(axes: Any, values: FloatArray, row: _Row) -> Any:
     axes.set_facecolor("0.85")
     return axes.imshow(
-        np.ma.masked_invalid(values), cmap=COLORS, norm=row.norm, origin="lower", aspect="auto"
+        np.ma.masked_invalid(values),
+        cmap=COLORS,
+        norm=row.norm,
+        origin="lower",
+        aspect="auto",
     )

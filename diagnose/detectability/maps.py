@@ -102,7 +102,11 @@ def read_bandwidths(given: Sequence[float] | None, pairs: Pairs) -> tuple[float,
 
 
 def make_maps(
-    pairs: Pairs, bandwidths: Sequence[float], *, n_workers: int, on_done: Callable[[str], None]
+    pairs: Pairs,
+    bandwidths: Sequence[float],
+    *,
+    n_workers: int,
+    on_done: Callable[[str], None],
 ) -> Maps:
     """Simulate every cell and let both observers look at it; the same bits for any number of
     workers.
@@ -134,7 +138,9 @@ def make_maps(
         auroc=over_cells([cell.auroc for cell in cells]),
         indicator=over_cells([cell.indicator for cell in cells]),
         raises=over_cells([cell.raises for cell in cells]),
-        noise_rms=np.sqrt(_median(over_cells([cell.noise_power for cell in cells]), axis=2)),
+        noise_rms=np.sqrt(
+            _median(over_cells([cell.noise_power for cell in cells]), axis=2)
+        ),
         n_failed=int(np.isnan(energy[..., 0, 0]).sum()),
     )
 
@@ -153,7 +159,9 @@ def look_at(pairs: Pairs, place: int, bandwidths: Sequence[float]) -> Cell:
         return np.array([getattr(one, name) for one in seen]).reshape(shape)
 
     return Cell(
-        energy=residual_energy(cell.residual, cell.noise_density, pairs.sampling_rate, bandwidths),
+        energy=residual_energy(
+            cell.residual, cell.noise_density, pairs.sampling_rate, bandwidths
+        ),
         noise_power=cell.noise_power,
         d_prime=of_seen("d_prime"),
         standard_error=of_seen("standard_error"),
@@ -188,10 +196,14 @@ def confirm_best(maps: Maps, others: Pairs) -> Seen:
     speed, torque, channel, band = place = best_and_worst(maps.seen)[0]
     cell = others.cell(speed * len(maps.torques_nm) + torque)
     sound, faulty = (
-        table[:, channel, band] for table in _indicator_tables(others, cell, maps.bandwidths)
+        table[:, channel, band]
+        for table in _indicator_tables(others, cell, maps.bandwidths)
     )
     return confirmed(
-        sound, faulty, indicator=int(maps.indicator[place]), raises=bool(maps.raises[place])
+        sound,
+        faulty,
+        indicator=int(maps.indicator[place]),
+        raises=bool(maps.raises[place]),
     )
 
 
@@ -220,7 +232,9 @@ def _median(values: FloatArray, axis: int) -> FloatArray:
     """Median without NaN; NaN where there is nothing else."""
     counts = np.isfinite(values).any(axis=axis)
     return np.where(
-        counts, np.nanmedian(np.where(np.expand_dims(counts, axis), values, 0.0), axis=axis), np.nan
+        counts,
+        np.nanmedian(np.where(np.expand_dims(counts, axis), values, 0.0), axis=axis),
+        np.nan,
     )
 
 
@@ -228,7 +242,10 @@ _work: dict[str, Any] = {}
 
 
 def _look_at_all(
-    pairs: Pairs, bandwidths: Sequence[float], n_workers: int, on_done: Callable[[str], None]
+    pairs: Pairs,
+    bandwidths: Sequence[float],
+    n_workers: int,
+    on_done: Callable[[str], None],
 ) -> list[Cell]:
     """Every cell, in order; with one thread a process."""
     places = range(pairs.n_cells)
@@ -246,7 +263,9 @@ def _look_at_all(
         min(n_workers, pairs.n_cells), context, _start_worker, (pairs, bandwidths)
     ) as executor:
         try:
-            for place, cell in zip(places, executor.map(_look_in_worker, places), strict=True):
+            for place, cell in zip(
+                places, executor.map(_look_in_worker, places), strict=True
+            ):
                 cells.append(cell)
                 on_done(_cell_text(pairs, place))
         except BrokenProcessPool:

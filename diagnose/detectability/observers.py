@@ -15,7 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.signals.averaging import average_turn, residual_signal
-from gensig.signals.indicators import crest_factor, energy_ratio, fm4, kurtosis, rms, sideband_ratio
+from gensig.signals.indicators import (
+    crest_factor,
+    energy_ratio,
+    fm4,
+    kurtosis,
+    rms,
+    sideband_ratio,
+)
 from gensig.signals.rotation import resample_by_angle
 
 FloatArray = NDArray[np.floating]
@@ -61,7 +68,10 @@ def residual_energy(
         sides[-1] = 1.0
     power = sides * np.abs(np.fft.rfft(residual, axis=-1)) ** 2 / n_samples
     energy = np.divide(
-        power, noise_density, out=np.full(power.shape, np.nan), where=noise_density > 0.0
+        power,
+        noise_density,
+        out=np.full(power.shape, np.nan),
+        where=noise_density > 0.0,
     )
     places = np.searchsorted(frequency, bandwidths, side="right")
     return np.stack(
@@ -106,7 +116,9 @@ def band_indicators(
     """
     x = signal - signal.mean(axis=-1, keepdims=True)
     n_channels, n_samples = x.shape
-    table = np.full((n_channels, len(bandwidths), len(indicator_names(list(gears)))), np.nan)
+    table = np.full(
+        (n_channels, len(bandwidths), len(indicator_names(list(gears)))), np.nan
+    )
     turns = {gear: _turns(x, ratio * angle) for gear, (_, ratio) in gears.items()}
     orders = {gear: _orders(ratio * angle) for gear, (_, ratio) in gears.items()}
     spectrum = np.fft.rfft(x, axis=-1)
@@ -153,10 +165,16 @@ def _turns(x: FloatArray, angle: FloatArray) -> FloatArray:
 def _orders(angle: FloatArray) -> FloatArray | None:
     """e^(-i k angle) of the harmonics over the whole turns that there are, (harmonic, sample)."""
     turned = angle - angle[0]
-    n_kept = int(np.searchsorted(turned, 2.0 * math.pi * math.floor(turned[-1] / (2.0 * math.pi))))
+    n_kept = int(
+        np.searchsorted(
+            turned, 2.0 * math.pi * math.floor(turned[-1] / (2.0 * math.pi))
+        )
+    )
     if n_kept == 0:
         return None
-    return np.cumprod(np.tile(np.exp(-1j * turned[:n_kept]), (ENVELOPE_HARMONICS, 1)), axis=0)
+    return np.cumprod(
+        np.tile(np.exp(-1j * turned[:n_kept]), (ENVELOPE_HARMONICS, 1)), axis=0
+    )
 
 
 def _envelope_turns(magnitude: FloatArray, orders: FloatArray | None) -> FloatArray:
@@ -166,21 +184,32 @@ def _envelope_turns(magnitude: FloatArray, orders: FloatArray | None) -> FloatAr
     mean = kept.mean(axis=-1)
     lines = 2.0 * np.abs(kept @ orders.T) / kept.shape[-1]
     return np.divide(
-        np.sqrt(np.sum(lines**2, axis=-1)), mean, out=np.full(len(kept), np.nan), where=mean > 0.0
+        np.sqrt(np.sum(lines**2, axis=-1)),
+        mean,
+        out=np.full(len(kept), np.nan),
+        where=mean > 0.0,
     )
 
 
-def _of_average(average: FloatArray, highest_order: int, n_teeth: int) -> list[FloatArray]:
+def _of_average(
+    average: FloatArray, highest_order: int, n_teeth: int
+) -> list[FloatArray]:
     """The indicators of an average turn up to some order, (channel,) each."""
     n_samples = average.shape[-1]
     highest = min(highest_order, (n_samples - 1) // 2)
-    if highest <= n_teeth + (n_teeth - 1) // 2:  # no room for the mesh and its sidebands
+    if (
+        highest <= n_teeth + (n_teeth - 1) // 2
+    ):  # no room for the mesh and its sidebands
         return [np.full(len(average), np.nan)] * (len(OF_GEAR) - 1)
     # fewer samples a turn: nothing is left above the highest order, not even rounding
     turn = np.fft.irfft(np.fft.rfft(average)[:, : highest + 1], 2 * highest + 1) * (
         (2 * highest + 1) / n_samples
     )
-    ratios = [fm4(turn, n_teeth), sideband_ratio(turn, n_teeth), energy_ratio(turn, n_teeth)]
+    ratios = [
+        fm4(turn, n_teeth),
+        sideband_ratio(turn, n_teeth),
+        energy_ratio(turn, n_teeth),
+    ]
     return [*ratios, rms(residual_signal(turn, n_teeth))]
 
 
@@ -232,12 +261,17 @@ def seen_by_indicators(sound: FloatArray, faulty: FloatArray) -> Seen:
     """
     known = np.isfinite(sound).any(axis=1) & np.isfinite(faulty).any(axis=1)
     sound, faulty = sound[known], faulty[known]
-    usable = np.flatnonzero(np.isfinite(sound).all(axis=0) & np.isfinite(faulty).all(axis=0))
+    usable = np.flatnonzero(
+        np.isfinite(sound).all(axis=0) & np.isfinite(faulty).all(axis=0)
+    )
     n_units = len(sound)
     if n_units < FEWEST_UNITS or usable.size == 0:
         return NOTHING_SEEN
     groups = np.stack([sound[:, usable], faulty[:, usable]])
-    middle, scale = groups[0].mean(axis=0), np.maximum(groups[0].std(axis=0, ddof=1), LEAST_SPREAD)
+    middle, scale = (
+        groups[0].mean(axis=0),
+        np.maximum(groups[0].std(axis=0, ddof=1), LEAST_SPREAD),
+    )
     scores = np.empty((2, n_units))
     chosen = np.empty(n_units, dtype=np.intp)
     for unit in range(n_units):
@@ -251,7 +285,9 @@ def seen_by_indicators(sound: FloatArray, faulty: FloatArray) -> Seen:
     return _judged(*scores, indicator=int(usable[most]), raises=bool(raises))
 
 
-def confirmed(sound: FloatArray, faulty: FloatArray, *, indicator: int, raises: bool) -> Seen:
+def confirmed(
+    sound: FloatArray, faulty: FloatArray, *, indicator: int, raises: bool
+) -> Seen:
     """What one indicator, chosen on other machines, tells: the best of many tests is best by luck
     too.
 
@@ -270,7 +306,9 @@ def confirmed(sound: FloatArray, faulty: FloatArray, *, indicator: int, raises: 
     )
 
 
-def _judged(sound: FloatArray, faulty: FloatArray, *, indicator: int, raises: bool) -> Seen:
+def _judged(
+    sound: FloatArray, faulty: FloatArray, *, indicator: int, raises: bool
+) -> Seen:
     """Scores of the same machines without and with the fault, (unit,) each."""
     n_units = len(sound)
     bias = 1.0 - 3.0 / (4.0 * n_units - 5.0)
@@ -290,7 +328,9 @@ def _spread(groups: FloatArray) -> FloatArray:
     """Root mean square of the standard deviations of two groups, (indicator,) from (group, unit,
     indicator).
     """
-    return np.maximum(np.sqrt(np.mean(np.var(groups, axis=1, ddof=1), axis=0)), LEAST_SPREAD)
+    return np.maximum(
+        np.sqrt(np.mean(np.var(groups, axis=1, ddof=1), axis=0)), LEAST_SPREAD
+    )
 
 
 def _auroc(sound: FloatArray, faulty: FloatArray) -> float:

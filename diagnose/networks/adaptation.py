@@ -32,9 +32,7 @@ FloatArray = NDArray[np.floating]
 HEALTHY = "healthy"
 PREFIX = "adaptation."
 MOST_WINDOWS = 500  # of the training, evenly spaced, whose features are stored
-LEAST_WINDOWS = (
-    8  # assumed; a second at the default length: moments of fewer are those of the moment
-)
+LEAST_WINDOWS = 8  # assumed; a second at the default length: moments of fewer are those of the moment
 HEAD = "head"  # of every network: what makes scores of features
 RIDGE = 1.0  # on covariances of features of unit variance, as published
 
@@ -58,9 +56,13 @@ class Statistics:
     def tensors(self) -> dict[str, NDArray[np.float32]]:
         """What is stored beside the weights."""
         named = {f"{PREFIX}mean.{name}": value for name, value in self.mean.items()}
-        named |= {f"{PREFIX}variance.{name}": value for name, value in self.variance.items()}
+        named |= {
+            f"{PREFIX}variance.{name}": value for name, value in self.variance.items()
+        }
         named |= {f"{PREFIX}features": self.features, f"{PREFIX}levels": self.levels}
-        return {name: np.asarray(value, dtype=np.float32) for name, value in named.items()}
+        return {
+            name: np.asarray(value, dtype=np.float32) for name, value in named.items()
+        }
 
 
 def statistics_from(tensors: Mapping[str, NDArray[Any]]) -> Statistics | None:
@@ -79,12 +81,21 @@ def statistics_from(tensors: Mapping[str, NDArray[Any]]) -> Statistics | None:
         return None
     whole = {name: np.asarray(value, dtype=float) for name, value in held.items()}
     mean, variance = (
-        {name.removeprefix(part): value for name, value in whole.items() if name.startswith(part)}
+        {
+            name.removeprefix(part): value
+            for name, value in whole.items()
+            if name.startswith(part)
+        }
         for part in ("mean.", "variance.")
     )
     if not {"features", "levels"} <= set(whole) or set(mean) != set(variance):
-        raise DatasetError("its healthy statistics are not whole; train the model again")
-    if not all(np.isfinite(value).all() for value in whole.values()) or whole["features"].ndim != 2:
+        raise DatasetError(
+            "its healthy statistics are not whole; train the model again"
+        )
+    if (
+        not all(np.isfinite(value).all() for value in whole.values())
+        or whole["features"].ndim != 2
+    ):
         raise DatasetError(
             "its healthy statistics hold what is no statistic; train the model again"
         )
@@ -100,12 +111,18 @@ def healthy_statistics(
     if HEALTHY not in class_names:
         return None
     healthy = np.flatnonzero(train.label == class_names.index(HEALTHY))
-    return statistics_of(model, chosen_windows(train, healthy)) if healthy.size else None
+    return (
+        statistics_of(model, chosen_windows(train, healthy)) if healthy.size else None
+    )
 
 
 def chosen_windows(windows: WindowSet, chosen: NDArray[np.integer]) -> WindowSet:
     """At most `MOST_WINDOWS` of the chosen ones, evenly spaced."""
-    kept = np.linspace(0, chosen.size - 1, min(chosen.size, MOST_WINDOWS)).round().astype(int)
+    kept = (
+        np.linspace(0, chosen.size - 1, min(chosen.size, MOST_WINDOWS))
+        .round()
+        .astype(int)
+    )
     parts = {
         name: getattr(windows, name)[chosen[kept]]
         for name in ("segment", "start", "label", "record")
@@ -168,7 +185,9 @@ def _adapt_norms(model: nn.Module, source: Statistics, windows: WindowSet) -> No
     """
     norms = _norms(model)
     if not norms:
-        raise ConfigError("adabn moves batch normalisations, and this network has none; take coral")
+        raise ConfigError(
+            "adabn moves batch normalisations, and this network has none; take coral"
+        )
     if set(source.mean) != {name for name, _ in norms}:
         raise DatasetError("the healthy statistics belong to another network")
     for name, layer in norms:
@@ -212,7 +231,9 @@ def _align_features(model: nn.Module, source: Statistics, windows: WindowSet) ->
         for rows, power in ((target, -0.5), (source.features, 0.5))
     )
     turn = (inverse @ root) * scale / scale[:, None]
-    weight, bias = (value.detach().double().numpy() for value in (head.weight, head.bias))
+    weight, bias = (
+        value.detach().double().numpy() for value in (head.weight, head.bias)
+    )
     offset = source.features.mean(axis=0) - target.mean(axis=0) @ turn
     with torch.no_grad():
         head.weight.copy_(torch.from_numpy(weight @ turn.T))
@@ -233,7 +254,9 @@ def adapt_domain(domain: Domain, source: Statistics, windows: WindowSet) -> Doma
     the training data.
     """
     if source.levels.shape != domain.levels.shape[1:]:
-        raise DatasetError("the healthy statistics belong to another out-of-distribution flag")
+        raise DatasetError(
+            "the healthy statistics belong to another out-of-distribution flag"
+        )
     shift = window_levels(windows, np.arange(len(windows))).mean(axis=0) - source.levels
     return replace(domain, levels=(domain.levels + shift).astype(np.float32))
 
@@ -298,7 +321,10 @@ def _observe(
             hook.remove()
     mean = {name: sums[name] / counts[name] for name in names}
     moments = {
-        name: (mean[name], np.maximum(squares[name] / counts[name] - mean[name] ** 2, 0.0))
+        name: (
+            mean[name],
+            np.maximum(squares[name] / counts[name] - mean[name] ** 2, 0.0),
+        )
         for name in names
     }
     return moments, np.concatenate(features)

@@ -52,10 +52,14 @@ def fit_temperature(log_probability: FloatArray, label: IntArray) -> float:
         fitted = _scaled(log_probability, np.exp(log_temperature))[rows, label]
         return float(log_temperature**2 / 2 - fitted.sum())
 
-    return float(np.exp(minimize_scalar(loss, bounds=LOG_TEMPERATURE_BOUNDS, method="bounded").x))
+    return float(
+        np.exp(minimize_scalar(loss, bounds=LOG_TEMPERATURE_BOUNDS, method="bounded").x)
+    )
 
 
-def reliability(confidence: FloatArray, right: NDArray[np.bool_]) -> list[dict[str, float | int]]:
+def reliability(
+    confidence: FloatArray, right: NDArray[np.bool_]
+) -> list[dict[str, float | int]]:
     """Share of right predictions against the probability given to them, in `N_BINS` equal bins;
     empty ones left out.
 
@@ -86,7 +90,8 @@ def calibration_error(rows: Sequence[dict[str, float | int]]) -> float:
     """
     total = sum(row["n_records"] for row in rows)
     return float(
-        sum(row["n_records"] * abs(row["confidence"] - row["accuracy"]) for row in rows) / total
+        sum(row["n_records"] * abs(row["confidence"] - row["accuracy"]) for row in rows)
+        / total
     )
 
 
@@ -96,7 +101,9 @@ def error_by_chance(confidence: FloatArray) -> float:
     """
     rng = np.random.default_rng(0)
     draws = rng.uniform(size=(N_DRAWS, confidence.size)) < confidence
-    return float(np.mean([calibration_error(reliability(confidence, right)) for right in draws]))
+    return float(
+        np.mean([calibration_error(reliability(confidence, right)) for right in draws])
+    )
 
 
 def calibration_scores(
@@ -121,9 +128,13 @@ def calibration_scores(
         values.argmax(axis=1) == truth
         for values, truth in zip(log_probabilities, labels, strict=True)
     ]
-    for name, scales in (("before", [1.0] * len(temperatures)), ("after", temperatures)):
+    for name, scales in (
+        ("before", [1.0] * len(temperatures)),
+        ("after", temperatures),
+    ):
         logs = [
-            _scaled(values, scale) for values, scale in zip(log_probabilities, scales, strict=True)
+            _scaled(values, scale)
+            for values, scale in zip(log_probabilities, scales, strict=True)
         ]
         confidence = [np.exp(values.max(axis=1)) for values in logs]
         result[name] = {
@@ -136,7 +147,9 @@ def calibration_scores(
                 -float(np.mean(values[np.arange(truth.size), truth]))
                 for values, truth in zip(logs, labels, strict=True)
             ],
-            "reliability": reliability(np.concatenate(confidence), np.concatenate(right)),
+            "reliability": reliability(
+                np.concatenate(confidence), np.concatenate(right)
+            ),
         }
     return result
 

@@ -45,7 +45,11 @@ class Domain:
     n_validation_windows: int
 
     def __post_init__(self) -> None:
-        if self.levels.ndim != 2 or self.levels.size == 0 or not np.isfinite(self.levels).all():
+        if (
+            self.levels.ndim != 2
+            or self.levels.size == 0
+            or not np.isfinite(self.levels).all()
+        ):
             raise DatasetError(
                 "the tensor of its out-of-distribution flag holds no levels of windows"
             )
@@ -68,7 +72,9 @@ class Domain:
         }
 
 
-def domain_from(facts: Mapping[str, Any], tensors: Mapping[str, NDArray[Any]]) -> Domain:
+def domain_from(
+    facts: Mapping[str, Any], tensors: Mapping[str, NDArray[Any]]
+) -> Domain:
     """Domain of a stored model.
 
     Raises
@@ -103,10 +109,14 @@ def fit_domain(train: WindowSet, validation: WindowSet) -> Domain:
     (2022), "Out-of-distribution detection with deep nearest neighbors", ICML, section 3.
     """
     kept = np.unique(
-        np.linspace(0, len(train) - 1, min(len(train), MOST_WINDOWS)).round().astype(int)
+        np.linspace(0, len(train) - 1, min(len(train), MOST_WINDOWS))
+        .round()
+        .astype(int)
     )
     levels = window_levels(train, kept).astype(np.float32)
-    distance = neighbor_distance(window_levels(validation, np.arange(len(validation))), levels)
+    distance = neighbor_distance(
+        window_levels(validation, np.arange(len(validation))), levels
+    )
     return Domain(
         levels=levels,
         threshold=float(np.quantile(distance, QUANTILE, method="higher")),
@@ -161,5 +171,7 @@ def neighbor_distance(levels: FloatArray, known: FloatArray) -> FloatArray:
     """
     from sklearn.neighbors import NearestNeighbors
 
-    neighbors = NearestNeighbors(n_neighbors=min(N_NEIGHBORS, len(known))).fit(known.astype(float))
+    neighbors = NearestNeighbors(n_neighbors=min(N_NEIGHBORS, len(known))).fit(
+        known.astype(float)
+    )
     return neighbors.kneighbors(levels)[0][:, -1]

@@ -73,7 +73,9 @@ class Network(nn.Module, ABC):
             **{name: head(features) for name, head in self.further.items()},
         }
         return (
-            said if maps is None or self.places is None else {**said, "places": self.places(maps)}
+            said
+            if maps is None or self.places is None
+            else {**said, "places": self.places(maps)}
         )
 
     def add_heads(self, names: Sequence[str], n_features: int, n_classes: int) -> None:

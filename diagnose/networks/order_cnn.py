@@ -62,18 +62,28 @@ class OrderCnn(Network):
         super().__init__(input_scale)
         check_blocks(widths, kernels, strides)
         if any(kernel % 2 == 0 for kernel in kernels):
-            raise ConfigError("model: kernels must be odd, so that a turn stays as long as it is")
+            raise ConfigError(
+                "model: kernels must be odd, so that a turn stays as long as it is"
+            )
         self.n_points = [teeth * samples_per_tooth for teeth in (*n_teeth, 1)]
         self.n_teeth = list(n_teeth)
-        if not gears or not set(gears) <= set(GEARS[1:]) or len(set(gears)) < len(gears):
-            raise ConfigError(f"model: gears must be a list out of {', '.join(GEARS[1:])}")
+        if (
+            not gears
+            or not set(gears) <= set(GEARS[1:])
+            or len(set(gears)) < len(gears)
+        ):
+            raise ConfigError(
+                f"model: gears must be a list out of {', '.join(GEARS[1:])}"
+            )
         self.gears = [GEARS.index(gear) - 1 for gear in gears]
         self.turns = tuple((gear + 1, n_teeth[gear]) for gear in self.gears)
         self.kernels = list(kernels)
         inputs = (2 * n_channels, *widths)
         self.convolutions = nn.ModuleList(
             nn.Conv1d(n_in, n_out, kernel, stride=stride, bias=False)
-            for n_in, n_out, kernel, stride in zip(inputs, widths, kernels, strides, strict=False)
+            for n_in, n_out, kernel, stride in zip(
+                inputs, widths, kernels, strides, strict=False
+            )
         )
         self.norms = nn.ModuleList(nn.BatchNorm1d(width) for width in widths)
         self.compression = nn.Parameter(torch.full((widths[0], 1), float(compression)))
@@ -92,7 +102,8 @@ class OrderCnn(Network):
         *turns, mesh = windows.split(self.n_points, dim=-1)
         looked_at = [(turns[gear], self.n_teeth[gear]) for gear in self.gears]
         parts = [
-            torch.cat([turn, mesh.repeat(1, 1, n_teeth)], dim=1) for turn, n_teeth in looked_at
+            torch.cat([turn, mesh.repeat(1, 1, n_teeth)], dim=1)
+            for turn, n_teeth in looked_at
         ]
         for index, (convolution, norm) in enumerate(
             zip(self.convolutions, self.norms, strict=True),
@@ -106,7 +117,9 @@ class OrderCnn(Network):
             for part in parts
         ]
         parts = _together(self.compare_norm, [self.compare(part) for part in usual])
-        return torch.cat([part.amax(dim=-1) for part in parts], dim=1), torch.cat(parts, dim=-1)
+        return torch.cat([part.amax(dim=-1) for part in parts], dim=1), torch.cat(
+            parts, dim=-1
+        )
 
 
 def _together(norm: nn.Module, parts: Sequence[torch.Tensor]) -> list[torch.Tensor]:

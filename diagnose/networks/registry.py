@@ -46,10 +46,14 @@ def build_model(
     ConfigError    for an unknown kind or parameters that it does not take
     """
     make: Callable[..., Network] = _network_class(config)
-    parameters = {key: value for key, value in config.items() if key not in ("kind", "name")}
+    parameters = {
+        key: value for key, value in config.items() if key not in ("kind", "name")
+    }
     scale = [1.0] * n_channels if input_scale is None else input_scale
     try:
-        return make(n_channels=n_channels, n_classes=n_classes, input_scale=scale, **parameters)
+        return make(
+            n_channels=n_channels, n_classes=n_classes, input_scale=scale, **parameters
+        )
     except (TypeError, ValueError, RuntimeError) as error:
         reason = " ".join(str(error).split())
         raise ConfigError(f"model {config['kind']}: {reason}") from None

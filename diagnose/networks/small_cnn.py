@@ -71,7 +71,9 @@ class SmallCnn(Network):
                 _start_as_band_passes(convolution.weight)
             blocks += [convolution, nn.BatchNorm1d(n_out), nn.ReLU()]
         self.blocks = nn.Sequential(*blocks)
-        self.head = nn.Sequential(nn.Dropout(dropout), nn.Linear(2 * widths[-1], n_classes))
+        self.head = nn.Sequential(
+            nn.Dropout(dropout), nn.Linear(2 * widths[-1], n_classes)
+        )
         self.add_heads(heads, 2 * widths[-1], n_classes)
 
     def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, None]:

@@ -93,7 +93,10 @@ class SpectrumCnn(Network):
             )
             blocks += [convolution, nn.BatchNorm1d(n_out), nn.ReLU()]
         self.blocks = nn.Sequential(*blocks)
-        self.mean, self.maximum = nn.AdaptiveAvgPool1d(n_bands), nn.AdaptiveMaxPool1d(n_bands)
+        self.mean, self.maximum = (
+            nn.AdaptiveAvgPool1d(n_bands),
+            nn.AdaptiveMaxPool1d(n_bands),
+        )
         self.head = nn.Sequential(
             nn.Flatten(),
             nn.Dropout(dropout),
@@ -105,4 +108,6 @@ class SpectrumCnn(Network):
         """Mean and maximum of every band of the last block."""
         spectrum = log_spectrum(windows, self.floor)
         maps = self.blocks(spectrum - spectrum.mean(dim=-1, keepdim=True))
-        return torch.cat([self.mean(maps), self.maximum(maps)], dim=1).flatten(start_dim=1), None
+        return torch.cat([self.mean(maps), self.maximum(maps)], dim=1).flatten(
+            start_dim=1
+        ), None

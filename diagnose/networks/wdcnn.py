@@ -57,7 +57,9 @@ class Wdcnn(Network):
     ) -> None:
         super().__init__(input_scale)
         layers: list[nn.Module] = []
-        for index, (n_in, n_out) in enumerate(zip((n_channels, *widths), widths, strict=False)):
+        for index, (n_in, n_out) in enumerate(
+            zip((n_channels, *widths), widths, strict=False)
+        ):
             if index == 0:
                 convolution = nn.Conv1d(
                     n_in,

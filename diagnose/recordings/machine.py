@@ -46,7 +46,9 @@ def adapt_model(
     """
     model, description = load_model(folder)
     if description.adaptation is not None:
-        raise DatasetError(f"{folder} was adapted before; take the network that was trained")
+        raise DatasetError(
+            f"{folder} was adapted before; take the network that was trained"
+        )
     statistics = load_statistics(folder)
     if statistics is None:
         raise DatasetError(
@@ -80,7 +82,9 @@ def adapt_model(
     }
     for when, network, region in (("before", model, domain), ("after", adapted, moved)):
         beyond = (
-            None if region is None else int((distances(region, windows) > region.threshold).sum())
+            None
+            if region is None
+            else int((distances(region, windows) > region.threshold).sum())
         )
         said = np.exp(predict_windows(network, windows)[:, healthy]).mean()
         result[when] = {"probability_healthy": float(said), "n_windows_beyond": beyond}
@@ -93,7 +97,9 @@ def together(parts: Sequence[WindowSet]) -> WindowSet:
     n_records = np.cumsum([0, *(int(part.record.max()) + 1 for part in parts)])
     moved = [
         replace(
-            part, segment=part.segment + n_signals[index], record=part.record + n_records[index]
+            part,
+            segment=part.segment + n_signals[index],
+            record=part.record + n_records[index],
         )
         for index, part in enumerate(parts)
     ]
@@ -112,7 +118,11 @@ def _check_speed(source: Source, trained: tuple[float, float] | None) -> None:
     if source.speed_rpm is None or trained is None:
         return
     low, high = trained
-    if not low * (1 - SPEED_TOLERANCE) <= source.speed_rpm <= high * (1 + SPEED_TOLERANCE):
+    if (
+        not low * (1 - SPEED_TOLERANCE)
+        <= source.speed_rpm
+        <= high * (1 + SPEED_TOLERANCE)
+    ):
         raise ConfigError(
             f"--speed-rpm {source.speed_rpm:g} is outside the {low:.0f} to {high:.0f} r/min of the training; adapt at "
             "speeds of the training, or train at this one"

@@ -73,7 +73,9 @@ def export_onnx(network: StoredNetwork, file: Path) -> str:
         taken = (normalised(windows, description.normalise), *graph.further.values())
         with torch.inference_mode():
             expected = (
-                graph.answer(network.model, *map(torch.from_numpy, taken)).numpy().astype(float)
+                graph.answer(network.model, *map(torch.from_numpy, taken))
+                .numpy()
+                .astype(float)
             )
         error = np.abs(found - expected) / np.maximum(np.abs(expected), 1.0)
         difference = float(np.max(error))
@@ -98,12 +100,16 @@ def answers_of(
 
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
-    session = onnxruntime.InferenceSession(str(file), options, providers=["CPUExecutionProvider"])
+    session = onnxruntime.InferenceSession(
+        str(file), options, providers=["CPUExecutionProvider"]
+    )
     blocks = [
         {name: values[part] for name, values in inputs.items()}
         for part in (slice(0, 1), slice(1, None))
     ]
-    return np.concatenate([session.run([output], block)[0] for block in blocks]).astype(float)
+    return np.concatenate([session.run([output], block)[0] for block in blocks]).astype(
+        float
+    )
 
 
 def write_onnx(
@@ -120,7 +126,9 @@ def write_onnx(
     """
     shapes = ({0: torch.export.Dim("window", min=1)},) * len(inputs)
     said = io.StringIO()
-    loggers = [logging.getLogger(name) for name in ("torch.onnx", "onnxscript", "onnx_ir")]
+    loggers = [
+        logging.getLogger(name) for name in ("torch.onnx", "onnxscript", "onnx_ir")
+    ]
     before = [logger.level for logger in loggers]
     try:
         for logger in loggers:
@@ -150,7 +158,9 @@ def write_onnx(
             logger.setLevel(level)
 
 
-def describe_onnx(file: Path, description: ModelDescription, answers: Mapping[str, Any]) -> None:
+def describe_onnx(
+    file: Path, description: ModelDescription, answers: Mapping[str, Any]
+) -> None:
     """What the numbers mean, as text and JSON in the file's metadata.
 
     ``answers`` what is told of the output.

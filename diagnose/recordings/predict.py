@@ -68,14 +68,18 @@ def predict_recording(
     return {
         "recording": source.file,
         **answer.record,
-        "out_of_distribution": None if beyond is None and not reasons else bool(reasons),
+        "out_of_distribution": None
+        if beyond is None and not reasons
+        else bool(reasons),
         "reasons": reasons,
         "n_windows": len(windows),
         "n_windows_beyond": None if beyond is None else int(beyond.sum()),
         "distance_threshold": None if domain is None else domain.threshold,
         "window_duration_s": prepared.duration_s,
         "windows": rows,
-        "channels": dict(zip(description.channel_names, prepared.channels, strict=True)),
+        "channels": dict(
+            zip(description.channel_names, prepared.channels, strict=True)
+        ),
         "sampling_rate_hz": prepared.recording.sampling_rate,
         "model_sampling_rate_hz": rate,
         **answer.conditions,
@@ -109,14 +113,17 @@ def reasons_unlike(
     """Reasons why a recording is out of distribution; empty if it is not."""
     reasons = []
     if beyond is not None and 2 * beyond.sum() >= beyond.size:
-        reasons.append(f"{beyond.sum()} of {beyond.size} windows are unlike the training data")
+        reasons.append(
+            f"{beyond.sum()} of {beyond.size} windows are unlike the training data"
+        )
     if description.speed_rpm_range is not None:
         low, high = description.speed_rpm_range
         speeds = (source.speed_rpm,) if tracked is None else tracked.speed_range_rpm
         outside = [
             speed
             for speed in speeds
-            if speed and not low * (1 - SPEED_TOLERANCE) <= speed <= high * (1 + SPEED_TOLERANCE)
+            if speed
+            and not low * (1 - SPEED_TOLERANCE) <= speed <= high * (1 + SPEED_TOLERANCE)
         ]
         if outside:
             hint = in_hertz(outside[-1]) if low <= 60.0 * outside[-1] <= high else ""
@@ -128,6 +135,8 @@ def reasons_unlike(
         and description.n_teeth is not None
         and source.teeth != description.n_teeth
     ):
-        given, known = ("/".join(map(str, teeth)) for teeth in (source.teeth, description.n_teeth))
+        given, known = (
+            "/".join(map(str, teeth)) for teeth in (source.teeth, description.n_teeth)
+        )
         reasons.append(f"the gears have {given} teeth, those of the training {known}")
     return reasons

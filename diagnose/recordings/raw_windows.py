@@ -37,7 +37,12 @@ class RawWindows(nn.Module):
         unit: float,
     ) -> None:
         super().__init__()
-        self.model, self.normalise, self.answer, self.unit = model, normalise, answer, unit
+        self.model, self.normalise, self.answer, self.unit = (
+            model,
+            normalise,
+            answer,
+            unit,
+        )
 
     def forward(self, *inputs: torch.Tensor) -> torch.Tensor:
         """Answer in its unit for (window, channel, sample) in m/s^2 and further inputs."""
@@ -64,7 +69,8 @@ class EqualParts(nn.Module):
     def __init__(self, n_samples: int, n_parts: int, *, maximum: bool) -> None:
         super().__init__()
         self.parts = [
-            (i * n_samples // n_parts, -(-(i + 1) * n_samples // n_parts)) for i in range(n_parts)
+            (i * n_samples // n_parts, -(-(i + 1) * n_samples // n_parts))
+            for i in range(n_parts)
         ]
         self.maximum = maximum
 
@@ -72,11 +78,14 @@ class EqualParts(nn.Module):
         """(window, channel, part) of (window, channel, sample)."""
         cut = [maps[..., first:last] for first, last in self.parts]
         return torch.stack(
-            [part.amax(dim=-1) if self.maximum else part.mean(dim=-1) for part in cut], dim=-1
+            [part.amax(dim=-1) if self.maximum else part.mean(dim=-1) for part in cut],
+            dim=-1,
         )
 
 
-def raw_examples(model: nn.Module, description: ModelDescription) -> NDArray[np.float32]:
+def raw_examples(
+    model: nn.Module, description: ModelDescription
+) -> NDArray[np.float32]:
     """(window, channel, sample) m/s2: noise and tones beside an offset, and a silent channel.
 
     Levels go from a tenth to ten times what the network divides its input by, the RMS of its
@@ -86,7 +95,9 @@ def raw_examples(model: nn.Module, description: ModelDescription) -> NDArray[np.
     shape = (N_CHECKED, len(description.channel_names), description.window_samples)
     time = np.arange(description.window_samples)
     tones = np.sin(2 * np.pi * rng.uniform(0.001, 0.4, shape[:2])[..., None] * time)
-    scales = [value for name, value in model.named_buffers() if name.endswith("input_scale")]
+    scales = [
+        value for name, value in model.named_buffers() if name.endswith("input_scale")
+    ]
     typical = scales[0].numpy()  # (channel, 1)
     level = np.geomspace(0.1, 10.0, N_CHECKED)[:, None, None] * typical
     windows = level * (rng.standard_normal(shape) + 2.0 * tones + 0.5)
@@ -104,7 +115,9 @@ def with_fixed_pooling(model: nn.Module, *inputs: torch.Tensor) -> nn.Module:
     }
     lengths: dict[nn.Module, int] = {}
 
-    def measure(module: nn.Module, given: tuple[torch.Tensor, ...], _: torch.Tensor) -> None:
+    def measure(
+        module: nn.Module, given: tuple[torch.Tensor, ...], _: torch.Tensor
+    ) -> None:
         lengths[module] = int(given[0].shape[-1])
 
     hooks = [module.register_forward_hook(measure) for module in pools.values()]
@@ -119,7 +132,9 @@ def with_fixed_pooling(model: nn.Module, *inputs: torch.Tensor) -> nn.Module:
         hook.remove()
     for name, module in pools.items():
         n_parts = (
-            module.output_size if isinstance(module.output_size, int) else module.output_size[0]
+            module.output_size
+            if isinstance(module.output_size, int)
+            else module.output_size[0]
         )
         parent, _, last = name.rpartition(".")
         parts = EqualParts(

@@ -70,12 +70,16 @@ class Source:
     def __post_init__(self) -> None:
         if self.speed_rpm is not None and not 0.0 < self.speed_rpm < 1e6:
             raise ConfigError(f"--speed-rpm {self.speed_rpm:g} must be positive")
-        if self.teeth is not None and not all(4 <= n_teeth <= 1000 for n_teeth in self.teeth):
+        if self.teeth is not None and not all(
+            4 <= n_teeth <= 1000 for n_teeth in self.teeth
+        ):
             raise ConfigError(
                 f"--teeth {self.teeth[0]} {self.teeth[1]}: a gear has 4 to 1000 teeth",
             )
         if self.pulses_per_turn < 1:
-            raise ConfigError(f"--pulses-per-turn {self.pulses_per_turn} must be at least 1")
+            raise ConfigError(
+                f"--pulses-per-turn {self.pulses_per_turn} must be at least 1"
+            )
         if self.to_speed_rpm is not None and not self.is_tracked:
             raise ConfigError(
                 "--to-speed needs order tracking: give --tacho, or --teeth and --speed-rpm",
@@ -114,7 +118,9 @@ class PreparedRecording:
     duration_s: float
 
 
-def prepare_recording(description: ModelDescription, source: Source) -> PreparedRecording:
+def prepare_recording(
+    description: ModelDescription, source: Source
+) -> PreparedRecording:
     """Inputs of a recording for a network.
 
     Raises
@@ -125,7 +131,11 @@ def prepare_recording(description: ModelDescription, source: Source) -> Prepared
     recording, channels, tacho = _read(description, source)
     tracked = _tracked(recording, tacho, source) if source.is_tracked else None
     rate = description.sampling_rate_hz
-    speed = source.speed_rpm if tracked is None else source.to_speed_rpm or tracked.speed_rpm
+    speed = (
+        source.speed_rpm
+        if tracked is None
+        else source.to_speed_rpm or tracked.speed_rpm
+    )
     recorded = RecordedSignal(
         signal=_in_domain(recording, tracked, description, source),
         sampling_rate=rate,
@@ -168,7 +178,9 @@ def tracking_text(tracking: Mapping[str, Any] | None) -> str:
     return f" (speed by {tracking['by']}, {low:.5g} to {high:.5g} r/min, played at {tracking['played_at_rpm']:.5g})"
 
 
-def _tracked(recording: Recording, tacho: NDArray[np.floating] | None, source: Source) -> Tracked:
+def _tracked(
+    recording: Recording, tacho: NDArray[np.floating] | None, source: Source
+) -> Tracked:
     """The recording over the angle of the driving shaft."""
     from diagnose.data.tracking import track_by_mesh, track_by_tacho
     from gensig.signals.mesh_motion import Teeth
@@ -222,12 +234,18 @@ def _read(
         tacho = content.values[place]
         names = tuple(name for name in content.channels if name != source.tacho)
         if not names:
-            raise ConfigError(f"{content.file}: there is no channel beside {source.tacho}")
-        content = replace(content, channels=names, values=np.delete(content.values, place, axis=0))
+            raise ConfigError(
+                f"{content.file}: there is no channel beside {source.tacho}"
+            )
+        content = replace(
+            content, channels=names, values=np.delete(content.values, place, axis=0)
+        )
     chosen = _channels(content, description.channel_names, source.channels)
     needs_level = description.normalise == "none"
     return (
-        recording_of(content, unit=source.unit, channels=chosen, needs_level=needs_level),
+        recording_of(
+            content, unit=source.unit, channels=chosen, needs_level=needs_level
+        ),
         chosen,
         tacho,
     )
@@ -256,7 +274,9 @@ def _channels(
     if len(content.channels) != len(wanted):
         raise ConfigError(f"{has}; {needs}: choose with --channels, in this order")
     if content.named and len(wanted) > 1:
-        raise ConfigError(f"{has}; {needs}: say which is which with --channels, in this order")
+        raise ConfigError(
+            f"{has}; {needs}: say which is which with --channels, in this order"
+        )
     return content.channels
 
 
@@ -270,7 +290,11 @@ def _in_domain(
 
     Refuses what holds less bandwidth than that.
     """
-    found, rate, file = recording.sampling_rate, description.sampling_rate_hz, source.file
+    found, rate, file = (
+        recording.sampling_rate,
+        description.sampling_rate_hz,
+        source.file,
+    )
     if found < rate * (1 - RATE_TOLERANCE):
         raise ConfigError(
             f"{file} has {found:g} samples a second and so nothing above {found / 2:g} Hz; the model was trained at "

@@ -47,7 +47,9 @@ class StoredClassifier(StoredNetwork):
         for name in ("torque_nm", "life_time_h"):
             if getattr(source, name) is not None:
                 option = name.replace("_", "-")
-                raise ConfigError(f"--{option} is for models of remaining life; leave it out")
+                raise ConfigError(
+                    f"--{option} is for models of remaining life; leave it out"
+                )
 
     def answer(self, source: Source, prepared: PreparedRecording) -> Answer:
         """Class, probabilities, and severity and gear as far as the network has such heads."""
@@ -57,13 +59,18 @@ class StoredClassifier(StoredNetwork):
         overall = probabilities(by_record, description.temperature)[0]
         names, speeds = description.class_names, description.speed_rpm_range
         by_class = dict(zip(names, overall.tolist(), strict=True))
-        heads = {name: values[0] for name, values in predict_heads(self.model, windows).items()}
+        heads = {
+            name: values[0]
+            for name, values in predict_heads(self.model, windows).items()
+        }
         severity, gear = heads.get("severity"), heads.get("gear")
         return Answer(
             record={
                 **verdict(by_class, description.test_score),
                 "probabilities": by_class,
-                "severity": None if severity is None else float(severity[overall.argmax()]),
+                "severity": None
+                if severity is None
+                else float(severity[overall.argmax()]),
                 "gear": None if gear is None else GEARS[int(gear.argmax())],
             },
             windows=[
@@ -117,10 +124,15 @@ class StoredClassifier(StoredNetwork):
         predicted = [(record, log_probability.argmax(axis=1))]
         label, temperature = task.labels()[record], description.temperature
         return Scores(
-            counts={"n_records": int(record.size), "n_units": int(np.unique(units).size)},
+            counts={
+                "n_records": int(record.size),
+                "n_units": int(np.unique(units).size),
+            },
             method={},
             values={
-                "calibration": calibration_scores([log_probability], [label], [temperature]),
+                "calibration": calibration_scores(
+                    [log_probability], [label], [temperature]
+                ),
                 **score_predictions(task, predicted, description.n_bootstrap),
             },
             write=_write_confusion,
@@ -139,7 +151,9 @@ class StoredClassifier(StoredNetwork):
                 low, high = score["low"], score["high"]
                 spread = f"95 % interval over units {low:.3f} to {high:.3f}"
             lines.append(f"{name} {score['mean']:.3f}, {spread}")
-        return lines + [f"recall {name} {share:.3f}" for name, share in result["recall"].items()]
+        return lines + [
+            f"recall {name} {share:.3f}" for name, share in result["recall"].items()
+        ]
 
     def graph(self) -> Graph:
         """Windows in m/s^2 in, log-probabilities out."""

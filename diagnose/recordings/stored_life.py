@@ -16,7 +16,11 @@ from diagnose.recordings.source import SPEED_TOLERANCE, PreparedRecording, Sourc
 from diagnose.recordings.stored_network import Answer, Graph, Scores, StoredNetwork
 from diagnose.scoring.life_scores import MEASURES, by_life, interval, life_scores
 from diagnose.training.life_store import AGE, LifeFacts, load_life_model
-from diagnose.training.remaining_life import LifeNetwork, shares_of_records, shares_of_windows
+from diagnose.training.remaining_life import (
+    LifeNetwork,
+    shares_of_records,
+    shares_of_windows,
+)
 from diagnose.training.store import ModelDescription
 from gensig.errors import ConfigError, DatasetError
 
@@ -48,7 +52,9 @@ class StoredLife(StoredNetwork):
         for name, value in (("torque_nm", source.torque_nm), (AGE, source.life_time_h)):
             option, is_told = OPTIONS[name], name in self.facts.told
             if value is None and is_told:
-                raise ConfigError(f"this model must know {name} of {source.file}: say {option}")
+                raise ConfigError(
+                    f"this model must know {name} of {source.file}: say {option}"
+                )
             if value is not None and not is_told:
                 raise ConfigError(
                     f"{option}: {self.facts.method} is not told {name}; leave it out",
@@ -63,7 +69,11 @@ class StoredLife(StoredNetwork):
             raise ConfigError(
                 f"this model must know the speed of {source.file}: say --speed-rpm or --tacho",
             )
-        values = {"speed_rpm": speed, "torque_nm": source.torque_nm, AGE: source.life_time_h}
+        values = {
+            "speed_rpm": speed,
+            "torque_nm": source.torque_nm,
+            AGE: source.life_time_h,
+        }
         conditions = np.array([[float(values[name] or 0.0) for name in facts.told]])
         by_window = shares_of_windows(self.model, prepared.windows, conditions)
         level = facts.early_life_h
@@ -87,22 +97,34 @@ class StoredLife(StoredNetwork):
             ],
             conditions={
                 "told": {name: values[name] for name in facts.told},
-                "trained_range": {name: list(facts.told_range[name]) for name in facts.told},
+                "trained_range": {
+                    name: list(facts.told_range[name]) for name in facts.told
+                },
             },
             training={"trained_classes": list(self.description.class_names)},
-            reasons=[line for name in OPTIONS if (line := _outside(facts, name, values[name]))],
+            reasons=[
+                line
+                for name in OPTIONS
+                if (line := _outside(facts, name, values[name]))
+            ],
         )
 
     def line(self, result: Mapping[str, Any]) -> str:
         """Hours left with their interval, and how far the model can be relied on."""
         level, hours = result["early_life_h"], result["remaining_life_h"]
-        left = f"{level:.3g} h or longer" if result["at_early_level"] else f"{hours:.3g} h left"
+        left = (
+            f"{level:.3g} h or longer"
+            if result["at_early_level"]
+            else f"{hours:.3g} h left"
+        )
         said = f"{result['recording']}: {left}"
         if result["intervals_hold"]:
             end = f"{result['high_h']:.3g} h"
             if result["high_h"] >= level:
                 end += " or longer"
-            said += f", {result['coverage']:.0%} interval {result['low_h']:.3g} to {end}"
+            said += (
+                f", {result['coverage']:.0%} interval {result['low_h']:.3g} to {end}"
+            )
         else:
             n_lives = result["n_calibration_lives"]
             said += f"; no interval: {n_lives} validation lives are too few for one"
@@ -145,7 +167,9 @@ class StoredLife(StoredNetwork):
             )
         columns = [np.asarray(dataset.column(name), dtype=float) for name in facts.told]
         windows = input_of(self.description.network).load(task, segments)
-        record, share = shares_of_records(self.model, windows, np.stack(columns, axis=1))
+        record, share = shares_of_records(
+            self.model, windows, np.stack(columns, axis=1)
+        )
         prediction = LifePrediction(
             protocol=self.description.protocol,
             method=facts.method,
@@ -163,7 +187,9 @@ class StoredLife(StoredNetwork):
         def write(folder: Path, result: dict[str, Any]) -> None:
             from diagnose.report.life_report import life_figure
 
-            write_life_predictions(folder / "predictions.csv", task, lives, [prediction])
+            write_life_predictions(
+                folder / "predictions.csv", task, lives, [prediction]
+            )
             life_figure(folder / "remaining_life.png", lives, [prediction])
 
         return Scores(
@@ -202,7 +228,9 @@ class StoredLife(StoredNetwork):
         ]
         for name in MEASURES:
             mean, low, high = (result[name][key] for key in ("mean", "low", "high"))
-            lines.append(f"{name} {mean:.4g}, 95 % interval over lives {low:.4g} to {high:.4g}")
+            lines.append(
+                f"{name} {mean:.4g}, 95 % interval over lives {low:.4g} to {high:.4g}"
+            )
         wanted = f"coverage wanted {result['coverage_wanted']:.0%}"
         if not result["intervals_hold"]:
             wanted += ": too few validation lives for such intervals"
@@ -220,7 +248,9 @@ class StoredLife(StoredNetwork):
             agreement="hours within {:.1g} of the early level of torch's",
             facts={
                 "told": list(facts.told),
-                "told_range": {name: list(ends) for name, ends in facts.told_range.items()},
+                "told_range": {
+                    name: list(ends) for name, ends in facts.told_range.items()
+                },
                 "early_life_h": facts.early_life_h,
                 "half_width_h": facts.half_width_h,
                 "coverage": facts.coverage,
@@ -234,7 +264,9 @@ class StoredLife(StoredNetwork):
 
 def _condition_examples(facts: LifeFacts) -> NDArray[np.float32]:
     """(window, column) within the ranges of the training, as many as examples of windows."""
-    low, high = np.array([facts.told_range[name] for name in facts.told]).reshape(-1, 2).T
+    low, high = (
+        np.array([facts.told_range[name] for name in facts.told]).reshape(-1, 2).T
+    )
     share = np.random.default_rng(1).uniform(size=(N_CHECKED, len(facts.told)))
     return (low + share * (high - low)).astype(np.float32)
 

@@ -71,4 +71,6 @@ def score_text(said: Mapping[str, Any]) -> str:
     elif said["adaptation"] is not None:
         where += ", before it was adapted"
     value = interval_text(score["balanced_accuracy"])
-    return f"this model: balanced accuracy {value} {where}, chance {score['chance']:.2f}"
+    return (
+        f"this model: balanced accuracy {value} {where}, chance {score['chance']:.2f}"
+    )

@@ -13,7 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.report.figures import COLORS, MARKERS, save, subplots
-from diagnose.scoring.detection_limit import CURVE_NEEDS, records_behind, too_few_for_curve
+from diagnose.scoring.detection_limit import (
+    CURVE_NEEDS,
+    records_behind,
+    too_few_for_curve,
+)
 
 PANELS_A_ROW = 5
 Answers = Mapping[str, Any]
@@ -30,13 +34,20 @@ def conditions_figure(path: Path, answers: Answers) -> None:
     """
     rows = answers["conditions"]["rows"]
     columns = list(dict.fromkeys(row["column"] for row in rows))[:PANELS_A_ROW]
-    methods = [name for name in (answers["network"], answers["best_baseline"]) if name is not None]
-    figure, axes = subplots(len(columns), size=(3.1 * len(columns) + 0.8, 3.5), sharey=True)
+    methods = [
+        name
+        for name in (answers["network"], answers["best_baseline"])
+        if name is not None
+    ]
+    figure, axes = subplots(
+        len(columns), size=(3.1 * len(columns) + 0.8, 3.5), sharey=True
+    )
     for panel, column in zip(axes, columns, strict=True):
         mine = [row for row in rows if row["column"] == column]
         numbers = mine[0]["low"] is not None
         at = [
-            (row["low"] + row["high"]) / 2 if numbers else place for place, row in enumerate(mine)
+            (row["low"] + row["high"]) / 2 if numbers else place
+            for place, row in enumerate(mine)
         ]
         aside = 0.0 if numbers else 0.15
         for index, method in enumerate(methods):
@@ -49,7 +60,11 @@ def conditions_figure(path: Path, answers: Answers) -> None:
                 method,
                 joined=numbers,
             )
-        weak = [place for place, row in enumerate(mine) if (row["difference_at_most"] or 0) < 0]
+        weak = [
+            place
+            for place, row in enumerate(mine)
+            if (row["difference_at_most"] or 0) < 0
+        ]
         values = [mine[place]["scores"][methods[0]]["mean"] for place in weak]
         panel.plot(
             [at[place] for place in weak],
@@ -60,7 +75,9 @@ def conditions_figure(path: Path, answers: Answers) -> None:
             color="black",
         )
         if not numbers:
-            panel.set_xticks(at, [row["group"] for row in mine], rotation=20, fontsize=7)
+            panel.set_xticks(
+                at, [row["group"] for row in mine], rotation=20, fontsize=7
+            )
             panel.set_xlim(-0.5, len(mine) - 0.5 + aside)
         panel.set(xlabel=column.removeprefix("params/"), ylim=(-0.03, 1.03))
         panel.set_title(mine[0]["measure"].replace("_", " "), fontsize=9)
@@ -81,19 +98,36 @@ def detection_figure(path: Path, answers: Answers) -> None:
     """
     detection = answers["detection"]
     classes = graded_classes(answers)
-    methods = [name for name in (answers["network"], answers["best_baseline"]) if name is not None]
-    figure, axes = subplots(len(classes), size=(4.2 * len(classes) + 0.8, 3.8), sharey=True)
+    methods = [
+        name
+        for name in (answers["network"], answers["best_baseline"])
+        if name is not None
+    ]
+    figure, axes = subplots(
+        len(classes), size=(4.2 * len(classes) + 0.8, 3.8), sharey=True
+    )
     for panel, name in zip(axes, classes, strict=True):
         for index, method in enumerate(methods):
             found = detection[method]["classes"][name]
             rows = found["by_severity"]
-            at = np.array([(row["severity_low"] + row["severity_high"]) / 2 for row in rows])
-            at = at + index * 0.01 * (at.max() - at.min())  # so that bars do not hide each other
+            at = np.array(
+                [(row["severity_low"] + row["severity_high"]) / 2 for row in rows]
+            )
+            at = at + index * 0.01 * (
+                at.max() - at.min()
+            )  # so that bars do not hide each other
             _line_with_band(
-                panel, at, [row["share_found"] for row in rows], index, method, joined=False
+                panel,
+                at,
+                [row["share_found"] for row in rows],
+                index,
+                method,
+                joined=False,
             )
             panel.plot(
-                found["curve"]["severity"], found["curve"]["share_found"], color=COLORS[index]
+                found["curve"]["severity"],
+                found["curve"]["share_found"],
+                color=COLORS[index],
             )
             alarms = detection[method]["false_alarms"]["mean"]
             if alarms is not None:
@@ -119,7 +153,9 @@ def detection_figure(path: Path, answers: Answers) -> None:
 
 def graded_classes(answers: Answers) -> list[str]:
     """Fault classes whose severity varies among the test records."""
-    found = answers.get("detection", {}).get(answers["network"], {"classes": {}})["classes"]
+    found = answers.get("detection", {}).get(answers["network"], {"classes": {}})[
+        "classes"
+    ]
     return [name for name, part in found.items() if part["by_severity"]]
 
 
@@ -131,7 +167,9 @@ def window_length_figure(path: Path, answers: Mapping[str, Answers]) -> None:
     path : PNG to write
     answers : protocol -> its answers, each with ``window_length``
     """
-    figure, axes = subplots(len(answers), size=(3.4 * len(answers) + 0.8, 3.4), sharey=True)
+    figure, axes = subplots(
+        len(answers), size=(3.4 * len(answers) + 0.8, 3.4), sharey=True
+    )
     for panel, (protocol, part) in zip(axes, answers.items(), strict=True):
         rows = part["window_length"]["rows"]
         seconds = [row["seconds"] for row in rows]
@@ -160,7 +198,10 @@ def _line_with_band(
     Open where unknown.
     """
     mean, low, high = (
-        np.array([np.nan if score[key] is None else score[key] for score in scores], dtype=float)
+        np.array(
+            [np.nan if score[key] is None else score[key] for score in scores],
+            dtype=float,
+        )
         for key in ("mean", "low", "high")
     )
     color, marker = COLORS[index], MARKERS[index]
@@ -169,7 +210,12 @@ def _line_with_band(
         panel.fill_between(at, low, high, color=color, alpha=0.18, linewidth=0)
         return
     panel.plot(
-        at, mean, color=color, marker=marker, linestyle="none", label=label.replace("_", " ")
+        at,
+        mean,
+        color=color,
+        marker=marker,
+        linestyle="none",
+        label=label.replace("_", " "),
     )
     panel.vlines(at, low, high, color=color, linewidth=1.2, alpha=0.7)
 
@@ -181,7 +227,13 @@ def _draw_limits(panel: Any, limits: Sequence[Mapping[str, Any]]) -> None:
             continue
         low = row["value"] if row["low"] is None else row["low"]
         high = row["largest_tested"] if row["high"] is None else row["high"]
-        panel.plot([low, high], [row["share"], row["share"]], color="black", linewidth=2, alpha=0.6)
+        panel.plot(
+            [low, high],
+            [row["share"], row["share"]],
+            color="black",
+            linewidth=2,
+            alpha=0.6,
+        )
         panel.plot(row["value"], row["share"], color="black", marker="|", markersize=12)
         text = f"{row['share']:.0%} at {row['value']:.2f}"
         panel.annotate(

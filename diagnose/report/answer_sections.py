@@ -28,11 +28,13 @@ def answer_sections(folder: Path, clean: Mapping[str, Any]) -> list[Section]:
     answers = {name: result["answers"] for name, result in clean.items()}
     sections = [
         _detection_section(
-            folder, {name: part for name, part in answers.items() if "detection" in part}
+            folder,
+            {name: part for name, part in answers.items() if "detection" in part},
         ),
         _conditions_section(folder, answers),
         _length_section(
-            folder, {name: part for name, part in answers.items() if "window_length" in part}
+            folder,
+            {name: part for name, part in answers.items() if "window_length" in part},
         ),
         _comparisons_section(answers),
     ]
@@ -43,19 +45,30 @@ def _detection_section(folder: Path, answers: Mapping[str, Any]) -> Section:
     rows, notes, figures = [], [], []
     for protocol, part in answers.items():
         for method, detection in part["detection"].items():
-            alarms = interval_text(detection["false_alarms"]) + f" ({detection['threshold_from']})"
+            alarms = (
+                interval_text(detection["false_alarms"])
+                + f" ({detection['threshold_from']})"
+            )
             for name, found in detection["classes"].items():
-                auroc, share = interval_text(found["auroc"]), interval_text(found["share_found"])
+                auroc, share = (
+                    interval_text(found["auroc"]),
+                    interval_text(found["share_found"]),
+                )
                 rows.append([protocol, method, name, auroc, share, alarms])
         mine = part["detection"][part["network"]]
         notes += [(protocol, found["summary"]) for found in mine["classes"].values()]
         if mine["too_many_false_alarms"]:
             warning = "false alarms are above 5 % here, so that the shares found and the limits are too good"
-            notes.append((protocol, f"{warning}: {interval_text(mine['false_alarms'])}."))
+            notes.append(
+                (protocol, f"{warning}: {interval_text(mine['false_alarms'])}.")
+            )
         if graded_classes(part):
             detection_figure(folder / f"detection_{protocol}.png", part)
             figures.append(
-                (f"detection_{protocol}.png", f"share found against severity, {protocol}")
+                (
+                    f"detection_{protocol}.png",
+                    f"share found against severity, {protocol}",
+                )
             )
     if not rows:
         return Section(title="From what severity a fault is found")
@@ -67,7 +80,15 @@ def _detection_section(folder: Path, answers: Mapping[str, Any]) -> Section:
             "more faulty than a healthy one; 0.5 is guessing."
         ],
         table=Table(
-            head=["protocol", "method", "class", "AUROC", "share found", "false alarms"], rows=rows
+            head=[
+                "protocol",
+                "method",
+                "class",
+                "AUROC",
+                "share found",
+                "false alarms",
+            ],
+            rows=rows,
         ),
         notes=notes,
         figures=figures,
@@ -87,7 +108,10 @@ def _conditions_section(folder: Path, answers: Mapping[str, Any]) -> Section:
             )
     return Section(
         title="Which condition fails",
-        notes=[(protocol, part["conditions"]["summary"]) for protocol, part in answers.items()],
+        notes=[
+            (protocol, part["conditions"]["summary"])
+            for protocol, part in answers.items()
+        ],
         figures=figures,
     )
 
@@ -98,9 +122,15 @@ def _length_section(folder: Path, answers: Mapping[str, Any]) -> Section:
     window_length_figure(folder / "window_length.png", answers)
     return Section(
         title="How much signal it needs",
-        notes=[(protocol, part["window_length"]["summary"]) for protocol, part in answers.items()],
+        notes=[
+            (protocol, part["window_length"]["summary"])
+            for protocol, part in answers.items()
+        ],
         figures=[
-            ("window_length.png", "score by the length of signal judged, networks as trained")
+            (
+                "window_length.png",
+                "score by the length of signal judged, networks as trained",
+            )
         ],
         folded=True,
     )

@@ -25,19 +25,29 @@ def write_tables(folder: Path, metrics: Mapping[str, Any]) -> list[str]:
     metrics : of `diagnose.studies.study.run_study`
     """
     results = metrics["protocols"]
-    answers = {name: result["answers"] for name, result in results.items() if result["answers"]}
+    answers = {
+        name: result["answers"] for name, result in results.items() if result["answers"]
+    }
     tables: dict[str, list[dict[str, Any]]] = {
-        SCORES: [row for name, result in results.items() for row in _score_rows(name, result)],
+        SCORES: [
+            row for name, result in results.items() for row in _score_rows(name, result)
+        ],
         BY_CONDITION: [
             row for name, part in answers.items() for row in _condition_rows(name, part)
         ],
-        BY_SEVERITY: [row for name, part in answers.items() for row in _severity_rows(name, part)],
-        LIMITS: [row for name, part in answers.items() for row in _limit_rows(name, part)],
+        BY_SEVERITY: [
+            row for name, part in answers.items() for row in _severity_rows(name, part)
+        ],
+        LIMITS: [
+            row for name, part in answers.items() for row in _limit_rows(name, part)
+        ],
         COMPARISONS: [
             {
                 "protocol": name,
                 **{
-                    key: value for key, value in row.items() if key not in ("difference", "summary")
+                    key: value
+                    for key, value in row.items()
+                    if key not in ("difference", "summary")
                 },
             }
             | _spread("difference", row["difference"])
@@ -96,7 +106,9 @@ def _condition_rows(protocol: str, answers: Row) -> Iterable[dict[str, Any]]:
                 **score,
                 "n_records": row["n_records"],
                 "n_units": row["n_units"],
-                "difference_from_rest": row["difference_from_rest"] if network else None,
+                "difference_from_rest": row["difference_from_rest"]
+                if network
+                else None,
                 "difference_at_most": row["difference_at_most"] if network else None,
             }
 
@@ -126,4 +138,8 @@ def _limit_rows(protocol: str, answers: Row) -> Iterable[dict[str, Any]]:
 
 
 def _spread(name: str, value: Row) -> dict[str, Any]:
-    return {name: value["mean"], f"{name}_low": value["low"], f"{name}_high": value["high"]}
+    return {
+        name: value["mean"],
+        f"{name}_low": value["low"],
+        f"{name}_high": value["high"],
+    }

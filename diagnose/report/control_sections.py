@@ -44,7 +44,11 @@ def controls_section(metrics: Mapping[str, Any]) -> Section:
     if not rows:
         return Section(title="Controls")
     labels = [row[1] for row in rows]
-    notes = [(name, text) for name, text in control_notes().items() if _explains(name, labels)]
+    notes = [
+        (name, text)
+        for name, text in control_notes().items()
+        if _explains(name, labels)
+    ]
     if not _explains("oracle", labels) and metrics["settings"]["oracle"] == "auto":
         notes.append(
             (
@@ -57,7 +61,9 @@ def controls_section(metrics: Mapping[str, Any]) -> Section:
         text=[
             "What would show that a score has another cause than the fault, and what the signal holds at best."
         ],
-        table=Table(head=["protocol", "control", "balanced accuracy", "verdict"], rows=rows),
+        table=Table(
+            head=["protocol", "control", "balanced accuracy", "verdict"], rows=rows
+        ),
         notes=notes,
         folded=True,
     )
@@ -85,14 +91,20 @@ def _rows(result: Mapping[str, Any], model: str) -> list[list[str]]:
     if "oracle" in methods:
         chosen = oracle_labels(model)
         rows.append(
-            ["oracle", score_cell(methods["oracle"]), f"of {chosen[methods['oracle']['chosen']]}"]
+            [
+                "oracle",
+                score_cell(methods["oracle"]),
+                f"of {chosen[methods['oracle']['chosen']]}",
+            ]
         )
         rows += [
             [f"oracle, {name}", score_cell(methods[key]), ""]
             for key, name in chosen.items()
             if key in methods
         ]
-        rows.append([f"{model} over oracle", oracle_share(result), oracle_verdict(result)])
+        rows.append(
+            [f"{model} over oracle", oracle_share(result), oracle_verdict(result)]
+        )
     return rows
 
 

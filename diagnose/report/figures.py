@@ -14,10 +14,15 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 
 def confusion_figure(
-    path: Path, confusion: Sequence[Sequence[int]], class_names: Sequence[str], title: str
+    path: Path,
+    confusion: Sequence[Sequence[int]],
+    class_names: Sequence[str],
+    title: str,
 ) -> None:
     """Share of each true class given each label, with counts of records (summed over seeds)."""
-    figure, axes = subplots(1, size=(1.2 * len(class_names) + 2.4, 1.0 * len(class_names) + 1.9))
+    figure, axes = subplots(
+        1, size=(1.2 * len(class_names) + 2.4, 1.0 * len(class_names) + 1.9)
+    )
     counts = np.asarray(confusion)
     total = counts.sum(axis=1, keepdims=True)
     share = np.divide(counts, total, out=np.zeros(counts.shape), where=total > 0)
@@ -25,7 +30,9 @@ def confusion_figure(
     for (row, column), value in np.ndenumerate(share):
         text = f"{value:.2f}\n({counts[row, column]})"
         color = "black" if value > 0.5 else "white"
-        axes[0].text(column, row, text, ha="center", va="center", color=color, fontsize=9)
+        axes[0].text(
+            column, row, text, ha="center", va="center", color=color, fontsize=9
+        )
     ticks = range(len(class_names))
     axes[0].set_xticks(ticks, class_names, rotation=20, ha="right")
     axes[0].set_yticks(ticks, class_names)
@@ -40,7 +47,10 @@ def scores_figure(path: Path, metrics: Mapping[str, Any]) -> None:
     """
     results = sorted(metrics["protocols"].items(), key=lambda item: item[1]["leaky"])
     named = dict.fromkeys(
-        [metrics["model"], *(name for _, result in results for name in result["methods"])]
+        [
+            metrics["model"],
+            *(name for _, result in results for name in result["methods"]),
+        ]
     )
     methods = [name for name in named if name != "chance"]
     height = 0.34 * len(methods) + 1.1
@@ -48,22 +58,35 @@ def scores_figure(path: Path, metrics: Mapping[str, Any]) -> None:
         len(results), size=(min(3.4 * len(results) + 1.6, 16), height), sharey=True
     )
     for panel, (protocol, result) in zip(axes, results, strict=True):
-        panel.axvline(result["methods"]["chance"]["balanced_accuracy"], color="0.4", linestyle=":")
+        panel.axvline(
+            result["methods"]["chance"]["balanced_accuracy"], color="0.4", linestyle=":"
+        )
         for place, name in enumerate(reversed(methods)):
             if name not in result["methods"]:
                 continue
             score = result["methods"][name]["balanced_accuracy"]
             color = (
-                "0.6" if result["leaky"] else COLORS[0] if name == metrics["model"] else COLORS[-1]
+                "0.6"
+                if result["leaky"]
+                else COLORS[0]
+                if name == metrics["model"]
+                else COLORS[-1]
             )
             if score["low"] is not None:
-                panel.plot([score["low"], score["high"]], [place, place], color=color, linewidth=2)
+                panel.plot(
+                    [score["low"], score["high"]],
+                    [place, place],
+                    color=color,
+                    linewidth=2,
+                )
             panel.plot(score["mean"], place, color=color, marker="o")
         panel.set_yticks(
             range(len(methods)), [name.replace("_", " ") for name in reversed(methods)]
         )
         title = protocol + ("\nLEAKY: not a result" if result["leaky"] else "")
-        panel.set(xlim=(0, 1.02), ylim=(-0.6, len(methods) - 0.4), xlabel="balanced accuracy")
+        panel.set(
+            xlim=(0, 1.02), ylim=(-0.6, len(methods) - 0.4), xlabel="balanced accuracy"
+        )
         panel.set_title(title, fontsize=10)
         panel.grid(alpha=0.3, axis="x")
     save(figure, path)
@@ -88,7 +111,10 @@ def reliability_figure(path: Path, protocols: Mapping[str, Mapping[str, Any]]) -
                 label=f"{name} scaling, error {error:.2f}",
             )
         panel.set(
-            xlabel="probability of the predicted class", xlim=(0, 1), ylim=(0, 1.03), title=protocol
+            xlabel="probability of the predicted class",
+            xlim=(0, 1),
+            ylim=(0, 1.03),
+            title=protocol,
         )
         panel.grid(alpha=0.3)
         panel.legend(loc="upper left", fontsize=8)

@@ -55,7 +55,10 @@ MEANINGS = [
 
 
 def write_life_report(
-    folder: Path, metrics: Mapping[str, Any], lives: Lives, predictions: Sequence[LifePrediction]
+    folder: Path,
+    metrics: Mapping[str, Any],
+    lives: Lives,
+    predictions: Sequence[LifePrediction],
 ) -> Path:
     """Write ``metrics.json``, ``scores.csv``, a figure a protocol and ``report.html``, and return
     the page.
@@ -78,7 +81,11 @@ def write_life_report(
     ]
     for name, result in metrics["protocols"].items():
         picture = f"remaining_life_{name}.png"
-        life_figure(folder / picture, lives, [one for one in predictions if one.protocol == name])
+        life_figure(
+            folder / picture,
+            lives,
+            [one for one in predictions if one.protocol == name],
+        )
         caption = (
             f"said against true remaining life, a line a life (at most {MOST_LINES}), first seed; grey: within "
             f"{ALPHA:.0%} of the truth; dotted: the early level"
@@ -115,7 +122,12 @@ def write_life_report(
     ]
     page = folder / "report.html"
     kept = [section for section in sections if section.text or section.notes]
-    write_page(page, title="How long the machines still run", lead=_lead(metrics), sections=kept)
+    write_page(
+        page,
+        title="How long the machines still run",
+        lead=_lead(metrics),
+        sections=kept,
+    )
     return page
 
 
@@ -139,16 +151,26 @@ def life_tables(metrics: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def life_figure(path: Path, lives: Lives, predictions: Sequence[LifePrediction]) -> None:
+def life_figure(
+    path: Path, lives: Lives, predictions: Sequence[LifePrediction]
+) -> None:
     """Said against true remaining life, in the manner of alpha-lambda plots, one panel a method."""
-    shown = {one.method: one for one in reversed(predictions) if one.method != "constant"}
-    order = [name for name in dict.fromkeys(one.method for one in predictions) if name in shown]
+    shown = {
+        one.method: one for one in reversed(predictions) if one.method != "constant"
+    }
+    order = [
+        name
+        for name in dict.fromkeys(one.method for one in predictions)
+        if name in shown
+    ]
     figure, axes = subplots(len(order), size=(3.1 * len(order) + 0.8, 3.9), sharey=True)
     for panel, name in zip(axes, order, strict=True):
         one = shown[name]
         level = one.early_life
         at = np.linspace(0, level, 50)
-        panel.fill_between(at, (1 - ALPHA) * at, np.minimum((1 + ALPHA) * at, level), color="0.88")
+        panel.fill_between(
+            at, (1 - ALPHA) * at, np.minimum((1 + ALPHA) * at, level), color="0.88"
+        )
         panel.plot(at, at, color="0.4", linewidth=1)
         panel.axhline(level, color="0.4", linestyle=":", linewidth=1)
         names = np.unique(lives.name[one.record[lives.failed[one.record]]])[:MOST_LINES]
@@ -165,7 +187,9 @@ def life_figure(path: Path, lives: Lives, predictions: Sequence[LifePrediction])
                 linewidth=0.8,
                 markersize=4,
             )
-        panel.set(xlim=(1.03 * level, -0.03 * level), ylim=(-0.03 * level, 1.06 * level))
+        panel.set(
+            xlim=(1.03 * level, -0.03 * level), ylim=(-0.03 * level, 1.06 * level)
+        )
         panel.set(xlabel="true remaining life, h", title=name.replace("_", " "))
         panel.grid(alpha=0.3)
     axes[0].set_ylabel("said, h")
@@ -225,7 +249,11 @@ def _caveats(name: str, result: Mapping[str, Any]) -> list[str]:
 
 def _lead(metrics: Mapping[str, Any]) -> list[str]:
     settings = metrics["settings"]
-    level = "level kept" if settings["normalise"] == "none" else "level removed (RMS-normalised)"
+    level = (
+        "level kept"
+        if settings["normalise"] == "none"
+        else "level removed (RMS-normalised)"
+    )
     return [
         f"Data: {metrics['data']}, {metrics['n_records']} records; channels {', '.join(metrics['channel_names'])} at "
         f"{metrics['sampling_rate_hz']:g} Hz. Simulated vibration: a score says nothing yet about measured machines.",

@@ -6,7 +6,13 @@ from collections.abc import Sequence
 
 from diagnose.baselines.base import MethodText, Role
 from diagnose.baselines.registry import BASELINES
-from diagnose.studies.jobs import LABEL_SHUFFLE, LEVEL_KEPT, ORACLE, ORACLE_NETWORK, SHAM
+from diagnose.studies.jobs import (
+    LABEL_SHUFFLE,
+    LEVEL_KEPT,
+    ORACLE,
+    ORACLE_NETWORK,
+    SHAM,
+)
 from diagnose.training.sham import sham_method
 
 CHANCE = "chance"
@@ -99,7 +105,9 @@ def oracle_labels(model: str) -> dict[str, str]:
 def control_notes() -> dict[str, str]:
     """Explanation of each control by the beginning of its label."""
     probes = baseline_texts(Role.AT_CHANCE, Role.FOLLOWER)
-    bounds = {f"{ORACLE}, {text.label}": text.meaning for text in baseline_texts(Role.BOUND)}
+    bounds = {
+        f"{ORACLE}, {text.label}": text.meaning for text in baseline_texts(Role.BOUND)
+    }
     return {
         **{text.label: text.meaning for text in probes},
         SHAM: SHAM_NOTE,

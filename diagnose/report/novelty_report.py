@@ -7,7 +7,11 @@ from typing import Any
 
 from diagnose.scoring.judged import interval_text
 from diagnose.studies.novelty import SCORE_LABELS
-from diagnose.studies.novelty_metrics import FALSE_ALARMS, LEAST_VALIDATION, TRUE_POSITIVES
+from diagnose.studies.novelty_metrics import (
+    FALSE_ALARMS,
+    LEAST_VALIDATION,
+    TRUE_POSITIVES,
+)
 from gensig.text.page import Section, Table
 
 QUESTIONS = {
@@ -83,7 +87,10 @@ def _accuracy(result: Mapping[str, Any]) -> list[str]:
 
 def _notes(result: Mapping[str, Any]) -> list[tuple[str, str]]:
     notes = [
-        ("AUROC", "how often a new record has a larger score than a known one; chance is 0.50."),
+        (
+            "AUROC",
+            "how often a new record has a larger score than a known one; chance is 0.50.",
+        ),
         (
             "Found",
             f"share of records above a threshold set on validation units for {FALSE_ALARMS:.0%} false alarms.",
@@ -125,7 +132,11 @@ def _table(result: Mapping[str, Any]) -> Table:
         scores = [_cell(method.get(key)) for key in keys]
         found = [_cell(method["found"][label]) for label in novel]
         rows.append([SCORE_LABELS[name], *scores, *found])
-    head = ["score", *(heads[key] for key in keys), *(f"{name} found" for name in novel)]
+    head = [
+        "score",
+        *(heads[key] for key in keys),
+        *(f"{name} found" for name in novel),
+    ]
     return Table(head=head, rows=rows)
 
 

@@ -62,7 +62,11 @@ def result_table(metrics: Mapping[str, Any]) -> list[str]:
     table = _score_table(metrics)
     lines = ["| " + " | ".join(table.head) + " |", "|---" * len(table.head) + "|"]
     for number, (name, *cells) in enumerate(table.rows):
-        label = f"*{name}* (LEAKY: not a result)" if number in table.quiet else f"**{name}**"
+        label = (
+            f"*{name}* (LEAKY: not a result)"
+            if number in table.quiet
+            else f"**{name}**"
+        )
         lines.append("| " + " | ".join([label, *cells]) + " |")
     return lines
 
@@ -80,7 +84,9 @@ def without_interval(metrics: Mapping[str, Any]) -> list[str]:
 def _score_table(metrics: Mapping[str, Any]) -> Table:
     results = sorted(metrics["protocols"].items(), key=lambda item: item[1]["leaky"])
     columns = score_columns(metrics["model"])
-    shown = [key for key in columns if any(key in result["methods"] for _, result in results)]
+    shown = [
+        key for key in columns if any(key in result["methods"] for _, result in results)
+    ]
     return Table(
         head=["protocol", *(columns[key] for key in shown)],
         rows=[
@@ -94,7 +100,11 @@ def _score_table(metrics: Mapping[str, Any]) -> Table:
 def _lead(metrics: Mapping[str, Any]) -> list[str]:
     settings = metrics["settings"]
     window_ms = 1e3 * settings["window_samples"] / metrics["sampling_rate_hz"]
-    level = "level kept" if settings["normalise"] == "none" else "level removed (RMS-normalised)"
+    level = (
+        "level kept"
+        if settings["normalise"] == "none"
+        else "level removed (RMS-normalised)"
+    )
     return [
         f"Data: {metrics['data']}, {metrics['n_records']} records, classes {', '.join(metrics['class_names'])}; "
         f"channels {', '.join(metrics['channel_names'])} at {metrics['sampling_rate_hz']:g} Hz.",
@@ -115,7 +125,9 @@ def _sections(folder: Path, metrics: Mapping[str, Any]) -> list[Section]:
     sections += novelty_sections(metrics["novelty"])
     if ordered:
         sections.append(controls_section(metrics))
-    sections.append(Section(title="Caveats", notes=[("", line) for line in caveats(metrics)]))
+    sections.append(
+        Section(title="Caveats", notes=[("", line) for line in caveats(metrics)])
+    )
     if ordered:
         sections.append(_meaning_section(metrics, clean))
     if clean:
@@ -166,7 +178,10 @@ def _score_sections(
             ],
             cards=[
                 answer_card(
-                    name, result, model, LEAKY_MEANING if result["leaky"] else MEANING[name]
+                    name,
+                    result,
+                    model,
+                    LEAKY_MEANING if result["leaky"] else MEANING[name],
                 )
                 for name, result in ordered
             ],
@@ -178,7 +193,11 @@ def _score_sections(
             ],
             table=_score_table(metrics),
             figures=_figures(
-                folder, "scores.png", "scores and intervals; dotted: chance", scores_figure, metrics
+                folder,
+                "scores.png",
+                "scores and intervals; dotted: chance",
+                scores_figure,
+                metrics,
             ),
         ),
     ]
@@ -192,7 +211,10 @@ def _meaning_section(metrics: Mapping[str, Any], clean: Mapping[str, Any]) -> Se
                 "A record's label",
                 "the class with the largest mean log-probability over its windows.",
             ),
-            *[(name, f"{MEANING[name]}{_sensors(result)}.") for name, result in clean.items()],
+            *[
+                (name, f"{MEANING[name]}{_sensors(result)}.")
+                for name, result in clean.items()
+            ],
             ("LEAKY", f"{LEAKY_MEANING}."),
             *_explanations(metrics),
         ],
@@ -206,7 +228,9 @@ def _explanations(metrics: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [(text.label, text.meaning) for text in shown]
 
 
-def _fault_section(folder: Path, clean: Mapping[str, Any], metrics: Mapping[str, Any]) -> Section:
+def _fault_section(
+    folder: Path, clean: Mapping[str, Any], metrics: Mapping[str, Any]
+) -> Section:
     model, names = metrics["model"], metrics["class_names"]
     return Section(
         title="Which faults are found",
@@ -252,9 +276,13 @@ def _confusion_section(
     for name, result in ordered:
         title = f"{metrics['model']}, {name}" + (" (LEAKY)" if result["leaky"] else "")
         confusion = result["methods"][metrics["model"]]["confusion"]
-        confusion_figure(folder / f"confusion_{name}.png", confusion, metrics["class_names"], title)
+        confusion_figure(
+            folder / f"confusion_{name}.png", confusion, metrics["class_names"], title
+        )
         figures.append((f"confusion_{name}.png", title))
-    return Section(title="Confusion matrices", figures=figures, side_by_side=True, folded=True)
+    return Section(
+        title="Confusion matrices", figures=figures, side_by_side=True, folded=True
+    )
 
 
 def _figures(
@@ -267,7 +295,9 @@ def _figures(
 
 def _sensors(result: Mapping[str, Any]) -> str:
     """Which channels, where the test has others than the training."""
-    trained, tested = (", ".join(result["channels"][subset]) for subset in ("train", "test"))
+    trained, tested = (
+        ", ".join(result["channels"][subset]) for subset in ("train", "test")
+    )
     return "" if trained == tested else f": trained on {trained}, tested on {tested}"
 
 

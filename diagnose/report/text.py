@@ -30,7 +30,10 @@ def score_cell(method: Mapping[str, Any] | None) -> str:
 def answer_card(name: str, result: Mapping[str, Any], model: str, meaning: str) -> Card:
     """One protocol's score against chance, the best baseline and the shuffled labels."""
     methods = result["methods"]
-    score, chance = methods[model]["balanced_accuracy"], methods["chance"]["balanced_accuracy"]
+    score, chance = (
+        methods[model]["balanced_accuracy"],
+        methods["chance"]["balanced_accuracy"],
+    )
     value, spread = f"{score['mean']:.2f}", _spread(score)
     if result["leaky"]:
         title, meaning = f"{name} (LEAKY)", _sentence(meaning)
@@ -43,7 +46,9 @@ def answer_card(name: str, result: Mapping[str, Any], model: str, meaning: str) 
             mark="quiet",
         )
     above = is_above(score, chance)
-    verdict = [f"{'above chance' if above else 'not distinguishable from chance'} ({chance:.2f})"]
+    verdict = [
+        f"{'above chance' if above else 'not distinguishable from chance'} ({chance:.2f})"
+    ]
     if score["low"] is None:
         verdict = [f"no verdict against chance ({chance:.2f}): too few machines"]
     elif comparison := _best_rival(methods, score):
@@ -54,7 +59,9 @@ def answer_card(name: str, result: Mapping[str, Any], model: str, meaning: str) 
             result["over_oracle"]["balanced_accuracy"],
             methods["oracle"]["balanced_accuracy"],
         )
-        verdict.append(f"{share['mean']:.2f} ({_spread(share)}) of the oracle ({best['mean']:.2f})")
+        verdict.append(
+            f"{share['mean']:.2f} ({_spread(share)}) of the oracle ({best['mean']:.2f})"
+        )
     for key, control in controls_on_cards().items():
         if key in methods:
             found = methods[key]["balanced_accuracy"]
@@ -70,13 +77,20 @@ def answer_card(name: str, result: Mapping[str, Any], model: str, meaning: str) 
     mark = "good" if above and not leak else "bad"
     text = _sentence(meaning if meaning.startswith("tested") else f"tested {meaning}")
     return Card(
-        title=name, value=value, spread=spread, verdict="; ".join(verdict), meaning=text, mark=mark
+        title=name,
+        value=value,
+        spread=spread,
+        verdict="; ".join(verdict),
+        meaning=text,
+        mark=mark,
     )
 
 
 def _best_rival(methods: Mapping[str, Any], score: Mapping[str, Any]) -> str | None:
     """Comparison of the network's score with the best baseline; None where none ran."""
-    labels = {name: label for name, label in rivals_on_cards().items() if name in methods}
+    labels = {
+        name: label for name, label in rivals_on_cards().items() if name in methods
+    }
     if not labels:
         return None
     means = {name: methods[name]["balanced_accuracy"]["mean"] for name in labels}
@@ -92,7 +106,9 @@ def _best_rival(methods: Mapping[str, Any], score: Mapping[str, Any]) -> str | N
 
 def _spread(score: Mapping[str, Any]) -> str:
     return (
-        "too few machines" if score["low"] is None else f"{score['low']:.2f} to {score['high']:.2f}"
+        "too few machines"
+        if score["low"] is None
+        else f"{score['low']:.2f} to {score['high']:.2f}"
     )
 
 
@@ -100,11 +116,21 @@ def _sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
 
-def recall_table(clean: Mapping[str, Any], model: str, class_names: Sequence[str]) -> Table:
+def recall_table(
+    clean: Mapping[str, Any], model: str, class_names: Sequence[str]
+) -> Table:
     """Recall by class, a row a protocol."""
-    shares = {name: result["methods"][model]["recall"] for name, result in clean.items()}
+    shares = {
+        name: result["methods"][model]["recall"] for name, result in clean.items()
+    }
     rows = [
-        [name, *(f"{share[label]:.2f}" if label in share else "-" for label in class_names)]
+        [
+            name,
+            *(
+                f"{share[label]:.2f}" if label in share else "-"
+                for label in class_names
+            ),
+        ]
         for name, share in shares.items()
     ]
     return Table(head=["protocol", *class_names], rows=rows)
@@ -119,10 +145,13 @@ def confusions(confusion: Sequence[Sequence[int]], class_names: Sequence[str]) -
             if true != predicted and count / total >= CONFUSED:
                 found.append((count / total, class_names[true], class_names[predicted]))
     if not found:
-        return f"no class is taken for another in {CONFUSED:.0%} of its records or more."
+        return (
+            f"no class is taken for another in {CONFUSED:.0%} of its records or more."
+        )
     return (
         "; ".join(
-            f"{a} taken for {b} ({share:.0%})" for share, a, b in sorted(found, reverse=True)[:3]
+            f"{a} taken for {b} ({share:.0%})"
+            for share, a, b in sorted(found, reverse=True)[:3]
         )
         + "."
     )
@@ -174,7 +203,9 @@ def few_machines(n_units: int) -> str:
 
 def caveats(metrics: Mapping[str, Any]) -> list[str]:
     """What a reader must know before using the scores."""
-    lines = ["Simulated vibration. A score here says nothing yet about measured machines."]
+    lines = [
+        "Simulated vibration. A score here says nothing yet about measured machines."
+    ]
     for name, result in metrics["protocols"].items():
         n_units = result["n_units"]["test"]
         if n_units < LEAST_UNITS:
@@ -191,7 +222,8 @@ def caveats(metrics: Mapping[str, Any]) -> list[str]:
             "normalise=none gives the level to the network too."
         )
     lines += [
-        f"{name} is left out: {reason}." for name, reason in metrics["protocols_left_out"].items()
+        f"{name} is left out: {reason}."
+        for name, reason in metrics["protocols_left_out"].items()
     ]
     if metrics["n_records_unusable"]:
         lines.append(

@@ -30,10 +30,14 @@ RECORDS_A_GROUP = 20  # fewer say little of four classes
 MOST_GROUPS = 5
 MOST_NAMES = 12  # more gearboxes than this are units, not a condition to compare
 LEAST_A_CLASS = 5  # records of each class that balanced accuracy needs in each group
-LEAST_UNITS_TESTED = 4  # on both sides of a comparison; the spread of fewer is guesswork
+LEAST_UNITS_TESTED = (
+    4  # on both sides of a comparison; the spread of fewer is guesswork
+)
 
 
-def condition_columns(dataset: Dataset, record: NDArray[np.integer]) -> dict[str, NDArray[Any]]:
+def condition_columns(
+    dataset: Dataset, record: NDArray[np.integer]
+) -> dict[str, NDArray[Any]]:
     """Columns that say under which condition a record was taken and differ among the records,
     (record,) each.
 
@@ -47,7 +51,9 @@ def condition_columns(dataset: Dataset, record: NDArray[np.integer]) -> dict[str
         and not name.endswith("_seed")
     ]
     columns: dict[str, NDArray[Any]] = {}
-    for name in [known for known in BASE_COLUMNS if known in dataset.column_names] + drawn:
+    for name in [
+        known for known in BASE_COLUMNS if known in dataset.column_names
+    ] + drawn:
         values = np.asarray(dataset.column(name))[record]
         is_name = values.dtype.kind in "US"
         if values.ndim != 1 or not (
@@ -119,12 +125,20 @@ def by_condition(
             row, resampled = _row(column, group, measure, methods, drawn, rng)
             rows.append(row)
             differences.append(resampled)
-    tested = [index for index, row in enumerate(rows) if row["difference_from_rest"] is not None]
+    tested = [
+        index
+        for index, row in enumerate(rows)
+        if row["difference_from_rest"] is not None
+    ]
     for index in tested:
         row = rows[index]
         overall = score(network, row["measure"])
         spread = _spread(
-            differences[index], overall, row["n_records"], network.label.size, row["n_units"]
+            differences[index],
+            overall,
+            row["n_records"],
+            network.label.size,
+            row["n_units"],
         )
         row["difference_at_most"] = (
             row["difference_from_rest"] + _factor(len(tested), row["n_units"]) * spread
@@ -179,16 +193,26 @@ def _row(
 
 def _measure(label: NDArray[np.integer], groups: Sequence[Group]) -> str:
     present = np.unique(label)
-    fewest = min(int((label[group.member] == name).sum()) for group in groups for name in present)
+    fewest = min(
+        int((label[group.member] == name).sum()) for group in groups for name in present
+    )
     return "balanced_accuracy" if fewest >= LEAST_A_CLASS else "share_right"
 
 
 def _spread(
-    differences: NDArray[np.floating], overall: float, n_inside: int, n_records: int, n_units: int
+    differences: NDArray[np.floating],
+    overall: float,
+    n_inside: int,
+    n_records: int,
+    n_units: int,
 ) -> float:
     """Standard error of a difference between a group and the rest."""
-    of_records = np.sqrt(overall * (1 - overall) * (1 / n_inside + 1 / (n_records - n_inside)))
-    return float(max(np.nanstd(differences) * np.sqrt(n_units / (n_units - 1)), of_records))
+    of_records = np.sqrt(
+        overall * (1 - overall) * (1 / n_inside + 1 / (n_records - n_inside))
+    )
+    return float(
+        max(np.nanstd(differences) * np.sqrt(n_units / (n_units - 1)), of_records)
+    )
 
 
 def _factor(n_compared: int, n_units: int) -> float:

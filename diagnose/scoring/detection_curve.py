@@ -12,7 +12,9 @@ FloatArray = NDArray[np.floating]
 SHARES = (0.5, 0.9)
 LEAST_RECORDS = 10  # of a class, below which no curve is drawn
 LEAST_SIZES = 3
-PRIOR_SCALE = 5.0  # of both coefficients, per standard deviation of the log size; assumed, weak
+PRIOR_SCALE = (
+    5.0  # of both coefficients, per standard deviation of the log size; assumed, weak
+)
 N_STEPS = 30
 
 
@@ -44,7 +46,8 @@ def fit_curves(size: FloatArray, found: FloatArray, weight: FloatArray) -> Float
         share = expit(coefficients[:, :1] + coefficients[:, 1:] * scaled)
         excess = weight * (found - share)
         gradient = (
-            np.stack([excess.sum(axis=1), excess @ scaled], axis=1) - coefficients / PRIOR_SCALE**2
+            np.stack([excess.sum(axis=1), excess @ scaled], axis=1)
+            - coefficients / PRIOR_SCALE**2
         )
         spread = weight * share * (1 - share)
         cross = spread @ scaled
@@ -56,7 +59,9 @@ def fit_curves(size: FloatArray, found: FloatArray, weight: FloatArray) -> Float
             axis=1,
         )
         curvature += np.eye(2) / PRIOR_SCALE**2
-        coefficients += np.clip(np.linalg.solve(curvature, gradient[..., None])[..., 0], -2.0, 2.0)
+        coefficients += np.clip(
+            np.linalg.solve(curvature, gradient[..., None])[..., 0], -2.0, 2.0
+        )
     falling = coefficients[:, 1] < 0
     total = np.maximum(weight.sum(axis=1), 1e-12)
     level = np.clip((weight * found).sum(axis=1) / total, 1e-6, 1 - 1e-6)
@@ -87,7 +92,9 @@ def limits(coefficients: FloatArray, size: FloatArray, share: float) -> FloatArr
         + log_size.mean()
     )
     inside = np.clip(crossing, size.min(), size.max())
-    return np.where(ends[:, 1] < share, np.inf, np.where(ends[:, 0] >= share, size.min(), inside))
+    return np.where(
+        ends[:, 1] < share, np.inf, np.where(ends[:, 0] >= share, size.min(), inside)
+    )
 
 
 def _scaled(values: FloatArray, size: FloatArray) -> FloatArray:

@@ -37,7 +37,9 @@ RECORDS_A_GROUP = 8  # fewer say nothing of a share
 MOST_GROUPS = 5
 CURVE_POINTS = 41
 CURVE_NEEDS = f"a curve needs {LEAST_RECORDS} records of {LEAST_SIZES} severities"
-SIZE_FOLLOWS_SEVERITY = 0.95  # least rank correlation of a fault parameter that is called its size
+SIZE_FOLLOWS_SEVERITY = (
+    0.95  # least rank correlation of a fault parameter that is called its size
+)
 
 
 def detection_score(log_probability: FloatArray, healthy: int) -> FloatArray:
@@ -50,7 +52,9 @@ def detection_score(log_probability: FloatArray, healthy: int) -> FloatArray:
     return logsumexp(faulty, axis=-1) - log_probability[..., healthy]
 
 
-def alarm_threshold(scores: FloatArray, weight: NDArray[np.int64], *, new: bool) -> FloatArray:
+def alarm_threshold(
+    scores: FloatArray, weight: NDArray[np.int64], *, new: bool
+) -> FloatArray:
     """(resample,) score above which at most 5 % of healthy records lie.
 
     With `new`, of healthy records like these but not among them: the score of rank ceil(0.95 (n +
@@ -72,7 +76,9 @@ def alarm_threshold(scores: FloatArray, weight: NDArray[np.int64], *, new: bool)
     return scores[order][np.argmax(below >= rank[:, None], axis=1)]
 
 
-def size_columns(dataset: Dataset, record: IntArray, severity: FloatArray) -> dict[str, FloatArray]:
+def size_columns(
+    dataset: Dataset, record: IntArray, severity: FloatArray
+) -> dict[str, FloatArray]:
     """Parameters of one fault class that grow with its severity, (record,) each: its size in
     physical units.
 
@@ -160,7 +166,9 @@ def detection(
         classes[name] = {
             "n_records": int(member.sum()),
             "n_units": int(n_units),
-            "auroc": with_interval(area[0], area[1:], min(n_units, np.unique(judged.unit).size)),
+            "auroc": with_interval(
+                area[0], area[1:], min(n_units, np.unique(judged.unit).size)
+            ),
             "share_found": share(member),
             "by_severity": _by_severity(by_size.get("severity"), member, judged, share),
             "limits": [
@@ -170,7 +178,9 @@ def detection(
                     quantity, size, found[:, member], weight[:, member], int(n_units)
                 )
             ],
-            "curve": _curve(by_size.get("severity"), found[:1, member], weight[:1, member]),
+            "curve": _curve(
+                by_size.get("severity"), found[:1, member], weight[:1, member]
+            ),
         }
         classes[name]["summary"] = _sentence(name, classes[name], false_alarms)
     return {
@@ -184,7 +194,9 @@ def detection(
     }
 
 
-def _drawn(judged: Judged, n_bootstrap: int, rng: np.random.Generator) -> NDArray[np.int64]:
+def _drawn(
+    judged: Judged, n_bootstrap: int, rng: np.random.Generator
+) -> NDArray[np.int64]:
     """All units once, then the resamples: (1 + resample, unit)."""
     once = np.ones((1, judged.n_units), dtype=np.int64)
     return np.concatenate([once, units_drawn(judged.n_units, n_bootstrap, rng)])
@@ -212,11 +224,15 @@ def _thresholds(
         member = judged.label == healthy
         weight, values = drawn[:, judged.unit[member]].copy(), scores[:, member]
         weight[weight.sum(axis=1) == 0] = 1
-    thresholds = np.stack([alarm_threshold(row, weight, new=new) for row in values], axis=1)
+    thresholds = np.stack(
+        [alarm_threshold(row, weight, new=new) for row in values], axis=1
+    )
     return thresholds, "healthy validation records" if new else "healthy test records"
 
 
-def _found(scores: FloatArray, thresholds: FloatArray, seeds: IntArray) -> NDArray[np.float32]:
+def _found(
+    scores: FloatArray, thresholds: FloatArray, seeds: IntArray
+) -> NDArray[np.float32]:
     """(1 + resample, record) share of the trainings drawn whose score is above their threshold."""
     found = np.empty((len(seeds), scores.shape[1]), dtype=np.float32)
     for row, drawn in enumerate(seeds):
@@ -247,10 +263,13 @@ def _area(
         for unit in np.unique(judged.unit[healthy]):
             ordered = np.sort(values[healthy & (judged.unit == unit)])
             smaller, not_larger = (
-                np.searchsorted(ordered, values[faulty], side) for side in ("left", "right")
+                np.searchsorted(ordered, values[faulty], side)
+                for side in ("left", "right")
             )
             below = (smaller + not_larger) / 2
-            won[unit] = np.bincount(judged.unit[faulty], weights=below, minlength=judged.n_units)
+            won[unit] = np.bincount(
+                judged.unit[faulty], weights=below, minlength=judged.n_units
+            )
         n_won = np.einsum("bu,bv,uv->b", drawn, drawn, won, optimize=True)
         areas[:, seed] = np.divide(
             n_won, n_pairs, out=np.full(len(drawn), np.nan), where=n_pairs > 0
@@ -289,7 +308,11 @@ def _by_severity(
 
 
 def _has_curve(size: FloatArray | None) -> bool:
-    return size is not None and size.size >= LEAST_RECORDS and np.unique(size).size >= LEAST_SIZES
+    return (
+        size is not None
+        and size.size >= LEAST_RECORDS
+        and np.unique(size).size >= LEAST_SIZES
+    )
 
 
 def _limit_rows(
@@ -336,11 +359,11 @@ def _curve(
 def _sentence(name: str, found: Mapping[str, Any], false_alarms: Interval) -> str:
     rows = [row for row in found["limits"] if row["quantity"] == "severity"]
     alarms = (
-        f"at {false_alarms['mean']:.0%} false alarms" if false_alarms["mean"] is not None else ""
+        f"at {false_alarms['mean']:.0%} false alarms"
+        if false_alarms["mean"] is not None
+        else ""
     )
-    text = (
-        f"{name}: {interval_text(found['share_found'])} of {records_behind(found)} found {alarms}"
-    )
+    text = f"{name}: {interval_text(found['share_found'])} of {records_behind(found)} found {alarms}"
     if too_few_for_curve(found):
         text += f"; from what severity on is not told: {CURVE_NEEDS}"
     for row in rows:
@@ -354,7 +377,9 @@ def _sentence(name: str, found: Mapping[str, Any], false_alarms: Interval) -> st
         ]
         if row["status"] == "reached" and others:
             text += (
-                " (" + ", ".join(f"{other['quantity']} {_ends(other)}" for other in others) + ")"
+                " ("
+                + ", ".join(f"{other['quantity']} {_ends(other)}" for other in others)
+                + ")"
             )
     return text + "."
 

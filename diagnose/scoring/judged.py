@@ -78,13 +78,17 @@ class Judged:
     def confusion(self) -> NDArray[np.int64]:
         """Counts of records, (seed, unit, true class, predicted class)."""
         n_classes = self.log_probability.shape[-1]
-        counts = np.zeros((self.n_seeds, self.n_units, n_classes, n_classes), dtype=np.int64)
+        counts = np.zeros(
+            (self.n_seeds, self.n_units, n_classes, n_classes), dtype=np.int64
+        )
         for seed, predicted in enumerate(self.predicted):
             np.add.at(counts[seed], (self.unit, self.label, predicted), 1)
         return counts
 
 
-def units_drawn(n_units: int, n_bootstrap: int, rng: np.random.Generator) -> NDArray[np.int64]:
+def units_drawn(
+    n_units: int, n_bootstrap: int, rng: np.random.Generator
+) -> NDArray[np.int64]:
     """How often each resample holds each unit, (resample, unit): as many draws with replacement
     as there are units.
 
@@ -148,8 +152,14 @@ def share_with_interval(value: float, resampled: FloatArray, n_units: int) -> In
     from scipy.stats import binomtest
 
     interval = with_interval(value, resampled, n_units)
-    if value in (0.0, 1.0) and interval["low"] is not None and interval["high"] is not None:
-        exact = binomtest(round(value * n_units), n_units).proportion_ci(0.95, method="exact")
+    if (
+        value in (0.0, 1.0)
+        and interval["low"] is not None
+        and interval["high"] is not None
+    ):
+        exact = binomtest(round(value * n_units), n_units).proportion_ci(
+            0.95, method="exact"
+        )
         interval["low"] = min(interval["low"], float(exact.low))
         interval["high"] = max(interval["high"], float(exact.high))
     return interval

@@ -14,11 +14,19 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.floating]
 EARLY, LATE = 13.0, 10.0  # units of error in which the score grows e-fold, of PHM 2008
-UNITS = (
-    125.0  # units of the score in the early level: the cycles at which C-MAPSS studies usually cut
+UNITS = 125.0  # units of the score in the early level: the cycles at which C-MAPSS studies usually cut
+BAND = (
+    0.2  # of the early level, about the true remaining life, for the horizon; assumed
 )
-BAND = 0.2  # of the early level, about the true remaining life, for the horizon; assumed
-MEASURES = ("rmse_h", "mae_h", "phm_score", "phm_score_last", "coverage", "width_h", "horizon_h")
+MEASURES = (
+    "rmse_h",
+    "mae_h",
+    "phm_score",
+    "phm_score_last",
+    "coverage",
+    "width_h",
+    "horizon_h",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,7 +89,9 @@ def phm_score(error: FloatArray, early_life: float) -> FloatArray:
     each stopped at one snapshot. The unit is ours.
     """
     d = np.asarray(error, dtype=float) * (UNITS / early_life)
-    return np.where(d < 0, np.expm1(-np.minimum(d, 0) / EARLY), np.expm1(np.maximum(d, 0) / LATE))
+    return np.where(
+        d < 0, np.expm1(-np.minimum(d, 0) / EARLY), np.expm1(np.maximum(d, 0) / LATE)
+    )
 
 
 def prognostic_horizon(true: FloatArray, said: FloatArray, band: float) -> float:
@@ -98,7 +108,9 @@ def prognostic_horizon(true: FloatArray, said: FloatArray, band: float) -> float
     return float(true[order][n_inside - 1]) if n_inside else 0.0
 
 
-def conformal_half_width(error: FloatArray, life: NDArray[Any], coverage: float) -> float:
+def conformal_half_width(
+    error: FloatArray, life: NDArray[Any], coverage: float
+) -> float:
     """Half width of intervals that hold a random snapshot of a new life with at least the
     probability ``coverage``.
 
@@ -138,7 +150,10 @@ def by_life(snapshots: Snapshots) -> dict[str, NDArray[Any]]:
         "width_h": snapshots.high - snapshots.low,
     }
     counts = np.bincount(snapshots.life)
-    found = {name: np.bincount(snapshots.life, weights=row) / counts for name, row in rows.items()}
+    found = {
+        name: np.bincount(snapshots.life, weights=row) / counts
+        for name, row in rows.items()
+    }
     last, horizon = np.empty(counts.size), np.empty(counts.size)
     for life in range(counts.size):
         mine = np.flatnonzero(snapshots.life == life)
@@ -148,7 +163,9 @@ def by_life(snapshots: Snapshots) -> dict[str, NDArray[Any]]:
         at = before[np.argmin(snapshots.true[before])] if before.size else mine[0]
         last[life] = rows["phm_score"][at]
         band = BAND * snapshots.early_life
-        horizon[life] = prognostic_horizon(snapshots.true[mine], snapshots.said[mine], band)
+        horizon[life] = prognostic_horizon(
+            snapshots.true[mine], snapshots.said[mine], band
+        )
     return found | {"phm_score_last": last, "horizon_h": horizon}
 
 
@@ -175,7 +192,11 @@ def life_scores(
 
 
 def gain(
-    values: FloatArray, against: FloatArray, *, n_bootstrap: int, rng: np.random.Generator
+    values: FloatArray,
+    against: FloatArray,
+    *,
+    n_bootstrap: int,
+    rng: np.random.Generator,
 ) -> dict[str, float]:
     """RMSE of ``against`` less that of ``values``, (seed, life) squared errors each, in h: above
     0 is better.

@@ -35,7 +35,9 @@ class Score:
     per_seed: tuple[float, ...]
 
 
-def over_records(log_probability: FloatArray, record: IntArray) -> tuple[IntArray, FloatArray]:
+def over_records(
+    log_probability: FloatArray, record: IntArray
+) -> tuple[IntArray, FloatArray]:
     """Prediction of a record: the mean of the log-probabilities of its windows.
 
     Parameters
@@ -86,7 +88,9 @@ def macro_f1(confusion: CountArray) -> FloatArray:
     true_total, predicted_total = confusion.sum(axis=-1), confusion.sum(axis=-2)
     hits = np.diagonal(confusion, axis1=-2, axis2=-1).astype(float)
     total = true_total + predicted_total
-    f1 = np.divide(2 * hits, total, out=np.full(total.shape, np.nan), where=true_total > 0)
+    f1 = np.divide(
+        2 * hits, total, out=np.full(total.shape, np.nan), where=true_total > 0
+    )
     return _nanmean(f1)
 
 
@@ -118,11 +122,17 @@ def score_with_interval(
     score = SCORES[name]
     per_seed = score(confusion.sum(axis=1))
     n_units = confusion.shape[1]
-    times_drawn = rng.multinomial(n_units, np.full(n_units, 1 / n_units), size=n_bootstrap)
+    times_drawn = rng.multinomial(
+        n_units, np.full(n_units, 1 / n_units), size=n_bootstrap
+    )
     resampled = score(np.einsum("bu,sutp->bstp", times_drawn, confusion))
     if shuffled:
-        resampled = resampled + _renaming_luck(name, confusion.sum(axis=1), n_bootstrap, rng)
-    low, high = percentile_interval(np.clip(_over_drawn_seeds(resampled, rng), 0, 1), n_units)
+        resampled = resampled + _renaming_luck(
+            name, confusion.sum(axis=1), n_bootstrap, rng
+        )
+    low, high = percentile_interval(
+        np.clip(_over_drawn_seeds(resampled, rng), 0, 1), n_units
+    )
     return Score(
         mean=float(np.mean(per_seed)),
         low=low,
@@ -169,14 +179,18 @@ def ratio_with_interval(
     ``mean``, ``low``, ``high``; the last two None for fewer than `LEAST_UNITS`
     """
     score, n_units = SCORES[name], confusion.shape[1]
-    times_drawn = rng.multinomial(n_units, np.full(n_units, 1 / n_units), size=n_bootstrap)
+    times_drawn = rng.multinomial(
+        n_units, np.full(n_units, 1 / n_units), size=n_bootstrap
+    )
     above, below = (
         _over_drawn_seeds(score(np.einsum("bu,sutp->bstp", times_drawn, counts)), rng)
         for counts in (confusion, reference)
     )
     least = np.finfo(float).tiny  # a reference that finds nothing in a resample
     low, high = percentile_interval(above / np.maximum(below, least), n_units)
-    mean = np.mean(score(confusion.sum(axis=1))) / max(np.mean(score(reference.sum(axis=1))), least)
+    mean = np.mean(score(confusion.sum(axis=1))) / max(
+        np.mean(score(reference.sum(axis=1))), least
+    )
     return {"mean": float(mean), "low": low, "high": high}
 
 

@@ -8,14 +8,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.scoring.judged import Judged, resampled_score, score, units_drawn, with_interval
+from diagnose.scoring.judged import (
+    Judged,
+    resampled_score,
+    score,
+    units_drawn,
+    with_interval,
+)
 
 FloatArray = NDArray[np.floating]
 N_PERMUTATIONS = 9999  # all of them where there are no more
 
 
 def compare(
-    network: Judged, others: Sequence[Judged], *, n_bootstrap: int, rng: np.random.Generator
+    network: Judged,
+    others: Sequence[Judged],
+    *,
+    n_bootstrap: int,
+    rng: np.random.Generator,
 ) -> list[dict[str, Any]]:
     """Difference of balanced accuracy, network less another method, one row a method.
 
@@ -40,7 +50,9 @@ def compare(
     mine = resampled_score(network, "balanced_accuracy", drawn, rng)
     rows: list[dict[str, Any]] = []
     for other in others:
-        difference = score(network, "balanced_accuracy") - score(other, "balanced_accuracy")
+        difference = score(network, "balanced_accuracy") - score(
+            other, "balanced_accuracy"
+        )
         resampled = mine - resampled_score(other, "balanced_accuracy", drawn, rng)
         rows.append(
             {
@@ -57,7 +69,9 @@ def compare(
     return rows
 
 
-def permutation_p_value(first: Judged, second: Judged, rng: np.random.Generator) -> float:
+def permutation_p_value(
+    first: Judged, second: Judged, rng: np.random.Generator
+) -> float:
     """Two-sided p-value that two methods have the same balanced accuracy, by swapping them unit
     by unit.
 
@@ -107,9 +121,15 @@ def _sentence(row: dict[str, Any]) -> str:
     what = f"{row['method']} against {row['against'].replace('_', ' ')}: {difference['mean']:+.2f}"
     if difference["low"] is None:
         return f"{what}; one unit shows no spread, so that nothing can be said"
-    sure = row["p_value_holm"] < 0.05 and not difference["low"] <= 0 <= difference["high"]
-    p_value = "p < 0.001" if row["p_value_holm"] < 0.001 else f"p = {row['p_value_holm']:.3f}"
-    verdict = ("better" if difference["mean"] > 0 else "worse") if sure else "not told apart"
+    sure = (
+        row["p_value_holm"] < 0.05 and not difference["low"] <= 0 <= difference["high"]
+    )
+    p_value = (
+        "p < 0.001" if row["p_value_holm"] < 0.001 else f"p = {row['p_value_holm']:.3f}"
+    )
+    verdict = (
+        ("better" if difference["mean"] > 0 else "worse") if sure else "not told apart"
+    )
     return (
         f"{what} [{difference['low']:+.2f}, {difference['high']:+.2f}] balanced accuracy, "
         f"{p_value} (permutation of {row['n_units']} units, Holm): {verdict}"

@@ -82,7 +82,9 @@ class Prediction:
         return self.log_probability.argmax(axis=1)
 
 
-def write_predictions(path: Path, task: Task, predictions: Sequence[Prediction]) -> None:
+def write_predictions(
+    path: Path, task: Task, predictions: Sequence[Prediction]
+) -> None:
     """Write one row a prediction.
 
     Protocol, method, seed, record, its true class and condition, log-probabilities.
@@ -98,7 +100,10 @@ def write_predictions(path: Path, task: Task, predictions: Sequence[Prediction])
         )
         for prediction in predictions:
             for record, guess, scores in zip(
-                prediction.record, prediction.predicted, prediction.log_probability, strict=True
+                prediction.record,
+                prediction.predicted,
+                prediction.log_probability,
+                strict=True,
             ):
                 writer.writerow(
                     [prediction.protocol, prediction.method, prediction.seed]

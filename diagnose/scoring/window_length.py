@@ -52,7 +52,9 @@ def by_window_length(
     """
     place = [_place_in_record(record) for record, _ in windows]
     longest = int(max(order.max() for order in place)) + 1
-    counts = [2**power for power in range(longest.bit_length()) if 2**power < longest] + [longest]
+    counts = [
+        2**power for power in range(longest.bit_length()) if 2**power < longest
+    ] + [longest]
     drawn = units_drawn(judged.n_units, n_bootstrap, rng)
     rows, resampled, scores = [], [], []
     for count in counts:
@@ -70,10 +72,14 @@ def by_window_length(
             {
                 "n_windows": count,
                 "seconds": window_seconds + (count - 1) * step_seconds,
-                "balanced_accuracy": with_interval(scores[-1], resampled[-1], judged.n_units),
+                "balanced_accuracy": with_interval(
+                    scores[-1], resampled[-1], judged.n_units
+                ),
             }
         )
-    gain = with_interval(scores[-1] - scores[0], resampled[-1] - resampled[0], judged.n_units)
+    gain = with_interval(
+        scores[-1] - scores[0], resampled[-1] - resampled[0], judged.n_units
+    )
     return {
         "method": judged.method,
         "rows": rows,
@@ -91,10 +97,14 @@ def _place_in_record(record: IntArray) -> IntArray:
     return place
 
 
-def _sentence(method: str, rows: Sequence[dict[str, Any]], gain: dict[str, float | None]) -> str:
+def _sentence(
+    method: str, rows: Sequence[dict[str, Any]], gain: dict[str, float | None]
+) -> str:
     first, last = rows[0], rows[-1]
     if len(rows) == 1:
-        return f"Records hold one window of {first['seconds']:.3g} s: nothing to compare."
+        return (
+            f"Records hold one window of {first['seconds']:.3g} s: nothing to compare."
+        )
     text = (
         f"{method} scores {interval_text(first['balanced_accuracy'])} on the first {first['seconds']:.3g} s of a "
         f"record and {interval_text(last['balanced_accuracy'])} on {last['seconds']:.3g} s"

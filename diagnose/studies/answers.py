@@ -67,7 +67,10 @@ def protocol_answers(
             network, list(judged.values()), n_bootstrap=settings.n_bootstrap, rng=_rng()
         ),
     }
-    if HEALTHY in task.class_names and (network.label == task.class_names.index(HEALTHY)).any():
+    if (
+        HEALTHY in task.class_names
+        and (network.label == task.class_names.index(HEALTHY)).any()
+    ):
         sizes = _sizes(task, record)
         result["detection"] = {
             method.method: detection(
@@ -88,7 +91,9 @@ def protocol_answers(
     if windows:
         rate = task.dataset.sampling_rate
         result["window_length"] = by_window_length(
-            _judged(task, network_name, runs[network_name], runs[network_name][0].record),
+            _judged(
+                task, network_name, runs[network_name], runs[network_name][0].record
+            ),
             windows,
             window_seconds=task.window_samples / rate,
             step_seconds=task.stride_samples / rate,
@@ -106,7 +111,9 @@ def _rng() -> np.random.Generator:
 def _judged(
     task: Task, method: str, runs: Sequence[Prediction], record: NDArray[np.integer]
 ) -> Judged:
-    scores = np.stack([run.log_probability[np.searchsorted(run.record, record)] for run in runs])
+    scores = np.stack(
+        [run.log_probability[np.searchsorted(run.record, record)] for run in runs]
+    )
     return _of_records(task, method, record, scores)
 
 
@@ -115,14 +122,19 @@ def _validation(task: Task, method: str, runs: Sequence[Prediction]) -> Judged |
     if len(parts) < len(runs):
         return None
     return _of_records(
-        task, method, parts[0].record, np.stack([part.log_probability for part in parts])
+        task,
+        method,
+        parts[0].record,
+        np.stack([part.log_probability for part in parts]),
     )
 
 
 def _of_records(
     task: Task, method: str, record: NDArray[np.integer], scores: NDArray[np.floating]
 ) -> Judged:
-    names, unit = np.unique(np.asarray(task.dataset.column("unit_id"))[record], return_inverse=True)
+    names, unit = np.unique(
+        np.asarray(task.dataset.column("unit_id"))[record], return_inverse=True
+    )
     return Judged(
         method=method,
         label=task.labels()[record],
@@ -136,7 +148,9 @@ def _accuracy(judged: Judged) -> float:
     return float(balanced_accuracy(judged.confusion().sum(axis=1)).mean())
 
 
-def _sizes(task: Task, record: NDArray[np.integer]) -> dict[str, dict[str, NDArray[np.floating]]]:
+def _sizes(
+    task: Task, record: NDArray[np.integer]
+) -> dict[str, dict[str, NDArray[np.floating]]]:
     """Severity of the records of each faulty class, where it is above 0, and what grows with it
     in physical units.
     """
@@ -145,7 +159,12 @@ def _sizes(task: Task, record: NDArray[np.integer]) -> dict[str, dict[str, NDArr
     sizes = {}
     for index, name in enumerate(task.class_names):
         mine = severity[label == index]
-        if name != HEALTHY and mine.size and np.isfinite(mine).all() and (mine > 0).all():
+        if (
+            name != HEALTHY
+            and mine.size
+            and np.isfinite(mine).all()
+            and (mine > 0).all()
+        ):
             sizes[name] = {"severity": mine} | size_columns(
                 task.dataset, record[label == index], mine
             )

@@ -63,15 +63,21 @@ class Benchmark:
                 lines.append(f"its split {protocol} is another one")
         if n_failed := int(np.sum(~np.asarray(dataset.usable, dtype=bool))):
             return [*lines, f"{n_failed} of its records are missing or failed"]
-        number_of = {str(name): index for index, name in enumerate(dataset.column("record_id"))}
+        number_of = {
+            str(name): index for index, name in enumerate(dataset.column("record_id"))
+        }
         known = {
-            number_of[name]: values for name, values in self.signal_rms.items() if name in number_of
+            number_of[name]: values
+            for name, values in self.signal_rms.items()
+            if name in number_of
         }
         if not all(
             np.allclose(signal_rms(dataset, record), values, rtol=RTOL, atol=0)
             for record, values in known.items()
         ):
-            lines.append(f"its signals are not those that gensig {self.generator_version} made")
+            lines.append(
+                f"its signals are not those that gensig {self.generator_version} made"
+            )
         return lines
 
 
@@ -97,7 +103,9 @@ def benchmark_of(dataset: Dataset) -> Benchmark | None:
     return None
 
 
-def score_file(dataset: Dataset, path: Path, *, protocol: str | None = None) -> dict[str, Any]:
+def score_file(
+    dataset: Dataset, path: Path, *, protocol: str | None = None
+) -> dict[str, Any]:
     """Score the predictions of a CSV file on the test parts of the data set's splits.
 
     Parameters
@@ -133,16 +141,33 @@ def score_file(dataset: Dataset, path: Path, *, protocol: str | None = None) -> 
     benchmark = None
     if frozen is not None:
         differences = frozen.differences(dataset)
-        results = {} if differences else {name: frozen.results.get(name, {}) for name in scores}
-        benchmark = {"name": frozen.name, "differences": differences, "results": results}
-    return {"data": str(dataset.folder), "scores": scores, "chance": chance, "benchmark": benchmark}
+        results = (
+            {}
+            if differences
+            else {name: frozen.results.get(name, {}) for name in scores}
+        )
+        benchmark = {
+            "name": frozen.name,
+            "differences": differences,
+            "results": results,
+        }
+    return {
+        "data": str(dataset.folder),
+        "scores": scores,
+        "chance": chance,
+        "benchmark": benchmark,
+    }
 
 
-def _runs(task: Task, path: Path, protocol: str | None) -> dict[tuple[str, str], list[Run]]:
+def _runs(
+    task: Task, path: Path, protocol: str | None
+) -> dict[tuple[str, str], list[Run]]:
     """(protocol, method) -> for each seed the records of the test part, sorted, and their labels,
     (record,) both.
     """
-    number_of = {str(name): index for index, name in enumerate(task.dataset.column("record_id"))}
+    number_of = {
+        str(name): index for index, name in enumerate(task.dataset.column("record_id"))
+    }
     class_of = {name: index for index, name in enumerate(task.class_names)}
     said: dict[tuple[str, str, str], dict[int, int]] = {}
     for line, row in enumerate(_rows(path), start=2):
@@ -172,7 +197,10 @@ def _runs(task: Task, path: Path, protocol: str | None) -> dict[tuple[str, str],
         if is_leaky(name):
             continue
         expected = np.unique(subset_segments(task, name, "test").record)
-        missing, others = set(expected.tolist()) - set(mine), set(mine) - set(expected.tolist())
+        missing, others = (
+            set(expected.tolist()) - set(mine),
+            set(mine) - set(expected.tolist()),
+        )
         if missing or others:
             raise DatasetError(
                 f"{path}: {method}, seed {seed} must name each of the {expected.size} test records of {name} once; "
@@ -182,7 +210,9 @@ def _runs(task: Task, path: Path, protocol: str | None) -> dict[tuple[str, str],
             (expected, np.array([mine[record] for record in expected.tolist()]))
         )
     if not runs:
-        raise ConfigError(f"{path} holds predictions of leaky protocols only: those are no results")
+        raise ConfigError(
+            f"{path} holds predictions of leaky protocols only: those are no results"
+        )
     return runs
 
 
@@ -195,7 +225,9 @@ def _rows(path: Path) -> list[dict[str, str]]:
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             reader = csv.DictReader(file, strict=True)
-            missing = [name for name in REQUIRED if name not in (reader.fieldnames or ())]
+            missing = [
+                name for name in REQUIRED if name not in (reader.fieldnames or ())
+            ]
             if missing:
                 raise DatasetError(
                     f"{path} has no column {missing[0]}; it needs {' and '.join(REQUIRED)}"
@@ -217,7 +249,10 @@ def score_table(result: Mapping[str, Any]) -> list[str]:
     for protocol, methods in result["scores"].items():
         rows: Sequence[tuple[str, Any]] = [
             *((name, score["balanced_accuracy"]) for name, score in methods.items()),
-            *((f"{name} (shipped)", score) for name, score in shipped.get(protocol, {}).items()),
+            *(
+                (f"{name} (shipped)", score)
+                for name, score in shipped.get(protocol, {}).items()
+            ),
         ]
         for name, score in rows:
             lines.append(

@@ -20,7 +20,9 @@ from diagnose.training import sham
 Pairs = Sequence[tuple[Any, Any]]
 
 
-def control_jobs(task: Task, settings: TrainSettings, clean: Sequence[str]) -> list[Job]:
+def control_jobs(
+    task: Task, settings: TrainSettings, clean: Sequence[str]
+) -> list[Job]:
     """Jobs of the controls on protocols that are not leaky; the label shuffle is not among them.
 
     Raises
@@ -34,7 +36,11 @@ def control_jobs(task: Task, settings: TrainSettings, clean: Sequence[str]) -> l
     if not clean:
         return []
     with_oracle = settings.oracle == "auto" and has_twin(task.dataset)
-    jobs = [Job(protocols=clean, seed=None, control=PROBE)] if settings.metadata_probe else []
+    jobs = (
+        [Job(protocols=clean, seed=None, control=PROBE)]
+        if settings.metadata_probe
+        else []
+    )
     # a twin of the same channels says nothing of channels never seen
     known = tuple(name for name in clean if name != CROSS_SENSOR) if with_oracle else ()
     if known:
@@ -45,12 +51,17 @@ def control_jobs(task: Task, settings: TrainSettings, clean: Sequence[str]) -> l
     for protocol in clean:
         if settings.normalise == BOTH:
             jobs += [
-                Job(protocols=(protocol,), seed=seed, control=LEVEL_KEPT) for seed in settings.seeds
+                Job(protocols=(protocol,), seed=seed, control=LEVEL_KEPT)
+                for seed in settings.seeds
             ]
         if protocol in known:
-            jobs += [Job(protocols=(protocol,), seed=seed, control=ORACLE) for seed in few]
+            jobs += [
+                Job(protocols=(protocol,), seed=seed, control=ORACLE) for seed in few
+            ]
         if protocol in shams:
-            jobs += [Job(protocols=(protocol,), seed=seed, control=SHAM) for seed in few]
+            jobs += [
+                Job(protocols=(protocol,), seed=seed, control=SHAM) for seed in few
+            ]
     return jobs
 
 
@@ -80,10 +91,15 @@ def sham_methods(
     runs: dict[tuple[str, str], list[Prediction]] = {}
     for prediction in predictions:
         if is_sham(prediction.method):
-            runs.setdefault((prediction.protocol, prediction.method), []).append(prediction)
+            runs.setdefault((prediction.protocol, prediction.method), []).append(
+                prediction
+            )
     for (protocol, method), mine in runs.items():
         scores = score(other, [(run.record, run.predicted) for run in mine])
-        told = {"seeds": [run.seed for run in mine], "detail": [run.detail for run in mine]}
+        told = {
+            "seeds": [run.seed for run in mine],
+            "detail": [run.detail for run in mine],
+        }
         found.setdefault(protocol, {})[method] = {**scores, **told}
     return found
 
@@ -98,6 +114,8 @@ def chosen_oracle(task: Task, runs: Sequence[Prediction]) -> str | None:
             continue
         label = labels[run.validation.record]
         predicted = run.validation.log_probability.argmax(axis=1)
-        confusion = confusion_by_unit(label, predicted, np.zeros_like(label), n_classes)[0]
+        confusion = confusion_by_unit(
+            label, predicted, np.zeros_like(label), n_classes
+        )[0]
         scores.setdefault(run.method, []).append(float(balanced_accuracy(confusion)))
     return max(scores, key=lambda name: float(np.mean(scores[name])), default=None)

@@ -129,7 +129,9 @@ def run_job(task: Task, settings: TrainSettings, job: Job) -> list[Outcome]:
         inputs = input_of(settings.model)
         if name == HEALTHY_ONLY:
             inputs = WINDOWS  # of the autoencoder
-        return [*trained_runs(settings, name, job.seed, _windows(task, name, "", inputs))]
+        return [
+            *trained_runs(settings, name, job.seed, _windows(task, name, "", inputs))
+        ]
     if job.control == SHAM:
         task = _sham(task, settings)
     if job.seed is not None:
@@ -141,7 +143,12 @@ def run_job(task: Task, settings: TrainSettings, job: Job) -> list[Outcome]:
 
 
 def _run_training(
-    task: Task, settings: TrainSettings, protocol: str, seed: int, shuffled: bool, control: str
+    task: Task,
+    settings: TrainSettings,
+    protocol: str,
+    seed: int,
+    shuffled: bool,
+    control: str,
 ) -> Prediction:
     n_classes = len(task.class_names)
     sets = _windows(task, protocol, control, input_of(settings.model))
@@ -169,7 +176,11 @@ def _run_training(
     is_model = not shuffled and not control
     domain = _domain(protocol, train, validation) if is_model else None
     network = str(settings.model.get("name", "network"))
-    names = {ORACLE: ORACLE_NETWORK, SHAM: sham_method(network, network), LEVEL_KEPT: LEVEL_KEPT}
+    names = {
+        ORACLE: ORACLE_NETWORK,
+        SHAM: sham_method(network, network),
+        LEVEL_KEPT: LEVEL_KEPT,
+    }
     last = log_probability
     if training.last_model is not None and not shuffled:
         _, last = over_records(predict_windows(training.last_model, test), test.record)
@@ -184,7 +195,9 @@ def _run_training(
         windows=Rows(record=test.record, log_probability=by_window),
         weights=training.weights() if is_model else None,
         domain=domain,
-        healthy=None if shuffled else healthy_statistics(training.model, train, task.class_names),
+        healthy=None
+        if shuffled
+        else healthy_statistics(training.model, train, task.class_names),
         best_epoch=training.best_epoch,
         validation_loss=training.validation_loss,
         temperature=training.temperature,
@@ -211,7 +224,9 @@ def _run_baselines(task: Task, settings: TrainSettings, job: Job) -> list[Predic
     if job.control != SHAM:
         return predictions
     network = str(settings.model.get("name", "network"))
-    return [replace(run, method=sham_method(run.method, network)) for run in predictions]
+    return [
+        replace(run, method=sham_method(run.method, network)) for run in predictions
+    ]
 
 
 def _names_of_baselines(settings: TrainSettings, control: str) -> tuple[str, ...]:
@@ -240,7 +255,9 @@ def _windows(
     key = (str(task.dataset.folder), protocol, control == ORACLE, inputs)
     if key not in _loaded:
         _loaded.clear()
-        load = partial(oracle_windows, inputs=inputs) if control == ORACLE else inputs.load
+        load = (
+            partial(oracle_windows, inputs=inputs) if control == ORACLE else inputs.load
+        )
         _loaded[key] = {
             name: load(
                 task.part(protocol, name),
@@ -250,7 +267,10 @@ def _windows(
             for name in SUBSETS
         }
     if control == LEVEL_KEPT:
-        return {name: replace(windows, normalise="none") for name, windows in _loaded[key].items()}
+        return {
+            name: replace(windows, normalise="none")
+            for name, windows in _loaded[key].items()
+        }
     return _loaded[key]
 
 
@@ -270,7 +290,9 @@ def _domain(protocol: str, train: WindowSet, validation: WindowSet) -> Domain:
     return _domains[protocol]
 
 
-def _start_worker(task: Task, settings: TrainSettings, run: Callable[..., list[Any]]) -> None:
+def _start_worker(
+    task: Task, settings: TrainSettings, run: Callable[..., list[Any]]
+) -> None:
     from threadpoolctl import threadpool_limits
 
     torch.set_num_threads(1)

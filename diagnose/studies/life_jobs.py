@@ -40,7 +40,12 @@ from diagnose.training.train import train_network
 
 FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
-AGE_ONLY, CONSTANT, INDICATORS, AND_AGE = "age_only", "constant", "indicators", "_and_age"
+AGE_ONLY, CONSTANT, INDICATORS, AND_AGE = (
+    "age_only",
+    "constant",
+    "indicators",
+    "_and_age",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,7 +118,9 @@ class LifeSets:
             seed=seed,
             record=record,
             said=self.level * share[record],
-            half_width=min(conformal_half_width(error, life, self.coverage), self.level),
+            half_width=min(
+                conformal_half_width(error, life, self.coverage), self.level
+            ),
             early_life=self.level,
             detail=detail,
         )
@@ -152,7 +159,9 @@ def run_life_job(task: Task, settings: TrainSettings, job: Job) -> list[LifePred
     return _networks(task, settings, sets, job.seed)
 
 
-def _baselines(task: Task, settings: TrainSettings, sets: LifeSets) -> list[LifePrediction]:
+def _baselines(
+    task: Task, settings: TrainSettings, sets: LifeSets
+) -> list[LifePrediction]:
     lives, parts, share = sets.lives, sets.parts, sets.share
     train = parts["train"].record
     usual = constant_regression(share[train], lives.name[train])
@@ -161,7 +170,9 @@ def _baselines(task: Task, settings: TrainSettings, sets: LifeSets) -> list[Life
     cache: Cache = {}
     clock = {name: age_table(lives, part) for name, part in parts.items()}
     heard = {
-        name: indicator_table(task, lives, part, features=settings.features, cache=cache)
+        name: indicator_table(
+            task, lives, part, features=settings.features, cache=cache
+        )
         for name, part in parts.items()
     }
     tables: dict[str, dict[str, Table]] = {AGE_ONLY: clock, INDICATORS: heard}
@@ -169,7 +180,9 @@ def _baselines(task: Task, settings: TrainSettings, sets: LifeSets) -> list[Life
         aged = {name: with_age(table, lives) for name, table in heard.items()}
         tables[INDICATORS + AND_AGE] = aged
     for method, table in tables.items():
-        detail, predict = fit_regression(table["train"], table["validation"], lives, share)
+        detail, predict = fit_regression(
+            table["train"], table["validation"], lives, share
+        )
         answer = np.full(share.size, np.nan)
         for part in ("validation", "test"):
             answer[table[part].record] = np.clip(predict(table[part]), 0.0, 1.0)
@@ -185,9 +198,13 @@ def _networks(
 ) -> list[LifePrediction]:
     load, lives = input_of(settings.model).load, sets.lives
     windows = {
-        name: load(task, part, training=name == "train") for name, part in sets.parts.items()
+        name: load(task, part, training=name == "train")
+        for name, part in sets.parts.items()
     }
-    columns, values = operating_names(task), operating_values(task, np.arange(sets.share.size))
+    columns, values = (
+        operating_names(task),
+        operating_values(task, np.arange(sets.share.size)),
+    )
     network = str(settings.model.get("name", "network"))
     conditions = {network: (columns, values)}
     if settings.remaining_life.with_age:

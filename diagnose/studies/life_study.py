@@ -93,7 +93,11 @@ def plan_life_study(task: Task, settings: TrainSettings) -> LifePlan:
     check_network(
         task,
         settings,
-        [life_segments(task, lives, name, subset) for name in protocols for subset in SUBSETS],
+        [
+            life_segments(task, lives, name, subset)
+            for name in protocols
+            for subset in SUBSETS
+        ],
     )
     seeds = (None, *settings.seeds)
     jobs = [Job(protocols=(name,), seed=seed) for name in protocols for seed in seeds]
@@ -151,7 +155,8 @@ def run_life_study(
         "model": str(settings.model.get("name", "network")),
         "settings": {**asdict(settings), "model": dict(settings.model)},
         "protocols": {
-            name: _result(task, settings, lives, name, predictions) for name in plan.protocols
+            name: _result(task, settings, lives, name, predictions)
+            for name in plan.protocols
         },
         "protocols_left_out": plan.left_out,
         "duration_s": round(time.perf_counter() - started, 1),
@@ -191,7 +196,9 @@ def _result(
     tables: dict[str, dict[str, FloatArray]] = {}
     for name, of_seeds in runs.items():
         rows = [by_life(scored_snapshots(lives, one)) for one in of_seeds]
-        tables[name] = {measure: np.stack([row[measure] for row in rows]) for measure in rows[0]}
+        tables[name] = {
+            measure: np.stack([row[measure] for row in rows]) for measure in rows[0]
+        }
     methods = {}
     for name, of_seeds in runs.items():
         rng = np.random.default_rng(BOOTSTRAP_SEED)
@@ -204,11 +211,16 @@ def _result(
                 rng=np.random.default_rng(BOOTSTRAP_SEED),
             ),
             "half_width_h": [one.half_width for one in of_seeds],
-            "censored_below_bound": float(np.mean([below_bound(lives, one) for one in of_seeds])),
+            "censored_below_bound": float(
+                np.mean([below_bound(lives, one) for one in of_seeds])
+            ),
             "seeds": [one.seed for one in of_seeds],
             "detail": [one.detail for one in of_seeds],
         }
-    parts = {subset: life_segments(task, lives, protocol, subset).record for subset in SUBSETS}
+    parts = {
+        subset: life_segments(task, lives, protocol, subset).record
+        for subset in SUBSETS
+    }
     level = mine[0].early_life
     n_calibration = np.unique(
         lives.name[parts["validation"][lives.failed[parts["validation"]]]],
@@ -217,12 +229,16 @@ def _result(
         "early_life_h": level,
         "phm_unit_h": level / UNITS,
         "coverage_wanted": settings.remaining_life.coverage,
-        "intervals_hold": intervals_hold(n_calibration, settings.remaining_life.coverage),
+        "intervals_hold": intervals_hold(
+            n_calibration, settings.remaining_life.coverage
+        ),
         "n_lives": {
-            subset: count_lives(lives, record, failed=True) for subset, record in parts.items()
+            subset: count_lives(lives, record, failed=True)
+            for subset, record in parts.items()
         },
         "n_lives_censored": {
-            subset: count_lives(lives, record, failed=False) for subset, record in parts.items()
+            subset: count_lives(lives, record, failed=False)
+            for subset, record in parts.items()
         },
         "n_records": {subset: int(record.size) for subset, record in parts.items()},
         "n_records_unknown": {
@@ -240,7 +256,9 @@ def below_bound(lives: Lives, prediction: LifePrediction) -> float:
     0 where there are none.
     """
     censored = ~lives.failed[prediction.record]
-    bound = np.minimum(lives.remaining[prediction.record], prediction.early_life)[censored]
+    bound = np.minimum(lives.remaining[prediction.record], prediction.early_life)[
+        censored
+    ]
     return float(np.mean(prediction.said[censored] < bound)) if bound.size else 0.0
 
 
@@ -272,17 +290,34 @@ def write_life_predictions(
     ]
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*head, "early_life_h", "predicted_h", "low_h", "high_h", "scored"])
+        writer.writerow(
+            [*head, "early_life_h", "predicted_h", "low_h", "high_h", "scored"]
+        )
         for one in predictions:
             low, high = interval(one.said, one.half_width, one.early_life)
             for row, record in enumerate(one.record.tolist()):
                 failed = int(lives.failed[record])
                 writer.writerow(
-                    [one.protocol, one.method, one.seed, ids[record], lives.name[record]]
-                    + [f"{lives.age[record]:.6g}", f"{lives.remaining[record]:.6g}", failed]
+                    [
+                        one.protocol,
+                        one.method,
+                        one.seed,
+                        ids[record],
+                        lives.name[record],
+                    ]
+                    + [
+                        f"{lives.age[record]:.6g}",
+                        f"{lives.remaining[record]:.6g}",
+                        failed,
+                    ]
                     + [
                         f"{value:.6g}"
-                        for value in (one.early_life, one.said[row], low[row], high[row])
+                        for value in (
+                            one.early_life,
+                            one.said[row],
+                            low[row],
+                            high[row],
+                        )
                     ]
                     + [failed]
                 )

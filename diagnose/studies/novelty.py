@@ -19,7 +19,12 @@ from torch import nn
 from diagnose.baselines.features import FeatureTable, feature_table
 from diagnose.data.windows import SUBSETS, Task, WindowSet, subset_segments
 from diagnose.networks.calibration import probabilities
-from diagnose.networks.domain import MOST_WINDOWS, distances, fit_domain, neighbor_distance
+from diagnose.networks.domain import (
+    MOST_WINDOWS,
+    distances,
+    fit_domain,
+    neighbor_distance,
+)
 from diagnose.scoring.metrics import over_records
 from diagnose.settings import TrainSettings
 from diagnose.training.autoencoder import fit_autoencoder, reconstruction_error
@@ -116,9 +121,14 @@ def _indicator_runs(
     level = np.array([name.endswith("log_rms") for name in train.names])
     kept = np.flatnonzero(known & (with_level | ~level))
     scaler = make_pipeline(SimpleImputer(), StandardScaler()).fit(train.values[:, kept])
-    values = {subset: scaler.transform(table.values[:, kept]) for subset, table in tables.items()}
+    values = {
+        subset: scaler.transform(table.values[:, kept])
+        for subset, table in tables.items()
+    }
     forest = IsolationForest(random_state=0).fit(values["train"])
-    near = {subset: neighbor_distance(values[subset], values["train"]) for subset in SCORED}
+    near = {
+        subset: neighbor_distance(values[subset], values["train"]) for subset in SCORED
+    }
     rare = {subset: -forest.score_samples(values[subset]) for subset in SCORED}
     text = f"{kept.size} indicators of {len(train.label)} stretches"
     return [
@@ -144,14 +154,20 @@ def trained_runs(
     """
     if protocol != "healthy_only":
         return _classifier_runs(settings, protocol, seed, sets)
-    model = fit_autoencoder(sets["train"], sets["validation"], settings=settings, seed=seed)
+    model = fit_autoencoder(
+        sets["train"], sets["validation"], settings=settings, seed=seed
+    )
     scores = {
         subset: over_records(
             reconstruction_error(model, sets[subset])[:, None], sets[subset].record
         )
         for subset in SCORED
     }
-    return [_run(protocol, "autoencoder", f"best epoch {model.best_epoch}", scores, seed=seed)]
+    return [
+        _run(
+            protocol, "autoencoder", f"best epoch {model.best_epoch}", scores, seed=seed
+        )
+    ]
 
 
 def _classifier_runs(
@@ -192,18 +208,29 @@ def _classifier_runs(
         record, log_probability = over_records(
             predict_windows(training.model, windows), windows.record
         )
-        largest = probabilities(log_probability, training.temperature).max(axis=1, keepdims=True)
-        features, logits = network_outputs(training.model, windows, np.arange(len(windows)))
+        largest = probabilities(log_probability, training.temperature).max(
+            axis=1, keepdims=True
+        )
+        features, logits = network_outputs(
+            training.model, windows, np.arange(len(windows))
+        )
         energy = -np.logaddexp.reduce(logits, axis=1)
-        distance = neighbor_distance(_unit_length(features), _unit_length(trained_features))
+        distance = neighbor_distance(
+            _unit_length(features), _unit_length(trained_features)
+        )
         found.setdefault("largest_probability", {})[subset] = (record, 1 - largest)
-        found.setdefault("energy", {})[subset] = over_records(energy[:, None], windows.record)
+        found.setdefault("energy", {})[subset] = over_records(
+            energy[:, None], windows.record
+        )
         found.setdefault("nearest_features", {})[subset] = over_records(
             distance[:, None], windows.record
         )
     predicted = classes[log_probability.argmax(axis=1)]
     return [
-        replace(_run(protocol, name, training.detail, found[name], seed=seed), predicted=predicted)
+        replace(
+            _run(protocol, name, training.detail, found[name], seed=seed),
+            predicted=predicted,
+        )
         for name in found
     ]
 
@@ -215,18 +242,24 @@ def network_outputs(
     (window, class).
     """
     heads = [
-        part for name, part in model.named_modules() if name == "head" or name.startswith("head.")
+        part
+        for name, part in model.named_modules()
+        if name == "head" or name.startswith("head.")
     ]
     layer = [part for part in heads if isinstance(part, nn.Linear)][-1]
     seen: list[tuple[torch.Tensor, torch.Tensor]] = []
-    hook = layer.register_forward_hook(lambda _, inputs, output: seen.append((inputs[0], output)))
+    hook = layer.register_forward_hook(
+        lambda _, inputs, output: seen.append((inputs[0], output))
+    )
     try:
         with torch.inference_mode():
             for block in np.array_split(chosen, -(-chosen.size // 64)):
                 model(torch.from_numpy(windows.cut(block)))
     finally:
         hook.remove()
-    features, logits = (torch.cat(parts).numpy().astype(float) for parts in zip(*seen, strict=True))
+    features, logits = (
+        torch.cat(parts).numpy().astype(float) for parts in zip(*seen, strict=True)
+    )
     return features, logits
 
 

@@ -62,7 +62,9 @@ def false_positive_rate_95(
     false_positives, true_positives, _ = roc_curve(
         ~novel, -score, sample_weight=weight, drop_intermediate=False
     )
-    return float(false_positives[int(np.argmax(true_positives >= TRUE_POSITIVES - 1e-9))])
+    return float(
+        false_positives[int(np.argmax(true_positives >= TRUE_POSITIVES - 1e-9))]
+    )
 
 
 def check_open_protocol(task: Task, protocol: str) -> None:
@@ -75,10 +77,12 @@ def check_open_protocol(task: Task, protocol: str) -> None:
     """
     labels = task.labels()
     trained, _, tested = (
-        set(labels[subset_segments(task, protocol, subset).record].tolist()) for subset in SUBSETS
+        set(labels[subset_segments(task, protocol, subset).record].tolist())
+        for subset in SUBSETS
     )
     known, shown = (
-        ", ".join(task.class_names[index] for index in sorted(found)) for found in (trained, tested)
+        ", ".join(task.class_names[index] for index in sorted(found))
+        for found in (trained, tested)
     )
     if not tested - trained or not tested & trained:
         raise ConfigError(
@@ -91,7 +95,12 @@ def check_open_protocol(task: Task, protocol: str) -> None:
 
 
 def novelty_protocol_result(
-    task: Task, protocol: str, runs: Sequence[NoveltyRun], *, n_bootstrap: int, seed: int
+    task: Task,
+    protocol: str,
+    runs: Sequence[NoveltyRun],
+    *,
+    n_bootstrap: int,
+    seed: int,
 ) -> dict[str, Any]:
     """Entry of an open protocol in ``metrics.json``; every method is judged on the same resamples.
 
@@ -103,7 +112,8 @@ def novelty_protocol_result(
     """
     labels, unit = task.labels(), np.asarray(task.dataset.column("unit_id"))
     parts = {
-        subset: np.unique(subset_segments(task, protocol, subset).record) for subset in SUBSETS
+        subset: np.unique(subset_segments(task, protocol, subset).record)
+        for subset in SUBSETS
     }
     known = np.unique(labels[parts["train"]])
     by_method: dict[str, list[NoveltyRun]] = {}
@@ -113,19 +123,29 @@ def novelty_protocol_result(
     result: dict[str, Any] = {
         "known_classes": [task.class_names[index] for index in known],
         "novel_classes": [
-            task.class_names[index] for index in np.setdiff1d(labels[parts["test"]], known)
+            task.class_names[index]
+            for index in np.setdiff1d(labels[parts["test"]], known)
         ],
         "n_records": {subset: int(record.size) for subset, record in parts.items()},
-        "n_units": {subset: int(np.unique(unit[record]).size) for subset, record in parts.items()},
+        "n_units": {
+            subset: int(np.unique(unit[record]).size)
+            for subset, record in parts.items()
+        },
         "false_alarms_wanted": FALSE_ALARMS,
         "methods": {
             name: novelty_result(
-                task, of_method, known.tolist(), n_bootstrap, np.random.default_rng(seed)
+                task,
+                of_method,
+                known.tolist(),
+                n_bootstrap,
+                np.random.default_rng(seed),
             )
             for name, of_method in by_method.items()
         },
     }
-    networks = next((found for found in by_method.values() if found[0].predicted is not None), None)
+    networks = next(
+        (found for found in by_method.values() if found[0].predicted is not None), None
+    )
     if networks is not None:
         result["known"] = _accuracy_on_known(
             task, networks, known, n_bootstrap, np.random.default_rng(seed)
@@ -151,9 +171,14 @@ def _accuracy_on_known(
     )
     predicted = [run.predicted[mine] for run in runs if run.predicted is not None]
     confusion = np.stack(
-        [confusion_by_unit(label, given, unit, len(task.class_names)) for given in predicted]
+        [
+            confusion_by_unit(label, given, unit, len(task.class_names))
+            for given in predicted
+        ]
     )
-    score = score_with_interval("balanced_accuracy", confusion, n_bootstrap=n_bootstrap, rng=rng)
+    score = score_with_interval(
+        "balanced_accuracy", confusion, n_bootstrap=n_bootstrap, rng=rng
+    )
     return {"balanced_accuracy": asdict(score), "chance": 1 / np.unique(label).size}
 
 
@@ -163,18 +188,39 @@ def write_novelty(path: Path, task: Task, runs: Sequence[NoveltyRun]) -> None:
     Protocol, method, seed, record, its class and unit, the score and the threshold.
     """
     labels = task.labels()
-    columns = [np.asarray(task.dataset.column(name)) for name in ("record_id", "unit_id")]
+    columns = [
+        np.asarray(task.dataset.column(name)) for name in ("record_id", "unit_id")
+    ]
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(
-            ["protocol", "method", "seed", "record_id", "unit_id", "label", "score", "threshold"]
+            [
+                "protocol",
+                "method",
+                "seed",
+                "record_id",
+                "unit_id",
+                "label",
+                "score",
+                "threshold",
+            ]
         )
         for run in runs:
             threshold = f"{alarm_threshold(run.validation_score):.9g}"
             for record, score in zip(run.record, run.score, strict=True):
-                truth = [*(column[record] for column in columns), task.class_names[labels[record]]]
+                truth = [
+                    *(column[record] for column in columns),
+                    task.class_names[labels[record]],
+                ]
                 writer.writerow(
-                    [run.protocol, run.method, run.seed, *truth, f"{score:.9g}", threshold]
+                    [
+                        run.protocol,
+                        run.method,
+                        run.seed,
+                        *truth,
+                        f"{score:.9g}",
+                        threshold,
+                    ]
                 )
 
 
@@ -204,7 +250,9 @@ def novelty_result(
     """
     record = runs[0].record
     label = task.labels()[record]
-    unit = np.unique(np.asarray(task.dataset.column("unit_id"))[record], return_inverse=True)[1]
+    unit = np.unique(
+        np.asarray(task.dataset.column("unit_id"))[record], return_inverse=True
+    )[1]
     n_units = int(unit.max()) + 1
     drawn = rng.multinomial(n_units, np.full(n_units, 1 / n_units), size=n_bootstrap)
     seeds = rng.integers(len(runs), size=(n_bootstrap, len(runs)))
@@ -213,18 +261,25 @@ def novelty_result(
     threshold = np.array([alarm_threshold(run.validation_score) for run in runs])
     alarm = scores > threshold[:, None]
     trained = [(index, task.class_names[index]) for index in np.unique(label[~novel])]
-    classes = [(task.class_names[index], label == index) for index in np.unique(label[novel])]
+    classes = [
+        (task.class_names[index], label == index) for index in np.unique(label[novel])
+    ]
 
     def area(chosen: Mask) -> dict[str, Any]:
-        return asdict(_area(scores[:, chosen], novel[chosen], unit[chosen], drawn, seeds))
+        return asdict(
+            _area(scores[:, chosen], novel[chosen], unit[chosen], drawn, seeds)
+        )
 
     result = {
         "auroc": area(np.ones_like(novel)),
         "auroc_by_class": {name: area(chosen | ~novel) for name, chosen in classes},
-        "auroc_by_known_class": {name: area((label == index) | novel) for index, name in trained},
+        "auroc_by_known_class": {
+            name: area((label == index) | novel) for index, name in trained
+        },
         "false_alarms": asdict(_share(alarm, ~novel, unit, drawn, seeds)),
         "found": {
-            name: asdict(_share(alarm, chosen, unit, drawn, seeds)) for name, chosen in classes
+            name: asdict(_share(alarm, chosen, unit, drawn, seeds))
+            for name, chosen in classes
         },
         "threshold": threshold.tolist(),
         "n_validation_records": int(runs[0].validation_score.size),
@@ -245,19 +300,29 @@ def _area(
     """
     from sklearn.metrics import roc_auc_score
 
-    won = np.stack([_won_by_units(score, novel, unit, drawn.shape[1]) for score in scores])
+    won = np.stack(
+        [_won_by_units(score, novel, unit, drawn.shape[1]) for score in scores]
+    )
     pairs = drawn @ np.bincount(unit[novel], minlength=drawn.shape[1])
     pairs = pairs * (drawn @ np.bincount(unit[~novel], minlength=drawn.shape[1]))
     total = np.einsum("bu,suv,bv->bs", drawn, won, drawn, optimize=True)
     resampled = np.divide(
-        total, pairs[:, None], out=np.full(total.shape, np.nan), where=pairs[:, None] > 0
+        total,
+        pairs[:, None],
+        out=np.full(total.shape, np.nan),
+        where=pairs[:, None] > 0,
     )
     return _score(
-        [float(roc_auc_score(novel, score)) for score in scores], resampled, seeds, drawn.shape[1]
+        [float(roc_auc_score(novel, score)) for score in scores],
+        resampled,
+        seeds,
+        drawn.shape[1],
     )
 
 
-def _won_by_units(score: FloatArray, novel: Mask, unit: IntArray, n_units: int) -> FloatArray:
+def _won_by_units(
+    score: FloatArray, novel: Mask, unit: IntArray, n_units: int
+) -> FloatArray:
     """(unit of novel, unit of known) pairs of records in which the novel one has the larger
     score, equal ones half.
     """
@@ -271,18 +336,28 @@ def _won_by_units(score: FloatArray, novel: Mask, unit: IntArray, n_units: int) 
     return won
 
 
-def _share(alarm: Mask, chosen: Mask, unit: IntArray, drawn: IntArray, seeds: IntArray) -> Score:
+def _share(
+    alarm: Mask, chosen: Mask, unit: IntArray, drawn: IntArray, seeds: IntArray
+) -> Score:
     """Share of the chosen records with an alarm (seed, record)."""
     n_units = drawn.shape[1]
     hits = np.stack(
-        [np.bincount(unit[chosen], weights=row[chosen], minlength=n_units) for row in alarm]
+        [
+            np.bincount(unit[chosen], weights=row[chosen], minlength=n_units)
+            for row in alarm
+        ]
     )
     total = drawn @ np.bincount(unit[chosen], minlength=n_units)
     raised = drawn @ hits.T
     resampled = np.divide(
-        raised, total[:, None], out=np.full(raised.shape, np.nan), where=total[:, None] > 0
+        raised,
+        total[:, None],
+        out=np.full(raised.shape, np.nan),
+        where=total[:, None] > 0,
     )
-    return _score([float(row[chosen].mean()) for row in alarm], resampled, seeds, drawn.shape[1])
+    return _score(
+        [float(row[chosen].mean()) for row in alarm], resampled, seeds, drawn.shape[1]
+    )
 
 
 def _false_positives(
@@ -291,17 +366,25 @@ def _false_positives(
     def resample(weight: FloatArray) -> list[float]:
         whole = weight[novel].any() and weight[~novel].any()
         return [
-            false_positive_rate_95(novel, score, weight) if whole else np.nan for score in scores
+            false_positive_rate_95(novel, score, weight) if whole else np.nan
+            for score in scores
         ]
 
     resampled = np.array([resample(times[unit].astype(float)) for times in drawn])
     return _score(
-        [false_positive_rate_95(novel, score) for score in scores], resampled, seeds, drawn.shape[1]
+        [false_positive_rate_95(novel, score) for score in scores],
+        resampled,
+        seeds,
+        drawn.shape[1],
     )
 
 
-def _score(per_seed: list[float], resampled: FloatArray, seeds: IntArray, n_units: int) -> Score:
+def _score(
+    per_seed: list[float], resampled: FloatArray, seeds: IntArray, n_units: int
+) -> Score:
     """Percentile interval of (resample, seed) values over drawn seeds."""
     means = np.take_along_axis(resampled, seeds, axis=1).mean(axis=1)
     low, high = percentile_interval(means, n_units)
-    return Score(mean=float(np.mean(per_seed)), low=low, high=high, per_seed=tuple(per_seed))
+    return Score(
+        mean=float(np.mean(per_seed)), low=low, high=high, per_seed=tuple(per_seed)
+    )

@@ -45,7 +45,12 @@ from diagnose.scoring.metrics import (
 from diagnose.scoring.predictions import Prediction, write_predictions
 from diagnose.settings import BOTH, TrainSettings
 from diagnose.studies.answers import protocol_answers
-from diagnose.studies.controls import chosen_oracle, control_jobs, sham_methods, without_sham
+from diagnose.studies.controls import (
+    chosen_oracle,
+    control_jobs,
+    sham_methods,
+    without_sham,
+)
 from diagnose.studies.jobs import LABEL_SHUFFLE, ORACLE, Job, Outcome, run_jobs
 from diagnose.studies.novelty import NoveltyRun
 from diagnose.studies.novelty_metrics import (
@@ -76,7 +81,9 @@ def is_leaky(protocol: str) -> bool:
     return "leaky" in protocol
 
 
-def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], list[Job]]:
+def plan_study(
+    task: Task, settings: TrainSettings
+) -> tuple[tuple[str, ...], list[Job]]:
     """Protocols, leaky ones last, and their jobs, after checking that every subset can be used.
 
     Raises
@@ -85,7 +92,9 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
         subset or a window that does not fit
     """
     wanted, _ = choose_protocols(task, settings.protocols)
-    protocols = tuple(sorted(wanted, key=lambda name: (is_leaky(name), wanted.index(name))))
+    protocols = tuple(
+        sorted(wanted, key=lambda name: (is_leaky(name), wanted.index(name)))
+    )
     labels = task.labels()
     parts: list[Segments] = []
     for protocol in protocols:
@@ -93,7 +102,11 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
             segments = subset_segments(task, protocol, subset)
             parts.append(segments)
             present = np.unique(labels[segments.record])
-            if protocol not in OPEN_PROTOCOLS and subset != "validation" and present.size < 2:
+            if (
+                protocol not in OPEN_PROTOCOLS
+                and subset != "validation"
+                and present.size < 2
+            ):
                 name = task.class_names[int(present[0])]
                 raise ConfigError(
                     f"protocol {protocol}: one class only in its {subset} part ({name})"
@@ -108,7 +121,9 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
     closed = tuple(name for name in protocols if name not in OPEN_PROTOCOLS)
     jobs = [Job(protocols=closed, seed=None)] if settings.baselines and closed else []
     for protocol in protocols:
-        jobs += [Job(protocols=(protocol,), seed=None)] if protocol not in closed else []
+        jobs += (
+            [Job(protocols=(protocol,), seed=None)] if protocol not in closed else []
+        )
         jobs += [Job(protocols=(protocol,), seed=seed) for seed in settings.seeds]
         if settings.shuffle_control and protocol in closed:
             first = min(settings.seeds)
@@ -121,7 +136,9 @@ def plan_study(task: Task, settings: TrainSettings) -> tuple[tuple[str, ...], li
     )
 
 
-def check_network(task: Task, settings: TrainSettings, parts: Sequence[Segments]) -> None:
+def check_network(
+    task: Task, settings: TrainSettings, parts: Sequence[Segments]
+) -> None:
     """Refuse a network or a device that cannot be trained on every one of these parts.
 
     Raises
@@ -129,7 +146,9 @@ def check_network(task: Task, settings: TrainSettings, parts: Sequence[Segments]
     ConfigError    for parameters, stretches or windows that do not fit, and a missing device
     """
     n_channels = len(task.channel_names)
-    model = build_model(settings.model, n_channels=n_channels, n_classes=len(task.class_names))
+    model = build_model(
+        settings.model, n_channels=n_channels, n_classes=len(task.class_names)
+    )
     inputs, name = input_of(settings.model), str(settings.model.get("name", "network"))
     for segments in parts:
         inputs.check(task, segments, name)
@@ -151,7 +170,9 @@ def task_from(dataset: Any, settings: TrainSettings) -> Task:
         channels=settings.channels,
         one_class=settings.task == "remaining_life",
     )
-    crossed = channels_to_cross(dataset.channel_names, settings.channels, settings.test_channels)
+    crossed = channels_to_cross(
+        dataset.channel_names, settings.channels, settings.test_channels
+    )
     return replace(task, cross_channels=crossed)
 
 
@@ -170,7 +191,8 @@ def window_note(dataset: Dataset, settings: TrainSettings) -> str | None:
 def settings_for(dataset: Any, settings: TrainSettings) -> TrainSettings:
     """The settings with what an open data set decides: the window, and what turns need."""
     window = (
-        settings.window_samples or chosen_window(at_rate(dataset, settings.sampling_rate_hz))[0]
+        settings.window_samples
+        or chosen_window(at_rate(dataset, settings.sampling_rate_hz))[0]
     )
     return replace(
         settings,
@@ -214,8 +236,16 @@ def run_study(
     for prediction in predictions:
         if prediction.weights is not None:
             target = folder / "models" / f"{prediction.protocol}-seed{prediction.seed}"
-            parts = [part for part in (prediction.domain, prediction.healthy) if part is not None]
-            known = {name: tensor for part in parts for name, tensor in part.tensors().items()}
+            parts = [
+                part
+                for part in (prediction.domain, prediction.healthy)
+                if part is not None
+            ]
+            known = {
+                name: tensor
+                for part in parts
+                for name, tensor in part.tensors().items()
+            }
             described = model_description(task, settings, prediction)
             described = replace(
                 described, test_score=test_score(task, prediction, settings.n_bootstrap)
@@ -307,15 +337,17 @@ def test_score(task: Task, prediction: Prediction, n_bootstrap: int) -> dict[str
 
     Balanced accuracy with its interval, chance, and on how much.
     """
-    scores = score_predictions(task, [(prediction.record, prediction.predicted)], n_bootstrap)[
-        "balanced_accuracy"
-    ]
+    scores = score_predictions(
+        task, [(prediction.record, prediction.predicted)], n_bootstrap
+    )["balanced_accuracy"]
     return {
         "balanced_accuracy": {key: scores[key] for key in ("mean", "low", "high")},
         "chance": 1.0 / int(np.unique(task.labels()[prediction.record]).size),
         "n_records": int(prediction.record.size),
         "n_units": int(
-            np.unique(np.asarray(task.dataset.column("unit_id"))[prediction.record]).size
+            np.unique(
+                np.asarray(task.dataset.column("unit_id"))[prediction.record]
+            ).size
         ),
         "leaky": is_leaky(prediction.protocol),
     }
@@ -336,7 +368,10 @@ def _confusion(
 
 
 def _protocol_result(
-    task: Task, settings: TrainSettings, protocol: str, predictions: Sequence[Prediction]
+    task: Task,
+    settings: TrainSettings,
+    protocol: str,
+    predictions: Sequence[Prediction],
 ) -> dict[str, Any]:
     labels, unit = task.labels(), np.asarray(task.dataset.column("unit_id"))
     mine = [prediction for prediction in predictions if prediction.protocol == protocol]
@@ -351,7 +386,9 @@ def _protocol_result(
             "seeds": [run.seed for run in runs],
             "detail": [run.detail for run in runs],
         }
-    network = [run for run in mine if run.method == str(settings.model.get("name", "network"))]
+    network = [
+        run for run in mine if run.method == str(settings.model.get("name", "network"))
+    ]
     test = np.unique(network[0].record)
     counts = np.bincount(labels[test], minlength=len(task.class_names))
     methods["chance"] = {
@@ -359,14 +396,18 @@ def _protocol_result(
         "majority_accuracy": float(counts.max() / counts.sum()),
     }
     parts = {
-        subset: np.unique(subset_segments(task, protocol, subset).record) for subset in SUBSETS
+        subset: np.unique(subset_segments(task, protocol, subset).record)
+        for subset in SUBSETS
     }
     oracle = chosen_oracle(task, mine)
     over_oracle: dict[str, Any] = {}
     if oracle is not None:
         methods[ORACLE] = {**methods[oracle], "chosen": oracle}
         found = [
-            _confusion(task, [(run.record, run.predicted) for run in mine if run.method == name])
+            _confusion(
+                task,
+                [(run.record, run.predicted) for run in mine if run.method == name],
+            )
             for name in (network[0].method, oracle)
         ]
         for name in SCORES:
@@ -377,18 +418,26 @@ def _protocol_result(
     return {
         "leaky": is_leaky(protocol),
         "channels": {
-            subset: list(task.part(protocol, subset).channel_names) for subset in ("train", "test")
+            subset: list(task.part(protocol, subset).channel_names)
+            for subset in ("train", "test")
         },
         "n_records": {subset: int(record.size) for subset, record in parts.items()},
-        "n_units": {subset: int(np.unique(unit[record]).size) for subset, record in parts.items()},
+        "n_units": {
+            subset: int(np.unique(unit[record]).size)
+            for subset, record in parts.items()
+        },
         "methods": methods,
         "over_oracle": over_oracle,
         "validation_loss": [list(run.validation_loss) for run in network],
         "best_epoch": [run.best_epoch for run in network],
         "last_epoch": _last_epoch(task, settings, network),
         "calibration": _calibration(task, network),
-        "heads": head_scores(task, parts["train"], network, n_bootstrap=settings.n_bootstrap),
-        "answers": None if is_leaky(protocol) else protocol_answers(task, settings, mine),
+        "heads": head_scores(
+            task, parts["train"], network, n_bootstrap=settings.n_bootstrap
+        ),
+        "answers": None
+        if is_leaky(protocol)
+        else protocol_answers(task, settings, mine),
     }
 
 
@@ -399,7 +448,11 @@ def _last_epoch(
 
     What choosing the best epoch brought.
     """
-    pairs = [(run.record, run.last_predicted) for run in network if run.last_predicted is not None]
+    pairs = [
+        (run.record, run.last_predicted)
+        for run in network
+        if run.last_predicted is not None
+    ]
     scores = score_predictions(task, pairs, settings.n_bootstrap)
     return {
         "epoch": [len(run.validation_loss) for run in network],
@@ -412,7 +465,9 @@ def _calibration(task: Task, network: Sequence[Prediction]) -> dict[str, Any]:
     `diagnose.networks.calibration.calibration_scores`.
     """
     labels = task.labels()
-    runs = [(run.log_probability, labels[run.record], run.temperature) for run in network]
+    runs = [
+        (run.log_probability, labels[run.record], run.temperature) for run in network
+    ]
     return calibration_scores(*(list(column) for column in zip(*runs, strict=True)))
 
 

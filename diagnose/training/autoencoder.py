@@ -47,7 +47,9 @@ class WindowAutoencoder(nn.Module):
 
     def __init__(self, scale: Sequence[float]) -> None:
         super().__init__()
-        self.register_buffer("scale", torch.tensor(list(scale), dtype=torch.float32)[:, None])
+        self.register_buffer(
+            "scale", torch.tensor(list(scale), dtype=torch.float32)[:, None]
+        )
         first, second, third = STRIDES
         wide, narrow, code = WIDTHS
         n_channels = len(scale)
@@ -131,18 +133,27 @@ def fit_autoencoder(
         for epoch in range(1, settings.epochs + 1):
             model.train()
             for batch in np.array_split(
-                rng.permutation(len(train))[:n_drawn], max(n_drawn // settings.batch_size, 1)
+                rng.permutation(len(train))[:n_drawn],
+                max(n_drawn // settings.batch_size, 1),
             ):
                 optimizer.zero_grad()
-                model(torch.from_numpy(train.cut(batch, rng)).to(device)).mean().backward()
+                model(
+                    torch.from_numpy(train.cut(batch, rng)).to(device)
+                ).mean().backward()
                 optimizer.step()
             loss = float(_errors(model, held_out).mean())
             if loss < best:
-                best, best_weights, best_epoch = loss, copy.deepcopy(model.state_dict()), epoch
+                best, best_weights, best_epoch = (
+                    loss,
+                    copy.deepcopy(model.state_dict()),
+                    epoch,
+                )
             if epoch - best_epoch >= settings.patience:
                 break
     if best_epoch == 0:
-        raise SimulationError("the autoencoder diverged from its first epoch; reduce learning_rate")
+        raise SimulationError(
+            "the autoencoder diverged from its first epoch; reduce learning_rate"
+        )
     model.load_state_dict(best_weights)
     return Autoencoder(model=model.cpu().eval(), best_epoch=best_epoch)
 
@@ -174,4 +185,6 @@ def _errors(
     model.eval()
     device = model.scale.device
     with torch.inference_mode():
-        return torch.cat([model(block.to(device)).cpu() for block in windows.split(batch_size)])
+        return torch.cat(
+            [model(block.to(device)).cpu() for block in windows.split(batch_size)]
+        )

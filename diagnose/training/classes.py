@@ -62,7 +62,9 @@ class Classes(LearningTarget[Network]):
         """Cross-entropy of the classes, and the losses of further heads and of the fault's place."""
         device = signals.device
         label = torch.from_numpy(windows.label[batch]).to(device)
-        weight = torch.from_numpy(_class_weights(windows.label, self.n_classes)).to(device)
+        weight = torch.from_numpy(_class_weights(windows.label, self.n_classes)).to(
+            device
+        )
         targets = {
             name: torch.from_numpy(values[batch]).to(device)
             for name, values in windows.targets.items()
@@ -74,10 +76,14 @@ class Classes(LearningTarget[Network]):
                 loss = loss + HEADS_WEIGHT * further_loss(answers, label, targets)
             if "places" in answers and {"gear", "place"} <= set(targets):
                 gear, place = targets["gear"], targets["place"]
-                loss = loss + place_loss(answers["places"], label, gear, place, model.turns)
+                loss = loss + place_loss(
+                    answers["places"], label, gear, place, model.turns
+                )
         return loss
 
-    def answers(self, model: Network, signals: torch.Tensor, windows: WindowSet) -> FloatArray:
+    def answers(
+        self, model: Network, signals: torch.Tensor, windows: WindowSet
+    ) -> FloatArray:
         """(window, class) log-probabilities."""
         return _log_probabilities(model, signals)
 
@@ -85,14 +91,18 @@ class Classes(LearningTarget[Network]):
         """Cross-entropy of record predictions, each class present counting the same."""
         by_record, label = _over_labelled_records(answers, windows)
         losses = -by_record[np.arange(label.size), label]
-        return float(np.mean([losses[label == present].mean() for present in np.unique(label)]))
+        return float(
+            np.mean([losses[label == present].mean() for present in np.unique(label)])
+        )
 
     def temperature(self, answers: FloatArray, windows: WindowSet) -> float:
         """Temperature with the least cross-entropy over the records."""
         return fit_temperature(*_over_labelled_records(answers, windows))
 
 
-def predict_windows(model: nn.Module, windows: WindowSet, *, batch_size: int = 64) -> FloatArray:
+def predict_windows(
+    model: nn.Module, windows: WindowSet, *, batch_size: int = 64
+) -> FloatArray:
     """(window, class) log-probabilities at the planned starts.
 
     The batch size changes speed only.
@@ -108,7 +118,10 @@ def _log_probabilities(model: nn.Module, signals: torch.Tensor) -> FloatArray:
     model.eval()
     device = next(model.parameters()).device
     with torch.inference_mode():
-        blocks = [log_softmax(model(block.to(device)), dim=1) for block in signals.split(CACHED)]
+        blocks = [
+            log_softmax(model(block.to(device)), dim=1)
+            for block in signals.split(CACHED)
+        ]
     return torch.cat(blocks).cpu().numpy().astype(float)
 
 
@@ -133,7 +146,9 @@ def with_shuffled_labels(
     permutation leaves every class a majority label by chance, and a network that finds the classes
     then scores 0, 1/4, 1/2, ... at random.
     """
-    records, first, position = np.unique(windows.record, return_index=True, return_inverse=True)
+    records, first, position = np.unique(
+        windows.record, return_index=True, return_inverse=True
+    )
     true = windows.label[first]
     share = np.bincount(true, minlength=n_classes) / true.size
     shuffled = np.empty_like(true)

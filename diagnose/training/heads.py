@@ -83,13 +83,19 @@ def head_scores(
     """
     rng = np.random.default_rng(BOOTSTRAP_SEED)
     record = runs[0].record
-    truth, known = record_targets(task.dataset, record), record_targets(task.dataset, trained_on)
+    truth, known = (
+        record_targets(task.dataset, record),
+        record_targets(task.dataset, trained_on),
+    )
     unit = np.asarray(task.dataset.column("unit_id"))[record]
     found: dict[str, Any] = {}
     if "severity" in truth and all("severity" in run.heads for run in runs):
         labels = task.labels()
         said = np.stack(
-            [run.heads["severity"][np.arange(record.size), labels[record]] for run in runs]
+            [
+                run.heads["severity"][np.arange(record.size), labels[record]]
+                for run in runs
+            ]
         )
         found["severity_mae"] = {
             name: _severity_error(
@@ -101,12 +107,16 @@ def head_scores(
                 rng=rng,
             )
             for index, name in enumerate(task.class_names)
-            if (chosen := (labels[record] == index) & ~np.isnan(truth["severity"])).any()
+            if (
+                chosen := (labels[record] == index) & ~np.isnan(truth["severity"])
+            ).any()
         }
     if "gear" in truth and all("gear" in run.heads for run in runs):
         confusion = np.stack(
             [
-                confusion_by_unit(truth["gear"], run.heads["gear"].argmax(axis=1), unit, len(GEARS))
+                confusion_by_unit(
+                    truth["gear"], run.heads["gear"].argmax(axis=1), unit, len(GEARS)
+                )
                 for run in runs
             ]
         )
@@ -135,15 +145,21 @@ def _severity_error(
     error = np.abs(said - truth).mean(axis=0)
     names, position = np.unique(unit, return_inverse=True)
     counts = np.bincount(position)
-    times_drawn = rng.multinomial(names.size, np.full(names.size, 1 / names.size), size=n_bootstrap)
-    means = (times_drawn @ np.bincount(position, weights=error)) / (times_drawn @ counts)
+    times_drawn = rng.multinomial(
+        names.size, np.full(names.size, 1 / names.size), size=n_bootstrap
+    )
+    means = (times_drawn @ np.bincount(position, weights=error)) / (
+        times_drawn @ counts
+    )
     low, high = percentile_interval(means, names.size)
     usual = in_training[~np.isnan(in_training)]
     return {
         "mean": float(error.mean()),
         "low": low,
         "high": high,
-        "constant": float(np.abs(np.median(usual) - truth).mean()) if usual.size else None,
+        "constant": float(np.abs(np.median(usual) - truth).mean())
+        if usual.size
+        else None,
         "n_records": int(truth.size),
     }
 

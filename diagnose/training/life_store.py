@@ -66,7 +66,9 @@ class LifeFacts:
         return intervals_hold(self.n_calibration_lives, self.coverage)
 
 
-def load_life_model(folder: str | Path) -> tuple[LifeNetwork, ModelDescription, LifeFacts]:
+def load_life_model(
+    folder: str | Path,
+) -> tuple[LifeNetwork, ModelDescription, LifeFacts]:
     """Network in evaluation mode, its description, and the facts of its hours.
 
     Raises
@@ -97,7 +99,8 @@ def _facts(folder: Path, content: Mapping[str, Any]) -> LifeFacts:
             for name, (low, high) in content["told_range"].items()
         }
         numbers = {
-            name: float(content[name]) for name in ("early_life_h", "half_width_h", "coverage")
+            name: float(content[name])
+            for name in ("early_life_h", "half_width_h", "coverage")
         }
         return LifeFacts(
             **{

@@ -108,7 +108,9 @@ class RemainingLife(LearningTarget[LifeNetwork]):
         error = model(signals, conditions) - share
         return (weight * error.square()).mean()
 
-    def answers(self, model: LifeNetwork, signals: torch.Tensor, windows: WindowSet) -> FloatArray:
+    def answers(
+        self, model: LifeNetwork, signals: torch.Tensor, windows: WindowSet
+    ) -> FloatArray:
         """(window, 1) shares of the early level, not cut."""
         return _shares(model, signals, self.conditions[windows.record])[:, None]
 
@@ -133,7 +135,8 @@ def shares_of_windows(
     blocks = np.array_split(every, -(-every.size // AT_A_TIME))
     of_window = conditions[windows.record]
     shares = [
-        _shares(model, torch.from_numpy(windows.cut(block)), of_window[block]) for block in blocks
+        _shares(model, torch.from_numpy(windows.cut(block)), of_window[block])
+        for block in blocks
     ]
     return np.concatenate(shares)
 
@@ -152,13 +155,19 @@ def _over_records(share: FloatArray, windows: WindowSet) -> tuple[IntArray, Floa
     return record, np.clip(mean[:, 0], 0.0, 1.0)
 
 
-def _shares(model: LifeNetwork, signals: torch.Tensor, conditions: FloatArray) -> FloatArray:
+def _shares(
+    model: LifeNetwork, signals: torch.Tensor, conditions: FloatArray
+) -> FloatArray:
     """(window,) shares of windows (window, channel, sample) under conditions (window, column)."""
     model.eval()
     device = model.mean.device
     known = torch.from_numpy(conditions.astype(np.float32))
     n_blocks = -(-len(signals) // AT_A_TIME)
-    pairs = zip(signals.tensor_split(n_blocks), known.tensor_split(n_blocks), strict=True)
+    pairs = zip(
+        signals.tensor_split(n_blocks), known.tensor_split(n_blocks), strict=True
+    )
     with torch.inference_mode():
-        shares = [model(part.to(device), values.to(device)).cpu() for part, values in pairs]
+        shares = [
+            model(part.to(device), values.to(device)).cpu() for part, values in pairs
+        ]
     return torch.cat(shares).numpy().astype(float)

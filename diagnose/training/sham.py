@@ -66,7 +66,9 @@ def sham_task(task: Task, folder: str) -> Task:
 def _is_sham(dataset: Dataset) -> bool:
     """Whether the set's own configuration says so."""
     try:
-        return json.loads(str(dataset.attributes["config_json"]))["plan"]["sham"] is True
+        return (
+            json.loads(str(dataset.attributes["config_json"]))["plan"]["sham"] is True
+        )
     except (KeyError, TypeError, ValueError):
         return False
 

@@ -28,7 +28,10 @@ if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
 
 MODEL_SCHEMA_VERSION = 2
-READABLE_VERSIONS = (1, MODEL_SCHEMA_VERSION)  # 1: without out_of_distribution and speed_rpm_range
+READABLE_VERSIONS = (
+    1,
+    MODEL_SCHEMA_VERSION,
+)  # 1: without out_of_distribution and speed_rpm_range
 WEIGHTS, DESCRIPTION = "model.safetensors", "model.json"
 
 
@@ -59,9 +62,13 @@ class ModelDescription:
     n_teeth: tuple[int, int] | None = (
         None  # of the driving and the driven gear; None where not told or not the same
     )
-    temperature: float = 1.0  # see `diagnose.networks.calibration`; models of before have none
+    temperature: float = (
+        1.0  # see `diagnose.networks.calibration`; models of before have none
+    )
     test_channel_names: tuple[str, ...] | None = None  # of protocol cross_sensor
-    adaptation: dict[str, Any] | None = None  # see `diagnose.recordings.machine`; None as trained
+    adaptation: dict[str, Any] | None = (
+        None  # see `diagnose.recordings.machine`; None as trained
+    )
     test_score: dict[str, Any] | None = (
         None  # see `diagnose.studies.study.test_score`; models of before have none
     )
@@ -83,7 +90,9 @@ class ModelDescription:
 
     def __post_init__(self) -> None:
         if not 0 < self.temperature < float("inf"):
-            raise ValueError(f"temperature must be greater than 0, not {self.temperature!r}")
+            raise ValueError(
+                f"temperature must be greater than 0, not {self.temperature!r}"
+            )
 
 
 class Trained(Protocol):
@@ -110,11 +119,14 @@ class Trained(Protocol):
         """Of its probabilities."""
 
 
-def model_description(task: Task, settings: TrainSettings, prediction: Trained) -> ModelDescription:
+def model_description(
+    task: Task, settings: TrainSettings, prediction: Trained
+) -> ModelDescription:
     """Description of the network behind a prediction."""
     trained_on = subset_segments(task, prediction.protocol, "train").record
     channels, tested = (
-        task.part(prediction.protocol, subset).channel_names for subset in ("train", "test")
+        task.part(prediction.protocol, subset).channel_names
+        for subset in ("train", "test")
     )
     speed = np.asarray(task.dataset.column("speed_rpm"), dtype=float)[trained_on]
     return ModelDescription(
@@ -134,7 +146,9 @@ def model_description(task: Task, settings: TrainSettings, prediction: Trained) 
         n_bootstrap=settings.n_bootstrap,
         speed_rpm_range=(float(speed.min()), float(speed.max())),
         n_teeth=_n_teeth(task.dataset),
-        out_of_distribution=None if prediction.domain is None else prediction.domain.facts(),
+        out_of_distribution=None
+        if prediction.domain is None
+        else prediction.domain.facts(),
         temperature=prediction.temperature,
         test_channel_names=None if tested == channels else tested,
     )
@@ -156,7 +170,8 @@ def save_model(
 
     folder.mkdir(parents=True, exist_ok=True)
     save_file(
-        {key: np.ascontiguousarray(value) for key, value in weights.items()}, folder / WEIGHTS
+        {key: np.ascontiguousarray(value) for key, value in weights.items()},
+        folder / WEIGHTS,
     )
     (folder / DESCRIPTION).write_text(
         json.dumps(asdict(description), indent=2) + "\n", encoding="utf-8"
@@ -201,10 +216,14 @@ def load_weights(model: nn.Module, folder: Path) -> None:
     from diagnose.networks.domain import TENSOR
 
     stored = {
-        k: v for k, v in tensors_of(folder).items() if k != TENSOR and not k.startswith(PREFIX)
+        k: v
+        for k, v in tensors_of(folder).items()
+        if k != TENSOR and not k.startswith(PREFIX)
     }
     try:
-        model.load_state_dict({name: torch.from_numpy(value) for name, value in stored.items()})
+        model.load_state_dict(
+            {name: torch.from_numpy(value) for name, value in stored.items()}
+        )
     except (RuntimeError, TypeError) as error:
         raise DatasetError(
             f"{folder / WEIGHTS} does not fit {DESCRIPTION}: {_one_line(error)}"
@@ -291,7 +310,9 @@ def read_description(folder: str | Path) -> ModelDescription:
         version = content["model_schema_version"]
         if version not in READABLE_VERSIONS:
             known = " and ".join(map(str, READABLE_VERSIONS))
-            raise DatasetError(f"{path}: model schema {version!r}, this program reads {known}")
+            raise DatasetError(
+                f"{path}: model schema {version!r}, this program reads {known}"
+            )
         for name in ("class_names", "channel_names"):
             content[name] = tuple(str(value) for value in content[name])
         if content.get("test_channel_names") is not None:
@@ -301,20 +322,29 @@ def read_description(folder: str | Path) -> ModelDescription:
         content["sampling_rate_hz"] = float(content["sampling_rate_hz"])
         for name in ("window_samples", "stride_samples"):
             if not isinstance(content[name], int) or content[name] < 1:
-                raise ValueError(f"{name} {content[name]!r} is no positive whole number")
+                raise ValueError(
+                    f"{name} {content[name]!r} is no positive whole number"
+                )
         if content.get("speed_rpm_range") is not None:
             low, high = content["speed_rpm_range"]
             content["speed_rpm_range"] = (float(low), float(high))
         if content.get("n_teeth") is not None:
             driving, driven = content["n_teeth"]
             content["n_teeth"] = (int(driving), int(driven))
-        for name in ("out_of_distribution", "adaptation", "remaining_life", "test_score"):
+        for name in (
+            "out_of_distribution",
+            "adaptation",
+            "remaining_life",
+            "test_score",
+        ):
             if content.get(name) is not None:
                 content[name] = dict(content[name])
         return ModelDescription(**content)
     except FileNotFoundError:
         inside = sorted(
-            child.name for child in (folder / "models").glob("*") if (child / DESCRIPTION).is_file()
+            child.name
+            for child in (folder / "models").glob("*")
+            if (child / DESCRIPTION).is_file()
         )
         hint = (
             f"; choose one of its models, for instance {folder / 'models' / inside[0]}"
@@ -323,7 +353,9 @@ def read_description(folder: str | Path) -> ModelDescription:
         )
         raise DatasetError(f"{folder} holds no {DESCRIPTION}{hint}") from None
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise DatasetError(f"{path} does not describe a model: {_one_line(error)}") from None
+        raise DatasetError(
+            f"{path} does not describe a model: {_one_line(error)}"
+        ) from None
 
 
 def _one_line(error: Exception) -> str:

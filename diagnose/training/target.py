@@ -55,7 +55,9 @@ class LearningTarget(ABC, Generic[Model]):
         """
 
     @abstractmethod
-    def answers(self, model: Model, signals: torch.Tensor, windows: WindowSet) -> FloatArray:
+    def answers(
+        self, model: Model, signals: torch.Tensor, windows: WindowSet
+    ) -> FloatArray:
         """(window, output) answers of a network in evaluation mode.
 
         Parameters

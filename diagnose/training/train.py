@@ -53,7 +53,9 @@ def train_network(
     target: LearningTarget[Model],
     settings: TrainSettings,
     seed: int,
-    on_epoch: Callable[[int, float, float], None] = lambda epoch, training, validation: None,
+    on_epoch: Callable[
+        [int, float, float], None
+    ] = lambda epoch, training, validation: None,
 ) -> Training[Model]:
     """Train with early stopping on the validation units' loss.
 
@@ -78,7 +80,9 @@ def train_network(
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         model = target.network(settings.model, train, input_scale(train))
-        model.to(device)  # weights are drawn on the processor: the same ones on every device
+        model.to(
+            device
+        )  # weights are drawn on the processor: the same ones on every device
         n_drawn = windows_an_epoch(train, settings.epoch_fraction)
         n_batches = max(n_drawn // settings.batch_size, 1)
         descent = _Descent(model, settings, n_batches)
@@ -97,7 +101,9 @@ def train_network(
             if epoch - best_epoch >= settings.patience:
                 break
     if best_epoch == 0:
-        raise SimulationError("the training diverged from its first epoch; reduce learning_rate")
+        raise SimulationError(
+            "the training diverged from its first epoch; reduce learning_rate"
+        )
     last_model = None
     if best_epoch < len(losses):
         last_model = copy.deepcopy(model).cpu().eval()
@@ -114,9 +120,13 @@ def train_network(
 class _Descent:
     """AdamW with a learning rate that rises and falls once over all epochs."""
 
-    def __init__(self, model: torch.nn.Module, settings: TrainSettings, n_batches: int) -> None:
+    def __init__(
+        self, model: torch.nn.Module, settings: TrainSettings, n_batches: int
+    ) -> None:
         rate, decay = settings.learning_rate, settings.weight_decay
-        self.optimizer = torch.optim.AdamW(model.parameters(), lr=rate, weight_decay=decay)
+        self.optimizer = torch.optim.AdamW(
+            model.parameters(), lr=rate, weight_decay=decay
+        )
         self.schedule = torch.optim.lr_scheduler.OneCycleLR(
             self.optimizer,
             max_lr=rate,
@@ -162,7 +172,9 @@ def device_of(name: str) -> torch.device:
     """
     present = torch.cuda.is_available()
     if name == "cuda" and not present:
-        raise ConfigError("device=cuda: torch finds no GPU here; use device=auto or device=cpu")
+        raise ConfigError(
+            "device=cuda: torch finds no GPU here; use device=auto or device=cpu"
+        )
     return torch.device("cuda" if present and name != "cpu" else "cpu")
 
 

@@ -42,5 +42,7 @@ def _entries(body: str) -> str:
         if entry:
             lines.append(f"- `{entry['name']}`: {entry['text'].strip()}")
         else:
-            lines.append(line if not line.startswith(" ") or not lines else f"    {line.strip()}")
+            lines.append(
+                line if not line.startswith(" ") or not lines else f"    {line.strip()}"
+            )
     return "\n".join(lines) + (f"\n\n{rest.strip()}" if rest.strip() else "")

@@ -44,15 +44,20 @@ def on_files(files: Files, config: Any) -> Files:
     """Add the pages beside README.md, and every file outside ``docs`` that a page links to."""
     for page, name in BESIDE.items():
         if (ROOT / name).is_file():
-            files.append(File.generated(config, page, content=(ROOT / name).read_text("utf-8")))
+            files.append(
+                File.generated(config, page, content=(ROOT / name).read_text("utf-8"))
+            )
     linked = set()
     for page in files.documentation_pages():
         linked |= {
-            _path(page.src_uri, target) for _, target, _ in LINK.findall(page.content_string)
+            _path(page.src_uri, target)
+            for _, target, _ in LINK.findall(page.content_string)
         }
     for path in sorted(filter(None, linked)):
         if (place := _place(path)) and place.startswith(f"{SOURCE}/"):
-            files.append(File.generated(config, place, content=(ROOT / path).read_text("utf-8")))
+            files.append(
+                File.generated(config, place, content=(ROOT / path).read_text("utf-8"))
+            )
     return files
 
 
@@ -84,7 +89,9 @@ def equation(source: str, *_: Any, **__: Any) -> str:
         if (part.text or "")[:1] in ("\\", "&")
     ]
     if unread:
-        raise PluginError(f"equation {tag[1]} has {unread}, which latex2mathml cannot read")
+        raise PluginError(
+            f"equation {tag[1]} has {unread}, which latex2mathml cannot read"
+        )
     return f'<div class="equation" id="eq-{tag[1].lower()}">{mathml}<span>({tag[1]})</span></div>'
 
 

@@ -18,7 +18,10 @@ def overrides(parser: argparse.ArgumentParser) -> None:
 def options(parser: argparse.ArgumentParser) -> None:
     """Arguments of options."""
     parser.add_argument(
-        "what", nargs="?", metavar="GROUP[=OPTION]", help="options of a group, or keys of an option"
+        "what",
+        nargs="?",
+        metavar="GROUP[=OPTION]",
+        help="options of a group, or keys of an option",
     )
     parser.add_argument(
         "--config-dir", metavar="DIR", help="folder with groups and options of your own"
@@ -28,7 +31,9 @@ def options(parser: argparse.ArgumentParser) -> None:
 
 def completion(parser: argparse.ArgumentParser) -> None:
     """Arguments of completion."""
-    parser.add_argument("shell", choices=("bash", "zsh", "fish"), help="the shell that reads it")
+    parser.add_argument(
+        "shell", choices=("bash", "zsh", "fish"), help="the shell that reads it"
+    )
 
 
 def generate(parser: argparse.ArgumentParser) -> None:
@@ -40,14 +45,18 @@ def generate(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="one data set for each combination of values a,b",
     )
-    parser.add_argument("--quiet", action="store_true", help="print nothing but mistakes")
+    parser.add_argument(
+        "--quiet", action="store_true", help="print nothing but mistakes"
+    )
 
 
 def stiffness(parser: argparse.ArgumentParser) -> None:
     """Arguments of stiffness."""
     overrides(parser)
     parser.add_argument("--json", metavar="FILE", help="write the curves")
-    parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
+    parser.add_argument(
+        "--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)"
+    )
 
 
 def root_stress(parser: argparse.ArgumentParser) -> None:
@@ -81,13 +90,23 @@ def forced_response(parser: argparse.ArgumentParser) -> None:
     """Arguments of forced-response."""
     overrides(parser)
     parser.add_argument(
-        "--speed", type=float, metavar="RPM", help="of the crank (default: excitation.reference)"
+        "--speed",
+        type=float,
+        metavar="RPM",
+        help="of the crank (default: excitation.reference)",
     )
     parser.add_argument(
-        "--torque", type=float, metavar="NM", help="brake torque (default: excitation.reference)"
+        "--torque",
+        type=float,
+        metavar="NM",
+        help="brake torque (default: excitation.reference)",
     )
     parser.add_argument(
-        "--nodes", type=int, nargs="+", metavar="N", help="to show (default: with toothed wheels)"
+        "--nodes",
+        type=int,
+        nargs="+",
+        metavar="N",
+        help="to show (default: with toothed wheels)",
     )
     parser.add_argument(
         "--run",
@@ -123,24 +142,43 @@ def forced_response(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="write speed_fluctuation_rpm, angle_deg by orders, tooth forces, root stress, the run, the sweep",
     )
-    parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
+    parser.add_argument(
+        "--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)"
+    )
 
 
 def tune_damper(parser: argparse.ArgumentParser) -> None:
     """Arguments of tune-damper."""
     overrides(parser)
     parser.add_argument(
-        "--out", required=True, metavar="FILE", help="option to write: DIR/system/NAME.yaml"
-    )
-    parser.add_argument("--force", action="store_true", help="replace the file of --out")
-    parser.add_argument(
-        "--mesh", type=int, nargs=2, required=True, metavar="N", help="nodes of its two gears"
-    )
-    parser.add_argument(
-        "--nodes", type=int, nargs="+", metavar="N", help="with a damper each (default: the gears)"
+        "--out",
+        required=True,
+        metavar="FILE",
+        help="option to write: DIR/system/NAME.yaml",
     )
     parser.add_argument(
-        "--most-inertia", type=float, metavar="KG_M2", help="of a ring (default: that of its node)"
+        "--force", action="store_true", help="replace the file of --out"
+    )
+    parser.add_argument(
+        "--mesh",
+        type=int,
+        nargs=2,
+        required=True,
+        metavar="N",
+        help="nodes of its two gears",
+    )
+    parser.add_argument(
+        "--nodes",
+        type=int,
+        nargs="+",
+        metavar="N",
+        help="with a damper each (default: the gears)",
+    )
+    parser.add_argument(
+        "--most-inertia",
+        type=float,
+        metavar="KG_M2",
+        help="of a ring (default: that of its node)",
     )
     parser.add_argument(
         "--viscous",
@@ -148,26 +186,40 @@ def tune_damper(parser: argparse.ArgumentParser) -> None:
         help="rings that only a fluid holds (default: a spring too)",
     )
     speeds = "speeds of the crank, r/min (default: those of system.campbell, 25)"
-    parser.add_argument("--run", type=float, nargs=3, metavar=("LOW", "HIGH", "STEP"), help=speeds)
     parser.add_argument(
-        "--torque", type=float, metavar="NM", help="brake torque (default: excitation.reference)"
+        "--run", type=float, nargs=3, metavar=("LOW", "HIGH", "STEP"), help=speeds
+    )
+    parser.add_argument(
+        "--torque",
+        type=float,
+        metavar="NM",
+        help="brake torque (default: excitation.reference)",
     )
     parser.add_argument(
         "--seed", type=int, default=0, metavar="N", help="of the search (default: 0)"
     )
     parser.add_argument(
-        "--json", metavar="FILE", help="write forces, root stress and safety before and after"
+        "--json",
+        metavar="FILE",
+        help="write forces, root stress and safety before and after",
     )
-    parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
+    parser.add_argument(
+        "--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)"
+    )
 
 
 def modify_flank(parser: argparse.ArgumentParser) -> None:
     """Arguments of modify-flank."""
     overrides(parser)
     parser.add_argument(
-        "--out", required=True, metavar="FILE", help="option to write: DIR/modification/NAME.yaml"
+        "--out",
+        required=True,
+        metavar="FILE",
+        help="option to write: DIR/modification/NAME.yaml",
     )
-    parser.add_argument("--force", action="store_true", help="replace the file of --out")
+    parser.add_argument(
+        "--force", action="store_true", help="replace the file of --out"
+    )
     parser.add_argument(
         "--torques",
         type=float,
@@ -194,49 +246,80 @@ def modify_flank(parser: argparse.ArgumentParser) -> None:
         "--seed", type=int, default=0, metavar="N", help="of the search (default: 0)"
     )
     parser.add_argument("--json", metavar="FILE", help="write the front")
-    parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
+    parser.add_argument(
+        "--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)"
+    )
 
 
 def wear_life(parser: argparse.ArgumentParser) -> None:
     """Arguments of wear-life."""
     overrides(parser)
     parser.add_argument(
-        "--json", metavar="FILE", help="write life, wear, sliding and pressure along the flank"
-    )
-    parser.add_argument("--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)")
-    parser.add_argument(
-        "--map", action="store_true", help="lives over torque and speed, and laws fitted to them"
+        "--json",
+        metavar="FILE",
+        help="write life, wear, sliding and pressure along the flank",
     )
     parser.add_argument(
-        "--torques", type=float, nargs="+", metavar="NM", help="of the map (default: 1/4 to 3/2)"
+        "--plot", metavar="FILE", help="write a figure (PNG, SVG or PDF)"
     )
     parser.add_argument(
-        "--speeds", type=float, nargs="+", metavar="RPM", help="of the map (default: 1/4 to twice)"
+        "--map",
+        action="store_true",
+        help="lives over torque and speed, and laws fitted to them",
     )
     parser.add_argument(
-        "--out", metavar="FILE", help="write the worn flanks as an option: DIR/fault/NAME.yaml"
+        "--torques",
+        type=float,
+        nargs="+",
+        metavar="NM",
+        help="of the map (default: 1/4 to 3/2)",
     )
-    parser.add_argument("--force", action="store_true", help="replace the file of --out")
+    parser.add_argument(
+        "--speeds",
+        type=float,
+        nargs="+",
+        metavar="RPM",
+        help="of the map (default: 1/4 to twice)",
+    )
+    parser.add_argument(
+        "--out",
+        metavar="FILE",
+        help="write the worn flanks as an option: DIR/fault/NAME.yaml",
+    )
+    parser.add_argument(
+        "--force", action="store_true", help="replace the file of --out"
+    )
 
 
 def simulate(parser: argparse.ArgumentParser) -> None:
     """Arguments of simulate."""
     overrides(parser)
     parser.add_argument(
-        "--from", dest="folder", metavar="DIR", help="a record of this data set, made again"
+        "--from",
+        dest="folder",
+        metavar="DIR",
+        help="a record of this data set, made again",
     )
-    parser.add_argument("--record", metavar="I", help="with --from: number or id of the record")
+    parser.add_argument(
+        "--record", metavar="I", help="with --from: number or id of the record"
+    )
     parser.add_argument(
         "--twin",
         action="store_true",
         help="with --from: the same without its faults, noise included",
     )
     parser.add_argument(
-        "--output", metavar="FILE", help="write the record: .h5 (a shard of one record) or .csv"
+        "--output",
+        metavar="FILE",
+        help="write the record: .h5 (a shard of one record) or .csv",
     )
-    parser.add_argument("--force", action="store_true", help="replace the file of --output")
     parser.add_argument(
-        "--plot", metavar="FILE", help="write a figure: signal, spectrum, envelope spectrum"
+        "--force", action="store_true", help="replace the file of --output"
+    )
+    parser.add_argument(
+        "--plot",
+        metavar="FILE",
+        help="write a figure: signal, spectrum, envelope spectrum",
     )
 
 
@@ -270,10 +353,19 @@ def twin(parser: argparse.ArgumentParser) -> None:
     )
     two = ("DRIVING", "DRIVEN")
     parser.add_argument(
-        "--teeth", type=int, nargs=2, required=True, metavar=two, help="teeth of both gears"
+        "--teeth",
+        type=int,
+        nargs=2,
+        required=True,
+        metavar=two,
+        help="teeth of both gears",
     )
     parser.add_argument(
-        "--speed", type=float, required=True, metavar="RPM", help="of the driving gear, within 3 %%"
+        "--speed",
+        type=float,
+        required=True,
+        metavar="RPM",
+        help="of the driving gear, within 3 %%",
     )
     parser.add_argument(
         "--out",
@@ -282,25 +374,37 @@ def twin(parser: argparse.ArgumentParser) -> None:
         help="folder for the options; its name becomes theirs",
     )
     parser.add_argument(
-        "--rate", type=float, metavar="HZ", help="samples a second, where the file does not tell"
+        "--rate",
+        type=float,
+        metavar="HZ",
+        help="samples a second, where the file does not tell",
     )
     parser.add_argument(
-        "--unit", default="m/s2", help="m/s2 or g, where the column does not say (default: m/s2)"
+        "--unit",
+        default="m/s2",
+        help="m/s2 or g, where the column does not say (default: m/s2)",
     )
     parser.add_argument(
         "--channels", nargs="+", metavar="NAME", help="columns to use (default: all)"
     )
     parser.add_argument(
-        "--array", metavar="NAME", help="array of a .npz, .h5 or .mat file (default: acceleration)"
+        "--array",
+        metavar="NAME",
+        help="array of a .npz, .h5 or .mat file (default: acceleration)",
     )
     parser.add_argument(
         "--module", type=float, metavar="MM", help="normal module (default: 2, assumed)"
     )
     parser.add_argument(
-        "--torque", type=float, metavar="NM", help="of the driving gear (default: assumed by size)"
+        "--torque",
+        type=float,
+        metavar="NM",
+        help="of the driving gear (default: assumed by size)",
     )
     parser.add_argument(
-        "--check", metavar="FILE", help="healthy recording held out (default: the second half)"
+        "--check",
+        metavar="FILE",
+        help="healthy recording held out (default: the second half)",
     )
 
 
@@ -312,7 +416,9 @@ def new(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--teeth", type=int, nargs=2, metavar=two, help="needed; teeth of both gears"
     )
-    parser.add_argument("--module", type=float, metavar="MM", help="needed; normal module")
+    parser.add_argument(
+        "--module", type=float, metavar="MM", help="needed; normal module"
+    )
     parser.add_argument(
         "--speed", type=float, metavar="RPM", help="needed; rated speed of the pinion"
     )
@@ -334,19 +440,34 @@ def new(parser: argparse.ArgumentParser) -> None:
         help="bore diameters (default: by the torque)",
     )
     parser.add_argument(
-        "--helix", type=float, metavar="DEG", help="helix angle of the pinion (default: 0, spur)"
+        "--helix",
+        type=float,
+        metavar="DEG",
+        help="helix angle of the pinion (default: 0, spur)",
     )
     parser.add_argument(
-        "--pressure-angle", type=float, metavar="DEG", help="of the basic rack (default: 20)"
+        "--pressure-angle",
+        type=float,
+        metavar="DEG",
+        help="of the basic rack (default: 20)",
     )
     parser.add_argument(
-        "--profile-shifts", type=float, nargs="+", metavar="X", help="profile shifts (default: 0)"
+        "--profile-shifts",
+        type=float,
+        nargs="+",
+        metavar="X",
+        help="profile shifts (default: 0)",
     )
     parser.add_argument(
-        "--addendum", type=float, metavar="X", help="of the teeth, over the module (default: 1)"
+        "--addendum",
+        type=float,
+        metavar="X",
+        help="of the teeth, over the module (default: 1)",
     )
     stiffness = "radial stiffness of what holds each gear (default: of ball bearings and shafts)"
-    parser.add_argument("--supports", type=float, nargs="+", metavar="N_PER_M", help=stiffness)
+    parser.add_argument(
+        "--supports", type=float, nargs="+", metavar="N_PER_M", help=stiffness
+    )
     parser.add_argument(
         "--experiment",
         choices=("plain", "realistic"),
@@ -357,16 +478,28 @@ def new(parser: argparse.ArgumentParser) -> None:
         "--rate", type=float, metavar="HZ", help="samples a second (default: 51200)"
     )
     parser.add_argument(
-        "--duration", type=float, metavar="S", help="of a record (default: at least 10 turns)"
+        "--duration",
+        type=float,
+        metavar="S",
+        help="of a record (default: at least 10 turns)",
     )
     parser.add_argument(
-        "--grade", type=int, metavar="N", help="of ISO 1328 (default: that of the experiment)"
+        "--grade",
+        type=int,
+        metavar="N",
+        help="of ISO 1328 (default: that of the experiment)",
     )
     parser.add_argument(
-        "--classes", nargs="+", metavar="FAULT", help="healthy and faults (default: five)"
+        "--classes",
+        nargs="+",
+        metavar="FAULT",
+        help="healthy and faults (default: five)",
     )
     parser.add_argument(
-        "--sensors", nargs="+", metavar="NAME", help="on the housing, with --experiment realistic"
+        "--sensors",
+        nargs="+",
+        metavar="NAME",
+        help="on the housing, with --experiment realistic",
     )
     ends = ("LOW", "HIGH")
     parser.add_argument(
@@ -386,7 +519,9 @@ def new(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--dir", default="configs", help="folder of your options (default: configs)"
     )
-    parser.add_argument("--json", action="store_true", help="print what was derived as JSON")
+    parser.add_argument(
+        "--json", action="store_true", help="print what was derived as JSON"
+    )
 
 
 def resume(parser: argparse.ArgumentParser) -> None:
@@ -399,22 +534,33 @@ def resume(parser: argparse.ArgumentParser) -> None:
         help="executor=... and executor.key=...; other keys must agree",
     )
     parser.add_argument(
-        "--workers", type=int, metavar="N", help="worker processes (default: one a core)"
+        "--workers",
+        type=int,
+        metavar="N",
+        help="worker processes (default: one a core)",
     )
-    parser.add_argument("--quiet", action="store_true", help="print nothing but mistakes")
+    parser.add_argument(
+        "--quiet", action="store_true", help="print nothing but mistakes"
+    )
 
 
 def reproduce(parser: argparse.ArgumentParser) -> None:
     """Arguments of reproduce."""
     folder(parser)
     parser.add_argument(
-        "--records", type=int, default=10, metavar="N", help="records, spread evenly (default: 10)"
+        "--records",
+        type=int,
+        default=10,
+        metavar="N",
+        help="records, spread evenly (default: 10)",
     )
 
 
 def inspect(parser: argparse.ArgumentParser) -> None:
     """Arguments of inspect."""
-    parser.add_argument("path", metavar="PATH", help="folder of a data set, or an HDF5 file")
+    parser.add_argument(
+        "path", metavar="PATH", help="folder of a data set, or an HDF5 file"
+    )
 
 
 def verify(parser: argparse.ArgumentParser) -> None:
@@ -426,7 +572,9 @@ def verify(parser: argparse.ArgumentParser) -> None:
 def validate(parser: argparse.ArgumentParser) -> None:
     """Arguments of validate."""
     parser.add_argument(
-        "--markdown", metavar="FILE", help="write the whole comparison as a Markdown page"
+        "--markdown",
+        metavar="FILE",
+        help="write the whole comparison as a Markdown page",
     )
 
 
@@ -435,15 +583,24 @@ def export(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "folder", metavar="DIR", help="folder of a complete data set; it is left alone"
     )
-    parser.add_argument("--to", required=True, metavar="FORMAT", help="hdf5, parquet, npz or wav")
     parser.add_argument(
-        "--out", required=True, metavar="PATH", help="file (wav: folder) that does not exist yet"
+        "--to", required=True, metavar="FORMAT", help="hdf5, parquet, npz or wav"
     )
     parser.add_argument(
-        "--samples", action="store_true", help="parquet: time signals too, not only the labels"
+        "--out",
+        required=True,
+        metavar="PATH",
+        help="file (wav: folder) that does not exist yet",
     )
     parser.add_argument(
-        "--one-channel", action="store_true", help="wav: one file a channel, not one a record"
+        "--samples",
+        action="store_true",
+        help="parquet: time signals too, not only the labels",
+    )
+    parser.add_argument(
+        "--one-channel",
+        action="store_true",
+        help="wav: one file a channel, not one a record",
     )
 
 
@@ -451,8 +608,13 @@ def report(parser: argparse.ArgumentParser) -> None:
     """Arguments of report."""
     parser.add_argument("folder", metavar="DIR", help="folder of a complete data set")
     parser.add_argument(
-        "--out", metavar="FILE", help="page to write, a new file (default: DIR/report.html)"
+        "--out",
+        metavar="FILE",
+        help="page to write, a new file (default: DIR/report.html)",
     )
     parser.add_argument(
-        "--records", type=int, metavar="N", help="records shown of each class (default: up to 3)"
+        "--records",
+        type=int,
+        metavar="N",
+        help="records shown of each class (default: up to 3)",
     )

@@ -32,7 +32,9 @@ def one_line_warnings(program: str) -> Iterator[None]:
     """
     seen: set[object] = set()
 
-    def show(message: Warning | str, category: type[Warning], *_details: Any, **_more: Any) -> None:
+    def show(
+        message: Warning | str, category: type[Warning], *_details: Any, **_more: Any
+    ) -> None:
         text = " ".join(str(message).split())
         key = category if getattr(category, "once", False) else text
         if key not in seen:
@@ -59,12 +61,12 @@ class ShardProgress:
     that are to be made tell what is going on.
     """
 
-    def __init__(self, *, quiet: bool, n_records: int, n_shards: int, n_at_work: int) -> None:
+    def __init__(
+        self, *, quiet: bool, n_records: int, n_shards: int, n_at_work: int
+    ) -> None:
         self.quiet = quiet
         self.n_records = n_records
-        self.at_work = (
-            f"{min(n_at_work, n_shards)} of {n_shards} shards at work, counted when whole"
-        )
+        self.at_work = f"{min(n_at_work, n_shards)} of {n_shards} shards at work, counted when whole"
         self._last: Progress | None = None
         self._begin = self._last_time = time.monotonic()
         self._bar: Any = None
@@ -76,7 +78,12 @@ class ShardProgress:
             return self
         if sys.stderr.isatty():
             from rich.console import Console
-            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+            from rich.progress import (
+                BarColumn,
+                MofNCompleteColumn,
+                Progress,
+                TextColumn,
+            )
 
             self._bar = Progress(
                 TextColumn("records"),
@@ -86,7 +93,9 @@ class ShardProgress:
                 console=Console(stderr=True),
             )
             self._bar.start()
-            self._task = self._bar.add_task("records", total=self.n_records, facts=self.facts())
+            self._task = self._bar.add_task(
+                "records", total=self.n_records, facts=self.facts()
+            )
         self._ticker.start()
         return self
 
@@ -129,18 +138,26 @@ class ShardProgress:
         seconds = self._last_time - self._begin
         if last is None or not last.n_made or seconds <= 0.0:
             waited = time.monotonic() - self._begin
-            first = "; the first run compiles for a minute or two" if waited > LONG_SECONDS else ""
+            first = (
+                "; the first run compiles for a minute or two"
+                if waited > LONG_SECONDS
+                else ""
+            )
             return f"{waited:.0f} s; {self.at_work}{first}"
         rate = last.n_made / seconds
         left = max(
-            0.0, (last.n_records - last.n_done) / rate - (time.monotonic() - self._last_time)
+            0.0,
+            (last.n_records - last.n_done) / rate
+            - (time.monotonic() - self._last_time),
         )
         failed = f", {last.n_failed} failed" if last.n_failed else ""
         return f"{rate:.1f} records/s, {last.n_bytes / 1e6:.1f} MB, {_duration(left)} left{failed}"
 
     def _print_line(self) -> None:
         n_done = self._last.n_done if self._last is not None else 0
-        then = "; checksums, figures and card follow" if n_done == self.n_records else ""
+        then = (
+            "; checksums, figures and card follow" if n_done == self.n_records else ""
+        )
         print(
             f"{n_done} of {self.n_records} records, {self.facts()}{then}",
             file=sys.stderr,
@@ -166,7 +183,9 @@ def replaced_file(path: str | Path) -> Iterator[Path]:
     """
     target = Path(path)
     if not target.parent.is_dir():
-        raise ConfigError(f"{target}: there is no folder {target.parent}; make it first")
+        raise ConfigError(
+            f"{target}: there is no folder {target.parent}; make it first"
+        )
     temporary = target.with_name(f".{target.name}.{os.getpid()}{target.suffix}")
     try:
         yield temporary

@@ -35,7 +35,9 @@ def list_options(arguments: Namespace) -> int:
         content, lines = _all_groups(folder)
     else:
         group, equals, option = word.partition("=")
-        content, lines = _one_option(group, option, folder) if equals else _one_group(group, folder)
+        content, lines = (
+            _one_option(group, option, folder) if equals else _one_group(group, folder)
+        )
     print(json.dumps(content, indent=1) if arguments.json else "\n".join(lines))
     return 0
 
@@ -44,15 +46,25 @@ def _all_groups(folder: str | None) -> tuple[Any, list[str]]:
     found, parts = groups(folder), sections()
     content = {
         "groups": [
-            {**asdict(group), "options": [one.name for one in options(group.name, folder)]}
+            {
+                **asdict(group),
+                "options": [one.name for one in options(group.name, folder)],
+            }
             for group in found
         ],
         "sections": list(parts),
     }
     rows = [(group.name, group.default or "-", group.about) for group in found]
-    lines = ["groups: choose with GROUP=OPTION; `gensig options GROUP` lists the options", ""]
+    lines = [
+        "groups: choose with GROUP=OPTION; `gensig options GROUP` lists the options",
+        "",
+    ]
     lines += _table(("group", "default", "what it is"), rows)
-    lines += ["", "keys without a choice: set with KEY=VALUE; `gensig options NAME` lists them", ""]
+    lines += [
+        "",
+        "keys without a choice: set with KEY=VALUE; `gensig options NAME` lists them",
+        "",
+    ]
     lines += _table(
         ("name", "read by", "keys"),
         [(name, READ_BY[parts[name]], _key_names(name)) for name in parts],
@@ -63,13 +75,19 @@ def _all_groups(folder: str | None) -> tuple[Any, list[str]]:
 def _one_group(group: str, folder: str | None) -> tuple[Any, list[str]]:
     if group in sections():
         keys = section_keys(group)
-        return {"section": group, "keys": [asdict(key) for key in keys]}, _key_table(keys)
+        return {"section": group, "keys": [asdict(key) for key in keys]}, _key_table(
+            keys
+        )
     _check_group(group, folder)
     found = options(group, folder)
-    content = {"group": group, "options": [{"name": one.name, "about": one.about} for one in found]}
+    content = {
+        "group": group,
+        "options": [{"name": one.name, "about": one.about} for one in found],
+    }
     default = next(one.default for one in groups(folder) if one.name == group)
     rows = [
-        (f"{group}={one.name}" + (" *" if one.name == default else ""), one.about) for one in found
+        (f"{group}={one.name}" + (" *" if one.name == default else ""), one.about)
+        for one in found
     ]
     star = ["", "* taken where none is typed"] if default else []
     return content, [
@@ -85,13 +103,24 @@ def _one_option(group: str, option: str, folder: str | None) -> tuple[Any, list[
     if option not in found:
         there = option_files.elsewhere(group, option) or nearest.hint(option, found)
         raise ConfigError(f"no option '{option}' of {group}; {there}")
-    keys, beside = option_keys(group, option, folder), chosen_beside(group, option, folder)
+    keys, beside = (
+        option_keys(group, option, folder),
+        chosen_beside(group, option, folder),
+    )
     about = found[option].about
     listed = [asdict(key) for key in keys]
-    content = {"group": group, "option": option, "about": about, "chooses": beside, "keys": listed}
+    content = {
+        "group": group,
+        "option": option,
+        "about": about,
+        "chooses": beside,
+        "keys": listed,
+    }
     head = [f"{group}={option}: {about}"]
     if beside:
-        head.append(f"chooses too: {' '.join(f'{name}={other}' for name, other in beside.items())}")
+        head.append(
+            f"chooses too: {' '.join(f'{name}={other}' for name, other in beside.items())}"
+        )
     return content, [*head, "", *_key_table(keys)]
 
 
@@ -99,9 +128,15 @@ def _check_group(group: str, folder: str | None) -> None:
     names = [one.name for one in groups(folder)]
     if group not in names:
         known = [*names, *sections()]
-        having = [name for name in names if group in [one.name for one in options(name, folder)]]
+        having = [
+            name
+            for name in names
+            if group in [one.name for one in options(name, folder)]
+        ]
         if having:
-            raise ConfigError(f"'{group}' is an option; type gensig options {having[0]}={group}")
+            raise ConfigError(
+                f"'{group}' is an option; type gensig options {having[0]}={group}"
+            )
         raise ConfigError(
             f"no group '{group}'; {nearest.hint(group, known)}; `gensig options` says what each is"
         )
@@ -129,10 +164,14 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
 
     On a terminal the last one is cut to its width, so that every row is one line.
     """
-    widths = [max(len(row[place]) for row in (head, *rows)) for place in range(len(head) - 1)]
+    widths = [
+        max(len(row[place]) for row in (head, *rows)) for place in range(len(head) - 1)
+    ]
     lines = []
     for row in (head, *rows):
-        cells = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False))
+        cells = "  ".join(
+            cell.ljust(width) for cell, width in zip(row, widths, strict=False)
+        )
         lines.append(f"{cells}  {row[-1]}".rstrip())
     if not sys.stdout.isatty():
         return lines

@@ -32,7 +32,9 @@ def check_file(flag: str, name: str | None, types: tuple[str, ...] = ()) -> None
     if types and path.suffix not in types:
         raise ConfigError(f"{flag} {name}: the name must end in {', '.join(types)}")
     if not path.parent.is_dir():
-        raise ConfigError(f"{flag} {name}: there is no folder {path.parent}; make it first")
+        raise ConfigError(
+            f"{flag} {name}: there is no folder {path.parent}; make it first"
+        )
     if path.is_dir():
         raise ConfigError(f"{flag} {name} is a folder; give the name of a file")
 
@@ -75,7 +77,9 @@ def write_option(target: Path, text: str) -> None:
     with replaced_file(target) as path:
         path.write_text(text, encoding="utf-8")
     folder = target.absolute().parent
-    print(f"{target}: take it with {folder.name}={target.stem} --config-dir {target.parent.parent}")
+    print(
+        f"{target}: take it with {folder.name}={target.stem} --config-dir {target.parent.parent}"
+    )
 
 
 def write_outputs(

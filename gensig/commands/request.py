@@ -21,7 +21,9 @@ def read_configuration(arguments: Namespace) -> Configuration:
 
 
 def say_unread(
-    arguments: Namespace, reads: Mapping[str, Sequence[str]] | None, instead: Mapping[str, str]
+    arguments: Namespace,
+    reads: Mapping[str, Sequence[str]] | None,
+    instead: Mapping[str, str],
 ) -> None:
     """Print a note on stderr for every typed key that the verb does not read.
 
@@ -35,10 +37,21 @@ def say_unread(
     for key in override_keys(getattr(arguments, "overrides", ()) or ()):
         section = key.partition(".")[0]
         flag = next(
-            (flag for name, flag in instead.items() if key == name or key.startswith(f"{name}.")),
+            (
+                flag
+                for name, flag in instead.items()
+                if key == name or key.startswith(f"{name}.")
+            ),
             None,
         )
-        unread = sections is not None and section not in sections and section != CHOOSES_OTHERS
+        unread = (
+            sections is not None
+            and section not in sections
+            and section != CHOOSES_OTHERS
+        )
         if flag is not None or unread:
             hint = f"; use {flag}" if flag else ""
-            print(f"gensig: note: {key} is not read by {arguments.verb}{hint}", file=sys.stderr)
+            print(
+                f"gensig: note: {key} is not read by {arguments.verb}{hint}",
+                file=sys.stderr,
+            )

@@ -21,6 +21,9 @@ def validate(arguments: Namespace) -> int:
     print(summary(results))
     surprises = [result for result in results if not result.as_expected]
     if surprises:
-        print(f"gensig: {len(surprises)} row(s) differ from what they declare", file=sys.stderr)
+        print(
+            f"gensig: {len(surprises)} row(s) differ from what they declare",
+            file=sys.stderr,
+        )
         return 1
     return 0

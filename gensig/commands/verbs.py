@@ -34,7 +34,16 @@ class Verb:
 
 # Sections of the configuration that make a machine: at rest, with its flanks in slices, and
 # running.
-GEARS = ("system", "gear", "material", "modification", "heat", "mesh", "operating", "fault")
+GEARS = (
+    "system",
+    "gear",
+    "material",
+    "modification",
+    "heat",
+    "mesh",
+    "operating",
+    "fault",
+)
 RUNNING = (*GEARS, "sensing", "quality", "solver", "excitation")
 TABLES = ("system", "material")
 SPUR, HELICAL, OTHERS = "spur_pair", "helical_pair", ""
@@ -189,7 +198,15 @@ VERBS: dict[str, Verb] = {
             "out": "--json or --plot",
         },
         reads={
-            OTHERS: (*TABLES, "excitation", "seed", "mesh", "strength", "quality", "modification")
+            OTHERS: (
+                *TABLES,
+                "excitation",
+                "seed",
+                "mesh",
+                "strength",
+                "quality",
+                "modification",
+            )
         },
     ),
     "tune-damper": Verb(
@@ -200,7 +217,15 @@ VERBS: dict[str, Verb] = {
         arguments.tune_damper,
         instead={"operating.speed_rpm": "--run", "operating.torque_nm": "--torque"},
         reads={
-            OTHERS: (*TABLES, "excitation", "seed", "mesh", "strength", "quality", "modification")
+            OTHERS: (
+                *TABLES,
+                "excitation",
+                "seed",
+                "mesh",
+                "strength",
+                "quality",
+                "modification",
+            )
         },
     ),
     "twin": Verb(

@@ -97,7 +97,10 @@ class Uniform(Range):
 
     def level_values(self) -> list[Any]:
         """See ``Distribution``."""
-        return [float(value) for value in np.linspace(self.low, self.high, self.require_levels())]
+        return [
+            float(value)
+            for value in np.linspace(self.low, self.high, self.require_levels())
+        ]
 
 
 @final
@@ -111,7 +114,10 @@ class LogUniform(Range):
 
     def level_values(self) -> list[Any]:
         """See ``Distribution``."""
-        return [float(value) for value in np.geomspace(self.low, self.high, self.require_levels())]
+        return [
+            float(value)
+            for value in np.geomspace(self.low, self.high, self.require_levels())
+        ]
 
 
 @final
@@ -130,7 +136,10 @@ class Normal(Range):
         from scipy.stats import truncnorm
 
         a, b = (self.low - self.mean) / self.std, (self.high - self.mean) / self.std
-        return [float(value) for value in truncnorm.ppf(unit, a, b, loc=self.mean, scale=self.std)]
+        return [
+            float(value)
+            for value in truncnorm.ppf(unit, a, b, loc=self.mean, scale=self.std)
+        ]
 
     def level_values(self) -> list[Any]:
         """See ``Distribution``."""
@@ -151,7 +160,8 @@ class Integers(Range):
     def level_values(self) -> list[Any]:
         """See ``Distribution``."""
         return [
-            round(float(value)) for value in np.linspace(self.low, self.high, self.require_levels())
+            round(float(value))
+            for value in np.linspace(self.low, self.high, self.require_levels())
         ]
 
 
@@ -211,7 +221,9 @@ def read_distribution(key: str, spec: Any) -> Distribution:
     """
     _check_distribution(key, spec)
     kind = spec["distribution"]
-    numbers = {name: tuple(spec[name]) if kind == CHOICE else spec[name] for name in KEYS[kind]}
+    numbers = {
+        name: tuple(spec[name]) if kind == CHOICE else spec[name] for name in KEYS[kind]
+    }
     return DISTRIBUTIONS[kind](
         key=key, levels=spec.get(LEVELS), names_levels=LEVELS in spec, **numbers
     )
@@ -251,8 +263,12 @@ def _check_range(key: str, spec: Mapping[str, Any], needed: tuple[str, ...]) -> 
         raise ConfigError(
             f"{key}: low = {low:g} and high = {high:g} are no range for {kind}; low must be below{also}"
         )
-    if kind == "integers" and not all(float(spec[name]).is_integer() for name in needed):
-        raise ConfigError(f"{key}: low = {low:g} and high = {high:g} must be whole numbers")
+    if kind == "integers" and not all(
+        float(spec[name]).is_integer() for name in needed
+    ):
+        raise ConfigError(
+            f"{key}: low = {low:g} and high = {high:g} must be whole numbers"
+        )
     if kind == "normal" and spec["std"] <= 0.0:
         raise ConfigError(f"{key}: std = {spec['std']:g} must be positive")
 
@@ -276,10 +292,16 @@ def _check_levels(key: str, spec: Mapping[str, Any]) -> None:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    return (
+        isinstance(value, int | float)
+        and not isinstance(value, bool)
+        and math.isfinite(value)
+    )
 
 
-def design_points(design: str, n_points: int, n_dimensions: int, rng: np.random.Generator) -> Array:
+def design_points(
+    design: str, n_points: int, n_dimensions: int, rng: np.random.Generator
+) -> Array:
     """Space-filling points of the unit cube, (point, dimension), in random order.
 
     The order of a Sobol sequence is structure: point by point two of them are alike in their

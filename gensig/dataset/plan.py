@@ -39,15 +39,21 @@ class Plan:
     columns: Mapping[str, np.ndarray]
 
     def __post_init__(self) -> None:
-        columns = {name: _normalized(name, values) for name, values in self.columns.items()}
-        missing = [name for name in ("record_id", "shard", "row") if name not in columns]
+        columns = {
+            name: _normalized(name, values) for name, values in self.columns.items()
+        }
+        missing = [
+            name for name in ("record_id", "shard", "row") if name not in columns
+        ]
         if missing:
             raise DatasetError(
                 f"the plan has no column {', '.join(missing)}; every plan needs record_id, shard and row"
             )
         lengths = {name: len(values) for name, values in columns.items()}
         n = lengths["record_id"]
-        wrong = [f"{name} ({length})" for name, length in lengths.items() if length != n]
+        wrong = [
+            f"{name} ({length})" for name, length in lengths.items() if length != n
+        ]
         if n == 0 or wrong:
             raise DatasetError(
                 f"the plan has {n} records, and columns of other lengths: {wrong}; all must be equal, not 0"
@@ -93,13 +99,22 @@ def _rebuild(columns: dict[str, np.ndarray]) -> Plan:
 def _normalized(name: str, values: np.ndarray) -> np.ndarray:
     """A read-only copy as text, int64 or float64; DatasetError for anything else."""
     array = np.asarray(values)
-    kind = {"U": "str", "T": "str", "i": "int", "u": "int", "b": "int", "f": "float"}.get(
-        array.dtype.kind
-    )
+    kind = {
+        "U": "str",
+        "T": "str",
+        "i": "int",
+        "u": "int",
+        "b": "int",
+        "f": "float",
+    }.get(array.dtype.kind)
     if array.dtype.kind == "O" and all(isinstance(value, str) for value in array.flat):
         kind, array = "str", array.astype(str)
     wanted = kind_of(name) or kind
-    if array.ndim != 1 or kind is None or (kind != wanted and (kind, wanted) != ("int", "float")):
+    if (
+        array.ndim != 1
+        or kind is None
+        or (kind != wanted and (kind, wanted) != ("int", "float"))
+    ):
         raise DatasetError(
             f"plan column {name} has type {array.dtype} and shape {array.shape}; "
             f"allowed is one axis of {wanted or 'text, int or float'}"
@@ -115,7 +130,9 @@ def _normalized(name: str, values: np.ndarray) -> np.ndarray:
         _DTYPES.get(wanted or "", array.dtype)
     )  # a copy: the caller's array stays writable
     if wanted == "float":
-        array[np.isnan(array)] = np.nan  # one NaN only: others would not come back from text
+        array[np.isnan(array)] = (
+            np.nan
+        )  # one NaN only: others would not come back from text
     array.flags.writeable = False
     return array
 
@@ -124,7 +141,12 @@ def _check_ids(ids: np.ndarray) -> None:
     values = ids.tolist()
     limit = COLUMNS["record_id"].n_bytes
     bad = next(
-        (value for value in values if not _RECORD_ID.fullmatch(value) or len(value) > limit), None
+        (
+            value
+            for value in values
+            if not _RECORD_ID.fullmatch(value) or len(value) > limit
+        ),
+        None,
     )
     if bad is not None:
         raise DatasetError(
@@ -156,7 +178,9 @@ def record_ids(n_records: int) -> np.ndarray:
     return np.array([f"r{i:06d}" for i in range(n_records)])
 
 
-def shard_places(n_records: int, records_per_shard: int) -> tuple[np.ndarray, np.ndarray]:
+def shard_places(
+    n_records: int, records_per_shard: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Shard and row of each record, (record,) each, filling one shard after the other."""
     if records_per_shard < 1 or n_records < 1:
         raise DatasetError(
@@ -171,11 +195,18 @@ def plan_text(plan: Plan) -> str:
     cells = []
     for name, values in plan.columns.items():
         if _CONTROL.search(name) or not name:
-            raise DatasetError(f"plan column name {name!r} is not allowed; use printable text")
+            raise DatasetError(
+                f"plan column name {name!r} is not allowed; use printable text"
+            )
         texts = [
-            repr(value) if values.dtype.kind == "f" else str(value) for value in values.tolist()
+            repr(value) if values.dtype.kind == "f" else str(value)
+            for value in values.tolist()
         ]
-        if values.dtype.kind == "U" and kind_of(name) is None and _infer(texts) != "str":
+        if (
+            values.dtype.kind == "U"
+            and kind_of(name) is None
+            and _infer(texts) != "str"
+        ):
             raise DatasetError(
                 f"plan column {name} is text, but all its values look like numbers, such as {texts[0]!r}; "
                 "they would not come back as text: put a letter in front"
@@ -199,9 +230,13 @@ def read_plan(path: Path) -> Plan:
     try:
         header, *rows = csv.reader(io.StringIO(text, newline=""), strict=True)
     except (csv.Error, ValueError) as error:
-        raise DatasetError(f"{path} is no CSV table ({error}); restore it from a copy") from error
+        raise DatasetError(
+            f"{path} is no CSV table ({error}); restore it from a copy"
+        ) from error
     if len(set(header)) != len(header):
-        raise DatasetError(f"{path} has two columns of the same name; restore it from a copy")
+        raise DatasetError(
+            f"{path} has two columns of the same name; restore it from a copy"
+        )
     wrong = next((i for i, cells in enumerate(rows) if len(cells) != len(header)), None)
     if wrong is not None:
         raise DatasetError(
@@ -212,7 +247,8 @@ def read_plan(path: Path) -> Plan:
     try:
         return Plan(
             columns={
-                name: _parsed(name, cells) for name, cells in zip(header, columns, strict=True)
+                name: _parsed(name, cells)
+                for name, cells in zip(header, columns, strict=True)
             }
         )
     except DatasetError as error:
@@ -238,7 +274,9 @@ class PlanRows:
             with path.open("rb") as file:
                 lengths = np.fromiter((len(line) for line in file), dtype=np.int64)
         except OSError as error:
-            raise DatasetError(f"{path} cannot be read: {error}; check its permissions") from error
+            raise DatasetError(
+                f"{path} cannot be read: {error}; check its permissions"
+            ) from error
         self._begins = np.concatenate([[0], np.cumsum(lengths)])
         self.names = next(self._cells(0, 1), [])
 
@@ -247,7 +285,12 @@ class PlanRows:
         try:
             with self.path.open("rb") as file:
                 file.seek(begin)
-                lines = file.read(end - begin).decode("utf-8").removesuffix("\n").split("\n")
+                lines = (
+                    file.read(end - begin)
+                    .decode("utf-8")
+                    .removesuffix("\n")
+                    .split("\n")
+                )
             yield from csv.reader(lines, strict=True)
         except (OSError, ValueError, csv.Error) as error:
             raise DatasetError(
@@ -261,13 +304,18 @@ class PlanRows:
                 f"{self.path} has no records {first} to {first + n_records - 1}; restore it from a copy"
             )
         rows = list(self._cells(1 + first, n_records))
-        if len(rows) != n_records or any(len(cells) != len(self.names) for cells in rows):
+        if len(rows) != n_records or any(
+            len(cells) != len(self.names) for cells in rows
+        ):
             raise DatasetError(
                 f"{self.path} is cut or damaged near record {first}; restore it from a copy"
             )
         columns = zip(self.names, zip(*rows, strict=True), strict=True)
         values = {name: _parsed(name, cells).tolist() for name, cells in columns}
-        return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
+        return [
+            dict(zip(values, row, strict=True))
+            for row in zip(*values.values(), strict=True)
+        ]
 
 
 def _infer(cells: tuple[str, ...] | list[str]) -> str:

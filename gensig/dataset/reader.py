@@ -10,7 +10,13 @@ from typing import Any
 import h5py
 import numpy as np
 
-from gensig.dataset.folder.layout import PLAN, SPLITS, Manifest, read_manifest, shard_path
+from gensig.dataset.folder.layout import (
+    PLAN,
+    SPLITS,
+    Manifest,
+    read_manifest,
+    shard_path,
+)
 from gensig.dataset.plan import Plan, read_plan
 from gensig.dataset.schema import SCALES, SIGNALS
 from gensig.dataset.selection import Selection, StoredRecord, structured, unknown_name
@@ -79,10 +85,13 @@ class Dataset:
         self.n_records = manifest.n_records
         self._starts = np.cumsum([0, *(entry.rows for entry in manifest.shards)])
         first_done = next(
-            (i for i, entry in enumerate(manifest.shards) if entry.state == "done"), None
+            (i for i, entry in enumerate(manifest.shards) if entry.state == "done"),
+            None,
         )
         if first_done is None:
-            raise DatasetError(f"{folder} has no finished shard yet; run `gensig resume {folder}`")
+            raise DatasetError(
+                f"{folder} has no finished shard yet; run `gensig resume {folder}`"
+            )
         self._columns: dict[str, np.ndarray] = {}
         self._plan: Plan | None = None
         self._files: OrderedDict[int, h5py.File] = OrderedDict()
@@ -142,7 +151,9 @@ class Dataset:
     def protocols(self) -> list[str]:
         """Names that `split` takes."""
         return sorted(
-            Path(name).stem for name in self.manifest.files if name.startswith(f"{SPLITS}/")
+            Path(name).stem
+            for name in self.manifest.files
+            if name.startswith(f"{SPLITS}/")
         )
 
     def column(self, name: str) -> np.ndarray:
@@ -154,7 +165,10 @@ class Dataset:
             raise unknown_name("column", name, self.column_names, self.folder)
         if name not in self._columns:
             values = np.concatenate(
-                [self.shard_column(shard, name) for shard in range(len(self.manifest.shards))]
+                [
+                    self.shard_column(shard, name)
+                    for shard in range(len(self.manifest.shards))
+                ]
             )
             values.flags.writeable = False
             self._columns[name] = values
@@ -170,7 +184,9 @@ class Dataset:
             return self._read_rows(shard, name, shape)
         if dtype.kind == "S":
             return np.full((entry.rows, *shape), "")
-        return np.full((entry.rows, *shape), np.nan if dtype.kind == "f" else -1, dtype=dtype)
+        return np.full(
+            (entry.rows, *shape), np.nan if dtype.kind == "f" else -1, dtype=dtype
+        )
 
     def first_record(self, shard: int) -> int:
         """Number of the record in row 0 of a shard."""
@@ -209,7 +225,9 @@ class Dataset:
                 shard, ValueError(f"{name} has another shape than in the other shards")
             )
         return (
-            block if channels is None else block[[self._channel(channel) for channel in channels]]
+            block
+            if channels is None
+            else block[[self._channel(channel) for channel in channels]]
         )
 
     def trace(
@@ -231,7 +249,9 @@ class Dataset:
             values = self._file(shard)[name][row, ..., start:stop]
         except HDF5_ERRORS as error:
             raise self._unreadable(shard, error) from error
-        if values.shape[-1:] != (stop - start,) or values.ndim != len(SIGNALS[name].axes):
+        if values.shape[-1:] != (stop - start,) or values.ndim != len(
+            SIGNALS[name].axes
+        ):
             raise self._unreadable(
                 shard, ValueError(f"{name} has another shape than in the other shards")
             )
@@ -244,7 +264,9 @@ class Dataset:
                 f"record {record_index} does not exist; {self.folder} has 0 to {self.n_records - 1}"
             )
         if not 0 <= start < stop <= self.n_samples:
-            raise DatasetError(f"samples {start} to {stop}; a record has 0 to {self.n_samples}")
+            raise DatasetError(
+                f"samples {start} to {stop}; a record has 0 to {self.n_samples}"
+            )
         shard = int(np.searchsorted(self._starts, record_index, side="right")) - 1
         if self.manifest.shards[shard].state != "done":
             raise DatasetError(
@@ -292,10 +314,16 @@ class Dataset:
         path = self.folder / SPLITS / f"{protocol}.csv"
         table = read_split(path)
         index = {
-            record_id: i for i, record_id in enumerate(self.plan.columns["record_id"].tolist())
+            record_id: i
+            for i, record_id in enumerate(self.plan.columns["record_id"].tolist())
         }
         rows: SplitRows = {subset: [] for subset in SUBSETS}
-        columns = (table.record_id, table.start_fraction, table.stop_fraction, table.subset)
+        columns = (
+            table.record_id,
+            table.start_fraction,
+            table.stop_fraction,
+            table.subset,
+        )
         for record_id, start, stop, subset in zip(
             *(column.tolist() for column in columns), strict=True
         ):
@@ -338,9 +366,7 @@ class Dataset:
         return {**self.__dict__, "_files": OrderedDict(), "_checked": {}}
 
     def __repr__(self) -> str:
-        return (
-            f"Dataset({str(self.folder)!r}, {self.n_records} records, classes {self.class_names})"
-        )
+        return f"Dataset({str(self.folder)!r}, {self.n_records} records, classes {self.class_names})"
 
     def _file(self, shard: int) -> h5py.File:
         """The open shard.

@@ -60,7 +60,9 @@ class Column:
         Text is marked as ASCII, because Octave reads none that is marked as UTF-8.
         """
         return (
-            np.dtype(f"S{self.n_bytes}") if self.is_text else np.dtype(self.dtype).newbyteorder("<")
+            np.dtype(f"S{self.n_bytes}")
+            if self.is_text
+            else np.dtype(self.dtype).newbyteorder("<")
         )
 
     @property
@@ -71,13 +73,20 @@ class Column:
 
 def _table(*rows: tuple[str, str, str, str, str]) -> dict[str, Column]:
     return {
-        n: Column(name=n, dtype=d, unit=u, role=r, description=text) for n, d, u, r, text in rows
+        n: Column(name=n, dtype=d, unit=u, role=r, description=text)
+        for n, d, u, r, text in rows
     }
 
 
 COLUMNS: dict[str, Column] = _table(
     ("record_id", "str32", "", "id", "name of the record, unique in the data set"),
-    ("label", "int16", "1", "label", "class number, index into the attribute class_names"),
+    (
+        "label",
+        "int16",
+        "1",
+        "label",
+        "class number, index into the attribute class_names",
+    ),
     ("label_name", "str64", "", "label", "class name"),
     (
         "faults_json",
@@ -93,7 +102,13 @@ COLUMNS: dict[str, Column] = _table(
         "fault",
         "0 healthy to 1: relative size of the fault, the largest when compound",
     ),
-    ("fault_gear", "str16", "", "fault", "gear that carries the (first) fault; empty when healthy"),
+    (
+        "fault_gear",
+        "str16",
+        "",
+        "fault",
+        "gear that carries the (first) fault; empty when healthy",
+    ),
     (
         "fault_tooth",
         "int32",
@@ -101,8 +116,20 @@ COLUMNS: dict[str, Column] = _table(
         "fault",
         "lowest tooth with the (first) fault, counted from 0; -1: all or none",
     ),
-    ("start_tooth_pinion", "int32", "1", "condition", "pinion tooth in mesh at the first sample"),
-    ("start_tooth_wheel", "int32", "1", "condition", "wheel tooth in mesh at the first sample"),
+    (
+        "start_tooth_pinion",
+        "int32",
+        "1",
+        "condition",
+        "pinion tooth in mesh at the first sample",
+    ),
+    (
+        "start_tooth_wheel",
+        "int32",
+        "1",
+        "condition",
+        "wheel tooth in mesh at the first sample",
+    ),
     (
         "start_phase",
         "float64",
@@ -110,8 +137,20 @@ COLUMNS: dict[str, Column] = _table(
         "condition",
         "mesh phase at the first sample, as a fraction of a base pitch",
     ),
-    ("speed_rpm", "float64", "r/min", "result", "actual mean speed of the driving shaft"),
-    ("speed_set_rpm", "float64", "r/min", "condition", "speed set-point of the driving shaft"),
+    (
+        "speed_rpm",
+        "float64",
+        "r/min",
+        "result",
+        "actual mean speed of the driving shaft",
+    ),
+    (
+        "speed_set_rpm",
+        "float64",
+        "r/min",
+        "condition",
+        "speed set-point of the driving shaft",
+    ),
     (
         "torque_nm",
         "float64",
@@ -126,7 +165,13 @@ COLUMNS: dict[str, Column] = _table(
         "result",
         "mean tooth-mesh frequency of the faulted mesh, the first when healthy",
     ),
-    ("snr_db", "float64", "dB", "noise", "signal-to-noise ratio asked for; NaN without noise"),
+    (
+        "snr_db",
+        "float64",
+        "dB",
+        "noise",
+        "signal-to-noise ratio asked for; NaN without noise",
+    ),
     ("gearbox_id", "str64", "", "unit", "housing, transfer path and bearings"),
     ("specimen_id", "str64", "", "unit", "set of gears with its manufacturing errors"),
     ("unit_id", "str64", "", "unit", "one specimen in one gearbox"),
@@ -195,7 +240,13 @@ COLUMNS: dict[str, Column] = _table(
         "result",
         "share of the samples of all channels outside the converter's range; 0 without one, NaN in a failed record",
     ),
-    ("clipped", "int8", "1", "result", "1 where that is above sensing.sensor.max_clipped_fraction"),
+    (
+        "clipped",
+        "int8",
+        "1",
+        "result",
+        "1 where that is above sensing.sensor.max_clipped_fraction",
+    ),
     (
         "dropped_fraction",
         "float64",
@@ -319,7 +370,12 @@ REQUIRED = (
     "acceleration", "record_id", "label", "label_name", "severity", "gearbox_id", "specimen_id", "unit_id",
     "condition_id", "speed_rpm", "torque_nm", "status",
 )  # fmt: skip
-REQUIRED_ATTRIBUTES = ("schema_version", "sampling_rate_hz", "channel_names", "class_names")
+REQUIRED_ATTRIBUTES = (
+    "schema_version",
+    "sampling_rate_hz",
+    "channel_names",
+    "class_names",
+)
 
 # A column left out of `ShardWriter.write` gets its value here; any other must be given.
 DEFAULTS: dict[str, str | float] = {
@@ -357,7 +413,9 @@ def kind_of(name: str) -> str | None:
 def stored_reason(reason: str | float) -> str:
     """`status_reason` as far as a shard holds it."""
     return (
-        str(reason).encode("ascii", "backslashreplace")[: COLUMNS["status_reason"].n_bytes].decode()
+        str(reason)
+        .encode("ascii", "backslashreplace")[: COLUMNS["status_reason"].n_bytes]
+        .decode()
     )
 
 
@@ -373,12 +431,19 @@ def unit_in_file(column: Column, attributes: Mapping[str, Any]) -> str:
     )
     if ACCELERATION not in column.unit or units <= {ACCELERATION}:
         return column.unit
-    return column.unit.replace(ACCELERATION, units.pop()) if len(units) == 1 else "by channel_units"
+    return (
+        column.unit.replace(ACCELERATION, units.pop())
+        if len(units) == 1
+        else "by channel_units"
+    )
 
 
 def column_table() -> str:
     """The Markdown table of all data sets of a shard, as it stands in `docs/format.md`."""
-    lines = ["| name | shape | type | unit | role | meaning |", "|---|---|---|---|---|---|"]
+    lines = [
+        "| name | shape | type | unit | role | meaning |",
+        "|---|---|---|---|---|---|",
+    ]
     for column in (*SIGNALS.values(), *COLUMNS.values()):
         shape = ", ".join(("record", *column.axes))
         kind = f"ASCII, {column.n_bytes} bytes" if column.is_text else column.dtype

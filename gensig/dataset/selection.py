@@ -78,7 +78,9 @@ class StoredRecord:
     index: int
     values: Mapping[str, Any]
 
-    def signals(self, start: int = 0, stop: int | None = None, **options: Any) -> np.ndarray:
+    def signals(
+        self, start: int = 0, stop: int | None = None, **options: Any
+    ) -> np.ndarray:
         """Acceleration, (channel, sample) float32 in m/s^2; arguments as for `Dataset.signals`."""
         return self.dataset.signals(self.index, start, stop, **options)
 
@@ -117,7 +119,10 @@ class Selection:
         return self.dataset.signals(self._record(place), start, stop, **options)
 
     def array(
-        self, start: int = 0, stop: int | None = None, channels: Sequence[int | str] | None = None
+        self,
+        start: int = 0,
+        stop: int | None = None,
+        channels: Sequence[int | str] | None = None,
     ) -> np.ndarray:
         """Acceleration of all chosen records at once, (record, channel, sample) float32 in m/s^2.
 
@@ -125,7 +130,9 @@ class Selection:
         """
         stop = self.dataset.n_samples if stop is None else stop
         n_channels = len(self.dataset.channel_names if channels is None else channels)
-        block = np.empty((len(self.index), n_channels, max(0, stop - start)), dtype=np.float32)
+        block = np.empty(
+            (len(self.index), n_channels, max(0, stop - start)), dtype=np.float32
+        )
         for place, index in enumerate(self.index.tolist()):
             block[place] = self.dataset.signals(index, start, stop, channels)
         return block
@@ -137,7 +144,9 @@ class Selection:
         """
         if names is None:
             names = [
-                name for name in self.dataset.column_names if self.dataset.column(name).ndim == 1
+                name
+                for name in self.dataset.column_names
+                if self.dataset.column(name).ndim == 1
             ]
         return structured({name: self.column(name) for name in names})
 
@@ -146,9 +155,12 @@ class Selection:
 
     def __getitem__(self, place: int) -> StoredRecord:
         index = self._record(place)
-        values = {name: self.dataset.column(name)[index] for name in self.dataset.column_names}
+        values = {
+            name: self.dataset.column(name)[index] for name in self.dataset.column_names
+        }
         plain = {
-            name: value.item() if np.ndim(value) == 0 else value for name, value in values.items()
+            name: value.item() if np.ndim(value) == 0 else value
+            for name, value in values.items()
         }
         return StoredRecord(dataset=self.dataset, index=index, values=plain)
 
@@ -166,18 +178,24 @@ class Selection:
 
 def structured(columns: Mapping[str, np.ndarray]) -> np.ndarray:
     """Columns of equal length as one structured array, (record,), fields in the order given."""
-    fields = [(name, values.dtype, values.shape[1:]) for name, values in columns.items()]
+    fields = [
+        (name, values.dtype, values.shape[1:]) for name, values in columns.items()
+    ]
     table = np.empty(len(next(iter(columns.values()), ())), dtype=fields)
     for name, values in columns.items():
         table[name] = values
     return table
 
 
-def unknown_name(kind: str, name: str, known: Sequence[str], place: object) -> DatasetError:
+def unknown_name(
+    kind: str, name: str, known: Sequence[str], place: object
+) -> DatasetError:
     """The one line for a name that does not exist, with the nearest names first."""
     close = difflib.get_close_matches(name, known, n=3)
     hint = (
-        f"did you mean {' or '.join(map(repr, close))}?" if close else f"it has {', '.join(known)}"
+        f"did you mean {' or '.join(map(repr, close))}?"
+        if close
+        else f"it has {', '.join(known)}"
     )
     return DatasetError(f"{kind} {name!r} does not exist in {place}; {hint}")
 
@@ -192,7 +210,9 @@ def _meets(dataset: RecordSource, name: str, wanted: Any) -> np.ndarray:
     if isinstance(wanted, tuple):
         return _in_range(name, values, wanted)
     choices = (
-        [*wanted] if isinstance(wanted, list | set | frozenset | range | np.ndarray) else [wanted]
+        [*wanted]
+        if isinstance(wanted, list | set | frozenset | range | np.ndarray)
+        else [wanted]
     )
     is_text = values.dtype.kind == "U"
     for choice in choices:
@@ -201,7 +221,8 @@ def _meets(dataset: RecordSource, name: str, wanted: Any) -> np.ndarray:
         ):
             raise DatasetError(
                 f"where {name}={choice!r}: the column holds {'text' if is_text else 'numbers'}; give a value of that "
-                "kind, a list of them" + ("" if is_text else ", or a range as a tuple (low, high)")
+                "kind, a list of them"
+                + ("" if is_text else ", or a range as a tuple (low, high)")
             )
     if is_text:
         _check_choices(dataset, name, values, choices)
@@ -222,7 +243,9 @@ def _values(dataset: RecordSource, name: str) -> np.ndarray:
         return dataset.plan.columns[name]
     known = sorted({*ALIASES, *dataset.column_names, *dataset.plan.columns})
     short = [known_name.removeprefix(f"{PARAMS}/") for known_name in known]
-    raise unknown_name("column", name, known if "/" in name else sorted({*short}), dataset.folder)
+    raise unknown_name(
+        "column", name, known if "/" in name else sorted({*short}), dataset.folder
+    )
 
 
 def _in_range(name: str, values: np.ndarray, wanted: tuple) -> np.ndarray:
@@ -231,7 +254,11 @@ def _in_range(name: str, values: np.ndarray, wanted: tuple) -> np.ndarray:
     right = len(wanted) == 2 and all(
         isinstance(limit, int | float | np.number) for limit in numbers
     )
-    if values.dtype.kind == "U" or not right or any(np.isnan(limit) for limit in numbers):
+    if (
+        values.dtype.kind == "U"
+        or not right
+        or any(np.isnan(limit) for limit in numbers)
+    ):
         raise DatasetError(
             f"where {name}={wanted!r}: a tuple is a closed range (low, high) of numbers, None where a side is open; "
             "give a list for several values"
@@ -256,7 +283,9 @@ def _check_choices(
     """
     column = ALIASES.get(name, name)
     possible = {*values.tolist(), ""}
-    possible |= {"label_name": {*dataset.class_names}, "status": {*_STATES}}.get(column, set())
+    possible |= {"label_name": {*dataset.class_names}, "status": {*_STATES}}.get(
+        column, set()
+    )
     for choice in choices:
         if str(choice) not in possible:
             raise unknown_name(

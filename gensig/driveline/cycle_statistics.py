@@ -44,7 +44,10 @@ def fluctuations(signals: Array, crank_angle: Array) -> Array:
     (signal, sample).
     """
     return (
-        0.5 * np.array([np.ptp(signals[:, cycle], axis=1) for cycle in whole_cycles(crank_angle)]).T
+        0.5
+        * np.array(
+            [np.ptp(signals[:, cycle], axis=1) for cycle in whole_cycles(crank_angle)]
+        ).T
     )
 
 
@@ -72,7 +75,10 @@ def order_amplitudes(signals: Array, crank_angle: Array, n_orders: int) -> Array
     angle = crank_angle[used] - crank_angle[0]
     weight = np.gradient(angle)
     base = np.vander(angle, 2)
-    rest = signals[:, used] - (base @ np.linalg.lstsq(base, signals[:, used].T, rcond=None)[0]).T
+    rest = (
+        signals[:, used]
+        - (base @ np.linalg.lstsq(base, signals[:, used].T, rcond=None)[0]).T
+    )
     orders = 0.5 * np.arange(1, n_orders + 1)
     # an order at a time: all of them for a minute of samples would fill the memory
     found = [np.abs((rest * weight) @ np.exp(-1j * order * angle)) for order in orders]

@@ -9,7 +9,13 @@ import numpy as np
 from gensig.driveline.linear.dampers import with_dampers
 from gensig.driveline.linear.matrices import LineMatrices, line_matrices
 from gensig.driveline.linear.modal import Modes, natural_modes
-from gensig.driveline.linear.shaft_line import GearMesh, LineGear, Node, Shaft, ShaftLine
+from gensig.driveline.linear.shaft_line import (
+    GearMesh,
+    LineGear,
+    Node,
+    Shaft,
+    ShaftLine,
+)
 from gensig.driveline.options import Campbell, read_options
 from gensig.driveline.shaft_tables import read_gears, read_shafting, shipped_tables
 from gensig.driveline.table_rows import (
@@ -85,7 +91,13 @@ class DriveLine:
         if self.campbell.orders is not None:
             return self.campbell.orders
         return tuple(
-            sorted({factor * order for order in (1.0, *self.mesh_orders) for factor in (1.0, 2.0)})
+            sorted(
+                {
+                    factor * order
+                    for order in (1.0, *self.mesh_orders)
+                    for factor in (1.0, 2.0)
+                }
+            )
         )
 
 
@@ -105,7 +117,9 @@ def read_drive_line(config: Configuration) -> DriveLine:
     material = read_material(config)
     shafting = read_shafting("system.shafting_csv", options.shafting_csv)
     gear_rows = (
-        [] if options.gears_csv is None else read_gears("system.gears_csv", options.gears_csv)
+        []
+        if options.gears_csv is None
+        else read_gears("system.gears_csv", options.gears_csv)
     )
     node_rows = rows_of_nodes(shafting)
     numbers = tuple(node_rows)
@@ -133,7 +147,9 @@ def read_drive_line(config: Configuration) -> DriveLine:
             meshes.append(mesh)
         else:
             shafts.append(shaft_of(row, ends, options.loss_factor))
-    line = ShaftLine(nodes=nodes, shafts=tuple(shafts), gears=tuple(gears), meshes=tuple(meshes))
+    line = ShaftLine(
+        nodes=nodes, shafts=tuple(shafts), gears=tuple(gears), meshes=tuple(meshes)
+    )
     check_gears_in_mesh(gear_rows, line)
     check_whole(list(node_rows.values()), numbers, line)
     line, numbers = with_dampers(line, numbers, options.dampers)
@@ -206,7 +222,9 @@ def drive_line_of_pair(system: GearPairMachine, name: str) -> DriveLine:
     )
 
 
-def _coupling(rotor: Rotor, gear_node: int, rotor_node: int, gear_inertia: float) -> Shaft:
+def _coupling(
+    rotor: Rotor, gear_node: int, rotor_node: int, gear_inertia: float
+) -> Shaft:
     return Shaft(
         first=gear_node,
         second=rotor_node,

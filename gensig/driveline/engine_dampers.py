@@ -75,7 +75,9 @@ class DynamicRootStress:
     passes: dict[str, Array]
 
 
-def with_own_dampers(line: EngineLine, dampers: Sequence[TorsionalDamper]) -> EngineLine:
+def with_own_dampers(
+    line: EngineLine, dampers: Sequence[TorsionalDamper]
+) -> EngineLine:
     """The same engine with further dampers on its line."""
     drive = line.drive
     damped, numbers = with_dampers(drive.line, drive.numbers, dampers)
@@ -102,12 +104,17 @@ def tooth_load(line: EngineLine, mesh: int, response: SteadyResponse) -> ToothLo
     """Force of a mesh in a steady vibration; the mesh is a spring that never parts."""
     mean, amplitudes = response.element_forces(line.linear()[1])
     return ToothLoad(
-        speed=response.speed, force=mean[mesh] + over_cycle(amplitudes[mesh], CYCLE_POINTS)
+        speed=response.speed,
+        force=mean[mesh] + over_cycle(amplitudes[mesh], CYCLE_POINTS),
     )
 
 
 def seen_by_dampers(
-    line: EngineLine, mesh: int, nodes: Sequence[int], speeds: Iterable[float], torque: float
+    line: EngineLine,
+    mesh: int,
+    nodes: Sequence[int],
+    speeds: Iterable[float],
+    torque: float,
 ) -> SeenFromNodes:
     """Force of a mesh over a range of speeds (rad/s) at one brake torque, for dampers on ``nodes``.
 
@@ -122,7 +129,9 @@ def seen_by_dampers(
                 f"the shaft line has no node {node}; it has {min(numbers)} to {max(numbers)}"
             )
     if len(set(nodes)) != len(nodes):
-        raise ConfigError(f"dampers on nodes {', '.join(map(str, nodes))}: name each node once")
+        raise ConfigError(
+            f"dampers on nodes {', '.join(map(str, nodes))}: name each node once"
+        )
     linear, meshes = line.linear()
     return seen_from_nodes(
         linear,
@@ -135,7 +144,9 @@ def seen_by_dampers(
     )
 
 
-def read_mesh_strength(config: Configuration, line: EngineLine, mesh: int) -> RootStrength:
+def read_mesh_strength(
+    config: Configuration, line: EngineLine, mesh: int
+) -> RootStrength:
     """Pair and strength of one mesh of a line, without load.
 
     Flanks, material and strength of the configuration.
@@ -174,13 +185,18 @@ def dynamic_root_stress(
             "its row"
         )
     radius = strength.pair.pinion.base_radius
-    loaded = replace(strength, flanks=replace(strength.flanks, torque=load.greatest * radius))
+    loaded = replace(
+        strength, flanks=replace(strength.flanks, torque=load.greatest * radius)
+    )
     history = loaded.history()
     crank = crank_of_passes(
         strength, line, mesh, history.roll, range(passes_of_a_cycle(line, mesh))
     )
     angle = CYCLE / len(load.force) * np.arange(len(load.force))
-    share = np.maximum(np.interp(crank, angle, load.force, period=CYCLE), 0.0) / load.greatest
+    share = (
+        np.maximum(np.interp(crank, angle, load.force, period=CYCLE), 0.0)
+        / load.greatest
+    )
     return DynamicRootStress(
         strength=loaded,
         gears=loaded.gears(),
@@ -199,7 +215,11 @@ def passes_of_a_cycle(line: EngineLine, mesh: int) -> int:
 
 
 def crank_of_passes(
-    strength: RootStrength, line: EngineLine, mesh: int, roll: Array, passes: Iterable[int]
+    strength: RootStrength,
+    line: EngineLine,
+    mesh: int,
+    roll: Array,
+    passes: Iterable[int],
 ) -> Array:
     """Crank angles at which pairs, counted from crank angle 0 on, are at ``roll`` (point,) m,
     (pass, point) rad.

@@ -56,11 +56,14 @@ class EngineLine:
     def ratios(self) -> dict[int, float]:
         """Speed of every node over the crank's, by its number, positive."""
         crank = abs(
-            self.drive.line.speed_ratio[self._place(self.engine.driving_nodes[0], "throw_nodes")]
+            self.drive.line.speed_ratio[
+                self._place(self.engine.driving_nodes[0], "throw_nodes")
+            ]
         )
         ratios = np.abs(self.drive.line.speed_ratio) / crank
         return {
-            number: float(ratio) for number, ratio in zip(self.drive.numbers, ratios, strict=True)
+            number: float(ratio)
+            for number, ratio in zip(self.drive.numbers, ratios, strict=True)
         }
 
     @property
@@ -107,11 +110,15 @@ class EngineLine:
         """Torques on the degrees of freedom, (dof, point) N m."""
         rows = torques.on(self.drive.numbers)
         n_dofs = len(self.drive.matrices().mass)
-        return np.asarray(np.concatenate([rows, np.zeros((n_dofs - len(rows), rows.shape[1]))]))
+        return np.asarray(
+            np.concatenate([rows, np.zeros((n_dofs - len(rows), rows.shape[1]))])
+        )
 
     def response(self, speed: float, torque: float | None) -> SteadyResponse:
         """Steady vibration at a speed of the crank (rad/s) and a brake torque (N m)."""
-        return steady_response(self.linear()[0], self.on_line(self.torques(speed, torque)), speed)
+        return steady_response(
+            self.linear()[0], self.on_line(self.torques(speed, torque)), speed
+        )
 
     def seen_by(
         self, wheel: ToothedWheel, response: SteadyResponse, rng: np.random.Generator
@@ -123,7 +130,8 @@ class EngineLine:
         one = over_cycle(response.angle[place], SAMPLES_PER_CYCLE)
         crank = CYCLE / SAMPLES_PER_CYCLE * np.arange(SEEN_CYCLES * SAMPLES_PER_CYCLE)
         angle = np.asarray(
-            self.ratios[wheel.node] * crank + np.tile(one, SEEN_CYCLES), dtype=np.float64
+            self.ratios[wheel.node] * crank + np.tile(one, SEEN_CYCLES),
+            dtype=np.float64,
         )
         rate = SAMPLES_PER_CYCLE * response.speed / CYCLE
         return instantaneous_speed(wheel, draw_wheel(rng, wheel), angle, rate)
@@ -153,5 +161,7 @@ def read_engine_line(config: Configuration) -> EngineLine:
     values = config["excitation"]
     check_group("excitation", values)
     drive = read_drive_line(config)
-    engine = read_motor(values, drive) if values.get("kind") == KIND else read_engine(values)
+    engine = (
+        read_motor(values, drive) if values.get("kind") == KIND else read_engine(values)
+    )
     return EngineLine(drive=drive, engine=engine, wheels=read_wheels(values))

@@ -9,7 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.driveline.engine_line import EngineLine
-from gensig.driveline.running import Governor, OwnMesh, mesh_forces, running_line, steady_course
+from gensig.driveline.running import (
+    Governor,
+    OwnMesh,
+    mesh_forces,
+    running_line,
+    steady_course,
+)
 from gensig.driveline.teeth import ToothLaw, sound_meshes
 from gensig.driveline.time.newmark import LineSolver
 from gensig.mesh.options import read_mesh_options, read_slice_options
@@ -82,8 +88,12 @@ def time_response(
     ------
     SimulationError    where the energies do not balance to `MOST_ENERGY_RESIDUAL`
     """
-    line = running_line(machine, steady_course(speed, torque), governor=GOVERNOR, own=own)
-    speeds, angles = ([(kind, line.dof(node)) for node in nodes] for kind in ("speed", "angle"))
+    line = running_line(
+        machine, steady_course(speed, torque), governor=GOVERNOR, own=own
+    )
+    speeds, angles = (
+        [(kind, line.dof(node)) for node in nodes] for kind in ("speed", "angle")
+    )
     forces = [("mesh_force", place) for place in range(len(machine.mesh_names))]
     solver = LineSolver(
         sampling_rate=RATE, oversampling=STEPS, max_energy_residual=MOST_ENERGY_RESIDUAL
@@ -95,7 +105,8 @@ def time_response(
         settling=SETTLING,
     )
     found, angle, force = (
-        np.array([motion.signals[one] for one in channels]) for channels in (speeds, angles, forces)
+        np.array([motion.signals[one] for one in channels])
+        for channels in (speeds, angles, forces)
     )
     # teeth that never meet on their back flanks cannot pull: below 0 is what the low-pass rings
     force = np.where(motion.back_contact[:, None] > 0.0, force, np.maximum(force, 0.0))
@@ -106,7 +117,8 @@ def time_response(
         angle=angle,
         mesh_force=force,
         fluctuation=0.5 * np.ptp(found, axis=1),
-        cycle_fluctuation=0.5 * np.ptp(_mean_cycle(found, motion.nominal_angle), axis=1),
+        cycle_fluctuation=0.5
+        * np.ptp(_mean_cycle(found, motion.nominal_angle), axis=1),
         contact_loss=motion.contact_loss,
         back_contact=motion.back_contact,
         least_force=force.min(axis=1),
@@ -121,5 +133,8 @@ def _mean_cycle(signals: Array, angle: Array, n_points: int = 1440) -> Array:
     n_cycles = max(1, int((angle[-1] - angle[0]) // period))
     at = angle[0] + period * (np.arange(n_cycles * n_points) / n_points)
     return np.array(
-        [np.interp(at, angle, one).reshape(n_cycles, n_points).mean(axis=0) for one in signals]
+        [
+            np.interp(at, angle, one).reshape(n_cycles, n_points).mean(axis=0)
+            for one in signals
+        ]
     )

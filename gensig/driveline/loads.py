@@ -16,7 +16,9 @@ Array = NDArray[np.float64]
 
 SECONDS = 0.5  # of steady running that stand for a set-point
 SHARED = 0.5  # of the mesh force on one tooth where two pairs carry; assumed
-LEAST_TORQUE = 1e-6  # N m, of a mesh that passes without touching: laws take roots and logarithms
+LEAST_TORQUE = (
+    1e-6  # N m, of a mesh that passes without touching: laws take roots and logarithms
+)
 
 
 def greatest_loads(pair: GearPair, angle: Array, force: Array) -> Array:
@@ -37,14 +39,18 @@ def greatest_loads(pair: GearPair, angle: Array, force: Array) -> Array:
     """
     roll = pair.pinion.base_radius * angle
     entered = (
-        np.arange(math.ceil(roll[0] / pair.base_pitch), math.floor(roll[-1] / pair.base_pitch))
+        np.arange(
+            math.ceil(roll[0] / pair.base_pitch), math.floor(roll[-1] / pair.base_pitch)
+        )
         * pair.base_pitch
     )
     found = []
     for entry in entered[entered + pair.path_of_contact <= roll[-1]]:
         place = roll - entry
         engaged = (place >= 0.0) & (place <= pair.path_of_contact)
-        alone = (place > pair.path_of_contact - pair.base_pitch) & (place < pair.base_pitch)
+        alone = (place > pair.path_of_contact - pair.base_pitch) & (
+            place < pair.base_pitch
+        )
         load = np.where(alone, 1.0, SHARED)[engaged] * np.maximum(force[engaged], 0.0)
         found.append(float(load.max(initial=0.0)))
     return np.maximum(np.array(found) * pair.pinion.base_radius, LEAST_TORQUE)

@@ -66,7 +66,9 @@ from gensig.units import SPEED
 
 Array = NDArray[np.float64]
 
-SETTLING = 0.3  # s before a record, until the start from the linear vibration has died away
+SETTLING = (
+    0.3  # s before a record, until the start from the linear vibration has died away
+)
 MOST_ENERGY_RESIDUAL = 1e-3
 KNOT = 5e-3  # s between the knots of a course that changes
 AFTER = 0.2  # s that a course goes on after a record: the low-pass looks ahead
@@ -126,7 +128,9 @@ class LineMachine(Machine):
     def driving_node(self) -> int:
         """Number of the node that carries the driving gear of the record mesh."""
         drive = self.engine.drive
-        return drive.numbers[drive.line.gears[drive.line.meshes[self.place].driving].node]
+        return drive.numbers[
+            drive.line.gears[drive.line.meshes[self.place].driving].node
+        ]
 
     @property
     def line_solver(self) -> LineSolver:
@@ -171,12 +175,16 @@ class LineMachine(Machine):
     @property
     def mesh_force(self) -> float:
         """Mean normal force of the mesh at the set-point, N, or what closes it by 2 um."""
-        return reference_force(self.engine, self.place, float(self.mesh_forces[self.place]))
+        return reference_force(
+            self.engine, self.place, float(self.mesh_forces[self.place])
+        )
 
     @property
     def mesh_forces(self) -> Array:
         """Mean normal forces of all meshes at the set-point, (mesh,) N."""
-        return mesh_forces(self.engine, self.operating.speed / self.ratio, self.operating.torque)
+        return mesh_forces(
+            self.engine, self.operating.speed / self.ratio, self.operating.torque
+        )
 
     @property
     def law(self) -> ToothLaw:
@@ -188,7 +196,11 @@ class LineMachine(Machine):
         return tooth_table(self.law, self.pair, tuple(faults), self.mesh_force)
 
     def stiffness_curves(
-        self, faults: Sequence[Fault] = (), *, n_positions: int = 201, points_per_tooth: int = 100
+        self,
+        faults: Sequence[Fault] = (),
+        *,
+        n_positions: int = 201,
+        points_per_tooth: int = 100,
     ) -> StiffnessCurves:
         """Curves of the followed mesh under its mean force.
 
@@ -248,7 +260,10 @@ class LineMachine(Machine):
         self._warn_of_supports()
         self.quality.check_covered(self.pair.pinion, self.pair.wheel)
         check_memory(
-            self.operating.duration, sensing.sampling_rate, len(sensing.channels), self.solver
+            self.operating.duration,
+            sensing.sampling_rate,
+            len(sensing.channels),
+            self.solver,
         )
         self.mesh_table()
 
@@ -258,10 +273,14 @@ class LineMachine(Machine):
         if rated is None:
             return
         force = np.abs(self.mesh_forces)
-        heavy = [place for place in range(len(force)) if force[place] > FAR_ABOVE * rated]
+        heavy = [
+            place for place in range(len(force)) if force[place] > FAR_ABOVE * rated
+        ]
         if heavy:
             names = self.engine.mesh_names
-            listed = ", ".join(f"{names[place]} {force[place]:.0f} N" for place in heavy)
+            listed = ", ".join(
+                f"{names[place]} {force[place]:.0f} N" for place in heavy
+            )
             warnings.warn(
                 f"{drive.name}: mean tooth forces of meshes {listed}, but every gear is on a support for "
                 f"system.support.force_n = {rated:g} N, less stiff than bearings so loaded; set it, and bearing and "
@@ -277,7 +296,9 @@ class LineMachine(Machine):
         gears do not come back to each other after every cycle, it is the drawn one.
         """
         pinion, wheel = self.pair.pinion.n_teeth, self.pair.wheel.n_teeth
-        once_a_cycle = isinstance(self.engine.engine, Engine) and round(2.0 * self.ratio) == 1
+        once_a_cycle = (
+            isinstance(self.engine.engine, Engine) and round(2.0 * self.ratio) == 1
+        )
         if once_a_cycle and pinion % wheel == 0:
             return tooth_pinion % wheel
         return drawn
@@ -313,8 +334,12 @@ class LineMachine(Machine):
                 "life: on a drive line damage grows in a spur record mesh; choose one, system.record_mesh"
             )
         if not self.operating.is_steady:
-            raise ConfigError("life: on a drive line set-points are steady; take operating=rated")
-        machine = replace(self, operating=replace(self.operating, speed=speed, torque=torque))
+            raise ConfigError(
+                "life: on a drive line set-points are steady; take operating=rated"
+            )
+        machine = replace(
+            self, operating=replace(self.operating, speed=speed, torque=torque)
+        )
         line = machine.line(Run(system=machine, faults=()))
         shaft = line.dof(machine.driving_node)
         motion = line.run(
@@ -329,7 +354,9 @@ class LineMachine(Machine):
         )
 
     @classmethod
-    def simulate_runs(cls, runs: Sequence[Run[Self]]) -> list[CleanRecord | SimulationError]:
+    def simulate_runs(
+        cls, runs: Sequence[Run[Self]]
+    ) -> list[CleanRecord | SimulationError]:
         """Simulate runs one after the other, in the order given."""
         records: list[CleanRecord | SimulationError] = []
         for run in runs:
@@ -376,7 +403,8 @@ class LineMachine(Machine):
         if run.gearbox is not None and engine.drive.lateral:
             bodies = (self.pinion, slice(0, 2)), (self.wheel, slice(2, 4))
             held = [
-                in_gearbox(body, run.gearbox, axes, self.quality).support for body, axes in bodies
+                in_gearbox(body, run.gearbox, axes, self.quality).support
+                for body, axes in bodies
             ]
             engine = with_supports(engine, self.place, held)
         turned, forces = self.crank_angle(start), self.mesh_forces
@@ -398,7 +426,10 @@ class LineMachine(Machine):
             start_phase=start.phase,
         )
         sound = sound_meshes(engine, self.law, forces, besides={self.place, *beside})
-        frequency, ratio = self.operating.drive_frequency, self.operating.drive_damping_ratio
+        frequency, ratio = (
+            self.operating.drive_frequency,
+            self.operating.drive_damping_ratio,
+        )
         return running_line(
             engine,
             self._course(),
@@ -415,7 +446,11 @@ class LineMachine(Machine):
         tooth chooses the turn. A motor has no cycle: its turns are counted on, so that the other
         meshes stand as the teeth allow.
         """
-        pitches = start.tooth_pinion + start.phase - start_phase(self.engine.drive, self.place)
+        pitches = (
+            start.tooth_pinion
+            + start.phase
+            - start_phase(self.engine.drive, self.place)
+        )
         if not isinstance(self.engine.engine, Engine):
             return (
                 2.0
@@ -436,7 +471,9 @@ class LineMachine(Machine):
         nominal = operating.nominal(time)
         load = self.engine.load_at(operating.torque, nominal.speed / operating.speed)
         return EngineCourse(
-            time=time, speed=nominal.speed / self.ratio, torque=load * nominal.torque_factor
+            time=time,
+            speed=nominal.speed / self.ratio,
+            torque=load * nominal.torque_factor,
         )
 
     def _channel(self, line: RunningLine, name: str) -> tuple[str, int]:
@@ -456,7 +493,9 @@ class LineMachine(Machine):
     def _wheel(self, name: str) -> tuple[int, ToothedWheel]:
         wanted = name.removesuffix(SPEED)
         return next(
-            (k, wheel) for k, (own, wheel) in enumerate(self.engine.wheels.items()) if own == wanted
+            (k, wheel)
+            for k, (own, wheel) in enumerate(self.engine.wheels.items())
+            if own == wanted
         )
 
     def _seen(

@@ -65,7 +65,9 @@ def start_rolls(line: DriveLine, turned: float = 0.0) -> Array:
     angles = tooth_angles(line, turned)
     rolls = []
     for mesh, pair in zip(line.line.meshes, line.pairs, strict=True):
-        sense = math.copysign(1.0, line.line.speed_ratio[line.line.gears[mesh.driving].node])
+        sense = math.copysign(
+            1.0, line.line.speed_ratio[line.line.gears[mesh.driving].node]
+        )
         past = _past_pitch_point(mesh, pair, sense, float(angles[mesh.driving]))
         rolls.append((pair.pitch_point + past * pair.base_pitch) % pair.base_pitch)
     return np.array(rolls)
@@ -84,7 +86,10 @@ def start_phase(line: DriveLine, place: int, turned: float = 0.0) -> float:
     What a mesh table takes as its start.
     """
     pair = line.pairs[place]
-    return float(start_rolls(line, turned)[place] + first_slice_lead(pair)) / pair.base_pitch
+    return (
+        float(start_rolls(line, turned)[place] + first_slice_lead(pair))
+        / pair.base_pitch
+    )
 
 
 def _spread(by_node: list[float | None], one: int, other: int) -> None:
@@ -102,12 +107,15 @@ def _half_teeth(pair: GearPair) -> tuple[float, float]:
     """
     cosine = math.cos(pair.working_pressure_angle)
     first, second = (
-        gear.half_tooth_angle_at(gear.base_radius / cosine) for gear in (pair.pinion, pair.wheel)
+        gear.half_tooth_angle_at(gear.base_radius / cosine)
+        for gear in (pair.pinion, pair.wheel)
     )
     return first, second
 
 
-def _past_pitch_point(mesh: GearMesh, pair: GearPair, sense: float, angle: float) -> float:
+def _past_pitch_point(
+    mesh: GearMesh, pair: GearPair, sense: float, angle: float
+) -> float:
     """Base pitches by which the driving flank of the tooth at ``angle`` has passed the pitch
     point.
     """
@@ -121,7 +129,9 @@ def _driven_angle(mesh: GearMesh, pair: GearPair, sense: float, past: float) -> 
     return mesh.center_line + math.pi - sense * turned
 
 
-def _driving_angle(mesh: GearMesh, pair: GearPair, sense: float, driven_angle: float) -> float:
+def _driving_angle(
+    mesh: GearMesh, pair: GearPair, sense: float, driven_angle: float
+) -> float:
     """The reverse of the two above."""
     turned = sense * (mesh.center_line + math.pi - driven_angle) - _half_teeth(pair)[1]
     past = turned * pair.wheel.n_teeth / (2.0 * math.pi)

@@ -70,7 +70,9 @@ class GearHolding:
 
     def __post_init__(self) -> None:
         if not self.force > 0.0:
-            raise ConfigError(f"system.support.force_n = {self.force:g} must be positive")
+            raise ConfigError(
+                f"system.support.force_n = {self.force:g} must be positive"
+            )
         if not 0.0 <= self.damping_ratio < 1.0:
             raise ConfigError(
                 f"system.support.damping_ratio = {self.damping_ratio:g} must lie in 0..1"
@@ -78,10 +80,16 @@ class GearHolding:
 
     def under(self, mass: float, material: Material) -> Support:
         """The support of a gear of ``mass`` in kg."""
-        across, along = support_stiffness(self.bearing, self.shaft, material, self.force)
-        rigid = Support(stiffness_x=across, stiffness_y=along, damping_x=0.0, damping_y=0.0)
+        across, along = support_stiffness(
+            self.bearing, self.shaft, material, self.force
+        )
+        rigid = Support(
+            stiffness_x=across, stiffness_y=along, damping_x=0.0, damping_y=0.0
+        )
         return rigid.damped(
-            Body(mass=mass, inertia=0.0, support=rigid), self.damping_ratio, self.damping_ratio
+            Body(mass=mass, inertia=0.0, support=rigid),
+            self.damping_ratio,
+            self.damping_ratio,
         )
 
 
@@ -116,11 +124,17 @@ def read_options(machine: Section) -> LineOptions:
         shaft = read(BearingShaft, held.get("shaft", {}), "shaft")
     except ConfigError as error:
         raise ConfigError(f"system.support.{error}") from None
-    own_support = {key: value for key, value in held.items() if key not in ("bearing", "shaft")}
+    own_support = {
+        key: value for key, value in held.items() if key not in ("bearing", "shaft")
+    }
     groups: dict[str, Any] = {
-        "loss_factor": read(LossFactors, machine.get("loss_factor", {}), "system.loss_factor"),
+        "loss_factor": read(
+            LossFactors, machine.get("loss_factor", {}), "system.loss_factor"
+        ),
         "campbell": read(Campbell, machine.get("campbell", {}), "system.campbell"),
-        "support": read(GearHolding, own_support, "system.support", bearing=bearing, shaft=shaft),
+        "support": read(
+            GearHolding, own_support, "system.support", bearing=bearing, shaft=shaft
+        ),
         "dampers": _read_dampers(machine.get("dampers", ())),
     }
     own = {key: value for key, value in machine.items() if key not in groups}
@@ -130,14 +144,18 @@ def read_options(machine: Section) -> LineOptions:
             f"system.helical_meshes = {options.helical_meshes!r}; allowed: {', '.join(HELICAL_MESHES)}"
         )
     if options.backlash < 0.0:
-        raise ConfigError(f"system.backlash_um = {options.backlash * 1e6:g} must not be negative")
+        raise ConfigError(
+            f"system.backlash_um = {options.backlash * 1e6:g} must not be negative"
+        )
     return options
 
 
 def _read_dampers(values: Any) -> tuple[TorsionalDamper, ...]:
     """The list ``system.dampers``; their nodes are checked against the line's."""
     if not isinstance(values, list | tuple):
-        raise ConfigError(f"system.dampers = {values!r} must be a list of dampers, [] for none")
+        raise ConfigError(
+            f"system.dampers = {values!r} must be a list of dampers, [] for none"
+        )
     found = []
     for place, one in enumerate(values):
         where = f"system.dampers[{place}]"

@@ -45,7 +45,9 @@ def read_line_machine(config: Configuration) -> LineMachine:
         place=place,
         slices=read_slice_options(config.section("mesh")),
     )
-    return replace(machine, operating=replace(operating, speed=operating.speed * machine.ratio))
+    return replace(
+        machine, operating=replace(operating, speed=operating.speed * machine.ratio)
+    )
 
 
 def _record_mesh(engine: EngineLine) -> int:

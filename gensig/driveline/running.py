@@ -24,7 +24,12 @@ from gensig.driveline.time.chords import sliced_pair_mesh
 from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
 from gensig.driveline.time.geared_line import GearedLine
 from gensig.driveline.time.line_mesh import LineMesh, pair_mesh, phase_mesh
-from gensig.driveline.time.newmark import LineMotion, LineSolver, integrate_line, static_start
+from gensig.driveline.time.newmark import (
+    LineMotion,
+    LineSolver,
+    integrate_line,
+    static_start,
+)
 from gensig.errors import ConfigError, StepError
 from gensig.geometry.contact import GearPair
 from gensig.mesh.pair_table import PairTable
@@ -34,7 +39,9 @@ Array = NDArray[np.float64]
 
 CONSTANT_NODES = 8  # of a pitch whose stiffness is constant
 LEAST_APPROACH = 2e-6  # m, at which a mesh that carries next to nothing is taken
-TABLE_STEP = 100.0 * math.pi / 30.0  # rad/s of the crank between torques that a run-up goes over
+TABLE_STEP = (
+    100.0 * math.pi / 30.0
+)  # rad/s of the crank between torques that a run-up goes over
 TABLE_SHARE = 0.1  # of the largest torque between them
 MOST_TABLES = 24
 MOST_STEPS = 64  # per sample, that are tried where steps turn out to be too long
@@ -84,7 +91,9 @@ class EngineCourse:
 
     def __post_init__(self) -> None:
         if not len(self.time) == len(self.speed) == len(self.torque) >= 1:
-            raise ConfigError("the course of an engine needs as many speeds and torques as times")
+            raise ConfigError(
+                "the course of an engine needs as many speeds and torques as times"
+            )
         if not self.speed.min() > 0.0:
             raise ConfigError(
                 f"the speed of the crank, {self.speed.min() * 30.0 / math.pi:g} r/min, must be positive"
@@ -93,7 +102,9 @@ class EngineCourse:
 
 def steady_course(speed: float, torque: float) -> EngineCourse:
     """One speed (rad/s) and one brake torque (N m)."""
-    return EngineCourse(time=np.zeros(1), speed=np.array([speed]), torque=np.array([torque]))
+    return EngineCourse(
+        time=np.zeros(1), speed=np.array([speed]), torque=np.array([torque])
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -115,7 +126,9 @@ class RunningLine:
 
     def dof(self, node: int) -> int:
         """Place of the degree of freedom that a node, by its number, turns with."""
-        return int(np.argmax(self.matrices.expand[self.machine.drive.numbers.index(node)]))
+        return int(
+            np.argmax(self.matrices.expand[self.machine.drive.numbers.index(node)])
+        )
 
     @one_thread
     def run(
@@ -134,7 +147,9 @@ class RunningLine:
         """
         lead = max(settling, LEAD_SAMPLES / solver.sampling_rate)
         lead = math.ceil(lead * solver.sampling_rate) / solver.sampling_rate
-        turned, speed = (float(one[0]) for one in self.course.nominal(np.array([-lead])))
+        turned, speed = (
+            float(one[0]) for one in self.course.nominal(np.array([-lead]))
+        )
         phasor = np.exp(1j * self.linear.orders * (self.turned + turned))
         still = static_start(self.line, self.course, self.torques, time=-lead)
         start = (
@@ -260,8 +275,13 @@ def _mesh(
     direction = matrices.directions[place]
     roll_dof = int(np.argmax(matrices.expand[drive.line.gears[mesh.driving].node]))
     # so many N s/m under the mean force; a mesh that carries less is damped less
-    damping = float(matrices.mesh_damping[place]) / reference_force(machine, place, force)
-    name, phase = machine.mesh_names[place], (roll + first_slice_lead(pair)) / pair.base_pitch
+    damping = float(matrices.mesh_damping[place]) / reference_force(
+        machine, place, force
+    )
+    name, phase = (
+        machine.mesh_names[place],
+        (roll + first_slice_lead(pair)) / pair.base_pitch,
+    )
     if own is not None:
         make: Callable[..., LineMesh] = (
             sliced_pair_mesh if isinstance(own.table, SlicedTable) else pair_mesh
@@ -289,25 +309,37 @@ def _mesh(
     )
 
 
-def _tables(machine: EngineLine, matrices: LineMatrices, speed: float, torque: float) -> Array:
+def _tables(
+    machine: EngineLine, matrices: LineMatrices, speed: float, torque: float
+) -> Array:
     """Torques on the degrees of freedom over the cycle of the crank, (dof, point) N m."""
     on_nodes = machine.torques(speed, torque).on(machine.drive.numbers)
     return np.asarray(matrices.expand[: len(on_nodes)].T @ on_nodes)
 
 
 def _torques(
-    machine: EngineLine, matrices: LineMatrices, course: EngineCourse, turned: float, first: Array
+    machine: EngineLine,
+    matrices: LineMatrices,
+    course: EngineCourse,
+    turned: float,
+    first: Array,
 ) -> tuple[ShaftTorque, ...]:
     """The torques of the engine along a course: between tables at some times they go straight."""
-    rotation, crank = matrices.rigid[0], abs(float(matrices.rigid[0][_crank(machine, matrices)]))
+    rotation, crank = (
+        matrices.rigid[0],
+        abs(float(matrices.rigid[0][_crank(machine, matrices)])),
+    )
     at = _table_times(course)
     found: list[ShaftTorque] = []
     for place, time in enumerate(at):
         speed, torque = (
-            float(np.interp(time, course.time, one)) for one in (course.speed, course.torque)
+            float(np.interp(time, course.time, one))
+            for one in (course.speed, course.torque)
         )
         tables = first if place == 0 else _tables(machine, matrices, speed, torque)
-        share = np.interp(course.time, at, np.eye(len(at))[place]) if len(at) > 1 else None
+        share = (
+            np.interp(course.time, at, np.eye(len(at))[place]) if len(at) > 1 else None
+        )
         least = ROUNDED * float(np.abs(tables).max())
         for dof in np.flatnonzero(np.any(tables != 0.0, axis=1)):
             table, ratio = tables[dof], abs(float(rotation[dof])) / crank
@@ -321,7 +353,9 @@ def _torques(
                     factor=share,
                 )
             )
-    if len(course.time) > 1:  # what speeds the whole line up comes from the throws, or the motor
+    if (
+        len(course.time) > 1
+    ):  # what speeds the whole line up comes from the throws, or the motor
         rise = (
             float(rotation @ matrices.mass @ rotation)
             / crank
@@ -330,7 +364,11 @@ def _torques(
         driving = machine.engine.driving_nodes
         for node in driving:
             throw = int(np.argmax(matrices.expand[machine.drive.numbers.index(node)]))
-            found.append(ShaftTorque(dof=throw, table=np.array([1.0 / len(driving)]), factor=rise))
+            found.append(
+                ShaftTorque(
+                    dof=throw, table=np.array([1.0 / len(driving)]), factor=rise
+                )
+            )
     return tuple(found)
 
 
@@ -339,9 +377,9 @@ def _table_times(course: EngineCourse) -> Array:
     if len(course.time) == 1:
         return course.time
     greatest = max(float(np.abs(course.torque).max()), 1e-9)
-    steps = np.abs(np.diff(course.speed)) / TABLE_STEP + np.abs(np.diff(course.torque)) / (
-        TABLE_SHARE * greatest
-    )
+    steps = np.abs(np.diff(course.speed)) / TABLE_STEP + np.abs(
+        np.diff(course.torque)
+    ) / (TABLE_SHARE * greatest)
     gone = np.concatenate([[0.0], np.cumsum(steps)])
     n_tables = min(MOST_TABLES, 1 + math.ceil(gone[-1]))
     if n_tables < 2:
@@ -352,14 +390,22 @@ def _table_times(course: EngineCourse) -> Array:
 
 def _crank(machine: EngineLine, matrices: LineMatrices) -> int:
     return int(
-        np.argmax(matrices.expand[machine.drive.numbers.index(machine.engine.driving_nodes[0])])
+        np.argmax(
+            matrices.expand[
+                machine.drive.numbers.index(machine.engine.driving_nodes[0])
+            ]
+        )
     )
 
 
-def with_supports(machine: EngineLine, place: int, supports: Sequence[object]) -> EngineLine:
+def with_supports(
+    machine: EngineLine, place: int, supports: Sequence[object]
+) -> EngineLine:
     """The same with other supports of the two gears of a mesh, driving and driven."""
     line = machine.drive.line
     mesh, gears = line.meshes[place], list(line.gears)
     for gear, support in zip((mesh.driving, mesh.driven), supports, strict=True):
         gears[gear] = replace(gears[gear], support=support)  # type: ignore[arg-type]
-    return replace(machine, drive=replace(machine.drive, line=replace(line, gears=tuple(gears))))
+    return replace(
+        machine, drive=replace(machine.drive, line=replace(line, gears=tuple(gears)))
+    )

@@ -35,7 +35,14 @@ GEAR_COLUMNS: dict[str, str | None] = {
     "face_width": "mm", "mass": "kg", "profile_shift": "", "bore_radius": "mm", "addendum_coefficient": "",
     "clearance_coefficient": "", "cutter_tip_radius_coefficient": "",
 }  # fmt: skip
-GEARS_NEEDED = ("node", "n_teeth", "normal_module", "pressure_angle", "helix_angle", "face_width")
+GEARS_NEEDED = (
+    "node",
+    "n_teeth",
+    "normal_module",
+    "pressure_angle",
+    "helix_angle",
+    "face_width",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,21 +78,27 @@ class TableRow:
             raise ConfigError(f"{self.place(column)}: '{cell}' is no number")
         value = to_si(self.headers[column], value)
         if value != 0.0 and not LEAST <= abs(value) <= MOST:
-            raise ConfigError(f"{self.place(column)}: {cell} is beyond any machine; check its unit")
+            raise ConfigError(
+                f"{self.place(column)}: {cell} is beyond any machine; check its unit"
+            )
         return value
 
     def positive(self, column: str) -> float | None:
         """A number above 0, None where the cell is empty."""
         value = self.number(column)
         if value is not None and value <= 0.0:
-            raise ConfigError(f"{self.place(column)}: {self.text(column)} must be positive")
+            raise ConfigError(
+                f"{self.place(column)}: {self.text(column)} must be positive"
+            )
         return value
 
     def not_negative(self, column: str) -> float | None:
         """A number of at least 0, None where the cell is empty."""
         value = self.number(column)
         if value is not None and value < 0.0:
-            raise ConfigError(f"{self.place(column)}: {self.text(column)} must not be negative")
+            raise ConfigError(
+                f"{self.place(column)}: {self.text(column)} must not be negative"
+            )
         return value
 
     def whole(self, column: str) -> int | None:
@@ -118,7 +131,9 @@ def read_gears(key: str, file: str) -> list[TableRow]:
 
 def shipped_tables() -> list[str]:
     """Names of the tables that come with gensig."""
-    return sorted(path.name for path in _tables().iterdir() if path.name.endswith(".csv"))
+    return sorted(
+        path.name for path in _tables().iterdir() if path.name.endswith(".csv")
+    )
 
 
 def _tables() -> resources.abc.Traversable:  # type: ignore[name-defined]
@@ -133,7 +148,9 @@ def _text_of(key: str, file: str) -> str:
     try:
         return Path(file).expanduser().read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
+        reason = (
+            error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
+        )
         raise ConfigError(
             f"{key} = {file} cannot be read: {reason}; give a path, or one of {', '.join(shipped_tables())}"
         ) from None
@@ -153,7 +170,9 @@ def _read(
             f"{table} is empty; its first line names the columns: {', '.join(_shown(columns))}"
         )
     if len(lines) > MOST_ROWS:
-        raise ConfigError(f"{table} has {len(lines)} rows; at most {MOST_ROWS} are read")
+        raise ConfigError(
+            f"{table} has {len(lines)} rows; at most {MOST_ROWS} are read"
+        )
     cells = [_cells(f"{table}, row {number}", line) for number, line in lines]
     names = _header(f"{table}, row {lines[0][0]}", cells[0], columns, needed)
     rows = []
@@ -186,24 +205,35 @@ def _cells(place: str, line: str) -> list[str]:
 
 
 def _header(
-    place: str, header: list[str], columns: Mapping[str, str | None], needed: tuple[str, ...]
+    place: str,
+    header: list[str],
+    columns: Mapping[str, str | None],
+    needed: tuple[str, ...],
 ) -> list[str]:
     """Bare names of the columns; text columns keep theirs."""
     names = []
     for written in header:
-        names.append(_column(f"{place}, column {written or '(without a name)'}", written, columns))
+        names.append(
+            _column(
+                f"{place}, column {written or '(without a name)'}", written, columns
+            )
+        )
         if names[-1] in names[:-1]:
             raise ConfigError(f"{place}, column {written}: there are two of it")
     for name in needed:
         if name not in names:
-            raise ConfigError(f"{place}: there is no column {_suffixed(name, columns[name])}")
+            raise ConfigError(
+                f"{place}: there is no column {_suffixed(name, columns[name])}"
+            )
     return names
 
 
 def _column(place: str, written: str, columns: Mapping[str, str | None]) -> str:
     if written in columns:
         if columns[written]:
-            raise ConfigError(f"{place}: its unit is missing; write {_choices(written, columns)}")
+            raise ConfigError(
+                f"{place}: its unit is missing; write {_choices(written, columns)}"
+            )
         return written
     if written.startswith(TEXT):
         return written
@@ -217,7 +247,9 @@ def _column(place: str, written: str, columns: Mapping[str, str | None]) -> str:
         return bare
     for name, unit in columns.items():  # a unit that there is not
         if unit and written.startswith(f"{name}_"):
-            raise ConfigError(f"{place}: no unit known here; write {_choices(name, columns)}")
+            raise ConfigError(
+                f"{place}: no unit known here; write {_choices(name, columns)}"
+            )
     close = difflib.get_close_matches(written, [*_shown(columns), *columns], n=1)
     hint = (
         f"did you mean {close[0]}?"
@@ -239,5 +271,7 @@ def _choices(name: str, columns: Mapping[str, str | None]) -> str:
     """Every header that the column may have."""
     quantity = UNITS[columns[name] or ""][1]
     return " or ".join(
-        f"{name}_{suffix}" for suffix, (_, measured) in UNITS.items() if measured == quantity
+        f"{name}_{suffix}"
+        for suffix, (_, measured) in UNITS.items()
+        if measured == quantity
     )

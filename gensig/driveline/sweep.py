@@ -13,10 +13,20 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.driveline.cycle_statistics import fluctuations, order_amplitudes, typical_extremes
+from gensig.driveline.cycle_statistics import (
+    fluctuations,
+    order_amplitudes,
+    typical_extremes,
+)
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.cycle import CYCLE
-from gensig.driveline.in_time import GOVERNOR, MOST_ENERGY_RESIDUAL, RATE, SETTLING, STEPS
+from gensig.driveline.in_time import (
+    GOVERNOR,
+    MOST_ENERGY_RESIDUAL,
+    RATE,
+    SETTLING,
+    STEPS,
+)
 from gensig.driveline.running import EngineCourse, OwnMesh, running_line
 from gensig.driveline.time.newmark import LineMotion, LineSolver
 from gensig.errors import ConfigError
@@ -25,10 +35,14 @@ Array = NDArray[np.float64]
 
 KNOT = 0.02  # s between the knots of the course
 MOST_BINS = 44  # of speed: 25 r/min over 650 to 1750 r/min
-LEAST_CYCLES = 2.2  # of the crank at its lowest speed in a bin: two whole ones wherever they begin
+LEAST_CYCLES = (
+    2.2  # of the crank at its lowest speed in a bin: two whole ones wherever they begin
+)
 SPECTRUM_WINDOW = 0.5  # s, Hann: 4 Hz wide at half height
 SPECTRUM_HZ = 700.0
-APART = 3.0  # standard errors of the difference, beyond which up and down are told apart
+APART = (
+    3.0  # standard errors of the difference, beyond which up and down are told apart
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -70,10 +84,14 @@ class Sweep:
     def told_apart(self) -> Array:
         """Where up and down differ by more than their cycles scatter, (node, bin) of bool."""
         error = np.hypot(self.up.scatter, self.down.scatter)
-        return np.asarray(np.abs(self.up.fluctuation - self.down.fluctuation) > APART * error)
+        return np.asarray(
+            np.abs(self.up.fluctuation - self.down.fluctuation) > APART * error
+        )
 
 
-def sweep_course(low: float, high: float, seconds: float, torque: float) -> EngineCourse:
+def sweep_course(
+    low: float, high: float, seconds: float, torque: float
+) -> EngineCourse:
     """From ``low`` rad/s straight to ``high`` in ``seconds`` and straight back, under one brake
     torque in N m.
     """
@@ -112,7 +130,8 @@ def sweep_response(
         )
     course = sweep_course(low, high, seconds, torque)
     course = replace(
-        course, torque=machine.load_at(torque, course.speed / machine.engine.reference.speed)
+        course,
+        torque=machine.load_at(torque, course.speed / machine.engine.reference.speed),
     )
     line = running_line(machine, course, governor=GOVERNOR, own=own)
     solver = LineSolver(
@@ -121,7 +140,10 @@ def sweep_response(
     names = [(kind, line.dof(node)) for kind in ("angle", "speed") for node in nodes]
     names += [("mesh_force", place) for place in range(len(machine.mesh_names))]
     motion = line.run(
-        solver, duration=2.0 * seconds, channels=list(dict.fromkeys(names)), settling=SETTLING
+        solver,
+        duration=2.0 * seconds,
+        channels=list(dict.fromkeys(names)),
+        settling=SETTLING,
     )
     signals = np.array([motion.signals[name] for name in names])
     edges = seconds * np.arange(n_bins + 1) / n_bins
@@ -149,13 +171,21 @@ def sweep_response(
 
 
 def _way(
-    motion: LineMotion, signals: Array, n_nodes: int, edges: Array, speeds: Array, n_orders: int
+    motion: LineMotion,
+    signals: Array,
+    n_nodes: int,
+    edges: Array,
+    speeds: Array,
+    n_orders: int,
 ) -> SweepWay:
     """One way: ``edges`` (bin + 1,) s of its bins, ``speeds`` (bin,) in their middles."""
     found: dict[str, list[Array]] = {
         key: [] for key in ("angle", "mean", "scatter", "force", "spectra")
     }
-    frequencies, n_window = np.zeros(0), min(round(SPECTRUM_WINDOW * RATE), signals.shape[1])
+    frequencies, n_window = (
+        np.zeros(0),
+        min(round(SPECTRUM_WINDOW * RATE), signals.shape[1]),
+    )
     for begin, end in pairwise(edges):
         inside = slice(math.ceil(begin * RATE), math.floor(end * RATE))
         crank, part = motion.nominal_angle[inside], signals[:, inside]
@@ -166,10 +196,14 @@ def _way(
         found["force"].append(typical_extremes(part[2 * n_nodes :], crank)[1])
         first = round(0.5 * (begin + end) * RATE) - n_window // 2
         first = min(max(first, 0), signals.shape[1] - n_window)
-        frequencies, spectra = amplitude_spectra(signals[:n_nodes, first : first + n_window])
+        frequencies, spectra = amplitude_spectra(
+            signals[:n_nodes, first : first + n_window]
+        )
         found["spectra"].append(spectra)
     order = np.argsort(speeds)
-    by_bin = {key: np.moveaxis(np.array(values)[order], 0, 1) for key, values in found.items()}
+    by_bin = {
+        key: np.moveaxis(np.array(values)[order], 0, 1) for key, values in found.items()
+    }
     return SweepWay(
         speeds=speeds[order],
         orders=np.arange(1, n_orders + 1) / 2.0,
@@ -182,7 +216,9 @@ def _way(
     )
 
 
-def amplitude_spectra(signals: Array, highest: float = SPECTRUM_HZ) -> tuple[Array, Array]:
+def amplitude_spectra(
+    signals: Array, highest: float = SPECTRUM_HZ
+) -> tuple[Array, Array]:
     """Frequencies (frequency,) Hz up to the highest and amplitudes (signal, frequency) of signals
     (signal, sample).
 

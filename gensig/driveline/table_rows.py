@@ -7,7 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from gensig.driveline.linear.shaft_line import GearMesh, LineGear, Node, Shaft, ShaftLine
+from gensig.driveline.linear.shaft_line import (
+    GearMesh,
+    LineGear,
+    Node,
+    Shaft,
+    ShaftLine,
+)
 from gensig.driveline.options import LineOptions, LossFactors
 from gensig.driveline.shaft_tables import EDGE_KINDS, TableRow
 from gensig.dynamics.pair import solid_disc
@@ -55,7 +61,11 @@ def node_of(
     number = row.whole("node")
     inertia = row.positive("inertia")
     if inertia is None:
-        own = [shape for gear, shape in zip(gears, shapes, strict=True) if gear.node == place]
+        own = [
+            shape
+            for gear, shape in zip(gears, shapes, strict=True)
+            if gear.node == place
+        ]
         if not own:
             raise ConfigError(
                 f"{row.place('inertia')}: it is empty and node {number} has no gear to derive it from"
@@ -64,7 +74,9 @@ def node_of(
     if number == options.viscous_damper_node:
         inertia *= 0.5  # Den Hartog, Mechanical Vibrations: at the best damping J + J_ring / 2 meets the fixed point
     return Node(
-        name=row.text("name") or f"node {number}", inertia=inertia, place=row.place("inertia")
+        name=row.text("name") or f"node {number}",
+        inertia=inertia,
+        place=row.place("inertia"),
     )
 
 
@@ -79,7 +91,9 @@ def gear_of(row: TableRow) -> Gear:
 
     What the table leaves out is an ISO 53 rack, no shift, a bore of half the pitch radius.
     """
-    helix, module = (row.given(key, row.number(key)) for key in ("helix_angle", "normal_module"))
+    helix, module = (
+        row.given(key, row.number(key)) for key in ("helix_angle", "normal_module")
+    )
     n_teeth = round(row.given("n_teeth", row.whole("n_teeth")))
     row.given("face_width", row.positive("face_width"))
     if not module > 0.0 or not abs(helix) < 0.5 * math.pi:
@@ -115,14 +129,20 @@ def gear_of(row: TableRow) -> Gear:
 
 
 def line_gear(
-    row: TableRow, shape: Gear, numbers: tuple[int, ...], options: LineOptions, material: Material
+    row: TableRow,
+    shape: Gear,
+    numbers: tuple[int, ...],
+    options: LineOptions,
+    material: Material,
 ) -> LineGear:
     """A gear on its node, with its mass (of a solid disc where it is empty) and, for lateral
     motion, its support.
     """
     number = round(row.given("node", row.whole("node")))
     if number not in numbers:
-        raise ConfigError(f"{row.place('node')}: {options.shafting_csv} has no node {number}")
+        raise ConfigError(
+            f"{row.place('node')}: {options.shafting_csv} has no node {number}"
+        )
     mass = row.positive("mass") or _disc(shape, material)[0]
     return LineGear(
         name=shape.name,
@@ -146,9 +166,12 @@ def ends_of(row: TableRow, numbers: tuple[int, ...]) -> tuple[int, int] | None:
                 )
         return None
     if kind not in EDGE_KINDS:
-        raise ConfigError(f"{row.place('edge_kind')}: '{kind}'; allowed: {', '.join(EDGE_KINDS)}")
+        raise ConfigError(
+            f"{row.place('edge_kind')}: '{kind}'; allowed: {', '.join(EDGE_KINDS)}"
+        )
     first, second = (
-        round(row.given(key, end)) for key, end in zip(("edge_from", "edge_to"), ends, strict=True)
+        round(row.given(key, end))
+        for key, end in zip(("edge_from", "edge_to"), ends, strict=True)
     )
     for column, number in (("edge_from", first), ("edge_to", second)):
         if number not in numbers:
@@ -246,7 +269,12 @@ def _mesh_stiffness(row: TableRow, pair: GearPair) -> float:
 
 
 def _gear_at(
-    row: TableRow, node: int, number: int, end: str, gears: list[LineGear], options: LineOptions
+    row: TableRow,
+    node: int,
+    number: int,
+    end: str,
+    gears: list[LineGear],
+    options: LineOptions,
 ) -> int:
     """Place of the gear on a node that the row means.
 
@@ -264,7 +292,9 @@ def _gear_at(
         )
     meant = [place for place in there if n_teeth in (None, gears[place].n_teeth)]
     if not meant:
-        has = ", ".join(f"{gears[place].name} with {gears[place].n_teeth}" for place in there)
+        has = ", ".join(
+            f"{gears[place].name} with {gears[place].n_teeth}" for place in there
+        )
         raise ConfigError(
             f"{row.place(f'teeth_{end}')}: {n_teeth}, but on node {number} the gears table has {has} teeth"
         )
@@ -285,7 +315,9 @@ def check_gears_in_mesh(rows: list[TableRow], line: ShaftLine) -> None:
             )
 
 
-def check_whole(rows: list[TableRow], numbers: tuple[int, ...], line: ShaftLine) -> None:
+def check_whole(
+    rows: list[TableRow], numbers: tuple[int, ...], line: ShaftLine
+) -> None:
     """Raise for a line that falls apart, and for speed ratios that the teeth contradict."""
     if len(line.parts) > 1:
         lost = line.parts[1]
@@ -298,7 +330,9 @@ def check_whole(rows: list[TableRow], numbers: tuple[int, ...], line: ShaftLine)
         )
     for row, number, ratio in zip(rows, numbers, np.abs(line.speed_ratio), strict=True):
         given = row.positive("speed_ratio")
-        if given is not None and not math.isclose(given, ratio, rel_tol=RATIO_TOLERANCE):
+        if given is not None and not math.isclose(
+            given, ratio, rel_tol=RATIO_TOLERANCE
+        ):
             raise ConfigError(
                 f"{row.place('speed_ratio')}: {given:g} contradicts the tooth counts, by which node {number} turns at "
                 f"{ratio:.6g} of node {numbers[0]}"

@@ -32,9 +32,7 @@ from gensig.sensing.manufacturing import Specimen
 Array = NDArray[np.float64]
 
 SOUND_NODES = 128  # most of a pitch of sound helical teeth: short tables are read faster, and these ripple slowly
-FORCES_PER_OCTAVE = (
-    2  # at which sound helical teeth are tabulated: chords reach over all depths of bite
-)
+FORCES_PER_OCTAVE = 2  # at which sound helical teeth are tabulated: chords reach over all depths of bite
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,12 +107,18 @@ def sound_meshes(
 
 
 def _table_in_line(
-    machine: EngineLine, law: ToothLaw, place: int, faults: tuple[Fault, ...], force: float
+    machine: EngineLine,
+    law: ToothLaw,
+    place: int,
+    faults: tuple[Fault, ...],
+    force: float,
 ) -> PairTable | SlicedTable:
     pair, force = machine.drive.pairs[place], reference_force(machine, place, force)
     require_drive(pair, law.slices)
     if pair.pinion.helix_angle:
-        force = 2.0 ** (math.ceil(FORCES_PER_OCTAVE * math.log2(force)) / FORCES_PER_OCTAVE)
+        force = 2.0 ** (
+            math.ceil(FORCES_PER_OCTAVE * math.log2(force)) / FORCES_PER_OCTAVE
+        )
     return tooth_table(law, named_by_side(pair), faults, force)
 
 
@@ -161,7 +165,9 @@ def neighbour_meshes(
             seen = [felt for one in seen if (felt := one.on_other_flank()) is not None]
         carried = tuple(replace(one, gear=SIDES[there]) for one in seen)
         teeth = [0, 0]
-        teeth[there] = tooth_there(machine.drive, (place, here), (other, there), start, turned)
+        teeth[there] = tooth_there(
+            machine.drive, (place, here), (other, there), start, turned
+        )
         found[other] = OwnMesh(
             table=_table_in_line(machine, law, other, carried, float(forces[other])),
             errors=(errors[0], errors[1]),
@@ -222,4 +228,6 @@ def _mate_angle(drive: DriveLine, place: int, side: int) -> float:
 
 def start_of(pair: GearPair, teeth: tuple[int, int], phase: float) -> ToothStart:
     """From the phase at which the first slices of teeth begin, pitches."""
-    return ToothStart(teeth=teeth, phase=phase - first_slice_lead(pair) / pair.base_pitch)
+    return ToothStart(
+        teeth=teeth, phase=phase - first_slice_lead(pair) / pair.base_pitch
+    )

@@ -11,7 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.driveline.cycle_statistics import typical_extremes, whole_cycles
-from gensig.driveline.engine_dampers import DynamicRootStress, crank_of_passes, passes_of_a_cycle
+from gensig.driveline.engine_dampers import (
+    DynamicRootStress,
+    crank_of_passes,
+    passes_of_a_cycle,
+)
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.cycle import CYCLE
 from gensig.driveline.in_time import TimeResponse
@@ -70,5 +74,7 @@ def typical_largest(passes: Array, in_cycle: int) -> float:
     """Median over the cycles of the largest root stress in a cycle, Pa, of passes (pass, point)."""
     whole = len(passes) // in_cycle
     return float(
-        np.median(passes.max(axis=1)[: whole * in_cycle].reshape(whole, in_cycle).max(axis=1))
+        np.median(
+            passes.max(axis=1)[: whole * in_cycle].reshape(whole, in_cycle).max(axis=1)
+        )
     )

@@ -21,7 +21,15 @@ from gensig.dynamics._layout import (
     NOMINAL,
     is_helical,
 )
-from gensig.dynamics._vector import at, get_row, inlined, set_row, spread, where_above, width
+from gensig.dynamics._vector import (
+    at,
+    get_row,
+    inlined,
+    set_row,
+    spread,
+    where_above,
+    width,
+)
 
 # degrees of freedom of the two gears that every machine begins with; helical gears have more
 # behind them
@@ -41,8 +49,12 @@ def motion(group, q, v, work):
     numbers = group.numbers
     pinion_radius = get_row(numbers, layout.PINION_RADIUS)
     wheel_radius = get_row(numbers, layout.WHEEL_RADIUS)
-    approach = pinion_radius * get_row(work, q + P_TURN) - wheel_radius * get_row(work, q + W_TURN)
-    rate = pinion_radius * get_row(work, v + P_TURN) - wheel_radius * get_row(work, v + W_TURN)
+    approach = pinion_radius * get_row(work, q + P_TURN) - wheel_radius * get_row(
+        work, q + W_TURN
+    )
+    rate = pinion_radius * get_row(work, v + P_TURN) - wheel_radius * get_row(
+        work, v + W_TURN
+    )
     deviation = approach - get_row(work, q + P_Y) + get_row(work, q + W_Y)
     approach = get_row(numbers, layout.REST_APPROACH) + deviation
     rate = rate - get_row(work, v + P_Y) + get_row(work, v + W_Y)
@@ -89,15 +101,22 @@ def set_out(group, time, q, drive, forces, work, wide):
             exact[at(layout.START_ROLL, lane, n)],
             exact[at(layout.EXACT_RADIUS, lane, n)],
         )
-        wide[at(BASE, lane, n)] = start_roll + radius * (turned + work[at(q + P_TURN, lane, n)])
-    gain, torque = get_row(work, drive + DRIVE_GAIN), get_row(work, drive + DRIVE_TORQUE)
+        wide[at(BASE, lane, n)] = start_roll + radius * (
+            turned + work[at(q + P_TURN, lane, n)]
+        )
+    gain, torque = (
+        get_row(work, drive + DRIVE_GAIN),
+        get_row(work, drive + DRIVE_TORQUE),
+    )
     center = get_row(work, drive + DRIVE_CENTER)
     for d in range(n_dof):
         held = center * get_row(group.held, d) + gain * get_row(group.carried, d)
         set_row(
             work,
             forces + d,
-            get_row(group.force, d) + get_row(group.set_force, d) * (torque - 1.0) - held,
+            get_row(group.force, d)
+            + get_row(group.set_force, d) * (torque - 1.0)
+            - held,
         )
 
 
@@ -115,7 +134,9 @@ def accelerate(group, law, q, v, torque, forces, a, work):
     )
     set_row(work, a + W_X, 0.0 - law.friction)
     set_row(work, a + W_Y, 0.0 - normal)
-    set_row(work, a + W_TURN, get_row(numbers, layout.WHEEL_RADIUS) * normal + law.moment_w)
+    set_row(
+        work, a + W_TURN, get_row(numbers, layout.WHEEL_RADIUS) * normal + law.moment_w
+    )
     n_gears = _n_gears(group)
     for d in range(N_IN_PLANE, n_gears):
         set_row(work, a + d, 0.0 - get_row(group.reach, d) * normal)
@@ -161,7 +182,10 @@ def event(group, first, last, work):
     zero, one = spread(work, 0.0), spread(work, 1.0)
     earliest = one
     for k in range(first, last):
-        before, after = get_row(work, MARGIN + k), get_row(work, MARGIN + MOST_PAIRS + k)
+        before, after = (
+            get_row(work, MARGIN + k),
+            get_row(work, MARGIN + MOST_PAIRS + k),
+        )
         share = _crossing(before, after, zero, one)
         earliest = where_above(earliest, share, share, earliest)
         if not group.one_sided:  # and where the pair is wholly in
@@ -169,7 +193,10 @@ def event(group, first, last, work):
             share = where_above(zero, (before - 1.0) * (after - 1.0), share, one)
             earliest = where_above(earliest, share, share, earliest)
     play = get_row(group.numbers, layout.BACKLASH)
-    before, after = get_row(work, layout.WITHIN) + play, get_row(work, layout.STEP_APPROACH) + play
+    before, after = (
+        get_row(work, layout.WITHIN) + play,
+        get_row(work, layout.STEP_APPROACH) + play,
+    )
     share = _crossing(before, after, zero, one)
     earliest = where_above(earliest, share, share, earliest)
     earliest = where_above(one, earliest, earliest, spread(work, 0.5))

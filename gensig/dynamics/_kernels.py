@@ -11,7 +11,14 @@ from __future__ import annotations
 import numpy as np
 
 from gensig.dynamics import _layout as layout
-from gensig.dynamics._equations import P_TURN, accelerate, event, motion, recenter, set_out
+from gensig.dynamics._equations import (
+    P_TURN,
+    accelerate,
+    event,
+    motion,
+    recenter,
+    set_out,
+)
 from gensig.dynamics._layout import (
     AHEAD,
     BASE,
@@ -93,7 +100,10 @@ def integrate(
     # rows of states, each q and then v; see _layout
     now, single = machine_rows(layout.NOW, n_dof), machine_rows(layout.SINGLE, n_dof)
     parted = machine_rows(layout.PARTED, n_dof)
-    trial_a, trial_b = machine_rows(layout.TRIAL_A, n_dof), machine_rows(layout.TRIAL_B, n_dof)
+    trial_a, trial_b = (
+        machine_rows(layout.TRIAL_A, n_dof),
+        machine_rows(layout.TRIAL_B, n_dof),
+    )
     a = machine_rows(layout.ACCELERATIONS, n_dof)
     sum_q, sum_v = machine_rows(layout.SUM_Q, n_dof), machine_rows(layout.SUM_V, n_dof)
     drive = machine_rows(layout.BEHIND, n_dof)
@@ -135,14 +145,18 @@ def integrate(
             for lane in range(n):
                 if fresh[lane] > 0.0:
                     wide[at(ROLL + begin, lane, n)] = wide[at(BASE, lane, n)]
-                    work[at(layout.LAST_TOTAL, lane, n)] = numbers[at(layout.MEAN_FORCE, lane, n)]
+                    work[at(layout.LAST_TOTAL, lane, n)] = numbers[
+                        at(layout.MEAN_FORCE, lane, n)
+                    ]
         if is_helical(group):
             bent = get_row(numbers, layout.SHARED) * get_row(work, layout.LAST_TOTAL)
             set_row(work, layout.LOCAL, approach + 0.5 * step * rate - bent)
         if number == first_step:
             gather(group, begin, True, work, wide, near)
         for lane in range(n):
-            wide[at(ROLL + end, lane, n)] = wide[at(BASE, lane, n)] + work[at(AHEAD + end, lane, n)]
+            wide[at(ROLL + end, lane, n)] = (
+                wide[at(BASE, lane, n)] + work[at(AHEAD + end, lane, n)]
+            )
         if gather(group, end, True, work, wide, near):
             set_row(work, layout.FLAGS, one)
             gather(group, begin, False, work, wide, near)
@@ -151,10 +165,12 @@ def integrate(
                 wide[at(ROLL + begin, lane, n)] - wide[at(BASE, lane, n)]
             )
         first = min(
-            near[span_place(begin, n) + FIRST_NEAR_PAIR], near[span_place(end, n) + FIRST_NEAR_PAIR]
+            near[span_place(begin, n) + FIRST_NEAR_PAIR],
+            near[span_place(end, n) + FIRST_NEAR_PAIR],
         )
         last = max(
-            near[span_place(begin, n) + LAST_NEAR_PAIR], near[span_place(end, n) + LAST_NEAR_PAIR]
+            near[span_place(begin, n) + LAST_NEAR_PAIR],
+            near[span_place(end, n) + LAST_NEAR_PAIR],
         )
         cover(begin, first, last, work, near)
         cover(end, first, last, work, near)
@@ -191,14 +207,32 @@ def integrate(
                 q, v = at_stage, at_stage + n_dof
                 approach, rate = motion(group, q, v, work)
                 turned = radius * (
-                    (speed + 0.5 * gain * since) * since + (get_row(work, q + P_TURN) - q_0)
+                    (speed + 0.5 * gain * since) * since
+                    + (get_row(work, q + P_TURN) - q_0)
                 )
                 roll_rate = radius * (speed + gain * since + get_row(work, v + P_TURN))
                 law = mesh_law(
-                    group, first, last, slot, rows, turned, approach, rate, roll_rate, work, wide
+                    group,
+                    first,
+                    last,
+                    slot,
+                    rows,
+                    turned,
+                    approach,
+                    rate,
+                    roll_rate,
+                    work,
+                    wide,
                 )
                 accelerate(
-                    group, law, q, v, get_row(work, drive + layout.DRIVE_TORQUE), forces, a, work
+                    group,
+                    law,
+                    q,
+                    v,
+                    get_row(work, drive + layout.DRIVE_TORQUE),
+                    forces,
+                    a,
+                    work,
                 )
                 if part == 0:
                     if stage == 0:
@@ -212,30 +246,44 @@ def integrate(
                         changed = where_above(differs * differs, zero, one, changed)
                         set_row(work, layout.STEP_APPROACH, approach)
                         if stage == LAST_STAGE and is_helical(group):
-                            set_row(work, layout.LAST_TOTAL, get_row(work, layout.TOTAL))
+                            set_row(
+                                work, layout.LAST_TOTAL, get_row(work, layout.TOTAL)
+                            )
                 if stage == LAST_STAGE:
                     break
                 reach = h if stage == LAST_STAGE - 1 else half
                 for d in range(n_dof):
                     gained = get_row(work, a + d)
                     set_row(
-                        work, ahead + d, get_row(work, source + d) + reach * get_row(work, v + d)
+                        work,
+                        ahead + d,
+                        get_row(work, source + d) + reach * get_row(work, v + d),
                     )
                     set_row(
-                        work, ahead + n_dof + d, get_row(work, source + n_dof + d) + reach * gained
+                        work,
+                        ahead + n_dof + d,
+                        get_row(work, source + n_dof + d) + reach * gained,
                     )
                     if stage == 0:
                         set_row(work, sum_q + d, RK4.position[0] * gained)
                         set_row(work, sum_v + d, RK4.weight[0] * gained)
                     else:
                         set_row(
-                            work, sum_q + d, get_row(work, sum_q + d) + RK4.position[1] * gained
+                            work,
+                            sum_q + d,
+                            get_row(work, sum_q + d) + RK4.position[1] * gained,
                         )
-                        set_row(work, sum_v + d, get_row(work, sum_v + d) + RK4.weight[1] * gained)
+                        set_row(
+                            work,
+                            sum_v + d,
+                            get_row(work, sum_v + d) + RK4.weight[1] * gained,
+                        )
                 at_stage, ahead = ahead, trial_b if ahead == trial_a else trial_a
             per_sum = h * RK4.share
             for d in range(n_dof):
-                gained = get_row(work, sum_v + d) + RK4.weight[LAST_STAGE] * get_row(work, a + d)
+                gained = get_row(work, sum_v + d) + RK4.weight[LAST_STAGE] * get_row(
+                    work, a + d
+                )
                 set_row(work, sum_v + d, gained)
                 speed_0 = get_row(work, source + n_dof + d)
                 moved = h * (speed_0 + per_sum * get_row(work, sum_q + d))
@@ -339,8 +387,14 @@ def low_pass(means, first, taps, factor, n_channels, n_samples, out, out_row):
             zero = spread(means, 0.0)
             p, q, r, t = zero, zero, zero, zero
             for k in range(n_read):
-                value, tap = get_row(means, (first + s * factor + k) * n_channels + c), apart + k
-                p, q = plus_product(p, taps, tap, value), plus_product(q, taps, tap - factor, value)
+                value, tap = (
+                    get_row(means, (first + s * factor + k) * n_channels + c),
+                    apart + k,
+                )
+                p, q = (
+                    plus_product(p, taps, tap, value),
+                    plus_product(q, taps, tap - factor, value),
+                )
                 r = plus_product(r, taps, tap - 2 * factor, value)
                 t = plus_product(t, taps, tap - 3 * factor, value)
             sample = (out_row + s) * n_channels + c
@@ -364,7 +418,11 @@ def record(
     on the step after ``first_step``. ``means`` is a scratch of ``mean_rows`` rows of channels, of
     which the last ``BLOCK`` take samples.
     """
-    n, n_channels, n_kept = width(work), len(channels), len(taps) - (2 * TOGETHER - 1) * factor
+    n, n_channels, n_kept = (
+        width(work),
+        len(channels),
+        len(taps) - (2 * TOGETHER - 1) * factor,
+    )
     angle_row, now, done = 0, first_step, 0
     samples = n_kept + BLOCK * factor
     n_steps, out_row = (
@@ -386,14 +444,18 @@ def record(
                 for c in range(n_channels):
                     series = (lane * n_channels + c) * n_samples
                     for s in range(n_block):
-                        out[series + done + s] = means[at((samples + s) * n_channels + c, lane, n)]
+                        out[series + done + s] = means[
+                            at((samples + s) * n_channels + c, lane, n)
+                        ]
             for i in range(n_kept * n_channels):
                 set_row(means, i, get_row(means, n_steps * n_channels + i))
             done += n_block
         if done == n_samples:
             break
         n_steps, out_row = (
-            (n_kept, 0) if out_row < 0 else (min(BLOCK, n_samples - done) * factor, n_kept)
+            (n_kept, 0)
+            if out_row < 0
+            else (min(BLOCK, n_samples - done) * factor, n_kept)
         )
 
 
@@ -406,7 +468,11 @@ def law_at(group, motion, work, wide, near, found):
     chords, less often.
     """
     n = width(work)
-    approach, rate, roll_rate = get_row(motion, 1), get_row(motion, 2), get_row(motion, 3)
+    approach, rate, roll_rate = (
+        get_row(motion, 1),
+        get_row(motion, 2),
+        get_row(motion, 3),
+    )
     for lane in range(n):
         near[at(layout.NEWEST, lane, n)] = layout.NOBODY
         wide[at(BASE, lane, n)] = motion[at(0, lane, n)]
@@ -425,7 +491,17 @@ def law_at(group, motion, work, wide, near, found):
         first, last = near[span + FIRST_NEAR_PAIR], near[span + LAST_NEAR_PAIR]
         turned = spread(work, 0.0)
         law = mesh_law(
-            group, first, last, EVEN, layout.MARGIN, turned, approach, rate, roll_rate, work, wide
+            group,
+            first,
+            last,
+            EVEN,
+            layout.MARGIN,
+            turned,
+            approach,
+            rate,
+            roll_rate,
+            work,
+            wide,
         )
         for row in range(layout.N_LAW):
             set_row(found, row, law[row])
@@ -441,7 +517,15 @@ def mean_rows(n_taps, factor):
 def scratch(n_dof, n_channels, precision="float64"):
     """Work rows, float64 rows and whole numbers of ``integrate`` and ``law_at``."""
     n = n_lanes(precision)
-    n_rows = layout.N_MESH + layout.BEHIND * n_dof + layout.N_DRIVE + n_dof + 2 * n_channels
+    n_rows = (
+        layout.N_MESH + layout.BEHIND * n_dof + layout.N_DRIVE + n_dof + 2 * n_channels
+    )
     near = np.zeros((layout.N_COUNTS, n), dtype=np.int64)
-    near[layout.NEWEST] = layout.NOBODY  # no pair: the first look at the tables finds the teeth
-    return np.zeros(n_rows * n, dtype=precision), np.zeros(layout.N_WIDE * n), near.ravel()
+    near[layout.NEWEST] = (
+        layout.NOBODY
+    )  # no pair: the first look at the tables finds the teeth
+    return (
+        np.zeros(n_rows * n, dtype=precision),
+        np.zeros(layout.N_WIDE * n),
+        near.ravel(),
+    )

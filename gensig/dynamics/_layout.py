@@ -38,7 +38,9 @@ FAR_NEAR = 1e-4  # approaches below are asked of the pairs between FIRST_NEAR an
     PINION_ROWS, WHEEL_ROWS, FIRST_PITCH, FOLLOWED, CHORD_STRIDE, COAST_TABLE, N_PLACES,
 ) = range(16)  # fmt: skip
 # rows of a cell of Group.profile
-NOMINAL_ANGLE, NOMINAL_SPEED, NOMINAL_ACCELERATION, TORQUE, TORQUE_SLOPE, N_PROFILE = range(6)
+NOMINAL_ANGLE, NOMINAL_SPEED, NOMINAL_ACCELERATION, TORQUE, TORQUE_SLOPE, N_PROFILE = (
+    range(6)
+)
 
 # rows of one pair in a slot of the scratch
 OWN, OWN_SLOPE, GAP, GAP_SLOPE, STIFFNESS, POSITION, N_KEPT = range(7)
@@ -48,7 +50,9 @@ SLOT_ROWS = MOST_PAIRS * N_KEPT
 COLUMNS = FOUR  # of a table: compliance, its slope, gap, its slope
 # rows of the scratch behind the slots
 BITE = N_SLOTS * SLOT_ROWS
-MARGIN = BITE + MOST_PAIRS  # twice as many: at the first and at the last stage of a step
+MARGIN = (
+    BITE + MOST_PAIRS
+)  # twice as many: at the first and at the last stage of a step
 ERROR = MARGIN + 2 * MOST_PAIRS
 TILT = ERROR + MOST_PAIRS
 AHEAD = TILT + MOST_PAIRS  # roll of a slot, less that at the begin of the step

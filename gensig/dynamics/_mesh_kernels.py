@@ -86,7 +86,9 @@ def _clip(x, low, high):
 @inlined
 def _sliding(numbers, position):
     """Direction of sliding, smooth through the pitch point, -1 before it and 1 after it."""
-    x = (position - get_row(numbers, PITCH_POINT)) * get_row(numbers, PER_FRICTION_WIDTH)
+    x = (position - get_row(numbers, PITCH_POINT)) * get_row(
+        numbers, PER_FRICTION_WIDTH
+    )
     x = _clip(x, spread(numbers, -1.0), spread(numbers, 1.0))
     return x * (1.5 - 0.5 * x * x)
 
@@ -151,7 +153,9 @@ def one_sided_law(
     driven = approach + 0.5 * get_row(numbers, BACKLASH)
     for k in range(first, last):
         pair = pair_rows(slot, k)
-        bite = approach - (get_row(work, pair + GAP) + ahead * get_row(work, pair + GAP_SLOPE))
+        bite = approach - (
+            get_row(work, pair + GAP) + ahead * get_row(work, pair + GAP_SLOPE)
+        )
         if margin >= 0:
             set_row(work, margin + k, bite)
         bite = where_above(bite, zero, bite, zero)
@@ -172,7 +176,9 @@ def one_sided_law(
         pair = pair_rows(slot, k)
         bite = get_row(work, BITE + k)
         if margin >= 0:
-            others = stiffness - where_above(bite, zero, get_row(work, pair + STIFFNESS), zero)
+            others = stiffness - where_above(
+                bite, zero, get_row(work, pair + STIFFNESS), zero
+            )
             deep = get_row(work, margin + k) - shared * total
             alone = deep * ((1.0 + shared * stiffness) / (1.0 + shared * others))
             set_row(work, margin + k, where_above(bite, zero, alone, deep))
@@ -191,10 +197,18 @@ def one_sided_law(
         loaded = loaded + where_above(force, zero, one, zero)
         stored = stored + elastic * (bite - 0.5 * get_row(work, pair + OWN) * elastic)
         lost = lost + (force - elastic) * rate
-        along = along + force * slope + 0.5 * elastic * elastic * get_row(work, pair + OWN_SLOPE)
+        along = (
+            along
+            + force * slope
+            + 0.5 * elastic * elastic * get_row(work, pair + OWN_SLOPE)
+        )
         position = get_row(work, pair + POSITION) + middle
         sliding, moment, reaction = _rubbed(numbers, position, force)
-        friction, moment_p, moment_w = friction + sliding, moment_p + moment, moment_w + reaction
+        friction, moment_p, moment_w = (
+            friction + sliding,
+            moment_p + moment,
+            moment_w + reaction,
+        )
     if helical:
         set_row(work, TOTAL, total)
         for k in range(first, last):
@@ -215,7 +229,9 @@ def one_sided_law(
 
 
 @inlined
-def papers_law(numbers, first, last, slot, margin, ahead, approach, approach_rate, work):
+def papers_law(
+    numbers, first, last, slot, margin, ahead, approach, approach_rate, work
+):
     """F = k(t) delta + c_m delta': two-sided, no gap, pairs in and out over one integration step.
 
     Rows ``margin`` take how far every pair is in, from 0 to 1 and beyond, ``PAIR_FORCE`` its
@@ -236,12 +252,19 @@ def papers_law(numbers, first, last, slot, margin, ahead, approach, approach_rat
         share = 0.5 * (1.0 + inside * get_row(numbers, PER_SWITCH_WIDTH))
         # a pair that is not there is never in
         share = where_above(
-            get_row(work, pair + STIFFNESS), spread(work, 1e-20), share, spread(work, -1.0)
+            get_row(work, pair + STIFFNESS),
+            spread(work, 1e-20),
+            share,
+            spread(work, -1.0),
         )
         if margin >= 0:
             set_row(work, margin + k, share)
         share = _clip(share, zero, one)
-        loaded = loaded + where_above(share, zero, one, zero) + where_above(one, share, zero, one)
+        loaded = (
+            loaded
+            + where_above(share, zero, one, zero)
+            + where_above(one, share, zero, one)
+        )
         own = share * get_row(work, pair + STIFFNESS)
         set_row(work, BITE + k, own)
         stiffness = stiffness + own
@@ -257,8 +280,15 @@ def papers_law(numbers, first, last, slot, margin, ahead, approach, approach_rat
         if margin >= 0:
             set_row(work, PAIR_FORCE + k, part)
         sliding, moment, reaction = _rubbed(numbers, position, part)
-        friction, moment_p, moment_w = friction + sliding, moment_p + moment, moment_w + reaction
-    stored, lost = 0.5 * together * approach * approach, damping * approach_rate * approach_rate
+        friction, moment_p, moment_w = (
+            friction + sliding,
+            moment_p + moment,
+            moment_w + reaction,
+        )
+    stored, lost = (
+        0.5 * together * approach * approach,
+        damping * approach_rate * approach_rate,
+    )
     return Law(normal, friction, moment_p, moment_w, zero, stored, lost, loaded)
 
 
@@ -271,7 +301,12 @@ def coast_law(group, lane, roll, approach, rate, roll_rate, work):
     ``COAST`` and the bites.
     """
     n = width(work)
-    numbers, exact, places, table = group.numbers, group.exact, group.places, group.table
+    numbers, exact, places, table = (
+        group.numbers,
+        group.exact,
+        group.places,
+        group.table,
+    )
     pitch, shared = exact[at(PITCH, lane, n)], numbers[at(SHARED, lane, n)]
     mirrored = 2.0 * numbers[at(MIDDLE_POINT, lane, n)] + 0.5 * pitch - roll
     within = -approach - numbers[at(BACKLASH, lane, n)]
@@ -283,7 +318,9 @@ def coast_law(group, lane, roll, approach, rate, roll_rate, work):
         tooth_p = (places[at(START_PINION, lane, n)] - newest + k) % places[
             at(PINION_TEETH, lane, n)
         ]
-        tooth_w = (places[at(START_WHEEL, lane, n)] - newest + k) % places[at(WHEEL_TEETH, lane, n)]
+        tooth_w = (places[at(START_WHEEL, lane, n)] - newest + k) % places[
+            at(WHEEL_TEETH, lane, n)
+        ]
         there = (
             group.tooth_row[places[at(PINION_TOOTH, lane, n)] + tooth_p] >= 0
             and group.tooth_row[places[at(WHEEL_TOOTH, lane, n)] + tooth_w] >= 0
@@ -301,7 +338,11 @@ def coast_law(group, lane, roll, approach, rate, roll_rate, work):
                 high += table[p + wheel + COLUMNS + column]
             work[at(pair + column, lane, n)] = low + (x - cell) * (high - low)
             if column in (OWN_SLOPE, GAP_SLOPE):
-                bent = (x - cell) * (1.0 - (x - cell)) * group.bend[lane * COLUMNS + column - 1]
+                bent = (
+                    (x - cell)
+                    * (1.0 - (x - cell))
+                    * group.bend[lane * COLUMNS + column - 1]
+                )
                 work[at(pair + column - 1, lane, n)] -= bent * (high - low)
         work[at(pair + OWN, lane, n)] -= shared
         bite = within - work[at(pair + GAP, lane, n)]
@@ -321,11 +362,20 @@ def coast_law(group, lane, roll, approach, rate, roll_rate, work):
                 lifted = True
         if not lifted:
             break
-    normal, along, stored, lost, loaded = 0.0, 0.0, -0.5 * shared * total * total, 0.0, 0.0
+    normal, along, stored, lost, loaded = (
+        0.0,
+        0.0,
+        -0.5 * shared * total * total,
+        0.0,
+        0.0,
+    )
     for k in range(n_pairs):
         bite, pair = work[at(BITE + k, lane, n)], pair_rows(COAST, k)
         if bite > 0.0:
-            own, slope = work[at(pair + OWN, lane, n)], work[at(pair + GAP_SLOPE, lane, n)]
+            own, slope = (
+                work[at(pair + OWN, lane, n)],
+                work[at(pair + GAP_SLOPE, lane, n)],
+            )
             elastic = (bite - shared * total) / own
             pair_rate = slope * roll_rate - rate
             part = max(0.0, elastic * (1.0 + numbers[at(DAMPING, lane, n)] * pair_rate))
@@ -333,7 +383,10 @@ def coast_law(group, lane, roll, approach, rate, roll_rate, work):
             loaded += part > 0.0
             stored += elastic * (bite - 0.5 * own * elastic)
             lost += (part - elastic) * pair_rate
-            along += part * slope + 0.5 * elastic * elastic * work[at(pair + OWN_SLOPE, lane, n)]
+            along += (
+                part * slope
+                + 0.5 * elastic * elastic * work[at(pair + OWN_SLOPE, lane, n)]
+            )
     mirrored_along = 0.0
     if group.consistent:
         mirrored_along = -along
@@ -343,7 +396,9 @@ def coast_law(group, lane, roll, approach, rate, roll_rate, work):
 
 
 @inlined
-def mesh_law(group, first, last, slot, margin, turned, approach, rate, roll_rate, work, wide):
+def mesh_law(
+    group, first, last, slot, margin, turned, approach, rate, roll_rate, work, wide
+):
     """The law of the chosen kind in every lane, on whichever flank it touches, ``turned`` m of
     roll after ``BASE``.
     """
@@ -395,5 +450,7 @@ def mesh_law(group, first, last, slot, margin, turned, approach, rate, roll_rate
                 get_row(work, LAW + 7),
             )
     else:
-        law = papers_law(numbers, first, last, slot, margin, ahead, approach, rate, work)
+        law = papers_law(
+            numbers, first, last, slot, margin, ahead, approach, rate, work
+        )
     return law

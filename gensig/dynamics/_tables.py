@@ -89,17 +89,29 @@ def _meet(group, lane, newest, work, near):
     """Remember the table rows and the gap offsets of the pairs of one lane, the newest first."""
     n = width(work)
     places = group.places
-    n_pinion, n_wheel = places[at(PINION_TEETH, lane, n)], places[at(WHEEL_TEETH, lane, n)]
-    first_p, first_w = places[at(PINION_TOOTH, lane, n)], places[at(WHEEL_TOOTH, lane, n)]
+    n_pinion, n_wheel = (
+        places[at(PINION_TEETH, lane, n)],
+        places[at(WHEEL_TEETH, lane, n)],
+    )
+    first_p, first_w = (
+        places[at(PINION_TOOTH, lane, n)],
+        places[at(WHEEL_TOOTH, lane, n)],
+    )
     start, stride = places[at(TABLE, lane, n)], places[at(STRIDE, lane, n)]
     tooth_p = (newest + places[at(START_PINION, lane, n)]) % n_pinion
     tooth_w = (newest + places[at(START_WHEEL, lane, n)]) % n_wheel
     for k in range(places[at(FOLLOWED, lane, n)]):
-        row_p, row_w = group.tooth_row[first_p + tooth_p], group.tooth_row[first_w + tooth_w]
+        row_p, row_w = (
+            group.tooth_row[first_p + tooth_p],
+            group.tooth_row[first_w + tooth_w],
+        )
         there = row_p >= 0 and row_w >= 0
         pinion, wheel = row_p * places[at(PINION_ROWS, lane, n)] + row_w, -1
         if places[at(WHEEL_ROWS, lane, n)] > 0:
-            pinion, wheel = row_p, start + (places[at(WHEEL_ROWS, lane, n)] + row_w) * stride
+            pinion, wheel = (
+                row_p,
+                start + (places[at(WHEEL_ROWS, lane, n)] + row_w) * stride,
+            )
         near[at(AT_PINION + k, lane, n)] = start + pinion * stride if there else -1
         near[at(AT_WHEEL + k, lane, n)] = wheel
         near[at(CHORD + k, lane, n)] = 0
@@ -142,7 +154,10 @@ def gather(group, slot, renew, work, wide, near):
                 changed = True
                 _meet(group, lane, newest, work, near)
         lowest, highest = exact[at(FIRST_NEAR, lane, n)], exact[at(LAST_NEAR, lane, n)]
-        last_cell, within = group.places[at(LAST_CELL, lane, n)], work[at(WITHIN, lane, n)]
+        last_cell, within = (
+            group.places[at(LAST_CELL, lane, n)],
+            work[at(WITHIN, lane, n)],
+        )
         start = exact[at(TABLE_START, lane, n)]
         position = roll - near[at(NEWEST, lane, n)] * pitch
         for k in range(n_pairs):
@@ -154,13 +169,31 @@ def gather(group, slot, renew, work, wide, near):
                 if is_helical(group):
                     if renew:
                         changed = (
-                            _choose(group, lane, k, pinion, cell, x - cell, position, work, near)
+                            _choose(
+                                group,
+                                lane,
+                                k,
+                                pinion,
+                                cell,
+                                x - cell,
+                                position,
+                                work,
+                                near,
+                            )
                             or changed
                         )
-                    pinion += near[at(CHORD + k, lane, n)] * group.places[at(CHORD_STRIDE, lane, n)]
-                    _read_beside(group, lane, k, pinion + cell * COLUMNS, x - cell, work)
+                    pinion += (
+                        near[at(CHORD + k, lane, n)]
+                        * group.places[at(CHORD_STRIDE, lane, n)]
+                    )
+                    _read_beside(
+                        group, lane, k, pinion + cell * COLUMNS, x - cell, work
+                    )
                 p, wheel = pinion + cell * COLUMNS, near[at(AT_WHEEL + k, lane, n)]
-                low, high = load_four(group.table, p), load_four(group.table, p + COLUMNS)
+                low, high = (
+                    load_four(group.table, p),
+                    load_four(group.table, p + COLUMNS),
+                )
                 if wheel >= 0:
                     w = wheel + cell * COLUMNS
                     low, high = (
@@ -206,10 +239,15 @@ def _choose(group, lane, k, pair, cell, part, position, work, near):
         + part * step
         - part * (1.0 - part) * group.bend[lane * COLUMNS + GAP] * step_slope
     )
-    tilted = work[at(TILT + k, lane, n)] * (position - group.numbers[at(MIDDLE_POINT, lane, n)])
+    tilted = work[at(TILT + k, lane, n)] * (
+        position - group.numbers[at(MIDDLE_POINT, lane, n)]
+    )
     bite = work[at(LOCAL, lane, n)] - (gap + work[at(ERROR + k, lane, n)] + tilted)
     chord = 0
-    while chord + 1 < group.n_chords and bite > group.depth[lane * group.n_chords + chord + 1]:
+    while (
+        chord + 1 < group.n_chords
+        and bite > group.depth[lane * group.n_chords + chord + 1]
+    ):
         chord += 1
     before = near[at(CHORD + k, lane, n)]
     near[at(CHORD + k, lane, n)] = chord
@@ -317,17 +355,22 @@ def between(a, b, middle, first, last, work):
         for value, slope in ((OWN, OWN_SLOPE), (GAP, GAP_SLOPE)):
             before, after = get_row(work, p + value), get_row(work, q + value)
             slope_p, slope_q = get_row(work, p + slope), get_row(work, q + slope)
-            mean = CUBIC_MIDDLE.value_by_values * (before + after) + bend * (slope_p - slope_q)
+            mean = CUBIC_MIDDLE.value_by_values * (before + after) + bend * (
+                slope_p - slope_q
+            )
             least = where_above(before, after, after, before)
             set_row(work, m + value, where_above(mean, least, mean, least))
             set_row(
                 work,
                 m + slope,
-                growth * (after - before) - CUBIC_MIDDLE.slope_by_slopes * (slope_p + slope_q),
+                growth * (after - before)
+                - CUBIC_MIDDLE.slope_by_slopes * (slope_p + slope_q),
             )
         set_row(work, m + STIFFNESS, 1.0 / get_row(work, m + OWN))
         set_row(
-            work, m + POSITION, 0.5 * (get_row(work, p + POSITION) + get_row(work, q + POSITION))
+            work,
+            m + POSITION,
+            0.5 * (get_row(work, p + POSITION) + get_row(work, q + POSITION)),
         )
 
 
@@ -342,10 +385,13 @@ def beside_between(a, b, middle, first, last, work):
         for value, slope in ((LEFT_OUT, LEFT_OUT_SLOPE), (TOUCH, TOUCH_SLOPE)):
             before, after = get_row(work, p + value), get_row(work, q + value)
             slope_p, slope_q = get_row(work, p + slope), get_row(work, q + slope)
-            mean = CUBIC_MIDDLE.value_by_values * (before + after) + bend * (slope_p - slope_q)
+            mean = CUBIC_MIDDLE.value_by_values * (before + after) + bend * (
+                slope_p - slope_q
+            )
             set_row(work, m + value, mean)
             set_row(
                 work,
                 m + slope,
-                growth * (after - before) - CUBIC_MIDDLE.slope_by_slopes * (slope_p + slope_q),
+                growth * (after - before)
+                - CUBIC_MIDDLE.slope_by_slopes * (slope_p + slope_q),
             )

@@ -97,7 +97,9 @@ class _Model(models.PrimitiveModel):  # type: ignore[misc]
 
 
 _ELEMENTS = {name: getattr(types, name) for name in PRECISIONS}
-GROUPS = {element: Vector(element, n_lanes(name)) for name, element in _ELEMENTS.items()}
+GROUPS = {
+    element: Vector(element, n_lanes(name)) for name, element in _ELEMENTS.items()
+}
 ROWS = {element: Vector(element, FOUR) for element in _ELEMENTS.values()}
 VECTORS = (*GROUPS.values(), *ROWS.values())
 
@@ -107,7 +109,9 @@ def _filled(builder: Any, kind: Vector, number: Any) -> Any:
     return _repeated(
         builder,
         kind,
-        builder.fptrunc(number, ir.FloatType()) if kind.element is types.float32 else number,
+        builder.fptrunc(number, ir.FloatType())
+        if kind.element is types.float32
+        else number,
     )
 
 
@@ -139,7 +143,9 @@ def _binary(function: Any, instruction: str) -> None:
         @lower_builtin(function, types.float64, kind)  # type: ignore[untyped-decorator]
         def _mixed(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             vectors = [
-                value if given is sig.return_type else _filled(builder, sig.return_type, value)
+                value
+                if given is sig.return_type
+                else _filled(builder, sig.return_type, value)
                 for given, value in zip(sig.args, args, strict=True)
             ]
             return getattr(builder, instruction)(*vectors)
@@ -157,11 +163,15 @@ for _function, _instruction in (
 _NUMBERS = {types.float64: ir.DoubleType(), types.float32: ir.FloatType()}
 
 
-def _address(context: Any, builder: Any, kind: Any, array: Any, place: Any, read: Any) -> Any:
+def _address(
+    context: Any, builder: Any, kind: Any, array: Any, place: Any, read: Any
+) -> Any:
     """Where a vector, or a single number, lies."""
     # the plain field: a proxy of the whole array at every access would cost the compiler most of
     # its time
-    data = builder.extract_value(array, context.data_model_manager[kind].get_field_position("data"))
+    data = builder.extract_value(
+        array, context.data_model_manager[kind].get_field_position("data")
+    )
     llvm = read.llvm if isinstance(read, Vector) else _NUMBERS[read]
     return builder.bitcast(builder.gep(data, [place]), llvm.as_pointer())
 
@@ -268,13 +278,17 @@ def where_above(typing_context: Any, a: Any, b: Any, yes: Any, no: Any) -> Any:
     """``yes`` in the lanes where a > b, ``no`` elsewhere."""
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.select(builder.fcmp_ordered(">", args[0], args[1]), args[2], args[3])
+        return builder.select(
+            builder.fcmp_ordered(">", args[0], args[1]), args[2], args[3]
+        )
 
     return a(a, a, a, a), build
 
 
 @_intrinsic
-def plus_product(typing_context: Any, total: Any, factors: Any, place: Any, value: Any) -> Any:
+def plus_product(
+    typing_context: Any, total: Any, factors: Any, place: Any, value: Any
+) -> Any:
     """``total + factors[place] * value``, rounded once.
 
     ``factors`` is an array of the vectors' kind.
@@ -315,7 +329,9 @@ def transpose(typing_context: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         def mixed(x: Any, y: Any, places: list[int]) -> Any:
-            return builder.shuffle_vector(x, y, ir.Constant(ir.VectorType(_INDEX, FOUR), places))
+            return builder.shuffle_vector(
+                x, y, ir.Constant(ir.VectorType(_INDEX, FOUR), places)
+            )
 
         low, high = [0, 4, 1, 5], [2, 6, 3, 7]
         ac_low, bd_low = mixed(args[0], args[2], low), mixed(args[1], args[3], low)
@@ -335,6 +351,8 @@ def second_and_fourth(typing_context: Any, row: Any) -> Any:
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         places = ir.Constant(ir.VectorType(_INDEX, FOUR), [1, 1, 3, 3])
-        return builder.shuffle_vector(args[0], ir.Constant(sig.args[0].llvm, ir.Undefined), places)
+        return builder.shuffle_vector(
+            args[0], ir.Constant(sig.args[0].llvm, ir.Undefined), places
+        )
 
     return row(row), build

@@ -17,7 +17,9 @@ from gensig.units import from_si, unit
 
 Array = NDArray[np.float64]
 
-CAGE_POSITIONS = 64  # over half of the angle between two balls, the other half mirrors it
+CAGE_POSITIONS = (
+    64  # over half of the angle between two balls, the other half mirrors it
+)
 MOST_STEPS = 200
 BALANCED = 1e-10  # of the load
 SOFTEST = 1e-12  # of a loaded ball's stiffness; keeps a Newton step finite where one ball alone carries the load
@@ -55,10 +57,14 @@ class BallBearing:
             )
         for key in ("inner_groove_conformity", "outer_groove_conformity"):
             if not 0.505 <= getattr(self, key) <= 0.6:
-                raise ConfigError(f"bearing.{key} = {getattr(self, key):g} must lie in 0.505..0.6")
+                raise ConfigError(
+                    f"bearing.{key} = {getattr(self, key):g} must lie in 0.505..0.6"
+                )
         if not -20e-6 <= self.radial_clearance <= 100e-6:
             clearance = from_si("radial_clearance_um", self.radial_clearance)
-            raise ConfigError(f"bearing.radial_clearance_um = {clearance:g} must lie in -20..100")
+            raise ConfigError(
+                f"bearing.radial_clearance_um = {clearance:g} must lie in -20..100"
+            )
 
     def groove_curvatures(self, race: str) -> tuple[float, float, float, float]:
         """Principal curvatures 1/m of the ball (twice), then of the "inner" or "outer" groove
@@ -70,7 +76,9 @@ class BallBearing:
         """
         ball, sign = 2.0 / self.ball_diameter, 1.0 if race == "inner" else -1.0
         conformity = (
-            self.inner_groove_conformity if race == "inner" else self.outer_groove_conformity
+            self.inner_groove_conformity
+            if race == "inner"
+            else self.outer_groove_conformity
         )
         along = sign * 2.0 / (self.pitch_diameter - sign * self.ball_diameter)
         return ball, ball, along, -1.0 / (conformity * self.ball_diameter)
@@ -117,7 +125,12 @@ def point_contact_coefficient(
     total = one + two
     ellipticity = _ellipticity(abs(one - two) / total)
     first, second = _elliptic_integrals(ellipticity)
-    deflection = 2.0 * first / math.pi * (math.pi / (2.0 * ellipticity**2 * second)) ** (1.0 / 3.0)
+    deflection = (
+        2.0
+        * first
+        / math.pi
+        * (math.pi / (2.0 * ellipticity**2 * second)) ** (1.0 / 3.0)
+    )
     compliance = (1.0 - material.poisson_ratio**2) / material.youngs_modulus
     unit_load = deflection * (3.0 * compliance / total) ** (2.0 / 3.0) * 0.5 * total
     return float(unit_load**-1.5)
@@ -141,7 +154,9 @@ def _ellipticity(difference: float) -> float:
     def excess(logarithm: float) -> float:
         square = math.exp(2.0 * logarithm)
         first, second = _elliptic_integrals(math.exp(logarithm))
-        return ((square + 1.0) * second - 2.0 * first) / ((square - 1.0) * second) - difference
+        return ((square + 1.0) * second - 2.0 * first) / (
+            (square - 1.0) * second
+        ) - difference
 
     return math.exp(brentq(excess, 1e-4, 12.0, xtol=1e-12))
 
@@ -176,7 +191,9 @@ def cage_positions(bearing: BallBearing) -> Array:
     """Angles of a ball from the load, over half of the angle between two balls without its ends,
     (position,) rad.
     """
-    return (np.arange(CAGE_POSITIONS) + 0.5) / CAGE_POSITIONS * math.pi / bearing.n_balls
+    return (
+        (np.arange(CAGE_POSITIONS) + 0.5) / CAGE_POSITIONS * math.pi / bearing.n_balls
+    )
 
 
 def bearing_equilibrium(
@@ -196,9 +213,17 @@ def bearing_equilibrium(
     ------
     SimulationError    where no equilibrium is found
     """
-    coefficient, gap = ball_coefficient(bearing, material), 0.5 * bearing.radial_clearance
-    angle = positions[:, None] + 2.0 * math.pi * np.arange(bearing.n_balls) / bearing.n_balls
-    direction = np.stack([np.sin(angle), np.cos(angle)], axis=-1)  # (position, ball, axis)
+    coefficient, gap = (
+        ball_coefficient(bearing, material),
+        0.5 * bearing.radial_clearance,
+    )
+    angle = (
+        positions[:, None]
+        + 2.0 * math.pi * np.arange(bearing.n_balls) / bearing.n_balls
+    )
+    direction = np.stack(
+        [np.sin(angle), np.cos(angle)], axis=-1
+    )  # (position, ball, axis)
     force = np.array([0.0, load])
 
     def pressed(place: Array) -> Array:
@@ -220,11 +245,15 @@ def bearing_equilibrium(
         rest = np.einsum("pb,pba->pa", coefficient * delta**1.5, direction) - force
         if np.abs(rest).max() <= BALANCED * load:
             return BearingState(
-                displacement=place, ball_load=coefficient * delta**1.5, stiffness=tangent(delta)
+                displacement=place,
+                ball_load=coefficient * delta**1.5,
+                stiffness=tangent(delta),
             )
         step = np.linalg.solve(tangent(delta) + softest, -rest[:, :, None])[:, :, 0]
         longest = np.abs(step).max(axis=1, keepdims=True)
-        step *= np.minimum(1.0, (abs(gap) + 4.0 * largest) / np.maximum(longest, 1e-300))
+        step *= np.minimum(
+            1.0, (abs(gap) + 4.0 * largest) / np.maximum(longest, 1e-300)
+        )
         before, share = energy(place), np.ones((len(place), 1))
         slope = np.einsum("pa,pa->p", rest, step)
         for _ in range(40):
@@ -240,7 +269,9 @@ def bearing_equilibrium(
     )
 
 
-def bearing_stiffness(bearing: BallBearing, material: Material, load: float) -> tuple[float, float]:
+def bearing_stiffness(
+    bearing: BallBearing, material: Material, load: float
+) -> tuple[float, float]:
     """Tangent stiffness across and along a radial load in N, averaged over the position of the
     cage, N/m.
 

@@ -27,9 +27,7 @@ GROUP_N = (
     (10, 2), (18, 3), (30, 5), (50, 6), (65, 8), (80, 10), (100, 12), (120, 15), (160, 18), (180, 20), (200, 25),
 )  # fmt: skip
 BALL_SHARE = 0.3  # of half the ring's section D - d, times 2; assumed: makers' 6203 to 6210 have 0.29 to 0.32
-FILLED_SHARE = (
-    0.59  # of the pitch circle that balls take up; assumed: the same bearings have 0.57 to 0.60
-)
+FILLED_SHARE = 0.59  # of the pitch circle that balls take up; assumed: the same bearings have 0.57 to 0.60
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,5 +70,7 @@ def bearing_for(shaft_mm: float) -> BearingSize:
         n_balls=round(FILLED_SHARE * math.pi * pitch / ball),
         ball_diameter=round(ball, 3),
         pitch_diameter=pitch,
-        clearance_um=float(next(least for largest, least in GROUP_N if bore <= largest)),
+        clearance_um=float(
+            next(least for largest, least in GROUP_N if bore <= largest)
+        ),
     )

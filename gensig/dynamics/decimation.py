@@ -60,7 +60,16 @@ class Decimator:
         n_samples = (n_steps - 1) // self.oversampling - 2 * self.margin
         out = np.empty((n_samples, n_channels, n_lanes), dtype=means.dtype)
         taps = self.padded(means.dtype.name)
-        low_pass(means.ravel(), 1, taps, self.oversampling, n_channels, n_samples, out.ravel(), 0)
+        low_pass(
+            means.ravel(),
+            1,
+            taps,
+            self.oversampling,
+            n_channels,
+            n_samples,
+            out.ravel(),
+            0,
+        )
         return np.ascontiguousarray(out.transpose(2, 1, 0), dtype=np.float64)
 
     def apply_to_columns(self, means: Array) -> Array:
@@ -83,7 +92,9 @@ def decimator(oversampling: int) -> Decimator:
     if stored is None:
         return design(oversampling)
     return Decimator(
-        np.array([*stored, *reversed(stored)]), oversampling, len(stored) // oversampling
+        np.array([*stored, *reversed(stored)]),
+        oversampling,
+        len(stored) // oversampling,
     )
 
 
@@ -108,7 +119,12 @@ def design(oversampling: int) -> Decimator:
     n_grid = max(16385, 1 + 2 ** math.ceil(math.log2(256 * oversampling)))
     window = ("kaiser", beta)
     taps = firwin2(
-        2 * margin * oversampling, frequency, gain, nfreqs=n_grid, window=window, fs=2.0 * nyquist
+        2 * margin * oversampling,
+        frequency,
+        gain,
+        nfreqs=n_grid,
+        window=window,
+        fs=2.0 * nyquist,
     )
     return Decimator(taps, oversampling, margin)
 
@@ -132,7 +148,8 @@ def in_band_error(found: Array, exact: Array, sampling_rate: float) -> Array:
     inside = (frequency >= LOWEST_HZ) & (frequency <= usable_band(sampling_rate)[1])
     window = np.hanning(n_samples)
     spectra = [
-        np.fft.rfft(signal * window, axis=-1)[..., inside] for signal in (found - exact, exact)
+        np.fft.rfft(signal * window, axis=-1)[..., inside]
+        for signal in (found - exact, exact)
     ]
     off, level = (np.linalg.norm(spectrum, axis=-1) for spectrum in spectra)
     return np.asarray(

@@ -38,7 +38,9 @@ def axial_reach(pair: GearPair) -> Array:
     slant = math.copysign(math.tan(pair.base_helix_angle), pair.pinion.helix_angle)
     across = math.tan(pair.working_pressure_angle)
     pinion, wheel = pair.pinion.base_radius, pair.wheel.base_radius
-    return slant * np.array([1.0, -pinion * across, -pinion, -1.0, -wheel * across, -wheel])
+    return slant * np.array(
+        [1.0, -pinion * across, -pinion, -1.0, -wheel * across, -wheel]
+    )
 
 
 def half_lag(table: PairTable | SlicedTable) -> float:

@@ -6,7 +6,11 @@ from collections.abc import Sequence
 
 from gensig.dynamics.backends.base import BOUNCING, Integration, Motions, count_samples
 from gensig.dynamics.backends.registry import BACKENDS
-from gensig.dynamics.backends.step_limits import CoarseStepWarning, check_step, settling_time
+from gensig.dynamics.backends.step_limits import (
+    CoarseStepWarning,
+    check_step,
+    settling_time,
+)
 from gensig.dynamics.pair import DOFS, PairDynamics
 from gensig.dynamics.solver import FINEST, Solver
 from gensig.errors import ConfigError
@@ -80,7 +84,9 @@ def check_machine(dynamics: PairDynamics, solver: Solver, sampling_rate: float) 
     )
 
 
-def check_memory(duration: float, sampling_rate: float, n_channels: int, solver: Solver) -> None:
+def check_memory(
+    duration: float, sampling_rate: float, n_channels: int, solver: Solver
+) -> None:
     """Raise ConfigError for records that would not fit into memory side by side."""
     together = records_together(solver)
     n_bytes = count_samples(duration, sampling_rate) * n_channels * together * 8

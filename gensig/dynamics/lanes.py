@@ -66,7 +66,10 @@ def pack(
     places = np.empty((N_PLACES, len(lanes)), dtype=np.int64)
     rests = [one.rest() for one in lanes]
     for lane, one in enumerate(lanes):
-        numbers[:, lane], exact[:, lane] = one.numbers(step, rests[lane]), one.exact_numbers()
+        numbers[:, lane], exact[:, lane] = (
+            one.numbers(step, rests[lane]),
+            one.exact_numbers(),
+        )
         first_tooth, (_, n_chords, n_nodes, _) = sum(teeth[:lane]), tables[lane].shape
         first_table, per_chord = sum(sizes[:lane]), n_nodes * COLUMNS
         first_pitch, last_pitch = pitches(one.table)
@@ -86,16 +89,20 @@ def pack(
             last_pitch - first_pitch,
             per_chord,
             first_table
-            + per_chord * (one.table.set_chord if isinstance(one.table, SlicedTable) else 0),
+            + per_chord
+            * (one.table.set_chord if isinstance(one.table, SlicedTable) else 0),
         )
     systems = [one.system() for one in lanes]
     stiffness = np.stack([system.stiffness for system in systems])
     damping = np.stack([system.damping for system in systems])
     mass, rotation = (
-        np.stack([getattr(system, name) for system in systems]) for name in ("mass", "rotation")
+        np.stack([getattr(system, name) for system in systems])
+        for name in ("mass", "rotation")
     )
     n_dof = mass.shape[1]
-    coupled = np.any((stiffness != 0.0) | (damping != 0.0), axis=0) & ~np.eye(n_dof, dtype=bool)
+    coupled = np.any((stiffness != 0.0) | (damping != 0.0), axis=0) & ~np.eye(
+        n_dof, dtype=bool
+    )
     row, column = np.nonzero(coupled)
     profile, profile_first, cells_per_second = _nominal(lanes, span)
 
@@ -118,10 +125,16 @@ def pack(
         places=places.ravel(),
         n_pairs=int(places[FOLLOWED].max()),
         n_chords=len(depth[0]),
-        table=np.concatenate([table[..., :COLUMNS].ravel() for table in tables]).astype(precision),
+        table=np.concatenate([table[..., :COLUMNS].ravel() for table in tables]).astype(
+            precision
+        ),
         depth=depth.astype(precision).ravel(),
-        beside=np.concatenate([table[..., COLUMNS:].ravel() for table in tables]).astype(precision),
-        bend=np.outer(0.5 / exact[NODES_PER_METER], [1.0, 0.0, 1.0, 0.0]).astype(precision).ravel(),
+        beside=np.concatenate(
+            [table[..., COLUMNS:].ravel() for table in tables]
+        ).astype(precision),
+        bend=np.outer(0.5 / exact[NODES_PER_METER], [1.0, 0.0, 1.0, 0.0])
+        .astype(precision)
+        .ravel(),
         tooth_row=np.concatenate(rows),
         tooth_error=np.concatenate(
             [error for one in lanes for error in (one.pinion_error, one.wheel_error)]
@@ -139,7 +152,9 @@ def pack(
         other_column=np.ascontiguousarray(column),
         other_stiffness=side_by_side(stiffness[:, row, column]),
         other_damping=side_by_side(damping[:, row, column]),
-        force=side_by_side(set_force - np.einsum("lij,lj->li", stiffness, np.stack(rests))),
+        force=side_by_side(
+            set_force - np.einsum("lij,lj->li", stiffness, np.stack(rests))
+        ),
         set_force=side_by_side(set_force),
         rest=np.stack(rests, axis=-1),
         rotation=side_by_side(rotation),
@@ -151,7 +166,9 @@ def pack(
     )
 
 
-def _nominal(lanes: Sequence[PairDynamics], span: tuple[float, float]) -> tuple[Array, int, float]:
+def _nominal(
+    lanes: Sequence[PairDynamics], span: tuple[float, float]
+) -> tuple[Array, int, float]:
     """Nominal motion and torque by cells of time, (cell, 5, lane) flat, the number of the first,
     and cells a second.
 
@@ -159,7 +176,10 @@ def _nominal(lanes: Sequence[PairDynamics], span: tuple[float, float]) -> tuple[
     """
     if all(one.operating.is_steady for one in lanes):
         profile = np.zeros((1, N_PROFILE, len(lanes)))
-        profile[0, NOMINAL_SPEED], profile[0, TORQUE] = [one.operating.speed for one in lanes], 1.0
+        profile[0, NOMINAL_SPEED], profile[0, TORQUE] = (
+            [one.operating.speed for one in lanes],
+            1.0,
+        )
         return profile.ravel(), 0, 1.0
     # cells begin at multiples of their length, so that the same instants have the same bits
     # whatever the span
@@ -170,40 +190,53 @@ def _nominal(lanes: Sequence[PairDynamics], span: tuple[float, float]) -> tuple[
     for lane, one in enumerate(lanes):
         nominal = one.nominal(edges)
         gain, slope = (
-            np.diff(values) * CELLS_PER_SECOND for values in (nominal.speed, nominal.torque_factor)
+            np.diff(values) * CELLS_PER_SECOND
+            for values in (nominal.speed, nominal.torque_factor)
         )
         turned = 0.5 * (nominal.speed[1:] + nominal.speed[:-1]) / CELLS_PER_SECOND
         before, after = turned[:-first], turned[-first:]
-        angle = np.concatenate([-np.cumsum(before[::-1])[::-1], [0.0], np.cumsum(after)])
+        angle = np.concatenate(
+            [-np.cumsum(before[::-1])[::-1], [0.0], np.cumsum(after)]
+        )
         profile[:, NOMINAL_ANGLE, lane], profile[:, NOMINAL_SPEED, lane] = (
             angle[:-1],
             nominal.speed[:-1],
         )
         profile[:, NOMINAL_ACCELERATION, lane] = gain
-        profile[:, TORQUE, lane], profile[:, TORQUE_SLOPE, lane] = nominal.torque_factor[:-1], slope
+        profile[:, TORQUE, lane], profile[:, TORQUE_SLOPE, lane] = (
+            nominal.torque_factor[:-1],
+            slope,
+        )
     return profile.ravel(), first, CELLS_PER_SECOND
 
 
 def _depths(lanes: Sequence[PairDynamics]) -> Array:
     """Bites from which on chords hold, (lane, chord) m, infinite for those that a lane has not."""
-    own = [one.table.depth if isinstance(one.table, SlicedTable) else np.zeros(1) for one in lanes]
+    own = [
+        one.table.depth if isinstance(one.table, SlicedTable) else np.zeros(1)
+        for one in lanes
+    ]
     depth = np.full((len(lanes), max(len(values) for values in own)), np.inf)
     for row, values in zip(depth, own, strict=True):
         row[: len(values)] = values
     return depth
 
 
-def _rows(table: PairTable | SlicedTable) -> tuple[Array, NDArray[np.int64], tuple[int, int]]:
+def _rows(
+    table: PairTable | SlicedTable,
+) -> tuple[Array, NDArray[np.int64], tuple[int, int]]:
     """As ``_table_rows``, rows (row, chord, node, column); behind the columns of helical teeth
     what stands beside them."""
     if isinstance(table, PairTable):
         rows, row, steps = _table_rows(table)
         return rows[:, None], row, steps
     (pinion, pinion_row), (wheel, wheel_row) = (
-        np.unique(kind, return_inverse=True) for kind in (table.pinion_kind, table.wheel_kind)
+        np.unique(kind, return_inverse=True)
+        for kind in (table.pinion_kind, table.wheel_kind)
     )
     touch = [
-        np.broadcast_to(value[:, :, :1], value.shape) for value in (table.gap, table.gap_slope)
+        np.broadcast_to(value[:, :, :1], value.shape)
+        for value in (table.gap, table.gap_slope)
     ]
     values = [
         table.compliance,
@@ -214,10 +247,16 @@ def _rows(table: PairTable | SlicedTable) -> tuple[Array, NDArray[np.int64], tup
         *touch,
     ]
     pairs = np.stack(
-        [value[np.ix_(pinion, wheel)].reshape(-1, *value.shape[2:]) for value in values], axis=-1
+        [
+            value[np.ix_(pinion, wheel)].reshape(-1, *value.shape[2:])
+            for value in values
+        ],
+        axis=-1,
     )
     if pinion[0] != 0 or wheel[0] != 0:  # back flanks are those of sound teeth
-        pairs = np.concatenate([np.stack([value[0, 0] for value in values], axis=-1)[None], pairs])
+        pairs = np.concatenate(
+            [np.stack([value[0, 0] for value in values], axis=-1)[None], pairs]
+        )
         wheel_row = wheel_row + 1
     sides = (
         (table.pinion_kind, table.pinion_present, pinion_row),
@@ -225,14 +264,18 @@ def _rows(table: PairTable | SlicedTable) -> tuple[Array, NDArray[np.int64], tup
     )
     return (
         pairs,
-        np.concatenate([np.where(present[kind], row, -1) for kind, present, row in sides]),
+        np.concatenate(
+            [np.where(present[kind], row, -1) for kind, present, row in sides]
+        ),
         (len(wheel), 0),
     )
 
 
 def _columns(side: GearTable) -> Array:
     """Table columns [c, c', g, g'], (distinct, node, 4)."""
-    return np.stack([side.compliance, side.compliance_slope, side.gap, side.gap_slope], axis=-1)
+    return np.stack(
+        [side.compliance, side.compliance_slope, side.gap, side.gap_slope], axis=-1
+    )
 
 
 def at_step(group: Group, before: float, after: float) -> Group:
@@ -253,7 +296,9 @@ def _table_rows(table: PairTable) -> tuple[Array, NDArray[np.int64], tuple[int, 
     (pinion, pinion_row), (wheel, wheel_row) = _used(table.pinion), _used(table.wheel)
     if _are_many(table):
         everything = np.concatenate([_columns(table.pinion), _columns(table.wheel)])
-        row = np.concatenate([_present(side, side.kind) for side in (table.pinion, table.wheel)])
+        row = np.concatenate(
+            [_present(side, side.kind) for side in (table.pinion, table.wheel)]
+        )
         return everything, row, (1, len(table.pinion.compliance))
     pairs = (pinion[:, None] + wheel[None]).reshape(-1, *pinion.shape[1:])
     if not (
@@ -263,13 +308,17 @@ def _table_rows(table: PairTable) -> tuple[Array, NDArray[np.int64], tuple[int, 
             [(_columns(table.pinion)[0] + _columns(table.wheel)[0])[None], pairs]
         )
         wheel_row = wheel_row + 1
-    row = np.concatenate([_present(table.pinion, pinion_row), _present(table.wheel, wheel_row)])
+    row = np.concatenate(
+        [_present(table.pinion, pinion_row), _present(table.wheel, wheel_row)]
+    )
     return pairs, row, (len(wheel), 0)
 
 
 def _are_many(table: PairTable) -> bool:
     """Whether all pairs of distinct teeth would take much more memory than the teeth."""
-    n_pinion, n_wheel = (len(np.unique(side.kind)) for side in (table.pinion, table.wheel))
+    n_pinion, n_wheel = (
+        len(np.unique(side.kind)) for side in (table.pinion, table.wheel)
+    )
     return n_pinion * n_wheel > 2 * (n_pinion + n_wheel)
 
 

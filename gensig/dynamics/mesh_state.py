@@ -45,7 +45,10 @@ class MeshState:
 
 
 def mesh_state(
-    dynamics: PairDynamics, seen: Array, angle: Array, faulty: Collection[tuple[str, int]] = ()
+    dynamics: PairDynamics,
+    seen: Array,
+    angle: Array,
+    faulty: Collection[tuple[str, int]] = (),
 ) -> MeshState:
     """Read what the compiled core tells of the mesh of one machine.
 

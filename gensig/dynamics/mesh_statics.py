@@ -40,11 +40,14 @@ def loss_arm(table: PairTable | SlicedTable, position: Array) -> Array:
 def least_gaps(table: PairTable | SlicedTable) -> list[Array]:
     """Two gaps by node of which no pair of teeth has less than the sum, (node,) m each."""
     if isinstance(table, SlicedTable):
-        touch = table.gap[np.ix_(table.pinion_present, table.wheel_present)][:, :, 0].min(
-            axis=(0, 1)
-        )
+        touch = table.gap[np.ix_(table.pinion_present, table.wheel_present)][
+            :, :, 0
+        ].min(axis=(0, 1))
         return [touch, np.zeros_like(touch)]
-    return [np.asarray(side.gap[side.present].min(axis=0)) for side in (table.pinion, table.wheel)]
+    return [
+        np.asarray(side.gap[side.present].min(axis=0))
+        for side in (table.pinion, table.wheel)
+    ]
 
 
 def mean_mesh_stiffness(table: PairTable | SlicedTable, force: float) -> float:
@@ -64,7 +67,9 @@ def mean_mesh_stiffness(table: PairTable | SlicedTable, force: float) -> float:
         chords = table
         if pinion is not None and wheel is not None:
             chords = replace(table, pinion_kind=pinion, wheel_kind=wheel)
-        stiffness = chord_equilibrium(chords, chord_states(chords, roll), force).stiffness
+        stiffness = chord_equilibrium(
+            chords, chord_states(chords, roll), force
+        ).stiffness
     else:
         mesh = table
         if pinion is not None and wheel is not None:

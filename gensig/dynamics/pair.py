@@ -18,7 +18,12 @@ from gensig.dynamics.helical import AXIAL_DOFS, axial_reach, half_lag, pitches
 from gensig.dynamics.mesh_statics import least_gaps, loss_arm, mean_mesh_stiffness
 from gensig.dynamics.system import LumpedSystem, eigenvalues
 from gensig.errors import ConfigError
-from gensig.mesh.load_distribution import PairStates, StaticMesh, pair_states, static_mesh
+from gensig.mesh.load_distribution import (
+    PairStates,
+    StaticMesh,
+    pair_states,
+    static_mesh,
+)
 from gensig.mesh.pair_table import PairTable
 from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
 from gensig.mesh.sliced.sliced_table import SlicedTable
@@ -27,7 +32,14 @@ from gensig.units import split_unit, unit
 
 Array = NDArray[np.float64]
 
-PAIR_DOFS = ("pinion_x", "pinion_y", "pinion_rotation", "wheel_x", "wheel_y", "wheel_rotation")
+PAIR_DOFS = (
+    "pinion_x",
+    "pinion_y",
+    "pinion_rotation",
+    "wheel_x",
+    "wheel_y",
+    "wheel_rotation",
+)
 # all that a machine may have; ``PairDynamics.dofs`` says which
 DOFS = (*PAIR_DOFS, *AXIAL_DOFS, "motor_rotation", "load_rotation")
 APPROACH_SIGN = (0.0, -1.0, 1.0, 0.0, 1.0, -1.0)
@@ -59,7 +71,10 @@ class Support:
             ("stiffness", ("n_per_m", "nm_per_rad")),
             ("damping", ("ns_per_m", "nms_per_rad")),
         ):
-            keys = [f"{name}_{axis}_{suffixes[axis == 'tilt']}" for axis in ("x", "y", "z", "tilt")]
+            keys = [
+                f"{name}_{axis}_{suffixes[axis == 'tilt']}"
+                for axis in ("x", "y", "z", "tilt")
+            ]
             for key in keys:
                 value = getattr(self, split_unit(key)[0])
                 if value < 0.0:
@@ -74,7 +89,9 @@ class Support:
             damping_x=2.0 * ratio_x * math.sqrt(self.stiffness_x * body.mass),
             damping_y=2.0 * ratio_y * math.sqrt(self.stiffness_y * body.mass),
             damping_z=2.0 * mean * math.sqrt(self.stiffness_z * body.mass),
-            damping_tilt=2.0 * mean * math.sqrt(self.stiffness_tilt * body.tilt_inertia),
+            damping_tilt=2.0
+            * mean
+            * math.sqrt(self.stiffness_tilt * body.tilt_inertia),
         )
 
 
@@ -103,7 +120,11 @@ class Rotor:
     coupling_damping_ratio: float
 
     def __post_init__(self) -> None:
-        for key in ("inertia_kg_m2", "coupling_stiffness_nm_per_rad", "coupling_damping_ratio"):
+        for key in (
+            "inertia_kg_m2",
+            "coupling_stiffness_nm_per_rad",
+            "coupling_damping_ratio",
+        ):
             value = getattr(self, split_unit(key)[0])
             if not value > 0.0:
                 raise ConfigError(f"rotor.{key} = {value:g} must be positive")
@@ -111,7 +132,11 @@ class Rotor:
     def coupling_damping(self, gear_inertia: float) -> float:
         """Damping of the coupling for its ratio on the two inertias it joins, N m s/rad."""
         joined = self.inertia * gear_inertia / (self.inertia + gear_inertia)
-        return 2.0 * self.coupling_damping_ratio * math.sqrt(self.coupling_stiffness * joined)
+        return (
+            2.0
+            * self.coupling_damping_ratio
+            * math.sqrt(self.coupling_stiffness * joined)
+        )
 
 
 def solid_disc(
@@ -185,8 +210,12 @@ class PairDynamics:
     @property
     def _ends(self) -> tuple[int, int]:
         """Degrees of freedom that the drive and the load torque act on."""
-        driver = PINION_ROTATION if self.motor is None else self.dofs.index("motor_rotation")
-        return driver, WHEEL_ROTATION if self.load is None else self.dofs.index("load_rotation")
+        driver = (
+            PINION_ROTATION if self.motor is None else self.dofs.index("motor_rotation")
+        )
+        return driver, WHEEL_ROTATION if self.load is None else self.dofs.index(
+            "load_rotation"
+        )
 
     @property
     def equivalent_mass(self) -> float:
@@ -220,7 +249,9 @@ class PairDynamics:
     @property
     def reduced_inertia(self) -> float:
         """Inertia of all that turns, reduced to the pinion, kg m2."""
-        driving = self.pinion.inertia + (0.0 if self.motor is None else self.motor.inertia)
+        driving = self.pinion.inertia + (
+            0.0 if self.motor is None else self.motor.inertia
+        )
         return driving + self.driven_inertia / self.table.pair.ratio**2
 
     @property
@@ -258,7 +289,11 @@ class PairDynamics:
         for z, body in ((PINION_Z, p), (WHEEL_Z, w)) if self.is_helical else ():
             mass[z : z + 3] = body.mass, body.tilt_inertia, body.tilt_inertia
             held, axes = body.support, np.arange(z, z + 3)
-            stiffness[axes, axes] = held.stiffness_z, held.stiffness_tilt, held.stiffness_tilt
+            stiffness[axes, axes] = (
+                held.stiffness_z,
+                held.stiffness_tilt,
+                held.stiffness_tilt,
+            )
             damping[axes, axes] = held.damping_z, held.damping_tilt, held.damping_tilt
         driver, driven = self._ends
         for rotor, place, gear in (
@@ -276,7 +311,9 @@ class PairDynamics:
         )
         force[driver] = self.operating.torque + self.friction_torque()
         if self.motor is not None:
-            force[driver] += drive_stiffness * force[driver] / self.motor.coupling_stiffness
+            force[driver] += (
+                drive_stiffness * force[driver] / self.motor.coupling_stiffness
+            )
         force[driven] = -self.operating.torque * ratio
         return LumpedSystem(
             names=dofs,
@@ -306,7 +343,9 @@ class PairDynamics:
         )
         direction[: len(PAIR_DOFS)] = np.array(APPROACH_SIGN) * radii
         if self.is_helical:
-            direction[len(PAIR_DOFS) : len(self.gear_dofs)] = axial_reach(self.table.pair)
+            direction[len(PAIR_DOFS) : len(self.gear_dofs)] = axial_reach(
+                self.table.pair
+            )
         return direction
 
     @cached_property
@@ -326,7 +365,9 @@ class PairDynamics:
     @cached_property
     def stiff_rates(self) -> NDArray[np.complex128]:
         """Eigenvalues with the mesh held somewhat above its mean stiffness, 1/s."""
-        return eigenvalues(self.system(), self.approach_direction(), 1.2 * self.mean_mesh_stiffness)
+        return eigenvalues(
+            self.system(), self.approach_direction(), 1.2 * self.mean_mesh_stiffness
+        )
 
     def numbers(self, step: float, rest: Array) -> tuple[float, ...]:
         """The mesh as numbers, in the order of the rows of ``_layout.Group.numbers``."""
@@ -354,7 +395,11 @@ class PairDynamics:
     def exact_numbers(self) -> tuple[float, ...]:
         """What decides where pairs stand, in the order of the rows of ``_layout.Group.exact``."""
         options, pair = self.table.options, self.table.pair
-        near = self._near_positions() if options.law == "one_sided" else (-math.inf, math.inf)
+        near = (
+            self._near_positions()
+            if options.law == "one_sided"
+            else (-math.inf, math.inf)
+        )
         return (
             pair.pinion.base_radius,
             pair.base_pitch,
@@ -369,7 +414,10 @@ class PairDynamics:
         """Positions s outside of which no pair comes within ``FAR_NEAR`` of touching, m."""
         table = self.table
         beyond = table.position - table.pair.pitch_point - half_lag(table)
-        teeth = ((self.pinion_error, self.pinion_tilt), (self.wheel_error, self.wheel_tilt))
+        teeth = (
+            (self.pinion_error, self.pinion_tilt),
+            (self.wheel_error, self.wheel_tilt),
+        )
         nearest = [
             flank + error.min() + np.minimum(tilt.min() * beyond, tilt.max() * beyond)
             for flank, (error, tilt) in zip(least_gaps(table), teeth, strict=True)
@@ -410,9 +458,13 @@ class PairDynamics:
         """
         pair, system, (driver, driven) = self.table.pair, self.system(), self._ends
         nominal, smooth = (
-            one.nominal(np.array([time])) for one in (self.operating, self.operating.without_ripple)
+            one.nominal(np.array([time]))
+            for one in (self.operating, self.operating.without_ripple)
         )
-        factor, acceleration = float(nominal.torque_factor[0]), float(smooth.acceleration[0])
+        factor, acceleration = (
+            float(nominal.torque_factor[0]),
+            float(smooth.acceleration[0]),
+        )
         wheel_acceleration = acceleration / pair.ratio
         force = (
             factor * self.mesh_force
@@ -424,12 +476,21 @@ class PairDynamics:
             lead = factor * system.force[driver] / system.stiffness[driver, driver]
             start[driver] = start[PINION_ROTATION] + lead
             driven_inertia = self.reduced_inertia - self.motor.inertia
-            start[PINION_ROTATION] -= acceleration * driven_inertia / self.motor.coupling_stiffness
+            start[PINION_ROTATION] -= (
+                acceleration * driven_inertia / self.motor.coupling_stiffness
+            )
         advance = pair.pinion.base_radius * start[PINION_ROTATION]
         elapsed = float(self.operating.time_at_set_speed(np.array([time]))[0])
-        roll = self.start_roll + pair.pinion.base_radius * self.operating.speed * elapsed + advance
+        roll = (
+            self.start_roll
+            + pair.pinion.base_radius * self.operating.speed * elapsed
+            + advance
+        )
         approach = float(self._statics(np.array([roll]), force)[1].approach[0])
-        axial, reach = range(len(PAIR_DOFS), len(self.gear_dofs)), self.approach_direction()
+        axial, reach = (
+            range(len(PAIR_DOFS), len(self.gear_dofs)),
+            self.approach_direction(),
+        )
         for dof in (PINION_Y, WHEEL_Y, *axial):
             if system.stiffness[dof, dof] > 0.0:
                 start[dof] = -reach[dof] * force / system.stiffness[dof, dof]
@@ -439,8 +500,12 @@ class PairDynamics:
             pushed += reach[dof] * start[dof]
         start[WHEEL_ROTATION] = (pushed - closed + advance) / pair.wheel.base_radius
         if self.load is not None:
-            torque = factor * system.force[driven] - wheel_acceleration * self.load.inertia
-            start[driven] = start[WHEEL_ROTATION] + torque / self.load.coupling_stiffness
+            torque = (
+                factor * system.force[driven] - wheel_acceleration * self.load.inertia
+            )
+            start[driven] = (
+                start[WHEEL_ROTATION] + torque / self.load.coupling_stiffness
+            )
         return start
 
     def _statics(self, roll: Array, force: float) -> tuple[Array, StaticMesh]:

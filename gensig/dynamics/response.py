@@ -33,6 +33,10 @@ def accelerations(dynamics: PairDynamics, frequency: Array, force: Complex) -> C
     system, direction = dynamics.system(), dynamics.approach_direction()
     mesh = np.outer(direction, direction)
     w = np.asarray(frequency, dtype=np.float64)[:, None, None]
-    dynamic = (system.stiffness + dynamics.mean_mesh_stiffness * mesh) - w**2 * np.diag(system.mass)
+    dynamic = (system.stiffness + dynamics.mean_mesh_stiffness * mesh) - w**2 * np.diag(
+        system.mass
+    )
     dynamic = dynamic + 1j * w * (system.damping + dynamics.mesh_damping * mesh)
-    return np.asarray(-(w[:, :, 0] ** 2) * np.linalg.solve(dynamic, force[:, :, None])[:, :, 0])
+    return np.asarray(
+        -(w[:, :, 0] ** 2) * np.linalg.solve(dynamic, force[:, :, None])[:, :, 0]
+    )

@@ -31,7 +31,9 @@ class Solver:
 
     def __post_init__(self) -> None:
         if not 2 <= self.oversampling <= 256:
-            raise ConfigError(f"solver.oversampling = {self.oversampling} must lie in 2..256")
+            raise ConfigError(
+                f"solver.oversampling = {self.oversampling} must lie in 2..256"
+            )
         if self.precision not in PRECISIONS:
             raise ConfigError(
                 f"solver.precision = {self.precision!r}; allowed: {', '.join(PRECISIONS)}"
@@ -41,4 +43,6 @@ class Solver:
                 f"solver.max_error = {self.max_error:g} must lie in 1e-6..1, or be null"
             )
         if self.backend not in BACKENDS:
-            raise ConfigError(f"solver.backend = {self.backend!r}; allowed: {', '.join(BACKENDS)}")
+            raise ConfigError(
+                f"solver.backend = {self.backend!r}; allowed: {', '.join(BACKENDS)}"
+            )

@@ -37,7 +37,9 @@ class LumpedSystem:
         for matrix, what in ((self.stiffness, "stiffness"), (self.damping, "damping")):
             if not np.allclose(matrix, matrix.T, rtol=1e-12, atol=0.0):
                 raise SimulationError(f"the {what} matrix is not symmetric")
-            if np.linalg.eigvalsh(matrix).min() < -1e-9 * max(1.0, float(np.abs(matrix).max())):
+            if np.linalg.eigvalsh(matrix).min() < -1e-9 * max(
+                1.0, float(np.abs(matrix).max())
+            ):
                 raise SimulationError(
                     f"the {what} matrix would feed energy in; check the signs of the supports"
                 )
@@ -51,14 +53,18 @@ def eigenvalues(
     ``direction`` (dof,) is the gradient of the approach.
     """
     n = len(system.mass)
-    k = (system.stiffness + mesh_stiffness * np.outer(direction, direction)) / system.mass[:, None]
+    k = (
+        system.stiffness + mesh_stiffness * np.outer(direction, direction)
+    ) / system.mass[:, None]
     c = system.damping / system.mass[:, None]
-    return np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-k, -c]])).astype(
-        np.complex128
-    )
+    return np.linalg.eigvals(
+        np.block([[np.zeros((n, n)), np.eye(n)], [-k, -c]])
+    ).astype(np.complex128)
 
 
-def slowest_decay(system: LumpedSystem, direction: Array, mesh_stiffness: float) -> float:
+def slowest_decay(
+    system: LumpedSystem, direction: Array, mesh_stiffness: float
+) -> float:
     """Slowest decay rate in 1/s of the system with its mesh held at a mean stiffness.
 
     ``direction`` (dof,) is the gradient of the approach. Rigid-body motion without restoring

@@ -40,10 +40,16 @@ class ArrayExecutor(Executor):
 
     def share(self, shard_indices: Sequence[int]) -> list[int]:
         """The shards of this task: what others have made meanwhile does not change them."""
-        return [index for index in shard_indices if index % self.shard_count == self.shard_index]
+        return [
+            index
+            for index in shard_indices
+            if index % self.shard_count == self.shard_index
+        ]
 
     def run(
         self, job: Callable[[int], T], shard_indices: Sequence[int]
     ) -> Iterator[tuple[int, T | ShardFailure]]:
         """See ``Executor.run``."""
-        yield from LocalExecutor(n_workers=self.n_workers).run(job, self.share(shard_indices))
+        yield from LocalExecutor(n_workers=self.n_workers).run(
+            job, self.share(shard_indices)
+        )

@@ -47,10 +47,14 @@ class DaskExecutor(Executor):
         distributed = load_distributed()
         with self._client(distributed) as client:
             futures = client.map(
-                functools.partial(guarded, job), shard_indices, pure=False, retries=TRIES - 1
+                functools.partial(guarded, job),
+                shard_indices,
+                pure=False,
+                retries=TRIES - 1,
             )
             numbers = {
-                future.key: index for future, index in zip(futures, shard_indices, strict=True)
+                future.key: index
+                for future, index in zip(futures, shard_indices, strict=True)
             }
             for future in distributed.as_completed(futures, loop=client.loop):
                 try:
@@ -83,7 +87,9 @@ class DaskExecutor(Executor):
                 yield client
             return
         try:
-            client = distributed.Client(self.address, timeout=CONNECT_SECONDS, set_as_default=False)
+            client = distributed.Client(
+                self.address, timeout=CONNECT_SECONDS, set_as_default=False
+            )
         except (OSError, ValueError) as error:
             raise ConfigError(
                 f"executor.address = {self.address!r}: no Dask scheduler answers there ({one_line(error)}); start one "

@@ -19,7 +19,14 @@ from dataclasses import dataclass
 from multiprocessing import connection, resource_tracker
 from typing import Any
 
-from gensig.execution.base import THREAD_VARIABLES, TRIES, Executor, ShardFailure, T, guarded
+from gensig.execution.base import (
+    THREAD_VARIABLES,
+    TRIES,
+    Executor,
+    ShardFailure,
+    T,
+    guarded,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,7 +71,9 @@ class LocalExecutor(Executor):
                             waiting.append(index)
                             idle.append(worker)
                             continue
-                        result = ShardFailure(reason=f"its worker process died {TRIES} times")
+                        result = ShardFailure(
+                            reason=f"its worker process died {TRIES} times"
+                        )
                     idle.append(worker)
                     yield index, result
         except BaseException:
@@ -124,8 +133,13 @@ def _main_unknown() -> Iterator[None]:
     importable without it.
     """
     main = sys.modules["__main__"]
-    looked_at = ("__spec__", "__file__")  # by multiprocessing.spawn.get_preparation_data
-    hidden: dict[str, Any] = {name: vars(main)[name] for name in looked_at if name in vars(main)}
+    looked_at = (
+        "__spec__",
+        "__file__",
+    )  # by multiprocessing.spawn.get_preparation_data
+    hidden: dict[str, Any] = {
+        name: vars(main)[name] for name in looked_at if name in vars(main)
+    }
     main.__spec__ = None
     vars(main).pop("__file__", None)
     try:

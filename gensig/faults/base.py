@@ -22,7 +22,9 @@ class Growth(Enum):
 
     NONE = "none"  # the fault stays as it is
     PARIS = "paris"  # a root crack deepens with the range of its stress intensity
-    PITS = "pits"  # contact stress damages a flank until pits come, more and larger ones
+    PITS = (
+        "pits"  # contact stress damages a flank until pits come, more and larger ones
+    )
     ARCHARD = "archard"  # sliding under pressure takes material off a flank
 
 
@@ -52,7 +54,9 @@ class Fault(ABC):
             raise FaultError(
                 f"fault.tooth = {self.tooth!r}; give a number, a list of numbers, or {ALL}"
             )
-        if isinstance(self.tooth, tuple) and not 0 < len(set(self.tooth)) == len(self.tooth):
+        if isinstance(self.tooth, tuple) and not 0 < len(set(self.tooth)) == len(
+            self.tooth
+        ):
             raise FaultError(
                 f"fault.tooth = {list(self.tooth)} must name one tooth or more, each once"
             )
@@ -104,7 +108,12 @@ def require(fault: Fault, key: str, holds: bool, rule: str) -> None:
 def require_not_negative(fault: Fault, *keys: str) -> None:
     """Check lengths and depths."""
     for key in keys:
-        require(fault, key, getattr(fault, split_unit(key)[0]) >= 0.0, "must not be negative")
+        require(
+            fault,
+            key,
+            getattr(fault, split_unit(key)[0]) >= 0.0,
+            "must not be negative",
+        )
 
 
 def _shown(fault: Fault, key: str) -> str:
@@ -113,7 +122,9 @@ def _shown(fault: Fault, key: str) -> str:
 
 
 def faulty_teeth(
-    pair: GearPair, faults: Iterable[Fault], sound_teeth: Mapping[str, Tooth] | None = None
+    pair: GearPair,
+    faults: Iterable[Fault],
+    sound_teeth: Mapping[str, Tooth] | None = None,
 ) -> dict[tuple[str, int], Tooth]:
     """The teeth that differ from the sound one, by (gear, tooth); several faults of a tooth
     compose in order.

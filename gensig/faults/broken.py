@@ -97,7 +97,12 @@ class ChippedTooth(Fault):
     def severity(self, gear: Gear) -> float:
         """Broken share of height times width."""
         share = 0.5 if self.chip_shape == "triangular" else 1.0
-        return share * self.chip_height * self.chip_width / (tooth_height(gear) * gear.face_width)
+        return (
+            share
+            * self.chip_height
+            * self.chip_width
+            / (tooth_height(gear) * gear.face_width)
+        )
 
     def on_other_flank(self) -> ChippedTooth:
         """The same: the chip is gone from both flanks."""
@@ -119,7 +124,9 @@ class ChippedTooth(Fault):
         middle = 0.5 * (sliced.slice_edges[1:] + sliced.slice_edges[:-1])
         height = np.where(middle < self.chip_width, self.chip_height, 0.0)
         if self.chip_shape == "triangular":
-            height = np.maximum(self.chip_height * (1.0 - middle / self.chip_width), 0.0)
+            height = np.maximum(
+                self.chip_height * (1.0 - middle / self.chip_width), 0.0
+            )
         return _without_tip(sliced, height)
 
 
@@ -142,7 +149,10 @@ def _without_tip(tooth: Tooth, height: Array) -> Tooth:
     if not height.any():
         return tooth
     profile = tooth.profile
-    gone = profile.abscissa[profile.n_root_cells :] > tooth.gear.tip_radius - height[:, None]
+    gone = (
+        profile.abscissa[profile.n_root_cells :]
+        > tooth.gear.tip_radius - height[:, None]
+    )
     broken = tooth.with_loss(np.where(gone, np.inf, 0.0))
     left = np.isfinite(broken.material_loss).any()
     return broken if left else replace(broken, present=False)

@@ -51,7 +51,10 @@ class Crack(Fault):
         Fault.__post_init__(self)
         require_not_negative(self, "crack_depth_mm")
         require(
-            self, "crack_angle_deg", 0.0 < self.crack_angle <= 0.5 * math.pi, "must lie in 0..90"
+            self,
+            "crack_angle_deg",
+            0.0 < self.crack_angle <= 0.5 * math.pi,
+            "must lie in 0..90",
         )
         for key, allowed in (
             ("crack_start", CRACK_STARTS),

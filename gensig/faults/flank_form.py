@@ -61,7 +61,11 @@ class PitchError(FlankForm):
 
     def apply(self, tooth: Tooth, number: int) -> Tooth:
         """Move the flank."""
-        return tooth.with_deviation(np.array(self.pitch_error)) if self.pitch_error else tooth
+        return (
+            tooth.with_deviation(np.array(self.pitch_error))
+            if self.pitch_error
+            else tooth
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -191,19 +195,26 @@ class Wear(FlankForm):
         given = self.wear_profile
         rule = "must hold two depths or more, none negative"
         require(
-            self, "wear_profile", given is None or (len(given) >= 2 and min(given) >= 0.0), rule
+            self,
+            "wear_profile",
+            given is None or (len(given) >= 2 and min(given) >= 0.0),
+            rule,
         )
 
     def size(self) -> float:
         """The greatest depth."""
-        return self.wear_depth * (1.0 if self.wear_profile is None else max(self.wear_profile))
+        return self.wear_depth * (
+            1.0 if self.wear_profile is None else max(self.wear_profile)
+        )
 
     def apply(self, tooth: Tooth, number: int) -> Tooth:
         """Take the worn layer off."""
         if self.size() == 0.0:
             return tooth
         shape = (1.0,) * 2 if self.wear_profile is None else self.wear_profile
-        depth = self.wear_depth * np.interp(_share(tooth), np.linspace(0.0, 1.0, len(shape)), shape)
+        depth = self.wear_depth * np.interp(
+            _share(tooth), np.linspace(0.0, 1.0, len(shape)), shape
+        )
         return tooth.with_loss(tooth.material_loss + depth)
 
 

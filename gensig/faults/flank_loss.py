@@ -74,7 +74,10 @@ def remove_patch(tooth: Tooth, patch: Patch, name: str) -> Tooth:
     if patch.length * patch.width * patch.depth == 0.0:
         return tooth
     _require_on_flank(tooth, patch, name)
-    begin, end = patch.face_position - 0.5 * patch.width, patch.face_position + 0.5 * patch.width
+    begin, end = (
+        patch.face_position - 0.5 * patch.width,
+        patch.face_position + 0.5 * patch.width,
+    )
     n_strips = 1 if patch.shape == "rectangular" else N_STRIPS
     sliced = tooth.split(np.linspace(begin, end, n_strips + 1))
     return sliced.with_loss(patch_loss(sliced, patch))
@@ -99,7 +102,10 @@ def _require_on_flank(tooth: Tooth, patch: Patch, name: str) -> None:
             f"flank of the {gear.name} tooth, which reaches from {(flank[0] - root) * 1e3:.4g} to "
             f"{(flank[-1] - root) * 1e3:.4g} mm; change fault.{name}_position_mm or fault.{name}_length_mm"
         )
-    begin, end = patch.face_position - 0.5 * patch.width, patch.face_position + 0.5 * patch.width
+    begin, end = (
+        patch.face_position - 0.5 * patch.width,
+        patch.face_position + 0.5 * patch.width,
+    )
     if begin < -1e-9 or end > gear.face_width + 1e-9:
         raise FaultError(
             f"the {name} from {begin * 1e3:.4g} to {end * 1e3:.4g} mm across the face leaves the {gear.name} tooth, "

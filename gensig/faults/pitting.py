@@ -58,7 +58,11 @@ class Pitting(Fault):
 
     def severity(self, gear: Gear) -> float:
         """Pitted share of the flank (involute height on the tooth axis times face width)."""
-        return 0.0 if self.pit_depth == 0.0 else self.pit_length * self.pit_width / flank_area(gear)
+        return (
+            0.0
+            if self.pit_depth == 0.0
+            else self.pit_length * self.pit_width / flank_area(gear)
+        )
 
     def on_other_flank(self) -> None:
         """None: a pit is in one flank."""
@@ -91,8 +95,15 @@ class Spalling(Fault):
 
     def __post_init__(self) -> None:
         Fault.__post_init__(self)
-        require_not_negative(self, "spall_length_mm", "spall_width_mm", "spall_depth_mm")
-        require(self, "spall_shape", self.spall_shape in SHAPES, f"is none of {', '.join(SHAPES)}")
+        require_not_negative(
+            self, "spall_length_mm", "spall_width_mm", "spall_depth_mm"
+        )
+        require(
+            self,
+            "spall_shape",
+            self.spall_shape in SHAPES,
+            f"is none of {', '.join(SHAPES)}",
+        )
 
     def severity(self, gear: Gear) -> float:
         """Spalled share of the flank."""
@@ -131,7 +142,9 @@ def _patch(
         length=size[0],
         width=size[1],
         depth=size[2],
-        abscissa=pitch_abscissa(gear) if position is None else root_chord_abscissa(gear) + position,
+        abscissa=pitch_abscissa(gear)
+        if position is None
+        else root_chord_abscissa(gear) + position,
         face_position=0.5 * gear.face_width if face_position is None else face_position,
     )
 
@@ -165,12 +178,21 @@ class DistributedPitting(Fault):
     def __post_init__(self) -> None:
         Fault.__post_init__(self)
         require(self, "region_low", self.region_low >= 0.0, "must not be negative")
-        require(self, "region_high", self.region_high <= 1.0, "must not be above 1, the tip")
+        require(
+            self, "region_high", self.region_high <= 1.0, "must not be above 1, the tip"
+        )
         rule = f"must lie below region_high = {self.region_high:g}"
         require(self, "region_low", self.region_low < self.region_high, rule)
         require(self, "pit_diameter_mm", self.pit_diameter > 0.0, "must be positive")
-        require(self, "depth_ratio", 0.0 < self.depth_ratio <= 0.5, "must lie in 0..0.5")
-        require(self, "diameter_scatter", 0.0 <= self.diameter_scatter <= 1.0, "must lie in 0..1")
+        require(
+            self, "depth_ratio", 0.0 < self.depth_ratio <= 0.5, "must lie in 0..0.5"
+        )
+        require(
+            self,
+            "diameter_scatter",
+            0.0 <= self.diameter_scatter <= 1.0,
+            "must lie in 0..1",
+        )
         require(self, "pit_seed", self.pit_seed >= 0, "must not be negative")
         most = 0.7 * (self.region_high - self.region_low)
         rule = f"must lie in 0..{most:.3g}, 0.7 of the region: pits overlap"
@@ -198,7 +220,9 @@ class DistributedPitting(Fault):
         cell_area = np.outer(sliced.slice_width, np.gradient(flank)) / flank_area(gear)
         loss = np.zeros_like(cell_area)
         for _ in range(MOST_PITS):
-            loss = np.maximum(loss, patch_loss(sliced, self._draw(rng, gear, low, high)))
+            loss = np.maximum(
+                loss, patch_loss(sliced, self._draw(rng, gear, low, high))
+            )
             if float(cell_area[loss > 0.0].sum()) >= self.pitted_share:
                 return sliced.with_loss(loss)
         raise FaultError(
@@ -206,8 +230,12 @@ class DistributedPitting(Fault):
             f"{self.pitted_share:g}; increase fault.pit_diameter_mm"
         )
 
-    def _draw(self, rng: np.random.Generator, gear: Gear, low: float, high: float) -> Patch:
-        diameter = self.pit_diameter * math.exp(self.diameter_scatter * rng.standard_normal())
+    def _draw(
+        self, rng: np.random.Generator, gear: Gear, low: float, high: float
+    ) -> Patch:
+        diameter = self.pit_diameter * math.exp(
+            self.diameter_scatter * rng.standard_normal()
+        )
         share = self.region_low + (self.region_high - self.region_low) * rng.random()
         return Patch(
             shape="elliptic",

@@ -9,7 +9,14 @@ from gensig.errors import FaultError
 from gensig.faults.base import Fault
 from gensig.faults.broken import BrokenTooth, ChippedTooth, MissingTooth
 from gensig.faults.crack import Crack
-from gensig.faults.flank_form import Misalignment, PitchError, ProfileError, Runout, TipRelief, Wear
+from gensig.faults.flank_form import (
+    Misalignment,
+    PitchError,
+    ProfileError,
+    Runout,
+    TipRelief,
+    Wear,
+)
 from gensig.faults.pitting import DistributedPitting, Pitting, Spalling
 from gensig.units import read
 
@@ -23,7 +30,9 @@ FAULTS: dict[str, type[Fault]] = {
 COMPOUND = "compound"
 
 
-def fault_parts(values: Mapping[str, Any], where: str = "fault") -> list[Mapping[str, Any]]:
+def fault_parts(
+    values: Mapping[str, Any], where: str = "fault"
+) -> list[Mapping[str, Any]]:
     """The single faults that a configuration's fault is made of.
 
     None for healthy, the parts of a compound one.
@@ -39,7 +48,9 @@ def fault_parts(values: Mapping[str, Any], where: str = "fault") -> list[Mapping
         or not parts
         or not all(isinstance(part, Mapping) for part in parts)
     ):
-        raise FaultError(f"{where}.parts = {parts!r} must be a list of faults, each with its kind")
+        raise FaultError(
+            f"{where}.parts = {parts!r} must be a list of faults, each with its kind"
+        )
     unknown = sorted(set(values) - {"kind", "parts", "vary"})
     if unknown:
         raise FaultError(
@@ -56,7 +67,9 @@ def read_faults(values: Mapping[str, Any], where: str = "fault") -> tuple[Fault,
     parts = fault_parts(values, where)
     if values.get("kind") != COMPOUND:
         return tuple(_read_fault(part, where) for part in parts)
-    return tuple(_read_fault(part, f"{where}.parts.{place}") for place, part in enumerate(parts))
+    return tuple(
+        _read_fault(part, f"{where}.parts.{place}") for place, part in enumerate(parts)
+    )
 
 
 def without_vary(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -72,5 +85,7 @@ def _read_fault(values: Mapping[str, Any], where: str) -> Fault:
     kind = values.get("kind")
     if kind not in FAULTS:
         alone = "" if ".parts." in where else f"healthy, {COMPOUND}, "
-        raise FaultError(f"{where}.kind = {kind!r}; allowed: {alone}{', '.join(FAULTS)}")
+        raise FaultError(
+            f"{where}.kind = {kind!r}; allowed: {alone}{', '.join(FAULTS)}"
+        )
     return read(FAULTS[kind], keys, where)

@@ -40,7 +40,9 @@ class GearPair:
         same = ("normal_module", "pressure_angle")
         for key in same:
             if getattr(self.pinion, key) != getattr(self.wheel, key):
-                raise GeometryError(f"pinion and wheel cannot mesh: their {key} differs")
+                raise GeometryError(
+                    f"pinion and wheel cannot mesh: their {key} differs"
+                )
         if self.pinion.helix_angle != -self.wheel.helix_angle:
             raise GeometryError(
                 f"pinion and wheel cannot mesh on parallel shafts: helix_angle_deg = "
@@ -48,7 +50,9 @@ class GearPair:
                 f"and of opposite hand (sign)"
             )
         if self.backlash < 0.0:
-            raise GeometryError(f"gear.backlash_um = {self.backlash * 1e6:g} must not be negative")
+            raise GeometryError(
+                f"gear.backlash_um = {self.backlash * 1e6:g} must not be negative"
+            )
         if self.path_of_contact <= 0.0:
             raise GeometryError(
                 "pinion and wheel never touch on the line of action; check teeth and profile shifts"
@@ -78,7 +82,9 @@ class GearPair:
 
     def curvature(self, side: str, position: Array | float) -> Array | float:
         """Curvature radius of a gear's flank at positions s, m."""
-        by_side = dict(zip(SIDES, (self.pinion_curvature, self.wheel_curvature), strict=True))
+        by_side = dict(
+            zip(SIDES, (self.pinion_curvature, self.wheel_curvature), strict=True)
+        )
         return by_side[side](position)
 
     def speed_ratio(self, side: str) -> float:
@@ -102,7 +108,9 @@ class GearPair:
         if self.center_distance_change == 0.0:  # to the bit
             return alpha
         base = self.pinion.base_radius + self.wheel.base_radius
-        return math.acos(min(1.0, base / (base / math.cos(alpha) + self.center_distance_change)))
+        return math.acos(
+            min(1.0, base / (base / math.cos(alpha) + self.center_distance_change))
+        )
 
     @property
     def _angle_without_play(self) -> float:
@@ -133,7 +141,9 @@ class GearPair:
     @property
     def start_curvature_radius(self) -> float:
         """Pinion curvature radius at A, where the wheel's tip meets the pinion's flank."""
-        return self.tangent_length - math.sqrt(self.wheel.tip_radius**2 - self.wheel.base_radius**2)
+        return self.tangent_length - math.sqrt(
+            self.wheel.tip_radius**2 - self.wheel.base_radius**2
+        )
 
     @property
     def end_curvature_radius(self) -> float:
@@ -242,10 +252,19 @@ def _pinion_tip_gap(pair: GearPair, position: Array) -> Array:
     alpha, radius = pair.working_pressure_angle, pair.pinion.tip_radius
     r_p, r_g = pair.pinion.base_radius, pair.wheel.base_radius
     roll_tip = pair.end_curvature_radius / r_p
-    polar = (pair.start_curvature_radius + position) / r_p - roll_tip + math.atan(roll_tip) - alpha
+    polar = (
+        (pair.start_curvature_radius + position) / r_p
+        - roll_tip
+        + math.atan(roll_tip)
+        - alpha
+    )
     x, y = pair.center_distance - radius * np.cos(polar), radius * np.sin(polar)
     return r_g * _flank_lead(
-        np.hypot(x, y), np.arctan2(y, x), r_g, alpha, np.asarray(pair.wheel_curvature(position))
+        np.hypot(x, y),
+        np.arctan2(y, x),
+        r_g,
+        alpha,
+        np.asarray(pair.wheel_curvature(position)),
     )
 
 
@@ -254,11 +273,18 @@ def _wheel_tip_gap(pair: GearPair, position: Array) -> Array:
     r_p, r_g = pair.pinion.base_radius, pair.wheel.base_radius
     roll_tip = math.sqrt(radius**2 - r_g**2) / r_g
     polar = (
-        alpha - np.asarray(pair.wheel_curvature(position)) / r_g + roll_tip - math.atan(roll_tip)
+        alpha
+        - np.asarray(pair.wheel_curvature(position)) / r_g
+        + roll_tip
+        - math.atan(roll_tip)
     )
     x, y = pair.center_distance - radius * np.cos(polar), radius * np.sin(polar)
     return r_p * _flank_lead(
-        np.hypot(x, y), -np.arctan2(y, x), r_p, alpha, np.asarray(pair.pinion_curvature(position))
+        np.hypot(x, y),
+        -np.arctan2(y, x),
+        r_p,
+        alpha,
+        np.asarray(pair.pinion_curvature(position)),
     )
 
 

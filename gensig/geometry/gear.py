@@ -9,7 +9,9 @@ from gensig.errors import GeometryError
 from gensig.geometry.involute import involute
 from gensig.units import from_si, unit
 
-LARGEST_HELIX = 45.0  # degrees; beyond, the slices of a tooth are no spur teeth any more
+LARGEST_HELIX = (
+    45.0  # degrees; beyond, the slices of a tooth are no spur teeth any more
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +74,9 @@ class Gear:
 
     def _check_ranges(self) -> None:
         if self.n_teeth < 3:
-            raise GeometryError(f"{self.name}: n_teeth = {self.n_teeth} must be at least 3")
+            raise GeometryError(
+                f"{self.name}: n_teeth = {self.n_teeth} must be at least 3"
+            )
         for key in ("normal_module_mm", "face_width_mm", "addendum_coefficient"):
             value = from_si(key, getattr(self, key.removesuffix("_mm")))
             if not value > 0.0:
@@ -91,7 +95,9 @@ class Gear:
                 f"{self.name}: clearance_coefficient = {self.clearance_coefficient:g} must lie in 0..1"
             )
         rounding = self.cutter_tip_radius_coefficient
-        room = self.clearance_coefficient / (1.0 - math.sin(self.transverse_pressure_angle))
+        room = self.clearance_coefficient / (
+            1.0 - math.sin(self.transverse_pressure_angle)
+        )
         if not 0.0 < rounding <= room * 1.001:
             raise GeometryError(
                 f"{self.name}: cutter_tip_radius_coefficient = {rounding:g} must be positive and at most "
@@ -136,7 +142,9 @@ class Gear:
     @property
     def root_radius(self) -> float:
         """Root radius r_f that the cutter's tip generates."""
-        depth = self.addendum_coefficient + self.clearance_coefficient - self.profile_shift
+        depth = (
+            self.addendum_coefficient + self.clearance_coefficient - self.profile_shift
+        )
         return self.pitch_radius - depth * self.normal_module
 
     @property
@@ -155,7 +163,9 @@ class Gear:
 
     def half_tooth_angle_at(self, radius: float) -> float:
         """Half tooth angle on the circle of ``radius`` (at least the base radius)."""
-        return self.half_tooth_angle_base - involute(math.acos(min(1.0, self.base_radius / radius)))
+        return self.half_tooth_angle_base - involute(
+            math.acos(min(1.0, self.base_radius / radius))
+        )
 
     @property
     def cutter_tip_radius(self) -> float:
@@ -165,7 +175,9 @@ class Gear:
     @property
     def rounding_center_depth(self) -> float:
         """Distance a_1 from the pitch line to the centre of the rack's tip rounding."""
-        depth = self.addendum_coefficient + self.clearance_coefficient - self.profile_shift
+        depth = (
+            self.addendum_coefficient + self.clearance_coefficient - self.profile_shift
+        )
         return depth * self.normal_module - self.cutter_tip_radius
 
     @property
@@ -174,7 +186,9 @@ class Gear:
         rounding.
         """
         alpha, rounding = self.transverse_pressure_angle, self.cutter_tip_radius
-        depth = (self.addendum_coefficient + self.clearance_coefficient) * self.normal_module
+        depth = (
+            self.addendum_coefficient + self.clearance_coefficient
+        ) * self.normal_module
         return (
             math.pi * self.transverse_module / 4.0
             + depth * math.tan(alpha)
@@ -201,4 +215,6 @@ class Gear:
         Not positive when undercut.
         """
         alpha = self.transverse_pressure_angle
-        return self.base_radius * math.tan(alpha) - self.straight_flank_depth / math.sin(alpha)
+        return self.base_radius * math.tan(
+            alpha
+        ) - self.straight_flank_depth / math.sin(alpha)

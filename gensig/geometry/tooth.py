@@ -73,7 +73,9 @@ class Tooth:
     @property
     def cell_half_thickness(self) -> Array:
         """Half thickness of the sound outline at the cell centres, (cell,) m."""
-        return 0.5 * (self.profile.half_thickness[1:] + self.profile.half_thickness[:-1])
+        return 0.5 * (
+            self.profile.half_thickness[1:] + self.profile.half_thickness[:-1]
+        )
 
     @property
     def tip_curvature_radius(self) -> float:

@@ -36,9 +36,9 @@ def root_curve(gear: Gear, gamma: Array) -> tuple[Array, Array]:
     r = gear.pitch_radius
     phi = (a1 / np.tan(gamma) + b1) / r
     reach = a1 / np.sin(gamma) + gear.cutter_tip_radius
-    return r * np.cos(phi) - reach * np.sin(gamma - phi), r * np.sin(phi) - reach * np.cos(
-        gamma - phi
-    )
+    return r * np.cos(phi) - reach * np.sin(gamma - phi), r * np.sin(
+        phi
+    ) - reach * np.cos(gamma - phi)
 
 
 def involute_point(gear: Gear, curvature_radius: Array) -> tuple[Array, Array]:

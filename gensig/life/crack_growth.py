@@ -54,8 +54,14 @@ class CrackGrowthOptions(GrowthOptions):
             ("threshold", -1e-9, 1e9),
         ):
             if not low < getattr(self, key) <= high:
-                allowed = "must not be negative" if low < 0.0 else f"must lie above 0, to {high:g}"
-                raise ConfigError(f"life.crack.{key} = {getattr(self, key):g}: it {allowed}")
+                allowed = (
+                    "must not be negative"
+                    if low < 0.0
+                    else f"must lie above 0, to {high:g}"
+                )
+                raise ConfigError(
+                    f"life.crack.{key} = {getattr(self, key):g}: it {allowed}"
+                )
         if not 0.0 < self.width_share <= 1.0:
             raise ConfigError(
                 f"life.crack.width_share = {self.width_share:g} must lie above 0, to 1"
@@ -64,7 +70,9 @@ class CrackGrowthOptions(GrowthOptions):
             raise ConfigError(
                 f"life.crack.end_share = {self.end_share:g}: cracks are known up to {DEEPEST:g} of the root chord"
             )
-        smallest, largest = (self.start_share * factor for factor in (1.0 / self.most, self.most))
+        smallest, largest = (
+            self.start_share * factor for factor in (1.0 / self.most, self.most)
+        )
         if smallest < LEAST_DEPTH or largest >= self.end_share:
             raise ConfigError(
                 f"life.crack.start_share = {self.start_share:g} spreads from {smallest:.3g} to {largest:.3g} among "
@@ -134,9 +142,15 @@ class CrackGrowth(GrowthLaw):
         """
         if len(self.torques) == 1:
             return self.intensity[0]
-        place = float(np.interp(np.log(torque), np.log(self.torques), np.arange(len(self.torques))))
+        place = float(
+            np.interp(
+                np.log(torque), np.log(self.torques), np.arange(len(self.torques))
+            )
+        )
         row = min(int(place), len(self.torques) - 2)
-        return (row + 1 - place) * self.intensity[row] + (place - row) * self.intensity[row + 1]
+        return (row + 1 - place) * self.intensity[row] + (place - row) * self.intensity[
+            row + 1
+        ]
 
 
 def crack_growth(
@@ -163,16 +177,18 @@ def crack_growth(
             f"system=helical_pair, whose pairs share the load"
         )
     gear = pair.gears[crack.gear]
-    zone = np.linspace(pair.path_of_contact - pair.base_pitch, pair.base_pitch, N_PLACES)
+    zone = np.linspace(
+        pair.path_of_contact - pair.base_pitch, pair.base_pitch, N_PLACES
+    )
     curvature = np.asarray(pair.curvature(crack.gear, zone))
     chord, strain = crack.root_chord(gear), material.in_plane("plane_strain")
     tooth = healthy_tooth(gear)
     sizes = crack_depths(options, chord)
 
     def compliance(depth: float, width: float | None) -> Array:
-        cut = replace(crack, crack_depth=depth, crack_width=width, crack_front="straight").apply(
-            tooth, 0
-        )
+        cut = replace(
+            crack, crack_depth=depth, crack_width=width, crack_front="straight"
+        ).apply(tooth, 0)
         return crack_compliance(cut, curvature, strain, allow_extrapolation=True)
 
     if options.width_share == 1.0:
@@ -189,7 +205,8 @@ def crack_growth(
         sizes=sizes,
         width=width,
         torques=np.ones(1),
-        intensity=np.sqrt(np.maximum(greatest, 0.0) * strain.youngs_modulus)[None] * force,
+        intensity=np.sqrt(np.maximum(greatest, 0.0) * strain.youngs_modulus)[None]
+        * force,
         face_width=gear.face_width,
         meshes=pair.speed_ratio(crack.gear),
     )
@@ -214,7 +231,10 @@ def _slope(depth: Array, values: Array) -> Array:
     """Derivative over the depth, (depth, place)."""
     from scipy.interpolate import CubicSpline
 
-    return np.asarray(CubicSpline(np.log(depth), values, axis=0)(np.log(depth), 1)) / depth[:, None]
+    return (
+        np.asarray(CubicSpline(np.log(depth), values, axis=0)(np.log(depth), 1))
+        / depth[:, None]
+    )
 
 
 def _part_of_face(
@@ -228,7 +248,8 @@ def _part_of_face(
     depths, widths = sizes[::WIDTH_STEP], crack_widths(face, options)
     table = np.array([[compliance(float(a), float(w)) for w in widths] for a in depths])
     splines = [
-        RectBivariateSpline(np.log(depths), widths, table[:, :, k]) for k in range(table.shape[2])
+        RectBivariateSpline(np.log(depths), widths, table[:, :, k])
+        for k in range(table.shape[2])
     ]
 
     def release(depth: float, width: float) -> tuple[float, float]:
@@ -243,7 +264,11 @@ def _part_of_face(
         by_depth, by_width = release(float(depth), now)
         width[k], greatest[k] = now, by_depth
         if k + 1 < len(sizes) and now < face:
-            ratio = (by_width / by_depth) ** (0.5 * options.exponent) if by_depth > 0.0 else 0.0
+            ratio = (
+                (by_width / by_depth) ** (0.5 * options.exponent)
+                if by_depth > 0.0
+                else 0.0
+            )
             now = min(now + ratio * float(sizes[k + 1] - depth), face)
     return width, greatest
 

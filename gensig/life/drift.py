@@ -28,13 +28,20 @@ class Drift:
                 f"life.drift: change = {self.change:g} must lie in -1..100, -1 excluded"
             )
         if not self.time > 0.0:
-            raise ConfigError(f"life.drift: time_h = {self.time / 3600.0:g} must be positive")
+            raise ConfigError(
+                f"life.drift: time_h = {self.time / 3600.0:g} must be positive"
+            )
         if not 0.0 <= self.scatter <= 2.0:
-            raise ConfigError(f"life.drift: scatter = {self.scatter:g} must lie in 0..2")
+            raise ConfigError(
+                f"life.drift: scatter = {self.scatter:g} must lie in 0..2"
+            )
 
     def factor(self, running: float, unit_factor: float) -> float:
         """On the number, after so many s of running.
 
         ``unit_factor`` is the unit's own on the change.
         """
-        return max(1.0 + self.change * unit_factor * (1.0 - math.exp(-running / self.time)), 0.01)
+        return max(
+            1.0 + self.change * unit_factor * (1.0 - math.exp(-running / self.time)),
+            0.01,
+        )

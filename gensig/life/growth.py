@@ -60,11 +60,16 @@ class GrowthLaw(ABC):
         middle, width = 0.5 * (self.sizes[1:] + self.sizes[:-1]), np.diff(self.sizes)
         rates = np.array(
             [
-                np.mean([self.rate(middle, float(one)) for one in np.atleast_1d(row)], axis=0)
+                np.mean(
+                    [self.rate(middle, float(one)) for one in np.atleast_1d(row)],
+                    axis=0,
+                )
                 for row in torque
             ]
         )
-        return np.divide(width, rates, out=np.full_like(rates, np.inf), where=rates > 0.0)
+        return np.divide(
+            width, rates, out=np.full_like(rates, np.inf), where=rates > 0.0
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -95,7 +100,9 @@ class Course:
         Never within a standstill.
         """
         last = len(self.running) - 2
-        piece = min(max(int(np.searchsorted(self.running, running, side="right")) - 1, 0), last)
+        piece = min(
+            max(int(np.searchsorted(self.running, running, side="right")) - 1, 0), last
+        )
         while piece > 0 and self.running[piece + 1] == self.running[piece]:
             piece -= 1  # a standstill at the very end
         begin, end = self.running[piece], self.running[piece + 1]
@@ -125,7 +132,10 @@ def grow(sizes: Array, turns: Array, history: History, start: float) -> Course:
     knots: list[tuple[float, float, float, float, int, bool]] = []
     failed = False
     blocks = zip(
-        history.begin.tolist(), history.end.tolist(), history.setpoint.tolist(), strict=True
+        history.begin.tolist(),
+        history.end.tolist(),
+        history.setpoint.tolist(),
+        strict=True,
     )
     for begin, end, setpoint in blocks:
         seconds_a_turn = 2.0 * math.pi / float(history.speed[setpoint])
@@ -133,7 +143,11 @@ def grow(sizes: Array, turns: Array, history: History, start: float) -> Course:
         while left > 0.0:
             whole = per_cell[setpoint][cell]
             width = nodes[cell + 1] - nodes[cell]
-            needed = whole * (nodes[cell + 1] - size) / width if math.isfinite(whole) else math.inf
+            needed = (
+                whole * (nodes[cell + 1] - size) / width
+                if math.isfinite(whole)
+                else math.inf
+            )
             knots.append((clock, running, turned, size, setpoint, math.isfinite(whole)))
             spent = min(needed, left)
             crossed = needed <= left

@@ -34,10 +34,14 @@ class LifeMap:
     @property
     def hours(self) -> Array:
         """(torque, speed)."""
-        return np.array([[hours(turns, speed) for speed in self.speed] for turns in self.turns])
+        return np.array(
+            [[hours(turns, speed) for speed in self.speed] for turns in self.turns]
+        )
 
 
-def life_map(case: WearCase, torques: Sequence[float], speeds: Sequence[float]) -> LifeMap:
+def life_map(
+    case: WearCase, torques: Sequence[float], speeds: Sequence[float]
+) -> LifeMap:
     """Lives of a pair under other torques in N m and at speeds in rad/s.
 
     Raises
@@ -52,7 +56,9 @@ def life_map(case: WearCase, torques: Sequence[float], speeds: Sequence[float]) 
     torque = np.unique(np.asarray(torques, dtype=np.float64))
     turns = np.array([_life_under(case, float(one)) for one in torque])
     return LifeMap(
-        torque=torque, speed=np.unique(np.asarray(speeds, dtype=np.float64)), turns=turns
+        torque=torque,
+        speed=np.unique(np.asarray(speeds, dtype=np.float64)),
+        turns=turns,
     )
 
 
@@ -69,7 +75,9 @@ def torque_exponent(case: WearCase) -> float:
         wear_life(case.under(case.torque * (1.0 + step))).life
         for step in (-EXPONENT_STEP, EXPONENT_STEP)
     )
-    return -math.log(high / low) / math.log((1.0 + EXPONENT_STEP) / (1.0 - EXPONENT_STEP))
+    return -math.log(high / low) / math.log(
+        (1.0 + EXPONENT_STEP) / (1.0 - EXPONENT_STEP)
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,7 +106,9 @@ class FittedLaw:
             return self.a - self.b * np.log(torque)
         return self.a * np.exp(-self.b * np.asarray(speed))
 
-    def life(self, torque: float, speed: float, *, allow_extrapolation: bool = False) -> float:
+    def life(
+        self, torque: float, speed: float, *, allow_extrapolation: bool = False
+    ) -> float:
         """Hours of life.
 
         Raises
@@ -110,7 +120,10 @@ class FittedLaw:
             ("torque", torque, self.torque),
             ("speed", speed, self.speed),
         ):
-            if not low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9) and not allow_extrapolation:
+            if (
+                not low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9)
+                and not allow_extrapolation
+            ):
                 unit = "N m" if name == "torque" else "rad/s"
                 raise ExtrapolationError(
                     f"the {self.form} law was fitted for a {name} of {low:g} to {high:g} {unit}, not {value:g}; take "
@@ -149,13 +162,22 @@ def fitted_laws(lives: LifeMap, torque: float, speed: float) -> tuple[FittedLaw,
     at_speed = int(np.argmin(np.abs(lives.speed - speed)))
     at_torque = int(np.argmin(np.abs(lives.torque - torque)))
     values = lives.hours
-    log_torque, log_speed = np.meshgrid(np.log(lives.torque), np.log(lives.speed), indexing="ij")
-    columns = np.stack([np.ones(values.size), -log_torque.ravel(), -log_speed.ravel()], axis=1)
-    constant, by_torque, by_speed = np.linalg.lstsq(columns, np.log(values).ravel(), rcond=None)[0]
+    log_torque, log_speed = np.meshgrid(
+        np.log(lives.torque), np.log(lives.speed), indexing="ij"
+    )
+    columns = np.stack(
+        [np.ones(values.size), -log_torque.ravel(), -log_speed.ravel()], axis=1
+    )
+    constant, by_torque, by_speed = np.linalg.lstsq(
+        columns, np.log(values).ravel(), rcond=None
+    )[0]
     slope, level = np.polyfit(np.log(lives.torque), values[:, at_speed], 1)
     decay, start = np.polyfit(lives.speed, np.log(values[at_torque]), 1)
     spans = {"torque": _span(lives.torque), "speed": _span(lives.speed)}
-    at = {"torque": (lives.torque[at_torque],) * 2, "speed": (lives.speed[at_speed],) * 2}
+    at = {
+        "torque": (lives.torque[at_torque],) * 2,
+        "speed": (lives.speed[at_speed],) * 2,
+    }
     return (
         _law("power", (math.exp(constant), by_torque, by_speed), spans, lives, values),
         _law(
@@ -184,17 +206,30 @@ def _law(
 ) -> FittedLaw:
     a, b, c = (float(number) for number in numbers)
     law = FittedLaw(
-        form=form, a=a, b=b, c=c, largest_error=0.0, torque=spans["torque"], speed=spans["speed"]
+        form=form,
+        a=a,
+        b=b,
+        c=c,
+        largest_error=0.0,
+        torque=spans["torque"],
+        speed=spans["speed"],
     )
     found = law.formula(lives.torque[:, None], lives.speed)
     error = np.max(
         np.abs(
-            np.broadcast_to(found, np.broadcast_shapes(np.shape(found), values.shape)) / values
+            np.broadcast_to(found, np.broadcast_shapes(np.shape(found), values.shape))
+            / values
             - 1.0
         )
     )
     return FittedLaw(
-        form=form, a=a, b=b, c=c, largest_error=float(error), torque=law.torque, speed=law.speed
+        form=form,
+        a=a,
+        b=b,
+        c=c,
+        largest_error=float(error),
+        torque=law.torque,
+        speed=law.speed,
     )
 
 

@@ -73,9 +73,13 @@ class LifeOptions:
 
     def __post_init__(self) -> None:
         if self.n_setpoints < 1:
-            raise ConfigError(f"life.n_setpoints = {self.n_setpoints} must be at least 1")
+            raise ConfigError(
+                f"life.n_setpoints = {self.n_setpoints} must be at least 1"
+            )
         if not self.horizon > 0.0:
-            raise ConfigError(f"life.horizon_h = {self.horizon / 3600.0:g} must be positive")
+            raise ConfigError(
+                f"life.horizon_h = {self.horizon / 3600.0:g} must be positive"
+            )
         if self.snapshot_count < 3:
             raise ConfigError(
                 f"life.snapshot_count = {self.snapshot_count}: a life needs 3 snapshots or more"
@@ -106,7 +110,9 @@ def read_life(life: Mapping[str, Any]) -> LifeOptions:
     ConfigError    for keys or values that make no life
     """
     if life.get("kind") != RUN_TO_FAILURE:
-        raise ConfigError(f"life.kind = {life.get('kind')!r}; allowed: {NO_LIFE}, {RUN_TO_FAILURE}")
+        raise ConfigError(
+            f"life.kind = {life.get('kind')!r}; allowed: {NO_LIFE}, {RUN_TO_FAILURE}"
+        )
     own = {key: value for key, value in life.items() if key != "kind"}
     laws: dict[str, GrowthOptions] = {}
     for kind, fault in FAULTS.items():
@@ -133,7 +139,10 @@ def read_life(life: Mapping[str, Any]) -> LifeOptions:
         "life",
         drawn=drawn,
         blocks=_blocks(own.get("blocks")),
-        drift={key: read(Drift, values, f"life.drift.{key}") for key, values in drift.items()},
+        drift={
+            key: read(Drift, values, f"life.drift.{key}")
+            for key, values in drift.items()
+        },
         laws=laws,
     )
 
@@ -154,15 +163,20 @@ def _blocks(rows: Any) -> tuple[tuple[float, ...], ...] | None:
         return None
     shape = f"a list of [{', '.join(BLOCK_COLUMNS)}]"
     if not isinstance(rows, list | tuple) or not rows:
-        raise ConfigError(f"life.blocks = {rows!r} must be {shape}, or null to draw them")
+        raise ConfigError(
+            f"life.blocks = {rows!r} must be {shape}, or null to draw them"
+        )
     found = []
     for place, row in enumerate(rows):
         if not isinstance(row, list | tuple) or len(row) != len(BLOCK_COLUMNS):
-            raise ConfigError(f"life.blocks.{place} = {row!r}: life.blocks must be {shape}")
+            raise ConfigError(
+                f"life.blocks.{place} = {row!r}: life.blocks must be {shape}"
+            )
         numbers = zip(BLOCK_COLUMNS, row, strict=True)
         found.append(
             tuple(
-                to_si(key, _number(f"life.blocks.{place}.{key}", value)) for key, value in numbers
+                to_si(key, _number(f"life.blocks.{place}.{key}", value))
+                for key, value in numbers
             )
         )
     return tuple(found)

@@ -88,11 +88,17 @@ class DrawnBlocks:
                     f"and in order"
                 )
         if not 0.0 <= self.gap_chance < 1.0:
-            raise ConfigError(f"life.gap_chance = {self.gap_chance:g} must lie in 0..1, 1 excluded")
+            raise ConfigError(
+                f"life.gap_chance = {self.gap_chance:g} must lie in 0..1, 1 excluded"
+            )
 
 
 def draw_history(
-    blocks: DrawnBlocks, speed: Array, torque: Array, horizon: float, rng: np.random.Generator
+    blocks: DrawnBlocks,
+    speed: Array,
+    torque: Array,
+    horizon: float,
+    rng: np.random.Generator,
 ) -> History:
     """Blocks at set-points drawn with equal chance, up to the horizon in s of clock time, where
     the last is cut.
@@ -118,7 +124,11 @@ def draw_history(
     kept = begin < horizon
     end = np.minimum(begin + lengths, horizon)
     return History(
-        begin=begin[kept], end=end[kept], setpoint=setpoint[kept], speed=speed, torque=torque
+        begin=begin[kept],
+        end=end[kept],
+        setpoint=setpoint[kept],
+        speed=speed,
+        torque=torque,
     )
 
 
@@ -141,7 +151,9 @@ def given_history(rows: tuple[tuple[float, ...], ...], horizon: float) -> Histor
         torque=points[:, 1],
     )
     if not kept.any():
-        raise ConfigError(f"life.blocks: none begins before life.horizon_h = {horizon / 3600.0:g}")
+        raise ConfigError(
+            f"life.blocks: none begins before life.horizon_h = {horizon / 3600.0:g}"
+        )
     return History(
         begin=whole.begin[kept],
         end=np.minimum(whole.end[kept], horizon),

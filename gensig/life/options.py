@@ -70,18 +70,26 @@ class WearOptions:
         for key, allowed in CHOICES.items():
             value = getattr(self, key)
             if value not in allowed and not (key == "sharing" and value is None):
-                raise ConfigError(f"wear.{key} = {value!r}; allowed: {', '.join(allowed)}")
+                raise ConfigError(
+                    f"wear.{key} = {value!r}; allowed: {', '.join(allowed)}"
+                )
         if not 1 <= self.n_intervals <= 1_000_000:
-            raise ConfigError(f"wear.n_intervals = {self.n_intervals} must lie in 1..1000000")
+            raise ConfigError(
+                f"wear.n_intervals = {self.n_intervals} must lie in 1..1000000"
+            )
         ends = (
             "threshold_um",
             "transmission_error_limit_um",
             "vibration_limit_m_per_s2",
             "vibration_rise_db",
         )
-        _require_positive("wear", self, (*ends, "step_um", "coefficient", "hardness_hbs"))
+        _require_positive(
+            "wear", self, (*ends, "step_um", "coefficient", "hardness_hbs")
+        )
         for name in SIDES:
-            _require_positive(f"wear.{name}", getattr(self, name), ("coefficient", "hardness_hbs"))
+            _require_positive(
+                f"wear.{name}", getattr(self, name), ("coefficient", "hardness_hbs")
+            )
         for place, values in (
             ("wear", self),
             *((f"wear.{name}", getattr(self, name)) for name in SIDES),
@@ -114,11 +122,16 @@ def _require_positive(place: str, values: Any, keys: tuple[str, ...]) -> None:
     for key in keys:
         value = getattr(values, split_unit(key)[0])
         if value is not None and not value > 0.0:
-            raise ConfigError(f"{place}.{key} = {from_si(key, value):g} must be positive")
+            raise ConfigError(
+                f"{place}.{key} = {from_si(key, value):g} must be positive"
+            )
 
 
 def read_wear_options(values: Section) -> WearOptions:
     """Options from the boundary keys of ``wear``."""
-    sides = {name: read(FlankMaterial, values.get(name, {}), f"wear.{name}") for name in SIDES}
+    sides = {
+        name: read(FlankMaterial, values.get(name, {}), f"wear.{name}")
+        for name in SIDES
+    }
     own = {key: value for key, value in values.items() if key not in SIDES}
     return read(WearOptions, own, "wear", **sides)

@@ -89,9 +89,14 @@ class PitGrowth(GrowthLaw):
 
     def rate(self, size: Array, torque: float) -> Array:
         """Damage a turn of the pinion, (size,): Miner's sum (ISO 6336-6)."""
-        at_one = float(np.interp(math.log(torque), np.log(self.torques), self.stress_at_one))
+        at_one = float(
+            np.interp(math.log(torque), np.log(self.torques), self.stress_at_one)
+        )
         stress = at_one * math.sqrt(torque)
-        lasting = self.options.cycles * (self.options.strength / stress) ** self.options.exponent
+        lasting = (
+            self.options.cycles
+            * (self.options.strength / stress) ** self.options.exponent
+        )
         return np.full(np.shape(size), self.meshes / lasting)
 
     def n_pits(self, size: float) -> float:
@@ -131,7 +136,10 @@ def contact_stress(pair: GearPair, material: Material, torque: float) -> float:
     Hertz's largest pressure of the two flanks at the pitch point, the whole load on one pair (ISO
     6336-2, sigma_H0).
     """
-    radii = (pair.pinion_curvature(pair.pitch_point), pair.wheel_curvature(pair.pitch_point))
+    radii = (
+        pair.pinion_curvature(pair.pitch_point),
+        pair.wheel_curvature(pair.pitch_point),
+    )
     curvature = sum(1.0 / float(radius) for radius in radii)
     reduced = material.youngs_modulus / (1.0 - material.poisson_ratio**2)
     load = torque / pair.pinion.base_radius / pair.face_width
@@ -176,7 +184,9 @@ def pit_growth(
         area=flank_area(gear),
     )
     if law.first_diameter <= 0.0 or not law.share(2.0) > 0.0:
-        raise ConfigError("life: pits without a diameter never reach life.pitting.end_share")
+        raise ConfigError(
+            "life: pits without a diameter never reach life.pitting.end_share"
+        )
     most = 0.7 * (pits.region_high - pits.region_low)
     if options.end_share > most:
         raise ConfigError(
@@ -188,11 +198,17 @@ def pit_growth(
     low = 1.0
     for _ in range(60):
         middle = 0.5 * (low + end)
-        low, end = (middle, end) if law.share(middle) < options.end_share else (low, middle)
+        low, end = (
+            (middle, end) if law.share(middle) < options.end_share else (low, middle)
+        )
     sizes = np.concatenate(
         [np.linspace(0.0, 1.0, 20, endpoint=False), np.linspace(1.0, end, N_SIZES - 20)]
     )
     return PitGrowth(
-        **{name: getattr(law, name) for name in law.__dataclass_fields__ if name != "sizes"},
+        **{
+            name: getattr(law, name)
+            for name in law.__dataclass_fields__
+            if name != "sizes"
+        },
         sizes=sizes,
     )

@@ -33,7 +33,9 @@ DEPTH_STEP = 10  # nodes of the law between two depths at which the mesh is solv
 N_PHASES = 16  # a base pitch, of the first look
 N_CLOSER = 16  # between the neighbours of the greatest of them
 JUST = 1e-9  # base pitches before the next pair enters, and after one has left: there the others carry most
-DEPTH_SHARE = 1e-3  # of the depth, on either side, over which the energy is differentiated
+DEPTH_SHARE = (
+    1e-3  # of the depth, on either side, over which the energy is differentiated
+)
 WIDTH_STRIPS = 2  # of the crack's front, on either side, the same over the width
 
 
@@ -72,17 +74,29 @@ def sliced_crack_growth(
     def cut(depth: float, width: float) -> SlicedMesh:
         own = None if width >= face else width
         return mesh_of(
-            (replace(crack, tooth=0, crack_depth=depth, crack_width=own, crack_front="straight"),)
+            (
+                replace(
+                    crack,
+                    tooth=0,
+                    crack_depth=depth,
+                    crack_width=own,
+                    crack_front="straight",
+                ),
+            )
         )
 
     def rates(depth: float, width: float) -> Array:
         """Greatest release rate over the depth, and over the width, (torque, 2) N/m."""
-        deeper = [cut(depth * (1.0 + step), width) for step in (-DEPTH_SHARE, DEPTH_SHARE)]
+        deeper = [
+            cut(depth * (1.0 + step), width) for step in (-DEPTH_SHARE, DEPTH_SHARE)
+        ]
         spans = [(deeper, 2.0 * DEPTH_SHARE * depth * width)]
         if width < face:
             step = WIDTH_STRIPS / N_STRIPS * face
             ends = (width - step, min(width + step, face))
-            spans.append(([cut(depth, end) for end in ends], (ends[1] - ends[0]) * depth))
+            spans.append(
+                ([cut(depth, end) for end in ends], (ends[1] - ends[0]) * depth)
+            )
         mesh = cut(depth, width)
         return np.array(
             [
@@ -100,14 +114,18 @@ def sliced_crack_growth(
         sizes=sizes,
         width=_smooth(looked, width, sizes),
         torques=torques,
-        intensity=np.sqrt(np.maximum(greatest, 0.0) * strain.youngs_modulus) / torques[:, None],
+        intensity=np.sqrt(np.maximum(greatest, 0.0) * strain.youngs_modulus)
+        / torques[:, None],
         face_width=face,
         meshes=pair.speed_ratio(crack.gear),
     )
 
 
 def _greatest(
-    mesh: SlicedMesh, gear: str, spans: Sequence[tuple[Sequence[SlicedMesh], float]], force: float
+    mesh: SlicedMesh,
+    gear: str,
+    spans: Sequence[tuple[Sequence[SlicedMesh], float]],
+    force: float,
 ) -> list[float]:
     """Greatest release rates over the engagement of the cracked pair under a force in N, (span,)
     N/m.
@@ -145,7 +163,9 @@ def _greatest(
         seen = released(coarse, ends, area)
         peak = coarse[int(seen.argmax())]
         near = peak + pitch / N_PHASES * (np.arange(1 - N_CLOSER, N_CLOSER) / N_CLOSER)
-        found.append(max(float(seen.max()), float(released(near, ends, area).max()), 0.0))
+        found.append(
+            max(float(seen.max()), float(released(near, ends, area).max()), 0.0)
+        )
     return found
 
 
@@ -153,7 +173,10 @@ def _softening(mesh: SlicedMesh, gear: str, position: Array) -> Array:
     """What the crack makes its pair softer, (phase, slice) m2/N."""
     softening = mesh.sides[gear].softening[-1]
     return np.stack(
-        [np.interp(at, mesh.position, one) for at, one in zip(position.T, softening, strict=True)],
+        [
+            np.interp(at, mesh.position, one)
+            for at, one in zip(position.T, softening, strict=True)
+        ],
         axis=1,
     )
 
@@ -166,7 +189,10 @@ def _smooth(looked: Array, values: Array, sizes: Array) -> Array:
 
 
 def _followed(
-    depths: Array, face: float, options: CrackGrowthOptions, rates: Callable[[float, float], Array]
+    depths: Array,
+    face: float,
+    options: CrackGrowthOptions,
+    rates: Callable[[float, float], Array],
 ) -> tuple[Array, Array]:
     """Width that goes with each depth at the middle torque, (depth,) m, and release rates,
     (depth, torque) N/m.
@@ -186,8 +212,14 @@ def _followed(
             width[k:] = face
             continue
         by_depth, by_width = both[len(both) // 2]
-        wider = depth * (by_width / by_depth) ** (0.5 * options.exponent) if by_depth > 0.0 else 0.0
-        pace = wider if k == 0 else wider + 0.5 * steps[k] / steps[k - 1] * (wider - last)
+        wider = (
+            depth * (by_width / by_depth) ** (0.5 * options.exponent)
+            if by_depth > 0.0
+            else 0.0
+        )
+        pace = (
+            wider if k == 0 else wider + 0.5 * steps[k] / steps[k - 1] * (wider - last)
+        )
         width[k + 1 :] = min(now + pace * float(steps[k]), face)
         last = wider
     return width, np.array(found)

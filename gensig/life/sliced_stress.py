@@ -37,5 +37,7 @@ def sliced_contact_stress(
         contact = loaded_contact(mesh, roll, float(torque) / pair.pinion.base_radius)
         pressure = contact_pressure(mesh, contact, material)
         passing = pressure[own, np.argmax(contact.pair_index == 0, axis=1), own]
-        found.append(np.average(passing**exponent, weights=mesh.slice_width) ** (1.0 / exponent))
+        found.append(
+            np.average(passing**exponent, weights=mesh.slice_width) ** (1.0 / exponent)
+        )
     return np.array(found)

@@ -13,7 +13,9 @@ SPACINGS = ("linear", "logarithmic", "adaptive")
 LAST_SHARE = 1e-3  # of the life, left at the last look but one of a logarithmic row
 
 
-def snapshot_times(course: Course, spacing: str, count: int, every: float | None = None) -> Array:
+def snapshot_times(
+    course: Course, spacing: str, count: int, every: float | None = None
+) -> Array:
     """Running times from new to the end of the life, (snapshot,) s.
 
     Parameters

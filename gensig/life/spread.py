@@ -24,7 +24,9 @@ class Spread:
     def __post_init__(self) -> None:
         for key in ("rate_scatter", "start_scatter"):
             if not 0.0 <= getattr(self, key) <= 2.0:
-                raise ConfigError(f"life: {key} = {getattr(self, key):g} must lie in 0..2")
+                raise ConfigError(
+                    f"life: {key} = {getattr(self, key):g} must lie in 0..2"
+                )
 
     @property
     def largest_start(self) -> float:

@@ -47,10 +47,13 @@ def lower_envelope(standing_back, arc, center, relative_radius, gap):
                         break
                     least = min(least, back[j] + x * x / (2.0 * relative_radius[k]))
                     if j + 1 < n_profile:
-                        least = min(least, _between(back, arc, j, center[k], relative_radius[k]))
+                        least = min(
+                            least, _between(back, arc, j, center[k], relative_radius[k])
+                        )
                     if j > 0:
                         least = min(
-                            least, _between(back, arc, j - 1, center[k], relative_radius[k])
+                            least,
+                            _between(back, arc, j - 1, center[k], relative_radius[k]),
                         )
                     j += direction
             gap[i, k] = least
@@ -108,6 +111,10 @@ def share_over_slices(
                 break
             for position in range(n_bearing):
                 i = order[position]
-                intensity = max((approach - slice_gap[i, k]) / unit[i], LEAST_INTENSITY * even)
-                unit[i] = factor * (constant[k] - log_weight * np.log(intensity)) + bending[k]
+                intensity = max(
+                    (approach - slice_gap[i, k]) / unit[i], LEAST_INTENSITY * even
+                )
+                unit[i] = (
+                    factor * (constant[k] - log_weight * np.log(intensity)) + bending[k]
+                )
         compliance[k] = (approach - first) / load[k] - bending[k] / full

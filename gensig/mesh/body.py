@@ -11,7 +11,10 @@ from gensig.errors import ExtrapolationError
 from gensig.geometry.gear import Gear
 from gensig.material import Material
 from gensig.mesh.body_coupling import cross_compliance
-from gensig.mesh.fillet_foundation import ExtrapolationWarning, fillet_foundation_compliance
+from gensig.mesh.fillet_foundation import (
+    ExtrapolationWarning,
+    fillet_foundation_compliance,
+)
 from gensig.mesh.options import MeshOptions
 
 Array = NDArray[np.float64]

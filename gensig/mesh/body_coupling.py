@@ -19,9 +19,7 @@ from gensig.material import Material
 
 Array = NDArray[np.float64]
 
-STRESS_EXPONENT = (
-    6  # shape xi (1 - xi^6) of the bending stress on the root arc: the one calibrated number
-)
+STRESS_EXPONENT = 6  # shape xi (1 - xi^6) of the bending stress on the root arc: the one calibrated number
 SERIES_LENGTH = 12.0  # harmonics up to n theta_f = 12: cross terms to 1e-4
 
 
@@ -39,14 +37,18 @@ def shared_body_compliance(pair: GearPair, material: Material) -> float:
         pair.pinion,
         material,
         load_angle(pair.pinion, np.asarray(pair.pinion_curvature(position))),
-        load_angle(pair.pinion, np.asarray(pair.pinion_curvature(position + pair.base_pitch))),
+        load_angle(
+            pair.pinion, np.asarray(pair.pinion_curvature(position + pair.base_pitch))
+        ),
         pitches=1,
     )
     wheel = cross_compliance(
         pair.wheel,
         material,
         load_angle(pair.wheel, np.asarray(pair.wheel_curvature(position))),
-        load_angle(pair.wheel, np.asarray(pair.wheel_curvature(position + pair.base_pitch))),
+        load_angle(
+            pair.wheel, np.asarray(pair.wheel_curvature(position + pair.base_pitch))
+        ),
         pitches=-1,
     )
     return float(np.mean(pinion + wheel))
@@ -63,8 +65,12 @@ def cross_compliance(
     loaded, probed : (phase,) rad    load angles on the loaded tooth and on the probed one
     pitches : 0 gives the body compliance under the loaded tooth itself
     """
-    flexibility = arc_flexibility(gear, material, 2.0 * math.pi * pitches / gear.n_teeth)
-    return np.einsum("pi,ij,pj->p", _load(gear, probed), flexibility, _load(gear, loaded))
+    flexibility = arc_flexibility(
+        gear, material, 2.0 * math.pi * pitches / gear.n_teeth
+    )
+    return np.einsum(
+        "pi,ij,pj->p", _load(gear, probed), flexibility, _load(gear, loaded)
+    )
 
 
 @lru_cache(maxsize=64)
@@ -114,7 +120,10 @@ def ring_harmonic(gear: Gear, material: Material, n: int) -> Array:
     if n == 0:
         q = (r_f / r_i) ** 2
         return np.diag(
-            [r_f * (q - 1.0) / (2.0 * (lame + mu) * q + 2.0 * mu), r_f * (q - 1.0) / (2.0 * mu)]
+            [
+                r_f * (q - 1.0) / (2.0 * (lame + mu) * q + 2.0 * mu),
+                r_f * (q - 1.0) / (2.0 * mu),
+            ]
         )
 
     # power p, amplitudes (U, V), reference radius; the logarithm replaces the third for n = 1
@@ -126,7 +135,9 @@ def ring_harmonic(gear: Gear, material: Material, n: int) -> Array:
     if n > 1:
         powers.insert(2, (1 - n, kappa - 1.0 + n, n - kappa - 1.0, r_i))
 
-    def column(u: float, v: float, u_slope: float, v_slope: float) -> tuple[float, float]:
+    def column(
+        u: float, v: float, u_slope: float, v_slope: float
+    ) -> tuple[float, float]:
         stress = (lame * (u_slope + u + n * v) + 2.0 * mu * u_slope) / r_f
         return stress, mu * (-n * u + v_slope - v) / r_f
 
@@ -145,7 +156,13 @@ def ring_harmonic(gear: Gear, material: Material, n: int) -> Array:
     if n == 1:
         log = 2.0 * kappa * math.log(r_i / r_f)
         columns.append(
-            [log - 1.0, -log - 1.0, *column(-1.0, -1.0, 2.0 * kappa, -2.0 * kappa), -1.0, -1.0]
+            [
+                log - 1.0,
+                -log - 1.0,
+                *column(-1.0, -1.0, 2.0 * kappa, -2.0 * kappa),
+                -1.0,
+                -1.0,
+            ]
         )
     system = np.array(columns).T
     system[2:4] /= mu  # one scale for displacements and stresses
@@ -156,7 +173,12 @@ def ring_harmonic(gear: Gear, material: Material, n: int) -> Array:
 
 
 def _resultants(
-    theta_f: float, r_f: float, nodes: Array, weights: Array, normal: Array, shear: Array
+    theta_f: float,
+    r_f: float,
+    nodes: Array,
+    weights: Array,
+    normal: Array,
+    shear: Array,
 ) -> Array:
     """(F_x, F_y, moment about the centre) of each stress shape per unit width.
 
@@ -175,5 +197,6 @@ def _resultants(
 def _load(gear: Gear, angle: Array) -> Array:
     """Resultants of a unit force pressing on the loaded flank, (phase, 3)."""
     return np.stack(
-        [-np.sin(angle), -np.cos(angle), np.full_like(angle, -gear.base_radius)], axis=-1
+        [-np.sin(angle), -np.cos(angle), np.full_like(angle, -gear.base_radius)],
+        axis=-1,
     )

@@ -73,11 +73,16 @@ def tooth_compliance(
     x_load, h_load = involute_point(gear, curvature_radius)
     if reach == "to_centreline":
         # the same force, moved along its line to the centreline: arm and integral end there
-        x_load, h_load = np.maximum(x_load - h_load * np.tan(angle), root), np.zeros_like(h_load)
+        x_load, h_load = (
+            np.maximum(x_load - h_load * np.tan(angle), root),
+            np.zeros_like(h_load),
+        )
     arm = x_load - root
 
     def up_to_load(cells: Array) -> Array:
-        return np.interp(x_load, profile.abscissa, np.concatenate([[0.0], np.cumsum(cells)]))
+        return np.interp(
+            x_load, profile.abscissa, np.concatenate([[0.0], np.cumsum(cells)])
+        )
 
     zeroth, first, second = (up_to_load(bend * x**power) for power in range(3))
     return ToothCompliance(
@@ -86,6 +91,7 @@ def tooth_compliance(
             - 2.0 * cos * sin * h_load * (arm * zeroth - first)
             + sin**2 * h_load**2 * zeroth
         ),
-        shear=cos**2 * up_to_load(SHEAR_FACTORS[reach] * step / (material.shear_modulus * area)),
+        shear=cos**2
+        * up_to_load(SHEAR_FACTORS[reach] * step / (material.shear_modulus * area)),
         axial=sin**2 * up_to_load(step / (material.youngs_modulus * area)),
     )

@@ -40,7 +40,9 @@ def slice_gaps(tooth: Tooth, curvature_radius: Array, relative_radius: Array) ->
     """
     base = tooth.gear.base_radius
     arc = tooth.profile.curvature_radius**2 / (2.0 * base)
-    different, first, place = np.unique(curvature_radius, return_index=True, return_inverse=True)
+    different, first, place = np.unique(
+        curvature_radius, return_index=True, return_inverse=True
+    )
     center, relative_radius = different**2 / (2.0 * base), relative_radius[first]
     standing_back = tooth.material_loss + tooth.flank_deviation
 
@@ -57,7 +59,9 @@ def slice_gaps(tooth: Tooth, curvature_radius: Array, relative_radius: Array) ->
         beyond = np.maximum(
             np.maximum(center - arc[-1], arc[0] - center), 0.0
         )  # of a nominal flank the end touches
-        gap[~even] = (envelope(shapes) - beyond**2 / (2.0 * relative_radius))[which] + moved
+        gap[~even] = (envelope(shapes) - beyond**2 / (2.0 * relative_radius))[
+            which
+        ] + moved
     return gap[:, place]
 
 
@@ -96,7 +100,9 @@ def face_contact(
     bending : (phase,) m/N    of both teeth over the whole face, where every slice bends by itself, else 0
     """
     gaps = slice_gaps(tooth, curvature_radius, relative_radius)
-    if len(gaps) == 1 and np.isfinite(gaps).all():  # one slice bears as a sound flank does
+    if (
+        len(gaps) == 1 and np.isfinite(gaps).all()
+    ):  # one slice bears as a sound flank does
         return gaps[0], law.compliance(tooth.gear.face_width, load)
     gap, compliance = np.empty_like(load), np.empty_like(load)
     unit = bending * tooth.gear.face_width

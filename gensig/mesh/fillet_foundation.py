@@ -60,7 +60,9 @@ def fillet_foundation_compliance(
         + values["M"] * lever
         + values["P"] * (1.0 + values["Q"] * np.tan(load_angle) ** 2)
     )
-    return np.cos(load_angle) ** 2 / (gear.face_width * material.youngs_modulus) * bracket
+    return (
+        np.cos(load_angle) ** 2 / (gear.face_width * material.youngs_modulus) * bracket
+    )
 
 
 def body_coefficients(gear: Gear, *, allow_extrapolation: bool) -> dict[str, float]:
@@ -74,10 +76,16 @@ def body_coefficients(gear: Gear, *, allow_extrapolation: bool) -> dict[str, flo
     }
 
 
-def _check_range(gear: Gear, found: dict[str, float], allow_extrapolation: bool) -> None:
+def _check_range(
+    gear: Gear, found: dict[str, float], allow_extrapolation: bool
+) -> None:
     for key, value in found.items():
         low, high = PLAUSIBLE[key]
-        what = "half root angle theta_f" if key == "theta_f" else "root radius over bore radius h_f"
+        what = (
+            "half root angle theta_f"
+            if key == "theta_f"
+            else "root radius over bore radius h_f"
+        )
         if not low <= value <= high and not allow_extrapolation:
             mend = "change bore_radius_mm" if key == "h_f" else "change the teeth"
             raise ExtrapolationError(

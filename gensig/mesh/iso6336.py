@@ -12,7 +12,17 @@ from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 
 # q' = sum of these times 1, 1/z1, 1/z2, x1, x1/z1, x2, x2/z2, x1^2, x2^2; q' in mm um / N
-FLEXIBILITY = (0.04723, 0.15551, 0.25791, -0.00635, -0.11654, -0.00193, -0.24188, 0.00529, 0.00182)
+FLEXIBILITY = (
+    0.04723,
+    0.15551,
+    0.25791,
+    -0.00635,
+    -0.11654,
+    -0.00193,
+    -0.24188,
+    0.00529,
+    0.00182,
+)
 FLEXIBILITY_UNIT = 1e-9  # mm um / N in m2/N
 SHIFT_SUM = (-0.5, 2.0)  # range of x1 + x2 of the series, which also asks for x1 >= x2
 LEAST_CONTACT_RATIO = 1.2  # of c_gamma

@@ -19,9 +19,7 @@ from gensig.mesh.pair_table import N_PAIRS, PairTable, pair_table
 Array = NDArray[np.float64]
 
 LOAD_ROUNDS = 3
-LEAST_LOAD_SHARE = (
-    0.02  # a pair about to take load: its local compliance has no limit as the load falls to 0
-)
+LEAST_LOAD_SHARE = 0.02  # a pair about to take load: its local compliance has no limit as the load falls to 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +68,9 @@ def pair_states(
     index = newest[:, None] + 1 - np.arange(N_PAIRS)
     position = roll[:, None] - index * pitch
     nodes, n_cells = table.position, len(table.position) - 1
-    place = np.clip((position - nodes[0]) * (n_cells / (nodes[-1] - nodes[0])), 0.0, n_cells)
+    place = np.clip(
+        (position - nodes[0]) * (n_cells / (nodes[-1] - nodes[0])), 0.0, n_cells
+    )
     cell = np.minimum(place.astype(np.int64), n_cells - 1)
     part = place - cell
     compliance = np.full(position.shape, -table.shared_compliance)
@@ -86,9 +86,9 @@ def pair_states(
             gap += error[teeth]
         if tilt is not None:
             gap += tilt[teeth] * (position - table.pair.pitch_point)
-        compliance += (1.0 - part) * side.compliance[kinds, cell] + part * side.compliance[
-            kinds, cell + 1
-        ]
+        compliance += (1.0 - part) * side.compliance[
+            kinds, cell
+        ] + part * side.compliance[kinds, cell + 1]
         gap += (1.0 - part) * side.gap[kinds, cell] + part * side.gap[kinds, cell + 1]
         gap[~side.present[kinds]] = np.inf
     return PairStates(compliance=compliance, gap=gap, position=position)
@@ -114,7 +114,9 @@ def static_mesh(table: PairTable, states: PairStates, force: float) -> StaticMes
     own = np.take_along_axis(states.compliance, order, axis=1)
     touching = np.isfinite(sorted_gap)
     stiffness = np.cumsum(np.where(touching, 1.0 / own, 0.0), axis=1)
-    reach = np.cumsum(np.where(touching, np.where(touching, sorted_gap, 0.0) / own, 0.0), axis=1)
+    reach = np.cumsum(
+        np.where(touching, np.where(touching, sorted_gap, 0.0) / own, 0.0), axis=1
+    )
     with np.errstate(divide="ignore"):
         local = (
             force + reach
@@ -124,7 +126,9 @@ def static_mesh(table: PairTable, states: PairStates, force: float) -> StaticMes
     rows = np.arange(len(last))
     total, approach = stiffness[rows, last], local[rows, last]
     lost = carried == 0
-    bite = np.where(lost, 0.0, approach)[:, None] - np.where(np.isfinite(gap), gap, np.inf)
+    bite = np.where(lost, 0.0, approach)[:, None] - np.where(
+        np.isfinite(gap), gap, np.inf
+    )
     load = np.maximum(bite, 0.0) / states.compliance
     return StaticMesh(
         approach=np.where(lost, np.inf, approach + table.shared_compliance * force),
@@ -150,7 +154,9 @@ def loaded_pair_table(
         if options.contact == "linear"
         else sound_load(pair, material, options, force, modification)
     )
-    return pair_table(pair, material, options, teeth, load=load, modification=modification)
+    return pair_table(
+        pair, material, options, teeth, load=load, modification=modification
+    )
 
 
 @lru_cache(maxsize=32)  # the records of a condition share it, whatever their faults
@@ -169,7 +175,9 @@ def sound_load(
     """
     load: Array | float = force
     for _ in range(LOAD_ROUNDS):
-        sound = pair_table(pair, material, options, load=load, modification=modification)
+        sound = pair_table(
+            pair, material, options, load=load, modification=modification
+        )
         shares = static_mesh(sound, _sound_states(sound), force).load
         load = np.maximum(np.append(shares.T.ravel(), 0.0), LEAST_LOAD_SHARE * force)
     loads = np.asarray(load)
@@ -188,7 +196,9 @@ def _sound_states(table: PairTable) -> PairStates:
 
     return PairStates(
         compliance=of_pairs(
-            table.pinion.compliance[0] + table.wheel.compliance[0] - table.shared_compliance
+            table.pinion.compliance[0]
+            + table.wheel.compliance[0]
+            - table.shared_compliance
         ),
         gap=of_pairs(table.pinion.gap[0] + table.wheel.gap[0]),
         position=of_pairs(table.position),

@@ -46,7 +46,9 @@ def linear_contact(position: Array, material: Material) -> ContactLaw:
 
     Source: spur paper eq. (8). About a quarter of the local compliance that finite elements find.
     """
-    factor = 4.0 * (1.0 - material.poisson_ratio**2) / (math.pi * material.youngs_modulus)
+    factor = (
+        4.0 * (1.0 - material.poisson_ratio**2) / (math.pi * material.youngs_modulus)
+    )
     return ContactLaw(factor=factor, constant=np.ones_like(position), log_weight=0.0)
 
 
@@ -65,13 +67,17 @@ def weber_contact(pair: GearPair, position: Array, material: Material) -> Contac
     """
     nu = material.poisson_ratio
     reduced = (1.0 - nu**2) / (math.pi * material.youngs_modulus)
-    constant = -nu / (1.0 - nu) - np.log(8.0 * reduced * relative_radius(pair, position))
+    constant = -nu / (1.0 - nu) - np.log(
+        8.0 * reduced * relative_radius(pair, position)
+    )
     for gear, curvature in (
         (pair.pinion, np.asarray(pair.pinion_curvature(position))),
         (pair.wheel, np.asarray(pair.wheel_curvature(position))),
     ):
         constant += np.log(
-            2.0 * involute_point(gear, curvature)[1] / np.cos(load_angle(gear, curvature))
+            2.0
+            * involute_point(gear, curvature)[1]
+            / np.cos(load_angle(gear, curvature))
         )
     return ContactLaw(factor=2.0 * reduced, constant=constant, log_weight=1.0)
 

@@ -63,7 +63,9 @@ class FlankModification:
             value: Any = getattr(self, field.name)
             if field.name not in ("profile_shape", "helix_slope") and not value >= 0.0:
                 key = f"{field.name}_{field.metadata['unit']}"
-                raise ConfigError(f"{key} = {from_si(key, value):g} must not be negative")
+                raise ConfigError(
+                    f"{key} = {from_si(key, value):g} must not be negative"
+                )
         for depth, length, key in (
             (self.tip_relief, self.tip_relief_height, "tip_relief_height_mm"),
             (self.root_relief, self.root_relief_height, "root_relief_height_mm"),
@@ -100,10 +102,14 @@ class FlankModification:
         depth = np.zeros_like(radius)
         if tip:
             depth += (
-                self.tip_relief * np.maximum((radius - gear.tip_radius + tip) / tip, 0.0) ** power
+                self.tip_relief
+                * np.maximum((radius - gear.tip_radius + tip) / tip, 0.0) ** power
             )
         if root:
-            depth += self.root_relief * np.maximum((start + root - radius) / root, 0.0) ** power
+            depth += (
+                self.root_relief
+                * np.maximum((start + root - radius) / root, 0.0) ** power
+            )
         return depth
 
     def lead(self, place: Array, face_width: float) -> Array:
@@ -162,7 +168,9 @@ class PairModification:
         """
         on_path = np.clip(position, 0.0, pair.path_of_contact)
         curvature = {side: np.asarray(pair.curvature(side, on_path)) for side in SIDES}
-        profile = sum(self.profile(pair, side, values) for side, values in curvature.items())
+        profile = sum(
+            self.profile(pair, side, values) for side, values in curvature.items()
+        )
         return profile + self.lead(pair, place)[:, None]
 
     def profile(self, pair: GearPair, name: str, curvature_radius: Array) -> Array:
@@ -188,7 +196,9 @@ class PairModification:
 PLAIN = PairModification(pinion=FlankModification(), wheel=FlankModification())
 
 
-def sound_teeth(pair: GearPair, modification: PairModification = PLAIN) -> Mapping[str, Tooth]:
+def sound_teeth(
+    pair: GearPair, modification: PairModification = PLAIN
+) -> Mapping[str, Tooth]:
     """The tooth that all of a spur gear have before faults and errors, by gear.
 
     As cut, or modified.
@@ -199,7 +209,9 @@ def sound_teeth(pair: GearPair, modification: PairModification = PLAIN) -> Mappi
 
 
 @lru_cache(maxsize=16)
-def _modified_teeth(pair: GearPair, modification: PairModification) -> Mapping[str, Tooth]:
+def _modified_teeth(
+    pair: GearPair, modification: PairModification
+) -> Mapping[str, Tooth]:
     """A mate feels the sum of both leads only.
 
     All of it stands on the gear with the narrower face.

@@ -92,7 +92,9 @@ class MeshOptions:
         ):
             value = getattr(self, key)
             if not low <= value <= high:
-                raise ConfigError(f"mesh.{key} = {value:g} must lie in {low:g}..{high:g}")
+                raise ConfigError(
+                    f"mesh.{key} = {value:g} must lie in {low:g}..{high:g}"
+                )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,7 +122,9 @@ class SliceOptions:
         for key, low, high in (("n_slices", 1, 1000), ("coupling_modules", 0.0, 10.0)):
             value = getattr(self, key)
             if not low <= value <= high:
-                raise ConfigError(f"mesh.{key} = {value:g} must lie in {low:g}..{high:g}")
+                raise ConfigError(
+                    f"mesh.{key} = {value:g} must lie in {low:g}..{high:g}"
+                )
 
 
 SLICE_KEYS = frozenset(field.name for field in fields(SliceOptions))
@@ -129,7 +133,9 @@ SLICE_KEYS = frozenset(field.name for field in fields(SliceOptions))
 def read_slice_options(values: Section) -> SliceOptions:
     """Slices from the boundary keys of ``mesh``."""
     return read(
-        SliceOptions, {key: value for key, value in values.items() if key in SLICE_KEYS}, "mesh"
+        SliceOptions,
+        {key: value for key, value in values.items() if key in SLICE_KEYS},
+        "mesh",
     )
 
 
@@ -137,7 +143,9 @@ def read_mesh_options(values: Section) -> MeshOptions:
     """Options from boundary keys; a convention that is null follows ``law``."""
     convention = CONVENTIONS.get(str(values.get("law")))
     if convention is None:
-        raise ConfigError(f"mesh.law = {values.get('law')!r}; allowed: {', '.join(CONVENTIONS)}")
+        raise ConfigError(
+            f"mesh.law = {values.get('law')!r}; allowed: {', '.join(CONVENTIONS)}"
+        )
     own = {key: value for key, value in values.items() if key not in SLICE_KEYS}
     return read(
         MeshOptions,

@@ -128,13 +128,17 @@ def pair_table(
 
 
 @lru_cache(maxsize=16)
-def _node_sides(pair: GearPair, material: Material, options: MeshOptions) -> dict[str, FlankSide]:
+def _node_sides(
+    pair: GearPair, material: Material, options: MeshOptions
+) -> dict[str, FlankSide]:
     """The flanks at the nodes, under no load that matters."""
     return flank_sides(pair, node_positions(pair, options), material, options, 1.0)
 
 
 @lru_cache(maxsize=16)
-def _sound_structure(pair: GearPair, material: Material, options: MeshOptions) -> dict[str, Any]:
+def _sound_structure(
+    pair: GearPair, material: Material, options: MeshOptions
+) -> dict[str, Any]:
     """What neither load nor faults change: (corner gap, structural compliance) of either gear at
     the nodes, (node,) each, what bends slice by slice (node,), and the shared body compliance."""
     position = node_positions(pair, options)
@@ -144,8 +148,15 @@ def _sound_structure(pair: GearPair, material: Material, options: MeshOptions) -
     by_side: dict[str, Any] = {}
     for (side, gear), gap in zip(pair.gears.items(), corner, strict=True):
         curvature = np.asarray(pair.curvature(side, on_path))
-        by_side[side] = gap, _structure_at_nodes(healthy_tooth(gear), curvature, structure, options)
-    shared = shared_body_compliance(pair, structure) if options.pair_coupling == "coupled" else 0.0
+        by_side[side] = (
+            gap,
+            _structure_at_nodes(healthy_tooth(gear), curvature, structure, options),
+        )
+    shared = (
+        shared_body_compliance(pair, structure)
+        if options.pair_coupling == "coupled"
+        else 0.0
+    )
     return {
         **by_side,
         "bending": slice_bending(pair, position, material, options),
@@ -170,11 +181,16 @@ def structural_compliance(
 
     The material as ``Material.in_plane`` gives it.
     """
-    return np.sum(list(structural_terms(tooth, curvature, material, options).values()), axis=0)
+    return np.sum(
+        list(structural_terms(tooth, curvature, material, options).values()), axis=0
+    )
 
 
 def check_teeth(
-    pair: GearPair, material: Material, options: MeshOptions, teeth: Mapping[tuple[str, int], Tooth]
+    pair: GearPair,
+    material: Material,
+    options: MeshOptions,
+    teeth: Mapping[tuple[str, int], Tooth],
 ) -> None:
     """Raise what ``pair_table`` would raise about faulty teeth, at the cost of one contact point
     a tooth.
@@ -184,14 +200,21 @@ def check_teeth(
     FaultError, ExtrapolationError    for what the chosen conventions cannot take
     """
     structure, known = material.in_plane(options.elasticity), set()
-    sides = flank_sides(pair, np.array([pair.pitch_point]), material, options, 1.0) if teeth else {}
+    sides = (
+        flank_sides(pair, np.array([pair.pitch_point]), material, options, 1.0)
+        if teeth
+        else {}
+    )
     for (name, _), tooth in teeth.items():
         if id(tooth) in known or not tooth.present:
             continue
         known.add(id(tooth))
         side = sides[name]
         structural_terms(
-            tooth, np.minimum(side.curvature, tooth.tip_curvature_radius), structure, options
+            tooth,
+            np.minimum(side.curvature, tooth.tip_curvature_radius),
+            structure,
+            options,
         )
         if options.law == "paper" and not is_nominal(tooth):
             bearing_width(tooth, side.curvature)
@@ -217,7 +240,9 @@ def structural_terms(
         "bending": parts.bending,
         "shear": parts.shear,
         "axial": parts.axial,
-        "foundation": body_compliance(gear, load_angle(gear, curvature), material, options),
+        "foundation": body_compliance(
+            gear, load_angle(gear, curvature), material, options
+        ),
         "crack": opened,
     }
 
@@ -234,7 +259,9 @@ def slice_bending(
     """
     if options.bending == "whole":
         return np.zeros_like(position)
-    on_path, place = np.unique(np.clip(position, 0.0, pair.path_of_contact), return_inverse=True)
+    on_path, place = np.unique(
+        np.clip(position, 0.0, pair.path_of_contact), return_inverse=True
+    )
     structure = material.in_plane(options.elasticity)
     own = np.zeros_like(on_path)
     for gear, curvature in (
@@ -242,7 +269,9 @@ def slice_bending(
         (pair.wheel, pair.wheel_curvature),
     ):
         radius = np.asarray(curvature(on_path))
-        own += tooth_compliance(healthy_tooth(gear), radius, structure, reach=options.tooth).total
+        own += tooth_compliance(
+            healthy_tooth(gear), radius, structure, reach=options.tooth
+        ).total
     return own[place]
 
 
@@ -263,12 +292,18 @@ class FlankSide:
 
     def under(self, load: Array | float) -> FlankSide:
         """The same under another load of a pair in N, (phase,) or one for all."""
-        loads = np.array(np.broadcast_to(np.asarray(load, dtype=np.float64), self.curvature.shape))
+        loads = np.array(
+            np.broadcast_to(np.asarray(load, dtype=np.float64), self.curvature.shape)
+        )
         return replace(
-            self, load=loads, base=self.share * self.law.compliance(self.gear.face_width, loads)
+            self,
+            load=loads,
+            base=self.share * self.law.compliance(self.gear.face_width, loads),
         )
 
-    def contact(self, tooth: Tooth, bending: Array, options: MeshOptions) -> tuple[Array, Array]:
+    def contact(
+        self, tooth: Tooth, bending: Array, options: MeshOptions
+    ) -> tuple[Array, Array]:
         """Gap and contact compliance of one tooth against a sound mate, (phase,) m and m/N, less
         ``base``.
 
@@ -280,9 +315,16 @@ class FlankSide:
             ) - self.base
         if options.law == "paper":
             width = bearing_width(tooth, self.curvature)
-            return np.zeros_like(self.load), self.law.compliance(width, self.load) - self.base
+            return np.zeros_like(self.load), self.law.compliance(
+                width, self.load
+            ) - self.base
         gap, compliance = face_contact(
-            tooth, self.flank_curvature, self.relative_radius, self.law, self.load, bending
+            tooth,
+            self.flank_curvature,
+            self.relative_radius,
+            self.law,
+            self.load,
+            bending,
         )
         return gap, compliance - self.base
 
@@ -315,7 +357,12 @@ def flank_sides(
             base=np.empty(0),
         ).under(load)
         for gear, curvature, beyond_tip, share in (
-            (pair.pinion, pair.pinion_curvature, np.maximum(position, 0.0), 1.0 - pinion_share),
+            (
+                pair.pinion,
+                pair.pinion_curvature,
+                np.maximum(position, 0.0),
+                1.0 - pinion_share,
+            ),
             (
                 pair.wheel,
                 pair.wheel_curvature,
@@ -368,14 +415,18 @@ def _gear_table(
     )
 
 
-def distinct_teeth(sound: Tooth, odd: Mapping[int, Tooth]) -> tuple[list[Tooth], NDArray[np.int64]]:
+def distinct_teeth(
+    sound: Tooth, odd: Mapping[int, Tooth]
+) -> tuple[list[Tooth], NDArray[np.int64]]:
     """The sound tooth and those that differ, by object, and which of them each tooth of the gear
     is, (tooth,).
     """
     distinct = [sound]
     kind = np.zeros(sound.gear.n_teeth, dtype=np.int64)
     for number, tooth in odd.items():
-        row = next((row for row, known in enumerate(distinct) if known is tooth), len(distinct))
+        row = next(
+            (row for row, known in enumerate(distinct) if known is tooth), len(distinct)
+        )
         if row == len(distinct):
             distinct.append(tooth)
         kind[number] = row
@@ -391,6 +442,6 @@ def pair_compliance(
     table: PairTable, position: Array, pinion_kind: int = 0, wheel_kind: int = 0
 ) -> Array:
     """Compliance of a single pair under the table's load, (phase,) m/N."""
-    return np.interp(position, table.position, table.pinion.compliance[pinion_kind]) + np.interp(
-        position, table.position, table.wheel.compliance[wheel_kind]
-    )
+    return np.interp(
+        position, table.position, table.pinion.compliance[pinion_kind]
+    ) + np.interp(position, table.position, table.wheel.compliance[wheel_kind])

@@ -26,7 +26,11 @@ MIDDLE_ANGLE, MIDDLE_SLOPE = math.radians(45.0), math.radians(40.0)
 
 
 def crack_compliance(
-    tooth: Tooth, curvature_radius: Array, material: Material, *, allow_extrapolation: bool = False
+    tooth: Tooth,
+    curvature_radius: Array,
+    material: Material,
+    *,
+    allow_extrapolation: bool = False,
 ) -> Array:
     """What the cracks of a tooth add to its compliance along the line of action, (phase,) m/N.
 
@@ -84,7 +88,9 @@ def basis(depth: Array, angle: float, slope: float) -> Array:
     """
     tilt, fillet = angle - MIDDLE_ANGLE, slope - MIDDLE_SLOPE
     angles = np.array([1.0, tilt, tilt**2, fillet, tilt * fillet])
-    return (np.power(depth[:, None], np.array(POWERS))[:, :, None] * angles).reshape(len(depth), -1)
+    return (np.power(depth[:, None], np.array(POWERS))[:, :, None] * angles).reshape(
+        len(depth), -1
+    )
 
 
 def root_loads(gear: Gear, crack: RootCrack, load_angle: Array) -> Array:

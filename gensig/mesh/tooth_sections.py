@@ -22,7 +22,10 @@ def sections(tooth: Tooth, *, papers_crack: bool) -> tuple[Array, Array]:
     by strip with the tooth kept whole.
     """
     gear, half = tooth.gear, tooth.cell_half_thickness
-    area, second_moment = 2.0 * half * gear.face_width, (2.0 * half) ** 3 * gear.face_width / 12.0
+    area, second_moment = (
+        2.0 * half * gear.face_width,
+        (2.0 * half) ** 3 * gear.face_width / 12.0,
+    )
     if tooth.material_loss.any():
         flank = slice(tooth.profile.n_root_cells, None)
         kept = np.maximum(1e-9 * gear.normal_module, _kept_height(tooth, half[flank]))
@@ -42,7 +45,8 @@ def sections(tooth: Tooth, *, papers_crack: bool) -> tuple[Array, Array]:
 def _kept_height(tooth: Tooth, half: Array) -> Array:
     """Height of the sections on the involute that is left in each slice, (slice, cell) m."""
     lost = np.minimum(
-        tooth.material_loss, 2.0 * tooth.profile.half_thickness[tooth.profile.n_root_cells :]
+        tooth.material_loss,
+        2.0 * tooth.profile.half_thickness[tooth.profile.n_root_cells :],
     )
     return 2.0 * half - 0.5 * (lost[:, 1:] + lost[:, :-1])
 

@@ -20,12 +20,14 @@ Array = NDArray[np.float64]
 
 MOST_POINTS = 100_000
 LATEST = 1e6  # s
-SHORTEST_PIECE = 1e-3  # s; the integration takes the course as straight through every millisecond
-FASTEST_RIPPLE = (
-    150.0  # Hz; straight pieces of 1 ms take sinc^2(0.15) of it, 7.2 % too little; points are exact
+SHORTEST_PIECE = (
+    1e-3  # s; the integration takes the course as straight through every millisecond
 )
+FASTEST_RIPPLE = 150.0  # Hz; straight pieces of 1 ms take sinc^2(0.15) of it, 7.2 % too little; points are exact
 EARLIEST = -2.0  # s; a walk begins here, before any machine begins to settle
-POINTS_PER_CORRELATION_TIME = 20  # straight lines between points take 1.6 % of the variance
+POINTS_PER_CORRELATION_TIME = (
+    20  # straight lines between points take 1.6 % of the variance
+)
 WALK_LIMIT = 4.0  # standard deviations at which a walk is cut, so that its slowest is known; 6e-5 of the time
 MOST_SCATTER = 0.2
 
@@ -44,10 +46,14 @@ class Profile:
     def __post_init__(self) -> None:
         n = len(self.times)
         if n != len(self.factors):
-            raise ConfigError(f"{n} times and {len(self.factors)} factors; give one factor a time")
+            raise ConfigError(
+                f"{n} times and {len(self.factors)} factors; give one factor a time"
+            )
         if not 2 <= n <= MOST_POINTS:
             raise ConfigError(f"{n} points; give 2 to {MOST_POINTS}")
-        for place, (time, factor) in enumerate(zip(self.times, self.factors, strict=True)):
+        for place, (time, factor) in enumerate(
+            zip(self.times, self.factors, strict=True)
+        ):
             if not (abs(time) <= LATEST and math.isfinite(factor)):
                 raise ConfigError(
                     f"point {place} = [{time:g}, {factor:g}]; give a time within {LATEST:g} s and a finite factor"
@@ -99,7 +105,9 @@ class Ramp:
     def profile(self, duration: float) -> Profile:
         """The course of a record of ``duration`` s."""
         end = duration if self.end is None else self.end
-        return Profile(times=(self.begin, end), factors=(self.first_factor, self.last_factor))
+        return Profile(
+            times=(self.begin, end), factors=(self.first_factor, self.last_factor)
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,7 +127,9 @@ class RandomWalk:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.scatter <= MOST_SCATTER:
-            raise ConfigError(f"scatter = {self.scatter:g} must lie in 0..{MOST_SCATTER:g}")
+            raise ConfigError(
+                f"scatter = {self.scatter:g} must lie in 0..{MOST_SCATTER:g}"
+            )
         least = POINTS_PER_CORRELATION_TIME * SHORTEST_PIECE
         if not least <= self.correlation_time <= LATEST:
             raise ConfigError(
@@ -140,7 +150,12 @@ class RandomWalk:
         step = self.correlation_time / POINTS_PER_CORRELATION_TIME
         n_points = math.ceil((duration - EARLIEST) / step) + 2
         if n_points > MOST_POINTS:
-            least = 1.01 * POINTS_PER_CORRELATION_TIME * (duration - EARLIEST) / (MOST_POINTS - 2)
+            least = (
+                1.01
+                * POINTS_PER_CORRELATION_TIME
+                * (duration - EARLIEST)
+                / (MOST_POINTS - 2)
+            )
             raise ConfigError(
                 f"correlation_time_s = {self.correlation_time:g} needs {n_points} points for {duration:g} s, more than "
                 f"{MOST_POINTS}; give {least:.3g} or more"
@@ -148,12 +163,16 @@ class RandomWalk:
         rho = math.exp(-step / self.correlation_time)
         fresh = math.sqrt(1.0 - rho * rho)
         normal = rng.standard_normal(n_points).tolist()
-        walk = itertools.accumulate(normal, lambda value, draw: rho * value + fresh * draw)
+        walk = itertools.accumulate(
+            normal, lambda value, draw: rho * value + fresh * draw
+        )
         factors = tuple(
-            1.0 + self.scatter * min(max(value, -WALK_LIMIT), WALK_LIMIT) for value in walk
+            1.0 + self.scatter * min(max(value, -WALK_LIMIT), WALK_LIMIT)
+            for value in walk
         )
         return Profile(
-            times=tuple(EARLIEST + step * place for place in range(n_points)), factors=factors
+            times=tuple(EARLIEST + step * place for place in range(n_points)),
+            factors=factors,
         )
 
 
@@ -173,9 +192,13 @@ class Ripple:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.share < 1.0:
-            raise ConfigError(f"share = {self.share:g} must lie in 0..1, 1 not included")
+            raise ConfigError(
+                f"share = {self.share:g} must lie in 0..1, 1 not included"
+            )
         if (self.order is None) == (self.frequency is None):
-            raise ConfigError("give order (of the pinion's turn) or frequency_hz, one of the two")
+            raise ConfigError(
+                "give order (of the pinion's turn) or frequency_hz, one of the two"
+            )
         for key, value in (("order", self.order), ("frequency_hz", self.frequency)):
             if value is not None and not value > 0.0:
                 raise ConfigError(f"{key} = {value:g} must be positive")
@@ -204,14 +227,20 @@ class Ripple:
         """
         if self.order is not None:
             psi = self.psi(times, set_angle)
-            return self.share / (self.order * set_speed) * (math.cos(self.phase) - np.cos(psi))
+            return (
+                self.share
+                / (self.order * set_speed)
+                * (math.cos(self.phase) - np.cos(psi))
+            )
         rate = self._fixed_rate
         course = profile or Profile(times=(0.0, 1.0), factors=(1.0, 1.0))
         knots, factors = course.times, course.factors
 
         def primitive(time: Array) -> Array:
             held = np.clip(time, knots[0], knots[-1])
-            piece = np.clip(np.searchsorted(knots, held, side="right") - 1, 0, len(knots) - 2)
+            piece = np.clip(
+                np.searchsorted(knots, held, side="right") - 1, 0, len(knots) - 2
+            )
             sine = np.sin(rate * np.array(knots) + self.phase) / rate
             slope = np.diff(factors) / np.diff(knots)
             before = np.concatenate([[0.0], np.cumsum(slope * np.diff(sine))])
@@ -219,7 +248,11 @@ class Ripple:
                 np.sin(rate * held + self.phase) / rate - sine[piece]
             )
             return np.asarray(
-                (partly - np.interp(time, knots, factors) * np.cos(rate * time + self.phase)) / rate
+                (
+                    partly
+                    - np.interp(time, knots, factors) * np.cos(rate * time + self.phase)
+                )
+                / rate
             )
 
         return self.share * (
@@ -229,5 +262,8 @@ class Ripple:
     def later(self, delay: float, set_angle: float) -> Ripple:
         """The same ripple, ``delay`` s and ``set_angle`` rad later."""
         return replace(
-            self, phase=self.phase - (self.order or 0.0) * set_angle - self._fixed_rate * delay
+            self,
+            phase=self.phase
+            - (self.order or 0.0) * set_angle
+            - self._fixed_rate * delay,
         )

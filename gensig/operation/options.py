@@ -75,7 +75,9 @@ class Schedule:
                 f"operating.turns_of = {self.turns_of!r}; allowed: {', '.join(TURNS_OF)}"
             )
         if self.course_seed < 0:
-            raise ConfigError(f"operating.course_seed = {self.course_seed} must not be negative")
+            raise ConfigError(
+                f"operating.course_seed = {self.course_seed} must not be negative"
+            )
 
 
 SCHEDULE_KEYS = tuple(Schedule.__dataclass_fields__)
@@ -83,7 +85,11 @@ SCHEDULE_KEYS = tuple(Schedule.__dataclass_fields__)
 
 def read_schedule(values: Section) -> Schedule:
     """Turns and seed of a group ``operating``; ConfigError for what cannot be used."""
-    return read(Schedule, {key: values[key] for key in SCHEDULE_KEYS if key in values}, "operating")
+    return read(
+        Schedule,
+        {key: values[key] for key in SCHEDULE_KEYS if key in values},
+        "operating",
+    )
 
 
 def read_operating(values: Section) -> Operating:
@@ -104,7 +110,9 @@ def read_operating(values: Section) -> Operating:
     profiles = {}
     for place, key in enumerate(QUANTITIES):
         course = read_course(values, key)
-        rng = np.random.Generator(np.random.SFC64(np.random.SeedSequence(seed, spawn_key=(place,))))
+        rng = np.random.Generator(
+            np.random.SFC64(np.random.SeedSequence(seed, spawn_key=(place,)))
+        )
         try:
             profiles[key] = _profile(course, steady.duration, rng)
         except ConfigError as error:
@@ -123,7 +131,10 @@ def read_course(values: Section, key: str) -> Course | None:
     where, value = f"operating.{key}", values.get(key)
     if not isinstance(value, Mapping):
         return read_profile(where, value)
-    kind, own = value.get("kind"), {name: entry for name, entry in value.items() if name != "kind"}
+    kind, own = (
+        value.get("kind"),
+        {name: entry for name, entry in value.items() if name != "kind"},
+    )
     try:
         if kind == "ramp":
             return read(Ramp, own, where)
@@ -167,7 +178,9 @@ def read_profile(key: str, value: Any) -> Profile | None:
         raise ConfigError(f"{key}: {error}") from None
 
 
-def _profile(course: Course | None, duration: float, rng: np.random.Generator) -> Profile | None:
+def _profile(
+    course: Course | None, duration: float, rng: np.random.Generator
+) -> Profile | None:
     if course is None or isinstance(course, Profile):
         return course
     return (
@@ -177,7 +190,9 @@ def _profile(course: Course | None, duration: float, rng: np.random.Generator) -
     )
 
 
-def _read_file(where: str, own: Mapping[str, Any], quantity: str, set_point: Any) -> FileCourse:
+def _read_file(
+    where: str, own: Mapping[str, Any], quantity: str, set_point: Any
+) -> FileCourse:
     """``time_s`` and ``factor``, or ``time_s`` and the quantity itself, which is divided by the
     set-point.
     """
@@ -196,7 +211,9 @@ def _read_file(where: str, own: Mapping[str, Any], quantity: str, set_point: Any
     times, factors = columns[names.index("time_s")], columns[names.index(value)]
     if value == quantity:
         if not (_is_number(set_point) and set_point > 0.0):
-            raise ConfigError(f"operating.{quantity} = {set_point!r} must be a positive number")
+            raise ConfigError(
+                f"operating.{quantity} = {set_point!r} must be a positive number"
+            )
         factors = to_si(quantity, 1.0) * factors / to_si(quantity, float(set_point))
     try:
         profile = Profile(times=tuple(times.tolist()), factors=tuple(factors.tolist()))
@@ -204,7 +221,11 @@ def _read_file(where: str, own: Mapping[str, Any], quantity: str, set_point: Any
         raise ConfigError(f"{key} = {file}: {error}") from None
     step = float(times[-1] - times[-2])
     return FileCourse(
-        key=where, file=file, profile_given=profile, step=step, is_absolute=value == quantity
+        key=where,
+        file=file,
+        profile_given=profile,
+        step=step,
+        is_absolute=value == quantity,
     )
 
 
@@ -239,7 +260,10 @@ def _is_number(value: Any) -> bool:
 
 
 def operating_signals(
-    operating: Operating, sampling_rate: float, shaft_angle: Array, load_exponent: int = 0
+    operating: Operating,
+    sampling_rate: float,
+    shaft_angle: Array,
+    load_exponent: int = 0,
 ) -> dict[str, NDArray[np.float32]]:
     """Traces of a record, (sample,) each: ``shaft_speed`` in rad/s, as the shaft turned, and
     ``torque_set`` in N m.
@@ -259,4 +283,7 @@ def operating_signals(
         * nominal.torque_factor
         * (nominal.speed / operating.speed) ** load_exponent
     )
-    return {"shaft_speed": speed.astype(np.float32), "torque_set": torque.astype(np.float32)}
+    return {
+        "shaft_speed": speed.astype(np.float32),
+        "torque_set": torque.astype(np.float32),
+    }

@@ -61,7 +61,9 @@ class Operating:
             value = getattr(self, key)
             if not value > 0.0:
                 name = f"{key}_{suffix}"
-                raise ConfigError(f"operating.{name} = {from_si(name, value):g} must be positive")
+                raise ConfigError(
+                    f"operating.{name} = {from_si(name, value):g} must be positive"
+                )
         if not 0.0 < self.drive_damping_ratio <= 10.0:
             raise ConfigError(
                 f"operating.drive_damping_ratio = {self.drive_damping_ratio:g} must lie in 0..10"
@@ -98,7 +100,12 @@ class Operating:
     @property
     def is_steady(self) -> bool:
         """Whether neither speed nor torque changes."""
-        courses = (self.speed_profile, self.torque_profile, self.speed_ripple, self.torque_ripple)
+        courses = (
+            self.speed_profile,
+            self.torque_profile,
+            self.speed_ripple,
+            self.torque_ripple,
+        )
         return all(course is None for course in courses)
 
     @property
@@ -114,8 +121,12 @@ class Operating:
         return replace(
             self,
             duration=duration,
-            speed_profile=None if self.speed_profile is None else self.speed_profile.later(lead),
-            torque_profile=None if self.torque_profile is None else self.torque_profile.later(lead),
+            speed_profile=None
+            if self.speed_profile is None
+            else self.speed_profile.later(lead),
+            torque_profile=None
+            if self.torque_profile is None
+            else self.torque_profile.later(lead),
             speed_ripple=None
             if self.speed_ripple is None
             else self.speed_ripple.later(lead, turned),
@@ -187,6 +198,6 @@ def _rippled(
         return factor, slope
     psi = ripple.psi(times, set_angle)
     whole = 1.0 + ripple.share * np.sin(psi)
-    return factor * whole, slope * whole + factor * ripple.share * np.cos(psi) * ripple.rate(
-        set_speed
-    )
+    return factor * whole, slope * whole + factor * ripple.share * np.cos(
+        psi
+    ) * ripple.rate(set_speed)

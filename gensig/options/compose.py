@@ -30,7 +30,10 @@ CONFIG_MODULE = "gensig.configs"
 
 
 def compose(
-    config_name: str, overrides: Sequence[str] = (), *, config_dir: str | Path | None = None
+    config_name: str,
+    overrides: Sequence[str] = (),
+    *,
+    config_dir: str | Path | None = None,
 ) -> Configuration:
     """Compose one configuration.
 
@@ -57,7 +60,9 @@ def compose(
     with _hydra():
         try:
             config = hydra_compose(config_name=config_name, overrides=words)
-            resolved = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
+            resolved = OmegaConf.to_container(
+                config, resolve=True, throw_on_missing=True
+            )
         except (HydraException, OmegaConfBaseException, ValueError) as error:
             raise ConfigError(_explain(error, config_name, words, config_dir)) from None
     assert isinstance(resolved, dict)
@@ -84,7 +89,9 @@ def job_folders(jobs: Sequence[Sequence[str]]) -> list[str]:
     varied = [{job[index] for job in jobs} for index in range(len(jobs[0]))]
     names = []
     for number, job in enumerate(jobs):
-        text = ",".join(word for word, values in zip(job, varied, strict=True) if len(values) > 1)
+        text = ",".join(
+            word for word, values in zip(job, varied, strict=True) if len(values) > 1
+        )
         safe = re.sub(r"[^A-Za-z0-9_.,=+-]+", "_", text)[:120]
         names.append(f"{number}-{safe}" if safe else str(number))
     return names
@@ -115,7 +122,9 @@ def _one_value(override: Any) -> str:
                 else default
             )
     numbers = re.fullmatch(r"[-+]?\d+, ?\d+", text)
-    if isinstance(default, ListConfig) or (default is None and "." in key and not numbers):
+    if isinstance(default, ListConfig) or (
+        default is None and "." in key and not numbers
+    ):
         return f"; or is it a list? Then write '{key}=[{','.join(parts)}]'"
     if numbers:
         return f"; or is it a decimal point? Then write {key}={'.'.join(parts)}"
@@ -131,7 +140,9 @@ def typed_mapping(overrides: Sequence[str], key: str) -> dict[str, Any]:
     for override in _parse([word for word in overrides if word.startswith(f"{key}=")]):
         value = override.value()
         if not isinstance(value, dict):
-            raise ConfigError(f"{key} must be a mapping, for instance '{key}={{name: value}}'")
+            raise ConfigError(
+                f"{key} must be a mapping, for instance '{key}={{name: value}}'"
+            )
         result.update({str(name): _plain(item) for name, item in value.items()})
     return result
 
@@ -172,7 +183,9 @@ def _parse(overrides: Sequence[str]) -> list[Any]:
                 f"an override is a text such as 'seed=1', not {word!r}; give each as its own argument"
             )
         if "=" not in word and not word.startswith("~"):
-            text = "is neither group=option nor key=value, such as fault=crack or seed=1"
+            text = (
+                "is neither group=option nor key=value, such as fault=crack or seed=1"
+            )
             raise ConfigError(f"cannot read the override: '{word}' {text}")
     try:
         return list(OverridesParser.create().parse_overrides(overrides=list(overrides)))
@@ -181,7 +194,10 @@ def _parse(overrides: Sequence[str]) -> list[Any]:
 
 
 def _explain(
-    error: Exception, config_name: str, overrides: Sequence[str], config_dir: str | Path | None
+    error: Exception,
+    config_name: str,
+    overrides: Sequence[str],
+    config_dir: str | Path | None,
 ) -> str:
     """One line for a failed composition, with the nearest existing names."""
     text = " ".join(str(error).split())
@@ -190,9 +206,7 @@ def _explain(
         for one in _parse(overrides):
             key, value = str(one.key_or_group), one.value()
             if key in groups and not isinstance(value, str | list):
-                return (
-                    f"{one.input_line}: a group takes one of its options: {', '.join(options(key))}"
-                )
+                return f"{one.input_line}: a group takes one of its options: {', '.join(options(key))}"
     if isinstance(error, ValueError) and not isinstance(error, HydraException):
         return text
     for pattern in (r"Could not override '([^']+)'", r"Key '([^']+)' is not in struct"):
@@ -201,12 +215,22 @@ def _explain(
             return f"unknown key '{key}'{_nearest(key, _known_keys(config_name))}"
     if found := re.search(r"Could not find '([^']+)'", text):
         group, _, wanted = found.group(1).rpartition("/")
-        names = [one.name for one in option_files.options(group, config_dir)] if group else []
+        names = (
+            [one.name for one in option_files.options(group, config_dir)]
+            if group
+            else []
+        )
         there = option_files.elsewhere(group, wanted) or nearest.hint(wanted, names)
         return f"no option '{wanted}' of {group or 'the configuration'}; {there}"
-    if "mismatched input" in text or "extraneous input" in text or "no viable alternative" in text:
+    if (
+        "mismatched input" in text
+        or "extraneous input" in text
+        or "no viable alternative" in text
+    ):
         return f"cannot read the override: {text}"
-    if found := re.search(r"Could not override '([^']+)'\. No match in the defaults list", text):
+    if found := re.search(
+        r"Could not override '([^']+)'\. No match in the defaults list", text
+    ):
         return f"unknown group '{found.group(1)}'{_nearest(found.group(1), _groups())}"
     if found := re.search(r"Missing mandatory value: (\S+)", text):
         key = getattr(error, "full_key", None) or found.group(1)
@@ -217,7 +241,9 @@ def _explain(
 def _known_keys(config_name: str) -> list[str]:
     """Every dotted key of the default configuration."""
     with _hydra():
-        tree = OmegaConf.to_container(hydra_compose(config_name=config_name), resolve=False)
+        tree = OmegaConf.to_container(
+            hydra_compose(config_name=config_name), resolve=False
+        )
     return list(_dotted(tree))
 
 
@@ -244,7 +270,9 @@ def _nearest(key: str, names: Sequence[str]) -> str:
             leaf, [name.rpartition(".")[2] for name in names], n=3, cutoff=0.75
         )
         close = [name for name in names if name.rpartition(".")[2] in leaves][:3]
-    return f"; did you mean {' or '.join(repr(name) for name in close)}?" if close else ""
+    return (
+        f"; did you mean {' or '.join(repr(name) for name in close)}?" if close else ""
+    )
 
 
 def _first_line(error: Exception) -> str:

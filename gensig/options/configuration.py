@@ -53,7 +53,9 @@ class Section(Mapping[str, Any]):
 
     def __init__(self, name: str, values: Mapping[str, Any]) -> None:
         self.name = name
-        self._values: Mapping[str, Any] = values._values if isinstance(values, Section) else values
+        self._values: Mapping[str, Any] = (
+            values._values if isinstance(values, Section) else values
+        )
 
     def __getitem__(self, key: str) -> Any:
         return self._values[key]
@@ -80,7 +82,8 @@ class Section(Mapping[str, Any]):
     def without(self, *keys: str) -> Section:
         """The same group without some keys."""
         return Section(
-            self.name, {key: value for key, value in self._values.items() if key not in keys}
+            self.name,
+            {key: value for key, value in self._values.items() if key not in keys},
         )
 
     def __or__(self, values: Mapping[str, Any]) -> Section:
@@ -182,7 +185,9 @@ class Configuration(Mapping[str, Any]):
             node = node.get(name) if isinstance(node, dict) else None
         if not isinstance(node, dict) or not _is_number(node.get(leaf, "")):
             known = [
-                name for name in _numeric_keys(self._values) if not name.startswith(FIXED_KEYS)
+                name
+                for name in _numeric_keys(self._values)
+                if not name.startswith(FIXED_KEYS)
             ]
             near = nearest.near(key, known)
             hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
@@ -196,7 +201,9 @@ class Configuration(Mapping[str, Any]):
 def whole_number(key: str, value: Any, *, at_least: int) -> int:
     """A count of a configuration, checked."""
     if isinstance(value, bool) or not isinstance(value, int) or value < at_least:
-        raise ConfigError(f"{key} = {value!r} must be a whole number of at least {at_least}")
+        raise ConfigError(
+            f"{key} = {value!r} must be a whole number of at least {at_least}"
+        )
     return value
 
 

@@ -86,11 +86,15 @@ class _File:
         try:
             return yaml.compose(self.source, Loader=LOADER)
         except yaml.YAMLError as error:
-            raise ConfigError(f"{self.path} is no YAML: {' '.join(str(error).split())}") from None
+            raise ConfigError(
+                f"{self.path} is no YAML: {' '.join(str(error).split())}"
+            ) from None
 
     @property
     def is_global(self) -> bool:
-        return any(line.replace(" ", "") == "#@package_global_" for line in self.lines[:3])
+        return any(
+            line.replace(" ", "") == "#@package_global_" for line in self.lines[:3]
+        )
 
     def about(self) -> str:
         """The first sentence of the comment at the top."""
@@ -107,7 +111,9 @@ class _File:
 
         Group (None for an option of its own group), option, comment.
         """
-        for key, value in self.tree.value if isinstance(self.tree, yaml.MappingNode) else ():
+        for key, value in (
+            self.tree.value if isinstance(self.tree, yaml.MappingNode) else ()
+        ):
             if key.value == "defaults" and isinstance(value, yaml.SequenceNode):
                 return [self._entry(node) for node in value.value]
         return []
@@ -132,7 +138,11 @@ class _File:
             if top and key.value == "defaults":
                 continue
             name = f"{prefix}{key.value}"
-            if isinstance(value, yaml.MappingNode) and not value.flow_style and key.value != "vary":
+            if (
+                isinstance(value, yaml.MappingNode)
+                and not value.flow_style
+                and key.value != "vary"
+            ):
                 yield from self._keys(value, f"{name}.")
                 continue
             plain = _value(value)
@@ -156,7 +166,9 @@ class _File:
         behind = re.search(r"(?:^|\s)#\s*(.*)$", self.lines[mark.line][mark.column :])
         parts = [behind.group(1)] if behind else []
         for line in self.lines[mark.line + 1 :]:
-            if not (line.lstrip().startswith("#") and _indent(line) > key.start_mark.column):
+            if not (
+                line.lstrip().startswith("#") and _indent(line) > key.start_mark.column
+            ):
                 break
             parts.append(line.lstrip().lstrip("# "))
         above = self.lines[: key.start_mark.line]
@@ -173,12 +185,17 @@ def groups(config_dir: str | Path | None = None) -> list[Group]:
     for primary in PRIMARY:
         for name, option, comment in _primary(primary).defaults():
             if name is not None and name not in found:
-                found[name] = Group(name=name, about=comment, default=option, primary=primary)
+                found[name] = Group(
+                    name=name, about=comment, default=option, primary=primary
+                )
     for folder in _folders(config_dir)[1:]:
         for path in sorted(folder.iterdir()):
             if path.is_dir() and path.name not in found and any(path.glob("*.yaml")):
                 found[path.name] = Group(
-                    name=path.name, about="of your own", default=None, primary=PRIMARY[0]
+                    name=path.name,
+                    about="of your own",
+                    default=None,
+                    primary=PRIMARY[0],
                 )
     return list(found.values())
 
@@ -213,18 +230,28 @@ def section_keys(name: str) -> list[Key]:
     return [
         key
         for key in keys
-        if (key.name.startswith(f"{name}.") if name not in PRIMARY else "." not in key.name)
+        if (
+            key.name.startswith(f"{name}.")
+            if name not in PRIMARY
+            else "." not in key.name
+        )
     ]
 
 
-def option_keys(group: str, option: str, config_dir: str | Path | None = None) -> list[Key]:
+def option_keys(
+    group: str, option: str, config_dir: str | Path | None = None
+) -> list[Key]:
     """Keys of one option, with those of the options that it builds on."""
     found: dict[str, Key] = {}
     for key in _option_keys(group, option, group, config_dir):
         before = found.get(key.name)
         if before is not None and not key.comment:
             key = Key(
-                name=key.name, text=key.text, value=key.value, unit=key.unit, comment=before.comment
+                name=key.name,
+                text=key.text,
+                value=key.value,
+                unit=key.unit,
+                comment=before.comment,
             )
         for outer in [name for name in found if key.name.startswith(f"{name}.")]:
             del found[outer]  # null there, a group of keys here
@@ -232,7 +259,9 @@ def option_keys(group: str, option: str, config_dir: str | Path | None = None) -
     return list(found.values())
 
 
-def chosen_beside(group: str, option: str, config_dir: str | Path | None = None) -> dict[str, str]:
+def chosen_beside(
+    group: str, option: str, config_dir: str | Path | None = None
+) -> dict[str, str]:
     """Options of other groups that an option chooses too."""
     entries = _find(group, option, config_dir).defaults()
     return {
@@ -283,7 +312,9 @@ def _folders(config_dir: str | Path | None) -> Sequence[Path]:
     spec = importlib.util.find_spec("gensig.configs")
     places = list(spec.submodule_search_locations or ()) if spec is not None else []
     if not places:
-        raise ConfigError("gensig's own configuration files are missing; install gensig again")
+        raise ConfigError(
+            "gensig's own configuration files are missing; install gensig again"
+        )
     if config_dir is None:
         return [Path(places[0])]
     own = Path(config_dir).expanduser()
@@ -327,4 +358,6 @@ def _is_on_its_own(lines: Sequence[str]) -> bool:
     place = len(lines)
     while place and lines[place - 1].lstrip().startswith("#"):
         place -= 1
-    return place > 0 and not re.search(r"\S\s+#", lines[place - 1] if _indent(lines[place]) else "")
+    return place > 0 and not re.search(
+        r"\S\s+#", lines[place - 1] if _indent(lines[place]) else ""
+    )

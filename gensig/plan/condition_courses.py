@@ -49,8 +49,13 @@ def settle_courses(config: Configuration, typed: Collection[str]) -> Configurati
                 f"operating.{key}.file = {course.file} gives {QUANTITIES[key]} itself, but the plan varies {varied}; "
                 f"name its column factor, or pin {varied}"
             )
-    if any(isinstance(course, RandomWalk) for course in courses.values()) and SEED_KEY not in typed:
-        config = config.with_keys("operating", course_seed=operating.get("course_seed", 0))
+    if (
+        any(isinstance(course, RandomWalk) for course in courses.values())
+        and SEED_KEY not in typed
+    ):
+        config = config.with_keys(
+            "operating", course_seed=operating.get("course_seed", 0)
+        )
         config = config.with_keys(
             "plan", vary={**vary, SEED_KEY: vary.get(SEED_KEY, dict(EVERY_SEED))}
         )
@@ -58,13 +63,19 @@ def settle_courses(config: Configuration, typed: Collection[str]) -> Configurati
     if schedule.turns is None:
         return config
     if DURATION_KEY in typed:
-        raise ConfigError(f"{DURATION_KEY} and operating.turns are both given; leave one out")
-    system = read_machine(config.with_keys("operating", **dict.fromkeys((*QUANTITIES, *RIPPLES))))
+        raise ConfigError(
+            f"{DURATION_KEY} and operating.turns are both given; leave one out"
+        )
+    system = read_machine(
+        config.with_keys("operating", **dict.fromkeys((*QUANTITIES, *RIPPLES)))
+    )
     least = least_speed(config, system.operating.speed)
     pair = system.pair
     n_teeth = {side: gear.n_teeth for side, gear in pair.gears.items()}
     gears = (
-        _faulted(config) & set(n_teeth) if schedule.turns_of == "faulted" else {schedule.turns_of}
+        _faulted(config) & set(n_teeth)
+        if schedule.turns_of == "faulted"
+        else {schedule.turns_of}
     )
     slowest = max((n_teeth[gear] for gear in gears), default=pair.pinion.n_teeth)
     slowdown = slowest / pair.pinion.n_teeth
@@ -96,17 +107,24 @@ def least_speed(config: Configuration, set_speed: float) -> float:
     if SPEED_KEY in vary:
         drawn_speed = read_distribution(f"plan.vary.{SPEED_KEY}", vary[SPEED_KEY])
         set_speed = to_si(SPEED_KEY, drawn_speed.least)
-    course, ripple = read_course(operating, "speed_profile"), read_ripple(operating, "speed_ripple")
+    course, ripple = (
+        read_course(operating, "speed_profile"),
+        read_ripple(operating, "speed_ripple"),
+    )
     factor = (1.0 if course is None else course.least) * (
         1.0 if ripple is None else 1.0 - ripple.share
     )
     if not set_speed * factor > 0.0:
-        raise ConfigError("operating.turns: the slowest speed of the plan must be positive")
+        raise ConfigError(
+            "operating.turns: the slowest speed of the plan must be positive"
+        )
     return set_speed * factor
 
 
 def _faulted(config: Configuration) -> set[str]:
     """Gears that carry a fault in any class."""
     return {
-        str(part.get("gear")) for fault in config["classes"].values() for part in fault_parts(fault)
+        str(part.get("gear"))
+        for fault in config["classes"].values()
+        for part in fault_parts(fault)
     }

@@ -8,7 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dataset.distributions import GRID, Distribution, design_points, read_distribution
+from gensig.dataset.distributions import (
+    GRID,
+    Distribution,
+    design_points,
+    read_distribution,
+)
 from gensig.errors import ConfigError
 from gensig.faults.registry import COMPOUND, fault_parts, read_faults
 from gensig.geometry.tooth_profile import root_curve_point
@@ -17,7 +22,13 @@ from gensig.record.machines import read_machine
 from gensig.systems.registry import LINE, read_pair
 from gensig.units import from_si, split_unit, to_si
 
-SCALED = ("low", "high", "mean", "std", "values")  # of a distribution that is a share of a size
+SCALED = (
+    "low",
+    "high",
+    "mean",
+    "std",
+    "values",
+)  # of a distribution that is a share of a size
 CEILING = "at_most_of_root_chord"  # beside ``of``: the highest value, over the root chord of the faulted gear
 OWN = ("of", CEILING)
 
@@ -73,7 +84,9 @@ def fault_specs(
     for place, part in enumerate(fault_parts(fault)):
         for key, spec in (part.get("vary") or {}).items():
             if key not in part or key == "vary":
-                raise ConfigError(f"fault.vary: '{key}' is no key of fault={part['kind']}")
+                raise ConfigError(
+                    f"fault.vary: '{key}' is no key of fault={part['kind']}"
+                )
             name = f"parts.{place}.{key}" if fault["kind"] == COMPOUND else key
             specs[name] = read_distribution(
                 f"fault.vary.{name}", _for_gear(config, part, key, spec)
@@ -94,7 +107,8 @@ def draw_faults(
     """
     specs, places = fault_specs(config, fault)
     parts = [
-        {key: value for key, value in part.items() if key != "vary"} for part in fault_parts(fault)
+        {key: value for key, value in part.items() if key != "vary"}
+        for part in fault_parts(fault)
     ]
     drawn = draw_values(config, specs, points, rng)
     faults: list[dict[str, Any]] = []
@@ -116,7 +130,9 @@ def _gear_sizes(config: Configuration, gear: str) -> tuple[int, dict[str, float]
     if config["system"]["kind"] == LINE:  # whose gears stand in a table
         own = getattr(read_machine(config).pair, gear)
         sizes = {"normal_module": own.normal_module, "face_width": own.face_width}
-        return own.n_teeth, {name: from_si("size_mm", value) for name, value in sizes.items()}
+        return own.n_teeth, {
+            name: from_si("size_mm", value) for name, value in sizes.items()
+        }
     values = config["gear"][gear]
     sizes = {
         "normal_module": config["gear"]["normal_module_mm"],
@@ -127,11 +143,17 @@ def _gear_sizes(config: Configuration, gear: str) -> tuple[int, dict[str, float]
 
 def _root_chord(config: Configuration, gear: str) -> float:
     """Thickness of a gear's tooth in the middle of its root curve, where cracks begin, m."""
-    pair = read_machine(config).pair if config["system"]["kind"] == LINE else read_pair(config)
+    pair = (
+        read_machine(config).pair
+        if config["system"]["kind"] == LINE
+        else read_pair(config)
+    )
     return 2.0 * root_curve_point(getattr(pair, gear), "arc_mid")[1]
 
 
-def _for_gear(config: Configuration, part: Mapping[str, Any], key: str, spec: Any) -> Any:
+def _for_gear(
+    config: Configuration, part: Mapping[str, Any], key: str, spec: Any
+) -> Any:
     """A distribution of a fault's key in the sizes of its gear.
 
     ``distribution: tooth`` becomes one over the gear's teeth, shares ``of`` a size become lengths.
@@ -152,7 +174,9 @@ def _for_gear(config: Configuration, part: Mapping[str, Any], key: str, spec: An
     size = from_si(key, to_si("size_mm", sizes[spec["of"]]))
 
     def scaled(value: Any) -> Any:
-        return [scaled(one) for one in value] if isinstance(value, list) else value * size
+        return (
+            [scaled(one) for one in value] if isinstance(value, list) else value * size
+        )
 
     try:
         drawn = {

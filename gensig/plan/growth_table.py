@@ -104,7 +104,9 @@ def paris(
     """A root crack that begins at a share of the root chord."""
     gear = gears.machine.pair.gears[fault.gear]
     law = crack_law(gears.machine, fault.seed(), options, gears.torques)
-    return UnitGrowth(law=law, start=options.start_share * first * fault.root_chord(gear))
+    return UnitGrowth(
+        law=law, start=options.start_share * first * fault.root_chord(gear)
+    )
 
 
 def pits(
@@ -130,7 +132,9 @@ def archard(
     table = gears.wear
     case = table.lives[0].case
     torque = float(np.exp(np.log(history.torque).mean()))
-    law = WearGrowth(table=table, torque=torque, as_fault=lambda depth: wear_fault(case, depth))
+    law = WearGrowth(
+        table=table, torque=torque, as_fault=lambda depth: wear_fault(case, depth)
+    )
     return UnitGrowth(law=law, start=0.0)
 
 

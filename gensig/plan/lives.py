@@ -64,7 +64,11 @@ def snapshots(config: Configuration) -> Iterator[Snapshot]:
     ------
     ConfigError    for a plan that lives cannot follow, and classes that do not grow
     """
-    seed, options, names = config.seed, read_life(config["life"]), list(config["plan"]["classes"])
+    seed, options, names = (
+        config.seed,
+        read_life(config["life"]),
+        list(config["plan"]["classes"]),
+    )
     n_units = _checked_units(config, options)
     machine = read_machine(config)
     points = _setpoints(config, options, n_units)
@@ -72,7 +76,10 @@ def snapshots(config: Configuration) -> Iterator[Snapshot]:
     speed, torque = _speed_and_torque(machine, points, n_units)
     faults = {
         name: draw_faults(
-            config, config["classes"][name], np.arange(n_units), stream(seed, Stream.FAULT, index)
+            config,
+            config["classes"][name],
+            np.arange(n_units),
+            stream(seed, Stream.FAULT, index),
         )
         for index, name in enumerate(names)
     }
@@ -99,7 +106,9 @@ def snapshots(config: Configuration) -> Iterator[Snapshot]:
             point = unit * n_setpoints + setpoint
             values = dict(points[point])
             for key, drift in options.drift.items():
-                values[key] = _number(config, key, values) * drift.factor(running, factors[key])
+                values[key] = _number(config, key, values) * drift.factor(
+                    running, factors[key]
+                )
             yield Snapshot(
                 unit=unit,
                 label=label,
@@ -141,10 +150,15 @@ class _Life:
         return {
             "life_time_h": from_si("time_h", clock),
             "life_cycles": course.value("turns", place),
-            "remaining_life_h": from_si("time_h", max(float(course.clock[-1]) - clock, 0.0)),
+            "remaining_life_h": from_si(
+                "time_h", max(float(course.clock[-1]) - clock, 0.0)
+            ),
             "life_failed": int(course.has_failed),
             "life_growing": int(course.growing[place[0]]),
-            **{f"params/fault.{key}": value for key, value in self._measures(place).items()},
+            **{
+                f"params/fault.{key}": value
+                for key, value in self._measures(place).items()
+            },
         }
 
     def _measures(self, place: tuple[int, float]) -> dict[str, float]:
@@ -211,7 +225,9 @@ def _checked_units(config: Configuration, options: LifeOptions) -> int:
     return whole_number("plan.n_units", plan["n_units"], at_least=1)
 
 
-def _setpoints(config: Configuration, options: LifeOptions, n_units: int) -> list[dict[str, float]]:
+def _setpoints(
+    config: Configuration, options: LifeOptions, n_units: int
+) -> list[dict[str, float]]:
     """Values of every set-point of every unit, those of a unit beside each other."""
     vary = read_plan_options(config).vary
     blocks = options.blocks
@@ -222,9 +238,12 @@ def _setpoints(config: Configuration, options: LifeOptions, n_units: int) -> lis
     given = None if blocks is None else given_history(blocks, options.horizon)
     n_setpoints = options.n_setpoints if given is None else len(given.speed)
     points = np.arange(n_units * n_setpoints)
-    drawn_values = draw_values(config, vary, points, stream(config.seed, Stream.CONDITION))
+    drawn_values = draw_values(
+        config, vary, points, stream(config.seed, Stream.CONDITION)
+    )
     found = [
-        {key: float(values[k]) for key, values in drawn_values.items()} for k in points.tolist()
+        {key: float(values[k]) for key, values in drawn_values.items()}
+        for k in points.tolist()
     ]
     if given is not None:
         for k, values in enumerate(found):
@@ -241,7 +260,9 @@ def _speed_and_torque(
     """Set speeds in rad/s and torques in N m, (unit, setpoint) each."""
     set_speed = from_si("speed_rpm", machine.operating.speed / machine.ratio)
     speed = np.array([values.get(SPEED, set_speed) for values in points])
-    torque = np.array([values.get(TORQUE, machine.operating.torque) for values in points])
+    torque = np.array(
+        [values.get(TORQUE, machine.operating.torque) for values in points]
+    )
     shape = (n_units, len(points) // n_units)
     return speed.reshape(shape) * (2.0 * np.pi / 60.0), torque.reshape(shape)
 

@@ -88,12 +88,18 @@ def make_plan(config: Configuration) -> Plan:
     rng = stream(seed, Stream.CONDITION)
     conditions = draw_values(config, options.vary, counts.condition_points, rng)
     faults = {
-        name: draw_faults(config, fault, counts.fault_points, stream(seed, Stream.FAULT, index))
+        name: draw_faults(
+            config, fault, counts.fault_points, stream(seed, Stream.FAULT, index)
+        )
         for index, (name, fault) in enumerate(config["classes"].items())
     }
-    sound = next((name for name in names if not fault_parts(config["classes"][name])), None)
+    sound = next(
+        (name for name in names if not fault_parts(config["classes"][name])), None
+    )
     rows: list[dict[str, Any]] = []
-    for condition, repeat in itertools.product(range(counts.n_conditions), range(counts.n_repeats)):
+    for condition, repeat in itertools.product(
+        range(counts.n_conditions), range(counts.n_repeats)
+    ):
         unit = condition % counts.n_units
         values = {key: drawn[condition] for key, drawn in conditions.items()}
         if repeat == 0:
@@ -117,7 +123,9 @@ def make_plan(config: Configuration) -> Plan:
                 {
                     "label": int(label),
                     "label_name": name,
-                    **_unit_ids(unit, unit % counts.n_gearboxes, unit // counts.n_gearboxes),
+                    **_unit_ids(
+                        unit, unit % counts.n_gearboxes, unit // counts.n_gearboxes
+                    ),
                     "condition_id": f"condition-{condition:06d}",
                     "repeat": repeat,
                     **_row(machine, fault, values, start),
@@ -190,7 +198,9 @@ def read_counts(config: Configuration) -> Counts:
     if per_unit is not None:
         n_conditions = plan.n_units * per_unit * n_faults
         product = n_conditions * n_classes * plan.n_repeats
-        n_records = _fitting(plan, product, (plan.n_units, per_unit, n_faults, n_classes))
+        n_records = _fitting(
+            plan, product, (plan.n_units, per_unit, n_faults, n_classes)
+        )
     elif n_records is not None:
         n_conditions = math.ceil(n_records / (n_classes * plan.n_repeats))
     else:
@@ -229,7 +239,9 @@ def _n_points(vary: Mapping[str, Distribution]) -> int:
 
 def _fault_varies(config: Configuration) -> dict[str, dict[str, Distribution]]:
     """Distributions of the keys of each class."""
-    return {name: fault_specs(config, fault)[0] for name, fault in config["classes"].items()}
+    return {
+        name: fault_specs(config, fault)[0] for name, fault in config["classes"].items()
+    }
 
 
 def describe_design(config: Configuration) -> str:
@@ -245,7 +257,10 @@ def describe_design(config: Configuration) -> str:
         for name, vary in _fault_varies(config).items()
         for key, distribution in vary.items()
     }
-    keys = {key: distribution.n_levels for key, distribution in {**plan.vary, **of_faults}.items()}
+    keys = {
+        key: distribution.n_levels
+        for key, distribution in {**plan.vary, **of_faults}.items()
+    }
     crossed = " x ".join(f"{key} {n}" for key, n in keys.items() if n is not None)
     drawn = ", ".join(key for key, n in keys.items() if n is None)
     return f"grid of {crossed or 'no key'}" + (f"; drawn: {drawn}" if drawn else "")
@@ -257,7 +272,9 @@ def _fitting(plan: PlanOptions, n_records: int, counts: tuple[int, ...]) -> int:
     """
     names = ("units", "conditions", "faults", "classes", "repeats")
     product = " x ".join(
-        f"{n:,} {name}" for n, name in zip((*counts, plan.n_repeats), names, strict=True) if n > 1
+        f"{n:,} {name}"
+        for n, name in zip((*counts, plan.n_repeats), names, strict=True)
+        if n > 1
     )
     sum_of_all = f"{n_records:,} records ({product})" if product else "1 record"
     if plan.is_grid and n_records > MOST_IN_GRID:
@@ -285,13 +302,19 @@ class _Fault:
 
 
 def _row(
-    machine: Machine, fault: _Fault, values: Mapping[str, float], start: np.random.Generator
+    machine: Machine,
+    fault: _Fault,
+    values: Mapping[str, float],
+    start: np.random.Generator,
 ) -> dict[str, Any]:
     """Columns of one record that follow from its drawn values."""
     applied = read_faults(fault.plain)
     if fault.is_checked:
         check_teeth(
-            machine.pair, machine.material, machine.mesh, faulty_teeth(machine.pair, applied)
+            machine.pair,
+            machine.material,
+            machine.mesh,
+            faulty_teeth(machine.pair, applied),
         )
     parts = fault_parts(fault.plain)
     tooth = int(start.integers(machine.pair.pinion.n_teeth))
@@ -308,7 +331,10 @@ def _row(
         "torque_nm": machine.operating.torque,
         "snr_db": MISSING if machine.sensing.snr is None else machine.sensing.snr,
         **{f"params/{key}": float(value) for key, value in values.items()},
-        **{f"params/fault.{key}": value for key, value in fault_sizes(fault.plain).items()},
+        **{
+            f"params/fault.{key}": value
+            for key, value in fault_sizes(fault.plain).items()
+        },
     }
 
 
@@ -321,7 +347,11 @@ def _as_plan(config: Configuration, rows: list[dict[str, Any]]) -> Plan:
     for row in rows:
         names.update(dict.fromkeys(row))
     shard, place = shard_places(len(rows), records_per_shard(config))
-    columns: dict[str, Any] = {"record_id": record_ids(len(rows)), "shard": shard, "row": place}
+    columns: dict[str, Any] = {
+        "record_id": record_ids(len(rows)),
+        "shard": shard,
+        "row": place,
+    }
     for name in names:
         columns[name] = np.array([row.pop(name, MISSING) for row in rows])
     return Plan(columns=columns)
@@ -344,6 +374,8 @@ def record_bytes(config: Configuration, *, as_stored: bool = False) -> int:
     n_bytes = 0
     for name, shape in shapes.items():
         if SIGNALS[name].is_bulk:
-            width = COUNT_BYTES if as_counts and name in SCALES else SIGNALS[name].n_bytes
+            width = (
+                COUNT_BYTES if as_counts and name in SCALES else SIGNALS[name].n_bytes
+            )
             n_bytes += math.prod(shape) * width
     return n_bytes

@@ -7,7 +7,11 @@ from gensig.dataset.splitting.protocols import why_left_out
 from gensig.life.life_options import runs_to_failure
 from gensig.options.configuration import Configuration
 
-BY_MACHINE = {"by_unit": "unit", "cross_specimen": "set of gears", "cross_gearbox": "gearbox"}
+BY_MACHINE = {
+    "by_unit": "unit",
+    "cross_specimen": "set of gears",
+    "cross_gearbox": "gearbox",
+}
 
 
 def plan_notes(config: Configuration, plan: Plan) -> list[str]:
@@ -27,9 +31,7 @@ def _units_left_out(config: Configuration, plan: Plan) -> str:
     classes = _count(len(config["plan"]["classes"]), "class", "es")
     repeats = _count(config["plan"]["n_repeats"], "repeat")
     records = _count(plan.n_records, "record")
-    return (
-        f"{records} are {conditions} of {classes} and {repeats}: {used} of {asked} units are used"
-    )
+    return f"{records} are {conditions} of {classes} and {repeats}: {used} of {asked} units are used"
 
 
 def _splits_left_out(plan: Plan, seed: int) -> str:
@@ -40,7 +42,8 @@ def _splits_left_out(plan: Plan, seed: int) -> str:
     if "by_unit" in reasons:
         reasons = {"by_unit": reasons["by_unit"]}
     return "; ".join(
-        f"no split by {BY_MACHINE[name]} is possible ({reason})" for name, reason in reasons.items()
+        f"no split by {BY_MACHINE[name]} is possible ({reason})"
+        for name, reason in reasons.items()
     )
 
 

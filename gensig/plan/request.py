@@ -41,7 +41,9 @@ class Request:
     notes: tuple[str, ...] = ()
 
 
-def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = None) -> Request:
+def read_request(
+    overrides: Sequence[str], *, config_dir: str | Path | None = None
+) -> Request:
     """Compose the configuration for one job.
 
     A ``fault.key=value`` is applied to every class of the plan whose option has that key, and
@@ -60,7 +62,9 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
     selected = _class_fault(words, words.keys.get("fault"), base["fault"], config_dir)
     faults = {name: selected for name in names}
     if listed and "fault" not in words.keys:
-        options_of = {name: _fault_option(words, name, (), config_dir) for name in names}
+        options_of = {
+            name: _fault_option(words, name, (), config_dir) for name in names
+        }
         faults = {
             name: _class_fault(words, name, option, config_dir)
             for name, option in options_of.items()
@@ -68,16 +72,22 @@ def read_request(overrides: Sequence[str], *, config_dir: str | Path | None = No
     _refuse_unused(words, [selected, *faults.values()])
     notes = []
     if listed and listed != names:
-        notes.append(f"fault={names[0]} replaces plan.classes [{', '.join(map(str, listed))}]")
+        notes.append(
+            f"fault={names[0]} replaces plan.classes [{', '.join(map(str, listed))}]"
+        )
     base["plan"]["classes"] = names
-    pinned = dict.fromkeys(key for fault in (selected, *faults.values()) for key in fault.pinned)
+    pinned = dict.fromkeys(
+        key for fault in (selected, *faults.values()) for key in fault.pinned
+    )
     pinned |= dict.fromkeys(_pin_varied(words, base["plan"]))
     if pinned:
         notes.append(
             f"pinned, no longer varied: {', '.join(f'{key} = {words.keys[key]}' for key in pinned)}"
         )
     base["fault"] = copy.deepcopy(selected.option)
-    base["classes"] = {name: copy.deepcopy(fault.option) for name, fault in faults.items()}
+    base["classes"] = {
+        name: copy.deepcopy(fault.option) for name, fault in faults.items()
+    }
     _reset_derived(base["gear"], set(words.keys) | set(base["plan"]["vary"]))
     config = settle_courses(Configuration(base), words.keys)
     return Request(config=config, overrides=tuple(overrides), notes=tuple(notes))
@@ -103,14 +113,18 @@ class _Words:
 
     def clears(self, key: str) -> bool:
         """Whether an empty mapping was typed for ``plan.vary`` or ``fault.vary``."""
-        return key in self.keys and not (self.plan_vary if key == "plan.vary" else self.fault_vary)
+        return key in self.keys and not (
+            self.plan_vary if key == "plan.vary" else self.fault_vary
+        )
 
 
 def _typed_words(overrides: Sequence[str]) -> _Words:
     keys = override_keys(overrides)
     plan_vary, fault_vary = (typed_mapping(overrides, key) for key in VARY_KEYS)
     plain = [
-        word for word in overrides if not word.startswith(tuple(f"{key}=" for key in VARY_KEYS))
+        word
+        for word in overrides
+        if not word.startswith(tuple(f"{key}=" for key in VARY_KEYS))
     ]
     of_fault = [word for word in plain if word.lstrip("+").startswith("fault.")]
     return _Words(
@@ -129,7 +143,9 @@ def _class_names(words: _Words, base: Mapping[str, Any]) -> list[str]:
         names = [words.keys["fault"]]
     is_list = isinstance(names, list) and all(isinstance(name, str) for name in names)
     if not is_list or len(set(names)) < len(names):
-        raise ConfigError(f"plan.classes = {names!r} must be a list of different fault options")
+        raise ConfigError(
+            f"plan.classes = {names!r} must be a list of different fault options"
+        )
     return names
 
 
@@ -147,13 +163,20 @@ class _ClassFault:
 
 
 def _class_fault(
-    words: _Words, name: str | None, option: dict[str, Any], config_dir: str | Path | None
+    words: _Words,
+    name: str | None,
+    option: dict[str, Any],
+    config_dir: str | Path | None,
 ) -> _ClassFault:
     """A fault option with the typed keys that it has.
 
     ``name`` None for that of the whole configuration.
     """
-    typed = {key: word for key, word in words.fault_words.items() if key.split(".")[1] in option}
+    typed = {
+        key: word
+        for key, word in words.fault_words.items()
+        if key.split(".")[1] in option
+    }
     typed.pop("fault.vary", None)
     if typed:
         option = _fault_option(words, name, tuple(typed.values()), config_dir)
@@ -169,7 +192,10 @@ def _class_fault(
 
 
 def _fault_option(
-    words: _Words, name: str | None, fault_words: tuple[str, ...], config_dir: str | Path | None
+    words: _Words,
+    name: str | None,
+    fault_words: tuple[str, ...],
+    config_dir: str | Path | None,
 ) -> dict[str, Any]:
     """A fault option by its name, with words that its keys are given by.
 
@@ -179,18 +205,28 @@ def _fault_option(
     message where no such option exists.
     """
     removed = tuple(word for word in words.others if word.startswith("~fault."))
-    if name is not None and not _experiment_sets_fault(words.keys.get("experiment"), config_dir):
+    if name is not None and not _experiment_sets_fault(
+        words.keys.get("experiment"), config_dir
+    ):
         try:
-            return copy.deepcopy(_option_alone(name, (*removed, *fault_words), config_dir))
+            return copy.deepcopy(
+                _option_alone(name, (*removed, *fault_words), config_dir)
+            )
         except ConfigError:
             pass
-    others = [word for word in words.others if name is None or not word.startswith("fault=")]
+    others = [
+        word for word in words.others if name is None or not word.startswith("fault=")
+    ]
     chosen = [] if name is None else [f"fault={name}"]
-    whole = compose(CONFIG_NAME, [*others, *chosen, *fault_words], config_dir=config_dir)
+    whole = compose(
+        CONFIG_NAME, [*others, *chosen, *fault_words], config_dir=config_dir
+    )
     return whole["fault"].plain()
 
 
-def _experiment_sets_fault(experiment: str | None, config_dir: str | Path | None) -> bool:
+def _experiment_sets_fault(
+    experiment: str | None, config_dir: str | Path | None
+) -> bool:
     """Whether the file of an experiment sets keys of whatever fault is chosen, such as its gear."""
     if experiment in (None, "null"):
         return False
@@ -227,7 +263,11 @@ def _with_whole_parts(
                 f"fault.parts: kind = {part.get('kind')!r}; give the kind of one single fault"
             )
         option = _fault_option(words, part["kind"], (), config_dir)
-        vary = {key: spec for key, spec in (option.get("vary") or {}).items() if key not in part}
+        vary = {
+            key: spec
+            for key, spec in (option.get("vary") or {}).items()
+            if key not in part
+        }
         parts.append({**option, "vary": vary, **part})
     return {**fault, "parts": parts}
 
@@ -289,12 +329,18 @@ def _reset_derived(gear: dict[str, Any], touched: set[str]) -> None:
     for side in SIDES:
         changed = sorted(
             touched
-            & {"gear.normal_module_mm", f"gear.{side}.n_teeth", f"gear.{side}.face_width_mm"}
+            & {
+                "gear.normal_module_mm",
+                f"gear.{side}.n_teeth",
+                f"gear.{side}.face_width_mm",
+            }
         )
         lost = [
             key
             for key in ("mass_kg", "inertia_kg_m2")
-            if changed and f"gear.{side}.{key}" not in touched and gear[side][key] is not None
+            if changed
+            and f"gear.{side}.{key}" not in touched
+            and gear[side][key] is not None
         ]
         for key in lost:
             gear[side][key] = None

@@ -19,7 +19,13 @@ from gensig.options.configuration import Configuration, whole_number
 from gensig.plan.condition_courses import SEED_KEY, settle_courses
 from gensig.plan.make import make_plan
 from gensig.production.streaming import epoch_seed
-from gensig.record.inputs import InputReader, RecordInputs, Row, simulate_motions, twin_start
+from gensig.record.inputs import (
+    InputReader,
+    RecordInputs,
+    Row,
+    simulate_motions,
+    twin_start,
+)
 from gensig.record.options import read_plan_options
 from gensig.record.streams import Stream, stream
 from gensig.sensing.instrument import Instrument
@@ -33,7 +39,9 @@ SPEED_SHARES = (0.25, 0.5, 1.0, 1.5, 2.0)  # of the set-point, where no speeds a
 TORQUE_SHARES = (0.25, 0.5, 1.0, 2.0)
 FEWEST_UNITS = 4  # what is chosen on all but one of them needs a spread
 MOST_CELLS = 400
-NOISE_DRAWS = 16  # records of noise whose spectra are averaged where it is not white ...
+NOISE_DRAWS = (
+    16  # records of noise whose spectra are averaged where it is not white ...
+)
 NOISE_BINS = 9  # ... and bins: together the mean of its inverse is right within 1 %
 
 
@@ -102,7 +110,9 @@ class FaultPairs:
         motions = simulate_motions([*sound, *faulty])
         n_samples = round(self.duration * self.sampling_rate)
         shape = (self.n_units, len(self.channel_names), n_samples)
-        signals = {name: np.full(shape, np.nan) for name in ("residual", "sound", "faulty")}
+        signals = {
+            name: np.full(shape, np.nan) for name in ("residual", "sound", "faulty")
+        }
         angles = {
             name: np.full((self.n_units, n_samples), np.nan)
             for name in ("sound_angle", "faulty_angle")
@@ -110,7 +120,9 @@ class FaultPairs:
         power = np.full(shape[:2], np.nan)
         for unit, inputs in enumerate(faulty):
             without, with_fault = motions[unit], motions[self.n_units + unit]
-            if isinstance(without, SimulationError) or isinstance(with_fault, SimulationError):
+            if isinstance(without, SimulationError) or isinstance(
+                with_fault, SimulationError
+            ):
                 continue
             power[unit] = (
                 _noise_power(inputs, without)
@@ -123,9 +135,14 @@ class FaultPairs:
                 signals[name][unit] = inputs.noisy(clean[-1], power[unit])[0]
                 angles[f"{name}_angle"][unit] = motion.shaft_angle
             signals["residual"][unit] = clean[1] - clean[0]
-        shape_of_noise = np.ones((1, 1, 1)) if self.noise_shape is None else self.noise_shape
+        shape_of_noise = (
+            np.ones((1, 1, 1)) if self.noise_shape is None else self.noise_shape
+        )
         return PairCell(
-            **signals, **angles, noise_power=power, noise_density=power[:, :, None] * shape_of_noise
+            **signals,
+            **angles,
+            noise_power=power,
+            noise_density=power[:, :, None] * shape_of_noise,
         )
 
 
@@ -169,8 +186,12 @@ def make_pairs(
             "sensing.snr_reference: noise that follows the record tells the fault; use healthy_twin"
         )
     whole_number("the number of units", n_units, at_least=FEWEST_UNITS)
-    speeds = _levels("speeds in r/min", speeds_rpm, config["operating"]["speed_rpm"], SPEED_SHARES)
-    torques = _levels("torques in N m", torques_nm, config["operating"]["torque_nm"], TORQUE_SHARES)
+    speeds = _levels(
+        "speeds in r/min", speeds_rpm, config["operating"]["speed_rpm"], SPEED_SHARES
+    )
+    torques = _levels(
+        "torques in N m", torques_nm, config["operating"]["torque_nm"], TORQUE_SHARES
+    )
     if len(speeds) * len(torques) > MOST_CELLS:
         raise ConfigError(
             f"{len(speeds)} speeds x {len(torques)} torques are more than {MOST_CELLS} cells; give fewer"
@@ -222,7 +243,10 @@ def _levels(
 
 
 def _planned(
-    config: Configuration, speeds: Sequence[float], torques: Sequence[float], n_units: int
+    config: Configuration,
+    speeds: Sequence[float],
+    torques: Sequence[float],
+    n_units: int,
 ) -> tuple[Configuration, list[dict[str, Any]]]:
     """The configuration with a plan of one row a cell and unit, and those rows, each unit in a
     gearbox of its own.
@@ -246,9 +270,12 @@ def _planned(
     config = settle_courses(config, () if SEED_KEY in plan.vary else (SEED_KEY,))
     table = make_plan(config)
     rows = [table.record(index) for index in range(table.n_records)]
-    gearboxes = [f"gearbox-{index % n_units % n_gearboxes:04d}" for index in range(len(rows))]
+    gearboxes = [
+        f"gearbox-{index % n_units % n_gearboxes:04d}" for index in range(len(rows))
+    ]
     return config, [
-        {**row, "gearbox_id": gearbox} for row, gearbox in zip(rows, gearboxes, strict=True)
+        {**row, "gearbox_id": gearbox}
+        for row, gearbox in zip(rows, gearboxes, strict=True)
     ]
 
 
@@ -263,7 +290,9 @@ def _contrasts(
     reader = InputReader(config)
     inputs = [reader.inputs(row) for row in rows]
     starts = [twin_start(each.machine, each.stream(Stream.TWIN)) for each in inputs]
-    faulty = [each.from_start(start) for each, start in zip(inputs, starts, strict=True)]
+    faulty = [
+        each.from_start(start) for each, start in zip(inputs, starts, strict=True)
+    ]
     return [each.without_faults() for each in faulty], faulty
 
 
@@ -276,7 +305,9 @@ def _noise_power(inputs: RecordInputs, sound: CleanRecord) -> Array:
 def _power_at_set_point(config: Configuration, n_units: int) -> Array:
     """Noise power of every unit at the configured speed and torque, (unit, channel)."""
     operating = config["operating"]
-    planned, rows = _planned(config, [operating["speed_rpm"]], [operating["torque_nm"]], n_units)
+    planned, rows = _planned(
+        config, [operating["speed_rpm"]], [operating["torque_nm"]], n_units
+    )
     sound, _ = _contrasts(planned, rows)
     powers = []
     for inputs, motion in zip(sound, simulate_motions(sound), strict=True):
@@ -298,12 +329,18 @@ def _noise_shape(config: Configuration, rows: Sequence[Row]) -> Array:
         n_samples = round(inputs.machine.operating.duration * sensing.sampling_rate)
         silent = np.zeros((len(sensing.channel_names), n_samples))
         ideal = Instrument(
-            sensing=replace(sensing, sensor=None), path=inputs.instrument.path, sensors=None
+            sensing=replace(sensing, sensor=None),
+            path=inputs.instrument.path,
+            sensors=None,
         )
         children = stream(config.seed, Stream.NOISE, unit).spawn(NOISE_DRAWS)
-        noises = (ideal.record(silent, np.ones(len(silent)), rng)[0] for rng in children)
+        noises = (
+            ideal.record(silent, np.ones(len(silent)), rng)[0] for rng in children
+        )
         density = (
-            np.mean([np.abs(np.fft.rfft(noise, axis=-1)) ** 2 for noise in noises], axis=0)
+            np.mean(
+                [np.abs(np.fft.rfft(noise, axis=-1)) ** 2 for noise in noises], axis=0
+            )
             / n_samples
         )
         densities.append([_smoothed(line) for line in density])

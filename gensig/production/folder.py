@@ -90,7 +90,8 @@ def begin_folder(config: Configuration, overrides: Sequence[str], out: Path) -> 
         generator_version=__version__,
     )
     log(
-        out, f"gensig {__version__}: {plan.n_records} records in {plan.n_shards} shards are planned"
+        out,
+        f"gensig {__version__}: {plan.n_records} records in {plan.n_shards} shards are planned",
     )
     return plan
 
@@ -126,7 +127,9 @@ def run_folder(
     entries = {index: manifest.shards[index] for index in mine}
     if not executor.closes:
         entries |= {
-            index: entry for index in mine if (entry := read_receipt(out, index)) is not None
+            index: entry
+            for index in mine
+            if (entry := read_receipt(out, index)) is not None
         }
     missing = [index for index in mine if not _is_there(out, index, entries[index])]
     n_records = sum(rows[index] for index in mine)
@@ -138,7 +141,10 @@ def run_folder(
         executor.closes and not manifest.is_complete
     )  # the log of a closed folder is closed too
     if logged:
-        log(out, f"gensig {__version__}, {executor}: {len(missing)} of {len(mine)} shards to make")
+        log(
+            out,
+            f"gensig {__version__}, {executor}: {len(missing)} of {len(mine)} shards to make",
+        )
     try:
         for index, result in executor.run(functools.partial(write_shard, out), missing):
             if isinstance(result, ShardFailure):
@@ -152,7 +158,9 @@ def run_folder(
                 n_done, n_failed = n_done + rows[index], n_failed + result.n_failed
                 n_made, n_bytes = n_made + rows[index], n_bytes + result.n_bytes
                 if executor.closes:
-                    record_shard(out, index, result.sha256, result.n_bytes, result.n_failed)
+                    record_shard(
+                        out, index, result.sha256, result.n_bytes, result.n_failed
+                    )
                     receipt_path(out, index).unlink(missing_ok=True)
                     log(
                         out,
@@ -191,7 +199,9 @@ def _close(out: Path) -> None:
 def _is_there(out: Path, index: int, entry: ShardEntry) -> bool:
     """True for a shard that is done and whose file has not been lost or cut since."""
     path = shard_path(out, index)
-    return entry.state == "done" and path.is_file() and path.stat().st_size == entry.bytes
+    return (
+        entry.state == "done" and path.is_file() and path.stat().st_size == entry.bytes
+    )
 
 
 def close_folder(out: Path) -> int:
@@ -234,7 +244,11 @@ def write_shard(out: Path, shard_index: int) -> WrittenShard:
     """
     config, plan, sizes = _folder_inputs(out, (out / PLAN).stat().st_mtime_ns)
     n_records, begin = sizes[shard_index], sum(sizes[:shard_index])
-    params = [name.removeprefix("params/") for name in plan.names if name.startswith("params/")]
+    params = [
+        name.removeprefix("params/")
+        for name in plan.names
+        if name.startswith("params/")
+    ]
     writer = open_shard(shard_path(out, shard_index), config, n_records, params)
     together = block_length(config)
     with writer:
@@ -243,24 +257,35 @@ def write_shard(out: Path, shard_index: int) -> WrittenShard:
             _check_places(out, rows, shard_index, first)
             for row, record in enumerate(simulate_records(config, rows), start=first):
                 writer.write(row, record.signals, record.values)
-    written = WrittenShard(sha256=writer.sha256, n_bytes=writer.n_bytes, n_failed=writer.n_failed)
+    written = WrittenShard(
+        sha256=writer.sha256, n_bytes=writer.n_bytes, n_failed=writer.n_failed
+    )
     write_receipt(out, shard_index, rows=n_records, **dataclasses.asdict(written))
     return written
 
 
 @functools.lru_cache(maxsize=1)
-def _folder_inputs(out: Path, _changed: int) -> tuple[Configuration, PlanRows, list[int]]:
+def _folder_inputs(
+    out: Path, _changed: int
+) -> tuple[Configuration, PlanRows, list[int]]:
     """Configuration, plan and records of each shard, read once by a process that makes many
     shards of one folder.
     """
     manifest, config = joined_folder(out)
-    return Configuration(config), PlanRows(out / PLAN), [entry.rows for entry in manifest.shards]
+    return (
+        Configuration(config),
+        PlanRows(out / PLAN),
+        [entry.rows for entry in manifest.shards],
+    )
 
 
 def _check_places(
     out: Path, rows: Sequence[Mapping[str, Any]], shard_index: int, first: int
 ) -> None:
-    if any((row["shard"], row["row"]) != (shard_index, first + k) for k, row in enumerate(rows)):
+    if any(
+        (row["shard"], row["row"]) != (shard_index, first + k)
+        for k, row in enumerate(rows)
+    ):
         raise DatasetError(
             f"{out / PLAN} and the manifest disagree on shard {shard_index}; restore both from a copy"
         )
@@ -299,7 +324,10 @@ def _shaft_sensors(dataset: DatasetOptions, system: Machine) -> dict[str, Any]:
     tacho, encoder = system.sensing.tacho, system.sensing.encoder
     attributes: dict[str, Any] = {}
     if dataset.store_tacho:
-        attributes |= {"tacho_shaft": tacho.shaft, "tacho_pulses_per_turn": tacho.pulses_per_turn}
+        attributes |= {
+            "tacho_shaft": tacho.shaft,
+            "tacho_pulses_per_turn": tacho.pulses_per_turn,
+        }
     if dataset.store_encoder:
         attributes |= {
             "encoder_shaft": encoder.shaft,

@@ -31,7 +31,9 @@ class FailedRecordsWarning(UserWarning):
 
 
 def predict(
-    config: Configuration, *, on_plan: Callable[[Plan, int], None] = lambda _plan, _n_timed: None
+    config: Configuration,
+    *,
+    on_plan: Callable[[Plan, int], None] = lambda _plan, _n_timed: None,
 ) -> dict[str, str]:
     """Facts of a data set that is not made yet, by name, as text.
 
@@ -54,7 +56,9 @@ def predict(
     simulate_records(config, probe[:1])  # compiles, or loads what was compiled
     workers = min(_n_processes(config), table.n_shards)
     # Workers import once more what this process has imported, and load what was compiled.
-    start_up = planning + started * (1 if workers == 1 else 2) + time.monotonic() - begin
+    start_up = (
+        planning + started * (1 if workers == 1 else 2) + time.monotonic() - begin
+    )
     forget_twins()
     begin = time.monotonic()
     records = simulate_records(config, probe)
@@ -84,7 +88,9 @@ def predict(
 
 def _warn_of_failed(records: Sequence[Record]) -> None:
     reasons = [
-        str(one.values["status_reason"]) for one in records if one.values.get("status") == "failed"
+        str(one.values["status_reason"])
+        for one in records
+        if one.values.get("status") == "failed"
     ]
     if reasons:
         warnings.warn(
@@ -103,7 +109,11 @@ def _n_processes(config: Configuration) -> int:
 
 def _stored_bytes(config: Configuration, table: Plan, records: list[Record]) -> int:
     """Bytes of all files, from two shards of different length and what is usual beside them."""
-    params = [name.removeprefix("params/") for name in table.columns if name.startswith("params/")]
+    params = [
+        name.removeprefix("params/")
+        for name in table.columns
+        if name.startswith("params/")
+    ]
     sizes = []
     with tempfile.TemporaryDirectory() as folder:
         for n in (1, len(records)):

@@ -79,7 +79,9 @@ def reproduce(folder: Path, n_records: int) -> Reproduction:
         if recorded[name] != str(here[name])
     }
     chosen = np.unique(
-        np.linspace(0, plan.n_records - 1, min(n_records, plan.n_records)).round().astype(int)
+        np.linspace(0, plan.n_records - 1, min(n_records, plan.n_records))
+        .round()
+        .astype(int)
     )
     differences: dict[str, float] = {}
     refused, n_failed = 0, 0
@@ -148,7 +150,9 @@ def simulate_twin(config: Configuration, row: Mapping[str, Any]) -> Record:
         if isinstance(healthy, SimulationError):
             raise healthy
         signals["noise_power"] = original.signals["noise_power"]
-        noisy, conversion = inputs.noisy(inputs.clean(healthy.acceleration), signals["noise_power"])
+        noisy, conversion = inputs.noisy(
+            inputs.clean(healthy.acceleration), signals["noise_power"]
+        )
         signals["acceleration"] = noisy.astype(np.float32)
         sound |= conversion
     return Record(signals=signals, values={**twin.values, **sound})
@@ -157,11 +161,15 @@ def simulate_twin(config: Configuration, row: Mapping[str, Any]) -> Record:
 def _finished(folder: Path) -> tuple[Manifest, Configuration, Plan]:
     manifest, config = joined_folder(folder)
     if not manifest.is_complete:
-        raise DatasetError(f"{folder} is incomplete; run `gensig resume {folder}` first")
+        raise DatasetError(
+            f"{folder} is incomplete; run `gensig resume {folder}` first"
+        )
     return manifest, Configuration(config), read_plan(folder / PLAN)
 
 
-def _difference(folder: Path, row: Mapping[str, Any], record: Record) -> tuple[float, float]:
+def _difference(
+    folder: Path, row: Mapping[str, Any], record: Record
+) -> tuple[float, float]:
     """Largest difference of a sample over the RMS of its channel, and what one count is on that
     scale.
     """
@@ -176,20 +184,32 @@ def _difference(folder: Path, row: Mapping[str, Any], record: Record) -> tuple[f
                 stored_reason(record.values["status_reason"]),
                 str(read_rows(file["status_reason"])[place]),
             ]
-            return (0.0 if len(set(map(without_numbers, reasons))) == 1 else np.inf), 0.0
+            return (
+                0.0 if len(set(map(without_numbers, reasons))) == 1 else np.inf
+            ), 0.0
         for name, scale_name in SCALES.items():
             if name not in file:
                 continue
             stored, made = read_signal(file, name, place), record.signals[name]
             if file[name].dtype.kind == "i":
                 counts, scale = quantized(made)
-                made = np.multiply(counts, scale[:, None], dtype=np.float64).astype(np.float32)
-                count = float(np.max(np.asarray(file[scale_name][place]) / _rms(stored)))
+                made = np.multiply(counts, scale[:, None], dtype=np.float64).astype(
+                    np.float32
+                )
+                count = float(
+                    np.max(np.asarray(file[scale_name][place]) / _rms(stored))
+                )
             if _sha256(stored) != _sha256(made):
                 wide = stored.astype(np.float64)
-                largest = max(largest, float(np.max(np.abs(wide - made) / _rms(wide)[:, None])))
-        for name in [name for name in record.signals if name in file and name not in SCALES]:
-            largest = max(largest, _other_difference(file[name][place], record.signals[name]))
+                largest = max(
+                    largest, float(np.max(np.abs(wide - made) / _rms(wide)[:, None]))
+                )
+        for name in [
+            name for name in record.signals if name in file and name not in SCALES
+        ]:
+            largest = max(
+                largest, _other_difference(file[name][place], record.signals[name])
+            )
     return largest, count
 
 
@@ -214,4 +234,6 @@ def _rms(signal: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def _sha256(samples: NDArray[np.float32]) -> str:
-    return hashlib.sha256(np.ascontiguousarray(samples, dtype="<f4").tobytes()).hexdigest()
+    return hashlib.sha256(
+        np.ascontiguousarray(samples, dtype="<f4").tobytes()
+    ).hexdigest()

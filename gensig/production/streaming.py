@@ -67,7 +67,9 @@ class RecordStream:
     def channels(self) -> list[str]:
         """Names along the channel axis."""
         sensing = self.config["sensing"]
-        return list(sensing["channels"] if sensing["sensors"] is None else sensing["sensors"])
+        return list(
+            sensing["channels"] if sensing["sensors"] is None else sensing["sensors"]
+        )
 
     channel_names = channels  # as a stored data set calls them
 
@@ -120,10 +122,21 @@ class RecordStream:
             )
             raise DatasetError(f"split {protocol!r} does not exist; {reason}")
         table = tables[protocol]
-        places = {name: place for place, name in enumerate(self.column("record_id").tolist())}
-        rows: dict[str, list[tuple[int, float, float]]] = {subset: [] for subset in SUBSETS}
-        columns = (table.record_id, table.start_fraction, table.stop_fraction, table.subset)
-        for name, start, stop, subset in zip(*(column.tolist() for column in columns), strict=True):
+        places = {
+            name: place for place, name in enumerate(self.column("record_id").tolist())
+        }
+        rows: dict[str, list[tuple[int, float, float]]] = {
+            subset: [] for subset in SUBSETS
+        }
+        columns = (
+            table.record_id,
+            table.start_fraction,
+            table.stop_fraction,
+            table.subset,
+        )
+        for name, start, stop, subset in zip(
+            *(column.tolist() for column in columns), strict=True
+        ):
             if name in places:
                 rows[subset].append((places[name], float(start), float(stop)))
         return rows
@@ -132,7 +145,10 @@ class RecordStream:
         """Some records of this part: (record,) places in it, or True for each that is meant."""
         chosen = np.asarray(places)
         return replace(
-            self, numbers=self.numbers[chosen if chosen.dtype == bool else chosen.astype(np.int64)]
+            self,
+            numbers=self.numbers[
+                chosen if chosen.dtype == bool else chosen.astype(np.int64)
+            ],
         )
 
     def shard(self, index: int, count: int) -> RecordStream:
@@ -192,7 +208,9 @@ def open_stream(config: Configuration, *, epoch: int = 0) -> RecordStream:
     config = config.with_entries(out=None)
     read_dataset_options(config)  # refuses what no data set has
     plan = make_plan(_at_epoch(config, epoch))
-    return RecordStream(config=config, epoch=epoch, plan=plan, numbers=np.arange(plan.n_records))
+    return RecordStream(
+        config=config, epoch=epoch, plan=plan, numbers=np.arange(plan.n_records)
+    )
 
 
 def epoch_seed(seed: int, epoch: int) -> int:

@@ -81,7 +81,10 @@ class RecordNumbers:
         ``r000007``.
         """
         return cls(
-            **{name: _number(row[f"{name}_id"]) for name in (RECORD, CONDITION, GEARBOX, SPECIMEN)}
+            **{
+                name: _number(row[f"{name}_id"])
+                for name in (RECORD, CONDITION, GEARBOX, SPECIMEN)
+            }
         )
 
 
@@ -138,7 +141,9 @@ class RecordInputs:
         )
         return replace(self, run=run, is_reference=True)
 
-    def nuisance_streams(self) -> tuple[dict[str, np.random.Generator], np.random.Generator]:
+    def nuisance_streams(
+        self,
+    ) -> tuple[dict[str, np.random.Generator], np.random.Generator]:
         """Generators of the nuisances of gearbox and specimen, and of the angles that no tooth
         fixes.
 
@@ -155,11 +160,15 @@ class RecordInputs:
     def clean(self, acceleration: Array) -> Array:
         """Output of the sensors before noise, their drift included, (sensor, sample) m/s2."""
         measured = self.instrument.measure(acceleration)
-        return measured * self.instrument.drift(measured.shape[1], self.stream(Stream.DRIFT))
+        return measured * self.instrument.drift(
+            measured.shape[1], self.stream(Stream.DRIFT)
+        )
 
     def noisy(self, clean: Array, noise_power: Array) -> tuple[Array, dict[str, Any]]:
         """Noise, offset, converter and lost samples, and the columns on clipping and loss."""
-        noisy, clipped = self.instrument.record(clean, noise_power, self.stream(Stream.NOISE))
+        noisy, clipped = self.instrument.record(
+            clean, noise_power, self.stream(Stream.NOISE)
+        )
         received, dropped = self.instrument.sent(noisy, self.stream(Stream.DROPPED))
         sensor = self.instrument.sensing.sensor
         too_many = int(sensor is not None and clipped > sensor.max_clipped_fraction)
@@ -188,16 +197,22 @@ class RecordInputs:
         """
         start = self.run.start or Start(tooth_pinion=0, tooth_wheel=0, phase=0.0)
         generators = (self.stream(Stream.ENCODER), self.stream(Stream.TACHO))
-        return shaft_signals(self.dataset.shaft_signals, self.machine, start, record, *generators)
+        return shaft_signals(
+            self.dataset.shaft_signals, self.machine, start, record, *generators
+        )
 
 
-def simulate_motions(inputs: Sequence[RecordInputs]) -> list[CleanRecord | SimulationError]:
+def simulate_motions(
+    inputs: Sequence[RecordInputs],
+) -> list[CleanRecord | SimulationError]:
     """Accelerations at the bearings, nuisances included, side by side; an error in place of a
     failed one.
 
     A record's bits do not depend on what it is simulated beside.
     """
-    runs = {id(each.run): each.run for each in inputs}  # a twin may share the run of a sound record
+    runs = {
+        id(each.run): each.run for each in inputs
+    }  # a twin may share the run of a sound record
     results = dict(zip(runs, simulate_with_lead_in(list(runs.values())), strict=True))
     return [_with_nuisances(each, results[id(each.run)]) for each in inputs]
 
@@ -241,18 +256,29 @@ class InputReader:
             faults=() if self.plan.sham else tuple(row_faults(row)),
             start=start,
             specimen=_specimen(
-                seed, numbers.specimen, machine.pair.pinion, machine.pair.wheel, machine.quality
+                seed,
+                numbers.specimen,
+                machine.pair.pinion,
+                machine.pair.wheel,
+                machine.quality,
             ),
             gearbox=_gearbox(seed, numbers.gearbox, machine),
             tell_mesh=self.dataset.store_mesh_state,
-            discs=machine.draw_discs(stream(seed, Stream.TOOTHED_WHEEL, numbers.gearbox)),
+            discs=machine.draw_discs(
+                stream(seed, Stream.TOOTHED_WHEEL, numbers.gearbox)
+            ),
         )
         generators = (
-            stream(seed, cause, numbers.gearbox) for cause in (Stream.PATH, Stream.SENSOR)
+            stream(seed, cause, numbers.gearbox)
+            for cause in (Stream.PATH, Stream.SENSOR)
         )
         instrument = draw_instrument(machine.sensing, *generators)
         return RecordInputs(
-            seed=seed, numbers=numbers, run=run, instrument=instrument, dataset=self.dataset
+            seed=seed,
+            numbers=numbers,
+            run=run,
+            instrument=instrument,
+            dataset=self.dataset,
         )
 
     def machine(self, values: Mapping[str, float]) -> Machine:
@@ -289,7 +315,9 @@ def twin_start(machine: Machine, rng: np.random.Generator) -> Start:
     tooth = int(rng.integers(machine.pair.pinion.n_teeth))
     return Start(
         tooth_pinion=tooth,
-        tooth_wheel=machine.driven_tooth(tooth, int(rng.integers(machine.pair.wheel.n_teeth))),
+        tooth_wheel=machine.driven_tooth(
+            tooth, int(rng.integers(machine.pair.wheel.n_teeth))
+        ),
         phase=float(rng.random()),
     )
 
@@ -303,5 +331,7 @@ def _gearbox(seed: int, number: int, machine: Machine) -> Gearbox:
 
 
 @lru_cache(maxsize=32)  # the records of a unit share it
-def _specimen(seed: int, number: int, pinion: Gear, wheel: Gear, quality: Quality) -> Specimen:
+def _specimen(
+    seed: int, number: int, pinion: Gear, wheel: Gear, quality: Quality
+) -> Specimen:
     return draw_specimen(stream(seed, Stream.SPECIMEN, number), pinion, wheel, quality)

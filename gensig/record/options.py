@@ -53,12 +53,16 @@ def read_dataset_options(config: Configuration) -> DatasetOptions:
     ConfigError    for unknown or missing keys, and values of the wrong type
     """
     section = config.section("dataset")
-    switches = [field.name for field in fields(DatasetOptions) if field.name.startswith(PREFIX)]
+    switches = [
+        field.name for field in fields(DatasetOptions) if field.name.startswith(PREFIX)
+    ]
     for key in switches:
         if key in section and not isinstance(section[key], bool):
             raise ConfigError(f"dataset.{key} = {section[key]!r} must be true or false")
     if section.get("records_per_shard") is not None:
-        whole_number("dataset.records_per_shard", section["records_per_shard"], at_least=1)
+        whole_number(
+            "dataset.records_per_shard", section["records_per_shard"], at_least=1
+        )
     return section.read(DatasetOptions)
 
 
@@ -112,7 +116,10 @@ def read_plan_options(config: Configuration) -> PlanOptions:
             whole_number(f"plan.{key}", plan[key], at_least=1)
     if plan["n_records"] is not None:
         whole_number("plan.n_records", plan["n_records"], at_least=len(plan["classes"]))
-    vary = {key: read_distribution(f"plan.vary.{key}", spec) for key, spec in plan["vary"].items()}
+    vary = {
+        key: read_distribution(f"plan.vary.{key}", spec)
+        for key, spec in plan["vary"].items()
+    }
     return plan.without("vary").read(PlanOptions, vary=vary)
 
 

@@ -17,7 +17,13 @@ from gensig.dataset.folder.manifest import identity_hash
 from gensig.errors import SimulationError
 from gensig.operation.options import operating_signals
 from gensig.options.configuration import Configuration
-from gensig.record.inputs import MISSING, InputReader, RecordInputs, Row, simulate_motions
+from gensig.record.inputs import (
+    MISSING,
+    InputReader,
+    RecordInputs,
+    Row,
+    simulate_motions,
+)
 from gensig.record.options import read_dataset_options
 from gensig.sensing.chain import detectability
 from gensig.systems.base import Machine
@@ -59,19 +65,28 @@ def simulate_records(config: Configuration, rows: Sequence[Row]) -> list[Record]
     sound: dict[int, RecordInputs] = {}
     if reader.dataset.needs_sound_records:
         sound = {
-            index: each.without_faults() for index, each in enumerate(inputs) if each.run.faults
+            index: each.without_faults()
+            for index, each in enumerate(inputs)
+            if each.run.faults
         }
     motions = simulate_motions([*inputs, *twins.values(), *sound.values()])
     of_records, others = motions[: len(inputs)], motions[len(inputs) :]
     of_sound = dict(zip(sound, others[len(twins) :], strict=True))
     _keep_twins(
-        keys, {key: (twins[key], motion) for key, motion in zip(twins, others, strict=False)}
+        keys,
+        {key: (twins[key], motion) for key, motion in zip(twins, others, strict=False)},
     )
     records = []
-    for index, (row, each, motion) in enumerate(zip(rows, inputs, of_records, strict=True)):
-        without_faults = of_sound.get(index, motion) if reader.dataset.needs_sound_records else None
+    for index, (row, each, motion) in enumerate(
+        zip(rows, inputs, of_records, strict=True)
+    ):
+        without_faults = (
+            of_sound.get(index, motion) if reader.dataset.needs_sound_records else None
+        )
         power = _TWINS.get(keys[index])
-        measured = _Measured(inputs=each, motion=motion, sound=without_faults, twin_power=power)
+        measured = _Measured(
+            inputs=each, motion=motion, sound=without_faults, twin_power=power
+        )
         records.append(_record(config, row, measured))
     return records
 
@@ -100,7 +115,9 @@ class _Measured:
         if sensing.snr is None:
             return np.zeros(len(signal))
         reference = (
-            instrument.power(signal) if sensing.snr_reference != "healthy_twin" else self.twin_power
+            instrument.power(signal)
+            if sensing.snr_reference != "healthy_twin"
+            else self.twin_power
         )
         if isinstance(reference, SimulationError):
             raise reference
@@ -132,7 +149,9 @@ def _record(config: Configuration, row: Row, measured: _Measured) -> Record:
     if dataset.store_operating:
         angle = np.full(n_samples, MISSING) if motion is None else motion.shaft_angle
         rate = machine.sensing.sampling_rate
-        signals |= operating_signals(machine.operating, rate, angle, machine.load_exponent)
+        signals |= operating_signals(
+            machine.operating, rate, angle, machine.load_exponent
+        )
     signals |= measured.inputs.shaft_signals(motion)
     if dataset.store_mesh_state:
         state = None if motion is None else motion.mesh
@@ -161,11 +180,17 @@ def _finished(measured: _Measured) -> Record:
         **conversion,
     }
     sound = measured.sound
-    if dataset.store_detectability and sensing.has_white_noise and isinstance(sound, CleanRecord):
+    if (
+        dataset.store_detectability
+        and sensing.has_white_noise
+        and isinstance(sound, CleanRecord)
+    ):
         residual = clean - inputs.clean(sound.acceleration)
         values["detectability"] = detectability(residual, noise_power)
     source = motion.acceleration[:, sensing.n_lead :]
-    return Record(signals=_samples(inputs, noisy, clean, noise_power, source, twin), values=values)
+    return Record(
+        signals=_samples(inputs, noisy, clean, noise_power, source, twin), values=values
+    )
 
 
 def _failed(measured: _Measured, error: SimulationError) -> Record:
@@ -183,7 +208,8 @@ def _failed(measured: _Measured, error: SimulationError) -> Record:
         "mesh_frequency_hz": MISSING,
     }
     return Record(
-        signals=_samples(inputs, silent, silent, noise_power, source, twin), values=values
+        signals=_samples(inputs, silent, silent, noise_power, source, twin),
+        values=values,
     )
 
 
@@ -214,7 +240,9 @@ def _n_samples(machine: Machine) -> int:
     return round(machine.operating.duration * machine.sensing.sampling_rate)
 
 
-def signal_shapes(config: Configuration, machine: Machine) -> dict[str, tuple[int, ...]]:
+def signal_shapes(
+    config: Configuration, machine: Machine
+) -> dict[str, tuple[int, ...]]:
     """Shape of every array of one record, by signal name."""
     dataset = read_dataset_options(config)
     n_channels, n_samples = len(machine.sensing.channel_names), _n_samples(machine)
@@ -278,7 +306,11 @@ def _missing_twins(
     shared: dict[TwinKey, RecordInputs] = {}
     for each, key in zip(inputs, keys, strict=True):
         sensing = each.machine.sensing
-        if sensing.snr is None or sensing.snr_reference != "healthy_twin" or key in _TWINS:
+        if (
+            sensing.snr is None
+            or sensing.snr_reference != "healthy_twin"
+            or key in _TWINS
+        ):
             continue
         twin = each.healthy_twin()
         twins.setdefault(key, twin)

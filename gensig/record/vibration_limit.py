@@ -37,7 +37,9 @@ ROW = {
     "faults_json": "[]",
 }
 N_LOOKS = 17  # at equal shares of the life to the threshold, new flanks and its end among them
-MOST_STEPS = 10  # further records between the first look that is at the limit and the one before
+MOST_STEPS = (
+    10  # further records between the first look that is at the limit and the one before
+)
 TOLERANCE = 2e-3  # of the life to the threshold
 
 
@@ -82,7 +84,9 @@ class _Bench:
     def heard(self) -> list[int]:
         """Numbers of the sensors that give m/s2."""
         names = self.machine.sensing.channel_names
-        return [sensor for sensor, name in enumerate(names) if channel_unit(name) == "m/s^2"]
+        return [
+            sensor for sensor, name in enumerate(names) if channel_unit(name) == "m/s^2"
+        ]
 
     def rms(self, depths: Sequence[Array]) -> Array:
         """RMS of clean records with (2, slice, node) m off the flanks, (depth, sensor) m/s2.
@@ -153,7 +157,12 @@ def limited_by_vibration(
         if over(after) >= 0.0:
             root = float(
                 brentq(
-                    over, before, after, xtol=TOLERANCE * life.life, maxiter=MOST_STEPS, disp=False
+                    over,
+                    before,
+                    after,
+                    xtol=TOLERANCE * life.life,
+                    maxiter=MOST_STEPS,
+                    disp=False,
                 )
             )
             limit_depth = case.judged(_worn(life, root))
@@ -201,7 +210,9 @@ def _share_of_limit(options: WearOptions, rms: Array, new: Array) -> float:
     if options.vibration_limit_m_per_s2 is not None:
         shares.append(float(rms.max()) / options.vibration_limit_m_per_s2)
     if options.vibration_rise is not None:
-        shares.append(float((rms / new).max()) / 10.0 ** (options.vibration_rise / 20.0))
+        shares.append(
+            float((rms / new).max()) / 10.0 ** (options.vibration_rise / 20.0)
+        )
     return max(shares)
 
 

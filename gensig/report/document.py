@@ -63,9 +63,13 @@ def write_report(
     """
     path = folder / REPORT if out is None else out
     if path.exists() or path.is_symlink():
-        raise ConfigError(f"{path} exists already; remove it, or choose another --out FILE")
+        raise ConfigError(
+            f"{path} exists already; remove it, or choose another --out FILE"
+        )
     if out is not None and not path.parent.is_dir():
-        raise ConfigError(f"{path}: there is no folder {path.parent}; give an existing one")
+        raise ConfigError(
+            f"{path}: there is no folder {path.parent}; give an existing one"
+        )
     if per_class is not None and per_class < 1:
         raise ConfigError(f"--records {per_class} must be at least 1")
     with open_dataset(folder) as data:
@@ -125,7 +129,9 @@ def _content(
     """What the script draws."""
     along = [name for name in ALONG if name in data.column_names]
     table = value_table(data, measured.records, along)
-    table["columns"] |= {name: pack_floats(values) for name, values in measured.values.items()}
+    table["columns"] |= {
+        name: pack_floats(values) for name, values in measured.values.items()
+    }
     content = {
         "classes": [plain(name) for name in data.class_names],
         "channels": [{"name": plain(n), "unit": plain(u)} for n, u in zip(chosen.channels, units, strict=True)],
@@ -152,7 +158,9 @@ def _signals(
     groups: dict[str, list[tuple[str, str]]] = {}
     for number, one in enumerate(examples):
         severity = "unknown" if one["severity"] is None else f"{one['severity']:.2f}"
-        text = plain(f"{one['class']}, severity {severity}, {one['unit']}, {one['record']}")
+        text = plain(
+            f"{one['class']}, severity {severity}, {one['unit']}, {one['record']}"
+        )
         groups.setdefault(plain(one["class"]), []).append((str(number), text))
     last = groups[list(groups)[-1]]
     first = (
@@ -167,7 +175,11 @@ def _signals(
     if any(name == "mesh" for name, _ in orders):
         zooms += [(f"{k}", f"around mesh harmonic {k}") for k in (1, 2, 3)]
     low, high = envelope_band(data.sampling_rate)
-    which = "of each class, those of one life from" if has_lives(data) else "of each class, from"
+    which = (
+        "of each class, those of one life from"
+        if has_lives(data)
+        else "of each class, from"
+    )
     sound = (
         "; sound ones at the conditions of the middle one of another class"
         if "healthy" in groups
@@ -210,19 +222,27 @@ def _signals(
 
 def _first_channel(chosen: Choice) -> str:
     """Number of the channel shown first: that of the data card's figures, where there is one."""
-    return str(chosen.channels.index(FIRST_CHOICE)) if FIRST_CHOICE in chosen.channels else "0"
+    return (
+        str(chosen.channels.index(FIRST_CHOICE))
+        if FIRST_CHOICE in chosen.channels
+        else "0"
+    )
 
 
 def _parameters(data: Dataset, table: dict[str, Any]) -> Section:
     names = list(table["columns"])
     drawn = [(name, column_label(name)) for name in names if name.startswith("params/")]
-    other = [(name, column_label(name)) for name in names if not name.startswith("params/")]
+    other = [
+        (name, column_label(name)) for name in names if not name.startswith("params/")
+    ]
     n_rows = table["rows"]
     text = [
         f"{_of(n_rows, data)}. A parameter is in the records to which it applies; those that never differ are left out."
     ]
     if not names:
-        return Section(title="Parameters", text=["No parameter differs between the records."])
+        return Section(
+            title="Parameters", text=["No parameter differs between the records."]
+        )
     return Section(
         title="Parameters",
         text=text,
@@ -249,10 +269,16 @@ def _further(signal: np.ndarray, sampling_rate: float) -> dict[str, np.ndarray]:
 
 
 def _indicators(
-    data: Dataset, chosen: Choice, measured: Measured, table: dict[str, Any], units: Sequence[str]
+    data: Dataset,
+    chosen: Choice,
+    measured: Measured,
+    table: dict[str, Any],
+    units: Sequence[str],
 ) -> Section:
     known = [
-        (name, label) for name, label in INDICATORS if np.isfinite(measured.values[name]).any()
+        (name, label)
+        for name, label in INDICATORS
+        if np.isfinite(measured.values[name]).any()
     ]
     along = [(name, column_label(name)) for name in ALONG if name in table["columns"]]
     text = [f"{_of(len(measured.records), data)}. Averages over turns are taken at the mean speed; where it varies, "
@@ -294,8 +320,12 @@ def _lives(table: dict[str, Any]) -> Section:
         charts=Charts(
             name="lives",
             label="Choice of quantity",
-            selects=[Select(name="quantity", label="Quantity", groups=[("", quantities)])],
-            switches=[Switch(name="relative", label="time as a share of the life", on=False)],
+            selects=[
+                Select(name="quantity", label="Quantity", groups=[("", quantities)])
+            ],
+            switches=[
+                Switch(name="relative", label="time as a share of the life", on=False)
+            ],
             plots=[("lives", "Lives over time")],
         ),
     )
@@ -306,9 +336,13 @@ def _beside(compared: Sequence[Comparison], units: Sequence[str]) -> Section:
     if not compared:
         return section
     charts = Charts(
-        name="beside", label="Nothing to choose", plots=[("beside", "Measured ranges and this set")]
+        name="beside",
+        label="Nothing to choose",
+        plots=[("beside", "Measured ranges and this set")],
     )
-    return Section(title=section.title, text=section.text, table=section.table, charts=charts)
+    return Section(
+        title=section.title, text=section.text, table=section.table, charts=charts
+    )
 
 
 def _of(n_rows: int, data: Dataset) -> str:

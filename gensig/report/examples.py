@@ -52,7 +52,9 @@ class Choice:
     @property
     def n_signals(self) -> int:
         """Records times channels."""
-        return len(self.channels) * sum(len(records) for records in self.records.values())
+        return len(self.channels) * sum(
+            len(records) for records in self.records.values()
+        )
 
 
 def choose(data: Dataset, per_class: int | None) -> Choice:
@@ -73,9 +75,13 @@ def choose(data: Dataset, per_class: int | None) -> Choice:
     wanted = RECORDS_PER_CLASS if per_class is None else per_class
     n_channels = min(len(data.channel_names), max(limit // len(classes), 1))
     n_shown = max(min(wanted, limit // (len(classes) * n_channels)), 1)
-    faulty = {name: _spread(data, name, n_shown) for name in classes if name != "healthy"}
+    faulty = {
+        name: _spread(data, name, n_shown) for name in classes if name != "healthy"
+    }
     chosen = {
-        name: faulty[name] if name in faulty else _sound(data, list(faulty.values())[::-1], n_shown)
+        name: faulty[name]
+        if name in faulty
+        else _sound(data, list(faulty.values())[::-1], n_shown)
         for name in classes
     }
     remarks = []
@@ -88,7 +94,9 @@ def choose(data: Dataset, per_class: int | None) -> Choice:
             f"the first {n_channels} of {len(data.channel_names)} channels, so that the page stays small"
         )
     return Choice(
-        records=chosen, channels=data.channel_names[:n_channels], remark="; ".join(remarks)
+        records=chosen,
+        channels=data.channel_names[:n_channels],
+        remark="; ".join(remarks),
     )
 
 
@@ -101,7 +109,11 @@ def _spread(data: Dataset, name: str, n_shown: int) -> list[int]:
     mine = mine[np.argsort(data.column("severity")[mine], kind="stable")]
     if has_lives(data):  # the machine that gets worst, from its beginning
         mine = mine[data.column("life_id")[mine] == data.column("life_id")[mine[-1]]]
-    places = np.linspace(0, mine.size - 1, n_shown) if n_shown > 1 else np.array([mine.size // 2])
+    places = (
+        np.linspace(0, mine.size - 1, n_shown)
+        if n_shown > 1
+        else np.array([mine.size // 2])
+    )
     return list(dict.fromkeys(mine[np.rint(places).astype(int)].tolist()))
 
 
@@ -114,7 +126,9 @@ def _sound(data: Dataset, faulty: Sequence[Sequence[int]], n_shown: int) -> list
     found: list[int] = []
     for records in faulty:
         middle = records[len(records) // 2]
-        same = sound[(condition[sound] == condition[middle]) & (unit[sound] == unit[middle])]
+        same = sound[
+            (condition[sound] == condition[middle]) & (unit[sound] == unit[middle])
+        ]
         found += [index for index in same[:1].tolist() if index not in found]
     found = found[:n_shown]
     return (
@@ -154,7 +168,9 @@ def example(
         "frequencies": rotation.of(index),
         "fault": rotation.fault_gear(index),
         "views": [
-            _views(signal, data.sampling_rate, usable_top(data), rotation.of(index)["mesh"])
+            _views(
+                signal, data.sampling_rate, usable_top(data), rotation.of(index)["mesh"]
+            )
             for signal in signals
         ],
     }
@@ -165,7 +181,11 @@ def usable_top(data: Dataset) -> float:
     band = data.attributes.get("usable_band_hz")
     half = data.sampling_rate / 2
     try:
-        return min(float(band[1]), half) if band is not None and float(band[1]) > 0.0 else half
+        return (
+            min(float(band[1]), half)
+            if band is not None and float(band[1]) > 0.0
+            else half
+        )
     except (TypeError, IndexError, ValueError):
         return half
 
@@ -175,7 +195,9 @@ def envelope_band(sampling_rate: float) -> tuple[float, float]:
     return ENVELOPE_BAND[0] * sampling_rate, ENVELOPE_BAND[1] * sampling_rate
 
 
-def _views(signal: FloatArray, rate: float, top: float, mesh: float | None) -> dict[str, Any]:
+def _views(
+    signal: FloatArray, rate: float, top: float, mesh: float | None
+) -> dict[str, Any]:
     part = signal[:WAVEFORM_SAMPLES]
     frequency, amplitude = amplitude_spectrum(signal, rate)
     views: dict[str, Any] = {
@@ -222,8 +244,12 @@ def _spectrogram(signal: FloatArray, rate: float, top: float) -> dict[str, Any]:
     n_window = max(min(WINDOW_SAMPLES, len(signal) // 8 * 2), 2)
     hop = max((len(signal) - n_window) // (SPECTROGRAM_COLUMNS - 1), 1)
     weights = get_window("hann", n_window)
-    stretches = np.lib.stride_tricks.sliding_window_view(signal - signal.mean(), n_window)[::hop]
-    amplitude = np.abs(np.fft.rfft(stretches * weights, axis=-1)) * (2.0 / weights.sum())
+    stretches = np.lib.stride_tricks.sliding_window_view(
+        signal - signal.mean(), n_window
+    )[::hop]
+    amplitude = np.abs(np.fft.rfft(stretches * weights, axis=-1)) * (
+        2.0 / weights.sum()
+    )
     amplitude = amplitude[:, : max(int(top / rate * n_window) + 1, 2)]
     return {
         **pack_amplitude(amplitude),

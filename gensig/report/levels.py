@@ -20,10 +20,10 @@ FloatArray = NDArray[np.floating]
 
 VELOCITY = "velocity_rms"
 BAND = (10.0, 1000.0)  # Hz, of broad-band velocity in ISO 20816-1 and -3
-HARMFUL_VELOCITY = (
-    11.0e-3  # m/s, zone boundary C/D of ISO 20816-3 for large machines on flexible supports
-)
-LOUD_ACCELERATION = 10.0 * STANDARD_GRAVITY  # assumed: published housings of sound gears stay below
+HARMFUL_VELOCITY = 11.0e-3  # m/s, zone boundary C/D of ISO 20816-3 for large machines on flexible supports
+LOUD_ACCELERATION = (
+    10.0 * STANDARD_GRAVITY
+)  # assumed: published housings of sound gears stay below
 
 
 def velocity_rms(signal: FloatArray, sampling_rate: float) -> FloatArray:
@@ -54,7 +54,13 @@ def level_table(
         )
         for name, channel, rms, velocity in _medians(data, measured, channels, units)
     ]
-    head = ("class", "channel", "RMS, m/s²", "RMS, g", "velocity RMS 10 to 1000 Hz, mm/s")
+    head = (
+        "class",
+        "channel",
+        "RMS, m/s²",
+        "RMS, g",
+        "velocity RMS 10 to 1000 Hz, mm/s",
+    )
     return Table(head=head, rows=rows) if rows else None
 
 
@@ -66,7 +72,11 @@ def loudness(
     Empty elsewhere.
     """
     medians = _medians(data, measured, channels, units)
-    loud = [row for row in medians if row[2] > LOUD_ACCELERATION or row[3] > HARMFUL_VELOCITY]
+    loud = [
+        row
+        for row in medians
+        if row[2] > LOUD_ACCELERATION or row[3] > HARMFUL_VELOCITY
+    ]
     if not loud:
         return []
     names = ", ".join(dict.fromkeys(plain(name) for name, *_ in loud))

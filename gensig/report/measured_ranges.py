@@ -33,7 +33,9 @@ def at_measured_rate(signal: FloatArray, sampling_rate: float) -> dict[str, Floa
     return {"rms_5_khz": rms(x), "kurtosis_5_khz": kurtosis(x)}
 
 
-def beside_measurements(data: Dataset, measured: Measured, units: list[str]) -> list[Comparison]:
+def beside_measurements(
+    data: Dataset, measured: Measured, units: list[str]
+) -> list[Comparison]:
     """Every quantity with a measured range for which the data set has values.
 
     Parameters
@@ -68,10 +70,14 @@ def _ratios(
     if "speed_set_rpm" not in data.column_names:
         return {}
     keys = [
-        data.column(name)[records].tolist() for name in ("gearbox_id", "speed_set_rpm", "torque_nm")
+        data.column(name)[records].tolist()
+        for name in ("gearbox_id", "speed_set_rpm", "torque_nm")
     ]
     place = list(zip(*keys, strict=True))
-    specimen, label = data.column("specimen_id")[records], data.column("label_name")[records]
+    specimen, label = (
+        data.column("specimen_id")[records],
+        data.column("label_name")[records],
+    )
     sound: dict[tuple[object, ...], list[int]] = {}
     for row in np.flatnonzero(label == "healthy").tolist():
         sound.setdefault(place[row], []).append(row)
@@ -79,7 +85,12 @@ def _ratios(
     for row in np.flatnonzero(label != "healthy").tolist():
         for other in sound.get(place[row], []):
             if specimen[row] != specimen[other]:
-                for ratio, of in (("rms_ratio", "rms_5_khz"), ("kurtosis_ratio", "kurtosis_5_khz")):
+                for ratio, of in (
+                    ("rms_ratio", "rms_5_khz"),
+                    ("kurtosis_ratio", "kurtosis_5_khz"),
+                ):
                     quotient = values[of][row] / values[of][other]
-                    found.setdefault((f"{label[row]}.{ratio}", ALL), []).append(quotient)
+                    found.setdefault((f"{label[row]}.{ratio}", ALL), []).append(
+                        quotient
+                    )
     return {name: np.concatenate(ratios) for name, ratios in found.items()}

@@ -52,11 +52,19 @@ class Rotation:
     def references(self) -> list[tuple[str, str]]:
         """What orders can be counted in: (name of the frequency, words)."""
         if not np.any(np.isfinite(self.mesh) & (self.mesh > 0.0)):
-            return [("drive", "turns of the driving shaft")] if np.any(self.drive > 0.0) else []
+            return (
+                [("drive", "turns of the driving shaft")]
+                if np.any(self.drive > 0.0)
+                else []
+            )
         found = [(gear, f"turns of the {gear}") for gear in self.n_teeth]
         turning = (self.mesh > 0.0) & (self.drive > 0.0)
-        ratios = [self.turns(gear)[turning] / self.drive[turning] for gear in self.n_teeth]
-        if np.any(turning) and all(np.abs(ratio - 1.0).max() > SAME for ratio in ratios):
+        ratios = [
+            self.turns(gear)[turning] / self.drive[turning] for gear in self.n_teeth
+        ]
+        if np.any(turning) and all(
+            np.abs(ratio - 1.0).max() > SAME for ratio in ratios
+        ):
             found.append(("drive", "turns of the driving shaft"))
         return [*found, ("mesh", "meshes of a tooth")]
 
@@ -70,11 +78,19 @@ def read_rotation(data: Dataset) -> Rotation:
         if isinstance(number, (int, np.integer)) and number > 0:
             n_teeth[gear] = int(number)
     names = data.column_names
-    faulty = data.column("fault_gear") if "fault_gear" in names else np.full(data.n_records, "")
-    if "fault_tooth" in names:  # -1: a fault of all teeth, such as wear, has no turn of its own
+    faulty = (
+        data.column("fault_gear")
+        if "fault_gear" in names
+        else np.full(data.n_records, "")
+    )
+    if (
+        "fault_tooth" in names
+    ):  # -1: a fault of all teeth, such as wear, has no turn of its own
         faulty = np.where(data.column("fault_tooth") == -1, "", faulty)
     return Rotation(
-        mesh=data.column("mesh_frequency_hz") if "mesh_frequency_hz" in names else unknown,
+        mesh=data.column("mesh_frequency_hz")
+        if "mesh_frequency_hz" in names
+        else unknown,
         drive=data.column("speed_rpm") / 60.0,
         n_teeth=n_teeth,
         gear=faulty,

@@ -11,7 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
-from gensig.dataset.cards.card import CAVEATS, GEOMETRY, plain, rounded, torque_words, value_range
+from gensig.dataset.cards.card import (
+    CAVEATS,
+    GEOMETRY,
+    plain,
+    rounded,
+    torque_words,
+    value_range,
+)
 from gensig.dataset.folder.layout import CONFIG, CONFIG_BYTES_LIMIT, OVERRIDES
 from gensig.dataset.reader import Dataset
 from gensig.dataset.splitting.protocols import PROTOCOLS
@@ -52,16 +59,24 @@ def contents(data: Dataset) -> list[Section]:
         (
             "records",
             f"{data.n_records}"
-            + (f", of which {n_failed} failed and are left out here" if n_failed else ""),
+            + (
+                f", of which {n_failed} failed and are left out here"
+                if n_failed
+                else ""
+            ),
         ),
         (
             "a record",
             f"{data.n_samples / data.sampling_rate:g} s, {data.n_samples} samples at {data.sampling_rate:g} Hz",
         ),
-        ("channels", ", ".join(f"{plain(name)} ({plain(unit)})" for name, unit in channels)),
+        (
+            "channels",
+            ", ".join(f"{plain(name)} ({plain(unit)})" for name, unit in channels),
+        ),
         (
             "further signals",
-            ", ".join(name for name in data.signal_names if name != "acceleration") or "none",
+            ", ".join(name for name in data.signal_names if name != "acceleration")
+            or "none",
         ),
     ]
     rows += [
@@ -85,7 +100,10 @@ def contents(data: Dataset) -> list[Section]:
         rows.append(("signal-to-noise ratio", value_range(data.column("snr_db"), "dB")))
     if "life_id" in data.column_names:
         rows.append(
-            ("lives", f"{len(np.unique(data.column('life_id')))}, to failure or to the horizon")
+            (
+                "lives",
+                f"{len(np.unique(data.column('life_id')))}, to failure or to the horizon",
+            )
         )
     return [
         Section(title="What is in it", table=Table(head=("fact", "value"), rows=rows)),
@@ -114,7 +132,9 @@ def _classes(data: Dataset) -> Table:
                 middle,
             )
         )
-    return Table(head=("class", "records", "units", "severity", "its median"), rows=rows)
+    return Table(
+        head=("class", "records", "units", "severity", "its median"), rows=rows
+    )
 
 
 def splits(data: Dataset) -> Section:
@@ -124,7 +144,10 @@ def splits(data: Dataset) -> Section:
     leaky: list[int] = []
     for protocol in data.protocols:
         parts = data.split(protocol)
-        units = {name: set(unit[[row[0] for row in part]].tolist()) for name, part in parts.items()}
+        units = {
+            name: set(unit[[row[0] for row in part]].tolist())
+            for name, part in parts.items()
+        }
         cells = [
             f"{sum(stop - start for _, start, stop in part):.5g} ({len(units[name])})"
             for name, part in parts.items()
@@ -133,9 +156,19 @@ def splits(data: Dataset) -> Section:
         if not apart:
             leaky.append(len(rows))
         shared = len(units["train"] & units["test"])
-        kept = ", ".join(name.removesuffix("_id") for name in apart) or "nothing: leaks on purpose"
+        kept = (
+            ", ".join(name.removesuffix("_id") for name in apart)
+            or "nothing: leaks on purpose"
+        )
         rows.append((plain(protocol), *cells, f"{shared}", kept))
-    head = ("protocol", "train", "validation", "test", "units on both sides", "keeps apart")
+    head = (
+        "protocol",
+        "train",
+        "validation",
+        "test",
+        "units on both sides",
+        "keeps apart",
+    )
     text = [
         "Records of each subset, and in brackets the units that they are from.",
         "A score is only worth what its protocol keeps apart.",
@@ -166,8 +199,18 @@ def measured_table(found: Sequence[Comparison], units: Sequence[str]) -> Section
         (one.id, one.at, shown_range(one), _number(one.median), f"{_number(one.p5)} to {_number(one.p95)}", f"{one.n}",
          one.verdict) for one in found
     ]  # fmt: skip
-    head = ("quantity", "at", "measured", "median here", "5 to 95 % here", "values", "verdict")
-    return Section(title="Beside measurements", text=text, table=Table(head=head, rows=rows))
+    head = (
+        "quantity",
+        "at",
+        "measured",
+        "median here",
+        "5 to 95 % here",
+        "values",
+        "verdict",
+    )
+    return Section(
+        title="Beside measurements", text=text, table=Table(head=head, rows=rows)
+    )
 
 
 def provenance(data: Dataset) -> list[Section]:
@@ -177,7 +220,10 @@ def provenance(data: Dataset) -> list[Section]:
         ("made by", f"gensig {plain(manifest.generator_version)}"),
         ("format version", f"{manifest.schema_version}"),
         ("seed", f"{manifest.seed}"),
-        ("identity (sha256 of configuration, schema and version)", plain(manifest.identity)),
+        (
+            "identity (sha256 of configuration, schema and version)",
+            plain(manifest.identity),
+        ),
     ]
     rows += [
         (plain(name).replace("_", " "), plain(value))
@@ -193,8 +239,12 @@ def provenance(data: Dataset) -> list[Section]:
     if len(manifest.shards) > MANY_SHARDS:
         text.append(f"The first {MANY_SHARDS} of {len(manifest.shards)} shards.")
     return [
-        Section(title="Where it is from", table=Table(head=("fact", "value"), rows=rows)),
-        Section(title="Overrides as typed", code=_file(data.folder / OVERRIDES), folded=True),
+        Section(
+            title="Where it is from", table=Table(head=("fact", "value"), rows=rows)
+        ),
+        Section(
+            title="Overrides as typed", code=_file(data.folder / OVERRIDES), folded=True
+        ),
         Section(title="Configuration", code=_file(data.folder / CONFIG), folded=True),
         Section(
             title="Files",
@@ -207,7 +257,9 @@ def provenance(data: Dataset) -> list[Section]:
 
 def loading(data: Dataset) -> list[Section]:
     """Code that reads this set, and what to mind."""
-    name = next((name for name in data.class_names if name != "healthy"), data.class_names[0])
+    name = next(
+        (name for name in data.class_names if name != "healthy"), data.class_names[0]
+    )
     protocol = "by_unit" if "by_unit" in data.protocols else (data.protocols or [""])[0]
     code = [
         "import gensig",
@@ -224,7 +276,8 @@ def loading(data: Dataset) -> list[Section]:
         )
     text = ["Every shard is plain HDF5 too: h5py, MATLAB and Octave read it."]
     caveats = [
-        " ".join(line.replace("`", "").split()) for line in CAVEATS.removeprefix("- ").split("\n- ")
+        " ".join(line.replace("`", "").split())
+        for line in CAVEATS.removeprefix("- ").split("\n- ")
     ]
     return [
         Section(title="Load it", text=text, code="\n".join(code)),
@@ -242,7 +295,8 @@ def _file(path: Path) -> str:
 def _shown(value: object) -> str:
     if isinstance(value, (list, tuple, np.ndarray)):
         return " to ".join(
-            f"{part:g}" if isinstance(part, (int, float)) else plain(part) for part in value
+            f"{part:g}" if isinstance(part, (int, float)) else plain(part)
+            for part in value
         )
     return plain(rounded(value))
 

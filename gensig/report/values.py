@@ -70,10 +70,14 @@ def some_records(data: Dataset, most: int) -> NDArray[np.intp]:
     return np.sort(by_class[np.linspace(0, by_class.size - 1, most).astype(int)])
 
 
-def value_table(data: Dataset, records: NDArray[np.intp], names: list[str]) -> dict[str, Any]:
+def value_table(
+    data: Dataset, records: NDArray[np.intp], names: list[str]
+) -> dict[str, Any]:
     """Columns of some records for the page: class numbers, and floats by name."""
     label = data.column("label")[records]
-    if label.size and (label.min() < 0 or label.max() >= min(len(data.class_names), 255)):
+    if label.size and (
+        label.min() < 0 or label.max() >= min(len(data.class_names), 255)
+    ):
         raise DatasetError(
             f"{data.folder} has labels beyond its class names; run gensig verify {data.folder}"
         )
@@ -129,7 +133,9 @@ def measure(
         records=records,
         values={name: np.array([row[name] for row in rows]) for name in names},
         further={
-            name: np.array([row[name] for row in rows]) for name in rows[0] if name not in names
+            name: np.array([row[name] for row in rows])
+            for name in rows[0]
+            if name not in names
         }
         if rows
         else {},
@@ -145,13 +151,15 @@ def _rows(
 ) -> Iterator[dict[str, FloatArray]]:
     turns = {gear: rotation.turns(gear) for gear in rotation.n_teeth}
     for index in records.tolist():
-        x = data.signals(index, stop=min(data.n_samples, MOST_SAMPLES), channels=channels).astype(
-            float
-        )
+        x = data.signals(
+            index, stop=min(data.n_samples, MOST_SAMPLES), channels=channels
+        ).astype(float)
         x = x - x.mean(axis=-1, keepdims=True)
         row = {"rms": rms(x), "kurtosis": kurtosis(x), "crest_factor": crest_factor(x)}
         for gear in ("pinion", "wheel"):
-            row |= _of_turns(x, data.sampling_rate, gear, turns, rotation.n_teeth, index)
+            row |= _of_turns(
+                x, data.sampling_rate, gear, turns, rotation.n_teeth, index
+            )
         yield {**row, **further(x, data.sampling_rate)}
 
 
@@ -201,5 +209,7 @@ def life_table(data: Dataset) -> dict[str, Any]:
     found = value_table(
         data, usable, ["life_time_h", "remaining_life_h", "severity", "life_failed"]
     )
-    found["columns"]["life"] = pack_floats([number[name] for name in names[usable].tolist()])
+    found["columns"]["life"] = pack_floats(
+        [number[name] for name in names[usable].tolist()]
+    )
     return {**found, "names": [str(name) for name in shown], "n_lives": len(lives)}

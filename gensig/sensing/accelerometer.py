@@ -50,7 +50,10 @@ class Accelerometer:
                 raise ConfigError(
                     f"sensing.sensor.{key} = {getattr(self, key):g} must lie in 0..0.5"
                 )
-        if self.mounted_resonance is not None and not 1e3 <= self.mounted_resonance <= 1e6:
+        if (
+            self.mounted_resonance is not None
+            and not 1e3 <= self.mounted_resonance <= 1e6
+        ):
             raise ConfigError(
                 f"sensing.sensor.mounted_resonance_hz = {self.mounted_resonance:g} must lie in 1e3..1e6, or be null"
             )
@@ -75,7 +78,9 @@ class Accelerometer:
                 f"sensing.sensor.adc_range_m_per_s2 = {self.adc_range_m_per_s2:g} must be positive"
             )
         if self.adc_bits is not None and not 4 <= self.adc_bits <= 24:
-            raise ConfigError(f"sensing.sensor.adc_bits = {self.adc_bits} must lie in 4..24")
+            raise ConfigError(
+                f"sensing.sensor.adc_bits = {self.adc_bits} must lie in 4..24"
+            )
         if not 0.0 <= self.max_clipped_fraction <= 1.0:
             raise ConfigError(
                 f"sensing.sensor.max_clipped_fraction = {self.max_clipped_fraction:g} must lie in 0..1"
@@ -90,7 +95,9 @@ class Accelerometer:
             ("dropped_run_samples", self.dropped_run_samples, 1, 1_000_000),
         ):
             if not low <= value <= high:
-                raise ConfigError(f"sensing.sensor.{key} = {value:g} must lie in {low:g}..{high:g}")
+                raise ConfigError(
+                    f"sensing.sensor.{key} = {value:g} must lie in {low:g}..{high:g}"
+                )
         if self.dropped_fill not in FILLS:
             raise ConfigError(
                 f"sensing.sensor.dropped_fill = {self.dropped_fill!r}; allowed: {', '.join(FILLS)}"
@@ -100,7 +107,9 @@ class Accelerometer:
     def is_ideal(self) -> bool:
         """Whether it reports the motion at its place as it is, offset and converter apart."""
         filters = self.mounted_resonance is not None or self.low_cutoff is not None
-        return not (filters or self.sensitivity_tolerance or self.transverse_sensitivity)
+        return not (
+            filters or self.sensitivity_tolerance or self.transverse_sensitivity
+        )
 
     @property
     def memory(self) -> float:
@@ -109,7 +118,11 @@ class Accelerometer:
         The low cut-off would take long, but has little to settle from: accelerations hold next to
         nothing so low.
         """
-        slowest = 0.0 if self.low_cutoff is None else SETTLED / (2.0 * math.pi * self.low_cutoff)
+        slowest = (
+            0.0
+            if self.low_cutoff is None
+            else SETTLED / (2.0 * math.pi * self.low_cutoff)
+        )
         return max(min(slowest, LONGEST_LOW), self.memory_of_resonance)
 
     @property
@@ -117,7 +130,9 @@ class Accelerometer:
         """Time after which 0.7 % of the mounted resonance's ringing is left, s."""
         if self.mounted_resonance is None:
             return 0.0
-        return SETTLED / (2.0 * math.pi * self.mounted_resonance * self.resonance_damping_ratio)
+        return SETTLED / (
+            2.0 * math.pi * self.mounted_resonance * self.resonance_damping_ratio
+        )
 
     def filtered(self, signal: Array, sampling_rate: float) -> Array:
         """Mounted resonance and low cut-off, (sensor, sample).
@@ -133,10 +148,13 @@ class Accelerometer:
 
             n_samples = signal.shape[1]
             n_padded = next_fast_len(
-                n_samples + math.ceil(self.memory_of_resonance * sampling_rate), real=True
+                n_samples + math.ceil(self.memory_of_resonance * sampling_rate),
+                real=True,
             )
             ratio = rfftfreq(n_padded, 1.0 / sampling_rate) / self.mounted_resonance
-            response = 1.0 / (1.0 - ratio**2 + 2j * self.resonance_damping_ratio * ratio)
+            response = 1.0 / (
+                1.0 - ratio**2 + 2j * self.resonance_damping_ratio * ratio
+            )
             signal = irfft(rfft(signal, n_padded, axis=1) * response, n_padded, axis=1)[
                 :, :n_samples
             ]
@@ -174,7 +192,9 @@ class SensorSet:
     offset: Array
 
 
-def draw_sensors(rng: np.random.Generator, sensor: Accelerometer, n_sensors: int) -> SensorSet:
+def draw_sensors(
+    rng: np.random.Generator, sensor: Accelerometer, n_sensors: int
+) -> SensorSet:
     """Uniform within what the data sheet allows."""
     gain, transverse, offset = rng.uniform(-1.0, 1.0, (3, n_sensors))
     return SensorSet(

@@ -95,7 +95,9 @@ def third_octave_power(signal: Array, sampling_rate: float) -> Array:
     below = np.cumsum(lines, axis=-1)
 
     def power_below(edge: Array) -> Array:
-        place = edge * n_samples / sampling_rate + 0.5  # line k reaches from k - 0.5 to k + 0.5
+        place = (
+            edge * n_samples / sampling_rate + 0.5
+        )  # line k reaches from k - 0.5 to k + 0.5
         line = place.astype(np.int64)
         return np.asarray(below[..., line] - (line + 1 - place) * lines[..., line])
 
@@ -113,7 +115,9 @@ def third_octave_difference(found: Array, exact: Array, sampling_rate: float) ->
     Left out are bands that lie more than 60 dB below the channel's loudest in both: noise covers
     them.
     """
-    powers, expected = (third_octave_power(signal, sampling_rate) for signal in (found, exact))
+    powers, expected = (
+        third_octave_power(signal, sampling_rate) for signal in (found, exact)
+    )
     threshold = 10.0 ** (-HEARD_DB / 10.0) * expected.max(axis=-1, keepdims=True)
     unheard = np.maximum(powers, expected) <= threshold
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -97,13 +97,20 @@ class Bearing(Nuisance):
         check_number("harmonic_exponent", self.harmonic_exponent, 0.0, 10.0)
 
     def draw(
-        self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics
+        self,
+        unit_rng: np.random.Generator,
+        record_rng: np.random.Generator,
+        dynamics: PairDynamics,
     ) -> Tones:
         """As ``Nuisance.draw``."""
         n, count = self.n_balls, self.n_harmonics
-        outer, inner, ball, cage = (logarithmic(unit_rng, self.waviness) for _ in range(4))
+        outer, inner, ball, cage = (
+            logarithmic(unit_rng, self.waviness) for _ in range(4)
+        )
         along = fixed(TURN * unit_rng.random())
-        phases = TURN * unit_rng.random((5, MOST_HARMONICS))  # as many whatever n_harmonics is
+        phases = TURN * unit_rng.random(
+            (5, MOST_HARMONICS)
+        )  # as many whatever n_harmonics is
         slip, cage_angle, ball_angle = (
             uniform(record_rng, self.slip),
             *(TURN * record_rng.random(2)),
@@ -128,7 +135,9 @@ class Bearing(Nuisance):
                 size[2] * inner * backward,
             ]
             forces += [size[3] * ball * forward, size[4] * ball * backward]
-        begin = np.exp(1j * np.array(multiples) @ np.array([0.0, cage_angle, ball_angle]))
+        begin = np.exp(
+            1j * np.array(multiples) @ np.array([0.0, cage_angle, ball_angle])
+        )
         support = getattr(dynamics, self.gear).support
         stiffness = np.array([support.stiffness_x, support.stiffness_y, 0.0])
         return make_tones(

@@ -67,11 +67,16 @@ class Sensing:
                 f"sensing.snr_reference = {self.snr_reference!r}; allowed: {', '.join(SNR_REFERENCES)}"
             )
         if not 0.0 <= self.gain_scatter < 0.5:
-            raise ConfigError(f"sensing.gain_scatter = {self.gain_scatter:g} must lie in 0..0.5")
+            raise ConfigError(
+                f"sensing.gain_scatter = {self.gain_scatter:g} must lie in 0..0.5"
+            )
         self._check_path()
         self._check_sensor()
         if self.noise is not None:
-            if self.noise.band is not None and self.noise.band[1] > 0.5 * self.sampling_rate:
+            if (
+                self.noise.band is not None
+                and self.noise.band[1] > 0.5 * self.sampling_rate
+            ):
                 raise ConfigError(
                     f"sensing.noise.band_hz ends at {self.noise.band[1]:g} Hz, above half of "
                     f"sensing.sampling_rate_hz = {self.sampling_rate:g}; give "
@@ -99,7 +104,9 @@ class Sensing:
     def noise_factor(self, snr: float) -> Array:
         """Power of the noise over that of its reference, (sensor,), at ``snr`` in dB."""
         offsets = None if self.noise is None else self.noise.offsets
-        louder = np.zeros(len(self.channel_names)) if offsets is None else np.array(offsets)
+        louder = (
+            np.zeros(len(self.channel_names)) if offsets is None else np.array(offsets)
+        )
         return 10.0 ** (-snr / 10.0) * 10.0 ** (louder / 10.0)
 
     @property
@@ -120,7 +127,9 @@ class Sensing:
     def place(self, n_samples: int) -> Place:
         """Where noise is heard."""
         return Place(
-            sensors=self.channel_names, n_samples=n_samples, sampling_rate=self.sampling_rate
+            sensors=self.channel_names,
+            n_samples=n_samples,
+            sampling_rate=self.sampling_rate,
         )
 
     def check(self, duration: float) -> None:
@@ -136,7 +145,9 @@ class Sensing:
     def _responses(self) -> ImpulseResponses:
         if not isinstance(self.path, MeasuredPath):
             raise ValueError("only a measured path has responses of a file")
-        return read_responses(self.path, self.channels, self.channel_names, self.sampling_rate)
+        return read_responses(
+            self.path, self.channels, self.channel_names, self.sampling_rate
+        )
 
     def _check_path(self) -> None:
         if (self.path is None) != (self.sensors is None):
@@ -165,8 +176,13 @@ class Sensing:
                 f"sensing.channels: {turning[0]} is no bearing; a transfer path takes bearing channels"
             )
         highest = usable_band(self.sampling_rate)[1]
-        lowest = self.path.natural_frequency[0] if isinstance(self.path, ModalPath) else 0.0
-        if isinstance(self.path, ModalPath) and self.path.natural_frequency[1] > highest:
+        lowest = (
+            self.path.natural_frequency[0] if isinstance(self.path, ModalPath) else 0.0
+        )
+        if (
+            isinstance(self.path, ModalPath)
+            and self.path.natural_frequency[1] > highest
+        ):
             raise ConfigError(
                 f"sensing.path.natural_frequency_hz reaches {self.path.natural_frequency[1]:g} Hz, above the usable "
                 f"band of {highest:g} Hz at sensing.sampling_rate_hz = {self.sampling_rate:g}; give "
@@ -181,7 +197,10 @@ class Sensing:
     def _check_sensor(self) -> None:
         if self.sensor is None:
             return
-        if self.sensor.low_cutoff is not None and self.sensor.low_cutoff > 0.1 * self.sampling_rate:
+        if (
+            self.sensor.low_cutoff is not None
+            and self.sensor.low_cutoff > 0.1 * self.sampling_rate
+        ):
             raise ConfigError(
                 f"sensing.sensor.low_cutoff_hz = {self.sensor.low_cutoff:g} is too near the sampling rate"
             )
@@ -191,7 +210,11 @@ class Sensing:
             raise ConfigError(
                 "sensing.sensor.transverse_sensitivity: a measured path tells no transverse motion; give 0"
             )
-        lonely = [name for name in self.channels if transverse_channel(name) not in self.channels]
+        lonely = [
+            name
+            for name in self.channels
+            if transverse_channel(name) not in self.channels
+        ]
         if self.path is None and lonely:
             raise ConfigError(
                 f"sensing.sensor.transverse_sensitivity: sensing.channels has {lonely[0]} without the other axis; "

@@ -16,9 +16,7 @@ Array = NDArray[np.float64]
 
 MOST_LINES = 100_000
 MOST_ECCENTRICITY = math.radians(5.0)
-MOST_LINE_SHARE = (
-    0.1  # standard deviation of a line's place over the spacing; with WIDEST no line passes another
-)
+MOST_LINE_SHARE = 0.1  # standard deviation of a line's place over the spacing; with WIDEST no line passes another
 WIDEST = 4.0  # standard deviations
 
 
@@ -81,7 +79,9 @@ class Disc:
         (sample,) rad.
         """
         n_lines = len(self.places)
-        places = np.concatenate([self.places + turn * 2.0 * math.pi for turn in (-1.0, 0.0, 1.0)])
+        places = np.concatenate(
+            [self.places + turn * 2.0 * math.pi for turn in (-1.0, 0.0, 1.0)]
+        )
         turns = np.floor((angle - self.index) / (2.0 * math.pi))
         within = angle - self.index - 2.0 * math.pi * turns
         number = np.searchsorted(places, within, side="right") - 1.0
@@ -92,7 +92,9 @@ class Disc:
 
 def draw_disc(rng: np.random.Generator, encoder: Encoder) -> Disc:
     """The disc of an encoder, see `draw_lines`."""
-    return draw_lines(rng, encoder.lines_per_turn, encoder.eccentricity_error, encoder.line_error)
+    return draw_lines(
+        rng, encoder.lines_per_turn, encoder.eccentricity_error, encoder.line_error
+    )
 
 
 def draw_lines(

@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-POINTS_PER_TIME = (
-    20  # in a correlation time; between them the logarithm is straight: 2.4 % less variance midway
-)
+POINTS_PER_TIME = 20  # in a correlation time; between them the logarithm is straight: 2.4 % less variance midway
 
 
 def draw_drift(

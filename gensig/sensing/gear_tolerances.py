@@ -37,7 +37,9 @@ def cumulative_pitch_limit(gear: Gear, grade: float) -> float:
     """
     diameter = _diameter(gear)
     return _limit(
-        gear, grade, 0.002 * diameter + 0.55 * math.sqrt(diameter) + 0.7 * _module(gear) + 12.0
+        gear,
+        grade,
+        0.002 * diameter + 0.55 * math.sqrt(diameter) + 0.7 * _module(gear) + 12.0,
     )
 
 

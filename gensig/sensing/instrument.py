@@ -12,7 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.sensing.accelerometer import SensorSet, draw_sensors
-from gensig.sensing.chain import LONGEST_LEAD, Sensing, add_noise, power, transverse_channel
+from gensig.sensing.chain import (
+    LONGEST_LEAD,
+    Sensing,
+    add_noise,
+    power,
+    transverse_channel,
+)
 from gensig.sensing.dropped import draw_dropped, filled
 from gensig.sensing.gain_drift import draw_drift
 from gensig.sensing.measured_path import ImpulseResponses, read_responses
@@ -67,7 +73,9 @@ class Instrument:
         if sensor is None or not sensor.drift_scatter:
             return np.ones((1, 1))
         rate = self.sensing.sampling_rate
-        return draw_drift(rng, sensor.drift_scatter, sensor.drift_time, n_sensors, n_samples, rate)
+        return draw_drift(
+            rng, sensor.drift_scatter, sensor.drift_time, n_sensors, n_samples, rate
+        )
 
     def power(self, signal: Array) -> Array:
         """Mean square without the mean in the band of the signal-to-noise ratio, (sensor,)
@@ -93,7 +101,9 @@ class Instrument:
         elif np.any(noise_power > 0.0):
             place = self.sensing.place(clean.shape[1])
             if self.path is not None:
-                place = replace(place, through_path=lambda own: self._coloured(own, clean.shape[1]))
+                place = replace(
+                    place, through_path=lambda own: self._coloured(own, clean.shape[1])
+                )
             noisy = clean + noise.make(noise_power, rng, place)
         else:
             noisy = clean
@@ -132,7 +142,9 @@ class Instrument:
     def _coloured(self, rng: np.random.Generator, n_samples: int) -> Array:
         if self.path is None:
             raise ValueError("noise coloured by the path needs one")
-        n_lead = math.ceil(min(self.path.memory, LONGEST_LEAD) * self.sensing.sampling_rate)
+        n_lead = math.ceil(
+            min(self.path.memory, LONGEST_LEAD) * self.sensing.sampling_rate
+        )
         source = rng.standard_normal((len(self.sensing.channels), n_lead + n_samples))
         lines = self.path.apply(source, self.sensing.sampling_rate)
         return lines[: len(self.sensing.channel_names), n_lead:]
@@ -151,6 +163,8 @@ def draw_instrument(
             sensing.path, sensing.channels, sensing.channel_names, sensing.sampling_rate
         )
     sensors = (
-        None if sensing.sensor is None else draw_sensors(sensor_rng, sensing.sensor, n_sensors)
+        None
+        if sensing.sensor is None
+        else draw_sensors(sensor_rng, sensing.sensor, n_sensors)
     )
     return Instrument(sensing=sensing, path=path, sensors=sensors)

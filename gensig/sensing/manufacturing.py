@@ -29,13 +29,9 @@ from gensig.units import from_si, unit
 
 Array = NDArray[np.float64]
 
-FORM_WAVES = (
-    3  # most waves of the form deviation from end to end; whole ones have no slope of their own
-)
+FORM_WAVES = 3  # most waves of the form deviation from end to end; whole ones have no slope of their own
 SUPPORT_SCATTERS = ("support_stiffness_scatter", "support_damping_scatter")
-RUNOUT_STEPS = (
-    20  # in which the eccentricity is made smaller until the index deviation fits its limit
-)
+RUNOUT_STEPS = 20  # in which the eccentricity is made smaller until the index deviation fits its limit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,16 +75,25 @@ class Quality:
             raise ConfigError(
                 "quality.used_share_low and used_share_high must be ordered and lie in 0..1"
             )
-        for key in ("tooth_share", "undulation_share", "backlash_scatter", *SUPPORT_SCATTERS):
+        for key in (
+            "tooth_share",
+            "undulation_share",
+            "backlash_scatter",
+            *SUPPORT_SCATTERS,
+        ):
             if not 0.0 <= getattr(self, key) <= 1.0:
-                raise ConfigError(f"quality.{key} = {getattr(self, key):g} must lie in 0..1")
+                raise ConfigError(
+                    f"quality.{key} = {getattr(self, key):g} must lie in 0..1"
+                )
         if not 1 <= self.undulation_waves <= 50:
             raise ConfigError(
                 f"quality.undulation_waves = {self.undulation_waves} must lie in 1..50"
             )
         if self.misalignment < 0.0:
             value = from_si("misalignment_um", self.misalignment)
-            raise ConfigError(f"quality.misalignment_um = {value:g} must not be negative")
+            raise ConfigError(
+                f"quality.misalignment_um = {value:g} must not be negative"
+            )
         low, high = self.support_damping_ratio_low, self.support_damping_ratio_high
         if (low is None) != (high is None) or (
             low is not None and high is not None and not 0.0 < low <= high <= 1.0
@@ -165,7 +170,10 @@ def draw_specimen(
     tilted, play = rng.uniform(-1.0, 1.0, 2)
     if quality.iso1328_grade is None:
         return perfect_specimen(pinion, wheel)
-    (pinion_error, pinion_tilt, pinion_forms), (wheel_error, wheel_tilt, wheel_forms) = drawn
+    (
+        (pinion_error, pinion_tilt, pinion_forms),
+        (wheel_error, wheel_tilt, wheel_forms),
+    ) = drawn
     misalignment = Misalignment(
         gear=pinion.name,
         tooth=ALL,
@@ -192,7 +200,10 @@ def _draw_gear(
     """Errors (tooth,) m, tilts (tooth,) m/m and the common form of the flanks of one gear."""
     share = rng.uniform(quality.used_share_low, quality.used_share_high)
     runout_share, angle = rng.random(), rng.uniform(0.0, 2.0 * math.pi)
-    shape, of_teeth = rng.standard_normal(gear.n_teeth), rng.uniform(-1.0, 1.0, gear.n_teeth)
+    shape, of_teeth = (
+        rng.standard_normal(gear.n_teeth),
+        rng.uniform(-1.0, 1.0, gear.n_teeth),
+    )
     sign, waves = rng.choice((-1.0, 1.0)), int(rng.integers(1, FORM_WAVES + 1))
     if quality.iso1328_grade is None:
         return np.zeros(gear.n_teeth), np.zeros(gear.n_teeth), ()
@@ -208,8 +219,13 @@ def _draw_gear(
         return error, tilt, ()
     slope = share * profile_slope_limit(gear, quality.iso1328_grade)
     form = share * profile_form_limit(gear, quality.iso1328_grade)
-    involute = math.sqrt(gear.tip_radius**2 - gear.base_radius**2) - gear.junction_curvature_radius
-    towards_tip = 1.0 if gear.name == "pinion" else -1.0  # as the contact runs along the path
+    involute = (
+        math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
+        - gear.junction_curvature_radius
+    )
+    towards_tip = (
+        1.0 if gear.name == "pinion" else -1.0
+    )  # as the contact runs along the path
     tilt = tilt + towards_tip * quality.tooth_share * slope / involute * of_teeth
     parts = (
         (
@@ -235,7 +251,12 @@ def _draw_gear(
 
 
 def _scaled_index(
-    gear: Gear, grade: float, share: float, runout_share: float, angle: float, shape: Array
+    gear: Gear,
+    grade: float,
+    share: float,
+    runout_share: float,
+    angle: float,
+    shape: Array,
 ) -> tuple[float, Array]:
     """Eccentricity in m and random pitch errors (tooth,) m that keep to the share of three limits.
 
@@ -250,7 +271,10 @@ def _scaled_index(
         random = random - 2.0 / gear.n_teeth * (random @ once) * once
     once = np.cos(turn - angle)
     arc = share * math.cos(gear.transverse_pressure_angle)
-    step, total = arc * single_pitch_limit(gear, grade), arc * cumulative_pitch_limit(gear, grade)
+    step, total = (
+        arc * single_pitch_limit(gear, grade),
+        arc * cumulative_pitch_limit(gear, grade),
+    )
     steps, steps_once = (np.diff(part, append=part[0]) for part in (random, once))
     tried = np.linspace(
         0.5 * runout_share * share * runout_limit(gear, grade), 0.0, RUNOUT_STEPS + 1
@@ -262,9 +286,9 @@ def _scaled_index(
         0.0,
     )
     height = (room / np.maximum(np.abs(steps), 1e-300)).min(axis=1)
-    fits = (np.ptp(tried[:, None] * once + height[:, None] * random, axis=1) <= total) & (
-        height > 0.0
-    )
+    fits = (
+        np.ptp(tried[:, None] * once + height[:, None] * random, axis=1) <= total
+    ) & (height > 0.0)
     if fits.any():
         first = int(fits.argmax())
         return float(tried[first]), height[first] * random
@@ -286,7 +310,9 @@ def draw_gearbox(
 ) -> Gearbox:
     """Log-normal factors, so that none can turn negative."""
     return Gearbox(
-        stiffness_factor=np.exp(quality.support_stiffness_scatter * rng.standard_normal(4)),
+        stiffness_factor=np.exp(
+            quality.support_stiffness_scatter * rng.standard_normal(4)
+        ),
         damping_factor=np.exp(quality.support_damping_scatter * rng.standard_normal(4)),
         gain=np.exp(gain_scatter * rng.standard_normal(n_channels)),
     )
@@ -294,14 +320,20 @@ def draw_gearbox(
 
 def nominal_gearbox(n_channels: int) -> Gearbox:
     """The gearbox as configured: no scatter."""
-    return Gearbox(stiffness_factor=np.ones(4), damping_factor=np.ones(4), gain=np.ones(n_channels))
+    return Gearbox(
+        stiffness_factor=np.ones(4), damping_factor=np.ones(4), gain=np.ones(n_channels)
+    )
 
 
-def with_damping_ratio(gearbox: Gearbox, rng: np.random.Generator, quality: Quality) -> Gearbox:
+def with_damping_ratio(
+    gearbox: Gearbox, rng: np.random.Generator, quality: Quality
+) -> Gearbox:
     """The gearbox with a damping ratio for each of its four supports, log-uniform, where
     ``quality`` has a range.
     """
     low, high = quality.support_damping_ratio_low, quality.support_damping_ratio_high
     if low is None or high is None:
         return gearbox
-    return replace(gearbox, damping_ratio=np.exp(rng.uniform(np.log(low), np.log(high), 4)))
+    return replace(
+        gearbox, damping_ratio=np.exp(rng.uniform(np.log(low), np.log(high), 4))
+    )

@@ -58,15 +58,18 @@ class ImpulseResponses:
             raise ValueError(
                 f"responses at {self.sampling_rate:g} Hz, signal at {sampling_rate:g} Hz"
             )
-        out: Array = oaconvolve(source[None], self.taps, axes=2)[:, :, : source.shape[1]].sum(
-            axis=1
-        )
+        out: Array = oaconvolve(source[None], self.taps, axes=2)[
+            :, :, : source.shape[1]
+        ].sum(axis=1)
         return out
 
 
 @lru_cache(maxsize=4)
 def read_responses(
-    path: MeasuredPath, channels: tuple[str, ...], sensors: tuple[str, ...], sampling_rate: float
+    path: MeasuredPath,
+    channels: tuple[str, ...],
+    sensors: tuple[str, ...],
+    sampling_rate: float,
 ) -> ImpulseResponses:
     """Impulse responses of a measured path.
 
@@ -105,7 +108,9 @@ def _impulse_responses(
     where = f"{KEY} = {file}"
     step = np.diff(frequency)
     if not (np.all(step > 0.0) and frequency[0] >= 0.0):
-        raise ConfigError(f"{where}: frequency_hz must rise from line to line and not be negative")
+        raise ConfigError(
+            f"{where}: frequency_hz must rise from line to line and not be negative"
+        )
     highest = usable_band(sampling_rate)[1]
     if frequency[0] > LOWEST_HZ or frequency[-1] < highest:
         raise ConfigError(
@@ -113,18 +118,24 @@ def _impulse_responses(
         )
     n_taps = 2 * math.ceil(sampling_rate / float(step.min()))
     if n_taps > MOST_TAPS:
-        raise ConfigError(f"{where}: lines {step.min():g} Hz apart are too narrow; thin them out")
+        raise ConfigError(
+            f"{where}: lines {step.min():g} Hz apart are too narrow; thin them out"
+        )
     grid = np.fft.rfftfreq(n_taps, 1.0 / sampling_rate)
     even = np.stack(
         [
-            np.interp(grid, frequency, row.real) + 1j * np.interp(grid, frequency, row.imag)
+            np.interp(grid, frequency, row.real)
+            + 1j * np.interp(grid, frequency, row.imag)
             for row in response
         ]
     )
     taps = np.fft.irfft(even, n_taps, axis=1)
     half = n_taps // 2
     early = float(
-        np.max(np.sum(taps[:, half:] ** 2, axis=1) / np.maximum(np.sum(taps**2, axis=1), 1e-300))
+        np.max(
+            np.sum(taps[:, half:] ** 2, axis=1)
+            / np.maximum(np.sum(taps**2, axis=1), 1e-300)
+        )
     )
     if early > NON_CAUSAL:
         raise ConfigError(

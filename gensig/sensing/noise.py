@@ -54,7 +54,11 @@ class Part(ABC):
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
             value = getattr(self, name)
-            if isinstance(value, int | float) and not value > 0 and name != "frequency_scatter":
+            if (
+                isinstance(value, int | float)
+                and not value > 0
+                and name != "frequency_scatter"
+            ):
                 raise ConfigError(f"{name} = {value:g} must be positive")
 
     @property
@@ -87,7 +91,9 @@ class Pink(Part):
         frequency = np.fft.rfftfreq(place.n_samples, 1.0 / place.sampling_rate)
         spectrum = np.fft.rfft(rng.standard_normal(place.shape), axis=1)
         return np.fft.irfft(
-            spectrum / np.sqrt(np.maximum(frequency, self.lowest)), place.n_samples, axis=1
+            spectrum / np.sqrt(np.maximum(frequency, self.lowest)),
+            place.n_samples,
+            axis=1,
         )
 
 
@@ -136,21 +142,29 @@ class Impulsive(Part):
     def __post_init__(self) -> None:
         Part.__post_init__(self)
         if not 1e-3 <= self.damping_ratio < 1.0:
-            raise ConfigError(f"damping_ratio = {self.damping_ratio:g} must lie in 0.001..1")
+            raise ConfigError(
+                f"damping_ratio = {self.damping_ratio:g} must lie in 0.001..1"
+            )
 
     def make(self, rng: np.random.Generator, place: Place) -> Array:
         """As ``Part.make``."""
         from scipy.signal import sosfilt
 
         rate = place.sampling_rate
-        before = math.ceil(SETTLED / (2.0 * math.pi * self.ring * self.damping_ratio) * rate)
+        before = math.ceil(
+            SETTLED / (2.0 * math.pi * self.ring * self.damping_ratio) * rate
+        )
         force = np.zeros((len(place.sensors), before + place.n_samples))
         n_knocks = rng.poisson(self.knocks * force.shape[1] / rate)
         for instant in rng.integers(0, force.shape[1], n_knocks).tolist():
             force[:, instant] += rng.standard_normal(len(force))
-        force[:, before + rng.integers(place.n_samples)] += rng.standard_normal(len(force))
+        force[:, before + rng.integers(place.n_samples)] += rng.standard_normal(
+            len(force)
+        )
         return np.asarray(
-            sosfilt(mode_section(self.ring, self.damping_ratio, rate), force, axis=1)[:, before:]
+            sosfilt(mode_section(self.ring, self.damping_ratio, rate), force, axis=1)[
+                :, before:
+            ]
         )
 
 
@@ -174,7 +188,9 @@ class Machine(Part):
     def __post_init__(self) -> None:
         Part.__post_init__(self)
         if not 0.0 <= self.frequency_scatter <= 0.5:
-            raise ConfigError(f"frequency_scatter = {self.frequency_scatter:g} must lie in 0..0.5")
+            raise ConfigError(
+                f"frequency_scatter = {self.frequency_scatter:g} must lie in 0..0.5"
+            )
 
     @property
     def is_broad(self) -> bool:
@@ -196,7 +212,9 @@ class Machine(Part):
             weight = np.where(offsets == 0.0, 1.0, sideband)
             orders = (order * harmonic[:, None] + offsets).ravel()
             amplitude = (weight / harmonic[:, None]).ravel()
-            heard = (orders > 0.0) & (orders * shaft <= usable_band(place.sampling_rate)[1])
+            heard = (orders > 0.0) & (
+                orders * shaft <= usable_band(place.sampling_rate)[1]
+            )
             family = tones(rng, place, shaft * orders[heard], amplitude[heard])
             out += unit_power(family)
         return out
@@ -216,7 +234,9 @@ class Background(Part):
         """The recording, (column, sample), checked against the sensors, rate and length of a
         record.
         """
-        return _background(self.file, place.sensors, place.n_samples, place.sampling_rate)
+        return _background(
+            self.file, place.sensors, place.n_samples, place.sampling_rate
+        )
 
     def make(self, rng: np.random.Generator, place: Place) -> Array:
         """As ``Part.make``."""
@@ -224,10 +244,15 @@ class Background(Part):
         last = values.shape[1] - place.n_samples
         if names == ["background"]:
             starts = rng.integers(0, last, len(place.sensors), endpoint=True)
-            return np.stack([values[0, start : start + place.n_samples] for start in starts])
+            return np.stack(
+                [values[0, start : start + place.n_samples] for start in starts]
+            )
         start = int(rng.integers(0, last, endpoint=True))
         return np.stack(
-            [values[names.index(name), start : start + place.n_samples] for name in place.sensors]
+            [
+                values[names.index(name), start : start + place.n_samples]
+                for name in place.sensors
+            ]
         )
 
 
@@ -271,7 +296,9 @@ class Spectrum(Part):
         grid = np.fft.rfftfreq(place.n_samples, 1.0 / place.sampling_rate)
         size = np.sqrt([np.interp(grid, frequency, row) for row in density])
         return np.fft.irfft(
-            size * np.fft.rfft(rng.standard_normal(place.shape), axis=1), place.n_samples, axis=1
+            size * np.fft.rfft(rng.standard_normal(place.shape), axis=1),
+            place.n_samples,
+            axis=1,
         )
 
 
@@ -288,7 +315,9 @@ def _spectrum(file: str, sensors: tuple[str, ...]) -> tuple[Array, Array]:
             f"{key} = {file}: frequency_hz must rise from line to line and not be negative"
         )
     if density.min() < 0.0 or not np.all(density.max(axis=1) > 0.0):
-        raise ConfigError(f"{key} = {file}: a power density must not be negative, nor 0 throughout")
+        raise ConfigError(
+            f"{key} = {file}: a power density must not be negative, nor 0 throughout"
+        )
     return frequency, density
 
 
@@ -356,7 +385,10 @@ def read_noise(values: Any) -> Noise:
     ConfigError    for unknown kinds, keys or values, naming the part
     """
     where = "sensing.noise"
-    if not isinstance(values, Mapping) or set(values) - {"offsets_db"} != {"parts", "band_hz"}:
+    if not isinstance(values, Mapping) or set(values) - {"offsets_db"} != {
+        "parts",
+        "band_hz",
+    }:
         raise ConfigError(
             f"{where} must be a group of the keys parts and band_hz, and may have offsets_db"
         )
@@ -373,15 +405,21 @@ def read_noise(values: Any) -> Noise:
         try:
             parts.append(
                 read(
-                    PARTS[kind], {key: value for key, value in part.items() if key != "kind"}, place
+                    PARTS[kind],
+                    {key: value for key, value in part.items() if key != "kind"},
+                    place,
                 )
             )
         except ConfigError as error:
             text = str(error)
-            raise ConfigError(text if text.startswith(place) else f"{place}.{text}") from None
+            raise ConfigError(
+                text if text.startswith(place) else f"{place}.{text}"
+            ) from None
     band = _numbers(f"{where}.band_hz", values["band_hz"], "[low, high] in Hz")
     offsets = _numbers(
-        f"{where}.offsets_db", values.get("offsets_db"), "a list of numbers, one a sensor"
+        f"{where}.offsets_db",
+        values.get("offsets_db"),
+        "a list of numbers, one a sensor",
     )
     return Noise(parts=tuple(parts), band=band, offsets=offsets)
 
@@ -390,14 +428,18 @@ def _numbers(key: str, value: Any, what: str) -> tuple[float, ...] | None:
     if value is None:
         return None
     if not isinstance(value, list | tuple) or not all(
-        isinstance(one, int | float) and not isinstance(one, bool) and math.isfinite(one)
+        isinstance(one, int | float)
+        and not isinstance(one, bool)
+        and math.isfinite(one)
         for one in value
     ):
         raise ConfigError(f"{key} = {value!r} must be {what}, or null")
     return tuple(float(one) for one in value)
 
 
-def tones(rng: np.random.Generator, place: Place, frequency: Array, amplitude: Array) -> Array:
+def tones(
+    rng: np.random.Generator, place: Place, frequency: Array, amplitude: Array
+) -> Array:
     """Sum of tones, each with a random phase in each sensor, (sensor, sample)."""
     blocks = np.arange(-(-place.n_samples // BLOCK))[:, None] * BLOCK
     phases = rng.uniform(0.0, 2.0 * np.pi, (len(place.sensors), len(frequency)))
@@ -417,10 +459,14 @@ def unit_power(signal: Array) -> Array:
     """The signal without its mean at mean square 1; one that is still stays so."""
     centred = signal - signal.mean(axis=1, keepdims=True)
     level = np.sqrt(np.mean(centred**2, axis=1, keepdims=True))
-    return np.asarray(np.divide(centred, level, out=np.zeros_like(centred), where=level > 0.0))
+    return np.asarray(
+        np.divide(centred, level, out=np.zeros_like(centred), where=level > 0.0)
+    )
 
 
-def band_power(signal: Array, sampling_rate: float, band: tuple[float, ...] | None) -> Array:
+def band_power(
+    signal: Array, sampling_rate: float, band: tuple[float, ...] | None
+) -> Array:
     """Mean square without the mean, in a band with both its ends, (sensor,).
 
     None is the whole band.

@@ -64,7 +64,10 @@ class Unbalance(Nuisance):
             check_number("rotor_mass_kg", self.rotor_mass, 1e-3, 1e5)
 
     def draw(
-        self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics
+        self,
+        unit_rng: np.random.Generator,
+        record_rng: np.random.Generator,
+        dynamics: PairDynamics,
     ) -> Tones:
         """As ``Nuisance.draw``."""
         share, angle = uniform(unit_rng, self.used_share), TURN * unit_rng.random()
@@ -74,7 +77,11 @@ class Unbalance(Nuisance):
             * self.iso21940_grade
             / (self.rated_speed * shaft(dynamics, self.gear).speed_ratio)
         )
-        mass = getattr(dynamics, self.gear).mass if self.rotor_mass is None else self.rotor_mass
+        mass = (
+            getattr(dynamics, self.gear).mass
+            if self.rotor_mass is None
+            else self.rotor_mass
+        )
         force = mass * eccentricity * shaft(dynamics, self.gear).speed ** 2
         rotating = np.exp(1j * angle) * force * turning(self.gear)
         return make_tones(self.gear, [1.0], [[1]], [rotating], "speed_squared")
@@ -100,16 +107,23 @@ class CouplingMisalignment(Nuisance):
         Nuisance.__post_init__(self)
         check_range("force_share", self.force_share, 1e-6, 1.0)
         check_range("torque_share", self.torque_share, 0.0, 1.0)
-        check_number("number of order_shares", len(self.order_shares), 1, MOST_HARMONICS)
+        check_number(
+            "number of order_shares", len(self.order_shares), 1, MOST_HARMONICS
+        )
         for share in self.order_shares:
             check_number("order_shares", share, 0.0, 100.0)
 
     def draw(
-        self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics
+        self,
+        unit_rng: np.random.Generator,
+        record_rng: np.random.Generator,
+        dynamics: PairDynamics,
     ) -> Tones:
         """As ``Nuisance.draw``."""
         radial = logarithmic(unit_rng, self.force_share) * dynamics.mesh_force
-        torque = uniform(unit_rng, self.torque_share) * shaft(dynamics, self.gear).torque
+        torque = (
+            uniform(unit_rng, self.torque_share) * shaft(dynamics, self.gear).torque
+        )
         along, twist = fixed(TURN * unit_rng.random()), np.array([0.0, 0.0, 1.0])
         twisting = torque * np.exp(1j * TURN * unit_rng.random()) * twist
         phases = np.exp(1j * TURN * unit_rng.random(len(self.order_shares)))
@@ -118,7 +132,9 @@ class CouplingMisalignment(Nuisance):
             for share, phase in zip(self.order_shares, phases, strict=True)
         ]
         orders = [[k + 1] for k in range(len(forces))]
-        return make_tones(self.gear, [1.0], [[2], *orders], [twisting, *forces], "torque")
+        return make_tones(
+            self.gear, [1.0], [[2], *orders], [twisting, *forces], "torque"
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,11 +162,17 @@ class Looseness(Nuisance):
         check_number("harmonic_exponent", self.harmonic_exponent, 0.0, 10.0)
 
     def draw(
-        self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics
+        self,
+        unit_rng: np.random.Generator,
+        record_rng: np.random.Generator,
+        dynamics: PairDynamics,
     ) -> Tones:
         """As ``Nuisance.draw``."""
         level = logarithmic(unit_rng, self.force_share) * dynamics.mesh_force
-        half_share, along = uniform(unit_rng, self.half_share), fixed(TURN * unit_rng.random())
+        half_share, along = (
+            uniform(unit_rng, self.half_share),
+            fixed(TURN * unit_rng.random()),
+        )
         halves = np.arange(1, 2 * self.n_orders + 1)
         is_half = halves % 2 == 1
         size = (
@@ -160,7 +182,11 @@ class Looseness(Nuisance):
         second_turn = math.pi * halves * int(record_rng.integers(2))
         phase = np.exp(1j * (TURN * unit_rng.random(len(halves)) + second_turn))
         return make_tones(
-            self.gear, [0.5], halves[:, None], level * (size * phase)[:, None] * along, "torque"
+            self.gear,
+            [0.5],
+            halves[:, None],
+            level * (size * phase)[:, None] * along,
+            "torque",
         )
 
 
@@ -196,7 +222,10 @@ class NeighbourMesh(Nuisance):
         check_range("sideband_share", self.sideband_share, 0.0, 1.0)
 
     def draw(
-        self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics
+        self,
+        unit_rng: np.random.Generator,
+        record_rng: np.random.Generator,
+        dynamics: PairDynamics,
     ) -> Tones:
         """As ``Nuisance.draw``."""
         level = (
@@ -258,12 +287,16 @@ def read_nuisances(values: Any) -> tuple[Nuisance, ...]:
         try:
             parts.append(
                 read(
-                    KINDS[kind], {key: value for key, value in part.items() if key != "kind"}, place
+                    KINDS[kind],
+                    {key: value for key, value in part.items() if key != "kind"},
+                    place,
                 )
             )
         except ConfigError as error:
             text = str(error)
-            raise ConfigError(text if text.startswith(place) else f"{place}.{text}") from None
+            raise ConfigError(
+                text if text.startswith(place) else f"{place}.{text}"
+            ) from None
     return tuple(parts)
 
 

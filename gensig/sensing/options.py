@@ -64,5 +64,7 @@ def _read_path(values: Any) -> ModalPath | MeasuredPath | None:
             )
         return None
     if kind not in PATHS:
-        raise ConfigError(f"sensing.path.kind = {kind!r}; allowed: {', '.join((IDENTITY, *PATHS))}")
+        raise ConfigError(
+            f"sensing.path.kind = {kind!r}; allowed: {', '.join((IDENTITY, *PATHS))}"
+        )
     return read(PATHS[kind], own, "sensing.path")

@@ -15,9 +15,7 @@ Array = NDArray[np.float64]
 
 SHAFTS = ("pinion", "wheel")
 MOST_PULSES = 1000  # a turn
-JITTERS_IN_A_WIDTH = (
-    8.0  # standard deviations that fit into a pulse or a gap, so that no edge overtakes another
-)
+JITTERS_IN_A_WIDTH = 8.0  # standard deviations that fit into a pulse or a gap, so that no edge overtakes another
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +48,9 @@ class Tachometer:
             / JITTERS_IN_A_WIDTH
         )
         if not 0.0 <= self.jitter <= most:
-            given, allowed = (from_si("jitter_deg", value) for value in (self.jitter, most))
+            given, allowed = (
+                from_si("jitter_deg", value) for value in (self.jitter, most)
+            )
             raise ConfigError(
                 f"sensing.tacho.jitter_deg = {given:g} must lie in 0..{allowed:g}, an eighth of the narrower of pulse "
                 "and gap; change that with pulse_width_share"
@@ -65,7 +65,9 @@ class Tachometer:
 def check_shaft(place: str, shaft: str) -> None:
     """Raise ConfigError for a shaft on which no sensor can sit."""
     if shaft not in SHAFTS:
-        raise ConfigError(f"sensing.{place}.shaft = {shaft!r}; allowed: {', '.join(SHAFTS)}")
+        raise ConfigError(
+            f"sensing.{place}.shaft = {shaft!r}; allowed: {', '.join(SHAFTS)}"
+        )
 
 
 def draw_mark(rng: np.random.Generator) -> float:
@@ -74,7 +76,11 @@ def draw_mark(rng: np.random.Generator) -> float:
 
 
 def pulse_train(
-    tacho: Tachometer, mark: float, angle: Array, sampling_rate: float, rng: np.random.Generator
+    tacho: Tachometer,
+    mark: float,
+    angle: Array,
+    sampling_rate: float,
+    rng: np.random.Generator,
 ) -> Array:
     """What the tachometer puts out, (sample,): 1 in a pulse, 0 between, at an edge the share that
     is high.
@@ -94,10 +100,16 @@ def pulse_train(
     first = math.floor((turned[0] - mark) / tacho.spacing) - 1
     last = math.ceil((turned[-1] - mark) / tacho.spacing) + 1
     number = np.arange(first, last + 1)
-    begins = mark + tacho.spacing * number + tacho.jitter * rng.standard_normal(len(number))
-    edges = np.column_stack([begins, begins + tacho.pulse_width_share * tacho.spacing]).ravel()
+    begins = (
+        mark + tacho.spacing * number + tacho.jitter * rng.standard_normal(len(number))
+    )
+    edges = np.column_stack(
+        [begins, begins + tacho.pulse_width_share * tacho.spacing]
+    ).ravel()
     at = np.interp(
         edges, np.maximum.accumulate(turned), np.arange(-1.0, n_samples + 1.0)
     )  # in samples
-    high = np.concatenate([[0.0], np.cumsum(np.diff(at) * (np.arange(len(at) - 1) % 2 == 0))])
+    high = np.concatenate(
+        [[0.0], np.cumsum(np.diff(at) * (np.arange(len(at) - 1) % 2 == 0))]
+    )
     return np.diff(np.interp(np.arange(n_samples + 1) - 0.5, at, high))

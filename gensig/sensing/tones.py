@@ -68,7 +68,10 @@ class Nuisance(ABC):
 
     @abstractmethod
     def draw(
-        self, unit_rng: np.random.Generator, record_rng: np.random.Generator, dynamics: PairDynamics
+        self,
+        unit_rng: np.random.Generator,
+        record_rng: np.random.Generator,
+        dynamics: PairDynamics,
     ) -> Tones:
         """The forces of one unit, and what differs from one of its records to the next.
 
@@ -91,10 +94,16 @@ def shaft(dynamics: PairDynamics, gear: str) -> Shaft:
     """The shaft of one gear at the set point."""
     ratio = 1.0 if gear == "pinion" else 1.0 / dynamics.table.pair.ratio
     operating = dynamics.operating
-    return Shaft(speed=ratio * operating.speed, speed_ratio=ratio, torque=operating.torque / ratio)
+    return Shaft(
+        speed=ratio * operating.speed,
+        speed_ratio=ratio,
+        torque=operating.torque / ratio,
+    )
 
 
-def make_tones(gear: str, base: list[float], multiple: Any, force: Any, follows: str) -> Tones:
+def make_tones(
+    gear: str, base: list[float], multiple: Any, force: Any, follows: str
+) -> Tones:
     """Tones of anything that arrays are made of."""
     return Tones(
         gear=gear,

@@ -41,14 +41,18 @@ class ToothedWheel:
 
     def __post_init__(self) -> None:
         if not 4 <= self.n_teeth <= MOST_TEETH:
-            raise ConfigError(f"toothed_wheel.n_teeth = {self.n_teeth} must lie in 4..{MOST_TEETH}")
+            raise ConfigError(
+                f"toothed_wheel.n_teeth = {self.n_teeth} must lie in 4..{MOST_TEETH}"
+            )
         for key, value, most in (
             ("eccentricity_error_deg", self.eccentricity_error, MOST_ECCENTRICITY),
             ("tooth_error_deg", self.tooth_error, MOST_LINE_SHARE * self.spacing),
         ):
             if not 0.0 <= value <= most * (1.0 + 1e-9):
                 given, allowed = (from_si(key, one) for one in (value, most))
-                raise ConfigError(f"toothed_wheel.{key} = {given:g} must lie in 0..{allowed:g}")
+                raise ConfigError(
+                    f"toothed_wheel.{key} = {given:g} must lie in 0..{allowed:g}"
+                )
         if not self.clock_frequency >= SLOWEST_CLOCK:
             raise ConfigError(
                 f"toothed_wheel.clock_frequency_hz = {self.clock_frequency:g} must be at least {SLOWEST_CLOCK:g}"
@@ -65,7 +69,9 @@ def draw_wheel(rng: np.random.Generator, wheel: ToothedWheel) -> Disc:
     return draw_lines(rng, wheel.n_teeth, wheel.eccentricity_error, wheel.tooth_error)
 
 
-def passage_times(wheel: ToothedWheel, disc: Disc, angle: Array, sampling_rate: float) -> Array:
+def passage_times(
+    wheel: ToothedWheel, disc: Disc, angle: Array, sampling_rate: float
+) -> Array:
     """Times at which teeth pass the pick-up, (passage,) s from the first sample, as the clock
     reads them.
 
@@ -81,7 +87,9 @@ def passage_times(wheel: ToothedWheel, disc: Disc, angle: Array, sampling_rate: 
     from scipy.interpolate import CubicSpline
 
     if not np.all(np.diff(angle) > 0.0):
-        raise SimulationError("the shaft under a toothed wheel must turn forward throughout")
+        raise SimulationError(
+            "the shaft under a toothed wheel must turn forward throughout"
+        )
     first = math.floor((angle[0] - disc.index) / (2.0 * math.pi)) - 1
     last = math.ceil((angle[-1] - disc.index) / (2.0 * math.pi)) + 1
     turns = 2.0 * math.pi * np.arange(first, last + 1)
@@ -113,4 +121,6 @@ def instantaneous_speed(
             f"{wheel.clock_frequency:g} Hz, too few or too fast; change n_teeth or clock_frequency_hz"
         )
     sample_times = np.arange(len(angle)) / sampling_rate
-    return np.asarray(np.interp(sample_times, 0.5 * (times[1:] + times[:-1]), wheel.spacing / gaps))
+    return np.asarray(
+        np.interp(sample_times, 0.5 * (times[1:] + times[:-1]), wheel.spacing / gaps)
+    )

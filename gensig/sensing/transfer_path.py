@@ -47,7 +47,9 @@ class ModalPath:
     @property
     def memory(self) -> float:
         """Time after which 0.7 % of the slowest mode that can be drawn is left, s."""
-        return SETTLED / (2.0 * math.pi * self.natural_frequency[0] * self.damping_ratio[0])
+        return SETTLED / (
+            2.0 * math.pi * self.natural_frequency[0] * self.damping_ratio[0]
+        )
 
 
 def _check_range(key: str, ends: tuple[float, ...], least: float, most: float) -> None:
@@ -74,7 +76,9 @@ class Housing:
     @property
     def memory(self) -> float:
         """Time after which 0.7 % of the slowest mode is left, s."""
-        return SETTLED / float(np.min(2.0 * np.pi * self.natural_frequency * self.damping_ratio))
+        return SETTLED / float(
+            np.min(2.0 * np.pi * self.natural_frequency * self.damping_ratio)
+        )
 
     def apply(self, source: Array, sampling_rate: float) -> Array:
         """Accelerations at the sensors from those at the bearings, (channel, sample) to (line,
@@ -98,7 +102,9 @@ class Housing:
 
 
 @lru_cache(maxsize=4096)
-def mode_section(natural_frequency: float, damping_ratio: float, sampling_rate: float) -> Array:
+def mode_section(
+    natural_frequency: float, damping_ratio: float, sampling_rate: float
+) -> Array:
     """Second-order section of one mode with gain 1 at rest, (1, 6).
 
     Source: ramp invariance as in Smallwood (1981), which shock response spectra use (ISO 18431-4).
@@ -107,7 +113,9 @@ def mode_section(natural_frequency: float, damping_ratio: float, sampling_rate: 
 
     angular = 2.0 * math.pi * natural_frequency
     continuous = ([angular**2], [1.0, 2.0 * damping_ratio * angular, angular**2])
-    numerator, denominator, _ = cont2discrete(continuous, 1.0 / sampling_rate, method="foh")
+    numerator, denominator, _ = cont2discrete(
+        continuous, 1.0 / sampling_rate, method="foh"
+    )
     return np.concatenate([np.ravel(numerator), denominator])[None]
 
 

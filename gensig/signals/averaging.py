@@ -16,7 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.floating]
 
-MIN_TURNS = 20  # an average of fewer holds more than 1/20 of the power of what does not repeat
+MIN_TURNS = (
+    20  # an average of fewer holds more than 1/20 of the power of what does not repeat
+)
 
 
 def samples_per_turn_for(sampling_rate: float, rotation_frequency: float) -> int:
@@ -70,7 +72,9 @@ def resample_to_angle(
         raise ValueError(
             f"{n_samples} samples hold no whole turn of {samples_in_a_turn:.1f} samples"
         )
-    per_turn = samples_per_turn or samples_per_turn_for(sampling_rate, rotation_frequency)
+    per_turn = samples_per_turn or samples_per_turn_for(
+        sampling_rate, rotation_frequency
+    )
     position = np.arange(n_turns * per_turn) * (samples_in_a_turn / per_turn)
     return interpolate(x, position.reshape(n_turns, per_turn))
 
@@ -93,7 +97,12 @@ def interpolate(x: FloatArray, position: FloatArray) -> FloatArray:
     u = position - index
     coefficients = spline_filter1d(x, order=3, axis=-1, mode="mirror")
     padded = np.concatenate(
-        [coefficients[..., 1:2], coefficients, coefficients[..., -2:-1], coefficients[..., -3:-2]],
+        [
+            coefficients[..., 1:2],
+            coefficients,
+            coefficients[..., -2:-1],
+            coefficients[..., -3:-2],
+        ],
         axis=-1,
     )
     squared = u * u
@@ -123,7 +132,9 @@ def time_synchronous_average(
 
     `resample_to_angle`, then `average_turn` with its ``min_turns``.
     """
-    turns = resample_to_angle(signal, sampling_rate, rotation_frequency, samples_per_turn)
+    turns = resample_to_angle(
+        signal, sampling_rate, rotation_frequency, samples_per_turn
+    )
     return average_turn(turns, min_turns=min_turns)
 
 
@@ -163,7 +174,9 @@ def remove_orders(average: ArrayLike, orders: Iterable[int]) -> FloatArray:
     return np.fft.irfft(spectrum, n=turn.shape[-1], axis=-1)
 
 
-def regular_signal(average: ArrayLike, n_teeth: int, *, n_sidebands: int = 1) -> FloatArray:
+def regular_signal(
+    average: ArrayLike, n_teeth: int, *, n_sidebands: int = 1
+) -> FloatArray:
     """What a sound gear makes: every mesh harmonic with the lowest sidebands, without the lowest
     shaft orders.
 
@@ -186,7 +199,9 @@ def regular_signal(average: ArrayLike, n_teeth: int, *, n_sidebands: int = 1) ->
     return remove_orders(average, set(range(np.shape(average)[-1] // 2 + 1)) - kept)
 
 
-def residual_signal(average: ArrayLike, n_teeth: int, *, n_shaft_orders: int = 2) -> FloatArray:
+def residual_signal(
+    average: ArrayLike, n_teeth: int, *, n_shaft_orders: int = 2
+) -> FloatArray:
     """Average turn without the mean, the lowest shaft orders and every mesh harmonic.
 
     Parameters
@@ -202,7 +217,9 @@ def residual_signal(average: ArrayLike, n_teeth: int, *, n_shaft_orders: int = 2
     )
 
 
-def difference_signal(average: ArrayLike, n_teeth: int, *, n_shaft_orders: int = 2) -> FloatArray:
+def difference_signal(
+    average: ArrayLike, n_teeth: int, *, n_shaft_orders: int = 2
+) -> FloatArray:
     """Residual signal without the first sideband on either side of every mesh harmonic too.
 
     Parameters as `residual_signal`.

@@ -16,7 +16,11 @@ FloatArray = NDArray[np.floating]
 
 
 def band_pass(
-    signal: ArrayLike, sampling_rate: float, band: tuple[float, float], *, order: int = 4
+    signal: ArrayLike,
+    sampling_rate: float,
+    band: tuple[float, float],
+    *,
+    order: int = 4,
 ) -> FloatArray:
     """Butterworth band-pass run forwards and backwards: no phase shift, twice the order in
     attenuation.
@@ -38,7 +42,9 @@ def band_pass(
         raise ValueError(
             f"band {low:g}-{high:g} Hz must lie inside 0-{sampling_rate / 2:g} Hz, low before high"
         )
-    sections = butter(order, [low, high], btype="bandpass", fs=sampling_rate, output="sos")
+    sections = butter(
+        order, [low, high], btype="bandpass", fs=sampling_rate, output="sos"
+    )
     return sosfiltfilt(sections, np.asarray(signal, dtype=float), axis=-1)
 
 
@@ -61,12 +67,20 @@ def envelope(
     from scipy.signal import hilbert
 
     x = np.asarray(signal, dtype=float)
-    x = x - x.mean(axis=-1, keepdims=True) if band is None else band_pass(x, sampling_rate, band)
+    x = (
+        x - x.mean(axis=-1, keepdims=True)
+        if band is None
+        else band_pass(x, sampling_rate, band)
+    )
     return np.abs(hilbert(x, axis=-1))
 
 
 def mesh_envelope(
-    average: ArrayLike, n_teeth: int, *, harmonic: int = 1, n_sidebands: int | None = None
+    average: ArrayLike,
+    n_teeth: int,
+    *,
+    harmonic: int = 1,
+    n_sidebands: int | None = None,
 ) -> FloatArray:
     """Amplitude of one mesh harmonic over a turn, from the band of its sidebands: amplitude
     demodulation.

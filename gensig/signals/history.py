@@ -45,7 +45,11 @@ def na4(averages: ArrayLike, n_teeth: int) -> FloatArray:
 
 
 def nb4(
-    averages: ArrayLike, n_teeth: int, *, harmonic: int = 1, n_sidebands: int | None = None
+    averages: ArrayLike,
+    n_teeth: int,
+    *,
+    harmonic: int = 1,
+    n_sidebands: int | None = None,
 ) -> FloatArray:
     """As `na4`, of the envelope of one mesh harmonic: teeth under load that share it differently
     modulate the mesh.
@@ -90,5 +94,8 @@ def _over_mean_variance(signal: FloatArray, level: FloatArray) -> FloatArray:
     moment = np.where(above, np.mean(np.square(squared), axis=-1), 0.0)
     indicator = np.full(variance.shape, np.nan)
     return np.divide(
-        moment, np.square(mean_variance), out=indicator, where=known & (mean_variance > 0.0)
+        moment,
+        np.square(mean_variance),
+        out=indicator,
+        where=known & (mean_variance > 0.0),
     )

@@ -21,7 +21,9 @@ RAYLEIGH_MEDIAN = math.sqrt(
 )  # median of the envelope of Gaussian noise of deviation 1
 
 
-def impacts_per_turn(turns: ArrayLike, n_teeth: int, *, threshold: float = 5.0) -> FloatArray:
+def impacts_per_turn(
+    turns: ArrayLike, n_teeth: int, *, threshold: float = 5.0
+) -> FloatArray:
     """Impacts that stand out of what is between them, a turn.
 
     Parameters
@@ -45,7 +47,9 @@ def impacts_per_turn(turns: ArrayLike, n_teeth: int, *, threshold: float = 5.0) 
     n_turns, per_turn = x.shape[-2:]
     magnitude = envelope(x.reshape(*x.shape[:-2], -1), 1.0)
     level = threshold / RAYLEIGH_MEDIAN * np.median(magnitude, axis=-1, keepdims=True)
-    rows = (magnitude / np.where(level > 0.0, level, np.inf)).reshape(-1, n_turns * per_turn)
+    rows = (magnitude / np.where(level > 0.0, level, np.inf)).reshape(
+        -1, n_turns * per_turn
+    )
     apart = max(1, round(per_turn / n_teeth))
     counts = [len(find_peaks(row, height=1.0, distance=apart)[0]) for row in rows]
     return np.reshape(counts, x.shape[:-2]) / n_turns
@@ -65,7 +69,9 @@ def peak_over_rms(turns: ArrayLike) -> FloatArray:
     x = np.asarray(turns, dtype=float)
     peak = np.median(np.max(np.abs(x), axis=-1), axis=-1)
     level = rms(x.reshape(*x.shape[:-2], -1))
-    return np.divide(peak, level, out=np.full(np.shape(level), np.nan), where=level > 0.0)
+    return np.divide(
+        peak, level, out=np.full(np.shape(level), np.nan), where=level > 0.0
+    )
 
 
 def impact_decay(turns: ArrayLike, turn_duration: float) -> FloatArray:

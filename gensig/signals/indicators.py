@@ -15,9 +15,7 @@ from gensig.signals.synchronous import mesh_harmonics
 
 FloatArray = NDArray[np.floating]
 
-ROUNDING = (
-    1e-12  # of the average's RMS: what is left of a transform forth and back where nothing is
-)
+ROUNDING = 1e-12  # of the average's RMS: what is left of a transform forth and back where nothing is
 
 
 def rms(signal: ArrayLike) -> FloatArray:
@@ -65,7 +63,9 @@ def crest_factor(signal: ArrayLike) -> FloatArray:
     return _ratio(np.max(np.abs(x), axis=-1), rms(x))
 
 
-def fm0(average: ArrayLike, n_teeth: int, *, n_harmonics: int | None = None) -> FloatArray:
+def fm0(
+    average: ArrayLike, n_teeth: int, *, n_harmonics: int | None = None
+) -> FloatArray:
     """Peak to peak of the average turn over the sum of the mesh's amplitudes: 2 for a mesh that
     is one sine.
 
@@ -89,9 +89,15 @@ def fm0(average: ArrayLike, n_teeth: int, *, n_harmonics: int | None = None) -> 
     turn = np.asarray(average, dtype=float)
     n_held = (turn.shape[-1] - 1) // 2 // n_teeth
     if n_held < 1:
-        raise ValueError(f"{turn.shape[-1]} samples a turn cannot hold mesh order {n_teeth}")
-    mesh = mesh_harmonics(turn, n_teeth, min(n_harmonics or n_held, n_held)).sum(axis=-1)
-    return _ratio(np.ptp(turn, axis=-1), np.where(mesh > ROUNDING * rms(turn), mesh, 0.0))
+        raise ValueError(
+            f"{turn.shape[-1]} samples a turn cannot hold mesh order {n_teeth}"
+        )
+    mesh = mesh_harmonics(turn, n_teeth, min(n_harmonics or n_held, n_held)).sum(
+        axis=-1
+    )
+    return _ratio(
+        np.ptp(turn, axis=-1), np.where(mesh > ROUNDING * rms(turn), mesh, 0.0)
+    )
 
 
 def fm4(average: ArrayLike, n_teeth: int) -> FloatArray:
@@ -153,7 +159,10 @@ def energy_ratio(average: ArrayLike, n_teeth: int) -> FloatArray:
     """
     turn = np.asarray(average, dtype=float)
     mesh = rms(regular_signal(turn, n_teeth))
-    return _ratio(rms(_difference(turn, n_teeth)), np.where(mesh > ROUNDING * rms(turn), mesh, 0.0))
+    return _ratio(
+        rms(_difference(turn, n_teeth)),
+        np.where(mesh > ROUNDING * rms(turn), mesh, 0.0),
+    )
 
 
 def sideband_ratio(
@@ -189,14 +198,18 @@ def sideband_ratio(
         )
     steps = np.arange(1, reach + 1)
     sidebands = (centers[:, None] + np.concatenate([-steps, steps])).ravel()
-    return _ratio(amplitude[..., sidebands].sum(axis=-1), amplitude[..., centers].sum(axis=-1))
+    return _ratio(
+        amplitude[..., sidebands].sum(axis=-1), amplitude[..., centers].sum(axis=-1)
+    )
 
 
 def _difference(average: ArrayLike, n_teeth: int) -> FloatArray:
     """Difference signal, exactly zero where only rounding is left."""
     turn = np.asarray(average, dtype=float)
     difference = difference_signal(turn, n_teeth)
-    return np.where((rms(difference) > ROUNDING * rms(turn))[..., None], difference, 0.0)
+    return np.where(
+        (rms(difference) > ROUNDING * rms(turn))[..., None], difference, 0.0
+    )
 
 
 def _standardised_moment(signal: ArrayLike, half_order: int) -> FloatArray:
@@ -206,10 +219,14 @@ def _standardised_moment(signal: ArrayLike, half_order: int) -> FloatArray:
     """
     x = np.asarray(signal, dtype=float)
     squared = np.square(x - x.mean(axis=-1, keepdims=True))
-    return _ratio(np.mean(squared**half_order, axis=-1), squared.mean(axis=-1) ** half_order)
+    return _ratio(
+        np.mean(squared**half_order, axis=-1), squared.mean(axis=-1) ** half_order
+    )
 
 
 def _ratio(numerator: FloatArray, denominator: FloatArray) -> FloatArray:
     """Quotient, NaN where the denominator is zero."""
     quotient = np.full(np.shape(numerator), np.nan)
-    return np.divide(numerator, denominator, out=quotient, where=np.asarray(denominator) > 0)
+    return np.divide(
+        numerator, denominator, out=quotient, where=np.asarray(denominator) > 0
+    )

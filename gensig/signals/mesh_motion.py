@@ -27,8 +27,15 @@ FALSE_ALARM = 1e-6  # and by more than noise would at one line with this probabi
 TURNS_A_SEGMENT = 4  # of the slower gear, so that its sidebands are told from the mesh
 LEAST_TURNS = 8
 LOW_SPEED_RPM = 100.0  # assumed: a stated speed below is asked back
-FOLLOWED = 0.4  # share of the slower shaft's frequency up to which the speed is followed
-PASSES = (1, 2, 4, 8)  # harmonics followed in each round: a coarse phase first, then a fine one
+FOLLOWED = (
+    0.4  # share of the slower shaft's frequency up to which the speed is followed
+)
+PASSES = (
+    1,
+    2,
+    4,
+    8,
+)  # harmonics followed in each round: a coarse phase first, then a fine one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,18 +153,26 @@ def _search(
     frequency, density = welch(
         signal, rate, nperseg=length, noverlap=length // 2, nfft=padded, axis=1
     )
-    floor = median_filter(density, size=(1, 8 * 4 * TURNS_A_SEGMENT + 1), mode="nearest")
+    floor = median_filter(
+        density, size=(1, 8 * 4 * TURNS_A_SEGMENT + 1), mode="nearest"
+    )
     standing = np.max(density / np.maximum(floor, 1e-300), axis=0)
     n_harmonics = max(1, min(MOST_HARMONICS, int(highest / (nominal * (1.0 + SEARCH)))))
     candidates = np.linspace(1.0 - SEARCH, 1.0 + SEARCH, 4001) * nominal
     harmonics = np.arange(1, n_harmonics + 1)
     at_lines = np.interp(harmonics[:, None] * candidates, frequency, standing)
     best = int(np.argmax(np.log10(np.maximum(at_lines, 1.0)).sum(axis=0)))
-    return float(candidates[best]), 10.0 * np.log10(np.maximum(at_lines[:, best], 1e-300))
+    return float(candidates[best]), 10.0 * np.log10(
+        np.maximum(at_lines[:, best], 1e-300)
+    )
 
 
 def _follow(
-    recording: Recording, teeth: Teeth, mesh: float, heard: NDArray[np.intp], line_db: Array
+    recording: Recording,
+    teeth: Teeth,
+    mesh: float,
+    heard: NDArray[np.intp],
+    line_db: Array,
 ) -> Motion:
     """Phase of the harmonics that are heard, in rounds.
 
@@ -182,11 +197,15 @@ def _follow(
         cycles = cycles + np.concatenate([[0.0], np.cumsum(deviation[:-1])]) / rate
     mean = float((cycles[-1] - cycles[0]) * rate / (n_samples - 1))
     instantaneous: Array = np.gradient(cycles[inner]) * rate / mean - 1.0
-    noise = 0.5 * (groups[1, inner] - groups[2, inner]) / mean if len(groups) == 3 else None
+    noise = (
+        0.5 * (groups[1, inner] - groups[2, inner]) / mean if len(groups) == 3 else None
+    )
     return _told(instantaneous, noise, mean, cycles, rate, slow, line_db)
 
 
-def _deviation(signal: Array, cycles: Array, used: list[int], width: float, rate: float) -> Array:
+def _deviation(
+    signal: Array, cycles: Array, used: list[int], width: float, rate: float
+) -> Array:
     """What the mesh frequency is above that of ``cycles``, (group, sample) Hz: of all lines, then
     of every other one.
 
@@ -211,7 +230,9 @@ def _deviation(signal: Array, cycles: Array, used: list[int], width: float, rate
     groups = [parts, parts[::2], parts[1::2]] if len(parts) > 1 else [parts]
     return np.stack(
         [
-            sum(top for top, _ in some) / sum(bottom for _, bottom in some) / (2.0 * np.pi)
+            sum(top for top, _ in some)
+            / sum(bottom for _, bottom in some)
+            / (2.0 * np.pi)
             for some in groups
         ]
     )

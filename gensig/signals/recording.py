@@ -95,12 +95,18 @@ class Recording:
     def part(self, first: float, last: float) -> Recording:
         """From one share of its length to another."""
         n_samples = self.acceleration.shape[1]
-        stretch = self.acceleration[:, round(first * n_samples) : round(last * n_samples)]
+        stretch = self.acceleration[
+            :, round(first * n_samples) : round(last * n_samples)
+        ]
         return replace(self, acceleration=stretch - stretch.mean(axis=1, keepdims=True))
 
 
 def read_file(
-    file: str, *, rate: float | None = None, array: str | None = None, rate_option: str = "--rate"
+    file: str,
+    *,
+    rate: float | None = None,
+    array: str | None = None,
+    rate_option: str = "--rate",
 ) -> RecordingFile:
     """Channels and rate of a file.
 
@@ -124,7 +130,9 @@ def read_file(
         )
     if suffix == ".csv":
         if array is not None:
-            raise ConfigError(f"{file}: --array is for .npz, .h5, .hdf5 and .mat; leave it out")
+            raise ConfigError(
+                f"{file}: --array is for .npz, .h5, .hdf5 and .mat; leave it out"
+            )
         names, values, rate = _read_csv(file, rate, rate_option)
         return RecordingFile(
             file=file,
@@ -140,12 +148,18 @@ def read_file(
         raise ConfigError(f"{file} cannot be read: {error.strerror}") from None
     content = READERS[suffix](file, array)
     found = content.sampling_rate
-    _check_range(found, f"{file}: {content.rate_from} has {found} samples a second, which")
+    _check_range(
+        found, f"{file}: {content.rate_from} has {found} samples a second, which"
+    )
     if found is None and rate is None:
         raise ConfigError(
             f"{file}: an array tells no rate; give the samples a second with {rate_option}"
         )
-    if found is not None and rate is not None and not math.isclose(found, rate, rel_tol=1e-3):
+    if (
+        found is not None
+        and rate is not None
+        and not math.isclose(found, rate, rel_tol=1e-3)
+    ):
         raise ConfigError(_disagree(file, content.rate_from, found, rate_option, rate))
     return RecordingFile(
         file=file,
@@ -190,7 +204,10 @@ def recording_of(
         raise ConfigError("--channels: name at least one channel, each once")
     chosen = list(channels or names)
     rows = np.stack(
-        [source.values[names.index(name)] * _factor(file, name, unit) for name in chosen]
+        [
+            source.values[names.index(name)] * _factor(file, name, unit)
+            for name in chosen
+        ]
     )
     if rows.shape[1] < LEAST_SAMPLES:
         raise ConfigError(
@@ -214,10 +231,14 @@ def recording_of(
 
 def without_unit(name: str) -> str:
     """Name of a column less the unit at its end."""
-    return next((name[: -len(end)] for end in SUFFIXES if name.lower().endswith(end)), name)
+    return next(
+        (name[: -len(end)] for end in SUFFIXES if name.lower().endswith(end)), name
+    )
 
 
-def _read_csv(file: str, rate: float | None, rate_option: str) -> tuple[list[str], Array, float]:
+def _read_csv(
+    file: str, rate: float | None, rate_option: str
+) -> tuple[list[str], Array, float]:
     names, values = read_table("recording", file, least_rows=LEAST_SAMPLES)
     if "time_s" not in names:
         if rate is None:
@@ -226,18 +247,26 @@ def _read_csv(file: str, rate: float | None, rate_option: str) -> tuple[list[str
             )
         return names, values, rate
     time = values[names.index("time_s")]
-    found = (len(time) - 1) / float(time[-1] - time[0]) if time[-1] > time[0] else math.nan
+    found = (
+        (len(time) - 1) / float(time[-1] - time[0]) if time[-1] > time[0] else math.nan
+    )
     check_rate("recording", file, time, found)
     if rate is not None and not math.isclose(found, rate, rel_tol=1e-3):
         raise ConfigError(_disagree(file, "time_s", found, rate_option, rate))
     kept = [place for place, name in enumerate(names) if name != "time_s"]
     if not kept:
-        raise ConfigError(f"{file}: there is no column beside time_s; give one a sensor")
+        raise ConfigError(
+            f"{file}: there is no column beside time_s; give one a sensor"
+        )
     # times are often printed with few digits: a rate within their rounding of a whole number is
     # that number
     whole = round(found)
     precise = float(whole) if math.isclose(found, whole, rel_tol=2e-6) else found
-    return [names[place] for place in kept], values[kept], rate if rate is not None else precise
+    return (
+        [names[place] for place in kept],
+        values[kept],
+        rate if rate is not None else precise,
+    )
 
 
 def _disagree(file: str, source: str, found: float, option: str, rate: float) -> str:
@@ -257,5 +286,6 @@ def _factor(file: str, name: str, unit: str) -> float:
             f"{file}: {name} ends in {wrong[0]}, which is no acceleration; choose others with --channels, or rename it"
         )
     return next(
-        (factor for suffix, factor in SUFFIXES.items() if lower.endswith(suffix)), UNITS[unit]
+        (factor for suffix, factor in SUFFIXES.items() if lower.endswith(suffix)),
+        UNITS[unit],
     )

@@ -49,7 +49,9 @@ def read_wav(file: str, array: str | None) -> Content:
 
     _no_array_name(file, array)
     with _one_line(file, "it is no WAV file"), warnings.catch_warnings():
-        warnings.simplefilter("ignore", wavfile.WavFileWarning)  # chunks that are no samples
+        warnings.simplefilter(
+            "ignore", wavfile.WavFileWarning
+        )  # chunks that are no samples
         rate, samples = wavfile.read(Path(file).expanduser())
     rows = np.atleast_2d(np.asarray(samples).T).astype(np.float64)
     return Content(
@@ -78,7 +80,10 @@ def read_npz(file: str, array: str | None) -> Content:
             raise ValueError
         with content:
             name = _chosen(file, array, content.files)
-            values, rate = content[name], content[RATE_KEY] if RATE_KEY in content.files else None
+            values, rate = (
+                content[name],
+                content[RATE_KEY] if RATE_KEY in content.files else None,
+            )
     return Content(values=_rows(file, values), sampling_rate=_rate(file, rate))
 
 
@@ -89,7 +94,10 @@ def read_hdf5(file: str, array: str | None, *, from_matlab: bool = False) -> Con
     """
     import h5py
 
-    with _one_line(file, "it is no HDF5 file"), h5py.File(Path(file).expanduser(), "r") as content:
+    with (
+        _one_line(file, "it is no HDF5 file"),
+        h5py.File(Path(file).expanduser(), "r") as content,
+    ):
         found: dict[str, Any] = {}
         # visits what the file itself holds: neither soft nor external links
         content.visititems(
@@ -106,7 +114,8 @@ def read_hdf5(file: str, array: str | None, *, from_matlab: bool = False) -> Con
         if rate is None and RATE_KEY in found:
             rate = found[RATE_KEY][()]
     return Content(
-        values=_rows(file, values, from_matlab=from_matlab), sampling_rate=_rate(file, rate)
+        values=_rows(file, values, from_matlab=from_matlab),
+        sampling_rate=_rate(file, rate),
     )
 
 
@@ -142,9 +151,7 @@ def _one_line(file: str, what: str) -> Iterator[None]:
         raise ConfigError(
             f"{file} cannot be read: {(error.errno and error.strerror) or what}"
         ) from None
-    except (
-        Exception
-    ):  # the parsers of scipy and h5py raise nearly any on bytes that were made to mislead them
+    except Exception:  # the parsers of scipy and h5py raise nearly any on bytes that were made to mislead them
         raise ConfigError(f"{file} cannot be read: {what}") from None
 
 
@@ -171,7 +178,9 @@ def _chosen(file: str, array: str | None, names: Any) -> str:
 
 def _no_array_name(file: str, array: str | None) -> None:
     if array is not None:
-        raise ConfigError(f"{file}: --array is for .npz, .h5, .hdf5 and .mat; leave it out")
+        raise ConfigError(
+            f"{file}: --array is for .npz, .h5, .hdf5 and .mat; leave it out"
+        )
 
 
 def _rows(file: str, content: Any, *, from_matlab: bool = False) -> Array:
@@ -181,7 +190,9 @@ def _rows(file: str, content: Any, *, from_matlab: bool = False) -> Array:
         or content.dtype.kind not in "fiu"
         or content.ndim not in (1, 2)
     ):
-        raise ConfigError(f"{file}: give one array of real numbers, (sample,) or (sensor, sample)")
+        raise ConfigError(
+            f"{file}: give one array of real numbers, (sample,) or (sensor, sample)"
+        )
     rows = np.atleast_2d(content).astype(np.float64)
     if rows.shape[0] > rows.shape[1]:
         if not from_matlab:

@@ -35,7 +35,9 @@ class RateChange:
 
     def __post_init__(self) -> None:
         if self.up < 1 or self.down < 1 or math.gcd(self.up, self.down) != 1:
-            raise ValueError(f"{self.up} / {self.down} is no ratio of rates in lowest terms")
+            raise ValueError(
+                f"{self.up} / {self.down} is no ratio of rates in lowest terms"
+            )
 
     @property
     def is_none(self) -> bool:
@@ -61,7 +63,11 @@ class RateChange:
         return samples[..., : self.n_samples(x.shape[-1])]
 
     def apply_to_part(
-        self, read: Callable[[int, int], FloatArray], n_found: int, start: int, stop: int
+        self,
+        read: Callable[[int, int], FloatArray],
+        n_found: int,
+        start: int,
+        stop: int,
     ) -> FloatArray:
         """Samples from start to stop of `apply`, read and computed from what they need of the
         signal.
@@ -81,7 +87,9 @@ class RateChange:
     def _taps(self) -> FloatArray:
         from scipy.signal import firwin, kaiserord
 
-        lower = 1.0 / max(self.up, self.down)  # lower of both rates over the rate that both divide
+        lower = 1.0 / max(
+            self.up, self.down
+        )  # lower of both rates over the rate that both divide
         n_taps, beta = kaiserord(ATTENUATION_DB, 2.0 * (0.5 - PASS_SHARE) * lower)
         return firwin(n_taps | 1, (PASS_SHARE + 0.5) * lower, window=("kaiser", beta))
 

@@ -18,7 +18,9 @@ from gensig.signals.averaging import interpolate, samples_per_turn_for
 FloatArray = NDArray[np.floating]
 
 PADDING = 8  # bins of the searched spectrum for one of the record's
-FADED = 0.2  # of the median amplitude; band-limited noise is below it for 3 % of the time
+FADED = (
+    0.2  # of the median amplitude; band-limited noise is below it for 3 % of the time
+)
 
 
 def resample_by_angle(
@@ -113,15 +115,17 @@ def find_mesh_frequency(
     spectrum = np.abs(np.fft.rfft(x * np.hanning(x.shape[-1]), n=n_bins, axis=-1))
     amplitude = np.sqrt(np.mean(np.square(spectrum), axis=0))
     spacing = sampling_rate / n_bins
-    searched = np.arange((1.0 - share) * expected, (1.0 + share) * expected, spacing / n_harmonics)
+    searched = np.arange(
+        (1.0 - share) * expected, (1.0 + share) * expected, spacing / n_harmonics
+    )
     lines = [
         np.interp(harmonic * searched / spacing, np.arange(amplitude.size), amplitude)
         for harmonic in range(1, n_harmonics + 1)
         if harmonic * searched[-1] < 0.5 * sampling_rate
     ]
-    over = np.array([line / floor for line in lines if (floor := np.median(line)) > 0.0]).reshape(
-        -1, searched.size
-    )
+    over = np.array(
+        [line / floor for line in lines if (floor := np.median(line)) > 0.0]
+    ).reshape(-1, searched.size)
     coarse = searched[np.argmax(np.sum(np.log(np.maximum(over, 1.0)), axis=0))]
     near = np.abs(searched - coarse) <= PADDING * spacing
     return float(searched[near][np.argmax(np.sum(np.square(over), axis=0)[near])])
@@ -165,10 +169,14 @@ def mesh_phase_angle(
 
     x = np.asarray(signal, dtype=float)
     window = get_window("hann", round(2.0 * sampling_rate * n_teeth / mesh_frequency))
-    steady = 2.0 * math.pi * harmonic * mesh_frequency / sampling_rate * np.arange(x.size)
+    steady = (
+        2.0 * math.pi * harmonic * mesh_frequency / sampling_rate * np.arange(x.size)
+    )
     band = oaconvolve((x - x.mean()) * np.exp(-1j * steady), window, mode="same")
     phase, magnitude = steady + np.unwrap(np.angle(band)), np.abs(band)
-    if magnitude.min() <= FADED * np.median(magnitude) or not np.all(np.diff(phase) > 0.0):
+    if magnitude.min() <= FADED * np.median(magnitude) or not np.all(
+        np.diff(phase) > 0.0
+    ):
         raise ValueError(
             f"no steady line stands out at {harmonic * mesh_frequency:.5g} Hz; try another harmonic or channel"
         )

@@ -71,7 +71,9 @@ def separate_gears(
     x = np.asarray(signal, dtype=float)
     x = x - x.mean(axis=-1, keepdims=True)
     if samples_per_tooth < 2 or samples_per_tooth % 2:
-        raise ValueError(f"samples_per_tooth must be even and at least 2, not {samples_per_tooth}")
+        raise ValueError(
+            f"samples_per_tooth must be even and at least 2, not {samples_per_tooth}"
+        )
     in_a_passage = sampling_rate / mesh_frequency
     n_passages = math.floor((x.shape[-1] + 1e-6) / in_a_passage)
     if n_passages < n_teeth[0]:
@@ -81,14 +83,21 @@ def separate_gears(
     fine = samples_per_tooth * max(
         math.ceil(in_a_passage / samples_per_tooth), 1
     )  # nothing aliases
-    position = np.arange(n_passages * fine).reshape(n_passages, fine) * (in_a_passage / fine)
+    position = np.arange(n_passages * fine).reshape(n_passages, fine) * (
+        in_a_passage / fine
+    )
     passages = np.moveaxis(interpolate(x, position), -2, 0)
     mesh = passages.mean(axis=0)
     teeth = _tooth_parts((passages - mesh).reshape(n_passages, -1), n_teeth).reshape(
         -1, *mesh.shape
     )
-    for first, last in ((0, n_teeth[0]), (n_teeth[0], min(sum(n_teeth), n_teeth[0] + n_passages))):
-        common = teeth[first:last].mean(axis=0)  # of the teeth that pass: it belongs to no tooth
+    for first, last in (
+        (0, n_teeth[0]),
+        (n_teeth[0], min(sum(n_teeth), n_teeth[0] + n_passages)),
+    ):
+        common = teeth[first:last].mean(
+            axis=0
+        )  # of the teeth that pass: it belongs to no tooth
         teeth[first:last] -= common
         mesh = mesh + common
 
@@ -97,7 +106,9 @@ def separate_gears(
         return _fewer_samples(whole, whole.shape[-1] // fine * samples_per_tooth)
 
     return GearTurns(
-        driving=turn(teeth[: n_teeth[0]]), driven=turn(teeth[n_teeth[0] :]), mesh=turn(mesh[None])
+        driving=turn(teeth[: n_teeth[0]]),
+        driven=turn(teeth[n_teeth[0] :]),
+        mesh=turn(mesh[None]),
     )
 
 

@@ -65,5 +65,10 @@ def spectral_kurtosis(
     power = np.square(np.abs(lines[..., inner, :]))
     squared_mean = np.square(power.mean(axis=-1))
     ratio = np.full(squared_mean.shape, np.nan)
-    np.divide(np.mean(np.square(power), axis=-1), squared_mean, out=ratio, where=squared_mean > 0.0)
+    np.divide(
+        np.mean(np.square(power), axis=-1),
+        squared_mean,
+        out=ratio,
+        where=squared_mean > 0.0,
+    )
     return frequency[inner], ratio - 2.0

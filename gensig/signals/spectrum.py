@@ -85,4 +85,6 @@ def spectrum_of_turns(turns: ArrayLike) -> tuple[FloatArray, FloatArray]:
     amplitude : (..., bin) m/s^2, no window: whole orders fall on bins
     """
     x = np.asarray(turns, dtype=float)
-    return amplitude_spectrum(x.reshape(*x.shape[:-2], -1), x.shape[-1], window="boxcar")
+    return amplitude_spectrum(
+        x.reshape(*x.shape[:-2], -1), x.shape[-1], window="boxcar"
+    )

@@ -18,7 +18,9 @@ from gensig.signals.recording import Recording
 
 FloatArray = NDArray[np.floating]
 
-TURNS_A_FRAME = 3  # of the faster gear: its sidebands, one turn away, are told from the mesh
+TURNS_A_FRAME = (
+    3  # of the faster gear: its sidebands, one turn away, are told from the mesh
+)
 FRAMES_A_FRAME = 4  # hop is a quarter of the frame
 MOST_HARMONICS = 10
 FINER_SPECTRUM = 2  # bins of the frame's spectrum for one of the frame
@@ -28,9 +30,7 @@ LEAST_LINE_DB = 18.0  # of the strongest of the first harmonics,
 LEAST_MEAN_DB = 10.0  # or of all of them on the average
 FIRST_HARMONICS = 5
 FINE = 0.25  # candidates lie this share of a bin apart at the highest harmonic
-STEP_SHARE = (
-    0.003  # assumed: standard deviation of the relative change of speed from one frame to the next
-)
+STEP_SHARE = 0.003  # assumed: standard deviation of the relative change of speed from one frame to the next
 
 
 def wandering_mesh_cycles(
@@ -81,10 +81,15 @@ def wandering_mesh_cycles(
     )
     samples = np.arange(n_samples)
     frequency = np.interp(samples / rate, time, course)
-    coarse = np.concatenate([[0.0], np.cumsum(0.5 * (frequency[1:] + frequency[:-1]))]) / rate
+    coarse = (
+        np.concatenate([[0.0], np.cumsum(0.5 * (frequency[1:] + frequency[:-1]))])
+        / rate
+    )
     mean = float(coarse[-1] * rate / (n_samples - 1))
     warped = coarse / mean * rate  # place of every sample once the speed is steady
-    steady = np.stack([np.interp(samples, warped, row) for row in recording.acceleration])
+    steady = np.stack(
+        [np.interp(samples, warped, row) for row in recording.acceleration]
+    )
     motion = find_motion(
         replace(recording, acceleration=steady),
         teeth,
@@ -142,7 +147,9 @@ def mesh_frequency_course(
 
     x = np.asarray(signal, dtype=float)
     length = round(TURNS_A_FRAME * n_teeth / mesh_frequency * sampling_rate)
-    n_harmonics = min(MOST_HARMONICS, math.floor(highest / ((1.0 + search) * mesh_frequency)))
+    n_harmonics = min(
+        MOST_HARMONICS, math.floor(highest / ((1.0 + search) * mesh_frequency))
+    )
     if search * n_teeth >= 1.0 or n_harmonics < 1 or length > x.shape[-1]:
         raise ValueError(
             f"no course: {n_harmonics} harmonics, frames of {length} samples, search {search:g}"
@@ -165,9 +172,14 @@ def mesh_frequency_course(
     harmonic = np.arange(1, n_harmonics + 1)[:, None]
     place = harmonic * (1.0 + candidates) * mesh_frequency / frequency[1]
     likelihood = np.stack(
-        [np.interp(place, np.arange(frequency.size), row).sum(axis=0) for row in standing.T]
+        [
+            np.interp(place, np.arange(frequency.size), row).sum(axis=0)
+            for row in standing.T
+        ]
     )
-    return time, (1.0 + candidates[_most_probable(likelihood, candidates)]) * mesh_frequency
+    return time, (
+        1.0 + candidates[_most_probable(likelihood, candidates)]
+    ) * mesh_frequency
 
 
 def _floor(power: FloatArray) -> FloatArray:
@@ -185,7 +197,9 @@ def _most_probable(likelihood: FloatArray, candidates: FloatArray) -> NDArray[np
     """(frame,) indices of the candidates along the best course, logarithms of probability (frame,
     candidate).
     """
-    change = -0.5 * np.square((candidates[:, None] - candidates[None, :]) / STEP_SHARE)  # to, from
+    change = -0.5 * np.square(
+        (candidates[:, None] - candidates[None, :]) / STEP_SHARE
+    )  # to, from
     total, origin = likelihood[0], []
     for row in likelihood[1:]:
         reached = change + total[None, :]

@@ -13,7 +13,9 @@ from gensig.signals.averaging import remove_orders
 FloatArray = NDArray[np.floating]
 
 
-def mesh_harmonics(average: ArrayLike, n_teeth: int, n_harmonics: int = 3) -> FloatArray:
+def mesh_harmonics(
+    average: ArrayLike, n_teeth: int, n_harmonics: int = 3
+) -> FloatArray:
     """Amplitudes of the harmonics of the mesh in an average turn.
 
     Parameters
@@ -62,11 +64,16 @@ def nonsynchronous_share(turns: ArrayLike) -> FloatArray:
     averaged = np.mean(np.square(x.mean(axis=-2)), axis=-1)
     share = np.full(np.shape(whole), np.nan)
     return np.divide(
-        (whole - averaged) * n_turns / (n_turns - 1), whole, out=share, where=whole > 0.0
+        (whole - averaged) * n_turns / (n_turns - 1),
+        whole,
+        out=share,
+        where=whole > 0.0,
     )
 
 
-def residual_turns(turns: ArrayLike, n_teeth: int, *, n_shaft_orders: int = 2) -> FloatArray:
+def residual_turns(
+    turns: ArrayLike, n_teeth: int, *, n_shaft_orders: int = 2
+) -> FloatArray:
     """Turns without the mean, the lowest shaft orders and every mesh harmonic; what does not
     repeat stays.
 
@@ -87,5 +94,7 @@ def residual_turns(turns: ArrayLike, n_teeth: int, *, n_shaft_orders: int = 2) -
     x = np.asarray(turns, dtype=float)
     n_turns, per_turn = x.shape[-2:]
     orders = {*range(n_shaft_orders + 1), *range(n_teeth, per_turn // 2 + 1, n_teeth)}
-    flat = remove_orders(x.reshape(*x.shape[:-2], -1), [n_turns * order for order in orders])
+    flat = remove_orders(
+        x.reshape(*x.shape[:-2], -1), [n_turns * order for order in orders]
+    )
     return flat.reshape(x.shape)

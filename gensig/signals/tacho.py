@@ -37,7 +37,9 @@ def pulse_times(tacho: ArrayLike, sampling_rate: float) -> FloatArray:
     return (rising + 0.5 - share[rising - 1] - share[rising]) / sampling_rate
 
 
-def speed_of_pulses(times: ArrayLike, pulses_per_turn: int = 1) -> tuple[FloatArray, FloatArray]:
+def speed_of_pulses(
+    times: ArrayLike, pulses_per_turn: int = 1
+) -> tuple[FloatArray, FloatArray]:
     """Mean speed from each pulse to the next.
 
     Parameters
@@ -50,7 +52,9 @@ def speed_of_pulses(times: ArrayLike, pulses_per_turn: int = 1) -> tuple[FloatAr
     rotation_frequency : (pulse - 1,) Hz
     """
     instants = np.asarray(times, dtype=float)
-    return 0.5 * (instants[1:] + instants[:-1]), 1.0 / (pulses_per_turn * np.diff(instants))
+    return 0.5 * (instants[1:] + instants[:-1]), 1.0 / (
+        pulses_per_turn * np.diff(instants)
+    )
 
 
 def resample_by_pulses(
@@ -91,7 +95,9 @@ def resample_by_pulses(
     instants = np.asarray(times, dtype=float)
     n_turns = (len(instants) - 1) // pulses_per_turn
     if n_turns < 1:
-        raise ValueError(f"{len(instants)} pulses at {pulses_per_turn} a turn span no whole turn")
+        raise ValueError(
+            f"{len(instants)} pulses at {pulses_per_turn} a turn span no whole turn"
+        )
     longest = float(np.max(instants[pulses_per_turn:] - instants[:-pulses_per_turn]))
     per_turn = samples_per_turn or samples_per_turn_for(sampling_rate, 1.0 / longest)
     at = CubicSpline(np.arange(len(instants)) / pulses_per_turn, instants)

@@ -14,7 +14,9 @@ from gensig.signals.envelope import band_pass
 
 FloatArray = NDArray[np.floating]
 
-NORMAL = 1.4826  # standard deviation of a normal variable over the median of its magnitude
+NORMAL = (
+    1.4826  # standard deviation of a normal variable over the median of its magnitude
+)
 FLOOR = 1e-30  # of a mean square, below which a passage is silent
 
 
@@ -57,8 +59,12 @@ def tooth_levels(
     skipped = (first - start) * per_tooth
     samples = max(math.ceil(per_tooth), 2)
     begin = round(skipped)
-    turns = resample_to_angle(x[..., begin:], sampling_rate, rotation_frequency, samples * n_teeth)
-    power = np.mean(np.square(turns.reshape(*turns.shape[:-1], n_teeth, samples)), axis=-1)
+    turns = resample_to_angle(
+        x[..., begin:], sampling_rate, rotation_frequency, samples * n_teeth
+    )
+    power = np.mean(
+        np.square(turns.reshape(*turns.shape[:-1], n_teeth, samples)), axis=-1
+    )
     levels = np.mean(10.0 * np.log10(np.maximum(power, FLOOR)), axis=-2)
     return np.roll(levels, first % n_teeth, axis=-1)
 

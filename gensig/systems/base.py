@@ -134,7 +134,11 @@ class Machine(ABC):
 
     @abstractmethod
     def stiffness_curves(
-        self, faults: Sequence[Fault] = (), *, n_positions: int = 201, points_per_tooth: int = 100
+        self,
+        faults: Sequence[Fault] = (),
+        *,
+        n_positions: int = 201,
+        points_per_tooth: int = 100,
     ) -> StiffnessCurves:
         """Single-pair and mesh stiffness of spur teeth; ConfigError for teeth in slices."""
 
@@ -155,7 +159,9 @@ class Machine(ABC):
 
     @classmethod
     @abstractmethod
-    def simulate_runs(cls, runs: Sequence[Run[Self]]) -> list[CleanRecord | SimulationError]:
+    def simulate_runs(
+        cls, runs: Sequence[Run[Self]]
+    ) -> list[CleanRecord | SimulationError]:
         """Simulate runs of machines of this kind; ``simulate_together`` takes any kinds.
 
         The results are in the order of the runs.
@@ -174,7 +180,11 @@ class Machine(ABC):
         What is not given is perfect, nominal, and starts with teeth 0 at A.
         """
         run = Run(
-            system=self, faults=tuple(faults), start=start, specimen=specimen, gearbox=gearbox
+            system=self,
+            faults=tuple(faults),
+            start=start,
+            specimen=specimen,
+            gearbox=gearbox,
         )
         (record,) = self.simulate_runs([run])
         if isinstance(record, SimulationError):

@@ -22,15 +22,18 @@ Array = NDArray[np.float64]
 # of the search, in normal modules: depth and height as the paper on transmission error takes
 # them, section 2
 LARGEST_DEPTH, LARGEST_HEIGHT = 0.02, 0.65
-N_VARIABLES = (
-    9  # tip and root relief, each with depth and height, of both gears; crowning of the pair
-)
-N_PHASES, N_SLICES = 32, 28  # of the search; what it finds is judged with the pair's own
+N_VARIABLES = 9  # tip and root relief, each with depth and height, of both gears; crowning of the pair
+N_PHASES, N_SLICES = (
+    32,
+    28,
+)  # of the search; what it finds is judged with the pair's own
 POPULATION, GENERATIONS = (
     8,
     60,
 )  # of differential evolution; the population counts for each variable
-BETWEEN = 0.5  # of these generations where a search starts from the front of those before
+BETWEEN = (
+    0.5  # of these generations where a search starts from the front of those before
+)
 REFUSED = 1e3  # times the unmodified value, for flanks that overlap or lose contact
 
 
@@ -61,7 +64,11 @@ class Optimum:
 
 
 def judge(
-    system: SlicedPair, modification: PairModification, cases: Cases, *, n_phases: int = 64
+    system: SlicedPair,
+    modification: PairModification,
+    cases: Cases,
+    *,
+    n_phases: int = 64,
 ) -> Optimum:
     """Worst ripple and worst line load over the cases.
 
@@ -69,7 +76,9 @@ def judge(
     """
     ripple, line_load = 0.0, 0.0
     for misalignment in cases.misalignments:
-        askew = replace(modification, misalignment=modification.misalignment + misalignment)
+        askew = replace(
+            modification, misalignment=modification.misalignment + misalignment
+        )
         mesh = replace(system, modification=askew).sliced_mesh()
         for torque in cases.torques:
             contact = loaded_contact(
@@ -107,7 +116,8 @@ def optimise(
     ``scipy.optimize.differential_evolution`` has it.
     """
     search = replace(
-        system, slices=replace(system.slices, n_slices=min(N_SLICES, system.slices.n_slices))
+        system,
+        slices=replace(system.slices, n_slices=min(N_SLICES, system.slices.n_slices)),
     )
     plain = judge(search, _plain(), cases, n_phases=N_PHASES)
     seen: dict[bytes, tuple[float, float]] = {}
@@ -118,25 +128,42 @@ def optimise(
         if key not in seen:
             try:
                 found = judge(search, unpacked(point, search), cases, n_phases=N_PHASES)
-                seen[key] = found.ripple / plain.ripple, found.line_load / plain.line_load
+                seen[key] = (
+                    found.ripple / plain.ripple,
+                    found.line_load / plain.line_load,
+                )
             except (ConfigError, GeometryError):
                 seen[key] = REFUSED, REFUSED
         return seen[key]
 
     def run(
-        objective: Callable[[Array], float], start: Sequence[Array], number: int, n_generations: int
+        objective: Callable[[Array], float],
+        start: Sequence[Array],
+        number: int,
+        n_generations: int,
     ) -> Array:
-        point = _minimum(objective, start, seed=seed + number, generations=n_generations)
+        point = _minimum(
+            objective, start, seed=seed + number, generations=n_generations
+        )
         on_done(number + 1, n_front)
         return point
 
-    points = [run(lambda point: values(point)[0], [np.zeros(N_VARIABLES)], 0, generations)]
+    points = [
+        run(lambda point: values(point)[0], [np.zeros(N_VARIABLES)], 0, generations)
+    ]
     if n_front > 1:
         points.append(
-            run(lambda point: values(point)[1], [np.zeros(N_VARIABLES), points[0]], 1, generations)
+            run(
+                lambda point: values(point)[1],
+                [np.zeros(N_VARIABLES), points[0]],
+                1,
+                generations,
+            )
         )
         most, least = values(points[0])[1], values(points[1])[1]
-        for number, bound in enumerate(np.linspace(most, least, n_front)[1:-1], start=2):
+        for number, bound in enumerate(
+            np.linspace(most, least, n_front)[1:-1], start=2
+        ):
 
             def bounded(point: Array, bound: float = float(bound)) -> float:
                 ripple, load = values(point)
@@ -171,7 +198,11 @@ def _spread(seen: Mapping[bytes, tuple[float, float]], n_points: int) -> list[Ar
 
 
 def _minimum(
-    objective: Callable[[Array], float], start: Sequence[Array], *, seed: int, generations: int
+    objective: Callable[[Array], float],
+    start: Sequence[Array],
+    *,
+    seed: int,
+    generations: int,
 ) -> Array:
     """Best point of the unit box, (variable,), from a random population that holds the given
     ones.
@@ -179,9 +210,9 @@ def _minimum(
     from scipy.optimize import differential_evolution
     from scipy.stats import qmc
 
-    population = qmc.LatinHypercube(N_VARIABLES, rng=np.random.default_rng(seed)).random(
-        POPULATION * N_VARIABLES
-    )
+    population = qmc.LatinHypercube(
+        N_VARIABLES, rng=np.random.default_rng(seed)
+    ).random(POPULATION * N_VARIABLES)
     population[: len(start)] = start
     result = differential_evolution(
         objective,
@@ -230,5 +261,6 @@ def _not_beaten(found: Sequence[Optimum]) -> list[Optimum]:
         )
     ]
     return sorted(
-        {(one.ripple, one.line_load): one for one in kept}.values(), key=lambda one: one.ripple
+        {(one.ripple, one.line_load): one for one in kept}.values(),
+        key=lambda one: one.ripple,
     )

@@ -29,7 +29,10 @@ N_TORQUES = 3  # how slices share the load hangs little on the torque
 
 
 def crack_law(
-    machine: Machine, crack: Crack, options: CrackGrowthOptions, torques: tuple[float, float]
+    machine: Machine,
+    crack: Crack,
+    options: CrackGrowthOptions,
+    torques: tuple[float, float],
 ) -> CrackGrowth:
     """The law of a crack like ``crack``.
 
@@ -54,8 +57,12 @@ def pit_law(
     if not isinstance(machine, HelicalPair):
         return pit_growth(machine.pair, machine.material, pits, options, first)
     looked = _between(torques)
-    stress = _stresses(_for_lives(machine.flanks), tuple(looked.tolist()), options.exponent)
-    return pit_growth(machine.pair, machine.material, pits, options, first, (looked, stress))
+    stress = _stresses(
+        _for_lives(machine.flanks), tuple(looked.tolist()), options.exponent
+    )
+    return pit_growth(
+        machine.pair, machine.material, pits, options, first, (looked, stress)
+    )
 
 
 def _for_lives(flanks: SlicedPair) -> SlicedPair:
@@ -63,13 +70,19 @@ def _for_lives(flanks: SlicedPair) -> SlicedPair:
 
     Contact on its path only, like the spur laws, and calibrated cracks.
     """
-    mesh = replace(flanks.mesh, law="paper", crack="calibrated", allow_extrapolation=True)
+    mesh = replace(
+        flanks.mesh, law="paper", crack="calibrated", allow_extrapolation=True
+    )
     return replace(flanks, mesh=mesh)
 
 
 def _between(torques: tuple[float, float]) -> Array:
     least, greatest = torques
-    return np.array([least]) if least == greatest else np.geomspace(least, greatest, N_TORQUES)
+    return (
+        np.array([least])
+        if least == greatest
+        else np.geomspace(least, greatest, N_TORQUES)
+    )
 
 
 @lru_cache(maxsize=32)
@@ -84,13 +97,20 @@ def _spur_crack_law(
 
 @lru_cache(maxsize=32)
 def _sliced_crack_law(
-    flanks: SlicedPair, crack: Crack, options: CrackGrowthOptions, torques: tuple[float, float]
+    flanks: SlicedPair,
+    crack: Crack,
+    options: CrackGrowthOptions,
+    torques: tuple[float, float],
 ) -> CrackGrowth:
     mesh_of = flanks.sliced_mesh
     looked = _between(torques)
-    return sliced_crack_growth(flanks.pair, flanks.material, mesh_of, crack, options, looked)
+    return sliced_crack_growth(
+        flanks.pair, flanks.material, mesh_of, crack, options, looked
+    )
 
 
 @lru_cache(maxsize=8)
 def _stresses(flanks: SlicedPair, torques: tuple[float, ...], exponent: float) -> Array:
-    return sliced_contact_stress(flanks.sliced_mesh(), flanks.material, np.array(torques), exponent)
+    return sliced_contact_stress(
+        flanks.sliced_mesh(), flanks.material, np.array(torques), exponent
+    )

@@ -42,7 +42,11 @@ class HelicalPair(GearPairMachine):
         return self.flanks.mesh_table(faults)
 
     def stiffness_curves(
-        self, faults: Sequence[Fault] = (), *, n_positions: int = 201, points_per_tooth: int = 100
+        self,
+        faults: Sequence[Fault] = (),
+        *,
+        n_positions: int = 201,
+        points_per_tooth: int = 100,
     ) -> StiffnessCurves:
         """Raise ConfigError: these curves are of whole teeth, and a helical pair has slices."""
         raise ConfigError(

@@ -169,9 +169,15 @@ def heated(
             pair = _in_housing(system.pair, pair, state.growth, strain, housing)
         system = replace(system, pair=pair, growth=state.growth if growth else None)
     if softening:
-        ratios = [duty.heat.modulus_ratio(body.tooth) for body in (state.pinion, state.wheel)]
-        modulus = system.material.youngs_modulus * 2.0 / sum(1.0 / ratio for ratio in ratios)
-        system = replace(system, material=replace(system.material, youngs_modulus=modulus))
+        ratios = [
+            duty.heat.modulus_ratio(body.tooth) for body in (state.pinion, state.wheel)
+        ]
+        modulus = (
+            system.material.youngs_modulus * 2.0 / sum(1.0 / ratio for ratio in ratios)
+        )
+        system = replace(
+            system, material=replace(system.material, youngs_modulus=modulus)
+        )
     return system
 
 
@@ -207,7 +213,9 @@ def stiffness_variants(duty: Duty, state: HotState) -> dict[str, Variant]:
         )
     if heat.center_distance:
         found[CONTACT_RATIO] = _variant(
-            heated(duty, state, growth=heat.growth, center_distance=True, softening=False)
+            heated(
+                duty, state, growth=heat.growth, center_distance=True, softening=False
+            )
         )
     if heat.growth:
         cold, thermal = found[COLD], state.growth.teeth_alone(duty.system.pair)
@@ -215,11 +223,16 @@ def stiffness_variants(duty: Duty, state: HotState) -> dict[str, Variant]:
             left = cold.approach - thermal
             factor = float(cold.approach.mean() / left.mean())
             found[APPARENT] = replace(
-                cold, approach=left, mesh=duty.system.mesh_force / left, single=cold.single * factor
+                cold,
+                approach=left,
+                mesh=duty.system.mesh_force / left,
+                single=cold.single * factor,
             )
     if heat.softening:
         found[SOFTENED] = _variant(
-            heated(duty, state, growth=heat.growth, center_distance=False, softening=True)
+            heated(
+                duty, state, growth=heat.growth, center_distance=False, softening=True
+            )
         )
     return found
 
@@ -241,7 +254,9 @@ def sweep(duty: Duty, name: str, values: Sequence[float]) -> list[dict[str, Vari
         elif name == "speed":
             changed = replace(duty, speed=value)
         else:
-            raise ConfigError(f"a sweep over {name!r}; allowed: friction, torque, speed")
+            raise ConfigError(
+                f"a sweep over {name!r}; allowed: friction, torque, speed"
+            )
         found.append(stiffness_variants(changed, hot_state(changed)))
     return found
 
@@ -259,7 +274,9 @@ def flash_skin_growth(duty: Duty, state: HotState) -> float:
     width = 2.0 * float(contact_half_width(pair, hottest, load, material)[0])
     slowest = min(float(one[0]) for one in rolling_speeds(pair, hottest, duty.speed))
     depth = math.sqrt(
-        heat.conductivity * width / (slowest * material.density_kg_per_m3 * heat.specific_heat)
+        heat.conductivity
+        * width
+        / (slowest * material.density_kg_per_m3 * heat.specific_heat)
     )
     held = (1.0 + material.poisson_ratio) / (1.0 - material.poisson_ratio)
     return held * heat.expansion * float(state.flash.max()) * depth
@@ -275,7 +292,8 @@ def _body(
     )
     for temperature in (body.tooth, float(body.temperature[0])):
         heat.require_known(
-            temperature, f"{gear.name}: a temperature of {temperature:.4g} degrees Celsius"
+            temperature,
+            f"{gear.name}: a temperature of {temperature:.4g} degrees Celsius",
         )
     return body
 
@@ -316,7 +334,10 @@ def _grown(pair: GearPair, growth: PairGrowth, strain: float) -> GearPair:
         for gear, own in ((pair.pinion, growth.pinion), (pair.wheel, growth.wheel))
     )
     return replace(
-        pair, pinion=pinion, wheel=wheel, center_distance_change=pair.center_distance_change
+        pair,
+        pinion=pinion,
+        wheel=wheel,
+        center_distance_change=pair.center_distance_change,
     )
 
 
@@ -335,9 +356,13 @@ def _in_housing(
     scale = pair.pinion.normal_module / cold.pinion.normal_module
     change = cold.center_distance * scale * ((1.0 + housing) / (1.0 + strain) - 1.0)
     try:
-        return replace(pair, backlash=cold.backlash - closing, center_distance_change=change)
+        return replace(
+            pair, backlash=cold.backlash - closing, center_distance_change=change
+        )
     except GeometryError as error:
-        raise GeometryError(f"gears grown against the housing by heat: {error}") from None
+        raise GeometryError(
+            f"gears grown against the housing by heat: {error}"
+        ) from None
 
 
 def _variant(system: SlicedPair) -> Variant:

@@ -16,7 +16,9 @@ from gensig.systems.base import Machine, simulate_together
 from gensig.systems.run import CleanRecord, Run, Start
 
 
-def simulate_with_lead_in(runs: Sequence[Run[Machine]]) -> list[CleanRecord | SimulationError]:
+def simulate_with_lead_in(
+    runs: Sequence[Run[Machine]],
+) -> list[CleanRecord | SimulationError]:
     """As ``simulate_together``, but every acceleration has its ``sensing.n_lead`` samples before
     the record too.
 
@@ -38,7 +40,11 @@ def earlier(run: Run[Machine]) -> Run[Machine]:
     n_lead = run.system.sensing.n_lead
     if n_lead == 0:
         return run
-    operating, pair, rate = run.system.operating, run.system.pair, run.system.sensing.sampling_rate
+    operating, pair, rate = (
+        run.system.operating,
+        run.system.pair,
+        run.system.sensing.sampling_rate,
+    )
     lead = n_lead / rate
     start = run.start or Start()
     turned = operating.speed * float(operating.time_at_set_speed(np.array([-lead]))[0])
@@ -63,7 +69,9 @@ def _cut(record: CleanRecord, run: Run[Machine]) -> CleanRecord:
         return record
     n_samples = len(record.shaft_angle) - n_lead
     operating = run.system.operating
-    before = -operating.speed * float(operating.time_at_set_speed(np.array([-n_lead / rate]))[0])
+    before = -operating.speed * float(
+        operating.time_at_set_speed(np.array([-n_lead / rate]))[0]
+    )
     end = record.shaft_angle[0] + record.mean_speed * (n_lead + n_samples) / rate
     return replace(
         record,

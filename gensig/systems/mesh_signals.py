@@ -11,7 +11,9 @@ from gensig.dynamics.mesh_state import NO_TOOTH, MeshState
 from gensig.errors import ConfigError
 
 
-def mesh_signals(mesh: MeshState | None, n_samples: int, n_pairs: int) -> dict[str, NDArray[Any]]:
+def mesh_signals(
+    mesh: MeshState | None, n_samples: int, n_pairs: int
+) -> dict[str, NDArray[Any]]:
     """The mesh state as a shard takes it, ``n_pairs`` rows of pairs; of a failed record nothing
     is known.
 

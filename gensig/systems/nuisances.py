@@ -79,7 +79,10 @@ def nuisance_acceleration(
     before = operating.nominal(np.arange(-n_lead, 0) / rate).angle + shaft_angle[0]
     turned = np.concatenate([before, shaft_angle])
     begin_at = run.start or Start()
-    first = {gear: float(gear_angle(run.system, gear, begin_at, np.zeros(1))[0]) for gear in SENSE}
+    first = {
+        gear: float(gear_angle(run.system, gear, begin_at, np.zeros(1))[0])
+        for gear in SENSE
+    }
     channels = [dynamics.dofs.index(name) for name in sensing.channels]
 
     n_samples = len(turned)
@@ -93,7 +96,11 @@ def nuisance_acceleration(
         [part for one in answers for part in (one.real, -one.imag)], axis=1
     )  # on cosines, sines
     fastest = max(
-        float(np.max(np.abs(_frequencies(dynamics, part, nominal.speed)) * one.any(axis=2)))
+        float(
+            np.max(
+                np.abs(_frequencies(dynamics, part, nominal.speed)) * one.any(axis=2)
+            )
+        )
         for part, one in zip(tones, answers, strict=True)
     )
     every = max(1, min(BLOCK, int(SPLINE_PHASE * rate / max(fastest, 1.0))))
@@ -104,7 +111,9 @@ def nuisance_acceleration(
     for block, (start, stop) in enumerate(pairwise(ends.tolist())):
         own = made[start:stop]
         ratio = {gear: shaft(dynamics, gear).speed_ratio for gear in SENSE}
-        waves = _waves(tones, {gear: first[gear] + ratio[gear] * turned[own] for gear in SENSE})
+        waves = _waves(
+            tones, {gear: first[gear] + ratio[gear] * turned[own] for gear in SENSE}
+        )
         # einsum, not @: its bits depend on no thread count
         coarse[:, start:stop] = np.einsum("tc,ts->cs", factors[block], waves)
         change = factors[block + 1] - factors[block]
@@ -122,10 +131,14 @@ def _frequencies(dynamics: PairDynamics, tones: Tones, speed: Array) -> Array:
 
     Below 0 against the shaft's sense.
     """
-    return np.asarray(speed[:, None] * shaft(dynamics, tones.gear).speed_ratio * tones.order)
+    return np.asarray(
+        speed[:, None] * shaft(dynamics, tones.gear).speed_ratio * tones.order
+    )
 
 
-def _answers(dynamics: PairDynamics, tones: Tones, nominal: Nominal, highest: float) -> Complex:
+def _answers(
+    dynamics: PairDynamics, tones: Tones, nominal: Nominal, highest: float
+) -> Complex:
     """Accelerations (time, tone, dof) of steady turning; 0 for tones above ``highest`` in rad/s."""
     frequency = _frequencies(dynamics, tones, nominal.speed)
     growth = {
@@ -134,11 +147,13 @@ def _answers(dynamics: PairDynamics, tones: Tones, nominal: Nominal, highest: fl
         "nothing": np.ones(len(frequency)),
     }
     force = np.zeros((*frequency.shape, len(dynamics.dofs)), dtype=np.complex128)
-    places = [dynamics.dofs.index(f"{tones.gear}_{axis}") for axis in ("x", "y", "rotation")]
+    places = [
+        dynamics.dofs.index(f"{tones.gear}_{axis}") for axis in ("x", "y", "rotation")
+    ]
     force[:, :, places] = growth[tones.follows][:, None, None] * tones.force
-    answer = accelerations(dynamics, frequency.ravel(), force.reshape(-1, force.shape[2])).reshape(
-        force.shape
-    )
+    answer = accelerations(
+        dynamics, frequency.ravel(), force.reshape(-1, force.shape[2])
+    ).reshape(force.shape)
     return answer * (np.abs(frequency) <= highest)[:, :, None]
 
 
@@ -148,7 +163,9 @@ def _waves(tones: Sequence[Tones], angle: Mapping[str, Array]) -> Array:
     A power costs a fiftieth of a cosine, and parts share those of the angles that they share.
     """
     powers: dict[tuple[str, float], _Powers] = {}
-    out = np.empty((2 * sum(len(part.multiple) for part in tones), len(next(iter(angle.values())))))
+    out = np.empty(
+        (2 * sum(len(part.multiple) for part in tones), len(next(iter(angle.values()))))
+    )
     row = 0
     for part in tones:
         n_tones = len(part.multiple)

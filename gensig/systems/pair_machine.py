@@ -37,7 +37,9 @@ from gensig.units import from_si
 
 Array = NDArray[np.float64]
 
-FINEST_BOUNCING = 20  # steps per sample above which what bounces does not come nearer to anything
+FINEST_BOUNCING = (
+    20  # steps per sample above which what bounces does not come nearer to anything
+)
 PairMachine = Machine  # the name of version 0.9
 
 __all__ = [
@@ -86,13 +88,18 @@ class GearPairMachine(Machine):
     def meshes(self) -> tuple[MachineMesh, ...]:
         """The one mesh."""
         driving, driven = self.gears
-        return (MachineMesh(driving=driving, driven=driven, pair=self.pair, followed=True),)
+        return (
+            MachineMesh(driving=driving, driven=driven, pair=self.pair, followed=True),
+        )
 
     @property
     def channels(self) -> tuple[str, ...]:
         """Motions of the gears, and the rotations of motor and load if there are any."""
         rotors = {"motor_rotation": self.motor, "load_rotation": self.load}
-        return (*self.gear_channels, *[name for name, rotor in rotors.items() if rotor is not None])
+        return (
+            *self.gear_channels,
+            *[name for name, rotor in rotors.items() if rotor is not None],
+        )
 
     @property
     def ratio(self) -> float:
@@ -135,14 +142,21 @@ class GearPairMachine(Machine):
         self.mesh_table()
         self.quality.check_covered(self.pair.pinion, self.pair.wheel)
         sensing, operating = self.sensing, self.operating
-        check_memory(operating.duration, sensing.sampling_rate, len(sensing.channels), self.solver)
+        check_memory(
+            operating.duration,
+            sensing.sampling_rate,
+            len(sensing.channels),
+            self.solver,
+        )
         nominal = pair_dynamics(Run(system=self, faults=()))
         check_channels(sensing.channels, self.channels)
         sensing.check(operating.duration)
         check_machine(nominal, self.solver, sensing.sampling_rate)
 
     @classmethod
-    def simulate_runs(cls, runs: Sequence[Run[Self]]) -> list[CleanRecord | SimulationError]:
+    def simulate_runs(
+        cls, runs: Sequence[Run[Self]]
+    ) -> list[CleanRecord | SimulationError]:
         """Simulate runs, those that share rate, duration and law side by side."""
         return simulate_pairs(runs)
 
@@ -189,7 +203,11 @@ def _kind(run: PairRun) -> tuple[object, ...]:
     """Everything that runs must share to be integrated in one call."""
     system = run.system
     operating = system.operating
-    sensing = (system.sensing.sampling_rate, system.sensing.channels, operating.duration)
+    sensing = (
+        system.sensing.sampling_rate,
+        system.sensing.channels,
+        operating.duration,
+    )
     machine = (
         type(system),
         system.motor is None,
@@ -231,10 +249,16 @@ def simulate_pairs(runs: Sequence[PairRun]) -> list[CleanRecord | SimulationErro
             [runs[place] for place in places], [machines[place] for place in places]
         )
         found.update(zip(places, records, strict=True))
-    coarse = [place for place, record in found.items() if _is_too_coarse(runs[place], record)]
+    coarse = [
+        place for place, record in found.items() if _is_too_coarse(runs[place], record)
+    ]
     if coarse:
         found.update(
-            zip(coarse, simulate_pairs([_finer(runs[place]) for place in coarse]), strict=True)
+            zip(
+                coarse,
+                simulate_pairs([_finer(runs[place]) for place in coarse]),
+                strict=True,
+            )
         )
     return [found[place] for place in range(len(runs))]
 
@@ -246,7 +270,9 @@ def _is_too_coarse(run: PairRun, record: CleanRecord | SimulationError) -> bool:
     return 2 * run.system.solver.oversampling <= finest
 
 
-def _checks(motions: Motions, solver: Solver, sampling_rate: float) -> tuple[Array, list[str]]:
+def _checks(
+    motions: Motions, solver: Solver, sampling_rate: float
+) -> tuple[Array, list[str]]:
     """Relative error in the band of every motion, and its meaning."""
     exact, kept = motions.check, motions.finite
     errors = np.full(len(exact), np.nan)
@@ -254,7 +280,9 @@ def _checks(motions: Motions, solver: Solver, sampling_rate: float) -> tuple[Arr
         return errors, ["none"] * len(exact)
     found = motions.acceleration[:, :, : exact.shape[2]]
     errors[kept] = in_band_error(found[kept], exact[kept], sampling_rate)
-    checks = ["error" if error <= solver.max_error else "unresolved" for error in errors]
+    checks = [
+        "error" if error <= solver.max_error else "unresolved" for error in errors
+    ]
     for index, check in enumerate(checks):
         if (
             check == "unresolved"
@@ -308,6 +336,8 @@ def _side_by_side(
     return records
 
 
-def _mesh_state(run: PairRun, dynamics: PairDynamics, motions: Motions, index: int) -> MeshState:
+def _mesh_state(
+    run: PairRun, dynamics: PairDynamics, motions: Motions, index: int
+) -> MeshState:
     faulty = faulty_teeth(run.system.pair, run.faults)
     return mesh_state(dynamics, motions.seen[index], motions.shaft_angle[index], faulty)

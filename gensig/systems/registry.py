@@ -86,7 +86,9 @@ def _read_machine(config: Configuration, pair: GearPair) -> dict[str, Any]:
     machine = config.section("system")
     for key in machine:
         if key not in SYSTEM_KEYS:
-            raise ConfigError(f"system: unknown key '{key}'; known: {', '.join(SYSTEM_KEYS)}")
+            raise ConfigError(
+                f"system: unknown key '{key}'; known: {', '.join(SYSTEM_KEYS)}"
+            )
     gears = pair.gears
     operating, quality = (
         read_operating(config.section("operating")),
@@ -97,7 +99,9 @@ def _read_machine(config: Configuration, pair: GearPair) -> dict[str, Any]:
     if on_bearings(machine.get("supports", AS_GIVEN), quality):
         force = operating.torque / pair.pinion.base_radius
         bodies = {
-            name: put_on_bearings(bodies[name], gears[name], held[name], material, force)
+            name: put_on_bearings(
+                bodies[name], gears[name], held[name], material, force
+            )
             for name in SIDES
         }
     return {
@@ -145,10 +149,13 @@ def read_pair(config: Configuration) -> GearPair:
     gear = config.section("gear")
     helix = _number("gear.helix_angle_deg", gear["helix_angle_deg"])
     pinion, wheel = (
-        _read_gear(name, gear, hand * helix) for name, hand in zip(SIDES, (1.0, -1.0), strict=True)
+        _read_gear(name, gear, hand * helix)
+        for name, hand in zip(SIDES, (1.0, -1.0), strict=True)
     )
     return GearPair(
-        pinion=pinion, wheel=wheel, backlash=_number("gear.backlash_um", gear["backlash_um"])
+        pinion=pinion,
+        wheel=wheel,
+        backlash=_number("gear.backlash_um", gear["backlash_um"]),
     )
 
 
@@ -156,7 +163,9 @@ def read_material(config: Configuration) -> Material:
     """The material of a configuration."""
     material = read(Material, config.section("material"), "material")
     if material.poisson_ratio >= 0.5:
-        raise ConfigError(f"material.poisson_ratio = {material.poisson_ratio:g} must be below 0.5")
+        raise ConfigError(
+            f"material.poisson_ratio = {material.poisson_ratio:g} must be below 0.5"
+        )
     return material
 
 
@@ -171,14 +180,22 @@ def read_modification(config: Configuration) -> PairModification:
     for name in SIDES:
         try:
             sides[name] = read(
-                FlankModification, config.section("modification", name), f"modification.{name}"
+                FlankModification,
+                config.section("modification", name),
+                f"modification.{name}",
             )
         except ConfigError as error:
             text = str(error)
             raise ConfigError(
-                text if text.startswith("modification") else f"modification.{name}.{text}"
+                text
+                if text.startswith("modification")
+                else f"modification.{name}.{text}"
             ) from None
-    own = {key: value for key, value in config.section("modification").items() if key not in SIDES}
+    own = {
+        key: value
+        for key, value in config.section("modification").items()
+        if key not in SIDES
+    }
     return read(PairModification, own, "modification", **sides)
 
 
@@ -203,7 +220,9 @@ def read_system(config: Configuration) -> GearPairMachine:
             "as operating says, leave excitation out"
         )
     if kind not in SYSTEMS:
-        raise ConfigError(f"system.kind = {kind!r}; allowed: {', '.join((*SYSTEMS, LINE))}")
+        raise ConfigError(
+            f"system.kind = {kind!r}; allowed: {', '.join((*SYSTEMS, LINE))}"
+        )
     return SYSTEMS[kind](config)
 
 
@@ -239,7 +258,9 @@ def _read_body(gear: Gear, values: Section, material: Material) -> Body:
     given = [values["mass_kg"], values["inertia_kg_m2"]]
     mass, inertia = (
         fallback if value is None else _number(f"gear.{gear.name}.{key}", value)
-        for value, fallback, key in zip(given, derived, ("mass_kg", "inertia_kg_m2"), strict=True)
+        for value, fallback, key in zip(
+            given, derived, ("mass_kg", "inertia_kg_m2"), strict=True
+        )
     )
     for key, value in (("mass_kg", mass), ("inertia_kg_m2", inertia)):
         if not value > 0.0:
@@ -247,7 +268,9 @@ def _read_body(gear: Gear, values: Section, material: Material) -> Body:
                 f"gear.{gear.name}.{key} = {value:g} must be positive, or null to derive it"
             )
     given_support = {
-        key: value for key, value in values.section("support").items() if value is not None
+        key: value
+        for key, value in values.section("support").items()
+        if value is not None
     }
     support = read(Support, given_support, f"gear.{gear.name}.support")
     return Body(mass=mass, inertia=inertia, support=support)
@@ -255,7 +278,9 @@ def _read_body(gear: Gear, values: Section, material: Material) -> Body:
 
 def _read_rotor(place: str, values: Any) -> Rotor | None:
     """A motor or a load; None where it is null, or its inertia."""
-    if values is None or (isinstance(values, Mapping) and values.get("inertia_kg_m2", 0.0) is None):
+    if values is None or (
+        isinstance(values, Mapping) and values.get("inertia_kg_m2", 0.0) is None
+    ):
         return None
     try:
         return read(Rotor, values, "rotor")

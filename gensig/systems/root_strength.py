@@ -111,7 +111,9 @@ class RootStrength:
             raise ConfigError(
                 f"a root stress of {stress * 1e-6:g} MPa cannot be asked for; give a positive one"
             )
-        return stress / (self.factors[self.decisive].stress_per_force * self.strength.load_factor)
+        return stress / (
+            self.factors[self.decisive].stress_per_force * self.strength.load_factor
+        )
 
     def under(self, stress: float) -> RootStrength:
         """The same pair under the torque that gives the decisive gear this sigma_F in Pa."""
@@ -129,7 +131,8 @@ class RootStrength:
         def excess(force: float) -> float:
             loaded = replace(self, flanks=replace(self.flanks, torque=force * radius))
             return (
-                max(float(values.max()) for values in loaded.history().stress.values()) / stress
+                max(float(values.max()) for values in loaded.history().stress.values())
+                / stress
                 - 1.0
             )
 
@@ -195,7 +198,9 @@ class RootStrength:
             stress={name: values[order][kept] for name, values in stress.items()},
         )
 
-    def _whole(self, phases: Array, force: float) -> tuple[Array, Array, dict[str, Array]]:
+    def _whole(
+        self, phases: Array, force: float
+    ) -> tuple[Array, Array, dict[str, Array]]:
         """Pairs of a spur pair as wholes.
 
         Roll, share of the load and stress by gear, (point,) each.
@@ -203,19 +208,29 @@ class RootStrength:
         mesh = self.flanks.mesh
         flanks = self.flanks
         table = loaded_pair_table(
-            self.pair, flanks.material, mesh, force=force, modification=flanks.modification
+            self.pair,
+            flanks.material,
+            mesh,
+            force=force,
+            modification=flanks.modification,
         )
         states = pair_states(table, phases)
         load = static_mesh(table, states, force).load
         stress = {
             name: pair_root_stress(
-                self.pair, gear, states.position, load, allow_extrapolation=mesh.allow_extrapolation
+                self.pair,
+                gear,
+                states.position,
+                load,
+                allow_extrapolation=mesh.allow_extrapolation,
             ).ravel()
             for name, gear in self.pair.gears.items()
         }
         return states.position.ravel(), load.ravel() / force, stress
 
-    def _sliced(self, phases: Array, force: float) -> tuple[Array, Array, dict[str, Array]]:
+    def _sliced(
+        self, phases: Array, force: float
+    ) -> tuple[Array, Array, dict[str, Array]]:
         """The same slice by slice, the largest of the face.
 
         Slices bend each other as in the mesh.
@@ -238,7 +253,9 @@ class RootStrength:
             tangential = contact.line_load * math.cos(gear.transverse_pressure_angle)
             common = pair.face_width / root_width(pair, gear)
             own = tangential * common * factor / gear.normal_module
-            stress[name] = spread_along_face(own, structure, coupling).max(axis=2).ravel()
+            stress[name] = (
+                spread_along_face(own, structure, coupling).max(axis=2).ravel()
+            )
         share = (contact.line_load * mesh.slice_width).sum(axis=2)
         return roll.ravel(), (share / share.sum(axis=1, keepdims=True)).ravel(), stress
 

@@ -58,18 +58,24 @@ def shaft_signals(
     n_samples = round(system.operating.duration * sensing.sampling_rate)
     if record is None or not names:
         return {name: np.full(n_samples, np.nan).astype(_type(name)) for name in names}
-    mark = draw_mark(gearbox_rng)  # also where it is not asked for: what is stored moves nothing
+    mark = draw_mark(
+        gearbox_rng
+    )  # also where it is not asked for: what is stored moves nothing
     found = {"shaft_angle": record.shaft_angle}
     if "tacho" in names:
         angle = gear_angle(system, sensing.tacho.shaft, start, record.shaft_angle)
-        found["tacho"] = pulse_train(sensing.tacho, mark, angle, sensing.sampling_rate, record_rng)
+        found["tacho"] = pulse_train(
+            sensing.tacho, mark, angle, sensing.sampling_rate, record_rng
+        )
     if "encoder_angle" in names:
         angle = gear_angle(system, sensing.encoder.shaft, start, record.shaft_angle)
         disc = draw_disc(gearbox_rng, sensing.encoder)
         before = (
             2.0 * math.pi * math.floor((angle[0] - disc.index) / (2.0 * math.pi))
         )  # turns that nobody counted
-        found["encoder_angle"] = disc.read(angle - before, quantised=sensing.encoder.quantised)
+        found["encoder_angle"] = disc.read(
+            angle - before, quantised=sensing.encoder.quantised
+        )
     return {name: found[name].astype(_type(name)) for name in names}
 
 

@@ -110,11 +110,18 @@ class SlicedPair:
         """
         if not self.modification.is_any and self.growth is None:
             return None
-        position, place = node_positions(self.pair, self.mesh), slice_places(self.pair, self.slices)
+        position, place = (
+            node_positions(self.pair, self.mesh),
+            slice_places(self.pair, self.slices),
+        )
         back = np.zeros((len(place), len(position)))
         if self.modification.is_any:
             back = back + self.modification.deviation(self.pair, position, place)
-        return back if self.growth is None else back + self.growth.deviation(self.pair, position)
+        return (
+            back
+            if self.growth is None
+            else back + self.growth.deviation(self.pair, position)
+        )
 
     def mesh_table(self, faults: Sequence[Fault] = ()) -> SlicedTable:
         """What the dynamics asks of the mesh with the given faults."""
@@ -145,7 +152,9 @@ class SlicedPair:
         roll = self.phases(n_phases, first_period=first_period, n_periods=n_periods)
         contact = loaded_contact(mesh, roll, self.mesh_force, meeting)
         load = (contact.line_load * mesh.slice_width).sum(axis=2)
-        on_path = (contact.position >= 0.0) & (contact.position <= self.pair.path_of_contact)
+        on_path = (contact.position >= 0.0) & (
+            contact.position <= self.pair.path_of_contact
+        )
         spectrum = 2.0 * np.abs(np.fft.rfft(contact.approach)) / len(roll)
         return TransmissionError(
             contact=contact,
@@ -167,7 +176,9 @@ class SlicedPair:
         Positions s of the first slice in m, and N/m.
         """
         mesh = self.sliced_mesh()
-        position = np.linspace(0.0, self.pair.path_of_contact + float(mesh.lag.max()), n_positions)
+        position = np.linspace(
+            0.0, self.pair.path_of_contact + float(mesh.lag.max()), n_positions
+        )
         return position, single_pair_stiffness(mesh, position, self.mesh_force)
 
     def faulty_pair(self, faults: Sequence[Fault], position: Array) -> Array:
@@ -175,13 +186,17 @@ class SlicedPair:
         closes, (phase,) N/m.
         """
         mesh, sound = self.sliced_mesh(faults), self.sliced_mesh()
-        within = float(loaded_contact(sound, self.phases(), self.mesh_force).approach.mean())
+        within = float(
+            loaded_contact(sound, self.phases(), self.mesh_force).approach.mean()
+        )
         pinion, wheel = (
             int(side.kind[side.kind > 0][0]) if side.kind.any() else 0
             for side in (mesh.pinion, mesh.wheel)
         )
         closed = within - mesh.shared_compliance * self.mesh_force
-        return single_pair_stiffness(mesh, position, self.mesh_force, (pinion, wheel), closed)
+        return single_pair_stiffness(
+            mesh, position, self.mesh_force, (pinion, wheel), closed
+        )
 
 
 def _seen(mesh: SlicedMesh) -> tuple[int, int, Meeting, tuple[int, int] | None]:

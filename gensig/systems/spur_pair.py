@@ -15,11 +15,20 @@ from gensig.faults.base import Fault, faulty_teeth
 from gensig.geometry.contact import GearPair
 from gensig.material import Material
 from gensig.mesh.load_distribution import loaded_pair_table
-from gensig.mesh.modification import PLAIN, FlankModification, PairModification, sound_teeth
+from gensig.mesh.modification import (
+    PLAIN,
+    FlankModification,
+    PairModification,
+    sound_teeth,
+)
 from gensig.mesh.options import MeshOptions
 from gensig.mesh.pair_table import N_PAIRS, PairTable
 from gensig.systems.pair_machine import GearPairMachine
-from gensig.systems.stiffness_curves import StiffnessCurves, single_pair, stiffness_curves
+from gensig.systems.stiffness_curves import (
+    StiffnessCurves,
+    single_pair,
+    stiffness_curves,
+)
 
 
 @final
@@ -46,17 +55,29 @@ class SpurPair(GearPairMachine):
     def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable:
         """Compliance and gap tables with the given faults."""
         return _mesh_table(
-            self.pair, self.material, self.mesh, tuple(faults), self.mesh_force, self.modification
+            self.pair,
+            self.material,
+            self.mesh,
+            tuple(faults),
+            self.mesh_force,
+            self.modification,
         )
 
     def stiffness_curves(
-        self, faults: Sequence[Fault] = (), *, n_positions: int = 201, points_per_tooth: int = 100
+        self,
+        faults: Sequence[Fault] = (),
+        *,
+        n_positions: int = 201,
+        points_per_tooth: int = 100,
     ) -> StiffnessCurves:
         """Single-pair and mesh stiffness with their parts.
 
         Contact ratios below 1 are allowed, nothing need turn.
         """
-        table, whole = self.mesh_table(faults), sound_teeth(self.pair, self.modification)
+        table, whole = (
+            self.mesh_table(faults),
+            sound_teeth(self.pair, self.modification),
+        )
         return stiffness_curves(
             self,
             table,
@@ -98,7 +119,8 @@ class SpurPair(GearPairMachine):
         pinion, wheel = (
             FlankModification(
                 tip_relief=float(back),
-                tip_relief_height=gear.tip_radius - float(np.hypot(gear.base_radius, curvature)),
+                tip_relief_height=gear.tip_radius
+                - float(np.hypot(gear.base_radius, curvature)),
             )
             for (gear, curvature), back in zip(starts, depth, strict=True)
         )
@@ -115,4 +137,6 @@ def _mesh_table(
     modification: PairModification,
 ) -> PairTable:
     teeth = faulty_teeth(pair, faults, sound_teeth(pair, modification))
-    return loaded_pair_table(pair, material, mesh, teeth, force=force, modification=modification)
+    return loaded_pair_table(
+        pair, material, mesh, teeth, force=force, modification=modification
+    )

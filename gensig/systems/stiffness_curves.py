@@ -18,7 +18,12 @@ from gensig.geometry.tooth import Tooth
 from gensig.material import Material
 from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.options import MeshOptions
-from gensig.mesh.pair_table import PairTable, flank_sides, slice_bending, structural_terms
+from gensig.mesh.pair_table import (
+    PairTable,
+    flank_sides,
+    slice_bending,
+    structural_terms,
+)
 
 Array = NDArray[np.float64]
 
@@ -102,9 +107,15 @@ def stiffness_curves(
     """
     pair = machine.pair
     position = np.linspace(0.0, pair.path_of_contact, n_positions)
-    sound, faulty = (single_pair(machine, position, some, whole) for some in ((), faults))
+    sound, faulty = (
+        single_pair(machine, position, some, whole) for some in ((), faults)
+    )
     gear = pair.gears[faults[0].gear] if faults else pair.pinion
-    roll = pair.base_pitch * (np.arange(gear.n_teeth * points_per_tooth) + 0.5) / points_per_tooth
+    roll = (
+        pair.base_pitch
+        * (np.arange(gear.n_teeth * points_per_tooth) + 0.5)
+        / points_per_tooth
+    )
     static = static_mesh(table, pair_states(table, roll), machine.mesh_force)
     return StiffnessCurves(
         contact_position=position / pair.base_pitch,
@@ -114,12 +125,16 @@ def stiffness_curves(
         compliance=faulty.terms,
         roll_angle=roll / gear.base_radius,
         mesh_stiffness=static.stiffness,
-        load_share=static.load / np.maximum(static.load.sum(axis=1, keepdims=True), 1e-30),
+        load_share=static.load
+        / np.maximum(static.load.sum(axis=1, keepdims=True), 1e-30),
     )
 
 
 def single_pair(
-    machine: LoadedMesh, position: Array, faults: Sequence[Fault], whole: Mapping[str, Tooth]
+    machine: LoadedMesh,
+    position: Array,
+    faults: Sequence[Fault],
+    whole: Mapping[str, Tooth],
 ) -> SinglePair:
     """The pair of each gear's first faulty tooth, sound where there is none, under the whole load.
 
@@ -129,7 +144,12 @@ def single_pair(
     odd = faulty_teeth(machine.pair, faults, whole)
     structure = machine.material.in_plane(machine.mesh.elasticity)
     sides = flank_sides(
-        machine.pair, position, machine.material, machine.mesh, machine.mesh_force, pinion_share=0.5
+        machine.pair,
+        position,
+        machine.material,
+        machine.mesh,
+        machine.mesh_force,
+        pinion_share=0.5,
     )
     bending = slice_bending(machine.pair, position, machine.material, machine.mesh)
     terms, gap, touches = {}, np.zeros_like(position), np.ones_like(position)

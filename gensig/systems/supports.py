@@ -96,7 +96,11 @@ def put_on_bearings(
         )
     across, along = support_stiffness(holding.bearing, holding.shaft, material, force)
     held = replace(
-        body.support, stiffness_x=across, stiffness_y=along, damping_x=0.0, damping_y=0.0
+        body.support,
+        stiffness_x=across,
+        stiffness_y=along,
+        damping_x=0.0,
+        damping_y=0.0,
     )
     return replace(body, support=held)
 
@@ -129,10 +133,17 @@ def held_axially(body: Body, gear: Gear, values: Section) -> Body:
             raise ConfigError(
                 f"gear.{gear.name}.support.stiffness_tilt_nm_per_rad = null is derived from shaft.span_mm; give either"
             )
-        derived["stiffness_tilt"] = 0.25 * radial * to_si("span_mm", shaft["span_mm"]) ** 2
-    springs = {"stiffness_z": support.stiffness_z, "stiffness_tilt": support.stiffness_tilt}
+        derived["stiffness_tilt"] = (
+            0.25 * radial * to_si("span_mm", shaft["span_mm"]) ** 2
+        )
+    springs = {
+        "stiffness_z": support.stiffness_z,
+        "stiffness_tilt": support.stiffness_tilt,
+    }
     springs |= {
-        name: value for name, value in derived.items() if given.get(KEYS_OF_AXIS[name]) is None
+        name: value
+        for name, value in derived.items()
+        if given.get(KEYS_OF_AXIS[name]) is None
     }
     dampers = {
         name: getattr(support, name)
@@ -141,7 +152,9 @@ def held_axially(body: Body, gear: Gear, values: Section) -> Body:
         for name in ("damping_z", "damping_tilt")
     }
     tilting = 0.5 * body.inertia + body.mass * gear.face_width**2 / 12.0
-    return replace(body, support=replace(support, **springs, **dampers), tilt_inertia=tilting)
+    return replace(
+        body, support=replace(support, **springs, **dampers), tilt_inertia=tilting
+    )
 
 
 def in_gearbox(body: Body, gearbox: Gearbox, axes: slice, quality: Quality) -> Body:
@@ -157,7 +170,10 @@ def in_gearbox(body: Body, gearbox: Gearbox, axes: slice, quality: Quality) -> B
         gearbox.stiffness_factor[axes],
         gearbox.damping_factor[axes],
     )
-    stiffer, more_damped = float(np.sqrt(stiffness.prod())), float(np.sqrt(damping.prod()))
+    stiffer, more_damped = (
+        float(np.sqrt(stiffness.prod())),
+        float(np.sqrt(damping.prod())),
+    )
     scattered = replace(
         support,
         stiffness_x=support.stiffness_x * float(stiffness[0]),
@@ -172,7 +188,9 @@ def in_gearbox(body: Body, gearbox: Gearbox, axes: slice, quality: Quality) -> B
     nominal = quality.support_damping_ratio
     if nominal is not None:
         ratio = (
-            np.full(2, nominal) if gearbox.damping_ratio is None else gearbox.damping_ratio[axes]
+            np.full(2, nominal)
+            if gearbox.damping_ratio is None
+            else gearbox.damping_ratio[axes]
         )
         scattered = scattered.damped(body, float(ratio[0]), float(ratio[1]))
     return replace(body, support=scattered)

@@ -76,7 +76,9 @@ def wear_fault(case: WearCase, depth: Array) -> dict[str, Any]:
     return {"kind": "compound", "parts": parts, "vary": {}}
 
 
-def flank_profile(case: WearCase, side: int, depth: Array, n_profile: int = N_PROFILE) -> Array:
+def flank_profile(
+    case: WearCase, side: int, depth: Array, n_profile: int = N_PROFILE
+) -> Array:
     """Depth at curvature radii evenly spaced from the lower end of the involute to the tip,
     (profile,) m.
 

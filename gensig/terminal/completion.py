@@ -64,17 +64,27 @@ def _offer(action: argparse.Action, verb: str, primary: str) -> None:
             "generate" if verb == "detectability" else primary,
         )
     elif action.dest == "what":
-        action.completer = lambda prefix, parsed_args, **_: what_candidates(prefix, parsed_args)  # type: ignore[attr-defined]
+        action.completer = lambda prefix, parsed_args, **_: what_candidates(
+            prefix, parsed_args
+        )  # type: ignore[attr-defined]
 
 
-def candidates(prefix: str, typed: Sequence[str], arguments: Any, primary: str) -> dict[str, str]:
+def candidates(
+    prefix: str, typed: Sequence[str], arguments: Any, primary: str
+) -> dict[str, str]:
     """Groups, their options, keys of the chosen options, each with its line.
 
     Paths for the keys that take one.
     """
     from argcomplete.completers import FilesCompleter
 
-    from gensig.options.files import groups, option_keys, options, section_keys, sections
+    from gensig.options.files import (
+        groups,
+        option_keys,
+        options,
+        section_keys,
+        sections,
+    )
 
     folder = getattr(arguments, "config_dir", None)
     offered = [group for group in groups(folder) if group.primary == primary]
@@ -82,7 +92,9 @@ def candidates(prefix: str, typed: Sequence[str], arguments: Any, primary: str) 
     if equals and (name in ("data", "out") or name.endswith("_csv")):
         return {f"{name}={path}": "" for path in FilesCompleter()(value)}
     if equals:
-        known = options(name, folder) if name in [group.name for group in offered] else []
+        known = (
+            options(name, folder) if name in [group.name for group in offered] else []
+        )
         return {f"{name}={one.name}": one.about for one in known}
     found = {f"{group.name}=": group.about for group in offered}
     chosen = dict(word.partition("=")[::2] for word in typed)
@@ -94,7 +106,8 @@ def candidates(prefix: str, typed: Sequence[str], arguments: Any, primary: str) 
             one.name for one in options(group.name, folder)
         ]:
             found |= {
-                f"{key.name}=": key.comment for key in option_keys(group.name, str(option), folder)
+                f"{key.name}=": key.comment
+                for key in option_keys(group.name, str(option), folder)
             }
     return found
 

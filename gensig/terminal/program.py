@@ -50,7 +50,10 @@ class Parser(argparse.ArgumentParser):
         for word in sys.argv[1:] if args is None else args:
             if word == "--":
                 break
-            if word.startswith("--") and word.partition("=")[0] not in self._option_string_actions:
+            if (
+                word.startswith("--")
+                and word.partition("=")[0] not in self._option_string_actions
+            ):
                 self.error(f"unrecognized arguments: {word}")
         return super().parse_known_args(args, namespace)
 
@@ -62,10 +65,14 @@ class Parser(argparse.ArgumentParser):
         """The complaint with what was given, what is allowed and what to do."""
         if found := re.match(r"unrecognized arguments: (.*)", message):
             return self._unknown(found.group(1).split())
-        if found := re.match(r"argument (\S+): invalid (float|int) value: '(.*)'", message):
+        if found := re.match(
+            r"argument (\S+): invalid (float|int) value: '(.*)'", message
+        ):
             flag, kind, given = found.groups()
             text = f"{flag} {given} is not a {'whole ' if kind == 'int' else ''}number"
-            return f"{text}; key=value words stand before {flag}" if "=" in given else text
+            return (
+                f"{text}; key=value words stand before {flag}" if "=" in given else text
+            )
         if found := re.match(
             r"argument (\S+): invalid choice: '(.*?)' \(choose from (.*)\)", message
         ):
@@ -91,7 +98,9 @@ class Parser(argparse.ArgumentParser):
             if flag.startswith("--")
         ]
         if "=" in word and not nearest.near(word.partition("=")[0], flags):
-            return f"no flag '{word}'; groups and keys have no dashes: {word.lstrip('-')}"
+            return (
+                f"no flag '{word}'; groups and keys have no dashes: {word.lstrip('-')}"
+            )
         return f"no flag '{word}'; {nearest.hint(word.partition('=')[0], flags)}"
 
     def _wanted(self, name: str) -> str:
@@ -114,18 +123,27 @@ class Parser(argparse.ArgumentParser):
 
 def exit_text(exits: Mapping[int, str]) -> str:
     """The exit statuses of a verb, a line each, for its help."""
-    lines = [f"  {status:<4} {meaning}" for status, meaning in sorted({**EXITS, **exits}.items())]
+    lines = [
+        f"  {status:<4} {meaning}"
+        for status, meaning in sorted({**EXITS, **exits}.items())
+    ]
     return "\n".join(["exit status:", *lines])
 
 
 def refuse_verb(
-    program: str, word: str, verbs: Mapping[str, object], other: str, other_verbs: tuple[str, ...]
+    program: str,
+    word: str,
+    verbs: Mapping[str, object],
+    other: str,
+    other_verbs: tuple[str, ...],
 ) -> None:
     """Raise for a first word that is no verb, with the nearest ones or the command that has it."""
     if word in other_verbs:
         raise ConfigError(f"'{word}' is a command of {other}; type {other} {word}")
     if word.startswith("-") or "=" in word:
-        raise ConfigError(f"'{word}' stands behind a command; there is {', '.join(verbs)}")
+        raise ConfigError(
+            f"'{word}' stands behind a command; there is {', '.join(verbs)}"
+        )
     raise ConfigError(f"no command '{word}'; {nearest.hint(word, verbs)}")
 
 
@@ -140,9 +158,7 @@ def guarded(program: str, run: Callable[[], int], *, interrupted: str) -> int:
         return status
     except GensigError as error:
         return complain(program, str(error))
-    except (
-        BrokenPipeError
-    ):  # the reader of a pipe has gone, as head does: nothing to say, and nowhere to say it
+    except BrokenPipeError:  # the reader of a pipe has gone, as head does: nothing to say, and nowhere to say it
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 0
     except OSError as error:

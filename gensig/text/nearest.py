@@ -21,12 +21,16 @@ def hint(name: str, known: Iterable[str], *, n: int = 3, listed: int = 24) -> st
         return f"did you mean {' or '.join(repr(one) for one in close)}?"
     if not names:
         return "there is none"
-    perhaps = "".join(f"did you mean '{one}'? " for one in near(name, names, n=1, cutoff=FAR))
+    perhaps = "".join(
+        f"did you mean '{one}'? " for one in near(name, names, n=1, cutoff=FAR)
+    )
     more = f" and {len(names) - listed} more" if len(names) > listed else ""
     return f"{perhaps}there is {', '.join(names[:listed])}{more}"
 
 
-def near(name: str, names: Iterable[str], *, n: int = 3, cutoff: float = NEAR) -> list[str]:
+def near(
+    name: str, names: Iterable[str], *, n: int = 3, cutoff: float = NEAR
+) -> list[str]:
     """At most ``n`` names that are spelled much alike, or that ``name`` begins.
 
     Case does not count.
@@ -35,6 +39,8 @@ def near(name: str, names: Iterable[str], *, n: int = 3, cutoff: float = NEAR) -
     wanted = str(name).lower()
     found = difflib.get_close_matches(wanted, by_lower, n=n, cutoff=cutoff)
     begun = [
-        one for one in by_lower if len(wanted) >= 3 and one.startswith(wanted) and one not in found
+        one
+        for one in by_lower
+        if len(wanted) >= 3 and one.startswith(wanted) and one not in found
     ]
     return [by_lower[one] for one in [*found, *begun][:n]]

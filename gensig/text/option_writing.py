@@ -24,17 +24,24 @@ def is_option_name(name: str) -> bool:
 
 
 def option_lines(
-    values: Mapping[str, Any], remarks: Mapping[str, str], above: str = "", indent: str = ""
+    values: Mapping[str, Any],
+    remarks: Mapping[str, str],
+    above: str = "",
+    indent: str = "",
 ) -> list[str]:
     """Nested values as lines of YAML; ``remarks`` are by dotted name and stand behind the value."""
     lines = []
     for key, value in values.items():
         place = f"{above}{key}"
         if isinstance(value, Mapping):
-            lines += [f"{indent}{key}:", *option_lines(value, remarks, f"{place}.", indent + "  ")]
+            lines += [
+                f"{indent}{key}:",
+                *option_lines(value, remarks, f"{place}.", indent + "  "),
+            ]
         else:
             remark = remarks.get(place)
             lines.append(
-                f"{indent}{key}: {json.dumps(value)}" + (f"   # {remark}" if remark else "")
+                f"{indent}{key}: {json.dumps(value)}"
+                + (f"   # {remark}" if remark else "")
             )
     return lines

@@ -44,7 +44,9 @@ class Card:
 
     def __post_init__(self) -> None:
         if self.mark not in MARKS:
-            raise ValueError(f"mark must be one of {', '.join(MARKS)}, not {self.mark!r}")
+            raise ValueError(
+                f"mark must be one of {', '.join(MARKS)}, not {self.mark!r}"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,7 +113,9 @@ class Section:
     folded: bool = False
 
 
-def write_page(path: Path, *, title: str, lead: Sequence[str], sections: Sequence[Section]) -> None:
+def write_page(
+    path: Path, *, title: str, lead: Sequence[str], sections: Sequence[Section]
+) -> None:
     """Write the page.
 
     The figures lie beside it and are copied into it, so that it can be sent alone.
@@ -123,7 +127,12 @@ def write_page(path: Path, *, title: str, lead: Sequence[str], sections: Sequenc
         ).decode("ascii")
 
     text = _render(
-        title=title, lead=lead, sections=sections, embedded=embedded, scripts=(), data=""
+        title=title,
+        lead=lead,
+        sections=sections,
+        embedded=embedded,
+        scripts=(),
+        data="",
     )
     path.write_text(text, encoding="utf-8")
 
@@ -156,7 +165,12 @@ def interactive_page(
         .replace(">", "\\u003e")
     )
     return _render(
-        title=title, lead=lead, sections=sections, embedded=None, scripts=scripts, data=content
+        title=title,
+        lead=lead,
+        sections=sections,
+        embedded=None,
+        scripts=scripts,
+        data=content,
     )
 
 
@@ -171,10 +185,13 @@ def _render(*, scripts: Sequence[str], **content: Any) -> str:
         trim_blocks=True,
     )
     hashes = [
-        base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii") for text in scripts
+        base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")
+        for text in scripts
     ]
     policy = (
-        "script-src " + " ".join(f"'sha256-{text}'" for text in hashes) + "; " if scripts else ""
+        "script-src " + " ".join(f"'sha256-{text}'" for text in hashes) + "; "
+        if scripts
+        else ""
     )
     content["data"] = Markup(content["data"])
     template = environment.get_template("page.html")

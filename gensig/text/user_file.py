@@ -32,12 +32,16 @@ def read_table(key: str, file: str, *, least_rows: int) -> tuple[list[str], Arra
     where = f"{key} = {file}"
     try:
         if path.stat().st_size > MOST_BYTES:
-            raise ConfigError(f"{where} is larger than {MOST_BYTES // 1_000_000} MB; cut it")
+            raise ConfigError(
+                f"{where} is larger than {MOST_BYTES // 1_000_000} MB; cut it"
+            )
         with path.open(newline="", encoding="utf-8-sig") as stream:
             names = _header(where, stream)
             values = np.loadtxt(stream, delimiter=",", ndmin=2, dtype=np.float64)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
+        reason = (
+            error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
+        )
         raise ConfigError(f"{where} cannot be read: {reason}") from None
     except ValueError as error:
         raise ConfigError(
@@ -54,7 +58,9 @@ def read_table(key: str, file: str, *, least_rows: int) -> tuple[list[str], Arra
     bad = np.argwhere(~np.isfinite(values))
     if len(bad):
         row, column = bad[0]
-        raise ConfigError(f"{where}: row {row + 2}, column {names[column]} is no finite number")
+        raise ConfigError(
+            f"{where}: row {row + 2}, column {names[column]} is no finite number"
+        )
     return names, np.ascontiguousarray(values.T)
 
 

@@ -73,7 +73,8 @@ class Check:
         indicator).
         """
         return np.asarray(
-            (self.measured >= self.twin.min(axis=0)) & (self.measured <= self.twin.max(axis=0))
+            (self.measured >= self.twin.min(axis=0))
+            & (self.measured <= self.twin.max(axis=0))
         )
 
 
@@ -83,7 +84,11 @@ def held_out_duration(held_out: Recording, fitted: Recording) -> float:
 
 
 def check(
-    config: Configuration, held_out: Recording, motion: Motion, fitted: Recording, teeth: Teeth
+    config: Configuration,
+    held_out: Recording,
+    motion: Motion,
+    fitted: Recording,
+    teeth: Teeth,
 ) -> Check:
     """Simulate healthy records of the twin and compare.
 
@@ -102,13 +107,17 @@ def check(
     cycles = motion.cycles[:n_samples]
     signals, angles = _healthy_records(config)
     lower, upper = third_octave_bands(n_samples, rate)
-    measured_db, fitted_db = (_decibel(third_octave_power(stretch, rate)) for stretch in stretches)
+    measured_db, fitted_db = (
+        _decibel(third_octave_power(stretch, rate)) for stretch in stretches
+    )
     return Check(
         sensors=held_out.sensors,
         band=np.sqrt(lower * upper),
         measured_db=measured_db,
         fitted_db=fitted_db,
-        twin_db=np.stack([_decibel(third_octave_power(signal, rate)) for signal in signals]),
+        twin_db=np.stack(
+            [_decibel(third_octave_power(signal, rate)) for signal in signals]
+        ),
         measured=_indicators(stretches[0], cycles, rate, teeth),
         twin=np.stack(
             [
@@ -128,11 +137,17 @@ def _healthy_records(config: Configuration) -> tuple[Sequence[Array], Sequence[A
         "n_records": N_RECORDS, "n_units": N_RECORDS, "n_gearboxes": 1, "conditions_per_unit": None, "n_repeats": 1,
         "classes": ["healthy"], "design": "latin_hypercube", "vary": {}, "sham": False,
     }  # fmt: skip
-    unused = dict.fromkeys(("store_mesh_state", "store_detectability", "store_healthy_twin"), False)
-    whole = config.with_entries(plan=plan, classes={"healthy": {"kind": "healthy", "vary": {}}})
+    unused = dict.fromkeys(
+        ("store_mesh_state", "store_detectability", "store_healthy_twin"), False
+    )
+    whole = config.with_entries(
+        plan=plan, classes={"healthy": {"kind": "healthy", "vary": {}}}
+    )
     whole = whole.with_keys("dataset", **unused, store_shaft_angle=True)
     drawn = make_plan(whole)
-    records = simulate_records(whole, [drawn.record(place) for place in range(N_RECORDS)])
+    records = simulate_records(
+        whole, [drawn.record(place) for place in range(N_RECORDS)]
+    )
     failed = [
         record.values["status_reason"]
         for record in records
@@ -149,9 +164,17 @@ def _indicators(signal: Array, cycles: Array, rate: float, teeth: Teeth) -> Arra
     centred = signal - signal.mean(axis=1, keepdims=True)
     ratios = sideband_ratios(find_lines(centred, cycles, rate, teeth), teeth)
     middle = np.array(
-        [np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else np.nan for row in ratios]
+        [
+            np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else np.nan
+            for row in ratios
+        ]
     )
-    columns = [20.0 * np.log10(rms(centred)), kurtosis(centred), crest_factor(centred), middle]
+    columns = [
+        20.0 * np.log10(rms(centred)),
+        kurtosis(centred),
+        crest_factor(centred),
+        middle,
+    ]
     return np.stack(columns, axis=1)
 
 

@@ -31,23 +31,27 @@ from gensig.units import from_si, to_si
 
 Array = NDArray[np.float64]
 
-SOURCE_CHANNEL = (
-    "pinion_y"  # the driving gear's bearing along the line of action, where the path begins
+SOURCE_CHANNEL = "pinion_y"  # the driving gear's bearing along the line of action, where the path begins
+INTERNAL_RATE = (
+    256_000.0  # Hz; least rate of the integration, that of the default configuration
 )
-INTERNAL_RATE = 256_000.0  # Hz; least rate of the integration, that of the default configuration
 SIMULATED_TURNS = (
     12,
     32,
 )  # of the slower gear, in each simulated record: as many as measured, within these
 SEED = 0
 LOWEST_NOISE = 20.0  # Hz
-THIRD = 1.0 / 6.0  # octaves to either side over which a density is averaged, and at least some bins
+THIRD = (
+    1.0 / 6.0
+)  # octaves to either side over which a density is averaged, and at least some bins
 FINE = (
     1.0 / 24.0
 )  # where lines are counted too: those of shafts stand far above what is beside them
 LEAST_FREE, LEAST_ALL = 20, 2
 CLEAR = 2.0  # a drift is written where the speed scatters this many times as much as pitch errors make it
-LEAST_SHARE = 0.1  # of the floor, left as noise where the model alone explains the power
+LEAST_SHARE = (
+    0.1  # of the floor, left as noise where the model alone explains the power
+)
 SURE = 3.0  # standard deviations above the floor from which the power of lines counts
 
 
@@ -109,12 +113,18 @@ def fit(
     """
     teeth = Teeth(driving=system.pair.pinion.n_teeth, driven=system.pair.wheel.n_teeth)
     motion = find_motion(recording, teeth, speed_rpm)
-    measured = find_lines(recording.acceleration, motion.cycles, recording.sampling_rate, teeth)
+    measured = find_lines(
+        recording.acceleration, motion.cycles, recording.sampling_rate, teeth
+    )
     model = fitting_system(system, recording, motion.mesh_frequency, teeth)
-    tell(f"speed {60.0 * motion.mesh_frequency / teeth.driving:.3f} r/min; simulating grades")
+    tell(
+        f"speed {60.0 * motion.mesh_frequency / teeth.driving:.3f} r/min; simulating grades"
+    )
     graded = simulated_records(model, GRADES, N_SPECIMENS, SEED)
     grade = fit_grade(
-        measured, [[simulated_lines(one, model) for one in row] for row in graded], teeth
+        measured,
+        [[simulated_lines(one, model) for one in row] for row in graded],
+        teeth,
     )
     tell(f"grade {grade.grade:.1f}; simulating that grade")
     (records,) = simulated_records(model, [grade.grade], 2 * N_SPECIMENS, SEED + 1)
@@ -137,11 +147,16 @@ def fit(
 
 
 def _own_scatter(records: Sequence[CleanRecord], model: Machine, teeth: Teeth) -> float:
-    rate, speed_rpm = model.sensing.sampling_rate, from_si("speed_rpm", model.operating.speed)
+    rate, speed_rpm = (
+        model.sensing.sampling_rate,
+        from_si("speed_rpm", model.operating.speed),
+    )
     found = []
     for record in records:
         heard = Recording(
-            sensors=(SOURCE_CHANNEL,), acceleration=record.acceleration, sampling_rate=rate
+            sensors=(SOURCE_CHANNEL,),
+            acceleration=record.acceleration,
+            sampling_rate=rate,
         )
         found.append(find_motion(heard, teeth, speed_rpm).scatter or 0.0)
     return float(np.median(found))
@@ -174,7 +189,9 @@ def fitting_system(
             path=None,
         ),
         solver=replace(
-            solver, oversampling=oversampling(sampling_rate, solver.oversampling), max_error=None
+            solver,
+            oversampling=oversampling(sampling_rate, solver.oversampling),
+            max_error=None,
         ),
     )
 
@@ -195,26 +212,43 @@ def fit_path(
     centers = band_centers(0.5 * measured.mesh_frequency, recording.sampling_rate)
     power = band_sums(measured.synchronous, measured.frequency, centers)
     n_bins = np.maximum(
-        band_sums(measured.is_line[None].astype(float), measured.frequency, centers), 1.0
+        band_sums(measured.is_line[None].astype(float), measured.frequency, centers),
+        1.0,
     )
-    floor = band_sums(np.where(measured.is_line, measured.floor, 0.0), measured.frequency, centers)
-    spread = floor / np.sqrt(n_bins / 2.0)  # two bins of a Hann window are about one of their own
-    model = _mean([band_sums(one.synchronous, one.frequency, centers)[0] for one in simulated])
+    floor = band_sums(
+        np.where(measured.is_line, measured.floor, 0.0), measured.frequency, centers
+    )
+    spread = floor / np.sqrt(
+        n_bins / 2.0
+    )  # two bins of a Hann window are about one of their own
+    model = _mean(
+        [band_sums(one.synchronous, one.frequency, centers)[0] for one in simulated]
+    )
     heard = (power > SURE * spread) & (model > 0.0)
     gain = np.empty_like(power)
-    for sensor, (row, noise, known) in enumerate(zip(power, spread, heard, strict=True)):
+    for sensor, (row, noise, known) in enumerate(
+        zip(power, spread, heard, strict=True)
+    ):
         if not known.any():
             name = recording.sensors[sensor]
-            raise ConfigError(f"{name} hears nothing of the gears; leave it out with --channels")
+            raise ConfigError(
+                f"{name} hears nothing of the gears; leave it out with --channels"
+            )
         squared = row[known] / model[known]
-        filled = np.exp(np.interp(np.log(centers), np.log(centers[known]), np.log(squared)))
+        filled = np.exp(
+            np.interp(np.log(centers), np.log(centers[known]), np.log(squared))
+        )
         most = (np.maximum(row, 0.0) + SURE * noise) / np.maximum(model, 1e-300)
         gain[sensor] = np.sqrt(np.where(known, filled, np.minimum(filled, most)))
     return centers, gain, heard
 
 
 def fit_noise(
-    measured: Lines, simulated: Sequence[Lines], recording: Recording, frequency: Array, gain: Array
+    measured: Lines,
+    simulated: Sequence[Lines],
+    recording: Recording,
+    frequency: Array,
+    gain: Array,
 ) -> tuple[Array, Array, Array]:
     """Density of what does not turn with the gears, and the signal-to-noise ratio.
 
@@ -236,7 +270,9 @@ def fit_noise(
         return _mean_density(one, power * counted, counted, lines, THIRD, LEAST_FREE)
 
     def all_of(one: Lines, power: Array) -> Array:
-        return _mean_density(one, power, np.ones(len(one.frequency)), lines, FINE, LEAST_ALL)
+        return _mean_density(
+            one, power, np.ones(len(one.frequency)), lines, FINE, LEAST_ALL
+        )
 
     def lacking(density: Callable[[Lines, Array], Array]) -> Array:
         explained = _mean(
@@ -263,7 +299,10 @@ def fit_noise(
 def _through(simulated: Lines, frequency: Array, gain: Array) -> Array:
     """Power of simulated lines at the sensors, (sensor, bin)."""
     return np.stack(
-        [gain_at(simulated.frequency, frequency, row) ** 2 * simulated.power[0] for row in gain]
+        [
+            gain_at(simulated.frequency, frequency, row) ** 2 * simulated.power[0]
+            for row in gain
+        ]
     )
 
 
@@ -273,7 +312,9 @@ def gain_at(wanted: Array, frequency: Array, gain: Array) -> Array:
     Straight in the logarithms, held beyond them.
     """
     axis = np.log(np.maximum(wanted, 1e-3))
-    return np.asarray(np.exp(np.interp(axis, np.log(frequency), np.log(np.maximum(gain, 1e-300)))))
+    return np.asarray(
+        np.exp(np.interp(axis, np.log(frequency), np.log(np.maximum(gain, 1e-300))))
+    )
 
 
 def _mean_density(
@@ -283,16 +324,25 @@ def _mean_density(
     line) 1/Hz.
     """
     reach = least * lines.width
-    first = np.searchsorted(lines.frequency, np.minimum(wanted * 2.0**-half, wanted - reach))
-    last = np.searchsorted(lines.frequency, np.maximum(wanted * 2.0**half, wanted + reach))
+    first = np.searchsorted(
+        lines.frequency, np.minimum(wanted * 2.0**-half, wanted - reach)
+    )
+    last = np.searchsorted(
+        lines.frequency, np.maximum(wanted * 2.0**half, wanted + reach)
+    )
 
     def between(row: Array) -> Array:
-        return np.diff(np.concatenate([[0.0], np.cumsum(row)])[np.stack([first, last])], axis=0)[0]
+        return np.diff(
+            np.concatenate([[0.0], np.cumsum(row)])[np.stack([first, last])], axis=0
+        )[0]
 
     n_bins = between(counted)
     known = n_bins > 0
     means = [between(row)[known] / n_bins[known] for row in power]
-    return np.stack([np.interp(wanted, wanted[known], mean) for mean in means]) / lines.width
+    return (
+        np.stack([np.interp(wanted, wanted[known], mean) for mean in means])
+        / lines.width
+    )
 
 
 def _mean(powers: Sequence[Array]) -> Array:
@@ -313,14 +363,22 @@ def minimum_phase(
     folded to positive times.
     """
     n_lines = math.floor(0.5 * sampling_rate / step)
-    n_fft = 2 * 8 * n_lines  # eight lines between those given, so that the cepstrum does not fold
+    n_fft = (
+        2 * 8 * n_lines
+    )  # eight lines between those given, so that the cepstrum does not fold
     logarithm: Array = np.log(
-        gain_at(np.arange(n_fft // 2 + 1) * (0.5 * sampling_rate) / (n_fft // 2), frequency, gain)
+        gain_at(
+            np.arange(n_fft // 2 + 1) * (0.5 * sampling_rate) / (n_fft // 2),
+            frequency,
+            gain,
+        )
     )
     cepstrum: Array = np.fft.irfft(logarithm, n_fft)
     fold = np.zeros(n_fft)
     fold[0] = fold[n_fft // 2] = 1.0
     fold[1 : n_fft // 2] = 2.0
     response = np.exp(np.fft.rfft(cepstrum * fold))[::8]
-    even: Array = np.arange(n_lines + 1, dtype=np.float64) * (0.5 * sampling_rate / n_lines)
+    even: Array = np.arange(n_lines + 1, dtype=np.float64) * (
+        0.5 * sampling_rate / n_lines
+    )
     return even, np.asarray(response, dtype=np.complex128)

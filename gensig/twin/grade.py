@@ -49,7 +49,11 @@ def sideband_orders(teeth: Teeth, harmonic: int) -> Array:
     """Mesh orders of the sidebands of a harmonic, each once, (line,)."""
     steps = np.arange(1, N_SIDEBANDS + 1)
     offsets = np.concatenate(
-        [side * steps / n for n in (teeth.driving, teeth.driven) for side in (-1.0, 1.0)]
+        [
+            side * steps / n
+            for n in (teeth.driving, teeth.driven)
+            for side in (-1.0, 1.0)
+        ]
     )
     return harmonic + np.unique(np.round(offsets, 9))
 
@@ -99,7 +103,10 @@ def simulated_records(
             specimen = draw_specimen(rng, pair.pinion, pair.wheel, quality)
             runs.append(Run(system=system, faults=(), start=start, specimen=specimen))
     made = [_finite(record) for record in simulate_together(runs)]
-    return [made[place * n_specimens : (place + 1) * n_specimens] for place in range(len(grades))]
+    return [
+        made[place * n_specimens : (place + 1) * n_specimens]
+        for place in range(len(grades))
+    ]
 
 
 def _finite(record: CleanRecord | SimulationError) -> CleanRecord:
@@ -115,7 +122,9 @@ def simulated_lines(record: CleanRecord, system: Machine) -> Lines:
     return find_lines(record.acceleration, cycles, system.sensing.sampling_rate, teeth)
 
 
-def fit_grade(measured: Lines, simulated: Sequence[Sequence[Lines]], teeth: Teeth) -> Grade:
+def fit_grade(
+    measured: Lines, simulated: Sequence[Sequence[Lines]], teeth: Teeth
+) -> Grade:
     """Grade at which the median difference of measured and simulated ratios is zero, and its
     interval.
 
@@ -128,7 +137,10 @@ def fit_grade(measured: Lines, simulated: Sequence[Sequence[Lines]], teeth: Teet
     # (grade, specimen): by how much a simulated set of gears has stronger sidebands than the
     # measured one
     excess = np.array(
-        [[_excess(sideband_ratios(one, teeth), ratios) for one in row] for row in simulated]
+        [
+            [_excess(sideband_ratios(one, teeth), ratios) for one in row]
+            for row in simulated
+        ]
     )
     if n_ratios == 0 or not np.all(np.isfinite(excess)):
         middle = GRADES[len(GRADES) // 2 - 1]

@@ -16,7 +16,9 @@ from gensig.signals.mesh_motion import Teeth
 
 Array = NDArray[np.float64]
 
-SPREAD = 2  # bins to either side of a line in which a Hann window leaves 99.9 % of its power
+SPREAD = (
+    2  # bins to either side of a line in which a Hann window leaves 99.9 % of its power
+)
 FINER = 2  # upsampling before the interpolation to angle, whose error grows towards half the rate
 BANDS_AN_OCTAVE = 12
 HALF_BAND = (
@@ -63,7 +65,9 @@ class Lines:
         return np.asarray((self.power - self.floor)[:, inside].sum(axis=2))
 
 
-def find_lines(signal: Array, cycles: Array, sampling_rate: float, teeth: Teeth) -> Lines:
+def find_lines(
+    signal: Array, cycles: Array, sampling_rate: float, teeth: Teeth
+) -> Lines:
     """Order spectrum of signals whose mesh angle is known.
 
     Parameters
@@ -97,7 +101,9 @@ def find_lines(signal: Array, cycles: Array, sampling_rate: float, teeth: Teeth)
     power, frequency, order = power[:, kept], frequency[kept], order[kept]
     is_line = np.zeros(len(order), dtype=bool)
     for n_teeth in (teeth.driving, teeth.driven):
-        distance = np.abs(order * n_teeth - np.rint(order * n_teeth)) * n_cycles / n_teeth  # bins
+        distance = (
+            np.abs(order * n_teeth - np.rint(order * n_teeth)) * n_cycles / n_teeth
+        )  # bins
         is_line |= distance <= SPREAD + 0.5
     return Lines(
         power=power,
@@ -120,7 +126,9 @@ def _floor(power: Array, is_line: NDArray[np.bool_]) -> Array:
     levels = np.stack(
         [np.median(power[:, stretch], axis=1) for stretch in stretches], axis=1
     ) / math.log(2.0)
-    return np.stack([np.interp(np.arange(power.shape[1]), middle, row) for row in levels])
+    return np.stack(
+        [np.interp(np.arange(power.shape[1]), middle, row) for row in levels]
+    )
 
 
 def band_centers(lowest: float, sampling_rate: float) -> Array:
@@ -134,8 +142,11 @@ def band_centers(lowest: float, sampling_rate: float) -> Array:
 
 def band_sums(values: Array, frequency: Array, centers: Array) -> Array:
     """Sums over the sixth of an octave around each center, (row, bin) to (row, band)."""
-    sums = np.concatenate([np.zeros((len(values), 1)), np.cumsum(values, axis=1)], axis=1)
+    sums = np.concatenate(
+        [np.zeros((len(values), 1)), np.cumsum(values, axis=1)], axis=1
+    )
     first, last = (
-        np.searchsorted(frequency, centers * 2.0**half) for half in (-HALF_BAND, HALF_BAND)
+        np.searchsorted(frequency, centers * 2.0**half)
+        for half in (-HALF_BAND, HALF_BAND)
     )
     return np.asarray(sums[:, last] - sums[:, first])

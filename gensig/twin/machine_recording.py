@@ -23,7 +23,9 @@ def read_recording(
     array: str | None = None,
 ) -> Recording:
     """Recording of a file; parameters and mistakes as of `read_file` and `recording_of`."""
-    recording = recording_of(read_file(file, rate=rate, array=array), unit=unit, channels=channels)
+    recording = recording_of(
+        read_file(file, rate=rate, array=array), unit=unit, channels=channels
+    )
     return replace(recording, sensors=_sensor_names(file, recording.sensors))
 
 
@@ -31,9 +33,13 @@ def _sensor_names(file: str, names: Sequence[str]) -> tuple[str, ...]:
     """Names as ``sensing.sensors`` takes them: letters, digits and _, at most 32."""
     made = []
     for place, name in enumerate(names):
-        plain = re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_")[:32] or f"channel_{place}"
+        plain = (
+            re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_")[:32] or f"channel_{place}"
+        )
         made.append(
-            plain if plain[0].isalpha() and not is_turning(plain) else f"s_{plain}"[:30] + "_a"
+            plain
+            if plain[0].isalpha() and not is_turning(plain)
+            else f"s_{plain}"[:30] + "_a"
         )
     if len(set(made)) < len(made):
         raise ConfigError(

@@ -29,15 +29,17 @@ def fitted_rows(fitted: Fit, n_driving: int) -> list[tuple[str, str]]:
         spread = f"{100 * fitted.drift:.4f} % (standard deviation)"
         drift = f"{spread} over {motion.correlation_time:.3g} s; {seen}, {errors}"
     elif seen:
-        fast = f"; changes within {motion.followed_time:.2g} s are the gears' own or noise"
-        drift = f"none written: {seen} over {motion.correlation_time:.3g} s, {errors}{fast}"
+        fast = (
+            f"; changes within {motion.followed_time:.2g} s are the gears' own or noise"
+        )
+        drift = (
+            f"none written: {seen} over {motion.correlation_time:.3g} s, {errors}{fast}"
+        )
     elif motion.detection_limit is not None:
         drift = f"none written: below the detection limit of {100 * motion.detection_limit:.4f} %"
     else:
         drift = "none written: one harmonic alone is heard, which does not tell it from noise"
-    quality = (
-        f"{grade.grade:.1f}, 90 % of simulated sets of gears: {grade.low:.1f} to {grade.high:.1f}"
-    )
+    quality = f"{grade.grade:.1f}, 90 % of simulated sets of gears: {grade.low:.1f} to {grade.high:.1f}"
     if not grade.is_bounded:
         quality += "; NOT BOUNDED: no grade from 1 to 11 gives such sidebands, or none are heard"
     heard = ", ".join(
@@ -45,7 +47,8 @@ def fitted_rows(fitted: Fit, n_driving: int) -> list[tuple[str, str]]:
         for name, row in zip(fitted.sensors, fitted.heard, strict=True)
     )
     snr = ", ".join(
-        f"{name} {one:.1f} dB" for name, one in zip(fitted.sensors, fitted.snr, strict=True)
+        f"{name} {one:.1f} dB"
+        for name, one in zip(fitted.sensors, fitted.snr, strict=True)
     )
     return [
         (
@@ -81,7 +84,10 @@ def check_lines(check: Check) -> list[str]:
             f"{itself[place]:.1f} dB",
         ]
         for number, unit in enumerate(INDICATOR_UNITS):
-            low, high = check.twin[:, place, number].min(), check.twin[:, place, number].max()
+            low, high = (
+                check.twin[:, place, number].min(),
+                check.twin[:, place, number].max(),
+            )
             word = "agrees" if check.agrees[place, number] else "NO"
             cells.append(
                 f"{check.measured[place, number]:.2f} {unit} in {low:.2f}..{high:.2f}: {word}"
@@ -97,9 +103,13 @@ def check_summary(check: Check) -> list[str]:
     )
     lines = [head]
     for place, sensor in enumerate(check.sensors):
-        words = "".join(f"{'agrees' if agrees else 'NO':>16}" for agrees in check.agrees[place])
+        words = "".join(
+            f"{'agrees' if agrees else 'NO':>16}" for agrees in check.agrees[place]
+        )
         off = float(np.median(np.abs(check.difference_db[place])))
-        lines.append(f"{sensor:<20}{100 * check.share_within[place]:>12.0f} %{off:>9.1f} dB{words}")
+        lines.append(
+            f"{sensor:<20}{100 * check.share_within[place]:>12.0f} %{off:>9.1f} dB{words}"
+        )
     return lines
 
 
@@ -128,7 +138,9 @@ def report_text(
     words: Sequence[str],
 ) -> str:
     """The report in Markdown."""
-    rows = "\n".join(f"| {key} | {value} |" for key, value in fitted_rows(fitted, n_driving))
+    rows = "\n".join(
+        f"| {key} | {value} |" for key, value in fitted_rows(fitted, n_driving)
+    )
     guesses = "\n".join(f"| `{key}` | {value} |" for key, value in assumed.items())
     table = "\n".join(check_lines(check))
     return f"""# {name}: a twin fitted to healthy measurements

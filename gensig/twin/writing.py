@@ -13,9 +13,7 @@ from gensig.errors import ConfigError
 from gensig.text.option_writing import is_option_name, option_lines
 from gensig.twin.fitting import SOURCE_CHANNEL, Fit, minimum_phase, oversampling
 
-PATH_STEP = (
-    20.0  # Hz between the lines of the path's file; its gain is smooth over a sixth of an octave
-)
+PATH_STEP = 20.0  # Hz between the lines of the path's file; its gain is smooth over a sixth of an octave
 DEFAULT_OVERSAMPLING = 5  # solver.oversampling of configs/generate.yaml
 PATH_FILE, NOISE_FILE = "path.csv", "noise.csv"
 
@@ -61,8 +59,12 @@ def write_options(
     (out / "gear" / f"{name}.yaml").write_text(
         head + "\n".join(option_lines(gear, remarks)) + "\n", encoding="utf-8"
     )
-    (out / "sensing" / f"{name}.yaml").write_text(head + _sensing(out, fitted), encoding="utf-8")
-    experiment = "# @package _global_\n" + head + _experiment(name, fitted, torque_nm, duration)
+    (out / "sensing" / f"{name}.yaml").write_text(
+        head + _sensing(out, fitted), encoding="utf-8"
+    )
+    experiment = (
+        "# @package _global_\n" + head + _experiment(name, fitted, torque_nm, duration)
+    )
     (out / "experiment" / f"{name}.yaml").write_text(experiment, encoding="utf-8")
     _write_path(out / PATH_FILE, fitted)
     _write_noise(out / NOISE_FILE, fitted)
@@ -138,7 +140,9 @@ def _write_path(file: Path, fitted: Fit) -> None:
             fitted.gain_frequency, gain, fitted.sampling_rate, PATH_STEP
         )
         columns += [response.real, response.imag]
-        names += [f"{SOURCE_CHANNEL}_to_{sensor}_{part}" for part in ("real", "imaginary")]
+        names += [
+            f"{SOURCE_CHANNEL}_to_{sensor}_{part}" for part in ("real", "imaginary")
+        ]
     np.savetxt(
         file,
         np.column_stack([frequency, *columns]),
@@ -152,5 +156,10 @@ def _write_path(file: Path, fitted: Fit) -> None:
 def _write_noise(file: Path, fitted: Fit) -> None:
     table = np.column_stack([fitted.noise_frequency, *fitted.density])
     np.savetxt(
-        file, table, "%.9g", ",", header=",".join(["frequency_hz", *fitted.sensors]), comments=""
+        file,
+        table,
+        "%.9g",
+        ",",
+        header=",".join(["frequency_hz", *fitted.sensors]),
+        comments="",
     )

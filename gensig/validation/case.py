@@ -69,7 +69,9 @@ class Case:
             return {}
         fault = self.faults[0]
         side = self.table.pinion if fault.gear == "pinion" else self.table.wheel
-        return {f"{fault.gear}_kind": int(side.kind[fault.teeth(self.gear(fault.gear))[0]])}
+        return {
+            f"{fault.gear}_kind": int(side.kind[fault.teeth(self.gear(fault.gear))[0]])
+        }
 
     def gear(self, name: str) -> Gear:
         """The pinion or the wheel."""
@@ -78,7 +80,13 @@ class Case:
     def position(self, point: str) -> float:
         """Distance of a named point from A along the line of action, m; C is the pitch point."""
         pitch, path = self.pair.base_pitch, self.pair.path_of_contact
-        named = {"A": 0.0, "B": path - pitch, "C": self.pair.pitch_point, "D": pitch, "E": path}
+        named = {
+            "A": 0.0,
+            "B": path - pitch,
+            "C": self.pair.pitch_point,
+            "D": pitch,
+            "E": path,
+        }
         if point in named:
             return named[point]
         return 0.5 * (named[point[0]] + named[point[1]])
@@ -135,7 +143,9 @@ def _whole_load_table(case: Case) -> PairTable:
     if system.mesh.contact == "linear":
         return case.table
     teeth = faulty_teeth(case.pair, case.faults)
-    return pair_table(case.pair, system.material, system.mesh, teeth, load=system.mesh_force)
+    return pair_table(
+        case.pair, system.material, system.mesh, teeth, load=system.mesh_force
+    )
 
 
 @lru_cache(maxsize=8)
@@ -148,7 +158,10 @@ def _fault_option(name: str) -> dict[str, Any]:
 def _read_faults(overrides: tuple[str, ...]) -> tuple[Fault, ...]:
     words = dict(word.split("=", 1) for word in overrides)
     option = _fault_option(words.pop("fault", "healthy"))
-    typed = {key.removeprefix("fault."): yaml.safe_load(value) for key, value in words.items()}
+    typed = {
+        key.removeprefix("fault."): yaml.safe_load(value)
+        for key, value in words.items()
+    }
     return read_faults({**option, **typed})
 
 

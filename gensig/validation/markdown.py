@@ -233,18 +233,28 @@ def markdown(results: Sequence[Result]) -> str:
     ]
     for source in _sources(results):
         mine = [result for result in results if result.row.origin == source]
-        parts += [f"\n## {SOURCE_TITLES.get(source, source)}\n", SOURCE_TEXTS.get(source, "")]
+        parts += [
+            f"\n## {SOURCE_TITLES.get(source, source)}\n",
+            SOURCE_TEXTS.get(source, ""),
+        ]
         for head in dict.fromkeys(_head(result) for result in mine):
             parts.append(f"\n### {TITLES.get(head, head)}\n")
-            parts.append(_table([result for result in mine if _head(result) == head], head=head))
+            parts.append(
+                _table([result for result in mine if _head(result) == head], head=head)
+            )
     return "\n".join([*parts, *realism_lines()]) + "\n"
 
 
 def summary(results: Sequence[Result]) -> str:
     """Counts by verdict and source, a Markdown table."""
-    lines = ["| source | rows | " + " | ".join(VERDICTS) + " |", "|---" * (len(VERDICTS) + 2) + "|"]
+    lines = [
+        "| source | rows | " + " | ".join(VERDICTS) + " |",
+        "|---" * (len(VERDICTS) + 2) + "|",
+    ]
     for source in _sources(results):
-        found = Counter(result.verdict for result in results if result.row.origin == source)
+        found = Counter(
+            result.verdict for result in results if result.row.origin == source
+        )
         lines.append(
             f"| {source} | {found.total()} | "
             + " | ".join(str(found[name]) for name in VERDICTS)
@@ -309,7 +319,11 @@ def _table(results: Sequence[Result], *, head: str = "") -> str:
             " ".join(_computed(result) for result in members),
             unit,
             _largest(
-                [result.deviation for result in members if result.deviation is not None],
+                [
+                    result.deviation
+                    for result in members
+                    if result.deviation is not None
+                ],
                 rough=rows[0].origin in ROUGH,
             ),
             verdict,

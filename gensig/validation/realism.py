@@ -23,7 +23,13 @@ from gensig.errors import ConfigError
 
 FOLDER = Path(__file__).resolve().parent
 RANGES, RESULTS = FOLDER / "realism_ranges.csv", FOLDER / "realism_results.csv"
-INSIDE, OVERLAPS, MISSES, WITHOUT, NOTHING = "inside", "overlaps", "misses", "no range", "no value"
+INSIDE, OVERLAPS, MISSES, WITHOUT, NOTHING = (
+    "inside",
+    "overlaps",
+    "misses",
+    "no range",
+    "no value",
+)
 TOLD, NOT_TOLD = "told apart", "not told apart"
 VERDICTS = (INSIDE, OVERLAPS, MISSES, WITHOUT, NOTHING, TOLD, NOT_TOLD)
 RECORDING = "recording"  # ids that begin so belong to the second table
@@ -106,7 +112,9 @@ def compare(measured: Range, values: ArrayLike) -> Comparison:
     """Put simulated values beside a measured range."""
     median, p5, p95, n = points(values)
     verdict = judge(measured.low, measured.high, p5, p95)
-    return Comparison(**asdict(measured), median=median, p5=p5, p95=p95, n=n, verdict=verdict)
+    return Comparison(
+        **asdict(measured), median=median, p5=p5, p95=p95, n=n, verdict=verdict
+    )
 
 
 def read_ranges(path: Path = RANGES) -> dict[Place, Range]:
@@ -121,7 +129,11 @@ def write_results(path: Path, heading: str, found: Sequence[Comparison]) -> None
 
     The reasons of a former file stay.
     """
-    former = {one.place: one.reason for one in read_results(path)[1]} if path.exists() else {}
+    former = (
+        {one.place: one.reason for one in read_results(path)[1]}
+        if path.exists()
+        else {}
+    )
     names = [field.name for field in fields(Comparison)]
     with path.open("w", encoding="utf-8", newline="") as file:
         file.write(f"# {' '.join(heading.split())}\n")
@@ -145,7 +157,9 @@ def read_results(path: Path = RESULTS) -> tuple[str, list[Comparison]]:
             f"{path.name} must begin with a line '# ' that says what was compared; make it again"
         )
     found = [
-        Comparison(**{**_read(line, ("low", "high", "median", "p5", "p95")), **_points(line)})
+        Comparison(
+            **{**_read(line, ("low", "high", "median", "p5", "p95")), **_points(line)}
+        )
         for line in csv.DictReader(lines[1:])
     ]
     return lines[0][2:], found
@@ -156,7 +170,15 @@ def realism_lines(path: Path = RESULTS) -> list[str]:
     if not path.exists():
         return []
     heading, found = read_results(path)
-    lines = ["", "## Realism: beside measurements", "", TEXT, "", f"Compared: {heading}", ""]
+    lines = [
+        "",
+        "## Realism: beside measurements",
+        "",
+        TEXT,
+        "",
+        f"Compared: {heading}",
+        "",
+    ]
     yardstick = [one for one in found if not one.id.startswith(RECORDING)]
     recording = [one for one in found if one.id.startswith(RECORDING)]
     for title, text, figure, rows in (
@@ -218,7 +240,9 @@ def _number(value: float) -> str:
 
 
 def _written(value: Any) -> Any:
-    return "" if value is None else f"{value:.6g}" if isinstance(value, float) else value
+    return (
+        "" if value is None else f"{value:.6g}" if isinstance(value, float) else value
+    )
 
 
 def _read(line: Mapping[str, str], numbers: Sequence[str]) -> dict[str, Any]:

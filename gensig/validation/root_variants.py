@@ -36,7 +36,9 @@ def straight_root_profile(gear: Gear) -> ToothProfile:
     root = math.sqrt(gear.root_radius**2 - float(y[0]) ** 2)
     return ToothProfile(
         gear=gear,
-        abscissa=np.concatenate([np.linspace(root, float(x[0]), n_root + 1)[:n_root], x]),
+        abscissa=np.concatenate(
+            [np.linspace(root, float(x[0]), n_root + 1)[:n_root], x]
+        ),
         half_thickness=np.concatenate([np.full(n_root, y[0]), y]),
         n_root_cells=n_root,
         curvature_radius=curvature,
@@ -74,17 +76,21 @@ def other_root_angle(gear: Gear, where: str) -> Gear:
 
         def excess(gamma: float) -> float:
             turned = (
-                gear.rounding_center_depth / math.tan(gamma) + gear.rounding_center_offset
+                gear.rounding_center_depth / math.tan(gamma)
+                + gear.rounding_center_offset
             ) / gear.pitch_radius
             return gamma - turned - math.radians(30.0)
 
         gamma = brentq(excess, gear.pressure_angle, 0.5 * math.pi)
-        angle = math.asin(float(root_curve(gear, np.array([gamma]))[1][0]) / gear.root_radius)
+        angle = math.asin(
+            float(root_curve(gear, np.array([gamma]))[1][0]) / gear.root_radius
+        )
     elif where == "junction":
         x, y = involute_point(gear, np.array([gear.junction_curvature_radius]))
         angle = math.atan2(float(y[0]), float(x[0]))
     else:
         angle = gear.half_tooth_angle_base
     return _GearOnRootAngle(
-        **{item.name: getattr(gear, item.name) for item in fields(Gear)}, body_half_angle=angle
+        **{item.name: getattr(gear, item.name) for item in fields(Gear)},
+        body_half_angle=angle,
     )

@@ -107,11 +107,17 @@ class Row:
             raise ConfigError(
                 f"{self.origin}.csv, {self.id}: expected = {self.expected!r}; allowed: {VERDICTS}"
             )
-        if (self.tolerance is not None) != (self.kind == "value" and bool(self.printed)):
+        if (self.tolerance is not None) != (
+            self.kind == "value" and bool(self.printed)
+        ):
             raise ConfigError(
                 f"{self.origin}.csv, {self.id}: a printed value, and nothing else, has a tolerance"
             )
-        if self.kind == "claim" and self.printed and self.printed.split()[0] not in (">", "<"):
+        if (
+            self.kind == "claim"
+            and self.printed
+            and self.printed.split()[0] not in (">", "<")
+        ):
             raise ConfigError(
                 f"{self.origin}.csv, {self.id}: a claim prints '> number' or '< number'"
             )
@@ -144,9 +150,13 @@ def read_rows(source: str) -> tuple[Row, ...]:
     ConfigError    for a source there is not, or a row that makes no sense
     """
     if source not in SOURCES:
-        raise ConfigError(f"no validation source '{source}'; allowed: {', '.join(SOURCES)}")
+        raise ConfigError(
+            f"no validation source '{source}'; allowed: {', '.join(SOURCES)}"
+        )
     text = (
-        resources.files("gensig.validation").joinpath(f"{source}.csv").read_text(encoding="utf-8")
+        resources.files("gensig.validation")
+        .joinpath(f"{source}.csv")
+        .read_text(encoding="utf-8")
     )
     return tuple(_row(source, values) for values in csv.DictReader(text.splitlines()))
 
@@ -174,9 +184,13 @@ def judge(row: Row, value: float) -> Result:
         )
     else:
         printed = float(row.printed)
-        allowed = max((row.tolerance or 0.0) * abs(printed), half_last_digit(row.printed))
+        allowed = max(
+            (row.tolerance or 0.0) * abs(printed), half_last_digit(row.printed)
+        )
         deviation = (computed - printed) / abs(printed) if printed else None
-        verdict = REPRODUCED if abs(computed - printed) <= allowed * (1.0 + 1e-9) else DIFFERS
+        verdict = (
+            REPRODUCED if abs(computed - printed) <= allowed * (1.0 + 1e-9) else DIFFERS
+        )
     return Result(row=row, computed=computed, deviation=deviation, verdict=verdict)
 
 
@@ -189,7 +203,11 @@ def half_last_digit(printed: str) -> float:
 
 def _row(source: str, values: dict[str, str]) -> Row:
     good = (
-        NOT_PRINTED if not values["printed"] else REPRODUCED if values["kind"] == "value" else HOLDS
+        NOT_PRINTED
+        if not values["printed"]
+        else REPRODUCED
+        if values["kind"] == "value"
+        else HOLDS
     )
     return Row(
         origin=source,

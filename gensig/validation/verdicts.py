@@ -55,7 +55,9 @@ def evaluate(row: Row) -> Result:
 
 
 def run_validation(
-    sources: Sequence[str] | None = None, *, on_row: Callable[[Result], None] | None = None
+    sources: Sequence[str] | None = None,
+    *,
+    on_row: Callable[[Result], None] | None = None,
 ) -> list[Result]:
     """Judge all rows of the given sources (all when None), in the order of their files.
 

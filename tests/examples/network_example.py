@@ -32,7 +32,9 @@ class EnvelopeCnn(Network):
     heads : see `diagnose.settings.HEADS`
     """
 
-    inputs: ClassVar[type[NetworkInput]] = Windows  # or Turns: what a training is to feed it
+    inputs: ClassVar[type[NetworkInput]] = (
+        Windows  # or Turns: what a training is to feed it
+    )
 
     def __init__(
         self,
@@ -47,7 +49,9 @@ class EnvelopeCnn(Network):
         super().__init__(input_scale)
         self.filters = nn.Conv1d(n_channels, width, kernel, bias=False)
         self.norm = nn.BatchNorm1d(width)
-        self.head = nn.Linear(2 * width, n_classes)  # adaptation and novelty expect this name
+        self.head = nn.Linear(
+            2 * width, n_classes
+        )  # adaptation and novelty expect this name
         self.add_heads(heads, 2 * width, n_classes)
 
     def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, None]:

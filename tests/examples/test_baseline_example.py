@@ -32,7 +32,9 @@ def data(monkeypatch):
     }
     for name, dataset in sets.items():
         dataset.folder = Path(name)
-    monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path: sets[str(path)])
+    monkeypatch.setattr(
+        gensig.dataset.reader, "open_dataset", lambda path: sets[str(path)]
+    )
 
 
 def train(out, *words):
@@ -52,11 +54,18 @@ def test_it_runs_in_a_study_and_stands_on_the_page(data, monkeypatch, tmp_path):
     assert result["answers"]["best_baseline"] == "nearest_crest"
 
     page = (out / "report.html").read_text()
-    for words in (NearestCrest.text.label, NearestCrest.text.meaning, "sham, nearest crest factor"):
+    for words in (
+        NearestCrest.text.label,
+        NearestCrest.text.meaning,
+        "sham, nearest crest factor",
+    ):
         assert words in page
     assert "nearest_crest" in (out / "predictions.csv").read_text()
 
 
 def test_without_its_line_in_the_registry_it_is_refused(data, tmp_path, capsys):
     assert train(tmp_path / "out", "baselines=[nearest_crest]") == 2
-    assert "baselines must be false or a list of different names" in capsys.readouterr().err
+    assert (
+        "baselines must be false or a list of different names"
+        in capsys.readouterr().err
+    )

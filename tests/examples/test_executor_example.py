@@ -40,8 +40,13 @@ def test_it_makes_the_same_bytes(folder: Path) -> None:
     assert contents(serial) == contents(local)
 
 
-def test_an_unknown_one_is_refused(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+def test_an_unknown_one_is_refused(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
     monkeypatch.delitem(EXECUTORS, "serial")
     own = ["--config-dir", str(folder / "mine"), "executor=serial"]
     assert main(["generate", *WORDS, *own, f"out={folder / 'none'}"]) == 2
-    assert "executor.kind = 'serial'; there is local, dask, slurm" in capsys.readouterr().err
+    assert (
+        "executor.kind = 'serial'; there is local, dask, slurm"
+        in capsys.readouterr().err
+    )

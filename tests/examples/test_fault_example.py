@@ -44,7 +44,9 @@ def notch(**changes):
 def test_its_keys_are_read_with_their_units():
     expected = Notch(gear="pinion", tooth=0, notch_length=0.4e-3, notch_depth=0.1e-3)
     assert notch() == expected
-    with pytest.raises(FaultError, match=r"fault\.notch_depth_mm = -1 must not be negative"):
+    with pytest.raises(
+        FaultError, match=r"fault\.notch_depth_mm = -1 must not be negative"
+    ):
         notch(notch_depth_mm=-1)
     with pytest.raises(ConfigError, match="unknown key 'notch_depht_mm'; did you mean"):
         notch(notch_depht_mm=1)
@@ -71,7 +73,10 @@ def test_the_mesh_has_a_gap_over_the_groove_and_nowhere_else(xiamen):
 
 
 def test_its_severity_rises_with_its_length(xiamen):
-    values = [severity([notch(notch_length_mm=length)], xiamen.pair) for length in (0.0, 0.2, 0.4)]
+    values = [
+        severity([notch(notch_length_mm=length)], xiamen.pair)
+        for length in (0.0, 0.2, 0.4)
+    ]
     assert values[0] == pytest.approx(0.0, abs=0.0)
     assert 0.0 < values[1] < 1.0
     assert_allclose(values[2], 2.0 * values[1], rtol=1e-12)
@@ -93,5 +98,7 @@ def test_a_plan_draws_it(folder):
 def test_a_life_of_it_is_refused_in_words(folder):
     words = ("experiment=run_to_failure", "plan.n_units=2", "plan.classes=[notch]")
     config = read_request(words, config_dir=folder).config
-    with pytest.raises(ConfigError, match="nothing makes notch grow; this life has healthy, crack"):
+    with pytest.raises(
+        ConfigError, match="nothing makes notch grow; this life has healthy, crack"
+    ):
         make_plan(config)

@@ -45,13 +45,23 @@ def options(tmp_path):
 
 def test_it_is_trained_stored_and_loaded(data, options, tmp_path):
     out = tmp_path / "out"
-    words = ["data=any", f"out={out}", "model=envelope", f"--config-dir={options}", *SMALL]
+    words = [
+        "data=any",
+        f"out={out}",
+        "model=envelope",
+        f"--config-dir={options}",
+        *SMALL,
+    ]
     assert main(["train", *words]) == 0
     assert "envelope" in (out / "report.html").read_text()
 
     model, description = load_model(out / "models" / "by_unit-seed0")
     assert isinstance(model, EnvelopeCnn)
-    np.savez(tmp_path / "a.npz", acceleration=data.signals(0), sampling_rate_hz=data.sampling_rate)
+    np.savez(
+        tmp_path / "a.npz",
+        acceleration=data.signals(0),
+        sampling_rate_hz=data.sampling_rate,
+    )
     words = ["--model", str(out / "models" / "by_unit-seed0"), str(tmp_path / "a.npz")]
     assert main(["predict", *words]) in (0, 3)
     assert main(["evaluate", "data=any", f"model_dir={words[1]}"]) == 0
@@ -59,7 +69,9 @@ def test_it_is_trained_stored_and_loaded(data, options, tmp_path):
 
 
 def test_it_is_deterministic_and_reads_what_it_declares(data):
-    model = EnvelopeCnn(n_channels=1, n_classes=4, input_scale=[1.0], kernel=16, width=8).eval()
+    model = EnvelopeCnn(
+        n_channels=1, n_classes=4, input_scale=[1.0], kernel=16, width=8
+    ).eval()
     inputs = input_of(CONFIG)
     assert isinstance(inputs, EnvelopeCnn.inputs)
     assert inputs.n_points(1200) == 1200
@@ -68,8 +80,15 @@ def test_it_is_deterministic_and_reads_what_it_declares(data):
         assert_allclose(model(x), model(x.clone()), rtol=0, atol=0)
 
 
-def test_a_network_that_is_not_registered_is_refused(data, options, tmp_path, monkeypatch, capsys):
+def test_a_network_that_is_not_registered_is_refused(
+    data, options, tmp_path, monkeypatch, capsys
+):
     monkeypatch.delitem(MODELS, CONFIG["kind"])
-    words = ["data=any", f"out={tmp_path / 'out'}", "model=envelope", f"--config-dir={options}"]
+    words = [
+        "data=any",
+        f"out={tmp_path / 'out'}",
+        "model=envelope",
+        f"--config-dir={options}",
+    ]
     assert main(["train", *words, *SMALL]) == 2
     assert "no model kind 'envelope_cnn'; there is small_cnn" in capsys.readouterr().err

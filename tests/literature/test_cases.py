@@ -42,19 +42,28 @@ def test_mistakes_are_answered(word):
 
 
 def test_the_last_word_counts():
-    case = with_words(read_case(("mesh.law=paper", "fault=crack")), "mesh.law=one_sided")
+    case = with_words(
+        read_case(("mesh.law=paper", "fault=crack")), "mesh.law=one_sided"
+    )
     assert case.system.mesh.law == "one_sided"
     assert case.faults
     assert not with_fault(case).faults
 
 
 def test_one_pair_that_carries_all_is_stiffer_where_contact_hangs_on_load():
-    linear, weber = (read_case((f"mesh.contact={contact}",)) for contact in ("linear", "weber"))
+    linear, weber = (
+        read_case((f"mesh.contact={contact}",)) for contact in ("linear", "weber")
+    )
     for one, other in ((linear.whole_load_table.pinion, linear.table.pinion),
                        (linear.whole_load_table.wheel, linear.table.wheel)):  # fmt: skip
         assert_allclose(one.compliance, other.compliance, rtol=0, atol=0)
-    position, zone = weber.table.position, weber.pair.path_of_contact - weber.pair.base_pitch
-    whole, shared = (table.pinion.compliance[0] for table in (weber.whole_load_table, weber.table))
+    position, zone = (
+        weber.table.position,
+        weber.pair.path_of_contact - weber.pair.base_pitch,
+    )
+    whole, shared = (
+        table.pinion.compliance[0] for table in (weber.whole_load_table, weber.table)
+    )
     alone = np.abs(position - weber.position("C")) < 1e-4
     two = (position > 0.05 * zone) & (position < 0.95 * zone)
     assert_allclose(whole[alone], shared[alone], rtol=1e-6, atol=0)

@@ -40,7 +40,9 @@ def test_the_table_reader_and_plain_arrays_give_the_same_response():
 def test_flywheel_is_in_the_range_of_an_independent_estimate(damper):
     """13.4 to 17.9 r/min at the flywheel, over damper states and firing orders."""
     found = (
-        response_of(with_throws(option(injection_pump=None), IN_SEQUENCE), damper).fluctuation()
+        response_of(
+            with_throws(option(injection_pump=None), IN_SEQUENCE), damper
+        ).fluctuation()
         / RPM
     )
     assert 13.4 <= found[FLYWHEEL] <= 17.9
@@ -70,9 +72,9 @@ def test_order_1_dominates_at_the_flywheel_near_the_first_mode():
     speeds = np.arange(1640.0, 1781.0, 20.0)
     at_order_1 = [
         np.abs(
-            response_of(with_throws(option(), IN_SEQUENCE), speed=rpm * RPM).speed_deviation[
-                FLYWHEEL, 1
-            ]
+            response_of(
+                with_throws(option(), IN_SEQUENCE), speed=rpm * RPM
+            ).speed_deviation[FLYWHEEL, 1]
         )
         for rpm in speeds
     ]
@@ -82,7 +84,8 @@ def test_order_1_dominates_at_the_flywheel_near_the_first_mode():
 
 def test_plungers_move_the_pump_end_and_not_the_flywheel():
     with_pump, without = (
-        response_of(values).fluctuation() for values in (option(), option(injection_pump=None))
+        response_of(values).fluctuation()
+        for values in (option(), option(injection_pump=None))
     )
     assert with_pump[PUMP_GEAR] > 2.0 * without[PUMP_GEAR]
     assert with_pump[FAR_END] > 10.0 * without[FAR_END]

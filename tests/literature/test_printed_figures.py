@@ -30,7 +30,9 @@ def row_of(row_id):
 def test_rows_are_unique_and_shortfalls_are_explained():
     ids = [(row.origin, row.id) for row in ROWS]
     assert len(set(ids)) == len(ids)
-    unexplained = [row.id for row in ROWS if row.expected in (DIFFERS, FAILS) and not row.reason]
+    unexplained = [
+        row.id for row in ROWS if row.expected in (DIFFERS, FAILS) and not row.reason
+    ]
     assert not unexplained
     assert not [row.id for row in ROWS if row.printed and not row.source]
 
@@ -94,7 +96,9 @@ def test_a_claim_can_fail():
 
 
 def test_tolerance_is_relative_but_never_finer_than_the_printed_digits():
-    row = replace(row_of("table_2_2.pinion_axial.A"), printed="0.08", unit="", tolerance=0.001)
+    row = replace(
+        row_of("table_2_2.pinion_axial.A"), printed="0.08", unit="", tolerance=0.001
+    )
     assert judge(row, 0.0849).verdict == REPRODUCED
     assert judge(row, 0.0851).verdict == DIFFERS
     row = replace(row, printed="200.00")

@@ -31,8 +31,22 @@ SELF = {
     "wheel": (6.006637e-10, 3.235829e-7, -3.990314e-6, 4.953859e-5),
 }
 NEIGHBOR = {
-    "pinion": (1.032968e-10, 5.560972e-10, -2.711023e-8, -2.972583e-9, 1.532582e-7, -6.750071e-6),
-    "wheel": (3.812153e-10, 2.354808e-9, -2.941305e-8, -3.713858e-8, 4.609247e-7, -5.420136e-6),
+    "pinion": (
+        1.032968e-10,
+        5.560972e-10,
+        -2.711023e-8,
+        -2.972583e-9,
+        1.532582e-7,
+        -6.750071e-6,
+    ),
+    "wheel": (
+        3.812153e-10,
+        2.354808e-9,
+        -2.941305e-8,
+        -3.713858e-8,
+        4.609247e-7,
+        -5.420136e-6,
+    ),
 }
 # finite elements, 1e-12 m/N, at s = 0 ... 4.203 mm from A; ring reference (docs/theory/spur_mesh.md), table 4.3
 S_MM = (0.0, 0.700, 1.401, 2.101, 2.802, 3.502, 4.203)
@@ -80,17 +94,25 @@ def test_own_flexibility(gear, side, xiamen):
 
 def test_flexibility_of_the_neighbor(gear, side, xiamen):
     c = arc_flexibility(gear, xiamen.material, neighbor(gear))
-    assert_allclose(c[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]], NEIGHBOR[side], rtol=1e-6, atol=0)
-    assert_allclose([c[1, 0], c[2, 0], c[2, 1]], [-c[0, 1], -c[0, 2], c[1, 2]], rtol=1e-8, atol=0)
+    assert_allclose(
+        c[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]], NEIGHBOR[side], rtol=1e-6, atol=0
+    )
+    assert_allclose(
+        [c[1, 0], c[2, 0], c[2, 1]], [-c[0, 1], -c[0, 2], c[1, 2]], rtol=1e-8, atol=0
+    )
 
 
 @pytest.mark.parametrize("k", [1, 2, 5])
 def test_reciprocity_and_mirror_symmetry(gear, xiamen, k):
     ahead, behind = (
-        arc_flexibility(gear, xiamen.material, neighbor(gear, sign * k)) for sign in (1, -1)
+        arc_flexibility(gear, xiamen.material, neighbor(gear, sign * k))
+        for sign in (1, -1)
     )
     scale = np.sqrt(
-        np.outer(np.diag(ahead0 := arc_flexibility(gear, xiamen.material, 0.0)), np.diag(ahead0))
+        np.outer(
+            np.diag(ahead0 := arc_flexibility(gear, xiamen.material, 0.0)),
+            np.diag(ahead0),
+        )
     )
     assert_allclose((behind - ahead.T) / scale, 0.0, rtol=0, atol=1e-10)
     assert_allclose((behind - MIRROR @ ahead @ MIRROR) / scale, 0.0, rtol=0, atol=1e-10)
@@ -105,7 +127,9 @@ def test_body_under_the_loaded_tooth_at_the_pitch_point(gear, side, xiamen):
         gear, np.array([rho if side == "pinion" else xiamen.pair.tangent_length - rho])
     )
     found = cross_compliance(gear, xiamen.material, angle, angle, pitches=0)
-    assert_allclose(found, {"pinion": 1031.22e-12, "wheel": 2372.06e-12}[side], rtol=1e-5, atol=0)
+    assert_allclose(
+        found, {"pinion": 1031.22e-12, "wheel": 2372.06e-12}[side], rtol=1e-5, atol=0
+    )
 
 
 def cross_over_the_zone(pair, material, side, pitches):
@@ -118,19 +142,26 @@ def cross_over_the_zone(pair, material, side, pitches):
 
 
 def test_cross_compliance_against_finite_elements(side, xiamen):
-    found = cross_over_the_zone(xiamen.pair, xiamen.material, side, 1 if side == "pinion" else -1)
+    found = cross_over_the_zone(
+        xiamen.pair, xiamen.material, side, 1 if side == "pinion" else -1
+    )
     assert_allclose(found, np.array(CROSS_FE[side]) * 1e-12, rtol=0.01, atol=0)
 
 
 def test_the_wrong_neighbor_misses_the_finite_elements(side, xiamen):
-    found = cross_over_the_zone(xiamen.pair, xiamen.material, side, -1 if side == "pinion" else 1)
+    found = cross_over_the_zone(
+        xiamen.pair, xiamen.material, side, -1 if side == "pinion" else 1
+    )
     assert np.abs(found / (np.array(CROSS_FE[side]) * 1e-12) - 1).max() > 0.01
 
 
 def test_shared_compliance_is_the_mean_of_both_gears_over_the_double_zone(xiamen):
     expected = sum(np.mean(CROSS_FE[side]) for side in SIDES) * 1e-12
     assert_allclose(
-        shared_body_compliance(xiamen.pair, xiamen.material), expected, rtol=0.005, atol=0
+        shared_body_compliance(xiamen.pair, xiamen.material),
+        expected,
+        rtol=0.005,
+        atol=0,
     )
 
 
@@ -138,7 +169,9 @@ def test_cross_compliance_follows_the_bore(gear, xiamen):
     """Rigid twist of the body about the bore: a larger bore couples less, by more than the change in radius."""
     cross = [
         arc_flexibility(
-            replace(gear, bore_radius=bore * gear.root_radius), xiamen.material, neighbor(gear)
+            replace(gear, bore_radius=bore * gear.root_radius),
+            xiamen.material,
+            neighbor(gear),
         )[2, 2]
         for bore in (0.2, 0.4, 0.6)
     ]

@@ -28,7 +28,9 @@ def relieved(system, **values):
 def ripple(system, faults=()):
     table = system.mesh_table(faults)
     roll = system.pair.base_pitch * (np.arange(256) + 0.5) / 256
-    return np.ptp(static_mesh(table, pair_states(table, roll), system.mesh_force).approach)
+    return np.ptp(
+        static_mesh(table, pair_states(table, roll), system.mesh_force).approach
+    )
 
 
 def columns(table):
@@ -42,7 +44,9 @@ def columns(table):
 def test_no_depth_is_no_relief_bit_for_bit(xiamen, machine):
     heights = {f"modification.{side}.tip_relief_height_mm": 0.6 for side in SIDES}
     plain = machine({**heights, "modification.wheel.profile_shape": "parabolic"})
-    for mine, theirs in zip(columns(plain.mesh_table()), columns(xiamen.mesh_table()), strict=True):
+    for mine, theirs in zip(
+        columns(plain.mesh_table()), columns(xiamen.mesh_table()), strict=True
+    ):
         assert_array_equal(mine, theirs)
 
 
@@ -50,14 +54,20 @@ def test_no_depth_is_no_relief_bit_for_bit(xiamen, machine):
 def test_the_gaps_are_those_of_the_fault_of_the_same_relief(xiamen, shape):
     """The fault falls off along the line of action, the modification over the radius: 4 % of the depth between them."""
     depth, height = 10 * UM, 0.6 * MM
-    system = relieved(xiamen, tip_relief=depth, tip_relief_height=height, profile_shape=shape)
+    system = relieved(
+        xiamen, tip_relief=depth, tip_relief_height=height, profile_shape=shape
+    )
     faults = []
     for name in SIDES:
         gear = getattr(xiamen.pair, name)
         length = np.sqrt(gear.tip_radius**2 - gear.base_radius**2) - np.sqrt(
             (gear.tip_radius - height) ** 2 - gear.base_radius**2
         )
-        words = {"relief_um": depth / UM, "relief_length_mm": length / MM, "relief_curve": shape}
+        words = {
+            "relief_um": depth / UM,
+            "relief_length_mm": length / MM,
+            "relief_curve": shape,
+        }
         faults.append(one("tip_relief", gear=name, tooth="all", **words))
     mine, theirs = system.mesh_table(), xiamen.mesh_table(faults)
     for name in SIDES:
@@ -78,8 +88,12 @@ def test_back_flanks_are_modified_too(xiamen):
 def test_a_fault_comes_on_top(xiamen):
     """What a pitch error adds to relieved teeth is the pitch error."""
     system = relieved(xiamen, tip_relief=10 * UM, tip_relief_height=0.6 * MM)
-    side = system.mesh_table((one("pitch_error", gear="wheel", tooth=5, pitch_error_um=7),)).wheel
-    assert_allclose(side.gap[side.kind[5]], side.gap[0] + 7 * UM, rtol=0, atol=1e-3 * UM)
+    side = system.mesh_table(
+        (one("pitch_error", gear="wheel", tooth=5, pitch_error_um=7),)
+    ).wheel
+    assert_allclose(
+        side.gap[side.kind[5]], side.gap[0] + 7 * UM, rtol=0, atol=1e-3 * UM
+    )
 
 
 def test_relief_of_the_deflection_takes_most_ripple_off(xiamen, machine):
@@ -87,9 +101,16 @@ def test_relief_of_the_deflection_takes_most_ripple_off(xiamen, machine):
     for system in (xiamen, machine({"operating.torque_nm": 60.0})):
         best = replace(system, modification=system.long_relief())
         assert ripple(best) < 0.2 * ripple(system)
-        twice = {name: replace(side, tip_relief=2 * side.tip_relief) for name, side in sides(best)}
-        assert ripple(replace(system, modification=PairModification(**twice))) > 3 * ripple(best)
-        assert best.long_relief() == best.modification  # of teeth as cut, whatever is ground off
+        twice = {
+            name: replace(side, tip_relief=2 * side.tip_relief)
+            for name, side in sides(best)
+        }
+        assert ripple(
+            replace(system, modification=PairModification(**twice))
+        ) > 3 * ripple(best)
+        assert (
+            best.long_relief() == best.modification
+        )  # of teeth as cut, whatever is ground off
     with pytest.raises(GeometryError, match=r"contact ratio 0.9\d+ lies outside 1..2"):
         machine({"gear.addendum_coefficient": 0.5}).long_relief()
 
@@ -114,11 +135,15 @@ def test_leads_are_those_of_the_sliced_pair(config_with, lead, share):
     config = config_with()
     spur = relieved(read_system(config), **lead)
     sliced = read_system(config.with_keys("system", kind="helical_pair"))
-    sliced = replace(sliced, flanks=replace(sliced.flanks, modification=spur.modification))
+    sliced = replace(
+        sliced, flanks=replace(sliced.flanks, modification=spur.modification)
+    )
     roll = spur.pair.base_pitch * (np.arange(64) + 0.5) / 64
     table, slices = spur.mesh_table(), sliced.mesh_table()
     own = static_mesh(table, pair_states(table, roll), spur.mesh_force).approach.mean()
-    theirs = chord_equilibrium(slices, chord_states(slices, roll), spur.mesh_force).approach.mean()
+    theirs = chord_equilibrium(
+        slices, chord_states(slices, roll), spur.mesh_force
+    ).approach.mean()
     assert own == pytest.approx(theirs, rel=share)
 
 
@@ -134,12 +159,15 @@ def test_opposite_slopes_leave_an_aligned_pair(xiamen):
 
 def test_relieved_gears_shake_less_along_the_line_of_action(machine):
     """Tips that do not strike: a quarter of the acceleration along the line of action at the rated point."""
-    system = machine({"operating.duration_s": 0.2, "sensing.channels": ["pinion_y", "wheel_y"]})
+    system = machine(
+        {"operating.duration_s": 0.2, "sensing.channels": ["pinion_y", "wheel_y"]}
+    )
     runs = [
         Run(system=replace(system, modification=modification), faults=())
         for modification in (PLAIN, system.long_relief())
     ]
     plain, quiet = (
-        np.sqrt((record.acceleration**2).mean(axis=1)) for record in simulate_together(runs)
+        np.sqrt((record.acceleration**2).mean(axis=1))
+        for record in simulate_together(runs)
     )
     assert (quiet < 0.5 * plain).all()

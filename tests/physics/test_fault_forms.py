@@ -56,11 +56,14 @@ class TestOneIsTheOther:
         assert_allclose(found.gap, expected.gap, rtol=0, atol=0)
         assert np.isinf(expected.gap).any()
         loads = [
-            static_mesh(table, pair_states(table, roll), xiamen.mesh_force).load for table in tables
+            static_mesh(table, pair_states(table, roll), xiamen.mesh_force).load
+            for table in tables
         ]
         assert_allclose(loads[0], loads[1], rtol=0, atol=1e-9)
         there = np.isfinite(expected.gap)
-        assert_allclose(found.compliance[there], expected.compliance[there], rtol=1e-12, atol=0)
+        assert_allclose(
+            found.compliance[there], expected.compliance[there], rtol=1e-12, atol=0
+        )
 
     @pytest.mark.parametrize("height_mm", [0.5, 2.0])
     def test_chipped_over_the_whole_face_is_broken(self, xiamen, gear, height_mm):
@@ -73,7 +76,9 @@ class TestOneIsTheOther:
             chip_shape="rectangular",
         )
         broken = one("broken", gear=gear, tooth=0, broken_height_mm=height_mm)
-        for found, expected in zip(rows(xiamen, chip), rows(xiamen, broken), strict=True):
+        for found, expected in zip(
+            rows(xiamen, chip), rows(xiamen, broken), strict=True
+        ):
             assert_allclose(found, expected, rtol=1e-12, atol=0)
         assert chip.severity(getattr(xiamen.pair, gear)) == pytest.approx(
             broken.severity(getattr(xiamen.pair, gear))
@@ -89,7 +94,9 @@ class TestOneIsTheOther:
         body = getattr(xiamen.pair, gear)
         assert spall.severity(body) == pytest.approx(pit.severity(body))
         ellipse = patch("spalling", "spall", gear)
-        assert ellipse.severity(body) == pytest.approx(0.25 * np.pi * pit.severity(body))
+        assert ellipse.severity(body) == pytest.approx(
+            0.25 * np.pi * pit.severity(body)
+        )
 
     def test_an_ellipse_costs_less_than_its_rectangle(self, xiamen, gear):
         inner, outer = (
@@ -126,7 +133,9 @@ def patch(kind, prefix, gear, **changes):
 
 @pytest.mark.parametrize("gear", GEARS)
 @pytest.mark.parametrize("height_mm", [0.5, 2.0])
-def test_a_broken_tooth_bends_as_the_sound_one_up_to_its_corner(xiamen, gear, height_mm):
+def test_a_broken_tooth_bends_as_the_sound_one_up_to_its_corner(
+    xiamen, gear, height_mm
+):
     """What is gone carried nothing of a load below it; above it the corner is loaded, not what is no longer there."""
     fault = one("broken", gear=gear, tooth=0, broken_height_mm=height_mm)
     corner = faulty_teeth(xiamen.pair, (fault,))[gear, 0].tip_curvature_radius
@@ -135,7 +144,9 @@ def test_a_broken_tooth_bends_as_the_sound_one_up_to_its_corner(xiamen, gear, he
     below = curvature(xiamen, gear) <= corner
     assert_allclose(broken[below], sound[below], rtol=1e-3, atol=0)
     # the contact term goes on to vary with the position
-    assert_allclose(broken[~below], sound[below][-1 if gear == "pinion" else 0], rtol=0.05, atol=0)
+    assert_allclose(
+        broken[~below], sound[below][-1 if gear == "pinion" else 0], rtol=0.05, atol=0
+    )
     assert (sound[~below] / sound[below][-1 if gear == "pinion" else 0]).max() > 1.05
 
 
@@ -144,10 +155,13 @@ class TestGapsInClosedForm:
     @pytest.mark.parametrize("depth_um", [5.0, 80.0])
     def test_uniform_wear_is_a_gap_of_its_depth(self, xiamen, gear, depth_um):
         gap, _ = rows(
-            xiamen, one("wear", gear=gear, tooth=0, wear_depth_um=depth_um, wear_profile=None)
+            xiamen,
+            one("wear", gear=gear, tooth=0, wear_depth_um=depth_um, wear_profile=None),
         )
         assert_allclose(gap[path(xiamen)[0]], depth_um * UM, rtol=1e-12, atol=0)
-        uneven, _ = rows(xiamen, one("wear", gear=gear, tooth=0, wear_depth_um=depth_um))
+        uneven, _ = rows(
+            xiamen, one("wear", gear=gear, tooth=0, wear_depth_um=depth_um)
+        )
         assert np.ptp(uneven[path(xiamen)[0]]) > 0.5 * depth_um * UM
 
     @pytest.mark.parametrize("error_um", [20.0, -20.0, 0.5])
@@ -158,19 +172,32 @@ class TestGapsInClosedForm:
         # far off the path the corner gap is millimetres, whose rounding remains
         assert_allclose(gap, error_um * UM, rtol=1e-9, atol=1e-16)
         assert_allclose(
-            compliance, side_of(xiamen.mesh_table(), gear).compliance[0], rtol=1e-12, atol=0
+            compliance,
+            side_of(xiamen.mesh_table(), gear).compliance[0],
+            rtol=1e-12,
+            atol=0,
         )
 
     @pytest.mark.parametrize("slope_um", [20.0, -20.0])
     def test_a_profile_slope_is_straight_in_roll(self, xiamen, gear, slope_um):
         gap, _ = rows(
             xiamen,
-            one("profile_error", gear=gear, tooth=0, profile_slope_um=slope_um, profile_form_um=0),
+            one(
+                "profile_error",
+                gear=gear,
+                tooth=0,
+                profile_slope_um=slope_um,
+                profile_form_um=0,
+            ),
         )
         expected = slope_um * UM * (along_flank(xiamen, gear) - 0.5)
         within_second_order(xiamen, gear, gap, expected)
         # half of it stands back at one end of the flank, as much stands proud at the other
-        ends = gap[path(xiamen)[0]][[0, -1]] * (1 if gear == "pinion" else -1) * np.sign(slope_um)
+        ends = (
+            gap[path(xiamen)[0]][[0, -1]]
+            * (1 if gear == "pinion" else -1)
+            * np.sign(slope_um)
+        )
         assert ends[0] < 0 < ends[1]
 
     @pytest.mark.parametrize("waves", [1.0, 2.0])
@@ -189,7 +216,12 @@ class TestGapsInClosedForm:
     @pytest.mark.parametrize(("curve", "power"), [("linear", 1), ("parabolic", 2)])
     def test_tip_relief_falls_off_from_the_tip(self, xiamen, gear, curve, power):
         fault = one(
-            "tip_relief", gear=gear, tooth=0, relief_um=10, relief_length_mm=3, relief_curve=curve
+            "tip_relief",
+            gear=gear,
+            tooth=0,
+            relief_um=10,
+            relief_length_mm=3,
+            relief_curve=curve,
         )
         from_tip = np.abs(
             path(xiamen)[1] - (xiamen.pair.path_of_contact if gear == "pinion" else 0.0)
@@ -201,7 +233,8 @@ class TestGapsInClosedForm:
     def test_the_mate_rides_on_the_start_of_a_steep_relief(self, xiamen, gear):
         """Where slope times slope times radius is no longer small the gap is the edge's, not the relief's."""
         gap, _ = rows(
-            xiamen, one("tip_relief", gear=gear, tooth=0, relief_um=50, relief_length_mm=0.2)
+            xiamen,
+            one("tip_relief", gear=gear, tooth=0, relief_um=50, relief_length_mm=0.2),
         )
         assert 0 < gap[path(xiamen)[0]].max() < 25 * UM
         with pytest.raises(AssertionError):
@@ -222,14 +255,20 @@ def within_second_order(system, gear, gap, expected):
 def second_order(system, gear, deviation):
     """slope^2 rho / 2 of a deviation given on the path, (node,) m."""
     arc = curvature(system, gear) ** 2 / (2 * getattr(system.pair, gear).base_radius)
-    return np.gradient(deviation, arc) ** 2 * relative_radius(system.pair, path(system)[1]) / 2
+    return (
+        np.gradient(deviation, arc) ** 2
+        * relative_radius(system.pair, path(system)[1])
+        / 2
+    )
 
 
 class TestRunout:
     @pytest.mark.parametrize("gear", GEARS)
     def test_consecutive_teeth_agree_at_the_same_roll(self, xiamen, gear):
         """Tooth k + 1 is one base pitch behind tooth k: what moves the gear moves both."""
-        table = xiamen.mesh_table((one("runout", gear=gear, tooth=5, eccentricity_um=40),))
+        table = xiamen.mesh_table(
+            (one("runout", gear=gear, tooth=5, eccentricity_um=40),)
+        )
         side, pitch = side_of(table, gear), xiamen.pair.base_pitch
         both = np.linspace(pitch, xiamen.pair.path_of_contact, 50)
         gap = side.gap - side_of(xiamen.mesh_table(), gear).gap[0]
@@ -239,7 +278,11 @@ class TestRunout:
             return max(
                 np.abs(
                     np.interp(both, table.position, gap[side.kind[k]])
-                    - np.interp(both - pitch, table.position, gap[side.kind[(k + step) % n_teeth]])
+                    - np.interp(
+                        both - pitch,
+                        table.position,
+                        gap[side.kind[(k + step) % n_teeth]],
+                    )
                 ).max()
                 for k in range(n_teeth)
             )
@@ -248,19 +291,28 @@ class TestRunout:
             40 * UM / curvature(xiamen, gear)
         )  # slope of the deviation along the flank, at most
         assert (
-            jump(1) < 1.25 * (second**2 * relative_radius(xiamen.pair, path(xiamen)[1]) / 2).max()
+            jump(1)
+            < 1.25
+            * (second**2 * relative_radius(xiamen.pair, path(xiamen)[1]) / 2).max()
         )
         assert jump(-1) > 2 * UM
 
     @pytest.mark.parametrize("gear", GEARS)
     def test_the_amplitude_is_the_eccentricity(self, xiamen, gear):
-        table = xiamen.mesh_table((one("runout", gear=gear, tooth=5, eccentricity_um=40),))
+        table = xiamen.mesh_table(
+            (one("runout", gear=gear, tooth=5, eccentricity_um=40),)
+        )
         side = side_of(table, gear)
         at_pitch_point = np.array(
-            [np.interp(xiamen.pair.pitch_point, table.position, row) for row in side.gap]
+            [
+                np.interp(xiamen.pair.pitch_point, table.position, row)
+                for row in side.gap
+            ]
         )
         turn = 2 * np.pi * (np.arange(len(side.kind)) - 5) / len(side.kind)
-        assert_allclose(at_pitch_point[side.kind], 40 * UM * np.cos(turn), rtol=0, atol=0.1 * UM)
+        assert_allclose(
+            at_pitch_point[side.kind], 40 * UM * np.cos(turn), rtol=0, atol=0.1 * UM
+        )
         assert at_pitch_point[side.kind].argmax() == 5
 
 
@@ -296,7 +348,10 @@ class TestMisalignment:
         expected = even + tilt / 2 if ratio < 2 else np.sqrt(2 * even * tilt)
         for sign in (1, -1):
             assert_allclose(
-                self.approach(system, sign * tilt / UM, gear)[0], expected, rtol=0.015, atol=0
+                self.approach(system, sign * tilt / UM, gear)[0],
+                expected,
+                rtol=0.015,
+                atol=0,
             )
 
     def test_full_bearing_is_no_answer_for_a_large_tilt(self, machine):
@@ -306,14 +361,16 @@ class TestMisalignment:
 
     def test_slices_that_bend_by_themselves_are_softer(self, machine):
         by_slice, whole = (
-            self.approach(machine({"mesh.bending": how}), 15.0) for how in ("by_slice", "whole")
+            self.approach(machine({"mesh.bending": how}), 15.0)
+            for how in ("by_slice", "whole")
         )
         assert by_slice[0] > whole[0] * 1.2
         assert by_slice[1] > whole[1] * 1.2
 
     def test_either_end_of_the_face_is_the_same(self, xiamen):
         one_end, other_end = (
-            rows(xiamen, one("misalignment", tooth=0, misalignment_um=d)) for d in (15, -15)
+            rows(xiamen, one("misalignment", tooth=0, misalignment_um=d))
+            for d in (15, -15)
         )
         for found, expected in zip(one_end, other_end, strict=True):
             assert_allclose(found, expected, rtol=1e-9, atol=1e-15)

@@ -28,7 +28,11 @@ def test_severity_zero_is_healthy(xiamen, name, gear):
     row = side.kind[0]
     for key in ("compliance", "gap", "compliance_slope", "gap_slope"):
         assert_allclose(
-            getattr(side, key)[row], getattr(sound_side, key)[0], rtol=0, atol=0, err_msg=key
+            getattr(side, key)[row],
+            getattr(sound_side, key)[0],
+            rtol=0,
+            atol=0,
+            err_msg=key,
         )
     assert side.present.all()
 
@@ -47,7 +51,9 @@ def series(xiamen):
             found = np.array([deflection(xiamen, fault) for fault in faults])
             known[name, gear] = (
                 found,
-                np.array([fault.severity(getattr(xiamen.pair, gear)) for fault in faults]),
+                np.array(
+                    [fault.severity(getattr(xiamen.pair, gear)) for fault in faults]
+                ),
             )
         return known[name, gear]
 
@@ -57,7 +63,9 @@ def series(xiamen):
 def steps(found):
     """Change from each severity to the next, (step, node) m; nothing changes where no contact is left on either."""
     with np.errstate(invalid="ignore"):
-        return np.nan_to_num(np.diff(found, axis=0), nan=0.0, posinf=np.inf, neginf=-np.inf)
+        return np.nan_to_num(
+            np.diff(found, axis=0), nan=0.0, posinf=np.inf, neginf=-np.inf
+        )
 
 
 def falls(found, slack):
@@ -109,7 +117,8 @@ class TestTheChecksCanFail:
             one("pitting", pit_length_mm=0.05),
         )
         by_gap, by_width = (
-            (deflection(system, short) - deflection(system)).max() for system in (xiamen, narrow)
+            (deflection(system, short) - deflection(system)).max()
+            for system in (xiamen, narrow)
         )
         assert by_gap < 0.1 * by_width
 
@@ -119,16 +128,28 @@ class TestWhoseFacesBear:
     """The load of the drive flank presses a crack on the compression side together, whatever its severity."""
 
     def test_a_pressed_crack_that_breathes_costs_nothing(self, xiamen, gear):
-        crack = one("crack", gear=gear, tooth=0, crack_side="compression", crack_faces="breathing")
-        assert_allclose(deflection(xiamen, crack), deflection(xiamen), rtol=1e-12, atol=0)
+        crack = one(
+            "crack",
+            gear=gear,
+            tooth=0,
+            crack_side="compression",
+            crack_faces="breathing",
+        )
+        assert_allclose(
+            deflection(xiamen, crack), deflection(xiamen), rtol=1e-12, atol=0
+        )
         assert crack.severity(getattr(xiamen.pair, gear)) > 0.2
 
     def test_on_the_tension_side_it_is_open(self, xiamen, gear):
         breathing, kept_open = (
-            one("crack", gear=gear, tooth=0, crack_faces=faces) for faces in ("breathing", "open")
+            one("crack", gear=gear, tooth=0, crack_faces=faces)
+            for faces in ("breathing", "open")
         )
         assert_allclose(
-            deflection(xiamen, breathing), deflection(xiamen, kept_open), rtol=1e-12, atol=0
+            deflection(xiamen, breathing),
+            deflection(xiamen, kept_open),
+            rtol=1e-12,
+            atol=0,
         )
         assert (deflection(xiamen, kept_open) / deflection(xiamen)).max() > 1.02
 
@@ -153,10 +174,17 @@ class TestThePapersCrack:
         assert np.all(steps(found).max(axis=1) > 1e-3 * found.min())
 
     def test_rises_with_angle(self, cut):
-        faults = [one("crack", tooth=0, crack_angle_deg=angle) for angle in (15, 30, 45, 60, 90)]
-        assert not falls(np.array([deflection(cut, fault) for fault in faults]), 1e-9).any()
+        faults = [
+            one("crack", tooth=0, crack_angle_deg=angle)
+            for angle in (15, 30, 45, 60, 90)
+        ]
+        assert not falls(
+            np.array([deflection(cut, fault) for fault in faults]), 1e-9
+        ).any()
 
-    @pytest.mark.parametrize(("start", "loss"), [("gamma_mid", 0.0281), ("arc_mid", 0.0403)])
+    @pytest.mark.parametrize(
+        ("start", "loss"), [("gamma_mid", 0.0281), ("arc_mid", 0.0403)]
+    )
     def test_it_costs_what_its_formula_says(self, paper_machine, start, loss):
         # spur reference (docs/validation.md), section 2.3: loss of pair stiffness at the pitch point, 1 mm
         assert_allclose(
@@ -177,7 +205,10 @@ def lost_at_pitch_point(system, fault):
 class TestThePapersPit:
     def test_it_costs_what_its_formula_says(self, paper_machine):
         assert_allclose(
-            lost_at_pitch_point(paper_machine, one("pitting")), 0.0574, rtol=0, atol=2e-4
+            lost_at_pitch_point(paper_machine, one("pitting")),
+            0.0574,
+            rtol=0,
+            atol=2e-4,
         )
 
     def test_slices_cost_the_same_where_the_pit_is_deeper_than_the_load(
@@ -194,7 +225,8 @@ class TestThePapersPit:
         sliced = machine({f"mesh.{key}": value for key, value in terms.items()})
         assert sliced.mesh.law == "one_sided"
         found, expected = (
-            lost_at_pitch_point(system, one("pitting")) for system in (sliced, paper_machine)
+            lost_at_pitch_point(system, one("pitting"))
+            for system in (sliced, paper_machine)
         )
         assert 0.04 < found < 0.08
         assert_allclose(found, expected, rtol=1e-3, atol=0)
@@ -205,7 +237,9 @@ class TestThePapersPit:
 class TestTwoFaultsOnOneTooth:
     CRACK, PIT = (one(kind, tooth=0) for kind in ("crack", "pitting"))
 
-    @pytest.mark.parametrize("faults", [(CRACK, PIT), (PIT, CRACK)], ids=["crack_pit", "pit_crack"])
+    @pytest.mark.parametrize(
+        "faults", [(CRACK, PIT), (PIT, CRACK)], ids=["crack_pit", "pit_crack"]
+    )
     def test_softer_than_either(self, xiamen, faults):
         both = deflection(xiamen, *faults)
         for fault in faults:
@@ -215,7 +249,9 @@ class TestTwoFaultsOnOneTooth:
     @pytest.mark.parametrize("other", sorted(set(KINDS) - {"missing_tooth", "pitting"}))
     def test_order_hardly_matters(self, xiamen, other):
         pair = (self.PIT, one(other, tooth=0))
-        one_way, other_way = (deflection(xiamen, *faults) for faults in (pair, pair[::-1]))
+        one_way, other_way = (
+            deflection(xiamen, *faults) for faults in (pair, pair[::-1])
+        )
         assert_allclose(one_way, other_way, rtol=0.005, atol=0)
         assert np.abs(one_way / deflection(xiamen) - 1).max() > 0.005
 

@@ -52,8 +52,13 @@ def stress(xiamen):
 def test_tooth_and_body_of_many_gears(strain, case):
     """The shear factor 1 was read off 23 and 84 teeth; the other gears are its proof."""
     rows = groups("tooth", "case")[case]
-    gear, curvature = reference_gear(rows[0]), column(rows, "curvature_radius_over_module") * MODULE
-    tooth = tooth_compliance(healthy_tooth(gear), curvature, strain, reach="to_centreline")
+    gear, curvature = (
+        reference_gear(rows[0]),
+        column(rows, "curvature_radius_over_module") * MODULE,
+    )
+    tooth = tooth_compliance(
+        healthy_tooth(gear), curvature, strain, reach="to_centreline"
+    )
     angle = load_angle(gear, curvature)
     body = cross_compliance(gear, strain, angle, angle, pitches=0)
     scale = YOUNG * WIDTH
@@ -61,7 +66,9 @@ def test_tooth_and_body_of_many_gears(strain, case):
     assert_allclose(ratio[4:], 1.0, rtol=0.04, atol=0)
     assert np.all((ratio[:4] > 0.99) & (ratio[:4] < 1.27))
     assert_allclose(body * scale / column(rows, "body"), 1.0, rtol=0.05, atol=0)
-    assert_allclose((tooth.total + body) * scale / column(rows, "total"), 1.0, rtol=0.08, atol=0)
+    assert_allclose(
+        (tooth.total + body) * scale / column(rows, "total"), 1.0, rtol=0.08, atol=0
+    )
     # the long beam's shear is what the paper's form has too much
     long_beam = (tooth.total + 0.2 * tooth.shear) * scale / column(rows, "tooth")
     assert np.all(long_beam > 1.07)
@@ -75,7 +82,9 @@ def test_tooth_and_body_over_all_gears(strain):
             column(rows, "curvature_radius_over_module") * MODULE,
         )
         angle = load_angle(gear, curvature)
-        own = tooth_compliance(healthy_tooth(gear), curvature, strain, reach="to_centreline").total
+        own = tooth_compliance(
+            healthy_tooth(gear), curvature, strain, reach="to_centreline"
+        ).total
         body = cross_compliance(gear, strain, angle, angle, pitches=0)
         errors.append((own + body) * YOUNG * WIDTH / column(rows, "total") - 1.0)
     assert np.sqrt(np.mean(np.concatenate(errors) ** 2)) < 0.03
@@ -120,16 +129,25 @@ def test_cracks_of_many_gears(strain):
 
 def test_crack_on_the_compression_side(strain):
     """An open one by the same factors with the normal force reversed: rougher. A breathing one stays shut."""
-    rows = next(rows for key, rows in groups("crack", *CRACKS).items() if key[1] == "compression")
+    rows = next(
+        rows
+        for key, rows in groups("crack", *CRACKS).items()
+        if key[1] == "compression"
+    )
     ratio = increments(strain, rows) / column(rows, "increment")
     assert np.all((ratio > 0.8) & (ratio < 1.45))
     assert_allclose(increments(strain, rows, faces="breathing"), 0.0, rtol=0, atol=0)
 
 
 def test_breathing_on_the_tension_side_stays_open(strain):
-    rows = next(rows for key, rows in groups("crack", *CRACKS).items() if key[1] == "tension")
+    rows = next(
+        rows for key, rows in groups("crack", *CRACKS).items() if key[1] == "tension"
+    )
     assert_allclose(
-        increments(strain, rows, faces="breathing"), increments(strain, rows), rtol=0, atol=0
+        increments(strain, rows, faces="breathing"),
+        increments(strain, rows),
+        rtol=0,
+        atol=0,
     )
 
 
@@ -146,7 +164,8 @@ def test_outside_what_was_checked(strain, depth, angle):
 
 
 @pytest.mark.parametrize(
-    "key", [key for key in groups("bores", "gear", "elasticity", "bore_radius_over_module")]
+    "key",
+    [key for key in groups("bores", "gear", "elasticity", "bore_radius_over_module")],
 )
 def test_ring_over_bores(xiamen, strain, stress, key):
     """Self within 5 %, cross within 5 % (2 % for the bores of the paper's pair as we take them)."""
@@ -162,7 +181,8 @@ def test_ring_over_bores(xiamen, strain, stress, key):
     entering = column(cross, "position_over_module") * MODULE
     curvature = pair.pinion_curvature if name == "pinion" else pair.wheel_curvature
     angles = [
-        load_angle(own, np.asarray(curvature(entering + shift))) for shift in (0.0, pair.base_pitch)
+        load_angle(own, np.asarray(curvature(entering + shift)))
+        for shift in (0.0, pair.base_pitch)
     ]
     found = cross_compliance(
         own, material, angles[0], angles[1], pitches=1 if name == "pinion" else -1
@@ -178,8 +198,10 @@ def three_d(fault, depth, extent, point, quantity, loaded="1"):
     (row,) = (
         row
         for row in groups("three_d", "fault")[fault,]
-        if (row["crack_depth_over_module"], row["crack_extent_over_width"]) == (depth, extent)
-        and (row["point"], row["quantity"], row["loaded_over_width"]) == (point, quantity, loaded)
+        if (row["crack_depth_over_module"], row["crack_extent_over_width"])
+        == (depth, extent)
+        and (row["point"], row["quantity"], row["loaded_over_width"])
+        == (point, quantity, loaded)
     )
     return float(row["compliance"]), float(row["curvature_radius_over_module"]) * MODULE
 
@@ -189,7 +211,8 @@ def three_d(fault, depth, extent, point, quantity, loaded="1"):
 def test_partial_width_crack_in_three_dimensions(xiamen, strain, depth, extent):
     """Increment at the pitch point where the mate keeps the contact line straight, within 15 %."""
     (cracked, radius), (sound, _) = (
-        three_d(*case, "C", "rigid") for case in (("crack", depth, extent), ("sound", "0", "0"))
+        three_d(*case, "C", "rigid")
+        for case in (("crack", depth, extent), ("sound", "0", "0"))
     )
     crack = Crack(
         gear="pinion",
@@ -230,7 +253,9 @@ def test_partial_width_load_in_three_dimensions(machine):
         ).total
         # half of the slices bear: what is theirs counts twice; the wheel's part is not in this reference
         extra = own - mate if bending == "by_slice" else own
-        assert_allclose(extra, share if bending == "by_slice" else 0.0, rtol=1e-9, atol=0)
+        assert_allclose(
+            extra, share if bending == "by_slice" else 0.0, rtol=1e-9, atol=0
+        )
         found[bending] = (whole + extra)[0] * YOUNG * WIDTH / pitted
     assert_allclose(found["by_slice"], 1.0, rtol=0.15, atol=0)
     assert found["whole"] < 0.85

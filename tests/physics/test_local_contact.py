@@ -8,9 +8,27 @@ from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.local_contact import linear_contact, weber_contact
 
 # spur reference, section 3.4: named points by pinion curvature radius (mm), pair in plane strain at 20 N m (1e8 N/m)
-CURVATURE_MM = (2.45827, 4.55954, 6.66082, 7.51168, 7.86646, 8.36253, 10.46381, 12.56508)
+CURVATURE_MM = (
+    2.45827,
+    4.55954,
+    6.66082,
+    7.51168,
+    7.86646,
+    8.36253,
+    10.46381,
+    12.56508,
+)
 FINITE_ELEMENTS = (1.5067, 1.7595, 1.9036, 1.9262, 1.9291, 1.9264, 1.8218, 1.5706)
-LOCAL_PART = (1251.0, 1177.5, 1169.2, 1163.5, 1160.4, 1155.1, 1117.5, 1058.9)  # 1e-12 m/N
+LOCAL_PART = (
+    1251.0,
+    1177.5,
+    1169.2,
+    1163.5,
+    1160.4,
+    1155.1,
+    1117.5,
+    1058.9,
+)  # 1e-12 m/N
 
 
 @pytest.fixture(scope="module")
@@ -37,12 +55,18 @@ def single_pair(system):
 
 
 def test_single_pair_against_finite_elements(physical):
-    assert_allclose(single_pair(physical), np.array(FINITE_ELEMENTS) * 1e8, rtol=0.015, atol=0)
+    assert_allclose(
+        single_pair(physical), np.array(FINITE_ELEMENTS) * 1e8, rtol=0.015, atol=0
+    )
 
 
 @pytest.mark.parametrize(
     "other",
-    [{"mesh.contact": "linear"}, {"mesh.elasticity": "plane_stress"}, {"mesh.tooth": "to_contact"}],
+    [
+        {"mesh.contact": "linear"},
+        {"mesh.elasticity": "plane_stress"},
+        {"mesh.tooth": "to_contact"},
+    ],
     ids=str,
 )
 def test_the_papers_choice_of_any_misses_them(machine, other):
@@ -58,7 +82,10 @@ def test_local_part_against_finite_elements(physical):
         (found / (np.array(LOCAL_PART) * 1e-12) > 0.90)
         & (found / (np.array(LOCAL_PART) * 1e-12) < 0.95)
     )
-    assert linear_contact(at, physical.material).compliance(width, load)[0] < 0.3 * found.min()
+    assert (
+        linear_contact(at, physical.material).compliance(width, load)[0]
+        < 0.3 * found.min()
+    )
 
 
 def test_coupled_double_zone_against_finite_elements(physical):
@@ -66,15 +93,23 @@ def test_coupled_double_zone_against_finite_elements(physical):
     along_mm = np.array([0.0, 0.7, 1.401, 2.101, 2.802, 3.502, 4.203])
     expected = np.array([2.355, 2.386, 2.403, 2.408, 2.401, 2.381, 2.347]) * 1e8 * 1.04
     table = physical.mesh_table()
-    found = static_mesh(table, pair_states(table, along_mm * 1e-3), physical.mesh_force).stiffness
+    found = static_mesh(
+        table, pair_states(table, along_mm * 1e-3), physical.mesh_force
+    ).stiffness
     assert_allclose(found, expected, rtol=0.01, atol=0)
 
 
 def test_local_compliance_falls_with_load_and_width(physical):
-    law = weber_contact(physical.pair, np.full(4, physical.pair.pitch_point), physical.material)
+    law = weber_contact(
+        physical.pair, np.full(4, physical.pair.pitch_point), physical.material
+    )
     width = physical.pair.pinion.face_width
-    assert np.all(np.diff(law.compliance(width, np.array([50.0, 200.0, 900.0, 4000.0]))) < 0)
-    assert np.all(np.diff(law.compliance(width * np.array([0.25, 0.5, 0.75, 1.0]), 900.0)) < 0)
+    assert np.all(
+        np.diff(law.compliance(width, np.array([50.0, 200.0, 900.0, 4000.0]))) < 0
+    )
+    assert np.all(
+        np.diff(law.compliance(width * np.array([0.25, 0.5, 0.75, 1.0]), 900.0)) < 0
+    )
 
 
 def test_load_sharing_and_compliance_agree(physical):
@@ -94,14 +129,18 @@ def test_load_sharing_and_compliance_agree(physical):
     contact, full = law.compliance(width, load[inside]), law.compliance(width, force)
     curves = physical.stiffness_curves()
     alone = 1.0 / np.interp(
-        at / physical.pair.base_pitch, curves.contact_position, curves.single_pair_stiffness
+        at / physical.pair.base_pitch,
+        curves.contact_position,
+        curves.single_pair_stiffness,
     )
     assert_allclose(own - contact, alone - full, rtol=2e-3, atol=0)
 
 
 def test_more_torque_is_stiffer(machine):
     stiffness = [
-        machine({"operating.torque_nm": torque}).stiffness_curves().mesh_stiffness.mean()
+        machine({"operating.torque_nm": torque})
+        .stiffness_curves()
+        .mesh_stiffness.mean()
         for torque in (5.0, 20.0, 80.0)
     ]
     assert np.all(np.diff(stiffness) > 0)
@@ -111,7 +150,9 @@ def test_more_torque_is_stiffer(machine):
 def test_plane_strain_is_plane_stress_of_another_material(xiamen):
     material = xiamen.material
     inside = material.in_plane("plane_strain")
-    assert_allclose(inside.youngs_modulus, material.youngs_modulus / 0.91, rtol=1e-12, atol=0)
+    assert_allclose(
+        inside.youngs_modulus, material.youngs_modulus / 0.91, rtol=1e-12, atol=0
+    )
     assert_allclose(inside.shear_modulus, material.shear_modulus, rtol=1e-12, atol=0)
     assert material.in_plane("plane_stress") is material
 

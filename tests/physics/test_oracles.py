@@ -36,7 +36,9 @@ class TestFourMilliseconds:
         """Velocities, (sample, dof)."""
         dynamics = dynamics_of(xiamen, phase=PHASE)
         times = np.arange(cls.N_SAMPLES + 1) / SAMPLING_RATE
-        return solved(equations(dynamics)[0], at_rest(dynamics), times, "DOP853", 1e-11)[:, 6:]
+        return solved(
+            equations(dynamics)[0], at_rest(dynamics), times, "DOP853", 1e-11
+        )[:, 6:]
 
     @pytest.fixture(scope="class")
     @classmethod
@@ -46,14 +48,19 @@ class TestFourMilliseconds:
         def measured(system, oversampling):
             dynamics = dynamics_of(system, phase=PHASE)
             start, step = at_rest(dynamics), 1 / (SAMPLING_RATE * oversampling)
-            _, v = trajectory(dynamics, start[:6], start[6:], step, cls.N_SAMPLES * oversampling)
+            _, v = trajectory(
+                dynamics, start[:6], start[6:], step, cls.N_SAMPLES * oversampling
+            )
             return (
-                np.linalg.norm(v[::oversampling] - exact, axis=0) / np.linalg.norm(exact, axis=0)
+                np.linalg.norm(v[::oversampling] - exact, axis=0)
+                / np.linalg.norm(exact, axis=0)
             ).max()
 
         return measured
 
-    @pytest.mark.parametrize(("oversampling", "limit"), [(5, 2e-4), (10, 4e-5), (20, 1e-5)])
+    @pytest.mark.parametrize(
+        ("oversampling", "limit"), [(5, 2e-4), (10, 4e-5), (20, 1e-5)]
+    )
     def test_error(self, xiamen, error, oversampling, limit):
         assert error(xiamen, oversampling) < limit
 
@@ -94,7 +101,9 @@ class Case:
 
 CASES = {
     "healthy": Case(speed_rpm=1800, faults=(), period=60 / 1800 / 23, n_periods=69),
-    "crack": Case(speed_rpm=6000, faults=(one("crack", tooth=3),), period=60 / 6000, n_periods=10),
+    "crack": Case(
+        speed_rpm=6000, faults=(one("crack", tooth=3),), period=60 / 6000, n_periods=10
+    ),
 }
 
 
@@ -111,7 +120,9 @@ def periodic_motion(dynamics, period, n_points):
         dynamics.system().mass,
     )
     damping = (
-        2 * dynamics.table.options.damping_ratio * math.sqrt(stiffness * dynamics.equivalent_mass)
+        2
+        * dynamics.table.options.damping_ratio
+        * math.sqrt(stiffness * dynamics.equivalent_mass)
     )
     held = free.copy()
     held[6:] -= np.outer(
@@ -150,7 +161,10 @@ class TestPeriodicMotion:
         def found(oversampling, changes=None, phase=PHASE):
             system = machine({**case.changes, **(changes or {})})
             system = replace(
-                system, solver=replace(system.solver, oversampling=oversampling, max_error=None)
+                system,
+                solver=replace(
+                    system.solver, oversampling=oversampling, max_error=None
+                ),
             )
             start = Start(tooth_pinion=0, tooth_wheel=0, phase=phase)
             return np.fft.rfft(
@@ -165,15 +179,21 @@ class TestPeriodicMotion:
 
         The drive is soft: a torque of 1e-7 of the set one turns the pinion on by what 1e-8 s do.
         """
-        velocity = np.fft.rfft(tile[:-1, 6:], axis=0, norm="forward")[case.lines][:, RECORDED].T
+        velocity = np.fft.rfft(tile[:-1, 6:], axis=0, norm="forward")[case.lines][
+            :, RECORDED
+        ].T
         turn = 2j * np.pi * case.lines / case.period
         exact = turn * velocity
 
         def measured(*record):
             found = spectrum(*record)[:, case.n_periods * case.lines]
-            late = -np.vdot(turn * exact, found).real / np.linalg.norm(turn * exact) ** 2
+            late = (
+                -np.vdot(turn * exact, found).real / np.linalg.norm(turn * exact) ** 2
+            )
             off = found * np.exp(turn * late) - exact
-            return late, (np.linalg.norm(off, axis=1) / np.linalg.norm(exact, axis=1)).max()
+            return late, (
+                np.linalg.norm(off, axis=1) / np.linalg.norm(exact, axis=1)
+            ).max()
 
         return measured
 
@@ -185,10 +205,14 @@ class TestPeriodicMotion:
         assert abs(tile[:-1, 8].mean()) < 1e-8 * 2 * np.pi * case.speed_rpm / 60
 
     def test_a_record_holds_nothing_else(self, case, spectrum, default):
-        found = spectrum(default)[:, 1 : math.floor(20e3 * case.period * case.n_periods)]
+        found = spectrum(default)[
+            :, 1 : math.floor(20e3 * case.period * case.n_periods)
+        ]
         between = found.copy()
         between[:, case.n_periods - 1 :: case.n_periods] = 0
-        assert np.all(np.linalg.norm(between, axis=1) < 5e-4 * np.linalg.norm(found, axis=1))
+        assert np.all(
+            np.linalg.norm(between, axis=1) < 5e-4 * np.linalg.norm(found, axis=1)
+        )
 
     def test_a_record_at_the_default_oversampling(self, case, compared, default):
         late, error = compared(default)
@@ -220,7 +244,10 @@ class TestOutOfContact:
                     "solver.oversampling": 5, "solver.max_error": None}  # fmt: skip
         changes = ({}, {"solver.oversampling": 20}, {"operating.torque_nm": 1.1})
         return simulate_together(
-            [Run(system=machine({**bouncing, **change}), faults=missing) for change in changes]
+            [
+                Run(system=machine({**bouncing, **change}), faults=missing)
+                for change in changes
+            ]
         )
 
     def test_they_are(self, records):

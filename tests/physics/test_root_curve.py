@@ -30,9 +30,13 @@ def rack_clearance(gear, x, y):
         gear.pressure_angle,
         gear.cutter_tip_radius_coefficient * gear.normal_module,
     )
-    below_datum = (gear.addendum_coefficient + gear.clearance_coefficient) * m - rounding
+    below_datum = (
+        gear.addendum_coefficient + gear.clearance_coefficient
+    ) * m - rounding
     center_depth = below_datum - gear.profile_shift * m
-    center_offset = math.pi * m / 4 + below_datum * math.tan(alpha) + rounding / math.cos(alpha)
+    center_offset = (
+        math.pi * m / 4 + below_datum * math.tan(alpha) + rounding / math.cos(alpha)
+    )
     radius, polar, pitch_radius = (
         np.hypot(x, y)[:, None],
         np.arctan2(y, x)[:, None],
@@ -44,7 +48,10 @@ def rack_clearance(gear, x, y):
         deep = pitch_radius - radius * np.cos(polar - roll) - center_depth
         # the rack's tooth is the wedge right of its flank and above its tip line, grown by the rounding
         from_tip, from_flank = deep, -along * math.cos(alpha) + deep * math.sin(alpha)
-        on_tip, on_flank = along > 0, -along * math.sin(alpha) - deep * math.cos(alpha) > 0
+        on_tip, on_flank = (
+            along > 0,
+            -along * math.sin(alpha) - deep * math.cos(alpha) > 0,
+        )
         outside = np.where(
             on_tip & (from_tip > 0),
             from_tip,
@@ -54,10 +61,16 @@ def rack_clearance(gear, x, y):
         return np.where(inside, np.maximum(from_tip, from_flank), outside) - rounding
 
     span = np.linspace(-1.0, 1.0, 801) * 6 * m / pitch_radius
-    best, step = np.take(span, distance(span[None, :]).argmin(axis=1)), span[1] - span[0]
+    best, step = (
+        np.take(span, distance(span[None, :]).argmin(axis=1)),
+        span[1] - span[0],
+    )
     for _ in range(3):
         fine = best[:, None] + step * np.linspace(-1, 1, 101)
-        best, step = fine[np.arange(len(best)), distance(fine).argmin(axis=1)], step / 50
+        best, step = (
+            fine[np.arange(len(best)), distance(fine).argmin(axis=1)],
+            step / 50,
+        )
     return distance(best[:, None])[:, 0]
 
 
@@ -65,7 +78,10 @@ def outline(gear):
     gamma = np.linspace(math.pi / 2, gear.pressure_angle, 32)
     tip = math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
     flank = involute_point(gear, np.linspace(gear.junction_curvature_radius, tip, 16))
-    return [np.concatenate(parts) for parts in zip(root_curve(gear, gamma), flank, strict=True)]
+    return [
+        np.concatenate(parts)
+        for parts in zip(root_curve(gear, gamma), flank, strict=True)
+    ]
 
 
 def test_a_rolling_rack_cuts_this_outline(gear):
@@ -73,7 +89,9 @@ def test_a_rolling_rack_cuts_this_outline(gear):
 
 
 def test_the_rack_tells_another_cutter(gear):
-    other = replace(gear, cutter_tip_radius_coefficient=0.9 * gear.cutter_tip_radius_coefficient)
+    other = replace(
+        gear, cutter_tip_radius_coefficient=0.9 * gear.cutter_tip_radius_coefficient
+    )
     assert np.abs(rack_clearance(gear, *outline(other))).max() > 1e-6
 
 
@@ -88,13 +106,18 @@ def test_involute_end_joins_in_place_and_slope(gear):
     root = np.array(root_curve(gear, gear.pressure_angle + np.array([0.0, h])))
     flank = np.array(involute_point(gear, junction + np.array([0.0, h])))
     assert_allclose(root[:, 0], flank[:, 0], rtol=0, atol=1e-12)
-    angles = [math.atan2(*(curve[::-1, 1] - curve[::-1, 0])) % math.pi for curve in (root, flank)]
+    angles = [
+        math.atan2(*(curve[::-1, 1] - curve[::-1, 0])) % math.pi
+        for curve in (root, flank)
+    ]
     assert_allclose(angles[0], angles[1], rtol=0, atol=1e-4)
 
 
 def test_a_moved_junction_shows_as_a_gap(gear):
     root = np.array(root_curve(gear, np.array([gear.pressure_angle])))
-    flank = np.array(involute_point(gear, np.array([gear.junction_curvature_radius + 1e-5])))
+    flank = np.array(
+        involute_point(gear, np.array([gear.junction_curvature_radius + 1e-5]))
+    )
     assert np.abs(root - flank).max() > 1e-7
 
 

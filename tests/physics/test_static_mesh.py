@@ -11,7 +11,12 @@ from gensig.mesh.load_distribution import PairStates, pair_states, static_mesh
 
 
 def fault(kind, gear="pinion", tooth=5):
-    return one(kind, gear=gear, tooth=tooth, **({"crack_depth_mm": 2.0} if kind == "crack" else {}))
+    return one(
+        kind,
+        gear=gear,
+        tooth=tooth,
+        **({"crack_depth_mm": 2.0} if kind == "crack" else {}),
+    )
 
 
 # runout is on every tooth
@@ -41,7 +46,9 @@ def violation(states, static, shared, force):
     """
     flexibility = np.einsum("ij,jk->ijk", states.compliance, np.eye(4)) + shared
     slack = (
-        states.gap + np.einsum("ijk,ik->ij", flexibility, static.load) - static.approach[:, None]
+        states.gap
+        + np.einsum("ijk,ik->ij", flexibility, static.load)
+        - static.approach[:, None]
     )
     scale = static.approach.max()
     carrying = static.load > 0
@@ -77,7 +84,10 @@ class TestComplementarity:
 @pytest.mark.parametrize("kind", KINDS)
 def test_equilibrium_with_every_fault_over_a_turn(xiamen, kind, gear):
     """C F = approach - gap where a pair carries, none pulls, none that could carry is left, all force is borne."""
-    faulty, force = xiamen.mesh_table((one(kind, gear=gear, tooth=3),)), xiamen.mesh_force
+    faulty, force = (
+        xiamen.mesh_table((one(kind, gear=gear, tooth=3),)),
+        xiamen.mesh_force,
+    )
     roll = xiamen.pair.base_pitch * np.linspace(0, 23, 23 * 20, endpoint=False)
     states = pair_states(faulty, roll)
     static = static_mesh(faulty, states, force)
@@ -85,24 +95,36 @@ def test_equilibrium_with_every_fault_over_a_turn(xiamen, kind, gear):
     share = static.load / static.load.sum(axis=1, keepdims=True)
     assert_allclose(share.sum(axis=1), 1.0, rtol=1e-12, atol=0)
     assert share.min() >= 0
-    sound = static_mesh(xiamen.mesh_table(), pair_states(xiamen.mesh_table(), roll), force)
+    sound = static_mesh(
+        xiamen.mesh_table(), pair_states(xiamen.mesh_table(), roll), force
+    )
     assert np.abs(static.load - sound.load).max() > 1e-3 * force
     assert (
-        violation(states, replace(static, load=sound.load), faulty.shared_compliance, force) > 1e-6
+        violation(
+            states, replace(static, load=sound.load), faulty.shared_compliance, force
+        )
+        > 1e-6
     )
 
 
 def test_approach_rises_with_force_and_stiffness_is_its_slope(table):
     states = random_states(table)
     forces = np.geomspace(1, 1e5, 60)
-    approach = np.array([static_mesh(table, states, force).approach for force in forces])
+    approach = np.array(
+        [static_mesh(table, states, force).approach for force in forces]
+    )
     assert np.all(np.diff(approach, axis=0) > 0)
-    low, high = (static_mesh(table, states, 1000.0 * (1 + sign * 1e-7)) for sign in (-1, 1))
+    low, high = (
+        static_mesh(table, states, 1000.0 * (1 + sign * 1e-7)) for sign in (-1, 1)
+    )
     same = ((low.load > 0) == (high.load > 0)).all(axis=1)
     slope = 2e-4 / (high.approach - low.approach)
     assert same.mean() > 0.9
     assert_allclose(
-        static_mesh(table, states, 1000.0).stiffness[same], slope[same], rtol=1e-5, atol=0
+        static_mesh(table, states, 1000.0).stiffness[same],
+        slope[same],
+        rtol=1e-5,
+        atol=0,
     )
 
 
@@ -115,8 +137,12 @@ def test_shares_of_the_stiffness_curves_sum_to_one(xiamen):
 class TestMeshPeriod:
     @pytest.mark.parametrize("law", ["one_sided", "paper"])
     def test_sound_teeth_repeat_every_pitch(self, machine, law):
-        teeth = machine({"mesh.law": law}).stiffness_curves().mesh_stiffness.reshape(23, -1)
-        assert_allclose(teeth, np.broadcast_to(teeth[0], teeth.shape), rtol=1e-8, atol=0)
+        teeth = (
+            machine({"mesh.law": law}).stiffness_curves().mesh_stiffness.reshape(23, -1)
+        )
+        assert_allclose(
+            teeth, np.broadcast_to(teeth[0], teeth.shape), rtol=1e-8, atol=0
+        )
         assert np.ptp(teeth[0]) > 0.1 * teeth.mean()
 
     @pytest.mark.parametrize("kind", FAULTS)
@@ -135,9 +161,14 @@ def test_a_faulty_tooth_shows_once_a_turn_at_its_number(xiamen, gear, kind, toot
     force = xiamen.operating.torque / xiamen.pair.pinion.base_radius
     stiffness = [
         static_mesh(table, pair_states(table, roll), force).stiffness
-        for table in (xiamen.mesh_table(), xiamen.mesh_table((fault(kind, gear, tooth),)))
+        for table in (
+            xiamen.mesh_table(),
+            xiamen.mesh_table((fault(kind, gear, tooth),)),
+        )
     ]
-    touched = (np.abs(stiffness[1] / stiffness[0] - 1) > 1e-9).reshape(2, n_teeth, points)
+    touched = (np.abs(stiffness[1] / stiffness[0] - 1) > 1e-9).reshape(
+        2, n_teeth, points
+    )
     assert (touched[0] == touched[1]).all()
     pitches = np.flatnonzero(touched[0].any(axis=1)) - tooth
     pitches = np.sort((pitches + n_teeth // 2) % n_teeth - n_teeth // 2)
@@ -157,7 +188,9 @@ def test_start_teeth_shift_the_fault(xiamen, gear):
         rtol=1e-9,
         atol=0,
     )
-    assert np.abs(shifted.compliance - pair_states(table, roll).compliance).max() > 1e-10
+    assert (
+        np.abs(shifted.compliance - pair_states(table, roll).compliance).max() > 1e-10
+    )
 
 
 @pytest.mark.parametrize("gear", ["pinion", "wheel"])
@@ -167,7 +200,9 @@ def test_the_pair_of_a_missing_tooth_never_carries(machine, gear, law):
     table = system.mesh_table((fault("missing_tooth", gear, 1),))
     roll = system.pair.base_pitch * np.linspace(1, 4, 500)
     states = pair_states(table, roll)
-    pair_index = np.rint((roll[:, None] - states.position) / system.pair.base_pitch).astype(int)
+    pair_index = np.rint(
+        (roll[:, None] - states.position) / system.pair.base_pitch
+    ).astype(int)
     for force in (10.0, 925.0, 5e4):
         load = static_mesh(table, states, force).load
         assert np.all(load[pair_index == 1] <= 0)
@@ -178,16 +213,25 @@ class TestPaperLaw:
     def test_zones_match_the_contact_ratio(self, paper_machine):
         table, pitch = paper_machine.mesh_table(), paper_machine.pair.base_pitch
         roll = pitch * (np.arange(20000) + 0.5) / 20000
-        n_carrying = (static_mesh(table, pair_states(table, roll), 925.0).load > 0).sum(axis=1)
+        n_carrying = (static_mesh(table, pair_states(table, roll), 925.0).load > 0).sum(
+            axis=1
+        )
         assert set(n_carrying.tolist()) == {1, 2}
         assert_allclose(
-            n_carrying.mean(), paper_machine.pair.transverse_contact_ratio, rtol=0, atol=1e-4
+            n_carrying.mean(),
+            paper_machine.pair.transverse_contact_ratio,
+            rtol=0,
+            atol=1e-4,
         )
 
     def test_the_one_sided_law_keeps_pairs_longer(self, xiamen):
         roll = xiamen.pair.base_pitch * (np.arange(2000) + 0.5) / 2000
-        load = static_mesh(xiamen.mesh_table(), pair_states(xiamen.mesh_table(), roll), 925.0).load
-        assert (load > 0).sum(axis=1).mean() > xiamen.pair.transverse_contact_ratio + 0.01
+        load = static_mesh(
+            xiamen.mesh_table(), pair_states(xiamen.mesh_table(), roll), 925.0
+        ).load
+        assert (load > 0).sum(
+            axis=1
+        ).mean() > xiamen.pair.transverse_contact_ratio + 0.01
 
     def test_double_zone_is_the_plain_sum(self, paper_machine):
         # spur reference (docs/validation.md), table 2.3, bores 9 / 15 mm
@@ -206,7 +250,9 @@ class TestPaperLaw:
             3.7540,
             3.7199,
         ]
-        expected = 1e8 * np.array([*double, 3.6783, 2.0686, 2.0800, 2.0879, 2.0921, 2.0927, 2.0895])
+        expected = 1e8 * np.array(
+            [*double, 3.6783, 2.0686, 2.0800, 2.0879, 2.0921, 2.0927, 2.0895]
+        )
         curves = paper_machine.stiffness_curves(points_per_tooth=20)
         assert_allclose(curves.mesh_stiffness[:20], expected, rtol=2e-3, atol=0)
 
@@ -215,4 +261,6 @@ class TestPaperLaw:
             (fault("missing_tooth", tooth=0),), points_per_tooth=200
         )
         lost = np.mean(curves.mesh_stiffness <= 0) * 23
-        assert_allclose(lost, 2 - paper_machine.pair.transverse_contact_ratio, rtol=0, atol=0.01)
+        assert_allclose(
+            lost, 2 - paper_machine.pair.transverse_contact_ratio, rtol=0, atol=0.01
+        )

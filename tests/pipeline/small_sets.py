@@ -16,7 +16,17 @@ PARTS = ("plan.csv", "index.h5", "shards/*", "splits/*")
 
 def make(out: Path, *overrides: str) -> Path:
     assert (
-        main(["generate", "--quiet", *TINY, "executor.n_workers=1", *overrides, f"out={out}"]) == 0
+        main(
+            [
+                "generate",
+                "--quiet",
+                *TINY,
+                "executor.n_workers=1",
+                *overrides,
+                f"out={out}",
+            ]
+        )
+        == 0
     )
     return out
 

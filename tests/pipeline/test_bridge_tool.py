@@ -123,7 +123,9 @@ def test_the_control_has_a_row_for_every_case_and_forgives_a_sound_gear(
     assert {row["n_windows"] for row in rows} == {20}
     alike = [row for row in rows if row["channel"] == 1]
     assert sum(row["contains_zero"] or row["refuses_both"] for row in alike) >= 7
-    unlike = [row for row in rows if row["channel"] == 0 and row["variant"] != control.BEFORE]
+    unlike = [
+        row for row in rows if row["channel"] == 0 and row["variant"] != control.BEFORE
+    ]
     assert all(row["beyond_if_broken"] > 0.9 for row in unlike)
     assert np.mean([row["beyond_if_healthy"] for row in unlike]) < 0.5
 
@@ -137,6 +139,6 @@ def test_a_difference_is_told_from_none():
     assert not row["refuses_both"]
     shifted = {**noise, "broken_tooth": noise["broken_tooth"] + 0.3}
     assert not control._row(shifted, told, np.random.default_rng(1))["contains_zero"]
-    assert control._row(noise, {state: np.ones(20) for state in noise}, np.random.default_rng(1))[
-        "refuses_both"
-    ]
+    assert control._row(
+        noise, {state: np.ones(20) for state in noise}, np.random.default_rng(1)
+    )["refuses_both"]

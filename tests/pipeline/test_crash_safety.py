@@ -49,7 +49,9 @@ def begun(reference: Path, tmp_path: Path) -> Path:
 
 def resume(out: Path, *words: str) -> int:
     """In this process, unless the words choose an executor."""
-    own = () if any(word.startswith("executor") for word in words) else ("--workers", "1")
+    own = (
+        () if any(word.startswith("executor") for word in words) else ("--workers", "1")
+    )
     return main(["resume", "--quiet", str(out), *words, *own])
 
 
@@ -63,7 +65,9 @@ def test_killed_at_random_moments_it_ends_byte_equal() -> None:
         "--seed",
         str(time.time_ns()),
     ]
-    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    result = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, check=False
+    )
     assert result.returncode == 0, f"{command}\n{result.stdout}{result.stderr}"
 
 
@@ -92,7 +96,9 @@ def test_interrupt_from_a_terminal_reaches_all_processes_and_is_one_line(
         "executor.n_workers=2",
         f"out={out}",
     ]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    process = subprocess.Popen(
+        command, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
     while not (out / "manifest.json").is_file():
         assert process.poll() is None
         time.sleep(0.01)
@@ -189,7 +195,9 @@ def test_closed_folder_is_one_line_and_changes_nothing(
     assert "cannot write" in said
     assert "Traceback" not in said
     assert not verify(begun).complete
-    assert {name: content for name, content in contents(begun).items() if name in before} == before
+    assert {
+        name: content for name, content in contents(begun).items() if name in before
+    } == before
     assert resume(begun) == 0
     assert contents(begun) == contents(reference)
 
@@ -223,7 +231,11 @@ def change_plan(out: Path) -> None:
         (change_config, (), ("operating.torque_nm",)),
         (change_version, (), ("0.0.1",)),
         (change_plan, (), ("plan.csv",)),
-        (lambda out: None, ("seed=3", "mesh.damping_ratio=0.1"), ("mesh.damping_ratio", "seed")),
+        (
+            lambda out: None,
+            ("seed=3", "mesh.damping_ratio=0.1"),
+            ("mesh.damping_ratio", "seed"),
+        ),
     ],
 )
 def test_resume_with_another_identity_is_refused(
@@ -238,7 +250,9 @@ def test_resume_with_another_identity_is_refused(
     assert resume(begun, *words) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert all(hint in line for hint in hints)
-    assert {path: path.read_bytes() for path in begun.rglob("*") if path.is_file()} == before
+    assert {
+        path: path.read_bytes() for path in begun.rglob("*") if path.is_file()
+    } == before
 
 
 def test_what_was_begun_says_how_it_is_finished(
@@ -312,7 +326,10 @@ def test_resume_without_the_compression_is_refused_before_anything_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "data"
-    assert main(["plan", "--freeze", *TINY, "dataset.compression=blosc2", f"out={out}"]) == 0
+    assert (
+        main(["plan", "--freeze", *TINY, "dataset.compression=blosc2", f"out={out}"])
+        == 0
+    )
     monkeypatch.setitem(sys.modules, "hdf5plugin", None)
     capsys.readouterr()
     assert resume(out) == 2
@@ -329,11 +346,15 @@ def test_a_shard_lost_since_is_made_again(begun: Path, reference: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", ["none", "cut shard", "no json", "other rows"])
-def test_receipts_are_taken_only_of_whole_shards(begun: Path, reference: Path, damage: str) -> None:
+def test_receipts_are_taken_only_of_whole_shards(
+    begun: Path, reference: Path, damage: str
+) -> None:
     entry = read_manifest(reference).shards[2]
     shutil.copy(shard_path(reference, 2), shard_path(begun, 2))
     rows = 2 if damage == "other rows" else 1
-    write_receipt(begun, 2, rows=rows, sha256=entry.sha256, n_bytes=entry.bytes, n_failed=0)
+    write_receipt(
+        begun, 2, rows=rows, sha256=entry.sha256, n_bytes=entry.bytes, n_failed=0
+    )
     if damage == "cut shard":
         shard_path(begun, 2).write_bytes(b"short")
     if damage == "no json":

@@ -24,7 +24,9 @@ SMALL = (
 
 def _python(page: Path) -> list[Block]:
     return [
-        block for block in blocks(page.read_text(encoding="utf-8")) if block.language == "python"
+        block
+        for block in blocks(page.read_text(encoding="utf-8"))
+        if block.language == "python"
     ]
 
 
@@ -33,7 +35,9 @@ def _runs(block: Block) -> bool:
 
 
 RUN = [
-    page for page in PAGES if page.parent != ROOT and any(_runs(block) for block in _python(page))
+    page
+    for page in PAGES
+    if page.parent != ROOT and any(_runs(block) for block in _python(page))
 ]
 
 

@@ -42,7 +42,9 @@ def deadly(notes: Path, poison: int, deaths: int, index: int) -> int:
     return 10 * index
 
 
-def outcome(executor: Executor, notes: Path, deaths: int) -> tuple[dict, dict[int, int]]:
+def outcome(
+    executor: Executor, notes: Path, deaths: int
+) -> tuple[dict, dict[int, int]]:
     """Results by index, and how often each was begun."""
     results = dict(executor.run(functools.partial(deadly, notes, 2, deaths), range(6)))
     return results, {index: len(list(notes.glob(f"{index}-*"))) for index in range(6)}
@@ -54,7 +56,9 @@ def test_only_the_shard_of_a_killed_worker_runs_again(tmp_path: Path) -> None:
     assert begun == {0: 1, 1: 1, 2: 2, 3: 1, 4: 1, 5: 1}
 
 
-def test_a_shard_that_always_kills_is_given_up_and_the_others_are_made(tmp_path: Path) -> None:
+def test_a_shard_that_always_kills_is_given_up_and_the_others_are_made(
+    tmp_path: Path,
+) -> None:
     results, begun = outcome(LOCAL, tmp_path, 99)
     failure = results.pop(2)
     assert isinstance(failure, ShardFailure)
@@ -71,9 +75,13 @@ def refuse(notes: Path, index: int) -> int:
 
 
 @pytest.mark.parametrize("n_workers", [1, 2])
-def test_an_exception_is_one_line_and_not_tried_again(tmp_path: Path, n_workers: int) -> None:
+def test_an_exception_is_one_line_and_not_tried_again(
+    tmp_path: Path, n_workers: int
+) -> None:
     results = dict(
-        LocalExecutor(n_workers=n_workers).run(functools.partial(refuse, tmp_path), range(3))
+        LocalExecutor(n_workers=n_workers).run(
+            functools.partial(refuse, tmp_path), range(3)
+        )
     )
     assert results == {0: 0, 1: ShardFailure(reason="ValueError: no such luck"), 2: 2}
     assert len(list(tmp_path.iterdir())) == 3
@@ -100,12 +108,16 @@ def test_workers_end_with_a_killed_parent(tmp_path: Path) -> None:
 
 def is_alive(pid: int) -> bool:
     try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+        return (
+            Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+        )
     except OSError:
         return False
 
 
-def wait_until(condition, process: subprocess.Popen | None = None, seconds: float = 120.0) -> None:
+def wait_until(
+    condition, process: subprocess.Popen | None = None, seconds: float = 120.0
+) -> None:
     deadline = time.monotonic() + seconds
     while not condition():
         assert process is None or process.poll() is None, "the process ended too early"
@@ -122,7 +134,9 @@ def test_a_script_without_a_main_guard_runs_once(tmp_path: Path) -> None:
         "print(sorted(LocalExecutor(n_workers=2).run(operator.neg, range(4))))\n"
         "print(__file__, __spec__)\n"
     )
-    ran = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=120)
+    ran = subprocess.run(
+        [sys.executable, script], capture_output=True, text=True, timeout=120
+    )
     assert ran.returncode == 0, ran.stderr
     assert ran.stdout.splitlines() == [
         "begun",
@@ -133,12 +147,17 @@ def test_a_script_without_a_main_guard_runs_once(tmp_path: Path) -> None:
 
 
 def test_tasks_of_an_array_share_all_shards_out() -> None:
-    tasks = [ArrayExecutor(shard_index=index, shard_count=3, n_workers=1) for index in range(3)]
+    tasks = [
+        ArrayExecutor(shard_index=index, shard_count=3, n_workers=1)
+        for index in range(3)
+    ]
     shares = [task.share(range(8)) for task in tasks]
     assert sorted(index for share in shares for index in share) == list(range(8))
     assert all(shares)
     assert dict(tasks[1].run(lambda index: -index, range(8))) == {1: -1, 4: -4, 7: -7}
-    assert ArrayExecutor(shard_index=9, shard_count=10, n_workers=1).share(range(8)) == []
+    assert (
+        ArrayExecutor(shard_index=9, shard_count=10, n_workers=1).share(range(8)) == []
+    )
 
 
 @pytest.mark.parametrize(
@@ -151,8 +170,14 @@ def test_tasks_of_an_array_share_all_shards_out() -> None:
             {"kind": "slurm", "n_workers": 1, "shard_index": None, "shard_count": 2},
             "executor.shard_index",
         ),
-        ({"kind": "slurm", "n_workers": 1, "shard_index": 2, "shard_count": 2}, "--array=0-1"),
-        ({"kind": "slurm", "n_workers": 1, "shard_index": -1, "shard_count": 2}, "at least 0"),
+        (
+            {"kind": "slurm", "n_workers": 1, "shard_index": 2, "shard_count": 2},
+            "--array=0-1",
+        ),
+        (
+            {"kind": "slurm", "n_workers": 1, "shard_index": -1, "shard_count": 2},
+            "at least 0",
+        ),
     ],
 )
 def test_a_mistake_is_one_line(section: dict, hint: str) -> None:
@@ -173,9 +198,17 @@ def test_two_tasks_at_a_time_make_the_same_bytes(
     out = tmp_path / "data"
     assert main(["plan", "--freeze", *TINY, "executor=slurm", f"out={out}"]) == 0
     frozen = (out / "manifest.json").read_bytes()
-    words = ["generate", "--quiet", "executor=slurm", "executor.shard_count=2", f"out={out}"]
+    words = [
+        "generate",
+        "--quiet",
+        "executor=slurm",
+        "executor.shard_count=2",
+        f"out={out}",
+    ]
     capsys.readouterr()
-    assert main([*words, "executor.shard_index=0", "seed=5", "operating.torque_nm=7"]) == 2
+    assert (
+        main([*words, "executor.shard_index=0", "seed=5", "operating.torque_nm=7"]) == 2
+    )
     assert "operating.torque_nm, seed" in capsys.readouterr().err
     command = [sys.executable, "-m", "gensig.cli", *words, "executor.shard_index=1"]
     other = subprocess.Popen(command)
@@ -183,16 +216,22 @@ def test_two_tasks_at_a_time_make_the_same_bytes(
     assert not verify(out).complete
     assert other.wait(timeout=300) == 0
     assert (out / "manifest.json").read_bytes() == frozen  # tasks leave it alone
-    (out / "shards" / ".shard-00003.h5.done").unlink()  # as if that task had been killed just then
+    (
+        out / "shards" / ".shard-00003.h5.done"
+    ).unlink()  # as if that task had been killed just then
     assert main(["finalize", str(out)]) == 2
-    assert "5 of 6 shards are done, shard-00003.h5 is planned" in capsys.readouterr().err
+    assert (
+        "5 of 6 shards are done, shard-00003.h5 is planned" in capsys.readouterr().err
+    )
     assert main([*words, "executor.shard_index=1"]) == 0
     assert main(["finalize", str(out)]) == 0
     assert verify(out).problems == []
     assert contents(out) == contents(reference)
 
 
-@pytest.mark.parametrize("words", [(), ("dataset.compression=gzip", "dataset.sample_type=int16")])
+@pytest.mark.parametrize(
+    "words", [(), ("dataset.compression=gzip", "dataset.sample_type=int16")]
+)
 def test_plan_predicts_bytes(
     tmp_path: Path, words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -201,12 +240,18 @@ def test_plan_predicts_bytes(
     n_bytes = sum(path.stat().st_size for path in out.rglob("*") if path.is_file())
     capsys.readouterr()
     assert main(["plan", *TINY, *overrides]) == 0
-    (line,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("bytes")]
+    (line,) = [
+        line
+        for line in capsys.readouterr().out.splitlines()
+        if line.startswith("bytes")
+    ]
     predicted = int(line.split()[1].replace(",", ""))
     assert 1 / 1.5 < predicted / n_bytes < 1.5
 
 
-def test_a_task_needs_a_frozen_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_task_needs_a_frozen_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     words = [
         "executor=slurm",
         "executor.shard_index=0",
@@ -241,11 +286,18 @@ def cluster(
             str(note),
         ]
         with (folder / "log").open("a") as log:
-            return subprocess.Popen(command, cwd=folder, env=environment, stdout=log, stderr=log)
+            return subprocess.Popen(
+                command, cwd=folder, env=environment, stdout=log, stderr=log
+            )
 
-    scheduler = start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
+    scheduler = start(
+        "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"
+    )
     wait_until(note.is_file, scheduler)
-    workers = [start("worker", "--nthreads", "1", "--no-nanny", "--no-dashboard") for _ in range(2)]
+    workers = [
+        start("worker", "--nthreads", "1", "--no-nanny", "--no-dashboard")
+        for _ in range(2)
+    ]
     address = json.loads(note.read_text())["address"]
     from distributed import Client
 
@@ -291,7 +343,9 @@ def test_dask_survives_a_killed_worker_with_the_same_bytes(
     assert contents(out) == contents(reference)
 
 
-def test_dask_on_this_machine_gives_up_a_shard_that_always_kills(tmp_path: Path) -> None:
+def test_dask_on_this_machine_gives_up_a_shard_that_always_kills(
+    tmp_path: Path,
+) -> None:
     results, begun = outcome(DaskExecutor(n_workers=2, address=None), tmp_path, 99)
     failure = results.pop(2)
     assert isinstance(failure, ShardFailure)

@@ -47,7 +47,9 @@ def test_bits_do_not_depend_on_shards_or_workers(
     reference: Path, tmp_path: Path, per_shard: int
 ) -> None:
     other = make(
-        tmp_path / "data", f"dataset.records_per_shard={per_shard}", "executor.n_workers=2"
+        tmp_path / "data",
+        f"dataset.records_per_shard={per_shard}",
+        "executor.n_workers=2",
     )
     assert signals(other).tobytes() == signals(reference).tobytes()
 
@@ -83,7 +85,9 @@ def test_a_data_set_is_labelled_and_whole(reference: Path) -> None:
         assert np.isfinite(index["acceleration"][...]).all()
 
 
-def test_noise_floor_is_the_same_for_every_class_of_a_condition(reference: Path) -> None:
+def test_noise_floor_is_the_same_for_every_class_of_a_condition(
+    reference: Path,
+) -> None:
     with gensig.open_dataset(reference) as data:
         noise, condition = data.column("noise_power"), data.column("condition_id")
     for name in set(condition):
@@ -94,13 +98,17 @@ def test_noise_floor_is_the_same_for_every_class_of_a_condition(reference: Path)
 
 def test_sham_plan_keeps_labels_without_faults(tmp_path: Path) -> None:
     folder = make(
-        tmp_path / "data", "plan.sham=true", "sensing.snr_db=null", "dataset.records_per_shard=8"
+        tmp_path / "data",
+        "plan.sham=true",
+        "sensing.snr_db=null",
+        "dataset.records_per_shard=8",
     )
     with gensig.open_dataset(folder) as data:
         assert set(data.column("severity")) == {0.0}
         assert len(set(data.column("label"))) == 4
         level = {
-            name: np.std(data.signals(i)[1]) for i, name in enumerate(data.column("label_name"))
+            name: np.std(data.signals(i)[1])
+            for i, name in enumerate(data.column("label_name"))
         }
     assert level["missing_tooth"] < 1.3 * level["healthy"]
 
@@ -133,7 +141,12 @@ def test_python_interface_makes_and_opens(tmp_path: Path) -> None:
         assert data.n_records == 2
 
 
-LONGER = (*SMALL, "operating.duration_s=0.1", "dataset.records_per_shard=2", "executor.n_workers=1")
+LONGER = (
+    *SMALL,
+    "operating.duration_s=0.1",
+    "dataset.records_per_shard=2",
+    "executor.n_workers=1",
+)
 
 
 @pytest.fixture(scope="module")
@@ -165,7 +178,11 @@ def test_interrupted_set_is_never_whole_and_resume_ends_byte_equal(
     assert main(["verify", str(out)]) == 1
     assert main(["resume", "--quiet", "--workers", "1", str(out)]) == 0
     assert main(["verify", str(out)]) == 0
-    for name in ("plan.csv", "index.h5", *(f"shards/{path.name}" for path in shards.iterdir())):
+    for name in (
+        "plan.csv",
+        "index.h5",
+        *(f"shards/{path.name}" for path in shards.iterdir()),
+    ):
         assert (out / name).read_bytes() == (uninterrupted / name).read_bytes(), name
 
 

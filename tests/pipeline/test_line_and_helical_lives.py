@@ -67,7 +67,9 @@ def test_a_worn_out_record_of_a_drive_line_is_made(line):
         (("system=two_stage_gearbox", "system.record_mesh=[3,4]"), "no node"),
     ],
 )
-def test_what_lives_of_a_drive_line_do_not_do_is_refused_in_one_line(overrides, said, capsys):
+def test_what_lives_of_a_drive_line_do_not_do_is_refused_in_one_line(
+    overrides, said, capsys
+):
     assert main(["plan", *LINE, *overrides]) != 0
     told = capsys.readouterr().err
     assert re.search(said, told)
@@ -84,6 +86,7 @@ def test_cracks_and_pits_of_helical_pairs_make_lives():
     assert columns["life_growing"].all()
     assert (np.diff(columns["params/fault.pitting_damage"][~crack]) > 0.0).all()
     record = simulate_records(
-        read_request(list(HELICAL)).config, [plan.record(int(np.flatnonzero(crack)[-1]))]
+        read_request(list(HELICAL)).config,
+        [plan.record(int(np.flatnonzero(crack)[-1]))],
     )[0]
     assert np.isfinite(record.signals["acceleration"]).all()

@@ -14,7 +14,9 @@ from gensig.cli import main
 from gensig.dataset.reader import open_dataset
 
 HOWTO = Path(__file__).resolve().parents[2] / "docs" / "howto" / "operation.md"
-BLOCKS = re.findall(r"```sh\n(.*?)```", HOWTO.read_text(encoding="utf-8"), flags=re.DOTALL)
+BLOCKS = re.findall(
+    r"```sh\n(.*?)```", HOWTO.read_text(encoding="utf-8"), flags=re.DOTALL
+)
 SMALLER = {"plan.n_records=40": "plan.n_records=4", "plan.n_units=10": "plan.n_units=1"}
 
 
@@ -37,8 +39,12 @@ def test_the_traces_are_in_the_file(folder):
     data = open_dataset(folder)
     for name in ("shaft_speed", "torque_set"):
         assert data.trace(0, name).shape == (1024,)
-    speed = np.array([data.trace(place, "shaft_speed").mean() for place in range(data.n_records)])
-    np.testing.assert_allclose(speed * 30 / np.pi, data.column("speed_rpm"), rtol=1e-4, atol=0)
+    speed = np.array(
+        [data.trace(place, "shaft_speed").mean() for place in range(data.n_records)]
+    )
+    np.testing.assert_allclose(
+        speed * 30 / np.pi, data.column("speed_rpm"), rtol=1e-4, atol=0
+    )
     assert len(np.unique(data.column("params/operating.course_seed"))) == 3
 
 
@@ -58,7 +64,9 @@ def test_the_configuration_tells_the_duration_of_turns(tmp_path):
         )
         == 0
     )
-    told = yaml.safe_load((out / "config.yaml").read_text(encoding="utf-8"))["operating"]
+    told = yaml.safe_load((out / "config.yaml").read_text(encoding="utf-8"))[
+        "operating"
+    ]
     assert told["turns"] == 1
     assert told["duration_s"] == pytest.approx(1 / 30, abs=1 / 51200)
     assert open_dataset(out).signals(0).shape == (1, 1707)
@@ -68,7 +76,15 @@ def test_the_configuration_tells_the_duration_of_turns(tmp_path):
 @pytest.mark.parametrize("value", ["1", "null", "yes"])
 def test_the_switch_is_true_or_false(value, tmp_path, capsys):
     assert (
-        main(["generate", *TINY, f"dataset.store_operating={value}", f"out={tmp_path / 'x'}"]) != 0
+        main(
+            [
+                "generate",
+                *TINY,
+                f"dataset.store_operating={value}",
+                f"out={tmp_path / 'x'}",
+            ]
+        )
+        != 0
     )
     assert "dataset.store_operating = " in capsys.readouterr().err
 
@@ -79,6 +95,11 @@ def test_commands_of_the_howto(block, tmp_path, monkeypatch):
     for line in block.strip().splitlines():
         if line.startswith("gensig "):
             words = [SMALLER.get(word, word) for word in shlex.split(line)[1:]]
-            assert main([*words, *(["executor.n_workers=1"] if "generate" in words else [])]) == 0
+            assert (
+                main(
+                    [*words, *(["executor.n_workers=1"] if "generate" in words else [])]
+                )
+                == 0
+            )
         else:
             subprocess.run(["bash", "-c", line], check=True)

@@ -24,8 +24,15 @@ from tests.wheel import (
 )
 
 RECORD = ["generate", "--quiet", "plan.n_records=1", "operating.duration_s=0.02"]
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-NOT_FOR_COMMANDS = {"all", "test", "docs", "fem"}  # extras that serve the project itself
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))[
+    "project"
+]
+NOT_FOR_COMMANDS = {
+    "all",
+    "test",
+    "docs",
+    "fem",
+}  # extras that serve the project itself
 
 TYPED = """
 from typing import assert_type
@@ -82,24 +89,41 @@ def python(wheel: Path, folder: Path) -> Path:
 
 
 def test_source_distribution_holds_the_whole_tree(source: Path) -> None:
-    assert {name for name in files_of_the_tree() if not (source / name).is_file()} == set()
+    assert {
+        name for name in files_of_the_tree() if not (source / name).is_file()
+    } == set()
 
 
 def test_wheel_holds_the_packages_and_nothing_else(wheel: Path) -> None:
     parts = [name.split("/", 1) for name in files_of_the_tree()]
-    expected = {f"{PACKAGES[part[0]]}/{part[1]}" for part in parts if part[0] in PACKAGES}
+    expected = {
+        f"{PACKAGES[part[0]]}/{part[1]}" for part in parts if part[0] in PACKAGES
+    }
     with zipfile.ZipFile(wheel) as archive:
-        notes = {name.split("/", 1)[1] for name in archive.namelist() if ".dist-info/" in name}
+        notes = {
+            name.split("/", 1)[1]
+            for name in archive.namelist()
+            if ".dist-info/" in name
+        }
         files = {name for name in archive.namelist() if ".dist-info/" not in name}
     assert files == expected
     assert {"licenses/LICENSE", "licenses/THIRD-PARTY.md", "entry_points.txt"} < notes
-    assert {"gensig/py.typed", "diagnose/py.typed", "gensig/configs/generate.yaml"} < files
+    assert {
+        "gensig/py.typed",
+        "diagnose/py.typed",
+        "gensig/configs/generate.yaml",
+    } < files
 
 
 def test_wheel_runs_from_another_folder(python: Path, tmp_path: Path) -> None:
     def run(*command: str | Path) -> str:
         done = subprocess.run(
-            command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False
+            command,
+            cwd=tmp_path,
+            env=ENVIRONMENT,
+            capture_output=True,
+            text=True,
+            check=False,
         )
         assert done.returncode == 0, done.stderr
         return done.stdout
@@ -140,9 +164,16 @@ def test_types_reach_those_who_use_the_wheel(python: Path, tmp_path: Path) -> No
     ]
     command = [sys.executable, "-m", "mypy", *options, "typed.py", "mistyped.py"]
     shown = subprocess.run(
-        command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False
+        command,
+        cwd=tmp_path,
+        env=ENVIRONMENT,
+        capture_output=True,
+        text=True,
+        check=False,
     ).stdout
-    errors = [line.split(" error: ")[0] for line in shown.splitlines() if " error: " in line]
+    errors = [
+        line.split(" error: ")[0] for line in shown.splitlines() if " error: " in line
+    ]
     assert errors == ["mistyped.py:4:", "mistyped.py:5:"], shown
 
 
@@ -162,7 +193,9 @@ def test_all_is_every_extra_that_a_command_asks_for() -> None:
         for path in (ROOT / name).rglob("*")
     ]
     texts = [
-        path.read_text(encoding="utf-8") for path in files if path.suffix in (".py", ".yaml", ".md")
+        path.read_text(encoding="utf-8")
+        for path in files
+        if path.suffix in (".py", ".yaml", ".md")
     ]
     named = {
         name
@@ -170,12 +203,16 @@ def test_all_is_every_extra_that_a_command_asks_for() -> None:
         for part in re.findall(r"gensig\[([\w, ]+)\]", text)
         for name in part.split(",")
     }
-    assert of_commands <= named  # whoever lacks a package is told the extra that brings it
+    assert (
+        of_commands <= named
+    )  # whoever lacks a package is told the extra that brings it
     assert named <= set(extras)
 
 
 def test_this_environment_finds_its_configuration(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "gensig.cli", "stiffness", "gear=xiamen_23_84"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        command, cwd=tmp_path, capture_output=True, text=True, check=True
+    )
     assert "1.71178" in done.stdout
     assert list(tmp_path.iterdir()) == []

@@ -38,7 +38,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def ran(words: list[str], folder: Path) -> str:
     """What a command prints; fails where it fails."""
-    paths = {"PATH": f"{folder / 'bin'}{os.pathsep}{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
+    paths = {
+        "PATH": f"{folder / 'bin'}{os.pathsep}{os.environ['PATH']}",
+        "PYTHONPATH": str(ROOT),
+    }
     done = subprocess.run(
         words,
         cwd=folder / "empty",
@@ -71,14 +74,18 @@ def test_ten_lines_of_python_as_a_script(folder: Path) -> None:
     code = block("Ten lines of Python")
     assert len(code.strip().splitlines()) <= 11  # and the empty one
     script = folder / "mine.py"
-    script.write_text(code + "print(signal.shape, len(train), softer.min() < softer.max())\n")
+    script.write_text(
+        code + "print(signal.shape, len(train), softer.min() < softer.max())\n"
+    )
     said = ran([sys.executable, str(script)], folder).splitlines()
     assert said[0].startswith("['healthy', 'crack', 'pitting', 'missing_tooth']")
     assert re.fullmatch(r"\(4, 12800\) [1-9]\d* True", said[-1])
 
 
 def test_the_two_commands_are_those_of_the_makefile() -> None:
-    commands = [line.split("#")[0].split() for line in block("Two commands").splitlines()]
+    commands = [
+        line.split("#")[0].split() for line in block("Two commands").splitlines()
+    ]
     assert commands == [["make", "demo"], ["make", "test"]]
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     for _, target in commands:
@@ -86,7 +93,8 @@ def test_the_two_commands_are_those_of_the_makefile() -> None:
 
 
 @pytest.mark.parametrize(
-    "page", ["README.md", "docs/what_is_inside.md", "docs/alternatives.md", "docs/tour.ipynb"]
+    "page",
+    ["README.md", "docs/what_is_inside.md", "docs/alternatives.md", "docs/tour.ipynb"],
 )
 def test_links_lead_somewhere(page: str) -> None:
     text = (ROOT / page).read_text(encoding="utf-8")
@@ -96,7 +104,11 @@ def test_links_lead_somewhere(page: str) -> None:
         if not link.startswith(("http", "attachment"))
     ]
     assert links
-    missing = [link for link in links if not ((ROOT / page).parent / link.split("#")[0]).exists()]
+    missing = [
+        link
+        for link in links
+        if not ((ROOT / page).parent / link.split("#")[0]).exists()
+    ]
     assert not missing
 
 

@@ -41,8 +41,15 @@ def healthy(seed=0, *, teeth=TEETH, depth=0.3, noise=0.3):
 class TestValues:
     def test_resampling_keeps_what_fits_and_nothing_else(self):
         time = np.arange(51200) / 51200.0
-        for frequency, amplitude in ((1000.0, 1.0), (3000.0, 0.0), (6000.0, 0.0), (20000.0, 0.0)):
-            x = values.to_rate(5.0 + np.sin(2 * np.pi * frequency * time), 51200.0, 5000.0)
+        for frequency, amplitude in (
+            (1000.0, 1.0),
+            (3000.0, 0.0),
+            (6000.0, 0.0),
+            (20000.0, 0.0),
+        ):
+            x = values.to_rate(
+                5.0 + np.sin(2 * np.pi * frequency * time), 51200.0, 5000.0
+            )
             assert x.shape == (5000,)
             assert_allclose(np.sqrt(2) * np.std(x[500:-500]), amplitude, atol=5e-3)
 
@@ -76,7 +83,9 @@ class TestValues:
             np.array(column) for column in zip(*rows, strict=True)
         )
         size = (
-            np.where(labels == "healthy", 1.0, 3.0) * np.where(specimens == "x", 1.0, 10.0) * speeds
+            np.where(labels == "healthy", 1.0, 3.0)
+            * np.where(specimens == "x", 1.0, 10.0)
+            * speeds
         )
         size *= np.where(
             gearboxes == "a", 1.0, 1e6
@@ -96,12 +105,15 @@ class TestValues:
             sorted(ratios), [0.3] * 8 + [30.0] * 8
         )  # 2 gearboxes x 2 speeds x 2 channels, each way
         assert_allclose(found["missing_tooth.rms_ratio_same_unit", values.ALL], 3.0)
-        assert_allclose(sorted(set(found["healthy.mesh_amplitude_ratio", values.ALL])), [0.1, 10.0])
+        assert_allclose(
+            sorted(set(found["healthy.mesh_amplitude_ratio", values.ALL])), [0.1, 10.0]
+        )
 
     def test_the_slow_and_light_corner_stands_apart(self):
         found = values.quantities(self.table())
         slow, rest = (
-            found["missing_tooth.kurtosis", where] for where in (values.SLOW, values.ELSEWHERE)
+            found["missing_tooth.kurtosis", where]
+            for where in (values.SLOW, values.ELSEWHERE)
         )
         assert len(slow) == len(rest) == 8
         assert_allclose(sorted(rest), 3.0 * np.sort(slow))
@@ -110,7 +122,9 @@ class TestValues:
     def test_every_range_has_its_quantity(self):
         found = values.quantities(self.table())
         fault = {
-            place for place in read_ranges() if place[0].startswith(("missing_tooth", "healthy"))
+            place
+            for place in read_ranges()
+            if place[0].startswith(("missing_tooth", "healthy"))
         }
         assert fault <= set(found)
 
@@ -130,16 +144,26 @@ class TestSets:
         config = read_request(sets.yardstick_words(BASE, TINY)).config
         spec = config["classes"]["crack"]["vary"]["crack_depth_mm"]
         assert spec["high"] == pytest.approx(2 * spec["low"], rel=1e-3)
-        assert spec["low"] == pytest.approx(0.25 * 1e3 * sets.root_chord(BASE), rel=1e-3)
+        assert spec["low"] == pytest.approx(
+            0.25 * 1e3 * sets.root_chord(BASE), rel=1e-3
+        )
 
     def test_the_machine_of_the_recording_and_what_is_wrong_on_purpose(self):
         right, teeth, finer, rougher = (
             read_request(sets.recording_words(BASE, TINY, control)).config
             for control in sets.CONTROLS
         )
-        assert [right["gear"][side]["n_teeth"] for side in ("pinion", "wheel")] == [23, 46]
-        assert [teeth["gear"][side]["n_teeth"] for side in ("pinion", "wheel")] == [27, 42]
-        grades = [config["quality"]["iso1328_grade"] for config in (finer, right, rougher)]
+        assert [right["gear"][side]["n_teeth"] for side in ("pinion", "wheel")] == [
+            23,
+            46,
+        ]
+        assert [teeth["gear"][side]["n_teeth"] for side in ("pinion", "wheel")] == [
+            27,
+            42,
+        ]
+        grades = [
+            config["quality"]["iso1328_grade"] for config in (finer, right, rougher)
+        ]
         assert_allclose(np.sqrt(2.0) ** np.diff(grades), 3.0, rtol=1e-3)
         assert right["plan"]["classes"] == ["healthy"]
         assert "operating.speed_rpm" not in right["plan"]["vary"]
@@ -151,7 +175,10 @@ class TestSets:
             sets.recording_words([*BASE, "quality.iso1328_grade=null"], TINY, "right")
         with pytest.raises(ConfigError, match="would be crossed"):
             sets.yardstick_words(
-                [*BASE, "plan.vary={sensing.snr_db: {distribution: choice, values: [10, 20]}}"],
+                [
+                    *BASE,
+                    "plan.vary={sensing.snr_db: {distribution: choice, values: [10, 20]}}",
+                ],
                 TINY,
             )
 
@@ -174,16 +201,23 @@ class TestRecording:
         assert_allclose(found["sideband_ratio"], 20 * np.log10(0.3), atol=0.6)
         carrier = 0.5 * (1 + 0.25 + 0.0625)
         assert_allclose(
-            found["mesh_share"], 10 * np.log10(carrier / (carrier * (1 + 0.3**2 / 2))), atol=0.1
+            found["mesh_share"],
+            10 * np.log10(carrier / (carrier * (1 + 0.3**2 / 2))),
+            atol=0.1,
         )
 
-    def test_other_teeth_and_stronger_sidebands_are_told_apart_and_the_same_machine_is_not(self):
+    def test_other_teeth_and_stronger_sidebands_are_told_apart_and_the_same_machine_is_not(
+        self,
+    ):
         def simulated(**changes):
             rows = [
                 recording.indicators(healthy(seed, **changes), RATE, TEETH, SPEED)
                 for seed in range(10, 22)
             ]
-            return {name: np.array([row[name] for row in rows]) for name in recording.INDICATORS}
+            return {
+                name: np.array([row[name] for row in rows])
+                for name in recording.INDICATORS
+            }
 
         controls = dict(zip(sets.CONTROLS, (simulated(), simulated(teeth=27), simulated(depth=0.1), simulated()),
                             strict=True))  # fmt: skip
@@ -197,7 +231,9 @@ class TestRecording:
         at = [one.at for one in found if one.id == "recording.fm4"]
         assert at == ["channels", "width", "wrong teeth", "errors / 3", "errors x 3"]
         without = recording.recording_comparisons(controls, None)
-        assert next(one.at for one in without if one.id == "recording.fm4") == "simulated"
+        assert (
+            next(one.at for one in without if one.id == "recording.fm4") == "simulated"
+        )
 
     def test_nothing_is_looked_for_without_the_variable(self, monkeypatch, tmp_path):
         monkeypatch.delenv(recording.VARIABLE, raising=False)
@@ -230,7 +266,11 @@ def test_from_nothing_to_table_and_figures(tmp_path, monkeypatch, capsys):
     monkeypatch.delenv(recording.VARIABLE, raising=False)
     monkeypatch.setattr(realism, "QUICK", TINY)
     folders = {"--data": "data", "--json": "found.json", "--figures": "figures"}
-    places = [word for option, name in folders.items() for word in (option, str(tmp_path / name))]
+    places = [
+        word
+        for option, name in folders.items()
+        for word in (option, str(tmp_path / name))
+    ]
     words = ["--quick", "--base", " ".join(BASE), *places]
     assert realism.main(words) == 0
     said = capsys.readouterr().out
@@ -246,7 +286,10 @@ def test_from_nothing_to_table_and_figures(tmp_path, monkeypatch, capsys):
     assert rows["crack.rms_ratio", "all conditions"]["n"] == 16
     assert rows["missing_tooth.kurtosis", "slow and light"]["n"] == 8
     assert rows["recording.kurtosis", "simulated"]["n"] == 8
-    pictures = [tmp_path / "figures" / f"realism_{name}.png" for name in ("yardstick", "recording")]
+    pictures = [
+        tmp_path / "figures" / f"realism_{name}.png"
+        for name in ("yardstick", "recording")
+    ]
     assert all(path.stat().st_size > 10_000 for path in pictures)
     plan = (tmp_path / "data" / "yardstick" / "plan.csv").stat().st_mtime_ns
     assert realism.main(words[:5]) == 0  # what is there is read, not made again

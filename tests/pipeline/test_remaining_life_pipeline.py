@@ -24,7 +24,14 @@ def test_lives_are_made_and_learnt_whole(tmp_path, capsys):
     ]
     assert (
         diagnose(
-            ["train", *words, "seeds=1", "window_samples=1024", "n_threads=1", "n_bootstrap=50"]
+            [
+                "train",
+                *words,
+                "seeds=1",
+                "window_samples=1024",
+                "n_threads=1",
+                "n_bootstrap=50",
+            ]
         )
         == 0
     )

@@ -42,5 +42,19 @@ def test_repeats_are_stored_and_told_apart(
 
 
 def test_one_record_of_a_plan_with_repeats_can_be_looked_at(tmp_path: Path) -> None:
-    for words in (WORDS, ("plan.design=grid", "plan.n_repeats=3", "operating.duration_s=0.02")):
-        assert main(["simulate", *words, "--output", str(tmp_path / "record.csv"), "--force"]) == 0
+    for words in (
+        WORDS,
+        ("plan.design=grid", "plan.n_repeats=3", "operating.duration_s=0.02"),
+    ):
+        assert (
+            main(
+                [
+                    "simulate",
+                    *words,
+                    "--output",
+                    str(tmp_path / "record.csv"),
+                    "--force",
+                ]
+            )
+            == 0
+        )

@@ -26,7 +26,9 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return make(tmp_path_factory.mktemp("reference") / "data", *SET, vary)
 
 
-def reproduce(folder: Path, capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str]:
+def reproduce(
+    folder: Path, capsys: pytest.CaptureFixture[str], *words: str
+) -> tuple[int, str]:
     capsys.readouterr()
     return main(["reproduce", str(folder), *words]), capsys.readouterr().out
 
@@ -43,7 +45,9 @@ def test_every_record_has_the_same_bits(
 
 def test_a_set_of_the_default_backend_is_stored_as_by_0_9(reference: Path) -> None:
     """Nothing that is stored names the default backend, so that files, identity and shards are those of 0.9.0."""
-    texts = [(reference / name).read_text() for name in ("config.yaml", "manifest.json")]
+    texts = [
+        (reference / name).read_text() for name in ("config.yaml", "manifest.json")
+    ]
     with h5py.File(reference / "shards" / "shard-00000.h5") as file:
         texts.append(str(file.attrs["config_json"]))
     assert all("oversampling" in text and "backend" not in text for text in texts)
@@ -58,15 +62,26 @@ def test_a_set_that_names_the_default_backend_goes_on(
     config = yaml.safe_load((folder / "config.yaml").read_text())
     config["solver"]["backend"] = DEFAULT_BACKEND
     (folder / "config.yaml").write_text(yaml.safe_dump(config, sort_keys=False))
-    assert reproduce(folder, capsys, "--records", "2") == (0, "2 of 2 records have the same bits\n")
+    assert reproduce(folder, capsys, "--records", "2") == (
+        0,
+        "2 of 2 records have the same bits\n",
+    )
     content = json.loads((folder / "manifest.json").read_text())
     content["state"] = "incomplete"
-    content["shards"][1] |= {"state": "planned", "sha256": "", "bytes": 0, "n_failed": 0}
+    content["shards"][1] |= {
+        "state": "planned",
+        "sha256": "",
+        "bytes": 0,
+        "n_failed": 0,
+    }
     (folder / "manifest.json").write_text(json.dumps(content))
     lost = folder / "shards" / "shard-00001.h5"
     lost.unlink()
     assert main(["resume", "--quiet", "--workers", "1", str(folder)]) == 0
-    with h5py.File(lost) as made, h5py.File(reference / "shards" / "shard-00001.h5") as before:
+    with (
+        h5py.File(lost) as made,
+        h5py.File(reference / "shards" / "shard-00001.h5") as before,
+    ):
         assert np.array_equal(made["acceleration"], before["acceleration"])
 
 
@@ -88,7 +103,8 @@ ELSEWHERE = {"cpu_model": "Another CPU"}
 
 
 @pytest.mark.parametrize(
-    ("part", "environment", "status"), [(5e-7, {}, 1), (5e-7, ELSEWHERE, 0), (2e-6, ELSEWHERE, 1)]
+    ("part", "environment", "status"),
+    [(5e-7, {}, 1), (5e-7, ELSEWHERE, 0), (2e-6, ELSEWHERE, 1)],
 )
 def test_a_difference_is_accepted_only_elsewhere_and_up_to_1e_6(
     reference: Path,
@@ -128,7 +144,9 @@ def test_records_that_failed_are_told_apart(
 ) -> None:
     """Half of the conditions ask for steps that are too long; all that says so names the reason."""
     out = tmp_path / "data"
-    vary = "plan.vary={operating.drive_frequency_hz:{distribution:choice,values:[1,1e6]}}"
+    vary = (
+        "plan.vary={operating.drive_frequency_hz:{distribution:choice,values:[1,1e6]}}"
+    )
     words = [
         "generate",
         *TINY,
@@ -153,7 +171,9 @@ def test_records_that_failed_are_told_apart(
 
 def read_one(path: Path) -> dict[str, np.ndarray]:
     with h5py.File(path) as file:
-        return {name: file[name][0] for name in file if isinstance(file[name], h5py.Dataset)}
+        return {
+            name: file[name][0] for name in file if isinstance(file[name], h5py.Dataset)
+        }
 
 
 @pytest.mark.parametrize("noise", ["healthy_twin", "record"])
@@ -162,7 +182,9 @@ def test_record_and_twin_differ_by_the_fault_alone(
 ) -> None:
     folder = reference
     if noise == "record":
-        folder = make(tmp_path / "data", *SET, "sensing.snr_reference=record", "sensing.snr_db=20")
+        folder = make(
+            tmp_path / "data", *SET, "sensing.snr_reference=record", "sensing.snr_db=20"
+        )
     with h5py.File(folder / "shards" / "shard-00000.h5") as file:
         faulty = int(np.flatnonzero(file["label_name"].asstr()[:] == "crack")[0])
         stored = {
@@ -174,7 +196,10 @@ def test_record_and_twin_differ_by_the_fault_alone(
     assert main([*words, str(tmp_path / "twin.h5"), "--twin"]) == 0
     said = capsys.readouterr().out
     assert f"healthy twin of r{faulty:06d} (crack)\nspeed" in said
-    assert f"class crack, severity {read_one(tmp_path / 'again.h5')['severity']:.3f}\nspeed" in said
+    assert (
+        f"class crack, severity {read_one(tmp_path / 'again.h5')['severity']:.3f}\nspeed"
+        in said
+    )
     again, twin = read_one(tmp_path / "again.h5"), read_one(tmp_path / "twin.h5")
     for name, values in stored.items():
         assert np.array_equal(again[name], values), name
@@ -193,7 +218,8 @@ def test_record_and_twin_differ_by_the_fault_alone(
     assert not np.array_equal(twin["acceleration_clean"], again["acceleration_clean"])
     level = np.sqrt(np.mean(np.square(stored["acceleration"], dtype=np.float64)))
     residuals = [
-        again[name].astype(float) - twin[name] for name in ("acceleration", "acceleration_clean")
+        again[name].astype(float) - twin[name]
+        for name in ("acceleration", "acceleration_clean")
     ]
     np.testing.assert_allclose(*residuals, rtol=0.0, atol=3e-6 * level)
 
@@ -210,6 +236,8 @@ def test_record_and_twin_differ_by_the_fault_alone(
 def test_a_mistake_is_one_line(
     reference: Path, words: list[str], hint: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["simulate", *(word.replace("@", str(reference)) for word in words)]) == 2
+    assert (
+        main(["simulate", *(word.replace("@", str(reference)) for word in words)]) == 2
+    )
     (line,) = capsys.readouterr().err.splitlines()
     assert hint in line

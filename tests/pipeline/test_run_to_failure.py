@@ -59,7 +59,8 @@ def test_a_life_is_one_unit_with_gears_of_its_own_and_one_class(plan):
         "fault_tooth",
     ):
         assert all(
-            len(set(plan.columns[name][rows].tolist())) == 1 for rows in lives(plan).values()
+            len(set(plan.columns[name][rows].tolist())) == 1
+            for rows in lives(plan).values()
         ), name
     assert len(set(plan.columns["specimen_id"].tolist())) == 12
     names, counts = np.unique(plan.columns["label_name"], return_counts=True)
@@ -67,7 +68,9 @@ def test_a_life_is_one_unit_with_gears_of_its_own_and_one_class(plan):
     assert set(counts.tolist()) == {32}
 
 
-def test_time_cycles_and_severity_only_rise_and_the_rest_of_the_life_falls_to_nothing(plan):
+def test_time_cycles_and_severity_only_rise_and_the_rest_of_the_life_falls_to_nothing(
+    plan,
+):
     columns = plan.columns
     for rows in lives(plan).values():
         assert (np.diff(columns["life_time_h"][rows]) > 0.0).all()
@@ -92,7 +95,9 @@ def test_failure_is_the_declared_size(plan):
 def test_the_same_seed_gives_the_same_lives_and_another_seed_others(plan):
     assert plan_text(planned()) == plan_text(plan)
     other = planned("seed=1")
-    assert not np.array_equal(other.columns["remaining_life_h"], plan.columns["remaining_life_h"])
+    assert not np.array_equal(
+        other.columns["remaining_life_h"], plan.columns["remaining_life_h"]
+    )
 
 
 def test_number_of_unit_and_gearbox_do_not_tell_the_class():
@@ -105,9 +110,13 @@ def test_number_of_unit_and_gearbox_do_not_tell_the_class():
     first = np.array([rows[0] for rows in lives(plan).values()])
     labels = plan.columns["label"][first]
     boxes = np.unique(plan.columns["gearbox_id"][first], return_inverse=True)[1]
-    table = np.array([[np.sum((labels == a) & (boxes == b)) for a in range(2)] for b in range(2)])
+    table = np.array(
+        [[np.sum((labels == a) & (boxes == b)) for a in range(2)] for b in range(2)]
+    )
     chi_square = ((table - 40) ** 2 / 40).sum()
-    assert chi_square < 10.8  # 1 degree of freedom, p = 0.001; dealt in turn it would be 160
+    assert (
+        chi_square < 10.8
+    )  # 1 degree of freedom, p = 0.001; dealt in turn it would be 160
 
 
 def test_splits_keep_a_life_whole_on_one_side():
@@ -117,10 +126,16 @@ def test_splits_keep_a_life_whole_on_one_side():
     for name in ("by_unit", "cross_specimen", "cross_gearbox"):
         assert split_problems(name, tables[name], plan) == []
         sides = dict(
-            zip(tables[name].record_id.tolist(), tables[name].subset.tolist(), strict=True)
+            zip(
+                tables[name].record_id.tolist(),
+                tables[name].subset.tolist(),
+                strict=True,
+            )
         )
         ids = plan.columns["record_id"]
-        assert all(len({sides[ids[row]] for row in rows}) == 1 for rows in lives(plan).values())
+        assert all(
+            len({sides[ids[row]] for row in rows}) == 1 for rows in lives(plan).values()
+        )
 
 
 def test_below_the_threshold_the_records_say_that_nothing_grows_and_the_life_is_censored():
@@ -131,7 +146,9 @@ def test_below_the_threshold_the_records_say_that_nothing_grows_and_the_life_is_
     ranges = plan.columns["params/fault.stress_intensity_range_mpa_sqrt_m"]
     assert (ranges < 5.0).all()
     assert_allclose(
-        plan.columns["life_time_h"][7] + plan.columns["remaining_life_h"][7], 500.0, rtol=0.05
+        plan.columns["life_time_h"][7] + plan.columns["remaining_life_h"][7],
+        500.0,
+        rtol=0.05,
     )
     for rows in lives(plan).values():
         assert len(set(plan.columns["severity"][rows].tolist())) == 1
@@ -146,9 +163,14 @@ def test_a_healthy_unit_lives_to_the_horizon():
 
 
 def test_a_drift_moves_the_machine_of_every_class_alike():
-    drift = "life.drift={mesh.friction_coefficient: {change: 1.0, time_h: 5, scatter: 0.0}}"
+    drift = (
+        "life.drift={mesh.friction_coefficient: {change: 1.0, time_h: 5, scatter: 0.0}}"
+    )
     plan = planned("plan.classes=[healthy,crack]", "life=crack_growth", drift)
-    friction, time = plan.columns["params/mesh.friction_coefficient"], plan.columns["life_time_h"]
+    friction, time = (
+        plan.columns["params/mesh.friction_coefficient"],
+        plan.columns["life_time_h"],
+    )
     assert_allclose(friction[time == 0.0], 0.05)
     assert (friction[time > 300.0] > 0.0999).all()
     assert len(set(plan.columns["condition_id"].tolist())) == plan.n_records
@@ -197,7 +219,11 @@ def lived():
         ("life.distributed_pitting.strength_mpa", 0.0, "strength"),
         ("life.wear.rate_scatter", -1.0, "rate_scatter"),
         ("life.blocks", [[0, 1, 1800, 90]], r"pin it, or take plan\.vary"),
-        ("life.drift", {"mesh.friction": {"change": 1, "time_h": 5, "scatter": 0}}, "is no key"),
+        (
+            "life.drift",
+            {"mesh.friction": {"change": 1, "time_h": 5, "scatter": 0}},
+            "is no key",
+        ),
         (
             "life.drift",
             {"operating.torque_nm": {"change": 1, "time_h": 5, "scatter": 0}},
@@ -242,7 +268,9 @@ def test_snapshots_come_out_the_same_alone_and_together():
     together = simulate_records(config, rows)
     for row, record in zip(rows, together, strict=True):
         alone = simulate_records(config, [row])[0]
-        assert_array_equal(alone.signals["acceleration"], record.signals["acceleration"])
+        assert_array_equal(
+            alone.signals["acceleration"], record.signals["acceleration"]
+        )
 
 
 def test_a_data_set_of_lives_whatever_its_shards(tmp_path):
@@ -278,5 +306,9 @@ def test_the_worn_flank_of_a_record_is_that_of_its_life(plan):
         for row in rows:
             parts = json.loads(plan.columns["faults_json"][row])
             assert [part["gear"] for part in parts] == ["pinion", "wheel"], name
-            deepest = max(part["wear_depth_um"] * max(part["wear_profile"]) for part in parts)
-            assert_allclose(plan.columns["severity"][row], deepest / 100.0, rtol=1e-6, atol=1e-9)
+            deepest = max(
+                part["wear_depth_um"] * max(part["wear_profile"]) for part in parts
+            )
+            assert_allclose(
+                plan.columns["severity"][row], deepest / 100.0, rtol=1e-6, atol=1e-9
+            )

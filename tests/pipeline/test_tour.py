@@ -35,20 +35,26 @@ assert found[3] > 0.9 > found[:3].max()
 def printed(tmp_path_factory: pytest.TempPathFactory) -> str:
     """What all cells print, once the checks of what they computed have passed."""
     folder = tmp_path_factory.mktemp("tour")
-    (folder / "tour.py").write_text("\n".join([*CODE[:-1], CODE[-1], CHECKS]), encoding="utf-8")
+    (folder / "tour.py").write_text(
+        "\n".join([*CODE[:-1], CODE[-1], CHECKS]), encoding="utf-8"
+    )
     environment = os.environ | {"MPLBACKEND": "Agg", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         [sys.executable, "-W", "error::RuntimeWarning", "tour.py"],
         cwd=folder, env=environment, capture_output=True, text=True, timeout=3600,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[-3000:]
-    assert [path.name for path in folder.iterdir()] == ["tour.py"]  # nothing is left behind
+    assert [path.name for path in folder.iterdir()] == [
+        "tour.py"
+    ]  # nothing is left behind
     return done.stdout
 
 
 def test_it_runs_and_the_figures_in_its_outputs_are_still_true(printed: str) -> None:
     stored = "".join(
-        "".join(output.get("text", [])) for cell in CELLS for output in cell.get("outputs", [])
+        "".join(output.get("text", []))
+        for cell in CELLS
+        for output in cell.get("outputs", [])
     )
 
     def of_the_physics(text: str) -> list[list[float]]:
@@ -57,7 +63,10 @@ def test_it_runs_and_the_figures_in_its_outputs_are_still_true(printed: str) -> 
             for line in text.splitlines()
             if re.match(r"A crack|crack +\d+%|sidebands|spur|helical", line)
         ]
-        return [[float(number) for number in re.findall(r"\d+\.?\d*", line)] for line in lines]
+        return [
+            [float(number) for number in re.findall(r"\d+\.?\d*", line)]
+            for line in lines
+        ]
 
     now, then = of_the_physics(printed), of_the_physics(stored)
     assert len(then) == 9
@@ -77,9 +86,13 @@ def test_its_outputs_are_small_and_name_no_place_of_a_machine() -> None:
         == 4
     )
     shown = "".join(
-        "".join(output.get("text", [])) for cell in CELLS for output in cell.get("outputs", [])
+        "".join(output.get("text", []))
+        for cell in CELLS
+        for output in cell.get("outputs", [])
     )
     assert not re.search(r"/(tmp|home|root|Users)/", shown)
     assert all(
-        output["output_type"] != "error" for cell in CELLS for output in cell.get("outputs", [])
+        output["output_type"] != "error"
+        for cell in CELLS
+        for output in cell.get("outputs", [])
     )

@@ -93,7 +93,9 @@ def _series(rows: list[dict[str, str]]) -> Series:
         side=first["side"],
         breathing=False,
     )
-    curvature = np.array([float(row["curvature_radius_over_module"]) for row in rows]) * MODULE
+    curvature = (
+        np.array([float(row["curvature_radius_over_module"]) for row in rows]) * MODULE
+    )
     loads = root_loads(gear, crack, load_angle(gear, curvature))
     functions = basis(np.array([depth]), crack.angle, crack.mouth_slope)[0]
     return Series(
@@ -101,7 +103,8 @@ def _series(rows: list[dict[str, str]]) -> Series:
         angle_deg=float(first["crack_angle_deg"]),
         depth_over_chord=depth,
         side=first["side"],
-        increment=np.array([float(row["increment"]) for row in rows]) / (1.0 - POISSON**2),
+        increment=np.array([float(row["increment"]) for row in rows])
+        / (1.0 - POISSON**2),
         design=(loads.T[:, :, None] * functions).reshape(len(rows), -1),
     )
 
@@ -118,7 +121,10 @@ def fit(series: Sequence[Series]) -> Array:
 def errors(series: Sequence[Series], coefficients: Array) -> Array:
     """Relative errors of the increments."""
     return np.concatenate(
-        [(one.design @ coefficients.ravel()) ** 2 / one.increment - 1.0 for one in series]
+        [
+            (one.design @ coefficients.ravel()) ** 2 / one.increment - 1.0
+            for one in series
+        ]
     )
 
 
@@ -137,7 +143,8 @@ def main() -> None:
     used = [one for one in tension if (one.case, one.angle_deg) not in LEFT_OUT]
     coefficients = fit(used)
     lines = ",\n".join(
-        "    (" + ", ".join(f"{value:.6g}" for value in row) + ")" for row in coefficients
+        "    (" + ", ".join(f"{value:.6g}" for value in row) + ")"
+        for row in coefficients
     )
     TARGET.write_text(
         '"""Written by ``python -m tests.reference.calibrate_crack``.\n\n'
@@ -154,7 +161,8 @@ def main() -> None:
         if case != MOST_ANGLES:
             held_out = fit([one for one in used if one.case != case])
             _told(
-                "  left out of the fit", errors([one for one in used if one.case == case], held_out)
+                "  left out of the fit",
+                errors([one for one in used if one.case == case], held_out),
             )
     for angle in sorted({one.angle_deg for one in used}):
         _told(
@@ -164,7 +172,10 @@ def main() -> None:
     others = [one for one in tension if (one.case, one.angle_deg) in LEFT_OUT]
     for name, some in (
         ("not fitted: z84, 75 deg", others),
-        ("compression side, open", [one for one in everything if one.side != "tension"]),
+        (
+            "compression side, open",
+            [one for one in everything if one.side != "tension"],
+        ),
     ):
         if some:
             _told(name, errors(some, coefficients))

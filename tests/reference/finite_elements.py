@@ -97,7 +97,11 @@ def structural_compliance(
 
 
 def tooth_compliance(
-    gear: Gear, curvature_radius: Array, plane: Plane, *, resolution: Resolution | None = None
+    gear: Gear,
+    curvature_radius: Array,
+    plane: Plane,
+    *,
+    resolution: Resolution | None = None,
 ) -> Array:
     """Compliance of tooth 0 clamped at its root chord, the line through the ends of its root curves.
 
@@ -106,10 +110,14 @@ def tooth_compliance(
     """
     mesh = tooth_mesh(gear, curvature_radius, resolution=resolution)
     chord = gear.root_radius * math.cos(gear.root_half_angle) / gear.normal_module
-    solution = _solve(mesh, np.flatnonzero(mesh.p[0] < chord + 1e-9), gear, curvature_radius, plane)
+    solution = _solve(
+        mesh, np.flatnonzero(mesh.p[0] < chord + 1e-9), gear, curvature_radius, plane
+    )
     inside = _crossing(gear, curvature_radius)[0] > chord
     compliance = np.zeros(len(curvature_radius))
-    compliance[inside] = _along_force(solution.of(inside), gear, curvature_radius[inside])
+    compliance[inside] = _along_force(
+        solution.of(inside), gear, curvature_radius[inside]
+    )
     return compliance * plane.unit_compliance
 
 
@@ -129,7 +137,11 @@ def crack_increment(
     compliance = []
     for opened in (True, False):
         mesh = gear_mesh(
-            gear, {0: curvature_radius}, crack=crack, opened=opened, resolution=resolution
+            gear,
+            {0: curvature_radius},
+            crack=crack,
+            opened=opened,
+            resolution=resolution,
         )
         solution = _solve(mesh, _on_bore(gear, mesh), gear, curvature_radius, plane)
         compliance.append(_along_force(solution, gear, curvature_radius))
@@ -167,7 +179,9 @@ def cross_compliance(
     turn = 2.0 * math.pi * tooth / gear.n_teeth
     points = polar_rotation(_flank_point(gear, probed), turn)
     forces = polar_rotation(_force(gear, probed), turn)
-    dofs = solution.basis.nodal_dofs[:, [nearest_node(mesh, point) for point in points.T]]
+    dofs = solution.basis.nodal_dofs[
+        :, [nearest_node(mesh, point) for point in points.T]
+    ]
     moved = solution.displacement[dofs, np.arange(len(probed))]
     return np.sum(forces * moved, axis=0) * plane.unit_compliance
 
@@ -217,7 +231,9 @@ def solve_definite(matrix: csr_matrix, loads: Array) -> Array:
 
 
 def _on_bore(gear: Gear, mesh: MeshTri) -> NDArray[np.int64]:
-    return np.flatnonzero(np.hypot(*mesh.p) < gear.bore_radius / gear.normal_module + 1e-9)
+    return np.flatnonzero(
+        np.hypot(*mesh.p) < gear.bore_radius / gear.normal_module + 1e-9
+    )
 
 
 def _flank_point(gear: Gear, radii: Array) -> Array:
@@ -237,7 +253,9 @@ def _crossing(gear: Gear, radii: Array) -> Array:
 
 
 def _along_force(solution: Solution, gear: Gear, radii: Array) -> Array:
-    values = point_values(solution.basis, _crossing(gear, radii)) @ solution.displacement
+    values = (
+        point_values(solution.basis, _crossing(gear, radii)) @ solution.displacement
+    )
     moved = np.diagonal(values.reshape(2, len(radii), len(radii)), axis1=1, axis2=2)
     return np.sum(_force(gear, radii) * moved, axis=0)
 
@@ -256,7 +274,9 @@ def contact_radii(
     """
     tip = math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
     start = gear.junction_curvature_radius
-    return np.linspace(start + root_margin * (tip - start), tip - tip_margin, n_contacts)
+    return np.linspace(
+        start + root_margin * (tip - start), tip - tip_margin, n_contacts
+    )
 
 
 def root_stress_factor(
@@ -279,16 +299,25 @@ def root_stress_factor(
     (contact,) rad    slope of the edge to the tooth centreline where it is largest; ISO 6336-3 takes 30 degrees
     """
     mesh = gear_mesh(
-        gear, {0: curvature_radius}, resolution=resolution, modelled_teeth=modelled_teeth
+        gear,
+        {0: curvature_radius},
+        resolution=resolution,
+        modelled_teeth=modelled_teeth,
     )
     solution = _solve(mesh, _on_bore(gear, mesh), gear, curvature_radius, plane)
     edges = mesh.facets[:, mesh.boundary_facets()]
     middle = mesh.p[:, edges].mean(axis=1)
-    junction = math.hypot(gear.base_radius, gear.junction_curvature_radius) / gear.normal_module
+    junction = (
+        math.hypot(gear.base_radius, gear.junction_curvature_radius)
+        / gear.normal_module
+    )
     bore = 0.5 * (gear.bore_radius + gear.root_radius) / gear.normal_module
     radius, angle = np.hypot(*middle), np.arctan2(middle[1], middle[0])
     on_root = (
-        (radius > bore) & (radius < junction) & (angle > 0.0) & (angle < math.pi / gear.n_teeth)
+        (radius > bore)
+        & (radius < junction)
+        & (angle > 0.0)
+        & (angle < math.pi / gear.n_teeth)
     )
     first, second = edges[:, on_root]
     along = mesh.p[:, second] - mesh.p[:, first]
@@ -296,9 +325,9 @@ def root_stress_factor(
     length = np.hypot(*along)
     sign = np.sign(mesh.p[0, second] - mesh.p[0, first])
     dofs = solution.basis.nodal_dofs
-    moved = (solution.displacement[dofs[:, second]] - solution.displacement[dofs[:, first]]) * sign[
-        None, :, None
-    ]
+    moved = (
+        solution.displacement[dofs[:, second]] - solution.displacement[dofs[:, first]]
+    ) * sign[None, :, None]
     stretch = np.einsum("ce,cel->el", along, moved) / length[:, None] ** 2
     nu = plane.material.poisson_ratio
     stress = stretch / (1.0 if plane.elasticity == "plane_stress" else 1.0 - nu**2)

@@ -24,11 +24,15 @@ from gensig.geometry.tooth_profile import involute_point, root_curve, root_curve
 Array = NDArray[np.float64]
 Curve = Callable[[Array], tuple[Array, Array]]
 
-MODELLED_TEETH = 23  # beyond these, nearest to tooth 0, the outline follows the root circle
+MODELLED_TEETH = (
+    23  # beyond these, nearest to tooth 0, the outline follows the root circle
+)
 
 
 BORE_EDGES = 96  # at least: a polygon inside the bore makes it smaller
-INSIDE_DISTANCE = 10.0  # modules from the outline, where edges reach their largest length
+INSIDE_DISTANCE = (
+    10.0  # modules from the outline, where edges reach their largest length
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +58,9 @@ class Resolution:
         """Sizes with which the root curve is fine enough for a crack."""
         if crack is None:
             return self
-        return replace(self, root=min(self.root, self.crack_face * crack.depth / module))
+        return replace(
+            self, root=min(self.root, self.crack_face * crack.depth / module)
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,21 +97,29 @@ def gear_mesh(
     modelled_teeth : number of teeth with their outline, the nearest to tooth 0
     """
     sizes = (resolution or Resolution()).near(crack, gear.normal_module)
-    outline = Polyline.closed(gear_outline(gear, contacts, crack, sizes, modelled_teeth))
+    outline = Polyline.closed(
+        gear_outline(gear, contacts, crack, sizes, modelled_teeth)
+    )
     bore_radius = gear.bore_radius / gear.normal_module
-    bore = circle(bore_radius, min(sizes.bore, 2.0 * math.pi * bore_radius / BORE_EDGES))
+    bore = circle(
+        bore_radius, min(sizes.bore, 2.0 * math.pi * bore_radius / BORE_EDGES)
+    )
     slits = [] if crack is None else [crack_line(gear, crack, sizes)]
     mesh = triangulate([outline, Polyline.closed(bore)], slits, sizes.inside)
     return open_slit(mesh, slits[0]) if slits and opened else mesh
 
 
-def tooth_mesh(gear: Gear, contacts: Array, *, resolution: Resolution | None = None) -> MeshTri:
+def tooth_mesh(
+    gear: Gear, contacts: Array, *, resolution: Resolution | None = None
+) -> MeshTri:
     """Tooth 0 alone, cut off at its root chord (the line through the gamma = pi/2 points); lengths in modules."""
     sizes = resolution or Resolution()
     tooth = tooth_outline(gear, contacts, sizes.root, sizes.flank)
     n_chord = math.ceil((tooth[1, -1] - tooth[1, 0]) / sizes.root)
     chord = np.linspace(tooth[:, -1], tooth[:, 0], n_chord + 1, axis=1)
-    return triangulate([Polyline.closed(np.hstack([tooth, chord[:, 1:-1]]))], [], sizes.inside)
+    return triangulate(
+        [Polyline.closed(np.hstack([tooth, chord[:, 1:-1]]))], [], sizes.inside
+    )
 
 
 def tooth_outline(
@@ -122,11 +136,16 @@ def tooth_outline(
     tip = math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
     gammas = [0.5 * math.pi, *sorted(root_knots, reverse=True), gear.pressure_angle]
     radii = _distinct(
-        [gear.junction_curvature_radius, *np.sort(contacts), tip], 1e-6 * gear.normal_module
+        [gear.junction_curvature_radius, *np.sort(contacts), tip],
+        1e-6 * gear.normal_module,
     )
-    root = _sample(lambda gamma: root_curve(gear, gamma), gammas, root_size * gear.normal_module)
+    root = _sample(
+        lambda gamma: root_curve(gear, gamma), gammas, root_size * gear.normal_module
+    )
     flank = _sample(
-        lambda radius: involute_point(gear, radius), radii, flank_size * gear.normal_module
+        lambda radius: involute_point(gear, radius),
+        radii,
+        flank_size * gear.normal_module,
     )
     half = np.hstack([root[:, :-1], flank]) / gear.normal_module
     half_tip = gear.half_tooth_angle_at(gear.tip_radius)
@@ -140,7 +159,10 @@ def crack_start_gamma(gear: Gear, start: str) -> float:
     radius = math.hypot(*root_curve_point(gear, start))
     return brentq(
         lambda gamma: (
-            math.hypot(*(float(value[0]) for value in root_curve(gear, np.array([gamma])))) - radius
+            math.hypot(
+                *(float(value[0]) for value in root_curve(gear, np.array([gamma])))
+            )
+            - radius
         ),
         gear.pressure_angle,
         0.5 * math.pi,
@@ -154,7 +176,9 @@ def crack_line(gear: Gear, crack: Crack, sizes: Resolution) -> Array:
     side = {"tension": 1.0, "compression": -1.0}[crack.side]
     depth = crack.depth / gear.normal_module
     along = depth - growing_steps(depth, sizes.crack_tip * depth, sizes.root)[::-1]
-    return np.stack([x - along * math.cos(crack.angle), side * (y - along * math.sin(crack.angle))])
+    return np.stack(
+        [x - along * math.cos(crack.angle), side * (y - along * math.sin(crack.angle))]
+    )
 
 
 def growing_steps(length: float, first: float, largest: float) -> Array:
@@ -200,7 +224,11 @@ def gear_outline(
         else:
             outline = _arc(gear.root_radius / module, -here, here, size)
         gap = _arc(gear.root_radius / module, here, 2.0 * math.pi / z - here, root_size)
-        pieces.append(polar_rotation(np.hstack([outline, gap[:, 1:-1]]), 2.0 * math.pi * tooth / z))
+        pieces.append(
+            polar_rotation(
+                np.hstack([outline, gap[:, 1:-1]]), 2.0 * math.pi * tooth / z
+            )
+        )
     return np.hstack(pieces)
 
 
@@ -227,7 +255,9 @@ def _sample(curve: Curve, knots: Sequence[float], size: float) -> Array:
 
 def _arc(radius: float, start: float, end: float, size: float) -> Array:
     return _sample(
-        lambda polar: (radius * np.cos(polar), radius * np.sin(polar)), [start, end], size
+        lambda polar: (radius * np.cos(polar), radius * np.sin(polar)),
+        [start, end],
+        size,
     )
 
 
@@ -262,14 +292,22 @@ class Polyline:
     @classmethod
     def open(cls, points: Array, size: float) -> Polyline:
         """Open line; a single point gets ``size``."""
-        edges = np.hypot(*np.diff(points, axis=1)) if points.shape[1] > 1 else np.array([size])
+        edges = (
+            np.hypot(*np.diff(points, axis=1))
+            if points.shape[1] > 1
+            else np.array([size])
+        )
         return cls(
             points,
-            np.maximum(np.append(edges, edges[-1]), np.append(edges[0], edges))[: points.shape[1]],
+            np.maximum(np.append(edges, edges[-1]), np.append(edges[0], edges))[
+                : points.shape[1]
+            ],
         )
 
 
-def triangulate(loops: Sequence[Polyline], inner: Sequence[Array], inside_size: float) -> MeshTri:
+def triangulate(
+    loops: Sequence[Polyline], inner: Sequence[Array], inside_size: float
+) -> MeshTri:
     """Triangles inside the first closed loop and outside the others, with nodes and edges along the inner lines.
 
     Every edge of the lines is one edge of a triangle; elsewhere edges grow with the distance from the nearest line.
@@ -288,7 +326,9 @@ def triangulate(loops: Sequence[Polyline], inner: Sequence[Array], inside_size: 
         gmsh.finalize()
 
 
-def _describe(loops: Sequence[Polyline], inner: Sequence[Array], inside_size: float) -> None:
+def _describe(
+    loops: Sequence[Polyline], inner: Sequence[Array], inside_size: float
+) -> None:
     """Geometry and wanted edge lengths as gmsh takes them."""
     geo = gmsh.model.geo
     tags: dict[tuple[float, float], int] = {}
@@ -317,7 +357,9 @@ def _describe(loops: Sequence[Polyline], inner: Sequence[Array], inside_size: fl
     edges = [edge for nodes in embedded for edge in connect(nodes)]
     geo.synchronize()
     gmsh.model.mesh.embed(1, edges, 2, surface)
-    gmsh.model.mesh.embed(0, [nodes[0] for nodes in embedded if len(nodes) == 1], 2, surface)
+    gmsh.model.mesh.embed(
+        0, [nodes[0] for nodes in embedded if len(nodes) == 1], 2, surface
+    )
     _grow_inwards(inside_size)
 
 
@@ -352,7 +394,9 @@ def _read_triangles() -> MeshTri:
     order = np.argsort(node_tags)
     cells = order[np.searchsorted(node_tags, triangles, sorter=order)]
     used, cells = np.unique(cells, return_inverse=True)
-    return MeshTri(coordinates.reshape(-1, 3)[used, :2].T.copy(), cells.reshape(-1, 3).T.copy())
+    return MeshTri(
+        coordinates.reshape(-1, 3)[used, :2].T.copy(), cells.reshape(-1, 3).T.copy()
+    )
 
 
 def open_slit(mesh: MeshTri, slit: Array) -> MeshTri:
@@ -361,7 +405,8 @@ def open_slit(mesh: MeshTri, slit: Array) -> MeshTri:
     copies = np.arange(mesh.nvertices)
     copies[nodes] = mesh.nvertices + np.arange(len(nodes))
     return MeshTri(
-        np.hstack([mesh.p, mesh.p[:, nodes]]), np.where(left_of(mesh, slit), copies[mesh.t], mesh.t)
+        np.hstack([mesh.p, mesh.p[:, nodes]]),
+        np.where(left_of(mesh, slit), copies[mesh.t], mesh.t),
     )
 
 

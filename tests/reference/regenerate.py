@@ -59,14 +59,37 @@ N_CONTACTS = 10
 TIP_MARGIN = 0.15e-3  # keeps the point load off the tip corner
 BODY_RATIO = 2.3  # root radius over bore radius where no bore is given
 CRACK_ANGLES_DEG = (30.0, 45.0, 60.0, 75.0)
-CRACK_DEPTHS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8)  # over the chord at the crack's start
-BORE_PAIRS_MM = ((5.0, 10.0), (7.0, 12.5), (9.0, 15.0), (10.0, 20.0), (12.0, 30.0), (14.0, 40.0))
+CRACK_DEPTHS = (
+    0.05,
+    0.1,
+    0.2,
+    0.3,
+    0.4,
+    0.5,
+    0.6,
+    0.7,
+    0.8,
+)  # over the chord at the crack's start
+BORE_PAIRS_MM = (
+    (5.0, 10.0),
+    (7.0, 12.5),
+    (9.0, 15.0),
+    (10.0, 20.0),
+    (12.0, 30.0),
+    (14.0, 40.0),
+)
 
 
 def _gear(n_teeth: int, *, bore_radius: float | None = None, **changes: float) -> Gear:
     """The basic rack's gear; without ``bore_radius``, its bore follows ``BODY_RATIO``."""
-    gear = replace(BASE, **({"n_teeth": n_teeth, "bore_radius": bore_radius or 1e-3} | changes))  # type: ignore[arg-type]
-    return gear if bore_radius else replace(gear, bore_radius=gear.root_radius / BODY_RATIO)
+    gear = replace(
+        BASE, **({"n_teeth": n_teeth, "bore_radius": bore_radius or 1e-3} | changes)
+    )  # type: ignore[arg-type]
+    return (
+        gear
+        if bore_radius
+        else replace(gear, bore_radius=gear.root_radius / BODY_RATIO)
+    )
 
 
 GEARS: dict[str, Gear] = {
@@ -80,14 +103,34 @@ GEARS: dict[str, Gear] = {
     "z50": _gear(50),
     "z84": _gear(84),
     "z120": _gear(120),
-    "z30_alpha25": _gear(30, pressure_angle=math.radians(25.0), cutter_tip_radius_coefficient=0.3),
+    "z30_alpha25": _gear(
+        30, pressure_angle=math.radians(25.0), cutter_tip_radius_coefficient=0.3
+    ),
     "z25_sharp": _gear(25, cutter_tip_radius_coefficient=0.2),
     "z30_long": _gear(30, addendum_coefficient=1.15),
 }
 ONLY_STRESSED = {"z54": _gear(54)}
 CRACKED = ("z23_bore9", "z40", "z84", "z17_x03", "z30_alpha25", "z25_sharp")
-STRESSED = ("z17_x03", "z23", "z25_sharp", "z30_alpha25", "z30_long", "z40", "z54", "z84")
-TIP_DISTANCES = (0.02, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1.05)  # base pitches from the tip
+STRESSED = (
+    "z17_x03",
+    "z23",
+    "z25_sharp",
+    "z30_alpha25",
+    "z30_long",
+    "z40",
+    "z54",
+    "z84",
+)
+TIP_DISTANCES = (
+    0.02,
+    0.15,
+    0.3,
+    0.45,
+    0.6,
+    0.75,
+    0.9,
+    1.05,
+)  # base pitches from the tip
 FINE_ROOT = Resolution(flank=0.05, root=0.015, inside=1.0)
 ALL_ANGLES = ("z23_bore9", "z40", "z84")
 
@@ -119,7 +162,8 @@ def _contact_rows(
     for index, radius in enumerate(radii):
         label = labels[index] if labels else {}
         values = {
-            name: value[index] / STRAIN.unit_compliance for name, value in compliances.items()
+            name: value[index] / STRAIN.unit_compliance
+            for name, value in compliances.items()
         }
         yield {
             **head,
@@ -167,7 +211,12 @@ def crack() -> Iterator[Row]:
         for start, angle, side in _crack_families(case):
             chord = 2.0 * root_curve_point(gear, start)[1]
             for share in CRACK_DEPTHS:
-                slit = Crack(start=start, angle=math.radians(angle), depth=share * chord, side=side)
+                slit = Crack(
+                    start=start,
+                    angle=math.radians(angle),
+                    depth=share * chord,
+                    side=side,
+                )
                 head = _gear_columns(case) | {
                     "start": start,
                     "crack_angle_deg": angle,
@@ -211,7 +260,10 @@ def bores() -> Iterator[Row]:
                     "bore_radius_over_module": gear.bore_radius / gear.normal_module,
                 }
                 radii = _radii(pair, gear, np.array(list(named.values())))
-                labels = [_position("self", point, position) for point, position in named.items()]
+                labels = [
+                    _position("self", point, position)
+                    for point, position in named.items()
+                ]
                 own = structural_compliance(gear, radii, plane)
                 yield from _contact_rows(head, radii, labels, compliance=own)
                 radii = _radii(pair, gear, double)
@@ -241,7 +293,11 @@ def root_stress() -> Iterator[Row]:
 
 
 def _position(kind: str, point: str, position: float) -> Row:
-    return {"kind": kind, "point": point, "position_over_module": position / BASE.normal_module}
+    return {
+        "kind": kind,
+        "point": point,
+        "position_over_module": position / BASE.normal_module,
+    }
 
 
 def _pair(pinion_bore_mm: float, wheel_bore_mm: float) -> GearPair:
@@ -269,7 +325,9 @@ def _named_positions(pair: GearPair) -> dict[str, float]:
 def _radii(pair: GearPair, gear: Gear, position: Array) -> Array:
     """Curvature radii of one of the gears, kept on its involute against rounding."""
     radii = (
-        pair.pinion_curvature(position) if gear is pair.pinion else pair.wheel_curvature(position)
+        pair.pinion_curvature(position)
+        if gear is pair.pinion
+        else pair.wheel_curvature(position)
     )
     return np.minimum(radii, math.sqrt(gear.tip_radius**2 - gear.base_radius**2))
 
@@ -279,7 +337,8 @@ def three_d_tables() -> dict[str, Iterable[Row]]:
     pair = _pair(9.0, 15.0)
     named = _named_positions(pair)
     points = {
-        point: float(_radii(pair, pair.pinion, np.array([named[point]]))[0]) for point in "CBDE"
+        point: float(_radii(pair, pair.pinion, np.array([named[point]]))[0])
+        for point in "CBDE"
     }
     return dict(three_d(pair.pinion, points, STEEL.poisson_ratio))
 
@@ -306,7 +365,8 @@ def write_table(path: Path, table: Iterable[Row]) -> int:
 
 def _rounded(row: Row) -> Row:
     return {
-        key: f"{value:.8g}" if isinstance(value, float) else value for key, value in row.items()
+        key: f"{value:.8g}" if isinstance(value, float) else value
+        for key, value in row.items()
     }
 
 
@@ -328,10 +388,17 @@ def main(arguments: list[str] | None = None) -> None:
         start = time.perf_counter()
         for name, rows in TABLES[group]().items():
             count = write_table(DATA / f"{name}.csv", rows)
-            print(f"{name}.csv: {count} rows, {time.perf_counter() - start:.0f} s", flush=True)
+            print(
+                f"{name}.csv: {count} rows, {time.perf_counter() - start:.0f} s",
+                flush=True,
+            )
     packages = ("gmsh", "numpy", "scikit-fem", "scipy")
-    versions = {"python": platform.python_version()} | {name: version(name) for name in packages}
-    (DATA / "versions.json").write_text(json.dumps(versions, indent=2) + "\n", encoding="utf-8")
+    versions = {"python": platform.python_version()} | {
+        name: version(name) for name in packages
+    }
+    (DATA / "versions.json").write_text(
+        json.dumps(versions, indent=2) + "\n", encoding="utf-8"
+    )
 
 
 if __name__ == "__main__":

@@ -105,7 +105,9 @@ class Extrusion:
         n_plane, n_layers = self.section.nvertices, len(self.heights) - 1
         low = np.sort(self.section.t, axis=0)
         high = low + n_plane
-        prism = np.stack([[*low, high[2]], [*low[:2], *high[1:]], [low[0], *high]], axis=1)
+        prism = np.stack(
+            [[*low, high[2]], [*low[:2], *high[1:]], [low[0], *high]], axis=1
+        )
         cells = prism[:, None] + n_plane * np.arange(n_layers)[None, :, None, None]
         middle = 0.5 * (self.heights[1:] + self.heights[:-1]) / self.heights[-1]
         points = np.vstack(
@@ -118,7 +120,8 @@ class Extrusion:
         cells = cells[:, np.broadcast_to(kept, cells.shape[1:])]
         used, cells = np.unique(cells, return_inverse=True)
         return MeshTet(
-            np.ascontiguousarray(points[:, used]), np.ascontiguousarray(cells.reshape(4, -1))
+            np.ascontiguousarray(points[:, used]),
+            np.ascontiguousarray(cells.reshape(4, -1)),
         )
 
     def _cracked(
@@ -131,24 +134,41 @@ class Extrusion:
             for point in self.slit.T[reach < fault.crack_depth - 1e-6]
         ]
         extent = fault.crack_extent * self.heights[-1]
-        planes = np.flatnonzero((self.heights < extent - 1e-6) | (fault.crack_extent >= 1.0))
+        planes = np.flatnonzero(
+            (self.heights < extent - 1e-6) | (fault.crack_extent >= 1.0)
+        )
         nodes = (planes[:, None] * self.section.nvertices + np.array(opened)).ravel()
         copies = np.arange(points.shape[1])
         copies[nodes] = points.shape[1] + np.arange(len(nodes))
-        left = left_of(self.section, self.slit) & (middle < fault.crack_extent)[:, None, None]
-        return np.hstack([points, points[:, nodes]]), np.where(left, copies[cells], cells)
+        left = (
+            left_of(self.section, self.slit)
+            & (middle < fault.crack_extent)[:, None, None]
+        )
+        return np.hstack([points, points[:, nodes]]), np.where(
+            left, copies[cells], cells
+        )
 
 
 def extrude(
-    gear: Gear, radii: Array, *, sizes: Resolution = SECTION, layers: Sequence[int] = LAYERS
+    gear: Gear,
+    radii: Array,
+    *,
+    sizes: Resolution = SECTION,
+    layers: Sequence[int] = LAYERS,
 ) -> Extrusion:
     """The gear's section with nodes at contacts and on the centreline, and layers over its face width."""
     module = gear.normal_module
-    crack = Crack(start=CRACK_START, angle=CRACK_ANGLE, depth=max(CRACK_DEPTHS) * module)
+    crack = Crack(
+        start=CRACK_START, angle=CRACK_ANGLE, depth=max(CRACK_DEPTHS) * module
+    )
     slit = _slit(gear, sizes)
     ends = _pit_ends(gear, radii[0])
-    outline = gear_outline(gear, {0: np.append(radii, ends)}, crack, sizes, modelled_teeth=3)
-    floor = np.stack(involute_point(gear, ends)) / module - np.array([[0.0], [PIT_DEPTH]])
+    outline = gear_outline(
+        gear, {0: np.append(radii, ends)}, crack, sizes, modelled_teeth=3
+    )
+    floor = np.stack(involute_point(gear, ends)) / module - np.array(
+        [[0.0], [PIT_DEPTH]]
+    )
     wall = np.stack(involute_point(gear, ends)) / module
     pit_line = np.hstack(
         [wall[:, :1], np.linspace(floor[:, 0], floor[:, 1], 4, axis=1), wall[:, 1:]]
@@ -175,13 +195,20 @@ def extrude(
 def _slit(gear: Gear, sizes: Resolution) -> Array:
     """Nodes of the deepest crack, refined at the tip of every depth."""
     line = crack_line(
-        gear, Crack(start=CRACK_START, angle=CRACK_ANGLE, depth=gear.normal_module), sizes
+        gear,
+        Crack(start=CRACK_START, angle=CRACK_ANGLE, depth=gear.normal_module),
+        sizes,
     )
     mouth, direction = line[:, :1], line[:, -1:] - line[:, :1]
     first, *deeper = CRACK_DEPTHS
-    along = [first - growing_steps(first, sizes.crack_tip * first, sizes.crack_face * first)[::-1]]
+    along = [
+        first
+        - growing_steps(first, sizes.crack_tip * first, sizes.crack_face * first)[::-1]
+    ]
     for start, end in zip(CRACK_DEPTHS, deeper, strict=False):
-        half = growing_steps(0.5 * (end - start), sizes.crack_tip * start, sizes.crack_face * start)
+        half = growing_steps(
+            0.5 * (end - start), sizes.crack_tip * start, sizes.crack_face * start
+        )
         along += [start + half[1:], end - half[-2::-1]]
     return mouth + direction * np.concatenate(along)
 
@@ -193,10 +220,14 @@ def _pit_ends(gear: Gear, pitch: float) -> Array:
 
     def beyond(radius: float, half: float) -> float:
         return float(
-            involute_point(gear, np.array([radius]))[0][0] - centre - half * gear.normal_module
+            involute_point(gear, np.array([radius]))[0][0]
+            - centre
+            - half * gear.normal_module
         )
 
-    lower = brentq(beyond, gear.junction_curvature_radius, pitch, args=(-0.5 * PIT_HEIGHT,))
+    lower = brentq(
+        beyond, gear.junction_curvature_radius, pitch, args=(-0.5 * PIT_HEIGHT,)
+    )
     return np.array([lower, brentq(beyond, pitch, tip, args=(0.5 * PIT_HEIGHT,))])
 
 
@@ -227,7 +258,9 @@ class Response:
 def solve(gear: Gear, radii: Array, mesh: MeshTet, poisson_ratio: float) -> Response:
     """Strip responses at every contact, one factorisation."""
     basis = Basis(mesh, ElementVector(ElementTetP2()), intorder=1)
-    stiffness = _stiffness(mesh, basis.element_dofs, *lame_parameters(1.0, poisson_ratio))
+    stiffness = _stiffness(
+        mesh, basis.element_dofs, *lame_parameters(1.0, poisson_ratio)
+    )
     bore = np.hypot(*mesh.p[:2]) < gear.bore_radius / gear.normal_module + 1e-6
     free = basis.complement_dofs(
         basis.get_dofs(facets=np.flatnonzero(bore[mesh.facets].all(axis=0)))
@@ -237,7 +270,9 @@ def solve(gear: Gear, radii: Array, mesh: MeshTet, poisson_ratio: float) -> Resp
         np.stack(involute_point(gear, np.array([radius])))[:, 0] / gear.normal_module
         for radius in radii
     ]
-    loads = np.hstack([_strip_means(basis, mesh, p, f) for p, f in zip(flank, forces, strict=True)])
+    loads = np.hstack(
+        [_strip_means(basis, mesh, p, f) for p, f in zip(flank, forces, strict=True)]
+    )
     displacement = np.zeros_like(loads)
     displacement[free] = solve_definite(stiffness[free][:, free], loads[free])
     width = gear.face_width / gear.normal_module
@@ -251,7 +286,9 @@ def solve(gear: Gear, radii: Array, mesh: MeshTet, poisson_ratio: float) -> Resp
             line[np.argmin(np.abs(mesh.p[2, line] - z))]
             for z in np.linspace(0.0, width, N_STRIPS + 1)
         ]
-        profile.append(np.tensordot(force, moved.mean(axis=1)[basis.nodal_dofs[:2, ends]], axes=1))
+        profile.append(
+            np.tensordot(force, moved.mean(axis=1)[basis.nodal_dofs[:2, ends]], axes=1)
+        )
     return Response(strips=np.stack(strips) * width, profile=np.stack(profile) * width)
 
 
@@ -268,7 +305,9 @@ def _stiffness(
         np.arange(mesh.nelements), math.ceil(mesh.nelements / CELLS_AT_ONCE)
     ):
         scalar = Basis(mesh, ElementTetP2(), elements=cells, intorder=2)
-        gradient = np.stack([shape[0].grad for shape in scalar.basis]) * np.sqrt(scalar.dx)
+        gradient = np.stack([shape[0].grad for shape in scalar.basis]) * np.sqrt(
+            scalar.dx
+        )
         gradient = gradient.transpose(2, 0, 1, 3).reshape(len(cells), n_local, -1)
         products = (gradient @ gradient.transpose(0, 2, 1)).reshape(
             len(cells), n_local // 3, 3, n_local // 3, 3
@@ -278,7 +317,9 @@ def _stiffness(
         for axis in range(3):
             local[:, :, axis, :, axis] += trace
         rows = np.broadcast_to(dofs.T[cells, :, None], (len(cells), n_local, n_local))
-        columns = np.broadcast_to(dofs.T[cells, None, :], (len(cells), n_local, n_local))
+        columns = np.broadcast_to(
+            dofs.T[cells, None, :], (len(cells), n_local, n_local)
+        )
         total = total + csr_matrix(
             (local.ravel(), (rows.ravel(), columns.ravel())), shape=total.shape
         )
@@ -297,7 +338,9 @@ def _strip_means(basis: Basis, mesh: MeshTet, place: Array, force: Array) -> Arr
     keys = mesh.edges[0].astype(np.int64) * mesh.nvertices + mesh.edges[1]
     order = np.argsort(keys)
     wanted = low * mesh.nvertices + high
-    found = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]
+    found = order[
+        np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)
+    ]
     vectors = np.zeros((basis.N, N_STRIPS))
     for layer in np.flatnonzero(keys[found] == wanted):
         strip = int(0.5 * (z[layer] + z[layer + 1]) / strip_width)
@@ -328,7 +371,9 @@ def _crossing(gear: Gear, radius: float) -> Array:
     return np.array([gear.base_radius / math.cos(angle) / gear.normal_module, 0.0])
 
 
-def three_d(gear: Gear, points: dict[str, float], poisson_ratio: float) -> dict[str, list[Row]]:
+def three_d(
+    gear: Gear, points: dict[str, float], poisson_ratio: float
+) -> dict[str, list[Row]]:
     """Tables of all faults; ``points`` names curvature radii (m), the pitch point "C" first."""
     radii = np.array(list(points.values()))
     extrusion = extrude(gear, radii)
@@ -356,7 +401,10 @@ def summary_rows(
             "point": point,
             "curvature_radius_over_module": radius / module,
         }
-        whole, partial = response.strips[index], response.strips[index][np.ix_(outside, outside)]
+        whole, partial = (
+            response.strips[index],
+            response.strips[index][np.ix_(outside, outside)],
+        )
         if not fault.pitted:
             yield head | _value("mean", 1.0, whole.mean())
             for place, value in enumerate(response.profile[index]):
@@ -365,7 +413,9 @@ def summary_rows(
             yield head | _value("rigid", 1.0, rigid_compliance(whole))
         if point == "C" and fault.crack_depth == 0.0:
             yield head | _value("mean", len(outside) / N_STRIPS, partial.mean())
-            yield head | _value("rigid", len(outside) / N_STRIPS, rigid_compliance(partial))
+            yield head | _value(
+                "rigid", len(outside) / N_STRIPS, rigid_compliance(partial)
+            )
 
 
 def flexibility_rows(fault: Fault, response: Response) -> Iterator[Row]:
@@ -389,7 +439,9 @@ def _fault_columns(fault: Fault) -> Row:
     }
 
 
-def _value(quantity: str, loaded: float, compliance: float, place: float | None = None) -> Row:
+def _value(
+    quantity: str, loaded: float, compliance: float, place: float | None = None
+) -> Row:
     where = "" if place is None else place
     return {
         "quantity": quantity,

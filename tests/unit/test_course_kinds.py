@@ -38,8 +38,12 @@ def walk(seed, one=WALK, duration=1.0):
 class TestRamp:
     def test_from_the_begin_to_the_end_of_the_record(self):
         found = Ramp(first_factor=0.5, last_factor=1.0).profile(4.0)
-        assert_allclose(found.curve()([-1, 0, 2, 4, 9]), [0.5, 0.5, 0.75, 1, 1], rtol=1e-12, atol=0)
-        early = Ramp(first_factor=0.5, last_factor=1.0, begin=-1.0, end=1.0).profile(4.0)
+        assert_allclose(
+            found.curve()([-1, 0, 2, 4, 9]), [0.5, 0.5, 0.75, 1, 1], rtol=1e-12, atol=0
+        )
+        early = Ramp(first_factor=0.5, last_factor=1.0, begin=-1.0, end=1.0).profile(
+            4.0
+        )
         assert_allclose(early.curve()([-2, 0, 2]), [0.5, 0.75, 1], rtol=1e-12, atol=0)
 
     def test_its_least_factor(self):
@@ -62,8 +66,12 @@ class TestRandomWalk:
         """Over independent seeds; three standard errors of 4000 draws."""
         draws = np.array([walk(seed, duration=0.1).factors for seed in range(4000)])
         every = draws.shape[0]
-        assert_allclose(draws.mean(axis=0), 1.0, rtol=0, atol=4.5 * WALK.scatter / math.sqrt(every))
-        assert_allclose(draws.std(axis=0), WALK.scatter, rtol=4.5 / math.sqrt(2 * every), atol=0)
+        assert_allclose(
+            draws.mean(axis=0), 1.0, rtol=0, atol=4.5 * WALK.scatter / math.sqrt(every)
+        )
+        assert_allclose(
+            draws.std(axis=0), WALK.scatter, rtol=4.5 / math.sqrt(2 * every), atol=0
+        )
         normed = (draws - 1.0) / WALK.scatter
         for lag in (1, 20, 40, 100):  # twentieths of the correlation time
             expected = math.exp(-lag / 20)
@@ -90,7 +98,10 @@ class TestRandomWalk:
         [
             ({"scatter": 0.3}, "scatter = 0.3 must lie in 0..0.2"),
             ({"scatter": -0.1}, "scatter = -0.1 must lie in 0..0.2"),
-            ({"correlation_time": 0.01}, "correlation_time_s = 0.01 must lie in 0.02..1e+06"),
+            (
+                {"correlation_time": 0.01},
+                "correlation_time_s = 0.01 must lie in 0.02..1e+06",
+            ),
         ],
     )
     def test_refusals(self, values, text):
@@ -99,11 +110,15 @@ class TestRandomWalk:
 
     def test_too_many_points(self):
         with pytest.raises(
-            ConfigError, match=r"correlation_time_s = 0.02 needs 1002002 points for 1000 s"
+            ConfigError,
+            match=r"correlation_time_s = 0.02 needs 1002002 points for 1000 s",
         ) as caught:
             walk(0, replace(WALK, correlation_time=0.02), duration=1000.0)
         least = float(re.search(r"give ([\d.]+) or more", str(caught.value))[1])
-        assert len(walk(0, replace(WALK, correlation_time=least), duration=1000.0).times) > 90_000
+        assert (
+            len(walk(0, replace(WALK, correlation_time=least), duration=1000.0).times)
+            > 90_000
+        )
 
 
 class TestRipple:
@@ -124,12 +139,19 @@ class TestRipple:
             t = np.asarray(t)
             return float(curve(t) * ripple.share * np.sin(ripple.psi(t, angle(t))))
 
-        inside = [knot for knot in course.times if min(0.0, time) < knot < max(0.0, time)]
+        inside = [
+            knot for knot in course.times if min(0.0, time) < knot < max(0.0, time)
+        ]
         edges = [0.0, *(inside if time > 0 else inside[::-1]), time]
-        expected = sum(quad(wave, a, b, limit=200)[0] for a, b in itertools.pairwise(edges))
+        expected = sum(
+            quad(wave, a, b, limit=200)[0] for a, b in itertools.pairwise(edges)
+        )
         at = np.array([time, 0.0])
         assert_allclose(
-            ripple.gained(at, angle(at), set_speed, profile), [expected, 0.0], rtol=1e-8, atol=1e-10
+            ripple.gained(at, angle(at), set_speed, profile),
+            [expected, 0.0],
+            rtol=1e-8,
+            atol=1e-10,
         )
 
     @pytest.mark.parametrize("name", list(RIPPLES))
@@ -150,9 +172,15 @@ class TestRipple:
     @pytest.mark.parametrize(
         ("values", "text"),
         [
-            ({"share": 1.0, "order": 1.0}, "share = 1 must lie in 0..1, 1 not included"),
+            (
+                {"share": 1.0, "order": 1.0},
+                "share = 1 must lie in 0..1, 1 not included",
+            ),
             ({"share": -0.1, "order": 1.0}, "share = -0.1 must lie in 0..1"),
-            ({"share": 0.1}, "give order (of the pinion's turn) or frequency_hz, one of the two"),
+            (
+                {"share": 0.1},
+                "give order (of the pinion's turn) or frequency_hz, one of the two",
+            ),
             (
                 {"share": 0.1, "order": 1.0, "frequency": 5.0},
                 "give order (of the pinion's turn) or frequency_hz",

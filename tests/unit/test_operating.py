@@ -20,7 +20,8 @@ from gensig.systems.registry import read_system
 
 POINTS = ((-0.2, 0.5), (0.3, 0.8), (0.7, 1.0), (1.0, 0.25))
 PROFILE = Profile(
-    times=tuple(time for time, _ in POINTS), factors=tuple(factor for _, factor in POINTS)
+    times=tuple(time for time, _ in POINTS),
+    factors=tuple(factor for _, factor in POINTS),
 )
 
 
@@ -35,11 +36,15 @@ def operating(xiamen):
 
 def profiles():
     """Any profile around time 0."""
-    pieces = st.lists(st.tuples(st.floats(0.01, 2.0), st.floats(0.1, 3.0)), min_size=2, max_size=8)
+    pieces = st.lists(
+        st.tuples(st.floats(0.01, 2.0), st.floats(0.1, 3.0)), min_size=2, max_size=8
+    )
 
     def build(start, parts):
         times = start + np.cumsum([length for length, _ in parts])
-        return Profile(times=tuple(times.tolist()), factors=tuple(factor for _, factor in parts))
+        return Profile(
+            times=tuple(times.tolist()), factors=tuple(factor for _, factor in parts)
+        )
 
     return st.builds(build, st.floats(-3.0, 1.0), pieces)
 
@@ -54,7 +59,9 @@ class TestCurve:
         assert_allclose(slope, [0, 0.6, 0.6, 0.5, -2.5, 0, 0], rtol=1e-9, atol=1e-12)
 
     def test_the_same_points_make_the_same_profile(self):
-        again = read_profile("operating.speed_profile", [list(point) for point in POINTS])
+        again = read_profile(
+            "operating.speed_profile", [list(point) for point in POINTS]
+        )
         assert again == PROFILE
         assert hash(again) == hash(PROFILE)
         assert replace(PROFILE, factors=(0.5, 0.8, 1.0, 0.3)) != PROFILE
@@ -67,26 +74,42 @@ class TestNominal:
         assert found.angle.tobytes() == (speed * times).tobytes()
         assert_allclose(found.speed, speed, rtol=0, atol=0)
         assert_allclose(found.torque_factor, 1, rtol=0, atol=0)
-        assert_allclose([found.acceleration, found.torque_slope], np.zeros((2, 4)), rtol=0, atol=0)
+        assert_allclose(
+            [found.acceleration, found.torque_slope], np.zeros((2, 4)), rtol=0, atol=0
+        )
 
     def test_whole_numbers_are_times_too(self, operating, xiamen):
         times = np.arange(3)
         for one in (operating, xiamen.operating):
             assert_allclose(
-                one.nominal(times).angle, one.nominal(times.astype(float)).angle, rtol=0, atol=0
+                one.nominal(times).angle,
+                one.nominal(times.astype(float)).angle,
+                rtol=0,
+                atol=0,
             )
             assert one.nominal(times).torque_factor.dtype == np.float64
 
     @given(profile=profiles(), time=st.floats(-5.0, 12.0))
-    def test_the_angle_is_the_integral_of_the_speed_from_time_0(self, xiamen, profile, time):
+    def test_the_angle_is_the_integral_of_the_speed_from_time_0(
+        self, xiamen, profile, time
+    ):
         operating = replace(xiamen.operating, speed_profile=profile)
-        inside = [knot for knot in profile.times if min(0.0, time) < knot < max(0.0, time)]
+        inside = [
+            knot for knot in profile.times if min(0.0, time) < knot < max(0.0, time)
+        ]
         expected, _ = quad(
-            lambda t: float(profile.curve()(t)), 0.0, time, points=inside or None, limit=100
+            lambda t: float(profile.curve()(t)),
+            0.0,
+            time,
+            points=inside or None,
+            limit=100,
         )
         found = operating.nominal(np.array([time, 0.0])).angle
         assert_allclose(
-            found, [operating.speed * expected, 0.0], rtol=1e-9, atol=1e-9 * operating.speed
+            found,
+            [operating.speed * expected, 0.0],
+            rtol=1e-9,
+            atol=1e-9 * operating.speed,
         )
 
     def test_the_angle_is_negative_before_time_0(self, operating):
@@ -96,9 +119,14 @@ class TestNominal:
     def test_speed_and_acceleration_are_its_derivatives(self, operating):
         times, h = np.array([-0.3, 0.1, 0.5, 0.9, 1.4]), 1e-6
         before, at, after = (operating.nominal(times + shift) for shift in (-h, 0.0, h))
-        assert_allclose(at.speed, (after.angle - before.angle) / (2 * h), rtol=1e-7, atol=0)
         assert_allclose(
-            at.acceleration, (after.speed - before.speed) / (2 * h), rtol=1e-6, atol=1e-6
+            at.speed, (after.angle - before.angle) / (2 * h), rtol=1e-7, atol=0
+        )
+        assert_allclose(
+            at.acceleration,
+            (after.speed - before.speed) / (2 * h),
+            rtol=1e-6,
+            atol=1e-6,
         )
         assert_allclose(
             at.torque_slope,
@@ -117,12 +145,14 @@ class TestNominal:
             np.linspace(-0.5, 2.0, 11),
             Profile(times=(0.0, 0.4, 1.0), factors=(1.0, 1.0, 1.0)),
         )
-        with_ones = replace(xiamen.operating, speed_profile=ones, torque_profile=ones).nominal(
-            times
-        )
+        with_ones = replace(
+            xiamen.operating, speed_profile=ones, torque_profile=ones
+        ).nominal(times)
         plain = xiamen.operating.nominal(times)
         for name in ("angle", "speed", "acceleration", "torque_factor", "torque_slope"):
-            assert_allclose(getattr(with_ones, name), getattr(plain, name), rtol=1e-14, atol=1e-13)
+            assert_allclose(
+                getattr(with_ones, name), getattr(plain, name), rtol=1e-14, atol=1e-13
+            )
 
 
 class TestConfiguration:
@@ -135,7 +165,9 @@ class TestConfiguration:
         assert config["operating"]["speed_profile"] == [[0, 0.5], [1, 1]]
         operating = read_system(config).operating
         assert operating.speed_profile == Profile(times=(0.0, 1.0), factors=(0.5, 1.0))
-        assert operating.torque_profile == Profile(times=(0.1, 0.2, 1.0), factors=(0.0, 1.5, 1.0))
+        assert operating.torque_profile == Profile(
+            times=(0.1, 0.2, 1.0), factors=(0.0, 1.5, 1.0)
+        )
 
     def test_constant_by_default(self, xiamen, composed_config):
         assert (
@@ -153,7 +185,10 @@ class TestConfiguration:
         )
         times = np.array([-0.3, 0.5, 2.0])
         assert_allclose(
-            slow.nominal(times).speed, 20 * math.pi * np.array([0.5, 0.75, 1.0]), rtol=1e-12, atol=0
+            slow.nominal(times).speed,
+            20 * math.pi * np.array([0.5, 0.75, 1.0]),
+            rtol=1e-12,
+            atol=0,
         )
         assert_allclose(
             fast.nominal(times).angle, 2 * slow.nominal(times).angle, rtol=1e-12, atol=0
@@ -161,7 +196,8 @@ class TestConfiguration:
 
     def test_as_many_points_as_allowed(self):
         many = read_profile(
-            "operating.speed_profile", [[place * 1e-3, 1.0] for place in range(MOST_POINTS)]
+            "operating.speed_profile",
+            [[place * 1e-3, 1.0] for place in range(MOST_POINTS)],
         )
         assert len(many.times) == MOST_POINTS
 
@@ -178,9 +214,15 @@ class TestConfiguration:
             ({"kind": "sine"}, ".kind = 'sine'; allowed: ramp, random_walk, file"),
             ([], ": 0 points; give 2 to 100000"),
             ([[0, 1]], ": 1 points; give 2 to 100000"),
-            ([[place, 1] for place in range(100_001)], ": 100001 points; give 2 to 100000"),
+            (
+                [[place, 1] for place in range(100_001)],
+                ": 100001 points; give 2 to 100000",
+            ),
             ([0, 1], ": point 0 = 0; give two finite numbers, [time_s, factor]"),
-            ([[0, 1], [1]], ": point 1 = [1]; give two finite numbers, [time_s, factor]"),
+            (
+                [[0, 1], [1]],
+                ": point 1 = [1]; give two finite numbers, [time_s, factor]",
+            ),
             ([[0, 1], [1, 1, 1]], ": point 1 = [1, 1, 1]; give two finite numbers"),
             ([[0, 1], [1, "x"]], ": point 1 = [1, 'x']; give two finite numbers"),
             ([[0, True], [1, 1]], ": point 0 = [0, True]; give two finite numbers"),
@@ -195,7 +237,10 @@ class TestConfiguration:
                 [[0, 1], [0, 2]],
                 ": the time 0 s follows 0 s; times must increase, by 0.001 s or more",
             ),
-            ([[0, 1], [1, 1], [0.5, 1]], ": the time 0.5 s follows 1 s; times must increase"),
+            (
+                [[0, 1], [1, 1], [0.5, 1]],
+                ": the time 0.5 s follows 1 s; times must increase",
+            ),
             (
                 [[0, 1], [1e-5, 1]],
                 ": the time 1e-05 s follows 0 s; times must increase, by 0.001 s or more",
@@ -204,15 +249,21 @@ class TestConfiguration:
         ],
     )
     def test_refusals(self, config_with, key, value, text):
-        with pytest.raises(ConfigError, match=re.escape(f"operating.{key}{text}")) as caught:
+        with pytest.raises(
+            ConfigError, match=re.escape(f"operating.{key}{text}")
+        ) as caught:
             read_system(config_with({f"operating.{key}": value}))
         assert "\n" not in str(caught.value)
 
     def test_a_torque_may_fall_to_nothing_but_no_speed(self, machine):
         value = [[0, 1], [1, 0]]
-        assert machine({"operating.torque_profile": value}).operating.torque_profile is not None
+        assert (
+            machine({"operating.torque_profile": value}).operating.torque_profile
+            is not None
+        )
         with pytest.raises(
-            ConfigError, match=re.escape("operating.speed_profile: factor 0 must be positive")
+            ConfigError,
+            match=re.escape("operating.speed_profile: factor 0 must be positive"),
         ):
             machine({"operating.speed_profile": value})
 

@@ -40,7 +40,8 @@ class TestKinds:
     def test_walks_of_speed_and_torque_are_different(self, operating):
         found = operating({SPEED: WALK, TORQUE: WALK})
         one, other = (
-            np.array(course.factors) for course in (found.speed_profile, found.torque_profile)
+            np.array(course.factors)
+            for course in (found.speed_profile, found.torque_profile)
         )
         assert abs(np.corrcoef(one, other)[0, 1]) < 0.5
         assert operating({SPEED: WALK, TORQUE: WALK}) == found
@@ -78,7 +79,9 @@ class TestKinds:
         own = saved(tmp_path, "factor,time_s\n0.5,-1\n0.5,0\n1,1\n")
         for speed in (600.0, 1800.0):
             found = operating({SPEED: own, "operating.speed_rpm": speed})
-            assert_allclose(found.nominal(TIMES[:2]).speed / found.speed, 0.5, rtol=1e-12, atol=0)
+            assert_allclose(
+                found.nominal(TIMES[:2]).speed / found.speed, 0.5, rtol=1e-12, atol=0
+            )
 
     def test_a_file_of_speeds_and_one_of_torques(self, operating, tmp_path):
         own = saved(tmp_path, "time_s,speed_rpm\n0,900\n1,1500\n")
@@ -87,18 +90,25 @@ class TestKinds:
                 np.array([-1.0, 0.5, 1.0])
             )
             assert_allclose(
-                found.speed, np.array([900, 1200, 1500]) * math.pi / 30, rtol=1e-12, atol=0
+                found.speed,
+                np.array([900, 1200, 1500]) * math.pi / 30,
+                rtol=1e-12,
+                atol=0,
             )
         own = saved(tmp_path, "time_s,torque_nm\n0,10\n1,40\n")
         found = operating({TORQUE: own})
         assert_allclose(
-            found.torque * found.nominal(np.array([0.5])).torque_factor, 25, rtol=1e-12, atol=0
+            found.torque * found.nominal(np.array([0.5])).torque_factor,
+            25,
+            rtol=1e-12,
+            atol=0,
         )
 
     def test_a_file_may_end_one_step_early(self, operating, tmp_path):
         rows = "".join(f"{k / 100},1\n" for k in range(100))
         assert (
-            operating({SPEED: saved(tmp_path, "time_s,factor\n" + rows)}).speed_profile is not None
+            operating({SPEED: saved(tmp_path, "time_s,factor\n" + rows)}).speed_profile
+            is not None
         )
 
 
@@ -117,10 +127,16 @@ class TestRefusals:
             ({**RAMP, "last_factor": "x"}, ".last_factor = 'x' is not a number"),
             ({**WALK, "scatter": 1}, ": scatter = 1 must lie in 0..0.2"),
             ({**WALK, "scatter": math.nan}, ".scatter = nan is not finite"),
-            ({**WALK, "seed": 1}, ": unknown key 'seed'; known: scatter, correlation_time_s"),
+            (
+                {**WALK, "seed": 1},
+                ": unknown key 'seed'; known: scatter, correlation_time_s",
+            ),
             ({"kind": "file"}, ": kind = file needs exactly file"),
             ({"kind": "file", "file": 3}, ": kind = file needs exactly file"),
-            ({"kind": "file", "file": "none.csv"}, ".file = none.csv cannot be read: No such file"),
+            (
+                {"kind": "file", "file": "none.csv"},
+                ".file = none.csv cannot be read: No such file",
+            ),
         ],
     )
     @pytest.mark.parametrize("key", [SPEED, TORQUE])
@@ -146,7 +162,10 @@ class TestRefusals:
             ("time_s,factor\n0,1\n1,fast\n", "give numbers under one header"),
             ("time_s,factor\n0,1\n1\n", "give numbers under one header"),
             ("time_s,factor\n0,1\n", "is too short: 1 rows, at least 2 are needed"),
-            ("time_s,factor\n0,1\n2,1\n1,1\n", "the time 1 s follows 2 s; times must increase"),
+            (
+                "time_s,factor\n0,1\n2,1\n1,1\n",
+                "the time 1 s follows 2 s; times must increase",
+            ),
             (
                 "time_s,factor\n0,1\n1e-4,1\n1,1\n",
                 "the time 0.0001 s follows 0 s; times must increase, by 0.001 s",
@@ -178,7 +197,10 @@ class TestRefusals:
             (3, " = 3 must be a group of keys, not one value"),
             ({"share": 0.1}, ": give order (of the pinion's turn) or frequency_hz"),
             ({"share": "x", "order": 1}, ".share = 'x' is not a number"),
-            ({"share": 0.1, "orders": 1}, ": unknown key 'orders'; did you mean 'order'?"),
+            (
+                {"share": 0.1, "orders": 1},
+                ": unknown key 'orders'; did you mean 'order'?",
+            ),
             (
                 {"share": 0.1, "frequency": 1},
                 ": 'frequency' has the wrong unit; write it as 'frequency_hz'",
@@ -190,7 +212,9 @@ class TestRefusals:
             ({"share": 0.1, "order": 6}, ": order 6 makes up to 180 Hz, above 150 Hz"),
         ],
     )
-    @pytest.mark.parametrize("key", ["operating.speed_ripple", "operating.torque_ripple"])
+    @pytest.mark.parametrize(
+        "key", ["operating.speed_ripple", "operating.torque_ripple"]
+    )
     def test_of_ripples(self, config_with, key, value, text):
         with pytest.raises(ConfigError, match=re.escape(f"{key}{text}")) as caught:
             read_system(config_with({key: value}))
@@ -205,9 +229,17 @@ class TestRefusals:
     @pytest.mark.parametrize(
         ("key", "value", "text"),
         [
-            ("turns", 0, "operating.turns = 0 must be positive, or null to use duration_s"),
+            (
+                "turns",
+                0,
+                "operating.turns = 0 must be positive, or null to use duration_s",
+            ),
             ("turns", "ten", "operating.turns = 'ten' is not a number"),
-            ("turns_of", "gear", "operating.turns_of = 'gear'; allowed: pinion, wheel, faulted"),
+            (
+                "turns_of",
+                "gear",
+                "operating.turns_of = 'gear'; allowed: pinion, wheel, faulted",
+            ),
             ("turns_of", None, "operating.turns_of is null; give a value"),
             ("course_seed", 1.5, "operating.course_seed = 1.5 is not a whole number"),
             ("course_seed", -1, "operating.course_seed = -1 must not be negative"),
@@ -220,9 +252,13 @@ class TestRefusals:
 
 class TestRipple:
     def test_of_a_constant_speed(self, operating):
-        found = operating({"operating.speed_ripple": {"share": 0.1, "order": 1, "phase_deg": 90}})
+        found = operating(
+            {"operating.speed_ripple": {"share": 0.1, "order": 1, "phase_deg": 90}}
+        )
         nominal = found.nominal(np.array([0.0, 0.25, 0.5]) / 30)
-        assert_allclose(nominal.speed / found.speed, [1.1, 1.0, 0.9], rtol=1e-12, atol=0)
+        assert_allclose(
+            nominal.speed / found.speed, [1.1, 1.0, 0.9], rtol=1e-12, atol=0
+        )
         assert_allclose(nominal.torque_factor, 1.0, rtol=0, atol=0)
 
     @pytest.mark.parametrize(
@@ -233,9 +269,14 @@ class TestRipple:
                            "operating.torque_ripple": {**ripple, "phase_deg": 30}})  # fmt: skip
         times, h = np.array([-0.2512, 0.1013, 0.5017, 0.9123]), 1e-6
         before, at, after = (found.nominal(times + shift) for shift in (-h, 0.0, h))
-        assert_allclose(at.speed, (after.angle - before.angle) / (2 * h), rtol=1e-7, atol=0)
         assert_allclose(
-            at.acceleration, (after.speed - before.speed) / (2 * h), rtol=1e-5, atol=1e-4
+            at.speed, (after.angle - before.angle) / (2 * h), rtol=1e-7, atol=0
+        )
+        assert_allclose(
+            at.acceleration,
+            (after.speed - before.speed) / (2 * h),
+            rtol=1e-5,
+            atol=1e-4,
         )
         assert_allclose(
             at.torque_slope,
@@ -246,16 +287,22 @@ class TestRipple:
 
     def test_the_order_follows_the_set_angle_of_both_shafts_courses(self, operating):
         """On a ramp a torque ripple of order 2 has two periods a turn of the pinion, whatever the speed."""
-        found = operating({SPEED: RAMP, "operating.torque_ripple": {"share": 0.1, "order": 2}})
+        found = operating(
+            {SPEED: RAMP, "operating.torque_ripple": {"share": 0.1, "order": 2}}
+        )
         times = np.linspace(0.0, 1.0, 2001)
         nominal = found.nominal(times)
         assert_allclose(
-            nominal.torque_factor, 1 + 0.1 * np.sin(2 * nominal.angle), rtol=0, atol=1e-9
+            nominal.torque_factor,
+            1 + 0.1 * np.sin(2 * nominal.angle),
+            rtol=0,
+            atol=1e-9,
         )
 
 
 @pytest.mark.parametrize(
-    "ripple", [{"share": 0.02, "order": 2}, {"share": 0.02, "frequency_hz": 50, "phase_deg": 20}]
+    "ripple",
+    [{"share": 0.02, "order": 2}, {"share": 0.02, "frequency_hz": 50, "phase_deg": 20}],
 )
 def test_a_lead_in_shifts_all_courses_alike(machine, ripple):
     changes = {SPEED: WALK, TORQUE: WALK, "operating.speed_ripple": ripple, "operating.torque_ripple": ripple,

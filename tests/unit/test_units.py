@@ -50,7 +50,9 @@ def test_there_and_back(suffix, value):
 
 @given(st.floats(-1e9, 1e9))
 def test_a_name_without_unit_is_taken_as_it_is(value):
-    assert_allclose([to_si("share", value), from_si("share", value)], value, rtol=0, atol=0)
+    assert_allclose(
+        [to_si("share", value), from_si("share", value)], value, rtol=0, atol=0
+    )
 
 
 @pytest.mark.parametrize(
@@ -92,9 +94,17 @@ def test_the_longest_suffix_wins(name, parts):
 def test_read_converts_and_fills():
     found = shaft(labels=["a", "b"])
     assert_allclose(
-        [found.length, found.inertia, found.angle], [12.5e-3, 2.0, math.pi / 2], rtol=1e-14, atol=0
+        [found.length, found.inertia, found.angle],
+        [12.5e-3, 2.0, math.pi / 2],
+        rtol=1e-14,
+        atol=0,
     )
-    assert (found.name, found.n_keys, found.hollow, found.labels) == ("shaft", 2, True, ("a", "b"))
+    assert (found.name, found.n_keys, found.hollow, found.labels) == (
+        "shaft",
+        2,
+        True,
+        ("a", "b"),
+    )
     assert shaft(angle_deg=None).angle is None
 
 
@@ -122,11 +132,31 @@ def test_a_unit_with_a_default():
 @pytest.mark.parametrize(
     ("key", "value", "text"),
     [
-        ("lenght_mm", 1, "gear.shaft: unknown key 'lenght_mm'; did you mean 'length_mm'?"),
-        ("length_deg", 1, "gear.shaft: 'length_deg' has the wrong unit; write it as 'length_mm'"),
-        ("length_um", 1, "gear.shaft: 'length_um' has the wrong unit; write it as 'length_mm'"),
-        ("length", 1, "gear.shaft: 'length' has the wrong unit; write it as 'length_mm'"),
-        ("share_mm", 1, "gear.shaft: 'share_mm' has the wrong unit; write it as 'share'"),
+        (
+            "lenght_mm",
+            1,
+            "gear.shaft: unknown key 'lenght_mm'; did you mean 'length_mm'?",
+        ),
+        (
+            "length_deg",
+            1,
+            "gear.shaft: 'length_deg' has the wrong unit; write it as 'length_mm'",
+        ),
+        (
+            "length_um",
+            1,
+            "gear.shaft: 'length_um' has the wrong unit; write it as 'length_mm'",
+        ),
+        (
+            "length",
+            1,
+            "gear.shaft: 'length' has the wrong unit; write it as 'length_mm'",
+        ),
+        (
+            "share_mm",
+            1,
+            "gear.shaft: 'share_mm' has the wrong unit; write it as 'share'",
+        ),
         ("name", "x", "gear.shaft: unknown key 'name'"),
         (
             "zzz",
@@ -146,14 +176,22 @@ def test_a_unit_with_a_default():
         ("labels", [1], "gear.shaft.labels = [1] is not a list of names"),
         ("labels", ["a", 1], "gear.shaft.labels = ['a', 1] is not a list of names"),
         ("labels", None, "gear.shaft.labels is null; give a value"),
-        ("seats_mm", [1, "x"], "gear.shaft.seats_mm = [1, 'x'] is not a list of numbers or null"),
+        (
+            "seats_mm",
+            [1, "x"],
+            "gear.shaft.seats_mm = [1, 'x'] is not a list of numbers or null",
+        ),
         (
             "seats_mm",
             [1, math.nan],
             "gear.shaft.seats_mm = [1, nan] is not a list of numbers or null",
         ),
         ("seats_mm", 3, "gear.shaft.seats_mm = 3 is not a list of numbers or null"),
-        ("seats", [1], "gear.shaft: 'seats' has the wrong unit; write it as 'seats_mm'"),
+        (
+            "seats",
+            [1],
+            "gear.shaft: 'seats' has the wrong unit; write it as 'seats_mm'",
+        ),
         ("angle_deg", "x", "gear.shaft.angle_deg = 'x' is not a number or null"),
         ("angle_deg", math.inf, "gear.shaft.angle_deg = inf is not finite"),
         (

@@ -55,7 +55,9 @@ def plot_dampers(
     first = states["before"]
     rpm = from_si("speed_rpm", first.load.speed)
     axes[0, 0].set(
-        title="Largest tooth force of a cycle", xlabel="speed of the crank, r/min", ylabel="kN"
+        title="Largest tooth force of a cycle",
+        xlabel="speed of the crank, r/min",
+        ylabel="kN",
     )
     axes[0, 0].set_ylim(0.0, None)
     axes[0, 1].axhline(0.0, color=GREY, linewidth=0.8)
@@ -87,5 +89,7 @@ def plot_dampers(
         f"node {one.node}: {one.ring_inertia:.3g} kg m$^2$, {one.damping:.3g} N m s/rad, {one.stiffness:.3g} N m/rad"
         for one in dampers
     )
-    figure.suptitle(f"{first.line.drive.name}, mesh {first.line.mesh_names[mesh]}\n{sizes}")
+    figure.suptitle(
+        f"{first.line.drive.name}, mesh {first.line.mesh_names[mesh]}\n{sizes}"
+    )
     save(figure, path)

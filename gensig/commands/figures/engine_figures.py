@@ -7,7 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from gensig.commands.figures.machine_figures import COLOURS, FAULTY, GREY, SOUND, pyplot, save
+from gensig.commands.figures.machine_figures import (
+    COLOURS,
+    FAULTY,
+    GREY,
+    SOUND,
+    pyplot,
+    save,
+)
 from gensig.commands.figures.motor_figures import motor_rows, turner, turns_evenly
 from gensig.commands.figures.time_figures import root_row, sweep_rows, time_rows
 from gensig.commands.lines.results import ResponseResult
@@ -81,7 +88,9 @@ def _cycle(axes: Any, engine: Engine, found: ResponseResult) -> None:
         xticks=range(0, 721, 90),
     )
     late = axes.twinx()
-    late.plot(degrees, from_si("pressure_mpa", 1.0) * pressure, color=GREY, linewidth=0.9)
+    late.plot(
+        degrees, from_si("pressure_mpa", 1.0) * pressure, color=GREY, linewidth=0.9
+    )
     late.set_ylabel("pressure (grey), MPa")
     axes.legend(loc="upper center")
 
@@ -97,11 +106,19 @@ def _orders(axes: Any, line: EngineLine, engine: Engine, found: ResponseResult) 
     ]
     if plungers:
         rows.append(("all plungers together", _sum(on, numbers, plungers)))
-    for (name, row), colour, width in zip(rows, COLOURS, (0.4, 0.22, 0.1), strict=False):
+    for (name, row), colour, width in zip(
+        rows, COLOURS, (0.4, 0.22, 0.1), strict=False
+    ):
         _, amplitude = cycle_orders(row, SHOWN_ORDERS)
         orders = np.arange(1, SHOWN_ORDERS + 1) / 2.0
         shown = np.abs(amplitude) > 1e-6 * np.abs(amplitude).max()
-        axes.bar(orders[shown], np.abs(amplitude)[shown], width=width, color=colour, label=name)
+        axes.bar(
+            orders[shown],
+            np.abs(amplitude)[shown],
+            width=width,
+            color=colour,
+            label=name,
+        )
     axes.set(
         title="Torques by orders of the crank",
         xlabel="order",
@@ -147,10 +164,17 @@ def _spectra(axes: Any, line: EngineLine, found: ResponseResult) -> None:
     hz = found.response.orders * found.response.speed / (2.0 * np.pi)
     shown = hz <= 2.0 * WATERFALL_HZ
     for node, colour, marker in zip(found.nodes, COLOURS, "osD^v<", strict=False):
-        amplitude = np.degrees(np.abs(found.response.angle[line.drive.numbers.index(node)]))
+        amplitude = np.degrees(
+            np.abs(found.response.angle[line.drive.numbers.index(node)])
+        )
         axes.vlines(hz[shown], 1e-7, amplitude[shown], color=colour, linewidth=0.7)
         axes.plot(
-            hz[shown], amplitude[shown], marker, color=colour, markersize=3, label=_name(line, node)
+            hz[shown],
+            amplitude[shown],
+            marker,
+            color=colour,
+            markersize=3,
+            label=_name(line, node),
         )
     axes.set(
         title="Angular displacement",
@@ -163,7 +187,9 @@ def _spectra(axes: Any, line: EngineLine, found: ResponseResult) -> None:
     axes.legend(fontsize=8)
 
 
-def _waterfall(figure: Any, axes: Any, line: EngineLine, node: int, run: Waterfall) -> None:
+def _waterfall(
+    figure: Any, axes: Any, line: EngineLine, node: int, run: Waterfall
+) -> None:
     """Angular displacement over frequency and speed."""
     hz = np.arange(0.0, WATERFALL_HZ + 0.1, 1.0)
     rpm = from_si("speed_rpm", 1.0) * run.speeds
@@ -174,7 +200,9 @@ def _waterfall(figure: Any, axes: Any, line: EngineLine, node: int, run: Waterfa
     )
     top = spread.max()
     level = np.log10(np.maximum(spread, 1e-4 * top))
-    image = axes.pcolormesh(hz, rpm, level, cmap="magma", shading="nearest", rasterized=True)
+    image = axes.pcolormesh(
+        hz, rpm, level, cmap="magma", shading="nearest", rasterized=True
+    )
     figure.colorbar(image, ax=axes, label="log10 of the amplitude in degrees")
     for order in (0.5, 1.0, 2.5, 5.0, 10.0):
         if order * rpm[-1] / 60.0 < WATERFALL_HZ:

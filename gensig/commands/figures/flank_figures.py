@@ -17,7 +17,9 @@ from gensig.systems.sliced_pair import SlicedPair, TransmissionError
 Array = NDArray[np.float64]
 
 
-def plot_transmission_error(system: SlicedPair, result: TransmissionError, path: Path) -> None:
+def plot_transmission_error(
+    system: SlicedPair, result: TransmissionError, path: Path
+) -> None:
     """Transmission error over two periods, its orders, load over the flank and load sharing."""
     figure, axes = pyplot.subplots(2, 2, figsize=(11, 7.6), layout="constrained")
     _error(axes[0, 0], system, result)
@@ -29,19 +31,29 @@ def plot_transmission_error(system: SlicedPair, result: TransmissionError, path:
 
 
 def plot_front(
-    system: SlicedPair, before: Optimum, chosen: Optimum, front: Sequence[Optimum], path: Path
+    system: SlicedPair,
+    before: Optimum,
+    chosen: Optimum,
+    front: Sequence[Optimum],
+    path: Path,
 ) -> None:
     """The front, and transmission error and load over the flank before and after."""
     figure, axes = pyplot.subplots(2, 2, figsize=(11, 7.6), layout="constrained")
     ripple = [one.ripple * 1e6 for one in front]
     axes[0, 0].plot(
-        ripple, [one.line_load * 1e-3 for one in front], "o-", color=SOUND, label="front"
+        ripple,
+        [one.line_load * 1e-3 for one in front],
+        "o-",
+        color=SOUND,
+        label="front",
     )
     for one, marker, colour, name in (
         (before, "s", GREY, "before"),
         (chosen, "D", COLOURS[1], "chosen"),
     ):
-        axes[0, 0].plot(one.ripple * 1e6, one.line_load * 1e-3, marker, color=colour, label=name)
+        axes[0, 0].plot(
+            one.ripple * 1e6, one.line_load * 1e-3, marker, color=colour, label=name
+        )
     axes[0, 0].set(
         title="Worst of all cases",
         xlabel="transmission error, peak to peak, um",
@@ -56,11 +68,16 @@ def plot_front(
         result = changed.transmission_error()
         phase = np.arange(2 * len(result.error)) / len(result.error)
         axes[0, 1].plot(
-            phase, np.tile(result.error - result.error.mean(), 2) * 1e6, color=colour, label=name
+            phase,
+            np.tile(result.error - result.error.mean(), 2) * 1e6,
+            color=colour,
+            label=name,
         )
         _load_map(figure, axes[1, place], changed, result)
         axes[1, place].set_title(f"Load over the flank, {name}")
-    axes[0, 1].set(title="Transmission error less its mean", xlabel="mesh periods", ylabel="um")
+    axes[0, 1].set(
+        title="Transmission error less its mean", xlabel="mesh periods", ylabel="um"
+    )
     axes[0, 1].legend()
     figure.suptitle(_title(system))
     save(figure, path)
@@ -82,10 +99,15 @@ def plot_sliced_stiffness(
     ``sound`` is the mesh without the fault, drawn beside it.
     """
     figure, axes = pyplot.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
-    axes[0].plot(position / system.pair.base_pitch, single / 1e9, color=SOUND, label="sound")
+    axes[0].plot(
+        position / system.pair.base_pitch, single / 1e9, color=SOUND, label="sound"
+    )
     if faulty is not None:
         axes[0].plot(
-            position / system.pair.base_pitch, faulty / 1e9, color=COLOURS[1], label="faulty"
+            position / system.pair.base_pitch,
+            faulty / 1e9,
+            color=COLOURS[1],
+            label="faulty",
         )
         axes[0].legend()
     axes[0].set(
@@ -97,10 +119,15 @@ def plot_sliced_stiffness(
     if faulty is not None:
         without = np.resize(sound.contact.stiffness, stiffness.shape) / 1e9
         axes[1].plot(
-            *_over_periods(system, result, without), color=GREY, linewidth=0.8, label="sound"
+            *_over_periods(system, result, without),
+            color=GREY,
+            linewidth=0.8,
+            label="sound",
         )
     colour, label = (SOUND, "sound") if faulty is None else (COLOURS[1], "faulty")
-    axes[1].plot(*_over_periods(system, result, stiffness / 1e9), color=colour, label=label)
+    axes[1].plot(
+        *_over_periods(system, result, stiffness / 1e9), color=colour, label=label
+    )
     if faulty is not None:
         axes[1].legend()
     axes[1].set(title="Mesh", xlabel="mesh periods", ylabel="stiffness, 10$^9$ N/m")
@@ -139,10 +166,16 @@ def _error(axes: Any, system: SlicedPair, result: TransmissionError) -> None:
 def _orders(axes: Any, result: TransmissionError) -> None:
     order = np.arange(1, len(result.harmonics) + 1)
     axes.bar(order, result.harmonics * 1e6, color=SOUND)
-    axes.set(title="Its mesh orders", xlabel="order of the mesh frequency", ylabel="amplitude, um")
+    axes.set(
+        title="Its mesh orders",
+        xlabel="order of the mesh frequency",
+        ylabel="amplitude, um",
+    )
 
 
-def _load_map(figure: Any, axes: Any, system: SlicedPair, result: TransmissionError) -> None:
+def _load_map(
+    figure: Any, axes: Any, system: SlicedPair, result: TransmissionError
+) -> None:
     """Largest load of every place of the flank over the period, as a pair passes it."""
     pitch, contact = system.pair.base_pitch, result.contact
     low, high = -0.15, system.pair.transverse_contact_ratio + 0.15
@@ -191,7 +224,11 @@ def _sharing(axes: Any, system: SlicedPair, result: TransmissionError) -> None:
     axes.plot(place.ravel() - 1.0, share.ravel(), color=SOUND, label="one pair")
     for shift, colour in zip((-1, 1), COLOURS[1:], strict=False):
         axes.plot(
-            place.ravel() - 1.0 + shift, share.ravel(), ":", color=colour, label=f"pair {shift:+d}"
+            place.ravel() - 1.0 + shift,
+            share.ravel(),
+            ":",
+            color=colour,
+            label=f"pair {shift:+d}",
         )
     axes.set(
         title="Load sharing", xlabel="roll since the first slice passed A, base pitches", ylabel="share of the load",
@@ -202,7 +239,10 @@ def _sharing(axes: Any, system: SlicedPair, result: TransmissionError) -> None:
 
 def _sharing_of_all(axes: Any, system: SlicedPair, result: TransmissionError) -> None:
     assert result.odd_pairs is not None
-    roll, index = result.contact.roll / system.pair.base_pitch, result.contact.pair_index
+    roll, index = (
+        result.contact.roll / system.pair.base_pitch,
+        result.contact.pair_index,
+    )
     first, last = result.odd_pairs
     for pair in range(index.min(), index.max() + 1):
         share = np.where(index == pair, result.load_share, 0.0).sum(axis=1)
@@ -210,7 +250,13 @@ def _sharing_of_all(axes: Any, system: SlicedPair, result: TransmissionError) ->
         is_odd = first <= pair <= last
         name = {first: "pair of faulty teeth", first - 1: "sound pairs"}.get(pair)
         share = np.where(followed, share, np.nan)
-        axes.plot(roll, share, color=COLOURS[1] if is_odd else GREY, zorder=2 + is_odd, label=name)
+        axes.plot(
+            roll,
+            share,
+            color=COLOURS[1] if is_odd else GREY,
+            zorder=2 + is_odd,
+            label=name,
+        )
     axes.set(
         title="Load sharing", xlabel="mesh periods; the faulty tooth enters at 0", ylabel="share of the load",
         xlim=(roll[0], roll[-1]), ylim=(0.0, None),

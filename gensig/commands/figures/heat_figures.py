@@ -43,7 +43,9 @@ def plot_heat(report: HeatReport, path: Path) -> None:
         if left_out
         else ""
     )
-    axes[1, 1].set(title=f"Mesh{beyond}", xlabel="mesh periods", ylabel="stiffness, 10$^9$ N/m")
+    axes[1, 1].set(
+        title=f"Mesh{beyond}", xlabel="mesh periods", ylabel="stiffness, 10$^9$ N/m"
+    )
     axes[1, 0].legend(loc="lower center")
     duty = report.duty
     figure.suptitle(
@@ -59,9 +61,7 @@ def _bulk(axes: Any, report: HeatReport) -> None:
         COLOURS, (("pinion", state.pinion), ("wheel", state.wheel)), strict=False
     ):
         share = (body.radius - body.radius[0]) / (body.radius[-1] - body.radius[0])
-        label = (
-            f"{name}, bore radius {body.radius[0] * 1e3:.4g}, root {body.radius[-1] * 1e3:.4g} mm"
-        )
+        label = f"{name}, bore radius {body.radius[0] * 1e3:.4g}, root {body.radius[-1] * 1e3:.4g} mm"
         axes.plot(share, body.temperature, color=colour, label=label)
     for value, style, name in (
         (heat.oil_temperature, ":", "oil"),
@@ -79,7 +79,12 @@ def _bulk(axes: Any, report: HeatReport) -> None:
 def _flash(axes: Any, report: HeatReport) -> None:
     pair, state = report.duty.system.pair, report.state
     axes.plot(state.flash_position / pair.base_pitch, state.flash, color=COLOURS[0])
-    axes.axvline(pair.pitch_point / pair.base_pitch, color=GREY, linestyle=":", label="pitch point")
+    axes.axvline(
+        pair.pitch_point / pair.base_pitch,
+        color=GREY,
+        linestyle=":",
+        label="pitch point",
+    )
     axes.set(
         title="Flash temperature under the slices' own loads",
         xlabel="contact position from the start of contact, base pitches",

@@ -18,7 +18,13 @@ from gensig.units import SPEED, channel_unit
 matplotlib.use("Agg")
 from matplotlib import pyplot
 
-SOUND, FAULTY, THIRD, FOURTH, GREY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#777777"
+SOUND, FAULTY, THIRD, FOURTH, GREY = (
+    "#0072B2",
+    "#D55E00",
+    "#009E73",
+    "#CC79A7",
+    "#777777",
+)
 COLOURS = (SOUND, FAULTY, THIRD, FOURTH, "#56B4E9", GREY)
 # above the mesh line, below the highest usable frequency: where teeth ring and faults modulate
 ENVELOPE_BAND_HZ = (5000.0, 19000.0)
@@ -40,7 +46,10 @@ def plot_stiffness(
     _mesh(axes[0, 1], system, curves, faults, sound)
     _load_sharing(axes[1, 0], system, curves, faults)
     _terms(axes[1, 1], curves)
-    pair, of_what = system.pair, f" of the {system.torque_of}" if system.torque_of else ""
+    pair, of_what = (
+        system.pair,
+        f" of the {system.torque_of}" if system.torque_of else "",
+    )
     figure.suptitle(
         f"{pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth, contact ratio {pair.transverse_contact_ratio:.3f}, "
         f"{system.operating.torque:g} N m{of_what}, mesh.law={system.mesh.law}, "
@@ -51,7 +60,10 @@ def plot_stiffness(
 
 def _single_pair(axes: Any, curves: StiffnessCurves, faults: Sequence[Fault]) -> None:
     axes.plot(
-        curves.contact_position, curves.single_pair_stiffness / 1e8, color=SOUND, label="sound pair"
+        curves.contact_position,
+        curves.single_pair_stiffness / 1e8,
+        color=SOUND,
+        label="sound pair",
     )
     if curves.faulty_pair_stiffness is not None:
         axes.plot(
@@ -61,9 +73,13 @@ def _single_pair(axes: Any, curves: StiffnessCurves, faults: Sequence[Fault]) ->
             color=FAULTY,
             label=f"{faults[0].kind} pair",
         )
-    if curves.faulty_pair_gap is not None and np.any(np.abs(curves.faulty_pair_gap) > 1e-9):
+    if curves.faulty_pair_gap is not None and np.any(
+        np.abs(curves.faulty_pair_gap) > 1e-9
+    ):
         late = axes.twinx()
-        late.plot(curves.contact_position, curves.faulty_pair_gap * 1e6, ":", color=GREY)
+        late.plot(
+            curves.contact_position, curves.faulty_pair_gap * 1e6, ":", color=GREY
+        )
         late.set_ylabel("touches later by (dotted), um")
     axes.set(
         title="One pair carrying the whole load",
@@ -87,7 +103,9 @@ def _mesh(
         without = np.resize(sound.mesh_stiffness, angle.shape)
         axes.plot(angle, without / 1e8, color=GREY, linewidth=0.7, label="sound")
     label = f"with {faults[0].kind}" if faults else None
-    axes.plot(angle, curves.mesh_stiffness / 1e8, color=SOUND, linewidth=0.9, label=label)
+    axes.plot(
+        angle, curves.mesh_stiffness / 1e8, color=SOUND, linewidth=0.9, label=label
+    )
     if faults:
         begin = _fault_angle(system, faults[0])
         end = begin + _contact_angle(system, faults[0])
@@ -176,10 +194,14 @@ def plot_record(
     shown = min(len(signal), int(5.0 * rate / shaft))
     axes[0].plot(np.arange(shown) / rate, signal[:shown], color=SOUND, linewidth=0.5)
     axes[0].set(
-        title=f"{channel}, first turns of the pinion", xlabel="time, s", ylabel=f"{what}, {unit}"
+        title=f"{channel}, first turns of the pinion",
+        xlabel="time, s",
+        ylabel=f"{what}, {unit}",
     )
     frequency, amplitude = amplitude_spectrum(signal, rate)
-    axes[1].semilogy(frequency / 1e3, np.maximum(amplitude, 1e-9), color=SOUND, linewidth=0.5)
+    axes[1].semilogy(
+        frequency / 1e3, np.maximum(amplitude, 1e-9), color=SOUND, linewidth=0.5
+    )
     for harmonic in range(1, int(0.39 * rate / mesh) + 1):
         axes[1].axvline(harmonic * mesh / 1e3, color=FAULTY, linewidth=0.4, alpha=0.5)
     axes[1].set(
@@ -201,7 +223,9 @@ def plot_record(
         ylabel=f"amplitude, {unit}",
     )
     title = name or f"{values['label_name']}, severity {values['severity']:.2f}"
-    figure.suptitle(f"{title}: {values['speed_rpm']:.1f} r/min, {values['torque_nm']:.3g} N m")
+    figure.suptitle(
+        f"{title}: {values['speed_rpm']:.1f} r/min, {values['torque_nm']:.3g} N m"
+    )
     save(figure, path)
 
 

@@ -7,7 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from gensig.commands.figures.machine_figures import FAULTY, GREY, SOUND, THIRD, pyplot, save
+from gensig.commands.figures.machine_figures import (
+    FAULTY,
+    GREY,
+    SOUND,
+    THIRD,
+    pyplot,
+    save,
+)
 from gensig.driveline.drive_line import DriveLine
 from gensig.driveline.linear.modal import Modes
 from gensig.units import from_si
@@ -54,7 +61,8 @@ def _shown(found: Modes) -> range:
 def _campbell(axes: Any, line: DriveLine, found: Modes) -> None:
     """Natural frequencies across the speeds, rays of the orders, dots where they meet."""
     low, high = (
-        from_si("speed_rpm", speed) for speed in (line.campbell.low_speed, line.campbell.high_speed)
+        from_si("speed_rpm", speed)
+        for speed in (line.campbell.low_speed, line.campbell.high_speed)
     )
     top = 1.08 * max(line.campbell_orders) * high / 60.0
     shown = [(mode, hz) for mode, hz in enumerate(found.frequency) if 0.0 < hz < top]
@@ -99,10 +107,14 @@ def _angles(axes: Any, line: DriveLine, found: Modes, mode: int) -> None:
     number, gears = line.numbers, line.line.gears
     for shaft in line.line.shafts:
         ends = [shaft.first, shaft.second]
-        axes.plot([number[end] for end in ends], angle[ends], "-", color=SOUND, linewidth=1.2)
+        axes.plot(
+            [number[end] for end in ends], angle[ends], "-", color=SOUND, linewidth=1.2
+        )
     for mesh in line.line.meshes:
         ends = [gears[mesh.driving].node, gears[mesh.driven].node]
-        axes.plot([number[end] for end in ends], angle[ends], "--", color=THIRD, linewidth=0.8)
+        axes.plot(
+            [number[end] for end in ends], angle[ends], "--", color=THIRD, linewidth=0.8
+        )
     axes.plot(number, angle, ".", color=SOUND, markersize=4)
     if mode == _shown(found)[-1]:
         axes.set_xlabel("node")
@@ -117,7 +129,10 @@ def _energies(axes: Any, line: DriveLine, found: Modes, mode: int) -> None:
     axes.bar(
         place,
         height,
-        color=[THIRD if name[-2:] in (" x", " y") else SOUND for name in matrices.coordinate_names],
+        color=[
+            THIRD if name[-2:] in (" x", " y") else SOUND
+            for name in matrices.coordinate_names
+        ],
     )
     if len(height) <= MOST_BARS:
         names = [
@@ -126,4 +141,6 @@ def _energies(axes: Any, line: DriveLine, found: Modes, mode: int) -> None:
         ]
         axes.set_xticks(place, names)
     if mode == _shown(found)[-1]:
-        axes.set_xlabel("degree of freedom: rotations (blue), then x and y of every gear (green)")
+        axes.set_xlabel(
+            "degree of freedom: rotations (blue), then x and y of every gear (green)"
+        )

@@ -36,5 +36,9 @@ def motor_rows(axes: Any, line: EngineLine, found: ResponseResult) -> None:
     )
     force = found.response.element_forces(line.linear()[1])[0]
     axes[1].bar(list(line.mesh_names), force / 1e3, color=SOUND, width=0.4)
-    evenly = " (no torque ripple: even in the linear line)" if turns_evenly(line) else ""
-    axes[1].set(title=f"Mean tooth force of the meshes{evenly}", xlabel="mesh", ylabel="kN")
+    evenly = (
+        " (no torque ripple: even in the linear line)" if turns_evenly(line) else ""
+    )
+    axes[1].set(
+        title=f"Mean tooth force of the meshes{evenly}", xlabel="mesh", ylabel="kN"
+    )

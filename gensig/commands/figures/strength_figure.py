@@ -9,11 +9,23 @@ from typing import Any
 
 import numpy as np
 
-from gensig.commands.figures.machine_figures import FAULTY, GREY, SOUND, THIRD, pyplot, save
+from gensig.commands.figures.machine_figures import (
+    FAULTY,
+    GREY,
+    SOUND,
+    THIRD,
+    pyplot,
+    save,
+)
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth_profile import tooth_profile
 from gensig.life.root.root_stress import normal_contact_ratio
-from gensig.life.root.tooth_root import TANGENT, root_loading, root_section, virtual_gear
+from gensig.life.root.tooth_root import (
+    TANGENT,
+    root_loading,
+    root_section,
+    virtual_gear,
+)
 from gensig.systems.root_strength import GearStress, RootHistory, RootStrength
 
 
@@ -38,7 +50,9 @@ def _stress(
     axis: Any, system: RootStrength, gears: dict[str, GearStress], history: RootHistory
 ) -> None:
     roll = np.degrees(history.roll / system.pair.pinion.base_radius)
-    for (name, values), colour in zip(history.stress.items(), (SOUND, FAULTY), strict=True):
+    for (name, values), colour in zip(
+        history.stress.items(), (SOUND, FAULTY), strict=True
+    ):
         axis.plot(roll, values * 1e-6, color=colour, label=f"{name}, through the mesh")
         axis.axhline(
             gears[name].stress * 1e-6,
@@ -58,11 +72,17 @@ def _stress(
     )
     axis.set_ylim(0.0, 1.45e-6 * highest)  # room for the legend
     share = axis.twinx()
-    share.plot(roll, history.share, color=GREY, linestyle=":", label="load share of the pair")
+    share.plot(
+        roll, history.share, color=GREY, linestyle=":", label="load share of the pair"
+    )
     share.set(ylabel="share of the load", ylim=(0.0, 1.45))
     lines = [line for side in (axis, share) for line in side.get_lines()]
     axis.legend(
-        lines, [line.get_label() for line in lines], loc="upper center", ncols=2, fontsize=8
+        lines,
+        [line.get_label() for line in lines],
+        loc="upper center",
+        ncols=2,
+        fontsize=8,
     )
 
 
@@ -98,7 +118,10 @@ def _tooth(axis: Any, system: RootStrength, found: GearStress) -> None:
         0.0 if at_tip else pitch * (normal_contact_ratio(system.pair) - 1.0),
         allow_extrapolation=True,
     )
-    top, slope = height + float(loading.lever_arm[0]) * 1e3, math.tan(float(loading.load_angle[0]))
+    top, slope = (
+        height + float(loading.lever_arm[0]) * 1e3,
+        math.tan(float(loading.load_angle[0])),
+    )
     axis.annotate(
         "", xy=(0.0, top), xytext=(1.6 * half, top + 1.6 * half * slope),
         arrowprops={"arrowstyle": "->", "color": SOUND, "linewidth": 1.8},
@@ -124,4 +147,6 @@ def _spur(gear: Gear) -> Gear:
     section.
     """
     n_teeth = round(virtual_gear(gear).n_teeth)
-    return replace(gear, n_teeth=n_teeth, helix_angle=0.0, bore_radius=0.1 * gear.normal_module)
+    return replace(
+        gear, n_teeth=n_teeth, helix_angle=0.0, bore_radius=0.1 * gear.normal_module
+    )

@@ -34,7 +34,9 @@ ROOT_LOOKS = {
 }
 
 
-def time_rows(axes: Any, line: EngineLine, found: ResponseResult, response: TimeResponse) -> None:
+def time_rows(
+    axes: Any, line: EngineLine, found: ResponseResult, response: TimeResponse
+) -> None:
     """Two rows: speeds and spectra at the nodes.
 
     Tooth loads of all meshes and the course of one, (2, 2) axes.
@@ -61,11 +63,17 @@ def root_row(axes: Any, line: EngineLine, found: ResponseResult) -> None:
         roll = np.degrees(root.history.roll / root.strength.pair.pinion.base_radius)
         largest = passes.max(axis=1)
         axes[0].plot(
-            roll, passes[int(largest.argmax())], color=colour, linestyle=style, label=label
+            roll,
+            passes[int(largest.argmax())],
+            color=colour,
+            linestyle=style,
+            label=label,
         )
         whole = len(largest) // in_cycle
         by_pair = largest[: whole * in_cycle].reshape(whole, in_cycle)
-        axes[1].plot(np.median(by_pair, axis=0), color=colour, linestyle=style, label=label)
+        axes[1].plot(
+            np.median(by_pair, axis=0), color=colour, linestyle=style, label=label
+        )
         if whole > 1:
             axes[1].fill_between(
                 range(in_cycle),
@@ -112,7 +120,9 @@ def sweep_rows(
         axes[2, column].set_xlabel(f"speed of the {turner(line)}, r/min")
 
 
-def _speeds(axes: Any, line: EngineLine, found: ResponseResult, response: TimeResponse) -> None:
+def _speeds(
+    axes: Any, line: EngineLine, found: ResponseResult, response: TimeResponse
+) -> None:
     rpm = from_si("speed_rpm", 1.0)
     angle = np.degrees(response.crank_angle)
     shown = angle < TRACE_CYCLES * 720.0
@@ -143,7 +153,9 @@ def _speeds(axes: Any, line: EngineLine, found: ResponseResult, response: TimeRe
     axes.legend(fontsize=8, loc="upper right")
 
 
-def _spectra(axes: Any, line: EngineLine, found: ResponseResult, response: TimeResponse) -> None:
+def _spectra(
+    axes: Any, line: EngineLine, found: ResponseResult, response: TimeResponse
+) -> None:
     """Angular displacement by frequency.
 
     Grey lines at the half orders, or the mesh frequencies where none fires.
@@ -160,7 +172,10 @@ def _spectra(axes: Any, line: EngineLine, found: ResponseResult, response: TimeR
     shown = frequencies <= highest
     for order in orders[orders * rate < highest]:
         axes.axvline(
-            order * rate, color=GREY, linewidth=0.3, linestyle="-" if order % 1.0 == 0.0 else ":"
+            order * rate,
+            color=GREY,
+            linewidth=0.3,
+            linestyle="-" if order % 1.0 == 0.0 else ":",
         )
     for row, node in enumerate(found.nodes[: len(COLOURS)]):
         label = _name(line, node)
@@ -220,10 +235,14 @@ def _loads(axes: Any, line: EngineLine, linear: Any, response: TimeResponse) -> 
     axes.legend(fontsize=8)
 
 
-def _course(axes: Any, line: EngineLine, mesh: int, linear: Any, response: TimeResponse) -> None:
+def _course(
+    axes: Any, line: EngineLine, mesh: int, linear: Any, response: TimeResponse
+) -> None:
     name, force = line.mesh_names[mesh], response.mesh_force[mesh]
     shown = response.crank_angle < TRACE_CYCLES * CYCLE
-    cycle = np.linspace(0.0, 720.0 * TRACE_CYCLES, TRACE_CYCLES * len(linear), endpoint=False)
+    cycle = np.linspace(
+        0.0, 720.0 * TRACE_CYCLES, TRACE_CYCLES * len(linear), endpoint=False
+    )
     axes.plot(
         np.degrees(response.crank_angle[shown]),
         force[shown] / 1e3,
@@ -232,7 +251,11 @@ def _course(axes: Any, line: EngineLine, mesh: int, linear: Any, response: TimeR
         label="in time",
     )
     axes.plot(
-        cycle, np.tile(linear, TRACE_CYCLES) / 1e3, color=SOUND, linewidth=0.9, label="linear"
+        cycle,
+        np.tile(linear, TRACE_CYCLES) / 1e3,
+        color=SOUND,
+        linewidth=0.9,
+        label="linear",
     )
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     axes.set(
@@ -262,7 +285,9 @@ def _waterfall(figure: Any, axes: Any, way: SweepWay, column: int, top: float) -
     figure.colorbar(image, ax=axes, label="log10 of the amplitude in degrees")
     for order in MARKED_ORDERS:
         if order * rpm[-1] / 60.0 < way.frequencies[-1]:
-            axes.plot(order * rpm / 60.0, rpm, color="white", linewidth=0.4, linestyle=":")
+            axes.plot(
+                order * rpm / 60.0, rpm, color="white", linewidth=0.4, linestyle=":"
+            )
             axes.annotate(
                 f"{order:g}",
                 (order * rpm[-1] / 60.0, rpm[-1]),
@@ -287,7 +312,12 @@ def _both_ways(axes: Any, found: ResponseResult, sweep: Sweep, column: int) -> N
         )
         axes.plot(rpm, mean, color=colour, label=f"{label}, in {sweep.seconds:g} s")
         axes.fill_between(
-            rpm, mean - 3.0 * error, mean + 3.0 * error, color=colour, alpha=0.15, linewidth=0.0
+            rpm,
+            mean - 3.0 * error,
+            mean + 3.0 * error,
+            color=colour,
+            alpha=0.15,
+            linewidth=0.0,
         )
     if found.run:
         run = found.run[column]

@@ -24,9 +24,17 @@ def plot_twin(fitted: Fit, check: Check, path: Path) -> None:
     )
     for place, (sensor, row) in enumerate(zip(fitted.sensors, axes, strict=True)):
         levels, path_axes = row
-        low, high = check.twin_db[:, place].min(axis=0), check.twin_db[:, place].max(axis=0)
+        low, high = (
+            check.twin_db[:, place].min(axis=0),
+            check.twin_db[:, place].max(axis=0),
+        )
         levels.fill_between(
-            check.band, low, high, color=SOUND, alpha=0.3, label="twin, least to greatest"
+            check.band,
+            low,
+            high,
+            color=SOUND,
+            alpha=0.3,
+            label="twin, least to greatest",
         )
         levels.semilogx(
             check.band,
@@ -35,7 +43,10 @@ def plot_twin(fitted: Fit, check: Check, path: Path) -> None:
             label="twin, median",
         )
         levels.semilogx(
-            check.band, check.measured_db[place], color=FAULTY, label="measured, held out"
+            check.band,
+            check.measured_db[place],
+            color=FAULTY,
+            label="measured, held out",
         )
         levels.set(title=sensor, ylabel="third-octave level, dB re 1 m/s$^2$")
         gain = 20.0 * np.log10(np.maximum(fitted.gain[place], 1e-12))
@@ -46,7 +57,9 @@ def plot_twin(fitted: Fit, check: Check, path: Path) -> None:
             color=SOUND,
             label="gears heard",
         )
-        path_axes.set(title=f"{sensor}: fitted path", ylabel="gain from the bearing, dB")
+        path_axes.set(
+            title=f"{sensor}: fitted path", ylabel="gain from the bearing, dB"
+        )
         for one in row:
             one.set_xlabel("frequency, Hz")
             one.grid(alpha=0.3)

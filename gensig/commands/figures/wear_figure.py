@@ -38,7 +38,11 @@ SHOWN = (10, 20, 30, 40)  # snapshots: quarters of the life
 
 
 def plot_wear_life(
-    life: WearLife, speed: float, content: Mapping[str, Any], lives: LifeMap | None, path: Path
+    life: WearLife,
+    speed: float,
+    content: Mapping[str, Any],
+    lives: LifeMap | None,
+    path: Path,
 ) -> None:
     """Six panels.
 
@@ -109,7 +113,10 @@ def _depth(axes: Any, place: Array, life: WearLife) -> None:
                 label=name if last else None,
             )
     axes.invert_yaxis()
-    axes.set(title="Worn off at each quarter of the life", ylabel="depth normal to the flank, um")
+    axes.set(
+        title="Worn off at each quarter of the life",
+        ylabel="depth normal to the flank, um",
+    )
     axes.legend()
 
 
@@ -128,7 +135,11 @@ def _radii(axes: Any, place: Array, content: Mapping[str, Any]) -> None:
         axes.plot(place, new, color=colour, label=f"{name}, new")
         axes.plot(place, shown, "--", color=colour, label=f"{name}, worn profile")
         axes.plot(
-            place, content[f"{name}_curvature_radius_by_eq_22_mm"], ":", color=THIRD, label=None
+            place,
+            content[f"{name}_curvature_radius_by_eq_22_mm"],
+            ":",
+            color=THIRD,
+            label=None,
         )
     axes.set(
         title="Curvature radius (green: eq. 22 of the paper)",
@@ -141,16 +152,25 @@ def _radii(axes: Any, place: Array, content: Mapping[str, Any]) -> None:
 def _history(axes: Any, content: Mapping[str, Any]) -> None:
     history = content["history"]
     for name, colour in zip(SIDES, COLOURS, strict=False):
-        axes.plot(history["hours"], history[f"{name}_depth_um"], color=colour, label=name)
+        axes.plot(
+            history["hours"], history[f"{name}_depth_um"], color=colour, label=name
+        )
     axes.set(title="Deepest place over time", xlabel="hours", ylabel="um")
     axes.legend(loc="upper left")
-    error, vibration = history["transmission_error_peak_to_peak_um"], content.get("vibration")
+    error, vibration = (
+        history["transmission_error_peak_to_peak_um"],
+        content.get("vibration"),
+    )
     if vibration is not None:
         beside = axes.twinx()
         loudest = np.array(vibration["rms_m_per_s2"]).max(axis=1)
         shown = np.array(vibration["hours"]) <= content["life_hours"] * 1.001
         beside.plot(
-            np.array(vibration["hours"])[shown], loudest[shown], ":o", color=GREY, markersize=3
+            np.array(vibration["hours"])[shown],
+            loudest[shown],
+            ":o",
+            color=GREY,
+            markersize=3,
         )
         beside.set_ylabel("RMS of the loudest sensor (dotted), m/s2")
         beside.set_ylim(bottom=0.0)
@@ -163,8 +183,16 @@ def _history(axes: Any, content: Mapping[str, Any]) -> None:
 
 def _map(figure: Any, axes: Any, lives: LifeMap, content: Mapping[str, Any]) -> None:
     rpm = lives.speed * 30.0 / math.pi
-    image = axes.contourf(rpm, lives.torque, np.log10(lives.hours), levels=14, cmap="cividis")
-    axes.plot(content["speed_rpm"], content["torque_nm"], "o", color=FAULTY, clip_on=False)
-    axes.set(title="Life", xlabel="speed of the pinion, r/min", ylabel="torque of the pinion, N m")
+    image = axes.contourf(
+        rpm, lives.torque, np.log10(lives.hours), levels=14, cmap="cividis"
+    )
+    axes.plot(
+        content["speed_rpm"], content["torque_nm"], "o", color=FAULTY, clip_on=False
+    )
+    axes.set(
+        title="Life",
+        xlabel="speed of the pinion, r/min",
+        ylabel="torque of the pinion, N m",
+    )
     axes.set(xscale="log", yscale="log")
     figure.colorbar(image, ax=axes, label="log$_{10}$ of the hours")

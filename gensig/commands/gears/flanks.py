@@ -23,7 +23,9 @@ from gensig.systems.registry import read_sliced_pair
 from gensig.systems.sliced_pair import SlicedPair, TransmissionError
 
 LOST_SHARE = 0.02  # of the bearing field; less is the edge of the reliefs
-LEAST_SHARE = 0.05  # of the highest stiffness of a pair; less is one slice that enters or leaves
+LEAST_SHARE = (
+    0.05  # of the highest stiffness of a pair; less is one slice that enters or leaves
+)
 
 
 def transmission_error(arguments: Namespace) -> int:
@@ -71,11 +73,15 @@ def added_um(sound: TransmissionError, faulty: TransmissionError) -> list[float]
 
 def _span(values: list[float], form: str) -> str:
     """Least and greatest value; what is 0 up to rounding has no sign."""
-    low, high = (0.0 if abs(value) < 1e-9 else value for value in (min(values), max(values)))
+    low, high = (
+        0.0 if abs(value) < 1e-9 else value for value in (min(values), max(values))
+    )
     return f"{low:{form}} .. {high:{form}}"
 
 
-def transmission_error_content(system: SlicedPair, result: TransmissionError) -> dict[str, Any]:
+def transmission_error_content(
+    system: SlicedPair, result: TransmissionError
+) -> dict[str, Any]:
     """The keys of ``gensig transmission-error --json``."""
     pair, error = system.pair, result.error
     return {
@@ -84,7 +90,9 @@ def transmission_error_content(system: SlicedPair, result: TransmissionError) ->
         "total_contact_ratio": pair.total_contact_ratio,
         "center_distance_mm": pair.center_distance * 1e3,
         "mesh_force_n": system.mesh_force,
-        "roll_angle_deg": np.degrees(result.contact.roll / pair.pinion.base_radius).tolist(),
+        "roll_angle_deg": np.degrees(
+            result.contact.roll / pair.pinion.base_radius
+        ).tolist(),
         "transmission_error_um": (error * 1e6).tolist(),
         "mesh_periods": result.n_periods,
         "mean_um": float(error.mean()) * 1e6,
@@ -119,7 +127,9 @@ def sliced_stiffness(config: Configuration, arguments: Namespace) -> int:
         "base_pitch_mm": system.pair.base_pitch * 1e3,
         "contact_position": (position / system.pair.base_pitch).tolist(),
         "single_pair_stiffness_n_per_m": single.tolist(),
-        "roll_angle_deg": np.degrees(result.contact.roll / system.pair.pinion.base_radius).tolist(),
+        "roll_angle_deg": np.degrees(
+            result.contact.roll / system.pair.pinion.base_radius
+        ).tolist(),
         "mesh_stiffness_n_per_m": stiffness.tolist(),
         "mesh_stiffness_mean_n_per_m": float(stiffness.mean()),
         "mesh_stiffness_kind": "dF/d(approach) at static equilibrium, contact term as a secant",
@@ -146,10 +156,14 @@ def sliced_stiffness(config: Configuration, arguments: Namespace) -> int:
     print(f"contact ratio              {system.pair.transverse_contact_ratio:.4f} transverse, "
           f"{system.pair.overlap_ratio:.4f} overlap, {system.pair.total_contact_ratio:.4f} total")  # fmt: skip
     print(f"mesh stiffness, mean       {stiffness.mean():.4e} N/m")
-    print(f"mesh stiffness, range      {stiffness.min():.4e} .. {stiffness.max():.4e} N/m")
+    print(
+        f"mesh stiffness, range      {stiffness.min():.4e} .. {stiffness.max():.4e} N/m"
+    )
     print(f"single pair, highest       {highest(single, faulty)}")
     if faulty is not None:
-        lost = 1e2 * (1.0 - stiffness / np.tile(sound.contact.stiffness, result.n_periods))
+        lost = 1e2 * (
+            1.0 - stiffness / np.tile(sound.contact.stiffness, result.n_periods)
+        )
         print(
             f"mesh periods               {result.n_periods}, the first faulty tooth enters at roll 0"
         )

@@ -73,10 +73,14 @@ def heat_content(report: HeatReport) -> dict[str, Any]:
         "flash_contact_position": (state.flash_position / pair.base_pitch).tolist(),
         "flash_temperature_k": state.flash.tolist(),
         "flash_skin_growth_um": flash_skin_growth(duty, state) * 1e6,
-        "base_pitch_difference_um": (pinion_strain - wheel_strain) * pair.base_pitch * 1e6,
+        "base_pitch_difference_um": (pinion_strain - wheel_strain)
+        * pair.base_pitch
+        * 1e6,
         "backlash_taken_um": state.growth.closing(pair, housing) * 1e6,
         "tooth_growth_um": state.growth.teeth_alone(pair) * 1e6,
-        "variants": {name: _variant_content(variant) for name, variant in report.variants.items()},
+        "variants": {
+            name: _variant_content(variant) for name, variant in report.variants.items()
+        },
     }
 
 
@@ -100,7 +104,9 @@ def print_heat(report: HeatReport) -> None:
         print(
             f"{name + ', bore to teeth':<27}{body.temperature[0]:.1f} .. {body.tooth:.1f} degrees Celsius"
         )
-    print(f"flash temperature          up to {state.flash.max():.1f} K above the teeth's")
+    print(
+        f"flash temperature          up to {state.flash.max():.1f} K above the teeth's"
+    )
     cold = report.variants[COLD]
     print(f"{'':<27}{'contact ratio':>13}{'mesh, mean':>18}{'single, highest':>28}")
     for key, name in NAMES.items():

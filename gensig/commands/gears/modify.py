@@ -14,7 +14,12 @@ from typing import Any
 
 from gensig.commands.console import one_line_warnings
 from gensig.commands.gears.flanks import sound_pair
-from gensig.commands.output import check_outputs, option_file, write_option, write_outputs
+from gensig.commands.output import (
+    check_outputs,
+    option_file,
+    write_option,
+    write_outputs,
+)
 from gensig.commands.request import read_configuration
 from gensig.errors import ConfigError
 from gensig.mesh.modification import FlankModification, PairModification
@@ -41,11 +46,15 @@ def modify_flank(arguments: Namespace) -> int:
         given = system.modification.misalignment
         cases = Cases(
             torques=tuple(arguments.torques or (system.torque,)),
-            misalignments=tuple(given + value * 1e-6 for value in arguments.misalignments),
+            misalignments=tuple(
+                given + value * 1e-6 for value in arguments.misalignments
+            ),
         )
         plain = replace(system.modification, misalignment=0.0)
         before = judge(system, plain, cases)
-        front = optimise(system, cases, n_front=arguments.points, seed=arguments.seed, on_done=_say)
+        front = optimise(
+            system, cases, n_front=arguments.points, seed=arguments.seed, on_done=_say
+        )
     chosen = _chosen(front, before)
     content = {
         "before": _content(before),
@@ -64,7 +73,9 @@ def modify_flank(arguments: Namespace) -> int:
         ("before", before),
         *((("chosen" if one is chosen else "front"), one) for one in front),
     ):
-        print(f"{name:<12}{one.ripple * 1e6:>11.4f} um{one.line_load * 1e-3:>11.2f} N/mm")
+        print(
+            f"{name:<12}{one.ripple * 1e6:>11.4f} um{one.line_load * 1e-3:>11.2f} N/mm"
+        )
     write_option(target, option_text(chosen, system, cases))
     return 0
 
@@ -80,7 +91,9 @@ def _chosen(front: Sequence[Optimum], before: Optimum) -> Optimum:
     """
     return min(
         front,
-        key=lambda one: (one.ripple / before.ripple) ** 2 + (one.line_load / before.line_load) ** 2,
+        key=lambda one: (
+            (one.ripple / before.ripple) ** 2 + (one.line_load / before.line_load) ** 2
+        ),
     )
 
 
@@ -113,7 +126,9 @@ def _keys(modification: PairModification) -> dict[str, dict[str, Any]]:
             key = field.name if suffix is None else f"{field.name}_{suffix}"
             value = getattr(side, field.name)
             values[key] = (
-                value if suffix is None else round(from_si(key, value), {"um": 3, "mm": 4}[suffix])
+                value
+                if suffix is None
+                else round(from_si(key, value), {"um": 3, "mm": 4}[suffix])
             )
         sides[name] = values
     return sides

@@ -64,7 +64,11 @@ def stiffness(arguments: Namespace) -> int:
         from gensig.commands.figures.machine_figures import plot_stiffness
 
         plot_stiffness(
-            system, curves, faults, path, sound=system.stiffness_curves() if faults else curves
+            system,
+            curves,
+            faults,
+            path,
+            sound=system.stiffness_curves() if faults else curves,
         )
 
     write_outputs(arguments, content, draw)
@@ -115,7 +119,9 @@ def stiffness_content(system: Machine, curves: StiffnessCurves) -> dict[str, Any
 def _print_stiffness(content: dict[str, Any], curves: StiffnessCurves) -> None:
     print(f"transverse contact ratio   {content['transverse_contact_ratio']:.5f}")
     print(f"base pitch                 {content['base_pitch_mm']:.5f} mm")
-    print(f"mesh stiffness, mean       {content['mesh_stiffness_mean_n_per_m']:.4e} N/m")
+    print(
+        f"mesh stiffness, mean       {content['mesh_stiffness_mean_n_per_m']:.4e} N/m"
+    )
     print(
         f"mesh stiffness, range      {curves.mesh_stiffness.min():.4e} .. {curves.mesh_stiffness.max():.4e} N/m"
     )
@@ -137,7 +143,9 @@ def _print_stiffness(content: dict[str, Any], curves: StiffnessCurves) -> None:
 
 def _range(values: Array, form: str) -> str:
     """Least and greatest value; what is 0 up to rounding has no sign."""
-    low, high = (0.0 if abs(value) < 1e-9 else value for value in (values.min(), values.max()))
+    low, high = (
+        0.0 if abs(value) < 1e-9 else value for value in (values.min(), values.max())
+    )
     return f"{low:{form}} .. {high:{form}}"
 
 
@@ -154,7 +162,9 @@ def simulate(arguments: Namespace) -> int:
     if arguments.folder is not None:
         return _simulate_again(arguments)
     if arguments.record is not None or arguments.twin:
-        raise ConfigError("--record and --twin are of a data set; give it with --from DIR")
+        raise ConfigError(
+            "--record and --twin are of a data set; give it with --from DIR"
+        )
     request = read_request(arguments.overrides, config_dir=arguments.config_dir)
     config = request.config
     name = config["fault"]["kind"]
@@ -165,7 +175,9 @@ def simulate(arguments: Namespace) -> int:
         "conditions_per_unit": None,
         "n_repeats": 1,
     }
-    config = config.with_keys("plan", **one, classes=[name], design="latin_hypercube", vary={})
+    config = config.with_keys(
+        "plan", **one, classes=[name], design="latin_hypercube", vary={}
+    )
     config = config.with_entries(classes={name: without_vary(config["fault"])})
     row = make_plan(config).record(0)
     return _show(config, simulate_record(config, row), arguments)
@@ -183,8 +195,14 @@ def _simulate_again(arguments: Namespace) -> int:
     if arguments.record is None:
         raise ConfigError("--from needs --record I, the number or id of a record")
     config, row = recorded_row(Path(arguments.folder), arguments.record)
-    record = simulate_twin(config, row) if arguments.twin else simulate_record(config, row)
-    name = f"healthy twin of {row['record_id']} ({row['label_name']})" if arguments.twin else None
+    record = (
+        simulate_twin(config, row) if arguments.twin else simulate_record(config, row)
+    )
+    name = (
+        f"healthy twin of {row['record_id']} ({row['label_name']})"
+        if arguments.twin
+        else None
+    )
     return _show(config, record, arguments, name)
 
 
@@ -202,22 +220,34 @@ def _show(
         from gensig.commands.figures.machine_figures import plot_record
 
         with replaced_file(arguments.plot) as path:
-            plot_record(system, record.signals["acceleration"], record.values, path, name=name)
-    print(name or f"class {record.values['label_name']}, severity {record.values['severity']:.3f}")
+            plot_record(
+                system, record.signals["acceleration"], record.values, path, name=name
+            )
+    print(
+        name
+        or f"class {record.values['label_name']}, severity {record.values['severity']:.3f}"
+    )
     _print_record(system, record.signals["acceleration"], record.values)
     return 0
 
 
-def _write_record(config: Configuration, system: Machine, record: Record, output: str) -> None:
+def _write_record(
+    config: Configuration, system: Machine, record: Record, output: str
+) -> None:
     """One record as a shard of one row, or as a table with time and channels."""
     path = Path(output)
     if path.suffix != ".csv":
         from gensig.production.folder import open_shard
 
         params = [
-            name.removeprefix("params/") for name in record.values if name.startswith("params/")
+            name.removeprefix("params/")
+            for name in record.values
+            if name.startswith("params/")
         ]
-        with replaced_file(path) as temporary, open_shard(temporary, config, 1, params) as writer:
+        with (
+            replaced_file(path) as temporary,
+            open_shard(temporary, config, 1, params) as writer,
+        ):
             writer.write(0, record.signals, record.values)
     else:
         acceleration = record.signals["acceleration"]
@@ -227,7 +257,8 @@ def _write_record(config: Configuration, system: Machine, record: Record, output
             for name in system.sensing.channel_names
         )
         names = (
-            f"{name}_{unit}" for name, unit in zip(system.sensing.channel_names, units, strict=True)
+            f"{name}_{unit}"
+            for name, unit in zip(system.sensing.channel_names, units, strict=True)
         )
         header = ",".join(["time_s", *names])
         with replaced_file(path) as temporary:

@@ -14,7 +14,12 @@ from gensig.commands.request import read_configuration
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
 from gensig.life.root.strength import reliability
-from gensig.systems.root_strength import GearStress, RootHistory, RootStrength, read_root_strength
+from gensig.systems.root_strength import (
+    GearStress,
+    RootHistory,
+    RootStrength,
+    read_root_strength,
+)
 
 
 def root_stress(arguments: Namespace) -> int:
@@ -35,7 +40,9 @@ def root_stress(arguments: Namespace) -> int:
     gears, history = system.gears(), system.history()
     content = root_stress_content(system, gears, history)
     if arguments.stress is not None:
-        content["tangential_force_over_mesh_n"] = system.force_over_mesh_for(arguments.stress * 1e6)
+        content["tangential_force_over_mesh_n"] = system.force_over_mesh_for(
+            arguments.stress * 1e6
+        )
 
     def draw(path: Path) -> None:
         from gensig.commands.figures.strength_figure import plot_root_stress
@@ -69,7 +76,11 @@ def root_stress_content(
         "transverse_contact_ratio": pair.transverse_contact_ratio,
         "overlap_ratio": pair.overlap_ratio,
         "strength": {"bending_limit_mpa": strength.bending_limit * 1e-6}
-        | {key: value for key, value in asdict(strength).items() if key != "bending_limit"},
+        | {
+            key: value
+            for key, value in asdict(strength).items()
+            if key != "bending_limit"
+        },
         "gears": by_gear,
     }
 
@@ -100,13 +111,17 @@ def _gear_content(gear: GearStress, stress: np.ndarray[Any, Any]) -> dict[str, A
     }
 
 
-def _print(system: RootStrength, gears: dict[str, GearStress], content: dict[str, Any]) -> None:
+def _print(
+    system: RootStrength, gears: dict[str, GearStress], content: dict[str, Any]
+) -> None:
     strength = system.strength
     print(
         f"tangential force           {content['tangential_force_n']:.1f} N, {content['torque_nm']:.2f} N m"
     )
     if "tangential_force_over_mesh_n" in content:
-        print(f"over the mesh it takes     {content['tangential_force_over_mesh_n']:.1f} N")
+        print(
+            f"over the mesh it takes     {content['tangential_force_over_mesh_n']:.1f} N"
+        )
     print(
         f"load point                 {strength.load_point.replace('_', ' ')}, ISO 6336-3:{strength.edition}"
     )

@@ -18,10 +18,21 @@ import yaml
 from numpy.typing import NDArray
 
 from gensig.commands.console import one_line_warnings
-from gensig.commands.output import check_outputs, option_file, write_option, write_outputs
+from gensig.commands.output import (
+    check_outputs,
+    option_file,
+    write_option,
+    write_outputs,
+)
 from gensig.commands.request import read_configuration
 from gensig.errors import ConfigError, SimulationError
-from gensig.life.life_laws import FittedLaw, LifeMap, fitted_laws, life_map, torque_exponent
+from gensig.life.life_laws import (
+    FittedLaw,
+    LifeMap,
+    fitted_laws,
+    life_map,
+    torque_exponent,
+)
 from gensig.life.options import SIDES, WearOptions
 from gensig.life.wear.archard import flank_radii, hunting_turns
 from gensig.life.wear.wear_case import WearCase
@@ -44,7 +55,9 @@ def wear_life_verb(arguments: Namespace) -> int:
     """Life and wear to JSON, a figure, an option for records, or a summary."""
     check_outputs(arguments)
     target = (
-        None if arguments.out is None else option_file(arguments.out, GROUP, force=arguments.force)
+        None
+        if arguments.out is None
+        else option_file(arguments.out, GROUP, force=arguments.force)
     )
     config = read_configuration(arguments)
     with one_line_warnings("gensig"):
@@ -79,7 +92,9 @@ def _lives(
         return None, ()
     torques = arguments.torques or case.torque * MAP_TORQUES
     speeds = (
-        speed * MAP_SPEEDS if not arguments.speeds else np.array(arguments.speeds) * math.pi / 30.0
+        speed * MAP_SPEEDS
+        if not arguments.speeds
+        else np.array(arguments.speeds) * math.pi / 30.0
     )
     lives = life_map(case, list(torques), list(speeds))
     return lives, fitted_laws(lives, case.torque, speed)
@@ -111,7 +126,9 @@ def wear_life_content(
         "transverse_contact_ratio": pair.transverse_contact_ratio,
         "overlap_ratio": pair.overlap_ratio,
         "rule": options.rule,
-        "n_intervals": options.n_intervals if options.rule == "fixed_intervals" else None,
+        "n_intervals": options.n_intervals
+        if options.rule == "fixed_intervals"
+        else None,
         "criterion": options.criterion,
         "sharing": "one_pair" if case.loads is None else "mesh",
         "geometry": options.geometry,
@@ -252,7 +269,9 @@ def _warn_of_pressure(case: WearCase, content: Mapping[str, Any]) -> None:
         )
 
 
-def _print(content: Mapping[str, Any], lives: LifeMap | None, laws: tuple[FittedLaw, ...]) -> None:
+def _print(
+    content: Mapping[str, Any], lives: LifeMap | None, laws: tuple[FittedLaw, ...]
+) -> None:
     def ends(key: str) -> str:
         values = content[key]
         return f"{values[0]:.4g} .. {values[-1]:.4g}"
@@ -295,7 +314,11 @@ def _print(content: Mapping[str, Any], lives: LifeMap | None, laws: tuple[Fitted
 
 
 def _refusal(law: FittedLaw) -> str:
-    return "" if law.no_life_from is None else f"; no life from {law.no_life_from:.4g} N m on"
+    return (
+        ""
+        if law.no_life_from is None
+        else f"; no life from {law.no_life_from:.4g} N m on"
+    )
 
 
 def _print_limits(content: Mapping[str, Any]) -> None:
@@ -310,10 +333,20 @@ def _print_limits(content: Mapping[str, Any]) -> None:
     vibration = content.get("vibration")
     if vibration is not None:
         rms = np.array(vibration["rms_m_per_s2"])
-        end = int(np.abs(np.array(vibration["depth_um"]) - content["threshold_um"]).argmin())
-        asked = ((vibration["limit_m_per_s2"], "m/s2"), (vibration["rise_limit_db"], "dB"))
-        limits = " and ".join(f"{value:g} {unit}" for value, unit in asked if value is not None)
-        rise, reached = max(vibration["rise_db"][end]), "" if vibration["is_reached"] else "not "
+        end = int(
+            np.abs(np.array(vibration["depth_um"]) - content["threshold_um"]).argmin()
+        )
+        asked = (
+            (vibration["limit_m_per_s2"], "m/s2"),
+            (vibration["rise_limit_db"], "dB"),
+        )
+        limits = " and ".join(
+            f"{value:g} {unit}" for value, unit in asked if value is not None
+        )
+        rise, reached = (
+            max(vibration["rise_db"][end]),
+            "" if vibration["is_reached"] else "not ",
+        )
         print(f"vibration                  {rms[0].max():.4g} m/s2 RMS with new flanks, loudest sensor; at the end "
               f"{rms[end].max():.4g}, up by {rise:.3g} dB at most; limit of {limits} {reached}reached")  # fmt: skip
 
@@ -321,7 +354,9 @@ def _print_limits(content: Mapping[str, Any]) -> None:
 def _write_option(life: WearLife, speed: float, target: Path) -> None:
     """The worn flanks as an option of the group ``fault``."""
     pair = life.case.pair
-    option = yaml.safe_dump(wear_fault(life.case, life.depth[-1]), sort_keys=False, width=110)
+    option = yaml.safe_dump(
+        wear_fault(life.case, life.depth[-1]), sort_keys=False, width=110
+    )
     write_option(
         target,
         f"# Flanks of {pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth after {hours(life.life, speed):.4g} h at "

@@ -10,7 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from gensig.driveline.cycle_statistics import fluctuations, order_amplitudes, typical_extremes
+from gensig.driveline.cycle_statistics import (
+    fluctuations,
+    order_amplitudes,
+    typical_extremes,
+)
 from gensig.driveline.engine_dampers import DynamicRootStress, passes_of_a_cycle
 from gensig.driveline.engine_line import EngineLine, read_engine_line
 from gensig.driveline.excitation.line_torques import LineTorques
@@ -36,7 +40,9 @@ def simulate_time(
 ) -> TimeResponse:
     """An operating point integrated in time, its spur meshes by tables of their teeth."""
     if not 0.0 < duration <= LONGEST_TIME:
-        raise ConfigError(f"--time {duration:g}: give seconds above 0, at most {LONGEST_TIME:g}")
+        raise ConfigError(
+            f"--time {duration:g}: give seconds above 0, at most {LONGEST_TIME:g}"
+        )
     speed, torque = torques.speed, torques.brake_torque
     own = own_meshes(line, config, speed, torque)
     return time_response(line, speed, torque, own=own, nodes=nodes, duration=duration)
@@ -60,7 +66,9 @@ def simulate_sweep(
             f"{LONGEST_TIME:g}"
         )
     own = own_meshes(line, config, 0.5 * (low + high), torque)
-    return sweep_response(line, low, high, seconds, torque, own=own, nodes=nodes, n_orders=n_orders)
+    return sweep_response(
+        line, low, high, seconds, torque, own=own, nodes=nodes, n_orders=n_orders
+    )
 
 
 def without_dampers(config: Configuration) -> EngineLine:
@@ -120,7 +128,9 @@ def _way_content(way: SweepWay) -> dict[str, Any]:
     }
 
 
-def root_content(line: EngineLine, mesh: int, root: DynamicRootStress) -> dict[str, Any]:
+def root_content(
+    line: EngineLine, mesh: int, root: DynamicRootStress
+) -> dict[str, Any]:
     """Root stress of the decisive gear of a mesh under one dynamic load."""
     name = root.strength.decisive
     gear, passes = root.gears[name], root.passes[name]
@@ -129,7 +139,9 @@ def root_content(line: EngineLine, mesh: int, root: DynamicRootStress) -> dict[s
         "decisive_gear": name,
         "greatest_tooth_force_n": root.strength.flanks.mesh_force,
         "iso_root_stress_mpa": from_si("stress_mpa", gear.stress),
-        "largest_root_stress_mpa": from_si("stress_mpa", typical_largest(passes, in_cycle)),
+        "largest_root_stress_mpa": from_si(
+            "stress_mpa", typical_largest(passes, in_cycle)
+        ),
         "roll_angle_deg": np.degrees(
             root.history.roll / root.strength.pair.pinion.base_radius
         ).tolist(),
@@ -148,9 +160,19 @@ def root_content(line: EngineLine, mesh: int, root: DynamicRootStress) -> dict[s
 
 def print_in_time(content: Mapping[str, Any]) -> None:
     """A summary of ``--time``."""
-    print(f"in time, teeth free to part (energy residual {content['time_energy_residual']:.1g}):")
-    kinds = ("typical_fluctuation_rpm", "speed_fluctuation_rpm", "mean_cycle_fluctuation_rpm")
-    nodes = zip(content["shown_nodes"], *(content[f"time_{kind}"] for kind in kinds), strict=True)
+    print(
+        f"in time, teeth free to part (energy residual {content['time_energy_residual']:.1g}):"
+    )
+    kinds = (
+        "typical_fluctuation_rpm",
+        "speed_fluctuation_rpm",
+        "mean_cycle_fluctuation_rpm",
+    )
+    nodes = zip(
+        content["shown_nodes"],
+        *(content[f"time_{kind}"] for kind in kinds),
+        strict=True,
+    )
     for node, typical, whole, cycle in nodes:
         print(
             f"  node {node:>3} +- {typical:.2f} r/min in a cycle, {whole:.2f} in all, {cycle:.2f} of the mean cycle"
@@ -161,7 +183,9 @@ def print_in_time(content: Mapping[str, Any]) -> None:
         "contact_loss_fraction",
         "back_contact_fraction",
     )
-    rows = zip(content["meshes"], *(content[f"time_{key}"] for key in keys), strict=True)
+    rows = zip(
+        content["meshes"], *(content[f"time_{key}"] for key in keys), strict=True
+    )
     for name, least, greatest, low, high, apart, back in rows:
         print(
             f"  mesh {name:>6} {least:7.0f} .. {greatest:.0f} N in a cycle, {low:.0f} .. {high:.0f} in all, "
@@ -172,12 +196,16 @@ def print_in_time(content: Mapping[str, Any]) -> None:
 def print_roots(content: Mapping[str, Any]) -> None:
     """A summary of ``--mesh``."""
     roots = content["root_stress"]
-    print(f"root stress of mesh {content['root_stress_mesh']}, {roots['linear']['decisive_gear']}:")
+    print(
+        f"root stress of mesh {content['root_stress_mesh']}, {roots['linear']['decisive_gear']}:"
+    )
     for name, root in roots.items():
         change = ""
         if name + WITHOUT in roots:
             before = roots[name + WITHOUT]["iso_root_stress_mpa"]
-            change = f", {root['iso_root_stress_mpa'] / before - 1.0:+.1%} by the dampers"
+            change = (
+                f", {root['iso_root_stress_mpa'] / before - 1.0:+.1%} by the dampers"
+            )
         print(
             f"  {name.replace('_', ' '):<24} {root['greatest_tooth_force_n']:7.0f} N, "
             f"{root['iso_root_stress_mpa']:.1f} MPa by ISO 6336-3, "
@@ -187,7 +215,9 @@ def print_roots(content: Mapping[str, Any]) -> None:
             f"  {'':<24} safety {root['safety_factor_paper']:.3f} ({root['reliability_paper']}) by the paper, "
             f"{root['safety_factor_iso']:.3f} ({root['reliability_iso']}) by ISO 6336-3"
         )
-    classes = ", ".join(f"{one.name} from {one.least_safety:.2f} on" for one in RELIABILITY)
+    classes = ", ".join(
+        f"{one.name} from {one.least_safety:.2f} on" for one in RELIABILITY
+    )
     print(f"  reliability: {classes}")
 
 

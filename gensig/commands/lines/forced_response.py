@@ -58,13 +58,19 @@ def forced_response(arguments: Namespace) -> int:
     config = read_configuration(arguments)
     line = read_engine_line(config)
     found = _find(line, arguments, config["seed"])
-    if (arguments.time, arguments.sweep) != (None, None) and line.engine.pressure_decides_torque:
+    if (arguments.time, arguments.sweep) != (
+        None,
+        None,
+    ) and line.engine.pressure_decides_torque:
         raise ConfigError(
             "excitation.pressure.file decides the torque; leave --time and --sweep out"
         )
     if arguments.time is not None:
         found = replace(
-            found, in_time=simulate_time(line, config, found.torques, found.nodes, arguments.time)
+            found,
+            in_time=simulate_time(
+                line, config, found.torques, found.nodes, arguments.time
+            ),
         )
     if arguments.mesh is not None:
         found = replace(found, mesh=mesh_between(line, arguments.mesh))
@@ -100,9 +106,11 @@ def response_content(line: EngineLine, found: ResponseResult) -> dict[str, Any]:
         "node_numbers": list(numbers),
         "nodes": [node.name for node in line.drive.line.nodes],
         "mean_speed_rpm": [
-            line.ratios[number] * from_si("speed_rpm", response.speed) for number in numbers
+            line.ratios[number] * from_si("speed_rpm", response.speed)
+            for number in numbers
         ],
-        "speed_fluctuation_rpm": from_si("speed_rpm", 1.0) * response.fluctuation()[: len(numbers)],
+        "speed_fluctuation_rpm": from_si("speed_rpm", 1.0)
+        * response.fluctuation()[: len(numbers)],
         "toothed_wheel_fluctuation_rpm": {
             name: from_si("speed_rpm", value) for name, value in found.seen.items()
         },
@@ -116,11 +124,16 @@ def response_content(line: EngineLine, found: ResponseResult) -> dict[str, Any]:
     }
     if isinstance(torques, EngineTorques):
         content["indicated_torque_nm"] = torques.indicated_torque
-        content["peak_pressure_mpa"] = from_si("pressure_mpa", float(torques.pressure.max()))
+        content["peak_pressure_mpa"] = from_si(
+            "pressure_mpa", float(torques.pressure.max())
+        )
     if isinstance(torques, EngineTorques) and torques.disturbance_torque:
         place = numbers.index(torques.disturbance_node)
         moved = disturbance_response(
-            linear, place, torques.disturbance_torque, 2.0 * np.pi * torques.disturbance_frequency
+            linear,
+            place,
+            torques.disturbance_torque,
+            2.0 * np.pi * torques.disturbance_frequency,
         )
         content["disturbance_frequency_hz"] = torques.disturbance_frequency
         content["disturbance_angle_deg"] = np.degrees(np.abs(moved[places]))
@@ -131,7 +144,8 @@ def response_content(line: EngineLine, found: ResponseResult) -> dict[str, Any]:
     if found.mesh is not None:
         content["root_stress_mesh"] = line.mesh_names[found.mesh]
         content["root_stress"] = {
-            name: root_content(line, found.mesh, root) for name, root in found.roots.items()
+            name: root_content(line, found.mesh, root)
+            for name, root in found.roots.items()
         }
     if found.run:
         content["run_speeds_rpm"] = from_si("speed_rpm", 1.0) * found.run[0].speeds
@@ -143,14 +157,19 @@ def response_content(line: EngineLine, found: ResponseResult) -> dict[str, Any]:
 
 
 def _roots(
-    line: EngineLine, config: Configuration, found: ResponseResult, duration: float | None
+    line: EngineLine,
+    config: Configuration,
+    found: ResponseResult,
+    duration: float | None,
 ) -> dict[str, DynamicRootStress]:
     """Root stress of the mesh asked for, without the dampers too where there are any."""
     mesh = found.mesh
     assert mesh is not None
     strength = read_mesh_strength(config, line, mesh)
     roots = {
-        "linear": dynamic_root_stress(strength, line, mesh, tooth_load(line, mesh, found.response))
+        "linear": dynamic_root_stress(
+            strength, line, mesh, tooth_load(line, mesh, found.response)
+        )
     }
     if found.in_time is not None:
         roots["in_time"] = root_stress_in_time(strength, line, mesh, found.in_time)
@@ -163,16 +182,26 @@ def _roots(
     )
     if duration is not None:
         undamped = simulate_time(bare, config, torques, found.nodes, duration)
-        roots["in_time_without_dampers"] = root_stress_in_time(strength, bare, mesh, undamped)
+        roots["in_time_without_dampers"] = root_stress_in_time(
+            strength, bare, mesh, undamped
+        )
     return roots
 
 
 def _find(line: EngineLine, arguments: Namespace, seed: int) -> ResponseResult:
     reference, ratios = line.engine.reference, line.ratios
-    speed = reference.speed if arguments.speed is None else to_si("speed_rpm", arguments.speed)
+    speed = (
+        reference.speed
+        if arguments.speed is None
+        else to_si("speed_rpm", arguments.speed)
+    )
     measured = line.engine.pressure_decides_torque
     torque = (
-        None if measured else reference.torque if arguments.torque is None else arguments.torque
+        None
+        if measured
+        else reference.torque
+        if arguments.torque is None
+        else arguments.torque
     )
     if measured and (arguments.torque is not None or arguments.run is not None):
         raise ConfigError(
@@ -180,7 +209,9 @@ def _find(line: EngineLine, arguments: Namespace, seed: int) -> ResponseResult:
         )
     measured_nodes = tuple(wheel.node for wheel in line.wheels.values())
     nodes = tuple(
-        arguments.nodes or measured_nodes or (line.engine.driving_nodes[0], line.engine.load_node)
+        arguments.nodes
+        or measured_nodes
+        or (line.engine.driving_nodes[0], line.engine.load_node)
     )
     for node in nodes:
         if node not in ratios:
@@ -207,7 +238,9 @@ def _find(line: EngineLine, arguments: Namespace, seed: int) -> ResponseResult:
         run = run_of_speeds(
             linear,
             lambda one: line.on_line(
-                line.torques(one, line.load_at(arguments.run_torque, one / reference.speed))
+                line.torques(
+                    one, line.load_at(arguments.run_torque, one / reference.speed)
+                )
             ),
             speeds,
             places,
@@ -233,7 +266,9 @@ def _print(content: dict[str, Any]) -> None:
         print(
             f"{content['speed_rpm']:g} r/min, {content['torque_nm']:.6g} N m of the load at the motor"
         )
-    by_number = dict(zip(content["node_numbers"], range(len(content["nodes"])), strict=True))
+    by_number = dict(
+        zip(content["node_numbers"], range(len(content["nodes"])), strict=True)
+    )
     for node in content["shown_nodes"]:
         place = by_number[node]
         print(

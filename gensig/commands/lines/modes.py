@@ -86,7 +86,10 @@ def modes_content(line: DriveLine, found: Modes) -> dict[str, Any]:
 def mesh_names(line: DriveLine) -> list[str]:
     """Names of the two gears of every mesh."""
     gears = line.line.gears
-    return [f"{gears[mesh.driving].name} / {gears[mesh.driven].name}" for mesh in line.line.meshes]
+    return [
+        f"{gears[mesh.driving].name} / {gears[mesh.driven].name}"
+        for mesh in line.line.meshes
+    ]
 
 
 def _print_modes(line: DriveLine, found: Modes, content: Mapping[str, Any]) -> None:
@@ -114,7 +117,11 @@ def _print_modes(line: DriveLine, found: Modes, content: Mapping[str, Any]) -> N
     print(f"{'mode':>4} {'Hz':>10} {'damping':>8}  kinetic energy")
     for mode, frequency in enumerate(content["natural_frequencies_hz"][:SHOWN]):
         share = found.kinetic_share[mode]
-        most = [place for place in np.argsort(-share, kind="stable")[:3] if share[place] > 0.05]
+        most = [
+            place
+            for place in np.argsort(-share, kind="stable")[:3]
+            if share[place] > 0.05
+        ]
         where = ", ".join(f"{share[place]:.0%} {motions[place]}" for place in most)
         strain = max(content["mesh_strain_energy_share"][mode], default=0.0)
         where += (
@@ -124,7 +131,9 @@ def _print_modes(line: DriveLine, found: Modes, content: Mapping[str, Any]) -> N
             if strain > 0.5
             else ""
         )
-        print(f"{mode:>4} {frequency:>10.2f} {content['damping_ratio'][mode]:>8.4f}  {where}")
+        print(
+            f"{mode:>4} {frequency:>10.2f} {content['damping_ratio'][mode]:>8.4f}  {where}"
+        )
     if len(content["natural_frequencies_hz"]) > SHOWN:
         last = content["natural_frequencies_hz"][-1]
         print(

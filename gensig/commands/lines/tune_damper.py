@@ -17,7 +17,12 @@ from numpy.typing import NDArray
 
 from gensig.commands.lines.forced_response import MOST_SPEEDS
 from gensig.commands.lines.results import DamperState
-from gensig.commands.output import check_outputs, option_file, write_option, write_outputs
+from gensig.commands.output import (
+    check_outputs,
+    option_file,
+    write_option,
+    write_outputs,
+)
 from gensig.commands.request import read_configuration
 from gensig.driveline.engine_dampers import (
     dynamic_root_stress,
@@ -51,7 +56,10 @@ def tune_damper(arguments: Namespace) -> int:
         raise ConfigError(
             "excitation.pressure.file is of one operating point; tune-damper runs over a range of speeds"
         )
-    mesh, nodes = mesh_between(line, arguments.mesh), tuple(arguments.nodes or arguments.mesh)
+    mesh, nodes = (
+        mesh_between(line, arguments.mesh),
+        tuple(arguments.nodes or arguments.mesh),
+    )
     speeds = _speeds(line, arguments.run)
     reference = line.engine.reference
     torque = reference.torque if arguments.torque is None else arguments.torque
@@ -61,7 +69,8 @@ def tune_damper(arguments: Namespace) -> int:
         for number, node in zip(line.drive.numbers, line.drive.line.nodes, strict=True)
     }
     most = [
-        own[node] if arguments.most_inertia is None else arguments.most_inertia for node in nodes
+        own[node] if arguments.most_inertia is None else arguments.most_inertia
+        for node in nodes
     ]
     print(
         f"searching for dampers on nodes {', '.join(map(str, nodes))}; this takes a minute",
@@ -106,13 +115,16 @@ def tuning_content(
         "run_speeds_rpm": (from_si("speed_rpm", 1.0) * speeds).tolist(),
         "reference_speed_rpm": from_si("speed_rpm", before.load.speed),
         **{name: _state_content(state) for name, state in states.items()},
-        "largest_force_drop": 1.0 - float(states["after"].largest.max() / before.largest.max()),
+        "largest_force_drop": 1.0
+        - float(states["after"].largest.max() / before.largest.max()),
         "root_stress_drop": 1.0 - states["after"].load.greatest / before.load.greatest,
     }
 
 
 def option_text(
-    machine: Mapping[str, Any], dampers: Sequence[TorsionalDamper], content: Mapping[str, Any]
+    machine: Mapping[str, Any],
+    dampers: Sequence[TorsionalDamper],
+    content: Mapping[str, Any],
 ) -> str:
     """The whole machine as YAML that the group ``system`` takes, the new dampers behind those
     that it had.
@@ -123,8 +135,13 @@ def option_text(
         f"{content['torque_nm']:g} N m\n# {content['before']['worst_force_n']:.0f} N without them, "
         f"{content['after']['worst_force_n']:.0f} N with them, of a mesh that never parts.\n"
     )
-    values = {**machine, "dampers": [*machine["dampers"], *(_keys(one) for one in dampers)]}
-    return head + yaml.safe_dump(values, sort_keys=False, default_flow_style=None, width=110)
+    values = {
+        **machine,
+        "dampers": [*machine["dampers"], *(_keys(one) for one in dampers)],
+    }
+    return head + yaml.safe_dump(
+        values, sort_keys=False, default_flow_style=None, width=110
+    )
 
 
 def _speeds(line: EngineLine, run: Sequence[float] | None) -> NDArray[np.float64]:
@@ -163,12 +180,18 @@ def _keys(damper: TorsionalDamper) -> dict[str, Any]:
 
 
 def _state(
-    line: EngineLine, mesh: int, strength: RootStrength, torque: float, largest: NDArray[np.float64]
+    line: EngineLine,
+    mesh: int,
+    strength: RootStrength,
+    torque: float,
+    largest: NDArray[np.float64],
 ) -> DamperState:
     response = line.response(line.engine.reference.speed, torque)
     load = tooth_load(line, mesh, response)
     root = dynamic_root_stress(strength, line, mesh, load)
-    return DamperState(line=line, largest=largest, response=response, load=load, root=root)
+    return DamperState(
+        line=line, largest=largest, response=response, load=load, root=root
+    )
 
 
 def _state_content(state: DamperState) -> dict[str, Any]:
@@ -185,7 +208,9 @@ def _state_content(state: DamperState) -> dict[str, Any]:
         "greatest_force_n": state.load.greatest,
         "decisive_gear": name,
         "iso_root_stress_mpa": from_si("stress_mpa", gear.stress),
-        "largest_root_stress_mpa": from_si("stress_mpa", float(root.history.stress[name].max())),
+        "largest_root_stress_mpa": from_si(
+            "stress_mpa", float(root.history.stress[name].max())
+        ),
         "roll_angle_deg": np.degrees(
             root.history.roll / root.strength.pair.pinion.base_radius
         ).tolist(),
@@ -195,7 +220,9 @@ def _state_content(state: DamperState) -> dict[str, Any]:
         "safety_factor_paper": gear.safety.paper,
         "reliability_paper": reliability(gear.safety.paper),
         "safety_factor_iso": gear.safety.iso,
-        "speed_fluctuation_rpm": {str(numbers[one.node]): float(half[one.node]) for one in driven},
+        "speed_fluctuation_rpm": {
+            str(numbers[one.node]): float(half[one.node]) for one in driven
+        },
     }
 
 
@@ -218,5 +245,7 @@ def _print(content: Mapping[str, Any]) -> None:
         ("safety, ISO 6336-3", "safety_factor_iso", ".3f"),
     )
     for label, key, form in rows:
-        cells = "".join(f"{content[name][key]:>12{form}}" for name in ("before", "after"))
+        cells = "".join(
+            f"{content[name][key]:>12{form}}" for name in ("before", "after")
+        )
         print(f"{label:<36}{cells:>24}")

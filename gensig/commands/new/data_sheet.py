@@ -60,7 +60,9 @@ class DataSheet:
             ("--bores", self.bores or ()),
             ("--supports", self.supports or ()),
         ):
-            if wrong := [value for value in values if not (value > 0.0 and math.isfinite(value))]:
+            if wrong := [
+                value for value in values if not (value > 0.0 and math.isfinite(value))
+            ]:
                 raise ConfigError(f"{flag} {wrong[0]:g} must be positive")
         if not MODULES[0] <= self.module <= MODULES[1]:
             raise ConfigError(
@@ -105,7 +107,8 @@ class GearOption:
     def bearings(self) -> dict[str, str]:
         """The bearings beside each gear."""
         return {
-            side: bearing_for(2.0 * self.gear[side]["bore_radius_mm"]).describes for side in SIDES
+            side: bearing_for(2.0 * self.gear[side]["bore_radius_mm"]).describes
+            for side in SIDES
         }
 
     def derived(self) -> dict[str, float | None]:
@@ -127,7 +130,8 @@ class GearOption:
             "wheel_speed_rpm": speed / ratio,
             "wheel_torque_nm": torque * ratio,
             "power_kw": 1e-3 * to_si("speed_rpm", speed) * torque,
-            "pitch_line_speed_m_per_s": to_si("speed_rpm", speed) * pair.pinion.pitch_radius,
+            "pitch_line_speed_m_per_s": to_si("speed_rpm", speed)
+            * pair.pinion.pitch_radius,
             "tooth_force_per_width_n_per_mm": 1e-3 * force / width,
             "nominal_root_stress_mpa": stress,
             "center_distance_mm": pair.center_distance * 1e3,
@@ -139,7 +143,10 @@ class GearOption:
             "pinion_inertia_kg_m2": machine.pinion.inertia,
             "wheel_inertia_kg_m2": machine.wheel.inertia,
             "backlash_um": self.gear["backlash_um"],
-            **{f"{side}_bore_mm": 2.0 * self.gear[side]["bore_radius_mm"] for side in SIDES},
+            **{
+                f"{side}_bore_mm": 2.0 * self.gear[side]["bore_radius_mm"]
+                for side in SIDES
+            },
         }
 
 
@@ -226,16 +233,25 @@ def tip_rounding(pressure_angle_deg: float, addendum: float = ADDENDUM) -> float
     if not 10.0 <= pressure_angle_deg <= 35.0:  # the geometry says so
         return LARGEST_ROUNDING
     room = 1.0 - math.sin(alpha)
-    middle = (math.pi / 4.0 - (addendum + CLEARANCE) * math.tan(alpha)) * math.cos(alpha) / room
+    middle = (
+        (math.pi / 4.0 - (addendum + CLEARANCE) * math.tan(alpha))
+        * math.cos(alpha)
+        / room
+    )
     return max(
-        0.01, min(LARGEST_ROUNDING, math.floor(100.1 * min(CLEARANCE / room, middle)) / 100.0)
+        0.01,
+        min(
+            LARGEST_ROUNDING, math.floor(100.1 * min(CLEARANCE / room, middle)) / 100.0
+        ),
     )
 
 
 def _bores(sheet: DataSheet) -> tuple[float, float]:
     """Diameters of two shafts that are twisted to the same stress, mm."""
     pinion = BORE_SHARE * sheet.module * sheet.teeth[0]
-    return round(pinion, 1), round(pinion * (sheet.teeth[1] / sheet.teeth[0]) ** (1.0 / 3.0), 1)
+    return round(pinion, 1), round(
+        pinion * (sheet.teeth[1] / sheet.teeth[0]) ** (1.0 / 3.0), 1
+    )
 
 
 def _no_support(is_helical: bool) -> dict[str, float | None]:
@@ -261,11 +277,17 @@ def _bearing(size: BearingSize) -> dict[str, Any]:
     }
 
 
-def _config(sheet: DataSheet, gear: Mapping[str, Any], *, on_bearings: bool) -> Configuration:
+def _config(
+    sheet: DataSheet, gear: Mapping[str, Any], *, on_bearings: bool
+) -> Configuration:
     config = read_request(["system=helical_pair"] if sheet.is_helical else []).config
     config = config.with_entries(gear=gear)
-    config = config.with_keys("system", supports="bearings" if on_bearings else "as_given")
-    config = config.with_keys("operating", speed_rpm=sheet.speed, torque_nm=sheet.torque)
+    config = config.with_keys(
+        "system", supports="bearings" if on_bearings else "as_given"
+    )
+    config = config.with_keys(
+        "operating", speed_rpm=sheet.speed, torque_nm=sheet.torque
+    )
     limits = {
         "support_damping_ratio_low": DAMPING_RATIO,
         "support_damping_ratio_high": DAMPING_RATIO,

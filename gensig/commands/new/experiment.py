@@ -19,9 +19,14 @@ from gensig.plan.request import read_request
 
 PLAIN, REALISTIC = "plain", "realistic"
 LEAST_TURNS = 10  # of the pinion in a record at the slowest speed
-SPEED_SHARES, TORQUE_SHARES = (0.5, 1.2), (0.3, 1.2)  # of the rated ones, over which a plan draws
+SPEED_SHARES, TORQUE_SHARES = (
+    (0.5, 1.2),
+    (0.3, 1.2),
+)  # of the rated ones, over which a plan draws
 LARGEST_SHARE = 3.0
-N_UNITS = 16  # a quarter of them is tested: four machines, the fewest that make an interval
+N_UNITS = (
+    16  # a quarter of them is tested: four machines, the fewest that make an interval
+)
 CLASSES = ("healthy", "crack", "pitting", "chipped", "missing_tooth")
 GRADE_STEP = math.sqrt(2.0)  # between the limits of neighbouring grades of ISO 1328-1
 
@@ -44,7 +49,9 @@ class Wishes:
 
     def __post_init__(self) -> None:
         if self.sensors is not None and self.base == PLAIN:
-            raise ConfigError(f"--sensors are on a housing: add --experiment {REALISTIC}")
+            raise ConfigError(
+                f"--sensors are on a housing: add --experiment {REALISTIC}"
+            )
         for flag, shares in (
             ("--speed-range", self.speed_range),
             ("--torque-range", self.torque_range),
@@ -58,8 +65,18 @@ class Wishes:
 
 def read_wishes(arguments: Namespace) -> Wishes:
     """The flags of the verb that are about the experiment."""
-    names = ("rate", "duration", "grade", "classes", "sensors", "speed_range", "torque_range")
-    return Wishes(base=arguments.experiment, **{name: getattr(arguments, name) for name in names})
+    names = (
+        "rate",
+        "duration",
+        "grade",
+        "classes",
+        "sensors",
+        "speed_range",
+        "torque_range",
+    )
+    return Wishes(
+        base=arguments.experiment, **{name: getattr(arguments, name) for name in names}
+    )
 
 
 def experiment_text(option: GearOption, wishes: Wishes) -> str:
@@ -68,7 +85,9 @@ def experiment_text(option: GearOption, wishes: Wishes) -> str:
     name = option.gear["name"]
     classes = list(wishes.classes or CLASSES)
     n_records = N_UNITS * len(classes)
-    about = f"{n_records} records of {name}, {len(classes)} classes from {N_UNITS} units"
+    about = (
+        f"{n_records} records of {name}, {len(classes)} classes from {N_UNITS} units"
+    )
     realistic = wishes.base == REALISTIC
     lines = [
         "# @package _global_",
@@ -100,7 +119,9 @@ def _short(value: float) -> str:
 
 def _check_rate(option: GearOption, wishes: Wishes) -> None:
     """Raise where the mesh is not heard."""
-    fastest = (wishes.speed_range or SPEED_SHARES)[1] * option.gear["rated_speed_rpm"] / 60.0
+    fastest = (
+        (wishes.speed_range or SPEED_SHARES)[1] * option.gear["rated_speed_rpm"] / 60.0
+    )
     mesh = fastest * option.pair.pinion.n_teeth
     if wishes.rate is not None and not usable_band(wishes.rate)[1] > mesh:
         raise ConfigError(
@@ -117,14 +138,21 @@ def _operating(option: GearOption, wishes: Wishes) -> list[str]:
     slowest = (wishes.speed_range or SPEED_SHARES)[0] * option.gear["rated_speed_rpm"]
     least = LEAST_TURNS * 60.0 / slowest
     duration = (
-        max(1.0, math.ceil(10.0 * least) / 10.0) if wishes.duration is None else wishes.duration
+        max(1.0, math.ceil(10.0 * least) / 10.0)
+        if wishes.duration is None
+        else wishes.duration
     )
     if not (math.isfinite(duration) and duration > 0.0):
         raise ConfigError(f"--duration {duration:g} must be positive")
-    derived = f"derived: at least {LEAST_TURNS} turns of the pinion at the slowest speed"
+    derived = (
+        f"derived: at least {LEAST_TURNS} turns of the pinion at the slowest speed"
+    )
     return [
         "operating:",
-        _line(f"  duration_s: {duration:g}", derived if wishes.duration is None else "given"),
+        _line(
+            f"  duration_s: {duration:g}",
+            derived if wishes.duration is None else "given",
+        ),
     ]
 
 
@@ -151,9 +179,15 @@ def _couplings(option: GearOption) -> list[str]:
         ("motor", 1.0, 1.0),
         ("load", _ratio(option.gear), _ratio(base["gear"])),
     ):
-        body, there = base["system"][name], base["gear"]["rated_torque_nm"] * there_ratio
+        body, there = (
+            base["system"][name],
+            base["gear"]["rated_torque_nm"] * there_ratio,
+        )
         size = torque * ratio / there
-        inertia, stiffness = body["inertia_kg_m2"], body["coupling_stiffness_nm_per_rad"]
+        inertia, stiffness = (
+            body["inertia_kg_m2"],
+            body["coupling_stiffness_nm_per_rad"],
+        )
         lines += [
             f"  {name}:",
             _line(
@@ -178,7 +212,10 @@ def _housing(wishes: Wishes) -> list[str]:
     lines = ["sensing:", _line(f"  sampling_rate_hz: {rate:g}", _origin(wishes.rate))]
     if wishes.sensors is not None:
         lines.append(_line(f"  sensors: [{', '.join(wishes.sensors)}]", "given"))
-    (lowest, highest), band = sensing["path"]["natural_frequency_hz"], sensing["noise"]["band_hz"]
+    (lowest, highest), band = (
+        sensing["path"]["natural_frequency_hz"],
+        sensing["noise"]["band_hz"],
+    )
     usable = usable_band(rate)[1]
     if highest > usable:
         lines += [
@@ -201,16 +238,29 @@ def _housing(wishes: Wishes) -> list[str]:
 
 def _bearings(option: GearOption, wishes: Wishes) -> list[str]:
     axes = "yz" if option.is_helical else "xy"
-    channels = ", ".join(f"{gear}_{axis}" for gear in ("pinion", "wheel") for axis in axes)
-    rate = [] if wishes.rate is None else [_line(f"  sampling_rate_hz: {wishes.rate:g}", "given")]
+    channels = ", ".join(
+        f"{gear}_{axis}" for gear in ("pinion", "wheel") for axis in axes
+    )
+    rate = (
+        []
+        if wishes.rate is None
+        else [_line(f"  sampling_rate_hz: {wishes.rate:g}", "given")]
+    )
     return ["sensing:", *rate, _line(f"  channels: [{channels}]", "at the bearings")]
 
 
-def _plan(option: GearOption, wishes: Wishes, classes: list[str], n_records: int) -> list[str]:
+def _plan(
+    option: GearOption, wishes: Wishes, classes: list[str], n_records: int
+) -> list[str]:
     ranges = []
     for key, rated, given, assumed in (
         ("speed_rpm", option.gear["rated_speed_rpm"], wishes.speed_range, SPEED_SHARES),
-        ("torque_nm", option.gear["rated_torque_nm"], wishes.torque_range, TORQUE_SHARES),
+        (
+            "torque_nm",
+            option.gear["rated_torque_nm"],
+            wishes.torque_range,
+            TORQUE_SHARES,
+        ),
     ):
         low, high = given or assumed
         ranges.append(
@@ -230,7 +280,10 @@ def _plan(option: GearOption, wishes: Wishes, classes: list[str], n_records: int
     return [
         "plan:",
         _line(f"  n_records: {n_records}", "assumed: one of each class and unit"),
-        _line(f"  n_units: {N_UNITS}", "assumed; a unit is one set of gears in one housing"),
+        _line(
+            f"  n_units: {N_UNITS}",
+            "assumed; a unit is one set of gears in one housing",
+        ),
         _line(
             "  n_gearboxes: null",
             "about the square root of n_units; 1: all sets of gears in one housing, yours",
@@ -238,7 +291,10 @@ def _plan(option: GearOption, wishes: Wishes, classes: list[str], n_records: int
         _line(f"  classes: [{', '.join(classes)}]", _origin(wishes.classes)),
         "  vary:",
         *ranges,
-        _line(f"    sensing.snr_db: {{distribution: uniform, low: {lowest}, high: 30}}", "assumed"),
+        _line(
+            f"    sensing.snr_db: {{distribution: uniform, low: {lowest}, high: 30}}",
+            "assumed",
+        ),
         *(shards if wishes.base == REALISTIC else []),
     ]
 

@@ -57,7 +57,10 @@ def new(arguments: Namespace) -> int:
         file.write_text(texts[group], encoding="utf-8")
     commands = _commands(folder, name)
     if arguments.json:
-        content = {"files": [str(file) for file in files.values()], "derived": option.derived()}
+        content = {
+            "files": [str(file) for file in files.values()],
+            "derived": option.derived(),
+        }
         content |= {"bearings": option.bearings(), "next": commands}
         print(json.dumps(content))
     else:
@@ -85,13 +88,17 @@ def _check_name(name: str, files: Any) -> None:
             )
     for file in files:
         if file.exists():
-            raise ConfigError(f"{file} is there already; choose another name or --dir, or edit it")
+            raise ConfigError(
+                f"{file} is there already; choose another name or --dir, or edit it"
+            )
 
 
 def _complete(arguments: Namespace) -> None:
     """Ask for what was left out, on a terminal; elsewhere name all that is missing."""
     missing = [
-        name for name, _, _, needed in QUESTIONS if needed and getattr(arguments, name) is None
+        name
+        for name, _, _, needed in QUESTIONS
+        if needed and getattr(arguments, name) is None
     ]
     if not missing:
         return
@@ -103,7 +110,9 @@ def _complete(arguments: Namespace) -> None:
         )
     for name, question, count, needed in QUESTIONS:
         if getattr(arguments, name) is None:
-            answer = _ask(question, count, int if name == "teeth" else float, needed=needed)
+            answer = _ask(
+                question, count, int if name == "teeth" else float, needed=needed
+            )
             setattr(arguments, name, answer[0] if answer and count == 1 else answer)
 
 

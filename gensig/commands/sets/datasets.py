@@ -38,9 +38,13 @@ def generate(arguments: Namespace) -> int:
     requests = [read_request(job, config_dir=arguments.config_dir) for job in jobs]
     parents = {str(request.config["out"]) for request in requests}
     if requests[0].config["out"] in (None, ""):
-        raise ConfigError("out is required: give out=DIR, a folder that does not exist or is empty")
+        raise ConfigError(
+            "out is required: give out=DIR, a folder that does not exist or is empty"
+        )
     if len(parents) > 1:
-        raise ConfigError("out must be one folder; with -m each data set gets a folder below it")
+        raise ConfigError(
+            "out must be one folder; with -m each data set gets a folder below it"
+        )
     executors = [read_executor(request.config["executor"]) for request in requests]
     if not executors[0].closes:
         if arguments.multirun:
@@ -50,14 +54,20 @@ def generate(arguments: Namespace) -> int:
         return _generate_share(executors[0], arguments)
     parent = Path(str(requests[0].config["out"])).expanduser()
     refuse_used(parent)
-    folders = [parent / name for name in job_folders(jobs)] if arguments.multirun else [parent]
+    folders = (
+        [parent / name for name in job_folders(jobs)]
+        if arguments.multirun
+        else [parent]
+    )
     return max(
         _generate_one(request, folder, executor, arguments)
         for request, folder, executor in zip(requests, folders, executors, strict=True)
     )
 
 
-def _generate_one(request: Request, out: Path, executor: Executor, arguments: Namespace) -> int:
+def _generate_one(
+    request: Request, out: Path, executor: Executor, arguments: Namespace
+) -> int:
     from gensig.plan.notes import plan_notes
     from gensig.production.folder import begin_folder, run_folder
 
@@ -112,7 +122,8 @@ def _generate_share(executor: Executor, arguments: Namespace) -> int:
         print(f"gensig: {problem}", file=sys.stderr)
     if problems:
         print(
-            "gensig: this task's share is incomplete; the same command tries again", file=sys.stderr
+            "gensig: this task's share is incomplete; the same command tries again",
+            file=sys.stderr,
         )
         return 1
     _say_failed(out, n_failed, n_records)
@@ -134,7 +145,11 @@ def _asked(
     if not words:
         return None
     keys = {_key(word) for word in words}
-    begun = [word for word in _recorded_words(out) if not _is_free(word) and _key(word) not in keys]
+    begun = [
+        word
+        for word in _recorded_words(out)
+        if not _is_free(word) and _key(word) not in keys
+    ]
     try:
         return read_request([*begun, *words], config_dir=config_dir).config
     except ConfigError as error:
@@ -184,7 +199,9 @@ def resume(arguments: Namespace) -> int:
     n_left = len(manifest.shards) - manifest.n_done
     with _progress(arguments, executor, manifest.n_records, n_left) as progress:
         outcome = run_folder(out, executor=executor, on_shard=progress, asked=asked)
-    return _closing_line(out, outcome, manifest.n_records, time.monotonic() - begin, arguments)
+    return _closing_line(
+        out, outcome, manifest.n_records, time.monotonic() - begin, arguments
+    )
 
 
 def finalize(arguments: Namespace) -> int:
@@ -212,7 +229,11 @@ def finalize(arguments: Namespace) -> int:
 
 
 def _closing_line(
-    out: Path, outcome: tuple[int, list[str]], n_records: int, seconds: float, arguments: Namespace
+    out: Path,
+    outcome: tuple[int, list[str]],
+    n_records: int,
+    seconds: float,
+    arguments: Namespace,
 ) -> int:
     n_failed, problems = outcome
     for problem in problems:
@@ -225,7 +246,9 @@ def _closing_line(
         return 1
     _say_failed(out, n_failed, n_records)
     if not arguments.quiet:
-        print(f"{out}: {n_records} records in {seconds:.1f} s; gensig inspect {out} describes them")
+        print(
+            f"{out}: {n_records} records in {seconds:.1f} s; gensig inspect {out} describes them"
+        )
     return 1 if n_failed else 0
 
 
@@ -284,7 +307,9 @@ def reproduce(arguments: Namespace) -> int:
         raise ConfigError(f"--records {arguments.records} must be at least 1")
     found = reproduce_records(Path(arguments.folder), arguments.records)
     for name, (recorded, present) in found.other.items():
-        print(f"made with {name} {recorded or 'unknown'}, here is {present or 'unknown'}")
+        print(
+            f"made with {name} {recorded or 'unknown'}, here is {present or 'unknown'}"
+        )
     again = (
         f"; {found.n_failed} failed again for the same reason and hold no signal"
         if found.n_failed
@@ -292,8 +317,12 @@ def reproduce(arguments: Namespace) -> int:
     )
     print(f"{found.n_equal} of {found.n_records} records have the same bits{again}")
     if found.worst:
-        print(f"largest difference {found.largest:.2g} of the record's RMS, in {found.worst}")
-        accepted = f"{ACCEPTED:g} is accepted" if found.other else "here every bit must agree"
+        print(
+            f"largest difference {found.largest:.2g} of the record's RMS, in {found.worst}"
+        )
+        accepted = (
+            f"{ACCEPTED:g} is accepted" if found.other else "here every bit must agree"
+        )
         print(f"{found.n_refused} record(s) NOT reproduced; {accepted}")
     return 1 if found.n_refused else 0
 

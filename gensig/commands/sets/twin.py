@@ -45,7 +45,9 @@ def twin(arguments: Namespace) -> int:
     duration = held_out_duration(held_out, fitted_part)
     words = [f"experiment={name}", f"operating.duration_s={duration!r}"]
     _tell("simulating healthy records of the twin")
-    found = check(read_request(words, config_dir=out).config, held_out, motion, fitted_part, teeth)
+    found = check(
+        read_request(words, config_dir=out).config, held_out, motion, fitted_part, teeth
+    )
     assumed = {f"gear.{key}": text for key, text in remarks.items() if text != "fitted"}
     typed = [
         arguments.recording,
@@ -54,7 +56,9 @@ def twin(arguments: Namespace) -> int:
         "--speed",
         f"{arguments.speed:g}",
     ]
-    text = report_text(name, fitted, found, assumed, held_out_name, teeth.driving, typed)
+    text = report_text(
+        name, fitted, found, assumed, held_out_name, teeth.driving, typed
+    )
     (out / "report.md").write_text(text, encoding="utf-8")
     from gensig.commands.figures.twin_figure import plot_twin
 
@@ -87,7 +91,9 @@ def _read(file: str, arguments: Namespace) -> Recording:
     )
 
 
-def _split(recording: Recording, arguments: Namespace) -> tuple[Recording, Recording, str]:
+def _split(
+    recording: Recording, arguments: Namespace
+) -> tuple[Recording, Recording, str]:
     """What is fitted to, what is held out, and how to name that."""
     if arguments.check is None:
         return (
@@ -120,7 +126,9 @@ def _gear(arguments: Namespace, name: str) -> tuple[dict[str, Any], dict[str, st
     ):
         if value is not None and not (value > 0.0 and math.isfinite(value)):
             raise ConfigError(f"{key} {value:g} must be positive")
-    if wrong := [word for word in arguments.overrides if not word.startswith(GEAR_WORD)]:
+    if wrong := [
+        word for word in arguments.overrides if not word.startswith(GEAR_WORD)
+    ]:
         raise ConfigError(
             f"{wrong[0]}: twin takes overrides of the gears only, such as gear.pinion.face_width_mm=15"
         )
@@ -144,7 +152,9 @@ def _gear(arguments: Namespace, name: str) -> tuple[dict[str, Any], dict[str, st
     return gear, _remarks(gear, typed, arguments.module is not None)
 
 
-def _remarks(gear: dict[str, Any], typed: set[str], knows_module: bool) -> dict[str, str]:
+def _remarks(
+    gear: dict[str, Any], typed: set[str], knows_module: bool
+) -> dict[str, str]:
     remarks = {
         key: "assumed, the default's"
         for key in gear
@@ -162,9 +172,13 @@ def _remarks(gear: dict[str, Any], typed: set[str], knows_module: bool) -> dict[
         }
         for part in ("support", "bearing", "shaft"):
             remarks |= {
-                f"{side}.{part}.{key}": "assumed, the default's" for key in gear[side][part]
+                f"{side}.{part}.{key}": "assumed, the default's"
+                for key in gear[side][part]
             }
-    return {key: "given" if f"gear.{key}" in typed else text for key, text in remarks.items()}
+    return {
+        key: "given" if f"gear.{key}" in typed else text
+        for key, text in remarks.items()
+    }
 
 
 def _torque(arguments: Namespace, gear: dict[str, Any]) -> tuple[float, str]:
@@ -175,11 +189,16 @@ def _torque(arguments: Namespace, gear: dict[str, Any]) -> tuple[float, str]:
 
     def size(one: dict[str, Any]) -> float:
         return float(
-            one["pinion"]["n_teeth"] * one["normal_module_mm"] ** 2 * one["pinion"]["face_width_mm"]
+            one["pinion"]["n_teeth"]
+            * one["normal_module_mm"] ** 2
+            * one["pinion"]["face_width_mm"]
         )
 
     torque = round(default["rated_torque_nm"] * size(gear) / size(default), 3)
-    return torque, "assumed: tooth load over module and face width as the default machine has it"
+    return (
+        torque,
+        "assumed: tooth load over module and face width as the default machine has it",
+    )
 
 
 def _config(gear: dict[str, Any], torque: float, speed: float) -> Configuration:

@@ -115,7 +115,10 @@ def _gallery(pictures: Mapping[str, str]) -> str:
         return ""
     shown = [f"![{escape(name)}]({path})" for name, path in pictures.items()]
     return "\n\n".join(
-        ["The record of median severity of each class, noise included, on the same axes:", *shown]
+        [
+            "The record of median severity of each class, noise included, on the same axes:",
+            *shown,
+        ]
     )
 
 
@@ -132,7 +135,10 @@ def front_matter(data: Dataset) -> str:
         "tags": [*TAGS, f"gensig-{plain(data.manifest.generator_version)}"],
         "size_categories": [size],
         "configs": [
-            {"config_name": "default", "data_files": [{"split": "train", "path": f"{SHARDS}/*.h5"}]}
+            {
+                "config_name": "default",
+                "data_files": [{"split": "train", "path": f"{SHARDS}/*.h5"}],
+            }
         ],
     }
     return f"---\n{yaml.safe_dump(content, sort_keys=False, allow_unicode=True)}---"
@@ -157,11 +163,15 @@ def _table(header: tuple[str, ...], rows: list[tuple[object, ...]]) -> str:
 def _facts(data: Dataset) -> list[tuple[object, ...]]:
     units = data.attributes.get("channel_units", ["m/s^2"] * len(data.channel_names))
     channels = ", ".join(
-        f"{name} ({unit})" for name, unit in zip(data.channel_names, units, strict=False)
+        f"{name} ({unit})"
+        for name, unit in zip(data.channel_names, units, strict=False)
     )
     n_failed = int(np.count_nonzero(~data.usable))
     rows: list[tuple[object, ...]] = [
-        ("records", f"{data.n_records}" + (f", of which {n_failed} failed" if n_failed else "")),
+        (
+            "records",
+            f"{data.n_records}" + (f", of which {n_failed} failed" if n_failed else ""),
+        ),
         (
             "duration of a record",
             f"{data.n_samples / data.sampling_rate:g} s ({data.n_samples} samples)",
@@ -169,7 +179,11 @@ def _facts(data: Dataset) -> list[tuple[object, ...]]:
         ("sampling rate", f"{data.sampling_rate:g} Hz"),
         ("channels", channels),
     ]
-    rows += [(name, rounded(data.attributes[name])) for name in GEOMETRY if name in data.attributes]
+    rows += [
+        (name, rounded(data.attributes[name]))
+        for name in GEOMETRY
+        if name in data.attributes
+    ]
     rows += [
         (name, len(np.unique(data.column(column))))
         for name, column in (
@@ -195,7 +209,8 @@ def _facts(data: Dataset) -> list[tuple[object, ...]]:
         rows.append(
             (
                 "compression",
-                data.compression + " (read with hdf5plugin)" * (data.compression == "blosc2"),
+                data.compression
+                + " (read with hdf5plugin)" * (data.compression == "blosc2"),
             )
         )
     rows += [("seed", data.manifest.seed), ("identity", data.manifest.identity)]

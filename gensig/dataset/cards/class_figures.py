@@ -19,10 +19,14 @@ from gensig.dataset.storage.atomic import cannot_write, write_bytes
 from gensig.signals.spectrum import amplitude_spectrum
 
 BLUE, ORANGE = "#0072B2", "#D55E00"
-FIRST_CHOICE = "pinion_y"  # along the line of centers, next to the faulted gear of most sets
+FIRST_CHOICE = (
+    "pinion_y"  # along the line of centers, next to the faulted gear of most sets
+)
 TURNS = 2.0
 DECADES = 4.0  # of the spectrum's amplitude axis
-N_BINS = 500  # the largest line of each is drawn: more than there are pixels helps nobody
+N_BINS = (
+    500  # the largest line of each is drawn: more than there are pixels helps nobody
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,13 +61,18 @@ def write_class_figures(data: Dataset) -> dict[str, str]:
         import matplotlib
     except ImportError:
         return {}
-    channel = FIRST_CHOICE if FIRST_CHOICE in data.channel_names else data.channel_names[0]
+    channel = (
+        FIRST_CHOICE if FIRST_CHOICE in data.channel_names else data.channel_names[0]
+    )
     units = data.attributes.get("channel_units", [])
     unit = (
-        dict(zip(data.channel_names, units, strict=False)).get(channel, "m/s^2").replace("^2", "²")
+        dict(zip(data.channel_names, units, strict=False))
+        .get(channel, "m/s^2")
+        .replace("^2", "²")
     )
     examples = {
-        name: _example(data, index, channel) for name, index in example_records(data).items()
+        name: _example(data, index, channel)
+        for name, index in example_records(data).items()
     }
     if not examples:
         return {}
@@ -89,12 +98,18 @@ def write_class_figures(data: Dataset) -> dict[str, str]:
 
 def example_records(data: Dataset) -> dict[str, int]:
     """Number of one record a class, by class name: the usable one of median severity."""
-    label, severity, usable = data.column("label_name"), data.column("severity"), data.usable
+    label, severity, usable = (
+        data.column("label_name"),
+        data.column("severity"),
+        data.usable,
+    )
     chosen = {}
     for name in data.class_names:
         mine = np.flatnonzero((label == name) & usable)
         if mine.size:
-            chosen[name] = int(mine[np.argsort(severity[mine], kind="stable")[mine.size // 2]])
+            chosen[name] = int(
+                mine[np.argsort(severity[mine], kind="stable")[mine.size // 2]]
+            )
     return chosen
 
 
@@ -162,10 +177,15 @@ def _spectrum(axes: Any, example: ClassExample, ordinate: str, limit: float) -> 
     top = float(example.frequency[-1])
     if np.isfinite(example.mesh_frequency) and example.mesh_frequency > 0.0:
         harmonics = (
-            np.arange(1, min(60, int(top / example.mesh_frequency)) + 1) * example.mesh_frequency
+            np.arange(1, min(60, int(top / example.mesh_frequency)) + 1)
+            * example.mesh_frequency
         )
         axes.plot(
-            harmonics, np.full(len(harmonics), limit / 1.5), "v", color=ORANGE, markersize=2.5
+            harmonics,
+            np.full(len(harmonics), limit / 1.5),
+            "v",
+            color=ORANGE,
+            markersize=2.5,
         )
     axes.set(
         xlim=(0.0, top),

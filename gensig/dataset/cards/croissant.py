@@ -79,7 +79,8 @@ def croissant_text(data: Dataset, caveats: str) -> str:
         "keywords": ["vibration", "gear", "fault diagnosis", "synthetic"],
         "isLiveDataset": False,
         "citeAs": f"{name}: simulated gear vibration, gensig {manifest.generator_version}, {manifest.identity[:16]}",
-        "datePublished": str(manifest.environment.get("created", ""))[:10] or "1970-01-01",
+        "datePublished": str(manifest.environment.get("created", ""))[:10]
+        or "1970-01-01",
         **_responsible_ai(data, facts, caveats),
         "distribution": _distribution(data),
         "recordSet": [_plan_records(data.plan)],
@@ -91,10 +92,14 @@ def _responsible_ai(data: Dataset, facts: str, caveats: str) -> dict[str, Any]:
     """The fields that say how the data came to be and what they are not good for."""
     names, counts = np.unique(data.column("label_name"), return_counts=True)
     classes = ", ".join(
-        f"{name} {count}" for name, count in zip(names.tolist(), counts.tolist(), strict=True)
+        f"{name} {count}"
+        for name, count in zip(names.tolist(), counts.tolist(), strict=True)
     )
     failed = int(np.count_nonzero(~data.usable))
-    limits = [line.removeprefix("- ") for line in caveats.replace("\n  ", " ").strip().splitlines()]
+    limits = [
+        line.removeprefix("- ")
+        for line in caveats.replace("\n  ", " ").strip().splitlines()
+    ]
     return {
         "rai:dataCollection": "Simulated from physics; nothing was measured. config.yaml and plan.csv hold every "
         f"parameter; gensig makes the same bytes from them again (seed {data.manifest.seed}).",
@@ -160,7 +165,8 @@ def _plan_records(plan: Plan) -> dict[str, Any]:
                 "@type": "cr:Field",
                 "@id": f"records/{name.replace('/', '.')}",
                 "name": f"records/{name.replace('/', '.')}",
-                "description": (column.description if column else _meaning(name)) + unit,
+                "description": (column.description if column else _meaning(name))
+                + unit,
                 "dataType": _TYPES[values.dtype.kind],
                 "source": {"fileObject": {"@id": PLAN}, "extract": {"column": name}},
             }

@@ -23,7 +23,12 @@ from gensig.dataset.exports.export_tables import (
 )
 from gensig.dataset.reader import Dataset, open_dataset
 from gensig.dataset.schema import COLUMNS, SIGNALS
-from gensig.dataset.storage.atomic import publish, sync_file, sync_folder, temporary_name
+from gensig.dataset.storage.atomic import (
+    publish,
+    sync_file,
+    sync_folder,
+    temporary_name,
+)
 from gensig.dataset.storage.attributes import HDF5_ERRORS, set_attribute
 from gensig.dataset.storage.guard import first_line
 from gensig.dataset.storage.image import LIBRARY_VERSIONS
@@ -95,9 +100,13 @@ def export(
         }
 
 
-def _check_request(folder: Path, to: str, out: Path, *, samples: bool, one_channel: bool) -> None:
+def _check_request(
+    folder: Path, to: str, out: Path, *, samples: bool, one_channel: bool
+) -> None:
     if to not in FORMATS:
-        raise DatasetError(f"format {to!r} is unknown; allowed are {', '.join(FORMATS)}")
+        raise DatasetError(
+            f"format {to!r} is unknown; allowed are {', '.join(FORMATS)}"
+        )
     if (samples and to != "parquet") or (one_channel and to != "wav"):
         raise DatasetError(
             f"'samples' belongs to parquet and 'one_channel' to wav; the format asked for is {to}"
@@ -127,7 +136,9 @@ def _check_ids(data: Dataset) -> None:
 
 def _check_space(data: Dataset, out: Path) -> None:
     """Refuse before writing what cannot fit: HDF5 crashes the process on a full disk."""
-    n_bytes = data.n_records * sum(signal_row(data, 0, name).nbytes for name in data.signal_names)
+    n_bytes = data.n_records * sum(
+        signal_row(data, 0, name).nbytes for name in data.signal_names
+    )
     free = shutil.disk_usage(out.parent).free
     if n_bytes > free:
         raise DatasetError(
@@ -161,9 +172,12 @@ def _write_hdf5(data: Dataset, path: Path) -> None:
             sample = data.shard_column(0, name)
             dtype = sample.dtype
             if dtype.kind == "U":
-                plain = all(text.isascii() for text in np.unique(data.column(name)).tolist())
+                plain = all(
+                    text.isascii() for text in np.unique(data.column(name)).tolist()
+                )
                 dtype = h5py.string_dtype(
-                    "ascii" if plain else "utf-8", column.n_bytes if column else TEXT_BYTES
+                    "ascii" if plain else "utf-8",
+                    column.n_bytes if column else TEXT_BYTES,
                 )
             item = file.create_dataset(name, (data.n_records, *sample.shape[1:]), dtype)
             set_attribute(item, "unit", unit_of(data, name))
@@ -175,7 +189,9 @@ def _write_hdf5(data: Dataset, path: Path) -> None:
                 item[start : start + entry.rows] = values
         for name in data.signal_names:
             shape, dtype = signal_layout(data, name)
-            item = file.create_dataset(name, (data.n_records, *shape), dtype, chunks=(1, *shape))
+            item = file.create_dataset(
+                name, (data.n_records, *shape), dtype, chunks=(1, *shape)
+            )
             set_attribute(item, "unit", unit_of(data, name))
             for index in range(data.n_records):
                 item[index] = signal_row(data, index, name)
@@ -191,7 +207,9 @@ def _write_wav(data: Dataset, folder: Path, *, one_channel: bool) -> None:
             f"sampling rate {data.sampling_rate} Hz: a wav file holds whole hertz only; use another format"
         )
     folder.mkdir()
-    names = [name for name in column_names(data) if data.shard_column(0, name).ndim == 1]
+    names = [
+        name for name in column_names(data) if data.shard_column(0, name).ndim == 1
+    ]
     with (folder / "labels.csv").open("w", encoding="utf-8", newline="") as stream:
         table = csv.writer(stream, lineterminator="\n")
         table.writerow(["file", *(["channel"] if one_channel else []), *names])
@@ -207,7 +225,9 @@ def _write_wav(data: Dataset, folder: Path, *, one_channel: bool) -> None:
                 ):
                     wavfile.write(folder / name, rate, np.ascontiguousarray(block.T))
                     table.writerow([name, *channel, *values])
-    (folder / "attributes.json").write_text(attributes_json(data.attributes), encoding="utf-8")
+    (folder / "attributes.json").write_text(
+        attributes_json(data.attributes), encoding="utf-8"
+    )
 
 
 def _wav_files(

@@ -73,7 +73,11 @@ def _write_npy(
     parts: Iterable[np.ndarray],
 ) -> None:
     """One array of an npz file, part by part, in row order."""
-    header = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
+    header = {
+        "descr": np.lib.format.dtype_to_descr(dtype),
+        "fortran_order": False,
+        "shape": shape,
+    }
     with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as stream:
         np.lib.format.write_array_header_2_0(stream, header)
         for part in parts:
@@ -104,22 +108,29 @@ def write_parquet(data: Dataset, path: Path, *, samples: bool) -> None:
     def batch(shard: int, start: int, stop: int) -> pyarrow.RecordBatch:
         first = data.first_record(shard)
         arrays = {
-            name: nested(data.shard_column(shard, name)[start:stop]) for name in column_names(data)
+            name: nested(data.shard_column(shard, name)[start:stop])
+            for name in column_names(data)
         }
         for name in data.signal_names if samples else []:
             rows = [signal_row(data, first + row, name) for row in range(start, stop)]
             arrays[name] = nested(np.stack(rows))
         fields = [
             pyarrow.field(
-                name, array.type, metadata={"unit": unit} if (unit := unit_of(data, name)) else None
+                name,
+                array.type,
+                metadata={"unit": unit} if (unit := unit_of(data, name)) else None,
             )
             for name, array in arrays.items()
         ]
-        return pyarrow.RecordBatch.from_arrays(list(arrays.values()), schema=pyarrow.schema(fields))
+        return pyarrow.RecordBatch.from_arrays(
+            list(arrays.values()), schema=pyarrow.schema(fields)
+        )
 
     n_bytes = sum(signal_row(data, 0, name).nbytes for name in data.signal_names)
     step = max(1, ROW_GROUP_BYTES // n_bytes) if samples else ROWS_LIMIT
-    schema = batch(0, 0, 1).schema.with_metadata({"gensig": attributes_json(data.attributes)})
+    schema = batch(0, 0, 1).schema.with_metadata(
+        {"gensig": attributes_json(data.attributes)}
+    )
     # Samples hardly repeat: looking for repetitions takes memory and time for nothing.
     texts = [field.name for field in schema if pyarrow.types.is_string(field.type)]
     with parquet.ParquetWriter(path, schema, use_dictionary=texts) as writer:

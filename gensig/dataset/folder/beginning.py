@@ -28,7 +28,12 @@ from gensig.dataset.folder.layout import (
 from gensig.dataset.folder.manifest import deciding, identity_hash, stored_config
 from gensig.dataset.plan import Plan, plan_text
 from gensig.dataset.splitting.protocols import make_splits
-from gensig.dataset.storage.atomic import TEMPORARY_SUFFIX, cannot_write, locked, write_text
+from gensig.dataset.storage.atomic import (
+    TEMPORARY_SUFFIX,
+    cannot_write,
+    locked,
+    write_text,
+)
 from gensig.errors import DatasetError
 
 
@@ -68,8 +73,12 @@ def create_folder(
             f"identity {identity[:12]} does not belong to this configuration; use identity_hash(config, ...)"
         )
     texts = {
-        CONFIG: yaml.safe_dump(stored_config(config), sort_keys=False, allow_unicode=True),
-        OVERRIDES: yaml.safe_dump([str(item) for item in overrides], allow_unicode=True),
+        CONFIG: yaml.safe_dump(
+            stored_config(config), sort_keys=False, allow_unicode=True
+        ),
+        OVERRIDES: yaml.safe_dump(
+            [str(item) for item in overrides], allow_unicode=True
+        ),
         PLAN: plan_text(plan),
         **{
             f"{SPLITS}/{name}.csv": table.to_csv()
@@ -82,9 +91,13 @@ def create_folder(
         seed=seed,
         n_records=plan.n_records,
         shards=tuple(
-            ShardEntry(name=shard_name(i), rows=rows) for i, rows in enumerate(plan.shard_sizes())
+            ShardEntry(name=shard_name(i), rows=rows)
+            for i, rows in enumerate(plan.shard_sizes())
         ),
-        files={name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()},
+        files={
+            name: hashlib.sha256(text.encode()).hexdigest()
+            for name, text in texts.items()
+        },
         configuration=deciding(config),
         environment=environment(),
     )
@@ -92,7 +105,8 @@ def create_folder(
     try:
         refuse_used(out)
         _make_folders(
-            [folder for folder in (*reversed(out.parents), out) if not folder.exists()], made
+            [folder for folder in (*reversed(out.parents), out) if not folder.exists()],
+            made,
         )
         with locked(out):
             refuse_used(out)  # another process may have been faster
@@ -162,20 +176,27 @@ def _is_killed_beginning(out: Path) -> bool:
         and names <= {BEGINNING, CONFIG, OVERRIDES, PLAN, SHARDS, SPLITS}
         and all(part.is_dir() and not part.is_symlink() for part in parts)
         and all(
-            path.parent.name == SPLITS and (path.suffix == ".csv" or _is_temporary(path))
+            path.parent.name == SPLITS
+            and (path.suffix == ".csv" or _is_temporary(path))
             for path in inside
         )
     )
 
 
 def _is_temporary(path: Path) -> bool:
-    return path.name.startswith(".") and path.name.endswith(TEMPORARY_SUFFIX) and path.is_file()
+    return (
+        path.name.startswith(".")
+        and path.name.endswith(TEMPORARY_SUFFIX)
+        and path.is_file()
+    )
 
 
 def _clear(out: Path) -> None:
     """Remove what a killed beginning left, its note last."""
     paths = sorted(
-        out.rglob("*"), key=lambda path: (path.name != BEGINNING, len(path.parts)), reverse=True
+        out.rglob("*"),
+        key=lambda path: (path.name != BEGINNING, len(path.parts)),
+        reverse=True,
     )
     for path in paths:
         path.rmdir() if path.is_dir() and not path.is_symlink() else path.unlink()

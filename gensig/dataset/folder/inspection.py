@@ -27,12 +27,17 @@ def inspect(path: Path) -> str:
     if path.is_dir():
         return _folder(path)
     if not path.exists():
-        raise DatasetError(f"{path} does not exist; give a data-set folder or an HDF5 file")
+        raise DatasetError(
+            f"{path} does not exist; give a data-set folder or an HDF5 file"
+        )
     with open_file(path) as file:
         try:
             return (
                 "\n".join(
-                    [f"{_show(path)}: HDF5 file, {path.stat().st_size} bytes", *_objects(file)]
+                    [
+                        f"{_show(path)}: HDF5 file, {path.stat().st_size} bytes",
+                        *_objects(file),
+                    ]
                 )
                 + "\n"
             )
@@ -81,9 +86,13 @@ def _manifest_lines(folder: Path, manifest: Manifest) -> list[str]:
 def _dataset_lines(data: Dataset) -> list[str]:
     usable = data.usable
     duration = data.n_samples / data.sampling_rate
-    units = " and ".join(map(_show, dict.fromkeys(data.attributes.get("channel_units", ["m/s^2"]))))
+    units = " and ".join(
+        map(_show, dict.fromkeys(data.attributes.get("channel_units", ["m/s^2"])))
+    )
     of_what = (
-        f", of the {_show(data.attributes['torque_of'])}" if "torque_of" in data.attributes else ""
+        f", of the {_show(data.attributes['torque_of'])}"
+        if "torque_of" in data.attributes
+        else ""
     )
     lines = [
         f"  signal       acceleration ({len(data.channel_names)}, {data.n_samples}) float32, {units}, "

@@ -45,7 +45,10 @@ def joined_folder(
         )
     if identity_hash(config, __version__) != manifest.identity:
         begun = manifest.configuration
-        told = begun and identity_hash(begun, manifest.generator_version) == manifest.identity
+        told = (
+            begun
+            and identity_hash(begun, manifest.generator_version) == manifest.identity
+        )
         where = f" in {_listed(differing_keys(begun, config))}" if told else ""
         raise DatasetError(
             f"{out / CONFIG} was changed{where} since the folder was begun; undo that, or start a new folder"
@@ -59,7 +62,9 @@ def joined_folder(
         raise DatasetError(
             f"{out / PLAN} was changed since the folder was begun; restore it, or start a new folder"
         )
-    creation_options(config["dataset"]["compression"])  # refuses one whose package is missing
+    creation_options(
+        config["dataset"]["compression"]
+    )  # refuses one whose package is missing
     return manifest, config
 
 

@@ -31,7 +31,9 @@ CONFIG_BYTES_LIMIT = 1024**2
 CONFIG_DEPTH_LIMIT = 50
 
 _HASH = re.compile(r"[0-9a-f]{64}")
-_FILE = re.compile(r"config\.yaml|overrides\.yaml|plan\.csv|index\.h5|splits/[a-z0-9_]+\.csv")
+_FILE = re.compile(
+    r"config\.yaml|overrides\.yaml|plan\.csv|index\.h5|splits/[a-z0-9_]+\.csv"
+)
 
 
 def shard_name(index: int) -> str:
@@ -113,7 +115,10 @@ class Manifest:
 
 def manifest_text(manifest: Manifest) -> str:
     """What `manifest.json` holds."""
-    return json.dumps(asdict(manifest), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    return (
+        json.dumps(asdict(manifest), indent=1, ensure_ascii=False, allow_nan=False)
+        + "\n"
+    )
 
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:
@@ -148,7 +153,8 @@ def read_manifest(folder: Path) -> Manifest:
                 f"format version {version}; this gensig reads {SCHEMA_VERSION}, install a matching one"
             )
         shards = tuple(
-            shard_entry(i, entry) for i, entry in enumerate(_get(content, "shards", list))
+            shard_entry(i, entry)
+            for i, entry in enumerate(_get(content, "shards", list))
         )
         manifest = Manifest(
             schema_version=version,
@@ -156,10 +162,13 @@ def read_manifest(folder: Path) -> Manifest:
             identity=_hash(_get(content, "identity", str), "identity"),
             seed=_get(content, "seed", int),
             n_records=_get(content, "n_records", int),
-            state=_one_of(_get(content, "state", str), ("incomplete", "complete"), "state"),
+            state=_one_of(
+                _get(content, "state", str), ("incomplete", "complete"), "state"
+            ),
             shards=shards,
             files={
-                name: _hash(value, name) for name, value in _get(content, "files", dict).items()
+                name: _hash(value, name)
+                for name, value in _get(content, "files", dict).items()
             },
             configuration=_get(content, "configuration", dict)
             if "configuration" in content
@@ -206,13 +215,17 @@ def _get(content: Any, key: str, kind: type) -> Any:
 
 def _hash(value: Any, name: str) -> str:
     if not isinstance(value, str) or not _HASH.fullmatch(value):
-        raise DatasetError(f"{name!r}: {str(value)[:80]!r} is no sha256; the manifest is damaged")
+        raise DatasetError(
+            f"{name!r}: {str(value)[:80]!r} is no sha256; the manifest is damaged"
+        )
     return value
 
 
 def _one_of(value: str, allowed: tuple[str, ...], name: str) -> str:
     if value not in allowed:
-        raise DatasetError(f"{name} is {value[:40]!r}; allowed are {', '.join(allowed)}")
+        raise DatasetError(
+            f"{name} is {value[:40]!r}; allowed are {', '.join(allowed)}"
+        )
     return value
 
 
@@ -225,7 +238,9 @@ def shard_entry(index: int, content: Any) -> ShardEntry:
         raise DatasetError(
             f"shard {index} is named {name[:80]!r}; the only name allowed is {shard_name(index)!r}"
         )
-    state = _one_of(_get(content, "state", str), ("planned", "done", "failed"), f"state of {name}")
+    state = _one_of(
+        _get(content, "state", str), ("planned", "done", "failed"), f"state of {name}"
+    )
     digest = _get(content, "sha256", str)
     entry = ShardEntry(
         name=name,
@@ -266,7 +281,9 @@ def _refuse_yaml_bombs(text: str, path: Path) -> None:
     depth = 0
     for event in yaml.parse(text, Loader=yaml.SafeLoader):
         if isinstance(event, yaml.AliasEvent):
-            raise DatasetError(f"{path} uses YAML aliases; a gensig configuration has none")
+            raise DatasetError(
+                f"{path} uses YAML aliases; a gensig configuration has none"
+            )
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(
             event, yaml.CollectionEndEvent
         )

@@ -67,13 +67,19 @@ def identity_hash(config: ConfigContent, generator_version: str) -> str:
         "generator_version": generator_version,
         "schema_version": SCHEMA_VERSION,
     }
-    canonical = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+    canonical = json.dumps(
+        content, sort_keys=True, separators=(",", ":"), ensure_ascii=True
+    )
     return hashlib.sha256(canonical.encode()).hexdigest()
 
 
 def deciding(config: ConfigContent) -> dict[str, Any]:
     """The part of a configuration that decides bits, as plain data of its own."""
-    return {key: value for key, value in stored_config(config).items() if key not in NOT_IDENTITY}
+    return {
+        key: value
+        for key, value in stored_config(config).items()
+        if key not in NOT_IDENTITY
+    }
 
 
 def stored_config(config: dict[str, Any]) -> dict[str, Any]:
@@ -113,12 +119,16 @@ def _leaves(content: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return leaves
 
 
-def record_shard(out: Path, shard_index: int, sha256: str, bytes: int, n_failed: int) -> None:
+def record_shard(
+    out: Path, shard_index: int, sha256: str, bytes: int, n_failed: int
+) -> None:
     """Enter a finished shard, already under its final name, in the manifest.
 
     Local processes may do so at once.
     """
-    _record(out, {shard_index: {"sha256": sha256, "bytes": bytes, "n_failed": n_failed}})
+    _record(
+        out, {shard_index: {"sha256": sha256, "bytes": bytes, "n_failed": n_failed}}
+    )
 
 
 def record_shards(out: Path, entries: Mapping[int, ShardEntry]) -> None:
@@ -146,7 +156,9 @@ def record_failed_shard(out: Path, shard_index: int) -> None:
 
     The data set cannot be closed until it is.
     """
-    _update(out, {shard_index: {"state": "failed", "sha256": "", "bytes": 0, "n_failed": 0}})
+    _update(
+        out, {shard_index: {"state": "failed", "sha256": "", "bytes": 0, "n_failed": 0}}
+    )
 
 
 def _update(out: Path, changes: Mapping[int, Mapping[str, Any]]) -> None:
@@ -205,7 +217,9 @@ def finalize(out: Path, *, figures: bool = True) -> None:
             environment={**manifest.environment, "finished": now()},
         )
         write_card(out, figures=figures)
-        write_checksums(out, closed, hashlib.sha256(manifest_text(closed).encode()).hexdigest())
+        write_checksums(
+            out, closed, hashlib.sha256(manifest_text(closed).encode()).hexdigest()
+        )
         write_manifest(out, closed)
 
 

@@ -72,14 +72,18 @@ def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
     except DatasetError as error:
         if not (folder / MANIFEST).is_file():
             raise
-        return VerifyResult(complete=False, problems=[str(error)], n_records=0, n_failed=0)
+        return VerifyResult(
+            complete=False, problems=[str(error)], n_records=0, n_failed=0
+        )
     problems = _state(folder, manifest) + _extra_files(folder, manifest)
     if manifest.is_complete:
         problems += [one.line for one in differences(folder, manifest, quick=quick)]
     plan = None
     if not quick:
         found, plan = _beside_shards(folder, manifest)
-        problems += found + (_splits(folder, manifest, plan) if plan is not None else [])
+        problems += found + (
+            _splits(folder, manifest, plan) if plan is not None else []
+        )
     starts = np.cumsum([0, *(entry.rows for entry in manifest.shards)])
     reference: dict | None = None
     for i, entry in enumerate(manifest.shards):
@@ -102,7 +106,9 @@ def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
         except DatasetError as error:
             problems.append(str(error))
         except HDF5_ERRORS as error:
-            problems.append(f"{entry.name} cannot be read ({first_line(error)}); it is damaged")
+            problems.append(
+                f"{entry.name} cannot be read ({first_line(error)}); it is damaged"
+            )
     return VerifyResult(
         complete=not problems,
         problems=problems,
@@ -128,7 +134,9 @@ def _state(folder: Path, manifest: Manifest) -> list[str]:
         for name in needed
         if name not in manifest.files
     ]
-    problems += [f"{name} is missing" for name in manifest.files if not (folder / name).is_file()]
+    problems += [
+        f"{name} is missing" for name in manifest.files if not (folder / name).is_file()
+    ]
     if manifest.is_complete:
         found = sorted(f"{SPLITS}/{path.name}" for path in (folder / SPLITS).glob("*"))
         problems += [
@@ -171,7 +179,10 @@ def _beside_shards(folder: Path, manifest: Manifest) -> tuple[list[str], Plan | 
                 f"{CONFIG} and the identity in the manifest do not belong together; one was altered"
             )
         begun = manifest.configuration
-        if begun and identity_hash(begun, manifest.generator_version) != manifest.identity:
+        if (
+            begun
+            and identity_hash(begun, manifest.generator_version) != manifest.identity
+        ):
             problems.append(
                 f"{MANIFEST} has a configuration and an identity that do not belong together"
             )
@@ -186,7 +197,10 @@ def _beside_shards(folder: Path, manifest: Manifest) -> tuple[list[str], Plan | 
     except DatasetError as error:
         return [*problems, str(error)], None
     if plan.shard_sizes() != [entry.rows for entry in manifest.shards]:
-        return [*problems, f"{PLAN} and the manifest have different shards; one was altered"], None
+        return [
+            *problems,
+            f"{PLAN} and the manifest have different shards; one was altered",
+        ], None
     return problems, plan
 
 
@@ -201,14 +215,18 @@ def _splits(folder: Path, manifest: Manifest, plan: Plan) -> list[str]:
         try:
             problems += [
                 f"{SPLITS}/{line}"
-                for line in split_problems(Path(name).stem, read_split(folder / name), plan)
+                for line in split_problems(
+                    Path(name).stem, read_split(folder / name), plan
+                )
             ]
         except DatasetError as error:
             problems.append(str(error))
     return problems
 
 
-def _bytes_differ(path: Path, entry: ShardEntry, manifest: Manifest, *, quick: bool) -> list[str]:
+def _bytes_differ(
+    path: Path, entry: ShardEntry, manifest: Manifest, *, quick: bool
+) -> list[str]:
     if not path.is_file():
         return [f"{entry.name} is missing"]
     size = path.stat().st_size
@@ -231,7 +249,8 @@ def _bytes_differ(path: Path, entry: ShardEntry, manifest: Manifest, *, quick: b
 def _description(file: h5py.File, path: Path) -> dict:
     """What all shards of one data set have in common."""
     shapes = {
-        name: (str(data.dtype), data.shape[1:]) for name, data in datasets(file, path).items()
+        name: (str(data.dtype), data.shape[1:])
+        for name, data in datasets(file, path).items()
     }
     return {"data sets": shapes, "attributes": read_attributes(file)}
 
@@ -252,7 +271,9 @@ def _description_differs(file: h5py.File, path: Path, reference: dict) -> list[s
     return problems
 
 
-def _rows_differ(file: h5py.File, entry: ShardEntry, plan: Plan | None, start: int) -> list[str]:
+def _rows_differ(
+    file: h5py.File, entry: ShardEntry, plan: Plan | None, start: int
+) -> list[str]:
     """Row count, rows against the plan, failed records, scales, finite signals."""
     name = entry.name
     n = file["record_id"].shape[0]

@@ -61,22 +61,29 @@ def deal_groups(plan: Plan, deal: Deal, rng: np.random.Generator) -> SplitTable 
     ]:
         return f"a class has no record that may be used for {lacking[0]}"
     n_validation, n_test = (
-        max(1, round(share * len(names))) for share in (VALIDATION_SHARE, deal.test_share)
+        max(1, round(share * len(names)))
+        for share in (VALIDATION_SHARE, deal.test_share)
     )
     if MAX_FOR_TESTS * len(names) >= MIN_TESTED:
         n_test = max(n_test, MIN_TESTED)
     in_order = np.repeat(
-        np.arange(len(SUBSETS)), [len(names) - n_validation - n_test, n_validation, n_test]
+        np.arange(len(SUBSETS)),
+        [len(names) - n_validation - n_test, n_validation, n_test],
     )
     worth = (
-        None if deal.for_test is None else np.bincount(group, weights=deal.for_test).astype(float)
+        None
+        if deal.for_test is None
+        else np.bincount(group, weights=deal.for_test).astype(float)
     )
     for attempt in range(_ATTEMPTS):
         side = rng.permutation(in_order)
         if worth is not None and attempt < _ATTEMPTS // 2:
             side = _best_tested(side, worth, rng)
         present = np.stack(
-            [holds[subset, side == subset].any(axis=0) for subset in range(len(SUBSETS))]
+            [
+                holds[subset, side == subset].any(axis=0)
+                for subset in range(len(SUBSETS))
+            ]
         )
         if (present >= needed).all():
             return _table(plan, side[group], deal.usable)
@@ -96,7 +103,9 @@ def _best_tested(
     return dealt
 
 
-def _table(plan: Plan, subset: NDArray[np.integer], usable: NDArray[np.bool_]) -> SplitTable:
+def _table(
+    plan: Plan, subset: NDArray[np.integer], usable: NDArray[np.bool_]
+) -> SplitTable:
     """Whole records in the order of the plan."""
     kept = np.flatnonzero(usable[subset, np.arange(plan.n_records)])
     return SplitTable(

@@ -19,9 +19,15 @@ from gensig.dataset.splitting.splits import SUBSETS, SplitTable
 
 N_WINDOWS = 8
 MIN_SPECIMENS = 4
-HELD_OUT = 0.25  # share of the records, or of a fault's records, whose values are held out
-CONDITION_TEST_SHARE = 0.25  # of the units: where each unit has one condition, nothing is lost
-SEVERITY_TEST_SHARE = 0.4  # of the units, because a test uses a quarter of their faults only
+HELD_OUT = (
+    0.25  # share of the records, or of a fault's records, whose values are held out
+)
+CONDITION_TEST_SHARE = (
+    0.25  # of the units: where each unit has one condition, nothing is lost
+)
+SEVERITY_TEST_SHARE = (
+    0.4  # of the units, because a test uses a quarter of their faults only
+)
 
 Mask = NDArray[np.bool_]
 Outcome = SplitTable | str
@@ -59,17 +65,25 @@ def make_splits(plan: Plan, seed: int) -> dict[str, SplitTable]:
     -------
     protocol -> SplitTable, a subset of `PROTOCOLS`
     """
-    return {name: table for name, table in _outcomes(plan, seed) if isinstance(table, SplitTable)}
+    return {
+        name: table
+        for name, table in _outcomes(plan, seed)
+        if isinstance(table, SplitTable)
+    }
 
 
-def why_left_out(plan: Plan, seed: int, names: Collection[str] | None = None) -> dict[str, str]:
+def why_left_out(
+    plan: Plan, seed: int, names: Collection[str] | None = None
+) -> dict[str, str]:
     """Protocol -> one line that says why this plan cannot have it, for those that `make_splits`
     leaves out.
 
     ``names`` are the protocols to ask about, None all of them.
     """
     return {
-        name: reason for name, reason in _outcomes(plan, seed, names) if isinstance(reason, str)
+        name: reason
+        for name, reason in _outcomes(plan, seed, names)
+        if isinstance(reason, str)
     }
 
 
@@ -82,7 +96,11 @@ def _outcomes(
             continue
         sequence = np.random.SeedSequence(seed, spawn_key=(protocol.stream,))
         rng = np.random.Generator(np.random.Philox(sequence))
-        missing = [column for column in ("label", *protocol.apart) if column not in plan.columns]
+        missing = [
+            column
+            for column in ("label", *protocol.apart)
+            if column not in plan.columns
+        ]
         if missing and protocol.apart:
             found.append((name, f"the plan has no column {missing[0]}"))
         else:
@@ -109,16 +127,22 @@ def _random_windows(plan: Plan, rng: np.random.Generator) -> SplitTable:
     )
 
 
-def _by_group(column: str, min_groups: int, plan: Plan, rng: np.random.Generator) -> Outcome:
+def _by_group(
+    column: str, min_groups: int, plan: Plan, rng: np.random.Generator
+) -> Outcome:
     """Whole groups dealt 60 / 20 / 20.
 
     Of 40 to 49, ten are tested on, see `gensig.dataset.splitting.dealing`.
     """
     usable = np.ones((len(SUBSETS), plan.n_records), dtype=bool)
-    return deal_groups(plan, Deal(column=column, usable=usable, min_groups=min_groups), rng)
+    return deal_groups(
+        plan, Deal(column=column, usable=usable, min_groups=min_groups), rng
+    )
 
 
-def _cross_range(column: str, hold: str, plan: Plan, rng: np.random.Generator) -> Outcome:
+def _cross_range(
+    column: str, hold: str, plan: Plan, rng: np.random.Generator
+) -> Outcome:
     """The highest or lowest quarter of a condition's values tested on, in units that are not
     trained on.
     """
@@ -149,7 +173,10 @@ def _unseen_severity(
     if "severity" not in plan.columns:
         return "the plan has no column severity"
     severity = np.asarray(plan.columns["severity"], dtype=float)
-    held, varies = np.zeros(plan.n_records, dtype=bool), np.zeros(plan.n_records, dtype=bool)
+    held, varies = (
+        np.zeros(plan.n_records, dtype=bool),
+        np.zeros(plan.n_records, dtype=bool),
+    )
     for label in np.unique(plan.columns["label"]):
         records = np.flatnonzero(plan.columns["label"] == label)
         held[records] = hold(severity[records])
@@ -174,7 +201,9 @@ def _healthy_only(plan: Plan, rng: np.random.Generator) -> Outcome:
         return f"the plan has no {'faulty' if healthy.all() else 'healthy'} records"
     everything = np.ones(plan.n_records, dtype=bool)
     usable = np.stack([healthy, healthy, everything])
-    return deal_groups(plan, Deal(column="unit_id", usable=usable, every_class=False), rng)
+    return deal_groups(
+        plan, Deal(column="unit_id", usable=usable, every_class=False), rng
+    )
 
 
 def _open_set(plan: Plan, rng: np.random.Generator) -> Outcome:
@@ -191,7 +220,9 @@ def _open_set(plan: Plan, rng: np.random.Generator) -> Outcome:
     known = label != rng.choice(faulty)
     everything = np.ones(plan.n_records, dtype=bool)
     usable = np.stack([known, known, everything])
-    return deal_groups(plan, Deal(column="unit_id", usable=usable, every_class=False), rng)
+    return deal_groups(
+        plan, Deal(column="unit_id", usable=usable, every_class=False), rng
+    )
 
 
 def _outer(values: NDArray[np.float64]) -> Mask:
@@ -231,7 +262,9 @@ _UNIT = ("unit_id",)
 PROTOCOLS = {
     "random_window_leaky": Protocol(stream=9001, apart=(), make=_random_windows),
     "by_unit": Protocol(
-        stream=9002, apart=_UNIT, make=functools.partial(_by_group, "unit_id", len(SUBSETS))
+        stream=9002,
+        apart=_UNIT,
+        make=functools.partial(_by_group, "unit_id", len(SUBSETS)),
     ),
     "cross_specimen": Protocol(
         stream=9003,
@@ -243,8 +276,12 @@ PROTOCOLS = {
         apart=("gearbox_id",),
         make=functools.partial(_by_group, "gearbox_id", len(SUBSETS)),
     ),
-    "cross_speed": Protocol(stream=9005, apart=_UNIT, make=_cross("speed_set_rpm", "highest")),
-    "cross_torque": Protocol(stream=9006, apart=_UNIT, make=_cross("torque_nm", "highest")),
+    "cross_speed": Protocol(
+        stream=9005, apart=_UNIT, make=_cross("speed_set_rpm", "highest")
+    ),
+    "cross_torque": Protocol(
+        stream=9006, apart=_UNIT, make=_cross("torque_nm", "highest")
+    ),
     "cross_snr": Protocol(stream=9007, apart=_UNIT, make=_cross("snr_db", "lowest")),
     "unseen_severity_inner": Protocol(
         stream=9008, apart=_UNIT, make=functools.partial(_unseen_severity, _inner)
@@ -252,6 +289,8 @@ PROTOCOLS = {
     "unseen_severity_outer": Protocol(
         stream=9009, apart=_UNIT, make=functools.partial(_unseen_severity, _outer)
     ),
-    "healthy_only": Protocol(stream=9010, apart=_UNIT, make=_healthy_only, every_class=False),
+    "healthy_only": Protocol(
+        stream=9010, apart=_UNIT, make=_healthy_only, every_class=False
+    ),
     "open_set": Protocol(stream=9011, apart=_UNIT, make=_open_set, every_class=False),
 }

@@ -19,7 +19,9 @@ def split_problems(protocol: str, table: SplitTable, plan: Plan) -> list[str]:
     """
     ids = plan.columns["record_id"]
     order = np.argsort(ids, kind="stable")
-    place = np.minimum(np.searchsorted(ids, table.record_id, sorter=order), plan.n_records - 1)
+    place = np.minimum(
+        np.searchsorted(ids, table.record_id, sorter=order), plan.n_records - 1
+    )
     record = order[place]
     unknown = table.record_id[ids[record] != table.record_id]
     if unknown.size:
@@ -33,7 +35,9 @@ def split_problems(protocol: str, table: SplitTable, plan: Plan) -> list[str]:
     sides = np.unique(table.subset, return_inverse=True)[1]
     for column in ("record_id", *known.apart):
         if column not in plan.columns:
-            problems.append(f"{protocol}: the plan has no column {column}, which it keeps apart")
+            problems.append(
+                f"{protocol}: the plan has no column {column}, which it keeps apart"
+            )
             continue
         names, group = np.unique(plan.columns[column], return_inverse=True)
         seen = np.zeros((len(names), 3), dtype=bool)
@@ -49,5 +53,9 @@ def split_problems(protocol: str, table: SplitTable, plan: Plan) -> list[str]:
 def _overlapping(record: np.ndarray, table: SplitTable) -> Sequence[int]:
     """Records of which two rows share a part."""
     order = np.lexsort((table.start_fraction, record))
-    record, start, stop = record[order], table.start_fraction[order], table.stop_fraction[order]
+    record, start, stop = (
+        record[order],
+        table.start_fraction[order],
+        table.stop_fraction[order],
+    )
     return record[1:][(record[1:] == record[:-1]) & (start[1:] < stop[:-1])].tolist()

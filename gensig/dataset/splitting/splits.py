@@ -50,7 +50,9 @@ def read_split(path: Path) -> SplitTable:
     try:
         header, *rows = csv.reader(io.StringIO(text, newline=""), strict=True)
         if tuple(header) != HEADER:
-            raise ValueError(f"header is {','.join(header)[:80]}, expected {','.join(HEADER)}")
+            raise ValueError(
+                f"header is {','.join(header)[:80]}, expected {','.join(HEADER)}"
+            )
         ids, starts, stops, subsets = zip(*rows, strict=True)
         start, stop = np.array(starts, dtype=float), np.array(stops, dtype=float)
         if not ((start >= 0) & (start < stop) & (stop <= 1)).all():
@@ -61,7 +63,12 @@ def read_split(path: Path) -> SplitTable:
                 f"subset {min(unknown)[:40]!r} is unknown; allowed are {', '.join(SUBSETS)}"
             )
     except (csv.Error, ValueError) as error:
-        raise DatasetError(f"{path} is no split table ({error}); restore it from a copy") from error
+        raise DatasetError(
+            f"{path} is no split table ({error}); restore it from a copy"
+        ) from error
     return SplitTable(
-        record_id=np.array(ids), start_fraction=start, stop_fraction=stop, subset=np.array(subsets)
+        record_id=np.array(ids),
+        start_fraction=start,
+        stop_fraction=stop,
+        subset=np.array(subsets),
     )

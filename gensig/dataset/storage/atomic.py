@@ -18,7 +18,9 @@ def temporary_name(path: Path) -> Path:
 
     Hidden, ending in `TEMPORARY_SUFFIX`.
     """
-    return path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}{TEMPORARY_SUFFIX}")
+    return path.with_name(
+        f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}{TEMPORARY_SUFFIX}"
+    )
 
 
 @contextmanager
@@ -91,7 +93,9 @@ def write_bytes(path: Path, content: bytes) -> None:
 def cannot_write(path: Path, error: Exception) -> DatasetError:
     """The one line for a disk that is full or a folder that may not be written."""
     reason = getattr(error, "strerror", None) or str(error).splitlines()[0]
-    return DatasetError(f"cannot write {path}: {reason}; free some space or choose another out=DIR")
+    return DatasetError(
+        f"cannot write {path}: {reason}; free some space or choose another out=DIR"
+    )
 
 
 def read_text(path: Path, *, limit: int) -> str:
@@ -115,7 +119,9 @@ def read_text(path: Path, *, limit: int) -> str:
             f"{path} is not UTF-8 text (byte {error.start}); it is damaged, restore it"
         ) from error
     except (OSError, ValueError) as error:
-        raise DatasetError(f"{path} cannot be read: {error}; check its permissions") from error
+        raise DatasetError(
+            f"{path} cannot be read: {error}; check its permissions"
+        ) from error
 
 
 def sha256_file(path: Path) -> str:

@@ -9,7 +9,15 @@ from gensig.errors import DatasetError
 
 ATTRIBUTE_BYTES_LIMIT = 60_000
 # What h5py raises on damaged files, seen by fuzzing.
-HDF5_ERRORS = (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError, MemoryError)
+HDF5_ERRORS = (
+    OSError,
+    RuntimeError,
+    KeyError,
+    ValueError,
+    TypeError,
+    OverflowError,
+    MemoryError,
+)
 
 Attribute = str | int | float | Sequence[str] | Sequence[int] | Sequence[float]
 
@@ -21,7 +29,11 @@ def set_attribute(target: h5py.HLObject, name: str, value: Attribute) -> None:
     """
     if isinstance(value, str):
         data: np.ndarray = _text_array([value], name).reshape(())
-    elif isinstance(value, Sequence) and value and all(isinstance(item, str) for item in value):
+    elif (
+        isinstance(value, Sequence)
+        and value
+        and all(isinstance(item, str) for item in value)
+    ):
         data = _text_array([str(item) for item in value], name)
     else:
         data = np.asarray(value)
@@ -37,7 +49,9 @@ def set_attribute(target: h5py.HLObject, name: str, value: Attribute) -> None:
             "make it a column or a file beside the shards"
         )
     dtype = (
-        h5py.string_dtype("utf-8", data.dtype.itemsize) if data.dtype.kind == "S" else data.dtype
+        h5py.string_dtype("utf-8", data.dtype.itemsize)
+        if data.dtype.kind == "S"
+        else data.dtype
     )
     target.attrs.create(name, data, shape=data.shape, dtype=dtype)
 
@@ -58,7 +72,9 @@ def read_attributes(target: h5py.HLObject) -> dict:
         if kind not in ("S", "i", "u", "f"):
             continue
         value = np.asarray(target.attrs[name])
-        found[name] = (decoded(value) if kind == "S" or value.dtype.kind == "O" else value).tolist()
+        found[name] = (
+            decoded(value) if kind == "S" or value.dtype.kind == "O" else value
+        ).tolist()
     return found
 
 

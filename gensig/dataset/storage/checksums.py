@@ -48,7 +48,8 @@ def write_checksums(folder: Path, manifest: Manifest, manifest_digest: str) -> N
     digests = {MANIFEST: manifest_digest, **_recorded(manifest)}
     digests |= {name: sha256_file(folder / name) for name in _beside(folder)}
     write_text(
-        folder / CHECKSUMS, "".join(f"{digest}  {name}\n" for name, digest in digests.items())
+        folder / CHECKSUMS,
+        "".join(f"{digest}  {name}\n" for name, digest in digests.items()),
     )
 
 
@@ -62,8 +63,12 @@ def _recorded(manifest: Manifest) -> dict[str, str]:
 
 def _beside(folder: Path) -> list[str]:
     """Files of the folder that the manifest does not list: card, figures, log."""
-    figures = sorted(f"{FIGURES}/{path.name}" for path in (folder / FIGURES).glob("*.png"))
-    return [name for name in (CARD, CROISSANT, LOG, *figures) if (folder / name).is_file()]
+    figures = sorted(
+        f"{FIGURES}/{path.name}" for path in (folder / FIGURES).glob("*.png")
+    )
+    return [
+        name for name in (CARD, CROISSANT, LOG, *figures) if (folder / name).is_file()
+    ]
 
 
 def read_checksums(folder: Path) -> dict[str, str]:
@@ -89,11 +94,15 @@ def read_checksums(folder: Path) -> dict[str, str]:
             )
         found[match[2]] = match[1]
     if not text.endswith("\n"):
-        raise DatasetError(f"{CHECKSUMS} was altered: its end is missing; restore it from a copy")
+        raise DatasetError(
+            f"{CHECKSUMS} was altered: its end is missing; restore it from a copy"
+        )
     return found
 
 
-def differences(folder: Path, manifest: Manifest, *, quick: bool = False) -> list[Difference]:
+def differences(
+    folder: Path, manifest: Manifest, *, quick: bool = False
+) -> list[Difference]:
     """Every file whose digest is not the one in `SHA256SUMS`; those that the manifest lists are
     compared with it.
 
@@ -120,12 +129,12 @@ def differences(folder: Path, manifest: Manifest, *, quick: bool = False) -> lis
         path = folder / name
         if name in recorded:
             if digest and digest != recorded[name]:
-                line = (
-                    f"{CHECKSUMS} and {MANIFEST} have different sha256 of {name}; one was altered"
-                )
+                line = f"{CHECKSUMS} and {MANIFEST} have different sha256 of {name}; one was altered"
                 found.append(Difference(name=CHECKSUMS, line=line))
         elif not path.is_file() or not path.resolve().is_relative_to(folder.resolve()):
-            found.append(Difference(name=name, line=f"{name} is missing; {CHECKSUMS} lists it"))
+            found.append(
+                Difference(name=name, line=f"{name} is missing; {CHECKSUMS} lists it")
+            )
         elif digest and (name == MANIFEST or not quick) and sha256_file(path) != digest:
             hint = (
                 f"; if you edited it, `gensig finalize {folder}` accepts it"
@@ -148,14 +157,20 @@ def accept_edits(folder: Path) -> list[str]:
     with locked(folder):
         manifest = read_manifest(folder)
         if not manifest.is_complete:
-            raise DatasetError(f"{folder} is incomplete; run `gensig resume {folder}` first")
+            raise DatasetError(
+                f"{folder} is incomplete; run `gensig resume {folder}` first"
+            )
         found = differences(folder, manifest)
         missing = not (folder / CHECKSUMS).exists()
         refused = [
-            one for one in found if one.name not in EDITABLE or not (folder / one.name).is_file()
+            one
+            for one in found
+            if one.name not in EDITABLE or not (folder / one.name).is_file()
         ]
         if refused and not missing:
-            raise DatasetError(f"{refused[0].line}; only {' and '.join(EDITABLE)} may be edited")
+            raise DatasetError(
+                f"{refused[0].line}; only {' and '.join(EDITABLE)} may be edited"
+            )
         if found:
             write_checksums(folder, manifest, sha256_file(folder / MANIFEST))
         return [one.name for one in found]

@@ -20,7 +20,11 @@ BLOSC2_FILTER = 32026
 # what is stored.
 BLOSC2_CHUNK_LIMIT = 256 * 1024**2
 
-_NAMES = {h5py.h5z.FILTER_DEFLATE: "gzip", h5py.h5z.FILTER_LZF: "lzf", BLOSC2_FILTER: "blosc2"}
+_NAMES = {
+    h5py.h5z.FILTER_DEFLATE: "gzip",
+    h5py.h5z.FILTER_LZF: "lzf",
+    BLOSC2_FILTER: "blosc2",
+}
 
 
 def creation_options(compression: str) -> dict[str, Any]:
@@ -34,7 +38,9 @@ def creation_options(compression: str) -> dict[str, Any]:
         return {}
     if compression == "blosc2":
         plugin = load_blosc2("dataset.compression=blosc2")
-        return dict(plugin.Blosc2(cname="lz4", clevel=5, filters=plugin.Blosc2.BITSHUFFLE))
+        return dict(
+            plugin.Blosc2(cname="lz4", clevel=5, filters=plugin.Blosc2.BITSHUFFLE)
+        )
     return {"compression": compression, "shuffle": True}
 
 
@@ -58,7 +64,11 @@ def fixed_settings() -> Iterator[None]:
 
     Blosc2 obeys them before its arguments, and they change the bytes.
     """
-    hidden = {name: os.environ.pop(name) for name in list(os.environ) if name.startswith("BLOSC_")}
+    hidden = {
+        name: os.environ.pop(name)
+        for name in list(os.environ)
+        if name.startswith("BLOSC_")
+    }
     try:
         yield
     finally:
@@ -73,4 +83,6 @@ def filters(data: h5py.Dataset) -> set[int]:
 
 def compression_of(data: h5py.Dataset) -> str:
     """Which of `COMPRESSIONS` a data set of a checked shard is stored with."""
-    return next((_NAMES[number] for number in filters(data) if number in _NAMES), "none")
+    return next(
+        (_NAMES[number] for number in filters(data) if number in _NAMES), "none"
+    )

@@ -40,7 +40,9 @@ _FILTERS = {
 def open_file(path: Path) -> h5py.File:
     """An HDF5 file, read-only and without locks; DatasetError when it is none."""
     if not path.is_file():
-        raise DatasetError(f"{path} is missing or no ordinary file; restore it from a copy")
+        raise DatasetError(
+            f"{path} is missing or no ordinary file; restore it from a copy"
+        )
     try:
         return h5py.File(path, "r", locking=False)
     except (OSError, RuntimeError) as error:
@@ -207,13 +209,19 @@ def _is_stored(data: h5py.Dataset, used: set[int]) -> bool:
     item, chunks = data.dtype.itemsize, data.chunks
     chunk = math.prod(chunks) * item if chunks else 0
     if BLOSC2_FILTER in used:
-        counts = (-(-length // step) for length, step in zip(data.shape, chunks, strict=True))
-        return chunk <= BLOSC2_CHUNK_LIMIT and data.id.get_num_chunks() == math.prod(counts)
+        counts = (
+            -(-length // step) for length, step in zip(data.shape, chunks, strict=True)
+        )
+        return chunk <= BLOSC2_CHUNK_LIMIT and data.id.get_num_chunks() == math.prod(
+            counts
+        )
     limit = data.id.get_storage_size() * (EXPANSION_LIMIT if used else 1)
     return max(data.size * item, chunk) <= limit
 
 
-def _check_scale(found: dict[str, h5py.Dataset], name: str, scale: str, path: Path) -> None:
+def _check_scale(
+    found: dict[str, h5py.Dataset], name: str, scale: str, path: Path
+) -> None:
     """Refuse counts without their scale, one a record and channel."""
     if name not in found or found[name].dtype.kind == "f":
         return
@@ -229,7 +237,9 @@ def _check_scale(found: dict[str, h5py.Dataset], name: str, scale: str, path: Pa
 
 def _check_attributes(file: h5py.File, path: Path) -> None:
     if len(file.attrs) > ATTRIBUTES_LIMIT:
-        raise DatasetError(f"{path} has {len(file.attrs)} attributes; it is no gensig shard")
+        raise DatasetError(
+            f"{path} has {len(file.attrs)} attributes; it is no gensig shard"
+        )
     found = read_attributes(file)
     missing = [name for name in REQUIRED_ATTRIBUTES if name not in found]
     if missing:
@@ -242,10 +252,14 @@ def _check_attributes(file: h5py.File, path: Path) -> None:
             f"{path} has format version {version}; this gensig reads {SCHEMA_VERSION}, get a matching one"
         )
     if not isinstance(rate, int | float) or not 0 < rate < float("inf"):
-        raise DatasetError(f"{path}: sampling_rate_hz is {rate}; it must be a positive number")
+        raise DatasetError(
+            f"{path}: sampling_rate_hz is {rate}; it must be a positive number"
+        )
     for name in ("channel_names", "class_names"):
         value = found[name]
-        if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+        if not isinstance(value, list) or not all(
+            isinstance(item, str) for item in value
+        ):
             raise DatasetError(f"{path}: attribute {name} must be a list of text")
     if len(found["channel_names"]) != file["acceleration"].shape[1]:
         raise DatasetError(

@@ -23,7 +23,12 @@ def memory_file() -> h5py.File:
     # No file of this name is made; HDF5 wants distinct names for files that are open together.
     name = f"gensig-memory-{next(_COUNTER)}"
     return h5py.File(
-        name, "w", driver="core", backing_store=False, block_size=GROWTH, libver=LIBRARY_VERSIONS
+        name,
+        "w",
+        driver="core",
+        backing_store=False,
+        block_size=GROWTH,
+        libver=LIBRARY_VERSIONS,
     )
 
 

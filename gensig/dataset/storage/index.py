@@ -5,8 +5,18 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from gensig.dataset.folder.layout import INDEX, SHARDS, Manifest, read_manifest, shard_path
-from gensig.dataset.storage.attributes import HDF5_ERRORS, read_attributes, set_attribute
+from gensig.dataset.folder.layout import (
+    INDEX,
+    SHARDS,
+    Manifest,
+    read_manifest,
+    shard_path,
+)
+from gensig.dataset.storage.attributes import (
+    HDF5_ERRORS,
+    read_attributes,
+    set_attribute,
+)
 from gensig.dataset.storage.guard import datasets, first_line, open_file, open_shard
 from gensig.dataset.storage.image import memory_file, publish_image
 from gensig.errors import DatasetError
@@ -20,7 +30,10 @@ def write_index(folder: Path, manifest: Manifest) -> str:
     names and shapes only, not on time or place.
     """
     path = folder / INDEX
-    with open_shard(shard_path(folder, 0), folder=folder) as first, memory_file() as index:
+    with (
+        open_shard(shard_path(folder, 0), folder=folder) as first,
+        memory_file() as index,
+    ):
         for name, value in read_attributes(first).items():
             set_attribute(index, name, value)
         for name, data in datasets(first, path).items():
@@ -40,13 +53,17 @@ def _map(index: h5py.File, name: str, data: h5py.Dataset, manifest: Manifest) ->
     properties.set_obj_track_times(False)
     kind = data.dtype.kind
     if kind in "fi":
-        properties.set_fill_value(np.array(np.nan if kind == "f" else -1, dtype=data.dtype))
+        properties.set_fill_value(
+            np.array(np.nan if kind == "f" else -1, dtype=data.dtype)
+        )
     start = 0
     for entry in manifest.shards:
         shape = (entry.rows, *row_shape)
         space.select_hyperslab((start, *(0 for _ in row_shape)), shape)
         source = h5py.h5s.create_simple(shape)
-        properties.set_virtual(space, f"{SHARDS}/{entry.name}".encode(), name.encode(), source)
+        properties.set_virtual(
+            space, f"{SHARDS}/{entry.name}".encode(), name.encode(), source
+        )
         start += entry.rows
     space.select_all()
     parent = index
@@ -94,7 +111,10 @@ def open_index(folder: Path) -> h5py.File:
 def _check_view(data: h5py.Dataset, name: str, manifest: Manifest, path: Path) -> None:
     expected = [(f"{SHARDS}/{entry.name}", name) for entry in manifest.shards]
     found = (
-        [(str(source.file_name), str(source.dset_name)) for source in data.virtual_sources()]
+        [
+            (str(source.file_name), str(source.dset_name))
+            for source in data.virtual_sources()
+        ]
         if data.is_virtual
         else []
     )

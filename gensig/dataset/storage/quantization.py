@@ -8,7 +8,9 @@ import numpy as np
 
 from gensig.dataset.schema import SCALES
 
-COUNTS = 32767  # of the largest value of a channel, so that both signs have the same range
+COUNTS = (
+    32767  # of the largest value of a channel, so that both signs have the same range
+)
 
 
 def quantized(signal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

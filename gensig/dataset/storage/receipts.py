@@ -32,7 +32,13 @@ def receipt_path(folder: Path, shard_index: int) -> Path:
 
 
 def write_receipt(
-    folder: Path, shard_index: int, *, rows: int, sha256: str, n_bytes: int, n_failed: int
+    folder: Path,
+    shard_index: int,
+    *,
+    rows: int,
+    sha256: str,
+    n_bytes: int,
+    n_failed: int,
 ) -> None:
     """Say that a shard is whole under its final name."""
     entry = ShardEntry(
@@ -55,10 +61,16 @@ def read_receipt(folder: Path, shard_index: int) -> ShardEntry | None:
     if not path.is_file():
         return None
     try:
-        entry = shard_entry(shard_index, json.loads(read_text(path, limit=RECEIPT_BYTES_LIMIT)))
+        entry = shard_entry(
+            shard_index, json.loads(read_text(path, limit=RECEIPT_BYTES_LIMIT))
+        )
     except (DatasetError, ValueError, RecursionError):
         return None  # damaged: the shard is made again
-    whole = entry.state == "done" and shard.is_file() and shard.stat().st_size == entry.bytes
+    whole = (
+        entry.state == "done"
+        and shard.is_file()
+        and shard.stat().st_size == entry.bytes
+    )
     return entry if whole else None
 
 

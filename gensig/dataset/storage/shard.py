@@ -88,10 +88,14 @@ class ShardWriter:
         self.compression = compression
         self.sample_type = sample_type
         self.scales = {
-            name: SCALES[name] for name in signals if name in SCALES and sample_type == "int16"
+            name: SCALES[name]
+            for name in signals
+            if name in SCALES and sample_type == "int16"
         }
         self.columns = {
-            name: column for name, column in COLUMNS.items() if lives or name not in LIFE_COLUMNS
+            name: column
+            for name, column in COLUMNS.items()
+            if lives or name not in LIFE_COLUMNS
         }
         for name in params:
             full_name = f"{PARAMS}/{name}"
@@ -151,7 +155,10 @@ class ShardWriter:
             self._close()
 
     def write(
-        self, row: int, signals: Mapping[str, np.ndarray], values: Mapping[str, str | int | float]
+        self,
+        row: int,
+        signals: Mapping[str, np.ndarray],
+        values: Mapping[str, str | int | float],
     ) -> None:
         """Write one record.
 
@@ -162,7 +169,9 @@ class ShardWriter:
         values : dict    every column of `COLUMNS` but those in `DEFAULTS`; `params/<name>` left out become NaN
         """
         if self._file is None:
-            raise DatasetError(f"{self.path.name}: write is allowed inside the with-block only")
+            raise DatasetError(
+                f"{self.path.name}: write is allowed inside the with-block only"
+            )
         if not 0 <= row < self.n_records or self._written[row]:
             raise DatasetError(
                 f"{self.path.name}: row {row} is out of range or written already; "
@@ -171,11 +180,14 @@ class ShardWriter:
         self._refuse_unknown(signals, self.signals)
         self._refuse_unknown(values, self.columns)
         encoded = {
-            name: _encoded(column, _value(column, values)) for name, column in self.columns.items()
+            name: _encoded(column, _value(column, values))
+            for name, column in self.columns.items()
         }
         _check_row(values)
         failed = encoded["status"] == b"failed"
-        arrays = {name: self._signal(name, signals, failed=failed) for name in self.signals}
+        arrays = {
+            name: self._signal(name, signals, failed=failed) for name in self.signals
+        }
         for name, array in arrays.items():
             if name in self.scales:
                 array, self._rows[self.scales[name]][row] = quantized(array)
@@ -188,7 +200,9 @@ class ShardWriter:
             self._rows[name][row] = value
         self._written[row] = True
 
-    def _signal(self, name: str, signals: Mapping[str, np.ndarray], *, failed: bool) -> np.ndarray:
+    def _signal(
+        self, name: str, signals: Mapping[str, np.ndarray], *, failed: bool
+    ) -> np.ndarray:
         column, shape = SIGNALS[name], self.signals[name]
         if name not in signals:
             if failed and column.storage_dtype.kind == "f":
@@ -229,14 +243,21 @@ class ShardWriter:
             dcpl=properties,
             **self._options,
         )
-        set_attribute(data, "unit", unit_in_file(column, self.attributes) if scale is None else "1")
+        set_attribute(
+            data,
+            "unit",
+            unit_in_file(column, self.attributes) if scale is None else "1",
+        )
         if scale is not None:
             set_attribute(data, "scale", scale)
 
     def _refuse_unknown(self, given: Mapping, known: Mapping) -> None:
         for name in given:
             if name not in known:
-                near = difflib.get_close_matches(name, list(known), n=3) or sorted(known)[:5]
+                near = (
+                    difflib.get_close_matches(name, list(known), n=3)
+                    or sorted(known)[:5]
+                )
                 raise DatasetError(
                     f"{self.path.name}: '{name}' is not declared; did you mean {', '.join(near)}?"
                 )
@@ -250,7 +271,9 @@ class ShardWriter:
                 f"the first is row {missing[0]}; write every row"
             )
         if len(np.unique(self._rows["record_id"])) != self.n_records:
-            raise DatasetError(f"{self.path.name}: a record_id occurs twice; ids must be unique")
+            raise DatasetError(
+                f"{self.path.name}: a record_id occurs twice; ids must be unique"
+            )
         for name, rows in self._rows.items():
             column = SIGNALS.get(name) or self.columns[name]
             data = self._file.create_dataset(
@@ -279,11 +302,17 @@ def _check_declaration(writer: ShardWriter, params: Sequence[str]) -> None:
                 f"{name}: {key} '{given}' is unknown; allowed are {', '.join(known)}"
             )
     if writer.n_records < 1:
-        raise DatasetError(f"{name}: {writer.n_records} records; a shard needs at least 1")
+        raise DatasetError(
+            f"{name}: {writer.n_records} records; a shard needs at least 1"
+        )
     for signal, shape in writer.signals.items():
-        own = {key: column for key, column in SIGNALS.items() if key not in SCALES.values()}
+        own = {
+            key: column for key, column in SIGNALS.items() if key not in SCALES.values()
+        }
         if signal not in own or len(shape) != len(own[signal].axes) or min(shape) < 1:
-            allowed = ", ".join(f"{key} ({', '.join(column.axes)})" for key, column in own.items())
+            allowed = ", ".join(
+                f"{key} ({', '.join(column.axes)})" for key, column in own.items()
+            )
             raise DatasetError(
                 f"{name}: signal {signal} of shape {shape} is not allowed; allowed are {allowed}"
             )
@@ -303,7 +332,10 @@ def _check_declaration(writer: ShardWriter, params: Sequence[str]) -> None:
             f"{name}: schema_version {writer.attributes['schema_version']}, this writer makes {SCHEMA_VERSION}"
         )
     channels = writer.attributes["channel_names"]
-    if not isinstance(channels, Sequence) or len(channels) != writer.signals["acceleration"][0]:
+    if (
+        not isinstance(channels, Sequence)
+        or len(channels) != writer.signals["acceleration"][0]
+    ):
         raise DatasetError(
             f"{name}: channel_names {channels!r} for {writer.signals['acceleration'][0]} channels"
         )
@@ -314,7 +346,9 @@ def _check_declaration(writer: ShardWriter, params: Sequence[str]) -> None:
         )
 
 
-def _value(column: Column, values: Mapping[str, str | int | float]) -> str | int | float:
+def _value(
+    column: Column, values: Mapping[str, str | int | float]
+) -> str | int | float:
     if column.name in values:
         return values[column.name]
     if column.name in DEFAULTS:
@@ -360,6 +394,10 @@ def _encoded(column: Column, value: str | int | float) -> bytes | int | float:
 def _check_row(values: Mapping[str, str | int | float]) -> None:
     status = values.get("status", "ok")
     if status not in ("ok", "failed"):
-        raise DatasetError(f"column status: {status!r} is unknown; allowed are 'ok' and 'failed'")
+        raise DatasetError(
+            f"column status: {status!r} is unknown; allowed are 'ok' and 'failed'"
+        )
     if not 0.0 <= float(values["severity"]) <= 1.0:
-        raise DatasetError(f"column severity: {values['severity']} is outside 0 (healthy) to 1")
+        raise DatasetError(
+            f"column severity: {values['severity']} is outside 0 (healthy) to 1"
+        )

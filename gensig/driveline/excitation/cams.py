@@ -43,14 +43,18 @@ class Cam:
 
     def __post_init__(self) -> None:
         if self.follower not in FOLLOWERS:
-            raise ConfigError(f"cam.follower = {self.follower!r}; allowed: {', '.join(FOLLOWERS)}")
+            raise ConfigError(
+                f"cam.follower = {self.follower!r}; allowed: {', '.join(FOLLOWERS)}"
+            )
         for key, value in (
             ("lift_mm", self.lift),
             ("base_radius_mm", self.base_radius),
             ("span_deg", self.span),
         ):
             if not value > 0.0:
-                raise ConfigError(f"cam.{key} = {from_si(key, value):g} must be positive")
+                raise ConfigError(
+                    f"cam.{key} = {from_si(key, value):g} must be positive"
+                )
         if self.span > 2.0 * math.pi:
             raise ConfigError(
                 f"cam.span_deg = {math.degrees(self.span):g} must be at most a turn of the cam, 360"
@@ -62,7 +66,9 @@ class Cam:
             ("spring_rate_n_per_m", self.spring_rate),
         ):
             if not value >= 0.0:
-                raise ConfigError(f"cam.{key} = {from_si(key, value):g} must not be negative")
+                raise ConfigError(
+                    f"cam.{key} = {from_si(key, value):g} must not be negative"
+                )
         if not 0.0 <= self.friction_coefficient <= 1.0:
             raise ConfigError(
                 f"cam.friction_coefficient = {self.friction_coefficient:g} must lie in 0..1"
@@ -84,10 +90,16 @@ class Cam:
         lift = 64.0 * both**3
         slope = 192.0 * np.square(both) * side
         curvature = 384.0 * both * (np.square(side) - both)
-        return self.lift * lift, self.lift * slope / self.span, self.lift * curvature / self.span**2
+        return (
+            self.lift * lift,
+            self.lift * slope / self.span,
+            self.lift * curvature / self.span**2,
+        )
 
 
-def follower_force(cam: Cam, angle: Array, speed: float, load: Array | float = 0.0) -> Array:
+def follower_force(
+    cam: Cam, angle: Array, speed: float, load: Array | float = 0.0
+) -> Array:
     """Force of the follower on the cam while it lifts, along the follower's way, (point,) N; 0 on
     the base circle.
 
@@ -113,7 +125,9 @@ def follower_force(cam: Cam, angle: Array, speed: float, load: Array | float = 0
     return np.asarray(force)
 
 
-def cam_torque(cam: Cam, angle: Array, speed: float, load: Array | float = 0.0) -> Array:
+def cam_torque(
+    cam: Cam, angle: Array, speed: float, load: Array | float = 0.0
+) -> Array:
     """Torque on the camshaft, (point,) N m, negative where the cam takes it: T = -(F dh/da + F_s
     r).
 

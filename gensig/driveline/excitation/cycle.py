@@ -36,9 +36,14 @@ class Cylinder:
     reciprocating_mass: float = unit("kg")
 
     def __post_init__(self) -> None:
-        for key, value, scale in (("bore_mm", self.bore, 1e3), ("stroke_mm", self.stroke, 1e3)):
+        for key, value, scale in (
+            ("bore_mm", self.bore, 1e3),
+            ("stroke_mm", self.stroke, 1e3),
+        ):
             if not value > 0.0:
-                raise ConfigError(f"excitation.cylinder.{key} = {value * scale:g} must be positive")
+                raise ConfigError(
+                    f"excitation.cylinder.{key} = {value * scale:g} must be positive"
+                )
         if not 0.0 < self.crank_to_rod_ratio < 1.0:
             raise ConfigError(
                 f"excitation.cylinder.crank_to_rod_ratio = {self.crank_to_rod_ratio:g} must lie between 0 and 1; "
@@ -80,7 +85,9 @@ class Cylinder:
         """
         ratio = self.crank_to_rod_ratio
         rod = np.sqrt(1.0 - np.square(ratio * np.sin(angle)))
-        return np.asarray(self.crank_radius * (1.0 - np.cos(angle) + (1.0 - rod) / ratio))
+        return np.asarray(
+            self.crank_radius * (1.0 - np.cos(angle) + (1.0 - rod) / ratio)
+        )
 
     def piston_rate(self, angle: Array) -> Array:
         """Slope dx/da, m/rad."""
@@ -115,7 +122,9 @@ def gas_torque(
     pi/4 D^2 R times the tangential pressure. Assumes a piston pin on the cylinder's axis.
     """
     return np.asarray(
-        (pressure - crankcase_pressure) * cylinder.piston_area * cylinder.piston_rate(angle)
+        (pressure - crankcase_pressure)
+        * cylinder.piston_area
+        * cylinder.piston_rate(angle)
     )
 
 

@@ -45,7 +45,9 @@ def read_engine(values: Section) -> Engine:
     """
     check_group(PLACE, values)
     if values.get("kind", "engine") != "engine":
-        raise ConfigError(f"{PLACE}.kind = {values['kind']!r}; allowed: engine, motor_and_load")
+        raise ConfigError(
+            f"{PLACE}.kind = {values['kind']!r}; allowed: engine, motor_and_load"
+        )
     if "motor" in values:
         raise ConfigError(
             f"{PLACE}.motor is of a motor, {PLACE}.kind = engine of an engine: a line is turned by one of them; take "
@@ -66,7 +68,8 @@ def read_engine(values: Section) -> Engine:
         reference=read(Reference, values["reference"], f"{PLACE}.reference"),
         throw_nodes=_whole_numbers("throw_nodes", values["throw_nodes"]),
         valve_trains={
-            name: _read_train(name, one) for name, one in named_groups("valves", values["valves"])
+            name: _read_train(name, one)
+            for name, one in named_groups("valves", values["valves"])
         },
         valve_nodes={
             name: _whole_numbers(f"valve_nodes.{name}", one)
@@ -95,7 +98,9 @@ def _read_pressure(values: Any) -> WiebeCycle | PressureFile:
     """The cycle, or the file in its place where one is given."""
     check_group(f"{PLACE}.pressure", values)
     cycle = read(
-        WiebeCycle, {key: one for key, one in values.items() if key != "file"}, f"{PLACE}.pressure"
+        WiebeCycle,
+        {key: one for key, one in values.items() if key != "file"},
+        f"{PLACE}.pressure",
     )
     if values.get("file") is None:
         return cycle
@@ -107,7 +112,10 @@ def _read_train(name: str, values: Any) -> ValveTrain:
     check_group(place, values)
     own = {key: one for key, one in values.items() if key != "cam"}
     return read(
-        ValveTrain, own, place, cam=read_named(Cam, values.get("cam"), f"valves.{name}.cam", "cam")
+        ValveTrain,
+        own,
+        place,
+        cam=read_named(Cam, values.get("cam"), f"valves.{name}.cam", "cam"),
     )
 
 
@@ -120,7 +128,11 @@ def _read_pump(values: Any) -> tuple[Plunger | None, dict[str, int]]:
         return None, {}
     place = f"{PLACE}.injection_pump"
     check_group(place, values)
-    own = {key: one for key, one in values.items() if key not in ("cam", "nodes", "cylinders")}
+    own = {
+        key: one
+        for key, one in values.items()
+        if key not in ("cam", "nodes", "cylinders")
+    }
     nodes, cylinders = (
         _whole_numbers("injection_pump.nodes", values.get("nodes")),
         values.get("cylinders"),
@@ -134,7 +146,10 @@ def _read_pump(values: Any) -> tuple[Plunger | None, dict[str, int]]:
             f"{place}.cylinders must name a different cylinder for each of its {len(nodes)} nodes"
         )
     plunger = read(
-        Plunger, own, place, cam=read_named(Cam, values.get("cam"), "injection_pump.cam", "cam")
+        Plunger,
+        own,
+        place,
+        cam=read_named(Cam, values.get("cam"), "injection_pump.cam", "cam"),
     )
     return plunger, dict(zip(cylinders, nodes, strict=True))
 
@@ -159,11 +174,15 @@ def named_groups(key: str, values: Any) -> list[tuple[str, Any]]:
 def check_group(place: str, values: Any) -> None:
     """Raise for anything that is no group of keys."""
     if not isinstance(values, Mapping):
-        raise ConfigError(f"{place} = {values!r} must be a group of keys, not one value")
+        raise ConfigError(
+            f"{place} = {values!r} must be a group of keys, not one value"
+        )
 
 
 def _whole_numbers(key: str, values: Any) -> tuple[int, ...]:
-    if not isinstance(values, list | tuple) or not all(type(one) is int for one in values):
+    if not isinstance(values, list | tuple) or not all(
+        type(one) is int for one in values
+    ):
         raise ConfigError(f"{PLACE}.{key} = {values!r} is not a list of whole numbers")
     return tuple(values)
 

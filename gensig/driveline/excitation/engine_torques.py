@@ -23,7 +23,13 @@ from gensig.driveline.excitation.cycle import (
 )
 from gensig.driveline.excitation.firing import Layout
 from gensig.driveline.excitation.injection_pump import Plunger, plunger_torque
-from gensig.driveline.excitation.line_torques import LAWS, POINTS, LineTorques, Load, Reference
+from gensig.driveline.excitation.line_torques import (
+    LAWS,
+    POINTS,
+    LineTorques,
+    Load,
+    Reference,
+)
 from gensig.driveline.excitation.pressure import (
     PressureFile,
     WiebeCycle,
@@ -119,7 +125,9 @@ class Engine:
             ("friction_mean_pressure_mpa", self.friction_mean_pressure),
         ):
             if not value >= 0.0:
-                raise ConfigError(f"excitation.{key} = {value * 1e-6:g} must not be negative")
+                raise ConfigError(
+                    f"excitation.{key} = {value * 1e-6:g} must not be negative"
+                )
 
     @property
     def pressure_decides_torque(self) -> bool:
@@ -213,16 +221,27 @@ def engine_torques(
         )
     share = speed / engine.reference.speed
     parts = [*_loads(engine, share), *_valve_torques(engine, speed, n_points)]
-    taken = engine.friction_torque - sum(ratios[node] * float(np.mean(row)) for node, row in parts)
+    taken = engine.friction_torque - sum(
+        ratios[node] * float(np.mean(row)) for node, row in parts
+    )
     one_plunger = partial(_plunger_torque, engine, speed, share, n_points=n_points)
     if isinstance(engine.pressure, PressureFile):
-        pressure, indicated, brake = _measured(engine, torque, taken, one_plunger, n_points)
+        pressure, indicated, brake = _measured(
+            engine, torque, taken, one_plunger, n_points
+        )
     else:
-        pressure, indicated, brake = _burned(engine, speed, torque, taken, one_plunger, n_points)
+        pressure, indicated, brake = _burned(
+            engine, speed, torque, taken, one_plunger, n_points
+        )
     volume = _fuel(engine, indicated)
     pulses, firing = one_plunger(volume), engine.layout.firing_angles()
-    parts += [(node, delayed(pulses, firing[name])) for name, node in engine.plunger_nodes.items()]
-    parts += [(engine.dynamometer.node, np.array(-brake / ratios[engine.dynamometer.node]))]
+    parts += [
+        (node, delayed(pulses, firing[name]))
+        for name, node in engine.plunger_nodes.items()
+    ]
+    parts += [
+        (engine.dynamometer.node, np.array(-brake / ratios[engine.dynamometer.node]))
+    ]
     parts += _cylinder_torques(engine, pressure, speed)
     nodes = tuple(sorted({node for node, _ in parts}))
     torques = np.zeros((len(nodes), n_points))
@@ -253,8 +272,12 @@ def _check_nodes(engine: Engine, ratios: Mapping[int, float]) -> None:
     wanted: list[tuple[str, int, float | None]] = [
         ("throw_nodes", node, 1.0) for node in engine.throw_nodes
     ]
-    wanted += [("valve_nodes or injection_pump.nodes", node, CAM_RATIO) for node in cams]
-    wanted += [(f"loads.{name}.node", load.node, None) for name, load in engine.loads.items()]
+    wanted += [
+        ("valve_nodes or injection_pump.nodes", node, CAM_RATIO) for node in cams
+    ]
+    wanted += [
+        (f"loads.{name}.node", load.node, None) for name, load in engine.loads.items()
+    ]
     wanted += [("dynamometer.node", engine.dynamometer.node, None)]
     for key, node, ratio in wanted:
         if node not in ratios:
@@ -273,7 +296,9 @@ def _loads(engine: Engine, speed_share: float) -> list[tuple[int, Array]]:
     ]
 
 
-def _valve_torques(engine: Engine, speed: float, n_points: int) -> list[tuple[int, Array]]:
+def _valve_torques(
+    engine: Engine, speed: float, n_points: int
+) -> list[tuple[int, Array]]:
     """Torques of the valve cams on their nodes, (point,) each."""
     firing, parts = engine.layout.firing_angles(), []
     for train in engine.valve_trains.values():
@@ -297,7 +322,9 @@ def _plunger_torque(
     return plunger_torque(engine.plunger, angle, CAM_RATIO * speed, volume, speed_share)
 
 
-def _cylinder_torques(engine: Engine, pressure: Array, speed: float) -> list[tuple[int, Array]]:
+def _cylinder_torques(
+    engine: Engine, pressure: Array, speed: float
+) -> list[tuple[int, Array]]:
     """Gas, inertia and friction torques of the cylinders on the throws, (point,) each."""
     angle = cycle_angles(len(pressure))
     one = gas_torque(engine.cylinder, angle, pressure, engine.crankcase_pressure)
@@ -320,7 +347,10 @@ def _fuel(engine: Engine, indicated: float) -> float:
 def _indicated(engine: Engine, pressure: Array) -> float:
     """Mean torque of the gas in all cylinders, N m."""
     torque = gas_torque(
-        engine.cylinder, cycle_angles(len(pressure)), pressure, engine.crankcase_pressure
+        engine.cylinder,
+        cycle_angles(len(pressure)),
+        pressure,
+        engine.crankcase_pressure,
     )
     return float(np.mean(torque)) * len(engine.layout.cylinders)
 
@@ -331,7 +361,11 @@ def _taken_by(engine: Engine, one_plunger: Array) -> float:
 
 
 def _measured(
-    engine: Engine, torque: float | None, taken: float, one_plunger: partial[Array], n_points: int
+    engine: Engine,
+    torque: float | None,
+    taken: float,
+    one_plunger: partial[Array],
+    n_points: int,
 ) -> tuple[Array, float, float]:
     """Pressure, indicated and brake torque with a measured pressure."""
     assert isinstance(engine.pressure, PressureFile)
@@ -369,7 +403,9 @@ def _burned(
             f"the brake torque {torque:g} N m is below the friction, which the engine overcomes itself; give 0 or more"
         )
     power_share = torque * speed / (engine.reference.torque * engine.reference.speed)
-    motored, fired = wiebe_parts(engine.pressure, engine.cylinder, n_points, power_share)
+    motored, fired = wiebe_parts(
+        engine.pressure, engine.cylinder, n_points, power_share
+    )
     indicated = torque + taken
     for _ in range(ROUNDS):
         before, indicated = (

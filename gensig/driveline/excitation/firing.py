@@ -62,7 +62,9 @@ class Layout:
     def cylinders(self) -> tuple[str, ...]:
         """Names, bank by bank."""
         return tuple(
-            f"{bank}{throw + 1}" for bank in self.banks for throw in range(len(self.throw_angles))
+            f"{bank}{throw + 1}"
+            for bank in self.banks
+            for throw in range(len(self.throw_angles))
         )
 
     def throw(self, cylinder: str) -> int:
@@ -105,11 +107,16 @@ class Layout:
         turns.
         """
         gaps = self._gaps()
-        total, same = sum(gaps), [place for place, gap in enumerate(gaps) if gap == TURN]
+        total, same = (
+            sum(gaps),
+            [place for place, gap in enumerate(gaps) if gap == TURN],
+        )
         if abs(total - 2.0 * TURN) <= TOGETHER:
             return
         if same and abs(total - len(same) * TURN - 2.0 * TURN) <= TOGETHER:
-            names = [self.firing_order[place % len(gaps)] for place in (same[0], same[0] + 1)]
+            names = [
+                self.firing_order[place % len(gaps)] for place in (same[0], same[0] + 1)
+            ]
             raise ConfigError(
                 f"excitation.layout: {' and '.join(names)} fire together with these bank_angles_deg and "
                 "throw_angles_deg; change one of them or the firing order"

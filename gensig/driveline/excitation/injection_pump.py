@@ -49,7 +49,9 @@ class Plunger:
             ("heating_value_j_per_kg", self.heating_value_j_per_kg),
         ):
             if not value > 0.0:
-                raise ConfigError(f"{place}.{key} = {from_si(key, value):g} must be positive")
+                raise ConfigError(
+                    f"{place}.{key} = {from_si(key, value):g} must be positive"
+                )
         if not 0.0 < self.ramp_share <= 0.5:
             raise ConfigError(
                 f"{place}.ramp_share = {self.ramp_share:g} must be above 0 and at most 0.5"
@@ -72,7 +74,9 @@ class Plunger:
     def fuel_volume(self, work: float) -> float:
         """Volume of fuel, m3, that a cylinder burns for the work of its gas over a cycle, J."""
         return work / (
-            self.indicated_efficiency * self.heating_value_j_per_kg * self.fuel_density_kg_per_m3
+            self.indicated_efficiency
+            * self.heating_value_j_per_kg
+            * self.fuel_density_kg_per_m3
         )
 
     def pressure(
@@ -96,7 +100,9 @@ class Plunger:
         if not stroke > 0.0:
             return np.zeros_like(lift)
         delivered = (lift - self.lift_at_delivery) / stroke
-        inside = np.clip(np.minimum(delivered, 1.0 - delivered) / self.ramp_share, 0.0, 1.0)
+        inside = np.clip(
+            np.minimum(delivered, 1.0 - delivered) / self.ramp_share, 0.0, 1.0
+        )
         peak = max(self.delivery_pressure * speed_share**2, self.opening_pressure)
         return np.where(rising, peak * np.square(np.sin(0.5 * math.pi * inside)), 0.0)
 

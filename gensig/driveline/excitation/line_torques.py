@@ -32,7 +32,9 @@ class Reference:
 
     def __post_init__(self) -> None:
         if not (self.speed > 0.0 and self.torque > 0.0):
-            raise ConfigError("excitation.reference: speed_rpm and torque_nm must be positive")
+            raise ConfigError(
+                "excitation.reference: speed_rpm and torque_nm must be positive"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,7 +9,12 @@ from dataclasses import dataclass
 
 from gensig.driveline.drive_line import DriveLine
 from gensig.driveline.excitation.engine import KEYS as ENGINE_KEYS
-from gensig.driveline.excitation.engine import PLACE, check_group, named_groups, read_named
+from gensig.driveline.excitation.engine import (
+    PLACE,
+    check_group,
+    named_groups,
+    read_named,
+)
 from gensig.driveline.excitation.line_torques import Load, Reference
 from gensig.driveline.excitation.motor_torques import MotorDrive, TorqueRipple
 from gensig.errors import ConfigError
@@ -71,7 +76,9 @@ def read_motor(values: Section, drive: DriveLine) -> MotorDrive:
     }
     for name, load in loads.items():
         if load.node not in drive.numbers:
-            raise ConfigError(f"{PLACE}.loads.{name}.node: {_no_node(drive, load.node)}")
+            raise ConfigError(
+                f"{PLACE}.loads.{name}.node: {_no_node(drive, load.node)}"
+            )
     return MotorDrive(
         reference=read(Reference, values["reference"], f"{PLACE}.reference"),
         motor_node=_node(drive, "motor_node", "a motor", drive.motor_node),

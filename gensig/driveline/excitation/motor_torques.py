@@ -10,7 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.driveline.excitation.cycle import cycle_angles
-from gensig.driveline.excitation.line_torques import LAWS, POINTS, LineTorques, Load, Reference
+from gensig.driveline.excitation.line_torques import (
+    LAWS,
+    POINTS,
+    LineTorques,
+    Load,
+    Reference,
+)
 from gensig.errors import ConfigError
 
 Array = NDArray[np.float64]
@@ -93,7 +99,9 @@ class MotorDrive:
         taken = [(self.load_node, self.load_law, torque / ratios[self.load_node])]
         taken += [(load.node, load.law, load.torque) for load in self.loads.values()]
         for node, law, own in taken:
-            found[node] = found.get(node, 0.0) + LAWS[law] * own / (speed * ratios[node])
+            found[node] = found.get(node, 0.0) + LAWS[law] * own / (
+                speed * ratios[node]
+            )
         return found
 
 
@@ -128,14 +136,23 @@ def motor_torques(
             f"the speed of the motor, {speed * 30.0 / math.pi:g} r/min, must be positive"
         )
     if not 0.0 <= torque < math.inf:
-        raise ConfigError(f"the torque of the load, {torque:g} N m at the motor, must be 0 or more")
+        raise ConfigError(
+            f"the torque of the load, {torque:g} N m at the motor, must be 0 or more"
+        )
     share = speed / drive.reference.speed
-    taken = [(load.node, load.torque * share ** LAWS[load.law]) for load in drive.loads.values()]
+    taken = [
+        (load.node, load.torque * share ** LAWS[load.law])
+        for load in drive.loads.values()
+    ]
     taken.append((drive.load_node, torque / ratios[drive.load_node]))
-    given = sum(ratios[node] * value for node, value in taken) / ratios[drive.motor_node]
+    given = (
+        sum(ratios[node] * value for node, value in taken) / ratios[drive.motor_node]
+    )
     wave: Array = np.ones(n_points)
     if drive.ripple is not None:
-        wave = wave + drive.ripple.share * np.sin(drive.ripple.order * cycle_angles(n_points))
+        wave = wave + drive.ripple.share * np.sin(
+            drive.ripple.order * cycle_angles(n_points)
+        )
     nodes = tuple(sorted({drive.motor_node, *(node for node, _ in taken)}))
     torques = np.zeros((len(nodes), n_points))
     torques[nodes.index(drive.motor_node)] += given * wave

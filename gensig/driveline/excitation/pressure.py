@@ -21,7 +21,9 @@ from gensig.units import UNITS, split_unit, to_si, unit
 
 Array = NDArray[np.float64]
 
-BURNED = -math.log(1e-3)  # Wiebe's exponent: 99.9 % at the end of combustion, by definition
+BURNED = -math.log(
+    1e-3
+)  # Wiebe's exponent: 99.9 % at the end of combustion, by definition
 WIDEST_GAP = math.radians(10.0)  # between points of a measured pressure
 LEAST_POINTS = 100
 FILE_KEY = "excitation.pressure.file"
@@ -53,7 +55,8 @@ class WiebeCycle:
         place = "excitation.pressure"
         if not 0.0 < self.ambient_pressure <= self.boost_pressure:
             given = ", ".join(
-                f"{value * 1e-6:g}" for value in (self.ambient_pressure, self.boost_pressure)
+                f"{value * 1e-6:g}"
+                for value in (self.ambient_pressure, self.boost_pressure)
             )
             raise ConfigError(
                 f"{place}: 0 < ambient_pressure_mpa <= boost_pressure_mpa is needed, not {given}"
@@ -63,14 +66,24 @@ class WiebeCycle:
             ("exponent", self.exponent, 1.1, 1.67),
             ("shape", self.shape, 0.1, 10.0),
             ("combustion_begin_deg", math.degrees(self.combustion_begin), -60.0, 60.0),
-            ("combustion_duration_deg", math.degrees(self.combustion_duration), 5.0, 150.0),
+            (
+                "combustion_duration_deg",
+                math.degrees(self.combustion_duration),
+                5.0,
+                150.0,
+            ),
             ("exhaust_opening_deg", math.degrees(self.exhaust_opening), 90.0, 180.0),
             ("blowdown_angle_deg", math.degrees(self.blowdown_angle), 1.0, 60.0),
             ("intake_closing_deg", math.degrees(self.intake_closing), -180.0, -90.0),
         ):
             if not low - 1e-9 <= value <= high + 1e-9:
-                raise ConfigError(f"{place}.{key} = {value:g} must lie in {low:g}..{high:g}")
-        if self.combustion_begin + self.combustion_duration > self.exhaust_opening + 1e-9:
+                raise ConfigError(
+                    f"{place}.{key} = {value:g} must lie in {low:g}..{high:g}"
+                )
+        if (
+            self.combustion_begin + self.combustion_duration
+            > self.exhaust_opening + 1e-9
+        ):
             end = math.degrees(self.combustion_begin + self.combustion_duration)
             raise ConfigError(
                 f"{place}: combustion ends {end:g} degrees after top dead center, past exhaust_opening_deg = "
@@ -79,8 +92,13 @@ class WiebeCycle:
 
     def gas_exchange(self, power_share: float) -> tuple[float, float]:
         """Boost and exhaust pressure, Pa, at a share of the reference point's brake power."""
-        above = (self.boost_pressure - self.ambient_pressure) * min(max(power_share, 0.0), 1.2)
-        return self.ambient_pressure + above, self.ambient_pressure + self.exhaust_share * above
+        above = (self.boost_pressure - self.ambient_pressure) * min(
+            max(power_share, 0.0), 1.2
+        )
+        return (
+            self.ambient_pressure + above,
+            self.ambient_pressure + self.exhaust_share * above,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,12 +131,16 @@ def wiebe_parts(
     volume = cylinder.volume(rising)
     closing = float(cylinder.volume(np.array([cycle.intake_closing]))[0])
     motored = boost * (closing / volume) ** cycle.exponent
-    share = np.clip((rising - cycle.combustion_begin) / cycle.combustion_duration, 0.0, 1.0)
+    share = np.clip(
+        (rising - cycle.combustion_begin) / cycle.combustion_duration, 0.0, 1.0
+    )
     burned = -np.expm1(-BURNED * share ** (cycle.shape + 1.0)) / -math.expm1(-BURNED)
     weight = volume ** (cycle.exponent - 1.0)
     steps = 0.5 * (weight[1:] + weight[:-1]) * np.diff(burned)
     fired = (
-        (cycle.exponent - 1.0) * np.concatenate([[0.0], np.cumsum(steps)]) / volume**cycle.exponent
+        (cycle.exponent - 1.0)
+        * np.concatenate([[0.0], np.cumsum(steps)])
+        / volume**cycle.exponent
     )
     opened = rising > cycle.exhaust_opening
     fall = np.exp(-(rising - cycle.exhaust_opening) / cycle.blowdown_angle)
@@ -144,7 +166,10 @@ def read_pressure(given: PressureFile, n_points: int) -> Array:
     bare = [split_unit(name)[0] for name in names]
     check_columns(FILE_KEY, given.file, bare, ["crank_angle", "pressure"])
     columns = {}
-    for quantity, kind, example in (("crank_angle", "angle", "deg"), ("pressure", "stress", "mpa")):
+    for quantity, kind, example in (
+        ("crank_angle", "angle", "deg"),
+        ("pressure", "stress", "mpa"),
+    ):
         name = names[bare.index(quantity)]
         suffix = split_unit(name)[1]
         if suffix is None or UNITS[suffix][1] != kind:

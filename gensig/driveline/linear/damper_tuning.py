@@ -87,7 +87,9 @@ class SeenFromNodes:
         """
         amplitudes = self.force_with(dampers)
         points = 8 * amplitudes.shape[-1] if n_points is None else n_points
-        return np.asarray(np.abs(self.mean[:, None] + over_cycle(amplitudes, points)).max(axis=1))
+        return np.asarray(
+            np.abs(self.mean[:, None] + over_cycle(amplitudes, points)).max(axis=1)
+        )
 
 
 def seen_from_nodes(
@@ -138,7 +140,11 @@ def seen_from_nodes(
 
 
 def tune_dampers(
-    seen: SeenFromNodes, most_inertia: Sequence[float], *, viscous: bool = False, seed: int = 0
+    seen: SeenFromNodes,
+    most_inertia: Sequence[float],
+    *,
+    viscous: bool = False,
+    seed: int = 0,
 ) -> tuple[TorsionalDamper, ...]:
     """Dampers, one on each node, that make the largest force over all speeds least.
 
@@ -173,11 +179,16 @@ def tune_dampers(
         if viscous:
             bounds.append((math.log(low / RATE_MARGIN), math.log(high * RATE_MARGIN)))
         else:
-            bounds += [(math.log(low), math.log(high)), tuple(map(math.log, DAMPING_RATIOS))]  # type: ignore[list-item]
+            bounds += [
+                (math.log(low), math.log(high)),
+                tuple(map(math.log, DAMPING_RATIOS)),
+            ]  # type: ignore[list-item]
 
     def dampers(unknowns: Array) -> tuple[TorsionalDamper, ...]:
         rows = np.exp(np.reshape(unknowns, (len(seen.nodes), -1)))
-        return tuple(_damper(node, row) for node, row in zip(seen.nodes, rows, strict=True))
+        return tuple(
+            _damper(node, row) for node, row in zip(seen.nodes, rows, strict=True)
+        )
 
     def worst(unknowns: Array) -> float:
         return float(seen.largest_force(dampers(unknowns)).max())
@@ -193,7 +204,11 @@ def tune_dampers(
         init="sobol",
     )
     nearest = minimize(
-        worst, found.x, method="Nelder-Mead", bounds=bounds, options={"xatol": 1e-4, "fatol": 1e-9}
+        worst,
+        found.x,
+        method="Nelder-Mead",
+        bounds=bounds,
+        options={"xatol": 1e-4, "fatol": 1e-9},
     )
     return dampers(nearest.x if nearest.fun <= found.fun else found.x)
 

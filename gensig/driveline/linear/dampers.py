@@ -36,7 +36,9 @@ class TorsionalDamper:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.ring_inertia < math.inf:
-            raise ConfigError(f"damper.ring_inertia_kg_m2 = {self.ring_inertia:g} must be positive")
+            raise ConfigError(
+                f"damper.ring_inertia_kg_m2 = {self.ring_inertia:g} must be positive"
+            )
         for key, value in (
             ("damping_nms_per_rad", self.damping),
             ("stiffness_nm_per_rad", self.stiffness),

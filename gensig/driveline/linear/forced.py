@@ -60,7 +60,9 @@ class LinearLine:
         """
         w = np.asarray(frequency, dtype=float)[:, None, None]
         return np.asarray(
-            self.stiffness + 1j * (self.loss + w * self.damping) - np.square(w) * self.mass
+            self.stiffness
+            + 1j * (self.loss + w * self.damping)
+            - np.square(w) * self.mass
         )
 
     def response(self, force: ComplexArray, frequency: Array) -> ComplexArray:
@@ -72,7 +74,9 @@ class LinearLine:
         SimulationError    where an undamped line is excited at its own frequency
         """
         try:
-            found = np.linalg.solve(self.dynamic_stiffness(frequency), force[..., None])[..., 0]
+            found = np.linalg.solve(
+                self.dynamic_stiffness(frequency), force[..., None]
+            )[..., 0]
         except np.linalg.LinAlgError:
             raise SimulationError(
                 "an undamped line is excited at its natural frequency; give it damping"
@@ -184,7 +188,9 @@ class SteadyResponse:
 
         What is printed as plus or minus.
         """
-        return np.asarray(0.5 * np.ptp(self.speed_over_cycle(32 * len(self.orders)), axis=1))
+        return np.asarray(
+            0.5 * np.ptp(self.speed_over_cycle(32 * len(self.orders)), axis=1)
+        )
 
     def element_forces(self, elements: Elements) -> tuple[Array, ComplexArray]:
         """Mean (element,) and complex amplitudes (element, order) of what the elements carry, N m
@@ -229,7 +235,9 @@ def cycle_orders(torque: Array, n_orders: int) -> tuple[Array, ComplexArray]:
             f"n_orders = {n_orders} must lie in 1..{(n_points - 1) // 2}: there are {n_points} points"
         )
     spectrum = np.fft.rfft(torque, axis=-1) / n_points
-    return np.asarray(spectrum[..., 0].real), np.asarray(2.0 * spectrum[..., 1 : n_orders + 1])
+    return np.asarray(spectrum[..., 0].real), np.asarray(
+        2.0 * spectrum[..., 1 : n_orders + 1]
+    )
 
 
 def steady_response(
@@ -252,7 +260,9 @@ def steady_response(
     mean, amplitudes = cycle_orders(torque, n_orders)
     orders = np.arange(1, n_orders + 1) / TURNS_PER_CYCLE
     angle = line.response(amplitudes.T, orders * speed).T
-    return SteadyResponse(speed=speed, orders=orders, angle=angle, twist=_mean_twist(line, mean))
+    return SteadyResponse(
+        speed=speed, orders=orders, angle=angle, twist=_mean_twist(line, mean)
+    )
 
 
 def disturbance_response(
@@ -287,9 +297,9 @@ class Waterfall:
         step = frequencies[1] - frequencies[0]
         out = np.zeros((len(self.speeds), len(frequencies)))
         for row, speed, amplitudes in zip(out, self.speeds, self.angle, strict=True):
-            bins = np.rint((self.orders * speed / (2.0 * math.pi) - frequencies[0]) / step).astype(
-                int
-            )
+            bins = np.rint(
+                (self.orders * speed / (2.0 * math.pi) - frequencies[0]) / step
+            ).astype(int)
             inside = (bins >= 0) & (bins < len(frequencies))
             np.maximum.at(row, bins[inside], amplitudes[inside])
         return out
@@ -314,7 +324,10 @@ def run_of_speeds(
     -----
     Steady at every speed: a run-up that is slow against the line's decay. Up and down are then the same.
     """
-    found = [steady_response(line, torques(speed), speed, n_orders=n_orders) for speed in speeds]
+    found = [
+        steady_response(line, torques(speed), speed, n_orders=n_orders)
+        for speed in speeds
+    ]
     if not found:
         raise ValueError("no speed is given")
     fluctuations = [one.fluctuation() for one in found]
@@ -341,7 +354,9 @@ def _mean_twist(line: LinearLine, mean: Array) -> Array:
     values, vectors = _statics(line)
     held = values > RIGID * values[-1]
     rest = vectors[:, ~held].T @ mean
-    if rest.size and np.max(np.abs(rest)) > UNBALANCED * max(float(np.max(np.abs(mean))), 1e-300):
+    if rest.size and np.max(np.abs(rest)) > UNBALANCED * max(
+        float(np.max(np.abs(mean))), 1e-300
+    ):
         raise SimulationError(
             f"the mean torques leave {np.max(np.abs(rest)):.4g} N m on a line that nothing holds; balance them"
         )

@@ -100,7 +100,9 @@ def line_matrices(
     for place in moving:
         gear, x = line.gears[place], n_nodes + 2 * place
         if gear.mass is None or gear.support is None:
-            raise ConfigError(f"{gear.name}: its lateral motion needs a mass and a support")
+            raise ConfigError(
+                f"{gear.name}: its lateral motion needs a mass and a support"
+            )
         if min(gear.support.stiffness_x, gear.support.stiffness_y) <= 0.0:
             raise ConfigError(
                 f"{gear.name}: its support needs stiffness along both axes, else it floats away"
@@ -117,17 +119,25 @@ def line_matrices(
     directions = np.zeros((len(line.meshes), n_coordinates))
     for row, mesh in enumerate(line.meshes):
         one, other = line.gears[mesh.driving], line.gears[mesh.driven]
-        directions[row, one.node], directions[row, other.node] = one.base_radius, -other.base_radius
+        directions[row, one.node], directions[row, other.node] = (
+            one.base_radius,
+            -other.base_radius,
+        )
         if lateral:
             along = _line_of_action(line, mesh)
             for gear_place, sign in ((mesh.driving, 1.0), (mesh.driven, -1.0)):
                 turn, x = along - frames[gear_place], n_nodes + 2 * gear_place
-                directions[row, x : x + 2] += sign * math.sin(turn), -sign * math.cos(turn)
+                directions[row, x : x + 2] += (
+                    sign * math.sin(turn),
+                    -sign * math.cos(turn),
+                )
     elastic_parts = line.elastic_parts
     rotation = np.zeros((len(elastic_parts), n_coordinates))
     for part, nodes in enumerate(elastic_parts):
         rotation[part, list(nodes)] = np.abs(line.speed_ratio[list(nodes)])
-    gear_names = [f"{line.gears[place].name} {axis}" for place in moving for axis in "xy"]
+    gear_names = [
+        f"{line.gears[place].name} {axis}" for place in moving for axis in "xy"
+    ]
     return LineMatrices(
         names=(
             *(" + ".join(line.nodes[n].name for n in nodes) for nodes in compounds),
@@ -147,7 +157,10 @@ def line_matrices(
         coordinate_mass=own_mass,
         expand=expand,
         coordinate_node=np.array(
-            [*range(n_nodes), *(line.gears[place].node for place in moving for _ in "xy")],
+            [
+                *range(n_nodes),
+                *(line.gears[place].node for place in moving for _ in "xy"),
+            ],
             dtype=np.int64,
         ),
     )

@@ -74,7 +74,9 @@ def natural_modes(matrices: LineMatrices) -> Modes:
     # rotations of the parts do not couple through the mass, so each is a mode of its own
     shapes[:n_rigid] = (
         matrices.rigid
-        / np.sqrt(np.einsum("rd,de,re->r", matrices.rigid, matrices.mass, matrices.rigid))[:, None]
+        / np.sqrt(
+            np.einsum("rd,de,re->r", matrices.rigid, matrices.mass, matrices.rigid)
+        )[:, None]
     )
     largest = np.take_along_axis(shapes, np.abs(shapes).argmax(axis=1)[:, None], axis=1)
     shapes *= np.where(largest < 0.0, -1.0, 1.0)
@@ -83,13 +85,18 @@ def natural_modes(matrices: LineMatrices) -> Modes:
     omega = 2.0 * math.pi * frequency[n_rigid:]
     elastic = shapes[n_rigid:]
     lost = _quadratic(elastic, matrices.loss_stiffness)
-    lost += approach[n_rigid:] ** 2 @ (matrices.mesh_loss_factor * matrices.mesh_stiffness)
+    lost += approach[n_rigid:] ** 2 @ (
+        matrices.mesh_loss_factor * matrices.mesh_stiffness
+    )
     viscous = (
-        _quadratic(elastic, matrices.damping) + approach[n_rigid:] ** 2 @ matrices.mesh_damping
+        _quadratic(elastic, matrices.damping)
+        + approach[n_rigid:] ** 2 @ matrices.mesh_damping
     )
     ratio, strain = np.zeros(len(frequency)), np.zeros(approach.shape)
     ratio[n_rigid:] = 0.5 * lost / omega**2 + 0.5 * viscous / omega
-    strain[n_rigid:] = approach[n_rigid:] ** 2 * matrices.mesh_stiffness / omega[:, None] ** 2
+    strain[n_rigid:] = (
+        approach[n_rigid:] ** 2 * matrices.mesh_stiffness / omega[:, None] ** 2
+    )
     kinetic = matrices.coordinate_mass * (shapes @ matrices.expand.T) ** 2
     return Modes(
         frequency=frequency,
@@ -114,9 +121,13 @@ def with_viscous_losses(matrices: LineMatrices) -> LineMatrices:
     omega = 2.0 * math.pi * modes.frequency
     rate = np.zeros(len(omega))
     elastic = omega > 0.0
-    rate[elastic] = _quadratic(modes.shapes[elastic], matrices.loss_stiffness) / omega[elastic]
+    rate[elastic] = (
+        _quadratic(modes.shapes[elastic], matrices.loss_stiffness) / omega[elastic]
+    )
     momentum = modes.shapes @ matrices.mass
-    own = matrices.mesh_loss_factor * np.sqrt(matrices.mesh_stiffness * matrices.mesh_mass)
+    own = matrices.mesh_loss_factor * np.sqrt(
+        matrices.mesh_stiffness * matrices.mesh_mass
+    )
     return replace(
         matrices,
         damping=matrices.damping + (momentum.T * rate) @ momentum,

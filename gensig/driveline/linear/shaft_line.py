@@ -59,12 +59,18 @@ class Shaft:
         if self.first == self.second:
             raise ConfigError(f"{place}: it joins a node to itself")
         if self.stiffness is None and not self.rigid:
-            raise ConfigError(f"{place}: it has no stiffness; give one, or make it rigid")
+            raise ConfigError(
+                f"{place}: it has no stiffness; give one, or make it rigid"
+            )
         if self.stiffness is not None and not 0.0 <= self.stiffness < math.inf:
-            raise ConfigError(f"{place}: stiffness {self.stiffness:g} N m/rad must not be negative")
+            raise ConfigError(
+                f"{place}: stiffness {self.stiffness:g} N m/rad must not be negative"
+            )
         _check_losses(place, self.damping, self.loss_factor)
         if self.stiffness == self.damping == 0.0:
-            raise ConfigError(f"{place}: it has neither stiffness nor damping; give one of both")
+            raise ConfigError(
+                f"{place}: it has neither stiffness nor damping; give one of both"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,9 +119,13 @@ class GearMesh:
     def __post_init__(self) -> None:
         place = self.place or f"mesh of gears {self.driving} and {self.driven}"
         if not 0.0 < self.stiffness < math.inf:
-            raise ConfigError(f"{place}: mesh stiffness {self.stiffness:g} N/m must be positive")
+            raise ConfigError(
+                f"{place}: mesh stiffness {self.stiffness:g} N/m must be positive"
+            )
         if not 0.0 <= self.backlash < math.inf:
-            raise ConfigError(f"{place}: backlash {self.backlash:g} m must not be negative")
+            raise ConfigError(
+                f"{place}: backlash {self.backlash:g} m must not be negative"
+            )
         _check_losses(place, self.damping, self.loss_factor)
 
 
@@ -144,13 +154,19 @@ class ShaftLine:
             raise ConfigError("a shaft line needs at least one node")
         for shaft in self.shafts:
             self._check_places(
-                shaft.place or "a shaft", (shaft.first, shaft.second), len(self.nodes), "node"
+                shaft.place or "a shaft",
+                (shaft.first, shaft.second),
+                len(self.nodes),
+                "node",
             )
         for gear in self.gears:
             self._check_places(gear.name, (gear.node,), len(self.nodes), "node")
         for mesh in self.meshes:
             self._check_places(
-                mesh.place or "a mesh", (mesh.driving, mesh.driven), len(self.gears), "gear"
+                mesh.place or "a mesh",
+                (mesh.driving, mesh.driven),
+                len(self.gears),
+                "gear",
             )
             one, other = self.gears[mesh.driving], self.gears[mesh.driven]
             if one.node == other.node:
@@ -158,7 +174,9 @@ class ShaftLine:
                     f"{mesh.place or 'a mesh'}: {one.name} and {other.name} turn with the same node"
                 )
             if not math.isclose(
-                one.base_radius * other.n_teeth, other.base_radius * one.n_teeth, rel_tol=1e-9
+                one.base_radius * other.n_teeth,
+                other.base_radius * one.n_teeth,
+                rel_tol=1e-9,
             ):
                 raise ConfigError(
                     f"{mesh.place or 'a mesh'}: the base radii of {one.name} and {other.name} are not as their teeth, "
@@ -167,10 +185,14 @@ class ShaftLine:
         _ = self._turning  # refuses loops that lock
 
     @staticmethod
-    def _check_places(what: str, places: tuple[int, ...], count: int, kind: str) -> None:
+    def _check_places(
+        what: str, places: tuple[int, ...], count: int, kind: str
+    ) -> None:
         for place in places:
             if not 0 <= place < count:
-                raise ConfigError(f"{what}: there is no {kind} {place}, only 0..{count - 1}")
+                raise ConfigError(
+                    f"{what}: there is no {kind} {place}, only 0..{count - 1}"
+                )
 
     @cached_property
     def _turning(self) -> tuple[tuple[Fraction, ...], tuple[int, ...]]:
@@ -183,8 +205,12 @@ class ShaftLine:
             joints[shaft.second].append((shaft.first, Fraction(1), shaft.place))
         for mesh in self.meshes:
             one, other = self.gears[mesh.driving], self.gears[mesh.driven]
-            joints[one.node].append((other.node, Fraction(-one.n_teeth, other.n_teeth), mesh.place))
-            joints[other.node].append((one.node, Fraction(-other.n_teeth, one.n_teeth), mesh.place))
+            joints[one.node].append(
+                (other.node, Fraction(-one.n_teeth, other.n_teeth), mesh.place)
+            )
+            joints[other.node].append(
+                (one.node, Fraction(-other.n_teeth, one.n_teeth), mesh.place)
+            )
         speed: list[Fraction | None] = [None] * len(self.nodes)
         part = [-1] * len(self.nodes)
         for first in range(len(self.nodes)):
@@ -223,7 +249,8 @@ class ShaftLine:
         """
         part = self._turning[1]
         return tuple(
-            tuple(n for n, own in enumerate(part) if own == one) for one in range(max(part) + 1)
+            tuple(n for n, own in enumerate(part) if own == one)
+            for one in range(max(part) + 1)
         )
 
     @property
@@ -234,15 +261,21 @@ class ShaftLine:
         Each turns as one without deforming anything, first that of the first node.
         """
         leader = list(range(len(self.nodes)))
-        joints = [(shaft.first, shaft.second) for shaft in self.shafts if shaft.stiffness != 0.0]
+        joints = [
+            (shaft.first, shaft.second)
+            for shaft in self.shafts
+            if shaft.stiffness != 0.0
+        ]
         joints += [
-            (self.gears[mesh.driving].node, self.gears[mesh.driven].node) for mesh in self.meshes
+            (self.gears[mesh.driving].node, self.gears[mesh.driven].node)
+            for mesh in self.meshes
         ]
         for first, second in joints:
             one, other = sorted((leader[first], leader[second]))
             leader = [one if own == other else own for own in leader]
         return tuple(
-            tuple(n for n, own in enumerate(leader) if own == one) for one in sorted(set(leader))
+            tuple(n for n, own in enumerate(leader) if own == one)
+            for one in sorted(set(leader))
         )
 
     @property
@@ -258,5 +291,6 @@ class ShaftLine:
                 one, other = sorted((leader[shaft.first], leader[shaft.second]))
                 leader = [one if own == other else own for own in leader]
         return tuple(
-            tuple(n for n, own in enumerate(leader) if own == one) for one in sorted(set(leader))
+            tuple(n for n, own in enumerate(leader) if own == one)
+            for one in sorted(set(leader))
         )

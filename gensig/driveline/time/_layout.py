@@ -45,7 +45,9 @@ def node_place(place, row, n_cells, cell):
 
     ``place`` are the whole numbers of the mesh.
     """
-    return place[AT_TABLE] + (row * (n_cells + 1) + cell) * spring_column(place[N_SPRINGS])
+    return place[AT_TABLE] + (row * (n_cells + 1) + cell) * spring_column(
+        place[N_SPRINGS]
+    )
 
 
 class Rows(NamedTuple):

@@ -52,7 +52,11 @@ def gather(meshes, mesh, flank, turned, within, pairs):
     up to where what was gathered is all that touches, m
     """
     place = meshes.place[mesh]
-    first, n_nodes, n_pairs = place[layout.FIRST], place[layout.NODES], place[layout.N_PAIRS]
+    first, n_nodes, n_pairs = (
+        place[layout.FIRST],
+        place[layout.NODES],
+        place[layout.N_PAIRS],
+    )
     sense, at_rows = 1, place[layout.AT_ROWS]
     if flank == COAST:
         sense, at_rows = -1, place[layout.AT_COAST_ROWS]
@@ -89,7 +93,12 @@ def gather(meshes, mesh, flank, turned, within, pairs):
                 break
             column = spring_column(spring)
             between(
-                meshes.table, low + column, high + column, x - cell, sense * n_nodes, here[column:]
+                meshes.table,
+                low + column,
+                high + column,
+                x - cell,
+                sense * n_nodes,
+                here[column:],
             )
     return reach
 
@@ -169,7 +178,9 @@ def mesh_law(meshes, mesh, turned, roll_rate, approach, rate, law, work):
         if not within > least:
             continue
         if not within <= work.reach[mesh, flank]:
-            work.reach[mesh, flank] = gather(meshes, mesh, flank, turned, within, work.pairs)
+            work.reach[mesh, flank] = gather(
+                meshes, mesh, flank, turned, within, work.pairs
+            )
         normal, tangent, rate_tangent, stored, lost, along = flank_law(
             work.pairs[mesh, flank, :n_pairs],
             depth,
@@ -250,7 +261,9 @@ def solve_contact(
         for m in range(n):
             off, most = free[m] - approach[m], 0.0
             for k in range(n):
-                off -= compliance[m, k] * (law[k, layout.FORCE] - carried[k, layout.FORCE])
+                off -= compliance[m, k] * (
+                    law[k, layout.FORCE] - carried[k, layout.FORCE]
+                )
                 most += abs(compliance[m, k]) * (
                     abs(law[k, layout.FORCE]) + abs(carried[k, layout.FORCE])
                 )

@@ -34,8 +34,12 @@ def factorize(matrix, first, reach, lower, inverse_pivot):
         for j in range(start, i):
             value = matrix[i, j]
             for k in range(max(start, j - reach[j]), j):
-                value -= lower[first[i] + k - start] * lower[first[j] + k - j + reach[j]]
-            lower[first[i] + j - start] = value  # times the pivot of j, until the row is done
+                value -= (
+                    lower[first[i] + k - start] * lower[first[j] + k - j + reach[j]]
+                )
+            lower[first[i] + j - start] = (
+                value  # times the pivot of j, until the row is done
+            )
         for j in range(start, i):
             scaled = lower[first[i] + j - start]
             lower[first[i] + j - start] = scaled * inverse_pivot[j]
@@ -50,7 +54,9 @@ def factorize(matrix, first, reach, lower, inverse_pivot):
 def add_full(matrix, share, x, out):
     """Add ``share`` times a symmetric matrix (dof, dof) times x to ``out``."""
     n = len(x)
-    for j in range(0, n - n % 4, 4):  # four rows at once share what they read and write of ``out``
+    for j in range(
+        0, n - n % 4, 4
+    ):  # four rows at once share what they read and write of ``out``
         p, q, r, s = share * x[j], share * x[j + 1], share * x[j + 2], share * x[j + 3]
         for i in range(n):
             out[i] += (p * matrix[j, i] + q * matrix[j + 1, i]) + (
@@ -168,11 +174,15 @@ def push(line, torques, angle, gain, knot, share, q, force):
         n_nodes = torques.first[j + 1] - first
         value = torques.table[first]
         if n_nodes > 1:
-            x = (line.rotation[dof] * angle + q[dof]) * torques.per_rad[j] + torques.shift[j]
+            x = (line.rotation[dof] * angle + q[dof]) * torques.per_rad[
+                j
+            ] + torques.shift[j]
             x -= math.floor(x / n_nodes) * n_nodes
             node = min(int(x), n_nodes - 1)
             low = torques.table[first + node]
-            value = low + (x - node) * (torques.table[first + (node + 1) % n_nodes] - low)
+            value = low + (x - node) * (
+                torques.table[first + (node + 1) % n_nodes] - low
+            )
         factor = torques.factor[j, knot]
         if share > 0.0:
             factor += share * (torques.factor[j, knot + 1] - factor)
@@ -184,7 +194,10 @@ def roll(meshes, angle, speed, q, v, turned, roll_rate):
     """Where the meshes have rolled to, in pitches, and how fast, (mesh,) each."""
     for m in range(len(turned)):
         number, dof = meshes.number[m], meshes.place[m, layout.ROLL_DOF]
-        per_angle, per_rad = number[layout.NOMINAL_PITCHES], number[layout.PITCHES_PER_RAD]
+        per_angle, per_rad = (
+            number[layout.NOMINAL_PITCHES],
+            number[layout.PITCHES_PER_RAD],
+        )
         turned[m] = number[layout.START] + per_angle * angle + per_rad * q[dof]
         roll_rate[m] = per_angle * speed + per_rad * v[dof]
 
@@ -201,7 +214,10 @@ def look(line, meshes, torques, course, time, state, work):
     roll(meshes, angle, speed, q, v, turned, roll_rate)
     work.reach[:] = -math.inf
     for m in range(len(law)):
-        approach[m], rate[m] = row_product(line.direction, m, q), row_product(line.direction, m, v)
+        approach[m], rate[m] = (
+            row_product(line.direction, m, q),
+            row_product(line.direction, m, v),
+        )
         mesh_law(meshes, m, turned[m], roll_rate[m], approach[m], rate[m], law, work)
 
 
@@ -238,7 +254,12 @@ def advance(
     """
     q, v, mean, force, approach, rate, law = state
     n, n_meshes = len(q), len(law)
-    ahead_q, ahead_v, moved, force_1 = work.ahead_q, work.ahead_v, work.moved, work.force
+    ahead_q, ahead_v, moved, force_1 = (
+        work.ahead_q,
+        work.ahead_v,
+        work.moved,
+        work.force,
+    )
     turned, roll_rate, free, approach_1, law_1 = (
         work.turned,
         work.roll_rate,
@@ -264,7 +285,9 @@ def advance(
         for m in range(n_meshes):
             approach_1[m] = row_product(line.direction, m, ahead_q)
             rate_1 = per_step * (approach_1[m] - approach[m]) - rate[m]
-            mesh_law(meshes, m, turned[m], roll_rate[m], approach_1[m], rate_1, law_1, work)
+            mesh_law(
+                meshes, m, turned[m], roll_rate[m], approach_1[m], rate_1, law_1, work
+            )
             along = law[m, layout.ALONG] + law_1[m, layout.ALONG]
             moved[meshes.place[m, layout.ROLL_DOF]] += (
                 along * meshes.number[m, layout.PITCHES_PER_RAD]
@@ -307,7 +330,9 @@ def advance(
             elif kind == ACCELERATION:
                 out[place - first_step, c] = per_step * (moved[i] / step - v[i])
             else:
-                out[place - first_step, c] = 0.5 * (law[i, layout.FORCE] + law_1[i, layout.FORCE])
+                out[place - first_step, c] = 0.5 * (
+                    law[i, layout.FORCE] + law_1[i, layout.FORCE]
+                )
         put_in, lost = 0.0, 0.0
         drag = ahead_v
         drag[:] = 0.0
@@ -379,7 +404,9 @@ def rest(line, meshes, force, angle, q, law, work):
             approach[m] = before[m]
             mesh_law(meshes, m, turned[m], 0.0, approach[m], 0.0, law_1, work)
             for p in range(line.direction.first[m], line.direction.first[m + 1]):
-                moved[line.direction.column[p]] -= law[m, layout.FORCE] * line.direction.value[p]
+                moved[line.direction.column[p]] -= (
+                    law[m, layout.FORCE] * line.direction.value[p]
+                )
         solve(line.factor, moved)
         for m in range(n_meshes):
             free[m] = before[m] + row_product(line.direction, m, moved)
@@ -414,4 +441,13 @@ def rest(line, meshes, force, angle, q, law, work):
     return -1
 
 
-__all__ = ["advance", "energy", "factorize", "gather", "look", "nominal", "respond", "rest"]
+__all__ = [
+    "advance",
+    "energy",
+    "factorize",
+    "gather",
+    "look",
+    "nominal",
+    "respond",
+    "rest",
+]

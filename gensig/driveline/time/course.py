@@ -31,7 +31,11 @@ class LineCourse:
     speed: Array
 
     def __post_init__(self) -> None:
-        if self.time.ndim != 1 or self.time.shape != self.speed.shape or len(self.time) < 1:
+        if (
+            self.time.ndim != 1
+            or self.time.shape != self.speed.shape
+            or len(self.time) < 1
+        ):
             raise ConfigError(
                 f"course: time {self.time.shape} and speed {self.speed.shape} must be alike, (knot,)"
             )
@@ -48,7 +52,9 @@ class LineCourse:
         gain = np.zeros_like(self.speed)
         gain[:-1] = np.diff(self.speed) / np.diff(self.time)
         angle = np.zeros_like(self.speed)
-        angle[1:] = np.cumsum(0.5 * (self.speed[1:] + self.speed[:-1]) * np.diff(self.time))
+        angle[1:] = np.cumsum(
+            0.5 * (self.speed[1:] + self.speed[:-1]) * np.diff(self.time)
+        )
         course = Course(time=self.time, speed=self.speed, angle=angle, gain=gain)
         return course._replace(angle=angle - _at(course, np.zeros(1))[0][0])
 
@@ -81,7 +87,11 @@ class ShaftTorque:
     factor: Array | None = None
 
     def __post_init__(self) -> None:
-        if self.table.ndim != 1 or len(self.table) < 1 or not np.isfinite(self.table).all():
+        if (
+            self.table.ndim != 1
+            or len(self.table) < 1
+            or not np.isfinite(self.table).all()
+        ):
             raise ConfigError(
                 f"torque on degree of freedom {self.dof}: its table must be finite numbers, (node,)"
             )
@@ -100,4 +110,6 @@ def _at(course: Course, times: Array) -> tuple[Array, Array]:
     since = times - course.time[knot]
     gain = np.where(since < 0.0, 0.0, course.gain[knot])
     speed = course.speed[knot]
-    return course.angle[knot] + (speed + 0.5 * gain * since) * since, speed + gain * since
+    return course.angle[knot] + (
+        speed + 0.5 * gain * since
+    ) * since, speed + gain * since

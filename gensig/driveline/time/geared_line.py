@@ -19,7 +19,9 @@ from gensig.mesh.pair_table import SMOOTHED_GAP, SMOOTHED_SHARE
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-CLOSING = 1e-6  # of its terms, by which nominal rotation may close a mesh: radii come rounded
+CLOSING = (
+    1e-6  # of its terms, by which nominal rotation may close a mesh: radii come rounded
+)
 SYMMETRIC = 1e-9
 FULL = 0.5  # of a matrix that is filled, or of a triangle of its factor: from there on, all of it costs less
 
@@ -104,7 +106,10 @@ def pack_line(
         for part in (line.mass, line.damping, line.stiffness)
     )
     direction = _direction(line, order)
-    answer, compliance = np.empty(direction.shape), np.empty((len(direction), len(direction)))
+    answer, compliance = (
+        np.empty(direction.shape),
+        np.empty((len(direction), len(direction))),
+    )
     rows = _rows(direction)
     factor = _factor(
         mass_share * mass + damping_share * damping + stiffness,
@@ -137,7 +142,9 @@ def elimination_order(line: GearedLine) -> Index:
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
     joined = (line.mass != 0.0) | (line.damping != 0.0) | (line.stiffness != 0.0)
-    return np.asarray(reverse_cuthill_mckee(csr_array(joined), symmetric_mode=True), dtype=np.int64)
+    return np.asarray(
+        reverse_cuthill_mckee(csr_array(joined), symmetric_mode=True), dtype=np.int64
+    )
 
 
 def pack_meshes(line: GearedLine, order: Index) -> Meshes:
@@ -176,8 +183,12 @@ def pack_meshes(line: GearedLine, order: Index) -> Meshes:
         place=place,
         table=np.concatenate([*parts["table"], np.empty(0)]),
         depth=np.concatenate([*parts["depth"], np.empty(0)]),
-        rows=np.concatenate([*parts["rows"], np.empty(0, dtype=np.int64)]).astype(np.int64),
-        kind=np.concatenate([*parts["kind"], np.empty(0, dtype=np.int64)]).astype(np.int64),
+        rows=np.concatenate([*parts["rows"], np.empty(0, dtype=np.int64)]).astype(
+            np.int64
+        ),
+        kind=np.concatenate([*parts["kind"], np.empty(0, dtype=np.int64)]).astype(
+            np.int64
+        ),
         error=np.concatenate([*parts["error"], np.empty(0)]),
     )
 
@@ -188,7 +199,9 @@ def _columns(mesh: LineMesh) -> Array:
     gap = np.stack([mesh.gap, _slopes(mesh.gap, SMOOTHED_GAP)], axis=2)
     slope = _slopes(mesh.stiffness, SMOOTHED_SHARE * float(mesh.stiffness.max()))
     springs = np.stack([mesh.stiffness, slope], axis=2).reshape(n_rows, -1, n_nodes, 2)
-    return np.concatenate([gap, np.moveaxis(springs, 1, 2).reshape(n_rows, n_nodes, -1)], axis=2)
+    return np.concatenate(
+        [gap, np.moveaxis(springs, 1, 2).reshape(n_rows, n_nodes, -1)], axis=2
+    )
 
 
 def _slopes(values: Array, limit: float) -> Array:
@@ -204,8 +217,14 @@ def _slopes(values: Array, limit: float) -> Array:
     before, after = chord[:, :-1], chord[:, 1:]
     mean, product = 0.5 * (before + after), before * after
     limited = np.divide(product, mean, out=np.zeros_like(mean), where=product > 0.0)
-    is_smooth = (np.abs(after - before) <= limit) & (values[:, :-2] != 0.0) & (values[:, 2:] != 0.0)
-    return np.concatenate([chord[:, :1], np.where(is_smooth, mean, limited), chord[:, -1:]], axis=1)
+    is_smooth = (
+        (np.abs(after - before) <= limit)
+        & (values[:, :-2] != 0.0)
+        & (values[:, 2:] != 0.0)
+    )
+    return np.concatenate(
+        [chord[:, :1], np.where(is_smooth, mean, limited), chord[:, -1:]], axis=1
+    )
 
 
 def pack_torques(
@@ -217,8 +236,13 @@ def pack_torques(
     per_rad, shift = np.zeros((2, len(torques)))
     for j, torque in enumerate(torques):
         if not 0 <= torque.dof < n:
-            raise ConfigError(f"torque {j}: degree of freedom {torque.dof} must lie in 0..{n - 1}")
-        told, turning = f"torque on '{line.names[torque.dof]}'", float(line.rotation[torque.dof])
+            raise ConfigError(
+                f"torque {j}: degree of freedom {torque.dof} must lie in 0..{n - 1}"
+            )
+        told, turning = (
+            f"torque on '{line.names[torque.dof]}'",
+            float(line.rotation[torque.dof]),
+        )
         if len(torque.table) > 1 and turning == 0.0:
             raise ConfigError(
                 f"{told}: a table over its angle needs a degree of freedom that turns; give one number"
@@ -235,10 +259,12 @@ def pack_torques(
         shift[j] = torque.phase * len(torque.table) / torque.period
     return Torques(
         dof=np.array([at_of[torque.dof] for torque in torques], dtype=np.int64),
-        first=np.cumsum([0, *[len(torque.table) for torque in torques]], dtype=np.int64),
-        table=np.concatenate([*[torque.table for torque in torques], np.empty(0)]).astype(
-            np.float64
+        first=np.cumsum(
+            [0, *[len(torque.table) for torque in torques]], dtype=np.int64
         ),
+        table=np.concatenate(
+            [*[torque.table for torque in torques], np.empty(0)]
+        ).astype(np.float64),
         per_rad=per_rad,
         shift=shift,
         factor=factor,
@@ -246,7 +272,9 @@ def pack_torques(
 
 
 def _direction(line: GearedLine, order: Index) -> Array:
-    return np.array([mesh.direction[order] for mesh in line.meshes]).reshape(-1, len(order))
+    return np.array([mesh.direction[order] for mesh in line.meshes]).reshape(
+        -1, len(order)
+    )
 
 
 def _rows(matrix: Array) -> Rows:
@@ -264,9 +292,9 @@ def _padded(matrix: Array) -> Padded:
     width = max(1, int(filled.sum(axis=1).max()))
     if width > FULL * len(matrix):
         return Padded(column=np.empty((0, len(matrix)), dtype=np.int64), value=matrix)
-    column = np.ascontiguousarray(np.argsort(~filled, axis=1, kind="stable")[:, :width].T).astype(
-        np.int64
-    )
+    column = np.ascontiguousarray(
+        np.argsort(~filled, axis=1, kind="stable")[:, :width].T
+    ).astype(np.int64)
     return Padded(column=column, value=np.take_along_axis(matrix.T, column, axis=0))
 
 
@@ -280,7 +308,9 @@ def _factor(matrix: Array, names: Sequence[str], step: str) -> Factor:
     )  # how many rows must be solved one after the other before a row
     for i in range(n):
         waits[i] = 1 + waits[i - reach[i] : i].max(initial=-1)
-    failed = kernels.factorize(matrix, first, reach.astype(np.int64), lower, inverse_pivot)
+    failed = kernels.factorize(
+        matrix, first, reach.astype(np.int64), lower, inverse_pivot
+    )
     if failed >= 0:
         raise SimulationError(
             f"line: no positive pivot at '{names[failed]}' {step}; check its inertia and springs"

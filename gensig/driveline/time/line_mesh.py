@@ -62,7 +62,11 @@ class LineMesh:
 
     def __post_init__(self) -> None:
         told = f"mesh '{self.name}'"
-        if not len(self.depth) or self.depth[0] != 0.0 or not np.all(np.diff(self.depth) > 0.0):
+        if (
+            not len(self.depth)
+            or self.depth[0] != 0.0
+            or not np.all(np.diff(self.depth) > 0.0)
+        ):
             raise ConfigError(f"{told}: depth {self.depth} must begin at 0 and grow")
         if self.stiffness.ndim != 2 or self.stiffness.shape != (
             len(self.gap) * len(self.depth),
@@ -98,16 +102,26 @@ class LineMesh:
                 raise ConfigError(
                     f"{told}: {what} {rows.shape} must name rows -1..{n_rows - 1} for {counts} kinds"
                 )
-        for kind, error, start in zip(self.kinds, self.errors, self.start_teeth, strict=True):
-            if len(kind) != len(error) or kind.min() < 0 or not np.isfinite(error).all():
+        for kind, error, start in zip(
+            self.kinds, self.errors, self.start_teeth, strict=True
+        ):
+            if (
+                len(kind) != len(error)
+                or kind.min() < 0
+                or not np.isfinite(error).all()
+            ):
                 raise ConfigError(
                     f"{told}: {len(kind)} teeth need as many kinds, and finite errors, not {len(error)}"
                 )
             if not 0 <= start < len(kind):
-                raise ConfigError(f"{told}: start tooth {start} must lie in 0..{len(kind) - 1}")
+                raise ConfigError(
+                    f"{told}: start tooth {start} must lie in 0..{len(kind) - 1}"
+                )
         for key in ("backlash", "damping", "shared_compliance"):
             if not 0.0 <= getattr(self, key) < math.inf:
-                raise ConfigError(f"{told}: {key} {getattr(self, key):g} must not be negative")
+                raise ConfigError(
+                    f"{told}: {key} {getattr(self, key):g} must not be negative"
+                )
 
     @property
     def n_teeth(self) -> tuple[int, int]:
@@ -139,7 +153,11 @@ def phase_mesh(
         a, irregular teeth among them; the node that closes a pitch is the first of the next
     gap : the same shape, m    static transmission error and pitch errors, by which the teeth stand back; default 0
     """
-    gaps = np.zeros_like(stiffness) if gap is None else np.broadcast_to(gap, stiffness.shape)
+    gaps = (
+        np.zeros_like(stiffness)
+        if gap is None
+        else np.broadcast_to(gap, stiffness.shape)
+    )
     if stiffness.ndim != 2 or len(stiffness) not in (1, n_teeth[0]):
         raise ConfigError(
             f"mesh '{name}': stiffness {stiffness.shape} must be (1, node) or ({n_teeth[0]}, node), one row a tooth"
@@ -147,7 +165,8 @@ def phase_mesh(
     n_rows = len(stiffness)
     # the mesh has rolled u = i + s where row i is at s, and the next row begins where it ends
     closed, closed_gap = (
-        np.hstack([part, np.roll(part[:, :1], -1, axis=0)]) for part in (stiffness, gaps)
+        np.hstack([part, np.roll(part[:, :1], -1, axis=0)])
+        for part in (stiffness, gaps)
     )
     kinds = np.arange(n_teeth[0]) % n_rows, np.zeros(n_teeth[1], dtype=np.int64)
     rows = np.arange(n_rows)[:, None]
@@ -204,7 +223,10 @@ def pair_mesh(
     pair, kinds = table.pair, (table.pinion.kind, table.wheel.kind)
     n_kinds = len(table.pinion.compliance), len(table.wheel.compliance)
     n_nodes = len(table.position)
-    own = _summed(table.pinion.compliance, table.wheel.compliance) - table.shared_compliance
+    own = (
+        _summed(table.pinion.compliance, table.wheel.compliance)
+        - table.shared_compliance
+    )
     gap = _summed(table.pinion.gap, table.wheel.gap)
     rows = np.arange(n_kinds[0] * n_kinds[1]).reshape(n_kinds)
     present = table.pinion.present[:, None] & table.wheel.present[None, :]
@@ -259,7 +281,11 @@ def mesh_start(
     """
     if n_teeth < 1:
         raise GeometryError(f"a gear of {n_teeth} teeth has no phase")
-    passed = (tooth_angle - mate_angle) * n_teeth / (2.0 * math.pi) + _quarter(drives) + pitch_point
+    passed = (
+        (tooth_angle - mate_angle) * n_teeth / (2.0 * math.pi)
+        + _quarter(drives)
+        + pitch_point
+    )
     pair = math.floor(passed)
     # the phase is taken within a pitch, so what was pair ``pair`` becomes pair 0
     return pair % n_teeth, passed - pair
@@ -280,7 +306,10 @@ def tooth_angle(
     meshes of the gear.
     """
     tooth, phase = start
-    return mate_angle + (tooth + phase - _quarter(drives) - pitch_point) * 2.0 * math.pi / n_teeth
+    return (
+        mate_angle
+        + (tooth + phase - _quarter(drives) - pitch_point) * 2.0 * math.pi / n_teeth
+    )
 
 
 def _quarter(drives: bool) -> float:

@@ -56,7 +56,9 @@ class LineSolver:
                 f"line solver: sampling rate {self.sampling_rate:g} Hz must be positive"
             )
         if not 2 <= self.oversampling <= 256:
-            raise ConfigError(f"line solver: oversampling {self.oversampling} must lie in 2..256")
+            raise ConfigError(
+                f"line solver: oversampling {self.oversampling} must lie in 2..256"
+            )
         if not 0.0 < self.max_energy_residual <= 1.0:
             raise ConfigError(
                 f"line solver: max_energy_residual {self.max_energy_residual:g} must lie in 0..1"
@@ -134,13 +136,17 @@ def integrate_line(
     if start is not None and any(
         part.shape != (n,) or not np.isfinite(part).all() for part in start
     ):
-        raise ConfigError(f"line: start must be finite deviations and rates, ({n},) each")
+        raise ConfigError(
+            f"line: start must be finite deviations and rates, ({n},) each"
+        )
     step, low_pass = solver.step, decimator(solver.oversampling)
     _check_step(line, course, step)
     first_sample = -max(low_pass.margin + 1, math.ceil(lead_in * solver.sampling_rate))
     if start is None:
         start = (
-            static_start(line, course, torques, time=first_sample / solver.sampling_rate),
+            static_start(
+                line, course, torques, time=first_sample / solver.sampling_rate
+            ),
             np.zeros(n),
         )
     run = _Run(line, course, torques, solver, start, channels)
@@ -165,7 +171,11 @@ def _told_above(value: float, limit: float) -> str:
 
 
 def static_start(
-    line: GearedLine, course: LineCourse, torques: Sequence[ShaftTorque], *, time: float = 0.0
+    line: GearedLine,
+    course: LineCourse,
+    torques: Sequence[ShaftTorque],
+    *,
+    time: float = 0.0,
 ) -> Array:
     """Deviations at which the line turns without vibrating under its mean torques at a time,
     (dof,).
@@ -179,7 +189,10 @@ def static_start(
     """
     order = elimination_order(line)
     still = pack_line(line, order, STILL, 0.0, "at rest")
-    meshes, pushed = pack_meshes(line, order), pack_torques(line, order, torques, course)
+    meshes, pushed = (
+        pack_meshes(line, order),
+        pack_torques(line, order, torques, course),
+    )
     means = np.array([torque.table.mean() for torque in torques])
     pushed = pushed._replace(first=np.arange(len(torques) + 1), table=means)
     angle, _, gain, knot, share = kernels.nominal(course.knots, time, 0)
@@ -189,7 +202,9 @@ def static_start(
     if free <= 1e-12 * float(
         np.abs(line.rotation) @ np.abs(line.stiffness) @ np.abs(line.rotation)
     ):
-        force -= still.carried * (force @ still.rotation) / (still.carried @ still.rotation)
+        force -= (
+            still.carried * (force @ still.rotation) / (still.carried @ still.rotation)
+        )
     law = np.zeros((len(line.meshes), layout.N_LAW))
     if kernels.rest(still, meshes, force, angle, q, law, _scratch(line)) < 0:
         raise SimulationError(
@@ -235,7 +250,10 @@ class _Run:
         self.tally = np.zeros((len(line.meshes), layout.N_TALLY))
         self.sums = np.zeros(layout.N_SUMS)
         self.chosen = np.array(
-            [(KINDS.index(kind), i if kind == "mesh_force" else at_of[i]) for kind, i in channels],
+            [
+                (KINDS.index(kind), i if kind == "mesh_force" else at_of[i])
+                for kind, i in channels
+            ],
             dtype=np.int64,
         ).reshape(-1, 2)
         self.place, self.n_steps, self.energy = 0, 0, 0.0
@@ -245,7 +263,13 @@ class _Run:
         self.place = place
         time = place * self.solver.step
         kernels.look(
-            self.packed, self.meshes, self.torques, self.course, time, self.state, self.work
+            self.packed,
+            self.meshes,
+            self.torques,
+            self.course,
+            time,
+            self.state,
+            self.work,
         )
         self.energy = self._energy()
 
@@ -267,7 +291,9 @@ class _Run:
         self.place += n_steps
         self.n_steps += n_steps
         if not max(np.abs(q).max(), np.abs(v).max()) < OUT_OF_BOUNDS:
-            worst = self.line.names[self.order[int(np.argmax(np.maximum(np.abs(q), np.abs(v))))]]
+            worst = self.line.names[
+                self.order[int(np.argmax(np.maximum(np.abs(q), np.abs(v))))]
+            ]
             raise SimulationError(
                 f"line: '{worst}' left all bounds before {self.place * self.solver.step:.6g} s; the torques are not "
                 f"balanced, or the step is too long"
@@ -275,7 +301,10 @@ class _Run:
 
     def skip(self, n_steps: int) -> None:
         """Integrate on and give out nothing."""
-        nothing, n_block = np.empty((0, 2), dtype=np.int64), BLOCK * self.solver.oversampling
+        nothing, n_block = (
+            np.empty((0, 2), dtype=np.int64),
+            BLOCK * self.solver.oversampling,
+        )
         while n_steps > 0:
             self.advance(min(n_steps, n_block), nothing, np.empty((0, 0)))
             n_steps -= n_block

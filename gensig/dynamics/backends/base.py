@@ -15,9 +15,7 @@ from gensig.errors import ConfigError
 Array = NDArray[np.float64]
 
 BOUNCING = 0.01  # share of the time without contact above which teeth bounce
-OUT_OF_BOUNDS = (
-    1e6  # m, rad, m/s or rad/s: no machine; a motion that overflows may come back to finite numbers
-)
+OUT_OF_BOUNDS = 1e6  # m, rad, m/s or rad/s: no machine; a motion that overflows may come back to finite numbers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +42,9 @@ class Integration:
     max_error: float | None
 
     def __post_init__(self) -> None:
-        count_samples(self.duration, self.sampling_rate)  # refuses a record without samples
+        count_samples(
+            self.duration, self.sampling_rate
+        )  # refuses a record without samples
 
     @property
     def n_samples(self) -> int:
@@ -94,7 +94,9 @@ class Backend(ABC):
         """Returns the least number of records that are simulated at full speed."""
 
     @abstractmethod
-    def integrate(self, machines: Sequence[PairDynamics], integration: Integration) -> Motions:
+    def integrate(
+        self, machines: Sequence[PairDynamics], integration: Integration
+    ) -> Motions:
         """Returns the settled motions of machines that have passed ``check_step``.
 
         The machines share their degrees of freedom and the kind of their mesh law. The motion of a

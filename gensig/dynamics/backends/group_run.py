@@ -28,7 +28,9 @@ class GroupRun:
         self.state = np.zeros((2, n_dof, self.n_lanes), dtype=precision)
         self.lost = np.zeros(self.n_lanes, dtype=precision)
         self.fresh = np.ones(self.n_lanes, dtype=precision)
-        self.work, self.wide, self.near = _kernels.scratch(n_dof, len(channels), precision)
+        self.work, self.wide, self.near = _kernels.scratch(
+            n_dof, len(channels), precision
+        )
 
     @property
     def center(self) -> Array:
@@ -54,10 +56,18 @@ class GroupRun:
     def again(self) -> GroupRun:
         """A copy of the run whose tables are read anew, to go on at another step."""
         other = object.__new__(GroupRun)
-        other.n_lanes, other.channels, other.precision = self.n_lanes, self.channels, self.precision
+        other.n_lanes, other.channels, other.precision = (
+            self.n_lanes,
+            self.channels,
+            self.precision,
+        )
         other.state = self.state.copy()
         other.lost, other.fresh = np.zeros_like(self.lost), np.ones_like(self.fresh)
-        other.work, other.wide, other.near = self.work.copy(), self.wide.copy(), self.near.copy()
+        other.work, other.wide, other.near = (
+            self.work.copy(),
+            self.wide.copy(),
+            self.near.copy(),
+        )
         return other
 
     def advance(self, group: Group, step: float, first_step: int, n_steps: int) -> None:
@@ -91,11 +101,19 @@ class GroupRun:
         seen = np.empty((len(angle), N_SEEN if tell_mesh else 0, self.n_lanes))
         taps = low_pass.padded(self.precision)
         n_rows = _kernels.mean_rows(len(taps), factor)
-        means = np.empty((n_rows, len(self.channels), self.n_lanes), dtype=self.precision)
+        means = np.empty(
+            (n_rows, len(self.channels), self.n_lanes), dtype=self.precision
+        )
         _kernels.record(
             group, self.state.ravel(), self.lost, self.fresh, step, -margin * factor - 1, n_samples, factor,
             taps, self.channels, out.ravel(), angle.ravel(), seen.ravel(), means.ravel(), self.work, self.wide,
             self.near,
         )  # fmt: skip
-        of_mesh = np.ascontiguousarray(seen[margin : margin + n_samples].transpose(2, 1, 0))
-        return out, np.ascontiguousarray(angle[margin : margin + n_samples + 1].T), of_mesh
+        of_mesh = np.ascontiguousarray(
+            seen[margin : margin + n_samples].transpose(2, 1, 0)
+        )
+        return (
+            out,
+            np.ascontiguousarray(angle[margin : margin + n_samples + 1].T),
+            of_mesh,
+        )

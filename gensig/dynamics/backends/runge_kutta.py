@@ -15,7 +15,13 @@ from numpy.typing import NDArray
 
 from gensig.dynamics._layout import Group
 from gensig.dynamics._vector import n_lanes
-from gensig.dynamics.backends.base import BOUNCING, OUT_OF_BOUNDS, Backend, Integration, Motions
+from gensig.dynamics.backends.base import (
+    BOUNCING,
+    OUT_OF_BOUNDS,
+    Backend,
+    Integration,
+    Motions,
+)
 from gensig.dynamics.backends.group_run import GroupRun
 from gensig.dynamics.backends.step_limits import (
     check_step,
@@ -30,9 +36,7 @@ from gensig.dynamics.pair import PairDynamics
 Array = NDArray[np.float64]
 Stages: TypeAlias = Sequence[tuple[int, int]]
 
-CAREFUL = (
-    3  # steps per sample in which a machine that bounced settles again: hard landings are stiff
-)
+CAREFUL = 3  # steps per sample in which a machine that bounced settles again: hard landings are stiff
 CHECKED = 0.03  # s at the beginning of a record, integrated again at half the step
 
 
@@ -57,24 +61,33 @@ class RungeKutta(Backend):
         """Returns the number of vector lanes."""
         return n_lanes(precision)
 
-    def integrate(self, machines: Sequence[PairDynamics], integration: Integration) -> Motions:
+    def integrate(
+        self, machines: Sequence[PairDynamics], integration: Integration
+    ) -> Motions:
         """Returns the motions of machines, integrated in groups that settle in the same stages."""
         groups = lane_groups(machines, integration)
         motions = (
-            (group, integrate_group([machines[i] for i in group], integration)) for group in groups
+            (group, integrate_group([machines[i] for i in group], integration))
+            for group in groups
         )
         return in_order(motions, len(machines))
 
 
-def lane_groups(machines: Sequence[PairDynamics], integration: Integration) -> list[list[int]]:
+def lane_groups(
+    machines: Sequence[PairDynamics], integration: Integration
+) -> list[list[int]]:
     """Indices of the machines of each group; machines of one group settle in the same steps."""
     by_steps: dict[int, list[int]] = {}
     for index, machine in enumerate(machines):
-        steps = coarsest_oversampling(machine, integration.oversampling, integration.sampling_rate)
+        steps = coarsest_oversampling(
+            machine, integration.oversampling, integration.sampling_rate
+        )
         by_steps.setdefault(steps, []).append(index)
     n = n_lanes(integration.precision)
     return [
-        same[first : first + n] for same in by_steps.values() for first in range(0, len(same), n)
+        same[first : first + n]
+        for same in by_steps.values()
+        for first in range(0, len(same), n)
     ]
 
 
@@ -88,7 +101,9 @@ def in_order(groups: Iterable[tuple[list[int], Motions]], n_machines: int) -> Mo
                 rows[field.name] = values[:n_machines]
                 continue
             if field.name not in rows:
-                rows[field.name] = np.empty((n_machines, *values.shape[1:]), dtype=values.dtype)
+                rows[field.name] = np.empty(
+                    (n_machines, *values.shape[1:]), dtype=values.dtype
+                )
             rows[field.name][indices] = values[: len(indices)]
     return Motions(**rows)  # type: ignore[arg-type]
 
@@ -110,7 +125,9 @@ class GroupSteps:
         return at_step(self.packed, self.packed_step, step), step
 
 
-def integrate_group(machines: Sequence[PairDynamics], integration: Integration) -> Motions:
+def integrate_group(
+    machines: Sequence[PairDynamics], integration: Integration
+) -> Motions:
     """Settles machines and records them from time 0 on, in one group.
 
     Returns
@@ -185,17 +202,23 @@ def run_stages(
             run.advance(group, step, now * n_steps, (begin - now) * n_steps)
             for lane, dynamics in enumerate(lanes):
                 if begins[lane] == begin:
-                    run.begin(group, lane, dynamics.static_start(begin * n_steps * step))
+                    run.begin(
+                        group, lane, dynamics.static_start(begin * n_steps * step)
+                    )
                     lost[lane] = 0.0
             now = begin
         if now < until:
             run.advance(group, step, now * n_steps, (until - now) * n_steps)
             now = until
         lost += run.lost / n_steps
-    return run, ~run.is_within(OUT_OF_BOUNDS) | (lost > BOUNCING * (now - np.array(begins)))
+    return run, ~run.is_within(OUT_OF_BOUNDS) | (
+        lost > BOUNCING * (now - np.array(begins))
+    )
 
 
-def recorded(run: GroupRun, steps: GroupSteps, integration: Integration, end: int) -> Motions:
+def recorded(
+    run: GroupRun, steps: GroupSteps, integration: Integration, end: int
+) -> Motions:
     """Records settled machines, which stand at output sample ``end``."""
     fine, n_samples = integration.oversampling, integration.n_samples
     low_pass, (group, step) = decimator(fine), steps.at(fine)
@@ -214,7 +237,8 @@ def recorded(run: GroupRun, steps: GroupSteps, integration: Integration, end: in
         shaft_angle=angle[:, :-1],
         seen=seen,
         mean_speed=(angle[:, -1] - angle[:, 0]) * integration.sampling_rate / n_samples,
-        contact_loss_fraction=run.lost / ((n_samples + 2 * low_pass.margin - 1) * fine + 1),
+        contact_loss_fraction=run.lost
+        / ((n_samples + 2 * low_pass.margin - 1) * fine + 1),
         finite=run.is_within(OUT_OF_BOUNDS),
     )
 

@@ -15,9 +15,7 @@ from gensig.errors import SimulationError
 
 LONGEST_SETTLING = 0.45  # s
 SETTLED = 1e-4  # share of the start's transient that is left
-STABILITY_LIMIT = (
-    2.6  # |lambda| h of the classical RK4 on the imaginary axis is 2.83, on the real axis 2.79
-)
+STABILITY_LIMIT = 2.6  # |lambda| h of the classical RK4 on the imaginary axis is 2.83, on the real axis 2.79
 LONG_STEP = 0.5  # of the same, above which the error may exceed 1e-3
 COARSE_STABILITY = 0.6  # share of the limit: tables may be stiffer than their mean
 # Stages of the settling: steps per sample, and the time before the record at which the stage ends,
@@ -41,7 +39,9 @@ def settling_time(dynamics: PairDynamics) -> float:
     return min(LONGEST_SETTLING, math.log(1.0 / SETTLED) / rate)
 
 
-def coarsest_oversampling(dynamics: PairDynamics, oversampling: int, sampling_rate: float) -> int:
+def coarsest_oversampling(
+    dynamics: PairDynamics, oversampling: int, sampling_rate: float
+) -> int:
     """Least stable number of steps per sample of the settling, at most that of the record."""
     fastest = float(np.abs(dynamics.stiff_rates).max()) / sampling_rate
     return min(oversampling, math.ceil(fastest / (COARSE_STABILITY * STABILITY_LIMIT)))
@@ -59,7 +59,10 @@ def settling_stages(
 
 
 def check_step(
-    dynamics: PairDynamics, sampling_rate: float, oversampling: int, max_error: float | None = None
+    dynamics: PairDynamics,
+    sampling_rate: float,
+    oversampling: int,
+    max_error: float | None = None,
 ) -> None:
     """Raise SimulationError for a step that RK4 cannot take, warn of a long one where nothing will
     look at its error.

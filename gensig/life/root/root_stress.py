@@ -78,7 +78,9 @@ def root_width(pair: GearPair, gear: Gear) -> float:
     The gear's own, of a wider one no more than a module beyond either end.
     """
     mate = pair.wheel if gear is pair.pinion else pair.pinion
-    return min(gear.face_width, mate.face_width + 2.0 * OVERHANG_MODULES * gear.normal_module)
+    return min(
+        gear.face_width, mate.face_width + 2.0 * OVERHANG_MODULES * gear.normal_module
+    )
 
 
 def root_factors(
@@ -135,7 +137,9 @@ def root_factors(
             contact_ratio_factor=0.25 + 0.75 / max(ratio, 1.0) if at_tip else 1.0,
             helix_factor=helix_factor(pair, edition=edition),
             rim_thickness_factor=rim_thickness_factor(gear),
-            deep_tooth_factor=1.0 if at_tip or edition == 2019 else deep_tooth_factor(ratio, grade),
+            deep_tooth_factor=1.0
+            if at_tip or edition == 2019
+            else deep_tooth_factor(ratio, grade),
             notch_parameter=root_section(gear).notch_parameter,
         )
     return found
@@ -171,13 +175,18 @@ def rim_thickness_factor(gear: Gear) -> float:
 
     Source: ISO 6336-3, 9, external gears; no thinner rims than half a tooth height.
     """
-    height, rim = gear.tip_radius - gear.root_radius, gear.root_radius - gear.bore_radius
+    height, rim = (
+        gear.tip_radius - gear.root_radius,
+        gear.root_radius - gear.bore_radius,
+    )
     if rim <= RIM_SHARES[0] * height:
         raise GeometryError(
             f"{gear.name}: the rim between bore and root is {rim * 1e3:.3g} mm, {rim / height:.2g} tooth heights; ISO "
             f"6336-3 covers more than {RIM_SHARES[0]:g}; reduce bore_radius_mm"
         )
-    return 1.0 if rim >= RIM_SHARES[1] * height else 1.6 * math.log(2.242 * height / rim)
+    return (
+        1.0 if rim >= RIM_SHARES[1] * height else 1.6 * math.log(2.242 * height / rim)
+    )
 
 
 def deep_tooth_factor(ratio: float, grade: float | None) -> float:
@@ -213,7 +222,12 @@ def stress_factor_on_path(
 
 
 def pair_root_stress(
-    pair: GearPair, gear: Gear, position: Array, load: Array, *, allow_extrapolation: bool = False
+    pair: GearPair,
+    gear: Gear,
+    position: Array,
+    load: Array,
+    *,
+    allow_extrapolation: bool = False,
 ) -> Array:
     """Root stress of a spur tooth under the load of its pair, static or dynamic, of the shape of
     ``position``, Pa.
@@ -223,7 +237,9 @@ def pair_root_stress(
     position : m    of the contact from A
     load : N        of this pair along the line of action
     """
-    factor = stress_factor_on_path(pair, gear, position, allow_extrapolation=allow_extrapolation)
+    factor = stress_factor_on_path(
+        pair, gear, position, allow_extrapolation=allow_extrapolation
+    )
     tangential = load * math.cos(gear.transverse_pressure_angle)
     return tangential * factor / (root_width(pair, gear) * gear.normal_module)
 

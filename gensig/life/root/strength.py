@@ -54,7 +54,9 @@ def reliability(safety: float) -> str:
     Source: engine paper, table 3 (high, higher, general and low reliability from 2.00, 1.60, 1.25
     and 1.00 on).
     """
-    return next((found.name for found in RELIABILITY if safety >= found.least_safety), BELOW_ALL)
+    return next(
+        (found.name for found in RELIABILITY if safety >= found.least_safety), BELOW_ALL
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,7 +101,9 @@ class Strength:
         for key in ("bending_limit_mpa", "n_load_cycles", *FACTORS):
             value = getattr(self, key.removesuffix("_mpa"))
             if value is not None and not value > 0.0:
-                raise ConfigError(f"strength.{key} = {from_si(key, value):g} must be positive")
+                raise ConfigError(
+                    f"strength.{key} = {from_si(key, value):g} must be positive"
+                )
         for key, allowed in (("load_point", LOAD_POINTS), ("edition", EDITIONS)):
             if getattr(self, key) not in allowed:
                 raise ConfigError(
@@ -141,7 +145,9 @@ def safety(
     Y_S, so it is about half of the other.
     """
     if not stress > 0.0:
-        raise ConfigError(f"the root stress is {stress * 1e-6:g} MPa and must be positive")
+        raise ConfigError(
+            f"the root stress is {stress * 1e-6:g} MPa and must be positive"
+        )
     life = strength.life_factor
     notch = strength.relative_notch_sensitivity
     size = strength.size_factor
@@ -167,7 +173,11 @@ def life_factor(n_load_cycles: float) -> float:
     Source: ISO 6336-3, 12, the lower of its two lines beyond 3e6.
     """
     return float(
-        np.exp(np.interp(math.log(n_load_cycles), np.log(LIFE_CYCLES), np.log(LIFE_FACTORS)))
+        np.exp(
+            np.interp(
+                math.log(n_load_cycles), np.log(LIFE_CYCLES), np.log(LIFE_FACTORS)
+            )
+        )
     )
 
 

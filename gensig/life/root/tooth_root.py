@@ -86,7 +86,9 @@ class RootLoading:
 
 def virtual_gear(gear: Gear) -> VirtualGear:
     """The virtual spur gear of a gear."""
-    n_teeth = gear.n_teeth / (math.cos(gear.base_helix_angle) ** 2 * math.cos(gear.helix_angle))
+    n_teeth = gear.n_teeth / (
+        math.cos(gear.base_helix_angle) ** 2 * math.cos(gear.helix_angle)
+    )
     pitch_radius = 0.5 * gear.normal_module * n_teeth
     return VirtualGear(
         n_teeth=n_teeth,
@@ -119,8 +121,12 @@ def root_section(gear: Gear) -> RootSection:
     thickness = z * math.sin(math.pi / 3.0 - theta) + math.sqrt(3.0) * (
         g / math.cos(theta) - rounding
     )
-    fillet = rounding + 2.0 * g**2 / (math.cos(theta) * (z * math.cos(theta) ** 2 - 2.0 * g))
-    height = 0.5 * (z * math.cos(math.pi / 3.0 - theta) + g / math.cos(theta) - rounding)
+    fillet = rounding + 2.0 * g**2 / (
+        math.cos(theta) * (z * math.cos(theta) ** 2 - 2.0 * g)
+    )
+    height = 0.5 * (
+        z * math.cos(math.pi / 3.0 - theta) + g / math.cos(theta) - rounding
+    )
     module = gear.normal_module
     return RootSection(
         thickness=module * thickness,

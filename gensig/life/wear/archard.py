@@ -43,7 +43,10 @@ class FlankPath:
     def curvature(self) -> Array:
         """Curvature radii of new flanks in the transverse section, (2, node) m: pinion, wheel."""
         return np.array(
-            [self.pair.pinion_curvature(self.position), self.pair.wheel_curvature(self.position)]
+            [
+                self.pair.pinion_curvature(self.position),
+                self.pair.wheel_curvature(self.position),
+            ]
         )
 
     @cached_property
@@ -59,7 +62,9 @@ class FlankPath:
     @cached_property
     def relative_curvature(self) -> Array:
         """Sum of both flanks' curvatures in the section normal to the contact line, (node,) 1/m."""
-        return math.cos(self.pair.base_helix_angle) * np.sum(1.0 / self.curvature, axis=0)
+        return math.cos(self.pair.base_helix_angle) * np.sum(
+            1.0 / self.curvature, axis=0
+        )
 
     @cached_property
     def rolling(self) -> Array:
@@ -89,7 +94,10 @@ def flank_path(pair: GearPair, n_nodes: int = 101) -> FlankPath:
         return FlankPath(pair=pair, position=np.linspace(0.0, path, n_nodes))
     before = min(max(round(n_nodes * pitch / path), 2), n_nodes - 2)
     nodes = np.concatenate(
-        [np.linspace(0.0, pitch, before)[:-1], np.linspace(pitch, path, n_nodes + 1 - before)]
+        [
+            np.linspace(0.0, pitch, before)[:-1],
+            np.linspace(pitch, path, n_nodes + 1 - before),
+        ]
     )
     return FlankPath(pair=pair, position=nodes)
 
@@ -118,7 +126,9 @@ def hertz_pressure(
             for j in range(len(line_load))
         ]
     )
-    return np.sqrt(line_load * scaled * np.maximum(new + worn, LEAST_CURVATURE_SHARE * new))
+    return np.sqrt(
+        line_load * scaled * np.maximum(new + worn, LEAST_CURVATURE_SHARE * new)
+    )
 
 
 def band_half_width(path: FlankPath, line_load: Array, material: Material) -> Array:
@@ -169,7 +179,9 @@ def worn_curvature(path: FlankPath, depth: Array, half_width: Array) -> Array:
         length, back = arc[order], worn[order]
         whole = np.maximum(half_width[order], 2.0 * np.gradient(length))
         ends = [2.0 * length[0] - length[-1], 2.0 * length[-1] - length[0]]
-        slopes = np.diff(back)[[0, -1]] / np.diff(length)[[0, -1]] * (length[-1] - length[0])
+        slopes = (
+            np.diff(back)[[0, -1]] / np.diff(length)[[0, -1]] * (length[-1] - length[0])
+        )
         wide = np.concatenate([ends[:1], length, ends[1:]])
         long = np.concatenate([[back[0] - slopes[0]], back, [back[-1] + slopes[1]]])
         parts = []

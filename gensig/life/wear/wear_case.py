@@ -21,13 +21,21 @@ from gensig.life.wear.archard import (
     hertz_pressure,
     meshes_per_turn,
 )
-from gensig.life.wear.worn_contact import PathLoads, WornContact, path_loads, worn_contact
+from gensig.life.wear.worn_contact import (
+    PathLoads,
+    WornContact,
+    path_loads,
+    worn_contact,
+)
 from gensig.material import Material
 from gensig.mesh.sliced.slices import SlicedMesh
 
 Array = NDArray[np.float64]
 
-N_NODES = {"band": 101, "fixed_intervals": 51}  # the second is stiff, and does not converge anyhow
+N_NODES = {
+    "band": 101,
+    "fixed_intervals": 51,
+}  # the second is stiff, and does not converge anyhow
 ERROR_PHASES = 32
 
 
@@ -71,7 +79,9 @@ class WearCase:
         """Total force along the transverse line of action, N."""
         pinion = self.pair.pinion
         return self.torque / (
-            pinion.base_radius if self.options.load_radius == "base" else pinion.pitch_radius
+            pinion.base_radius
+            if self.options.load_radius == "base"
+            else pinion.pitch_radius
         )
 
     @property
@@ -137,7 +147,9 @@ class WearCase:
 
         The deepest place of either flank, or of both together.
         """
-        return float(depth.sum(axis=0).max() if self.options.criterion == "sum" else depth.max())
+        return float(
+            depth.sum(axis=0).max() if self.options.criterion == "sum" else depth.max()
+        )
 
 
 def wear_case(

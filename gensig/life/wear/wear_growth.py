@@ -41,7 +41,10 @@ class WearTable:
         for life, reached in zip(self.lives, self.reached, strict=True):
             place = float(np.interp(size, reached, np.arange(len(reached))))
             low = min(int(place), len(reached) - 2)
-            found.append(life.depth[low] + (place - low) * (life.depth[low + 1] - life.depth[low]))
+            found.append(
+                life.depth[low]
+                + (place - low) * (life.depth[low + 1] - life.depth[low])
+            )
         return _between(self.torque, np.array(found), torque)
 
 
@@ -52,15 +55,26 @@ def wear_table(case: WearCase, least: float, greatest: float) -> WearTable:
     ------
     GensigError    for what ``wear_life`` refuses
     """
-    torques = np.array([least]) if least == greatest else np.geomspace(least, greatest, N_TORQUES)
+    torques = (
+        np.array([least])
+        if least == greatest
+        else np.geomspace(least, greatest, N_TORQUES)
+    )
     lives = tuple(wear_life(case.under(float(torque))) for torque in torques)
     # a limit of the transmission error may end lives at unlike depths: the least of them ends all
     sizes = np.linspace(0.0, min(life.threshold for life in lives), N_DEPTHS)
-    reached = tuple(np.array([life.case.judged(depth) for depth in life.depth]) for life in lives)
-    turns = np.array(
-        [np.interp(sizes, depths, life.turns) for depths, life in zip(reached, lives, strict=True)]
+    reached = tuple(
+        np.array([life.case.judged(depth) for depth in life.depth]) for life in lives
     )
-    return WearTable(torque=torques, lives=lives, reached=reached, sizes=sizes, turns=turns)
+    turns = np.array(
+        [
+            np.interp(sizes, depths, life.turns)
+            for depths, life in zip(reached, lives, strict=True)
+        ]
+    )
+    return WearTable(
+        torque=torques, lives=lives, reached=reached, sizes=sizes, turns=turns
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

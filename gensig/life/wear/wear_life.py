@@ -25,9 +25,7 @@ Array = NDArray[np.float64]
 ACCURACY = {"band": (1e-3, 2e-9), "fixed_intervals": (1e-3, 1e-9)}
 BANDWIDTH = 13
 LARGEST_SHARE = 0.1  # of the threshold, worn in one step
-HORIZON = (
-    50.0  # times the life at the rate of new flanks: sharing slows wear down, but never so much
-)
+HORIZON = 50.0  # times the life at the rate of new flanks: sharing slows wear down, but never so much
 N_SNAPSHOTS = 41
 
 
@@ -109,12 +107,20 @@ def wear_life(case: WearCase) -> WearLife:
     by_error = len(ends) == 2 and len(solution.t_events[1]) > 0
     ended_by = "transmission_error" if by_error else "depth"
     return WearLife(
-        case=case, turns=turns, depth=depth, ended_by=ended_by, n_steps=len(solution.t) - 1
+        case=case,
+        turns=turns,
+        depth=depth,
+        ended_by=ended_by,
+        n_steps=len(solution.t) - 1,
     )
 
 
 def worn_flanks(
-    case: WearCase, turns: Array, *, torque: Array | None = None, start: Array | None = None
+    case: WearCase,
+    turns: Array,
+    *,
+    torque: Array | None = None,
+    start: Array | None = None,
 ) -> Array:
     """Depth off both flanks after so many turns of the pinion, whatever the threshold.
 
@@ -134,7 +140,11 @@ def worn_flanks(
     ConfigError    for turns that fall, or a torque that is not positive or not one for each
     """
     turns = np.asarray(turns, dtype=np.float64)
-    if turns.ndim != 1 or not np.isfinite(turns).all() or (np.diff(turns, prepend=0.0) < 0.0).any():
+    if (
+        turns.ndim != 1
+        or not np.isfinite(turns).all()
+        or (np.diff(turns, prepend=0.0) < 0.0).any()
+    ):
         raise ConfigError(
             "the turns of a life must be a row of numbers that never falls, from 0 on"
         )
@@ -147,7 +157,9 @@ def worn_flanks(
         )
     found = np.empty((len(turns), *case.shape))
     for k, stretch in enumerate(np.diff(turns, prepend=0.0)):
-        depth = found[k] = _depth_at(case.under(float(torque[k])), depth, np.array([stretch]))[0]
+        depth = found[k] = _depth_at(
+            case.under(float(torque[k])), depth, np.array([stretch])
+        )[0]
     return found
 
 

@@ -26,9 +26,7 @@ from gensig.mesh.sliced.slices import (
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-PHASES_PER_PITCH = (
-    24  # of a mesh in several slices, whose slices pass the nodes at other phases than these
-)
+PHASES_PER_PITCH = 24  # of a mesh in several slices, whose slices pass the nodes at other phases than these
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -59,9 +57,13 @@ class WornContact:
             return settled_contact(self.phases, force)
         back = depth.sum(axis=0) / math.cos(self.phases.mesh.pair.base_helix_angle)
         row = np.arange(len(back))
-        worn = (1.0 - self.share) * back[row, self.node] + self.share * back[row, self.node + 1]
+        worn = (1.0 - self.share) * back[row, self.node] + self.share * back[
+            row, self.node + 1
+        ]
         try:
-            return settled_contact(replace(self.phases, gap=self.phases.gap + worn), force)
+            return settled_contact(
+                replace(self.phases, gap=self.phases.gap + worn), force
+            )
         except GeometryError:
             raise SimulationError(
                 f"worn {depth.max() * 1e6:.3g} um deep, the flanks find no settled contact: what is left at the pitch "
@@ -74,9 +76,13 @@ def worn_contact(mesh: SlicedMesh, path: FlankPath, roll: Array) -> WornContact:
     phases = contact_phases(mesh, roll)
     place = np.clip(phases.position, path.position[0], path.position[-1])
     node = np.clip(
-        np.searchsorted(path.position, place, side="right") - 1, 0, len(path.position) - 2
+        np.searchsorted(path.position, place, side="right") - 1,
+        0,
+        len(path.position) - 2,
     )
-    share = (place - path.position[node]) / (path.position[node + 1] - path.position[node])
+    share = (place - path.position[node]) / (
+        path.position[node + 1] - path.position[node]
+    )
     return WornContact(phases=phases, node=node, share=share)
 
 
@@ -111,7 +117,11 @@ def path_loads(mesh: SlicedMesh, path: FlankPath) -> PathLoads:
     """
     n_slices, pitch = len(mesh.slice_place), mesh.pair.base_pitch
     one = n_slices == 1
-    roll = path.position if one else pitch * (np.arange(PHASES_PER_PITCH) + 0.5) / PHASES_PER_PITCH
+    roll = (
+        path.position
+        if one
+        else pitch * (np.arange(PHASES_PER_PITCH) + 0.5) / PHASES_PER_PITCH
+    )
     contact = worn_contact(mesh, path, roll)
     before, after = np.empty((2, n_slices, len(path.position)), dtype=np.int64)
     share = np.empty(before.shape)
@@ -119,11 +129,15 @@ def path_loads(mesh: SlicedMesh, path: FlankPath) -> PathLoads:
         place = contact.phases.position[..., j].ravel()
         order = np.argsort(place, kind="stable")
         if mesh.options.law == "paper":  # no contact beyond the path, and a step there
-            order = order[(place[order] >= 0.0) & (place[order] <= mesh.pair.path_of_contact)]
+            order = order[
+                (place[order] >= 0.0) & (place[order] <= mesh.pair.path_of_contact)
+            ]
         right = np.clip(np.searchsorted(place[order], path.position), 1, len(order) - 1)
         low, high = order[right - 1], order[right]
         share[j] = np.clip(
-            (path.position - place[low]) / np.maximum(place[high] - place[low], 1e-15), 0.0, 1.0
+            (path.position - place[low]) / np.maximum(place[high] - place[low], 1e-15),
+            0.0,
+            1.0,
         )
         before[j], after[j] = low * n_slices + j, high * n_slices + j
     return PathLoads(contact=contact, before=before, after=after, share=share)

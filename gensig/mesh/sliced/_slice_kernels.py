@@ -51,7 +51,10 @@ def solve_slices(
     number of phases whose bearing slices were still changing after `ROUNDS`
     """
     n_phases, n_pairs, n_slices = gap.shape
-    contact, bearing = np.empty((n_pairs, n_slices)), np.zeros((n_pairs, n_slices), np.bool_)
+    contact, bearing = (
+        np.empty((n_pairs, n_slices)),
+        np.zeros((n_pairs, n_slices), np.bool_),
+    )
     lift, rest = np.empty((n_pairs, n_slices)), np.empty((n_pairs, n_slices))
     own, between = np.empty((n_pairs, n_slices)), np.empty((n_pairs, n_slices))
     per_pivot = np.empty(n_slices)
@@ -91,7 +94,9 @@ def solve_slices(
                     if bearing[i, j]:
                         total += width[k, i, j] * (1.0 - lift[i, j]) / contact[i, j]
                         moment += (
-                            width[k, i, j] * (gap[k, i, j] - first - rest[i, j]) / contact[i, j]
+                            width[k, i, j]
+                            * (gap[k, i, j] - first - rest[i, j])
+                            / contact[i, j]
                         )
             local = (force + moment) / total  # above the first gap
             changed = False
@@ -177,17 +182,32 @@ def bite_forces(
             for j in range(n_slices):
                 if not bearing[j]:
                     contact[j] = factor * (constant[k, j] - log_weight * light)
-                    bearing[j] = width[k, j] > 0.0 and gap[k, j] - first[k] < depth[knot]
+                    bearing[j] = (
+                        width[k, j] > 0.0 and gap[k, j] - first[k] < depth[knot]
+                    )
             last, settled = 0.0, False
             for _ in range(ROUNDS):
                 _deflections(
-                    own, between, breadth, contact, gap[k], first[k], bearing, per_pivot, lift, rest
+                    own,
+                    between,
+                    breadth,
+                    contact,
+                    gap[k],
+                    first[k],
+                    bearing,
+                    per_pivot,
+                    lift,
+                    rest,
                 )
                 total, changed = 0.0, False
                 for j in range(n_slices):
                     if width[k, j] <= 0.0 or gap[k, j] == np.inf:
                         continue
-                    bite = depth[knot] - (gap[k, j] - first[k]) - (lift[j] * depth[knot] - rest[j])
+                    bite = (
+                        depth[knot]
+                        - (gap[k, j] - first[k])
+                        - (lift[j] * depth[knot] - rest[j])
+                    )
                     touches = bite > 0.0
                     changed = changed or touches != bearing[j]
                     bearing[j] = touches
@@ -224,7 +244,9 @@ def _stiffen(structure, breadth, length_squared, own, between):
 
 
 @_compiled
-def _deflections(own, between, breadth, contact, gap, first, bearing, per_pivot, lift, rest):
+def _deflections(
+    own, between, breadth, contact, gap, first, bearing, per_pivot, lift, rest
+):
     """Deflection of one pair's structure, lift x (approach above the first gap) - rest, (slice,)
     each, written.
 

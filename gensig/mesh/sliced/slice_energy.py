@@ -26,9 +26,13 @@ def structure_energy(
     n_slices = len(width)
     between = np.zeros_like(structure)
     between[:, :-1] = (
-        4.0 * length_squared / ((structure[:, 1:] + structure[:, :-1]) * (width[1:] + width[:-1]))
+        4.0
+        * length_squared
+        / ((structure[:, 1:] + structure[:, :-1]) * (width[1:] + width[:-1]))
     )
-    before = np.roll(between, 1, axis=1)  # the last ties to nothing, so the first does not either
+    before = np.roll(
+        between, 1, axis=1
+    )  # the last ties to nothing, so the first does not either
     pivot = width / structure + before + between
     load = width * line_load
     moved = load.copy()

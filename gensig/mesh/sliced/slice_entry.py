@@ -40,8 +40,12 @@ def over_slice(
     for j in range(n_looks + 1):
         own = begun[j : j + n_left]
         bite = np.clip((least - first[j : j + n_left])[:, None] + depth, 0.0, depth[-1])
-        chord = np.clip(np.searchsorted(knots, bite, side="right") - 1, 0, len(depth) - 1)
+        chord = np.clip(
+            np.searchsorted(knots, bite, side="right") - 1, 0, len(depth) - 1
+        )
         low, high = (np.take_along_axis(own, chord + more, axis=1) for more in (0, 1))
         share = (bite - knots[chord]) / np.diff(knots)[chord]
-        mean += (0.5 if j in (0, n_looks) else 1.0) / n_looks * (low + share * (high - low))
+        mean += (
+            (0.5 if j in (0, n_looks) else 1.0) / n_looks * (low + share * (high - low))
+        )
     return least, mean

@@ -14,7 +14,9 @@ from gensig.mesh.sliced.slices import LoadedContact, SlicedMesh
 Array = NDArray[np.float64]
 
 
-def contact_pressure(mesh: SlicedMesh, contact: LoadedContact, material: Material) -> Array:
+def contact_pressure(
+    mesh: SlicedMesh, contact: LoadedContact, material: Material
+) -> Array:
     """Largest Hertzian pressure of every slice, (phase, pair, slice) Pa.
 
     Source: Hertz, p = sqrt(w E' / (2 pi rho)) with E' = E / (1 - nu^2) for two like flanks. Load

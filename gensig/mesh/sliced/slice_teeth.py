@@ -90,7 +90,9 @@ def merged_edges(pair: GearPair, n_slices: int, teeth: Collection[Tooth]) -> Arr
     least = NARROWEST * pair.face_width
     nearest = even[np.searchsorted(0.5 * (even[1:] + even[:-1]), further)]
     further = further[
-        (further > 0.0) & (further < pair.face_width) & (np.abs(further - nearest) > least)
+        (further > 0.0)
+        & (further < pair.face_width)
+        & (np.abs(further - nearest) > least)
     ]
     if len(further):
         further = further[np.append(True, np.diff(further) > least)]
@@ -113,9 +115,17 @@ def slices_of_gears(
     structure : (node,) m2/N    of sound pairs per width, less what pairs share
     """
     sides = {}
-    flanks = flank_sides(pair, node_positions(pair, options), material, options, 1.0) if odd else {}
+    flanks = (
+        flank_sides(pair, node_positions(pair, options), material, options, 1.0)
+        if odd
+        else {}
+    )
     for gear in (pair.pinion, pair.wheel):
-        teeth = {number: odd[name, number] for name, number in sorted(odd) if name == gear.name}
+        teeth = {
+            number: odd[name, number]
+            for name, number in sorted(odd)
+            if name == gear.name
+        }
         distinct, kind = distinct_teeth(healthy_tooth(gear), teeth)
         shape = (len(distinct), len(edges) - 1, len(structure))
         if len(distinct) == 1:
@@ -125,11 +135,19 @@ def slices_of_gears(
             for row, tooth in enumerate(distinct[1:], start=1):
                 if tooth.present:
                     softening[row] = _softening(
-                        tooth, flanks[gear.name], pair, material, options, edges, structure
+                        tooth,
+                        flanks[gear.name],
+                        pair,
+                        material,
+                        options,
+                        edges,
+                        structure,
                     )
                     gap[row] = _gap(tooth, flanks[gear.name], pair, edges)
         present = np.array([tooth.present for tooth in distinct])
-        sides[gear.name] = GearSlices(softening=softening, gap=gap, present=present, kind=kind)
+        sides[gear.name] = GearSlices(
+            softening=softening, gap=gap, present=present, kind=kind
+        )
     return sides
 
 
@@ -141,7 +159,9 @@ def _overhang(pair: GearPair, tooth: Tooth) -> float:
 def _source(tooth: Tooth, pair: GearPair, edges: Array) -> NDArray[np.int64]:
     """Which slice of a tooth every slice of the pair is part of, (slice,)."""
     middle = 0.5 * (edges[1:] + edges[:-1]) + _overhang(pair, tooth)
-    return np.clip(np.searchsorted(tooth.slice_edges, middle) - 1, 0, len(tooth.slice_width) - 1)
+    return np.clip(
+        np.searchsorted(tooth.slice_edges, middle) - 1, 0, len(tooth.slice_width) - 1
+    )
 
 
 def _gap(tooth: Tooth, flank: FlankSide, pair: GearPair, edges: Array) -> Array:
@@ -169,16 +189,21 @@ def _softening(
     curvature, rest = different
     softer = opened = np.zeros((1, len(curvature)))
     if tooth.material_loss.any():
-        softer = _without_loss(tooth, curvature, in_plane, options)[_source(tooth, pair, edges)]
+        softer = _without_loss(tooth, curvature, in_plane, options)[
+            _source(tooth, pair, edges)
+        ]
     if tooth.cracks:
         reached = np.minimum(curvature, tooth.tip_curvature_radius)
         cracks = [
-            _strips(tooth, crack, reached, in_plane, options, pair, edges) for crack in tooth.cracks
+            _strips(tooth, crack, reached, in_plane, options, pair, edges)
+            for crack in tooth.cracks
         ]
         local = np.sum(cracks, axis=0)
         whole = _opened(tooth, reached, in_plane, options)
         opened = _shared_out(local, whole, rest / gear.face_width, np.diff(edges))
-    softer = np.broadcast_to(gear.face_width * (softer + opened), (len(edges) - 1, len(curvature)))
+    softer = np.broadcast_to(
+        gear.face_width * (softer + opened), (len(edges) - 1, len(curvature))
+    )
     return softer[:, place.ravel()]
 
 
@@ -191,15 +216,23 @@ def _without_loss(
     """
     gone = ~np.isfinite(tooth.material_loss)
     profile = tooth.profile.curvature_radius
-    tip = np.where(gone.any(axis=1), profile[np.maximum(gone.argmax(axis=1) - 1, 0)], profile[-1])
-    left = replace(tooth, cracks=(), material_loss=np.where(gone, 0.0, tooth.material_loss))
+    tip = np.where(
+        gone.any(axis=1), profile[np.maximum(gone.argmax(axis=1) - 1, 0)], profile[-1]
+    )
+    left = replace(
+        tooth, cracks=(), material_loss=np.where(gone, 0.0, tooth.material_loss)
+    )
     known = np.unique(np.concatenate([curvature, tip]))
     compliance = structural_compliance(left, known, material, options)
     loaded = np.interp(np.minimum(curvature, tip[:, None]), known, compliance)
-    return loaded - structural_compliance(healthy_tooth(tooth.gear), curvature, material, options)
+    return loaded - structural_compliance(
+        healthy_tooth(tooth.gear), curvature, material, options
+    )
 
 
-def _opened(tooth: Tooth, curvature: Array, material: Material, options: MeshOptions) -> Array:
+def _opened(
+    tooth: Tooth, curvature: Array, material: Material, options: MeshOptions
+) -> Array:
     """What the cracks of a tooth add to its compliance, (phase,) m/N."""
     if options.crack != "paper":
         return crack_compliance(
@@ -225,7 +258,9 @@ def _strips(
 ) -> Array:
     """What the crack adds if it is everywhere as deep as in a slice, (slice, phase) m/N."""
     depth, strip = np.unique(crack.depth, return_inverse=True)
-    alone = [replace(tooth, cracks=(replace(crack, depth=np.array([one])),)) for one in depth]
+    alone = [
+        replace(tooth, cracks=(replace(crack, depth=np.array([one])),)) for one in depth
+    ]
     found = np.array([_opened(one, curvature, material, options) if one.cracks[0].depth[0] else 0.0 * curvature
                       for one in alone])  # fmt: skip
     strips = np.linspace(0.0, tooth.gear.face_width, len(crack.depth) + 1)
@@ -265,7 +300,10 @@ def _shared_out(local: Array, whole: Array, rest: Array, width: Array) -> Array:
         stiffness = share / (rest + factor * local)
         slope = (stiffness * local / (rest + factor * local)).sum(axis=0)
         step = np.divide(
-            stiffness.sum(axis=0) - aim, slope, out=np.zeros_like(aim), where=slope > 0.0
+            stiffness.sum(axis=0) - aim,
+            slope,
+            out=np.zeros_like(aim),
+            where=slope > 0.0,
         )
         factor = factor + np.maximum(step, 0.0)
     return factor * local

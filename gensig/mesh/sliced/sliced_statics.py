@@ -49,10 +49,16 @@ def chord_states(
     index = index - np.arange(table.last_pitch - table.first_pitch)
     position = roll[:, None] - index * pitch
     nodes, n_cells = table.position, len(table.position) - 1
-    place = np.clip((position - nodes[0]) * (n_cells / (nodes[-1] - nodes[0])), 0.0, n_cells)
+    place = np.clip(
+        (position - nodes[0]) * (n_cells / (nodes[-1] - nodes[0])), 0.0, n_cells
+    )
     cell = np.minimum(place.astype(np.int64), n_cells - 1)
     part = (place - cell)[:, :, None]
-    beyond = position - pair.pitch_point - 0.5 * pair.face_width * math.tan(pair.base_helix_angle)
+    beyond = (
+        position
+        - pair.pitch_point
+        - 0.5 * pair.face_width * math.tan(pair.base_helix_angle)
+    )
     pinion, wheel = (
         (index + start_tooth_pinion) % pair.pinion.n_teeth,
         (index + start_tooth_wheel) % pair.wheel.n_teeth,
@@ -78,7 +84,9 @@ def chord_states(
     )
 
 
-def chord_equilibrium(table: SlicedTable, states: ChordStates, force: float) -> StaticMesh:
+def chord_equilibrium(
+    table: SlicedTable, states: ChordStates, force: float
+) -> StaticMesh:
     """Load sharing, approach and tangent stiffness dF/d(approach) under a total mesh force in N.
 
     Every pair is on the chord of its own depth of bite into what the others deflect. Forces of
@@ -89,7 +97,11 @@ def chord_equilibrium(table: SlicedTable, states: ChordStates, force: float) -> 
     if table.options.law == "paper":
         pair = table.pair
         reach = pair.path_of_contact + pair.face_width * math.tan(pair.base_helix_angle)
-        on_path = (states.position >= 0.0) & (states.position <= reach) & np.isfinite(gap[:, :, 0])
+        on_path = (
+            (states.position >= 0.0)
+            & (states.position <= reach)
+            & np.isfinite(gap[:, :, 0])
+        )
         gap = np.where(on_path[:, :, None], 0.0, np.inf)
     touch = gap[:, :, 0]
     lost = np.asarray(np.isinf(touch).all(axis=1))
@@ -100,18 +112,26 @@ def chord_equilibrium(table: SlicedTable, states: ChordStates, force: float) -> 
         deflection.
         """
         depth = local[:, None] - touch
-        chord = np.maximum(np.searchsorted(table.depth, depth.ravel()).reshape(depth.shape) - 1, 0)
+        chord = np.maximum(
+            np.searchsorted(table.depth, depth.ravel()).reshape(depth.shape) - 1, 0
+        )
         own, start = (
             np.take_along_axis(v, chord[:, :, None], axis=2)[:, :, 0]
             for v in (states.compliance, gap)
         )
         bears = (depth > 0.0) & np.isfinite(start)
         load = np.where(
-            bears, np.maximum(local[:, None] - np.where(bears, start, 0.0), 0.0) / own, 0.0
+            bears,
+            np.maximum(local[:, None] - np.where(bears, start, 0.0), 0.0) / own,
+            0.0,
         )
         return load, np.where(load > 0.0, 1.0 / own, 0.0)
 
-    local = np.min(touch, axis=1) + table.depth[-1] + force * states.compliance.min(axis=(1, 2))
+    local = (
+        np.min(touch, axis=1)
+        + table.depth[-1]
+        + force * states.compliance.min(axis=(1, 2))
+    )
     for _ in range(ROUNDS):
         load, stiffness = carried(local)
         total = np.where(lost, 1.0, stiffness.sum(axis=1))

@@ -22,11 +22,21 @@ from gensig.geometry.contact import GearPair
 from gensig.geometry.tooth import Tooth, healthy_tooth
 from gensig.material import Material
 from gensig.mesh.options import MeshOptions, SliceOptions
-from gensig.mesh.pair_table import FIRST_PITCH, SMOOTHED_GAP, SMOOTHED_SHARE, distinct_teeth
+from gensig.mesh.pair_table import (
+    FIRST_PITCH,
+    SMOOTHED_GAP,
+    SMOOTHED_SHARE,
+    distinct_teeth,
+)
 from gensig.mesh.sliced._slice_kernels import bite_forces
 from gensig.mesh.sliced.slice_entry import over_slice
 from gensig.mesh.sliced.slice_teeth import NO_FLANK
-from gensig.mesh.sliced.slices import SlicedMesh, cut_by_field, loaded_contact, sliced_mesh
+from gensig.mesh.sliced.slices import (
+    SlicedMesh,
+    cut_by_field,
+    loaded_contact,
+    sliced_mesh,
+)
 from gensig.mesh.smooth_table import smooth
 
 Array = NDArray[np.float64]
@@ -35,13 +45,9 @@ N_CHORDS = 8
 N_TRIED, N_SAMPLES = 32, 24  # depths and positions at which chords are chosen
 PER_SLICE = 4  # positions looked at from one slice's entry to the next one's
 SLICES_PER_STEP = 10  # few slices enter with a jolt: every node is looked at
-UNMET_STEP = (
-    8  # nodes between the positions looked at for teeth that never meet on their working flanks
-)
+UNMET_STEP = 8  # nodes between the positions looked at for teeth that never meet on their working flanks
 DEEPEST = 3.0  # largest depth, in largest static ones
-LEAST_REACH = (
-    1e-4  # m; first gaps up to here are tabulated, so that teeth that stand proud find their force
-)
+LEAST_REACH = 1e-4  # m; first gaps up to here are tabulated, so that teeth that stand proud find their force
 FARTHEST = 1e-3  # m; first gaps beyond are all alike
 N_PHASES = 32
 MOST_PAIRS = 400  # of different teeth, about a tenth of a second and 0.8 MB each
@@ -159,7 +165,11 @@ def sliced_table(
     (pinion, pinion_kind), (wheel, wheel_kind) = (
         distinct_teeth(
             healthy_tooth(gear),
-            {number: odd[name, number] for name, number in sorted(odd) if name == gear.name},
+            {
+                number: odd[name, number]
+                for name, number in sorted(odd)
+                if name == gear.name
+            },
         )
         for gear in (pair.pinion, pair.wheel)
     )
@@ -194,7 +204,9 @@ def sliced_table(
     compliance, gap = _chords(first, loads, frame.depth)
     mesh = _mesh(setting, setting.pinion, setting.wheel)
     shared = mesh.shared_compliance
-    columns = _smoothed(compliance + shared, gap, float(frame.position[1] - frame.position[0]))
+    columns = _smoothed(
+        compliance + shared, gap, float(frame.position[1] - frame.position[0])
+    )
     return SlicedTable(
         pair=pair,
         options=options,
@@ -238,7 +250,8 @@ def _smoothed(compliance: Array, gap: Array, distance: float) -> list[Array]:
     columns = [np.empty_like(compliance) for _ in range(4)]
     for chord in range(compliance.shape[2]):
         soft, far = (
-            values[:, :, chord].reshape(-1, values.shape[3]) for values in (compliance, gap)
+            values[:, :, chord].reshape(-1, values.shape[3])
+            for values in (compliance, gap)
         )
         found = (
             *smooth(soft, distance, SMOOTHED_SHARE * float(soft[0].min())),
@@ -266,7 +279,9 @@ def _known(tooth: Tooth) -> _Known:
         for crack in tooth.cracks
     ]
     arrays = (tooth.slice_edges, tooth.material_loss, tooth.flank_deviation)
-    return _Known(key=b"".join([_digest(*arrays), *cracks, bytes([tooth.present])]), value=tooth)
+    return _Known(
+        key=b"".join([_digest(*arrays), *cracks, bytes([tooth.present])]), value=tooth
+    )
 
 
 def _healthy(pair: GearPair) -> tuple[_Known, _Known]:
@@ -280,7 +295,9 @@ def _mesh(setting: _Setting, pinion: _Known, wheel: _Known) -> SlicedMesh:
     for gear, known in ((setting.pair.pinion, pinion), (setting.pair.wheel, wheel)):
         assert isinstance(known.value, Tooth)
         if known.key != _known(healthy_tooth(gear)).key:
-            odd.update({(gear.name, number): known.value for number in range(gear.n_teeth)})
+            odd.update(
+                {(gear.name, number): known.value for number in range(gear.n_teeth)}
+            )
     assert not isinstance(deviation, Tooth)
     return sliced_mesh(
         setting.pair,
@@ -296,24 +313,35 @@ def _mesh(setting: _Setting, pinion: _Known, wheel: _Known) -> SlicedMesh:
 def _frame(setting: _Setting) -> _Frame:
     """Depths and positions, from the static load of the teeth that meet most."""
     mesh, pitch = _mesh(setting, setting.pinion, setting.wheel), setting.pair.base_pitch
-    contact = loaded_contact(mesh, pitch * (np.arange(N_PHASES) + 0.5) / N_PHASES, setting.force)
+    contact = loaded_contact(
+        mesh, pitch * (np.arange(N_PHASES) + 0.5) / N_PHASES, setting.force
+    )
     per_pitch = setting.options.points_per_pitch
     highest = math.ceil(float(mesh.position[-1] + mesh.lag[-1]) / pitch)
     nodes = np.arange(FIRST_PITCH * per_pitch, highest * per_pitch + 1)
     first = _at(mesh, nodes * pitch / per_pitch)[1].min(axis=1)
-    sound = _at(_mesh(setting, *_healthy(setting.pair)), nodes * pitch / per_pitch)[1].min(axis=1)
+    sound = _at(_mesh(setting, *_healthy(setting.pair)), nodes * pitch / per_pitch)[
+        1
+    ].min(axis=1)
     bite = contact.approach - mesh.shared_compliance * setting.force - first.min()
     set_depth, deepest = float(bite.mean()), DEEPEST * float(bite.max())
     near = nodes[sound <= sound.min() + max(LEAST_REACH, deepest)]
-    first_pitch, last_pitch = math.floor(near[0] / per_pitch), math.ceil(near[-1] / per_pitch)
+    first_pitch, last_pitch = (
+        math.floor(near[0] / per_pitch),
+        math.ceil(near[-1] / per_pitch),
+    )
     depth = np.array([set_depth])
     if setting.options.law != "paper":
         sample = nodes[first <= first.min() + deepest]
         sample = sample[:: max(1, len(sample) // N_SAMPLES)] * pitch / per_pitch
-        depth = _knots(setting, mesh, sample, np.linspace(0.0, deepest, N_TRIED + 1)[1:])
+        depth = _knots(
+            setting, mesh, sample, np.linspace(0.0, deepest, N_TRIED + 1)[1:]
+        )
     return _Frame(
         depth=depth,
-        position=pitch / per_pitch * np.arange(first_pitch * per_pitch, last_pitch * per_pitch + 1),
+        position=pitch
+        / per_pitch
+        * np.arange(first_pitch * per_pitch, last_pitch * per_pitch + 1),
         first_pitch=first_pitch,
         last_pitch=last_pitch,
         reach=float(first.min()) + max(LEAST_REACH, deepest),
@@ -328,13 +356,19 @@ def _knots(setting: _Setting, mesh: SlicedMesh, position: Array, tried: Array) -
     The largest error over the positions counts. ``tried`` (knot,) m.
     """
     _, force = _bitten(setting, mesh, position, tried, np.inf)
-    depth, force = np.append(0.0, tried), np.column_stack([np.zeros(len(position)), force])
+    depth, force = (
+        np.append(0.0, tried),
+        np.column_stack([np.zeros(len(position)), force]),
+    )
     n_tried = len(depth)
     error = np.full((n_tried, n_tried), np.inf)
     for begin in range(n_tried - 1):
         for end in range(begin + 1, n_tried):
             part = (depth[begin : end + 1] - depth[begin]) / (depth[end] - depth[begin])
-            chord = force[:, begin, None] + (force[:, end] - force[:, begin])[:, None] * part
+            chord = (
+                force[:, begin, None]
+                + (force[:, end] - force[:, begin])[:, None] * part
+            )
             error[begin, end] = np.abs(chord - force[:, begin : end + 1]).max()
     least, before = error[0], []
     for _ in range(N_CHORDS - 1):
@@ -388,7 +422,9 @@ def _bitten(
 
 
 @lru_cache(maxsize=128)
-def _curves(setting: _Setting, pinion: _Known, wheel: _Known, are_met: bool) -> tuple[Array, Array]:
+def _curves(
+    setting: _Setting, pinion: _Known, wheel: _Known, are_met: bool
+) -> tuple[Array, Array]:
     """First gap (node,) m and force (node, knot) N of one pair of teeth at the depths of the
     frame.
     """
@@ -409,7 +445,9 @@ def _curves(setting: _Setting, pinion: _Known, wheel: _Known, are_met: bool) -> 
         nearest = np.searchsorted(0.5 * (found[1:] + found[:-1]), np.arange(len(first)))
         first, force = np.minimum(first, FARTHEST), force[found[nearest]]
     if len(looked) != len(frame.position) or n_looks:
-        force = np.stack([np.interp(frame.position, looked, column) for column in force.T], axis=1)
+        force = np.stack(
+            [np.interp(frame.position, looked, column) for column in force.T], axis=1
+        )
         first = np.interp(frame.position, looked, first)
     return first, force
 
@@ -423,13 +461,22 @@ def _looked(
     if (
         not mesh.lag[-1] > 0.0 or setting.options.law == "paper"
     ):  # whose slices the edge of the field cuts
-        return (position if are_met else np.append(position[:-1:UNMET_STEP], position[-1])), 0
+        return (
+            position if are_met else np.append(position[:-1:UNMET_STEP], position[-1])
+        ), 0
     n_slices = setting.slices.n_slices
-    later = float(setting.pair.face_width * math.tan(setting.pair.base_helix_angle)) / n_slices
+    later = (
+        float(setting.pair.face_width * math.tan(setting.pair.base_helix_angle))
+        / n_slices
+    )
     apart = (
-        min(later / PER_SLICE, n_slices / SLICES_PER_STEP * node) if are_met else UNMET_STEP * node
+        min(later / PER_SLICE, n_slices / SLICES_PER_STEP * node)
+        if are_met
+        else UNMET_STEP * node
     )
     n_looks = 2 * max(1, round(0.5 * later / max(apart, node)))
     n_beside, distance = n_looks // 2, later / n_looks
     n_steps = math.ceil((position[-1] - position[0]) / distance)
-    return position[0] + distance * np.arange(-n_beside, n_steps + n_beside + 1), n_looks
+    return position[0] + distance * np.arange(
+        -n_beside, n_steps + n_beside + 1
+    ), n_looks

@@ -21,7 +21,12 @@ from gensig.material import Material
 from gensig.mesh.body_coupling import shared_body_compliance
 from gensig.mesh.local_contact import contact_law
 from gensig.mesh.options import MeshOptions, SliceOptions
-from gensig.mesh.pair_table import FIRST_PITCH, LAST_PITCH, node_positions, structural_compliance
+from gensig.mesh.pair_table import (
+    FIRST_PITCH,
+    LAST_PITCH,
+    node_positions,
+    structural_compliance,
+)
 from gensig.mesh.sliced._slice_kernels import solve_slices
 from gensig.mesh.sliced.slice_teeth import (
     NO_FLANK,
@@ -144,10 +149,14 @@ def sliced_mesh(
     place = 0.5 * (edges[1:] + edges[:-1])
     position = node_positions(pair, options)
     structure, shared = _structure(pair, material, options)
-    law = contact_law(pair, np.clip(position, 0.0, pair.path_of_contact), material, options)
+    law = contact_law(
+        pair, np.clip(position, 0.0, pair.path_of_contact), material, options
+    )
     # the paper's law knows no corners: the edge of the field of action ends contact
     corner = (
-        np.zeros_like(position) if options.law == "paper" else corner_gap_by_pinion(pair, position)
+        np.zeros_like(position)
+        if options.law == "paper"
+        else corner_gap_by_pinion(pair, position)
     )
     gap = np.repeat(corner[None], len(place), axis=0)
     if deviation is not None:
@@ -194,12 +203,15 @@ def slice_places(pair: GearPair, slices: SliceOptions) -> Array:
 
 
 @lru_cache(maxsize=16)
-def _structure(pair: GearPair, material: Material, options: MeshOptions) -> tuple[Array, float]:
+def _structure(
+    pair: GearPair, material: Material, options: MeshOptions
+) -> tuple[Array, float]:
     """Compliance of both sound teeth and bodies per width (node,) m2/N, and what pairs share,
     m/N.
     """
     on_path, place = np.unique(
-        np.clip(node_positions(pair, options), 0.0, pair.path_of_contact), return_inverse=True
+        np.clip(node_positions(pair, options), 0.0, pair.path_of_contact),
+        return_inverse=True,
     )
     in_plane = material.in_plane(options.elasticity)
     whole = np.zeros_like(on_path)
@@ -275,16 +287,23 @@ class ContactPhases:
     width: Array
 
 
-def contact_phases(mesh: SlicedMesh, roll: Array, meeting: Meeting | None = None) -> ContactPhases:
+def contact_phases(
+    mesh: SlicedMesh, roll: Array, meeting: Meeting | None = None
+) -> ContactPhases:
     """Prepare the loaded contact at rolls, (phase,) m.
 
     At 0 the first slice of a pair enters at A.
     """
     position, index = pair_positions(mesh, roll)
     share = np.ones_like(position)
-    if mesh.options.law == "paper":  # elsewhere the corners' gaps tell where contact ends
+    if (
+        mesh.options.law == "paper"
+    ):  # elsewhere the corners' gaps tell where contact ends
         position, share = cut_by_field(mesh, position)
-    structure, gap = np.interp(position, mesh.position, mesh.structure), _gaps(mesh, position)
+    structure, gap = (
+        np.interp(position, mesh.position, mesh.structure),
+        _gaps(mesh, position),
+    )
     _add_teeth(mesh, position, index, meeting or Meeting(), structure, gap)
     return ContactPhases(
         mesh=mesh,
@@ -365,8 +384,18 @@ def _add_teeth(
 ) -> None:
     """Add what single teeth have to structure and gap, (phase, pair, slice)."""
     for side, start, error, tilt in (
-        (mesh.pinion, meeting.start_tooth_pinion, meeting.pinion_error, meeting.pinion_tilt),
-        (mesh.wheel, meeting.start_tooth_wheel, meeting.wheel_error, meeting.wheel_tilt),
+        (
+            mesh.pinion,
+            meeting.start_tooth_pinion,
+            meeting.pinion_error,
+            meeting.pinion_tilt,
+        ),
+        (
+            mesh.wheel,
+            meeting.start_tooth_wheel,
+            meeting.wheel_error,
+            meeting.wheel_tilt,
+        ),
     ):
         tooth = (index + start) % len(side.kind)
         kinds = side.kind[tooth]
@@ -383,7 +412,9 @@ def _add_teeth(
     gap[gap > 0.1 * NO_FLANK] = np.inf
 
 
-def _of_kind(mesh: SlicedMesh, side: GearSlices, kind: int, position: Array) -> tuple[Array, Array]:
+def _of_kind(
+    mesh: SlicedMesh, side: GearSlices, kind: int, position: Array
+) -> tuple[Array, Array]:
     """How much softer, m2/N, and how far back, m, the slices of one kind of tooth are at
     positions (phase, slice).
     """
@@ -439,6 +470,9 @@ def single_pair_stiffness(
     for side, kind in zip((mesh.pinion, mesh.wheel), kinds, strict=True):
         if kind:
             softer, gap = _of_kind(mesh, side, kind, middle)
-            softness, share = softness + softer, share * (gap < closed) * side.present[kind]
+            softness, share = (
+                softness + softer,
+                share * (gap < closed) * side.present[kind],
+            )
     alone = np.sum(mesh.slice_width * share / softness, axis=1)
     return alone / (1.0 + mesh.shared_compliance * alone)

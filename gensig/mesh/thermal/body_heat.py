@@ -48,7 +48,9 @@ class BodyHeat:
     def mean(self) -> float:
         """Temperature of the body, degC, mean over its volume."""
         weight = self.temperature * self.radius
-        return float(np.trapezoid(weight, self.radius) / np.trapezoid(self.radius, self.radius))
+        return float(
+            np.trapezoid(weight, self.radius) / np.trapezoid(self.radius, self.radius)
+        )
 
 
 def tooth_surface(gear: Gear) -> float:
@@ -58,15 +60,30 @@ def tooth_surface(gear: Gear) -> float:
     the surface is as long as the helix.
     """
     start = max(gear.base_radius, gear.root_radius)
-    roll = [math.sqrt(radius**2 - gear.base_radius**2) for radius in (start, gear.tip_radius)]
-    flank = (roll[1] ** 2 - roll[0] ** 2) / (2.0 * gear.base_radius) + start - gear.root_radius
+    roll = [
+        math.sqrt(radius**2 - gear.base_radius**2)
+        for radius in (start, gear.tip_radius)
+    ]
+    flank = (
+        (roll[1] ** 2 - roll[0] ** 2) / (2.0 * gear.base_radius)
+        + start
+        - gear.root_radius
+    )
     tip_land = 2.0 * gear.half_tooth_angle_at(gear.tip_radius) * gear.tip_radius
-    root_land = 2.0 * (math.pi / gear.n_teeth - gear.half_tooth_angle_at(start)) * gear.root_radius
+    root_land = (
+        2.0
+        * (math.pi / gear.n_teeth - gear.half_tooth_angle_at(start))
+        * gear.root_radius
+    )
     outline = 2.0 * flank + tip_land + max(root_land, 0.0)
     radius = np.linspace(gear.root_radius, gear.tip_radius, N_TOOTH_HEIGHTS)
-    thickness = [2.0 * gear.half_tooth_angle_at(max(one, start)) * one for one in radius]
+    thickness = [
+        2.0 * gear.half_tooth_angle_at(max(one, start)) * one for one in radius
+    ]
     ends = 2.0 * float(np.trapezoid(thickness, radius))
-    return gear.n_teeth * (outline * gear.face_width / math.cos(gear.helix_angle) + ends)
+    return gear.n_teeth * (
+        outline * gear.face_width / math.cos(gear.helix_angle) + ends
+    )
 
 
 def face_surface(gear: Gear) -> float:
@@ -100,23 +117,31 @@ def solved_body(
     ------
     ConfigError    where nothing cools the gear
     """
-    if heat.face_convection == heat.tooth_convection == 0.0 and bore_temperature is None:
+    if (
+        heat.face_convection == heat.tooth_convection == 0.0
+        and bore_temperature is None
+    ):
         raise ConfigError(
             f"{gear.name}: nothing cools it; give heat.face_convection_w_per_m2k, heat.tooth_convection_w_per_m2k, "
             f"heat.{gear.name}_bore_temperature_degc or heat.{gear.name}_temperature_degc"
         )
     radius = np.linspace(gear.bore_radius, gear.root_radius, N_RADII)
     values, slopes = _solutions(
-        radius, math.sqrt(2.0 * heat.face_convection / (heat.conductivity * gear.face_width))
+        radius,
+        math.sqrt(2.0 * heat.face_convection / (heat.conductivity * gear.face_width)),
     )
     per_slope = (
         2.0 * math.pi * radius * gear.face_width * heat.conductivity
     )  # W for 1 K/m through the cylinder
     from_teeth = heat.tooth_convection * tooth_surface(gear)
     at_bore = slopes[:, 0] if bore_temperature is None else values[:, 0]
-    bore_rise = 0.0 if bore_temperature is None else bore_temperature - heat.oil_temperature
+    bore_rise = (
+        0.0 if bore_temperature is None else bore_temperature - heat.oil_temperature
+    )
     at_rim = per_slope[-1] * slopes[:, -1] + from_teeth * values[:, -1]
-    weights = np.linalg.solve(np.array([at_bore, at_rim]), np.array([bore_rise, input_heat]))
+    weights = np.linalg.solve(
+        np.array([at_bore, at_rim]), np.array([bore_rise, input_heat])
+    )
     to_bore = float(per_slope[0] * (weights @ slopes[:, 0]))
     return BodyHeat(
         radius=radius,

@@ -72,7 +72,9 @@ class Heat:
             ("expansion_per_k", 0.0, 1e-4),
         ):
             value = next(
-                getattr(self, field.name) for field in fields(self) if key.startswith(field.name)
+                getattr(self, field.name)
+                for field in fields(self)
+                if key.startswith(field.name)
             )
             if not low <= value <= high:
                 raise ConfigError(
@@ -85,7 +87,9 @@ class Heat:
             )
         rising = all(
             a < b
-            for a, b in zip(self.modulus_temperature, self.modulus_temperature[1:], strict=False)
+            for a, b in zip(
+                self.modulus_temperature, self.modulus_temperature[1:], strict=False
+            )
         )
         if (
             len(self.modulus_temperature) < 2
@@ -97,7 +101,9 @@ class Heat:
                 f"{len(self.modulus)} values; give equally many, two or more, at temperatures that rise"
             )
         if not min(self.modulus) > 0.0:
-            raise ConfigError(f"heat.modulus_gpa = {min(self.modulus) / 1e9:g} must be positive")
+            raise ConfigError(
+                f"heat.modulus_gpa = {min(self.modulus) / 1e9:g} must be positive"
+            )
         for field in fields(self):
             value = getattr(self, field.name)
             if field.name.endswith("_temperature") and isinstance(value, float):
@@ -134,12 +140,16 @@ class Heat:
     def modulus_ratio(self, temperature: float) -> float:
         """Young's modulus at a temperature over that at the reference temperature."""
         at, reference = np.interp(
-            [temperature, self.reference_temperature], self.modulus_temperature, self.modulus
+            [temperature, self.reference_temperature],
+            self.modulus_temperature,
+            self.modulus,
         ).tolist()
         return float(at / reference)
 
 
-def rolling_speeds(pair: GearPair, position: Array, speed: float) -> tuple[Array, Array]:
+def rolling_speeds(
+    pair: GearPair, position: Array, speed: float
+) -> tuple[Array, Array]:
     """Speeds of both flanks along themselves where they touch, m/s, of the shape of ``position``.
 
     Parameters
@@ -204,13 +214,22 @@ def flash_temperature(
     """
     pinion, wheel = rolling_speeds(pair, position, speed)
     half_width = contact_half_width(pair, position, line_load, material)
-    effusivity = math.sqrt(heat.conductivity * material.density_kg_per_m3 * heat.specific_heat)
+    effusivity = math.sqrt(
+        heat.conductivity * material.density_kg_per_m3 * heat.specific_heat
+    )
     # sqrt(v1) - sqrt(v2) is |v1 - v2| over their sum; w / sqrt(B) goes to 0 with the load
     loaded = np.divide(
-        line_load, np.sqrt(half_width), out=np.zeros_like(half_width), where=half_width > 0.0
+        line_load,
+        np.sqrt(half_width),
+        out=np.zeros_like(half_width),
+        where=half_width > 0.0,
     )
     return (
-        BLOK_SEMI_WIDTH * friction * loaded * np.abs(np.sqrt(pinion) - np.sqrt(wheel)) / effusivity
+        BLOK_SEMI_WIDTH
+        * friction
+        * loaded
+        * np.abs(np.sqrt(pinion) - np.sqrt(wheel))
+        / effusivity
     )
 
 

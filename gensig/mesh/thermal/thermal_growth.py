@@ -41,13 +41,17 @@ class GearGrowth:
         along its axis besides.
         """
         shifted = (
-            gear.root_radius * (self.body - self.tooth) * np.sin(load_angle(gear, curvature_radius))
+            gear.root_radius
+            * (self.body - self.tooth)
+            * np.sin(load_angle(gear, curvature_radius))
         )
         return self.tooth * curvature_radius + shifted
 
     def of_tooth_alone(self, gear: Gear, curvature_radius: Array) -> Array:
         """The same for the tooth's own growth, its root at rest, (point,) m."""
-        return GearGrowth(tooth=self.tooth, body=0.0).along_action(gear, curvature_radius)
+        return GearGrowth(tooth=self.tooth, body=0.0).along_action(
+            gear, curvature_radius
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +86,9 @@ class PairGrowth:
 
         A hotter pinion has the longer base pitch: the pair that enters is late.
         """
-        on_path = np.append(np.clip(position, 0.0, pair.path_of_contact), pair.pitch_point)
+        on_path = np.append(
+            np.clip(position, 0.0, pair.path_of_contact), pair.pitch_point
+        )
         common = self.strain(pair) * pair.tangent_length
         proud = np.sum(self._movements(pair, on_path), axis=0) - common
         return proud[-1] - proud[:-1]
@@ -101,12 +107,20 @@ class PairGrowth:
         """
         at = np.array([pair.pitch_point])
         return float(
-            self.pinion.of_tooth_alone(pair.pinion, np.asarray(pair.pinion_curvature(at)))[0]
-            + self.wheel.of_tooth_alone(pair.wheel, np.asarray(pair.wheel_curvature(at)))[0]
+            self.pinion.of_tooth_alone(
+                pair.pinion, np.asarray(pair.pinion_curvature(at))
+            )[0]
+            + self.wheel.of_tooth_alone(
+                pair.wheel, np.asarray(pair.wheel_curvature(at))
+            )[0]
         )
 
     def _movements(self, pair: GearPair, position: Array) -> tuple[Array, Array]:
         return (
-            self.pinion.along_action(pair.pinion, np.asarray(pair.pinion_curvature(position))),
-            self.wheel.along_action(pair.wheel, np.asarray(pair.wheel_curvature(position))),
+            self.pinion.along_action(
+                pair.pinion, np.asarray(pair.pinion_curvature(position))
+            ),
+            self.wheel.along_action(
+                pair.wheel, np.asarray(pair.wheel_curvature(position))
+            ),
         )

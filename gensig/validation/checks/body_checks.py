@@ -37,7 +37,9 @@ def _straight_tooth(gear: Gear) -> Tooth:
     return straight_root_tooth(gear)
 
 
-def terms(case: Case, side: str, curvature: Array, *, root: str = "true") -> dict[str, Array]:
+def terms(
+    case: Case, side: str, curvature: Array, *, root: str = "true"
+) -> dict[str, Array]:
     """Bending, shear, axial and body compliance of a sound tooth, (phase,) m/N each.
 
     ``root`` may be ``straight``.
@@ -93,7 +95,9 @@ def _sainsot_over_fe_body(side: str, case: Case, at: str) -> float:
     ``at`` is ``point row``, the row that prints the latter.
     """
     point, row = at.split()
-    return _sainsot(case.gear(side), case, side, point) / printed_value("spur_reference", row)
+    return _sainsot(case.gear(side), case, side, point) / printed_value(
+        "spur_reference", row
+    )
 
 
 def _double_zone(case: Case, at: str) -> tuple[Array, Array]:
@@ -110,25 +114,34 @@ def _double_zone(case: Case, at: str) -> tuple[Array, Array]:
 
 def _curvature(case: Case, side: str, position: Array) -> Array:
     return np.asarray(
-        (case.pair.pinion_curvature if side == "pinion" else case.pair.wheel_curvature)(position)
+        (case.pair.pinion_curvature if side == "pinion" else case.pair.wheel_curvature)(
+            position
+        )
     )
 
 
 def _pair_structure(which: int, case: Case, at: str) -> float:
     """Teeth and bodies of the entering (0) or the leaving (1) pair in the double zone."""
     position = _double_zone(case, at)[which]
-    return float(sum(structure(case, side, _curvature(case, side, position))[0] for side in SIDES))
+    return float(
+        sum(
+            structure(case, side, _curvature(case, side, position))[0] for side in SIDES
+        )
+    )
 
 
 def _cross(side: str, case: Case, at: str) -> float:
     """Body compliance between the two pairs of the double zone."""
     gear = case.gear(side)
     angles = [
-        load_angle(gear, _curvature(case, side, position)) for position in _double_zone(case, at)
+        load_angle(gear, _curvature(case, side, position))
+        for position in _double_zone(case, at)
     ]
     pitches = 1 if side == "pinion" else -1
     return float(
-        cross_compliance(gear, case.structure_material, angles[0], angles[1], pitches=pitches)[0]
+        cross_compliance(
+            gear, case.structure_material, angles[0], angles[1], pitches=pitches
+        )[0]
     )
 
 
@@ -178,7 +191,8 @@ def _stiffness_other_root_angle(case: Case, at: str) -> float:
 def _straight_root_stiffness(case: Case, at: str) -> float:
     """Single pair with the straight root in both teeth; body and contact as they are."""
     change = sum(
-        _tooth(side, "straight", case, at) - _tooth(side, "true", case, at) for side in SIDES
+        _tooth(side, "straight", case, at) - _tooth(side, "true", case, at)
+        for side in SIDES
     )
     return 1.0 / (1.0 / single_pair_stiffness(case, at) + change)
 
@@ -195,7 +209,10 @@ def _straight_over_true_error(case: Case, at: str) -> float:
     what, point = at.split()
     if what == "pair":
         exact = printed_value("spur_reference", f"fe_pair_stress.{point}")
-        found = single_pair_stiffness(case, point), _straight_root_stiffness(case, point)
+        found = (
+            single_pair_stiffness(case, point),
+            _straight_root_stiffness(case, point),
+        )
     else:
         exact = printed_value("spur_reference", f"fe_tooth.{what}.{point}")
         found = _tooth(what, "true", case, point), _tooth(what, "straight", case, point)
@@ -205,7 +222,9 @@ def _straight_over_true_error(case: Case, at: str) -> float:
 def _disc(index: int, case: Case, at: str) -> float:
     gear = case.gear(at)
     density = case.system.material.density_kg_per_m3
-    return solid_disc(gear.pitch_radius, gear.bore_radius, gear.face_width, density)[index]
+    return solid_disc(gear.pitch_radius, gear.bore_radius, gear.face_width, density)[
+        index
+    ]
 
 
 BODY: dict[str, Check] = {
@@ -216,10 +235,16 @@ BODY: dict[str, Check] = {
     },
     **{f"{side}_load_angle": partial(_load_angle, side) for side in SIDES},
     **{f"{side}_tooth": partial(_tooth, side, "true") for side in SIDES},
-    **{f"{side}_tooth_straight_root": partial(_tooth, side, "straight") for side in SIDES},
+    **{
+        f"{side}_tooth_straight_root": partial(_tooth, side, "straight")
+        for side in SIDES
+    },
     **{f"{side}_structure": partial(_structure, side) for side in SIDES},
     **{f"{side}_body_coefficient": partial(_body_coefficient, side) for side in SIDES},
-    **{f"{side}_sainsot_over_fe_body": partial(_sainsot_over_fe_body, side) for side in SIDES},
+    **{
+        f"{side}_sainsot_over_fe_body": partial(_sainsot_over_fe_body, side)
+        for side in SIDES
+    },
     **{f"{side}_cross_compliance": partial(_cross, side) for side in SIDES},
     **{f"{side}_cross_over_body": partial(_cross_over_body, side) for side in SIDES},
     "entering_pair_structure": partial(_pair_structure, 0),

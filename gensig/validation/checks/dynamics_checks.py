@@ -40,7 +40,11 @@ def _amplitude(case: Case) -> Array:
 
 def _mesh_line(case: Case, harmonic: int, sideband: int = 0) -> float:
     """Amplitude of a mesh harmonic, or of its n-th sideband at the pinion's rotation, m/s2."""
-    return float(_amplitude(case)[RECORD_TURNS * (harmonic * case.pair.pinion.n_teeth + sideband)])
+    return float(
+        _amplitude(case)[
+            RECORD_TURNS * (harmonic * case.pair.pinion.n_teeth + sideband)
+        ]
+    )
 
 
 @lru_cache(maxsize=64)
@@ -52,7 +56,9 @@ def _residual(case: Case) -> Array:
 
 def _sidebands(case: Case, harmonic: int) -> list[float]:
     steps = range(1, N_SIDEBANDS + 1)
-    return [_mesh_line(case, harmonic, sign * step) for step in steps for sign in (-1, 1)]
+    return [
+        _mesh_line(case, harmonic, sign * step) for step in steps for sign in (-1, 1)
+    ]
 
 
 def _line_ratio(case: Case, at: str) -> float:
@@ -62,7 +68,10 @@ def _line_ratio(case: Case, at: str) -> float:
 
 def _strongest_line(case: Case, at: str) -> float:
     """Number of the strongest mesh harmonic up to the one in ``at``."""
-    return float(1 + np.argmax([_mesh_line(case, harmonic) for harmonic in range(1, int(at) + 1)]))
+    return float(
+        1
+        + np.argmax([_mesh_line(case, harmonic) for harmonic in range(1, int(at) + 1)])
+    )
 
 
 def _sideband_sum(case: Case, at: str) -> float:
@@ -144,7 +153,9 @@ def _natural_frequency(case: Case, at: str) -> float:
     system: LumpedSystem = dynamics.system()
     direction = dynamics.approach_direction()
     matrix = system.stiffness + float(stiffness) * np.outer(direction, direction)
-    along = [index for index, name in enumerate(system.names) if not name.endswith("_x")]
+    along = [
+        index for index, name in enumerate(system.names) if not name.endswith("_x")
+    ]
     reduced = matrix[np.ix_(along, along)] / system.mass[along][:, None]
     frequency = np.sqrt(np.sort(np.abs(np.linalg.eigvals(reduced)))) / (2.0 * np.pi)
     return float(frequency[int(mode)])
@@ -154,14 +165,18 @@ def _support_frequency(case: Case, at: str) -> float:
     """Undamped frequency in Hz of one gear on its own support; ``at`` is its degree of freedom."""
     system = pair_dynamics(case).system()
     index = system.names.index(at)
-    return float(np.sqrt(system.stiffness[index, index] / system.mass[index]) / (2.0 * np.pi))
+    return float(
+        np.sqrt(system.stiffness[index, index] / system.mass[index]) / (2.0 * np.pi)
+    )
 
 
 DYNAMICS: dict[str, Check] = {
     "acceleration_rms": _rms,
     "acceleration_kurtosis": _kurtosis,
     "rms_over_healthy": _rms_over_healthy,
-    "kurtosis_over_healthy": lambda case, at: _kurtosis(case, at) / _kurtosis(with_fault(case), at),
+    "kurtosis_over_healthy": lambda case, at: (
+        _kurtosis(case, at) / _kurtosis(with_fault(case), at)
+    ),
     "mesh_line": lambda case, at: _mesh_line(case, int(at)),
     "mesh_line_ratio": _line_ratio,
     "strongest_mesh_line": _strongest_line,

@@ -80,7 +80,9 @@ class DamperCase:
         found = run_of_speeds(
             self.line.linear()[0],
             lambda speed: self.line.on_line(self.line.torques(speed, 0.0)),
-            np.arange(campbell.low_speed, campbell.high_speed + 0.5 * RUN_STEP, RUN_STEP),
+            np.arange(
+                campbell.low_speed, campbell.high_speed + 0.5 * RUN_STEP, RUN_STEP
+            ),
             [numbers.index(node) for node in WATERFALL_NODES],
             n_orders=RUN_ORDERS,
         )
@@ -95,13 +97,17 @@ class DamperCase:
         run = self.waterfalls[int(node)]
         column = int(np.flatnonzero(run.orders == float(order))[0])
         return float(
-            run.speeds[int(run.angle[:, column].argmax())] * float(order) / (2.0 * math.pi)
+            run.speeds[int(run.angle[:, column].argmax())]
+            * float(order)
+            / (2.0 * math.pi)
         )
 
     def order(self, node: str, order: float) -> float:
         """Amplitude of an order of a node's angular displacement, rad."""
         line = self.response.angle[self.line.drive.numbers.index(int(node))]
-        return float(np.abs(line[int(np.flatnonzero(self.response.orders == order)[0])]))
+        return float(
+            np.abs(line[int(np.flatnonzero(self.response.orders == order)[0])])
+        )
 
     def half_order_share(self, node: str) -> float:
         """Largest line at an odd multiple of order 0.5 over the largest at a whole order."""
@@ -131,7 +137,9 @@ DAMPERS: dict[str, DamperCheck] = {
     "dampers.largest_root_stress": lambda case, at: _largest(case.root(at)),
     "dampers.safety_paper": lambda case, at: float(_wheel(case.root(at)).safety.paper),
     "dampers.safety_iso": lambda case, at: float(_wheel(case.root(at)).safety.iso),
-    "dampers.stress_drop": lambda case, at: 1.0 - _stress(case, at) / _stress(case.without, at),
+    "dampers.stress_drop": lambda case, at: (
+        1.0 - _stress(case, at) / _stress(case.without, at)
+    ),
     "spectrum.half_order_share": lambda case, at: case.half_order_share(at),
     "spectrum.disturbance_over_order_1": lambda case, at: (
         case.disturbance(at) / case.order(at, 1.0)

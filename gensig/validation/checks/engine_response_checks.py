@@ -10,7 +10,11 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from gensig.driveline.engine_line import read_engine_line
-from gensig.driveline.excitation.engine_torques import Engine, EngineTorques, engine_torques
+from gensig.driveline.excitation.engine_torques import (
+    Engine,
+    EngineTorques,
+    engine_torques,
+)
 from gensig.driveline.linear.forced import (
     Elements,
     LinearLine,
@@ -61,12 +65,16 @@ class ForcedCase:
     def torques(self) -> EngineTorques:
         """What acts on the line."""
         reference = self.engine.reference
-        return engine_torques(self.engine, reference.speed, reference.torque, self.ratios)
+        return engine_torques(
+            self.engine, reference.speed, reference.torque, self.ratios
+        )
 
     @cached_property
     def response(self) -> SteadyResponse:
         """Its steady vibration."""
-        return steady_response(self.line, self.torques.on(self.nodes), self.engine.reference.speed)
+        return steady_response(
+            self.line, self.torques.on(self.nodes), self.engine.reference.speed
+        )
 
     def fluctuation(self, node: str) -> float:
         """Half the peak to peak of a node's speed, rad/s."""

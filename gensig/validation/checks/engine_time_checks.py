@@ -16,7 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.driveline.cycle_statistics import fluctuations, order_amplitudes, typical_extremes
+from gensig.driveline.cycle_statistics import (
+    fluctuations,
+    order_amplitudes,
+    typical_extremes,
+)
 from gensig.driveline.engine_dampers import (
     DynamicRootStress,
     mesh_between,
@@ -55,15 +59,24 @@ class TimeCase:
     @cached_property
     def response(self) -> TimeResponse:
         """Its motion over `DURATION`."""
-        speed, torque = self.line.engine.reference.speed, self.line.engine.reference.torque
+        speed, torque = (
+            self.line.engine.reference.speed,
+            self.line.engine.reference.torque,
+        )
         own = own_meshes(self.line, self.config, speed, torque)
-        return time_response(self.line, speed, torque, own=own, nodes=NODES, duration=DURATION)
+        return time_response(
+            self.line, speed, torque, own=own, nodes=NODES, duration=DURATION
+        )
 
     @property
     def without(self) -> TimeCase:
         """The same without the dampers."""
         return read_time_case(
-            tuple(word for word in self.overrides if not word.startswith("system.dampers="))
+            tuple(
+                word
+                for word in self.overrides
+                if not word.startswith("system.dampers=")
+            )
         )
 
     def fluctuation(self, node: str) -> float:
@@ -73,7 +86,9 @@ class TimeCase:
 
     @cached_property
     def _angles(self) -> Array:
-        return order_amplitudes(self.response.angle, self.response.crank_angle, N_ORDERS)
+        return order_amplitudes(
+            self.response.angle, self.response.crank_angle, N_ORDERS
+        )
 
     def angles(self, node: str) -> Array:
         """Amplitudes of a node's angular displacement at the orders 0.5, 1, ..., (order,) rad."""
@@ -95,7 +110,10 @@ class TimeCase:
         """Root stress of a mesh."""
         place = self.mesh(mesh)
         return root_stress_in_time(
-            read_mesh_strength(self.config, self.line, place), self.line, place, self.response
+            read_mesh_strength(self.config, self.line, place),
+            self.line,
+            place,
+            self.response,
         )
 
 
@@ -132,7 +150,9 @@ def _half_order_share(case: TimeCase, at: str) -> float:
 def _spectrum_ratio(case: TimeCase, at: str) -> float:
     """Root of the summed squares of all lines of one node's angular displacement over another's."""
     first, second = at.split("/")
-    return math.sqrt(float(np.sum(case.angles(first) ** 2) / np.sum(case.angles(second) ** 2)))
+    return math.sqrt(
+        float(np.sum(case.angles(first) ** 2) / np.sum(case.angles(second) ** 2))
+    )
 
 
 TIMES: dict[str, TimeCheck] = {
@@ -141,8 +161,12 @@ TIMES: dict[str, TimeCheck] = {
     "time.energy_ratio": _energy_ratio,
     "time.spectrum_ratio": _spectrum_ratio,
     "time.half_order_share": _half_order_share,
-    "time.order_of_the_largest_line": lambda case, at: 0.5 * float(case.angles(at).argmax() + 1),
-    "time.contact_loss": lambda case, at: float(case.response.contact_loss[case.mesh(at)]),
+    "time.order_of_the_largest_line": lambda case, at: (
+        0.5 * float(case.angles(at).argmax() + 1)
+    ),
+    "time.contact_loss": lambda case, at: float(
+        case.response.contact_loss[case.mesh(at)]
+    ),
     "time.least_tooth_force": lambda case, at: case.tooth_force(at)[0],
     "time.greatest_tooth_force": lambda case, at: case.tooth_force(at)[1],
     "time.root_stress": lambda case, at: float(_wheel(case, at).stress),

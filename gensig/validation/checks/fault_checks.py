@@ -17,7 +17,9 @@ from gensig.validation.checks.mesh_checks import mesh_stiffness, single_pair_sti
 
 def _faulty_tooth(case: Case) -> Tooth:
     fault = case.faults[0]
-    return faulty_teeth(case.pair, case.faults)[fault.gear, fault.teeth(case.gear(fault.gear))[0]]
+    return faulty_teeth(case.pair, case.faults)[
+        fault.gear, fault.teeth(case.gear(fault.gear))[0]
+    ]
 
 
 def _fault_increment(case: Case, at: str) -> float:
@@ -32,12 +34,16 @@ def _fault_increment(case: Case, at: str) -> float:
 
 def _increment_over_papers(case: Case, at: str) -> float:
     """The crack's increment over that of eqs. (11) and (12)."""
-    return _fault_increment(case, at) / _fault_increment(with_words(case, "mesh.crack=paper"), at)
+    return _fault_increment(case, at) / _fault_increment(
+        with_words(case, "mesh.crack=paper"), at
+    )
 
 
 def stiffness_loss(case: Case, at: str) -> float:
     """Share of the sound pair's stiffness that the fault takes at a named point."""
-    return 1.0 - single_pair_stiffness(case, at) / single_pair_stiffness(with_fault(case), at)
+    return 1.0 - single_pair_stiffness(case, at) / single_pair_stiffness(
+        with_fault(case), at
+    )
 
 
 def _contact_loss(case: Case, at: str) -> float:
@@ -72,7 +78,9 @@ def _smallest_step(case: Case, at: str) -> float:
 def _crack_tip_half_thickness(case: Case, at: str) -> float:
     """h_q of eqs. (11) and (12): how far the crack's tip is from the tooth centreline."""
     crack = _faulty_tooth(case).cracks[0]
-    return crack.mouth_half_thickness - float(crack.depth.max()) * float(np.sin(crack.angle))
+    return crack.mouth_half_thickness - float(crack.depth.max()) * float(
+        np.sin(crack.angle)
+    )
 
 
 def _pit_end(case: Case, at: str) -> float:
@@ -81,7 +89,9 @@ def _pit_end(case: Case, at: str) -> float:
     """
     tooth = _faulty_tooth(case)
     flank = tooth.profile.abscissa[tooth.profile.n_root_cells :]
-    length = next(fault.pit_length for fault in case.faults if isinstance(fault, Pitting))
+    length = next(
+        fault.pit_length for fault in case.faults if isinstance(fault, Pitting)
+    )
     end = pitch_abscissa(tooth.gear) + (0.5 if at == "upper" else -0.5) * length
     return float(np.interp(end, flank, tooth.profile.curvature_radius))
 
@@ -91,7 +101,9 @@ def _pit_abscissa(case: Case, at: str) -> float:
     chord.
     """
     gear = case.gear(case.faults[0].gear)
-    return pitch_abscissa(gear) - (root_chord_abscissa(gear) if at == "root_chord" else 0.0)
+    return pitch_abscissa(gear) - (
+        root_chord_abscissa(gear) if at == "root_chord" else 0.0
+    )
 
 
 def _gap_opening(case: Case, at: str) -> float:
@@ -99,7 +111,9 @@ def _gap_opening(case: Case, at: str) -> float:
     table, fault = case.table, case.faults[0]
     side = table.pinion if fault.gear == "pinion" else table.wheel
     on_path = (table.position >= 0.0) & (table.position <= case.pair.path_of_contact)
-    return float((side.gap[case.faulty_kinds[f"{fault.gear}_kind"]] - side.gap[0])[on_path].max())
+    return float(
+        (side.gap[case.faulty_kinds[f"{fault.gear}_kind"]] - side.gap[0])[on_path].max()
+    )
 
 
 def _share_without_stiffness(case: Case, at: str) -> float:

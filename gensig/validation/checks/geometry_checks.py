@@ -30,7 +30,9 @@ def _of_gear(value: Callable[[Gear], float]) -> Check:
 
 
 def _junction(gear: Gear, axis: int) -> float:
-    return float(involute_point(gear, np.array([gear.junction_curvature_radius]))[axis][0])
+    return float(
+        involute_point(gear, np.array([gear.junction_curvature_radius]))[axis][0]
+    )
 
 
 def _junction_gap(gear: Gear) -> float:
@@ -87,7 +89,9 @@ GEOMETRY: dict[str, Check] = {
     "rounding_center_offset": _of_gear(lambda gear: gear.rounding_center_offset),
     "half_pitch_angle": _of_gear(lambda gear: float(np.pi / gear.n_teeth)),
     "junction_curvature_radius": _of_gear(lambda gear: gear.junction_curvature_radius),
-    "root_chord_abscissa": _of_gear(lambda gear: float(tooth_profile(gear).abscissa[0])),
+    "root_chord_abscissa": _of_gear(
+        lambda gear: float(tooth_profile(gear).abscissa[0])
+    ),
     "junction_radius": _of_gear(
         lambda gear: float(np.hypot(gear.base_radius, gear.junction_curvature_radius))
     ),
@@ -98,13 +102,19 @@ GEOMETRY: dict[str, Check] = {
     "gamma_mid_angle": _of_gear(lambda gear: root_curve_middle(gear, "gamma_mid")),
     "arc_mid_angle": _of_gear(lambda gear: root_curve_middle(gear, "arc_mid")),
     "gamma_mid_abscissa": _of_gear(lambda gear: root_curve_point(gear, "gamma_mid")[0]),
-    "gamma_mid_half_thickness": _of_gear(lambda gear: root_curve_point(gear, "gamma_mid")[1]),
+    "gamma_mid_half_thickness": _of_gear(
+        lambda gear: root_curve_point(gear, "gamma_mid")[1]
+    ),
     "arc_mid_abscissa": _of_gear(lambda gear: root_curve_point(gear, "arc_mid")[0]),
-    "arc_mid_half_thickness": _of_gear(lambda gear: root_curve_point(gear, "arc_mid")[1]),
+    "arc_mid_half_thickness": _of_gear(
+        lambda gear: root_curve_point(gear, "arc_mid")[1]
+    ),
     "tangent_length": lambda case, at: case.pair.tangent_length,
     "base_pitch": lambda case, at: case.pair.base_pitch,
     "transverse_contact_ratio": lambda case, at: case.pair.transverse_contact_ratio,
-    "single_zone_length": lambda case, at: 2.0 * case.pair.base_pitch - case.pair.path_of_contact,
+    "single_zone_length": lambda case, at: (
+        2.0 * case.pair.base_pitch - case.pair.path_of_contact
+    ),
     "zone_share": _zone_share,
     "pinion_curvature": lambda case, at: float(case.curvature("pinion", at)[0]),
     "corner_gap": _corner_gap,

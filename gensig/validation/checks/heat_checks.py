@@ -75,7 +75,8 @@ def _single_change(case: HotCase, at: str) -> float:
 
 def _contact_ratio_change(case: HotCase, at: str) -> float:
     return (
-        case.variants[at].transverse_contact_ratio / case.variants[COLD].transverse_contact_ratio
+        case.variants[at].transverse_contact_ratio
+        / case.variants[COLD].transverse_contact_ratio
         - 1.0
     )
 
@@ -83,8 +84,14 @@ def _contact_ratio_change(case: HotCase, at: str) -> float:
 def _even_flash(case: HotCase, at: str) -> float:
     """Flash temperature at the start, the pitch point or the end of the path under an even load."""
     system = case.duty.system
-    place = {"start": 0.0, "pitch": system.pair.pitch_point, "end": system.pair.path_of_contact}[at]
-    even = system.mesh_force / (system.pair.face_width * system.pair.transverse_contact_ratio)
+    place = {
+        "start": 0.0,
+        "pitch": system.pair.pitch_point,
+        "end": system.pair.path_of_contact,
+    }[at]
+    even = system.mesh_force / (
+        system.pair.face_width * system.pair.transverse_contact_ratio
+    )
     rise = flash_temperature(
         system.pair, np.array([place]), even, system.material, case.duty.heat,
         friction=case.duty.friction, speed=case.duty.speed,
@@ -101,7 +108,8 @@ def _surface_rise(case: HotCase, at: str) -> float:
     body: BodyHeat = getattr(case.state, at)
     heat = case.duty.heat.at_speed(case.duty.speed)
     return body.to_oil / (
-        heat.face_convection * face_surface(gear) + heat.tooth_convection * tooth_surface(gear)
+        heat.face_convection * face_surface(gear)
+        + heat.tooth_convection * tooth_surface(gear)
     )
 
 
@@ -119,14 +127,18 @@ def _rise_for_printed(case: HotCase, at: str) -> float:
         printed_value("helical_heat_paper", f"{name}.reference_root")
         for name in ("cold.mesh_mean", "hot.mesh_mean")
     ]
-    needed = float(case.variants[COLD].approach.mean()) * (1.0 - printed[0] / printed[1])
+    needed = float(case.variants[COLD].approach.mean()) * (
+        1.0 - printed[0] / printed[1]
+    )
     return needed / _teeth_per_kelvin(case, at)
 
 
 def _sweep_change(case: HotCase, at: str) -> float:
     """Change of the mean stiffness ``at`` from the first to the last value of a sweep."""
     variant, name = at.split(":")
-    first, last = (float(one[variant].mesh.mean()) for one in sweep(case.duty, name, SWEEPS[name]))
+    first, last = (
+        float(one[variant].mesh.mean()) for one in sweep(case.duty, name, SWEEPS[name])
+    )
     return last / first - 1.0
 
 
@@ -140,7 +152,9 @@ def _mean_single_difference(case: HotCase, at: str) -> float:
     """Mean difference of the single-pair curve to that of gensig's own mesh, over the latter,
     along one pair's way.
     """
-    ours = read_hot_case(("system=helical_pair", "gear=chongqing_40_162", "heat=chongqing_rated"))
+    ours = read_hot_case(
+        ("system=helical_pair", "gear=chongqing_40_162", "heat=chongqing_rated")
+    )
     curves = [one.variants[TRUE] for one in (case, ours)]
     place = np.linspace(0.0, 1.0, 201)[1:-1]
     analytic, best = (

@@ -42,7 +42,9 @@ def _tangential_force(case: SlicedCase, at: str) -> float:
 def _single_per_width(case: SlicedCase, at: str) -> float:
     """Largest stiffness of one slice of a pair per width: c'."""
     mesh = case.system.sliced_mesh()
-    on_path = (mesh.position >= 0.0) & (mesh.position <= case.system.pair.path_of_contact)
+    on_path = (mesh.position >= 0.0) & (
+        mesh.position <= case.system.pair.path_of_contact
+    )
     load = math.log(case.system.mesh_force / case.system.pair.face_width)
     contact = mesh.contact_factor * (mesh.contact_constant - mesh.log_weight * load)
     return float(np.max(1.0 / (mesh.structure + contact)[on_path]))
@@ -57,18 +59,28 @@ def _depth_of_all(case: SlicedCase, at: str) -> float:
 SLICED: dict[str, SlicedCheck] = {
     "sliced.center_distance": lambda case, at: case.system.pair.center_distance,
     "sliced.overlap_ratio": lambda case, at: case.system.pair.overlap_ratio,
-    "sliced.transverse_contact_ratio": lambda case, at: case.system.pair.transverse_contact_ratio,
+    "sliced.transverse_contact_ratio": lambda case, at: (
+        case.system.pair.transverse_contact_ratio
+    ),
     "sliced.total_contact_ratio": lambda case, at: case.system.pair.total_contact_ratio,
-    "sliced.working_pressure_angle": lambda case, at: case.system.pair.working_pressure_angle,
-    "sliced.mesh_period": lambda case, at: 2.0 * math.pi / case.system.pair.wheel.n_teeth,
+    "sliced.working_pressure_angle": lambda case, at: (
+        case.system.pair.working_pressure_angle
+    ),
+    "sliced.mesh_period": lambda case, at: (
+        2.0 * math.pi / case.system.pair.wheel.n_teeth
+    ),
     "sliced.tangential_force": _tangential_force,
     "sliced.mesh_force": lambda case, at: case.system.mesh_force,
     "sliced.mean_error": lambda case, at: float(case.result.error.mean()),
     "sliced.peak_to_peak": lambda case, at: float(np.ptp(case.result.error)),
     "sliced.line_load": lambda case, at: float(case.result.contact.line_load.max()),
     "sliced.contact_pressure": lambda case, at: float(case.result.pressure.max()),
-    "sliced.single_pair_stiffness": lambda case, at: float(case.system.single_pair()[1].max()),
-    "sliced.mesh_stiffness": lambda case, at: float(case.result.contact.stiffness.mean()),
+    "sliced.single_pair_stiffness": lambda case, at: float(
+        case.system.single_pair()[1].max()
+    ),
+    "sliced.mesh_stiffness": lambda case, at: float(
+        case.result.contact.stiffness.mean()
+    ),
     "sliced.stiffness_per_width": _single_per_width,
     "sliced.iso6336_stiffness_per_width": lambda case, at: single_stiffness(
         case.system.pair, allow_extrapolation=True

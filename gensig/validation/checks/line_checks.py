@@ -29,7 +29,10 @@ def _ratios_ignored(line: ShaftLine) -> ShaftLine:
         stiffness = mesh.stiffness * one.base_radius * other.base_radius
         shafts.append(
             Shaft(
-                first=one.node, second=other.node, stiffness=stiffness, loss_factor=mesh.loss_factor
+                first=one.node,
+                second=other.node,
+                stiffness=stiffness,
+                loss_factor=mesh.loss_factor,
             )
         )
     return ShaftLine(nodes=line.nodes, shafts=(*line.shafts, *shafts))
@@ -39,9 +42,12 @@ def _crank_only(line: ShaftLine) -> ShaftLine:
     """Nodes from the first one on that shafts alone join to it."""
     own = ShaftLine(nodes=line.nodes, shafts=line.shafts).parts[0]
     if own != tuple(range(len(own))):
-        raise ConfigError("crank_only: the nodes of the crank line must come first in the table")
+        raise ConfigError(
+            "crank_only: the nodes of the crank line must come first in the table"
+        )
     return ShaftLine(
-        nodes=line.nodes[: len(own)], shafts=tuple(s for s in line.shafts if s.first in own)
+        nodes=line.nodes[: len(own)],
+        shafts=tuple(s for s in line.shafts if s.first in own),
     )
 
 

@@ -17,7 +17,9 @@ N_MEAN = 4000  # points of a mean over a zone
 def contact_compliance(case: Case, position: Array) -> Array:
     """Local compliance of both flanks of a pair that carries the whole load, (phase,) m/N."""
     law = contact_law(case.pair, position, case.system.material, case.system.mesh)
-    return np.asarray(law.compliance(case.pair.pinion.face_width, case.system.mesh_force))
+    return np.asarray(
+        law.compliance(case.pair.pinion.face_width, case.system.mesh_force)
+    )
 
 
 def _contact(case: Case, at: str) -> float:
@@ -25,7 +27,9 @@ def _contact(case: Case, at: str) -> float:
 
 
 def _pair_stiffness(case: Case, position: Array) -> Array:
-    if not all(tooth.present for tooth in faulty_teeth(case.pair, case.faults).values()):
+    if not all(
+        tooth.present for tooth in faulty_teeth(case.pair, case.faults).values()
+    ):
         return np.zeros_like(position)
     return 1.0 / pair_compliance(case.whole_load_table, position, **case.faulty_kinds)
 
@@ -39,8 +43,13 @@ def single_pair_stiffness(case: Case, at: str) -> float:
 
 def _zone(case: Case, name: str) -> tuple[float, float]:
     """First and last roll of a zone of the mesh cycle, m."""
-    pitch, double = case.pair.base_pitch, case.pair.path_of_contact - case.pair.base_pitch
-    return {"cycle": (0.0, pitch), "single": (double, pitch), "double": (0.0, double)}[name]
+    pitch, double = (
+        case.pair.base_pitch,
+        case.pair.path_of_contact - case.pair.base_pitch,
+    )
+    return {"cycle": (0.0, pitch), "single": (double, pitch), "double": (0.0, double)}[
+        name
+    ]
 
 
 def _mean_stiffness(case: Case, at: str) -> float:
@@ -51,17 +60,23 @@ def _mean_stiffness(case: Case, at: str) -> float:
     share = (np.arange(N_MEAN) + 0.5) / N_MEAN
     if at == "cycle":
         path = pair.path_of_contact
-        return float(_pair_stiffness(case, share * path).mean()) * path / pair.base_pitch
+        return (
+            float(_pair_stiffness(case, share * path).mean()) * path / pair.base_pitch
+        )
     first, last = _zone(case, at)
     entering = _pair_stiffness(case, first + share * (last - first))
     if at == "single":
         return float(entering.mean())
-    return float((entering + _pair_stiffness(case, share * last + pair.base_pitch)).mean())
+    return float(
+        (entering + _pair_stiffness(case, share * last + pair.base_pitch)).mean()
+    )
 
 
 def statics(case: Case, roll: Array) -> StaticMesh:
     """Equilibrium under the set torque; teeth 0 enter at A at roll 0."""
-    return static_mesh(case.table, pair_states(case.table, roll), case.system.mesh_force)
+    return static_mesh(
+        case.table, pair_states(case.table, roll), case.system.mesh_force
+    )
 
 
 def mesh_stiffness(case: Case, roll: Array) -> Array:
@@ -78,7 +93,9 @@ def mean_mesh_stiffness(case: Case, at: str) -> float:
     """Mean tangent stiffness over a cycle, the single or the double zone."""
     first, last = _zone(case, at)
     return float(
-        mesh_stiffness(case, first + (last - first) * (np.arange(N_MEAN) + 0.5) / N_MEAN).mean()
+        mesh_stiffness(
+            case, first + (last - first) * (np.arange(N_MEAN) + 0.5) / N_MEAN
+        ).mean()
     )
 
 
@@ -91,7 +108,9 @@ def _double_zone_stiffness(case: Case, at: str) -> float:
     """At a share of the double zone, or its largest value."""
     if at == "max":
         return float(
-            mesh_stiffness(case, np.linspace(0.001, 0.999, 999) * _zone(case, "double")[1]).max()
+            mesh_stiffness(
+                case, np.linspace(0.001, 0.999, 999) * _zone(case, "double")[1]
+            ).max()
         )
     return float(mesh_stiffness(case, _double_roll(case, at))[0])
 
@@ -111,12 +130,16 @@ def _coupled_over_sum(case: Case, at: str) -> float:
 def _sum_over_coupled(case: Case, at: str) -> float:
     """How much the plain sum is too stiff on the mean of the double zone."""
     total = with_words(case, "mesh.pair_coupling=sum")
-    return mean_mesh_stiffness(total, "double") / mean_mesh_stiffness(case, "double") - 1.0
+    return (
+        mean_mesh_stiffness(total, "double") / mean_mesh_stiffness(case, "double") - 1.0
+    )
 
 
 def _stiffness_harmonic(case: Case, at: str) -> float:
     """Amplitude of a mesh harmonic of the stiffness over its mean."""
-    stiffness = mesh_stiffness(case, case.pair.base_pitch * (np.arange(8192) + 0.5) / 8192)
+    stiffness = mesh_stiffness(
+        case, case.pair.base_pitch * (np.arange(8192) + 0.5) / 8192
+    )
     spectrum = np.abs(np.fft.rfft(stiffness))
     return float(2.0 * spectrum[int(at)] / spectrum[0])
 
@@ -126,7 +149,9 @@ def largest_pair_stiffness(case: Case) -> float:
 
     What standards call the single stiffness.
     """
-    return float(_pair_stiffness(case, np.linspace(0.0, case.pair.path_of_contact, 501)).max())
+    return float(
+        _pair_stiffness(case, np.linspace(0.0, case.pair.path_of_contact, 501)).max()
+    )
 
 
 MESH: dict[str, Check] = {

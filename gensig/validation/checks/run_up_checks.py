@@ -57,22 +57,30 @@ class RunUpCase:
         order, speed = np.arange(1, N_ORDERS + 1), to_si("speed_rpm", 1.0) * SPEEDS_RPM
         frequency = np.outer(speed, order * system.pair.pinion.n_teeth).ravel()
         push = dynamics.mean_mesh_stiffness * np.tile(amplitude, len(speed))
-        force = np.asarray(push[:, None] * dynamics.approach_direction(), dtype=np.complex128)
+        force = np.asarray(
+            push[:, None] * dynamics.approach_direction(), dtype=np.complex128
+        )
         felt = accelerations(dynamics, frequency, force)[
             :, [dynamics.dofs.index(name) for name in CHANNELS]
         ]
-        return 10.0 * np.log10((np.abs(felt) ** 2).reshape(len(speed), -1).sum(axis=1) / 2.0)
+        return 10.0 * np.log10(
+            (np.abs(felt) ** 2).reshape(len(speed), -1).sum(axis=1) / 2.0
+        )
 
     def beside(self, variant: str | None) -> RunUpCase:
         """The same machine with another modification; None: with plain flanks."""
         others = tuple(word for word in self.overrides if not word.startswith(GROUP))
-        return read_run_up_case(others if variant is None else (*others, GROUP + variant))
+        return read_run_up_case(
+            others if variant is None else (*others, GROUP + variant)
+        )
 
 
 @lru_cache(maxsize=32)
 def read_run_up_case(overrides: tuple[str, ...]) -> RunUpCase:
     """Compose the machine of a row."""
-    return RunUpCase(system=read_helical_pair(compose("generate", overrides)), overrides=overrides)
+    return RunUpCase(
+        system=read_helical_pair(compose("generate", overrides)), overrides=overrides
+    )
 
 
 def _within(at: str) -> NDArray[np.bool_]:
@@ -81,13 +89,19 @@ def _within(at: str) -> NDArray[np.bool_]:
 
 
 def _change(reduce: Callable[[Array], float]) -> Callable[[RunUpCase, str], float]:
-    return lambda case, at: float(reduce((case.level - case.beside(None).level)[_within(at)]))
+    return lambda case, at: float(
+        reduce((case.level - case.beside(None).level)[_within(at)])
+    )
 
 
 def _behind_the_best(case: RunUpCase, at: str) -> float:
     """Mean level over some speeds less that of the best other variant, dB."""
-    mine = next(word.removeprefix(GROUP) for word in case.overrides if word.startswith(GROUP))
-    mean = {name: float(case.beside(name).level[_within(at)].mean()) for name in VARIANTS}
+    mine = next(
+        word.removeprefix(GROUP) for word in case.overrides if word.startswith(GROUP)
+    )
+    mean = {
+        name: float(case.beside(name).level[_within(at)].mean()) for name in VARIANTS
+    }
     return mean[mine] - min(value for name, value in mean.items() if name != mine)
 
 

@@ -9,7 +9,10 @@ from collections.abc import Callable
 from gensig.mesh import iso6336
 from gensig.validation.case import Case
 from gensig.validation.checks.geometry_checks import Check
-from gensig.validation.checks.mesh_checks import largest_pair_stiffness, mean_mesh_stiffness
+from gensig.validation.checks.mesh_checks import (
+    largest_pair_stiffness,
+    mean_mesh_stiffness,
+)
 
 
 def _line_load(case: Case, at: str = "") -> float:
@@ -42,19 +45,26 @@ def _low_load_factor(case: Case, at: str) -> float:
     return _iso_single(case, "own_load") / _iso_single(case, "stiff")
 
 
-_iso_single, _iso_mesh = _per_width(iso6336.single_stiffness), _per_width(iso6336.mesh_stiffness)
+_iso_single, _iso_mesh = (
+    _per_width(iso6336.single_stiffness),
+    _per_width(iso6336.mesh_stiffness),
+)
 
 STANDARD: dict[str, Check] = {
     "iso_flexibility": lambda case, at: iso6336.flexibility(case.pair),
     "iso_theoretical_single": lambda case, at: 1.0 / iso6336.flexibility(case.pair),
-    "iso_basic_rack_factor": lambda case, at: iso6336.basic_rack_factor(case.pair.pinion),
+    "iso_basic_rack_factor": lambda case, at: iso6336.basic_rack_factor(
+        case.pair.pinion
+    ),
     "iso_single": _iso_single,
     "iso_single_over_face": _over_face(_iso_single),
     "iso_mesh": _iso_mesh,
     "iso_mesh_over_face": _over_face(_iso_mesh),
     "iso_low_load_factor": _low_load_factor,
     "line_load": _line_load,
-    "single_per_width": lambda case, at: largest_pair_stiffness(case) / case.pair.pinion.face_width,
+    "single_per_width": lambda case, at: (
+        largest_pair_stiffness(case) / case.pair.pinion.face_width
+    ),
     "mesh_per_width": lambda case, at: (
         mean_mesh_stiffness(case, "cycle") / case.pair.pinion.face_width
     ),

@@ -10,7 +10,13 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.life.life_laws import FittedLaw, LifeMap, fitted_laws, life_map, torque_exponent
+from gensig.life.life_laws import (
+    FittedLaw,
+    LifeMap,
+    fitted_laws,
+    life_map,
+    torque_exponent,
+)
 from gensig.life.wear.archard import band_half_width, flank_radii
 from gensig.life.wear.wear_case import WearCase
 from gensig.life.wear.wear_life import WearLife, hours, wear_life
@@ -70,7 +76,9 @@ class WearPoint:
 
     def at(self, values: Array, point: str) -> float:
         """A row of nodes at A, C or E."""
-        pitch = int(np.argmin(np.abs(self.case.path.position - self.case.pair.pitch_point)))
+        pitch = int(
+            np.argmin(np.abs(self.case.path.position - self.case.pair.pitch_point))
+        )
         return float(values[{"A": 0, "C": pitch, "E": -1}[point]])
 
 
@@ -78,7 +86,9 @@ class WearPoint:
 def read_wear_point(overrides: tuple[str, ...]) -> WearPoint:
     """Compose the pair of a row."""
     config = compose("generate", overrides)
-    return WearPoint(case=read_wear_case(config), speed=read_operating(config["operating"]).speed)
+    return WearPoint(
+        case=read_wear_case(config), speed=read_operating(config["operating"]).speed
+    )
 
 
 def _pressure(point: WearPoint, at: str) -> float:
@@ -134,13 +144,18 @@ def _intervals_effect(point: WearPoint, at: str) -> float:
 def _step_effect(point: WearPoint, at: str) -> float:
     """Change of the life by half the step of the solver, relative, to four decimals."""
     finer = replace(point.case.options, step=0.05 * point.case.options.threshold)
-    return round(abs(wear_life(replace(point.case, options=finer)).life / point.life.life - 1.0), 4)
+    return round(
+        abs(wear_life(replace(point.case, options=finer)).life / point.life.life - 1.0),
+        4,
+    )
 
 
 def _degenerate(point: WearPoint, at: str) -> float:
     """Life with half the threshold and twice the intervals over the life."""
     options = point.case.options
-    other = replace(options, threshold=0.5 * options.threshold, n_intervals=2 * options.n_intervals)
+    other = replace(
+        options, threshold=0.5 * options.threshold, n_intervals=2 * options.n_intervals
+    )
     return wear_life(replace(point.case, options=other)).life / point.life.life
 
 
@@ -150,7 +165,9 @@ def _radius_ratio(kind: str) -> WearCheck:
     def check(point: WearPoint, at: str) -> float:
         depth = point.life.depth[-1][:, 0]
         radii = flank_radii(point.case.path, depth, point.load[0], point.case.material)
-        nodes = {"A": 10, "C": 0, "E": -11}[at]  # away from the ends, beyond which nothing wears
+        nodes = {"A": 10, "C": 0, "E": -11}[
+            at
+        ]  # away from the ends, beyond which nothing wears
         if at == "C":
             return point.at(radii[kind][0] / radii["new"][0], at)
         return float(radii[kind][0, nodes] / radii["new"][0, nodes])
@@ -187,21 +204,31 @@ def _printed_ratio(point: WearPoint, at: str) -> float:
 
 WEAR: dict[str, WearCheck] = {
     "wear.contact_ratio": lambda point, at: point.case.pair.transverse_contact_ratio,
-    "wear.pressure_angle": lambda point, at: point.at(point.case.path.pressure_angle[0], at),
+    "wear.pressure_angle": lambda point, at: point.at(
+        point.case.path.pressure_angle[0], at
+    ),
     "wear.factor": lambda point, at: point.case.options.wear_factor("pinion"),
     "wear.sliding": _sliding,
     "wear.sliding_root_over_tip": lambda point, at: abs(
         _sliding(point, "A") / _sliding(point, "E")
     ),
-    "wear.sliding_root_times_tip": lambda point, at: _sliding(point, "A") * _sliding(point, "E"),
-    "wear.sliding_at_pitch": lambda point, at: abs(_sliding(point, "C") / _sliding(point, "A")),
+    "wear.sliding_root_times_tip": lambda point, at: (
+        _sliding(point, "A") * _sliding(point, "E")
+    ),
+    "wear.sliding_at_pitch": lambda point, at: abs(
+        _sliding(point, "C") / _sliding(point, "A")
+    ),
     "wear.pressure": _pressure,
-    "wear.pressure_root_over_tip": lambda point, at: _pressure(point, "A") / _pressure(point, "E"),
+    "wear.pressure_root_over_tip": lambda point, at: (
+        _pressure(point, "A") / _pressure(point, "E")
+    ),
     "wear.equation_15": _equation_15,
     "wear.pinion_per_mesh": _per_mesh(0),
     "wear.wheel_per_mesh": _per_mesh(1),
     "wear.both_per_mesh": _per_mesh(None),
-    "wear.pitch_over": lambda point, at: _per_mesh(0)(point, "C") / _per_mesh(0)(point, at),
+    "wear.pitch_over": lambda point, at: (
+        _per_mesh(0)(point, "C") / _per_mesh(0)(point, at)
+    ),
     "wear.pinion_root_over_wheel_tip": lambda point, at: (
         _per_mesh(0)(point, "A") / _per_mesh(1)(point, "A")
     ),

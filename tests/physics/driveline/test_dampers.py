@@ -6,14 +6,17 @@ from numpy.testing import assert_allclose
 
 from gensig.driveline.linear.damper_tuning import seen_from_nodes, tune_dampers
 from gensig.driveline.linear.dampers import TorsionalDamper, with_dampers
-from gensig.driveline.linear.forced import Elements, LinearLine, closed_line, steady_response
+from gensig.driveline.linear.forced import (
+    Elements,
+    LinearLine,
+    closed_line,
+    steady_response,
+)
 from gensig.driveline.linear.matrices import line_matrices
 from gensig.driveline.linear.modal import natural_modes
 from gensig.driveline.linear.shaft_line import Node, Shaft, ShaftLine
 
-STIFFNESS = (
-    1.0  # of the spring that holds the one disc, whose inertia is 1: its frequency is 1 rad/s
-)
+STIFFNESS = 1.0  # of the spring that holds the one disc, whose inertia is 1: its frequency is 1 rad/s
 RATIOS = (0.1, 0.3)
 
 
@@ -25,9 +28,13 @@ def one_disc(speeds):
         loss=np.zeros((1, 1)),
         damping=np.zeros((1, 1)),
     )
-    spring = Elements(directions=np.ones((1, 1)), stiffness=np.array([STIFFNESS]), loss=np.zeros(1))
+    spring = Elements(
+        directions=np.ones((1, 1)), stiffness=np.array([STIFFNESS]), loss=np.zeros(1)
+    )
     torque = np.cos(2.0 * np.pi * np.arange(64) / 64)[None]
-    return seen_from_nodes(line, spring, 0, lambda speed: torque, speeds, {1: 0}, n_orders=1)
+    return seen_from_nodes(
+        line, spring, 0, lambda speed: torque, speeds, {1: 0}, n_orders=1
+    )
 
 
 def peak(seen, *dampers):
@@ -44,9 +51,14 @@ def test_the_tuned_damper_of_one_disc_is_den_hartogs(ratio):
     own = np.sqrt(found.stiffness / found.ring_inertia)
     assert_allclose(own, 1.0 / (1.0 + ratio), rtol=0.01)
     damping_ratio = found.damping / (2.0 * found.ring_inertia * own)
-    assert_allclose(damping_ratio, np.sqrt(3.0 * ratio / (8.0 * (1.0 + ratio))), rtol=0.1)
+    assert_allclose(
+        damping_ratio, np.sqrt(3.0 * ratio / (8.0 * (1.0 + ratio))), rtol=0.1
+    )
     other = TorsionalDamper(
-        node=1, ring_inertia=ratio, damping=found.damping, stiffness=1.2 * found.stiffness
+        node=1,
+        ring_inertia=ratio,
+        damping=found.damping,
+        stiffness=1.2 * found.stiffness,
     )
     assert peak(seen, other) > 1.1 * peak(seen, found)
 
@@ -59,7 +71,9 @@ def test_the_viscous_damper_of_one_disc_is_den_hartogs(ratio):
     assert found.stiffness == 0.0
     assert_allclose(peak(seen, found), 1.0 + 2.0 / ratio, rtol=2e-3)
     assert_allclose(
-        found.damping, 2.0 * ratio / np.sqrt(2.0 * (1.0 + ratio) * (2.0 + ratio)), rtol=0.02
+        found.damping,
+        2.0 * ratio / np.sqrt(2.0 * (1.0 + ratio) * (2.0 + ratio)),
+        rtol=0.02,
     )
 
 
@@ -90,7 +104,9 @@ def test_dampers_on_top_of_a_solution_are_the_line_solved_again():
     torque -= torque.mean(axis=1, keepdims=True)
     speeds = (60.0, 180.0, 400.0)
     bare, _ = closed_line(line_matrices(chain()[0]))
-    elements = Elements(directions=SPRING, stiffness=np.array([2e4]), loss=np.array([600.0]))
+    elements = Elements(
+        directions=SPRING, stiffness=np.array([2e4]), loss=np.array([600.0])
+    )
     seen = seen_from_nodes(
         bare, elements, 0, lambda speed: torque, speeds, {2: 1, 3: 2}, n_orders=20
     )
@@ -116,7 +132,9 @@ def test_a_ring_held_hard_or_not_at_all_is_inertia_or_nothing():
     locked = TorsionalDamper(node=1, ring_inertia=0.2, damping=0.0, stiffness=1e12)
     assert_allclose(locked.dynamic_stiffness(frequency), -0.2 * frequency**2, rtol=1e-6)
     loose = TorsionalDamper(node=1, ring_inertia=0.2, damping=1e-9, stiffness=0.0)
-    assert np.all(np.abs(loose.dynamic_stiffness(frequency)) < 1e-9 * 0.2 * frequency**2)
+    assert np.all(
+        np.abs(loose.dynamic_stiffness(frequency)) < 1e-9 * 0.2 * frequency**2
+    )
 
 
 def test_a_damper_only_takes_energy():

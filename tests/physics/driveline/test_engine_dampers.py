@@ -54,10 +54,15 @@ def test_dampers_of_the_configuration_are_those_added_and_those_tuned_with(line)
     assert read.drive.numbers == damped.drive.numbers == (*range(1, 68), 68, 69)
     assert read.ratios[68] == read.ratios[21] == 0.5
     mesh = mesh_between(line, (21, 45))
-    forces = [tooth_load(one, mesh, one.response(SPEED, TORQUE)).force for one in (damped, read)]
+    forces = [
+        tooth_load(one, mesh, one.response(SPEED, TORQUE)).force
+        for one in (damped, read)
+    ]
     assert_allclose(*forces, rtol=1e-9, atol=1e-6)
     seen = seen_by_dampers(line, mesh, (21, 45), [SPEED], TORQUE)
-    assert_allclose(seen.largest_force(DAMPERS, n_points=5760), np.abs(forces[0]).max(), rtol=1e-6)
+    assert_allclose(
+        seen.largest_force(DAMPERS, n_points=5760), np.abs(forces[0]).max(), rtol=1e-6
+    )
 
 
 def test_root_stress_follows_the_tooth_force(config, line, load):
@@ -71,7 +76,9 @@ def test_root_stress_follows_the_tooth_force(config, line, load):
         rtol=1e-3,
     )
     for name, stress in found.passes.items():
-        assert stress.shape[0] == 54  # 54 teeth meet in a cycle, which is one turn of the pump
+        assert (
+            stress.shape[0] == 54
+        )  # 54 teeth meet in a cycle, which is one turn of the pump
         assert np.all(stress <= found.history.stress[name] * (1.0 + 1e-12))
         assert stress.max() > 0.8 * found.history.stress[name].max()
     steady = ToothLoad(speed=SPEED, force=np.full(5760, load.greatest))
@@ -80,12 +87,16 @@ def test_root_stress_follows_the_tooth_force(config, line, load):
         assert_allclose(stress, np.tile(same.history.stress[name], (54, 1)), rtol=1e-12)
 
 
-def test_dampers_on_the_pump_drive_lower_the_load_there_and_leave_the_flywheel(line, load):
+def test_dampers_on_the_pump_drive_lower_the_load_there_and_leave_the_flywheel(
+    line, load
+):
     damped, mesh = with_own_dampers(line, DAMPERS), mesh_between(line, (21, 45))
     response = damped.response(SPEED, TORQUE)
     assert tooth_load(damped, mesh, response).largest < 0.75 * load.largest
     assert_allclose(
-        response.fluctuation()[13], line.response(SPEED, TORQUE).fluctuation()[13], rtol=0.02
+        response.fluctuation()[13],
+        line.response(SPEED, TORQUE).fluctuation()[13],
+        rtol=0.02,
     )
     worse = with_own_dampers(
         line, (TorsionalDamper(node=45, ring_inertia=0.1, damping=0.0, stiffness=1e9),)

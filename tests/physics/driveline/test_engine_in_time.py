@@ -52,7 +52,9 @@ def test_a_sweep_of_a_line_without_play_is_the_linear_line(passage):
         n_orders=20,
     )
     both = 0.5 * (sweep.up.angle + sweep.down.angle)[0, :, ORDER_5]
-    assert_allclose(both, steady.angle[:, ORDER_5], rtol=0.15)  # the bins are 18 r/min wide
+    assert_allclose(
+        both, steady.angle[:, ORDER_5], rtol=0.15
+    )  # the bins are 18 r/min wide
     assert sweep.energy_residual < 1e-3
     assert_allclose(sweep.up.speeds, sweep.down.speeds)
 
@@ -81,9 +83,13 @@ def test_too_short_a_sweep_is_refused():
     with pytest.raises(
         ConfigError, match=r"passes too few cycles at its low end; give 0\.81 s or more"
     ):
-        sweep_response(engine(), 650 * RPM, 1750 * RPM, 0.2, 0.0, own={}, nodes=(14,), n_orders=10)
+        sweep_response(
+            engine(), 650 * RPM, 1750 * RPM, 0.2, 0.0, own={}, nodes=(14,), n_orders=10
+        )
     with pytest.raises(ConfigError, match="from a positive speed up to a higher one"):
-        sweep_response(engine(), 1750 * RPM, 650 * RPM, 5.0, 0.0, own={}, nodes=(14,), n_orders=10)
+        sweep_response(
+            engine(), 1750 * RPM, 650 * RPM, 5.0, 0.0, own={}, nodes=(14,), n_orders=10
+        )
 
 
 def test_a_steady_line_has_its_amplitude_in_the_spectrum():
@@ -101,7 +107,9 @@ def motion(speed, force, n_cycles):
     crank = speed / RATE * np.arange(n_samples)
     nothing = np.zeros((1, n_samples))
     angle = 4.0 * np.pi / len(force) * np.arange(len(force))
-    mesh_force = np.zeros((8, n_samples)) + np.interp(crank, angle, force, period=4.0 * np.pi)
+    mesh_force = np.zeros((8, n_samples)) + np.interp(
+        crank, angle, force, period=4.0 * np.pi
+    )
     return TimeResponse(
         time=crank / speed, crank_angle=crank, speed=nothing, angle=nothing, mesh_force=mesh_force,
         fluctuation=np.zeros(1), cycle_fluctuation=np.zeros(1), contact_loss=np.zeros(8), back_contact=np.zeros(8),
@@ -114,9 +122,13 @@ def test_root_stress_in_time_of_a_force_that_repeats_is_that_of_one_cycle():
     mesh = mesh_between(line, (21, 45))
     strength = read_mesh_strength(config, line, mesh)
     load = tooth_load(line, mesh, line.response(1688 * RPM, 12680.0))
-    smooth = replace(load, force=1500.0 + 4000.0 * np.cos(4.0 * np.pi * np.arange(5760) / 5760))
+    smooth = replace(
+        load, force=1500.0 + 4000.0 * np.cos(4.0 * np.pi * np.arange(5760) / 5760)
+    )
     once = dynamic_root_stress(strength, line, mesh, smooth)
-    found = root_stress_in_time(strength, line, mesh, motion(load.speed, smooth.force, 4.1))
+    found = root_stress_in_time(
+        strength, line, mesh, motion(load.speed, smooth.force, 4.1)
+    )
     assert_allclose(found.gears["wheel"].stress, once.gears["wheel"].stress, rtol=1e-4)
     passes, one = found.passes["wheel"], once.passes["wheel"]
     assert 3 * 54 <= len(passes) <= 4 * 54
@@ -125,12 +137,16 @@ def test_root_stress_in_time_of_a_force_that_repeats_is_that_of_one_cycle():
     shift = int(
         np.flatnonzero(
             [
-                np.allclose(np.roll(one, -k, axis=0)[:50], passes[:50], atol=0.01 * one.max())
+                np.allclose(
+                    np.roll(one, -k, axis=0)[:50], passes[:50], atol=0.01 * one.max()
+                )
                 for k in range(54)
             ]
         )[0]
     )
-    assert_allclose(np.roll(one, -shift, axis=0)[:54], passes[54:108], atol=0.01 * one.max())
+    assert_allclose(
+        np.roll(one, -shift, axis=0)[:54], passes[54:108], atol=0.01 * one.max()
+    )
 
 
 def test_a_run_too_short_for_its_teeth_is_refused():
@@ -138,6 +154,10 @@ def test_a_run_too_short_for_its_teeth_is_refused():
     mesh = mesh_between(line, (21, 45))
     strength = read_mesh_strength(config, line, mesh)
     with pytest.raises(ConfigError, match="two cycles of the crank at least"):
-        root_stress_in_time(strength, line, mesh, motion(1688 * RPM, np.full(64, 1000.0), 1.02))
+        root_stress_in_time(
+            strength, line, mesh, motion(1688 * RPM, np.full(64, 1000.0), 1.02)
+        )
     with pytest.raises(ConfigError, match="nothing closes its driving flanks in time"):
-        root_stress_in_time(strength, line, mesh, motion(1688 * RPM, np.full(64, -1000.0), 3.0))
+        root_stress_in_time(
+            strength, line, mesh, motion(1688 * RPM, np.full(64, -1000.0), 3.0)
+        )

@@ -34,7 +34,10 @@ def changed(path, value):
 def test_power_of_the_gas_is_that_of_all_it_drives(rpm, torque):
     found = torques_of(option(), rpm * RPM, torque)
     ratio = np.array(list(ratio_of_teeth().values()))
-    assert abs(np.sum(ratio * found.on(NODES).mean(axis=1))) < 1e-6 * found.indicated_torque
+    assert (
+        abs(np.sum(ratio * found.on(NODES).mean(axis=1)))
+        < 1e-6 * found.indicated_torque
+    )
     assert found.brake_torque == torque
     assert found.indicated_torque > torque + 1000.0
     assert_allclose(found.on(NODES)[16].mean(), -torque, atol=1e-9)
@@ -46,7 +49,9 @@ def test_reference_point_is_that_of_the_class():
     assert_allclose(
         found.indicated_torque / 20, 697.0, rtol=0.02
     )  # the independent estimate with the same sizes
-    consumption = found.fuel_volume * 840 * 20 / CYCLE * SPEED / (TORQUE * SPEED)  # kg/J
+    consumption = (
+        found.fuel_volume * 840 * 20 / CYCLE * SPEED / (TORQUE * SPEED)
+    )  # kg/J
     assert 0.18 < consumption * 3.6e9 / 1e3 < 0.22  # kg/kWh of a good diesel
 
 
@@ -88,7 +93,9 @@ def test_uneven_firing_has_other_orders():
     values["layout"]["bank_angles_deg"] = [0, 90]
     throws = torques_of(values).on(NODES)[list(THROWS)]
     _, together = cycle_orders(throws.sum(axis=0), 80)
-    assert np.abs(together[4]) > 1000.0  # order 2.5: the bank's own, no longer cancelled
+    assert (
+        np.abs(together[4]) > 1000.0
+    )  # order 2.5: the bank's own, no longer cancelled
 
 
 def test_pump_pulses_follow_the_firing_and_the_load():
@@ -97,7 +104,9 @@ def test_pump_pulses_follow_the_firing_and_the_load():
     _, together = cycle_orders(pump.sum(axis=0), 80)
     others = np.arange(1, 81) % 20 != 0
     assert np.abs(together[others]).max() < 1e-6 * np.abs(together).max()
-    assert pump.sum(axis=0).mean() < 1.5 * half.on(NODES)[45:65].sum(axis=0).mean() < 0.0
+    assert (
+        pump.sum(axis=0).mean() < 1.5 * half.on(NODES)[45:65].sum(axis=0).mean() < 0.0
+    )
 
 
 def test_quadratic_loads_follow_the_speed_and_constant_ones_do_not():
@@ -122,7 +131,9 @@ def pressure_file(folder, scale=1.0):
     found = torques_of(option())
     path = folder / "measured.csv"
     table = np.column_stack([np.degrees(found.angle), scale * found.pressure * 1e-6])
-    np.savetxt(path, table, delimiter=",", header="crank_angle_deg,pressure_mpa", comments="")
+    np.savetxt(
+        path, table, delimiter=",", header="crank_angle_deg,pressure_mpa", comments=""
+    )
     return changed("pressure.file", str(path)), found
 
 
@@ -150,7 +161,9 @@ def test_a_measured_pressure_decides_the_torque_and_a_cycle_needs_one(tmp_path):
 
 
 def test_a_torque_below_the_friction_is_refused():
-    with pytest.raises(ConfigError, match=r"the brake torque -10 N m is below the friction"):
+    with pytest.raises(
+        ConfigError, match=r"the brake torque -10 N m is below the friction"
+    ):
         torques_of(option(), torque=-10.0)
     values = changed("friction_mean_pressure_mpa", 0.0)
     values["loads"], values["injection_pump"], values["valves"] = None, None, None
@@ -164,7 +177,11 @@ def test_a_torque_below_the_friction_is_refused():
 @pytest.mark.parametrize(
     ("path", "value", "message"),
     [
-        ("throw_nodes", [13, 12], "excitation.throw_nodes has 2 different nodes for 10 throws"),
+        (
+            "throw_nodes",
+            [13, 12],
+            "excitation.throw_nodes has 2 different nodes for 10 throws",
+        ),
         (
             "throw_nodes",
             [99, 12, 11, 10, 9, 8, 7, 6, 5, 4],
@@ -175,7 +192,11 @@ def test_a_torque_below_the_friction_is_refused():
             [20, 12, 11, 10, 9, 8, 7, 6, 5, 4],
             "node 20 turns 0.5 times as fast as the crank; it needs 1",
         ),
-        ("throw_nodes", [1.5], "excitation.throw_nodes = [1.5] is not a list of whole numbers"),
+        (
+            "throw_nodes",
+            [1.5],
+            "excitation.throw_nodes = [1.5] is not a list of whole numbers",
+        ),
         ("valve_nodes.A", [1, 2], "excitation.valve_nodes.A has 2 nodes for 10 throws"),
         (
             "valve_nodes.A",
@@ -188,7 +209,11 @@ def test_a_torque_below_the_friction_is_refused():
             0,
             "excitation.valves.intake.cam.lift_mm = 0 must be positive",
         ),
-        ("valves.intake.cam", 3, "excitation.valves.intake.cam = 3 must be a group of keys"),
+        (
+            "valves.intake.cam",
+            3,
+            "excitation.valves.intake.cam = 3 must be a group of keys",
+        ),
         (
             "valves.intake.open_deg",
             3,
@@ -209,7 +234,11 @@ def test_a_torque_below_the_friction_is_refused():
             1,
             "excitation.injection_pump.cam.follower = 1 is not text",
         ),
-        ("injection_pump.diameter_cm", 1, "unknown key 'diameter_cm'; did you mean 'diameter_mm'?"),
+        (
+            "injection_pump.diameter_cm",
+            1,
+            "unknown key 'diameter_cm'; did you mean 'diameter_mm'?",
+        ),
         (
             "loads.fresh_water_pump.node",
             99,
@@ -225,7 +254,11 @@ def test_a_torque_below_the_friction_is_refused():
             -1,
             "excitation.loads.fresh_water_pump.torque_nm = -1 must not be",
         ),
-        ("dynamometer.node", 99, "excitation.dynamometer.node: the shaft line has no node 99"),
+        (
+            "dynamometer.node",
+            99,
+            "excitation.dynamometer.node: the shaft line has no node 99",
+        ),
         (
             "dynamometer.disturbance_share",
             2,
@@ -260,7 +293,11 @@ def test_a_torque_below_the_friction_is_refused():
         ),
         ("kind", "motor", "excitation.kind = 'motor'; allowed: engine"),
         ("sound", 1, "excitation: unknown key 'sound'"),
-        ("cylinder.bore_mm", "wide", "excitation.cylinder.bore_mm = 'wide' is not a number"),
+        (
+            "cylinder.bore_mm",
+            "wide",
+            "excitation.cylinder.bore_mm = 'wide' is not a number",
+        ),
         (
             "layout.firing_order",
             ["A1"] * 20,
@@ -276,7 +313,10 @@ def test_what_makes_no_engine_is_refused_in_one_line(path, value, message):
 
 def test_toothed_wheels_are_read_by_name():
     wheels = read_wheels(option())
-    assert {name: wheel.node for name, wheel in wheels.items()} == {"flywheel": 14, "pump_end": 45}
+    assert {name: wheel.node for name, wheel in wheels.items()} == {
+        "flywheel": 14,
+        "pump_end": 45,
+    }
     assert read_wheels(option(toothed_wheels=None)) == {}
     with pytest.raises(
         ConfigError,
@@ -284,9 +324,13 @@ def test_toothed_wheels_are_read_by_name():
     ):
         read_wheels(changed("toothed_wheels.flywheel.n_teeth", 2))
     without_node = {
-        key: one for key, one in option()["toothed_wheels"]["flywheel"].items() if key != "node"
+        key: one
+        for key, one in option()["toothed_wheels"]["flywheel"].items()
+        if key != "node"
     }
-    with pytest.raises(ConfigError, match=r"excitation\.toothed_wheels\.flywheel: missing node"):
+    with pytest.raises(
+        ConfigError, match=r"excitation\.toothed_wheels\.flywheel: missing node"
+    ):
         read_wheels(option(toothed_wheels={"flywheel": without_node}))
 
 
@@ -302,7 +346,8 @@ def test_missing_keys_are_named():
 def test_finer_cycles_give_the_same_torques():
     engine = read_engine(option())
     coarse, fine = (
-        engine_torques(engine, SPEED, TORQUE, ratio_of_teeth(), n_points=n) for n in (2880, 11520)
+        engine_torques(engine, SPEED, TORQUE, ratio_of_teeth(), n_points=n)
+        for n in (2880, 11520)
     )
     _, one = cycle_orders(coarse.on(NODES), 40)
     _, other = cycle_orders(fine.on(NODES), 40)

@@ -37,7 +37,9 @@ def chain(loss_factor=0.0, damping=0.0, grounded=True):
     """Three discs on two shafts, the first on a third to ground."""
     directions = np.array([[1.0, 0, 0], [1, -1, 0], [0, 1, -1]])[0 if grounded else 1 :]
     stiffness = np.array([3e4, 2e4, 1e4])[0 if grounded else 1 :]
-    springs = Elements(directions=directions, stiffness=stiffness, loss=loss_factor * stiffness)
+    springs = Elements(
+        directions=directions, stiffness=stiffness, loss=loss_factor * stiffness
+    )
     line = LinearLine(
         mass=np.diag([0.5, 0.3, 0.2]),
         stiffness=springs.stiffness_matrix(),
@@ -62,7 +64,8 @@ def test_orders_of_a_torque_give_it_back():
     assert_allclose(found, amplitudes, rtol=1e-9)
     angle = cycle_angles(N)
     by_hand = sum(
-        np.real(c * np.exp(0.5j * k * angle)) for k, c in enumerate(amplitudes[0], start=1)
+        np.real(c * np.exp(0.5j * k * angle))
+        for k, c in enumerate(amplitudes[0], start=1)
     )
     assert_allclose(torque[0], by_hand, atol=1e-9)
 
@@ -77,7 +80,10 @@ def test_response_here_to_a_torque_there_is_that_there_to_one_here(damper):
     force = np.zeros((4, 67), dtype=complex)
     force[:, 13] = 1.0
     assert_allclose(
-        line.response(force, frequencies), receptance[:, :, 13], rtol=1e-6, atol=1e-9 * scale.max()
+        line.response(force, frequencies),
+        receptance[:, :, 13],
+        rtol=1e-6,
+        atol=1e-9 * scale.max(),
     )
 
 
@@ -101,7 +107,9 @@ def test_mean_power_in_is_what_the_damping_takes():
     power_in = 0.5 * np.sum(np.real(np.conj(found.speed_deviation) * amplitudes))
     w = speed * found.orders
     lost = line.loss[..., None] * w + line.damping[..., None] * w**2
-    power_lost = 0.5 * np.real(np.einsum("io,ijo,jo->", np.conj(found.angle), lost, found.angle))
+    power_lost = 0.5 * np.real(
+        np.einsum("io,ijo,jo->", np.conj(found.angle), lost, found.angle)
+    )
     assert power_in > 0.0
     assert_allclose(power_in, power_lost, rtol=1e-9)
 
@@ -136,7 +144,9 @@ def test_integration_in_time_settles_to_the_same():
 
     cycle = 4 * np.pi / speed
     times = 60 * cycle + np.arange(64) * cycle / 64
-    run = solve_ivp(slope, (0.0, times[-1]), np.zeros(6), t_eval=times, rtol=1e-9, atol=1e-12)
+    run = solve_ivp(
+        slope, (0.0, times[-1]), np.zeros(6), t_eval=times, rtol=1e-9, atol=1e-12
+    )
     speeds = found.speed_over_cycle(64)
     assert_allclose(run.y[3:], speeds, rtol=0, atol=1e-5 * np.ptp(speeds))
 
@@ -170,7 +180,8 @@ def test_mean_torques_are_carried_through_and_must_balance():
     assert abs(np.sum(np.diag(line.mass) * found.twist)) < 1e-12
     torque[2] += 1.0
     with pytest.raises(
-        SimulationError, match=r"the mean torques leave 0.5774 N m on a line that nothing holds"
+        SimulationError,
+        match=r"the mean torques leave 0.5774 N m on a line that nothing holds",
     ):
         steady_response(line, torque, 60.0, n_orders=12)
 
@@ -196,7 +207,8 @@ def test_more_orders_than_usual_change_little():
     line, _, _ = engine_line()
     torque = torques_of(option()).on(NODES)
     few, usual, many = (
-        steady_response(line, torque, SPEED, n_orders=n).fluctuation() for n in (60, 200, 400)
+        steady_response(line, torque, SPEED, n_orders=n).fluctuation()
+        for n in (60, 200, 400)
     )
     assert_allclose(few[[2, 13]], many[[2, 13]], rtol=0.02)
     assert_allclose(usual[[2, 13, 44, 64]], many[[2, 13, 44, 64]], rtol=0.03)
@@ -228,7 +240,9 @@ def test_a_disturbance_at_5_hz_moves_the_flywheel_more_than_its_own_turns():
     line, _, _ = engine_line()
     moved = disturbance_response(line, 16, 0.05 * 12680.0, 2 * np.pi * 5.0)
     turning = response_of(option())
-    assert np.abs(moved[13]) > np.abs(turning.angle[13]).max()  # as the paper's figure 12 has it
+    assert (
+        np.abs(moved[13]) > np.abs(turning.angle[13]).max()
+    )  # as the paper's figure 12 has it
     doubled = disturbance_response(line, 16, 0.10 * 12680.0, 2 * np.pi * 5.0)
     assert_allclose(doubled, 2.0 * moved, rtol=1e-12)
 
@@ -263,7 +277,9 @@ def test_meshes_given_apart_are_springs_of_the_line():
     )
     line, meshes = closed_line(apart)
     for name in ("mass", "damping", "stiffness", "loss"):
-        assert_allclose(getattr(line, name), getattr(whole, name), atol=1e-9, err_msg=name)
+        assert_allclose(
+            getattr(line, name), getattr(whole, name), atol=1e-9, err_msg=name
+        )
     assert_allclose(meshes.loss, [500.0])
     assert np.any(zero != line.loss)
 
@@ -274,9 +290,14 @@ def test_what_is_no_line_is_refused():
     skew[0, 1] *= 2.0
     with pytest.raises(ValueError, match="stiffness must be symmetric"):
         LinearLine(mass=line.mass, stiffness=skew, loss=line.loss, damping=line.damping)
-    with pytest.raises(ValueError, match=r"loss \(2, 2\) must be a finite matrix \(3, 3\)"):
+    with pytest.raises(
+        ValueError, match=r"loss \(2, 2\) must be a finite matrix \(3, 3\)"
+    ):
         LinearLine(
-            mass=line.mass, stiffness=line.stiffness, loss=np.zeros((2, 2)), damping=line.damping
+            mass=line.mass,
+            stiffness=line.stiffness,
+            loss=np.zeros((2, 2)),
+            damping=line.damping,
         )
     with pytest.raises(ValueError, match=r"n_orders = 40 must lie in 1\.\.31"):
         cycle_orders(np.zeros((3, 64)), 40)
@@ -285,7 +306,10 @@ def test_what_is_no_line_is_refused():
     with pytest.raises(ValueError, match="must be positive"):
         steady_response(line, np.zeros((3, 64)), 0.0, n_orders=4)
     undamped = LinearLine(
-        mass=np.eye(1), stiffness=np.eye(1), loss=np.zeros((1, 1)), damping=np.zeros((1, 1))
+        mass=np.eye(1),
+        stiffness=np.eye(1),
+        loss=np.zeros((1, 1)),
+        damping=np.zeros((1, 1)),
     )
     with pytest.raises(SimulationError, match="excited at its natural frequency"):
         undamped.response(np.ones((1, 1), dtype=complex), np.array([1.0]))

@@ -39,7 +39,9 @@ def placed(make, table, **more):
 @pytest.fixture(scope="module")
 def helical():
     """A helical pair with a missing tooth, as tabulated for records."""
-    pair = read_sliced_pair(read_request(["experiment=helical", "mesh.n_slices=16"]).config)
+    pair = read_sliced_pair(
+        read_request(["experiment=helical", "mesh.n_slices=16"]).config
+    )
     return pair.mesh_table((MissingTooth(gear="pinion", tooth=2),)), pair.mesh_force
 
 
@@ -48,7 +50,9 @@ def mesh(helical):
     table, _ = helical
     rng = np.random.default_rng(4)
     counts = table.pair.pinion.n_teeth, table.pair.wheel.n_teeth
-    return placed(sliced_pair_mesh, table, errors=tuple(rng.normal(0, 2e-6, n) for n in counts))
+    return placed(
+        sliced_pair_mesh, table, errors=tuple(rng.normal(0, 2e-6, n) for n in counts)
+    )
 
 
 class TestLaw:
@@ -59,7 +63,9 @@ class TestLaw:
         rolls = np.linspace(0.05, 30.05, 61)
         errors = dict(zip(("pinion_error", "wheel_error"), mesh.errors, strict=True))
         found = chord_equilibrium(
-            table, chord_states(table, rolls * table.pair.base_pitch, **errors), share * force
+            table,
+            chord_states(table, rolls * table.pair.base_pitch, **errors),
+            share * force,
         )
         forces = [
             law_at(mesh, turned, approach)[0]
@@ -75,25 +81,40 @@ class TestLaw:
         for turned in (0.313, 2.711, 9.173):
             found = law_at(mesh, turned, approach)
             below, above = (
-                law_at(mesh, turned + off, approach)[layout.STORED] for off in (-1e-7, 1e-7)
+                law_at(mesh, turned + off, approach)[layout.STORED]
+                for off in (-1e-7, 1e-7)
             )
-            assert_allclose(found[layout.ALONG], -(above - below) / 2e-7, rtol=1e-3, atol=1e-6)
+            assert_allclose(
+                found[layout.ALONG], -(above - below) / 2e-7, rtol=1e-3, atol=1e-6
+            )
             below, above = (
-                law_at(mesh, turned, approach + off)[layout.STORED] for off in (-1e-10, 1e-10)
+                law_at(mesh, turned, approach + off)[layout.STORED]
+                for off in (-1e-10, 1e-10)
             )
-            assert_allclose(found[layout.FORCE], (above - below) / 2e-10, rtol=1e-4, atol=0)
+            assert_allclose(
+                found[layout.FORCE], (above - below) / 2e-10, rtol=1e-4, atol=0
+            )
 
     def test_all_springs_of_a_pair_are_damped_by_its_first_touch(self, mesh):
         still, fast = law_at(mesh, 0.4, 3e-5), law_at(mesh, 0.4, 3e-5, rate=10.0)
         assert_allclose(
-            fast[layout.FORCE], (1.0 + 10.0 * DAMPING) * still[layout.FORCE], rtol=1e-12, atol=0
+            fast[layout.FORCE],
+            (1.0 + 10.0 * DAMPING) * still[layout.FORCE],
+            rtol=1e-12,
+            atol=0,
         )
-        assert law_at(mesh, 0.4, 3e-5, rate=-1e4)[layout.FORCE] == pytest.approx(0.0, abs=0.0)
+        assert law_at(mesh, 0.4, 3e-5, rate=-1e4)[layout.FORCE] == pytest.approx(
+            0.0, abs=0.0
+        )
 
-    def test_the_missing_tooth_is_missing_on_both_flanks_once_a_turn(self, helical, mesh):
+    def test_the_missing_tooth_is_missing_on_both_flanks_once_a_turn(
+        self, helical, mesh
+    ):
         n_teeth = helical[0].pair.pinion.n_teeth
         sound = replace(
-            mesh, rows=np.maximum(mesh.rows, 0), coast_rows=np.zeros_like(mesh.coast_rows)
+            mesh,
+            rows=np.maximum(mesh.rows, 0),
+            coast_rows=np.zeros_like(mesh.coast_rows),
         )
         for approach in (3e-5, -mesh.backlash - 3e-5):
             ratio = np.array([
@@ -134,12 +155,18 @@ class TestZeroHelix:
     @pytest.mark.parametrize("n_chords", [1, 3])
     def test_a_spur_table_in_chords_is_the_spur_mesh(self, xiamen, n_chords):
         table = xiamen.mesh_table((MissingTooth(gear="pinion", tooth=1),))
-        one, other = placed(pair_mesh, table), placed(sliced_pair_mesh, as_chords(table, n_chords))
+        one, other = (
+            placed(pair_mesh, table),
+            placed(sliced_pair_mesh, as_chords(table, n_chords)),
+        )
         for turned in (0.2, 1.7, 2.4, 23.9):
             for approach in (1e-5, 4e-5, -one.backlash - 2e-5):
                 expected = law_at(one, turned, approach, 1e-2, 1e3)
                 assert_allclose(
-                    law_at(other, turned, approach, 1e-2, 1e3), expected, rtol=1e-9, atol=1e-12
+                    law_at(other, turned, approach, 1e-2, 1e3),
+                    expected,
+                    rtol=1e-9,
+                    atol=1e-12,
                 )
 
     def test_spur_teeth_in_slices_move_as_the_spur_mesh(self, machine, dynamics_of):
@@ -152,13 +179,22 @@ class TestZeroHelix:
         force = spur.mesh_force
         own = loaded_pair_table(spur.pair, spur.material, spur.mesh, force=force)
         cut = sliced_table(spur.pair, spur.material, spur.mesh, slices, force=force)
-        told = {"direction": dynamics.approach_direction(), "roll_dof": 2, "damping": DAMPING}
+        told = {
+            "direction": dynamics.approach_direction(),
+            "roll_dof": 2,
+            "damping": DAMPING,
+        }
         (q, v, one), (q_1, v_1, other) = (
             moved(line_of(dynamics, mesh), dynamics)
-            for mesh in (pair_mesh("m", own, **told), sliced_pair_mesh("m", cut, **told))
+            for mesh in (
+                pair_mesh("m", own, **told),
+                sliced_pair_mesh("m", cut, **told),
+            )
         )
         assert max(one.energy_residual, other.energy_residual) < 1e-4
-        assert_allclose(q_1 @ told["direction"], q @ told["direction"], rtol=0, atol=2e-8)
+        assert_allclose(
+            q_1 @ told["direction"], q @ told["direction"], rtol=0, atol=2e-8
+        )
         assert_allclose(v_1, v, rtol=0, atol=5e-3 * np.abs(v).max())
 
 
@@ -185,7 +221,9 @@ class TestAgainstThePair:
     @pytest.fixture(scope="class", params=["sound", "missing tooth"])
     @classmethod
     def dynamics(cls, request, machine, dynamics_of):
-        spur = machine({"mesh.friction_coefficient": 0.0, "mesh.points_per_pitch": 2048})
+        spur = machine(
+            {"mesh.friction_coefficient": 0.0, "mesh.points_per_pitch": 2048}
+        )
         table = Slices(spur, HELIX).table(DEPTH)
         if request.param == "missing tooth":
             kind = np.zeros_like(table.pinion_kind)
@@ -197,7 +235,10 @@ class TestAgainstThePair:
             present = np.array([True, False])
             table = replace(table, pinion_kind=kind, pinion_present=present, **doubled)
         rng = np.random.default_rng(1)
-        errors = {"pinion_error": rng.normal(0, 2e-6, 23), "wheel_error": rng.normal(0, 2e-6, 84)}
+        errors = {
+            "pinion_error": rng.normal(0, 2e-6, 23),
+            "wheel_error": rng.normal(0, 2e-6, 84),
+        }
         return with_table(dynamics_of(spur, (), **errors), table)
 
     def test_the_same_motion(self, dynamics):

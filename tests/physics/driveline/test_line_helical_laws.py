@@ -44,16 +44,26 @@ def line_with(fault, *words, start=None):
 
 def simulated(record, *faults):
     applied = tuple(one for fault in faults for one in read_faults(fault))
-    return record.simulate(applied, start=Start(tooth_pinion=0, tooth_wheel=0, phase=0.0))
+    return record.simulate(
+        applied, start=Start(tooth_pinion=0, tooth_wheel=0, phase=0.0)
+    )
 
 
 @lru_cache(maxsize=4)
 def running(lateral, teeth):
-    words = [f"system.lateral={lateral}", f"system.helical_meshes={teeth}", "mesh.n_slices=20"]
-    config = read_request(["system=engine_gear_train", "excitation=engine_v20", *words]).config
+    words = [
+        f"system.lateral={lateral}",
+        f"system.helical_meshes={teeth}",
+        "mesh.n_slices=20",
+    ]
+    config = read_request(
+        ["system=engine_gear_train", "excitation=engine_v20", *words]
+    ).config
     engine = read_engine_line(config)
     own = own_meshes(engine, config, SPEED, TORQUE)
-    return running_line(engine, steady_course(SPEED, TORQUE), governor=GOVERNOR, own=own)
+    return running_line(
+        engine, steady_course(SPEED, TORQUE), governor=GOVERNOR, own=own
+    )
 
 
 @pytest.mark.parametrize("lateral", ["false", "true"])
@@ -61,7 +71,9 @@ def test_with_all_teeth_their_own_they_part_and_energies_balance(lateral):
     line = running(lateral, "sliced")
     assert [len(mesh.depth) > 1 for mesh in line.line.meshes] == [bool(pair.pinion.helix_angle)
                                                                   for pair in line.machine.drive.pairs]  # fmt: skip
-    motion = line.run(SOLVER, duration=0.3, channels=[("speed", line.dof(14))], settling=0.3)
+    motion = line.run(
+        SOLVER, duration=0.3, channels=[("speed", line.dof(14))], settling=0.3
+    )
     assert motion.energy_residual < 1e-3
     assert (motion.contact_loss > 0.1).sum() >= 4
 
@@ -70,9 +82,9 @@ def test_constant_stiffness_stays_a_choice_and_the_flywheel_hardly_feels_it():
     line, other = running("false", "constant"), running("false", "sliced")
     assert all(len(mesh.depth) == 1 for mesh in line.line.meshes)
     found = [
-        one.run(SOLVER, duration=0.3, channels=[("speed", one.dof(14))], settling=0.3).signals[
-            "speed", one.dof(14)
-        ]
+        one.run(
+            SOLVER, duration=0.3, channels=[("speed", one.dof(14))], settling=0.3
+        ).signals["speed", one.dof(14)]
         for one in (line, other)
     ]
     assert np.std(found[0] - found[1]) < 0.05 * np.std(found[0])
@@ -98,7 +110,8 @@ def test_a_fault_that_vanishes_is_the_sound_machine_and_a_missing_tooth_is_not()
     record = machine("system.record_mesh=[3,66]")
     sound = simulated(record)
     tiny = simulated(
-        record, {"kind": "broken", "gear": "wheel", "tooth": 10, "broken_height_mm": 0.0}
+        record,
+        {"kind": "broken", "gear": "wheel", "tooth": 10, "broken_height_mm": 0.0},
     )
     gone = simulated(record, {"kind": "missing_tooth", "gear": "wheel", "tooth": 10})
     assert_allclose(
@@ -118,13 +131,17 @@ def test_a_fault_that_vanishes_is_the_sound_machine_and_a_missing_tooth_is_not()
     [("[3,66]", "pinion", {"3/18": 0}), ("[3,66]", "wheel", {"66/67": 0}), ("[19,20]", "wheel", {"20/43": 0}),
      ("[20,43]", "wheel", {}), ("[66,67]", "pinion", {"3/66": 1})],
 )  # fmt: skip
-def test_the_faulty_tooth_is_on_its_gear_in_all_its_meshes_and_nowhere_else(mesh, gear, others):
+def test_the_faulty_tooth_is_on_its_gear_in_all_its_meshes_and_nowhere_else(
+    mesh, gear, others
+):
     fault = {"kind": "missing_tooth", "gear": gear, "tooth": 10}
     record, line = line_with(fault, f"system.record_mesh={mesh}")
     faulty = {record.engine.mesh_names[record.place]: SIDES.index(gear), **others}
     for name, one in zip(record.engine.mesh_names, line.meshes, strict=True):
         for side in range(2):
-            odd = np.flatnonzero(one.kinds[side] != np.bincount(one.kinds[side]).argmax()).tolist()
+            odd = np.flatnonzero(
+                one.kinds[side] != np.bincount(one.kinds[side]).argmax()
+            ).tolist()
             assert odd == ([10] if faulty.get(name) == side else []), (name, side)
         assert (one.rows == -1).any() == (name in faulty)
 
@@ -136,7 +153,11 @@ def test_pits_stay_on_their_flank_and_cracks_are_felt_from_behind(kind, same, ot
     """Both mates of the crank gear meet one flank of it; the idler is driven on one and drives with the other."""
     faults = {
         "pitting": {"pit_depth_mm": 0.2, "pit_width_mm": 5.0, "pit_length_mm": 1.0},
-        "crack": {"crack_depth_mm": 2.0, "crack_angle_deg": 70.0, "crack_start": "arc_mid"},
+        "crack": {
+            "crack_depth_mm": 2.0,
+            "crack_angle_deg": 70.0,
+            "crack_start": "arc_mid",
+        },
     }
     for gear, name, expected in (("pinion", "3/18", same), ("wheel", "66/67", other)):
         fault = {"kind": kind, "gear": gear, "tooth": 10, **faults[kind]}
@@ -147,7 +168,9 @@ def test_pits_stay_on_their_flank_and_cracks_are_felt_from_behind(kind, same, ot
 
 @pytest.mark.parametrize("turned", [0.0, 0.37, 5.1])
 @pytest.mark.parametrize("mesh", ["[3,66]", "[66,67]", "[19,20]", "[20,43]"])
-def test_a_tooth_comes_to_its_mates_when_the_gear_has_turned_from_one_to_the_other(mesh, turned):
+def test_a_tooth_comes_to_its_mates_when_the_gear_has_turned_from_one_to_the_other(
+    mesh, turned
+):
     """The tooth that is at a mate goes the angle between its mates, half a pitch less or more to its other flank."""
     record = machine(f"system.record_mesh={mesh}")
     drive, place = record.engine.drive, record.place
@@ -166,14 +189,17 @@ def test_a_tooth_comes_to_its_mates_when_the_gear_has_turned_from_one_to_the_oth
         ]
         # tooth 0 has gone by so many pitches past the pitch point of each
         gone = (past[1] + there_first) - (past[0] + teeth[here])
-        node = drive.line.gears[(meshes[place].driving, meshes[place].driven)[here]].node
+        node = drive.line.gears[
+            (meshes[place].driving, meshes[place].driven)[here]
+        ].node
         sense = math.copysign(1.0, drive.line.speed_ratio[node])
         angles = [
-            meshes[m].center_line + side * math.pi for m, side in ((place, here), (other, there))
+            meshes[m].center_line + side * math.pi
+            for m, side in ((place, here), (other, there))
         ]
-        expected = sense * (angles[0] - angles[1]) * gear.n_teeth / (2.0 * math.pi) + 0.5 * (
-            here - there
-        )
+        expected = sense * (angles[0] - angles[1]) * gear.n_teeth / (
+            2.0 * math.pi
+        ) + 0.5 * (here - there)
         off = (gone - expected + 0.5 * gear.n_teeth) % gear.n_teeth - 0.5 * gear.n_teeth
         assert abs(off) < 0.01
 
@@ -187,7 +213,9 @@ def test_meshes_stand_where_the_crank_puts_them():
     ):
         turned = record.crank_angle(start)
         assert_allclose(
-            (start_phase(drive, record.place, turned) - start.phase + 0.5) % 1.0, 0.5, atol=1e-9
+            (start_phase(drive, record.place, turned) - start.phase + 0.5) % 1.0,
+            0.5,
+            atol=1e-9,
         )
         line = record.line(Run(system=record, faults=(), start=start)).line
         for place, mesh in enumerate(line.meshes):
@@ -201,7 +229,9 @@ def test_meshes_stand_where_the_crank_puts_them():
 
 def test_slices_in_phase_are_refused():
     record = read_machine(
-        read_request([*RECORDS, "system.record_mesh=[3,66]", "mesh.slices_in_phase=true"]).config
+        read_request(
+            [*RECORDS, "system.record_mesh=[3,66]", "mesh.slices_in_phase=true"]
+        ).config
     )
     with pytest.raises(ConfigError, match="a line has the helix in"):
         record.check()

@@ -66,7 +66,9 @@ class TestLinear:
             q, v, _ = state_after(
                 line, start, cls.DURATION, n_steps, torques=constant_torques(torques)
             )
-            return np.linalg.norm(np.concatenate([q, v]) - exact) / np.linalg.norm(exact)
+            return np.linalg.norm(np.concatenate([q, v]) - exact) / np.linalg.norm(
+                exact
+            )
 
         return measured
 
@@ -74,21 +76,27 @@ class TestLinear:
         assert error(40000) < 2e-6
 
     def test_order_two(self, error):
-        assert order_of([error(n) for n in (2000, 4000, 8000)]) == pytest.approx(2.0, abs=0.02)
+        assert order_of([error(n) for n in (2000, 4000, 8000)]) == pytest.approx(
+            2.0, abs=0.02
+        )
 
     def test_undamped_vibration_keeps_its_energy_whatever_the_step(self, start):
         line = chain(6, loss=0.0)
         for n_steps in (50, 5000):
             q, v, told = state_after(line, start, self.DURATION, n_steps)
             energy = [
-                0.5 * (b @ line.mass @ b + a @ line.stiffness @ a) for a, b in (start, (q, v))
+                0.5 * (b @ line.mass @ b + a @ line.stiffness @ a)
+                for a, b in (start, (q, v))
             ]
             assert_allclose(energy[1], energy[0], rtol=1e-11, atol=0)
             assert told.energy_residual < 1e-11
 
     def test_damping_takes_energy(self, line, start):
         q, v, told = state_after(line, start, self.DURATION, 5000)
-        energy = [0.5 * (b @ line.mass @ b + a @ line.stiffness @ a) for a, b in (start, (q, v))]
+        energy = [
+            0.5 * (b @ line.mass @ b + a @ line.stiffness @ a)
+            for a, b in (start, (q, v))
+        ]
         assert energy[1] < 0.9 * energy[0]
         assert told.energy_residual < 1e-11
 
@@ -96,10 +104,14 @@ class TestLinear:
         """The same chain in other coordinates."""
         turn = np.eye(6) + 0.3 * np.eye(6, k=1)
         parts = {
-            name: turn.T @ getattr(line, name) @ turn for name in ("mass", "damping", "stiffness")
+            name: turn.T @ getattr(line, name) @ turn
+            for name in ("mass", "damping", "stiffness")
         }
         other = GearedLine(
-            names=line.names, rotation=np.linalg.solve(turn, line.rotation), meshes=(), **parts
+            names=line.names,
+            rotation=np.linalg.solve(turn, line.rotation),
+            meshes=(),
+            **parts,
         )
         moved = tuple(np.linalg.solve(turn, part) for part in start)
         q, v, _ = state_after(line, start, self.DURATION, 3000)
@@ -146,13 +158,20 @@ class TestTorquesAndCourse:
         table = -slope * np.where(nodes < np.pi, nodes, nodes - 2 * np.pi)
         start, quarter = np.array([1e-2]), 0.5 * np.pi * math.sqrt(inertia / slope)
         q, v, _ = state_after(
-            line, (start, np.zeros(1)), quarter, 4000, torques=[ShaftTorque(dof=0, table=table)]
+            line,
+            (start, np.zeros(1)),
+            quarter,
+            4000,
+            torques=[ShaftTorque(dof=0, table=table)],
         )
         assert_allclose(q / start, 0.0, rtol=0, atol=1e-5)
         assert_allclose(v / start, -math.sqrt(slope / inertia), rtol=1e-5, atol=0)
 
     def test_a_run_up_needs_the_torque_of_the_inertias_and_no_more(self):
-        line, course = chain(5), LineCourse(time=np.array([0.0, 0.2]), speed=np.array([50.0, 90.0]))
+        line, course = (
+            chain(5),
+            LineCourse(time=np.array([0.0, 0.2]), speed=np.array([50.0, 90.0])),
+        )
         torques = np.diag(line.mass) * 200.0
         q, v, _ = state_after(
             line,
@@ -166,13 +185,21 @@ class TestTorquesAndCourse:
         assert_allclose(v, 0.0, rtol=0, atol=1e-12)
 
     def test_without_that_torque_it_stays_behind_at_rest(self):
-        line, course = chain(5), LineCourse(time=np.array([0.0, 0.2]), speed=np.array([50.0, 90.0]))
-        q, v, _ = state_after(line, (np.zeros(5), np.zeros(5)), 0.1, 2000, course=course)
+        line, course = (
+            chain(5),
+            LineCourse(time=np.array([0.0, 0.2]), speed=np.array([50.0, 90.0])),
+        )
+        q, v, _ = state_after(
+            line, (np.zeros(5), np.zeros(5)), 0.1, 2000, course=course
+        )
         assert_allclose(v, -200.0 * 0.1, rtol=1e-9, atol=0)
         assert_allclose(q, -0.5 * 200.0 * 0.1**2, rtol=1e-9, atol=0)
 
     def test_a_factor_over_the_knots_is_a_torque_over_time(self):
-        line, course = chain(1), LineCourse(time=np.array([0.0, 0.1]), speed=np.array([50.0, 50.0]))
+        line, course = (
+            chain(1),
+            LineCourse(time=np.array([0.0, 0.1]), speed=np.array([50.0, 50.0])),
+        )
         ramp = ShaftTorque(dof=0, table=np.ones(1), factor=np.array([0.0, 3.0]))
         _, v, _ = state_after(
             line, (np.zeros(1), np.zeros(1)), 0.1, 500, torques=[ramp], course=course
@@ -186,13 +213,21 @@ class TestTorquesAndCourse:
             line, constant_speed(SPEED), [], steps(8000.0, 8), duration=0.02,
             channels=[("angle", 0), ("speed", 3)], start=start,
         )  # fmt: skip
-        margin = decimator(8).margin  # samples before time 0, and one, at which integration begins
+        margin = decimator(
+            8
+        ).margin  # samples before time 0, and one, at which integration begins
         for sample in (0, 30, 60):
             n_steps = 8 * (sample + margin + 1)
             q, v, _ = state_after(line, start, n_steps / 64000.0, n_steps)
             assert_allclose(
-                motion.signals["angle", 0][sample], q[0], rtol=0, atol=1e-5 * np.abs(start[0]).max()
+                motion.signals["angle", 0][sample],
+                q[0],
+                rtol=0,
+                atol=1e-5 * np.abs(start[0]).max(),
             )
             assert_allclose(
-                motion.signals["speed", 3][sample], v[3], rtol=0, atol=1e-4 * np.abs(v).max()
+                motion.signals["speed", 3][sample],
+                v[3],
+                rtol=0,
+                atol=1e-4 * np.abs(v).max(),
             )

@@ -22,7 +22,11 @@ SPEED, TORQUE = 1688.0 * RPM, 12680.0
 GOVERNOR = Governor(frequency=1.0, damping_ratio=0.7)
 SOLVER = LineSolver(sampling_rate=10240.0, oversampling=10, max_energy_residual=1e-3)
 ENGINE = ("system=engine_gear_train", "excitation=engine_v20")
-RECORDS = ("experiment=engine_broken_tooth", "operating.duration_s=0.1", "sensing.snr_db=null")
+RECORDS = (
+    "experiment=engine_broken_tooth",
+    "operating.duration_s=0.1",
+    "sensing.snr_db=null",
+)
 CLOSED = ("system.backlash_um=0", "system.loss_factor.gear_mesh=0")
 
 
@@ -39,8 +43,15 @@ def deviations(line, nodes, settling, duration=0.15):
     channels = [("speed", line.dof(node)) for node in nodes]
     motion = line.run(SOLVER, duration=duration, channels=channels, settling=settling)
     at = line.linear.orders * (line.turned + motion.nominal_angle[:, None])
-    linear = [np.real(np.exp(1j * at) @ line.linear.speed_deviation[dof]) for _, dof in channels]
-    return motion, np.array([motion.signals[channel] for channel in channels]), np.array(linear)
+    linear = [
+        np.real(np.exp(1j * at) @ line.linear.speed_deviation[dof])
+        for _, dof in channels
+    ]
+    return (
+        motion,
+        np.array([motion.signals[channel] for channel in channels]),
+        np.array(linear),
+    )
 
 
 def test_without_play_it_is_the_linear_line():
@@ -54,7 +65,9 @@ def test_without_play_it_is_the_linear_line():
     for share, most in ((1.0, 0.15), (0.01, 0.003)):
         torques = tuple(replace(one, table=share * one.table) for one in whole.torques)
         linear = replace(
-            whole.linear, angle=share * whole.linear.angle, twist=share * whole.linear.twist
+            whole.linear,
+            angle=share * whole.linear.angle,
+            twist=share * whole.linear.twist,
         )
         line = replace(whole, torques=torques, linear=linear)
         _, found, exact = deviations(line, (14, 17, 13), settling=0.0)
@@ -81,10 +94,14 @@ def test_meshes_stand_where_the_crank_puts_them():
         Start(tooth_pinion=50, tooth_wheel=3, phase=0.9),
     ):
         turned = record.crank_angle(start)
-        roll = start_rolls(record.engine.drive, turned)[record.place] / record.pair.base_pitch
+        roll = (
+            start_rolls(record.engine.drive, turned)[record.place]
+            / record.pair.base_pitch
+        )
         assert_allclose(roll, start.phase, atol=1e-9)
     one, next_tooth = (
-        record.crank_angle(Start(tooth_pinion=tooth, tooth_wheel=0, phase=0.0)) for tooth in (4, 5)
+        record.crank_angle(Start(tooth_pinion=tooth, tooth_wheel=0, phase=0.0))
+        for tooth in (4, 5)
     )
     assert_allclose(
         (next_tooth - one) % (4 * np.pi), 4 * np.pi / 54, rtol=1e-9
@@ -97,15 +114,21 @@ def test_a_run_up_follows_its_course_and_drives_its_own_inertia():
         time=time, speed=SPEED * (0.8 + 0.2 * time), torque=np.full(len(time), 3000.0)
     )
     line = running_line(engine(), course, governor=GOVERNOR)
-    motion = line.run(SOLVER, duration=0.2, channels=[("angle", line.dof(17))], settling=0.3)
-    assert_allclose(np.gradient(motion.nominal_speed, 1 / 10240.0), 0.2 * SPEED, rtol=1e-6)
+    motion = line.run(
+        SOLVER, duration=0.2, channels=[("angle", line.dof(17))], settling=0.3
+    )
+    assert_allclose(
+        np.gradient(motion.nominal_speed, 1 / 10240.0), 0.2 * SPEED, rtol=1e-6
+    )
     # the governor, 1 Hz soft, would lag by a / omega^2 = 0.9 rad if nothing else sped the line up
     assert np.abs(motion.signals["angle", line.dof(17)]).max() < 0.1
 
 
 def simulated(record, *faults, start=None):
     applied = tuple(one for fault in faults for one in read_faults(fault))
-    return record.simulate(applied, start=start or Start(tooth_pinion=0, tooth_wheel=0, phase=0.0))
+    return record.simulate(
+        applied, start=start or Start(tooth_pinion=0, tooth_wheel=0, phase=0.0)
+    )
 
 
 def test_a_fault_that_vanishes_is_the_sound_machine_and_a_missing_tooth_is_not():
@@ -114,7 +137,8 @@ def test_a_fault_that_vanishes_is_the_sound_machine_and_a_missing_tooth_is_not()
     again = simulated(record)
     np.testing.assert_array_equal(sound.acceleration, again.acceleration)
     tiny = simulated(
-        record, {"kind": "broken", "gear": "wheel", "tooth": 10, "broken_height_mm": 0.0}
+        record,
+        {"kind": "broken", "gear": "wheel", "tooth": 10, "broken_height_mm": 0.0},
     )
     gone = simulated(record, {"kind": "missing_tooth", "gear": "wheel", "tooth": 10})
     assert_allclose(
@@ -158,8 +182,13 @@ def test_a_fine_wheel_without_errors_shows_the_shaft():
     ]
     record = machine(*words, "sensing.channels=[flywheel_speed]")
     line = record.line(Run(system=record, faults=()))
-    motion = line.run(SOLVER, duration=0.1, channels=[("speed", line.dof(14))], settling=0.3)
-    seen, exact = record.simulate().acceleration[0], motion.signals["speed", line.dof(14)]
+    motion = line.run(
+        SOLVER, duration=0.1, channels=[("speed", line.dof(14))], settling=0.3
+    )
+    seen, exact = (
+        record.simulate().acceleration[0],
+        motion.signals["speed", line.dof(14)],
+    )
     inner = slice(20, -20)
     assert np.std(seen[inner] - exact[inner]) < 0.1 * np.std(exact)
 
@@ -168,9 +197,13 @@ def test_supports_of_a_gearbox_reach_the_lateral_line():
     record = machine("system.lateral=true", "sensing.channels=[wheel_x, wheel_y]")
     run = Run(system=record, faults=())
     nominal = record.line(run)
-    stiffer = replace(nominal_gearbox(2), stiffness_factor=np.array([1.0, 1.0, 2.0, 1.0]))
+    stiffer = replace(
+        nominal_gearbox(2), stiffness_factor=np.array([1.0, 1.0, 2.0, 1.0])
+    )
     scattered = record.line(replace(run, gearbox=stiffer))
-    name = record.engine.drive.line.gears[record.engine.drive.line.meshes[record.place].driven].name
+    name = record.engine.drive.line.gears[
+        record.engine.drive.line.meshes[record.place].driven
+    ].name
     at = nominal.matrices.names.index(f"{name} x")
     ratio = scattered.matrices.stiffness[at, at] / nominal.matrices.stiffness[at, at]
     assert ratio == pytest.approx(2.0)

@@ -33,10 +33,14 @@ class TestRippledMesh:
     def run(cls):
         u = np.arange(512) / 512
         stiffness = (
-            STIFFNESS * (1 + 0.2 * np.cos(2 * np.pi * u) + 0.05 * np.cos(4 * np.pi * u))[None]
+            STIFFNESS
+            * (1 + 0.2 * np.cos(2 * np.pi * u) + 0.05 * np.cos(4 * np.pi * u))[None]
         )
         line = two_gears(
-            stiffness=stiffness, gap=3e-6 * np.sin(2 * np.pi * u)[None], damping=2e-4, backlash=1e-4
+            stiffness=stiffness,
+            gap=3e-6 * np.sin(2 * np.pi * u)[None],
+            damping=2e-4,
+            backlash=1e-4,
         )
         torques = constant_torques([200.0, -400.0])
         course = constant_speed(400.0)
@@ -83,7 +87,9 @@ class TestBacklash:
             if approach > 0:
                 force = max(0.0, STIFFNESS * approach * (1 + damping * rate))
             elif approach < -cls.BACKLASH:
-                force = -max(0.0, STIFFNESS * (-approach - cls.BACKLASH) * (1 - damping * rate))
+                force = -max(
+                    0.0, STIFFNESS * (-approach - cls.BACKLASH) * (1 - damping * rate)
+                )
             return np.concatenate([y[2:], -direction * force / INERTIAS])
 
         solution = solve_ivp(
@@ -141,9 +147,18 @@ class TestAgainstThePair:
     @classmethod
     def dynamics(cls, request, machine, dynamics_of):
         rng = np.random.default_rng(1)
-        faults = (MissingTooth(gear="pinion", tooth=2),) if request.param == "missing tooth" else ()
-        pair = machine({"mesh.friction_coefficient": 0.0, "mesh.points_per_pitch": 2048})
-        errors = {"pinion_error": rng.normal(0, 3e-6, 23), "wheel_error": rng.normal(0, 3e-6, 84)}
+        faults = (
+            (MissingTooth(gear="pinion", tooth=2),)
+            if request.param == "missing tooth"
+            else ()
+        )
+        pair = machine(
+            {"mesh.friction_coefficient": 0.0, "mesh.points_per_pitch": 2048}
+        )
+        errors = {
+            "pinion_error": rng.normal(0, 3e-6, 23),
+            "wheel_error": rng.normal(0, 3e-6, 84),
+        }
         return dynamics_of(pair, faults, **errors)
 
     @pytest.fixture(scope="class")
@@ -161,7 +176,10 @@ class TestAgainstThePair:
         )  # fmt: skip
 
     def test_the_same_motion(self, dynamics, line):
-        start, n_steps = (dynamics.static_start(0.0), np.zeros(6)), self.STEPS * self.N_SAMPLES
+        start, n_steps = (
+            (dynamics.static_start(0.0), np.zeros(6)),
+            self.STEPS * self.N_SAMPLES,
+        )
         step = 1 / (51200 * self.STEPS)
         q, v, _ = advance(dynamics, *start, step, 0, n_steps)
         q_1, v_1, told = state_after(
@@ -208,14 +226,19 @@ class TestLowRank:
     def test_the_printed_frequencies(self, welded):
         n = 65  # rotations
         found = np.sqrt(
-            np.abs(eigh(welded.stiffness[:n, :n], welded.mass[:n, :n], eigvals_only=True))
+            np.abs(
+                eigh(welded.stiffness[:n, :n], welded.mass[:n, :n], eigvals_only=True)
+            )
         ) / (2 * np.pi)
         assert_allclose(found[1:5], [28.31, 68.72, 162.06, 215.97], rtol=0, atol=0.01)
 
     def test_the_same_motion(self, engine, welded):
         """A gear train without backlash is linear."""
         rng = np.random.default_rng(2)
-        start = rng.normal(0, 1e-4, len(engine.names)), rng.normal(0, 0.1, len(engine.names))
+        start = (
+            rng.normal(0, 1e-4, len(engine.names)),
+            rng.normal(0, 0.1, len(engine.names)),
+        )
         n_steps, duration = 4000, 0.04
         (q, v, told), (q_1, v_1, _) = (
             state_after(line, start, duration, n_steps) for line in (engine, welded)

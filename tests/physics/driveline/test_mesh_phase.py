@@ -56,7 +56,9 @@ def misfit(line, turned=0.0):
     """
     angles, found = tooth_angles(line, turned), []
     for mesh, pair in zip(line.line.meshes, line.pairs, strict=True):
-        sense = math.copysign(1.0, line.line.speed_ratio[line.line.gears[mesh.driving].node])
+        sense = math.copysign(
+            1.0, line.line.speed_ratio[line.line.gears[mesh.driving].node]
+        )
         tilt = sense * pair.working_pressure_angle
         one = (
             angles[mesh.driving]
@@ -87,7 +89,9 @@ TRAINS = [
 @pytest.mark.parametrize(("teeth", "center_lines", "shifts"), TRAINS)
 @pytest.mark.parametrize("driven_first", [False, True])
 @pytest.mark.parametrize("turned", [0.0, 0.37, -12.3])
-def test_flanks_touch_in_every_mesh(train, teeth, center_lines, shifts, driven_first, turned):
+def test_flanks_touch_in_every_mesh(
+    train, teeth, center_lines, shifts, driven_first, turned
+):
     line = train(teeth, center_lines, shifts, driven_first)
     assert_allclose(from_whole(misfit(line, turned)), 0.0, atol=1e-9)
 
@@ -120,7 +124,9 @@ def test_rolls_advance_as_the_meshing_frequencies_say(train):
     pitch = np.array([pair.base_pitch for pair in line.pairs])
     gone = (start_rolls(line, 0.1) - start_rolls(line)) / pitch
     assert_allclose(
-        from_whole(gone - 0.1 / (2.0 * math.pi) * np.array(line.mesh_orders)), 0.0, atol=1e-9
+        from_whole(gone - 0.1 / (2.0 * math.pi) * np.array(line.mesh_orders)),
+        0.0,
+        atol=1e-9,
     )
     assert np.all(start_rolls(line, 0.1) >= 0.0)
     assert np.all(start_rolls(line, 0.1) < pitch)
@@ -128,6 +134,8 @@ def test_rolls_advance_as_the_meshing_frequencies_say(train):
 
 def test_gears_on_one_shaft_have_a_tooth_at_one_angle():
     line = read_drive_line(read_request(["system=two_stage_gearbox"]).config)
-    angles = dict(zip((gear.name for gear in line.line.gears), tooth_angles(line), strict=True))
+    angles = dict(
+        zip((gear.name for gear in line.line.gears), tooth_angles(line), strict=True)
+    )
     assert angles["Input pinion"] == 0.0
     assert angles["Idler gear 1"] == angles["Idler gear 2"]

@@ -107,7 +107,10 @@ def test_a_record_whose_steps_are_too_long_is_made_with_half_of_them():
     words = ["operating.speed_rpm=2400", "operating.duration_s=0.05"]
     short, long = (machine(*words, f"solver.oversampling={steps}") for steps in (8, 4))
     line = long.line(Run(system=long, faults=()))
-    as_told = replace(SOLVER, oversampling=4), {"duration": 0.05, "channels": [("speed", 0)]}
+    as_told = (
+        replace(SOLVER, oversampling=4),
+        {"duration": 0.05, "channels": [("speed", 0)]},
+    )
     with pytest.raises(StepError, match="the energy balance misses"):
         integrate_line(line.line, line.course, line.torques, as_told[0], **as_told[1])
     found = simulated(long)
@@ -117,31 +120,43 @@ def test_a_record_whose_steps_are_too_long_is_made_with_half_of_them():
 
 @pytest.mark.parametrize("name", list(TEETH))
 def test_both_stages_sound_at_their_mesh_frequencies(name):
-    record = machine("operating.duration_s=1", f"system.record_mesh=[{name.replace('/', ',')}]")
+    record = machine(
+        "operating.duration_s=1", f"system.record_mesh=[{name.replace('/', ',')}]"
+    )
     rate = record.sensing.sampling_rate
     line = record.line(Run(system=record, faults=()))
     place = line.machine.mesh_names.index(name)
-    motion = line.run(SOLVER, duration=1.0, channels=[("mesh_force", place)], settling=0.3)
+    motion = line.run(
+        SOLVER, duration=1.0, channels=[("mesh_force", place)], settling=0.3
+    )
     force = motion.signals["mesh_force", place]
     spectrum = np.abs(np.fft.rfft((force - force.mean()) * np.hanning(len(force))))
     frequency = np.fft.rfftfreq(len(force), 1.0 / rate)
     wanted = TEETH[name][0] * RATIO[name] * SPEED / (2.0 * np.pi)
     assert record.operating.speed == pytest.approx(RATIO[name] * SPEED)
     at = round(wanted * len(force) / rate)
-    assert spectrum[at - 1 : at + 2].max() > 20.0 * np.median(spectrum[frequency < 4000.0])
+    assert spectrum[at - 1 : at + 2].max() > 20.0 * np.median(
+        spectrum[frequency < 4000.0]
+    )
     own = spectrum[at - 1 : at + 2].max()
     between = spectrum[(frequency > 1.1 * wanted) & (frequency < 1.4 * wanted)]
     assert own > 10.0 * between.max()
 
 
 @pytest.mark.parametrize(
-    ("name", "gear"), [("3/4", "pinion"), ("3/4", "wheel"), ("5/6", "pinion"), ("5/6", "wheel")]
+    ("name", "gear"),
+    [("3/4", "pinion"), ("3/4", "wheel"), ("5/6", "pinion"), ("5/6", "wheel")],
 )
 def test_a_missing_tooth_is_evident_once_a_turn_of_its_gear(name, gear):
     """The record less its sound twin is large where the tooth should be and nowhere else, turn by turn."""
-    record = machine("operating.duration_s=1", f"system.record_mesh=[{name.replace('/', ',')}]")
+    record = machine(
+        "operating.duration_s=1", f"system.record_mesh=[{name.replace('/', ',')}]"
+    )
     start = Start(tooth_pinion=0, tooth_wheel=0, phase=0.0)
-    sound, gone = simulated(record, start=start), simulated(record, missing(gear), start=start)
+    sound, gone = (
+        simulated(record, start=start),
+        simulated(record, missing(gear), start=start),
+    )
     excess = np.square(gone.acceleration[2] - sound.acceleration[2])
     n_teeth = TEETH[name][("pinion", "wheel").index(gear)]
     pitches = record.pair.pinion.n_teeth * sound.shaft_angle / (2.0 * np.pi)
@@ -149,7 +164,10 @@ def test_a_missing_tooth_is_evident_once_a_turn_of_its_gear(name, gear):
     by_tooth = np.bincount(tooth.astype(int), excess, minlength=n_teeth)
     near = by_tooth[5:9].sum()
     assert near > 0.6 * by_tooth.sum()
-    assert np.square(gone.acceleration[2]).max() > 2.0 * np.square(sound.acceleration[2]).max()
+    assert (
+        np.square(gone.acceleration[2]).max()
+        > 2.0 * np.square(sound.acceleration[2]).max()
+    )
 
 
 def test_a_broken_height_of_nothing_is_the_sound_machine():
@@ -172,7 +190,9 @@ def test_helical_stages_are_recorded_too(tmp_path):
     record = machine(f"system.gears_csv={gears}", "mesh.n_slices=8")
     sound, gone = simulated(record), simulated(record, missing("wheel", 3))
     assert sound.integration_error < 1e-3
-    assert np.std(gone.acceleration - sound.acceleration) > 0.01 * np.std(sound.acceleration)
+    assert np.std(gone.acceleration - sound.acceleration) > 0.01 * np.std(
+        sound.acceleration
+    )
 
 
 def test_the_other_stage_stands_where_the_teeth_allow():
@@ -186,7 +206,9 @@ def test_the_other_stage_stands_where_the_teeth_allow():
     assert_allclose(later - turned, 2.0 * np.pi / 48.0 * 3.0, rtol=1e-9)
 
 
-@pytest.mark.parametrize(("law", "exponent"), [("constant", 0), ("linear", 1), ("quadratic", 2)])
+@pytest.mark.parametrize(
+    ("law", "exponent"), [("constant", 0), ("linear", 1), ("quadratic", 2)]
+)
 def test_a_run_up_follows_its_course_and_its_load_the_law(law, exponent):
     words = (
         f"excitation.load.law={law}",
@@ -194,7 +216,10 @@ def test_a_run_up_follows_its_course_and_its_load_the_law(law, exponent):
         "operating.speed_profile.first_factor=0.5",
     )
     record = machine(
-        *words, "operating.speed_rpm=1746", "operating.torque_nm=60", "operating.duration_s=0.4"
+        *words,
+        "operating.speed_rpm=1746",
+        "operating.torque_nm=60",
+        "operating.duration_s=0.4",
     )
     line = record.line(Run(system=record, faults=()))
     channels = [("angle", line.dof(8)), ("mesh_force", 0)]
@@ -204,11 +229,15 @@ def test_a_run_up_follows_its_course_and_its_load_the_law(law, exponent):
     # the first mesh also speeds up what is behind it
     line_inertia = np.diag(line.matrices.mass) * line.line.rotation**2
     behind = line_inertia.sum() - sum(line_inertia[: line.dof(3) + 1])
-    taken = TORQUE * speed**exponent + behind * np.gradient(motion.nominal_speed, 1.0 / 10240.0)
+    taken = TORQUE * speed**exponent + behind * np.gradient(
+        motion.nominal_speed, 1.0 / 10240.0
+    )
     early, late = slice(500, 1500), slice(-1500, -500)
     for part in (early, late):
         assert_allclose(
-            force[part].mean() * record.pair.pinion.base_radius, taken[part].mean(), rtol=0.02
+            force[part].mean() * record.pair.pinion.base_radius,
+            taken[part].mean(),
+            rtol=0.02,
         )
     assert np.abs(motion.signals["angle", line.dof(8)]).max() < 0.2
 
@@ -217,9 +246,9 @@ def test_slip_damps_the_rigid_motion_and_ripple_shakes_at_its_order():
     line = driven(RIPPLE)
     slope = line.engine.dampers(line.ratios)
     assert_allclose(slope[1], 60.0 * 0.97 / (0.03 * SPEED), rtol=1e-12)
-    assert line.matrices().damping[0, 0] - line.drive.matrices().damping[0, 0] == pytest.approx(
-        slope[1]
-    )
+    assert line.matrices().damping[0, 0] - line.drive.matrices().damping[
+        0, 0
+    ] == pytest.approx(slope[1])
     response = line.response(SPEED, TORQUE)
     lines = np.abs(response.angle[0])
     assert response.orders[int(lines.argmax())] == 6.0

@@ -9,10 +9,23 @@ from numpy.testing import assert_allclose
 from gensig.driveline.drive_line import drive_line_of_pair, read_drive_line
 from gensig.driveline.linear.matrices import line_matrices
 from gensig.driveline.linear.modal import natural_modes, with_viscous_losses
-from gensig.driveline.linear.shaft_line import GearMesh, LineGear, Node, Shaft, ShaftLine
+from gensig.driveline.linear.shaft_line import (
+    GearMesh,
+    LineGear,
+    Node,
+    Shaft,
+    ShaftLine,
+)
 from gensig.plan.request import read_request
 
-LINES = ("engine", "engine_lateral", "gearbox", "gearbox_lateral", "pair", "pair_with_rotors")
+LINES = (
+    "engine",
+    "engine_lateral",
+    "gearbox",
+    "gearbox_lateral",
+    "pair",
+    "pair_with_rotors",
+)
 ROTORS = {"system.motor.inertia_kg_m2": 0.01, "system.load.inertia_kg_m2": 0.03}
 
 
@@ -38,7 +51,9 @@ def test_a_free_line_has_one_rigid_mode_in_the_gear_ratios(line):
     assert found.frequency[0] == 0.0
     assert np.all(np.diff(found.frequency) >= 0.0)
     turning = (matrices.expand @ found.shapes[0])[: len(line.numbers)]
-    assert_allclose(turning / turning[0], np.abs(line.line.speed_ratio), rtol=1e-12, atol=0)
+    assert_allclose(
+        turning / turning[0], np.abs(line.line.speed_ratio), rtol=1e-12, atol=0
+    )
     scale = np.abs(matrices.whole_stiffness).sum(axis=1) * np.abs(found.shapes[0]).max()
     assert np.all(np.abs(matrices.whole_stiffness @ found.shapes[0]) < 1e-12 * scale)
     wrong = found.shapes[0].copy()
@@ -50,14 +65,20 @@ def test_matrices_are_symmetric_and_store_no_negative_energy(line):
     for merge in (False, True):
         one = with_viscous_losses(line.matrices(merge_rigid=merge))
         for matrix in (one.mass, one.stiffness, one.damping, one.whole_stiffness):
-            assert_allclose(matrix, matrix.T, rtol=0, atol=1e-12 * max(1.0, np.abs(matrix).max()))
-            assert np.linalg.eigvalsh(matrix).min() > -1e-10 * max(1.0, np.abs(matrix).max())
+            assert_allclose(
+                matrix, matrix.T, rtol=0, atol=1e-12 * max(1.0, np.abs(matrix).max())
+            )
+            assert np.linalg.eigvalsh(matrix).min() > -1e-10 * max(
+                1.0, np.abs(matrix).max()
+            )
 
 
 def test_modes_are_orthogonal_and_hold_as_much_strain_as_kinetic_energy(line):
     found, matrices = line.modes(), line.matrices()
     assert_allclose(
-        found.shapes @ matrices.mass @ found.shapes.T, np.eye(len(found.shapes)), atol=1e-8
+        found.shapes @ matrices.mass @ found.shapes.T,
+        np.eye(len(found.shapes)),
+        atol=1e-8,
     )
     square = (2.0 * np.pi * found.frequency) ** 2
     strain = found.shapes @ matrices.whole_stiffness @ found.shapes.T
@@ -92,19 +113,24 @@ def test_equal_loss_factors_damp_every_mode_by_half_of_it(lines):
 
 def test_viscous_losses_damp_each_mode_as_its_loss_factors_do(lines):
     matrices = lines["gearbox"].matrices(merge_rigid=True)
-    shafts_only = replace(matrices, mesh_loss_factor=np.zeros_like(matrices.mesh_stiffness))
+    shafts_only = replace(
+        matrices, mesh_loss_factor=np.zeros_like(matrices.mesh_stiffness)
+    )
     ratio = natural_modes(shafts_only).damping_ratio
     viscous = with_viscous_losses(shafts_only)
     n = len(matrices.names)
     k, c = (
-        np.linalg.solve(matrices.mass, one) for one in (viscous.whole_stiffness, viscous.damping)
+        np.linalg.solve(matrices.mass, one)
+        for one in (viscous.whole_stiffness, viscous.damping)
     )
     rates = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-k, -c]]))
     ringing = rates[rates.imag > 1.0]
     ringing = ringing[np.argsort(np.abs(ringing))]
     assert_allclose(-ringing.real / np.abs(ringing), ratio[1:], rtol=1e-6, atol=0)
     assert_allclose(
-        viscous.damping @ matrices.rigid.T, 0.0, atol=1e-9 * np.abs(viscous.damping).max()
+        viscous.damping @ matrices.rigid.T,
+        0.0,
+        atol=1e-9 * np.abs(viscous.damping).max(),
     )
     assert np.all(natural_modes(viscous).damping_ratio[1:] >= ratio[1:] * (1 - 1e-9))
 
@@ -133,7 +159,10 @@ def test_two_discs_in_mesh_have_the_textbook_frequency():
     )
     found = natural_modes(line_matrices(line))
     assert_allclose(
-        found.frequency, [0.0, np.sqrt(2e8 / equivalent) / (2.0 * np.pi)], rtol=1e-12, atol=0
+        found.frequency,
+        [0.0, np.sqrt(2e8 / equivalent) / (2.0 * np.pi)],
+        rtol=1e-12,
+        atol=0,
     )
 
 
@@ -142,7 +171,9 @@ def test_a_geared_line_has_the_frequencies_of_the_line_referred_to_one_shaft():
     ratio, (a, b) = 20 / 50, two_discs().gears
     inertia, springs = (0.3, 1e-3, 2e-2, 0.5), (1e4, 2e8, 3e4)
     geared = ShaftLine(
-        nodes=tuple(Node(name=str(place), inertia=value) for place, value in enumerate(inertia)),
+        nodes=tuple(
+            Node(name=str(place), inertia=value) for place, value in enumerate(inertia)
+        ),
         shafts=(
             Shaft(first=0, second=1, stiffness=springs[0]),
             Shaft(first=2, second=3, stiffness=springs[2]),
@@ -168,16 +199,28 @@ def test_half_of_the_ring_is_where_a_best_viscous_damper_has_its_peak():
 
     def answer(omega, damper):
         carried = (
-            -(omega**2) * ring * 1j * omega * damper / (-(omega**2) * ring + 1j * omega * damper)
+            -(omega**2)
+            * ring
+            * 1j
+            * omega
+            * damper
+            / (-(omega**2) * ring + 1j * omega * damper)
         )
         return np.abs(1.0 / (spring - omega**2 * disc + carried))
 
     at_half = [answer(np.sqrt(square), damper) for damper in (1e-3, 10.0, 300.0, 1e8)]
     assert_allclose(at_half, at_half[0], rtol=1e-6, atol=0)
     share = ring / disc
-    best = 2.0 * ring * np.sqrt(spring / disc) / np.sqrt(2.0 * (1.0 + share) * (2.0 + share))
+    best = (
+        2.0
+        * ring
+        * np.sqrt(spring / disc)
+        / np.sqrt(2.0 * (1.0 + share) * (2.0 + share))
+    )
     omega = np.linspace(0.5, 1.5, 20001) * np.sqrt(square)
-    assert_allclose(omega[answer(omega, best).argmax()], np.sqrt(square), rtol=1e-3, atol=0)
+    assert_allclose(
+        omega[answer(omega, best).argmax()], np.sqrt(square), rtol=1e-3, atol=0
+    )
     assert answer(omega, 0.5 * best).max() > 1.05 * answer(omega, best).max()
 
 
@@ -194,7 +237,9 @@ def test_frequencies_do_not_depend_on_the_order_of_the_nodes(lines):
         gears=tuple(replace(gear, node=place[gear.node]) for gear in line.gears),
         meshes=line.meshes,
     )
-    one, other = (natural_modes(line_matrices(each)).frequency for each in (line, mixed))
+    one, other = (
+        natural_modes(line_matrices(each)).frequency for each in (line, mixed)
+    )
     assert_allclose(one[1:], other[1:], rtol=1e-7, atol=0)
 
 
@@ -220,9 +265,9 @@ def test_stiff_supports_leave_the_torsional_line(lines):
                                           stiffness_y=gear.support.stiffness_y * factor))
             for gear in lateral.gears
         )  # fmt: skip
-        found = natural_modes(line_matrices(replace(lateral, gears=gears), lateral=True)).frequency[
-            :12
-        ]
+        found = natural_modes(
+            line_matrices(replace(lateral, gears=gears), lateral=True)
+        ).frequency[:12]
         apart.append(np.abs(found[1:] / torsion[1:] - 1.0).max())
     assert apart[0] > 0.02
     assert apart[1] < 0.02 * 0.2
@@ -233,9 +278,14 @@ def test_softer_meshes_and_heavier_discs_lower_every_mode(lines):
     line = lines["gearbox"].line
     before = natural_modes(line_matrices(line)).frequency
     softer = replace(
-        line, meshes=tuple(replace(mesh, stiffness=0.5 * mesh.stiffness) for mesh in line.meshes)
+        line,
+        meshes=tuple(
+            replace(mesh, stiffness=0.5 * mesh.stiffness) for mesh in line.meshes
+        ),
     )
-    heavier = replace(line, nodes=(*line.nodes[:-1], replace(line.nodes[-1], inertia=0.06)))
+    heavier = replace(
+        line, nodes=(*line.nodes[:-1], replace(line.nodes[-1], inertia=0.06))
+    )
     for changed in (softer, heavier):
         after = natural_modes(line_matrices(changed)).frequency
         assert np.all(after <= before * (1 + 1e-9))
@@ -254,7 +304,11 @@ def test_the_single_pair_is_the_same_code_with_two_nodes(machine, dynamics_of, r
         "motor": "motor_rotation",
         "load": "load_rotation",
     }
-    places |= {f"{gear} {axis}": f"{gear}_{axis}" for gear in ("pinion", "wheel") for axis in "xy"}
+    places |= {
+        f"{gear} {axis}": f"{gear}_{axis}"
+        for gear in ("pinion", "wheel")
+        for axis in "xy"
+    }
     order = [own.names.index(places[name]) for name in matrices.names]
     stiffness, damping = own.stiffness.copy(), own.damping.copy()
     driver = own.names.index("motor_rotation" if rotors else "pinion_rotation")
@@ -262,7 +316,10 @@ def test_the_single_pair_is_the_same_code_with_two_nodes(machine, dynamics_of, r
     damping[driver, driver] = damping[driver, driver] if rotors else 0.0
     assert_allclose(np.diag(matrices.mass), own.mass[order], rtol=1e-14, atol=0)
     assert_allclose(
-        matrices.stiffness, stiffness[np.ix_(order, order)], rtol=1e-9, atol=1e-9 * stiffness.max()
+        matrices.stiffness,
+        stiffness[np.ix_(order, order)],
+        rtol=1e-9,
+        atol=1e-9 * stiffness.max(),
     )
     without_driver = [place for place, name in enumerate(order) if name != driver]
     assert_allclose(
@@ -272,22 +329,34 @@ def test_the_single_pair_is_the_same_code_with_two_nodes(machine, dynamics_of, r
         atol=0,
     )
     assert_allclose(
-        matrices.directions[0], dynamics.approach_direction()[order], rtol=1e-12, atol=1e-15
+        matrices.directions[0],
+        dynamics.approach_direction()[order],
+        rtol=1e-12,
+        atol=1e-15,
     )
-    assert_allclose(matrices.mesh_stiffness, [dynamics.mean_mesh_stiffness], rtol=0, atol=0)
+    assert_allclose(
+        matrices.mesh_stiffness, [dynamics.mean_mesh_stiffness], rtol=0, atol=0
+    )
     assert_allclose(matrices.mesh_damping, [dynamics.mesh_damping], rtol=0, atol=0)
     direction = dynamics.approach_direction()
-    whole = (stiffness + dynamics.mean_mesh_stiffness * np.outer(direction, direction)) / own.mass[
-        :, None
-    ]
+    whole = (
+        stiffness + dynamics.mean_mesh_stiffness * np.outer(direction, direction)
+    ) / own.mass[:, None]
     square = np.sort(np.abs(np.linalg.eigvals(whole)))
     assert_allclose(
-        line.modes().frequency[1:], np.sqrt(square[1:]) / (2.0 * np.pi), rtol=1e-6, atol=0
+        line.modes().frequency[1:],
+        np.sqrt(square[1:]) / (2.0 * np.pi),
+        rtol=1e-6,
+        atol=0,
     )
 
 
-def test_torsion_alone_of_the_pair_is_its_equivalent_mass_on_the_mesh(machine, dynamics_of):
+def test_torsion_alone_of_the_pair_is_its_equivalent_mass_on_the_mesh(
+    machine, dynamics_of
+):
     dynamics = dynamics_of(machine())
     found = natural_modes(line_matrices(drive_line_of_pair(machine(), "pair").line))
-    expected = np.sqrt(dynamics.mean_mesh_stiffness / dynamics.equivalent_mass) / (2.0 * np.pi)
+    expected = np.sqrt(dynamics.mean_mesh_stiffness / dynamics.equivalent_mass) / (
+        2.0 * np.pi
+    )
     assert_allclose(found.frequency, [0.0, expected], rtol=1e-12, atol=0)

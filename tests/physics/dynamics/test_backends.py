@@ -12,14 +12,21 @@ from plain_motion import at_rest, equations, solved
 from gensig.dynamics.backends.base import Backend, Integration, Motions
 from gensig.dynamics.backends.registry import BACKENDS, DEFAULT_BACKEND
 from gensig.dynamics.decimation import decimator, in_band_error
-from gensig.dynamics.integrator import Solver, check_machine, records_together, settling_time
+from gensig.dynamics.integrator import (
+    Solver,
+    check_machine,
+    records_together,
+    settling_time,
+)
 from gensig.dynamics.pair import PairDynamics
 from gensig.errors import ConfigError, SimulationError
 from gensig.systems.base import simulate_together
 from gensig.systems.run import CleanRecord, Run, Start
 from gensig.units import read
 
-ACCURACY = 1e-3  # of a channel's spectrum: what the compiled core promises at its default step
+ACCURACY = (
+    1e-3  # of a channel's spectrum: what the compiled core promises at its default step
+)
 QUICK = {
     "operating.duration_s": 0.03,
     "operating.drive_frequency_hz": 20,
@@ -40,7 +47,9 @@ class Lsoda(Backend):
     def records_together(self, precision: str) -> int:
         return 1
 
-    def integrate(self, machines: Sequence[PairDynamics], integration: Integration) -> Motions:
+    def integrate(
+        self, machines: Sequence[PairDynamics], integration: Integration
+    ) -> Motions:
         rows = [motion(machine, integration) for machine in machines]
         acceleration, angle = (np.array(part) for part in zip(*rows, strict=True))
         n = len(machines)
@@ -56,7 +65,9 @@ class Lsoda(Backend):
         )
 
 
-def motion(machine: PairDynamics, integration: Integration) -> tuple[np.ndarray, np.ndarray]:
+def motion(
+    machine: PairDynamics, integration: Integration
+) -> tuple[np.ndarray, np.ndarray]:
     """Accelerations (channel, sample), and angles of the pinion (sample + 1,), of one machine from rest."""
     low_pass, rate = decimator(integration.oversampling), integration.sampling_rate
     factor, margin = low_pass.oversampling, low_pass.margin
@@ -64,7 +75,9 @@ def motion(machine: PairDynamics, integration: Integration) -> tuple[np.ndarray,
     times = np.arange(first, last + 1) / (rate * factor)
     begin = times[0] - settling_time(machine)
     slope, _ = equations(machine)
-    states = solved(slope, at_rest(machine, begin), np.append(begin, times), "LSODA", 1e-7)[1:]
+    states = solved(
+        slope, at_rest(machine, begin), np.append(begin, times), "LSODA", 1e-7
+    )[1:]
     dofs = [machine.dofs.index(name) for name in integration.channels]
     means = np.diff(states[:, 6:][:, dofs], axis=0) * rate * factor
     angle = machine.operating.speed * times + states[:, 2]
@@ -118,17 +131,22 @@ def test_backends_are_asked_what_they_can(machine, dynamics_of, lsoda: str) -> N
     with pytest.raises(SimulationError, match="lsoda: 100 Hz is too slow"):
         check_machine(dynamics, other, 100.0)
     assert [
-        records_together(solver) for solver in (core, replace(core, precision="float32"), other)
+        records_together(solver)
+        for solver in (core, replace(core, precision="float32"), other)
     ] == [8, 16, 1]
 
 
-def test_a_machine_that_a_backend_refuses_is_a_failed_record(record, lsoda: str) -> None:
+def test_a_machine_that_a_backend_refuses_is_a_failed_record(
+    record, lsoda: str
+) -> None:
     failed = record(lsoda, **{"sensing.sampling_rate_hz": 8000})
     assert isinstance(failed, SimulationError)
     assert str(failed) == "lsoda: 8000 Hz is too slow"
 
 
-def test_an_unknown_backend_is_refused_with_those_that_there_are(config_with, lsoda: str) -> None:
+def test_an_unknown_backend_is_refused_with_those_that_there_are(
+    config_with, lsoda: str
+) -> None:
     options = config_with().section("solver").plain()
     assert read(Solver, options, "solver").backend == DEFAULT_BACKEND == "runge_kutta"
     with pytest.raises(ConfigError) as caught:

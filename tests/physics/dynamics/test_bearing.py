@@ -74,7 +74,11 @@ class TestHertz:
     def test_palmgren(self, bearing):
         """Palmgren's deflection of a ball between both races of deep grooves: 0.0020 (Q^2 / D)^(1/3) mm, Q in kgf."""
         load = 300.0
-        printed = 1e-3 * 0.0020 * ((load / 9.80665) ** 2 / (1e3 * bearing.ball_diameter)) ** (1 / 3)
+        printed = (
+            1e-3
+            * 0.0020
+            * ((load / 9.80665) ** 2 / (1e3 * bearing.ball_diameter)) ** (1 / 3)
+        )
         found = (load / ball_coefficient(bearing, STEEL)) ** (2 / 3)
         assert_allclose(found, printed, rtol=0.1, atol=0)
 
@@ -85,8 +89,13 @@ class TestEquilibrium:
     def test_the_balls_carry_the_load(self, bearing, load):
         positions = cage_positions(bearing)
         state = bearing_equilibrium(bearing, STEEL, load, positions)
-        angle = positions[:, None] + 2 * np.pi * np.arange(bearing.n_balls) / bearing.n_balls
-        assert_allclose((state.ball_load * np.cos(angle)).sum(axis=1), load, rtol=1e-9, atol=0)
+        angle = (
+            positions[:, None]
+            + 2 * np.pi * np.arange(bearing.n_balls) / bearing.n_balls
+        )
+        assert_allclose(
+            (state.ball_load * np.cos(angle)).sum(axis=1), load, rtol=1e-9, atol=0
+        )
         assert_allclose(
             (state.ball_load * np.sin(angle)).sum(axis=1), 0.0, rtol=0, atol=1e-9 * load
         )
@@ -99,7 +108,8 @@ class TestEquilibrium:
         """Two loads a little apart: displacement differs by compliance times the difference, along the load."""
         load, positions = 460.0, cage_positions(bearing)
         low, here, high = (
-            bearing_equilibrium(bearing, STEEL, load + d, positions) for d in (-0.01, 0.0, 0.01)
+            bearing_equilibrium(bearing, STEEL, load + d, positions)
+            for d in (-0.01, 0.0, 0.01)
         )
         compliance = np.linalg.inv(here.stiffness)[:, :, 1]
         assert_allclose(
@@ -114,7 +124,9 @@ class TestEquilibrium:
         for n_balls, within in ((8, 0.02), (9, 0.02), (20, 0.005)):
             bearing = replace(SMALL, n_balls=n_balls, pitch_diameter=80e-3)
             state = bearing_equilibrium(bearing, STEEL, 500.0, np.zeros(1))
-            assert_allclose(state.ball_load.max() * n_balls / 500.0, 4.37, rtol=within, atol=0)
+            assert_allclose(
+                state.ball_load.max() * n_balls / 500.0, 4.37, rtol=within, atol=0
+            )
         loose = bearing_equilibrium(LOOSE, STEEL, 500.0, np.zeros(1))
         assert 4.5 < loose.ball_load.max() * 8 / 500.0 < 5.5
 
@@ -123,15 +135,23 @@ class TestEquilibrium:
             state = bearing_equilibrium(SMALL, STEEL, 460.0, np.array([position]))
             assert abs(state.displacement[0, 0]) < 1e-12
             assert_allclose(
-                state.stiffness[0, 0, 1], 0.0, rtol=0, atol=1e-6 * state.stiffness[0, 1, 1]
+                state.stiffness[0, 0, 1],
+                0.0,
+                rtol=0,
+                atol=1e-6 * state.stiffness[0, 1, 1],
             )
 
     def test_a_mirrored_cage_mirrors_the_equilibrium(self):
         one, other = (
-            bearing_equilibrium(LOOSE, STEEL, 460.0, np.array([angle])) for angle in (0.2, -0.2)
+            bearing_equilibrium(LOOSE, STEEL, 460.0, np.array([angle]))
+            for angle in (0.2, -0.2)
         )
-        assert_allclose(one.displacement * [-1, 1], other.displacement, rtol=0, atol=1e-12)
-        assert_allclose(one.stiffness[0, 0, 1], -other.stiffness[0, 0, 1], rtol=1e-5, atol=0)
+        assert_allclose(
+            one.displacement * [-1, 1], other.displacement, rtol=0, atol=1e-12
+        )
+        assert_allclose(
+            one.stiffness[0, 0, 1], -other.stiffness[0, 0, 1], rtol=1e-5, atol=0
+        )
         assert abs(one.stiffness[0, 0, 1]) > 1e5  # so the twin above says something
 
 
@@ -142,15 +162,21 @@ class TestStiffness:
         """Along the load: Palmgren with Q = 5 F / Z, and Gargiulo (1980), 0.0325e6 (D F Z^2)^(1/3) lb/in."""
         ball, n = bearing.ball_diameter, bearing.n_balls
         inch, pound = 0.0254, 4.448222
-        gargiulo = 0.0325e6 * (ball / inch * load / pound * n**2) ** (1 / 3) * pound / inch
-        deflection = 1e-3 * 0.0020 * ((5 * load / n / 9.80665) ** 2 / (1e3 * ball)) ** (1 / 3)
+        gargiulo = (
+            0.0325e6 * (ball / inch * load / pound * n**2) ** (1 / 3) * pound / inch
+        )
+        deflection = (
+            1e-3 * 0.0020 * ((5 * load / n / 9.80665) ** 2 / (1e3 * ball)) ** (1 / 3)
+        )
         _, along = bearing_stiffness(bearing, STEEL, load)
         assert_allclose(along, gargiulo, rtol=0.1, atol=0)
         assert_allclose(along, 1.5 * load / deflection, rtol=0.1, atol=0)
 
     @TIGHTER
     def test_it_grows_with_the_cube_root_of_the_load(self, bearing):
-        one, other = (np.array(bearing_stiffness(bearing, STEEL, load)) for load in (50.0, 400.0))
+        one, other = (
+            np.array(bearing_stiffness(bearing, STEEL, load)) for load in (50.0, 400.0)
+        )
         assert_allclose(other / one, 2.0, rtol=1e-6, atol=0)
         loose = [
             bearing_stiffness(replace(bearing, radial_clearance=10e-6), STEEL, load)[0]
@@ -158,7 +184,9 @@ class TestStiffness:
         ]
         assert loose[1] / loose[0] > 2.2
 
-    @pytest.mark.parametrize("bearing", [SMALL, LARGE, LOOSE], ids=["6203", "6205", "loose"])
+    @pytest.mark.parametrize(
+        "bearing", [SMALL, LARGE, LOOSE], ids=["6203", "6205", "loose"]
+    )
     @LOADS
     def test_across_is_softer_than_along_without_preload(self, bearing, load):
         across, along = bearing_stiffness(bearing, STEEL, load)
@@ -172,9 +200,13 @@ class TestStiffness:
         assert_allclose(across / along, 2 / 3, rtol=2e-3, atol=0)
 
     def test_a_symmetric_bearing_under_strong_preload_is_isotropic(self):
-        across, along = bearing_stiffness(replace(SMALL, radial_clearance=-20e-6), STEEL, 1.0)
+        across, along = bearing_stiffness(
+            replace(SMALL, radial_clearance=-20e-6), STEEL, 1.0
+        )
         assert_allclose(across, along, rtol=1e-4, atol=0)
-        loaded = bearing_stiffness(replace(SMALL, radial_clearance=-20e-6), STEEL, 3000.0)
+        loaded = bearing_stiffness(
+            replace(SMALL, radial_clearance=-20e-6), STEEL, 3000.0
+        )
         assert abs(loaded[1] / loaded[0] - 1) > 0.02  # a load takes the symmetry away
 
     def test_more_clearance_is_softer_across(self):
@@ -189,7 +221,9 @@ class TestSupport:
     def test_a_stiff_shaft_leaves_two_bearings(self):
         stiff = replace(SHAFT, span=1e-3)
         two = 2 * np.array(bearing_stiffness(SMALL, STEEL, 460.0))
-        assert_allclose(support_stiffness(SMALL, stiff, STEEL, 920.0), two, rtol=1e-3, atol=0)
+        assert_allclose(
+            support_stiffness(SMALL, stiff, STEEL, 920.0), two, rtol=1e-3, atol=0
+        )
 
     def test_a_slender_shaft_is_a_beam(self):
         slender = replace(SHAFT, span=0.6)
@@ -211,7 +245,10 @@ class TestSupport:
     [
         ({"n_balls": 3}, "bearing.n_balls = 3 must lie in 5..60"),
         ({"ball_diameter": 0.0}, "bearing.ball_diameter_mm = 0 must be positive"),
-        ({"pitch_diameter": 15e-3}, "8 balls of this size touch each other; give more than 17.63"),
+        (
+            {"pitch_diameter": 15e-3},
+            "8 balls of this size touch each other; give more than 17.63",
+        ),
         (
             {"inner_groove_conformity": 0.5},
             "bearing.inner_groove_conformity = 0.5 must lie in 0.505..0.6",
@@ -220,7 +257,10 @@ class TestSupport:
             {"outer_groove_conformity": 0.7},
             "bearing.outer_groove_conformity = 0.7 must lie in 0.505..0.6",
         ),
-        ({"radial_clearance": 2e-4}, "bearing.radial_clearance_um = 200 must lie in -20..100"),
+        (
+            {"radial_clearance": 2e-4},
+            "bearing.radial_clearance_um = 200 must lie in -20..100",
+        ),
     ],
 )
 def test_a_bearing_that_is_none(changes, text):

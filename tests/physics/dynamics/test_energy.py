@@ -32,7 +32,9 @@ class Balance(NamedTuple):
     def residual(self):
         """Change of energy less work, J."""
         power = self.supplied - self.supports - self.mesh_damping + self.friction
-        work = np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1])) * self.step])
+        work = np.concatenate(
+            [[0.0], np.cumsum(0.5 * (power[1:] + power[:-1])) * self.step]
+        )
         return self.energy - self.energy[0] - work
 
 
@@ -52,18 +54,23 @@ def balance(dynamics, oversampling=OVERSAMPLING):
         dynamics.start_roll + radius * (speed * time + q[:, 2]),
         radius * (speed + v[:, 2]),
     )
-    law = laws(dynamics, np.column_stack([roll, q @ direction, v @ direction, roll_rate]), step)
+    law = laws(
+        dynamics, np.column_stack([roll, q @ direction, v @ direction, roll_rate]), step
+    )
     _, friction, moment_p, moment_w, _, stored, lost, _ = law.T
     speeds = v + np.array([0, 0, speed, 0, 0, speed / dynamics.table.pair.ratio])
     k, c = np.diag(system.stiffness), np.diag(system.damping)
     springs = [0, 1, 3, 4]
     drive = system.force[2] - k[2] * q[:, 2] - c[2] * v[:, 2]
     return Balance(
-        energy=0.5 * (speeds**2 @ system.mass + q[:, springs] ** 2 @ k[springs]) + stored,
+        energy=0.5 * (speeds**2 @ system.mass + q[:, springs] ** 2 @ k[springs])
+        + stored,
         supplied=drive * speeds[:, 2] + system.force[5] * speeds[:, 5],
         supports=v[:, springs] ** 2 @ c[springs],
         mesh_damping=lost,
-        friction=friction * (v[:, 0] - v[:, 3]) + moment_p * speeds[:, 2] + moment_w * speeds[:, 5],
+        friction=friction * (v[:, 0] - v[:, 3])
+        + moment_p * speeds[:, 2]
+        + moment_w * speeds[:, 5],
         stored=stored,
         step=step,
     )
@@ -91,7 +98,9 @@ def test_the_states_seen_are_those_of_a_run_in_one_go(machine, dynamics_of, name
 @pytest.fixture(scope="module", params=FAULTS)
 def case(request, machine, dynamics_of):
     return {
-        law: balance(dynamics_of(machine({"mesh.roll_torque": law}), FAULTS[request.param]))
+        law: balance(
+            dynamics_of(machine({"mesh.roll_torque": law}), FAULTS[request.param])
+        )
         for law in ("consistent", "classical")
     }
 
@@ -111,12 +120,20 @@ def test_the_classical_equations_do_not_balance(case):
 
 def test_coarse_tables_balance_too(machine, dynamics_of):
     """Force and energy of a table belong together, however far its nodes are apart."""
-    assert relative_residual(balance(dynamics_of(machine({"mesh.points_per_pitch": 128})))) < 2e-4
+    assert (
+        relative_residual(balance(dynamics_of(machine({"mesh.points_per_pitch": 128}))))
+        < 2e-4
+    )
 
 
 def test_the_balance_sees_a_missing_term(case):
     found = case["consistent"]
-    assert relative_residual(found._replace(mesh_damping=np.zeros_like(found.mesh_damping))) > 0.02
+    assert (
+        relative_residual(
+            found._replace(mesh_damping=np.zeros_like(found.mesh_damping))
+        )
+        > 0.02
+    )
 
 
 def test_mesh_damping_never_feeds_energy(case):
@@ -133,8 +150,14 @@ def test_friction_dissipates(case):
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_friction_of_rigid_gears_dissipates_at_every_position(xiamen, dynamics_of, seed):
-    speed, ratio, rng = xiamen.operating.speed, xiamen.pair.ratio, np.random.default_rng(seed)
+def test_friction_of_rigid_gears_dissipates_at_every_position(
+    xiamen, dynamics_of, seed
+):
+    speed, ratio, rng = (
+        xiamen.operating.speed,
+        xiamen.pair.ratio,
+        np.random.default_rng(seed),
+    )
     roll, rate = (
         rng.uniform(0, 50, 500) * xiamen.pair.base_pitch,
         xiamen.pair.pinion.base_radius * speed,
@@ -155,19 +178,28 @@ def test_action_equals_reaction(xiamen, dynamics_of):
     rng = np.random.default_rng(3)
     for _ in range(50):
         q = rng.normal(0, 1e-6, 6)
-        q[5] -= (rng.uniform(1e-6, 2e-5) - q @ direction) / xiamen.pair.wheel.base_radius
+        q[5] -= (
+            rng.uniform(1e-6, 2e-5) - q @ direction
+        ) / xiamen.pair.wheel.base_radius
         v = rng.normal(0, 1e-3, 6)
         acceleration = right_hand_side(dynamics, 0.0, q, v)
         force = (
-            system.mass * acceleration - system.force + system.stiffness @ q + system.damping @ v
+            system.mass * acceleration
+            - system.force
+            + system.stiffness @ q
+            + system.damping @ v
         )
         assert force[1] > 0
         assert_allclose(force[1], -force[4], rtol=1e-9, atol=1e-6)
         assert_allclose(force[0], -force[3], rtol=1e-9, atol=1e-6)
         assert abs(force[0]) <= 0.05 * force[1] * (1 + 1e-9)
         # the mesh force drives the wheel and brakes the pinion, up to friction and the roll torque
-        assert_allclose(force[5], force[1] * xiamen.pair.wheel.base_radius, rtol=0.03, atol=0)
-        assert_allclose(force[2], -force[1] * xiamen.pair.pinion.base_radius, rtol=0.1, atol=0)
+        assert_allclose(
+            force[5], force[1] * xiamen.pair.wheel.base_radius, rtol=0.03, atol=0
+        )
+        assert_allclose(
+            force[2], -force[1] * xiamen.pair.pinion.base_radius, rtol=0.1, atol=0
+        )
 
 
 def test_a_larger_approach_meets_a_larger_force_back(xiamen, dynamics_of):

@@ -52,7 +52,9 @@ class TestZeroHelix:
 
     @pytest.mark.parametrize("n_chords", [1, 3])
     @pytest.mark.parametrize("faults", [(), (MissingTooth(gear="pinion", tooth=1),)])
-    def test_the_motion_in_the_plane_has_the_same_bits(self, xiamen, dynamics_of, n_chords, faults):
+    def test_the_motion_in_the_plane_has_the_same_bits(
+        self, xiamen, dynamics_of, n_chords, faults
+    ):
         spur = dynamics_of(xiamen, faults)
         chords = with_table(spur, as_chords(spur.table, n_chords))
         assert chords.dofs == (*PAIR_DOFS, *AXIAL_DOFS)
@@ -70,13 +72,20 @@ class TestZeroHelix:
             for name in ("approach", "load", "stiffness"):
                 exact = getattr(expected, name)
                 assert_allclose(
-                    getattr(found, name), exact, rtol=1e-9, atol=1e-12 * np.abs(exact).max()
+                    getattr(found, name),
+                    exact,
+                    rtol=1e-9,
+                    atol=1e-12 * np.abs(exact).max(),
                 )
 
     def test_friction_and_mean_stiffness_are_the_spur_pairs(self, spur):
         chords = with_table(spur, as_chords(spur.table))
-        assert_allclose(chords.friction_torque(), spur.friction_torque(), rtol=1e-9, atol=0)
-        assert_allclose(chords.mean_mesh_stiffness, spur.mean_mesh_stiffness, rtol=1e-9, atol=0)
+        assert_allclose(
+            chords.friction_torque(), spur.friction_torque(), rtol=1e-9, atol=0
+        )
+        assert_allclose(
+            chords.mean_mesh_stiffness, spur.mean_mesh_stiffness, rtol=1e-9, atol=0
+        )
 
 
 def gears(dynamics):
@@ -112,8 +121,12 @@ class TestForces:
     def test_gears_moved_together_come_no_closer(self, one, axis):
         direction, unit = one.approach_direction(), np.eye(3)[axis]
         size = np.abs(direction).max()
-        assert_allclose(direction @ rigid(one, unit, np.zeros(3)), 0.0, rtol=0, atol=1e-14 * size)
-        assert_allclose(direction @ rigid(one, np.zeros(3), unit), 0.0, rtol=0, atol=1e-14 * size)
+        assert_allclose(
+            direction @ rigid(one, unit, np.zeros(3)), 0.0, rtol=0, atol=1e-14 * size
+        )
+        assert_allclose(
+            direction @ rigid(one, np.zeros(3), unit), 0.0, rtol=0, atol=1e-14 * size
+        )
 
     def test_the_approach_is_how_far_the_flanks_move_into_each_other(self, one):
         """Along the transverse line of action, from the displacement of the two bodies where they touch."""
@@ -123,7 +136,10 @@ class TestForces:
             pinion = q[[0, 1, 6]] + np.cross([q[7], q[8], -q[2]], at_pinion)
             wheel = q[[3, 4, 9]] + np.cross([q[10], q[11], q[5]], at_wheel)
             assert_allclose(
-                one.approach_direction() @ q, push @ (pinion - wheel), rtol=1e-10, atol=1e-18
+                one.approach_direction() @ q,
+                push @ (pinion - wheel),
+                rtol=1e-10,
+                atol=1e-18,
             )
 
     def test_action_equals_reaction_and_moments_balance(self, one):
@@ -134,24 +150,35 @@ class TestForces:
         still_system = still.system()
         acceleration = right_hand_side(still, 0.0, start, np.zeros(12))
         force = (
-            still_system.mass * acceleration - still_system.force + still_system.stiffness @ start
+            still_system.mass * acceleration
+            - still_system.force
+            + still_system.stiffness @ start
         )
         at_pinion, at_wheel, push = gears(one)
         normal = force[1]
         assert normal > 0.5 * one.mesh_force
         assert_allclose(force[[0, 1, 6]], -normal * push, rtol=1e-6, atol=1e-6 * normal)
         assert_allclose(force[[3, 4, 9]], normal * push, rtol=1e-6, atol=1e-6 * normal)
-        assert_allclose(abs(force[6]), normal * math.tan(pair.base_helix_angle), rtol=1e-6, atol=0)
+        assert_allclose(
+            abs(force[6]), normal * math.tan(pair.base_helix_angle), rtol=1e-6, atol=0
+        )
         # over the tangential force at the pitch circle it is the tangent of the helix angle there
         tangential = (
-            normal * pair.pinion.base_radius / (0.5 * pair.center_distance * 2 / (1 + pair.ratio))
+            normal
+            * pair.pinion.base_radius
+            / (0.5 * pair.center_distance * 2 / (1 + pair.ratio))
         )
         lead = math.tan(pair.base_helix_angle) / math.cos(pair.working_pressure_angle)
         assert_allclose(abs(force[6]) / tangential, lead, rtol=1e-6, atol=0)
-        for arm, places, sign in ((at_pinion, (7, 8, 2), -1.0), (at_wheel, (10, 11, 5), 1.0)):
+        for arm, places, sign in (
+            (at_pinion, (7, 8, 2), -1.0),
+            (at_wheel, (10, 11, 5), 1.0),
+        ):
             on_gear = np.cross(arm, force[[0, 1, 6]] if sign < 0 else force[[3, 4, 9]])
             found = force[list(places)] * [1.0, 1.0, sign]
-            assert_allclose(found, on_gear, rtol=1e-6, atol=1e-6 * np.abs(on_gear).max())
+            assert_allclose(
+                found, on_gear, rtol=1e-6, atol=1e-6 * np.abs(on_gear).max()
+            )
         assert system.names == one.dofs
 
     def test_the_thrust_on_a_right_handed_driver_is_along_its_rotation(self, one, hand):
@@ -197,7 +224,9 @@ class TestStatics:
         table, force = helical.table, helical.mesh_force
         roll = table.pair.base_pitch * (np.arange(20) + 0.3) / 20
         states = chord_states(table, roll)
-        low, high = (chord_equilibrium(table, states, force * (1 + s * 1e-6)) for s in (-1, 1))
+        low, high = (
+            chord_equilibrium(table, states, force * (1 + s * 1e-6)) for s in (-1, 1)
+        )
         slope = 2e-6 * force / (high.approach - low.approach)
         found = chord_equilibrium(table, states, force).stiffness
         assert (np.abs(found / slope - 1) < 1e-4).mean() > 0.9
@@ -205,7 +234,8 @@ class TestStatics:
     def test_slowly_turned_the_gears_follow_their_statics(self, helical):
         """At 30 r/min, the mean normal force and the approach are those of the equilibrium."""
         slow = replace(
-            helical, operating=replace(helical.operating, speed=helical.operating.speed / 60)
+            helical,
+            operating=replace(helical.operating, speed=helical.operating.speed / 60),
         )
         q, _ = moved(slow, 3000, step=1e-5)
         radius = slow.table.pair.pinion.base_radius
@@ -240,7 +270,9 @@ def balance(dynamics, n_steps=6000):
         dynamics.start_roll + radius * (speed * time + q[:, 2]),
         radius * (speed + v[:, 2]),
     )
-    law = laws(dynamics, np.column_stack([roll, q @ direction, v @ direction, roll_rate]), STEP)
+    law = laws(
+        dynamics, np.column_stack([roll, q @ direction, v @ direction, roll_rate]), STEP
+    )
     _, friction, moment_p, moment_w, _, stored, lost, _ = law.T
     speeds = v + speed * system.rotation
     springs = [dof for dof in range(12) if dof not in (2, 5)]
@@ -252,7 +284,11 @@ def balance(dynamics, n_steps=6000):
         - v[:, springs] ** 2 @ c[springs]
         - lost
     )
-    power += friction * (v[:, 0] - v[:, 3]) + moment_p * speeds[:, 2] + moment_w * speeds[:, 5]
+    power += (
+        friction * (v[:, 0] - v[:, 3])
+        + moment_p * speeds[:, 2]
+        + moment_w * speeds[:, 5]
+    )
     energy = 0.5 * (speeds**2 @ system.mass + q[:, springs] ** 2 @ k[springs]) + stored
     work = np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1])) * STEP])
     assert_allclose(speeds[:, 5] * ratio, speed + ratio * v[:, 5], rtol=1e-9)
@@ -275,10 +311,15 @@ class TestEnergy:
 
     def test_the_stored_energy_is_the_work_of_the_force(self, helical):
         """Pressed together at one place, over all chords."""
-        approach, roll = np.linspace(0.0, 2.5e-5, 2001), 0.6 * helical.table.pair.base_pitch
+        approach, roll = (
+            np.linspace(0.0, 2.5e-5, 2001),
+            0.6 * helical.table.pair.base_pitch,
+        )
         found = laws(
             helical,
-            np.column_stack([np.full_like(approach, roll), approach, 0 * approach, 0 * approach]),
+            np.column_stack(
+                [np.full_like(approach, roll), approach, 0 * approach, 0 * approach]
+            ),
         )
         force, stored = found[:, 0], found[:, 5]
         work = np.concatenate(
@@ -288,23 +329,34 @@ class TestEnergy:
 
     def test_the_roll_torque_is_the_slope_of_that_energy(self, helical):
         roll = np.linspace(0.2, 0.25, 400) * helical.table.pair.base_pitch
-        found = laws(helical, np.column_stack([roll, np.full_like(roll, 8e-6), 0 * roll, 0 * roll]))
+        found = laws(
+            helical,
+            np.column_stack([roll, np.full_like(roll, 8e-6), 0 * roll, 0 * roll]),
+        )
         along, stored = found[:, 4], found[:, 5]
         slope = np.gradient(stored, roll)
-        assert_allclose(-along[1:-1], slope[1:-1], rtol=0, atol=0.02 * np.abs(slope).max())
+        assert_allclose(
+            -along[1:-1], slope[1:-1], rtol=0, atol=0.02 * np.abs(slope).max()
+        )
 
 
 class TestChords:
     def test_forces_do_not_jump_where_a_chord_takes_over(self, helical):
         """Pressed ever deeper at one place, with damping and rolling on."""
-        approach, roll = np.linspace(0.0, 2.5e-5, 3001), 0.6 * helical.table.pair.base_pitch
+        approach, roll = (
+            np.linspace(0.0, 2.5e-5, 3001),
+            0.6 * helical.table.pair.base_pitch,
+        )
         for rate in (0.0, 0.01, -0.01):
             motion = np.column_stack([np.full_like(approach, roll), approach, np.full_like(approach, rate),
                                       np.full_like(approach, 4.0)])  # fmt: skip
             found = laws(helical, motion)
             for column, size in ((0, 1.0), (4, 1e-3)):
                 steps = np.abs(np.diff(found[:, column]))
-                assert steps.max() < 20 * np.median(steps) + 1e-3 * size * helical.mesh_force
+                assert (
+                    steps.max()
+                    < 20 * np.median(steps) + 1e-3 * size * helical.mesh_force
+                )
 
     def test_a_step_that_is_shorter_comes_closer(self, helical):
         """A lagging chord costs the square of the step: the force is continuous, its slope is not."""
@@ -314,7 +366,9 @@ class TestChords:
             return v[::oversampling] @ helical.approach_direction()
 
         exact = run(64)
-        errors = [np.linalg.norm(run(n) - exact) / np.linalg.norm(exact) for n in (5, 20)]
+        errors = [
+            np.linalg.norm(run(n) - exact) / np.linalg.norm(exact) for n in (5, 20)
+        ]
         assert errors[0] < 1e-2
         assert errors[1] < errors[0] / 8
 
@@ -331,7 +385,10 @@ class TestChords:
         })  # fmt: skip
         assert found[-1] < -100.0
         assert_allclose(
-            found, laws(replace(helical, table=alone), motion)[:, 0], rtol=1e-12, atol=1e-9
+            found,
+            laws(replace(helical, table=alone), motion)[:, 0],
+            rtol=1e-12,
+            atol=1e-9,
         )
 
 
@@ -382,7 +439,9 @@ class TestRecords:
             helical,
             narrow,
             replace(
-                helical, start_phase=0.9, pinion_error=np.random.default_rng(1).normal(0, 2e-6, 23)
+                helical,
+                start_phase=0.9,
+                pinion_error=np.random.default_rng(1).normal(0, 2e-6, 23),
             ),
         ]
         together = self.integrated(machines, precision=precision).acceleration
@@ -398,7 +457,8 @@ class TestRecords:
 
     def test_float32_agrees(self, helical):
         wide, narrow = (
-            self.integrated([helical], precision=p).acceleration[0] for p in ("float64", "float32")
+            self.integrated([helical], precision=p).acceleration[0]
+            for p in ("float64", "float32")
         )
         assert_allclose(narrow, wide, rtol=0, atol=2e-3 * np.abs(wide).max())
 

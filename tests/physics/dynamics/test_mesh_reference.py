@@ -15,7 +15,9 @@ from gensig.dynamics.lanes import pack
 from gensig.faults.broken import MissingTooth
 from gensig.faults.crack import Crack
 
-CRACK = Crack(gear="pinion", tooth=2, crack_depth=2e-3, crack_angle=0.8, crack_start="arc_mid")
+CRACK = Crack(
+    gear="pinion", tooth=2, crack_depth=2e-3, crack_angle=0.8, crack_start="arc_mid"
+)
 FAULTS = {"healthy": (), "crack": (CRACK,), "missing": (MissingTooth(gear="wheel", tooth=1),),
           "both": (CRACK, MissingTooth(gear="pinion", tooth=4)),
           # gaps of both signs that vary along the path, one tooth without its tip
@@ -70,13 +72,22 @@ class Reference:
                     self.d.pinion_error,
                     self.d.pinion_tilt,
                 ),
-                (self.table.wheel, self.d.start_tooth_wheel, self.d.wheel_error, self.d.wheel_tilt),
+                (
+                    self.table.wheel,
+                    self.d.start_tooth_wheel,
+                    self.d.wheel_error,
+                    self.d.wheel_tilt,
+                ),
             ):
                 tooth = (index + start) % len(side.kind)
                 kind = side.kind[tooth]
                 there = there and bool(side.present[kind])
-                row[1:] += columns(side, kind, np.array([position]), self.table.position)[:, 0]
-                row[3] += error[tooth] + tilt[tooth] * (position - self.pair.pitch_point)
+                row[1:] += columns(
+                    side, kind, np.array([position]), self.table.position
+                )[:, 0]
+                row[3] += error[tooth] + tilt[tooth] * (
+                    position - self.pair.pitch_point
+                )
                 row[4] += tilt[tooth]
             if there:
                 rows.append(row)
@@ -87,7 +98,9 @@ class Reference:
         n = len(gap)
         shared = self.table.shared_compliance
         flexibility = np.diag(compliance - shared) + shared
-        tried = chain.from_iterable(combinations(range(n), size) for size in range(n + 1))
+        tried = chain.from_iterable(
+            combinations(range(n), size) for size in range(n + 1)
+        )
         for chosen in map(list, tried):
             force = np.zeros(n)
             force[chosen] = np.linalg.solve(
@@ -111,7 +124,9 @@ class Reference:
             1,
         )
         sliding = self.options.friction_coefficient * load * x * (1.5 - 0.5 * x**2)
-        arm = self.pair.start_curvature_radius + np.clip(position, 0, self.pair.path_of_contact)
+        arm = self.pair.start_curvature_radius + np.clip(
+            position, 0, self.pair.path_of_contact
+        )
         own = c - self.table.shared_compliance
         stored = (
             elastic @ (approach - gap)
@@ -134,7 +149,11 @@ class Reference:
         The mirror image of a sound pair that turns backwards: its contact runs from where the back flanks of a space
         half a pitch on stand, its teeth count down, missing ones stay missing; no errors, no friction.
         """
-        pitch, position, n = self.pair.base_pitch, self.table.position, np.arange(-40, 41)
+        pitch, position, n = (
+            self.pair.base_pitch,
+            self.table.position,
+            np.arange(-40, 41),
+        )
         where = 2 * self.pair.pitch_point + 0.5 * pitch - roll - n * pitch
         inside = (where >= position[0]) & (where < position[-1])
         where, n = where[inside], n[inside]
@@ -143,7 +162,11 @@ class Reference:
             (self.table.wheel, self.d.start_tooth_wheel),
         )
         there = np.all(
-            [side.present[side.kind[(start - n) % len(side.kind)]] for side, start in sides], axis=0
+            [
+                side.present[side.kind[(start - n) % len(side.kind)]]
+                for side, start in sides
+            ],
+            axis=0,
         )
         c, c_slope, gap, gap_slope = sum(
             columns(side, 0, where[there], position) for side, _ in sides
@@ -155,7 +178,9 @@ class Reference:
         load = np.maximum(0.0, elastic * (1 + self.damping * pair_rate))
         own, shared = c - self.table.shared_compliance, self.table.shared_compliance
         stored = (
-            elastic @ (squeezed - gap) - 0.5 * own @ elastic**2 - 0.5 * shared * elastic.sum() ** 2
+            elastic @ (squeezed - gap)
+            - 0.5 * own @ elastic**2
+            - 0.5 * shared * elastic.sum() ** 2
         )
         along = -(load @ gap_slope + 0.5 * elastic**2 @ c_slope)
         return (
@@ -234,7 +259,9 @@ def test_back_flanks_agree_for_random_states(dynamics):
         laws(dynamics, states),
         np.array([reference.coast(*state) for state in states]),
     )
-    scale = np.array([1, 1, 0.1, 0.1, 1, 1e-5, 1e-2, 1]) * np.maximum(1.0, -expected[:, :1])
+    scale = np.array([1, 1, 0.1, 0.1, 1, 1e-5, 1e-2, 1]) * np.maximum(
+        1.0, -expected[:, :1]
+    )
     assert_allclose(found / scale, expected / scale, rtol=1e-9, atol=1e-9)
     assert (expected[:, 7] == -2).sum() > 50
 
@@ -247,7 +274,9 @@ def test_between_the_flanks_there_is_nothing(dynamics):
 
 
 @pytest.mark.parametrize("roll_torque", ["consistent", "classical"])
-def test_only_the_consistent_law_has_a_force_along_the_roll(machine, dynamics_of, roll_torque):
+def test_only_the_consistent_law_has_a_force_along_the_roll(
+    machine, dynamics_of, roll_torque
+):
     dynamics = dynamics_of(machine({"mesh.roll_torque": roll_torque}), (CRACK,))
     states = random_states(dynamics, 40, seed=19)
     states[1::2, 1] = -dynamics.table.pair.backlash - states[1::2, 1]
@@ -259,7 +288,8 @@ def test_a_motion_against_the_back_flanks(machine, dynamics_of):
     """Two teeth missing under a light load: the pinion runs ahead into the back flanks."""
     light = machine({"operating.torque_nm": 2})
     dynamics = dynamics_of(
-        light, (MissingTooth(gear="pinion", tooth=3), MissingTooth(gear="pinion", tooth=4))
+        light,
+        (MissingTooth(gear="pinion", tooth=3), MissingTooth(gear="pinion", tooth=4)),
     )
     step, direction = 1 / (51200 * 8), dynamics.approach_direction()
     q, v = trajectory(dynamics, dynamics.static_start(0.0), np.zeros(6), step, 8000)
@@ -278,7 +308,9 @@ def test_another_shared_compliance_would_show(dynamics):
     group, states = pack([dynamics], 1e-6), random_states(dynamics, 50, 7)
     numbers = group.numbers.copy()
     numbers[SHARED * LANES : (SHARED + 1) * LANES] *= 1.001
-    one, two = (group_laws(g, states)[:, 0] for g in (group, group._replace(numbers=numbers)))
+    one, two = (
+        group_laws(g, states)[:, 0] for g in (group, group._replace(numbers=numbers))
+    )
     assert np.abs(one / np.maximum(two, 1e-9) - 1)[one > 100].max() > 1e-6
 
 
@@ -300,7 +332,9 @@ def test_one_millisecond_against_dop853(xiamen, dynamics_of):
     n_steps = round(duration / (64 * step)) * 64
     reference = Reference(dynamics, step)
     start = dynamics.static_start(0.0) + 1e-6 * np.array([1, 1, 0, -1, 1, 0])
-    _, _, stored = advance(dynamics, start, np.zeros(6), step, 0, n_steps, tuple(range(6)))
+    _, _, stored = advance(
+        dynamics, start, np.zeros(6), step, 0, n_steps, tuple(range(6))
+    )
     law = law_of(dynamics, step)
     edges = np.arange(0, n_steps + 1, 64) * step
 
@@ -329,7 +363,10 @@ def runge_kutta(reference, law, time, q, v, step, n_parts):
 
     def slope(t, y):
         return np.concatenate(
-            [y[6:], reference.acceleration(t, y[:6], y[6:], lambda *state: law(*state)[:7])]
+            [
+                y[6:],
+                reference.acceleration(t, y[:6], y[6:], lambda *state: law(*state)[:7]),
+            ]
         )
 
     y, h = np.concatenate([q, v]), step / n_parts
@@ -344,7 +381,9 @@ def runge_kutta(reference, law, time, q, v, step, n_parts):
 
 
 @pytest.mark.parametrize("oversampling", [5, 16])
-def test_a_step_with_an_entry_or_exit_is_taken_in_parts(machine, dynamics_of, oversampling):
+def test_a_step_with_an_entry_or_exit_is_taken_in_parts(
+    machine, dynamics_of, oversampling
+):
     """Every step of two mesh periods is one of Runge and Kutta's, or two that meet where a pair comes or goes.
 
     With linear contact: the load-dependent term has no limit as the load of a pair falls to 0, and where tables have
@@ -361,17 +400,24 @@ def test_a_step_with_an_entry_or_exit_is_taken_in_parts(machine, dynamics_of, ov
     q, v = trajectory(dynamics, dynamics.static_start(0.0), np.zeros(6), step, n_steps)
     states = np.hstack([q, v])
     radius, speed = xiamen.pair.pinion.base_radius, xiamen.operating.speed
-    rolls = dynamics.start_roll + radius * (speed * np.arange(n_steps + 1) * step + q[:, 2])
-    motions = np.column_stack([rolls, q @ direction, v @ direction, radius * (speed + v[:, 2])])
+    rolls = dynamics.start_roll + radius * (
+        speed * np.arange(n_steps + 1) * step + q[:, 2]
+    )
+    motions = np.column_stack(
+        [rolls, q @ direction, v @ direction, radius * (speed + v[:, 2])]
+    )
     loaded = laws(dynamics, motions, step)[:, 7]
     events = np.flatnonzero(np.diff(loaded))
     assert 3 <= len(events) <= 6
-    plain = np.setdiff1d(np.arange(0, n_steps, 3), np.concatenate([events - 1, events, events + 1]))
+    plain = np.setdiff1d(
+        np.arange(0, n_steps, 3), np.concatenate([events - 1, events, events + 1])
+    )
     scale = np.abs(np.diff(states, axis=0)).max(axis=0)
 
     def off(places, n_parts):
         expected = [
-            runge_kutta(reference, law, n * step, q[n], v[n], step, n_parts) for n in places
+            runge_kutta(reference, law, n * step, q[n], v[n], step, n_parts)
+            for n in places
         ]
         return np.abs((states[places + 1] - expected) / scale).max(axis=1)
 

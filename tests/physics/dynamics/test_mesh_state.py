@@ -21,7 +21,13 @@ RATE = 51200.0
 QUICK = {"operating.duration_s": 0.1, "solver.max_error": None}
 MISSING = (MissingTooth(gear="pinion", tooth=3),)
 CRACK = (
-    Crack(gear="wheel", tooth=5, crack_depth=1e-3, crack_angle=np.pi / 4, crack_start="arc_mid"),
+    Crack(
+        gear="wheel",
+        tooth=5,
+        crack_depth=1e-3,
+        crack_angle=np.pi / 4,
+        crack_start="arc_mid",
+    ),
 )
 LAWS = {"one_sided": {}, "paper": {"mesh.law": "paper"}}
 
@@ -78,7 +84,9 @@ def test_teeth_follow_one_another_and_keep_their_place(sound, machine):
         order = np.argsort(sample, kind="stable")
         place, teeth = place[order], rows[place[order], sample[order] + 1]
         assert len(teeth) > n_teeth
-        assert (np.diff(teeth) % (n_teeth if rows is sound.mesh.pinion_tooth else 84) == 1).all()
+        assert (
+            np.diff(teeth) % (n_teeth if rows is sound.mesh.pinion_tooth else 84) == 1
+        ).all()
         assert (np.diff(place) % N_PAIRS == 1).all()
 
 
@@ -95,7 +103,9 @@ def test_slowly_turned_the_shares_are_the_static_ones(record, machine):
     system, found = machine({**QUICK, **changes}), record(changes)
     dynamics = pair_dynamics(Run(system=system, faults=()))
     roll = dynamics.start_roll + system.pair.pinion.base_radius * found.shaft_angle
-    static = static_mesh(dynamics.table, pair_states(dynamics.table, roll), dynamics.mesh_force)
+    static = static_mesh(
+        dynamics.table, pair_states(dynamics.table, roll), dynamics.mesh_force
+    )
     expected = np.sort(static.load / static.load.sum(axis=1, keepdims=True), axis=1).T
     found_shares = np.sort(found.mesh.load_share, axis=0)
     assert_allclose(found_shares.mean(axis=1), expected.mean(axis=1), rtol=0, atol=3e-3)
@@ -115,21 +125,32 @@ def test_a_missing_tooth_carries_nothing_and_still_has_its_time(record):
 def test_a_fault_is_engaged_when_its_tooth_carries(record):
     mesh = record({"operating.duration_s": 0.4}, faults=CRACK).mesh
     assert (mesh.fault_engaged[(mesh.wheel_tooth == 5).any(axis=0)]).all()
-    assert 0.8 < (mesh.wheel_tooth == 5).any(axis=0).sum() / mesh.fault_engaged.sum() <= 1.0
+    assert (
+        0.8
+        < (mesh.wheel_tooth == 5).any(axis=0).sum() / mesh.fault_engaged.sum()
+        <= 1.0
+    )
 
 
 def test_lost_contact_is_that_of_the_record(record):
     """Samples are one in five of the steps that the fraction counts."""
-    found = record({"operating.speed_rpm": 6000, "operating.torque_nm": 2}, faults=MISSING)
+    found = record(
+        {"operating.speed_rpm": 6000, "operating.torque_nm": 2}, faults=MISSING
+    )
     assert found.contact_loss_fraction > 0.01
-    assert_allclose(found.mesh.contact_lost.mean(), found.contact_loss_fraction, rtol=0, atol=2e-3)
+    assert_allclose(
+        found.mesh.contact_lost.mean(), found.contact_loss_fraction, rtol=0, atol=2e-3
+    )
     assert (found.mesh.load_share[:, found.mesh.contact_lost] == 0.0).all()
 
 
 @pytest.mark.parametrize("precision", ["float64", "float32"])
 def test_nothing_changes_by_being_told(machine, precision):
     run = Run(system=machine({**QUICK, "solver.precision": precision}), faults=MISSING)
-    (plain,), (told,) = simulate_together([run]), simulate_together([replace(run, tell_mesh=True)])
+    (plain,), (told,) = (
+        simulate_together([run]),
+        simulate_together([replace(run, tell_mesh=True)]),
+    )
     assert plain.mesh is None
     assert told.acceleration.tobytes() == plain.acceleration.tobytes()
 
@@ -138,7 +159,10 @@ class TestDetectability:
     def test_is_the_root_of_energy_over_noise(self):
         residual = np.array([[3.0, 0.0, 4.0], [0.0, 2.0, 0.0]])
         assert_allclose(
-            detectability(residual, np.array([25.0, 1.0])), math.sqrt(1.0 + 4.0), rtol=1e-12, atol=0
+            detectability(residual, np.array([25.0, 1.0])),
+            math.sqrt(1.0 + 4.0),
+            rtol=1e-12,
+            atol=0,
         )
 
     def test_is_what_a_matched_filter_reaches(self):
@@ -151,17 +175,23 @@ class TestDetectability:
             [
                 (
                     template
-                    * (there * residual + np.sqrt(noise)[:, None] * rng.standard_normal((2, 400)))
+                    * (
+                        there * residual
+                        + np.sqrt(noise)[:, None] * rng.standard_normal((2, 400))
+                    )
                 ).sum()
                 for _ in range(4000)
             ]
             for there in (0, 1)
         ]
         right = 0.5 * (
-            np.mean(np.array(scores[0]) < threshold) + np.mean(np.array(scores[1]) > threshold)
+            np.mean(np.array(scores[0]) < threshold)
+            + np.mean(np.array(scores[1]) > threshold)
         )
         half = 0.5 * detectability(residual, noise)
-        assert_allclose(right, 0.5 * (1.0 + math.erf(half / math.sqrt(2.0))), rtol=0, atol=0.02)
+        assert_allclose(
+            right, 0.5 * (1.0 + math.erf(half / math.sqrt(2.0))), rtol=0, atol=0.02
+        )
 
     def test_without_noise_there_is_none(self):
         assert math.isnan(detectability(np.ones((1, 4)), np.zeros(1)))

@@ -53,13 +53,17 @@ def at(machine):
 
 def amplitudes(signal, angle, order):
     """Complex amplitudes (channel,) at one order, by least squares beside a mean."""
-    waves = np.stack([np.cos(order * angle), -np.sin(order * angle), np.ones_like(angle)], axis=1)
+    waves = np.stack(
+        [np.cos(order * angle), -np.sin(order * angle), np.ones_like(angle)], axis=1
+    )
     found = np.linalg.lstsq(waves, signal.T, rcond=None)[0]
     return found[0] + 1j * found[1]
 
 
 @pytest.mark.parametrize("gear", SENSE)
-def test_unbalance_grows_with_the_square_of_the_speed_and_what_the_machine_answers(at, gear):
+def test_unbalance_grows_with_the_square_of_the_speed_and_what_the_machine_answers(
+    at, gear
+):
     found = {}
     for speed in (900.0, 1800.0, 3600.0):
         run = at(speed)
@@ -67,7 +71,9 @@ def test_unbalance_grows_with_the_square_of_the_speed_and_what_the_machine_answe
         w = run.system.operating.speed * (1.0 if gear == "pinion" else 23 / 84)
         force = np.zeros((1, 6), dtype=complex)
         force[0, [0, 1] if gear == "pinion" else [3, 4]] = 1.0, -1j * SENSE[gear]
-        answer = accelerations(pair_dynamics(run), np.array([w]), force)[0, [0, 1, 3, 4]]
+        answer = accelerations(pair_dynamics(run), np.array([w]), force)[
+            0, [0, 1, 3, 4]
+        ]
         angle = w * np.arange(round(DURATION * RATE)) / RATE
         measured = amplitudes(heard(run, [tones]), angle, 1.0)
         mine = [0, 1] if gear == "pinion" else [2, 3]
@@ -93,18 +99,30 @@ def test_its_angle_is_fixed_to_tooth_0(at):
         later = replace(run, start=Start(tooth_pinion=4, tooth_wheel=6, phase=0.25))
         turned = heard(run, [tones], angle + 2 * np.pi / 23)  # a pitch of either gear
         assert_allclose(
-            heard(later, [tones], angle), turned, rtol=0, atol=1e-9 * np.abs(turned).max()
+            heard(later, [tones], angle),
+            turned,
+            rtol=0,
+            atol=1e-9 * np.abs(turned).max(),
         )
         other = replace(
-            run, start=Start(tooth_pinion=4 if gear == "wheel" else 3, tooth_wheel=5, phase=0.25)
+            run,
+            start=Start(
+                tooth_pinion=4 if gear == "wheel" else 3, tooth_wheel=5, phase=0.25
+            ),
         )
-        assert_allclose(heard(other, [tones], angle), heard(run, [tones], angle), rtol=0, atol=0)
+        assert_allclose(
+            heard(other, [tones], angle), heard(run, [tones], angle), rtol=0, atol=0
+        )
         whole = replace(
-            run, start=Start(tooth_pinion=3 + n_teeth, tooth_wheel=5 + n_teeth, phase=0.25)
+            run,
+            start=Start(tooth_pinion=3 + n_teeth, tooth_wheel=5 + n_teeth, phase=0.25),
         )
         if gear == "pinion":
             assert_allclose(
-                heard(whole, [tones], angle), heard(run, [tones], angle), rtol=0, atol=1e-9
+                heard(whole, [tones], angle),
+                heard(run, [tones], angle),
+                rtol=0,
+                atol=1e-9,
             )
 
 
@@ -124,7 +142,9 @@ def test_a_neighbour_is_heard_at_its_orders_however_the_shaft_wobbles(at):
     # by the clock the wobble smears the lines: order 75 swings by 0.4 rad
     steady = np.array([np.cos(order * run.system.operating.speed * 23 / 84 * times + phase) for order in (25, 50, 75)
                        for phase in (0.0, 1.5)]).T  # fmt: skip
-    smeared = signal[2:].T - steady @ np.linalg.lstsq(steady, signal[2:].T, rcond=None)[0]
+    smeared = (
+        signal[2:].T - steady @ np.linalg.lstsq(steady, signal[2:].T, rcond=None)[0]
+    )
     assert smeared.std() > 1e-2 * signal[2:].std()
 
 
@@ -141,7 +161,9 @@ def test_on_a_ramp_it_is_what_the_force_does_in_time(at):
     )
     body = run.system.pinion
     c, k = body.support.damping_x / body.mass, body.support.stiffness_x / body.mass
-    _, expected, _ = lsim(([1.0 / body.mass, 0.0, 0.0], [1.0, c, k]), force, times - times[0])
+    _, expected, _ = lsim(
+        ([1.0 / body.mass, 0.0, 0.0], [1.0, c, k]), force, times - times[0]
+    )
     found = heard(run, [tones])[0]
     # from 30 to 90 turns a second in 0.2 s, on a support that takes 11 ms to follow
     assert np.std(found - expected[2000:]) < 0.04 * expected[2000:].std()

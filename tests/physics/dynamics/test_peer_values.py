@@ -18,7 +18,10 @@ from numpy.testing import assert_allclose
 from gensig.geometry.tooth import healthy_tooth
 from gensig.geometry.tooth_profile import involute_point, load_angle
 from gensig.mesh.compliance import tooth_compliance
-from gensig.mesh.fillet_foundation import body_coefficients, fillet_foundation_compliance
+from gensig.mesh.fillet_foundation import (
+    body_coefficients,
+    fillet_foundation_compliance,
+)
 from gensig.systems.spur_pair import SpurPair
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -51,7 +54,9 @@ class Peer:
 
     def ross(self, quantity):
         """Values of one quantity, (point,), SI."""
-        found = [float(row["value"]) for row in self.rows if row["quantity"] == quantity]
+        found = [
+            float(row["value"]) for row in self.rows if row["quantity"] == quantity
+        ]
         assert found, quantity
         return np.array(found)
 
@@ -94,13 +99,19 @@ def body(gear, curvature, material, *, half_angle=None, to_contact=False):
         if to_contact
         else gear.base_radius,
     )
-    return fillet_foundation_compliance(stand_in, angle, material, allow_extrapolation=True)
+    return fillet_foundation_compliance(
+        stand_in, angle, material, allow_extrapolation=True
+    )
 
 
 def pair_stiffness(peer, pinion, wheel):
     """Single pair with both of ROSS's body choices, (phase,) N/m."""
     material, width = peer.system.material, peer.system.pair.pinion.face_width
-    total = 4 * (1 - material.poisson_ratio**2) / (math.pi * material.youngs_modulus * width)
+    total = (
+        4
+        * (1 - material.poisson_ratio**2)
+        / (math.pi * material.youngs_modulus * width)
+    )
     for side, curvature in (("pinion", pinion), ("wheel", wheel)):
         gear = peer.gear(side)
         total = total + tooth_compliance(healthy_tooth(gear), curvature, material).total
@@ -119,9 +130,12 @@ def ross_path(peer, share):
     start = math.atan(pinion.junction_curvature_radius / pinion.base_radius)
     advance = share * (math.acos(pinion.base_radius / pinion.tip_radius) - start)
     from_tip = (
-        math.acos(wheel.base_radius / wheel.tip_radius) - advance * pinion.n_teeth / wheel.n_teeth
+        math.acos(wheel.base_radius / wheel.tip_radius)
+        - advance * pinion.n_teeth / wheel.n_teeth
     )
-    return pinion.base_radius * np.tan(start + advance), wheel.base_radius * np.tan(from_tip)
+    return pinion.base_radius * np.tan(start + advance), wheel.base_radius * np.tan(
+        from_tip
+    )
 
 
 @pytest.fixture(scope="module")
@@ -153,7 +167,10 @@ def test_every_stored_pair_is_compared(stored):
 
 def test_line_of_action_agrees(peer):
     assert_allclose(
-        peer.ross("contact_ratio"), peer.system.pair.transverse_contact_ratio, rtol=1e-8, atol=0
+        peer.ross("contact_ratio"),
+        peer.system.pair.transverse_contact_ratio,
+        rtol=1e-8,
+        atol=0,
     )
 
 
@@ -161,8 +178,12 @@ def test_line_of_action_agrees(peer):
 @pytest.mark.parametrize("side", SIDES)
 def test_tooth_terms_agree(peer, side, term):
     gear, curvature = getattr(peer.system.pair, side), peer.curvature(side)
-    found = getattr(tooth_compliance(healthy_tooth(gear), curvature, peer.system.material), term)
-    assert_allclose(found, peer.ross(f"{side}_{term}_compliance"), rtol=QUADRATURE, atol=0)
+    found = getattr(
+        tooth_compliance(healthy_tooth(gear), curvature, peer.system.material), term
+    )
+    assert_allclose(
+        found, peer.ross(f"{side}_{term}_compliance"), rtol=QUADRATURE, atol=0
+    )
 
 
 @pytest.mark.parametrize("side", SIDES)
@@ -171,7 +192,9 @@ def test_another_root_or_reach_would_show(peer, side):
     ross = peer.ross(f"{side}_shear_compliance")
     sharp = healthy_tooth(replace(gear, cutter_tip_radius_coefficient=0.3))
     assert np.all(
-        np.abs(tooth_compliance(sharp, curvature, peer.system.material).shear / ross - 1)
+        np.abs(
+            tooth_compliance(sharp, curvature, peer.system.material).shear / ross - 1
+        )
         > 5 * QUADRATURE
     )
     short = tooth_compliance(
@@ -193,7 +216,9 @@ def test_body_fit_agrees_at_the_same_half_angle(peer, side):
         **{key: getattr(gear, key) for key in ("name", "root_radius", "bore_radius")}
     )
     same.root_half_angle = peer.ross(f"{side}_root_half_angle")[0]
-    at_ross, at_ours = (body_coefficients(each, allow_extrapolation=True) for each in (same, gear))
+    at_ross, at_ours = (
+        body_coefficients(each, allow_extrapolation=True) for each in (same, gear)
+    )
     for letter in "LMPQ":
         ross = peer.ross(f"{side}_coefficient_{letter}")
         assert_allclose(at_ross[letter], ross, rtol=1e-7, atol=0)
@@ -215,7 +240,11 @@ def test_ross_body_term_starts_beside_its_own_root_curve(peer, side):
 
 @pytest.mark.parametrize("side", SIDES)
 def test_body_term_differs_by_two_choices(peer, side):
-    gear, curvature, material = peer.gear(side), peer.curvature(side), peer.system.material
+    gear, curvature, material = (
+        peer.gear(side),
+        peer.curvature(side),
+        peer.system.material,
+    )
     ross, half_angle = peer.ross(f"{side}_foundation_compliance"), ross_half_angle(gear)
     both = body(gear, curvature, material, half_angle=half_angle, to_contact=True)
     assert_allclose(both, ross, rtol=1e-8, atol=0)
@@ -236,18 +265,28 @@ def test_single_pair_differs_by_the_body_term_only(peer):
     position = (
         peer.curvature("pinion") - peer.system.pair.start_curvature_radius
     ) / peer.system.pair.base_pitch
-    ratio = np.interp(position, curves.contact_position, curves.single_pair_stiffness) / ross
+    ratio = (
+        np.interp(position, curves.contact_position, curves.single_pair_stiffness)
+        / ross
+    )
     assert np.all((ratio > 1.04) & (ratio < 1.10))
 
 
 def test_mesh_differs_by_the_body_term_and_where_contacts_are(peer):
     pair = peer.system.pair
-    ours = peer.system.stiffness_curves(points_per_tooth=N_PHASES).mesh_stiffness[:N_PHASES]
-    same_place, own_place = peer.ross("mesh_stiffness"), peer.ross("mesh_stiffness_own_path")
+    ours = peer.system.stiffness_curves(points_per_tooth=N_PHASES).mesh_stiffness[
+        :N_PHASES
+    ]
+    same_place, own_place = (
+        peer.ross("mesh_stiffness"),
+        peer.ross("mesh_stiffness_own_path"),
+    )
     assert np.all((ours / same_place > 1.06) & (ours / same_place < 1.10))
     assert np.all((ours / own_place > 1.02) & (ours / own_place < 1.05))
     for index, newest in enumerate((np.arange(N_PHASES) + 0.5) / N_PHASES):
-        pitches = np.array([s for s in (newest, newest + 1) if s <= pair.transverse_contact_ratio])
+        pitches = np.array(
+            [s for s in (newest, newest + 1) if s <= pair.transverse_contact_ratio]
+        )
         pinion = np.asarray(pair.pinion_curvature(pitches * pair.base_pitch))
         at_same_place = pair_stiffness(peer, pinion, pair.tangent_length - pinion).sum()
         at_own_place = pair_stiffness(
@@ -260,14 +299,19 @@ def test_mesh_differs_by_the_body_term_and_where_contacts_are(peer):
 def test_ross_contacts_lie_off_the_line_of_action(peer):
     """Flanks touch where their curvature radii add up to N1N2; ROSS's miss it by 0.2 to 0.65 modules."""
     pinion, wheel = ross_path(peer, np.linspace(0, 1, 11))
-    off = (pinion + wheel - peer.system.pair.tangent_length) / peer.system.pair.pinion.normal_module
+    off = (
+        pinion + wheel - peer.system.pair.tangent_length
+    ) / peer.system.pair.pinion.normal_module
     assert np.all((off < -0.2) & (off > -0.65))
 
 
 def test_document_shows_the_stored_values(stored):
     """Every line of the comparison in docs/peers.md is ROSS's stored value to the digits shown."""
     scales = {"1e-12 m/N": 1e12, "1e8 N/m": 1e-8, "rad": 1.0, "": 1.0}
-    known = {(row["pair"], row["quantity"], row["point"]): float(row["value"]) for row in stored}
+    known = {
+        (row["pair"], row["quantity"], row["point"]): float(row["value"])
+        for row in stored
+    }
     pair, n_lines = "", 0
     text = (ROOT / "docs" / "peers.md").read_text(encoding="utf-8")
     assert f"ROSS {stored[0]['ross_version']}" in text

@@ -16,7 +16,12 @@ ORDER = (5, 0, 3, 6, 1, 7, 2, 4)
 @pytest.fixture(scope="module")
 def config():
     request = read_request(
-        ["experiment=quickstart", "plan.n_records=8", "plan.n_units=2", "operating.duration_s=0.05"]
+        [
+            "experiment=quickstart",
+            "plan.n_records=8",
+            "plan.n_units=2",
+            "operating.duration_s=0.05",
+        ]
     )
     return request.config.with_keys("dataset", store_clean=True)
 
@@ -63,7 +68,9 @@ def test_in_blocks_the_bits_are_the_same(config, plan, in_order, size):
             for one in simulate_records(config, rows[first : first + size])
         ]
         assert [
-            index for index, one in zip(ORDER, found, strict=True) if not same(one, in_order[index])
+            index
+            for index, one in zip(ORDER, found, strict=True)
+            if not same(one, in_order[index])
         ] == []
 
 
@@ -85,28 +92,38 @@ def test_a_longer_plan_of_the_same_draws_keeps_a_row(config, plan, in_order):
 
 
 class TestNoise:
-    def test_the_noise_level_leaves_the_clean_signal_alone(self, config, plan, in_order):
+    def test_the_noise_level_leaves_the_clean_signal_alone(
+        self, config, plan, in_order
+    ):
         row = plan.record(3)
-        loud = simulate_record(config, {**row, "params/sensing.snr_db": 0.0, "snr_db": 0.0})
+        loud = simulate_record(
+            config, {**row, "params/sensing.snr_db": 0.0, "snr_db": 0.0}
+        )
         assert (
             loud.signals["acceleration_clean"].tobytes()
             == in_order[3].signals["acceleration_clean"].tobytes()
         )
         assert (
-            loud.signals["acceleration"].tobytes() != in_order[3].signals["acceleration"].tobytes()
+            loud.signals["acceleration"].tobytes()
+            != in_order[3].signals["acceleration"].tobytes()
         )
 
     def test_the_floor_is_the_same_for_every_class_of_a_group(self, plan, in_order):
-        floors = np.array([in_order[index].signals["noise_power"] for index in range(8)]).reshape(
-            2, 4, -1
+        floors = np.array(
+            [in_order[index].signals["noise_power"] for index in range(8)]
+        ).reshape(2, 4, -1)
+        assert_allclose(
+            floors, np.broadcast_to(floors[:, :1], floors.shape), rtol=1e-12, atol=0
         )
-        assert_allclose(floors, np.broadcast_to(floors[:, :1], floors.shape), rtol=1e-12, atol=0)
         assert np.abs(floors[0] / floors[1] - 1).max() > 0.01
 
     def test_a_floor_that_follows_the_record_would_tell_the_class(self, config, plan):
         own = config.with_keys("sensing", snr_reference="record")
         floors = np.array(
-            [found.signals["noise_power"] for found in simulated(own, plan, range(4)).values()]
+            [
+                found.signals["noise_power"]
+                for found in simulated(own, plan, range(4)).values()
+            ]
         )
         assert np.abs(floors / floors[0] - 1).max() > 0.05
 
@@ -120,8 +137,13 @@ class TestNoise:
             "faults_json": "[]",
         }
         found = simulate_record(own, row)
-        noise = found.signals["acceleration"].astype(float) - found.signals["acceleration_clean"]
-        assert_allclose(np.var(noise, axis=1), found.signals["noise_power"], rtol=0.04, atol=0)
+        noise = (
+            found.signals["acceleration"].astype(float)
+            - found.signals["acceleration_clean"]
+        )
+        assert_allclose(
+            np.var(noise, axis=1), found.signals["noise_power"], rtol=0.04, atol=0
+        )
         ratio = found.signals["signal_power"] / np.var(noise, axis=1)
         # against the healthy twin, which runs from another start: the mean over the channels
         assert_allclose(10 * np.log10(ratio).mean(), 12.0, rtol=0, atol=0.1)
@@ -129,11 +151,14 @@ class TestNoise:
     def test_no_noise_is_the_clean_signal(self, config, plan):
         own = config.with_keys("sensing", snr_db=None)
         row = {
-            key: value for key, value in plan.record(1).items() if key != "params/sensing.snr_db"
+            key: value
+            for key, value in plan.record(1).items()
+            if key != "params/sensing.snr_db"
         }
         found = simulate_record(own, row)
         assert (
-            found.signals["acceleration"].tobytes() == found.signals["acceleration_clean"].tobytes()
+            found.signals["acceleration"].tobytes()
+            == found.signals["acceleration_clean"].tobytes()
         )
 
 
@@ -141,7 +166,10 @@ def test_a_sham_record_is_healthy_under_its_label(config, plan, in_order):
     sham = config.with_keys("plan", sham=True)
     index = next(k for k in range(8) if plan.record(k)["label_name"] == "missing_tooth")
     found, real = simulate_record(sham, plan.record(index)), in_order[index]
-    assert found.signals["fault_multihot"].tolist() == real.signals["fault_multihot"].tolist()
+    assert (
+        found.signals["fault_multihot"].tolist()
+        == real.signals["fault_multihot"].tolist()
+    )
     assert (
         np.abs(found.signals["acceleration_clean"]).max()
         < np.abs(real.signals["acceleration_clean"]).max()
@@ -151,12 +179,16 @@ def test_a_sham_record_is_healthy_under_its_label(config, plan, in_order):
 def test_values_of_a_record(config, plan, in_order):
     row, found = plan.record(0), in_order[0].values
     assert_allclose(found["speed_rpm"], row["speed_set_rpm"], rtol=1e-4, atol=0)
-    assert_allclose(found["mesh_frequency_hz"], found["speed_rpm"] / 60 * 23, rtol=1e-12, atol=0)
+    assert_allclose(
+        found["mesh_frequency_hz"], found["speed_rpm"] / 60 * 23, rtol=1e-12, atol=0
+    )
     assert in_order[0].signals["acceleration"].dtype == np.float32
 
 
 def test_a_run_that_cannot_be_is_a_failed_record(config, plan):
-    coarse = config.with_keys("solver", oversampling=2).with_keys("sensing", sampling_rate_hz=6_000)
+    coarse = config.with_keys("solver", oversampling=2).with_keys(
+        "sensing", sampling_rate_hz=6_000
+    )
     found = simulate_record(coarse, plan.record(0))
     assert found.values["status"] == "failed"
     assert "solver.oversampling" in found.values["status_reason"]
@@ -171,4 +203,7 @@ def test_a_specimen_is_the_same_whatever_its_record_is_told_to_have(config, plan
         assert len(run.specimen.forms) == 2
         drawn.setdefault(row["specimen_id"], set()).add(repr(run.specimen))
     assert all(len(some) == 1 for some in drawn.values())
-    assert len({row["label_name"] for row in (plan.record(index) for index in range(8))}) == 4
+    assert (
+        len({row["label_name"] for row in (plan.record(index) for index in range(8))})
+        == 4
+    )

@@ -8,7 +8,11 @@ import pytest
 
 from gensig.dynamics.backends import runge_kutta, step_limits
 from gensig.dynamics.backends.base import BOUNCING
-from gensig.dynamics.backends.step_limits import COARSE, coarsest_oversampling, settling_stages
+from gensig.dynamics.backends.step_limits import (
+    COARSE,
+    coarsest_oversampling,
+    settling_stages,
+)
 from gensig.dynamics.decimation import in_band_error
 from gensig.errors import SimulationError
 from gensig.faults.broken import MissingTooth
@@ -33,9 +37,14 @@ def made(machine, changes, faults=()):
     return Run(
         system=system,
         faults=tuple(faults),
-        specimen=draw_specimen(rng, system.pair.pinion, system.pair.wheel, system.quality),
+        specimen=draw_specimen(
+            rng, system.pair.pinion, system.pair.wheel, system.quality
+        ),
         gearbox=draw_gearbox(
-            rng, len(system.sensing.channels), system.quality, system.sensing.gain_scatter
+            rng,
+            len(system.sensing.channels),
+            system.quality,
+            system.sensing.gain_scatter,
         ),
     )
 
@@ -44,7 +53,11 @@ def made(machine, changes, faults=()):
 def runs(machine):
     """Slow, usual with a fault, fast, and with motor and load."""
     crack = Crack(
-        gear="pinion", tooth=3, crack_depth=1e-3, crack_angle=np.pi / 4, crack_start="arc_mid"
+        gear="pinion",
+        tooth=3,
+        crack_depth=1e-3,
+        crack_angle=np.pi / 4,
+        crack_start="arc_mid",
     )
     return [
         made(machine, {"operating.speed_rpm": 600}),
@@ -70,7 +83,9 @@ def accelerations(runs):
 def left(runs, steady):
     """Relative difference from the steady records, (run,)."""
     pairs = zip(accelerations(runs), steady, strict=True)
-    return np.array([in_band_error(one, other, SAMPLING_RATE)[0] for one, other in pairs])
+    return np.array(
+        [in_band_error(one, other, SAMPLING_RATE)[0] for one, other in pairs]
+    )
 
 
 def test_nothing_of_the_start_is_left(runs, steady):
@@ -90,7 +105,8 @@ def test_a_shorter_settling_would_leave_more(runs, steady, monkeypatch):
 def test_machines_that_begin_in_different_stages_keep_their_bits(runs, machine):
     """A quick drive begins when the others' steps have changed already; it does so alone too."""
     quick = [
-        made(machine, {"operating.drive_frequency_hz": frequency}) for frequency in (9, 14, 300)
+        made(machine, {"operating.drive_frequency_hz": frequency})
+        for frequency in (9, 14, 300)
     ]
     together = simulate_together([*quick, *runs[:2]])
     for one, other in zip(quick, together, strict=False):
@@ -106,10 +122,14 @@ class TestHardLandings:
     @classmethod
     def bouncing(cls, machine):
         missing = [MissingTooth(gear="pinion", tooth=tooth) for tooth in (3, 4)]
-        run = made(machine, {"operating.torque_nm": 1.1, "operating.speed_rpm": 3600}, missing)
+        run = made(
+            machine, {"operating.torque_nm": 1.1, "operating.speed_rpm": 3600}, missing
+        )
         return replace(run, specimen=None, gearbox=None)
 
-    def test_they_are_settled_in_finer_steps_and_leave_their_neighbours_alone(self, runs, bouncing):
+    def test_they_are_settled_in_finer_steps_and_leave_their_neighbours_alone(
+        self, runs, bouncing
+    ):
         together = simulate_together([runs[0], bouncing, *runs[1:]])
         assert together[1].contact_loss_fraction > BOUNCING
         for one, other in zip([runs[0], bouncing, *runs[1:]], together, strict=True):
@@ -123,7 +143,9 @@ class TestHardLandings:
 
 
 def test_stages_become_finer_and_end_before_the_record(dynamics_of, xiamen):
-    stages = settling_stages(dynamics_of(xiamen), xiamen.solver.oversampling, SAMPLING_RATE)
+    stages = settling_stages(
+        dynamics_of(xiamen), xiamen.solver.oversampling, SAMPLING_RATE
+    )
     assert [steps for steps, _ in stages] == [steps for steps, _ in COARSE]
     assert all(one > other > 0 for (_, one), (_, other) in pairwise(stages))
 
@@ -134,9 +156,15 @@ def test_no_stage_takes_longer_steps_than_are_stable_nor_shorter_than_the_record
 ):
     dynamics = dynamics_of(xiamen)
     oversampling = xiamen.solver.oversampling
-    assert [steps for steps, _ in settling_stages(dynamics, 2, SAMPLING_RATE)] == [1, 2, 2]
+    assert [steps for steps, _ in settling_stages(dynamics, 2, SAMPLING_RATE)] == [
+        1,
+        2,
+        2,
+    ]
     assert coarsest_oversampling(dynamics, oversampling, SAMPLING_RATE) == 1
-    assert [steps for steps, _ in settling_stages(dynamics, oversampling, SAMPLING_RATE / 2)] == [
+    assert [
+        steps for steps, _ in settling_stages(dynamics, oversampling, SAMPLING_RATE / 2)
+    ] == [
         2,
         2,
         3,

@@ -25,7 +25,9 @@ def eccentric(pair, name, most, *, smooth=True):
     turn = 2 * np.pi / gear.n_teeth * (np.arange(gear.n_teeth) - most)
     error, tilt = SIZE * np.cos(turn), -SIZE / gear.base_radius * np.sin(turn)
     perfect = perfect_specimen(pair.pinion, pair.wheel)
-    return replace(perfect, **{f"{name}_error": error, f"{name}_tilt": tilt if smooth else 0.0})
+    return replace(
+        perfect, **{f"{name}_error": error, f"{name}_tilt": tilt if smooth else 0.0}
+    )
 
 
 def rolls(system, n_pitches=84, per_pitch=40):
@@ -35,7 +37,9 @@ def rolls(system, n_pitches=84, per_pitch=40):
 def transmission_error(system, specimen, faults=()):
     """Approach under the set torque over a turn of the wheel, (phase,) m: how far the wheel lags."""
     machine = pair_dynamics(Run(system=system, faults=faults, specimen=specimen))
-    return static_mesh(machine.table, machine._states(rolls(system)), system.mesh_force).approach
+    return static_mesh(
+        machine.table, machine._states(rolls(system)), system.mesh_force
+    ).approach
 
 
 def late(system, specimen):
@@ -111,7 +115,9 @@ class TestProfile:
                 gear.junction_curvature_radius,
                 np.sqrt(gear.tip_radius**2 - gear.base_radius**2),
             )
-            share = (np.asarray(getattr(pair, f"{name}_curvature")(position)) - low) / (high - low)
+            share = (np.asarray(getattr(pair, f"{name}_curvature")(position)) - low) / (
+                high - low
+            )
             wave = 0.5 * (1 - np.cos(2 * np.pi * form.profile_waves * share))
             back = back + form.profile_slope * (share - 0.5) + form.profile_form * wave
         return back
@@ -127,7 +133,9 @@ class TestProfile:
         )
         assert alone.mean() > 0.09
         found = late(xiamen, specimen)[alone]
-        assert_allclose(found, self.deviation(pair, position[alone]), rtol=0, atol=0.02 * UM)
+        assert_allclose(
+            found, self.deviation(pair, position[alone]), rtol=0, atol=0.02 * UM
+        )
         assert np.abs(found).max() > 0.5 * UM
 
     def test_the_tilt_of_the_teeth_is_a_profile_slope(self, xiamen):
@@ -136,7 +144,8 @@ class TestProfile:
         for name, towards_tip in (("pinion", 1.0), ("wheel", -1.0)):
             gear = getattr(pair, name)
             involute = (
-                np.sqrt(gear.tip_radius**2 - gear.base_radius**2) - gear.junction_curvature_radius
+                np.sqrt(gear.tip_radius**2 - gear.base_radius**2)
+                - gear.junction_curvature_radius
             )
             slope = 3 * UM
             form = ProfileError(
@@ -148,21 +157,36 @@ class TestProfile:
                 limit=1.0,
             )
             perfect = perfect_specimen(pair.pinion, pair.wheel)
-            tilted = replace(perfect, **{f"{name}_tilt": towards_tip * slope / involute})
-            found, expected = late(xiamen, tilted), late(xiamen, replace(perfect, forms=(form,)))
+            tilted = replace(
+                perfect, **{f"{name}_tilt": towards_tip * slope / involute}
+            )
+            found, expected = (
+                late(xiamen, tilted),
+                late(xiamen, replace(perfect, forms=(form,))),
+            )
             assert_allclose(
-                found - found.mean(), expected - expected.mean(), rtol=0, atol=0.02 * slope
+                found - found.mean(),
+                expected - expected.mean(),
+                rtol=0,
+                atol=0.02 * slope,
             )
             assert np.ptp(expected) > 0.1 * slope
 
     def test_faults_come_on_top(self, xiamen):
         """A specimen's flank with a fault stands back by both, and its sound teeth by the specimen's form alone."""
         fault = one("pitch_error", tooth=4, pitch_error_um=12)
-        tables = [xiamen.mesh_table(some) for some in (self.FORMS, (*self.FORMS, fault))]
+        tables = [
+            xiamen.mesh_table(some) for some in (self.FORMS, (*self.FORMS, fault))
+        ]
         assert_allclose(
-            tables[1].pinion.gap[tables[1].pinion.kind[3]], tables[0].pinion.gap[1], rtol=0, atol=0
+            tables[1].pinion.gap[tables[1].pinion.kind[3]],
+            tables[0].pinion.gap[1],
+            rtol=0,
+            atol=0,
         )
-        further = tables[1].pinion.gap[tables[1].pinion.kind[4]] - tables[0].pinion.gap[1]
+        further = (
+            tables[1].pinion.gap[tables[1].pinion.kind[4]] - tables[0].pinion.gap[1]
+        )
         assert_allclose(further[on_path(tables[0])], 12 * UM, rtol=1e-9, atol=0)
 
     def test_the_mesh_stiffness_that_damps_is_that_of_the_commonest_teeth(self, xiamen):
@@ -171,8 +195,14 @@ class TestProfile:
             perfect_specimen(xiamen.pair.pinion, xiamen.pair.wheel), forms=self.FORMS
         )
         sound, cracked, perfect = (
-            pair_dynamics(Run(system=xiamen, faults=faults, specimen=some)).mean_mesh_stiffness
-            for some, faults in ((specimen, ()), (specimen, (one("crack"),)), (None, ()))
+            pair_dynamics(
+                Run(system=xiamen, faults=faults, specimen=some)
+            ).mean_mesh_stiffness
+            for some, faults in (
+                (specimen, ()),
+                (specimen, (one("crack"),)),
+                (None, ()),
+            )
         )
         assert_allclose(cracked, sound, rtol=1e-12, atol=0)
         assert 0.7 * perfect < sound < 0.98 * perfect
@@ -182,12 +212,18 @@ def test_drawn_backlash_asks_for_no_further_tables(xiamen):
     perfect = perfect_specimen(xiamen.pair.pinion, xiamen.pair.wheel)
     nominal, wider = (
         pair_dynamics(
-            Run(system=xiamen, faults=(), specimen=replace(perfect, backlash_factor=factor))
+            Run(
+                system=xiamen,
+                faults=(),
+                specimen=replace(perfect, backlash_factor=factor),
+            )
         )
         for factor in (1.0, 1.2)
     )
     assert wider.table.pinion is nominal.table.pinion
-    rows = [machine.numbers(1e-6, machine.rest())[BACKLASH] for machine in (nominal, wider)]
+    rows = [
+        machine.numbers(1e-6, machine.rest())[BACKLASH] for machine in (nominal, wider)
+    ]
     assert_allclose(rows, [80 * UM, 96 * UM], rtol=1e-9, atol=0)
 
 
@@ -195,7 +231,11 @@ def test_drawn_backlash_asks_for_no_further_tables(xiamen):
 def test_misalignment_softens_the_mesh(machine, misalignment):
     system = machine()
     form = one(
-        "misalignment", gear="pinion", tooth="all", misalignment_um=misalignment, limit_um=100
+        "misalignment",
+        gear="pinion",
+        tooth="all",
+        misalignment_um=misalignment,
+        limit_um=100,
     )
     perfect = perfect_specimen(system.pair.pinion, system.pair.wheel)
     stiffness = [
@@ -211,7 +251,9 @@ def test_the_mesh_state_knows_no_fault_of_a_sound_specimen(machine):
     """Every tooth of a graded gear differs from the nominal one; only the record's own faults engage."""
     system = machine({"operating.duration_s": 0.05})
     pair = system.pair
-    specimen = draw_specimen(np.random.default_rng(1), pair.pinion, pair.wheel, system.quality)
+    specimen = draw_specimen(
+        np.random.default_rng(1), pair.pinion, pair.wheel, system.quality
+    )
     assert len(specimen.forms) == 2
     states = []
     for faults in ((), (one("pitch_error", tooth=3, pitch_error_um=5),)):
@@ -230,7 +272,9 @@ def test_a_drawn_specimen_moves_the_motion_little_but_surely(machine):
         system.simulate(specimen=specimen).acceleration
         for specimen in (
             None,
-            draw_specimen(np.random.default_rng(3), pair.pinion, pair.wheel, system.quality),
+            draw_specimen(
+                np.random.default_rng(3), pair.pinion, pair.wheel, system.quality
+            ),
         )
     ]
     assert 0.02 < (records[1] - records[0]).std() / records[0].std() < 3.0

@@ -16,14 +16,20 @@ from gensig.systems.run import Run
 
 RATE = 51200.0
 # so that nothing but the course moves the shaft
-PLAIN = {"solver.max_error": None, "mesh.friction_coefficient": 0, "quality.iso1328_grade": None}
+PLAIN = {
+    "solver.max_error": None,
+    "mesh.friction_coefficient": 0,
+    "quality.iso1328_grade": None,
+}
 SPEED, TORQUE = "operating.speed_profile", "operating.torque_profile"
 WALK = {"kind": "random_walk", "scatter": 0.02, "correlation_time_s": 0.2}
 
 
 @pytest.fixture(scope="module")
 def run(machine):
-    return lambda changes, **more: Run(system=machine({**PLAIN, **changes}), faults=(), **more)
+    return lambda changes, **more: Run(
+        system=machine({**PLAIN, **changes}), faults=(), **more
+    )
 
 
 def simulated(*runs):
@@ -48,7 +54,10 @@ def test_a_walk_without_scatter_is_none(run):
         run({"operating.duration_s": 0.05, SPEED: {**WALK, "scatter": 0.0}}),
     )
     assert_allclose(
-        found.acceleration, still.acceleration, rtol=0, atol=1e-9 * still.acceleration.std()
+        found.acceleration,
+        still.acceleration,
+        rtol=0,
+        atol=1e-9 * still.acceleration.std(),
     )
     assert_allclose(found.mean_speed, still.mean_speed, rtol=1e-12, atol=0)
 
@@ -71,7 +80,9 @@ def test_the_shaft_follows_a_slow_walk(run):
     off = found.shaft_angle - one.system.operating.nominal(times).angle
     course = one.system.operating.nominal(times).speed
     assert np.ptp(course) > 2e-3 * one.system.operating.speed
-    assert np.ptp(off) < 0.2 * np.abs(np.cumsum(course - one.system.operating.speed)[-1] / RATE)
+    assert np.ptp(off) < 0.2 * np.abs(
+        np.cumsum(course - one.system.operating.speed)[-1] / RATE
+    )
 
 
 @pytest.mark.parametrize(
@@ -80,13 +91,18 @@ def test_the_shaft_follows_a_slow_walk(run):
 def test_of_a_speed_ripple_comes_what_the_drive_lets_through(run, ripple, frequency):
     share, duration = 0.01, 0.2
     one = run(
-        {"operating.speed_ripple": {"share": share, **ripple}, "operating.duration_s": duration}
+        {
+            "operating.speed_ripple": {"share": share, **ripple},
+            "operating.duration_s": duration,
+        }
     )
     still = run({"operating.duration_s": duration})
     found, plain = simulated(one, still)
     moved = found.shaft_angle - plain.shaft_angle
     speed = np.gradient(moved, 1 / RATE, edge_order=2) / one.system.operating.speed
-    assert_allclose(wave(speed, frequency), share * followed(frequency), rtol=0.03, atol=0)
+    assert_allclose(
+        wave(speed, frequency), share * followed(frequency), rtol=0.03, atol=0
+    )
     assert followed(frequency) < 0.95
 
 
@@ -115,14 +131,18 @@ def test_a_lead_in_changes_neither_walk_nor_ripple(run):
     still, other = simulated(
         run({"operating.duration_s": 0.2}), run({**courses, "operating.course_seed": 1})
     )
-    speeds = [np.gradient(one.shaft_angle, 1 / RATE) for one in (found, expected, still, other)]
+    speeds = [
+        np.gradient(one.shaft_angle, 1 / RATE)
+        for one in (found, expected, still, other)
+    ]
     assert_allclose(speeds[0], speeds[1], rtol=0, atol=0.02 * speeds[1].std())
     assert_allclose(found.mean_speed, expected.mean_speed, rtol=2e-6, atol=0)
     for another in (still, other):
         assert abs(another.mean_speed / expected.mean_speed - 1) > 1e-4
     level = expected.acceleration.std(axis=1, keepdims=True)
     assert np.all(
-        (found.acceleration[:, n_lead:] - expected.acceleration).std(axis=1) <= 0.02 * level[:, 0]
+        (found.acceleration[:, n_lead:] - expected.acceleration).std(axis=1)
+        <= 0.02 * level[:, 0]
     )
 
 
@@ -150,17 +170,28 @@ class TestStored:
                 record.signals["shaft_speed"].astype(float),
                 record.signals["shaft_angle"],
             )
-            grown = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))]) / RATE
+            grown = (
+                np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))])
+                / RATE
+            )
             assert_allclose(grown, angle - angle[0], rtol=0, atol=2e-4)
             assert_allclose(
-                speed.mean() * 30 / math.pi, record.values["speed_rpm"], rtol=2e-5, atol=0
+                speed.mean() * 30 / math.pi,
+                record.values["speed_rpm"],
+                rtol=2e-5,
+                atol=0,
             )
-            assert abs(record.values["speed_rpm"] / record.values["speed_set_rpm"] - 1) > 1e-5
+            assert (
+                abs(record.values["speed_rpm"] / record.values["speed_set_rpm"] - 1)
+                > 1e-5
+            )
 
     def test_all_classes_of_a_condition_have_its_course(self, stored):
         torques = {}
         for row, record in zip(*stored, strict=True):
-            torques.setdefault(row["condition_id"], []).append(record.signals["torque_set"])
+            torques.setdefault(row["condition_id"], []).append(
+                record.signals["torque_set"]
+            )
         assert len(torques) == 2
         for one, other in torques.values():
             assert one.tobytes() == other.tobytes()

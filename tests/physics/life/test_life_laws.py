@@ -52,7 +52,10 @@ def law(machine, options, crack):
 def pits(machine, options):
     fault = read_request(["fault=distributed_pitting"]).config["fault"]
     return pit_growth(
-        machine.pair, machine.material, read_faults(fault)[0], options.laws["distributed_pitting"]
+        machine.pair,
+        machine.material,
+        read_faults(fault)[0],
+        options.laws["distributed_pitting"],
     )
 
 
@@ -66,7 +69,9 @@ def life_turns(law, torque, start):
     return course.turns[-1]
 
 
-@pytest.mark.parametrize(("torque", "low", "high"), [(20.0, 1.5, 1.8), (100.0, 7.6, 9.0)])
+@pytest.mark.parametrize(
+    ("torque", "low", "high"), [(20.0, 1.5, 1.8), (100.0, 7.6, 9.0)]
+)
 def test_the_stress_intensity_range_is_that_of_the_reference(law, torque, low, high):
     """A crack of 1 mm on the 23/84 pair, increments of the reference's finite elements."""
     assert low < law.measures(1e-3, torque)["stress_intensity_range_mpa_sqrt_m"] < high
@@ -81,11 +86,18 @@ def test_the_stress_intensity_range_is_irwins(law, machine, crack):
     place = np.array([pair.pinion_curvature(pair.base_pitch)])
     low, high = (
         crack_compliance(
-            replace(crack, crack_depth=depth).apply(healthy_tooth(pair.pinion), 0), place, strain
+            replace(crack, crack_depth=depth).apply(healthy_tooth(pair.pinion), 0),
+            place,
+            strain,
         )[0]
         for depth in (0.999e-3, 1.001e-3)
     )
-    release = (100.0 / pair.pinion.base_radius) ** 2 / (2.0 * pair.face_width) * (high - low) / 2e-6
+    release = (
+        (100.0 / pair.pinion.base_radius) ** 2
+        / (2.0 * pair.face_width)
+        * (high - low)
+        / 2e-6
+    )
     told = law.measures(1e-3, 100.0)["stress_intensity_range_mpa_sqrt_m"]
     assert_allclose(told, math.sqrt(release * strain.youngs_modulus) / 1e6, rtol=2e-3)
 
@@ -95,7 +107,9 @@ def test_below_the_threshold_a_crack_does_not_grow(law):
     assert not course.has_failed
     assert not course.growing.any()
     assert_array_equal(course.size, 1e-3)
-    assert grow(law.sizes, law.turns(np.array([100.0])), steady(100.0, 1e5), 1e-3).growing.all()
+    assert grow(
+        law.sizes, law.turns(np.array([100.0])), steady(100.0, 1e5), 1e-3
+    ).growing.all()
 
 
 @pytest.mark.parametrize("exponent", [2.25, 3.0])
@@ -111,7 +125,10 @@ def test_the_rate_goes_with_the_stress_intensity_to_the_paris_exponent(law):
     depths = np.geomspace(0.5e-3, 2.5e-3, 9)
     rates = np.log(law.rate(depths, 150.0))
     ranges = np.log(
-        [law.measures(depth, 150.0)["stress_intensity_range_mpa_sqrt_m"] for depth in depths]
+        [
+            law.measures(depth, 150.0)["stress_intensity_range_mpa_sqrt_m"]
+            for depth in depths
+        ]
     )
     assert_allclose(np.polyfit(ranges, rates, 1)[0], law.options.exponent, rtol=1e-9)
 
@@ -131,7 +148,10 @@ def test_a_crack_over_part_of_the_face_grows_both_ways_and_becomes_a_through_one
 ):
     whole = crack_growth(machine.pair, machine.material, crack, options.laws["crack"])
     part = crack_growth(
-        machine.pair, machine.material, crack, replace(options.laws["crack"], width_share=0.25)
+        machine.pair,
+        machine.material,
+        crack,
+        replace(options.laws["crack"], width_share=0.25),
     )
     assert (np.diff(part.width) >= 0.0).all()
     assert part.width[0] == pytest.approx(5e-3)
@@ -145,14 +165,19 @@ def test_a_crack_over_part_of_the_face_grows_both_ways_and_becomes_a_through_one
 def test_a_nearly_through_crack_grows_as_a_through_one(machine, crack, options):
     whole, nearly = (
         crack_growth(
-            machine.pair, machine.material, crack, replace(options.laws["crack"], width_share=share)
+            machine.pair,
+            machine.material,
+            crack,
+            replace(options.laws["crack"], width_share=share),
         )
         for share in (1.0, 0.999999)
     )
     assert_allclose(nearly.intensity[0, 20:-8], whole.intensity[0, 20:-8], rtol=0.02)
 
 
-def test_pits_come_after_the_first_life_and_go_with_the_load_to_the_exponent(pits, machine):
+def test_pits_come_after_the_first_life_and_go_with_the_load_to_the_exponent(
+    pits, machine
+):
     assert pits.n_pits(0.99) == 0.0
     assert pits.share(1.0) == 0.0
     assert_allclose(pits.n_pits(2.0), pits.options.pits_per_life, rtol=1e-12)
@@ -160,8 +185,12 @@ def test_pits_come_after_the_first_life_and_go_with_the_load_to_the_exponent(pit
     assert_allclose(math.log2(ratio), 0.5 * pits.options.exponent, rtol=1e-9)
     assert_allclose(pits.share(pits.sizes[-1]), pits.options.end_share, rtol=1e-9)
     # Hertz: the knee of the line is reached at the torque whose stress is the strength
-    torque = (pits.options.strength / contact_stress(machine.pair, machine.material, 1.0)) ** 2
-    assert_allclose(pits.rate(np.array([0.5]), torque), 1.0 / pits.options.cycles, rtol=1e-9)
+    torque = (
+        pits.options.strength / contact_stress(machine.pair, machine.material, 1.0)
+    ) ** 2
+    assert_allclose(
+        pits.rate(np.array([0.5]), torque), 1.0 / pits.options.cycles, rtol=1e-9
+    )
 
 
 def test_damage_adds_up_by_miner_whatever_the_order(pits):
@@ -190,13 +219,16 @@ def test_a_standstill_costs_clock_time_and_nothing_else(law):
         for a in (1.0, 9.0)
     ]
     near, far = (
-        grow(law.sizes, law.turns(np.array([90.0])), history, 5e-4) for history in histories
+        grow(law.sizes, law.turns(np.array([90.0])), history, 5e-4)
+        for history in histories
     )
     assert_array_equal(near.size[-1], far.size[-1])
     assert_array_equal(near.turns[-1], far.turns[-1])
     assert far.clock[-1] - near.clock[-1] == pytest.approx(8 * HOUR)
     # no look falls into the gap
-    looks = [far.value("clock", far.at(t)) / HOUR for t in snapshot_times(far, "linear", 9)]
+    looks = [
+        far.value("clock", far.at(t)) / HOUR for t in snapshot_times(far, "linear", 9)
+    ]
     assert not any(1.0 < look < 9.0 for look in looks)
     assert looks[-1] == pytest.approx(10.0)
 
@@ -214,10 +246,16 @@ def test_what_has_not_failed_at_the_horizon_is_censored(law):
 @pytest.mark.parametrize("spacing", ["linear", "logarithmic", "adaptive"])
 def test_looks_are_in_order_and_reach_from_new_to_the_end(law, spacing):
     drawn = DrawnBlocks(
-        shortest=600.0, longest=HOUR, gap_chance=0.3, gap_shortest=HOUR, gap_longest=2 * HOUR
+        shortest=600.0,
+        longest=HOUR,
+        gap_chance=0.3,
+        gap_shortest=HOUR,
+        gap_longest=2 * HOUR,
     )
     torque = np.array([60.0, 110.0, 90.0])
-    history = draw_history(drawn, np.full(3, SPEED), torque, 500 * HOUR, np.random.default_rng(3))
+    history = draw_history(
+        drawn, np.full(3, SPEED), torque, 500 * HOUR, np.random.default_rng(3)
+    )
     course = grow(law.sizes, law.turns(torque), history, 6e-4)
     times = snapshot_times(course, spacing, 21)
     sizes = np.array([course.value("size", course.at(t)) for t in times])
@@ -275,13 +313,24 @@ def test_a_history_that_cannot_be_is_refused(config, blocks, said):
 
 def test_a_drawn_history_keeps_to_its_limits():
     drawn = DrawnBlocks(
-        shortest=HOUR, longest=4 * HOUR, gap_chance=0.5, gap_shortest=HOUR, gap_longest=3 * HOUR
+        shortest=HOUR,
+        longest=4 * HOUR,
+        gap_chance=0.5,
+        gap_shortest=HOUR,
+        gap_longest=3 * HOUR,
     )
     history = draw_history(
-        drawn, np.full(2, SPEED), np.full(2, 50.0), 1000 * HOUR, np.random.default_rng(0)
+        drawn,
+        np.full(2, SPEED),
+        np.full(2, 50.0),
+        1000 * HOUR,
+        np.random.default_rng(0),
     )
     assert isinstance(history, History)
-    length, gap = (history.end - history.begin)[:-1], history.begin[1:] - history.end[:-1]
+    length, gap = (
+        (history.end - history.begin)[:-1],
+        history.begin[1:] - history.end[:-1],
+    )
     assert (length >= HOUR - 1e-6).all()
     assert (length <= 4 * HOUR + 1e-6).all()
     assert history.end[-1] <= 1000 * HOUR

@@ -23,7 +23,9 @@ def compared(case):
         np.array([float(row[key]) for row in rows])
         for key in ("tip_distance_over_base_pitch", "stress_factor")
     )
-    ours = root_loading(gear, place * gear.base_pitch).stress_factor * math.cos(gear.pressure_angle)
+    ours = root_loading(gear, place * gear.base_pitch).stress_factor * math.cos(
+        gear.pressure_angle
+    )
     return place, ours, exact, rows
 
 
@@ -40,7 +42,9 @@ def test_iso_is_near_finite_elements_where_it_takes_the_load(case):
 
 def test_the_pump_drives_gear_at_isos_load_point():
     place, ours, exact, _ = compared("z54")
-    assert np.interp(0.768, place, ours) == pytest.approx(np.interp(0.768, place, exact), rel=0.04)
+    assert np.interp(0.768, place, ours) == pytest.approx(
+        np.interp(0.768, place, exact), rel=0.04
+    )
 
 
 def test_the_order_of_gears_is_that_of_finite_elements():

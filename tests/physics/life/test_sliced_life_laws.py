@@ -29,7 +29,11 @@ HELICAL = ("system=helical_pair", "mesh.n_slices=12")
 
 def parts(*overrides):
     config = read_request(["life=mixed", "fault=crack", *overrides]).config
-    return read_system(config), read_life(config["life"]).laws, read_faults(config["fault"])[0]
+    return (
+        read_system(config),
+        read_life(config["life"]).laws,
+        read_faults(config["fault"])[0],
+    )
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +87,12 @@ def test_the_release_rate_is_the_change_of_the_energy_at_constant_load(helical):
     flanks = _for_lives(machine.flanks)
     flanks = replace(flanks, mesh=replace(flanks.mesh, contact="linear"))
     law = sliced_crack_growth(
-        flanks.pair, flanks.material, flanks.sliced_mesh, crack, laws["crack"], np.array([90.0])
+        flanks.pair,
+        flanks.material,
+        flanks.sliced_mesh,
+        crack,
+        laws["crack"],
+        np.array([90.0]),
     )
     depth, force = 1e-3, 90.0 / flanks.pair.pinion.base_radius
     roll = flanks.pair.base_pitch * np.linspace(0.01, 4.0, 400)
@@ -93,10 +102,20 @@ def test_the_release_rate_is_the_change_of_the_energy_at_constant_load(helical):
         ).approach
         for one in (0.995 * depth, 1.005 * depth)
     )
-    release = 0.5 * force * (high - low).max() / (0.01 * depth * flanks.pair.pinion.face_width)
-    expected = math.sqrt(release * flanks.material.in_plane("plane_strain").youngs_modulus) / 1e6
+    release = (
+        0.5
+        * force
+        * (high - low).max()
+        / (0.01 * depth * flanks.pair.pinion.face_width)
+    )
+    expected = (
+        math.sqrt(release * flanks.material.in_plane("plane_strain").youngs_modulus)
+        / 1e6
+    )
     assert_allclose(
-        law.measures(depth, 90.0)["stress_intensity_range_mpa_sqrt_m"], expected, rtol=2e-3
+        law.measures(depth, 90.0)["stress_intensity_range_mpa_sqrt_m"],
+        expected,
+        rtol=2e-3,
     )
 
 
@@ -122,14 +141,21 @@ def test_the_energy_of_slices_is_half_the_work_of_their_loads(length):
     width = rng.uniform(1e-3, 2e-3, 7)
     structure, load = rng.uniform(1e-11, 3e-11, (3, 7)), rng.uniform(0.0, 1e5, (3, 7))
     for soft, pressed, energy in zip(
-        structure, load, structure_energy(structure, load, width, length**2), strict=True
+        structure,
+        load,
+        structure_energy(structure, load, width, length**2),
+        strict=True,
     ):
         matrix = np.diag(width / soft)
         for j in range(6):
-            tie = length**2 * 4.0 / ((soft[j] + soft[j + 1]) * (width[j] + width[j + 1]))
+            tie = (
+                length**2 * 4.0 / ((soft[j] + soft[j + 1]) * (width[j] + width[j + 1]))
+            )
             matrix[j : j + 2, j : j + 2] += tie * np.array([[1.0, -1.0], [-1.0, 1.0]])
         assert_allclose(
-            energy, 0.5 * (width * pressed) @ np.linalg.solve(matrix, width * pressed), rtol=1e-9
+            energy,
+            0.5 * (width * pressed) @ np.linalg.solve(matrix, width * pressed),
+            rtol=1e-9,
         )
 
 
@@ -141,7 +167,9 @@ def test_the_contact_stress_of_slices_is_the_nominal_one_without_a_helix(spur):
         mesh, machine.material, torques, laws["distributed_pitting"].exponent
     )
     assert_allclose(
-        found, [contact_stress(machine.pair, machine.material, one) for one in torques], rtol=1e-9
+        found,
+        [contact_stress(machine.pair, machine.material, one) for one in torques],
+        rtol=1e-9,
     )
 
 
@@ -155,7 +183,9 @@ def test_pits_of_a_helical_pair_come_by_their_slices(helical):
     )
     # nearly as the root of the load where flanks are even; where they are not, one end carries all of a small one
     ratio = even.rate(np.zeros(1), 200.0) / even.rate(np.zeros(1), 50.0)
-    assert_allclose(math.log(ratio[0]) / math.log(4.0), 0.5 * options.exponent, rtol=0.02)
+    assert_allclose(
+        math.log(ratio[0]) / math.log(4.0), 0.5 * options.exponent, rtol=0.02
+    )
     assert tilted.stress_at_one[0] > tilted.stress_at_one[2] > even.stress_at_one[2]
 
 
@@ -163,7 +193,9 @@ def test_a_spectrum_grows_at_the_mean_of_its_rates(helical):
     machine, laws, crack = helical
     law = sliced(machine, crack, laws["crack"], (100.0, 300.0))
     alone = law.turns(np.array([150.0, 300.0]))
-    assert_allclose(law.turns([np.full(3, 150.0), np.full(2, 300.0)]), alone, rtol=1e-12)
+    assert_allclose(
+        law.turns([np.full(3, 150.0), np.full(2, 300.0)]), alone, rtol=1e-12
+    )
     both = law.turns([np.array([150.0, 300.0])])[0]
     assert_allclose(1.0 / both, 0.5 * (1.0 / alone).sum(axis=0), rtol=1e-12)
 
@@ -173,17 +205,23 @@ def test_the_loads_of_a_mesh_are_the_greatest_of_each_pair_of_teeth(spur):
     pitch = pair.base_pitch / pair.pinion.base_radius
     angle = np.linspace(0.0, 12.0 * pitch, 24001)
     radius = pair.pinion.base_radius
-    assert_allclose(greatest_loads(pair, angle, np.full(24001, 70.0)), 70.0 * radius, rtol=1e-12)
+    assert_allclose(
+        greatest_loads(pair, angle, np.full(24001, 70.0)), 70.0 * radius, rtol=1e-12
+    )
     assert_array_equal(greatest_loads(pair, angle, np.full(24001, -70.0)), LEAST_TORQUE)
     # an impact while two pairs carry is shared; alone, one has all of it
     for place, shares in (
         (0.1 * pair.base_pitch, (SHARED, SHARED)),
         (pair.base_pitch * 0.9, (1.0,)),
     ):
-        force = np.where(np.abs(angle * radius - 5.0 * pair.base_pitch - place) < 1e-5, 500.0, 0.0)
+        force = np.where(
+            np.abs(angle * radius - 5.0 * pair.base_pitch - place) < 1e-5, 500.0, 0.0
+        )
         loads = greatest_loads(pair, angle, force)
         assert_allclose(
-            np.sort(loads[loads > LEAST_TORQUE]), np.array(shares) * 500.0 * radius, rtol=1e-12
+            np.sort(loads[loads > LEAST_TORQUE]),
+            np.array(shares) * 500.0 * radius,
+            rtol=1e-12,
         )
 
 

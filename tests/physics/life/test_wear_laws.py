@@ -27,7 +27,9 @@ def case_of(*words):
 
 
 def changed(case, **options):
-    return wear_case(case.mesh, case.material, replace(case.options, **options), case.torque)
+    return wear_case(
+        case.mesh, case.material, replace(case.options, **options), case.torque
+    )
 
 
 def at_pitch(case):
@@ -45,13 +47,17 @@ def test_the_band_rule_is_the_integral_over_the_passing_contact():
     own, other = case.path.rolling * speed
     for node in (0, 30, 100):
         time = np.linspace(-half[node], half[node], 20001) / own[node]
-        pressure = peak[node] * np.sqrt(np.maximum(1.0 - (time * own[node] / half[node]) ** 2, 0.0))
+        pressure = peak[node] * np.sqrt(
+            np.maximum(1.0 - (time * own[node] / half[node]) ** 2, 0.0)
+        )
         depth = np.trapezoid(factor * pressure * abs(own[node] - other[node]), time)
         assert found[node] == pytest.approx(depth, rel=1e-4)
 
 
 @pytest.mark.parametrize("rule", ["band", "fixed_intervals"])
-@pytest.mark.parametrize("words", [PAPER, FULL, HELICAL], ids=["paper", "own mesh", "helical"])
+@pytest.mark.parametrize(
+    "words", [PAPER, FULL, HELICAL], ids=["paper", "own mesh", "helical"]
+)
 def test_nothing_wears_at_the_pitch_point_and_both_flanks_do_elsewhere(rule, words):
     case = case_of(*words, f"wear.rule={rule}")
     depth = case.wear_per_mesh(case.new_flanks())
@@ -81,9 +87,9 @@ def test_archard_is_linear_in_coefficient_and_hardness_of_each_gear():
 def test_life_goes_with_threshold_and_the_wheel_meshes_less_often():
     case = case_of(*PAPER)
     life = wear_life(case)
-    assert wear_life(changed(case, threshold=0.5 * case.options.threshold)).life == pytest.approx(
-        0.5 * life.life
-    )
+    assert wear_life(
+        changed(case, threshold=0.5 * case.options.threshold)
+    ).life == pytest.approx(0.5 * life.life)
     ratio = life.depth[-1] / (case.wear_per_mesh(case.new_flanks()) * life.life + 1e-30)
     assert_allclose(ratio[0, 0, :10], 1.0, rtol=1e-9)
     assert_allclose(ratio[1, 0, :10], 38.0 / 55.0, rtol=1e-9)
@@ -95,7 +101,9 @@ def test_exponents_of_both_rules_in_the_papers_setting():
     for rule, exponent in (("band", 1.0), ("fixed_intervals", 0.5)):
         one = changed(case, rule=rule)
         lives = [wear_life(one.under(torque)).life for torque in (50.0, 200.0)]
-        assert math.log(lives[0] / lives[1]) / math.log(4.0) == pytest.approx(exponent, abs=1e-9)
+        assert math.log(lives[0] / lives[1]) / math.log(4.0) == pytest.approx(
+            exponent, abs=1e-9
+        )
 
 
 def test_fixed_intervals_does_not_converge_and_the_band_does_not_ask():
@@ -124,15 +132,22 @@ def test_the_mesh_shares_the_load():
 
 
 def test_pressure_of_new_flanks_is_that_of_the_loaded_mesh():
-    system = read_sliced_pair(compose("generate", ["system=helical_pair", "mesh.n_slices=8"]))
+    system = read_sliced_pair(
+        compose("generate", ["system=helical_pair", "mesh.n_slices=8"])
+    )
     case = case_of("system=helical_pair", "mesh.n_slices=8")
     contact = loaded_contact(case.mesh, system.phases(96), system.mesh_force)
     pressure = contact_pressure(case.mesh, contact, case.material)
     found = case.pressure(case.line_load(case.new_flanks()), case.new_flanks())
     inside = (contact.position > 0.0) & (contact.position < case.pair.path_of_contact)
     for j in (0, 4, 7):
-        place, value = contact.position[..., j][inside[..., j]], pressure[..., j][inside[..., j]]
-        assert_allclose(np.interp(place, case.path.position, found[j]), value, rtol=0.02)
+        place, value = (
+            contact.position[..., j][inside[..., j]],
+            pressure[..., j][inside[..., j]],
+        )
+        assert_allclose(
+            np.interp(place, case.path.position, found[j]), value, rtol=0.02
+        )
 
 
 def test_slices_of_a_spur_pair_wear_alike_and_as_the_whole():
@@ -142,7 +157,10 @@ def test_slices_of_a_spur_pair_wear_alike_and_as_the_whole():
     sliced = replace(system, slices=replace(system.slices, n_slices=6)).sliced_mesh()
     six = wear_life(
         wear_case(
-            sliced, system.material, read_wear_options(compose("generate", words)["wear"]), 200.0
+            sliced,
+            system.material,
+            read_wear_options(compose("generate", words)["wear"]),
+            200.0,
         )
     )
     assert np.ptp(six.depth[-1], axis=1).max() < 1e-9 * six.depth.max()
@@ -156,15 +174,23 @@ def test_slices_of_a_helical_pair_converge():
 
 
 @pytest.mark.parametrize(
-    "words", [FULL, ("wear.threshold_um=100",), HELICAL], ids=["full", "default", "helical"]
+    "words",
+    [FULL, ("wear.threshold_um=100",), HELICAL],
+    ids=["full", "default", "helical"],
 )
 def test_half_the_step_and_twice_the_nodes_are_the_same_life(words):
     case = case_of(*words)
     life = wear_life(case)
     step = min(case.options.step, 0.1 * case.options.threshold)
-    assert wear_life(changed(case, step=0.5 * step)).life == pytest.approx(life.life, rel=5e-3)
+    assert wear_life(changed(case, step=0.5 * step)).life == pytest.approx(
+        life.life, rel=5e-3
+    )
     finer = wear_case(
-        case.mesh, case.material, case.options, case.torque, n_nodes=2 * len(case.path.position) - 1
+        case.mesh,
+        case.material,
+        case.options,
+        case.torque,
+        n_nodes=2 * len(case.path.position) - 1,
     )
     assert wear_life(finer).life == pytest.approx(life.life, rel=0.01)
 
@@ -194,7 +220,9 @@ def test_a_history_is_the_same_in_one_go_or_many(rule):
     assert_allclose(steady, at_once, atol=2e-3 * life.depth.max())
     later = worn_flanks(case, turns[3:] - turns[2], start=at_once[2])
     assert_allclose(later, at_once[3:], atol=2e-3 * life.depth.max())
-    heavier = worn_flanks(case, turns, torque=case.torque * np.array([1.0, 1.0, 1.0, 2.0, 1.0]))
+    heavier = worn_flanks(
+        case, turns, torque=case.torque * np.array([1.0, 1.0, 1.0, 2.0, 1.0])
+    )
     assert heavier[3].max() > 1.2 * at_once[3].max()
 
 

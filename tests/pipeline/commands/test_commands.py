@@ -32,16 +32,26 @@ def test_stiffness_json_has_the_promised_keys(tmp_path: Path) -> None:
     assert content["base_pitch_mm"] == pytest.approx(5.90426, abs=1e-5)
     position = np.array(content["contact_position"])
     sound, faulty = (
-        np.array(content[f"{kind}_pair_stiffness_n_per_m"]) for kind in ("single", "faulty")
+        np.array(content[f"{kind}_pair_stiffness_n_per_m"])
+        for kind in ("single", "faulty")
     )
     assert position[-1] == pytest.approx(content["transverse_contact_ratio"], rel=1e-12)
     assert np.all(faulty < sound)
-    terms = [values for gear in content["compliance_m_per_n"].values() for values in gear.values()]
+    terms = [
+        values
+        for gear in content["compliance_m_per_n"].values()
+        for values in gear.values()
+    ]
     assert len(terms) == 12
     np.testing.assert_allclose(1.0 / np.sum(terms, axis=0), faulty, rtol=1e-4, atol=0.0)
-    roll, mesh = np.array(content["roll_angle_deg"]), np.array(content["mesh_stiffness_n_per_m"])
+    roll, mesh = (
+        np.array(content["roll_angle_deg"]),
+        np.array(content["mesh_stiffness_n_per_m"]),
+    )
     assert 0.0 < roll[0] < roll[-1] < 360.0
-    assert content["mesh_stiffness_mean_n_per_m"] == pytest.approx(mesh.mean(), rel=1e-12)
+    assert content["mesh_stiffness_mean_n_per_m"] == pytest.approx(
+        mesh.mean(), rel=1e-12
+    )
     assert figure.read_bytes().startswith(b"\x89PNG")
 
 
@@ -104,15 +114,25 @@ def test_simulate_writes_one_record(
     assert (tmp_path / "r.png").stat().st_size > 10_000
     before = file.stat().st_mtime_ns
     assert main([*words, "--output", str(file)]) == 2
-    assert "is there already; choose another name, or add --force" in capsys.readouterr().err
+    assert (
+        "is there already; choose another name, or add --force"
+        in capsys.readouterr().err
+    )
     assert file.stat().st_mtime_ns == before
     assert main([*words, "--output", str(file), "--force"]) == 0
     assert file.stat().st_mtime_ns > before
     assert not list(tmp_path.glob(".*"))
 
 
-def test_plan_predicts_without_writing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["plan", "experiment=quickstart", "operating.duration_s=0.05", f"out={tmp_path / 'x'}"]
+def test_plan_predicts_without_writing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [
+        "plan",
+        "experiment=quickstart",
+        "operating.duration_s=0.05",
+        f"out={tmp_path / 'x'}",
+    ]
     assert main(words) == 0
     said, notes = capsys.readouterr()
     assert "records    400" in said
@@ -122,7 +142,17 @@ def test_plan_predicts_without_writing(tmp_path: Path, capsys: pytest.CaptureFix
 
 
 def test_typed_fault_narrows_the_classes(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["plan", "experiment=quickstart", "fault=crack", "operating.duration_s=0.02"]) == 0
+    assert (
+        main(
+            [
+                "plan",
+                "experiment=quickstart",
+                "fault=crack",
+                "operating.duration_s=0.02",
+            ]
+        )
+        == 0
+    )
     said, notes = capsys.readouterr()
     assert "crack 400" in said
     assert (
@@ -131,7 +161,9 @@ def test_typed_fault_narrows_the_classes(capsys: pytest.CaptureFixture[str]) -> 
     )
 
 
-def test_own_config_dir_adds_options(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_own_config_dir_adds_options(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "fault").mkdir()
     (tmp_path / "fault" / "deep.yaml").write_text(
         "kind: crack\ngear: wheel\ntooth: 1\ncrack_depth_mm: 2\ncrack_angle_deg: 60\ncrack_start: gamma_mid\nvary: {}\n"
@@ -152,7 +184,10 @@ BAD = {
     "unknown flag": (["stiffness", "--jsn", "x"], "--help"),
     "no out": (["generate"], "out=DIR"),
     "no records": (["generate", "plan.n_records=0", "out=@/x"], "plan.n_records"),
-    "not a number": (["generate", "operating.torque_nm=much", "out=@/x"], "operating.torque_nm"),
+    "not a number": (
+        ["generate", "operating.torque_nm=much", "out=@/x"],
+        "operating.torque_nm",
+    ),
     "negative depth": (
         ["generate", "fault=crack", "fault.crack_depth_mm=-1", "out=@/x"],
         "crack_depth_mm",
@@ -165,7 +200,10 @@ BAD = {
         ["stiffness", "fault=pitting", "fault.pit_position_mm=9"],
         "pit_position_mm",
     ),
-    "pit over the face": (["stiffness", "fault=pitting", "fault.pit_width_mm=21"], "20 mm wide"),
+    "pit over the face": (
+        ["stiffness", "fault=pitting", "fault.pit_width_mm=21"],
+        "20 mm wide",
+    ),
     "pit through the tooth": (
         ["stiffness", "fault=pitting", "fault.pit_depth_mm=3"],
         "pit_depth_mm",
@@ -198,10 +236,16 @@ BAD = {
     "no such path": (["inspect", "@/nothing"], "does not exist"),
     "no channel": (["simulate", "sensing.channels=[pinion_z]"], "pinion_y"),
     "helical": (["stiffness", "gear.helix_angle_deg=10"], "helix_angle_deg"),
-    "output format": (["simulate", "operating.duration_s=0.01", "--output", "@/x.txt"], ".csv"),
+    "output format": (
+        ["simulate", "operating.duration_s=0.01", "--output", "@/x.txt"],
+        ".csv",
+    ),
     "figure format": (["stiffness", "--plot", "@/x.foo"], ".png"),
     "no folder for a file": (["stiffness", "--json", "@/nowhere/x.json"], "no folder"),
-    "no sample": (["generate", "operating.duration_s=1e-6", "out=@/x"], "operating.duration_s"),
+    "no sample": (
+        ["generate", "operating.duration_s=1e-6", "out=@/x"],
+        "operating.duration_s",
+    ),
     "compression": (["generate", "dataset.compression=zip", "out=@/x"], "gzip"),
     "poisson": (["stiffness", "material.poisson_ratio=0.7"], "0.5"),
     "group as value": (["stiffness", "gear.pinion=3"], "gear.pinion"),
@@ -219,7 +263,11 @@ def test_a_mistake_is_one_line_and_touches_nothing(
     words, hint = BAD[name]
     assert main([word.replace("@", str(tmp_path)) for word in words]) == 2
     captured = capsys.readouterr()
-    lines = [line for line in captured.err.splitlines() if not line.startswith("gensig: note:")]
+    lines = [
+        line
+        for line in captured.err.splitlines()
+        if not line.startswith("gensig: note:")
+    ]
     assert len(lines) == 1, captured.err
     assert lines[0].startswith("gensig: ")
     assert hint in lines[0]
@@ -238,7 +286,9 @@ def test_existing_folder_is_refused_and_untouched(
 
 
 @pytest.mark.parametrize("verb", [*VERBS, None])
-def test_help_has_an_example(verb: str | None, capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_has_an_example(
+    verb: str | None, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["--help"] if verb is None else [verb, "--help"]) == 0
     said = capsys.readouterr().out
     assert (f"gensig {verb}" if verb else "commands:") in said

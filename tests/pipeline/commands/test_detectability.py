@@ -22,7 +22,9 @@ SMALL = ("operating.duration_s=0.1", "sensing.channels=[pinion_y]")
 BANDS = (1000.0, 5000.0, 25600.0)
 
 
-def maps_of(*overrides: str, speeds=(1800.0,), torques=(20.0,), n_workers: int = 1, **more):
+def maps_of(
+    *overrides: str, speeds=(1800.0,), torques=(20.0,), n_workers: int = 1, **more
+):
     pairs = gensig.fault_pairs(
         *SMALL, *overrides, speeds_rpm=speeds, torques_nm=torques, n_units=4, **more
     )
@@ -41,9 +43,12 @@ def one():
 
 
 @pytest.mark.parametrize(
-    "control", [("fault=crack", "plan.sham=true"), ("fault=crack", "fault.crack_depth_mm=0")]
+    "control",
+    [("fault=crack", "plan.sham=true"), ("fault=crack", "fault.crack_depth_mm=0")],
 )
-def test_no_fault_is_not_there_and_not_seen(control: tuple[str, ...], tmp_path: Path) -> None:
+def test_no_fault_is_not_there_and_not_seen(
+    control: tuple[str, ...], tmp_path: Path
+) -> None:
     maps = maps_of(*control)
     assert (maps.known == 0.0).all()
     assert (maps.seen == 0.0).all()
@@ -54,13 +59,16 @@ def test_no_fault_is_not_there_and_not_seen(control: tuple[str, ...], tmp_path: 
 
 def test_less_noise_tells_more(one) -> None:
     """As many times as its amplitude is smaller."""
-    quieter = maps_of("fault=crack", f"sensing.snr_db={20.0 + float(20.0 * np.log10(2.0))!r}")
+    quieter = maps_of(
+        "fault=crack", f"sensing.snr_db={20.0 + float(20.0 * np.log10(2.0))!r}"
+    )
     assert_allclose(quieter.known, 2.0 * one.known, rtol=1e-9, atol=0)
 
 
 def test_it_grows_with_the_fault(one) -> None:
     found = [
-        maps_of("fault=crack", f"fault.crack_depth_mm={depth}").known for depth in (0.5, 2.0, 3.0)
+        maps_of("fault=crack", f"fault.crack_depth_mm={depth}").known
+        for depth in (0.5, 2.0, 3.0)
     ]
     found = [found[0], one.known, *found[1:], maps_of("fault=missing_tooth").known]
     assert (np.diff(np.stack(found), axis=0) > 0.0).all()
@@ -74,7 +82,8 @@ def test_more_bandwidth_never_tells_less(crack) -> None:
 def test_it_grows_with_the_root_of_the_duration() -> None:
     """But for what turns of the same motion differ by: one and four of the wheel."""
     short, long = (
-        maps_of("fault=crack", f"operating.duration_s={84 / 23 / 30 * n!r}") for n in (1, 4)
+        maps_of("fault=crack", f"operating.duration_s={84 / 23 / 30 * n!r}")
+        for n in (1, 4)
     )
     assert_allclose(long.known[..., -1], 2.0 * short.known[..., -1], rtol=0.05, atol=0)
 
@@ -86,15 +95,23 @@ def test_it_is_what_a_data_set_stores() -> None:
     row = pairs.rows[4 + 2]
     config = pairs.config.with_keys("dataset", store_detectability=True)
     start = InputReader(config).inputs(row).healthy_twin().run.start
-    begin = {"start_tooth_pinion": start.tooth_pinion, "start_tooth_wheel": start.tooth_wheel}
+    begin = {
+        "start_tooth_pinion": start.tooth_pinion,
+        "start_tooth_wheel": start.tooth_wheel,
+    }
     record = simulate_record(config, {**row, **begin, "start_phase": start.phase})
     cell = pairs.cell(1)
     found = np.sqrt(np.sum(cell.residual[2] ** 2) / cell.noise_power[2, 0])
     assert found == pytest.approx(record.values["detectability"], rel=1e-12)
     assert_allclose(
-        cell.faulty[2].astype(np.float32), record.signals["acceleration"], rtol=0, atol=0
+        cell.faulty[2].astype(np.float32),
+        record.signals["acceleration"],
+        rtol=0,
+        atol=0,
     )
-    assert_allclose(cell.noise_power[2], record.signals["noise_power"], rtol=1e-12, atol=0)
+    assert_allclose(
+        cell.noise_power[2], record.signals["noise_power"], rtol=1e-12, atol=0
+    )
 
 
 def test_both_of_a_pair_have_the_same_noise() -> None:
@@ -109,7 +126,9 @@ def test_both_of_a_pair_have_the_same_noise() -> None:
 
 
 def test_noise_of_the_set_point_is_the_same_everywhere(crack) -> None:
-    fixed = maps_of("fault=crack", speeds=(900.0, 1800.0), torques=(10.0, 20.0), fixed_noise=True)
+    fixed = maps_of(
+        "fault=crack", speeds=(900.0, 1800.0), torques=(10.0, 20.0), fixed_noise=True
+    )
     assert np.ptp(fixed.noise_rms) == 0.0
     assert np.ptp(crack.noise_rms) > 0.0
     # the residual is the same, so that the one's d' times its noise is the other's; both are medians over machines
@@ -126,13 +145,17 @@ def test_coloured_noise_counts_where_it_is() -> None:
         "sensing.noise.band_hz=[1,25600]",
     )
     assert_allclose(in_parts.known[..., -1], white.known[..., -1], rtol=0.05, atol=0)
-    pink = maps_of("fault=crack", "sensing.noise.parts=[{kind:pink,share:1,lowest_hz:5}]")
+    pink = maps_of(
+        "fault=crack", "sensing.noise.parts=[{kind:pink,share:1,lowest_hz:5}]"
+    )
     assert (pink.known_band[..., -1] > 1.5 * white.known_band[..., -1]).all()
     assert (pink.known_band[..., 0] < white.known_band[..., 0]).all()
 
 
 def test_workers_do_not_change_the_bits(crack) -> None:
-    again = maps_of("fault=crack", speeds=(900.0, 1800.0), torques=(10.0, 20.0), n_workers=2)
+    again = maps_of(
+        "fault=crack", speeds=(900.0, 1800.0), torques=(10.0, 20.0), n_workers=2
+    )
     for name in (
         "known",
         "known_band",
@@ -148,7 +171,12 @@ def test_workers_do_not_change_the_bits(crack) -> None:
 def test_other_machines_are_others() -> None:
     cells = [
         gensig.fault_pairs(
-            *SMALL, "fault=crack", speeds_rpm=[1800], torques_nm=[20], n_units=4, epoch=epoch
+            *SMALL,
+            "fault=crack",
+            speeds_rpm=[1800],
+            torques_nm=[20],
+            n_units=4,
+            epoch=epoch,
         ).cell(0)
         for epoch in (0, 1)
     ]
@@ -189,9 +217,17 @@ def test_a_motion_that_does_not_stay_finite_is_left_out_and_counted(
         return results
 
     monkeypatch.setattr(gensig.record.inputs, "simulate_with_lead_in", one_fails)
-    pairs = gensig.fault_pairs(*SMALL, "fault=crack", speeds_rpm=[1800], torques_nm=[20], n_units=5)
+    pairs = gensig.fault_pairs(
+        *SMALL, "fault=crack", speeds_rpm=[1800], torques_nm=[20], n_units=5
+    )
     cell = pairs.cell(0)
-    assert np.isnan(cell.residual).all(axis=(1, 2)).tolist() == [False, True, False, False, False]
+    assert np.isnan(cell.residual).all(axis=(1, 2)).tolist() == [
+        False,
+        True,
+        False,
+        False,
+        False,
+    ]
     maps = make_maps(pairs, BANDS, n_workers=1, on_done=lambda _text: None)
     assert maps.n_failed == 1
     left = np.delete(np.sum(cell.residual**2, axis=-1) / cell.noise_power, 1, axis=0)
@@ -208,7 +244,9 @@ def test_turns_and_random_walks_follow_the_plan() -> None:
     assert len({row["params/operating.course_seed"] for row in pairs.rows}) == 8
 
 
-def test_the_command_writes_everything(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_writes_everything(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     table, figure = tmp_path / "map.json", tmp_path / "map.png"
     words = [
         "fault=missing_tooth",
@@ -221,7 +259,20 @@ def test_the_command_writes_everything(tmp_path: Path, capsys: pytest.CaptureFix
         "sensing.snr_db=15",
     ]
     flags = ["--bandwidths", "2000", "20000", "--n-units", "4", "--workers", "1"]
-    assert main(["detectability", *words, *flags, "--json", str(table), "--plot", str(figure)]) == 0
+    assert (
+        main(
+            [
+                "detectability",
+                *words,
+                *flags,
+                "--json",
+                str(table),
+                "--plot",
+                str(figure),
+            ]
+        )
+        == 0
+    )
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 2
     found = json.loads(table.read_text())
@@ -229,7 +280,10 @@ def test_the_command_writes_everything(tmp_path: Path, capsys: pytest.CaptureFix
     assert found["fault"]["kind"] == "missing_tooth"
     assert len(found["tests"]) == 2 * 1 * 1 * 2
     best = max(found["tests"], key=lambda test: test["d_prime_known"])
-    assert f"best at {best['speed_rpm']:g} r/min, 20 N m, pinion_y, up to 20 kHz" in lines[1]
+    assert (
+        f"best at {best['speed_rpm']:g} r/min, 20 N m, pinion_y, up to 20 kHz"
+        in lines[1]
+    )
     assert found["best_seen"]["d_prime_seen"] == max(
         test["d_prime_seen"] for test in found["tests"]
     )
@@ -248,7 +302,9 @@ def test_a_fault_is_named_with_its_sizes() -> None:
     assert fault_text(crack) == "crack on the pinion (crack depth 1.5 mm)"
     missing = {"kind": "missing_tooth", "gear": "wheel", "tooth": 0}
     assert fault_text(missing) == "missing tooth on the wheel"
-    assert fault_text({"kind": "compound", "parts": [crack, missing]}).count(" and ") == 1
+    assert (
+        fault_text({"kind": "compound", "parts": [crack, missing]}).count(" and ") == 1
+    )
 
 
 def test_a_map_without_any_value_is_refused() -> None:
@@ -267,13 +323,25 @@ def test_a_map_without_any_value_is_refused() -> None:
             ["fault=crack", "--speeds", "900", "900"],
             "speeds in r/min: 900, 900; give positive numbers, each once",
         ),
-        (["fault=crack", "--torques", "-5"], "torques in N m: -5; give positive numbers"),
+        (
+            ["fault=crack", "--torques", "-5"],
+            "torques in N m: -5; give positive numbers",
+        ),
         (["fault=crack", "--torques", "0"], "torques in N m: 0; give positive numbers"),
         (["fault=crack", "--speeds", "fast"], "--speeds fast: give numbers"),
-        (["fault=crack", "--speeds", *map(str, range(100, 501))], "more than 400 cells"),
-        (["fault=crack", "--bandwidths", "30000"], "from 10 to half the sampling rate, 25600"),
+        (
+            ["fault=crack", "--speeds", *map(str, range(100, 501))],
+            "more than 400 cells",
+        ),
+        (
+            ["fault=crack", "--bandwidths", "30000"],
+            "from 10 to half the sampling rate, 25600",
+        ),
         (["fault=crack", "--workers", "0"], "--workers 0 must be at least 1"),
-        (["fault=crack", "--plot", "map.txt"], "--plot map.txt: the name must end in .png"),
+        (
+            ["fault=crack", "--plot", "map.txt"],
+            "--plot map.txt: the name must end in .png",
+        ),
         (["fault=crack", "--json", "nowhere/map.json"], "there is no folder nowhere"),
         (["fault=crak"], "no option 'crak' of fault"),
         (["fault=crack", "plan.n_gearboxes=0"], "plan.n_gearboxes = 0"),

@@ -33,7 +33,11 @@ def test_it_writes_the_response_of_every_node(tmp_path, capsys):
         0.5 * own[44] < seen["pump_end"] < 1.1 * own[44]
     )  # a mean over one spacing loses what 120 teeth cannot hold
     drive = content["meshes"].index("21/45")
-    assert content["least_tooth_force_n"][drive] < 0.0 < content["mean_tooth_force_n"][drive]
+    assert (
+        content["least_tooth_force_n"][drive]
+        < 0.0
+        < content["mean_tooth_force_n"][drive]
+    )
     printed = capsys.readouterr().out
     assert "Flywheel" in printed
     assert "would part" in printed
@@ -69,9 +73,15 @@ def test_a_run_of_speeds_and_a_disturbance_are_written_and_drawn(tmp_path):
 
 
 def test_lateral_motion_of_the_gears_is_taken_along(tmp_path):
-    flat, lateral = (found_by(tmp_path, *words) for words in ((), ("system.lateral=true",)))
+    flat, lateral = (
+        found_by(tmp_path, *words) for words in ((), ("system.lateral=true",))
+    )
     flywheel = flat["node_numbers"].index(14)
-    assert len(lateral["speed_fluctuation_rpm"]) == len(flat["speed_fluctuation_rpm"]) == 67
+    assert (
+        len(lateral["speed_fluctuation_rpm"])
+        == len(flat["speed_fluctuation_rpm"])
+        == 67
+    )
     assert_allclose(
         lateral["speed_fluctuation_rpm"][flywheel],
         flat["speed_fluctuation_rpm"][flywheel],
@@ -83,12 +93,27 @@ def test_lateral_motion_of_the_gears_is_taken_along(tmp_path):
     ("words", "message"),
     [
         (("excitation=engine_v20",), "system.kind = 'spur_pair' is no drive line"),
-        (("system=engine_gear_train",), "no excitation is chosen; take excitation=engine_v20"),
-        ((*ENGINE, "--nodes", "99"), "--nodes 99: the shaft line has no such node; it has 1 to 67"),
-        ((*ENGINE, "--run", "900", "700", "10"), "--run 900 700 10: give low, high and step"),
+        (
+            ("system=engine_gear_train",),
+            "no excitation is chosen; take excitation=engine_v20",
+        ),
+        (
+            (*ENGINE, "--nodes", "99"),
+            "--nodes 99: the shaft line has no such node; it has 1 to 67",
+        ),
+        (
+            (*ENGINE, "--run", "900", "700", "10"),
+            "--run 900 700 10: give low, high and step",
+        ),
         ((*ENGINE, "--torque", "-5"), "the brake torque -5 N m is below the friction"),
-        ((*ENGINE, "--speed", "0"), "the speed of the crank, 0 r/min, must be positive"),
-        ((*ENGINE, "--speed", "4000"), "the follower leaves its cam at 2000 r/min of the camshaft"),
+        (
+            (*ENGINE, "--speed", "0"),
+            "the speed of the crank, 0 r/min, must be positive",
+        ),
+        (
+            (*ENGINE, "--speed", "4000"),
+            "the follower leaves its cam at 2000 r/min of the camshaft",
+        ),
         ((*ENGINE, "--plot", "a.txt"), "--plot a.txt: the name must end in .png"),
         (
             (*ENGINE, "excitation.dynamometer.node=99", "--nodes", "14"),

@@ -32,7 +32,10 @@ def test_loads_spectra_root_stress_and_a_sweep_are_written_and_drawn(tmp_path, c
         "1750",
         "0.8",
     ]
-    assert main(["forced-response", *words, "--json", str(out), "--plot", str(figure)]) == 0
+    assert (
+        main(["forced-response", *words, "--json", str(out), "--plot", str(figure)])
+        == 0
+    )
     content, printed = json.loads(out.read_text()), capsys.readouterr().out
     drive = content["meshes"].index("21/45")
     # a cycle has no more than the whole run, and rattling more than the linear line
@@ -40,13 +43,23 @@ def test_loads_spectra_root_stress_and_a_sweep_are_written_and_drawn(tmp_path, c
     assert len(greatest) == 8
     assert np.all(np.array(greatest) <= content["time_greatest_tooth_force_n"])
     assert greatest[drive] > content["greatest_tooth_force_n"][drive]
-    assert content["time_typical_fluctuation_rpm"][0] <= content["time_speed_fluctuation_rpm"][0]
+    assert (
+        content["time_typical_fluctuation_rpm"][0]
+        <= content["time_speed_fluctuation_rpm"][0]
+    )
     # order 1 leads at the flywheel, with the linear line's amplitude
     assert content["time_orders"][:3] == [0.5, 1.0, 1.5]
-    assert_allclose(content["time_angle_deg"][0][1], content["angle_deg"][0][1], rtol=0.1)
+    assert_allclose(
+        content["time_angle_deg"][0][1], content["angle_deg"][0][1], rtol=0.1
+    )
     roots = content["root_stress"]
     assert content["root_stress_mesh"] == "21/45"
-    assert set(roots) == {"linear", "in_time", "linear_without_dampers", "in_time_without_dampers"}
+    assert set(roots) == {
+        "linear",
+        "in_time",
+        "linear_without_dampers",
+        "in_time_without_dampers",
+    }
     for name in ("linear", "in_time"):
         before, after = roots[f"{name}_without_dampers"], roots[name]
         assert after["iso_root_stress_mpa"] < before["iso_root_stress_mpa"]
@@ -60,7 +73,11 @@ def test_loads_spectra_root_stress_and_a_sweep_are_written_and_drawn(tmp_path, c
     )
     n_speeds = len(content["sweep_speeds_rpm"])
     for way in ("sweep_up", "sweep_down"):
-        assert np.shape(content[way]["angle_deg"]) == (1, n_speeds, len(content["sweep_orders"]))
+        assert np.shape(content[way]["angle_deg"]) == (
+            1,
+            n_speeds,
+            len(content["sweep_orders"]),
+        )
         assert np.shape(content[way]["typical_greatest_tooth_force_n"]) == (8, n_speeds)
         assert np.all(np.array(content[way]["speed_fluctuation_rpm"]) > 0.0)
     assert np.all(np.diff(content["sweep_speeds_rpm"]) > 0.0)
@@ -75,7 +92,10 @@ def test_loads_spectra_root_stress_and_a_sweep_are_written_and_drawn(tmp_path, c
             ["--sweep", "900", "700", "5"],
             "--sweep 900 700 5: give low and high speed in r/min and the seconds",
         ),
-        (["--sweep", "650", "1750", "0"], "--sweep 650 1750 0: give low and high speed"),
+        (
+            ["--sweep", "650", "1750", "0"],
+            "--sweep 650 1750 0: give low and high speed",
+        ),
         (
             ["--sweep", "650", "1750", "0.3"],
             "passes too few cycles at its low end; give 0.81 s or more",

@@ -17,8 +17,17 @@ def test_stiffness_tells_every_effect_for_itself(tmp_path, capsys):
     assert main(["stiffness", *HOT, "--json", str(out), "--plot", str(figure)]) == 0
     content, text = json.loads(out.read_text()), capsys.readouterr().out
     heat = content["heat"]
-    assert list(heat["variants"]) == ["cold", "true", "contact_ratio", "apparent", "softened"]
-    mean = {name: one["mesh_stiffness_mean_n_per_m"] for name, one in heat["variants"].items()}
+    assert list(heat["variants"]) == [
+        "cold",
+        "true",
+        "contact_ratio",
+        "apparent",
+        "softened",
+    ]
+    mean = {
+        name: one["mesh_stiffness_mean_n_per_m"]
+        for name, one in heat["variants"].items()
+    }
     assert mean["softened"] < mean["cold"] < mean["contact_ratio"] < mean["apparent"]
     assert (
         heat["bulk"]["pinion"]["tooth_temperature_degc"]
@@ -83,7 +92,16 @@ def test_transmission_error_is_that_of_hot_flanks(tmp_path, capsys):
     out, errors = tmp_path / "te.json", {}
     for heat in ("none", "chongqing_rated"):
         assert (
-            main(["transmission-error", *HOT[:-4], *HOT[-3:], f"heat={heat}", "--json", str(out)])
+            main(
+                [
+                    "transmission-error",
+                    *HOT[:-4],
+                    *HOT[-3:],
+                    f"heat={heat}",
+                    "--json",
+                    str(out),
+                ]
+            )
             == 0
         )
         errors[heat] = json.loads(out.read_text())
@@ -125,7 +143,10 @@ def test_transmission_error_is_that_of_hot_flanks(tmp_path, capsys):
         ),
         (["stiffness", *HOT, "heat.housing_temperature_degc=0"], "the gears jam"),
         (
-            ["plan", "plan.vary={heat.oil_temperature_degc:{distribution:uniform,low:20,high:60}}"],
+            [
+                "plan",
+                "plan.vary={heat.oil_temperature_degc:{distribution:uniform,low:20,high:60}}",
+            ],
             "'heat.oil_temperature_degc' is one value for a whole data set",
         ),
     ],

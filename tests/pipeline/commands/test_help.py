@@ -42,16 +42,23 @@ def test_help_has_an_example_and_the_exit_statuses(
     command, verb = name.split()
     assert MAIN[command]([verb, "--help"]) == 0
     text = capsys.readouterr().out
-    assert f"  {name}" in text.partition("example")[2] or f"{name} " in text.partition("example")[2]
+    assert (
+        f"  {name}" in text.partition("example")[2]
+        or f"{name} " in text.partition("example")[2]
+    )
     for status in (0, 2, 130):
         assert re.search(rf"^  {status} +\S", text, re.MULTILINE)
 
 
-@pytest.mark.parametrize(("name", "example"), EXAMPLES, ids=[example for _, example in EXAMPLES])
+@pytest.mark.parametrize(
+    ("name", "example"), EXAMPLES, ids=[example for _, example in EXAMPLES]
+)
 def test_every_example_parses_and_composes(name: str, example: str) -> None:
     words = words_of(example)
     assert " ".join(words[:2]) in command_page.parsers()
-    arguments = command_page.parsers()[" ".join(words[:2])].parse_intermixed_args(words[2:])
+    arguments = command_page.parsers()[" ".join(words[:2])].parse_intermixed_args(
+        words[2:]
+    )
     overrides = getattr(arguments, "overrides", None)
     if (
         words[1] in ("evaluate", "resume", "twin")
@@ -136,7 +143,10 @@ MISTAKES = {
 
 @pytest.mark.parametrize("typed", MISTAKES)
 def test_a_typical_mistake_is_one_line_that_helps(
-    typed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    typed: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
     command, *words = typed.split()
@@ -167,7 +177,9 @@ def test_what_is_typed_and_not_read_is_said(capsys: pytest.CaptureFixture[str]) 
 
 
 @pytest.mark.parametrize("group", [group.name for group in option_files.groups()])
-def test_every_group_and_option_has_a_line_and_the_keys_that_hydra_reads(group: str) -> None:
+def test_every_group_and_option_has_a_line_and_the_keys_that_hydra_reads(
+    group: str,
+) -> None:
     (one,) = [found for found in option_files.groups() if found.name == group]
     assert one.about
     for option in option_files.options(group):
@@ -176,8 +188,14 @@ def test_every_group_and_option_has_a_line_and_the_keys_that_hydra_reads(group: 
         assert keys
         must_be_given = [f"{key.name}=given" for key in keys if key.text == "???"]
         listed = {key.name for key in keys}
-        if one.primary == "generate" and group not in ("experiment", "system", "excitation"):
-            composed = compose("generate", [f"{group}={option.name}", *must_be_given])[group]
+        if one.primary == "generate" and group not in (
+            "experiment",
+            "system",
+            "excitation",
+        ):
+            composed = compose("generate", [f"{group}={option.name}", *must_be_given])[
+                group
+            ]
             assert {name.split(".")[1] for name in listed} == set(composed)
 
 
@@ -188,9 +206,19 @@ def test_options_of_a_users_folder_are_listed(
     (tmp_path / "gear" / "mine.yaml").write_text(
         "# Our pair. More.\nname: mine   # ours\nbacklash_um: 40\n"
     )
-    assert MAIN["gensig"](["options", "gear", "--config-dir", str(tmp_path), "--json"]) == 0
-    assert {"name": "mine", "about": "Our pair"} in json.loads(capsys.readouterr().out)["options"]
-    assert MAIN["gensig"](["options", "gear=mine", "--config-dir", str(tmp_path), "--json"]) == 0
+    assert (
+        MAIN["gensig"](["options", "gear", "--config-dir", str(tmp_path), "--json"])
+        == 0
+    )
+    assert {"name": "mine", "about": "Our pair"} in json.loads(capsys.readouterr().out)[
+        "options"
+    ]
+    assert (
+        MAIN["gensig"](
+            ["options", "gear=mine", "--config-dir", str(tmp_path), "--json"]
+        )
+        == 0
+    )
     name, backlash = json.loads(capsys.readouterr().out)["keys"]
     assert name == {
         "name": "gear.name",
@@ -216,7 +244,9 @@ def completed(line: str, tmp_path: Path) -> set[str]:
         "_ARGCOMPLETE_STDOUT_FILENAME": str(answer),
     }  # fmt: skip
     command = [sys.executable, "-c", f"from {line.split()[0]}.cli import main; main()"]
-    subprocess.run(command, env={**os.environ, **asked}, check=True, capture_output=True)
+    subprocess.run(
+        command, env={**os.environ, **asked}, check=True, capture_output=True
+    )
     return {word.strip() for word in answer.read_text(encoding="utf-8").split("\n")}
 
 
@@ -249,7 +279,11 @@ def test_the_tab_key_completes_paths_of_keys(tmp_path: Path) -> None:
     """Zsh and fish take `data=...` for one word and would offer no files by themselves."""
     (tmp_path / "here").mkdir()
     (tmp_path / "her.csv").touch()
-    for line in ("diagnose train data=", "gensig generate out=", "gensig modes system.gears_csv="):
+    for line in (
+        "diagnose train data=",
+        "gensig generate out=",
+        "gensig modes system.gears_csv=",
+    ):
         key = line.split()[-1]
         assert completed(f"{line}{tmp_path}/he", tmp_path) == {
             f"{key}{tmp_path}/here/",
@@ -266,7 +300,9 @@ def test_what_a_shell_sources_names_both_commands(
     assert all(command in text for command in MAIN)
     if shell == "bash":
         done = subprocess.run(
-            ["bash", "-c", f"{text}\ncomplete -p gensig diagnose"], capture_output=True, check=True
+            ["bash", "-c", f"{text}\ncomplete -p gensig diagnose"],
+            capture_output=True,
+            check=True,
         )
         assert done.stdout.count(b"\n") == 2
 

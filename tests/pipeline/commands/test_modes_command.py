@@ -42,7 +42,9 @@ def test_the_engine_has_the_frequencies_of_its_printed_tables(tmp_path, capsys):
     assert content["damping_ratio"][0] == 0.0
     assert_allclose(frequency[1:5], [28.31, 68.72, 162.06, 215.97], rtol=0, atol=0.005)
     assert len(frequency) == len(content["nodes"]) == len(content["shapes"]) == 67
-    assert {len(row) for row in content["shapes"] + content["kinetic_energy_share"]} == {67}
+    assert {
+        len(row) for row in content["shapes"] + content["kinetic_energy_share"]
+    } == {67}
     assert_allclose(np.sum(content["kinetic_energy_share"], axis=1), 1.0, rtol=1e-9)
     assert_allclose(np.max(np.abs(content["shapes"]), axis=1), 1.0, rtol=1e-12)
     assert_allclose(content["kinetic_energy_share"][4][15], 0.82, atol=0.005)
@@ -70,14 +72,20 @@ def test_lateral_motion_adds_22_masses(tmp_path):
     assert {len(row) for row in content["kinetic_energy_share"]} == {67}
     assert content["n_rigid_modes"] == 1
     assert_allclose(
-        content["natural_frequencies_hz"][1:4], [28.31, 68.71, 161.92], rtol=0, atol=0.01
+        content["natural_frequencies_hz"][1:4],
+        [28.31, 68.71, 161.92],
+        rtol=0,
+        atol=0.01,
     )
 
 
 def test_a_viscous_damper_is_an_option(tmp_path):
     content = modes_of(tmp_path, ENGINE, "system.viscous_damper_node=1")
     assert_allclose(
-        content["natural_frequencies_hz"][1:5], [28.56, 70.36, 166.49, 215.97], rtol=0, atol=0.005
+        content["natural_frequencies_hz"][1:5],
+        [28.56, 70.36, 166.49, 215.97],
+        rtol=0,
+        atol=0.005,
     )
 
 
@@ -102,30 +110,45 @@ def test_your_own_tables_are_read_by_their_path(tmp_path):
     text = tables.joinpath("engine_shafting.csv").read_text(encoding="utf-8")
     mine.write_text(text, encoding="utf-8")
     gears.write_text(
-        tables.joinpath("engine_gears.csv").read_text(encoding="utf-8"), encoding="utf-8"
+        tables.joinpath("engine_gears.csv").read_text(encoding="utf-8"),
+        encoding="utf-8",
     )
-    words = ["system=shaft_line", f"system.shafting_csv={mine}", f"system.gears_csv='{gears}'"]
+    words = [
+        "system=shaft_line",
+        f"system.shafting_csv={mine}",
+        f"system.gears_csv='{gears}'",
+    ]
     one, other = modes_of(tmp_path, *words), modes_of(tmp_path, ENGINE)
-    assert_allclose(one["natural_frequencies_hz"], other["natural_frequencies_hz"], rtol=0, atol=0)
+    assert_allclose(
+        one["natural_frequencies_hz"], other["natural_frequencies_hz"], rtol=0, atol=0
+    )
 
 
 def test_the_page_on_your_own_line_runs_as_it_stands(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     page = HOWTO.read_text(encoding="utf-8")
-    for name, table in zip(("line.csv", "gears.csv"), blocks(page, "csv")[:2], strict=True):
+    for name, table in zip(
+        ("line.csv", "gears.csv"), blocks(page, "csv")[:2], strict=True
+    ):
         (tmp_path / name).write_text(table, encoding="utf-8")
     command, *_ = blocks(
         page, "sh"
     )  # the others make records: tests/pipeline/records/test_motor_records.py
     assert main(command.split()[1:]) == 0
-    assert len(json.loads((tmp_path / "modes.json").read_text())["natural_frequencies_hz"]) == 4
+    assert (
+        len(json.loads((tmp_path / "modes.json").read_text())["natural_frequencies_hz"])
+        == 4
+    )
     assert (tmp_path / "modes.png").stat().st_size > 1000
     option, *_ = blocks(page, "yaml")
     (tmp_path / "mine" / "system").mkdir(parents=True)
     (tmp_path / "mine" / "system" / "my_fan.yaml").write_text(
         option.replace("/data", str(tmp_path)), encoding="utf-8"
     )
-    assert modes_of(tmp_path, "system=my_fan", "--config-dir", "mine")["system"] == "my_fan"
+    assert (
+        modes_of(tmp_path, "system=my_fan", "--config-dir", "mine")["system"]
+        == "my_fan"
+    )
     (code,) = blocks(page, "python")
     capsys.readouterr()
     exec(compile(code, "your_drive_line.md", "exec"), {})
@@ -177,7 +200,10 @@ def test_a_spoilt_table_names_row_and_column(tmp_path, capsys, node, column, val
             ["modes", ENGINE, "system.gears_csv=null"],
             "gear_mesh needs a table of gears; give system.gears_csv",
         ),
-        (["modes", ENGINE, "system.shafting_csv=engine_gears"], "column face_width_mm: unknown"),
+        (
+            ["modes", ENGINE, "system.shafting_csv=engine_gears"],
+            "column face_width_mm: unknown",
+        ),
         (["modes", ENGINE, "system.viscous_damper_node=99"], "has no such node"),
         (["modes", "fault=crack"], "modes are those of sound teeth"),
         (["modes", "--plot", "modes.txt"], "the name must end in .png"),

@@ -40,9 +40,16 @@ def test_masses_are_those_of_steel_discs_with_bores():
         (option.machine.pinion, 0.030, 0.012, 0.030),
         (option.machine.wheel, 0.0675, 0.020, 0.028),
     ):
-        mass = option.machine.material.density_kg_per_m3 * math.pi * (radius**2 - bore**2) * width
+        mass = (
+            option.machine.material.density_kg_per_m3
+            * math.pi
+            * (radius**2 - bore**2)
+            * width
+        )
         assert_allclose(body.mass, mass, rtol=1e-12, atol=0.0)
-        assert_allclose(body.inertia, 0.5 * mass * (radius**2 + bore**2), rtol=1e-12, atol=0.0)
+        assert_allclose(
+            body.inertia, 0.5 * mass * (radius**2 + bore**2), rtol=1e-12, atol=0.0
+        )
 
 
 def test_a_gearbox_twice_as_large_scales_as_it_should():
@@ -53,11 +60,18 @@ def test_a_gearbox_twice_as_large_scales_as_it_should():
         rtol=1e-12,
         atol=0,
     )
-    assert_allclose(two.machine.pinion.mass, 8.0 * one.machine.pinion.mass, rtol=1e-9, atol=0.0)
     assert_allclose(
-        two.pair.transverse_contact_ratio, one.pair.transverse_contact_ratio, rtol=1e-12, atol=0.0
+        two.machine.pinion.mass, 8.0 * one.machine.pinion.mass, rtol=1e-9, atol=0.0
     )
-    assert two.machine.pinion.support.stiffness_y > one.machine.pinion.support.stiffness_y
+    assert_allclose(
+        two.pair.transverse_contact_ratio,
+        one.pair.transverse_contact_ratio,
+        rtol=1e-12,
+        atol=0.0,
+    )
+    assert (
+        two.machine.pinion.support.stiffness_y > one.machine.pinion.support.stiffness_y
+    )
 
 
 def test_backlash_is_that_of_the_printed_rule():
@@ -66,7 +80,9 @@ def test_backlash_is_that_of_the_printed_rule():
     )  # 2/3 (0.06 + 0.05 + 0.15) mm
 
 
-def test_every_value_of_the_option_has_a_remark_and_the_given_ones_are_kept(tmp_path, capsys):
+def test_every_value_of_the_option_has_a_remark_and_the_given_ones_are_kept(
+    tmp_path, capsys
+):
     more = (
         "--widths",
         "25",
@@ -79,11 +95,19 @@ def test_every_value_of_the_option_has_a_remark_and_the_given_ones_are_kept(tmp_
         "0.2",
         "-0.1",
     )
-    assert main(["new", "gearbox", "mine", *SHEET, *more, "--dir", str(tmp_path), "--json"]) == 0
+    assert (
+        main(
+            ["new", "gearbox", "mine", *SHEET, *more, "--dir", str(tmp_path), "--json"]
+        )
+        == 0
+    )
     text = (tmp_path / "gear" / "mine.yaml").read_text()
     gear = yaml.safe_load(text)
     assert [gear[side]["face_width_mm"] for side in ("pinion", "wheel")] == [25.0, 25.0]
-    assert [gear[side]["bore_radius_mm"] for side in ("pinion", "wheel")] == [11.0, 20.0]
+    assert [gear[side]["bore_radius_mm"] for side in ("pinion", "wheel")] == [
+        11.0,
+        20.0,
+    ]
     assert [gear[side]["profile_shift"] for side in ("pinion", "wheel")] == [0.2, -0.1]
     assert gear["wheel"]["support"]["stiffness_x_n_per_m"] == 1e8
     bare = [
@@ -109,7 +133,10 @@ DOUBTS = {
 
 @pytest.mark.parametrize("words", DOUBTS)
 def test_another_unit_is_said_loudly(words, tmp_path, capsys):
-    assert main(["new", "gearbox", "mine", *SHEET, *words.split(), "--dir", str(tmp_path)]) == 0
+    assert (
+        main(["new", "gearbox", "mine", *SHEET, *words.split(), "--dir", str(tmp_path)])
+        == 0
+    )
     said = capsys.readouterr().err
     assert said == "" if DOUBTS[words] is None else re.search(DOUBTS[words], said)
 
@@ -120,9 +147,14 @@ def test_what_follows_is_that_of_the_textbook():
     assert_allclose(told["wheel_torque_nm"], 60.0 * 45 / 20, rtol=1e-12, atol=0.0)
     assert_allclose(told["power_kw"], 60.0 * 1500.0 / 9549.3, rtol=1e-5, atol=0.0)
     assert_allclose(
-        told["pitch_line_speed_m_per_s"], 1500.0 / 60.0 * math.pi * 0.060, rtol=1e-12, atol=0.0
+        told["pitch_line_speed_m_per_s"],
+        1500.0 / 60.0 * math.pi * 0.060,
+        rtol=1e-12,
+        atol=0.0,
     )
-    assert_allclose(told["tooth_force_per_width_n_per_mm"], 2000.0 / 28.0, rtol=1e-12, atol=0.0)
+    assert_allclose(
+        told["tooth_force_per_width_n_per_mm"], 2000.0 / 28.0, rtol=1e-12, atol=0.0
+    )
 
 
 def test_the_root_stress_is_that_of_the_verb(tmp_path, capsys):
@@ -130,7 +162,9 @@ def test_the_root_stress_is_that_of_the_verb(tmp_path, capsys):
     assert main(words) == 0
     told = json.loads(capsys.readouterr().out)["derived"]["nominal_root_stress_mpa"]
     system = read_root_strength(read_request(["gear=mine"], config_dir=tmp_path).config)
-    assert_allclose(told, system.gears()[system.decisive].nominal * 1e-6, rtol=1e-9, atol=0.0)
+    assert_allclose(
+        told, system.gears()[system.decisive].nominal * 1e-6, rtol=1e-9, atol=0.0
+    )
 
 
 MEASURED = next(
@@ -140,7 +174,9 @@ MEASURED = next(
 )
 
 
-def test_the_measured_one_of_the_page_prints_what_the_page_shows(tmp_path, monkeypatch, capsys):
+def test_the_measured_one_of_the_page_prints_what_the_page_shows(
+    tmp_path, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
     pages = list(blocks((ROOT / "docs/howto/your_gearbox.md").read_text()))
     place = next(k for k, block in enumerate(pages) if block.code == MEASURED)
@@ -154,7 +190,9 @@ def test_the_measured_one_of_the_page_prints_what_the_page_shows(tmp_path, monke
         if re.search(r": \S", line) and not line.lstrip().startswith(("#", "-"))
     ]
     assert [
-        line for line in values if not re.search(r"# (given|derived|assumed|about|whole)", line)
+        line
+        for line in values
+        if not re.search(r"# (given|derived|assumed|about|whole)", line)
     ] == []
     config = read_request(["experiment=reducer"], config_dir="configs").config
     assert (config["sensing"]["sampling_rate_hz"], config["sensing"]["sensors"]) == (
@@ -162,7 +200,13 @@ def test_the_measured_one_of_the_page_prints_what_the_page_shows(tmp_path, monke
         ["housing"],
     )
     assert config["sensing"]["path"]["natural_frequency_hz"] == [300, 10000]
-    assert config["plan"]["classes"] == ["healthy", "crack", "pitting", "missing_tooth", "wear"]
+    assert config["plan"]["classes"] == [
+        "healthy",
+        "crack",
+        "pitting",
+        "missing_tooth",
+        "wear",
+    ]
     assert config["plan"]["vary"]["operating.torque_nm"] == {
         "distribution": "uniform",
         "low": 27.5,
@@ -172,11 +216,21 @@ def test_the_measured_one_of_the_page_prints_what_the_page_shows(tmp_path, monke
     assert main(plan[1:]) == 0
     printed = capsys.readouterr().out
     assert [
-        line for line in pages[place + 3].code.strip().splitlines() if line not in printed
+        line
+        for line in pages[place + 3].code.strip().splitlines()
+        if line not in printed
     ] == []
 
 
-REALISTIC = ("--experiment", "realistic", "--rate", "16000", "--classes", "healthy", "wear")
+REALISTIC = (
+    "--experiment",
+    "realistic",
+    "--rate",
+    "16000",
+    "--classes",
+    "healthy",
+    "wear",
+)
 
 
 @pytest.mark.parametrize(
@@ -197,7 +251,15 @@ def test_the_printed_commands_work_as_printed(helix, tmp_path, monkeypatch, caps
     )  # speed that wanders
     assert (tmp_path / "mine.png").stat().st_size > 10_000
     assert (
-        main([*generate, *cheap, "plan.n_records=10", "plan.n_units=2", "executor.n_workers=1"])
+        main(
+            [
+                *generate,
+                *cheap,
+                "plan.n_records=10",
+                "plan.n_units=2",
+                "executor.n_workers=1",
+            ]
+        )
         == 0
     )
     assert main(report) == 0
@@ -227,7 +289,10 @@ def test_the_printed_commands_work_as_printed(helix, tmp_path, monkeypatch, caps
             "no option 'worn' of fault; did you mean 'wear'?",
         ),
         (("mine", *SHEET, "--sensors", "top"), "add --experiment realistic"),
-        (("mine", *SHEET, "--speed-range", "1400", "1500"), "give shares of the rated value"),
+        (
+            ("mine", *SHEET, "--speed-range", "1400", "1500"),
+            "give shares of the rated value",
+        ),
         (("mine", *SHEET, "--rate", "1000"), "above the usable band of 390.6 Hz"),
         (("mine", *SHEET, "--grade", "20"), "quality.iso1328_grade = 20 must lie in"),
         (
@@ -267,7 +332,9 @@ def test_on_a_terminal_it_asks(tmp_path, monkeypatch):
         ["20", "20, 45", "3", "1500", "60", "", "30 28", "", ""]
     )  # the first is one number too few
     monkeypatch.setattr("builtins.input", lambda question: next(answers))
-    monkeypatch.setattr(sys, "stdin", type("Terminal", (), {"isatty": lambda self: True})())
+    monkeypatch.setattr(
+        sys, "stdin", type("Terminal", (), {"isatty": lambda self: True})()
+    )
     assert main(["new", "gearbox", "mine", "--dir", str(tmp_path)]) == 0
     gear = yaml.safe_load((tmp_path / "gear" / "mine.yaml").read_text())
     assert [gear[side]["face_width_mm"] for side in ("pinion", "wheel")] == [30.0, 28.0]

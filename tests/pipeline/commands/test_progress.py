@@ -21,14 +21,18 @@ from gensig.dataset.storage.checksums import read_checksums
 from gensig.execution.local import LocalExecutor
 from gensig.production.folder import Progress, run_folder
 
-STATE = Progress(n_done=60, n_records=100, n_failed=2, n_made=40, n_bytes=8_000_000, reason="")
+STATE = Progress(
+    n_done=60, n_records=100, n_failed=2, n_made=40, n_bytes=8_000_000, reason=""
+)
 
 
 def test_plain_lines_come_every_few_seconds_even_before_a_shard(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(console, "LINE_SECONDS", 0.05)
-    with ShardProgress(quiet=False, n_records=100, n_shards=17, n_at_work=3) as progress:
+    with ShardProgress(
+        quiet=False, n_records=100, n_shards=17, n_at_work=3
+    ) as progress:
         time.sleep(0.3)
         before = capsys.readouterr().err.splitlines()
         progress(STATE)
@@ -36,12 +40,16 @@ def test_plain_lines_come_every_few_seconds_even_before_a_shard(
     after = capsys.readouterr().err.splitlines()
     assert len(before) >= 2
     assert all(
-        re.fullmatch(r"0 of 100 records, 0 s; 3 of 17 shards at work, counted when whole", line)
+        re.fullmatch(
+            r"0 of 100 records, 0 s; 3 of 17 shards at work, counted when whole", line
+        )
         for line in before
     )
     assert len(after) >= 2
     assert all(
-        re.fullmatch(r"60 of 100 records, [0-9.]+ records/s, 8\.0 MB, 0 s left, 2 failed", line)
+        re.fullmatch(
+            r"60 of 100 records, [0-9.]+ records/s, 8\.0 MB, 0 s left, 2 failed", line
+        )
         for line in after
     )
 
@@ -92,7 +100,9 @@ def test_a_terminal_shows_a_bar_with_rate_bytes_and_time_left(tmp_path: Path) ->
         f"out={tmp_path / 'x'}",
     ]
     environment = {**os.environ, "TERM": "xterm", "COLUMNS": "120", "NO_COLOR": "1"}
-    process = subprocess.Popen(command, stderr=theirs, stdout=subprocess.DEVNULL, env=environment)
+    process = subprocess.Popen(
+        command, stderr=theirs, stdout=subprocess.DEVNULL, env=environment
+    )
     os.close(theirs)
     shown = io.BytesIO()
     while True:
@@ -112,7 +122,9 @@ def test_a_terminal_shows_a_bar_with_rate_bytes_and_time_left(tmp_path: Path) ->
 def test_the_log_tells_what_happened_and_is_closed_with_the_set(tmp_path: Path) -> None:
     out = make(tmp_path / "data")
     lines = (out / "run.log").read_text().splitlines()
-    assert all(re.match(r"20\d\d-\d\d-\d\dT\d\d:\d\d:\d\d\+00:00 \S", line) for line in lines)
+    assert all(
+        re.match(r"20\d\d-\d\d-\d\dT\d\d:\d\d:\d\d\+00:00 \S", line) for line in lines
+    )
     text = [line.partition(" ")[2] for line in lines]
     assert "6 records in 6 shards are planned" in text[0]
     assert "LocalExecutor(n_workers=1): 6 of 6 shards to make" in text[1]
@@ -123,7 +135,9 @@ def test_the_log_tells_what_happened_and_is_closed_with_the_set(tmp_path: Path) 
     before = (out / "run.log").read_bytes()
     assert main(["resume", "--quiet", str(out)]) == 0
     assert main(["finalize", str(out)]) == 0
-    assert run_folder(out, executor=LocalExecutor(n_workers=1), on_shard=lambda _: None) == (0, [])
+    assert run_folder(
+        out, executor=LocalExecutor(n_workers=1), on_shard=lambda _: None
+    ) == (0, [])
     assert main(["verify", str(out)]) == 0
     assert (out / "run.log").read_bytes() == before
 
@@ -137,8 +151,13 @@ def test_the_log_tells_of_a_run_that_ended_early(
     out = tmp_path / "data"
     with monkeypatch.context() as patch:
         patch.setattr(ShardProgress, "__call__", interrupt)
-        assert main(["generate", "--quiet", *TINY, "executor.n_workers=1", f"out={out}"]) == 130
-    assert "ended by KeyboardInterrupt" in (out / "run.log").read_text().splitlines()[-1]
+        assert (
+            main(["generate", "--quiet", *TINY, "executor.n_workers=1", f"out={out}"])
+            == 130
+        )
+    assert (
+        "ended by KeyboardInterrupt" in (out / "run.log").read_text().splitlines()[-1]
+    )
     assert main(["resume", "--quiet", "--workers", "1", str(out)]) == 0
     assert "5 of 6 shards to make" in (out / "run.log").read_text()
     assert verify(out).complete
@@ -154,7 +173,10 @@ def test_a_log_that_cannot_be_written_stops_nothing(tmp_path: Path) -> None:
 
 
 def test_figures_are_the_same_however_the_set_was_made(tmp_path: Path) -> None:
-    one, other = make(tmp_path / "one"), make(tmp_path / "other", "executor.n_workers=2")
+    one, other = (
+        make(tmp_path / "one"),
+        make(tmp_path / "other", "executor.n_workers=2"),
+    )
     names = sorted(path.name for path in (one / "figures").iterdir())
     assert names == ["0-healthy.png", "1-crack.png"]
     assert all(

@@ -12,7 +12,18 @@ PUMP = "gear=engine_pump_drive"
 def test_it_writes_what_it_promises(tmp_path, capsys):
     out, figure = tmp_path / "root.json", tmp_path / "root.png"
     assert (
-        main(["root-stress", PUMP, "--stress", "349.39", "--json", str(out), "--plot", str(figure)])
+        main(
+            [
+                "root-stress",
+                PUMP,
+                "--stress",
+                "349.39",
+                "--json",
+                str(out),
+                "--plot",
+                str(figure),
+            ]
+        )
         == 0
     )
     content = json.loads(out.read_text())
@@ -22,9 +33,10 @@ def test_it_writes_what_it_promises(tmp_path, capsys):
     assert content["tangential_force_n"] == pytest.approx(8393, abs=1)
     assert content["torque_nm"] == pytest.approx(680, abs=1)
     assert content["iso_root_stress_mpa"] == pytest.approx(349.39)
-    assert (content["safety_factor_paper"], content["safety_factor_iso"]) == pytest.approx(
-        (1.353, 2.7), rel=0.02
-    )
+    assert (
+        content["safety_factor_paper"],
+        content["safety_factor_iso"],
+    ) == pytest.approx((1.353, 2.7), rel=0.02)
     assert content["reliability_paper"] == "general"
     assert content["tangential_force_over_mesh_n"] > content["tangential_force_n"]
     assert (
@@ -33,9 +45,14 @@ def test_it_writes_what_it_promises(tmp_path, capsys):
         == len(content["load_share"])
         > 300
     )
-    assert content["largest_root_stress_mpa"] == max(content["root_stress_mpa"]) < 349.39
+    assert (
+        content["largest_root_stress_mpa"] == max(content["root_stress_mpa"]) < 349.39
+    )
     assert content["root_stress_mpa"] == content["gears"]["wheel"]["root_stress_mpa"]
-    assert content["gears"]["pinion"]["safety_factor_paper"] > content["safety_factor_paper"]
+    assert (
+        content["gears"]["pinion"]["safety_factor_paper"]
+        > content["safety_factor_paper"]
+    )
     assert content["roll_angle_deg"] == sorted(content["roll_angle_deg"])
     assert content["strength"]["bending_limit_mpa"] == pytest.approx(525.25)
     assert figure.read_bytes().startswith(b"\x89PNG")
@@ -70,7 +87,9 @@ def test_a_helical_pair_and_an_option_of_ones_own(tmp_path, capsys):
         == 0
     )
     after = json.loads(out.read_text())
-    assert after["safety_factor_iso"] == pytest.approx(before["safety_factor_iso"] * 430 / 525.25)
+    assert after["safety_factor_iso"] == pytest.approx(
+        before["safety_factor_iso"] * 430 / 525.25
+    )
     assert "sigma_Flim 430 MPa" in capsys.readouterr().out
 
 
@@ -90,7 +109,10 @@ def test_strength_is_no_draw(capsys):
         (["--stress", "much"], "--stress much is not a number"),
         (["operating.torque_nm=0"], "operating.torque_nm = 0 must be positive"),
         (["operating.torque_nm=-5", "system=helical_pair"], "must be positive"),
-        (["strength.bending_limit_mpa=0"], "strength.bending_limit_mpa = 0 must be positive"),
+        (
+            ["strength.bending_limit_mpa=0"],
+            "strength.bending_limit_mpa = 0 must be positive",
+        ),
         (["strength.bending_limit_mpa=steel"], "is not a number"),
         (["strength.load_point=middle"], "allowed: outer_single_pair, tip"),
         (["strength.edition=2001"], "allowed: 2019, 2006"),

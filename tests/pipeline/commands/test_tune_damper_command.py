@@ -58,7 +58,9 @@ def test_it_writes_an_option_that_the_line_takes(tmp_path, capsys):
     response = json.loads(taken.read_text())
     drive = response["meshes"].index("21/45")
     assert_allclose(
-        response["greatest_tooth_force_n"][drive], content["after"]["greatest_force_n"], rtol=1e-6
+        response["greatest_tooth_force_n"][drive],
+        content["after"]["greatest_force_n"],
+        rtol=1e-6,
     )
     assert response["node_numbers"][-1] == 68
     assert main(["modes", "system=damped", "--config-dir", str(tmp_path)]) == 0
@@ -68,10 +70,19 @@ def test_it_writes_an_option_that_the_line_takes(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ((*ENGINE, "--mesh", "21", "44"), "nodes 21 and 44 do not mesh; these do: 3/18"),
+        (
+            (*ENGINE, "--mesh", "21", "44"),
+            "nodes 21 and 44 do not mesh; these do: 3/18",
+        ),
         ((*PUMP, "--nodes", "99"), "the shaft line has no node 99; it has 1 to 67"),
-        ((*PUMP, "--nodes", "45", "45"), "dampers on nodes 45, 45: name each node once"),
-        ((*PUMP, "--run", "900", "700", "10"), "--run 900 700 10: give low, high and step"),
+        (
+            (*PUMP, "--nodes", "45", "45"),
+            "dampers on nodes 45, 45: name each node once",
+        ),
+        (
+            (*PUMP, "--run", "900", "700", "10"),
+            "--run 900 700 10: give low, high and step",
+        ),
         (
             (*PUMP, "--most-inertia", "0", "--run", "1700", "1750", "50"),
             "give a positive one for each damper",

@@ -16,7 +16,11 @@ from gensig.record.simulate import simulate_record
 from gensig.record.vibration_limit import ROW, limited_by_vibration
 from gensig.systems.wear import read_wear_case, wear_fault
 
-FAST = ("operating.duration_s=0.1", "sensing.channels=[pinion_y,wheel_y]", "wear.threshold_um=40")
+FAST = (
+    "operating.duration_s=0.1",
+    "sensing.channels=[pinion_y,wheel_y]",
+    "wear.threshold_um=40",
+)
 
 
 def config_of(*words):
@@ -32,7 +36,9 @@ def recorded_rms(depth, case):
     """RMS of the noiseless record that a data set holds of flanks worn so far."""
     config = config_of("dataset.store_clean=true", "sensing.snr_db=null")
     fault = wear_fault(case, depth)
-    config = config.with_keys("plan", n_records=1, n_units=1, n_gearboxes=1, classes=["worn"])
+    config = config.with_keys(
+        "plan", n_records=1, n_units=1, n_gearboxes=1, classes=["worn"]
+    )
     config = config.with_entries(classes={"worn": fault})
     row = {
         **make_plan(config).record(0),
@@ -48,7 +54,10 @@ def test_the_depth_found_is_where_records_reach_the_limit():
     assert case.options.threshold == vibration.limit_depth
     life = wear_life(case)
     assert life.threshold == pytest.approx(vibration.limit_depth, rel=1e-6)
-    new, worn = recorded_rms(0.0 * life.depth[-1] + 1e-12, case), recorded_rms(life.depth[-1], case)
+    new, worn = (
+        recorded_rms(0.0 * life.depth[-1] + 1e-12, case),
+        recorded_rms(life.depth[-1], case),
+    )
     assert_allclose(new, vibration.rms[0], rtol=1e-4)
     assert 20.0 * np.log10((worn / new).max()) == pytest.approx(4.0, abs=0.1)
     before = vibration.depth < 0.999 * vibration.limit_depth
@@ -64,7 +73,9 @@ def test_a_limit_in_m_per_s2_is_of_the_loudest_sensor_and_the_first_of_both_coun
     _, by_level = limited(f"wear.vibration_limit_m_per_s2={level}")
     end = int(np.argmin(np.abs(by_level.depth - by_level.limit_depth)))
     assert by_level.rms[end].max() == pytest.approx(level, rel=0.02)
-    _, both = limited(f"wear.vibration_limit_m_per_s2={level}", "wear.vibration_rise_db=4")
+    _, both = limited(
+        f"wear.vibration_limit_m_per_s2={level}", "wear.vibration_rise_db=4"
+    )
     assert both.limit_depth == pytest.approx(
         min(by_level.limit_depth, by_rise.limit_depth), rel=0.02
     )
@@ -93,7 +104,9 @@ def test_the_command_tells_what_ended_the_life(tmp_path, capsys):
     assert content["ended_by"] == "vibration"
     assert told["is_reached"] is True
     assert told["sensors"] == ["pinion_y", "wheel_y"]
-    assert max(content["pinion_depth_um"]) == pytest.approx(content["threshold_um"], rel=1e-6)
+    assert max(content["pinion_depth_um"]) == pytest.approx(
+        content["threshold_um"], rel=1e-6
+    )
     assert np.shape(told["rms_m_per_s2"]) == (len(told["hours"]), 2)
     end = int(np.argmin(np.abs(np.array(told["depth_um"]) - content["threshold_um"])))
     assert told["hours"][end] == pytest.approx(content["life_hours"], rel=0.01)
@@ -130,7 +143,9 @@ def test_lives_of_a_data_set_end_at_the_depth_found():
     assert plan.columns["life_failed"].tolist() == [1] * 6
     for last in (2, 5):
         parts = json.loads(plan.record(last)["faults_json"])
-        deepest = max(part["wear_depth_um"] * max(part["wear_profile"]) for part in parts)
+        deepest = max(
+            part["wear_depth_um"] * max(part["wear_profile"]) for part in parts
+        )
         assert deepest == pytest.approx(vibration.limit_depth * 1e6, rel=0.01)
         assert plan.record(last)["severity"] == pytest.approx(1.0, abs=0.01)
 
@@ -165,7 +180,12 @@ def test_mistakes_are_one_line(words, message, capsys):
 def test_worn_flanks_at_the_limit_are_an_option_for_records(tmp_path):
     target = tmp_path / "mine" / "fault" / "loud.yaml"
     target.parent.mkdir(parents=True)
-    assert main(["wear-life", *FAST, "wear.vibration_rise_db=4", "--out", str(target)]) == 0
+    assert (
+        main(["wear-life", *FAST, "wear.vibration_rise_db=4", "--out", str(target)])
+        == 0
+    )
     option = yaml.safe_load(target.read_text())
     _, vibration = limited("wear.vibration_rise_db=4")
-    assert option["parts"][0]["limit_um"] == pytest.approx(vibration.limit_depth * 1e6, rel=1e-3)
+    assert option["parts"][0]["limit_um"] == pytest.approx(
+        vibration.limit_depth * 1e6, rel=1e-3
+    )

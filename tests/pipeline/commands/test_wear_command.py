@@ -55,7 +55,9 @@ def test_keys_of_the_papers_rule(tmp_path):
     assert content["n_intervals"] == 50
     assert content["deepest"]["gear"] == "both"
     harder = life(tmp_path, *words, "wear.hardness_hbs=374")
-    assert harder["life_hours"] / life(tmp_path, *words)["life_hours"] == pytest.approx(2.0)
+    assert harder["life_hours"] / life(tmp_path, *words)["life_hours"] == pytest.approx(
+        2.0
+    )
 
 
 def test_worn_flanks_are_told_and_drawn(tmp_path, capsys):
@@ -71,14 +73,27 @@ def test_worn_flanks_are_told_and_drawn(tmp_path, capsys):
     assert history["hours"][-1] == pytest.approx(content["life_hours"])
     error = history["transmission_error_peak_to_peak_um"]
     assert error[-1] < 0.95 * error[0]  # so little wear is a relief
-    new, worn = (np.array(content[f"pinion_curvature_radius_{key}_mm"]) for key in ("new", "worn"))
+    new, worn = (
+        np.array(content[f"pinion_curvature_radius_{key}_mm"])
+        for key in ("new", "worn")
+    )
     assert np.abs(worn / new - 1.0).max() > 0.01
     assert content["n_intervals"] is None
 
 
 def test_a_map_and_its_laws(tmp_path, capsys):
     figure = tmp_path / "map.svg"
-    words = ["--torques", "50", "100", "200", "--speeds", "60", "120", "--plot", str(figure)]
+    words = [
+        "--torques",
+        "50",
+        "100",
+        "200",
+        "--speeds",
+        "60",
+        "120",
+        "--plot",
+        str(figure),
+    ]
     content = life(tmp_path, HARBIN, *words)
     lives = np.array(content["map"]["life_hours"])
     assert content["map"]["torque_nm"] == [50.0, 100.0, 200.0]
@@ -88,10 +103,15 @@ def test_a_map_and_its_laws(tmp_path, capsys):
     power = content["laws"][0]
     assert (power["form"], power["coefficients"]["b"]) == ("power", pytest.approx(1.0))
     assert power["torque_nm"] == [50.0, 200.0]
-    assert [law["form"] for law in content["laws"]] == ["power", "logarithm", "exponential"]
+    assert [law["form"] for law in content["laws"]] == [
+        "power",
+        "logarithm",
+        "exponential",
+    ]
     logarithm = content["laws"][1]
     assert (
-        f"no life from {logarithm['no_life_from_torque_nm']:.4g} N m on" in capsys.readouterr().out
+        f"no life from {logarithm['no_life_from_torque_nm']:.4g} N m on"
+        in capsys.readouterr().out
     )
     assert logarithm["no_life_from_torque_nm"] > 200.0
     assert figure.stat().st_size > 1000
@@ -106,7 +126,12 @@ def test_worn_flanks_as_an_option_that_other_commands_take(tmp_path, capsys):
     assert "add --force to replace it" in capsys.readouterr().err
     option = yaml.safe_load(target.read_text())
     assert [part["gear"] for part in option["parts"]] == ["pinion", "wheel"]
-    words = ["fault=worn", "--config-dir", str(tmp_path / "mine"), "operating.duration_s=0.1"]
+    words = [
+        "fault=worn",
+        "--config-dir",
+        str(tmp_path / "mine"),
+        "operating.duration_s=0.1",
+    ]
     assert main(["simulate", *words]) == 0
     assert "severity 1.0" in capsys.readouterr().out
     out = tmp_path / "s.json"
@@ -116,8 +141,13 @@ def test_worn_flanks_as_an_option_that_other_commands_take(tmp_path, capsys):
 
 
 def test_a_helical_pair_wears_slice_by_slice(tmp_path):
-    content = life(tmp_path, "system=helical_pair", "mesh.n_slices=6", "wear.threshold_um=5")
-    assert np.shape(content["wheel_depth_by_slice_um"]) == (6, len(content["position_mm"]))
+    content = life(
+        tmp_path, "system=helical_pair", "mesh.n_slices=6", "wear.threshold_um=5"
+    )
+    assert np.shape(content["wheel_depth_by_slice_um"]) == (
+        6,
+        len(content["position_mm"]),
+    )
     assert content["overlap_ratio"] > 0.9
     assert max(content["pinion_depth_um"]) == pytest.approx(5.0, rel=1e-6)
 
@@ -131,7 +161,10 @@ def test_what_would_yield_before_it_wears_is_said(capsys):
     ("words", "message"),
     [
         (["wear.threshold_um=9000"], "is deeper than the tooth"),
-        (["wear.threshold=50"], "unknown key 'wear.threshold'; did you mean 'wear.threshold_um'"),
+        (
+            ["wear.threshold=50"],
+            "unknown key 'wear.threshold'; did you mean 'wear.threshold_um'",
+        ),
         (["wear.hardness_hbs=0"], "wear.hardness_hbs = 0 must be positive"),
         (["wear.coefficient=-1"], "wear.coefficient = -1 must be positive"),
         (["wear.wheel.coefficient=3"], "wear.wheel.coefficient = 3 must be at most 1"),
@@ -162,4 +195,6 @@ def test_records_refuse_the_papers_pair_and_plans_its_keys(tmp_path, capsys):
     assert main(["plan", vary]) == 2
     assert "one value for a whole data set" in capsys.readouterr().err
     assert main(["plan", "wear.rule=rust"]) == 2
-    assert "wear.rule = 'rust'; allowed: band, fixed_intervals" in capsys.readouterr().err
+    assert (
+        "wear.rule = 'rust'; allowed: band, fixed_intervals" in capsys.readouterr().err
+    )

@@ -40,8 +40,12 @@ def test_a_set_of_an_idlers_teeth_is_whole_and_comes_again(folder, capsys):
                 ("", False) if name == "healthy" else ("wheel", True)
             )
         # the crank gear drives: the shaft told is the crank's, its teeth 59
-        np.testing.assert_allclose(file["speed_set_rpm"][:], file["params/operating.speed_rpm"][:])
-        np.testing.assert_allclose(file["mesh_frequency_hz"][:], 59 * file["speed_rpm"][:] / 60)
+        np.testing.assert_allclose(
+            file["speed_set_rpm"][:], file["params/operating.speed_rpm"][:]
+        )
+        np.testing.assert_allclose(
+            file["mesh_frequency_hz"][:], 59 * file["speed_rpm"][:] / 60
+        )
         signals = file["acceleration"][:]
         assert np.isfinite(signals).all()
         assert np.all(signals.std(axis=-1) > 0.0)
@@ -49,7 +53,9 @@ def test_a_set_of_an_idlers_teeth_is_whole_and_comes_again(folder, capsys):
 
 def test_a_record_depends_on_its_row_alone(folder):
     row = next(
-        row for row in PlanRows(folder / PLAN).records(0, 4) if row["label_name"] == "broken"
+        row
+        for row in PlanRows(folder / PLAN).records(0, 4)
+        if row["label_name"] == "broken"
     )
     with h5py.File(folder / "shards" / "shard-00000.h5") as file:
         stored = file["acceleration"][int(row["row"])]

@@ -50,9 +50,7 @@ def test_simulate_shows_and_writes_a_record_of_the_engine(folder, tmp_path, caps
     assert "flywheel_speed" in told
     assert "rad/s " in told
     with open(tmp_path / "one.csv") as file:
-        header = (
-            "time_s,flywheel_speed_rad_per_s,pump_end_speed_rad_per_s,pinion_rotation_rad_per_s2"
-        )
+        header = "time_s,flywheel_speed_rad_per_s,pump_end_speed_rad_per_s,pinion_rotation_rad_per_s2"
         assert file.readline().startswith(header)
 
 
@@ -75,7 +73,9 @@ def test_labels_units_and_columns_tell_gear_tooth_and_shaft(folder):
         np.testing.assert_allclose(
             file["speed_set_rpm"][:], 0.5 * file["params/operating.speed_rpm"][:]
         )
-        np.testing.assert_allclose(file["mesh_frequency_hz"][:], 54 * file["speed_rpm"][:] / 60)
+        np.testing.assert_allclose(
+            file["mesh_frequency_hz"][:], 54 * file["speed_rpm"][:] / 60
+        )
         signals = file["acceleration"][:]
         assert np.isfinite(signals).all()
         assert np.all(signals.std(axis=-1) > 0.0)
@@ -87,7 +87,9 @@ def test_a_record_depends_on_its_row_alone_and_a_sham_has_no_fault(folder):
     faulty = next(row for row in rows if row["label_name"] == "missing_tooth")
     with h5py.File(folder / "shards" / "shard-00000.h5") as file:
         stored = file["acceleration"][int(faulty["row"])]
-    np.testing.assert_array_equal(simulate_record(config, faulty).signals["acceleration"], stored)
+    np.testing.assert_array_equal(
+        simulate_record(config, faulty).signals["acceleration"], stored
+    )
     sham = simulate_record(config.with_keys("plan", sham=True), faulty)
     assert not np.array_equal(sham.signals["acceleration"], stored)
 
@@ -115,7 +117,9 @@ def test_a_record_depends_on_its_row_alone_and_a_sham_has_no_fault(folder):
         (["fault.tooth=60"], "whose teeth are 0..53"),
     ],
 )
-def test_what_no_record_can_be_made_of_is_refused_in_one_line(words, told, tmp_path, capsys):
+def test_what_no_record_can_be_made_of_is_refused_in_one_line(
+    words, told, tmp_path, capsys
+):
     assert main(["generate", *SMALL, *words, f"out={tmp_path / 'set'}"]) != 0
     error = capsys.readouterr().err.strip()
     assert told in error
@@ -125,7 +129,10 @@ def test_what_no_record_can_be_made_of_is_refused_in_one_line(words, told, tmp_p
 
 def test_a_backend_of_gear_pairs_is_refused(tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(BACKENDS, "other", BACKENDS[DEFAULT_BACKEND])
-    assert main(["generate", *SMALL, "solver.backend=other", f"out={tmp_path / 'set'}"]) != 0
+    assert (
+        main(["generate", *SMALL, "solver.backend=other", f"out={tmp_path / 'set'}"])
+        != 0
+    )
     error = capsys.readouterr().err.strip()
     assert error.endswith(
         "solver.backend = other: a drive line has an integrator of its own; leave it out"
@@ -155,6 +162,12 @@ def test_forced_response_in_time_says_what_parts(tmp_path, capsys):
     drive = content["meshes"].index("21/45")
     assert content["time_energy_residual"] < 1e-3
     assert content["time_contact_loss_fraction"][drive] > 0.1
-    assert content["time_speed_fluctuation_rpm"][1] > 1.5 * content["speed_fluctuation_rpm"][44]
-    assert content["time_greatest_tooth_force_n"][drive] > content["mean_tooth_force_n"][drive]
+    assert (
+        content["time_speed_fluctuation_rpm"][1]
+        > 1.5 * content["speed_fluctuation_rpm"][44]
+    )
+    assert (
+        content["time_greatest_tooth_force_n"][drive]
+        > content["mean_tooth_force_n"][drive]
+    )
     assert "on the back flanks" in capsys.readouterr().out

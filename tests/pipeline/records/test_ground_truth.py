@@ -32,7 +32,9 @@ def told(tmp_path_factory) -> Path:
 
 def test_signals_keep_their_bits(plain: Path, told: Path) -> None:
     with gensig.open_dataset(plain) as a, gensig.open_dataset(told) as b:
-        assert all(a.signals(k).tobytes() == b.signals(k).tobytes() for k in range(a.n_records))
+        assert all(
+            a.signals(k).tobytes() == b.signals(k).tobytes() for k in range(a.n_records)
+        )
         assert not set(TRACES) & set(a.signal_names)
         assert np.isnan(a.column("detectability")).all()
 
@@ -63,7 +65,9 @@ def test_faults_can_be_told_and_sound_gears_cannot(told: Path) -> None:
     assert (found[names == "crack"] > 0.0).all()
 
 
-def test_the_set_is_whole_and_is_made_again(told: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_set_is_whole_and_is_made_again(
+    told: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["verify", str(told)]) == 0
     assert main(["reproduce", str(told), "--records", "3"]) == 0
     capsys.readouterr()
@@ -72,11 +76,21 @@ def test_the_set_is_whole_and_is_made_again(told: Path, capsys: pytest.CaptureFi
 @pytest.mark.parametrize("kind", ["npz", "parquet", "hdf5"])
 def test_exports_hold_it(told: Path, tmp_path: Path, kind: str) -> None:
     pytest.importorskip("pyarrow")
-    assert main(["export", str(told), "--to", kind, "--out", str(tmp_path / "out")]) == 0
+    assert (
+        main(["export", str(told), "--to", kind, "--out", str(tmp_path / "out")]) == 0
+    )
 
 
 def test_a_switch_that_is_none_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["generate", "dataset.store_mesh_state=perhaps", f"out={tmp_path / 'set'}"]) != 0
-    assert "dataset.store_mesh_state = 'perhaps' must be true or false" in capsys.readouterr().err
+    assert (
+        main(
+            ["generate", "dataset.store_mesh_state=perhaps", f"out={tmp_path / 'set'}"]
+        )
+        != 0
+    )
+    assert (
+        "dataset.store_mesh_state = 'perhaps' must be true or false"
+        in capsys.readouterr().err
+    )

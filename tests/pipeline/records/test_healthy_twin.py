@@ -30,7 +30,9 @@ def records(*overrides: str, sham: bool = False) -> list:
     plan = make_plan(config)
     config = config.with_keys("plan", sham=sham)
     forget_twins()
-    return simulate_records(config, [plan.record(index) for index in range(plan.n_records)])
+    return simulate_records(
+        config, [plan.record(index) for index in range(plan.n_records)]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -43,34 +45,54 @@ def test_it_has_the_same_bits_whatever_the_fault(reference: str) -> None:
     """Severity zero changes no bit of it, so that it cannot tell the class; it does change the faulty records."""
     words = (*SMALL, f"sensing.snr_reference={reference}")
     for faulty, sound in zip(records(*words), records(*words, sham=True), strict=True):
-        assert faulty.signals["healthy_twin"].tobytes() == sound.signals["healthy_twin"].tobytes()
+        assert (
+            faulty.signals["healthy_twin"].tobytes()
+            == sound.signals["healthy_twin"].tobytes()
+        )
         changed = (
-            faulty.signals["acceleration"].tobytes() != sound.signals["acceleration"].tobytes()
+            faulty.signals["acceleration"].tobytes()
+            != sound.signals["acceleration"].tobytes()
         )
         assert changed == (faulty.values["label_name"] != "healthy")
 
 
 def test_nor_with_nuisances_drift_and_lost_samples() -> None:
-    for faulty, sound in zip(records(*REALISTIC), records(*REALISTIC, sham=True), strict=True):
-        assert faulty.signals["healthy_twin"].tobytes() == sound.signals["healthy_twin"].tobytes()
+    for faulty, sound in zip(
+        records(*REALISTIC), records(*REALISTIC, sham=True), strict=True
+    ):
+        assert (
+            faulty.signals["healthy_twin"].tobytes()
+            == sound.signals["healthy_twin"].tobytes()
+        )
 
 
-def test_its_noise_is_as_loud_and_has_nothing_to_do_with_that_of_the_record(found: list) -> None:
+def test_its_noise_is_as_loud_and_has_nothing_to_do_with_that_of_the_record(
+    found: list,
+) -> None:
     for record in found:
         if record.values["label_name"] != "healthy":
             continue
         clean = record.signals["acceleration_clean"].astype(float)
-        own, other = (record.signals[name] - clean for name in ("acceleration", "healthy_twin"))
+        own, other = (
+            record.signals[name] - clean for name in ("acceleration", "healthy_twin")
+        )
         for noise in (own, other):
-            assert_allclose(noise.var(axis=1), record.signals["noise_power"], rtol=0.05, atol=0)
-        assert np.abs(np.mean(own * other, axis=1) / record.signals["noise_power"]).max() < 0.05
+            assert_allclose(
+                noise.var(axis=1), record.signals["noise_power"], rtol=0.05, atol=0
+            )
+        assert (
+            np.abs(np.mean(own * other, axis=1) / record.signals["noise_power"]).max()
+            < 0.05
+        )
 
 
 def test_a_healthy_record_has_one_that_differs_by_noise_alone(found: list) -> None:
     """The difference of a healthy record and its twin holds twice the noise; that of a missing tooth holds more."""
     ratio = {
         record.values["label_name"]: np.var(
-            record.signals["acceleration"].astype(float) - record.signals["healthy_twin"], axis=1
+            record.signals["acceleration"].astype(float)
+            - record.signals["healthy_twin"],
+            axis=1,
         )
         / record.signals["noise_power"]
         for record in found
@@ -83,7 +105,8 @@ def test_drift_and_lost_samples_are_its_own() -> None:
     for record in records(*REALISTIC, "sensing.snr_db=null"):
         if record.values["label_name"] == "healthy":
             assert (
-                record.signals["acceleration"].tobytes() != record.signals["healthy_twin"].tobytes()
+                record.signals["acceleration"].tobytes()
+                != record.signals["healthy_twin"].tobytes()
             )
 
 
@@ -97,7 +120,9 @@ def test_a_record_has_the_same_twin_alone_and_among_others(found: list) -> None:
             assert values.tobytes() == found[index].signals[name].tobytes()
 
 
-def test_a_twin_that_does_not_stay_finite_fails_its_record(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_twin_that_does_not_stay_finite_fails_its_record(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     from gensig.errors import SimulationError
     from gensig.record import inputs as module
 
@@ -112,13 +137,20 @@ def test_a_twin_that_does_not_stay_finite_fails_its_record(monkeypatch: pytest.M
     assert len(failed) == 1
     assert failed[0].values["label_name"] != "healthy"
     assert failed[0].values["status_reason"] == "the motion grew without bound"
-    assert all(np.isnan(failed[0].signals[name]).all() for name in ("acceleration", "healthy_twin"))
+    assert all(
+        np.isnan(failed[0].signals[name]).all()
+        for name in ("acceleration", "healthy_twin")
+    )
 
 
 @pytest.fixture(scope="module", params=["float32", "int16"])
-def stored(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def stored(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
     return make(
-        tmp_path_factory.mktemp("stored") / "set", SWITCH, f"dataset.sample_type={request.param}"
+        tmp_path_factory.mktemp("stored") / "set",
+        SWITCH,
+        f"dataset.sample_type={request.param}",
     )
 
 
@@ -132,7 +164,9 @@ def test_a_set_with_twins_is_whole_and_is_made_again(
         assert data.signals(3, name="healthy_twin").shape == data.signals(3).shape
 
 
-def test_the_other_bits_are_those_of_a_set_without(stored: Path, tmp_path: Path) -> None:
+def test_the_other_bits_are_those_of_a_set_without(
+    stored: Path, tmp_path: Path
+) -> None:
     with gensig.open_dataset(stored) as data:
         plain = make(
             tmp_path / "plain",
@@ -162,8 +196,20 @@ def test_exports_of_it(stored: Path, tmp_path: Path, kind: str) -> None:
 def test_a_switch_that_is_none_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["generate", "dataset.store_healthy_twin=perhaps", f"out={tmp_path / 'set'}"]) != 0
-    assert "dataset.store_healthy_twin = 'perhaps' must be true or false" in capsys.readouterr().err
+    assert (
+        main(
+            [
+                "generate",
+                "dataset.store_healthy_twin=perhaps",
+                f"out={tmp_path / 'set'}",
+            ]
+        )
+        != 0
+    )
+    assert (
+        "dataset.store_healthy_twin = 'perhaps' must be true or false"
+        in capsys.readouterr().err
+    )
 
 
 def test_its_draws_have_a_stream_of_their_own() -> None:

@@ -37,7 +37,12 @@ def test_a_set_is_whole_and_every_record_is_found_good(
     assert main(["reproduce", str(helical), "--records", "2"]) == 0
     capsys.readouterr()
     with gensig.open_dataset(helical) as data:
-        assert tuple(data.channel_names) == ("pinion_y", "pinion_z", "wheel_y", "wheel_z")
+        assert tuple(data.channel_names) == (
+            "pinion_y",
+            "pinion_z",
+            "wheel_y",
+            "wheel_z",
+        )
         assert set(data.column("label_name")) == {
             "healthy",
             "crack",
@@ -55,10 +60,14 @@ def test_a_set_is_whole_and_every_record_is_found_good(
             "overlap_ratio": round(ratio, 4),
         }
         card = (helical / "README.md").read_text().replace("\\", "")
-        assert [f"| {name} | {value} |" in card for name, value in told.items()] == [True] * 3
+        assert [f"| {name} | {value} |" in card for name, value in told.items()] == [
+            True
+        ] * 3
         assert set(data.column("integration_check")) == {"error"}
         assert data.column("integration_error").max() <= 1e-3
-        level = np.array([np.square(data.signals(k)).mean(axis=1) for k in range(data.n_records)])
+        level = np.array(
+            [np.square(data.signals(k)).mean(axis=1) for k in range(data.n_records)]
+        )
         assert (level > 0.0).all()
 
 
@@ -81,7 +90,10 @@ def test_bits_do_not_depend_on_the_neighbours() -> None:
     rows = [plan.record(place) for place in range(3)]
     for row, together in zip(rows, simulate_records(config, rows), strict=True):
         alone = simulate_record(config, row)
-        assert alone.signals["acceleration"].tobytes() == together.signals["acceleration"].tobytes()
+        assert (
+            alone.signals["acceleration"].tobytes()
+            == together.signals["acceleration"].tobytes()
+        )
 
 
 def test_without_a_helix_it_moves_like_the_spur_pair() -> None:
@@ -93,11 +105,17 @@ def test_without_a_helix_it_moves_like_the_spur_pair() -> None:
     ]
     spur = read_system(read_request(words).config)
     sliced = read_system(
-        read_request([*words, "system=helical_pair", "gear=xiamen_23_84", "mesh.n_slices=8"]).config
+        read_request(
+            [*words, "system=helical_pair", "gear=xiamen_23_84", "mesh.n_slices=8"]
+        ).config
     )
-    one, other = simulate_together([Run(system=system, faults=()) for system in (spur, sliced)])
+    one, other = simulate_together(
+        [Run(system=system, faults=()) for system in (spur, sliced)]
+    )
     scale = one.acceleration.std(axis=1)
-    assert np.all(np.abs(one.acceleration - other.acceleration).std(axis=1) < 0.01 * scale)
+    assert np.all(
+        np.abs(one.acceleration - other.acceleration).std(axis=1) < 0.01 * scale
+    )
 
 
 def test_an_axial_force_pushes_gears_apart_along_their_shafts() -> None:
@@ -106,19 +124,26 @@ def test_an_axial_force_pushes_gears_apart_along_their_shafts() -> None:
         "operating.duration_s=0.02",
         "sensing.channels=[pinion_z,wheel_z]",
     ]
-    dynamics = pair_dynamics(Run(system=read_system(read_request(words).config), faults=()))
+    dynamics = pair_dynamics(
+        Run(system=read_system(read_request(words).config), faults=())
+    )
     rest = dict(zip(dynamics.dofs, dynamics.rest(), strict=True))
     thrust = dynamics.mesh_force * np.tan(dynamics.table.pair.base_helix_angle)
     assert rest["pinion_z"] == pytest.approx(
         -thrust / dynamics.pinion.support.stiffness_z, rel=1e-9
     )
-    assert rest["wheel_z"] == pytest.approx(thrust / dynamics.wheel.support.stiffness_z, rel=1e-9)
+    assert rest["wheel_z"] == pytest.approx(
+        thrust / dynamics.wheel.support.stiffness_z, rel=1e-9
+    )
 
 
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (["mesh.slices_in_phase=true"], "mesh.slices_in_phase = true is for comparing statics"),
+        (
+            ["mesh.slices_in_phase=true"],
+            "mesh.slices_in_phase = true is for comparing statics",
+        ),
         (["sensing.channels=[pinion_u]"], "no channel pinion_u"),
         (
             ["gear.pinion.support.stiffness_z_n_per_m=-1"],

@@ -48,7 +48,10 @@ def test_a_set_of_the_second_stage_is_whole_and_tells_gear_and_tooth(folder, cap
     capsys.readouterr()
     assert main(["inspect", str(folder)]) == 0
     assert "of the load, as the motor feels it" in capsys.readouterr().out
-    assert "torque of the load, as the motor feels it |" in (folder / "README.md").read_text()
+    assert (
+        "torque of the load, as the motor feels it |"
+        in (folder / "README.md").read_text()
+    )
     with h5py.File(folder / "shards" / "shard-00000.h5") as file:
         assert {value.decode() for value in file["status"][:]} == {"ok"}
         assert np.all(file["integration_error"][:] < 1e-3)
@@ -66,7 +69,9 @@ def test_a_set_of_the_second_stage_is_whole_and_tells_gear_and_tooth(folder, cap
             assert (gear.decode(), 0 <= tooth < 80) == (
                 ("", False) if name == "healthy" else ("wheel", True)
             )
-        assert_allclose(file["speed_set_rpm"][:], file["params/operating.speed_rpm"][:] / 3.0)
+        assert_allclose(
+            file["speed_set_rpm"][:], file["params/operating.speed_rpm"][:] / 3.0
+        )
         assert_allclose(file["mesh_frequency_hz"][:], 48 * file["speed_rpm"][:] / 60)
         assert np.isfinite(file["acceleration"][:]).all()
 
@@ -99,10 +104,25 @@ def test_loads_of_a_steady_mesh_are_its_static_torque(monkeypatch):
     assert_allclose(loads, 30.0, rtol=0.35)
 
 
-def test_simulate_shows_writes_and_repeats_records_of_the_line(folder, tmp_path, capsys):
-    words = ["simulate", "experiment=two_stage", "operating.duration_s=0.1", "fault=missing_tooth"]
+def test_simulate_shows_writes_and_repeats_records_of_the_line(
+    folder, tmp_path, capsys
+):
+    words = [
+        "simulate",
+        "experiment=two_stage",
+        "operating.duration_s=0.1",
+        "fault=missing_tooth",
+    ]
     assert (
-        main([*words, "--plot", str(tmp_path / "one.png"), "--output", str(tmp_path / "one.csv")])
+        main(
+            [
+                *words,
+                "--plot",
+                str(tmp_path / "one.png"),
+                "--output",
+                str(tmp_path / "one.csv"),
+            ]
+        )
         == 0
     )
     told = capsys.readouterr().out
@@ -114,11 +134,16 @@ def test_simulate_shows_writes_and_repeats_records_of_the_line(folder, tmp_path,
         )
     assert (tmp_path / "one.png").stat().st_size > 10000
     rows = PlanRows(folder / PLAN).records(0, 8)
-    number = next(k for k, row in enumerate(rows) if row["label_name"] == "missing_tooth")
+    number = next(
+        k for k, row in enumerate(rows) if row["label_name"] == "missing_tooth"
+    )
     again = ["simulate", "--from", str(folder), "--record", str(number), "--output"]
     assert main([*again, str(tmp_path / "again.h5")]) == 0
     assert main([*again, str(tmp_path / "twin.h5"), "--twin"]) == 0
-    with h5py.File(tmp_path / "again.h5") as own, h5py.File(tmp_path / "twin.h5") as twin:
+    with (
+        h5py.File(tmp_path / "again.h5") as own,
+        h5py.File(tmp_path / "twin.h5") as twin,
+    ):
         with h5py.File(folder / "shards" / "shard-00000.h5") as file:
             stored = file["acceleration"][int(rows[number]["row"])]
         assert_allclose(own["acceleration"][0], stored, rtol=0.0, atol=0.0)
@@ -135,12 +160,19 @@ def test_gears_that_bear_far_more_than_their_support_is_for_are_named():
         read_machine(read_request(words).config).check()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        read_machine(read_request([*words, "system.support.force_n=2000"]).config).check()
-        torsion = ["system.lateral=false", "sensing.channels=[pinion_rotation,wheel_rotation]"]
+        read_machine(
+            read_request([*words, "system.support.force_n=2000"]).config
+        ).check()
+        torsion = [
+            "system.lateral=false",
+            "sensing.channels=[pinion_rotation,wheel_rotation]",
+        ]
         read_machine(read_request([*words, *torsion]).config).check()
 
 
-def test_stiffness_is_that_of_the_record_mesh_and_a_helical_one_is_refused(tmp_path, capsys):
+def test_stiffness_is_that_of_the_record_mesh_and_a_helical_one_is_refused(
+    tmp_path, capsys
+):
     words = [
         "stiffness",
         *MOTOR,
@@ -149,22 +181,32 @@ def test_stiffness_is_that_of_the_record_mesh_and_a_helical_one_is_refused(tmp_p
         "fault=crack",
     ]
     out = tmp_path / "curves.json"
-    assert main([*words, "--json", str(out), "--plot", str(tmp_path / "curves.png")]) == 0
+    assert (
+        main([*words, "--json", str(out), "--plot", str(tmp_path / "curves.png")]) == 0
+    )
     content = json.loads(out.read_text())
     # the same teeth as a pair, under what the first stage makes of the torque
     line = read_machine(
-        read_request([*MOTOR, "system.record_mesh=[5,6]", "operating.torque_nm=60"]).config
+        read_request(
+            [*MOTOR, "system.record_mesh=[5,6]", "operating.torque_nm=60"]
+        ).config
     )
     alone = SpurPair(
         pair=line.pair, material=line.material, mesh=line.mesh, pinion=line.pinion, wheel=line.wheel,
         operating=replace(line.operating, torque=180.0), sensing=line.sensing, quality=line.quality, solver=line.solver,
     ).stiffness_curves()  # fmt: skip
-    assert_allclose(line.stiffness_curves().mesh_stiffness, alone.mesh_stiffness, rtol=1e-9)
+    assert_allclose(
+        line.stiffness_curves().mesh_stiffness, alone.mesh_stiffness, rtol=1e-9
+    )
     assert min(content["faulty_pair_stiffness_n_per_m"]) < min(
         content["single_pair_stiffness_n_per_m"]
     )
     capsys.readouterr()
-    engine = ["system=engine_gear_train", "excitation=engine_v20", "system.record_mesh=[3,18]"]
+    engine = [
+        "system=engine_gear_train",
+        "excitation=engine_v20",
+        "system.record_mesh=[3,18]",
+    ]
     assert main(["stiffness", *engine]) != 0
     error = capsys.readouterr().err.strip()
     assert "system.record_mesh 3/18 is of helical gears" in error
@@ -181,7 +223,17 @@ def test_an_encoder_and_the_load_s_own_torque_are_stored(tmp_path):
     )  # fmt: skip
     out = tmp_path / "set"
     assert (
-        main(["generate", *SMALL, *words, "plan.n_records=4", "plan.n_units=1", f"out={out}"]) == 0
+        main(
+            [
+                "generate",
+                *SMALL,
+                *words,
+                "plan.n_records=4",
+                "plan.n_units=1",
+                f"out={out}",
+            ]
+        )
+        == 0
     )
     with h5py.File(out / "shards" / "shard-00000.h5") as file:
         torque = file["torque_set"][:]
@@ -224,7 +276,10 @@ def test_an_encoder_and_the_load_s_own_torque_are_stored(tmp_path):
         ),
         (["excitation=engine_v20"], "the shaft line has no node 13"),
         (["excitation.kind=turbine"], "allowed: engine, motor_and_load"),
-        (["excitation.motor.slip=0"], "excitation.motor.slip = 0 must lie between 0 and 1"),
+        (
+            ["excitation.motor.slip=0"],
+            "excitation.motor.slip = 0 must lie between 0 and 1",
+        ),
         (
             ["excitation.motor.torque_ripple={share: 2, order: 6}"],
             "excitation.motor.torque_ripple.share = 2 must lie in 0..1",
@@ -238,7 +293,10 @@ def test_an_encoder_and_the_load_s_own_torque_are_stored(tmp_path):
             ["excitation.load.law=cubic"],
             "excitation.load.law = 'cubic'; allowed: constant, linear, quadratic",
         ),
-        (["excitation.reference.torque_nm=0"], "speed_rpm and torque_nm must be positive"),
+        (
+            ["excitation.reference.torque_nm=0"],
+            "speed_rpm and torque_nm must be positive",
+        ),
         (["excitation.motor=3"], "excitation.motor = 3 must be a group of keys"),
     ],
 )
@@ -253,10 +311,21 @@ def test_the_figure_shows_the_forces_of_every_mesh(monkeypatch, tmp_path):
     monkeypatch.setattr(line_time, "SETTLING", 0.02)
     drawn = []
     monkeypatch.setattr(
-        engine_figures, "save", lambda figure, path: drawn.append(figure) or path.write_bytes(b"0")
+        engine_figures,
+        "save",
+        lambda figure, path: drawn.append(figure) or path.write_bytes(b"0"),
     )
     assert (
-        main(["forced-response", *MOTOR, "--time", "0.1", "--plot", str(tmp_path / "found.png")])
+        main(
+            [
+                "forced-response",
+                *MOTOR,
+                "--time",
+                "0.1",
+                "--plot",
+                str(tmp_path / "found.png"),
+            ]
+        )
         == 0
     )
     panels = {axes.get_title(): axes for axes in drawn[0].axes}
@@ -276,7 +345,9 @@ def test_forced_response_says_torque_and_meshes_and_draws(tmp_path, capsys):
     assert "mean 1995 N" in told
     assert (tmp_path / "found.png").stat().st_size > 10000
     assert main(["forced-response", *MOTOR, "--run", "500", "1000", "100"]) != 0
-    assert "turns evenly without excitation.motor.torque_ripple" in capsys.readouterr().err
+    assert (
+        "turns evenly without excitation.motor.torque_ripple" in capsys.readouterr().err
+    )
     ripple = "excitation.motor.torque_ripple={share: 0.02, order: 12}"
     words = [
         ripple,

@@ -24,7 +24,9 @@ BASE = ("plan.n_records=4", "plan.n_units=1", "plan.classes=[healthy,missing_too
 def shaking():
     """A machine's nuisances on ideal bearing sensors."""
     listed = read_request(["sensing=machine"]).config["sensing"]["nuisances"]
-    config = read_request([*BASE, "sensing=bearing", "dataset.store_detectability=true"]).config
+    config = read_request(
+        [*BASE, "sensing=bearing", "dataset.store_detectability=true"]
+    ).config
     return config.with_keys("sensing", nuisances=listed)
 
 
@@ -49,7 +51,10 @@ def both(shaking, still):
 
 
 def added(one, other):
-    return one.signals["acceleration_source"].astype(float) - other.signals["acceleration_source"]
+    return (
+        one.signals["acceleration_source"].astype(float)
+        - other.signals["acceleration_source"]
+    )
 
 
 def test_without_any_a_record_is_the_same_object(still):
@@ -63,14 +68,18 @@ def test_without_any_a_record_is_the_same_object(still):
 def test_every_record_has_them_before_path_and_sensor(both):
     for one, other in zip(*both, strict=True):
         difference = added(one, other)
-        level, own = difference.std(axis=1), other.signals["acceleration_source"].std(axis=1)
+        level, own = (
+            difference.std(axis=1),
+            other.signals["acceleration_source"].std(axis=1),
+        )
         assert np.all(level > 1e-4 * own)
         assert np.all(level < own)
         np.testing.assert_allclose(
             one.signals["shaft_angle"], other.signals["shaft_angle"], rtol=0, atol=0
         )
         clean = (
-            one.signals["acceleration_clean"].astype(float) - other.signals["acceleration_clean"]
+            one.signals["acceleration_clean"].astype(float)
+            - other.signals["acceleration_clean"]
         )
         np.testing.assert_allclose(clean, difference, rtol=0, atol=1e-4 * own.max())
 
@@ -81,7 +90,9 @@ def with_nuisances_of(inputs, motion):
 
 def test_no_class_has_others(shaking):
     """At the same angle of the shaft a faulty machine and a sound one are shaken by the same bits."""
-    faulty = next(row for row in rows_of(shaking) if row["label_name"] == "missing_tooth")
+    faulty = next(
+        row for row in rows_of(shaking) if row["label_name"] == "missing_tooth"
+    )
     reader = InputReader(shaking)
     system = reader.inputs(faulty).machine
     angle = system.operating.speed * np.arange(5120) / system.sensing.sampling_rate
@@ -139,8 +150,12 @@ def test_a_part_more_leaves_the_others_alone(shaking, still):
     rest = added(made(fewer, [row])[0], made(still, [row])[0])
     whole = added(made(shaking, [row])[0], made(still, [row])[0])
     of_the_last = whole - rest
-    assert of_the_last[2].std() > 0.1 * whole[2].std()  # the neighbour's mesh, on the wheel
-    np.testing.assert_allclose(of_the_last[0], 0.0, rtol=0, atol=1e-3 * np.abs(whole[0]).max())
+    assert (
+        of_the_last[2].std() > 0.1 * whole[2].std()
+    )  # the neighbour's mesh, on the wheel
+    np.testing.assert_allclose(
+        of_the_last[0], 0.0, rtol=0, atol=1e-3 * np.abs(whole[0]).max()
+    )
 
 
 def test_a_twin_made_later_has_the_nuisances_of_its_record(shaking):
@@ -148,9 +163,16 @@ def test_a_twin_made_later_has_the_nuisances_of_its_record(shaking):
     config = shaking.with_keys("sensing", snr_reference="record")
     row = rows_of(config)[1]
     twin, original = simulate_twin(config, row), simulate_record(config, row)
-    noise = twin.signals["acceleration"].astype(float) - twin.signals["acceleration_clean"]
-    np.testing.assert_allclose(noise.var(axis=1), original.signals["noise_power"], rtol=0.1, atol=0)
-    same = original.signals["acceleration"].astype(float) - original.signals["acceleration_clean"]
+    noise = (
+        twin.signals["acceleration"].astype(float) - twin.signals["acceleration_clean"]
+    )
+    np.testing.assert_allclose(
+        noise.var(axis=1), original.signals["noise_power"], rtol=0.1, atol=0
+    )
+    same = (
+        original.signals["acceleration"].astype(float)
+        - original.signals["acceleration_clean"]
+    )
     np.testing.assert_allclose(noise, same, rtol=0, atol=1e-3 * same.std())
 
 

@@ -17,7 +17,9 @@ SHORT = (
     "plan.n_repeats=1",
 )
 FOUND = list(blocks((ROOT / "docs" / "howto" / PAGE).read_text(encoding="utf-8")))
-COMMANDS = next(block.code for block in FOUND if "test_own_drive_line" in block.mark).splitlines()
+COMMANDS = next(
+    block.code for block in FOUND if "test_own_drive_line" in block.mark
+).splitlines()
 
 
 @pytest.fixture(scope="module")
@@ -39,5 +41,7 @@ def test_commands_of_the_page_run(line, folder, monkeypatch, capsys):
     short = {"generate": SHORT, "simulate": SHORT[:1]}.get(words[0], ())
     assert main([*words, *short]) == 0, capsys.readouterr().err
     if words[0] == "generate":
-        with h5py.File(folder / "runs" / "my_records" / "shards" / "shard-00000.h5") as file:
+        with h5py.File(
+            folder / "runs" / "my_records" / "shards" / "shard-00000.h5"
+        ) as file:
             assert {value.decode() for value in file["status"][:]} == {"ok"}

@@ -48,7 +48,12 @@ def test_generate_verify_reproduce(folder, capsys):
 def test_channels_are_the_sensors(folder):
     data = open_dataset(folder)
     assert data.channel_names == SENSORS
-    assert data.attributes["source_names"] == ["pinion_x", "pinion_y", "wheel_x", "wheel_y"]
+    assert data.attributes["source_names"] == [
+        "pinion_x",
+        "pinion_y",
+        "wheel_x",
+        "wheel_y",
+    ]
     assert data.signals(0).shape == (3, 2560)
     assert np.all(np.isnan(data.column("detectability")))
     assert np.all(data.column("clipped_fraction") == 0.0)
@@ -60,7 +65,9 @@ def test_a_stream_gives_the_same(folder):
     streamed = open_stream(config)
     assert streamed.channel_names == SENSORS
     record = streamed[2]
-    assert np.array_equal(record.signals["acceleration"], open_dataset(folder).signals(2))
+    assert np.array_equal(
+        record.signals["acceleration"], open_dataset(folder).signals(2)
+    )
     assert record.signals["acceleration_source"].shape == (4, 2560)
 
 
@@ -68,7 +75,11 @@ def test_reading_for_diagnosis(folder):
     torch = pytest.importorskip("torch")
     from diagnose.data.torch_sets import VibrationDataset
 
-    options = {"channels": ["housing_top"], "window_samples": 256, "stride_samples": 256}
+    options = {
+        "channels": ["housing_top"],
+        "window_samples": 256,
+        "stride_samples": 256,
+    }
     window, label = VibrationDataset(
         open_dataset(folder), "random_window_leaky", "train", **options
     )[0]
@@ -91,14 +102,18 @@ def test_the_floor_is_the_same_for_all_classes_and_at_the_ratio_asked_for():
         for row, record in own:
             instrument = InputReader(config).inputs(row).instrument
             noise = (
-                record.signals["acceleration"].astype(float) - record.signals["acceleration_clean"]
+                record.signals["acceleration"].astype(float)
+                - record.signals["acceleration_clean"]
             )
             floors.append(instrument.power(noise))
             if row["label_name"] == "healthy":
                 healthy = record.signals["signal_power"]
         np.testing.assert_allclose(floors[0], floors[1], rtol=1e-4, atol=0)
         np.testing.assert_allclose(
-            10 * np.log10(healthy / floors[0]), config["sensing"]["snr_db"], rtol=0, atol=0.1
+            10 * np.log10(healthy / floors[0]),
+            config["sensing"]["snr_db"],
+            rtol=0,
+            atol=0.1,
         )
 
 
@@ -114,13 +129,19 @@ def test_the_source_is_that_of_a_sensor_on_the_bearing():
     _, _, housing = records("sensing=housing", *perfect, "dataset.store_source=true")
     _, _, bearing = records(*perfect, "dataset.store_clean=true")
     for one, other in zip(housing, bearing, strict=True):
-        ours, theirs = one.signals["acceleration_source"], other.signals["acceleration_clean"]
+        ours, theirs = (
+            one.signals["acceleration_source"],
+            other.signals["acceleration_clean"],
+        )
         sound = one.values["label_name"] == "healthy"
         # a crack that is in mesh where the machine starts moves its static equilibrium, to which the drive is anchored
-        assert np.all((ours - theirs).std(axis=1) < (2e-3 if sound else 0.05) * theirs.std(axis=1))
+        assert np.all(
+            (ours - theirs).std(axis=1) < (2e-3 if sound else 0.05) * theirs.std(axis=1)
+        )
         for name in ("mesh_pinion_tooth", "mesh_wheel_tooth", "fault_engaged"):
             shown, expected = (
-                np.sort(np.atleast_2d(record.signals[name]), axis=0) for record in (one, other)
+                np.sort(np.atleast_2d(record.signals[name]), axis=0)
+                for record in (one, other)
             )
             assert np.mean(shown != expected) < 2e-3
         assert one.signals["fault_engaged"].any() != sound
@@ -142,7 +163,12 @@ def test_a_converter_that_clips_marks_its_records():
 def test_a_user_file_that_does_not_fit_stops_the_plan(tmp_path, capsys):
     file = tmp_path / "response.csv"
     file.write_text("frequency_hz,x\n" + "".join(f"{line},1\n" for line in range(20)))
-    words = ["plan", "sensing=measured", f"sensing.path.file={file}", "plan.n_records=1"]
+    words = [
+        "plan",
+        "sensing=measured",
+        f"sensing.path.file={file}",
+        "plan.n_records=1",
+    ]
     assert main(words) != 0
     told = capsys.readouterr().err.strip()
     assert "no column pinion_x_to_housing_real" in told

@@ -48,7 +48,13 @@ def gear_angle(config, row, record, shaft):
     """Angle of a gear from where its tooth 0 enters contact, worked out from the columns alone."""
     teeth = {gear: config["gear"][gear]["n_teeth"] for gear in ("pinion", "wheel")}
     turned = record.signals["shaft_angle"] * teeth["pinion"] / teeth[shaft]
-    return turned + 2.0 * np.pi * (row[f"start_tooth_{shaft}"] + row["start_phase"]) / teeth[shaft]
+    return (
+        turned
+        + 2.0
+        * np.pi
+        * (row[f"start_tooth_{shaft}"] + row["start_phase"])
+        / teeth[shaft]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +89,9 @@ def test_the_mark_meets_the_same_tooth_in_every_record_of_a_gearbox():
         newest += record.signals["mesh_pinion_tooth"][:, samples].max(axis=0).tolist()
     assert len(newest) >= 20
     assert len({record.values["start_tooth_pinion"] for record in found}) > 2
-    assert np.ptp(newest) <= 1  # a mark near the change of teeth sees it now before, now after
+    assert (
+        np.ptp(newest) <= 1
+    )  # a mark near the change of teeth sees it now before, now after
 
 
 def test_mean_speed_is_that_of_the_column(steady):
@@ -91,7 +99,9 @@ def test_mean_speed_is_that_of_the_column(steady):
     for record in found:
         _, speed = speed_of_pulses(pulse_times(record.signals["tacho"], RATE))
         assert len(speed) == 5
-        assert_allclose(60.0 * speed.mean(), record.values["speed_rpm"], rtol=1e-3, atol=0)
+        assert_allclose(
+            60.0 * speed.mean(), record.values["speed_rpm"], rtol=1e-3, atol=0
+        )
         assert_allclose(speed, speed.mean(), rtol=2e-3, atol=0)
 
 
@@ -101,7 +111,9 @@ def test_jitter_moves_pulses_as_far_as_asked():
     off = []
     for record in found:
         times = pulse_times(record.signals["tacho"], RATE)
-        angle = np.interp(times, np.arange(10_240) / RATE, record.signals["shaft_angle"])
+        angle = np.interp(
+            times, np.arange(10_240) / RATE, record.signals["shaft_angle"]
+        )
         off.append((angle - angle[0] + np.radians(9.0)) % np.radians(18.0))
         off[-1] -= off[-1].mean()
     assert_allclose(np.degrees(np.concatenate(off).std()), 0.2, rtol=0.1, atol=0)
@@ -111,11 +123,17 @@ def test_jitter_moves_pulses_as_far_as_asked():
 
 def test_the_tachometer_makes_a_ramp_comparable():
     """The pinion's mesh harmonics after order tracking stand out of what a constant speed leaves of them."""
-    _, _, found = records(*STORED, RAMP, "plan.classes=[healthy]", "sensing.snr_db=null")
+    _, _, found = records(
+        *STORED, RAMP, "plan.classes=[healthy]", "sensing.snr_db=null"
+    )
     for record in found:
         signal, tacho = record.signals["acceleration"][1], record.signals["tacho"]
-        tracked = resample_by_pulses(signal, RATE, pulse_times(tacho, RATE)).mean(axis=0)
-        plain = time_synchronous_average(signal, RATE, record.values["speed_rpm"] / 60.0)
+        tracked = resample_by_pulses(signal, RATE, pulse_times(tacho, RATE)).mean(
+            axis=0
+        )
+        plain = time_synchronous_average(
+            signal, RATE, record.values["speed_rpm"] / 60.0
+        )
         mesh = [np.abs(np.fft.rfft(one))[23] / len(one) for one in (tracked, plain)]
         assert mesh[0] > 1.5 * mesh[1]
 
@@ -123,7 +141,9 @@ def test_the_tachometer_makes_a_ramp_comparable():
 def test_the_encoder_reads_the_angle_within_its_errors(steady):
     config, rows, found = steady
     encoder = config["sensing"]["encoder"]
-    most = np.radians(encoder["eccentricity_error_deg"] + 4.0 * encoder["line_error_deg"])
+    most = np.radians(
+        encoder["eccentricity_error_deg"] + 4.0 * encoder["line_error_deg"]
+    )
     line = 2.0 * np.pi / encoder["lines_per_turn"]
     indices = []
     for row, record in zip(rows, found, strict=True):
@@ -143,9 +163,17 @@ def test_what_is_stored_moves_no_bit(steady):
     _, _, plain = records()
     _, _, less = records("dataset.store_encoder=true")
     for one, other, third in zip(found, plain, less, strict=True):
-        assert set(one.signals) - set(other.signals) == {"tacho", "encoder_angle", "shaft_angle"}
-        assert np.array_equal(one.signals["acceleration"], other.signals["acceleration"])
-        assert np.array_equal(one.signals["encoder_angle"], third.signals["encoder_angle"])
+        assert set(one.signals) - set(other.signals) == {
+            "tacho",
+            "encoder_angle",
+            "shaft_angle",
+        }
+        assert np.array_equal(
+            one.signals["acceleration"], other.signals["acceleration"]
+        )
+        assert np.array_equal(
+            one.signals["encoder_angle"], third.signals["encoder_angle"]
+        )
 
 
 def test_drift_changes_the_signal_by_its_gain_and_not_the_floor():
@@ -154,7 +182,8 @@ def test_drift_changes_the_signal_by_its_gain_and_not_the_floor():
     gains = []
     for one, other in zip(found, plain, strict=True):
         clean, still = (
-            record.signals["acceleration_clean"].astype(float) for record in (one, other)
+            record.signals["acceleration_clean"].astype(float)
+            for record in (one, other)
         )
         clear = np.abs(still) > 0.1 * still.std(axis=1, keepdims=True)
         gain = np.where(clear, clean / np.where(clear, still, 1.0), np.nan)
@@ -162,7 +191,8 @@ def test_drift_changes_the_signal_by_its_gain_and_not_the_floor():
         assert np.nanmax(gain) < np.exp(0.6)
         assert np.all(np.nanstd(gain, axis=1) > 1e-3)
         noise, before = (
-            record.signals["acceleration"] - record.signals["acceleration_clean"].astype(float)
+            record.signals["acceleration"]
+            - record.signals["acceleration_clean"].astype(float)
             for record in (one, other)
         )
         assert_allclose(noise, before, rtol=0, atol=1e-3 * before.std())
@@ -174,7 +204,9 @@ def test_drift_changes_the_signal_by_its_gain_and_not_the_floor():
 
 def test_drift_is_no_part_of_what_a_fault_does():
     with_drift = records(
-        *DRIFTING, "dataset.store_detectability=true", "sensing.sensor.drift_scatter=0.3"
+        *DRIFTING,
+        "dataset.store_detectability=true",
+        "sensing.sensor.drift_scatter=0.3",
     )
     without = records("dataset.store_detectability=true")
     for one, other in zip(with_drift[2], without[2], strict=True):
@@ -226,14 +258,35 @@ def test_a_file_has_them_and_says_what_they_are(tmp_path, capsys):
     assert main(["reproduce", str(folder), "--records", "3"]) == 0
     assert "3 of 3 records have the same bits" in capsys.readouterr().out
     data = open_dataset(folder)
-    told = ("tacho_shaft", "tacho_pulses_per_turn", "encoder_shaft", "encoder_lines_per_turn")
+    told = (
+        "tacho_shaft",
+        "tacho_pulses_per_turn",
+        "encoder_shaft",
+        "encoder_lines_per_turn",
+    )
     assert [data.attributes[name] for name in told] == ["pinion", 60, "wheel", 1024]
-    assert data.trace(0, "tacho").shape == data.trace(0, "encoder_angle").shape == (2560,)
-    assert np.all((data.column("dropped_fraction") > 0.0) & (data.column("dropped_fraction") < 1.0))
+    assert (
+        data.trace(0, "tacho").shape == data.trace(0, "encoder_angle").shape == (2560,)
+    )
+    assert np.all(
+        (data.column("dropped_fraction") > 0.0)
+        & (data.column("dropped_fraction") < 1.0)
+    )
     sound, cracked = tmp_path / "sound.h5", tmp_path / "cracked.h5"
     faulty = str(np.flatnonzero(data.column("label_name") == "crack")[0])
     assert (
-        main(["simulate", "--from", str(folder), "--record", faulty, "--output", str(cracked)]) == 0
+        main(
+            [
+                "simulate",
+                "--from",
+                str(folder),
+                "--record",
+                faulty,
+                "--output",
+                str(cracked),
+            ]
+        )
+        == 0
     )
     assert (
         main(
@@ -253,9 +306,15 @@ def test_a_file_has_them_and_says_what_they_are(tmp_path, capsys):
     with h5py.File(sound) as one, h5py.File(cracked) as other:
         lost = [np.all(file["acceleration"][0] == 0.0, axis=0) for file in (one, other)]
         assert np.array_equal(*lost)
-        noise = [file["acceleration"][0] - file["acceleration_clean"][0] for file in (one, other)]
+        noise = [
+            file["acceleration"][0] - file["acceleration_clean"][0]
+            for file in (one, other)
+        ]
         assert_allclose(
-            noise[0][:, ~lost[0]], noise[1][:, ~lost[0]], rtol=0, atol=1e-4 * noise[1].std()
+            noise[0][:, ~lost[0]],
+            noise[1][:, ~lost[0]],
+            rtol=0,
+            atol=1e-4 * noise[1].std(),
         )
 
 
@@ -263,7 +322,10 @@ def test_a_file_has_them_and_says_what_they_are(tmp_path, capsys):
     ("word", "text"),
     [
         ("dataset.store_tacho=1", "dataset.store_tacho = 1 must be true or false"),
-        ("dataset.store_encoder=yess", "dataset.store_encoder = 'yess' must be true or false"),
+        (
+            "dataset.store_encoder=yess",
+            "dataset.store_encoder = 'yess' must be true or false",
+        ),
     ],
 )
 def test_mistakes(word, text):
@@ -271,7 +333,9 @@ def test_mistakes(word, text):
         read_dataset_options(read_request([word]).config)
 
 
-@pytest.mark.parametrize("key", ["sensing.tacho.pulses_per_turn", "sensing.encoder.lines_per_turn"])
+@pytest.mark.parametrize(
+    "key", ["sensing.tacho.pulses_per_turn", "sensing.encoder.lines_per_turn"]
+)
 def test_what_a_reader_has_to_know_is_one_for_the_set(key):
     config = read_request(
         [f"plan.vary={{{key}: {{distribution: integers, low: 8, high: 9}}}}"]
@@ -281,7 +345,9 @@ def test_what_a_reader_has_to_know_is_one_for_the_set(key):
 
 
 def test_drift_and_loss_can_vary_by_condition():
-    vary = "{sensing.sensor.drift_scatter: {distribution: uniform, low: 0.0, high: 0.1}}"
+    vary = (
+        "{sensing.sensor.drift_scatter: {distribution: uniform, low: 0.0, high: 0.1}}"
+    )
     config = read_request([f"plan.vary={vary}", "plan.n_records=2"]).config
     plan = make_plan(config)
     inputs = [InputReader(config).inputs(plan.record(k)) for k in range(2)]
@@ -310,10 +376,14 @@ class TestTorsionalChannels:
                 np.fft.rfft(one * np.hanning(len(one)))[: len(one) // 20]
                 for one in (by_angle, told)
             ]
-            assert np.linalg.norm(spectra[0] - spectra[1]) < 0.05 * np.linalg.norm(spectra[1])
+            assert np.linalg.norm(spectra[0] - spectra[1]) < 0.05 * np.linalg.norm(
+                spectra[1]
+            )
 
     def test_a_set_of_them_says_their_unit(self, tmp_path):
-        folder = make(tmp_path / "set", *self.ROTORS, f"sensing.channels=[{','.join(self.NAMES)}]")
+        folder = make(
+            tmp_path / "set", *self.ROTORS, f"sensing.channels=[{','.join(self.NAMES)}]"
+        )
         assert main(["verify", str(folder)]) == 0
         data = open_dataset(folder)
         assert data.attributes["channel_units"] == ["rad/s^2"] * 4
@@ -324,7 +394,9 @@ class TestTorsionalChannels:
             with h5py.File(path, locking=False) as file:
                 names = ("acceleration", "signal_power", "noise_power")
                 units = {name: file[name].attrs["unit"].decode() for name in names}
-            assert units == dict.fromkeys(units, "(rad/s^2)^2") | {"acceleration": "rad/s^2"}
+            assert units == dict.fromkeys(units, "(rad/s^2)^2") | {
+                "acceleration": "rad/s^2"
+            }
 
     def test_mixed_units_are_told_by_channel(self, tmp_path):
         folder = make(tmp_path / "set", "sensing.channels=[pinion_y,wheel_rotation]")
@@ -334,9 +406,15 @@ class TestTorsionalChannels:
         assert open_dataset(folder).attributes["channel_units"] == ["m/s^2", "rad/s^2"]
 
     def test_simulate_prints_and_writes_their_unit(self, tmp_path, capsys):
-        words = ["sensing.channels=[pinion_y,wheel_rotation]", "operating.duration_s=0.05"]
+        words = [
+            "sensing.channels=[pinion_y,wheel_rotation]",
+            "operating.duration_s=0.05",
+        ]
         path, figure = tmp_path / "record.csv", tmp_path / "record.png"
-        assert main(["simulate", *words, "--output", str(path), "--plot", str(figure)]) == 0
+        assert (
+            main(["simulate", *words, "--output", str(path), "--plot", str(figure)])
+            == 0
+        )
         units = {
             line.split()[0]: line.split()[2]
             for line in capsys.readouterr().out.splitlines()

@@ -20,7 +20,10 @@ LINES = {"two_stage_gearbox": (32, 96, 48, 80), "uconn_two_stage": (32, 80, 48, 
 def words_for(name: str) -> list[str]:
     """The gears with the system that takes them."""
     helix = read_request([f"gear={name}"]).config["gear"]["helix_angle_deg"]
-    return [f"gear={name}", *(["system=helical_pair", "mesh.n_slices=8"] if helix else [])]
+    return [
+        f"gear={name}",
+        *(["system=helical_pair", "mesh.n_slices=8"] if helix else []),
+    ]
 
 
 def heard_mesh_frequency(signal: np.ndarray, rate: float, expected: float) -> float:
@@ -30,13 +33,18 @@ def heard_mesh_frequency(signal: np.ndarray, rate: float, expected: float) -> fl
     frequencies = expected * np.linspace(0.96, 1.04, 161)
     harmonics = [n for n in range(1, 6) if n * frequencies[-1] < 0.45 * rate]
     comb = [
-        sum(abs(np.exp(-2j * np.pi * n * f * time) @ (window * signal)) ** 2 for n in harmonics)
+        sum(
+            abs(np.exp(-2j * np.pi * n * f * time) @ (window * signal)) ** 2
+            for n in harmonics
+        )
         for f in frequencies
     ]
     return float(frequencies[np.argmax(comb)])
 
 
-@pytest.mark.parametrize("name", [name for name in options("gear") if name != INTERRUPTED])
+@pytest.mark.parametrize(
+    "name", [name for name in options("gear") if name != INTERRUPTED]
+)
 def test_shipped_gears_make_a_data_set_that_sounds_like_them(name, tmp_path, capsys):
     words = words_for(name)
     gear = read_request(words).config["gear"]
@@ -70,7 +78,9 @@ def test_shipped_gears_make_a_data_set_that_sounds_like_them(name, tmp_path, cap
     heard: list[float] = []
     for shard in out.glob("shards/*.h5"):
         with h5py.File(shard) as file:
-            for record, label in zip(file["acceleration"], file["label_name"].asstr(), strict=True):
+            for record, label in zip(
+                file["acceleration"], file["label_name"].asstr(), strict=True
+            ):
                 assert np.all(np.isfinite(indicators(record, 51200.0, turns, n_teeth)))
                 if (
                     label == "healthy"

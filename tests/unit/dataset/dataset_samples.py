@@ -38,7 +38,10 @@ CONFIG = {
 
 
 def make_plan(
-    n_records: int = 36, records_per_shard: int = 10, n_units: int = 6, n_classes: int = 3
+    n_records: int = 36,
+    records_per_shard: int = 10,
+    n_units: int = 6,
+    n_classes: int = 3,
 ) -> Plan:
     shard, row = shard_places(n_records, records_per_shard)
     index = np.arange(n_records)
@@ -60,7 +63,9 @@ def make_plan(
     )
 
 
-def row_of(plan: Plan, index: int, *, status: str = "ok") -> tuple[dict[str, np.ndarray], dict]:
+def row_of(
+    plan: Plan, index: int, *, status: str = "ok"
+) -> tuple[dict[str, np.ndarray], dict]:
     """Signals and values of one record."""
     record = plan.record(index)
     label = int(record["label"])
@@ -71,7 +76,9 @@ def row_of(plan: Plan, index: int, *, status: str = "ok") -> tuple[dict[str, np.
         "signal_power": np.array([1.0, 2.0]),
         "noise_power": np.array([0.1, 0.2]),
     }
-    values = {name: value for name, value in record.items() if name not in ("shard", "row")} | {
+    values = {
+        name: value for name, value in record.items() if name not in ("shard", "row")
+    } | {
         "faults_json": "[]" if label == 0 else '[{"kind": "crack"}]',
         "severity": 0.0 if label == 0 else 0.25,
         "fault_gear": "" if label == 0 else "pinion",
@@ -110,7 +117,9 @@ def write_shard(
     )
     with writer:
         for row, index in enumerate(rows.tolist()):
-            signals, values = row_of(plan, index, status="failed" if index == failed else "ok")
+            signals, values = row_of(
+                plan, index, status="failed" if index == failed else "ok"
+            )
             if clean and index != failed:
                 signals["acceleration_clean"] = signals["acceleration"] / 2
             if index == failed:

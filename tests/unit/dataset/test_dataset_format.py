@@ -28,9 +28,13 @@ TEXT = (Path(__file__).parents[3] / "docs" / "format.md").read_text(encoding="ut
 
 
 def test_columns_are_in_step() -> None:
-    table = re.search(r"<!-- columns:.*?-->\n(.*?)<!-- end of columns -->", TEXT, re.DOTALL)
+    table = re.search(
+        r"<!-- columns:.*?-->\n(.*?)<!-- end of columns -->", TEXT, re.DOTALL
+    )
     assert table is not None
-    assert table.group(1) == column_table()  # to renew: paste the output of column_table()
+    assert (
+        table.group(1) == column_table()
+    )  # to renew: paste the output of column_table()
     assert f"version {SCHEMA_VERSION}\n" in TEXT.splitlines(keepends=True)[0]
 
 
@@ -55,11 +59,15 @@ def test_shards_are_as_described(folder: Path) -> None:
 
 @pytest.mark.parametrize("sample_type", SAMPLE_TYPES)
 @pytest.mark.parametrize("library", ["h5py", "gensig"])
-def test_python_examples_run(tmp_path: Path, plan: Plan, library: str, sample_type: str) -> None:
+def test_python_examples_run(
+    tmp_path: Path, plan: Plan, library: str, sample_type: str
+) -> None:
     folder = build(tmp_path / "set", plan, sample_type=sample_type)
     examples = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
     (code,) = [example for example in examples if f"import {library}\n" in example]
-    code = code.replace("DIR", str(folder)).replace("gensig.open_dataset", "open_dataset")
+    code = code.replace("DIR", str(folder)).replace(
+        "gensig.open_dataset", "open_dataset"
+    )
     names = {"open_dataset": open_dataset}
     exec(code, names)
     expected = row_of(plan, 0)[0]["acceleration"][: 2 if library == "h5py" else 1]

@@ -25,7 +25,9 @@ from gensig.errors import DatasetError
 def _plan(**columns) -> Plan:
     n = len(next(iter(columns.values())))
     shard, row = shard_places(n, 3)
-    return Plan(columns={"record_id": record_ids(n), "shard": shard, "row": row, **columns})
+    return Plan(
+        columns={"record_id": record_ids(n), "shard": shard, "row": row, **columns}
+    )
 
 
 def _same(a: Plan, b: Plan) -> None:
@@ -34,7 +36,9 @@ def _same(a: Plan, b: Plan) -> None:
         assert values.dtype.kind == b.columns[name].dtype.kind
         np.testing.assert_array_equal(values, b.columns[name])
         if values.dtype.kind == "f":
-            np.testing.assert_array_equal(np.signbit(values), np.signbit(b.columns[name]))
+            np.testing.assert_array_equal(
+                np.signbit(values), np.signbit(b.columns[name])
+            )
 
 
 @settings(max_examples=40, deadline=None)
@@ -45,7 +49,11 @@ def _same(a: Plan, b: Plan) -> None:
 )
 def test_round_trip_is_exact(floats: list[float], integer: int, text: str) -> None:
     n = len(floats)
-    plan = _plan(depth_mm=np.array(floats), count=np.full(n, integer), unit_id=np.array([text] * n))
+    plan = _plan(
+        depth_mm=np.array(floats),
+        count=np.full(n, integer),
+        unit_id=np.array([text] * n),
+    )
     with tempfile.TemporaryDirectory() as folder:
         write_plan(Path(folder) / "plan.csv", plan)
         _same(plan, read_plan(Path(folder) / "plan.csv"))
@@ -67,7 +75,9 @@ def test_some_rows_are_those_of_the_whole(
     """Line separators that are no control characters (U+2028, U+0085 is one) belong to the text."""
     n = len(texts)
     plan = _plan(
-        unit_id=np.array(texts), **{"params/depth_mm": np.full(n, depth)}, label=np.arange(n)
+        unit_id=np.array(texts),
+        **{"params/depth_mm": np.full(n, depth)},
+        label=np.arange(n),
     )
     first = data.draw(st.integers(0, n - 1))
     n_records = data.draw(st.integers(1, n - first))
@@ -80,7 +90,9 @@ def test_some_rows_are_those_of_the_whole(
 
 
 @pytest.mark.parametrize(("first", "n_records"), [(0, 0), (2, 3), (4, 1)])
-def test_rows_that_are_not_there_are_refused(tmp_path: Path, first: int, n_records: int) -> None:
+def test_rows_that_are_not_there_are_refused(
+    tmp_path: Path, first: int, n_records: int
+) -> None:
     write_plan(tmp_path / "plan.csv", _plan(label=np.arange(4)))
     with pytest.raises(DatasetError, match="has no records"):
         PlanRows(tmp_path / "plan.csv").records(first, n_records)
@@ -107,7 +119,9 @@ def test_round_trip_check_can_fail() -> None:
 
 def test_values_look_as_promised() -> None:
     text = plan_text(
-        _plan(a=np.array([0.1, 1.0]), b=np.array([3, -4]), c=np.array(["x", 'say "y", z']))
+        _plan(
+            a=np.array([0.1, 1.0]), b=np.array([3, -4]), c=np.array(["x", 'say "y", z'])
+        )
     )
     assert (
         text
@@ -116,7 +130,9 @@ def test_values_look_as_promised() -> None:
 
 
 def test_text_that_would_come_back_as_numbers_is_refused() -> None:
-    assert "7" in plan_text(_plan(unit_id=np.array(["7", "8"])))  # known to the schema as text
+    assert "7" in plan_text(
+        _plan(unit_id=np.array(["7", "8"]))
+    )  # known to the schema as text
     with pytest.raises(DatasetError, match="look like numbers"):
         plan_text(_plan(house=np.array(["7", "8"])))
 
@@ -146,12 +162,36 @@ def test_rows_of_shards() -> None:
 @pytest.mark.parametrize(
     "columns",
     [
-        {"record_id": np.array(["a", "a"]), "shard": np.array([0, 0]), "row": np.array([0, 1])},
-        {"record_id": np.array(["a", "b"]), "shard": np.array([0, 2]), "row": np.array([0, 0])},
-        {"record_id": np.array(["a", "b"]), "shard": np.array([1, 0]), "row": np.array([0, 0])},
-        {"record_id": np.array(["a", "b"]), "shard": np.array([0, 0]), "row": np.array([1, 0])},
-        {"record_id": np.array(["a", "../b"]), "shard": np.array([0, 0]), "row": np.array([0, 1])},
-        {"record_id": np.array(["a"]), "shard": np.array([0, 0]), "row": np.array([0, 1])},
+        {
+            "record_id": np.array(["a", "a"]),
+            "shard": np.array([0, 0]),
+            "row": np.array([0, 1]),
+        },
+        {
+            "record_id": np.array(["a", "b"]),
+            "shard": np.array([0, 2]),
+            "row": np.array([0, 0]),
+        },
+        {
+            "record_id": np.array(["a", "b"]),
+            "shard": np.array([1, 0]),
+            "row": np.array([0, 0]),
+        },
+        {
+            "record_id": np.array(["a", "b"]),
+            "shard": np.array([0, 0]),
+            "row": np.array([1, 0]),
+        },
+        {
+            "record_id": np.array(["a", "../b"]),
+            "shard": np.array([0, 0]),
+            "row": np.array([0, 1]),
+        },
+        {
+            "record_id": np.array(["a"]),
+            "shard": np.array([0, 0]),
+            "row": np.array([0, 1]),
+        },
         {
             "record_id": np.array([], dtype=str),
             "shard": np.array([], dtype=int),
@@ -189,7 +229,9 @@ def test_impossible_plan_is_refused(columns: dict) -> None:
         ("r000001", '"r000001'),
     ],
 )
-def test_malformed_file_is_refused_in_one_line(tmp_path: Path, old: str, new: str) -> None:
+def test_malformed_file_is_refused_in_one_line(
+    tmp_path: Path, old: str, new: str
+) -> None:
     path = tmp_path / "plan.csv"
     text = plan_text(_plan(a=np.array([0.5, 1.5])))
     path.write_text(text)

@@ -28,7 +28,9 @@ def test_facts(folder: Path) -> None:
             "cross_specimen",
             "random_window_leaky",
         ]
-        assert {"label", "params/crack_depth_mm", "noise_power"} <= set(data.column_names)
+        assert {"label", "params/crack_depth_mm", "noise_power"} <= set(
+            data.column_names
+        )
         assert "acceleration" not in data.column_names
         assert data.usable.all()
 
@@ -44,7 +46,9 @@ def test_columns_and_signals_come_in_plan_order(folder: Path, plan: Plan) -> Non
             np.testing.assert_array_equal(
                 data.signals(index, 20, 70, ["wheel_ü"]), expected[1:, 20:70]
             )
-            np.testing.assert_array_equal(data.signals(index, channels=[1, 0]), expected[::-1])
+            np.testing.assert_array_equal(
+                data.signals(index, channels=[1, 0]), expected[::-1]
+            )
         assert data.signals(3).dtype == np.float32
 
 
@@ -60,8 +64,12 @@ def test_split(folder: Path, plan: Plan) -> None:
     with open_dataset(folder) as data:
         split = data.split("by_unit")
         assert list(split) == ["train", "validation", "test"]
-        assert sorted(i for part in split.values() for i, _, _ in part) == list(range(36))
-        units = [{data.column("unit_id")[i] for i, _, _ in part} for part in split.values()]
+        assert sorted(i for part in split.values() for i, _, _ in part) == list(
+            range(36)
+        )
+        units = [
+            {data.column("unit_id")[i] for i, _, _ in part} for part in split.values()
+        ]
         assert sum(map(len, units)) == len(set.union(*units)) == 6
         assert all(part[0][1:] == (0.0, 1.0) for part in split.values())
         assert sum(map(len, data.split("random_window_leaky").values())) == 8 * 36
@@ -95,12 +103,17 @@ def test_incomplete_set_is_refused_unless_asked_for(tmp_path: Path, plan: Plan) 
         assert data.column("record_id")[0] == ""
         assert np.isnan(data.column("torque_nm")[:10]).all()
         assert data.column("label")[35] == -1
-        np.testing.assert_array_equal(data.signals(10), row_of(plan, 10)[0]["acceleration"])
-        with pytest.raises(DatasetError, match=r"shard-00000\.h5, which is not made yet"):
+        np.testing.assert_array_equal(
+            data.signals(10), row_of(plan, 10)[0]["acceleration"]
+        )
+        with pytest.raises(
+            DatasetError, match=r"shard-00000\.h5, which is not made yet"
+        ):
             data.signals(0)
     with pytest.raises(DatasetError, match="no finished shard"):
         open_dataset(
-            build(tmp_path / "b", plan, shards=range(0), close=False), allow_incomplete=True
+            build(tmp_path / "b", plan, shards=range(0), close=False),
+            allow_incomplete=True,
         )
 
 
@@ -110,11 +123,16 @@ def _first_sample(data: Dataset, index: int) -> float:
 
 @pytest.mark.parametrize("method", ["fork", "spawn"])
 def test_several_processes_read_at_once(folder: Path, plan: Plan, method: str) -> None:
-    expected = [float(row_of(plan, i)[0]["acceleration"][0, 0]) for i in (0, 12, 24, 35)]
+    expected = [
+        float(row_of(plan, i)[0]["acceleration"][0, 0]) for i in (0, 12, 24, 35)
+    ]
     with open_dataset(folder) as data:
         data.signals(0)
         with multiprocessing.get_context(method).Pool(2) as pool:
-            assert pool.starmap(_first_sample, [(data, i) for i in (0, 12, 24, 35)]) == expected
+            assert (
+                pool.starmap(_first_sample, [(data, i) for i in (0, 12, 24, 35)])
+                == expected
+            )
         assert _first_sample(data, 0) == expected[0]
 
 
@@ -142,7 +160,10 @@ def test_reading_changes_nothing_and_works_read_only(folder: Path) -> None:
 
 def test_damaged_shard_is_one_line(folder: Path) -> None:
     shard_path(folder, 1).write_bytes(b"no hdf5")
-    with open_dataset(folder) as data, pytest.raises(DatasetError, match=r"shard-00001\.h5"):
+    with (
+        open_dataset(folder) as data,
+        pytest.raises(DatasetError, match=r"shard-00001\.h5"),
+    ):
         data.signals(10)
 
 
@@ -151,8 +172,12 @@ def test_a_protocol_that_is_left_out_is_explained(folder: Path) -> None:
         assert "cross_specimen" not in data.left_out
         assert data.left_out["cross_speed"] == "the plan has no column speed_set_rpm"
         with pytest.raises(
-            DatasetError, match=r"split .cross_speed. does not exist in .*no column speed_set_rpm"
+            DatasetError,
+            match=r"split .cross_speed. does not exist in .*no column speed_set_rpm",
         ):
             data.split("cross_speed")
         del data.manifest.files["splits/by_unit.csv"]
-        assert data.left_out["by_unit"] == "gensig 0.1.0, which made the set, did not know it"
+        assert (
+            data.left_out["by_unit"]
+            == "gensig 0.1.0, which made the set, did not know it"
+        )

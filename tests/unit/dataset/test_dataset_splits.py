@@ -22,10 +22,15 @@ OLD_DIGESTS = {
 def _sides(table: SplitTable, plan: Plan, column: str) -> list[set]:
     """Values of a plan column in train, validation and test."""
     value = dict(
-        zip(plan.columns["record_id"].tolist(), plan.columns[column].tolist(), strict=True)
+        zip(
+            plan.columns["record_id"].tolist(),
+            plan.columns[column].tolist(),
+            strict=True,
+        )
     )
     return [
-        {value[r] for r in table.record_id[table.subset == subset].tolist()} for subset in SUBSETS
+        {value[r] for r in table.record_id[table.subset == subset].tolist()}
+        for subset in SUBSETS
     ]
 
 
@@ -35,7 +40,11 @@ def _disjoint(sides: list[set]) -> bool:
 
 @pytest.mark.parametrize(
     ("protocol", "column"),
-    [("by_unit", "unit_id"), ("cross_specimen", "specimen_id"), ("cross_gearbox", "gearbox_id")],
+    [
+        ("by_unit", "unit_id"),
+        ("cross_specimen", "specimen_id"),
+        ("cross_gearbox", "gearbox_id"),
+    ],
 )
 def test_clean_protocols_share_no_group(protocol: str, column: str) -> None:
     plan = make_plan(n_records=300, n_units=10)
@@ -58,7 +67,13 @@ def test_leaky_protocol_has_every_record_on_several_sides() -> None:
     shares = [float(np.mean(table.subset == subset)) for subset in SUBSETS]
     np.testing.assert_allclose(shares, [0.6, 0.2, 0.2], rtol=0, atol=0.06)
     assert (
-        len({tuple(table.subset[table.record_id == r]) for r in plan.columns["record_id"]}) > 10
+        len(
+            {
+                tuple(table.subset[table.record_id == r])
+                for r in plan.columns["record_id"]
+            }
+        )
+        > 10
     )  # scattered
 
 
@@ -74,7 +89,9 @@ def test_protocol_that_lacks_a_class_or_groups_is_left_out() -> None:
     poor = Plan(columns={**plan.columns, "label": one_unit_only})
     assert set(make_splits(poor, 1)) == {"random_window_leaky"}
     bare = Plan(
-        columns={name: plan.columns[name] for name in ("record_id", "shard", "row", "label")}
+        columns={
+            name: plan.columns[name] for name in ("record_id", "shard", "row", "label")
+        }
     )
     assert set(make_splits(bare, 1)) == {"random_window_leaky"}
 

@@ -40,7 +40,9 @@ def found(tiny: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Verdict]
 def test_no_mutant_does_harm(found: list[Verdict]) -> None:
     assert len(found) == N_MUTANTS
     harmful = [verdict for verdict in found if verdict.fault]
-    assert [f"{verdict.seed} ({verdict.kind}): {verdict.fault}" for verdict in harmful] == []
+    assert [
+        f"{verdict.seed} ({verdict.kind}): {verdict.fault}" for verdict in harmful
+    ] == []
 
 
 def test_every_forbidden_structure_was_tried_and_noticed(found: list[Verdict]) -> None:
@@ -74,12 +76,18 @@ def _crash(_folder: Path) -> None:
     ],
 )
 def test_the_judge_sees_harm(
-    tiny: Path, tmp_path: Path, reader: object, message: str, monkeypatch: pytest.MonkeyPatch
+    tiny: Path,
+    tmp_path: Path,
+    reader: object,
+    message: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A reader that dies, hangs, stumbles or takes everything is found, and the next mutant is tried all the same."""
     monkeypatch.setattr(_fuzz_judge, "TIME_LIMIT", 2.0)
     monkeypatch.setattr(_fuzz_judge, "mutate", _no_mutation)
-    monkeypatch.setattr(_fuzz_judge, "METHOD", "fork")  # the child must know the changes made here
+    monkeypatch.setattr(
+        _fuzz_judge, "METHOD", "fork"
+    )  # the child must know the changes made here
     if reader is not None:
         monkeypatch.setattr(_fuzz_judge, "_read_all", reader)
     result = list(verdicts(tiny, tmp_path, range(2)))
@@ -92,7 +100,9 @@ def test_inspect_reads_no_other_file(tmp_path: Path) -> None:
     (tmp_path / "secret.bin").write_bytes(SECRET)
     path = tmp_path / "a.h5"
     with h5py.File(path, "w") as file:
-        file.create_dataset("stolen", (1,), "i8", external=[(str(tmp_path / "secret.bin"), 0, 8)])
+        file.create_dataset(
+            "stolen", (1,), "i8", external=[(str(tmp_path / "secret.bin"), 0, 8)]
+        )
         layout = h5py.VirtualLayout((1,), "i8")
         layout[...] = h5py.VirtualSource(str(tmp_path / "other.h5"), "x", (1,))
         file.create_virtual_dataset("seen", layout)
@@ -114,7 +124,9 @@ def test_index_shows_this_folder_only(folder: Path, tmp_path: Path) -> None:
         layout = h5py.VirtualLayout((36,), "i2")
         layout[...] = h5py.VirtualSource("../other.h5", "label", (36,))
         file.create_virtual_dataset("label", layout)
-    with pytest.raises(DatasetError, match="'label' does not show the shards of this folder"):
+    with pytest.raises(
+        DatasetError, match="'label' does not show the shards of this folder"
+    ):
         open_index(folder)
     path.unlink()
     path.symlink_to(shard_path(folder, 0))

@@ -8,7 +8,11 @@ from gensig.dataset.splitting.protocols import PROTOCOLS, make_splits, why_left_
 from gensig.dataset.splitting.split_check import split_problems
 from gensig.dataset.splitting.splits import SUBSETS, SplitTable
 
-RANGES = {"cross_speed": "speed_set_rpm", "cross_torque": "torque_nm", "cross_snr": "snr_db"}
+RANGES = {
+    "cross_speed": "speed_set_rpm",
+    "cross_torque": "torque_nm",
+    "cross_snr": "snr_db",
+}
 SEVERITIES = ("unseen_severity_inner", "unseen_severity_outer")
 
 
@@ -23,12 +27,16 @@ def random_plan(seed: int, **fixed: int) -> Plan:
     n_gearboxes = int(rng.integers(1, n_units + 1))
     condition = np.arange(n) // n_classes
     unit = condition % n_units
-    label = rng.permuted(np.tile(np.arange(n_classes), (condition[-1] + 1, 1)), axis=1).ravel()[:n]
+    label = rng.permuted(
+        np.tile(np.arange(n_classes), (condition[-1] + 1, 1)), axis=1
+    ).ravel()[:n]
     shard, row = shard_places(n, 50)
 
     def draw(low: float, high: float) -> np.ndarray:
         values = rng.uniform(low, high, size=n)
-        return (values, np.round(4 * values / high) * high / 4, np.full(n, high))[rng.integers(3)]
+        return (values, np.round(4 * values / high) * high / 4, np.full(n, high))[
+            rng.integers(3)
+        ]
 
     columns = {
         "record_id": record_ids(n),
@@ -39,10 +47,14 @@ def random_plan(seed: int, **fixed: int) -> Plan:
         "gearbox_id": np.char.add("gearbox-", (unit % n_gearboxes).astype(str)),
         "specimen_id": np.char.add("specimen-", (unit // n_gearboxes).astype(str)),
         "faults_json": np.where(label == 0, "[]", '[{"kind": "crack"}]'),
-        "severity": np.where(label == 0, 0.0, np.where(label == 3, 1.0, draw(0.1, 0.8))),
+        "severity": np.where(
+            label == 0, 0.0, np.where(label == 3, 1.0, draw(0.1, 0.8))
+        ),
         "speed_set_rpm": draw(1000.0, 2000.0)[condition],
         "torque_nm": draw(10.0, 40.0)[condition],
-        "snr_db": draw(0.0, 30.0)[condition] if rng.random() < 0.8 else np.full(n, np.nan),
+        "snr_db": draw(0.0, 30.0)[condition]
+        if rng.random() < 0.8
+        else np.full(n, np.nan),
     }
     return Plan(columns=columns)
 
@@ -50,10 +62,16 @@ def random_plan(seed: int, **fixed: int) -> Plan:
 def sides(table: SplitTable, plan: Plan, column: str) -> list[np.ndarray]:
     """Values of a plan column in train, validation and test."""
     value = dict(
-        zip(plan.columns["record_id"].tolist(), plan.columns[column].tolist(), strict=True)
+        zip(
+            plan.columns["record_id"].tolist(),
+            plan.columns[column].tolist(),
+            strict=True,
+        )
     )
     return [
-        np.array([value[name] for name in table.record_id[table.subset == subset].tolist()])
+        np.array(
+            [value[name] for name in table.record_id[table.subset == subset].tolist()]
+        )
         for subset in SUBSETS
     ]
 
@@ -69,12 +87,16 @@ def made(request: pytest.FixtureRequest) -> tuple[Plan, dict[str, SplitTable]]:
 def test_random_plans_have_every_protocol_somewhere_and_lack_it_elsewhere() -> None:
     found = [set(make_splits(plan, seed)) for seed, plan in enumerate(PLANS)]
     counts = {name: sum(name in names for names in found) for name in PROTOCOLS}
-    assert all(5 < count < 60 for name, count in counts.items() if name != "random_window_leaky"), (
-        counts
-    )
+    assert all(
+        5 < count < 60
+        for name, count in counts.items()
+        if name != "random_window_leaky"
+    ), counts
 
 
-def test_a_protocol_is_made_or_its_lack_explained(made: tuple[Plan, dict[str, SplitTable]]) -> None:
+def test_a_protocol_is_made_or_its_lack_explained(
+    made: tuple[Plan, dict[str, SplitTable]],
+) -> None:
     plan, tables = made
     reasons = why_left_out(plan, PLANS.index(plan))
     assert {*tables, *reasons} == set(PROTOCOLS)
@@ -98,7 +120,9 @@ def test_every_class_is_on_every_side_of_a_closed_set(
     plan, tables = made
     classes = set(plan.columns["label"].tolist())
     for name, table in tables.items():
-        train, validation, test = (set(part.tolist()) for part in sides(table, plan, "label"))
+        train, validation, test = (
+            set(part.tolist()) for part in sides(table, plan, "label")
+        )
         assert test == classes
         if name == "healthy_only":
             assert train == validation == {0} != classes
@@ -118,16 +142,25 @@ def test_held_out_conditions_lie_beyond_those_of_training(
     for name in set(RANGES) & set(tables):
         train, validation, test = sides(tables[name], plan, RANGES[name])
         sign = -1.0 if name == "cross_snr" else 1.0  # tested where there is more noise
-        assert max((sign * train).max(), (sign * validation).max()) < (sign * test).min()
+        assert (
+            max((sign * train).max(), (sign * validation).max()) < (sign * test).min()
+        )
 
 
-def test_held_out_severities_are_in_no_training(made: tuple[Plan, dict[str, SplitTable]]) -> None:
+def test_held_out_severities_are_in_no_training(
+    made: tuple[Plan, dict[str, SplitTable]],
+) -> None:
     plan, tables = made
     for name in set(SEVERITIES) & set(tables):
-        labels, values = sides(tables[name], plan, "label"), sides(tables[name], plan, "severity")
+        labels, values = (
+            sides(tables[name], plan, "label"),
+            sides(tables[name], plan, "severity"),
+        )
         n_held = 0
         for label in np.unique(plan.columns["label"]).tolist():
-            distinct = np.unique(plan.columns["severity"][plan.columns["label"] == label])
+            distinct = np.unique(
+                plan.columns["severity"][plan.columns["label"] == label]
+            )
             train, validation, test = (
                 v[part == label] for v, part in zip(values, labels, strict=True)
             )
@@ -137,7 +170,9 @@ def test_held_out_severities_are_in_no_training(made: tuple[Plan, dict[str, Spli
             n_held += 1
             assert not ((learnt >= test.min()) & (learnt <= test.max())).any()
             assert (
-                test.max() < distinct[-1] if name.endswith("inner") else learnt.max() < test.min()
+                test.max() < distinct[-1]
+                if name.endswith("inner")
+                else learnt.max() < test.min()
             )
         assert n_held
 
@@ -145,8 +180,14 @@ def test_held_out_severities_are_in_no_training(made: tuple[Plan, dict[str, Spli
 def test_one_condition_a_unit_loses_no_record() -> None:
     plan = random_plan(3, n_units=40, n_classes=4, n_records=160)
     speed = np.repeat(np.random.default_rng(0).permutation(40) + 1000.0, 4)
-    table = make_splits(Plan(columns={**plan.columns, "speed_set_rpm": speed}), 0)["cross_speed"]
-    assert [int((table.subset == subset).sum()) for subset in SUBSETS] == [22 * 4, 8 * 4, 10 * 4]
+    table = make_splits(Plan(columns={**plan.columns, "speed_set_rpm": speed}), 0)[
+        "cross_speed"
+    ]
+    assert [int((table.subset == subset).sum()) for subset in SUBSETS] == [
+        22 * 4,
+        8 * 4,
+        10 * 4,
+    ]
 
 
 def test_levels_are_held_out_whole() -> None:
@@ -159,7 +200,8 @@ def test_levels_are_held_out_whole() -> None:
     tables = make_splits(poorer, 0)
     for name, held in (("unseen_severity_inner", 0.3), ("unseen_severity_outer", 0.5)):
         train, validation, test = (
-            set(part[part > 0].tolist()) for part in sides(tables[name], poorer, "severity")
+            set(part[part > 0].tolist())
+            for part in sides(tables[name], poorer, "severity")
         )
         assert test == {held}
         assert train == validation == set(levels.tolist()) - {held}
@@ -173,14 +215,21 @@ def test_why_is_precise() -> None:
         "snr_db": np.full(n, np.nan),
         "severity": np.zeros(n),
     }
-    poor = {name: value for name, value in plan.columns.items() if name != "torque_nm"} | flat
+    poor = {
+        name: value for name, value in plan.columns.items() if name != "torque_nm"
+    } | flat
     poor["gearbox_id"] = np.full(n, "gearbox-0")
     reasons = why_left_out(Plan(columns=poor), 0)
     assert reasons["cross_speed"] == "speed_set_rpm is 1800 in all records"
     assert reasons["cross_torque"] == "the plan has no column torque_nm"
     assert reasons["cross_snr"] == "snr_db is not a number in 100 of 100 records"
-    assert reasons["cross_gearbox"] == "1 gearbox_id in the plan, and at least 3 are needed"
-    assert "no class has enough different severities" in reasons["unseen_severity_inner"]
+    assert (
+        reasons["cross_gearbox"]
+        == "1 gearbox_id in the plan, and at least 3 are needed"
+    )
+    assert (
+        "no class has enough different severities" in reasons["unseen_severity_inner"]
+    )
     assert "three classes" in reasons["open_set"]
     assert "healthy_only" not in reasons
 
@@ -201,7 +250,9 @@ def moved(table: SplitTable, row: int, **change: object) -> SplitTable:
         name: getattr(table, name)
         for name in ("record_id", "start_fraction", "stop_fraction", "subset")
     }
-    return SplitTable(**{k: np.append(v, [change.get(k, v[row])]) for k, v in columns.items()})
+    return SplitTable(
+        **{k: np.append(v, [change.get(k, v[row])]) for k, v in columns.items()}
+    )
 
 
 def test_the_check_finds_what_is_on_two_sides() -> None:
@@ -228,5 +279,7 @@ def test_the_check_finds_what_is_on_two_sides() -> None:
     leaky = tables["random_window_leaky"]
     assert (
         "given twice"
-        in split_problems("random_window_leaky", moved(leaky, 0, start_fraction=0.1), plan)[0]
+        in split_problems(
+            "random_window_leaky", moved(leaky, 0, start_fraction=0.1), plan
+        )[0]
     )

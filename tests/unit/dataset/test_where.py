@@ -47,8 +47,12 @@ def test_conditions(folder: Path, conditions: dict, expected: np.ndarray) -> Non
         )
 
 
-def test_choosing_reads_no_signal(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reader_module, "read_signal", lambda *_: pytest.fail("a signal was read"))
+def test_choosing_reads_no_signal(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        reader_module, "read_signal", lambda *_: pytest.fail("a signal was read")
+    )
     with open_dataset(folder) as data:
         chosen = data.where(fault="crack").where(severity=0.25)
         assert [record.values["label_name"] for record in chosen] == ["crack"] * 12
@@ -69,7 +73,9 @@ def test_records_tables_and_arrays(folder: Path, plan: Plan) -> None:
         np.testing.assert_array_equal(
             third.signals(5, 9), row_of(plan, 8)[0]["acceleration"][:, 5:9]
         )
-        np.testing.assert_array_equal(chosen.signals(-1), row_of(plan, 35)[0]["acceleration"])
+        np.testing.assert_array_equal(
+            chosen.signals(-1), row_of(plan, 35)[0]["acceleration"]
+        )
         block = chosen.array(0, 50, ["wheel_ü"])
         assert (block.shape, block.dtype) == ((12, 1, 50), np.float32)
         for place, index in enumerate(chosen.index.tolist()):
@@ -115,7 +121,10 @@ def test_plan_is_a_structured_table(folder: Path, plan: Plan) -> None:
     ],
 )
 def test_mistakes_have_a_hint(folder: Path, conditions: dict, message: str) -> None:
-    with open_dataset(folder) as data, pytest.raises(DatasetError, match=message) as caught:
+    with (
+        open_dataset(folder) as data,
+        pytest.raises(DatasetError, match=message) as caught,
+    ):
         data.where(**conditions)
     assert "\n" not in str(caught.value)
 
@@ -164,5 +173,7 @@ def test_missing_shards_meet_no_condition(tmp_path: Path, plan: Plan) -> None:
         build(tmp_path / "a", plan, shards=range(1, 3), close=False, failed=12),
         allow_incomplete=True,
     ) as data:
-        assert data.where(status="ok").index.tolist() == [i for i in range(10, 30) if i != 12]
+        assert data.where(status="ok").index.tolist() == [
+            i for i in range(10, 30) if i != 12
+        ]
         assert data.where(torque_nm=(None, None)).index.tolist() == list(range(10, 30))

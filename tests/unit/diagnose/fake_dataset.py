@@ -7,7 +7,13 @@ import numpy as np
 
 N_TEETH = {"n_teeth_pinion": 23, "n_teeth_wheel": 84}
 CLASSES = ("healthy", "crack", "pitting", "missing_tooth")
-IMPULSE = {"healthy": 0.0, "crack": 1.0, "pitting": 1.8, "missing_tooth": 5.0, "wear": 3.0}
+IMPULSE = {
+    "healthy": 0.0,
+    "crack": 1.0,
+    "pitting": 1.8,
+    "missing_tooth": 5.0,
+    "wear": 3.0,
+}
 CARRIER_HZ = {
     "healthy": 4000.0,
     "crack": 3000.0,
@@ -40,12 +46,18 @@ class FakeDataset:
         self.sampling_rate = sampling_rate
         self.class_names = tuple(classes)
         self.channel_names = tuple(f"channel_{index}" for index in range(n_channels))
-        self.attributes = {"schema_version": 1, "sampling_rate_hz": sampling_rate, **N_TEETH}
+        self.attributes = {
+            "schema_version": 1,
+            "sampling_rate_hz": sampling_rate,
+            **N_TEETH,
+        }
         self.attributes["config_json"] = json.dumps({"plan": {"sham": sham}})
         self.signal_names = ["acceleration", *(["healthy_twin"] if twins else [])]
         self.sham = sham
         self.protocols = ("by_unit", "random_window_leaky")
-        self.left_out = {"cross_specimen": "1 specimen_id in the plan, and at least 4 are needed"}
+        self.left_out = {
+            "cross_specimen": "1 specimen_id in the plan, and at least 4 are needed"
+        }
         self.usable = np.ones(self.n_records, dtype=bool)
         self.strength, self.noise, self.seed = strength, noise, seed
         self.n_samples = round(duration * sampling_rate)
@@ -71,7 +83,9 @@ class FakeDataset:
     def column(self, name):
         return self.columns[name]
 
-    def signals(self, record_index, start=0, stop=None, channels=None, *, name="acceleration"):
+    def signals(
+        self, record_index, start=0, stop=None, channels=None, *, name="acceleration"
+    ):
         is_twin = self.signal_names.index(name) > 0
         rng = np.random.default_rng([self.seed, record_index])
         time = np.arange(self.n_samples) / self.sampling_rate
@@ -83,10 +97,16 @@ class FakeDataset:
         )
         since = np.mod(turn * time + phase, 1.0) / turn
         ringing = np.exp(-since / 8e-4) * np.sin(2 * np.pi * CARRIER_HZ[fault] * since)
-        height = self.strength * IMPULSE[fault] * (0.5 + self.columns["severity"][record_index])
+        height = (
+            self.strength
+            * IMPULSE[fault]
+            * (0.5 + self.columns["severity"][record_index])
+        )
         height = 0.0 if self.sham or is_twin else height
         rng = np.random.default_rng([self.seed, record_index, 1]) if is_twin else rng
-        noise = self.noise * rng.standard_normal((len(self.channel_names), self.n_samples))
+        noise = self.noise * rng.standard_normal(
+            (len(self.channel_names), self.n_samples)
+        )
         gain = (
             self.columns["unit_gain"][record_index]
             * np.linspace(1.0, 0.6, len(self.channel_names))[:, None]
@@ -100,11 +120,15 @@ class FakeDataset:
         n_units = unit.max() + 1
         subsets = {"train": [], "validation": [], "test": []}
         if protocol == "by_unit":
-            bounds = {"train": (0, n_units // 2), "validation": (n_units // 2, 3 * n_units // 4)}
+            bounds = {
+                "train": (0, n_units // 2),
+                "validation": (n_units // 2, 3 * n_units // 4),
+            }
             bounds["test"] = (3 * n_units // 4, n_units)
             for name, (low, high) in bounds.items():
                 subsets[name] = [
-                    (int(i), 0.0, 1.0) for i in np.flatnonzero((unit >= low) & (unit < high))
+                    (int(i), 0.0, 1.0)
+                    for i in np.flatnonzero((unit >= low) & (unit < high))
                 ]
         else:
             for i in range(self.n_records):
@@ -122,8 +146,12 @@ class CompleteDataset(FakeDataset):
         rng = np.random.default_rng(7)
         self.columns |= {
             "fault_gear": np.where(self.columns["label"] > 0, "wheel", ""),
-            "start_tooth_pinion": rng.integers(N_TEETH["n_teeth_pinion"], size=self.n_records),
-            "start_tooth_wheel": rng.integers(N_TEETH["n_teeth_wheel"], size=self.n_records),
+            "start_tooth_pinion": rng.integers(
+                N_TEETH["n_teeth_pinion"], size=self.n_records
+            ),
+            "start_tooth_wheel": rng.integers(
+                N_TEETH["n_teeth_wheel"], size=self.n_records
+            ),
             "start_phase": rng.uniform(size=self.n_records),
             "integration_error": rng.uniform(1e-5, 1e-4, self.n_records),
         }

@@ -11,7 +11,10 @@ class FakeLives(FakeDataset):
 
     def __init__(self, *, n_lives=20, n_snapshots=8, n_censored=0, **changes):
         super().__init__(
-            n_units=n_lives, records_per_unit=n_snapshots, classes=("missing_tooth",), **changes
+            n_units=n_lives,
+            records_per_unit=n_snapshots,
+            classes=("missing_tooth",),
+            **changes,
         )
         rng = np.random.default_rng([self.seed, 7])
         length = rng.uniform(80.0, 400.0, n_lives)
@@ -20,7 +23,9 @@ class FakeLives(FakeDataset):
         seen = np.where(censored, rng.uniform(0.4, 0.8, n_lives) * length, length)
         life = np.repeat(np.arange(n_lives), n_snapshots)
         age = (seen[:, None] * np.linspace(0, 1, n_snapshots)).ravel()
-        self.columns["severity"] = 2.0 * np.clip(1 - (length[life] - age) / SHOWS_H, 0, 1)
+        self.columns["severity"] = 2.0 * np.clip(
+            1 - (length[life] - age) / SHOWS_H, 0, 1
+        )
         self.columns |= {
             "torque_nm": np.full(self.n_records, 20.0),
             "life_id": self.columns["unit_id"],
@@ -31,5 +36,7 @@ class FakeLives(FakeDataset):
 
     def without(self, *names):
         """The same set without some columns."""
-        self.columns = {name: values for name, values in self.columns.items() if name not in names}
+        self.columns = {
+            name: values for name, values in self.columns.items() if name not in names
+        }
         return self

@@ -25,7 +25,11 @@ class FakeStream:
     @property
     def dataset(self):
         return FakeDataset(
-            n_units=4, records_per_unit=4, n_channels=2, noise=self.noise, seed=self.epoch
+            n_units=4,
+            records_per_unit=4,
+            n_channels=2,
+            noise=self.noise,
+            seed=self.epoch,
         )
 
     def __getattr__(self, name):
@@ -53,7 +57,10 @@ class FakeStream:
 
     def shard(self, index, count):
         return replace(
-            self, numbers=tuple(number for number in self.numbers if number // 4 % count == index)
+            self,
+            numbers=tuple(
+                number for number in self.numbers if number // 4 % count == index
+            ),
         )
 
     def at_epoch(self, epoch):
@@ -67,4 +74,6 @@ class FakeStream:
         for number in self.numbers:
             values = {"record_id": str(dataset.column("record_id")[number])}
             values["status"] = "failed" if number in self.failed else "ok"
-            yield FakeRecord(signals={"acceleration": dataset.signals(number)}, values=values)
+            yield FakeRecord(
+                signals={"acceleration": dataset.signals(number)}, values=values
+            )

@@ -11,7 +11,13 @@ class OpenDataset(FakeDataset):
 
     def __init__(self, **changes):
         super().__init__(
-            **{"n_units": 12, "records_per_unit": 8, "duration": 0.3, "noise": 0.3, **changes}
+            **{
+                "n_units": 12,
+                "records_per_unit": 8,
+                "duration": 0.3,
+                "noise": 0.3,
+                **changes,
+            }
         )
         self.protocols = ("by_unit", "healthy_only", "open_set")
 

@@ -43,7 +43,9 @@ def source_of(dataset):
     """Everything that a baseline may read of a data set."""
     task = task_of(dataset, window_samples=1200, stride_samples=1200, normalise="none")
     segments = {subset: subset_segments(task, "by_unit", subset) for subset in SUBSETS}
-    sets = {subset: load_windows(task, stretches) for subset, stretches in segments.items()}
+    sets = {
+        subset: load_windows(task, stretches) for subset, stretches in segments.items()
+    }
     return Source(
         task=task,
         protocol="by_unit",
@@ -101,8 +103,12 @@ def check_seed(baseline, parts):
 def check_order(baseline, parts):
     """Law: the order of the rows changes nothing but the order of the answers."""
     rng = np.random.default_rng(3)
-    orders = {subset: rng.permutation(len(getattr(parts, subset).label)) for subset in SUBSETS}
-    shuffled = Parts(**{name: rows_of(getattr(parts, name), rows) for name, rows in orders.items()})
+    orders = {
+        subset: rng.permutation(len(getattr(parts, subset).label)) for subset in SUBSETS
+    }
+    shuffled = Parts(
+        **{name: rows_of(getattr(parts, name), rows) for name, rows in orders.items()}
+    )
     made, _ = fitted(baseline, parts)
     other, _ = fitted(baseline, shuffled)
     expected = made.predict_proba(parts.test)[orders["test"]]
@@ -169,7 +175,9 @@ class Careless(Baseline):
         return " "
 
     def predict_proba(self, table):
-        chance = np.random.default_rng().uniform(size=(len(table.label), self.n_classes))
+        chance = np.random.default_rng().uniform(
+            size=(len(table.label), self.n_classes)
+        )
         chance[:, self.first] += np.arange(len(table.label))
         return chance
 
@@ -185,7 +193,9 @@ def test_the_laws_can_be_broken(parts_of):
 
 def test_each_kind_of_input_is_made_once(source, monkeypatch):
     calls = []
-    counted = replace(INDICATOR_INPUT, make=lambda s: calls.append(s) or INDICATOR_INPUT.make(s))
+    counted = replace(
+        INDICATOR_INPUT, make=lambda s: calls.append(s) or INDICATOR_INPUT.make(s)
+    )
     names = ("indicators", "indicators_without_level", "rms_threshold")
     for name in names:
         monkeypatch.setattr(BASELINES[name], "reads", counted)
@@ -197,14 +207,21 @@ def test_each_kind_of_input_is_made_once(source, monkeypatch):
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     """Folder of a study with every baseline, the sham set and the oracle."""
-    sets = {"good": CompleteDataset(n_units=16), "sham": CompleteDataset(n_units=16, sham=True)}
+    sets = {
+        "good": CompleteDataset(n_units=16),
+        "sham": CompleteDataset(n_units=16, sham=True),
+    }
     for name, dataset in sets.items():
         dataset.folder = Path(name)
     out = tmp_path_factory.mktemp("study") / "out"
     rivals = f"baselines=[{','.join(baseline_names(Role.RIVAL))}]"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(gensig.dataset.reader, "open_dataset", lambda path: sets[str(path)])
-        assert main(["train", "data=good", "sham=sham", f"out={out}", *SHORT, rivals]) == 0
+        patch.setattr(
+            gensig.dataset.reader, "open_dataset", lambda path: sets[str(path)]
+        )
+        assert (
+            main(["train", "data=good", "sham=sham", f"out={out}", *SHORT, rivals]) == 0
+        )
     return out
 
 
@@ -219,12 +236,16 @@ def missing_on_page(page, baseline):
 
 @pytest.mark.parametrize("name", BASELINES)
 def test_it_is_on_the_page(name, study):
-    methods = json.loads((study / "metrics.json").read_text())["protocols"]["by_unit"]["methods"]
+    methods = json.loads((study / "metrics.json").read_text())["protocols"]["by_unit"][
+        "methods"
+    ]
     assert name in methods
     assert missing_on_page((study / "report.html").read_text(), BASELINES[name]) == []
 
 
-def test_a_baseline_that_is_not_registered_is_not_on_the_page(study, tmp_path, monkeypatch):
+def test_a_baseline_that_is_not_registered_is_not_on_the_page(
+    study, tmp_path, monkeypatch
+):
     reference = BASELINES["reference"]
     metrics = json.loads((study / "metrics.json").read_text())
     monkeypatch.delitem(BASELINES, "reference")
@@ -239,6 +260,10 @@ def test_what_runs_by_default_is_registered():
 
 def test_settings_are_refused_without_loading_torch():
     """A mistake in a setting is answered at once; torch takes seconds to load."""
-    code = "import diagnose.settings, sys; print({'torch', 'sklearn'} & set(sys.modules))"
-    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    code = (
+        "import diagnose.settings, sys; print({'torch', 'sklearn'} & set(sys.modules))"
+    )
+    shown = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
     assert shown.stdout.strip() == "set()"

@@ -23,7 +23,9 @@ FAST = [
 
 
 def fake(**changes):
-    return FakeDataset(**{"n_units": 16, "records_per_unit": 4, "duration": 0.5, **changes})
+    return FakeDataset(
+        **{"n_units": 16, "records_per_unit": 4, "duration": 0.5, **changes}
+    )
 
 
 @pytest.fixture
@@ -71,7 +73,10 @@ def test_train_writes_what_it_promises(trained):
     assert metrics["protocols_left_out"] == {
         "cross_specimen": "1 specimen_id in the plan, and at least 4 are needed"
     }
-    assert "cross_specimen is left out: 1 specimen" in (trained / "report.html").read_text()
+    assert (
+        "cross_specimen is left out: 1 specimen"
+        in (trained / "report.html").read_text()
+    )
     methods = metrics["protocols"]["by_unit"]["methods"]
     assert set(methods) == {
         "cnn", "label_shuffle", "indicators", "indicators_without_level", "rms_threshold", "metadata_probe",
@@ -82,9 +87,13 @@ def test_train_writes_what_it_promises(trained):
         assert 0 <= value["low"] <= value["high"] <= 1
         assert np.sum(methods[name]["confusion"]) == 16 * len(methods[name]["seeds"])
     assert methods["chance"]["balanced_accuracy"] == 0.25
-    for seed, epoch in enumerate(metrics["protocols"]["by_unit"]["last_epoch"]["epoch"]):
+    for seed, epoch in enumerate(
+        metrics["protocols"]["by_unit"]["last_epoch"]["epoch"]
+    ):
         assert metrics["protocols"]["by_unit"]["best_epoch"][seed] <= epoch == 2
-        stored = json.loads((trained / "models" / f"by_unit-seed{seed}" / "model.json").read_text())
+        stored = json.loads(
+            (trained / "models" / f"by_unit-seed{seed}" / "model.json").read_text()
+        )
         assert (
             stored["temperature"]
             == metrics["protocols"]["by_unit"]["calibration"]["temperature"][seed]
@@ -96,16 +105,23 @@ def test_predictions_hold_what_the_scores_are_made_of(trained):
     metrics = json.loads((trained / "metrics.json").read_text())
     with (trained / "predictions.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    mine = [row for row in rows if (row["protocol"], row["method"]) == ("by_unit", "indicators")]
+    mine = [
+        row
+        for row in rows
+        if (row["protocol"], row["method"]) == ("by_unit", "indicators")
+    ]
     shares = []
     for name in metrics["class_names"]:
         guesses = [row["predicted"] for row in mine if row["label"] == name]
         shares.append(sum(guess == name for guess in guesses) / len(guesses))
-    score = metrics["protocols"]["by_unit"]["methods"]["indicators"]["balanced_accuracy"]["mean"]
+    score = metrics["protocols"]["by_unit"]["methods"]["indicators"][
+        "balanced_accuracy"
+    ]["mean"]
     assert sum(shares) / len(shares) == pytest.approx(score, abs=1e-12)
     for row in mine:
         largest = max(
-            metrics["class_names"], key=lambda name: float(row[f"log_probability_{name}"])
+            metrics["class_names"],
+            key=lambda name: float(row[f"log_probability_{name}"]),
         )
         assert largest == row["predicted"]
     assert {row["method"] for row in rows} >= {"cnn", "indicators", "label_shuffle"}
@@ -201,25 +217,40 @@ def visible_text(page):
 
 def test_evaluate_repeats_the_test_score_of_its_seed(trained, data, capsys, tmp_path):
     model = trained / "models" / "by_unit-seed1"
-    assert main(["evaluate", "data=good", f"model_dir={model}", f"out={tmp_path / 'e'}"]) == 0
-    assert "test part of by_unit (the data set it was trained on)" in capsys.readouterr().out
+    assert (
+        main(["evaluate", "data=good", f"model_dir={model}", f"out={tmp_path / 'e'}"])
+        == 0
+    )
+    assert (
+        "test part of by_unit (the data set it was trained on)"
+        in capsys.readouterr().out
+    )
     result = json.loads((tmp_path / "e" / "metrics.json").read_text())
     study = json.loads((trained / "metrics.json").read_text())
-    expected = study["protocols"]["by_unit"]["methods"]["cnn"]["balanced_accuracy"]["per_seed"][1]
+    expected = study["protocols"]["by_unit"]["methods"]["cnn"]["balanced_accuracy"][
+        "per_seed"
+    ][1]
     assert result["balanced_accuracy"]["mean"] == pytest.approx(expected, abs=1e-12)
     calibration = study["protocols"]["by_unit"]["calibration"]
     assert result["calibration"]["temperature"] == calibration["temperature"][1:]
     error = calibration["after"]["expected_calibration_error"][1]
-    assert result["calibration"]["after"]["expected_calibration_error"] == pytest.approx(
-        [error], abs=1e-6
-    )
+    assert result["calibration"]["after"][
+        "expected_calibration_error"
+    ] == pytest.approx([error], abs=1e-6)
     assert (tmp_path / "e" / "confusion.png").stat().st_size > 1000
 
 
 def test_evaluate_on_another_data_set_takes_all_records(trained, data, capsys):
     data["other"] = fake(seed=9)
     assert (
-        main(["evaluate", "data=other", f"model_dir={trained / 'models' / 'by_unit-seed0'}"]) == 0
+        main(
+            [
+                "evaluate",
+                "data=other",
+                f"model_dir={trained / 'models' / 'by_unit-seed0'}",
+            ]
+        )
+        == 0
     )
     assert capsys.readouterr().out.startswith("64 records of 16 unit(s): all records")
 
@@ -233,7 +264,11 @@ def test_evaluate_on_another_data_set_takes_all_records(trained, data, capsys):
             {},
             "its classes are healthy, crack, pitting, broken",
         ),
-        ({"classes": ("healthy", "crack")}, {}, "its classes are healthy, crack, the model knows"),
+        (
+            {"classes": ("healthy", "crack")},
+            {},
+            "its classes are healthy, crack, the model knows",
+        ),
         ({}, {"schema_version": 2}, "data schema 2, trained on schema 1"),
     ],
 )
@@ -255,14 +290,19 @@ def test_evaluate_refuses_what_does_not_fit(
 def test_evaluate_refuses_other_channels(trained, data, capsys):
     data["other"] = fake()
     data["other"].channel_names = ("housing",)
-    words = ["evaluate", "data=other", f"model_dir={trained / 'models' / 'by_unit-seed0'}"]
+    words = [
+        "evaluate",
+        "data=other",
+        f"model_dir={trained / 'models' / 'by_unit-seed0'}",
+    ]
     fails(capsys, words, "no channel channel_0 (it has housing)")
 
 
 def damaged(trained, tmp_path, **files):
     for name in ("model.json", "model.safetensors"):
         content = files.get(
-            name.replace(".", "_"), (trained / "models" / "by_unit-seed0" / name).read_bytes()
+            name.replace(".", "_"),
+            (trained / "models" / "by_unit-seed0" / name).read_bytes(),
         )
         (tmp_path / name).write_bytes(content)
     return f"model_dir={tmp_path}"
@@ -274,16 +314,26 @@ def test_evaluate_refuses_damaged_models(trained, data, capsys, tmp_path):
         ["evaluate", "data=good", f"model_dir={trained}"],
         "choose one of its models, for instance",
     )
-    fails(capsys, ["evaluate", "data=good", f"model_dir={tmp_path}"], "holds no model.json")
+    fails(
+        capsys,
+        ["evaluate", "data=good", f"model_dir={tmp_path}"],
+        "holds no model.json",
+    )
     import pickle
 
     for content in (pickle.dumps({"weights": [1.0]}), b"", b"PK\x03\x04" + bytes(400)):
-        words = ["evaluate", "data=good", damaged(trained, tmp_path, model_safetensors=content)]
+        words = [
+            "evaluate",
+            "data=good",
+            damaged(trained, tmp_path, model_safetensors=content),
+        ]
         fails(capsys, words, "is not a safetensors file")
     words = ["evaluate", "data=good", damaged(trained, tmp_path, model_json=b"{}")]
     fails(capsys, words, "does not describe a model")
     text = (trained / "models" / "by_unit-seed0" / "model.json").read_text()
-    later = text.replace('"model_schema_version": 2', '"model_schema_version": 9').encode()
+    later = text.replace(
+        '"model_schema_version": 2', '"model_schema_version": 9'
+    ).encode()
     fails(
         capsys,
         ["evaluate", "data=good", damaged(trained, tmp_path, model_json=later)],
@@ -312,7 +362,10 @@ def test_evaluate_refuses_damaged_models(trained, data, capsys, tmp_path):
             ["train", "data=good", "out=OUT", "protocols=[cross_specimen]"],
             "cross_specimen: 1 specimen_id in the plan",
         ),
-        (["train", "data=good", "out=OUT", "protocols=[open_set]"], "no protocol 'open_set'"),
+        (
+            ["train", "data=good", "out=OUT", "protocols=[open_set]"],
+            "no protocol 'open_set'",
+        ),
         (
             ["train", "data=good", "out=OUT", "protocols=[cross_sensor]"],
             "cross_sensor: the data set has 1 channel",
@@ -325,7 +378,10 @@ def test_evaluate_refuses_damaged_models(trained, data, capsys, tmp_path):
             ["train", "data=good", "out=OUT", "classes=[healthy,crak]"],
             "no class 'crak'; did you mean crack",
         ),
-        (["train", "data=good", "out=OUT", "classes=[crack]"], "one class only (crack)"),
+        (
+            ["train", "data=good", "out=OUT", "classes=[crack]"],
+            "one class only (crack)",
+        ),
         (["train", "data=good", "out=OUT", "epoch=3"], "epochs"),
         (["train", "data=good", "out=OUT", "model=cnnn"], "cnn"),
         (["train", "data=good", "out=OUT", "normalise=rms,none"], "-m"),
@@ -341,8 +397,12 @@ def test_evaluate_refuses_damaged_models(trained, data, capsys, tmp_path):
         (["learn"], "no command 'learn'"),
     ],
 )
-def test_mistakes_are_one_line_and_leave_nothing(words, message, data, capsys, tmp_path):
-    fails(capsys, [word.replace("OUT", str(tmp_path / "out")) for word in words], message)
+def test_mistakes_are_one_line_and_leave_nothing(
+    words, message, data, capsys, tmp_path
+):
+    fails(
+        capsys, [word.replace("OUT", str(tmp_path / "out")) for word in words], message
+    )
     assert list(tmp_path.iterdir()) == []
 
 
@@ -357,9 +417,15 @@ def test_a_real_folder_that_is_no_data_set(capsys, tmp_path):
 
 
 def test_existing_out_is_refused_before_the_data_is_read(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path: pytest.fail("read"))
+    monkeypatch.setattr(
+        gensig.dataset.reader, "open_dataset", lambda path: pytest.fail("read")
+    )
     (tmp_path / "precious").write_text("x")
-    fails(capsys, ["train", "data=good", f"out={tmp_path}"], "exists and is not an empty folder")
+    fails(
+        capsys,
+        ["train", "data=good", f"out={tmp_path}"],
+        "exists and is not an empty folder",
+    )
     fails(
         capsys,
         ["train", "-m", "data=good", f"out={tmp_path}", "normalise=rms,none"],
@@ -393,9 +459,14 @@ def test_multirun_writes_one_folder_for_each_value(data, tmp_path):
         "normalise=rms,none",
     ]
     assert main(words) == 0
-    assert sorted(path.name for path in out.iterdir()) == ["0-normalise=rms", "1-normalise=none"]
+    assert sorted(path.name for path in out.iterdir()) == [
+        "0-normalise=rms",
+        "1-normalise=none",
+    ]
     assert (
-        json.loads((out / "1-normalise=none" / "metrics.json").read_text())["settings"]["normalise"]
+        json.loads((out / "1-normalise=none" / "metrics.json").read_text())["settings"][
+            "normalise"
+        ]
         == "none"
     )
 
@@ -423,6 +494,8 @@ def test_diagnose_loads_neither_numba_nor_the_physics():
         "assert not bad, bad"
     )
     assert (
-        subprocess.run([sys.executable, "-c", code], capture_output=True, check=False).returncode
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, check=False
+        ).returncode
         == 0
     )

@@ -40,7 +40,13 @@ HOWTO = Path(__file__).parents[3] / "docs" / "howto" / "controls.md"
 
 def make_task(dataset, **changes):
     return task_of(
-        dataset, **{"window_samples": 1200, "stride_samples": 1000, "normalise": "rms", **changes}
+        dataset,
+        **{
+            "window_samples": 1200,
+            "stride_samples": 1000,
+            "normalise": "rms",
+            **changes,
+        },
     )
 
 
@@ -63,11 +69,15 @@ def test_record_and_difference_have_one_divisor_which_is_the_twins(normalise):
         dataset.signals(record, name=name).astype(float)
         for name in ("acceleration", "healthy_twin")
     )
-    level = np.std(twin, axis=1, keepdims=True) if normalise == "rms" else np.ones((2, 1))
+    level = (
+        np.std(twin, axis=1, keepdims=True) if normalise == "rms" else np.ones((2, 1))
+    )
     wanted = (np.concatenate([signal, signal - twin]) / np.tile(level, (2, 1)))[
         :, start : start + 1200
     ]
-    np.testing.assert_allclose(cut, wanted - wanted.mean(axis=1, keepdims=True), rtol=0, atol=1e-4)
+    np.testing.assert_allclose(
+        cut, wanted - wanted.mean(axis=1, keepdims=True), rtol=0, atol=1e-4
+    )
     np.testing.assert_array_equal(windows.label, plain.label)
     np.testing.assert_array_equal(windows.start, plain.start)
 
@@ -78,7 +88,9 @@ def test_what_the_oracle_sees_of_a_healthy_record_is_noise():
     task = make_task(dataset, normalise="none")
     windows = oracle_windows(task, subset_segments(task, "by_unit", "train"), Windows())
     power = windows.cut(np.arange(len(windows)))[:, 1].var(axis=1)
-    np.testing.assert_allclose(power[windows.label == 0].mean(), 2 * 0.5**2, rtol=0.05, atol=0)
+    np.testing.assert_allclose(
+        power[windows.label == 0].mean(), 2 * 0.5**2, rtol=0.05, atol=0
+    )
     assert power[windows.label == 3].mean() > 0.55
 
 
@@ -91,7 +103,9 @@ def test_the_table_has_finite_named_columns_and_shares_its_cache():
     again = oracle_table(task, subset_segments(task, "by_unit", "test"), cache)
     np.testing.assert_array_equal(table.values, again.values)
     difference = [
-        index for index, name in enumerate(table.names) if name.endswith("difference/log_rms")
+        index
+        for index, name in enumerate(table.names)
+        if name.endswith("difference/log_rms")
     ]
     assert len(difference) == 2
     assert (
@@ -117,7 +131,11 @@ def test_the_better_one_on_validation_units_is_the_oracle():
         chosen_oracle(task, [run("oracle_network", 5), run("oracle_indicators", 6)])
         == "oracle_indicators"
     )
-    two = [run("oracle_network", 8), run("oracle_network", 5, 1), run("oracle_indicators", 6)]
+    two = [
+        run("oracle_network", 8),
+        run("oracle_network", 5, 1),
+        run("oracle_indicators", 6),
+    ]
     assert chosen_oracle(task, two) == "oracle_network"
 
 
@@ -130,7 +148,11 @@ def test_a_method_over_itself_is_one_and_the_interval_grows_with_the_units_sprea
 
     def ratio(one, other):
         return ratio_with_interval(
-            "balanced_accuracy", one, other, n_bootstrap=500, rng=np.random.default_rng(1)
+            "balanced_accuracy",
+            one,
+            other,
+            n_bootstrap=500,
+            rng=np.random.default_rng(1),
         )
 
     same = ratio(counts[:1], counts[:1])
@@ -140,9 +162,9 @@ def test_a_method_over_itself_is_one_and_the_interval_grows_with_the_units_sprea
     found = ratio(counts, perfect)
     assert found["low"] < found["mean"] < found["high"] < 1
     assert found["mean"] == pytest.approx(hits.mean() / 10)
-    assert oracle_verdict({"over_oracle": {"balanced_accuracy": ratio(perfect, counts)}}).endswith(
-        "no bound here"
-    )
+    assert oracle_verdict(
+        {"over_oracle": {"balanced_accuracy": ratio(perfect, counts)}}
+    ).endswith("no bound here")
 
 
 # --- the probe ----------------------------------------------------------------------------------------------------
@@ -151,7 +173,8 @@ def test_a_method_over_itself_is_one_and_the_interval_grows_with_the_units_sprea
 def test_nothing_that_is_a_label_is_probed():
     dataset = FakeDataset(**SMALL)
     dataset.columns |= {
-        name: np.zeros(dataset.n_records) for name in (*COLUMNS, *EXCLUDED, "params/fault.depth_mm")
+        name: np.zeros(dataset.n_records)
+        for name in (*COLUMNS, *EXCLUDED, "params/fault.depth_mm")
     }
     for results in (False, True):
         probed = probed_columns(dataset, results=results)
@@ -166,7 +189,9 @@ def test_nothing_that_is_a_label_is_probed():
         } & {*probed}
         assert not set(EXCLUDED) & set(probed)
         assert "params/fault.depth_mm" not in probed
-        assert {"speed_rpm", "snr_db", "unit_id", "start_phase", "torque_nm"} <= set(probed)
+        assert {"speed_rpm", "snr_db", "unit_id", "start_phase", "torque_nm"} <= set(
+            probed
+        )
         assert ("integration_error" in probed) == ("clipped" in probed) == results
     known = {**COLUMNS, **SIGNALS}
     assert all(name in known for name in EXCLUDED)
@@ -187,7 +212,9 @@ def test_the_place_in_the_file_is_probed():
     )
     values, names = probe_values(dataset, 4, results=False)
     np.testing.assert_array_equal(values[:, names.index("place")], np.arange(64))
-    np.testing.assert_array_equal(values[:, names.index("place_in_condition")], np.arange(64) % 4)
+    np.testing.assert_array_equal(
+        values[:, names.index("place_in_condition")], np.arange(64) % 4
+    )
 
 
 def test_a_leak_is_found_and_where_there_is_none_the_probe_is_at_chance():
@@ -210,7 +237,9 @@ def test_a_leak_is_found_and_where_there_is_none_the_probe_is_at_chance():
         return np.mean(found.predicted == task.labels()[found.record])
 
     assert share("metadata_probe") == 1.0
-    dataset.columns["label"] = np.random.default_rng(3).permutation(dataset.columns["label"])
+    dataset.columns["label"] = np.random.default_rng(3).permutation(
+        dataset.columns["label"]
+    )
     assert 0.1 < share("metadata_probe") < 0.45
     dataset.columns["integration_error"] = 1e-4 + 1e-4 * dataset.columns["label"]
     assert share("metadata_probe") < 0.45
@@ -231,7 +260,9 @@ def test_every_control_has_its_jobs_and_only_on_clean_protocols():
     off = make_settings("oracle=false", "metadata_probe=false")
     assert control_jobs(task, off, ["by_unit"]) == []
     without = task_from(FakeDataset(**SMALL), settings)
-    assert all(job.control != "oracle" for job in control_jobs(without, settings, ["by_unit"]))
+    assert all(
+        job.control != "oracle" for job in control_jobs(without, settings, ["by_unit"])
+    )
 
 
 @pytest.fixture
@@ -243,13 +274,18 @@ def opened(monkeypatch):
     }
     for name, dataset in offered.items():
         dataset.folder = Path(name)
-    monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path: offered[str(path)])
+    monkeypatch.setattr(
+        gensig.dataset.reader, "open_dataset", lambda path: offered[str(path)]
+    )
     return offered
 
 
 def test_a_study_with_all_of_them(opened, tmp_path):
     out = tmp_path / "out"
-    assert main(["train", "data=good", f"out={out}", *FAST, "sham=sham", "normalise=both"]) == 0
+    assert (
+        main(["train", "data=good", f"out={out}", *FAST, "sham=sham", "normalise=both"])
+        == 0
+    )
     result = json.loads((out / "metrics.json").read_text())["protocols"]["by_unit"]
     methods = result["methods"]
     assert set(methods) == {
@@ -263,13 +299,15 @@ def test_a_study_with_all_of_them(opened, tmp_path):
     )
     share = result["over_oracle"]["balanced_accuracy"]
     mean = (
-        methods["cnn"]["balanced_accuracy"]["mean"] / methods["oracle"]["balanced_accuracy"]["mean"]
+        methods["cnn"]["balanced_accuracy"]["mean"]
+        / methods["oracle"]["balanced_accuracy"]["mean"]
     )
     assert share["mean"] == pytest.approx(mean)
     assert share["low"] <= share["mean"] <= share["high"]
     assert [path.name for path in (out / "models").iterdir()] == ["by_unit-seed0"]
     assert "sham" not in {
-        line.split(",")[1] for line in (out / "predictions.csv").read_text().splitlines()
+        line.split(",")[1]
+        for line in (out / "predictions.csv").read_text().splitlines()
     }
     page = (out / "report.html").read_text()
     for words in (
@@ -286,9 +324,13 @@ def test_the_controls_change_no_bit_of_the_rest(opened, tmp_path):
     plain = ["metadata_probe=false", "oracle=false"]
     results = []
     for name, words in (("with", ["sham=sham", "normalise=both"]), ("without", plain)):
-        assert main(["train", "data=good", f"out={tmp_path / name}", *FAST, *words]) == 0
+        assert (
+            main(["train", "data=good", f"out={tmp_path / name}", *FAST, *words]) == 0
+        )
         results.append(
-            json.loads((tmp_path / name / "metrics.json").read_text())["protocols"]["by_unit"]
+            json.loads((tmp_path / name / "metrics.json").read_text())["protocols"][
+                "by_unit"
+            ]
         )
     for method in ("cnn", "rms_threshold", "label_shuffle"):
         assert results[0]["methods"][method] == results[1]["methods"][method]
@@ -321,17 +363,26 @@ def test_a_sham_set_scores_chance_where_the_faults_score_above(opened, tmp_path)
         )
         == 0
     )
-    methods = json.loads((tmp_path / "out" / "metrics.json").read_text())["protocols"]["by_unit"][
-        "methods"
-    ]
+    methods = json.loads((tmp_path / "out" / "metrics.json").read_text())["protocols"][
+        "by_unit"
+    ]["methods"]
     for name in ("sham", "sham_indicators_without_level"):
-        assert verdict(methods[name], 1 / len(CLASSES)) != "ABOVE chance: look for a leak"
+        assert (
+            verdict(methods[name], 1 / len(CLASSES)) != "ABOVE chance: look for a leak"
+        )
     assert methods["indicators_without_level"]["balanced_accuracy"]["low"] > 0.4
 
 
 def test_the_section_is_empty_without_controls():
-    result = {"leaky": False, "methods": {"cnn": {}, "chance": {"balanced_accuracy": 0.25}}}
-    metrics = {"protocols": {"by_unit": result}, "model": "cnn", "settings": {"oracle": "auto"}}
+    result = {
+        "leaky": False,
+        "methods": {"cnn": {}, "chance": {"balanced_accuracy": 0.25}},
+    }
+    metrics = {
+        "protocols": {"by_unit": result},
+        "model": "cnn",
+        "settings": {"oracle": "auto"},
+    }
     assert controls_section(metrics).table is None
 
 
@@ -340,7 +391,9 @@ def test_the_section_is_empty_without_controls():
     [(0.2, 0.3, "at chance"), (0.3, 0.4, "ABOVE chance"), (0.1, 0.2, "below chance")],
 )
 def test_verdicts(low, high, says):
-    assert verdict({"balanced_accuracy": {"low": low, "high": high}}, 0.25).startswith(says)
+    assert verdict({"balanced_accuracy": {"low": low, "high": high}}, 0.25).startswith(
+        says
+    )
 
 
 # --- mistakes -----------------------------------------------------------------------------------------------------
@@ -361,20 +414,30 @@ def test_verdicts(low, high, says):
             {"n_channels": 2},
             "sham=other: its channels are channel_0, channel_1, those of data= channel_0",
         ),
-        ({"sampling_rate": 25600.0}, "sham=other is sampled at 25600 Hz, data= at 12800 Hz"),
+        (
+            {"sampling_rate": 25600.0},
+            "sham=other is sampled at 25600 Hz, data= at 12800 Hz",
+        ),
     ],
 )
-def test_a_sham_set_that_does_not_fit_is_refused(opened, capsys, tmp_path, other, message):
+def test_a_sham_set_that_does_not_fit_is_refused(
+    opened, capsys, tmp_path, other, message
+):
     opened["other"] = FakeDataset(**{**SMALL, "sham": True, **other})
     opened["other"].folder = Path("other")
-    assert main(["train", "data=good", f"out={tmp_path / 'out'}", *FAST, "sham=other"]) == 2
+    assert (
+        main(["train", "data=good", f"out={tmp_path / 'out'}", *FAST, "sham=other"])
+        == 2
+    )
     assert message in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
 def test_a_sham_set_without_the_protocol_is_refused(opened, capsys, tmp_path):
     opened["sham"].protocols = ("cross_speed",)
-    assert main(["train", "data=good", f"out={tmp_path / 'out'}", *FAST, "sham=sham"]) == 2
+    assert (
+        main(["train", "data=good", f"out={tmp_path / 'out'}", *FAST, "sham=sham"]) == 2
+    )
     assert "sham=sham has none of the protocols by_unit" in capsys.readouterr().err
 
 
@@ -382,7 +445,10 @@ def test_a_sham_set_without_the_protocol_is_refused(opened, capsys, tmp_path):
     ("word", "message"),
     [
         ("oracle=true", "oracle must be auto or false, not True"),
-        ("sham=3", "sham must be the folder of a data set made with plan.sham=true, not 3"),
+        (
+            "sham=3",
+            "sham must be the folder of a data set made with plan.sham=true, not 3",
+        ),
         ("metadata_probe=1", "metadata_probe must be true or false, not 1"),
         ("normalise=all", "no normalisation 'all'; there is rms, none, both"),
     ],

@@ -15,7 +15,9 @@ HOWTO = Path(__file__).resolve().parents[3] / "docs" / "howto"
 
 
 def python_of(page):
-    (code,) = re.findall(r"```python\n(.*?)```", (HOWTO / page).read_text("utf-8"), flags=re.DOTALL)
+    (code,) = re.findall(
+        r"```python\n(.*?)```", (HOWTO / page).read_text("utf-8"), flags=re.DOTALL
+    )
     return code
 
 
@@ -28,8 +30,12 @@ def one_thread():
 
 
 @pytest.mark.parametrize("classes", [CLASSES, (*CLASSES, "wear")])
-def test_a_model_of_ones_own_learns_and_is_judged_on_unseen_units(classes, monkeypatch, capsys):
-    data = FakeDataset(n_units=16, records_per_unit=8, duration=0.5, noise=0.2, classes=classes)
+def test_a_model_of_ones_own_learns_and_is_judged_on_unseen_units(
+    classes, monkeypatch, capsys
+):
+    data = FakeDataset(
+        n_units=16, records_per_unit=8, duration=0.5, noise=0.2, classes=classes
+    )
     monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path, **_: data)
     code = python_of("train_your_model.md")
     assert len(code.strip().splitlines()) <= 30

@@ -29,21 +29,32 @@ def residual() -> np.ndarray:
 
 
 @pytest.mark.parametrize("n_samples", [1000, 1001])
-def test_all_bands_together_are_the_energy_over_the_noise(residual, n_samples: int) -> None:
+def test_all_bands_together_are_the_energy_over_the_noise(
+    residual, n_samples: int
+) -> None:
     x, power = residual[..., :n_samples], np.array([0.5, 4.0])[:, None]
     assert_allclose(
-        d_prime(x, power)[..., -1] ** 2, np.sum(x**2, axis=-1) / power[:, 0], rtol=1e-12, atol=0
+        d_prime(x, power)[..., -1] ** 2,
+        np.sum(x**2, axis=-1) / power[:, 0],
+        rtol=1e-12,
+        atol=0,
     )
 
 
 def test_a_tone_is_in_its_band_alone() -> None:
     tone = np.sin(2.0 * math.pi * 1000.0 * np.arange(1000) / RATE)
     assert_allclose(
-        residual_energy(tone, np.ones(1), RATE, BANDS), [0.0, 500.0, 0.0], rtol=0, atol=1e-9
+        residual_energy(tone, np.ones(1), RATE, BANDS),
+        [0.0, 500.0, 0.0],
+        rtol=0,
+        atol=1e-9,
     )
     # at the edge it belongs to the lower band
     assert_allclose(
-        residual_energy(tone, np.ones(1), RATE, (1000.0, 2000.0)), [500.0, 0.0], rtol=0, atol=1e-9
+        residual_energy(tone, np.ones(1), RATE, (1000.0, 2000.0)),
+        [500.0, 0.0],
+        rtol=0,
+        atol=1e-9,
     )
 
 
@@ -54,7 +65,10 @@ def test_more_bandwidth_never_tells_less(residual) -> None:
 
 def test_six_decibels_less_noise_double_it(residual) -> None:
     assert_allclose(
-        d_prime(residual, np.full(1, 0.25)), 2.0 * d_prime(residual, np.ones(1)), rtol=1e-12, atol=0
+        d_prime(residual, np.full(1, 0.25)),
+        2.0 * d_prime(residual, np.ones(1)),
+        rtol=1e-12,
+        atol=0,
     )
 
 
@@ -88,19 +102,27 @@ def modulated(depth: float, n_turns: float = 40.0) -> tuple[np.ndarray, np.ndarr
     time = np.arange(int(n_turns / 25.0 * RATE)) / RATE
     angle = 2.0 * math.pi * 25.0 * time
     bump = np.exp(-0.5 * (np.angle(np.exp(1j * (angle - 1.0))) / 0.15) ** 2)
-    mesh = (1.0 + depth * bump) * np.cos(N_TEETH * angle) + 0.3 * np.cos(2 * N_TEETH * angle)
+    mesh = (1.0 + depth * bump) * np.cos(N_TEETH * angle) + 0.3 * np.cos(
+        2 * N_TEETH * angle
+    )
     return mesh + 0.01 * np.random.default_rng(3).standard_normal((2, len(time))), angle
 
 
 def table(depth: float, n_turns: float = 40.0, **changes) -> dict[str, np.ndarray]:
     signal, angle = modulated(depth, n_turns)
-    values = band_indicators(signal, angle, RATE, {"pinion": (N_TEETH, 1.0)}, BANDS, **changes)
-    return dict(zip(indicator_names(["pinion"]), np.moveaxis(values, -1, 0), strict=True))
+    values = band_indicators(
+        signal, angle, RATE, {"pinion": (N_TEETH, 1.0)}, BANDS, **changes
+    )
+    return dict(
+        zip(indicator_names(["pinion"]), np.moveaxis(values, -1, 0), strict=True)
+    )
 
 
 def test_indicators_of_a_known_mesh() -> None:
     found = table(0.0)
-    assert_allclose(found["rms"][:, 1:], 0.5 * math.log(0.5 + 0.5 * 0.3**2), rtol=0, atol=2e-3)
+    assert_allclose(
+        found["rms"][:, 1:], 0.5 * math.log(0.5 + 0.5 * 0.3**2), rtol=0, atol=2e-3
+    )
     assert np.isnan(
         found["fm4_pinion"][:, 0]
     ).all()  # below 500 Hz there is no room for the mesh and its sidebands
@@ -118,9 +140,15 @@ def test_the_envelope_counts_the_turns_of_the_gear() -> None:
     time = np.arange(20_000) / RATE
     angle = 2.0 * math.pi * 25.0 * time
     for order, heard in ((2, True), (ENVELOPE_HARMONICS + 2, False)):
-        signal = ((1.0 + 0.2 * np.cos(order * angle)) * np.cos(2.0 * math.pi * 1000.0 * time))[None]
-        values = band_indicators(signal, angle, RATE, {"pinion": (N_TEETH, 1.0)}, (500.0, 2000.0))
-        envelope = np.exp(values[0, 1, indicator_names(["pinion"]).index("envelope_pinion")])
+        signal = (
+            (1.0 + 0.2 * np.cos(order * angle)) * np.cos(2.0 * math.pi * 1000.0 * time)
+        )[None]
+        values = band_indicators(
+            signal, angle, RATE, {"pinion": (N_TEETH, 1.0)}, (500.0, 2000.0)
+        )
+        envelope = np.exp(
+            values[0, 1, indicator_names(["pinion"]).index("envelope_pinion")]
+        )
         assert envelope == pytest.approx(0.2, abs=1e-3) if heard else envelope < 1e-3
 
 
@@ -183,7 +211,8 @@ def test_the_best_of_many_indicators_by_chance_is_not_seen() -> None:
         difference = np.abs(sound.mean(axis=0) - other.mean(axis=0))
         best.append(
             np.max(
-                difference / np.sqrt(0.5 * (sound.var(axis=0, ddof=1) + other.var(axis=0, ddof=1)))
+                difference
+                / np.sqrt(0.5 * (sound.var(axis=0, ddof=1) + other.var(axis=0, ddof=1)))
             )
         )
         seen.append(seen_by_indicators(sound, other).d_prime)
@@ -193,7 +222,9 @@ def test_the_best_of_many_indicators_by_chance_is_not_seen() -> None:
 
 def test_confirmation_takes_the_direction_it_is_told() -> None:
     sound, faulty = groups(2.0)
-    up, down = (confirmed(sound, faulty, indicator=7, raises=raises) for raises in (True, False))
+    up, down = (
+        confirmed(sound, faulty, indicator=7, raises=raises) for raises in (True, False)
+    )
     assert up.d_prime == pytest.approx(-down.d_prime)
     assert up.auroc == pytest.approx(1.0 - down.auroc)
     assert up.d_prime > 1.0
@@ -203,7 +234,9 @@ def test_machines_without_a_value_are_left_out_and_too_few_tell_nothing() -> Non
     sound, faulty = groups(3.0)
     sound[2] = np.nan
     left = [unit for unit in range(10) if unit != 2]
-    assert seen_by_indicators(sound, faulty) == seen_by_indicators(sound[left], faulty[left])
+    assert seen_by_indicators(sound, faulty) == seen_by_indicators(
+        sound[left], faulty[left]
+    )
     sound[:, 7] = np.nan
     assert seen_by_indicators(sound, faulty).indicator != 7
     few = seen_by_indicators(sound[:3], faulty[:3])

@@ -33,14 +33,20 @@ def studies(tmp_path_factory):
             ("with", ["n_threads=2", "tensorboard=true"]),
             ("without", ["n_threads=1"]),
         ):
-            assert main(["train", "data=good", f"out={folder / name}", *FAST, *options]) == 0
+            assert (
+                main(["train", "data=good", f"out={folder / name}", *FAST, *options])
+                == 0
+            )
     return folder
 
 
 def scalars(folder):
     """tag -> values."""
     events = accumulator.EventAccumulator(str(folder)).Reload()
-    return {tag: [event.value for event in events.Scalars(tag)] for tag in events.Tags()["scalars"]}
+    return {
+        tag: [event.value for event in events.Scalars(tag)]
+        for tag in events.Tags()["scalars"]
+    }
 
 
 def metrics(folder):
@@ -50,12 +56,19 @@ def metrics(folder):
 def test_losses_are_those_of_the_study(studies):
     log = studies / "with" / "tensorboard"
     names = sorted(path.name for path in log.iterdir())
-    assert names == ["by_unit-label_shuffle-seed0", "by_unit-seed0", "by_unit-seed1", "scores"]
+    assert names == [
+        "by_unit-label_shuffle-seed0",
+        "by_unit-seed0",
+        "by_unit-seed1",
+        "scores",
+    ]
     for seed, expected in enumerate(
         metrics(studies / "with")["protocols"]["by_unit"]["validation_loss"]
     ):
         found = scalars(log / f"by_unit-seed{seed}")
-        np.testing.assert_allclose(found["loss/validation_records"], expected, rtol=1e-6, atol=0)
+        np.testing.assert_allclose(
+            found["loss/validation_records"], expected, rtol=1e-6, atol=0
+        )
         assert len(found["loss/training_windows"]) == len(expected)
         assert np.isfinite(found["loss/training_windows"]).all()
         assert min(found["loss/training_windows"]) > 0
@@ -67,7 +80,9 @@ def test_scores_are_those_of_the_study(studies):
     for method in ("cnn", "rms_threshold", "label_shuffle"):
         for part in ("mean", "low", "high"):
             (value,) = found[f"balanced_accuracy/{method}/{part}"]
-            assert value == pytest.approx(methods[method]["balanced_accuracy"][part], rel=1e-6)
+            assert value == pytest.approx(
+                methods[method]["balanced_accuracy"][part], rel=1e-6
+            )
     assert found["balanced_accuracy/chance/mean"] == [0.25]
 
 
@@ -75,8 +90,13 @@ def test_nothing_else_depends_on_it(studies):
     assert not (studies / "without" / "tensorboard").exists()
     for seed in (0, 1):
         path = f"models/by_unit-seed{seed}/model.safetensors"
-        assert (studies / "with" / path).read_bytes() == (studies / "without" / path).read_bytes()
-    assert metrics(studies / "with")["protocols"] == metrics(studies / "without")["protocols"]
+        assert (studies / "with" / path).read_bytes() == (
+            studies / "without" / path
+        ).read_bytes()
+    assert (
+        metrics(studies / "with")["protocols"]
+        == metrics(studies / "without")["protocols"]
+    )
 
 
 def test_a_value_that_is_no_switch_is_refused(tmp_path, capsys):

@@ -6,7 +6,9 @@ import pytest
 
 @pytest.mark.parametrize("path", api_pages.PAGES, ids=lambda path: path.stem)
 def test_lists_are_those_of_the_docstrings(path):
-    assert path.read_text(encoding="utf-8") == api_pages.page(path), "run python tests/api_pages.py"
+    assert path.read_text(encoding="utf-8") == api_pages.page(path), (
+        "run python tests/api_pages.py"
+    )
 
 
 def test_all_that_gensig_offers_is_listed():

@@ -75,7 +75,9 @@ def _check(words: list[str]) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=NAMES)
-def test_commands_of_a_page_can_be_typed(page: Path, stopped_after_parsing: None) -> None:
+def test_commands_of_a_page_can_be_typed(
+    page: Path, stopped_after_parsing: None
+) -> None:
     wrong = []
     for line, words in command_lines(page.read_text(encoding="utf-8")):
         try:
@@ -102,5 +104,7 @@ def test_a_mistake_would_be_found(command: str, stopped_after_parsing: None) -> 
 
 
 def test_there_are_commands_to_check() -> None:
-    n_commands = sum(len(list(command_lines(page.read_text(encoding="utf-8")))) for page in PAGES)
+    n_commands = sum(
+        len(list(command_lines(page.read_text(encoding="utf-8")))) for page in PAGES
+    )
     assert n_commands > 100

@@ -7,7 +7,15 @@ from typing import Any
 
 import pytest
 import yaml
-from docs_pages import NAMES, PAGES, ROOT, anchors, blocks, command_lines, without_blocks
+from docs_pages import (
+    NAMES,
+    PAGES,
+    ROOT,
+    anchors,
+    blocks,
+    command_lines,
+    without_blocks,
+)
 
 from gensig.options.compose import compose
 
@@ -62,15 +70,21 @@ def test_the_site_has_every_page_once() -> None:
             for leaf in leaves(item)
         ]
 
-    nav = leaves(yaml.safe_load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"))["nav"])
+    nav = leaves(
+        yaml.safe_load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"))["nav"]
+    )
     pages = [str(page.relative_to(DOCS)) for page in DOCS.rglob("*.md")]
     assert sorted(nav) == sorted(pages)
 
 
-@pytest.mark.parametrize("page", sorted(DOCS.glob("theory/*.md")), ids=lambda page: page.name)
+@pytest.mark.parametrize(
+    "page", sorted(DOCS.glob("theory/*.md")), ids=lambda page: page.name
+)
 def test_equations_are_numbered_in_order(page: Path) -> None:
     equations = [
-        block.code for block in blocks(page.read_text(encoding="utf-8")) if block.language == "math"
+        block.code
+        for block in blocks(page.read_text(encoding="utf-8"))
+        if block.language == "math"
     ]
     tags = [TAG.findall(code) for code in equations]
     assert all(len(tag) == 1 for tag in tags)
@@ -114,13 +128,24 @@ def test_configuration_keys_that_the_pages_name_exist() -> None:
     known: set[str] = set()
     for file in (ROOT / "configs").rglob("*.yaml"):
         text = file.read_text(encoding="utf-8")
-        group = file.relative_to(ROOT / "configs").parts[0] if file.parent.name != "configs" else ""
-        known |= _keys(
-            yaml.safe_load(text), "" if not group or "@package _global_" in text else f"{group}."
+        group = (
+            file.relative_to(ROOT / "configs").parts[0]
+            if file.parent.name != "configs"
+            else ""
         )
-    for life in ("crack_growth", "pit_growth", "wear", "mixed"):  # put together from several files
         known |= _keys(
-            compose("generate", ["experiment=run_to_failure", f"life={life}"]).plain(), ""
+            yaml.safe_load(text),
+            "" if not group or "@package _global_" in text else f"{group}.",
+        )
+    for life in (
+        "crack_growth",
+        "pit_growth",
+        "wear",
+        "mixed",
+    ):  # put together from several files
+        known |= _keys(
+            compose("generate", ["experiment=run_to_failure", f"life={life}"]).plain(),
+            "",
         )
     sections = {key.partition(".")[0] for key in known if "." in key}
     named = re.compile(
@@ -155,7 +180,9 @@ def test_a_page_is_cut_where_it_should_be() -> None:
         "python",
         "not run: why",
     )
-    assert [target for _, _, target in LINK.findall(without_blocks(page))] == ["other.md#x"]
+    assert [target for _, _, target in LINK.findall(without_blocks(page))] == [
+        "other.md#x"
+    ]
     assert anchors(page) == {"a-b-c", "twice", "twice-1"}
     assert list(command_lines(page)) == [(5, ["gensig", "plan", "fault=crack"])]
 
@@ -164,10 +191,14 @@ def test_examples_on_the_page_are_the_files_that_run() -> None:
     examples = ROOT / "tests" / "examples"
     page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
     shown = {
-        block.mark: block.code for block in blocks(page) if block.mark.startswith("tests/examples/")
+        block.mark: block.code
+        for block in blocks(page)
+        if block.mark.startswith("tests/examples/")
     }
     files = {
-        path for path in examples.iterdir() if path.is_file() and not path.name.startswith("test_")
+        path
+        for path in examples.iterdir()
+        if path.is_file() and not path.name.startswith("test_")
     }
     assert set(shown) == {str(path.relative_to(ROOT)) for path in files}
     for name, code in shown.items():

@@ -11,7 +11,9 @@ from gensig.plan.request import read_request
 from gensig.version import __version__
 
 ROOT = Path(__file__).resolve().parents[3]
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))[
+    "project"
+]
 
 
 def text(name: str) -> str:
@@ -20,7 +22,9 @@ def text(name: str) -> str:
 
 def test_changelog_begins_with_this_version() -> None:
     versions = re.findall(r"^## \[(\S+)\] - (\S+)$", text("CHANGELOG.md"), re.M)
-    numbers = [tuple(int(part) for part in version.split(".")) for version, _ in versions]
+    numbers = [
+        tuple(int(part) for part in version.split(".")) for version, _ in versions
+    ]
     assert versions[0][0] == __version__
     assert numbers == sorted(numbers, reverse=True)
     sections = re.split(r"^## ", text("CHANGELOG.md"), flags=re.M)[
@@ -42,7 +46,10 @@ def test_citation_is_of_this_version() -> None:
 def test_every_package_that_is_needed_has_its_licence_told() -> None:
     extras = PROJECT["optional-dependencies"]
     asked_for = re.findall(r"\w+", extras["all"][0])[1:]
-    needed = [*PROJECT["dependencies"], *(line for extra in asked_for for line in extras[extra])]
+    needed = [
+        *PROJECT["dependencies"],
+        *(line for extra in asked_for for line in extras[extra]),
+    ]
     told = " ".join(re.findall(r"^\| (.*?) \|", text("THIRD-PARTY.md"), re.M))
     names = {re.split(r"[<>=]", line)[0].lower() for line in needed}
     assert names - set(re.split(r"[^\w-]+", told.lower())) == set()
@@ -51,7 +58,8 @@ def test_every_package_that_is_needed_has_its_licence_told() -> None:
 def test_card_of_the_first_data_set_is_that_of_this_version() -> None:
     """Its identity names all that decides bits: a new key changes it, and the card has to follow."""
     identity = identity_hash(
-        read_request(["experiment=quickstart"]).config.with_entries(out=None).plain(), __version__
+        read_request(["experiment=quickstart"]).config.with_entries(out=None).plain(),
+        __version__,
     )
     card = text("data_cards/quickstart.md")
     assert f"| identity | {identity} |" in card

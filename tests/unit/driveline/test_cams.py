@@ -55,7 +55,10 @@ def test_lift_slope_and_curvature_belong_together():
     step = ANGLE[1]
     assert_allclose(lift.max(), 0.012, rtol=1e-6)
     assert_allclose(
-        np.gradient(lift, step)[1:-1], slope[1:-1], rtol=0, atol=1e-4 * np.abs(slope).max()
+        np.gradient(lift, step)[1:-1],
+        slope[1:-1],
+        rtol=0,
+        atol=1e-4 * np.abs(slope).max(),
     )
     inside = (ANGLE > 0.05) & (VALVE.span - 0.05 > ANGLE)
     assert_allclose(
@@ -80,7 +83,9 @@ def test_friction_takes_its_force_on_the_lever_of_the_contact():
     force = follower_force(VALVE, ANGLE, SPEED)
     lift, slope, _ = VALVE.motion(ANGLE)
     torque = cam_torque(VALVE, ANGLE, SPEED)
-    assert_allclose(-torque, force * slope + 0.1 * force * (lift + 0.04), rtol=1e-12)  # eq. (20)
+    assert_allclose(
+        -torque, force * slope + 0.1 * force * (lift + 0.04), rtol=1e-12
+    )  # eq. (20)
     assert torque.mean() < 0.0
 
 
@@ -112,8 +117,13 @@ def test_a_stroke_takes_the_work_of_the_fuel_pressed_out(speed_share):
     torque = plunger_torque(PLUNGER, ANGLE, SPEED, VOLUME, speed_share)
     peak = max(80e6 * speed_share**2, 25e6)
     share = np.linspace(0.0, 1.0, 10_001)
-    shape = np.sin(0.5 * np.pi * np.clip(np.minimum(share, 1.0 - share) / 0.25, 0.0, 1.0)) ** 2
-    assert_allclose(-2.0 * np.pi * torque.mean(), peak * VOLUME * shape.mean(), rtol=2e-3)
+    shape = (
+        np.sin(0.5 * np.pi * np.clip(np.minimum(share, 1.0 - share) / 0.25, 0.0, 1.0))
+        ** 2
+    )
+    assert_allclose(
+        -2.0 * np.pi * torque.mean(), peak * VOLUME * shape.mean(), rtol=2e-3
+    )
 
 
 def test_delivery_begins_at_the_stated_lift_and_ends_with_the_fuel():
@@ -137,7 +147,8 @@ def test_peak_is_pressure_times_area_times_slope():
 
 def test_fuel_that_the_plunger_cannot_deliver_is_refused():
     with pytest.raises(
-        ConfigError, match=r"3000 mm3 of fuel need 16.98 mm of the plunger .* the cam lifts 14 mm"
+        ConfigError,
+        match=r"3000 mm3 of fuel need 16.98 mm of the plunger .* the cam lifts 14 mm",
     ):
         plunger_torque(PLUNGER, ANGLE, SPEED, 3e-6, 1.0)
 
@@ -149,7 +160,10 @@ def test_fuel_that_the_plunger_cannot_deliver_is_refused():
         ({"lift": 0.0}, "cam.lift_mm = 0 must be positive"),
         ({"span": 7.0}, "cam.span_deg = 401.07 must be at most a turn"),
         ({"spring_rate": -1.0}, "cam.spring_rate_n_per_m = -1 must not be negative"),
-        ({"friction_coefficient": 1.5}, "cam.friction_coefficient = 1.5 must lie in 0..1"),
+        (
+            {"friction_coefficient": 1.5},
+            "cam.friction_coefficient = 1.5 must lie in 0..1",
+        ),
         ({"roller_radius": 0.01}, "cam.roller_radius_mm = 10 with follower = flat"),
         ({"follower": "roller"}, "cam.roller_radius_mm = 0 with follower = roller"),
     ],
@@ -163,8 +177,14 @@ def test_cams_that_cannot_be_are_refused(change, message):
     ("change", "message"),
     [
         ({"diameter": 0.0}, "injection_pump.diameter_mm = 0 must be positive"),
-        ({"opening_pressure": -1e6}, "injection_pump.opening_pressure_mpa = -1 must be positive"),
-        ({"ramp_share": 0.6}, "injection_pump.ramp_share = 0.6 must be above 0 and at most 0.5"),
+        (
+            {"opening_pressure": -1e6},
+            "injection_pump.opening_pressure_mpa = -1 must be positive",
+        ),
+        (
+            {"ramp_share": 0.6},
+            "injection_pump.ramp_share = 0.6 must be above 0 and at most 0.5",
+        ),
         (
             {"indicated_efficiency": 1.0},
             "injection_pump.indicated_efficiency = 1 must lie between 0 and 1",

@@ -24,7 +24,12 @@ def crank(n_cycles, *, rise=0.0, n_samples=20000):
 @pytest.mark.parametrize("rise", [0.0, 0.4])
 def test_orders_are_found_whatever_the_speed_and_the_trend(rise):
     angle = crank(6.3, rise=rise)
-    signal = 2.0 * np.cos(0.5 * angle + 0.2) + 0.5 * np.sin(10.0 * angle) + 3.0 + 0.01 * angle
+    signal = (
+        2.0 * np.cos(0.5 * angle + 0.2)
+        + 0.5 * np.sin(10.0 * angle)
+        + 3.0
+        + 0.01 * angle
+    )
     found = order_amplitudes(np.array([signal, -signal]), angle, 40)
     expected = np.zeros(40)
     expected[0], expected[19] = 2.0, 0.5
@@ -34,7 +39,9 @@ def test_orders_are_found_whatever_the_speed_and_the_trend(rise):
 def test_fluctuation_is_half_the_peak_to_peak_of_each_cycle():
     angle = crank(5.5)
     assert [one.stop for one in whole_cycles(angle)][-1] < len(angle)
-    found = fluctuations(np.array([np.sin(angle), 3.0 * np.sin(0.5 * angle) + 7.0]), angle)
+    found = fluctuations(
+        np.array([np.sin(angle), 3.0 * np.sin(0.5 * angle) + 7.0]), angle
+    )
     assert found.shape == (2, 5)
     assert_allclose(found, np.array([[1.0], [3.0]]) * np.ones((2, 5)), rtol=1e-5)
 
@@ -49,5 +56,7 @@ def test_one_impact_moves_the_extremes_of_a_run_but_not_the_typical_ones():
 
 
 def test_less_than_a_cycle_is_refused():
-    with pytest.raises(ConfigError, match="less than a cycle of two turns; simulate longer"):
+    with pytest.raises(
+        ConfigError, match="less than a cycle of two turns; simulate longer"
+    ):
         whole_cycles(crank(0.9))

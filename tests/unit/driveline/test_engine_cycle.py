@@ -62,7 +62,9 @@ def test_piston_runs_between_the_dead_centers():
 def test_slopes_are_those_of_the_travel():
     rate = CYLINDER.piston_rate(ANGLE)
     assert_allclose(rate, derivative(CYLINDER.piston_travel(ANGLE)), rtol=0, atol=1e-12)
-    assert_allclose(CYLINDER.piston_curvature(ANGLE), derivative(rate), rtol=0, atol=1e-10)
+    assert_allclose(
+        CYLINDER.piston_curvature(ANGLE), derivative(rate), rtol=0, atol=1e-10
+    )
 
 
 def test_mean_gas_torque_is_the_work_over_four_pi():
@@ -74,7 +76,9 @@ def test_mean_gas_torque_is_the_work_over_four_pi():
     work = np.sum(0.5 * (closed[1:] + closed[:-1]) * np.diff(volume))
     assert_allclose(torque.mean(), work / CYCLE, rtol=1e-3)
     assert torque.mean() > 500.0
-    assert_allclose(gas_torque(CYLINDER, ANGLE, np.full(N, 3e5), 1e5).mean(), 0.0, atol=1e-9)
+    assert_allclose(
+        gas_torque(CYLINDER, ANGLE, np.full(N, 3e5), 1e5).mean(), 0.0, atol=1e-9
+    )
 
 
 def test_inertia_torque_does_no_work_and_grows_with_the_speed_squared():
@@ -103,8 +107,13 @@ def test_inertia_torque_is_equation_19_without_its_leading_minus():
 def test_first_law_holds_while_the_valves_are_shut():
     heat = 15e3
     motored, fired = wiebe_parts(CYCLE_OPTION, CYLINDER, N, 1.0)
-    pressure, after = motored + heat * fired, np.where(ANGLE >= CYCLE / 2, ANGLE - CYCLE, ANGLE)
-    shut = (after >= CYCLE_OPTION.intake_closing) & (after <= CYCLE_OPTION.exhaust_opening)
+    pressure, after = (
+        motored + heat * fired,
+        np.where(ANGLE >= CYCLE / 2, ANGLE - CYCLE, ANGLE),
+    )
+    shut = (after >= CYCLE_OPTION.intake_closing) & (
+        after <= CYCLE_OPTION.exhaust_opening
+    )
     order = np.argsort(after[shut])
     p, v = pressure[shut][order], CYLINDER.volume(after[shut][order])
     work = np.sum(0.5 * (p[1:] + p[:-1]) * np.diff(v))
@@ -117,7 +126,9 @@ def test_without_heat_it_compresses_polytropically():
     closing = CYLINDER.volume(np.array([CYCLE_OPTION.intake_closing]))[0]
     top = CYLINDER.volume(np.array([0.0]))[0]
     assert_allclose(motored[0], 3.2e5 * (closing / top) ** 1.35, rtol=1e-12)
-    assert_allclose(motored[N * 500 // 720], 3.2e5, rtol=1e-12)  # 500 degrees: intake open
+    assert_allclose(
+        motored[N * 500 // 720], 3.2e5, rtol=1e-12
+    )  # 500 degrees: intake open
 
 
 def test_boost_follows_the_power():
@@ -137,9 +148,15 @@ def test_a_delay_of_whole_points_moves_and_changes_nothing():
     [
         ({"bore": 0.0}, "bore_mm = 0 must be positive"),
         ({"stroke": -0.1}, "stroke_mm = -100 must be positive"),
-        ({"crank_to_rod_ratio": 1.0}, "crank_to_rod_ratio = 1 must lie between 0 and 1"),
+        (
+            {"crank_to_rod_ratio": 1.0},
+            "crank_to_rod_ratio = 1 must lie between 0 and 1",
+        ),
         ({"compression_ratio": 1.0}, "compression_ratio = 1 must be above 1"),
-        ({"reciprocating_mass": -1.0}, "reciprocating_mass_kg = -1 must not be negative"),
+        (
+            {"reciprocating_mass": -1.0},
+            "reciprocating_mass_kg = -1 must not be negative",
+        ),
     ],
 )
 def test_cylinders_that_cannot_be_are_refused(change, message):
@@ -159,7 +176,10 @@ def test_cylinders_that_cannot_be_are_refused(change, message):
             {"combustion_duration": np.radians(150)},
             "combustion ends 138 degrees after top dead center",
         ),
-        ({"intake_closing": np.radians(-80)}, "intake_closing_deg = -80 must lie in -180..-90"),
+        (
+            {"intake_closing": np.radians(-80)},
+            "intake_closing_deg = -80 must lie in -180..-90",
+        ),
         ({"shape": float("nan")}, "shape = nan must lie in"),
     ],
 )
@@ -170,7 +190,13 @@ def test_cycles_that_cannot_be_are_refused(change, message):
 
 def write(folder, header, angle, pressure):
     path = folder / "pressure.csv"
-    np.savetxt(path, np.column_stack([angle, pressure]), delimiter=",", header=header, comments="")
+    np.savetxt(
+        path,
+        np.column_stack([angle, pressure]),
+        delimiter=",",
+        header=header,
+        comments="",
+    )
     return PressureFile(file=str(path))
 
 
@@ -179,17 +205,24 @@ MEGAPASCAL = 2.0 + np.cos(np.radians(DEGREES / 2.0))
 
 
 def test_a_measured_pressure_is_read_whatever_its_units_and_start(tmp_path):
-    one = read_pressure(write(tmp_path, "crank_angle_deg,pressure_mpa", DEGREES, MEGAPASCAL), N)
+    one = read_pressure(
+        write(tmp_path, "crank_angle_deg,pressure_mpa", DEGREES, MEGAPASCAL), N
+    )
     assert_allclose(one, 1e6 * (2.0 + np.cos(ANGLE / 2.0)), rtol=1e-4)
     (tmp_path / "b").mkdir()
     other = write(
-        tmp_path / "b", "pressure_gpa,crank_angle_rad", MEGAPASCAL * 1e-3, np.radians(DEGREES)
+        tmp_path / "b",
+        "pressure_gpa,crank_angle_rad",
+        MEGAPASCAL * 1e-3,
+        np.radians(DEGREES),
     )
     assert_allclose(read_pressure(other, N), one, rtol=1e-9)
     (tmp_path / "c").mkdir()
     both_ends = np.append(DEGREES, 360.0), np.append(MEGAPASCAL, 1.0)
     assert_allclose(
-        read_pressure(write(tmp_path / "c", "crank_angle_deg,pressure_mpa", *both_ends), N),
+        read_pressure(
+            write(tmp_path / "c", "crank_angle_deg,pressure_mpa", *both_ends), N
+        ),
         one,
         rtol=1e-9,
     )
@@ -217,7 +250,12 @@ def test_a_measured_pressure_is_read_whatever_its_units_and_start(tmp_path):
             "column crank_angle_mm has no unit that fits",
         ),
         ("angle_deg,pressure_mpa", DEGREES, MEGAPASCAL, "no column crank_angle"),
-        ("crank_angle_deg,pressure_mpa", DEGREES[::-1], MEGAPASCAL, "row 3, crank_angle must rise"),
+        (
+            "crank_angle_deg,pressure_mpa",
+            DEGREES[::-1],
+            MEGAPASCAL,
+            "row 3, crank_angle must rise",
+        ),
         (
             "crank_angle_deg,pressure_mpa",
             DEGREES[:600],
@@ -236,7 +274,12 @@ def test_a_measured_pressure_is_read_whatever_its_units_and_start(tmp_path):
             MEGAPASCAL - 2.0,
             "pressure is absolute and positive",
         ),
-        ("crank_angle_deg,pressure_mpa", DEGREES[:50], MEGAPASCAL[:50], "too short: 50 rows"),
+        (
+            "crank_angle_deg,pressure_mpa",
+            DEGREES[:50],
+            MEGAPASCAL[:50],
+            "too short: 50 rows",
+        ),
     ],
 )
 def test_measured_pressures_that_make_no_cycle_are_refused(

@@ -24,15 +24,21 @@ def test_twenty_cylinders_fire_every_36_degrees_once():
     assert_allclose(gaps(V20), 36.0, atol=1e-9)
     angles = V20.firing_angles()
     assert sorted(angles) == sorted(V20.cylinders)
-    assert_allclose(np.sort(np.degrees(list(angles.values()))), 36.0 * np.arange(20), atol=1e-9)
+    assert_allclose(
+        np.sort(np.degrees(list(angles.values()))), 36.0 * np.arange(20), atol=1e-9
+    )
 
 
 def test_bank_a_uses_the_stated_slots_and_bank_b_follows_by_72_degrees():
     angles = {name: np.degrees(angle) for name, angle in V20.firing_angles().items()}
-    slots = sorted(round(angle / 36.0) for name, angle in angles.items() if name[0] == "A")
+    slots = sorted(
+        round(angle / 36.0) for name, angle in angles.items() if name[0] == "A"
+    )
     assert slots == [0, 1, 4, 5, 8, 9, 12, 13, 16, 17]
     for throw in range(1, 11):
-        assert_allclose((angles[f"B{throw}"] - angles[f"A{throw}"]) % 720.0, 72.0, atol=1e-9)
+        assert_allclose(
+            (angles[f"B{throw}"] - angles[f"A{throw}"]) % 720.0, 72.0, atol=1e-9
+        )
 
 
 def test_every_cylinder_fires_at_its_own_top_dead_center():
@@ -61,10 +67,15 @@ def test_a_bank_angle_of_90_fires_18_and_54_degrees_apart():
 
 def test_a_parallel_twin_and_a_single_fire_a_turn_and_two_apart():
     twin = Layout(
-        banks=("A",), bank_angles=(0.0,), throw_angles=(0.0, 0.0), firing_order=("A1", "A2")
+        banks=("A",),
+        bank_angles=(0.0,),
+        throw_angles=(0.0, 0.0),
+        firing_order=("A1", "A2"),
     )
     assert_allclose(gaps(twin), 360.0)
-    single = Layout(banks=("A",), bank_angles=(0.0,), throw_angles=(0.5,), firing_order=("A1",))
+    single = Layout(
+        banks=("A",), bank_angles=(0.0,), throw_angles=(0.5,), firing_order=("A1",)
+    )
     assert_allclose(single.firing_angles()["A1"], 0.5)
 
 
@@ -102,7 +113,10 @@ def test_five_pairs_of_throws_72_degrees_apart_fire_two_at_a_time():
             {
                 "bank_angles": (0.0, 0.0),
                 "firing_order": tuple(
-                    f"{bank}{one[1:]}" for one in V20.firing_order if one[0] == "A" for bank in "AB"
+                    f"{bank}{one[1:]}"
+                    for one in V20.firing_order
+                    if one[0] == "A"
+                    for bank in "AB"
                 ),
             },
             "A1 and B1 fire together",

@@ -59,7 +59,9 @@ def pairs(table):
     """Spur pairs that share a body, with tooth errors."""
     rng = np.random.default_rng(4)
     errors = rng.normal(0, 2e-6, 23), rng.normal(0, 2e-6, 84)
-    return pair_mesh("m", table, direction=DIRECTION, roll_dof=0, damping=1e-3, errors=errors)
+    return pair_mesh(
+        "m", table, direction=DIRECTION, roll_dof=0, damping=1e-3, errors=errors
+    )
 
 
 class TestPhaseTable:
@@ -67,7 +69,10 @@ class TestPhaseTable:
         for turned in (0.0, 0.25, 0.5, 7.5, -3.25, 12345.25):
             expected = BITE * STIFFNESS * (1 + 0.2 * math.cos(2 * math.pi * turned))
             assert_allclose(
-                law_at(phases(), turned, BITE)[layout.FORCE], expected, rtol=1e-9, atol=0
+                law_at(phases(), turned, BITE)[layout.FORCE],
+                expected,
+                rtol=1e-9,
+                atol=0,
             )
 
     def test_a_whole_turn_repeats_with_the_turn(self):
@@ -112,18 +117,30 @@ class TestPhaseTable:
         table = rippled(TEETH[0])
         mesh = phases(stiffness=table, backlash=BACKLASH)
         for turned in (0.25, 5.5, 18.75):
-            front, back = law_at(mesh, turned, BITE)[0], law_at(mesh, turned, -BACKLASH - BITE)[0]
+            front, back = (
+                law_at(mesh, turned, BITE)[0],
+                law_at(mesh, turned, -BACKLASH - BITE)[0],
+            )
             assert_allclose(back, -front, rtol=1e-9, atol=0)
 
     def test_damping_grows_with_the_load_and_never_pulls(self):
         mesh = phases(damping=2e-3, backlash=BACKLASH)
         still, fast = law_at(mesh, 0.1, BITE), law_at(mesh, 0.1, BITE, rate=10.0)
-        assert_allclose(fast[layout.FORCE], 1.02 * still[layout.FORCE], rtol=1e-9, atol=0)
-        assert_allclose(fast[layout.LOST], 0.02 * still[layout.FORCE] * 10.0, rtol=1e-9, atol=0)
-        assert law_at(mesh, 0.1, BITE, rate=-1e4)[layout.FORCE] == pytest.approx(0.0, abs=0.0)
+        assert_allclose(
+            fast[layout.FORCE], 1.02 * still[layout.FORCE], rtol=1e-9, atol=0
+        )
+        assert_allclose(
+            fast[layout.LOST], 0.02 * still[layout.FORCE] * 10.0, rtol=1e-9, atol=0
+        )
+        assert law_at(mesh, 0.1, BITE, rate=-1e4)[layout.FORCE] == pytest.approx(
+            0.0, abs=0.0
+        )
         back = law_at(mesh, 0.1, -BACKLASH - BITE, rate=-10.0)
         assert_allclose(
-            back[layout.FORCE], 1.02 * law_at(mesh, 0.1, -BACKLASH - BITE)[0], rtol=1e-9, atol=0
+            back[layout.FORCE],
+            1.02 * law_at(mesh, 0.1, -BACKLASH - BITE)[0],
+            rtol=1e-9,
+            atol=0,
         )
 
 
@@ -155,11 +172,18 @@ class TestHelicalStatics:
     def test_it_is_where_statics_put_it(self, pair, contact, mesh):
         for place, approach in enumerate(contact.approach):
             assert_allclose(
-                law_at(mesh, place / 16, approach)[layout.FORCE], pair.mesh_force, rtol=1e-9, atol=0
+                law_at(mesh, place / 16, approach)[layout.FORCE],
+                pair.mesh_force,
+                rtol=1e-9,
+                atol=0,
             )
 
     def test_near_that_load_it_answers_as_statics_do(self, pair, contact, mesh):
-        other = replace(pair, torque=1.02 * pair.torque).transmission_error(n_phases=16).contact
+        other = (
+            replace(pair, torque=1.02 * pair.torque)
+            .transmission_error(n_phases=16)
+            .contact
+        )
         for place, approach in enumerate(other.approach):
             found = law_at(mesh, place / 16, approach)[layout.FORCE] - pair.mesh_force
             assert_allclose(found, 0.02 * pair.mesh_force, rtol=0.02, atol=0)
@@ -173,7 +197,9 @@ class TestPairs:
         found = static_mesh(
             table, pair_states(table, rolls * table.pair.base_pitch, **errors), 500.0
         )
-        for turned, approach, load in zip(rolls, found.approach, found.load, strict=True):
+        for turned, approach, load in zip(
+            rolls, found.approach, found.load, strict=True
+        ):
             law = law_at(pairs, turned, approach)
             assert_allclose(law[layout.FORCE], load.sum(), rtol=2e-5, atol=0)
 
@@ -182,21 +208,30 @@ class TestPairs:
         pairs = replace(pairs, errors=(pairs.errors[0], np.zeros(84)))
         for approach in (BITE * 4, -pairs.backlash - BITE * 4):
             force = np.array(
-                [abs(law_at(pairs, turned, approach)[0]) for turned in np.arange(0.5, 23.5, 0.25)]
+                [
+                    abs(law_at(pairs, turned, approach)[0])
+                    for turned in np.arange(0.5, 23.5, 0.25)
+                ]
             )
             turn_on = np.array(
-                [abs(law_at(pairs, turned, approach)[0]) for turned in np.arange(23.5, 46.5, 0.25)]
+                [
+                    abs(law_at(pairs, turned, approach)[0])
+                    for turned in np.arange(23.5, 46.5, 0.25)
+                ]
             )
             lost = force < 0.7 * np.median(force)
             assert 0 < lost.sum() < 12
             assert np.array_equal(lost, turn_on < 0.7 * np.median(force))
 
     @pytest.mark.parametrize("approach", [2e-5, -1.5e-4])
-    def test_the_force_along_the_roll_is_the_slope_of_what_is_stored(self, pairs, approach):
+    def test_the_force_along_the_roll_is_the_slope_of_what_is_stored(
+        self, pairs, approach
+    ):
         for turned in (0.313, 2.711, 9.173):
             step = 1e-7
             below, above = (
-                law_at(pairs, turned + off, approach)[layout.STORED] for off in (-step, step)
+                law_at(pairs, turned + off, approach)[layout.STORED]
+                for off in (-step, step)
             )
             expected = -(above - below) / (2 * step)
             found = law_at(pairs, turned, approach)[layout.ALONG]
@@ -206,11 +241,17 @@ class TestPairs:
     def test_the_force_is_the_slope_over_the_approach_too(self, pairs, approach):
         for turned in (0.313, 2.711, 9.173):
             step = 1e-10
-            below, above = (law_at(pairs, turned, approach + off) for off in (-step, step))
+            below, above = (
+                law_at(pairs, turned, approach + off) for off in (-step, step)
+            )
             found = law_at(pairs, turned, approach)
             slope = (above - below) / (2 * step)
-            assert_allclose(found[layout.FORCE], slope[layout.STORED], rtol=1e-4, atol=0)
-            assert_allclose(found[layout.TANGENT], slope[layout.FORCE], rtol=1e-4, atol=0)
+            assert_allclose(
+                found[layout.FORCE], slope[layout.STORED], rtol=1e-4, atol=0
+            )
+            assert_allclose(
+                found[layout.TANGENT], slope[layout.FORCE], rtol=1e-4, atol=0
+            )
 
 
 class TestPhasesBetweenMeshes:
@@ -224,7 +265,8 @@ class TestPhasesBetweenMeshes:
 
     def test_a_mate_a_tooth_further_on_meets_the_tooth_before(self):
         one, other = (
-            mesh_start(30, mate_angle=angle, drives=True) for angle in (1.0, 1.0 + 2 * math.pi / 30)
+            mesh_start(30, mate_angle=angle, drives=True)
+            for angle in (1.0, 1.0 + 2 * math.pi / 30)
         )
         assert_allclose(one[1], other[1], rtol=0, atol=1e-12)
         assert other[0] == (one[0] - 1) % 30
@@ -238,9 +280,15 @@ class TestPhasesBetweenMeshes:
 
     @pytest.mark.parametrize("drives", [True, False])
     def test_there_and_back(self, drives):
-        start = mesh_start(59, mate_angle=2.2, drives=drives, tooth_angle=0.71, pitch_point=0.4)
-        found = tooth_angle(59, mate_angle=2.2, drives=drives, start=start, pitch_point=0.4)
-        assert_allclose((found - 0.71 + math.pi) % (2 * math.pi), math.pi, rtol=0, atol=1e-12)
+        start = mesh_start(
+            59, mate_angle=2.2, drives=drives, tooth_angle=0.71, pitch_point=0.4
+        )
+        found = tooth_angle(
+            59, mate_angle=2.2, drives=drives, start=start, pitch_point=0.4
+        )
+        assert_allclose(
+            (found - 0.71 + math.pi) % (2 * math.pi), math.pi, rtol=0, atol=1e-12
+        )
 
     def test_no_teeth(self):
         with pytest.raises(GeometryError, match="0 teeth"):
@@ -253,7 +301,10 @@ class TestPhasesBetweenMeshes:
         ({"stiffness": np.full((3, 8), 1e8)}, r"must be \(1, node\) or \(20, node\)"),
         ({"stiffness": np.full((1, 8), -1e8)}, "must not be negative"),
         ({"stiffness": np.full((1, 8), np.nan)}, "stiffness is not finite"),
-        ({"gap": np.full((1, 8), np.inf), "stiffness": np.full((1, 8), 1e8)}, "gap is not finite"),
+        (
+            {"gap": np.full((1, 8), np.inf), "stiffness": np.full((1, 8), 1e8)},
+            "gap is not finite",
+        ),
         ({"backlash": -1e-4}, "backlash -0.0001 must not be negative"),
         ({"damping": math.nan}, "damping nan"),
         ({"start_teeth": (20, 0)}, r"start tooth 20 must lie in 0\.\.19"),

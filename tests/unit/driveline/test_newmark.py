@@ -8,7 +8,12 @@ import pytest
 from line_tools import chain, constant_torques, state_after, two_gears
 
 from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
-from gensig.driveline.time.newmark import LineSolver, _told_above, integrate_line, static_start
+from gensig.driveline.time.newmark import (
+    LineSolver,
+    _told_above,
+    integrate_line,
+    static_start,
+)
 from gensig.errors import ConfigError, GensigError, SimulationError
 
 SOLVER = LineSolver(sampling_rate=10240.0, oversampling=4, max_energy_residual=1e-3)
@@ -29,7 +34,11 @@ class TestLine:
     @pytest.mark.parametrize(
         ("changes", "error", "told"),
         [
-            ({"mass": np.eye(3)}, ConfigError, r"mass matrix \(3, 3\) must be \(2, 2\)"),
+            (
+                {"mass": np.eye(3)},
+                ConfigError,
+                r"mass matrix \(3, 3\) must be \(2, 2\)",
+            ),
             (
                 {"mass": np.diag([1.0, 0.0])},
                 SimulationError,
@@ -40,7 +49,11 @@ class TestLine:
                 SimulationError,
                 "stiffness matrix is not symmetric",
             ),
-            ({"damping": -np.eye(2)}, SimulationError, "damping matrix would feed energy in"),
+            (
+                {"damping": -np.eye(2)},
+                SimulationError,
+                "damping matrix would feed energy in",
+            ),
             ({"stiffness": np.full((2, 2), np.nan)}, ConfigError, "all finite"),
             ({"rotation": np.ones(3)}, ConfigError, r"rotation \(3,\) must be \(2,\)"),
             (
@@ -90,7 +103,10 @@ class TestTorques:
     @pytest.mark.parametrize(
         ("torque", "told"),
         [
-            ({"dof": 5, "table": np.ones(1)}, r"degree of freedom 5 must lie in 0\.\.1"),
+            (
+                {"dof": 5, "table": np.ones(1)},
+                r"degree of freedom 5 must lie in 0\.\.1",
+            ),
             (
                 {"dof": 0, "table": np.ones(1), "factor": np.ones(3)},
                 r"factor \(3,\) must be \(1,\)",
@@ -107,7 +123,10 @@ class TestTorques:
             ({"table": np.array([math.inf])}, "finite numbers"),
             ({"table": np.empty(0)}, "finite numbers"),
             ({"table": np.ones(4), "period": 0.0}, "period 0 rad must be positive"),
-            ({"table": np.ones(4), "factor": np.array([math.nan])}, "factors must be finite"),
+            (
+                {"table": np.ones(4), "factor": np.array([math.nan])},
+                "factors must be finite",
+            ),
         ],
     )
     def test_refused(self, torque, told):
@@ -142,7 +161,10 @@ class TestRun:
         ("changes", "told"),
         [
             ({"channels": []}, "no channel to give out"),
-            ({"channels": [("speed", 2)]}, r"no channel \('speed', 2\); allowed: .* of 0\.\.1"),
+            (
+                {"channels": [("speed", 2)]},
+                r"no channel \('speed', 2\); allowed: .* of 0\.\.1",
+            ),
             ({"channels": [("mesh_force", 1)]}, r"of 0\.\.0"),
             ({"channels": [("power", 0)]}, "no channel"),
             ({"duration": 0.0}, "hold no sample"),
@@ -181,12 +203,20 @@ class TestRun:
             SimulationError,
             "the energy balance misses .* more than 0.001; raise the oversampling above 2",
         ):
-            run(two_gears(backlash=1e-4), start=start, solver=replace(SOLVER, oversampling=2))
+            run(
+                two_gears(backlash=1e-4),
+                start=start,
+                solver=replace(SOLVER, oversampling=2),
+            )
 
     def test_divergence(self):
         """A free line under torques that nothing balances runs away; it is told as one, with a name."""
         with refused(SimulationError, "left all bounds"):
-            run(two_gears(), constant_torques([1e9, 0.0]), start=(np.zeros(2), np.zeros(2)))
+            run(
+                two_gears(),
+                constant_torques([1e9, 0.0]),
+                start=(np.zeros(2), np.zeros(2)),
+            )
 
     def test_infinite_motion_does_not_hang(self):
         with refused(SimulationError, "line: "):
@@ -210,18 +240,28 @@ class TestRun:
 
     def test_rest_of_an_unloaded_line_is_where_it_is(self):
         assert (
-            np.abs(static_start(two_gears(backlash=1e-4), constant_speed(10.0), [])).max() < 1e-15
+            np.abs(
+                static_start(two_gears(backlash=1e-4), constant_speed(10.0), [])
+            ).max()
+            < 1e-15
         )
 
     def test_what_drives_backwards_rests_on_the_back_flanks(self):
         line = two_gears(backlash=1e-4)
         q = static_start(line, constant_speed(10.0), constant_torques([-10.0, 20.0]))
-        assert line.meshes[0].direction @ q == pytest.approx(-1e-4 - 10.0 / 0.05 / 3e8, rel=1e-6)
+        assert line.meshes[0].direction @ q == pytest.approx(
+            -1e-4 - 10.0 / 0.05 / 3e8, rel=1e-6
+        )
 
 
 @pytest.mark.parametrize(
     ("missed", "told"),
-    [(0.0123456, "0.0123"), (1.0004e-3, "0.0010004"), (float("nan"), "nan"), (1e-3, "0.001")],
+    [
+        (0.0123456, "0.0123"),
+        (1.0004e-3, "0.0010004"),
+        (float("nan"), "nan"),
+        (1e-3, "0.001"),
+    ],
 )
 def test_a_residual_just_above_what_is_allowed_reads_above_it(missed, told):
     assert _told_above(missed, 1e-3) == told

@@ -7,7 +7,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gensig.driveline.linear.matrices import line_matrices
-from gensig.driveline.linear.shaft_line import GearMesh, LineGear, Node, Shaft, ShaftLine
+from gensig.driveline.linear.shaft_line import (
+    GearMesh,
+    LineGear,
+    Node,
+    Shaft,
+    ShaftLine,
+)
 from gensig.dynamics.pair import Support
 from gensig.errors import ConfigError
 
@@ -44,7 +50,9 @@ def branched(**changes) -> ShaftLine:
 
 
 def test_speed_ratios_have_their_sign():
-    assert_allclose(branched().speed_ratio, [1.0, 1.0, -0.5, -1.0 / 3.0, -0.5], rtol=1e-15, atol=0)
+    assert_allclose(
+        branched().speed_ratio, [1.0, 1.0, -0.5, -1.0 / 3.0, -0.5], rtol=1e-15, atol=0
+    )
     assert branched().parts == ((0, 1, 2, 3, 4),)
     assert branched().n_loops == 0
 
@@ -74,12 +82,15 @@ def test_a_loop_that_turns_is_counted_and_one_that_locks_is_refused():
         match=r"row 7: this joint closes a loop that locks.* out at -0\.491803.*at -0\.5",
     ):
         ShaftLine(nodes=nodes, gears=(*gears[:3], gear("d", 1, 61)), meshes=meshes)
-    with pytest.raises(ConfigError, match="loop that locks"):  # three gears in a ring turn no way
+    with pytest.raises(
+        ConfigError, match="loop that locks"
+    ):  # three gears in a ring turn no way
         ShaftLine(
             nodes=(*nodes, Node(name="third", inertia=1.0)),
             gears=tuple(gear(str(place), place, 20) for place in range(3)),
             meshes=tuple(
-                GearMesh(driving=a, driven=b, stiffness=1.0) for a, b in ((0, 1), (1, 2), (2, 0))
+                GearMesh(driving=a, driven=b, stiffness=1.0)
+                for a, b in ((0, 1), (1, 2), (2, 0))
             ),
         )
 
@@ -99,11 +110,20 @@ def test_what_falls_apart_has_a_part_and_a_rigid_motion_each():
 def test_matrices_are_what_the_parts_say():
     matrices = line_matrices(branched(), merge_rigid=False)
     assert matrices.names == ("motor", "pinion", "left", "right", "hub")
-    assert_allclose(np.diag(matrices.mass), [0.1, 1e-3, 5e-3, 8e-3, 2e-3], rtol=0, atol=0)
-    assert_allclose(matrices.stiffness[:2, :2], 1e4 * np.array([[1, -1], [-1, 1]]), rtol=0, atol=0)
-    assert_allclose(matrices.damping[:2, :2], 0.3 * np.array([[1, -1], [-1, 1]]), rtol=0, atol=0)
     assert_allclose(
-        matrices.loss_stiffness, 0.05 * matrices.stiffness * (np.arange(5) < 2), rtol=0, atol=0
+        np.diag(matrices.mass), [0.1, 1e-3, 5e-3, 8e-3, 2e-3], rtol=0, atol=0
+    )
+    assert_allclose(
+        matrices.stiffness[:2, :2], 1e4 * np.array([[1, -1], [-1, 1]]), rtol=0, atol=0
+    )
+    assert_allclose(
+        matrices.damping[:2, :2], 0.3 * np.array([[1, -1], [-1, 1]]), rtol=0, atol=0
+    )
+    assert_allclose(
+        matrices.loss_stiffness,
+        0.05 * matrices.stiffness * (np.arange(5) < 2),
+        rtol=0,
+        atol=0,
     )
     radius = 0.47 * 2e-3
     assert_allclose(
@@ -115,7 +135,10 @@ def test_matrices_are_what_the_parts_say():
     assert_allclose(matrices.rigid, [[1, 1, 0.5, 1 / 3, 0.5]], rtol=1e-14, atol=0)
     assert_allclose(matrices.backlash, [1e-4, 0.0], rtol=0, atol=0)
     assert_allclose(
-        matrices.mesh_mass[1], radius**-2 / (20**2 / 1e-3 + 60**2 / 8e-3), rtol=1e-12, atol=0
+        matrices.mesh_mass[1],
+        radius**-2 / (20**2 / 1e-3 + 60**2 / 8e-3),
+        rtol=1e-12,
+        atol=0,
     )
 
 
@@ -125,16 +148,22 @@ def test_a_rigid_compound_is_one_disc_for_integration():
     assert_allclose(np.diag(matrices.mass), [0.1, 1e-3, 7e-3, 8e-3], rtol=1e-14, atol=0)
     assert_allclose(matrices.expand @ [1, 2, 3, 4], [1, 2, 3, 4, 3], rtol=0, atol=0)
     without = branched(
-        shafts=(branched().shafts[0], Shaft(first=2, second=4, stiffness=None, rigid=True))
+        shafts=(
+            branched().shafts[0],
+            Shaft(first=2, second=4, stiffness=None, rigid=True),
+        )
     )
     assert len(line_matrices(without, merge_rigid=False).names) == 4
 
 
 def test_three_nodes_in_a_row_of_rigid_shafts_become_one():
     rigid = tuple(
-        Shaft(first=a, second=b, stiffness=None, rigid=True) for a, b in ((2, 3), (0, 1), (1, 2))
+        Shaft(first=a, second=b, stiffness=None, rigid=True)
+        for a, b in ((2, 3), (0, 1), (1, 2))
     )
-    line = ShaftLine(nodes=tuple(Node(name=name, inertia=1.0) for name in "abcd"), shafts=rigid)
+    line = ShaftLine(
+        nodes=tuple(Node(name=name, inertia=1.0) for name in "abcd"), shafts=rigid
+    )
     assert line.compounds(merge_rigid=False) == ((0, 1, 2, 3),)
 
 
@@ -156,7 +185,10 @@ def test_lateral_motion_is_in_frames_along_the_first_mesh_of_a_gear():
             {"shafts": (Shaft(first=0, second=9, stiffness=1.0),)},
             r"there is no node 9, only 0\.\.4",
         ),
-        ({"meshes": (GearMesh(driving=0, driven=3, stiffness=1.0),)}, "there is no gear 3"),
+        (
+            {"meshes": (GearMesh(driving=0, driven=3, stiffness=1.0),)},
+            "there is no gear 3",
+        ),
         ({"gears": (gear("a", 7, 20),), "meshes": ()}, "a: there is no node 7"),
         ({"gears": (gear("a", 0, 20), gear("b", 0, 40))}, "turn with the same node"),
         (
@@ -185,7 +217,10 @@ def test_what_joins_nothing_is_refused(changes, message):
             lambda: Shaft(first=0, second=1, stiffness=-1.0),
             "stiffness -1 N m/rad must not be negative",
         ),
-        (lambda: Shaft(first=0, second=1, stiffness=0.0), "neither stiffness nor damping"),
+        (
+            lambda: Shaft(first=0, second=1, stiffness=0.0),
+            "neither stiffness nor damping",
+        ),
         (
             lambda: Shaft(first=0, second=1, stiffness=1.0, damping=-1.0),
             "damping -1 must not be negative",
@@ -198,8 +233,14 @@ def test_what_joins_nothing_is_refused(changes, message):
             lambda: GearMesh(driving=0, driven=1, stiffness=1.0, loss_factor=-0.1),
             "loss factor -0.1",
         ),
-        (lambda: GearMesh(driving=0, driven=1, stiffness=1.0, backlash=-0.1), "backlash -0.1"),
-        (lambda: replace(gear("a", 0, 20), n_teeth=0), r"a: teeth \(0\) and base radius"),
+        (
+            lambda: GearMesh(driving=0, driven=1, stiffness=1.0, backlash=-0.1),
+            "backlash -0.1",
+        ),
+        (
+            lambda: replace(gear("a", 0, 20), n_teeth=0),
+            r"a: teeth \(0\) and base radius",
+        ),
         (lambda: replace(gear("a", 0, 20), mass=0.0), "a: mass 0 kg"),
     ],
 )
@@ -210,11 +251,15 @@ def test_what_cannot_be_is_refused(make, message):
 
 def test_lateral_motion_needs_mass_and_support():
     loose = (replace(gear("p", 1, 20), support=None), *branched().gears[1:])
-    with pytest.raises(ConfigError, match="p: its lateral motion needs a mass and a support"):
+    with pytest.raises(
+        ConfigError, match="p: its lateral motion needs a mass and a support"
+    ):
         line_matrices(branched(gears=loose), lateral=True)
     soft = (
         replace(gear("p", 1, 20), support=replace(SUPPORT, stiffness_x=0.0)),
         *branched().gears[1:],
     )
-    with pytest.raises(ConfigError, match="p: its support needs stiffness along both axes"):
+    with pytest.raises(
+        ConfigError, match="p: its support needs stiffness along both axes"
+    ):
         line_matrices(branched(gears=soft), lateral=True)

@@ -66,16 +66,22 @@ def test_what_is_empty_is_derived(line_of):
     density = read_request([]).config["material"]["density_kg_per_m3"]
     radius, bore = 0.04, 0.02
     mass = density * 3.141592653589793 * (radius**2 - bore**2) * 0.02
-    assert_allclose(read.line.nodes[2].inertia, 0.5 * mass * (radius**2 + bore**2), rtol=1e-9)
+    assert_allclose(
+        read.line.nodes[2].inertia, 0.5 * mass * (radius**2 + bore**2), rtol=1e-9
+    )
     assert_allclose(read.line.gears[1].mass, mass, rtol=1e-9)
     per_width = read.line.meshes[0].stiffness / 0.02
-    assert 14e9 < per_width < 22e9  # ISO's c_gamma of such steel gears is about 20 N/(mm um)
+    assert (
+        14e9 < per_width < 22e9
+    )  # ISO's c_gamma of such steel gears is about 20 N/(mm um)
 
 
 def test_header_units_are_read_as_they_are_written(line_of):
     milli = SHAFTING.replace("stiffness_knm_per_rad", "stiffness_nm_per_rad")
     one, other = line_of().line, line_of(milli).line
-    assert_allclose(one.shafts[0].stiffness, 1e3 * other.shafts[0].stiffness, rtol=1e-12)
+    assert_allclose(
+        one.shafts[0].stiffness, 1e3 * other.shafts[0].stiffness, rtol=1e-12
+    )
 
 
 def test_rows_may_hold_only_a_joint_and_columns_stand_in_any_order(line_of):
@@ -93,18 +99,23 @@ def test_rows_may_hold_only_a_joint_and_columns_stand_in_any_order(line_of):
             "teeth_to",
             "loss_factor",
         )
-        writer.writerow({key: "" if key in joint else value for key, value in row.items()})
+        writer.writerow(
+            {key: "" if key in joint else value for key, value in row.items()}
+        )
     for row in rows[:3]:
         writer.writerow({key: "" if key in ("node", "name", "inertia_kg_m2", "speed_ratio") else value
                          for key, value in row.items()})  # fmt: skip
     assert (
-        line_of(stream.getvalue()).line.speed_ratio.tolist() == line_of().line.speed_ratio.tolist()
+        line_of(stream.getvalue()).line.speed_ratio.tolist()
+        == line_of().line.speed_ratio.tolist()
     )
 
 
 def test_the_ring_of_a_viscous_damper_counts_half(line_of):
     assert line_of(viscous_damper_node=1).line.nodes[0].inertia == pytest.approx(0.05)
-    with pytest.raises(ConfigError, match=r"viscous_damper_node = 9: .* has no such node"):
+    with pytest.raises(
+        ConfigError, match=r"viscous_damper_node = 9: .* has no such node"
+    ):
         line_of(viscous_damper_node=9)
 
 
@@ -179,11 +190,23 @@ def test_a_mistake_in_the_line_names_row_and_column(line_of, old, new, message):
             "3,wheel,41",
             r"line.csv, row 4 .*column teeth_to: 40, but on node 3 .* wheel with 41",
         ),
-        ("3,wheel,40", "9,wheel,40", r"gears.csv, row 3 .*column node: .* has no node 9"),
+        (
+            "3,wheel,40",
+            "9,wheel,40",
+            r"gears.csv, row 3 .*column node: .* has no node 9",
+        ),
         ("3,wheel,40,2", "3,wheel,40,3", "pinion and wheel: .*normal_module differs"),
-        ("3,wheel,40,2,20", "3,wheel,40,2,60", r"gears.csv, row 3 .*pressure_angle_deg = 60"),
+        (
+            "3,wheel,40,2,20",
+            "3,wheel,40,2,60",
+            r"gears.csv, row 3 .*pressure_angle_deg = 60",
+        ),
         ("2,pinion,20", "2,pinion,3", r"gears.csv, row 2 .*undercut"),
-        ("20,2,20,0,20", "20,2,20,0,-20", r"row 2 .*column face_width_mm: -20 must be positive"),
+        (
+            "20,2,20,0,20",
+            "20,2,20,0,-20",
+            r"row 2 .*column face_width_mm: -20 must be positive",
+        ),
         ("20,2,20,0,20", "20,2,20,95,20", "helix angle below 90 degrees"),
         ("20,2,20,0,20", "20,0,20,0,20", "module must be positive"),
         ("20,2,20,0,20", "20,2,20,0,", "column face_width_mm: it is empty"),
@@ -192,8 +215,16 @@ def test_a_mistake_in_the_line_names_row_and_column(line_of, old, new, message):
             "normal_module",
             "column normal_module: its unit is missing; write normal_module_mm or",
         ),
-        ("3,wheel", "4,spare,40,2,20,0,20\n3,wheel", r"row 3 .*spare meshes with nothing"),
-        ("3,wheel", "3,twin,40,2,20,0,20\n3,wheel", "column teeth_to: node 3 has 2 such gears"),
+        (
+            "3,wheel",
+            "4,spare,40,2,20,0,20\n3,wheel",
+            r"row 3 .*spare meshes with nothing",
+        ),
+        (
+            "3,wheel",
+            "3,twin,40,2,20,0,20\n3,wheel",
+            "column teeth_to: node 3 has 2 such gears",
+        ),
     ],
 )
 def test_a_mistake_in_the_gears_names_row_and_column(line_of, old, new, message):
@@ -233,7 +264,10 @@ def test_gears_that_lock_are_named(line_of):
             {"shafting_csv": None},
             "system.shafting_csv is required: give a path, or one of engine_gears.csv",
         ),
-        ({"shafting_csv": "not_there.csv"}, "not_there.csv cannot be read: No such file"),
+        (
+            {"shafting_csv": "not_there.csv"},
+            "not_there.csv cannot be read: No such file",
+        ),
         ({"gears_csv": None}, "node 3 has no gear to derive it from"),
         ({"backlash_um": -1}, "system.backlash_um = -1 must not be negative"),
         ({"lateral": 1}, "system.lateral = 1 is not true or false"),
@@ -241,13 +275,22 @@ def test_gears_that_lock_are_named(line_of):
             {"loss_factor": {"shaft": 3, "coupling": 0, "gear_mesh": 0}},
             "system.loss_factor.shaft = 3 must lie in 0..2",
         ),
-        ({"loss_factor": {"shaft": 0}}, "system.loss_factor: missing coupling, gear_mesh"),
+        (
+            {"loss_factor": {"shaft": 0}},
+            "system.loss_factor: missing coupling, gear_mesh",
+        ),
         (
             {"campbell": {"low_speed_rpm": 9, "high_speed_rpm": 3, "orders": [1]}},
             "low_speed_rpm must lie between",
         ),
-        ({"campbell": {"low_speed_rpm": 0, "high_speed_rpm": 3, "orders": [0]}}, "all positive"),
-        ({"campbell": {"low_speed_rpm": 0, "high_speed_rpm": 3, "orders": []}}, "all positive"),
+        (
+            {"campbell": {"low_speed_rpm": 0, "high_speed_rpm": 3, "orders": [0]}},
+            "all positive",
+        ),
+        (
+            {"campbell": {"low_speed_rpm": 0, "high_speed_rpm": 3, "orders": []}},
+            "all positive",
+        ),
         ({"support": None}, "system.support = None must be a group of keys"),
         ({"latral": True}, "system: unknown key 'latral'; did you mean 'lateral'"),
     ],
@@ -258,7 +301,8 @@ def test_a_mistake_in_the_keys_is_one_line(line_of, keys, message):
 
 
 @pytest.mark.parametrize(
-    ("key", "value"), [("force_n", 0), ("damping_ratio", 1.5), ("bearing", 3), ("shaft", {})]
+    ("key", "value"),
+    [("force_n", 0), ("damping_ratio", 1.5), ("bearing", 3), ("shaft", {})],
 )
 def test_a_mistake_in_the_supports_is_one_line(line_of, config, key, value):
     with pytest.raises(ConfigError, match=f"system.support.{key}"):

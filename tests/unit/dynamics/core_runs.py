@@ -35,7 +35,10 @@ class CoreRun:
         self.channels = np.array(channels, dtype=np.int64)
         n = len(self.machines)
         self.state = np.zeros((2, len(machines[0].dofs), n), dtype=precision)
-        self.lost, self.fresh = np.zeros(n, dtype=precision), np.ones(n, dtype=precision)
+        self.lost, self.fresh = (
+            np.zeros(n, dtype=precision),
+            np.ones(n, dtype=precision),
+        )
         self.now = first_step
         self.work, self.wide, self.near = _kernels.scratch(
             self.state.shape[1], len(channels), precision
@@ -58,13 +61,16 @@ class CoreRun:
         """Put one lane at rest where it would stand now."""
         self.state[:, :, lane] = 0.0
         self.state[0, :, lane] = (
-            self.machines[lane].static_start(self.now * self.step) - self.group.rest[:, lane]
+            self.machines[lane].static_start(self.now * self.step)
+            - self.group.rest[:, lane]
         )
         self.center[lane], self.fresh[lane] = 0.0, 1.0
 
     def advance(self, n_steps: int) -> np.ndarray:
         """Mean accelerations over each of some steps, (step, channel, lane)."""
-        means = np.empty((n_steps, len(self.channels), len(self.machines)), dtype=self.precision)
+        means = np.empty(
+            (n_steps, len(self.channels), len(self.machines)), dtype=self.precision
+        )
         _kernels.integrate(
             self.group, self.state.ravel(), self.lost, self.fresh, self.step, self.now, n_steps, self.channels,
             means.ravel(), 0, np.empty(0), -1, 1, np.empty(0), self.work, self.wide, self.near,

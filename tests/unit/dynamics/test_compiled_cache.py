@@ -30,7 +30,11 @@ ASK = "from gensig.dynamics._calling import calling; print(calling(1.0), sum(cal
 def test_all_functions_know_all_files() -> None:
     stamps = {
         function._cache._cache_file._source_stamp
-        for function in (_newmark_kernels.advance, _newmark_kernels.rest, _line_mesh_kernels.gather)
+        for function in (
+            _newmark_kernels.advance,
+            _newmark_kernels.rest,
+            _line_mesh_kernels.gather,
+        )
     }
     assert stamps == {source_stamp(PACKAGE)}
 

@@ -39,7 +39,9 @@ def machines(request, machine, dynamics_of):
     ]
     return [
         dynamics_of(
-            machine({**law, "operating.speed_rpm": speed, "operating.torque_nm": torque}),
+            machine(
+                {**law, "operating.speed_rpm": speed, "operating.torque_nm": torque}
+            ),
             [MissingTooth(gear="pinion", tooth=1)] if k % 2 else [],
             phase=0.1 * k,
         )
@@ -83,7 +85,9 @@ class TestPieces:
         assert means[..., others].tobytes() == whole[1][..., others].tobytes()
         for lane, begin in ((1, 801), (3, 2000), (6, 801)):
             alone = motion(
-                [machines[lane]] * LANES, (begin, N_STEPS - begin), begins=(begin,) * LANES
+                [machines[lane]] * LANES,
+                (begin, N_STEPS - begin),
+                begins=(begin,) * LANES,
             )
             assert state[..., lane].tobytes() == alone[0][..., 0].tobytes()
             assert means[begin:, :, lane].tobytes() == alone[1][begin:, :, 0].tobytes()
@@ -100,7 +104,9 @@ class TestPieces:
 class TestRecentring:
     """Every 256 steps the pinion's turn is taken out of all rotations: nothing but the numbers' size tells."""
 
-    SHIFT = 100  # steps: the same motion, its rotations taken together at other instants
+    SHIFT = (
+        100  # steps: the same motion, its rotations taken together at other instants
+    )
 
     @pytest.fixture(scope="class")
     @classmethod
@@ -130,7 +136,8 @@ class TestRecentring:
 
     def test_the_motion_goes_on(self, twins):
         here, there = (
-            self.walk(one, first) for one, first in zip(twins, (0, self.SHIFT), strict=True)
+            self.walk(one, first)
+            for one, first in zip(twins, (0, self.SHIFT), strict=True)
         )
         level = np.abs(here[0]).max(axis=0)
         assert_allclose(here[0] / level, there[0] / level, rtol=0, atol=1e-11)
@@ -140,7 +147,9 @@ class TestRecentring:
     def test_the_state_itself_jumps_where_the_whole_does_not(self, twins):
         whole, bare = self.walk(twins[1], self.SHIFT)
         place = RECENTER - self.SHIFT
-        assert_allclose(bare[: place - 1], whole[: place - 1, 0, PINION_TURN], rtol=0, atol=0)
+        assert_allclose(
+            bare[: place - 1], whole[: place - 1, 0, PINION_TURN], rtol=0, atol=0
+        )
         assert abs(bare[place] - bare[place - 1]) > 0.5e-3
         assert np.abs(np.diff(whole[:, 0, PINION_TURN], 2)).max() < 1e-6
 
@@ -159,11 +168,14 @@ class TestBlocks:
     N_FACTOR = 5
 
     @pytest.mark.parametrize("n_samples", [1, BLOCK - 1, BLOCK, BLOCK + 1, 200])
-    def test_samples_are_those_of_one_low_pass_over_all_means(self, machines, n_samples):
+    def test_samples_are_those_of_one_low_pass_over_all_means(
+        self, machines, n_samples
+    ):
         low_pass = decimator(self.N_FACTOR)
         first = -low_pass.margin * self.N_FACTOR - 1
         run, whole = (
-            CoreRun(machines, STEP, first_step=first, channels=(0, 1, 5)) for _ in range(2)
+            CoreRun(machines, STEP, first_step=first, channels=(0, 1, 5))
+            for _ in range(2)
         )
         found, _ = run.record(low_pass, n_samples)
         means = whole.advance((n_samples + 2 * low_pass.margin) * self.N_FACTOR + 1)
@@ -174,7 +186,9 @@ class TestBlocks:
         low_pass = decimator(self.N_FACTOR)
         first = -low_pass.margin * self.N_FACTOR - 1
         three, one = (
-            CoreRun(machines, STEP, first_step=first, channels=names).record(low_pass, 70)[0]
+            CoreRun(machines, STEP, first_step=first, channels=names).record(
+                low_pass, 70
+            )[0]
             for names in ((0, 1, 5), (5,))
         )
         assert three[:, 2].tobytes() == one[:, 0].tobytes()

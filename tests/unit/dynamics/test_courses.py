@@ -57,7 +57,9 @@ class TestSteady:
     def test_a_constant_course_is_none(self, record, steady, key):
         found = record({key: [[0, 1], [1, 1]]})
         level = steady.acceleration.std(axis=1, keepdims=True)
-        assert_allclose(found.acceleration / level, steady.acceleration / level, rtol=0, atol=1e-9)
+        assert_allclose(
+            found.acceleration / level, steady.acceleration / level, rtol=0, atol=1e-9
+        )
         assert_allclose(found.shaft_angle, steady.shaft_angle, rtol=0, atol=1e-12)
         assert_allclose(found.mean_speed, steady.mean_speed, rtol=1e-12, atol=0)
 
@@ -75,18 +77,26 @@ class TestSteady:
 
     def test_the_shaft_turns_at_the_set_speed(self, steady):
         """To what the mesh shakes it."""
-        assert_allclose(np.diff(steady.shaft_angle) * RATE, SET_SPEED, rtol=1e-2, atol=0)
+        assert_allclose(
+            np.diff(steady.shaft_angle) * RATE, SET_SPEED, rtol=1e-2, atol=0
+        )
         assert abs(steady.shaft_angle[0]) < 0.1 * SET_SPEED / RATE
 
     def test_mean_speed_is_that_of_the_shaft(self, record):
         """Over the samples' own time: the angle at the sample after the last, of a record twice as long."""
-        short, long = record({SPEED: RAMP}), record({SPEED: RAMP, "operating.duration_s": 0.06})
+        short, long = (
+            record({SPEED: RAMP}),
+            record({SPEED: RAMP, "operating.duration_s": 0.06}),
+        )
         n = len(short.shaft_angle)
         assert_allclose(long.shaft_angle[:n], short.shaft_angle, rtol=0, atol=1e-9)
         expected = (long.shaft_angle[n] - long.shaft_angle[0]) * RATE / n
         assert_allclose(short.mean_speed, expected, rtol=1e-9, atol=0)
         assert_allclose(
-            short.mean_speed, np.diff(short.shaft_angle).mean() * RATE, rtol=1e-3, atol=0
+            short.mean_speed,
+            np.diff(short.shaft_angle).mean() * RATE,
+            rtol=1e-3,
+            atol=0,
         )
 
 
@@ -99,7 +109,11 @@ class TestRamp:
 
         Without friction: teeth that carry the inertia too would rub more.
         """
-        changes = {**rotors, "operating.duration_s": 0.06, "mesh.friction_coefficient": 0}
+        changes = {
+            **rotors,
+            "operating.duration_s": 0.06,
+            "mesh.friction_coefficient": 0,
+        }
         ramp, still = run({**changes, SPEED: RAMP}), record(changes)
         (found,) = simulate_together([ramp])
         assert np.isfinite(found.acceleration).all()
@@ -117,7 +131,10 @@ class TestRamp:
             twist += self.ACCELERATION * driven / ramp.system.motor.coupling_stiffness
         else:
             assert_allclose(
-                twist, self.ACCELERATION / (2 * math.pi * DRIVE) ** 2, rtol=1e-12, atol=0
+                twist,
+                self.ACCELERATION / (2 * math.pi * DRIVE) ** 2,
+                rtol=1e-12,
+                atol=0,
             )
         assert_allclose(lag.mean(), twist, rtol=2e-3, atol=0)
         assert np.ptp(lag) < 0.05 * twist
@@ -147,7 +164,10 @@ class TestTorque:
 
     def carried(self, dynamics, *begins):
         """Mean force on the pinion's bearing over four mesh periods from some instants on, as shares of the set one."""
-        core, period = CoreRun([dynamics], self.STEP, span=(0.0, 0.04)), 1 / dynamics.mesh_frequency
+        core, period = (
+            CoreRun([dynamics], self.STEP, span=(0.0, 0.04)),
+            1 / dynamics.mesh_frequency,
+        )
         shares = []
         for begin in begins:
             core.advance(round(begin / self.STEP) - core.now)
@@ -156,7 +176,9 @@ class TestTorque:
                 core.advance(1)
                 deflection.append(core.whole[0, PINION_Y, 0])
             shares.append(
-                np.mean(deflection) * dynamics.pinion.support.stiffness_y / dynamics.mesh_force
+                np.mean(deflection)
+                * dynamics.pinion.support.stiffness_y
+                / dynamics.mesh_force
             )
         return shares
 
@@ -170,7 +192,9 @@ class TestTorque:
     @pytest.mark.parametrize("rotors", [{}, ROTORS], ids=["pair", "motor_and_load"])
     def test_and_begin_with_it(self, run, rotors):
         dynamics = pair_dynamics(run({**rotors, TORQUE: [[0, 0.3], [1, 0.3]]}))
-        assert_allclose(self.carried(dynamics, 0.0, 0.02), [0.3, 0.3], rtol=2e-2, atol=0)
+        assert_allclose(
+            self.carried(dynamics, 0.0, 0.02), [0.3, 0.3], rtol=2e-2, atol=0
+        )
 
     def test_without_torque_nothing_touches(self, record):
         found = record({TORQUE: [[0, 0], [1, 0]]})
@@ -180,14 +204,21 @@ class TestTorque:
 
 
 def bits(record):
-    return record.acceleration.tobytes(), record.shaft_angle.tobytes(), record.mean_speed
+    return (
+        record.acceleration.tobytes(),
+        record.shaft_angle.tobytes(),
+        record.mean_speed,
+    )
 
 
 class TestNeighbours:
     def test_steady_and_changing_keep_their_bits(self, run):
         runs = [run(), run({SPEED: RAMP}), run({}, MISSING), run({TORQUE: RAMP}), run({SPEED: RAMP, TORQUE: RAMP}),
                 run({SPEED: [[0.0, 1.0], [0.01, 1.3]]}, MISSING)]  # fmt: skip
-        found, expected = simulate_together(runs), [simulate_together([one])[0] for one in runs]
+        found, expected = (
+            simulate_together(runs),
+            [simulate_together([one])[0] for one in runs],
+        )
         assert [bits(one) for one in found] == [bits(one) for one in expected]
         assert len({bits(one) for one in found}) == len(runs)
 
@@ -197,7 +228,10 @@ class TestNeighbours:
             SPEED: [[-0.1, 0.8], [0.01, 0.9], [0.03, 1.2]],
             TORQUE: [[0.0, 1.0], [0.02, 1.1]],
         }
-        runs = [run({**changing, "operating.drive_frequency_hz": rate}) for rate in (20, 5, 7.3)]
+        runs = [
+            run({**changing, "operating.drive_frequency_hz": rate})
+            for rate in (20, 5, 7.3)
+        ]
         expected = [simulate_together([one])[0] for one in runs]
         for order in list(permutations(range(3)))[::2]:
             found = simulate_together([runs[k] for k in order])
@@ -206,8 +240,17 @@ class TestNeighbours:
 
 def test_rotors_move_and_stay_finite(run):
     """Eight degrees of freedom, on a ramp of speed and torque; every channel lives."""
-    channels = ("pinion_y", "pinion_rotation", "wheel_rotation", "motor_rotation", "load_rotation")
-    one = run({**ROTORS, SPEED: RAMP, TORQUE: RAMP, "sensing.channels": list(channels)}, MISSING)
+    channels = (
+        "pinion_y",
+        "pinion_rotation",
+        "wheel_rotation",
+        "motor_rotation",
+        "load_rotation",
+    )
+    one = run(
+        {**ROTORS, SPEED: RAMP, TORQUE: RAMP, "sensing.channels": list(channels)},
+        MISSING,
+    )
     motions = integrate(
         [pair_dynamics(one)],
         one.system.solver,

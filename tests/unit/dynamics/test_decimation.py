@@ -48,7 +48,9 @@ def decimated(frequency, oversampling, phase=0.4):
         RATE * oversampling
     )
     turn = 2 * np.pi * frequency
-    integral = -np.cos(turn * edge + phase) / turn if frequency else edge * np.sin(phase)
+    integral = (
+        -np.cos(turn * edge + phase) / turn if frequency else edge * np.sin(phase)
+    )
     signal = np.diff(integral) * RATE * oversampling
     found = low_pass.apply(side_by_side(signal[None]))[0, 0]
     return found, np.sin(2 * np.pi * frequency * np.arange(N_SAMPLES) / RATE + phase)
@@ -61,7 +63,9 @@ def test_pass_band_is_flat_and_keeps_the_phase(frequency, oversampling):
     assert_allclose(found, expected, rtol=0, atol=tolerance)
 
 
-@pytest.mark.parametrize("folded_to", [25.0, 690.0, 12_000.0, 19_990.0, 23_000.0, 25_500.0])
+@pytest.mark.parametrize(
+    "folded_to", [25.0, 690.0, 12_000.0, 19_990.0, 23_000.0, 25_500.0]
+)
 @pytest.mark.parametrize("multiple", [1, 2])
 def test_folded_content_is_78_db_down(folded_to, multiple, oversampling):
     for frequency in (multiple * RATE - folded_to, multiple * RATE + folded_to):
@@ -72,7 +76,9 @@ def test_folded_content_is_78_db_down(folded_to, multiple, oversampling):
 
 def test_without_the_filter_it_would_fold(oversampling):
     internal = np.arange(N_SAMPLES * oversampling)
-    plain = np.sin(2 * np.pi * (RATE - 690.0) * internal / (RATE * oversampling))[::oversampling]
+    plain = np.sin(2 * np.pi * (RATE - 690.0) * internal / (RATE * oversampling))[
+        ::oversampling
+    ]
     assert np.abs(plain).max() > 0.9
 
 
@@ -101,13 +107,17 @@ def test_channels_and_lanes_are_filtered_by_themselves(n_samples, oversampling):
             ]
             for lane in range(LANES)
         ]
-        assert_allclose(replace(low_pass, taps=taps).apply(means), expected, rtol=0, atol=1e-14)
+        assert_allclose(
+            replace(low_pass, taps=taps).apply(means), expected, rtol=0, atol=1e-14
+        )
 
 
 @pytest.mark.parametrize("lane", range(LANES))
 def test_a_lane_that_is_not_finite_leaves_the_others_their_bits(lane, oversampling):
     low_pass, rng = decimator(oversampling), np.random.default_rng(3)
-    means = rng.standard_normal(((20 + 2 * low_pass.margin) * oversampling + 1, 2, LANES))
+    means = rng.standard_normal(
+        ((20 + 2 * low_pass.margin) * oversampling + 1, 2, LANES)
+    )
     clean, others = low_pass.apply(means), [k for k in range(LANES) if k != lane]
     means[7:, :, lane] = np.nan
     spoilt = low_pass.apply(means)
@@ -145,7 +155,10 @@ def test_in_float32_the_sums_keep_six_digits(oversampling):
     found = low_pass.apply(means.astype(np.float32))
     assert found.dtype == np.float64
     assert found.shape == (n_lanes("float32"), 2, 20)
-    halves = low_pass.apply(means[..., :LANES].copy()), low_pass.apply(means[..., LANES:].copy())
+    halves = (
+        low_pass.apply(means[..., :LANES].copy()),
+        low_pass.apply(means[..., LANES:].copy()),
+    )
     assert_allclose(found, np.concatenate(halves), rtol=0, atol=1e-6)
 
 
@@ -155,10 +168,18 @@ def test_every_step_that_is_allowed_has_its_low_pass(finest):
     coarse, fine = decimator(finest), decimator(2 * finest)
     assert fine.margin <= coarse.margin
     frequency = np.array(
-        [0.0, usable_band(RATE)[1], 0.5 * RATE, 0.7 * RATE, (0.5 * 2 * finest - 0.3) * RATE]
+        [
+            0.0,
+            usable_band(RATE)[1],
+            0.5 * RATE,
+            0.7 * RATE,
+            (0.5 * 2 * finest - 0.3) * RATE,
+        ]
     )
     turn = np.exp(
-        -2j * np.pi * np.outer(frequency / (2 * finest * RATE), np.arange(len(fine.taps)))
+        -2j
+        * np.pi
+        * np.outer(frequency / (2 * finest * RATE), np.arange(len(fine.taps)))
     )
     gain = np.abs(turn @ fine.taps) * np.sinc(frequency / (2 * finest * RATE))
     assert_allclose(gain[:2], 1.0, rtol=0, atol=10 ** (0.01 / 20) - 1)
@@ -187,11 +208,15 @@ class TestInBandError:
             [self.tones((5000, 1e-3)), self.tones((5000, 1e-2))],
             [self.tones((5000, 2e-5)), 0 * self.TIME],
         ]
-        assert_allclose(self.error(np.add(exact, off), exact), [1e-3, 2e-5], rtol=1e-2, atol=0)
+        assert_allclose(
+            self.error(np.add(exact, off), exact), [1e-3, 2e-5], rtol=1e-2, atol=0
+        )
 
     def test_is_that_of_the_worst_channel(self):
         exact = np.array([[self.tones((1000, 1.0)), self.tones((1000, 1.0))]])
-        assert_allclose(self.error(exact * [[[1.001], [1.02]]], exact), [0.02], rtol=1e-9, atol=0)
+        assert_allclose(
+            self.error(exact * [[[1.001], [1.02]]], exact), [0.02], rtol=1e-9, atol=0
+        )
 
     def test_does_not_count_what_lies_outside_the_band(self):
         exact = np.array([[self.tones((1000, 1.0))]])
@@ -210,5 +235,7 @@ def test_the_error_of_a_record_does_not_depend_on_the_others(n_channels):
     found = exact + 1e-4 * rng.standard_normal(exact.shape)
     together = in_band_error(found, exact, 51_200.0)
     for n in (1, 2, 3, 8):
-        assert np.array_equal(in_band_error(found[:n], exact[:n], 51_200.0), together[:n])
+        assert np.array_equal(
+            in_band_error(found[:n], exact[:n], 51_200.0), together[:n]
+        )
     assert np.unique(together).size == 8

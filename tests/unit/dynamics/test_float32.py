@@ -71,7 +71,9 @@ class TestAgreement:
     def test_of_the_signal_in_its_band(self, records):
         """Measured: 1e-6 to 7e-6 of a channel's level, what rounding shakes; at 600 r/min, less level, 1.2e-5."""
         single, double = records
-        error = in_band_error(single.acceleration[None], double.acceleration[None], RATE)[0]
+        error = in_band_error(
+            single.acceleration[None], double.acceleration[None], RATE
+        )[0]
         assert 1e-8 < error < 5e-5
         assert single.acceleration.dtype == double.acceleration.dtype == np.float64
 
@@ -79,7 +81,10 @@ class TestAgreement:
         single, double = records
         assert_allclose(single.mean_speed, double.mean_speed, rtol=1e-8, atol=0)
         assert_allclose(
-            single.contact_loss_fraction, double.contact_loss_fraction, rtol=1e-3, atol=0
+            single.contact_loss_fraction,
+            double.contact_loss_fraction,
+            rtol=1e-3,
+            atol=0,
         )
         assert np.abs(single.shaft_angle - double.shaft_angle).max() < 1e-7
 
@@ -110,7 +115,13 @@ class TestBits:
                 },
                 MISSING,
             ),
-            run({**BRIEF, "mesh.points_per_pitch": 64, "operating.drive_frequency_hz": 9}),
+            run(
+                {
+                    **BRIEF,
+                    "mesh.points_per_pitch": 64,
+                    "operating.drive_frequency_hz": 9,
+                }
+            ),
             run(
                 BRIEF,
                 [one("crack", tooth=4)],
@@ -142,7 +153,9 @@ class TestBits:
 
     def test_beside_one_that_fails_and_records_in_double(self, run, runs, expected):
         proud = np.where(np.arange(23) % 2, -0.03, 0.0)
-        diverging = run(BRIEF, specimen=Specimen(pinion_error=proud, wheel_error=np.zeros(84)))
+        diverging = run(
+            BRIEF, specimen=Specimen(pinion_error=proud, wheel_error=np.zeros(84))
+        )
         double = run(BRIEF, (), "float64")
         found = simulate_together([runs[0], diverging, double, *runs[1:]])
         assert isinstance(found.pop(1), SimulationError)
@@ -154,9 +167,9 @@ class TestBits:
         runs = [run(law), run(law, MISSING), run({**law, "mesh.points_per_pitch": 64})]
         expected = alone(runs)
         for order in ((0, 1, 2), (2, 1, 0)):
-            assert [bits(one) for one in simulate_together([runs[k] for k in order])] == [
-                expected[k] for k in order
-            ]
+            assert [
+                bits(one) for one in simulate_together([runs[k] for k in order])
+            ] == [expected[k] for k in order]
 
 
 def test_taking_rotations_together_keeps_the_whole(xiamen, dynamics_of):

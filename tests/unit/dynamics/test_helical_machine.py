@@ -36,7 +36,9 @@ def spur(xiamen, dynamics_of):
 
 @pytest.fixture(scope="module")
 def helical(xiamen, spur):
-    return with_table(spur, Slices(xiamen, 0.35, n_slices=8).table(np.array([0.0, 3e-6, 8e-6])))
+    return with_table(
+        spur, Slices(xiamen, 0.35, n_slices=8).table(np.array([0.0, 3e-6, 8e-6]))
+    )
 
 
 def test_a_support_takes_axial_keys_or_none(xiamen):
@@ -69,17 +71,25 @@ def test_masses_and_supports_stand_where_the_names_say(helical):
                      for axis in "xy"})  # fmt: skip
     for name, expected in mass.items():
         place = helical.dofs.index(name)
-        found = system.mass[place], system.stiffness[place, place], system.damping[place, place]
+        found = (
+            system.mass[place],
+            system.stiffness[place, place],
+            system.damping[place, place],
+        )
         assert_allclose(found, expected, rtol=1e-12)
         assert np.count_nonzero(system.stiffness[place]) == 1
         assert abs(system.rotation[place]) == 0.0
 
 
 def test_motor_and_load_follow_the_gears(helical, machine):
-    driven = machine({"system.motor.inertia_kg_m2": 2e-3, "system.load.inertia_kg_m2": 0.05})
+    driven = machine(
+        {"system.motor.inertia_kg_m2": 2e-3, "system.load.inertia_kg_m2": 0.05}
+    )
     whole = replace(helical, motor=driven.motor, load=driven.load)
     assert whole.dofs == (*PAIR_DOFS, *AXIAL_DOFS, "motor_rotation", "load_rotation")
-    assert_allclose(whole.approach_direction() @ whole.system().rotation, 0.0, rtol=0, atol=1e-15)
+    assert_allclose(
+        whole.approach_direction() @ whole.system().rotation, 0.0, rtol=0, atol=1e-15
+    )
     assert isinstance(pack([whole], 1e-6), HelicalGroup)
 
 
@@ -87,7 +97,11 @@ def test_rest_is_where_nothing_is_pushed(helical):
     """Supports hold the mean mesh force; the pinion has not turned."""
     system, force, rest = helical.system(), helical.mesh_force, helical.rest()
     held = system.stiffness @ rest + force * helical.approach_direction()
-    places = [place for place, name in enumerate(helical.dofs) if not name.endswith("rotation")]
+    places = [
+        place
+        for place, name in enumerate(helical.dofs)
+        if not name.endswith("rotation")
+    ]
     assert_allclose(held[places], 0.0, rtol=0, atol=1e-9 * force)
     assert abs(rest[2]) == 0.0
 
@@ -124,9 +138,13 @@ def test_a_gearbox_keeps_what_holds_the_axis(xiamen):
     held = read(Support, {**SUPPORT, **AXIAL}, "support")
     body = Body(mass=2.0, inertia=1e-3, support=held, tilt_inertia=6e-4)
     gearbox = nominal_gearbox(4)
-    given = replace(xiamen.quality, support_damping_ratio_low=None, support_damping_ratio_high=None)
+    given = replace(
+        xiamen.quality, support_damping_ratio_low=None, support_damping_ratio_high=None
+    )
     assert in_gearbox(body, gearbox, slice(0, 2), given).support == held
-    drawn = replace(xiamen.quality, support_damping_ratio_low=0.02, support_damping_ratio_high=0.04)
+    drawn = replace(
+        xiamen.quality, support_damping_ratio_low=0.02, support_damping_ratio_high=0.04
+    )
     found = in_gearbox(body, gearbox, slice(0, 2), drawn).support
     ratio = found.damping_x / (2.0 * np.sqrt(1e8 * 2.0))
     assert_allclose(found.damping_z, 2.0 * ratio * np.sqrt(2e7 * 2.0), rtol=1e-12)
@@ -139,7 +157,9 @@ def test_pairs_and_lag_follow_the_table(helical, spur):
     first, last = pitches(helical.table)
     assert pack([helical], 1e-6).n_pairs == last - first > 4
     pair = helical.table.pair
-    assert_allclose(2.0 * half_lag(helical.table), pair.overlap_ratio * pair.base_pitch, rtol=1e-12)
+    assert_allclose(
+        2.0 * half_lag(helical.table), pair.overlap_ratio * pair.base_pitch, rtol=1e-12
+    )
 
 
 def test_sliding_turns_where_the_middle_of_the_face_passes_the_pitch_point(helical):
@@ -147,7 +167,9 @@ def test_sliding_turns_where_the_middle_of_the_face_passes_the_pitch_point(helic
     turn, lag = table.pair.pitch_point + half_lag(table), half_lag(table)
     place = turn + np.linspace(-0.3, 0.3, 7) * lag
     arms = loss_arm(table, place)
-    assert_allclose(arms, arms[::-1], rtol=1e-9, atol=0)  # against sliding on both sides
+    assert_allclose(
+        arms, arms[::-1], rtol=1e-9, atol=0
+    )  # against sliding on both sides
     assert (arms[[0, 1, 2]] > 0).all()
     assert abs(arms[3]) < 1e-12
 
@@ -160,8 +182,13 @@ def test_teeth_that_nobody_has_take_no_room(helical, spur):
         for name in ("compliance", "compliance_slope", "gap", "gap_slope")
     }
     kind = np.full_like(table.pinion_kind, 2)
-    odd = replace(table, **three, pinion_kind=kind, pinion_present=np.array([True, True, False]))
-    group, one = pack([with_table(spur, odd)], 1e-6), pack([with_table(spur, table)], 1e-6)
+    odd = replace(
+        table, **three, pinion_kind=kind, pinion_present=np.array([True, True, False])
+    )
+    group, one = (
+        pack([with_table(spur, odd)], 1e-6),
+        pack([with_table(spur, table)], 1e-6),
+    )
     assert group.table.size == 2 * one.table.size
     assert (group.tooth_row[: len(kind)] == -1).all()
 

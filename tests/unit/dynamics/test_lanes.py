@@ -48,7 +48,9 @@ def run(machine):
     """A run of the quick machine with keys replaced."""
 
     def make(changes=None, faults=(), **values):
-        return Run(system=machine({**QUICK, **(changes or {})}), faults=tuple(faults), **values)
+        return Run(
+            system=machine({**QUICK, **(changes or {})}), faults=tuple(faults), **values
+        )
 
     return make
 
@@ -80,10 +82,15 @@ def mix(run):
                     wheel_tilt=100.0 * pinion,
                 ),
             ),
-            run({**law, **GEOMETRY}, start=Start(tooth_pinion=30, tooth_wheel=2, phase=0.1)),
+            run(
+                {**law, **GEOMETRY},
+                start=Start(tooth_pinion=30, tooth_wheel=2, phase=0.1),
+            ),
             run(
                 {**law, "operating.torque_nm": 60},
-                [one("crack", tooth=4), one("pitch_error", gear="wheel", tooth=3)] if gaps else (),
+                [one("crack", tooth=4), one("pitch_error", gear="wheel", tooth=3)]
+                if gaps
+                else (),
                 gearbox=Gearbox(
                     stiffness_factor=np.array([1.1, 0.9, 1.0, 1.2]),
                     damping_factor=np.full(4, 0.9),
@@ -138,7 +145,9 @@ def mixed(mix):
 def diverging(run):
     """A run in which every other tooth of the pinion stands 30 mm proud."""
     errors = np.where(np.arange(23) % 2, -PROUD, 0.0)
-    return replace(run, specimen=Specimen(pinion_error=errors, wheel_error=np.zeros(84)))
+    return replace(
+        run, specimen=Specimen(pinion_error=errors, wheel_error=np.zeros(84))
+    )
 
 
 def bits(record):
@@ -179,9 +188,13 @@ class TestBitsAlone:
         runs = mix({"operating.duration_s": 0.01})
         expected = alone(runs)
         rng = np.random.default_rng(1)
-        for order in (range(LANES - 1, -1, -1), *(rng.permutation(LANES) for _ in range(6))):
+        for order in (
+            range(LANES - 1, -1, -1),
+            *(rng.permutation(LANES) for _ in range(6)),
+        ):
             assert not different(
-                simulate_together([runs[k] for k in order]), [expected[k] for k in order]
+                simulate_together([runs[k] for k in order]),
+                [expected[k] for k in order],
             )
 
     @pytest.mark.parametrize("n", [1, 2, 3, 7, 9])
@@ -201,12 +214,21 @@ class TestBitsAlone:
 
     def test_beside_others_that_settle_longer(self, run):
         slow = {"operating.drive_frequency_hz": 5}
-        soft = {"gear.wheel.support.damping_y_ns_per_m": 400, "operating.drive_frequency_hz": 12}
-        runs = [run(), run(slow), run(soft), run({"operating.drive_frequency_hz": 9}, MISSING)]
+        soft = {
+            "gear.wheel.support.damping_y_ns_per_m": 400,
+            "operating.drive_frequency_hz": 12,
+        }
+        runs = [
+            run(),
+            run(slow),
+            run(soft),
+            run({"operating.drive_frequency_hz": 9}, MISSING),
+        ]
         expected = alone(runs)
         for order in ((0, 1, 2, 3), (1, 0, 3, 2), (2, 3, 0, 1), (3, 2, 1, 0)):
             assert not different(
-                simulate_together([runs[k] for k in order]), [expected[k] for k in order]
+                simulate_together([runs[k] for k in order]),
+                [expected[k] for k in order],
             )
         assert not different(simulate_together(runs[:2]), expected[:2])
 
@@ -244,7 +266,9 @@ class TestOneThatFails:
     @pytest.mark.parametrize("law", ["one_sided", "paper"])
     def test_diverging_leaves_its_neighbours(self, run, mixed, law, lane):
         runs, expected = mixed(law)
-        runs[lane] = diverging(run()) if law == "one_sided" else run({**LAWS[law], **OVERDAMPED})
+        runs[lane] = (
+            diverging(run()) if law == "one_sided" else run({**LAWS[law], **OVERDAMPED})
+        )
         found = simulate_together(runs)
         failed = found.pop(lane)
         assert isinstance(failed, SimulationError)
@@ -264,7 +288,10 @@ class TestOneThatFails:
         assert not different(found[2:3], alone(runs[2:3]))
 
     def test_the_error_is_looked_for_all_the_same(self, run):
-        runs = [run({"solver.max_error": 1e-3}), diverging(run({"solver.max_error": 1e-3}))]
+        runs = [
+            run({"solver.max_error": 1e-3}),
+            diverging(run({"solver.max_error": 1e-3})),
+        ]
         found = simulate_together(runs)
         assert isinstance(found[1], SimulationError)
         assert not different(found[:1], alone(runs[:1]))
@@ -272,7 +299,11 @@ class TestOneThatFails:
     @pytest.mark.parametrize("lane", [0, 2])
     def test_too_stiff_for_any_step(self, run, lane):
         """Refused before it is integrated: its own error, and its neighbours' records."""
-        runs = [run(), run({"operating.speed_rpm": 1200}), run({"operating.torque_nm": 8})]
+        runs = [
+            run(),
+            run({"operating.speed_rpm": 1200}),
+            run({"operating.torque_nm": 8}),
+        ]
         expected = alone(runs)
         runs.insert(lane, run({"gear.pinion.support.stiffness_y_n_per_m": 1e13}))
         found = simulate_together(runs)
@@ -284,7 +315,9 @@ class TestOneThatFails:
     def test_one_by_itself_raises(self, run):
         with pytest.raises(SimulationError, match="the motion stopped being finite"):
             diverging(run()).system.simulate(specimen=diverging(run()).specimen)
-        with pytest.raises(SimulationError, match=r"raise solver\.oversampling to at least \d+$"):
+        with pytest.raises(
+            SimulationError, match=r"raise solver\.oversampling to at least \d+$"
+        ):
             run({"gear.pinion.support.stiffness_y_n_per_m": 1e13}).system.simulate()
 
 
@@ -304,7 +337,10 @@ class TestError:
     def runs(cls, run):
         fast = {"operating.speed_rpm": 6000, "operating.torque_nm": 60, "solver.oversampling": 5,
                 "solver.max_error": LIMIT, "operating.duration_s": 0.1}  # fmt: skip
-        calm, light = {**fast, "operating.speed_rpm": 1200}, {**fast, "operating.torque_nm": 5}
+        calm, light = (
+            {**fast, "operating.speed_rpm": 1200},
+            {**fast, "operating.torque_nm": 5},
+        )
         return [
             run(calm),
             run(fast, MISSING),
@@ -324,14 +360,20 @@ class TestError:
 
     def test_only_the_coarse_are_made_again(self, runs, found):
         for k, (one_run, record) in enumerate(zip(runs, found, strict=True)):
-            (first,) = simulate_together([with_solver(one_run, oversampling=5, max_error=1.0)])
+            (first,) = simulate_together(
+                [with_solver(one_run, oversampling=5, max_error=1.0)]
+            )
             assert first.integration_check == "error"
-            assert (first.integration_error > LIMIT) == (k in (*self.COARSE, self.BOUNCING))
+            assert (first.integration_error > LIMIT) == (
+                k in (*self.COARSE, self.BOUNCING)
+            )
             assert (bits(first)[0] == bits(record)[0]) == (k not in self.COARSE)
 
     def test_what_is_made_again_is_that_of_more_steps(self, runs, found):
         for k in self.COARSE:
-            (finer,) = simulate_together([with_solver(runs[k], oversampling=10, max_error=LIMIT)])
+            (finer,) = simulate_together(
+                [with_solver(runs[k], oversampling=10, max_error=LIMIT)]
+            )
             assert bits(finer) == bits(found[k])
 
     def test_errors_are_measured_and_end_below_the_limit(self, found):
@@ -342,7 +384,9 @@ class TestError:
         assert found[self.BOUNCING].integration_check == "levels"
 
     def test_nobody_looks_where_none_is_asked_for(self, runs):
-        (record,) = simulate_together([with_solver(runs[1], oversampling=5, max_error=None)])
+        (record,) = simulate_together(
+            [with_solver(runs[1], oversampling=5, max_error=None)]
+        )
         assert np.isnan(record.integration_error)
         assert record.integration_check == "none"
 
@@ -398,7 +442,9 @@ class TestMotions:
         assert all(lane.tobytes() == first.tobytes() for lane in rest)
 
     @pytest.mark.filterwarnings("ignore::gensig.dynamics.integrator.CoarseStepWarning")
-    def test_any_number_of_machines_comes_back_in_order(self, motions, machine, dynamics_of):
+    def test_any_number_of_machines_comes_back_in_order(
+        self, motions, machine, dynamics_of
+    ):
         """More than a group takes, of two kinds of settling; every motion is that of the machine alone."""
         stiff = machine({"gear.pinion.support.stiffness_y_n_per_m": 2e9})
         machines = [
@@ -411,17 +457,23 @@ class TestMotions:
         for k, one_machine in enumerate(machines):
             single = motions([one_machine])
             for field in fields(Motions):
-                of_all, of_one = getattr(together, field.name)[k], getattr(single, field.name)[0]
+                of_all, of_one = (
+                    getattr(together, field.name)[k],
+                    getattr(single, field.name)[0],
+                )
                 assert of_all.tobytes() == of_one.tobytes(), field.name
 
 
 def test_a_group_takes_teeth_of_different_numbers(machine, dynamics_of):
     """Every lane's places point at its own tables."""
     machines = [
-        dynamics_of(machine(changes)) for changes in ({}, GEOMETRY, {"mesh.points_per_pitch": 64})
+        dynamics_of(machine(changes))
+        for changes in ({}, GEOMETRY, {"mesh.points_per_pitch": 64})
     ]
     group = pack(machines, 1e-6)
     teeth = [23 + 84, 31 + 61, *[23 + 84] * (LANES - 2)]
     assert len(group.tooth_row) == len(group.tooth_error) == sum(teeth)
-    nodes = [one.table.position.size for one in (*machines, *[machines[0]] * (LANES - 3))]
+    nodes = [
+        one.table.position.size for one in (*machines, *[machines[0]] * (LANES - 3))
+    ]
     assert len(group.table) == sum(4 * n for n in nodes)

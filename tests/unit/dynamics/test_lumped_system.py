@@ -30,8 +30,14 @@ def two_masses(**changes):
     ("changes", "text"),
     [
         ({"mass": np.array([1.0, 0.0])}, "mass or inertia of 'b' must be positive"),
-        ({"stiffness": np.array([[5.0, -5.0], [0.0, 5.0]])}, "stiffness matrix is not symmetric"),
-        ({"damping": np.array([[0.0, 1.0], [-1.0, 0.0]])}, "damping matrix is not symmetric"),
+        (
+            {"stiffness": np.array([[5.0, -5.0], [0.0, 5.0]])},
+            "stiffness matrix is not symmetric",
+        ),
+        (
+            {"damping": np.array([[0.0, 1.0], [-1.0, 0.0]])},
+            "damping matrix is not symmetric",
+        ),
         ({"damping": np.diag([-1.0, 0.0])}, "damping matrix would feed energy in"),
         ({"stiffness": np.diag([1.0, -1.0])}, "stiffness matrix would feed energy in"),
     ],
@@ -63,17 +69,23 @@ LIGHT = {
 
 
 @pytest.mark.parametrize(
-    "kinds", [(SOFT, {}, STIFF), (ROTORS, LIGHT, {**STIFF, **ROTORS})], ids=["pair", "rotors"]
+    "kinds",
+    [(SOFT, {}, STIFF), (ROTORS, LIGHT, {**STIFF, **ROTORS})],
+    ids=["pair", "rotors"],
 )
 def test_a_group_holds_the_matrices_of_each_machine(machine, dynamics_of, kinds):
     """Also where a machine lacks an entry that its neighbour has; an empty lane repeats the first."""
     machines = [dynamics_of(machine(changes)) for changes in kinds]
     group, n = pack(machines, 1e-6), len(machines[0].dofs)
     assert len(group.other_column) == (0 if n == 6 else 4)
-    for lane, dynamics in enumerate([*machines, *[machines[0]] * (LANES - len(machines))]):
+    for lane, dynamics in enumerate(
+        [*machines, *[machines[0]] * (LANES - len(machines))]
+    ):
         system = dynamics.system()
         for part in ("stiffness", "damping"):
-            assert_allclose(rebuilt(group, part, lane, n), getattr(system, part), rtol=0, atol=0)
+            assert_allclose(
+                rebuilt(group, part, lane, n), getattr(system, part), rtol=0, atol=0
+            )
         expected = {
             "inverse_mass": 1 / system.mass,
             "rotation": system.rotation,
@@ -111,12 +123,22 @@ def mesh_forces(dynamics, law, n):
     return np.array([*pinion, *wheel, *np.zeros(n - 6)])
 
 
-@pytest.mark.parametrize("time", [0.0, (10**8 + 6) * BRIEF], ids=["recentred", "as_it_is"])
-@pytest.mark.parametrize("changes", [{}, ROTORS, LIGHT], ids=["pair", "rotors", "light"])
-def test_the_compiled_right_hand_side_is_that_of_the_matrices(machine, dynamics_of, changes, time):
+@pytest.mark.parametrize(
+    "time", [0.0, (10**8 + 6) * BRIEF], ids=["recentred", "as_it_is"]
+)
+@pytest.mark.parametrize(
+    "changes", [{}, ROTORS, LIGHT], ids=["pair", "rotors", "light"]
+)
+def test_the_compiled_right_hand_side_is_that_of_the_matrices(
+    machine, dynamics_of, changes, time
+):
     """M q'' = f - K q - C v + mesh, also where the pinion's turn is first taken out of all rotations."""
     dynamics, rng = dynamics_of(machine(changes)), np.random.default_rng(6)
-    system, direction, n = dynamics.system(), dynamics.approach_direction(), len(dynamics.dofs)
+    system, direction, n = (
+        dynamics.system(),
+        dynamics.approach_direction(),
+        len(dynamics.dofs),
+    )
     for _ in range(10):
         q = (
             rng.uniform(0.8, 1.5) * dynamics.static_start(0.0)
@@ -127,12 +149,18 @@ def test_the_compiled_right_hand_side_is_that_of_the_matrices(machine, dynamics_
         v = 1e-3 * rng.standard_normal(n) + rng.standard_normal() * system.rotation
         radius, speed = dynamics.table.pair.pinion.base_radius, dynamics.operating.speed
         roll = dynamics.start_roll + radius * (speed * time + q[2])
-        (law,) = laws(dynamics, [(roll, direction @ q, direction @ v, radius * (speed + v[2]))])
+        (law,) = laws(
+            dynamics, [(roll, direction @ q, direction @ v, radius * (speed + v[2]))]
+        )
         assert law[0] > 0
         mesh = mesh_forces(dynamics, law, n)
-        expected = (system.force - system.stiffness @ q - system.damping @ v + mesh) / system.mass
+        expected = (
+            system.force - system.stiffness @ q - system.damping @ v + mesh
+        ) / system.mass
         found = right_hand_side(dynamics, time, q, v)
-        terms = np.abs(system.force) + np.abs(system.stiffness) @ np.abs(q) + np.abs(mesh)
+        terms = (
+            np.abs(system.force) + np.abs(system.stiffness) @ np.abs(q) + np.abs(mesh)
+        )
         assert np.abs((found - expected) * system.mass / terms).max() < 1e-9
 
 
@@ -165,7 +193,9 @@ class TestPairModes:
     def test_reference_frequencies(self, modes):
         # spur reference (docs/validation.md), section 5.1, mesh 3.28e8 N/m
         found = modes(3.28e8, drive=False)
-        assert_allclose(found[1:], [60.8, 178.6, 269.4, 690.2, 11704], rtol=3e-3, atol=0)
+        assert_allclose(
+            found[1:], [60.8, 178.6, 269.4, 690.2, 11704], rtol=3e-3, atol=0
+        )
 
     def test_exactly_one_rigid_mode_without_the_drive(self, modes):
         found = modes(3.28e8, drive=False)

@@ -35,7 +35,9 @@ def run(system, dynamics, **changes):
 
 
 @pytest.mark.parametrize("phase", [0.0, 0.4, 0.9])
-def test_static_start_is_in_equilibrium_along_the_line_of_action(xiamen, dynamics_of, phase):
+def test_static_start_is_in_equilibrium_along_the_line_of_action(
+    xiamen, dynamics_of, phase
+):
     dynamics = dynamics_of(xiamen, phase=phase)
     q, direction = dynamics.static_start(0.0), dynamics.approach_direction()
     force = laws(dynamics, [(dynamics.start_roll, q @ direction, 0.0, 0.0)])[0, 0]
@@ -58,9 +60,12 @@ def test_reduced_values(xiamen, dynamics_of):
 
 def test_mean_mesh_stiffness_ignores_the_faulty_tooth(xiamen, dynamics_of):
     sound, faulty = (
-        dynamics_of(xiamen, faults) for faults in ((), (MissingTooth(gear="pinion", tooth=3),))
+        dynamics_of(xiamen, faults)
+        for faults in ((), (MissingTooth(gear="pinion", tooth=3),))
     )
-    assert_allclose(faulty.mean_mesh_stiffness, sound.mean_mesh_stiffness, rtol=1e-9, atol=0)
+    assert_allclose(
+        faulty.mean_mesh_stiffness, sound.mean_mesh_stiffness, rtol=1e-9, atol=0
+    )
     assert 2e8 < sound.mean_mesh_stiffness < 3e8
 
 
@@ -79,7 +84,10 @@ def test_the_system_is_not_driven_on_balance(xiamen, dynamics_of):
     """Load and drive differ by the mean friction torque only."""
     force, dynamics = dynamics_of(xiamen).system().force, dynamics_of(xiamen)
     assert_allclose(
-        force[2] + force[5] / xiamen.pair.ratio, dynamics.friction_torque(), rtol=1e-9, atol=0
+        force[2] + force[5] / xiamen.pair.ratio,
+        dynamics.friction_torque(),
+        rtol=1e-9,
+        atol=0,
     )
 
 
@@ -95,12 +103,15 @@ def test_settling_time_follows_the_slowest_motion_and_is_capped(machine, dynamic
 class TestRefusals:
     def test_unknown_channels_list_the_known(self, xiamen, dynamics_of):
         with pytest.raises(
-            ConfigError, match=r"no channel housing; allowed: pinion_x, pinion_y, pinion_rotation"
+            ConfigError,
+            match=r"no channel housing; allowed: pinion_x, pinion_y, pinion_rotation",
         ):
             run(xiamen, dynamics_of(xiamen), channels=("housing",))
 
     def test_a_step_too_long(self, xiamen, dynamics_of):
-        with pytest.raises(SimulationError, match=r"raise solver.oversampling to at least \d+$"):
+        with pytest.raises(
+            SimulationError, match=r"raise solver.oversampling to at least \d+$"
+        ):
             run(
                 xiamen,
                 dynamics_of(xiamen),
@@ -119,7 +130,9 @@ class TestRefusals:
         with pytest.raises(SimulationError) as caught:
             check_step(dynamics, rate, oversampling)
         text = str(caught.value)
-        assert text.startswith(f"solver.oversampling = {oversampling} makes internal steps of ")
+        assert text.startswith(
+            f"solver.oversampling = {oversampling} makes internal steps of "
+        )
         assert "\n" not in text
         enough = int(re.search(r"to at least (\d+)$", text)[1])
         check_step(dynamics, rate, enough)
@@ -131,10 +144,13 @@ class TestRefusals:
     ):
         dynamics, rate = dynamics_of(xiamen), 51200.0
         with pytest.warns(
-            CoarseStepWarning, match=r"internal steps to a period of the mesh mode .* raise solver"
+            CoarseStepWarning,
+            match=r"internal steps to a period of the mesh mode .* raise solver",
         ) as seen:
             check_step(dynamics, rate, 2)
-        enough = int(re.search(r"solver.oversampling to (\d+)", str(seen[0].message))[1])
+        enough = int(
+            re.search(r"solver.oversampling to (\d+)", str(seen[0].message))[1]
+        )
         with pytest.warns(CoarseStepWarning):
             check_step(dynamics, rate, enough - 1)
         recwarn.clear()
@@ -153,7 +169,9 @@ class TestRefusals:
             f"operating.duration_s = 10000: {lanes} records side by side with 4 channels at 51200 Hz"
         )
         longest = float(re.search(r"at most (.+) s at a time$", text)[1])
-        assert_allclose(longest, MOST_BYTES / (51200 * 4 * 8 * lanes), rtol=5e-3, atol=0)
+        assert_allclose(
+            longest, MOST_BYTES / (51200 * 4 * 8 * lanes), rtol=5e-3, atol=0
+        )
         check_memory(0.99 * longest, 51200.0, 4, solver)
         with pytest.raises(ConfigError, match="record at most"):
             check_memory(1.01 * longest, 51200.0, 4, solver)
@@ -165,7 +183,9 @@ class TestRefusals:
         with pytest.raises(
             SimulationError, match=r"solver\.oversampling = 2 makes internal steps of"
         ):
-            machine({"solver.oversampling": 2, "sensing.sampling_rate_hz": 6000}).check()
+            machine(
+                {"solver.oversampling": 2, "sensing.sampling_rate_hz": 6000}
+            ).check()
 
     def test_a_duration_without_samples(self, machine, dynamics_of):
         system = machine({"operating.duration_s": 1e-6})
@@ -179,8 +199,14 @@ class TestRefusals:
         [
             ({"oversampling": 0}, "solver.oversampling = 0 must lie in 2..256"),
             ({"oversampling": 257}, "solver.oversampling = 257 must lie in 2..256"),
-            ({"precision": "float16"}, "solver.precision = 'float16'; allowed: float64, float32"),
-            ({"max_error": 0.0}, "solver.max_error = 0 must lie in 1e-6..1, or be null"),
+            (
+                {"precision": "float16"},
+                "solver.precision = 'float16'; allowed: float64, float32",
+            ),
+            (
+                {"max_error": 0.0},
+                "solver.max_error = 0 must lie in 1e-6..1, or be null",
+            ),
         ],
     )
     def test_solvers(self, changes, text):
@@ -191,7 +217,9 @@ class TestRefusals:
         ("key", "unit"), [("stiffness_x", "n_per_m"), ("damping_y", "ns_per_m")]
     )
     def test_supports_name_the_key_as_typed(self, xiamen, key, unit):
-        with pytest.raises(ConfigError, match=f"{key}_{unit} = -1 must not be negative"):
+        with pytest.raises(
+            ConfigError, match=f"{key}_{unit} = -1 must not be negative"
+        ):
             replace(xiamen.pinion.support, **{key: -1.0})
 
     @pytest.mark.parametrize(
@@ -200,7 +228,10 @@ class TestRefusals:
             ({"speed": 0.0}, "operating.speed_rpm = 0 must be positive"),
             ({"torque": -5.0}, "operating.torque_nm = -5 must be positive"),
             ({"duration": -1.0}, "operating.duration_s = -1 must be positive"),
-            ({"drive_damping_ratio": 0.0}, "operating.drive_damping_ratio = 0 must lie in 0..10"),
+            (
+                {"drive_damping_ratio": 0.0},
+                "operating.drive_damping_ratio = 0 must lie in 0..10",
+            ),
         ],
     )
     def test_operating_points(self, xiamen, changes, text):
@@ -236,7 +267,9 @@ class TestRecord:
         """Half a mesh period later by phase is half a mesh period later in time."""
         period = 51200 / 690
         one = short.simulate().acceleration[1]
-        two = short.simulate(start=Start(tooth_pinion=0, tooth_wheel=0, phase=0.5)).acceleration[1]
+        two = short.simulate(
+            start=Start(tooth_pinion=0, tooth_wheel=0, phase=0.5)
+        ).acceleration[1]
         samples = np.arange(200, 400)
         shifted = np.interp(samples + 1.5 * period, np.arange(2560), one)
         assert np.corrcoef(shifted, two[samples + round(period)])[0, 1] > 0.8
@@ -258,7 +291,9 @@ class TestRecord:
         coupling = "coupled" if law == "one_sided" else "sum"
         system = machine({"mesh.law": law, "mesh.pair_coupling": coupling, "operating.speed_rpm": 1500,
                           "operating.duration_s": 4 * 2048 / 51200})  # fmt: skip
-        signal = system.simulate((MissingTooth(gear="pinion", tooth=3),)).acceleration[1]
+        signal = system.simulate((MissingTooth(gear="pinion", tooth=3),)).acceleration[
+            1
+        ]
         turns = np.abs(signal.reshape(4, 2048))
         peaks = turns.argmax(axis=1)
         assert np.ptp(peaks) <= 3
@@ -273,12 +308,16 @@ class TestRecord:
             "tooth": "to_contact",
         }
         own = {f"mesh.{key}": value for key, value in terms.items()}
-        system = machine({**own, "mesh.pair_coupling": "sum", "operating.duration_s": 0.3})
+        system = machine(
+            {**own, "mesh.pair_coupling": "sum", "operating.duration_s": 0.3}
+        )
         healthy, missing = (
             system.simulate(faults).acceleration[1]
             for faults in ((), (MissingTooth(gear="pinion", tooth=3),))
         )
-        assert_allclose([healthy.std(), missing.std()], [158.2, 183.9], rtol=0.05, atol=0)
+        assert_allclose(
+            [healthy.std(), missing.std()], [158.2, 183.9], rtol=0.05, atol=0
+        )
         assert_allclose(
             np.abs(missing).max() / np.abs(healthy).max(), 2404 / 694, rtol=0.15, atol=0
         )

@@ -102,11 +102,16 @@ class TestEquations:
     def test_a_degree_of_freedom_for_each_body_that_there_is(self, dynamics, rotors):
         system = dynamics.system()
         assert (
-            dynamics.dofs == system.names == (*PAIR_DOFS, *[f"{name}_rotation" for name in rotors])
+            dynamics.dofs
+            == system.names
+            == (*PAIR_DOFS, *[f"{name}_rotation" for name in rotors])
         )
         assert set(dynamics.dofs) <= set(DOFS)
         assert_allclose(
-            system.mass[6:], [rotor.inertia for rotor in rotors.values()], rtol=0, atol=0
+            system.mass[6:],
+            [rotor.inertia for rotor in rotors.values()],
+            rtol=0,
+            atol=0,
         )
         direction = dynamics.approach_direction()
         assert direction.shape == (len(dynamics.dofs),)
@@ -132,27 +137,43 @@ class TestEquations:
             (system.stiffness, system.damping), drive_matrices(dynamics), strict=True
         ):
             assert_allclose(
-                (matrix - drive) @ system.rotation, 0, rtol=0, atol=1e-12 * np.abs(matrix).max()
+                (matrix - drive) @ system.rotation,
+                0,
+                rtol=0,
+                atol=1e-12 * np.abs(matrix).max(),
             )
-        assert_allclose(dynamics.approach_direction() @ system.rotation, 0, rtol=0, atol=1e-15)
+        assert_allclose(
+            dynamics.approach_direction() @ system.rotation, 0, rtol=0, atol=1e-15
+        )
 
     def test_that_law_sees_a_wrong_ratio(self, whole):
         system = whole.system()
-        wrong = np.where(np.array(system.names) == "load_rotation", 1.0, system.rotation)
+        wrong = np.where(
+            np.array(system.names) == "load_rotation", 1.0, system.rotation
+        )
         drive = drive_matrices(whole)[0]
-        assert np.abs((system.stiffness - drive) @ wrong).max() > 0.1 * LOAD.coupling_stiffness
+        assert (
+            np.abs((system.stiffness - drive) @ wrong).max()
+            > 0.1 * LOAD.coupling_stiffness
+        )
 
     def test_the_drive_holds_all_that_turns(self, dynamics, smooth):
         """At its frequency and damping ratio, whatever is driven."""
         system, operating = dynamics.system(), smooth.operating
         inertia = system.rotation @ np.diag(system.mass) @ system.rotation
         stiffness, damping = (
-            system.rotation @ part @ system.rotation for part in (system.stiffness, system.damping)
+            system.rotation @ part @ system.rotation
+            for part in (system.stiffness, system.damping)
         )
         rate = math.sqrt(stiffness / inertia)
-        assert_allclose(rate / (2 * math.pi), operating.drive_frequency, rtol=1e-12, atol=0)
         assert_allclose(
-            damping / (2 * inertia * rate), operating.drive_damping_ratio, rtol=1e-12, atol=0
+            rate / (2 * math.pi), operating.drive_frequency, rtol=1e-12, atol=0
+        )
+        assert_allclose(
+            damping / (2 * inertia * rate),
+            operating.drive_damping_ratio,
+            rtol=1e-12,
+            atol=0,
         )
 
     def test_torques_act_at_the_ends_and_balance(self, dynamics, smooth):
@@ -161,8 +182,14 @@ class TestEquations:
             lead[6] = smooth.operating.torque / MOTOR.coupling_stiffness
         driving = system.force - drive_matrices(dynamics)[0] @ lead
         ends = (
-            dynamics.dofs.index("motor_rotation" if dynamics.motor else "pinion_rotation"),
-            (dynamics.dofs.index("load_rotation" if dynamics.load else "wheel_rotation")),
+            dynamics.dofs.index(
+                "motor_rotation" if dynamics.motor else "pinion_rotation"
+            ),
+            (
+                dynamics.dofs.index(
+                    "load_rotation" if dynamics.load else "wheel_rotation"
+                )
+            ),
         )
         assert np.flatnonzero(driving).tolist() == sorted(ends)
         assert_allclose(driving[list(ends)], [20, -20 * 84 / 23], rtol=1e-12, atol=0)
@@ -192,16 +219,25 @@ class TestTorsion:
         )
         found = eigenvalues(free, np.zeros(2), 0.0)
         turning = found[np.imag(found) > 1.0]
-        expected = math.sqrt(rotor.coupling_stiffness * (1 / free.mass[0] + 1 / free.mass[1]))
+        expected = math.sqrt(
+            rotor.coupling_stiffness * (1 / free.mass[0] + 1 / free.mass[1])
+        )
         assert_allclose(np.abs(turning), [expected], rtol=1e-9, atol=0)
         assert_allclose(
-            -np.real(turning) / np.abs(turning), [rotor.coupling_damping_ratio], rtol=1e-9, atol=0
+            -np.real(turning) / np.abs(turning),
+            [rotor.coupling_damping_ratio],
+            rtol=1e-9,
+            atol=0,
         )
         assert (np.abs(found) < 1e-6 * expected).sum() == 2
 
     def test_three_inertias_where_teeth_and_bearings_are_rigid(self, whole):
         system, direction, ratio = whole.system(), whole.approach_direction(), 84 / 23
-        matrix = system.stiffness - drive_matrices(whole)[0] + 1e13 * np.outer(direction, direction)
+        matrix = (
+            system.stiffness
+            - drive_matrices(whole)[0]
+            + 1e13 * np.outer(direction, direction)
+        )
         rigid = np.diag([1e13, 1e13, 0, 1e13, 1e13, 0, 0, 0])
         root = np.sqrt(np.outer(system.mass, system.mass))
         found = np.sort(np.abs(np.linalg.eigvalsh((matrix + rigid) / root)))[:3]
@@ -215,7 +251,9 @@ class TestTorsion:
         product = k1 * k2 * (j1 + j2 + j3) / (j1 * j2 * j3)
         root = math.sqrt(total**2 - 4 * product)
         assert found[0] < 1e-3 * found[1]
-        assert_allclose(found[1:], [(total - root) / 2, (total + root) / 2], rtol=2e-3, atol=0)
+        assert_allclose(
+            found[1:], [(total - root) / 2, (total + root) / 2], rtol=2e-3, atol=0
+        )
 
 
 class TestStart:
@@ -243,27 +281,42 @@ class TestStart:
     def test_the_pinion_stands_where_the_record_says(self, dynamics):
         """Couplings wind up around it: neither torque nor coupling moves the teeth that begin in contact."""
         for course in ("constant", "slower", "lighter"):
-            assert_allclose(on_course(dynamics, course).static_start(-0.2)[2], 0, rtol=0, atol=0)
+            assert_allclose(
+                on_course(dynamics, course).static_start(-0.2)[2], 0, rtol=0, atol=0
+            )
 
     def test_the_start_follows_the_nominal_angle(self, dynamics):
         slower = on_course(dynamics, "slower")
         assert_allclose(
-            slower.static_start(-0.4), dynamics.static_start(-0.12), rtol=1e-12, atol=1e-18
+            slower.static_start(-0.4),
+            dynamics.static_start(-0.12),
+            rtol=1e-12,
+            atol=1e-18,
         )
-        assert np.abs(slower.static_start(-0.4) - dynamics.static_start(-0.4)).max() > 1e-8
+        assert (
+            np.abs(slower.static_start(-0.4) - dynamics.static_start(-0.4)).max() > 1e-8
+        )
 
     def test_the_twist_follows_the_torque(self, whole):
         light = on_course(whole, "lighter").static_start(-0.2)
-        assert_allclose(light[6] * MOTOR.coupling_stiffness, 0.3 * 20, rtol=1e-12, atol=0)
         assert_allclose(
-            (light[5] - light[7]) * LOAD.coupling_stiffness, 0.3 * 20 * 84 / 23, rtol=1e-9, atol=0
+            light[6] * MOTOR.coupling_stiffness, 0.3 * 20, rtol=1e-12, atol=0
+        )
+        assert_allclose(
+            (light[5] - light[7]) * LOAD.coupling_stiffness,
+            0.3 * 20 * 84 / 23,
+            rtol=1e-9,
+            atol=0,
         )
 
     def test_no_torque_leaves_everything_at_rest(self, dynamics):
         idle = replace(
-            dynamics.operating, torque_profile=Profile(times=(0.0, 1.0), factors=(0.0, 1.0))
+            dynamics.operating,
+            torque_profile=Profile(times=(0.0, 1.0), factors=(0.0, 1.0)),
         )
-        assert_allclose(replace(dynamics, operating=idle).static_start(-0.2), 0, rtol=0, atol=0)
+        assert_allclose(
+            replace(dynamics, operating=idle).static_start(-0.2), 0, rtol=0, atol=0
+        )
 
 
 def test_power_in_is_stored_and_dissipated_on_a_ramp(whole):
@@ -289,11 +342,18 @@ def test_power_in_is_stored_and_dissipated_on_a_ramp(whole):
         )
 
     def energy(time, state):
-        speeds = state[n : 2 * n] + system.rotation * moving.nominal(np.array([time])).speed
+        speeds = (
+            state[n : 2 * n] + system.rotation * moving.nominal(np.array([time])).speed
+        )
         return 0.5 * (speeds**2 @ system.mass + state[:n] @ stiffness @ state[:n])
 
-    start, end = np.concatenate([moving.static_start(0.0), np.zeros(n), [0.0, 0.0]]), 0.01
-    state = solve_ivp(slope, (0.0, end), start, method="LSODA", rtol=1e-9, atol=1e-12).y[:, -1]
+    start, end = (
+        np.concatenate([moving.static_start(0.0), np.zeros(n), [0.0, 0.0]]),
+        0.01,
+    )
+    state = solve_ivp(
+        slope, (0.0, end), start, method="LSODA", rtol=1e-9, atol=1e-12
+    ).y[:, -1]
     gained = energy(end, state) - energy(0.0, start)
     supplied, lost = state[2 * n :]
     assert lost > 0
@@ -328,12 +388,17 @@ class TestConfiguration:
 
     def test_a_whole_group_may_be_null_or_absent(self, config_with):
         config = config_with({"system.motor": None})
-        system = read_system(config.with_entries(system=config["system"].without("load")))
+        system = read_system(
+            config.with_entries(system=config["system"].without("load"))
+        )
         assert system.motor is system.load is None
 
     def test_coupling_damping(self):
         assert_allclose(
-            MOTOR.coupling_damping(2e-3), 2 * 0.05 * math.sqrt(3e3 * 1e-3), rtol=1e-12, atol=0
+            MOTOR.coupling_damping(2e-3),
+            2 * 0.05 * math.sqrt(3e3 * 1e-3),
+            rtol=1e-12,
+            atol=0,
         )
 
     @pytest.mark.parametrize("side", ["motor", "load"])
@@ -359,7 +424,9 @@ class TestConfiguration:
         ],
     )
     def test_refusals(self, machine, side, changes, text):
-        with pytest.raises(ConfigError, match=re.escape(f"system.{side}{text}")) as caught:
+        with pytest.raises(
+            ConfigError, match=re.escape(f"system.{side}{text}")
+        ) as caught:
             machine({f"system.{side}.{key}": value for key, value in changes.items()})
         assert "\n" not in str(caught.value)
 
@@ -379,7 +446,9 @@ class TestConfiguration:
 
 
 class TestMeshNumbers:
-    def test_the_mean_stiffness_is_found_once_a_machine(self, smooth, dynamics_of, monkeypatch):
+    def test_the_mean_stiffness_is_found_once_a_machine(
+        self, smooth, dynamics_of, monkeypatch
+    ):
         calls = []
 
         def counted(*arguments):
@@ -392,7 +461,9 @@ class TestMeshNumbers:
         assert fresh.mean_mesh_stiffness == first
         assert len(calls) == 1
         assert (
-            replace(fresh, start_phase=0.9, **MACHINES["both"]).mean_mesh_stiffness.hex()
+            replace(
+                fresh, start_phase=0.9, **MACHINES["both"]
+            ).mean_mesh_stiffness.hex()
             == first.hex()
         )
         lighter = replace(fresh, operating=replace(fresh.operating, torque=2.0))
@@ -409,9 +480,14 @@ class TestMeshNumbers:
                 name: np.repeat(getattr(table.pinion, name), 2, axis=0)
                 for name in ("gap", "gap_slope", "present")
             }
-            rows["compliance_slope"] = np.repeat(table.pinion.compliance_slope, 2, axis=0)
+            rows["compliance_slope"] = np.repeat(
+                table.pinion.compliance_slope, 2, axis=0
+            )
             return mesh_statics.mean_mesh_stiffness(
-                replace(table, pinion=replace(table.pinion, compliance=soft, kind=kind, **rows)),
+                replace(
+                    table,
+                    pinion=replace(table.pinion, compliance=soft, kind=kind, **rows),
+                ),
                 force,
             )
 

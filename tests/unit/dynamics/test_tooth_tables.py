@@ -15,7 +15,11 @@ from gensig.faults.broken import MissingTooth
 LAWS = {
     "one_sided": {},
     "classical": {"mesh.roll_torque": "classical"},
-    "paper": {"mesh.law": "paper", "mesh.pair_coupling": "sum", "mesh.contact": "linear"},
+    "paper": {
+        "mesh.law": "paper",
+        "mesh.pair_coupling": "sum",
+        "mesh.contact": "linear",
+    },
 }
 PITS = tuple(
     one("pitting", gear=gear, tooth=tooth, pit_width_mm=3.0 + 2.0 * tooth)
@@ -39,7 +43,12 @@ def motions(dynamics):
     rng, n = np.random.default_rng(9), 4000
     roll = dynamics.table.pair.base_pitch * rng.uniform(-200, 200, n)
     return np.column_stack(
-        [roll, rng.uniform(-4e-5, 4e-5, n), 1e-3 * rng.standard_normal(n), rng.uniform(2, 6, n)]
+        [
+            roll,
+            rng.uniform(-4e-5, 4e-5, n),
+            1e-3 * rng.standard_normal(n),
+            rng.uniform(2, 6, n),
+        ]
     )
 
 
@@ -64,10 +73,16 @@ def test_many_products_stand_by_themselves(xiamen, dynamics_of, dynamics):
 
 
 def test_both_layouts_give_one_law(dynamics, motions, laid_out):
-    by_pair, by_tooth = (laid_out(many, lambda: laws(dynamics, motions)) for many in (False, True))
+    by_pair, by_tooth = (
+        laid_out(many, lambda: laws(dynamics, motions)) for many in (False, True)
+    )
     for name, found, expected in zip(LAW, by_tooth.T, by_pair.T, strict=True):
         assert_allclose(
-            found, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max(), err_msg=name
+            found,
+            expected,
+            rtol=1e-12,
+            atol=1e-12 * np.abs(expected).max(),
+            err_msg=name,
         )
     assert (by_pair[:, 0] > 0).mean() > 0.2
     assert (by_pair[:, 0] < 0).mean() > 0.2
@@ -78,7 +93,10 @@ def test_teeth_differ_in_that_law(dynamics, motions, xiamen, dynamics_of):
     found = laws(dynamics, motions)[:, 0]
     for some in (PITS[:5], PITS[5:], ()):
         sound = dynamics_of(
-            xiamen, some, pinion_error=dynamics.pinion_error, wheel_error=dynamics.wheel_error
+            xiamen,
+            some,
+            pinion_error=dynamics.pinion_error,
+            wheel_error=dynamics.wheel_error,
         )
         other = laws(sound, motions)[:, 0]
         assert np.abs(other - found).max() > 0.05 * np.abs(found).max()
@@ -89,6 +107,12 @@ def test_both_layouts_give_one_motion(dynamics, laid_out):
         run = CoreRun(machines, 1 / (51200 * 5))
         return run.advance(3000), run.whole
 
-    by_pair, by_tooth = (laid_out(many, lambda: walk([dynamics])) for many in (False, True))
-    assert_allclose(by_tooth[0], by_pair[0], rtol=0, atol=1e-9 * np.abs(by_pair[0]).max())
-    assert_allclose(by_tooth[1], by_pair[1], rtol=0, atol=1e-9 * np.abs(by_pair[1]).max())
+    by_pair, by_tooth = (
+        laid_out(many, lambda: walk([dynamics])) for many in (False, True)
+    )
+    assert_allclose(
+        by_tooth[0], by_pair[0], rtol=0, atol=1e-9 * np.abs(by_pair[0]).max()
+    )
+    assert_allclose(
+        by_tooth[1], by_pair[1], rtol=0, atol=1e-9 * np.abs(by_pair[1]).max()
+    )

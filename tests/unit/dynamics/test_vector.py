@@ -35,7 +35,10 @@ OPERATIONS = {
     "truediv": operator.truediv,
 }
 COMPILED = njit(error_model="numpy")
-CHOICE, N_LANE_BY_LANE = 12, 13  # results before: two vectors, vector and number, number and vector
+CHOICE, N_LANE_BY_LANE = (
+    12,
+    13,
+)  # results before: two vectors, vector and number, number and vector
 
 
 def lane_by_lane(read, per_row, n):
@@ -62,7 +65,9 @@ def lane_by_lane(read, per_row, n):
             store(
                 out,
                 there + 12 * n,
-                where_above(a, b, read(rows, here + 2 * per_row), read(rows, here + 3 * per_row)),
+                where_above(
+                    a, b, read(rows, here + 2 * per_row), read(rows, here + 3 * per_row)
+                ),
             )
             above[k] = any_above(a, b)
 
@@ -72,7 +77,10 @@ def lane_by_lane(read, per_row, n):
 EVERY = {
     (precision, shape): lane_by_lane(*of)
     for precision in PRECISIONS
-    for shape, of in (("group", (get_row, 1, n_lanes(precision))), ("row", (load_four, FOUR, FOUR)))
+    for shape, of in (
+        ("group", (get_row, 1, n_lanes(precision))),
+        ("row", (load_four, FOUR, FOUR)),
+    )
 }
 
 
@@ -134,7 +142,9 @@ def numbers(precision):
 
     def draw(*size):
         values = rng.standard_normal(size) * 10.0 ** rng.integers(-reach, reach, size)
-        return np.where(rng.random(size) < 0.3, rng.choice(ODD[precision], size), values)
+        return np.where(
+            rng.random(size) < 0.3, rng.choice(ODD[precision], size), values
+        )
 
     return draw
 
@@ -142,9 +152,9 @@ def numbers(precision):
 @pytest.fixture(scope="module")
 def rows(precision, shape, numbers):
     """(group, a to d, lane); some of a equal to b."""
-    values = numbers(N_GROUPS, 4, n_lanes(precision) if shape == "group" else FOUR).astype(
-        precision
-    )
+    values = numbers(
+        N_GROUPS, 4, n_lanes(precision) if shape == "group" else FOUR
+    ).astype(precision)
     values[::5, 1] = values[::5, 0]
     return values
 
@@ -176,7 +186,9 @@ def same_numbers(one, two):
     return (
         one.dtype == two.dtype
         and np.array_equal(one, two, equal_nan=True)
-        and np.array_equal(np.signbit(one)[~np.isnan(one)], np.signbit(two)[~np.isnan(two)])
+        and np.array_equal(
+            np.signbit(one)[~np.isnan(one)], np.signbit(two)[~np.isnan(two)]
+        )
     )
 
 
@@ -264,10 +276,13 @@ def test_a_vector_goes_into_an_array_of_its_own_kind_only(precision):
     (other,) = (name for name in PRECISIONS if name != precision)
     values, out = np.zeros(16, dtype=precision), np.full(16, 7.0, dtype=other)
     with pytest.raises(
-        TypeError, match=f"{precision}x{n_lanes(precision)} is no row of an array of {other}"
+        TypeError,
+        match=f"{precision}x{n_lanes(precision)} is no row of an array of {other}",
     ):
         move(values, 0, 0, out)
-    with pytest.raises(TypeError, match=f"{precision}x{FOUR} does not fit an array of {other}"):
+    with pytest.raises(
+        TypeError, match=f"{precision}x{FOUR} does not fit an array of {other}"
+    ):
         move_four(values, 0, 0, out)
     assert (out == 7.0).all()
 

@@ -51,4 +51,6 @@ def test_the_seed_of_a_crack_keeps_what_its_law_depends_on():
     kept = {"gear", "crack_angle", "crack_start", "crack_side"}
     assert all(getattr(seed, name) == getattr(crack, name) for name in kept)
     assert (seed.tooth, seed.crack_depth, seed.crack_width) == (0, 0.0, None)
-    assert one("crack", tooth=9).seed() == one("crack", tooth=2, crack_depth_mm=2.0).seed()
+    assert (
+        one("crack", tooth=9).seed() == one("crack", tooth=2, crack_depth_mm=2.0).seed()
+    )

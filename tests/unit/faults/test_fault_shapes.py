@@ -90,7 +90,9 @@ class TestWhatChanges:
         )
         tooth_of(one(kind, tooth=3), one("wear", tooth=3), one("misalignment", tooth=3))
         for found, copy in zip(
-            (before.material_loss, before.flank_deviation, before.slice_edges), copies, strict=True
+            (before.material_loss, before.flank_deviation, before.slice_edges),
+            copies,
+            strict=True,
         ):
             assert_allclose(found, copy, rtol=0, atol=0)
         assert before.present
@@ -108,7 +110,9 @@ class TestWhatChanges:
         assert tooth.material_loss.min() >= 0
 
     def test_neighbors_stay_sound(self, xiamen):
-        assert set(faulty_teeth(xiamen.pair, [one("crack", tooth=3)])) == {("pinion", 3)}
+        assert set(faulty_teeth(xiamen.pair, [one("crack", tooth=3)])) == {
+            ("pinion", 3)
+        }
         assert set(faulty_teeth(xiamen.pair, [one("runout", tooth=3)])) == {
             ("pinion", k) for k in range(23)
         }
@@ -124,7 +128,9 @@ class TestThePapersSections:
         assert area.min() > 0
         assert (moment < sound_moment).any()
         rc = tooth.profile.curvature_radius
-        assert_allclose(bearing_width(tooth, rc), bearing_width(sound, rc), rtol=0, atol=0)
+        assert_allclose(
+            bearing_width(tooth, rc), bearing_width(sound, rc), rtol=0, atol=0
+        )
         for found, expected in zip(
             sections(tooth, papers_crack=False), (sound_area, sound_moment), strict=True
         ):
@@ -142,7 +148,10 @@ class TestThePapersSections:
 
     def test_a_pit_takes_an_eccentric_rectangle(self, tooth_of):
         """Eq. (15) as the parallel-axis theorem, section by section."""
-        tooth, (sound_area, _) = tooth_of(one("pitting")), sections(tooth_of(), papers_crack=True)
+        tooth, (sound_area, _) = (
+            tooth_of(one("pitting")),
+            sections(tooth_of(), papers_crack=True),
+        )
         area, moment = sections(tooth, papers_crack=True)
         touched = np.flatnonzero(area < (1 - 1e-9) * sound_area)
         inside = touched[2:-2]
@@ -156,7 +165,9 @@ class TestThePapersSections:
             - pit_width * depth * (half - depth / 2) ** 2
         )
         assert_allclose(area[inside], expected, rtol=1e-12, atol=0)
-        assert_allclose(moment[inside], about_middle - expected * centroid**2, rtol=1e-9, atol=0)
+        assert_allclose(
+            moment[inside], about_middle - expected * centroid**2, rtol=1e-9, atol=0
+        )
         x = tooth.cell_abscissa[touched]
         middle = 0.5 * (x.min() + x.max()) - tooth.profile.abscissa[0]
         assert_allclose([np.ptp(x), middle], [1e-3, 2.6220e-3], rtol=0, atol=2e-5)
@@ -168,22 +179,39 @@ class TestThePapersSections:
         assert_allclose(np.unique(width), [10e-3, 20e-3], rtol=1e-12, atol=0)
         # spur reference (docs/validation.md), section 2.3: rc 6.2928 to 9.1975 mm
         narrow = rc[width < 20e-3]
-        assert_allclose([narrow[0], narrow[-1]], [6.2928e-3, 9.1975e-3], rtol=0, atol=0.03e-3)
+        assert_allclose(
+            [narrow[0], narrow[-1]], [6.2928e-3, 9.1975e-3], rtol=0, atol=0.03e-3
+        )
 
     def test_even_wear_narrows_nothing(self, tooth_of):
         worn = tooth_of(one("wear", wear_profile=None, wear_depth_um=100))
         assert_allclose(
-            bearing_width(worn, worn.profile.curvature_radius), 20e-3, rtol=1e-12, atol=0
+            bearing_width(worn, worn.profile.curvature_radius),
+            20e-3,
+            rtol=1e-12,
+            atol=0,
         )
-        both = tooth_of(one("pitting"), one("wear", wear_profile=None, wear_depth_um=100))
+        both = tooth_of(
+            one("pitting"), one("wear", wear_profile=None, wear_depth_um=100)
+        )
         assert_allclose(
-            bearing_width(both, both.profile.curvature_radius).min(), 10e-3, rtol=1e-12, atol=0
+            bearing_width(both, both.profile.curvature_radius).min(),
+            10e-3,
+            rtol=1e-12,
+            atol=0,
         )
 
     def test_loss_makes_sections_smaller(self, tooth_of):
         """Parallel axes over slices that differ: never more than what was there, by any fault."""
         sound = sections(tooth_of(), papers_crack=False)
-        for kind in ("pitting", "spalling", "distributed_pitting", "chipped", "broken", "wear"):
+        for kind in (
+            "pitting",
+            "spalling",
+            "distributed_pitting",
+            "chipped",
+            "broken",
+            "wear",
+        ):
             for found, whole in zip(
                 sections(tooth_of(one(kind)), papers_crack=False), sound, strict=True
             ):
@@ -209,7 +237,9 @@ class TestCrackFront:
     def test_mean_depth_in_closed_form(self, xiamen, tooth_of, front, mean, width):
         depth = self.depth(tooth_of, front, width)
         assert_allclose(depth.mean(), 2e-3 * mean * width / FULL, rtol=1e-12, atol=0)
-        fault = one("crack", crack_depth_mm=2.0, crack_front=front, crack_width_mm=width)
+        fault = one(
+            "crack", crack_depth_mm=2.0, crack_front=front, crack_width_mm=width
+        )
         chord = fault.root_chord(xiamen.pair.pinion)
         assert_allclose(
             fault.severity(xiamen.pair.pinion), depth.mean() / chord, rtol=1e-12, atol=0
@@ -231,7 +261,9 @@ class TestCrackFront:
         assert np.all(depth[edges[:-1] >= width] <= 0)
         # strips that lie in the crack whole; the very end of a parabola is too steep for the middle of its strip
         whole = edges[1:] <= 0.95 * width
-        assert_allclose(depth[whole], 2e-3 * shape(middle[whole] / width), rtol=0.01, atol=0)
+        assert_allclose(
+            depth[whole], 2e-3 * shape(middle[whole] / width), rtol=0.01, atol=0
+        )
         assert depth.max() <= 2e-3 * (1 + 1e-12)
 
     def test_null_is_the_whole_face(self, tooth_of):
@@ -269,7 +301,9 @@ class TestHoles:
 
     def test_an_elliptic_spall_has_its_area(self, tooth_of):
         tooth = tooth_of(one("spalling"))
-        assert_allclose(lost_area(tooth), 0.25 * np.pi * 1.5e-3 * 8e-3, rtol=0.02, atol=0)
+        assert_allclose(
+            lost_area(tooth), 0.25 * np.pi * 1.5e-3 * 8e-3, rtol=0.02, atol=0
+        )
         longest = (tooth.material_loss > 0).sum(axis=1)
         assert longest.argmax() == pytest.approx(len(longest) // 2, abs=1)
         assert_allclose(longest, longest[::-1], rtol=0, atol=1)
@@ -303,10 +337,14 @@ class TestHoles:
 class TestTips:
     def test_a_broken_tooth_ends_below_its_tip(self, xiamen, gear):
         body = getattr(xiamen.pair, gear)
-        tooth = one("broken", gear=gear, broken_height_mm=1.5).apply(healthy_tooth(body), 0)
+        tooth = one("broken", gear=gear, broken_height_mm=1.5).apply(
+            healthy_tooth(body), 0
+        )
         gone = np.isinf(tooth.material_loss[0])
         cell = np.diff(on_flank(tooth)).max()
-        assert_allclose(on_flank(tooth)[gone].min(), body.tip_radius - 1.5e-3, rtol=0, atol=cell)
+        assert_allclose(
+            on_flank(tooth)[gone].min(), body.tip_radius - 1.5e-3, rtol=0, atol=cell
+        )
         assert not gone[on_flank(tooth) < body.tip_radius - 1.5e-3].any()
         assert tooth.tip_curvature_radius == tooth.profile.curvature_radius[~gone].max()
         assert tooth.present
@@ -330,7 +368,10 @@ class TestTips:
         tooth = chip.apply(healthy_tooth(body), 0)
         gone = np.isinf(tooth.material_loss)
         height = np.array(
-            [body.tip_radius - on_flank(tooth)[row].min() if row.any() else 0.0 for row in gone]
+            [
+                body.tip_radius - on_flank(tooth)[row].min() if row.any() else 0.0
+                for row in gone
+            ]
         )
         expected = 2e-3 * np.maximum(1 - across(tooth) / 8e-3, 0)
         # a node of the flank, and the arc of the tip, which is lower beside the centreline
@@ -365,7 +406,8 @@ class TestDistributedPitting:
 
     def test_a_larger_share_has_all_pits_of_a_smaller(self, xiamen):
         series = [
-            self.pits(xiamen, pitted_share=share).material_loss for share in (0.02, 0.05, 0.1, 0.3)
+            self.pits(xiamen, pitted_share=share).material_loss
+            for share in (0.02, 0.05, 0.1, 0.3)
         ]
         for less, more in pairwise(series):
             assert np.all(more >= less)
@@ -377,7 +419,9 @@ class TestDistributedPitting:
         tooth = self.pits(xiamen, number, pitted_share=share, diameter_scatter=0.2)
         pitted = lost_area(tooth) / flank_area(xiamen.pair.pinion)
         largest = tooth.material_loss.max() / 0.2  # diameters by the depth ratio
-        a_pit = (largest + tooth.slice_width.max()) * (largest + np.diff(on_flank(tooth)).max())
+        a_pit = (largest + tooth.slice_width.max()) * (
+            largest + np.diff(on_flank(tooth)).max()
+        )
         assert share <= pitted < share + a_pit / flank_area(xiamen.pair.pinion)
 
     def test_pits_lie_in_their_region(self, xiamen):
@@ -393,7 +437,9 @@ class TestDistributedPitting:
         even = self.pits(xiamen, diameter_scatter=0.0).material_loss
         assert_allclose(np.unique(even), [0, 0.1e-3], rtol=1e-12, atol=0)
         depths = np.unique(
-            np.concatenate([np.unique(self.pits(xiamen, k).material_loss) for k in range(12)])
+            np.concatenate(
+                [np.unique(self.pits(xiamen, k).material_loss) for k in range(12)]
+            )
         )[1:]
         # deep pits cover shallow ones, so that the median seen lies a little above the one drawn
         assert 0.1e-3 < np.median(depths) < 0.13e-3

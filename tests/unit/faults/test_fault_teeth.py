@@ -28,7 +28,9 @@ def assert_same_tooth(table, other, gear, tooth):
     for key, found, expected in zip(
         KEYS, rows(table, gear, tooth), rows(other, gear, tooth), strict=True
     ):
-        assert_allclose(found, expected, rtol=1e-12, atol=1e-18, err_msg=f"{key} of tooth {tooth}")
+        assert_allclose(
+            found, expected, rtol=1e-12, atol=1e-18, err_msg=f"{key} of tooth {tooth}"
+        )
 
 
 class TestSeveralTeeth:
@@ -37,7 +39,9 @@ class TestSeveralTeeth:
         table = xiamen.mesh_table((one(kind, gear="wheel", tooth=[1, 5]),))
         assert np.flatnonzero(table.wheel.kind).tolist() == [1, 5]
         assert len(table.wheel.compliance) == 2
-        assert_same_tooth(table, xiamen.mesh_table((one(kind, gear="wheel", tooth=5),)), "wheel", 5)
+        assert_same_tooth(
+            table, xiamen.mesh_table((one(kind, gear="wheel", tooth=5),)), "wheel", 5
+        )
         assert not table.pinion.kind.any()
 
     @pytest.mark.parametrize("kind", ALIKE)
@@ -48,7 +52,9 @@ class TestSeveralTeeth:
 
     @pytest.mark.parametrize("gear", GEARS)
     def test_pits_are_drawn_for_each_tooth(self, xiamen, gear):
-        table = xiamen.mesh_table((some("distributed_pitting", gear=gear, tooth=[1, 5]),))
+        table = xiamen.mesh_table(
+            (some("distributed_pitting", gear=gear, tooth=[1, 5]),)
+        )
         assert np.unique(side_of(table, gear).kind).tolist() == [0, 1, 2]
         alone = xiamen.mesh_table((some("distributed_pitting", gear=gear, tooth=5),))
         assert_same_tooth(table, alone, gear, 5)
@@ -63,7 +69,12 @@ class TestSeveralTeeth:
 
     @pytest.mark.parametrize(
         ("tooth", "first", "teeth"),
-        [(3, 3, (3,)), ([5, 1], 1, (5, 1)), ("all", -1, tuple(range(23))), ([22], 22, (22,))],
+        [
+            (3, 3, (3,)),
+            ([5, 1], 1, (5, 1)),
+            ("all", -1, tuple(range(23))),
+            ([22], 22, (22,)),
+        ],
     )
     def test_the_first_tooth_stands_for_them(self, xiamen, tooth, first, teeth):
         fault = one("crack", tooth=tooth)
@@ -73,7 +84,13 @@ class TestSeveralTeeth:
     def test_a_fault_can_be_a_key(self):
         """Tables are kept by their faults."""
         assert (
-            len({one("wear", tooth=[1, 5]), one("wear", tooth=[1, 5]), one("wear", tooth="all")})
+            len(
+                {
+                    one("wear", tooth=[1, 5]),
+                    one("wear", tooth=[1, 5]),
+                    one("wear", tooth="all"),
+                }
+            )
             == 2
         )
 
@@ -128,7 +145,9 @@ class TestCompound:
         )
         table = xiamen.mesh_table((wear, pitch))
         gap, at_pitch_point = rows(table, "pinion", 2)[1], xiamen.pair.pitch_point
-        assert np.interp(at_pitch_point, table.position, gap) == pytest.approx(30e-6, rel=1e-9)
+        assert np.interp(at_pitch_point, table.position, gap) == pytest.approx(
+            30e-6, rel=1e-9
+        )
 
     def test_a_cracked_missing_tooth_is_missing(self, xiamen):
         for faults in (
@@ -146,7 +165,9 @@ class TestCompound:
         both = faulty_teeth(xiamen.pair, (tension, compression))["pinion", 0]
         assert [crack.side for crack in both.cracks] == ["tension", "compression"]
         for system in (xiamen, machine({"mesh.crack": "paper"})):
-            two, single = (system.mesh_table(own) for own in ((tension, compression), (tension,)))
+            two, single = (
+                system.mesh_table(own) for own in ((tension, compression), (tension,))
+            )
             assert np.all(rows(two, "pinion", 0)[0] > rows(single, "pinion", 0)[0])
 
     def test_the_configuration_says_the_same(self, xiamen):

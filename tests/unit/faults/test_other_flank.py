@@ -29,7 +29,9 @@ def test_what_is_gone_is_gone_from_both_flanks(fault):
 
 
 def test_what_pulls_a_crack_open_on_one_flank_presses_it_together_on_the_other():
-    crack = Crack(**ON, crack_depth=1e-3, crack_angle=math.radians(70.0), crack_start="arc_mid")
+    crack = Crack(
+        **ON, crack_depth=1e-3, crack_angle=math.radians(70.0), crack_start="arc_mid"
+    )
     felt = crack.on_other_flank()
     assert (crack.crack_side, felt.crack_side) == ("tension", "compression")
     assert (felt.crack_depth, felt.tooth) == (crack.crack_depth, crack.tooth)
@@ -51,7 +53,11 @@ def test_every_fault_answers_with_a_fault_of_the_same_teeth_or_none(kind):
     fault = one(kind)
     felt = fault.on_other_flank()
     if kind in ("crack", "chipped", "broken", "missing_tooth"):
-        assert (type(felt), felt.gear, felt.tooth) == (type(fault), fault.gear, fault.tooth)
+        assert (type(felt), felt.gear, felt.tooth) == (
+            type(fault),
+            fault.gear,
+            fault.tooth,
+        )
     else:
         assert felt is None
 

@@ -43,7 +43,9 @@ def test_reference_line_of_action(pair):
 
 @pytest.mark.parametrize("shifts", [(0.0, 0.0), (0.3, -0.3), (0.3, 0.2), (-0.1, 0.4)])
 class TestShifts:
-    def test_curvatures_add_up_and_the_pitch_point_halves_by_ratio(self, shifted, shifts):
+    def test_curvatures_add_up_and_the_pitch_point_halves_by_ratio(
+        self, shifted, shifts
+    ):
         pair = shifted(*shifts)
         s = np.linspace(0, pair.path_of_contact, 7)
         assert_allclose(
@@ -56,7 +58,9 @@ class TestShifts:
             pair.pitch_point
         )
         assert_allclose(at_pitch_point, pair.ratio, rtol=1e-12, atol=0)
-        assert_allclose(pair.wheel.base_pitch, pair.pinion.base_pitch, rtol=1e-12, atol=0)
+        assert_allclose(
+            pair.wheel.base_pitch, pair.pinion.base_pitch, rtol=1e-12, atol=0
+        )
 
     def test_teeth_fill_the_working_pitch_circle(self, shifted, shifts):
         """No play at the working centre distance: both tooth thicknesses make one pitch (an independent reading)."""
@@ -70,9 +74,13 @@ class TestShifts:
             for gear, radius in zip((pair.pinion, pair.wheel), radii, strict=True)
         )
         assert_allclose(sum(radii), pair.center_distance, rtol=1e-12, atol=0)
-        assert_allclose(thickness, 2 * math.pi * radii[0] / pair.pinion.n_teeth, rtol=1e-9, atol=0)
+        assert_allclose(
+            thickness, 2 * math.pi * radii[0] / pair.pinion.n_teeth, rtol=1e-9, atol=0
+        )
 
-    def test_reference_center_distance_only_when_the_shifts_cancel(self, shifted, shifts):
+    def test_reference_center_distance_only_when_the_shifts_cancel(
+        self, shifted, shifts
+    ):
         pair = shifted(*shifts)
         moved = pair.center_distance - 107e-3
         assert abs(moved) < 1e-12 if sum(shifts) == 0 else moved > 0.1e-3
@@ -136,13 +144,18 @@ class TestCornerGap:
 
     @pytest.mark.parametrize(
         ("side", "expected"),
-        [("before", [1.61, 10.0, 28.8, 57.5, 115.9]), ("after", [0.83, 5.25, 15.4, 31.3, 64.2])],
+        [
+            ("before", [1.61, 10.0, 28.8, 57.5, 115.9]),
+            ("after", [0.83, 5.25, 15.4, 31.3, 64.2]),
+        ],
     )
     def test_reference_numbers(self, pair, side, expected):
         # spur reference (docs/validation.md), section 5.3, point 6
         beyond = np.array([0.2, 0.5, 0.85, 1.2, 1.7]) * 1e-3
         position = -beyond if side == "before" else pair.path_of_contact + beyond
-        assert_allclose(corner_gap(pair, position) * 1e6, expected, rtol=5e-3, atol=0.006)
+        assert_allclose(
+            corner_gap(pair, position) * 1e6, expected, rtol=5e-3, atol=0.006
+        )
 
     @pytest.mark.parametrize("beyond", [0.2e-3, 0.85e-3, 1.7e-3])
     @pytest.mark.parametrize("side", ["before", "after"])
@@ -167,12 +180,15 @@ class TestCornerGap:
 class TestPairsThatCannotMesh:
     def test_interference(self, pair):
         with pytest.raises(
-            GeometryError, match=r"pinion: contact would reach curvature radius .* \(interference\)"
+            GeometryError,
+            match=r"pinion: contact would reach curvature radius .* \(interference\)",
         ):
             replace(
                 pair,
                 wheel=replace(
-                    pair.wheel, addendum_coefficient=1.2, cutter_tip_radius_coefficient=0.3
+                    pair.wheel,
+                    addendum_coefficient=1.2,
+                    cutter_tip_radius_coefficient=0.3,
                 ),
             )
         assert replace(pair, wheel=replace(pair.wheel, addendum_coefficient=1.02))
@@ -185,9 +201,14 @@ class TestPairsThatCannotMesh:
         }
         large = replace(pair.pinion, n_teeth=40)
         with pytest.raises(
-            GeometryError, match=r"pinion: its tip cuts .* mm into the root of the wheel"
+            GeometryError,
+            match=r"pinion: its tip cuts .* mm into the root of the wheel",
         ):
-            replace(pair, pinion=replace(large, **shallow), wheel=replace(pair.wheel, **shallow))
+            replace(
+                pair,
+                pinion=replace(large, **shallow),
+                wheel=replace(pair.wheel, **shallow),
+            )
         assert replace(pair, pinion=large)
 
     def test_different_modules(self, pair):
@@ -195,7 +216,9 @@ class TestPairsThatCannotMesh:
             replace(pair, wheel=replace(pair.wheel, normal_module=2.5e-3))
 
     def test_negative_backlash(self, pair):
-        with pytest.raises(GeometryError, match="backlash_um = -1 must not be negative"):
+        with pytest.raises(
+            GeometryError, match="backlash_um = -1 must not be negative"
+        ):
             replace(pair, backlash=-1e-6)
 
     def test_contact_ratio_below_one_is_refused_only_when_asked(self, pair):
@@ -206,7 +229,8 @@ class TestPairsThatCannotMesh:
         )
         assert short.transverse_contact_ratio < 1
         with pytest.raises(
-            GeometryError, match=f"contact ratio {short.transverse_contact_ratio:.4f} is below 1"
+            GeometryError,
+            match=f"contact ratio {short.transverse_contact_ratio:.4f} is below 1",
         ):
             short.require_continuous_drive()
         pair.require_continuous_drive()

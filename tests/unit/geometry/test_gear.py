@@ -13,8 +13,18 @@ from gensig.geometry.tooth_profile import load_angle, root_curve_point, tooth_pr
 
 # spur reference (docs/validation.md), section 1, m = 2 mm, 20 deg, no shift
 TABLE = {
-    23: {"pitch_radius": 23.0, "base_radius": 21.61293, "tip_radius": 25.0, "root_radius": 20.5},
-    84: {"pitch_radius": 84.0, "base_radius": 78.93418, "tip_radius": 86.0, "root_radius": 81.5},
+    23: {
+        "pitch_radius": 23.0,
+        "base_radius": 21.61293,
+        "tip_radius": 25.0,
+        "root_radius": 20.5,
+    },
+    84: {
+        "pitch_radius": 84.0,
+        "base_radius": 78.93418,
+        "tip_radius": 86.0,
+        "root_radius": 81.5,
+    },
 }
 ANGLES = {23: (0.083200, 0.130995), 84: (0.033604, 0.035868)}
 MIDDLES = {
@@ -31,7 +41,10 @@ def test_radii_and_angles_of_the_reference_pair(gear_with, n_teeth):
     for key, value in TABLE[n_teeth].items():
         assert_allclose(getattr(gear, key), value * 1e-3, rtol=0, atol=6e-9)
     assert_allclose(
-        [gear.half_tooth_angle_base, gear.root_half_angle], ANGLES[n_teeth], rtol=0, atol=6e-7
+        [gear.half_tooth_angle_base, gear.root_half_angle],
+        ANGLES[n_teeth],
+        rtol=0,
+        atol=6e-7,
     )
 
 
@@ -49,7 +62,10 @@ def test_profile_covers_root_to_tip(xiamen):
     x, y = profile.abscissa, profile.half_thickness
     assert len(x) == profile.n_root_cells + len(profile.curvature_radius)
     assert_allclose(
-        np.hypot(x[[0, -1]], y[[0, -1]]), [gear.root_radius, gear.tip_radius], rtol=1e-12, atol=0
+        np.hypot(x[[0, -1]], y[[0, -1]]),
+        [gear.root_radius, gear.tip_radius],
+        rtol=1e-12,
+        atol=0,
     )
     assert np.all(np.diff(x) > 0)
 
@@ -64,17 +80,23 @@ def test_half_tooth_angle_falls_from_pitch_to_tip_and_shift_thickens(gear_with):
     on_pitch = gear.half_tooth_angle_at(gear.pitch_radius)
     assert_allclose(on_pitch, math.pi / (2 * 23), rtol=1e-12, atol=0)
     assert gear.half_tooth_angle_at(gear.tip_radius) < on_pitch
-    assert gear_with(profile_shift=0.2).half_tooth_angle_at(gear.pitch_radius) > on_pitch
+    assert (
+        gear_with(profile_shift=0.2).half_tooth_angle_at(gear.pitch_radius) > on_pitch
+    )
 
 
 def test_twelve_teeth_are_undercut_and_a_shift_cures_them(gear_with):
-    with pytest.raises(GeometryError, match="12 teeth with profile shift 0 are undercut"):
+    with pytest.raises(
+        GeometryError, match="12 teeth with profile shift 0 are undercut"
+    ):
         gear_with(n_teeth=12)
     assert gear_with(n_teeth=12, profile_shift=0.5).junction_curvature_radius > 0
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.1, 0.25])
-def test_the_undercut_message_names_the_smallest_sound_number_of_teeth(gear_with, shift):
+def test_the_undercut_message_names_the_smallest_sound_number_of_teeth(
+    gear_with, shift
+):
     with pytest.raises(GeometryError, match="undercut") as caught:
         gear_with(n_teeth=10, profile_shift=shift)
     limit = int(re.search(r"at least (\d+) teeth", str(caught.value)).group(1))
@@ -96,7 +118,10 @@ def test_a_large_shift_makes_the_tooth_pointed(gear_with):
         ({"normal_module": 0.0}, "normal_module_mm = 0 must be positive"),
         ({"face_width": -1e-3}, "face_width_mm = -1 must be positive"),
         ({"addendum_coefficient": 0.0}, "addendum_coefficient = 0 must be positive"),
-        ({"pressure_angle": math.radians(5)}, "pressure_angle_deg = 5 must lie between 10 and 35"),
+        (
+            {"pressure_angle": math.radians(5)},
+            "pressure_angle_deg = 5 must lie between 10 and 35",
+        ),
         ({"clearance_coefficient": 1.5}, "clearance_coefficient = 1.5"),
         (
             {"cutter_tip_radius_coefficient": 0.5},
@@ -116,7 +141,8 @@ def test_sizes_that_cannot_be(xiamen, changes, text):
 
 def test_a_rack_tip_wider_than_the_space_is_refused(gear_with):
     with pytest.raises(
-        GeometryError, match=r"cutter_tip_radius_coefficient = 0\.38 is wider than the space"
+        GeometryError,
+        match=r"cutter_tip_radius_coefficient = 0\.38 is wider than the space",
     ):
         gear_with(n_teeth=40, pressure_angle=math.radians(25.0))
     assert gear_with(

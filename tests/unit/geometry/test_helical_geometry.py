@@ -34,7 +34,9 @@ def beihang(addendum=1.0, helix=18.0):
     rack = {"module": 1.3, "angle": 17.5, "addendum": addendum}
     pinion = gear("pinion", 61, -0.077, 15, helix=helix, **rack)
     return GearPair(
-        pinion=pinion, wheel=gear("wheel", 132, 0.150, 14, helix=-helix, **rack), backlash=1e-4
+        pinion=pinion,
+        wheel=gear("wheel", 132, 0.150, 14, helix=-helix, **rack),
+        backlash=1e-4,
     )
 
 
@@ -51,7 +53,9 @@ def test_figures_of_the_transmission_error_paper():
     assert pair.center_distance == pytest.approx(132.0005e-3, rel=1e-6)
     assert pair.overlap_ratio == pytest.approx(1.0593, abs=5e-5)
     assert pair.transverse_contact_ratio == pytest.approx(1.856, abs=5e-4)
-    assert beihang(addendum=1.2423).total_contact_ratio == pytest.approx(3.325, abs=5e-4)
+    assert beihang(addendum=1.2423).total_contact_ratio == pytest.approx(
+        3.325, abs=5e-4
+    )
     force = 178 / pair.pinion.pitch_radius
     assert force == pytest.approx(4269.6, rel=2e-5)
     assert force / math.cos(pair.pinion.transverse_pressure_angle) == pytest.approx(
@@ -65,7 +69,9 @@ def test_figures_of_the_temperature_paper():
     for shift, ratio in ((0.0, 1.704), (0.469, 1.644), (0.938, 1.548)):
         pair = chongqing(shift, 0.938)
         assert pair.center_distance == pytest.approx(1.250, rel=2e-5)
-        assert math.degrees(pair.working_pressure_angle) == pytest.approx(21.716, abs=2e-3)
+        assert math.degrees(pair.working_pressure_angle) == pytest.approx(
+            21.716, abs=2e-3
+        )
         assert pair.transverse_contact_ratio == pytest.approx(ratio, abs=1e-3)
         assert pair.overlap_ratio == pytest.approx(0.9927, abs=5e-5)
 
@@ -90,7 +96,11 @@ def test_helix_zero_is_the_spur_gear_to_the_bit():
 @pytest.mark.parametrize("helix", [0.0, 8.0, 18.0, 35.0])
 def test_normal_and_transverse_section_tell_the_same_tooth(helix):
     one = beihang(helix=helix).pinion
-    beta, alpha_n, alpha_t = one.helix_angle, one.pressure_angle, one.transverse_pressure_angle
+    beta, alpha_n, alpha_t = (
+        one.helix_angle,
+        one.pressure_angle,
+        one.transverse_pressure_angle,
+    )
     # the normal base pitch is that of the rack
     normal_base_pitch = math.pi * one.normal_module * math.cos(alpha_n)
     assert one.base_pitch * math.cos(one.base_helix_angle) == pytest.approx(
@@ -100,8 +110,15 @@ def test_normal_and_transverse_section_tell_the_same_tooth(helix):
         math.tan(beta) * math.cos(alpha_t), rel=1e-12
     )
     # thickness on the reference cylinder, normal to the teeth, is the rack's: pi m / 2 + 2 x m tan(alpha_n)
-    thickness = 2 * one.pitch_radius * one.half_tooth_angle_at(one.pitch_radius) * math.cos(beta)
-    rack = one.normal_module * (0.5 * math.pi + 2 * one.profile_shift * math.tan(alpha_n))
+    thickness = (
+        2
+        * one.pitch_radius
+        * one.half_tooth_angle_at(one.pitch_radius)
+        * math.cos(beta)
+    )
+    rack = one.normal_module * (
+        0.5 * math.pi + 2 * one.profile_shift * math.tan(alpha_n)
+    )
     assert thickness == pytest.approx(rack, rel=1e-9)
 
 
@@ -115,7 +132,9 @@ def test_root_curve_ends_on_the_involute_with_its_direction(helix):
     assert (
         abs(
             math.remainder(
-                math.atan2(y[1] - y[0], x[1] - x[0]) - math.atan2(v[1] - v[0], u[1] - u[0]), math.pi
+                math.atan2(y[1] - y[0], x[1] - x[0])
+                - math.atan2(v[1] - v[0], u[1] - u[0]),
+                math.pi,
             )
         )
         < 1e-4
@@ -138,7 +157,8 @@ def test_hands_that_do_not_match_are_refused():
     for other in (18.0, -17.0, 0.0):
         with pytest.raises(GeometryError, match=r"equal and of opposite hand"):
             dataclasses.replace(
-                pair, wheel=dataclasses.replace(pair.wheel, helix_angle=math.radians(other))
+                pair,
+                wheel=dataclasses.replace(pair.wheel, helix_angle=math.radians(other)),
             )
     with pytest.raises(GeometryError, match="must lie between -45 and 45"):
         dataclasses.replace(pair.pinion, helix_angle=math.radians(50))

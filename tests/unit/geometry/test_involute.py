@@ -23,7 +23,9 @@ def test_inverse_gives_the_angle_back(angle):
 def test_inverse_solves_to_rounding(value):
     angle = inverse_involute(value)
     assert 0.0 <= angle <= math.radians(80) * (1 + 1e-15)
-    assert_allclose(involute(angle), value, rtol=0, atol=1e-16 + 2e-16 * math.tan(angle) ** 2 * 4)
+    assert_allclose(
+        involute(angle), value, rtol=0, atol=1e-16 + 2e-16 * math.tan(angle) ** 2 * 4
+    )
 
 
 @pytest.mark.parametrize("value", [-0.01, 100.0])

@@ -37,7 +37,8 @@ def pair(*words):
 def test_figures_of_the_pump_drive():
     """Computed independently of this project for 54/54, m 3, b 20: factors and the forces that give the stress."""
     outer, tip = (
-        case(PUMP, f"strength.load_point={point}") for point in ("outer_single_pair", "tip")
+        case(PUMP, f"strength.load_point={point}")
+        for point in ("outer_single_pair", "tip")
     )
     assert outer.decisive == tip.decisive == "wheel"
     factors = outer.factors["wheel"]
@@ -50,33 +51,43 @@ def test_figures_of_the_pump_drive():
     )
     assert factors.contact_ratio_factor == pytest.approx(0.674, abs=6e-4)
     for stress, forces in ((349.39e6, (8393, 7847)), (292.88e6, (7036, 6578))):
-        assert (outer.force_for(stress), tip.force_for(stress)) == pytest.approx(forces, abs=1.0)
+        assert (outer.force_for(stress), tip.force_for(stress)) == pytest.approx(
+            forces, abs=1.0
+        )
 
 
 def test_a_force_gives_the_stress_it_was_asked_for():
-    loaded = case(PUMP, "strength.application_factor=1.25", "strength.face_load_factor=1.2").under(
-        349.39e6
-    )
+    loaded = case(
+        PUMP, "strength.application_factor=1.25", "strength.face_load_factor=1.2"
+    ).under(349.39e6)
     found = loaded.gears()["wheel"]
     assert found.stress == pytest.approx(349.39e6, rel=1e-12)
     assert found.nominal == pytest.approx(349.39e6 / 1.5, rel=1e-12)
     assert found.safety.paper == pytest.approx(1.353, abs=5e-4)
-    assert loaded.tangential_force == pytest.approx(case(PUMP).force_for(349.39e6) / 1.5, rel=1e-12)
+    assert loaded.tangential_force == pytest.approx(
+        case(PUMP).force_for(349.39e6) / 1.5, rel=1e-12
+    )
 
 
 def test_stress_goes_with_force_and_against_width_and_module_squared():
     base = case(*EQUAL).gears()["wheel"].nominal
-    assert case(*EQUAL, "operating.torque_nm=260").gears()["wheel"].nominal == pytest.approx(
-        2.0 * base
-    )
+    assert case(*EQUAL, "operating.torque_nm=260").gears()[
+        "wheel"
+    ].nominal == pytest.approx(2.0 * base)
     wide = case(*EQUAL, "gear.pinion.face_width_mm=40", "gear.wheel.face_width_mm=40")
     assert wide.gears()["wheel"].nominal == pytest.approx(0.5 * base)
     large = [
         f"gear.{key}"
-        for key in ("normal_module_mm=6", "pinion.bore_radius_mm=63", "wheel.bore_radius_mm=63")
+        for key in (
+            "normal_module_mm=6",
+            "pinion.bore_radius_mm=63",
+            "wheel.bore_radius_mm=63",
+        )
     ]
     # at the same torque the force is half too
-    assert case(*EQUAL, *large).gears()["wheel"].nominal == pytest.approx(0.25 * base, rel=1e-9)
+    assert case(*EQUAL, *large).gears()["wheel"].nominal == pytest.approx(
+        0.25 * base, rel=1e-9
+    )
 
 
 def test_a_wider_gear_is_helped_by_a_module_at_either_end():
@@ -96,7 +107,9 @@ def test_no_helix_is_a_spur_gear():
             f"strength.edition={edition}",
             "gear.helix_angle_deg=0.01",
         )
-        assert case(*words).factors["wheel"].stress_per_force == pytest.approx(spur, rel=2e-3)
+        assert case(*words).factors["wheel"].stress_per_force == pytest.approx(
+            spur, rel=2e-3
+        )
 
 
 def test_load_distribution_goes_on_at_its_bounds():
@@ -118,12 +131,16 @@ def test_load_distribution_goes_on_at_its_bounds():
             / found.overlap_ratio
         ]
         values = [load_distribution_factor(one) for one in narrow]
-        assert values[0] == pytest.approx(1.0 if ratio < 2.0 else math.sqrt(0.5), rel=1e-6)
+        assert values[0] == pytest.approx(
+            1.0 if ratio < 2.0 else math.sqrt(0.5), rel=1e-6
+        )
         assert values[2] == pytest.approx(values[3], rel=1e-5)
         assert values[3] == pytest.approx(ratio**-0.5)
         assert values[0] > values[1] > values[2]
     assert load_distribution_factor(pair(PUMP)) == 1.0
-    deep = pair(PUMP, "gear.addendum_coefficient=1.25", "gear.cutter_tip_radius_coefficient=0.2")
+    deep = pair(
+        PUMP, "gear.addendum_coefficient=1.25", "gear.cutter_tip_radius_coefficient=0.2"
+    )
     assert normal_contact_ratio(deep) > 2.0
     assert load_distribution_factor(deep) == 0.7
 
@@ -151,7 +168,9 @@ def test_rim_and_deep_teeth():
     assert values[0.8] == pytest.approx(1.6 * math.log(2.242 / 0.8))
     assert values[0.51] > values[0.8] > 1.6
     with pytest.raises(GeometryError, match="reduce bore_radius_mm"):
-        rim_thickness_factor(replace(wheel, bore_radius=wheel.root_radius - 0.4 * height))
+        rim_thickness_factor(
+            replace(wheel, bore_radius=wheel.root_radius - 0.4 * height)
+        )
     assert [deep_tooth_factor(ratio, 4) for ratio in (2.0, 2.3, 2.6)] == pytest.approx(
         [1.0, 0.8342, 0.7]
     )
@@ -170,14 +189,18 @@ def test_the_papers_mesh_peaks_at_isos_load_point():
         at = history.stress[name].argmax()
         assert history.stress[name][at] == pytest.approx(gears[name].stress, rel=1e-7)
         assert history.share[at] == pytest.approx(1.0)
-        assert history.roll[at] == pytest.approx(place, abs=1e-6 * loaded.pair.base_pitch)
+        assert history.roll[at] == pytest.approx(
+            place, abs=1e-6 * loaded.pair.base_pitch
+        )
 
 
 def test_light_loads_come_near_it_and_heavy_ones_share_more():
     shares = []
     for torque in (1.0, 130.0, 680.0):
         loaded = case(PUMP, f"operating.torque_nm={torque}")
-        shares.append(loaded.history().stress["wheel"].max() / loaded.gears()["wheel"].stress)
+        shares.append(
+            loaded.history().stress["wheel"].max() / loaded.gears()["wheel"].stress
+        )
     assert 1.0 >= shares[0] > shares[1] > shares[2]
     assert shares[0] == pytest.approx(1.0, abs=0.01)
 
@@ -245,7 +268,9 @@ def test_spreading_keeps_the_sum_and_evens_out():
 def test_misalignment_raises_the_stress():
     words = ("system=helical_pair", "mesh.n_slices=12")
     straight = case(*words).history().stress["wheel"].max()
-    crooked = case(*words, "modification.misalignment_um=10").history().stress["wheel"].max()
+    crooked = (
+        case(*words, "modification.misalignment_um=10").history().stress["wheel"].max()
+    )
     assert crooked > 1.1 * straight
 
 
@@ -253,14 +278,19 @@ def test_misalignment_raises_the_stress():
 def test_every_gear_option_has_a_root_stress(name):
     config = compose("generate", [f"gear={name}"])
     words = [f"gear={name}"] + (
-        [] if config["gear"]["helix_angle_deg"] == 0 else ["system=helical_pair", f"gear={name}"]
+        []
+        if config["gear"]["helix_angle_deg"] == 0
+        else ["system=helical_pair", f"gear={name}"]
     )
     loaded = case(*words)
     history = loaded.history(n_phases=40)
     for gear, found in loaded.gears().items():
         assert 5e6 < found.stress < 2e9
         assert 0.4 * found.stress < history.stress[gear].max() < 1.5 * found.stress
-    assert 0.99 < history.share.max() <= 1.0 + 1e-9 or loaded.pair.total_contact_ratio > 1.2
+    assert (
+        0.99 < history.share.max() <= 1.0 + 1e-9
+        or loaded.pair.total_contact_ratio > 1.2
+    )
 
 
 def test_the_force_over_the_mesh_gives_its_stress():
@@ -268,10 +298,14 @@ def test_the_force_over_the_mesh_gives_its_stress():
     force = loaded.force_over_mesh_for(200e6)
     torque = force * loaded.pair.pinion.pitch_radius
     found = case(PUMP, f"operating.torque_nm={torque!r}").history().stress
-    assert max(values.max() for values in found.values()) == pytest.approx(200e6, rel=1e-5)
+    assert max(values.max() for values in found.values()) == pytest.approx(
+        200e6, rel=1e-5
+    )
     assert force > loaded.force_for(200e6)
     exact = case(PUMP, *PAPER_LAW)
-    assert exact.force_over_mesh_for(200e6) == pytest.approx(exact.force_for(200e6), rel=1e-5)
+    assert exact.force_over_mesh_for(200e6) == pytest.approx(
+        exact.force_for(200e6), rel=1e-5
+    )
 
 
 def test_mistakes():

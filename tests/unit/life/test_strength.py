@@ -23,13 +23,17 @@ def strength():
 
 
 def safe(strength, stress=349.39e6, **changes):
-    return safety(replace(strength, **changes), stress, notch_parameter=2.5, normal_module=3e-3)
+    return safety(
+        replace(strength, **changes), stress, notch_parameter=2.5, normal_module=3e-3
+    )
 
 
 def test_the_papers_safety_factors(strength):
     assert safe(strength).paper == pytest.approx(1.353, abs=5e-4)
     assert safe(strength, 292.88e6).paper == pytest.approx(1.614, abs=5e-4)
-    assert [reliability(safe(strength, stress).paper) for stress in (349.39e6, 292.88e6)] == [
+    assert [
+        reliability(safe(strength, stress).paper) for stress in (349.39e6, 292.88e6)
+    ] == [
         "general",
         "higher",
     ]
@@ -56,14 +60,16 @@ def test_every_factor_is_a_factor(strength, key):
 
 def test_safety_falls_with_the_stress_and_rises_with_the_limit(strength):
     assert safe(strength, 2e8).iso == pytest.approx(2.0 * safe(strength, 4e8).iso)
-    assert safe(strength, bending_limit=2.0 * strength.bending_limit).paper == pytest.approx(
-        2.0 * safe(strength).paper
-    )
+    assert safe(
+        strength, bending_limit=2.0 * strength.bending_limit
+    ).paper == pytest.approx(2.0 * safe(strength).paper)
 
 
 def test_life_factor():
     cycles = (1e2, 1e3, 3e6, 1e10, 1e12)
-    assert [life_factor(n) for n in cycles] == pytest.approx([2.5, 2.5, 1.0, 0.85, 0.85])
+    assert [life_factor(n) for n in cycles] == pytest.approx(
+        [2.5, 2.5, 1.0, 0.85, 0.85]
+    )
     # its lines as the standard writes them
     assert life_factor(1e5) == pytest.approx((3e6 / 1e5) ** 0.115, rel=5e-3)
     assert life_factor(3.6e8) == pytest.approx((3e6 / 3.6e8) ** 0.02, rel=5e-3)
@@ -72,10 +78,16 @@ def test_life_factor():
 
 def test_notch_and_size():
     assert relative_notch_sensitivity(2.5) == 1.0
-    assert 0.98 < relative_notch_sensitivity(1.5) < 1.0 < relative_notch_sensitivity(4.0) < 1.02
-    assert [size_factor(module) for module in (1e-3, 5e-3, 12e-3, 25e-3, 40e-3)] == pytest.approx(
-        [1.0, 1.0, 0.93, 0.8, 0.8]
+    assert (
+        0.98
+        < relative_notch_sensitivity(1.5)
+        < 1.0
+        < relative_notch_sensitivity(4.0)
+        < 1.02
     )
+    assert [
+        size_factor(module) for module in (1e-3, 5e-3, 12e-3, 25e-3, 40e-3)
+    ] == pytest.approx([1.0, 1.0, 0.93, 0.8, 0.8])
 
 
 def test_reliability_classes():
@@ -85,7 +97,9 @@ def test_reliability_classes():
 
 
 def test_load_factors(strength):
-    loaded = replace(strength, application_factor=1.25, dynamic_factor=1.1, face_load_factor=1.3)
+    loaded = replace(
+        strength, application_factor=1.25, dynamic_factor=1.1, face_load_factor=1.3
+    )
     assert strength.load_factor == strength.force_factor == 1.0
     assert loaded.force_factor == pytest.approx(1.375)
     assert loaded.load_factor == pytest.approx(1.7875)
@@ -94,7 +108,9 @@ def test_load_factors(strength):
 def test_every_option_is_a_strength():
     assert {"18cr2ni4w", "case_hardened_mq"} <= set(options("strength"))
     for name in options("strength"):
-        found = read(Strength, compose("generate", [f"strength={name}"])["strength"], "strength")
+        found = read(
+            Strength, compose("generate", [f"strength={name}"])["strength"], "strength"
+        )
         assert found.name == name
 
 
@@ -110,7 +126,10 @@ def test_every_option_is_a_strength():
         ),
         ({"edition": 1996}, "strength.edition = 1996; allowed: 2019, 2006"),
         ({"bending_limit": 5}, "write it as 'bending_limit_mpa'"),
-        ({"dynamic_factor": "high"}, "strength.dynamic_factor = 'high' is not a number"),
+        (
+            {"dynamic_factor": "high"},
+            "strength.dynamic_factor = 'high' is not a number",
+        ),
     ],
 )
 def test_mistakes(change, message):

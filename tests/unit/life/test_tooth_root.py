@@ -11,7 +11,12 @@ from gensig.errors import ExtrapolationError
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth_profile import involute_point, root_curve
 from gensig.geometry.tooth_profile import load_angle as flank_load_angle
-from gensig.life.root.tooth_root import TANGENT, root_loading, root_section, virtual_gear
+from gensig.life.root.tooth_root import (
+    TANGENT,
+    root_loading,
+    root_section,
+    virtual_gear,
+)
 
 
 def gear(n_teeth, *, shift=0.0, module=3e-3, rounding=0.38, helix=0.0):
@@ -42,7 +47,13 @@ def touching(found, angle=TANGENT):
     return brentq(slope, found.pressure_angle, 0.5 * math.pi)
 
 
-SHAPES = [(18, 0.0, 0.38), (23, 0.3, 0.25), (54, 0.0, 0.38), (84, -0.2, 0.3), (400, 0.0, 0.38)]
+SHAPES = [
+    (18, 0.0, 0.38),
+    (23, 0.3, 0.25),
+    (54, 0.0, 0.38),
+    (84, -0.2, 0.3),
+    (400, 0.0, 0.38),
+]
 
 
 @pytest.mark.parametrize(("n_teeth", "shift", "rounding"), SHAPES)
@@ -55,13 +66,15 @@ def test_the_critical_section_lies_on_our_own_root_curve(n_teeth, shift, roundin
     assert section.height == pytest.approx(x[0], rel=1e-9)
     # at 28 degrees it would be elsewhere
     assert section.thickness != pytest.approx(
-        2.0 * root_curve(found, np.array([touching(found, math.radians(28.0))]))[1][0], rel=1e-3
+        2.0 * root_curve(found, np.array([touching(found, math.radians(28.0))]))[1][0],
+        rel=1e-3,
     )
     around = at + np.linspace(-2e-2, 2e-2, 201)
     x, y = root_curve(found, around)
     dx, dy = np.gradient(x, around), np.gradient(y, around)
     curvature = (
-        np.abs(dx * np.gradient(dy, around) - dy * np.gradient(dx, around)) / np.hypot(dx, dy) ** 3
+        np.abs(dx * np.gradient(dy, around) - dy * np.gradient(dx, around))
+        / np.hypot(dx, dy) ** 3
     )
     assert section.fillet_radius == pytest.approx(1.0 / curvature[100], rel=1e-5)
 
@@ -76,7 +89,10 @@ def test_the_lever_arm_is_that_of_our_own_flank(n_teeth, shift, rounding):
     angle = flank_load_angle(found, tip - distance)
     np.testing.assert_allclose(loading.load_angle, angle, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(
-        loading.lever_arm, x - y * np.tan(angle) - root_section(found).height, rtol=1e-7, atol=1e-12
+        loading.lever_arm,
+        x - y * np.tan(angle) - root_section(found).height,
+        rtol=1e-7,
+        atol=1e-12,
     )
 
 
@@ -106,7 +122,9 @@ def test_another_program():
         assert section.fillet_radius * 1e3 == pytest.approx(fillet, rel=2e-4)
         assert loading.lever_arm[0] * 1e3 == pytest.approx(arm, rel=2e-4)
         assert loading.form_factor[0] == pytest.approx(form, rel=3e-4)
-        assert loading.stress_correction_factor[0] == pytest.approx(correction, rel=3e-4)
+        assert loading.stress_correction_factor[0] == pytest.approx(
+            correction, rel=3e-4
+        )
 
 
 def test_many_teeth_are_a_rack():
@@ -121,16 +139,20 @@ def test_many_teeth_are_a_rack():
         + rounding / math.cos(alpha)
     )
     section, loading = root_section(found), root_loading(found, 0.0)
-    thickness, depth = 2.0 * (b - rounding * math.cos(TANGENT)), a + rounding * math.sin(TANGENT)
+    thickness, depth = (
+        2.0 * (b - rounding * math.cos(TANGENT)),
+        a + rounding * math.sin(TANGENT),
+    )
     assert section.thickness == pytest.approx(1e-3 * thickness, rel=1e-5)
     assert section.fillet_radius == pytest.approx(1e-3 * rounding, rel=1e-4)
     half_tip = math.pi / 4.0 - math.tan(alpha)
     arm = 1.0 + depth - half_tip * math.tan(alpha)
     assert loading.lever_arm[0] == pytest.approx(1e-3 * arm, rel=1e-5)
     assert loading.form_factor[0] == pytest.approx(6.0 * arm / thickness**2, rel=1e-4)
-    assert (loading.form_factor[0], loading.stress_correction_factor[0]) == pytest.approx(
-        (2.06, 1.97), rel=5e-3
-    )
+    assert (
+        loading.form_factor[0],
+        loading.stress_correction_factor[0],
+    ) == pytest.approx((2.06, 1.97), rel=5e-3)
 
 
 def test_factors_do_not_depend_on_size_and_a_rounder_root_has_less_stress():
@@ -139,7 +161,8 @@ def test_factors_do_not_depend_on_size_and_a_rounder_root_has_less_stress():
     )
     np.testing.assert_allclose(small.stress_factor, large.stress_factor, rtol=1e-12)
     sharp, round_ = (
-        root_loading(gear(30, rounding=radius), 0.0).stress_factor[0] for radius in (0.2, 0.38)
+        root_loading(gear(30, rounding=radius), 0.0).stress_factor[0]
+        for radius in (0.2, 0.38)
     )
     assert sharp > 1.03 * round_
     higher, lower = root_loading(gear(30), [0.0, 2e-3]).stress_factor
@@ -150,7 +173,9 @@ def test_the_product_is_that_of_both_factors_and_goes_on_below_the_section():
     distance = np.linspace(0.0, 5e-3, 400)
     loading = root_loading(gear(54), distance)
     np.testing.assert_allclose(
-        loading.stress_factor, loading.form_factor * loading.stress_correction_factor, rtol=1e-12
+        loading.stress_factor,
+        loading.form_factor * loading.stress_correction_factor,
+        rtol=1e-12,
     )
     deep = root_loading(gear(54), np.linspace(0.0, 22e-3, 400))
     assert deep.lever_arm[-1] < 0.0
@@ -166,7 +191,9 @@ def test_a_helical_gear_has_the_factors_of_its_virtual_gear():
         root_loading(gear(n), 0.0).stress_factor[0]
         for n in (math.floor(virtual.n_teeth), math.ceil(virtual.n_teeth))
     ]
-    assert virtual.n_teeth == pytest.approx(40 / math.cos(math.radians(20.0)) ** 3, rel=0.02)
+    assert virtual.n_teeth == pytest.approx(
+        40 / math.cos(math.radians(20.0)) ** 3, rel=0.02
+    )
     assert min(near) < root_loading(helical, 0.0).stress_factor[0] < max(near)
     assert virtual_gear(gear(40)).tip_radius == gear(40).tip_radius
 

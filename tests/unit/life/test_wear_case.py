@@ -44,7 +44,9 @@ def test_curvature_of_a_parabola_and_of_a_straight_wear(full):
     # a wave as long as the half width, to which its second difference over the half width alone is blind
     wave = 1e-6 * np.cos(2.0 * np.pi * (arc - arc[:, :1]) / 6e-4)
     felt = worn_curvature(full.path, wave, np.full(arc.shape[1], 6e-4))
-    assert np.all(np.abs(felt[:, 20:-20]).max(axis=1) > 0.1 * 1e-6 * (2.0 * np.pi / 6e-4) ** 2)
+    assert np.all(
+        np.abs(felt[:, 20:-20]).max(axis=1) > 0.1 * 1e-6 * (2.0 * np.pi / 6e-4) ** 2
+    )
 
 
 def test_hollow_flanks_press_no_less_than_nearly_flat_ones(full):
@@ -64,8 +66,12 @@ def test_radii_of_new_and_worn_flanks(full):
     assert_allclose(radii["by_eq_22"], radii["new"])
     life = wear_life(full)
     worn = flank_radii(full.path, life.depth[-1][:, 0], load, full.material)
-    assert_allclose(worn["by_eq_22"], radii["new"], rtol=3e-3)  # a shift of some um on radii of mm
-    assert np.abs(worn["worn"] / radii["new"] - 1.0).max() > 0.2  # what the profile itself does
+    assert_allclose(
+        worn["by_eq_22"], radii["new"], rtol=3e-3
+    )  # a shift of some um on radii of mm
+    assert (
+        np.abs(worn["worn"] / radii["new"] - 1.0).max() > 0.2
+    )  # what the profile itself does
 
 
 def test_a_limit_of_the_transmission_error_finds_the_threshold(full):
@@ -107,7 +113,11 @@ def test_laws_know_their_range_and_refuse_a_negative_life():
     assert logarithm.largest_error > 0.1
     with pytest.raises(SimulationError, match="gives a life of -"):
         logarithm.life(900.0, 12.0, allow_extrapolation=True)
-    for law, torque, speed in ((power, 500.0, 6.0), (power, 100.0, 2.0), (logarithm, 100.0, 3.0)):
+    for law, torque, speed in (
+        (power, 500.0, 6.0),
+        (power, 100.0, 2.0),
+        (logarithm, 100.0, 3.0),
+    ):
         with pytest.raises(ExtrapolationError, match="was fitted for a"):
             law.life(torque, speed)
     assert power.life(500.0, 6.0, allow_extrapolation=True) > 0.0
@@ -151,11 +161,15 @@ def test_what_is_worn_off_is_a_fault(words):
         curvature = case.path.curvature[side]
         mean = depth[side].mean(axis=0) / np.cos(case.pair.base_helix_angle)
         order = np.argsort(curvature)
-        inside = (curvature > curvature.min() + 4e-4) & (curvature < curvature.max() - 4e-4)
+        inside = (curvature > curvature.min() + 4e-4) & (
+            curvature < curvature.max() - 4e-4
+        )
         found = np.interp(curvature, tooth.profile.curvature_radius, loss)
         assert_allclose(found[inside], mean[inside], atol=0.05 * mean.max())
         assert (
-            loss[tooth.profile.curvature_radius < curvature[order][0] - 4e-4].max(initial=0.0)
+            loss[tooth.profile.curvature_radius < curvature[order][0] - 4e-4].max(
+                initial=0.0
+            )
             == 0.0
         )
 
@@ -168,7 +182,10 @@ def test_turns_until_the_same_teeth_meet(full):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["wear.rule=archard"], "wear.rule = 'archard'; allowed: band, fixed_intervals"),
+        (
+            ["wear.rule=archard"],
+            "wear.rule = 'archard'; allowed: band, fixed_intervals",
+        ),
         (["wear.criterion=both"], "allowed: first, sum"),
         (["wear.sharing=none"], "allowed: mesh, one_pair"),
         (["wear.geometry=old"], "allowed: worn, unworn"),
@@ -181,8 +198,14 @@ def test_turns_until_the_same_teeth_meet(full):
         (["wear.threshold_um=2000"], "is deeper than the tooth"),
         (["wear.coefficient=0"], "wear.coefficient = 0 must be positive"),
         (["wear.hardness_hbs=-1"], "wear.hardness_hbs = -1 must be positive"),
-        (["wear.pinion.hardness_hbs=0"], "wear.pinion.hardness_hbs = 0 must be positive"),
-        (["wear.wheel.coefficient=-1e-6"], "wear.wheel.coefficient = -1e-06 must be positive"),
+        (
+            ["wear.pinion.hardness_hbs=0"],
+            "wear.pinion.hardness_hbs = 0 must be positive",
+        ),
+        (
+            ["wear.wheel.coefficient=-1e-6"],
+            "wear.wheel.coefficient = -1e-06 must be positive",
+        ),
         (["wear.wheel.coefficient=hard"], "is not a number"),
         (["wear.step_um=0"], "wear.step_um = 0 must be positive"),
         (["wear.wheel=3"], "wear.wheel = 3 must be a group of keys"),
@@ -191,8 +214,14 @@ def test_turns_until_the_same_teeth_meet(full):
             ["wear.transmission_error_limit_um=9", "wear.geometry=unworn"],
             "needs wear.geometry=worn",
         ),
-        (["wear.transmission_error_limit_um=9", "wear.sharing=one_pair"], "wear.sharing=mesh"),
-        (["wear.transmission_error_limit_um=9", "gear=harbin_38_55"], "needs wear.sharing=mesh"),
+        (
+            ["wear.transmission_error_limit_um=9", "wear.sharing=one_pair"],
+            "wear.sharing=mesh",
+        ),
+        (
+            ["wear.transmission_error_limit_um=9", "gear=harbin_38_55"],
+            "needs wear.sharing=mesh",
+        ),
         (["operating.torque_nm=0"], "operating.torque_nm = 0 must be positive"),
         (["fault=crack"], "a life begins with sound flanks"),
     ],
@@ -215,9 +244,9 @@ def test_a_history_with_gaps_is_refused(full):
 
 
 def test_values_of_a_gear_override_those_of_both():
-    keys = compose("generate", ["wear.pinion.coefficient=1e-6", "wear.wheel.hardness_hbs=200"])[
-        "wear"
-    ]
+    keys = compose(
+        "generate", ["wear.pinion.coefficient=1e-6", "wear.wheel.hardness_hbs=200"]
+    )["wear"]
     options = read_wear_options(keys)
     assert options.wear_factor("pinion") == pytest.approx(1e-6 / (187 * 9.80665e6))
     assert options.wear_factor("wheel") == pytest.approx(6.25e-6 / (200 * 9.80665e6))

@@ -8,7 +8,12 @@ import pytest
 
 from gensig.errors import ConfigError
 from gensig.geometry.tooth_profile import tooth_profile
-from gensig.mesh.thermal.body_heat import face_surface, solved_body, tooth_surface, uniform_body
+from gensig.mesh.thermal.body_heat import (
+    face_surface,
+    solved_body,
+    tooth_surface,
+    uniform_body,
+)
 from gensig.options.compose import compose
 from gensig.systems.registry import read_heat, read_pair
 
@@ -34,7 +39,10 @@ def test_what_goes_in_comes_out(gear, heat, bore, convection):
     # the faces cool steeply near hot rims: integrate finely
     fine = np.linspace(body.radius[0], body.radius[-1], 20001)
     faces = (
-        4.0 * math.pi * convection * np.trapezoid(np.interp(fine, body.radius, rise) * fine, fine)
+        4.0
+        * math.pi
+        * convection
+        * np.trapezoid(np.interp(fine, body.radius, rise) * fine, fine)
     )
     teeth = cooled.tooth_convection * tooth_surface(gear) * rise[-1]
     tolerance = (
@@ -52,14 +60,18 @@ def test_the_disc_obeys_its_equation(gear, heat):
     body = solved_body(gear, 6000.0, heat, bore_temperature=70.0)
     step = body.radius[1] - body.radius[0]
     between = 0.5 * (body.radius[1:] + body.radius[:-1])
-    flow = np.diff(between * np.diff(body.temperature) / step) / step / body.radius[1:-1]
+    flow = (
+        np.diff(between * np.diff(body.temperature) / step) / step / body.radius[1:-1]
+    )
     cooling = 2.0 * heat.face_convection / (heat.conductivity * gear.face_width)
     lost = cooling * (body.temperature[1:-1] - heat.oil_temperature)
     np.testing.assert_allclose(flow, lost, rtol=1e-4, atol=1e-4 * lost.max())
 
 
 def test_without_convection_at_the_faces_it_is_the_paper_s_equation_4(gear, heat):
-    body = solved_body(gear, 6000.0, replace(heat, face_convection=0.0), bore_temperature=50.0)
+    body = solved_body(
+        gear, 6000.0, replace(heat, face_convection=0.0), bore_temperature=50.0
+    )
     radius, ends = body.radius, body.temperature[[0, -1]]
     expected = ends[0] + (ends[1] - ends[0]) * np.log(radius / radius[0]) / np.log(
         radius[-1] / radius[0]
@@ -83,8 +95,17 @@ def test_surfaces_are_of_the_right_size(gear):
     side = np.sum(np.hypot(np.diff(profile.abscissa), np.diff(profile.half_thickness)))
     lands = 2.0 * (gear.half_tooth_angle_at(gear.tip_radius) * gear.tip_radius)
     lands += 2.0 * (math.pi / gear.n_teeth - gear.root_half_angle) * gear.root_radius
-    outline = gear.n_teeth * (2.0 * side + lands) * gear.face_width / math.cos(gear.helix_angle)
-    area = 2.0 * np.trapezoid(2.0 * profile.half_thickness, profile.abscissa) * gear.n_teeth
+    outline = (
+        gear.n_teeth
+        * (2.0 * side + lands)
+        * gear.face_width
+        / math.cos(gear.helix_angle)
+    )
+    area = (
+        2.0
+        * np.trapezoid(2.0 * profile.half_thickness, profile.abscissa)
+        * gear.n_teeth
+    )
     assert tooth_surface(gear) == pytest.approx(outline + area, rel=0.04)
     assert face_surface(gear) + tooth_surface(gear) == pytest.approx(0.73, rel=0.2)
     wide = replace(gear, face_width=2.0 * gear.face_width)
@@ -100,7 +121,8 @@ def test_a_known_temperature_is_the_same_all_over(gear):
 def test_a_gear_that_nothing_cools_is_refused(gear, heat):
     closed = replace(heat, face_convection=0.0, tooth_convection=0.0)
     with pytest.raises(
-        ConfigError, match=r"^pinion: nothing cools it; give heat.face_convection_w_per_m2k"
+        ConfigError,
+        match=r"^pinion: nothing cools it; give heat.face_convection_w_per_m2k",
     ):
         solved_body(gear, 6000.0, closed, bore_temperature=None)
     held = solved_body(gear, 6000.0, closed, bore_temperature=60.0)

@@ -38,7 +38,9 @@ def test_terms_of_the_reference_pinion(xiamen, term):
             gear, load_angle(gear, CURVATURE), material, allow_extrapolation=False
         )
     else:
-        found = getattr(tooth_compliance(healthy_tooth(gear), CURVATURE, material), term)
+        found = getattr(
+            tooth_compliance(healthy_tooth(gear), CURVATURE, material), term
+        )
     assert_allclose(found, np.array(PINION[term]) * 1e-12, rtol=1e-3, atol=0.01e-12)
 
 
@@ -53,14 +55,20 @@ def test_running_sums_equal_direct_quadrature(xiamen):
     def integrand(x):
         half = np.interp(x, fine.abscissa, fine.half_thickness)
         moment = math.cos(angle) * (x_load - x) - math.sin(angle) * h_load
-        return moment**2 / (material.youngs_modulus * (2 * half) ** 3 * gear.face_width / 12)
+        return moment**2 / (
+            material.youngs_modulus * (2 * half) ** 3 * gear.face_width / 12
+        )
 
     knee = fine.abscissa[fine.n_root_cells]
     expected = sum(
-        quad(integrand, *ends, limit=200)[0] for ends in ((fine.abscissa[0], knee), (knee, x_load))
+        quad(integrand, *ends, limit=200)[0]
+        for ends in ((fine.abscissa[0], knee), (knee, x_load))
     )
     assert_allclose(
-        tooth_compliance(healthy_tooth(gear), rho, material).bending, expected, rtol=1e-4, atol=0
+        tooth_compliance(healthy_tooth(gear), rho, material).bending,
+        expected,
+        rtol=1e-4,
+        atol=0,
     )
 
 
@@ -71,7 +79,9 @@ def test_quadrature_is_converged(xiamen, term):
     coarse, fine = (
         getattr(
             tooth_compliance(
-                healthy_tooth(gear, tooth_profile(gear, n_root_cells=n, n_flank_cells=3 * n // 2)),
+                healthy_tooth(
+                    gear, tooth_profile(gear, n_root_cells=n, n_flank_cells=3 * n // 2)
+                ),
                 rho,
                 xiamen.material,
             ),
@@ -95,13 +105,18 @@ def test_compliance_scales_with_modulus_and_width(xiamen, factor):
         atol=0,
     )
     assert_allclose(
-        tooth_compliance(wide, CURVATURE, material).total, base / factor, rtol=1e-12, atol=0
+        tooth_compliance(wide, CURVATURE, material).total,
+        base / factor,
+        rtol=1e-12,
+        atol=0,
     )
 
 
 def test_contact_term(xiamen):
     # spur reference (docs/validation.md), section 2: 281.23e-12 m/N at 20 mm
-    found = linear_contact(np.zeros(2), xiamen.material).compliance(np.array([20e-3, 10e-3]), 1.0)
+    found = linear_contact(np.zeros(2), xiamen.material).compliance(
+        np.array([20e-3, 10e-3]), 1.0
+    )
     assert_allclose(found, [281.23e-12, 2 * 281.23e-12], rtol=2e-5, atol=0)
 
 
@@ -128,7 +143,8 @@ class TestRangeOfTheBodyFit:
     def test_refused_beyond_unless_allowed(self, gear_with, bore):
         gear = gear_with(bore_radius=bore)
         with pytest.raises(
-            ExtrapolationError, match=r"pinion: root radius over bore radius h_f .*bore_radius_mm"
+            ExtrapolationError,
+            match=r"pinion: root radius over bore radius h_f .*bore_radius_mm",
         ):
             body_coefficients(gear, allow_extrapolation=False)
         with pytest.warns(ExtrapolationWarning):

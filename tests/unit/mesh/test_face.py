@@ -38,7 +38,9 @@ class TestLowerEnvelope:
         rng = np.random.default_rng(seed)
         arc = np.sort(rng.uniform(0.0, 6e-3, 80))
         back = rng.uniform(
-            0.0, {"rough": 60, "smooth": 5, "steps": 0.1, "broken": 30}[name] * UM, (5, len(arc))
+            0.0,
+            {"rough": 60, "smooth": 5, "steps": 0.1, "broken": 30}[name] * UM,
+            (5, len(arc)),
         )
         if name == "smooth":
             back = np.cumsum(back - back.mean(axis=1, keepdims=True), axis=1)
@@ -64,7 +66,9 @@ class TestLowerEnvelope:
         with np.errstate(invalid="ignore"):
             height = back[:, :-1, None] + np.diff(back, axis=1)[..., None] * share
         height = np.where(
-            np.isfinite(back[:, :-1, None]) & np.isfinite(back[:, 1:, None]), height, np.inf
+            np.isfinite(back[:, :-1, None]) & np.isfinite(back[:, 1:, None]),
+            height,
+            np.inf,
         )
         flat, where = height.reshape(len(back), -1), place.ravel()
         return np.stack(
@@ -98,7 +102,9 @@ class TestLowerEnvelope:
 
     def test_nothing_left_touches_nowhere(self, flank):
         _, arc, center, radius = flank
-        assert np.isinf(self.compiled(np.full((1, len(arc)), np.inf), arc, center, radius)).all()
+        assert np.isinf(
+            self.compiled(np.full((1, len(arc)), np.inf), arc, center, radius)
+        ).all()
 
 
 class TestRigidFlanks:
@@ -109,10 +115,14 @@ class TestRigidFlanks:
             xiamen, one("pitting", tooth=0, pit_width_mm=20, pit_depth_mm=depth_mm)
         )
         assert_allclose(gap[on_path(table)].max(), 22 * UM, rtol=0, atol=2 * UM)
-        assert_allclose(table.position[gap.argmax()], xiamen.pair.pitch_point, rtol=0, atol=0.1e-3)
+        assert_allclose(
+            table.position[gap.argmax()], xiamen.pair.pitch_point, rtol=0, atol=0.1e-3
+        )
 
     def test_a_shallow_one_no_more_than_its_depth(self, xiamen):
-        gap, table = gap_rows(xiamen, one("pitting", tooth=0, pit_width_mm=20, pit_depth_mm=0.01))
+        gap, table = gap_rows(
+            xiamen, one("pitting", tooth=0, pit_width_mm=20, pit_depth_mm=0.01)
+        )
         assert_allclose(gap[on_path(table)].max(), 10 * UM, rtol=1e-9, atol=0)
 
     @pytest.mark.parametrize("height_mm", [0.2, 0.5, 1.0])
@@ -140,13 +150,19 @@ class TestRigidFlanks:
         tip = np.hypot(body.base_radius, tooth.tip_curvature_radius)
         addendum = (tip - body.pitch_radius) / body.normal_module - body.profile_shift
         clearance = body.clearance_coefficient + body.addendum_coefficient - addendum
-        short = replace(body, addendum_coefficient=addendum, clearance_coefficient=clearance)
+        short = replace(
+            body, addendum_coefficient=addendum, clearance_coefficient=clearance
+        )
         pair = replace(system.pair, **{gear: short})
         gap, table = gap_rows(system, fault)
         from_its_own_start = (
-            table.position + system.pair.start_curvature_radius - pair.start_curvature_radius
+            table.position
+            + system.pair.start_curvature_radius
+            - pair.start_curvature_radius
         )
-        return gap[on_path(table)], corner_gap_by_pinion(pair, from_its_own_start)[on_path(table)]
+        return gap[on_path(table)], corner_gap_by_pinion(pair, from_its_own_start)[
+            on_path(table)
+        ]
 
     @pytest.mark.parametrize("gear", GEARS)
     def test_a_tooth_without_deviation_has_no_gap(self, xiamen, gear):
@@ -162,7 +178,9 @@ class TestRigidFlanks:
         tooth = healthy_tooth(xiamen.pair.pinion).with_deviation(np.array([-7 * UM]))
         assert not is_nominal(tooth)
         at = tooth.profile.curvature_radius[-1] * np.linspace(0.5, 1.2, 50)
-        assert_allclose(slice_gaps(tooth, at, np.full(50, 5e-3)), -7 * UM, rtol=1e-12, atol=0)
+        assert_allclose(
+            slice_gaps(tooth, at, np.full(50, 5e-3)), -7 * UM, rtol=1e-12, atol=0
+        )
 
 
 def shared(law: ContactLaw, slice_gap, width, load, bending):
@@ -170,7 +188,15 @@ def shared(law: ContactLaw, slice_gap, width, load, bending):
     gap, compliance = np.empty_like(load), np.empty_like(load)
     unit = np.broadcast_to(bending, load.shape).copy()
     share_over_slices(
-        slice_gap, width, load, law.factor, law.constant, law.log_weight, unit, gap, compliance
+        slice_gap,
+        width,
+        load,
+        law.factor,
+        law.constant,
+        law.log_weight,
+        unit,
+        gap,
+        compliance,
     )
     return gap, compliance
 
@@ -210,7 +236,10 @@ def approach_by_root_finding(law, bending, node, slice_gap, width, load):
             return pressed / (law.factor * law.constant[node] + bending)
 
         def excess(log_q):
-            return np.exp(log_q) * (law.factor * (law.constant[node] - log_q) + bending) - pressed
+            return (
+                np.exp(log_q) * (law.factor * (law.constant[node] - log_q) + bending)
+                - pressed
+            )
 
         # beyond it the law would give way under less load
         highest = law.constant[node] + bending / law.factor - 1.0
@@ -224,7 +253,11 @@ def approach_by_root_finding(law, bending, node, slice_gap, width, load):
 
     def missing(approach):
         return (
-            sum(w * line_load(approach - g) for w, g in zip(width, slice_gap, strict=True)) - load
+            sum(
+                w * line_load(approach - g)
+                for w, g in zip(width, slice_gap, strict=True)
+            )
+            - load
         )
 
     return brentq(missing, first, first + 300 * UM, xtol=1e-18, rtol=1e-12)
@@ -237,13 +270,17 @@ class TestShareOverSlices:
         for even in (0.0, 3 * UM, -4 * UM):
             gap, compliance = shared(law, np.full((12, 10), even), width, load, bending)
             assert_allclose(gap, even, rtol=0, atol=0)
-            assert_allclose(compliance, law.compliance(width.sum(), load), rtol=1e-9, atol=0)
+            assert_allclose(
+                compliance, law.compliance(width.sum(), load), rtol=1e-9, atol=0
+            )
 
     def test_half_a_face_is_the_law_of_half_the_width(self, law, bending):
         width, load = np.full(8, 2.5e-3), np.full(10, 925.0)
         expected = law.compliance(10e-3, load) + bending * (1 / 10e-3 - 1 / 20e-3)
         for lost in (np.inf, 1e-3):
-            slice_gap = np.where(np.arange(8)[:, None] % 2 == 0, np.full((8, 10), UM), lost)
+            slice_gap = np.where(
+                np.arange(8)[:, None] % 2 == 0, np.full((8, 10), UM), lost
+            )
             gap, compliance = shared(law, slice_gap, width, load, bending)
             assert_allclose(gap, UM, rtol=0, atol=0)
             assert_allclose(compliance, expected, rtol=1e-9, atol=0)
@@ -258,12 +295,18 @@ class TestShareOverSlices:
             approach_by_root_finding(law, bending, k, slice_gap[:, k], width, load[k])
             for k in range(10)
         ]
-        assert_allclose(approach, expected, rtol=1e-9 if law.log_weight == 0 else 1e-6, atol=0)
-        touching = np.isfinite(slice_gap).sum(axis=0) - (slice_gap < approach).sum(axis=0)
+        assert_allclose(
+            approach, expected, rtol=1e-9 if law.log_weight == 0 else 1e-6, atol=0
+        )
+        touching = np.isfinite(slice_gap).sum(axis=0) - (slice_gap < approach).sum(
+            axis=0
+        )
         assert touching.min() == 0
         assert touching.max() >= 3
 
-    def test_a_larger_gap_anywhere_never_lowers_the_approach(self, law, bending, random_face):
+    def test_a_larger_gap_anywhere_never_lowers_the_approach(
+        self, law, bending, random_face
+    ):
         slice_gap, width, load = random_face
         rng = np.random.default_rng(2)
         for _ in range(200):
@@ -272,10 +315,13 @@ class TestShareOverSlices:
             )
             before, after = (
                 gap + (c + bending / width.sum()) * load
-                for gap, c in (shared(law, g, width, load, bending) for g in (slice_gap, more))
+                for gap, c in (
+                    shared(law, g, width, load, bending) for g in (slice_gap, more)
+                )
             )
             assert np.all(
-                after >= before - (1e-9 if law.log_weight == 0 else 1e-8) * np.abs(before)
+                after
+                >= before - (1e-9 if law.log_weight == 0 else 1e-8) * np.abs(before)
             )
             slice_gap = more
 

@@ -26,7 +26,8 @@ SPEED = 125.0
 def duty():
     return read_duty(
         compose(
-            "generate", ["system=helical_pair", "gear=chongqing_40_162", "heat=chongqing_rated"]
+            "generate",
+            ["system=helical_pair", "gear=chongqing_40_162", "heat=chongqing_rated"],
         )
     )
 
@@ -51,8 +52,16 @@ def test_friction_heat_is_friction_times_load_times_sliding(duty):
         pair, position, np.ones_like(position), force=force, friction=0.04, speed=SPEED
     )
     before, after = pair.pitch_point, pair.path_of_contact - pair.pitch_point
-    mean = 0.5 * (before**2 + after**2) / (before + after) * SPEED * (1.0 + 1.0 / pair.ratio)
-    assert found == pytest.approx(0.04 * force / math.cos(pair.base_helix_angle) * mean, rel=1e-6)
+    mean = (
+        0.5
+        * (before**2 + after**2)
+        / (before + after)
+        * SPEED
+        * (1.0 + 1.0 / pair.ratio)
+    )
+    assert found == pytest.approx(
+        0.04 * force / math.cos(pair.base_helix_angle) * mean, rel=1e-6
+    )
 
 
 def test_sliding_vanishes_at_the_pitch_point_alone(duty):
@@ -69,9 +78,13 @@ def test_flash_scales_as_blok_says(duty):
     """Friction, load^(3/4), root of speed; the reference's 28 and 64 K over 39 to 48 for 12 and 36 kN m are that."""
     position = np.linspace(0.0, duty.system.pair.path_of_contact, 9)
     one = flash(duty, position, 3e5)
-    np.testing.assert_allclose(flash(duty, position, 3e5, friction=0.1), 2.0 * one, rtol=1e-12)
+    np.testing.assert_allclose(
+        flash(duty, position, 3e5, friction=0.1), 2.0 * one, rtol=1e-12
+    )
     np.testing.assert_allclose(flash(duty, position, 6e5), 2.0**0.75 * one, rtol=1e-12)
-    np.testing.assert_allclose(flash(duty, position, 3e5, speed=4 * SPEED), 2.0 * one, rtol=1e-12)
+    np.testing.assert_allclose(
+        flash(duty, position, 3e5, speed=4 * SPEED), 2.0 * one, rtol=1e-12
+    )
     assert flash(duty, position, np.zeros(9)).max() == 0.0
 
 
@@ -85,7 +98,9 @@ def test_half_width_is_the_one_of_the_pressure(duty):
     system = duty.system
     contact = loaded_contact(system.sliced_mesh(), system.phases(4), system.mesh_force)
     pressure = contact_pressure(system.sliced_mesh(), contact, system.material)
-    half = contact_half_width(system.pair, contact.position, contact.line_load, system.material)
+    half = contact_half_width(
+        system.pair, contact.position, contact.line_load, system.material
+    )
     bearing = contact.line_load > 0.0
     assert bearing.any()
     expected = 2.0 * contact.line_load[bearing] / (math.pi * half[bearing])
@@ -95,9 +110,9 @@ def test_half_width_is_the_one_of_the_pressure(duty):
 def test_modulus_falls_by_three_per_cent_in_a_hundred_kelvin(duty):
     assert duty.heat.modulus_ratio(20.0) == pytest.approx(1.0, abs=1e-15)
     assert 0.960 < duty.heat.modulus_ratio(120.0) < 0.975
-    assert replace(duty.heat, reference_temperature=100.0).modulus_ratio(100.0) == pytest.approx(
-        1.0, abs=1e-15
-    )
+    assert replace(duty.heat, reference_temperature=100.0).modulus_ratio(
+        100.0
+    ) == pytest.approx(1.0, abs=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -108,7 +123,11 @@ def test_modulus_falls_by_three_per_cent_in_a_hundred_kelvin(duty):
             ExtrapolationError,
             "heat.oil_temperature_degc = 400 lies beyond the mate",
         ),
-        (["heat.pinion_temperature_degc=-80"], ExtrapolationError, "-75 to 300 degrees Celsius"),
+        (
+            ["heat.pinion_temperature_degc=-80"],
+            ExtrapolationError,
+            "-75 to 300 degrees Celsius",
+        ),
         (
             ["heat.face_convection_w_per_m2k=-1"],
             ConfigError,
@@ -124,13 +143,21 @@ def test_modulus_falls_by_three_per_cent_in_a_hundred_kelvin(duty):
             ConfigError,
             "heat.pinion_heat_share = 1.2 must lie in 0..1",
         ),
-        (["heat.expansion_per_k=1"], ConfigError, "heat.expansion_per_k = 1 must lie in 0..0.0001"),
+        (
+            ["heat.expansion_per_k=1"],
+            ConfigError,
+            "heat.expansion_per_k = 1 must lie in 0..0.0001",
+        ),
         (
             ["heat.conductivity_w_per_mk=0"],
             ConfigError,
             "heat.conductivity_w_per_mk = 0 must lie in 1..500",
         ),
-        (["heat.modulus_gpa=[200,190]"], ConfigError, "has 7 and heat.modulus_gpa 2 values"),
+        (
+            ["heat.modulus_gpa=[200,190]"],
+            ConfigError,
+            "has 7 and heat.modulus_gpa 2 values",
+        ),
         (
             ["heat.modulus_temperature_degc=[20,10]", "heat.modulus_gpa=[1,2]"],
             ConfigError,

@@ -28,8 +28,12 @@ def shifted(pair: GearPair, pinion: float, wheel: float) -> GearPair:
 
 
 def test_flexibility_and_theoretical_stiffness(pair):
-    assert_allclose(iso6336.flexibility(pair) * N_PER_MM_UM, 0.057062, rtol=1e-5, atol=0)
-    assert_allclose(1 / iso6336.flexibility(pair) / N_PER_MM_UM, 17.525, rtol=3e-5, atol=0)
+    assert_allclose(
+        iso6336.flexibility(pair) * N_PER_MM_UM, 0.057062, rtol=1e-5, atol=0
+    )
+    assert_allclose(
+        1 / iso6336.flexibility(pair) / N_PER_MM_UM, 17.525, rtol=3e-5, atol=0
+    )
     assert_allclose(iso6336.basic_rack_factor(pair.pinion), 0.975, rtol=1e-12, atol=0)
 
 
@@ -50,7 +54,9 @@ def test_values_of_the_reference(pair, function, line_load, per_width, at_20_mm)
 
 
 def test_without_the_correction_factor(pair):
-    theoretical = iso6336.mesh_stiffness(pair, correction_factor=1.0) * pair.pinion.face_width
+    theoretical = (
+        iso6336.mesh_stiffness(pair, correction_factor=1.0) * pair.pinion.face_width
+    )
     assert_allclose(theoretical, 5.24e8, rtol=5e-4, atol=0)
 
 
@@ -74,7 +80,9 @@ def test_profile_shift_follows_the_series(pair):
 
 
 def test_basic_rack_factor_is_the_mean_of_both_gears(pair):
-    flat = replace(pair.wheel, clearance_coefficient=0.2, cutter_tip_radius_coefficient=0.3)
+    flat = replace(
+        pair.wheel, clearance_coefficient=0.2, cutter_tip_radius_coefficient=0.3
+    )
     mixed = GearPair(pinion=pair.pinion, wheel=flat, backlash=0.0)
     ratio = iso6336.single_stiffness(mixed) / iso6336.single_stiffness(pair)
     assert_allclose(ratio, 0.5 * (0.975 + 1.0) / 0.975, rtol=1e-12, atol=0)
@@ -82,7 +90,9 @@ def test_basic_rack_factor_is_the_mean_of_both_gears(pair):
 
 def test_a_larger_pressure_angle_stiffens_by_2_percent_a_degree(pair):
     steep = replace(
-        pair.pinion, pressure_angle=math.radians(25.0), cutter_tip_radius_coefficient=0.3
+        pair.pinion,
+        pressure_angle=math.radians(25.0),
+        cutter_tip_radius_coefficient=0.3,
     )
     assert_allclose(iso6336.basic_rack_factor(steep), 0.975 * 1.1, rtol=1e-12, atol=0)
 
@@ -104,7 +114,9 @@ def test_shifts_outside_the_series_are_refused(pair, pinion, wheel):
 
 
 def test_small_contact_ratio_is_refused(pair):
-    short = [replace(gear, addendum_coefficient=0.6) for gear in (pair.pinion, pair.wheel)]
+    short = [
+        replace(gear, addendum_coefficient=0.6) for gear in (pair.pinion, pair.wheel)
+    ]
     few = GearPair(pinion=short[0], wheel=short[1], backlash=0.0)
     assert few.transverse_contact_ratio < 1.2
     with pytest.raises(ExtrapolationError, match="contact ratio"):
@@ -113,7 +125,9 @@ def test_small_contact_ratio_is_refused(pair):
     assert iso6336.mesh_stiffness(few, allow_extrapolation=True) > 0.0
 
 
-@pytest.mark.parametrize("argument", ["line_load", "correction_factor", "youngs_modulus"])
+@pytest.mark.parametrize(
+    "argument", ["line_load", "correction_factor", "youngs_modulus"]
+)
 def test_what_is_not_positive_is_refused(pair, argument):
     with pytest.raises(ConfigError, match=argument):
         iso6336.single_stiffness(pair, **{argument: 0.0})

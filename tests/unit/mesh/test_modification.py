@@ -31,7 +31,9 @@ def at(pair, modification, n_slices=5):
 
 
 @pytest.mark.parametrize("shape", ["linear", "parabolic"])
-def test_reliefs_have_their_depth_at_the_ends_and_run_out_over_their_height(pair, shape):
+def test_reliefs_have_their_depth_at_the_ends_and_run_out_over_their_height(
+    pair, shape
+):
     side = FlankModification(
         tip_relief=8 * MICRO, tip_relief_height=0.5 * MILLI, root_relief=3 * MICRO, root_relief_height=0.4 * MILLI,
         profile_shape=shape,
@@ -43,12 +45,16 @@ def test_reliefs_have_their_depth_at_the_ends_and_run_out_over_their_height(pair
     )
     np.testing.assert_allclose(deviation[:, position <= 0.0], 3 * MICRO, rtol=1e-12)
     radius = np.hypot(pair.pinion.base_radius, pair.pinion_curvature(position))
-    begin = radius > pair.pinion.tip_radius - 0.25 * MILLI  # the upper half of the relief
+    begin = (
+        radius > pair.pinion.tip_radius - 0.25 * MILLI
+    )  # the upper half of the relief
     inside = begin & (position < pair.path_of_contact)
     least = {"linear": 4, "parabolic": 2}[shape]
     assert deviation[0, inside].min() == pytest.approx(least * MICRO, rel=0.15)
     lowest = math.hypot(pair.pinion.base_radius, pair.pinion_curvature(0.0))
-    between = (radius < pair.pinion.tip_radius - 0.5 * MILLI) & (radius > lowest + 0.4 * MILLI)
+    between = (radius < pair.pinion.tip_radius - 0.5 * MILLI) & (
+        radius > lowest + 0.4 * MILLI
+    )
     assert between.any()
     assert (deviation[:, between] == 0.0).all()
 
@@ -66,17 +72,26 @@ def test_crowning_slope_and_end_relief_across_the_face(pair):
     crowned = FlankModification(crowning=4 * MICRO).lead(place, width)
     np.testing.assert_allclose(crowned, np.array([4, 1, 0, 1, 4]) * MICRO, atol=1e-18)
     sloped = FlankModification(helix_slope=-4 * MICRO).lead(place, width)
-    np.testing.assert_allclose(sloped, np.array([0, -1, -2, -3, -4]) * MICRO, atol=1e-18)
-    ended = FlankModification(end_relief=6 * MICRO, end_relief_width=0.5 * width).lead(place, width)
+    np.testing.assert_allclose(
+        sloped, np.array([0, -1, -2, -3, -4]) * MICRO, atol=1e-18
+    )
+    ended = FlankModification(end_relief=6 * MICRO, end_relief_width=0.5 * width).lead(
+        place, width
+    )
     np.testing.assert_allclose(ended, np.array([6, 3, 0, 3, 6]) * MICRO, atol=1e-18)
 
 
 def test_two_slopes_of_opposite_sign_leave_an_aligned_pair(pair):
     """A slope on one gear is taken back by the other's; nothing ever stands proud."""
-    one, other = FlankModification(helix_slope=5 * MICRO), FlankModification(helix_slope=-5 * MICRO)
+    one, other = (
+        FlankModification(helix_slope=5 * MICRO),
+        FlankModification(helix_slope=-5 * MICRO),
+    )
     assert np.abs(at(pair, of_pair(pinion=one, wheel=other))[2]).max() < 1e-18
     assert at(pair, of_pair(pinion=other))[2].min() == 0.0
-    askew = PairModification(pinion=FlankModification(), wheel=other, misalignment=5 * MICRO)
+    askew = PairModification(
+        pinion=FlankModification(), wheel=other, misalignment=5 * MICRO
+    )
     assert np.abs(at(pair, askew)[2]).max() < 1e-18
 
 
@@ -120,8 +135,14 @@ def test_reliefs_that_overlap_are_refused(pair):
         root_relief_height=2 * MILLI,
     )
     with pytest.raises(
-        ConfigError, match=r"tip_relief_height_mm = 2 and root_relief_height_mm = 2 overlap"
+        ConfigError,
+        match=r"tip_relief_height_mm = 2 and root_relief_height_mm = 2 overlap",
     ):
         at(pair, of_pair(pinion=tall))
     with pytest.raises(ConfigError, match="at both ends overlaps on a face of 14 mm"):
-        at(pair, of_pair(wheel=FlankModification(end_relief=MICRO, end_relief_width=8 * MILLI)))
+        at(
+            pair,
+            of_pair(
+                wheel=FlankModification(end_relief=MICRO, end_relief_width=8 * MILLI)
+            ),
+        )

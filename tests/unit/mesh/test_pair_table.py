@@ -15,7 +15,12 @@ from gensig.geometry.tooth import healthy_tooth
 from gensig.mesh import pair_table as module
 from gensig.mesh.fillet_foundation import ExtrapolationWarning
 from gensig.mesh.local_contact import contact_law
-from gensig.mesh.pair_table import flank_sides, pair_compliance, pair_table, slice_bending
+from gensig.mesh.pair_table import (
+    flank_sides,
+    pair_compliance,
+    pair_table,
+    slice_bending,
+)
 
 # single pairs of the reference pair at A, B, C, D, E, 1e8 N/m (spur reference (docs/validation.md), table 2.2)
 RC_MM = np.array([2.45827, 6.66082, 7.86646, 8.36253, 12.56508])
@@ -25,7 +30,10 @@ SINGLE_PAIR = np.array([1.5692, 2.0650, 2.0929, 2.0864, 1.5779])
 def test_single_pair_stiffness_of_the_reference_pair(paper_machine):
     position = RC_MM * 1e-3 - paper_machine.pair.start_curvature_radius
     assert_allclose(
-        1e-8 / pair_compliance(paper_machine.mesh_table(), position), SINGLE_PAIR, rtol=1e-3, atol=0
+        1e-8 / pair_compliance(paper_machine.mesh_table(), position),
+        SINGLE_PAIR,
+        rtol=1e-3,
+        atol=0,
     )
 
 
@@ -35,7 +43,10 @@ def test_sound_teeth_have_the_corner_gap_and_nothing_else(xiamen):
     near = expected < 1e-4
     # the parabolas of the table cut that much off where the gap begins
     assert_allclose(
-        (table.pinion.gap[0] + table.wheel.gap[0])[near], expected[near], rtol=0, atol=5e-9
+        (table.pinion.gap[0] + table.wheel.gap[0])[near],
+        expected[near],
+        rtol=0,
+        atol=5e-9,
     )
     assert table.pinion.kind.tolist() == [0] * 23
     assert table.wheel.kind.tolist() == [0] * 84
@@ -46,14 +57,21 @@ def test_slopes_are_those_of_the_tables(xiamen):
     table = xiamen.mesh_table((one("pitting", tooth=0),))
     step = np.diff(table.position)
     for key in ("compliance", "gap"):
-        values, slopes = getattr(table.pinion, key), getattr(table.pinion, f"{key}_slope")
+        values, slopes = (
+            getattr(table.pinion, key),
+            getattr(table.pinion, f"{key}_slope"),
+        )
         for value, slope in zip(values, slopes, strict=True):
             climbed = np.cumsum(0.5 * (slope[1:] + slope[:-1]) * step)
-            assert_allclose(climbed, value[1:] - value[0], rtol=0, atol=1e-12 * np.ptp(value))
+            assert_allclose(
+                climbed, value[1:] - value[0], rtol=0, atol=1e-12 * np.ptp(value)
+            )
 
 
 def test_only_the_faulty_tooth_has_its_own_row(xiamen):
-    fault = Crack(gear="wheel", tooth=7, crack_depth=1e-3, crack_angle=0.8, crack_start="arc_mid")
+    fault = Crack(
+        gear="wheel", tooth=7, crack_depth=1e-3, crack_angle=0.8, crack_start="arc_mid"
+    )
     table = xiamen.mesh_table((fault,))
     assert np.flatnonzero(table.wheel.kind).tolist() == [7]
     assert not table.pinion.kind.any()
@@ -68,13 +86,20 @@ class TestFlankSides:
         """Contact compliance of the pair at places on the path, (phase,) m/N, with a fault on either gear."""
         at = np.linspace(0.0, system.pair.path_of_contact, 9)
         sides = flank_sides(
-            system.pair, at, system.material, system.mesh, system.mesh_force, pinion_share=share
+            system.pair,
+            at,
+            system.material,
+            system.mesh,
+            system.mesh_force,
+            pinion_share=share,
         )
         bending = slice_bending(system.pair, at, system.material, system.mesh)
         total = 0.0
         for name, side in sides.items():
             own = [faults[name]] if name in faults else []
-            tooth = faulty_teeth(system.pair, own).get((name, 0), healthy_tooth(side.gear))
+            tooth = faulty_teeth(system.pair, own).get(
+                (name, 0), healthy_tooth(side.gear)
+            )
             total = total + side.contact(tooth, bending, system.mesh)[1]
         return total, contact_law(system.pair, at, system.material, system.mesh)
 
@@ -83,7 +108,9 @@ class TestFlankSides:
     def test_sound_flanks_make_the_law(self, machine, contact, share):
         system = machine({"mesh.contact": contact})
         total, law = self.contact(system, share)
-        assert_allclose(total, law.compliance(20e-3, system.mesh_force), rtol=1e-12, atol=0)
+        assert_allclose(
+            total, law.compliance(20e-3, system.mesh_force), rtol=1e-12, atol=0
+        )
 
     @pytest.mark.parametrize("gear", GEARS)
     @pytest.mark.parametrize("bending", ["whole", "by_slice"])
@@ -91,7 +118,11 @@ class TestFlankSides:
         system = machine({"mesh.bending": bending})
         fault = {
             gear: one(
-                "chipped", gear=gear, chip_width_mm=10, chip_shape="rectangular", chip_height_mm=3
+                "chipped",
+                gear=gear,
+                chip_width_mm=10,
+                chip_shape="rectangular",
+                chip_height_mm=3,
             )
         }
         totals = [self.contact(system, share, **fault)[0] for share in (0.0, 0.5, 1.0)]
@@ -115,11 +146,17 @@ class TestFlankSides:
         at = xiamen.pair.path_of_contact * np.array([-0.2, 0.5, 1.2])
         sides = flank_sides(xiamen.pair, at, xiamen.material, xiamen.mesh, 900.0)
         for name, low, high in (("pinion", 0, 2), ("wheel", 2, 0)):
-            side, tip = sides[name], healthy_tooth(sides[name].gear).profile.curvature_radius[-1]
+            side, tip = (
+                sides[name],
+                healthy_tooth(sides[name].gear).profile.curvature_radius[-1],
+            )
             assert side.curvature.max() == pytest.approx(tip, rel=1e-9)
             assert side.flank_curvature[high] > tip * 1.05
             assert_allclose(
-                side.flank_curvature[[low, 1]], side.curvature[[low, 1]], rtol=1e-12, atol=0
+                side.flank_curvature[[low, 1]],
+                side.curvature[[low, 1]],
+                rtol=1e-12,
+                atol=0,
             )
 
 
@@ -128,7 +165,9 @@ class TestRows:
         """Flanks that only stand elsewhere bend as the sound one does, and teeth that are one object are one row."""
         computed, original = [], module.structural_compliance
         monkeypatch.setattr(
-            module, "structural_compliance", lambda *own: computed.append(1) or original(*own)
+            module,
+            "structural_compliance",
+            lambda *own: computed.append(1) or original(*own),
         )
         for faults, n_rows, n_structures in (
             ((one("runout", gear="wheel"),), 85, 0),
@@ -151,7 +190,10 @@ class TestRows:
             table = pair_table(
                 xiamen.pair, xiamen.material, xiamen.mesh, teeth, load=xiamen.mesh_force
             )
-            assert (len(table.wheel.compliance), len(computed)) == (n_rows, n_structures)
+            assert (len(table.wheel.compliance), len(computed)) == (
+                n_rows,
+                n_structures,
+            )
             assert len(table.wheel.present) == n_rows
 
     @pytest.mark.parametrize("gear", GEARS)
@@ -163,11 +205,17 @@ class TestRows:
             xiamen.mesh_table((fault,)),
             xiamen.stiffness_curves((fault,), points_per_tooth=1),
         )
-        side, at = side_of(table, gear), curves.contact_position * xiamen.pair.base_pitch
+        side, at = (
+            side_of(table, gear),
+            curves.contact_position * xiamen.pair.base_pitch,
+        )
         expected = np.interp(at, table.position, side.gap[side.kind[0]] - side.gap[0])
         # straight between nodes, whose parabolas round steps off, against the value itself
         assert_allclose(
-            curves.faulty_pair_gap, expected, rtol=0, atol=2e-9 + 3e-3 * np.abs(expected).max()
+            curves.faulty_pair_gap,
+            expected,
+            rtol=0,
+            atol=2e-9 + 3e-3 * np.abs(expected).max(),
         )
         assert np.all(np.isfinite(side.compliance))
         assert side.compliance.min() > 0
@@ -198,8 +246,16 @@ def test_shared_compliance_only_when_coupled(xiamen, paper_machine):
         ("bending", "x", "mesh.bending = 'x'; allowed: by_slice, whole"),
         ("roll_torque", "", "mesh.roll_torque = ''; allowed: consistent, classical"),
         ("damping_ratio", -0.1, "mesh.damping_ratio = -0.1 must lie in 0..1"),
-        ("friction_coefficient", 0.9, "mesh.friction_coefficient = 0.9 must lie in 0..0.5"),
-        ("friction_transition", 0.0, "mesh.friction_transition = 0 must lie in 0.001..0.5"),
+        (
+            "friction_coefficient",
+            0.9,
+            "mesh.friction_coefficient = 0.9 must lie in 0..0.5",
+        ),
+        (
+            "friction_transition",
+            0.0,
+            "mesh.friction_transition = 0 must lie in 0.001..0.5",
+        ),
         ("points_per_pitch", 3, "mesh.points_per_pitch = 3 must lie in 32..8192"),
     ],
 )

@@ -29,9 +29,16 @@ def approach_of(*words, n_periods=9, meeting=None):
     """Pair, its faulty teeth, rolls, and approach in slices over mesh periods from the third before the fault on."""
     system, faults = case(*words)
     teeth = faulty_teeth(system.pair, faults)
-    mesh = sliced_mesh(system.pair, system.material, system.mesh, system.slices, teeth=teeth)
+    mesh = sliced_mesh(
+        system.pair, system.material, system.mesh, system.slices, teeth=teeth
+    )
     roll = system.phases(32, first_period=-3, n_periods=n_periods)
-    return system, teeth, roll, loaded_contact(mesh, roll, system.mesh_force, meeting).approach
+    return (
+        system,
+        teeth,
+        roll,
+        loaded_contact(mesh, roll, system.mesh_force, meeting).approach,
+    )
 
 
 @pytest.mark.parametrize(
@@ -89,8 +96,12 @@ def test_errors_of_single_teeth_are_those_of_the_spur_pair():
         "wheel_tilt": rng.uniform(-3e-4, 3e-4, 84),
     }
     _, _, roll, approach = approach_of(*SPUR, n_periods=30, meeting=Meeting(**meeting))
-    table = loaded_pair_table(system.pair, system.material, system.mesh, force=system.mesh_force)
-    exact = static_mesh(table, pair_states(table, roll, **meeting), system.mesh_force).approach
+    table = loaded_pair_table(
+        system.pair, system.material, system.mesh, force=system.mesh_force
+    )
+    exact = static_mesh(
+        table, pair_states(table, roll, **meeting), system.mesh_force
+    ).approach
     np.testing.assert_allclose(approach, exact, rtol=1e-3)
     assert np.ptp(exact) > 5e-6
 
@@ -109,7 +120,10 @@ def test_misalignment_is_the_spur_pair_s_while_the_whole_face_bears(misalignment
     )
     exact = static_mesh(table, pair_states(table, roll), system.mesh_force).approach
     np.testing.assert_allclose(approach, exact, rtol=0.01)
-    assert approach.mean() > approach_of(*words[:2], n_periods=1)[3].mean() + 0.4e-6 * misalignment
+    assert (
+        approach.mean()
+        > approach_of(*words[:2], n_periods=1)[3].mean() + 0.4e-6 * misalignment
+    )
 
 
 def test_misalignment_of_teeth_is_that_of_the_shafts():
@@ -186,7 +200,9 @@ def test_a_small_fault_is_nearly_none():
 
 def test_a_crack_is_felt_where_it_is():
     """The cracked half of the face takes less of its pair's load than the same half of a sound pair."""
-    system, faults = case("fault=crack", "fault.crack_depth_mm=1.5", "fault.crack_width_mm=7.5")
+    system, faults = case(
+        "fault=crack", "fault.crack_depth_mm=1.5", "fault.crack_width_mm=7.5"
+    )
     cracked, sound = system.transmission_error(faults), system.transmission_error()
     first_half = sound.slice_place < 6.5e-3
     tile = np.tile(sound.contact.line_load, (cracked.n_periods, 1, 1))
@@ -198,7 +214,10 @@ def test_a_crack_is_felt_where_it_is():
 
 def test_flank_that_is_gone_bears_nothing():
     system, faults = case(
-        "fault=pitting", "fault.pit_length_mm=0.8", "fault.pit_width_mm=5", "fault.pit_depth_mm=0.3"
+        "fault=pitting",
+        "fault.pit_length_mm=0.8",
+        "fault.pit_width_mm=5",
+        "fault.pit_depth_mm=0.3",
     )
     result = system.transmission_error(faults)
     contact, place = result.contact, result.slice_place
@@ -234,7 +253,9 @@ def test_slices_converge_with_a_fault():
     """In slices, and in points of the profile table."""
 
     def added_most(*words):
-        more = added_with("fault=crack", "fault.crack_depth_mm=1", "fault.crack_width_mm=5", *words)
+        more = added_with(
+            "fault=crack", "fault.crack_depth_mm=1", "fault.crack_width_mm=5", *words
+        )
         return more.max()
 
     def added_with(*words):
@@ -246,12 +267,16 @@ def test_slices_converge_with_a_fault():
     assert errors[1] < 0.5 * errors[0] + 1e-3 * finest
     assert errors[1] < 0.02 * finest
     pit = ("fault=pitting", "fault.pit_length_mm=0.6", "fault.pit_width_mm=5")
-    points = [added_with(*pit, f"mesh.points_per_pitch={n}").max() for n in (128, 512, 2048)]
+    points = [
+        added_with(*pit, f"mesh.points_per_pitch={n}").max() for n in (128, 512, 2048)
+    ]
     assert abs(points[1] - points[2]) < 0.01 * points[2]
 
 
 def test_slices_end_where_a_fault_does():
-    system, faults = case("fault=pitting", "fault.pit_length_mm=0.6", "fault.pit_width_mm=5")
+    system, faults = case(
+        "fault=pitting", "fault.pit_length_mm=0.6", "fault.pit_width_mm=5"
+    )
     edges = merged_edges(system.pair, 40, faulty_teeth(system.pair, faults).values())
     assert len(edges) == 43
     # the pinion is 15 mm wide, the wheel 14: the pit lies in the middle of both
@@ -270,6 +295,8 @@ def test_independent_slices_refuse_a_fault_over_part_of_the_face():
     with pytest.raises(ConfigError, match=r"mesh\.independent_faulty_slices=true"):
         approach_of(*words)
     approach_of(*words, "mesh.independent_faulty_slices=true")
-    approach_of("mesh.slice_coupling=independent", "fault=crack", "fault.crack_depth_mm=1")
+    approach_of(
+        "mesh.slice_coupling=independent", "fault=crack", "fault.crack_depth_mm=1"
+    )
     with pytest.raises(ConfigError, match="over part of the face"):
         approach_of("mesh.slice_coupling=independent", "fault=chipped")

@@ -11,7 +11,12 @@ from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static
 from gensig.mesh.pair_table import node_positions
 from gensig.mesh.sliced._slice_kernels import bite_forces
 from gensig.mesh.sliced.sliced_table import DEEPEST, N_CHORDS, sliced_table
-from gensig.mesh.sliced.slices import Meeting, loaded_contact, single_pair_stiffness, slice_places
+from gensig.mesh.sliced.slices import (
+    Meeting,
+    loaded_contact,
+    single_pair_stiffness,
+    slice_places,
+)
 from gensig.plan.request import read_request
 from gensig.systems.registry import read_sliced_pair
 
@@ -21,7 +26,10 @@ def table_of(*words, teeth=None):
     system = read_sliced_pair(read_request(["system=helical_pair", *words]).config)
     deviation = None
     if system.modification.is_any:
-        places = node_positions(system.pair, system.mesh), slice_places(system.pair, system.slices)
+        places = (
+            node_positions(system.pair, system.mesh),
+            slice_places(system.pair, system.slices),
+        )
         deviation = system.modification.deviation(system.pair, *places)
     table = sliced_table(
         system.pair,
@@ -53,7 +61,9 @@ def at_rest(table, roll, force, errors=None):
 
     def read(values):
         low, high = (
-            values[kinds[0][..., None], kinds[1][..., None], chords, (cell + k)[..., None]]
+            values[
+                kinds[0][..., None], kinds[1][..., None], chords, (cell + k)[..., None]
+            ]
             for k in (0, 1)
         )
         return (1.0 - part) * low + part * high
@@ -85,7 +95,11 @@ def at_rest(table, roll, force, errors=None):
     [
         (),
         ("gear=chongqing_40_162",),
-        ("mesh.contact=linear", "mesh.slice_coupling=independent", "mesh.pair_coupling=sum"),
+        (
+            "mesh.contact=linear",
+            "mesh.slice_coupling=independent",
+            "mesh.pair_coupling=sum",
+        ),
         ("modification=beihang_both", "modification.misalignment_um=15"),
         ("gear=xiamen_23_84",),
         ("mesh.n_slices=160",),
@@ -99,7 +113,10 @@ def test_equilibrium_is_that_of_the_slices(words):
         approach, load = at_rest(table, roll, part * system.mesh_force)
         np.testing.assert_allclose(approach, exact.approach, rtol=5e-3 / min(part, 1.0))
         ripple = np.ptp(exact.approach)
-        assert np.ptp(approach - exact.approach) < 0.1 * ripple + 2e-3 * exact.approach.mean()
+        assert (
+            np.ptp(approach - exact.approach)
+            < 0.1 * ripple + 2e-3 * exact.approach.mean()
+        )
         own = (exact.line_load * mesh.slice_width).sum(axis=2)
         # newest first in both; the table follows fewer
         behind = load.shape[1] - own.shape[1]
@@ -121,13 +138,16 @@ def test_few_slices_that_enter_over_their_width_are_many(n_slices, share):
     )
     found = at_rest(table, roll, force)[0]
     error, whole = (
-        np.ptp(approach - approach.mean() - many + many.mean()) for approach in (found, few)
+        np.ptp(approach - approach.mean() - many + many.mean())
+        for approach in (found, few)
     )
     assert error < share * np.ptp(many)
     assert error < 0.4 * whole
 
 
-@pytest.mark.parametrize("words", [(), ("gear=chongqing_40_162",), ("gear=xiamen_23_84",)])
+@pytest.mark.parametrize(
+    "words", [(), ("gear=chongqing_40_162",), ("gear=xiamen_23_84",)]
+)
 def test_chords_err_by_less_than_a_hundredth_of_the_set_force(words):
     """One pair alone at 60 depths, to three times that of the set torque, and positions between the nodes."""
     system, table, mesh = table_of(*words)
@@ -137,7 +157,10 @@ def test_chords_err_by_less_than_a_hundredth_of_the_set_force(words):
     structure = np.interp(position, mesh.position, mesh.structure)
     constant = np.interp(position, mesh.position, mesh.contact_constant)
     gap = np.array(
-        [np.interp(at, mesh.position, row) for at, row in zip(position.T, mesh.gap, strict=True)]
+        [
+            np.interp(at, mesh.position, row)
+            for at, row in zip(position.T, mesh.gap, strict=True)
+        ]
     ).T
     first, exact = np.empty(40), np.empty((40, 60))
     depth = table.depth[-1] * np.arange(1, 61) / 60
@@ -151,7 +174,10 @@ def test_chords_err_by_less_than_a_hundredth_of_the_set_force(words):
         for values in (table.compliance - table.shared_compliance, table.gap)
     )
     found = np.maximum(
-        ((first[:, None, None] + depth[:, None] - far.T[:, None]) / own.T[:, None]).max(axis=2), 0.0
+        ((first[:, None, None] + depth[:, None] - far.T[:, None]) / own.T[:, None]).max(
+            axis=2
+        ),
+        0.0,
     )
     assert exact.max() > system.mesh_force
     np.testing.assert_allclose(found, exact, atol=0.01 * system.mesh_force)
@@ -209,7 +235,12 @@ def test_teeth_that_all_share_a_form_are_looked_at_once():
     form = replace(read_faults(read["fault"])[0], tooth="all")
     crack = read_faults(
         read_request(
-            ["system=helical_pair", "fault=crack", "fault.crack_depth_mm=1", "fault.tooth=3"]
+            [
+                "system=helical_pair",
+                "fault=crack",
+                "fault.crack_depth_mm=1",
+                "fault.tooth=3",
+            ]
         ).config["fault"]
     )
     table = system.mesh_table((form, *crack))
@@ -224,9 +255,12 @@ def test_teeth_that_all_share_a_form_are_looked_at_once():
 
 def test_too_many_different_teeth_are_refused():
     system, _, _ = table_of()
-    runout = read_faults(read_request(["system=helical_pair", "fault=runout"]).config["fault"])[0]
+    runout = read_faults(
+        read_request(["system=helical_pair", "fault=runout"]).config["fault"]
+    )[0]
     with pytest.raises(
-        FaultError, match="62 different teeth of the pinion and 133 of the wheel make 8246 pairs"
+        FaultError,
+        match="62 different teeth of the pinion and 133 of the wheel make 8246 pairs",
     ):
         system.mesh_table((runout, replace(runout, gear="wheel")))
 
@@ -239,15 +273,20 @@ def test_chords_are_convex_and_meet():
     near = gap[0] < 20e-6
     assert (np.diff(own[:, near], axis=0) < 1e-4 * own[1:, near]).all()
     force = [
-        (gap[0] + table.depth[1:, None] - gap[k : k + N_CHORDS - 1]) / own[k : k + N_CHORDS - 1]
+        (gap[0] + table.depth[1:, None] - gap[k : k + N_CHORDS - 1])
+        / own[k : k + N_CHORDS - 1]
         for k in (0, 1)
     ]
-    np.testing.assert_allclose(force[0][:, near], force[1][:, near], atol=2e-3 * system.mesh_force)
+    np.testing.assert_allclose(
+        force[0][:, near], force[1][:, near], atol=2e-3 * system.mesh_force
+    )
     # deep enough for three times the load, and the set chord holds the mean load
     deepest = loaded_contact(
         system.sliced_mesh(), system.phases(64), system.mesh_force
     ).approach.max()
-    assert table.depth[-1] < DEEPEST * (deepest - table.shared_compliance * system.mesh_force)
+    assert table.depth[-1] < DEEPEST * (
+        deepest - table.shared_compliance * system.mesh_force
+    )
     assert 0 < table.set_chord < N_CHORDS
 
 
@@ -270,19 +309,25 @@ def test_slopes_are_those_of_the_values():
         (table.gap, table.gap_slope),
     ):
         step = 0.5 * distance * (slopes[..., 1:] + slopes[..., :-1])
-        np.testing.assert_allclose(np.diff(values, axis=3), step, atol=1e-9 * np.abs(values).max())
+        np.testing.assert_allclose(
+            np.diff(values, axis=3), step, atol=1e-9 * np.abs(values).max()
+        )
 
 
 @pytest.mark.parametrize("contact", ["linear", "weber"])
 def test_zero_helix_is_the_spur_pair_s_table(contact):
-    system, table, _ = table_of("gear=xiamen_23_84", f"mesh.contact={contact}", "mesh.n_slices=5")
+    system, table, _ = table_of(
+        "gear=xiamen_23_84", f"mesh.contact={contact}", "mesh.n_slices=5"
+    )
     force = system.mesh_force
     spur = loaded_pair_table(system.pair, system.material, system.mesh, force=force)
     roll = system.phases(128)
     exact = static_mesh(spur, pair_states(spur, roll), force)
     approach, _ = at_rest(table, roll, force)
     # the spur table's contact is a secant at the load of sound pairs
-    np.testing.assert_allclose(approach, exact.approach, rtol=3e-4 if contact == "linear" else 2e-3)
+    np.testing.assert_allclose(
+        approach, exact.approach, rtol=3e-4 if contact == "linear" else 2e-3
+    )
 
 
 def test_the_papers_law_has_one_chord():

@@ -66,7 +66,11 @@ def solved(pair, torque, keys, *, n_phases=64, deviation=None, **changes):
     """Mesh and contact over one pitch under a pinion torque."""
     values = keys | {"slice_coupling": "independent"} | changes
     mesh = sliced_mesh(
-        pair, STEEL, read_mesh_options(values), read_slice_options(values), deviation=deviation
+        pair,
+        STEEL,
+        read_mesh_options(values),
+        read_slice_options(values),
+        deviation=deviation,
     )
     roll = pair.base_pitch * (np.arange(n_phases) + 0.5) / n_phases
     return mesh, loaded_contact(mesh, roll, torque / pair.pinion.base_radius)
@@ -95,12 +99,15 @@ def test_figures_of_the_temperature_paper(mesh_keys):
 
 @pytest.mark.parametrize("coupling", ["independent", "coupled"])
 @pytest.mark.parametrize(
-    "changes", [{"contact": "linear", "pair_coupling": "sum"}, {"contact": "linear"}, {}]
+    "changes",
+    [{"contact": "linear", "pair_coupling": "sum"}, {"contact": "linear"}, {}],
 )
 def test_spur_is_the_same_code_with_zero_helix(mesh_keys, coupling, changes):
     pair = gears("xiamen_23_84")
     options = read_mesh_options(mesh_keys | changes)
-    _, contact = solved(pair, 20.0, mesh_keys | changes, slice_coupling=coupling, n_slices=7)
+    _, contact = solved(
+        pair, 20.0, mesh_keys | changes, slice_coupling=coupling, n_slices=7
+    )
     force = 20.0 / pair.pinion.base_radius
     table = loaded_pair_table(pair, STEEL, options, force=force)
     static = static_mesh(table, pair_states(table, contact.roll), force)
@@ -133,7 +140,9 @@ def test_equilibrium_is_that_of_an_independent_solver(mesh_keys, length):
         "n_slices": 12,
     }
     deviation = np.linspace(0.0, 8e-6, 12)[:, None]
-    mesh, contact = solved(pair, 60.0, mesh_keys, n_phases=3, deviation=deviation, **changes)
+    mesh, contact = solved(
+        pair, 60.0, mesh_keys, n_phases=3, deviation=deviation, **changes
+    )
     force, width = 60.0 / pair.pinion.base_radius, mesh.slice_width[0]
     coupling = (length * pair.pinion.normal_module / width) ** 2
     for k in range(3):
@@ -142,14 +151,18 @@ def test_equilibrium_is_that_of_an_independent_solver(mesh_keys, length):
         softness = np.zeros((n_pairs * n, n_pairs * n))
         gap = np.array(
             [
-                np.interp(position[:, j], mesh.position, mesh.gap[j], left=1.0, right=1.0)
+                np.interp(
+                    position[:, j], mesh.position, mesh.gap[j], left=1.0, right=1.0
+                )
                 for j in range(n)
             ]
         ).T
         for i in range(n_pairs):
             own = np.interp(position[i], mesh.position, mesh.structure)
             between = coupling * 2.0 / (own[1:] + own[:-1])
-            stiff = np.diag(1.0 / own) + np.diag(np.append(between, 0) + np.append(0, between))
+            stiff = np.diag(1.0 / own) + np.diag(
+                np.append(between, 0) + np.append(0, between)
+            )
             stiff -= np.diag(between, 1) + np.diag(between, -1)
             block = slice(i * n, (i + 1) * n)
             local = mesh.contact_factor * np.interp(
@@ -160,7 +173,9 @@ def test_equilibrium_is_that_of_an_independent_solver(mesh_keys, length):
         root = np.linalg.cholesky(softness).T
         reach = contact.approach[k] - mesh.shared_compliance * force - gap.ravel()
         load, _ = nnls(root * 1e6, np.linalg.solve(root.T, reach) * 1e6)
-        np.testing.assert_allclose(contact.line_load[k].ravel(), load, atol=2e-6 * load.max())
+        np.testing.assert_allclose(
+            contact.line_load[k].ravel(), load, atol=2e-6 * load.max()
+        )
 
 
 @pytest.mark.parametrize(
@@ -181,7 +196,9 @@ def test_coupling_length_is_that_of_finite_elements(mesh_keys, loaded, finite_el
     options = read_mesh_options(mesh_keys)
     curvature = np.array([float(pair.pinion_curvature(pair.pitch_point))])
     in_plane = STEEL.in_plane(options.elasticity)
-    whole = structural_compliance(healthy_tooth(pair.pinion), curvature, in_plane, options)[0]
+    whole = structural_compliance(
+        healthy_tooth(pair.pinion), curvature, in_plane, options
+    )[0]
     overlap = np.linspace(0.0, pair.path_of_contact - pair.base_pitch, 9)
     angles = [
         load_angle(pair.pinion, np.asarray(pair.pinion_curvature(at)))
@@ -217,15 +234,17 @@ def test_an_overlap_of_one_has_no_ripple(mesh_keys):
 def test_results_settle_with_more_slices(mesh_keys):
     pair = gears("beihang_61_132")
     for keys in (mesh_keys, mesh_keys | REFERENCE):
-        coarse, fine, finest = (solved(pair, 178.0, keys, n_slices=n)[1] for n in (10, 40, 160))
+        coarse, fine, finest = (
+            solved(pair, 178.0, keys, n_slices=n)[1] for n in (10, 40, 160)
+        )
         for of in (
             lambda c: c.approach.mean(),
             lambda c: np.ptp(c.approach),
             lambda c: c.line_load.max(),
         ):
-            assert abs(of(fine) - of(finest)) < 0.5 * abs(of(coarse) - of(finest)) + 1e-9 * abs(
-                of(finest)
-            )
+            assert abs(of(fine) - of(finest)) < 0.5 * abs(
+                of(coarse) - of(finest)
+            ) + 1e-9 * abs(of(finest))
 
 
 def test_a_modification_moves_the_error_by_no_more_than_its_depth(mesh_keys):
@@ -269,7 +288,9 @@ def test_contact_pressure_is_that_of_a_cylinder_on_a_cylinder(mesh_keys):
     normal_load_per_length = (
         contact.line_load[k, i, j] / slant * slant
     )  # normal force up, contact line longer
-    expected = math.sqrt(normal_load_per_length * 210e9 / (1 - 0.3**2) / (2 * math.pi * radius))
+    expected = math.sqrt(
+        normal_load_per_length * 210e9 / (1 - 0.3**2) / (2 * math.pi * radius)
+    )
     assert pressure[k, i, j] == pytest.approx(expected, rel=1e-12)
 
 
@@ -282,7 +303,8 @@ def test_no_contact_is_refused(mesh_keys):
 
 
 @pytest.mark.parametrize(
-    ("key", "value"), [("n_slices", 0), ("coupling_modules", -1.0), ("slice_coupling", "glued")]
+    ("key", "value"),
+    [("n_slices", 0), ("coupling_modules", -1.0), ("slice_coupling", "glued")],
 )
 def test_slices_that_make_no_sense_are_refused(mesh_keys, key, value):
     with pytest.raises(ConfigError, match=f"mesh.{key} = "):

@@ -22,7 +22,9 @@ def pair():
 def flank(pair, gear):
     on_path = np.linspace(0.0, pair.path_of_contact, 51)
     return np.asarray(
-        pair.pinion_curvature(on_path) if gear is pair.pinion else pair.wheel_curvature(on_path)
+        pair.pinion_curvature(on_path)
+        if gear is pair.pinion
+        else pair.wheel_curvature(on_path)
     )
 
 
@@ -52,15 +54,21 @@ def test_uneven_heat_moves_every_point_of_the_flank(pair, tooth, body):
     angle = load_angle(gear, curvature)
     expected = x_moved * np.sin(angle) + y * tooth * np.cos(angle)
     growth = GearGrowth(tooth=tooth, body=body)
-    np.testing.assert_allclose(growth.along_action(gear, curvature), expected, rtol=1e-9)
+    np.testing.assert_allclose(
+        growth.along_action(gear, curvature), expected, rtol=1e-9
+    )
     if body == 0.0:
-        np.testing.assert_allclose(growth.of_tooth_alone(gear, curvature), expected, rtol=1e-9)
+        np.testing.assert_allclose(
+            growth.of_tooth_alone(gear, curvature), expected, rtol=1e-9
+        )
 
 
 def test_the_rim_grows_as_the_paper_s_equations_5_and_9_say(pair):
     """Eq. (5) integrated numerically and eq. (9), its closed form for the logarithmic field."""
     gear, heat = pair.pinion, read_heat(compose("generate", WORDS))
-    body = solved_body(gear, 6000.0, replace(heat, face_convection=0.0), bore_temperature=50.0)
+    body = solved_body(
+        gear, 6000.0, replace(heat, face_convection=0.0), bore_temperature=50.0
+    )
     inner, outer = gear.bore_radius, gear.root_radius
     rise = body.temperature - 20.0
     nu, expansion, whole = 0.3, 1.21e-5, np.trapezoid(rise * body.radius, body.radius)
@@ -92,7 +100,9 @@ def test_a_hotter_pinion_makes_the_entering_pair_late(pair):
     position = np.linspace(-0.2, 1.2, 141) * pair.path_of_contact
     gap = PairGrowth(pinion=hot, wheel=cold).deviation(pair, position)
     on_path = (position >= 0.0) & (position <= pair.path_of_contact)
-    np.testing.assert_allclose(np.diff(gap[on_path]), -1e-3 * np.diff(position[on_path]), rtol=1e-6)
+    np.testing.assert_allclose(
+        np.diff(gap[on_path]), -1e-3 * np.diff(position[on_path]), rtol=1e-6
+    )
     assert np.interp(pair.pitch_point, position, gap) == pytest.approx(0.0, abs=1e-12)
     np.testing.assert_allclose(gap[position < 0.0], 1e-3 * pair.pitch_point, rtol=1e-9)
     other = PairGrowth(pinion=cold, wheel=hot).deviation(pair, position)

@@ -32,7 +32,8 @@ class TestDefaults:
         assert plain(composed_config.plain())
         assert "${" not in json.dumps(composed_config.plain())
         assert (
-            composed_config["operating"]["speed_rpm"] == composed_config["gear"]["rated_speed_rpm"]
+            composed_config["operating"]["speed_rpm"]
+            == composed_config["gear"]["rated_speed_rpm"]
         )
 
     def test_the_selected_fault_is_the_only_class(self, composed_config):
@@ -74,9 +75,15 @@ class TestMistakes:
                 ["fault=crack", "fault.pit_width_mm=1"],
                 ["fault.pit_width_mm", "fault=crack", "crack_depth_mm", "pitting"],
             ),
-            (["fault.crack_depth_mm=1"], ["fault.crack_depth_mm", "fault=healthy", "crack"]),
+            (
+                ["fault.crack_depth_mm=1"],
+                ["fault.crack_depth_mm", "fault=healthy", "crack"],
+            ),
             (["fault=crack,healthy"], ["fault=crack,healthy", "-m"]),
-            (["plan.classes=[crack,crack]"], ["plan.classes", "different fault options"]),
+            (
+                ["plan.classes=[crack,crack]"],
+                ["plan.classes", "different fault options"],
+            ),
             (["plan.classes=3"], ["plan.classes = 3", "list"]),
             (["operating"], ["cannot read the override", "operating"]),
             (["fault=("], ["cannot read the override"]),
@@ -132,9 +139,9 @@ def test_own_options_are_found(tmp_path):
 
 class TestFaultKeys:
     def test_they_go_to_the_classes_that_have_them(self):
-        classes = read_request([FOUR, "fault.crack_depth_mm=1.5", "fault.gear=wheel"]).config[
-            "classes"
-        ]
+        classes = read_request(
+            [FOUR, "fault.crack_depth_mm=1.5", "fault.gear=wheel"]
+        ).config["classes"]
         assert classes["crack"]["crack_depth_mm"] == pytest.approx(1.5)
         assert [fault.get("gear") for fault in classes.values()] == [
             None,
@@ -152,7 +159,9 @@ class TestFaultKeys:
         )
         assert set(free["crack"]["vary"]) == {"tooth", "crack_depth_mm"}
         assert pinned["crack"]["vary"] == {}
-        assert set(pinned["pitting"]["vary"]) == set(free["pitting"]["vary"]) - {"tooth"}
+        assert set(pinned["pitting"]["vary"]) == set(free["pitting"]["vary"]) - {
+            "tooth"
+        }
 
     def test_typing_a_fault_narrows_the_classes(self):
         config = read_request(["experiment=quickstart", "fault=crack"]).config
@@ -213,7 +222,10 @@ def at_end(fault, end):
     """A fault with everything that plans vary at one end of its range; teeth are left where they are."""
     if "parts" in fault:
         return {**fault, "parts": [at_end(part, end) for part in fault["parts"]]}
-    return {**fault, **{key: spec[end] for key, spec in fault["vary"].items() if end in spec}}
+    return {
+        **fault,
+        **{key: spec[end] for key, spec in fault["vary"].items() if end in spec},
+    }
 
 
 class TestCompound:
@@ -227,10 +239,10 @@ class TestCompound:
         assert plain(config.plain())
 
     def test_what_is_not_typed_is_varied_and_a_part_can_say_what(self):
-        own = "{kind: wear, vary: {limit_um: {distribution: uniform, low: 90, high: 99}}}"
-        parts = (
-            f"fault.parts=[{{kind: crack, tooth: 3}}, {{kind: spalling, spall_width_mm: 4}}, {own}]"
+        own = (
+            "{kind: wear, vary: {limit_um: {distribution: uniform, low: 90, high: 99}}}"
         )
+        parts = f"fault.parts=[{{kind: crack, tooth: 3}}, {{kind: spalling, spall_width_mm: 4}}, {own}]"
         parts = read_request(["fault=compound", parts]).config["fault"]["parts"]
         assert [set(part["vary"]) for part in parts] == [
             {"crack_depth_mm"},
@@ -240,7 +252,9 @@ class TestCompound:
         assert parts[1]["spall_width_mm"] == 4
 
     def test_one_key_of_one_part(self):
-        parts = read_request(["fault=compound", "fault.parts.1.tooth=4"]).config["fault"]["parts"]
+        parts = read_request(["fault=compound", "fault.parts.1.tooth=4"]).config[
+            "fault"
+        ]["parts"]
         assert [part["tooth"] for part in parts] == [0, 4]
 
     def test_typed_keys_of_single_faults_leave_it_alone(self):
@@ -272,7 +286,8 @@ class TestCompound:
         parts = "fault.parts=[{kind: pitting}, {kind: crack, crack_dept_mm: 1}]"
         fault = read_request(["fault=compound", parts]).config["fault"]
         with pytest.raises(
-            ConfigError, match=re.escape("fault.parts.1: unknown key 'crack_dept_mm'; did you mean")
+            ConfigError,
+            match=re.escape("fault.parts.1: unknown key 'crack_dept_mm'; did you mean"),
         ):
             read_faults(fault)
 
@@ -291,12 +306,18 @@ class TestPinnedKeys:
             for words in ((), ("operating.speed_rpm=1500",))
         )
         assert "operating.speed_rpm" in free["plan"]["vary"]
-        assert set(free["plan"]["vary"]) - set(pinned["plan"]["vary"]) == {"operating.speed_rpm"}
+        assert set(free["plan"]["vary"]) - set(pinned["plan"]["vary"]) == {
+            "operating.speed_rpm"
+        }
         assert pinned["operating"]["speed_rpm"] == 1500
 
     def test_vary_can_be_given_as_design_says(self):
-        words = ["plan.vary={operating.torque_nm: {distribution: uniform, low: 10, high: 40}}"]
-        assert set(read_request(words).config["plan"]["vary"]) == {"operating.torque_nm"}
+        words = [
+            "plan.vary={operating.torque_nm: {distribution: uniform, low: 10, high: 40}}"
+        ]
+        assert set(read_request(words).config["plan"]["vary"]) == {
+            "operating.torque_nm"
+        }
 
 
 class TestMassAndInertia:
@@ -312,24 +333,28 @@ class TestMassAndInertia:
         with pytest.warns(DerivedValueWarning, match=re.escape(word.partition("=")[0])):
             gear = read_request([word]).config["gear"]
         for side in ("pinion", "wheel"):
-            assert [gear[side][key] is None for key in ("mass_kg", "inertia_kg_m2")] == [
-                side in sides
-            ] * 2
+            assert [
+                gear[side][key] is None for key in ("mass_kg", "inertia_kg_m2")
+            ] == [side in sides] * 2
 
     def test_a_typed_mass_stays(self):
         with pytest.warns(DerivedValueWarning, match="inertia_kg_m2"):
-            gear = read_request(["gear.pinion.n_teeth=30", "gear.pinion.mass_kg=0.3"]).config[
-                "gear"
-            ]
+            gear = read_request(
+                ["gear.pinion.n_teeth=30", "gear.pinion.mass_kg=0.3"]
+            ).config["gear"]
         assert gear["pinion"]["mass_kg"] == pytest.approx(0.3)
         assert gear["pinion"]["inertia_kg_m2"] is None
 
     def test_the_derived_mass_is_that_of_a_disc(self, machine):
-        found = machine({"gear.pinion.mass_kg": None, "gear.pinion.inertia_kg_m2": None}).pinion
+        found = machine(
+            {"gear.pinion.mass_kg": None, "gear.pinion.inertia_kg_m2": None}
+        ).pinion
         # steel, 23 mm less a 9 mm bore, 20 mm wide
         mass = 7850 * 3.14159265 * (0.023**2 - 0.009**2) * 0.02
         assert found.mass == pytest.approx(mass, rel=1e-6)
-        assert found.inertia == pytest.approx(0.5 * mass * (0.023**2 + 0.009**2), rel=1e-6)
+        assert found.inertia == pytest.approx(
+            0.5 * mass * (0.023**2 + 0.009**2), rel=1e-6
+        )
 
     def test_nothing_changes_silently_otherwise(self):
         with warnings.catch_warnings():
@@ -372,7 +397,10 @@ class TestSweeps:
         ("word", "instead"),
         [
             ("operating.torque_nm=55,5", "Then write operating.torque_nm=55.5"),
-            ("protocols=by_unit,cross_specimen", "Then write 'protocols=[by_unit,cross_specimen]'"),
+            (
+                "protocols=by_unit,cross_specimen",
+                "Then write 'protocols=[by_unit,cross_specimen]'",
+            ),
             ("plan.classes=healthy,crack", "Then write 'plan.classes=[healthy,crack]'"),
             ("fault=healthy,crack", None),
             ("operating.speed_rpm=1000,1500,2000", None),
@@ -401,7 +429,16 @@ class TestSweeps:
 def test_paper_experiment_means_every_convention_of_the_paper():
     config = read_request(["experiment=paper"]).config
     mesh = read_system(config).mesh
-    keys = ("law", "pair_coupling", "contact", "elasticity", "body", "tooth", "crack", "bending")
+    keys = (
+        "law",
+        "pair_coupling",
+        "contact",
+        "elasticity",
+        "body",
+        "tooth",
+        "crack",
+        "bending",
+    )
     assert [getattr(mesh, key) for key in keys] == [
         "paper", "sum", "linear", "plane_stress", "sainsot", "to_contact", "paper", "whole"]  # fmt: skip
 
@@ -409,7 +446,8 @@ def test_paper_experiment_means_every_convention_of_the_paper():
 def test_three_keys_mean_the_papers_conventions_for_ever():
     words = ["mesh.law=paper", "mesh.pair_coupling=sum", "mesh.contact=linear"]
     by_keys, by_experiment = (
-        read_system(read_request(own).config).mesh for own in (words, ["experiment=paper"])
+        read_system(read_request(own).config).mesh
+        for own in (words, ["experiment=paper"])
     )
     assert by_keys == by_experiment
     assert read_system(read_request([]).config).mesh.elasticity == "plane_strain"

@@ -48,14 +48,21 @@ class TestTurns:
     )  # fmt: skip
     def test_at_the_slowest_speed(self, words, seconds):
         found = config("operating.turns=10", *words)
-        assert found["operating"]["duration_s"] == pytest.approx(samples(seconds), rel=1e-12)
+        assert found["operating"]["duration_s"] == pytest.approx(
+            samples(seconds), rel=1e-12
+        )
         assert read_system(found).operating.duration == found["operating"]["duration_s"]
 
     def test_a_file_is_as_slow_as_its_slowest(self, tmp_path):
         file = tmp_path / "speed.csv"
         file.write_text("time_s,speed_rpm\n0,600\n2,1200\n")
-        words = ["operating.turns=10", f"operating.speed_profile={{kind: file, file: '{file}'}}"]
-        assert config(*words)["operating"]["duration_s"] == pytest.approx(1.0, rel=1e-12)
+        words = [
+            "operating.turns=10",
+            f"operating.speed_profile={{kind: file, file: '{file}'}}",
+        ]
+        assert config(*words)["operating"]["duration_s"] == pytest.approx(
+            1.0, rel=1e-12
+        )
 
     def test_without_turns_the_duration_is_the_typed_one(self):
         assert config("operating.duration_s=0.3")["operating"]["duration_s"] == 0.3
@@ -83,7 +90,10 @@ class TestWalks:
     def test_each_condition_has_its_own_and_all_its_classes_share_it(self):
         plan = make_plan(
             config(
-                WALK, "plan.classes=[healthy,crack,pitting]", "plan.n_records=18", "plan.n_units=3"
+                WALK,
+                "plan.classes=[healthy,crack,pitting]",
+                "plan.n_records=18",
+                "plan.n_units=3",
             )
         )
         seeds = {}
@@ -96,7 +106,13 @@ class TestWalks:
     def test_also_in_a_grid(self):
         speeds = "plan.vary={operating.speed_rpm: {distribution: choice, values: [1200, 1800]}}"
         plan = make_plan(
-            config(WALK, "plan.design=grid", "plan.n_records=null", "plan.n_units=3", speeds)
+            config(
+                WALK,
+                "plan.design=grid",
+                "plan.n_records=null",
+                "plan.n_units=3",
+                speeds,
+            )
         )
         assert len(set(plan.columns[f"params/{SEED_KEY}"])) == 6
 
@@ -110,12 +126,22 @@ class TestWalks:
 
     def test_without_a_walk_there_is_none(self):
         assert SEED_KEY not in config("operating=ramp")["plan"]["vary"]
-        assert SEED_KEY in config("operating=drifting", "experiment=quickstart")["plan"]["vary"]
+        assert (
+            SEED_KEY
+            in config("operating=drifting", "experiment=quickstart")["plan"]["vary"]
+        )
 
     def test_absolute_files_do_not_go_with_varied_set_points(self, tmp_path):
         file = tmp_path / "speed.csv"
         file.write_text("time_s,speed_rpm\n0,600\n2,1200\n")
-        words = ["experiment=quickstart", f"operating.speed_profile={{kind: file, file: '{file}'}}"]
-        with pytest.raises(ConfigError, match="gives speed_rpm itself, but the plan varies"):
+        words = [
+            "experiment=quickstart",
+            f"operating.speed_profile={{kind: file, file: '{file}'}}",
+        ]
+        with pytest.raises(
+            ConfigError, match="gives speed_rpm itself, but the plan varies"
+        ):
             config(*words)
-        assert config(*words, "operating.speed_rpm=900")["operating"]["speed_rpm"] == 900
+        assert (
+            config(*words, "operating.speed_rpm=900")["operating"]["speed_rpm"] == 900
+        )

@@ -12,13 +12,24 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.stats import qmc
 
-from gensig.dataset.distributions import DISTRIBUTIONS, KEYS, design_points, read_distribution
+from gensig.dataset.distributions import (
+    DISTRIBUTIONS,
+    KEYS,
+    design_points,
+    read_distribution,
+)
 from gensig.errors import ConfigError
 
 SPECS = {
     "uniform": {"distribution": "uniform", "low": -1.0, "high": 3.0},
     "log_uniform": {"distribution": "log_uniform", "low": 0.1, "high": 10.0},
-    "normal": {"distribution": "normal", "mean": 1.0, "std": 2.0, "low": -2.0, "high": 5.0},
+    "normal": {
+        "distribution": "normal",
+        "mean": 1.0,
+        "std": 2.0,
+        "low": -2.0,
+        "high": 5.0,
+    },
     "integers": {"distribution": "integers", "low": 2, "high": 5},
     "choice": {"distribution": "choice", "values": [1.0, 2.5, 7]},
 }
@@ -26,7 +37,9 @@ POINTS = (np.arange(4000) + 0.5) / 4000
 
 
 @settings(deadline=None)
-@given(st.sampled_from(sorted(SPECS)), st.lists(st.floats(0, 1), min_size=1, max_size=20))
+@given(
+    st.sampled_from(sorted(SPECS)), st.lists(st.floats(0, 1), min_size=1, max_size=20)
+)
 def test_values_stay_in_range(kind, points):
     spec = SPECS[kind]
     values = read_distribution("key", spec).values_at(np.array(points))
@@ -43,19 +56,29 @@ def test_values_rise_with_the_point_and_reach_both_ends(kind):
     values = np.array(read_distribution("key", SPECS[kind]).values_at(POINTS))
     assert np.all(np.diff(values) >= 0)
     spec = SPECS[kind]
-    assert_allclose([values[0], values[-1]], [spec["low"], spec["high"]], rtol=0.02, atol=0.02)
+    assert_allclose(
+        [values[0], values[-1]], [spec["low"], spec["high"]], rtol=0.02, atol=0.02
+    )
 
 
 def test_shapes():
     uniform, log_uniform, normal, integers, choice = (
-        np.array(read_distribution("key", SPECS[kind]).values_at(POINTS)) for kind in SPECS
+        np.array(read_distribution("key", SPECS[kind]).values_at(POINTS))
+        for kind in SPECS
     )
-    assert_allclose([uniform.mean(), uniform.std()], [1.0, 4 / np.sqrt(12)], rtol=1e-3, atol=0)
+    assert_allclose(
+        [uniform.mean(), uniform.std()], [1.0, 4 / np.sqrt(12)], rtol=1e-3, atol=0
+    )
     assert_allclose(np.median(log_uniform), 1.0, rtol=1e-3, atol=0)
-    assert_allclose(normal.mean(), 1.0 + 2 * 0.0853, rtol=0.01, atol=0)  # cut at -1.5 and +2 sigma
+    assert_allclose(
+        normal.mean(), 1.0 + 2 * 0.0853, rtol=0.01, atol=0
+    )  # cut at -1.5 and +2 sigma
     assert np.unique(integers, return_counts=True)[1].tolist() == [1000] * 4
     assert_allclose(
-        [np.mean(choice == value) for value in SPECS["choice"]["values"]], 1 / 3, rtol=0, atol=1e-3
+        [np.mean(choice == value) for value in SPECS["choice"]["values"]],
+        1 / 3,
+        rtol=0,
+        atol=1e-3,
     )
 
 
@@ -79,9 +102,14 @@ def cut_normal_share(value, *, mean, std, low, high):
 
 @pytest.mark.parametrize("numbers", NORMALS)
 def test_a_cut_normal_has_the_normal_density_between_its_ends(numbers):
-    values = read_distribution("key", {"distribution": "normal", **numbers}).values_at(POINTS)
+    values = read_distribution("key", {"distribution": "normal", **numbers}).values_at(
+        POINTS
+    )
     assert_allclose(
-        [cut_normal_share(value, **numbers) for value in values], POINTS, rtol=0, atol=1e-8
+        [cut_normal_share(value, **numbers) for value in values],
+        POINTS,
+        rtol=0,
+        atol=1e-8,
     )
 
 
@@ -90,9 +118,9 @@ def test_a_cut_normal_stays_space_filling(design):
     """One value in each of 64 parts of equal probability: nothing is drawn and thrown away."""
     for numbers in NORMALS[:2]:
         points = design_points(design, 64, 1, np.random.default_rng(3))
-        values = read_distribution("key", {"distribution": "normal", **numbers}).values_at(
-            points[:, 0]
-        )
+        values = read_distribution(
+            "key", {"distribution": "normal", **numbers}
+        ).values_at(points[:, 0])
         parts = [int(64 * cut_normal_share(value, **numbers)) for value in values]
         assert sorted(parts) == list(range(64))
 
@@ -123,19 +151,26 @@ class TestLevels:
 
     @pytest.mark.parametrize("kind", sorted(SPECS))
     def test_null_has_none(self, kind):
-        assert read_distribution("key", {**SPECS[kind], "levels": None}).n_levels is None
+        assert (
+            read_distribution("key", {**SPECS[kind], "levels": None}).n_levels is None
+        )
 
     @pytest.mark.parametrize("kind", sorted(SPECS))
     def test_designs_that_draw_pass_over_them(self, kind):
         levels = None if kind == "choice" else 3
         levelled = read_distribution("key", {**SPECS[kind], "levels": levels})
-        assert levelled.values_at(POINTS) == read_distribution("key", SPECS[kind]).values_at(POINTS)
+        assert levelled.values_at(POINTS) == read_distribution(
+            "key", SPECS[kind]
+        ).values_at(POINTS)
 
 
 @pytest.mark.parametrize(
     ("spec", "text"),
     [
-        (3, "give a distribution, one of uniform, log_uniform, normal, integers, choice"),
+        (
+            3,
+            "give a distribution, one of uniform, log_uniform, normal, integers, choice",
+        ),
         ({"low": 1, "high": 2}, "give a distribution"),
         ({"distribution": "unform", "low": 1, "high": 2}, "give a distribution"),
         ({"distribution": "uniform", "low": 1}, "uniform needs exactly low, high"),
@@ -163,24 +198,45 @@ class TestLevels:
             {"distribution": "log_uniform", "low": 0, "high": 1},
             "no range for log_uniform; low must be below and above 0",
         ),
-        ({"distribution": "uniform", "low": "a", "high": 1}, "low = 'a' is not a finite number"),
+        (
+            {"distribution": "uniform", "low": "a", "high": 1},
+            "low = 'a' is not a finite number",
+        ),
         (
             {"distribution": "uniform", "low": 0, "high": float("inf")},
             "high = inf is not a finite number",
         ),
-        ({"distribution": "uniform", "low": True, "high": 2}, "low = True is not a finite number"),
+        (
+            {"distribution": "uniform", "low": True, "high": 2},
+            "low = True is not a finite number",
+        ),
         ({**SPECS["normal"], "std": 0}, "std = 0 must be positive"),
         ({**SPECS["normal"], "std": -1.5}, "std = -1.5 must be positive"),
-        ({**SPECS["normal"], "mean": float("nan")}, "mean = nan is not a finite number"),
+        (
+            {**SPECS["normal"], "mean": float("nan")},
+            "mean = nan is not a finite number",
+        ),
         (
             {"distribution": "normal", "mean": 1, "std": 2},
             "normal needs exactly mean, std, low, high",
         ),
-        ({**SPECS["uniform"], "levels": 1}, "levels = 1 must be a whole number of at least 2"),
-        ({**SPECS["uniform"], "levels": 2.5}, "levels = 2.5 must be a whole number of at least 2"),
-        ({**SPECS["integers"], "levels": 5}, "levels = 5, but there are 4 whole numbers"),
+        (
+            {**SPECS["uniform"], "levels": 1},
+            "levels = 1 must be a whole number of at least 2",
+        ),
+        (
+            {**SPECS["uniform"], "levels": 2.5},
+            "levels = 2.5 must be a whole number of at least 2",
+        ),
+        (
+            {**SPECS["integers"], "levels": 5},
+            "levels = 5, but there are 4 whole numbers",
+        ),
         ({**SPECS["choice"], "levels": 3}, "the levels of a choice are its values"),
-        ({"distribution": "choice", "values": []}, "values must be a list with at least one entry"),
+        (
+            {"distribution": "choice", "values": []},
+            "values must be a list with at least one entry",
+        ),
         ({"distribution": "choice", "values": ["a"]}, "values must be finite numbers"),
     ],
 )
@@ -200,7 +256,8 @@ def test_whole_numbers_need_whole_ends():
 class TestDesigns:
     def test_shape_range_and_seed(self, design, n_points):
         one, two, other = (
-            design_points(design, n_points, 3, np.random.default_rng(seed)) for seed in (1, 1, 2)
+            design_points(design, n_points, 3, np.random.default_rng(seed))
+            for seed in (1, 1, 2)
         )
         assert one.shape == (n_points, 3)
         assert one.min() >= 0
@@ -211,7 +268,10 @@ class TestDesigns:
     def test_every_axis_is_filled_evenly(self, design, n_points):
         points = design_points(design, n_points, 3, np.random.default_rng(1))
         counts = np.array(
-            [np.bincount((axis * n_points).astype(int), minlength=n_points) for axis in points.T]
+            [
+                np.bincount((axis * n_points).astype(int), minlength=n_points)
+                for axis in points.T
+            ]
         )
         assert counts.max() <= (1 if design == "latin_hypercube" else 2)
 
@@ -220,23 +280,34 @@ def test_two_designs_of_one_size_have_nothing_in_common():
     """Of 16 x 16 cells about 163 are hit by chance; Sobol points in the order of the sequence hit 16."""
 
     def n_cells(one, other):
-        return len(set(zip((16 * one).astype(int), (16 * other).astype(int), strict=True)))
+        return len(
+            set(zip((16 * one).astype(int), (16 * other).astype(int), strict=True))
+        )
 
     for design in ("latin_hypercube", "sobol"):
-        one, other = (design_points(design, 256, 2, np.random.default_rng(seed)) for seed in (1, 2))
+        one, other = (
+            design_points(design, 256, 2, np.random.default_rng(seed))
+            for seed in (1, 2)
+        )
         assert min(n_cells(one[:, k], other[:, k]) for k in range(2)) > 130
-    raw = [qmc.Sobol(2, rng=np.random.default_rng(seed)).random_base2(8) for seed in (1, 2)]
+    raw = [
+        qmc.Sobol(2, rng=np.random.default_rng(seed)).random_base2(8) for seed in (1, 2)
+    ]
     assert n_cells(raw[0][:, 0], raw[1][:, 0]) == 16
 
 
 def test_no_dimension_draws_nothing():
-    assert design_points("latin_hypercube", 5, 0, np.random.default_rng(0)).shape == (5, 0)
+    assert design_points("latin_hypercube", 5, 0, np.random.default_rng(0)).shape == (
+        5,
+        0,
+    )
 
 
 @pytest.mark.parametrize("n_dimensions", [0, 2])
 def test_unknown_designs_list_the_known(n_dimensions):
     with pytest.raises(
-        ConfigError, match=r"plan.design = 'factorial'; allowed: latin_hypercube, sobol, grid"
+        ConfigError,
+        match=r"plan.design = 'factorial'; allowed: latin_hypercube, sobol, grid",
     ):
         design_points("factorial", 4, n_dimensions, np.random.default_rng(0))
 

@@ -38,7 +38,12 @@ class TestFaultOptionAlone:
     def test_a_reference_to_another_group_is_followed(self):
         words = ["operating.torque_nm=3", "fault.crack_depth_mm=${operating.torque_nm}"]
         for choice in ("plan.classes=[crack]", "fault=crack"):
-            assert read_request([choice, *words]).config["classes"]["crack"]["crack_depth_mm"] == 3
+            assert (
+                read_request([choice, *words]).config["classes"]["crack"][
+                    "crack_depth_mm"
+                ]
+                == 3
+            )
 
     def test_the_whole_configuration_is_composed_once(self, monkeypatch):
         composed = []

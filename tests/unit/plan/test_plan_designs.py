@@ -74,21 +74,31 @@ class TestGrid:
     @classmethod
     def crossed(cls, planned):
         """Three depths of cracks, two lengths of pits: six faults at every set-point."""
-        faults = {"crack": {"crack_depth_mm": DEPTH}, "pitting": {"pit_length_mm": LENGTH}}
-        return planned(faults, **{**GRID, "n_units": 3}, vary={"operating.speed_rpm": SPEED})
+        faults = {
+            "crack": {"crack_depth_mm": DEPTH},
+            "pitting": {"pit_length_mm": LENGTH},
+        }
+        return planned(
+            faults, **{**GRID, "n_units": 3}, vary={"operating.speed_rpm": SPEED}
+        )
 
     def test_every_unit_runs_every_combination_with_every_class_once(self, plan):
         found = Counter(rows(plan, "unit_id", *SET_POINT, "label_name"))
         units = [f"unit-{number:04d}" for number in range(5)]
         expected = set(
-            itertools.product(units, (1200.0, 1800.0, 2400.0), (10.0, 20.0, 30.0, 40.0), CLASSES)
+            itertools.product(
+                units, (1200.0, 1800.0, 2400.0), (10.0, 20.0, 30.0, 40.0), CLASSES
+            )
         )
         assert set(found) == expected
         assert set(found.values()) == {1}
 
     def test_levels_of_the_key_are_those_of_the_machine(self, plan):
         assert_allclose(
-            plan.columns["speed_set_rpm"], plan.columns[SET_POINT[0]], rtol=1e-12, atol=0
+            plan.columns["speed_set_rpm"],
+            plan.columns[SET_POINT[0]],
+            rtol=1e-12,
+            atol=0,
         )
         assert_array_equal(plan.columns["torque_nm"], plan.columns[SET_POINT[1]])
 
@@ -100,7 +110,9 @@ class TestGrid:
 
     def test_null_levels_leave_a_key_of_the_conditions_to_chance(self, planned):
         noise = {"distribution": "uniform", "low": 10, "high": 30, "levels": None}
-        plan = planned(**GRID, vary={"operating.speed_rpm": SPEED, "sensing.snr_db": noise})
+        plan = planned(
+            **GRID, vary={"operating.speed_rpm": SPEED, "sensing.snr_db": noise}
+        )
         found = dict(rows(plan, "condition_id", "snr_db"))
         assert len(found) == len(set(found.values())) == 15
         assert min(found.values()) < 12
@@ -108,20 +120,32 @@ class TestGrid:
 
     def test_faults_with_levels_are_crossed_with_all_else(self, crossed):
         found = Counter(
-            rows(crossed, "unit_id", "params/operating.speed_rpm", "params/fault.crack_depth_mm")
+            rows(
+                crossed,
+                "unit_id",
+                "params/operating.speed_rpm",
+                "params/fault.crack_depth_mm",
+            )
         )
         depths = {key: n for key, n in found.items() if key[2] == key[2]}
         assert {key[2] for key in depths} == {1.0, 2.0, 3.0}
         assert len(depths) == 3 * 3 * 3
         assert set(depths.values()) == {2}
         lengths = Counter(
-            rows(crossed, "unit_id", "params/operating.speed_rpm", "params/fault.pit_length_mm")
+            rows(
+                crossed,
+                "unit_id",
+                "params/operating.speed_rpm",
+                "params/fault.pit_length_mm",
+            )
         )
         assert {n for key, n in lengths.items() if key[2] == key[2]} == {3}
 
     def test_all_classes_have_as_many_records(self, plan, crossed):
         assert set(Counter(plan.columns["label_name"].tolist()).values()) == {5 * 12}
-        assert set(Counter(crossed.columns["label_name"].tolist()).values()) == {3 * 3 * 6}
+        assert set(Counter(crossed.columns["label_name"].tolist()).values()) == {
+            3 * 3 * 6
+        }
 
     def test_a_condition_holds_every_class_once(self, crossed):
         assert set(Counter(rows(crossed, "condition_id", "label")).values()) == {1}
@@ -130,7 +154,9 @@ class TestGrid:
     def test_a_tooth_may_have_levels(self, planned):
         tooth = {"distribution": "tooth", "levels": 3}
         plan = planned({"crack": {"tooth": tooth}}, **GRID, vary={})
-        found = Counter(plan.columns["fault_tooth"][plan.columns["label_name"] == "crack"].tolist())
+        found = Counter(
+            plan.columns["fault_tooth"][plan.columns["label_name"] == "crack"].tolist()
+        )
         assert found == {0: 5, 11: 5, 22: 5}
 
     def test_the_same_configuration_gives_the_same_plan(self, configured):
@@ -138,15 +164,20 @@ class TestGrid:
         other = make_plan(configured(**GRID, vary=VARY).with_entries(seed=1))
         assert plan_text(one) == plan_text(two)
         assert plan_text(one) != plan_text(other)
-        assert_array_equal(one.columns["speed_set_rpm"][::4], other.columns["speed_set_rpm"][::4])
+        assert_array_equal(
+            one.columns["speed_set_rpm"][::4], other.columns["speed_set_rpm"][::4]
+        )
 
     def test_the_right_number_of_records_may_be_typed(self, planned, plan):
-        assert plan_text(planned(**{**GRID, "n_records": 240}, vary=VARY)) == plan_text(plan)
+        assert plan_text(planned(**{**GRID, "n_records": 240}, vary=VARY)) == plan_text(
+            plan
+        )
 
     def test_levels_change_no_other_design(self, planned):
         plain = {key: value for key, value in TORQUE.items() if key != "levels"}
         one, two = (
-            planned(n_records=24, vary={"operating.torque_nm": spec}) for spec in (TORQUE, plain)
+            planned(n_records=24, vary={"operating.torque_nm": spec})
+            for spec in (TORQUE, plain)
         )
         assert plan_text(one) == plan_text(two)
 
@@ -156,7 +187,9 @@ class TestGrid:
             "grid of operating.speed_rpm 3 x operating.torque_nm 4 x crack.crack_depth_mm 3; drawn: crack.tooth, "
             "pitting.tooth, pitting.pit_length_mm, pitting.pit_width_mm, missing_tooth.tooth"
         )
-        assert describe_design(configured(**GRID, vary={})).startswith("grid of no key; drawn: ")
+        assert describe_design(configured(**GRID, vary={})).startswith(
+            "grid of no key; drawn: "
+        )
         assert describe_design(configured(design="sobol")) == "sobol"
 
     @pytest.mark.parametrize(
@@ -186,13 +219,18 @@ class TestGrid:
         assert "\n" not in str(caught.value)
 
     def test_mistakes_in_a_fault_are_named(self, planned):
-        with pytest.raises(ConfigError, match=re.escape("fault.vary.crack_depth_mm: levels = 1")):
-            planned({"crack": {"crack_depth_mm": {**DEPTH, "levels": 1}}}, **GRID, vary={})
+        with pytest.raises(
+            ConfigError, match=re.escape("fault.vary.crack_depth_mm: levels = 1")
+        ):
+            planned(
+                {"crack": {"crack_depth_mm": {**DEPTH, "levels": 1}}}, **GRID, vary={}
+            )
 
     def test_too_large_a_grid_over_faults(self, planned):
         seeds = {"distribution": "uniform", "low": 1, "high": 3, "levels": 10**6}
         with pytest.raises(
-            ConfigError, match=r"20,000,000 records \(5 units x 1,000,000 faults x 4 classes\)"
+            ConfigError,
+            match=r"20,000,000 records \(5 units x 1,000,000 faults x 4 classes\)",
         ):
             planned({"crack": {"crack_depth_mm": seeds}}, **GRID, vary={})
 
@@ -233,20 +271,26 @@ class TestRepeats:
         for one, *others in families.values():
             for other in others:
                 assert {key for key in one if str(one[key]) != str(other[key])} <= own
-        phases = [record["start_phase"] for records in families.values() for record in records]
+        phases = [
+            record["start_phase"] for records in families.values() for record in records
+        ]
         assert len(set(phases)) == len(phases)
 
     def test_repeats_come_one_after_another_in_random_order(self, plan):
         labels = plan.columns["label"].reshape(-1, 4)
         assert (np.sort(labels, axis=1) == np.arange(4)).all()
         assert len({tuple(order) for order in labels.tolist()}) > 15
-        assert_array_equal(plan.columns["repeat"], np.tile(np.repeat(np.arange(self.N), 4), 20))
+        assert_array_equal(
+            plan.columns["repeat"], np.tile(np.repeat(np.arange(self.N), 4), 20)
+        )
 
     @pytest.mark.parametrize("n_records", [4, 11, 13, 50])
     @pytest.mark.parametrize("design", ["latin_hypercube", "sobol"])
     def test_classes_are_balanced_to_one(self, planned, design, n_records):
         counts = Counter(
-            planned(n_records=n_records, n_repeats=2, design=design).columns["label_name"].tolist()
+            planned(n_records=n_records, n_repeats=2, design=design)
+            .columns["label_name"]
+            .tolist()
         )
         assert set(counts) == set(CLASSES)
         assert max(counts.values()) - min(counts.values()) <= 1
@@ -264,7 +308,9 @@ class TestRepeats:
         side = {}
         for protocol in ("by_unit", "cross_specimen"):
             table = tables[protocol]
-            subset = dict(zip(table.record_id.tolist(), table.subset.tolist(), strict=True))
+            subset = dict(
+                zip(table.record_id.tolist(), table.subset.tolist(), strict=True)
+            )
             side = defaultdict(set)
             for name, *family in rows(plan, "record_id", "condition_id", "label_name"):
                 side[tuple(family)].add(subset[name])
@@ -321,7 +367,9 @@ class TestStartOfTheSound:
             group = int(record["condition_id"].rpartition("-")[2])
             is_twin = record["label_name"] == "healthy" and record.get("repeat", 0) == 0
             expected = (
-                self.drawn(Stream.TWIN, group) if is_twin else self.drawn(Stream.START, index)
+                self.drawn(Stream.TWIN, group)
+                if is_twin
+                else self.drawn(Stream.START, index)
             )
             assert tuple(record[name] for name in self.START) == expected
 
@@ -373,17 +421,24 @@ class TestSobol:
 
     @staticmethod
     def n_cells(one, other):
-        ranks = [16 * np.argsort(np.argsort(values)) // len(values) for values in (one, other)]
+        ranks = [
+            16 * np.argsort(np.argsort(values)) // len(values)
+            for values in (one, other)
+        ]
         return len(set(zip(*ranks, strict=True)))
 
     def test_speed_does_not_tell_the_size_of_the_fault(self, plan):
         cracks = plan.columns["label_name"] == "crack"
         depth, torque = (
-            plan.columns[f"params/{key}"] for key in ("fault.crack_depth_mm", "operating.torque_nm")
+            plan.columns[f"params/{key}"]
+            for key in ("fault.crack_depth_mm", "operating.torque_nm")
         )
-        assert self.n_cells(depth[cracks], torque[cracks]) > 130  # of 256 cells about 163 by chance
+        assert (
+            self.n_cells(depth[cracks], torque[cracks]) > 130
+        )  # of 256 cells about 163 by chance
         raw = [
-            qmc.Sobol(3, rng=np.random.default_rng(seed)).random_base2(8)[:, 1] for seed in (1, 2)
+            qmc.Sobol(3, rng=np.random.default_rng(seed)).random_base2(8)[:, 1]
+            for seed in (1, 2)
         ]
         assert self.n_cells(*raw) == 16
 
@@ -438,7 +493,9 @@ def test_whatever_can_be_drawn_carries_its_unit():
     assert len(options) > 10
     for file in options:
         fault = {
-            key: value for key, value in yaml.safe_load(file.read_text()).items() if key != "vary"
+            key: value
+            for key, value in yaml.safe_load(file.read_text()).items()
+            if key != "vary"
         }
         assert {key for key in numbers_in(fault) if not has_unit(key)} <= NUMBERS
 

@@ -18,7 +18,11 @@ def said(*words: str) -> list[str]:
 
 def test_units_without_a_record_are_told() -> None:
     (line,) = said(
-        THREE, "plan.n_units=4", "plan.n_gearboxes=2", "plan.n_records=12", "plan.n_repeats=2"
+        THREE,
+        "plan.n_units=4",
+        "plan.n_gearboxes=2",
+        "plan.n_records=12",
+        "plan.n_repeats=2",
     )
     assert line == (
         "12 records are 2 conditions of 3 classes and 2 repeats: 2 of 4 units are used; no split by unit is possible "
@@ -34,7 +38,9 @@ def test_a_split_by_machine_that_cannot_be_made_is_told() -> None:
     )
 
 
-@pytest.mark.parametrize("words", [("experiment=quickstart",), ("experiment=run_to_failure",)])
+@pytest.mark.parametrize(
+    "words", [("experiment=quickstart",), ("experiment=run_to_failure",)]
+)
 def test_a_plan_with_all_of_it_has_no_note(words: tuple[str, ...]) -> None:
     assert said(*words) == []
 

@@ -43,13 +43,19 @@ def test_unit_condition_and_noise_stay_on_one_side(design: str) -> None:
         "open_set",
     } <= set(tables)
     names = plan.columns["record_id"].tolist()
-    noise = [stream(0, Stream.NOISE, int(name.lstrip("r"))).integers(2**62) for name in names]
+    noise = [
+        stream(0, Stream.NOISE, int(name.lstrip("r"))).integers(2**62) for name in names
+    ]
     columns = {"noise": np.array(noise)} | {
         name: plan.columns[name] for name in ("unit_id", "condition_id")
     }
     for protocol in set(CLEAN) & set(tables):
         subset = dict(
-            zip(tables[protocol].record_id.tolist(), tables[protocol].subset.tolist(), strict=True)
+            zip(
+                tables[protocol].record_id.tolist(),
+                tables[protocol].subset.tolist(),
+                strict=True,
+            )
         )
         for column, values in columns.items():
             sides: dict[object, set[str]] = {}
@@ -65,7 +71,11 @@ def test_quickstart_has_all_protocols_with_ten_units_to_test_what_is_held_out() 
     tables = make_splits(plan, 0)
     assert set(tables) == set(PROTOCOLS)
     unit = dict(
-        zip(plan.columns["record_id"].tolist(), plan.columns["unit_id"].tolist(), strict=True)
+        zip(
+            plan.columns["record_id"].tolist(),
+            plan.columns["unit_id"].tolist(),
+            strict=True,
+        )
     )
     for name in set(CLEAN) - {
         "cross_specimen"
@@ -76,13 +86,22 @@ def test_quickstart_has_all_protocols_with_ten_units_to_test_what_is_held_out() 
 
 
 @pytest.mark.parametrize(
-    ("n_units", "n_tested"), [(5, 1), (20, 4), (39, 8), (40, 10), (49, 10), (50, 10), (100, 20)]
+    ("n_units", "n_tested"),
+    [(5, 1), (20, 4), (39, 8), (40, 10), (49, 10), (50, 10), (100, 20)],
 )
-def test_ten_units_are_tested_on_where_a_quarter_is_ten(n_units: int, n_tested: int) -> None:
-    plan = planned("plan.n_records=800", f"plan.n_units={n_units}", "plan.n_gearboxes=1")
+def test_ten_units_are_tested_on_where_a_quarter_is_ten(
+    n_units: int, n_tested: int
+) -> None:
+    plan = planned(
+        "plan.n_records=800", f"plan.n_units={n_units}", "plan.n_gearboxes=1"
+    )
     table = make_splits(plan, 0)["by_unit"]
     unit = dict(
-        zip(plan.columns["record_id"].tolist(), plan.columns["unit_id"].tolist(), strict=True)
+        zip(
+            plan.columns["record_id"].tolist(),
+            plan.columns["unit_id"].tolist(),
+            strict=True,
+        )
     )
     sides = {
         name: {unit[record] for record in table.record_id[table.subset == name]}
@@ -95,10 +114,15 @@ def test_ten_units_are_tested_on_where_a_quarter_is_ten(n_units: int, n_tested: 
 def test_a_sham_plan_has_no_severity_to_hold_out_and_keeps_the_others() -> None:
     sham, real = planned("plan.sham=true"), planned()
     tables = make_splits(sham, 0)
-    assert set(PROTOCOLS) - set(tables) == {"unseen_severity_inner", "unseen_severity_outer"}
+    assert set(PROTOCOLS) - set(tables) == {
+        "unseen_severity_inner",
+        "unseen_severity_outer",
+    }
     assert (
-        "no class has enough different severities" in why_left_out(sham, 0)["unseen_severity_outer"]
+        "no class has enough different severities"
+        in why_left_out(sham, 0)["unseen_severity_outer"]
     )
     assert all(
-        table.to_csv() == make_splits(real, 0)[name].to_csv() for name, table in tables.items()
+        table.to_csv() == make_splits(real, 0)[name].to_csv()
+        for name, table in tables.items()
     )

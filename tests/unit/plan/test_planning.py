@@ -56,7 +56,9 @@ def groups(plan, key):
 
 @pytest.mark.parametrize("n_records", [4, 7, 40])
 def test_classes_are_balanced_to_one(planned, n_records):
-    counts = Counter(planned(plan={"n_records": n_records}).columns["label_name"].tolist())
+    counts = Counter(
+        planned(plan={"n_records": n_records}).columns["label_name"].tolist()
+    )
     assert set(counts) == set(CLASSES)
     assert max(counts.values()) - min(counts.values()) <= 1
 
@@ -96,7 +98,9 @@ class TestPosition:
         assert position_chi_square(np.sort(groups(plan, "label"), axis=1)) > 100
 
 
-@pytest.mark.parametrize("key", ["start_tooth_pinion", "start_tooth_wheel", "start_phase"])
+@pytest.mark.parametrize(
+    "key", ["start_tooth_pinion", "start_tooth_wheel", "start_phase"]
+)
 def test_starts_do_not_tell_the_class(plan, key):
     values, labels = plan.columns[key].astype(float), plan.columns["label"]
     spread = values.std() / np.sqrt(len(values) / 4)
@@ -122,7 +126,9 @@ def test_drawn_values_lie_in_their_ranges(plan, quickstart):
         rtol=1e-12,
         atol=0,
     )
-    cracks = plan.columns["params/fault.crack_depth_mm"][plan.columns["label_name"] == "crack"]
+    cracks = plan.columns["params/fault.crack_depth_mm"][
+        plan.columns["label_name"] == "crack"
+    ]
     spec = quickstart["classes"]["crack"]["vary"]["crack_depth_mm"]
     low, high = (2.0 * spec[end] for end in ("low", "high"))  # of the module
     assert low <= cracks.min() <= cracks.max() <= high
@@ -135,7 +141,11 @@ def test_faults_are_recorded_whole(plan):
         faults = json.loads(record["faults_json"])
         if record["label_name"] == "healthy":
             assert faults == []
-            assert (record["fault_tooth"], record["fault_gear"], record["severity"]) == (
+            assert (
+                record["fault_tooth"],
+                record["fault_gear"],
+                record["severity"],
+            ) == (
                 -1,
                 "",
                 pytest.approx(0.0),
@@ -161,16 +171,25 @@ def test_a_sham_has_severity_zero_and_keeps_its_labels(planned, plan):
 def test_units_are_specimens_in_gearboxes(plan, quickstart):
     units = set(
         zip(
-            *(plan.columns[key].tolist() for key in ("unit_id", "gearbox_id", "specimen_id")),
+            *(
+                plan.columns[key].tolist()
+                for key in ("unit_id", "gearbox_id", "specimen_id")
+            ),
             strict=True,
         )
     )
-    assert len(units) == quickstart["plan"]["n_units"] == len({unit for unit, _, _ in units})
-    assert len({gearbox for _, gearbox, _ in units}) == quickstart["plan"]["n_gearboxes"]
-    assert len({(gearbox, specimen) for _, gearbox, specimen in units}) == len(units)
-    assert len({specimen for _, _, specimen in units}) * quickstart["plan"]["n_gearboxes"] == len(
-        units
+    assert (
+        len(units)
+        == quickstart["plan"]["n_units"]
+        == len({unit for unit, _, _ in units})
     )
+    assert (
+        len({gearbox for _, gearbox, _ in units}) == quickstart["plan"]["n_gearboxes"]
+    )
+    assert len({(gearbox, specimen) for _, gearbox, specimen in units}) == len(units)
+    assert len({specimen for _, _, specimen in units}) * quickstart["plan"][
+        "n_gearboxes"
+    ] == len(units)
 
 
 class TestRefusals:
@@ -180,22 +199,35 @@ class TestRefusals:
     def test_keys_of_the_whole_data_set(self, planned, key):
         vary = {key: {"distribution": "uniform", "low": 1, "high": 2}}
         with pytest.raises(
-            ConfigError, match=re.escape(f"plan.vary: '{key}' is one value for a whole data set")
+            ConfigError,
+            match=re.escape(f"plan.vary: '{key}' is one value for a whole data set"),
         ):
             planned(plan={"vary": vary})
 
     @pytest.mark.parametrize(
-        "key", ["operating.sped_rpm", "mesh.law", "mesh", "mesh.allow_extrapolation", "fault.tooth"]
+        "key",
+        [
+            "operating.sped_rpm",
+            "mesh.law",
+            "mesh",
+            "mesh.allow_extrapolation",
+            "fault.tooth",
+        ],
     )
     def test_keys_that_hold_no_number(self, planned, key):
         vary = {key: {"distribution": "uniform", "low": 1, "high": 2}}
-        with pytest.raises(ConfigError, match=re.escape(f"plan.vary: '{key}' is no key")):
+        with pytest.raises(
+            ConfigError, match=re.escape(f"plan.vary: '{key}' is no key")
+        ):
             planned(plan={"vary": vary})
 
     @pytest.mark.parametrize(
         ("changes", "text"),
         [
-            ({"n_records": 3}, "plan.n_records = 3 must be a whole number of at least 4"),
+            (
+                {"n_records": 3},
+                "plan.n_records = 3 must be a whole number of at least 4",
+            ),
             ({"n_records": 0}, "plan.n_records = 0"),
             ({"n_records": 8.0}, "plan.n_records = 8.0"),
             ({"n_units": 0}, "plan.n_units = 0"),
@@ -205,7 +237,10 @@ class TestRefusals:
                 {"design": "factorial"},
                 "plan.design = 'factorial'; allowed: latin_hypercube, sobol, grid",
             ),
-            ({"n_repeats": 0}, "plan.n_repeats = 0 must be a whole number of at least 1"),
+            (
+                {"n_repeats": 0},
+                "plan.n_repeats = 0 must be a whole number of at least 1",
+            ),
             ({"n_repeats": 1.5}, "plan.n_repeats = 1.5"),
             (
                 {"n_records": None},
@@ -217,7 +252,10 @@ class TestRefusals:
                 "plan.n_records = 8, but the plan has 960 records (40 units x 3 conditions x 4 classes x 2 repeats); "
                 "plan.n_records=null takes them",
             ),
-            ({"n_reports": 3}, "plan: unknown key 'n_reports'; it has n_records, n_units"),
+            (
+                {"n_reports": 3},
+                "plan: unknown key 'n_reports'; it has n_records, n_units",
+            ),
             ({"sham": 3}, "plan.sham = 3"),
         ],
     )
@@ -228,20 +266,27 @@ class TestRefusals:
     def test_an_option_of_ones_own_that_lacks_a_key(self, quickstart):
         plan = quickstart["plan"].without("n_repeats")
         with pytest.raises(
-            ConfigError, match="plan: missing key 'n_repeats'; it has n_records, n_units"
+            ConfigError,
+            match="plan: missing key 'n_repeats'; it has n_records, n_units",
         ):
             make_plan(quickstart.with_entries(plan=plan))
 
     def test_values_are_checked_before_anything_runs(self, planned):
-        vary = {"operating.torque_nm": {"distribution": "uniform", "low": -20, "high": -10}}
-        with pytest.raises(ConfigError, match=r"operating.torque_nm = -1\d.* must be positive"):
+        vary = {
+            "operating.torque_nm": {"distribution": "uniform", "low": -20, "high": -10}
+        }
+        with pytest.raises(
+            ConfigError, match=r"operating.torque_nm = -1\d.* must be positive"
+        ):
             planned(plan={"n_records": 8, "vary": vary})
 
     def test_channels_are_checked_before_anything_runs(self, planned):
         with pytest.raises(ConfigError, match="no channel housing"):
             planned(plan={"n_records": 8}, sensing={"channels": ["housing"]})
 
-    def test_bodies_outside_the_fit_are_refused_before_anything_runs(self, planned, quickstart):
+    def test_bodies_outside_the_fit_are_refused_before_anything_runs(
+        self, planned, quickstart
+    ):
         gear = quickstart["gear"].plain()
         gear["wheel"]["bore_radius_mm"] = 1
         with pytest.raises(ExtrapolationError, match="bore_radius_mm"):
@@ -250,7 +295,9 @@ class TestRefusals:
     def test_a_gear_that_is_none(self, planned, quickstart):
         classes = quickstart["classes"].plain()
         classes["crack"]["gear"] = "ring"
-        with pytest.raises(FaultError, match=r"fault.gear = 'ring'; allowed: pinion, wheel"):
+        with pytest.raises(
+            FaultError, match=r"fault.gear = 'ring'; allowed: pinion, wheel"
+        ):
             planned(plan={"n_records": 8}, classes=classes)
 
     def test_interrupted_drive(self, planned, quickstart):
@@ -269,7 +316,9 @@ def test_shards_hold_about_64_mb(config_with):
 
 def test_streams_depend_on_cause_and_index_alone():
     draws = {
-        (cause, index): stream(1, cause, index).random() for cause in (0, 1) for index in (0, 1)
+        (cause, index): stream(1, cause, index).random()
+        for cause in (0, 1)
+        for index in (0, 1)
     }
     assert len(set(draws.values())) == 4
     assert stream(1, 0, 1).random() == pytest.approx(draws[0, 1], abs=0.0)

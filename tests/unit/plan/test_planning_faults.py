@@ -22,7 +22,11 @@ MIXED = ("healthy", "crack", "compound", "wear", "runout", "distributed_pitting"
 def typed(value):
     """A mapping as it is typed on the command line."""
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{key}: {typed(item)}" for key, item in value.items()) + "}"
+        return (
+            "{"
+            + ", ".join(f"{key}: {typed(item)}" for key, item in value.items())
+            + "}"
+        )
     return str(value)
 
 
@@ -34,7 +38,11 @@ class TestManyKindsOfFaults:
     def config(cls):
         parts = "[{kind: crack, gear: wheel, crack_depth_mm: 1.0}, {kind: pitting, tooth: 2}]"
         return read_request(
-            [f"plan.classes=[{','.join(MIXED)}]", f"fault.parts={parts}", "plan.n_records=60"]
+            [
+                f"plan.classes=[{','.join(MIXED)}]",
+                f"fault.parts={parts}",
+                "plan.n_records=60",
+            ]
         ).config
 
     @pytest.fixture(scope="class")
@@ -63,9 +71,14 @@ class TestManyKindsOfFaults:
             "params/fault.parts.1.pit_length_mm",
         } <= params
         assert not {
-            key for key in params if key.endswith((".tooth", ".kind", ".parts", ".wear_profile"))
+            key
+            for key in params
+            if key.endswith((".tooth", ".kind", ".parts", ".wear_profile"))
         }
-        for name, prefix in (("compound", "params/fault.parts."), ("wear", "params/fault.wear_")):
+        for name, prefix in (
+            ("compound", "params/fault.parts."),
+            ("wear", "params/fault.wear_"),
+        ):
             own = mixed.columns["label_name"] == name
             for key in (key for key in params if key.startswith(prefix)):
                 assert np.isfinite(mixed.columns[key][own]).all()
@@ -88,9 +101,15 @@ class TestManyKindsOfFaults:
                 for key, value in part.items():
                     if isinstance(value, float):
                         assert_allclose(
-                            record[f"params/fault.parts.{place}.{key}"], value, rtol=1e-12, atol=0
+                            record[f"params/fault.parts.{place}.{key}"],
+                            value,
+                            rtol=1e-12,
+                            atol=0,
                         )
-            assert (record["fault_gear"], record["fault_tooth"]) == ("wheel", crack["tooth"])
+            assert (record["fault_gear"], record["fault_tooth"]) == (
+                "wheel",
+                crack["tooth"],
+            )
             drawn.append((crack["tooth"], pit["pit_length_mm"], pit["pit_width_mm"]))
         teeth, *sizes = zip(*drawn, strict=True)
         assert len(set(teeth)) > 5
@@ -105,9 +124,12 @@ class TestManyKindsOfFaults:
     def test_a_fault_on_all_teeth_has_no_number(self, mixed):
         for name in ("wear", "distributed_pitting"):
             assert {record["fault_tooth"] for record in self.of(mixed, name)} == {-1}
-            assert {record["fault_gear"] for record in self.of(mixed, name)} == {"pinion"}
+            assert {record["fault_gear"] for record in self.of(mixed, name)} == {
+                "pinion"
+            }
             assert {
-                json.loads(record["faults_json"])[0]["tooth"] for record in self.of(mixed, name)
+                json.loads(record["faults_json"])[0]["tooth"]
+                for record in self.of(mixed, name)
             } == {"all"}
         assert len({record["fault_tooth"] for record in self.of(mixed, "runout")}) > 5
         assert all(record["fault_tooth"] >= 0 for record in self.of(mixed, "runout"))
@@ -125,20 +147,29 @@ class TestManyKindsOfFaults:
             parts = [severity([fault], xiamen.pair) for fault in row_faults(record)]
             assert_allclose(record["severity"], max(parts), rtol=1e-12, atol=0)
         assert all(
-            0 < record["severity"] <= 1 for name in MIXED[1:] for record in self.of(mixed, name)
+            0 < record["severity"] <= 1
+            for name in MIXED[1:]
+            for record in self.of(mixed, name)
         )
 
     def test_a_sham_keeps_the_faults_on_paper(self, config, mixed):
         sham = make_plan(config.with_keys("plan", sham=True))
         assert_allclose(sham.columns["severity"], 0.0, rtol=0, atol=0)
-        for key in ("label", "faults_json", "fault_tooth", "params/fault.parts.1.pit_length_mm"):
+        for key in (
+            "label",
+            "faults_json",
+            "fault_tooth",
+            "params/fault.parts.1.pit_length_mm",
+        ):
             assert_array_equal(sham.columns[key], mixed.columns[key])
 
     @pytest.fixture(scope="class")
     @classmethod
     def hot(cls, config):
         """Names of the classes that ``fault_multihot`` has for a row of the plan."""
-        short = config.with_keys("operating", duration_s=0.01).with_keys("sensing", snr_db=None)
+        short = config.with_keys("operating", duration_s=0.01).with_keys(
+            "sensing", snr_db=None
+        )
 
         def of_row(row, **classes):
             record = simulate_record(short.with_keys("classes", **classes), row)
@@ -168,7 +199,9 @@ class TestManyKindsOfFaults:
 
     def test_another_class_of_the_same_kind_is_not(self, config, mixed, hot):
         """Two options of one kind, say small and large cracks: a single fault is of its own class alone."""
-        assert hot(self.of(mixed, "crack")[0], wear=config["classes"]["crack"]) == {"crack"}
+        assert hot(self.of(mixed, "crack")[0], wear=config["classes"]["crack"]) == {
+            "crack"
+        }
 
     @pytest.mark.parametrize(
         ("fault", "text"),
@@ -183,12 +216,17 @@ class TestManyKindsOfFaults:
                 {"kind": "crack", "vary": {"crack_dept_mm": {}}},
                 "fault.vary: 'crack_dept_mm' is no key of fault=crack",
             ),
-            ({"kind": "crack", "crack_dept_mm": 1}, "fault.parts.0: unknown key 'crack_dept_mm'"),
+            (
+                {"kind": "crack", "crack_dept_mm": 1},
+                "fault.parts.0: unknown key 'crack_dept_mm'",
+            ),
         ],
     )
     def test_parts_are_checked_before_anything_runs(self, fault, text):
         with pytest.raises(GensigError, match=re.escape(text)):
-            make_plan(read_request(["fault=compound", f"fault.parts=[{typed(fault)}]"]).config)
+            make_plan(
+                read_request(["fault=compound", f"fault.parts=[{typed(fault)}]"]).config
+            )
 
 
 @pytest.mark.parametrize(

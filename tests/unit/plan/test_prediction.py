@@ -39,7 +39,9 @@ def foretold(name: str) -> dict[str, str]:
 def test_bytes_are_within_a_factor_of_one_and_a_half(name: str, tmp_path: Path) -> None:
     expected = int(foretold(name)["bytes"].split()[0].replace(",", ""))
     gensig.generate(*SETS[name], "executor.n_workers=1", out=tmp_path / "data").close()
-    made = sum(path.stat().st_size for path in (tmp_path / "data").rglob("*") if path.is_file())
+    made = sum(
+        path.stat().st_size for path in (tmp_path / "data").rglob("*") if path.is_file()
+    )
     assert made > 700_000
     assert 1 / 1.5 < expected / made < 1.5
 
@@ -55,7 +57,9 @@ def test_what_a_grid_holds_is_told() -> None:
     )
 
 
-def test_records_that_fail_while_they_are_timed_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_records_that_fail_while_they_are_timed_are_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     whole = records.simulate_with_lead_in
     monkeypatch.setattr(
         records,
@@ -66,6 +70,7 @@ def test_records_that_fail_while_they_are_timed_are_told(monkeypatch: pytest.Mon
         ["operating.duration_s=0.02", "plan.n_records=2", "executor.n_workers=1"]
     ).config
     with pytest.warns(
-        FailedRecordsWarning, match="^1 of 2 records made to time the plan failed: it grew$"
+        FailedRecordsWarning,
+        match="^1 of 2 records made to time the plan failed: it grew$",
     ):
         predict(config)

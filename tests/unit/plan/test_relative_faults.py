@@ -40,7 +40,9 @@ def test_a_larger_gear_has_as_much_larger_faults():
 def test_a_length_in_millimetres_is_taken_as_it_is():
     spec = "{crack_depth_mm: {distribution: uniform, low: 1, high: 2}}"
     plan = make_plan(
-        read_request(["fault=crack", f"fault.vary={spec}", "gear.normal_module_mm=4"]).config
+        read_request(
+            ["fault=crack", f"fault.vary={spec}", "gear.normal_module_mm=4"]
+        ).config
     )
     depth = np.asarray(plan.columns["params/fault.crack_depth_mm"])
     assert 1.0 <= depth.min() <= depth.max() <= 2.0

@@ -20,7 +20,9 @@ IDEAL = Accelerometer(
 
 def gain(sensor, frequency):
     time = np.arange(51200) / RATE
-    answer = sensor.filtered(np.sin(2 * np.pi * frequency * time)[None], RATE)[0, 25_600:]
+    answer = sensor.filtered(np.sin(2 * np.pi * frequency * time)[None], RATE)[
+        0, 25_600:
+    ]
     return np.sqrt(2.0 * np.mean(answer**2))
 
 
@@ -45,7 +47,9 @@ def test_mounted_resonance_also_above_half_the_rate(resonance, frequency):
 @pytest.mark.parametrize("frequency", [2.0, 5.0, 10.0, 20.0, 200.0])
 def test_low_cut_off_is_of_first_order(frequency):
     exact = 1.0 / np.sqrt(1.0 + (10.0 / frequency) ** 2)
-    assert_allclose(gain(replace(IDEAL, low_cutoff=10.0), frequency), exact, rtol=0.01, atol=0)
+    assert_allclose(
+        gain(replace(IDEAL, low_cutoff=10.0), frequency), exact, rtol=0.01, atol=0
+    )
 
 
 @pytest.mark.parametrize("bits", [8, 12, 16])
@@ -57,16 +61,27 @@ def test_converter_steps_and_range(bits):
     assert_allclose(found / step, np.rint(found / step), rtol=0, atol=1e-9)
     inside = np.abs(signal) < 10.0 - step
     assert np.abs(found - signal)[inside].max() <= 0.5 * step * (1 + 1e-9)
-    assert_allclose([found.min(), found.max()], [-10.0, 10.0 - step], rtol=1e-12, atol=0)
+    assert_allclose(
+        [found.min(), found.max()], [-10.0, 10.0 - step], rtol=1e-12, atol=0
+    )
     assert_allclose(clipped, 2.0 / 22.0, rtol=0, atol=step)
 
 
 def test_scatter_stays_within_the_data_sheet():
     sensor = replace(
-        IDEAL, sensitivity_tolerance=0.1, transverse_sensitivity=0.05, dc_offset_m_per_s2=0.3
+        IDEAL,
+        sensitivity_tolerance=0.1,
+        transverse_sensitivity=0.05,
+        dc_offset_m_per_s2=0.3,
     )
-    drawn = [draw_sensors(np.random.default_rng(seed), sensor, 3) for seed in range(300)]
-    for name, middle, most in (("gain", 1.0, 0.1), ("transverse", 0.0, 0.05), ("offset", 0.0, 0.3)):
+    drawn = [
+        draw_sensors(np.random.default_rng(seed), sensor, 3) for seed in range(300)
+    ]
+    for name, middle, most in (
+        ("gain", 1.0, 0.1),
+        ("transverse", 0.0, 0.05),
+        ("offset", 0.0, 0.3),
+    ):
         values = np.concatenate([getattr(one, name) for one in drawn]) - middle
         assert 0.97 * most < np.abs(values).max() <= most * (1 + 1e-12)
         assert abs(values.mean()) < 0.1 * most
@@ -79,9 +94,15 @@ def test_scatter_stays_within_the_data_sheet():
             {"sensitivity_tolerance": 0.6},
             "sensing.sensor.sensitivity_tolerance = 0.6 must lie in 0..0.5",
         ),
-        ({"transverse_sensitivity": -0.1}, "sensing.sensor.transverse_sensitivity = -0.1"),
+        (
+            {"transverse_sensitivity": -0.1},
+            "sensing.sensor.transverse_sensitivity = -0.1",
+        ),
         ({"mounted_resonance": 10.0}, "sensing.sensor.mounted_resonance_hz = 10"),
-        ({"resonance_damping_ratio": 0.0}, "sensing.sensor.resonance_damping_ratio = 0"),
+        (
+            {"resonance_damping_ratio": 0.0},
+            "sensing.sensor.resonance_damping_ratio = 0",
+        ),
         ({"low_cutoff": 0.0}, "sensing.sensor.low_cutoff_hz = 0"),
         ({"dc_offset_m_per_s2": -1.0}, "sensing.sensor.dc_offset_m_per_s2 = -1"),
         ({"adc_bits": 12}, "give both adc_range_m_per_s2 and adc_bits"),

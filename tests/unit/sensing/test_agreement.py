@@ -58,7 +58,9 @@ class TestBands:
         assert np.all(upper - lower >= 4 * RATE / n_samples)
 
     def test_too_short(self):
-        with pytest.raises(ValueError, match="40 samples at 51200 Hz resolve no third-octave band"):
+        with pytest.raises(
+            ValueError, match="40 samples at 51200 Hz resolve no third-octave band"
+        ):
             third_octave_bands(40, RATE)
 
 
@@ -80,12 +82,16 @@ class TestPower:
         lower, upper = third_octave_bands(N_SAMPLES, RATE)
         found = third_octave_power(noise(200), RATE).mean(axis=0)
         assert_allclose(found, (upper - lower) / (RATE / 2), rtol=0.1, atol=0)
-        assert_allclose(10 * np.log10(found[18:29] / found[17:28]), 1.0, rtol=0, atol=0.1)
+        assert_allclose(
+            10 * np.log10(found[18:29] / found[17:28]), 1.0, rtol=0, atol=0.1
+        )
 
     def test_the_length_does_not_matter(self):
         signal = noise(50)
         long = third_octave_power(signal, RATE)[..., -10:]
-        short = third_octave_power(signal.reshape(50, 20, -1), RATE).mean(axis=1)[..., -10:]
+        short = third_octave_power(signal.reshape(50, 20, -1), RATE).mean(axis=1)[
+            ..., -10:
+        ]
         assert_allclose(short.mean(axis=0), long.mean(axis=0), rtol=0.02, atol=0)
 
 
@@ -94,7 +100,9 @@ class TestThirdOctaves:
         """The variance of a level is (10 / ln 10)^2 x 35/18 over width times duration under a Hann window."""
         lower, upper = third_octave_bands(N_SAMPLES, RATE)
         powers = third_octave_power(noise(2, 400), RATE)[..., 10:]
-        found = np.sqrt(np.mean(np.square(10 * np.log10(powers[0] / powers[1])), axis=0))
+        found = np.sqrt(
+            np.mean(np.square(10 * np.log10(powers[0] / powers[1])), axis=0)
+        )
         assert_allclose(found, (8.56 / np.sqrt(upper - lower))[10:], rtol=0.15, atol=0)
 
     @pytest.mark.parametrize("moved", [-3.0, -0.3, 0.5, 2.0])
@@ -105,7 +113,10 @@ class TestThirdOctaves:
         found = exact.copy()
         found[1, 1] = tone(MIDDLES[17], moved) + others
         assert_allclose(
-            third_octave_difference(found, exact, RATE), [0.0, abs(moved)], rtol=0, atol=2e-3
+            third_octave_difference(found, exact, RATE),
+            [0.0, abs(moved)],
+            rtol=0,
+            atol=2e-3,
         )
 
     @pytest.mark.parametrize("factor", [0.5, 1.02, 3.0])
@@ -114,7 +125,9 @@ class TestThirdOctaves:
         found = third_octave_difference(factor * exact, exact, RATE)
         assert_allclose(found, abs(20 * np.log10(factor)), rtol=1e-9, atol=0)
 
-    @pytest.mark.parametrize(("level", "heard"), [(-HEARD_DB + 3, True), (-HEARD_DB - 3, False)])
+    @pytest.mark.parametrize(
+        ("level", "heard"), [(-HEARD_DB + 3, True), (-HEARD_DB - 3, False)]
+    )
     def test_what_is_far_below_the_loudest_is_not_heard(self, level, heard):
         loud = tone(MIDDLES[17])
         exact, found = (
@@ -126,19 +139,25 @@ class TestThirdOctaves:
     def test_the_loudest_is_that_of_the_channel(self):
         quiet = tone(MIDDLES[17], -80)
         difference = third_octave_difference(
-            one_lane(tone(MIDDLES[17]), 2 * quiet), one_lane(tone(MIDDLES[17]), quiet), RATE
+            one_lane(tone(MIDDLES[17]), 2 * quiet),
+            one_lane(tone(MIDDLES[17]), quiet),
+            RATE,
         )
         assert_allclose(difference, 20 * np.log10(2), rtol=1e-9, atol=0)
 
     def test_what_one_alone_has_is_heard(self):
         exact = one_lane(tone(MIDDLES[17]))
-        assert third_octave_difference(exact + tone(MIDDLES[24], -20), exact, RATE)[0] > 20
+        assert (
+            third_octave_difference(exact + tone(MIDDLES[24], -20), exact, RATE)[0] > 20
+        )
 
 
 class TestIndicators:
     def test_a_scaled_signal_differs_in_rms_alone(self):
         exact = noise(2, 3)
-        assert_allclose(indicator_difference(1.03 * exact, exact), 0.03, rtol=1e-9, atol=0)
+        assert_allclose(
+            indicator_difference(1.03 * exact, exact), 0.03, rtol=1e-9, atol=0
+        )
 
     def test_a_clipped_peak_shows_in_the_crest_factor(self):
         """One sample of 51 200 at 8 goes to 6: the crest factor falls by a quarter, RMS and kurtosis hardly change."""
@@ -152,13 +171,18 @@ class TestIndicators:
         exact = tone(1000.0)
         found = exact * np.where(np.arange(N_SAMPLES) < N_SAMPLES // 2, np.sqrt(2), 0)
         assert_allclose(
-            indicator_difference(one_lane(found), one_lane(exact)), 1.0, rtol=1e-3, atol=0
+            indicator_difference(one_lane(found), one_lane(exact)),
+            1.0,
+            rtol=1e-3,
+            atol=0,
         )
 
     def test_the_worst_channel_of_each_lane(self):
         exact = noise(2, 2)
         factor = np.array([[1.0, 1.01], [0.9, 1.02]])[..., None]
-        assert_allclose(indicator_difference(factor * exact, exact), [0.01, 0.1], rtol=1e-9, atol=0)
+        assert_allclose(
+            indicator_difference(factor * exact, exact), [0.01, 0.1], rtol=1e-9, atol=0
+        )
 
 
 class TestAgreement:

@@ -18,7 +18,8 @@ N = 10_000
 def logarithms(seeds, *, scatter=0.1, time=0.5, n_samples=501, rate=500.0):
     """(record and sensor, sample)"""
     drawn = [
-        draw_drift(np.random.default_rng(seed), scatter, time, 2, n_samples, rate) for seed in seeds
+        draw_drift(np.random.default_rng(seed), scatter, time, 2, n_samples, rate)
+        for seed in seeds
     ]
     return np.log(np.concatenate(drawn))
 
@@ -41,13 +42,17 @@ def test_drift_is_slow_and_each_sensors_own():
 
 
 def test_a_longer_record_begins_as_a_shorter_one():
-    short, long = (draw_drift(np.random.default_rng(1), 0.1, 0.3, 2, n, 1000.0) for n in (200, 900))
+    short, long = (
+        draw_drift(np.random.default_rng(1), 0.1, 0.3, 2, n, 1000.0) for n in (200, 900)
+    )
     assert_allclose(long[:, :200], short, rtol=1e-12, atol=0)
 
 
 @pytest.mark.parametrize("run", [1, 64])
 def test_the_asked_share_is_lost_in_whole_packets(run):
-    lost = [draw_dropped(np.random.default_rng(seed), 0.1, run, N) for seed in range(200)]
+    lost = [
+        draw_dropped(np.random.default_rng(seed), 0.1, run, N) for seed in range(200)
+    ]
     assert all(one.shape == (N,) for one in lost)
     share = np.mean(lost)
     assert_allclose(share, 0.1, rtol=0, atol=4.0 * np.sqrt(0.09 * run / (200 * N)))
@@ -68,8 +73,12 @@ def test_the_first_packet_begins_anywhere():
 def test_filling():
     signal = np.arange(1.0, 9.0)[None] * [[1.0], [10.0]]
     dropped = np.array([1, 0, 0, 1, 1, 0, 1, 0], dtype=bool)
-    assert_allclose(filled(signal, dropped, "zero")[0], [0, 2, 3, 0, 0, 6, 0, 8], rtol=0, atol=0)
-    assert_allclose(filled(signal, dropped, "hold")[0], [2, 2, 3, 3, 3, 6, 6, 8], rtol=0, atol=0)
+    assert_allclose(
+        filled(signal, dropped, "zero")[0], [0, 2, 3, 0, 0, 6, 0, 8], rtol=0, atol=0
+    )
+    assert_allclose(
+        filled(signal, dropped, "hold")[0], [2, 2, 3, 3, 3, 6, 6, 8], rtol=0, atol=0
+    )
     assert_allclose(
         filled(signal, dropped, "hold")[1],
         10.0 * filled(signal, dropped, "hold")[0],
@@ -91,7 +100,9 @@ def test_none_changes_no_bit():
 
 
 def test_an_instrument_that_has_them():
-    one = instrument(changed(HOUSING, sensor__drift_scatter=0.05, sensor__dropped_fraction=0.2))
+    one = instrument(
+        changed(HOUSING, sensor__drift_scatter=0.05, sensor__dropped_fraction=0.2)
+    )
     drift = one.drift(4000, np.random.default_rng(0))
     assert drift.shape == (3, 4000)
     assert np.abs(np.log(drift)).max() < 0.25
@@ -104,7 +115,10 @@ def test_an_instrument_that_has_them():
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"sensor__drift_scatter": 0.6}, "sensing.sensor.drift_scatter = 0.6 must lie in 0..0.5"),
+        (
+            {"sensor__drift_scatter": 0.6},
+            "sensing.sensor.drift_scatter = 0.6 must lie in 0..0.5",
+        ),
         (
             {"sensor__drift_time_s": 0.01},
             "sensing.sensor.drift_time_s = 0.01 must lie in 0.1..1e+06",
@@ -130,7 +144,10 @@ def test_an_instrument_that_has_them():
             {"tacho": {"shaft": "pinion"}},
             "sensing.tacho: missing pulses_per_turn, pulse_width_share, jitter_deg",
         ),
-        ({"encoder__shaft": "x"}, "sensing.encoder.shaft = 'x'; allowed: pinion, wheel"),
+        (
+            {"encoder__shaft": "x"},
+            "sensing.encoder.shaft = 'x'; allowed: pinion, wheel",
+        ),
         ({"encoder": {"lines": 3}}, "sensing.encoder: unknown key 'lines'"),
     ],
 )

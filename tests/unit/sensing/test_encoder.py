@@ -11,7 +11,11 @@ from gensig.errors import ConfigError
 from gensig.sensing.encoder import Disc, Encoder, draw_disc
 
 PERFECT = Encoder(
-    shaft="pinion", lines_per_turn=1000, eccentricity_error=0.0, line_error=0.0, quantised=True
+    shaft="pinion",
+    lines_per_turn=1000,
+    eccentricity_error=0.0,
+    line_error=0.0,
+    quantised=True,
 )
 ANGLE = np.linspace(-1.0, 40.0, 200_001)
 
@@ -32,7 +36,9 @@ def test_a_perfect_one_is_behind_by_at_most_a_line():
     off = error(PERFECT)
     assert off.max() <= 1e-9
     assert off.min() > -PERFECT.spacing * (1.0 + 1e-9)
-    assert_allclose(read / PERFECT.spacing, np.rint(read / PERFECT.spacing), rtol=0, atol=1e-8)
+    assert_allclose(
+        read / PERFECT.spacing, np.rint(read / PERFECT.spacing), rtol=0, atol=1e-8
+    )
     assert np.all(np.diff(read) >= -1e-12)
     assert_allclose(off.std(), PERFECT.spacing / np.sqrt(12.0), rtol=0.02, atol=0)
 
@@ -88,7 +94,9 @@ def test_the_pattern_repeats_every_turn_and_is_each_discs_own():
 
 
 def test_lines_pass_in_order_at_the_largest_errors():
-    encoder = replace(PERFECT, eccentricity_error=np.radians(5.0), line_error=0.1 * PERFECT.spacing)
+    encoder = replace(
+        PERFECT, eccentricity_error=np.radians(5.0), line_error=0.1 * PERFECT.spacing
+    )
     for seed in range(50):
         places = disc_of(encoder, seed).places
         assert np.all(np.diff([*places, places[0] + 2.0 * np.pi]) > 0.0)
@@ -97,7 +105,15 @@ def test_lines_pass_in_order_at_the_largest_errors():
 def test_a_line_is_read_where_it_passes():
     disc = Disc(index=0.5, places=np.array([0.1, np.pi / 2, np.pi, 3 * np.pi / 2]))
     angle = 0.5 + np.array(
-        [0.0, 0.05, 0.11, np.pi - 0.01, np.pi + 0.01, 2 * np.pi + 0.05, 2 * np.pi + 0.11]
+        [
+            0.0,
+            0.05,
+            0.11,
+            np.pi - 0.01,
+            np.pi + 0.01,
+            2 * np.pi + 0.05,
+            2 * np.pi + 0.11,
+        ]
     )
     expected = np.pi / 2 * np.array([-1, -1, 0, 1, 2, 3, 4])
     assert_allclose(disc.read(angle, quantised=True), expected, rtol=0, atol=1e-12)
@@ -107,9 +123,15 @@ def test_a_line_is_read_where_it_passes():
     ("changes", "text"),
     [
         ({"shaft": "load"}, "sensing.encoder.shaft = 'load'; allowed: pinion, wheel"),
-        ({"lines_per_turn": 3}, "sensing.encoder.lines_per_turn = 3 must lie in 4..100000"),
+        (
+            {"lines_per_turn": 3},
+            "sensing.encoder.lines_per_turn = 3 must lie in 4..100000",
+        ),
         ({"eccentricity_error": 0.1}, "sensing.encoder.eccentricity_error_deg = 5.7"),
-        ({"line_error": 0.01}, "must lie in 0..0.036, a tenth of the spacing of the lines"),
+        (
+            {"line_error": 0.01},
+            "must lie in 0..0.036, a tenth of the spacing of the lines",
+        ),
     ],
 )
 def test_values_out_of_range(changes, text):

@@ -34,7 +34,9 @@ BY_HAND = {
 
 @pytest.mark.parametrize("limit", LIMITS)
 def test_grade_5_by_hand(xiamen, limit):
-    for gear, expected in zip((xiamen.pair.pinion, xiamen.pair.wheel), BY_HAND[limit], strict=True):
+    for gear, expected in zip(
+        (xiamen.pair.pinion, xiamen.pair.wheel), BY_HAND[limit], strict=True
+    ):
         assert_allclose(limit(gear, 5), expected * UM, rtol=1e-6, atol=0)
 
 
@@ -42,7 +44,9 @@ def test_grade_5_by_hand(xiamen, limit):
 def test_two_grades_are_a_factor_of_two(xiamen, limit):
     for gear in (xiamen.pair.pinion, xiamen.pair.wheel):
         assert_allclose(limit(gear, 7), 2 * limit(gear, 5), rtol=1e-12, atol=0)
-        assert_allclose(limit(gear, 5.5) ** 2, limit(gear, 5) * limit(gear, 6), rtol=1e-12, atol=0)
+        assert_allclose(
+            limit(gear, 5.5) ** 2, limit(gear, 5) * limit(gear, 6), rtol=1e-12, atol=0
+        )
 
 
 def test_runout_is_nine_tenths_of_the_cumulative_pitch(xiamen):
@@ -81,5 +85,9 @@ def test_gears_that_are_not_covered(gear_with, changes, text):
 
 
 def test_the_ends_of_the_range_are_covered(gear_with):
-    for changes in ({"n_teeth": 1000}, {"normal_module": 0.5e-3}, {"normal_module": 70e-3}):
+    for changes in (
+        {"n_teeth": 1000},
+        {"normal_module": 0.5e-3},
+        {"normal_module": 70e-3},
+    ):
         assert single_pitch_limit(gear_with(**changes), 5) > 0.0

@@ -30,7 +30,8 @@ def changed(values, **changes):
 
 def instrument(values, seed=0):
     return draw_instrument(
-        read_sensing(values), *(np.random.default_rng(seed + place) for place in range(2))
+        read_sensing(values),
+        *(np.random.default_rng(seed + place) for place in range(2)),
     )
 
 
@@ -51,10 +52,16 @@ def test_on_the_bearing_nothing_changes():
 def test_measuring_is_linear_and_names_the_sensors():
     one = instrument(HOUSING)
     first, second = source(one.sensing, 2000), source(one.sensing, 2000)[::-1]
-    assert one.sensing.channel_names == ("housing_input", "housing_output", "housing_top")
+    assert one.sensing.channel_names == (
+        "housing_input",
+        "housing_output",
+        "housing_top",
+    )
     together = one.measure(2.0 * first - second)
     assert together.shape == (3, 2000)
-    assert_allclose(together, 2.0 * one.measure(first) - one.measure(second), rtol=0, atol=1e-9)
+    assert_allclose(
+        together, 2.0 * one.measure(first) - one.measure(second), rtol=0, atol=1e-9
+    )
 
 
 @pytest.mark.parametrize("n_lead", [0, None])
@@ -75,7 +82,9 @@ def test_filters_have_settled_at_the_first_sample(n_lead, monkeypatch):
 @pytest.mark.parametrize("snr_db", [-5.0, 20.0])
 @pytest.mark.parametrize("n_samples", [5120, 51_200])
 def test_achieved_signal_to_noise_ratio_in_the_band(snr_db, n_samples):
-    one = instrument(changed(HOUSING, sensor__adc_bits=None, sensor__adc_range_m_per_s2=None))
+    one = instrument(
+        changed(HOUSING, sensor__adc_bits=None, sensor__adc_range_m_per_s2=None)
+    )
     clean = one.measure(source(one.sensing, n_samples))
     noisy, clipped = one.record(
         clean, one.power(clean) * 10 ** (-snr_db / 10), np.random.default_rng(3)
@@ -98,7 +107,9 @@ def test_noise_of_the_path_has_the_resonances_of_the_path():
     )
     noise = one.record(np.zeros((3, 51_200)), np.ones(3), np.random.default_rng(4))[0]
     lines = np.abs(np.fft.rfft(noise, axis=1)) ** 2
-    assert np.all(lines[:, 1900:2100].mean(axis=1) > 100.0 * lines[:, 9000:10_000].mean(axis=1))
+    assert np.all(
+        lines[:, 1900:2100].mean(axis=1) > 100.0 * lines[:, 9000:10_000].mean(axis=1)
+    )
 
 
 def test_no_noise_leaves_converter_and_offset():
@@ -123,7 +134,9 @@ def test_gearboxes_differ_and_path_and_sensor_have_their_own_numbers():
     path = [instrument(HOUSING, seed).path.natural_frequency[0] for seed in range(5)]
     assert len(set(path)) == 5
     calm = changed(HOUSING, path__n_modes=[3, 3])
-    assert_allclose(instrument(calm).sensors.gain, instrument(HOUSING).sensors.gain, rtol=0, atol=0)
+    assert_allclose(
+        instrument(calm).sensors.gain, instrument(HOUSING).sensors.gain, rtol=0, atol=0
+    )
 
 
 @pytest.mark.parametrize(
@@ -134,7 +147,11 @@ def test_gearboxes_differ_and_path_and_sensor_have_their_own_numbers():
             {"sensors": None},
             "sensing.sensors names the places that a transfer path leads to: give at least one",
         ),
-        (BEARING, {"sensors": ["a"]}, "leave it null with sensing.path.kind = identity"),
+        (
+            BEARING,
+            {"sensors": ["a"]},
+            "leave it null with sensing.path.kind = identity",
+        ),
         (HOUSING, {"sensors": ["a", "a"]}, "must name at least one sensor, each once"),
         (HOUSING, {"sensors": ["a b"]}, "sensing.sensors: 'a b'"),
         (HOUSING, {"sensors": ["my_rotation"]}, "not ending in 'rotation'"),
@@ -149,7 +166,11 @@ def test_gearboxes_differ_and_path_and_sensor_have_their_own_numbers():
             {"sampling_rate_hz": 25_600},
             "give 'sensing.path.natural_frequency_hz=[300,10000]' or a rate of at least 30720 Hz",
         ),
-        (HOUSING, {"noise__band_hz": [10, 30_000]}, "above half of sensing.sampling_rate_hz"),
+        (
+            HOUSING,
+            {"noise__band_hz": [10, 30_000]},
+            "above half of sensing.sampling_rate_hz",
+        ),
         (
             BEARING,
             {"noise__parts": [{"kind": "path", "share": 1}]},
@@ -191,6 +212,10 @@ def test_a_measured_path_tells_no_transverse_motion():
 def test_a_group_without_the_new_keys_is_named():
     with pytest.raises(
         ConfigError,
-        match=re.escape("sensing: missing path, sensor, noise, nuisances, tacho, encoder"),
+        match=re.escape(
+            "sensing: missing path, sensor, noise, nuisances, tacho, encoder"
+        ),
     ):
-        read_sensing({key: value for key, value in BEARING.items() if key not in NESTED})
+        read_sensing(
+            {key: value for key, value in BEARING.items() if key not in NESTED}
+        )

@@ -87,7 +87,9 @@ def used(pair, specimen, grade):
     for name in GEARS:
         gear = getattr(pair, name)
         error = getattr(specimen, f"{name}_error")
-        arc = error / np.cos(gear.pressure_angle)  # offsets are along the line of action
+        arc = error / np.cos(
+            gear.pressure_angle
+        )  # offsets are along the line of action
         slopes, form = profile_of(pair, specimen, name)
         shares[name] = np.array([
             largest_step(arc) / single_pitch_limit(gear, grade),
@@ -125,10 +127,15 @@ def pairs(xiamen, gear_with):
 class TestLimits:
     def test_every_gear_keeps_to_its_grade(self, pairs, quality, name, grade):
         own = quality(
-            iso1328_grade=grade, used_share_low=0.8, used_share_high=1.0, undulation_share=0.3
+            iso1328_grade=grade,
+            used_share_low=0.8,
+            used_share_high=1.0,
+            undulation_share=0.3,
         )
         for seed in range(25):
-            for shares in used(pairs[name], draw(pairs[name], own, seed), grade).values():
+            for shares in used(
+                pairs[name], draw(pairs[name], own, seed), grade
+            ).values():
                 assert (shares <= 1.0 + 1e-6).all(), (seed, shares)
 
     @pytest.mark.parametrize("share", [0.3, 0.9])
@@ -136,9 +143,13 @@ class TestLimits:
         """Of the single pitch and the profile form to the last digit, of nothing more."""
         own = quality(iso1328_grade=grade, used_share_low=share, used_share_high=share)
         for seed in range(8):
-            for shares in used(pairs[name], draw(pairs[name], own, seed), grade).values():
+            for shares in used(
+                pairs[name], draw(pairs[name], own, seed), grade
+            ).values():
                 assert_allclose(shares[0], share, rtol=1e-9, atol=0)
-                assert_allclose(shares[3], share, rtol=2e-3, atol=0)  # the trace is read at points
+                assert_allclose(
+                    shares[3], share, rtol=2e-3, atol=0
+                )  # the trace is read at points
                 assert (shares <= share * (1.0 + 1e-6)).all()
 
 
@@ -159,33 +170,50 @@ class TestWhatIsDrawn:
         assert np.ptp(found) > 0.4
 
     def test_everything_doubles_in_two_grades(self, xiamen, quality):
-        fine, coarse = (draw(xiamen.pair, quality(iso1328_grade=grade), 3) for grade in (5, 7))
+        fine, coarse = (
+            draw(xiamen.pair, quality(iso1328_grade=grade), 3) for grade in (5, 7)
+        )
         for key in ("pinion_error", "wheel_error", "pinion_tilt", "wheel_tilt"):
-            assert_allclose(getattr(coarse, key), 2 * getattr(fine, key), rtol=1e-9, atol=1e-20)
+            assert_allclose(
+                getattr(coarse, key), 2 * getattr(fine, key), rtol=1e-9, atol=1e-20
+            )
         for one, other in zip(fine.forms, coarse.forms, strict=True):
-            assert_allclose(other.profile_slope, 2 * one.profile_slope, rtol=1e-12, atol=0)
-            assert_allclose(other.profile_form, 2 * one.profile_form, rtol=1e-12, atol=0)
+            assert_allclose(
+                other.profile_slope, 2 * one.profile_slope, rtol=1e-12, atol=0
+            )
+            assert_allclose(
+                other.profile_form, 2 * one.profile_form, rtol=1e-12, atol=0
+            )
 
     def test_errors_have_no_mean(self, xiamen, quality):
         for seed in range(10):
             specimen = draw(xiamen.pair, quality(), seed)
             for name in GEARS:
-                assert_allclose(getattr(specimen, f"{name}_error").mean(), 0.0, rtol=0, atol=1e-15)
+                assert_allclose(
+                    getattr(specimen, f"{name}_error").mean(), 0.0, rtol=0, atol=1e-15
+                )
 
     def test_eccentricity_is_the_only_once_per_turn_part(self, xiamen, quality):
         """Without the tooth-to-tooth slopes the tilts are those of an eccentric circle: it is there once, not twice."""
         for seed in range(10):
             specimen = draw(xiamen.pair, quality(tooth_share=0.0), seed)
             for name in GEARS:
-                gear, error = getattr(xiamen.pair, name), getattr(specimen, f"{name}_error")
+                gear, error = (
+                    getattr(xiamen.pair, name),
+                    getattr(specimen, f"{name}_error"),
+                )
                 tilt = getattr(specimen, f"{name}_tilt")
                 assert_allclose(
-                    tilt, eccentric_tilt(gear, error), rtol=0, atol=1e-9 * np.abs(tilt).max()
+                    tilt,
+                    eccentric_tilt(gear, error),
+                    rtol=0,
+                    atol=1e-9 * np.abs(tilt).max(),
                 )
 
     def test_eccentricities_and_phases_scatter(self, xiamen, quality):
         drawn = [
-            once_per_turn(draw(xiamen.pair, quality(), seed).wheel_error) for seed in range(80)
+            once_per_turn(draw(xiamen.pair, quality(), seed).wheel_error)
+            for seed in range(80)
         ]
         size, most = np.array(drawn).T
         assert size.min() < 1.0 * UM
@@ -193,7 +221,10 @@ class TestWhatIsDrawn:
         assert len(np.unique(np.floor(most % 84 / 21))) == 4
 
     def test_slopes_of_either_sign(self, xiamen, quality):
-        slopes = [draw(xiamen.pair, quality(), seed).forms[0].profile_slope for seed in range(40)]
+        slopes = [
+            draw(xiamen.pair, quality(), seed).forms[0].profile_slope
+            for seed in range(40)
+        ]
         assert 10 <= np.sum(np.array(slopes) > 0.0) <= 30
 
     def test_teeth_differ_by_their_share_of_the_slope(self, xiamen, quality):
@@ -205,11 +236,16 @@ class TestWhatIsDrawn:
 
     def test_undulation_is_part_of_the_form(self, xiamen, quality):
         for part in (0.0, 0.25, 1.0):
-            forms = draw(xiamen.pair, quality(undulation_share=part, undulation_waves=11), 2).forms
+            forms = draw(
+                xiamen.pair, quality(undulation_share=part, undulation_waves=11), 2
+            ).forms
             own = [form for form in forms if form.gear == "pinion"]
             waves = sum(form.profile_form for form in own if form.profile_waves == 11)
             assert_allclose(
-                waves / sum(form.profile_form for form in own), part, rtol=1e-12, atol=1e-15
+                waves / sum(form.profile_form for form in own),
+                part,
+                rtol=1e-12,
+                atol=1e-15,
             )
 
     def test_misalignment_and_backlash_keep_to_their_range(self, xiamen, quality):
@@ -230,7 +266,10 @@ class TestWhatIsDrawn:
          {"backlash_scatter": 0.0}],
     )  # fmt: skip
     def test_one_key_leaves_the_rest_alone(self, xiamen, quality, changes):
-        one, other = draw(xiamen.pair, quality(), 7), draw(xiamen.pair, quality(**changes), 7)
+        one, other = (
+            draw(xiamen.pair, quality(), 7),
+            draw(xiamen.pair, quality(**changes), 7),
+        )
         for key in ("pinion_error", "wheel_error"):
             assert_allclose(getattr(one, key), getattr(other, key), rtol=0, atol=0)
         assert any(
@@ -241,11 +280,16 @@ class TestWhatIsDrawn:
     def test_without_profile_errors(self, xiamen, quality):
         specimen = draw(xiamen.pair, quality(profile_errors=False), 1)
         assert specimen.forms == ()
-        assert_allclose(profile_of(xiamen.pair, specimen, "pinion")[0], 0.0, rtol=0, atol=1e-15)
+        assert_allclose(
+            profile_of(xiamen.pair, specimen, "pinion")[0], 0.0, rtol=0, atol=1e-15
+        )
 
     def test_no_grade_is_perfect(self, xiamen, quality):
         nothing = quality(
-            iso1328_grade=None, misalignment=9 * UM, backlash_scatter=0.9, undulation_share=0.5
+            iso1328_grade=None,
+            misalignment=9 * UM,
+            backlash_scatter=0.9,
+            undulation_share=0.5,
         )
         specimen, perfect = (
             draw(xiamen.pair, nothing),
@@ -253,9 +297,14 @@ class TestWhatIsDrawn:
         )
         for field in fields(perfect):
             assert_allclose(
-                getattr(specimen, field.name), getattr(perfect, field.name), rtol=0, atol=0
+                getattr(specimen, field.name),
+                getattr(perfect, field.name),
+                rtol=0,
+                atol=0,
             )
-        assert not any(np.any(getattr(specimen, field.name)) for field in fields(perfect)[:-1])
+        assert not any(
+            np.any(getattr(specimen, field.name)) for field in fields(perfect)[:-1]
+        )
         assert specimen.backlash_factor == 1.0
 
     def test_a_gear_outside_the_standard_needs_no_grade(self, machine):
@@ -264,22 +313,32 @@ class TestWhatIsDrawn:
             "gear.pinion.bore_radius_mm": 1.5,
             "gear.wheel.bore_radius_mm": 5,
         }
-        with pytest.raises(ConfigError, match=r"covers 0\.5 to 70 mm module, the pinion has 0\.4"):
+        with pytest.raises(
+            ConfigError, match=r"covers 0\.5 to 70 mm module, the pinion has 0\.4"
+        ):
             machine(tiny).check()
         machine({**tiny, "quality.iso1328_grade": None}).check()
 
 
 def test_gearbox_factors_scatter_as_told(xiamen):
-    quality = replace(xiamen.quality, support_stiffness_scatter=0.2, support_damping_scatter=0.1)
+    quality = replace(
+        xiamen.quality, support_stiffness_scatter=0.2, support_damping_scatter=0.1
+    )
     drawn = [draw_gearbox(rng(seed), 4, quality, 0.05) for seed in range(400)]
-    for key, scatter in (("stiffness_factor", 0.2), ("damping_factor", 0.1), ("gain", 0.05)):
+    for key, scatter in (
+        ("stiffness_factor", 0.2),
+        ("damping_factor", 0.1),
+        ("gain", 0.05),
+    ):
         logarithm = np.log([getattr(gearbox, key) for gearbox in drawn])
         assert_allclose(logarithm.std(), scatter, rtol=0.06, atol=0)
         assert_allclose(logarithm.mean(), 0.0, rtol=0, atol=0.1 * scatter)
 
 
 def test_no_scatter_is_nominal(xiamen):
-    quality = replace(xiamen.quality, support_stiffness_scatter=0.0, support_damping_scatter=0.0)
+    quality = replace(
+        xiamen.quality, support_stiffness_scatter=0.0, support_damping_scatter=0.0
+    )
     drawn, nominal = draw_gearbox(rng(), 3, quality, 0.0), nominal_gearbox(3)
     for key in ("stiffness_factor", "damping_factor", "gain"):
         assert_allclose(getattr(drawn, key), getattr(nominal, key), rtol=0, atol=0)
@@ -288,14 +347,23 @@ def test_no_scatter_is_nominal(xiamen):
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"iso1328_grade": 12}, "quality.iso1328_grade = 12 must lie in 1..11, or be null"),
-        ({"used_share_low": 0.95}, "quality.used_share_low and used_share_high must be ordered"),
+        (
+            {"iso1328_grade": 12},
+            "quality.iso1328_grade = 12 must lie in 1..11, or be null",
+        ),
+        (
+            {"used_share_low": 0.95},
+            "quality.used_share_low and used_share_high must be ordered",
+        ),
         (
             {"support_damping_scatter": -0.1},
             "quality.support_damping_scatter = -0.1 must lie in 0..1",
         ),
         ({"tooth_share": 1.1}, "quality.tooth_share = 1.1 must lie in 0..1"),
-        ({"undulation_share": -0.1}, "quality.undulation_share = -0.1 must lie in 0..1"),
+        (
+            {"undulation_share": -0.1},
+            "quality.undulation_share = -0.1 must lie in 0..1",
+        ),
         ({"undulation_waves": 0}, "quality.undulation_waves = 0 must lie in 1..50"),
         ({"misalignment": -3e-6}, "quality.misalignment_um = -3 must not be negative"),
         ({"backlash_scatter": 1.5}, "quality.backlash_scatter = 1.5 must lie in 0..1"),
@@ -309,9 +377,18 @@ def test_values_out_of_range(xiamen, changes, text):
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"quality.profile_errors": 1}, "quality.profile_errors = 1 is not true or false"),
-        ({"quality.undulation_waves": 2.5}, "quality.undulation_waves = 2.5 is not a whole number"),
-        ({"quality.misalignment_um": "much"}, "quality.misalignment_um = 'much' is not a number"),
+        (
+            {"quality.profile_errors": 1},
+            "quality.profile_errors = 1 is not true or false",
+        ),
+        (
+            {"quality.undulation_waves": 2.5},
+            "quality.undulation_waves = 2.5 is not a whole number",
+        ),
+        (
+            {"quality.misalignment_um": "much"},
+            "quality.misalignment_um = 'much' is not a number",
+        ),
         ({"quality.tooth_share": None}, "quality.tooth_share is null; give a value"),
     ],
 )

@@ -16,7 +16,14 @@ PAIRS = ("pinion_y_to_housing", "wheel_y_to_housing")
 
 
 def write(path, names, columns):
-    np.savetxt(path, np.column_stack(columns), "%.12g", ",", header=",".join(names), comments="")
+    np.savetxt(
+        path,
+        np.column_stack(columns),
+        "%.12g",
+        ",",
+        header=",".join(names),
+        comments="",
+    )
     return str(path)
 
 
@@ -45,7 +52,9 @@ def test_impulse_response_is_a_convolution(tmp_path):
     rng = np.random.default_rng(1)
     taps, source = rng.standard_normal((2, 64)), rng.standard_normal((2, 500))
     found = read(impulse_file(tmp_path / "h.csv", taps)).apply(source, RATE)
-    expected = sum(np.convolve(row, tap)[:500] for row, tap in zip(source, taps, strict=True))
+    expected = sum(
+        np.convolve(row, tap)[:500] for row, tap in zip(source, taps, strict=True)
+    )
     assert_allclose(found, [expected], rtol=0, atol=1e-9)
 
 
@@ -54,7 +63,10 @@ def test_linear_and_causal(tmp_path):
     one, other = np.random.default_rng(2).standard_normal((2, 2, 3000))
     together = path.apply(one + 2.0 * other, RATE)
     assert_allclose(
-        together, path.apply(one, RATE) + 2.0 * path.apply(other, RATE), rtol=0, atol=1e-9
+        together,
+        path.apply(one, RATE) + 2.0 * path.apply(other, RATE),
+        rtol=0,
+        atol=1e-9,
     )
     late = one.copy()
     late[:, 1500:] = 0.0
@@ -91,7 +103,9 @@ def test_refused_files(tmp_path):
         "reaches from 0 to 5000 Hz; 20 to 20000 Hz is needed": frequency_file(file.with_stem("f"), mode, high=5000.0),
         "comes before time 0": frequency_file(file.with_stem("g"), lambda f: np.conj(mode(f))),
     }  # fmt: skip
-    backwards = write(file.with_stem("i"), ["time_s", *PAIRS], [-np.arange(32) / RATE, *taps])
+    backwards = write(
+        file.with_stem("i"), ["time_s", *PAIRS], [-np.arange(32) / RATE, *taps]
+    )
     cases["time_s must rise in even steps"] = backwards
     words = tmp_path / "words.csv"
     words.write_text("time_s,a\n1,two\n" * 20)

@@ -35,7 +35,10 @@ def place(n_samples=51200):
         return np.cumsum(rng.standard_normal((2, n_samples)), axis=1)
 
     return Place(
-        sensors=("a", "b"), n_samples=n_samples, sampling_rate=RATE, through_path=through_path
+        sensors=("a", "b"),
+        n_samples=n_samples,
+        sampling_rate=RATE,
+        through_path=through_path,
     )
 
 
@@ -45,7 +48,9 @@ def noise(*kinds, band=None):
 
 def background(path, columns, *, rate=RATE, names=("background",)):
     table = np.column_stack([np.arange(len(columns[0])) / rate, *columns])
-    np.savetxt(path, table, "%.9g", ",", header=",".join(["time_s", *names]), comments="")
+    np.savetxt(
+        path, table, "%.9g", ",", header=",".join(["time_s", *names]), comments=""
+    )
     return {"kind": "file", "share": 1.0, "file": str(path)}
 
 
@@ -58,7 +63,9 @@ def test_every_kind_is_tested():
 
 
 @pytest.mark.parametrize("n_samples", [2048, 51200])
-@pytest.mark.parametrize("kinds", [*[(kind,) for kind in KINDS], tuple(KINDS)], ids="-".join)
+@pytest.mark.parametrize(
+    "kinds", [*[(kind,) for kind in KINDS], tuple(KINDS)], ids="-".join
+)
 def test_power_is_exact(kinds, n_samples):
     power = np.array([2.0, 0.3])
     made = noise(*kinds).make(power, np.random.default_rng(1), place(n_samples))
@@ -66,14 +73,18 @@ def test_power_is_exact(kinds, n_samples):
     assert_allclose(made.mean(axis=1), 0.0, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("kinds", [("white",), ("pink", "hum"), tuple(KINDS)], ids="-".join)
+@pytest.mark.parametrize(
+    "kinds", [("white",), ("pink", "hum"), tuple(KINDS)], ids="-".join
+)
 def test_power_in_a_band(kinds):
     from scipy.signal import butter, sosfilt
 
     made = noise(*kinds, band=[300.0, 8000.0]).make(
         np.array([2.0, 0.3]), np.random.default_rng(1), place()
     )
-    within = sosfilt(butter(8, [300.0, 8000.0], "bandpass", fs=RATE, output="sos"), made, axis=1)
+    within = sosfilt(
+        butter(8, [300.0, 8000.0], "bandpass", fs=RATE, output="sos"), made, axis=1
+    )
     assert_allclose(np.var(within, axis=1), [2.0, 0.3], rtol=0.04, atol=0)
     assert np.all(np.var(made, axis=1) > 1.02 * np.array([2.0, 0.3]))
 
@@ -82,7 +93,10 @@ def test_band_power_of_a_tone():
     tone = 3.0 * np.sin(2 * np.pi * 1000.0 * np.arange(51200) / RATE)[None] + 5.0
     assert_allclose(band_power(tone, RATE, (900.0, 1100.0)), 4.5, rtol=1e-9, atol=0)
     assert_allclose(
-        band_power(tone, RATE, (0.0, 25_600.0)), band_power(tone, RATE, None), rtol=1e-9, atol=0
+        band_power(tone, RATE, (0.0, 25_600.0)),
+        band_power(tone, RATE, None),
+        rtol=1e-9,
+        atol=0,
     )
     assert_allclose(band_power(tone, RATE, (1200.0, 2000.0)), 0.0, rtol=0, atol=1e-9)
 
@@ -125,10 +139,15 @@ def test_background_takes_a_stretch(tmp_path):
     made = read_noise({"parts": [part], "band_hz": None}).make(
         np.ones(2), np.random.default_rng(7), place(1000)
     )
-    starts = [int(np.argmax(np.correlate(recording[k], made[k], "valid"))) for k in range(2)]
+    starts = [
+        int(np.argmax(np.correlate(recording[k], made[k], "valid"))) for k in range(2)
+    ]
     assert starts[0] == starts[1]
     for k in range(2):
-        assert np.corrcoef(recording[k, starts[k] : starts[k] + 1000], made[k])[0, 1] > 1 - 1e-6
+        assert (
+            np.corrcoef(recording[k, starts[k] : starts[k] + 1000], made[k])[0, 1]
+            > 1 - 1e-6
+        )
 
 
 def spectrum(path, columns, *, names=("background",)):
@@ -168,7 +187,10 @@ def test_refused_spectra(tmp_path):
         "no column b": ([lines, good], ("a",)),
         "unknown column c": ([lines, good, good, good], ("a", "b", "c")),
         "must rise": ([[1000.0, 100.0], good], ("background",)),
-        "must not be negative, nor 0 throughout": ([lines, [1.0, -1.0]], ("background",)),
+        "must not be negative, nor 0 throughout": (
+            [lines, [1.0, -1.0]],
+            ("background",),
+        ),
         "nor 0 throughout": ([lines, [0.0, 0.0], good], ("a", "b")),
         "is no finite number": ([lines, [1.0, np.nan]], ("background",)),
         "too short": ([[100.0], [1.0]], ("background",)),
@@ -188,7 +210,9 @@ def test_refused_backgrounds(tmp_path):
         "too short: 900 rows, at least 1000": background(
             tmp_path / "a.csv", rng.standard_normal((1, 900))
         ),
-        "no column a": background(tmp_path / "b.csv", rng.standard_normal((1, 2000)), names=("c",)),
+        "no column a": background(
+            tmp_path / "b.csv", rng.standard_normal((1, 2000)), names=("c",)
+        ),
         "samples a second": background(
             tmp_path / "c.csv", rng.standard_normal((1, 2000)), rate=8000
         ),
@@ -234,7 +258,11 @@ def test_refused_backgrounds(tmp_path):
             None,
             "frequency_scatter = 0.9 must lie in 0..0.5",
         ),
-        ([KINDS["white"]], [100.0], "sensing.noise.band_hz = [100.0] must be [low, high]"),
+        (
+            [KINDS["white"]],
+            [100.0],
+            "sensing.noise.band_hz = [100.0] must be [low, high]",
+        ),
         ([KINDS["white"]], [200.0, 100.0], "must be [low, high], ordered"),
         ([KINDS["white"]], "all", "must be [low, high] in Hz, or null"),
         ([KINDS["hum"]], [100.0, 200.0], "tones alone may miss the band"),

@@ -49,11 +49,15 @@ def test_every_kind_is_tested():
 
 def test_bearing_orders_are_those_of_the_textbook():
     found = bearing_orders(9, 7.94e-3, 39.04e-3, 0.0)
-    assert_allclose([found.outer_race, found.inner_race], [3.585, 5.415], rtol=0, atol=5e-4)
+    assert_allclose(
+        [found.outer_race, found.inner_race], [3.585, 5.415], rtol=0, atol=5e-4
+    )
     assert_allclose([found.cage, found.ball], [0.3983, 2.357], rtol=0, atol=5e-4)
     ratio = 7.94 / 39.04 * math.cos(0.3)
     tilted = bearing_orders(9, 7.94e-3, 39.04e-3, 0.3)
-    assert_allclose(tilted.ball, 39.04 / (2 * 7.94) * (1 - ratio**2), rtol=1e-12, atol=0)
+    assert_allclose(
+        tilted.ball, 39.04 / (2 * 7.94) * (1 - ratio**2), rtol=1e-12, atol=0
+    )
     slipping = bearing_orders(9, 7.94e-3, 39.04e-3, 0.0, slip=0.02)
     assert_allclose(slipping.outer_race, 0.98 * found.outer_race, rtol=1e-12, atol=0)
     assert_allclose(slipping.inner_race + slipping.outer_race, 9.0, rtol=1e-12, atol=0)
@@ -67,7 +71,9 @@ def test_the_force_of_an_unbalance_of_grade_g2_5(dynamics):
     assert_allclose(tones.order, [1.0], rtol=0, atol=0)
     (wheel,) = draw(dynamics, {**PARTS["unbalance"], "gear": "wheel"})
     # the wheel turns slower by 23 / 84 in service and at the rated speed: e grows, w^2 falls
-    assert_allclose(np.abs(wheel.force), np.abs(tones.force) * 23 / 84, rtol=1e-12, atol=0)
+    assert_allclose(
+        np.abs(wheel.force), np.abs(tones.force) * 23 / 84, rtol=1e-12, atol=0
+    )
 
 
 @pytest.mark.parametrize(("gear", "sense"), [("pinion", -1.0), ("wheel", 1.0)])
@@ -76,7 +82,10 @@ def test_an_unbalance_turns_by_the_sense_of_its_gear(dynamics, gear, sense):
     turning = np.real(tones.force[0, :2] * np.exp(1j * np.array([0.0, 0.1]))[:, None])
     angles = np.arctan2(turning[:, 1], turning[:, 0])
     assert_allclose(
-        (angles[1] - angles[0] + np.pi) % (2 * np.pi) - np.pi, 0.1 * sense, rtol=1e-9, atol=0
+        (angles[1] - angles[0] + np.pi) % (2 * np.pi) - np.pi,
+        0.1 * sense,
+        rtol=1e-9,
+        atol=0,
     )
 
 
@@ -88,7 +97,10 @@ def test_the_senses_are_those_of_the_equations_of_motion():
     radius, rho, along, friction = 0.02, 0.005, 100.0, 7.0
     from_x_to_y = radius * along + rho * friction
     assert_allclose(
-        SENSE["pinion"] * from_x_to_y, -along * radius - rho * friction, rtol=1e-12, atol=0
+        SENSE["pinion"] * from_x_to_y,
+        -along * radius - rho * friction,
+        rtol=1e-12,
+        atol=0,
     )
     assert SENSE["wheel"] == -SENSE["pinion"]
 
@@ -99,7 +111,10 @@ def test_orders_and_sizes_of_a_coupling(dynamics):
     assert_allclose(np.abs(tones.force[0]), [0.0, 0.0, 1e-3 * 20.0], rtol=1e-12, atol=0)
     radial = np.linalg.norm(tones.force[1:, :2], axis=1)
     assert_allclose(
-        radial, 0.01 * dynamics.mesh_force * np.array([0.5, 1.0, 0.3]), rtol=1e-12, atol=0
+        radial,
+        0.01 * dynamics.mesh_force * np.array([0.5, 1.0, 0.3]),
+        rtol=1e-12,
+        atol=0,
     )
     direction = tones.force[1:, 1] / tones.force[1:, 0]
     assert_allclose(direction, direction[0].real, rtol=1e-9, atol=0)
@@ -108,7 +123,11 @@ def test_orders_and_sizes_of_a_coupling(dynamics):
 def test_orders_and_sizes_of_looseness(dynamics):
     (tones,) = draw(dynamics, PARTS["looseness"])
     assert_allclose(tones.order, np.arange(1, 7) / 2, rtol=0, atol=0)
-    wanted = 0.01 * dynamics.mesh_force * np.array([0.5, 1.0, 0.5 / 1.5, 0.5, 0.5 / 2.5, 1 / 3])
+    wanted = (
+        0.01
+        * dynamics.mesh_force
+        * np.array([0.5, 1.0, 0.5 / 1.5, 0.5, 0.5 / 2.5, 1 / 3])
+    )
     assert_allclose(np.linalg.norm(tones.force, axis=1), wanted, rtol=1e-12, atol=0)
 
 
@@ -117,7 +136,11 @@ def test_orders_and_sizes_of_a_bearing(dynamics):
     orders = bearing_orders(9, 7.94e-3, 39.04e-3, 0.0, slip=0.01)
     wanted = [orders.cage]
     for k in (1, 2):
-        wanted += [k * orders.outer_race, k * orders.inner_race + 1, k * orders.inner_race - 1]
+        wanted += [
+            k * orders.outer_race,
+            k * orders.inner_race + 1,
+            k * orders.inner_race - 1,
+        ]
         wanted += [2 * k * orders.ball + orders.cage, 2 * k * orders.ball - orders.cage]
     assert_allclose(sorted(tones.order), sorted(wanted), rtol=1e-12, atol=0)
     support, waviness = dynamics.pinion.support, 1e-7
@@ -128,7 +151,9 @@ def test_orders_and_sizes_of_a_bearing(dynamics):
         rtol=1e-9,
         atol=0,
     )
-    assert_allclose(np.abs(tones.force[6:]), 0.5 * np.abs(tones.force[1:6]), rtol=1e-9, atol=0)
+    assert_allclose(
+        np.abs(tones.force[6:]), 0.5 * np.abs(tones.force[1:6]), rtol=1e-9, atol=0
+    )
     assert np.all(tones.force[:, 2] == 0.0)
 
 
@@ -145,7 +170,10 @@ def test_orders_and_sizes_of_a_neighbour(dynamics):
     for order, size in wanted.items():
         (force,) = tones.force[np.isclose(tones.order, order)]
         assert_allclose(
-            np.abs(force), size * np.array([0.5, math.sqrt(0.75), 29.4e-3]), rtol=1e-9, atol=0
+            np.abs(force),
+            size * np.array([0.5, math.sqrt(0.75), 29.4e-3]),
+            rtol=1e-9,
+            atol=0,
         )
 
 
@@ -182,7 +210,10 @@ def test_a_part_more_at_the_end_changes_no_other(dynamics):
 
 def test_ranges_are_filled_and_kept(dynamics):
     part = {**PARTS["unbalance"], "used_share": [0.2, 0.8]}
-    found = [abs(draw(dynamics, part, specimen=k)[0].force[0, 0]) / 0.5655 for k in range(200)]
+    found = [
+        abs(draw(dynamics, part, specimen=k)[0].force[0, 0]) / 0.5655
+        for k in range(200)
+    ]
     assert 0.2 <= min(found) < 0.23
     assert 0.77 < max(found) <= 0.8001
     part = {**PARTS["bearing"], "slip": [0.0, 0.02]}
@@ -231,6 +262,10 @@ def test_only_a_list_is_a_list(values):
 
 
 def test_a_missing_key_is_named():
-    part = {key: value for key, value in PARTS["looseness"].items() if key != "half_share"}
-    with pytest.raises(ConfigError, match=re.escape("sensing.nuisances[1]: missing half_share")):
+    part = {
+        key: value for key, value in PARTS["looseness"].items() if key != "half_share"
+    }
+    with pytest.raises(
+        ConfigError, match=re.escape("sensing.nuisances[1]: missing half_share")
+    ):
         read_nuisances([PARTS["unbalance"], part])

@@ -12,7 +12,9 @@ from gensig.sensing.tachometer import Tachometer, draw_mark, pulse_train
 from gensig.signals.tacho import pulse_times
 
 RATE = 51_200.0
-PLAIN = Tachometer(shaft="pinion", pulses_per_turn=1, pulse_width_share=0.05, jitter=0.0)
+PLAIN = Tachometer(
+    shaft="pinion", pulses_per_turn=1, pulse_width_share=0.05, jitter=0.0
+)
 MARK = 1.234
 
 
@@ -28,7 +30,9 @@ def train(tacho=PLAIN, angle=None, mark=MARK, seed=0):
 @pytest.mark.parametrize("n_pulses", [1, 2, 60])
 def test_pulses_begin_at_the_marks(n_pulses):
     tacho = replace(PLAIN, pulses_per_turn=n_pulses, pulse_width_share=0.3)
-    expected = np.arange(MARK % tacho.spacing, steady()[-1], tacho.spacing) / (2.0 * np.pi * 30.0)
+    expected = np.arange(MARK % tacho.spacing, steady()[-1], tacho.spacing) / (
+        2.0 * np.pi * 30.0
+    )
     assert len(expected) >= 9 * n_pulses - 1
     assert_allclose(pulse_times(train(tacho), RATE), expected, rtol=0, atol=1e-6 / RATE)
 
@@ -94,7 +98,10 @@ def test_the_mark_is_anywhere():
             "sensing.tacho.pulse_width_share = 1 must lie in 0.001..0.999",
         ),
         ({"jitter": -0.1}, "sensing.tacho.jitter_deg = -5.7"),
-        ({"jitter": 0.1}, "must lie in 0..2.25, an eighth of the narrower of pulse and gap"),
+        (
+            {"jitter": 0.1},
+            "must lie in 0..2.25, an eighth of the narrower of pulse and gap",
+        ),
         ({"jitter": 0.01, "pulse_width_share": 0.99}, "must lie in 0..0.45"),
     ],
 )

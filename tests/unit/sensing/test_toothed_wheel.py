@@ -42,7 +42,9 @@ def amplitude(signal, order):
         2
         * abs(
             np.sum(
-                window * (signal[:n] - signal[:n].mean()) * np.exp(-1j * order * MEAN * TIME[:n])
+                window
+                * (signal[:n] - signal[:n].mean())
+                * np.exp(-1j * order * MEAN * TIME[:n])
             )
         )
         / window.sum()
@@ -68,7 +70,9 @@ def test_few_teeth_hold_low_orders_only():
         speed = instantaneous_speed(wheel, disc_of(wheel), angle_of(order), RATE)
         # once by the mean over a spacing, once more by the straight lines between
         assert_allclose(
-            amplitude(speed, order), SHARE * MEAN * np.sinc(order / n_teeth) ** 3, rtol=0.02
+            amplitude(speed, order),
+            SHARE * MEAN * np.sinc(order / n_teeth) ** 3,
+            rtol=0.02,
         )
 
 
@@ -99,7 +103,9 @@ def test_each_machine_has_its_own_wheel():
     one, same, other = disc_of(wheel, 1), disc_of(wheel, 1), disc_of(wheel, 2)
     assert_allclose(one.places, same.places, atol=0)
     assert np.max(np.abs(one.places - other.places)) > 1e-4
-    speeds = [instantaneous_speed(wheel, disc, MEAN * TIME, RATE) for disc in (one, other)]
+    speeds = [
+        instantaneous_speed(wheel, disc, MEAN * TIME, RATE) for disc in (one, other)
+    ]
     assert np.std(speeds[0] - speeds[1]) > 1e-3 * MEAN
 
 
@@ -107,7 +113,9 @@ def test_passages_are_where_the_teeth_are():
     disc = Disc(index=0.3, places=np.radians([0.0, 91.0, 180.0, 270.0]))
     wheel = replace(PERFECT, n_teeth=4)
     times = passage_times(wheel, disc, np.linspace(0.0, 10.0, 1001), 100.0)
-    expected = [0.3 + turn * 2 * np.pi + place for turn in (-1, 0, 1) for place in disc.places]
+    expected = [
+        0.3 + turn * 2 * np.pi + place for turn in (-1, 0, 1) for place in disc.places
+    ]
     assert_allclose(times, [one for one in expected if 0.0 <= one <= 10.0], atol=2e-9)
 
 
@@ -116,7 +124,9 @@ def test_a_shaft_that_turns_back_or_too_few_teeth_are_refused():
     with pytest.raises(SimulationError, match="must turn forward throughout"):
         instantaneous_speed(PERFECT, disc_of(PERFECT), angle, RATE)
     with pytest.raises(SimulationError, match="too few or too fast"):
-        instantaneous_speed(PERFECT, disc_of(PERFECT), np.linspace(0.0, 0.05, 100), RATE)
+        instantaneous_speed(
+            PERFECT, disc_of(PERFECT), np.linspace(0.0, 0.05, 100), RATE
+        )
 
 
 @pytest.mark.parametrize(
@@ -127,8 +137,14 @@ def test_a_shaft_that_turns_back_or_too_few_teeth_are_refused():
             {"eccentricity_error": 0.1},
             "toothed_wheel.eccentricity_error_deg = 5.72958 must lie in 0..5",
         ),
-        ({"tooth_error": 0.01}, "toothed_wheel.tooth_error_deg = 0.572958 must lie in 0..0.225"),
-        ({"tooth_error": -0.01}, "toothed_wheel.tooth_error_deg = -0.572958 must lie in"),
+        (
+            {"tooth_error": 0.01},
+            "toothed_wheel.tooth_error_deg = 0.572958 must lie in 0..0.225",
+        ),
+        (
+            {"tooth_error": -0.01},
+            "toothed_wheel.tooth_error_deg = -0.572958 must lie in",
+        ),
         (
             {"clock_frequency": 100.0},
             "toothed_wheel.clock_frequency_hz = 100 must be at least 10000",

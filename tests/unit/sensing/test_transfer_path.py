@@ -10,7 +10,11 @@ from gensig.errors import ConfigError
 from gensig.sensing.transfer_path import ModalPath, draw_housing, mode_section
 
 RATE = 51200.0
-RANGES = {"n_modes": (8, 20), "natural_frequency": (300.0, 12e3), "damping_ratio": (0.01, 0.05)}
+RANGES = {
+    "n_modes": (8, 20),
+    "natural_frequency": (300.0, 12e3),
+    "damping_ratio": (0.01, 0.05),
+}
 
 
 def housing(seed=0, **changes):
@@ -74,7 +78,9 @@ def test_ranges_are_kept_and_used():
 
 
 def test_memory_is_when_the_slowest_mode_has_died_out():
-    path = housing(n_modes=(1, 1), natural_frequency=(500.0, 500.0), damping_ratio=(0.02, 0.02))
+    path = housing(
+        n_modes=(1, 1), natural_frequency=(500.0, 500.0), damping_ratio=(0.02, 0.02)
+    )
     impulse = np.zeros((4, 20_000))
     impulse[:, 0] = 1.0
     answer = np.abs(path.apply(impulse, RATE)[0])
@@ -85,12 +91,18 @@ def test_memory_is_when_the_slowest_mode_has_died_out():
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"n_modes": (0, 3)}, "sensing.path.n_modes = [0, 3] must be two ordered numbers"),
+        (
+            {"n_modes": (0, 3)},
+            "sensing.path.n_modes = [0, 3] must be two ordered numbers",
+        ),
         ({"n_modes": (9, 3)}, "sensing.path.n_modes = [9, 3]"),
         ({"n_modes": (3,)}, "sensing.path.n_modes = [3]"),
         ({"natural_frequency": (0.0, 3e3)}, "sensing.path.natural_frequency_hz"),
         ({"damping_ratio": (0.01, 0.9)}, "sensing.path.damping_ratio"),
-        ({"transmissibility": 0.0}, "sensing.path.transmissibility = 0 must lie in 0..1000"),
+        (
+            {"transmissibility": 0.0},
+            "sensing.path.transmissibility = 0 must lie in 0..1000",
+        ),
     ],
 )
 def test_values_out_of_range(changes, text):

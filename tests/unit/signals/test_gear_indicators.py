@@ -38,7 +38,9 @@ def gear(turn=TURN):
         + np.cos((TEETH + 1) * turn)
         + np.cos(turn)
     )
-    return mesh + sum(0.3 * np.cos(order * turn + order) for order in (7, 31, 40, 41, 55))
+    return mesh + sum(
+        0.3 * np.cos(order * turn + order) for order in (7, 31, 40, 41, 55)
+    )
 
 
 def impact(size, place=900):
@@ -63,7 +65,9 @@ def test_gain_sign_and_start_tooth_change_nothing(name):
 @every
 def test_phase_between_samples_changes_nothing_but_the_peaks_that_are_sampled(name):
     moved = OF_ONE_TURN[name](gear(TURN + 0.0007), TEETH)
-    assert_allclose(moved, OF_ONE_TURN[name](gear(), TEETH), rtol=2e-3 if name == "fm0" else 1e-9)
+    assert_allclose(
+        moved, OF_ONE_TURN[name](gear(), TEETH), rtol=2e-3 if name == "fm0" else 1e-9
+    )
 
 
 @every
@@ -72,7 +76,9 @@ def test_leading_axes_are_kept_and_too_few_turns_are_nan(name):
     turns = gear() + rng.standard_normal((2, 3, 20, PER_TURN))
     found = OF_ONE_TURN[name](average_turn(turns), TEETH)
     assert found.shape == (2, 3)
-    assert_allclose(found[1, 2], OF_ONE_TURN[name](average_turn(turns[1, 2]), TEETH), rtol=1e-12)
+    assert_allclose(
+        found[1, 2], OF_ONE_TURN[name](average_turn(turns[1, 2]), TEETH), rtol=1e-12
+    )
     assert np.isnan(OF_ONE_TURN[name](average_turn(turns[..., :19, :]), TEETH)).all()
 
 
@@ -89,10 +95,14 @@ def test_a_turn_is_its_regular_part_what_is_left_and_the_shaft():
     turn = gear() + 0.7
     shaft = 0.7 + np.cos(TURN)
     assert_allclose(
-        regular_signal(turn, TEETH) + difference_signal(turn, TEETH) + shaft, turn, atol=1e-9
+        regular_signal(turn, TEETH) + difference_signal(turn, TEETH) + shaft,
+        turn,
+        atol=1e-9,
     )
     assert_allclose(
-        regular_signal(turn, TEETH, n_sidebands=0) + residual_signal(turn, TEETH) + shaft,
+        regular_signal(turn, TEETH, n_sidebands=0)
+        + residual_signal(turn, TEETH)
+        + shaft,
         turn,
         atol=1e-9,
     )
@@ -134,7 +144,9 @@ def test_fm0_counts_the_harmonics_it_is_told():
 def test_moments_of_one_order_outside_the_mesh():
     turn = 10 * np.cos(TEETH * TURN) + 0.1 * np.cos(30 * TURN)
     assert_allclose(
-        [fm4(turn, TEETH), m6a(turn, TEETH), m8a(turn, TEETH)], [1.5, 2.5, 4.375], rtol=1e-6
+        [fm4(turn, TEETH), m6a(turn, TEETH), m8a(turn, TEETH)],
+        [1.5, 2.5, 4.375],
+        rtol=1e-6,
     )
 
 
@@ -143,7 +155,9 @@ def test_moments_of_gaussian_noise():
     turn = rng.standard_normal((400, PER_TURN)) + 10 * np.cos(TEETH * TURN)
     n_samples = turn.size
     for indicator, half, expected in ((fm4, 2, 3), (m6a, 3, 15), (m8a, 4, 105)):
-        raw = np.prod(np.arange(1, 4 * half, 2)) - expected**2  # variance of the moment itself
+        raw = (
+            np.prod(np.arange(1, 4 * half, 2)) - expected**2
+        )  # variance of the moment itself
         assert_allclose(
             indicator(turn, TEETH).mean(),
             expected,
@@ -155,7 +169,9 @@ def test_moments_of_one_impact():
     """With n samples a single one has a moment of n to the power of half its order less one, but for its mean."""
     p = 1.0 / PER_TURN
     for indicator, half in ((fm4, 2), (m6a, 3), (m8a, 4)):
-        exact = ((1 - p) ** (2 * half) * p + p ** (2 * half) * (1 - p)) / (p * (1 - p)) ** half
+        exact = ((1 - p) ** (2 * half) * p + p ** (2 * half) * (1 - p)) / (
+            p * (1 - p)
+        ) ** half
         assert_allclose(
             indicator(impact(3.0), 2 * PER_TURN), exact, rtol=0.01
         )  # no mesh in the band, orders 0 to 2 lost
@@ -184,8 +200,14 @@ def test_envelope_is_of_its_band_only():
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda: fm0(np.ones(46), TEETH), "46 samples a turn cannot hold mesh order 23"),
-        (lambda: mesh_envelope(np.ones(60), TEETH), "cannot hold the band of mesh orders 12 to 34"),
+        (
+            lambda: fm0(np.ones(46), TEETH),
+            "46 samples a turn cannot hold mesh order 23",
+        ),
+        (
+            lambda: mesh_envelope(np.ones(60), TEETH),
+            "cannot hold the band of mesh orders 12 to 34",
+        ),
         (lambda: mesh_envelope(TURN, TEETH, n_sidebands=23), "mesh orders 0 to 46"),
     ],
 )

@@ -60,7 +60,9 @@ def test_nb4_of_a_modulation_that_deepens():
     depth = np.array([0.1, 0.1, 0.1, 0.3])
     averages = (1 + depth[:, None] * np.cos(2 * TURN)) * np.cos(TEETH * TURN)
     mean_variance = np.cumsum(depth**2 / 2) / np.arange(1, 5)
-    assert_allclose(nb4(averages, TEETH), 3 / 8 * depth**4 / mean_variance**2, rtol=1e-9)
+    assert_allclose(
+        nb4(averages, TEETH), 3 / 8 * depth**4 / mean_variance**2, rtol=1e-9
+    )
 
 
 def test_a_record_of_too_few_turns_is_passed_over():
@@ -82,4 +84,6 @@ def test_leading_axes_are_kept():
     averages = np.stack([history([1.0, 2.0], seed=seed) for seed in range(3)])
     for indicator in (na4, nb4):
         assert indicator(averages, TEETH).shape == (3, 2)
-        assert_allclose(indicator(averages, TEETH)[1], indicator(averages[1], TEETH), rtol=1e-12)
+        assert_allclose(
+            indicator(averages, TEETH)[1], indicator(averages[1], TEETH), rtol=1e-12
+        )

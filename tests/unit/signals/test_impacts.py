@@ -19,14 +19,18 @@ def rings(decay, places=(100,), size=20.0, noise=1.0, seed=0):
             late = time - place / RATE
             phase = rng.uniform(0, 2 * np.pi)
             turn += size * np.where(
-                late >= 0, np.exp(-late / decay) * np.cos(2 * np.pi * 1200 * late + phase), 0.0
+                late >= 0,
+                np.exp(-late / decay) * np.cos(2 * np.pi * 1200 * late + phase),
+                0.0,
             )
     return turns
 
 
 @pytest.mark.parametrize("places", [(), (100,), (100, 300), (20, 160, 400)])
 def test_impacts_are_counted(places):
-    assert impacts_per_turn(rings(1e-3, places), TEETH) == pytest.approx(len(places), abs=0.1)
+    assert impacts_per_turn(rings(1e-3, places), TEETH) == pytest.approx(
+        len(places), abs=0.1
+    )
 
 
 def test_threshold_is_in_deviations_of_what_lies_between():
@@ -39,13 +43,18 @@ def test_threshold_is_in_deviations_of_what_lies_between():
 @pytest.mark.parametrize("decay", [0.7e-3, 1.4e-3, 3e-3])
 @pytest.mark.parametrize("noise", [0.01, 2.0])
 def test_decay_is_recovered(decay, noise):
-    found = [impact_decay(rings(decay, noise=noise, seed=seed), DURATION) for seed in range(8)]
+    found = [
+        impact_decay(rings(decay, noise=noise, seed=seed), DURATION)
+        for seed in range(8)
+    ]
     assert np.mean(found) == pytest.approx(decay, rel=0.25 if decay < 1e-3 else 0.15)
 
 
 def test_no_impact_no_decay():
     assert np.isnan(impact_decay(np.zeros((3, 100)), DURATION))
-    assert np.isnan(impact_decay(np.tile(np.cos(np.arange(100) * np.pi / 2), (3, 1)), DURATION))
+    assert np.isnan(
+        impact_decay(np.tile(np.cos(np.arange(100) * np.pi / 2), (3, 1)), DURATION)
+    )
 
 
 def test_peak_over_rms_is_the_usual_peak_not_the_rarest():

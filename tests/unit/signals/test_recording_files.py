@@ -45,20 +45,27 @@ def files(tmp_path_factory):
     write_hdf5(folder / "r.h5", {"acceleration": SIGNAL}, RATE)
     write_hdf5(folder / "r.hdf5", content)
     io.savemat(folder / "r.mat", content)
-    io.savemat(folder / "tall.mat", {**content, "acceleration": SIGNAL.T}, do_compression=True)
-    write_mat73(folder / "r73.mat", {"acceleration": SIGNAL.T, "sampling_rate_hz": [[RATE]]})
+    io.savemat(
+        folder / "tall.mat", {**content, "acceleration": SIGNAL.T}, do_compression=True
+    )
+    write_mat73(
+        folder / "r73.mat", {"acceleration": SIGNAL.T, "sampling_rate_hz": [[RATE]]}
+    )
     return folder
 
 
 @pytest.mark.parametrize(
-    "name", ["r.csv", "r.wav", "r.npz", "r.h5", "r.hdf5", "r.mat", "tall.mat", "r73.mat"]
+    "name",
+    ["r.csv", "r.wav", "r.npz", "r.h5", "r.hdf5", "r.mat", "tall.mat", "r73.mat"],
 )
 def test_all_formats_say_the_same(files, name):
     source = read_file(str(files / name))
     assert source.sampling_rate == RATE
     assert source.named == (name == "r.csv")
     found = recording_of(source).acceleration
-    assert_allclose(found, SIGNAL - SIGNAL.mean(axis=1, keepdims=True), rtol=0, atol=1e-12)
+    assert_allclose(
+        found, SIGNAL - SIGNAL.mean(axis=1, keepdims=True), rtol=0, atol=1e-12
+    )
 
 
 def test_an_array_by_its_name(tmp_path):
@@ -66,11 +73,15 @@ def test_an_array_by_its_name(tmp_path):
     write_hdf5(tmp_path / "c.h5", {"run/one": SIGNAL[0]})
     for name, array in (("c.mat", "X097_DE_time"), ("c.h5", "run/one")):
         found = recording_of(read_file(str(tmp_path / name), rate=RATE, array=array))
-        assert_allclose(found.acceleration[0], SIGNAL[0] - SIGNAL[0].mean(), rtol=0, atol=1e-12)
+        assert_allclose(
+            found.acceleration[0], SIGNAL[0] - SIGNAL[0].mean(), rtol=0, atol=1e-12
+        )
 
 
 def test_whole_numbers_of_a_wav_file_keep_their_shape_and_have_no_level(tmp_path):
-    wavfile.write(tmp_path / "i.wav", int(RATE), np.round(1000.0 * SIGNAL.T).astype(np.int16))
+    wavfile.write(
+        tmp_path / "i.wav", int(RATE), np.round(1000.0 * SIGNAL.T).astype(np.int16)
+    )
     source = read_file(str(tmp_path / "i.wav"))
     found = recording_of(source, needs_level=False).acceleration
     assert np.corrcoef(found[0], SIGNAL[0])[0, 1] > 0.99999
@@ -90,10 +101,14 @@ def refused(folder):
     bad = SIGNAL.copy()
     bad[1, 7] = np.nan
     io.savemat(folder / "nan.mat", {"acceleration": bad})
-    io.savemat(folder / "cell.mat", {"acceleration": np.array([{"a": 1.0}, 2.0], dtype=object)})
+    io.savemat(
+        folder / "cell.mat", {"acceleration": np.array([{"a": 1.0}, 2.0], dtype=object)}
+    )
     io.savemat(folder / "text.mat", {"acceleration": "no numbers"})
     io.savemat(folder / "other.mat", {"velocity": SIGNAL})
-    io.savemat(folder / "rates.mat", {"acceleration": SIGNAL, "sampling_rate_hz": [1.0, 2.0]})
+    io.savemat(
+        folder / "rates.mat", {"acceleration": SIGNAL, "sampling_rate_hz": [1.0, 2.0]}
+    )
     io.savemat(folder / "slow.mat", {"acceleration": SIGNAL, "sampling_rate_hz": 3.0})
     for name in ("garbage.wav", "garbage.mat", "garbage.h5", "garbage.npz"):
         (folder / name).write_bytes(b"no recording at all " * 40)
@@ -102,10 +117,14 @@ def refused(folder):
     write_hdf5(folder / "tall.h5", {"acceleration": SIGNAL.T}, RATE)
     write_hdf5(folder / "target.h5", {"acceleration": SIGNAL}, RATE)
     with h5py.File(folder / "link.h5", "w") as file:
-        file["acceleration"] = h5py.ExternalLink(str(folder / "target.h5"), "/acceleration")
+        file["acceleration"] = h5py.ExternalLink(
+            str(folder / "target.h5"), "/acceleration"
+        )
     with h5py.File(folder / "virtual.h5", "w") as file:
         layout = h5py.VirtualLayout(SIGNAL.shape, float)
-        layout[:] = h5py.VirtualSource(str(folder / "target.h5"), "acceleration", SIGNAL.shape)
+        layout[:] = h5py.VirtualSource(
+            str(folder / "target.h5"), "acceleration", SIGNAL.shape
+        )
         file.create_virtual_dataset("acceleration", layout)
     with h5py.File(folder / "huge.h5", "w") as file:
         file.create_dataset("acceleration", (2, 10**9), "f8", chunks=(1, 10**6))

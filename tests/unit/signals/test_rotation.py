@@ -5,7 +5,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gensig.signals.averaging import resample_to_angle
-from gensig.signals.rotation import find_mesh_frequency, mesh_phase_angle, resample_by_angle
+from gensig.signals.rotation import (
+    find_mesh_frequency,
+    mesh_phase_angle,
+    resample_by_angle,
+)
 from gensig.signals.spectrum import spectrum_of_turns
 
 RATE, TEETH = 10_000.0, 23
@@ -16,7 +20,10 @@ TURNS = 20.0 * TIME + 0.16 / (2 * np.pi * 0.4) * np.sin(
 
 
 def mesh(turns, *harmonics):
-    return sum(a * np.cos(2 * np.pi * (k + 1) * TEETH * turns + k) for k, a in enumerate(harmonics))
+    return sum(
+        a * np.cos(2 * np.pi * (k + 1) * TEETH * turns + k)
+        for k, a in enumerate(harmonics)
+    )
 
 
 def test_a_steady_angle_gives_what_a_steady_speed_gives():
@@ -39,7 +46,9 @@ def test_a_turn_gets_the_samples_of_the_slowest_by_itself_and_orders_stay_sharp(
     turns = resample_by_angle(mesh(TURNS, 1.0, 0.5), 2 * np.pi * TURNS)
     assert turns.shape[-1] == 506  # even, at 19.84 Hz 504.03
     order, amplitude = spectrum_of_turns(turns)
-    assert_allclose(amplitude[np.isin(order, [TEETH, 2 * TEETH])], [1.0, 0.5], rtol=2e-3)
+    assert_allclose(
+        amplitude[np.isin(order, [TEETH, 2 * TEETH])], [1.0, 0.5], rtol=2e-3
+    )
     assert amplitude[~np.isin(order, [TEETH, 2 * TEETH])].max() < 2e-3
 
 
@@ -61,13 +70,19 @@ def test_mesh_frequency_is_found_through_noise_and_sidebands(true):
     turns = true * TIME
     modulated = (1 + 0.8 * np.cos(2 * np.pi * turns)) * mesh(turns, 1.0, 0.3, 0.5)
     x = modulated + np.random.default_rng(1).standard_normal(TIME.size)
-    assert find_mesh_frequency(x, RATE, TEETH, 20.0) == pytest.approx(TEETH * true, rel=2e-5)
+    assert find_mesh_frequency(x, RATE, TEETH, 20.0) == pytest.approx(
+        TEETH * true, rel=2e-5
+    )
 
 
 def test_a_foreign_tone_near_one_harmonic_is_not_taken_for_the_mesh():
-    x = mesh(20.1 * TIME, 0.2, 0.1, 0.2, 0.1) + 2.0 * np.cos(2 * np.pi * TEETH * 19.8 * TIME)
+    x = mesh(20.1 * TIME, 0.2, 0.1, 0.2, 0.1) + 2.0 * np.cos(
+        2 * np.pi * TEETH * 19.8 * TIME
+    )
     x += 0.5 * np.random.default_rng(4).standard_normal(TIME.size)
-    assert find_mesh_frequency(x, RATE, TEETH, 20.0) == pytest.approx(TEETH * 20.1, rel=1e-4)
+    assert find_mesh_frequency(x, RATE, TEETH, 20.0) == pytest.approx(
+        TEETH * 20.1, rel=1e-4
+    )
     assert find_mesh_frequency(x, RATE, TEETH, 20.0, n_harmonics=1) == pytest.approx(
         TEETH * 19.8, rel=1e-4
     )
@@ -77,7 +92,9 @@ def test_channels_are_searched_together():
     rng = np.random.default_rng(2)
     x = rng.standard_normal((2, TIME.size))
     x[1] += 0.3 * mesh(20.21 * TIME, 1.0)
-    assert find_mesh_frequency(x, RATE, TEETH, 20.0) == pytest.approx(TEETH * 20.21, rel=1e-4)
+    assert find_mesh_frequency(x, RATE, TEETH, 20.0) == pytest.approx(
+        TEETH * 20.21, rel=1e-4
+    )
 
 
 def test_a_search_that_reaches_sidebands_or_folds_is_refused():

@@ -46,7 +46,11 @@ def separate(signal, **changes):
 def test_every_part_comes_back():
     signal, (driving, driven, mesh) = a_pair(130)
     found = separate(signal + 7.0)
-    for ours, expected in ((found.driving, driving), (found.driven, driven), (found.mesh, mesh)):
+    for ours, expected in (
+        (found.driving, driving),
+        (found.driven, driven),
+        (found.mesh, mesh),
+    ):
         assert ours.shape == expected.shape
         assert_allclose(ours, expected, atol=0.03 * np.abs(signal).max())
 
@@ -55,7 +59,9 @@ def test_neither_gear_leaks_into_the_other_as_it_does_into_an_average():
     """In passages that are no whole number of the other's turns an average keeps a share of them."""
     signal, (driving, _, _) = a_pair(44)
     own = separate(signal).driving
-    averaged = time_synchronous_average(signal, RATE, MESH_HZ / TEETH[0], TEETH[0] * SAMPLES)
+    averaged = time_synchronous_average(
+        signal, RATE, MESH_HZ / TEETH[0], TEETH[0] * SAMPLES
+    )
     averaged = averaged - np.tile(
         averaged.reshape(2, TEETH[0], SAMPLES).mean(axis=1), (1, TEETH[0])
     )
@@ -83,9 +89,13 @@ def test_noise_falls_with_the_passages_of_a_tooth():
 
 def test_what_lies_above_half_the_samples_is_taken_away_and_does_not_alias():
     t = np.arange(64 * 100)
-    high = np.sin(2 * np.pi * 24 * t / 64)[None] * np.where(t // 64 % TEETH[0] == 2, 1.0, 0.0)
+    high = np.sin(2 * np.pi * 24 * t / 64)[None] * np.where(
+        t // 64 % TEETH[0] == 2, 1.0, 0.0
+    )
     found = separate(high)
-    assert np.sqrt(np.mean(np.square(found.driving))) < 0.1 * np.sqrt(np.mean(np.square(high)))
+    assert np.sqrt(np.mean(np.square(found.driving))) < 0.1 * np.sqrt(
+        np.mean(np.square(high))
+    )
 
 
 def test_less_than_a_turn_and_odd_samples_are_refused():

@@ -37,7 +37,9 @@ class TestIndicators:
         pulse = np.zeros(1000)
         pulse[7] = 3.0
         p = 1 / 1000
-        assert_allclose(kurtosis(pulse), (1 - 3 * p + 3 * p**2) / (p * (1 - p)), rtol=1e-9)
+        assert_allclose(
+            kurtosis(pulse), (1 - 3 * p + 3 * p**2) / (p * (1 - p)), rtol=1e-9
+        )
         assert_allclose(crest_factor(pulse), np.sqrt(1000), rtol=1e-12)
 
     def test_gaussian_noise_has_kurtosis_three(self):
@@ -97,7 +99,9 @@ class TestAveraging:
         frequency = 17.3
         turns = resample_to_angle(sine(40 * frequency), RATE, frequency)
         n_turns, per_turn = turns.shape
-        angle = np.arange(n_turns * per_turn).reshape(turns.shape) / per_turn * 2 * np.pi
+        angle = (
+            np.arange(n_turns * per_turn).reshape(turns.shape) / per_turn * 2 * np.pi
+        )
         inner = slice(1, -1)
         assert n_turns == 17
         assert per_turn == samples_per_turn_for(RATE, frequency)
@@ -107,13 +111,19 @@ class TestAveraging:
         for share, bound in ((8, 1.2e-3), (6, 4e-3), (4, 2.5e-2)):
             turns = resample_to_angle(sine(RATE / share), RATE, 17.3, 4096)
             position = np.arange(turns.size) / 4096 / 17.3
-            error = np.abs(turns.ravel() - sine(RATE / share, time=position))[4096:-4096].max()
+            error = np.abs(turns.ravel() - sine(RATE / share, time=position))[
+                4096:-4096
+            ].max()
             assert bound / 2 < error < bound
 
-    def test_average_keeps_what_repeats_and_halves_the_noise_for_four_times_the_turns(self):
+    def test_average_keeps_what_repeats_and_halves_the_noise_for_four_times_the_turns(
+        self,
+    ):
         frequency, rng = 25.0, np.random.default_rng(5)
         noise = rng.standard_normal(TIME.size)
-        average = time_synchronous_average(sine(23 * frequency) + noise, RATE, frequency)
+        average = time_synchronous_average(
+            sine(23 * frequency) + noise, RATE, frequency
+        )
         clean = time_synchronous_average(sine(23 * frequency), RATE, frequency)
         assert_allclose(rms(clean), 1 / np.sqrt(2), rtol=1e-4)
         assert_allclose(rms(average - clean), 1 / np.sqrt(25), rtol=0.05)
@@ -129,15 +139,21 @@ class TestAveraging:
     def test_residual_and_difference(self):
         mesh = 3 * np.cos(23 * TURN) + 2 * np.sin(46 * TURN) + 1.0 + np.cos(TURN)
         sideband, other = 0.5 * np.cos(24 * TURN), 0.2 * np.cos(30 * TURN)
-        assert_allclose(residual_signal(mesh + sideband + other, 23), sideband + other, atol=1e-9)
-        assert_allclose(difference_signal(mesh + sideband + other, 23), other, atol=1e-9)
+        assert_allclose(
+            residual_signal(mesh + sideband + other, 23), sideband + other, atol=1e-9
+        )
+        assert_allclose(
+            difference_signal(mesh + sideband + other, 23), other, atol=1e-9
+        )
         assert_allclose(remove_orders(other, [30, 5000]), 0.0, atol=1e-9)
 
 
 class TestSpectra:
     @pytest.mark.parametrize("window", ["hann", "boxcar"])
     def test_amplitude_of_a_sine_and_of_the_mean(self, window):
-        frequency, amplitude = amplitude_spectrum(2.0 + sine(640.0, 3.0), RATE, window=window)
+        frequency, amplitude = amplitude_spectrum(
+            2.0 + sine(640.0, 3.0), RATE, window=window
+        )
         assert_allclose(amplitude[0], 2.0, rtol=1e-3)
         assert_allclose(amplitude[np.argmin(np.abs(frequency - 640))], 3.0, rtol=1e-9)
         assert frequency[-1] == RATE / 2
@@ -161,7 +177,9 @@ class TestEnvelope:
 
     def test_envelope_spectrum_finds_the_rate_in_its_band_only(self):
         modulation = 1 + 0.5 * np.cos(2 * np.pi * 30 * TIME)
-        x = modulation * np.cos(2 * np.pi * 5000 * TIME) + 4 * np.cos(2 * np.pi * 700 * TIME)
+        x = modulation * np.cos(2 * np.pi * 5000 * TIME) + 4 * np.cos(
+            2 * np.pi * 700 * TIME
+        )
         frequency, amplitude = envelope_spectrum(x, RATE, (4000.0, 6000.0))
         assert frequency[np.argmax(amplitude)] == 30.0
         assert_allclose(amplitude.max(), 0.5, rtol=1e-2)

@@ -23,11 +23,15 @@ def test_gaussian_noise_is_zero_in_every_line_and_scatters_as_stated(window):
     assert frequency[0] >= 2 * RATE / window * 0.999
     assert frequency[-1] <= RATE / 2 - 2 * RATE / window * 0.999
     assert np.std(kurtosis) == pytest.approx(spread, rel=0.15)
-    assert np.abs(kurtosis.mean(axis=0) + 1.5 * window / N_SAMPLES).max() < 5 * spread / np.sqrt(20)
+    assert np.abs(
+        kurtosis.mean(axis=0) + 1.5 * window / N_SAMPLES
+    ).max() < 5 * spread / np.sqrt(20)
 
 
 def test_a_tone_is_minus_one():
-    frequency, kurtosis = spectral_kurtosis(np.cos(2 * np.pi * 2500 * TIME), RATE, WINDOW)
+    frequency, kurtosis = spectral_kurtosis(
+        np.cos(2 * np.pi * 2500 * TIME), RATE, WINDOW
+    )
     assert kurtosis[frequency == 2500.0] == pytest.approx(-1.0, abs=1e-9)
 
 
@@ -43,7 +47,9 @@ def test_rings_are_found_in_their_band():
     x = noise(2)
     for start in range(500, N_SAMPLES - 500, 1000):
         late = TIME[:200]
-        x[start : start + 200] += 8 * np.exp(-late / 2e-3) * np.cos(2 * np.pi * 3200 * late)
+        x[start : start + 200] += (
+            8 * np.exp(-late / 2e-3) * np.cos(2 * np.pi * 3200 * late)
+        )
     frequency, kurtosis = spectral_kurtosis(x, RATE, WINDOW)
     assert abs(frequency[np.argmax(kurtosis)] - 3200) <= 200
     assert kurtosis.max() > 5

@@ -22,17 +22,36 @@ def recording(depth, *, noise=1.0, duration=3.0, seed=0):
     cycles = TEETH.driving * turned
     signal = np.zeros((2, time.size))
     for harmonic in range(1, 5):
-        for orders in (0.0, 1.0, -1.0, TEETH.driving / TEETH.driven, -TEETH.driving / TEETH.driven):
-            height = (1.0 if orders == 0 else 0.15) / harmonic * rng.uniform(0.5, 1.5, (2, 1))
+        for orders in (
+            0.0,
+            1.0,
+            -1.0,
+            TEETH.driving / TEETH.driven,
+            -TEETH.driving / TEETH.driven,
+        ):
+            height = (
+                (1.0 if orders == 0 else 0.15)
+                / harmonic
+                * rng.uniform(0.5, 1.5, (2, 1))
+            )
             phase = rng.uniform(0, 2 * np.pi, (2, 1))
-            signal += height * np.cos(2 * np.pi * (harmonic * cycles + orders * turned) + phase)
+            signal += height * np.cos(
+                2 * np.pi * (harmonic * cycles + orders * turned) + phase
+            )
     signal += noise * rng.standard_normal(signal.shape)
-    return Recording(sensors=("a", "b"), acceleration=signal, sampling_rate=RATE), cycles
+    return Recording(
+        sensors=("a", "b"), acceleration=signal, sampling_rate=RATE
+    ), cycles
 
 
 def followed(made, speed_rpm=SPEED):
     return wandering_mesh_cycles(
-        made, TEETH, speed_rpm, highest=10_000.0, options="the speed", longer="record longer"
+        made,
+        TEETH,
+        speed_rpm,
+        highest=10_000.0,
+        options="the speed",
+        longer="record longer",
     )
 
 

@@ -5,11 +5,16 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gensig.signals.averaging import residual_signal
-from gensig.signals.synchronous import mesh_harmonics, nonsynchronous_share, residual_turns
+from gensig.signals.synchronous import (
+    mesh_harmonics,
+    nonsynchronous_share,
+    residual_turns,
+)
 
 TURN = np.arange(400) / 400 * 2 * np.pi
 TURNS = np.tile(
-    3 * np.cos(23 * TURN + 1) + 0.5 * np.cos(46 * TURN) + 0.2 * np.cos(24 * TURN), (30, 1)
+    3 * np.cos(23 * TURN + 1) + 0.5 * np.cos(46 * TURN) + 0.2 * np.cos(24 * TURN),
+    (30, 1),
 )
 
 
@@ -28,7 +33,9 @@ def test_share_is_right_on_the_average_for_any_number_of_turns(n_turns):
     power = 4.5 + 0.125 + 0.02
     deviation = np.sqrt(power / 3)  # a quarter of the whole
     found = [
-        nonsynchronous_share(TURNS[:n_turns] + deviation * rng.standard_normal((n_turns, 400)))
+        nonsynchronous_share(
+            TURNS[:n_turns] + deviation * rng.standard_normal((n_turns, 400))
+        )
         for _ in range(200)
     ]
     assert np.mean(found) == pytest.approx(0.25, abs=0.01)
@@ -48,7 +55,9 @@ def test_residual_of_turns_is_that_of_the_average_and_what_does_not_repeat():
     noise = np.random.default_rng(1).standard_normal(TURNS.shape)
     residual = residual_turns(TURNS + noise, 23)
     assert_allclose(
-        residual.mean(axis=0), residual_signal((TURNS + noise).mean(axis=0), 23), atol=1e-12
+        residual.mean(axis=0),
+        residual_signal((TURNS + noise).mean(axis=0), 23),
+        atol=1e-12,
     )
     assert_allclose(residual_turns(TURNS, 23)[3], 0.2 * np.cos(24 * TURN), atol=1e-12)
     assert np.var(residual) > 0.9

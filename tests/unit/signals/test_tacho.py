@@ -56,9 +56,15 @@ def test_orders_stay_sharp_where_the_speed_changes():
 
 def test_several_pulses_a_turn_and_several_channels():
     _, turns, _ = ramp()
-    marks = np.interp(np.arange(1, int(4 * turns[-1])) / 4.0, turns, np.arange(len(turns)) / RATE)
-    signals = np.stack([np.cos(2.0 * np.pi * 3.0 * turns), np.sin(2.0 * np.pi * 3.0 * turns)])
-    found = resample_by_pulses(signals, RATE, marks, pulses_per_turn=4, samples_per_turn=64)
+    marks = np.interp(
+        np.arange(1, int(4 * turns[-1])) / 4.0, turns, np.arange(len(turns)) / RATE
+    )
+    signals = np.stack(
+        [np.cos(2.0 * np.pi * 3.0 * turns), np.sin(2.0 * np.pi * 3.0 * turns)]
+    )
+    found = resample_by_pulses(
+        signals, RATE, marks, pulses_per_turn=4, samples_per_turn=64
+    )
     assert found.shape == (2, (len(marks) - 1) // 4, 64)
     angle = (
         2.0 * np.pi * 3.0 * (0.25 + np.arange(64) / 64.0)
@@ -70,7 +76,9 @@ def test_several_pulses_a_turn_and_several_channels():
 def test_at_constant_speed_it_is_that_of_a_constant_speed():
     signal = np.random.default_rng(0).standard_normal(5000)
     by_speed = resample_to_angle(signal, RATE, 20.0)
-    by_pulses = resample_by_pulses(signal, RATE, np.arange(5) / 20.0, samples_per_turn=1000)
+    by_pulses = resample_by_pulses(
+        signal, RATE, np.arange(5) / 20.0, samples_per_turn=1000
+    )
     assert_allclose(by_pulses, by_speed[:4], rtol=0, atol=1e-9)
 
 

@@ -76,10 +76,14 @@ def test_softening_is_the_modulus_s():
     assert set(variants) == {"cold", "softened"}
     ratio = duty.heat.modulus_ratio(70.0)
     assert 0.98 < ratio < 0.99
-    np.testing.assert_allclose(variants["softened"].mesh / variants["cold"].mesh, ratio, rtol=1e-9)
+    np.testing.assert_allclose(
+        variants["softened"].mesh / variants["cold"].mesh, ratio, rtol=1e-9
+    )
 
 
-@pytest.mark.parametrize(("pinion", "wheel"), [(70.0, 70.0), (90.0, 40.0), (45.0, 80.0)])
+@pytest.mark.parametrize(
+    ("pinion", "wheel"), [(70.0, 70.0), (90.0, 40.0), (45.0, 80.0)]
+)
 def test_gears_hotter_than_the_housing_reach_farther_into_each_other(pinion, wheel):
     """Against the path of contact of gears that are each grown as they are, at the housing's centre distance."""
     duty = duty_of(
@@ -92,13 +96,17 @@ def test_gears_hotter_than_the_housing_reach_farther_into_each_other(pinion, whe
         "pinion": (pinion - 20) * duty.heat.expansion,
         "wheel": (wheel - 20) * duty.heat.expansion,
     }
-    base = {name: getattr(cold, name).base_radius * (1 + strain[name]) for name in strain}
+    base = {
+        name: getattr(cold, name).base_radius * (1 + strain[name]) for name in strain
+    }
     tip = {name: getattr(cold, name).tip_radius * (1 + strain[name]) for name in strain}
     distance = cold.center_distance * (1 + 10 * duty.heat.expansion)
     assert pair.center_distance == pytest.approx(distance, rel=1e-9)
     tangent = math.sqrt(distance**2 - sum(base.values()) ** 2)
     path = sum(math.sqrt(tip[name] ** 2 - base[name] ** 2) for name in strain) - tangent
-    exact = path / (2 * math.pi * sum(base.values()) / (cold.pinion.n_teeth + cold.wheel.n_teeth))
+    exact = path / (
+        2 * math.pi * sum(base.values()) / (cold.pinion.n_teeth + cold.wheel.n_teeth)
+    )
     assert exact > cold.transverse_contact_ratio + 0.01
     # tips are taken as grown by the common strain: wrong by the difference of the strains times their curvature
     allowed = 1e-6 if pinion == wheel else 0.006
@@ -108,7 +116,9 @@ def test_gears_hotter_than_the_housing_reach_farther_into_each_other(pinion, whe
 
 def test_a_hotter_pinion_loads_the_pair_that_leaves():
     even = duty_of(*EVEN)
-    uneven = duty_of("heat.pinion_temperature_degc=90", "heat.wheel_temperature_degc=50")
+    uneven = duty_of(
+        "heat.pinion_temperature_degc=90", "heat.wheel_temperature_degc=50"
+    )
     loads = []
     for duty in (even, uneven):
         system = heated(duty, hot_state(duty), **effects(growth=True))
@@ -121,7 +131,10 @@ def test_a_hotter_pinion_loads_the_pair_that_leaves():
 def test_apparent_stiffness_is_force_over_what_growth_leaves_of_the_approach():
     duty = duty_of("heat.pinion_temperature_degc=30", "heat.wheel_temperature_degc=30")
     state = hot_state(duty)
-    variants, thermal = stiffness_variants(duty, state), state.growth.teeth_alone(duty.system.pair)
+    variants, thermal = (
+        stiffness_variants(duty, state),
+        state.growth.teeth_alone(duty.system.pair),
+    )
     cold, apparent = variants["cold"], variants["apparent"]
     assert thermal == pytest.approx(10 * 0.345e-6, rel=0.02)
     np.testing.assert_allclose(
@@ -145,24 +158,36 @@ def test_more_friction_makes_hotter_gears_and_no_other_load():
         > cool["contact_ratio"].transverse_contact_ratio
     )
     states = [hot_state(replace(duty, speed=speed)) for speed in (60.0, 120.0)]
-    assert states[1].friction_heat == pytest.approx(2.0 * states[0].friction_heat, rel=1e-12)
+    assert states[1].friction_heat == pytest.approx(
+        2.0 * states[0].friction_heat, rel=1e-12
+    )
     slow, fast = sweep(duty, "torque", [12e3, 24e3])
     assert slow["cold"].approach.mean() == pytest.approx(
         0.5 * fast["cold"].approach.mean(), rel=1e-9
     )
-    with pytest.raises(ConfigError, match="a sweep over 'oil'; allowed: friction, torque, speed"):
+    with pytest.raises(
+        ConfigError, match="a sweep over 'oil'; allowed: friction, torque, speed"
+    ):
         sweep(duty, "oil", [1.0])
 
 
 @pytest.mark.parametrize(("known_at", "power"), [("null", 1.0), ("600", 0.5)])
 def test_cooling_grows_with_the_root_of_the_speed(known_at, power):
     """Friction heat goes with speed; the faces keep their temperature's shape where cooling is so weak."""
-    duty = duty_of(f"heat.convection_speed_rpm={known_at}", "heat.conductivity_w_per_mk=500")
-    slow, fast = (hot_state(replace(duty, speed=speed)).pinion for speed in (60.0, 240.0))
+    duty = duty_of(
+        f"heat.convection_speed_rpm={known_at}", "heat.conductivity_w_per_mk=500"
+    )
+    slow, fast = (
+        hot_state(replace(duty, speed=speed)).pinion for speed in (60.0, 240.0)
+    )
     rise = [body.tooth - duty.heat.oil_temperature for body in (slow, fast)]
-    assert rise[1] / rise[0] == pytest.approx(4.0**power, rel=1e-9 if known_at == "null" else 0.02)
+    assert rise[1] / rise[0] == pytest.approx(
+        4.0**power, rel=1e-9 if known_at == "null" else 0.02
+    )
     at_known = hot_state(replace(duty, speed=20.0 * math.pi)).pinion.tooth
-    fixed = replace(duty, heat=replace(duty.heat, convection_speed=None), speed=20.0 * math.pi)
+    fixed = replace(
+        duty, heat=replace(duty.heat, convection_speed=None), speed=20.0 * math.pi
+    )
     assert hot_state(fixed).pinion.tooth == pytest.approx(at_known, rel=1e-12)
 
 
@@ -191,17 +216,27 @@ def test_a_modification_of_hot_flanks_adds_to_their_growth():
     relieved = replace(
         hot,
         modification=replace(
-            hot.modification, pinion=FlankModification(tip_relief=20e-6, tip_relief_height=6e-3)
+            hot.modification,
+            pinion=FlankModification(tip_relief=20e-6, tip_relief_height=6e-3),
         ),
     )
     meshes = [
         one.sliced_mesh()
-        for one in (replace(hot, growth=None), hot, replace(relieved, growth=None), relieved)
+        for one in (
+            replace(hot, growth=None),
+            hot,
+            replace(relieved, growth=None),
+            relieved,
+        )
     ]
-    plain, grown, ground, both = (np.where(np.isfinite(mesh.gap), mesh.gap, 0.0) for mesh in meshes)
+    plain, grown, ground, both = (
+        np.where(np.isfinite(mesh.gap), mesh.gap, 0.0) for mesh in meshes
+    )
     assert np.ptp(grown - plain) > 1e-6
     assert np.ptp(ground - plain) > 1e-6
-    np.testing.assert_allclose(both - plain, (grown - plain) + (ground - plain), atol=1e-15)
+    np.testing.assert_allclose(
+        both - plain, (grown - plain) + (ground - plain), atol=1e-15
+    )
 
 
 @pytest.mark.parametrize(
@@ -212,7 +247,11 @@ def test_a_modification_of_hot_flanks_adds_to_their_growth():
             GeometryError,
             "the gears jam: heat makes them grow",
         ),
-        (["mesh.friction_coefficient=0.5"], ExtrapolationError, "pinion: a temperature of"),
+        (
+            ["mesh.friction_coefficient=0.5"],
+            ExtrapolationError,
+            "pinion: a temperature of",
+        ),
         (
             ["heat.face_convection_w_per_m2k=0", "heat.tooth_convection_w_per_m2k=0"],
             ConfigError,

@@ -31,7 +31,9 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*mean tooth forces:UserWarning"
 
 
 def read(words, *more):
-    return read_machine(read_request([*words, "operating.duration_s=0.02", *more]).config)
+    return read_machine(
+        read_request([*words, "operating.duration_s=0.02", *more]).config
+    )
 
 
 @pytest.fixture(scope="module", params=MACHINES)
@@ -95,7 +97,12 @@ def test_the_name_of_version_0_9_is_the_machine(any_machine):
 
 
 def unknown_gears(gears, meshes):
-    return [name for mesh in meshes for name in (mesh.driving, mesh.driven) if name not in gears]
+    return [
+        name
+        for mesh in meshes
+        for name in (mesh.driving, mesh.driven)
+        if name not in gears
+    ]
 
 
 def test_gears_have_their_names_and_bodies(any_machine):
@@ -103,7 +110,9 @@ def test_gears_have_their_names_and_bodies(any_machine):
     assert [gear.name for gear in gears.values()] == list(gears)
     assert set(bodies) == set(gears)
     assert all(body.inertia > 0.0 for body in bodies.values())
-    assert list(gears)[:2] == list(any_machine.pair.gears)  # those that records follow come first
+    assert list(gears)[:2] == list(
+        any_machine.pair.gears
+    )  # those that records follow come first
     for name, gear in any_machine.pair.gears.items():
         assert gears[name] == gear
         assert getattr(any_machine, name) == bodies[name]
@@ -119,7 +128,9 @@ def test_meshes_are_of_gears_that_exist(any_machine):
         assert gears[mesh.driven].n_teeth == mesh.pair.wheel.n_teeth
     (followed,) = [mesh for mesh in meshes if mesh.followed]
     assert followed.pair == any_machine.pair
-    assert {name for mesh in meshes for name in (mesh.driving, mesh.driven)} == set(gears)
+    assert {name for mesh in meshes for name in (mesh.driving, mesh.driven)} == set(
+        gears
+    )
 
 
 def test_each_gear_of_a_line_turns_as_its_meshes_say():
@@ -130,7 +141,9 @@ def test_each_gear_of_a_line_turns_as_its_meshes_say():
     speed = {}
     for mesh, own in zip(line.meshes, drive.line.meshes, strict=True):
         speed.setdefault(mesh.driving, ratio[drive.line.gears[own.driving].node])
-        turned = speed[mesh.driving] * mesh.pair.pinion.n_teeth / mesh.pair.wheel.n_teeth
+        turned = (
+            speed[mesh.driving] * mesh.pair.pinion.n_teeth / mesh.pair.wheel.n_teeth
+        )
         assert speed.setdefault(mesh.driven, turned) == pytest.approx(turned, rel=1e-9)
     assert len(speed) == len(drive.line.gears) == len(line.gears)
 
@@ -176,14 +189,18 @@ def parts(table):
 
 def is_same(table, other):
     one, two = parts(table), parts(other)
-    return one.keys() == two.keys() and all(np.array_equal(one[key], two[key]) for key in one)
+    return one.keys() == two.keys() and all(
+        np.array_equal(one[key], two[key]) for key in one
+    )
 
 
 def test_the_table_without_faults_is_the_sound_one(any_machine):
     sound = any_machine.mesh_table()
     specimen = perfect_specimen(any_machine.pair.pinion, any_machine.pair.wheel)
     assert is_same(any_machine.mesh_table(specimen.forms), sound)
-    assert not any(np.any(value) for key, value in parts(sound).items() if key.endswith("kind."))
+    assert not any(
+        np.any(value) for key, value in parts(sound).items() if key.endswith("kind.")
+    )
     assert sound.pair == any_machine.pair
     missing = read_faults({"kind": "missing_tooth", "gear": "pinion", "tooth": 0})
     assert not is_same(any_machine.mesh_table(missing), sound)
@@ -222,7 +239,9 @@ def test_set_points_have_finite_loads(any_machine):
 
 def test_loads_of_teeth_are_recorded_where_they_are_known(any_machine):
     if any_machine.most_pairs:
-        assert mesh_signals(None, 5, any_machine.most_pairs)["mesh_load_share"].shape == (
+        assert mesh_signals(None, 5, any_machine.most_pairs)[
+            "mesh_load_share"
+        ].shape == (
             any_machine.most_pairs,
             5,
         )

@@ -25,7 +25,9 @@ def schemes():
     """The paper's three modifications."""
     names = ("beihang_least_ripple", "beihang_even_load", "beihang_both")
     return {
-        name: read_sliced_pair(read_request(["system=helical_pair", f"modification={name}"]).config)
+        name: read_sliced_pair(
+            read_request(["system=helical_pair", f"modification={name}"]).config
+        )
         for name in names
     }
 
@@ -41,7 +43,8 @@ def test_harmonics_and_shares_are_of_the_curve(helical):
 
 def test_a_relief_deeper_than_the_deflection_loses_contact(helical):
     deep = replace(
-        helical.modification, pinion=FlankModification(tip_relief=100e-6, tip_relief_height=1e-3)
+        helical.modification,
+        pinion=FlankModification(tip_relief=100e-6, tip_relief_height=1e-3),
     )
     assert replace(helical, modification=deep).transmission_error().bearing < 0.85
 
@@ -56,7 +59,12 @@ def test_the_paper_s_modifications_lower_the_ripple(schemes):
     ]
     system = read_sliced_pair(
         read_request(
-            ["system=helical_pair", *keys, "mesh.allow_extrapolation=true", "mesh.n_slices=84"]
+            [
+                "system=helical_pair",
+                *keys,
+                "mesh.allow_extrapolation=true",
+                "mesh.n_slices=84",
+            ]
         ).config
     )
     plain = judge(system, system.modification, ALIGNED)
@@ -74,7 +82,11 @@ def test_the_paper_s_modifications_lower_the_ripple(schemes):
 def test_the_worst_case_counts(helical):
     wide = Cases(torques=(60.0, 178.0), misalignments=(-5e-6, 0.0, 5e-6))
     each = [
-        judge(helical, helical.modification, Cases(torques=(torque,), misalignments=(askew,)))
+        judge(
+            helical,
+            helical.modification,
+            Cases(torques=(torque,), misalignments=(askew,)),
+        )
         for torque in wide.torques
         for askew in wide.misalignments
     ]
@@ -85,7 +97,9 @@ def test_the_worst_case_counts(helical):
 
 def test_a_short_search_beats_plain_flanks_and_repeats(helical):
     plain = judge(helical, helical.modification, ALIGNED)
-    first, again = (optimise(helical, ALIGNED, n_front=1, seed=3, generations=4) for _ in range(2))
+    first, again = (
+        optimise(helical, ALIGNED, n_front=1, seed=3, generations=4) for _ in range(2)
+    )
     assert first == again
     assert len(first) == 1
     assert first[0].ripple < 0.95 * plain.ripple
@@ -121,7 +135,10 @@ def test_points_of_the_box_are_modifications(helical):
             r"^modification.wheel.tip_relief_height_mm = 0: a relief of 3 um needs a length",
         ),
         (
-            ["modification.pinion.tip_relief_um=3", "modification.pinion.tip_relief_height_mm=9"],
+            [
+                "modification.pinion.tip_relief_um=3",
+                "modification.pinion.tip_relief_height_mm=9",
+            ],
             "tip_relief_height_mm = 9 and root_relief_height_mm = 0 overlap",
         ),
         (

@@ -17,7 +17,11 @@ from gensig.plan.request import read_request
 from gensig.record.inputs import InputReader
 from gensig.record.simulate import simulate_record
 from gensig.record.streams import Stream, stream
-from gensig.sensing.manufacturing import draw_gearbox, nominal_gearbox, with_damping_ratio
+from gensig.sensing.manufacturing import (
+    draw_gearbox,
+    nominal_gearbox,
+    with_damping_ratio,
+)
 from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.registry import read_system
 from gensig.systems.run import Run
@@ -45,13 +49,19 @@ def ratios(dynamics):
     """Damping ratios of the gears on their supports, (support,)."""
     stiffness, damping = supports(dynamics)
     return damping / (
-        2 * np.sqrt(stiffness * np.repeat([dynamics.pinion.mass, dynamics.wheel.mass], 2))
+        2
+        * np.sqrt(stiffness * np.repeat([dynamics.pinion.mass, dynamics.wheel.mass], 2))
     )
 
 
 @pytest.fixture(scope="module")
 def realistic():
-    words = ["experiment=realistic", "plan.n_records=20", "plan.n_units=2", "plan.n_gearboxes=2"]
+    words = [
+        "experiment=realistic",
+        "plan.n_records=20",
+        "plan.n_units=2",
+        "plan.n_gearboxes=2",
+    ]
     return read_request(words).config
 
 
@@ -67,7 +77,9 @@ def run_of(config, row):
 
 class TestStiffness:
     @pytest.mark.parametrize("torque", [2.0, 20.0])
-    def test_it_is_that_of_the_bearings_at_the_set_torque(self, machine, config_with, torque):
+    def test_it_is_that_of_the_bearings_at_the_set_torque(
+        self, machine, config_with, torque
+    ):
         system = machine({**BEARINGS, "operating.torque_nm": torque})
         for side in SIDES:
             held = read_holding(getattr(system.pair, side), config_with()["gear"][side])
@@ -81,15 +93,23 @@ class TestStiffness:
 
     def test_a_shaft_without_a_diameter_fills_the_bore(self, machine):
         thin, given = (
-            machine({**BEARINGS, "gear.pinion.shaft": {"diameter_mm": value, "span_mm": 80}})
+            machine(
+                {**BEARINGS, "gear.pinion.shaft": {"diameter_mm": value, "span_mm": 80}}
+            )
             for value in (None, 18.0)
         )
         assert_allclose(
-            thin.pinion.support.stiffness_y, given.pinion.support.stiffness_y, rtol=1e-12, atol=0
+            thin.pinion.support.stiffness_y,
+            given.pinion.support.stiffness_y,
+            rtol=1e-12,
+            atol=0,
         )
 
     def test_more_torque_is_stiffer(self, machine):
-        low, high = (machine({**BEARINGS, "operating.torque_nm": torque}) for torque in (2.0, 40.0))
+        low, high = (
+            machine({**BEARINGS, "operating.torque_nm": torque})
+            for torque in (2.0, 40.0)
+        )
         for side in SIDES:
             for key in ("stiffness_x", "stiffness_y"):
                 assert getattr(getattr(high, side).support, key) > 1.3 * getattr(
@@ -109,8 +129,13 @@ class TestStiffness:
             system = machine({**BEARINGS, "operating.torque_nm": float(torque)})
             body = getattr(system, side)
             stiffness = np.array([body.support.stiffness_x, body.support.stiffness_y])
-            expected = [*(1e-6 * stiffness), *(np.sqrt(stiffness / body.mass) / (2 * math.pi))]
-            assert_allclose([float(value) for value in printed[-4:]], expected, rtol=5e-3, atol=0)
+            expected = [
+                *(1e-6 * stiffness),
+                *(np.sqrt(stiffness / body.mass) / (2 * math.pi)),
+            ]
+            assert_allclose(
+                [float(value) for value in printed[-4:]], expected, rtol=5e-3, atol=0
+            )
 
 
 class TestDamping:
@@ -126,7 +151,9 @@ class TestDamping:
         nominal, _ = supports(
             pair_dynamics(Run(system=system, faults=(), gearbox=nominal_gearbox(4)))
         )
-        assert_allclose(supports(dynamics)[0], nominal * box.stiffness_factor, rtol=1e-12, atol=0)
+        assert_allclose(
+            supports(dynamics)[0], nominal * box.stiffness_factor, rtol=1e-12, atol=0
+        )
         assert_allclose(ratios(dynamics), box.damping_ratio, rtol=1e-12, atol=0)
         assert len(set(box.damping_ratio)) == 4
 
@@ -150,7 +177,9 @@ class TestDamping:
         )
 
     def test_given_supports_take_a_ratio_too(self, machine):
-        ratio = {key: value for key, value in BEARINGS.items() if key != "system.supports"}
+        ratio = {
+            key: value for key, value in BEARINGS.items() if key != "system.supports"
+        }
         dynamics = pair_dynamics(Run(system=machine(ratio), faults=()))
         plain, _ = supports(pair_dynamics(Run(system=machine(), faults=())))
         assert_allclose(supports(dynamics)[0], plain, rtol=1e-12, atol=0)
@@ -159,20 +188,28 @@ class TestDamping:
 
 def test_as_given_supports_are_those_of_the_option(machine, config_with):
     """Bit for bit: bearing and shaft, there or not, change neither supports nor what a gearbox draws."""
-    absent = {f"gear.{side}.{key}": None for side in SIDES for key in ("bearing", "shaft")}
+    absent = {
+        f"gear.{side}.{key}": None for side in SIDES for key in ("bearing", "shaft")
+    }
     plain, without = machine(), machine(absent)
     box = draw_gearbox(stream(0, Stream.GEARBOX), 4, plain.quality, 0.05)
     drawn = with_damping_ratio(box, stream(0, Stream.SUPPORT), plain.quality)
     assert drawn is box
     given = config_with()["gear"]
     for system in (plain, without):
-        stiffness, damping = supports(pair_dynamics(Run(system=system, faults=(), gearbox=drawn)))
+        stiffness, damping = supports(
+            pair_dynamics(Run(system=system, faults=(), gearbox=drawn))
+        )
         for found, kind, factor in (
             (stiffness, "stiffness_{}_n_per_m", box.stiffness_factor),
             (damping, "damping_{}_ns_per_m", box.damping_factor),
         ):
             expected = np.array(
-                [given[side]["support"][kind.format(axis)] for side in SIDES for axis in "xy"]
+                [
+                    given[side]["support"][kind.format(axis)]
+                    for side in SIDES
+                    for axis in "xy"
+                ]
             )
             assert np.array_equal(found, expected * factor)
 
@@ -187,8 +224,12 @@ class TestRecords:
             )
             classes.setdefault(row["gearbox_id"], set()).add(row["label_name"])
         assert len(drawn) == 2
-        assert all(found == set(realistic["plan"]["classes"]) for found in classes.values())
-        assert all(np.array_equal(one, found[0]) for found in drawn.values() for one in found)
+        assert all(
+            found == set(realistic["plan"]["classes"]) for found in classes.values()
+        )
+        assert all(
+            np.array_equal(one, found[0]) for found in drawn.values() for one in found
+        )
         one, other = (found[0] for found in drawn.values())
         assert not np.any(one == other)
 
@@ -222,7 +263,10 @@ class TestRecords:
                 * run.system.operating.drive_damping_ratio
             )
             assert_allclose(
-                settling_time(pair_dynamics(run)), math.log(1e4) / drive, rtol=1e-3, atol=0
+                settling_time(pair_dynamics(run)),
+                math.log(1e4) / drive,
+                rtol=1e-3,
+                atol=0,
             )
 
 
@@ -262,9 +306,18 @@ class TestBadInput:
                 {"gear.pinion.bearing.n_balls": 2},
                 "gear.pinion.bearing.n_balls = 2 must lie in 5..60",
             ),
-            ({"gear.wheel.bearing": 6205}, "gear.wheel.bearing = 6205 must be a group of keys"),
-            ({"gear.wheel.shaft": {"span_mm": 80}}, "gear.wheel.shaft: missing diameter_mm"),
-            ({"gear.wheel.shaft.span_mm": -1}, "gear.wheel.shaft.span_mm = -1 must be positive"),
+            (
+                {"gear.wheel.bearing": 6205},
+                "gear.wheel.bearing = 6205 must be a group of keys",
+            ),
+            (
+                {"gear.wheel.shaft": {"span_mm": 80}},
+                "gear.wheel.shaft: missing diameter_mm",
+            ),
+            (
+                {"gear.wheel.shaft.span_mm": -1},
+                "gear.wheel.shaft.span_mm = -1 must be positive",
+            ),
         ],
     )
     def test_one_line(self, config_with, changes, text):
@@ -274,4 +327,8 @@ class TestBadInput:
 
     def test_a_ratio_above_1(self, xiamen):
         with pytest.raises(ConfigError, match="at most 1"):
-            replace(xiamen.quality, support_damping_ratio_low=0.5, support_damping_ratio_high=1.5)
+            replace(
+                xiamen.quality,
+                support_damping_ratio_low=0.5,
+                support_damping_ratio_high=1.5,
+            )

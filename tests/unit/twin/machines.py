@@ -32,7 +32,8 @@ def drifting(scatter, correlation_time, duration, seed):
     while len(walk) * step < duration:
         walk.append(keep * walk[-1] + np.sqrt(1.0 - keep**2) * rng.standard_normal())
     return [
-        [round(place * step, 6), 1.0 + scatter * float(value)] for place, value in enumerate(walk)
+        [round(place * step, 6), 1.0 + scatter * float(value)]
+        for place, value in enumerate(walk)
     ]
 
 
@@ -62,7 +63,8 @@ def measured(*, duration=2.4, seed=5, profile=None, snr=SNR, grade=GRADE, path=T
     snr_db = float(
         10.0
         * np.log10(
-            record.signals["signal_power"] / np.maximum(record.signals["noise_power"], 1e-300)
+            record.signals["signal_power"]
+            / np.maximum(record.signals["noise_power"], 1e-300)
         ).mean()
     )
     return Known(

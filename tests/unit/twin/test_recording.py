@@ -18,7 +18,9 @@ SIGNAL = np.random.default_rng(1).standard_normal((2, 20_000))
 
 
 def csv(path, columns, names):
-    np.savetxt(path, np.column_stack(columns), "%.9g", ",", header=",".join(names), comments="")
+    np.savetxt(
+        path, np.column_stack(columns), "%.9g", ",", header=",".join(names), comments=""
+    )
     return str(path)
 
 
@@ -46,14 +48,19 @@ class TestRead:
     @pytest.mark.parametrize(
         ("text", "message"),
         [
-            ("time_s;a\n0,0;0,5\n", "separated by ';': save it with commas, decimals with points"),
+            (
+                "time_s;a\n0,0;0,5\n",
+                "separated by ';': save it with commas, decimals with points",
+            ),
             ("0.000000;0.228867\n0.1;0.2\n", "separated by ';'"),
             ("time_s\ta\n0\t1\n", "separated by tabs"),
             ("0.000000,0.228867\n0.1,0.2\n", "its first line holds numbers, not names"),
             ("time_s,-1.5e-3\n0.1,0.2\n", "its first line holds numbers, not names"),
         ],
     )
-    def test_tables_without_a_header_or_commas_are_refused(self, text, message, tmp_path):
+    def test_tables_without_a_header_or_commas_are_refused(
+        self, text, message, tmp_path
+    ):
         (tmp_path / "r.csv").write_text(text)
         with pytest.raises(ConfigError, match=re.escape(message)):
             read_recording(str(tmp_path / "r.csv"), rate=RATE)
@@ -63,7 +70,9 @@ class TestRead:
         found = read_recording(file)
         assert found.sensors == ("case", "lid")
         assert_allclose(
-            found.acceleration.std(axis=1), SIGNAL.std(axis=1) * [STANDARD_GRAVITY, 1.0], rtol=1e-6
+            found.acceleration.std(axis=1),
+            SIGNAL.std(axis=1) * [STANDARD_GRAVITY, 1.0],
+            rtol=1e-6,
         )
         plain = timed(tmp_path / "p.csv")
         size = read_recording(plain, unit="g").acceleration.std(axis=1)
@@ -72,7 +81,9 @@ class TestRead:
     def test_channels_in_the_order_asked_for(self, tmp_path):
         found = read_recording(timed(tmp_path / "t.csv"), channels=["b", "a"])
         assert found.sensors == ("b", "a")
-        assert_allclose(found.acceleration.std(axis=1), SIGNAL[::-1].std(axis=1), rtol=1e-6)
+        assert_allclose(
+            found.acceleration.std(axis=1), SIGNAL[::-1].std(axis=1), rtol=1e-6
+        )
 
     def test_names_become_sensors(self, tmp_path):
         found = read_recording(timed(tmp_path / "t.csv", names=("1 x", "gear case")))
@@ -92,14 +103,18 @@ def refused(tmp_path):
     np.save(tmp_path / "nan.npy", bad)
     np.save(tmp_path / "tall.npy", SIGNAL.T)
     np.save(tmp_path / "words.npy", np.array(["a", "b"] * 300))
-    np.save(tmp_path / "objects.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
+    np.save(
+        tmp_path / "objects.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True
+    )
     np.save(tmp_path / "short.npy", SIGNAL[:, :100])
     np.save(tmp_path / "still.npy", np.ones((1, 1000)))
     np.savez(tmp_path / "other.npz", velocity=SIGNAL)
     (tmp_path / "garbage.npy").write_bytes(b"no numpy" * 10)
     (tmp_path / "garbage.npz").write_bytes(b"no numpy" * 10)
     time = np.arange(20_000) / RATE
-    jumping = csv(tmp_path / "jump.csv", [time + (time > 1.0), SIGNAL[0]], ["time_s", "a"])
+    jumping = csv(
+        tmp_path / "jump.csv", [time + (time > 1.0), SIGNAL[0]], ["time_s", "a"]
+    )
     rated = {"rate": RATE}
     array = {name: str(tmp_path / name) for name in (
         "nan.npy", "tall.npy", "words.npy", "objects.npy", "short.npy", "still.npy", "other.npz", "garbage.npy",
@@ -109,7 +124,11 @@ def refused(tmp_path):
         ("the name must end in .csv, .npy, .npz", "recording.flac", {}),
         ("cannot be read", array["none.npy"], rated),
         ("cannot be read", str(tmp_path / "none.csv"), {}),
-        ("an array tells no rate; give the samples a second with --rate", array["nan.npy"], {}),
+        (
+            "an array tells no rate; give the samples a second with --rate",
+            array["nan.npy"],
+            {},
+        ),
         ("it has no column time_s; give", csv(tmp_path / "n.csv", SIGNAL, "ab"), {}),
         ("sample 7 of channel_1 is no finite number", array["nan.npy"], rated),
         ("transpose it", array["tall.npy"], rated),
@@ -128,10 +147,22 @@ def refused(tmp_path):
             timed(tmp_path / "e.csv"),
             {"rate": 6000.0},
         ),
-        ("--rate 3 must lie in 1000..1000000", timed(tmp_path / "f.csv"), {"rate": 3.0}),
+        (
+            "--rate 3 must lie in 1000..1000000",
+            timed(tmp_path / "f.csv"),
+            {"rate": 3.0},
+        ),
         ("--unit mm: allowed: m/s2, g", timed(tmp_path / "g.csv"), {"unit": "mm"}),
-        ("a_mm_per_s ends in _mm_per_s", timed(tmp_path / "h.csv", names=("a_mm_per_s", "b")), {}),
-        ("differ in nothing but signs", timed(tmp_path / "i.csv", names=("a b", "a-b")), {}),
+        (
+            "a_mm_per_s ends in _mm_per_s",
+            timed(tmp_path / "h.csv", names=("a_mm_per_s", "b")),
+            {},
+        ),
+        (
+            "differ in nothing but signs",
+            timed(tmp_path / "i.csv", names=("a b", "a-b")),
+            {},
+        ),
     ]
 
 
@@ -199,6 +230,10 @@ def test_the_command_refuses_in_one_line(tmp_path, monkeypatch, capsys, words, t
         "mine",
     ]
     assert main([*common, *(files.get(word, word) for word in words)]) == 2
-    error = [line for line in capsys.readouterr().err.splitlines() if line.startswith("gensig: ")]
+    error = [
+        line
+        for line in capsys.readouterr().err.splitlines()
+        if line.startswith("gensig: ")
+    ]
     assert text in error[-1]
     assert not (tmp_path / "mine").exists()

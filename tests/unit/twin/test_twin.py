@@ -27,8 +27,20 @@ def twin(known, tmp_path_factory):
     """Folder of the twin, and what the command printed."""
     folder = tmp_path_factory.mktemp("twin")
     np.savez(folder / "healthy.npz", acceleration=known.signal)
-    words = ["--teeth", *map(str, TEETH), "--speed", f"{WRONG_START:g}", "--rate", f"{RATE:g}"]
-    assert main(["twin", str(folder / "healthy.npz"), *words, "--out", str(folder / "mine")]) == 0
+    words = [
+        "--teeth",
+        *map(str, TEETH),
+        "--speed",
+        f"{WRONG_START:g}",
+        "--rate",
+        f"{RATE:g}",
+    ]
+    assert (
+        main(
+            ["twin", str(folder / "healthy.npz"), *words, "--out", str(folder / "mine")]
+        )
+        == 0
+    )
     return folder / "mine"
 
 
@@ -70,7 +82,9 @@ def test_held_out_levels(twin):
     ]
     assert [row[0] for row in rows] == ["channel_0", "channel_1"]
     for row in rows:
-        assert float(row[2].removesuffix(" dB")) < 3.0  # median difference of third-octave levels
+        assert (
+            float(row[2].removesuffix(" dB")) < 3.0
+        )  # median difference of third-octave levels
         assert float(row[1].removesuffix(" %")) > 50.0
     assert (twin / "report.png").read_bytes().startswith(b"\x89PNG")
     assert "cannot tell" in report
@@ -83,7 +97,9 @@ def test_assumed_values_are_called_so(twin):
     gear = yaml.safe_load(text)
     assert [gear[side]["n_teeth"] for side in ("pinion", "wheel")] == list(TEETH)
     lines = [
-        line for line in text.splitlines() if ": " in line and not line.startswith(("#", "name"))
+        line
+        for line in text.splitlines()
+        if ": " in line and not line.startswith(("#", "name"))
     ]
     assert all("   # " in line for line in lines)
 
@@ -131,14 +147,18 @@ class TestMotion:
     @pytest.mark.parametrize("start", [0.975, 1.0, 1.025])
     def test_wherever_the_search_begins(self, known, start):
         motion = find_motion(recording(known), BOTH, start * SPEED)
-        assert motion.mesh_frequency / TEETH[0] * 60.0 == pytest.approx(known.speed_rpm, rel=1e-4)
+        assert motion.mesh_frequency / TEETH[0] * 60.0 == pytest.approx(
+            known.speed_rpm, rel=1e-4
+        )
 
     def test_drift(self):
         profile = drifting(2e-3, 0.25, 3.0, seed=4)
         moving = measured(profile=profile)
         motion = find_motion(recording(moving), BOTH, WRONG_START)
         true = np.std([factor for time, factor in profile if time < 2.4])
-        assert motion.mesh_frequency / TEETH[0] * 60.0 == pytest.approx(moving.speed_rpm, rel=1e-4)
+        assert motion.mesh_frequency / TEETH[0] * 60.0 == pytest.approx(
+            moving.speed_rpm, rel=1e-4
+        )
         assert motion.scatter == pytest.approx(true, rel=0.3)
         assert 0.05 < motion.correlation_time < 0.6
         angle = (moving.shaft_angle - moving.shaft_angle[0]) * TEETH[0] / (2.0 * np.pi)
@@ -156,5 +176,9 @@ def test_minimum_phase_of_a_filter_is_the_filter():
     frequency, response = minimum_phase(known_at, gain, RATE, 20.0)
     expected = freqz(*filters, frequency, fs=RATE, include_nyquist=True)[1]
     assert frequency[1] == pytest.approx(20.0)
-    np.testing.assert_allclose(response, expected, rtol=0.0, atol=1e-3 * np.abs(expected).max())
-    np.testing.assert_allclose(np.abs(response), gain_at(frequency, known_at, gain), rtol=1e-6)
+    np.testing.assert_allclose(
+        response, expected, rtol=0.0, atol=1e-3 * np.abs(expected).max()
+    )
+    np.testing.assert_allclose(
+        np.abs(response), gain_at(frequency, known_at, gain), rtol=1e-6
+    )

@@ -67,7 +67,9 @@ def test_every_published_range_is_read_once_and_makes_sense():
     found = read_ranges()
     with realism.RANGES.open(encoding="utf-8") as file:
         assert len(found) == len(list(csv.DictReader(file))) > 20
-    bounded = [one for one in found.values() if one.low is not None or one.high is not None]
+    bounded = [
+        one for one in found.values() if one.low is not None or one.high is not None
+    ]
     assert all(one.source for one in bounded)
     assert found["missing_tooth.kurtosis", "slow and light"].low == 20.0
     assert found["missing_tooth.rms_ratio", "all conditions"].low is None
@@ -83,7 +85,10 @@ def test_a_range_upside_down_and_a_verdict_there_is_not_are_refused():
 
 def test_results_come_back_and_reasons_stay(tmp_path):
     path = tmp_path / "results.csv"
-    found = [compare(measured(), [1.5, 1.6]), compare(measured(id="recording.x", low=None), [NAN])]
+    found = [
+        compare(measured(), [1.5, 1.6]),
+        compare(measured(id="recording.x", low=None), [NAN]),
+    ]
     write_results(path, "base, gensig 0,\nfrozen", found)
     heading, back = read_results(path)
     assert heading == "base, gensig 0, frozen"
@@ -113,7 +118,8 @@ def test_section(tmp_path):
     lines = realism.realism_lines(path)
     assert "Compared: told so" in lines
     assert any(
-        line.startswith("| a.b, ms | here | 1 to 2 | 1.55 | ") and " inside | rig |" in line
+        line.startswith("| a.b, ms | here | 1 to 2 | 1.55 | ")
+        and " inside | rig |" in line
         for line in lines
     )
     assert lines.index("### Yardstick") < lines.index("### A healthy recording")

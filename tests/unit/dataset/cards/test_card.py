@@ -26,7 +26,9 @@ def test_front_matter(folder: Path) -> None:
     assert front["license"] == "cc-by-4.0"
     assert front["size_categories"] == ["n<1K"]
     assert {"synthetic", "vibration", "gensig-0.1.0"} <= set(front["tags"])
-    assert front["configs"][0]["data_files"] == [{"split": "train", "path": "shards/*.h5"}]
+    assert front["configs"][0]["data_files"] == [
+        {"split": "train", "path": "shards/*.h5"}
+    ]
 
 
 @pytest.mark.parametrize(
@@ -60,8 +62,12 @@ def test_croissant_is_valid_and_gives_the_records(folder: Path, plan: Plan) -> N
         name.encode() for name in plan.columns["record_id"].tolist()
     ]
     assert [row["records/label"] for row in rows] == plan.columns["label"].tolist()
-    depths = np.array([row["records/params.crack_depth_mm"] for row in rows], dtype=float)
-    np.testing.assert_allclose(depths, plan.columns["params/crack_depth_mm"], rtol=1e-12, atol=0)
+    depths = np.array(
+        [row["records/params.crack_depth_mm"] for row in rows], dtype=float
+    )
+    np.testing.assert_allclose(
+        depths, plan.columns["params/crack_depth_mm"], rtol=1e-12, atol=0
+    )
 
 
 def test_the_validator_would_find_a_mistake(folder: Path) -> None:
@@ -91,7 +97,8 @@ def test_responsible_ai_fields_state_facts_and_caveats(tmp_path: Path) -> None:
     assert "crack 12, healthy 12, pitting 12" in content["rai:dataBiases"][0]
     assert "1 records failed" in content["rai:dataBiases"][2]
     assert any(
-        "proved nothing about measured signals" in line for line in content["rai:dataLimitations"]
+        "proved nothing about measured signals" in line
+        for line in content["rai:dataLimitations"]
     )
     assert all(name in content["description"] for name in CLASSES)
     metadata = mlcroissant.Dataset(jsonld=folder / "croissant.json").metadata

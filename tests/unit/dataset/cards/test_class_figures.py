@@ -20,7 +20,9 @@ from gensig.dataset.reader import open_dataset
 
 @pytest.fixture(scope="module")
 def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return build(tmp_path_factory.mktemp("drawn") / "set", make_plan(), figures=True, failed=18)
+    return build(
+        tmp_path_factory.mktemp("drawn") / "set", make_plan(), figures=True, failed=18
+    )
 
 
 def test_a_closed_set_has_a_picture_a_class_and_its_card_shows_it(drawn: Path) -> None:
@@ -58,7 +60,9 @@ def test_the_bytes_depend_on_nobody_s_style(drawn: Path, tmp_path: Path) -> None
     ):
         write_class_figures(data)
         assert matplotlib.rcParams["font.size"] == 22.0
-    assert {path.name: path.read_bytes() for path in (folder / "figures").iterdir()} == before
+    assert {
+        path.name: path.read_bytes() for path in (folder / "figures").iterdir()
+    } == before
 
 
 def test_without_matplotlib_a_card_has_no_pictures(
@@ -95,7 +99,9 @@ def test_hostile_class_names_stay_names(tmp_path: Path) -> None:
     plan = Plan(columns={**plan.columns, "label_name": names})
     folder = build(tmp_path / "set", plan, shards=range(0), close=False)
     writer = write_shard(
-        shard_path(folder, 0), plan, attributes=ATTRIBUTES | {"class_names": ["healthy", evil]}
+        shard_path(folder, 0),
+        plan,
+        attributes=ATTRIBUTES | {"class_names": ["healthy", evil]},
     )
     record_shard(folder, 0, writer.sha256, writer.n_bytes, writer.n_failed)
     finalize(folder)

@@ -47,15 +47,23 @@ def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "channel_names": ["pinion_y", HOSTILE],
         "channel_units": ["m/s^2", "rad/s"],
     }
-    folder = build(tmp_path_factory.mktemp("page") / "set", make_plan(), attributes=attributes)
+    folder = build(
+        tmp_path_factory.mktemp("page") / "set", make_plan(), attributes=attributes
+    )
     return write_report(folder, folder.parent / "page.html")[0]
 
 
 @pytest.fixture(params=["desktop", "phone", "dark"])
-def page(browser: Any, page_file: Path, request: pytest.FixtureRequest) -> Iterator[Any]:
+def page(
+    browser: Any, page_file: Path, request: pytest.FixtureRequest
+) -> Iterator[Any]:
     options: dict[str, Any] = {
         "desktop": {"viewport": {"width": 1280, "height": 900}},
-        "phone": {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True},
+        "phone": {
+            "viewport": {"width": 390, "height": 844},
+            "is_mobile": True,
+            "has_touch": True,
+        },
         "dark": {"viewport": {"width": 1280, "height": 900}, "color_scheme": "dark"},
     }[request.param]
     context = browser.new_context(**options)
@@ -85,7 +93,8 @@ def test_legends_are_clear_of_the_toolbar(page: Any) -> None:
     """Below the drawing, whose upper edge leaves room for the toolbar."""
     box = "([plot, part]) => document.querySelector(`#plot-${plot} ${part}`).getBoundingClientRect().toJSON()"
     legend, drawing, whole = (
-        page.evaluate(box, ["indicators", part]) for part in (".legend", ".nsewdrag", ".main-svg")
+        page.evaluate(box, ["indicators", part])
+        for part in (".legend", ".nsewdrag", ".main-svg")
     )
     assert drawing["bottom"] <= legend["top"] <= legend["bottom"] <= whole["bottom"] + 1
     assert drawing["top"] - whole["top"] >= 28  # height of the toolbar
@@ -96,7 +105,8 @@ def test_record_channel_and_comparison(page: Any) -> None:
     for value in ("0", "4"):
         page.select_option(f"{form} [name=record]", value)
         wanted = page.evaluate(
-            "i => JSON.parse(document.getElementById('data').textContent).examples[i].record", value
+            "i => JSON.parse(document.getElementById('data').textContent).examples[i].record",
+            value,
         )
         assert wanted in page.evaluate(TRACES, "wave")[-1]
         assert wanted in page.inner_text("#signals-said")
@@ -137,11 +147,17 @@ def test_axes_marks_and_zoom(page: Any) -> None:
         page.keyboard.press("Space")  # by keyboard alone
         assert (label in page.evaluate(TRACES, "envelope")) is not before
     page.locator(f"{form} [name=decibel]").uncheck()
-    assert page.evaluate("document.getElementById('plot-spectrum').layout.yaxis.type") == "linear"
+    assert (
+        page.evaluate("document.getElementById('plot-spectrum').layout.yaxis.type")
+        == "linear"
+    )
     page.select_option(f"{form} [name=axis]", "hz")
     whole = page.evaluate("document.getElementById('plot-spectrum').layout.xaxis.range")
     page.select_option(f"{form} [name=zoom]", "1")
-    assert page.evaluate("document.getElementById('plot-spectrum').layout.xaxis.range") != whole
+    assert (
+        page.evaluate("document.getElementById('plot-spectrum').layout.xaxis.range")
+        != whole
+    )
 
 
 def test_parameters_and_indicators(page: Any) -> None:
@@ -150,12 +166,21 @@ def test_parameters_and_indicators(page: Any) -> None:
     page.select_option("#parameters-controls [name=column]", "speed_rpm")
     assert page.evaluate(TRACES, "parameters") == ["healthy", "crack", "pitting"]
     page.select_option("#parameters-controls [name=form]", "boxes")
-    assert page.evaluate("document.getElementById('plot-parameters').data[0].type") == "box"
+    assert (
+        page.evaluate("document.getElementById('plot-parameters').data[0].type")
+        == "box"
+    )
     page.select_option("#indicators-controls [name=indicator]", "kurtosis")
     page.select_option("#indicators-controls [name=along]", "speed_rpm")
     assert page.evaluate(AXIS, "indicators") == "speed, r/min"
     first = page.evaluate("document.getElementById('plot-indicators').data[0].y[0]")
     page.select_option("#indicators-controls [name=channel]", "1")
-    assert page.evaluate("document.getElementById('plot-indicators').data[0].y[0]") != first
+    assert (
+        page.evaluate("document.getElementById('plot-indicators').data[0].y[0]")
+        != first
+    )
     page.locator("#indicators-controls [name=decibel]").check()
-    assert page.evaluate("document.getElementById('plot-levels').layout.yaxis.type") == "log"
+    assert (
+        page.evaluate("document.getElementById('plot-levels').layout.yaxis.type")
+        == "log"
+    )

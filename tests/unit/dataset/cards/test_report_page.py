@@ -77,7 +77,9 @@ def unpack(packed: dict) -> np.ndarray:
     """Amplitudes as the page's script reads them."""
     counts = np.frombuffer(base64.b64decode(packed["n"]), dtype="u1").astype(float)
     return np.where(
-        counts > 0, packed["top"] * 10.0 ** ((counts - 255.0) * packed["step_db"] / 20.0), 0.0
+        counts > 0,
+        packed["top"] * 10.0 ** ((counts - 255.0) * packed["step_db"] / 20.0),
+        0.0,
     )
 
 
@@ -133,7 +135,11 @@ def test_structure(made: tuple[Path, Page]) -> None:
             assert "label" in names[number - 1 : number], attributes
         if "role" in attributes:
             assert attributes["aria-label"]
-    plots = {attributes["id"] for _, attributes in page.tags if attributes.get("class") == "plot"}
+    plots = {
+        attributes["id"]
+        for _, attributes in page.tags
+        if attributes.get("class") == "plot"
+    }
     assert {
         "plot-wave",
         "plot-spectrum",
@@ -150,8 +156,12 @@ def test_every_option_has_its_data(made: tuple[Path, Page]) -> None:
     values = [attributes.get("value") for attributes in page.all("option")]
     assert set(map(str, range(len(data["examples"])))) <= set(values)
     assert set(data["drawn"]["columns"]) <= set(values)
-    assert all(len(one["views"]) == len(data["channels"]) == 2 for one in data["examples"])
-    assert {"wave", "spectrum", "envelope", "spectrogram"} == set(data["examples"][0]["views"][0])
+    assert all(
+        len(one["views"]) == len(data["channels"]) == 2 for one in data["examples"]
+    )
+    assert {"wave", "spectrum", "envelope", "spectrogram"} == set(
+        data["examples"][0]["views"][0]
+    )
     for table in (data["drawn"], data["measured"]):
         assert len(base64.b64decode(table["class"])) == table["rows"] == 36
     column = np.frombuffer(
@@ -159,7 +169,11 @@ def test_every_option_has_its_data(made: tuple[Path, Page]) -> None:
     )
     with open_dataset(made[0]) as source:
         np.testing.assert_allclose(
-            column, source.column("params/crack_depth_mm"), rtol=1e-6, atol=0, equal_nan=True
+            column,
+            source.column("params/crack_depth_mm"),
+            rtol=1e-6,
+            atol=0,
+            equal_nan=True,
         )
 
 
@@ -170,8 +184,13 @@ def test_the_signals_are_those_of_the_records(made: tuple[Path, Page]) -> None:
         for one in data["examples"]:
             signal = source.signals(ids.index(one["record"]))[1].astype(float)
             packed = one["views"][1]["wave"]
-            shown = np.frombuffer(base64.b64decode(packed["n"]), dtype="<i2") * packed["scale"]
-            np.testing.assert_allclose(shown, signal, rtol=0, atol=np.abs(signal).max() / 32000)
+            shown = (
+                np.frombuffer(base64.b64decode(packed["n"]), dtype="<i2")
+                * packed["scale"]
+            )
+            np.testing.assert_allclose(
+                shown, signal, rtol=0, atol=np.abs(signal).max() / 32000
+            )
             packed = one["views"][1]["spectrum"]
             frequency, amplitude = amplitude_spectrum(signal, source.sampling_rate)
             amplitude = amplitude[frequency <= 400.0]  # the usable band
@@ -226,17 +245,21 @@ def test_the_code_on_the_page_runs(
     assert names["signal"].shape == (2, 200)
 
 
-def test_sound_records_of_the_same_machine_stand_beside(made: tuple[Path, Page]) -> None:
+def test_sound_records_of_the_same_machine_stand_beside(
+    made: tuple[Path, Page],
+) -> None:
     with open_dataset(made[0]) as data:
         chosen = choose(data, None)
-        assert {name: len(records) for name, records in chosen.records.items()} == dict.fromkeys(
-            data.class_names, 3
-        )
+        assert {
+            name: len(records) for name, records in chosen.records.items()
+        } == dict.fromkeys(data.class_names, 3)
         unit, middle = (
             data.column("unit_id"),
             [chosen.records[name][1] for name in ("crack", "pitting")],
         )
-        matched = {(unit[i], data.column("condition_id")[i]) for i in chosen.records["healthy"]}
+        matched = {
+            (unit[i], data.column("condition_id")[i]) for i in chosen.records["healthy"]
+        }
         sound = {
             (unit[i], data.column("condition_id")[i])
             for i in np.flatnonzero(data.column("label") == 0)
@@ -274,7 +297,12 @@ def test_frequencies_of_a_geared_engine() -> None:
     )  # fmt: skip
     assert rotation.of(0) == {"mesh": 100.0, "drive": 5.0, "pinion": 10.0, "wheel": 2.5}
     assert set(rotation.of(1).values()) == {None}
-    assert [name for name, _ in rotation.references] == ["pinion", "wheel", "drive", "mesh"]
+    assert [name for name, _ in rotation.references] == [
+        "pinion",
+        "wheel",
+        "drive",
+        "mesh",
+    ]
     assert rotation.fault_gear(0) == "wheel"
     same = Rotation(
         mesh=rotation.mesh,
@@ -303,15 +331,26 @@ def _shorten(folder: Path) -> None:
 
 
 DAMAGE = {
-    "no folder": (lambda folder: folder.rename(folder.with_name("gone")), "manifest.json"),
+    "no folder": (
+        lambda folder: folder.rename(folder.with_name("gone")),
+        "manifest.json",
+    ),
     "a shard cut short": (_shorten, "shard-00001.h5"),
-    "a split gone": (lambda folder: (folder / "splits" / "by_unit.csv").unlink(), "by_unit.csv"),
-    "no configuration": (lambda folder: (folder / "config.yaml").unlink(), "config.yaml"),
+    "a split gone": (
+        lambda folder: (folder / "splits" / "by_unit.csv").unlink(),
+        "by_unit.csv",
+    ),
+    "no configuration": (
+        lambda folder: (folder / "config.yaml").unlink(),
+        "config.yaml",
+    ),
 }
 
 
 @pytest.mark.parametrize("damage", DAMAGE)
-def test_a_damaged_set_is_one_clear_line(tmp_path: Path, plan: Plan, damage: str) -> None:
+def test_a_damaged_set_is_one_clear_line(
+    tmp_path: Path, plan: Plan, damage: str
+) -> None:
     folder = build(tmp_path / "set", plan)
     harm, named = DAMAGE[damage]
     harm(folder)
@@ -321,7 +360,9 @@ def test_a_damaged_set_is_one_clear_line(tmp_path: Path, plan: Plan, damage: str
     assert not (tmp_path / "page.html").exists()
 
 
-def test_an_incomplete_set_and_bad_options_are_refused(tmp_path: Path, plan: Plan) -> None:
+def test_an_incomplete_set_and_bad_options_are_refused(
+    tmp_path: Path, plan: Plan
+) -> None:
     begun = build(tmp_path / "begun", plan, shards=range(1), close=False)
     with pytest.raises(DatasetError, match="gensig resume"):
         write_report(begun, tmp_path / "page.html")
@@ -336,7 +377,9 @@ def test_values_that_are_not_finite_are_refused(
 ) -> None:
     read = Dataset.signals
     monkeypatch.setattr(
-        Dataset, "signals", lambda *args, **more: read(*args, **more) * np.float32(np.nan)
+        Dataset,
+        "signals",
+        lambda *args, **more: read(*args, **more) * np.float32(np.nan),
     )
     with pytest.raises(DatasetError, match="not finite"):
         write_report(made[0], made[0].parent / "other.html")
@@ -345,12 +388,16 @@ def test_values_that_are_not_finite_are_refused(
 def test_it_opens_on_a_healthy_record(made: tuple[Path, Page]) -> None:
     page = made[1]
     (number,) = [
-        int(a["value"]) for a in page.all("option") if "selected" in a and a["value"].isdigit()
+        int(a["value"])
+        for a in page.all("option")
+        if "selected" in a and a["value"].isdigit()
     ][:1]
     assert page.data["examples"][number]["class"] == "healthy"
 
 
-def test_a_fault_of_all_teeth_has_no_frequency_of_its_own(made: tuple[Path, Page]) -> None:
+def test_a_fault_of_all_teeth_has_no_frequency_of_its_own(
+    made: tuple[Path, Page],
+) -> None:
     with open_dataset(made[0]) as data:
         before = read_rotation(data)
         faulty = np.flatnonzero(data.column("label") > 0)
@@ -369,14 +416,18 @@ def test_velocity_of_a_tone_is_its_acceleration_over_its_frequency() -> None:
     velocity = velocity_rms(tones, 51200.0)
     expected = [3.0 / np.sqrt(2.0) / (2 * np.pi * f) for f in (100.25, 950.5)]
     np.testing.assert_allclose(velocity[:2], expected, rtol=2e-3)
-    assert velocity[2:].max() < 0.02 * 3.0 / (2 * np.pi * 10.0)  # outside of 10 to 1000 Hz
+    assert velocity[2:].max() < 0.02 * 3.0 / (
+        2 * np.pi * 10.0
+    )  # outside of 10 to 1000 Hz
     faded = 40.0 * np.cos(
         2 * np.pi * 3000.7 * time
     )  # neither end of it is 0: nothing of it leaks below 1 kHz
     assert velocity_rms(faded[None], 51200.0)[0] < 1e-6
 
 
-def test_levels_are_stated_in_g_and_mm_s_and_loud_ones_are_named(made: tuple[Path, Page]) -> None:
+def test_levels_are_stated_in_g_and_mm_s_and_loud_ones_are_named(
+    made: tuple[Path, Page],
+) -> None:
     with open_dataset(made[0]) as data:
         measured = Measured(
             records=np.arange(2),
@@ -395,5 +446,10 @@ def test_levels_are_stated_in_g_and_mm_s_and_loud_ones_are_named(made: tuple[Pat
         (line,) = loudness(data, measured, ["case", "shaft"], units)
         assert line.startswith("Louder than most published housings: crack. Above 10 g")
         measured.further["velocity_rms"][0, 0] = 12e-3
-        assert "housings: healthy, crack." in loudness(data, measured, ["case", "shaft"], units)[0]
-        assert level_table(data, measured, ["case", "shaft"], ["rad/s", "rad/s"]) is None
+        assert (
+            "housings: healthy, crack."
+            in loudness(data, measured, ["case", "shaft"], units)[0]
+        )
+        assert (
+            level_table(data, measured, ["case", "shaft"], ["rad/s", "rad/s"]) is None
+        )

@@ -92,10 +92,16 @@ def test_killed_at_every_change_it_is_no_data_set_and_is_begun_anew(
             assert ("again" in str(caught.value)) == (out / BEGINNING).is_file()
             begin(out)
         made = files(out)
-        made.pop(BEGINNING, None)  # stays where the kill came between manifest and its end
-        made = {name: content for name, content in made.items() if not name.endswith(".tmp")}
+        made.pop(
+            BEGINNING, None
+        )  # stays where the kill came between manifest and its end
+        made = {
+            name: content for name, content in made.items() if not name.endswith(".tmp")
+        }
         assert made.keys() == whole.keys()
-        assert all(made[name] == whole[name] for name in whole if name != "manifest.json")
+        assert all(
+            made[name] == whole[name] for name in whole if name != "manifest.json"
+        )
     assert refused > 20
     assert finished >= 1
     assert read_manifest(out).n_done == 0
@@ -119,7 +125,9 @@ def test_a_killed_beginning_that_holds_anything_else_is_not_touched(
     assert files(tmp_path / "set") == before
 
 
-def test_files_of_a_data_set_without_its_manifest_are_not_touched(tmp_path: Path) -> None:
+def test_files_of_a_data_set_without_its_manifest_are_not_touched(
+    tmp_path: Path,
+) -> None:
     begin(tmp_path / "set")
     (tmp_path / "set" / "manifest.json").unlink()
     with pytest.raises(DatasetError, match="not empty"):
@@ -141,7 +149,9 @@ def test_two_processes_do_not_begin_the_same_folder(tmp_path: Path) -> None:
                 finally:
                     os._exit(0)
             children.append(process)
-        statuses = sorted(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) for child in children)
+        statuses = sorted(
+            os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) for child in children
+        )
         assert statuses == [0, 7]
         for path in sorted(out.rglob("*"), reverse=True):
             path.rmdir() if path.is_dir() else path.unlink()

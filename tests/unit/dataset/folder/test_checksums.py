@@ -40,7 +40,11 @@ def with_log(logged: Path, tmp_path: Path) -> Path:
 
 
 def test_every_file_is_listed_as_sha256sum_does(with_log: Path) -> None:
-    found = {str(path.relative_to(with_log)) for path in with_log.rglob("*") if path.is_file()}
+    found = {
+        str(path.relative_to(with_log))
+        for path in with_log.rglob("*")
+        if path.is_file()
+    }
     listed = read_checksums(with_log)
     assert listed.keys() == found - {"SHA256SUMS"}
     assert set(FILES) <= found
@@ -51,13 +55,17 @@ def test_every_file_is_listed_as_sha256sum_does(with_log: Path) -> None:
     command = shutil.which("sha256sum")
     if command:
         done = subprocess.run(
-            [command, "--check", "--strict", "SHA256SUMS"], cwd=with_log, capture_output=True
+            [command, "--check", "--strict", "SHA256SUMS"],
+            cwd=with_log,
+            capture_output=True,
         )
         assert done.returncode == 0
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_a_flipped_byte_anywhere_is_found_and_its_file_named(with_log: Path, name: str) -> None:
+def test_a_flipped_byte_anywhere_is_found_and_its_file_named(
+    with_log: Path, name: str
+) -> None:
     path = with_log / name
     content = path.read_bytes()
     n = len(content)
@@ -86,7 +94,9 @@ def test_a_missing_file_is_named(with_log: Path, name: str, quick: bool) -> None
             verify(with_log, quick=quick)
         return
     result = verify(with_log, quick=quick)
-    assert any(f"{Path(name).name} is missing" in problem for problem in result.problems)
+    assert any(
+        f"{Path(name).name} is missing" in problem for problem in result.problems
+    )
 
 
 def test_environment_cannot_be_rewritten(with_log: Path) -> None:
@@ -95,7 +105,8 @@ def test_environment_cannot_be_rewritten(with_log: Path) -> None:
     (with_log / "manifest.json").write_text(json.dumps(content, indent=1) + "\n")
     for quick in (False, True):
         assert any(
-            "manifest.json was altered" in line for line in verify(with_log, quick=quick).problems
+            "manifest.json was altered" in line
+            for line in verify(with_log, quick=quick).problems
         )
 
 
@@ -138,7 +149,10 @@ def test_a_card_that_is_gone_is_not_accepted(with_log: Path) -> None:
 def test_checksums_that_are_gone_are_written_when_asked(with_log: Path) -> None:
     before = (with_log / "SHA256SUMS").read_bytes()
     (with_log / "SHA256SUMS").unlink()
-    assert any("SHA256SUMS is missing" in line for line in verify(with_log, quick=True).problems)
+    assert any(
+        "SHA256SUMS is missing" in line
+        for line in verify(with_log, quick=True).problems
+    )
     assert accept_edits(with_log) == ["SHA256SUMS"]
     assert (with_log / "SHA256SUMS").read_bytes() == before
 

@@ -35,12 +35,16 @@ def _create(out: Path, plan: Plan, **changes) -> None:
         "seed": 7,
         "generator_version": "0.1.0",
     }
-    create_folder(out, **({"identity": identity_hash(CONFIG, "0.1.0")} | given | changes))
+    create_folder(
+        out, **({"identity": identity_hash(CONFIG, "0.1.0")} | given | changes)
+    )
 
 
 def _tree(folder: Path) -> dict[str, bytes]:
     return {
-        str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()
+        str(p.relative_to(folder)): p.read_bytes()
+        for p in sorted(folder.rglob("*"))
+        if p.is_file()
     }
 
 
@@ -70,7 +74,9 @@ def test_a_key_that_came_after_0_9_counts_only_where_it_is_not_at_its_default() 
     assert deciding(default) == deciding(before)
     assert default["solver"]["backend"] == "runge_kutta"
     assert identity_hash(default, "0.9.0") == identity_hash(before, "0.9.0")
-    assert identity_hash(with_backend("other"), "0.9.0") != identity_hash(before, "0.9.0")
+    assert identity_hash(with_backend("other"), "0.9.0") != identity_hash(
+        before, "0.9.0"
+    )
     assert differing_keys(before, default) == differing_keys(default, before) == []
     assert differing_keys(before, with_backend("other")) == ["solver.backend"]
 
@@ -136,7 +142,9 @@ def test_failure_while_creating_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_identity_of_another_configuration_is_refused(tmp_path: Path, plan: Plan) -> None:
+def test_identity_of_another_configuration_is_refused(
+    tmp_path: Path, plan: Plan
+) -> None:
     with pytest.raises(DatasetError, match="does not belong"):
         _create(tmp_path / "a", plan, identity="0" * 64)
     assert list(tmp_path.iterdir()) == []
@@ -172,17 +180,24 @@ def _record(folder: Path, shard: int) -> None:
 
 def test_processes_do_not_overwrite_each_other(tmp_path: Path) -> None:
     folder = build(
-        tmp_path / "a", make_plan(n_records=24, records_per_shard=1), shards=range(0), close=False
+        tmp_path / "a",
+        make_plan(n_records=24, records_per_shard=1),
+        shards=range(0),
+        close=False,
     )
     for shard in range(24):
         shard_path(folder, shard).touch()
     context = multiprocessing.get_context("fork")
     with context.Pool(4) as pool:
         pool.starmap(_record, [(folder, shard) for shard in range(24)])
-    assert [entry.bytes for entry in read_manifest(folder).shards] == list(range(10, 34))
+    assert [entry.bytes for entry in read_manifest(folder).shards] == list(
+        range(10, 34)
+    )
 
 
-def test_index_shows_all_shards_from_any_folder_and_nan_for_a_missing_one(folder: Path) -> None:
+def test_index_shows_all_shards_from_any_folder_and_nan_for_a_missing_one(
+    folder: Path,
+) -> None:
     shard_path(folder, 1).unlink()
     code = (
         "import h5py, sys; f = h5py.File(sys.argv[1], locking=False); a = f['acceleration'];"

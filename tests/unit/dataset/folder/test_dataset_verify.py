@@ -31,7 +31,10 @@ def _forge(folder: Path, shard: int, change: Callable[[h5py.File], None]) -> Non
     with h5py.File(path, "r+") as file:
         change(file)
     manifest = json.loads((folder / "manifest.json").read_text())
-    manifest["shards"][shard] |= {"sha256": sha256_file(path), "bytes": path.stat().st_size}
+    manifest["shards"][shard] |= {
+        "sha256": sha256_file(path),
+        "bytes": path.stat().st_size,
+    }
     (folder / "manifest.json").write_text(json.dumps(manifest))
     (folder / "SHA256SUMS").unlink()
     accept_edits(folder)
@@ -56,17 +59,34 @@ def test_split_with_a_unit_on_two_sides_is_found(folder: Path) -> None:
     header, first, *others = path.read_text().splitlines(keepends=True)
     record, _, subset = first.strip().partition(",0,1,")
     path.write_text(
-        "".join([header, f"{record},0,1,{'test' if subset != 'test' else 'train'}\n", *others])
+        "".join(
+            [
+                header,
+                f"{record},0,1,{'test' if subset != 'test' else 'train'}\n",
+                *others,
+            ]
+        )
     )
     problems = [
-        problem for problem in verify(folder).problems if problem.startswith("splits/by_unit: ")
+        problem
+        for problem in verify(folder).problems
+        if problem.startswith("splits/by_unit: ")
     ]
-    assert problems == ["splits/by_unit: unit_id u0 is in more than one subset (1 such)"]
+    assert problems == [
+        "splits/by_unit: unit_id u0 is in more than one subset (1 such)"
+    ]
 
 
 @pytest.mark.parametrize("part", [0.0, 0.5, 0.999])
 @pytest.mark.parametrize(
-    "name", ["shards/shard-00002.h5", "plan.csv", "config.yaml", "splits/by_unit.csv", "index.h5"]
+    "name",
+    [
+        "shards/shard-00002.h5",
+        "plan.csv",
+        "config.yaml",
+        "splits/by_unit.csv",
+        "index.h5",
+    ],
 )
 def test_flipped_byte_is_found(folder: Path, name: str, part: float) -> None:
     path = folder / name
@@ -78,17 +98,28 @@ def test_flipped_byte_is_found(folder: Path, name: str, part: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["shards/shard-00001.h5", "plan.csv", "config.yaml", "splits/by_unit.csv", "index.h5"]
+    "name",
+    [
+        "shards/shard-00001.h5",
+        "plan.csv",
+        "config.yaml",
+        "splits/by_unit.csv",
+        "index.h5",
+    ],
 )
 @pytest.mark.parametrize("quick", [False, True])
 def test_missing_file_is_found(folder: Path, name: str, quick: bool) -> None:
     (folder / name).unlink()
     result = verify(folder, quick=quick)
     assert not result.complete
-    assert any(f"{Path(name).name} is missing" in problem for problem in result.problems)
+    assert any(
+        f"{Path(name).name} is missing" in problem for problem in result.problems
+    )
 
 
-def test_truncated_swapped_extra_and_foreign_shards_are_named(folder: Path, tmp_path: Path) -> None:
+def test_truncated_swapped_extra_and_foreign_shards_are_named(
+    folder: Path, tmp_path: Path
+) -> None:
     path = shard_path(folder, 3)
     path.write_bytes(path.read_bytes()[:-10])
     _swap(shard_path(folder, 0), shard_path(folder, 1))
@@ -101,7 +132,9 @@ def test_truncated_swapped_extra_and_foreign_shards_are_named(folder: Path, tmp_
     assert "shard-00004.h5' is extra" in text
     assert ".shard-00001.h5.1-a.tmp' is extra" in text
     assert "shard-00002.h5" not in text
-    assert any("truncated" in problem for problem in verify(folder, quick=True).problems)
+    assert any(
+        "truncated" in problem for problem in verify(folder, quick=True).problems
+    )
 
 
 def test_quick_reads_no_record(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -126,11 +159,16 @@ def _swap(a: Path, b: Path) -> None:
     b.write_bytes(content)
 
 
-def test_foreign_shard_is_found_even_when_the_manifest_agrees(folder: Path, tmp_path: Path) -> None:
+def test_foreign_shard_is_found_even_when_the_manifest_agrees(
+    folder: Path, tmp_path: Path
+) -> None:
     other = tmp_path / "other.h5"
     plan = make_plan()
     renamed = Plan(
-        columns={**plan.columns, "record_id": np.char.replace(plan.columns["record_id"], "r", "x")}
+        columns={
+            **plan.columns,
+            "record_id": np.char.replace(plan.columns["record_id"], "r", "x"),
+        }
     )
     write_shard(other, renamed, 1, attributes=ATTRIBUTES | {"config_json": '{"a": 2}'})
     shutil.copyfile(other, shard_path(folder, 1))
@@ -138,7 +176,9 @@ def test_foreign_shard_is_found_even_when_the_manifest_agrees(folder: Path, tmp_
     _forge(folder, 1, lambda file: None)
     text = "\n".join(verify(folder).problems)
     assert "shard-00001.h5 is foreign: its attributes config_json" in text
-    assert "shard-00001.h5 row 0: record_id is 'x000010', the plan says 'r000010'" in text
+    assert (
+        "shard-00001.h5 row 0: record_id is 'x000010', the plan says 'r000010'" in text
+    )
 
 
 def _set(name: str, row: int, value: object) -> Callable[[h5py.File], None]:
@@ -182,7 +222,9 @@ def test_altered_plan_and_identity_are_found(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("n_shards", [0, 2, 4])
-def test_interrupted_set_never_looks_whole(tmp_path: Path, plan: Plan, n_shards: int) -> None:
+def test_interrupted_set_never_looks_whole(
+    tmp_path: Path, plan: Plan, n_shards: int
+) -> None:
     folder = build(tmp_path / "a", plan, shards=range(n_shards), close=False)
     for quick in (False, True):
         result = verify(folder, quick=quick)
@@ -203,7 +245,9 @@ def test_folder_that_is_no_data_set(tmp_path: Path) -> None:
         verify(tmp_path)
 
 
-def test_linked_shards_outside_the_folder_are_refused(folder: Path, tmp_path: Path) -> None:
+def test_linked_shards_outside_the_folder_are_refused(
+    folder: Path, tmp_path: Path
+) -> None:
     (folder / "shards").rename(tmp_path / "elsewhere")
     (folder / "shards").symlink_to(tmp_path / "elsewhere")
     assert any("leads out" in problem for problem in verify(folder).problems)
@@ -233,7 +277,11 @@ def test_inspect_shows_what_is_there(folder: Path, tmp_path: Path) -> None:
         file["out"] = h5py.ExternalLink("/etc/passwd", "/x")
     text = inspect(tmp_path / "any.h5")
     assert "\x1b" not in text
-    for part in ("value 3.5", "/deep/er/y (3,) float64", "/out -> ExternalLink, not followed"):
+    for part in (
+        "value 3.5",
+        "/deep/er/y (3,) float64",
+        "/out -> ExternalLink, not followed",
+    ):
         assert part in text, part
     for bad in (tmp_path / "none", folder / "plan.csv", tmp_path):
         with pytest.raises(DatasetError):
@@ -244,7 +292,9 @@ def test_card_states_facts_and_escapes(tmp_path: Path) -> None:
     plan = make_plan()
     evil = "<script>|`*"
     units = np.where(plan.columns["label"] == 1, evil, plan.columns["label_name"])
-    folder = build(tmp_path / "a_b", Plan(columns={**plan.columns, "label_name": units}), failed=3)
+    folder = build(
+        tmp_path / "a_b", Plan(columns={**plan.columns, "label_name": units}), failed=3
+    )
     card = (folder / "README.md").read_text()
     assert "\n# a\\_b\n" in card
     for part in ("36, of which 1 failed", "1000 Hz", "0.2 s (200 samples)", "n\\_teeth\\_pinion | 23", "CC BY 4.0",

@@ -88,7 +88,9 @@ def test_unwritten_row_is_refused_and_leaves_nothing(tmp_path: Path) -> None:
         ) as w:
             w.write(0, *row_of(plan, 0))
 
-    with pytest.raises(DatasetError, match="1 of 2 rows were never written, the first is row 1"):
+    with pytest.raises(
+        DatasetError, match="1 of 2 rows were never written, the first is row 1"
+    ):
         write_one()
     assert list(tmp_path.iterdir()) == []
 
@@ -118,7 +120,9 @@ def test_failed_record_keeps_its_parameters(tmp_path: Path) -> None:
         ({"params/unknown": 3.0}, "not declared"),
     ],
 )
-def test_value_that_does_not_fit_is_refused(tmp_path: Path, change: dict, message: str) -> None:
+def test_value_that_does_not_fit_is_refused(
+    tmp_path: Path, change: dict, message: str
+) -> None:
     signals, values = row_of(make_plan(), 0)
     with (
         ShardWriter(
@@ -155,9 +159,13 @@ def test_missing_column_and_bad_signals_are_refused(tmp_path: Path) -> None:
             with pytest.raises(DatasetError, match=next(iter(wrong))):
                 writer.write(0, signals | wrong, values)
         with pytest.raises(DatasetError, match="signal noise_power is missing"):
-            writer.write(0, {k: v for k, v in signals.items() if k != "noise_power"}, values)
+            writer.write(
+                0, {k: v for k, v in signals.items() if k != "noise_power"}, values
+            )
         with pytest.raises(DatasetError, match="column torque_nm is missing"):
-            writer.write(0, signals, {k: v for k, v in values.items() if k != "torque_nm"})
+            writer.write(
+                0, signals, {k: v for k, v in values.items() if k != "torque_nm"}
+            )
         writer.write(0, signals, values)
 
 
@@ -177,14 +185,25 @@ def test_missing_column_and_bad_signals_are_refused(tmp_path: Path) -> None:
         {"attributes": ATTRIBUTES | {"schema_version": 2}},
     ],
 )
-def test_declaration_that_could_not_be_read_back_is_refused(tmp_path: Path, change: dict) -> None:
-    given = {"n_records": 1, "signals": SIGNALS, "params": [], "attributes": ATTRIBUTES} | change
+def test_declaration_that_could_not_be_read_back_is_refused(
+    tmp_path: Path, change: dict
+) -> None:
+    given = {
+        "n_records": 1,
+        "signals": SIGNALS,
+        "params": [],
+        "attributes": ATTRIBUTES,
+    } | change
     with pytest.raises(DatasetError):
         ShardWriter(tmp_path / "a.h5", **given)
 
 
-@pytest.mark.parametrize("value", [{"a": 1}, None, ["a", 1, None], "a\0b", "x" * 70_000])
-def test_attribute_that_would_not_come_back_is_refused(tmp_path: Path, value: object) -> None:
+@pytest.mark.parametrize(
+    "value", [{"a": 1}, None, ["a", 1, None], "a\0b", "x" * 70_000]
+)
+def test_attribute_that_would_not_come_back_is_refused(
+    tmp_path: Path, value: object
+) -> None:
     writer = ShardWriter(
         tmp_path / "a.h5",
         n_records=1,
@@ -234,14 +253,22 @@ def _attribute(name: str, value: object) -> object:
         (_external, "'params/more' is a link"),
         (_virtual, "in another file"),
         (
-            _replace("torque_nm", shape=(10,), dtype="f8", external="/tmp/gensig-none.bin"),
+            _replace(
+                "torque_nm", shape=(10,), dtype="f8", external="/tmp/gensig-none.bin"
+            ),
             "in another file",
         ),
         (_replace("torque_nm", data=np.zeros(9)), "has shape"),
         (_replace("torque_nm", data=np.zeros((10, 1))), "axes"),
         (_replace("label", data=np.zeros(10)), "has type"),
-        (_replace("acceleration", data=np.ones((10, 2, 200), "i4")), "wants float32 or int16"),
-        (_replace("acceleration", data=np.ones((10, 2, 200), "u2")), "wants float32 or int16"),
+        (
+            _replace("acceleration", data=np.ones((10, 2, 200), "i4")),
+            "wants float32 or int16",
+        ),
+        (
+            _replace("acceleration", data=np.ones((10, 2, 200), "u2")),
+            "wants float32 or int16",
+        ),
         (
             _replace("acceleration", data=np.ones((10, 2, 200), "i2")),
             "no data set acceleration_scale",
@@ -250,15 +277,31 @@ def _attribute(name: str, value: object) -> object:
             _replace("acceleration", data=np.ones((10, 2, 200)), scaleoffset=2),
             "allowed are gzip, lzf and blosc2",
         ),
-        (_replace("label_name", data=["x"] * 10, dtype=h5py.string_dtype()), "has type object"),
+        (
+            _replace("label_name", data=["x"] * 10, dtype=h5py.string_dtype()),
+            "has type object",
+        ),
         (_replace("label_name", data=np.zeros(10, dtype=[("a", "f8")])), "has type"),
-        (_replace("acceleration", shape=(10, 2, 10**12), dtype="f4", chunks=(1, 2, 100)), "bomb"),
-        (_replace("acceleration", shape=(10, 2, 10**9), dtype="f4", compression="gzip"), "bomb"),
+        (
+            _replace(
+                "acceleration", shape=(10, 2, 10**12), dtype="f4", chunks=(1, 2, 100)
+            ),
+            "bomb",
+        ),
+        (
+            _replace(
+                "acceleration", shape=(10, 2, 10**9), dtype="f4", compression="gzip"
+            ),
+            "bomb",
+        ),
         (_attribute("schema_version", 2), "format version 2"),
         (_attribute("sampling_rate_hz", float("nan")), "positive"),
         (_attribute("channel_names", 3), "list of text"),
         (lambda file: file.__delitem__("status"), "no data set status"),
-        (lambda file: file.attrs.__delitem__("class_names"), "no root attribute class_names"),
+        (
+            lambda file: file.attrs.__delitem__("class_names"),
+            "no root attribute class_names",
+        ),
     ],
 )
 def test_stranger_is_refused(tmp_path: Path, change, message: str) -> None:
@@ -315,10 +358,16 @@ except DatasetError as error:
 
 
 @pytest.mark.parametrize(("limit", "fits"), [(20_000, False), (10_000_000, True)])
-def test_full_disk_is_one_line_and_leaves_nothing(tmp_path: Path, limit: int, fits: bool) -> None:
+def test_full_disk_is_one_line_and_leaves_nothing(
+    tmp_path: Path, limit: int, fits: bool
+) -> None:
     command = [sys.executable, "-c", FULL_DISK, str(tmp_path), str(limit)]
     run = subprocess.run(
-        command, capture_output=True, text=True, cwd=Path(__file__).parents[1], check=False
+        command,
+        capture_output=True,
+        text=True,
+        cwd=Path(__file__).parents[1],
+        check=False,
     )
     assert run.returncode == (0 if fits else 1)
     assert [path.name for path in tmp_path.iterdir()] == (["a.h5"] if fits else [])

@@ -28,7 +28,9 @@ NAMES = {"hdf5": "all.h5", "parquet": "all.parquet", "npz": "all.npz", "wav": "a
 
 
 @pytest.fixture(scope="module", params=["float32", "int16"])
-def stored(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def stored(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
     """A data set with a failed record and clean signals, in both ways to store samples."""
     out = tmp_path_factory.mktemp("stored") / "set"
     return build(out, make_plan(), failed=12, clean=True, sample_type=request.param)
@@ -36,13 +38,17 @@ def stored(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
 
 def _signals(folder: Path, name: str = "acceleration") -> np.ndarray:
     with open_dataset(folder) as data:
-        return np.stack([data.signals(index, name=name) for index in range(data.n_records)])
+        return np.stack(
+            [data.signals(index, name=name) for index in range(data.n_records)]
+        )
 
 
 def _columns(folder: Path) -> dict[str, np.ndarray]:
     with open_dataset(folder) as data:
         return {
-            name: data.column(name) for name in data.column_names if not name.endswith("_scale")
+            name: data.column(name)
+            for name in data.column_names
+            if not name.endswith("_scale")
         }
 
 
@@ -61,7 +67,9 @@ def test_hdf5_is_one_shard_in_physical_units(stored: Path, tmp_path: Path) -> No
             np.testing.assert_array_equal(read_rows(file[name]), values)
         with h5py.File(shard_path(stored, 0), locking=False) as shard:
             columns = list(_columns(stored))
-            assert [file[name].dtype for name in columns] == [shard[name].dtype for name in columns]
+            assert [file[name].dtype for name in columns] == [
+                shard[name].dtype for name in columns
+            ]
 
 
 def test_npz_needs_no_pickle(stored: Path, tmp_path: Path) -> None:
@@ -74,7 +82,10 @@ def test_npz_needs_no_pickle(stored: Path, tmp_path: Path) -> None:
         )
         for name, values in _columns(stored).items():
             np.testing.assert_array_equal(arrays[name], values)
-        assert json.loads(str(arrays["attributes_json"])) == {"schema_version": 1, **ATTRIBUTES}
+        assert json.loads(str(arrays["attributes_json"])) == {
+            "schema_version": 1,
+            **ATTRIBUTES,
+        }
 
 
 @pytest.mark.parametrize("samples", [False, True])
@@ -92,7 +103,9 @@ def test_parquet(
     assert ("acceleration" in frame) is samples
     if samples:
         found = np.array(frame["acceleration"].tolist()).tolist()
-        np.testing.assert_array_equal(np.stack([np.stack(row) for row in found]), _signals(stored))
+        np.testing.assert_array_equal(
+            np.stack([np.stack(row) for row in found]), _signals(stored)
+        )
     file = parquet.ParquetFile(out)
     assert file.schema_arrow.field("speed_rpm").metadata[b"unit"] == b"r/min"
     assert json.loads(file.schema_arrow.metadata[b"gensig"])["class_names"] == CLASSES
@@ -119,7 +132,9 @@ def test_wav(stored: Path, tmp_path: Path, one_channel: bool) -> None:
         assert float(row["speed_rpm"]) == 1800.0 + record
         if one_channel:
             assert row["channel"] == ATTRIBUTES["channel_names"][channel]
-    assert json.loads((out / "attributes.json").read_text(encoding="utf-8"))["channel_units"] == [
+    assert json.loads((out / "attributes.json").read_text(encoding="utf-8"))[
+        "channel_units"
+    ] == [
         "m/s^2",
         "m/s^2",
     ]
@@ -157,20 +172,29 @@ def test_mistakes_are_one_line(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for arguments, message in (
-        (["--to", "matlab", "--out", str(tmp_path / "x")], "allowed are hdf5, parquet, npz, wav"),
+        (
+            ["--to", "matlab", "--out", str(tmp_path / "x")],
+            "allowed are hdf5, parquet, npz, wav",
+        ),
         (["--to", "npz", "--out", str(tmp_path / "no" / "x")], "there is no folder"),
         (["--to", "npz", "--out", str(folder / "x.npz")], "lies in the data set"),
         (
             ["--to", "npz", "--samples", "--out", str(tmp_path / "x")],
             "'samples' belongs to parquet",
         ),
-        (["--to", "npz", "--one-channel", "--out", str(tmp_path / "x")], "'one_channel' to wav"),
+        (
+            ["--to", "npz", "--one-channel", "--out", str(tmp_path / "x")],
+            "'one_channel' to wav",
+        ),
     ):
         assert main(["export", str(folder), *arguments]) == 2
         error = capsys.readouterr().err
         assert message in error
         assert error.count("\n") == 1
-    assert main(["export", str(folder), "--to", "npz", "--out", str(tmp_path / "x.npz")]) == 0
+    assert (
+        main(["export", str(folder), "--to", "npz", "--out", str(tmp_path / "x.npz")])
+        == 0
+    )
     assert "36 records as npz, 1 file(s)" in capsys.readouterr().out
 
 

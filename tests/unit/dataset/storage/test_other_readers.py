@@ -25,7 +25,9 @@ def _offline(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("sample_type", ["float32", "int16"])
-def test_hugging_face_example_of_the_format(tmp_path: Path, plan: Plan, sample_type: str) -> None:
+def test_hugging_face_example_of_the_format(
+    tmp_path: Path, plan: Plan, sample_type: str
+) -> None:
     """The example in docs/format.md runs, and gives every record of every shard."""
     folder = build(tmp_path / "set", plan, sample_type=sample_type)
     (code,) = [
@@ -69,44 +71,68 @@ def test_pandas(folder: Path, plan: Plan) -> None:
     assert isinstance(frame, pandas.DataFrame)
     assert len(frame) == 10
     assert frame["label_name"].tolist() == plan.columns["label_name"][:10].tolist()
-    assert frame.groupby("label_name")["speed_rpm"].mean()["crack"] == pytest.approx(1804.0)
+    assert frame.groupby("label_name")["speed_rpm"].mean()["crack"] == pytest.approx(
+        1804.0
+    )
 
 
 @pytest.mark.parametrize("sample_type", ["float32", "int16"])
 def test_types_are_those_old_programs_know(tmp_path: Path, sample_type: str) -> None:
     """MATLAB and Octave are not run here: what their HDF5 readers cannot take is looked for in the file itself."""
     folder = build(
-        tmp_path / "set", make_plan(n_records=4, records_per_shard=4), sample_type=sample_type
+        tmp_path / "set",
+        make_plan(n_records=4, records_per_shard=4),
+        sample_type=sample_type,
     )
     path = shard_path(folder, 0)
-    assert path.read_bytes()[8] == 0  # superblock version 0, which every HDF5 library reads
+    assert (
+        path.read_bytes()[8] == 0
+    )  # superblock version 0, which every HDF5 library reads
     with h5py.File(path, locking=False) as file:
         found: list[str] = []
         file.visititems(
-            lambda name, item: found.append(name) if isinstance(item, h5py.Dataset) else None
+            lambda name, item: (
+                found.append(name) if isinstance(item, h5py.Dataset) else None
+            )
         )
         assert {"acceleration", "label_name", "params/crack_depth_mm"} <= set(found)
         types = {name: file[name].id.get_type() for name in found}
-        types |= {f"attribute {name}": file.attrs.get_id(name).get_type() for name in file.attrs}
+        types |= {
+            f"attribute {name}": file.attrs.get_id(name).get_type()
+            for name in file.attrs
+        }
         for name, kind in types.items():
             if isinstance(kind, h5py.h5t.TypeStringID):
                 assert not kind.is_variable_str(), name
                 assert kind.get_strpad() == h5py.h5t.STR_NULLPAD, name
                 utf8 = name.startswith("attribute")  # Octave reads no attributes
-                assert kind.get_cset() == (h5py.h5t.CSET_UTF8 if utf8 else h5py.h5t.CSET_ASCII), (
-                    name
-                )
+                assert kind.get_cset() == (
+                    h5py.h5t.CSET_UTF8 if utf8 else h5py.h5t.CSET_ASCII
+                ), name
                 assert kind.get_size() > 0, name
             else:
-                assert type(kind) in (h5py.h5t.TypeIntegerID, h5py.h5t.TypeFloatID), name
-                assert kind.get_order() in (h5py.h5t.ORDER_LE, h5py.h5t.ORDER_NONE), name
+                assert type(kind) in (h5py.h5t.TypeIntegerID, h5py.h5t.TypeFloatID), (
+                    name
+                )
+                assert kind.get_order() in (h5py.h5t.ORDER_LE, h5py.h5t.ORDER_NONE), (
+                    name
+                )
                 assert kind.get_size() in (1, 2, 4, 8), name
         spaces = {name: file[name].id.get_space() for name in found}
-        spaces |= {f"attribute {name}": file.attrs.get_id(name).get_space() for name in file.attrs}
+        spaces |= {
+            f"attribute {name}": file.attrs.get_id(name).get_space()
+            for name in file.attrs
+        }
         allowed = (h5py.h5s.SCALAR, h5py.h5s.SIMPLE)
-        assert all(space.get_simple_extent_type() in allowed for space in spaces.values())
-        assert file["acceleration"].id.get_type().get_size() == (2 if sample_type == "int16" else 4)
-        assert all(not file[name].is_virtual and not file[name].external for name in found)
+        assert all(
+            space.get_simple_extent_type() in allowed for space in spaces.values()
+        )
+        assert file["acceleration"].id.get_type().get_size() == (
+            2 if sample_type == "int16" else 4
+        )
+        assert all(
+            not file[name].is_virtual and not file[name].external for name in found
+        )
         assert file["acceleration"].id.get_create_plist().get_nfilters() == 0
         layout = file["label"].id.get_create_plist().get_layout()
         assert layout in (h5py.h5d.CONTIGUOUS, h5py.h5d.COMPACT)
@@ -129,7 +155,8 @@ def test_text_is_read_the_way_octave_asks_for_it(folder: Path, plan: Plan) -> No
             data.read(h5py.h5s.ALL, h5py.h5s.ALL, values, mtype=wanted)
             np.testing.assert_array_equal(values, file[name][:])
         assert (
-            file["label_name"][:].astype(str).tolist() == plan.columns["label_name"][:10].tolist()
+            file["label_name"][:].astype(str).tolist()
+            == plan.columns["label_name"][:10].tolist()
         )
 
 
@@ -139,4 +166,6 @@ def test_utf8_text_could_not_be_read_that_way(tmp_path: Path) -> None:
         wanted = h5py.h5t.C_S1.copy()
         wanted.set_size(9)
         with pytest.raises(OSError, match="conversion path"):
-            file["text"].id.read(h5py.h5s.ALL, h5py.h5s.ALL, np.zeros(1, "S9"), mtype=wanted)
+            file["text"].id.read(
+                h5py.h5s.ALL, h5py.h5s.ALL, np.zeros(1, "S9"), mtype=wanted
+            )

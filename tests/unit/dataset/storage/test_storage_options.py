@@ -41,7 +41,12 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A set of int16 with blosc2, a failed record and signals without noise; read only."""
     out = tmp_path_factory.mktemp("whole") / "set"
     return build(
-        out, make_plan(), failed=FAILED, clean=True, compression="blosc2", sample_type="int16"
+        out,
+        make_plan(),
+        failed=FAILED,
+        clean=True,
+        compression="blosc2",
+        sample_type="int16",
     )
 
 
@@ -56,10 +61,14 @@ def bound(signal: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("peak", [3e38, 1e4, 1.0, 1e-12, 1e-30, 1e-40, 1.5e-45])
-def test_quantization_uses_the_whole_range_and_errs_by_half_a_count(peak: float) -> None:
+def test_quantization_uses_the_whole_range_and_errs_by_half_a_count(
+    peak: float,
+) -> None:
     rng = np.random.default_rng(1)
     signal = rng.normal(size=(3, 5000))
-    signal = (signal / np.abs(signal).max(axis=1, keepdims=True) * peak).astype(np.float32)
+    signal = (signal / np.abs(signal).max(axis=1, keepdims=True) * peak).astype(
+        np.float32
+    )
     counts, scale = quantized(signal)
     assert counts.dtype == np.int16
     assert (
@@ -69,7 +78,9 @@ def test_quantization_uses_the_whole_range_and_errs_by_half_a_count(peak: float)
     assert (error <= HALF_COUNT * scale[:, None]).all()
     assert error.max() < 10 ** (-90 / 20) * float(np.abs(signal).max())
     if peak > 1e-30:  # else float32 itself is as coarse as a count
-        assert (error.max(axis=1) > 0.49 * scale).all()  # the bound is no looser than it must be
+        assert (
+            error.max(axis=1) > 0.49 * scale
+        ).all()  # the bound is no looser than it must be
 
 
 def test_quantization_of_zero_constant_and_not_finite_channels() -> None:
@@ -91,13 +102,22 @@ def test_every_way_gives_the_signals_back(
 ) -> None:
     path = tmp_path / "a.h5"
     write_shard(
-        path, plan, 1, failed=FAILED, clean=True, compression=compression, sample_type=sample_type
+        path,
+        plan,
+        1,
+        failed=FAILED,
+        clean=True,
+        compression=compression,
+        sample_type=sample_type,
     )
     with open_shard(path) as file:
         for name, factor in (("acceleration", 1), ("acceleration_clean", 0.5)):
             assert file[name].dtype == sample_type
             for row in range(10):
-                found, signal = read_signal(file, name, row), factor * expected(10 + row)
+                found, signal = (
+                    read_signal(file, name, row),
+                    factor * expected(10 + row),
+                )
                 assert found.dtype == np.float32
                 if row == FAILED - 10:
                     assert np.isnan(found).all()
@@ -110,9 +130,13 @@ def test_every_way_gives_the_signals_back(
         assert [scale in file for scale in scales] == [sample_type == "int16"] * 2
         assert compression_of(file["acceleration"]) == compression
         if compression == "blosc2":  # as docs/format.md says: level 5, bit shuffle, LZ4
-            number, _, options, _ = file["acceleration"].id.get_create_plist().get_filter(0)
+            number, _, options, _ = (
+                file["acceleration"].id.get_create_plist().get_filter(0)
+            )
             assert (number, options[4:7]) == (32026, (5, 2, 1))
-        assert file["acceleration"].attrs["unit"] == (b"1" if sample_type == "int16" else b"m/s^2")
+        assert file["acceleration"].attrs["unit"] == (
+            b"1" if sample_type == "int16" else b"m/s^2"
+        )
 
 
 @pytest.mark.parametrize(("compression", "sample_type"), WAYS)
@@ -128,13 +152,17 @@ def test_silent_and_failed_shards_are_read(
         compression=compression, sample_type=sample_type,
     ) as writer:  # fmt: skip
         for row in range(2):
-            writer.write(row, signals, row_of(plan, row, status="failed" if failed else "ok")[1])
+            writer.write(
+                row, signals, row_of(plan, row, status="failed" if failed else "ok")[1]
+            )
     with open_shard(path) as file:
         found = read_signal(file, "acceleration", 1)
     np.testing.assert_array_equal(found, np.full(shape, np.nan if failed else 0.0))
 
 
-def test_failed_record_keeps_the_channels_that_are_finite(tmp_path: Path, plan: Plan) -> None:
+def test_failed_record_keeps_the_channels_that_are_finite(
+    tmp_path: Path, plan: Plan
+) -> None:
     signals, values = row_of(plan, 0, status="failed")
     signals["acceleration"][1, 7] = np.inf
     shapes = {name: array.shape for name, array in signals.items()}
@@ -145,7 +173,9 @@ def test_failed_record_keeps_the_channels_that_are_finite(tmp_path: Path, plan: 
         writer.write(0, signals, values)
     with open_shard(tmp_path / "a.h5") as file:
         found = read_signal(file, "acceleration", 0)
-    assert (np.abs(found - signals["acceleration"])[0] <= bound(signals["acceleration"])[0]).all()
+    assert (
+        np.abs(found - signals["acceleration"])[0] <= bound(signals["acceleration"])[0]
+    ).all()
     assert np.isnan(found[1]).all()
 
 
@@ -184,7 +214,9 @@ def test_reader_gives_physical_values(whole: Path) -> None:
             np.testing.assert_array_equal(
                 data.signals(index, 20, 70, ["wheel_ü"]), found[1:, 20:70]
             )
-            np.testing.assert_array_equal(data.signals(index, channels=[1, 0]), found[::-1])
+            np.testing.assert_array_equal(
+                data.signals(index, channels=[1, 0]), found[::-1]
+            )
             clean = data.signals(index, name="acceleration_clean")
             assert (np.abs(clean - signal / 2) <= bound(signal / 2)).all()
         assert np.isnan(data.signals(FAILED)).all()
@@ -194,19 +226,30 @@ def test_reader_gives_physical_values(whole: Path) -> None:
         assert data.usable.sum() == 35
 
 
-def test_index_holds_counts_and_scales_of_all_shards(whole: Path, tmp_path: Path) -> None:
+def test_index_holds_counts_and_scales_of_all_shards(
+    whole: Path, tmp_path: Path
+) -> None:
     copy = shutil.copytree(whole, tmp_path / "set")
     shard_path(copy, 3).unlink()
-    with open_dataset(whole) as data, h5py.File(copy / "index.h5", locking=False) as index:
+    with (
+        open_dataset(whole) as data,
+        h5py.File(copy / "index.h5", locking=False) as index,
+    ):
         assert index["acceleration"].attrs["scale"] == b"acceleration_scale"
-        physical = index["acceleration"][...] * index["acceleration_scale"][...][:, :, None]
+        physical = (
+            index["acceleration"][...] * index["acceleration_scale"][...][:, :, None]
+        )
         for row in (0, FAILED, 29):
-            np.testing.assert_array_equal(physical[row].astype(np.float32), data.signals(row))
+            np.testing.assert_array_equal(
+                physical[row].astype(np.float32), data.signals(row)
+            )
     assert np.isnan(physical[30:]).all()  # the shard that is missing
     assert np.isfinite(physical[:FAILED]).all()
 
 
-def test_diagnosis_and_descriptions_go_through_the_scale(whole: Path, folder: Path) -> None:
+def test_diagnosis_and_descriptions_go_through_the_scale(
+    whole: Path, folder: Path
+) -> None:
     windows = []
     for path in (folder, whole):
         with open_dataset(path) as data:
@@ -217,9 +260,16 @@ def test_diagnosis_and_descriptions_go_through_the_scale(whole: Path, folder: Pa
                 normalise="none",
                 classes=["healthy", "pitting"],
             )
-            windows.append(load_windows(task, subset_segments(task, "by_unit", "train")))
-    kept = np.isin(windows[0].record, windows[1].record)  # the failed record is left out
-    first, second = windows[0].cut(np.flatnonzero(kept)), windows[1].cut(np.arange(len(windows[1])))
+            windows.append(
+                load_windows(task, subset_segments(task, "by_unit", "train"))
+            )
+    kept = np.isin(
+        windows[0].record, windows[1].record
+    )  # the failed record is left out
+    first, second = (
+        windows[0].cut(np.flatnonzero(kept)),
+        windows[1].cut(np.arange(len(windows[1]))),
+    )
     np.testing.assert_allclose(second, first, rtol=0, atol=5 / 32767)
     assert np.abs(second).max() > 1.0
     text = inspect(whole)
@@ -244,7 +294,10 @@ def test_other_processes_read_blosc2(whole: Path, method: str) -> None:
     with open_dataset(whole) as data:
         here = [_first_sample(data, index) for index in (0, 35)]
         with multiprocessing.get_context(method).Pool(1) as pool:
-            assert pool.starmap(_first_sample, [(data, index) for index in (0, 35)]) == here
+            assert (
+                pool.starmap(_first_sample, [(data, index) for index in (0, 35)])
+                == here
+            )
 
 
 def _forge(folder: Path, change: Callable[[h5py.File], None]) -> str:
@@ -291,9 +344,15 @@ def _narrow_scale(file: h5py.File) -> None:
         (_scale(-1e-3), "row 4: acceleration_scale is -0.001"),
         (_scale(1e300), "row 4: acceleration is not finite"),
         (_scale(0.0, row=FAILED - 10), "row 2: acceleration_scale is 0.0"),
-        (_scale(-1.0, name="acceleration_clean_scale"), "row 4: acceleration_clean_scale is -1.0"),
+        (
+            _scale(-1.0, name="acceleration_clean_scale"),
+            "row 4: acceleration_clean_scale is -1.0",
+        ),
         (_without_scale, "no data set acceleration_scale"),
-        (_narrow_scale, "acceleration_scale has shape (10, 1), acceleration has (10, 2)"),
+        (
+            _narrow_scale,
+            "acceleration_scale has shape (10, 1), acceleration has (10, 2)",
+        ),
     ],
 )
 def test_verify_finds_a_scale_that_is_none(
@@ -317,7 +376,9 @@ def test_reader_refuses_a_scale_that_is_none(whole: Path, tmp_path: Path) -> Non
     _forge(folder, _scale(0.0))
     with open_dataset(folder) as data:
         data.signals(15)
-        with pytest.raises(DatasetError, match=r"acceleration_scale of row 4 is 0\.0") as caught:
+        with pytest.raises(
+            DatasetError, match=r"acceleration_scale of row 4 is 0\.0"
+        ) as caught:
             data.signals(14)
     assert "\n" not in str(caught.value)
 
@@ -332,13 +393,16 @@ def test_missing_plugin_is_one_line(
         lambda: open_dataset(whole),
     ):
         with pytest.raises(
-            DatasetError, match=r"blosc2.* needs the package hdf5plugin.*'gensig\[blosc2\]'"
+            DatasetError,
+            match=r"blosc2.* needs the package hdf5plugin.*'gensig\[blosc2\]'",
         ) as caught:
             use()
         assert "\n" not in str(caught.value)
     assert "needs the package hdf5plugin" in "\n".join(verify(whole).problems)
     assert list(tmp_path.iterdir()) == []
-    build(tmp_path / "gzip", plan, compression="gzip", sample_type="int16")  # needs it not
+    build(
+        tmp_path / "gzip", plan, compression="gzip", sample_type="int16"
+    )  # needs it not
     assert verify(tmp_path / "gzip").complete
 
 
@@ -351,17 +415,23 @@ def test_blosc2_bombs_are_refused(
         options = file["acceleration"].id.get_create_plist()
         del file["acceleration"]
         space = h5py.h5s.create_simple((10, 2, 200))
-        h5py.h5d.create(file.id, b"acceleration", h5py.h5t.IEEE_F32LE, space, dcpl=options)
+        h5py.h5d.create(
+            file.id, b"acceleration", h5py.h5t.IEEE_F32LE, space, dcpl=options
+        )
         file["acceleration"][:9] = 1.0  # the last record is never written
     with pytest.raises(DatasetError, match="never written or is a bomb"):
         open_shard(path)
     write_shard(path, plan, compression="blosc2")
     open_shard(path).close()
     for module in (guard_module, shard_module):
-        monkeypatch.setattr(module, "BLOSC2_CHUNK_LIMIT", 1599)  # a record has 1600 bytes
+        monkeypatch.setattr(
+            module, "BLOSC2_CHUNK_LIMIT", 1599
+        )  # a record has 1600 bytes
     with pytest.raises(DatasetError, match="bomb"):
         open_shard(path)
-    with pytest.raises(DatasetError, match="acceleration has 1600 bytes, blosc2 takes 1599"):
+    with pytest.raises(
+        DatasetError, match="acceleration has 1600 bytes, blosc2 takes 1599"
+    ):
         write_shard(path, plan, compression="blosc2")
 
 
@@ -371,20 +441,32 @@ SMALL = (
 )  # fmt: skip
 
 
-def test_generated_int16_is_the_float32_set_but_for_half_a_count(tmp_path: Path) -> None:
-    ways = {"plain": (), "small": ("dataset.sample_type=int16", "dataset.compression=blosc2")}
+def test_generated_int16_is_the_float32_set_but_for_half_a_count(
+    tmp_path: Path,
+) -> None:
+    ways = {
+        "plain": (),
+        "small": ("dataset.sample_type=int16", "dataset.compression=blosc2"),
+    }
     for name, words in ways.items():
-        assert main(["generate", "--quiet", *SMALL, *words, f"out={tmp_path / name}"]) == 0
+        assert (
+            main(["generate", "--quiet", *SMALL, *words, f"out={tmp_path / name}"]) == 0
+        )
         assert main(["verify", str(tmp_path / name)]) == 0
     assert (tmp_path / "small" / "plan.csv").read_bytes() == (
         tmp_path / "plain" / "plan.csv"
     ).read_bytes()
-    with open_dataset(tmp_path / "plain") as plain, open_dataset(tmp_path / "small") as small:
+    with (
+        open_dataset(tmp_path / "plain") as plain,
+        open_dataset(tmp_path / "small") as small,
+    ):
         assert plain.manifest.identity != small.manifest.identity
         assert (small.sample_type, small.compression) == ("int16", "blosc2")
         for index, name in itertools.product(range(2), SCALES):
             signal = plain.signals(index, name=name)
-            assert (np.abs(small.signals(index, name=name) - signal) <= bound(signal)).all()
+            assert (
+                np.abs(small.signals(index, name=name) - signal) <= bound(signal)
+            ).all()
         for column in plain.column_names:
             np.testing.assert_array_equal(small.column(column), plain.column(column))
 
@@ -392,12 +474,18 @@ def test_generated_int16_is_the_float32_set_but_for_half_a_count(tmp_path: Path)
 @pytest.mark.parametrize(
     ("word", "message"),
     [
-        ("dataset.sample_type=int8", "dataset.sample_type = 'int8'; allowed: float32, int16"),
+        (
+            "dataset.sample_type=int8",
+            "dataset.sample_type = 'int8'; allowed: float32, int16",
+        ),
         (
             "dataset.compression=zip",
             "dataset.compression = 'zip'; allowed: none, gzip, lzf, blosc2",
         ),
-        ("dataset.compression=blosc2", "dataset.compression=blosc2 needs the package hdf5plugin"),
+        (
+            "dataset.compression=blosc2",
+            "dataset.compression=blosc2 needs the package hdf5plugin",
+        ),
     ],
 )
 def test_generate_refuses_before_it_touches_anything(

@@ -78,10 +78,15 @@ def test_a_record_is_one_input_and_in_training_its_halves_too(dataset):
     task, config = task_from(dataset, settings), settings.model
     segments = subset_segments(task, "by_unit", "train")
     inputs = input_of(config)
-    whole, more = inputs.load(task, segments), inputs.load(task, segments, training=True)
+    whole, more = (
+        inputs.load(task, segments),
+        inputs.load(task, segments, training=True),
+    )
     assert config["n_teeth"] == [23, 84]
     assert len(more) == 3 * len(whole) == 3 * len(segments.record)
-    assert whole.cut(np.arange(2)).shape == (2, 1, inputs.n_points(1)) == (2, 1, 32 * 108)
+    assert (
+        whole.cut(np.arange(2)).shape == (2, 1, inputs.n_points(1)) == (2, 1, 32 * 108)
+    )
     assert_allclose(np.mean(whole.cut(np.arange(5)) ** 2, axis=-1), 1.0, rtol=1e-4)
     assert set(np.unique(more.record)) == set(segments.record)
 
@@ -90,7 +95,9 @@ def test_scores_do_not_depend_on_which_tooth_comes_first(dataset):
     model = make_model(dataset, "model.gears=[pinion,wheel]")
     x = torch.randn(3, 1, 32 * 108, generator=torch.Generator().manual_seed(0))
     driving, driven, mesh = x.split([32 * 23, 32 * 84, 32], dim=-1)
-    turned = torch.cat([driving.roll(5 * 32, -1), driven.roll(-9 * 32, -1), mesh], dim=-1)
+    turned = torch.cat(
+        [driving.roll(5 * 32, -1), driven.roll(-9 * 32, -1), mesh], dim=-1
+    )
     torch.testing.assert_close(model(turned), model(x), rtol=1e-4, atol=1e-5)
     mixed = driving.reshape(3, 1, 23, 32)[:, :, torch.randperm(23)].reshape(
         3,
@@ -127,7 +134,9 @@ def test_the_place_of_a_fault_moves_with_the_window():
     record = np.arange(4)
     first = fault_places(dataset, record, np.zeros(4), (23, 84))
     assert_allclose(first, [22.75, 77.5, np.nan, np.nan])
-    assert_allclose(fault_places(dataset, record, np.full(4, 3.5), (23, 84))[:2], [19.25, 74.0])
+    assert_allclose(
+        fault_places(dataset, record, np.full(4, 3.5), (23, 84))[:2], [19.25, 74.0]
+    )
     assert_allclose(
         fault_places(dataset, record, np.array([23.0, 84.0, 0.0, 0.0]), (23, 84)),
         first,
@@ -139,7 +148,11 @@ def test_the_place_of_a_fault_moves_with_the_window():
 
 def test_the_place_loss_is_small_where_the_scores_point_at_the_fault_only():
     turns = ((1, 23), (2, 84))
-    label, gear, place = torch.tensor([1, 1]), torch.tensor([1, 2]), torch.tensor([22.5, 40.0])
+    label, gear, place = (
+        torch.tensor([1, 1]),
+        torch.tensor([1, 2]),
+        torch.tensor([22.5, 40.0]),
+    )
     right = torch.zeros(2, 2, 107 * PER_TOOTH)
     right[0, 1, 1 * PER_TOOTH] = (
         20.0  # a tooth and a half after the last tooth but a half: around the end of the turn
@@ -162,14 +175,19 @@ def test_the_place_loss_is_small_where_the_scores_point_at_the_fault_only():
 
 
 def test_a_sound_record_has_no_severity_to_learn():
-    said, label = {"severity": torch.tensor([[-9.0, 5.0], [-5.0, -5.0]])}, torch.tensor([1, 0])
+    said, label = (
+        {"severity": torch.tensor([[-9.0, 5.0], [-5.0, -5.0]])},
+        torch.tensor([1, 0]),
+    )
     known = {"severity": torch.tensor([1.0, float("nan")])}
     assert further_loss(said, label, known) < 0.01
     assert further_loss({"severity": -said["severity"]}, label, known) > 4
 
 
 def test_a_visible_fault_is_learnt_stored_judged_and_predicted(dataset, tmp_path):
-    settings = make_settings(dataset, "epochs=8", "epoch_fraction=0.6", "learning_rate=0.01")
+    settings = make_settings(
+        dataset, "epochs=8", "epoch_fraction=0.6", "learning_rate=0.01"
+    )
     task = task_from(dataset, settings)
     plan_study(task, settings)
     (found,) = run_jobs(
@@ -181,7 +199,9 @@ def test_a_visible_fault_is_learnt_stored_judged_and_predicted(dataset, tmp_path
     )
     label = task.labels()[found.record]
     assert (
-        balanced_accuracy(confusion_by_unit(label, found.predicted, np.zeros_like(label), 2)[0])
+        balanced_accuracy(
+            confusion_by_unit(label, found.predicted, np.zeros_like(label), 2)[0]
+        )
         > 0.8
     )
     scores = head_scores(
@@ -209,10 +229,14 @@ def test_a_visible_fault_is_learnt_stored_judged_and_predicted(dataset, tmp_path
     record = int(found.record[0])
     np.savez(tmp_path / "a.npz", acceleration=dataset.signals(record))
     speed = float(dataset.column("speed_rpm")[record])
-    source = Source(file=str(tmp_path / "a.npz"), sampling_rate=12800.0, speed_rpm=speed)
+    source = Source(
+        file=str(tmp_path / "a.npz"), sampling_rate=12800.0, speed_rpm=speed
+    )
     result = predict_recording(network, None, source)
     assert result["class"] == task.class_names[found.predicted[0]]
-    assert_allclose(result["severity"], found.heads["severity"][0, found.predicted[0]], rtol=1e-3)
+    assert_allclose(
+        result["severity"], found.heads["severity"][0, found.predicted[0]], rtol=1e-3
+    )
     assert (result["gear"] != "none") == (", severity" in network.line(result))
     with pytest.raises(ConfigError, match="say --speed-rpm"):
         predict_recording(network, None, replace(source, speed_rpm=None))
@@ -231,7 +255,10 @@ def test_heads_that_are_right_have_no_error(dataset):
         record=record,
         log_probability=np.zeros((record.size, 2)),
         detail="",
-        heads={"severity": np.tile(np.nan_to_num(truth["severity"])[:, None], 2), "gear": gear},
+        heads={
+            "severity": np.tile(np.nan_to_num(truth["severity"])[:, None], 2),
+            "gear": gear,
+        },
     )
     scores = head_scores(task, record, [run], n_bootstrap=20)
     assert scores["faulted_gear"]["balanced_accuracy"]["low"] == 1.0
@@ -243,7 +270,9 @@ def test_a_network_without_heads_says_nothing_beside(dataset):
     settings = make_settings(dataset, "heads=false")
     assert "heads" not in settings.model
     task = task_from(dataset, settings)
-    windows = input_of(settings.model).load(task, subset_segments(task, "by_unit", "test"))
+    windows = input_of(settings.model).load(
+        task, subset_segments(task, "by_unit", "test")
+    )
     assert predict_heads(make_model(dataset, "heads=false"), windows) == {}
 
 
@@ -269,7 +298,9 @@ def test_bad_settings_are_refused_in_one_line(dataset, override, line):
 def test_what_a_turn_needs_and_is_not_there_is_said(dataset):
     without = FakeDataset(duration=0.01)
     without.attributes = {
-        name: value for name, value in without.attributes.items() if name != "n_teeth_wheel"
+        name: value
+        for name, value in without.attributes.items()
+        if name != "n_teeth_wheel"
     }
     with pytest.raises(ConfigError, match="does not say n_teeth_wheel"):
         make_settings(without)

@@ -28,7 +28,9 @@ WINDOW = {"window_samples": 700, "stride_samples": 300}
 
 def make_task(dataset=None, **changes):
     dataset = (
-        dataset if dataset is not None else FakeDataset(n_units=4, records_per_unit=4, n_channels=2)
+        dataset
+        if dataset is not None
+        else FakeDataset(n_units=4, records_per_unit=4, n_channels=2)
     )
     return task_of(dataset, **{**WINDOW, "normalise": "rms", **changes})
 
@@ -49,7 +51,8 @@ class PlannedDataset(FakeDataset):
         rng = np.random.default_rng(5)
         unit = self.columns["unit_id"]
         columns = {
-            name: self.columns[name] for name in ("record_id", "label", "severity", "unit_id")
+            name: self.columns[name]
+            for name in ("record_id", "label", "severity", "unit_id")
         }
         self.plan = Plan(
             columns=columns
@@ -57,8 +60,14 @@ class PlannedDataset(FakeDataset):
                 name: np.repeat(rng.uniform(1, 2, 24), 4)
                 for name in ("speed_set_rpm", "torque_nm", "snr_db")
             }
-            | {"gearbox_id": np.char.add("g", unit), "specimen_id": np.char.add("s", unit)}
-            | {"shard": np.zeros(self.n_records, dtype=int), "row": np.arange(self.n_records)}
+            | {
+                "gearbox_id": np.char.add("g", unit),
+                "specimen_id": np.char.add("s", unit),
+            }
+            | {
+                "shard": np.zeros(self.n_records, dtype=int),
+                "row": np.arange(self.n_records),
+            }
             | {"faults_json": np.where(columns["label"] == 0, "[]", "[{}]")}
         )
         self.tables = make_splits(self.plan, 0)
@@ -68,7 +77,12 @@ class PlannedDataset(FakeDataset):
         table = self.tables[protocol]
         number = [int(name.lstrip("r")) for name in table.record_id]
         rows = list(
-            zip(number, table.start_fraction.tolist(), table.stop_fraction.tolist(), strict=True)
+            zip(
+                number,
+                table.start_fraction.tolist(),
+                table.stop_fraction.tolist(),
+                strict=True,
+            )
         )
         return {
             s: [row for row, mine in zip(rows, table.subset == s, strict=True) if mine]
@@ -103,16 +117,21 @@ def test_windows_of_two_subsets_share_no_sample(dataset, protocol):
 def test_windows_cut_before_the_split_would_share_samples():
     start = np.arange(0, 3200 - 700 + 1, 300)
     train, test = start[::2], start[1::2]
-    assert samples_of(np.zeros(train.size), train, 700) & samples_of(np.zeros(test.size), test, 700)
+    assert samples_of(np.zeros(train.size), train, 700) & samples_of(
+        np.zeros(test.size), test, 700
+    )
 
 
 def test_units_are_on_one_side_only_but_for_the_leaky_protocol():
     task = make_task()
     unit = task.dataset.column("unit_id")
-    units = [set(unit[subset_segments(task, "by_unit", subset).record]) for subset in SUBSETS]
+    units = [
+        set(unit[subset_segments(task, "by_unit", subset).record]) for subset in SUBSETS
+    ]
     assert all(not a & b for a, b in itertools.combinations(units, 2))
     leaky = [
-        set(unit[subset_segments(task, "random_window_leaky", subset).record]) for subset in SUBSETS
+        set(unit[subset_segments(task, "random_window_leaky", subset).record])
+        for subset in SUBSETS
     ]
     assert leaky[0] & leaky[2]
 
@@ -127,12 +146,17 @@ def test_random_training_windows_stay_in_their_stretch():
         stretch = windows.signals[windows.segment[window]]
         assert stretch.shape[-1] == 1600
         views = np.lib.stride_tricks.sliding_window_view(stretch[0], 700)
-        assert np.abs(views - views.mean(axis=1, keepdims=True) - cut[0]).max(axis=1).min() < 1e-5
+        assert (
+            np.abs(views - views.mean(axis=1, keepdims=True) - cut[0]).max(axis=1).min()
+            < 1e-5
+        )
 
 
 def test_plan_windows_counts():
     segments = Segments(
-        record=np.array([4, 9, 9]), start=np.array([0, 100, 500]), stop=np.array([1000, 400, 1000])
+        record=np.array([4, 9, 9]),
+        start=np.array([0, 100, 500]),
+        stop=np.array([1000, 400, 1000]),
     )
     segment, start = plan_windows(segments, 400, 300)
     assert segment.tolist() == [0, 0, 0, 2]
@@ -142,8 +166,12 @@ def test_plan_windows_counts():
 def test_normalisation():
     x = np.random.default_rng(0).normal(3.0, 2.0, (5, 2, 400)).astype(np.float32)
     assert_allclose(np.sqrt((normalised(x, "rms") ** 2).mean(axis=-1)), 1.0, rtol=1e-4)
-    assert_allclose(normalised(x, "none"), x - x.mean(axis=-1, keepdims=True), rtol=1e-6, atol=1e-6)
-    assert_allclose(normalised(7 * x, "rms"), normalised(x, "rms"), rtol=1e-4, atol=1e-5)
+    assert_allclose(
+        normalised(x, "none"), x - x.mean(axis=-1, keepdims=True), rtol=1e-6, atol=1e-6
+    )
+    assert_allclose(
+        normalised(7 * x, "rms"), normalised(x, "rms"), rtol=1e-4, atol=1e-5
+    )
     assert (normalised(np.ones((2, 1, 8), dtype=np.float32), "rms") == 0).all()
 
 
@@ -187,9 +215,13 @@ def test_task_refuses(changes, message):
 
 def test_subsets_refuse():
     task = make_task()
-    with pytest.raises(ConfigError, match="no protocol 'by_units'; did you mean by_unit"):
+    with pytest.raises(
+        ConfigError, match="no protocol 'by_units'; did you mean by_unit"
+    ):
         subset_segments(task, "by_units", "train")
-    with pytest.raises(ConfigError, match="too long: the longest stretch holds 800 samples"):
+    with pytest.raises(
+        ConfigError, match="too long: the longest stretch holds 800 samples"
+    ):
         plan_windows(subset_segments(task, "random_window_leaky", "test"), 801, 1)
     task.dataset.usable[:] = False
     with pytest.raises(ConfigError, match="its test part is empty"):
@@ -207,7 +239,10 @@ def test_torch_dataset_gives_the_same_from_several_workers(method):
         windows, batch_size=16, num_workers=2, multiprocessing_context=method
     )
     got = list(loader)
-    assert torch.equal(torch.cat([label for _, label in got]), torch.from_numpy(windows.label))
     assert torch.equal(
-        torch.cat([x for x, _ in got]), torch.stack([windows[i][0] for i in range(len(windows))])
+        torch.cat([label for _, label in got]), torch.from_numpy(windows.label)
+    )
+    assert torch.equal(
+        torch.cat([x for x, _ in got]),
+        torch.stack([windows[i][0] for i in range(len(windows))]),
     )

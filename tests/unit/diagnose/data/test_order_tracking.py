@@ -102,7 +102,13 @@ def test_a_steady_recording_says_the_same_tracked(model, record, tmp_path, capsy
     _, by_mesh = asked(
         capsys,
         model,
-        [*csv(tmp_path / "m.csv", steady), "--speed-rpm", f"{speed:.0f}", "--teeth", *TEETH],
+        [
+            *csv(tmp_path / "m.csv", steady),
+            "--speed-rpm",
+            f"{speed:.0f}",
+            "--teeth",
+            *TEETH,
+        ],
     )
     for tracked, tolerance in ((by_tacho, 2e-4), (by_mesh, 1e-3)):
         assert_allclose(tracked["order_tracking"]["speed_rpm"], speed, rtol=tolerance)
@@ -114,9 +120,13 @@ def test_tachometer_undoes_a_run_from_slow_to_fast(tmp_path):
     """Exactly, where the signal is a function of angle alone."""
     turns = np.cumsum(np.linspace(15.0, 45.0, 4 * RATE)) / RATE
     order = 9.0
-    signal = np.stack([np.sin(2 * np.pi * order * turns), np.cos(2 * np.pi * order * turns)])
+    signal = np.stack(
+        [np.sin(2 * np.pi * order * turns), np.cos(2 * np.pi * order * turns)]
+    )
     pulse = (np.mod(turns, 1.0) < 0.2).astype(float)
-    recording = Recording(sensors=("a", "b"), acceleration=signal, sampling_rate=float(RATE))
+    recording = Recording(
+        sensors=("a", "b"), acceleration=signal, sampling_rate=float(RATE)
+    )
     tracked = track_by_tacho(recording, pulse, "pulses", pulses_per_turn=1)
     assert tracked.speed_rpm == pytest.approx(1800.0, rel=0.02)
     assert tracked.speed_range_rpm == pytest.approx((900.0, 2700.0), rel=0.06)
@@ -138,7 +148,9 @@ def test_nothing_folds_where_the_run_is_slow():
     time = np.arange(turns.size) / RATE
     pulse = (np.mod(turns, 1.0) < 0.2).astype(float)
     high = np.sin(2 * np.pi * 5500.0 * time) * (turns < 12.0)
-    recording = Recording(sensors=("a",), acceleration=high[None], sampling_rate=float(RATE))
+    recording = Recording(
+        sensors=("a",), acceleration=high[None], sampling_rate=float(RATE)
+    )
     played = at_constant_speed(
         track_by_tacho(recording, pulse, "p", pulses_per_turn=1), RATE, 1800.0
     )
@@ -169,7 +181,9 @@ def test_a_speed_that_wanders_is_played_at_its_mean(model, how, tmp_path, capsys
         assert_allclose(likelihood(tracked), likelihood(plain), rtol=0, atol=0.12)
 
 
-def test_a_speed_outside_the_training_is_said_whatever_it_is_played_at(model, tmp_path, capsys):
+def test_a_speed_outside_the_training_is_said_whatever_it_is_played_at(
+    model, tmp_path, capsys
+):
     data = fake(duration=1.0)
     low, high = load_model(model)[1].speed_rpm_range
     signal, pulse = wandering(data.signals(80), 2.0 * high, 0.0)
@@ -206,7 +220,9 @@ def test_other_teeth_are_said(model, tmp_path, capsys):
     assert own["order_tracking"] is None  # a speed is needed for that
     status, other = asked(capsys, model, [*words, "--teeth", "23", "57"])
     assert status == 3
-    assert other["reasons"] == ["the gears have 23/57 teeth, those of the training 23/84"]
+    assert other["reasons"] == [
+        "the gears have 23/57 teeth, those of the training 23/84"
+    ]
     assert other["trained_n_teeth"] == [23, 84]
     assert asked(capsys, model, [*words, "--teeth", "84", "23"])[0] == 3
 
@@ -215,8 +231,16 @@ def test_as_recorded_leaves_the_time_axis_alone(model, tmp_path, capsys):
     data = fake()
     signal, pulse = wandering(data.signals(80), data.column("speed_rpm")[80], 0.0)
     plain = asked(capsys, model, csv(tmp_path / "p.csv", signal))[1]
-    words = [*csv(tmp_path / "r.csv", signal, pulse), "--tacho", "pulses", "--as-recorded"]
-    assert likelihood(asked(capsys, model, words)[1]).tolist() == likelihood(plain).tolist()
+    words = [
+        *csv(tmp_path / "r.csv", signal, pulse),
+        "--tacho",
+        "pulses",
+        "--as-recorded",
+    ]
+    assert (
+        likelihood(asked(capsys, model, words)[1]).tolist()
+        == likelihood(plain).tolist()
+    )
 
 
 def test_what_cannot_be_tracked_is_refused_in_one_line(model, tmp_path, capsys):
@@ -231,14 +255,25 @@ def test_what_cannot_be_tracked_is_refused_in_one_line(model, tmp_path, capsys):
     noisy = csv(tmp_path / "noise.csv", noise)
     short = csv(tmp_path / "short.csv", signal[:, : RATE // 4])
     for given, message in [
-        ([*words, "--tacho", "tach"], "no channel tach; it has channel_0, channel_1, pulses"),
+        (
+            [*words, "--tacho", "tach"],
+            "no channel tach; it has channel_0, channel_1, pulses",
+        ),
         ([*words, "--tacho", "pulses", "--pulses-per-turn", "60"], "span no two turns"),
         (
             [*words, "--tacho", "pulses", "--pulses-per-turn", "0"],
             "--pulses-per-turn 0 must be at least 1",
         ),
         (
-            [*words, "--tacho", "pulses", "--pulses-per-turn", "2", "--speed-rpm", f"{speed:.0f}"],
+            [
+                *words,
+                "--tacho",
+                "pulses",
+                "--pulses-per-turn",
+                "2",
+                "--speed-rpm",
+                f"{speed:.0f}",
+            ],
             "--speed-rpm says",
         ),
         (
@@ -250,7 +285,10 @@ def test_what_cannot_be_tracked_is_refused_in_one_line(model, tmp_path, capsys):
             "a pulse too few or too many",
         ),
         ([*words, "--to-speed", "1500"], "--to-speed needs order tracking"),
-        ([*words, "--tacho", "pulses", "--to-speed", "9000"], "--to-speed 9000 must lie in the"),
+        (
+            [*words, "--tacho", "pulses", "--to-speed", "9000"],
+            "--to-speed 9000 must lie in the",
+        ),
         ([*words, "--teeth", "2", "84"], "--teeth 2 84: a gear has 4 to 1000 teeth"),
         ([*noisy, "--teeth", *TEETH, "--speed-rpm", "1500"], "sign of the mesh"),
         (
@@ -261,7 +299,10 @@ def test_what_cannot_be_tracked_is_refused_in_one_line(model, tmp_path, capsys):
             [*short, "--teeth", *TEETH, "--speed-rpm", "24.46"],
             "is 24.46 r/min in Hz? Then say 1467.6",
         ),
-        ([*noisy, "--teeth", "40", "84", "--speed-rpm", "1500"], "sidebands look like the mesh"),
+        (
+            [*noisy, "--teeth", "40", "84", "--speed-rpm", "1500"],
+            "sidebands look like the mesh",
+        ),
         ([*noisy, "--teeth", *TEETH, "--speed-rpm", "15000"], "lies above 5000 Hz"),
     ]:
         status, text = asked(capsys, model, given)
@@ -275,7 +316,14 @@ def test_the_line_tells_what_was_done(model, tmp_path, capsys):
     signal, pulse = wandering(data.signals(80), 1234.0, 0.01)
     capsys.readouterr()
     main(
-        ["predict", "--model", model, *csv(tmp_path / "r.csv", signal, pulse), "--tacho", "pulses"]
+        [
+            "predict",
+            "--model",
+            model,
+            *csv(tmp_path / "r.csv", signal, pulse),
+            "--tacho",
+            "pulses",
+        ]
     )
     line = capsys.readouterr().out.strip()
     assert "(speed by tacho, 12" in line

@@ -29,7 +29,10 @@ def loader(windows, n_workers, **options):
     [
         {},
         {"normalise": "none", "channels": ["channel_1"]},
-        {"classes": ["missing_tooth", "healthy"], "channels": ["channel_1", "channel_0"]},
+        {
+            "classes": ["missing_tooth", "healthy"],
+            "channels": ["channel_1", "channel_0"],
+        },
     ],
 )
 def test_items_are_those_of_the_stored_set(protocol, changes):
@@ -80,11 +83,15 @@ def test_set_epoch_reaches_workers_that_stay_alive():
         assert windows.epoch == epoch
         passes.append(bits(batches))
     assert passes[0] == passes[3] != passes[1] == passes[2]
-    assert Counter(passes[1]) == Counter(bits(StreamingDataset(FakeStream(epoch=1), **WINDOW)))
+    assert Counter(passes[1]) == Counter(
+        bits(StreamingDataset(FakeStream(epoch=1), **WINDOW))
+    )
 
 
 def test_epochs_follow_one_another_in_one_pass():
-    one = [bits(StreamingDataset(FakeStream(epoch=epoch), **WINDOW)) for epoch in (1, 2)]
+    one = [
+        bits(StreamingDataset(FakeStream(epoch=epoch), **WINDOW)) for epoch in (1, 2)
+    ]
     two = bits(StreamingDataset(FakeStream(epoch=1), **WINDOW, n_epochs=2))
     endless = StreamingDataset(FakeStream(epoch=1), **WINDOW, n_epochs=None)
     assert two == one[0] + one[1] == bits(itertools.islice(endless, len(two)))
@@ -104,7 +111,9 @@ def test_shuffle_buffer_keeps_the_items_and_mixes_them():
     assert Counter(mixed) == Counter(plain)
     assert mixed != plain
     assert bits(windows) == mixed
-    assert len({label for _, label in mixed[:16]}) > len({label for _, label in plain[:16]})
+    assert len({label for _, label in mixed[:16]}) > len(
+        {label for _, label in plain[:16]}
+    )
 
 
 def test_failed_records_are_left_out_and_others_must_be_finite():
@@ -121,7 +130,11 @@ def test_failed_records_are_left_out_and_others_must_be_finite():
 @pytest.mark.parametrize(
     ("words", "changes", "message"),
     [
-        ((), {"classes": ["helthy", "crack"]}, "no class 'helthy'; did you mean healthy"),
+        (
+            (),
+            {"classes": ["helthy", "crack"]},
+            "no class 'helthy'; did you mean healthy",
+        ),
         (("by_units", "train"), {}, "no protocol 'by_units'; did you mean by_unit"),
         (("by_unit", "training"), {}, "no subset 'training'; did you mean train"),
         (("by_unit",), {}, "give protocol and subset, or neither"),

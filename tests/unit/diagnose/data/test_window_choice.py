@@ -34,7 +34,9 @@ def test_fast_gears_keep_an_eighth_of_a_second_at_every_rate():
 def test_slow_gears_get_turns_of_the_one_with_the_fault(gear, ratio):
     dataset = at_speed(300, gear=gear, duration=2.0)
     window, why = chosen_window(dataset)
-    assert window / dataset.sampling_rate == pytest.approx(TURNS * ratio * 60 / 300, rel=1e-3)
+    assert window / dataset.sampling_rate == pytest.approx(
+        TURNS * ratio * 60 / 300, rel=1e-3
+    )
     assert gear in why
     assert "\n" not in why
 
@@ -58,7 +60,10 @@ def test_a_window_is_never_longer_than_a_record():
 def test_task_and_settings_agree_and_a_typed_length_stays():
     dataset = at_speed(300, gear="pinion", duration=1.0)
     found = chosen_window(dataset)[0]
-    task, settings = task_from(dataset, settings_of()), settings_for(dataset, settings_of())
+    task, settings = (
+        task_from(dataset, settings_of()),
+        settings_for(dataset, settings_of()),
+    )
     assert (task.window_samples, task.stride_samples) == (found, found)
     assert (settings.window_samples, settings.stride_samples) == (found, found)
     typed = task_from(dataset, settings_of("window_samples=2000"))
@@ -80,7 +85,13 @@ def test_a_split_that_cuts_records_shorter_is_left_out_with_the_reason():
 
 
 @pytest.mark.parametrize(
-    "word", ["window_samples=0", "stride_samples=-1", "window_samples=1.5", "window_samples=long"]
+    "word",
+    [
+        "window_samples=0",
+        "stride_samples=-1",
+        "window_samples=1.5",
+        "window_samples=long",
+    ],
 )
 def test_what_is_no_length_is_refused(word):
     with pytest.raises(ConfigError, match="must be a whole number of at least 1"):

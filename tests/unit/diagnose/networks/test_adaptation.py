@@ -69,7 +69,9 @@ def network(name):
     """A network whose batch normalisations know moments, of all classes as in training."""
     torch.manual_seed(0)
     model = build_model(
-        compose("train", ["data=x", "out=y", f"model={name}"])["model"], n_channels=2, n_classes=4
+        compose("train", ["data=x", "out=y", f"model={name}"])["model"],
+        n_channels=2,
+        n_classes=4,
     )
     for layer in model.modules():
         if isinstance(layer, torch.nn.BatchNorm1d):
@@ -82,7 +84,8 @@ def network(name):
 def moved(windows, gain):
     """The same windows through another path: a gain for each channel."""
     return replace(
-        windows, signals=tuple((gain * signal).astype(np.float32) for signal in windows.signals)
+        windows,
+        signals=tuple((gain * signal).astype(np.float32) for signal in windows.signals),
     )
 
 
@@ -111,7 +114,9 @@ def test_adabn_undoes_a_gain_also_for_faults_that_it_never_saw(name, windows):
     assert_allclose(after, own, rtol=0, atol=0.02 * moved_by)
 
 
-def test_a_mixture_taken_for_healthy_is_adaptive_batch_normalisation_as_published(windows):
+def test_a_mixture_taken_for_healthy_is_adaptive_batch_normalisation_as_published(
+    windows,
+):
     model, healthy = network("cnn"), healthy_of(windows)
     every = chosen_windows(windows, np.arange(len(windows)))
     mixture = statistics_of(model, every)
@@ -132,9 +137,15 @@ def test_a_mixture_taken_for_healthy_is_adaptive_batch_normalisation_as_publishe
         rtol=0,
         atol=1e-4 * np.abs(target.mean[first]).max(),
     )
-    assert_allclose(right.running_mean.numpy(), own.running_mean.numpy(), rtol=0, atol=1e-6)
-    assert_allclose(right.running_var.numpy(), own.running_var.numpy(), rtol=1e-4, atol=0)
-    assert not np.allclose(naive.running_var.numpy(), own.running_var.numpy(), rtol=0.02, atol=0)
+    assert_allclose(
+        right.running_mean.numpy(), own.running_mean.numpy(), rtol=0, atol=1e-6
+    )
+    assert_allclose(
+        right.running_var.numpy(), own.running_var.numpy(), rtol=1e-4, atol=0
+    )
+    assert not np.allclose(
+        naive.running_var.numpy(), own.running_var.numpy(), rtol=0.02, atol=0
+    )
 
 
 class Levels(torch.nn.Module):
@@ -153,19 +164,31 @@ class Levels(torch.nn.Module):
 
 def scores(model, windows):
     with torch.inference_mode():
-        return model(torch.from_numpy(windows.cut(np.arange(len(windows))))).numpy().astype(float)
+        return (
+            model(torch.from_numpy(windows.cut(np.arange(len(windows)))))
+            .numpy()
+            .astype(float)
+        )
 
 
-def test_coral_gives_healthy_features_the_mean_and_covariance_of_the_training(windows, monkeypatch):
+def test_coral_gives_healthy_features_the_mean_and_covariance_of_the_training(
+    windows, monkeypatch
+):
     monkeypatch.setattr(adaptation, "RIDGE", 1e-9)
     model, source = Levels(), healthy_of(windows)
     target = moved(source, 2.0)
     expected, before = scores(model, source), scores(model, target)
-    after = scores(adapt_network(model, statistics_of(model, source), target, "coral"), target)
+    after = scores(
+        adapt_network(model, statistics_of(model, source), target, "coral"), target
+    )
     scale = expected.std(axis=0)
     assert np.abs((before.mean(axis=0) - expected.mean(axis=0)) / scale).max() > 1.0
-    assert_allclose(after.mean(axis=0) / scale, expected.mean(axis=0) / scale, rtol=0, atol=1e-3)
-    assert_allclose(np.cov((after / scale).T), np.cov((expected / scale).T), rtol=0, atol=1e-2)
+    assert_allclose(
+        after.mean(axis=0) / scale, expected.mean(axis=0) / scale, rtol=0, atol=1e-3
+    )
+    assert_allclose(
+        np.cov((after / scale).T), np.cov((expected / scale).T), rtol=0, atol=1e-2
+    )
 
 
 def test_coral_keeps_directions_of_which_few_windows_say_nothing(windows):
@@ -176,7 +199,10 @@ def test_coral_keeps_directions_of_which_few_windows_say_nothing(windows):
     adapted = adapt_network(model, statistics_of(model, source), one, "coral")
     assert np.abs(adapted.head.weight.detach().numpy()).max() < 20.0
     assert_allclose(
-        scores(adapted, one).mean(axis=0), scores(model, source).mean(axis=0), rtol=0, atol=1e-3
+        scores(adapted, one).mean(axis=0),
+        scores(model, source).mean(axis=0),
+        rtol=0,
+        atol=1e-3,
     )
 
 
@@ -196,11 +222,16 @@ def test_the_domain_moves_as_healthy_windows_do_and_no_farther(windows):
     far = moved(windows, 10.0)
     assert (distances(domain, far) > domain.threshold).mean() == 1.0
     shifted = adapt_domain(domain, statistics, moved(healthy, 10.0))
-    assert_allclose(distances(shifted, far), distances(domain, windows), rtol=0, atol=1e-3)
+    assert_allclose(
+        distances(shifted, far), distances(domain, windows), rtol=0, atol=1e-3
+    )
     assert shifted.threshold == domain.threshold
     rng = np.random.default_rng(0)
     noise = replace(
-        far, signals=tuple(rng.standard_normal(s.shape).astype(np.float32) for s in far.signals)
+        far,
+        signals=tuple(
+            rng.standard_normal(s.shape).astype(np.float32) for s in far.signals
+        ),
     )
     assert (distances(shifted, noise) > shifted.threshold).mean() == 1.0
 
@@ -228,11 +259,16 @@ def test_statistics_of_another_network_are_refused(windows):
     for method in METHODS:
         with pytest.raises(DatasetError, match="another network"):
             adapt_network(
-                network("cnn"), statistics_of(network("spectrum"), healthy), healthy, method
+                network("cnn"),
+                statistics_of(network("spectrum"), healthy),
+                healthy,
+                method,
             )
     own = statistics_of(network("cnn"), healthy)
     with pytest.raises(DatasetError, match="another out-of-distribution flag"):
-        adapt_domain(fit_domain(windows, windows), replace(own, levels=own.levels[:3]), healthy)
+        adapt_domain(
+            fit_domain(windows, windows), replace(own, levels=own.levels[:3]), healthy
+        )
     with pytest.raises(ConfigError, match="there is adabn, coral"):
         adapt_network(network("cnn"), own, healthy, "magic")
 
@@ -251,7 +287,10 @@ def recordings(tmp_path):
     """Two healthy recordings of a machine with another path, and a faulty one."""
     dataset, files = fake(), []
     labels = dataset.column("label")
-    for record in [*np.flatnonzero(labels == 0)[:2], int(np.flatnonzero(labels == 3)[0])]:
+    for record in [
+        *np.flatnonzero(labels == 0)[:2],
+        int(np.flatnonzero(labels == 3)[0]),
+    ]:
         signal = dataset.signals(record)
         rolled = signal + 0.7 * np.roll(signal, 3, axis=-1)
         files.append(str(tmp_path / f"r{record}.npz"))
@@ -288,11 +327,17 @@ def test_the_command_writes_a_model_that_predict_takes_and_that_says_what_it_is(
     assert [one["file"] for one in told["recordings"]] == [
         Path(file).name for file in recordings[:2]
     ]
-    assert all(len(one["sha256"]) == 64 and one["n_windows"] == 9 for one in told["recordings"])
-    before, after = (load_file(Path(folder) / "model.safetensors") for folder in (model, out))
+    assert all(
+        len(one["sha256"]) == 64 and one["n_windows"] == 9 for one in told["recordings"]
+    )
+    before, after = (
+        load_file(Path(folder) / "model.safetensors") for folder in (model, out)
+    )
     changed = {name for name in after if not np.array_equal(after[name], before[name])}
     moving = (
-        ("running_mean", "running_var") if method == "adabn" else ("head.1.weight", "head.1.bias")
+        ("running_mean", "running_var")
+        if method == "adabn"
+        else ("head.1.weight", "head.1.bias")
     )
     assert changed
     assert all(name.endswith((*moving, "domain.levels")) for name in changed)

@@ -46,15 +46,22 @@ def test_no_error_on_few_records_is_no_certainty():
     assert 0.2 < temperature < 1.0
     # the more records, the surer
     assert (
-        fit_temperature(np.tile(log_probability, (50, 1)), np.tile(label, 50)) < 0.7 * temperature
+        fit_temperature(np.tile(log_probability, (50, 1)), np.tile(label, 50))
+        < 0.7 * temperature
     )
 
 
 def test_calibration_error_in_closed_form():
     right = np.arange(10) < 8
-    assert calibration_error(reliability(np.full(10, 0.8), right)) == pytest.approx(0.0, abs=1e-12)
-    assert calibration_error(reliability(np.full(10, 0.95), right)) == pytest.approx(0.15)
-    rows = reliability(np.array([0.31, 0.39, 1.0, 1.0]), np.array([True, False, True, True]))
+    assert calibration_error(reliability(np.full(10, 0.8), right)) == pytest.approx(
+        0.0, abs=1e-12
+    )
+    assert calibration_error(reliability(np.full(10, 0.95), right)) == pytest.approx(
+        0.15
+    )
+    rows = reliability(
+        np.array([0.31, 0.39, 1.0, 1.0]), np.array([True, False, True, True])
+    )
     assert [row["n_records"] for row in rows] == [2, 2]
     assert rows[0]["confidence"] == pytest.approx(0.35)
     assert calibration_error(rows) == pytest.approx(0.5 * 0.15)

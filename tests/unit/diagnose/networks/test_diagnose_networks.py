@@ -69,7 +69,12 @@ def test_wdcnn_has_the_published_sizes():
         (128, 16), (64, 16), (64, 32), (32, 32), (32, 64), (16, 64), (16, 64), (8, 64), (6, 64), (3, 64),
     ]  # fmt: skip
     torch.testing.assert_close(model.hidden[0](x), x, rtol=0, atol=0)
-    convolutions = (64 * 1 + 1) * 16 + (3 * 16 + 1) * 32 + (3 * 32 + 1) * 64 + 2 * (3 * 64 + 1) * 64
+    convolutions = (
+        (64 * 1 + 1) * 16
+        + (3 * 16 + 1) * 32
+        + (3 * 32 + 1) * 64
+        + 2 * (3 * 64 + 1) * 64
+    )
     normalisations = 2 * (16 + 32 + 3 * 64 + 100)
     expected = convolutions + normalisations + (3 * 64 + 1) * 100 + 101 * 10
     assert sum(parameter.numel() for parameter in model.parameters()) == expected
@@ -116,7 +121,9 @@ def test_spectrum_network_is_blind_to_sign_and_gain_and_the_others_are_not():
 
 
 @pytest.mark.parametrize("name", ["wdcnn", "spectrum"])
-def test_a_visible_fault_is_learnt_and_what_was_learnt_can_be_stored(name, task, tmp_path):
+def test_a_visible_fault_is_learnt_and_what_was_learnt_can_be_stored(
+    name, task, tmp_path
+):
     settings = make_settings(
         f"model={name}",
         "epochs=8",
@@ -125,11 +132,17 @@ def test_a_visible_fault_is_learnt_and_what_was_learnt_can_be_stored(name, task,
         "protocols=[by_unit]",
     )
     (found,) = run_jobs(
-        task, settings, [Job(protocols=("by_unit",), seed=0)], n_workers=1, on_done=lambda _: None
+        task,
+        settings,
+        [Job(protocols=("by_unit",), seed=0)],
+        n_workers=1,
+        on_done=lambda _: None,
     )
     label = task.labels()[found.record]
     assert (
-        balanced_accuracy(confusion_by_unit(label, found.predicted, np.zeros_like(label), 2)[0])
+        balanced_accuracy(
+            confusion_by_unit(label, found.predicted, np.zeros_like(label), 2)[0]
+        )
         > 0.8
     )
     assert len(found.validation_loss) <= 8
@@ -138,7 +151,9 @@ def test_a_visible_fault_is_learnt_and_what_was_learnt_can_be_stored(name, task,
     model, description = load_model(tmp_path / "m")
     assert description.temperature == found.temperature
     windows = load_windows(task, subset_segments(task, "by_unit", "test"))
-    first = torch.from_numpy(windows.cut(np.flatnonzero(windows.record == found.record[0])))
+    first = torch.from_numpy(
+        windows.cut(np.flatnonzero(windows.record == found.record[0]))
+    )
     with torch.inference_mode():
         mean = torch.log_softmax(model(first), dim=1).mean(dim=0).numpy()
     assert_allclose(mean, found.log_probability[0], rtol=1e-4, atol=1e-5)
@@ -156,7 +171,9 @@ def test_same_seed_same_weights(name, task):
         model = train_network(
             *sets, target=Classes(n_classes=2), settings=settings, seed=seed
         ).model
-        return torch.cat([value.flatten().double() for value in model.state_dict().values()])
+        return torch.cat(
+            [value.flatten().double() for value in model.state_dict().values()]
+        )
 
     first = weights(3)
     assert torch.equal(first, weights(3))
@@ -165,7 +182,9 @@ def test_same_seed_same_weights(name, task):
 
 def test_the_last_epoch_stands_beside_the_best_one(task):
     """Validation labels the wrong way round: what is learnt makes it worse, so that the best epoch is an early one."""
-    settings = make_settings("epochs=5", "patience=5", "epoch_fraction=0.6", "learning_rate=0.01")
+    settings = make_settings(
+        "epochs=5", "patience=5", "epoch_fraction=0.6", "learning_rate=0.01"
+    )
     train, validation = (
         load_windows(task, subset_segments(task, "by_unit", part))
         for part in ("train", "validation")
@@ -186,24 +205,34 @@ def test_the_last_epoch_stands_beside_the_best_one(task):
     ]
     assert losses[1] < 0.8 * losses[0]
     training = trained(validation)
-    assert (training.last_model is None) == (training.best_epoch == len(training.validation_loss))
+    assert (training.last_model is None) == (
+        training.best_epoch == len(training.validation_loss)
+    )
 
 
 def test_a_model_of_before_has_temperature_one_and_a_bad_one_is_refused(task, tmp_path):
     settings = make_settings("epochs=1", "epoch_fraction=0.1")
     (found,) = run_jobs(
-        task, settings, [Job(protocols=("by_unit",), seed=0)], n_workers=1, on_done=lambda _: None
+        task,
+        settings,
+        [Job(protocols=("by_unit",), seed=0)],
+        n_workers=1,
+        on_done=lambda _: None,
     )
     save_model(tmp_path / "m", found.weights, model_description(task, settings, found))
     path = tmp_path / "m" / "model.json"
     content = json.loads(path.read_text())
     path.write_text(
-        json.dumps({key: value for key, value in content.items() if key != "temperature"})
+        json.dumps(
+            {key: value for key, value in content.items() if key != "temperature"}
+        )
     )
     assert load_model(tmp_path / "m")[1].temperature == 1.0
     for bad in (0, -1.0, "warm", float("nan")):
         path.write_text(json.dumps({**content, "temperature": bad}))
-        with pytest.raises(DatasetError, match=r"model\.json does not describe a model"):
+        with pytest.raises(
+            DatasetError, match=r"model\.json does not describe a model"
+        ):
             load_model(tmp_path / "m")
 
 
@@ -211,13 +240,19 @@ def test_a_model_of_before_has_temperature_one_and_a_bad_one_is_refused(task, tm
     ("override", "message"),
     [
         ("device=tpu", "device must be one of auto, cpu, cuda"),
-        ("baselines=[minirockets]", "baselines must be false or a list of different names"),
+        (
+            "baselines=[minirockets]",
+            "baselines must be false or a list of different names",
+        ),
         (
             "baselines=[minirocket,minirocket]",
             "baselines must be false or a list of different names",
         ),
         ("baselines=true", "baselines must be false or a list of different names"),
-        ("minirocket_features=83", "minirocket_features must be a whole number of at least 84"),
+        (
+            "minirocket_features=83",
+            "minirocket_features must be a whole number of at least 84",
+        ),
     ],
 )
 def test_settings_refuse(override, message):
@@ -227,7 +262,9 @@ def test_settings_refuse(override, message):
 
 def test_baselines_may_be_left_out_or_be_one():
     assert (
-        make_settings("baselines=false").baselines == make_settings("baselines=[]").baselines == ()
+        make_settings("baselines=false").baselines
+        == make_settings("baselines=[]").baselines
+        == ()
     )
     assert make_settings("baselines=minirocket").baselines == ("minirocket",)
 

@@ -35,7 +35,9 @@ MODEL = [
 
 
 def make_settings(*overrides):
-    return settings_from(compose("train", ["data=x", "out=y", *SMALL, *MODEL, *overrides]))
+    return settings_from(
+        compose("train", ["data=x", "out=y", *SMALL, *MODEL, *overrides])
+    )
 
 
 @pytest.fixture(scope="module")
@@ -54,13 +56,19 @@ def study():
     task = task_from(dataset, settings)
     jobs = [Job(protocols=("by_unit",), seed=0)]
     jobs += [Job(protocols=("by_unit",), seed=seed, shuffled=True) for seed in range(3)]
-    return task, settings, run_jobs(task, settings, jobs, n_workers=1, on_done=lambda _: None)
+    return (
+        task,
+        settings,
+        run_jobs(task, settings, jobs, n_workers=1, on_done=lambda _: None),
+    )
 
 
 def score(study, method):
     task, settings, predictions = study
     runs = [(p.record, p.predicted) for p in predictions if p.method == method]
-    scores = score_predictions(task, runs, settings.n_bootstrap, shuffled=method == "label_shuffle")
+    scores = score_predictions(
+        task, runs, settings.n_bootstrap, shuffled=method == "label_shuffle"
+    )
     return scores["balanced_accuracy"]
 
 
@@ -85,7 +93,9 @@ def test_same_seed_same_weights_and_another_seed_others(study):
         model = train_network(
             *sets, target=Classes(n_classes=2), settings=settings, seed=seed
         ).model
-        return torch.cat([value.flatten().double() for value in model.state_dict().values()])
+        return torch.cat(
+            [value.flatten().double() for value in model.state_dict().values()]
+        )
 
     before = torch.random.get_rng_state()
     first = weights(3)
@@ -98,8 +108,14 @@ def test_same_seed_same_weights_and_another_seed_others(study):
 def test_two_processes_give_what_one_gives(study):
     task, _, _ = study
     settings = make_settings("epochs=2")
-    jobs = [Job(protocols=("by_unit",), seed=5), Job(protocols=("by_unit",), seed=6, shuffled=True)]
-    one, two = (run_jobs(task, settings, jobs, n_workers=n, on_done=lambda _: None) for n in (1, 2))
+    jobs = [
+        Job(protocols=("by_unit",), seed=5),
+        Job(protocols=("by_unit",), seed=6, shuffled=True),
+    ]
+    one, two = (
+        run_jobs(task, settings, jobs, n_workers=n, on_done=lambda _: None)
+        for n in (1, 2)
+    )
     assert [p.method for p in one] == [p.method for p in two]
     for a, b in zip(one, two, strict=True):
         np.testing.assert_array_equal(a.predicted, b.predicted)

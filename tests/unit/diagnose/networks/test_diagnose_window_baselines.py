@@ -31,23 +31,35 @@ def one_thread():
 
 def make_windows(n_channels=1, n=6, n_samples=400, seed=0):
     return (
-        np.random.default_rng(seed).standard_normal((n, n_channels, n_samples)).astype(np.float32)
+        np.random.default_rng(seed)
+        .standard_normal((n, n_channels, n_samples))
+        .astype(np.float32)
     )
 
 
 def make_sets(**changes):
     dataset = FakeDataset(
-        **{"n_units": 12, "records_per_unit": 8, "strength": 2.0, "noise": 0.2, **changes}
+        **{
+            "n_units": 12,
+            "records_per_unit": 8,
+            "strength": 2.0,
+            "noise": 0.2,
+            **changes,
+        }
     )
     task = task_of(dataset, window_samples=1000, stride_samples=1000, normalise="rms")
-    return [load_windows(task, subset_segments(task, "by_unit", name)) for name in SUBSETS], task
+    return [
+        load_windows(task, subset_segments(task, "by_unit", name)) for name in SUBSETS
+    ], task
 
 
 def accuracy(task, record, predicted):
     label = task.labels()[record]
     n_classes = len(task.class_names)
     return float(
-        balanced_accuracy(confusion_by_unit(label, predicted, np.zeros_like(label), n_classes)[0])
+        balanced_accuracy(
+            confusion_by_unit(label, predicted, np.zeros_like(label), n_classes)[0]
+        )
     )
 
 
@@ -66,12 +78,20 @@ def test_features_are_what_the_definition_says():
     for bank in banks:
         margin = 4 * bank.dilation
         padded = np.pad(windows.astype(float), ((0, 0), (0, 0), (margin, margin)))
-        taps = np.stack([padded[..., k * bank.dilation :][..., :400] for k in range(9)], axis=-1)
+        taps = np.stack(
+            [padded[..., k * bank.dilation :][..., :400] for k in range(9)], axis=-1
+        )
         output = np.einsum("wcsk,fck->wfs", taps, bank.weight.numpy().astype(float))
         for kernel in range(84):
-            values = output[:, kernel] if bank.padded[kernel] else output[:, kernel, margin:-margin]
+            values = (
+                output[:, kernel]
+                if bank.padded[kernel]
+                else output[:, kernel, margin:-margin]
+            )
             for bias in bank.bias[kernel]:
-                assert_allclose(features[:, column], (values > bias).mean(axis=1), atol=0.006)
+                assert_allclose(
+                    features[:, column], (values > bias).mean(axis=1), atol=0.006
+                )
                 column += 1
     assert column == features.shape[1] == 84 * 6
     assert 0 < sum(bank.padded.sum() for bank in banks) < 84 * len(banks)
@@ -79,15 +99,19 @@ def test_features_are_what_the_definition_says():
 
 def test_thresholds_are_spread_over_the_output():
     """On windows like those that gave them, the shares are spread evenly from 0 to 1."""
-    banks = fit_minirocket(make_windows(n=40), n_features=84 * 10, rng=np.random.default_rng(0))
-    shares = np.sort(minirocket_features(make_windows(n=40, seed=1), banks).mean(axis=0))
+    banks = fit_minirocket(
+        make_windows(n=40), n_features=84 * 10, rng=np.random.default_rng(0)
+    )
+    shares = np.sort(
+        minirocket_features(make_windows(n=40, seed=1), banks).mean(axis=0)
+    )
     assert_allclose(shares, np.linspace(0, 1, shares.size), atol=0.06)
 
 
 def test_every_kernel_sees_some_channel_and_not_always_all():
-    bank = fit_minirocket(make_windows(n_channels=4), n_features=84, rng=np.random.default_rng(0))[
-        0
-    ]
+    bank = fit_minirocket(
+        make_windows(n_channels=4), n_features=84, rng=np.random.default_rng(0)
+    )[0]
     n_seen = (bank.weight.abs().sum(dim=2) > 0).sum(dim=1)
     assert n_seen.min() == 1
     assert n_seen.max() == 4
@@ -96,7 +120,9 @@ def test_every_kernel_sees_some_channel_and_not_always_all():
 @pytest.mark.parametrize(
     ("n_samples", "per_kernel"), [(400, 1), (400, 6), (6400, 119), (9, 3), (50, 40)]
 )
-def test_dilations_fit_into_the_window_and_give_the_features_asked_for(n_samples, per_kernel):
+def test_dilations_fit_into_the_window_and_give_the_features_asked_for(
+    n_samples, per_kernel
+):
     dilations = _dilations(n_samples, per_kernel)
     assert all(8 * dilation <= n_samples - 1 for dilation, _ in dilations)
     assert sum(count for _, count in dilations) == per_kernel
@@ -108,7 +134,9 @@ def test_rows_are_stretches_and_their_mean_over_windows():
     table = spectrum_table(train, [1.0])
     assert len(table.label) == len(train.signals)
     mine = np.flatnonzero(train.segment == 2)
-    parts = [spectrum_table(subset(train, [window]), [1.0]).values[0] for window in mine]
+    parts = [
+        spectrum_table(subset(train, [window]), [1.0]).values[0] for window in mine
+    ]
     assert mine.size > 1
     assert_allclose(table.values[2], np.mean(parts, axis=0), rtol=1e-5, atol=1e-6)
     louder = spectrum_table(train, [0.1]).values
@@ -120,7 +148,8 @@ def subset(windows, chosen):
     from dataclasses import replace
 
     parts = {
-        name: getattr(windows, name)[chosen] for name in ("segment", "start", "label", "record")
+        name: getattr(windows, name)[chosen]
+        for name in ("segment", "start", "label", "record")
     }
     return replace(windows, **parts)
 
@@ -134,7 +163,9 @@ def judged(baseline, parts, n_classes=4):
 def test_both_find_the_fault_and_stay_at_chance_without_one():
     for strength, low, high in ((2.0, 0.6, 1.0), (0.0, 0.0, 0.55)):
         sets, task = make_sets(strength=strength)
-        text, record, score = judged(MiniRocket(), rocket_tables(*sets, n_features=84 * 4))
+        text, record, score = judged(
+            MiniRocket(), rocket_tables(*sets, n_features=84 * 4)
+        )
         assert low <= accuracy(task, record, score.argmax(axis=1)) <= high
         assert text.startswith("ridge, penalty ")
         tables = [spectrum_table(windows, [1.0]) for windows in sets]
@@ -146,5 +177,7 @@ def test_both_find_the_fault_and_stay_at_chance_without_one():
 
 def test_two_classes_have_one_score_and_it_points_the_right_way():
     sets, task = make_sets(classes=("healthy", "missing_tooth"), n_units=8)
-    _, record, score = judged(MiniRocket(), rocket_tables(*sets, n_features=84 * 2), n_classes=2)
+    _, record, score = judged(
+        MiniRocket(), rocket_tables(*sets, n_features=84 * 2), n_classes=2
+    )
     assert accuracy(task, record, score.argmax(axis=1)) > 0.8

@@ -26,7 +26,12 @@ OPTIONS = {
     "spectrum_cnn": ["model=spectrum"],
     "order_cnn": ["model=order", "model.samples_per_tooth=16", "model.kernels=[9,5,5]"],
 }
-DECLARED = {"small_cnn": Windows, "wdcnn": Windows, "spectrum_cnn": Windows, "order_cnn": Turns}
+DECLARED = {
+    "small_cnn": Windows,
+    "wdcnn": Windows,
+    "spectrum_cnn": Windows,
+    "order_cnn": Turns,
+}
 QUICK = [
     "window_samples=1200", "stride_samples=1000", "seeds=[0]", "n_threads=1", "n_bootstrap=50",
     "epochs=1", "epoch_fraction=0.2", "protocols=[by_unit]",
@@ -50,7 +55,11 @@ def study(request, dataset):
 
 def trained(task, settings, seed=0):
     (found,) = run_jobs(
-        task, settings, [replace(TRAINING, seed=seed)], n_workers=1, on_done=lambda _: None
+        task,
+        settings,
+        [replace(TRAINING, seed=seed)],
+        n_workers=1,
+        on_done=lambda _: None,
     )
     return found
 
@@ -94,7 +103,9 @@ def fed_to(network, monkeypatch, task, settings):
 def test_a_training_feeds_the_declared_input(study, monkeypatch):
     task, settings = study
     expected = {(2, input_of(settings.model).n_points(task.window_samples))}
-    assert fed_to(MODELS[settings.model["kind"]], monkeypatch, task, settings) == expected
+    assert (
+        fed_to(MODELS[settings.model["kind"]], monkeypatch, task, settings) == expected
+    )
 
 
 def test_a_network_that_declares_another_input_is_fed_that(dataset, monkeypatch):
@@ -125,7 +136,9 @@ def test_stored_and_loaded_it_says_the_same_of_records_and_recordings(study, tmp
     assert inputs == input_of(settings.model)
     windows = inputs.load(task, subset_segments(task, "by_unit", "test"))
     said = predict_windows(model, windows)
-    np.testing.assert_allclose(said, found.windows.log_probability, rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(
+        said, found.windows.log_probability, rtol=1e-4, atol=1e-5
+    )
     record = int(windows.record[0])
     recorded = RecordedSignal(
         signal=task.dataset.signals(record),
@@ -138,7 +151,9 @@ def test_stored_and_loaded_it_says_the_same_of_records_and_recordings(study, tmp
     )
     mine = np.flatnonzero(windows.record == record)
     of_recording = inputs.of_recording(recorded)
-    np.testing.assert_array_equal(of_recording.cut(np.arange(mine.size)), windows.cut(mine))
+    np.testing.assert_array_equal(
+        of_recording.cut(np.arange(mine.size)), windows.cut(mine)
+    )
     faster = inputs.of_recording(replace(recorded, speed_rpm=1.01 * recorded.speed_rpm))
     same = np.array_equal(faster.cut(np.arange(1)), windows.cut(mine[:1]))
     assert same == inputs.has_window_length  # turns depend on the speed, windows do not

@@ -51,7 +51,9 @@ def case(request):
     settings = settings_from(compose("train", words))
     task = task_from(dataset, settings)
     parts = ("train", "validation")
-    sets = [load_windows(task, subset_segments(task, "by_unit", part)) for part in parts]
+    sets = [
+        load_windows(task, subset_segments(task, "by_unit", part)) for part in parts
+    ]
     return target_of(dataset), *sets, settings
 
 
@@ -76,7 +78,9 @@ def test_right_answers_have_no_loss_and_the_reverse_have_one(case):
 def test_the_loss_of_a_record_does_not_depend_on_the_order_of_its_windows(case):
     target, _, validation, _ = case
     rng = np.random.default_rng(0)
-    answers = perfect(target, validation) + 0.1 * rng.standard_normal((len(validation), 1))
+    answers = perfect(target, validation) + 0.1 * rng.standard_normal(
+        (len(validation), 1)
+    )
     same = [np.flatnonzero(validation.record == record) for record in validation.record]
     turned = answers[[mine[::-1][list(mine).index(i)] for i, mine in enumerate(same)]]
     expected = target.record_loss(answers, validation)
@@ -91,8 +95,14 @@ def test_a_training_is_that_of_its_seed_and_returns_its_best_epoch(case):
     )
     weights = first.weights()
     assert all(np.array_equal(weights[name], again.weights()[name]) for name in weights)
-    assert any(not np.array_equal(weights[name], other.weights()[name]) for name in weights)
+    assert any(
+        not np.array_equal(weights[name], other.weights()[name]) for name in weights
+    )
     signals = torch.from_numpy(validation.cut(np.arange(len(validation))))
     answers = target.answers(first.model, signals, validation)
     loss = target.record_loss(answers, validation)
-    assert loss == first.validation_loss[first.best_epoch - 1] == min(first.validation_loss)
+    assert (
+        loss
+        == first.validation_loss[first.best_epoch - 1]
+        == min(first.validation_loss)
+    )

@@ -39,10 +39,17 @@ def settings_of(*overrides):
         (FOUR, ("c", "a"), None, (("c", "a"), ("b", "d"))),
         (FOUR, ("a",), ("d",), (("a",), ("d",))),
         (FOUR[:1], None, None, "the data set has 1 channel, and 2 are needed"),
-        (FOUR, ("a", "b", "c"), None, "1 channel(s) are left beside channels=a,b,c; name fewer"),
+        (
+            FOUR,
+            ("a", "b", "c"),
+            None,
+            "1 channel(s) are left beside channels=a,b,c; name fewer",
+        ),
     ],
 )
-def test_channels_by_default_and_by_choice(available, channels, test_channels, expected):
+def test_channels_by_default_and_by_choice(
+    available, channels, test_channels, expected
+):
     assert channels_to_cross(available, channels, test_channels) == expected
 
 
@@ -63,14 +70,19 @@ def test_test_channels_that_make_no_sense(channels, test_channels, message):
 def test_only_the_test_part_has_other_channels():
     dataset = FakeDataset(n_channels=4, duration=0.3)
     task = task_from(dataset, settings_of())
-    for subset, channels in (("train", [0, 1]), ("validation", [0, 1]), ("test", [2, 3])):
+    for subset, channels in (
+        ("train", [0, 1]),
+        ("validation", [0, 1]),
+        ("test", [2, 3]),
+    ):
         segments = subset_segments(task, "cross_sensor", subset)
         np.testing.assert_array_equal(
             segments.record, subset_segments(task, "by_unit", subset).record
         )
         windows = load_windows(task.part("cross_sensor", subset), segments)
         np.testing.assert_array_equal(
-            windows.signals[0], dataset.signals(int(segments.record[0]), channels=channels)
+            windows.signals[0],
+            dataset.signals(int(segments.record[0]), channels=channels),
         )
         assert task.part("by_unit", subset) is task
 
@@ -97,22 +109,34 @@ def test_sensors_that_hear_the_same_change_nothing():
         *(Job(protocols=(name,), seed=0) for name in protocols),
     ]
     found = run_jobs(task, settings, jobs, n_workers=1, on_done=lambda _: None)
-    by_protocol = {name: [run for run in found if run.protocol == name] for name in protocols}
+    by_protocol = {
+        name: [run for run in found if run.protocol == name] for name in protocols
+    }
     for known, other in zip(*by_protocol.values(), strict=True):
         np.testing.assert_array_equal(known.predicted, other.predicted)
 
 
 @pytest.fixture
 def data(monkeypatch):
-    offered = {"four": FakeDataset(n_channels=4, duration=0.5), "one": FakeDataset(duration=0.5)}
-    monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path: offered[str(path)])
+    offered = {
+        "four": FakeDataset(n_channels=4, duration=0.5),
+        "one": FakeDataset(duration=0.5),
+    }
+    monkeypatch.setattr(
+        gensig.dataset.reader, "open_dataset", lambda path: offered[str(path)]
+    )
     return offered
 
 
-def test_one_channel_is_refused_in_one_line_and_left_out_beside_others(data, tmp_path, capsys):
+def test_one_channel_is_refused_in_one_line_and_left_out_beside_others(
+    data, tmp_path, capsys
+):
     words = ["train", "data=one", f"out={tmp_path / 'out'}", *FAST]
     assert main([*words, "protocols=[cross_sensor]"]) == 2
-    assert "cross_sensor: the data set has 1 channel, and 2 are needed" in capsys.readouterr().err
+    assert (
+        "cross_sensor: the data set has 1 channel, and 2 are needed"
+        in capsys.readouterr().err
+    )
     assert plan_study(task_from(data["one"], settings_of()), settings_of("protocols=null"))[0] == (
         "by_unit", "random_window_leaky",
     )  # fmt: skip
@@ -127,7 +151,9 @@ def test_train_and_evaluate_know_the_channels(data, tmp_path, capsys):
         "baselines=false",
     ]
     assert main(["train", "data=four", f"out={out}", *FAST, *choice]) == 0
-    metrics = json.loads((out / "metrics.json").read_text())["protocols"]["cross_sensor"]
+    metrics = json.loads((out / "metrics.json").read_text())["protocols"][
+        "cross_sensor"
+    ]
     assert metrics["channels"] == {"train": ["channel_3"], "test": ["channel_1"]}
     assert (
         "never trained on: trained on channel_3, tested on channel_1."
@@ -144,7 +170,12 @@ def test_train_and_evaluate_know_the_channels(data, tmp_path, capsys):
     def evaluated(*words):
         capsys.readouterr()
         folder = tmp_path / f"judged-{'-'.join(words)}"
-        assert main(["evaluate", "data=four", f"model_dir={model}", f"out={folder}", *words]) == 0
+        assert (
+            main(
+                ["evaluate", "data=four", f"model_dir={model}", f"out={folder}", *words]
+            )
+            == 0
+        )
         return json.loads((folder / "metrics.json").read_text())
 
     own = evaluated()
@@ -160,18 +191,33 @@ def test_train_and_evaluate_know_the_channels(data, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["channels=channel_0,channel_1"], "the model takes 1, in the order of channel_0"),
+        (
+            ["channels=channel_0,channel_1"],
+            "the model takes 1, in the order of channel_0",
+        ),
         (["channels=channel_7"], "no channel channel_7"),
-        (["protocol=cross_sensor"], "protocol cross_sensor: no channels to test on are named"),
+        (
+            ["protocol=cross_sensor"],
+            "protocol cross_sensor: no channels to test on are named",
+        ),
     ],
 )
-def test_evaluate_refuses_channels_that_do_not_fit(data, tmp_path, capsys, words, message):
+def test_evaluate_refuses_channels_that_do_not_fit(
+    data, tmp_path, capsys, words, message
+):
     out = tmp_path / "out"
     few = ["protocols=[by_unit]", "baselines=false", "channels=[channel_0]", "epochs=1"]
     assert main(["train", "data=four", f"out={out}", *FAST, *few]) == 0
     capsys.readouterr()
     assert (
-        main(["evaluate", "data=four", f"model_dir={out / 'models' / 'by_unit-seed0'}", *words])
+        main(
+            [
+                "evaluate",
+                "data=four",
+                f"model_dir={out / 'models' / 'by_unit-seed0'}",
+                *words,
+            ]
+        )
         == 2
     )
     lines = capsys.readouterr().err.strip().splitlines()

@@ -34,7 +34,10 @@ def fake():
 def trained(folder, *overrides):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(gensig.dataset.reader, "open_dataset", lambda path: fake())
-        assert main(["train", "data=good", f"out={folder / 'out'}", *FAST, *overrides]) == 0
+        assert (
+            main(["train", "data=good", f"out={folder / 'out'}", *FAST, *overrides])
+            == 0
+        )
     return str(folder / "out" / "models" / "by_unit-seed0")
 
 
@@ -59,12 +62,20 @@ def test_the_file_says_what_torch_says_of_records(overrides, tmp_path, capsys):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["m.onnx", "out"]
     network, description = load_model(folder)
     data = fake()
-    task = task_of(data, window_samples=1200, stride_samples=1000, normalise=description.normalise)
+    task = task_of(
+        data, window_samples=1200, stride_samples=1000, normalise=description.normalise
+    )
     record = np.array([90])
-    whole = Segments(record=record, start=np.array([0]), stop=np.array([data.n_samples]))
+    whole = Segments(
+        record=record, start=np.array([0]), stop=np.array([data.n_samples])
+    )
     windows = load_windows(task, whole)
-    raw = np.stack([data.signals(90)[:, start : start + 1200] for start in windows.start])
-    session = onnxruntime.InferenceSession(str(file), providers=["CPUExecutionProvider"])
+    raw = np.stack(
+        [data.signals(90)[:, start : start + 1200] for start in windows.start]
+    )
+    session = onnxruntime.InferenceSession(
+        str(file), providers=["CPUExecutionProvider"]
+    )
     found = session.run(None, {"acceleration": raw + np.float32(0.25)})[
         0
     ]  # an offset counts for nothing
@@ -138,10 +149,16 @@ def test_mistakes_are_one_line(model, tmp_path, capsys):
         ("there.onnx", "exists; choose another"),
         ("none/m.onnx", "there is no folder"),
     ]:
-        fails(capsys, ["--to", "onnx", "--model", model, "--out", str(tmp_path / out)], message)
+        fails(
+            capsys,
+            ["--to", "onnx", "--model", model, "--out", str(tmp_path / out)],
+            message,
+        )
     assert (tmp_path / "there.onnx").read_text() == "mine"
     fails(
-        capsys, ["--to", "tflite", "--model", model, "--out", "m.onnx"], "tflite is not one of onnx"
+        capsys,
+        ["--to", "tflite", "--model", model, "--out", "m.onnx"],
+        "tflite is not one of onnx",
     )
     fails(
         capsys,

@@ -38,14 +38,23 @@ FAST = [
 
 def fake(**changes):
     return FakeDataset(
-        **{"n_units": 12, "records_per_unit": 8, "duration": 0.5, "n_channels": 2, **changes}
+        **{
+            "n_units": 12,
+            "records_per_unit": 8,
+            "duration": 0.5,
+            "n_channels": 2,
+            **changes,
+        }
     )
 
 
 def train(folder, *overrides):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(gensig.dataset.reader, "open_dataset", lambda path: fake())
-        assert main(["train", "data=good", f"out={folder / 'out'}", *FAST, *overrides]) == 0
+        assert (
+            main(["train", "data=good", f"out={folder / 'out'}", *FAST, *overrides])
+            == 0
+        )
     return str(folder / "out" / "models" / "by_unit-seed0")
 
 
@@ -87,14 +96,18 @@ def held_out(dataset):
 
 def flagged(model, folder, signals):
     """Share of recordings that are called out of distribution."""
-    files = [array(folder / f"{index}.npz", signal) for index, signal in enumerate(signals)]
+    files = [
+        array(folder / f"{index}.npz", signal) for index, signal in enumerate(signals)
+    ]
     return np.mean([predicted(model, file)["out_of_distribution"] for file in files])
 
 
 def written(folder, signal):
     """The same recording in every format, and what the command must be told."""
     time = np.arange(signal.shape[1]) / RATE
-    table = np.column_stack([time, *signal[::-1]])  # columns are found by name, in whatever order
+    table = np.column_stack(
+        [time, *signal[::-1]]
+    )  # columns are found by name, in whatever order
     names = "time_s,channel_1_m_per_s2,channel_0"
     np.savetxt(folder / "r.csv", table, "%.9g", ",", header=names, comments="")
     wavfile.write(folder / "r.wav", RATE, signal.T)
@@ -126,15 +139,22 @@ def test_every_format_says_what_the_data_set_says(which, request, tmp_path, caps
     capsys.readouterr()  # of the training
     network, description = load_model(folder)
     task = task_of(
-        dataset, window_samples=1200, stride_samples=1000, normalise=description.normalise
+        dataset,
+        window_samples=1200,
+        stride_samples=1000,
+        normalise=description.normalise,
     )
     for record in held_out(dataset)[:2]:
         whole = Segments(
-            record=np.array([record]), start=np.array([0]), stop=np.array([dataset.n_samples])
+            record=np.array([record]),
+            start=np.array([0]),
+            stop=np.array([dataset.n_samples]),
         )
         expected = np.exp(predict_windows(network, load_windows(task, whole)))
         for name, options in written(tmp_path, dataset.signals(record)).items():
-            status = main(["predict", "--model", folder, str(tmp_path / name), "--json", *options])
+            status = main(
+                ["predict", "--model", folder, str(tmp_path / name), "--json", *options]
+            )
             result = json.loads(capsys.readouterr().out)
             windows = [
                 [row["probabilities"][name] for name in dataset.class_names]
@@ -144,7 +164,10 @@ def test_every_format_says_what_the_data_set_says(which, request, tmp_path, caps
             assert status == (3 if result["out_of_distribution"] else 0)
             overall = np.exp(np.log(expected).mean(axis=0) / description.temperature)
             assert_allclose(
-                list(result["probabilities"].values()), overall / overall.sum(), rtol=0, atol=1e-4
+                list(result["probabilities"].values()),
+                overall / overall.sum(),
+                rtol=0,
+                atol=1e-4,
             )
             assert result["class"] == dataset.class_names[int(overall.argmax())]
             assert result["windows"][1]["start_s"] == pytest.approx(1000 / RATE)
@@ -171,10 +194,17 @@ def test_held_out_units_are_known_and_strangers_are_not(model, tmp_path):
     records = [dataset.signals(record) for record in held_out(dataset)]
     assert flagged(model, tmp_path, records) <= 0.1
     assert (
-        flagged(model, tmp_path, [rng.standard_normal(signal.shape) for signal in records[:8]])
+        flagged(
+            model,
+            tmp_path,
+            [rng.standard_normal(signal.shape) for signal in records[:8]],
+        )
         == 1.0
     )
-    assert flagged(model, tmp_path, [np.tile(signal[:, ::2], 2) for signal in records[:8]]) == 1.0
+    assert (
+        flagged(model, tmp_path, [np.tile(signal[:, ::2], 2) for signal in records[:8]])
+        == 1.0
+    )
     time = np.arange(dataset.n_samples) / RATE
     foreign = [
         np.sin(2 * np.pi * mesh * time) + 0.3 * np.sin(2 * np.pi * 2.6 * mesh * time)
@@ -213,37 +243,51 @@ def test_the_class_is_said_beside_the_next_one_and_the_models_own_score():
     clear = {"healthy": 0.61, "crack": 0.3, "pitting": 0.09}
     said = {**verdict(clear, SCORE), "adaptation": None}
     assert class_text(said) == "healthy, probability 0.61, next crack 0.30"
-    whole = (
-        "this model: balanced accuracy 0.80 [0.60, 0.90] on 8 machines it never saw, chance 0.25"
-    )
+    whole = "this model: balanced accuracy 0.80 [0.60, 0.90] on 8 machines it never saw, chance 0.25"
     assert score_text(said) == whole
-    assert score_text({**said, "adaptation": {}}).replace(", before it was adapted", "") == whole
+    assert (
+        score_text({**said, "adaptation": {}}).replace(", before it was adapted", "")
+        == whole
+    )
     assert "LEAKY" in score_text({**said, "model_test_score": {**SCORE, "leaky": True}})
-    close = verdict({"healthy": 0.35, "crack": 0.3, "pitting": 0.26, "missing_tooth": 0.09}, SCORE)
-    assert (close["undecided"], close["class"], close["runner_up"]) == (True, "healthy", "crack")
+    close = verdict(
+        {"healthy": 0.35, "crack": 0.3, "pitting": 0.26, "missing_tooth": 0.09}, SCORE
+    )
+    assert (close["undecided"], close["class"], close["runner_up"]) == (
+        True,
+        "healthy",
+        "crack",
+    )
     assert (
         class_text(close)
         == "undecided, healthy 0.35 or crack 0.30 (the two are less than 0.10 apart)"
     )
     for low in (0.2, None):
-        weak = {**SCORE, "balanced_accuracy": {"mean": 0.35, "low": low, "high": low and 0.5}}
+        weak = {
+            **SCORE,
+            "balanced_accuracy": {"mean": 0.35, "low": low, "high": low and 0.5},
+        }
         said = verdict(clear, weak)
-        assert said["undecided_because"] == ["the model was not shown to be better than chance"]
+        assert said["undecided_because"] == [
+            "the model was not shown to be better than chance"
+        ]
         assert class_text(said).startswith(
             "undecided, healthy 0.61 or crack 0.30 (the model was not shown"
         )
     assert not verdict(clear, None)["undecided"]  # an older model
 
 
-def test_a_model_stores_what_it_scored_and_several_recordings_are_answered(model, tmp_path, capsys):
+def test_a_model_stores_what_it_scored_and_several_recordings_are_answered(
+    model, tmp_path, capsys
+):
     dataset = fake()
     files = [
         str(array(tmp_path / f"{k}.npz", dataset.signals(record)))
         for k, record in enumerate(held_out(dataset))
     ]
-    metrics = json.loads(Path(model).parents[1].joinpath("metrics.json").read_text())["protocols"][
-        "by_unit"
-    ]
+    metrics = json.loads(Path(model).parents[1].joinpath("metrics.json").read_text())[
+        "protocols"
+    ]["by_unit"]
     stored = load_model(model)[1].test_score
     assert (
         stored["balanced_accuracy"]["mean"]
@@ -253,15 +297,22 @@ def test_a_model_stores_what_it_scored_and_several_recordings_are_answered(model
     assert stored["balanced_accuracy"]["low"] is None
     capsys.readouterr()
     strange = str(
-        array(tmp_path / "noise.npz", np.random.default_rng(0).standard_normal((2, 6400)))
+        array(
+            tmp_path / "noise.npz", np.random.default_rng(0).standard_normal((2, 6400))
+        )
     )
     assert main(["predict", files[0], "--model", model, files[1]]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.partition(": ")[0] for line in lines] == files[:2]
-    assert all("undecided" in line and "[too few machines] on" in line for line in lines)
+    assert all(
+        "undecided" in line and "[too few machines] on" in line for line in lines
+    )
     assert main(["predict", "--model", model, "--json", files[0], strange]) == 3
     first, second = json.loads(capsys.readouterr().out)
-    assert (first["out_of_distribution"], second["out_of_distribution"]) == (False, True)
+    assert (first["out_of_distribution"], second["out_of_distribution"]) == (
+        False,
+        True,
+    )
     assert first["model_test_score"] == stored
 
 
@@ -270,7 +321,9 @@ def older(model, folder):
     description = json.loads(Path(model, "model.json").read_text())
     for key in ("speed_rpm_range", "out_of_distribution", "test_score"):
         del description[key]
-    (folder / "model.json").write_text(json.dumps({**description, "model_schema_version": 1}))
+    (folder / "model.json").write_text(
+        json.dumps({**description, "model_schema_version": 1})
+    )
     tensors = load_file(f"{model}/model.safetensors")
     save_file(
         {k: v for k, v in tensors.items() if not k.startswith("domain.")},
@@ -289,7 +342,9 @@ def test_an_older_model_predicts_and_says_that_it_has_no_flag(model, tmp_path, c
     assert "no out-of-distribution flag" in shown
     assert "stores no test score" in shown
     assert predicted(old, file)["out_of_distribution"] is None
-    assert predicted(old, file)["probabilities"] == predicted(model, file)["probabilities"]
+    assert (
+        predicted(old, file)["probabilities"] == predicted(model, file)["probabilities"]
+    )
 
 
 def test_band_levels_of_a_tone_and_of_noise():
@@ -321,7 +376,9 @@ def test_recordings_that_do_not_fit_are_refused(model, levels_model, tmp_path, c
     signal = rng.standard_normal((2, 6400))
     bad = signal.copy()
     bad[0, 5] = np.nan
-    wavfile.write(tmp_path / "whole.wav", RATE, np.round(3000 * signal.T).astype(np.int16))
+    wavfile.write(
+        tmp_path / "whole.wav", RATE, np.round(3000 * signal.T).astype(np.int16)
+    )
     np.savetxt(tmp_path / "names.csv", signal.T, "%.6g", ",", header="a,b", comments="")
     np.save(tmp_path / "silent.npy", signal)
     files = {
@@ -340,8 +397,16 @@ def test_recordings_that_do_not_fit_are_refused(model, levels_model, tmp_path, c
             [],
             "10240 samples a second and so nothing above 5120 Hz; the model was trained at 12800",
         ),
-        ("one", [], "has 1 channel(s), channel_0; the model takes 2, channel_0, channel_1"),
-        ("three", ["--channels", "channel_0"], "--channels names 1 channel(s); the model takes 2"),
+        (
+            "one",
+            [],
+            "has 1 channel(s), channel_0; the model takes 2, channel_0, channel_1",
+        ),
+        (
+            "three",
+            ["--channels", "channel_0"],
+            "--channels names 1 channel(s); the model takes 2",
+        ),
         ("three", ["--channels", "channel_0", "channel_7"], "no channel channel_7"),
         ("short", [], "is too short: 0.0859 s, a window of the model is 0.0938 s"),
         ("good", ["--speed-rpm", "-5"], "--speed-rpm -5 must be positive"),
@@ -360,12 +425,28 @@ def test_recordings_that_do_not_fit_are_refused(model, levels_model, tmp_path, c
         "give the samples a second with --sampling-rate",
     )
     names = [str(tmp_path / "names.csv"), "--sampling-rate", str(RATE)]
-    fails(capsys, ["--model", model, *names], "say which is which with --channels, in this order")
-    fails(capsys, ["--model", levels_model, str(tmp_path / "whole.wav")], "no level in m/s2")
+    fails(
+        capsys,
+        ["--model", model, *names],
+        "say which is which with --channels, in this order",
+    )
+    fails(
+        capsys,
+        ["--model", levels_model, str(tmp_path / "whole.wav")],
+        "no level in m/s2",
+    )
     assert main(["predict", "--model", model, str(tmp_path / "whole.wav")]) == 3
     capsys.readouterr()
-    fails(capsys, ["--model", model, str(tmp_path)], "for a data set use diagnose evaluate")
-    fails(capsys, ["--model", model, str(tmp_path / "none.wav")], "cannot be read: No such file")
+    fails(
+        capsys,
+        ["--model", model, str(tmp_path)],
+        "for a data set use diagnose evaluate",
+    )
+    fails(
+        capsys,
+        ["--model", model, str(tmp_path / "none.wav")],
+        "cannot be read: No such file",
+    )
     fails(capsys, [str(files["good"])], "--model")
     fails(capsys, ["--model", model], "RECORDING")
 
@@ -380,13 +461,21 @@ def damaged(model, folder, *, change=lambda content: None, tensors=None):
 
 
 def test_models_that_are_none_are_refused(model, tmp_path, capsys):
-    file = str(array(tmp_path / "r.npz", np.random.default_rng(0).standard_normal((2, 6400))))
+    file = str(
+        array(tmp_path / "r.npz", np.random.default_rng(0).standard_normal((2, 6400)))
+    )
     capsys.readouterr()
     fails(capsys, ["--model", str(tmp_path), file], "holds no model.json")
     for change, message in [
-        (lambda c: c.update(model_schema_version=9), "model schema 9, this program reads 1 and 2"),
+        (
+            lambda c: c.update(model_schema_version=9),
+            "model schema 9, this program reads 1 and 2",
+        ),
         (lambda c: c.update(sampling_rate_hz="fast"), "does not describe a model"),
-        (lambda c: c.update(window_samples=0), "window_samples 0 is no positive whole number"),
+        (
+            lambda c: c.update(window_samples=0),
+            "window_samples 0 is no positive whole number",
+        ),
         (lambda c: c.update(speed_rpm_range=[1]), "does not describe a model"),
         (lambda c: c.update(out_of_distribution=3), "does not describe a model"),
         (
@@ -399,7 +488,9 @@ def test_models_that_are_none_are_refused(model, tmp_path, capsys):
             "threshold of its out-of-distribution flag is -1",
         ),
     ]:
-        fails(capsys, ["--model", damaged(model, tmp_path, change=change), file], message)
+        fails(
+            capsys, ["--model", damaged(model, tmp_path, change=change), file], message
+        )
     levels = load_file(f"{model}/model.safetensors")["domain.levels"]
     wrong = levels.copy()
     wrong[0, 0] = np.nan
@@ -410,7 +501,11 @@ def test_models_that_are_none_are_refused(model, tmp_path, capsys):
     ]:
         fails(
             capsys,
-            ["--model", damaged(model, tmp_path, tensors={"domain.levels": changed}), file],
+            [
+                "--model",
+                damaged(model, tmp_path, tensors={"domain.levels": changed}),
+                file,
+            ],
             message,
         )
     (tmp_path / "model.safetensors").write_bytes(b"PK\x03\x04" + bytes(400))

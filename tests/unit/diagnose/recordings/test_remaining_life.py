@@ -12,7 +12,12 @@ from numpy.testing import assert_allclose
 
 import gensig.dataset.reader
 from diagnose.cli import main
-from diagnose.data.lives import balanced_weights, choose_life_protocols, early_level, lives_of
+from diagnose.data.lives import (
+    balanced_weights,
+    choose_life_protocols,
+    early_level,
+    lives_of,
+)
 from diagnose.scoring.life_scores import (
     MEASURES,
     Snapshots,
@@ -51,7 +56,9 @@ def trained(dataset, out, *overrides):
         patch.setattr(gensig.dataset.reader, "open_dataset", lambda path: dataset)
         assert main(["train", "data=lives", f"out={out}", *FAST, *overrides]) == 0
     with (out / "predictions.csv").open() as file:
-        return json.loads((out / "metrics.json").read_text()), list(csv.DictReader(file))
+        return json.loads((out / "metrics.json").read_text()), list(
+            csv.DictReader(file)
+        )
 
 
 @pytest.fixture(scope="module")
@@ -66,9 +73,14 @@ def study(tmp_path_factory):
 def test_the_phm_score_has_its_printed_values():
     # exp(13/13) - 1 for 13 units too short, exp(10/10) - 1 for 10 too long: 1.718 both
     assert_allclose(
-        phm_score([-13.0, 0.0, 10.0], 125.0), [np.e - 1, 0, np.e - 1], rtol=1e-12, atol=1e-15
+        phm_score([-13.0, 0.0, 10.0], 125.0),
+        [np.e - 1, 0, np.e - 1],
+        rtol=1e-12,
+        atol=1e-15,
     )
-    assert_allclose(phm_score([-26.0, 20.0], 250.0), [np.e - 1, np.e - 1], rtol=1e-12, atol=0)
+    assert_allclose(
+        phm_score([-26.0, 20.0], 250.0), [np.e - 1, np.e - 1], rtol=1e-12, atol=0
+    )
     assert phm_score(np.array(20.0), 125.0) > phm_score(np.array(-20.0), 125.0)
 
 
@@ -85,7 +97,8 @@ def test_the_horizon_is_where_predictions_stay_within_the_band(said, expected):
     assert prognostic_horizon(true, np.array(said, dtype=float), 10.0) == expected
     shuffled = np.array([3, 0, 5, 1, 4, 2])
     assert (
-        prognostic_horizon(true[shuffled], np.array(said, dtype=float)[shuffled], 10.0) == expected
+        prognostic_horizon(true[shuffled], np.array(said, dtype=float)[shuffled], 10.0)
+        == expected
     )
 
 
@@ -116,7 +129,10 @@ def test_every_life_counts_the_same():
     assert scores["mae_h"]["low"] == 2
     assert scores["mae_h"]["high"] == 6
     better = gain(
-        values["rmse_h"], 4 * values["rmse_h"], n_bootstrap=100, rng=np.random.default_rng(0)
+        values["rmse_h"],
+        4 * values["rmse_h"],
+        n_bootstrap=100,
+        rng=np.random.default_rng(0),
     )
     assert better["mean"] == pytest.approx(np.sqrt(20))
     assert better["low"] > 0
@@ -124,7 +140,9 @@ def test_every_life_counts_the_same():
 
 def test_the_half_width_is_a_rank_of_lives():
     error, life = np.array([4.0, 1.0, 3.0, 2.0]), np.array(["d", "a", "c", "b"])
-    assert conformal_half_width(error, life, 0.8) == 4.0  # weights 1/5 each: the fourth reaches 0.8
+    assert (
+        conformal_half_width(error, life, 0.8) == 4.0
+    )  # weights 1/5 each: the fourth reaches 0.8
     assert conformal_half_width(error, life, 0.6) == 3.0
     assert (
         conformal_half_width(error[:3], life[:3], 0.8) == np.inf
@@ -139,7 +157,9 @@ def test_intervals_hold_for_new_lives_where_pooled_ones_do_not():
     rng = np.random.default_rng(0)
     held, pooled = [], []
     for _ in range(2000):
-        spread = rng.lognormal(sigma=1.0, size=6)  # errors of a life resemble each other
+        spread = rng.lognormal(
+            sigma=1.0, size=6
+        )  # errors of a life resemble each other
         error = spread[:, None] * rng.uniform(0.8, 1.2, size=(6, 20))
         life = np.repeat(np.arange(5), 20)
         new = rng.choice(error[5])
@@ -186,25 +206,36 @@ def test_a_split_that_cuts_lives_is_left_out():
     dataset = FakeLives(n_lives=12)
     settings = settings_of()
     task = task_from(dataset, settings)
-    protocols, left_out = choose_life_protocols(task, lives_of(task), settings.protocols)
+    protocols, left_out = choose_life_protocols(
+        task, lives_of(task), settings.protocols
+    )
     assert protocols == ("by_unit",)
-    assert left_out["random_window_leaky"] == "life u00 is in its train and its validation part"
+    assert (
+        left_out["random_window_leaky"]
+        == "life u00 is in its train and its validation part"
+    )
     with pytest.raises(ConfigError, match="life u00 is in its train"):
         planned(dataset, "protocols=[random_window_leaky]")
     dataset.columns["life_id"] = np.where(
         dataset.columns["unit_id"] == "u11", "u00", dataset.columns["life_id"]
     )
-    with pytest.raises(ConfigError, match="by_unit: life u00 is in its train and its test part"):
+    with pytest.raises(
+        ConfigError, match="by_unit: life u00 is in its train and its test part"
+    ):
         planned(dataset, "protocols=[by_unit]")
 
 
 def test_protocols_about_classes_and_sensors_are_left_out():
-    with pytest.raises(ConfigError, match="cross_sensor: it is of no use for remaining lives"):
+    with pytest.raises(
+        ConfigError, match="cross_sensor: it is of no use for remaining lives"
+    ):
         planned(FakeLives(n_lives=8, n_channels=2), "protocols=[cross_sensor]")
 
 
 def test_what_is_no_set_of_lives_is_refused_in_one_line(monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path: FakeDataset())
+    monkeypatch.setattr(
+        gensig.dataset.reader, "open_dataset", lambda path: FakeDataset()
+    )
     assert main(["train", "data=x", f"out={tmp_path / 'out'}", *FAST]) == 2
     lines = capsys.readouterr().err.strip().splitlines()
     assert len(lines) == 1
@@ -222,7 +253,9 @@ def test_each_column_is_needed(column):
 def test_columns_that_contradict_are_refused():
     dataset = FakeLives(n_lives=8)
     dataset.columns["life_failed"][3] = 0
-    with pytest.raises(DatasetError, match="life u00 has failed in some of its records"):
+    with pytest.raises(
+        DatasetError, match="life u00 has failed in some of its records"
+    ):
         planned(dataset)
     dataset = FakeLives(n_lives=8)
     dataset.columns["remaining_life_h"][5] = -1.0
@@ -247,7 +280,10 @@ def test_a_part_without_failures_is_refused():
             "remaining_life.early_life_share=0",
             "early_life_share must be a number above 0 and below 1",
         ),
-        ("remaining_life.early_life_h=-3", "early_life_h must be a number above 0, not -3"),
+        (
+            "remaining_life.early_life_h=-3",
+            "early_life_h must be a number above 0, not -3",
+        ),
         ("remaining_life.with_age=yes", "with_age must be true or false"),
         ("remaining_life.cut=3", "cut"),
         ("heads=[severity]", "heads is not for task=remaining_life"),
@@ -256,8 +292,12 @@ def test_a_part_without_failures_is_refused():
         ("protocols=[by_machine]", "no protocol 'by_machine'"),
     ],
 )
-def test_a_wrong_key_is_refused_in_one_line(word, message, monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path: FakeLives(n_lives=8))
+def test_a_wrong_key_is_refused_in_one_line(
+    word, message, monkeypatch, capsys, tmp_path
+):
+    monkeypatch.setattr(
+        gensig.dataset.reader, "open_dataset", lambda path: FakeLives(n_lives=8)
+    )
     assert main(["train", "data=x", f"out={tmp_path / 'out'}", *FAST, word]) == 2
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert re.search(message, line), line
@@ -279,12 +319,20 @@ def test_vibration_that_tells_the_life_beats_the_clock(study):
     }
     for name in ("indicators", "indicators_and_age", "cnn_and_age"):
         assert methods[name]["gain_over_age_only_h"]["low"] > 0, name
-    assert methods["indicators"]["rmse_h"]["mean"] < 0.6 * methods["age_only"]["rmse_h"]["mean"]
-    assert methods["indicators"]["horizon_h"]["mean"] > methods["age_only"]["horizon_h"]["mean"]
+    assert (
+        methods["indicators"]["rmse_h"]["mean"]
+        < 0.6 * methods["age_only"]["rmse_h"]["mean"]
+    )
+    assert (
+        methods["indicators"]["horizon_h"]["mean"]
+        > methods["age_only"]["horizon_h"]["mean"]
+    )
 
 
 def test_vibration_that_tells_nothing_does_not(tmp_path):
-    metrics, _ = trained(FakeLives(n_lives=24, seed=1, strength=0.0), tmp_path / "out", "epochs=1")
+    metrics, _ = trained(
+        FakeLives(n_lives=24, seed=1, strength=0.0), tmp_path / "out", "epochs=1"
+    )
     methods = metrics["protocols"]["by_unit"]["methods"]
     for name in ("indicators", "cnn"):
         assert methods[name]["gain_over_age_only_h"]["low"] <= 0, name
@@ -296,7 +344,9 @@ def test_censored_lives_are_told_and_never_scored(study):
     assert sum(result["n_lives"].values()) == 18
     assert sum(result["n_lives_censored"].values()) == 6
     assert {row["scored"] for row in rows if row["life_failed"] == "0"} <= {"0"}
-    mine = [row for row in rows if row["method"] == "indicators" and row["scored"] == "1"]
+    mine = [
+        row for row in rows if row["method"] == "indicators" and row["scored"] == "1"
+    ]
     assert len({row["life_id"] for row in mine}) == result["n_lives"]["test"]
     level = result["early_life_h"]
     by_name = {}
@@ -304,7 +354,9 @@ def test_censored_lives_are_told_and_never_scored(study):
         error = float(row["predicted_h"]) - min(float(row["remaining_life_h"]), level)
         by_name.setdefault(row["life_id"], []).append(error**2)
     rmse = np.sqrt(np.mean([np.mean(errors) for errors in by_name.values()]))
-    assert result["methods"]["indicators"]["rmse_h"]["mean"] == pytest.approx(rmse, rel=1e-4)
+    assert result["methods"]["indicators"]["rmse_h"]["mean"] == pytest.approx(
+        rmse, rel=1e-4
+    )
     for row in rows:
         assert (
             0
@@ -330,14 +382,19 @@ def test_the_report_is_whole(study):
         assert text in page
     assert metrics["protocols_left_out"]["random_window_leaky"].startswith("life u00")
     with (out / "scores.csv").open() as file:
-        rows = {(row["method"], row["measure"]): float(row["mean"]) for row in csv.DictReader(file)}
+        rows = {
+            (row["method"], row["measure"]): float(row["mean"])
+            for row in csv.DictReader(file)
+        }
     rmse = metrics["protocols"]["by_unit"]["methods"]["cnn"]["rmse_h"]["mean"]
     assert rows["cnn", "rmse_h"] == pytest.approx(rmse, rel=1e-5)
 
 
 def test_the_bits_do_not_depend_on_the_workers(study, tmp_path):
     out, metrics, _ = study
-    again, _ = trained(FakeLives(n_lives=24, n_censored=6, seed=1), tmp_path / "out", "n_threads=2")
+    again, _ = trained(
+        FakeLives(n_lives=24, n_censored=6, seed=1), tmp_path / "out", "n_threads=2"
+    )
     assert again["protocols"] == metrics["protocols"]
     assert (tmp_path / "out" / "predictions.csv").read_bytes() == (
         out / "predictions.csv"
@@ -356,4 +413,6 @@ def test_too_few_validation_lives_give_intervals_that_say_nothing(tmp_path):
     assert not result["intervals_hold"]
     assert set(result["methods"]) == {"constant", "age_only", "indicators", "cnn"}
     assert result["methods"]["cnn"]["coverage"]["mean"] == 1
-    assert "validation lives are too few" in (tmp_path / "out" / "report.html").read_text()
+    assert (
+        "validation lives are too few" in (tmp_path / "out" / "report.html").read_text()
+    )

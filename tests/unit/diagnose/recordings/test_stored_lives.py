@@ -51,7 +51,9 @@ def recording(folder, record):
     """One record as a file that a user has."""
     data = fake()
     np.savez(
-        folder / "mine.npz", acceleration=data.signals(record), sampling_rate_hz=data.sampling_rate
+        folder / "mine.npz",
+        acceleration=data.signals(record),
+        sampling_rate_hz=data.sampling_rate,
     )
     return str(folder / "mine.npz")
 
@@ -72,15 +74,23 @@ def told(record, method):
         str(column["torque_nm"][record]),
     ]
     return words + (
-        ["--life-time-h", str(column["life_time_h"][record])] if method.endswith("age") else []
+        ["--life-time-h", str(column["life_time_h"][record])]
+        if method.endswith("age")
+        else []
     )
 
 
 def test_every_network_is_stored_without_pickle(out):
     folders = sorted((out / "models").iterdir())
-    assert [folder.name for folder in folders] == ["by_unit-cnn-seed0", "by_unit-cnn_and_age-seed0"]
+    assert [folder.name for folder in folders] == [
+        "by_unit-cnn-seed0",
+        "by_unit-cnn_and_age-seed0",
+    ]
     for folder in folders:
-        assert sorted(path.name for path in folder.iterdir()) == ["model.json", "model.safetensors"]
+        assert sorted(path.name for path in folder.iterdir()) == [
+            "model.json",
+            "model.safetensors",
+        ]
     facts = load_life_model(folders[1])[2]
     assert facts.told == ("speed_rpm", "torque_nm", "life_time_h")
     assert facts.told_range["torque_nm"] == (20.0, 20.0)
@@ -112,14 +122,22 @@ def test_evaluate_on_the_own_test_part_finds_the_scores_of_the_report(
     with (tmp_path / "judged" / "predictions.csv").open() as file:
         again = list(csv.DictReader(file))
     assert [row["record_id"] for row in again] == [row["record_id"] for row in rows]
-    for column in ("predicted_h", "low_h", "high_h"):  # threads of torch change the last bits
-        found, expected = ([float(row[column]) for row in these] for these in (again, rows))
+    for column in (
+        "predicted_h",
+        "low_h",
+        "high_h",
+    ):  # threads of torch change the last bits
+        found, expected = (
+            [float(row[column]) for row in these] for these in (again, rows)
+        )
         assert_allclose(found, expected, rtol=1e-4, atol=1e-4)
     assert (tmp_path / "judged" / "remaining_life.png").is_file()
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_predict_says_of_a_file_what_the_report_says_of_its_record(method, out, capsys, tmp_path):
+def test_predict_says_of_a_file_what_the_report_says_of_its_record(
+    method, out, capsys, tmp_path
+):
     with (out / "predictions.csv").open() as file:
         row = [row for row in csv.DictReader(file) if row["method"] == method][11]
     record = int(row["record_id"][1:])
@@ -138,13 +156,21 @@ def test_predict_says_of_a_file_what_the_report_says_of_its_record(method, out, 
     _, line, _ = said(capsys, *words)
     assert len(line.strip().splitlines()) == 1
     assert re.search(
-        r"mine\.npz: .* h (left|or longer), 80 % interval .* to .* h", line.replace("80%", "80 %")
+        r"mine\.npz: .* h (left|or longer), 80 % interval .* to .* h",
+        line.replace("80%", "80 %"),
     ), line
 
 
 def test_a_load_or_an_age_that_was_never_trained_raises_the_flag(out, capsys, tmp_path):
     file = recording(tmp_path, 0)
-    words = ["predict", "--model", model_of(out, "cnn_and_age"), file, "--speed-rpm", "1800"]
+    words = [
+        "predict",
+        "--model",
+        model_of(out, "cnn_and_age"),
+        file,
+        "--speed-rpm",
+        "1800",
+    ]
     status, line, _ = said(capsys, *words, "--torque-nm", "80", "--life-time-h", "9000")
     assert status == 3
     assert "80 N m is outside the 20 to 20 N m of the training" in line
@@ -167,7 +193,11 @@ def test_a_load_or_an_age_that_was_never_trained_raises_the_flag(out, capsys, tm
             ["--speed-rpm", "1800", "--torque-nm", "20", "--life-time-h", "3"],
             "--life-time-h: cnn is not told life_time_h",
         ),
-        ("cnn", ["--speed-rpm", "1800", "--torque-nm", "-1"], "--torque-nm -1 must be 0 or above"),
+        (
+            "cnn",
+            ["--speed-rpm", "1800", "--torque-nm", "-1"],
+            "--torque-nm -1 must be 0 or above",
+        ),
         (
             "cnn",
             ["--speed-rpm", "1800", "--torque-nm", "nan"],
@@ -179,7 +209,12 @@ def test_what_the_network_must_know_is_asked_in_one_line(
     method, words, message, out, capsys, tmp_path
 ):
     status, _, errors = said(
-        capsys, "predict", "--model", model_of(out, method), recording(tmp_path, 0), *words
+        capsys,
+        "predict",
+        "--model",
+        model_of(out, method),
+        recording(tmp_path, 0),
+        *words,
     )
     assert status == 2
     (line,) = errors.strip().splitlines()
@@ -207,26 +242,42 @@ def test_another_data_set_is_judged_whole_and_one_without_lives_or_classes_refus
         ),
         (FakeLives(n_lives=6, n_censored=6), "no life failed"),
     ):
-        monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path, data=data: data)
+        monkeypatch.setattr(
+            gensig.dataset.reader, "open_dataset", lambda path, data=data: data
+        )
         status, _, errors = said(capsys, *words)
         assert status == 2
         (line,) = errors.strip().splitlines()
         assert message in line
 
 
-def test_a_classifiers_verbs_refuse_such_a_network_and_the_other_way_round(out, capsys, tmp_path):
+def test_a_classifiers_verbs_refuse_such_a_network_and_the_other_way_round(
+    out, capsys, tmp_path
+):
     with pytest.raises(DatasetError, match="says remaining lives and is no classifier"):
         load_model(model_of(out, "cnn"))
     file = recording(tmp_path, 0)
-    words = ["adapt", "--model", model_of(out, "cnn"), "--healthy", file, "--method", "adabn"]
+    words = [
+        "adapt",
+        "--model",
+        model_of(out, "cnn"),
+        "--healthy",
+        file,
+        "--method",
+        "adabn",
+    ]
     status, _, errors = said(capsys, *words, "--out", str(tmp_path / "moved"))
     assert status == 2
     assert "is no classifier" in errors
-    content = json.loads((out / "models" / "by_unit-cnn-seed0" / "model.json").read_text())
+    content = json.loads(
+        (out / "models" / "by_unit-cnn-seed0" / "model.json").read_text()
+    )
     plain = tmp_path / "plain"
     plain.mkdir()
     (plain / "model.json").write_text(json.dumps({**content, "remaining_life": None}))
-    with pytest.raises(DatasetError, match="is a classifier and says no remaining life"):
+    with pytest.raises(
+        DatasetError, match="is a classifier and says no remaining life"
+    ):
         load_life_model(plain)
 
 
@@ -242,10 +293,14 @@ def test_a_classifiers_verbs_refuse_such_a_network_and_the_other_way_round(out, 
     ],
 )
 def test_a_description_that_is_wrong_is_refused_in_one_line(change, out, tmp_path):
-    content = json.loads((out / "models" / "by_unit-cnn-seed0" / "model.json").read_text())
+    content = json.loads(
+        (out / "models" / "by_unit-cnn-seed0" / "model.json").read_text()
+    )
     content["remaining_life"] |= change
     (tmp_path / "model.json").write_text(json.dumps(content))
-    with pytest.raises(DatasetError, match="does not describe a model of remaining lives"):
+    with pytest.raises(
+        DatasetError, match="does not describe a model of remaining lives"
+    ):
         load_life_model(tmp_path)
 
 
@@ -275,9 +330,14 @@ def test_torque_is_not_for_classifiers(monkeypatch, capsys, tmp_path):
         "model.strides=[8,4]",
         "protocols=[by_unit]",
     ]
-    monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path: FakeDataset())
+    monkeypatch.setattr(
+        gensig.dataset.reader, "open_dataset", lambda path: FakeDataset()
+    )
     quick = ["shuffle_control=false", "baselines=false", "metadata_probe=false"]
-    assert main(["train", "data=x", f"out={tmp_path / 'c'}", *classes, *small, *quick]) == 0
+    assert (
+        main(["train", "data=x", f"out={tmp_path / 'c'}", *classes, *small, *quick])
+        == 0
+    )
     words = [
         "predict",
         "--model",
@@ -310,16 +370,21 @@ def test_the_onnx_file_says_the_same_hours(out, capsys, tmp_path):
         capsys, "predict", "--model", model_of(out, "cnn_and_age"), recording(tmp_path, record), "--json",
         *told(record, "cnn_and_age"),
     )  # fmt: skip
-    session = onnxruntime.InferenceSession(str(file), providers=["CPUExecutionProvider"])
+    session = onnxruntime.InferenceSession(
+        str(file), providers=["CPUExecutionProvider"]
+    )
     facts = session.get_modelmeta().custom_metadata_map
     columns = json.loads(facts["told"])
     assert columns == ["speed_rpm", "torque_nm", "life_time_h"]
     data = fake()
     windows = data.signals(record).reshape(1, -1, 1600).swapaxes(0, 1)
     beside = np.array(
-        [[data.columns[name][record] for name in columns]] * len(windows), dtype=np.float32
+        [[data.columns[name][record] for name in columns]] * len(windows),
+        dtype=np.float32,
     )
-    (hours,) = session.run(["remaining_life_h"], {"acceleration": windows, "told": beside})
+    (hours,) = session.run(
+        ["remaining_life_h"], {"acceleration": windows, "told": beside}
+    )
     level = json.loads(facts["early_life_h"])
     assert_allclose(
         np.clip(hours.mean(), 0, level),

@@ -56,10 +56,18 @@ def test_groups_hold_every_record_once_and_equal_values_together():
     values = np.random.default_rng(0).integers(0, 30, 200).astype(float)
     groups = groups_of(values, most=4)
     assert 2 <= len(groups) <= 4
-    assert_allclose(np.sum([group.member for group in groups], axis=0), 1, rtol=0, atol=0)
+    assert_allclose(
+        np.sum([group.member for group in groups], axis=0), 1, rtol=0, atol=0
+    )
     assert all(first.high < second.low for first, second in itertools.pairwise(groups))
-    assert [group.text for group in groups_of(np.array([3.0, 1.0, 3.0]), most=5)] == ["1", "3"]
-    assert [group.text for group in groups_of(np.array(["b", "a"]), most=1)] == ["a", "b"]
+    assert [group.text for group in groups_of(np.array([3.0, 1.0, 3.0]), most=5)] == [
+        "1",
+        "3",
+    ]
+    assert [group.text for group in groups_of(np.array(["b", "a"]), most=1)] == [
+        "a",
+        "b",
+    ]
 
 
 def test_a_planted_weak_condition_is_named_and_no_other():
@@ -77,7 +85,9 @@ def test_a_planted_weak_condition_is_named_and_no_other():
     assert result["weakest"][0].startswith("snr_db")
     assert "weakest at snr_db" in result["summary"]
     low, *others = (row for row in result["rows"] if row["column"] == "snr_db")
-    assert low["scores"]["cnn"]["mean"] < min(row["scores"]["cnn"]["mean"] for row in others)
+    assert low["scores"]["cnn"]["mean"] < min(
+        row["scores"]["cnn"]["mean"] for row in others
+    )
 
 
 def test_no_condition_is_named_where_all_are_alike():
@@ -88,7 +98,9 @@ def test_no_condition_is_named_where_all_are_alike():
     for study in range(40):
         predicted = label if study == 0 else rng.integers(0, N_CLASSES, label.size)
         columns = {"snr_db": rng.uniform(0, 30, label.size)}
-        result = by_condition(columns, [judged(predicted, label, unit)], n_bootstrap=100, rng=rng)
+        result = by_condition(
+            columns, [judged(predicted, label, unit)], n_bootstrap=100, rng=rng
+        )
         assert result["n_groups_compared"] == 5
         assert study > 0 or "No condition stands out" in result["summary"]
         named += bool(result["weakest"])
@@ -129,7 +141,11 @@ def test_equal_methods_are_not_told_apart_and_better_ones_are():
     same, worse = compare(
         good, [dataclasses.replace(good, method="same"), bad], n_bootstrap=300, rng=rng
     )
-    assert (same["difference"]["mean"], same["difference"]["low"], same["difference"]["high"]) == (
+    assert (
+        same["difference"]["mean"],
+        same["difference"]["low"],
+        same["difference"]["high"],
+    ) == (
         0,
         0,
         0,
@@ -151,7 +167,9 @@ def test_the_permutation_test_keeps_its_level():
         skill = rng.uniform(0.2, 1.0, 8)[unit]
         pair = [
             np.where(
-                rng.uniform(size=label.size) < skill, label, rng.integers(0, N_CLASSES, label.size)
+                rng.uniform(size=label.size) < skill,
+                label,
+                rng.integers(0, N_CLASSES, label.size),
             )
             for _ in range(2)
         ]
@@ -171,23 +189,36 @@ def test_one_unit_has_no_interval():
     network = judged(label, label, unit)
     rng = np.random.default_rng(6)
     row = compare(
-        network, [judged(np.zeros_like(label), label, unit, "guess")], n_bootstrap=50, rng=rng
+        network,
+        [judged(np.zeros_like(label), label, unit, "guess")],
+        n_bootstrap=50,
+        rng=rng,
     )[0]
     assert (row["difference"]["low"], row["p_value"]) == (None, 1.0)
     assert "one unit" in row["summary"]
-    result = by_condition({"snr_db": np.arange(40.0)}, [network], n_bootstrap=50, rng=rng)
+    result = by_condition(
+        {"snr_db": np.arange(40.0)}, [network], n_bootstrap=50, rng=rng
+    )
     assert all(row["scores"]["cnn"]["low"] is None for row in result["rows"])
     assert result["weakest"] == []
-    assert with_interval(0.5, np.full(10, np.nan), 3) == {"mean": 0.5, "low": None, "high": None}
+    assert with_interval(0.5, np.full(10, np.nan), 3) == {
+        "mean": 0.5,
+        "low": None,
+        "high": None,
+    }
 
 
-@pytest.mark.parametrize(("shown", "verdict"), [(1, "not told apart"), (4, "more signal helps")])
+@pytest.mark.parametrize(
+    ("shown", "verdict"), [(1, "not told apart"), (4, "more signal helps")]
+)
 def test_window_length_shows_what_later_windows_bring(shown, verdict):
     """Each window names the class with some luck: the mean of several is right more often; of copies, not."""
     label, unit = records()
     rng = np.random.default_rng(7)
     record = np.repeat(np.arange(label.size), 4)
-    scores = 1.5 * scores_of(label[record], 1.0) + rng.normal(size=(record.size, N_CLASSES))
+    scores = 1.5 * scores_of(label[record], 1.0) + rng.normal(
+        size=(record.size, N_CLASSES)
+    )
     if shown == 1:
         scores = np.repeat(scores[::4], 4, axis=0)
     result = by_window_length(
@@ -200,7 +231,10 @@ def test_window_length_shows_what_later_windows_bring(shown, verdict):
     )
     assert [row["n_windows"] for row in result["rows"]] == [1, 2, 4]
     assert_allclose(
-        [row["seconds"] for row in result["rows"]], [0.1, 0.15, 0.25], rtol=1e-12, atol=0
+        [row["seconds"] for row in result["rows"]],
+        [0.1, 0.15, 0.25],
+        rtol=1e-12,
+        atol=0,
     )
     assert verdict in result["summary"]
 
@@ -219,9 +253,13 @@ def study():
 
     def prediction(method, seed, skill):
         def says(record):
-            return scores_of(np.where(rng.uniform(size=record.size) < skill, label[record], 0))
+            return scores_of(
+                np.where(rng.uniform(size=record.size) < skill, label[record], 0)
+            )
 
-        windows = Rows(record=np.repeat(test, 2), log_probability=says(np.repeat(test, 2)))
+        windows = Rows(
+            record=np.repeat(test, 2), log_probability=says(np.repeat(test, 2))
+        )
         return Prediction(
             protocol="by_unit",
             method=method,
@@ -233,7 +271,11 @@ def study():
             windows=windows if method == "cnn" else None,
         )
 
-    runs = [prediction("cnn", 0, 0.9), prediction("cnn", 1, 0.9), prediction("indicators", 0, 0.5)]
+    runs = [
+        prediction("cnn", 0, 0.9),
+        prediction("cnn", 1, 0.9),
+        prediction("indicators", 0, 0.5),
+    ]
     return task, settings, runs
 
 
@@ -254,7 +296,10 @@ def metrics_of(task, answers):
     return {
         "model": "cnn",
         "class_names": list(task.class_names),
-        "protocols": {"by_unit": result, "leaky": {**result, "leaky": True, "answers": None}},
+        "protocols": {
+            "by_unit": result,
+            "leaky": {**result, "leaky": True, "answers": None},
+        },
     }
 
 
@@ -267,21 +312,28 @@ def test_every_part_is_there_and_can_be_written(study, tmp_path):
     assert set(answers["detection"]) == {"cnn", "indicators"}
     assert graded_classes(answers) == list(CLASSES[1:])
     names = write_tables(tmp_path, metrics_of(task, answers))
-    assert {"scores.csv", "by_condition.csv", "by_severity.csv", "confusion_by_unit.csv"} <= set(
-        names
-    )
+    assert {
+        "scores.csv",
+        "by_condition.csv",
+        "by_severity.csv",
+        "confusion_by_unit.csv",
+    } <= set(names)
     head, *rows = (tmp_path / "scores.csv").read_text().splitlines()
     assert head.startswith("protocol,leaky,method,score,mean,low,high")
     assert rows[0] == "by_unit,False,cnn,balanced_accuracy,0.5,0.4,0.6,1,80,5"
     conditions_figure(tmp_path / "a.png", answers)
     detection_figure(tmp_path / "b.png", answers)
     window_length_figure(tmp_path / "c.png", {"by_unit": answers})
-    assert all((tmp_path / name).stat().st_size > 5000 for name in ("a.png", "b.png", "c.png"))
+    assert all(
+        (tmp_path / name).stat().st_size > 5000 for name in ("a.png", "b.png", "c.png")
+    )
 
 
 def test_a_class_of_few_records_says_how_few(study, tmp_path):
     task, settings, runs = study
-    found = protocol_answers(task, settings, runs)["detection"]["cnn"]["classes"]["crack"]
+    found = protocol_answers(task, settings, runs)["detection"]["cnn"]["classes"][
+        "crack"
+    ]
     assert f"of {found['n_records']} records of 5 machines found" in found["summary"]
     assert "not told" not in found["summary"]
     runs = [dataclasses.replace(run, record=run.record[:24], log_probability=run.log_probability[:24], windows=None)
@@ -300,19 +352,28 @@ def test_a_class_of_few_records_says_how_few(study, tmp_path):
 def test_parts_without_ground_are_left_out(study, tmp_path):
     task, settings, runs = study
     task.dataset.columns["severity"] = np.where(task.labels() > 0, 1.0, 0.0)
-    alone = [dataclasses.replace(run, windows=None) for run in runs if run.method == "cnn"]
+    alone = [
+        dataclasses.replace(run, windows=None) for run in runs if run.method == "cnn"
+    ]
     answers = protocol_answers(task, settings, alone)
     assert "window_length" not in answers
     assert (answers["best_baseline"], answers["comparisons"]) == (None, [])
     assert graded_classes(answers) == []
-    assert all(part["limits"] == [] for part in answers["detection"]["cnn"]["classes"].values())
+    assert all(
+        part["limits"] == [] for part in answers["detection"]["cnn"]["classes"].values()
+    )
     assert "by_severity.csv" not in write_tables(tmp_path, metrics_of(task, answers))
     task.dataset.class_names = ("sound", *CLASSES[1:])
-    other = task_of(task.dataset, window_samples=800, stride_samples=800, normalise="rms")
+    other = task_of(
+        task.dataset, window_samples=800, stride_samples=800, normalise="rms"
+    )
     assert "detection" not in protocol_answers(other, settings, alone)
 
 
 def test_the_order_of_questions_and_runs_does_not_matter(study):
     task, settings, runs = study
-    first, second = protocol_answers(task, settings, runs), protocol_answers(task, settings, runs)
+    first, second = (
+        protocol_answers(task, settings, runs),
+        protocol_answers(task, settings, runs),
+    )
     assert first == second

@@ -34,7 +34,11 @@ def study(n_units=20, per_unit=20, shift=0.0, seed=0):
     unit = np.repeat(np.arange(n_units), per_unit)
     label = np.arange(unit.size) % 2
     severity = rng.uniform(0.1, 0.9, unit.size)
-    score = rng.normal(size=(2, unit.size)) + np.where(label == 1, 12 * severity - 4, 0) + shift
+    score = (
+        rng.normal(size=(2, unit.size))
+        + np.where(label == 1, 12 * severity - 4, 0)
+        + shift
+    )
     return judged(score, label, unit), severity[label == 1]
 
 
@@ -51,8 +55,12 @@ def answer(test, validation, severity, n_bootstrap=200):
 
 def test_the_score_ranks_by_the_odds_of_any_fault_and_knows_no_offset():
     logs = np.log(np.array([[0.5, 0.3, 0.2], [0.2, 0.4, 0.4]]))
-    assert_allclose(detection_score(logs, 0), np.log([1.0, 4.0]), rtol=1e-12, atol=1e-12)
-    assert_allclose(detection_score(logs + 7, 0), np.log([1.0, 4.0]), rtol=1e-12, atol=1e-12)
+    assert_allclose(
+        detection_score(logs, 0), np.log([1.0, 4.0]), rtol=1e-12, atol=1e-12
+    )
+    assert_allclose(
+        detection_score(logs + 7, 0), np.log([1.0, 4.0]), rtol=1e-12, atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("n_records", [19, 20, 57, 400])
@@ -61,7 +69,8 @@ def test_at_most_one_in_twenty_new_healthy_records_is_an_alarm(n_records):
     once = np.ones((1, n_records), dtype=int)
     alarms = [
         np.mean(
-            rng.normal(size=200) > alarm_threshold(rng.normal(size=n_records), once, new=True)[0]
+            rng.normal(size=200)
+            > alarm_threshold(rng.normal(size=n_records), once, new=True)[0]
         )
         for _ in range(400)
     ]
@@ -87,7 +96,9 @@ def test_curves_are_those_of_the_ordinary_logistic_regression():
     scaled = (np.log(size) - np.log(size).mean()) / np.log(size).std()
     for row, drawn in zip(ours, weight, strict=True):
         model = LogisticRegression(C=1e6).fit(scaled[:, None], hit, drawn)
-        assert_allclose(row, [model.intercept_[0], model.coef_[0, 0]], rtol=0.02, atol=0.02)
+        assert_allclose(
+            row, [model.intercept_[0], model.coef_[0, 0]], rtol=0.02, atol=0.02
+        )
     for share in (0.5, 0.9):
         at = limits(ours, size, share)
         assert_allclose(np.diag(curve_at(ours, at, size)), share, rtol=1e-6, atol=0)
@@ -96,7 +107,9 @@ def test_curves_are_those_of_the_ordinary_logistic_regression():
 
 def test_limits_say_nothing_of_sizes_that_were_not_tested():
     size, once = np.linspace(0.2, 0.8, 40), np.ones((1, 40))
-    none, every = (fit_curves(size, np.full((1, 40), value), once) for value in (0.0, 1.0))
+    none, every = (
+        fit_curves(size, np.full((1, 40), value), once) for value in (0.0, 1.0)
+    )
     assert np.isinf(limits(none, size, 0.5)[0])
     assert limits(every, size, 0.9)[0] == 0.2
 
@@ -104,7 +117,9 @@ def test_limits_say_nothing_of_sizes_that_were_not_tested():
 def test_a_curve_never_falls_and_a_sharp_step_is_found():
     size, once = np.linspace(0.2, 0.8, 40), np.ones((1, 40))
     falling = fit_curves(size, (size < 0.5).astype(float)[None], once)
-    assert_allclose(curve_at(falling, np.array([0.2, 0.8]), size), 0.5, rtol=1e-9, atol=0)
+    assert_allclose(
+        curve_at(falling, np.array([0.2, 0.8]), size), 0.5, rtol=1e-9, atol=0
+    )
     step = fit_curves(size, (size > 0.5).astype(float)[None], once)
     assert_allclose(limits(step, size, 0.5), 0.5, rtol=0.03, atol=0)
 
@@ -128,21 +143,23 @@ def test_a_known_limit_lies_in_the_interval():
 
 def test_perfect_and_blind_scores():
     test, severity = study()
-    perfect = answer(judged(100.0 * test.label, test.label, test.unit), None, severity)["classes"][
-        "crack"
-    ]
+    perfect = answer(judged(100.0 * test.label, test.label, test.unit), None, severity)[
+        "classes"
+    ]["crack"]
     assert perfect["auroc"]["mean"] == 1
     assert perfect["share_found"]["mean"] == 1
     assert perfect["share_found"]["low"] < 0.9
     assert {row["status"] for row in perfect["limits"]} == {"at_smallest_tested"}
     blind_scores = np.random.default_rng(3).normal(size=test.label.size)
-    blind = answer(judged(blind_scores, test.label, test.unit), None, severity)["classes"]["crack"]
+    blind = answer(judged(blind_scores, test.label, test.unit), None, severity)[
+        "classes"
+    ]["crack"]
     assert blind["auroc"]["low"] < 0.5 < blind["auroc"]["high"]
     assert {row["status"] for row in blind["limits"]} == {"not_reached"}
     assert "at no severity" in blind["summary"]
-    equal = answer(judged(np.zeros(test.label.size), test.label, test.unit), None, severity)[
-        "classes"
-    ]["crack"]
+    equal = answer(
+        judged(np.zeros(test.label.size), test.label, test.unit), None, severity
+    )["classes"]["crack"]
     assert (equal["auroc"]["mean"], equal["share_found"]["mean"]) == (0.5, 0.0)
 
 
@@ -151,10 +168,12 @@ def test_the_area_is_that_of_scikit_learn():
 
     test, severity = study()
     rounded = np.round(test.log_probability[0, :, 1])
-    area = answer(judged(rounded, test.label, test.unit), None, severity)["classes"]["crack"][
-        "auroc"
-    ]
-    assert_allclose(area["mean"], roc_auc_score(test.label, rounded), rtol=1e-12, atol=0)
+    area = answer(judged(rounded, test.label, test.unit), None, severity)["classes"][
+        "crack"
+    ]["auroc"]
+    assert_allclose(
+        area["mean"], roc_auc_score(test.label, rounded), rtol=1e-12, atol=0
+    )
 
 
 def test_too_many_false_alarms_are_said():
@@ -179,7 +198,11 @@ def test_one_unit_has_no_interval_and_one_severity_no_curve():
     assert crack["share_found"]["low"] is None
     assert all(row["low"] is None for row in crack["limits"])
     flat = answer(test, None, np.ones_like(severity))["classes"]["crack"]
-    assert (flat["by_severity"], flat["limits"], flat["curve"]["severity"]) == ([], [], [])
+    assert (flat["by_severity"], flat["limits"], flat["curve"]["severity"]) == (
+        [],
+        [],
+        [],
+    )
 
 
 def test_all_of_few_units_do_not_prove_a_share_of_one():

@@ -17,7 +17,10 @@ from diagnose.baselines.features import (
     feature_table,
     indicators,
 )
-from diagnose.baselines.indicator_models import IndicatorModel, IndicatorModelWithoutLevel
+from diagnose.baselines.indicator_models import (
+    IndicatorModel,
+    IndicatorModelWithoutLevel,
+)
 from diagnose.baselines.rms_threshold import RmsThreshold
 from diagnose.data.windows import SUBSETS, subset_segments, task_of
 from diagnose.report.page import without_interval
@@ -65,7 +68,9 @@ def test_scores_agree_with_scikit_learn():
         rtol=1e-12,
     )
     assert_allclose(
-        macro_f1(confusion.sum(axis=0)), f1_score(true, predicted, average="macro"), rtol=1e-12
+        macro_f1(confusion.sum(axis=0)),
+        f1_score(true, predicted, average="macro"),
+        rtol=1e-12,
     )
 
 
@@ -84,7 +89,10 @@ def test_interval_is_over_units_not_over_records():
         confusion[0, :5, [0, 1], [0, 1]] = n
         confusion[0, 5:, [0, 1], [1, 0]] = n
         score = score_with_interval(
-            "balanced_accuracy", confusion, n_bootstrap=4000, rng=np.random.default_rng(0)
+            "balanced_accuracy",
+            confusion,
+            n_bootstrap=4000,
+            rng=np.random.default_rng(0),
         )
         assert score.mean == pytest.approx(0.5)
         widths.append(score.high - score.low)
@@ -100,10 +108,16 @@ def test_few_units_have_no_interval(n_units):
         "balanced_accuracy", confusion, n_bootstrap=100, rng=np.random.default_rng(0)
     )
     ratio = ratio_with_interval(
-        "balanced_accuracy", confusion, confusion, n_bootstrap=100, rng=np.random.default_rng(0)
+        "balanced_accuracy",
+        confusion,
+        confusion,
+        n_bootstrap=100,
+        rng=np.random.default_rng(0),
     )
     for found in (asdict(score), ratio):
-        assert (found["low"] is None) == (found["high"] is None) == (n_units < LEAST_UNITS)
+        assert (
+            (found["low"] is None) == (found["high"] is None) == (n_units < LEAST_UNITS)
+        )
         assert not is_above(found, 2.0)
     assert score_cell({"balanced_accuracy": asdict(score)}).startswith(
         "0.50 [too few machines]" if n_units < LEAST_UNITS else "0.50 [0.50"
@@ -113,7 +127,10 @@ def test_few_units_have_no_interval(n_units):
 def test_why_there_is_no_interval_is_said_once():
     few, many = ({"n_units": {"test": n}} for n in (2, 12))
     (line,) = without_interval(
-        {"protocols": {"by_unit": few, "cross_speed": few, "cross_snr": many}, "novelty": {}}
+        {
+            "protocols": {"by_unit": few, "cross_speed": few, "cross_snr": many},
+            "novelty": {},
+        }
     )
     assert line.startswith(
         "by_unit, cross_speed: 2 test unit(s) are too few machines for an interval, 4 are the least"
@@ -129,9 +146,12 @@ def test_interval_covers_the_truth_about_as_often_as_it_says():
         right = rng.binomial(10, rate)
         confusion = np.zeros((1, 20, 1, 2), dtype=int)
         confusion = np.stack(
-            [np.stack([right, 10 - right], axis=1), np.zeros((20, 2), dtype=int)], axis=1
+            [np.stack([right, 10 - right], axis=1), np.zeros((20, 2), dtype=int)],
+            axis=1,
         )[None]
-        score = score_with_interval("balanced_accuracy", confusion, n_bootstrap=400, rng=rng)
+        score = score_with_interval(
+            "balanced_accuracy", confusion, n_bootstrap=400, rng=rng
+        )
         covered += score.low <= 0.7 <= score.high
     assert 0.86 < covered / 200 < 1.0
 
@@ -155,10 +175,13 @@ def test_interval_of_a_shuffle_covers_the_luck_of_its_names_but_not_a_leak():
 
 
 def make_tables(**changes):
-    dataset = FakeDataset(**{"n_units": 8, "records_per_unit": 8, "strength": 2.0, **changes})
+    dataset = FakeDataset(
+        **{"n_units": 8, "records_per_unit": 8, "strength": 2.0, **changes}
+    )
     task = task_of(dataset, window_samples=1000, stride_samples=1000, normalise="rms")
     return [
-        feature_table(task, subset_segments(task, "by_unit", subset)) for subset in SUBSETS
+        feature_table(task, subset_segments(task, "by_unit", subset))
+        for subset in SUBSETS
     ], task
 
 
@@ -174,7 +197,9 @@ def test_indicators_have_their_names_and_react_to_impulses():
 
 def test_indicators_are_nan_without_a_whole_turn():
     x = np.random.default_rng(0).standard_normal((2, 1000))
-    table = indicators(x, 12800.0, {"pinion": 30.0, "wheel": 8.0}, {"pinion": 23, "wheel": 84})
+    table = indicators(
+        x, 12800.0, {"pinion": 30.0, "wheel": 8.0}, {"pinion": 23, "wheel": 84}
+    )
     for index, name in enumerate(INDICATORS):
         assert np.isnan(table[:, index]).all() == name.endswith("_wheel"), name
     assert GEARS == ("pinion", "wheel")
@@ -190,7 +215,9 @@ def test_all_features_are_the_basic_ones_and_more_from_twenty_turns_up():
     assert table.shape == (2, len(FEATURES["all"])) == (2, 20)
     for index, name in enumerate(FEATURES["all"]):
         assert np.isnan(table[:, index]).all() == name.endswith("_wheel"), name
-    known = [index for index, name in enumerate(INDICATORS) if not name.endswith("_wheel")]
+    known = [
+        index for index, name in enumerate(INDICATORS) if not name.endswith("_wheel")
+    ]
     np.testing.assert_array_equal(table[:, known], basic[:, known])
     assert np.isfinite(basic).all()
     short = indicators(x[:, :100], 12800.0, speed, teeth, features="all")
@@ -200,7 +227,9 @@ def test_all_features_are_the_basic_ones_and_more_from_twenty_turns_up():
 def test_all_features_see_the_impulses_of_a_missing_tooth():
     dataset = FakeDataset(n_units=4, records_per_unit=16, strength=2.0, duration=1.5)
     task = task_of(dataset, window_samples=1000, stride_samples=1000, normalise="rms")
-    table = feature_table(task, subset_segments(task, "by_unit", "train"), features="all")
+    table = feature_table(
+        task, subset_segments(task, "by_unit", "train"), features="all"
+    )
     assert len(table.names) == table.values.shape[1] == len(FEATURES["all"])
     for name in ("spectral_kurtosis", "fm0_pinion", "m6a_pinion", "na4_pinion"):
         column = table.values[:, table.names.index(f"channel_0/{name}")]
@@ -211,7 +240,11 @@ def test_all_features_see_the_impulses_of_a_missing_tooth():
 def test_all_features_at_a_rate_that_holds_no_mesh_band_are_nan():
     x = np.random.default_rng(0).standard_normal((1, 30000))
     table = indicators(
-        x, 1000.0, {"pinion": 16.0, "wheel": 30.0}, {"pinion": 23, "wheel": 84}, features="all"
+        x,
+        1000.0,
+        {"pinion": 16.0, "wheel": 30.0},
+        {"pinion": 23, "wheel": 84},
+        features="all",
     )
     found = dict(zip(FEATURES["all"], np.isnan(table[0]).tolist(), strict=True))
     assert found["fm0_wheel"]
@@ -226,7 +259,9 @@ def test_features_do_not_depend_on_threads_or_cache():
     cache = {}
     first = feature_table(task, segments, cache=cache, n_threads=2).values
     assert len(cache) == segments.record.size
-    np.testing.assert_array_equal(first, feature_table(task, segments, cache=cache).values)
+    np.testing.assert_array_equal(
+        first, feature_table(task, segments, cache=cache).values
+    )
     np.testing.assert_array_equal(first, feature_table(task, segments).values)
 
 
@@ -239,7 +274,11 @@ def test_missing_tooth_count_is_one_clear_error():
 
 def accuracy(record, predicted, task):
     label = task.labels()[record]
-    return float(balanced_accuracy(confusion_by_unit(label, predicted, np.zeros_like(label), 4)[0]))
+    return float(
+        balanced_accuracy(
+            confusion_by_unit(label, predicted, np.zeros_like(label), 4)[0]
+        )
+    )
 
 
 def judged(baseline, train, validation, test):
@@ -261,8 +300,12 @@ def test_indicator_model_passes_over_what_no_stretch_is_long_enough_for():
     tables, _ = make_tables(n_units=4, records_per_unit=4)
     with_gap = []
     for table in tables:
-        values = np.concatenate([table.values, np.full((len(table.values), 1), np.nan)], axis=1)
-        with_gap.append(replace(table, values=values, names=(*table.names, "channel_0/nb4_wheel")))
+        values = np.concatenate(
+            [table.values, np.full((len(table.values), 1), np.nan)], axis=1
+        )
+        with_gap.append(
+            replace(table, values=values, names=(*table.names, "channel_0/nb4_wheel"))
+        )
     first = judged(IndicatorModel(), *tables)
     second = judged(IndicatorModel(), *with_gap)
     assert first[0] == second[0]
@@ -274,8 +317,13 @@ def test_the_level_changes_the_model_with_it_and_not_the_one_without():
     louder = []
     for table in tables:
         level = np.array([name.endswith("log_rms") for name in table.names])
-        louder.append(replace(table, values=table.values + level * table.label[:, None]))
-    without = [judged(IndicatorModelWithoutLevel(), *several)[2] for several in (tables, louder)]
+        louder.append(
+            replace(table, values=table.values + level * table.label[:, None])
+        )
+    without = [
+        judged(IndicatorModelWithoutLevel(), *several)[2]
+        for several in (tables, louder)
+    ]
     np.testing.assert_array_equal(*without)
     with_level = [judged(IndicatorModel(), *several)[2] for several in (tables, louder)]
     assert (with_level[0] != with_level[1]).any()
@@ -288,7 +336,10 @@ def test_rms_threshold_uses_the_level_only():
         [np.log(1 + label + 0.1 * rng.uniform(size=200)), rng.normal(size=200)], axis=1
     )
     table = FeatureTable(
-        values=values, names=("a/log_rms", "a/kurtosis"), label=label, record=np.arange(200)
+        values=values,
+        names=("a/log_rms", "a/kurtosis"),
+        label=label,
+        record=np.arange(200),
     )
     text, _, score = judged(RmsThreshold(), table, table, table)
     assert (score.argmax(axis=1) == label).all()
@@ -296,4 +347,6 @@ def test_rms_threshold_uses_the_level_only():
     blind = FeatureTable(
         values=values[:, ::-1], names=table.names, label=label, record=table.record
     )
-    assert (judged(RmsThreshold(), blind, blind, blind)[2].argmax(axis=1) == label).mean() < 0.7
+    assert (
+        judged(RmsThreshold(), blind, blind, blind)[2].argmax(axis=1) == label
+    ).mean() < 0.7

@@ -22,7 +22,11 @@ from diagnose.studies.novelty_metrics import (
     novelty_result,
 )
 from diagnose.studies.study import plan_study, task_from
-from diagnose.training.autoencoder import WindowAutoencoder, fit_autoencoder, reconstruction_error
+from diagnose.training.autoencoder import (
+    WindowAutoencoder,
+    fit_autoencoder,
+    reconstruction_error,
+)
 from diagnose.training.classes import Classes, predict_windows
 from diagnose.training.train import train_network
 from gensig.errors import ConfigError
@@ -57,7 +61,9 @@ def studies():
         task = task_from(OpenDataset(strength=strength, n_units=24), settings)
         protocols, jobs = plan_study(task, settings)
         runs = run_jobs(task, settings, jobs, n_workers=1, on_done=lambda _: None)
-        found[name] = {protocol: result_of(task, protocol, runs) for protocol in protocols}
+        found[name] = {
+            protocol: result_of(task, protocol, runs) for protocol in protocols
+        }
     return found
 
 
@@ -73,7 +79,9 @@ def test_a_plain_fault_is_found_by_those_who_know_only_health(studies):
         assert method["found"]["missing_tooth"]["mean"] > 0.6
 
 
-def test_a_plain_class_never_shown_is_noticed_and_the_known_ones_are_told_apart(studies):
+def test_a_plain_class_never_shown_is_noticed_and_the_known_ones_are_told_apart(
+    studies,
+):
     result = studies["plain"]["open_set"]
     assert result["novel_classes"] == ["missing_tooth"]
     assert result["methods"]["nearest_band_levels"]["auroc"]["low"] > 0.8
@@ -133,7 +141,9 @@ def test_perfect_and_empty_scores(labelled):
     assert perfect["false_alarms"]["mean"] == perfect["fpr95"]["mean"] == 0
     assert all(found["low"] == 1 for found in perfect["found"].values())
     empty = judge(np.zeros(novel.size), predicted=record)
-    assert empty["auroc"]["mean"] == empty["auroc"]["low"] == empty["auroc"]["high"] == 0.5
+    assert (
+        empty["auroc"]["mean"] == empty["auroc"]["low"] == empty["auroc"]["high"] == 0.5
+    )
     assert empty["fpr95"]["mean"] == 1
     assert "fpr95" not in judge(np.zeros(novel.size))
 
@@ -146,7 +156,9 @@ def test_units_that_are_copies_leave_nothing_to_resample(labelled):
     ).astype(float)
     area = judge(score)["auroc"]
     assert 0 < area["mean"] < 1
-    np.testing.assert_allclose([area["low"], area["high"]], area["mean"], rtol=1e-12, atol=0)
+    np.testing.assert_allclose(
+        [area["low"], area["high"]], area["mean"], rtol=1e-12, atol=0
+    )
     uneven = judge(score + (units == units[0]) * np.where(novel, 3, 0))["auroc"]
     assert uneven["low"] < uneven["mean"] < uneven["high"]
 
@@ -161,7 +173,9 @@ def test_interval_covers_the_seeds(labelled):
 @pytest.mark.parametrize("n", [19, 20, 21, 58, 400])
 def test_new_known_records_raise_no_more_alarms_than_promised(n):
     rng = np.random.default_rng(n)
-    shares = [1 - norm.cdf(alarm_threshold(rng.standard_normal(n))) for _ in range(4000)]
+    shares = [
+        1 - norm.cdf(alarm_threshold(rng.standard_normal(n))) for _ in range(4000)
+    ]
     assert 0.05 - 1 / (n + 1) < np.mean(shares) < 0.05 + 4 * np.std(shares) / 63
 
 
@@ -197,7 +211,9 @@ def test_features_and_outputs_are_those_of_the_last_layer():
     rebuilt = features @ layer.weight.detach().numpy().T + layer.bias.detach().numpy()
     np.testing.assert_allclose(logits, rebuilt, rtol=1e-4, atol=1e-5)
     scaled = logits - np.logaddexp.reduce(logits, axis=1, keepdims=True)
-    np.testing.assert_allclose(predict_windows(model, validation), scaled, rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(
+        predict_windows(model, validation), scaled, rtol=1e-4, atol=1e-5
+    )
 
 
 def healthy_windows(task, subset):
@@ -218,10 +234,13 @@ def test_the_autoencoder_answers_for_every_whole_step(window):
 def test_the_autoencoder_is_the_same_for_the_same_seed():
     settings = settings_of()
     task = task_from(OpenDataset(), settings)
-    train, validation = (healthy_windows(task, part) for part in ("train", "validation"))
+    train, validation = (
+        healthy_windows(task, part) for part in ("train", "validation")
+    )
     before = torch.random.get_rng_state()
     first, again, other = (
-        fit_autoencoder(train, validation, settings=settings, seed=seed) for seed in (1, 1, 2)
+        fit_autoencoder(train, validation, settings=settings, seed=seed)
+        for seed in (1, 1, 2)
     )
     assert torch.equal(before, torch.random.get_rng_state())
     error = reconstruction_error(first, validation)
@@ -233,10 +252,15 @@ def test_the_autoencoder_is_the_same_for_the_same_seed():
 
 def test_the_autoencoder_learns_and_a_moment_that_it_cannot_rebuild_is_seen():
     task = task_from(OpenDataset(), settings_of())
-    train, validation = (healthy_windows(task, part) for part in ("train", "validation"))
+    train, validation = (
+        healthy_windows(task, part) for part in ("train", "validation")
+    )
     short, long = (
         fit_autoencoder(
-            train, validation, settings=settings_of(f"epochs={n}", "patience=30"), seed=0
+            train,
+            validation,
+            settings=settings_of(f"epochs={n}", "patience=30"),
+            seed=0,
         )
         for n in (1, 30)
     )
@@ -249,9 +273,9 @@ def test_the_autoencoder_learns_and_a_moment_that_it_cannot_rebuild_is_seen():
     for signal in burst.signals:
         signal[:, 1100:1164] += 3 * np.sin(np.arange(64))
     seen = validation.start <= 1000  # the burst lies whole in these windows
-    assert (reconstruction_error(long, burst) > 1.5 * reconstruction_error(long, validation))[
-        seen
-    ].all()
+    assert (
+        reconstruction_error(long, burst) > 1.5 * reconstruction_error(long, validation)
+    )[seen].all()
 
 
 def test_two_processes_give_what_one_gives():
@@ -262,7 +286,10 @@ def test_two_processes_give_what_one_gives():
         for name in ("healthy_only", "open_set")
         for seed in (None, 3)
     ]
-    one, two = (run_jobs(task, settings, jobs, n_workers=n, on_done=lambda _: None) for n in (1, 2))
+    one, two = (
+        run_jobs(task, settings, jobs, n_workers=n, on_done=lambda _: None)
+        for n in (1, 2)
+    )
     assert [run.method for run in one] == [run.method for run in two]
     assert len(one) == 10
     for a, b in zip(one, two, strict=True):
@@ -279,8 +306,16 @@ def test_two_processes_give_what_one_gives():
             ["protocols=[open_set]", "classes=[healthy,crack,pitting]"],
             "it needs known and new ones",
         ),
-        ({}, ["protocols=[open_set]", "classes=[healthy,missing_tooth]"], "one known class only"),
-        ({}, ["protocols=[healthy_only]", "classes=[crack,pitting]"], "its train part is empty"),
+        (
+            {},
+            ["protocols=[open_set]", "classes=[healthy,missing_tooth]"],
+            "one known class only",
+        ),
+        (
+            {},
+            ["protocols=[healthy_only]", "classes=[crack,pitting]"],
+            "its train part is empty",
+        ),
     ],
 )
 def test_mistakes(changes, overrides, message):
@@ -291,9 +326,22 @@ def test_mistakes(changes, overrides, message):
 
 
 def test_the_command_reports_novelty_alone(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path: OpenDataset())
+    monkeypatch.setattr(
+        gensig.dataset.reader, "open_dataset", lambda path: OpenDataset()
+    )
     out = tmp_path / "out"
-    assert main(["train", "data=x", f"out={out}", *FAST, "protocols=[healthy_only,open_set]"]) == 0
+    assert (
+        main(
+            [
+                "train",
+                "data=x",
+                f"out={out}",
+                *FAST,
+                "protocols=[healthy_only,open_set]",
+            ]
+        )
+        == 0
+    )
     assert "**healthy_only**: Trained on" in capsys.readouterr().out
     metrics = json.loads((out / "metrics.json").read_text())
     assert metrics["protocols"] == {}
@@ -325,10 +373,12 @@ def test_the_command_reports_novelty_alone(monkeypatch, tmp_path, capsys):
         for row in rows
         if row[:2] == ["healthy_only", "autoencoder"] and row[5] == "missing_tooth"
     ]
-    found = metrics["novelty"]["healthy_only"]["methods"]["autoencoder"]["found"]["missing_tooth"][
-        "mean"
-    ]
-    assert np.mean([float(row[6]) > float(row[7]) for row in mine]) == pytest.approx(found)
+    found = metrics["novelty"]["healthy_only"]["methods"]["autoencoder"]["found"][
+        "missing_tooth"
+    ]["mean"]
+    assert np.mean([float(row[6]) > float(row[7]) for row in mine]) == pytest.approx(
+        found
+    )
 
 
 def test_null_runs_everything_and_both_kinds_share_a_report(monkeypatch, tmp_path):
@@ -336,7 +386,12 @@ def test_null_runs_everything_and_both_kinds_share_a_report(monkeypatch, tmp_pat
         gensig.dataset.reader, "open_dataset", lambda path: OpenDataset(n_channels=2)
     )
     out = tmp_path / "out"
-    few = ["protocols=null", "shuffle_control=false", "baselines=[rms_threshold]", "epochs=1"]
+    few = [
+        "protocols=null",
+        "shuffle_control=false",
+        "baselines=[rms_threshold]",
+        "epochs=1",
+    ]
     assert main(["train", "data=x", f"out={out}", *FAST, *few]) == 0
     metrics = json.loads((out / "metrics.json").read_text())
     assert list(metrics["protocols"]) == ["by_unit", "cross_sensor"]

@@ -20,7 +20,10 @@ class Machines(FakeDataset):
 
     def __init__(self, fall=0.4, **options):
         super().__init__(
-            classes=("healthy", "missing_tooth"), duration=2.0, sampling_rate=6400.0, **options
+            classes=("healthy", "missing_tooth"),
+            duration=2.0,
+            sampling_rate=6400.0,
+            **options,
         )
         self.attributes |= {f"n_teeth_{gear}": number for gear, number in TEETH.items()}
         rng, n = np.random.default_rng(1), self.n_records
@@ -30,12 +33,14 @@ class Machines(FakeDataset):
         self.columns["fault_tooth"] = np.where(
             self.columns["label"] > 0, rng.integers(12, size=n), -1
         )
-        self.columns["start_tooth_pinion"] = self.columns["start_tooth_wheel"] = rng.integers(
-            12, size=n
+        self.columns["start_tooth_pinion"] = self.columns["start_tooth_wheel"] = (
+            rng.integers(12, size=n)
         )
         self.columns["start_phase"] = rng.uniform(size=n)
 
-    def signals(self, record_index, start=0, stop=None, channels=None, *, name="acceleration"):
+    def signals(
+        self, record_index, start=0, stop=None, channels=None, *, name="acceleration"
+    ):
         unit = int(self.columns["unit_id"][record_index][1:])
         gains = 10 ** np.random.default_rng([2, unit]).uniform(-0.5, 0.5, 12)
         if self.columns["label"][record_index]:
@@ -45,7 +50,9 @@ class Machines(FakeDataset):
             + self.columns["start_phase"][record_index]
         )
         tooth = (
-            np.floor(np.arange(self.n_samples) / self.sampling_rate * 120.0 + first).astype(int)
+            np.floor(
+                np.arange(self.n_samples) / self.sampling_rate * 120.0 + first
+            ).astype(int)
             % 12
         )
         noise = np.random.default_rng([3, record_index]).normal(
@@ -56,7 +63,13 @@ class Machines(FakeDataset):
 
 
 def settings_of(*overrides):
-    words = ["data=x", "out=y", "baselines=[reference]", "protocols=[by_unit]", *overrides]
+    words = [
+        "data=x",
+        "out=y",
+        "baselines=[reference]",
+        "protocols=[by_unit]",
+        *overrides,
+    ]
     return settings_from(compose("train", words))
 
 
@@ -71,7 +84,9 @@ def test_the_reference_is_another_sound_record_of_the_same_unit():
     assert np.all(found != np.arange(dataset.n_records))
     assert np.all(dataset.columns["unit_id"][found] == dataset.columns["unit_id"])
     assert np.all(dataset.columns["label"][found] == 0)
-    dataset.columns["fault_gear"][np.flatnonzero(dataset.columns["unit_id"] == "u00")] = "wheel"
+    dataset.columns["fault_gear"][
+        np.flatnonzero(dataset.columns["unit_id"] == "u00")
+    ] = "wheel"
     assert np.all(references(opened(dataset)[0])[:6] == -1)
 
 
