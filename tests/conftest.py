@@ -1,17 +1,12 @@
 """Shared fixtures: the paper's rig as a configuration and as a machine."""
 
-import functools
-import pickle
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from hydra._internal.sources_registry import SourcesRegistry
-from hydra.core.plugins import Plugins
 
-import gensig.options.compose
 from gensig.dynamics.pair import PairDynamics
 from gensig.geometry.gear import Gear
 from gensig.options.configuration import Configuration
@@ -39,41 +34,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             len(FIRST),
         )
     )
-
-
-@pytest.fixture(scope="session", autouse=True)
-def compositions() -> Iterator[Any]:
-    """What the package's options are composed to, remembered; ``cache_clear`` forgets it.
-
-    Hydra parses some thirty files at every composition, which is half of the time of most commands; those of the
-    package stay the same in a run of the tests. A user's own options (``hydra.searchpath``) are always read anew.
-    """
-    Plugins.instance()  # registers the sources
-    source = SourcesRegistry.instance().resolve("pkg")
-    parse, parsed, compose = (
-        source._read_config,
-        {},
-        gensig.options.compose.hydra_compose,
-    )
-
-    def read(self: Any, path: Any) -> Any:
-        if str(path) not in parsed:
-            parsed[str(path)] = pickle.dumps(parse(self, path))
-        return pickle.loads(parsed[str(path)])
-
-    @functools.lru_cache(maxsize=32)
-    def remembered(config_name: str, overrides: tuple[str, ...]) -> Any:
-        return compose(config_name=config_name, overrides=list(overrides))
-
-    def composed(config_name: str, overrides: Sequence[str] = ()) -> Any:
-        if any(word.startswith("hydra.") for word in overrides):
-            return compose(config_name=config_name, overrides=list(overrides))
-        return remembered(config_name, tuple(overrides))
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(source, "_read_config", read)
-        patch.setattr(gensig.options.compose, "hydra_compose", composed)
-        yield remembered
 
 
 @pytest.fixture(scope="session")

@@ -158,7 +158,7 @@ def read_drive_line(config: Configuration) -> DriveLine:
         line=line,
         numbers=numbers,
         pairs=tuple(pairs),
-        lateral=options.lateral,
+        lateral=bool(options.lateral),
         campbell=options.campbell,
         record_mesh=options.record_mesh,
         slices_helical=options.helical_meshes == "sliced",

@@ -230,42 +230,49 @@ class LineMachine(Machine):
     def check(self) -> None:
         """Raise for what would stop every record."""
         self.require_drive()
-        sensing = self.sensing
-        if unknown := [name for name in sensing.channels if name not in self.channels]:
-            more = (
-                ""
-                if self.engine.drive.lateral
-                else "; with system.lateral=true also pinion_x and the like"
-            )
-            raise ConfigError(
-                f"sensing.channels: no channel {', '.join(unknown)}; allowed: {', '.join(self.channels)}{more}"
-            )
-        if sensing.path is not None or sensing.n_lead or sensing.nuisances:
-            raise ConfigError(
-                "sensing: records of a drive line have no transfer path, nuisances or sensor dynamics; take "
-                "sensing=shaft_line"
-            )
+        self._check_sensing()
         if self.mesh.law != "one_sided":
             raise ConfigError(
-                f"mesh.law = {self.mesh.law}: the meshes of a drive line are one-sided"
+                f"mesh.law = {self.mesh.law}: the meshes of a drive line are one-sided; "
+                "take mesh.law=one_sided"
             )
         if self.solver.precision != "float64":
             raise ConfigError(
-                f"solver.precision = {self.solver.precision}: a drive line is integrated in float64"
+                f"solver.precision = {self.solver.precision}: a drive line is integrated in "
+                "float64; take solver.precision=float64"
             )
         if self.solver.backend != DEFAULT_BACKEND:
             raise ConfigError(
-                f"solver.backend = {self.solver.backend}: a drive line has an integrator of its own; leave it out"
+                f"solver.backend = {self.solver.backend}: a drive line has an integrator of "
+                f"its own; take solver.backend={DEFAULT_BACKEND}"
             )
         self._warn_of_supports()
         self.quality.check_covered(self.pair.pinion, self.pair.wheel)
         check_memory(
             self.operating.duration,
-            sensing.sampling_rate,
-            len(sensing.channels),
+            self.sensing.sampling_rate,
+            len(self.sensing.channels),
             self.solver,
         )
         self.mesh_table()
+
+    def _check_sensing(self) -> None:
+        """Raise for channels and sensors that a drive line does not have."""
+        sensing = self.sensing
+        if unknown := [name for name in sensing.channels if name not in self.channels]:
+            more = ""
+            if not self.engine.drive.lateral:
+                more = "; with system.lateral=true also pinion_x and the like"
+            raise ConfigError(
+                f"sensing.channels: no channel {', '.join(unknown)}; "
+                f"allowed: {', '.join(self.channels)}{more}"
+            )
+        if sensing.path is not None or sensing.n_lead or sensing.nuisances:
+            option = "shaft_line" if self.engine.wheels else "geared_line"
+            raise ConfigError(
+                "sensing: records of a drive line have no transfer path, nuisances or sensor "
+                f"dynamics; take sensing={option}"
+            )
 
     def _warn_of_supports(self) -> None:
         """Warn of mesh forces far above the force for which the support of all gears is taken."""

@@ -101,7 +101,7 @@ class LineOptions:
     name: str
     shafting_csv: str | None
     gears_csv: str | None
-    lateral: bool
+    lateral: bool | None
     viscous_damper_node: int | None
     dampers: tuple[TorsionalDamper, ...]
     record_mesh: tuple[int, ...] | None = None

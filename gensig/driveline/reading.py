@@ -24,11 +24,12 @@ def read_line_machine(config: Configuration) -> LineMachine:
     ------
     ConfigError    for keys or tables that make no engine, and for a mesh that has no records
     """
-    engine = read_engine_line(config)
+    engine = read_engine_line(_with_lateral_motion(config))
     place = _record_mesh(engine)
     if read_heat(config).is_any or read_modification(config).is_any:
         raise ConfigError(
-            "heat and modification are of a single gear pair; a drive line takes heat=none"
+            "heat and modification are of a single gear pair; a drive line takes "
+            "heat=none and modification=none"
         )
     operating, quality = (
         read_operating(config.section("operating")),
@@ -48,6 +49,15 @@ def read_line_machine(config: Configuration) -> LineMachine:
     return replace(
         machine, operating=replace(operating, speed=operating.speed * machine.ratio)
     )
+
+
+def _with_lateral_motion(config: Configuration) -> Configuration:
+    """A configuration whose ``system.lateral`` null is true where a channel needs that motion."""
+    if config.section("system").get("lateral") is not None:
+        return config
+    channels = config.section("sensing").get("channels")
+    needed = any(str(name).endswith(("_x", "_y")) for name in channels or ())
+    return config.with_keys("system", lateral=needed)
 
 
 def _record_mesh(engine: EngineLine) -> int:

@@ -7,8 +7,10 @@ instantiated.
 from __future__ import annotations
 
 import difflib
+import functools
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -37,11 +39,13 @@ def compose(
 ) -> Configuration:
     """Compose one configuration.
 
+    Compositions of the package's files alone are kept: these files do not change while it runs.
+
     Parameters
     ----------
     config_name : the primary file, for instance ``"generate"``
     overrides : Hydra overrides as typed, ``group=option`` and ``key=value``
-    config_dir : folder with a user's own groups and options, searched beside the package's
+    config_dir : folder with a user's own groups and options, searched after the package's
 
     Returns
     -------
@@ -51,22 +55,35 @@ def compose(
     ------
     ConfigError    for an unknown key or option, a value of the wrong form, or a missing folder
     """
-    words = list(overrides)
+    words = tuple(overrides)
+    if config_dir is None and not any(word.startswith("hydra.") for word in words):
+        return _packaged(config_name, words)
+    return _composed(config_name, words, config_dir)
+
+
+@functools.lru_cache(maxsize=256)
+def _packaged(config_name: str, words: tuple[str, ...]) -> Configuration:
+    return _composed(config_name, words, None)
+
+
+def _composed(
+    config_name: str, words: tuple[str, ...], config_dir: str | Path | None
+) -> Configuration:
+    searched = list(words)
     if config_dir is not None:
         folder = Path(config_dir).expanduser().resolve()
         if not folder.is_dir():
             raise ConfigError(f"--config-dir {config_dir} is not a folder")
-        words.append(f"hydra.searchpath=[file://{folder}]")
+        searched.append(f"hydra.searchpath=[file://{folder}]")
     with _hydra():
         try:
-            config = hydra_compose(config_name=config_name, overrides=words)
-            resolved = OmegaConf.to_container(
-                config, resolve=True, throw_on_missing=True
-            )
+            config = hydra_compose(config_name=config_name, overrides=searched)
+            values = OmegaConf.to_container(config, resolve=True, throw_on_missing=True)
         except (HydraException, OmegaConfBaseException, ValueError) as error:
-            raise ConfigError(_explain(error, config_name, words, config_dir)) from None
-    assert isinstance(resolved, dict)
-    return Configuration({str(key): value for key, value in resolved.items()})
+            text = _explain(error, config_name, words, config_dir)
+            raise ConfigError(text) from None
+    assert isinstance(values, dict)
+    return Configuration({str(key): value for key, value in values.items()})
 
 
 def sweep(overrides: Sequence[str]) -> list[list[str]]:
@@ -110,25 +127,27 @@ def override_keys(overrides: Sequence[str]) -> dict[str, str]:
 
 
 def _one_value(override: Any) -> str:
-    """What was perhaps meant by several values: a decimal comma, or a list without its brackets."""
+    """A hint where several values were meant as one: a decimal comma, a list without brackets."""
     key, text = str(override.key_or_group), str(override.input_line).partition("=")[2]
     parts = [part.strip() for part in text.split(",")]
-    default = None
-    for primary in option_files.PRIMARY:
-        with _hydra():
-            default = (
-                OmegaConf.select(hydra_compose(config_name=primary), key)
-                if default is None
-                else default
-            )
-    numbers = re.fullmatch(r"[-+]?\d+, ?\d+", text)
-    if isinstance(default, ListConfig) or (
-        default is None and "." in key and not numbers
-    ):
+    is_decimal = re.fullmatch(r"[-+]?\d+, ?\d+", text) is not None
+    default = _default(key)
+    is_unknown_key = default is None and "." in key
+    if isinstance(default, ListConfig) or (is_unknown_key and not is_decimal):
         return f"; or is it a list? Then write '{key}=[{','.join(parts)}]'"
-    if numbers:
+    if is_decimal:
         return f"; or is it a decimal point? Then write {key}={'.'.join(parts)}"
     return ""
+
+
+def _default(key: str) -> Any:
+    """Value of a dotted key in the first default configuration that has one."""
+    for primary in option_files.PRIMARY:
+        with _hydra():
+            value = OmegaConf.select(hydra_compose(config_name=primary), key)
+        if value is not None:
+            return value
+    return None
 
 
 def typed_mapping(overrides: Sequence[str], key: str) -> dict[str, Any]:
@@ -196,55 +215,92 @@ def _parse(overrides: Sequence[str]) -> list[Any]:
 def _explain(
     error: Exception,
     config_name: str,
-    overrides: Sequence[str],
+    words: Sequence[str],
     config_dir: str | Path | None,
 ) -> str:
     """One line for a failed composition, with the nearest existing names."""
     text = " ".join(str(error).split())
     if "Config group override must be" in text:
-        groups = set(_groups())
-        for one in _parse(overrides):
-            key, value = str(one.key_or_group), one.value()
-            if key in groups and not isinstance(value, str | list):
-                return f"{one.input_line}: a group takes one of its options: {', '.join(options(key))}"
+        text = _not_an_option(words) or text
     if isinstance(error, ValueError) and not isinstance(error, HydraException):
         return text
-    for pattern in (r"Could not override '([^']+)'", r"Key '([^']+)' is not in struct"):
-        if found := re.search(pattern, text):
-            key = found.group(1)
-            return f"unknown key '{key}'{_nearest(key, _known_keys(config_name))}"
-    if found := re.search(r"Could not find '([^']+)'", text):
-        group, _, wanted = found.group(1).rpartition("/")
-        names = (
-            [one.name for one in option_files.options(group, config_dir)]
-            if group
-            else []
-        )
-        there = option_files.elsewhere(group, wanted) or nearest.hint(wanted, names)
-        return f"no option '{wanted}' of {group or 'the configuration'}; {there}"
-    if (
-        "mismatched input" in text
-        or "extraneous input" in text
-        or "no viable alternative" in text
-    ):
+    for pattern, explanation in _EXPLANATIONS.items():
+        if match := re.search(pattern, text):
+            context = _Failure(match.group(1), config_name, words, config_dir)
+            return explanation(context)
+    if re.search("mismatched input|extraneous input|no viable alternative", text):
         return f"cannot read the override: {text}"
-    if found := re.search(
-        r"Could not override '([^']+)'\. No match in the defaults list", text
-    ):
-        return f"unknown group '{found.group(1)}'{_nearest(found.group(1), _groups())}"
-    if found := re.search(r"Missing mandatory value: (\S+)", text):
-        key = getattr(error, "full_key", None) or found.group(1)
+    if match := re.search(r"Missing mandatory value: (\S+)", text):
+        key = getattr(error, "full_key", None) or match.group(1)
         return f"{key} is required: give {key}=..."
     return text.removesuffix(".")
 
 
-def _known_keys(config_name: str) -> list[str]:
-    """Every dotted key of the default configuration."""
-    with _hydra():
-        tree = OmegaConf.to_container(
-            hydra_compose(config_name=config_name), resolve=False
-        )
-    return list(_dotted(tree))
+def _not_an_option(words: Sequence[str]) -> str | None:
+    """Message for the first group that was given a number or a mapping."""
+    groups = set(_groups())
+    for override in _parse(words):
+        key = str(override.key_or_group)
+        if key in groups and not isinstance(override.value(), str | list):
+            names = ", ".join(options(key))
+            return f"{override.input_line}: a group takes one of its options: {names}"
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class _Failure:
+    """The name at which a composition failed, and the call that asked for it."""
+
+    name: str
+    config_name: str
+    words: Sequence[str]
+    config_dir: str | Path | None
+
+
+def _unknown_key(failure: _Failure) -> str:
+    keys = _known_keys(failure)
+    return f"unknown key '{failure.name}'{_nearest(failure.name, keys)}"
+
+
+def _unknown_group(failure: _Failure) -> str:
+    files = {group.name: group.primary for group in option_files.groups()}
+    primary = files.get(failure.name)
+    if primary is None:
+        return f"unknown group '{failure.name}'{_nearest(failure.name, list(files))}"
+    return (
+        f"the group '{failure.name}' is one of {primary}.yaml, "
+        f"not of {failure.config_name}.yaml"
+    )
+
+
+def _unknown_option(failure: _Failure) -> str:
+    group, _, wanted = failure.name.rpartition("/")
+    if not group:
+        return f"no option '{wanted}' of the configuration; {nearest.hint(wanted, [])}"
+    names = [option.name for option in option_files.options(group, failure.config_dir)]
+    hint = option_files.elsewhere(group, wanted) or nearest.hint(wanted, names)
+    return f"no option '{wanted}' of {group}; {hint}"
+
+
+# Words of Hydra and OmegaConf -> our explanation; the first that matches is taken.
+_EXPLANATIONS: dict[str, Callable[[_Failure], str]] = {
+    r"Could not override '([^']+)'\. No match in the defaults list": _unknown_group,
+    r"Could not override '([^']+)'": _unknown_key,
+    r"Key '([^']+)' is not in struct": _unknown_key,
+    r"Could not find '([^']+)'": _unknown_option,
+}
+
+
+def _known_keys(failure: _Failure) -> list[str]:
+    """Dotted keys of the default configuration with the groups that were chosen."""
+    groups = set(_groups())
+    parsed = _parse(failure.words)
+    chosen = [o.input_line for o in parsed if str(o.key_or_group) in groups]
+    try:
+        tree = compose(failure.config_name, chosen, config_dir=failure.config_dir)
+    except ConfigError:
+        tree = compose(failure.config_name)
+    return list(_dotted(tree.plain()))
 
 
 def _groups() -> list[str]:
@@ -265,14 +321,13 @@ def _nearest(key: str, names: Sequence[str]) -> str:
     """'; did you mean ...?' over whole keys, then over their last part."""
     close = difflib.get_close_matches(key, names, n=3, cutoff=0.6)
     if not close:
+        last = {name: name.rpartition(".")[2] for name in names}
         leaf = key.rpartition(".")[2]
-        leaves = difflib.get_close_matches(
-            leaf, [name.rpartition(".")[2] for name in names], n=3, cutoff=0.75
-        )
-        close = [name for name in names if name.rpartition(".")[2] in leaves][:3]
-    return (
-        f"; did you mean {' or '.join(repr(name) for name in close)}?" if close else ""
-    )
+        leaves = difflib.get_close_matches(leaf, last.values(), n=3, cutoff=0.75)
+        close = [name for name in names if last[name] in leaves][:3]
+    if not close:
+        return ""
+    return f"; did you mean {' or '.join(repr(name) for name in close)}?"
 
 
 def _first_line(error: Exception) -> str:

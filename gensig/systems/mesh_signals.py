@@ -23,7 +23,8 @@ def mesh_signals(
     """
     if n_pairs == 0:
         raise ConfigError(
-            "dataset.store_mesh_state: a drive line does not tell the loads of its teeth; take false"
+            "dataset.store_mesh_state: a drive line does not know the loads of its teeth; "
+            "take dataset.store_mesh_state=false"
         )
     if mesh is None:
         nobody = np.full((n_pairs, n_samples), NO_TOOTH, dtype=np.int16)

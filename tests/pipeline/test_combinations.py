@@ -1,0 +1,165 @@
+"""Every combination of options runs, or one line says what to type instead."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import gensig
+from gensig.errors import GensigError
+from gensig.options import files
+
+SHORTER = (
+    "operating.duration_s=0.02",
+    "mesh.n_slices=4",
+    "mesh.points_per_pitch=64",
+    "solver.max_error=null",
+)
+SHORT = ("plan.n_records=1", "plan.n_units=1", *SHORTER)
+pytestmark = pytest.mark.filterwarnings("ignore:.*mean tooth forces:UserWarning")
+TABLES = (
+    "system.shafting_csv=two_stage_shafting.csv",
+    "system.gears_csv=two_stage_gears.csv",
+    "system.record_mesh=[5,6]",
+    "system.motor_node=1",
+    "system.load_node=8",
+)
+SYSTEMS = {option.name: () for option in files.options("system")}
+SYSTEMS["shaft_line"] = TABLES  # it has no machine without tables
+FAULTS = [option.name for option in files.options("fault")]
+EXPERIMENTS = [option.name for option in files.options("experiment")]
+
+
+def first_record(*words):
+    """The first record that overrides describe, made and thrown away."""
+    return next(iter(gensig.stream(*words)))
+
+
+def check_runs(*words):
+    record = first_record(*words)
+    assert record.values["status"] == "ok", record.values["status_reason"]
+    assert np.isfinite(record.signals["acceleration"]).all()
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_every_fault_runs_on_every_system(system, fault):
+    check_runs(f"system={system}", *SYSTEMS[system], f"fault={fault}", *SHORT)
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS)
+def test_every_experiment_runs(experiment):
+    """With its own plan: the first of its records, made short."""
+    check_runs(f"experiment={experiment}", *SHORTER)
+
+
+# What a record of either kind of machine can have besides; each is switched on and off.
+SWITCHES = (
+    "sensing.snr_db=null",
+    "sensing.snr_reference=record",
+    "sensing.gain_scatter=0",
+    "sensing.sensor.dropped_fraction=0.01",
+    "sensing.sensor.drift_scatter=0.1",
+    "sensing.sensor.sensitivity_tolerance=0.1",
+    "sensing.sensor.dc_offset_m_per_s2=0.1",
+    "dataset.store_clean=true",
+    "dataset.store_shaft_angle=true",
+    "dataset.store_operating=true",
+    "dataset.store_tacho=true",
+    "dataset.store_encoder=true",
+    "dataset.store_healthy_twin=true",
+    "dataset.store_detectability=true",
+    "dataset.sample_type=int16",
+    "operating=drifting",
+    "fault=crack",
+    "quality.iso1328_grade=null",
+)
+# Of gear pairs alone.
+PAIR_SWITCHES = (
+    "sensing.sensor.mounted_resonance_hz=20000",
+    "sensing.sensor.low_cutoff_hz=1",
+    "dataset.store_source=true",
+    "dataset.store_mesh_state=true",
+)
+# One switch is on in these of eight runs: every half of them that has the first. Any two switches
+# then meet both on, both off, and either alone (Kleitman & Spencer 1973).
+HALVES = [{0, *others} for others in itertools.combinations(range(1, 8), 3)]
+SENSING = {
+    "spur_pair": ("bearing", "housing", "machine"),
+    "helical_pair": ("bearing", "housing", "machine"),
+    "two_stage_gearbox": ("geared_line",),
+    "engine_gear_train": ("shaft_line",),
+}
+
+
+def covering_rows(switches):
+    """Eight selections of switches that hold every pair of their states."""
+    halves = dict(zip(switches, HALVES, strict=False))
+    return [[word for word, runs in halves.items() if run in runs] for run in range(8)]
+
+
+def test_covering_rows_hold_every_pair():
+    rows = covering_rows(SWITCHES + PAIR_SWITCHES)
+    for first, second in itertools.combinations(SWITCHES + PAIR_SWITCHES, 2):
+        states = {(first in row, second in row) for row in rows}
+        assert len(states) == 4, (first, second)
+
+
+@pytest.mark.parametrize("row", range(8))
+@pytest.mark.parametrize(
+    ("system", "sensing"),
+    [(system, option) for system, names in SENSING.items() for option in names],
+)
+def test_sensing_options_run_pairwise(system, sensing, row):
+    is_pair = system.endswith("_pair")
+    switches = SWITCHES + PAIR_SWITCHES if is_pair else SWITCHES
+    words = covering_rows(switches)[row]
+    check_runs(f"system={system}", f"sensing={sensing}", *SHORT, *words)
+
+
+REFUSED = [
+    # system, overrides, words of the answer: the first says what, the last what to type
+    ("shaft_line", ["system.shafting_csv=null"], "system.shafting_csv is required"),
+    ("spur_pair", ["sensing=measured"], "give sensing.path.file="),
+    ("spur_pair", ["sensing=shaft_line"], "no channel flywheel_speed"),
+    ("spur_pair", ["heat=chongqing_rated"], "system=helical_pair takes heat"),
+    ("spur_pair", ["excitation=engine_v20"], "leave excitation out"),
+    ("spur_pair", ["sensing.sensor.adc_bits=16"], "give both adc_range_m_per_s2"),
+    ("spur_pair", ["system.supports=bearings"], "quality.support_damping_ratio_low"),
+    ("spur_pair", ["operating.turns=1"], "leave one out"),
+    ("spur_pair", ["life=mixed"], "leave it null"),
+    ("two_stage_gearbox", ["sensing=housing"], "take sensing=geared_line"),
+    ("two_stage_gearbox", ["sensing=machine"], "take sensing=geared_line"),
+    ("engine_gear_train", ["sensing=housing"], "take sensing=shaft_line"),
+    (
+        "two_stage_gearbox",
+        ["sensing.sensor.mounted_resonance_hz=9000"],
+        "take sensing=geared_line",
+    ),
+    (
+        "two_stage_gearbox",
+        ["sensing.channels=[pinion_y]", "system.lateral=false"],
+        "with system.lateral=true",
+    ),
+    (
+        "two_stage_gearbox",
+        ["dataset.store_mesh_state=true"],
+        "take dataset.store_mesh_state=false",
+    ),
+    ("two_stage_gearbox", ["solver.precision=float32"], "solver.precision=float64"),
+    ("two_stage_gearbox", ["mesh.law=paper"], "take mesh.law=one_sided"),
+    ("two_stage_gearbox", ["heat=chongqing_rated"], "heat=none"),
+    ("two_stage_gearbox", ["modification=tip_relief"], "modification=none"),
+    ("two_stage_gearbox", ["excitation=engine_v20"], "has no node 13"),
+    ("two_stage_gearbox", ["system.supports=bearings"], "did you mean"),
+    ("two_stage_gearbox", ["system.motor_node=null"], "system.motor_node"),
+]
+
+
+@pytest.mark.parametrize(("system", "words", "answer"), REFUSED)
+def test_what_cannot_be_says_what_to_type(system, words, answer):
+    with pytest.raises(GensigError) as refusal:
+        first_record(f"system={system}", *SYSTEMS[system], *SHORT, *words)
+    text = str(refusal.value)
+    assert answer in text
+    assert "\n" not in text
