@@ -294,13 +294,13 @@ _EXPLANATIONS: dict[str, Callable[[_Failure], str]] = {
 def _known_keys(failure: _Failure) -> list[str]:
     """Dotted keys of the default configuration with the groups that were chosen."""
     groups = set(_groups())
-    parsed = _parse(failure.words)
-    chosen = [o.input_line for o in parsed if str(o.key_or_group) in groups]
-    try:
-        tree = compose(failure.config_name, chosen, config_dir=failure.config_dir)
-    except ConfigError:
-        tree = compose(failure.config_name)
-    return list(_dotted(tree.plain()))
+    words = [word for word in failure.words if word.partition("=")[0] in groups]
+    with _hydra():
+        try:
+            config = hydra_compose(config_name=failure.config_name, overrides=words)
+        except HydraException:
+            config = hydra_compose(config_name=failure.config_name)
+        return list(_dotted(OmegaConf.to_container(config, resolve=False)))
 
 
 def _groups() -> list[str]:

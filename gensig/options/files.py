@@ -1,8 +1,7 @@
-"""What can be chosen and set: groups, their options, and the keys of an option with value, unit
-and comment.
+"""Groups, their options, and the keys of an option with value, unit and comment.
 
-Read from the text of the configuration files, comments included, without Hydra, so that it is
-quick enough for a key press. A group's own line stands behind it in the defaults list of the
+Read from the text of the configuration files, comments included, without Hydra: quick enough for
+completion at a key press. The description of a group is its comment in the defaults list of the
 primary file.
 """
 
@@ -11,7 +10,7 @@ from __future__ import annotations
 import importlib.util
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
@@ -22,23 +21,46 @@ from gensig.errors import ConfigError
 from gensig.units import split_unit
 
 PRIMARY = ("generate", "train")
-OWN = "configs"  # folder of a user's own options, unless told otherwise
-# suffix of a key as engineers write the unit; what is not here is written as it is
+OWN = "configs"  # default folder of a user's options
+# suffix of a key -> unit as engineers write it; other suffixes are units already
 WRITTEN = {
-    "mpa_sqrt_m": "MPa sqrt(m)", "kg_m2": "kg m2", "w_per_m2k": "W/(m2 K)", "w_per_mk": "W/(m K)",
-    "j_per_kgk": "J/(kg K)", "per_k": "1/K", "degc": "degC", "n_per_m": "N/m", "ns_per_m": "N s/m",
-    "nm_per_rad": "N m/rad", "knm_per_rad": "kN m/rad", "mnm_per_rad": "MN m/rad", "nms_per_rad": "N m s/rad",
-    "rpm": "r/min", "nm": "N m", "n": "N", "hz": "Hz", "gpa": "GPa", "mpa": "MPa", "hbs": "HBS", "db": "dB",
-}  # fmt: skip
+    "mpa_sqrt_m": "MPa sqrt(m)",
+    "kg_m2": "kg m2",
+    "w_per_m2k": "W/(m2 K)",
+    "w_per_mk": "W/(m K)",
+    "j_per_kgk": "J/(kg K)",
+    "per_k": "1/K",
+    "degc": "degC",
+    "n_per_m": "N/m",
+    "ns_per_m": "N s/m",
+    "nm_per_rad": "N m/rad",
+    "knm_per_rad": "kN m/rad",
+    "mnm_per_rad": "MN m/rad",
+    "nms_per_rad": "N m s/rad",
+    "rpm": "r/min",
+    "nm": "N m",
+    "n": "N",
+    "hz": "Hz",
+    "gpa": "GPa",
+    "mpa": "MPa",
+    "hbs": "HBS",
+    "db": "dB",
+}
 SENTENCE_END = re.compile(r"(?<!\bal)(?<!\beq)\.\s+(?=[A-Z<0-9]|docs/)")
+EXPONENT = re.compile(r"[-+]?[0-9.]+[eE][-+]?[0-9]+")
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Key:
-    """One key.
+    """One key of an option.
 
-    Dotted name, value as the file writes it and as it is read, unit or empty, comment or empty.
+    Attributes
+    ----------
+    name : dotted name
+    text : value as the file writes it
+    value : value as it is read
+    unit, comment : empty where there is none
     """
 
     name: str
@@ -50,10 +72,7 @@ class Key:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Group:
-    """One group.
-
-    What it is about, the option taken where none is typed, and the primary files that have it.
-    """
+    """One group: its subject, its default option, and the primary file that has it."""
 
     name: str
     about: str
@@ -70,11 +89,17 @@ class Option:
     file: Path
 
 
-class _File:
-    """One configuration file.
+@dataclass(frozen=True, slots=True)
+class _Default:
+    """An entry of a defaults list; ``group`` None for an option of the file's group."""
 
-    Its tree with the places of everything, and its lines for the comments.
-    """
+    group: str | None
+    option: Any
+    comment: str
+
+
+class _File:
+    """One configuration file: its tree with positions, and its lines for the comments."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -86,15 +111,14 @@ class _File:
         try:
             return yaml.compose(self.source, Loader=LOADER)
         except yaml.YAMLError as error:
-            raise ConfigError(
-                f"{self.path} is no YAML: {' '.join(str(error).split())}"
-            ) from None
+            text = " ".join(str(error).split())
+            raise ConfigError(f"{self.path} is no YAML: {text}") from None
 
     @property
     def is_global(self) -> bool:
-        return any(
-            line.replace(" ", "") == "#@package_global_" for line in self.lines[:3]
-        )
+        """Whether its keys are those of the whole configuration."""
+        head = [line.replace(" ", "") for line in self.lines[:3]]
+        return "#@package_global_" in head
 
     def about(self) -> str:
         """The first sentence of the comment at the top."""
@@ -102,194 +126,195 @@ class _File:
         for line in self.lines:
             if not line.startswith("#"):
                 break
-            if not line.lstrip("# ").startswith("@package"):
-                words.append(line.lstrip("# ").strip())
+            text = line.lstrip("# ")
+            if not text.startswith("@package"):
+                words.append(text.strip())
         return SENTENCE_END.split(" ".join(words))[0].rstrip(".")
 
-    def defaults(self) -> list[tuple[str | None, Any, str]]:
-        """The entries of its defaults list.
-
-        Group (None for an option of its own group), option, comment.
-        """
-        for key, value in (
-            self.tree.value if isinstance(self.tree, yaml.MappingNode) else ()
-        ):
+    def defaults(self) -> list[_Default]:
+        """The entries of its defaults list."""
+        if not isinstance(self.tree, yaml.MappingNode):
+            return []
+        for key, value in self.tree.value:
             if key.value == "defaults" and isinstance(value, yaml.SequenceNode):
-                return [self._entry(node) for node in value.value]
+                return [self._default(node) for node in value.value]
         return []
 
-    def _entry(self, node: Any) -> tuple[str | None, Any, str]:
-        if isinstance(node, yaml.MappingNode):
-            group, option = node.value[0]
-            return (
-                group.value,
-                None if option.value == "null" else option.value,
-                self._comment(group, option),
-            )
-        return None, node.value, ""
+    def _default(self, node: Any) -> _Default:
+        if not isinstance(node, yaml.MappingNode):
+            return _Default(None, node.value, "")
+        group, option = node.value[0]
+        name = None if option.value == "null" else option.value
+        return _Default(group.value, name, self._comment(group, option))
 
     def entries(self, prefix: str = "") -> Iterator[Key]:
-        """Every key that holds a value; what is nested is dotted."""
+        """Every key that holds a value; nested names are dotted."""
         if isinstance(self.tree, yaml.MappingNode):
-            yield from self._keys(self.tree, prefix, top=True)
+            yield from self._keys(self.tree, prefix, skipped=("defaults",))
 
-    def _keys(self, mapping: Any, prefix: str, *, top: bool = False) -> Iterator[Key]:
+    def _keys(
+        self, mapping: Any, prefix: str, *, skipped: Sequence[str] = ()
+    ) -> Iterator[Key]:
         for key, value in mapping.value:
-            if top and key.value == "defaults":
+            if key.value in skipped:
                 continue
             name = f"{prefix}{key.value}"
-            if (
-                isinstance(value, yaml.MappingNode)
-                and not value.flow_style
-                and key.value != "vary"
-            ):
+            is_block = isinstance(value, yaml.MappingNode) and not value.flow_style
+            if is_block and key.value != "vary":
                 yield from self._keys(value, f"{name}.")
-                continue
-            plain = _value(value)
-            text = self.source[value.start_mark.index : value.end_mark.index]
-            if isinstance(value, yaml.CollectionNode):
-                text = yaml.safe_dump(
-                    plain, default_flow_style=True, sort_keys=False, width=10**6
-                ).strip()
-            yield Key(
-                name=name,
-                text=text,
-                value=plain,
-                unit=_unit(str(key.value)),
-                comment=self._comment(key, value),
-            )
+            else:
+                yield self._key(name, key, value)
+
+    def _key(self, name: str, key: Any, node: Any) -> Key:
+        value = _value(node)
+        text = self.source[node.start_mark.index : node.end_mark.index]
+        if isinstance(node, yaml.CollectionNode):
+            text = yaml.safe_dump(
+                value, default_flow_style=True, sort_keys=False, width=10**6
+            ).strip()
+        return Key(
+            name=name,
+            text=text,
+            value=value,
+            unit=_unit(str(key.value)),
+            comment=self._comment(key, node),
+        )
 
     def _comment(self, key: Any, value: Any) -> str:
-        """What is written behind a value and goes on below it, else right above its key."""
-        block = isinstance(value, yaml.CollectionNode) and not value.flow_style
-        mark = key.end_mark if block else value.end_mark
-        behind = re.search(r"(?:^|\s)#\s*(.*)$", self.lines[mark.line][mark.column :])
-        parts = [behind.group(1)] if behind else []
+        """The comment after a value with its continuation lines, or the one above its key."""
+        is_block = isinstance(value, yaml.CollectionNode) and not value.flow_style
+        mark = key.end_mark if is_block else value.end_mark
+        rest = self.lines[mark.line][mark.column :]
+        after = re.search(r"(?:^|\s)#\s*(.*)$", rest)
+        parts = [after.group(1)] if after else []
         for line in self.lines[mark.line + 1 :]:
-            if not (
-                line.lstrip().startswith("#") and _indent(line) > key.start_mark.column
-            ):
+            is_deeper = _indent(line) > key.start_mark.column
+            if not (_is_comment(line) and is_deeper):
                 break
             parts.append(line.lstrip().lstrip("# "))
+        if not after:
+            parts = [*self._comment_above(key), *parts]
+        return " ".join(parts)
+
+    def _comment_above(self, key: Any) -> list[str]:
+        """Lines of the comment that ends right above a key, at its indentation."""
         above = self.lines[: key.start_mark.line]
-        while not behind and above and above[-1].lstrip().startswith("#"):
-            if _indent(above[-1]) != key.start_mark.column or not _is_on_its_own(above):
+        parts: list[str] = []
+        while above and _is_comment(above[-1]):
+            if _indent(above[-1]) != key.start_mark.column or not _is_separate(above):
                 break
             parts.insert(0, above.pop().lstrip().lstrip("# "))
-        return " ".join(parts)
+        return parts
 
 
 def groups(config_dir: str | Path | None = None) -> list[Group]:
     """Every group of the package and of a user's folder, in the order of the primary files."""
-    found: dict[str, Group] = {}
+    result: dict[str, Group] = {}
     for primary in PRIMARY:
-        for name, option, comment in _primary(primary).defaults():
-            if name is not None and name not in found:
-                found[name] = Group(
-                    name=name, about=comment, default=option, primary=primary
+        for entry in _primary(primary).defaults():
+            if entry.group is not None and entry.group not in result:
+                result[entry.group] = Group(
+                    name=entry.group,
+                    about=entry.comment,
+                    default=entry.option,
+                    primary=primary,
                 )
     for folder in _folders(config_dir)[1:]:
         for path in sorted(folder.iterdir()):
-            if path.is_dir() and path.name not in found and any(path.glob("*.yaml")):
-                found[path.name] = Group(
+            if path.is_dir() and path.name not in result and any(path.glob("*.yaml")):
+                result[path.name] = Group(
                     name=path.name,
                     about="of your own",
                     default=None,
                     primary=PRIMARY[0],
                 )
-    return list(found.values())
+    return list(result.values())
 
 
 def options(group: str, config_dir: str | Path | None = None) -> list[Option]:
-    """The options of a group; where both have one of a name it is the package's, as in Hydra."""
-    found: dict[str, Option] = {}
+    """The options of a group; the package's precede a user's of the same name, as in Hydra."""
+    files: dict[str, Path] = {}
     for folder in _folders(config_dir):
-        for path in sorted((folder / group).glob("*.yaml")):
-            found.setdefault(
-                path.stem, Option(name=path.stem, about=_File(path).about(), file=path)
-            )
-    return [found[name] for name in sorted(found)]
+        for path in (folder / group).glob("*.yaml"):
+            files.setdefault(path.stem, path)
+    return [
+        Option(name=name, about=_File(path).about(), file=path)
+        for name, path in sorted(files.items())
+    ]
 
 
 def sections() -> dict[str, str]:
-    """Parts of the primary files that offer no choice, each with its primary file.
+    """Sections of the primary files that offer no choice, each with its primary file.
 
-    Mesh, solver, quality, ...
+    Mesh, solver, quality and others; plain keys belong to the section named as the file.
     """
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     for primary in PRIMARY:
         for key in _primary(primary).entries():
             head, dot, _ = key.name.partition(".")
-            found.setdefault(head if dot else primary, primary)
-    return found
+            result.setdefault(head if dot else primary, primary)
+    return result
 
 
 def section_keys(name: str) -> list[Key]:
-    """Keys of one part of a primary file; of those at its top where ``name`` is that file's."""
+    """Keys of one section of a primary file, see `sections`."""
     keys = list(_primary(sections()[name]).entries())
-    return [
-        key
-        for key in keys
-        if (
-            key.name.startswith(f"{name}.")
-            if name not in PRIMARY
-            else "." not in key.name
-        )
-    ]
+    if name in PRIMARY:
+        return [key for key in keys if "." not in key.name]
+    return [key for key in keys if key.name.startswith(f"{name}.")]
 
 
 def option_keys(
     group: str, option: str, config_dir: str | Path | None = None
 ) -> list[Key]:
     """Keys of one option, with those of the options that it builds on."""
-    found: dict[str, Key] = {}
+    result: dict[str, Key] = {}
     for key in _option_keys(group, option, group, config_dir):
-        before = found.get(key.name)
+        before = result.get(key.name)
         if before is not None and not key.comment:
-            key = Key(
-                name=key.name,
-                text=key.text,
-                value=key.value,
-                unit=key.unit,
-                comment=before.comment,
-            )
-        for outer in [name for name in found if key.name.startswith(f"{name}.")]:
-            del found[outer]  # null there, a group of keys here
-        found[key.name] = key
-    return list(found.values())
+            key = replace(key, comment=before.comment)
+        for outer in [name for name in result if key.name.startswith(f"{name}.")]:
+            del result[outer]  # null there, a group of keys here
+        result[key.name] = key
+    return list(result.values())
 
 
 def chosen_beside(
     group: str, option: str, config_dir: str | Path | None = None
 ) -> dict[str, str]:
-    """Options of other groups that an option chooses too."""
-    entries = _find(group, option, config_dir).defaults()
-    return {
-        name.removeprefix("override /"): str(other)
-        for name, other, _ in entries
-        if name and name[:8] == "override"
-    }
+    """Options of other groups that an option chooses, with those that it builds on."""
+    file = _find(group, option, config_dir)
+    result: dict[str, str] = {}
+    for entry in file.defaults():
+        if entry.group is None and entry.option != "_self_":
+            result |= chosen_beside(group, entry.option, config_dir)
+    for entry in file.defaults():
+        if entry.group is not None and entry.group.startswith("override /"):
+            result[entry.group.removeprefix("override /")] = str(entry.option)
+    return result
 
 
 def _option_keys(
     group: str, option: str, package: str, config_dir: str | Path | None
 ) -> Iterator[Key]:
     file = _find(group, option, config_dir)
-    for name, other, _ in file.defaults():
-        if name is None and other != "_self_":
-            yield from _option_keys(group, other, package, config_dir)
-        elif name is not None and not name.startswith("override") and other is not None:
-            inner, _, place = name.partition("@")
+    for entry in file.defaults():
+        if entry.group is None:
+            if entry.option != "_self_":
+                yield from _option_keys(group, entry.option, package, config_dir)
+        elif not entry.group.startswith("override") and entry.option is not None:
+            inner, _, key = entry.group.partition("@")
             yield from _option_keys(
-                f"{group}/{inner}", other, f"{package}.{place or inner}", config_dir
+                f"{group}/{inner}",
+                entry.option,
+                f"{package}.{key or inner}",
+                config_dir,
             )
     yield from file.entries("" if file.is_global else f"{package}.")
 
 
 def elsewhere(group: str, option: str) -> str | None:
-    """How to take an option that lies in the folder where gensig new writes, for who forgot to
-    name it.
-    """
+    """Hint for an option in the folder where gensig new writes, which was not named."""
     if not (Path(OWN) / group / f"{option}.yaml").is_file():
         return None
     return f"it is in ./{OWN}: add --config-dir {OWN}, in Python config_dir='{OWN}'"
@@ -297,8 +322,9 @@ def elsewhere(group: str, option: str) -> str | None:
 
 def _find(group: str, option: str, config_dir: str | Path | None) -> _File:
     for folder in _folders(config_dir):
-        if (folder / group / f"{option}.yaml").is_file():
-            return _File(folder / group / f"{option}.yaml")
+        path = folder / group / f"{option}.yaml"
+        if path.is_file():
+            return _File(path)
     raise ConfigError(f"no option '{option}' of {group}")
 
 
@@ -307,34 +333,32 @@ def _primary(name: str) -> _File:
     return _File(_folders(None)[0] / f"{name}.yaml")
 
 
-def _folders(config_dir: str | Path | None) -> Sequence[Path]:
+def _folders(config_dir: str | Path | None) -> list[Path]:
     """The package's folder of configurations, and the user's."""
     spec = importlib.util.find_spec("gensig.configs")
-    places = list(spec.submodule_search_locations or ()) if spec is not None else []
-    if not places:
+    locations = spec.submodule_search_locations if spec is not None else None
+    if not locations:
         raise ConfigError(
             "gensig's own configuration files are missing; install gensig again"
         )
+    package = Path(next(iter(locations)))
     if config_dir is None:
-        return [Path(places[0])]
-    own = Path(config_dir).expanduser()
-    if not own.is_dir():
+        return [package]
+    folder = Path(config_dir).expanduser()
+    if not folder.is_dir():
         raise ConfigError(f"--config-dir {config_dir} is not a folder")
-    return [Path(places[0]), own]
+    return [package, folder]
 
 
 def _value(node: Any) -> Any:
     """A node as plain Python; 3e3 is a number, as Hydra reads it."""
     if isinstance(node, yaml.MappingNode):
-        return {key.value: _value(one) for key, one in node.value}
+        return {key.value: _value(inner) for key, inner in node.value}
     if isinstance(node, yaml.SequenceNode):
-        return [_value(one) for one in node.value]
+        return [_value(inner) for inner in node.value]
     value = yaml.safe_load(yaml.serialize(node))
-    if (
-        isinstance(value, str)
-        and not node.style
-        and re.fullmatch(r"[-+]?[0-9.]+[eE][-+]?[0-9]+", value)
-    ):
+    is_plain_text = isinstance(value, str) and not node.style
+    if is_plain_text and EXPONENT.fullmatch(value):
         return float(value)
     return value
 
@@ -343,21 +367,27 @@ def _unit(key: str) -> str:
     """Unit of a key as engineers write it; empty for a plain number, text or flag."""
     if key.endswith("_m_per_s2"):
         return "m/s2"
-    suffix = split_unit(key)[1]
-    return "" if suffix is None else WRITTEN.get(suffix, suffix)
+    suffix = split_unit(key)[1] or ""
+    return WRITTEN.get(suffix, suffix)
 
 
 def _indent(line: str) -> int:
     return len(line) - len(line.lstrip())
 
 
-def _is_on_its_own(lines: Sequence[str]) -> bool:
-    """Whether the comment that ends ``lines`` goes on from none behind a value, and is not the
-    head of the file.
+def _is_comment(line: str) -> bool:
+    return line.lstrip().startswith("#")
+
+
+def _is_separate(lines: Sequence[str]) -> bool:
+    """Whether the comment that ends ``lines`` continues no comment after a value.
+
+    False for the head of the file too.
     """
-    place = len(lines)
-    while place and lines[place - 1].lstrip().startswith("#"):
-        place -= 1
-    return place > 0 and not re.search(
-        r"\S\s+#", lines[place - 1] if _indent(lines[place]) else ""
-    )
+    first = len(lines)
+    while first and _is_comment(lines[first - 1]):
+        first -= 1
+    if first == 0:
+        return False
+    has_comment = re.search(r"\S\s+#", lines[first - 1]) is not None
+    return not (has_comment and _indent(lines[first]) > 0)
