@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from benchmarks._realism_recording import INDICATORS
 from benchmarks._realism_sets import CONTROLS
 from gensig.commands.figures.machine_figures import FAULTY, GREY, SOUND, pyplot
-from gensig.validation.realism import Comparison, points
+from gensig.report.realism import Comparison, points
 
 FloatArray = NDArray[np.floating]
 

@@ -24,15 +24,7 @@ from benchmarks._realism_sets import (
 from benchmarks._realism_values import to_rate
 from gensig.dataset.reader import Dataset
 from gensig.errors import DatasetError
-from gensig.signals.averaging import resample_to_angle, samples_per_turn_for
-from gensig.signals.indicators import crest_factor, fm4, kurtosis, rms, sideband_ratio
-from gensig.signals.rotation import (
-    find_mesh_frequency,
-    mesh_phase_angle,
-    resample_by_angle,
-)
-from gensig.signals.synchronous import mesh_harmonics
-from gensig.validation.realism import (
+from gensig.report.realism import (
     NOT_TOLD,
     NOTHING,
     RECORDING,
@@ -42,6 +34,14 @@ from gensig.validation.realism import (
     judge,
     points,
 )
+from gensig.signals.averaging import resample_to_angle, samples_per_turn_for
+from gensig.signals.indicators import crest_factor, fm4, kurtosis, rms, sideband_ratio
+from gensig.signals.rotation import (
+    find_mesh_frequency,
+    mesh_phase_angle,
+    resample_by_angle,
+)
+from gensig.signals.synchronous import mesh_harmonics
 
 FloatArray = NDArray[np.floating]
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gensig.dataset.reader import Dataset
+from gensig.report.realism import Place
 from gensig.signals.averaging import samples_per_turn_for
 from gensig.signals.impacts import impact_decay, impacts_per_turn, peak_over_rms
 from gensig.signals.indicators import fm4, kurtosis, rms
@@ -20,7 +21,6 @@ from gensig.signals.synchronous import (
     nonsynchronous_share,
     residual_turns,
 )
-from gensig.validation.realism import Place
 
 FloatArray = NDArray[np.floating]
 

@@ -3,7 +3,7 @@
 Makes the data sets of the yardstick from ``experiment=realistic`` (or ``--base``), healthy and faulty at three speeds
 and two torques, and of a healthy machine like that of one public recording; resamples them to 5 kHz and 25.6 kHz;
 prints what is measured beside what is simulated. The recording is read from the folder ``$GENSIG_MEASURED`` where it
-is set. What is compared and how it is judged: ``gensig/validation/realism.py``; nothing here is a target to tune to.
+is set. What is compared and how it is judged: ``gensig/report/realism.py``; nothing here is a target to tune to.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from benchmarks._realism_sets import (
 )
 from benchmarks._realism_values import quantities, read_table
 from gensig.errors import GensigError
-from gensig.validation.realism import (
+from gensig.report.realism import (
     RESULTS,
     Comparison,
     compare,

@@ -57,7 +57,7 @@ def test_import_is_light(statement: str, absent: tuple[str, ...]) -> None:
 GENSIG = {
     "cli": "commands terminal version",
     "commands": "dataset driveline dynamics errors execution faults geometry life mesh "
-    "operation options plan production record report signals systems text twin units validation",
+    "operation options plan production record report signals systems text twin units",
     "dataset": "errors signals version",
     "driveline": "dynamics errors faults geometry life material mesh operation options sensing systems text units",
     "dynamics": "errors geometry material mesh operation units",
@@ -72,7 +72,7 @@ GENSIG = {
     "plan": "dataset errors faults geometry life mesh operation options record systems units",
     "production": "dataset dynamics errors execution faults life options plan record sensing systems units version",
     "record": "dataset driveline errors faults geometry life operation options sensing systems units version",
-    "report": "dataset errors signals text validation",
+    "report": "dataset errors signals text",
     "sensing": "dynamics errors faults geometry options signals text units",
     "signals": "errors text",
     "systems": "dynamics errors faults geometry life material mesh operation options sensing units",
@@ -80,8 +80,6 @@ GENSIG = {
     "text": "errors",
     "twin": "dynamics errors options plan record sensing signals systems text units",
     "units": "errors",
-    "validation": "driveline dynamics errors faults geometry life material mesh operation "
-    "options sensing signals systems units",
 }
 DIAGNOSE = {
     "baselines": "data networks scoring",

@@ -18,6 +18,7 @@ from gensig.report.examples import Choice, choose, envelope_band, example, usabl
 from gensig.report.levels import VELOCITY, level_table, loudness, velocity_rms
 from gensig.report.measured_ranges import at_measured_rate, beside_measurements
 from gensig.report.packing import pack_floats
+from gensig.report.realism import Comparison
 from gensig.report.rotation_frequencies import Rotation, read_rotation
 from gensig.report.values import (
     ALONG,
@@ -33,7 +34,6 @@ from gensig.report.values import (
     value_table,
 )
 from gensig.text.page import Charts, Section, Select, Switch, interactive_page
-from gensig.validation.realism import Comparison
 
 SCRIPT = "dataset_report.js"
 REPORT = "report.html"

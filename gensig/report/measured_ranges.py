@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dataset.reader import Dataset
+from gensig.report.realism import Comparison, Place, compare, read_ranges
 from gensig.report.values import Measured
 from gensig.signals.indicators import kurtosis, rms
 from gensig.signals.resampling import rate_change
-from gensig.validation.realism import Comparison, Place, compare, read_ranges
 
 FloatArray = NDArray[np.floating]
 

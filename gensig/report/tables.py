@@ -23,8 +23,8 @@ from gensig.dataset.folder.layout import CONFIG, CONFIG_BYTES_LIMIT, OVERRIDES
 from gensig.dataset.reader import Dataset
 from gensig.dataset.splitting.protocols import PROTOCOLS
 from gensig.dataset.storage.atomic import read_text
+from gensig.report.realism import Comparison, shown_range
 from gensig.text.page import Section, Table
-from gensig.validation.realism import Comparison, shown_range
 
 MANY_SHARDS = 200
 IN_WORDS = {

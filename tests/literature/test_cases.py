@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from validation.case import read_case, with_fault, with_words
 
 from gensig.errors import ConfigError
 from gensig.options.compose import compose
 from gensig.systems.registry import read_system
-from gensig.validation.case import read_case, with_fault, with_words
 
 
 @pytest.mark.parametrize(

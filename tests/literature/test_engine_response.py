@@ -12,8 +12,7 @@ from engine_cases import (
     with_throws,
 )
 from numpy.testing import assert_allclose
-
-from gensig.validation.checks.engine_response_checks import read_forced_case
+from validation.checks.engine_response_checks import read_forced_case
 
 FLYWHEEL, CRANK_GEAR, PUMP_GEAR, FAR_END = 13, 2, 44, 64
 BASE_RADIUS = 0.081 * np.cos(

@@ -4,9 +4,7 @@ import re
 from dataclasses import replace
 
 import pytest
-
-from gensig.errors import ConfigError
-from gensig.validation.rows import (
+from validation.rows import (
     DIFFERS,
     FAILS,
     HOLDS,
@@ -18,7 +16,9 @@ from gensig.validation.rows import (
     printed_value,
     read_rows,
 )
-from gensig.validation.verdicts import KINDS, evaluate, run_validation
+from validation.verdicts import KINDS, evaluate, run_validation
+
+from gensig.errors import ConfigError
 
 ROWS = [row for source in SOURCES for row in read_rows(source)]
 

@@ -5,10 +5,9 @@ import re
 from pathlib import Path
 
 import pytest
-
-from gensig.validation.markdown import markdown, shortfalls
-from gensig.validation.rows import SOURCES, VERDICTS
-from gensig.validation.verdicts import evaluate, run_validation
+from validation.markdown import markdown, shortfalls
+from validation.rows import SOURCES, VERDICTS
+from validation.verdicts import evaluate, run_validation
 
 PAGE = Path(__file__).parents[2] / "docs" / "validation.md"
 NUMBER = re.compile(r"(~)?[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?( %)?")

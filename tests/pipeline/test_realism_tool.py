@@ -13,7 +13,7 @@ from benchmarks import realism
 from gensig.errors import ConfigError, DatasetError
 from gensig.plan.make import read_counts
 from gensig.plan.request import read_request
-from gensig.validation.realism import read_ranges
+from gensig.report.realism import read_ranges
 
 BASE = ["experiment=quickstart", "executor.n_workers=1"]
 TINY = sets.Size(

@@ -8,8 +8,8 @@ from gensig.faults.base import faulty_teeth
 from gensig.mesh.load_distribution import StaticMesh, pair_states, static_mesh
 from gensig.mesh.local_contact import contact_law
 from gensig.mesh.pair_table import pair_compliance
-from gensig.validation.case import Array, Case, with_words
-from gensig.validation.checks.geometry_checks import Check
+from validation.case import Array, Case, with_words
+from validation.checks.geometry_checks import Check
 
 N_MEAN = 4000  # points of a mean over a zone
 

@@ -22,7 +22,7 @@ from gensig.systems.hot_pair import (
     sweep,
 )
 from gensig.systems.registry import read_duty
-from gensig.validation.rows import printed_value
+from validation.rows import printed_value
 
 HotCheck = Callable[["HotCase", str], float]
 

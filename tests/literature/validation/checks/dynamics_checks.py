@@ -17,7 +17,7 @@ from gensig.dynamics.system import LumpedSystem
 from gensig.signals.averaging import remove_orders
 from gensig.signals.indicators import kurtosis, rms
 from gensig.signals.spectrum import amplitude_spectrum
-from gensig.validation.case import (
+from validation.case import (
     RECORD_TURNS,
     Array,
     Case,
@@ -26,7 +26,7 @@ from gensig.validation.case import (
     with_fault,
     with_words,
 )
-from gensig.validation.checks.geometry_checks import Check
+from validation.checks.geometry_checks import Check
 
 SAMPLES_PER_TOOTH = 512
 N_SIDEBANDS = 6

@@ -6,8 +6,8 @@ import math
 import pytest
 
 from gensig.errors import ConfigError
-from gensig.validation import realism
-from gensig.validation.realism import (
+from gensig.report import realism
+from gensig.report.realism import (
     Comparison,
     Range,
     compare,

@@ -7,9 +7,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from gensig.mesh import iso6336
-from gensig.validation.case import Case
-from gensig.validation.checks.geometry_checks import Check
-from gensig.validation.checks.mesh_checks import (
+from validation.case import Case
+from validation.checks.geometry_checks import Check
+from validation.checks.mesh_checks import (
     largest_pair_stiffness,
     mean_mesh_stiffness,
 )

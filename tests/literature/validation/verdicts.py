@@ -6,23 +6,23 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from gensig.errors import ConfigError
-from gensig.validation.case import read_case
-from gensig.validation.checks.body_checks import BODY
-from gensig.validation.checks.dynamics_checks import DYNAMICS
-from gensig.validation.checks.engine_damper_checks import DAMPERS, read_damper_case
-from gensig.validation.checks.engine_response_checks import FORCED, read_forced_case
-from gensig.validation.checks.engine_time_checks import TIMES, read_time_case
-from gensig.validation.checks.fault_checks import FAULT
-from gensig.validation.checks.geometry_checks import GEOMETRY
-from gensig.validation.checks.heat_checks import HOT, read_hot_case
-from gensig.validation.checks.helical_checks import SLICED, read_sliced_case
-from gensig.validation.checks.line_checks import LINES, read_line_case
-from gensig.validation.checks.mesh_checks import MESH
-from gensig.validation.checks.run_up_checks import RUN_UP, read_run_up_case
-from gensig.validation.checks.standard_checks import STANDARD
-from gensig.validation.checks.strength_checks import STRENGTH, read_strength_case
-from gensig.validation.checks.wear_checks import WEAR, read_wear_point
-from gensig.validation.rows import SOURCES, Result, Row, judge, read_rows
+from validation.case import read_case
+from validation.checks.body_checks import BODY
+from validation.checks.dynamics_checks import DYNAMICS
+from validation.checks.engine_damper_checks import DAMPERS, read_damper_case
+from validation.checks.engine_response_checks import FORCED, read_forced_case
+from validation.checks.engine_time_checks import TIMES, read_time_case
+from validation.checks.fault_checks import FAULT
+from validation.checks.geometry_checks import GEOMETRY
+from validation.checks.heat_checks import HOT, read_hot_case
+from validation.checks.helical_checks import SLICED, read_sliced_case
+from validation.checks.line_checks import LINES, read_line_case
+from validation.checks.mesh_checks import MESH
+from validation.checks.run_up_checks import RUN_UP, read_run_up_case
+from validation.checks.standard_checks import STANDARD
+from validation.checks.strength_checks import STRENGTH, read_strength_case
+from validation.checks.wear_checks import WEAR, read_wear_point
+from validation.rows import SOURCES, Result, Row, judge, read_rows
 
 # quantities by the kind of case that they are of, and what reads it
 KINDS: tuple[tuple[dict[str, Any], Callable[[tuple[str, ...]], Any]], ...] = (
@@ -50,7 +50,7 @@ def evaluate(row: Row) -> Result:
         if row.quantity in quantities:
             return judge(row, quantities[row.quantity](read(row.overrides), row.at))
     raise ConfigError(
-        f"{row.origin}.csv, {row.id}: no quantity '{row.quantity}'; see gensig.validation.verdicts"
+        f"{row.origin}.csv, {row.id}: no quantity '{row.quantity}'; see validation.verdicts"
     )
 
 

@@ -1,7 +1,7 @@
 """Printed figures as data: one CSV per source, one row per figure or claim.
 
 The columns: ``id``; ``quantity`` and ``at``, what is computed and where
-(``gensig.validation.verdicts.KINDS``); ``overrides``, the configuration it belongs to;
+(``validation.verdicts.KINDS``); ``overrides``, the configuration it belongs to;
 ``printed``, ``unit`` and ``tolerance``; ``kind``; ``expected``, a verdict other than the good one
 that is known and explained; ``source`` (section, equation or table); ``reason``.
 
@@ -16,10 +16,11 @@ from __future__ import annotations
 import csv
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib import resources
+from pathlib import Path
 
 from gensig.errors import ConfigError
 
+FOLDER = Path(__file__).resolve().parent
 SOURCES = (
     "spur_reference",
     "spur_paper",
@@ -153,11 +154,7 @@ def read_rows(source: str) -> tuple[Row, ...]:
         raise ConfigError(
             f"no validation source '{source}'; allowed: {', '.join(SOURCES)}"
         )
-    text = (
-        resources.files("gensig.validation")
-        .joinpath(f"{source}.csv")
-        .read_text(encoding="utf-8")
-    )
+    text = (FOLDER / f"{source}.csv").read_text(encoding="utf-8")
     return tuple(_row(source, values) for values in csv.DictReader(text.splitlines()))
 
 

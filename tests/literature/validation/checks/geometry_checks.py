@@ -15,7 +15,7 @@ from gensig.geometry.tooth_profile import (
     root_curve_point,
     tooth_profile,
 )
-from gensig.validation.case import Case, pair_dynamics
+from validation.case import Case, pair_dynamics
 
 Check = Callable[[Case, str], float]
 

@@ -18,16 +18,16 @@ from gensig.mesh.fillet_foundation import (
     fillet_foundation_compliance,
 )
 from gensig.mesh.pair_table import structural_terms
-from gensig.validation.case import Array, Case
-from gensig.validation.checks.geometry_checks import Check
-from gensig.validation.checks.mesh_checks import (
+from validation.case import Array, Case
+from validation.checks.geometry_checks import Check
+from validation.checks.mesh_checks import (
     N_MEAN,
     contact_compliance,
     mean_mesh_stiffness,
     single_pair_stiffness,
 )
-from gensig.validation.root_variants import other_root_angle, straight_root_tooth
-from gensig.validation.rows import printed_value
+from validation.root_variants import other_root_angle, straight_root_tooth
+from validation.rows import printed_value
 
 SIDES = ("pinion", "wheel")
 

@@ -9,10 +9,10 @@ from gensig.faults.flank_loss import pitch_abscissa, root_chord_abscissa
 from gensig.faults.pitting import Pitting
 from gensig.geometry.tooth import Tooth
 from gensig.mesh.pair_table import pair_compliance, structural_compliance
-from gensig.validation.case import Case, read_case, with_fault, with_words
-from gensig.validation.checks.body_checks import structure
-from gensig.validation.checks.geometry_checks import Check
-from gensig.validation.checks.mesh_checks import mesh_stiffness, single_pair_stiffness
+from validation.case import Case, read_case, with_fault, with_words
+from validation.checks.body_checks import structure
+from validation.checks.geometry_checks import Check
+from validation.checks.mesh_checks import mesh_stiffness, single_pair_stiffness
 
 
 def _faulty_tooth(case: Case) -> Tooth:
