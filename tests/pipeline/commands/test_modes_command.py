@@ -134,7 +134,7 @@ def test_the_page_on_your_own_line_runs_as_it_stands(tmp_path, capsys, monkeypat
     command, *_ = blocks(
         page, "sh"
     )  # the others make records: tests/pipeline/records/test_motor_records.py
-    assert main(command.split()[1:]) == 0
+    assert main(command.replace("\\\n", " ").split()[1:]) == 0
     assert (
         len(json.loads((tmp_path / "modes.json").read_text())["natural_frequencies_hz"])
         == 4
