@@ -11,7 +11,7 @@ import pytest
 from docs_pages import NAMES, PAGES, ROOT, Block, blocks
 from small_sets import make
 
-FOLDERS = ("runs/quick", "runs/first", "runs/told", "runs/measured", "DIR")
+FOLDERS = ("runs/quick", "runs/first", "runs/traced", "runs/measured", "DIR")
 SMALL = (
     "plan.n_records=20",
     "plan.n_units=10",

@@ -92,7 +92,7 @@ def test_the_switch_is_true_or_false(value, tmp_path, capsys):
 @pytest.mark.parametrize("block", BLOCKS, ids=range(len(BLOCKS)))
 def test_commands_of_the_howto(block, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for line in block.strip().splitlines():
+    for line in block.strip().replace("\\\n", " ").splitlines():
         if line.startswith("gensig "):
             words = [SMALLER.get(word, word) for word in shlex.split(line)[1:]]
             assert (

@@ -94,7 +94,7 @@ def test_the_two_commands_are_those_of_the_makefile() -> None:
 
 @pytest.mark.parametrize(
     "page",
-    ["README.md", "docs/what_is_inside.md", "docs/alternatives.md", "docs/tour.ipynb"],
+    ["README.md", "docs/index.md", "docs/alternatives.md", "docs/tour.ipynb"],
 )
 def test_links_lead_somewhere(page: str) -> None:
     text = (ROOT / page).read_text(encoding="utf-8")

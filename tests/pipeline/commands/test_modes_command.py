@@ -127,28 +127,20 @@ def test_your_own_tables_are_read_by_their_path(tmp_path):
 def test_the_page_on_your_own_line_runs_as_it_stands(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     page = HOWTO.read_text(encoding="utf-8")
-    for name, table in zip(
-        ("line.csv", "gears.csv"), blocks(page, "csv")[:2], strict=True
-    ):
-        (tmp_path / name).write_text(table, encoding="utf-8")
-    command, *_ = blocks(
-        page, "sh"
-    )  # the others make records: tests/pipeline/records/test_motor_records.py
-    assert main(command.split()[1:]) == 0
-    assert (
-        len(json.loads((tmp_path / "modes.json").read_text())["natural_frequencies_hz"])
-        == 4
-    )
-    assert (tmp_path / "modes.png").stat().st_size > 1000
+    mine = tmp_path / "mine"
+    (mine / "system").mkdir(parents=True)
+    line, gears = blocks(page, "csv")
     option, *_ = blocks(page, "yaml")
-    (tmp_path / "mine" / "system").mkdir(parents=True)
-    (tmp_path / "mine" / "system" / "my_fan.yaml").write_text(
-        option.replace("/data", str(tmp_path)), encoding="utf-8"
-    )
-    assert (
-        modes_of(tmp_path, "system=my_fan", "--config-dir", "mine")["system"]
-        == "my_fan"
-    )
+    (mine / "line.csv").write_text(line, encoding="utf-8")
+    (mine / "gears.csv").write_text(gears, encoding="utf-8")
+    (mine / "system" / "my_gearbox.yaml").write_text(option, encoding="utf-8")
+    command, *_ = blocks(page, "sh")  # the others run in tests/pipeline/records
+    assert main(command.replace("\\\n", " ").split()[1:]) == 0
+    found = json.loads((tmp_path / "modes.json").read_text())
+    assert len(found["natural_frequencies_hz"]) == 6
+    assert (tmp_path / "modes.png").stat().st_size > 1000
+    words = ["system=my_gearbox", "--config-dir", "mine"]
+    assert modes_of(tmp_path, *words)["system"] == "my_gearbox"
     (code,) = blocks(page, "python")
     capsys.readouterr()
     exec(compile(code, "your_drive_line.md", "exec"), {})

@@ -17,9 +17,8 @@ SHORT = (
     "plan.n_repeats=1",
 )
 FOUND = list(blocks((ROOT / "docs" / "howto" / PAGE).read_text(encoding="utf-8")))
-COMMANDS = next(
-    block.code for block in FOUND if "test_own_drive_line" in block.mark
-).splitlines()
+CODE = next(block.code for block in FOUND if "test_own_drive_line" in block.mark)
+COMMANDS = CODE.replace("\\\n", " ").splitlines()
 
 
 @pytest.fixture(scope="module")
