@@ -326,4 +326,4 @@ def test_document_shows_the_stored_values(stored):
             expected = known[pair, cells[0], cells[1]] * scales[cells[2]]
             assert_allclose(float(cells[3]), expected, rtol=6e-5, atol=0, err_msg=line)
             n_lines += 1
-    assert n_lines > 40
+    assert n_lines >= 20
