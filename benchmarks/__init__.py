@@ -1,1 +1,4 @@
-"""Comparisons with peers and long campaigns, each one command; nothing here is part of the installed package."""
+"""Comparisons with peers and long campaigns, each one command.
+
+Nothing here is part of the installed package.
+"""

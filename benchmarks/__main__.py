@@ -1,8 +1,8 @@
 """How fast records are made on this machine: ``python -m benchmarks``.
 
-Rates count CPU seconds of one core, the least of several runs; only the lines that say so count wall time. Ratios are
-what compares between machines, and only those of one run. ``--json FILE`` writes all figures with the machine.
-What the lines mean: ``docs/howto/speed.md``.
+Rates count CPU seconds of one core, the least of several runs; only the lines that say so count
+wall time. Ratios are what compares between machines, and only those of one run. ``--json FILE``
+writes all figures with the machine. What the lines mean: ``docs/howto/speed.md``.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def kernels(runs: int) -> dict[str, float]:
 
 
 def same_law() -> dict[str, float]:
-    """Relative differences of the accelerations of scalar code and compiled core, 20 Hz to 20 kHz."""
+    """Relative differences of the accelerations of scalar and compiled code, 20 Hz to 20 kHz."""
     eight = _rates.machines(n=LANES)
     return {
         f"x{_rates.SAME_OVERSAMPLING}, required below {_rates.SAME:g}": _rates.check_same_law(

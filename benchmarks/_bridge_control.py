@@ -1,8 +1,10 @@
-"""The negative control: two states of a measured gearbox that differ in how its sensors are mounted, not in the gear.
+"""The negative control: two states of a measured gearbox that differ in how its sensors are
+mounted, not in the gear.
 
-The recordings are looked for in the folder ``$GENSIG_MEASURED`` and nowhere else. Networks are trained on one channel
-of simulated gears of its teeth and speed. They are adapted by one half of the healthy recordings and judge the
-other half of both states; then the halves change places. Every window is judged once, by networks that did not see it.
+The recordings are looked for in the folder ``$GENSIG_MEASURED`` and nowhere else. Networks are
+trained on one channel of simulated gears of its teeth and speed. They are adapted by one half
+of the healthy recordings and judge the other half of both states; then the halves change
+places. Every window is judged once, by networks that did not see it.
 """
 
 from __future__ import annotations
@@ -48,7 +50,8 @@ STATES = ("healthy", "broken_tooth")
 LOADS = (0, 50, 90)  # %
 SCORED = 3  # the channel in which both states have the same path; the others are only reported
 TWIN_OF = "healthy__load50"
-# Windows of 0.125 s as the default's at 51.2 kHz; the default network stays at chance on so little of one channel.
+# Windows of 0.125 s as the default's at 51.2 kHz; the default network stays at chance on so
+# little of one channel.
 TRAINING = (
     "window_samples=1600",
     "stride_samples=1600",
@@ -70,9 +73,11 @@ def find_control() -> Path | None:
 
 
 def training_sets(file: Path, twin: Path) -> dict[str, tuple[list[str], Path | None]]:
-    """Name of each set that networks are trained on: its overrides, and the folder of options that they need.
+    """Name of each set that networks are trained on: its overrides, and the folder of options that
+    they need.
 
-    ``housings`` are gears of those teeth in housings drawn at random, nothing of them fitted; ``twin`` is the twin.
+    ``housings`` are gears of those teeth in housings drawn at random, nothing of them fitted;
+    ``twin`` is the twin.
 
     Parameters
     ----------
@@ -103,7 +108,10 @@ def training_sets(file: Path, twin: Path) -> dict[str, tuple[list[str], Path | N
         )
         if status != 0:
             raise ConfigError(f"gensig twin ended with status {status}")
-    torque = f"operating.torque_nm: {{distribution: uniform, low: {TORQUES[0]}, high: {TORQUES[1]}}}"
+    torque = (
+        "operating.torque_nm: "
+        f"{{distribution: uniform, low: {TORQUES[0]}, high: {TORQUES[1]}}}"
+    )
     common = [
         f"plan.classes=[{','.join(CLASSES)}]",
         "plan.n_records=320",
@@ -134,7 +142,10 @@ def training_sets(file: Path, twin: Path) -> dict[str, tuple[list[str], Path | N
 
 
 def judge_control(file: Path, models: Sequence[Path]) -> list[dict[str, Any]]:
-    """One row for each channel, load and variant: how much more of a fault the broken state is said to have."""
+    """One row for each channel, load and variant.
+
+    How much more of a fault the broken state is said to have.
+    """
     with np.load(file, allow_pickle=False) as held:
         recorded = {
             (state, load): held[f"{state}__load{load}"]
@@ -180,7 +191,9 @@ def _judge(
     domain: Any,
     folder: Path,
 ) -> dict[tuple[str, int], tuple[FloatArray, FloatArray]]:
-    """(state, load) -> probability of a fault and whether unlike the training, (window,) each, in the order of time."""
+    """(state, load) -> probability of a fault and whether unlike the training, (window,) each, in
+    the order of time.
+    """
     statistics = load_statistics(folder)
     assert statistics is not None
     healthy = description.class_names.index(HEALTHY)
@@ -245,7 +258,9 @@ def _row(
     beyond: dict[str, FloatArray],
     rng: np.random.Generator,
 ) -> dict[str, Any]:
-    """Difference of the mean probabilities with a 95 % interval by bootstrap over blocks of each recording."""
+    """Difference of the mean probabilities with a 95 % interval by bootstrap over blocks of each
+    recording.
+    """
     drawn = {state: _block_means(values, rng) for state, values in fault.items()}
     sound, broken = (fault[state] for state in STATES)
     low, high = np.quantile(drawn[STATES[1]] - drawn[STATES[0]], [0.025, 0.975])

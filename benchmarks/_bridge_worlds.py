@@ -1,4 +1,7 @@
-"""Simulated other worlds: networks trained in one, adapted to another by its healthy records, judged on its units."""
+"""Simulated other worlds.
+
+Networks trained in one, adapted to another by its healthy records, judged on its units.
+"""
 
 from __future__ import annotations
 
@@ -83,7 +86,9 @@ class Judged:
 
 
 def judge_world(source: Dataset, world: Dataset, models: Sequence[Path]) -> Judged:
-    """Adapt each network by the world's healthy training records, judge it on its validation and test records."""
+    """Adapt each network by the world's healthy training records, judge it on its validation and
+    test records.
+    """
     seeds: list[dict[str, FloatArray]] = []
     for folder in models:
         model, description = load_model(folder)
@@ -148,7 +153,9 @@ def _adapted(
     judged: WindowSet,
     group: NDArray[Any],
 ) -> FloatArray:
-    """(window, class) log-probabilities, each group of records by the network adapted to its healthy ones."""
+    """(window, class) log-probabilities, each group of records by the network adapted to its
+    healthy ones.
+    """
     found = np.empty((len(judged), 0))
     for name in np.unique(group[judged.record]):
         mine, theirs = (
@@ -163,9 +170,11 @@ def _adapted(
 
 
 def scores(judged: Judged, class_names: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Of each variant: scores with 95 % intervals over units and seeds, and differences to the network as trained.
+    """Of each variant: scores with 95 % intervals over units and seeds, and differences to the
+    network as trained.
 
-    Intervals of differences draw the same units and seeds for both. ``auroc`` is that of healthy against the rest.
+    Intervals of differences draw the same units and seeds for both. ``auroc`` is that of
+    healthy against the rest.
     """
     n_classes, n_units = len(class_names), np.unique(judged.unit).size
     rng = np.random.default_rng(20240607)

@@ -1,8 +1,10 @@
-"""A reference integrator of the spur pair whose contact compliance follows each pair's own present load.
+"""A reference integrator of the spur pair whose contact compliance follows each pair's own present
+load.
 
-The equations and the names are those of ``gensig.dynamics``; only the mesh law differs. It is told the compliance of
-a pair at several loads and takes it linear in ln(load) between and beyond them, which is exact for a sound flank.
-Given the same compliance at every load it is gensig's own law.
+The equations and the names are those of ``gensig.dynamics``; only the mesh law differs. It is
+told the compliance of a pair at several loads and takes it linear in ln(load) between and
+beyond them, which is exact for a sound flank. Given the same compliance at every load it is
+gensig's own law.
 """
 
 from __future__ import annotations
@@ -30,8 +32,10 @@ _compiled: Any = functools.partial(njit, cache=True, error_model="numpy")()
 class Mesh(NamedTuple):
     """What a pair of a pinion tooth and a sound wheel tooth does, by the kind of the pinion tooth.
 
-    ``compliance`` and ``slope``, its change over position, are (kind, load, node), without the part that all pairs
-    share; ``gap`` and ``gap_slope`` are (kind, 1, node); ``kind`` (tooth,) is -1 for a missing tooth. The loads lie
+    ``compliance`` and ``slope``, its change over position, are (kind, load, node), without the
+    part that all pairs
+    share; ``gap`` and ``gap_slope`` are (kind, 1, node); ``kind`` (tooth,) is -1 for a missing
+    tooth. The loads lie
     evenly in their logarithm, ``per_log`` of them to one.
     """
 
@@ -72,7 +76,10 @@ def _between(table, kind, j, x):
 
 @_compiled
 def _bent(table, slope, kind, j, x, per_meter):
-    """A value between the nodes of one row: slopes go straight there, values follow their integral."""
+    """A value between the nodes of one row.
+
+    Slopes go straight there, values follow their integral.
+    """
     cell = min(max(int(x), 0), table.shape[2] - 2)
     part = x - cell
     bend = (
@@ -130,9 +137,11 @@ def _pair_load(mesh, kind, x, bite, guess, per_meter):
 
 @_compiled
 def share_load(mesh, m, roll, approach, work):
-    """Loads of all pairs at an approach: gap + own deflection + what the bodies share = approach, load >= 0.
+    """Loads of all pairs at an approach: gap + own deflection + what the bodies share = approach,
+    load >= 0.
 
-    Fills ``work`` (5, pair), begins with the loads that it finds there, and returns the total load and the tangent
+    Fills ``work`` (5, pair), begins with the loads that it finds there, and returns the total
+    load and the tangent
     stiffness d(load)/d(approach).
     """
     newest = int(np.floor(roll / m.pitch)) + 1
@@ -169,7 +178,9 @@ def share_load(mesh, m, roll, approach, work):
 
 @_compiled
 def static_approach(mesh, m, roll, force, highest, approach, stiffness):
-    """Approach and tangent stiffness, (phase,) m and N/m, under a static force at each roll, from above."""
+    """Approach and tangent stiffness, (phase,) m and N/m, under a static force at each roll, from
+    above.
+    """
     work = np.zeros((5, N_PAIRS))
     for i in range(len(roll)):
         approach[i] = highest
@@ -199,7 +210,8 @@ def _rates(mesh, m, direction, mass, spring, damper, force, time, state, work):
             continue
         x = (position - FIRST_PITCH * m.pitch) * m.nodes_per_meter
         gap_slope = _between(mesh.gap_slope, kind, 0, x)
-        # the slope of the energy, the integral of compliance(load) load over load, is what work balance asks for
+        # the slope of the energy, the integral of compliance(load) load over load, is what work
+        # balance asks for
         slope, growth = _slope(mesh, kind, x, elastic)
         load = max(
             0.0, elastic * (1.0 + m.damping * (approach_rate - gap_slope * roll_rate))
@@ -231,7 +243,7 @@ def _rates(mesh, m, direction, mass, spring, damper, force, time, state, work):
 def _integrate(
     mesh, m, direction, mass, spring, damper, force, state, step, first_step, velocity
 ):
-    """Classical RK4; a step in which a pair takes up or lets go of its load is taken again in parts.
+    """Classical RK4; a step in which a tooth pair gains or loses contact is repeated in parts.
 
     Fills ``velocity`` and returns the lowest approach.
     """
@@ -289,7 +301,8 @@ def motion(
 
     Begins with the deflections ``start``, (dof,), at rest against the nominal rotation.
 
-    ``direction`` (dof,) is the gradient of the approach. Raises where a back flank would be reached, which has no law
+    ``direction`` (dof,) is the gradient of the approach. Raises where a back flank would be
+    reached, which has no law
     here.
     """
     velocity = np.empty(n_steps + 1)

@@ -1,4 +1,7 @@
-"""Data sets as ``gensig generate`` makes them, timed: CPU time of one process by stage, wall time of several."""
+"""Data sets as ``gensig generate`` makes them, timed.
+
+CPU time of one process by stage, wall time of several.
+"""
 
 from __future__ import annotations
 
@@ -26,13 +29,17 @@ from gensig.production.folder import begin_folder, run_folder
 from gensig.record import simulate as records
 from gensig.systems import spur_pair
 
-RECORDING_SHARE = "share of the records' own integration"  # of the kernel's rate, where that would be the same
+# of the kernel's rate, where that would be the same
+RECORDING_SHARE = "share of the records' own integration"
 SHARD = 24  # records, as in the experiment
 N_SHARDS, SHARDS_A_WORKER = 2, 3
 
 
 def data_set(precision: str, n_shards: int) -> dict[str, Any]:
-    """Configuration of a quickstart data set: 1 s, four channels, a fault, speed, load and noise of its own each."""
+    """Configuration of a quickstart data set.
+
+    1 s, four channels, a fault, speed, load and noise of its own each.
+    """
     config, _ = quickstart(
         n_shards * SHARD,
         f"solver.precision={precision}",
@@ -42,7 +49,10 @@ def data_set(precision: str, n_shards: int) -> dict[str, Any]:
 
 
 def by_stage(precision: str, runs: int) -> dict[str, float]:
-    """CPU milliseconds of a record by stage and in all, and rates of one process; the best of several runs."""
+    """CPU milliseconds of a record by stage and in all, and rates of one process.
+
+    The best of several runs.
+    """
     config = data_set(precision, N_SHARDS)
     n_records = N_SHARDS * SHARD
     n_samples = round(
@@ -95,7 +105,10 @@ def wall_name(workers: int) -> str:
 
 
 def wall_rates(precision: str, workers: int, runs: int) -> dict[str, float]:
-    """Records a second of wall time: once every worker has finished its first shard, and of the whole data set."""
+    """Records a second of wall time.
+
+    Once every worker has finished its first shard, and of the whole data set.
+    """
     n_shards = SHARDS_A_WORKER * workers
     config, whole, running = data_set(precision, n_shards), [], []
     for _ in range(runs):

@@ -1,7 +1,8 @@
-"""The engine of the timing-gear paper as plain arrays, its meshes non-linear: the shaft-line integrator is timed on it.
+"""The engine of the timing-gear paper as plain arrays, its meshes non-linear: the shaft-line
+integrator is timed on it.
 
-Table A1 of Sun et al., J. Vib. Eng. 37 (2024) 1969, as printed, with true speed ratios. Assumed: supports, backlash,
-damping, the ripple of mesh stiffness, torques.
+Table A1 of Sun et al., J. Vib. Eng. 37 (2024) 1969, as printed, with true speed ratios.
+Assumed: supports, backlash, damping, the ripple of mesh stiffness, torques.
 """
 
 from __future__ import annotations
@@ -19,23 +20,78 @@ Array = NDArray[np.float64]
 
 CAMS = [0.005, *[0.0021] * 9]
 INERTIA = [
-    1.042, 0.492, 0.181, 1.706, 1.507, 0.927, 1.507, 1.507, 1.507, 1.507, 0.927, 1.507, 1.706, 11.94, 8.622, 17.1, 75.0,
-    0.01914, 0.00483, 0.03876, 0.01544, *CAMS, 0.02945, *CAMS, 0.0065, 0.00648, 0.01138, *[0.0002] * 7, 0.00037,
-    0.00037, *[0.0002] * 10, 0.00034, 0.04523, 0.00483,
-]  # kg m2, nodes 1 to 67  # fmt: skip
+    1.042,
+    0.492,
+    0.181,
+    1.706,
+    1.507,
+    0.927,
+    1.507,
+    1.507,
+    1.507,
+    1.507,
+    0.927,
+    1.507,
+    1.706,
+    11.94,
+    8.622,
+    17.1,
+    75.0,
+    0.01914,
+    0.00483,
+    0.03876,
+    0.01544,
+    *CAMS,
+    0.02945,
+    *CAMS,
+    0.0065,
+    0.00648,
+    0.01138,
+    *[0.0002] * 7,
+    0.00037,
+    0.00037,
+    *[0.0002] * 10,
+    0.00034,
+    0.04523,
+    0.00483,
+]  # kg m2, nodes 1 to 67
 SHAFTS = [
-    *zip(range(1, 17), [100, 100, 10.42, *[8.35] * 9, 12.66, 25, 0.96, 25], strict=True),
-    (21, 0.18), *[(i, 0.2) for i in range(22, 31)], (32, 0.18), *[(i, 0.2) for i in range(33, 42)],
-    (45, 0.29), *[(i, 1.1) for i in range(46, 53)], (53, 0.15), *[(i, 1.1) for i in range(54, 65)],
-]  # MN m/rad, from a node to the next  # fmt: skip
+    *zip(
+        range(1, 17), [100, 100, 10.42, *[8.35] * 9, 12.66, 25, 0.96, 25], strict=True
+    ),
+    (21, 0.18),
+    *[(i, 0.2) for i in range(22, 31)],
+    (32, 0.18),
+    *[(i, 0.2) for i in range(33, 42)],
+    (45, 0.29),
+    *[(i, 1.1) for i in range(46, 53)],
+    (53, 0.15),
+    *[(i, 1.1) for i in range(54, 65)],
+]  # MN m/rad, from a node to the next
 RIGID = ((18, 19), (20, 21))
 MESHES = (
-    (3, 18, 59, 59, 18.0, 3.31), (19, 20, 33, 66, 18.0, 2.18), (19, 32, 33, 66, 18.0, 3.23),
-    (20, 43, 66, 41, 18.0, 2.64), (32, 44, 66, 41, 18.0, 2.4), (21, 45, 54, 54, 0.0, 1.74),
-    (3, 66, 59, 68, 18.0, 3.6), (66, 67, 68, 40, 18.0, 2.6),
-)  # driver, driven, teeth, helix angle in degrees, MN m/rad  # fmt: skip
-MASS = {3: 4.2608, 66: 6.851, 67: 2.0185, 18: 3.3467, 19: 2.5686, 45: 2.7469, 20: 6.0784, 21: 3.8131, 43: 2.4102,
-        32: 4.5783, 44: 2.4033}  # kg  # fmt: skip
+    (3, 18, 59, 59, 18.0, 3.31),
+    (19, 20, 33, 66, 18.0, 2.18),
+    (19, 32, 33, 66, 18.0, 3.23),
+    (20, 43, 66, 41, 18.0, 2.64),
+    (32, 44, 66, 41, 18.0, 2.4),
+    (21, 45, 54, 54, 0.0, 1.74),
+    (3, 66, 59, 68, 18.0, 3.6),
+    (66, 67, 68, 40, 18.0, 2.6),
+)  # driver, driven, teeth, helix angle in degrees, MN m/rad
+MASS = {
+    3: 4.2608,
+    66: 6.851,
+    67: 2.0185,
+    18: 3.3467,
+    19: 2.5686,
+    45: 2.7469,
+    20: 6.0784,
+    21: 3.8131,
+    43: 2.4102,
+    32: 4.5783,
+    44: 2.4033,
+}  # kg
 MODULE, PRESSURE_ANGLE = 3e-3, math.radians(20.0)
 SUPPORT, SUPPORT_RATIO = 5e8, 0.03  # N/m and damping ratio, assumed
 LOSS_FACTOR, LOSS_AT = (
@@ -59,9 +115,11 @@ def base_radius(n_teeth: int, helix_angle: float) -> float:
 
 
 def engine_line(*, lateral: bool = True, linear: bool = False) -> GearedLine:
-    """The whole line, rigid compounds merged: 65 rotations, and 44 lateral motions of 11 gears on their bearings.
+    """The whole line, rigid compounds merged: 65 rotations, and 44 lateral motions of 11 gears on
+    their bearings.
 
-    ``linear`` meshes have no backlash and do not ripple, so that the natural frequencies are those of the table.
+    ``linear`` meshes have no backlash and do not ripple, so that the natural frequencies are
+    those of the table.
     """
     merged = {second: first for first, second in RIGID}
     nodes = [node for node in range(1, 68) if node not in merged]
@@ -133,7 +191,9 @@ def engine_line(*, lateral: bool = True, linear: bool = False) -> GearedLine:
 
 
 def engine_torques(mean: float = 5e3, pulse: float = 30.0) -> list[ShaftTorque]:
-    """Pulses on ten throws and on pump and valve cams, N m over two turns of the crank, against the dynamometer."""
+    """Pulses on ten throws and on pump and valve cams, N m over two turns of the crank, against
+    the dynamometer.
+    """
     angle = np.linspace(0.0, 4.0 * math.pi, 720, endpoint=False)
     gas = (
         6.0

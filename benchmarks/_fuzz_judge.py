@@ -1,4 +1,7 @@
-"""What becomes of a mutant: everything that reads is tried, in a process whose death, delay and hunger are seen."""
+"""What becomes of a mutant.
+
+Everything that reads is tried, in a process whose death, delay and hunger are seen.
+"""
 
 from __future__ import annotations
 
@@ -124,7 +127,10 @@ def _work(template: Path, scratch: Path, seeds: range, pipe: Connection) -> None
 
 
 def verdicts(template: Path, scratch: Path, seeds: range) -> Iterator[Verdict]:
-    """A verdict a seed; a process that dies or hangs is one too, and another takes over behind it."""
+    """A verdict a seed.
+
+    A process that dies or hangs is one too, and another takes over behind it.
+    """
     context = multiprocessing.get_context(METHOD)
     while len(seeds):
         here, there = context.Pipe(duplex=False)

@@ -1,4 +1,7 @@
-"""gensig's values beside ROSS's: paper's terms, defaults, and the paper's terms with ROSS's choices put in."""
+"""gensig's values beside ROSS's.
+
+Paper's terms, defaults, and the paper's terms with ROSS's choices put in.
+"""
 
 from __future__ import annotations
 
@@ -33,8 +36,14 @@ PAIRS: dict[str, tuple[str, ...]] = {
     "23/84": (),
     "25/50": (
         "gear.normal_module_mm=3",
-        "gear.pinion={n_teeth: 25, face_width_mm: 25, bore_radius_mm: 12, mass_kg: null, inertia_kg_m2: null}",
-        "gear.wheel={n_teeth: 50, face_width_mm: 25, bore_radius_mm: 20, mass_kg: null, inertia_kg_m2: null}",
+        (
+            "gear.pinion={n_teeth: 25, face_width_mm: 25, bore_radius_mm: 12, mass_kg: null, "
+            "inertia_kg_m2: null}"
+        ),
+        (
+            "gear.wheel={n_teeth: 50, face_width_mm: 25, bore_radius_mm: 20, mass_kg: null, "
+            "inertia_kg_m2: null}"
+        ),
     ),
 }
 N_PHASES, N_POSITIONS = 20, 2001
@@ -48,7 +57,10 @@ def machine(pair: str, overrides: Sequence[str] = ()) -> SpurPair:
 
 
 def positions(pair: GearPair) -> dict[str, float]:
-    """Positions from A of the named points, m: A, E ends of the path, B, D of the single zone, C pitch point."""
+    """Positions from A of the named points, m.
+
+    A, E ends of the path, B, D of the single zone, C pitch point.
+    """
     path, pitch = pair.path_of_contact, pair.base_pitch
     a, b, c, d, e = 0.0, path - pitch, pair.pitch_point, pitch, path
     return {
@@ -159,7 +171,9 @@ def gensig_values(system: SpurPair) -> Values:
 
 
 def ross_choices(system: SpurPair) -> Values:
-    """The paper's terms of gensig with nothing but ROSS's choices put in, to show that these explain the difference."""
+    """The paper's terms of gensig with nothing but ROSS's choices put in, to show that these
+    explain the difference.
+    """
     system = replace(system, pair=ross_rounding(system.pair))
     pair, material = system.pair, system.material
     points, position = list(positions(pair)), np.array(list(positions(pair).values()))
@@ -206,7 +220,9 @@ def ross_choices(system: SpurPair) -> Values:
 def foundation(
     gear: Gear, curvature: Array, system: SpurPair, *, half_angle: float, height: Height
 ) -> Array:
-    """gensig's body term of the paper with the two choices that differ between the programs put in, (phase,) m/N."""
+    """gensig's body term of the paper with the two choices that differ between the programs put
+    in, (phase,) m/N.
+    """
     angle = load_angle(gear, curvature)
     reach = (gear.root_radius + height(gear, curvature)) * np.cos(
         angle
@@ -218,7 +234,10 @@ def foundation(
 
 
 def centerline_height(gear: Gear, curvature: Array) -> Array:
-    """u_f from the root circle to where the load crosses the tooth centreline, m: Sainsot's and gensig's."""
+    """u_f from the root circle to where the load crosses the tooth centreline, m.
+
+    Sainsot's and gensig's.
+    """
     return gear.base_radius / np.cos(load_angle(gear, curvature)) - gear.root_radius
 
 
@@ -250,7 +269,8 @@ def ross_rounding(pair: GearPair) -> GearPair:
 def ross_path(pair: GearPair, share: Array) -> tuple[Array, Array]:
     """Curvature radii of pinion and wheel where ROSS puts a share of the path, (phase,) m.
 
-    The pinion's pressure angle runs evenly from its own junction with the root curve to its tip, the wheel's falls
+    The pinion's pressure angle runs evenly from its own junction with the root curve to its
+    tip, the wheel's falls
     from its tip by the gear ratio.
     """
     pinion, wheel = pair.pinion, pair.wheel

@@ -1,4 +1,7 @@
-"""What all benchmarks share: the machine by name, the least of several runs, and where figures go."""
+"""What all benchmarks share.
+
+The machine by name, the least of several runs, and where figures go.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +40,8 @@ def machine() -> dict[str, Any]:
 def print_machine(found: Mapping[str, Any]) -> None:
     """One line of the machine, one of the versions, and a warning where others keep it busy."""
     print(
-        f"{found['cpu_model']} ({found['cpu_target']}), {found['cores']} cores, load {found['load_at_start']} at start"
+        f"{found['cpu_model']} ({found['cpu_target']}), {found['cores']} cores, load "
+        f"{found['load_at_start']} at start"
     )
     print(
         ", ".join(
@@ -72,7 +76,10 @@ def begin(program: str, about: str) -> tuple[argparse.Namespace, dict[str, Any],
 
 
 def in_turn(works: Mapping[str, Callable[[], Any]], runs: int) -> dict[str, float]:
-    """Least CPU time of each work, s; they take turns, so that what disturbs the machine for a while disturbs all."""
+    """Least CPU time of each work, s.
+
+    They take turns, so that what disturbs the machine for a while disturbs all.
+    """
     found = dict.fromkeys(works, math.inf)
     for _ in range(runs):
         for name, work in works.items():

@@ -1,4 +1,6 @@
-"""One machine's gear mesh as plain numbers, for the scalar codes that the compiled core is compared with."""
+"""One machine's gear mesh as plain numbers, for the scalar codes that the compiled core is
+compared with.
+"""
 
 from __future__ import annotations
 

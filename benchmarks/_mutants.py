@@ -1,4 +1,7 @@
-"""Data-set folders as an accident or a stranger could leave them: one change a seed, the same for the same seed."""
+"""Data-set folders as an accident or a stranger could leave them.
+
+One change a seed, the same for the same seed.
+"""
 
 from __future__ import annotations
 
@@ -88,9 +91,14 @@ def forge_checksums(folder: Path) -> None:
 
 def _file(folder: Path, rng: np.random.Generator) -> Path:
     names = [
-        "plan.csv", "index.h5", "config.yaml", "README.md", "croissant.json", "SHA256SUMS",
+        "plan.csv",
+        "index.h5",
+        "config.yaml",
+        "README.md",
+        "croissant.json",
+        "SHA256SUMS",
         *sorted(path.name for path in (folder / "splits").iterdir()),
-    ]  # fmt: skip
+    ]
     name = str(rng.choice(names))
     other = (
         folder / "splits" / name
@@ -107,7 +115,10 @@ def _shard(folder: Path, rng: np.random.Generator) -> Path:
 
 
 def _damage(folder: Path, path: Path, rng: np.random.Generator) -> Mutant:
-    """Flipped, overwritten, lost, doubled or swapped bytes; half of them in the head, where HDF5 keeps its tables."""
+    """Flipped, overwritten, lost, doubled or swapped bytes.
+
+    Half of them in the head, where HDF5 keeps its tables.
+    """
     before = path.read_bytes()
     content = bytearray(before)
     size = len(content)
@@ -216,8 +227,14 @@ def _gzip_bomb(file: h5py.File, name: str) -> None:
 
 def _chunk_bomb(file: h5py.File, name: str) -> None:
     n = file["record_id"].shape[0]
-    data = file.create_dataset(name, (n, 2, 4), "f4", maxshape=(None, None, None), chunks=(1, 2, 4 * 10**8),
-                               compression="gzip")  # fmt: skip
+    data = file.create_dataset(
+        name,
+        (n, 2, 4),
+        "f4",
+        maxshape=(None, None, None),
+        chunks=(1, 2, 4 * 10**8),
+        compression="gzip",
+    )
     assert data.chunks
 
 

@@ -1,4 +1,7 @@
-"""The roof over the compiled core: vector additions and multiplications one core can do, and what a step needs."""
+"""The roof over the compiled core.
+
+Vector additions and multiplications one core can do, and what a step needs.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +15,10 @@ from gensig.dynamics._vector import compiled, get_row, n_lanes, set_row
 ROUNDS = 200_000
 PER_ROUND = 32  # vector operations
 
-# Counted by hand in the code of one step of a sound pair at the usual three followed pairs, a lane: the law of four
-# stages 4 x (3 x 43 + 26), motion and accelerations 4 x 90, the sums of Runge-Kutta 4 x 72, both readings of the tables
-# and the middle between them 3 x (32 + 24), what is set out once 60. Each square root, division or comparison as one.
+# Counted by hand in the code of one step of a sound pair at the usual three followed pairs, a
+# lane: the law of four stages 4 x (3 x 43 + 26), motion and accelerations 4 x 90, the sums of
+# Runge-Kutta 4 x 72, both readings of the tables and the middle between them 3 x (32 + 24),
+# what is set out once 60. Each square root, division or comparison as one.
 OPERATIONS = 4 * (3 * 43 + 26) + 4 * 90 + 4 * 72 + 3 * (32 + 24) + 60
 TABLE_BYTES = 3 * 64  # two rows of four numbers for each pair
 
@@ -38,7 +42,10 @@ def _chains(numbers, rounds):
 
 
 def peak(runs: int, precision: str = "float64") -> float:
-    """Additions and multiplications of one core without memory, 1e9 a CPU second; the most of several runs."""
+    """Additions and multiplications of one core without memory, 1e9 a CPU second.
+
+    The most of several runs.
+    """
     n = n_lanes(precision)
     numbers = np.concatenate([np.full(n, 0.999), np.full(n, 1e-3), np.zeros(n)]).astype(
         precision

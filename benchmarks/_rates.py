@@ -1,4 +1,7 @@
-"""Simulated seconds per second of one core: the compiled core, scalar Numba, and scipy on the same equations."""
+"""Simulated seconds per second of one core.
+
+The compiled core, scalar Numba, and scipy on the same equations.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +47,10 @@ SCIPY_SECONDS, SCIPY_RTOL, SCIPY_ATOL = 0.01, 1e-6, 1e-12
 def quickstart(
     n_records: int, *words: str
 ) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Configuration and first rows of the quickstart experiment: four classes, each record its own fault and load."""
+    """Configuration and first rows of the quickstart experiment.
+
+    Four classes, each record its own fault and load.
+    """
     config = read_request(
         ["experiment=quickstart", f"plan.n_records={n_records}", *words]
     ).config
@@ -68,7 +74,9 @@ def rates(works: dict[str, Work], runs: int) -> dict[str, float]:
 def kernel(
     lanes: list[PairDynamics], oversampling: int, precision: str = "float64"
 ) -> Work:
-    """The product's integrator with the mean accelerations of four channels, tables already packed."""
+    """The product's integrator with the mean accelerations of four channels, tables already
+    packed.
+    """
     step = 1.0 / (SAMPLING_RATE * oversampling)
     group, n_settling = pack(lanes, step, precision), round(SETTLING / step)
     settled = GroupRun(fill_lanes(lanes, precision), CHANNELS, precision)
@@ -86,9 +94,24 @@ def kernel(
         state = run.state.ravel()
         for call in range(n_calls):
             _kernels.integrate(
-                group, state, run.lost, run.fresh, step, n_settling + call * PER_CALL, PER_CALL, CHANNELS, means, 0,
-                nothing, -1, 1, nothing, run.work, run.wide, run.near,
-            )  # fmt: skip
+                group,
+                state,
+                run.lost,
+                run.fresh,
+                step,
+                n_settling + call * PER_CALL,
+                PER_CALL,
+                CHANNELS,
+                means,
+                0,
+                nothing,
+                -1,
+                1,
+                nothing,
+                run.work,
+                run.wide,
+                run.near,
+            )
             run.fresh[:] = 0.0
 
     return work, len(lanes) * n_calls * PER_CALL * step
@@ -97,7 +120,9 @@ def kernel(
 def scalar_run(
     dynamics: PairDynamics, oversampling: int, seconds: float
 ) -> tuple[Array, Array]:
-    """State (2, dof) and mean accelerations (step, channel) of the scalar code, from rest at time 0."""
+    """State (2, dof) and mean accelerations (step, channel) of the scalar code, from rest at time
+    0.
+    """
     step = 1.0 / (SAMPLING_RATE * oversampling)
     state = np.array([dynamics.static_start(0.0), np.zeros(len(dynamics.dofs))])
     means = np.empty((round(seconds / step), len(CHANNELS)))
@@ -105,7 +130,8 @@ def scalar_run(
     lowest = _scalar.integrate(machine, state, step, 0, len(means), CHANNELS, means)
     if lowest < -machine.mesh.backlash:
         raise ValueError(
-            f"the approach fell to {lowest:.3g} m, to the back flanks, which the scalar code has not"
+            f"the approach fell to {lowest:.3g} m, to the back flanks, which the scalar "
+            "code has not"
         )
     return state, means
 
@@ -132,7 +158,9 @@ def scalar(all_of: list[PairDynamics], oversampling: int) -> Work:
 
 
 def difference(all_of: list[PairDynamics], oversampling: int) -> float:
-    """Largest relative difference of both codes' accelerations, 20 Hz to 20 kHz, over 20 ms from the same start."""
+    """Largest relative difference of both codes' accelerations, 20 Hz to 20 kHz, over 20 ms from
+    the same start.
+    """
     step, low_pass = 1.0 / (SAMPLING_RATE * oversampling), decimator(oversampling)
     n_steps = (round(SETTLING * SAMPLING_RATE) + 2 * low_pass.margin) * oversampling + 1
     group, run = pack(all_of, step), GroupRun(all_of, CHANNELS, "float64")
@@ -140,9 +168,24 @@ def difference(all_of: list[PairDynamics], oversampling: int) -> float:
         run.begin(group, lane, dynamics.static_start(0.0))
     ours = np.empty((n_steps, len(CHANNELS), LANES))
     _kernels.integrate(
-        group, run.state.ravel(), run.lost, run.fresh, step, 0, n_steps, CHANNELS, ours.ravel(), 0,
-        np.empty(0), -1, 1, np.empty(0), run.work, run.wide, run.near,
-    )  # fmt: skip
+        group,
+        run.state.ravel(),
+        run.lost,
+        run.fresh,
+        step,
+        0,
+        n_steps,
+        CHANNELS,
+        ours.ravel(),
+        0,
+        np.empty(0),
+        -1,
+        1,
+        np.empty(0),
+        run.work,
+        run.wide,
+        run.near,
+    )
     theirs = np.stack(
         [scalar_run(one, oversampling, n_steps * step)[1] for one in all_of], axis=-1
     )
@@ -164,7 +207,8 @@ def check_same_law(all_of: list[PairDynamics]) -> float:
 def scipy_works(dynamics: PairDynamics) -> dict[str, Work]:
     """``solve_ivp`` at rtol 1e-6 from a settled state on, by method.
 
-    The right-hand side is the scalar code, compiled whole with the machine in it; once more it is NumPy around the
+    The right-hand side is the scalar code, compiled whole with the machine in it; once more it
+    is NumPy around the
     product's own compiled law, as one would write it without.
     """
     settled = scalar_run(dynamics, SAME_OVERSAMPLING, SETTLING)[0].ravel()

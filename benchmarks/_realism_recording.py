@@ -1,7 +1,7 @@
 """One healthy recording on the simulated healthy distribution of its geometry and speed.
 
-The recording is looked for in the folder ``$GENSIG_MEASURED`` and nowhere else; nothing of it is stored but the range
-of each indicator over its channels.
+The recording is looked for in the folder ``$GENSIG_MEASURED`` and nowhere else; nothing of it
+is stored but the range of each indicator over its channels.
 """
 
 from __future__ import annotations
@@ -118,9 +118,11 @@ def indicators(
 def _turns(
     x: FloatArray, sampling_rate: float, n_teeth: int, mesh_frequency: float
 ) -> FloatArray:
-    """Whole turns by the angle under which the mesh stands out most: steady, or by the phase of a mesh harmonic.
+    """Whole turns by the angle under which the mesh stands out most: steady, or by the phase of a
+    mesh harmonic.
 
-    The phase of each harmonic is taken from the channel that holds most of it; where no line stands out it is left out.
+    The phase of each harmonic is taken from the channel that holds most of it; where no line
+    stands out it is left out.
     """
     rotation = mesh_frequency / n_teeth
     per_turn = samples_per_turn_for(sampling_rate, rotation)
@@ -138,7 +140,9 @@ def _turns(
 
 
 def _mesh_power(turns: FloatArray, n_teeth: int) -> float:
-    """Power of the first mesh harmonics in the average turn over that of the turns, mean over the channels."""
+    """Power of the first mesh harmonics in the average turn over that of the turns, mean over the
+    channels.
+    """
     harmonics = mesh_harmonics(turns.mean(axis=-2), n_teeth, 3)
     return float(
         np.mean(
@@ -153,7 +157,9 @@ def _decibel(ratio: FloatArray) -> FloatArray:
 
 
 def simulated_indicators(data: Dataset) -> dict[str, FloatArray]:
-    """(record, channel) indicators of the records of a set, resampled to the rate of the recording."""
+    """(record, channel) indicators of the records of a set, resampled to the rate of the
+    recording.
+    """
     rows = [
         indicators(
             to_rate(data.signals(index), data.sampling_rate, RECORDING_RATE),
@@ -183,7 +189,8 @@ def recording_comparisons(
     simulated: Mapping[str, Mapping[str, FloatArray]],
     recorded: Mapping[str, FloatArray] | None,
 ) -> list[Comparison]:
-    """Rows of the second table: the right simulation beside the recording, its width, and the wrong ones beside it.
+    """Rows of the second table: the right simulation beside the recording, its width, and the
+    wrong ones beside it.
 
     Parameters
     ----------
@@ -236,6 +243,14 @@ def _row(
     median, p5, p95 = simulated[:3]
     count = int(simulated[3]) if n is None else n
     return Comparison(
-        **row, at=at, low=beside[0], high=beside[1], source=source, median=median, p5=p5, p95=p95, n=count,
+        **row,
+        at=at,
+        low=beside[0],
+        high=beside[1],
+        source=source,
+        median=median,
+        p5=p5,
+        p95=p95,
+        n=count,
         verdict=verdict if count else NOTHING,
-    )  # fmt: skip
+    )

@@ -1,4 +1,7 @@
-"""The data sets of ``python -m benchmarks.realism``: overrides on a base experiment, made once and kept."""
+"""The data sets of ``python -m benchmarks.realism``.
+
+Overrides on a base experiment, made once and kept.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +53,8 @@ CONTROLS = ("right", "wrong teeth", "errors / 3", "errors x 3")
 class Size:
     """How much is simulated; speeds and torques as shares of the rated ones.
 
-    The first speed and torque are the slow and light corner: at 1800 r/min and 20 N m rated, 600 r/min and 2 N m.
+    The first speed and torque are the slow and light corner: at 1800 r/min and 20 N m rated,
+    600 r/min and 2 N m.
     """
 
     n_units: int = 40
@@ -65,7 +69,8 @@ class Size:
     def __post_init__(self) -> None:
         if self.n_units < 2 * self.n_gearboxes:
             raise ConfigError(
-                f"{self.n_units} units in {self.n_gearboxes} gearboxes: another specimen needs two in each at least"
+                f"{self.n_units} units in {self.n_gearboxes} gearboxes: another specimen "
+                "needs two in each at least"
             )
 
 
@@ -73,7 +78,10 @@ QUICK = Size(n_units=8, n_gearboxes=2, n_turns=10.5, recording_duration=1.28)
 
 
 def yardstick_words(base: Sequence[str], size: Size) -> list[str]:
-    """Overrides of the grid: every unit runs every speed and torque, healthy and with each fault."""
+    """Overrides of the grid.
+
+    Every unit runs every speed and torque, healthy and with each fault.
+    """
     config = base_config(tuple(base))
     gear = config["gear"]
     speeds = [round(share * gear["rated_speed_rpm"], 6) for share in size.speeds]
@@ -101,7 +109,10 @@ def yardstick_words(base: Sequence[str], size: Size) -> list[str]:
 
 
 def recording_words(base: Sequence[str], size: Size, control: str) -> list[str]:
-    """Overrides of the machine of the recording, healthy: right, or wrong on purpose in one thing."""
+    """Overrides of the machine of the recording, healthy.
+
+    Right, or wrong on purpose in one thing.
+    """
     config = base_config(tuple(base))
     teeth = WRONG_TEETH if control == "wrong teeth" else RECORDING_TEETH
     step = {"errors / 3": -GRADE_STEPS, "errors x 3": GRADE_STEPS}.get(control, 0.0)
@@ -191,7 +202,8 @@ def _drawn(spec: Any) -> dict[str, Any]:
     plain = copy.deepcopy(dict(spec))
     if plain.get("distribution") == "choice":
         raise ConfigError(
-            "a base whose plan.vary has distribution: choice would be crossed; pin that key in --base"
+            "a base whose plan.vary has distribution: choice would be crossed; pin that "
+            "key in --base"
         )
     return {**plain, "levels": None}
 

@@ -1,4 +1,7 @@
-"""From data sets to the numbers of the yardstick: indicators a record and sensor, quantities over pairs of records."""
+"""From data sets to the numbers of the yardstick.
+
+Indicators a record and sensor, quantities over pairs of records.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,10 @@ SLOW, ELSEWHERE, ALL = "slow and light", "elsewhere", "all conditions"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
-    """One row a record: plain columns (record,), and indicators (record, channel) or (record, channel, harmonic)."""
+    """One row a record.
+
+    Plain columns (record,), and indicators (record, channel) or (record, channel, harmonic).
+    """
 
     columns: dict[str, NDArray[Any]]
     indicators: dict[str, FloatArray]
@@ -39,7 +45,7 @@ class Table:
 
 
 def to_rate(signal: ArrayLike, sampling_rate: float, rate: float) -> FloatArray:
-    """A signal less its mean at another rate, by a polyphase filter that keeps what would fold away.
+    """A signal less its mean at another rate, by a polyphase filter against aliasing.
 
     Parameters
     ----------
@@ -100,7 +106,10 @@ def record_values(
 
 
 def read_table(data: Dataset) -> Table:
-    """Indicators of all records that did not fail; the faulted gear is that of the record's fault, else the pinion."""
+    """Indicators of all records that did not fail.
+
+    The faulted gear is that of the record's fault, else the pinion.
+    """
     usable = np.flatnonzero(data.usable)
     names = (
         "label_name",
@@ -218,7 +227,9 @@ def _pairs(
     *,
     another: bool,
 ) -> Iterator[tuple[int, int]]:
-    """Faulty and healthy records of one gearbox at one set-point, of another specimen or of the same."""
+    """Faulty and healthy records of one gearbox at one set-point, of another specimen or of the
+    same.
+    """
     groups: dict[tuple[Any, ...], list[int]] = {}
     keys, specimen = (
         ("gearbox_id", "speed_set_rpm", "torque_nm"),

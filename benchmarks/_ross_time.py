@@ -1,7 +1,8 @@
-"""What ROSS's time response of the 23/84 pair takes, stored so that it can be shown where ROSS is not installed.
+"""What ROSS's time response of the 23/84 pair takes, stored so that it can be shown where ROSS is
+not installed.
 
-Stored with it is the rate of the scalar Numba code in the same run: the quotient of both is what carries over to
-another machine.
+Stored with it is the rate of the scalar Numba code in the same run: the quotient of both is
+what carries over to another machine.
 """
 
 from __future__ import annotations
@@ -97,9 +98,14 @@ def lines() -> list[str]:
         found["scalar_simulated_s_per_core_s"],
     )
     return [
-        f"ROSS {found['ross_version']}, run_time_response with TVMS gears: {found['n_dof']} degrees of freedom, "
+        f"ROSS {found['ross_version']}, run_time_response with TVMS gears: "
+        f"{found['n_dof']} degrees of freedom, "
         f"Newmark's method, one step a sample at 51.2 kHz",
-        f"{found['cpu_s']:.3g} CPU s for {found['simulated_s']:.3g} s: {rate:.3g} simulated s per core-s; scalar Numba "
+        f"{found['cpu_s']:.3g} CPU s for {found['simulated_s']:.3g} s: {rate:.3g} "
+        "simulated s per core-s; scalar Numba "
         f"RK4 x{OVERSAMPLING} in the same run {scalar:.3g}, {scalar / rate:.3g} times as many",
-        f"on {found['cpu_model']} ({found['cpu_target']}), load {found['load_at_start']} after it, {found['created']}",
+        (
+            f"on {found['cpu_model']} ({found['cpu_target']}), load {found['load_at_start']} "
+            f"after it, {found['created']}"
+        ),
     ]

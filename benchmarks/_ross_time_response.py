@@ -1,7 +1,8 @@
 """ROSS's own time for one time response: ``python _ross_time_response.py JOB.json TIME.json``.
 
-Runs in ROSS's environment and knows nothing of gensig. Two shafts of two elements each carry a gear in the middle and
-a bearing at either end; the mesh stiffness is taken anew at every step, which ROSS integrates by Newmark's method.
+Runs in ROSS's environment and knows nothing of gensig. Two shafts of two elements each carry a
+gear in the middle and a bearing at either end; the mesh stiffness is taken anew at every step,
+which ROSS integrates by Newmark's method.
 """
 
 from __future__ import annotations

@@ -1,7 +1,9 @@
-"""ROSS's own values for the pairs of ``benchmarks.ross``: ``python _ross_values.py JOB.json VALUES.csv``.
+"""ROSS's own values for the pairs of ``benchmarks.ross``: ``python _ross_values.py JOB.json
+VALUES.csv``.
 
-Runs in ROSS's environment and knows nothing of gensig. A job holds, in SI units, the gears and the curvature radii of
-the contacts of rigid involutes, so that both programs are asked for the same contact positions.
+Runs in ROSS's environment and knows nothing of gensig. A job holds, in SI units, the gears and
+the curvature radii of the contacts of rigid involutes, so that both programs are asked for the
+same contact positions.
 """
 
 from __future__ import annotations
@@ -102,7 +104,7 @@ def read_gear(values: dict[str, Any], material: Any) -> Any:
 
 
 def body_rows(name: str, gear: Any) -> Iterator[Row]:
-    """Half angles of the root, as the body term and as the root curve have it, and L*, M*, P*, Q*."""
+    """Half angles of the root, of the body term and of the root curve, and L*, M*, P*, Q*."""
     y, x, _, _ = gear._compute_transition_curve(0.5 * math.pi)
     yield (
         f"{name}_root_half_angle",
@@ -118,7 +120,10 @@ def body_rows(name: str, gear: Any) -> Iterator[Row]:
 
 
 def body_coefficients(gear: Any) -> dict[str, float]:
-    """L*, M*, P* and Q*, which ROSS keeps to itself: from its body compliance at four chosen heights and angles."""
+    """L*, M*, P* and Q*, which ROSS keeps to itself.
+
+    From its body compliance at four chosen heights and angles.
+    """
     root = gear.radii_dict["root"]
     chord = 2.0 * root * gear.tooth_dict["root_angle"]
 
@@ -140,7 +145,10 @@ def body_coefficients(gear: Any) -> dict[str, float]:
 def point_rows(
     contact: dict[str, Any], gears: dict[str, Any], mesh: Any
 ) -> Iterator[Row]:
-    """Terms and single-pair stiffness at one contact; the pair also where ROSS itself puts this share of the path."""
+    """Terms and single-pair stiffness at one contact.
+
+    The pair also where ROSS itself puts this share of the path.
+    """
     place = (contact["point"], contact["pinion"], contact["share"])
     for name, gear in gears.items():
         beta = gear._to_tau(contact_angle(contact[name], gear))

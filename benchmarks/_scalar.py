@@ -1,7 +1,9 @@
-"""The peer of the compiled core: the same law of the gear mesh and classical RK4 as one would write them in Numba.
+"""The peer of the compiled core: the same law of the gear mesh and classical RK4 as one would
+write them in Numba.
 
-One record, one number at a time, every table read at every stage, no step taken twice. The symbols are those of
-``docs/theory/spur_dynamics.md``. Constant speed, drive flanks, and the six degrees of freedom of a pair only.
+One record, one number at a time, every table read at every stage, no step taken twice. The
+symbols are those of ``docs/theory/spur_dynamics.md``. Constant speed, drive flanks, and the six
+degrees of freedom of a pair only.
 """
 
 from __future__ import annotations
@@ -26,7 +28,10 @@ _compiled: Any = functools.partial(njit, cache=True, error_model="numpy")()
 
 
 class Machine(NamedTuple):
-    """One record's machine; ``table`` is (pinion kind, wheel kind, node, [c, c', g, g']), kinds are -1 for no tooth."""
+    """One record's machine.
+
+    ``table`` is (pinion kind, wheel kind, node, [c, c', g, g']), kinds are -1 for no tooth.
+    """
 
     mesh: MeshNumbers
     pinion_kind: NDArray[np.int64]
@@ -177,7 +182,8 @@ def accelerations(m, time, q, v, work, a):
 
 @_compiled
 def integrate(m, state, step, first_step, n_steps, channels, means):
-    """Advance ``state`` (2, dof) by classical RK4; ``means`` (step, channel) takes the mean acceleration of each step.
+    """Advance ``state`` (2, dof) by classical RK4; ``means`` (step, channel) takes the mean
+    acceleration of each step.
 
     Returns the lowest approach.
     """
@@ -213,7 +219,10 @@ def integrate(m, state, step, first_step, n_steps, channels, means):
 
 
 def right_hand_side(m: Machine) -> Callable[[float, Array], Array]:
-    """Derivative of (q, v), (12,), compiled with the machine in it: nothing but the state is passed at a call."""
+    """Derivative of (q, v), (12,), compiled with the machine in it.
+
+    Nothing but the state is passed at a call.
+    """
 
     @njit(error_model="numpy")
     def slope(time, state):

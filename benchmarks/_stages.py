@@ -1,4 +1,7 @@
-"""Where the CPU time of ``gensig generate`` goes: the product's own functions, each with a clock around it."""
+"""Where the CPU time of ``gensig generate`` goes.
+
+The product's own functions, each with a clock around it.
+"""
 
 from __future__ import annotations
 
@@ -61,9 +64,10 @@ CLOCKED: tuple[tuple[Any, str, str], ...] = (
 
 
 class Stages:
-    """CPU seconds by stage, each without what it calls of other stages, and how much there was to do.
+    """CPU seconds by stage, each without the stages that it calls, and the amount of work.
 
-    ``n_samples`` counts rows of output samples by oversampling; ``n_runs`` the records, twins and repetitions.
+    ``n_samples`` counts rows of output samples by oversampling; ``n_runs`` the records, twins
+    and repetitions.
     """
 
     def __init__(self) -> None:
@@ -91,7 +95,10 @@ class Stages:
 
     @contextmanager
     def watching(self, n_whole: int) -> Iterator[None]:
-        """Clock the product's functions; recordings of fewer samples than ``n_whole`` are those of the error check."""
+        """Clock the product's functions.
+
+        Recordings of fewer samples than ``n_whole`` are those of the error check.
+        """
         counted = self._counted(pair_machine.simulate_pairs)
         with ExitStack() as patches:
             patches.enter_context(
@@ -137,7 +144,9 @@ class Stages:
         return clocked
 
     def separate_low_pass(self, precision: str, n_channels: int, runs: int) -> None:
-        """Move what the low-pass costs from the integration, in which it is compiled, to its own stage."""
+        """Move what the low-pass costs from the integration, in which it is compiled, to its own
+        stage.
+        """
         for (oversampling, stage), n_samples in self.n_samples.items():
             spent = n_samples * low_pass_seconds(
                 oversampling, precision, n_channels, runs
@@ -155,7 +164,9 @@ def _low_pass_of(
 def low_pass_seconds(
     oversampling: int, precision: str, n_channels: int, runs: int
 ) -> float:
-    """CPU seconds of the low-pass for one output sample of a whole group, block by block as in the product."""
+    """CPU seconds of the low-pass for one output sample of a whole group, block by block as in the
+    product.
+    """
     low_pass, block = decimator(oversampling), _kernels.BLOCK
     width = n_channels * _kernels.n_lanes(precision)
     taps = low_pass.padded(precision)

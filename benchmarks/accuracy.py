@@ -1,8 +1,8 @@
-"""Integration error against 128 steps a sample, by fault and speed: ``python -m benchmarks.accuracy``.
+"""``python -m benchmarks.accuracy``: integration error against 128 steps a sample.
 
-Relative error of the spectrum from 20 Hz to 20 kHz (Hann window, worst channel) of records of perfect gears and of
-gears of a quality grade; where teeth bounce for more than 1 % of the time, third-octave levels (dB) and indicators
-(%) beside it. ``--json FILE`` writes the figures.
+Relative error of the spectrum from 20 Hz to 20 kHz (Hann window, worst channel) of records of
+perfect gears and of gears of a quality grade; where teeth bounce for more than 1 % of the time,
+third-octave levels (dB) and indicators (%) beside it. ``--json FILE`` writes the figures.
 """
 
 from __future__ import annotations
@@ -156,7 +156,8 @@ def main() -> None:
             row[column] for row in table.values() if row["contact_loss"] <= BOUNCING
         ]
         print(
-            f"{column}: largest error with contact lost for at most 1 % of the time {max(steady):.1e}"
+            f"{column}: largest error with contact lost for at most 1 % of the time "
+            f"{max(steady):.1e}"
         )
     if arguments.json:
         Path(arguments.json).write_text(

@@ -1,10 +1,11 @@
-"""``python -m benchmarks.bridge``: does adapting a network by healthy recordings help, and what does it break?
+"""``python -m benchmarks.bridge``: does adapting a network by healthy recordings help, and what
+does it break?
 
-Trains the default network in one simulated world, adapts it to others by their healthy records alone
-(`diagnose.networks.adaptation`) and judges it on units that took no part; beside it the naive variants,
-which match all classes of the training to healthy records, and a network trained in the other world with
-labels. Then the negative control:
-recordings of two states that differ in the mounting, read from the folder ``$GENSIG_MEASURED`` where it is set.
+Trains the default network in one simulated world, adapts it to others by their healthy records
+alone (`diagnose.networks.adaptation`) and judges it on units that took no part; beside it the
+naive variants, which match all classes of the training to healthy records, and a network
+trained in the other world with labels. Then the negative control: recordings of two states that
+differ in the mounting, read from the folder ``$GENSIG_MEASURED`` where it is set.
 """
 
 from __future__ import annotations
@@ -39,7 +40,10 @@ TOLD = (
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Make what is not there yet, judge, print, and write the figures; 0 when it was made, whatever it says."""
+    """Make what is not there yet, judge, print, and write the figures.
+
+    0 when it was made, whatever it says.
+    """
     options = _parser().parse_args(arguments)
     named, begun = machine(), time.perf_counter()
     print_machine(named)
@@ -75,10 +79,14 @@ def judge_worlds(folder: Path) -> dict[str, Any]:
         there = _own_score(folder / f"model_{name}")
         n_units = len(set(judged.unit.tolist()))
         print(
-            f"\n{name}: {judged.label.size} records of {n_units} units, {judged.n_windows} healthy windows to adapt by"
+            f"\n{name}: {judged.label.size} records of {n_units} units, "
+            f"{judged.n_windows} healthy windows to adapt by"
         )
         for variant, row in table.items():
-            gain = f"{row['gain']:+.3f} [{row['gain_interval'][0]:+.3f}, {row['gain_interval'][1]:+.3f}]"
+            gain = (
+                f"{row['gain']:+.3f} [{row['gain_interval'][0]:+.3f}, "
+                f"{row['gain_interval'][1]:+.3f}]"
+            )
             print(
                 f"  {variant:<24}{_said(row)}  gain {gain}  auroc {row['auroc']:.3f}  "
                 f"healthy found {row['recall'][worlds.HEALTHY]:.2f}"
@@ -96,7 +104,10 @@ def judge_worlds(folder: Path) -> dict[str, Any]:
 
 
 def judge_control(folder: Path) -> dict[str, Any]:
-    """Rows of the negative control for each set trained on; none where the recordings are not there."""
+    """Rows of the negative control for each set trained on.
+
+    None where the recordings are not there.
+    """
     file = control.find_control()
     if file is None:
         print(
@@ -116,7 +127,8 @@ def judge_control(folder: Path) -> dict[str, Any]:
             f"\nnegative control, trained on {name}; on its own unseen units {_said(own)}"
         )
         print(
-            "P(fault): channel, load %, variant: healthy, broken, difference; windows unlike the training"
+            "P(fault): channel, load %, variant: healthy, broken, difference; windows "
+            "unlike the training"
         )
         for row in rows:
             _print_control(row)
@@ -170,7 +182,10 @@ def _said(row: Mapping[str, Any]) -> str:
 
 
 def _one_thread() -> Any:
-    """One thread for torch and the BLAS: adapted networks are the same on every machine's number of cores."""
+    """One thread for torch and the BLAS.
+
+    Adapted networks are the same on every machine's number of cores.
+    """
     import torch
     from threadpoolctl import threadpool_limits
 

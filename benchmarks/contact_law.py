@@ -1,8 +1,10 @@
-"""``python -m benchmarks.contact_law``: what the secant of the contact term costs against the full non-linear law.
+"""``python -m benchmarks.contact_law``: what the secant of the contact term costs against the full
+non-linear law.
 
-In gensig's dynamics the Weber-Banaschek contact compliance of a pair stays what it is under the record's quasi-static
-pair load. Here the same equations are integrated with the compliance of every pair following its own present load,
-and both are compared, torque by torque, sound and with a fault. Prints Markdown tables.
+In gensig's dynamics the Weber-Banaschek contact compliance of a pair stays what it is under the
+record's quasi-static pair load. Here the same equations are integrated with the compliance of
+every pair following its own present load, and both are compared, torque by torque, sound and
+with a fault. Prints Markdown tables.
 """
 
 from __future__ import annotations
@@ -41,7 +43,8 @@ TORQUES = (5, 20, 50, 100)  # N m on the pinion
 FAULTS = ("healthy", "missing_tooth", "pitting")
 CHANNEL = "pinion_y"
 DURATION = 0.2  # s; six turns of the pinion
-N_TURNS = 3  # of which are compared, the last ones; whole turns: every mesh harmonic has its own line
+# of which are compared, the last ones; whole turns: every mesh harmonic has its own line
+N_TURNS = 3
 N_HARMONICS = 6
 MOST_SHIFT = 5.0  # samples
 N_LOADS, MORE_LOADS = 41, 81
@@ -63,7 +66,10 @@ class Case:
 
     @property
     def dynamics(self) -> PairDynamics:
-        """Perfect gears, tooth 0 of either entering at A at time 0: what ``SpurPair.simulate`` takes unasked."""
+        """Perfect gears, tooth 0 of either entering at A at time 0.
+
+        What ``SpurPair.simulate`` takes unasked.
+        """
         return pair_dynamics(Run(system=self.system, faults=self.faults))
 
     @property
@@ -105,8 +111,10 @@ def case(torque: float, fault: str, *changes: str) -> Case:
 def mesh_of(this: Case, law: str, n_loads: int = N_LOADS) -> Mesh:
     """The mesh under one of three laws.
 
-    ``secant``: gensig's own table, whatever the load. ``full``: the logarithm follows the pair's present load, over
-    the width that bears under its quasi-static load. ``reshared``: and so does the share of each slice of a faulty
+    ``secant``: gensig's own table, whatever the load. ``full``: the logarithm follows the
+    pair's present load, over
+    the width that bears under its quasi-static load. ``reshared``: and so does the share of
+    each slice of a faulty
     flank; more slices bear under more load.
     """
     table, n = this.system.mesh_table(this.faults), n_loads if law == "reshared" else 2
@@ -125,7 +133,9 @@ def mesh_of(this: Case, law: str, n_loads: int = N_LOADS) -> Mesh:
 def change_with_load(
     this: Case, table: PairTable, loads: Array, *, resharing: bool
 ) -> Array:
-    """Contact compliance at loads, (load, 1) N, less that at the table's, (kind, load, node) m/N, by pinion tooth."""
+    """Contact compliance at loads, (load, 1) N, less that at the table's, (kind, load, node) m/N,
+    by pinion tooth.
+    """
     system = this.system
     arguments = system.pair, table.position, system.material, system.mesh
     width, force = system.pair.pinion.face_width, system.mesh_force
@@ -156,7 +166,8 @@ def change_with_load(
             carried = (
                 loads * law.compliance(bearing, loads) * bearing
             )  # load x unit compliance
-            # the approach at which the first n slices would carry the load; the least of them is the true one
+            # the approach at which the first n slices would carry the load; the least of them
+            # is the true one
             pressed = np.min(
                 [
                     (carried + m) / w
@@ -176,7 +187,9 @@ def change_with_load(
 def record(
     this: Case, law: str, *, oversampling: int = 8, n_loads: int = N_LOADS
 ) -> Array:
-    """Acceleration along the line of action over the last turns of the pinion, decimated, (sample,) m/s2."""
+    """Acceleration along the line of action over the last turns of the pinion, decimated,
+    (sample,) m/s2.
+    """
     dynamics, low_pass = this.dynamics, decimator(oversampling)
     rate = this.system.sensing.sampling_rate
     step = 1.0 / (rate * oversampling)
@@ -214,7 +227,9 @@ def last_turns(this: Case, signal: Array) -> Array:
 
 
 def static(this: Case, law: str) -> tuple[Array, Array]:
-    """Approach and tangent stiffness under the set torque over one turn of the pinion, (phase,) m and N/m."""
+    """Approach and tangent stiffness under the set torque over one turn of the pinion, (phase,) m
+    and N/m.
+    """
     dynamics, roll = this.dynamics, this.roll
     approach, stiffness = np.empty_like(roll), np.empty_like(roll)
     highest = (
@@ -255,9 +270,11 @@ def away(signal: Array, reference: Array) -> float:
 
 
 def delayed(signal: Array, reference: Array) -> tuple[float, float]:
-    """The difference that is left once ``signal`` is shifted as a whole turn, and the shift in samples.
+    """The difference that is left once ``signal`` is shifted as a whole turn, and the shift in
+    samples.
 
-    The drive is soft: 1e-3 N m more mean torque turns the pinion by 3 mrad, so that all happens 17 us later, a sixth
+    The drive is soft: 1e-3 N m more mean torque turns the pinion by 3 mrad, so that all happens
+    17 us later, a sixth
     of a period of the mesh mode, and nothing else changes.
     """
     ours = np.fft.rfft(signal)
@@ -274,7 +291,9 @@ def delayed(signal: Array, reference: Array) -> tuple[float, float]:
 
 
 def harmonics(signal: Array) -> Array:
-    """Amplitudes of the first mesh harmonics of whole turns of the 23-tooth pinion, (harmonic,) m/s2."""
+    """Amplitudes of the first mesh harmonics of whole turns of the 23-tooth pinion, (harmonic,)
+    m/s2.
+    """
     n_meshes = N_TURNS * case(TORQUES[0], FAULTS[0]).system.pair.pinion.n_teeth
     return (
         np.abs(np.fft.rfft(signal))[n_meshes * np.arange(1, N_HARMONICS + 1)]
@@ -292,7 +311,10 @@ def static_rows() -> Iterator[Sequence[str]]:
             f, f_full = resonance(this, k.mean()), resonance(this, k_full.mean())
             approach = f"{x.mean() * 1e6:.3f} {x_full.mean() * 1e6:.3f}"
             swing = f"{np.ptp(x) * 1e6:.3f} {np.ptp(x_full) * 1e6:.3f}"
-            stiffness = f"{k.mean() * 1e-8:.3f} {k_full.mean() * 1e-8:.3f} | {percent(k_full.mean() / k.mean() - 1.0)}"
+            stiffness = (
+                f"{k.mean() * 1e-8:.3f} {k_full.mean() * 1e-8:.3f} | "
+                f"{percent(k_full.mean() / k.mean() - 1.0)}"
+            )
             yield (
                 f"{torque}",
                 fault,
@@ -382,22 +404,29 @@ def main() -> None:
     """Print every table."""
     begun = time.perf_counter()
     print(
-        "Static, secant and full law: approach in um, tangent stiffness in 1e8 N/m, mesh resonance in Hz\n"
+        "Static, secant and full law: approach in um, tangent stiffness in 1e8 N/m, mesh "
+        "resonance in Hz\n"
     )
     table(
         "| N m | fault | mean | peak to peak | mean stiffness | % | resonance | % |",
         static_rows(),
     )
     print(
-        f"{CHANNEL} in m/s2, secant and full law; changes from the secant; difference over the full law's RMS\n"
+        f"{CHANNEL} in m/s2, secant and full law; changes from the secant; difference "
+        "over the full law's RMS\n"
     )
-    head = "| N m | fault | RMS | % | mesh harmonics 1..6, % | difference, once shifted, % | shift, us |"
+    head = (
+        "| N m | fault | RMS | % | mesh harmonics 1..6, % | difference, once shifted, % | "
+        "shift, us |"
+    )
     table(head, dynamic_rows())
     print(
-        f"Differences that should be none; records at {TORQUES} N m, finer ones at {TORQUES[1::2]}, the rest at 20\n"
+        f"Differences that should be none; records at {TORQUES} N m, finer ones at "
+        f"{TORQUES[1::2]}, the rest at 20\n"
     )
     table(
-        "| fault | secant, gensig's record | static approach | stiffness | linear contact: full, secant | "
+        "| fault | secant, gensig's record | static approach | stiffness | linear "
+        "contact: full, secant | "
         "full, 8 and 16 steps a sample | face shared anew, 41 and 81 loads |",
         check_rows(),
     )

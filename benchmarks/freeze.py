@@ -1,7 +1,9 @@
-"""Freeze a data set and what was reached on it as a benchmark: ``python -m benchmarks.freeze NAME DATA REPORT...``.
+"""Freeze a data set and what was reached on it as a benchmark: ``python -m benchmarks.freeze NAME
+DATA REPORT...``.
 
-DATA is the folder of ``gensig generate experiment=NAME``, each REPORT that of a ``diagnose train`` on it. Writes
-``diagnose/frozen/NAME.json``; an existing one is never written again: a benchmark that changes needs another name.
+DATA is the folder of ``gensig generate experiment=NAME``, each REPORT that of a ``diagnose
+train`` on it. Writes ``diagnose/frozen/NAME.json``; an existing one is never written again: a
+benchmark that changes needs another name.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """Mutated data sets against everything that reads: ``python -m benchmarks.fuzz_campaign``.
 
-Each mutant is a small data set with one change (`benchmarks._mutants`): damaged bytes, forged shards, manifests and
-tables. None may crash or hang the reader, fill its memory, make it look outside the folder, or pass in silence.
-``--mutants`` is their number, ``--first`` the first seed, ``--folder`` a data set to mutate instead of a new one,
-``--json FILE`` writes the figures. The exit status is 1 where any mutant did harm.
+Each mutant is a small data set with one change (`benchmarks._mutants`): damaged bytes, forged
+shards, manifests and tables. None may crash or hang the reader, fill its memory, make it look
+outside the folder, or pass in silence. ``--mutants`` is their number, ``--first`` the first
+seed, ``--folder`` a data set to mutate instead of a new one, ``--json FILE`` writes the
+figures. The exit status is 1 where any mutant did harm.
 """
 
 from __future__ import annotations

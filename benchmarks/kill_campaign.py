@@ -1,13 +1,16 @@
-"""Kill a run at random moments, resume it, compare: ``python -m benchmarks.kill_campaign [--kills 200]``.
+"""Kill a run at random moments, resume it, compare: ``python -m benchmarks.kill_campaign [--kills
+200]``.
 
-Each data set is begun with ``gensig generate`` and killed (SIGKILL) up to five times; then it is resumed, verified, and
-every file that counts as the data set is compared with an uninterrupted run byte by byte. After each kill the folder
-must not look whole unless it is; one that was killed before it had a manifest is begun again by the same command.
+Each data set is begun with ``gensig generate`` and killed (SIGKILL) up to five times; then it
+is resumed, verified, and every file that counts as the data set is compared with an
+uninterrupted run byte by byte. After each kill the folder must not look whole unless it is; one
+that was killed before it had a manifest is begun again by the same command.
 
-Most runs are forked from this process, which has imported and compiled everything, so that kills fall into planning,
-writing and closing; one in ``COMMAND_EVERY`` is the command itself with two workers, imports included, of which the
-parent or a worker is killed. Needs Linux (/proc). The exit status is 1 for any difference, and where too few kills fell
-before the end of a run.
+Most runs are forked from this process, which has imported and compiled everything, so that
+kills fall into planning, writing and closing; one in ``COMMAND_EVERY`` is the command itself
+with two workers, imports included, of which the parent or a worker is killed. Needs Linux
+(/proc). The exit status is 1 for any difference, and where too few kills fell before the end of
+a run.
 """
 
 from __future__ import annotations
@@ -142,7 +145,8 @@ def workers_of(run: Run) -> list[int]:
 def kill_once(run: Run, out: Path, seconds: float, rng: random.Random) -> str:
     """Kill a run at a random moment; says who was killed, or 'ended first'."""
     before, limit = signature(out), time.monotonic() + LONGEST
-    # Half the kills come after the next shard, in the thick of writing; the others at any moment, imports included.
+    # Half the kills come after the next shard, in the thick of writing; the others at any
+    # moment, imports included.
     if rng.random() < 0.5:
         while (
             signature(out) == before
@@ -183,7 +187,10 @@ def is_whole(out: Path) -> bool:
 
 
 def durations(folder: Path) -> dict[bool, float]:
-    """Time of an undisturbed run: of the command (True) and of a fork (False), everything being compiled."""
+    """Time of an undisturbed run.
+
+    Of the command (True) and of a fork (False), everything being compiled.
+    """
     (folder / "reference").parent.mkdir(exist_ok=True)
     if gensig(
         [
@@ -209,7 +216,10 @@ def n_kills_of(outcome: Counter[str]) -> int:
 
 
 def campaign(n_kills: int, seed: int, folder: Path) -> tuple[Counter[str], list[str]]:
-    """Spend the kills on one data set after the other; what was killed, and every way in which one was not equal."""
+    """Spend the kills on one data set after the other.
+
+    What was killed, and every way in which one was not equal.
+    """
     rng = random.Random(seed)
     seconds = durations(folder)
     wanted = contents(folder / "reference")

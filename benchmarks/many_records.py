@@ -1,8 +1,9 @@
 """Memory of a large data set: ``python -m benchmarks.many_records``.
 
-Makes 100,000 records of 0.1 s and one channel on two workers, as anyone would, and prints the largest sum of the memory
-of all its processes (proportional set size, Linux). It takes about an hour on two idle cores; ``--minutes N`` stops
-earlier, after which ``gensig resume`` could go on.
+Makes 100,000 records of 0.1 s and one channel on two workers, as anyone would, and prints the
+largest sum of the memory of all its processes (proportional set size, Linux). It takes about an
+hour on two idle cores; ``--minutes N`` stops earlier, after which ``gensig resume`` could go
+on.
 """
 
 from __future__ import annotations
@@ -17,8 +18,13 @@ from pathlib import Path
 
 from benchmarks._measure import machine, print_machine
 
-WORDS = ("experiment=quickstart", "operating.duration_s=0.1", "sensing.channels=[pinion_y]", "executor.n_workers=2",
-         "dataset.records_per_shard=null")  # fmt: skip
+WORDS = (
+    "experiment=quickstart",
+    "operating.duration_s=0.1",
+    "sensing.channels=[pinion_y]",
+    "executor.n_workers=2",
+    "dataset.records_per_shard=null",
+)
 LIMIT_MB = 1500
 EVERY_S = 2.0
 
@@ -88,7 +94,8 @@ def main() -> int:
         n_shards = len(list((out / "shards").glob("shard-*.h5")))
     told = "within" if peak < LIMIT_MB * 1e6 else "beyond"
     print(
-        f"{arguments.records} records, {n_shards} shards whole after {time.monotonic() - begun:.0f} s: at most "
+        f"{arguments.records} records, {n_shards} shards whole after "
+        f"{time.monotonic() - begun:.0f} s: at most "
         f"{peak / 1e6:.0f} MB in all processes, {told} {LIMIT_MB}"
     )
     return int(told == "beyond")

@@ -1,8 +1,8 @@
 """Time to tabulate the mesh of one faulty gear pair: ``python -m benchmarks.mesh_tables``.
 
-Cold forgets what is kept of sound teeth and bodies, as for the first record of a geometry; warm is the first of every
-further condition, whose other records find the load of its pairs too. CPU time, the least of several runs, compiled
-code loaded.
+Cold forgets what is kept of sound teeth and bodies, as for the first record of a geometry; warm
+is the first of every further condition, whose other records find the load of its pairs too. CPU
+time, the least of several runs, compiled code loaded.
 """
 
 from __future__ import annotations

@@ -1,9 +1,11 @@
 """``python -m benchmarks.realism``: simulated records beside measured ones, quantity by quantity.
 
-Makes the data sets of the yardstick from ``experiment=realistic`` (or ``--base``), healthy and faulty at three speeds
-and two torques, and of a healthy machine like that of one public recording; resamples them to 5 kHz and 25.6 kHz;
-prints what is measured beside what is simulated. The recording is read from the folder ``$GENSIG_MEASURED`` where it
-is set. What is compared and how it is judged: ``gensig/report/realism.py``; nothing here is a target to tune to.
+Makes the data sets of the yardstick from ``experiment=realistic`` (or ``--base``), healthy and
+faulty at three speeds and two torques, and of a healthy machine like that of one public
+recording; resamples them to 5 kHz and 25.6 kHz; prints what is measured beside what is
+simulated. The recording is read from the folder ``$GENSIG_MEASURED`` where it is set. What is
+compared and how it is judged: ``gensig/report/realism.py``; nothing here is a target to tune
+to.
 """
 
 from __future__ import annotations
@@ -88,7 +90,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"benchmarks.realism: {error}", file=sys.stderr)
         return 1
     heading = (
-        f"{' '.join(base)}, gensig {__version__}, {size.n_units} units in {size.n_gearboxes} gearboxes; "
+        f"{' '.join(base)}, gensig {__version__}, {size.n_units} units in "
+        f"{size.n_gearboxes} gearboxes; "
         f"ranges frozen in commit {options.frozen or '(none named)'}"
     )
     print(
@@ -107,7 +110,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.stored:
         write_results(RESULTS, heading, found)
         print(
-            f"stored in {RESULTS.name}; write the reasons of misses into its last column, then run {PAGE}"
+            f"stored in {RESULTS.name}; write the reasons of misses into its last column, "
+            f"then run {PAGE}"
         )
     return 0
 
@@ -153,7 +157,10 @@ def yardstick_comparisons(
     with kept(folder / "yardstick", yardstick_words(base, size)) as data:
         found = read_table(data)
     least = found.indicators["n_turns"].min()
-    told = f"{data.n_records} records, {found.n_failed} failed, at least {least:.0f} turns of the faulted shaft"
+    told = (
+        f"{data.n_records} records, {found.n_failed} failed, at least {least:.0f} turns of "
+        "the faulted shaft"
+    )
     print(f"yardstick: {told}", flush=True)
     values = quantities(found)
     return [

@@ -1,9 +1,11 @@
-"""``python -m benchmarks.ross``: gensig's mesh beside ROSS's, quantity by quantity, and what ROSS's motion costs.
+"""``python -m benchmarks.ross``: gensig's mesh beside ROSS's, quantity by quantity, and what
+ROSS's motion costs.
 
-Makes ROSS its own virtual environment (about 1.5 GB, kept for the next run), asks it for its values, stores them with
-its version in ``tests/reference/data/ross.csv``, and prints both programs' values as Markdown tables. What the
-differences come from: ``docs/peers.md``. ROSS's ``run_time_response`` with the same gears is timed too; what it takes
-is stored in ``benchmarks/ross_time.json``.
+Makes ROSS its own virtual environment (about 1.5 GB, kept for the next run), asks it for its
+values, stores them with its version in ``tests/reference/data/ross.csv``, and prints both
+programs' values as Markdown tables. What the differences come from: ``docs/peers.md``. ROSS's
+``run_time_response`` with the same gears is timed too; what it takes is stored in
+``benchmarks/ross_time.json``.
 """
 
 from __future__ import annotations
@@ -197,7 +199,9 @@ def read_values(path: Path) -> tuple[StoredValues, str]:
 def comparison(
     pair: str, ross: dict[tuple[str, str], tuple[float, str]], *, every: bool
 ) -> Iterator[str]:
-    """ROSS's value, gensig's by the paper's terms, the same with ROSS's choices put in, and gensig's default."""
+    """ROSS's value, gensig's by the paper's terms, the same with ROSS's choices put in, and
+    gensig's default.
+    """
     paper = ours.machine(pair, ours.PAPER)
     columns = (
         ours.gensig_values(paper),
@@ -239,7 +243,10 @@ def comparison(
 def body_evidence(
     pair: str, ross: dict[tuple[str, str], tuple[float, str]]
 ) -> Iterator[str]:
-    """Body term of the paper over ROSS's: as it stands, with ROSS's theta_f, with ROSS's u_f, with both."""
+    """Body term of the paper over ROSS's.
+
+    As it stands, with ROSS's theta_f, with ROSS's u_f, with both.
+    """
     system = ours.machine(pair, ours.PAPER)
     points = ours.positions(system.pair)
     choices = ("as it stands", "theta_f without c*", "u_f to the contact", "both")
@@ -265,7 +272,9 @@ def body_evidence(
 
 
 def path_evidence(pair: str) -> Iterator[str]:
-    """Curvature radii at the named shares of the path, and what their sum lacks to the length of the line of action."""
+    """Curvature radii at the named shares of the path, and what their sum lacks to the length of
+    the line of action.
+    """
     gears = ours.machine(pair, ours.PAPER).pair
     points = ours.positions(gears)
     position = np.array(list(points.values()))
@@ -290,7 +299,9 @@ def path_evidence(pair: str) -> Iterator[str]:
 
 
 def steps(pair: str) -> Iterator[str]:
-    """Stiffness at C and mid in the double zone while the paper's choices give way to the default's."""
+    """Stiffness at C and mid in the double zone while the paper's choices give way to the
+    default's.
+    """
     yield from _head(
         "choice",
         "pair_stiffness at C, 1e8 N/m",

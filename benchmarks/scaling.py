@@ -1,8 +1,8 @@
 """What cost and memory grow with: ``python -m benchmarks.scaling``.
 
-CPU seconds of one core, the least of several runs, against the duration of records, their number, the number of
-distinct teeth, and the degrees of freedom; peak memory of the processes that make a data set, against its size.
-``--json FILE`` writes the figures.
+CPU seconds of one core, the least of several runs, against the duration of records, their
+number, the number of distinct teeth, and the degrees of freedom; peak memory of the processes
+that make a data set, against its size. ``--json FILE`` writes the figures.
 """
 
 from __future__ import annotations
@@ -56,7 +56,8 @@ ALONE = "import sys; from benchmarks import scaling; scaling.{}(*sys.argv[1:])"
 def peak_memory() -> int:
     """Most bytes of memory that this process ever held."""
     status = Path("/proc/self/status")
-    if status.exists():  # what getrusage tells is that of the process that started this one, if it held more
+    # what getrusage tells is that of the process that started this one, if it held more
+    if status.exists():
         lines = status.read_text(encoding="utf-8").splitlines()
         return next(
             int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM:")
@@ -67,7 +68,10 @@ def peak_memory() -> int:
 
 
 def make_set(n_records: str, *words: str) -> None:
-    """Print the CPU seconds of a data set, from its plan to its last byte, and the peak memory; for a process alone."""
+    """Print the CPU seconds of a data set, from its plan to its last byte, and the peak memory.
+
+    For a process alone.
+    """
     with tempfile.TemporaryDirectory() as folder:
         _begin(Path(folder) / "warm", "8", *words)
         _finish(Path(folder) / "warm")
@@ -85,7 +89,10 @@ def make_plan(n_records: str, out: str, *words: str) -> None:
 
 
 def make_shard(out: str) -> None:
-    """Make the first shard of a data set and print the CPU seconds and the peak memory; for a process alone."""
+    """Make the first shard of a data set and print the CPU seconds and the peak memory.
+
+    For a process alone.
+    """
     begun = time.process_time()
     write_shard(Path(out), 0)
     print(json.dumps([time.process_time() - begun, peak_memory()]))
@@ -130,7 +137,9 @@ def simulate(runs: Sequence[Run]) -> None:
 
 
 def against_duration(runs: int) -> dict[str, float]:
-    """CPU seconds of a group by duration, and how far from a straight line with a constant for the settling."""
+    """CPU seconds of a group by duration, and how far from a straight line with a constant for the
+    settling.
+    """
     group, works = side_by_side(), {}
     for duration in DURATIONS:
         operating = replace(group[0].system.operating, duration=duration)
@@ -147,7 +156,9 @@ def against_duration(runs: int) -> dict[str, float]:
 def straight(
     unit: str, sizes: Sequence[float], found: Sequence[float], per: int = 1
 ) -> dict[str, float]:
-    """Constant and slope of the line through measured costs, and the largest relative distance from it."""
+    """Constant and slope of the line through measured costs, and the largest relative distance
+    from it.
+    """
     x, y = np.asarray(sizes, dtype=np.float64), np.asarray(found)
     (constant, slope), *_ = np.linalg.lstsq(
         np.stack([1.0 / y, x / y], axis=1), np.ones_like(y), rcond=None
@@ -161,7 +172,9 @@ def straight(
 
 
 def against_number(runs: int) -> dict[str, float]:
-    """CPU milliseconds a record by the number of records of a data set, made by one process from plan to index."""
+    """CPU milliseconds a record by the number of records of a data set, made by one process from
+    plan to index.
+    """
     found = []
     for n_records in COUNTS:
         told = [
@@ -177,7 +190,9 @@ def against_number(runs: int) -> dict[str, float]:
 
 
 def memory(_runs: int) -> dict[str, float]:
-    """Peak memory in MB of the process that plans, and of a worker that makes one whole shard, by number of records."""
+    """Peak memory in MB of the process that plans, and of a worker that makes one whole shard, by
+    number of records.
+    """
     found = {}
     for n_records in LONG_COUNTS:
         with tempfile.TemporaryDirectory() as folder:
@@ -195,7 +210,9 @@ def memory(_runs: int) -> dict[str, float]:
 
 
 def against_teeth(runs: int) -> tuple[dict[str, float], dict[str, float]]:
-    """CPU milliseconds of a table, and of a record without it, by the number of pitted pinion teeth."""
+    """CPU milliseconds of a table, and of a record without it, by the number of pitted pinion
+    teeth.
+    """
     tables, motions = {}, {}
 
     def table(run: Run) -> None:

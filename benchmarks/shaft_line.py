@@ -1,8 +1,10 @@
-"""The engine's whole shaft line: how fast and how accurately by step. ``python -m benchmarks.shaft_line``
+"""The engine's whole shaft line: how fast and how accurately by step. ``python -m
+benchmarks.shaft_line``
 
-109 degrees of freedom (65 rotations once rigid compounds are one, 44 lateral motions), 8 non-linear meshes, 51 torques
-over the angle. Errors are relative differences of a channel's spectrum from 20 Hz to 4 kHz against a step four times
-as fine as the finest asked for, where no tooth leaves its mate: where teeth rattle, points of time mean little.
+109 degrees of freedom (65 rotations once rigid compounds are one, 44 lateral motions), 8
+non-linear meshes, 51 torques over the angle. Errors are relative differences of a channel's
+spectrum from 20 Hz to 4 kHz against a step four times as fine as the finest asked for, where no
+tooth leaves its mate: where teeth rattle, points of time mean little.
 """
 
 from __future__ import annotations
@@ -36,7 +38,10 @@ CHANNELS = [
 def engine_run(
     oversampling: int, duration: float, *, loaded: bool
 ) -> tuple[LineMotion, float]:
-    """A motion of the engine, and the CPU seconds that it took; ``loaded`` teeth stay together, others rattle."""
+    """A motion of the engine, and the CPU seconds that it took.
+
+    ``loaded`` teeth stay together, others rattle.
+    """
     line, torques = engine_line(), engine_torques()
     if loaded:
         torques = engine_torques(*CALM) + [
@@ -89,7 +94,8 @@ def main() -> None:
         motion, spent = engine_run(oversampling, words.duration, loaded=False)
         print(
             f"{1e6 / RATE / oversampling:7.2f} | {spent:14.2f} | {motion.newton_rounds:6.2f} | "
-            f"{motion.energy_residual:15.1e} | {motion.contact_loss.max():.2f} {motion.back_contact.max():.2f}"
+            f"{motion.energy_residual:15.1e} | {motion.contact_loss.max():.2f} "
+            f"{motion.back_contact.max():.2f}"
         )
     finest = 4 * max(words.oversampling)
     exact, _ = engine_run(finest, words.checked, loaded=True)

@@ -1,9 +1,11 @@
 """What each way to store a data set costs: ``python -m benchmarks.storage``.
 
-Records of the quickstart machines with 10 % noise (20 dB) are written as shards with every compression and sample type,
-and read back as users read them. Beside them stands plain h5py: one contiguous float32 data set, no checks, no labels.
-MB count the samples as float32, whatever is stored. Times are the least of several runs, in CPU time of one core, from
-a warm cache; ``--folder`` chooses the disk, whose own speed is not in them. ``--json FILE`` writes the figures.
+Records of the quickstart machines with 10 % noise (20 dB) are written as shards with every
+compression and sample type, and read back as users read them. Beside them stands plain h5py:
+one contiguous float32 data set, no checks, no labels. MB count the samples as float32, whatever
+is stored. Times are the least of several runs, in CPU time of one core, from a warm cache;
+``--folder`` chooses the disk, whose own speed is not in them. ``--json FILE`` writes the
+figures.
 """
 
 from __future__ import annotations
@@ -177,9 +179,8 @@ def main() -> None:
     for way, (write, ratio, read, error) in (
         (way, values.values()) for way, values in found.items()
     ):
-        print(
-            f"{way:<32}{write:>12.0f}{ratio:>8.2f}{read:>18.2f}{f'{error:.1f}' if error > -np.inf else 'none':>10}"
-        )
+        shown_error = f"{error:.1f}" if error > -np.inf else "none"
+        print(f"{way:<32}{write:>12.0f}{ratio:>8.2f}{read:>18.2f}{shown_error:>10}")
     if arguments.json:
         machine = {
             "machine": platform.processor() or platform.machine(),

@@ -14,8 +14,9 @@ from gensig.plan.request import read_request
 from gensig.systems.registry import read_system
 from gensig.systems.spur_pair import SpurPair
 
-# The first file compiles the integrator, which takes a minute; those of the networks, which another process begins
-# with, need none of it and find everything compiled afterwards. Then what takes long, so that no process ends alone.
+# The first file compiles the integrator, which takes a minute; those of the networks, which
+# another process begins with, need none of it and find everything compiled afterwards. Then
+# what takes long, so that no process ends alone.
 FIRST = (
     "tests/literature/test_validation_document.py",
     "tests/unit/diagnose/",

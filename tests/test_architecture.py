@@ -59,7 +59,10 @@ GENSIG = {
     "commands": "dataset driveline dynamics errors execution faults geometry life mesh "
     "operation options plan production record report signals systems text twin units",
     "dataset": "errors signals version",
-    "driveline": "dynamics errors faults geometry life material mesh operation options sensing systems text units",
+    "driveline": (
+        "dynamics errors faults geometry life material mesh operation options sensing "
+        "systems text units"
+    ),
     "dynamics": "errors geometry material mesh operation units",
     "execution": "errors options",
     "faults": "errors geometry units",
@@ -69,13 +72,25 @@ GENSIG = {
     "mesh": "errors geometry material options units",
     "operation": "errors options text units",
     "options": "errors text units",
-    "plan": "dataset errors faults geometry life mesh operation options record systems units",
-    "production": "dataset dynamics errors execution faults life options plan record sensing systems units version",
-    "record": "dataset driveline errors faults geometry life operation options sensing systems units version",
+    "plan": (
+        "dataset errors faults geometry life mesh operation options record systems "
+        "units"
+    ),
+    "production": (
+        "dataset dynamics errors execution faults life options plan record sensing "
+        "systems units version"
+    ),
+    "record": (
+        "dataset driveline errors faults geometry life operation options sensing "
+        "systems units version"
+    ),
     "report": "dataset errors signals text",
     "sensing": "dynamics errors faults geometry options signals text units",
     "signals": "errors text",
-    "systems": "dynamics errors faults geometry life material mesh operation options sensing units",
+    "systems": (
+        "dynamics errors faults geometry life material mesh operation options sensing "
+        "units"
+    ),
     "terminal": "errors options text",
     "text": "errors",
     "twin": "dynamics errors options plan record sensing signals systems text units",
@@ -106,7 +121,9 @@ def graph() -> grimp.ImportGraph:
 def folder_imports(
     graph: grimp.ImportGraph, package: str, imported: str
 ) -> dict[str, set[str]]:
-    """Folder of ``package`` -> folders of ``imported`` that its modules import, type-only imports included."""
+    """Folder of ``package`` -> folders of ``imported`` that its modules import, type-only imports
+    included.
+    """
     arrows: dict[str, set[str]] = {}
     for module in sorted(graph.modules):
         for other in graph.find_modules_directly_imported_by(module):
@@ -271,5 +288,8 @@ def test_imports_of_0_9_keep_working() -> None:
 
 
 def test_a_moved_module_is_the_same_object() -> None:
-    code = "import diagnose.metrics, diagnose.scoring.metrics as new; assert diagnose.metrics is new"
+    code = (
+        "import diagnose.metrics, diagnose.scoring.metrics as new; "
+        "assert diagnose.metrics is new"
+    )
     assert run(sys.executable, "-c", code).returncode == 0

@@ -1,6 +1,8 @@
-"""The house's docstrings as Markdown: ``name : shape unit, meaning`` under NumPy's headings becomes a list.
+"""The house's docstrings as Markdown: ``name : shape unit, meaning`` under NumPy's headings
+becomes a list.
 
-NumPy's own form has a type behind the colon and the meaning on a line of its own; here types stand in the signature.
+NumPy's own form has a type behind the colon and the meaning on a line of its own; here types
+stand in the signature.
 """
 
 from __future__ import annotations
@@ -34,7 +36,10 @@ def as_markdown(text: str) -> str:
 
 
 def _entries(body: str) -> str:
-    """Return what stands under a heading: entries as a list, with what follows the blank line behind them."""
+    """Return what stands under a heading.
+
+    Entries as a list, with what follows the blank line behind them.
+    """
     block, _, rest = body.strip("\n").partition("\n\n")
     lines = []
     for line in block.split("\n"):

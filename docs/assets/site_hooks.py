@@ -1,7 +1,9 @@
-"""What ``mkdocs build`` does beside its plugins: equations as MathML, and links to files that lie outside ``docs``.
+"""What ``mkdocs build`` does beside its plugins: equations as MathML, and links to files that lie
+outside ``docs``.
 
-Pages are written for two readers, a code forge and the site. So equations are fenced blocks of ``math`` with a
-``\\tag``, and links go to files of the repository; here both become something that works without a network.
+Pages are written for two readers, a code forge and the site. So equations are fenced blocks of
+``math`` with a ``\\tag``, and links go to files of the repository; here both become something
+that works without a network.
 """
 
 from __future__ import annotations
@@ -27,7 +29,10 @@ TAG = re.compile(r"\\tag\{([^}]*)\}")
 
 
 def on_config(config: Any) -> Any:
-    """Set what YAML cannot say plainly: how equations are written, anchors as code forges make them, more pages."""
+    """Set what YAML cannot say plainly.
+
+    How equations are written, anchors as code forges make them, more pages.
+    """
     config.mdx_configs["pymdownx.superfences"] = {
         "custom_fences": [{"name": "math", "class": "equation", "format": equation}]
     }
@@ -62,7 +67,10 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Point links that leave ``docs`` to what the site has of them; a folder's name is left as text."""
+    """Point links that leave ``docs`` to what the site has of them.
+
+    A folder's name is left as text.
+    """
 
     def renewed(found: re.Match[str]) -> str:
         text, target, anchor = found.groups(default="")
@@ -96,7 +104,10 @@ def equation(source: str, *_: Any, **__: Any) -> str:
 
 
 def _path(page: str, target: str) -> str | None:
-    """Path from the repository's root that a page's link leads to; None where it leaves the repository."""
+    """Path from the repository's root that a page's link leads to.
+
+    None where it leaves the repository.
+    """
     if "://" in target or target.startswith(("mailto:", "/")):
         return None
     folder = "" if page in BESIDE else posixpath.join("docs", posixpath.dirname(page))
