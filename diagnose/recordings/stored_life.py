@@ -155,7 +155,7 @@ class StoredLife(StoredNetwork):
             scored_snapshots,
             write_life_predictions,
         )
-        from diagnose.studies.study import BOOTSTRAP_SEED
+        from diagnose.studies.protocol_results import BOOTSTRAP_SEED
 
         facts, dataset = self.facts, task.dataset
         lives = lives_of(task)
@@ -175,7 +175,7 @@ class StoredLife(StoredNetwork):
             method=facts.method,
             seed=self.description.seed,
             record=record,
-            said=facts.early_life_h * share,
+            predicted=facts.early_life_h * share,
             half_width=facts.half_width_h,
             early_life=facts.early_life_h,
             detail=part,

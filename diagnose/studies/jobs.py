@@ -24,7 +24,12 @@ from diagnose.scoring.metrics import over_records
 from diagnose.scoring.predictions import Prediction, Rows
 from diagnose.settings import TrainSettings
 from diagnose.studies.baseline_runs import baseline_predictions
-from diagnose.studies.novelty import NoveltyRun, fitted_runs, trained_runs
+from diagnose.studies.novelty import (
+    NoveltyRun,
+    fitted_runs,
+    rows_of_records,
+    trained_runs,
+)
 from diagnose.studies.result_files import network_name
 from diagnose.training.classes import Classes, predict_windows, with_shuffled_labels
 from diagnose.training.heads import predict_heads
@@ -161,7 +166,7 @@ def _run_training(
         record=record,
         log_probability=scores,
         detail=training.detail,
-        validation=_by_record(model, validation),
+        validation=rows_of_records(model, validation),
         windows=Rows(record=test.record, log_probability=by_window),
         best_epoch=training.best_epoch,
         validation_loss=training.validation_loss,
@@ -171,7 +176,7 @@ def _run_training(
     if shuffled:
         return prediction
     if training.last_model is not None:
-        last = _by_record(training.last_model, test).log_probability
+        last = rows_of_records(training.last_model, test).log_probability
         prediction = replace(prediction, last_predicted=last.argmax(axis=1))
     prediction = replace(
         prediction,
@@ -189,12 +194,6 @@ def _method(settings: TrainSettings, control: str) -> str:
     network = network_name(settings)
     names = {ORACLE: ORACLE_NETWORK, SHAM: sham_method(network, network)}
     return names.get(control, control) or network
-
-
-def _by_record(model: Any, windows: WindowSet) -> Rows:
-    """Log-probabilities of the records of a set."""
-    record, scores = over_records(predict_windows(model, windows), windows.record)
-    return Rows(record=record, log_probability=scores)
 
 
 def _run_baselines(task: Task, settings: TrainSettings, job: Job) -> list[Prediction]:
