@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import difflib
-from argparse import ArgumentParser
-from collections.abc import Mapping, Sequence
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
 from pathlib import Path
 
-from diagnose.commands.parser import Parser, refuse_existing, verb_parser
+from diagnose.commands.parser import add_overrides, refuse_existing
 from gensig.errors import ConfigError
 
 HELP = """\
@@ -30,46 +30,37 @@ examples:
 KEYS = ("data", "model_dir", "out", "protocol", "subset", "channels")
 
 
-def parser() -> Parser:
-    """The verb's parser, with its help."""
-    parser = verb_parser("evaluate", HELP, EXAMPLE)
-    add_arguments(parser)
-    return parser
-
-
 def add_arguments(parser: ArgumentParser) -> None:
-    """What can be typed behind the verb."""
-    parser.add_argument("overrides", nargs="*", metavar="key=value", help="see above")
+    """Add the arguments of the verb."""
+    add_overrides(parser)
 
 
-def run(words: Sequence[str]) -> int:
+def run(arguments: Namespace) -> int:
     """Judge a trained network and print its scores."""
-    arguments = parser().parse_intermixed_args(words)
     values = _key_values(arguments.overrides)
-    out = Path(values["out"]) if "out" in values else None
+    out = values.get("out")
     if out is not None:
-        refuse_existing(out)
+        refuse_existing(Path(out))
     from diagnose.recordings.evaluate import evaluate_network
     from diagnose.recordings.registry import open_network
     from gensig.dataset.reader import open_dataset
 
+    channels = None
+    if "channels" in values:
+        channels = values["channels"].strip("[]").split(",")
     network = open_network(values["model_dir"])
     evaluation = evaluate_network(
         network,
         open_dataset(values["data"]),
         protocol=values.get("protocol"),
         subset=values.get("subset"),
-        channels=_channels(values),
+        channels=channels,
     )
     print("\n".join(network.lines(evaluation.result)))
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        evaluation.write(out)
+        Path(out).mkdir(parents=True, exist_ok=True)
+        evaluation.write(Path(out))
     return 0
-
-
-def _channels(values: Mapping[str, str]) -> list[str] | None:
-    return values["channels"].strip("[]").split(",") if "channels" in values else None
 
 
 def _key_values(words: Sequence[str]) -> dict[str, str]:
@@ -83,10 +74,9 @@ def _key_values(words: Sequence[str]) -> dict[str, str]:
         if not equals or not value:
             raise ConfigError(f"'{word}' is not of the form key=value")
         if key not in KEYS:
-            close = difflib.get_close_matches(key, KEYS, n=1)
-            hint = (
-                f"did you mean {close[0]}?" if close else f"there is {', '.join(KEYS)}"
-            )
+            hint = f"there is {', '.join(KEYS)}"
+            for close in difflib.get_close_matches(key, KEYS, n=1):
+                hint = f"did you mean {close}?"
             raise ConfigError(f"unknown key '{key}'; {hint}")
         if key in values:
             raise ConfigError(f"{key} is given twice")

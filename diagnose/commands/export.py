@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser
-from collections.abc import Sequence
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from diagnose.commands.parser import Parser, verb_parser
+from diagnose.commands.parser import add_model
 from gensig.errors import ConfigError, DatasetError
 
 HELP = """\
@@ -20,27 +19,15 @@ example:
   diagnose export --to onnx --model runs/report/models/by_unit-seed0 --out gearbox.onnx"""
 
 
-def parser() -> Parser:
-    """The verb's parser, with its help."""
-    parser = verb_parser("export", HELP, EXAMPLE)
-    add_arguments(parser)
-    return parser
-
-
 def add_arguments(parser: ArgumentParser) -> None:
-    """What can be typed behind the verb."""
+    """Add the arguments of the verb."""
     parser.add_argument(
         "--to",
         required=True,
         choices=["onnx"],
         help="format; needs pip install 'gensig[onnx]'",
     )
-    parser.add_argument(
-        "--model",
-        required=True,
-        metavar="DIR",
-        help="folder that diagnose train wrote below models/",
-    )
+    add_model(parser)
     parser.add_argument(
         "--out",
         required=True,
@@ -49,9 +36,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
 
 
-def run(words: Sequence[str]) -> int:
-    """Write the file, check it, and say how well it agrees."""
-    arguments = parser().parse_args(words)
+def run(arguments: Namespace) -> int:
+    """Write the file, check it, and print how well it agrees with torch."""
     out = Path(arguments.out)
     if out.suffix != ".onnx":
         raise ConfigError(f"--out {out}: the name must end in .onnx")

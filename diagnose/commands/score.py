@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from argparse import ArgumentParser
-from collections.abc import Sequence
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
-
-from diagnose.commands.parser import Parser, verb_parser
 
 HELP = """\
 Score predictions of your own on a data set's split, by the scorer of diagnose train.
@@ -22,15 +19,8 @@ examples:
   diagnose score --data runs/benchmark --predictions runs/report/predictions.csv --json"""
 
 
-def parser() -> Parser:
-    """The verb's parser, with its help."""
-    parser = verb_parser("score", HELP, EXAMPLE)
-    add_arguments(parser)
-    return parser
-
-
 def add_arguments(parser: ArgumentParser) -> None:
-    """What can be typed behind the verb."""
+    """Add the arguments of the verb."""
     parser.add_argument(
         "--data", required=True, metavar="DIR", help="data set made by gensig generate"
     )
@@ -48,12 +38,11 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print everything as JSON")
 
 
-def run(words: Sequence[str]) -> int:
+def run(arguments: Namespace) -> int:
     """Print the scores.
 
     A benchmark that differs from the frozen one is named on stderr and not compared.
     """
-    arguments = parser().parse_args(words)
     from diagnose.studies.benchmark import score_file, score_table
     from gensig.dataset.reader import open_dataset
 

@@ -99,19 +99,21 @@ def adapt_model(
 def together(parts: Sequence[WindowSet]) -> WindowSet:
     """Windows of several sets as one set, with their records numbered one after another."""
     signals: list[Any] = []
-    columns: dict[str, list[Any]] = {
-        name: [] for name in ("segment", "start", "label", "record")
-    }
+    segment, record = [], []
     n_records = 0
     for part in parts:
-        columns["segment"].append(part.segment + len(signals))
-        columns["start"].append(part.start)
-        columns["label"].append(part.label)
-        columns["record"].append(part.record + n_records)
+        segment.append(part.segment + len(signals))
+        record.append(part.record + n_records)
         signals += part.signals
         n_records += int(part.record.max()) + 1
-    joined = {name: np.concatenate(column) for name, column in columns.items()}
-    return replace(parts[0], signals=tuple(signals), **joined)
+    return replace(
+        parts[0],
+        signals=tuple(signals),
+        segment=np.concatenate(segment),
+        start=np.concatenate([part.start for part in parts]),
+        label=np.concatenate([part.label for part in parts]),
+        record=np.concatenate(record),
+    )
 
 
 def _check_speed(source: Source, description: ModelDescription) -> None:

@@ -67,8 +67,8 @@ def predict_recording(
     if tracked is not None:
         tracking = tracking_facts(tracked, source)
     reasons = reasons_unlike(description, source, tracked, beyond) + answer.reasons
-    is_unlike = bool(reasons) or None
-    if domain is not None:
+    is_unlike = None
+    if reasons or domain is not None:
         is_unlike = bool(reasons)
     return {
         "recording": source.file,

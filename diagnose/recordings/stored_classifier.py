@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, final
@@ -17,6 +16,7 @@ from diagnose.recordings.source import PreparedRecording, Source, tracking_text
 from diagnose.recordings.stored_network import Answer, Graph, Scores, StoredNetwork
 from diagnose.recordings.verdict import class_text, score_text, verdict
 from diagnose.scoring.metrics import over_records
+from diagnose.studies.result_files import Content
 from diagnose.training.classes import predict_windows
 from diagnose.training.heads import predict_heads
 from diagnose.training.store import ModelDescription, data_fingerprint, load_model
@@ -84,7 +84,7 @@ class StoredClassifier(StoredNetwork):
         """Class -> its value, from (class,)."""
         return dict(zip(self.description.class_names, values.tolist(), strict=True))
 
-    def line(self, result: Mapping[str, Any]) -> str:
+    def line(self, result: Content) -> str:
         """Classes, speed, and how far the model can be relied on."""
         text = f"{result['recording']}: {class_text(result)}"
         is_faulty = result["gear"] not in (None, "none")
@@ -137,7 +137,7 @@ class StoredClassifier(StoredNetwork):
             write=_write_confusion,
         )
 
-    def lines(self, result: Mapping[str, Any]) -> list[str]:
+    def lines(self, result: Content) -> list[str]:
         """Part, channels, both scores and the recall of each class."""
         lines = [
             f"{result['n_records']} records of {result['n_units']} unit(s): {result['part']}",

@@ -15,6 +15,7 @@ from diagnose.recordings.raw_windows import N_CHECKED
 from diagnose.recordings.source import SPEED_TOLERANCE, PreparedRecording, Source
 from diagnose.recordings.stored_network import Answer, Graph, Scores, StoredNetwork
 from diagnose.scoring.life_scores import MEASURES, by_life, interval, life_scores
+from diagnose.studies.result_files import Content
 from diagnose.training.life_store import AGE, LifeFacts, load_life_model
 from diagnose.training.remaining_life import (
     LifeNetwork,
@@ -103,7 +104,7 @@ class StoredLife(StoredNetwork):
             reasons=_outside(facts, values),
         )
 
-    def line(self, result: Mapping[str, Any]) -> str:
+    def line(self, result: Content) -> str:
         """Hours left with their interval, and how far the model can be relied on."""
         level, hours = result["early_life_h"], result["remaining_life_h"]
         left = f"{hours:.3g} h left"
@@ -209,7 +210,7 @@ class StoredLife(StoredNetwork):
                     "it has no such column"
                 )
 
-    def lines(self, result: Mapping[str, Any]) -> list[str]:
+    def lines(self, result: Content) -> list[str]:
         """Part, channels, every measure, and the coverage that was wanted."""
         lives, censored = result["n_lives"], result["n_lives_censored"]
         channels, level = ", ".join(result["channel_names"]), result["early_life_h"]

@@ -7,12 +7,13 @@ from typing import Any
 
 from diagnose.scoring.judged import interval_text
 from diagnose.scoring.metrics import is_above
+from diagnose.studies.result_files import Content
 
 LEAST_MARGIN = 0.10  # between the two most probable classes; assumed
 
 
 def verdict(
-    probabilities: Mapping[str, float], test_score: Mapping[str, Any] | None
+    probabilities: Mapping[str, float], test_score: Content | None
 ) -> dict[str, Any]:
     """The two most probable classes, and the reasons why the first is not sure.
 
@@ -46,7 +47,7 @@ def verdict(
     }
 
 
-def class_text(result: Mapping[str, Any]) -> str:
+def class_text(result: Content) -> str:
     """Both classes with their probabilities, or the reasons why the class is undecided."""
     name, first = result["class"], f"{result['probability']:.2f}"
     second = f"{result['runner_up']} {result['runner_up_probability']:.2f}"
@@ -56,7 +57,7 @@ def class_text(result: Mapping[str, Any]) -> str:
     return f"{name}, probability {first}, next {second}"
 
 
-def score_text(result: Mapping[str, Any]) -> str:
+def score_text(result: Content) -> str:
     """Score of the model when it was trained."""
     score = result["model_test_score"]
     if score is None:

@@ -14,13 +14,13 @@ from diagnose.scoring.detection_limit import (
     records_behind,
     too_few_for_curve,
 )
+from diagnose.studies.result_files import Content
 
 PANELS_A_ROW = 5
 SHARES = (-0.03, 1.03)  # limits of an axis
-Answers = Mapping[str, Any]
 
 
-def conditions_figure(path: Path, answers: Answers) -> None:
+def conditions_figure(path: Path, answers: Content) -> None:
     """Scores of the network and the best baseline over each condition.
 
     Rings mark groups weaker than the rest.
@@ -31,7 +31,7 @@ def conditions_figure(path: Path, answers: Answers) -> None:
     answers : of one protocol, as `diagnose.studies.answers.protocol_answers` gives them, with at
         least one condition
     """
-    columns: dict[str, list[Answers]] = {}
+    columns: dict[str, list[Content]] = {}
     for row in answers["conditions"]["rows"]:
         columns.setdefault(row["column"], []).append(row)
     shown = list(columns.items())[:PANELS_A_ROW]
@@ -46,7 +46,7 @@ def conditions_figure(path: Path, answers: Answers) -> None:
     save(figure, path)
 
 
-def _condition_panel(panel: Any, answers: Answers, rows: Sequence[Answers]) -> None:
+def _condition_panel(panel: Any, answers: Content, rows: Sequence[Content]) -> None:
     """Draw the groups of one condition: by their middles, or side by side for names."""
     numbers = rows[0]["low"] is not None
     at, aside = np.arange(len(rows), dtype=float), 0.15
@@ -65,12 +65,12 @@ def _condition_panel(panel: Any, answers: Answers, rows: Sequence[Answers]) -> N
         panel.set_xlim(-0.5, len(rows) - 0.5 + aside)
 
 
-def _methods(answers: Answers) -> list[str]:
+def _methods(answers: Content) -> list[str]:
     """Names of the network and of the best baseline, where there is one."""
     return [name for name in (answers["network"], answers["best_baseline"]) if name]
 
 
-def detection_figure(path: Path, answers: Answers) -> None:
+def detection_figure(path: Path, answers: Content) -> None:
     """Share found at 5 % false alarms against severity: groups, fitted curve, limits.
 
     Parameters
@@ -103,7 +103,7 @@ def detection_figure(path: Path, answers: Answers) -> None:
 
 
 def _detection_lines(
-    panel: Any, detection: Answers, name: str, index: int, method: str
+    panel: Any, detection: Content, name: str, index: int, method: str
 ) -> None:
     """Draw the groups and the curve of one class, and the false alarms, of one method."""
     part, color = detection["classes"][name], COLORS[index]
@@ -118,7 +118,7 @@ def _detection_lines(
         panel.axhline(alarms, color=color, linestyle=":", linewidth=1)
 
 
-def graded_classes(answers: Answers) -> list[str]:
+def graded_classes(answers: Content) -> list[str]:
     """Fault classes whose severity varies among the test records."""
     if "detection" not in answers:
         return []
@@ -126,7 +126,7 @@ def graded_classes(answers: Answers) -> list[str]:
     return [name for name, part in classes.items() if part["by_severity"]]
 
 
-def window_length_figure(path: Path, answers: Mapping[str, Answers]) -> None:
+def window_length_figure(path: Path, answers: Mapping[str, Content]) -> None:
     """Balanced accuracy of the network over the length of signal judged, one panel a protocol.
 
     Parameters
@@ -149,7 +149,7 @@ def window_length_figure(path: Path, answers: Mapping[str, Answers]) -> None:
     save(figure, path)
 
 
-def _draw_limits(panel: Any, limits: Sequence[Answers]) -> None:
+def _draw_limits(panel: Any, limits: Sequence[Content]) -> None:
     """Draw a mark and its interval for each limit of severity that is reached."""
     for row in limits:
         if row["quantity"] != "severity" or row["status"] != "reached":

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from diagnose.report.answer_figures import (
     conditions_figure,
@@ -13,12 +11,11 @@ from diagnose.report.answer_figures import (
     window_length_figure,
 )
 from diagnose.scoring.judged import interval_text
+from diagnose.studies.result_files import Content
 from gensig.text.page import Section, Table
 
-Answers = Mapping[str, Any]
 
-
-def answer_sections(folder: Path, clean: Mapping[str, Any]) -> list[Section]:
+def answer_sections(folder: Path, clean: Content) -> list[Section]:
     """Sections on detection, conditions, length and comparisons, with figures in the folder.
 
     Parameters
@@ -36,11 +33,11 @@ def answer_sections(folder: Path, clean: Mapping[str, Any]) -> list[Section]:
     return [section for section in sections if section.table or section.notes]
 
 
-def _with_part(answers: Answers, part: str) -> Answers:
+def _with_part(answers: Content, part: str) -> Content:
     return {name: answer for name, answer in answers.items() if part in answer}
 
 
-def _detection_section(folder: Path, answers: Answers) -> Section:
+def _detection_section(folder: Path, answers: Content) -> Section:
     rows, notes, figures = [], [], []
     for protocol, part in answers.items():
         for method, detection in part["detection"].items():
@@ -88,7 +85,7 @@ def _detection_section(folder: Path, answers: Answers) -> Section:
     )
 
 
-def _conditions_section(folder: Path, answers: Answers) -> Section:
+def _conditions_section(folder: Path, answers: Content) -> Section:
     figures = []
     for protocol, part in answers.items():
         if part["conditions"]["rows"]:
@@ -103,11 +100,11 @@ def _conditions_section(folder: Path, answers: Answers) -> Section:
     )
 
 
-def _summaries(answers: Answers, key: str) -> list[tuple[str, str]]:
+def _summaries(answers: Content, key: str) -> list[tuple[str, str]]:
     return [(protocol, part[key]["summary"]) for protocol, part in answers.items()]
 
 
-def _length_section(folder: Path, answers: Answers) -> Section:
+def _length_section(folder: Path, answers: Content) -> Section:
     title, picture = "How much signal it needs", "window_length.png"
     if not answers:
         return Section(title=title)
@@ -121,7 +118,7 @@ def _length_section(folder: Path, answers: Answers) -> Section:
     )
 
 
-def _comparisons_section(answers: Answers) -> Section:
+def _comparisons_section(answers: Content) -> Section:
     return Section(
         title="Is the network better than the baselines",
         text=[

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
-from diagnose.studies.result_files import write_rows
+from diagnose.studies.result_files import Content, Entry, write_rows
 
-Row = Mapping[str, Any]
 SCORES = "scores.csv"
 BY_CONDITION = "by_condition.csv"
 BY_SEVERITY = "by_severity.csv"
@@ -16,7 +14,7 @@ LIMITS = "detection_limits.csv"
 COMPARISONS = "comparisons.csv"
 
 
-def write_tables(folder: Path, metrics: Mapping[str, Any]) -> list[str]:
+def write_tables(folder: Path, metrics: Content) -> list[str]:
     """Write the CSV files into the folder and return their names.
 
     A file that would have no row is left out.
@@ -27,7 +25,10 @@ def write_tables(folder: Path, metrics: Mapping[str, Any]) -> list[str]:
     metrics : of `diagnose.studies.study.run_study`
     """
     names = metrics["class_names"]
-    tables: dict[str, list[Row]] = {SCORES: [], **{name: [] for name in ANSWER_ROWS}}
+    tables: dict[str, list[Content]] = {
+        SCORES: [],
+        **{name: [] for name in ANSWER_ROWS},
+    }
     for protocol, result in metrics["protocols"].items():
         first = {"protocol": protocol}
         tables[SCORES] += [first | row for row in _score_rows(result)]
@@ -45,7 +46,7 @@ def write_tables(folder: Path, metrics: Mapping[str, Any]) -> list[str]:
     return written
 
 
-def _score_rows(result: Row) -> Iterator[dict[str, Any]]:
+def _score_rows(result: Content) -> Iterator[Entry]:
     for method, scores in result["methods"].items():
         for name, score in scores.items():
             if isinstance(score, float):
@@ -65,7 +66,7 @@ def _score_rows(result: Row) -> Iterator[dict[str, Any]]:
             }
 
 
-def _condition_rows(answers: Row) -> Iterator[dict[str, Any]]:
+def _condition_rows(answers: Content) -> Iterator[Entry]:
     for row in answers["conditions"]["rows"]:
         difference = _chosen(row, "difference_from_rest", "difference_at_most")
         for method, score in row["scores"].items():
@@ -83,7 +84,7 @@ def _condition_rows(answers: Row) -> Iterator[dict[str, Any]]:
             }
 
 
-def _class_rows(answers: Row, key: str) -> Iterator[tuple[dict[str, Any], Row]]:
+def _class_rows(answers: Content, key: str) -> Iterator[tuple[Entry, Content]]:
     """Method and class, and each entry of a list of ``detection``."""
     for method, detection in answers.get("detection", {}).items():
         for name, found in detection["classes"].items():
@@ -91,7 +92,7 @@ def _class_rows(answers: Row, key: str) -> Iterator[tuple[dict[str, Any], Row]]:
                 yield {"method": method, "class": name}, row
 
 
-def _severity_rows(answers: Row) -> Iterator[dict[str, Any]]:
+def _severity_rows(answers: Content) -> Iterator[Entry]:
     for first, row in _class_rows(answers, "by_severity"):
         yield {
             **first,
@@ -101,22 +102,22 @@ def _severity_rows(answers: Row) -> Iterator[dict[str, Any]]:
         }
 
 
-def _limit_rows(answers: Row) -> Iterator[dict[str, Any]]:
+def _limit_rows(answers: Content) -> Iterator[Entry]:
     for first, row in _class_rows(answers, "limits"):
         yield {**first, **row}
 
 
-def _comparison_rows(answers: Row) -> Iterator[dict[str, Any]]:
+def _comparison_rows(answers: Content) -> Iterator[Entry]:
     for row in answers["comparisons"]:
         others = [key for key in row if key not in ("difference", "summary")]
         yield _chosen(row, *others) | _spread("difference", row)
 
 
-def _chosen(row: Row, *keys: str) -> dict[str, Any]:
+def _chosen(row: Content, *keys: str) -> Entry:
     return {key: row[key] for key in keys}
 
 
-def _spread(name: str, row: Row) -> dict[str, Any]:
+def _spread(name: str, row: Content) -> Entry:
     """Mean and interval of a score as columns."""
     score = row[name]
     return {
@@ -127,7 +128,7 @@ def _spread(name: str, row: Row) -> dict[str, Any]:
 
 
 # File -> rows of the answers of a protocol.
-ANSWER_ROWS: dict[str, Callable[[Row], Iterator[dict[str, Any]]]] = {
+ANSWER_ROWS: dict[str, Callable[[Content], Iterator[Entry]]] = {
     BY_CONDITION: _condition_rows,
     BY_SEVERITY: _severity_rows,
     LIMITS: _limit_rows,

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from diagnose.baselines.base import Role
 from diagnose.report.methods import (
     baseline_texts,
@@ -15,6 +12,7 @@ from diagnose.report.methods import (
 from diagnose.report.text import score_cell
 from diagnose.scoring.judged import interval_text
 from diagnose.scoring.metrics import is_above
+from diagnose.studies.result_files import Content
 from gensig.text.page import Section, Table
 
 NO_TWINS = (
@@ -22,7 +20,7 @@ NO_TWINS = (
 )
 
 
-def verdict(method: Mapping[str, Any], chance: float) -> str:
+def verdict(method: Content, chance: float) -> str:
     """Verdict on a control that must be at chance."""
     score = method["balanced_accuracy"]
     if score["low"] is None:
@@ -34,7 +32,7 @@ def verdict(method: Mapping[str, Any], chance: float) -> str:
     return "at chance"
 
 
-def controls_section(metrics: Mapping[str, Any]) -> Section:
+def controls_section(metrics: Content) -> Section:
     """Every control of every clean protocol with its verdict; empty where none ran."""
     rows: list[list[str]] = []
     for protocol, result in metrics["protocols"].items():
@@ -64,7 +62,7 @@ def controls_section(metrics: Mapping[str, Any]) -> Section:
     )
 
 
-def _rows(result: Mapping[str, Any], model: str) -> list[list[str]]:
+def _rows(result: Content, model: str) -> list[list[str]]:
     methods = result["methods"]
     chance = methods["chance"]["balanced_accuracy"]
     rows = [
@@ -90,7 +88,7 @@ def _rows(result: Mapping[str, Any], model: str) -> list[list[str]]:
     return [*rows, [f"{model} over oracle", share, oracle_verdict(result)]]
 
 
-def oracle_verdict(result: Mapping[str, Any]) -> str:
+def oracle_verdict(result: Content) -> str:
     """Verdict on the oracle as a bound."""
     if is_above(result["over_oracle"]["balanced_accuracy"], 1):
         return "the oracle was not learnt: no bound here"

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from diagnose.report.panels import COLORS, MARKERS, panels, save, spaced
+from diagnose.studies.result_files import Content
 
 WIDEST = 16.0  # inches, of a figure of scores
 
@@ -44,7 +44,7 @@ def confusion_figure(
     save(figure, path)
 
 
-def scores_figure(path: Path, metrics: Mapping[str, Any]) -> None:
+def scores_figure(path: Path, metrics: Content) -> None:
     """Balanced accuracy and interval of every method, one panel a protocol.
 
     Leaky protocols come last and in grey.
@@ -89,7 +89,7 @@ def scores_figure(path: Path, metrics: Mapping[str, Any]) -> None:
     save(figure, path)
 
 
-def reliability_figure(path: Path, protocols: Mapping[str, Mapping[str, Any]]) -> None:
+def reliability_figure(path: Path, protocols: Mapping[str, Content]) -> None:
     """Share of right predictions against their probability, one panel a protocol.
 
     Parameters

@@ -15,7 +15,7 @@ from diagnose.report.panels import COLORS, panels, save, spaced
 from diagnose.report.text import data_line, files_section, level_text, made_by
 from diagnose.scoring.life_scores import BAND, MEASURES
 from diagnose.studies.life_jobs import AGE_ONLY, AND_AGE, CONSTANT, LifePrediction
-from diagnose.studies.result_files import write_metrics, write_rows
+from diagnose.studies.result_files import Content, write_metrics, write_rows
 from gensig.text.page import Card, Section, Table, write_page
 
 FEW_LIVES = 10
@@ -67,7 +67,7 @@ CAPTION = (
 
 def write_life_report(
     folder: Path,
-    metrics: Mapping[str, Any],
+    metrics: Content,
     lives: Lives,
     predictions: Sequence[LifePrediction],
 ) -> Path:
@@ -115,7 +115,7 @@ def write_life_report(
     return page
 
 
-def life_table(result: Mapping[str, Any]) -> Table:
+def life_table(result: Content) -> Table:
     """Scores of one protocol, a row a method."""
     rows = [
         [spaced(name), *(_cell(method[measure]) for measure in MEASURES)]
@@ -124,7 +124,7 @@ def life_table(result: Mapping[str, Any]) -> Table:
     return Table(head=["method", *HEAD.values()], rows=rows)
 
 
-def life_tables(metrics: Mapping[str, Any]) -> list[str]:
+def life_tables(metrics: Content) -> list[str]:
     """Markdown tables of all protocols."""
     lines = []
     for name, result in metrics["protocols"].items():
@@ -174,7 +174,7 @@ def _life_panel(panel: Any, lives: Lives, run: LifePrediction) -> None:
     panel.set(xlim=(1.03 * level, -0.03 * level), ylim=(-0.03 * level, 1.06 * level))
 
 
-def _card(name: str, result: Mapping[str, Any], model: str) -> Card:
+def _card(name: str, result: Content, model: str) -> Card:
     """The network's error against that of the age alone."""
     methods = result["methods"]
     network, by_age = methods[model], methods[AGE_ONLY]["rmse_h"]["mean"]
@@ -198,7 +198,7 @@ def _card(name: str, result: Mapping[str, Any], model: str) -> Card:
     )
 
 
-def _lives_sentence(result: Mapping[str, Any]) -> str:
+def _lives_sentence(result: Content) -> str:
     lives, censored = result["n_lives"], result["n_lives_censored"]
     return (
         f"{lives['train']} training, {lives['validation']} validation and {lives['test']} test "
@@ -208,7 +208,7 @@ def _lives_sentence(result: Mapping[str, Any]) -> str:
     )
 
 
-def _caveats(name: str, result: Mapping[str, Any]) -> list[str]:
+def _caveats(name: str, result: Content) -> list[str]:
     lines, lives = [], result["n_lives"]
     if lives["test"] < FEW_LIVES:
         lines.append(
@@ -228,7 +228,7 @@ def _caveats(name: str, result: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def _lead(metrics: Mapping[str, Any]) -> list[str]:
+def _lead(metrics: Content) -> list[str]:
     return [
         f"{data_line(metrics)} "
         "Simulated vibration: a score says nothing yet about measured machines.",
@@ -241,7 +241,7 @@ def _cell(score: Mapping[str, float]) -> str:
     return f"{score['mean']:.3g} [{score['low']:.3g}, {score['high']:.3g}]"
 
 
-def _score_rows(metrics: Mapping[str, Any]) -> Iterator[dict[str, str]]:
+def _score_rows(metrics: Content) -> Iterator[dict[str, str]]:
     for protocol, result in metrics["protocols"].items():
         for name, method in result["methods"].items():
             for measure in (*MEASURES, "gain_over_age_only_h"):

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from diagnose.report.markdown import table_lines
 from diagnose.scoring.judged import interval_text
 from diagnose.studies.novelty import SCORE_LABELS
@@ -13,6 +10,7 @@ from diagnose.studies.novelty_metrics import (
     LEAST_VALIDATION,
     TRUE_POSITIVES,
 )
+from diagnose.studies.result_files import Content
 from gensig.text.page import Section, Table
 
 QUESTIONS = {
@@ -31,7 +29,7 @@ MEANINGS = {
 }
 
 
-def novelty_tables(novelty: Mapping[str, Any]) -> list[str]:
+def novelty_tables(novelty: Content) -> list[str]:
     """Markdown: for each protocol one line on its parts, and the table of its scores."""
     lines: list[str] = []
     for name, result in novelty.items():
@@ -41,7 +39,7 @@ def novelty_tables(novelty: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def novelty_sections(novelty: Mapping[str, Any]) -> list[Section]:
+def novelty_sections(novelty: Content) -> list[Section]:
     """A section of the report for each protocol."""
     return [
         Section(
@@ -54,7 +52,7 @@ def novelty_sections(novelty: Mapping[str, Any]) -> list[Section]:
     ]
 
 
-def novelty_caveats(novelty: Mapping[str, Any], few_units: int) -> list[str]:
+def novelty_caveats(novelty: Content, few_units: int) -> list[str]:
     """Weaknesses of the numbers, one line each."""
     lines = []
     for name, result in novelty.items():
@@ -70,7 +68,7 @@ def novelty_caveats(novelty: Mapping[str, Any], few_units: int) -> list[str]:
     return lines
 
 
-def _parts_sentence(result: Mapping[str, Any]) -> str:
+def _parts_sentence(result: Content) -> str:
     """Records and units of each part, known and new classes."""
     counts, units = result["n_records"], result["n_units"]
     return (
@@ -82,7 +80,7 @@ def _parts_sentence(result: Mapping[str, Any]) -> str:
     )
 
 
-def _accuracy(result: Mapping[str, Any]) -> list[str]:
+def _accuracy(result: Content) -> list[str]:
     if "known" not in result:
         return []
     score = interval_text(result["known"]["balanced_accuracy"])
@@ -92,7 +90,7 @@ def _accuracy(result: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _notes(result: Mapping[str, Any]) -> list[tuple[str, str]]:
+def _notes(result: Content) -> list[tuple[str, str]]:
     notes = [*MEANINGS.items()]
     if "known" not in result:
         return notes
@@ -108,7 +106,7 @@ def _notes(result: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [*notes, ("FPR95", rate)]
 
 
-def _table(result: Mapping[str, Any]) -> Table:
+def _table(result: Content) -> Table:
     novel = result["novel_classes"]
     keys = [key for key in HEADS if key != "fpr95" or "known" in result]
     rows = []
@@ -120,7 +118,7 @@ def _table(result: Mapping[str, Any]) -> Table:
     return Table(head=["score", *head], rows=rows)
 
 
-def _cell(score: Mapping[str, Any] | None) -> str:
+def _cell(score: Content | None) -> str:
     if score is None:
         return "-"
     return interval_text(score)

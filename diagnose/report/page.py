@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ from diagnose.report.text import (
     trust_table,
 )
 from diagnose.scoring.metrics import LEAST_UNITS
-from diagnose.studies.result_files import write_metrics
+from diagnose.studies.result_files import Content, write_metrics
 from diagnose.training.heads import heads_notes
 from gensig.text.page import Section, Table, write_page
 
@@ -47,7 +47,7 @@ FILES = {
 Entries = Sequence[tuple[str, Any]]
 
 
-def write_report(folder: Path, metrics: Mapping[str, Any]) -> Path:
+def write_report(folder: Path, metrics: Content) -> Path:
     """Write ``metrics.json``, the figures and ``report.html`` and return the page."""
     write_metrics(folder, metrics)
     write_tables(folder, metrics)
@@ -61,7 +61,7 @@ def write_report(folder: Path, metrics: Mapping[str, Any]) -> Path:
     return page
 
 
-def result_table(metrics: Mapping[str, Any]) -> list[str]:
+def result_table(metrics: Content) -> list[str]:
     """Markdown table of protocol x method.
 
     Balanced accuracy with its 95 % interval, leaky protocols last.
@@ -78,7 +78,7 @@ def result_table(metrics: Mapping[str, Any]) -> list[str]:
     return table_lines(table.head, rows)
 
 
-def without_interval(metrics: Mapping[str, Any]) -> list[str]:
+def without_interval(metrics: Content) -> list[str]:
     """Line on the protocols whose scores have no interval; empty where all have one."""
     results = metrics["protocols"] | metrics["novelty"]
     units = {name: result["n_units"]["test"] for name, result in results.items()}
@@ -88,12 +88,12 @@ def without_interval(metrics: Mapping[str, Any]) -> list[str]:
     return [f"{', '.join(few)}: {few_machines(min(few.values()))}"]
 
 
-def _ordered(metrics: Mapping[str, Any]) -> Entries:
+def _ordered(metrics: Content) -> Entries:
     """Protocols with their results, leaky ones last."""
     return sorted(metrics["protocols"].items(), key=lambda item: item[1]["leaky"])
 
 
-def _score_table(metrics: Mapping[str, Any]) -> Table:
+def _score_table(metrics: Content) -> Table:
     results = _ordered(metrics)
     columns = {
         name: label
@@ -111,11 +111,11 @@ def _score_table(metrics: Mapping[str, Any]) -> Table:
     )
 
 
-def _has(metrics: Mapping[str, Any], method: str) -> bool:
+def _has(metrics: Content, method: str) -> bool:
     return any(method in result["methods"] for result in metrics["protocols"].values())
 
 
-def _lead(metrics: Mapping[str, Any]) -> list[str]:
+def _lead(metrics: Content) -> list[str]:
     samples = metrics["settings"]["window_samples"]
     window_ms = 1e3 * samples / metrics["sampling_rate_hz"]
     return [
@@ -125,7 +125,7 @@ def _lead(metrics: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _sections(folder: Path, metrics: Mapping[str, Any]) -> list[Section]:
+def _sections(folder: Path, metrics: Content) -> list[Section]:
     """Sections of the page; their figures are written into the folder."""
     ordered = _ordered(metrics)
     clean = {name: result for name, result in ordered if not result["leaky"]}
@@ -157,9 +157,7 @@ def _sections(folder: Path, metrics: Mapping[str, Any]) -> list[Section]:
     ]
 
 
-def _score_sections(
-    folder: Path, metrics: Mapping[str, Any], ordered: Entries
-) -> list[Section]:
+def _score_sections(folder: Path, metrics: Content, ordered: Entries) -> list[Section]:
     cards = []
     for name, result in ordered:
         meaning = MEANING.get(name, LEAKY_MEANING)
@@ -188,7 +186,7 @@ def _score_sections(
     ]
 
 
-def _meaning_section(metrics: Mapping[str, Any], clean: Mapping[str, Any]) -> Section:
+def _meaning_section(metrics: Content, clean: Content) -> Section:
     label = "the class with the largest mean log-probability over its windows."
     return Section(
         title="What the numbers mean",
@@ -206,7 +204,7 @@ def _meaning_section(metrics: Mapping[str, Any], clean: Mapping[str, Any]) -> Se
     )
 
 
-def _sensors(result: Mapping[str, Any]) -> str:
+def _sensors(result: Content) -> str:
     """Channels of training and test, where they differ."""
     channels = result["channels"]
     trained, tested = ", ".join(channels["train"]), ", ".join(channels["test"])
@@ -215,7 +213,7 @@ def _sensors(result: Mapping[str, Any]) -> str:
     return f": trained on {trained}, tested on {tested}"
 
 
-def _fault_section(clean: Mapping[str, Any], metrics: Mapping[str, Any]) -> Section:
+def _fault_section(clean: Content, metrics: Content) -> Section:
     model, names = metrics["model"], metrics["class_names"]
     notes = [
         (name, confusions(result["methods"][model]["confusion"], names))
@@ -229,7 +227,7 @@ def _fault_section(clean: Mapping[str, Any], metrics: Mapping[str, Any]) -> Sect
     )
 
 
-def _trust_section(folder: Path, clean: Mapping[str, Any]) -> Section:
+def _trust_section(folder: Path, clean: Content) -> Section:
     calibration = {name: result["calibration"] for name, result in clean.items()}
     reliability_figure(folder / "reliability.png", calibration)
     return Section(
@@ -248,9 +246,7 @@ def _trust_section(folder: Path, clean: Mapping[str, Any]) -> Section:
     )
 
 
-def _confusion_section(
-    folder: Path, metrics: Mapping[str, Any], ordered: Entries
-) -> Section:
+def _confusion_section(folder: Path, metrics: Content, ordered: Entries) -> Section:
     figures = []
     for name, result in ordered:
         title = f"{metrics['model']}, {name}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from diagnose.report.methods import controls_on_cards, rivals_on_cards
 from diagnose.report.novelty_report import novelty_caveats
 from diagnose.scoring.judged import interval_text
 from diagnose.scoring.metrics import LEAST_UNITS, is_above
+from diagnose.studies.result_files import Content
 from gensig.text.page import Card, Section, Table
 
 FEW_UNITS = 10
@@ -26,7 +26,7 @@ TRUST_HEAD = (
 )
 
 
-def score_cell(method: Mapping[str, Any] | None) -> str:
+def score_cell(method: Content | None) -> str:
     """Balanced accuracy with its interval, "-" for a method that was not run."""
     if method is None:
         return "-"
@@ -36,7 +36,7 @@ def score_cell(method: Mapping[str, Any] | None) -> str:
     return interval_text(value)
 
 
-def data_line(metrics: Mapping[str, Any]) -> str:
+def data_line(metrics: Content) -> str:
     """Sentence on the data: size, classes, channels, rate."""
     records = f"{metrics['n_records']} records"
     if "class_names" in metrics:
@@ -48,14 +48,14 @@ def data_line(metrics: Mapping[str, Any]) -> str:
     )
 
 
-def level_text(metrics: Mapping[str, Any]) -> str:
+def level_text(metrics: Content) -> str:
     """Normalisation in words."""
     if metrics["settings"]["normalise"] == "none":
         return "level kept"
     return "level removed (RMS-normalised)"
 
 
-def made_by(metrics: Mapping[str, Any]) -> str:
+def made_by(metrics: Content) -> str:
     """Number of seeds, version and time."""
     made = metrics["environment"]
     n_seeds = len(metrics["settings"]["seeds"])
@@ -67,7 +67,7 @@ def files_section(files: Mapping[str, str]) -> Section:
     return Section(title="Files beside this page", notes=[*files.items()], folded=True)
 
 
-def answer_card(name: str, result: Mapping[str, Any], model: str, meaning: str) -> Card:
+def answer_card(name: str, result: Content, model: str, meaning: str) -> Card:
     """One protocol's score against chance, the best baseline, the oracle and the controls."""
     methods = result["methods"]
     score = methods[model]["balanced_accuracy"]
@@ -90,9 +90,7 @@ def answer_card(name: str, result: Mapping[str, Any], model: str, meaning: str) 
     )
 
 
-def _verdict(
-    result: Mapping[str, Any], score: Mapping[str, Any], chance: float
-) -> tuple[list[str], bool]:
+def _verdict(result: Content, score: Content, chance: float) -> tuple[list[str], bool]:
     """Verdicts on a score, and True if a control is above chance."""
     methods = result["methods"]
     if score["low"] is None:
@@ -123,7 +121,7 @@ def _verdict(
     return lines, leak
 
 
-def _best_rival(methods: Mapping[str, Any], score: Mapping[str, Any]) -> list[str]:
+def _best_rival(methods: Content, score: Content) -> list[str]:
     """Comparison of the network's score with the best baseline; empty where none ran."""
     means = {
         label: methods[name]["balanced_accuracy"]["mean"]
@@ -142,15 +140,13 @@ def _best_rival(methods: Mapping[str, Any], score: Mapping[str, Any]) -> list[st
     return [f"{comparison} {best} ({means[best]:.2f})"]
 
 
-def _spread(score: Mapping[str, Any]) -> str:
+def _spread(score: Content) -> str:
     if score["low"] is None:
         return "too few machines"
     return f"{score['low']:.2f} to {score['high']:.2f}"
 
 
-def recall_table(
-    clean: Mapping[str, Any], model: str, class_names: Sequence[str]
-) -> Table:
+def recall_table(clean: Content, model: str, class_names: Sequence[str]) -> Table:
     """Recall by class, a row a protocol."""
     rows = []
     for protocol, result in clean.items():
@@ -177,7 +173,7 @@ def confusions(confusion: Sequence[Sequence[int]], class_names: Sequence[str]) -
     return "; ".join(texts[:3]) + "."
 
 
-def trust_table(clean: Mapping[str, Any]) -> Table:
+def trust_table(clean: Content) -> Table:
     """Calibration and the choice of the epoch, a row a protocol."""
     rows = []
     for name, result in clean.items():
@@ -211,7 +207,7 @@ def few_machines(n_units: int) -> str:
     )
 
 
-def caveats(metrics: Mapping[str, Any]) -> list[str]:
+def caveats(metrics: Content) -> list[str]:
     """Limits of the scores that a reader must know before using them."""
     lines = [
         "Simulated vibration. A score here says nothing yet about measured machines."

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial, reduce
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,7 @@ from diagnose.scoring.predictions import Prediction
 from diagnose.scoring.window_length import by_window_length
 from diagnose.settings import TrainSettings
 from diagnose.studies.counts import unit_ids
-from diagnose.studies.result_files import network_name
+from diagnose.studies.result_files import Entry, network_name
 
 ANSWERS_SEED = 20240608
 IntArray = NDArray[np.integer]
@@ -33,7 +32,7 @@ FloatArray = NDArray[np.floating]
 
 def protocol_answers(
     task: Task, settings: TrainSettings, predictions: Sequence[Prediction]
-) -> dict[str, Any]:
+) -> Entry:
     """Part ``answers`` of one clean protocol in ``metrics.json``; see docs/howto/report.md.
 
     Parameters
@@ -61,7 +60,7 @@ def protocol_answers(
     shown = [method for method in (network, best) if method is not None]
     n_bootstrap = settings.n_bootstrap
     columns = condition_columns(task.dataset, record)
-    result: dict[str, Any] = {
+    result: Entry = {
         "network": name,
         "best_baseline": getattr(best, "method", None),
         "n_records": int(record.size),
@@ -107,7 +106,7 @@ def _has_healthy(task: Task, network: Judged) -> bool:
 
 def _window_length(
     task: Task, settings: TrainSettings, runs: Sequence[Prediction]
-) -> dict[str, Any]:
+) -> Entry:
     """Scores of the network by length of the signal judged."""
     rate = task.dataset.sampling_rate
     windows = [run.windows for run in runs if run.windows is not None]

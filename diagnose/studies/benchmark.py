@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from diagnose.data.windows import Task, subset_segments, task_of
 from diagnose.scoring.judged import interval_text
 from diagnose.studies.counts import n_different
 from diagnose.studies.protocol_results import is_leaky, score_predictions
-from diagnose.studies.result_files import sha256
+from diagnose.studies.result_files import Content, Entry, sha256
 from gensig.dataset.folder.layout import PLAN, SPLITS
 from gensig.errors import ConfigError, DatasetError
 
@@ -52,7 +52,7 @@ class Benchmark:
     plan_sha256: str
     split_sha256: Mapping[str, str]
     signal_rms: Mapping[str, Sequence[float]]
-    results: Mapping[str, Mapping[str, Any]]
+    results: Mapping[str, Content]
 
     def differences(self, dataset: Dataset) -> list[str]:
         """Differences of a data set with this plan from the benchmark, one line each."""
@@ -89,9 +89,7 @@ def benchmark_of(dataset: Dataset) -> Benchmark | None:
     return None
 
 
-def score_file(
-    dataset: Dataset, path: Path, *, protocol: str | None = None
-) -> dict[str, Any]:
+def score_file(dataset: Dataset, path: Path, *, protocol: str | None = None) -> Entry:
     """Score the predictions of a CSV file on the test parts of the data set's splits.
 
     Parameters
@@ -112,7 +110,7 @@ def score_file(
     ConfigError    for a class or protocol that does not exist, or a leaky protocol
     """
     task = task_of(dataset, window_samples=1, stride_samples=1, normalise="none")
-    scores: dict[str, dict[str, Any]] = {}
+    scores: dict[str, Entry] = {}
     chance: dict[str, float] = {}
     for (name, method), runs in _runs(task, path, protocol).items():
         record = runs[0][0]
@@ -130,13 +128,13 @@ def score_file(
     }
 
 
-def _comparison(dataset: Dataset, protocols: Sequence[str]) -> dict[str, Any] | None:
+def _comparison(dataset: Dataset, protocols: Sequence[str]) -> Entry | None:
     """Frozen benchmark of a data set, with results only where nothing differs; None without."""
     frozen = benchmark_of(dataset)
     if frozen is None:
         return None
     differences = frozen.differences(dataset)
-    results: dict[str, Any] = {}
+    results: Entry = {}
     if not differences:
         results = {name: frozen.results.get(name, {}) for name in protocols}
     return {"name": frozen.name, "differences": differences, "results": results}
@@ -228,7 +226,7 @@ def _rows(path: Path) -> list[dict[str, str]]:
     return rows
 
 
-def score_table(result: Mapping[str, Any]) -> list[str]:
+def score_table(result: Content) -> list[str]:
     """Markdown table: a row for each protocol and method, those of the benchmark marked."""
     lines = ["| protocol | method | balanced accuracy | chance |", "|---|---|---|---|"]
     shipped = (result["benchmark"] or {"results": {}})["results"]

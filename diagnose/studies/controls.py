@@ -16,6 +16,7 @@ from diagnose.scoring.predictions import Prediction
 from diagnose.settings import BOTH, TrainSettings
 from diagnose.studies.counts import by_method, run_notes
 from diagnose.studies.jobs import LEVEL_KEPT, ORACLE, ORACLE_NETWORK, PROBE, SHAM, Job
+from diagnose.studies.result_files import Entry
 from diagnose.training import sham
 
 Pairs = Sequence[tuple[Any, Any]]
@@ -83,14 +84,14 @@ def sham_methods(
     task: Task,
     settings: TrainSettings,
     predictions: Sequence[Prediction],
-    score: Callable[[Task, Pairs], dict[str, Any]],
-) -> dict[str, dict[str, Any]]:
+    score: Callable[[Task, Pairs], Entry],
+) -> dict[str, Entry]:
     """Protocol -> method -> scores, by ``score``, of the trainings on the sham data set."""
     if settings.sham is None:
         return {}
     other = sham.sham_task(task, settings.sham)
     on_sham = [run for run in predictions if is_sham(run.method)]
-    results: dict[str, dict[str, Any]] = {}
+    results: dict[str, Entry] = {}
     for protocol in dict.fromkeys(run.protocol for run in on_sham):
         results[protocol] = {}
         for method, runs in by_method(on_sham, protocol).items():

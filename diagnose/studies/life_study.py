@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +31,7 @@ from diagnose.studies.counts import by_method, n_different, run_notes
 from diagnose.studies.jobs import Job, run_jobs
 from diagnose.studies.life_jobs import AGE_ONLY, LifePrediction, run_life_job
 from diagnose.studies.protocol_results import BOOTSTRAP_SEED
-from diagnose.studies.result_files import save_network, study_facts, write_rows
+from diagnose.studies.result_files import Entry, save_network, study_facts, write_rows
 from diagnose.studies.study import check_network
 from diagnose.workers import n_cores
 from gensig.errors import ConfigError
@@ -101,7 +100,7 @@ def run_life_study(
     plan: LifePlan,
     *,
     on_done: Callable[[str], None] = lambda line: None,
-) -> tuple[dict[str, Any], list[LifePrediction]]:
+) -> tuple[Entry, list[LifePrediction]]:
     """Content of ``metrics.json``, and the predictions.
 
     Parameters
@@ -168,7 +167,7 @@ def _result(
     lives: Lives,
     protocol: str,
     predictions: Sequence[LifePrediction],
-) -> dict[str, Any]:
+) -> Entry:
     """Entry of a protocol in ``metrics.json``."""
     runs = by_method(predictions, protocol)
     tables: dict[str, dict[str, FloatArray]] = {}
@@ -257,7 +256,7 @@ def write_life_predictions(
 
 def _rows(
     task: Task, lives: Lives, predictions: Sequence[LifePrediction]
-) -> Iterator[dict[str, Any]]:
+) -> Iterator[Entry]:
     ids = np.asarray(task.dataset.column("record_id"))
     for run in predictions:
         low, high = interval(run.predicted, run.half_width, run.early_life)

@@ -22,7 +22,7 @@ from diagnose.studies.counts import (
     unit_ids,
 )
 from diagnose.studies.novelty import NoveltyRun
-from diagnose.studies.result_files import write_rows
+from diagnose.studies.result_files import Entry, write_rows
 from gensig.errors import ConfigError
 
 FloatArray = NDArray[np.floating]
@@ -102,7 +102,7 @@ def novelty_protocol_result(
     *,
     n_bootstrap: int,
     seed: int,
-) -> dict[str, Any]:
+) -> Entry:
     """Entry of an open protocol in ``metrics.json``; every method is judged on the same resamples.
 
     Parameters
@@ -116,7 +116,7 @@ def novelty_protocol_result(
     known = np.unique(labels[parts["train"]])
     novel = np.setdiff1d(labels[parts["test"]], known)
     methods = by_method(runs, protocol)
-    result: dict[str, Any] = {
+    result: Entry = {
         "known_classes": [task.class_names[index] for index in known],
         "novel_classes": [task.class_names[index] for index in novel],
         **part_sizes(task, parts),
@@ -142,7 +142,7 @@ def _accuracy_on_known(
     known: IntArray,
     n_bootstrap: int,
     rng: np.random.Generator,
-) -> dict[str, Any]:
+) -> Entry:
     """Balanced accuracy over the test records of known classes."""
     record = runs[0].record
     mine = np.isin(task.labels()[record], known)
@@ -161,7 +161,7 @@ def write_novelty(path: Path, task: Task, runs: Sequence[NoveltyRun]) -> None:
     write_rows(path, _rows(task, runs))
 
 
-def _rows(task: Task, runs: Sequence[NoveltyRun]) -> Iterator[dict[str, Any]]:
+def _rows(task: Task, runs: Sequence[NoveltyRun]) -> Iterator[Entry]:
     labels, unit = task.labels(), unit_ids(task)
     ids = np.asarray(task.dataset.column("record_id"))
     for run in runs:
@@ -202,7 +202,7 @@ class _Resamples:
         """(unit,) number, or sum of the weights, of chosen records."""
         return np.bincount(self.unit[chosen], weights=weights, minlength=self.n_units)
 
-    def score(self, per_seed: Sequence[float], resampled: FloatArray) -> dict[str, Any]:
+    def score(self, per_seed: Sequence[float], resampled: FloatArray) -> Entry:
         """Mean and percentile interval of (resample, seed) values over drawn seeds."""
         means = np.take_along_axis(resampled, self.seeds, axis=1).mean(axis=1)
         low, high = percentile_interval(means, self.n_units)
@@ -216,7 +216,7 @@ def novelty_result(
     known: Sequence[int],
     n_bootstrap: int,
     rng: np.random.Generator,
-) -> dict[str, Any]:
+) -> Entry:
     """Scores of one method on one protocol, with intervals by bootstrap over units and seeds.
 
     Parameters
@@ -252,7 +252,7 @@ def novelty_result(
     new = {name: mine for name, mine in of_class.items() if novel[mine].any()}
     trained = {name: mine for name, mine in of_class.items() if name not in new}
 
-    def area(chosen: Mask) -> dict[str, Any]:
+    def area(chosen: Mask) -> Entry:
         return _area(scores, novel & chosen, ~novel & chosen, resamples)
 
     result = {
@@ -272,9 +272,7 @@ def novelty_result(
     return result
 
 
-def _area(
-    scores: FloatArray, novel: Mask, known: Mask, resamples: _Resamples
-) -> dict[str, Any]:
+def _area(scores: FloatArray, novel: Mask, known: Mask, resamples: _Resamples) -> Entry:
     """Area under the ROC curve of (seed, record) scores, of novel against known records.
 
     A resample weighs the comparisons of each pair of units.
@@ -311,7 +309,7 @@ def _won_by_units(
     return won
 
 
-def _share(alarm: Mask, chosen: Mask, resamples: _Resamples) -> dict[str, Any]:
+def _share(alarm: Mask, chosen: Mask, resamples: _Resamples) -> Entry:
     """Share of the chosen records with an alarm (seed, record)."""
     hits = np.stack([resamples.count(chosen, row[chosen]) for row in alarm])
     total = resamples.drawn @ resamples.count(chosen)
@@ -319,9 +317,7 @@ def _share(alarm: Mask, chosen: Mask, resamples: _Resamples) -> dict[str, Any]:
     return resamples.score(per_seed, _ratio(resamples.drawn @ hits.T, total))
 
 
-def _false_positives(
-    scores: FloatArray, novel: Mask, resamples: _Resamples
-) -> dict[str, Any]:
+def _false_positives(scores: FloatArray, novel: Mask, resamples: _Resamples) -> Entry:
     resampled = np.full((len(resamples.drawn), len(scores)), np.nan)
     for row, times in zip(resampled, resamples.drawn, strict=True):
         weight = times[resamples.unit].astype(float)

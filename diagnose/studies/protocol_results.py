@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +30,7 @@ from diagnose.studies.counts import (
     unit_ids,
 )
 from diagnose.studies.jobs import LABEL_SHUFFLE, ORACLE
-from diagnose.studies.result_files import network_name
+from diagnose.studies.result_files import Entry, network_name
 from diagnose.training.heads import head_scores
 
 BOOTSTRAP_SEED = 20240607
@@ -48,7 +47,7 @@ def is_leaky(protocol: str) -> bool:
 
 def score_predictions(
     task: Task, runs: Pairs, n_bootstrap: int, *, shuffled: bool = False
-) -> dict[str, Any]:
+) -> Entry:
     """Scores of one method with intervals over units, confusion counts and recall.
 
     Parameters
@@ -60,7 +59,7 @@ def score_predictions(
     """
     confusion = confusion_counts(task, runs)
     rng = np.random.default_rng(BOOTSTRAP_SEED)
-    result: dict[str, Any] = {}
+    result: Entry = {}
     for name in SCORES:
         score = score_with_interval(
             name, confusion, n_bootstrap=n_bootstrap, rng=rng, shuffled=shuffled
@@ -73,7 +72,7 @@ def score_predictions(
     return result
 
 
-def test_score(task: Task, prediction: Prediction, n_bootstrap: int) -> dict[str, Any]:
+def test_score(task: Task, prediction: Prediction, n_bootstrap: int) -> Entry:
     """Score that is stored with a network.
 
     Balanced accuracy with its interval, chance, and the numbers of records and units.
@@ -95,7 +94,7 @@ def protocol_result(
     settings: TrainSettings,
     protocol: str,
     predictions: Sequence[Prediction],
-) -> dict[str, Any]:
+) -> Entry:
     """Entry of a protocol in ``metrics.json``.
 
     Parameters
@@ -110,7 +109,7 @@ def protocol_result(
     network = runs[network_name(settings)]
     methods["chance"] = _chance(task, network[0].record)
     mine = [run for of_method in runs.values() for run in of_method]
-    over_oracle: dict[str, Any] = {}
+    over_oracle: Entry = {}
     oracle = chosen_oracle(task, mine)
     if oracle is not None:
         methods[ORACLE] = {**methods[oracle], "chosen": oracle}
@@ -141,7 +140,7 @@ def protocol_result(
 
 def _method_result(
     task: Task, settings: TrainSettings, method: str, runs: Sequence[Prediction]
-) -> dict[str, Any]:
+) -> Entry:
     pairs = [(run.record, run.predicted) for run in runs]
     shuffled = method == LABEL_SHUFFLE
     scores = score_predictions(task, pairs, settings.n_bootstrap, shuffled=shuffled)
@@ -163,7 +162,7 @@ def _over_oracle(
     settings: TrainSettings,
     network: Sequence[Prediction],
     oracle: Sequence[Prediction],
-) -> dict[str, Any]:
+) -> Entry:
     """Scores of the network as shares of the oracle's."""
     above, below = (
         confusion_counts(task, [(run.record, run.predicted) for run in runs])
@@ -180,7 +179,7 @@ def _over_oracle(
 
 def _last_epoch(
     task: Task, settings: TrainSettings, network: Sequence[Prediction]
-) -> dict[str, Any]:
+) -> Entry:
     """Epochs run, and scores of the weights of the last one, for comparison with the best."""
     pairs = [
         (run.record, run.last_predicted)
@@ -194,7 +193,7 @@ def _last_epoch(
     }
 
 
-def _calibration(task: Task, network: Sequence[Prediction]) -> dict[str, Any]:
+def _calibration(task: Task, network: Sequence[Prediction]) -> Entry:
     """Calibration of the probabilities of test records."""
     labels = task.labels()
     return calibration_scores(

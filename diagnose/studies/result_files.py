@@ -26,6 +26,8 @@ from diagnose.training.store import (
 from gensig.version import __version__
 
 METRICS_SCHEMA_VERSION = 1
+Entry = dict[str, Any]  # made for ``metrics.json``
+Content = Mapping[str, Any]  # read from it
 
 
 def network_name(settings: TrainSettings) -> str:
@@ -69,13 +71,13 @@ def sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def write_metrics(folder: Path, metrics: Mapping[str, Any]) -> None:
+def write_metrics(folder: Path, metrics: Content) -> None:
     """Write ``metrics.json`` into a folder."""
     text = json.dumps(metrics, indent=2, allow_nan=False)
     (folder / "metrics.json").write_text(f"{text}\n", encoding="utf-8")
 
 
-def write_rows(path: Path, rows: Iterable[Mapping[str, Any]]) -> None:
+def write_rows(path: Path, rows: Iterable[Content]) -> None:
     """Write rows with the same keys, at least one, as a CSV file."""
     first, *others = rows
     with path.open("w", newline="", encoding="utf-8") as file:

@@ -47,7 +47,7 @@ from diagnose.studies.protocol_results import (
     score_predictions,
     test_score,
 )
-from diagnose.studies.result_files import network_name, save_network, study_facts
+from diagnose.studies.result_files import Entry, network_name, save_network, study_facts
 from diagnose.training.autoencoder import check_window_for_autoencoder
 from diagnose.training.tensorboard import need_tensorboard, write_scores
 from diagnose.training.train import device_of
@@ -197,7 +197,7 @@ def run_study(
     protocols: Sequence[str],
     jobs: Sequence[Job],
     on_done: Callable[[str], None] = lambda line: None,
-) -> dict[str, Any]:
+) -> Entry:
     """Run the jobs, write the models below `folder` and return the content of ``metrics.json``.
 
     Parameters
@@ -225,8 +225,8 @@ def run_study(
     if novelty:
         write_novelty(folder / "novelty.csv", task, novelty)
     n_bootstrap = settings.n_bootstrap
-    results: dict[str, Any] = {}
-    novelty_results: dict[str, Any] = {}
+    results: Entry = {}
+    novelty_results: Entry = {}
     for name in protocols:
         if name in OPEN_PROTOCOLS:
             novelty_results[name] = novelty_protocol_result(
