@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import torch
 from fake_dataset import FakeDataset
-from runs import NETWORK_ONLY, QUICK, SMALL_CNN, model_of, train
+from fake_lives import FakeLives
+from runs import LIFE, NETWORK_ONLY, QUICK, SMALL_CNN, model_of, train
 
 
 def fake():
@@ -38,6 +39,19 @@ def model(train_network):
 def levels_model(train_network):
     """A network that sees levels in m/s2."""
     return train_network("epochs=5", "normalise=none")
+
+
+@pytest.fixture(scope="session")
+def lives():
+    """Data set of lives."""
+    return FakeLives(n_lives=24, n_censored=6, seed=1)
+
+
+@pytest.fixture(scope="session")
+def life_study(tmp_path_factory, lives):
+    """Folder of a study of remaining lives."""
+    out = tmp_path_factory.mktemp("lives") / "out"
+    return train(out, lives, *LIFE, "normalise=none")
 
 
 @pytest.fixture
