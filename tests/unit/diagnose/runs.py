@@ -21,6 +21,18 @@ QUICK = (
     "n_bootstrap=100",
 )
 FAST = (*QUICK, *SMALL_CNN)
+LIFE = (
+    "task=remaining_life",
+    "window_samples=1600",
+    "stride_samples=1600",
+    "epochs=5",
+    "seeds=[0]",
+    "n_bootstrap=200",
+    "n_threads=1",
+    "epoch_fraction=1",
+    "learning_rate=0.01",
+    *SMALL_CNN,
+)
 NETWORK_ONLY = (
     "protocols=[by_unit]",
     "shuffle_control=false",
@@ -82,17 +94,3 @@ def refuses(capsys, words, *messages):
     assert line.startswith("diagnose: ")
     for message in messages:
         assert message in line
-
-
-LIFE = (
-    "task=remaining_life",
-    "window_samples=1600",
-    "stride_samples=1600",
-    "epochs=5",
-    "seeds=[0]",
-    "n_bootstrap=200",
-    "n_threads=1",
-    "epoch_fraction=1",
-    "learning_rate=0.01",
-    *SMALL_CNN,
-)

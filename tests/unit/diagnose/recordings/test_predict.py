@@ -2,8 +2,6 @@
 
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import h5py
@@ -357,17 +355,6 @@ def test_wrong_tensors_are_refused(model, signals, recorded, tmp_path, capsys):
         tensors["domain.levels"] = changed
         folder = copied(model, tmp_path, setting(), tensors)
         refuses(capsys, ["predict", "--model", folder, file], message)
-
-
-def test_predict_loads_neither_numba_nor_the_physics():
-    code = (
-        "import re, sys, diagnose.recordings.predict, diagnose.recordings.registry\n"
-        "import diagnose.networks.domain\n"
-        "physics = 'numba$|gensig.(mesh|geometry|faults|dynamics|systems|sensing|twin)'\n"
-        "print([name for name in sys.modules if re.match(physics, name)])"
-    )
-    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert shown.stdout == "[]\n", shown.stderr
 
 
 def test_the_help_explains_the_exit_status(capsys):
