@@ -385,6 +385,7 @@ def test_verdicts(low, high, says):
 def test_a_sham_set_that_does_not_fit_is_refused(
     opened, capsys, tmp_path, other, message
 ):
+    other = dict(other)
     protocols = other.pop("protocols", None)
     opened["other"] = small(**{"sham": True, **other})
     opened["other"].folder = Path("other")
