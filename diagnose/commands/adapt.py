@@ -8,16 +8,17 @@ from pathlib import Path
 from diagnose.commands.parser import add_model, add_recording_options, refuse_existing
 
 HELP = """\
-Move a trained network to a machine by healthy recordings of it, and write it as another model for predict.
+Move a trained network to a machine by healthy recordings of it, and write it as another model for
+predict.
 
-What healthy recordings of the machine have instead of the healthy training data is taken for the effect of its path,
-sensors and noise, and undone. Whether faults are moved alike cannot be seen from healthy recordings:
-docs/howto/bridge.md says what was gained and lost where it could be measured. Speeds and loads should be those of the
-training."""
+A difference between the healthy recordings and the healthy training data is taken for the effect
+of the machine's path, sensors and noise, and undone. Healthy recordings cannot show whether faults
+are moved alike: docs/howto/bridge.md says what was gained and lost where it could be measured.
+Speeds and loads should be those of the training."""
 EXAMPLE = """\
 example:
-  diagnose adapt --model runs/report/models/by_unit-seed0 --healthy a.csv b.csv --method adabn --out runs/mine
-  diagnose predict --model runs/mine today.csv"""
+  diagnose adapt --model runs/report/models/by_unit-seed0 --healthy a.csv --method adabn --out mine
+  diagnose predict --model mine today.csv"""
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -84,8 +85,8 @@ def run(arguments: Namespace) -> int:
     )
     if after["n_windows_beyond"] is not None:
         print(
-            f"unlike the training data: {before['n_windows_beyond']} of {n_windows} windows before, "
-            f"{after['n_windows_beyond']} after"
+            f"unlike the training data: {before['n_windows_beyond']} of {n_windows} windows "
+            f"before, {after['n_windows_beyond']} after"
         )
     print(
         "Healthy recordings cannot show whether faults are still found: docs/howto/bridge.md"

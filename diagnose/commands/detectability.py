@@ -12,17 +12,19 @@ from diagnose.commands.parser import add_overrides
 from gensig.errors import ConfigError
 
 HELP = """\
-Which test shows the fault? Maps over speed, torque, channel and bandwidth, without training anything.
+Which test shows the fault? Maps over speed, torque, channel and bandwidth, without any training.
 
-Machines of the same build are simulated with and without the selected fault, everything as configured. Two observers
-look at them: one knows what the fault adds and the spectrum of the noise (physically there), one knows indicators of
-other machines (seen). Both answer with d', how many standard deviations sound and faulty lie apart.
+Machines of the same build are simulated with and without the selected fault, everything as
+configured. One observer knows what the fault adds and the spectrum of the noise (physically
+there). The other knows indicators of other machines (seen). Both answer with d', the distance of
+sound and faulty records in standard deviations.
 
-OVERRIDES are those of gensig: fault=crack fault.crack_depth_mm=1 sensing=housing; plan.sham=true is the control."""
+OVERRIDES are those of gensig: fault=crack fault.crack_depth_mm=1 sensing=housing. The control is
+plan.sham=true."""
 EXAMPLE = """\
 examples:
   diagnose detectability fault=crack --plot crack.png --json crack.json
-  diagnose detectability fault=pitting sensing=housing --speeds 600 1200 2400 --torques 10 40 --n-units 12"""
+  diagnose detectability fault=pitting sensing=housing --speeds 600 1200 2400 --torques 10 40"""
 FIGURE_TYPES = (".png", ".svg", ".pdf")
 NOT_READ = {
     "out": "--json and --plot",

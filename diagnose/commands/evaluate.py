@@ -15,18 +15,19 @@ Evaluate a trained network on a data set.
 
   data=DIR         data set made by gensig generate
   model_dir=DIR    one of the folders that diagnose train wrote below models/
-  out=DIR          optional: receives metrics.json and confusion.png, of remaining lives also predictions.csv; must not
-                   exist or be empty
+  out=DIR          optional: receives metrics.json and confusion.png, of remaining lives also
+                   predictions.csv; must not exist or be empty
   protocol=NAME    optional: judge on a part of this split of the data set
   subset=NAME      optional: which part (train, validation, test); default test
-  channels=A,B     optional: channels in place of those it was trained on, as many, in their order
+  channels=A,B     optional: channels in place of those of the training, as many, in their order
 
-Without protocol: the test part of the network's own split on the data set it was trained on, all records elsewhere."""
+Without protocol: the test part of the network's split on the data set that it was trained on, all
+records elsewhere."""
 EXAMPLE = """\
 examples:
-  diagnose evaluate data=runs/lives2 model_dir=runs/remaining/models/by_unit-cnn-seed0
+  diagnose evaluate data=runs/lives2 model_dir=runs/hours/models/by_unit-cnn-seed0
   diagnose evaluate data=runs/other model_dir=runs/report/models/by_unit-seed0
-  diagnose evaluate data=runs/other model_dir=runs/report/models/by_unit-seed0 channels=wheel_x,wheel_y"""
+  diagnose evaluate data=runs/other model_dir=runs/report/models/by_unit-seed0 channels=wheel_x"""
 KEYS = ("data", "model_dir", "out", "protocol", "subset", "channels")
 
 

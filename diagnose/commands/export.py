@@ -11,9 +11,10 @@ from gensig.errors import ConfigError, DatasetError
 HELP = """\
 Write a trained network for other programs, and check the file against torch.
 
-The file takes windows (window, channel, sample) in m/s2 as float32 and gives log-probabilities (window, class); mean
-and RMS of the windows are taken off inside. Names of classes and channels, rate, window and temperature are in its
-metadata. One of a model of remaining life takes what it is told beside (window, column) too, and gives hours."""
+The file takes windows (window, channel, sample) in m/s2 as float32 and gives log-probabilities
+(window, class); it takes off mean and RMS of the windows itself. Names of classes and channels,
+rate, window and temperature are in its metadata. The file of a model of remaining life also takes
+the values that the model must know (window, column), and gives hours."""
 EXAMPLE = """\
 example:
   diagnose export --to onnx --model runs/report/models/by_unit-seed0 --out gearbox.onnx"""

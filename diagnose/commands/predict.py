@@ -8,19 +8,20 @@ from typing import Any
 from diagnose.commands.parser import add_model, add_recording_options
 
 HELP = """\
-Class probabilities of one recording, or how long the machine still runs, with a flag for what is unlike the training
-data.
+Class probabilities of one recording, or how long the machine still runs, with a flag for
+recordings unlike the training data.
 
-A model listens in time: to windows of its length, at its rate, of a speed that does not change within them. The
-recording is resampled to that rate; one with less bandwidth is refused. Where the speed wanders, order tracking plays
-the recording at one speed, its own mean or --to-speed: with --tacho by the pulses of the driving shaft, with --teeth
-and --speed-rpm by the mesh. A model of remaining life must know speed and torque too."""
+A model takes windows of its length, at its rate, of a speed that does not change within them. The
+recording is resampled to that rate; one with less bandwidth is refused. Where the speed wanders,
+order tracking plays the recording at one speed, its mean or --to-speed: with --tacho by the pulses
+of the driving shaft, with --teeth and --speed-rpm by the mesh. A model of remaining life must know
+speed and torque too."""
 EXAMPLE = """\
 examples:
-  diagnose predict --model runs/report/models/by_unit-seed0 housing.wav --channels channel_1 --speed-rpm 1500
+  diagnose predict --model runs/report/models/by_unit-seed0 a.wav --channels left --speed-rpm 1500
   diagnose predict --model runs/report/models/by_unit-seed0 runup.csv --tacho pulses
   diagnose predict --model runs/report/models/by_unit-seed0 bench.csv --teeth 23 84 --speed-rpm 1500
-  diagnose predict --model runs/remaining/models/by_unit-cnn-seed0 today.csv --speed-rpm 1500 --torque-nm 90"""
+  diagnose predict --model runs/hours/models/by_unit-cnn-seed0 a.csv --speed-rpm 900 --torque-nm 9"""
 OUT_OF_DISTRIBUTION = 3
 EXITS = {
     0: "predicted, and like the training data (or the model is too old to tell)",

@@ -8,11 +8,11 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 HELP = """\
-Score predictions of your own on a data set's split, by the scorer of diagnose train.
+Score your predictions on a data set's split, by the scorer of diagnose train.
 
-FILE is a CSV with the columns record_id and predicted (a class name); protocol, method and seed may stand beside, as
-in the predictions.csv of diagnose train. Every test record is named once. Where the data set is a frozen benchmark,
-the results that ship with it stand beside yours."""
+FILE is a CSV with the columns record_id and predicted (a class name), and optional columns
+protocol, method and seed, as in the predictions.csv of diagnose train. Every test record is named
+once. Where the data set is a frozen benchmark, the results that ship with it are shown too."""
 EXAMPLE = """\
 examples:
   diagnose score --data runs/benchmark --predictions mine.csv

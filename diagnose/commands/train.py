@@ -18,21 +18,22 @@ if TYPE_CHECKING:
     from diagnose.settings import TrainSettings
 
 HELP = """\
-Train a network and its baselines on splits of a data set and write a report. Default protocols: by_unit,
-cross_specimen and the leaky one, as far as the data set has them. task=remaining_life says how long each machine still
-runs, on data sets that run to failure.
+Train a network and its baselines on splits of a data set and write a report. Default protocols:
+by_unit, cross_specimen and the leaky one, as far as the data set has them. task=remaining_life
+predicts how long each machine still runs, on data sets that run to failure.
 
   data=DIR    data set made by gensig generate
-  out=DIR     folder to write; must not exist or be empty. Receives report.html, metrics.json, figures, models/
+  out=DIR     folder to write; must not exist or be empty. Receives report.html, metrics.json,
+              figures, models/
 
 Every other key=value overrides configs/train.yaml, model=NAME chooses a file of configs/model."""
 EXAMPLE = """\
 examples:
   diagnose train data=runs/quickstart out=runs/report
-  diagnose train data=runs/quickstart out=runs/report protocols=[by_unit] seeds=[0,1,2,3,4] epochs=30
-  diagnose train data=runs/quickstart out=runs/cross protocols=[cross_speed,cross_torque,unseen_severity_outer]
-  diagnose train data=runs/quickstart out=runs/novelty protocols=[healthy_only,open_set,cross_sensor]
-  diagnose train data=runs/lives out=runs/remaining task=remaining_life normalise=none
+  diagnose train data=runs/quickstart out=runs/report protocols=[by_unit] seeds=[0,1,2,3,4]
+  diagnose train data=runs/quickstart out=runs/cross protocols=[cross_speed,unseen_severity_outer]
+  diagnose train data=runs/quickstart out=runs/novelty protocols=[healthy_only,open_set]
+  diagnose train data=runs/lives out=runs/hours task=remaining_life normalise=none
   diagnose train -m data=runs/quickstart out=runs/levels normalise=rms,none"""
 
 

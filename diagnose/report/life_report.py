@@ -35,9 +35,9 @@ MEANINGS = {
     "of it. A prediction at that level says 'that long or longer'.",
     "Scores": "are means over the snapshots of a life, then over lives, so that every life counts "
     "the same; of the test lives that failed. In brackets 95 % over lives and seeds.",
-    "PHM score": "exp(-d/13) - 1 for too short a prediction, exp(d/10) - 1 for too long a one, d in "
-    "units of 1/125 of the early level; smaller is better. 'last': of the last snapshot before the "
-    "failure alone.",
+    "PHM score": "exp(-d/13) - 1 for too short a prediction, exp(d/10) - 1 for too long a one, d "
+    "in units of 1/125 of the early level; smaller is better. 'last': of the last snapshot before "
+    "the failure alone.",
     "Share in the interval": "how often the prediction interval holds the true remaining life, "
     "with the share that was wanted. Its half width comes of the errors on validation lives "
     "(conformal prediction, every life counting the same); these chose the model too, so that it "
@@ -218,7 +218,8 @@ def _caveats(name: str, result: Content) -> list[str]:
     if not result["intervals_hold"]:
         lines.append(
             f"{lives['validation']} validation lives are too few for intervals of "
-            f"{result['coverage_wanted']:.0%}: they reach from 0 to the early level and say nothing."
+            f"{result['coverage_wanted']:.0%}: they reach from 0 to the early level and say "
+            "nothing."
         )
     if unknown := sum(result["n_records_unknown"].values()):
         lines.append(

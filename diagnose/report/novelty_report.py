@@ -63,7 +63,8 @@ def novelty_caveats(novelty: Content, few_units: int) -> list[str]:
         if (n_records := result["n_records"]["validation"]) < LEAST_VALIDATION:
             lines.append(
                 f"{name}: {n_records} validation record(s); with fewer than {LEAST_VALIDATION} no "
-                f"threshold promises {FALSE_ALARMS:.0%} of false alarms, the largest score is taken."
+                f"threshold promises {FALSE_ALARMS:.0%} of false alarms, "
+                "the largest score is taken."
             )
     return lines
 

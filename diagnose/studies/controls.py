@@ -42,11 +42,11 @@ def control_jobs(
     if settings.oracle == "auto" and has_twin(task.dataset):
         # a twin of the same channels says nothing of channels never seen
         with_oracle = tuple(name for name in protocols if name != CROSS_SENSOR)
-    fitted = {
-        PROBE: protocols if settings.metadata_probe else (),
-        ORACLE: with_oracle,
-        SHAM: shams if settings.baselines else (),
-    }
+    fitted = {PROBE: protocols, ORACLE: with_oracle, SHAM: shams}
+    if not settings.metadata_probe:
+        fitted[PROBE] = ()
+    if not settings.baselines:
+        fitted[SHAM] = ()
     jobs = [
         Job(protocols=names, seed=None, control=control)
         for control, names in fitted.items()

@@ -1,4 +1,4 @@
-"""Maps of diagnose detectability on simulated machines: laws, agreement with data sets, refusals."""
+"""Maps of diagnose detectability on simulated machines: laws, agreement with data sets."""
 
 import json
 import pickle

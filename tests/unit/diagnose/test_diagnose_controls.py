@@ -194,7 +194,7 @@ def test_the_place_in_the_file_is_probed():
 
 
 def test_a_leak_is_found_and_where_there_is_none_the_probe_is_at_chance():
-    """The fake set deals its classes in turn, so that the place tells all; dealt at random it tells nothing."""
+    """Classes come in turn: the index gives the class; shuffled, it does not."""
     dataset = small(n_units=24, records_per_unit=8)
     task = make_task(dataset)
 

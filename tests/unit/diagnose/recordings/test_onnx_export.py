@@ -1,4 +1,4 @@
-"""The exported network answers like torch, from m/s2, and its metadata say what its numbers mean."""
+"""The exported network answers like torch, from m/s2, and describes its numbers."""
 
 import json
 import sys

@@ -72,7 +72,7 @@ def test_the_horizon_is_where_predictions_stay_within_the_band(predicted, expect
 
 
 def test_every_life_counts_the_same():
-    # life 0: one snapshot, error 6; life 1: three, error 2 too late each and the failure itself at the end
+    # life 0: one snapshot, error 6; life 1: three, each 2 too late, the last at the failure
     snapshots = Snapshots(
         life=np.array([0, 1, 1, 1]),
         true=np.array([50.0, 60.0, 30.0, 0.0]),
