@@ -21,7 +21,7 @@ examples:
   diagnose predict --model runs/report/models/by_unit-seed0 a.wav --channels left --speed-rpm 1500
   diagnose predict --model runs/report/models/by_unit-seed0 runup.csv --tacho pulses
   diagnose predict --model runs/report/models/by_unit-seed0 bench.csv --teeth 23 84 --speed-rpm 1500
-  diagnose predict --model runs/hours/models/by_unit-cnn-seed0 a.csv --speed-rpm 900 --torque-nm 9"""
+  diagnose predict --model runs/hours/models/by_unit-cnn-seed0 a.csv --speed-rpm 90 --torque-nm 9"""
 OUT_OF_DISTRIBUTION = 3
 EXITS = {
     0: "predicted, and like the training data (or the model is too old to tell)",

@@ -230,8 +230,12 @@ def test_every_control_has_its_jobs_and_only_on_clean_protocols():
     task = task_from(small(twins=True), settings)
     jobs = control_jobs(task, settings, ["by_unit"])
     assert [(job.control, job.seed) for job in jobs] == [
-        ("probe", None), ("oracle", None), ("level_kept", 3), ("level_kept", 4), ("oracle", 3),
-    ]  # fmt: skip
+        ("probe", None),
+        ("oracle", None),
+        ("level_kept", 3),
+        ("level_kept", 4),
+        ("oracle", 3),
+    ]
     assert control_jobs(task, settings, []) == []
     off = settings_of(*FAST, "oracle=false", "metadata_probe=false")
     assert control_jobs(task, off, ["by_unit"]) == []
