@@ -13,7 +13,8 @@ from typing import Any
 from gensig.terminal.program import HELP_FLAGS, Parser, exit_text, guarded, refuse_verb
 from gensig.version import __version__
 
-# Verb -> what it does; ``diagnose.commands.VERB`` has ``run(words) -> exit status``.
+# Verb -> its purpose. ``diagnose.commands.VERB`` has HELP, EXAMPLE, ``add_arguments(parser)`` and
+# ``run(arguments) -> exit status``.
 VERBS = {
     "train": "train, judge and report",
     "evaluate": "judge a trained network",
@@ -23,8 +24,6 @@ VERBS = {
     "detectability": "which test shows a fault: maps over speed, torque, channel and bandwidth",
     "score": "score predictions of your own, beside a frozen benchmark",
 }
-
-
 OF_GENSIG = (
     "generate",
     "plan",
@@ -52,7 +51,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             for name, summary in VERBS.items()
         }
         answer(PROGRAM, verbs, primary="train")
-    words = list(sys.argv[1:] if argv is None else argv)
+    if argv is None:
+        argv = sys.argv[1:]
+    words = list(argv)
     return guarded(PROGRAM, lambda: _dispatch(words), interrupted="interrupted")
 
 
@@ -60,22 +61,28 @@ def _dispatch(words: list[str]) -> int:
     if words[:1] == ["help"]:
         words = [*words[1:2], HELP_FLAGS[1]]
     if not words or words[0] in HELP_FLAGS:
-        print(_help(), file=sys.stdout if words else sys.stderr)
-        return 0 if words else 2
+        file, status = (sys.stdout, 0) if words else (sys.stderr, 2)
+        print(_help(), file=file)
+        return status
     if words[0] in ("-V", "--version"):
         print(f"diagnose {__version__}")
         return 0
     if words[0] not in VERBS:
         refuse_verb(PROGRAM, words[0], VERBS, "gensig", OF_GENSIG)
+    verb, *rest = words
     try:
-        return int(_module(words[0]).run(words[1:]))
+        arguments = verb_parser(verb).parse_intermixed_args(rest)
+        return int(_module(verb).run(arguments))
     except SystemExit as leaving:  # --help
         return int(leaving.code or 0)
 
 
 def verb_parser(name: str) -> Parser:
     """The parser of a verb, with its help."""
-    parser: Parser = _module(name).parser()
+    verb = _module(name)
+    exits = getattr(verb, "EXITS", {})
+    parser = Parser(f"{PROGRAM} {name}", verb.HELP, verb.EXAMPLE, exits)
+    verb.add_arguments(parser)
     return parser
 
 
@@ -93,7 +100,8 @@ def _help() -> str:
         "usage: diagnose COMMAND [ARGUMENTS]\n\n"
         "Train and judge fault classifiers on gensig data sets.\n\n"
         f"commands:\n{verbs}\n\n"
-        "gensig options train lists the keys of diagnose train, gensig options model its networks.\n"
+        "gensig options train lists the keys of diagnose train, gensig options model its "
+        "networks.\n"
         f"diagnose COMMAND --help explains each, with an example.\n\n{statuses}"
     )
 

@@ -98,13 +98,14 @@ GENSIG = {
 }
 DIAGNOSE = {
     "baselines": "data networks scoring",
-    "commands": "data detectability progress recordings report settings studies training",
+    "commands": "data detectability progress recordings report settings studies training workers",
+    "detectability": "workers",
     "networks": "data",
     "recordings": "data networks report scoring studies training",
     "report": "baselines data scoring studies training",
     "scoring": "data networks",
     "settings": "baselines",
-    "studies": "baselines data networks scoring settings training",
+    "studies": "baselines data networks scoring settings training workers",
     "training": "data networks scoring settings",
 }
 # What diagnose imports of gensig: the reading side of data sets, signals and words; no physics.

@@ -3,26 +3,28 @@
 from __future__ import annotations
 
 import sys
-from argparse import ArgumentParser
+from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from diagnose.commands.parser import Parser, verb_parser
+from diagnose.commands.parser import add_overrides
 from gensig.errors import ConfigError
 
 HELP = """\
-Which test shows the fault? Maps over speed, torque, channel and bandwidth, without training anything.
+Which test shows the fault? Maps over speed, torque, channel and bandwidth, without any training.
 
-Machines of the same build are simulated with and without the selected fault, everything as configured. Two observers
-look at them: one knows what the fault adds and the spectrum of the noise (physically there), one knows indicators of
-other machines (seen). Both answer with d', how many standard deviations sound and faulty lie apart.
+Machines of the same build are simulated with and without the selected fault, everything as
+configured. One observer knows what the fault adds and the spectrum of the noise (physically
+there). The other knows indicators of other machines (seen). Both answer with d', the distance of
+sound and faulty records in standard deviations.
 
-OVERRIDES are those of gensig: fault=crack fault.crack_depth_mm=1 sensing=housing; plan.sham=true is the control."""
+OVERRIDES are those of gensig: fault=crack fault.crack_depth_mm=1 sensing=housing. The control is
+plan.sham=true."""
 EXAMPLE = """\
 examples:
   diagnose detectability fault=crack --plot crack.png --json crack.json
-  diagnose detectability fault=pitting sensing=housing --speeds 600 1200 2400 --torques 10 40 --n-units 12"""
+  diagnose detectability fault=pitting sensing=housing --speeds 600 1200 2400 --torques 10 40"""
 FIGURE_TYPES = (".png", ".svg", ".pdf")
 NOT_READ = {
     "out": "--json and --plot",
@@ -32,16 +34,9 @@ NOT_READ = {
 READ_OF_PLAN = ("plan.n_gearboxes", "plan.sham", "plan.vary")
 
 
-def parser() -> Parser:
-    """The verb's parser, with its help."""
-    parser = verb_parser("detectability", HELP, EXAMPLE)
-    add_arguments(parser)
-    return parser
-
-
 def add_arguments(parser: ArgumentParser) -> None:
-    """What can be typed behind the verb."""
-    parser.add_argument("overrides", nargs="*", metavar="OVERRIDES", help="see above")
+    """Add the arguments of the verb."""
+    add_overrides(parser, "OVERRIDES")
     parser.add_argument(
         "--config-dir", metavar="DIR", help="folder with groups and options of your own"
     )
@@ -65,7 +60,10 @@ def add_arguments(parser: ArgumentParser) -> None:
         metavar="K",
         help="machines of the same build (default: 8)",
     )
-    fixed = "the noise of the set-point everywhere, as a sensor's own is (default: the same snr_db everywhere)"
+    fixed = (
+        "the noise of the set-point everywhere, as a sensor's own is "
+        "(default: the same snr_db everywhere)"
+    )
     parser.add_argument("--fixed-noise", action="store_true", help=fixed)
     parser.add_argument(
         "--workers", type=int, metavar="N", help="processes (default: one a core)"
@@ -76,13 +74,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
 
 
-def run(words: Sequence[str]) -> int:
-    """Make the maps, write them, print the best test and the worst."""
-    arguments = parser().parse_intermixed_args(words)
-    figure, table = (
-        _file("--plot", arguments.plot, FIGURE_TYPES),
-        _file("--json", arguments.json, (".json",)),
-    )
+def run(arguments: Namespace) -> int:
+    """Make and write the maps; print the best test and the worst."""
+    figure = _file("--plot", arguments.plot, FIGURE_TYPES)
+    table = _file("--json", arguments.json, (".json",))
     if arguments.workers is not None and arguments.workers < 1:
         raise ConfigError(f"--workers {arguments.workers} must be at least 1")
     overrides = list(arguments.overrides)
@@ -95,6 +90,7 @@ def run(words: Sequence[str]) -> int:
     from diagnose.detectability.maps import confirm_best, make_maps, read_bandwidths
     from diagnose.detectability.summary import content, summary
     from diagnose.progress import progress
+    from diagnose.workers import n_cores
 
     make_pairs = partial(
         gensig.fault_pairs,
@@ -108,20 +104,17 @@ def run(words: Sequence[str]) -> int:
     pairs = make_pairs()
     edges = read_bandwidths(bandwidths, pairs)
     with progress(pairs.n_cells, "simulating") as on_done:
-        maps = make_maps(
-            pairs, edges, n_workers=arguments.workers or _n_cores(), on_done=on_done
-        )
-    again = confirm_best(maps, make_pairs(epoch=1))
-    print("\n".join(summary(maps, again)))
+        n_workers = arguments.workers or n_cores()
+        maps = make_maps(pairs, edges, n_workers=n_workers, on_done=on_done)
+    confirmation = confirm_best(maps, make_pairs(epoch=1))
+    print("\n".join(summary(maps, confirmation)))
     if maps.n_failed:
         print(f"{maps.n_failed} pairs did not stay finite and are left out")
     if table is not None:
         import json
 
-        table.write_text(
-            json.dumps(content(maps, again), indent=1, allow_nan=False) + "\n",
-            encoding="utf-8",
-        )
+        text = json.dumps(content(maps, confirmation), indent=1, allow_nan=False)
+        table.write_text(f"{text}\n", encoding="utf-8")
     if figure is not None:
         from diagnose.detectability.figure import detectability_figure
 
@@ -130,23 +123,14 @@ def run(words: Sequence[str]) -> int:
 
 
 def _say_unread(overrides: Sequence[str]) -> None:
-    """One line on stderr for every typed key of which a map makes nothing."""
+    """Print one line on stderr for every typed key that a map does not read."""
     from gensig.options.compose import override_keys
 
     for key in override_keys(overrides):
-        flag = next(
-            (
-                flag
-                for name, flag in NOT_READ.items()
-                if key == name or key.startswith(f"{name}.")
-            ),
-            None,
-        )
+        flag = NOT_READ.get(key.partition(".")[0])
         if flag is not None and key not in READ_OF_PLAN:
-            print(
-                f"diagnose: note: {key} is not read by detectability; use {flag}",
-                file=sys.stderr,
-            )
+            note = f"{key} is not read by detectability; use {flag}"
+            print(f"diagnose: note: {note}", file=sys.stderr)
 
 
 def _numbers(
@@ -175,13 +159,3 @@ def _file(flag: str, name: str | None, types: tuple[str, ...]) -> Path | None:
             f"{flag} {name}: there is no folder {path.parent}; make it first"
         )
     return path
-
-
-def _n_cores() -> int:
-    import os
-
-    return (
-        len(os.sched_getaffinity(0))
-        if hasattr(os, "sched_getaffinity")
-        else os.cpu_count() or 1
-    )

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import difflib
-from argparse import ArgumentParser
-from collections.abc import Mapping, Sequence
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
 from pathlib import Path
 
-from diagnose.commands.parser import Parser, refuse_existing, verb_parser
+from diagnose.commands.parser import add_overrides, refuse_existing
 from gensig.errors import ConfigError
 
 HELP = """\
@@ -15,61 +15,53 @@ Evaluate a trained network on a data set.
 
   data=DIR         data set made by gensig generate
   model_dir=DIR    one of the folders that diagnose train wrote below models/
-  out=DIR          optional: receives metrics.json and confusion.png, of remaining lives also predictions.csv; must not
-                   exist or be empty
+  out=DIR          optional: receives metrics.json and confusion.png, of remaining lives also
+                   predictions.csv; must not exist or be empty
   protocol=NAME    optional: judge on a part of this split of the data set
   subset=NAME      optional: which part (train, validation, test); default test
-  channels=A,B     optional: channels in place of those it was trained on, as many, in their order
+  channels=A,B     optional: channels in place of those of the training, as many, in their order
 
-Without protocol: the test part of the network's own split on the data set it was trained on, all records elsewhere."""
+Without protocol: the test part of the network's split on the data set that it was trained on, all
+records elsewhere."""
 EXAMPLE = """\
 examples:
-  diagnose evaluate data=runs/lives2 model_dir=runs/remaining/models/by_unit-cnn-seed0
+  diagnose evaluate data=runs/lives2 model_dir=runs/hours/models/by_unit-cnn-seed0
   diagnose evaluate data=runs/other model_dir=runs/report/models/by_unit-seed0
-  diagnose evaluate data=runs/other model_dir=runs/report/models/by_unit-seed0 channels=wheel_x,wheel_y"""
+  diagnose evaluate data=runs/other model_dir=runs/report/models/by_unit-seed0 channels=wheel_x"""
 KEYS = ("data", "model_dir", "out", "protocol", "subset", "channels")
 
 
-def parser() -> Parser:
-    """The verb's parser, with its help."""
-    parser = verb_parser("evaluate", HELP, EXAMPLE)
-    add_arguments(parser)
-    return parser
-
-
 def add_arguments(parser: ArgumentParser) -> None:
-    """What can be typed behind the verb."""
-    parser.add_argument("overrides", nargs="*", metavar="key=value", help="see above")
+    """Add the arguments of the verb."""
+    add_overrides(parser)
 
 
-def run(words: Sequence[str]) -> int:
+def run(arguments: Namespace) -> int:
     """Judge a trained network and print its scores."""
-    arguments = parser().parse_intermixed_args(words)
     values = _key_values(arguments.overrides)
-    out = Path(values["out"]) if "out" in values else None
+    out = values.get("out")
     if out is not None:
-        refuse_existing(out)
+        refuse_existing(Path(out))
     from diagnose.recordings.evaluate import evaluate_network
     from diagnose.recordings.registry import open_network
     from gensig.dataset.reader import open_dataset
 
+    channels = None
+    if "channels" in values:
+        channels = values["channels"].strip("[]").split(",")
     network = open_network(values["model_dir"])
     evaluation = evaluate_network(
         network,
         open_dataset(values["data"]),
         protocol=values.get("protocol"),
         subset=values.get("subset"),
-        channels=_channels(values),
+        channels=channels,
     )
     print("\n".join(network.lines(evaluation.result)))
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        evaluation.write(out)
+        Path(out).mkdir(parents=True, exist_ok=True)
+        evaluation.write(Path(out))
     return 0
-
-
-def _channels(values: Mapping[str, str]) -> list[str] | None:
-    return values["channels"].strip("[]").split(",") if "channels" in values else None
 
 
 def _key_values(words: Sequence[str]) -> dict[str, str]:
@@ -83,10 +75,9 @@ def _key_values(words: Sequence[str]) -> dict[str, str]:
         if not equals or not value:
             raise ConfigError(f"'{word}' is not of the form key=value")
         if key not in KEYS:
-            close = difflib.get_close_matches(key, KEYS, n=1)
-            hint = (
-                f"did you mean {close[0]}?" if close else f"there is {', '.join(KEYS)}"
-            )
+            hint = f"there is {', '.join(KEYS)}"
+            for close in difflib.get_close_matches(key, KEYS, n=1):
+                hint = f"did you mean {close}?"
             raise ConfigError(f"unknown key '{key}'; {hint}")
         if key in values:
             raise ConfigError(f"{key} is given twice")

@@ -2,45 +2,33 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser
-from collections.abc import Sequence
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from diagnose.commands.parser import Parser, verb_parser
+from diagnose.commands.parser import add_model
 from gensig.errors import ConfigError, DatasetError
 
 HELP = """\
 Write a trained network for other programs, and check the file against torch.
 
-The file takes windows (window, channel, sample) in m/s2 as float32 and gives log-probabilities (window, class); mean
-and RMS of the windows are taken off inside. Names of classes and channels, rate, window and temperature are in its
-metadata. One of a model of remaining life takes what it is told beside (window, column) too, and gives hours."""
+The file takes windows (window, channel, sample) in m/s2 as float32 and gives log-probabilities
+(window, class); it takes off mean and RMS of the windows itself. Names of classes and channels,
+rate, window and temperature are in its metadata. The file of a model of remaining life also takes
+the values that the model must know (window, column), and gives hours."""
 EXAMPLE = """\
 example:
   diagnose export --to onnx --model runs/report/models/by_unit-seed0 --out gearbox.onnx"""
 
 
-def parser() -> Parser:
-    """The verb's parser, with its help."""
-    parser = verb_parser("export", HELP, EXAMPLE)
-    add_arguments(parser)
-    return parser
-
-
 def add_arguments(parser: ArgumentParser) -> None:
-    """What can be typed behind the verb."""
+    """Add the arguments of the verb."""
     parser.add_argument(
         "--to",
         required=True,
         choices=["onnx"],
         help="format; needs pip install 'gensig[onnx]'",
     )
-    parser.add_argument(
-        "--model",
-        required=True,
-        metavar="DIR",
-        help="folder that diagnose train wrote below models/",
-    )
+    add_model(parser)
     parser.add_argument(
         "--out",
         required=True,
@@ -49,9 +37,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
 
 
-def run(words: Sequence[str]) -> int:
-    """Write the file, check it, and say how well it agrees."""
-    arguments = parser().parse_args(words)
+def run(arguments: Namespace) -> int:
+    """Write the file, check it, and print how well it agrees with torch."""
     out = Path(arguments.out)
     if out.suffix != ".onnx":
         raise ConfigError(f"--out {out}: the name must end in .onnx")

@@ -1,25 +1,46 @@
-"""What the verbs share.
-
-A parser that complains in one line, and the refusal of a folder that holds something.
-"""
+"""Arguments that verbs share, and the refusal of a folder that holds something."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from argparse import ArgumentParser
 from pathlib import Path
 
 from gensig.errors import DatasetError
-from gensig.terminal.program import Parser
 
 
-def verb_parser(
-    verb: str, description: str, examples: str, exits: Mapping[int, str] | None = None
-) -> Parser:
-    """Parser of a verb, to be given its arguments.
+def add_overrides(parser: ArgumentParser, metavar: str = "key=value") -> None:
+    """Add words of the form key=value, which the help explains."""
+    parser.add_argument("overrides", nargs="*", metavar=metavar, help="see above")
 
-    ``exits`` says what exit statuses of its own mean.
-    """
-    return Parser(f"diagnose {verb}", description, examples, exits or {})
+
+def add_model(parser: ArgumentParser) -> None:
+    """Add the folder of a network."""
+    parser.add_argument(
+        "--model",
+        required=True,
+        metavar="DIR",
+        help="folder that diagnose train wrote below models/",
+    )
+
+
+def add_recording_options(parser: ArgumentParser) -> None:
+    """Add options on how a recording is read."""
+    parser.add_argument(
+        "--channels",
+        nargs="+",
+        metavar="NAME",
+        help="for the model's channels, in their order",
+    )
+    parser.add_argument(
+        "--unit",
+        default="m/s2",
+        help="m/s2 or g, where the column does not say (default: m/s2)",
+    )
+    parser.add_argument(
+        "--array",
+        metavar="NAME",
+        help="array of .npz, .h5 or .mat files (default: acceleration)",
+    )
 
 
 def refuse_existing(folder: Path) -> None:

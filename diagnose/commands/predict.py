@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser
-from collections.abc import Sequence
+from argparse import ArgumentParser, Namespace
+from typing import Any
 
-from diagnose.commands.parser import Parser, verb_parser
+from diagnose.commands.parser import add_model, add_recording_options
 
 HELP = """\
-Class probabilities of one recording, or how long the machine still runs, with a flag for what is unlike the training
-data.
+Class probabilities of one recording, or how long the machine still runs, with a flag for
+recordings unlike the training data.
 
-A model listens in time: to windows of its length, at its rate, of a speed that does not change within them. The
-recording is resampled to that rate; one with less bandwidth is refused. Where the speed wanders, order tracking plays
-the recording at one speed, its own mean or --to-speed: with --tacho by the pulses of the driving shaft, with --teeth
-and --speed-rpm by the mesh. A model of remaining life must know speed and torque too."""
+A model takes windows of its length, at its rate, of a speed that does not change within them. The
+recording is resampled to that rate; one with less bandwidth is refused. Where the speed wanders,
+order tracking plays the recording at one speed, its mean or --to-speed: with --tacho by the pulses
+of the driving shaft, with --teeth and --speed-rpm by the mesh. A model of remaining life must know
+speed and torque too."""
 EXAMPLE = """\
 examples:
-  diagnose predict --model runs/report/models/by_unit-seed0 housing.wav --channels channel_1 --speed-rpm 1500
+  diagnose predict --model runs/report/models/by_unit-seed0 a.wav --channels left --speed-rpm 1500
   diagnose predict --model runs/report/models/by_unit-seed0 runup.csv --tacho pulses
   diagnose predict --model runs/report/models/by_unit-seed0 bench.csv --teeth 23 84 --speed-rpm 1500
-  diagnose predict --model runs/remaining/models/by_unit-cnn-seed0 today.csv --speed-rpm 1500 --torque-nm 90"""
+  diagnose predict --model runs/hours/models/by_unit-cnn-seed0 a.csv --speed-rpm 90 --torque-nm 9"""
 OUT_OF_DISTRIBUTION = 3
 EXITS = {
     0: "predicted, and like the training data (or the model is too old to tell)",
@@ -28,27 +29,15 @@ EXITS = {
 }
 
 
-def parser() -> Parser:
-    """The verb's parser, with its help."""
-    parser = verb_parser("predict", HELP, EXAMPLE, EXITS)
-    add_arguments(parser)
-    return parser
-
-
 def add_arguments(parser: ArgumentParser) -> None:
-    """What can be typed behind the verb."""
+    """Add the arguments of the verb."""
     parser.add_argument(
         "recording",
         metavar="RECORDING",
         nargs="+",
         help="one or more: .csv, .wav, .npy, .npz, .h5, .hdf5 or .mat",
     )
-    parser.add_argument(
-        "--model",
-        required=True,
-        metavar="DIR",
-        help="folder that diagnose train wrote below models/",
-    )
+    add_model(parser)
     parser.add_argument(
         "--sampling-rate",
         type=float,
@@ -91,22 +80,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         action="store_true",
         help="no order tracking, even with --teeth or --tacho",
     )
-    parser.add_argument(
-        "--channels",
-        nargs="+",
-        metavar="NAME",
-        help="for the model's channels, in their order",
-    )
-    parser.add_argument(
-        "--unit",
-        default="m/s2",
-        help="m/s2 or g, where the column does not say (default: m/s2)",
-    )
-    parser.add_argument(
-        "--array",
-        metavar="NAME",
-        help="array of a .npz, .h5 or .mat file (default: acceleration)",
-    )
+    add_recording_options(parser)
     parser.add_argument(
         "--torque-nm",
         type=float,
@@ -126,9 +100,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
 
 
-def run(words: Sequence[str]) -> int:
-    """Print the answers; the exit status tells of a recording unlike the training data."""
-    arguments = parser().parse_intermixed_args(words)
+def run(arguments: Namespace) -> int:
+    """Print the answers; exit status 3 if a recording is unlike the training data."""
     from diagnose.recordings.predict import predict_recording
     from diagnose.recordings.registry import open_network
     from diagnose.recordings.source import Source
@@ -139,12 +112,12 @@ def run(words: Sequence[str]) -> int:
             file=recording,
             sampling_rate=arguments.sampling_rate,
             speed_rpm=arguments.speed_rpm,
-            teeth=None if arguments.teeth is None else tuple(arguments.teeth),
+            teeth=arguments.teeth and tuple(arguments.teeth),
             tacho=arguments.tacho,
             pulses_per_turn=arguments.pulses_per_turn,
             as_recorded=arguments.as_recorded,
             to_speed_rpm=arguments.to_speed,
-            channels=None if arguments.channels is None else tuple(arguments.channels),
+            channels=arguments.channels and tuple(arguments.channels),
             unit=arguments.unit,
             array=arguments.array,
             torque_nm=arguments.torque_nm,
@@ -163,13 +136,10 @@ def run(words: Sequence[str]) -> int:
     if arguments.json:
         import json
 
-        print(
-            json.dumps(
-                results[0] if len(results) == 1 else results, indent=2, allow_nan=False
-            )
-        )
-    return (
-        OUT_OF_DISTRIBUTION
-        if any(result["out_of_distribution"] for result in results)
-        else 0
-    )
+        printed: Any = results
+        if len(results) == 1:
+            printed = results[0]
+        print(json.dumps(printed, indent=2, allow_nan=False))
+    if any(result["out_of_distribution"] for result in results):
+        return OUT_OF_DISTRIBUTION
+    return 0

@@ -4,33 +4,23 @@ from __future__ import annotations
 
 import json
 import sys
-from argparse import ArgumentParser
-from collections.abc import Sequence
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from diagnose.commands.parser import Parser, verb_parser
-
 HELP = """\
-Score predictions of your own on a data set's split, by the scorer of diagnose train.
+Score your predictions on a data set's split, by the scorer of diagnose train.
 
-FILE is a CSV with the columns record_id and predicted (a class name); protocol, method and seed may stand beside, as
-in the predictions.csv of diagnose train. Every test record is named once. Where the data set is a frozen benchmark,
-the results that ship with it stand beside yours."""
+FILE is a CSV with the columns record_id and predicted (a class name), and optional columns
+protocol, method and seed, as in the predictions.csv of diagnose train. Every test record is named
+once. Where the data set is a frozen benchmark, the results that ship with it are shown too."""
 EXAMPLE = """\
 examples:
   diagnose score --data runs/benchmark --predictions mine.csv
   diagnose score --data runs/benchmark --predictions runs/report/predictions.csv --json"""
 
 
-def parser() -> Parser:
-    """The verb's parser, with its help."""
-    parser = verb_parser("score", HELP, EXAMPLE)
-    add_arguments(parser)
-    return parser
-
-
 def add_arguments(parser: ArgumentParser) -> None:
-    """What can be typed behind the verb."""
+    """Add the arguments of the verb."""
     parser.add_argument(
         "--data", required=True, metavar="DIR", help="data set made by gensig generate"
     )
@@ -48,12 +38,11 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print everything as JSON")
 
 
-def run(words: Sequence[str]) -> int:
+def run(arguments: Namespace) -> int:
     """Print the scores.
 
     A benchmark that differs from the frozen one is named on stderr and not compared.
     """
-    arguments = parser().parse_args(words)
     from diagnose.studies.benchmark import score_file, score_table
     from gensig.dataset.reader import open_dataset
 

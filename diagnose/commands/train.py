@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import sys
-from argparse import ArgumentParser
+from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from diagnose.commands.parser import Parser, refuse_existing, verb_parser
+from diagnose.commands.parser import add_overrides, refuse_existing
 from gensig.errors import ConfigError
 from gensig.options.configuration import Configuration
 
@@ -18,34 +18,28 @@ if TYPE_CHECKING:
     from diagnose.settings import TrainSettings
 
 HELP = """\
-Train a network and its baselines on splits of a data set and write a report. Default protocols: by_unit,
-cross_specimen and the leaky one, as far as the data set has them. task=remaining_life says how long each machine still
-runs, on data sets that run to failure.
+Train a network and its baselines on splits of a data set and write a report. Default protocols:
+by_unit, cross_specimen and the leaky one, as far as the data set has them. task=remaining_life
+predicts how long each machine still runs, on data sets that run to failure.
 
   data=DIR    data set made by gensig generate
-  out=DIR     folder to write; must not exist or be empty. Receives report.html, metrics.json, figures, models/
+  out=DIR     folder to write; must not exist or be empty. Receives report.html, metrics.json,
+              figures, models/
 
 Every other key=value overrides configs/train.yaml, model=NAME chooses a file of configs/model."""
 EXAMPLE = """\
 examples:
   diagnose train data=runs/quickstart out=runs/report
-  diagnose train data=runs/quickstart out=runs/report protocols=[by_unit] seeds=[0,1,2,3,4] epochs=30
-  diagnose train data=runs/quickstart out=runs/cross protocols=[cross_speed,cross_torque,unseen_severity_outer]
-  diagnose train data=runs/quickstart out=runs/novelty protocols=[healthy_only,open_set,cross_sensor]
-  diagnose train data=runs/lives out=runs/remaining task=remaining_life normalise=none
+  diagnose train data=runs/quickstart out=runs/report protocols=[by_unit] seeds=[0,1,2,3,4]
+  diagnose train data=runs/quickstart out=runs/cross protocols=[cross_speed,unseen_severity_outer]
+  diagnose train data=runs/quickstart out=runs/novelty protocols=[healthy_only,open_set]
+  diagnose train data=runs/lives out=runs/hours task=remaining_life normalise=none
   diagnose train -m data=runs/quickstart out=runs/levels normalise=rms,none"""
 
 
-def parser() -> Parser:
-    """The verb's parser, with its help."""
-    parser = verb_parser("train", HELP, EXAMPLE)
-    add_arguments(parser)
-    return parser
-
-
 def add_arguments(parser: ArgumentParser) -> None:
-    """What can be typed behind the verb."""
-    parser.add_argument("overrides", nargs="*", metavar="key=value", help="see above")
+    """Add the arguments of the verb."""
+    add_overrides(parser)
     parser.add_argument(
         "-m",
         "--multirun",
@@ -59,24 +53,24 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
 
 
-def run(words: Sequence[str]) -> int:
-    """Train, judge, write the report."""
-    arguments = parser().parse_intermixed_args(words)
+def run(arguments: Namespace) -> int:
+    """Train, judge and write the report of every combination."""
     from gensig.options.compose import compose, override_keys
 
+    overrides, config_dir = arguments.overrides, arguments.config_dir
     if not arguments.multirun:
-        override_keys(arguments.overrides)
-        _train_one(
-            compose("train", arguments.overrides, config_dir=arguments.config_dir)
-        )
+        override_keys(overrides)
+        _train_one(compose("train", overrides, config_dir=config_dir))
         return 0
-    jobs = _expand(arguments.overrides, arguments.config_dir)
+    jobs = _expand(overrides, config_dir)
     for number, config in enumerate(jobs, start=1):
-        print(
-            f"run {number} of {len(jobs)}: {config['out']}", file=sys.stderr, flush=True
-        )
+        _note(f"run {number} of {len(jobs)}: {config['out']}")
         _train_one(config)
     return 0
+
+
+def _note(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)
 
 
 def _expand(overrides: Sequence[str], config_dir: str | None) -> list[Configuration]:
@@ -123,9 +117,8 @@ def _study_classes(settings: TrainSettings, out: Path) -> tuple[Path, list[str]]
 
     task, settings = _opened(settings)
     protocols, jobs = plan_study(task, settings)
-    with _started(
-        out, len(jobs), choose_protocols(task, settings.protocols)[1]
-    ) as on_done:
+    left_out = choose_protocols(task, settings.protocols)[1]
+    with _started(out, len(jobs), left_out) as on_done:
         metrics = run_study(
             task, settings, out, protocols=protocols, jobs=jobs, on_done=on_done
         )
@@ -169,7 +162,7 @@ def _opened(settings: TrainSettings) -> tuple[Task, TrainSettings]:
 
     task = task_from(open_dataset(settings.data), settings)
     if note := window_note(task.dataset, settings):
-        print(note, file=sys.stderr, flush=True)
+        _note(note)
     return task, settings_for(task.dataset, settings)
 
 
@@ -182,6 +175,6 @@ def _started(
     from diagnose.progress import progress
 
     for name, reason in left_out.items():
-        print(f"protocol {name} is left out: {reason}", file=sys.stderr, flush=True)
+        _note(f"protocol {name} is left out: {reason}")
     out.mkdir(parents=True, exist_ok=True)
     return progress(n_jobs)

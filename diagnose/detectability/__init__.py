@@ -1,1 +1,1 @@
-"""Maps of how well a fault can be told, over speed and torque."""
+"""Detectability of a fault: maps over speed and torque."""

@@ -1,7 +1,4 @@
-"""The figure of `diagnose detectability`.
-
-A row an observer, the best map large, all channels and bandwidths small.
-"""
+"""Figure of `diagnose detectability`: a row an observer, the best map large, all maps small."""
 
 from __future__ import annotations
 
@@ -19,21 +16,32 @@ FloatArray = NDArray[np.floating]
 
 COLORS = "cividis"  # even steps for every kind of colour vision, and in print
 DARK = 0.55  # of the colour scale: below it white letters are read best
-LEAST_TOP = 1.0  # d' at the top of the scale of indicators, so that next to nothing does not look like much
+LEAST_TOP = (
+    1.0  # d' at the top of the scale of indicators, so that small values look small
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Row:
-    """One observer.
+    """Maps of one observer.
 
-    Values (speed, torque, channel, band), their scale, and what is written into a cell.
+    Attributes
+    ----------
+    values : (speed, torque, channel, band)
+    norm : scale of the colors
+    auroc : like the values, written below them; None where there is none
     """
 
     title: str
     label: str
     values: FloatArray
     norm: Any
-    texts: FloatArray | None
+    auroc: FloatArray | None = None
+
+    @property
+    def best(self) -> tuple[int, ...]:
+        """Speed, torque, channel and band of the largest value."""
+        return best_and_worst(self.values)[0]
 
 
 def detectability_figure(path: Path, maps: Maps) -> None:
@@ -41,29 +49,24 @@ def detectability_figure(path: Path, maps: Maps) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    n_channels, n_bands = len(maps.channels), len(maps.bandwidths)
-    small = max(4.6, 1.25 * n_bands)
-    figure = Figure(
-        figsize=(
-            1.2 * len(maps.torques_nm) + 3.0 + small,
-            2.0 * max(4.0, 1.15 * n_channels),
-        ),
-        dpi=130,
-    )
+    small = max(4.6, 1.25 * len(maps.bandwidths))
+    large = 1.2 * len(maps.torques_nm) + 3.0
+    height = 2.0 * max(4.0, 1.15 * len(maps.channels))
+    figure = Figure(figsize=(large + small, height), dpi=130)
     figure.set_layout_engine("constrained", hspace=0.03)
     FigureCanvasAgg(figure)
-    parts: Any = figure.subfigures(
-        2, 2, width_ratios=(1.2 * len(maps.torques_nm) + 3.0, small)
-    )
-    for (large, many), row in zip(parts, _rows(maps), strict=True):
-        image = _large(large, maps, row)
-        axes = _many(many, maps, row)
-        many.colorbar(image, ax=axes, label=row.label, fraction=0.05, pad=0.02)
-    noise = f"{maps.n_units} machines, records of {maps.duration:g} s"
-    figure.suptitle(
-        f"Which test shows the fault? {fault_text(maps.fault)}; {noise}", fontsize=13
-    )
-    figure.savefig(path, metadata={"Software": None} if path.suffix == ".png" else None)
+    parts: Any = figure.subfigures(2, 2, width_ratios=(large, small))
+    for (left, right), row in zip(parts, (_known(maps), _seen(maps)), strict=True):
+        image = _best_map(left, maps, row)
+        axes = _all_maps(right, maps, row)
+        right.colorbar(image, ax=axes, label=row.label, fraction=0.05, pad=0.02)
+    records = f"{maps.n_units} machines, records of {maps.duration:g} s"
+    title = f"Which test shows the fault? {fault_text(maps.fault)}; {records}"
+    figure.suptitle(title, fontsize=13)
+    metadata = None
+    if path.suffix == ".png":
+        metadata = {"Software": None}
+    figure.savefig(path, metadata=metadata)
 
 
 def fault_text(fault: dict[str, Any]) -> str:
@@ -73,66 +76,68 @@ def fault_text(fault: dict[str, Any]) -> str:
 
 
 def _part_text(part: dict[str, Any]) -> str:
-    sizes = [
-        (key.split("_"), value)
-        for key, value in part.items()
-        if isinstance(value, int | float) and key != "tooth"
-    ]
-    told = ", ".join(
-        f"{' '.join(words[:-1])} {value:g} {words[-1]}" for words, value in sizes[:3]
+    text = f"{str(part['kind']).replace('_', ' ')} on the {part['gear']}"
+    sizes = []
+    for key, value in part.items():
+        if isinstance(value, int | float) and key != "tooth":
+            *words, unit = key.split("_")
+            sizes.append(f"{' '.join(words)} {value:g} {unit}")
+    if sizes:
+        text += f" ({', '.join(sizes[:3])})"
+    return text
+
+
+def _known(maps: Maps) -> _Row:
+    """Maps of the observer that knows what the fault adds."""
+    from matplotlib.colors import LogNorm
+
+    known = maps.known[np.isfinite(maps.known) & (maps.known > 0.0)]
+    low, high = 0.1, 1.0
+    if known.size:
+        low, high = known.min(), known.max()
+    return _Row(
+        title="Physically there",
+        label="d' of a filter that knows what the fault adds",
+        values=maps.known,
+        norm=LogNorm(low, max(high, 1.01 * low)),
     )
-    return f"{str(part['kind']).replace('_', ' ')} on the {part['gear']}" + (
-        f" ({told})" if told else ""
+
+
+def _seen(maps: Maps) -> _Row:
+    """Maps of the observer that knows indicators."""
+    from matplotlib.colors import Normalize
+
+    return _Row(
+        title="Seen by indicators among machines",
+        label="d' of the indicator chosen on other machines",
+        values=maps.seen,
+        norm=Normalize(0.0, float(np.nanmax([LEAST_TOP, *maps.seen.flat]))),
+        auroc=maps.auroc,
     )
 
 
-def _rows(maps: Maps) -> list[_Row]:
-    from matplotlib.colors import LogNorm, Normalize
-
-    known = np.where(maps.known > 0.0, maps.known, np.nan)
-    low, high = (
-        (np.nanmin(known), np.nanmax(known)) if np.isfinite(known).any() else (0.1, 1.0)
-    )
-    top = (
-        max(LEAST_TOP, float(np.nanmax(maps.seen)))
-        if np.isfinite(maps.seen).any()
-        else LEAST_TOP
-    )
-    return [
-        _Row(
-            title="Physically there",
-            label="d' of a filter that knows what the fault adds",
-            values=maps.known,
-            norm=LogNorm(low, max(high, 1.01 * low)),
-            texts=None,
-        ),
-        _Row(
-            title="Seen by indicators among machines",
-            label="d' of the indicator chosen on other machines",
-            values=maps.seen,
-            norm=Normalize(0.0, top),
-            texts=maps.auroc,
-        ),
-    ]
-
-
-def _large(figure: Any, maps: Maps, row: _Row) -> Any:
+def _best_map(figure: Any, maps: Maps, row: _Row) -> Any:
     """Speed by torque for the best channel and bandwidth, values in the cells."""
-    speed, torque, channel, band = best_and_worst(row.values)[0]
+    *best, channel, band = row.best
     values = row.values[:, :, channel, band]
     axes = figure.subplots()
     image = _image(axes, values, row)
-    for place in np.ndindex(values.shape):
-        if not np.isfinite(values[place]):
+    for cell, value in np.ndenumerate(values):
+        if not np.isfinite(value):
             continue
-        text = short(float(values[place]))
-        if row.texts is not None:
-            text = f"{round(float(values[place]), 2) + 0.0:.2f}\n({row.texts[:, :, channel, band][place]:.2f})"
-        color = "white" if row.norm(values[place]) < DARK else "black"
-        weight = "bold" if place == (speed, torque) else "normal"
+        text = short(float(value))
+        if row.auroc is not None:
+            # adding 0 turns -0.00 into 0.00
+            rounded = round(float(value), 2) + 0.0
+            text = f"{rounded:.2f}\n({row.auroc[(*cell, channel, band)]:.2f})"
+        color, weight = "black", "normal"
+        if row.norm(value) < DARK:
+            color = "white"
+        if list(cell) == best:
+            weight = "bold"
         axes.text(
-            place[1],
-            place[0],
+            cell[1],
+            cell[0],
             text,
             ha="center",
             va="center",
@@ -140,24 +145,21 @@ def _large(figure: Any, maps: Maps, row: _Row) -> Any:
             fontsize=9.5,
             fontweight=weight,
         )
-    axes.set_xticks(
-        range(len(maps.torques_nm)), [f"{one:g}" for one in maps.torques_nm]
-    )
-    axes.set_yticks(
-        range(len(maps.speeds_rpm)), [f"{one:g}" for one in maps.speeds_rpm]
-    )
-    inside = "d'" if row.texts is None else "d' (AUROC)"
+    for axis, numbers in ((axes.xaxis, maps.torques_nm), (axes.yaxis, maps.speeds_rpm)):
+        axis.set_ticks(range(len(numbers)), [f"{number:g}" for number in numbers])
     axes.set(xlabel="torque of the pinion, N m", ylabel="speed of the pinion, r/min")
+    inside = "d'"
+    if row.auroc is not None:
+        inside = "d' (AUROC)"
     test = f"{maps.channels[channel]}, up to {maps.bandwidths[band] / 1e3:.3g} kHz"
-    axes.set_title(f"{row.title}\nbest: {test}; in the cells {inside}", fontsize=10.5)
+    title = f"{row.title}\nbest: {test}; in the cells {inside}"
+    axes.set_title(title, fontsize=10.5)
     return image
 
 
-def _many(figure: Any, maps: Maps, row: _Row) -> Any:
-    """The same map for every channel (down) and bandwidth (across), on the same scale of colours."""
-    n_channels, n_bands = len(maps.channels), len(maps.bandwidths)
-    axes = figure.subplots(n_channels, n_bands, squeeze=False)
-    _, _, best_channel, best_band = best_and_worst(row.values)[0]
+def _all_maps(figure: Any, maps: Maps, row: _Row) -> Any:
+    """The same map for every channel (down) and bandwidth (across), on the same scale of colors."""
+    axes = figure.subplots(len(maps.channels), len(maps.bandwidths), squeeze=False)
     for (channel, band), panel in np.ndenumerate(axes):
         _image(panel, row.values[:, :, channel, band], row)
         panel.set_xticks([])
@@ -166,12 +168,11 @@ def _many(figure: Any, maps: Maps, row: _Row) -> Any:
             panel.set_title(f"to {maps.bandwidths[band] / 1e3:.3g} kHz", fontsize=9)
         if band == 0:
             panel.set_ylabel(maps.channels[channel], fontsize=9)
-        if (channel, band) == (best_channel, best_band):
+        if (channel, band) == row.best[2:]:
             for edge in panel.spines.values():
                 edge.set(color="#D55E00", linewidth=2.5)
-    figure.suptitle(
-        "every channel and bandwidth: speed upwards, torque to the right", fontsize=10
-    )
+    title = "every channel and bandwidth: speed upwards, torque to the right"
+    figure.suptitle(title, fontsize=10)
     return axes
 
 

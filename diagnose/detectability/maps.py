@@ -1,13 +1,8 @@
-"""Maps of how well a fault can be told, over speed, torque, channel and bandwidth, by two
-observers.
-"""
+"""Maps of detectability over speed, torque, channel and bandwidth, by two observers."""
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,39 +18,42 @@ from diagnose.detectability.observers import (
     seen_by_indicators,
 )
 from diagnose.detectability.pairs import PairCell, Pairs
+from diagnose.workers import call_all
 from gensig.errors import ConfigError, GensigError
 
 FloatArray = NDArray[np.floating]
 
 BANDWIDTHS_HZ = (1000.0, 2000.0, 5000.0, 10000.0, 20000.0)
+OF_SEEN = ("d_prime", "standard_error", "auroc", "indicator", "raises")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cell:
     """One speed and torque as the observers see it.
 
-    ``energy`` (unit, channel, band) is the square of d' that each band brings, ``noise_power``
-    (unit, channel) (m/s2)^2; the others (channel, band) tell of indicators, as
-    `diagnose.detectability.observers.Seen` does.
+    Attributes
+    ----------
+    energy : (unit, channel, band) square of d' of the known residual in each band
+    noise_power : (unit, channel) (m/s2)^2
+    seen : attribute of `diagnose.detectability.observers.Seen` -> (channel, band)
     """
 
     energy: FloatArray
     noise_power: FloatArray
-    d_prime: FloatArray
-    standard_error: FloatArray
-    auroc: FloatArray
-    indicator: NDArray[np.integer]
-    raises: NDArray[np.bool_]
+    seen: dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Maps:
-    """Both observers' maps.
+    """Maps of both observers, (speed, torque, channel, band) each.
 
-    ``known`` is d' of the matched filter by bandwidth and ``known_band`` that of each band alone,
-    both the median over the machines; ``seen``, ``standard_error``, ``auroc``, ``indicator`` and
-    ``raises`` are those of indicators. All are (speed, torque, channel, band); ``noise_rms``
-    (speed, torque, channel) m/s2, ``n_failed`` pairs that have no signal.
+    Attributes
+    ----------
+    known : d' of the matched filter by bandwidth, median over the machines
+    known_band : the same of each band alone
+    seen, standard_error, auroc, indicator, raises : of indicators
+    noise_rms : (speed, torque, channel) m/s2
+    n_failed : pairs of records that have no signal
     """
 
     fault: dict[str, Any]
@@ -78,27 +76,25 @@ class Maps:
 
 
 def read_bandwidths(given: Sequence[float] | None, pairs: Pairs) -> tuple[float, ...]:
-    """Upper frequencies in Hz, rising; by default those of `BANDWIDTHS_HZ` that the signals have,
-    and their highest.
+    """Upper frequencies in Hz, rising.
+
+    By default those of `BANDWIDTHS_HZ` that the signals have, and their highest.
 
     Raises
     ------
     ConfigError    for frequencies outside what is recorded
     """
     if given is None:
-        inside = [one for one in BANDWIDTHS_HZ if one < pairs.usable_frequency]
+        inside = [value for value in BANDWIDTHS_HZ if value < pairs.usable_frequency]
         return (*inside, pairs.usable_frequency)
     highest = 0.5 * pairs.sampling_rate
-    if (
-        not given
-        or len(set(given)) < len(given)
-        or not all(10.0 <= one <= highest for one in given)
-    ):
+    in_range = all(10.0 <= value <= highest for value in given)
+    if not given or len(set(given)) < len(given) or not in_range:
         raise ConfigError(
-            f"bandwidths in Hz: {', '.join(f'{one:g}' for one in given)}; give each once, from 10 to half the sampling "
-            f"rate, {highest:g}"
+            f"bandwidths in Hz: {', '.join(f'{value:g}' for value in given)}; give each once, "
+            f"from 10 to half the sampling rate, {highest:g}"
         )
-    return tuple(sorted(float(one) for one in given))
+    return tuple(sorted(map(float, given)))
 
 
 def make_maps(
@@ -108,20 +104,30 @@ def make_maps(
     n_workers: int,
     on_done: Callable[[str], None],
 ) -> Maps:
-    """Simulate every cell and let both observers look at it; the same bits for any number of
-    workers.
+    """Maps of all cells; the same bits for any number of workers.
 
     Raises
     ------
     GensigError    if a worker was killed
     """
-    cells = _look_at_all(pairs, bandwidths, n_workers, on_done)
+    cells: list[Cell] = call_all(
+        look_at,
+        (pairs, bandwidths),
+        range(pairs.n_cells),
+        n_workers=n_workers,
+        on_done=lambda index, _: on_done(_cell_text(pairs, index)),
+        remedy="try --workers 1",
+    )
     shape = (len(pairs.speeds_rpm), len(pairs.torques_nm))
 
     def over_cells(values: Sequence[NDArray[Any]]) -> NDArray[Any]:
         return np.stack(values).reshape(*shape, *values[0].shape)
 
     energy = over_cells([cell.energy for cell in cells])
+    power = over_cells([cell.noise_power for cell in cells])
+    seen = {
+        name: over_cells([cell.seen[name] for cell in cells]) for name in cells[0].seen
+    }
     return Maps(
         fault=pairs.config.section("fault").plain(),
         speeds_rpm=pairs.speeds_rpm,
@@ -131,48 +137,43 @@ def make_maps(
         indicators=indicator_names(list(pairs.gears)),
         n_units=pairs.n_units,
         duration=pairs.duration,
-        known=_median(np.sqrt(np.cumsum(energy, axis=-1)), axis=2),
-        known_band=_median(np.sqrt(energy), axis=2),
-        seen=over_cells([cell.d_prime for cell in cells]),
-        standard_error=over_cells([cell.standard_error for cell in cells]),
-        auroc=over_cells([cell.auroc for cell in cells]),
-        indicator=over_cells([cell.indicator for cell in cells]),
-        raises=over_cells([cell.raises for cell in cells]),
-        noise_rms=np.sqrt(
-            _median(over_cells([cell.noise_power for cell in cells]), axis=2)
-        ),
+        known=_median_of_units(np.sqrt(np.cumsum(energy, axis=-1))),
+        known_band=_median_of_units(np.sqrt(energy)),
+        seen=seen.pop("d_prime"),
+        noise_rms=np.sqrt(_median_of_units(power)),
         n_failed=int(np.isnan(energy[..., 0, 0]).sum()),
+        **seen,
     )
 
 
-def look_at(pairs: Pairs, place: int, bandwidths: Sequence[float]) -> Cell:
+def _cell_text(pairs: Pairs, index: int) -> str:
+    speed, torque = divmod(index, len(pairs.torques_nm))
+    return f"{pairs.speeds_rpm[speed]:g} r/min, {pairs.torques_nm[torque]:g} N m"
+
+
+def look_at(pairs: Pairs, bandwidths: Sequence[float], index: int) -> Cell:
     """Simulate one cell and let both observers look at it."""
-    cell = pairs.cell(place)
+    cell = pairs.cell(index)
     sound, faulty = _indicator_tables(pairs, cell, bandwidths)
     shape = sound.shape[1:3]
     seen = [
         seen_by_indicators(sound[:, channel, band], faulty[:, channel, band])
         for channel, band in np.ndindex(shape)
     ]
-
-    def of_seen(name: str) -> NDArray[Any]:
-        return np.array([getattr(one, name) for one in seen]).reshape(shape)
-
     return Cell(
         energy=residual_energy(
             cell.residual, cell.noise_density, pairs.sampling_rate, bandwidths
         ),
         noise_power=cell.noise_power,
-        d_prime=of_seen("d_prime"),
-        standard_error=of_seen("standard_error"),
-        auroc=of_seen("auroc"),
-        indicator=of_seen("indicator"),
-        raises=of_seen("raises"),
+        seen={
+            name: np.array([getattr(each, name) for each in seen]).reshape(shape)
+            for name in OF_SEEN
+        },
     )
 
 
 def best_and_worst(values: FloatArray) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Places of the largest and of the smallest value, NaN apart.
+    """Indices of the largest and of the smallest value; NaN is ignored.
 
     Raises
     ------
@@ -180,30 +181,32 @@ def best_and_worst(values: FloatArray) -> tuple[tuple[int, ...], tuple[int, ...]
     """
     if np.isnan(values).all():
         raise GensigError(
-            "no pair of records could be simulated or judged; longer records or fewer extremes may help"
+            "no pair of records could be simulated or judged; "
+            "longer records or fewer extremes may help"
         )
-    largest, smallest = np.nanargmax(values), np.nanargmin(values)
-    return tuple(map(int, np.unravel_index(largest, values.shape))), tuple(
-        map(int, np.unravel_index(smallest, values.shape))
+    largest, smallest = (
+        tuple(map(int, np.unravel_index(flat, values.shape)))
+        for flat in (np.nanargmax(values), np.nanargmin(values))
     )
+    return largest, smallest
 
 
 def confirm_best(maps: Maps, others: Pairs) -> Seen:
     """The best test of the indicators on machines that had no part in choosing it.
 
-    ``others`` of the same map.
+    Parameters
+    ----------
+    others : such machines over the same map
     """
-    speed, torque, channel, band = place = best_and_worst(maps.seen)[0]
+    best = best_and_worst(maps.seen)[0]
+    speed, torque, channel, band = best
     cell = others.cell(speed * len(maps.torques_nm) + torque)
-    sound, faulty = (
-        table[:, channel, band]
-        for table in _indicator_tables(others, cell, maps.bandwidths)
-    )
+    sound, faulty = _indicator_tables(others, cell, maps.bandwidths)
     return confirmed(
-        sound,
-        faulty,
-        indicator=int(maps.indicator[place]),
-        raises=bool(maps.raises[place]),
+        sound[:, channel, band],
+        faulty[:, channel, band],
+        indicator=int(maps.indicator[best]),
+        raises=bool(maps.raises[best]),
     )
 
 
@@ -211,84 +214,23 @@ def _indicator_tables(
     pairs: Pairs, cell: PairCell, bandwidths: Sequence[float]
 ) -> tuple[FloatArray, FloatArray]:
     """Indicators of the sound and of the faulty records, (unit, channel, band, indicator) each."""
-    shape = (
-        pairs.n_units,
-        len(pairs.channel_names),
-        len(bandwidths),
-        len(indicator_names(list(pairs.gears))),
-    )
-    tables = np.full((2, *shape), np.nan)
-    records = ((cell.sound, cell.sound_angle), (cell.faulty, cell.faulty_angle))
-    for table, (signals, angles) in zip(tables, records, strict=True):
-        for unit, (signal, angle) in enumerate(zip(signals, angles, strict=True)):
+    n_indicators = len(indicator_names(list(pairs.gears)))
+    shape = (pairs.n_units, len(pairs.channel_names), len(bandwidths), n_indicators)
+    sound, faulty = np.full(shape, np.nan), np.full(shape, np.nan)
+    for table, signals, angles in (
+        (sound, cell.sound, cell.sound_angle),
+        (faulty, cell.faulty, cell.faulty_angle),
+    ):
+        for row, signal, angle in zip(table, signals, angles, strict=True):
             if np.isfinite(signal).all():
-                table[unit] = band_indicators(
+                row[:] = band_indicators(
                     signal, angle, pairs.sampling_rate, pairs.gears, bandwidths
                 )
-    return tables[0], tables[1]
+    return sound, faulty
 
 
-def _median(values: FloatArray, axis: int) -> FloatArray:
-    """Median without NaN; NaN where there is nothing else."""
-    counts = np.isfinite(values).any(axis=axis)
-    return np.where(
-        counts,
-        np.nanmedian(np.where(np.expand_dims(counts, axis), values, 0.0), axis=axis),
-        np.nan,
-    )
-
-
-_work: dict[str, Any] = {}
-
-
-def _look_at_all(
-    pairs: Pairs,
-    bandwidths: Sequence[float],
-    n_workers: int,
-    on_done: Callable[[str], None],
-) -> list[Cell]:
-    """Every cell, in order; with one thread a process."""
-    places = range(pairs.n_cells)
-    cells = []
-    if n_workers == 1 or pairs.n_cells == 1:
-        from threadpoolctl import threadpool_limits
-
-        with threadpool_limits(1):
-            for place in places:
-                cells.append(look_at(pairs, place, bandwidths))
-                on_done(_cell_text(pairs, place))
-        return cells
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(
-        min(n_workers, pairs.n_cells), context, _start_worker, (pairs, bandwidths)
-    ) as executor:
-        try:
-            for place, cell in zip(
-                places, executor.map(_look_in_worker, places), strict=True
-            ):
-                cells.append(cell)
-                on_done(_cell_text(pairs, place))
-        except BrokenProcessPool:
-            raise GensigError(
-                "a worker process was killed (out of memory?); try --workers 1"
-            ) from None
-        except BaseException:
-            executor.shutdown(wait=False, cancel_futures=True)
-            raise
-    return cells
-
-
-def _cell_text(pairs: Pairs, place: int) -> str:
-    speed, torque = divmod(place, len(pairs.torques_nm))
-    return f"{pairs.speeds_rpm[speed]:g} r/min, {pairs.torques_nm[torque]:g} N m"
-
-
-def _start_worker(pairs: Pairs, bandwidths: Sequence[float]) -> None:
-    from threadpoolctl import threadpool_limits
-
-    threadpool_limits(1)
-    _work.update(pairs=pairs, bandwidths=bandwidths)
-
-
-def _look_in_worker(place: int) -> Cell:
-    return look_at(_work["pairs"], place, _work["bandwidths"])
+def _median_of_units(values: FloatArray) -> FloatArray:
+    """Median over the units (third axis) without NaN; NaN where there is nothing else."""
+    known = np.isfinite(values).any(axis=2)
+    median = np.nanmedian(np.where(np.expand_dims(known, 2), values, 0.0), axis=2)
+    return np.where(known, median, np.nan)

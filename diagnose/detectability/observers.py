@@ -1,8 +1,7 @@
-"""Two observers of the same fault: one that knows what it adds, one that knows indicators of
-other machines.
+"""Two observers of the same fault: one knows what it adds, one knows indicators of machines.
 
-Both answer with d': how far apart sound and faulty lie, in standard deviations. A share Phi(d' /
-sqrt(2)) of pairs of a sound and a faulty record is then ranked right.
+Both answer with d', the distance of sound and faulty records in standard deviations. A share
+Phi(d' / sqrt(2)) of pairs of a sound and a faulty record is then ranked right.
 """
 
 from __future__ import annotations
@@ -10,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,9 +29,8 @@ FloatArray = NDArray[np.floating]
 
 OF_SIGNAL = ("rms", "band_rms", "kurtosis", "crest_factor")
 OF_GEAR = ("envelope", "fm4", "sideband_ratio", "energy_ratio", "residual_rms")
-ENVELOPE_HARMONICS = (
-    5  # of the gear's turns, assumed: a short event once a turn has about equal ones
-)
+# Of the gear's turns, assumed: a short event once a turn has about equal ones.
+ENVELOPE_HARMONICS = 5
 FEWEST_UNITS = 4  # all but one of them still have a spread
 LEAST_SPREAD = 1e-9  # of an indicator's logarithm: what rounding leaves of none
 
@@ -42,20 +41,21 @@ def residual_energy(
     sampling_rate: float,
     bandwidths: Sequence[float],
 ) -> FloatArray:
-    """Square of d' that every band of a known residual brings against Gaussian noise of a known
-    spectrum.
+    """Square of d' of a known residual in Gaussian noise of a known spectrum, by band.
 
     Parameters
     ----------
-    residual : (..., sample) m/s2       what the fault adds
-    noise_density : (..., bin) (m/s2)^2 mean of |rfft(noise)|^2 / samples; one bin for all where it is white
+    residual : (..., sample) m/s2, what the fault adds
+    noise_density : (..., bin) (m/s2)^2, mean of |rfft(noise)|^2 / samples; one bin for all where
+        it is white
     sampling_rate : Hz
-    bandwidths : (band,) Hz, rising     upper ends; the first band begins at 0, a frequency belongs to the lower band
+    bandwidths : (band,) Hz, rising upper ends; the first band begins at 0, a frequency belongs to
+        the lower band
 
     Returns
     -------
-    (..., band)    independent bands, and records after one another, add up: d' grows with the root of the duration;
-                   NaN without noise
+    (..., band)    independent bands, and records after one another, add up: d' grows with the root
+                   of the duration; NaN without noise
 
     Source: the matched filter of a known signal in Gaussian noise, whitened: Van Trees (1968),
     "Detection, estimation, and modulation theory", part I, section 4.3.
@@ -67,20 +67,11 @@ def residual_energy(
     if n_samples % 2 == 0:
         sides[-1] = 1.0
     power = sides * np.abs(np.fft.rfft(residual, axis=-1)) ** 2 / n_samples
-    energy = np.divide(
-        power,
-        noise_density,
-        out=np.full(power.shape, np.nan),
-        where=noise_density > 0.0,
-    )
-    places = np.searchsorted(frequency, bandwidths, side="right")
-    return np.stack(
-        [
-            energy[..., low:high].sum(axis=-1)
-            for low, high in zip([0, *places], places, strict=False)
-        ],
-        -1,
-    )
+    unknown = np.full(power.shape, np.nan)
+    energy = np.divide(power, noise_density, out=unknown, where=noise_density > 0.0)
+    ends = np.searchsorted(frequency, bandwidths, side="right")
+    bands = [energy[..., low:high].sum(axis=-1) for low, high in pairwise([0, *ends])]
+    return np.stack(bands, axis=-1)
 
 
 def indicator_names(gears: Sequence[str]) -> tuple[str, ...]:
@@ -95,8 +86,7 @@ def band_indicators(
     gears: Mapping[str, tuple[int, float]],
     bandwidths: Sequence[float],
 ) -> FloatArray:
-    """Logarithms of the indicators of one record, as an analyst with a tachometer has them, by
-    bandwidth.
+    """Logarithms of the indicators of one record by bandwidth, for an analyst with a tachometer.
 
     ``band_rms`` and the envelope are those of the highest band of the bandwidth alone, all others
     of everything below. The envelope is the amplitude of its first `ENVELOPE_HARMONICS` orders of
@@ -112,7 +102,8 @@ def band_indicators(
 
     Returns
     -------
-    (channel, band, indicator)    NaN where the record is too short or the bandwidth too small for an indicator
+    (channel, band, indicator)    NaN where the record is too short or the bandwidth too small for
+        an indicator
     """
     x = signal - signal.mean(axis=-1, keepdims=True)
     n_channels, n_samples = x.shape
@@ -122,11 +113,10 @@ def band_indicators(
     turns = {gear: _turns(x, ratio * angle) for gear, (_, ratio) in gears.items()}
     orders = {gear: _orders(ratio * angle) for gear, (_, ratio) in gears.items()}
     spectrum = np.fft.rfft(x, axis=-1)
-    places = np.searchsorted(
-        np.fft.rfftfreq(n_samples, 1.0 / sampling_rate), bandwidths, side="right"
-    )
+    frequency = np.fft.rfftfreq(n_samples, 1.0 / sampling_rate)
+    ends = np.searchsorted(frequency, bandwidths, side="right")
     below = np.zeros(x.shape, dtype=np.complex128)
-    for band, (low, high) in enumerate(zip([1, *places], places, strict=False)):
+    for band, (low, high) in enumerate(pairwise([1, *ends])):
         one_sided = np.zeros(x.shape, dtype=np.complex128)
         one_sided[:, low:high] = 2.0 * spectrum[:, low:high]
         analytic = np.fft.ifft(one_sided, axis=-1)
@@ -165,16 +155,12 @@ def _turns(x: FloatArray, angle: FloatArray) -> FloatArray:
 def _orders(angle: FloatArray) -> FloatArray | None:
     """e^(-i k angle) of the harmonics over the whole turns that there are, (harmonic, sample)."""
     turned = angle - angle[0]
-    n_kept = int(
-        np.searchsorted(
-            turned, 2.0 * math.pi * math.floor(turned[-1] / (2.0 * math.pi))
-        )
-    )
+    whole_turns = 2.0 * math.pi * math.floor(turned[-1] / (2.0 * math.pi))
+    n_kept = int(np.searchsorted(turned, whole_turns))
     if n_kept == 0:
         return None
-    return np.cumprod(
-        np.tile(np.exp(-1j * turned[:n_kept]), (ENVELOPE_HARMONICS, 1)), axis=0
-    )
+    first = np.exp(-1j * turned[:n_kept])
+    return np.cumprod(np.tile(first, (ENVELOPE_HARMONICS, 1)), axis=0)
 
 
 def _envelope_turns(magnitude: FloatArray, orders: FloatArray | None) -> FloatArray:
@@ -183,12 +169,8 @@ def _envelope_turns(magnitude: FloatArray, orders: FloatArray | None) -> FloatAr
     kept = magnitude[:, : orders.shape[1]]
     mean = kept.mean(axis=-1)
     lines = 2.0 * np.abs(kept @ orders.T) / kept.shape[-1]
-    return np.divide(
-        np.sqrt(np.sum(lines**2, axis=-1)),
-        mean,
-        out=np.full(len(kept), np.nan),
-        where=mean > 0.0,
-    )
+    total = np.sqrt(np.sum(lines**2, axis=-1))
+    return np.divide(total, mean, out=np.full(len(kept), np.nan), where=mean > 0.0)
 
 
 def _of_average(
@@ -197,29 +179,27 @@ def _of_average(
     """The indicators of an average turn up to some order, (channel,) each."""
     n_samples = average.shape[-1]
     highest = min(highest_order, (n_samples - 1) // 2)
-    if (
-        highest <= n_teeth + (n_teeth - 1) // 2
-    ):  # no room for the mesh and its sidebands
+    if highest <= n_teeth + (n_teeth - 1) // 2:
+        # no room for the mesh and its sidebands
         return [np.full(len(average), np.nan)] * (len(OF_GEAR) - 1)
     # fewer samples a turn: nothing is left above the highest order, not even rounding
-    turn = np.fft.irfft(np.fft.rfft(average)[:, : highest + 1], 2 * highest + 1) * (
-        (2 * highest + 1) / n_samples
-    )
-    ratios = [
-        fm4(turn, n_teeth),
-        sideband_ratio(turn, n_teeth),
-        energy_ratio(turn, n_teeth),
-    ]
+    n_kept = 2 * highest + 1
+    orders = np.fft.rfft(average)[:, : highest + 1]
+    turn = np.fft.irfft(orders, n_kept) * (n_kept / n_samples)
+    ratios = [of_turn(turn, n_teeth) for of_turn in (fm4, sideband_ratio, energy_ratio)]
     return [*ratios, rms(residual_signal(turn, n_teeth))]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Seen:
-    """What indicators tell of a fault on machines that had no part in choosing one.
+    """Detectability of a fault by indicators, on machines that had no part in choosing one.
 
-    ``d_prime`` with its ``standard_error``, ``auroc`` of pairs of different machines, the
-    ``indicator`` that most choices fell on, by its place, and whether the fault ``raises`` it;
-    NaN and -1 where too few machines have one.
+    Attributes
+    ----------
+    d_prime, standard_error : NaN where too few machines have an indicator
+    auroc : of pairs of different machines
+    indicator : index of the one that most choices fell on; -1 where there is none
+    raises : True if the fault raises it
     """
 
     d_prime: float
@@ -235,12 +215,11 @@ NOTHING_SEEN = Seen(
 
 
 def seen_by_indicators(sound: FloatArray, faulty: FloatArray) -> Seen:
-    """Choose the indicator that tells best on all machines but one, and judge it on that one;
-    each in turn.
+    """Score of the indicator that is best on all machines but one, judged on that one, in turn.
 
-    A machine's score is how many standard deviations of the sound ones it lies off their mean, in
-    the direction in which the faulty ones of the others do: what was chosen for different
-    machines is then on one scale.
+    A machine's score is its distance from the mean of the sound ones, in their standard
+    deviations, in the direction in which the faulty ones of the others lie. Scores of indicators
+    chosen for different machines are then on one scale.
 
     Parameters
     ----------
@@ -252,34 +231,34 @@ def seen_by_indicators(sound: FloatArray, faulty: FloatArray) -> Seen:
 
     Notes
     -----
-    d' is the difference of the means over the root mean square s of both standard deviations, times 1 - 3 / (4 n - 5),
-    which takes the bias of few machines away. The groups are the same n machines, so that the square of its standard
-    error is the variance of their own differences over n s^2, plus d'^2 / (2 n - 2) for s. Both hold for one indicator:
-    S. B. Morris & R. P. DeShon (2002), "Combining effect size estimates in meta-analysis with repeated measures and
-    independent-groups designs", Psychological Methods 7 (1), 105-125. Without a fault both groups are the same numbers:
-    d' is 0 and the AUROC 0.5, however many indicators there are.
+    d' is the difference of the means over the root mean square s of both standard deviations,
+    times 1 - 3 / (4 n - 5), which takes the bias of few machines away. The groups are the same n
+    machines, so that the square of its standard error is the variance of their differences over
+    n s^2, plus d'^2 / (2 n - 2) for s. Both hold for one indicator: S. B. Morris & R. P. DeShon
+    (2002), "Combining effect size estimates in meta-analysis with repeated measures and
+    independent-groups designs", Psychological Methods 7 (1), 105-125. Without a fault both groups
+    are the same numbers: d' is 0 and the AUROC 0.5, however many indicators there are.
     """
     known = np.isfinite(sound).any(axis=1) & np.isfinite(faulty).any(axis=1)
     sound, faulty = sound[known], faulty[known]
-    usable = np.flatnonzero(
-        np.isfinite(sound).all(axis=0) & np.isfinite(faulty).all(axis=0)
-    )
+    everywhere = np.isfinite(sound).all(axis=0) & np.isfinite(faulty).all(axis=0)
+    usable = np.flatnonzero(everywhere)
     n_units = len(sound)
     if n_units < FEWEST_UNITS or usable.size == 0:
         return NOTHING_SEEN
     groups = np.stack([sound[:, usable], faulty[:, usable]])
-    middle, scale = (
-        groups[0].mean(axis=0),
-        np.maximum(groups[0].std(axis=0, ddof=1), LEAST_SPREAD),
-    )
+    middle = groups[0].mean(axis=0)
+    scale = np.maximum(groups[0].std(axis=0, ddof=1), LEAST_SPREAD)
     scores = np.empty((2, n_units))
     chosen = np.empty(n_units, dtype=np.intp)
     for unit in range(n_units):
         others = np.delete(groups, unit, axis=1)
         difference = others[1].mean(axis=0) - others[0].mean(axis=0)
         chosen[unit] = best = int(np.argmax(np.abs(difference) / _spread(others)))
-        own = (groups[:, unit, best] - middle[best]) / scale[best]
-        scores[:, unit] = own if difference[best] >= 0.0 else -own
+        score = (groups[:, unit, best] - middle[best]) / scale[best]
+        if difference[best] < 0.0:
+            score = -score
+        scores[:, unit] = score
     most = int(np.argmax(np.bincount(chosen)))
     raises = groups[1, :, most].mean() >= groups[0, :, most].mean()
     return _judged(*scores, indicator=int(usable[most]), raises=bool(raises))
@@ -288,22 +267,22 @@ def seen_by_indicators(sound: FloatArray, faulty: FloatArray) -> Seen:
 def confirmed(
     sound: FloatArray, faulty: FloatArray, *, indicator: int, raises: bool
 ) -> Seen:
-    """What one indicator, chosen on other machines, tells: the best of many tests is best by luck
-    too.
+    """Detectability by one indicator that was chosen on other machines.
+
+    The best of many tests is partly best by luck.
 
     Parameters
     ----------
     sound, faulty : (unit, indicator)    as in `seen_by_indicators`
     indicator, raises : as that one says
     """
-    sign = 1.0 if raises else -1.0
-    scores = sign * np.stack([sound[:, indicator], faulty[:, indicator]])
+    scores = np.stack([sound[:, indicator], faulty[:, indicator]])
+    if not raises:
+        scores = -scores
     scores = scores[:, np.isfinite(scores).all(axis=0)]
-    return (
-        _judged(*scores, indicator=indicator, raises=raises)
-        if scores.shape[1] >= FEWEST_UNITS
-        else NOTHING_SEEN
-    )
+    if scores.shape[1] < FEWEST_UNITS:
+        return NOTHING_SEEN
+    return _judged(*scores, indicator=indicator, raises=raises)
 
 
 def _judged(
@@ -325,12 +304,14 @@ def _judged(
 
 
 def _spread(groups: FloatArray) -> FloatArray:
-    """Root mean square of the standard deviations of two groups, (indicator,) from (group, unit,
-    indicator).
+    """Root mean square of the standard deviations of two groups, (indicator,).
+
+    Parameters
+    ----------
+    groups : (group, unit, indicator)
     """
-    return np.maximum(
-        np.sqrt(np.mean(np.var(groups, axis=1, ddof=1), axis=0)), LEAST_SPREAD
-    )
+    variance = np.mean(np.var(groups, axis=1, ddof=1), axis=0)
+    return np.maximum(np.sqrt(variance), LEAST_SPREAD)
 
 
 def _auroc(sound: FloatArray, faulty: FloatArray) -> float:

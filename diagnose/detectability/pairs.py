@@ -1,4 +1,4 @@
-"""Protocols of `gensig.production.fault_pairs.FaultPairs` and its cells, which need no physics."""
+"""Interfaces of `gensig.production.fault_pairs.FaultPairs` and its cells, without its physics."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Pairs(Protocol):
     def n_cells(self) -> int:
         """Speeds times torques."""
 
-    def cell(self, place: int) -> PairCell:
+    def cell(self, index: int, /) -> PairCell:
         """Pairs of all units at one speed and torque."""
 
 

@@ -1,8 +1,7 @@
-"""A trained network on a data set, its own or another one, if the two fit."""
+"""Evaluation of a trained network on a data set, if the two fit."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from diagnose.data.at_rate import at_rate
 from diagnose.data.windows import Segments, Task, all_segments, subset_segments, task_of
 from diagnose.recordings.stored_network import Scores, StoredNetwork
+from diagnose.studies.result_files import write_metrics
 from diagnose.training.store import ModelDescription, data_fingerprint, schema_version
 from gensig.errors import ConfigError, DatasetError
 
@@ -32,9 +32,8 @@ class Evaluation:
     scores: Scores
 
     def write(self, folder: Path) -> None:
-        """Write ``metrics.json`` and what belongs beside it."""
-        text = json.dumps(self.result, indent=2, allow_nan=False)
-        (folder / "metrics.json").write_text(text + "\n", encoding="utf-8")
+        """Write ``metrics.json`` and the files that belong to it."""
+        write_metrics(folder, self.result)
         self.scores.write(folder, self.result)
 
 
@@ -104,7 +103,9 @@ def _matching_task(
     )
     if description.test_channel_names is None:
         return task
-    tested = description.test_channel_names if channels is None else wanted
+    tested = wanted
+    if channels is None:
+        tested = description.test_channel_names
     return replace(task, cross_channels=(wanted, tested))
 
 
@@ -115,26 +116,29 @@ def fitting_channels(
 ) -> tuple[str, ...]:
     """Channels of a data set for those of a network.
 
-    Refuses another format, a lower rate and what it has not.
+    Refuses another format, a lower rate and channels that it has not.
     """
     where = f"{dataset.folder} does not fit the model"
     if schema_version(dataset) != description.data_schema_version:
         raise DatasetError(
-            f"{where}: data schema {schema_version(dataset)}, trained on schema {description.data_schema_version}",
+            f"{where}: data schema {schema_version(dataset)}, trained on schema "
+            f"{description.data_schema_version}",
         )
     if dataset.sampling_rate < description.sampling_rate_hz * (1 - 1e-9):
         raise DatasetError(
-            f"{where}: sampled at {dataset.sampling_rate:g} Hz, trained at {description.sampling_rate_hz:g} Hz",
+            f"{where}: sampled at {dataset.sampling_rate:g} Hz, trained at "
+            f"{description.sampling_rate_hz:g} Hz",
         )
     if channels is not None and len(channels) != len(description.channel_names):
         raise ConfigError(
-            f"channels={','.join(channels)}: the model takes {len(description.channel_names)}, in the order of "
-            f"{', '.join(description.channel_names)}"
+            f"channels={','.join(channels)}: the model takes {len(description.channel_names)}, in "
+            f"the order of {', '.join(description.channel_names)}"
         )
     wanted = tuple(channels or description.channel_names)
     if missing := [name for name in wanted if name not in dataset.channel_names]:
         raise DatasetError(
-            f"{where}: it has no channel {', '.join(missing)} (it has {', '.join(dataset.channel_names)})",
+            f"{where}: it has no channel {', '.join(missing)} "
+            f"(it has {', '.join(dataset.channel_names)})",
         )
     return wanted
 
@@ -146,19 +150,17 @@ def chosen_segments(
     subset: str | None,
 ) -> tuple[Segments, str, Task]:
     """Stretches to judge, the part in words, and the task with the channels of that part."""
-    own = data_fingerprint(task.dataset) == description.data_fingerprint
-    if protocol is None and subset is not None and not own:
+    note = ""
+    if data_fingerprint(task.dataset) == description.data_fingerprint:
+        note = " (the data set it was trained on)"
+        protocol = protocol or description.protocol
+    if protocol is None and subset is not None:
         raise ConfigError(
             f"subset={subset} needs protocol=..., one of {', '.join(task.dataset.protocols)}",
         )
-    if protocol is None and own:
-        protocol = description.protocol
     if protocol is None:
         return all_segments(task), "all records", task
     subset = subset or "test"
-    note = " (the data set it was trained on)" if own else ""
-    return (
-        subset_segments(task, protocol, subset),
-        f"{subset} part of {protocol}{note}",
-        task.part(protocol, subset),
-    )
+    segments = subset_segments(task, protocol, subset)
+    text = f"{subset} part of {protocol}{note}"
+    return segments, text, task.part(protocol, subset)

@@ -1,4 +1,4 @@
-"""A trained network as an ONNX file that takes m/s^2, checked against torch when it is written."""
+"""Export of a trained network as an ONNX file that takes m/s^2, checked against torch."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import io
 import json
 import logging
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from diagnose.training.store import ModelDescription
 
 INPUT = "acceleration"
+LOGGERS = ("torch.onnx", "onnxscript", "onnx_ir")
 TOLERANCE = 1e-4  # of an answer, and this share of it where that is above 1
 
 
@@ -72,11 +73,8 @@ def export_onnx(network: StoredNetwork, file: Path) -> str:
         found = answers_of(file, inputs, graph.output) / graph.unit
         taken = (normalised(windows, description.normalise), *graph.further.values())
         with torch.inference_mode():
-            expected = (
-                graph.answer(network.model, *map(torch.from_numpy, taken))
-                .numpy()
-                .astype(float)
-            )
+            answer = graph.answer(network.model, *map(torch.from_numpy, taken))
+        expected = answer.numpy().astype(float)
         error = np.abs(found - expected) / np.maximum(np.abs(expected), 1.0)
         difference = float(np.max(error))
         if not difference <= TOLERANCE:
@@ -95,7 +93,7 @@ def answers_of(
     inputs: Mapping[str, NDArray[np.float32]],
     output: str,
 ) -> NDArray[np.float64]:
-    """What onnxruntime makes of inputs (window, ...), in blocks of two sizes."""
+    """Answers of onnxruntime to inputs (window, ...), in blocks of two sizes."""
     import onnxruntime
 
     options = onnxruntime.SessionOptions()
@@ -103,13 +101,11 @@ def answers_of(
     session = onnxruntime.InferenceSession(
         str(file), options, providers=["CPUExecutionProvider"]
     )
-    blocks = [
-        {name: values[part] for name, values in inputs.items()}
-        for part in (slice(0, 1), slice(1, None))
-    ]
-    return np.concatenate([session.run([output], block)[0] for block in blocks]).astype(
-        float
-    )
+    answers = []
+    for part in (slice(0, 1), slice(1, None)):
+        block = {name: values[part] for name, values in inputs.items()}
+        answers.append(session.run([output], block)[0])
+    return np.concatenate(answers).astype(float)
 
 
 def write_onnx(
@@ -125,20 +121,8 @@ def write_onnx(
     GensigError    for a network that cannot be written
     """
     shapes = ({0: torch.export.Dim("window", min=1)},) * len(inputs)
-    said = io.StringIO()
-    loggers = [
-        logging.getLogger(name) for name in ("torch.onnx", "onnxscript", "onnx_ir")
-    ]
-    before = [logger.level for logger in loggers]
     try:
-        for logger in loggers:
-            logger.setLevel(logging.ERROR)
-        with (
-            warnings.catch_warnings(),
-            contextlib.redirect_stdout(said),
-            contextlib.redirect_stderr(said),
-        ):
-            warnings.simplefilter("ignore")
+        with _silent():
             torch.onnx.export(
                 whole,
                 tuple(inputs.values()),
@@ -153,17 +137,37 @@ def write_onnx(
     except Exception as error:  # torch raises whatever stopped it
         reason = " ".join(str(error).split())[:160]
         raise GensigError(f"this network cannot be written as ONNX: {reason}") from None
-    finally:
-        for logger, level in zip(loggers, before, strict=True):
-            logger.setLevel(level)
+
+
+@contextlib.contextmanager
+def _silent() -> Iterator[None]:
+    """No output of the exporters: no lines, no warnings, of their loggers errors only."""
+    output = io.StringIO()
+    loggers = [logging.getLogger(name) for name in LOGGERS]
+    before = [logger.level for logger in loggers]
+    with (
+        warnings.catch_warnings(),
+        contextlib.redirect_stdout(output),
+        contextlib.redirect_stderr(output),
+    ):
+        warnings.simplefilter("ignore")
+        for logger in loggers:
+            logger.setLevel(logging.ERROR)
+        try:
+            yield
+        finally:
+            for logger, level in zip(loggers, before, strict=True):
+                logger.setLevel(level)
 
 
 def describe_onnx(
     file: Path, description: ModelDescription, answers: Mapping[str, Any]
 ) -> None:
-    """What the numbers mean, as text and JSON in the file's metadata.
+    """Write the meaning of the numbers, as text and JSON, into the file's metadata.
 
-    ``answers`` what is told of the output.
+    Parameters
+    ----------
+    answers : facts of the output
     """
     import onnx
 
@@ -185,9 +189,8 @@ def describe_onnx(
     content = onnx.load(file)
     del content.metadata_props[:]
     for key, value in facts.items():
-        content.metadata_props.add(
-            key=key,
-            value=value if isinstance(value, str) else json.dumps(value),
-        )
+        if not isinstance(value, str):
+            value = json.dumps(value)
+        content.metadata_props.add(key=key, value=value)
     onnx.checker.check_model(content)
     onnx.save(content, file)

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.recordings.source import (
-    SPEED_TOLERANCE,
     Source,
     prepare_recording,
     tracking_facts,
+    trained_at,
 )
 from diagnose.recordings.stored_network import StoredNetwork
 from gensig.signals.mesh_motion import in_hertz
@@ -32,7 +32,7 @@ def predict_recording(
 
     The recording counts as out of distribution if at least half of its windows lie farther from
     the training windows than the threshold, its speed lies outside those of the training records,
-    its gears have other teeth, or the network has reasons of its own. With a tachometer, or with
+    its gears have other teeth, or the network gives further reasons. With a tachometer, or with
     teeth and speed, the recording is first played at one constant speed.
 
     Parameters
@@ -55,26 +55,29 @@ def predict_recording(
     prepared = prepare_recording(description, source)
     windows, tracked = prepared.windows, prepared.tracked
     answer = network.answer(source, prepared)
-    rate = description.sampling_rate_hz
+    rate, n_teeth = description.sampling_rate_hz, description.n_teeth
     rows = [
         {"start_s": float(start / rate), **row, "distance": None, "beyond": None}
         for start, row in zip(windows.start, answer.windows, strict=True)
     ]
-    beyond = None
+    beyond = n_beyond = threshold = tracking = None
     if domain is not None:
         beyond = _with_distances(rows, domain, windows)
+        n_beyond, threshold = int(beyond.sum()), domain.threshold
+    if tracked is not None:
+        tracking = tracking_facts(tracked, source)
     reasons = reasons_unlike(description, source, tracked, beyond) + answer.reasons
-    n_teeth = description.n_teeth
+    is_unlike = None
+    if reasons or domain is not None:
+        is_unlike = bool(reasons)
     return {
         "recording": source.file,
         **answer.record,
-        "out_of_distribution": None
-        if beyond is None and not reasons
-        else bool(reasons),
+        "out_of_distribution": is_unlike,
         "reasons": reasons,
         "n_windows": len(windows),
-        "n_windows_beyond": None if beyond is None else int(beyond.sum()),
-        "distance_threshold": None if domain is None else domain.threshold,
+        "n_windows_beyond": n_beyond,
+        "distance_threshold": threshold,
         "window_duration_s": prepared.duration_s,
         "windows": rows,
         "channels": dict(
@@ -83,8 +86,8 @@ def predict_recording(
         "sampling_rate_hz": prepared.recording.sampling_rate,
         "model_sampling_rate_hz": rate,
         **answer.conditions,
-        "order_tracking": None if tracked is None else tracking_facts(tracked, source),
-        "trained_n_teeth": None if n_teeth is None else list(n_teeth),
+        "order_tracking": tracking,
+        "trained_n_teeth": n_teeth and list(n_teeth),
         **answer.training,
     }
 
@@ -116,27 +119,24 @@ def reasons_unlike(
         reasons.append(
             f"{beyond.sum()} of {beyond.size} windows are unlike the training data"
         )
-    if description.speed_rpm_range is not None:
-        low, high = description.speed_rpm_range
-        speeds = (source.speed_rpm,) if tracked is None else tracked.speed_range_rpm
-        outside = [
-            speed
-            for speed in speeds
-            if speed
-            and not low * (1 - SPEED_TOLERANCE) <= speed <= high * (1 + SPEED_TOLERANCE)
-        ]
-        if outside:
-            hint = in_hertz(outside[-1]) if low <= 60.0 * outside[-1] <= high else ""
-            reasons.append(
-                f"{outside[-1]:g} r/min is outside the {low:.0f} to {high:.0f} r/min of the training{hint}",
-            )
-    if (
-        source.teeth is not None
-        and description.n_teeth is not None
-        and source.teeth != description.n_teeth
-    ):
-        given, known = (
-            "/".join(map(str, teeth)) for teeth in (source.teeth, description.n_teeth)
+    speeds: tuple[float | None, ...] = (source.speed_rpm,)
+    if tracked is not None:
+        speeds = tracked.speed_range_rpm
+    outside = [
+        speed for speed in speeds if speed and not trained_at(description, speed)
+    ]
+    if outside and description.speed_rpm_range is not None:
+        (low, high), speed = description.speed_rpm_range, outside[-1]
+        hint = ""
+        if low <= 60.0 * speed <= high:
+            hint = in_hertz(speed)
+        reasons.append(
+            f"{speed:g} r/min is outside the {low:.0f} to {high:.0f} r/min of the training{hint}",
         )
-        reasons.append(f"the gears have {given} teeth, those of the training {known}")
+    given, known = source.teeth, description.n_teeth
+    if given and known and given != known:
+        reasons.append(
+            f"the gears have {given[0]}/{given[1]} teeth, "
+            f"those of the training {known[0]}/{known[1]}"
+        )
     return reasons

@@ -1,4 +1,4 @@
-"""Windows in m/s^2 for a graph: normalisation, pooling of one length, examples of many levels."""
+"""Windows in m/s^2 for a graph: normalisation, pooling of one length, examples of all levels."""
 
 from __future__ import annotations
 
@@ -37,12 +37,8 @@ class RawWindows(nn.Module):
         unit: float,
     ) -> None:
         super().__init__()
-        self.model, self.normalise, self.answer, self.unit = (
-            model,
-            normalise,
-            answer,
-            unit,
-        )
+        self.model, self.normalise = model, normalise
+        self.answer, self.unit = answer, unit
 
     def forward(self, *inputs: torch.Tensor) -> torch.Tensor:
         """Answer in its unit for (window, channel, sample) in m/s^2 and further inputs."""
@@ -69,18 +65,15 @@ class EqualParts(nn.Module):
     def __init__(self, n_samples: int, n_parts: int, *, maximum: bool) -> None:
         super().__init__()
         self.parts = [
-            (i * n_samples // n_parts, -(-(i + 1) * n_samples // n_parts))
+            slice(i * n_samples // n_parts, -(-(i + 1) * n_samples // n_parts))
             for i in range(n_parts)
         ]
-        self.maximum = maximum
+        self.reduce = torch.amax if maximum else torch.mean
 
     def forward(self, maps: torch.Tensor) -> torch.Tensor:
         """(window, channel, part) of (window, channel, sample)."""
-        cut = [maps[..., first:last] for first, last in self.parts]
-        return torch.stack(
-            [part.amax(dim=-1) if self.maximum else part.mean(dim=-1) for part in cut],
-            dim=-1,
-        )
+        reduced = [self.reduce(maps[..., part], dim=-1) for part in self.parts]
+        return torch.stack(reduced, dim=-1)
 
 
 def raw_examples(
@@ -108,19 +101,18 @@ def raw_examples(
 def with_fixed_pooling(model: nn.Module, *inputs: torch.Tensor) -> nn.Module:
     """A copy whose adaptive poolings are those of inputs of this length."""
     fixed = copy.deepcopy(model).eval()
+    adaptive = (nn.AdaptiveAvgPool1d, nn.AdaptiveMaxPool1d)
     pools = {
         name: module
         for name, module in fixed.named_modules()
-        if isinstance(module, nn.AdaptiveAvgPool1d | nn.AdaptiveMaxPool1d)
+        if isinstance(module, adaptive)
     }
     lengths: dict[nn.Module, int] = {}
 
-    def measure(
-        module: nn.Module, given: tuple[torch.Tensor, ...], _: torch.Tensor
-    ) -> None:
+    def measure(module: nn.Module, given: tuple[torch.Tensor, ...]) -> None:
         lengths[module] = int(given[0].shape[-1])
 
-    hooks = [module.register_forward_hook(measure) for module in pools.values()]
+    hooks = [module.register_forward_pre_hook(measure) for module in pools.values()]
     try:
         with torch.inference_mode():
             fixed(*inputs)
@@ -131,16 +123,9 @@ def with_fixed_pooling(model: nn.Module, *inputs: torch.Tensor) -> nn.Module:
     for hook in hooks:
         hook.remove()
     for name, module in pools.items():
-        n_parts = (
-            module.output_size
-            if isinstance(module.output_size, int)
-            else module.output_size[0]
-        )
+        n_parts = int(np.ravel(module.output_size)[0])
+        maximum = isinstance(module, nn.AdaptiveMaxPool1d)
+        parts = EqualParts(lengths[module], n_parts, maximum=maximum)
         parent, _, last = name.rpartition(".")
-        parts = EqualParts(
-            lengths[module],
-            int(n_parts),
-            maximum=isinstance(module, nn.AdaptiveMaxPool1d),
-        )
         setattr(fixed.get_submodule(parent), last, parts)
     return fixed

@@ -1,4 +1,4 @@
-"""A recording as a network takes it: channels chosen, speed followed, resampled and cut."""
+"""Recordings as inputs of a network: channels chosen, speed followed, resampled and cut."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SPEED_TOLERANCE = 0.02  # assumed: how well a user knows the speed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """A recording as the user describes it; None where the file tells or nothing is known.
+    """A recording as the user describes it; None where the file says it or nothing is known.
 
     Attributes
     ----------
@@ -70,12 +70,12 @@ class Source:
     def __post_init__(self) -> None:
         if self.speed_rpm is not None and not 0.0 < self.speed_rpm < 1e6:
             raise ConfigError(f"--speed-rpm {self.speed_rpm:g} must be positive")
-        if self.teeth is not None and not all(
-            4 <= n_teeth <= 1000 for n_teeth in self.teeth
-        ):
-            raise ConfigError(
-                f"--teeth {self.teeth[0]} {self.teeth[1]}: a gear has 4 to 1000 teeth",
-            )
+        if self.teeth is not None:
+            few, many = sorted(self.teeth)
+            if few < 4 or many > 1000:
+                raise ConfigError(
+                    f"--teeth {self.teeth[0]} {self.teeth[1]}: a gear has 4 to 1000 teeth",
+                )
         if self.pulses_per_turn < 1:
             raise ConfigError(
                 f"--pulses-per-turn {self.pulses_per_turn} must be at least 1"
@@ -106,8 +106,8 @@ class PreparedRecording:
     recording : as read, at its own rate
     channels : names in the file, in the order of the network's
     tracked : the recording over the shaft's angle; None without order tracking
-    speed_rpm : r/min at which the inputs are; None where nobody knows it
-    duration_s : that one input is about
+    speed_rpm : r/min at which the inputs are; None where it is not known
+    duration_s : duration of the signal of one input
     """
 
     windows: WindowSet
@@ -129,13 +129,10 @@ def prepare_recording(
         whose channels do not fit
     """
     recording, channels, tacho = _read(description, source)
-    tracked = _tracked(recording, tacho, source) if source.is_tracked else None
-    rate = description.sampling_rate_hz
-    speed = (
-        source.speed_rpm
-        if tracked is None
-        else source.to_speed_rpm or tracked.speed_rpm
-    )
+    tracked, speed, rate = None, source.speed_rpm, description.sampling_rate_hz
+    if source.is_tracked:
+        tracked = _tracked(recording, tacho, source)
+        speed = _played_at(tracked, source)
     recorded = RecordedSignal(
         signal=_in_domain(recording, tracked, description, source),
         sampling_rate=rate,
@@ -166,8 +163,21 @@ def tracking_facts(tracked: Tracked, source: Source) -> dict[str, Any]:
         "by": tracked.by,
         "speed_rpm": tracked.speed_rpm,
         "speed_range_rpm": list(tracked.speed_range_rpm),
-        "played_at_rpm": source.to_speed_rpm or tracked.speed_rpm,
+        "played_at_rpm": _played_at(tracked, source),
     }
+
+
+def _played_at(tracked: Tracked, source: Source) -> float:
+    """Speed in r/min of an order-tracked recording."""
+    return source.to_speed_rpm or tracked.speed_rpm
+
+
+def trained_at(description: ModelDescription, speed_rpm: float) -> bool:
+    """True if a speed lies within those of the training, or those are not known."""
+    if description.speed_rpm_range is None:
+        return True
+    low, high = description.speed_rpm_range
+    return low * (1 - SPEED_TOLERANCE) <= speed_rpm <= high * (1 + SPEED_TOLERANCE)
 
 
 def tracking_text(tracking: Mapping[str, Any] | None) -> str:
@@ -175,7 +185,10 @@ def tracking_text(tracking: Mapping[str, Any] | None) -> str:
     if not tracking:
         return ""
     low, high = tracking["speed_range_rpm"]
-    return f" (speed by {tracking['by']}, {low:.5g} to {high:.5g} r/min, played at {tracking['played_at_rpm']:.5g})"
+    return (
+        f" (speed by {tracking['by']}, {low:.5g} to {high:.5g} r/min, "
+        f"played at {tracking['played_at_rpm']:.5g})"
+    )
 
 
 def _tracked(
@@ -199,14 +212,12 @@ def _tracked(
         source.tacho,
         pulses_per_turn=source.pulses_per_turn,
     )
-    low, high = (
-        (1 - SPEED_TOLERANCE) * tracked.speed_range_rpm[0],
-        (1 + SPEED_TOLERANCE) * tracked.speed_range_rpm[1],
-    )
-    if source.speed_rpm is not None and not low <= source.speed_rpm <= high:
+    speed, (least, greatest) = source.speed_rpm, tracked.speed_range_rpm
+    low, high = (1 - SPEED_TOLERANCE) * least, (1 + SPEED_TOLERANCE) * greatest
+    if speed is not None and not low <= speed <= high:
         raise ConfigError(
-            f"--tacho {source.tacho} gives {tracked.speed_rpm:.5g} r/min, --speed-rpm says {source.speed_rpm:g}; check "
-            "--pulses-per-turn, or leave --speed-rpm out"
+            f"--tacho {source.tacho} gives {tracked.speed_rpm:.5g} r/min, --speed-rpm says "
+            f"{speed:g}; check --pulses-per-turn, or leave --speed-rpm out"
         )
     return tracked
 
@@ -215,9 +226,7 @@ def _read(
     description: ModelDescription,
     source: Source,
 ) -> tuple[Recording, tuple[str, ...], NDArray[Any] | None]:
-    """Recording with the network's channels in their order, what the file calls them, and the
-    tachometer's.
-    """
+    """Recording with the network's channels in their order, their names in the file, the tacho."""
     content = read_file(
         source.file,
         rate=source.sampling_rate,
@@ -230,25 +239,23 @@ def _read(
             raise ConfigError(
                 f"{content.file}: no channel {source.tacho}; it has {', '.join(content.channels)}",
             )
-        place = content.channels.index(source.tacho)
-        tacho = content.values[place]
+        index = content.channels.index(source.tacho)
+        tacho = content.values[index]
         names = tuple(name for name in content.channels if name != source.tacho)
         if not names:
             raise ConfigError(
                 f"{content.file}: there is no channel beside {source.tacho}"
             )
-        content = replace(
-            content, channels=names, values=np.delete(content.values, place, axis=0)
-        )
+        others = np.delete(content.values, index, axis=0)
+        content = replace(content, channels=names, values=others)
     chosen = _channels(content, description.channel_names, source.channels)
-    needs_level = description.normalise == "none"
-    return (
-        recording_of(
-            content, unit=source.unit, channels=chosen, needs_level=needs_level
-        ),
-        chosen,
-        tacho,
+    recording = recording_of(
+        content,
+        unit=source.unit,
+        channels=chosen,
+        needs_level=description.normalise == "none",
     )
+    return recording, chosen, tacho
 
 
 def _channels(
@@ -270,7 +277,8 @@ def _channels(
     by_name = {without_unit(name): name for name in content.channels}
     if all(name in by_name for name in wanted):
         return tuple(by_name[name] for name in wanted)
-    has = f"{content.file} has {len(content.channels)} channel(s), {', '.join(content.channels)}"
+    names = ", ".join(content.channels)
+    has = f"{content.file} has {len(content.channels)} channel(s), {names}"
     if len(content.channels) != len(wanted):
         raise ConfigError(f"{has}; {needs}: choose with --channels, in this order")
     if content.named and len(wanted) > 1:
@@ -288,33 +296,33 @@ def _in_domain(
 ) -> NDArray[np.float32]:
     """(channel, sample) at the network's rate and one speed.
 
-    Refuses what holds less bandwidth than that.
+    Refuses a recording with less bandwidth than that.
     """
-    found, rate, file = (
-        recording.sampling_rate,
-        description.sampling_rate_hz,
-        source.file,
-    )
+    found, rate = recording.sampling_rate, description.sampling_rate_hz
+    file = source.file
     if found < rate * (1 - RATE_TOLERANCE):
         raise ConfigError(
-            f"{file} has {found:g} samples a second and so nothing above {found / 2:g} Hz; the model was trained at "
-            f"{rate:g}: measure faster, or train a model with sampling_rate_hz={found:g} or below"
+            f"{file} has {found:g} samples a second and so nothing above {found / 2:g} Hz; the "
+            f"model was trained at {rate:g}: measure faster, or train a model with "
+            f"sampling_rate_hz={found:g} or below"
         )
     if tracked is None:
         return rate_change(found, rate).apply(recording.acceleration).astype(np.float32)
     from diagnose.data.tracking import at_constant_speed
 
-    speed, played = tracked.speed_rpm, source.to_speed_rpm or tracked.speed_rpm
+    speed, played = tracked.speed_rpm, _played_at(tracked, source)
     if description.speed_rpm_range is not None and source.to_speed_rpm is not None:
         low, high = description.speed_rpm_range
         if not low <= played <= high:
             raise ConfigError(
-                f"--to-speed {played:g} must lie in the {low:.0f} to {high:.0f} r/min of the training",
+                f"--to-speed {played:g} must lie in the {low:.0f} to {high:.0f} r/min of the "
+                "training",
             )
     as_fast = found * played / speed
     if as_fast < rate * (1 - RATE_TOLERANCE):
         raise ConfigError(
-            f"{file}: {found:g} samples a second at {speed:.4g} r/min, played at {played:g}, are {as_fast:.5g}; "
-            f"the model was trained at {rate:g}: give a --to-speed of {speed * rate / found:.4g} or more"
+            f"{file}: {found:g} samples a second at {speed:.4g} r/min, played at {played:g}, are "
+            f"{as_fast:.5g}; the model was trained at {rate:g}: give a --to-speed of "
+            f"{speed * rate / found:.4g} or more"
         )
     return at_constant_speed(tracked, rate, played).astype(np.float32)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, final
 
-import numpy as np
 from torch.nn.functional import log_softmax
 
 from diagnose.data.targets import GEARS
@@ -18,6 +16,7 @@ from diagnose.recordings.source import PreparedRecording, Source, tracking_text
 from diagnose.recordings.stored_network import Answer, Graph, Scores, StoredNetwork
 from diagnose.recordings.verdict import class_text, score_text, verdict
 from diagnose.scoring.metrics import over_records
+from diagnose.studies.result_files import Content
 from diagnose.training.classes import predict_windows
 from diagnose.training.heads import predict_heads
 from diagnose.training.store import ModelDescription, data_fingerprint, load_model
@@ -57,49 +56,49 @@ class StoredClassifier(StoredNetwork):
         log_probability = predict_windows(self.model, windows)
         _, by_record = over_records(log_probability, windows.record)
         overall = probabilities(by_record, description.temperature)[0]
-        names, speeds = description.class_names, description.speed_rpm_range
-        by_class = dict(zip(names, overall.tolist(), strict=True))
-        heads = {
-            name: values[0]
-            for name, values in predict_heads(self.model, windows).items()
-        }
-        severity, gear = heads.get("severity"), heads.get("gear")
+        by_class = self._by_class(overall)
+        heads = predict_heads(self.model, windows)
+        severity = gear = None
+        if "severity" in heads:
+            severity = float(heads["severity"][0, overall.argmax()])
+        if "gear" in heads:
+            gear = GEARS[int(heads["gear"][0].argmax())]
+        by_window = probabilities(log_probability)
+        speeds = description.speed_rpm_range
         return Answer(
             record={
                 **verdict(by_class, description.test_score),
                 "probabilities": by_class,
-                "severity": None
-                if severity is None
-                else float(severity[overall.argmax()]),
-                "gear": None if gear is None else GEARS[int(gear.argmax())],
+                "severity": severity,
+                "gear": gear,
             },
-            windows=[
-                {"probabilities": dict(zip(names, row.tolist(), strict=True))}
-                for row in probabilities(log_probability)
-            ],
+            windows=[{"probabilities": self._by_class(row)} for row in by_window],
             conditions={
                 "adaptation": description.adaptation,
                 "speed_rpm": source.speed_rpm,
             },
-            training={"trained_speed_rpm": None if speeds is None else list(speeds)},
+            training={"trained_speed_rpm": speeds and list(speeds)},
         )
 
-    def line(self, result: Mapping[str, Any]) -> str:
-        """Class and the one behind it, speed, and how far the model can be relied on."""
-        said = f"{result['recording']}: {class_text(result)}"
+    def _by_class(self, values: Any) -> dict[str, float]:
+        """Class -> its value, from (class,)."""
+        return dict(zip(self.description.class_names, values.tolist(), strict=True))
+
+    def line(self, result: Content) -> str:
+        """Classes, speed, and how far the model can be relied on."""
+        text = f"{result['recording']}: {class_text(result)}"
         is_faulty = result["gear"] not in (None, "none")
         if result["severity"] is not None and is_faulty and not result["undecided"]:
-            said += f", severity {result['severity']:.2f} on the {result['gear']}"
-        said += tracking_text(result["order_tracking"])
-        n_windows, beyond = result["n_windows"], result["n_windows_beyond"]
+            text += f", severity {result['severity']:.2f} on the {result['gear']}"
+        text += tracking_text(result["order_tracking"])
         if result["out_of_distribution"]:
             reasons = "; ".join(result["reasons"])
-            return f"{said}; OUT OF DISTRIBUTION, do not rely on the class: {reasons}"
+            return f"{text}; OUT OF DISTRIBUTION, do not rely on the class: {reasons}"
+        beyond = result["n_windows_beyond"]
+        flag = f"like the training data ({beyond} of {result['n_windows']} windows beyond it)"
         if beyond is None:
             flag = "no out-of-distribution flag: the model stores none, train it again"
-        else:
-            flag = f"like the training data ({beyond} of {n_windows} windows beyond it)"
-        return f"{said}; {flag}; {score_text(result)}"
+        return f"{text}; {flag}; {score_text(result)}"
 
     def classes_of(self, dataset: Dataset) -> tuple[str, ...]:
         """Classes of the training, which must be those of the data set unless it is the same."""
@@ -114,46 +113,45 @@ class StoredClassifier(StoredNetwork):
 
     def scores(self, task: Task, segments: Segments, part: str) -> Scores:
         """Scores by record with intervals over units, confusion, recall and calibration."""
-        from diagnose.studies.study import score_predictions
+        from diagnose.studies.counts import n_different, unit_ids
+        from diagnose.studies.protocol_results import score_predictions
 
         description = self.description
         windows = input_of(description.network).load(task, segments)
         by_window = predict_windows(self.model, windows)
         record, log_probability = over_records(by_window, windows.record)
-        units = np.asarray(task.dataset.column("unit_id"))[record]
+        calibration = calibration_scores(
+            [log_probability], [task.labels()[record]], [description.temperature]
+        )
         predicted = [(record, log_probability.argmax(axis=1))]
-        label, temperature = task.labels()[record], description.temperature
         return Scores(
             counts={
                 "n_records": int(record.size),
-                "n_units": int(np.unique(units).size),
+                "n_units": n_different(unit_ids(task)[record]),
             },
             method={},
             values={
-                "calibration": calibration_scores(
-                    [log_probability], [label], [temperature]
-                ),
+                "calibration": calibration,
                 **score_predictions(task, predicted, description.n_bootstrap),
             },
             write=_write_confusion,
         )
 
-    def lines(self, result: Mapping[str, Any]) -> list[str]:
+    def lines(self, result: Content) -> list[str]:
         """Part, channels, both scores and the recall of each class."""
         lines = [
             f"{result['n_records']} records of {result['n_units']} unit(s): {result['part']}",
             f"channels {', '.join(result['channel_names'])}",
         ]
         for name in ("balanced_accuracy", "macro_f1"):
-            score = result[name]
+            mean, low, high = (result[name][key] for key in ("mean", "low", "high"))
             spread = "no 95 % interval: too few machines"
-            if score["low"] is not None:
-                low, high = score["low"], score["high"]
+            if low is not None:
                 spread = f"95 % interval over units {low:.3f} to {high:.3f}"
-            lines.append(f"{name} {score['mean']:.3f}, {spread}")
-        return lines + [
-            f"recall {name} {share:.3f}" for name, share in result["recall"].items()
-        ]
+            lines.append(f"{name} {mean:.3f}, {spread}")
+        for name, share in result["recall"].items():
+            lines.append(f"recall {name} {share:.3f}")
+        return lines
 
     def graph(self) -> Graph:
         """Windows in m/s^2 in, log-probabilities out."""

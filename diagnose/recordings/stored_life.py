@@ -1,4 +1,4 @@
-"""A stored network of remaining lives: hours that are left of a machine, scores, its graph."""
+"""A stored network of remaining lives: hours that a machine has left, scores, its graph."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from diagnose.recordings.raw_windows import N_CHECKED
 from diagnose.recordings.source import SPEED_TOLERANCE, PreparedRecording, Source
 from diagnose.recordings.stored_network import Answer, Graph, Scores, StoredNetwork
 from diagnose.scoring.life_scores import MEASURES, by_life, interval, life_scores
+from diagnose.studies.result_files import Content
 from diagnose.training.life_store import AGE, LifeFacts, load_life_model
 from diagnose.training.remaining_life import (
     LifeNetwork,
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from diagnose.data.windows import Segments, Task
     from gensig.dataset.reader import Dataset
 
+# Column that a network may take, beside the speed -> its option and its unit.
 OPTIONS = {"torque_nm": "--torque-nm", AGE: "--life-time-h"}
 UNITS = {"torque_nm": "N m", AGE: "h"}
 
@@ -48,18 +50,20 @@ class StoredLife(StoredNetwork):
         return cls(model=model, description=description, facts=facts)
 
     def check(self, source: Source) -> None:
-        """Refuse a missing torque or age, no such number, and a column that it does not take."""
-        for name, value in (("torque_nm", source.torque_nm), (AGE, source.life_time_h)):
-            option, is_told = OPTIONS[name], name in self.facts.told
-            if value is None and is_told:
+        """Refuse a torque or an age that is missing, not taken or below 0."""
+        for name, option in OPTIONS.items():
+            value, is_taken = getattr(source, name), name in self.facts.told
+            if value is None and is_taken:
                 raise ConfigError(
                     f"this model must know {name} of {source.file}: say {option}"
                 )
-            if value is not None and not is_told:
+            if value is None:
+                continue
+            if not is_taken:
                 raise ConfigError(
                     f"{option}: {self.facts.method} is not told {name}; leave it out",
                 )
-            if value is not None and not 0.0 <= value < float("inf"):
+            if not 0.0 <= value < float("inf"):
                 raise ConfigError(f"{option} {value:g} must be 0 or above")
 
     def answer(self, source: Source, prepared: PreparedRecording) -> Answer:
@@ -69,16 +73,14 @@ class StoredLife(StoredNetwork):
             raise ConfigError(
                 f"this model must know the speed of {source.file}: say --speed-rpm or --tacho",
             )
-        values = {
-            "speed_rpm": speed,
-            "torque_nm": source.torque_nm,
-            AGE: source.life_time_h,
-        }
-        conditions = np.array([[float(values[name] or 0.0) for name in facts.told]])
+        known = {"speed_rpm": speed} | {name: getattr(source, name) for name in OPTIONS}
+        values = {name: known[name] for name in facts.told}
+        conditions = np.array([list(values.values())], dtype=float)
         by_window = shares_of_windows(self.model, prepared.windows, conditions)
         level = facts.early_life_h
         share = float(np.clip(by_window.mean(), 0.0, 1.0))
         low, high = interval(np.array(share * level), facts.half_width_h, level)
+        hours = np.clip(by_window, 0.0, 1.0).astype(float) * level
         return Answer(
             record={
                 "remaining_life_h": share * level,
@@ -91,48 +93,39 @@ class StoredLife(StoredNetwork):
                 "n_calibration_lives": facts.n_calibration_lives,
                 "method": facts.method,
             },
-            windows=[
-                {"remaining_life_h": float(np.clip(of_window, 0.0, 1.0)) * level}
-                for of_window in by_window
-            ],
+            windows=[{"remaining_life_h": value} for value in hours.tolist()],
             conditions={
-                "told": {name: values[name] for name in facts.told},
+                "told": values,
                 "trained_range": {
-                    name: list(facts.told_range[name]) for name in facts.told
+                    name: list(facts.told_range[name]) for name in values
                 },
             },
             training={"trained_classes": list(self.description.class_names)},
-            reasons=[
-                line
-                for name in OPTIONS
-                if (line := _outside(facts, name, values[name]))
-            ],
+            reasons=_outside(facts, values),
         )
 
-    def line(self, result: Mapping[str, Any]) -> str:
+    def line(self, result: Content) -> str:
         """Hours left with their interval, and how far the model can be relied on."""
         level, hours = result["early_life_h"], result["remaining_life_h"]
-        left = (
-            f"{level:.3g} h or longer"
-            if result["at_early_level"]
-            else f"{hours:.3g} h left"
-        )
-        said = f"{result['recording']}: {left}"
+        left = f"{hours:.3g} h left"
+        if result["at_early_level"]:
+            left = f"{level:.3g} h or longer"
+        text = f"{result['recording']}: {left}"
         if result["intervals_hold"]:
             end = f"{result['high_h']:.3g} h"
             if result["high_h"] >= level:
                 end += " or longer"
-            said += (
+            text += (
                 f", {result['coverage']:.0%} interval {result['low_h']:.3g} to {end}"
             )
         else:
             n_lives = result["n_calibration_lives"]
-            said += f"; no interval: {n_lives} validation lives are too few for one"
+            text += f"; no interval: {n_lives} validation lives are too few for one"
         if result["out_of_distribution"]:
             reasons = "; ".join(result["reasons"])
-            return f"{said}; OUT OF DISTRIBUTION, do not rely on it: {reasons}"
+            return f"{text}; OUT OF DISTRIBUTION, do not rely on it: {reasons}"
         beyond, n_windows = result["n_windows_beyond"], result["n_windows"]
-        return f"{said}; like the training data ({beyond} of {n_windows} windows beyond it)"
+        return f"{text}; like the training data ({beyond} of {n_windows} windows beyond it)"
 
     def classes_of(self, dataset: Dataset) -> tuple[str, ...]:
         """Classes of the training that the data set has, at least one."""
@@ -155,9 +148,9 @@ class StoredLife(StoredNetwork):
             scored_snapshots,
             write_life_predictions,
         )
-        from diagnose.studies.study import BOOTSTRAP_SEED
+        from diagnose.studies.protocol_results import BOOTSTRAP_SEED
 
-        facts, dataset = self.facts, task.dataset
+        facts, dataset, description = self.facts, task.dataset, self.description
         lives = lives_of(task)
         self._check_columns(dataset)
         segments = kept_segments(segments, lives.name != "")
@@ -166,16 +159,15 @@ class StoredLife(StoredNetwork):
                 f"{dataset.folder}, {part}: no life failed, so that there is nothing to score",
             )
         columns = [np.asarray(dataset.column(name), dtype=float) for name in facts.told]
-        windows = input_of(self.description.network).load(task, segments)
-        record, share = shares_of_records(
-            self.model, windows, np.stack(columns, axis=1)
-        )
+        windows = input_of(description.network).load(task, segments)
+        conditions = np.stack(columns, axis=1)
+        record, share = shares_of_records(self.model, windows, conditions)
         prediction = LifePrediction(
-            protocol=self.description.protocol,
+            protocol=description.protocol,
             method=facts.method,
-            seed=self.description.seed,
+            seed=description.seed,
             record=record,
-            said=facts.early_life_h * share,
+            predicted=facts.early_life_h * share,
             half_width=facts.half_width_h,
             early_life=facts.early_life_h,
             detail=part,
@@ -187,9 +179,8 @@ class StoredLife(StoredNetwork):
         def write(folder: Path, result: dict[str, Any]) -> None:
             from diagnose.report.life_report import life_figure
 
-            write_life_predictions(
-                folder / "predictions.csv", task, lives, [prediction]
-            )
+            path = folder / "predictions.csv"
+            write_life_predictions(path, task, lives, [prediction])
             life_figure(folder / "remaining_life.png", lives, [prediction])
 
         return Scores(
@@ -205,25 +196,27 @@ class StoredLife(StoredNetwork):
                 "coverage_wanted": facts.coverage,
                 "intervals_hold": facts.intervals_hold,
                 "censored_below_bound": below_bound(lives, prediction),
-                **life_scores(table, n_bootstrap=self.description.n_bootstrap, rng=rng),
+                **life_scores(table, n_bootstrap=description.n_bootstrap, rng=rng),
             },
             write=write,
         )
 
     def _check_columns(self, dataset: Dataset) -> None:
         """Refuse a data set without a column that the network takes beside the signal."""
-        absent = [name for name in self.facts.told if name not in dataset.column_names]
-        if absent:
-            raise DatasetError(
-                f"{dataset.folder} does not fit the model, which is told {absent[0]}: it has no such column"
-            )
+        for name in self.facts.told:
+            if name not in dataset.column_names:
+                raise DatasetError(
+                    f"{dataset.folder} does not fit the model, which is told {name}: "
+                    "it has no such column"
+                )
 
-    def lines(self, result: Mapping[str, Any]) -> list[str]:
+    def lines(self, result: Content) -> list[str]:
         """Part, channels, every measure, and the coverage that was wanted."""
         lives, censored = result["n_lives"], result["n_lives_censored"]
         channels, level = ", ".join(result["channel_names"]), result["early_life_h"]
         lines = [
-            f"{result['n_records']} records of {lives} lives that failed (and {censored} censored): {result['part']}",
+            f"{result['n_records']} records of {lives} lives that failed "
+            f"(and {censored} censored): {result['part']}",
             f"channels {channels}; remaining life cut at {level:.4g} h",
         ]
         for name in MEASURES:
@@ -239,8 +232,9 @@ class StoredLife(StoredNetwork):
     def graph(self) -> Graph:
         """Windows in m/s^2 and the columns beside them in, hours out."""
         facts = self.facts
+        ranges = {name: list(ends) for name, ends in facts.told_range.items()}
         return Graph(
-            answer=lambda model, windows, told: model(windows, told),
+            answer=lambda model, windows, conditions: model(windows, conditions),
             further={"told": _condition_examples(facts)},
             output="remaining_life_h",
             unit=facts.early_life_h,
@@ -248,9 +242,7 @@ class StoredLife(StoredNetwork):
             agreement="hours within {:.1g} of the early level of torch's",
             facts={
                 "told": list(facts.told),
-                "told_range": {
-                    name: list(ends) for name, ends in facts.told_range.items()
-                },
+                "told_range": ranges,
                 "early_life_h": facts.early_life_h,
                 "half_width_h": facts.half_width_h,
                 "coverage": facts.coverage,
@@ -264,19 +256,22 @@ class StoredLife(StoredNetwork):
 
 def _condition_examples(facts: LifeFacts) -> NDArray[np.float32]:
     """(window, column) within the ranges of the training, as many as examples of windows."""
-    low, high = (
-        np.array([facts.told_range[name] for name in facts.told]).reshape(-1, 2).T
-    )
+    ranges = np.array([facts.told_range[name] for name in facts.told])
+    low, high = ranges.reshape(-1, 2).T
     share = np.random.default_rng(1).uniform(size=(N_CHECKED, len(facts.told)))
     return (low + share * (high - low)).astype(np.float32)
 
 
-def _outside(facts: LifeFacts, name: str, value: float | None) -> str | None:
-    """Why a value is unlike those of the training; None if it is like them or not taken."""
-    if value is None:
-        return None
-    low, high = facts.told_range[name]
-    if low * (1 - SPEED_TOLERANCE) <= value <= high * (1 + SPEED_TOLERANCE):
-        return None
-    unit = UNITS[name]
-    return f"{value:g} {unit} is outside the {low:.4g} to {high:.4g} {unit} of the training"
+def _outside(facts: LifeFacts, values: Mapping[str, float]) -> list[str]:
+    """Reasons why torque and age are unlike those of the training."""
+    reasons = []
+    for name in OPTIONS:
+        if name not in values:
+            continue
+        value, unit = values[name], UNITS[name]
+        low, high = facts.told_range[name]
+        if not low * (1 - SPEED_TOLERANCE) <= value <= high * (1 + SPEED_TOLERANCE):
+            reasons.append(
+                f"{value:g} {unit} is outside the {low:.4g} to {high:.4g} {unit} of the training"
+            )
+    return reasons

@@ -1,7 +1,4 @@
-"""How far the answer for a recording carries.
-
-The runner-up, and what the network scored on machines it never saw.
-"""
+"""Confidence of a prediction: margin to the second class, score on machines never seen."""
 
 from __future__ import annotations
 
@@ -10,14 +7,15 @@ from typing import Any
 
 from diagnose.scoring.judged import interval_text
 from diagnose.scoring.metrics import is_above
+from diagnose.studies.result_files import Content
 
 LEAST_MARGIN = 0.10  # between the two most probable classes; assumed
 
 
 def verdict(
-    probabilities: Mapping[str, float], test_score: Mapping[str, Any] | None
+    probabilities: Mapping[str, float], test_score: Content | None
 ) -> dict[str, Any]:
-    """The most probable class, the one behind it, and why neither can be said.
+    """The two most probable classes, and the reasons why the first is not sure.
 
     Parameters
     ----------
@@ -26,18 +24,18 @@ def verdict(
 
     Returns
     -------
-    part of what ``diagnose predict --json`` prints; the class is undecided where `undecided_because` is not empty
+    part of what ``diagnose predict --json`` prints; the class is undecided where
+    `undecided_because` is not empty
     """
-    (first, highest), (second, next_highest) = sorted(
-        probabilities.items(), key=lambda item: -item[1]
-    )[:2]
+    ranked = sorted(probabilities.items(), key=lambda item: -item[1])
+    (first, highest), (second, next_highest) = ranked[:2]
     because = []
     if highest - next_highest < LEAST_MARGIN:
         because.append(f"the two are less than {LEAST_MARGIN:.2f} apart")
-    if test_score is not None and not is_above(
-        test_score["balanced_accuracy"], test_score["chance"]
-    ):
-        because.append("the model was not shown to be better than chance")
+    if test_score is not None:
+        test_score = dict(test_score)
+        if not is_above(test_score["balanced_accuracy"], test_score["chance"]):
+            because.append("the model was not shown to be better than chance")
     return {
         "class": first,
         "probability": highest,
@@ -45,30 +43,29 @@ def verdict(
         "runner_up_probability": next_highest,
         "undecided": bool(because),
         "undecided_because": because,
-        "model_test_score": None if test_score is None else dict(test_score),
+        "model_test_score": test_score,
     }
 
 
-def class_text(said: Mapping[str, Any]) -> str:
-    """The class and the one behind it, or that there is none."""
-    first, second = (
-        f"{said['probability']:.2f}",
-        f"{said['runner_up']} {said['runner_up_probability']:.2f}",
-    )
-    if said["undecided"]:
-        return f"undecided, {said['class']} {first} or {second} ({'; '.join(said['undecided_because'])})"
-    return f"{said['class']}, probability {first}, next {second}"
+def class_text(result: Content) -> str:
+    """Both classes with their probabilities, or the reasons why the class is undecided."""
+    name, first = result["class"], f"{result['probability']:.2f}"
+    second = f"{result['runner_up']} {result['runner_up_probability']:.2f}"
+    if result["undecided"]:
+        because = "; ".join(result["undecided_because"])
+        return f"undecided, {name} {first} or {second} ({because})"
+    return f"{name}, probability {first}, next {second}"
 
 
-def score_text(said: Mapping[str, Any]) -> str:
-    """What the model scored when it was trained."""
-    score = said["model_test_score"]
+def score_text(result: Content) -> str:
+    """Score of the model when it was trained."""
+    score = result["model_test_score"]
     if score is None:
         return "this model stores no test score, train it again"
     where = f"on {score['n_units']} machines it never saw"
     if score["leaky"]:
         where = "in a LEAKY split, no measure of diagnosis"
-    elif said["adaptation"] is not None:
+    elif result["adaptation"] is not None:
         where += ", before it was adapted"
     value = interval_text(score["balanced_accuracy"])
     return (

@@ -1,16 +1,16 @@
-"""Figures of a study as PNG, readable without telling red from green."""
+"""Figures of scores, confusion and calibration, readable without telling red from green."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-# Okabe & Ito (2008), "Color universal design", without the yellow.
-COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
-MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+from diagnose.report.panels import COLORS, MARKERS, panels, save, spaced
+from diagnose.studies.result_files import Content
+
+WIDEST = 16.0  # inches, of a figure of scores
 
 
 def confusion_figure(
@@ -20,84 +20,83 @@ def confusion_figure(
     title: str,
 ) -> None:
     """Share of each true class given each label, with counts of records (summed over seeds)."""
-    figure, axes = subplots(
-        1, size=(1.2 * len(class_names) + 2.4, 1.0 * len(class_names) + 1.9)
-    )
+    n_classes = len(class_names)
+    figure, (panel,) = panels(1, 1.2 * n_classes, n_classes + 1.9, margin=2.4)
     counts = np.asarray(confusion)
     total = counts.sum(axis=1, keepdims=True)
     share = np.divide(counts, total, out=np.zeros(counts.shape), where=total > 0)
-    image = axes[0].imshow(share, cmap="cividis", vmin=0, vmax=1)
+    image = panel.imshow(share, cmap="cividis", vmin=0, vmax=1)
+    colors = np.where(share > 0.5, "black", "white")
     for (row, column), value in np.ndenumerate(share):
-        text = f"{value:.2f}\n({counts[row, column]})"
-        color = "black" if value > 0.5 else "white"
-        axes[0].text(
-            column, row, text, ha="center", va="center", color=color, fontsize=9
+        panel.text(
+            column,
+            row,
+            f"{value:.2f}\n({counts[row, column]})",
+            ha="center",
+            va="center",
+            color=colors[row, column],
+            fontsize=9,
         )
-    ticks = range(len(class_names))
-    axes[0].set_xticks(ticks, class_names, rotation=20, ha="right")
-    axes[0].set_yticks(ticks, class_names)
-    axes[0].set(xlabel="predicted", ylabel="true", title=title)
-    figure.colorbar(image, ax=axes[0], label="share of the true class", fraction=0.046)
+    panel.set_xticks(range(n_classes), class_names, rotation=20, ha="right")
+    panel.set_yticks(range(n_classes), class_names)
+    panel.set(xlabel="predicted", ylabel="true", title=title)
+    figure.colorbar(image, ax=panel, label="share of the true class", fraction=0.046)
     save(figure, path)
 
 
-def scores_figure(path: Path, metrics: Mapping[str, Any]) -> None:
-    """Balanced accuracy and interval of every method, one panel a protocol, leaky ones last and
-    in grey.
+def scores_figure(path: Path, metrics: Content) -> None:
+    """Balanced accuracy and interval of every method, one panel a protocol.
+
+    Leaky protocols come last and in grey.
     """
+    model = metrics["model"]
     results = sorted(metrics["protocols"].items(), key=lambda item: item[1]["leaky"])
-    named = dict.fromkeys(
-        [
-            metrics["model"],
-            *(name for _, result in results for name in result["methods"]),
-        ]
-    )
-    methods = [name for name in named if name != "chance"]
-    height = 0.34 * len(methods) + 1.1
-    figure, axes = subplots(
-        len(results), size=(min(3.4 * len(results) + 1.6, 16), height), sharey=True
+    methods = [model]
+    for _, result in results:
+        methods += [name for name in result["methods"] if name not in methods]
+    methods.remove("chance")
+    methods.reverse()
+    width = min(3.4, (WIDEST - 1.6) / len(results))
+    figure, axes = panels(
+        len(results), width, 0.34 * len(methods) + 1.1, margin=1.6, sharey=True
     )
     for panel, (protocol, result) in zip(axes, results, strict=True):
-        panel.axvline(
-            result["methods"]["chance"]["balanced_accuracy"], color="0.4", linestyle=":"
-        )
-        for place, name in enumerate(reversed(methods)):
-            if name not in result["methods"]:
+        scores = {
+            name: method["balanced_accuracy"]
+            for name, method in result["methods"].items()
+        }
+        panel.axvline(scores["chance"], color="0.4", linestyle=":")
+        for row, name in enumerate(methods):
+            if name not in scores:
                 continue
-            score = result["methods"][name]["balanced_accuracy"]
-            color = (
-                "0.6"
-                if result["leaky"]
-                else COLORS[0]
-                if name == metrics["model"]
-                else COLORS[-1]
-            )
+            color = {model: COLORS[0]}.get(name, COLORS[-1])
+            if result["leaky"]:
+                color = "0.6"
+            score = scores[name]
             if score["low"] is not None:
-                panel.plot(
-                    [score["low"], score["high"]],
-                    [place, place],
-                    color=color,
-                    linewidth=2,
-                )
-            panel.plot(score["mean"], place, color=color, marker="o")
-        panel.set_yticks(
-            range(len(methods)), [name.replace("_", " ") for name in reversed(methods)]
-        )
-        title = protocol + ("\nLEAKY: not a result" if result["leaky"] else "")
+                ends = [score["low"], score["high"]]
+                panel.plot(ends, [row, row], color=color, linewidth=2)
+            panel.plot(score["mean"], row, color=color, marker="o")
+        panel.set_yticks(range(len(methods)), [spaced(name) for name in methods])
         panel.set(
             xlim=(0, 1.02), ylim=(-0.6, len(methods) - 0.4), xlabel="balanced accuracy"
         )
+        title = protocol
+        if result["leaky"]:
+            title += "\nLEAKY: not a result"
         panel.set_title(title, fontsize=10)
         panel.grid(alpha=0.3, axis="x")
     save(figure, path)
 
 
-def reliability_figure(path: Path, protocols: Mapping[str, Mapping[str, Any]]) -> None:
+def reliability_figure(path: Path, protocols: Mapping[str, Content]) -> None:
     """Share of right predictions against their probability, one panel a protocol.
 
-    `calibration.calibration_scores`.
+    Parameters
+    ----------
+    protocols : protocol -> `diagnose.networks.calibration.calibration_scores`
     """
-    figure, axes = subplots(len(protocols), size=(3.9 * len(protocols) + 0.6, 3.9))
+    figure, axes = panels(len(protocols), 3.9, 3.9, margin=0.6)
     for panel, (protocol, calibration) in zip(axes, protocols.items(), strict=True):
         panel.plot([0, 1], [0, 1], color="0.6", linestyle="--", label="calibrated")
         for index, name in enumerate(("before", "after")):
@@ -120,20 +119,3 @@ def reliability_figure(path: Path, protocols: Mapping[str, Mapping[str, Any]]) -
         panel.legend(loc="upper left", fontsize=8)
     axes[0].set_ylabel("share of records that are right")
     save(figure, path)
-
-
-def subplots(
-    n_panels: int, *, size: tuple[float, float], sharey: bool = False
-) -> tuple[Any, list[Any]]:
-    """Figure and axes without touching the state of pyplot, so that no display is needed."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=size, layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure, list(np.atleast_1d(figure.subplots(1, n_panels, sharey=sharey)))
-
-
-def save(figure: Any, path: Path) -> None:
-    """Write a PNG with the same bytes on every run."""
-    figure.savefig(path, dpi=120, metadata={"Software": None})

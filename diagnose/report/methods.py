@@ -33,7 +33,8 @@ SHAM_TEXT = MethodText(
     name=SHAM,
     label="sham",
     card_label="sham",
-    meaning="the same training on a data set of severity zero whose labels were kept; see Controls.",
+    meaning="the same training on a data set of severity zero whose labels were kept; "
+    "see Controls.",
 )
 SHUFFLE_TEXT = MethodText(
     name=LABEL_SHUFFLE,

@@ -1,10 +1,8 @@
-"""Scores of novelty for readers: a table a protocol, and what its numbers mean."""
+"""Scores of novelty for readers: a table a protocol with notes on its numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
+from diagnose.report.markdown import table_lines
 from diagnose.scoring.judged import interval_text
 from diagnose.studies.novelty import SCORE_LABELS
 from diagnose.studies.novelty_metrics import (
@@ -12,38 +10,41 @@ from diagnose.studies.novelty_metrics import (
     LEAST_VALIDATION,
     TRUE_POSITIVES,
 )
+from diagnose.studies.result_files import Content
 from gensig.text.page import Section, Table
 
 QUESTIONS = {
     "healthy_only": "Is a fault noticed by who knows health alone",
     "open_set": "Is a fault noticed that was never trained on",
 }
+HEADS = {"auroc": "AUROC", "fpr95": "FPR95", "false_alarms": "false alarms"}
+MEANINGS = {
+    "AUROC": "how often a new record has a larger score than a known one; chance is 0.50.",
+    "Found": "share of records above a threshold set on validation units for "
+    f"{FALSE_ALARMS:.0%} false alarms.",
+    "False alarms": "share of the known records of the test units above it; where it is larger "
+    "than meant, what is found flatters.",
+    "Band levels": "the flag of diagnose predict. It and the networks see windows as the "
+    "classifier does.",
+}
 
 
-def novelty_tables(novelty: Mapping[str, Any]) -> list[str]:
-    """Markdown: for each protocol one line of what it knows, and the table of its scores."""
+def novelty_tables(novelty: Content) -> list[str]:
+    """Markdown: for each protocol one line on its parts, and the table of its scores."""
     lines: list[str] = []
     for name, result in novelty.items():
         table = _table(result)
-        lines += [
-            "",
-            f"**{name}**: {_what_it_knows(result)}",
-            "",
-            "| " + " | ".join(table.head) + " |",
-        ]
-        lines += [
-            "|---" * len(table.head) + "|",
-            *("| " + " | ".join(row) + " |" for row in table.rows),
-        ]
+        lines += ["", f"**{name}**: {_parts_sentence(result)}", ""]
+        lines += table_lines(table.head, table.rows)
     return lines
 
 
-def novelty_sections(novelty: Mapping[str, Any]) -> list[Section]:
+def novelty_sections(novelty: Content) -> list[Section]:
     """A section of the report for each protocol."""
     return [
         Section(
             title=f"{QUESTIONS[name]} ({name})",
-            text=[_what_it_knows(result), *_accuracy(result)],
+            text=[_parts_sentence(result), *_accuracy(result)],
             table=_table(result),
             notes=_notes(result),
         )
@@ -51,8 +52,8 @@ def novelty_sections(novelty: Mapping[str, Any]) -> list[Section]:
     ]
 
 
-def novelty_caveats(novelty: Mapping[str, Any], few_units: int) -> list[str]:
-    """What weakens the numbers, one line each."""
+def novelty_caveats(novelty: Content, few_units: int) -> list[str]:
+    """Weaknesses of the numbers, one line each."""
     lines = []
     for name, result in novelty.items():
         if (n_units := result["n_units"]["test"]) < few_units:
@@ -61,84 +62,64 @@ def novelty_caveats(novelty: Mapping[str, Any], few_units: int) -> list[str]:
             )
         if (n_records := result["n_records"]["validation"]) < LEAST_VALIDATION:
             lines.append(
-                f"{name}: {n_records} validation record(s); with fewer than {LEAST_VALIDATION} no threshold promises "
-                f"{FALSE_ALARMS:.0%} of false alarms, the largest score is taken."
+                f"{name}: {n_records} validation record(s); with fewer than {LEAST_VALIDATION} no "
+                f"threshold promises {FALSE_ALARMS:.0%} of false alarms, "
+                "the largest score is taken."
             )
     return lines
 
 
-def _what_it_knows(result: Mapping[str, Any]) -> str:
+def _parts_sentence(result: Content) -> str:
+    """Records and units of each part, known and new classes."""
     counts, units = result["n_records"], result["n_units"]
     return (
-        f"Trained on {counts['train']} records ({', '.join(result['known_classes'])}) of {units['train']} units, "
+        f"Trained on {counts['train']} records ({', '.join(result['known_classes'])}) "
+        f"of {units['train']} units, "
         f"threshold from {counts['validation']} of {units['validation']}, "
-        f"tested on {counts['test']} of {units['test']}; new there: {', '.join(result['novel_classes'])}."
+        f"tested on {counts['test']} of {units['test']}; "
+        f"new there: {', '.join(result['novel_classes'])}."
     )
 
 
-def _accuracy(result: Mapping[str, Any]) -> list[str]:
+def _accuracy(result: Content) -> list[str]:
     if "known" not in result:
         return []
-    score, chance = result["known"]["balanced_accuracy"], result["known"]["chance"]
+    score = interval_text(result["known"]["balanced_accuracy"])
     return [
-        f"Balanced accuracy of the network on the known classes: {_cell(score)}, chance {chance:.2f}."
+        f"Balanced accuracy of the network on the known classes: {score}, "
+        f"chance {result['known']['chance']:.2f}."
     ]
 
 
-def _notes(result: Mapping[str, Any]) -> list[tuple[str, str]]:
-    notes = [
-        (
-            "AUROC",
-            "how often a new record has a larger score than a known one; chance is 0.50.",
-        ),
-        (
-            "Found",
-            f"share of records above a threshold set on validation units for {FALSE_ALARMS:.0%} false alarms.",
-        ),
-        (
-            "False alarms",
-            "share of the known records of the test units above it; where it is larger than meant, what is found "
-            "flatters.",
-        ),
-        (
-            "Band levels",
-            "the flag of diagnose predict. It and the networks see windows as the classifier does.",
-        ),
-    ]
-    if "known" in result:
-        for name, method in result["methods"].items():
-            areas = [
-                f"against {known} {_cell(area)}"
-                for known, area in method["auroc_by_known_class"].items()
-            ]
-            notes.append((f"AUROC of {SCORE_LABELS[name]}", ", ".join(areas) + "."))
-        notes.append(
-            (
-                "FPR95",
-                f"share of new records taken for known by the threshold that takes {TRUE_POSITIVES:.0%} of the known "
-                f"ones for known; chance is {TRUE_POSITIVES:.2f}, smaller is better.",
-            )
-        )
-    return notes
+def _notes(result: Content) -> list[tuple[str, str]]:
+    notes = [*MEANINGS.items()]
+    if "known" not in result:
+        return notes
+    for name, method in result["methods"].items():
+        areas = method["auroc_by_known_class"].items()
+        texts = [f"against {known} {interval_text(area)}" for known, area in areas]
+        notes.append((f"AUROC of {SCORE_LABELS[name]}", f"{', '.join(texts)}."))
+    rate = (
+        "share of new records taken for known by the threshold that takes "
+        f"{TRUE_POSITIVES:.0%} of the known ones for known; chance is {TRUE_POSITIVES:.2f}, "
+        "smaller is better."
+    )
+    return [*notes, ("FPR95", rate)]
 
 
-def _table(result: Mapping[str, Any]) -> Table:
+def _table(result: Content) -> Table:
     novel = result["novel_classes"]
-    rate = ["fpr95"] if "known" in result else []
-    keys = ["auroc", *rate, "false_alarms"]
-    heads = {"auroc": "AUROC", "fpr95": "FPR95", "false_alarms": "false alarms"}
+    keys = [key for key in HEADS if key != "fpr95" or "known" in result]
     rows = []
     for name, method in result["methods"].items():
-        scores = [_cell(method.get(key)) for key in keys]
-        found = [_cell(method["found"][label]) for label in novel]
-        rows.append([SCORE_LABELS[name], *scores, *found])
-    head = [
-        "score",
-        *(heads[key] for key in keys),
-        *(f"{name} found" for name in novel),
-    ]
-    return Table(head=head, rows=rows)
+        scores = [method.get(key) for key in keys]
+        scores += [method["found"][label] for label in novel]
+        rows.append([SCORE_LABELS[name], *map(_cell, scores)])
+    head = [*(HEADS[key] for key in keys), *(f"{name} found" for name in novel)]
+    return Table(head=["score", *head], rows=rows)
 
 
-def _cell(score: Mapping[str, Any] | None) -> str:
-    return "-" if score is None else interval_text(score)
+def _cell(score: Content | None) -> str:
+    if score is None:
+        return "-"
+    return interval_text(score)

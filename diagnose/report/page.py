@@ -1,12 +1,8 @@
-"""The result of a study.
-
-``metrics.json`` for programs, figures, and one HTML page that is understood in a minute.
-"""
+"""Report of a study: ``metrics.json`` for programs, tables, figures and one HTML page."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,32 +11,45 @@ from diagnose.report.answer_sections import answer_sections
 from diagnose.report.answer_tables import write_tables
 from diagnose.report.control_sections import controls_section
 from diagnose.report.figures import confusion_figure, reliability_figure, scores_figure
+from diagnose.report.markdown import table_lines
 from diagnose.report.methods import explained_methods, score_columns
 from diagnose.report.novelty_report import novelty_sections
 from diagnose.report.text import (
     answer_card,
     caveats,
     confusions,
+    data_line,
     few_machines,
+    files_section,
+    level_text,
+    made_by,
     recall_table,
     score_cell,
     trust_table,
 )
 from diagnose.scoring.metrics import LEAST_UNITS
+from diagnose.studies.result_files import Content, write_metrics
 from diagnose.training.heads import heads_notes
 from gensig.text.page import Section, Table, write_page
 
 LEAKY_MEANING = (
-    "windows of one record on both sides of the split, as in many papers. It shows how much a careless split flatters; "
-    "it is no measure of diagnosis"
+    "windows of one record on both sides of the split, as in many papers. It shows how much a "
+    "careless split flatters; it is no measure of diagnosis"
 )
+FILES = {
+    "metrics.json": "everything in numbers, with macro-F1, recall, calibration, settings and "
+    "versions.",
+    "predictions.csv": "the prediction of each method for each test record.",
+    "scores.csv and more": "the same numbers as tables, explained in docs/howto/report.md.",
+    "novelty.csv": "each score of novelty of each test record.",
+    "models/": "the networks, one folder each, for diagnose evaluate and diagnose predict.",
+}
+Entries = Sequence[tuple[str, Any]]
 
 
-def write_report(folder: Path, metrics: Mapping[str, Any]) -> Path:
+def write_report(folder: Path, metrics: Content) -> Path:
     """Write ``metrics.json``, the figures and ``report.html`` and return the page."""
-    (folder / "metrics.json").write_text(
-        json.dumps(metrics, indent=2, allow_nan=False) + "\n", encoding="utf-8"
-    )
+    write_metrics(folder, metrics)
     write_tables(folder, metrics)
     page = folder / "report.html"
     write_page(
@@ -52,7 +61,7 @@ def write_report(folder: Path, metrics: Mapping[str, Any]) -> Path:
     return page
 
 
-def result_table(metrics: Mapping[str, Any]) -> list[str]:
+def result_table(metrics: Content) -> list[str]:
     """Markdown table of protocol x method.
 
     Balanced accuracy with its 95 % interval, leaky protocols last.
@@ -60,105 +69,87 @@ def result_table(metrics: Mapping[str, Any]) -> list[str]:
     if not metrics["protocols"]:
         return []
     table = _score_table(metrics)
-    lines = ["| " + " | ".join(table.head) + " |", "|---" * len(table.head) + "|"]
+    rows = []
     for number, (name, *cells) in enumerate(table.rows):
-        label = (
-            f"*{name}* (LEAKY: not a result)"
-            if number in table.quiet
-            else f"**{name}**"
-        )
-        lines.append("| " + " | ".join([label, *cells]) + " |")
-    return lines
+        label = f"**{name}**"
+        if number in table.quiet:
+            label = f"*{name}* (LEAKY: not a result)"
+        rows.append([label, *cells])
+    return table_lines(table.head, rows)
 
 
-def without_interval(metrics: Mapping[str, Any]) -> list[str]:
-    """Why scores stand there without an interval, once, and of which protocols."""
-    units = {
-        name: one["n_units"]["test"]
-        for name, one in {**metrics["protocols"], **metrics["novelty"]}.items()
-    }
+def without_interval(metrics: Content) -> list[str]:
+    """Line on the protocols whose scores have no interval; empty where all have one."""
+    results = metrics["protocols"] | metrics["novelty"]
+    units = {name: result["n_units"]["test"] for name, result in results.items()}
     few = {name: n_units for name, n_units in units.items() if n_units < LEAST_UNITS}
-    return [f"{', '.join(few)}: {few_machines(min(few.values()))}"] if few else []
+    if not few:
+        return []
+    return [f"{', '.join(few)}: {few_machines(min(few.values()))}"]
 
 
-def _score_table(metrics: Mapping[str, Any]) -> Table:
-    results = sorted(metrics["protocols"].items(), key=lambda item: item[1]["leaky"])
-    columns = score_columns(metrics["model"])
-    shown = [
-        key for key in columns if any(key in result["methods"] for _, result in results)
-    ]
+def _ordered(metrics: Content) -> Entries:
+    """Protocols with their results, leaky ones last."""
+    return sorted(metrics["protocols"].items(), key=lambda item: item[1]["leaky"])
+
+
+def _score_table(metrics: Content) -> Table:
+    results = _ordered(metrics)
+    columns = {
+        name: label
+        for name, label in score_columns(metrics["model"]).items()
+        if _has(metrics, name)
+    }
+    rows = []
+    for protocol, result in results:
+        cells = [score_cell(result["methods"].get(name)) for name in columns]
+        rows.append([protocol, *cells])
     return Table(
-        head=["protocol", *(columns[key] for key in shown)],
-        rows=[
-            [name, *(score_cell(result["methods"].get(key)) for key in shown)]
-            for name, result in results
-        ],
+        head=["protocol", *columns.values()],
+        rows=rows,
         quiet=[number for number, (_, result) in enumerate(results) if result["leaky"]],
     )
 
 
-def _lead(metrics: Mapping[str, Any]) -> list[str]:
-    settings = metrics["settings"]
-    window_ms = 1e3 * settings["window_samples"] / metrics["sampling_rate_hz"]
-    level = (
-        "level kept"
-        if settings["normalise"] == "none"
-        else "level removed (RMS-normalised)"
-    )
+def _has(metrics: Content, method: str) -> bool:
+    return any(method in result["methods"] for result in metrics["protocols"].values())
+
+
+def _lead(metrics: Content) -> list[str]:
+    samples = metrics["settings"]["window_samples"]
+    window_ms = 1e3 * samples / metrics["sampling_rate_hz"]
     return [
-        f"Data: {metrics['data']}, {metrics['n_records']} records, classes {', '.join(metrics['class_names'])}; "
-        f"channels {', '.join(metrics['channel_names'])} at {metrics['sampling_rate_hz']:g} Hz.",
-        f"Network: {metrics['model']} on windows of {window_ms:.0f} ms, {level}, {len(settings['seeds'])} seed(s). "
-        f"gensig {metrics['environment']['gensig']}, {metrics['environment']['finished']}.",
+        data_line(metrics),
+        f"Network: {metrics['model']} on windows of {window_ms:.0f} ms, {level_text(metrics)}, "
+        f"{made_by(metrics)}",
     ]
 
 
-def _sections(folder: Path, metrics: Mapping[str, Any]) -> list[Section]:
-    ordered = sorted(metrics["protocols"].items(), key=lambda item: item[1]["leaky"])
+def _sections(folder: Path, metrics: Content) -> list[Section]:
+    """Sections of the page; their figures are written into the folder."""
+    ordered = _ordered(metrics)
     clean = {name: result for name, result in ordered if not result["leaky"]}
+    novelty = metrics["novelty"]
+    warnings = [("", line) for line in caveats(metrics)]
     sections = []
     if ordered:
         sections += _score_sections(folder, metrics, ordered)
     if clean:
-        sections.append(_fault_section(folder, clean, metrics))
+        sections.append(_fault_section(clean, metrics))
         sections += answer_sections(folder, clean)
-    sections += novelty_sections(metrics["novelty"])
+    sections += novelty_sections(novelty)
     if ordered:
         sections.append(controls_section(metrics))
-    sections.append(
-        Section(title="Caveats", notes=[("", line) for line in caveats(metrics)])
-    )
+    sections.append(Section(title="Caveats", notes=warnings))
     if ordered:
         sections.append(_meaning_section(metrics, clean))
     if clean:
         sections.append(_trust_section(folder, clean))
     sections.append(_confusion_section(folder, metrics, ordered))
-    sections.append(
-        Section(
-            title="Files beside this page",
-            notes=[
-                (
-                    "metrics.json",
-                    "everything in numbers, with macro-F1, recall, calibration, settings and versions.",
-                ),
-                ("predictions.csv", "what each method said of each test record."),
-                (
-                    "scores.csv and more",
-                    "the same numbers as tables, explained in docs/howto/report.md.",
-                ),
-                *(
-                    [("novelty.csv", "each score of novelty of each test record.")]
-                    if metrics["novelty"]
-                    else []
-                ),
-                (
-                    "models/",
-                    "the networks, one folder each, for diagnose evaluate and diagnose predict.",
-                ),
-            ],
-            folded=True,
-        )
-    )
+    files = {
+        name: text for name, text in FILES.items() if novelty or name != "novelty.csv"
+    }
+    sections.append(files_section(files))
     return [
         section
         for section in sections
@@ -166,140 +157,105 @@ def _sections(folder: Path, metrics: Mapping[str, Any]) -> list[Section]:
     ]
 
 
-def _score_sections(
-    folder: Path, metrics: Mapping[str, Any], ordered: Sequence[tuple[str, Any]]
-) -> list[Section]:
-    model = metrics["model"]
+def _score_sections(folder: Path, metrics: Content, ordered: Entries) -> list[Section]:
+    cards = []
+    for name, result in ordered:
+        meaning = MEANING.get(name, LEAKY_MEANING)
+        if result["leaky"]:
+            meaning = LEAKY_MEANING
+        cards.append(answer_card(name, result, metrics["model"], meaning))
+    scores_figure(folder / "scores.png", metrics)
     return [
         Section(
             title="In short",
             text=[
-                "Balanced accuracy of the network over test records: the mean share recognised of each class."
+                "Balanced accuracy of the network over test records: the mean share recognised "
+                "of each class."
             ],
-            cards=[
-                answer_card(
-                    name,
-                    result,
-                    model,
-                    LEAKY_MEANING if result["leaky"] else MEANING[name],
-                )
-                for name, result in ordered
-            ],
+            cards=cards,
         ),
         Section(
             title="Network, baselines and controls",
             text=[
-                "Mean over the seeds [95 % interval over test units, so over machines, not windows]."
+                "Mean over the seeds [95 % interval over test units, so over machines, not "
+                "windows]."
             ],
             table=_score_table(metrics),
-            figures=_figures(
-                folder,
-                "scores.png",
-                "scores and intervals; dotted: chance",
-                scores_figure,
-                metrics,
-            ),
+            figures=[("scores.png", "scores and intervals; dotted: chance")],
         ),
     ]
 
 
-def _meaning_section(metrics: Mapping[str, Any], clean: Mapping[str, Any]) -> Section:
+def _meaning_section(metrics: Content, clean: Content) -> Section:
+    label = "the class with the largest mean log-probability over its windows."
     return Section(
         title="What the numbers mean",
         notes=[
-            (
-                "A record's label",
-                "the class with the largest mean log-probability over its windows.",
-            ),
-            *[
-                (name, f"{MEANING[name]}{_sensors(result)}.")
-                for name, result in clean.items()
-            ],
+            ("A record's label", label),
+            *((name, f"{MEANING[name]}{_sensors(clean[name])}.") for name in clean),
             ("LEAKY", f"{LEAKY_MEANING}."),
-            *_explanations(metrics),
+            *(
+                (text.label, text.meaning)
+                for text in explained_methods()
+                if _has(metrics, text.name)
+            ),
         ],
         folded=True,
     )
 
 
-def _explanations(metrics: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Label and meaning of every method beside the network that ran."""
-    shown = [text for text in explained_methods() if _has(metrics, text.name)]
-    return [(text.label, text.meaning) for text in shown]
+def _sensors(result: Content) -> str:
+    """Channels of training and test, where they differ."""
+    channels = result["channels"]
+    trained, tested = ", ".join(channels["train"]), ", ".join(channels["test"])
+    if trained == tested:
+        return ""
+    return f": trained on {trained}, tested on {tested}"
 
 
-def _fault_section(
-    folder: Path, clean: Mapping[str, Any], metrics: Mapping[str, Any]
-) -> Section:
+def _fault_section(clean: Content, metrics: Content) -> Section:
     model, names = metrics["model"], metrics["class_names"]
+    notes = [
+        (name, confusions(result["methods"][model]["confusion"], names))
+        for name, result in clean.items()
+    ]
     return Section(
         title="Which faults are found",
         text=[f"Share of the test records of each class that {model} recognises."],
         table=recall_table(clean, model, names),
-        notes=[
-            *(
-                (name, confusions(result["methods"][model]["confusion"], names))
-                for name, result in clean.items()
-            ),
-            *heads_notes(clean),
-        ],
+        notes=[*notes, *heads_notes(clean)],
     )
 
 
-def _trust_section(folder: Path, clean: Mapping[str, Any]) -> Section:
+def _trust_section(folder: Path, clean: Content) -> Section:
     calibration = {name: result["calibration"] for name, result in clean.items()}
+    reliability_figure(folder / "reliability.png", calibration)
     return Section(
         title="What its probabilities are worth",
         text=[
-            "One temperature a network, fitted on the records of its validation units, brings the probabilities of "
-            "records nearer to the share that is right; it changes no label. Calibration error: mean distance between "
-            "the two over test records, and what such probabilities would have by chance if they were all true. "
-            "Cross-entropy: smaller is better. The network is the one of its best epoch on validation units; the score "
-            "of its last epoch stands beside."
+            "One temperature a network, fitted on the records of its validation units, brings the "
+            "probabilities of records nearer to the share that is right; it changes no label. "
+            "Calibration error: mean distance between the two over test records, and what such "
+            "probabilities would have by chance if they were all true. Cross-entropy: smaller is "
+            "better. The network is the one of its best epoch on validation units; the score of "
+            "its last epoch is shown for comparison."
         ],
         table=trust_table(clean),
-        figures=_figures(
-            folder,
-            "reliability.png",
-            "share right against probability",
-            reliability_figure,
-            calibration,
-        ),
+        figures=[("reliability.png", "share right against probability")],
         folded=True,
     )
 
 
-def _confusion_section(
-    folder: Path, metrics: Mapping[str, Any], ordered: Sequence[tuple[str, Any]]
-) -> Section:
+def _confusion_section(folder: Path, metrics: Content, ordered: Entries) -> Section:
     figures = []
     for name, result in ordered:
-        title = f"{metrics['model']}, {name}" + (" (LEAKY)" if result["leaky"] else "")
+        title = f"{metrics['model']}, {name}"
+        if result["leaky"]:
+            title += " (LEAKY)"
+        picture = f"confusion_{name}.png"
         confusion = result["methods"][metrics["model"]]["confusion"]
-        confusion_figure(
-            folder / f"confusion_{name}.png", confusion, metrics["class_names"], title
-        )
-        figures.append((f"confusion_{name}.png", title))
+        confusion_figure(folder / picture, confusion, metrics["class_names"], title)
+        figures.append((picture, title))
     return Section(
         title="Confusion matrices", figures=figures, side_by_side=True, folded=True
     )
-
-
-def _figures(
-    folder: Path, name: str, caption: str, draw: Any, content: Any
-) -> list[tuple[str, str]]:
-    """Draw one figure into the folder, for the page to show."""
-    draw(folder / name, content)
-    return [(name, caption)]
-
-
-def _sensors(result: Mapping[str, Any]) -> str:
-    """Which channels, where the test has others than the training."""
-    trained, tested = (
-        ", ".join(result["channels"][subset]) for subset in ("train", "test")
-    )
-    return "" if trained == tested else f": trained on {trained}, tested on {tested}"
-
-
-def _has(metrics: Mapping[str, Any], method: str) -> bool:
-    return any(method in result["methods"] for result in metrics["protocols"].values())

@@ -1,9 +1,8 @@
-"""Sentences, cells and tables of the report out of ``metrics.json``'s parts."""
+"""Sentences, cells and tables of the report out of the parts of ``metrics.json``."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -11,13 +10,23 @@ from diagnose.report.methods import controls_on_cards, rivals_on_cards
 from diagnose.report.novelty_report import novelty_caveats
 from diagnose.scoring.judged import interval_text
 from diagnose.scoring.metrics import LEAST_UNITS, is_above
-from gensig.text.page import Card, Table
+from diagnose.studies.result_files import Content
+from gensig.text.page import Card, Section, Table
 
 FEW_UNITS = 10
 CONFUSED = 0.1
+TRUST_HEAD = (
+    "protocol",
+    "calibration error before, after (chance)",
+    "cross-entropy before, after",
+    "temperature",
+    "best epoch",
+    "last epoch",
+    "score of the last",
+)
 
 
-def score_cell(method: Mapping[str, Any] | None) -> str:
+def score_cell(method: Content | None) -> str:
     """Balanced accuracy with its interval, "-" for a method that was not run."""
     if method is None:
         return "-"
@@ -27,182 +36,179 @@ def score_cell(method: Mapping[str, Any] | None) -> str:
     return interval_text(value)
 
 
-def answer_card(name: str, result: Mapping[str, Any], model: str, meaning: str) -> Card:
-    """One protocol's score against chance, the best baseline and the shuffled labels."""
-    methods = result["methods"]
-    score, chance = (
-        methods[model]["balanced_accuracy"],
-        methods["chance"]["balanced_accuracy"],
+def data_line(metrics: Content) -> str:
+    """Sentence on the data: size, classes, channels, rate."""
+    records = f"{metrics['n_records']} records"
+    if "class_names" in metrics:
+        records += f", classes {', '.join(metrics['class_names'])}"
+    channels = ", ".join(metrics["channel_names"])
+    return (
+        f"Data: {metrics['data']}, {records}; channels {channels} "
+        f"at {metrics['sampling_rate_hz']:g} Hz."
     )
-    value, spread = f"{score['mean']:.2f}", _spread(score)
-    if result["leaky"]:
-        title, meaning = f"{name} (LEAKY)", _sentence(meaning)
-        return Card(
-            title=title,
-            value=value,
-            spread=spread,
-            verdict="not a result",
-            meaning=meaning,
-            mark="quiet",
-        )
-    above = is_above(score, chance)
-    verdict = [
-        f"{'above chance' if above else 'not distinguishable from chance'} ({chance:.2f})"
-    ]
-    if score["low"] is None:
-        verdict = [f"no verdict against chance ({chance:.2f}): too few machines"]
-    elif comparison := _best_rival(methods, score):
-        verdict.append(comparison)
-    leak = False
-    if "oracle" in methods:
-        share, best = (
-            result["over_oracle"]["balanced_accuracy"],
-            methods["oracle"]["balanced_accuracy"],
-        )
-        verdict.append(
-            f"{share['mean']:.2f} ({_spread(share)}) of the oracle ({best['mean']:.2f})"
-        )
-    for key, control in controls_on_cards().items():
-        if key in methods:
-            found = methods[key]["balanced_accuracy"]
-            above_chance = is_above(found, chance)
-            leak |= above_chance
-            if found["low"] is None:
-                continue
-            verdict.append(
-                f"{control} ABOVE chance ({found['mean']:.2f}): look for a leak"
-                if above_chance
-                else f"{control} at chance"
-            )
-    mark = "good" if above and not leak else "bad"
-    text = _sentence(meaning if meaning.startswith("tested") else f"tested {meaning}")
+
+
+def level_text(metrics: Content) -> str:
+    """Normalisation in words."""
+    if metrics["settings"]["normalise"] == "none":
+        return "level kept"
+    return "level removed (RMS-normalised)"
+
+
+def made_by(metrics: Content) -> str:
+    """Number of seeds, version and time."""
+    made = metrics["environment"]
+    n_seeds = len(metrics["settings"]["seeds"])
+    return f"{n_seeds} seed(s). gensig {made['gensig']}, {made['finished']}."
+
+
+def files_section(files: Mapping[str, str]) -> Section:
+    """Section on the files of a report."""
+    return Section(title="Files beside this page", notes=[*files.items()], folded=True)
+
+
+def answer_card(name: str, result: Content, model: str, meaning: str) -> Card:
+    """One protocol's score against chance, the best baseline, the oracle and the controls."""
+    methods = result["methods"]
+    score = methods[model]["balanced_accuracy"]
+    chance = methods["chance"]["balanced_accuracy"]
+    title, mark, verdict = f"{name} (LEAKY)", "quiet", ["not a result"]
+    if not result["leaky"]:
+        title, mark = name, "bad"
+        verdict, leak = _verdict(result, score, chance)
+        if is_above(score, chance) and not leak:
+            mark = "good"
+        if not meaning.startswith("tested"):
+            meaning = f"tested {meaning}"
     return Card(
-        title=name,
-        value=value,
-        spread=spread,
+        title=title,
+        value=f"{score['mean']:.2f}",
+        spread=_spread(score),
         verdict="; ".join(verdict),
-        meaning=text,
+        meaning=f"{meaning[0].upper()}{meaning[1:]}.",
         mark=mark,
     )
 
 
-def _best_rival(methods: Mapping[str, Any], score: Mapping[str, Any]) -> str | None:
-    """Comparison of the network's score with the best baseline; None where none ran."""
-    labels = {
-        name: label for name, label in rivals_on_cards().items() if name in methods
+def _verdict(result: Content, score: Content, chance: float) -> tuple[list[str], bool]:
+    """Verdicts on a score, and True if a control is above chance."""
+    methods = result["methods"]
+    if score["low"] is None:
+        lines = [f"no verdict against chance ({chance:.2f}): too few machines"]
+    elif is_above(score, chance):
+        lines = [f"above chance ({chance:.2f})"]
+    else:
+        lines = [f"not distinguishable from chance ({chance:.2f})"]
+    if score["low"] is not None:
+        lines += _best_rival(methods, score)
+    if "oracle" in methods:
+        share = result["over_oracle"]["balanced_accuracy"]
+        best = methods["oracle"]["balanced_accuracy"]["mean"]
+        lines.append(
+            f"{share['mean']:.2f} ({_spread(share)}) of the oracle ({best:.2f})"
+        )
+    leak = False
+    for name, control in controls_on_cards().items():
+        found = methods.get(name, {}).get("balanced_accuracy", {"low": None})
+        if found["low"] is None:
+            continue
+        if is_above(found, chance):
+            leak = True
+            mean = found["mean"]
+            lines.append(f"{control} ABOVE chance ({mean:.2f}): look for a leak")
+        else:
+            lines.append(f"{control} at chance")
+    return lines, leak
+
+
+def _best_rival(methods: Content, score: Content) -> list[str]:
+    """Comparison of the network's score with the best baseline; empty where none ran."""
+    means = {
+        label: methods[name]["balanced_accuracy"]["mean"]
+        for name, label in rivals_on_cards().items()
+        if name in methods
     }
-    if not labels:
-        return None
-    means = {name: methods[name]["balanced_accuracy"]["mean"] for name in labels}
-    best = max(means, key=lambda name: means[name])
+    if not means:
+        return []
+    best = max(means, key=lambda label: means[label])
     # an interval that holds the other's mean tells the two apart neither way
     comparison = "not told from"
     if score["low"] > means[best]:
         comparison = "better than"
     elif score["high"] < means[best]:
         comparison = "worse than"
-    return f"{comparison} {labels[best]} ({means[best]:.2f})"
+    return [f"{comparison} {best} ({means[best]:.2f})"]
 
 
-def _spread(score: Mapping[str, Any]) -> str:
-    return (
-        "too few machines"
-        if score["low"] is None
-        else f"{score['low']:.2f} to {score['high']:.2f}"
-    )
+def _spread(score: Content) -> str:
+    if score["low"] is None:
+        return "too few machines"
+    return f"{score['low']:.2f} to {score['high']:.2f}"
 
 
-def _sentence(text: str) -> str:
-    return f"{text[0].upper()}{text[1:]}."
-
-
-def recall_table(
-    clean: Mapping[str, Any], model: str, class_names: Sequence[str]
-) -> Table:
+def recall_table(clean: Content, model: str, class_names: Sequence[str]) -> Table:
     """Recall by class, a row a protocol."""
-    shares = {
-        name: result["methods"][model]["recall"] for name, result in clean.items()
-    }
-    rows = [
-        [
-            name,
-            *(
-                f"{share[label]:.2f}" if label in share else "-"
-                for label in class_names
-            ),
-        ]
-        for name, share in shares.items()
-    ]
+    rows = []
+    for protocol, result in clean.items():
+        recall = result["methods"][model]["recall"]
+        cells = {name: f"{share:.2f}" for name, share in recall.items()}
+        rows.append([protocol, *(cells.get(name, "-") for name in class_names)])
     return Table(head=["protocol", *class_names], rows=rows)
 
 
 def confusions(confusion: Sequence[Sequence[int]], class_names: Sequence[str]) -> str:
     """The largest off-diagonal shares, at most three."""
     found = []
-    for true, row in enumerate(confusion):
+    for true, row in zip(class_names, confusion, strict=True):
         total = max(int(np.sum(row)), 1)
-        for predicted, count in enumerate(row):
+        for predicted, count in zip(class_names, row, strict=True):
             if true != predicted and count / total >= CONFUSED:
-                found.append((count / total, class_names[true], class_names[predicted]))
+                found.append((count / total, true, predicted))
     if not found:
         return (
             f"no class is taken for another in {CONFUSED:.0%} of its records or more."
         )
-    return (
-        "; ".join(
-            f"{a} taken for {b} ({share:.0%})"
-            for share, a, b in sorted(found, reverse=True)[:3]
-        )
-        + "."
-    )
+    found.sort(reverse=True)
+    texts = [f"{true} taken for {other} ({share:.0%})" for share, true, other in found]
+    return "; ".join(texts[:3]) + "."
 
 
-def trust_table(clean: Mapping[str, Any]) -> Table:
+def trust_table(clean: Content) -> Table:
     """Calibration and the choice of the epoch, a row a protocol."""
     rows = []
     for name, result in clean.items():
         calibration, last = result["calibration"], result["last_epoch"]
-        before, after = (
-            {
-                key: np.mean(calibration[when][key])
-                for key in ("expected_calibration_error", "cross_entropy")
-            }
-            for when in ("before", "after")
+        error, entropy = (
+            ", ".join(
+                f"{np.mean(calibration[when][key]):.3f}" for when in ("before", "after")
+            )
+            for key in ("expected_calibration_error", "cross_entropy")
         )
+        by_chance = np.mean(calibration["after"]["error_by_chance"])
         rows.append(
             [
                 name,
-                f"{before['expected_calibration_error']:.3f}, {after['expected_calibration_error']:.3f} "
-                f"({np.mean(calibration['after']['error_by_chance']):.3f})",
-                f"{before['cross_entropy']:.3f}, {after['cross_entropy']:.3f}",
-                _several(calibration["temperature"], ".2f"),
-                _several(result["best_epoch"], "d"),
-                _several(last["epoch"], "d"),
+                f"{error} ({by_chance:.3f})",
+                entropy,
+                ", ".join(f"{value:.2f}" for value in calibration["temperature"]),
+                ", ".join(map(str, result["best_epoch"])),
+                ", ".join(map(str, last["epoch"])),
                 score_cell(last),
             ]
         )
-    head = (
-        "protocol",
-        "calibration error before, after (chance)",
-        "cross-entropy before, after",
-        "temperature",
-        "best epoch",
-        "last epoch",
-        "score of the last",
-    )
-    return Table(head=head, rows=rows)
+    return Table(head=TRUST_HEAD, rows=rows)
 
 
 def few_machines(n_units: int) -> str:
-    """Why there is no interval."""
+    """Reason why there is no interval."""
     return (
-        f"{n_units} test unit(s) are too few machines for an interval, {LEAST_UNITS} are the least and {FEW_UNITS} "
-        "advisable: a score of so few says little of others."
+        f"{n_units} test unit(s) are too few machines for an interval, {LEAST_UNITS} are the "
+        f"least and {FEW_UNITS} advisable: a score of so few says little of others."
     )
 
 
-def caveats(metrics: Mapping[str, Any]) -> list[str]:
-    """What a reader must know before using the scores."""
+def caveats(metrics: Content) -> list[str]:
+    """Limits of the scores that a reader must know before using them."""
     lines = [
         "Simulated vibration. A score here says nothing yet about measured machines."
     ]
@@ -212,8 +218,8 @@ def caveats(metrics: Mapping[str, Any]) -> list[str]:
             lines.append(f"{name}: {few_machines(n_units)}")
         elif n_units < FEW_UNITS and not result["leaky"]:
             lines.append(
-                f"{name}: only {n_units} test unit(s). The interval shows the spread of these units and is too "
-                f"narrow for new ones; at least {FEW_UNITS} are advisable."
+                f"{name}: only {n_units} test unit(s). The interval shows the spread of these "
+                f"units and is too narrow for new ones; at least {FEW_UNITS} are advisable."
             )
     lines += novelty_caveats(metrics["novelty"], FEW_UNITS)
     if metrics["settings"]["normalise"] == "rms":
@@ -221,17 +227,8 @@ def caveats(metrics: Mapping[str, Any]) -> list[str]:
             "The network sees windows without their level, the indicators with it unless stated; "
             "normalise=none gives the level to the network too."
         )
-    lines += [
-        f"{name} is left out: {reason}."
-        for name, reason in metrics["protocols_left_out"].items()
-    ]
-    if metrics["n_records_unusable"]:
-        lines.append(
-            f"{metrics['n_records_unusable']} record(s) failed in simulation and are left out."
-        )
+    for name, reason in metrics["protocols_left_out"].items():
+        lines.append(f"{name} is left out: {reason}.")
+    if n_failed := metrics["n_records_unusable"]:
+        lines.append(f"{n_failed} record(s) failed in simulation and are left out.")
     return lines
-
-
-def _several(values: Sequence[float], form: str) -> str:
-    """One value a seed."""
-    return ", ".join(format(value, form) for value in values)

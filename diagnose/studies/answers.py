@@ -1,13 +1,12 @@
-"""What a study answers beside its scores.
+"""Answers of a study beside its scores.
 
-Which condition fails, from what severity, with how much signal, who wins.
+Conditions in which it fails, severities that are found, length of signal, comparisons.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import reduce
-from typing import Any
+from functools import partial, reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,15 +22,18 @@ from diagnose.scoring.paired import compare
 from diagnose.scoring.predictions import Prediction
 from diagnose.scoring.window_length import by_window_length
 from diagnose.settings import TrainSettings
+from diagnose.studies.counts import unit_ids
+from diagnose.studies.result_files import Entry, network_name
 
 ANSWERS_SEED = 20240608
+IntArray = NDArray[np.integer]
+FloatArray = NDArray[np.floating]
 
 
 def protocol_answers(
     task: Task, settings: TrainSettings, predictions: Sequence[Prediction]
-) -> dict[str, Any]:
-    """The part ``answers`` of one clean protocol in ``metrics.json``; docs/howto/report.md
-    explains every key.
+) -> Entry:
+    """Part ``answers`` of one clean protocol in ``metrics.json``; see docs/howto/report.md.
 
     Parameters
     ----------
@@ -40,101 +42,105 @@ def protocol_answers(
 
     Notes
     -----
-    A part for which the data have nothing is left out: no ``detection`` without a healthy class, no ``window_length``
-    where no windows were kept.
+    A part for which the data have nothing is left out: no ``detection`` without a healthy class,
+    no ``window_length`` where no windows were kept.
     """
-    network_name = str(settings.model.get("name", "network"))
-    compared = (network_name, *baseline_names(Role.RIVAL))
-    names = dict.fromkeys(p.method for p in predictions if p.method in compared)
-    runs = {name: [p for p in predictions if p.method == name] for name in names}
-    record = reduce(np.intersect1d, [run[0].record for run in runs.values()])
-    judged = {name: _judged(task, name, run, record) for name, run in runs.items()}
-    network = judged.pop(network_name)
-    best = max(judged.values(), key=_accuracy, default=None)
-    shown = [network] if best is None else [network, best]
-    result: dict[str, Any] = {
-        "network": network_name,
-        "best_baseline": None if best is None else best.method,
+    name = network_name(settings)
+    compared = (name, *baseline_names(Role.RIVAL))
+    runs: dict[str, list[Prediction]] = {}
+    for run in predictions:
+        if run.method in compared:
+            runs.setdefault(run.method, []).append(run)
+    record = reduce(np.intersect1d, [mine[0].record for mine in runs.values()])
+    rivals = {
+        method: _judged(task, method, mine, record) for method, mine in runs.items()
+    }
+    network = rivals.pop(name)
+    best = max(rivals.values(), key=_accuracy, default=None)
+    shown = [method for method in (network, best) if method is not None]
+    n_bootstrap = settings.n_bootstrap
+    columns = condition_columns(task.dataset, record)
+    result: Entry = {
+        "network": name,
+        "best_baseline": getattr(best, "method", None),
         "n_records": int(record.size),
         "n_units": network.n_units,
         "conditions": by_condition(
-            condition_columns(task.dataset, record),
-            shown,
-            n_bootstrap=settings.n_bootstrap,
-            rng=_rng(),
+            columns, shown, n_bootstrap=n_bootstrap, rng=_generator()
         ),
         "comparisons": compare(
-            network, list(judged.values()), n_bootstrap=settings.n_bootstrap, rng=_rng()
+            network, list(rivals.values()), n_bootstrap=n_bootstrap, rng=_generator()
         ),
     }
-    if (
-        HEALTHY in task.class_names
-        and (network.label == task.class_names.index(HEALTHY)).any()
-    ):
-        sizes = _sizes(task, record)
+    if _has_healthy(task, network):
+        detect = partial(
+            detection,
+            class_names=task.class_names,
+            sizes=_sizes(task, record),
+            n_bootstrap=n_bootstrap,
+        )
         result["detection"] = {
-            method.method: detection(
+            method.method: detect(
                 method,
                 _validation(task, method.method, runs[method.method]),
-                class_names=task.class_names,
-                sizes=sizes,
-                n_bootstrap=settings.n_bootstrap,
-                rng=_rng(),
+                rng=_generator(),
             )
             for method in shown
         }
-    windows = [
-        (p.windows.record, p.windows.log_probability)
-        for p in runs[network_name]
-        if p.windows is not None
-    ]
-    if windows:
-        rate = task.dataset.sampling_rate
-        result["window_length"] = by_window_length(
-            _judged(
-                task, network_name, runs[network_name], runs[network_name][0].record
-            ),
-            windows,
-            window_seconds=task.window_samples / rate,
-            step_seconds=task.stride_samples / rate,
-            n_bootstrap=settings.n_bootstrap,
-            rng=_rng(),
-        )
+    if any(run.windows is not None for run in runs[name]):
+        result["window_length"] = _window_length(task, settings, runs[name])
     return result
 
 
-def _rng() -> np.random.Generator:
-    """The same for every question, so that no answer depends on which others were asked."""
+def _generator() -> np.random.Generator:
+    """Generator of one question, so that no answer depends on the other questions."""
     return np.random.default_rng(ANSWERS_SEED)
 
 
-def _judged(
-    task: Task, method: str, runs: Sequence[Prediction], record: NDArray[np.integer]
-) -> Judged:
-    scores = np.stack(
-        [run.log_probability[np.searchsorted(run.record, record)] for run in runs]
+def _has_healthy(task: Task, network: Judged) -> bool:
+    """True if there are healthy test records."""
+    if HEALTHY not in task.class_names:
+        return False
+    return bool((network.label == task.class_names.index(HEALTHY)).any())
+
+
+def _window_length(
+    task: Task, settings: TrainSettings, runs: Sequence[Prediction]
+) -> Entry:
+    """Scores of the network by length of the signal judged."""
+    rate = task.dataset.sampling_rate
+    windows = [run.windows for run in runs if run.windows is not None]
+    return by_window_length(
+        _judged(task, runs[0].method, runs, runs[0].record),
+        [(part.record, part.log_probability) for part in windows],
+        window_seconds=task.window_samples / rate,
+        step_seconds=task.stride_samples / rate,
+        n_bootstrap=settings.n_bootstrap,
+        rng=_generator(),
     )
-    return _of_records(task, method, record, scores)
+
+
+def _judged(
+    task: Task, method: str, runs: Sequence[Prediction], record: IntArray
+) -> Judged:
+    """A method on some of its test records."""
+    scores = [run.log_probability[np.searchsorted(run.record, record)] for run in runs]
+    return _of_records(task, method, record, np.stack(scores))
 
 
 def _validation(task: Task, method: str, runs: Sequence[Prediction]) -> Judged | None:
+    """A method on its validation records; None where one of its runs has none."""
     parts = [run.validation for run in runs if run.validation is not None]
     if len(parts) < len(runs):
         return None
-    return _of_records(
-        task,
-        method,
-        parts[0].record,
-        np.stack([part.log_probability for part in parts]),
-    )
+    scores = np.stack([part.log_probability for part in parts])
+    return _of_records(task, method, parts[0].record, scores)
 
 
 def _of_records(
-    task: Task, method: str, record: NDArray[np.integer], scores: NDArray[np.floating]
+    task: Task, method: str, record: IntArray, scores: FloatArray
 ) -> Judged:
-    names, unit = np.unique(
-        np.asarray(task.dataset.column("unit_id"))[record], return_inverse=True
-    )
+    names, unit = np.unique(unit_ids(task)[record], return_inverse=True)
     return Judged(
         method=method,
         label=task.labels()[record],
@@ -148,24 +154,18 @@ def _accuracy(judged: Judged) -> float:
     return float(balanced_accuracy(judged.confusion().sum(axis=1)).mean())
 
 
-def _sizes(
-    task: Task, record: NDArray[np.integer]
-) -> dict[str, dict[str, NDArray[np.floating]]]:
-    """Severity of the records of each faulty class, where it is above 0, and what grows with it
-    in physical units.
+def _sizes(task: Task, record: IntArray) -> dict[str, dict[str, FloatArray]]:
+    """Severity, and what grows with it in physical units, of the records of each faulty class.
+
+    Classes of unknown or zero severity are left out.
     """
     label = task.labels()[record]
     severity = np.asarray(task.dataset.column("severity"), dtype=float)[record]
     sizes = {}
     for index, name in enumerate(task.class_names):
         mine = severity[label == index]
-        if (
-            name != HEALTHY
-            and mine.size
-            and np.isfinite(mine).all()
-            and (mine > 0).all()
-        ):
-            sizes[name] = {"severity": mine} | size_columns(
-                task.dataset, record[label == index], mine
-            )
+        graded = mine.size and np.isfinite(mine).all() and (mine > 0).all()
+        if name != HEALTHY and graded:
+            physical = size_columns(task.dataset, record[label == index], mine)
+            sizes[name] = {"severity": mine} | physical
     return sizes

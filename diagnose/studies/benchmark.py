@@ -1,24 +1,23 @@
-"""Scores of somebody's predictions on a data set's own split, beside the frozen results where it
-is a benchmark.
-"""
+"""Scores of a user's predictions on the split of a data set, and those of a frozen benchmark."""
 
 from __future__ import annotations
 
 import csv
-import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.windows import Task, subset_segments, task_of
 from diagnose.scoring.judged import interval_text
-from diagnose.studies.study import is_leaky, score_predictions
+from diagnose.studies.counts import n_different
+from diagnose.studies.protocol_results import is_leaky, score_predictions
+from diagnose.studies.result_files import Content, Entry, sha256
 from gensig.dataset.folder.layout import PLAN, SPLITS
 from gensig.errors import ConfigError, DatasetError
 
@@ -35,15 +34,16 @@ Run = tuple[NDArray[np.integer], NDArray[np.integer]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Benchmark:
-    """A frozen data set: what identifies it, whichever version made it, and what was reached on it.
+    """A frozen data set: digests that identify it, and results that were reached on it.
 
-    Parameters
+    Attributes
     ----------
-    name : str
-    generator_version : str               version of gensig that made it when it was frozen
-    plan_sha256 : str                     of plan.csv
-    split_sha256 : protocol -> str        of splits/PROTOCOL.csv
-    signal_rms : record_id -> (channel,)  m/s^2, of some records; other noise as strong changes its fourth digit
+    name : of the benchmark
+    generator_version : version of gensig that made it when it was frozen
+    plan_sha256 : of plan.csv
+    split_sha256 : protocol -> digest of splits/PROTOCOL.csv
+    signal_rms : record_id -> (channel,) m/s^2, of some records; other noise as strong changes its
+        fourth digit
     results : protocol -> method -> balanced accuracy with its interval, or one number
     """
 
@@ -52,10 +52,10 @@ class Benchmark:
     plan_sha256: str
     split_sha256: Mapping[str, str]
     signal_rms: Mapping[str, Sequence[float]]
-    results: Mapping[str, Mapping[str, Any]]
+    results: Mapping[str, Content]
 
     def differences(self, dataset: Dataset) -> list[str]:
-        """What a data set with this plan has otherwise than the benchmark, one line each."""
+        """Differences of a data set with this plan from the benchmark, one line each."""
         lines = []
         for protocol, expected in self.split_sha256.items():
             path = dataset.folder / SPLITS / f"{protocol}.csv"
@@ -63,33 +63,19 @@ class Benchmark:
                 lines.append(f"its split {protocol} is another one")
         if n_failed := int(np.sum(~np.asarray(dataset.usable, dtype=bool))):
             return [*lines, f"{n_failed} of its records are missing or failed"]
-        number_of = {
-            str(name): index for index, name in enumerate(dataset.column("record_id"))
-        }
-        known = {
-            number_of[name]: values
-            for name, values in self.signal_rms.items()
-            if name in number_of
-        }
-        if not all(
-            np.allclose(signal_rms(dataset, record), values, rtol=RTOL, atol=0)
-            for record, values in known.items()
-        ):
-            lines.append(
-                f"its signals are not those that gensig {self.generator_version} made"
-            )
+        for record, name in enumerate(dataset.column("record_id")):
+            values = self.signal_rms.get(str(name))
+            if values is None:
+                continue
+            if not np.allclose(signal_rms(dataset, record), values, rtol=RTOL, atol=0):
+                version = self.generator_version
+                return [*lines, f"its signals are not those that gensig {version} made"]
         return lines
 
 
 def signal_rms(dataset: Dataset, record: int) -> NDArray[np.floating]:
     """(channel,) RMS of a record in m/s^2."""
     return np.sqrt(np.mean(np.square(dataset.signals(record), dtype=float), axis=-1))
-
-
-def sha256(path: Path) -> str:
-    """Hexadecimal digest of a file."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def benchmark_of(dataset: Dataset) -> Benchmark | None:
@@ -103,22 +89,20 @@ def benchmark_of(dataset: Dataset) -> Benchmark | None:
     return None
 
 
-def score_file(
-    dataset: Dataset, path: Path, *, protocol: str | None = None
-) -> dict[str, Any]:
+def score_file(dataset: Dataset, path: Path, *, protocol: str | None = None) -> Entry:
     """Score the predictions of a CSV file on the test parts of the data set's splits.
 
     Parameters
     ----------
     dataset : open data set
-    path : CSV with the columns record_id and predicted (a class name), and, if it likes, protocol, method and seed.
-        For each of these the file names every test record once
+    path : CSV with the columns record_id and predicted (a class name), and optional columns
+        protocol, method and seed. For each of these the file names every test record once
     protocol : of files without that column; ``by_unit`` where None
 
     Returns
     -------
-    plain dictionary: `scores` by protocol and method, `chance` by protocol, `benchmark` (name, differences, results) or
-    None
+    plain dictionary: `scores` by protocol and method, `chance` by protocol, `benchmark` (name,
+    differences, results) or None
 
     Raises
     ------
@@ -126,89 +110,55 @@ def score_file(
     ConfigError    for a class or protocol that does not exist, or a leaky protocol
     """
     task = task_of(dataset, window_samples=1, stride_samples=1, normalise="none")
-    scores: dict[str, dict[str, Any]] = {}
+    scores: dict[str, Entry] = {}
     chance: dict[str, float] = {}
     for (name, method), runs in _runs(task, path, protocol).items():
-        found = score_predictions(task, runs, N_BOOTSTRAP)
-        present = np.unique(task.labels()[runs[0][0]])
-        chance[name] = 1 / present.size
+        record = runs[0][0]
+        chance[name] = 1 / n_different(task.labels()[record])
         scores.setdefault(name, {})[method] = {
-            **found,
-            "n_records": int(runs[0][0].size),
+            **score_predictions(task, runs, N_BOOTSTRAP),
+            "n_records": int(record.size),
             "n_seeds": len(runs),
-        }
-    frozen = benchmark_of(dataset)
-    benchmark = None
-    if frozen is not None:
-        differences = frozen.differences(dataset)
-        results = (
-            {}
-            if differences
-            else {name: frozen.results.get(name, {}) for name in scores}
-        )
-        benchmark = {
-            "name": frozen.name,
-            "differences": differences,
-            "results": results,
         }
     return {
         "data": str(dataset.folder),
         "scores": scores,
         "chance": chance,
-        "benchmark": benchmark,
+        "benchmark": _comparison(dataset, list(scores)),
     }
+
+
+def _comparison(dataset: Dataset, protocols: Sequence[str]) -> Entry | None:
+    """Frozen benchmark of a data set, with results only where nothing differs; None without."""
+    frozen = benchmark_of(dataset)
+    if frozen is None:
+        return None
+    differences = frozen.differences(dataset)
+    results: Entry = {}
+    if not differences:
+        results = {name: frozen.results.get(name, {}) for name in protocols}
+    return {"name": frozen.name, "differences": differences, "results": results}
 
 
 def _runs(
     task: Task, path: Path, protocol: str | None
 ) -> dict[tuple[str, str], list[Run]]:
-    """(protocol, method) -> for each seed the records of the test part, sorted, and their labels,
-    (record,) both.
-    """
-    number_of = {
-        str(name): index for index, name in enumerate(task.dataset.column("record_id"))
-    }
-    class_of = {name: index for index, name in enumerate(task.class_names)}
-    said: dict[tuple[str, str, str], dict[int, int]] = {}
-    for line, row in enumerate(_rows(path), start=2):
-        key = (
-            row.get("protocol") or protocol or "by_unit",
-            row.get("method") or path.stem,
-            row.get("seed") or "0",
-        )
-        if row["record_id"] not in number_of:
-            raise DatasetError(
-                f"{path} line {line}: the data set has no record {row['record_id']!r}"
-            )
-        if row["predicted"] not in class_of:
-            known = ", ".join(class_of)
-            raise ConfigError(
-                f"{path} line {line}: there is no class {row['predicted']!r}; there is {known}"
-            )
-        mine = said.setdefault(key, {})
-        record = number_of[row["record_id"]]
-        if record in mine:
-            raise DatasetError(
-                f"{path} line {line}: record {row['record_id']} twice for {', '.join(key)}"
-            )
-        mine[record] = class_of[row["predicted"]]
+    """(protocol, method) -> for each seed the records of the test part, and their labels."""
     runs: dict[tuple[str, str], list[Run]] = {}
-    for (name, method, seed), mine in said.items():
+    for (name, method, seed), labels in _labels(task, path, protocol).items():
         if is_leaky(name):
             continue
         expected = np.unique(subset_segments(task, name, "test").record)
-        missing, others = (
-            set(expected.tolist()) - set(mine),
-            set(mine) - set(expected.tolist()),
-        )
+        missing = set(expected.tolist()) - set(labels)
+        others = set(labels) - set(expected.tolist())
         if missing or others:
             raise DatasetError(
-                f"{path}: {method}, seed {seed} must name each of the {expected.size} test records of {name} once; "
-                f"{len(missing)} are missing, {len(others)} are not of the test part"
+                f"{path}: {method}, seed {seed} must name each of the {expected.size} test "
+                f"records of {name} once; {len(missing)} are missing, "
+                f"{len(others)} are not of the test part"
             )
-        runs.setdefault((name, method), []).append(
-            (expected, np.array([mine[record] for record in expected.tolist()]))
-        )
+        predicted = np.array([labels[record] for record in expected.tolist()])
+        runs.setdefault((name, method), []).append((expected, predicted))
     if not runs:
         raise ConfigError(
             f"{path} holds predictions of leaky protocols only: those are no results"
@@ -216,25 +166,59 @@ def _runs(
     return runs
 
 
+def _labels(
+    task: Task, path: Path, protocol: str | None
+) -> dict[tuple[str, str, str], dict[int, int]]:
+    """(protocol, method, seed) -> predicted label of each record that the file names."""
+    number_of = {
+        str(name): index for index, name in enumerate(task.dataset.column("record_id"))
+    }
+    class_of = {name: index for index, name in enumerate(task.class_names)}
+    found: dict[tuple[str, str, str], dict[int, int]] = {}
+    for line, row in enumerate(_rows(path), start=2):
+        key = (
+            row.get("protocol") or protocol or "by_unit",
+            row.get("method") or path.stem,
+            row.get("seed") or "0",
+        )
+        name, predicted, where = (
+            row["record_id"],
+            row["predicted"],
+            f"{path} line {line}",
+        )
+        if name not in number_of:
+            raise DatasetError(f"{where}: the data set has no record {name!r}")
+        if predicted not in class_of:
+            known = ", ".join(class_of)
+            raise ConfigError(
+                f"{where}: there is no class {predicted!r}; there is {known}"
+            )
+        labels = found.setdefault(key, {})
+        if number_of[name] in labels:
+            raise DatasetError(f"{where}: record {name} twice for {', '.join(key)}")
+        labels[number_of[name]] = class_of[predicted]
+    return found
+
+
 def _rows(path: Path) -> list[dict[str, str]]:
-    """Rows of the file; refuses one that is no CSV with the columns asked for."""
+    """Rows of the file; refuses one that is no CSV with the required columns."""
     if path.is_file() and path.stat().st_size > LARGEST_FILE:
+        size = path.stat().st_size
         raise DatasetError(
-            f"{path} has {path.stat().st_size} bytes, and at most {LARGEST_FILE} are read"
+            f"{path} has {size} bytes, and at most {LARGEST_FILE} are read"
         )
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             reader = csv.DictReader(file, strict=True)
-            missing = [
-                name for name in REQUIRED if name not in (reader.fieldnames or ())
-            ]
-            if missing:
-                raise DatasetError(
-                    f"{path} has no column {missing[0]}; it needs {' and '.join(REQUIRED)}"
-                )
+            names = reader.fieldnames or ()
             rows = list(reader)
     except (UnicodeDecodeError, csv.Error) as error:
         raise DatasetError(f"{path} is no CSV file in UTF-8: {error}") from None
+    for name in REQUIRED:
+        if name not in names:
+            raise DatasetError(
+                f"{path} has no column {name}; it needs {' and '.join(REQUIRED)}"
+            )
     if not rows:
         raise DatasetError(f"{path} has no rows")
     if any(None in row or None in row.values() for row in rows):
@@ -242,20 +226,16 @@ def _rows(path: Path) -> list[dict[str, str]]:
     return rows
 
 
-def score_table(result: Mapping[str, Any]) -> list[str]:
+def score_table(result: Content) -> list[str]:
     """Markdown table: a row for each protocol and method, those of the benchmark marked."""
     lines = ["| protocol | method | balanced accuracy | chance |", "|---|---|---|---|"]
-    shipped = {} if result["benchmark"] is None else result["benchmark"]["results"]
+    shipped = (result["benchmark"] or {"results": {}})["results"]
     for protocol, methods in result["scores"].items():
-        rows: Sequence[tuple[str, Any]] = [
-            *((name, score["balanced_accuracy"]) for name, score in methods.items()),
-            *(
-                (f"{name} (shipped)", score)
-                for name, score in shipped.get(protocol, {}).items()
-            ),
-        ]
-        for name, score in rows:
-            lines.append(
-                f"| {protocol} | {name} | {interval_text(score, '.3f')} | {result['chance'][protocol]:.3f} |"
-            )
+        rows = {name: score["balanced_accuracy"] for name, score in methods.items()}
+        for name, score in shipped.get(protocol, {}).items():
+            rows[f"{name} (shipped)"] = score
+        chance = f"{result['chance'][protocol]:.3f}"
+        for name, score in rows.items():
+            text = interval_text(score, ".3f")
+            lines.append(f"| {protocol} | {name} | {text} | {chance} |")
     return lines

@@ -1,4 +1,4 @@
-"""Which controls a study runs beside its methods, and what they add to the result of a protocol."""
+"""Controls that a study runs beside its methods, and their part in the result of a protocol."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from diagnose.data.windows import CROSS_SENSOR, Task
 from diagnose.scoring.metrics import balanced_accuracy, confusion_by_unit
 from diagnose.scoring.predictions import Prediction
 from diagnose.settings import BOTH, TrainSettings
+from diagnose.studies.counts import by_method, run_notes
 from diagnose.studies.jobs import LEVEL_KEPT, ORACLE, ORACLE_NETWORK, PROBE, SHAM, Job
+from diagnose.studies.result_files import Entry
 from diagnose.training import sham
 
 Pairs = Sequence[tuple[Any, Any]]
@@ -29,49 +31,52 @@ def control_jobs(
     ------
     ConfigError    for a sham data set that does not fit
     """
-    clean, first = tuple(clean), min(settings.seeds)
+    protocols = tuple(clean)
     shams: tuple[str, ...] = ()
     if settings.sham is not None:
-        shams = sham.sham_protocols(sham.sham_task(task, settings.sham), clean)
-    if not clean:
+        other = sham.sham_task(task, settings.sham)
+        shams = sham.sham_protocols(other, protocols)
+    if not protocols:
         return []
-    with_oracle = settings.oracle == "auto" and has_twin(task.dataset)
-    jobs = (
-        [Job(protocols=clean, seed=None, control=PROBE)]
-        if settings.metadata_probe
-        else []
-    )
-    # a twin of the same channels says nothing of channels never seen
-    known = tuple(name for name in clean if name != CROSS_SENSOR) if with_oracle else ()
-    if known:
-        jobs.append(Job(protocols=known, seed=None, control=ORACLE))
-    if shams and settings.baselines:
-        jobs.append(Job(protocols=shams, seed=None, control=SHAM))
+    with_oracle: tuple[str, ...] = ()
+    if settings.oracle == "auto" and has_twin(task.dataset):
+        # a twin of the same channels says nothing of channels never seen
+        with_oracle = tuple(name for name in protocols if name != CROSS_SENSOR)
+    fitted = {PROBE: protocols, ORACLE: with_oracle, SHAM: shams}
+    if not settings.metadata_probe:
+        fitted[PROBE] = ()
+    if not settings.baselines:
+        fitted[SHAM] = ()
+    jobs = [
+        Job(protocols=names, seed=None, control=control)
+        for control, names in fitted.items()
+        if names
+    ]
+    first = min(settings.seeds)
     few = range(first, first + settings.n_seeds_control)
-    for protocol in clean:
+    for protocol in protocols:
+        seeds: dict[str, Sequence[int]] = {}
         if settings.normalise == BOTH:
-            jobs += [
-                Job(protocols=(protocol,), seed=seed, control=LEVEL_KEPT)
-                for seed in settings.seeds
-            ]
-        if protocol in known:
-            jobs += [
-                Job(protocols=(protocol,), seed=seed, control=ORACLE) for seed in few
-            ]
+            seeds[LEVEL_KEPT] = settings.seeds
+        if protocol in with_oracle:
+            seeds[ORACLE] = few
         if protocol in shams:
-            jobs += [
-                Job(protocols=(protocol,), seed=seed, control=SHAM) for seed in few
-            ]
+            seeds[SHAM] = few
+        jobs += [
+            Job(protocols=(protocol,), seed=seed, control=control)
+            for control, of_control in seeds.items()
+            for seed in of_control
+        ]
     return jobs
 
 
 def without_sham(predictions: Sequence[Prediction]) -> list[Prediction]:
-    """Those on the data set itself."""
+    """Predictions on the data set itself."""
     return [prediction for prediction in predictions if not is_sham(prediction.method)]
 
 
 def is_sham(method: str) -> bool:
-    """Whether a method was trained on the sham data set."""
+    """True if a method was trained on the sham data set."""
     return method == sham.NETWORK or method.startswith(f"{sham.NETWORK}_")
 
 
@@ -79,29 +84,20 @@ def sham_methods(
     task: Task,
     settings: TrainSettings,
     predictions: Sequence[Prediction],
-    score: Callable[[Task, Pairs], dict[str, Any]],
-) -> dict[str, dict[str, Any]]:
-    """Protocol -> method -> scores of the trainings on the sham data set, as ``score`` makes them
-    of a task.
-    """
-    found: dict[str, dict[str, Any]] = {}
+    score: Callable[[Task, Pairs], Entry],
+) -> dict[str, Entry]:
+    """Protocol -> method -> scores, by ``score``, of the trainings on the sham data set."""
     if settings.sham is None:
-        return found
+        return {}
     other = sham.sham_task(task, settings.sham)
-    runs: dict[tuple[str, str], list[Prediction]] = {}
-    for prediction in predictions:
-        if is_sham(prediction.method):
-            runs.setdefault((prediction.protocol, prediction.method), []).append(
-                prediction
-            )
-    for (protocol, method), mine in runs.items():
-        scores = score(other, [(run.record, run.predicted) for run in mine])
-        told = {
-            "seeds": [run.seed for run in mine],
-            "detail": [run.detail for run in mine],
-        }
-        found.setdefault(protocol, {})[method] = {**scores, **told}
-    return found
+    on_sham = [run for run in predictions if is_sham(run.method)]
+    results: dict[str, Entry] = {}
+    for protocol in dict.fromkeys(run.protocol for run in on_sham):
+        results[protocol] = {}
+        for method, runs in by_method(on_sham, protocol).items():
+            scores = score(other, [(run.record, run.predicted) for run in runs])
+            results[protocol][method] = {**scores, **run_notes(runs)}
+    return results
 
 
 def chosen_oracle(task: Task, runs: Sequence[Prediction]) -> str | None:

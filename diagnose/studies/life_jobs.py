@@ -1,4 +1,4 @@
-"""The pieces of a study of remaining lives: baselines and networks of one protocol."""
+"""Jobs of a study of remaining lives: baselines and networks of one protocol."""
 
 from __future__ import annotations
 
@@ -33,29 +33,27 @@ from diagnose.networks.domain import Domain, fit_domain
 from diagnose.networks.registry import input_of
 from diagnose.scoring.life_scores import conformal_half_width
 from diagnose.settings import TrainSettings
+from diagnose.studies.counts import n_different
 from diagnose.studies.jobs import Job
+from diagnose.studies.result_files import network_name
 from diagnose.training.life_store import AGE, LifeFacts
 from diagnose.training.remaining_life import RemainingLife, shares_of_records
 from diagnose.training.train import train_network
 
 FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
-AGE_ONLY, CONSTANT, INDICATORS, AND_AGE = (
-    "age_only",
-    "constant",
-    "indicators",
-    "_and_age",
-)
+AGE_ONLY, CONSTANT, INDICATORS = "age_only", "constant", "indicators"
+AND_AGE = "_and_age"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LifePrediction:
-    """Test snapshots of a protocol with the answers of one method, trained with one seed.
+    """Remaining lives that one method, trained with one seed, predicts for test snapshots.
 
     Attributes
     ----------
-    record : (record,) place in the data set, sorted, each once
-    said : (record,) h remaining life, cut at the early level
+    record : (record,) index in the data set, sorted, each once
+    predicted : (record,) h remaining life, cut at the early level
     half_width : h, of the intervals; the early level where calibration lives are too few
     early_life : h
     detail : fit or training, in words
@@ -67,7 +65,7 @@ class LifePrediction:
     method: str
     seed: int
     record: IntArray
-    said: FloatArray
+    predicted: FloatArray
     half_width: float
     early_life: float
     detail: str
@@ -80,7 +78,7 @@ class LifePrediction:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LifeSets:
-    """Snapshots of a protocol, and the remaining life that is to be learnt of them.
+    """Snapshots of a protocol with the remaining lives to be learnt.
 
     Attributes
     ----------
@@ -111,16 +109,15 @@ class LifeSets:
         """Test snapshots with a method's shares of the level, (record,), of all records."""
         error = self.level * np.abs(share - self.share)[self.calibration]
         life = self.lives.name[self.calibration]
+        half_width = conformal_half_width(error, life, self.coverage)
         record = np.sort(self.parts["test"].record)
         return LifePrediction(
             protocol=self.protocol,
             method=method,
             seed=seed,
             record=record,
-            said=self.level * share[record],
-            half_width=min(
-                conformal_half_width(error, life, self.coverage), self.level
-            ),
+            predicted=self.level * share[record],
+            half_width=min(half_width, self.level),
             early_life=self.level,
             detail=detail,
         )
@@ -168,24 +165,26 @@ def _baselines(
     detail = f"{usual:.2f} of the early level for all"
     predictions = [sets.prediction(CONSTANT, detail, np.full(share.size, usual))]
     cache: Cache = {}
-    clock = {name: age_table(lives, part) for name, part in parts.items()}
-    heard = {
-        name: indicator_table(
-            task, lives, part, features=settings.features, cache=cache
-        )
+    features = settings.features
+    indicators = {
+        name: indicator_table(task, lives, part, features=features, cache=cache)
         for name, part in parts.items()
     }
-    tables: dict[str, dict[str, Table]] = {AGE_ONLY: clock, INDICATORS: heard}
+    tables: dict[str, dict[str, Table]] = {
+        AGE_ONLY: {name: age_table(lives, part) for name, part in parts.items()},
+        INDICATORS: indicators,
+    }
     if settings.remaining_life.with_age:
-        aged = {name: with_age(table, lives) for name, table in heard.items()}
-        tables[INDICATORS + AND_AGE] = aged
+        tables[INDICATORS + AND_AGE] = {
+            name: with_age(table, lives) for name, table in indicators.items()
+        }
     for method, table in tables.items():
         detail, predict = fit_regression(
             table["train"], table["validation"], lives, share
         )
         answer = np.full(share.size, np.nan)
-        for part in ("validation", "test"):
-            answer[table[part].record] = np.clip(predict(table[part]), 0.0, 1.0)
+        for subset in SUBSETS[1:]:
+            answer[table[subset].record] = np.clip(predict(table[subset]), 0.0, 1.0)
         predictions.append(sets.prediction(method, detail, answer))
     return predictions
 
@@ -201,11 +200,9 @@ def _networks(
         name: load(task, part, training=name == "train")
         for name, part in sets.parts.items()
     }
-    columns, values = (
-        operating_names(task),
-        operating_values(task, np.arange(sets.share.size)),
-    )
-    network = str(settings.model.get("name", "network"))
+    columns = operating_names(task)
+    values = operating_values(task, np.arange(sets.share.size))
+    network = network_name(settings)
     conditions = {network: (columns, values)}
     if settings.remaining_life.with_age:
         aged = np.concatenate([values, lives.age[:, None]], axis=1)
@@ -218,28 +215,26 @@ def _networks(
     seen = np.unique(windows["train"].record)
     predictions = []
     for method, (columns, values) in conditions.items():
-        target = RemainingLife(conditions=values, share=sets.share, weight=weight)
         training = train_network(
             windows["train"],
             windows["validation"],
-            target=target,
+            target=RemainingLife(conditions=values, share=sets.share, weight=weight),
             settings=settings,
             seed=seed,
         )
         answer = np.full(sets.share.size, np.nan)
-        for subset in ("validation", "test"):
+        for subset in SUBSETS[1:]:
             record, share = shares_of_records(training.model, windows[subset], values)
             answer[record] = share
         prediction = sets.prediction(method, training.detail, answer, seed)
-        predictions.append(
-            replace(
-                prediction,
-                facts=_facts(sets, prediction, columns, values[seen]),
-                weights=training.weights(),
-                domain=domain,
-                best_epoch=training.best_epoch,
-            )
+        prediction = replace(
+            prediction,
+            facts=_facts(sets, prediction, columns, values[seen]),
+            weights=training.weights(),
+            domain=domain,
+            best_epoch=training.best_epoch,
         )
+        predictions.append(prediction)
     return predictions
 
 
@@ -250,13 +245,13 @@ def _facts(
     values: FloatArray,
 ) -> LifeFacts:
     """Facts of a network whose training records have these values (record, column)."""
-    low, high = values.min(axis=0).tolist(), values.max(axis=0).tolist()
+    ends = zip(values.min(axis=0).tolist(), values.max(axis=0).tolist(), strict=True)
     return LifeFacts(
         method=prediction.method,
         early_life_h=sets.level,
         half_width_h=prediction.half_width,
         coverage=sets.coverage,
-        n_calibration_lives=int(np.unique(sets.lives.name[sets.calibration]).size),
+        n_calibration_lives=n_different(sets.lives.name[sets.calibration]),
         told=columns,
-        told_range=dict(zip(columns, zip(low, high, strict=True), strict=True)),
+        told_range=dict(zip(columns, ends, strict=True)),
     )

@@ -1,16 +1,11 @@
-"""A study of remaining lives.
-
-What each method says of each snapshot, and the numbers that come of it.
-"""
+"""A study of remaining lives: predictions of every method for each snapshot, and their scores."""
 
 from __future__ import annotations
 
-import csv
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,16 +27,13 @@ from diagnose.scoring.life_scores import (
     life_scores,
 )
 from diagnose.settings import BOTH, TrainSettings
+from diagnose.studies.counts import by_method, n_different, run_notes
 from diagnose.studies.jobs import Job, run_jobs
 from diagnose.studies.life_jobs import AGE_ONLY, LifePrediction, run_life_job
-from diagnose.studies.study import (
-    BOOTSTRAP_SEED,
-    METRICS_SCHEMA_VERSION,
-    check_network,
-    environment,
-    n_cores,
-)
-from diagnose.training.store import data_fingerprint, model_description, save_model
+from diagnose.studies.protocol_results import BOOTSTRAP_SEED
+from diagnose.studies.result_files import Entry, save_network, study_facts, write_rows
+from diagnose.studies.study import check_network
+from diagnose.workers import n_cores
 from gensig.errors import ConfigError
 
 FloatArray = NDArray[np.floating]
@@ -49,7 +41,7 @@ IntArray = NDArray[np.integer]
 
 
 def check_life_settings(settings: TrainSettings) -> None:
-    """Refuse what a study of remaining lives does not know, rather than ignore it.
+    """Refuse settings that a study of remaining lives would ignore.
 
     Raises
     ------
@@ -90,15 +82,12 @@ def plan_life_study(task: Task, settings: TrainSettings) -> LifePlan:
     """
     lives = lives_of(task)
     protocols, left_out = choose_life_protocols(task, lives, settings.protocols)
-    check_network(
-        task,
-        settings,
-        [
-            life_segments(task, lives, name, subset)
-            for name in protocols
-            for subset in SUBSETS
-        ],
-    )
+    parts = [
+        life_segments(task, lives, name, subset)
+        for name in protocols
+        for subset in SUBSETS
+    ]
+    check_network(task, settings, parts)
     seeds = (None, *settings.seeds)
     jobs = [Job(protocols=(name,), seed=seed) for name in protocols for seed in seeds]
     return LifePlan(protocols=protocols, left_out=left_out, jobs=jobs)
@@ -111,71 +100,62 @@ def run_life_study(
     plan: LifePlan,
     *,
     on_done: Callable[[str], None] = lambda line: None,
-) -> tuple[dict[str, Any], list[LifePrediction]]:
+) -> tuple[Entry, list[LifePrediction]]:
     """Content of ``metrics.json``, and the predictions.
 
     Parameters
     ----------
     folder : exists; receives ``predictions.csv`` and ``models/<protocol>-<method>-seed<k>``
-    on_done : is given one line for each finished piece
+    on_done : is given one line for each finished job
     """
     started = time.perf_counter()
-
-    def report(found: list[LifePrediction]) -> None:
-        on_done(
-            f"{found[-1].protocol}, {', '.join(one.method for one in found)}, seed {found[-1].seed}"
-        )
-
-    n_workers = settings.n_threads or n_cores()
     predictions: list[LifePrediction] = run_jobs(
         task,
         settings,
         plan.jobs,
-        n_workers=n_workers,
-        on_done=report,
+        n_workers=settings.n_threads or n_cores(),
+        on_done=lambda runs: on_done(_progress_line(runs)),
         run=run_life_job,
     )
     lives = lives_of(task)
-    for one in predictions:
-        if one.weights is not None and one.facts is not None:
-            target = folder / "models" / f"{one.protocol}-{one.method}-seed{one.seed}"
-            known = {} if one.domain is None else one.domain.tensors()
-            described = model_description(task, settings, one)
-            described = replace(described, remaining_life=asdict(one.facts))
-            save_model(target, one.weights | known, described)
+    for run in predictions:
+        if run.weights is not None and run.facts is not None:
+            tensors = dict(run.weights)
+            if run.domain is not None:
+                tensors |= run.domain.tensors()
+            name, facts = f"{run.protocol}-{run.method}", asdict(run.facts)
+            save_network(
+                folder, name, task, settings, run, tensors, remaining_life=facts
+            )
     write_life_predictions(folder / "predictions.csv", task, lives, predictions)
+    results = {
+        name: _result(task, settings, lives, name, predictions)
+        for name in plan.protocols
+    }
     metrics = {
-        "metrics_schema_version": METRICS_SCHEMA_VERSION,
+        **study_facts(task, settings),
         "task": settings.task,
-        "data": str(task.dataset.folder),
-        "data_fingerprint": data_fingerprint(task.dataset),
-        "n_records": int(task.dataset.n_records),
-        "sampling_rate_hz": float(task.dataset.sampling_rate),
-        "channel_names": list(task.channel_names),
-        "model": str(settings.model.get("name", "network")),
-        "settings": {**asdict(settings), "model": dict(settings.model)},
-        "protocols": {
-            name: _result(task, settings, lives, name, predictions)
-            for name in plan.protocols
-        },
+        "protocols": results,
         "protocols_left_out": plan.left_out,
         "duration_s": round(time.perf_counter() - started, 1),
-        "environment": environment(),
     }
     return metrics, predictions
 
 
-def scored_snapshots(lives: Lives, prediction: LifePrediction) -> Snapshots:
-    """The snapshots of lives that failed.
+def _progress_line(runs: Sequence[LifePrediction]) -> str:
+    """Line on a finished job."""
+    methods = ", ".join(run.method for run in runs)
+    return f"{runs[-1].protocol}, {methods}, seed {runs[-1].seed}"
 
-    How long a censored one would have run on is not known.
-    """
+
+def scored_snapshots(lives: Lives, prediction: LifePrediction) -> Snapshots:
+    """Snapshots of lives that failed; the remaining life of a censored one is not known."""
     chosen = lives.failed[prediction.record]
     record = prediction.record[chosen]
     return Snapshots(
         life=np.unique(lives.name[record], return_inverse=True)[1],
         true=np.minimum(lives.remaining[record], prediction.early_life),
-        said=prediction.said[chosen],
+        said=prediction.predicted[chosen],
         half_width=prediction.half_width,
         early_life=prediction.early_life,
     )
@@ -187,84 +167,78 @@ def _result(
     lives: Lives,
     protocol: str,
     predictions: Sequence[LifePrediction],
-) -> dict[str, Any]:
-    mine = [one for one in predictions if one.protocol == protocol]
-    runs = {
-        name: [one for one in mine if one.method == name]
-        for name in dict.fromkeys(one.method for one in mine)
-    }
+) -> Entry:
+    """Entry of a protocol in ``metrics.json``."""
+    runs = by_method(predictions, protocol)
     tables: dict[str, dict[str, FloatArray]] = {}
     for name, of_seeds in runs.items():
-        rows = [by_life(scored_snapshots(lives, one)) for one in of_seeds]
+        rows = [by_life(scored_snapshots(lives, run)) for run in of_seeds]
         tables[name] = {
             measure: np.stack([row[measure] for row in rows]) for measure in rows[0]
         }
+    n_bootstrap = settings.n_bootstrap
     methods = {}
     for name, of_seeds in runs.items():
         rng = np.random.default_rng(BOOTSTRAP_SEED)
+        scores = life_scores(tables[name], n_bootstrap=n_bootstrap, rng=rng)
+        scores["gain_over_age_only_h"] = gain(
+            tables[name]["rmse_h"],
+            tables[AGE_ONLY]["rmse_h"],
+            n_bootstrap=n_bootstrap,
+            rng=np.random.default_rng(BOOTSTRAP_SEED),
+        )
+        below = [below_bound(lives, run) for run in of_seeds]
         methods[name] = {
-            **life_scores(tables[name], n_bootstrap=settings.n_bootstrap, rng=rng),
-            "gain_over_age_only_h": gain(
-                tables[name]["rmse_h"],
-                tables[AGE_ONLY]["rmse_h"],
-                n_bootstrap=settings.n_bootstrap,
-                rng=np.random.default_rng(BOOTSTRAP_SEED),
-            ),
-            "half_width_h": [one.half_width for one in of_seeds],
-            "censored_below_bound": float(
-                np.mean([below_bound(lives, one) for one in of_seeds])
-            ),
-            "seeds": [one.seed for one in of_seeds],
-            "detail": [one.detail for one in of_seeds],
+            **scores,
+            "half_width_h": [run.half_width for run in of_seeds],
+            "censored_below_bound": float(np.mean(below)),
+            **run_notes(of_seeds),
         }
     parts = {
         subset: life_segments(task, lives, protocol, subset).record
         for subset in SUBSETS
     }
-    level = mine[0].early_life
-    n_calibration = np.unique(
-        lives.name[parts["validation"][lives.failed[parts["validation"]]]],
-    ).size
+    level = runs[AGE_ONLY][0].early_life
+    counts: dict[str, dict[str, int]] = {
+        "n_lives": {},
+        "n_lives_censored": {},
+        "n_records": {},
+        "n_records_unknown": {},
+    }
+    for subset, record in parts.items():
+        counts["n_lives"][subset] = count_lives(lives, record, failed=True)
+        counts["n_lives_censored"][subset] = count_lives(lives, record, failed=False)
+        counts["n_records"][subset] = int(record.size)
+        if subset != "test":
+            unknown = ~lives.known(level)[record]
+            counts["n_records_unknown"][subset] = int(unknown.sum())
+    coverage = settings.remaining_life.coverage
     return {
         "early_life_h": level,
         "phm_unit_h": level / UNITS,
-        "coverage_wanted": settings.remaining_life.coverage,
-        "intervals_hold": intervals_hold(
-            n_calibration, settings.remaining_life.coverage
-        ),
-        "n_lives": {
-            subset: count_lives(lives, record, failed=True)
-            for subset, record in parts.items()
-        },
-        "n_lives_censored": {
-            subset: count_lives(lives, record, failed=False)
-            for subset, record in parts.items()
-        },
-        "n_records": {subset: int(record.size) for subset, record in parts.items()},
-        "n_records_unknown": {
-            subset: int((~lives.known(level)[record]).sum())
-            for subset, record in parts.items()
-            if subset != "test"
-        },
+        "coverage_wanted": coverage,
+        "intervals_hold": intervals_hold(counts["n_lives"]["validation"], coverage),
+        **counts,
         "methods": methods,
     }
 
 
 def below_bound(lives: Lives, prediction: LifePrediction) -> float:
-    """Share of the censored test snapshots of which less is said than they have run on.
+    """Share of the censored test snapshots predicted below their known remaining life.
 
     0 where there are none.
     """
     censored = ~lives.failed[prediction.record]
-    bound = np.minimum(lives.remaining[prediction.record], prediction.early_life)[
-        censored
-    ]
-    return float(np.mean(prediction.said[censored] < bound)) if bound.size else 0.0
+    known = lives.remaining[prediction.record[censored]]
+    if not known.size:
+        return 0.0
+    bound = np.minimum(known, prediction.early_life)
+    return float(np.mean(prediction.predicted[censored] < bound))
 
 
 def count_lives(lives: Lives, record: IntArray, *, failed: bool) -> int:
     """Number of lives of records, of those that failed or of the others."""
-    return int(np.unique(lives.name[record[lives.failed[record] == failed]]).size)
+    return n_different(lives.name[record[lives.failed[record] == failed]])
 
 
 def write_life_predictions(
@@ -277,47 +251,29 @@ def write_life_predictions(
 
     ``scored`` is 0 for a censored life, whose remaining life is a lower bound.
     """
+    write_rows(path, _rows(task, lives, predictions))
+
+
+def _rows(
+    task: Task, lives: Lives, predictions: Sequence[LifePrediction]
+) -> Iterator[Entry]:
     ids = np.asarray(task.dataset.column("record_id"))
-    head = [
-        "protocol",
-        "method",
-        "seed",
-        "record_id",
-        "life_id",
-        "life_time_h",
-        "remaining_life_h",
-        "life_failed",
-    ]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(
-            [*head, "early_life_h", "predicted_h", "low_h", "high_h", "scored"]
-        )
-        for one in predictions:
-            low, high = interval(one.said, one.half_width, one.early_life)
-            for row, record in enumerate(one.record.tolist()):
-                failed = int(lives.failed[record])
-                writer.writerow(
-                    [
-                        one.protocol,
-                        one.method,
-                        one.seed,
-                        ids[record],
-                        lives.name[record],
-                    ]
-                    + [
-                        f"{lives.age[record]:.6g}",
-                        f"{lives.remaining[record]:.6g}",
-                        failed,
-                    ]
-                    + [
-                        f"{value:.6g}"
-                        for value in (
-                            one.early_life,
-                            one.said[row],
-                            low[row],
-                            high[row],
-                        )
-                    ]
-                    + [failed]
-                )
+    for run in predictions:
+        low, high = interval(run.predicted, run.half_width, run.early_life)
+        for row, record in enumerate(run.record.tolist()):
+            failed = int(lives.failed[record])
+            yield {
+                "protocol": run.protocol,
+                "method": run.method,
+                "seed": run.seed,
+                "record_id": ids[record],
+                "life_id": lives.name[record],
+                "life_time_h": f"{lives.age[record]:.6g}",
+                "remaining_life_h": f"{lives.remaining[record]:.6g}",
+                "life_failed": failed,
+                "early_life_h": f"{run.early_life:.6g}",
+                "predicted_h": f"{run.predicted[row]:.6g}",
+                "low_h": f"{low[row]:.6g}",
+                "high_h": f"{high[row]:.6g}",
+                "scored": failed,
+            }

@@ -1,15 +1,14 @@
-"""Scores of novelty, for protocols whose training lacks classes: the more, the less like what was
-trained on.
+"""Scores of novelty for protocols whose training lacks classes; larger is less like the training.
 
-``healthy_only`` knows healthy records alone and asks whether a fault is noticed. ``open_set``
-knows all classes but one and asks whether a network that tells them apart notices the one it was
-never shown.
+``healthy_only`` trains on healthy records alone and asks if a fault is noticed. ``open_set``
+trains on all classes but one and asks if a network that tells them apart notices the other one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import torch
@@ -26,6 +25,7 @@ from diagnose.networks.domain import (
     neighbor_distance,
 )
 from diagnose.scoring.metrics import over_records
+from diagnose.scoring.predictions import Rows
 from diagnose.settings import TrainSettings
 from diagnose.training.autoencoder import fit_autoencoder, reconstruction_error
 from diagnose.training.classes import Classes, predict_windows
@@ -33,8 +33,6 @@ from diagnose.training.train import train_network
 
 FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
-SCORED = SUBSETS[1:]
-WITH_LEVEL, WITHOUT_LEVEL = "indicators", "indicators_without_level"
 # Names of the scores in metrics.json, and their labels on the page.
 SCORE_LABELS = {
     "nearest_indicators": "5th neighbour, indicators",
@@ -51,8 +49,7 @@ SCORE_LABELS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NoveltyRun:
-    """Scores of the test records of a protocol by one method and seed, larger for what is less
-    like the training.
+    """Scores of novelty of the test records of a protocol, by one method and seed.
 
     Attributes
     ----------
@@ -71,11 +68,43 @@ class NoveltyRun:
     predicted: IntArray | None = None
 
 
+def _run(
+    protocol: str,
+    method: str,
+    detail: str,
+    score_of: Callable[[str], FloatArray],
+    rows: Mapping[str, WindowSet] | Mapping[str, FeatureTable] | Mapping[str, Rows],
+    *,
+    seed: int = 0,
+    predicted: IntArray | None = None,
+) -> NoveltyRun:
+    """Run of a method.
+
+    Parameters
+    ----------
+    score_of : (row,) scores of a subset
+    rows : subset -> windows, stretches or records; scores are averaged over each record
+    """
+    (record, score), (_, validation) = (
+        over_records(score_of(subset)[:, None], rows[subset].record)
+        for subset in ("test", "validation")
+    )
+    return NoveltyRun(
+        protocol=protocol,
+        method=method,
+        seed=seed,
+        detail=detail,
+        record=record,
+        score=score[:, 0],
+        validation_score=validation[:, 0],
+        predicted=predicted,
+    )
+
+
 def fitted_runs(
     task: Task, settings: TrainSettings, protocol: str, sets: Mapping[str, WindowSet]
 ) -> list[NoveltyRun]:
-    """Scores that need no training by steps: distance of band levels, and of healthy records
-    those of indicators.
+    """Scores that are fitted: distances of band levels, and for `healthy_only` of indicators.
 
     Parameters
     ----------
@@ -84,29 +113,39 @@ def fitted_runs(
     sets : windows of each subset
     """
     domain = fit_domain(sets["train"], sets["validation"])
-    scores = {
-        name: over_records(distances(domain, sets[name])[:, None], sets[name].record)
-        for name in SCORED
-    }
-    found = [_run(protocol, "nearest_band_levels", "distance of domain.py", scores)]
+    runs = [
+        _run(
+            protocol,
+            "nearest_band_levels",
+            "distance of domain.py",
+            lambda subset: distances(domain, sets[subset]),
+            sets,
+        )
+    ]
     if protocol != "healthy_only":
-        return found
+        return runs
     tables = {
         subset: feature_table(
             task, subset_segments(task, protocol, subset), features=settings.features
         )
         for subset in SUBSETS
     }
-    for suffix, with_level in ((WITH_LEVEL, True), (WITHOUT_LEVEL, False)):
-        found += _indicator_runs(protocol, tables, suffix, with_level)
-    return found
+    names = tables["train"].names
+    level = np.array([name.endswith("log_rms") for name in names])
+    runs += _indicator_runs(protocol, tables, "indicators", np.ones_like(level))
+    runs += _indicator_runs(protocol, tables, "indicators_without_level", ~level)
+    return runs
 
 
 def _indicator_runs(
-    protocol: str, tables: Mapping[str, FeatureTable], suffix: str, with_level: bool
+    protocol: str,
+    tables: Mapping[str, FeatureTable],
+    suffix: str,
+    chosen: NDArray[np.bool_],
 ) -> list[NoveltyRun]:
-    """Distance to the fifth nearest training record, and an isolation forest, on standardised
-    indicators.
+    """Distance to the fifth nearest training record, and an isolation forest.
+
+    Both on the chosen indicators, standardised.
 
     Source: Liu, Ting & Zhou (2008), "Isolation forest", ICDM; the distance as in
     `diagnose.networks.domain`.
@@ -118,30 +157,21 @@ def _indicator_runs(
 
     train = tables["train"]
     known = np.isfinite(train.values).any(axis=0)
-    level = np.array([name.endswith("log_rms") for name in train.names])
-    kept = np.flatnonzero(known & (with_level | ~level))
+    kept = np.flatnonzero(known & chosen)
     scaler = make_pipeline(SimpleImputer(), StandardScaler()).fit(train.values[:, kept])
     values = {
         subset: scaler.transform(table.values[:, kept])
         for subset, table in tables.items()
     }
     forest = IsolationForest(random_state=0).fit(values["train"])
-    near = {
-        subset: neighbor_distance(values[subset], values["train"]) for subset in SCORED
+    scores: dict[str, Callable[[str], FloatArray]] = {
+        "nearest": lambda subset: neighbor_distance(values[subset], values["train"]),
+        "forest": lambda subset: -forest.score_samples(values[subset]),
     }
-    rare = {subset: -forest.score_samples(values[subset]) for subset in SCORED}
     text = f"{kept.size} indicators of {len(train.label)} stretches"
     return [
-        _run(
-            protocol,
-            f"{name}_{suffix}",
-            text,
-            {
-                subset: over_records(score[:, None], tables[subset].record)
-                for subset, score in scores.items()
-            },
-        )
-        for name, scores in (("nearest", near), ("forest", rare))
+        _run(protocol, f"{name}_{suffix}", text, score_of, tables)
+        for name, score_of in scores.items()
     ]
 
 
@@ -157,15 +187,14 @@ def trained_runs(
     model = fit_autoencoder(
         sets["train"], sets["validation"], settings=settings, seed=seed
     )
-    scores = {
-        subset: over_records(
-            reconstruction_error(model, sets[subset])[:, None], sets[subset].record
-        )
-        for subset in SCORED
-    }
     return [
         _run(
-            protocol, "autoencoder", f"best epoch {model.best_epoch}", scores, seed=seed
+            protocol,
+            "autoencoder",
+            f"best epoch {model.best_epoch}",
+            lambda subset: reconstruction_error(model, sets[subset]),
+            sets,
+            seed=seed,
         )
     ]
 
@@ -187,7 +216,7 @@ def _classifier_runs(
     classes = np.unique(sets["train"].label)
     known = {
         name: replace(sets[name], label=np.searchsorted(classes, sets[name].label))
-        for name in SUBSETS[:2]
+        for name in ("train", "validation")
     }
     training = train_network(
         known["train"],
@@ -196,43 +225,42 @@ def _classifier_runs(
         settings=settings,
         seed=seed,
     )
-    rows = np.unique(
-        np.linspace(0, len(sets["train"]) - 1, min(len(sets["train"]), MOST_WINDOWS))
-        .round()
-        .astype(int)
+    model = training.model
+    n_train = len(sets["train"])
+    rows = np.linspace(0, n_train - 1, min(n_train, MOST_WINDOWS)).round().astype(int)
+    trained, _ = network_outputs(model, sets["train"], np.unique(rows))
+    outputs = {
+        subset: network_outputs(model, sets[subset], np.arange(len(sets[subset])))
+        for subset in ("validation", "test")
+    }
+    records = {subset: rows_of_records(model, sets[subset]) for subset in outputs}
+    predicted = classes[records["test"].log_probability.argmax(axis=1)]
+
+    def doubt(subset: str) -> FloatArray:
+        scores = records[subset].log_probability
+        return 1 - probabilities(scores, training.temperature).max(axis=1)
+
+    def energy(subset: str) -> FloatArray:
+        return -np.logaddexp.reduce(outputs[subset][1], axis=1)
+
+    def distance(subset: str) -> FloatArray:
+        features = _unit_length(outputs[subset][0])
+        return neighbor_distance(features, _unit_length(trained))
+
+    make = partial(
+        _run, protocol, detail=training.detail, seed=seed, predicted=predicted
     )
-    trained_features, _ = network_outputs(training.model, sets["train"], rows)
-    found: dict[str, dict[str, tuple[IntArray, FloatArray]]] = {}
-    for subset in SCORED:
-        windows = sets[subset]
-        record, log_probability = over_records(
-            predict_windows(training.model, windows), windows.record
-        )
-        largest = probabilities(log_probability, training.temperature).max(
-            axis=1, keepdims=True
-        )
-        features, logits = network_outputs(
-            training.model, windows, np.arange(len(windows))
-        )
-        energy = -np.logaddexp.reduce(logits, axis=1)
-        distance = neighbor_distance(
-            _unit_length(features), _unit_length(trained_features)
-        )
-        found.setdefault("largest_probability", {})[subset] = (record, 1 - largest)
-        found.setdefault("energy", {})[subset] = over_records(
-            energy[:, None], windows.record
-        )
-        found.setdefault("nearest_features", {})[subset] = over_records(
-            distance[:, None], windows.record
-        )
-    predicted = classes[log_probability.argmax(axis=1)]
     return [
-        replace(
-            _run(protocol, name, training.detail, found[name], seed=seed),
-            predicted=predicted,
-        )
-        for name in found
+        make("largest_probability", score_of=doubt, rows=records),
+        make("energy", score_of=energy, rows=sets),
+        make("nearest_features", score_of=distance, rows=sets),
     ]
+
+
+def rows_of_records(model: nn.Module, windows: WindowSet) -> Rows:
+    """Log-probabilities of the records of a set, means over their windows."""
+    record, scores = over_records(predict_windows(model, windows), windows.record)
+    return Rows(record=record, log_probability=scores)
 
 
 def network_outputs(
@@ -266,23 +294,3 @@ def network_outputs(
 def _unit_length(features: FloatArray) -> FloatArray:
     length = np.linalg.norm(features, axis=1, keepdims=True)
     return np.divide(features, length, out=np.zeros_like(features), where=length > 0)
-
-
-def _run(
-    protocol: str,
-    method: str,
-    detail: str,
-    scores: Mapping[str, tuple[IntArray, FloatArray]],
-    *,
-    seed: int = 0,
-) -> NoveltyRun:
-    record, score = scores["test"]
-    return NoveltyRun(
-        protocol=protocol,
-        method=method,
-        seed=seed,
-        detail=detail,
-        record=record,
-        score=score[:, 0],
-        validation_score=scores["validation"][1][:, 0],
-    )

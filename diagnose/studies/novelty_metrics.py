@@ -1,27 +1,28 @@
-"""How well a score tells what was never trained on from what was: AUROC, FPR95, alarms.
-
-Intervals over units.
-"""
+"""Scores of novelty: AUROC, FPR95 and alarms, with intervals over units."""
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.data.windows import SUBSETS, Task, subset_segments
-from diagnose.scoring.metrics import (
-    Score,
-    confusion_by_unit,
-    percentile_interval,
-    score_with_interval,
+from diagnose.data.windows import Task
+from diagnose.scoring.metrics import Score, percentile_interval, score_with_interval
+from diagnose.studies.counts import (
+    by_method,
+    confusion_counts,
+    n_different,
+    part_records,
+    part_sizes,
+    run_notes,
+    unit_ids,
 )
 from diagnose.studies.novelty import NoveltyRun
+from diagnose.studies.result_files import Entry, write_rows
 from gensig.errors import ConfigError
 
 FloatArray = NDArray[np.floating]
@@ -35,10 +36,10 @@ LEAST_VALIDATION = 19  # records: with fewer no threshold promises the share
 def alarm_threshold(validation_score: FloatArray) -> float:
     """Score that a new known record exceeds with a probability of at most `FALSE_ALARMS`.
 
-    Of n validation scores the one of rank (n + 1) (1 - share), rounded up, from below. Fewer than
+    The score of rank (n + 1) (1 - share), rounded up, of n validation scores. Fewer than
     `LEAST_VALIDATION` cannot promise the share: then it is the largest. Records of one unit
-    resemble each other, so that the promise is weaker than it reads; the share on test units says
-    what came of it.
+    resemble each other, so that the promise is weaker than it reads; the share on test units
+    shows the outcome.
 
     Source: Shafer & Vovk (2008), "A tutorial on conformal prediction", Journal of Machine
     Learning Research 9.
@@ -51,8 +52,7 @@ def alarm_threshold(validation_score: FloatArray) -> float:
 def false_positive_rate_95(
     novel: Mask, score: FloatArray, weight: FloatArray | None = None
 ) -> float:
-    """Share of the novel records taken for known by the threshold that takes `TRUE_POSITIVES` of
-    the known for known.
+    """Share of novel records called known, where `TRUE_POSITIVES` of the known are called known.
 
     Known is the positive class, as in Liu, Wang, Owens & Li (2020), "Energy-based
     out-of-distribution detection", NeurIPS, section 4.1.
@@ -62,33 +62,34 @@ def false_positive_rate_95(
     false_positives, true_positives, _ = roc_curve(
         ~novel, -score, sample_weight=weight, drop_intermediate=False
     )
-    return float(
-        false_positives[int(np.argmax(true_positives >= TRUE_POSITIVES - 1e-9))]
-    )
+    first = int(np.argmax(true_positives >= TRUE_POSITIVES - 1e-9))
+    return float(false_positives[first])
 
 
 def check_open_protocol(task: Task, protocol: str) -> None:
-    """Refuse a protocol whose test has nothing new, or nothing known, or where there are no two
-    classes to tell apart.
+    """Refuse a protocol without new or known classes in its test, or with one known class only.
 
     Raises
     ------
     ConfigError    with the classes that it has
     """
     labels = task.labels()
-    trained, _, tested = (
-        set(labels[subset_segments(task, protocol, subset).record].tolist())
-        for subset in SUBSETS
+    parts = part_records(task, protocol)
+    trained, tested = (
+        np.unique(labels[parts["train"]]),
+        np.unique(labels[parts["test"]]),
     )
     known, shown = (
-        ", ".join(task.class_names[index] for index in sorted(found))
-        for found in (trained, tested)
+        ", ".join(task.class_names[index] for index in classes)
+        for classes in (trained, tested)
     )
-    if not tested - trained or not tested & trained:
+    is_known = np.isin(tested, trained)
+    if is_known.all() or not is_known.any():
         raise ConfigError(
-            f"protocol {protocol}: it trains on {known} and tests on {shown}; it needs known and new ones"
+            f"protocol {protocol}: it trains on {known} and tests on {shown}; "
+            "it needs known and new ones"
         )
-    if protocol == "open_set" and len(trained) < 2:
+    if protocol == "open_set" and trained.size < 2:
         raise ConfigError(
             f"protocol {protocol}: one known class only ({known}): nothing to tell apart"
         )
@@ -101,7 +102,7 @@ def novelty_protocol_result(
     *,
     n_bootstrap: int,
     seed: int,
-) -> dict[str, Any]:
+) -> Entry:
     """Entry of an open protocol in ``metrics.json``; every method is judged on the same resamples.
 
     Parameters
@@ -110,46 +111,28 @@ def novelty_protocol_result(
     runs : of all protocols
     seed : of the resamples
     """
-    labels, unit = task.labels(), np.asarray(task.dataset.column("unit_id"))
-    parts = {
-        subset: np.unique(subset_segments(task, protocol, subset).record)
-        for subset in SUBSETS
-    }
+    labels = task.labels()
+    parts = part_records(task, protocol)
     known = np.unique(labels[parts["train"]])
-    by_method: dict[str, list[NoveltyRun]] = {}
-    for run in runs:
-        if run.protocol == protocol:
-            by_method.setdefault(run.method, []).append(run)
-    result: dict[str, Any] = {
+    novel = np.setdiff1d(labels[parts["test"]], known)
+    methods = by_method(runs, protocol)
+    result: Entry = {
         "known_classes": [task.class_names[index] for index in known],
-        "novel_classes": [
-            task.class_names[index]
-            for index in np.setdiff1d(labels[parts["test"]], known)
-        ],
-        "n_records": {subset: int(record.size) for subset, record in parts.items()},
-        "n_units": {
-            subset: int(np.unique(unit[record]).size)
-            for subset, record in parts.items()
-        },
+        "novel_classes": [task.class_names[index] for index in novel],
+        **part_sizes(task, parts),
         "false_alarms_wanted": FALSE_ALARMS,
-        "methods": {
-            name: novelty_result(
-                task,
-                of_method,
-                known.tolist(),
-                n_bootstrap,
-                np.random.default_rng(seed),
-            )
-            for name, of_method in by_method.items()
-        },
+        "methods": {},
     }
-    networks = next(
-        (found for found in by_method.values() if found[0].predicted is not None), None
-    )
-    if networks is not None:
-        result["known"] = _accuracy_on_known(
-            task, networks, known, n_bootstrap, np.random.default_rng(seed)
+    for name, mine in methods.items():
+        rng = np.random.default_rng(seed)
+        result["methods"][name] = novelty_result(
+            task, mine, known.tolist(), n_bootstrap, rng
         )
+    for mine in methods.values():
+        if mine[0].predicted is not None:
+            rng = np.random.default_rng(seed)
+            result["known"] = _accuracy_on_known(task, mine, known, n_bootstrap, rng)
+            break
     return result
 
 
@@ -159,69 +142,72 @@ def _accuracy_on_known(
     known: IntArray,
     n_bootstrap: int,
     rng: np.random.Generator,
-) -> dict[str, Any]:
-    """Balanced accuracy over the test records of known classes, every one of them given a known
-    class.
-    """
+) -> Entry:
+    """Balanced accuracy over the test records of known classes."""
     record = runs[0].record
     mine = np.isin(task.labels()[record], known)
-    label, unit = (
-        task.labels()[record][mine],
-        np.asarray(task.dataset.column("unit_id"))[record][mine],
-    )
-    predicted = [run.predicted[mine] for run in runs if run.predicted is not None]
-    confusion = np.stack(
-        [
-            confusion_by_unit(label, given, unit, len(task.class_names))
-            for given in predicted
-        ]
-    )
+    record = record[mine]
+    pairs = [(record, run.predicted[mine]) for run in runs if run.predicted is not None]
+    confusion = confusion_counts(task, pairs)
     score = score_with_interval(
         "balanced_accuracy", confusion, n_bootstrap=n_bootstrap, rng=rng
     )
-    return {"balanced_accuracy": asdict(score), "chance": 1 / np.unique(label).size}
+    chance = 1 / n_different(task.labels()[record])
+    return {"balanced_accuracy": asdict(score), "chance": chance}
 
 
 def write_novelty(path: Path, task: Task, runs: Sequence[NoveltyRun]) -> None:
-    """Write one row a score.
+    """Write one row a score."""
+    write_rows(path, _rows(task, runs))
 
-    Protocol, method, seed, record, its class and unit, the score and the threshold.
+
+def _rows(task: Task, runs: Sequence[NoveltyRun]) -> Iterator[Entry]:
+    labels, unit = task.labels(), unit_ids(task)
+    ids = np.asarray(task.dataset.column("record_id"))
+    for run in runs:
+        threshold = f"{alarm_threshold(run.validation_score):.9g}"
+        for record, score in zip(run.record, run.score, strict=True):
+            yield {
+                "protocol": run.protocol,
+                "method": run.method,
+                "seed": run.seed,
+                "record_id": ids[record],
+                "unit_id": unit[record],
+                "label": task.class_names[labels[record]],
+                "score": f"{score:.9g}",
+                "threshold": threshold,
+            }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Resamples:
+    """Units and seeds drawn with replacement.
+
+    Attributes
+    ----------
+    unit : (record,) index of the unit of each test record
+    drawn : (resample, unit) how often a resample holds each unit
+    seeds : (resample, draw) seeds
     """
-    labels = task.labels()
-    columns = [
-        np.asarray(task.dataset.column(name)) for name in ("record_id", "unit_id")
-    ]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(
-            [
-                "protocol",
-                "method",
-                "seed",
-                "record_id",
-                "unit_id",
-                "label",
-                "score",
-                "threshold",
-            ]
-        )
-        for run in runs:
-            threshold = f"{alarm_threshold(run.validation_score):.9g}"
-            for record, score in zip(run.record, run.score, strict=True):
-                truth = [
-                    *(column[record] for column in columns),
-                    task.class_names[labels[record]],
-                ]
-                writer.writerow(
-                    [
-                        run.protocol,
-                        run.method,
-                        run.seed,
-                        *truth,
-                        f"{score:.9g}",
-                        threshold,
-                    ]
-                )
+
+    unit: IntArray
+    drawn: IntArray
+    seeds: IntArray
+
+    @property
+    def n_units(self) -> int:
+        return int(self.drawn.shape[1])
+
+    def count(self, chosen: Mask, weights: FloatArray | Mask | None = None) -> Any:
+        """(unit,) number, or sum of the weights, of chosen records."""
+        return np.bincount(self.unit[chosen], weights=weights, minlength=self.n_units)
+
+    def score(self, per_seed: Sequence[float], resampled: FloatArray) -> Entry:
+        """Mean and percentile interval of (resample, seed) values over drawn seeds."""
+        means = np.take_along_axis(resampled, self.seeds, axis=1).mean(axis=1)
+        low, high = percentile_interval(means, self.n_units)
+        mean = float(np.mean(per_seed))
+        return asdict(Score(mean=mean, low=low, high=high, per_seed=tuple(per_seed)))
 
 
 def novelty_result(
@@ -230,8 +216,8 @@ def novelty_result(
     known: Sequence[int],
     n_bootstrap: int,
     rng: np.random.Generator,
-) -> dict[str, Any]:
-    """One method on one protocol, each figure with its interval by bootstrap over units and seeds.
+) -> Entry:
+    """Scores of one method on one protocol, with intervals by bootstrap over units and seeds.
 
     Parameters
     ----------
@@ -243,148 +229,99 @@ def novelty_result(
 
     Returns
     -------
-    plain dictionary: ``auroc`` of novel against known records, ``auroc_by_class`` of each novel class against all
-    known ones, ``auroc_by_known_class`` of all novel ones against each known class, ``false_alarms`` (share of known
-    records above the threshold), ``found`` (share of each novel class above it), ``threshold`` a seed, and of networks
-    that tell classes apart ``fpr95``
+    plain dictionary:
+        ``auroc`` of novel against known records;
+        ``auroc_by_class`` of each novel class against all known ones;
+        ``auroc_by_known_class`` of all novel ones against each known class;
+        ``false_alarms``, share of known records above the threshold;
+        ``found``, share of each novel class above it;
+        ``threshold`` a seed; and of networks that tell classes apart ``fpr95``
     """
     record = runs[0].record
     label = task.labels()[record]
-    unit = np.unique(
-        np.asarray(task.dataset.column("unit_id"))[record], return_inverse=True
-    )[1]
+    unit = np.unique(unit_ids(task)[record], return_inverse=True)[1]
     n_units = int(unit.max()) + 1
     drawn = rng.multinomial(n_units, np.full(n_units, 1 / n_units), size=n_bootstrap)
     seeds = rng.integers(len(runs), size=(n_bootstrap, len(runs)))
+    resamples = _Resamples(unit=unit, drawn=drawn, seeds=seeds)
     novel = ~np.isin(label, known)
     scores = np.stack([run.score for run in runs])
     threshold = np.array([alarm_threshold(run.validation_score) for run in runs])
     alarm = scores > threshold[:, None]
-    trained = [(index, task.class_names[index]) for index in np.unique(label[~novel])]
-    classes = [
-        (task.class_names[index], label == index) for index in np.unique(label[novel])
-    ]
+    of_class = {task.class_names[index]: label == index for index in np.unique(label)}
+    new = {name: mine for name, mine in of_class.items() if novel[mine].any()}
+    trained = {name: mine for name, mine in of_class.items() if name not in new}
 
-    def area(chosen: Mask) -> dict[str, Any]:
-        return asdict(
-            _area(scores[:, chosen], novel[chosen], unit[chosen], drawn, seeds)
-        )
+    def area(chosen: Mask) -> Entry:
+        return _area(scores, novel & chosen, ~novel & chosen, resamples)
 
     result = {
         "auroc": area(np.ones_like(novel)),
-        "auroc_by_class": {name: area(chosen | ~novel) for name, chosen in classes},
+        "auroc_by_class": {name: area(mine | ~novel) for name, mine in new.items()},
         "auroc_by_known_class": {
-            name: area((label == index) | novel) for index, name in trained
+            name: area(mine | novel) for name, mine in trained.items()
         },
-        "false_alarms": asdict(_share(alarm, ~novel, unit, drawn, seeds)),
-        "found": {
-            name: asdict(_share(alarm, chosen, unit, drawn, seeds))
-            for name, chosen in classes
-        },
+        "false_alarms": _share(alarm, ~novel, resamples),
+        "found": {name: _share(alarm, mine, resamples) for name, mine in new.items()},
         "threshold": threshold.tolist(),
         "n_validation_records": int(runs[0].validation_score.size),
-        "seeds": [run.seed for run in runs],
-        "detail": [run.detail for run in runs],
+        **run_notes(runs),
     }
     if runs[0].predicted is not None:
-        result["fpr95"] = asdict(_false_positives(scores, novel, unit, drawn, seeds))
+        result["fpr95"] = _false_positives(scores, novel, resamples)
     return result
 
 
-def _area(
-    scores: FloatArray, novel: Mask, unit: IntArray, drawn: IntArray, seeds: IntArray
-) -> Score:
-    """Area under the ROC curve of (seed, record) scores.
+def _area(scores: FloatArray, novel: Mask, known: Mask, resamples: _Resamples) -> Entry:
+    """Area under the ROC curve of (seed, record) scores, of novel against known records.
 
-    Resamples from the won comparisons of each pair of units.
+    A resample weighs the comparisons of each pair of units.
     """
     from sklearn.metrics import roc_auc_score
 
-    won = np.stack(
-        [_won_by_units(score, novel, unit, drawn.shape[1]) for score in scores]
-    )
-    pairs = drawn @ np.bincount(unit[novel], minlength=drawn.shape[1])
-    pairs = pairs * (drawn @ np.bincount(unit[~novel], minlength=drawn.shape[1]))
+    drawn, chosen = resamples.drawn, novel | known
+    won = np.stack([_won_by_units(score, novel, known, resamples) for score in scores])
+    pairs = (drawn @ resamples.count(novel)) * (drawn @ resamples.count(known))
     total = np.einsum("bu,suv,bv->bs", drawn, won, drawn, optimize=True)
-    resampled = np.divide(
-        total,
-        pairs[:, None],
-        out=np.full(total.shape, np.nan),
-        where=pairs[:, None] > 0,
-    )
-    return _score(
-        [float(roc_auc_score(novel, score)) for score in scores],
-        resampled,
-        seeds,
-        drawn.shape[1],
-    )
+    per_seed = [float(roc_auc_score(novel[chosen], score[chosen])) for score in scores]
+    return resamples.score(per_seed, _ratio(total, pairs))
+
+
+def _ratio(total: FloatArray, count: NDArray[Any]) -> FloatArray:
+    """(resample, seed) share of a total in a count (resample,); NaN where the count is 0."""
+    nothing = np.full(total.shape, np.nan)
+    return np.divide(total, count[:, None], out=nothing, where=count[:, None] > 0)
 
 
 def _won_by_units(
-    score: FloatArray, novel: Mask, unit: IntArray, n_units: int
+    score: FloatArray, novel: Mask, known: Mask, resamples: _Resamples
 ) -> FloatArray:
-    """(unit of novel, unit of known) pairs of records in which the novel one has the larger
-    score, equal ones half.
+    """(unit of novel, unit of known) record pairs in which the novel score is larger.
+
+    Equal scores count half.
     """
-    won = np.zeros((n_units, n_units))
-    for other in np.unique(unit[~novel]):
-        known = np.sort(score[~novel & (unit == other)])
-        below = np.searchsorted(known, score[novel], "left") + np.searchsorted(
-            known, score[novel], "right"
-        )
-        won[:, other] = np.bincount(unit[novel], weights=below / 2, minlength=n_units)
+    won = np.zeros((resamples.n_units, resamples.n_units))
+    for other in np.unique(resamples.unit[known]):
+        sound = np.sort(score[known & (resamples.unit == other)])
+        below = np.searchsorted(sound, score[novel], "left")
+        below = below + np.searchsorted(sound, score[novel], "right")
+        won[:, other] = resamples.count(novel, below / 2)
     return won
 
 
-def _share(
-    alarm: Mask, chosen: Mask, unit: IntArray, drawn: IntArray, seeds: IntArray
-) -> Score:
+def _share(alarm: Mask, chosen: Mask, resamples: _Resamples) -> Entry:
     """Share of the chosen records with an alarm (seed, record)."""
-    n_units = drawn.shape[1]
-    hits = np.stack(
-        [
-            np.bincount(unit[chosen], weights=row[chosen], minlength=n_units)
-            for row in alarm
-        ]
-    )
-    total = drawn @ np.bincount(unit[chosen], minlength=n_units)
-    raised = drawn @ hits.T
-    resampled = np.divide(
-        raised,
-        total[:, None],
-        out=np.full(raised.shape, np.nan),
-        where=total[:, None] > 0,
-    )
-    return _score(
-        [float(row[chosen].mean()) for row in alarm], resampled, seeds, drawn.shape[1]
-    )
+    hits = np.stack([resamples.count(chosen, row[chosen]) for row in alarm])
+    total = resamples.drawn @ resamples.count(chosen)
+    per_seed = [float(row[chosen].mean()) for row in alarm]
+    return resamples.score(per_seed, _ratio(resamples.drawn @ hits.T, total))
 
 
-def _false_positives(
-    scores: FloatArray, novel: Mask, unit: IntArray, drawn: IntArray, seeds: IntArray
-) -> Score:
-    def resample(weight: FloatArray) -> list[float]:
-        whole = weight[novel].any() and weight[~novel].any()
-        return [
-            false_positive_rate_95(novel, score, weight) if whole else np.nan
-            for score in scores
-        ]
-
-    resampled = np.array([resample(times[unit].astype(float)) for times in drawn])
-    return _score(
-        [false_positive_rate_95(novel, score) for score in scores],
-        resampled,
-        seeds,
-        drawn.shape[1],
-    )
-
-
-def _score(
-    per_seed: list[float], resampled: FloatArray, seeds: IntArray, n_units: int
-) -> Score:
-    """Percentile interval of (resample, seed) values over drawn seeds."""
-    means = np.take_along_axis(resampled, seeds, axis=1).mean(axis=1)
-    low, high = percentile_interval(means, n_units)
-    return Score(
-        mean=float(np.mean(per_seed)), low=low, high=high, per_seed=tuple(per_seed)
-    )
+def _false_positives(scores: FloatArray, novel: Mask, resamples: _Resamples) -> Entry:
+    resampled = np.full((len(resamples.drawn), len(scores)), np.nan)
+    for row, times in zip(resampled, resamples.drawn, strict=True):
+        weight = times[resamples.unit].astype(float)
+        if weight[novel].any() and weight[~novel].any():
+            row[:] = [false_positive_rate_95(novel, score, weight) for score in scores]
+    per_seed = [false_positive_rate_95(novel, score) for score in scores]
+    return resamples.score(per_seed, resampled)

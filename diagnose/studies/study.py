@@ -1,19 +1,15 @@
-"""A whole study: every protocol, seed, control and baseline, and the numbers that come of them."""
+"""A study that tells classes apart: every protocol, seed, control and baseline, with its scores."""
 
 from __future__ import annotations
 
 import functools
-import os
-import platform
-import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnose.data.at_rate import at_rate
 from diagnose.data.protocols import OPEN_PROTOCOLS, channels_to_cross, choose_protocols
@@ -27,7 +23,6 @@ from diagnose.data.windows import (
     subset_segments,
     task_of,
 )
-from diagnose.networks.calibration import calibration_scores
 from diagnose.networks.registry import (
     build_model,
     check_window,
@@ -35,50 +30,32 @@ from diagnose.networks.registry import (
     has_window_length,
     input_of,
 )
-from diagnose.scoring.metrics import (
-    SCORES,
-    confusion_by_unit,
-    ratio_with_interval,
-    recall,
-    score_with_interval,
-)
 from diagnose.scoring.predictions import Prediction, write_predictions
 from diagnose.settings import BOTH, TrainSettings
-from diagnose.studies.answers import protocol_answers
-from diagnose.studies.controls import (
-    chosen_oracle,
-    control_jobs,
-    sham_methods,
-    without_sham,
-)
-from diagnose.studies.jobs import LABEL_SHUFFLE, ORACLE, Job, Outcome, run_jobs
+from diagnose.studies.controls import control_jobs, sham_methods, without_sham
+from diagnose.studies.jobs import Job, Outcome, run_jobs
 from diagnose.studies.novelty import NoveltyRun
 from diagnose.studies.novelty_metrics import (
     check_open_protocol,
     novelty_protocol_result,
     write_novelty,
 )
+from diagnose.studies.protocol_results import (
+    BOOTSTRAP_SEED,
+    is_leaky,
+    protocol_result,
+    score_predictions,
+    test_score,
+)
+from diagnose.studies.result_files import Entry, network_name, save_network, study_facts
 from diagnose.training.autoencoder import check_window_for_autoencoder
-from diagnose.training.heads import head_scores
-from diagnose.training.store import data_fingerprint, model_description, save_model
 from diagnose.training.tensorboard import need_tensorboard, write_scores
 from diagnose.training.train import device_of
+from diagnose.workers import n_cores
 from gensig.errors import ConfigError
-from gensig.version import __version__
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
-
-METRICS_SCHEMA_VERSION = 1
-BOOTSTRAP_SEED = 20240607
-
-
-def is_leaky(protocol: str) -> bool:
-    """Whether a protocol has the same record on both sides.
-
-    Such a score is no measure of diagnosis.
-    """
-    return "leaky" in protocol
 
 
 def plan_study(
@@ -88,52 +65,60 @@ def plan_study(
 
     Raises
     ------
-    ConfigError    for a protocol that does not exist or cannot be trained on, a device that does not exist, an empty
-        subset or a window that does not fit
+    ConfigError    for a protocol that does not exist or cannot be trained on, a device that does
+        not exist, an empty subset or a window that does not fit
     """
     wanted, _ = choose_protocols(task, settings.protocols)
-    protocols = tuple(
-        sorted(wanted, key=lambda name: (is_leaky(name), wanted.index(name)))
-    )
-    labels = task.labels()
+    protocols = tuple(sorted(wanted, key=is_leaky))
     parts: list[Segments] = []
     for protocol in protocols:
-        for subset in SUBSETS:
-            segments = subset_segments(task, protocol, subset)
-            parts.append(segments)
-            present = np.unique(labels[segments.record])
-            if (
-                protocol not in OPEN_PROTOCOLS
-                and subset != "validation"
-                and present.size < 2
-            ):
-                name = task.class_names[int(present[0])]
-                raise ConfigError(
-                    f"protocol {protocol}: one class only in its {subset} part ({name})"
-                )
-        if protocol in OPEN_PROTOCOLS:
-            check_open_protocol(task, protocol)
+        parts += _checked_parts(task, protocol)
     if "healthy_only" in protocols:
         check_window_for_autoencoder(task.window_samples)
     check_network(task, settings, parts)
     if settings.tensorboard:
         need_tensorboard()
     closed = tuple(name for name in protocols if name not in OPEN_PROTOCOLS)
-    jobs = [Job(protocols=closed, seed=None)] if settings.baselines and closed else []
+    jobs: list[Job] = []
+    if settings.baselines and closed:
+        jobs.append(Job(protocols=closed, seed=None))
     for protocol in protocols:
-        jobs += (
-            [Job(protocols=(protocol,), seed=None)] if protocol not in closed else []
-        )
-        jobs += [Job(protocols=(protocol,), seed=seed) for seed in settings.seeds]
-        if settings.shuffle_control and protocol in closed:
-            first = min(settings.seeds)
-            jobs += [
-                Job(protocols=(protocol,), seed=first + k, shuffled=True)
-                for k in range(settings.n_seeds_control)
-            ]
-    return protocols, jobs + control_jobs(
-        task, settings, [name for name in closed if not is_leaky(name)]
-    )
+        jobs += _jobs_of(settings, protocol)
+    clean = [name for name in closed if not is_leaky(name)]
+    return protocols, jobs + control_jobs(task, settings, clean)
+
+
+def _checked_parts(task: Task, protocol: str) -> list[Segments]:
+    """Stretches of every subset of a protocol; refuses one that cannot be judged."""
+    labels = task.labels()
+    parts = []
+    for subset in SUBSETS:
+        segments = subset_segments(task, protocol, subset)
+        parts.append(segments)
+        if protocol in OPEN_PROTOCOLS or subset == "validation":
+            continue
+        present = np.unique(labels[segments.record])
+        if present.size < 2:
+            name = task.class_names[int(present[0])]
+            raise ConfigError(
+                f"protocol {protocol}: one class only in its {subset} part ({name})"
+            )
+    if protocol in OPEN_PROTOCOLS:
+        check_open_protocol(task, protocol)
+    return parts
+
+
+def _jobs_of(settings: TrainSettings, protocol: str) -> list[Job]:
+    """Trainings on a protocol, and the fitted scores of an open one."""
+    seeds: tuple[int | None, ...] = settings.seeds
+    if protocol in OPEN_PROTOCOLS:
+        return [Job(protocols=(protocol,), seed=seed) for seed in (None, *seeds)]
+    jobs = [Job(protocols=(protocol,), seed=seed) for seed in seeds]
+    if settings.shuffle_control:
+        first = min(settings.seeds)
+        for seed in range(first, first + settings.n_seeds_control):
+            jobs.append(Job(protocols=(protocol,), seed=seed, shuffled=True))
+    return jobs
 
 
 def check_network(
@@ -149,9 +134,9 @@ def check_network(
     model = build_model(
         settings.model, n_channels=n_channels, n_classes=len(task.class_names)
     )
-    inputs, name = input_of(settings.model), str(settings.model.get("name", "network"))
+    inputs = input_of(settings.model)
     for segments in parts:
-        inputs.check(task, segments, name)
+        inputs.check(task, segments, network_name(settings))
     check_window(model, n_channels, inputs.n_points(task.window_samples))
     device_of(settings.device)
 
@@ -161,11 +146,14 @@ def task_from(dataset: Any, settings: TrainSettings) -> Task:
     check_names("normalisation", (settings.normalise,), (*NORMALISATIONS, BOTH))
     dataset = at_rate(dataset, settings.sampling_rate_hz)
     window = settings.window_samples or chosen_window(dataset)[0]
+    normalise = settings.normalise
+    if normalise == BOTH:
+        normalise = "rms"
     task = task_of(
         dataset,
         window_samples=window,
         stride_samples=settings.stride_samples or window,
-        normalise="rms" if settings.normalise == BOTH else settings.normalise,
+        normalise=normalise,
         classes=settings.classes,
         channels=settings.channels,
         one_class=settings.task == "remaining_life",
@@ -189,11 +177,10 @@ def window_note(dataset: Dataset, settings: TrainSettings) -> str | None:
 
 
 def settings_for(dataset: Any, settings: TrainSettings) -> TrainSettings:
-    """The settings with what an open data set decides: the window, and what turns need."""
-    window = (
-        settings.window_samples
-        or chosen_window(at_rate(dataset, settings.sampling_rate_hz))[0]
-    )
+    """Settings with what an open data set decides: the window, and inputs of the network."""
+    window = settings.window_samples
+    if not window:
+        window = chosen_window(at_rate(dataset, settings.sampling_rate_hz))[0]
     return replace(
         settings,
         model=completed(settings.model, dataset.attributes, settings.heads),
@@ -210,284 +197,82 @@ def run_study(
     protocols: Sequence[str],
     jobs: Sequence[Job],
     on_done: Callable[[str], None] = lambda line: None,
-) -> dict[str, Any]:
-    """Run the jobs, write the models below `folder` and return what goes into ``metrics.json``.
+) -> Entry:
+    """Run the jobs, write the models below `folder` and return the content of ``metrics.json``.
 
     Parameters
     ----------
-    task, settings : what to learn and how
+    task, settings : of the study
     folder : exists; receives ``models/<protocol>-seed<k>`` and ``predictions.csv``
     protocols, jobs : of `plan_study`
-    on_done : told one line for each finished piece
+    on_done : is given one line for each finished job
     """
     started = time.perf_counter()
-
-    def report(predictions: list[Outcome]) -> None:
-        last = predictions[-1]
-        if isinstance(last, NoveltyRun) or last.best_epoch:
-            on_done(f"{last.protocol}, {last.method}, seed {last.seed}: {last.detail}")
-        else:
-            on_done(", ".join(dict.fromkeys(one.method for one in predictions)))
-
-    n_workers = settings.n_threads or n_cores()
-    outcomes = run_jobs(task, settings, jobs, n_workers=n_workers, on_done=report)
-    predictions = [outcome for outcome in outcomes if isinstance(outcome, Prediction)]
-    novelty = [outcome for outcome in outcomes if isinstance(outcome, NoveltyRun)]
-    for prediction in predictions:
-        if prediction.weights is not None:
-            target = folder / "models" / f"{prediction.protocol}-seed{prediction.seed}"
-            parts = [
-                part
-                for part in (prediction.domain, prediction.healthy)
-                if part is not None
-            ]
-            known = {
-                name: tensor
-                for part in parts
-                for name, tensor in part.tensors().items()
-            }
-            described = model_description(task, settings, prediction)
-            described = replace(
-                described, test_score=test_score(task, prediction, settings.n_bootstrap)
-            )
-            save_model(target, prediction.weights | known, described)
-    own = without_sham(predictions)
-    write_predictions(folder / "predictions.csv", task, own)
-    if novelty:
-        write_novelty(folder / "novelty.csv", task, novelty)
-    results = {
-        name: _protocol_result(task, settings, name, own)
-        for name in protocols
-        if name not in OPEN_PROTOCOLS
-    }
-    shams = sham_methods(
+    outcomes: list[Outcome] = run_jobs(
         task,
         settings,
-        predictions,
-        functools.partial(score_predictions, n_bootstrap=settings.n_bootstrap),
+        jobs,
+        n_workers=settings.n_threads or n_cores(),
+        on_done=lambda runs: on_done(_progress_line(runs)),
     )
-    for protocol, methods in shams.items():
+    predictions = [run for run in outcomes if isinstance(run, Prediction)]
+    novelty = [run for run in outcomes if isinstance(run, NoveltyRun)]
+    for prediction in predictions:
+        if prediction.weights is not None:
+            _save(folder, task, settings, prediction)
+    on_data = without_sham(predictions)
+    write_predictions(folder / "predictions.csv", task, on_data)
+    if novelty:
+        write_novelty(folder / "novelty.csv", task, novelty)
+    n_bootstrap = settings.n_bootstrap
+    results: Entry = {}
+    novelty_results: Entry = {}
+    for name in protocols:
+        if name in OPEN_PROTOCOLS:
+            novelty_results[name] = novelty_protocol_result(
+                task, name, novelty, n_bootstrap=n_bootstrap, seed=BOOTSTRAP_SEED
+            )
+        else:
+            results[name] = protocol_result(task, settings, name, on_data)
+    score = functools.partial(score_predictions, n_bootstrap=n_bootstrap)
+    for protocol, methods in sham_methods(task, settings, predictions, score).items():
         results[protocol]["methods"] |= methods
-    novelty_results = {
-        name: novelty_protocol_result(
-            task, name, novelty, n_bootstrap=settings.n_bootstrap, seed=BOOTSTRAP_SEED
-        )
-        for name in protocols
-        if name in OPEN_PROTOCOLS
-    }
     if settings.tensorboard:
         write_scores(folder, results)
     return {
-        "metrics_schema_version": METRICS_SCHEMA_VERSION,
-        "data": str(task.dataset.folder),
-        "data_fingerprint": data_fingerprint(task.dataset),
-        "n_records": int(task.dataset.n_records),
+        **study_facts(task, settings),
         "n_records_unusable": int(np.sum(~np.asarray(task.dataset.usable, dtype=bool))),
-        "sampling_rate_hz": float(task.dataset.sampling_rate),
         "class_names": list(task.class_names),
-        "channel_names": list(task.channel_names),
-        "model": str(settings.model.get("name", "network")),
-        "settings": {**asdict(settings), "model": dict(settings.model)},
         "protocols": results,
         "novelty": novelty_results,
         "protocols_left_out": choose_protocols(task, settings.protocols)[1],
         "duration_s": round(time.perf_counter() - started, 1),
-        "environment": environment(),
     }
 
 
-def score_predictions(
-    task: Task,
-    runs: Sequence[tuple[NDArray[np.integer], NDArray[np.integer]]],
-    n_bootstrap: int,
-    *,
-    shuffled: bool = False,
-) -> dict[str, Any]:
-    """Scores with intervals over units, confusion counts (true, predicted) and recall of one
-    method.
-
-    Parameters
-    ----------
-    task : gives labels and units
-    runs : for each seed, records (record,) and predicted labels (record,); the same records in each
-    n_bootstrap : resamples of the units
-    shuffled : see `diagnose.scoring.metrics.score_with_interval`
-    """
-    confusion = _confusion(task, runs)
-    rng = np.random.default_rng(BOOTSTRAP_SEED)
-    total = confusion.sum(axis=(0, 1))
-    scores = {
-        name: asdict(
-            score_with_interval(
-                name, confusion, n_bootstrap=n_bootstrap, rng=rng, shuffled=shuffled
-            )
-        )
-        for name in SCORES
-    }
-    shares = {
-        name: float(share)
-        for name, share in zip(task.class_names, recall(total), strict=True)
-        if np.isfinite(share)
-    }
-    return {**scores, "confusion": total.tolist(), "recall": shares}
+def _progress_line(runs: Sequence[Outcome]) -> str:
+    """Line on a finished job: its training, or the names of its baselines."""
+    last = runs[-1]
+    if isinstance(last, NoveltyRun) or last.best_epoch:
+        return f"{last.protocol}, {last.method}, seed {last.seed}: {last.detail}"
+    return ", ".join(dict.fromkeys(run.method for run in runs))
 
 
-def test_score(task: Task, prediction: Prediction, n_bootstrap: int) -> dict[str, Any]:
-    """What is stored with a network of what it scored.
-
-    Balanced accuracy with its interval, chance, and on how much.
-    """
-    scores = score_predictions(
-        task, [(prediction.record, prediction.predicted)], n_bootstrap
-    )["balanced_accuracy"]
-    return {
-        "balanced_accuracy": {key: scores[key] for key in ("mean", "low", "high")},
-        "chance": 1.0 / int(np.unique(task.labels()[prediction.record]).size),
-        "n_records": int(prediction.record.size),
-        "n_units": int(
-            np.unique(
-                np.asarray(task.dataset.column("unit_id"))[prediction.record]
-            ).size
-        ),
-        "leaky": is_leaky(prediction.protocol),
-    }
-
-
-def _confusion(
-    task: Task, runs: Sequence[tuple[NDArray[np.integer], NDArray[np.integer]]]
-) -> NDArray[np.int64]:
-    """Counts (seed, unit, true class, predicted class)."""
-    labels, unit = task.labels(), np.asarray(task.dataset.column("unit_id"))
-    n_classes = len(task.class_names)
-    return np.stack(
-        [
-            confusion_by_unit(labels[record], predicted, unit[record], n_classes)
-            for record, predicted in runs
-        ]
+def _save(
+    folder: Path, task: Task, settings: TrainSettings, prediction: Prediction
+) -> None:
+    """Write the network of a prediction, with its domain, its statistics and its score."""
+    tensors = dict(prediction.weights or {})
+    for part in (prediction.domain, prediction.healthy):
+        if part is not None:
+            tensors |= part.tensors()
+    score = test_score(task, prediction, settings.n_bootstrap)
+    save_network(
+        folder,
+        prediction.protocol,
+        task,
+        settings,
+        prediction,
+        tensors,
+        test_score=score,
     )
-
-
-def _protocol_result(
-    task: Task,
-    settings: TrainSettings,
-    protocol: str,
-    predictions: Sequence[Prediction],
-) -> dict[str, Any]:
-    labels, unit = task.labels(), np.asarray(task.dataset.column("unit_id"))
-    mine = [prediction for prediction in predictions if prediction.protocol == protocol]
-    methods: dict[str, Any] = {}
-    for method in dict.fromkeys(prediction.method for prediction in mine):
-        runs = [prediction for prediction in mine if prediction.method == method]
-        pairs = [(run.record, run.predicted) for run in runs]
-        shuffled = method == LABEL_SHUFFLE
-        scores = score_predictions(task, pairs, settings.n_bootstrap, shuffled=shuffled)
-        methods[method] = {
-            **scores,
-            "seeds": [run.seed for run in runs],
-            "detail": [run.detail for run in runs],
-        }
-    network = [
-        run for run in mine if run.method == str(settings.model.get("name", "network"))
-    ]
-    test = np.unique(network[0].record)
-    counts = np.bincount(labels[test], minlength=len(task.class_names))
-    methods["chance"] = {
-        "balanced_accuracy": 1.0 / int((counts > 0).sum()),
-        "majority_accuracy": float(counts.max() / counts.sum()),
-    }
-    parts = {
-        subset: np.unique(subset_segments(task, protocol, subset).record)
-        for subset in SUBSETS
-    }
-    oracle = chosen_oracle(task, mine)
-    over_oracle: dict[str, Any] = {}
-    if oracle is not None:
-        methods[ORACLE] = {**methods[oracle], "chosen": oracle}
-        found = [
-            _confusion(
-                task,
-                [(run.record, run.predicted) for run in mine if run.method == name],
-            )
-            for name in (network[0].method, oracle)
-        ]
-        for name in SCORES:
-            rng = np.random.default_rng(BOOTSTRAP_SEED)
-            over_oracle[name] = ratio_with_interval(
-                name, *found, n_bootstrap=settings.n_bootstrap, rng=rng
-            )
-    return {
-        "leaky": is_leaky(protocol),
-        "channels": {
-            subset: list(task.part(protocol, subset).channel_names)
-            for subset in ("train", "test")
-        },
-        "n_records": {subset: int(record.size) for subset, record in parts.items()},
-        "n_units": {
-            subset: int(np.unique(unit[record]).size)
-            for subset, record in parts.items()
-        },
-        "methods": methods,
-        "over_oracle": over_oracle,
-        "validation_loss": [list(run.validation_loss) for run in network],
-        "best_epoch": [run.best_epoch for run in network],
-        "last_epoch": _last_epoch(task, settings, network),
-        "calibration": _calibration(task, network),
-        "heads": head_scores(
-            task, parts["train"], network, n_bootstrap=settings.n_bootstrap
-        ),
-        "answers": None
-        if is_leaky(protocol)
-        else protocol_answers(task, settings, mine),
-    }
-
-
-def _last_epoch(
-    task: Task, settings: TrainSettings, network: Sequence[Prediction]
-) -> dict[str, Any]:
-    """Epochs run and the scores of the weights of the last one.
-
-    What choosing the best epoch brought.
-    """
-    pairs = [
-        (run.record, run.last_predicted)
-        for run in network
-        if run.last_predicted is not None
-    ]
-    scores = score_predictions(task, pairs, settings.n_bootstrap)
-    return {
-        "epoch": [len(run.validation_loss) for run in network],
-        **{name: scores[name] for name in SCORES},
-    }
-
-
-def _calibration(task: Task, network: Sequence[Prediction]) -> dict[str, Any]:
-    """Calibration of the probabilities of test records, see
-    `diagnose.networks.calibration.calibration_scores`.
-    """
-    labels = task.labels()
-    runs = [
-        (run.log_probability, labels[run.record], run.temperature) for run in network
-    ]
-    return calibration_scores(*(list(column) for column in zip(*runs, strict=True)))
-
-
-def n_cores() -> int:
-    """Cores this process may use."""
-    if sys.platform == "linux":
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-def environment() -> dict[str, str]:
-    """Versions that a result depends on, and when it was made."""
-    import sklearn
-    import torch
-
-    return {
-        "gensig": __version__,
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "torch": str(torch.__version__),
-        "scikit_learn": str(sklearn.__version__),
-        "finished": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
-    }

@@ -7,42 +7,39 @@ import numpy as np
 import pytest
 import torch
 
-import gensig.dataset.reader
 from benchmarks import _bridge_control as control
 from benchmarks import _bridge_worlds as worlds
-from diagnose.cli import main
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "unit" / "diagnose"))
 from fake_dataset import FakeDataset
+from runs import NETWORK_ONLY, SMALL_CNN, model_of, train
 
 CLASSES = ("healthy", "crack", "pitting", "missing_tooth")
-FAST = [
-    "window_samples=1600", "stride_samples=1600", "epochs=3", "seeds=[0]", "n_bootstrap=20", "n_threads=1",
-    "model.widths=[8,16]", "model.kernels=[32,5]", "model.strides=[8,4]", "protocols=[by_unit]",
-    "shuffle_control=false", "baselines=false",
-]  # fmt: skip
+FAST = (
+    "window_samples=1600",
+    "stride_samples=1600",
+    "epochs=3",
+    "seeds=[0]",
+    "n_bootstrap=20",
+    "n_threads=1",
+    *SMALL_CNN,
+    *NETWORK_ONLY[:-1],
+)
 
 
-def world(seed=0, n_channels=1):
-    made = FakeDataset(
-        n_units=12, records_per_unit=8, duration=0.5, n_channels=n_channels, seed=seed
-    )
-    made.columns["gearbox_id"] = np.array(
-        [f"g{index % 2}" for index in np.repeat(np.arange(12), 8)]
-    )
+def world(seed=0):
+    made = FakeDataset(n_units=12, records_per_unit=8, duration=0.5, seed=seed)
+    made.columns["gearbox_id"] = np.repeat(["g0", "g1"] * 6, 8)
     return made
 
 
 @pytest.fixture(scope="module")
 def model(tmp_path_factory):
     """A network of one channel trained on made-up records."""
-    folder = tmp_path_factory.mktemp("bridge")
     before = torch.get_num_threads()
     torch.set_num_threads(1)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(gensig.dataset.reader, "open_dataset", lambda path: world())
-        assert main(["train", "data=good", f"out={folder / 'out'}", *FAST]) == 0
-    yield folder / "out" / "models" / "by_unit-seed0"
+    out = train(tmp_path_factory.mktemp("bridge") / "out", world(), *FAST)
+    yield Path(model_of(out))
     torch.set_num_threads(before)
 
 
@@ -51,26 +48,15 @@ def test_scores_know_a_perfect_variant_from_chance():
     label, unit = np.tile(np.arange(4), 40), np.repeat(np.arange(16), 10)
     sure = np.log(np.where(np.arange(4) == label[:, None], 0.97, 0.01))
     random = np.stack([np.log(rng.dirichlet(np.ones(4), label.size)) for _ in range(2)])
-    found = worlds.scores(
-        worlds.Judged(
-            label=label,
-            unit=unit,
-            log_probability={
-                worlds.BEFORE: random,
-                "same": random,
-                "perfect": np.stack([sure, sure]),
-            },
-            n_windows=1,
-        ),
-        CLASSES,
-    )
-    assert found["perfect"]["balanced_accuracy"] == found["perfect"]["auroc"] == 1.0
-    assert found["perfect"]["gain"] == pytest.approx(
-        1.0 - found[worlds.BEFORE]["balanced_accuracy"]
-    )
-    assert found["perfect"]["gain_interval"][0] > 0.5
+    answers = {worlds.BEFORE: random, "same": random, "perfect": np.stack([sure, sure])}
+    judged = worlds.Judged(label=label, unit=unit, log_probability=answers, n_windows=1)
+    found = worlds.scores(judged, CLASSES)
+    before, perfect = found[worlds.BEFORE], found["perfect"]
+    assert perfect["balanced_accuracy"] == perfect["auroc"] == 1.0
+    assert perfect["gain"] == pytest.approx(1.0 - before["balanced_accuracy"])
+    assert perfect["gain_interval"][0] > 0.5
     assert found["same"]["gain_interval"] == [0.0, 0.0]
-    low, high = found[worlds.BEFORE]["interval"]
+    low, high = before["interval"]
     assert low < 0.25 < high
 
 
@@ -81,19 +67,23 @@ def test_every_variant_judges_units_that_no_adaptation_saw(model):
     units = {other.columns["unit_id"][record] for record in adapted_to}
     assert units.isdisjoint(judged.unit)
     assert judged.label.size + len(adapted_to) == other.n_records
-    names = [f"{kind}{method}, {scope}" for scope in worlds.SCOPES for method in ("adabn", "coral")
-             for kind in ("", "naive ")]  # fmt: skip
-    assert set(judged.log_probability) == {worlds.BEFORE, *names}
-    for name, values in judged.log_probability.items():
+    names = {
+        f"{kind}{method}, {scope}"
+        for scope in worlds.SCOPES
+        for method in ("adabn", "coral")
+        for kind in ("", "naive ")
+    }
+    answers = judged.log_probability
+    assert set(answers) == {worlds.BEFORE, *names}
+    for name, values in answers.items():
         assert values.shape == (1, judged.label.size, 4)
         assert np.isfinite(values).all()
-        assert (name == worlds.BEFORE) == np.array_equal(
-            values, judged.log_probability[worlds.BEFORE]
-        )
+        is_same = np.array_equal(values, answers[worlds.BEFORE])
+        assert is_same == (name == worlds.BEFORE)
 
 
 def recorded(folder, gain):
-    """Both states of the same gear; the sensor of channel 0 is `gain` times as loud in the high band when broken."""
+    """Both states of the same gear; broken, channel 0 is `gain` times as loud in the high band."""
     rng = np.random.default_rng(0)
     arrays = {}
     for state in control.STATES:
@@ -115,11 +105,8 @@ def test_the_control_has_a_row_for_every_case_and_forgives_a_sound_gear(
     monkeypatch.setenv(control.VARIABLE, str(tmp_path))
     assert control.find_control() == file
     rows = control.judge_control(file, [model])
-    assert (
-        len({(row["channel"], row["load"], row["variant"]) for row in rows})
-        == len(rows)
-        == 2 * 3 * 3
-    )
+    cases = {(row["channel"], row["load"], row["variant"]) for row in rows}
+    assert len(cases) == len(rows) == 2 * 3 * 3
     assert {row["n_windows"] for row in rows} == {20}
     alike = [row for row in rows if row["channel"] == 1]
     assert sum(row["contains_zero"] or row["refuses_both"] for row in alike) >= 7
@@ -133,12 +120,15 @@ def test_the_control_has_a_row_for_every_case_and_forgives_a_sound_gear(
 def test_a_difference_is_told_from_none():
     rng = np.random.default_rng(0)
     noise = {state: rng.uniform(0.4, 0.6, 20) for state in control.STATES}
-    told = {"healthy": np.zeros(20), "broken_tooth": np.ones(20)}
-    row = control._row(noise, told, np.random.default_rng(1))
-    assert row["contains_zero"]
-    assert not row["refuses_both"]
     shifted = {**noise, "broken_tooth": noise["broken_tooth"] + 0.3}
-    assert not control._row(shifted, told, np.random.default_rng(1))["contains_zero"]
-    assert control._row(
-        noise, {state: np.ones(20) for state in noise}, np.random.default_rng(1)
-    )["refuses_both"]
+    one_state = {"healthy": np.zeros(20), "broken_tooth": np.ones(20)}
+    both_states = {state: np.ones(20) for state in noise}
+
+    def row(probability, beyond):
+        return control._row(probability, beyond, np.random.default_rng(1))
+
+    same = row(noise, one_state)
+    assert same["contains_zero"]
+    assert not same["refuses_both"]
+    assert not row(shifted, one_state)["contains_zero"]
+    assert row(noise, both_states)["refuses_both"]

@@ -1,6 +1,7 @@
-"""docs/tour.ipynb: its cells run from first to last in a process of their own, and show what its text says.
+"""docs/tour.ipynb: its cells run from first to last in one process and show what its text says.
 
-The cells are plain Python, so that no notebook server is needed; their stored outputs come from the same run.
+The cells are plain Python, so that no notebook server is needed. Their stored outputs come from
+the same run.
 """
 
 import json
@@ -31,68 +32,46 @@ assert found[3] > 0.9 > found[:3].max()
 """
 
 
+OUTPUTS = [output for cell in CELLS for output in cell.get("outputs", [])]
+STORED = "".join("".join(output.get("text", [])) for output in OUTPUTS)
+PHYSICS = re.compile(r"A crack|crack +\d+%|sidebands|spur|helical")
+
+
 @pytest.fixture(scope="module")
 def printed(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """What all cells print, once the checks of what they computed have passed."""
+    """Output of all cells, once the checks of what they computed have passed."""
     folder = tmp_path_factory.mktemp("tour")
-    (folder / "tour.py").write_text(
-        "\n".join([*CODE[:-1], CODE[-1], CHECKS]), encoding="utf-8"
-    )
-    environment = os.environ | {"MPLBACKEND": "Agg", "PYTHONPATH": str(ROOT)}
+    (folder / "tour.py").write_text("\n".join([*CODE, CHECKS]), encoding="utf-8")
     done = subprocess.run(
         [sys.executable, "-W", "error::RuntimeWarning", "tour.py"],
-        cwd=folder, env=environment, capture_output=True, text=True, timeout=3600,
-    )  # fmt: skip
+        cwd=folder,
+        env=os.environ | {"MPLBACKEND": "Agg", "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=3600,
+    )
     assert done.returncode == 0, done.stderr[-3000:]
-    assert [path.name for path in folder.iterdir()] == [
-        "tour.py"
-    ]  # nothing is left behind
+    # nothing is left behind
+    assert [path.name for path in folder.iterdir()] == ["tour.py"]
     return done.stdout
 
 
 def test_it_runs_and_the_figures_in_its_outputs_are_still_true(printed: str) -> None:
-    stored = "".join(
-        "".join(output.get("text", []))
-        for cell in CELLS
-        for output in cell.get("outputs", [])
-    )
-
-    def of_the_physics(text: str) -> list[list[float]]:
-        lines = [
-            line
-            for line in text.splitlines()
-            if re.match(r"A crack|crack +\d+%|sidebands|spur|helical", line)
-        ]
-        return [
+    now, then = (
+        [
             [float(number) for number in re.findall(r"\d+\.?\d*", line)]
-            for line in lines
+            for line in text.splitlines()
+            if PHYSICS.match(line)
         ]
-
-    now, then = of_the_physics(printed), of_the_physics(stored)
+        for text in (printed, STORED)
+    )
     assert len(then) == 9
     for new, old in zip(now, then, strict=True):
         assert new == pytest.approx(old, rel=0.02, abs=2e-3)
 
 
-def test_its_outputs_are_small_and_name_no_place_of_a_machine() -> None:
-    text = NOTEBOOK.read_text(encoding="utf-8")
-    assert len(text) < 600_000
-    assert (
-        sum(
-            "image/png" in output.get("data", {})
-            for cell in CELLS
-            for output in cell.get("outputs", [])
-        )
-        == 4
-    )
-    shown = "".join(
-        "".join(output.get("text", []))
-        for cell in CELLS
-        for output in cell.get("outputs", [])
-    )
-    assert not re.search(r"/(tmp|home|root|Users)/", shown)
-    assert all(
-        output["output_type"] != "error"
-        for cell in CELLS
-        for output in cell.get("outputs", [])
-    )
+def test_its_outputs_are_small_and_name_no_folder_of_a_machine() -> None:
+    assert NOTEBOOK.stat().st_size < 600_000
+    assert sum("image/png" in output.get("data", {}) for output in OUTPUTS) == 4
+    assert not re.search(r"/(tmp|home|root|Users)/", STORED)
+    assert "error" not in {output["output_type"] for output in OUTPUTS}

@@ -1,6 +1,7 @@
-"""The maps of diagnose detectability on simulated machines: laws, agreement with data sets, and bad input."""
+"""Maps of diagnose detectability on simulated machines: laws, agreement with data sets."""
 
 import json
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,12 @@ import gensig
 import gensig.record.inputs
 from diagnose.cli import main
 from diagnose.detectability.figure import detectability_figure, fault_text
-from diagnose.detectability.maps import best_and_worst, make_maps, read_bandwidths
+from diagnose.detectability.maps import (
+    best_and_worst,
+    look_at,
+    make_maps,
+    read_bandwidths,
+)
 from gensig.errors import GensigError, SimulationError
 from gensig.plan.request import read_request
 from gensig.production.fault_pairs import make_pairs
@@ -20,36 +26,41 @@ from gensig.record.simulate import simulate_record
 
 SMALL = ("operating.duration_s=0.1", "sensing.channels=[pinion_y]")
 BANDS = (1000.0, 5000.0, 25600.0)
+FOUR_CELLS = {"speeds": (900.0, 1800.0), "torques": (10.0, 20.0)}
 
 
-def maps_of(
-    *overrides: str, speeds=(1800.0,), torques=(20.0,), n_workers: int = 1, **more
-):
-    pairs = gensig.fault_pairs(
-        *SMALL, *overrides, speeds_rpm=speeds, torques_nm=torques, n_units=4, **more
+def pairs_of(*overrides, speeds=(1800.0,), torques=(20.0,), n_units=4, **more):
+    """Pairs of records with and without a crack, or another fault."""
+    return gensig.fault_pairs(
+        *SMALL,
+        "fault=crack",
+        *overrides,
+        speeds_rpm=speeds,
+        torques_nm=torques,
+        n_units=n_units,
+        **more,
     )
-    return make_maps(pairs, BANDS, n_workers=n_workers, on_done=lambda _text: None)
+
+
+def maps_of(*overrides, **more):
+    pairs = pairs_of(*overrides, **more)
+    return make_maps(pairs, BANDS, n_workers=1, on_done=lambda _: None)
 
 
 @pytest.fixture(scope="module")
 def crack():
-    return maps_of("fault=crack", speeds=(900.0, 1800.0), torques=(10.0, 20.0))
+    return maps_of(**FOUR_CELLS)
 
 
 @pytest.fixture(scope="module")
-def one():
+def single():
     """The map of a single cell; a larger one draws other starts."""
-    return maps_of("fault=crack")
+    return maps_of()
 
 
-@pytest.mark.parametrize(
-    "control",
-    [("fault=crack", "plan.sham=true"), ("fault=crack", "fault.crack_depth_mm=0")],
-)
-def test_no_fault_is_not_there_and_not_seen(
-    control: tuple[str, ...], tmp_path: Path
-) -> None:
-    maps = maps_of(*control)
+@pytest.mark.parametrize("control", ["plan.sham=true", "fault.crack_depth_mm=0"])
+def test_no_fault_is_not_there_and_not_seen(control, tmp_path):
+    maps = maps_of(control)
     assert (maps.known == 0.0).all()
     assert (maps.seen == 0.0).all()
     assert (maps.auroc == 0.5).all()
@@ -57,241 +68,173 @@ def test_no_fault_is_not_there_and_not_seen(
     assert "Physically there" in (tmp_path / "nothing.svg").read_text()
 
 
-def test_less_noise_tells_more(one) -> None:
-    """As many times as its amplitude is smaller."""
-    quieter = maps_of(
-        "fault=crack", f"sensing.snr_db={20.0 + float(20.0 * np.log10(2.0))!r}"
-    )
-    assert_allclose(quieter.known, 2.0 * one.known, rtol=1e-9, atol=0)
+def test_half_the_noise_doubles_the_distance(single):
+    quieter = maps_of(f"sensing.snr_db={20.0 + float(20.0 * np.log10(2.0))!r}")
+    assert_allclose(quieter.known, 2.0 * single.known, rtol=1e-9, atol=0)
 
 
-def test_it_grows_with_the_fault(one) -> None:
-    found = [
-        maps_of("fault=crack", f"fault.crack_depth_mm={depth}").known
-        for depth in (0.5, 2.0, 3.0)
+def test_it_grows_with_the_fault(single):
+    depths = [
+        maps_of(f"fault.crack_depth_mm={depth}").known for depth in (0.5, 2.0, 3.0)
     ]
-    found = [found[0], one.known, *found[1:], maps_of("fault=missing_tooth").known]
-    assert (np.diff(np.stack(found), axis=0) > 0.0).all()
+    missing = maps_of("fault=missing_tooth").known
+    found = np.stack([depths[0], single.known, *depths[1:], missing])
+    assert (np.diff(found, axis=0) > 0.0).all()
 
 
-def test_more_bandwidth_never_tells_less(crack) -> None:
+def test_more_bandwidth_never_tells_less(crack):
     assert (np.diff(crack.known, axis=-1) >= 0.0).all()
     assert (crack.known_band <= crack.known).all()
 
 
-def test_it_grows_with_the_root_of_the_duration() -> None:
-    """But for what turns of the same motion differ by: one and four of the wheel."""
+def test_it_grows_with_the_root_of_the_duration():
+    """Except for differences of turns of the same motion: one and four of the wheel."""
     short, long = (
-        maps_of("fault=crack", f"operating.duration_s={84 / 23 / 30 * n!r}")
-        for n in (1, 4)
+        maps_of(f"operating.duration_s={84 / 23 / 30 * n!r}") for n in (1, 4)
     )
     assert_allclose(long.known[..., -1], 2.0 * short.known[..., -1], rtol=0.05, atol=0)
 
 
-def test_it_is_what_a_data_set_stores() -> None:
-    pairs = gensig.fault_pairs(
-        *SMALL, "fault=crack", speeds_rpm=[900, 1800], torques_nm=[20], n_units=4
-    )
+def test_it_is_what_a_data_set_stores():
+    pairs = pairs_of(speeds=(900.0, 1800.0))
     row = pairs.rows[4 + 2]
     config = pairs.config.with_keys("dataset", store_detectability=True)
     start = InputReader(config).inputs(row).healthy_twin().run.start
     begin = {
         "start_tooth_pinion": start.tooth_pinion,
         "start_tooth_wheel": start.tooth_wheel,
+        "start_phase": start.phase,
     }
-    record = simulate_record(config, {**row, **begin, "start_phase": start.phase})
+    record = simulate_record(config, {**row, **begin})
     cell = pairs.cell(1)
-    found = np.sqrt(np.sum(cell.residual[2] ** 2) / cell.noise_power[2, 0])
+    power = cell.noise_power[2]
+    found = np.sqrt(np.sum(cell.residual[2] ** 2) / power[0])
     assert found == pytest.approx(record.values["detectability"], rel=1e-12)
-    assert_allclose(
-        cell.faulty[2].astype(np.float32),
-        record.signals["acceleration"],
-        rtol=0,
-        atol=0,
-    )
-    assert_allclose(
-        cell.noise_power[2], record.signals["noise_power"], rtol=1e-12, atol=0
-    )
+    stored = record.signals["acceleration"]
+    np.testing.assert_array_equal(cell.faulty[2].astype(np.float32), stored)
+    assert_allclose(power, record.signals["noise_power"], rtol=1e-12, atol=0)
 
 
-def test_both_of_a_pair_have_the_same_noise() -> None:
-    cell = gensig.fault_pairs(
-        *SMALL, "fault=crack", speeds_rpm=[1800], torques_nm=[20], n_units=4
-    ).cell(0)
+def test_both_of_a_pair_have_the_same_noise_and_other_machines_another():
+    cell = pairs_of().cell(0)
     scale = np.abs(cell.sound).max()
     assert_allclose(cell.faulty - cell.sound, cell.residual, rtol=0, atol=1e-12 * scale)
-    assert (
-        len({one.tobytes() for one in cell.sound - cell.sound[0]}) == 4
-    )  # other machines have another
+    assert len({signal.tobytes() for signal in cell.sound - cell.sound[0]}) == 4
 
 
-def test_noise_of_the_set_point_is_the_same_everywhere(crack) -> None:
-    fixed = maps_of(
-        "fault=crack", speeds=(900.0, 1800.0), torques=(10.0, 20.0), fixed_noise=True
-    )
+def test_noise_of_the_set_point_is_the_same_everywhere(crack):
+    fixed = maps_of(fixed_noise=True, **FOUR_CELLS)
     assert np.ptp(fixed.noise_rms) == 0.0
     assert np.ptp(crack.noise_rms) > 0.0
-    # the residual is the same, so that the one's d' times its noise is the other's; both are medians over machines
+    # the residual is the same, so that d' times the noise is; both are medians over machines
     products = [maps.known[..., -1] * maps.noise_rms for maps in (fixed, crack)]
     assert_allclose(*products, rtol=0.1, atol=0)
 
 
-def test_coloured_noise_counts_where_it_is() -> None:
-    """White noise named as a list of parts has the density of white noise; pink leaves high frequencies clear."""
-    white = maps_of("fault=crack")
+def test_coloured_noise_counts_where_it_is(single):
+    """White noise as a list of parts is white noise; pink noise leaves high frequencies clear."""
     in_parts = maps_of(
-        "fault=crack",
         "sensing.noise.parts=[{kind:white,share:1}]",
         "sensing.noise.band_hz=[1,25600]",
     )
-    assert_allclose(in_parts.known[..., -1], white.known[..., -1], rtol=0.05, atol=0)
-    pink = maps_of(
-        "fault=crack", "sensing.noise.parts=[{kind:pink,share:1,lowest_hz:5}]"
-    )
-    assert (pink.known_band[..., -1] > 1.5 * white.known_band[..., -1]).all()
-    assert (pink.known_band[..., 0] < white.known_band[..., 0]).all()
+    assert_allclose(in_parts.known[..., -1], single.known[..., -1], rtol=0.05, atol=0)
+    pink = maps_of("sensing.noise.parts=[{kind:pink,share:1,lowest_hz:5}]")
+    assert (pink.known_band[..., -1] > 1.5 * single.known_band[..., -1]).all()
+    assert (pink.known_band[..., 0] < single.known_band[..., 0]).all()
 
 
-def test_workers_do_not_change_the_bits(crack) -> None:
-    again = maps_of(
-        "fault=crack", speeds=(900.0, 1800.0), torques=(10.0, 20.0), n_workers=2
-    )
-    for name in (
-        "known",
-        "known_band",
-        "seen",
-        "standard_error",
-        "auroc",
-        "indicator",
-        "noise_rms",
-    ):
-        assert getattr(again, name).tobytes() == getattr(crack, name).tobytes()
+def test_a_cell_of_another_process_has_the_same_bits(crack):
+    """A process of its own gets a copy of the pairs and looks at its cells in any order."""
+    pairs = pickle.loads(pickle.dumps(pairs_of(**FOUR_CELLS)))
+    cell = look_at(pairs, BANDS, 3)
+    seen = cell.seen | {"seen": cell.seen["d_prime"]}
+    for name in ("seen", "standard_error", "auroc", "indicator", "raises"):
+        assert seen[name].tobytes() == getattr(crack, name)[1, 1].tobytes()
+    known = np.median(np.sqrt(np.cumsum(cell.energy, axis=-1)), axis=0)
+    np.testing.assert_array_equal(known, crack.known[1, 1])
 
 
-def test_other_machines_are_others() -> None:
-    cells = [
-        gensig.fault_pairs(
-            *SMALL,
-            "fault=crack",
-            speeds_rpm=[1800],
-            torques_nm=[20],
-            n_units=4,
-            epoch=epoch,
-        ).cell(0)
-        for epoch in (0, 1)
-    ]
-    assert not np.isin(cells[0].sound, cells[1].sound).any()
+def test_other_machines_are_others():
+    first, second = (pairs_of(epoch=epoch).cell(0).sound for epoch in (0, 1))
+    assert not np.isin(first, second).any()
 
 
-def test_every_machine_has_its_own_gearbox_unless_the_plan_says_how_many() -> None:
-    own, shared = (
-        gensig.fault_pairs(
-            *SMALL, "fault=crack", *words, speeds_rpm=[1800], torques_nm=[20], n_units=4
-        ).rows
-        for words in ((), ("plan.n_gearboxes=1",))
-    )
-    assert len({row["gearbox_id"] for row in own}) == 4
-    assert len({row["gearbox_id"] for row in shared}) == 1
-    assert all(len({row["specimen_id"] for row in rows}) == 4 for rows in (own, shared))
+@pytest.mark.parametrize(
+    ("words", "n_gearboxes"), [((), 4), (("plan.n_gearboxes=1",), 1)]
+)
+def test_every_machine_has_its_gearbox_unless_the_plan_says_how_many(
+    words, n_gearboxes
+):
+    rows = pairs_of(*words).rows
+    assert len({row["gearbox_id"] for row in rows}) == n_gearboxes
+    assert len({row["specimen_id"] for row in rows}) == 4
 
 
-def test_without_numbers_the_map_is_about_the_set_point() -> None:
-    pairs = gensig.fault_pairs(
-        *SMALL, "fault=crack", "operating.speed_rpm=1000", "operating.torque_nm=8"
-    )
+def test_without_numbers_the_map_is_about_the_set_point():
+    words = ("operating.speed_rpm=1000", "operating.torque_nm=8")
+    pairs = pairs_of(*words, speeds=None, torques=None)
     assert pairs.speeds_rpm == (250.0, 500.0, 1000.0, 1500.0, 2000.0)
     assert pairs.torques_nm == (2.0, 4.0, 8.0, 16.0)
     assert read_bandwidths(None, pairs) == (1000.0, 2000.0, 5000.0, 10000.0, 20000.0)
 
 
-def test_a_motion_that_does_not_stay_finite_is_left_out_and_counted(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_motion_that_does_not_stay_finite_is_left_out_and_counted(monkeypatch):
     simulate = gensig.record.inputs.simulate_with_lead_in
 
-    def one_fails(runs):
+    def failing(runs):
         results = simulate(runs)
-        results[len(runs) // 2 + 1] = SimulationError(
-            "it did not stay finite"
-        )  # the second machine with its fault
+        # the second machine with its fault
+        results[len(runs) // 2 + 1] = SimulationError("it did not stay finite")
         return results
 
-    monkeypatch.setattr(gensig.record.inputs, "simulate_with_lead_in", one_fails)
-    pairs = gensig.fault_pairs(
-        *SMALL, "fault=crack", speeds_rpm=[1800], torques_nm=[20], n_units=5
-    )
+    monkeypatch.setattr(gensig.record.inputs, "simulate_with_lead_in", failing)
+    pairs = pairs_of(n_units=5)
     cell = pairs.cell(0)
-    assert np.isnan(cell.residual).all(axis=(1, 2)).tolist() == [
-        False,
-        True,
-        False,
-        False,
-        False,
-    ]
-    maps = make_maps(pairs, BANDS, n_workers=1, on_done=lambda _text: None)
+    failed = np.isnan(cell.residual).all(axis=(1, 2))
+    assert failed.tolist() == [False, True, False, False, False]
+    maps = make_maps(pairs, BANDS, n_workers=1, on_done=lambda _: None)
     assert maps.n_failed == 1
-    left = np.delete(np.sum(cell.residual**2, axis=-1) / cell.noise_power, 1, axis=0)
+    left = np.sum(cell.residual**2, axis=-1)[~failed] / cell.noise_power[~failed]
     assert maps.known[0, 0, 0, -1] == pytest.approx(np.median(np.sqrt(left)))
     assert np.isfinite(maps.seen).all()
 
 
-def test_turns_and_random_walks_follow_the_plan() -> None:
+def test_turns_and_random_walks_follow_the_plan():
     pairs = gensig.fault_pairs(
-        "sensing.channels=[pinion_y]", "fault=crack", "operating=drifting", "operating.turns=3",
-        speeds_rpm=[600, 1800], torques_nm=[20], n_units=4,
-    )  # fmt: skip
+        *SMALL[1:],
+        "fault=crack",
+        "operating=drifting",
+        "operating.turns=3",
+        speeds_rpm=[600, 1800],
+        torques_nm=[20],
+        n_units=4,
+    )
     assert pairs.duration > 3 * 60.0 / 600.0
     assert len({row["params/operating.course_seed"] for row in pairs.rows}) == 8
 
 
-def test_the_command_writes_everything(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_writes_everything(tmp_path: Path, capsys):
     table, figure = tmp_path / "map.json", tmp_path / "map.png"
-    words = [
-        "fault=missing_tooth",
-        *SMALL,
-        "--speeds",
-        "900",
-        "1800",
-        "--torques",
-        "20",
-        "sensing.snr_db=15",
-    ]
-    flags = ["--bandwidths", "2000", "20000", "--n-units", "4", "--workers", "1"]
-    assert (
-        main(
-            [
-                "detectability",
-                *words,
-                *flags,
-                "--json",
-                str(table),
-                "--plot",
-                str(figure),
-            ]
-        )
-        == 0
+    typed = (
+        "--speeds 900 1800 --torques 20 sensing.snr_db=15 --bandwidths 2000 20000 "
+        f"--n-units 4 --workers 1 --json {table} --plot {figure}"
     )
+    words = ["detectability", "fault=missing_tooth", *SMALL, *typed.split()]
+    assert main(words) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert len(lines) == 2
     found = json.loads(table.read_text())
+    best, tests = found["best_seen"], found["tests"]
     assert found["summary"] == lines
     assert found["fault"]["kind"] == "missing_tooth"
-    assert len(found["tests"]) == 2 * 1 * 1 * 2
-    best = max(found["tests"], key=lambda test: test["d_prime_known"])
-    assert (
-        f"best at {best['speed_rpm']:g} r/min, 20 N m, pinion_y, up to 20 kHz"
-        in lines[1]
-    )
-    assert found["best_seen"]["d_prime_seen"] == max(
-        test["d_prime_seen"] for test in found["tests"]
-    )
-    assert f"(on 4 others {found['best_seen']['d_prime_on_others']:.2f} +- " in lines[0]
+    assert len(tests) == 2 * 1 * 1 * 2
+    speed = max(tests, key=lambda test: test["d_prime_known"])["speed_rpm"]
+    assert f"best at {speed:g} r/min, 20 N m, pinion_y, up to 20 kHz" in lines[1]
+    assert best["d_prime_seen"] == max(test["d_prime_seen"] for test in tests)
+    assert f"(on 4 others {best['d_prime_on_others']:.2f} +- " in lines[0]
     assert figure.read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_fault_is_named_with_its_sizes() -> None:
+def test_a_fault_is_named_with_its_sizes():
     crack = {
         "kind": "crack",
         "gear": "pinion",
@@ -299,64 +242,57 @@ def test_a_fault_is_named_with_its_sizes() -> None:
         "crack_depth_mm": 1.5,
         "crack_start": "arc_mid",
     }
-    assert fault_text(crack) == "crack on the pinion (crack depth 1.5 mm)"
     missing = {"kind": "missing_tooth", "gear": "wheel", "tooth": 0}
-    assert fault_text(missing) == "missing tooth on the wheel"
+    text = fault_text({"kind": "compound", "parts": [crack, missing]})
     assert (
-        fault_text({"kind": "compound", "parts": [crack, missing]}).count(" and ") == 1
+        text
+        == "crack on the pinion (crack depth 1.5 mm) and missing tooth on the wheel"
     )
+    assert fault_text(missing) == "missing tooth on the wheel"
 
 
-def test_a_map_without_any_value_is_refused() -> None:
+def test_a_map_without_any_value_is_refused():
     with pytest.raises(GensigError, match="no pair"):
         best_and_worst(np.full((2, 2), np.nan))
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("typed", "message"),
     [
-        ([], "fault=healthy: there is nothing to find"),
-        (["fault=crack", "sensing.snr_db=null"], "sensing.snr_db = null"),
-        (["fault=crack", "sensing.snr_reference=record"], "use healthy_twin"),
-        (["fault=crack", "--n-units", "3"], "must be a whole number of at least 4"),
+        ("", "fault=healthy: there is nothing to find"),
+        ("fault=crack sensing.snr_db=null", "sensing.snr_db = null"),
+        ("fault=crack sensing.snr_reference=record", "use healthy_twin"),
+        ("fault=crack --n-units 3", "must be a whole number of at least 4"),
         (
-            ["fault=crack", "--speeds", "900", "900"],
+            "fault=crack --speeds 900 900",
             "speeds in r/min: 900, 900; give positive numbers, each once",
         ),
+        ("fault=crack --torques -5", "torques in N m: -5; give positive numbers"),
+        ("fault=crack --torques 0", "torques in N m: 0; give positive numbers"),
+        ("fault=crack --speeds fast", "--speeds fast: give numbers"),
         (
-            ["fault=crack", "--torques", "-5"],
-            "torques in N m: -5; give positive numbers",
-        ),
-        (["fault=crack", "--torques", "0"], "torques in N m: 0; give positive numbers"),
-        (["fault=crack", "--speeds", "fast"], "--speeds fast: give numbers"),
-        (
-            ["fault=crack", "--speeds", *map(str, range(100, 501))],
+            f"fault=crack --speeds {' '.join(map(str, range(100, 501)))}",
             "more than 400 cells",
         ),
         (
-            ["fault=crack", "--bandwidths", "30000"],
+            "fault=crack --bandwidths 30000",
             "from 10 to half the sampling rate, 25600",
         ),
-        (["fault=crack", "--workers", "0"], "--workers 0 must be at least 1"),
-        (
-            ["fault=crack", "--plot", "map.txt"],
-            "--plot map.txt: the name must end in .png",
-        ),
-        (["fault=crack", "--json", "nowhere/map.json"], "there is no folder nowhere"),
-        (["fault=crak"], "no option 'crak' of fault"),
-        (["fault=crack", "plan.n_gearboxes=0"], "plan.n_gearboxes = 0"),
+        ("fault=crack --workers 0", "--workers 0 must be at least 1"),
+        ("fault=crack --plot map.txt", "--plot map.txt: the name must end in .png"),
+        ("fault=crack --json nowhere/map.json", "there is no folder nowhere"),
+        ("fault=crak", "no option 'crak' of fault"),
+        ("fault=crack plan.n_gearboxes=0", "plan.n_gearboxes = 0"),
     ],
 )
-def test_a_mistake_is_one_line(
-    words: list[str], told: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["detectability", *words]) == 2
+def test_a_mistake_is_one_line(typed, message, capsys):
+    assert main(["detectability", *typed.split()]) == 2
     error = capsys.readouterr().err
-    assert told in error
+    assert message in error
     assert error.count("\n") == 1
 
 
-def test_pairs_take_a_composed_configuration() -> None:
+def test_pairs_take_a_composed_configuration():
     config = read_request([*SMALL, "fault=crack"]).config
     before = json.dumps(config.plain())
     make_pairs(config, speeds_rpm=[1800], torques_nm=[20], n_units=4)

@@ -1,24 +1,17 @@
-"""Sets in memory that have the protocols whose training lacks classes, and one whose channels are copies."""
+"""Data sets in memory with open protocols, and one whose channels are copies."""
 
 import numpy as np
 from fake_dataset import FakeDataset
 
 
 class OpenDataset(FakeDataset):
-    """Eight units: five to train on, one and a half to validate, the rest to test; `withheld` is new in open_set."""
+    """Twelve units with the open protocols; `withheld` is new in open_set."""
 
     withheld = "missing_tooth"
 
     def __init__(self, **changes):
-        super().__init__(
-            **{
-                "n_units": 12,
-                "records_per_unit": 8,
-                "duration": 0.3,
-                "noise": 0.3,
-                **changes,
-            }
-        )
+        sizes = {"n_units": 12, "records_per_unit": 8, "duration": 0.3, "noise": 0.3}
+        super().__init__(**{**sizes, **changes})
         self.protocols = ("by_unit", "healthy_only", "open_set")
 
     def split(self, protocol):

@@ -1,141 +1,117 @@
-"""Controls: an oracle that sees the twin, a sham without faults, a probe without a signal, the level beside."""
+"""Controls: an oracle that sees the twin, a sham without faults, probes, the level kept."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 from fake_dataset import CLASSES, FakeDataset
+from runs import FAST as QUICK
+from runs import metrics_of, refuses, rows_of, serve, settings_of
 
-import gensig.dataset.reader
 from diagnose.baselines.base import Source
 from diagnose.baselines.oracle import oracle_table, oracle_windows
-from diagnose.baselines.probe import (
-    EXCLUDED,
-    LABELS,
-    probe_values,
-    probed_columns,
-)
+from diagnose.baselines.probe import EXCLUDED, LABELS, probe_values, probed_columns
 from diagnose.cli import main
 from diagnose.data.window_input import Windows
 from diagnose.data.windows import load_windows, subset_segments, task_of
 from diagnose.report.control_sections import controls_section, oracle_verdict, verdict
 from diagnose.scoring.metrics import ratio_with_interval
 from diagnose.scoring.predictions import Prediction, Rows
-from diagnose.settings import settings_from
 from diagnose.studies.baseline_runs import baseline_predictions
 from diagnose.studies.controls import chosen_oracle, control_jobs
 from diagnose.studies.study import task_from
 from gensig.dataset.schema import COLUMNS, SIGNALS
 from gensig.errors import ConfigError
-from gensig.options.compose import compose
 
-FAST = [
-    "protocols=[by_unit]", "window_samples=1200", "stride_samples=1000", "epochs=2", "seeds=[0]", "n_bootstrap=200",
-    "n_threads=1", "model.widths=[8,16]", "model.kernels=[32,5]", "model.strides=[8,4]", "baselines=[rms_threshold]",
-]  # fmt: skip
-SMALL = {"n_units": 16, "records_per_unit": 4, "duration": 0.5}
+FAST = (*QUICK, "protocols=[by_unit]", "baselines=[rms_threshold]")
 HOWTO = Path(__file__).parents[3] / "docs" / "howto" / "controls.md"
 
 
-def make_task(dataset, **changes):
+def small(**changes):
+    sizes = {"n_units": 16, "records_per_unit": 4, "duration": 0.5}
+    return FakeDataset(**{**sizes, **changes})
+
+
+def make_task(dataset, normalise="rms"):
     return task_of(
-        dataset,
-        **{
-            "window_samples": 1200,
-            "stride_samples": 1000,
-            "normalise": "rms",
-            **changes,
-        },
+        dataset, window_samples=1200, stride_samples=1000, normalise=normalise
     )
 
 
-def make_settings(*overrides):
-    return settings_from(compose("train", ["data=x", "out=y", *FAST, *overrides]))
-
-
-# --- the oracle ---------------------------------------------------------------------------------------------------
+# ---- the oracle
 
 
 @pytest.mark.parametrize("normalise", ["rms", "none"])
 def test_record_and_difference_have_one_divisor_which_is_the_twins(normalise):
-    dataset = FakeDataset(**SMALL, n_channels=2, twins=True)
-    task = make_task(dataset, normalise=normalise)
-    windows = oracle_windows(task, subset_segments(task, "by_unit", "test"), Windows())
-    plain = load_windows(task, subset_segments(task, "by_unit", "test"))
+    dataset = small(n_channels=2, twins=True)
+    task = make_task(dataset, normalise)
+    segments = subset_segments(task, "by_unit", "test")
+    windows = oracle_windows(task, segments, Windows())
+    plain = load_windows(task, segments)
     cut = windows.cut(np.array([0]))[0]
     record, start = int(windows.record[0]), int(windows.start[0])
     signal, twin = (
         dataset.signals(record, name=name).astype(float)
         for name in ("acceleration", "healthy_twin")
     )
-    level = (
-        np.std(twin, axis=1, keepdims=True) if normalise == "rms" else np.ones((2, 1))
-    )
-    wanted = (np.concatenate([signal, signal - twin]) / np.tile(level, (2, 1)))[
-        :, start : start + 1200
-    ]
-    np.testing.assert_allclose(
-        cut, wanted - wanted.mean(axis=1, keepdims=True), rtol=0, atol=1e-4
-    )
+    level = np.ones((4, 1))
+    if normalise == "rms":
+        level = np.tile(np.std(twin, axis=1, keepdims=True), (2, 1))
+    wanted = np.concatenate([signal, signal - twin]) / level
+    wanted = wanted[:, start : start + 1200]
+    wanted = wanted - wanted.mean(axis=1, keepdims=True)
+    np.testing.assert_allclose(cut, wanted, rtol=0, atol=1e-4)
     np.testing.assert_array_equal(windows.label, plain.label)
     np.testing.assert_array_equal(windows.start, plain.start)
 
 
 def test_what_the_oracle_sees_of_a_healthy_record_is_noise():
-    """Law: twice the noise is left of a healthy record, more of a faulty one."""
-    dataset = FakeDataset(**SMALL, twins=True, noise=0.5)
-    task = make_task(dataset, normalise="none")
+    """Twice the noise is left of a healthy record, more of a faulty one."""
+    task = make_task(small(twins=True, noise=0.5), "none")
     windows = oracle_windows(task, subset_segments(task, "by_unit", "train"), Windows())
     power = windows.cut(np.arange(len(windows)))[:, 1].var(axis=1)
-    np.testing.assert_allclose(
-        power[windows.label == 0].mean(), 2 * 0.5**2, rtol=0.05, atol=0
-    )
-    assert power[windows.label == 3].mean() > 0.55
+    healthy, missing = (power[windows.label == label].mean() for label in (0, 3))
+    assert healthy == pytest.approx(2 * 0.5**2, rel=0.05)
+    assert missing > 0.55
 
 
 def test_the_table_has_finite_named_columns_and_shares_its_cache():
-    task = make_task(FakeDataset(**SMALL, n_channels=2, twins=True))
-    cache: dict = {}
-    table = oracle_table(task, subset_segments(task, "by_unit", "test"), cache)
+    task = make_task(small(n_channels=2, twins=True))
+    segments, cache = subset_segments(task, "by_unit", "test"), {}
+    table = oracle_table(task, segments, cache)
     assert table.values.shape == (16, len(table.names)) == (16, len(set(table.names)))
     assert len(cache) == 16
-    again = oracle_table(task, subset_segments(task, "by_unit", "test"), cache)
-    np.testing.assert_array_equal(table.values, again.values)
-    difference = [
-        index
-        for index, name in enumerate(table.names)
-        if name.endswith("difference/log_rms")
-    ]
-    assert len(difference) == 2
-    assert (
-        table.values[table.label == 3][:, difference].mean()
-        > table.values[table.label == 0][:, difference].mean()
+    cached = oracle_table(task, segments, cache)
+    np.testing.assert_array_equal(table.values, cached.values)
+    level = [name.endswith("difference/log_rms") for name in table.names]
+    assert sum(level) == 2
+    healthy, missing = (
+        table.values[table.label == label][:, level] for label in (0, 3)
     )
+    assert missing.mean() > healthy.mean()
 
 
 def test_the_better_one_on_validation_units_is_the_oracle():
-    task = make_task(FakeDataset(**SMALL))
+    task = make_task(small())
     labels = task.labels()
 
     def run(method, n_right, seed=0):
         guess = np.where(np.arange(8) < n_right, labels[:8], (labels[:8] + 1) % 4)
         validation = Rows(record=np.arange(8), log_probability=np.eye(4)[guess])
         return Prediction(
-            protocol="by_unit", method=method, seed=seed, record=np.arange(2), log_probability=np.zeros((2, 4)),
-            detail="", validation=validation,
-        )  # fmt: skip
+            protocol="by_unit",
+            method=method,
+            seed=seed,
+            record=np.arange(2),
+            log_probability=np.zeros((2, 4)),
+            detail="",
+            validation=validation,
+        )
 
+    network, indicators = run("oracle_network", 5, 1), run("oracle_indicators", 6)
     assert chosen_oracle(task, [run("cnn", 8)]) is None
-    assert (
-        chosen_oracle(task, [run("oracle_network", 5), run("oracle_indicators", 6)])
-        == "oracle_indicators"
-    )
-    two = [
-        run("oracle_network", 8),
-        run("oracle_network", 5, 1),
-        run("oracle_indicators", 6),
-    ]
+    assert chosen_oracle(task, [network, indicators]) == "oracle_indicators"
+    two = [run("oracle_network", 8), network, indicators]
     assert chosen_oracle(task, two) == "oracle_network"
 
 
@@ -167,11 +143,11 @@ def test_a_method_over_itself_is_one_and_the_interval_grows_with_the_units_sprea
     ).endswith("no bound here")
 
 
-# --- the probe ----------------------------------------------------------------------------------------------------
+# ---- the probe
 
 
 def test_nothing_that_is_a_label_is_probed():
-    dataset = FakeDataset(**SMALL)
+    dataset = small()
     dataset.columns |= {
         name: np.zeros(dataset.n_records)
         for name in (*COLUMNS, *EXCLUDED, "params/fault.depth_mm")
@@ -206,7 +182,7 @@ def test_the_howto_names_what_is_left_out_and_why():
 
 
 def test_the_place_in_the_file_is_probed():
-    dataset = FakeDataset(**SMALL)
+    dataset = small()
     dataset.columns["condition_id"] = np.array(
         [f"c{index // 4}" for index in range(dataset.n_records)]
     )
@@ -218,8 +194,8 @@ def test_the_place_in_the_file_is_probed():
 
 
 def test_a_leak_is_found_and_where_there_is_none_the_probe_is_at_chance():
-    """The fake set deals its classes in turn, so that the place tells all; dealt at random it tells nothing."""
-    dataset = FakeDataset(**{**SMALL, "n_units": 24, "records_per_unit": 8})
+    """Classes come in turn: the index gives the class; shuffled, it does not."""
+    dataset = small(n_units=24, records_per_unit=8)
     task = make_task(dataset)
 
     source = Source(
@@ -246,70 +222,89 @@ def test_a_leak_is_found_and_where_there_is_none_the_probe_is_at_chance():
     assert share("result_probe") == 1.0
 
 
-# --- the jobs -----------------------------------------------------------------------------------------------------
+# ---- the jobs
 
 
 def test_every_control_has_its_jobs_and_only_on_clean_protocols():
-    settings = make_settings("normalise=both", "seeds=[3,4]", "protocols=null")
-    task = task_from(FakeDataset(**SMALL, twins=True), settings)
+    settings = settings_of(*FAST, "normalise=both", "seeds=[3,4]", "protocols=null")
+    task = task_from(small(twins=True), settings)
     jobs = control_jobs(task, settings, ["by_unit"])
     assert [(job.control, job.seed) for job in jobs] == [
-        ("probe", None), ("oracle", None), ("level_kept", 3), ("level_kept", 4), ("oracle", 3),
-    ]  # fmt: skip
+        ("probe", None),
+        ("oracle", None),
+        ("level_kept", 3),
+        ("level_kept", 4),
+        ("oracle", 3),
+    ]
     assert control_jobs(task, settings, []) == []
-    off = make_settings("oracle=false", "metadata_probe=false")
+    off = settings_of(*FAST, "oracle=false", "metadata_probe=false")
     assert control_jobs(task, off, ["by_unit"]) == []
-    without = task_from(FakeDataset(**SMALL), settings)
+    without = task_from(small(), settings)
     assert all(
         job.control != "oracle" for job in control_jobs(without, settings, ["by_unit"])
     )
 
 
+def offered():
+    """Data sets by name, opened in place of folders."""
+    datasets = {"good": small(twins=True), "sham": small(sham=True, seed=5)}
+    for name, dataset in datasets.items():
+        dataset.folder = Path(name)
+    return datasets
+
+
 @pytest.fixture
 def opened(monkeypatch):
-    """Data sets by name, opened in place of folders."""
-    offered = {
-        "good": FakeDataset(**SMALL, twins=True),
-        "sham": FakeDataset(**SMALL, sham=True, seed=5),
-    }
-    for name, dataset in offered.items():
-        dataset.folder = Path(name)
-    monkeypatch.setattr(
-        gensig.dataset.reader, "open_dataset", lambda path: offered[str(path)]
-    )
-    return offered
+    datasets = offered()
+    serve(monkeypatch, datasets)
+    return datasets
 
 
-def test_a_study_with_all_of_them(opened, tmp_path):
-    out = tmp_path / "out"
-    assert (
-        main(["train", "data=good", f"out={out}", *FAST, "sham=sham", "normalise=both"])
-        == 0
-    )
-    result = json.loads((out / "metrics.json").read_text())["protocols"]["by_unit"]
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """Function that trains on the data set and returns the folder."""
+
+    def run(*words):
+        out = tmp_path_factory.mktemp("study") / "out"
+        with pytest.MonkeyPatch.context() as patch:
+            serve(patch, offered())
+            assert main(["train", "data=good", f"out={out}", *words]) == 0
+        return out
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def complete(study):
+    """Study with every control."""
+    return study(*FAST, "sham=sham", "normalise=both")
+
+
+def by_unit(out):
+    return metrics_of(out)["protocols"]["by_unit"]
+
+
+def test_a_study_with_all_of_them(complete):
+    result = by_unit(complete)
     methods = result["methods"]
-    assert set(methods) == {
-        "cnn", "label_shuffle", "rms_threshold", "metadata_probe", "result_probe", "oracle_network",
-        "oracle_indicators", "oracle", "level_kept", "sham", "sham_rms_threshold", "chance",
-    }  # fmt: skip
-    assert methods["oracle"]["chosen"] in ("oracle_network", "oracle_indicators")
-    assert (
-        methods["oracle"]["balanced_accuracy"]
-        == methods[methods["oracle"]["chosen"]]["balanced_accuracy"]
+    oracles = {"oracle_network", "oracle_indicators"}
+    others = {"label_shuffle", "metadata_probe", "result_probe", "level_kept"}
+    shams = {"sham", "sham_rms_threshold"}
+    rest = {"cnn", "rms_threshold", "oracle", "chance"}
+    assert set(methods) == oracles | others | shams | rest
+    assert methods["oracle"]["chosen"] in oracles
+    network, oracle, chosen = (
+        methods[name]["balanced_accuracy"]
+        for name in ("cnn", "oracle", methods["oracle"]["chosen"])
     )
+    assert oracle == chosen
     share = result["over_oracle"]["balanced_accuracy"]
-    mean = (
-        methods["cnn"]["balanced_accuracy"]["mean"]
-        / methods["oracle"]["balanced_accuracy"]["mean"]
-    )
-    assert share["mean"] == pytest.approx(mean)
+    assert share["mean"] == pytest.approx(network["mean"] / oracle["mean"])
     assert share["low"] <= share["mean"] <= share["high"]
-    assert [path.name for path in (out / "models").iterdir()] == ["by_unit-seed0"]
-    assert "sham" not in {
-        line.split(",")[1]
-        for line in (out / "predictions.csv").read_text().splitlines()
-    }
-    page = (out / "report.html").read_text()
+    assert [path.name for path in (complete / "models").iterdir()] == ["by_unit-seed0"]
+    rows = rows_of(complete / "predictions.csv")
+    assert not shams & {row["method"] for row in rows}
+    page = (complete / "report.html").read_text()
     for words in (
         "metadata probe",
         "sham, network",
@@ -320,66 +315,33 @@ def test_a_study_with_all_of_them(opened, tmp_path):
         assert words in page
 
 
-def test_the_controls_change_no_bit_of_the_rest(opened, tmp_path):
-    plain = ["metadata_probe=false", "oracle=false"]
-    results = []
-    for name, words in (("with", ["sham=sham", "normalise=both"]), ("without", plain)):
-        assert (
-            main(["train", "data=good", f"out={tmp_path / name}", *FAST, *words]) == 0
-        )
-        results.append(
-            json.loads((tmp_path / name / "metrics.json").read_text())["protocols"][
-                "by_unit"
-            ]
-        )
+def test_the_controls_change_no_bit_of_the_rest(complete, study):
+    plain = study(*FAST, "metadata_probe=false", "oracle=false")
+    with_controls, without = by_unit(complete), by_unit(plain)
     for method in ("cnn", "rms_threshold", "label_shuffle"):
-        assert results[0]["methods"][method] == results[1]["methods"][method]
-    weights = [
-        (tmp_path / name / "models" / "by_unit-seed0" / "model.safetensors")
-        for name in ("with", "without")
-    ]
-    assert weights[0].read_bytes() == weights[1].read_bytes()
-    assert results[1]["over_oracle"] == {}
-
-
-def test_a_sham_set_scores_chance_where_the_faults_score_above(opened, tmp_path):
-    few = [
-        "baselines=[indicators_without_level]",
-        "epochs=4",
-        "metadata_probe=false",
-        "oracle=false",
-    ]
-    assert (
-        main(
-            [
-                "train",
-                "data=good",
-                f"out={tmp_path / 'out'}",
-                *FAST[:3],
-                *FAST[4:10],
-                *few,
-                "sham=sham",
-            ]
-        )
-        == 0
+        assert with_controls["methods"][method] == without["methods"][method]
+    first, second = (
+        (out / "models" / "by_unit-seed0" / "model.safetensors").read_bytes()
+        for out in (complete, plain)
     )
-    methods = json.loads((tmp_path / "out" / "metrics.json").read_text())["protocols"][
-        "by_unit"
-    ]["methods"]
+    assert first == second
+    assert without["over_oracle"] == {}
+
+
+def test_a_sham_set_scores_chance_where_the_faults_score_above(study):
+    few = ("epochs=4", "metadata_probe=false", "oracle=false", "n_bootstrap=200")
+    chosen = ("baselines=[indicators_without_level]", "sham=sham")
+    methods = by_unit(study(*FAST, *few, *chosen))["methods"]
     for name in ("sham", "sham_indicators_without_level"):
-        assert (
-            verdict(methods[name], 1 / len(CLASSES)) != "ABOVE chance: look for a leak"
-        )
+        found = verdict(methods[name], 1 / len(CLASSES))
+        assert found != "ABOVE chance: look for a leak"
     assert methods["indicators_without_level"]["balanced_accuracy"]["low"] > 0.4
 
 
 def test_the_section_is_empty_without_controls():
-    result = {
-        "leaky": False,
-        "methods": {"cnn": {}, "chance": {"balanced_accuracy": 0.25}},
-    }
+    methods = {"cnn": {}, "chance": {"balanced_accuracy": 0.25}}
     metrics = {
-        "protocols": {"by_unit": result},
+        "protocols": {"by_unit": {"leaky": False, "methods": methods}},
         "model": "cnn",
         "settings": {"oracle": "auto"},
     }
@@ -396,7 +358,7 @@ def test_verdicts(low, high, says):
     )
 
 
-# --- mistakes -----------------------------------------------------------------------------------------------------
+# ---- mistakes
 
 
 @pytest.mark.parametrize(
@@ -415,6 +377,10 @@ def test_verdicts(low, high, says):
             "sham=other: its channels are channel_0, channel_1, those of data= channel_0",
         ),
         (
+            {"protocols": ("cross_speed",)},
+            "sham=other has none of the protocols by_unit",
+        ),
+        (
             {"sampling_rate": 25600.0},
             "sham=other is sampled at 25600 Hz, data= at 12800 Hz",
         ),
@@ -423,22 +389,15 @@ def test_verdicts(low, high, says):
 def test_a_sham_set_that_does_not_fit_is_refused(
     opened, capsys, tmp_path, other, message
 ):
-    opened["other"] = FakeDataset(**{**SMALL, "sham": True, **other})
+    other = dict(other)
+    protocols = other.pop("protocols", None)
+    opened["other"] = small(**{"sham": True, **other})
     opened["other"].folder = Path("other")
-    assert (
-        main(["train", "data=good", f"out={tmp_path / 'out'}", *FAST, "sham=other"])
-        == 2
-    )
-    assert message in capsys.readouterr().err
+    if protocols:
+        opened["other"].protocols = protocols
+    words = ["train", "data=good", f"out={tmp_path / 'out'}", *FAST, "sham=other"]
+    refuses(capsys, words, message)
     assert not (tmp_path / "out").exists()
-
-
-def test_a_sham_set_without_the_protocol_is_refused(opened, capsys, tmp_path):
-    opened["sham"].protocols = ("cross_speed",)
-    assert (
-        main(["train", "data=good", f"out={tmp_path / 'out'}", *FAST, "sham=sham"]) == 2
-    )
-    assert "sham=sham has none of the protocols by_unit" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -455,4 +414,4 @@ def test_a_sham_set_without_the_protocol_is_refused(opened, capsys, tmp_path):
 )
 def test_mistakes_in_settings(word, message):
     with pytest.raises(ConfigError, match=message):
-        task_from(FakeDataset(**SMALL), make_settings(word))
+        task_from(small(), settings_of(*FAST, word))

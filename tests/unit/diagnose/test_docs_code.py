@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 from fake_dataset import CLASSES, FakeDataset
+from runs import FAST, NETWORK_ONLY, model_of, train
 
 import gensig.dataset.reader
 from diagnose.cli import main
@@ -14,11 +15,14 @@ from diagnose.cli import main
 HOWTO = Path(__file__).resolve().parents[3] / "docs" / "howto"
 
 
-def python_of(page):
-    (code,) = re.findall(
-        r"```python\n(.*?)```", (HOWTO / page).read_text("utf-8"), flags=re.DOTALL
-    )
-    return code
+def run_page(page):
+    """Names that the Python code of a page, at most 30 lines, defines."""
+    text = (HOWTO / page).read_text("utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    assert len(code.strip().splitlines()) <= 30
+    names = {}
+    exec(compile(code, page, "exec"), names)
+    return names
 
 
 @pytest.fixture(autouse=True)
@@ -30,59 +34,32 @@ def one_thread():
 
 
 @pytest.mark.parametrize("classes", [CLASSES, (*CLASSES, "wear")])
-def test_a_model_of_ones_own_learns_and_is_judged_on_unseen_units(
+def test_a_model_of_the_user_learns_and_is_judged_on_unseen_units(
     classes, monkeypatch, capsys
 ):
     data = FakeDataset(
         n_units=16, records_per_unit=8, duration=0.5, noise=0.2, classes=classes
     )
     monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path, **_: data)
-    code = python_of("train_your_model.md")
-    assert len(code.strip().splitlines()) <= 30
-    names = {}
-    exec(compile(code, "train_your_model.md", "exec"), names)
+    names = run_page("train_your_model.md")
     shown = capsys.readouterr().out
-    score = float(shown.rsplit(":", 1)[1])
-    assert score > 0.45  # chance is 0.25
+    assert float(shown.rsplit(":", 1)[1]) > 0.45  # chance is 0.25
     assert shown.count(" of 8: training loss") == 8
     units = data.column("unit_id")
-    train = names["train"].record
-    assert not set(units[train]) & set(units[names["record"]])
+    train_units = set(units[names["train"].record])
+    assert not train_units & set(units[names["record"]])
 
 
 def test_an_exported_model_answers_where_the_page_says(monkeypatch, tmp_path, capsys):
     for name in ("onnx", "onnxscript", "onnxruntime"):
         pytest.importorskip(name, reason="extra onnx")
-    data = FakeDataset(n_units=12, records_per_unit=8, duration=0.5)
-    monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path: data)
     monkeypatch.chdir(tmp_path)
-    words = [
-        "window_samples=1200",
-        "stride_samples=1000",
-        "epochs=1",
-        "seeds=[0]",
-        "n_bootstrap=20",
-        "n_threads=1",
-    ]
-    words += ["protocols=[by_unit]", "shuffle_control=false", "baselines=false"]
-    assert main(["train", "data=good", "out=report", *words]) == 0
-    assert (
-        main(
-            [
-                "export",
-                "--to",
-                "onnx",
-                "--model",
-                "report/models/by_unit-seed0",
-                "--out",
-                "gearbox.onnx",
-            ]
-        )
-        == 0
-    )
+    data = FakeDataset(n_units=12, records_per_unit=8, duration=0.5)
+    model = model_of(train(Path("report"), data, *FAST, *NETWORK_ONLY, "epochs=1"))
+    words = ["export", "--to", "onnx", "--model", model, "--out", "gearbox.onnx"]
+    assert main(words) == 0
     capsys.readouterr()
-    names = {}
-    exec(compile(python_of("export.md"), "export.md", "exec"), names)
+    names = run_page("export.md")
     probability = names["weight"] / names["weight"].sum()
     assert probability.shape == (4,)
     assert np.isfinite(probability).all()

@@ -1,33 +1,25 @@
-"""Testing on channels that were never trained on: which they are, and that nothing else changes."""
-
-import json
+"""Tests on channels that were never trained on: their choice, and that nothing else changes."""
 
 import numpy as np
 import pytest
-import torch
 from fake_dataset import FakeDataset
 from novelty_sets import CopiedChannels
+from runs import FAST, NETWORK_ONLY, metrics_of, refuses, serve, settings_of, train
 
-import gensig.dataset.reader
 from diagnose.baselines.features import Cache, feature_table
 from diagnose.cli import main
 from diagnose.data.protocols import channels_to_cross
 from diagnose.data.windows import load_windows, subset_segments
-from diagnose.settings import settings_from
 from diagnose.studies.jobs import Job, run_jobs
 from diagnose.studies.study import plan_study, task_from
+from diagnose.training.store import load_model
 from gensig.errors import ConfigError
-from gensig.options.compose import compose
 
-FAST = [
-    "window_samples=1200", "stride_samples=1000", "epochs=2", "seeds=[0]", "n_bootstrap=100", "n_threads=1",
-    "model.widths=[8,16]", "model.kernels=[32,5]", "model.strides=[8,4]", "shuffle_control=false",
-]  # fmt: skip
 FOUR = ("a", "b", "c", "d")
 
 
-def settings_of(*overrides):
-    return settings_from(compose("train", ["data=x", "out=y", *FAST, *overrides]))
+def four():
+    return FakeDataset(n_channels=4, duration=0.5)
 
 
 @pytest.mark.parametrize(
@@ -41,7 +33,7 @@ def settings_of(*overrides):
         (FOUR[:1], None, None, "the data set has 1 channel, and 2 are needed"),
         (
             FOUR,
-            ("a", "b", "c"),
+            FOUR[:3],
             None,
             "1 channel(s) are left beside channels=a,b,c; name fewer",
         ),
@@ -67,159 +59,103 @@ def test_test_channels_that_make_no_sense(channels, test_channels, message):
         channels_to_cross(FOUR, channels, test_channels)
 
 
-def test_only_the_test_part_has_other_channels():
-    dataset = FakeDataset(n_channels=4, duration=0.3)
-    task = task_from(dataset, settings_of())
-    for subset, channels in (
-        ("train", [0, 1]),
-        ("validation", [0, 1]),
-        ("test", [2, 3]),
-    ):
-        segments = subset_segments(task, "cross_sensor", subset)
-        np.testing.assert_array_equal(
-            segments.record, subset_segments(task, "by_unit", subset).record
-        )
-        windows = load_windows(task.part("cross_sensor", subset), segments)
-        np.testing.assert_array_equal(
-            windows.signals[0],
-            dataset.signals(int(segments.record[0]), channels=channels),
-        )
-        assert task.part("by_unit", subset) is task
+@pytest.mark.parametrize(
+    ("subset", "channels"),
+    [("train", [0, 1]), ("validation", [0, 1]), ("test", [2, 3])],
+)
+def test_only_the_test_part_has_other_channels(subset, channels):
+    dataset = four()
+    task = task_from(dataset, settings_of(*FAST))
+    segments = subset_segments(task, "cross_sensor", subset)
+    by_unit = subset_segments(task, "by_unit", subset)
+    np.testing.assert_array_equal(segments.record, by_unit.record)
+    windows = load_windows(task.part("cross_sensor", subset), segments)
+    expected = dataset.signals(int(segments.record[0]), channels=channels)
+    np.testing.assert_array_equal(windows.signals[0], expected)
+    assert task.part("by_unit", subset) is task
 
 
 def test_indicators_of_one_channel_are_not_taken_for_those_of_another():
-    task = task_from(FakeDataset(n_channels=2, duration=0.3), settings_of())
+    task = task_from(FakeDataset(n_channels=2, duration=0.3), settings_of(*FAST))
     segments, cache = subset_segments(task, "cross_sensor", "test"), Cache()
+    parts = [task.part("cross_sensor", name) for name in ("train", "test")]
     first, second = (
-        feature_table(task.part("cross_sensor", name), segments, cache=cache).values
-        for name in ("train", "test")
+        feature_table(part, segments, cache=cache).values for part in parts
     )
     assert not np.isclose(first, second).all(axis=1).any()
-    again = feature_table(task.part("cross_sensor", "test"), segments).values
-    np.testing.assert_array_equal(second, again)
+    np.testing.assert_array_equal(second, feature_table(parts[1], segments).values)
 
 
 def test_sensors_that_hear_the_same_change_nothing():
-    torch.set_num_threads(1)
-    settings = settings_of("channels=[near_x,near_y]", "baselines=[indicators]")
+    settings = settings_of(*FAST, "channels=[near_x,near_y]", "baselines=[indicators]")
     task = task_from(CopiedChannels(), settings)
     protocols = ("by_unit", "cross_sensor")
-    jobs = [
-        Job(protocols=protocols, seed=None),
-        *(Job(protocols=(name,), seed=0) for name in protocols),
-    ]
+    jobs = [Job(protocols=protocols, seed=None)]
+    jobs += [Job(protocols=(name,), seed=0) for name in protocols]
     found = run_jobs(task, settings, jobs, n_workers=1, on_done=lambda _: None)
-    by_protocol = {
-        name: [run for run in found if run.protocol == name] for name in protocols
-    }
-    for known, other in zip(*by_protocol.values(), strict=True):
-        np.testing.assert_array_equal(known.predicted, other.predicted)
-
-
-@pytest.fixture
-def data(monkeypatch):
-    offered = {
-        "four": FakeDataset(n_channels=4, duration=0.5),
-        "one": FakeDataset(duration=0.5),
-    }
-    monkeypatch.setattr(
-        gensig.dataset.reader, "open_dataset", lambda path: offered[str(path)]
+    known, other = (
+        [run for run in found if run.protocol == name] for name in protocols
     )
-    return offered
+    assert len(known) == 2
+    for same, crossed in zip(known, other, strict=True):
+        np.testing.assert_array_equal(same.predicted, crossed.predicted)
 
 
-def test_one_channel_is_refused_in_one_line_and_left_out_beside_others(
-    data, tmp_path, capsys
-):
-    words = ["train", "data=one", f"out={tmp_path / 'out'}", *FAST]
-    assert main([*words, "protocols=[cross_sensor]"]) == 2
-    assert (
-        "cross_sensor: the data set has 1 channel, and 2 are needed"
-        in capsys.readouterr().err
-    )
-    assert plan_study(task_from(data["one"], settings_of()), settings_of("protocols=null"))[0] == (
-        "by_unit", "random_window_leaky",
-    )  # fmt: skip
+def test_one_channel_is_left_out_beside_other_protocols():
+    task = task_from(FakeDataset(duration=0.5), settings_of(*FAST))
+    protocols, _ = plan_study(task, settings_of(*FAST, "protocols=null"))
+    assert protocols == ("by_unit", "random_window_leaky")
 
 
-def test_train_and_evaluate_know_the_channels(data, tmp_path, capsys):
-    out = tmp_path / "out"
-    choice = [
-        "protocols=[cross_sensor]",
-        "channels=[channel_3]",
-        "test_channels=[channel_1]",
-        "baselines=false",
-    ]
-    assert main(["train", "data=four", f"out={out}", *FAST, *choice]) == 0
-    metrics = json.loads((out / "metrics.json").read_text())["protocols"][
-        "cross_sensor"
-    ]
-    assert metrics["channels"] == {"train": ["channel_3"], "test": ["channel_1"]}
-    assert (
-        "never trained on: trained on channel_3, tested on channel_1."
-        in (out / "report.html").read_text()
-    )
-    model = out / "models" / "cross_sensor-seed0"
-    description = json.loads((model / "model.json").read_text())
-    assert (description["channel_names"], description["test_channel_names"]) == (
-        ["channel_3"],
-        ["channel_1"],
-    )
-    expected = metrics["methods"]["cnn"]["balanced_accuracy"]["mean"]
+@pytest.fixture(scope="module")
+def crossed(tmp_path_factory):
+    """Study of cross_sensor with chosen channels."""
+    words = (*NETWORK_ONLY[1:], "protocols=[cross_sensor]", "channels=[channel_3]")
+    out = tmp_path_factory.mktemp("crossed") / "out"
+    return train(out, four(), *FAST, *words, "test_channels=[channel_1]")
+
+
+def test_train_and_evaluate_know_the_channels(crossed, tmp_path, monkeypatch):
+    serve(monkeypatch, {"four": four()})
+    result = metrics_of(crossed)["protocols"]["cross_sensor"]
+    assert result["channels"] == {"train": ["channel_3"], "test": ["channel_1"]}
+    sentence = "never trained on: trained on channel_3, tested on channel_1."
+    assert sentence in (crossed / "report.html").read_text()
+    model = crossed / "models" / "cross_sensor-seed0"
+    description = load_model(model)[1]
+    assert description.channel_names == ("channel_3",)
+    assert description.test_channel_names == ("channel_1",)
 
     def evaluated(*words):
-        capsys.readouterr()
-        folder = tmp_path / f"judged-{'-'.join(words)}"
-        assert (
-            main(
-                ["evaluate", "data=four", f"model_dir={model}", f"out={folder}", *words]
-            )
-            == 0
-        )
-        return json.loads((folder / "metrics.json").read_text())
+        out = tmp_path / f"judged-{'-'.join(words)}"
+        words = ["data=four", f"model_dir={model}", f"out={out}", *words]
+        assert main(["evaluate", *words]) == 0
+        return metrics_of(out)
 
-    own = evaluated()
-    assert own["channel_names"] == ["channel_1"]
-    assert own["balanced_accuracy"]["mean"] == pytest.approx(expected, abs=1e-12)
+    known = evaluated()
+    assert known["channel_names"] == ["channel_1"]
+    expected = result["methods"]["cnn"]["balanced_accuracy"]["mean"]
+    assert known["balanced_accuracy"]["mean"] == pytest.approx(expected, abs=1e-12)
     assert evaluated("subset=train")["channel_names"] == ["channel_3"]
     assert evaluated("protocol=by_unit")["channel_names"] == ["channel_3"]
     assert evaluated("channels=channel_0")["channel_names"] == ["channel_0"]
     same = evaluated("protocol=by_unit", "channels=channel_1")
-    assert same["confusion"] == own["confusion"]
+    assert same["confusion"] == known["confusion"]
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("word", "message"),
     [
+        ("channels=channel_0", "the model takes 2, in the order of channel_0"),
+        ("channels=channel_7,channel_8", "no channel channel_7"),
         (
-            ["channels=channel_0,channel_1"],
-            "the model takes 1, in the order of channel_0",
-        ),
-        (["channels=channel_7"], "no channel channel_7"),
-        (
-            ["protocol=cross_sensor"],
+            "protocol=cross_sensor",
             "protocol cross_sensor: no channels to test on are named",
         ),
     ],
 )
 def test_evaluate_refuses_channels_that_do_not_fit(
-    data, tmp_path, capsys, words, message
+    model, capsys, monkeypatch, word, message
 ):
-    out = tmp_path / "out"
-    few = ["protocols=[by_unit]", "baselines=false", "channels=[channel_0]", "epochs=1"]
-    assert main(["train", "data=four", f"out={out}", *FAST, *few]) == 0
-    capsys.readouterr()
-    assert (
-        main(
-            [
-                "evaluate",
-                "data=four",
-                f"model_dir={out / 'models' / 'by_unit-seed0'}",
-                *words,
-            ]
-        )
-        == 2
-    )
-    lines = capsys.readouterr().err.strip().splitlines()
-    assert len(lines) == 1
-    assert message in lines[0]
+    serve(monkeypatch, {"four": four()})
+    refuses(capsys, ["evaluate", "data=four", f"model_dir={model}", word], message)

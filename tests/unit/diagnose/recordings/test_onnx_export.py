@@ -1,18 +1,16 @@
-"""The exported network answers like torch, from acceleration in m/s2, and says what its numbers mean."""
+"""The exported network answers like torch, from m/s2, and describes its numbers."""
 
 import json
-import subprocess
 import sys
 
 import numpy as np
 import pytest
 import torch
-from fake_dataset import FakeDataset
 from numpy.testing import assert_allclose
+from runs import refuses, says
 
-import gensig.dataset.reader
-from diagnose.cli import main
 from diagnose.data.windows import Segments, load_windows, task_of
+from diagnose.recordings import onnx_export
 from diagnose.training.classes import predict_windows
 from diagnose.training.store import load_model
 
@@ -20,162 +18,104 @@ onnx = pytest.importorskip("onnx", reason="extra onnx")
 onnxruntime = pytest.importorskip("onnxruntime", reason="extra onnx")
 pytest.importorskip("onnxscript", reason="extra onnx")
 
-FAST = [
-    "window_samples=1200", "stride_samples=1000", "epochs=1", "seeds=[0]", "n_bootstrap=20", "n_threads=1",
-    "protocols=[by_unit]", "shuffle_control=false", "baselines=false",
-]  # fmt: skip
-SMALL_CNN = ["model.widths=[8,16]", "model.kernels=[32,5]", "model.strides=[8,4]"]
+
+def exporting(model, file):
+    return ["export", "--to", "onnx", "--model", str(model), "--out", str(file)]
 
 
-def fake():
-    return FakeDataset(n_units=12, records_per_unit=8, duration=0.5, n_channels=2)
-
-
-def trained(folder, *overrides):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(gensig.dataset.reader, "open_dataset", lambda path: fake())
-        assert (
-            main(["train", "data=good", f"out={folder / 'out'}", *FAST, *overrides])
-            == 0
-        )
-    return str(folder / "out" / "models" / "by_unit-seed0")
-
-
-@pytest.fixture(scope="module")
-def model(tmp_path_factory):
-    return trained(tmp_path_factory.mktemp("study"), *SMALL_CNN)
+def session_of(file):
+    return onnxruntime.InferenceSession(str(file), providers=["CPUExecutionProvider"])
 
 
 @pytest.mark.parametrize(
-    "overrides",
-    [[*SMALL_CNN], [*SMALL_CNN, "normalise=none"], ["model=wdcnn"], ["model=spectrum"]],
-    ids=["cnn", "cnn with level", "wdcnn", "spectrum"],
+    "network", ["model", "levels_model", "model=wdcnn", "model=spectrum"]
 )
-def test_the_file_says_what_torch_says_of_records(overrides, tmp_path, capsys):
-    folder = trained(tmp_path, *overrides)
-    capsys.readouterr()
+def test_the_file_answers_like_torch(
+    network, two_channels, train_network, request, tmp_path, capsys
+):
+    if "=" in network:
+        folder = train_network("epochs=1", network=(network,))
+    else:
+        folder = request.getfixturevalue(network)
     file = tmp_path / "m.onnx"
-    assert main(["export", "--to", "onnx", "--model", folder, "--out", str(file)]) == 0
-    captured = capsys.readouterr()
-    assert len(captured.out.strip().splitlines()) == 1
-    assert captured.err == ""
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["m.onnx", "out"]
-    network, description = load_model(folder)
-    data = fake()
+    assert len(says(capsys, *exporting(folder, file)).strip().splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["m.onnx"]
+    model, description = load_model(folder)
+    normalise = description.normalise
     task = task_of(
-        data, window_samples=1200, stride_samples=1000, normalise=description.normalise
+        two_channels, window_samples=1200, stride_samples=1000, normalise=normalise
     )
-    record = np.array([90])
-    whole = Segments(
-        record=record, start=np.array([0]), stop=np.array([data.n_samples])
-    )
+    stop = np.array([two_channels.n_samples])
+    whole = Segments(record=np.array([90]), start=np.array([0]), stop=stop)
     windows = load_windows(task, whole)
-    raw = np.stack(
-        [data.signals(90)[:, start : start + 1200] for start in windows.start]
-    )
-    session = onnxruntime.InferenceSession(
-        str(file), providers=["CPUExecutionProvider"]
-    )
-    found = session.run(None, {"acceleration": raw + np.float32(0.25)})[
-        0
-    ]  # an offset counts for nothing
-    assert_allclose(found, predict_windows(network, windows), rtol=0, atol=1e-4)
+    signal = two_channels.signals(90)
+    raw = np.stack([signal[:, start : start + 1200] for start in windows.start])
+    # an offset counts for nothing
+    inputs = {"acceleration": raw + np.float32(0.25)}
+    (found,) = session_of(file).run(None, inputs)
+    assert_allclose(found, predict_windows(model, windows), rtol=0, atol=1e-4)
 
 
-def test_metadata_is_the_description(model, tmp_path):
+def test_metadata_are_the_description(model, tmp_path, capsys):
     file = tmp_path / "m.onnx"
-    assert main(["export", "--to", "onnx", "--model", model, "--out", str(file)]) == 0
+    says(capsys, *exporting(model, file))
     description = load_model(model)[1]
-    facts = onnxruntime.InferenceSession(
-        str(file), providers=["CPUExecutionProvider"]
-    ).get_modelmeta()
-    facts = facts.custom_metadata_map
-    assert json.loads(facts["class_names"]) == list(description.class_names)
-    assert json.loads(facts["channel_names"]) == list(description.channel_names)
-    assert json.loads(facts["temperature"]) == description.temperature
-    assert float(facts["sampling_rate_hz"]) == 12800.0
-    assert (int(facts["window_samples"]), int(facts["stride_samples"])) == (1200, 1000)
-    assert facts["normalise"].startswith("rms")
-    assert json.loads(facts["n_teeth"]) == [23, 84]
+    stored = session_of(file).get_modelmeta().custom_metadata_map
+    assert stored.pop("normalise").startswith("rms")
+    assert json.loads(stored["class_names"]) == list(description.class_names)
+    assert json.loads(stored["channel_names"]) == list(description.channel_names)
+    for name in ("temperature", "sampling_rate_hz", "window_samples", "stride_samples"):
+        assert json.loads(stored[name]) == getattr(description, name)
+    assert json.loads(stored["n_teeth"]) == [23, 84]
     (given,) = onnx.load(file).graph.input
-    assert [dim.dim_value for dim in given.type.tensor_type.shape.dim] == [
-        0,
-        2,
-        1200,
-    ]  # any number of windows
-
-
-def fails(capsys, words, message):
-    capsys.readouterr()
-    assert main(["export", *words]) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert len(captured.err.strip().splitlines()) == 1
-    assert message in captured.err
+    sizes = [size.dim_value for size in given.type.tensor_type.shape.dim]
+    assert sizes == [0, 2, 1200]  # any number of windows
 
 
 def test_a_file_that_answers_otherwise_is_removed(model, tmp_path, capsys, monkeypatch):
-    import diagnose.recordings.onnx_export
-
-    class Louder(diagnose.recordings.onnx_export.RawWindows):
+    class Louder(onnx_export.RawWindows):
         def forward(self, *inputs):
             return 1.001 * super().forward(*inputs)
 
-    monkeypatch.setattr(diagnose.recordings.onnx_export, "RawWindows", Louder)
+    monkeypatch.setattr(onnx_export, "RawWindows", Louder)
     file = tmp_path / "m.onnx"
-    fails(
-        capsys,
-        ["--to", "onnx", "--model", model, "--out", str(file)],
-        "answered unlike torch by 0.001",
-    )
+    refuses(capsys, exporting(model, file), "answered unlike torch by 0.001")
     assert not file.exists()
 
 
-def test_what_torch_cannot_write_leaves_no_file(model, tmp_path, capsys, monkeypatch):
+def test_a_failed_export_leaves_no_file(model, tmp_path, capsys, monkeypatch):
+    file = tmp_path / "m.onnx"
+
     def stopped(*_, **__):
-        (tmp_path / "m.onnx").write_bytes(b"half")
+        file.write_bytes(b"half")
         raise RuntimeError("no such\noperator")
 
     monkeypatch.setattr(torch.onnx, "export", stopped)
-    words = ["--to", "onnx", "--model", model, "--out", str(tmp_path / "m.onnx")]
-    fails(capsys, words, "cannot be written as ONNX: no such operator")
-    assert list(tmp_path.iterdir()) == []
+    message = "cannot be written as ONNX: no such operator"
+    refuses(capsys, exporting(model, file), message)
+    assert not file.exists()
 
 
 def test_mistakes_are_one_line(model, tmp_path, capsys):
-    (tmp_path / "there.onnx").write_text("mine")
-    for out, message in [
-        ("m.pt", "the name must end in .onnx"),
-        ("there.onnx", "exists; choose another"),
-        ("none/m.onnx", "there is no folder"),
+    there = tmp_path / "there.onnx"
+    there.write_text("mine")
+    for words, message in [
+        (exporting(model, tmp_path / "m.pt"), "the name must end in .onnx"),
+        (exporting(model, there), "exists; choose another"),
+        (exporting(model, tmp_path / "none" / "m.onnx"), "there is no folder"),
+        (exporting(tmp_path, tmp_path / "m.onnx"), "holds no model.json"),
+        (["export", "--to", "tflite"], "tflite is not one of onnx"),
     ]:
-        fails(
-            capsys,
-            ["--to", "onnx", "--model", model, "--out", str(tmp_path / out)],
-            message,
-        )
-    assert (tmp_path / "there.onnx").read_text() == "mine"
-    fails(
-        capsys,
-        ["--to", "tflite", "--model", model, "--out", "m.onnx"],
-        "tflite is not one of onnx",
-    )
-    fails(
-        capsys,
-        ["--to", "onnx", "--model", str(tmp_path), "--out", str(tmp_path / "m.onnx")],
-        "holds no model.json",
-    )
+        refuses(capsys, words, message)
+    assert there.read_text() == "mine"
 
 
-def test_without_the_extra_one_line_says_what_to_install(model, tmp_path):
-    code = (
-        "import sys; sys.modules['onnxscript'] = None\nfrom diagnose.cli import main\n"
-        f"sys.exit(main(['export', '--to', 'onnx', '--model', {model!r}, '--out', {str(tmp_path / 'm.onnx')!r}]))"
-    )
-    shown = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False
-    )
-    assert shown.returncode == 2
-    assert shown.stderr.strip() == (
-        "diagnose: export --to onnx needs the package onnxscript: pip install 'gensig[onnx]'"
+def test_without_the_extra_one_line_says_what_to_install(
+    model, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setitem(sys.modules, "onnxscript", None)
+    refuses(
+        capsys,
+        exporting(model, tmp_path / "m.onnx"),
+        "diagnose: export --to onnx needs the package onnxscript: pip install 'gensig[onnx]'",
     )

@@ -1,17 +1,14 @@
-"""Remaining lives: scores against values by hand, intervals that hold, lives whole on one side, what is learnt."""
+"""Remaining lives: scores against values by hand, intervals, splits of lives, what is learnt."""
 
-import csv
-import json
-import re
+import pickle
 
 import numpy as np
 import pytest
 from fake_dataset import FakeDataset
 from fake_lives import FakeLives
 from numpy.testing import assert_allclose
+from runs import LIFE, metrics_of, refuses, rows_of, serve, settings_of, train
 
-import gensig.dataset.reader
-from diagnose.cli import main
 from diagnose.data.lives import (
     balanced_weights,
     choose_life_protocols,
@@ -28,43 +25,19 @@ from diagnose.scoring.life_scores import (
     phm_score,
     prognostic_horizon,
 )
-from diagnose.settings import settings_from
+from diagnose.studies.life_jobs import run_life_job
 from diagnose.studies.life_study import plan_life_study
 from diagnose.studies.study import task_from
 from gensig.errors import ConfigError, DatasetError
-from gensig.options.compose import compose
-
-FAST = [
-    "task=remaining_life", "window_samples=1600", "stride_samples=1600", "epochs=5", "seeds=[0]", "n_bootstrap=200",
-    "n_threads=1", "model.widths=[8,16]", "model.kernels=[32,5]", "model.strides=[8,4]", "epoch_fraction=1",
-    "learning_rate=0.01",
-]  # fmt: skip
 
 
-def settings_of(*overrides):
-    return settings_from(compose("train", ["data=x", "out=y", *FAST, *overrides]))
+def settled(dataset, *overrides):
+    settings = settings_of(*LIFE, *overrides)
+    return task_from(dataset, settings), settings
 
 
 def planned(dataset, *overrides):
-    settings = settings_of(*overrides)
-    return plan_life_study(task_from(dataset, settings), settings)
-
-
-def trained(dataset, out, *overrides):
-    """Metrics and the rows of ``predictions.csv`` of the command on a data set in memory."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(gensig.dataset.reader, "open_dataset", lambda path: dataset)
-        assert main(["train", "data=lives", f"out={out}", *FAST, *overrides]) == 0
-    with (out / "predictions.csv").open() as file:
-        return json.loads((out / "metrics.json").read_text()), list(
-            csv.DictReader(file)
-        )
-
-
-@pytest.fixture(scope="module")
-def study(tmp_path_factory):
-    out = tmp_path_factory.mktemp("lives") / "out"
-    return out, *trained(FakeLives(n_lives=24, n_censored=6, seed=1), out)
+    return plan_life_study(*settled(dataset, *overrides))
 
 
 # ---- scores
@@ -85,25 +58,21 @@ def test_the_phm_score_has_its_printed_values():
 
 
 @pytest.mark.parametrize(
-    ("said", "expected"),
+    ("predicted", "expected"),
     [
         ([100, 50, 62, 70, 25, 5], 20.0),
         ([95, 85, 60, 40, 20, 0], 100.0),
         ([100, 80, 60, 40, 20, 30], 0.0),
     ],
 )
-def test_the_horizon_is_where_predictions_stay_within_the_band(said, expected):
-    true = np.array([100.0, 80, 60, 40, 20, 0])
-    assert prognostic_horizon(true, np.array(said, dtype=float), 10.0) == expected
-    shuffled = np.array([3, 0, 5, 1, 4, 2])
-    assert (
-        prognostic_horizon(true[shuffled], np.array(said, dtype=float)[shuffled], 10.0)
-        == expected
-    )
+def test_the_horizon_is_where_predictions_stay_within_the_band(predicted, expected):
+    true, predicted = np.array([100.0, 80, 60, 40, 20, 0]), np.array(predicted, float)
+    for order in (np.arange(6), np.array([3, 0, 5, 1, 4, 2])):
+        assert prognostic_horizon(true[order], predicted[order], 10.0) == expected
 
 
 def test_every_life_counts_the_same():
-    # life 0: one snapshot, error 6; life 1: three, error 2 too late each and the failure itself at the end
+    # life 0: one snapshot, error 6; life 1: three, each 2 too late, the last at the failure
     snapshots = Snapshots(
         life=np.array([0, 1, 1, 1]),
         true=np.array([50.0, 60.0, 30.0, 0.0]),
@@ -173,24 +142,21 @@ def test_intervals_hold_for_new_lives_where_pooled_ones_do_not():
 
 
 def test_a_bound_above_the_early_level_is_known_and_one_below_is_not():
-    dataset = FakeLives(n_lives=12, n_censored=4)
-    lives = lives_of(task_from(dataset, settings_of()))
+    lives = lives_of(settled(FakeLives(n_lives=12, n_censored=4))[0])
     censored = ~lives.failed
-    assert 0 < censored.sum() < censored.size
     known = lives.known(60.0)
     assert known[lives.failed].all()
-    assert_allclose(known[censored], lives.remaining[censored] >= 60.0, rtol=0, atol=0)
-    assert known[censored].any()
-    assert not known[censored].all()
+    np.testing.assert_array_equal(known[censored], lives.remaining[censored] >= 60.0)
+    assert set(known[censored]) == {True, False}
 
 
 def test_the_early_level_is_of_training_lives_that_failed():
-    dataset = FakeLives(n_lives=12, n_censored=4)
-    settings = settings_of()
-    lives = lives_of(task_from(dataset, settings))
+    task, settings = settled(FakeLives(n_lives=12, n_censored=4))
+    lives = lives_of(task)
     record = np.flatnonzero(np.char.startswith(lives.name, "u0"))
-    names = np.unique(lives.name[record[lives.failed[record]]])
-    lengths = [(lives.age + lives.remaining)[lives.name == name][0] for name in names]
+    names, first = np.unique(lives.name, return_index=True)
+    chosen = first[np.isin(names, lives.name[record[lives.failed[record]]])]
+    lengths = (lives.age + lives.remaining)[chosen]
     share = settings.remaining_life.early_life_share
     level = early_level(lives, record, level_h=None, share=share)
     assert level == pytest.approx(0.6 * np.median(lengths), rel=1e-12)
@@ -204,68 +170,53 @@ def test_weights_of_a_life_do_not_grow_with_its_snapshots():
 
 def test_a_split_that_cuts_lives_is_left_out():
     dataset = FakeLives(n_lives=12)
-    settings = settings_of()
-    task = task_from(dataset, settings)
-    protocols, left_out = choose_life_protocols(
-        task, lives_of(task), settings.protocols
-    )
-    assert protocols == ("by_unit",)
-    assert (
-        left_out["random_window_leaky"]
-        == "life u00 is in its train and its validation part"
-    )
+    task, settings = settled(dataset)
+    found = choose_life_protocols(task, lives_of(task), settings.protocols)
+    reason = "life u00 is in its train and its validation part"
+    assert found[0] == ("by_unit",)
+    assert found[1]["random_window_leaky"] == reason
     with pytest.raises(ConfigError, match="life u00 is in its train"):
         planned(dataset, "protocols=[random_window_leaky]")
-    dataset.columns["life_id"] = np.where(
-        dataset.columns["unit_id"] == "u11", "u00", dataset.columns["life_id"]
-    )
-    with pytest.raises(
-        ConfigError, match="by_unit: life u00 is in its train and its test part"
-    ):
+    life = dataset.columns["life_id"]
+    dataset.columns["life_id"] = np.where(life == "u11", "u00", life)
+    reason = "by_unit: life u00 is in its train and its test part"
+    with pytest.raises(ConfigError, match=reason):
         planned(dataset, "protocols=[by_unit]")
 
 
-def test_protocols_about_classes_and_sensors_are_left_out():
-    with pytest.raises(
-        ConfigError, match="cross_sensor: it is of no use for remaining lives"
-    ):
+def changed(column, record, value):
+    dataset = FakeLives(n_lives=8)
+    dataset.columns[column][record] = value
+    return dataset
+
+
+@pytest.mark.parametrize(
+    ("dataset", "message"),
+    [
+        *(
+            (FakeLives(n_lives=8).without(column), f"has no column {column}")
+            for column in ("life_time_h", "remaining_life_h", "life_failed")
+        ),
+        (changed("life_failed", 3, 0), "life u00 has failed in some of its records"),
+        (changed("remaining_life_h", 5, -1.0), "record r00005: .* must not be below 0"),
+        (FakeLives(n_lives=8, n_censored=8), "no life of its train part failed"),
+    ],
+)
+def test_columns_that_are_missing_or_contradict_are_refused(dataset, message):
+    with pytest.raises((ConfigError, DatasetError), match=message):
+        planned(dataset)
+
+
+def test_protocols_about_sensors_are_left_out():
+    with pytest.raises(ConfigError, match="it is of no use for remaining lives"):
         planned(FakeLives(n_lives=8, n_channels=2), "protocols=[cross_sensor]")
 
 
-def test_what_is_no_set_of_lives_is_refused_in_one_line(monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(
-        gensig.dataset.reader, "open_dataset", lambda path: FakeDataset()
-    )
-    assert main(["train", "data=x", f"out={tmp_path / 'out'}", *FAST]) == 2
-    lines = capsys.readouterr().err.strip().splitlines()
-    assert len(lines) == 1
-    assert "has no column life_id" in lines[0]
-    assert "experiment=run_to_failure" in lines[0]
+def test_a_data_set_without_lives_is_refused(monkeypatch, capsys, tmp_path):
+    serve(monkeypatch, {"x": FakeDataset()})
+    words = ["train", "data=x", f"out={tmp_path / 'out'}", *LIFE]
+    refuses(capsys, words, "has no column life_id", "experiment=run_to_failure")
     assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize("column", ["life_time_h", "remaining_life_h", "life_failed"])
-def test_each_column_is_needed(column):
-    with pytest.raises(DatasetError, match=f"has no column {column}"):
-        planned(FakeLives(n_lives=8).without(column))
-
-
-def test_columns_that_contradict_are_refused():
-    dataset = FakeLives(n_lives=8)
-    dataset.columns["life_failed"][3] = 0
-    with pytest.raises(
-        DatasetError, match="life u00 has failed in some of its records"
-    ):
-        planned(dataset)
-    dataset = FakeLives(n_lives=8)
-    dataset.columns["remaining_life_h"][5] = -1.0
-    with pytest.raises(DatasetError, match=r"record r00005: .* must not be below 0"):
-        planned(dataset)
-
-
-def test_a_part_without_failures_is_refused():
-    with pytest.raises(ConfigError, match="no life of its train part failed"):
-        planned(FakeLives(n_lives=8, n_censored=8))
 
 
 @pytest.mark.parametrize(
@@ -295,84 +246,75 @@ def test_a_part_without_failures_is_refused():
 def test_a_wrong_key_is_refused_in_one_line(
     word, message, monkeypatch, capsys, tmp_path
 ):
-    monkeypatch.setattr(
-        gensig.dataset.reader, "open_dataset", lambda path: FakeLives(n_lives=8)
-    )
-    assert main(["train", "data=x", f"out={tmp_path / 'out'}", *FAST, word]) == 2
-    (line,) = capsys.readouterr().err.strip().splitlines()
-    assert re.search(message, line), line
+    serve(monkeypatch, {"x": FakeLives(n_lives=8)})
+    words = ["train", "data=x", f"out={tmp_path / 'out'}", *LIFE, word]
+    refuses(capsys, words, message)
 
 
 # ---- what is learnt
 
 
-def test_vibration_that_tells_the_life_beats_the_clock(study):
-    _, metrics, _ = study
-    methods = metrics["protocols"]["by_unit"]["methods"]
-    assert set(methods) == {
-        "constant",
-        "age_only",
-        "indicators",
-        "indicators_and_age",
-        "cnn",
-        "cnn_and_age",
-    }
+def by_unit(out):
+    return metrics_of(out)["protocols"]["by_unit"]
+
+
+def mean_of(methods, method, measure):
+    return methods[method][measure]["mean"]
+
+
+def test_vibration_that_tells_the_life_beats_the_age(life_study):
+    methods = by_unit(life_study)["methods"]
+    vibration = ["indicators", "indicators_and_age", "cnn", "cnn_and_age"]
+    assert set(methods) == {"constant", "age_only", *vibration}
     for name in ("indicators", "indicators_and_age", "cnn_and_age"):
         assert methods[name]["gain_over_age_only_h"]["low"] > 0, name
-    assert (
-        methods["indicators"]["rmse_h"]["mean"]
-        < 0.6 * methods["age_only"]["rmse_h"]["mean"]
+    errors, horizons = (
+        [mean_of(methods, name, measure) for name in ("indicators", "age_only")]
+        for measure in ("rmse_h", "horizon_h")
     )
-    assert (
-        methods["indicators"]["horizon_h"]["mean"]
-        > methods["age_only"]["horizon_h"]["mean"]
-    )
+    assert errors[0] < 0.6 * errors[1]
+    assert horizons[0] > horizons[1]
 
 
 def test_vibration_that_tells_nothing_does_not(tmp_path):
-    metrics, _ = trained(
-        FakeLives(n_lives=24, seed=1, strength=0.0), tmp_path / "out", "epochs=1"
-    )
-    methods = metrics["protocols"]["by_unit"]["methods"]
+    dataset = FakeLives(n_lives=24, seed=1, strength=0.0)
+    methods = by_unit(train(tmp_path / "out", dataset, *LIFE, "epochs=1"))["methods"]
     for name in ("indicators", "cnn"):
         assert methods[name]["gain_over_age_only_h"]["low"] <= 0, name
 
 
-def test_censored_lives_are_told_and_never_scored(study):
-    _, metrics, rows = study
-    result = metrics["protocols"]["by_unit"]
+def test_censored_lives_are_counted_and_never_scored(life_study):
+    result, rows = by_unit(life_study), rows_of(life_study / "predictions.csv")
     assert sum(result["n_lives"].values()) == 18
     assert sum(result["n_lives_censored"].values()) == 6
-    assert {row["scored"] for row in rows if row["life_failed"] == "0"} <= {"0"}
-    mine = [
-        row for row in rows if row["method"] == "indicators" and row["scored"] == "1"
-    ]
-    assert len({row["life_id"] for row in mine}) == result["n_lives"]["test"]
-    level = result["early_life_h"]
-    by_name = {}
-    for row in mine:
-        error = float(row["predicted_h"]) - min(float(row["remaining_life_h"]), level)
-        by_name.setdefault(row["life_id"], []).append(error**2)
-    rmse = np.sqrt(np.mean([np.mean(errors) for errors in by_name.values()]))
-    assert result["methods"]["indicators"]["rmse_h"]["mean"] == pytest.approx(
-        rmse, rel=1e-4
-    )
     for row in rows:
-        assert (
-            0
-            <= float(row["low_h"])
-            <= float(row["predicted_h"])
-            <= float(row["high_h"])
-            <= level * 1.00001
+        assert row["scored"] == row["life_failed"]
+        low, predicted, high = (
+            float(row[f"{end}_h"]) for end in ("low", "predicted", "high")
         )
+        assert 0 <= low <= predicted <= high <= result["early_life_h"] * 1.00001
+    errors = {}
+    for row in rows:
+        if row["method"] == "indicators" and row["scored"] == "1":
+            true = min(float(row["remaining_life_h"]), result["early_life_h"])
+            error = float(row["predicted_h"]) - true
+            errors.setdefault(row["life_id"], []).append(error**2)
+    assert len(errors) == result["n_lives"]["test"]
+    rmse = np.sqrt(np.mean([np.mean(of_life) for of_life in errors.values()]))
+    found = mean_of(result["methods"], "indicators", "rmse_h")
+    assert found == pytest.approx(rmse, rel=1e-4)
 
 
-def test_the_report_is_whole(study):
-    out, metrics, _ = study
-    assert {path.name for path in out.iterdir()} == {
-        "metrics.json", "predictions.csv", "scores.csv", "report.html", "remaining_life_by_unit.png", "models",
-    }  # fmt: skip
-    page = (out / "report.html").read_text()
+def test_the_report_is_whole(life_study):
+    assert {path.name for path in life_study.iterdir()} == {
+        "metrics.json",
+        "predictions.csv",
+        "scores.csv",
+        "report.html",
+        "remaining_life_by_unit.png",
+        "models",
+    }
+    page = (life_study / "report.html").read_text()
     for text in (
         "How long the machines still run",
         "age only",
@@ -380,39 +322,30 @@ def test_the_report_is_whole(study):
         "random_window_leaky is left out",
     ):
         assert text in page
-    assert metrics["protocols_left_out"]["random_window_leaky"].startswith("life u00")
-    with (out / "scores.csv").open() as file:
-        rows = {
-            (row["method"], row["measure"]): float(row["mean"])
-            for row in csv.DictReader(file)
-        }
-    rmse = metrics["protocols"]["by_unit"]["methods"]["cnn"]["rmse_h"]["mean"]
-    assert rows["cnn", "rmse_h"] == pytest.approx(rmse, rel=1e-5)
+    scores = {
+        (row["method"], row["measure"]): float(row["mean"])
+        for row in rows_of(life_study / "scores.csv")
+    }
+    rmse = mean_of(by_unit(life_study)["methods"], "cnn", "rmse_h")
+    assert scores["cnn", "rmse_h"] == pytest.approx(rmse, rel=1e-5)
 
 
-def test_the_bits_do_not_depend_on_the_workers(study, tmp_path):
-    out, metrics, _ = study
-    again, _ = trained(
-        FakeLives(n_lives=24, n_censored=6, seed=1), tmp_path / "out", "n_threads=2"
-    )
-    assert again["protocols"] == metrics["protocols"]
-    assert (tmp_path / "out" / "predictions.csv").read_bytes() == (
-        out / "predictions.csv"
-    ).read_bytes()
+def test_a_job_that_is_sent_to_another_process_gives_the_same_bits(life_study, lives):
+    """A process of its own gets copies; it needs nothing else of this one."""
+    task, settings = settled(lives, "normalise=none")
+    job = plan_life_study(task, settings).jobs[-1]
+    task, settings, job = pickle.loads(pickle.dumps((task, settings, job)))
+    rows = rows_of(life_study / "predictions.csv")
+    for run in run_life_job(task, settings, job):
+        expected = [row["predicted_h"] for row in rows if row["method"] == run.method]
+        assert [f"{hours:.6g}" for hours in run.predicted] == expected
 
 
 def test_too_few_validation_lives_give_intervals_that_say_nothing(tmp_path):
-    metrics, _rows = trained(
-        FakeLives(n_lives=8),
-        tmp_path / "out",
-        "epochs=1",
-        "remaining_life.coverage=0.9",
-        "remaining_life.with_age=false",
-    )
-    result = metrics["protocols"]["by_unit"]
+    words = ("remaining_life.coverage=0.9", "remaining_life.with_age=false")
+    out = train(tmp_path / "out", FakeLives(n_lives=8), *LIFE, "epochs=1", *words)
+    result = by_unit(out)
     assert not result["intervals_hold"]
     assert set(result["methods"]) == {"constant", "age_only", "indicators", "cnn"}
-    assert result["methods"]["cnn"]["coverage"]["mean"] == 1
-    assert (
-        "validation lives are too few" in (tmp_path / "out" / "report.html").read_text()
-    )
+    assert mean_of(result["methods"], "cnn", "coverage") == 1
+    assert "validation lives are too few" in (out / "report.html").read_text()

@@ -1,0 +1,203 @@
+"""Result of one protocol that tells classes apart: scores, calibration and answers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnose.data.windows import Task
+from diagnose.networks.calibration import calibration_scores
+from diagnose.scoring.metrics import (
+    SCORES,
+    ratio_with_interval,
+    recall,
+    score_with_interval,
+)
+from diagnose.scoring.predictions import Prediction
+from diagnose.settings import TrainSettings
+from diagnose.studies.answers import protocol_answers
+from diagnose.studies.controls import chosen_oracle
+from diagnose.studies.counts import (
+    by_method,
+    confusion_counts,
+    n_different,
+    part_records,
+    part_sizes,
+    run_notes,
+    unit_ids,
+)
+from diagnose.studies.jobs import LABEL_SHUFFLE, ORACLE
+from diagnose.studies.result_files import Entry, network_name
+from diagnose.training.heads import head_scores
+
+BOOTSTRAP_SEED = 20240607
+Pairs = Sequence[tuple[NDArray[np.integer], NDArray[np.integer]]]
+
+
+def is_leaky(protocol: str) -> bool:
+    """True if a protocol has the same record on both sides.
+
+    Such a score is no measure of diagnosis.
+    """
+    return "leaky" in protocol
+
+
+def score_predictions(
+    task: Task, runs: Pairs, n_bootstrap: int, *, shuffled: bool = False
+) -> Entry:
+    """Scores of one method with intervals over units, confusion counts and recall.
+
+    Parameters
+    ----------
+    task : gives labels and units
+    runs : for each seed, records (record,) and predicted labels (record,); the same records in each
+    n_bootstrap : resamples of the units
+    shuffled : see `diagnose.scoring.metrics.score_with_interval`
+    """
+    confusion = confusion_counts(task, runs)
+    rng = np.random.default_rng(BOOTSTRAP_SEED)
+    result: Entry = {}
+    for name in SCORES:
+        score = score_with_interval(
+            name, confusion, n_bootstrap=n_bootstrap, rng=rng, shuffled=shuffled
+        )
+        result[name] = asdict(score)
+    total = confusion.sum(axis=(0, 1))
+    shares = zip(task.class_names, recall(total).tolist(), strict=True)
+    result["confusion"] = total.tolist()
+    result["recall"] = {name: share for name, share in shares if np.isfinite(share)}
+    return result
+
+
+def test_score(task: Task, prediction: Prediction, n_bootstrap: int) -> Entry:
+    """Score that is stored with a network.
+
+    Balanced accuracy with its interval, chance, and the numbers of records and units.
+    """
+    record = prediction.record
+    scores = score_predictions(task, [(record, prediction.predicted)], n_bootstrap)
+    accuracy = scores["balanced_accuracy"]
+    return {
+        "balanced_accuracy": {key: accuracy[key] for key in ("mean", "low", "high")},
+        "chance": 1.0 / n_different(task.labels()[record]),
+        "n_records": int(record.size),
+        "n_units": n_different(unit_ids(task)[record]),
+        "leaky": is_leaky(prediction.protocol),
+    }
+
+
+def protocol_result(
+    task: Task,
+    settings: TrainSettings,
+    protocol: str,
+    predictions: Sequence[Prediction],
+) -> Entry:
+    """Entry of a protocol in ``metrics.json``.
+
+    Parameters
+    ----------
+    task, settings : of the study
+    predictions : of all protocols
+    """
+    runs = by_method(predictions, protocol)
+    methods = {
+        name: _method_result(task, settings, name, mine) for name, mine in runs.items()
+    }
+    network = runs[network_name(settings)]
+    methods["chance"] = _chance(task, network[0].record)
+    mine = [run for of_method in runs.values() for run in of_method]
+    over_oracle: Entry = {}
+    oracle = chosen_oracle(task, mine)
+    if oracle is not None:
+        methods[ORACLE] = {**methods[oracle], "chosen": oracle}
+        over_oracle = _over_oracle(task, settings, network, runs[oracle])
+    answers = None
+    if not is_leaky(protocol):
+        answers = protocol_answers(task, settings, mine)
+    parts = part_records(task, protocol)
+    return {
+        "leaky": is_leaky(protocol),
+        "channels": {
+            subset: list(task.part(protocol, subset).channel_names)
+            for subset in ("train", "test")
+        },
+        **part_sizes(task, parts),
+        "methods": methods,
+        "over_oracle": over_oracle,
+        "validation_loss": [list(run.validation_loss) for run in network],
+        "best_epoch": [run.best_epoch for run in network],
+        "last_epoch": _last_epoch(task, settings, network),
+        "calibration": _calibration(task, network),
+        "heads": head_scores(
+            task, parts["train"], network, n_bootstrap=settings.n_bootstrap
+        ),
+        "answers": answers,
+    }
+
+
+def _method_result(
+    task: Task, settings: TrainSettings, method: str, runs: Sequence[Prediction]
+) -> Entry:
+    pairs = [(run.record, run.predicted) for run in runs]
+    shuffled = method == LABEL_SHUFFLE
+    scores = score_predictions(task, pairs, settings.n_bootstrap, shuffled=shuffled)
+    return {**scores, **run_notes(runs)}
+
+
+def _chance(task: Task, tested: NDArray[np.integer]) -> dict[str, float]:
+    """Scores of guessing, and of always naming the most frequent class."""
+    labels = task.labels()[np.unique(tested)]
+    counts = np.bincount(labels, minlength=len(task.class_names))
+    return {
+        "balanced_accuracy": 1.0 / int((counts > 0).sum()),
+        "majority_accuracy": float(counts.max() / counts.sum()),
+    }
+
+
+def _over_oracle(
+    task: Task,
+    settings: TrainSettings,
+    network: Sequence[Prediction],
+    oracle: Sequence[Prediction],
+) -> Entry:
+    """Scores of the network as shares of the oracle's."""
+    above, below = (
+        confusion_counts(task, [(run.record, run.predicted) for run in runs])
+        for runs in (network, oracle)
+    )
+    ratios = {}
+    for name in SCORES:
+        rng = np.random.default_rng(BOOTSTRAP_SEED)
+        ratios[name] = ratio_with_interval(
+            name, above, below, n_bootstrap=settings.n_bootstrap, rng=rng
+        )
+    return ratios
+
+
+def _last_epoch(
+    task: Task, settings: TrainSettings, network: Sequence[Prediction]
+) -> Entry:
+    """Epochs run, and scores of the weights of the last one, for comparison with the best."""
+    pairs = [
+        (run.record, run.last_predicted)
+        for run in network
+        if run.last_predicted is not None
+    ]
+    scores = score_predictions(task, pairs, settings.n_bootstrap)
+    return {
+        "epoch": [len(run.validation_loss) for run in network],
+        **{name: scores[name] for name in SCORES},
+    }
+
+
+def _calibration(task: Task, network: Sequence[Prediction]) -> Entry:
+    """Calibration of the probabilities of test records."""
+    labels = task.labels()
+    return calibration_scores(
+        [run.log_probability for run in network],
+        [labels[run.record] for run in network],
+        [run.temperature for run in network],
+    )

@@ -1,0 +1,74 @@
+"""Networks that tests of recordings share."""
+
+import numpy as np
+import pytest
+import torch
+from fake_dataset import FakeDataset
+from fake_lives import FakeLives
+from runs import LIFE, NETWORK_ONLY, QUICK, SMALL_CNN, model_of, train
+
+
+def fake():
+    return FakeDataset(n_units=12, records_per_unit=8, duration=0.5, n_channels=2)
+
+
+@pytest.fixture(scope="session")
+def two_channels():
+    """Data set that the networks learnt from."""
+    return fake()
+
+
+@pytest.fixture(scope="session")
+def train_network(tmp_path_factory):
+    """Function that trains a network of the data set and returns its folder."""
+
+    def make(*words, network=SMALL_CNN):
+        out = tmp_path_factory.mktemp("study") / "out"
+        words = (*QUICK, *network, *NETWORK_ONLY, *words)
+        return model_of(train(out, fake(), *words))
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def model(train_network):
+    return train_network("epochs=5")
+
+
+@pytest.fixture(scope="session")
+def levels_model(train_network):
+    """A network that sees levels in m/s2."""
+    return train_network("epochs=5", "normalise=none")
+
+
+@pytest.fixture(scope="session")
+def lives():
+    """Data set of lives."""
+    return FakeLives(n_lives=24, n_censored=6, seed=1)
+
+
+@pytest.fixture(scope="session")
+def life_study(tmp_path_factory, lives):
+    """Folder of a study of remaining lives."""
+    out = tmp_path_factory.mktemp("lives") / "out"
+    return train(out, lives, *LIFE, "normalise=none")
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    """Function that writes signals as a file that a user has."""
+
+    def write(signal, rate=12800, name="mine.npz"):
+        np.savez(tmp_path / name, acceleration=signal, sampling_rate_hz=rate)
+        return str(tmp_path / name)
+
+    return write
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_thread():
+    """Small work: threads cost more than they bring."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
