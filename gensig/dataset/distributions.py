@@ -63,7 +63,8 @@ class Distribution(ABC):
         """The number of levels; ConfigError where there is none."""
         if self.n_levels is None:
             raise ConfigError(
-                f"{self.key}: a grid needs its levels, for instance levels: 4, or distribution: {CHOICE}"
+                f"{self.key}: a grid needs its levels, for instance levels: 4, or distribution: "
+                f"{CHOICE}"
             )
         return self.n_levels
 
@@ -241,7 +242,8 @@ def _check_distribution(key: str, spec: Any) -> None:
     missing = [name for name in needed if name not in spec]
     if extra or missing:
         raise ConfigError(
-            f"{key}: {spec['distribution']} needs exactly {', '.join(needed)} (and levels, for a grid)"
+            f"{key}: {spec['distribution']} needs exactly {', '.join(needed)} (and levels, for a "
+            "grid)"
         )
     if spec["distribution"] == CHOICE:
         if not isinstance(spec["values"], list) or not spec["values"]:
@@ -261,7 +263,8 @@ def _check_range(key: str, spec: Mapping[str, Any], needed: tuple[str, ...]) -> 
     if not low < high or (kind == "log_uniform" and low <= 0.0):
         also = " and above 0" if kind == "log_uniform" else ""
         raise ConfigError(
-            f"{key}: low = {low:g} and high = {high:g} are no range for {kind}; low must be below{also}"
+            f"{key}: low = {low:g} and high = {high:g} are no range for {kind}; low must be "
+            f"below{also}"
         )
     if kind == "integers" and not all(
         float(spec[name]).is_integer() for name in needed
@@ -283,11 +286,13 @@ def _check_levels(key: str, spec: Mapping[str, Any]) -> None:
         )
     if isinstance(levels, bool) or not isinstance(levels, int) or levels < 2:
         raise ConfigError(
-            f"{key}: levels = {levels!r} must be a whole number of at least 2, or null to draw the values"
+            f"{key}: levels = {levels!r} must be a whole number of at least 2, or null to draw "
+            "the values"
         )
     if kind == "integers" and levels > spec["high"] - spec["low"] + 1:
         raise ConfigError(
-            f"{key}: levels = {levels}, but there are {spec['high'] - spec['low'] + 1:g} whole numbers"
+            f"{key}: levels = {levels}, but there are {spec['high'] - spec['low'] + 1:g} whole "
+            "numbers"
         )
 
 

@@ -29,11 +29,13 @@ class Plan:
 
     Parameters
     ----------
-    columns : name -> (record,) array of text, int64 or float64; `record_id`, `shard` and `row` are required
+    columns : name -> (record,) array of text, int64 or float64; `record_id`, `shard` and `row` are
+        required
 
     Raises
     ------
-    DatasetError    for missing columns, unequal lengths, repeated ids, or shards and rows that do not count up from 0
+    DatasetError    for missing columns, unequal lengths, repeated ids, or shards and rows that do
+                    not count up from 0
     """
 
     columns: Mapping[str, np.ndarray]
@@ -47,7 +49,8 @@ class Plan:
         ]
         if missing:
             raise DatasetError(
-                f"the plan has no column {', '.join(missing)}; every plan needs record_id, shard and row"
+                f"the plan has no column {', '.join(missing)}; every plan needs record_id, shard "
+                "and row"
             )
         lengths = {name: len(values) for name, values in columns.items()}
         n = lengths["record_id"]
@@ -56,7 +59,8 @@ class Plan:
         ]
         if n == 0 or wrong:
             raise DatasetError(
-                f"the plan has {n} records, and columns of other lengths: {wrong}; all must be equal, not 0"
+                f"the plan has {n} records, and columns of other lengths: {wrong}; all must be "
+                "equal, not 0"
             )
         _check_ids(columns["record_id"])
         _check_places(columns["shard"], columns["row"])
@@ -155,7 +159,8 @@ def _check_ids(ids: np.ndarray) -> None:
     if len(set(values)) != len(values):
         unique, counts = np.unique(ids, return_counts=True)
         raise DatasetError(
-            f"record_id {str(unique[counts > 1][0])!r} occurs more than once in the plan; ids must be unique"
+            f"record_id {str(unique[counts > 1][0])!r} occurs more than once in the plan; ids "
+            "must be unique"
         )
 
 
@@ -168,8 +173,8 @@ def _check_places(shard: np.ndarray, row: np.ndarray) -> None:
     if wrong.size:
         i = int(wrong[0])
         raise DatasetError(
-            f"plan record {i} is at shard {shard[i]} row {row[i]}, expected shard {expected_shard[i]} "
-            f"row {expected_row[i]}; shards and rows must count up from 0"
+            f"plan record {i} is at shard {shard[i]} row {row[i]}, expected shard "
+            f"{expected_shard[i]} row {expected_row[i]}; shards and rows must count up from 0"
         )
 
 
@@ -208,8 +213,8 @@ def plan_text(plan: Plan) -> str:
             and _infer(texts) != "str"
         ):
             raise DatasetError(
-                f"plan column {name} is text, but all its values look like numbers, such as {texts[0]!r}; "
-                "they would not come back as text: put a letter in front"
+                f"plan column {name} is text, but all its values look like numbers, such as "
+                f"{texts[0]!r}; they would not come back as text: put a letter in front"
             )
         cells.append(texts)
     buffer = io.StringIO()
@@ -301,7 +306,8 @@ class PlanRows:
         """All values of some records, as `Plan.record` gives them."""
         if n_records < 1 or first + n_records > len(self._begins) - 2:
             raise DatasetError(
-                f"{self.path} has no records {first} to {first + n_records - 1}; restore it from a copy"
+                f"{self.path} has no records {first} to {first + n_records - 1}; restore it from "
+                "a copy"
             )
         rows = list(self._cells(1 + first, n_records))
         if len(rows) != n_records or any(

@@ -46,7 +46,8 @@ def open_dataset(path: str | Path, *, allow_incomplete: bool = False) -> "Datase
     Parameters
     ----------
     path : str | Path           the folder
-    allow_incomplete : bool     open an interrupted run too; records of missing shards are not `usable`
+    allow_incomplete : bool     open an interrupted run too; records of missing shards are not
+                                `usable`
 
     Raises
     ------
@@ -56,8 +57,8 @@ def open_dataset(path: str | Path, *, allow_incomplete: bool = False) -> "Datase
     manifest = read_manifest(folder)
     if not manifest.is_complete and not allow_incomplete:
         raise DatasetError(
-            f"{folder} is incomplete: {manifest.n_done} of {len(manifest.shards)} shards are done; run "
-            f"`gensig resume {folder}`, or open it with allow_incomplete=True"
+            f"{folder} is incomplete: {manifest.n_done} of {len(manifest.shards)} shards are "
+            f"done; run `gensig resume {folder}`, or open it with allow_incomplete=True"
         )
     return Dataset(folder, manifest)
 
@@ -74,7 +75,8 @@ class Dataset:
     sampling_rate : float            Hz
     channel_names, class_names : list of text, in the order of the channel axis and of `label`
     attributes : dict                root attributes of the shards
-    sample_type, compression : str   how `signals` are stored: 'float32' or 'int16'; 'none', 'gzip', 'lzf' or 'blosc2'
+    sample_type, compression : str   how `signals` are stored: 'float32' or 'int16'; 'none',
+        'gzip', 'lzf' or 'blosc2'
     column_names, signal_names, protocols : list of text
     usable : (record,) bool          False for failed records and those of missing shards
     """
@@ -270,7 +272,8 @@ class Dataset:
         shard = int(np.searchsorted(self._starts, record_index, side="right")) - 1
         if self.manifest.shards[shard].state != "done":
             raise DatasetError(
-                f"record {record_index} is in {self.manifest.shards[shard].name}, which is not made yet"
+                f"record {record_index} is in {self.manifest.shards[shard].name}, which is not "
+                "made yet"
             )
         return shard, record_index - int(self._starts[shard])
 
@@ -279,14 +282,16 @@ class Dataset:
 
         Parameters
         ----------
-        conditions : column=value, where a column is one of `column_names` or of the plan, ``params/`` may be left out,
-            and ``fault`` means ``label_name``. A value is met by equality, a list by any of its values, a tuple
-            ``(low, high)`` by numbers from low to high, both included, None where a side is open. Names that are no
-            Python names go in as ``**{"params/x.y": (0, 1)}``.
+        conditions : column=value, where a column is one of `column_names` or of the plan,
+            ``params/`` may be left out, and ``fault`` means ``label_name``. A value is met by
+            equality, a list by any of its values, a tuple ``(low, high)`` by numbers from low to
+            high, both included, None where a side is open. Names that are no Python names go in as
+            ``**{"params/x.y": (0, 1)}``.
 
         Raises
         ------
-        DatasetError    for a column that does not exist and for text that no record has, with the nearest names
+        DatasetError    for a column that does not exist and for text that no record has, with the
+                        nearest names
 
         >>> data.where(fault="crack", speed_rpm=(1000, 2000), status="ok")    # doctest: +SKIP
         """
@@ -329,7 +334,8 @@ class Dataset:
         ):
             if record_id not in index:
                 raise DatasetError(
-                    f"{path} names record {record_id[:40]!r}, which the plan has not; restore it from a copy"
+                    f"{path} names record {record_id[:40]!r}, which the plan has not; restore it "
+                    "from a copy"
                 )
             rows[subset].append((index[record_id], start, stop))
         return rows
@@ -422,5 +428,6 @@ class Dataset:
     def _unreadable(self, shard: int, error: Exception) -> DatasetError:
         reason = first_line(error)
         return DatasetError(
-            f"{shard_path(self.folder, shard)} cannot be read ({reason}); run `gensig verify {self.folder}`"
+            f"{shard_path(self.folder, shard)} cannot be read ({reason}); run `gensig verify "
+            f"{self.folder}`"
         )

@@ -215,8 +215,9 @@ COLUMNS: dict[str, Column] = _table(
         "str16",
         "",
         "result",
-        "'error': below its limit; 'levels': teeth bounce, third-octave levels agree within 0.5 dB and indicators "
-        "within 5 %; 'unresolved'; 'none': not looked for; 'energy': a drive line's energy residual",
+        "'error': below its limit; 'levels': teeth bounce, third-octave levels agree within 0.5 "
+        "dB and indicators within 5 %; 'unresolved'; 'none': not looked for; 'energy': a drive "
+        "line's energy residual",
     ),
     (
         "contact_loss_fraction",
@@ -230,15 +231,16 @@ COLUMNS: dict[str, Column] = _table(
         "float64",
         "1",
         "fault",
-        "d' of the best detector, which knows what the fault adds, in the record's noise; NaN where not asked for, "
-        "and where the noise is not white over the whole band",
+        "d' of the best detector, which knows what the fault adds, in the record's noise; NaN "
+        "where not asked for, and where the noise is not white over the whole band",
     ),
     (
         "clipped_fraction",
         "float64",
         "1",
         "result",
-        "share of the samples of all channels outside the converter's range; 0 without one, NaN in a failed record",
+        "share of the samples of all channels outside the converter's range; 0 without one, NaN "
+        "in a failed record",
     ),
     (
         "clipped",
@@ -252,7 +254,8 @@ COLUMNS: dict[str, Column] = _table(
         "float64",
         "1",
         "noise",
-        "share of the samples that were lost and filled in all channels; 0 where none can be, NaN in a failed record",
+        "share of the samples that were lost and filled in all channels; 0 where none can be, "
+        "NaN in a failed record",
     ),
     (
         "life_id",
@@ -316,27 +319,34 @@ SIGNALS: dict[str, Column] = {
         Column(name="acceleration_clean", dtype="float32", unit="m/s^2", role="result", axes=("channel", "sample"),
                description="the same without noise, offset and converter (optional)"),
         Column(name="healthy_twin", dtype="float32", unit="m/s^2", role="result", axes=("channel", "sample"),
-               description="acceleration of the same record without its faults, with noise of its own (optional)"),
+               description="acceleration of the same record without its faults, with noise of its own "
+                   "(optional)"),
         Column(name="acceleration_source", dtype="float32", unit="m/s^2", role="result", axes=("source", "sample"),
-               description="accelerations at the bearings, before path and sensor, by source_names (optional)"),
+               description="accelerations at the bearings, before path and sensor, by source_names "
+                   "(optional)"),
         Column(name="acceleration_scale", dtype="float64", unit="m/s^2", role="result", axes=("channel",),
-               description="value of one count of acceleration, NaN in a failed record (only where that is int16)"),
+               description="value of one count of acceleration, NaN in a failed record (only where that "
+                   "is int16)"),
         Column(name="acceleration_clean_scale", dtype="float64", unit="m/s^2", role="result", axes=("channel",),
                description="the same for acceleration_clean"),
         Column(name="healthy_twin_scale", dtype="float64", unit="m/s^2", role="result", axes=("channel",),
                description="the same for healthy_twin"),
         Column(name="tacho", dtype="float32", unit="1", role="result", axes=("sample",),
-               description="tachometer: 1 in a pulse, 0 between, at an edge the share of the sample (optional)"),
+               description="tachometer: 1 in a pulse, 0 between, at an edge the share of the sample "
+                   "(optional)"),
         Column(name="encoder_angle", dtype="float64", unit="rad", role="result", axes=("sample",),
-               description="angle that the encoder reads, from its index mark on, errors included (optional)"),
+               description="angle that the encoder reads, from its index mark on, errors included "
+                   "(optional)"),
         Column(name="shaft_angle", dtype="float64", unit="rad", role="result", axes=("sample",),
                description="angle of the driving shaft (optional)"),
         Column(name="shaft_speed", dtype="float32", unit="rad/s", role="result", axes=("sample",),
-               description="actual speed of the driving shaft, central difference of its angle (optional)"),
+               description="actual speed of the driving shaft, central difference of its angle "
+                   "(optional)"),
         Column(name="torque_set", dtype="float32", unit="N m", role="condition", axes=("sample",),
                description="set torque over time, as torque_nm (optional)"),
         Column(name="mesh_pinion_tooth", dtype="int16", unit="1", role="fault", axes=("pair", "sample"),
-               description="pinion tooth of each pair that carries load, from 0; -1 where it does not (optional)"),
+               description="pinion tooth of each pair that carries load, from 0; -1 where it does not "
+                   "(optional)"),
         Column(name="mesh_wheel_tooth", dtype="int16", unit="1", role="fault", axes=("pair", "sample"),
                description="the same of the wheel (optional)"),
         Column(name="mesh_load_share", dtype="float32", unit="1", role="fault", axes=("pair", "sample"),
@@ -346,9 +356,11 @@ SIGNALS: dict[str, Column] = {
         Column(name="contact_lost", dtype="int8", unit="1", role="fault", axes=("sample",),
                description="1 where no tooth touches another (optional)"),
         Column(name="fault_engaged", dtype="int8", unit="1", role="fault", axes=("sample",),
-               description="1 where a faulty tooth carries load or stands on the path of contact (optional)"),
+               description="1 where a faulty tooth carries load or stands on the path of contact "
+                   "(optional)"),
         Column(name="fault_multihot", dtype="int8", unit="1", role="label", axes=("class",),
-               description="1 for the record's class and those of a compound fault's parts, by class_names (optional)"),
+               description="1 for the record's class and those of a compound fault's parts, by "
+                   "class_names (optional)"),
         Column(name="signal_power", dtype="float64", unit="(m/s^2)^2", role="result", axes=("channel",),
                description="mean square of the signal without noise, in the band of snr_db (optional)"),
         Column(name="noise_power", dtype="float64", unit="(m/s^2)^2", role="noise", axes=("channel",),
@@ -451,10 +463,11 @@ def column_table() -> str:
             kind = " or ".join(SAMPLE_TYPES)
         name = f"`{column.name}`" + (" *" if column.name in REQUIRED else "")
         lines.append(
-            f"| {name} | ({shape}) | {kind} | {column.unit} | {column.role} | {column.description} |"
+            f"| {name} | ({shape}) | {kind} | {column.unit} | {column.role} | "
+            f"{column.description} |"
         )
     lines.append(
-        f"| `{PARAMS}/<name>` | (record) | float64 | in the name | | a drawn or swept value; NaN where it does "
-        "not apply |"
+        f"| `{PARAMS}/<name>` | (record) | float64 | in the name | | a drawn or swept value; NaN "
+        "where it does not apply |"
     )
     return "\n".join(lines) + "\n"

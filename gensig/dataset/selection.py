@@ -168,7 +168,10 @@ class Selection:
         return (self[place] for place in range(len(self)))
 
     def __repr__(self) -> str:
-        return f"Selection({len(self)} of {self.dataset.n_records} records of {str(self.dataset.folder)!r})"
+        return (
+            f"Selection({len(self)} of {self.dataset.n_records} records of "
+            f"{str(self.dataset.folder)!r})"
+        )
 
     def _record(self, place: int) -> int:
         if not -len(self.index) <= place < len(self.index):
@@ -205,7 +208,8 @@ def _meets(dataset: RecordSource, name: str, wanted: Any) -> np.ndarray:
     values = _values(dataset, name)
     if values.ndim != 1:
         raise DatasetError(
-            f"column {name!r} holds {values.shape[1:]} values a record; a condition needs one a record"
+            f"column {name!r} holds {values.shape[1:]} values a record; a condition needs one a "
+            "record"
         )
     if isinstance(wanted, tuple):
         return _in_range(name, values, wanted)
@@ -220,8 +224,8 @@ def _meets(dataset: RecordSource, name: str, wanted: Any) -> np.ndarray:
             choice, str | int | float | np.generic
         ):
             raise DatasetError(
-                f"where {name}={choice!r}: the column holds {'text' if is_text else 'numbers'}; give a value of that "
-                "kind, a list of them"
+                f"where {name}={choice!r}: the column holds {'text' if is_text else 'numbers'}; "
+                "give a value of that kind, a list of them"
                 + ("" if is_text else ", or a range as a tuple (low, high)")
             )
     if is_text:
@@ -260,8 +264,8 @@ def _in_range(name: str, values: np.ndarray, wanted: tuple) -> np.ndarray:
         or any(np.isnan(limit) for limit in numbers)
     ):
         raise DatasetError(
-            f"where {name}={wanted!r}: a tuple is a closed range (low, high) of numbers, None where a side is open; "
-            "give a list for several values"
+            f"where {name}={wanted!r}: a tuple is a closed range (low, high) of numbers, None "
+            "where a side is open; give a list for several values"
         )
     low, high = (
         (-np.inf if wanted[0] is None else wanted[0]),

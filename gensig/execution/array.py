@@ -29,8 +29,9 @@ class ArrayExecutor(Executor):
     def __post_init__(self) -> None:
         if self.shard_index >= self.shard_count:
             raise ConfigError(
-                f"executor.shard_index = {self.shard_index} with executor.shard_count = {self.shard_count}: tasks are "
-                f"counted from 0 to {self.shard_count - 1}; write #SBATCH --array=0-{self.shard_count - 1}"
+                f"executor.shard_index = {self.shard_index} with executor.shard_count = "
+                f"{self.shard_count}: tasks are counted from 0 to {self.shard_count - 1}; write "
+                f"#SBATCH --array=0-{self.shard_count - 1}"
             )
 
     @property

@@ -36,7 +36,8 @@ class Executor(ABC):
 
     Attributes
     ----------
-    closes : bool    True where one call makes every shard, so that the data set can be closed afterwards
+    closes : bool    True where one call makes every shard, so that the data set can be closed
+                     afterwards
     """
 
     closes = True

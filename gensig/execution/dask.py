@@ -92,8 +92,8 @@ class DaskExecutor(Executor):
             )
         except (OSError, ValueError) as error:
             raise ConfigError(
-                f"executor.address = {self.address!r}: no Dask scheduler answers there ({one_line(error)}); start one "
-                "with `dask scheduler`"
+                f"executor.address = {self.address!r}: no Dask scheduler answers there "
+                f"({one_line(error)}); start one with `dask scheduler`"
             ) from error
         with client:
             threads = client.nthreads()
@@ -117,6 +117,7 @@ def load_distributed() -> ModuleType:
         import distributed
     except ImportError as error:
         raise ConfigError(
-            "executor=dask needs the package distributed, which is an extra; pip install 'gensig[dask]'"
+            "executor=dask needs the package distributed, which is an extra; pip install "
+            "'gensig[dask]'"
         ) from error
     return distributed

@@ -46,8 +46,8 @@ def settle_courses(config: Configuration, typed: Collection[str]) -> Configurati
         varied = f"operating.{QUANTITIES[key]}"
         if isinstance(course, FileCourse) and course.is_absolute and varied in vary:
             raise ConfigError(
-                f"operating.{key}.file = {course.file} gives {QUANTITIES[key]} itself, but the plan varies {varied}; "
-                f"name its column factor, or pin {varied}"
+                f"operating.{key}.file = {course.file} gives {QUANTITIES[key]} itself, but the "
+                f"plan varies {varied}; name its column factor, or pin {varied}"
             )
     if (
         any(isinstance(course, RandomWalk) for course in courses.values())
@@ -102,7 +102,8 @@ def least_speed(config: Configuration, set_speed: float) -> float:
         if key.startswith(("operating.speed_profile.", "operating.speed_ripple."))
     ]:
         raise ConfigError(
-            f"operating.turns: the plan draws {drawn[0]}, so the slowest turn is not known; use duration_s"
+            f"operating.turns: the plan draws {drawn[0]}, so the slowest turn is not known; use "
+            "duration_s"
         )
     if SPEED_KEY in vary:
         drawn_speed = read_distribution(f"plan.vary.{SPEED_KEY}", vary[SPEED_KEY])

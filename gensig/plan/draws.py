@@ -169,7 +169,8 @@ def _for_gear(
     unit = split_unit(key)[1]
     if spec["of"] not in sizes or unit not in ("mm", "um"):
         raise ConfigError(
-            f"fault.vary.{key}: of = {spec['of']!r}; a length may be drawn as a share of {', '.join(sizes)}"
+            f"fault.vary.{key}: of = {spec['of']!r}; a length may be drawn as a share of "
+            f"{', '.join(sizes)}"
         )
     size = from_si(key, to_si("size_mm", sizes[spec["of"]]))
 

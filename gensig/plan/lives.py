@@ -37,8 +37,8 @@ class Snapshot:
 
     Parameters
     ----------
-    unit, label, condition : int    ``label`` is the place of the class; ``condition`` is one of the unit's set-points,
-        or the snapshot itself where the machine drifts
+    unit, label, condition : int    ``label`` is the place of the class; ``condition`` is one of
+        the unit's set-points, or the snapshot itself where the machine drifts
     values : configuration key -> value of the machine at this time
     fault : boundary keys
     columns : what else its row of the plan has
@@ -197,7 +197,8 @@ def _checked_units(config: Configuration, options: LifeOptions) -> int:
     for key in ("n_records", "conditions_per_unit"):
         if plan[key] is not None:
             raise ConfigError(
-                f"plan.{key} = {plan[key]!r}: lives and their snapshots say how many records there are; leave it null"
+                f"plan.{key} = {plan[key]!r}: lives and their snapshots say how many records "
+                "there are; leave it null"
             )
     if plan["n_repeats"] != 1 or plan["design"] == GRID:
         raise ConfigError(
@@ -208,7 +209,8 @@ def _checked_units(config: Configuration, options: LifeOptions) -> int:
         if kinds - set(options.laws) or len(fault_parts(fault)) > 1:
             grown = ", ".join(("healthy", *options.laws))
             raise ConfigError(
-                f"plan.classes: nothing makes {name} grow; this life has {grown}: take life=mixed, or other classes"
+                f"plan.classes: nothing makes {name} grow; this life has {grown}: take "
+                "life=mixed, or other classes"
             )
         unfollowed = sorted(kind for kind in kinds if FAULTS[kind].growth in PAIRS_ONLY)
         if config["system"]["kind"] == LINE and unfollowed:
@@ -233,7 +235,8 @@ def _setpoints(
     blocks = options.blocks
     if blocks is not None and (drawn := sorted({SPEED, TORQUE} & set(vary))):
         raise ConfigError(
-            f"life.blocks gives {drawn[0]} itself, but the plan varies it; pin it, or take plan.vary={{}}"
+            f"life.blocks gives {drawn[0]} itself, but the plan varies it; pin it, or take "
+            "plan.vary={}"
         )
     given = None if blocks is None else given_history(blocks, options.horizon)
     n_setpoints = options.n_setpoints if given is None else len(given.speed)

@@ -46,7 +46,8 @@ class Counts:
     ----------
     n_conditions : over all units; unit ``condition % n_units`` runs a condition
     condition_points : (condition,) int    point of the grid over ``plan.vary``
-    fault_points : (condition,) int        point of the grid over a fault's ``vary``, modulo the size that one has
+    fault_points : (condition,) int        point of the grid over a fault's ``vary``, modulo the
+        size that one has
 
     Only a grid reads the points: there every unit runs every set-point with every fault.
     """
@@ -191,7 +192,8 @@ def read_counts(config: Configuration) -> Counts:
     if plan.is_grid:
         if per_unit is not None:
             raise ConfigError(
-                f"plan.conditions_per_unit = {per_unit!r}: a grid's levels say how many; leave it null"
+                f"plan.conditions_per_unit = {per_unit!r}: a grid's levels say how many; leave "
+                "it null"
             )
         per_unit, n_faults = _grid_size(config, plan)
     n_records = plan.n_records
@@ -226,8 +228,8 @@ def _grid_size(config: Configuration, plan: PlanOptions) -> tuple[int, int]:
     for key, distribution in plan.vary.items():
         if distribution.n_levels is None and not distribution.names_levels:
             raise ConfigError(
-                f"plan.vary.{key}: a grid needs its levels: give levels: 4 or so, distribution: choice, or "
-                "levels: null to draw it all the same"
+                f"plan.vary.{key}: a grid needs its levels: give levels: 4 or so, distribution: "
+                "choice, or levels: null to draw it all the same"
             )
     n_faults = [_n_points(vary) for vary in _fault_varies(config).values()]
     return _n_points(plan.vary), math.lcm(*n_faults)
@@ -279,11 +281,13 @@ def _fitting(plan: PlanOptions, n_records: int, counts: tuple[int, ...]) -> int:
     sum_of_all = f"{n_records:,} records ({product})" if product else "1 record"
     if plan.is_grid and n_records > MOST_IN_GRID:
         raise ConfigError(
-            f"the grid has {sum_of_all}, more than {MOST_IN_GRID:,}; take fewer levels, units or repeats"
+            f"the grid has {sum_of_all}, more than {MOST_IN_GRID:,}; take fewer levels, units or "
+            "repeats"
         )
     if plan.n_records not in (None, n_records):
         raise ConfigError(
-            f"plan.n_records = {plan.n_records}, but the plan has {sum_of_all}; plan.n_records=null takes them"
+            f"plan.n_records = {plan.n_records}, but the plan has {sum_of_all}; "
+            "plan.n_records=null takes them"
         )
     return n_records
 

@@ -53,7 +53,8 @@ class WornVibration:
     turns : (look,) of the pinion, ascending from 0
     depth : (look,) m             by the criterion of the wear
     rms : (look, sensor) m/s2     of the clean record, without its mean
-    limit_depth : depth at which the limit is reached, m; None where the life to the threshold ends below it
+    limit_depth : depth at which the limit is reached, m; None where the life to the threshold ends
+        below it
     """
 
     sensors: tuple[str, ...]
@@ -188,8 +189,8 @@ def _bench(case: WearCase, config: Configuration) -> _Bench:
     bench = _Bench(sound=sound, case=case)
     if not bench.heard:
         raise ConfigError(
-            f"sensing.channels = {list(bench.machine.sensing.channels)}: a limit of the vibration is in m/s2; name an "
-            "acceleration, such as pinion_y"
+            f"sensing.channels = {list(bench.machine.sensing.channels)}: a limit of the "
+            "vibration is in m/s2; name an acceleration, such as pinion_y"
         )
     return bench
 
@@ -220,14 +221,14 @@ def _require_below(options: WearOptions, new: Array) -> None:
     limit = options.vibration_limit_m_per_s2
     if limit is not None and new.max() >= limit:
         raise ConfigError(
-            f"wear.vibration_limit_m_per_s2 = {limit:g} is reached by new flanks already: theirs is "
-            f"{new.max():.4g} m/s2 RMS; give more"
+            f"wear.vibration_limit_m_per_s2 = {limit:g} is reached by new flanks already: theirs "
+            f"is {new.max():.4g} m/s2 RMS; give more"
         )
 
 
 def _require_record(case: WearCase, life: WearLife, turn: float, rms: Array) -> None:
     if np.isnan(rms).any():
         raise SimulationError(
-            f"worn {case.judged(_worn(life, turn)) * 1e6:.4g} um deep, the machine makes no record, and no limit was "
-            "reached before; give a smaller wear.threshold_um"
+            f"worn {case.judged(_worn(life, turn)) * 1e6:.4g} um deep, the machine makes no "
+            "record, and no limit was reached before; give a smaller wear.threshold_um"
         )

@@ -1,4 +1,5 @@
-"""Kills, Ctrl-C, full disks, closed folders, changed settings: nothing looks whole that is not, and resume mends it."""
+"""Kills, Ctrl-C, full disks, closed folders, changed settings: nothing looks whole that is not, and
+resume mends it."""
 
 import json
 import os
@@ -297,7 +298,8 @@ def test_a_change_is_named_before_any_shard_is_done(
 def test_a_killed_beginning_says_what_to_do_and_is_begun_anew(
     reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """SIGKILL of the command itself as soon as it has begun its folder, before the manifest is there."""
+    """SIGKILL of the command itself as soon as it has begun its folder, before the manifest is
+    there."""
     out = tmp_path / "data"
     code = (
         "import os, signal, sys\n"

@@ -1,4 +1,5 @@
-"""Executors: every shard once, a dead worker replaced, and the same bytes wherever they are made."""
+"""Executors: every shard once, a dead worker replaced, and the same bytes wherever they are
+made."""
 
 import functools
 import os
@@ -94,8 +95,9 @@ def announce(notes: Path, index: int) -> None:
 
 def test_workers_end_with_a_killed_parent(tmp_path: Path) -> None:
     code = (
-        "import functools, pathlib, test_executors as t\n"
-        f"list(t.LOCAL.run(functools.partial(t.announce, pathlib.Path({str(tmp_path)!r})), range(2)))"
+        "import functools, pathlib, test_executors as "
+        f"t\nlist(t.LOCAL.run(functools.partial(t.announce, pathlib.Path({str(tmp_path)!r})), "
+        "range(2)))"
     )
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}
     process = subprocess.Popen([sys.executable, "-c", code], env=environment)

@@ -135,8 +135,8 @@ def _example(data: Dataset, index: int, channel: str) -> ClassExample:
     )
     signal = signal[: max(shown, 2)]
     return ClassExample(
-        title=f"{values['label_name']}, severity {values['severity']:.2f} (record {values['record_id']}, "
-        f"{values['speed_rpm']:.0f} r/min, {torque:.3g} N m)",
+        title=f"{values['label_name']}, severity {values['severity']:.2f} (record "
+        f"{values['record_id']}, {values['speed_rpm']:.0f} r/min, {torque:.3g} N m)",
         time=np.arange(len(signal)) / data.sampling_rate * 1e3,
         signal=signal,
         frequency=frequency[np.minimum(starts + step, len(frequency)) - 1] / 1e3,

@@ -73,12 +73,14 @@ def croissant_text(data: Dataset, caveats: str) -> str:
             "http://mlcommons.org/croissant/RAI/1.0",
         ],
         "name": name,
-        "description": f"Gear vibration, simulated and labelled by gensig {manifest.generator_version}: {facts}.",
+        "description": f"Gear vibration, simulated and labelled by gensig {manifest.generator_version}: "
+        f"{facts}.",
         "license": "https://creativecommons.org/licenses/by/4.0/",
         "version": "1.0.0",
         "keywords": ["vibration", "gear", "fault diagnosis", "synthetic"],
         "isLiveDataset": False,
-        "citeAs": f"{name}: simulated gear vibration, gensig {manifest.generator_version}, {manifest.identity[:16]}",
+        "citeAs": f"{name}: simulated gear vibration, gensig {manifest.generator_version}, "
+        f"{manifest.identity[:16]}",
         "datePublished": str(manifest.environment.get("created", ""))[:10]
         or "1970-01-01",
         **_responsible_ai(data, facts, caveats),
@@ -108,7 +110,8 @@ def _responsible_ai(data: Dataset, facts: str, caveats: str) -> dict[str, Any]:
         "rai:dataAnnotationProtocol": "Labels are the inputs of the simulation, not judgements: each record states the "
         "fault that was put into its gear, its size and its tooth.",
         "rai:dataPreprocessingProtocol": [
-            "Integrated at a multiple of the sampling rate, low-passed and decimated; noise added at the stated ratio."
+            "Integrated at a multiple of the sampling rate, low-passed and decimated; noise "
+            "added at the stated ratio."
         ],
         "rai:dataLimitations": limits,
         "rai:dataBiases": [
@@ -120,7 +123,8 @@ def _responsible_ai(data: Dataset, facts: str, caveats: str) -> dict[str, Any]:
         ],
         "rai:dataUseCases": [
             "Developing and comparing methods of gear-fault diagnosis under known truth.",
-            "Not validated: deciding on a real machine with a model trained on these records alone.",
+            "Not validated: deciding on a real machine with a model trained on these records "
+            "alone.",
         ],
         "rai:dataSocialImpact": "A model that was never tried on measured signals may miss a dangerous fault.",
         "rai:personalSensitiveInformation": [

@@ -52,8 +52,8 @@ def export(
     Parameters
     ----------
     folder : str | Path     a complete data set; it is left alone
-    to : str                'hdf5': one shard of all records; 'parquet' or 'npz': one file; 'wav': a folder with one
-                            file a record and a table labels.csv
+    to : str                'hdf5': one shard of all records; 'parquet' or 'npz': one file; 'wav':
+                            a folder with one file a record and a table labels.csv
     out : str | Path        file or, for wav, folder to make
     samples : bool          parquet: time signals too, not only the labels
     one_channel : bool      wav: one file a record and channel, instead of one a record
@@ -64,8 +64,9 @@ def export(
 
     Raises
     ------
-    DatasetError    for a format or option that does not exist, a data set that is incomplete or damaged, a name that is
-                    taken or lies in the data set's folder, and a disk that is full
+    DatasetError    for a format or option that does not exist, a data set that is incomplete or
+                    damaged, a name that is taken or lies in the data set's folder, and a disk that
+                    is full
 
     Accelerations are float32 in m/s^2 however they are stored: nothing is lost, and int16 scales
     are left out.
@@ -119,7 +120,8 @@ def _check_request(
         raise DatasetError(f"{out}: there is no folder {out.parent}; make it first")
     if out.resolve().is_relative_to(folder.resolve()):
         raise DatasetError(
-            f"{out} lies in the data set {folder}, which holds its own files only; choose another place"
+            f"{out} lies in the data set {folder}, which holds its own files only; choose "
+            "another place"
         )
 
 
@@ -130,7 +132,8 @@ def _check_ids(data: Dataset) -> None:
     """
     if not np.array_equal(data.column("record_id"), data.plan.columns["record_id"]):
         raise DatasetError(
-            f"{data.folder}: shards and plan have different record ids; run `gensig verify {data.folder}`"
+            f"{data.folder}: shards and plan have different record ids; run `gensig verify "
+            f"{data.folder}`"
         )
 
 
@@ -204,7 +207,8 @@ def _write_wav(data: Dataset, folder: Path, *, one_channel: bool) -> None:
     rate = round(data.sampling_rate)
     if rate != data.sampling_rate:
         raise DatasetError(
-            f"sampling rate {data.sampling_rate} Hz: a wav file holds whole hertz only; use another format"
+            f"sampling rate {data.sampling_rate} Hz: a wav file holds whole hertz only; use "
+            "another format"
         )
     folder.mkdir()
     names = [

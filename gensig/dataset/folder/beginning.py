@@ -54,7 +54,8 @@ def create_folder(
 
     Parameters
     ----------
-    out : Path           a folder that does not exist, is empty, or was left by a call that was killed
+    out : Path           a folder that does not exist, is empty, or was left by a call that was
+                         killed
     config : dict        resolved configuration, plain values
     overrides : list     what the user typed
     plan : Plan          all records; it fixes the shards
@@ -64,13 +65,14 @@ def create_folder(
 
     Raises
     ------
-    DatasetError    when `out` holds anything else, before anything is touched; when the disk refuses, after which
-                    nothing new is left
+    DatasetError    when `out` holds anything else, before anything is touched; when the disk
+                    refuses, after which nothing new is left
     """
     out = Path(out)
     if identity != identity_hash(config, generator_version):
         raise DatasetError(
-            f"identity {identity[:12]} does not belong to this configuration; use identity_hash(config, ...)"
+            f"identity {identity[:12]} does not belong to this configuration; use "
+            "identity_hash(config, ...)"
         )
     texts = {
         CONFIG: yaml.safe_dump(
@@ -149,10 +151,16 @@ def _what_it_holds(out: Path) -> str:
     except DatasetError:
         return "exists and is not empty; choose another out=DIR or empty it first"
     if manifest.is_complete:
-        return f"is not empty: a complete data set of {manifest.n_records} records; choose another out=DIR"
+        return (
+            f"is not empty: a complete data set of {manifest.n_records} records; choose another "
+            "out=DIR"
+        )
     kind = "an interrupted" if manifest.n_done else "a planned"
     done = f"{manifest.n_made} of {manifest.n_records} records done"
-    return f"is not empty: {kind} data set, {done}; `gensig resume {out}` finishes it, another out=DIR begins one"
+    return (
+        f"is not empty: {kind} data set, {done}; `gensig resume {out}` finishes it, another "
+        "out=DIR begins one"
+    )
 
 
 def _make_folders(folders: Sequence[Path], made: list[Path]) -> None:

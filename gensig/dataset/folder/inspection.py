@@ -75,7 +75,8 @@ def _manifest_lines(folder: Path, manifest: Manifest) -> list[str]:
     n_bytes = sum(entry.bytes for entry in manifest.shards)
     return [
         f"  records      {manifest.n_records}, {manifest.n_failed} failed",
-        f"  shards       {', '.join(f'{n} {state}' for state, n in states.items() if n)}; {n_bytes} bytes",
+        f"  shards       {', '.join(f'{n} {state}' for state, n in states.items() if n)}; "
+        f"{n_bytes} bytes",
         f"  made by      gensig {_show(manifest.generator_version)}, seed {manifest.seed}, "
         f"{_show(manifest.environment.get('created', ''))}",
         f"  identity     {manifest.identity}",
@@ -95,8 +96,8 @@ def _dataset_lines(data: Dataset) -> list[str]:
         else ""
     )
     lines = [
-        f"  signal       acceleration ({len(data.channel_names)}, {data.n_samples}) float32, {units}, "
-        f"{data.sampling_rate:g} Hz, {duration:g} s",
+        f"  signal       acceleration ({len(data.channel_names)}, {data.n_samples}) float32, "
+        f"{units}, {data.sampling_rate:g} Hz, {duration:g} s",
         f"  stored as    {data.sample_type}{' with a scale' * (data.sample_type == 'int16')}, "
         f"compression {data.compression}",
         f"  channels     {', '.join(map(_show, data.channel_names))}",

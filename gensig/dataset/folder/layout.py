@@ -77,7 +77,8 @@ class Manifest:
     state : str            'incomplete', or 'complete' once everything else is on disk
     shards : tuple         one entry a shard, in order
     files : dict           sha256 of the other files that decide or list the records
-    configuration : dict   what `identity` was made of, so that keys changed since can be named; {} in older folders
+    configuration : dict   what `identity` was made of, so that keys changed since can be named; {}
+                           in older folders
     environment : dict     versions, machine and times; decides nothing
     """
 
@@ -131,26 +132,28 @@ def read_manifest(folder: Path) -> Manifest:
 
     Raises
     ------
-    DatasetError    when the folder is no data set, or the manifest is damaged, newer than this gensig, or names a file
-                    that is not one of a data set (such as '../other')
+    DatasetError    when the folder is no data set, or the manifest is damaged, newer than this
+                    gensig, or names a file that is not one of a data set (such as '../other')
     """
     folder = Path(folder)
     path = folder / MANIFEST
     if not path.is_file():
         if (folder / BEGINNING).is_file():
             raise DatasetError(
-                f"{folder} holds no record: its run was killed before the plan was on disk; give the same "
-                f"`gensig generate` or `gensig plan --freeze` with out={folder} again"
+                f"{folder} holds no record: its run was killed before the plan was on disk; give "
+                f"the same `gensig generate` or `gensig plan --freeze` with out={folder} again"
             )
         raise DatasetError(
-            f"{folder} is no gensig data set: it has no {MANIFEST}; give the folder that `gensig generate` made"
+            f"{folder} is no gensig data set: it has no {MANIFEST}; give the folder that `gensig "
+            "generate` made"
         )
     try:
         content = json.loads(read_text(path, limit=TEXT_BYTES_LIMIT))
         version = _get(content, "schema_version", int)
         if version != SCHEMA_VERSION:
             raise DatasetError(
-                f"format version {version}; this gensig reads {SCHEMA_VERSION}, install a matching one"
+                f"format version {version}; this gensig reads {SCHEMA_VERSION}, install a "
+                "matching one"
             )
         shards = tuple(
             shard_entry(i, entry)
@@ -206,7 +209,8 @@ def _get(content: Any, key: str, kind: type) -> Any:
     value = content.get(key) if isinstance(content, dict) else None
     if not isinstance(value, kind) or isinstance(value, bool):
         raise DatasetError(
-            f"'{key}' is missing or no {kind.__name__}; the manifest is damaged, restore it from a copy"
+            f"'{key}' is missing or no {kind.__name__}; the manifest is damaged, restore it from "
+            "a copy"
         )
     if isinstance(value, int) and value < 0:
         raise DatasetError(f"'{key}' is {value}; it cannot be negative")
@@ -289,5 +293,6 @@ def _refuse_yaml_bombs(text: str, path: Path) -> None:
         )
         if depth > CONFIG_DEPTH_LIMIT:
             raise DatasetError(
-                f"{path} is nested deeper than {CONFIG_DEPTH_LIMIT} levels; it is no gensig configuration"
+                f"{path} is nested deeper than {CONFIG_DEPTH_LIMIT} levels; it is no gensig "
+                "configuration"
             )

@@ -60,7 +60,8 @@ def identity_hash(config: ConfigContent, generator_version: str) -> str:
 
     Raises
     ------
-    DatasetError    when the configuration holds something other than text, numbers, booleans, null, lists and mappings
+    DatasetError    when the configuration holds something other than text, numbers, booleans,
+                    null, lists and mappings
     """
     content = {
         "config": deciding(config),
@@ -200,14 +201,15 @@ def finalize(out: Path, *, figures: bool = True) -> None:
             named = ", ".join(f"{entry.name} is {entry.state}" for entry in missing[:3])
             more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
             raise DatasetError(
-                f"{out}: {manifest.n_done} of {len(manifest.shards)} shards are done, {named}{more}; run `gensig "
-                f"resume {out}` first"
+                f"{out}: {manifest.n_done} of {len(manifest.shards)} shards are done, "
+                f"{named}{more}; run `gensig resume {out}` first"
             )
         for i, entry in enumerate(manifest.shards):
             path = shard_path(out, i)
             if not path.is_file() or path.stat().st_size != entry.bytes:
                 raise DatasetError(
-                    f"{path} is missing or has not the {entry.bytes} bytes recorded; run `gensig resume {out}`"
+                    f"{path} is missing or has not the {entry.bytes} bytes recorded; run `gensig "
+                    f"resume {out}`"
                 )
         _remove_leftovers(out)
         closed = replace(
@@ -249,5 +251,6 @@ def plain_data(config: ConfigContent) -> dict[str, Any]:
         return json.loads(json.dumps(config))
     except (TypeError, ValueError, RecursionError) as error:
         raise DatasetError(
-            f"the configuration holds a value that is no plain data ({error}); use text, numbers, lists"
+            f"the configuration holds a value that is no plain data ({error}); use text, "
+            "numbers, lists"
         ) from error

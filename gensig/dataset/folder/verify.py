@@ -44,7 +44,8 @@ class VerifyResult:
     complete : bool       True only for a closed data set without any problem
     problems : list       one line each; empty exactly when `complete`
     n_records : int       records the data set is meant to have
-    n_failed : int        records whose simulation failed; they are no problem, but no silence either
+    n_failed : int        records whose simulation failed; they are no problem, but no silence
+                          either
     """
 
     complete: bool
@@ -125,8 +126,8 @@ def _state(folder: Path, manifest: Manifest) -> list[str]:
     ]
     if not manifest.is_complete:
         problems.append(
-            f"incomplete: {manifest.n_done} of {len(manifest.shards)} shards are done and the data set was "
-            f"never closed; run `gensig resume {folder}`"
+            f"incomplete: {manifest.n_done} of {len(manifest.shards)} shards are done and the "
+            f"data set was never closed; run `gensig resume {folder}`"
         )
     needed = [CONFIG, PLAN, OVERRIDES, *([INDEX] if manifest.is_complete else [])]
     problems += [
@@ -188,7 +189,8 @@ def _beside_shards(folder: Path, manifest: Manifest) -> tuple[list[str], Plan | 
             )
         if "seed" in config and config["seed"] != manifest.seed:
             problems.append(
-                f"{CONFIG} has seed {config['seed']!r} and the manifest {manifest.seed}; one was altered"
+                f"{CONFIG} has seed {config['seed']!r} and the manifest {manifest.seed}; one was "
+                "altered"
             )
     except DatasetError as error:
         problems.append(str(error))
@@ -242,7 +244,8 @@ def _bytes_differ(
     if other is not None:
         return [f"{entry.name} is swapped: it holds what belongs in {other}"]
     return [
-        f"{entry.name} was altered: its sha256 is {digest[:12]}..., recorded is {entry.sha256[:12]}..."
+        f"{entry.name} was altered: its sha256 is {digest[:12]}..., recorded is "
+        f"{entry.sha256[:12]}..."
     ]
 
 
@@ -266,7 +269,8 @@ def _description_differs(file: h5py.File, path: Path, reference: dict) -> list[s
         )
         if names:
             problems.append(
-                f"{path.name} is foreign: its {part} {', '.join(names)} differ from those of the other shards"
+                f"{path.name} is foreign: its {part} {', '.join(names)} differ from those of the "
+                "other shards"
             )
     return problems
 
@@ -297,8 +301,8 @@ def _rows_differ(
         if wrong.size:
             i = int(wrong[0])
             problems.append(
-                f"{name} row {i}: {column.name} is {found[i].item()!a}, the plan says {planned[i].item()!a} "
-                f"({wrong.size} such rows)"
+                f"{name} row {i}: {column.name} is {found[i].item()!a}, the plan says "
+                f"{planned[i].item()!a} ({wrong.size} such rows)"
             )
             if column.name == "record_id":
                 return problems

@@ -22,11 +22,15 @@ class Deal:
     Parameters
     ----------
     column : text                         plan column of the groups; none of them is on two sides
-    usable : (subset, record) bool        whether a record is used if its group is dealt to that subset
+    usable : (subset, record) bool        whether a record is used if its group is dealt to that
+        subset
     min_groups : int                      fewer groups are no deal
-    test_share : float                    of the groups; `MIN_TESTED` where that is no more than `MAX_FOR_TESTS`
-    for_test : (record,) float or None    groups of the largest sum are tested on, as long as all classes are there
-    every_class : bool                    whether a subset needs every class of the plan, or only those it may use
+    test_share : float                    of the groups; `MIN_TESTED` where that is no more than
+        `MAX_FOR_TESTS`
+    for_test : (record,) float or None    groups of the largest sum are tested on, as long as all
+        classes are there
+    every_class : bool                    whether a subset needs every class of the plan, or only
+        those it may use
     """
 
     column: str

@@ -58,7 +58,8 @@ def make_splits(plan: Plan, seed: int) -> dict[str, SplitTable]:
 
     Parameters
     ----------
-    plan : Plan    with `label` and, for the clean protocols, `unit_id` and the columns that they hold out
+    plan : Plan    with `label` and, for the clean protocols, `unit_id` and the columns that they
+                   hold out
     seed : int     the same plan and seed give the same splits
 
     Returns
@@ -150,7 +151,10 @@ def _cross_range(
         return f"the plan has no column {column}"
     values = np.asarray(plan.columns[column], dtype=float)
     if not np.isfinite(values).all():
-        return f"{column} is not a number in {int((~np.isfinite(values)).sum())} of {values.size} records"
+        return (
+            f"{column} is not a number in {int((~np.isfinite(values)).sum())} of {values.size} "
+            "records"
+        )
     held = _outer(values if hold == "highest" else -values)
     if not held.any():
         return f"{column} is {values[0]:g} in all records"

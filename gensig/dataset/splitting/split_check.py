@@ -1,4 +1,5 @@
-"""Does a split keep apart what its protocol says? Looked at in the table itself, whoever made it."""
+"""Does a split keep apart what its protocol says? Looked at in the table itself, whoever made
+it."""
 
 from collections.abc import Sequence
 

@@ -106,12 +106,14 @@ def read_text(path: Path, *, limit: int) -> str:
     try:
         if not path.is_file():
             raise DatasetError(
-                f"{path} is missing or no ordinary file; the folder is damaged or no gensig data set"
+                f"{path} is missing or no ordinary file; the folder is damaged or no gensig data "
+                "set"
             )
         size = path.stat().st_size
         if size > limit:
             raise DatasetError(
-                f"{path} has {size} bytes, at most {limit} are allowed; it is no file of a gensig data set"
+                f"{path} has {size} bytes, at most {limit} are allowed; it is no file of a "
+                "gensig data set"
             )
         return path.read_bytes().decode("utf-8")
     except UnicodeDecodeError as error:

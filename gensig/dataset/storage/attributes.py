@@ -41,7 +41,8 @@ def set_attribute(target: h5py.HLObject, name: str, value: Attribute) -> None:
             data = data.astype(np.int8)
         if data.dtype.kind not in "if":
             raise DatasetError(
-                f"attribute {name} is {value!r}; allowed are text, int, float and lists of one of them"
+                f"attribute {name} is {value!r}; allowed are text, int, float and lists of one "
+                "of them"
             )
     if data.nbytes > ATTRIBUTE_BYTES_LIMIT:
         raise DatasetError(

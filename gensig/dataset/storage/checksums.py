@@ -81,8 +81,8 @@ def read_checksums(folder: Path) -> dict[str, str]:
     path = folder / CHECKSUMS
     if not path.is_file():
         raise DatasetError(
-            f"{CHECKSUMS} is missing; restore it from a copy, or let `gensig finalize {folder}` write it where you "
-            "trust the folder as it is"
+            f"{CHECKSUMS} is missing; restore it from a copy, or let `gensig finalize {folder}` "
+            "write it where you trust the folder as it is"
         )
     text = read_text(path, limit=TEXT_BYTES_LIMIT)
     found: dict[str, str] = {}
@@ -90,7 +90,8 @@ def read_checksums(folder: Path) -> dict[str, str]:
         match = _LINE.fullmatch(line)
         if match is None or match[2] in found:
             raise DatasetError(
-                f"{CHECKSUMS} was altered: line {number} is none of a data set; restore it from a copy"
+                f"{CHECKSUMS} was altered: line {number} is none of a data set; restore it from "
+                "a copy"
             )
         found[match[2]] = match[1]
     if not text.endswith("\n"):
@@ -108,7 +109,8 @@ def differences(
 
     Parameters
     ----------
-    quick : bool    of the files beside those that the manifest lists, look at its own digest and at names only
+    quick : bool    of the files beside those that the manifest lists, look at its own digest and
+                    at names only
     """
     try:
         listed = read_checksums(folder)

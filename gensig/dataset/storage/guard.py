@@ -93,9 +93,10 @@ def check_shard(file: h5py.File, path: Path) -> None:
 
     Raises
     ------
-    DatasetError    for soft or external links, types that are no plain numbers or text, data outside the file, filters
-                    other than gzip, lzf and blosc2, shapes larger than what is stored, missing columns, unequal row
-                    counts, blosc2 without the package that reads it
+    DatasetError    for soft or external links, types that are no plain numbers or text, data
+                    outside the file, filters other than gzip, lzf and blosc2, shapes larger than
+                    what is stored, missing columns, unequal row counts, blosc2 without the package
+                    that reads it
     """
     try:
         found = datasets(file, path)
@@ -140,7 +141,8 @@ def datasets(file: h5py.File, path: Path) -> dict[str, h5py.Dataset]:
                 collect(item, f"{prefix}{key}/", deeper=False)
             else:
                 raise DatasetError(
-                    f"{path}: '{_plain(prefix + key)}' is neither a data set nor a group of data sets"
+                    f"{path}: '{_plain(prefix + key)}' is neither a data set nor a group of data "
+                    "sets"
                 )
 
     collect(file, "", deeper=True)
@@ -165,7 +167,8 @@ def _check_dataset(name: str, data: h5py.Dataset, n_records: int, path: Path) ->
         )
     if n_records == 0 or row_count(data) != n_records:
         raise DatasetError(
-            f"{label} has shape {data.shape}, record_id has {n_records} rows; all must be equal, not 0"
+            f"{label} has shape {data.shape}, record_id has {n_records} rows; all must be equal, "
+            "not 0"
         )
     used = filters(data)
     if not used <= _FILTERS:
@@ -176,8 +179,8 @@ def _check_dataset(name: str, data: h5py.Dataset, n_records: int, path: Path) ->
         load_blosc2(f"{path} is compressed with blosc2; reading it")
     if not _is_stored(data, used):
         raise DatasetError(
-            f"{label} declares {data.size * dtype.itemsize} bytes and stores {data.id.get_storage_size()}; "
-            "it was never written or is a bomb"
+            f"{label} declares {data.size * dtype.itemsize} bytes and stores "
+            f"{data.id.get_storage_size()}; it was never written or is a bomb"
         )
     column = SIGNALS.get(name) or COLUMNS.get(name)
     if column is not None:
@@ -187,7 +190,8 @@ def _check_dataset(name: str, data: h5py.Dataset, n_records: int, path: Path) ->
         if not same_kind or data.ndim != 1 + len(column.axes):
             raise DatasetError(
                 f"{label} has type {dtype} and {data.ndim} axes; format version 1 wants "
-                f"{' or '.join(SAMPLE_TYPES) if name in SCALES else column.dtype} and {1 + len(column.axes)}"
+                f"{' or '.join(SAMPLE_TYPES) if name in SCALES else column.dtype} and "
+                f"{1 + len(column.axes)}"
             )
 
 
@@ -231,7 +235,8 @@ def _check_scale(
         )
     if found[scale].shape != found[name].shape[:2]:
         raise DatasetError(
-            f"{path}: {scale} has shape {found[scale].shape}, {name} has {found[name].shape[:2]} records and channels"
+            f"{path}: {scale} has shape {found[scale].shape}, {name} has {found[name].shape[:2]} "
+            "records and channels"
         )
 
 
@@ -249,7 +254,8 @@ def _check_attributes(file: h5py.File, path: Path) -> None:
     version, rate = found["schema_version"], found["sampling_rate_hz"]
     if version != SCHEMA_VERSION:
         raise DatasetError(
-            f"{path} has format version {version}; this gensig reads {SCHEMA_VERSION}, get a matching one"
+            f"{path} has format version {version}; this gensig reads {SCHEMA_VERSION}, get a "
+            "matching one"
         )
     if not isinstance(rate, int | float) or not 0 < rate < float("inf"):
         raise DatasetError(
@@ -263,7 +269,8 @@ def _check_attributes(file: h5py.File, path: Path) -> None:
             raise DatasetError(f"{path}: attribute {name} must be a list of text")
     if len(found["channel_names"]) != file["acceleration"].shape[1]:
         raise DatasetError(
-            f"{path}: {len(found['channel_names'])} channel names for {file['acceleration'].shape[1]} channels"
+            f"{path}: {len(found['channel_names'])} channel names for "
+            f"{file['acceleration'].shape[1]} channels"
         )
 
 

@@ -85,7 +85,8 @@ def open_index(folder: Path) -> h5py.File:
 
     Raises
     ------
-    DatasetError    when it is missing or damaged, or a data set of it is no view of all shards in the manifest's order
+    DatasetError    when it is missing or damaged, or a data set of it is no view of all shards in
+                    the manifest's order
     """
     path = Path(folder) / INDEX
     manifest = read_manifest(folder)

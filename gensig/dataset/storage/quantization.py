@@ -24,8 +24,8 @@ def quantized(signal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Returns
     -------
     counts : (channel, sample) int16    -32767 to 32767, which the largest value of each channel has
-    scale : (channel,) float64          unit of the signal; 1 for a channel of zeros, NaN (and counts of 0) for one that
-                                        is not finite throughout
+    scale : (channel,) float64          unit of the signal; 1 for a channel of zeros, NaN (and
+        counts of 0) for one that is not finite throughout
 
     The error is at most half a count: 1 / 65534 of the channel's peak, 96.3 dB below it.
     """

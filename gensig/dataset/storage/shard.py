@@ -47,13 +47,17 @@ class ShardWriter:
 
     Parameters
     ----------
-    path : Path          the shard's final name; nothing appears under it before the block ends cleanly
+    path : Path          the shard's final name; nothing appears under it before the block ends
+                         cleanly
     n_records : int      number of rows
-    signals : name -> shape of one record's array, such as {"acceleration": (4, 51200), "noise_power": (4,)}
+    signals : name -> shape of one record's array, such as {"acceleration": (4, 51200),
+        "noise_power": (4,)}
     params : list        names of the `params/<name>` columns
-    attributes : dict    root attributes; `sampling_rate_hz`, `channel_names` and `class_names` are required
+    attributes : dict    root attributes; `sampling_rate_hz`, `channel_names` and `class_names` are
+                         required
     compression : str    one of `COMPRESSIONS`, for the time signals
-    sample_type : str    'float32', or 'int16': accelerations become counts, and the writer adds their scales
+    sample_type : str    'float32', or 'int16': accelerations become counts, and the writer adds
+                         their scales
     lives : bool         whether records are snapshots of lives, with `LIFE_COLUMNS`
 
     Attributes
@@ -62,7 +66,8 @@ class ShardWriter:
 
     Raises
     ------
-    DatasetError    for unknown names, wrong shapes or types, a row written twice or never, a disk that is full
+    DatasetError    for unknown names, wrong shapes or types, a row written twice or never, a disk
+                    that is full
 
     The bytes depend neither on time, folder nor process; with `compression='none'` not on the
     order of `write` either. The shard is built in memory, about twice its size at the end, and
@@ -165,8 +170,10 @@ class ShardWriter:
         Parameters
         ----------
         row : int        0 to n_records - 1, each exactly once
-        signals : dict   every declared signal; a record with status 'failed' may leave floating-point ones out (NaN)
-        values : dict    every column of `COLUMNS` but those in `DEFAULTS`; `params/<name>` left out become NaN
+        signals : dict   every declared signal; a record with status 'failed' may leave
+                         floating-point ones out (NaN)
+        values : dict    every column of `COLUMNS` but those in `DEFAULTS`; `params/<name>` left
+                         out become NaN
         """
         if self._file is None:
             raise DatasetError(
@@ -208,7 +215,8 @@ class ShardWriter:
             if failed and column.storage_dtype.kind == "f":
                 return np.full(shape, np.nan, column.storage_dtype)
             raise DatasetError(
-                f"{self.path.name}: signal {name} is missing; only a record with status 'failed' may omit it"
+                f"{self.path.name}: signal {name} is missing; only a record with status 'failed' "
+                "may omit it"
             )
         given = np.asarray(signals[name])
         if given.shape != shape or given.dtype.kind not in "fiub":
@@ -319,17 +327,19 @@ def _check_declaration(writer: ShardWriter, params: Sequence[str]) -> None:
         n_bytes = math.prod(shape) * own[signal].n_bytes
         if writer.compression == "blosc2" and n_bytes > BLOSC2_CHUNK_LIMIT:
             raise DatasetError(
-                f"{name}: a record's {signal} has {n_bytes} bytes, blosc2 takes {BLOSC2_CHUNK_LIMIT}; make shorter "
-                "records or choose another compression"
+                f"{name}: a record's {signal} has {n_bytes} bytes, blosc2 takes "
+                f"{BLOSC2_CHUNK_LIMIT}; make shorter records or choose another compression"
             )
     missing = [key for key in REQUIRED_ATTRIBUTES if key not in writer.attributes]
     if missing or "acceleration" not in writer.signals:
         raise DatasetError(
-            f"{name}: root attributes missing: {missing or 'none'}; they and the signal acceleration are required"
+            f"{name}: root attributes missing: {missing or 'none'}; they and the signal "
+            "acceleration are required"
         )
     if writer.attributes["schema_version"] != SCHEMA_VERSION:
         raise DatasetError(
-            f"{name}: schema_version {writer.attributes['schema_version']}, this writer makes {SCHEMA_VERSION}"
+            f"{name}: schema_version {writer.attributes['schema_version']}, this writer makes "
+            f"{SCHEMA_VERSION}"
         )
     channels = writer.attributes["channel_names"]
     if (
@@ -342,7 +352,8 @@ def _check_declaration(writer: ShardWriter, params: Sequence[str]) -> None:
     bad = [param for param in params if not _PARAM_NAME.fullmatch(param)]
     if bad or len(set(params)) != len(params):
         raise DatasetError(
-            f"{name}: params {bad or list(params)} are refused; use distinct names of letters, digits, '_', '.', '-'"
+            f"{name}: params {bad or list(params)} are refused; use distinct names of letters, "
+            "digits, '_', '.', '-'"
         )
 
 

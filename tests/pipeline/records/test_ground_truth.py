@@ -1,4 +1,5 @@
-"""Mesh state and detectability of a data set: asked for, stored, read back, and the same as without them."""
+"""Mesh state and detectability of a data set: asked for, stored, read back, and the same as without
+them."""
 
 from pathlib import Path
 

@@ -1,4 +1,5 @@
-"""The healthy twin of every record: nothing in it depends on the fault, and its noise is its own."""
+"""The healthy twin of every record: nothing in it depends on the fault, and its noise is its
+own."""
 
 from pathlib import Path
 
@@ -42,7 +43,8 @@ def found() -> list:
 
 @pytest.mark.parametrize("reference", ["healthy_twin", "record"])
 def test_it_has_the_same_bits_whatever_the_fault(reference: str) -> None:
-    """Severity zero changes no bit of it, so that it cannot tell the class; it does change the faulty records."""
+    """Severity zero changes no bit of it, so that it cannot tell the class; it does change the
+    faulty records."""
     words = (*SMALL, f"sensing.snr_reference={reference}")
     for faulty, sound in zip(records(*words), records(*words, sham=True), strict=True):
         assert (
@@ -87,7 +89,8 @@ def test_its_noise_is_as_loud_and_has_nothing_to_do_with_that_of_the_record(
 
 
 def test_a_healthy_record_has_one_that_differs_by_noise_alone(found: list) -> None:
-    """The difference of a healthy record and its twin holds twice the noise; that of a missing tooth holds more."""
+    """The difference of a healthy record and its twin holds twice the noise; that of a missing
+    tooth holds more."""
     ratio = {
         record.values["label_name"]: np.var(
             record.signals["acceleration"].astype(float)

@@ -105,7 +105,8 @@ def write_shard(
     clean: bool = False,
     **changes,
 ) -> ShardWriter:
-    """With ``clean``, every record's signal is stored a second time as the one without noise, at half its size."""
+    """With ``clean``, every record's signal is stored a second time as the one without noise, at
+    half its size."""
     rows = plan.rows(shard)
     writer = ShardWriter(
         path,

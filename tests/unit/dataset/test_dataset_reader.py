@@ -1,4 +1,5 @@
-"""Reading: what was written, in plan order, from any process, and never from an unfinished set by mistake."""
+"""Reading: what was written, in plan order, from any process, and never from an unfinished set by
+mistake."""
 
 import multiprocessing
 import pickle

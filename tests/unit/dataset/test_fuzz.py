@@ -1,4 +1,5 @@
-"""Files from strangers: 144 of the mutants of ``python -m benchmarks.fuzz_campaign``, none of which may do harm."""
+"""Files from strangers: 144 of the mutants of ``python -m benchmarks.fuzz_campaign``, none of which
+may do harm."""
 
 import collections
 import os
@@ -82,7 +83,8 @@ def test_the_judge_sees_harm(
     message: str,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A reader that dies, hangs, stumbles or takes everything is found, and the next mutant is tried all the same."""
+    """A reader that dies, hangs, stumbles or takes everything is found, and the next mutant is
+    tried all the same."""
     monkeypatch.setattr(_fuzz_judge, "TIME_LIMIT", 2.0)
     monkeypatch.setattr(_fuzz_judge, "mutate", _no_mutation)
     monkeypatch.setattr(
@@ -96,7 +98,8 @@ def test_the_judge_sees_harm(
 
 
 def test_inspect_reads_no_other_file(tmp_path: Path) -> None:
-    """A value small enough to be shown may lie in another file, or be declared with a chunk of any size."""
+    """A value small enough to be shown may lie in another file, or be declared with a chunk of any
+    size."""
     (tmp_path / "secret.bin").write_bytes(SECRET)
     path = tmp_path / "a.h5"
     with h5py.File(path, "w") as file:

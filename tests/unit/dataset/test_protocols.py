@@ -1,4 +1,5 @@
-"""Protocols over random plans: nothing is on two sides, held-out values are held out, and no subset lacks a class."""
+"""Protocols over random plans: nothing is on two sides, held-out values are held out, and no subset
+lacks a class."""
 
 import numpy as np
 import pytest
@@ -17,7 +18,8 @@ SEVERITIES = ("unseen_severity_inner", "unseen_severity_outer")
 
 
 def random_plan(seed: int, **fixed: int) -> Plan:
-    """Conditions of units, each with one record a class, cut anywhere; values drawn, in levels, or all equal."""
+    """Conditions of units, each with one record a class, cut anywhere; values drawn, in levels, or
+    all equal."""
     rng = np.random.default_rng(seed)
     n_units, n_classes = (
         fixed.get("n_units", int(rng.integers(1, 25))),

@@ -1,4 +1,5 @@
-"""Choosing records by their columns: what meets the conditions, in plan order, and a hint for every slip of the pen."""
+"""Choosing records by their columns: what meets the conditions, in plan order, and a hint for every
+slip of the pen."""
 
 import os
 import time

@@ -39,10 +39,12 @@ class TestTurns:
             (["operating.speed_rpm=600"], 1.0),
             (["experiment=quickstart"], 0.5),
             (["experiment=quickstart", "operating.speed_rpm=600"], 1.0),
-            (["plan.vary={operating.speed_rpm: {distribution: choice, values: [1800, 900, 1200]}}"], 10 / 15),
+            (["plan.vary={operating.speed_rpm: {distribution: choice, values: [1800, 900, "
+                "1200]}}"], 10 / 15),
             (["operating.speed_profile=[[0,1.2],[1,0.5]]"], 10 / 15),
             (["operating.speed_profile={kind: ramp, first_factor: 0.25, last_factor: 1}"], 10 / 7.5),
-            (["operating.speed_profile={kind: random_walk, scatter: 0.05, correlation_time_s: 1}"], 10 / 24),
+            (["operating.speed_profile={kind: random_walk, scatter: 0.05, correlation_time_s: "
+                "1}"], 10 / 24),
             (["operating.speed_ripple={share: 0.2, order: 1}"], 10 / 24),
         ],
     )  # fmt: skip
@@ -71,9 +73,11 @@ class TestTurns:
         ("words", "text"),
         [
             (["operating.duration_s=1"], "operating.duration_s and operating.turns are both given; leave one out"),
-            (["plan.vary={operating.speed_ripple.share: {distribution: uniform, low: 0, high: 0.1}}",
+            (["plan.vary={operating.speed_ripple.share: {distribution: uniform, low: 0, high: "
+                "0.1}}",
               "operating.speed_ripple={share: 0, order: 1}"],
-             "operating.turns: the plan draws operating.speed_ripple.share, so the slowest turn is not known"),
+             "operating.turns: the plan draws operating.speed_ripple.share, so the slowest turn "
+             "is not known"),
             (["plan.vary={operating.speed_rpm: {distribution: uniform, low: 0, high: 100}}"],
              "operating.turns: the slowest speed of the plan must be positive"),
             (["plan.vary={operating.speed_rpm: {distribution: uniform, low: 5}}"], "uniform needs exactly low, high"),

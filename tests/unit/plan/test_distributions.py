@@ -277,7 +277,8 @@ class TestDesigns:
 
 
 def test_two_designs_of_one_size_have_nothing_in_common():
-    """Of 16 x 16 cells about 163 are hit by chance; Sobol points in the order of the sequence hit 16."""
+    """Of 16 x 16 cells about 163 are hit by chance; Sobol points in the order of the sequence hit
+    16."""
 
     def n_cells(one, other):
         return len(

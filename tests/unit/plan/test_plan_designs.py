@@ -1,4 +1,5 @@
-"""Grids, repeats and counts of a plan: nested by unit, condition, fault and repeat, and balanced at every level."""
+"""Grids, repeats and counts of a plan: nested by unit, condition, fault and repeat, and balanced at
+every level."""
 
 import itertools
 import re
@@ -184,8 +185,9 @@ class TestGrid:
     def test_it_can_be_told_in_words(self, configured):
         config = configured({"crack": {"crack_depth_mm": DEPTH}}, **GRID, vary=VARY)
         assert describe_design(config) == (
-            "grid of operating.speed_rpm 3 x operating.torque_nm 4 x crack.crack_depth_mm 3; drawn: crack.tooth, "
-            "pitting.tooth, pitting.pit_length_mm, pitting.pit_width_mm, missing_tooth.tooth"
+            "grid of operating.speed_rpm 3 x operating.torque_nm 4 x crack.crack_depth_mm 3; "
+            "drawn: crack.tooth, pitting.tooth, pitting.pit_length_mm, pitting.pit_width_mm, "
+            "missing_tooth.tooth"
         )
         assert describe_design(configured(**GRID, vary={})).startswith(
             "grid of no key; drawn: "
@@ -197,8 +199,8 @@ class TestGrid:
         [
             (
                 {"n_records": 400},
-                "plan.n_records = 400, but the plan has 60 records (5 units x 3 conditions x 4 classes); "
-                "plan.n_records=null takes them",
+                "plan.n_records = 400, but the plan has 60 records (5 units x 3 conditions x 4 "
+                "classes); plan.n_records=null takes them",
             ),
             ({"n_records": 3}, "plan.n_records = 3 must be a whole number of at least 4"),
             ({"vary": {"operating.speed_rpm": WITHOUT}}, "plan.vary.operating.speed_rpm: a grid needs its levels"),
@@ -207,8 +209,8 @@ class TestGrid:
                 "plan.vary.operating.speed_rpm: the levels of a choice are its values",
             ),
             ({"vary": {"operating.sped_rpm": SPEED}}, "plan.vary: 'operating.sped_rpm' is no key"),
-            ({"vary": {"operating.speed_rpm": MANY}}, f"the grid has 2,000,000 records (5 units x 100,000 conditions x "
-             f"4 classes), more than {MOST_IN_GRID:,}; take fewer levels, units or repeats"),
+            ({"vary": {"operating.speed_rpm": MANY}}, "the grid has 2,000,000 records (5 units x 100,000 conditions x 4 classes), "
+                f"more than {MOST_IN_GRID:,}; take fewer levels, units or repeats"),
             ({"conditions_per_unit": 2}, "plan.conditions_per_unit = 2: a grid's levels say how many"),
             ({"n_repeats": 0}, "plan.n_repeats = 0"),
         ],
@@ -350,7 +352,8 @@ class TestRepeats:
 
 
 class TestStartOfTheSound:
-    """The first sound record of a condition starts as the healthy twin that sets the noise level, so that it is it."""
+    """The first sound record of a condition starts as the healthy twin that sets the noise level,
+    so that it is it."""
 
     START = ("start_tooth_pinion", "start_tooth_wheel", "start_phase")
 

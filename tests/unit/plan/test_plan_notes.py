@@ -25,8 +25,8 @@ def test_units_without_a_record_are_told() -> None:
         "plan.n_repeats=2",
     )
     assert line == (
-        "12 records are 2 conditions of 3 classes and 2 repeats: 2 of 4 units are used; no split by unit is possible "
-        "(2 unit_id in the plan, and at least 3 are needed)"
+        "12 records are 2 conditions of 3 classes and 2 repeats: 2 of 4 units are used; no "
+        "split by unit is possible (2 unit_id in the plan, and at least 3 are needed)"
     )
 
 

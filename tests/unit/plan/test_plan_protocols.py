@@ -1,4 +1,5 @@
-"""Protocols of real plans: what a unit draws stays on one side, noise included, whatever the design."""
+"""Protocols of real plans: what a unit draws stays on one side, noise included, whatever the
+design."""
 
 import numpy as np
 import pytest

@@ -83,7 +83,8 @@ def test_a_group_holds_every_class_once(plan):
 def position_chi_square(labels):
     """Departure of the (position, class) table from even, chi-square with 9 degrees of freedom.
 
-    Every group is a permutation, so cells of a row exclude each other: the plain sum is 4/3 too large.
+    Every group is a permutation, so cells of a row exclude each other: the plain sum is 4/3 too
+    large.
     """
     table = np.array([np.bincount(column, minlength=4) for column in labels.T])
     expected = len(labels) / 4
@@ -244,13 +245,14 @@ class TestRefusals:
             ({"n_repeats": 1.5}, "plan.n_repeats = 1.5"),
             (
                 {"n_records": None},
-                "plan.n_records = null: give a number, plan.conditions_per_unit, or plan.design=grid",
+                "plan.n_records = null: give a number, plan.conditions_per_unit, or "
+                "plan.design=grid",
             ),
             ({"conditions_per_unit": 0}, "plan.conditions_per_unit = 0"),
             (
                 {"conditions_per_unit": 3, "n_repeats": 2},
-                "plan.n_records = 8, but the plan has 960 records (40 units x 3 conditions x 4 classes x 2 repeats); "
-                "plan.n_records=null takes them",
+                "plan.n_records = 8, but the plan has 960 records (40 units x 3 conditions x 4 "
+                "classes x 2 repeats); plan.n_records=null takes them",
             ),
             (
                 {"n_reports": 3},

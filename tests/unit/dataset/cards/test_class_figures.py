@@ -1,4 +1,5 @@
-"""A picture a class: of a record that stands for it, the same bytes for the same records, and no trap in a name."""
+"""A picture a class: of a record that stands for it, the same bytes for the same records, and no
+trap in a name."""
 
 import builtins
 import shutil

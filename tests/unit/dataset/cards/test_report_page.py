@@ -1,4 +1,5 @@
-"""The page of a data set stands alone, says what the files say, and takes no text of theirs for markup."""
+"""The page of a data set stands alone, says what the files say, and takes no text of theirs for
+markup."""
 
 import base64
 import hashlib
@@ -151,7 +152,8 @@ def test_structure(made: tuple[Path, Page]) -> None:
 
 
 def test_every_option_has_its_data(made: tuple[Path, Page]) -> None:
-    """Each record, channel, parameter and indicator of the drop-downs is in the data of the page."""
+    """Each record, channel, parameter and indicator of the drop-downs is in the data of the
+    page."""
     page, data = made[1], made[1].data
     values = [attributes.get("value") for attributes in page.all("option")]
     assert set(map(str, range(len(data["examples"])))) <= set(values)
@@ -290,7 +292,8 @@ def test_few_of_many_records_are_of_all_classes(made: tuple[Path, Page]) -> None
 
 
 def test_frequencies_of_a_geared_engine() -> None:
-    """A shaft that is none of the gears' is a reference of its own; a gear that turns with the crank is not."""
+    """A shaft that is none of the gears' is a reference of its own; a gear that turns with the
+    crank is not."""
     rotation = Rotation(
         mesh=np.array([100.0, np.nan]), drive=np.array([5.0, np.nan]), n_teeth={"pinion": 10, "wheel": 40},
         gear=np.array(["wheel", ""]),

@@ -1,4 +1,5 @@
-"""A folder whose process is killed while it is being begun is no data set, is known, and is begun anew."""
+"""A folder whose process is killed while it is being begun is no data set, is known, and is begun
+anew."""
 
 import os
 import signal
@@ -31,7 +32,8 @@ def begin(out: Path) -> None:
 
 
 def killed_before(number: int, work: Callable[[], None]) -> bool:
-    """Do the work in a process of its own that is killed before its change of this number; False if it has fewer."""
+    """Do the work in a process of its own that is killed before its change of this number; False if
+    it has fewer."""
     process = os.fork()
     if process == 0:
         left = [number]

@@ -1,4 +1,5 @@
-"""No byte of a closed data set changes unnoticed, and only what is meant for hand-written words may be accepted."""
+"""No byte of a closed data set changes unnoticed, and only what is meant for hand-written words may
+be accepted."""
 
 import hashlib
 import json

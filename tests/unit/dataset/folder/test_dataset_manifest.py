@@ -1,4 +1,5 @@
-"""A folder's life: made, filled, closed; nothing that existed is touched, nothing unfinished looks whole."""
+"""A folder's life: made, filled, closed; nothing that existed is touched, nothing unfinished looks
+whole."""
 
 import json
 import multiprocessing
@@ -67,7 +68,8 @@ def with_backend(name: str) -> dict:
 
 
 def test_a_key_that_came_after_0_9_counts_only_where_it_is_not_at_its_default() -> None:
-    """A folder that was begun without the key goes on, and is another data set than one of another backend."""
+    """A folder that was begun without the key goes on, and is another data set than one of another
+    backend."""
     before = CONFIG | {"solver": {"oversampling": 5}}
     default = with_backend("runge_kutta")
     assert stored_config(default) == before
@@ -200,9 +202,10 @@ def test_index_shows_all_shards_from_any_folder_and_nan_for_a_missing_one(
 ) -> None:
     shard_path(folder, 1).unlink()
     code = (
-        "import h5py, sys; f = h5py.File(sys.argv[1], locking=False); a = f['acceleration'];"
-        "print(a.shape, f['record_id'][35].decode(), (a[10:20] != a[10:20]).all(), (a[20:] == a[20:]).all(),"
-        " f['label'][10], f['params/crack_depth_mm'].shape)"
+        "import h5py, sys; f = h5py.File(sys.argv[1], locking=False); a = "
+        "f['acceleration'];print(a.shape, f['record_id'][35].decode(), (a[10:20] != "
+        "a[10:20]).all(), (a[20:] == a[20:]).all(), f['label'][10], "
+        "f['params/crack_depth_mm'].shape)"
     )
     run = subprocess.run(
         [os.sys.executable, "-c", code, str(folder / "index.h5")],

@@ -1,4 +1,5 @@
-"""verify finds every way in which a data set can be wrong, and names it; inspect and the card show what is there."""
+"""verify finds every way in which a data set can be wrong, and names it; inspect and the card show
+what is there."""
 
 import json
 import os
@@ -26,7 +27,8 @@ def _flip(path: Path, offset: int) -> None:
 
 
 def _forge(folder: Path, shard: int, change: Callable[[h5py.File], None]) -> None:
-    """Change a shard and make every sha256 and size fit again: only the content can give it away."""
+    """Change a shard and make every sha256 and size fit again: only the content can give it
+    away."""
     path = shard_path(folder, shard)
     with h5py.File(path, "r+") as file:
         change(file)

@@ -1,4 +1,5 @@
-"""Sample types and compressions: the same signals whatever is stored, and nothing wrong in the scales goes unseen."""
+"""Sample types and compressions: the same signals whatever is stored, and nothing wrong in the
+scales goes unseen."""
 
 import itertools
 import json
