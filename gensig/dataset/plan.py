@@ -10,7 +10,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from gensig.dataset.schema import COLUMNS, kind_of
+from gensig.dataset.columns import COLUMNS
+from gensig.dataset.schema import kind_of
 from gensig.dataset.storage.atomic import read_text, write_text
 from gensig.errors import DatasetError
 

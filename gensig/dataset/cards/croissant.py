@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from gensig.dataset.columns import COLUMNS
 from gensig.dataset.folder.layout import MANIFEST, PLAN, SHARDS, SPLITS
 from gensig.dataset.plan import Plan
 from gensig.dataset.reader import Dataset
-from gensig.dataset.schema import COLUMNS, PARAMS
+from gensig.dataset.schema import PARAMS
 
 _CONTEXT: dict[str, Any] = {
     "@language": "en",

@@ -12,6 +12,7 @@ from typing import NoReturn
 import h5py
 import numpy as np
 
+from gensig.dataset.columns import COLUMNS
 from gensig.dataset.exports.export_tables import (
     attributes_json,
     column_names,
@@ -22,7 +23,7 @@ from gensig.dataset.exports.export_tables import (
     write_parquet,
 )
 from gensig.dataset.reader import Dataset, open_dataset
-from gensig.dataset.schema import COLUMNS, SIGNALS
+from gensig.dataset.schema import SIGNALS
 from gensig.dataset.storage.atomic import (
     publish,
     sync_file,

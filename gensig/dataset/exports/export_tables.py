@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from gensig.dataset.columns import COLUMNS
 from gensig.dataset.reader import Dataset
-from gensig.dataset.schema import COLUMNS, SCALES, SIGNALS, unit_in_file
+from gensig.dataset.schema import SCALES, SIGNALS, unit_in_file
 from gensig.errors import DatasetError
 
 ROW_GROUP_BYTES = 16 * 1024**2

@@ -6,6 +6,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from gensig.dataset.columns import COLUMNS
 from gensig.dataset.folder.inspection import inspect
 from gensig.dataset.folder.layout import (
     CONFIG,
@@ -22,7 +23,7 @@ from gensig.dataset.folder.layout import (
 )
 from gensig.dataset.folder.manifest import file_digests, identity_hash
 from gensig.dataset.plan import Plan, read_plan
-from gensig.dataset.schema import COLUMNS, SCALES
+from gensig.dataset.schema import SCALES
 from gensig.dataset.splitting.split_check import split_problems
 from gensig.dataset.splitting.splits import read_split
 from gensig.dataset.storage.atomic import sha256_file

@@ -14,17 +14,15 @@ from types import TracebackType
 import h5py
 import numpy as np
 
+from gensig.dataset.columns import COLUMNS, LIFE_COLUMNS, Column
 from gensig.dataset.schema import (
-    COLUMNS,
     DEFAULTS,
-    LIFE_COLUMNS,
     PARAMS,
     REQUIRED_ATTRIBUTES,
     SAMPLE_TYPES,
     SCALES,
     SCHEMA_VERSION,
     SIGNALS,
-    Column,
     stored_reason,
     unit_in_file,
 )

@@ -8,18 +8,16 @@ import numpy as np
 import pytest
 from dataset_samples import build, row_of
 
+from gensig.dataset.columns import COLUMNS, LIFE_COLUMNS, Column
 from gensig.dataset.folder.layout import read_manifest
 from gensig.dataset.plan import Plan
 from gensig.dataset.reader import open_dataset
 from gensig.dataset.schema import (
-    COLUMNS,
-    LIFE_COLUMNS,
     REQUIRED,
     REQUIRED_ATTRIBUTES,
     SAMPLE_TYPES,
     SCHEMA_VERSION,
     SIGNALS,
-    Column,
     column_table,
 )
 from gensig.errors import DatasetError

@@ -26,7 +26,8 @@ from diagnose.settings import settings_from
 from diagnose.studies.baseline_runs import baseline_predictions
 from diagnose.studies.controls import chosen_oracle, control_jobs
 from diagnose.studies.study import task_from
-from gensig.dataset.schema import COLUMNS, SIGNALS
+from gensig.dataset.columns import COLUMNS
+from gensig.dataset.schema import SIGNALS
 from gensig.errors import ConfigError
 from gensig.options.compose import compose
 

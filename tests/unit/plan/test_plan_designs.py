@@ -12,8 +12,8 @@ import yaml
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import qmc
 
+from gensig.dataset.columns import COLUMNS
 from gensig.dataset.plan import plan_text
-from gensig.dataset.schema import COLUMNS
 from gensig.dataset.splitting.protocols import make_splits
 from gensig.errors import ConfigError
 from gensig.options.configuration import FIXED_KEYS, Configuration
