@@ -67,7 +67,7 @@ def deal_groups(plan: Plan, deal: Deal, rng: np.random.Generator) -> SplitTable 
     for attempt in range(_ATTEMPTS):
         side = rng.permutation(in_order)
         if deal.for_test is not None and attempt < _ATTEMPTS // 2:
-            worth = np.bincount(group, weights=deal.for_test)
+            worth = np.bincount(group, deal.for_test).astype(float)
             side = _best_tested(side, worth, rng)
         sides = enumerate(holds)
         present = np.stack([held[side == k].any(axis=0) for k, held in sides])
