@@ -348,7 +348,8 @@ class Dataset:
         return {**self.__dict__, "_files": OrderedDict(), "_checked": {}}
 
     def __repr__(self) -> str:
-        return f"Dataset({str(self.folder)!r}, {self.n_records} records, classes {self.class_names})"
+        folder, n_records = str(self.folder), self.n_records
+        return f"Dataset({folder!r}, {n_records} records, classes {self.class_names})"
 
     def _file(self, shard: int) -> h5py.File:
         """The open shard.

@@ -1,4 +1,4 @@
-"""From the group ``executor`` of a configuration to an executor."""
+"""Executors by name, and the reader of the group ``executor`` of a configuration."""
 
 from __future__ import annotations
 

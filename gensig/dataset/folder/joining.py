@@ -1,7 +1,4 @@
-"""Joining a data-set folder.
-
-Only the version and configuration that began it may go on, for the bits' sake.
-"""
+"""Continuation of a data-set folder by the version and configuration that began it."""
 
 from __future__ import annotations
 
@@ -45,12 +42,9 @@ def joined_folder(
             "folder"
         )
     if identity_hash(config, __version__) != manifest.identity:
-        begun = manifest.configuration
-        told = (
-            begun
-            and identity_hash(begun, manifest.generator_version) == manifest.identity
-        )
-        where = f" in {_listed(differing_keys(begun, config))}" if told else ""
+        begun, where = manifest.configuration, ""
+        if begun and identity_hash(begun, __version__) == manifest.identity:
+            where = f" in {_listed(differing_keys(begun, config))}"
         raise DatasetError(
             f"{out / CONFIG} was changed{where} since the folder was begun; undo that, or start "
             "a new folder"
@@ -65,9 +59,7 @@ def joined_folder(
             f"{out / PLAN} was changed since the folder was begun; restore it, or start a new "
             "folder"
         )
-    creation_options(
-        config["dataset"]["compression"]
-    )  # refuses one whose package is missing
+    creation_options(config["dataset"]["compression"])  # its package may be missing
     return manifest, config
 
 

@@ -1,4 +1,4 @@
-"""Is a data set whole and unaltered? Every difference is named; nothing is repaired."""
+"""Verification that a data set is whole and unaltered; nothing is repaired."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,7 +38,7 @@ __all__ = ["VerifyResult", "inspect", "verify"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VerifyResult:
-    """What `verify` found.
+    """Result of `verify`.
 
     Parameters
     ----------
@@ -56,8 +56,7 @@ class VerifyResult:
 
 
 def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
-    """Check a data-set folder: state, sha256, sizes, rows, schema, plan against rows, splits,
-    scales, finite values.
+    """Check state, sha256, sizes, rows, schema, plan, splits, scales and values of a data set.
 
     Parameters
     ----------
@@ -82,10 +81,10 @@ def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
         problems += [one.line for one in differences(folder, manifest, quick=quick)]
     plan = None
     if not quick:
-        found, plan = _beside_shards(folder, manifest)
-        problems += found + (
-            _splits(folder, manifest, plan) if plan is not None else []
-        )
+        found, plan = _tables(folder, manifest)
+        problems += found
+        if plan is not None:
+            problems += _splits(folder, manifest, plan)
     starts = np.cumsum([0, *(entry.rows for entry in manifest.shards)])
     reference: dict | None = None
     for i, entry in enumerate(manifest.shards):
@@ -102,9 +101,10 @@ def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
                     reference = reference or _description(file, path)
                     problems += _description_differs(file, path, reference)
                 found = _rows_differ(file, entry, plan, int(starts[i]))
-                # A file whose bytes are wrong can have thousands of wrong rows; the first line
-                # tells.
-                problems += found[:1] if damage else found
+                # A damaged file can have thousands of wrong rows: one line is enough.
+                if damage:
+                    found = found[:1]
+                problems += found
         except DatasetError as error:
             problems.append(str(error))
         except HDF5_ERRORS as error:
@@ -130,22 +130,19 @@ def _state(folder: Path, manifest: Manifest) -> list[str]:
             f"incomplete: {manifest.n_done} of {len(manifest.shards)} shards are done and the "
             f"data set was never closed; run `gensig resume {folder}`"
         )
-    needed = [CONFIG, PLAN, OVERRIDES, *([INDEX] if manifest.is_complete else [])]
-    problems += [
-        f"the manifest does not list {name}; it is damaged"
-        for name in needed
-        if name not in manifest.files
-    ]
-    problems += [
-        f"{name} is missing" for name in manifest.files if not (folder / name).is_file()
-    ]
+    needed, found = [CONFIG, PLAN, OVERRIDES], []
     if manifest.is_complete:
+        needed.append(INDEX)
         found = sorted(f"{SPLITS}/{path.name}" for path in (folder / SPLITS).glob("*"))
-        problems += [
-            f"{name!a} is extra: the manifest does not list it"
-            for name in found
-            if name not in manifest.files
-        ]
+    for name in needed:
+        if name not in manifest.files:
+            problems.append(f"the manifest does not list {name}; it is damaged")
+    for name in manifest.files:
+        if not (folder / name).is_file():
+            problems.append(f"{name} is missing")
+    for name in found:
+        if name not in manifest.files:
+            problems.append(f"{name!a} is extra: the manifest does not list it")
     return problems
 
 
@@ -167,24 +164,22 @@ def _extra_files(folder: Path, manifest: Manifest) -> list[str]:
     ]
 
 
-def _beside_shards(folder: Path, manifest: Manifest) -> tuple[list[str], Plan | None]:
+def _tables(folder: Path, manifest: Manifest) -> tuple[list[str], Plan | None]:
     """Plan, configuration, splits and index against the manifest."""
     problems = [
         f"{name} was altered: its sha256 is not the one in the manifest"
         for name, recorded, actual in file_digests(folder, manifest)
         if actual and actual != recorded
     ]
+    version, identity = manifest.generator_version, manifest.identity
     try:
         config = read_config(folder)
-        if identity_hash(config, manifest.generator_version) != manifest.identity:
+        if identity_hash(config, version) != identity:
             problems.append(
                 f"{CONFIG} and the identity in the manifest do not belong together; one was altered"
             )
         begun = manifest.configuration
-        if (
-            begun
-            and identity_hash(begun, manifest.generator_version) != manifest.identity
-        ):
+        if begun and identity_hash(begun, version) != identity:
             problems.append(
                 f"{MANIFEST} has a configuration and an identity that do not belong together"
             )
@@ -200,28 +195,20 @@ def _beside_shards(folder: Path, manifest: Manifest) -> tuple[list[str], Plan | 
     except DatasetError as error:
         return [*problems, str(error)], None
     if plan.shard_sizes() != [entry.rows for entry in manifest.shards]:
-        return [
-            *problems,
-            f"{PLAN} and the manifest have different shards; one was altered",
-        ], None
+        line = f"{PLAN} and the manifest have different shards; one was altered"
+        return [*problems, line], None
     return problems, plan
 
 
 def _splits(folder: Path, manifest: Manifest, plan: Plan) -> list[str]:
     """Splits that do not keep apart what their protocol says."""
     problems = []
-    for name in sorted(
-        name
-        for name in manifest.files
-        if name.startswith(f"{SPLITS}/") and (folder / name).is_file()
-    ):
+    for path in sorted(folder / name for name in manifest.files):
+        if path.parent.name != SPLITS or not path.is_file():
+            continue
         try:
-            problems += [
-                f"{SPLITS}/{line}"
-                for line in split_problems(
-                    Path(name).stem, read_split(folder / name), plan
-                )
-            ]
+            found = split_problems(path.stem, read_split(path), plan)
+            problems += [f"{SPLITS}/{line}" for line in found]
         except DatasetError as error:
             problems.append(str(error))
     return problems
@@ -241,9 +228,9 @@ def _bytes_differ(
     digest = sha256_file(path)
     if digest == entry.sha256:
         return []
-    other = next((e.name for e in manifest.shards if e.sha256 == digest), None)
-    if other is not None:
-        return [f"{entry.name} is swapped: it holds what belongs in {other}"]
+    for other in manifest.shards:
+        if other.sha256 == digest:
+            return [f"{entry.name} is swapped: it holds what belongs in {other.name}"]
     return [
         f"{entry.name} was altered: its sha256 is {digest[:12]}..., recorded is "
         f"{entry.sha256[:12]}..."
@@ -251,7 +238,7 @@ def _bytes_differ(
 
 
 def _description(file: h5py.File, path: Path) -> dict:
-    """What all shards of one data set have in common."""
+    """Types, shapes and attributes, which all shards of one data set share."""
     shapes = {
         name: (str(data.dtype), data.shape[1:])
         for name, data in datasets(file, path).items()
@@ -263,11 +250,11 @@ def _description_differs(file: h5py.File, path: Path, reference: dict) -> list[s
     problems = []
     for part, found in _description(file, path).items():
         expected = reference[part]
-        names = sorted(
+        names = [
             name
-            for name in {*found, *expected}
+            for name in sorted(found | expected)
             if repr(found.get(name)) != repr(expected.get(name))
-        )
+        ]
         if names:
             problems.append(
                 f"{path.name} is foreign: its {part} {', '.join(names)} differ from those of the "
@@ -285,19 +272,14 @@ def _rows_differ(
     if n != entry.rows:
         return [f"{name} has {n} rows, recorded are {entry.rows}"]
     problems = []
-    planned_columns = plan.columns if plan is not None else {}
     for column in COLUMNS.values():
         # Other inputs may be refined while simulating; names and labels never.
-        if (
-            column.role not in ("id", "label", "unit")
-            or column.name not in planned_columns
-            or column.name not in file
-        ):
+        if plan is None or column.role not in ("id", "label", "unit"):
             continue
-        planned, found = (
-            planned_columns[column.name][start : start + n],
-            read_rows(file[column.name]),
-        )
+        if column.name not in plan.columns or column.name not in file:
+            continue
+        planned = plan.columns[column.name][start : start + n]
+        found = read_rows(file[column.name])
         wrong = np.flatnonzero(planned != found)
         if wrong.size:
             i = int(wrong[0])
@@ -313,15 +295,13 @@ def _rows_differ(
             f"{name} has {int(failed.sum())} failed records, recorded are {entry.n_failed}"
         )
     for row, is_failed in enumerate(failed.tolist()):
-        problems += [
-            f"{name} row {row}: {problem}"
-            for problem in _signal_problems(file, row, failed=is_failed)
-        ]
+        lines = _signal_problems(file, row, failed=is_failed)
+        problems += [f"{name} row {row}: {line}" for line in lines]
     return problems
 
 
 def _signal_problems(file: h5py.File, row: int, *, failed: bool) -> list[str]:
-    """Scales that are none, and signals that are not finite although the record did not fail."""
+    """Invalid scales, and signals that are not finite although the record did not fail."""
     problems = []
     for name, scale_name in SCALES.items():
         if name not in file:

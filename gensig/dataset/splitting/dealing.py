@@ -44,8 +44,8 @@ class Deal:
 def deal_groups(plan: Plan, deal: Deal, rng: np.random.Generator) -> SplitTable | str:
     """Table of one deal in which every subset has every class that it needs.
 
-    One line with the reason where there is none. A record that its group's side may not use is in no subset. Of the groups at least one is
-    dealt to each side.
+    One line with the reason where there is none. A record that its group's side may not use is in
+    no subset. Of the groups at least one is dealt to each side.
     """
     names, group = np.unique(plan.columns[deal.column], return_inverse=True)
     if len(names) < deal.min_groups:

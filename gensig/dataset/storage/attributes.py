@@ -49,11 +49,9 @@ def set_attribute(target: h5py.HLObject, name: str, value: Attribute) -> None:
             f"attribute {name} has {data.nbytes} bytes, HDF5 allows about {ATTRIBUTE_BYTES_LIMIT}; "
             "make it a column or a file beside the shards"
         )
-    dtype = (
-        h5py.string_dtype("utf-8", data.dtype.itemsize)
-        if data.dtype.kind == "S"
-        else data.dtype
-    )
+    dtype = data.dtype
+    if dtype.kind == "S":
+        dtype = h5py.string_dtype("utf-8", dtype.itemsize)
     target.attrs.create(name, data, shape=data.shape, dtype=dtype)
 
 
@@ -73,9 +71,9 @@ def read_attributes(target: h5py.HLObject) -> dict:
         if kind not in ("S", "i", "u", "f"):
             continue
         value = np.asarray(target.attrs[name])
-        found[name] = (
-            decoded(value) if kind == "S" or value.dtype.kind == "O" else value
-        ).tolist()
+        if kind == "S" or value.dtype.kind == "O":
+            value = decoded(value)
+        found[name] = value.tolist()
     return found
 
 

@@ -1,7 +1,4 @@
-"""Opening a shard that may come from a stranger.
-
-Checked before anything is read, and never trusted afterwards.
-"""
+"""Opening of shards from unknown sources, with a check before anything is read."""
 
 import math
 from pathlib import Path
@@ -33,8 +30,12 @@ EXPANSION_LIMIT = 1100
 ATTRIBUTES_LIMIT = 1000
 
 _FILTERS = {
-    h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32, h5py.h5z.FILTER_LZF, BLOSC2_FILTER,
-}  # fmt: skip
+    h5py.h5z.FILTER_DEFLATE,
+    h5py.h5z.FILTER_SHUFFLE,
+    h5py.h5z.FILTER_FLETCHER32,
+    h5py.h5z.FILTER_LZF,
+    BLOSC2_FILTER,
+}
 
 
 def open_file(path: Path) -> h5py.File:
@@ -78,18 +79,12 @@ def same_file(path: Path) -> tuple[int, ...]:
         found, link = path.stat(), path.lstat()
     except OSError:
         return ()
-    return (
-        found.st_dev,
-        found.st_ino,
-        found.st_size,
-        found.st_mtime_ns,
-        found.st_ctime_ns,
-        link.st_ino,
-    )
+    times = (found.st_mtime_ns, found.st_ctime_ns)
+    return (found.st_dev, found.st_ino, found.st_size, *times, link.st_ino)
 
 
 def check_shard(file: h5py.File, path: Path) -> None:
-    """Refuse, with one line, whatever a shard of format version 1 cannot contain.
+    """Check that a file is a shard of format version 1.
 
     Raises
     ------
@@ -151,7 +146,7 @@ def datasets(file: h5py.File, path: Path) -> dict[str, h5py.Dataset]:
 
 def row_count(data: h5py.Dataset) -> int:
     """Length of axis 0; 0 for a scalar."""
-    return int(data.shape[0]) if data.shape else 0
+    return int((*data.shape, 0)[0])
 
 
 def _check_dataset(name: str, data: h5py.Dataset, n_records: int, path: Path) -> None:
@@ -183,22 +178,22 @@ def _check_dataset(name: str, data: h5py.Dataset, n_records: int, path: Path) ->
             f"{data.id.get_storage_size()}; it was never written or is a bomb"
         )
     column = SIGNALS.get(name) or COLUMNS.get(name)
-    if column is not None:
-        same_kind = dtype.kind == column.storage_dtype.kind
-        if name in SCALES and dtype.kind == "i":
-            same_kind = dtype.itemsize == 2
-        if not same_kind or data.ndim != 1 + len(column.axes):
-            raise DatasetError(
-                f"{label} has type {dtype} and {data.ndim} axes; format version 1 wants "
-                f"{' or '.join(SAMPLE_TYPES) if name in SCALES else column.dtype} and "
-                f"{1 + len(column.axes)}"
-            )
+    if column is None:
+        return
+    wanted, n_axes = column.dtype, 1 + len(column.axes)
+    is_wanted = dtype.kind == column.storage_dtype.kind
+    if name in SCALES:
+        wanted = " or ".join(SAMPLE_TYPES)
+        is_wanted |= dtype.kind == "i" and dtype.itemsize == 2
+    if not is_wanted or data.ndim != n_axes:
+        raise DatasetError(
+            f"{label} has type {dtype} and {data.ndim} axes; format version 1 wants {wanted} and "
+            f"{n_axes}"
+        )
 
 
 def holds_its_data(data: h5py.Dataset) -> bool:
-    """True for a data set whose values are all in its own file, in no more bytes than it
-    declares.
-    """
+    """True for a data set whose values are all stored in its file, as declared."""
     used = filters(data)
     return (
         not data.is_virtual
@@ -210,16 +205,14 @@ def holds_its_data(data: h5py.Dataset) -> bool:
 
 def _is_stored(data: h5py.Dataset, used: set[int]) -> bool:
     """False for what declares more than its bytes in the file can hold, in all or in one chunk."""
-    item, chunks = data.dtype.itemsize, data.chunks
-    chunk = math.prod(chunks) * item if chunks else 0
+    item, chunks = data.dtype.itemsize, data.chunks or (0,)
+    chunk = math.prod(chunks) * item
     if BLOSC2_FILTER in used:
-        counts = (
-            -(-length // step) for length, step in zip(data.shape, chunks, strict=True)
-        )
-        return chunk <= BLOSC2_CHUNK_LIMIT and data.id.get_num_chunks() == math.prod(
-            counts
-        )
-    limit = data.id.get_storage_size() * (EXPANSION_LIMIT if used else 1)
+        n_chunks = math.prod(-(-np.array(data.shape) // chunks).tolist())
+        return chunk <= BLOSC2_CHUNK_LIMIT and data.id.get_num_chunks() == n_chunks
+    limit = data.id.get_storage_size()
+    if used:
+        limit *= EXPANSION_LIMIT
     return max(data.size * item, chunk) <= limit
 
 
@@ -263,21 +256,19 @@ def _check_attributes(file: h5py.File, path: Path) -> None:
         )
     for name in ("channel_names", "class_names"):
         value = found[name]
-        if not isinstance(value, list) or not all(
-            isinstance(item, str) for item in value
-        ):
+        if not isinstance(value, list) or {*map(type, value)} - {str}:
             raise DatasetError(f"{path}: attribute {name} must be a list of text")
-    if len(found["channel_names"]) != file["acceleration"].shape[1]:
-        raise DatasetError(
-            f"{path}: {len(found['channel_names'])} channel names for "
-            f"{file['acceleration'].shape[1]} channels"
-        )
+    n_names, n_channels = len(found["channel_names"]), file["acceleration"].shape[1]
+    if n_names != n_channels:
+        raise DatasetError(f"{path}: {n_names} channel names for {n_channels} channels")
 
 
 def read_rows(data: h5py.Dataset) -> np.ndarray:
     """The whole of a small data set, text decoded."""
     values = data[...]
-    return decoded(values) if values.dtype.kind == "S" else values
+    if values.dtype.kind == "S":
+        return decoded(values)
+    return values
 
 
 def first_line(error: Exception) -> str:

@@ -17,7 +17,7 @@ from gensig.dataset.plan import (
     read_plan,
     record_ids,
     shard_places,
-    write_plan,
+
 )
 from gensig.errors import DatasetError
 
@@ -55,7 +55,7 @@ def test_round_trip_is_exact(floats: list[float], integer: int, text: str) -> No
         unit_id=np.array([text] * n),
     )
     with tempfile.TemporaryDirectory() as folder:
-        write_plan(Path(folder) / "plan.csv", plan)
+        (Path(folder) / "plan.csv").write_text(plan_text(plan))
         _same(plan, read_plan(Path(folder) / "plan.csv"))
 
 
@@ -82,7 +82,7 @@ def test_some_rows_are_those_of_the_whole(
     first = data.draw(st.integers(0, n - 1))
     n_records = data.draw(st.integers(1, n - first))
     with tempfile.TemporaryDirectory() as folder:
-        write_plan(Path(folder) / "plan.csv", plan)
+        (Path(folder) / "plan.csv").write_text(plan_text(plan))
         rows = PlanRows(Path(folder) / "plan.csv")
         assert rows.names == list(plan.columns)
         found = rows.records(first, n_records)
@@ -93,13 +93,13 @@ def test_some_rows_are_those_of_the_whole(
 def test_rows_that_are_not_there_are_refused(
     tmp_path: Path, first: int, n_records: int
 ) -> None:
-    write_plan(tmp_path / "plan.csv", _plan(label=np.arange(4)))
+    (tmp_path / "plan.csv").write_text(plan_text(_plan(label=np.arange(4))))
     with pytest.raises(DatasetError, match="has no records"):
         PlanRows(tmp_path / "plan.csv").records(first, n_records)
 
 
 def test_a_damaged_row_is_refused(tmp_path: Path) -> None:
-    write_plan(tmp_path / "plan.csv", _plan(label=np.arange(4)))
+    (tmp_path / "plan.csv").write_text(plan_text(_plan(label=np.arange(4))))
     lines = (tmp_path / "plan.csv").read_text().splitlines()
     (tmp_path / "plan.csv").write_text(
         "\n".join([*lines[:3], lines[3].rpartition(",")[0], *lines[4:]]) + "\n"

@@ -14,7 +14,7 @@ from dataset_samples import ATTRIBUTES, CLASSES, build, make_plan, write_shard
 
 from gensig.dataset.folder.layout import shard_path
 from gensig.dataset.folder.verify import inspect, verify
-from gensig.dataset.plan import Plan, read_plan, write_plan
+from gensig.dataset.plan import Plan, plan_text, read_plan
 from gensig.dataset.storage.atomic import sha256_file
 from gensig.dataset.storage.checksums import accept_edits
 from gensig.errors import DatasetError
@@ -215,7 +215,7 @@ def test_altered_plan_and_identity_are_found(folder: Path) -> None:
     plan = read_plan(folder / "plan.csv")
     label = plan.columns["label"].copy()
     label[5] = 0
-    write_plan(folder / "plan.csv", Plan(columns={**plan.columns, "label": label}))
+    (folder / "plan.csv").write_text(plan_text(Plan(columns={**plan.columns, "label": label})))
     text = "\n".join(verify(folder).problems)
     assert "plan.csv was altered" in text
     assert "shard-00000.h5 row 5: label is 2, the plan says 0" in text
