@@ -208,7 +208,8 @@ def _is_stored(data: h5py.Dataset, used: set[int]) -> bool:
     item, chunks = data.dtype.itemsize, data.chunks or (0,)
     chunk = math.prod(chunks) * item
     if BLOSC2_FILTER in used:
-        n_chunks = math.prod(-(-np.array(data.shape) // chunks).tolist())
+        sizes = zip(data.shape, chunks, strict=True)
+        n_chunks = math.prod(-(-length // step) for length, step in sizes)
         return chunk <= BLOSC2_CHUNK_LIMIT and data.id.get_num_chunks() == n_chunks
     limit = data.id.get_storage_size()
     if used:

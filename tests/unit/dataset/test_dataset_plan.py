@@ -17,7 +17,6 @@ from gensig.dataset.plan import (
     read_plan,
     record_ids,
     shard_places,
-
 )
 from gensig.errors import DatasetError
 

@@ -38,23 +38,6 @@ def _disjoint(sides: list[set]) -> bool:
     return sum(map(len, sides)) == len(set.union(*sides))
 
 
-@pytest.mark.parametrize(
-    ("protocol", "column"),
-    [
-        ("by_unit", "unit_id"),
-        ("cross_specimen", "specimen_id"),
-        ("cross_gearbox", "gearbox_id"),
-    ],
-)
-def test_clean_protocols_share_no_group(protocol: str, column: str) -> None:
-    plan = make_plan(n_records=300, n_units=10)
-    table = make_splits(plan, 1)[protocol]
-    assert _disjoint(_sides(table, plan, column))
-    assert all(side == {0, 1, 2} for side in _sides(table, plan, "label"))
-    assert [len(side) for side in _sides(table, plan, column)] == [6, 2, 2]
-    assert table.record_id.tolist() == plan.columns["record_id"].tolist()
-
-
 def test_leaky_protocol_has_every_record_on_several_sides() -> None:
     plan = make_plan()
     table = make_splits(plan, 1)["random_window_leaky"]
@@ -94,16 +77,6 @@ def test_protocol_that_lacks_a_class_or_groups_is_left_out() -> None:
         }
     )
     assert set(make_splits(bare, 1)) == {"random_window_leaky"}
-
-
-def test_same_seed_same_split_other_seed_another() -> None:
-    plan = make_plan(n_records=300, n_units=10)
-    texts = [
-        {name: table.to_csv() for name, table in make_splits(plan, seed).items()}
-        for seed in (1, 1, 2)
-    ]
-    assert texts[0] == texts[1]
-    assert all(texts[0][name] != texts[2][name] for name in texts[0])
 
 
 def test_csv_round_trip_and_header(tmp_path: Path) -> None:

@@ -192,6 +192,27 @@ def test_one_condition_a_unit_loses_no_record() -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("n_units", "n_train", "n_tested"),
+    [
+        (5, 3, 1),
+        (10, 6, 2),
+        (20, 12, 4),
+        (39, 23, 8),
+        (40, 22, 10),
+        (49, 29, 10),
+        (100, 60, 20),
+    ],
+)
+def test_ten_units_are_tested_on_where_a_quarter_is_ten(
+    n_units: int, n_train: int, n_tested: int
+) -> None:
+    plan = random_plan(3, n_units=n_units, n_classes=4, n_records=800)
+    units = sides(make_splits(plan, 0)["by_unit"], plan, "unit_id")
+    sizes = [len(set(part.tolist())) for part in units]
+    assert sizes == [n_train, n_units - n_train - n_tested, n_tested]
+
+
 def test_levels_are_held_out_whole() -> None:
     plan = random_plan(3, n_units=20, n_classes=2, n_records=400)
     levels = np.array([0.2, 0.3, 0.4, 0.5])

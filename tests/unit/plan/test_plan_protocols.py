@@ -86,32 +86,6 @@ def test_quickstart_has_all_protocols_with_ten_units_to_test_what_is_held_out() 
         assert len(test) >= 40
 
 
-@pytest.mark.parametrize(
-    ("n_units", "n_tested"),
-    [(5, 1), (20, 4), (39, 8), (40, 10), (49, 10), (50, 10), (100, 20)],
-)
-def test_ten_units_are_tested_on_where_a_quarter_is_ten(
-    n_units: int, n_tested: int
-) -> None:
-    plan = planned(
-        "plan.n_records=800", f"plan.n_units={n_units}", "plan.n_gearboxes=1"
-    )
-    table = make_splits(plan, 0)["by_unit"]
-    unit = dict(
-        zip(
-            plan.columns["record_id"].tolist(),
-            plan.columns["unit_id"].tolist(),
-            strict=True,
-        )
-    )
-    sides = {
-        name: {unit[record] for record in table.record_id[table.subset == name]}
-        for name in set(table.subset)
-    }
-    assert len(sides["test"]) == n_tested
-    assert len(sides["train"]) >= n_units / 2
-
-
 def test_a_sham_plan_has_no_severity_to_hold_out_and_keeps_the_others() -> None:
     sham, real = planned("plan.sham=true"), planned()
     tables = make_splits(sham, 0)
