@@ -1,5 +1,4 @@
-"""Executors: every shard once, a dead worker replaced, and the same bytes wherever they are
-made."""
+"""Executors: every shard once, a dead worker replaced, and the same bytes from all."""
 
 import functools
 import os
@@ -231,26 +230,6 @@ def test_two_tasks_at_a_time_make_the_same_bytes(
     assert contents(out) == contents(reference)
 
 
-@pytest.mark.parametrize(
-    "words", [(), ("dataset.compression=gzip", "dataset.sample_type=int16")]
-)
-def test_plan_predicts_bytes(
-    tmp_path: Path, words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
-) -> None:
-    overrides = ("dataset.records_per_shard=2", *words)
-    out = make(tmp_path / "data", *overrides)
-    n_bytes = sum(path.stat().st_size for path in out.rglob("*") if path.is_file())
-    capsys.readouterr()
-    assert main(["plan", *TINY, *overrides]) == 0
-    (line,) = [
-        line
-        for line in capsys.readouterr().out.splitlines()
-        if line.startswith("bytes")
-    ]
-    predicted = int(line.split()[1].replace(",", ""))
-    assert 1 / 1.5 < predicted / n_bytes < 1.5
-
-
 def test_a_task_needs_a_frozen_folder(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -353,7 +332,7 @@ def test_dask_on_this_machine_gives_up_a_shard_that_always_kills(
     assert isinstance(failure, ShardFailure)
     assert "KilledWorker" in failure.reason
     assert results == {index: 10 * index for index in (0, 1, 3, 4, 5)}
-    # Dask counts a worker that is lost before it has begun the shard too; on a busy machine that happens.
+    # Dask also counts a worker that is lost before it has begun the shard, on a busy machine.
     assert 1 <= begun[2] <= TRIES
 
 

@@ -1,5 +1,4 @@
-"""Reading: what was written, in plan order, from any process, and never from an unfinished set by
-mistake."""
+"""Reading of data sets in plan order, from several processes, finished or not."""
 
 import pickle
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Splits: clean ones share no group, the leaky one leaks on purpose, and none lacks a class."""
+"""Split tables: the leaky protocol, protocols left out, and CSV files."""
 
 import hashlib
 from pathlib import Path

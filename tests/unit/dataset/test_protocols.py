@@ -1,5 +1,4 @@
-"""Protocols over random plans: nothing is on two sides, held-out values are held out, and no subset
-lacks a class."""
+"""Protocols over random plans: groups and held-out values apart, every class in each subset."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,4 @@
-"""Choosing records by their columns: what meets the conditions, in plan order, and a hint for every
-slip of the pen."""
+"""Selections of records by their columns, in plan order, with a hint for every mistake."""
 
 import os
 import time

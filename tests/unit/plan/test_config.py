@@ -1,5 +1,4 @@
-"""From overrides to one plain configuration: what is typed, what follows from it, and every mistake
-in one line."""
+"""Requests: typed overrides, derived values, and every mistake in one line."""
 
 import json
 import re
@@ -447,7 +446,15 @@ def test_paper_experiment_means_every_convention_of_the_paper():
         "bending",
     )
     assert [getattr(mesh, key) for key in keys] == [
-        "paper", "sum", "linear", "plane_stress", "sainsot", "to_contact", "paper", "whole"]  # fmt: skip
+        "paper",
+        "sum",
+        "linear",
+        "plane_stress",
+        "sainsot",
+        "to_contact",
+        "paper",
+        "whole",
+    ]
 
 
 def test_three_keys_mean_the_papers_conventions_for_ever():

@@ -1,4 +1,4 @@
-"""What a plan leaves out of what was asked, or undoes of an option, is told in a line."""
+"""Notes on a plan: units without records, impossible splits, and replaced settings."""
 
 import pytest
 

@@ -1,5 +1,4 @@
-"""Protocols of real plans: what a unit draws stays on one side, noise included, whatever the
-design."""
+"""Protocols of real plans: units, conditions and noise stay on one side."""
 
 import numpy as np
 import pytest

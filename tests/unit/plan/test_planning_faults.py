@@ -1,5 +1,4 @@
-"""Plans of faults on one tooth, on all of them, and of several at once: what is recorded, and what
-is refused."""
+"""Plans of faults on one tooth, on all teeth, and of several faults at once."""
 
 import json
 import re

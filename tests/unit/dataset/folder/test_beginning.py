@@ -1,5 +1,4 @@
-"""A folder whose process is killed while it is being begun is no data set, is known, and is begun
-anew."""
+"""A folder whose creation was killed is no data set, is recognized, and is begun anew."""
 
 import os
 import signal
@@ -24,7 +23,7 @@ def begin(out: Path) -> None:
         out,
         config=CONFIG,
         overrides=[],
-        plan=make_plan(),
+        plan=make_plan(n_records=9, n_units=3),
         identity=identity,
         seed=7,
         generator_version="0.1.0",

@@ -1,5 +1,4 @@
-"""A folder's life: made, filled, closed; nothing that existed is touched, nothing unfinished looks
-whole."""
+"""Folders: creation, entry of shards and closing; existing files are not touched."""
 
 import json
 import multiprocessing
@@ -85,11 +84,20 @@ def test_a_key_that_came_after_0_9_counts_only_where_it_is_not_at_its_default() 
 
 def test_folder_holds_what_is_needed(folder: Path, plan: Plan) -> None:
     assert set(_tree(folder)) == {
-        "config.yaml", "overrides.yaml", "plan.csv", "manifest.json", "index.h5", "README.md", "croissant.json",
+        "config.yaml",
+        "overrides.yaml",
+        "plan.csv",
+        "manifest.json",
+        "index.h5",
+        "README.md",
+        "croissant.json",
         "SHA256SUMS",
-        "splits/by_unit.csv", "splits/cross_gearbox.csv", "splits/cross_specimen.csv", "splits/random_window_leaky.csv",
+        "splits/by_unit.csv",
+        "splits/cross_gearbox.csv",
+        "splits/cross_specimen.csv",
+        "splits/random_window_leaky.csv",
         *(f"shards/shard-0000{i}.h5" for i in range(4)),
-    }  # fmt: skip
+    }
     manifest = read_manifest(folder)
     assert manifest.is_complete
     assert (manifest.seed, manifest.n_records, manifest.n_done) == (7, 36, 4)

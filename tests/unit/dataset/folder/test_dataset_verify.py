@@ -1,5 +1,4 @@
-"""verify finds every way in which a data set can be wrong, and names it; inspect and the card show
-what is there."""
+"""Verification names every defect of a data set; inspection and card show its content."""
 
 import os
 import shutil
@@ -240,8 +239,17 @@ def test_card_states_facts_and_escapes(tmp_path: Path) -> None:
     )
     card = (folder / "README.md").read_text()
     assert "\n# a\\_b\n" in card
-    for part in ("36, of which 1 failed", "1000 Hz", "0.2 s (200 samples)", "n\\_teeth\\_pinion | 23", "CC BY 4.0",
-                 "1800 to 1835 r/min", "wheel\\_ü (m/s^2)", "by\\_unit |", "| healthy | 12 | 0 |"):  # fmt: skip
+    for part in (
+        "36, of which 1 failed",
+        "1000 Hz",
+        "0.2 s (200 samples)",
+        "n\\_teeth\\_pinion | 23",
+        "CC BY 4.0",
+        "1800 to 1835 r/min",
+        "wheel\\_ü (m/s^2)",
+        "by\\_unit |",
+        "| healthy | 12 | 0 |",
+    ):
         assert part in card, part
     assert "<script>" not in card
     assert "&lt;script&gt;\\|\\`\\* | 12 | 0.25 |" in card

@@ -1,4 +1,4 @@
-"""Shards: the same bytes for the same input, whole or not there, and nothing unexpected inside."""
+"""Shards: equal bytes for equal input, written whole or not at all, foreign content refused."""
 
 import subprocess
 import sys
@@ -181,21 +181,6 @@ def _replace(name: str, **declaration) -> object:
     return change
 
 
-def _soft(file: h5py.File) -> None:
-    file["more"] = h5py.SoftLink("/label")
-
-
-def _external(file: h5py.File) -> None:
-    file["params/more"] = h5py.ExternalLink("/etc/passwd", "/x")
-
-
-def _virtual(file: h5py.File) -> None:
-    layout = h5py.VirtualLayout((10,), "f8")
-    layout[:] = h5py.VirtualSource("/etc/other.h5", "x", (10,))
-    del file["torque_nm"]
-    file.create_virtual_dataset("torque_nm", layout)
-
-
 def _attribute(name: str, value: object) -> object:
     def change(file: h5py.File) -> None:
         file.attrs[name] = value
@@ -206,15 +191,6 @@ def _attribute(name: str, value: object) -> object:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (_soft, "'more' is a link"),
-        (_external, "'params/more' is a link"),
-        (_virtual, "in another file"),
-        (
-            _replace(
-                "torque_nm", shape=(10,), dtype="f8", external="/tmp/gensig-none.bin"
-            ),
-            "in another file",
-        ),
         (_replace("torque_nm", data=np.zeros(9)), "has shape"),
         (_replace("torque_nm", data=np.zeros((10, 1))), "axes"),
         (_replace("label", data=np.zeros(10)), "has type"),
@@ -233,23 +209,6 @@ def _attribute(name: str, value: object) -> object:
         (
             _replace("acceleration", data=np.ones((10, 2, 200)), scaleoffset=2),
             "allowed are gzip, lzf and blosc2",
-        ),
-        (
-            _replace("label_name", data=["x"] * 10, dtype=h5py.string_dtype()),
-            "has type object",
-        ),
-        (_replace("label_name", data=np.zeros(10, dtype=[("a", "f8")])), "has type"),
-        (
-            _replace(
-                "acceleration", shape=(10, 2, 10**12), dtype="f4", chunks=(1, 2, 100)
-            ),
-            "bomb",
-        ),
-        (
-            _replace(
-                "acceleration", shape=(10, 2, 10**9), dtype="f4", compression="gzip"
-            ),
-            "bomb",
         ),
         (_attribute("schema_version", 2), "format version 2"),
         (_attribute("sampling_rate_hz", float("nan")), "positive"),

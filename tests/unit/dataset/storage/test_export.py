@@ -1,4 +1,4 @@
-"""Other formats give back the same numbers, to the libraries that people read them with."""
+"""Exports hold the same numbers for the libraries that read them."""
 
 import csv
 import json

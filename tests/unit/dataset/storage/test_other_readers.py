@@ -1,5 +1,4 @@
-"""A shard loads with what people have: Hugging Face `datasets`, pandas, and programs that know
-plain HDF5 only."""
+"""Shards load with Hugging Face `datasets`, pandas and plain HDF5 programs."""
 
 import re
 from pathlib import Path

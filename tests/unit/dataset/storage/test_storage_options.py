@@ -1,5 +1,4 @@
-"""Sample types and compressions: the same signals whatever is stored, and nothing wrong in the
-scales goes unseen."""
+"""Sample types and compressions: equal signals from all, and invalid scales are found."""
 
 import itertools
 import multiprocessing
@@ -24,7 +23,6 @@ from dataset_samples import (
 
 import gensig.dataset.storage.guard as guard_module
 import gensig.dataset.storage.shard as shard_module
-from diagnose.data.windows import load_windows, subset_segments, task_of
 from gensig.cli import main
 from gensig.dataset.folder.layout import shard_path
 from gensig.dataset.folder.verify import inspect, verify
@@ -246,31 +244,7 @@ def test_index_holds_counts_and_scales_of_all_shards(
     assert np.isfinite(physical[:FAILED]).all()
 
 
-def test_diagnosis_and_descriptions_go_through_the_scale(
-    whole: Path, folder: Path
-) -> None:
-    windows = []
-    for path in (folder, whole):
-        with open_dataset(path) as data:
-            task = task_of(
-                data,
-                window_samples=50,
-                stride_samples=50,
-                normalise="none",
-                classes=["healthy", "pitting"],
-            )
-            windows.append(
-                load_windows(task, subset_segments(task, "by_unit", "train"))
-            )
-    kept = np.isin(
-        windows[0].record, windows[1].record
-    )  # the failed record is left out
-    first, second = (
-        windows[0].cut(np.flatnonzero(kept)),
-        windows[1].cut(np.arange(len(windows[1]))),
-    )
-    np.testing.assert_allclose(second, first, rtol=0, atol=5 / 32767)
-    assert np.abs(second).max() > 1.0
+def test_descriptions_name_the_scale(whole: Path, folder: Path) -> None:
     text = inspect(whole)
     assert "acceleration (2, 200) float32, m/s^2" in text
     assert "int16 with a scale, compression blosc2" in text
@@ -343,8 +317,8 @@ def test_verify_finds_a_scale_that_is_none(
 def test_verify_looks_at_signals_without_noise_too(tmp_path: Path, plan: Plan) -> None:
     folder = build(tmp_path / "set", plan, clean=True)
     assert forge(folder, 1, lambda file: None) == ""
-    assert "row 4: acceleration_clean is not finite" in _forge(
-        folder, setting("acceleration_clean", (4, 1), np.nan)
+    assert "row 4: acceleration_clean is not finite" in forge(
+        folder, 1, setting("acceleration_clean", (4, 1), np.nan)
     )
 
 
@@ -353,11 +327,8 @@ def test_reader_refuses_a_scale_that_is_none(whole: Path, tmp_path: Path) -> Non
     forge(folder, 1, setting(SCALE, (4, 1), 0.0))
     with open_dataset(folder) as data:
         data.signals(15)
-        with pytest.raises(
-            DatasetError, match=r"acceleration_scale of row 4 is 0\.0"
-        ) as caught:
+        with pytest.raises(DatasetError, match=r"acceleration_scale of row 4 is 0\.0"):
             data.signals(14)
-    assert "\n" not in str(caught.value)
 
 
 def test_missing_plugin_is_one_line(
