@@ -103,13 +103,13 @@ class Dataset:
         self.sample_type = str(first["acceleration"].dtype.name)
         self.compression = compression_of(first["acceleration"])
         self._shape: tuple[int, int] = first["acceleration"].shape[1:]
-        found = datasets(first, folder)
+        contents = datasets(first, folder)
         self.signal_names: list[str] = [
-            name for name in SIGNALS if SIGNALS[name].is_bulk and name in found
+            name for name in SIGNALS if SIGNALS[name].is_bulk and name in contents
         ]
-        columns = found.keys() - self.signal_names
+        columns = contents.keys() - self.signal_names
         self._types = {
-            name: (found[name].dtype, found[name].shape[1:]) for name in columns
+            name: (contents[name].dtype, contents[name].shape[1:]) for name in columns
         }
 
     @property

@@ -32,11 +32,11 @@ def without_numbers(reason: str) -> str:
 
 def failure_reasons(folder: Path) -> list[str]:
     """`status_reason` of every failed record of the finished shards that store it."""
-    found: list[str] = []
+    reasons: list[str] = []
     for index, entry in enumerate(read_manifest(folder).shards):
         if entry.state == "done" and entry.n_failed:
             with open_shard(shard_path(folder, index), folder=folder) as file:
                 if "status_reason" in file:
                     failed = read_rows(file["status"]) == "failed"
-                    found += read_rows(file["status_reason"])[failed].tolist()
-    return found
+                    reasons += read_rows(file["status_reason"])[failed].tolist()
+    return reasons

@@ -143,15 +143,15 @@ def _objects(file: h5py.File) -> list[str]:
 
 
 def _dataset_notes(data: h5py.Dataset) -> str:
-    found = read_attributes(data)
+    attributes = read_attributes(data)
     notes = [""]
-    if unit := found.pop("unit", ""):
+    if unit := attributes.pop("unit", ""):
         notes.append(_show(unit))
     if data.is_virtual:
         notes.append("virtual")
     elif data.external:
         notes.append("data in another file, not read")
-    notes += [f"{_show(name)}={_show(value)}" for name, value in found.items()]
+    notes += [f"{_show(name)}={_show(value)}" for name, value in attributes.items()]
     if data.size == 1 and data.dtype.kind in "iuf" and holds_its_data(data):
         notes.append(f"value {data[()]}")
     return ", ".join(notes)

@@ -161,7 +161,7 @@ def read_manifest(folder: Path) -> Manifest:
             identity=_hash(_get(content, "identity", str), "identity"),
             seed=_get(content, "seed", int),
             n_records=_get(content, "n_records", int),
-            state=_one_of(state, ("incomplete", "complete"), "state"),
+            state=_choice(state, ("incomplete", "complete"), "state"),
             shards=tuple(shard_entry(i, entry) for i, entry in entries),
             files={name: _hash(value, name) for name, value in files.items()},
             configuration=_get({"configuration": {}} | content, "configuration", dict),
@@ -214,7 +214,7 @@ def _hash(value: Any, name: str) -> str:
     return value
 
 
-def _one_of(value: str, allowed: tuple[str, ...], name: str) -> str:
+def _choice(value: str, allowed: tuple[str, ...], name: str) -> str:
     if value not in allowed:
         raise DatasetError(
             f"{name} is {value[:40]!r}; allowed are {', '.join(allowed)}"
@@ -231,7 +231,7 @@ def shard_entry(index: int, content: Any) -> ShardEntry:
             f"shard {index} is named {name[:80]!r}; the only name allowed is {shard_name(index)!r}"
         )
     state = _get(content, "state", str)
-    _one_of(state, ("planned", "done", "failed"), f"state of {name}")
+    _choice(state, ("planned", "done", "failed"), f"state of {name}")
     digest = _get(content, "sha256", str)
     entry = ShardEntry(
         name=name,

@@ -90,9 +90,9 @@ def stored_config(config: dict[str, Any]) -> dict[str, Any]:
     return stored
 
 
-def differing_keys(one: ConfigContent, other: ConfigContent) -> list[str]:
+def differing_keys(config: ConfigContent, other: ConfigContent) -> list[str]:
     """Dotted keys that decide bits and whose values differ between two configurations, in order."""
-    ours, theirs = SINCE_0_9 | _leaves(one), SINCE_0_9 | _leaves(other)
+    ours, theirs = SINCE_0_9 | _leaves(config), SINCE_0_9 | _leaves(other)
     missing = object()
     return [
         key

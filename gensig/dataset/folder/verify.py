@@ -78,11 +78,13 @@ def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
         )
     problems = _state(folder, manifest) + _extra_files(folder, manifest)
     if manifest.is_complete:
-        problems += [one.line for one in differences(folder, manifest, quick=quick)]
+        problems += [
+            difference.line for difference in differences(folder, manifest, quick=quick)
+        ]
     plan = None
     if not quick:
-        found, plan = _tables(folder, manifest)
-        problems += found
+        lines, plan = _tables(folder, manifest)
+        problems += lines
         if plan is not None:
             problems += _splits(folder, manifest, plan)
     starts = np.cumsum([0, *(entry.rows for entry in manifest.shards)])
@@ -100,11 +102,11 @@ def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
                 if not damage:
                     reference = reference or _description(file, path)
                     problems += _description_differs(file, path, reference)
-                found = _rows_differ(file, entry, plan, int(starts[i]))
+                lines = _rows_differ(file, entry, plan, int(starts[i]))
                 # A damaged file can have thousands of wrong rows: one line is enough.
                 if damage:
-                    found = found[:1]
-                problems += found
+                    lines = lines[:1]
+                problems += lines
         except DatasetError as error:
             problems.append(str(error))
         except HDF5_ERRORS as error:
@@ -130,17 +132,19 @@ def _state(folder: Path, manifest: Manifest) -> list[str]:
             f"incomplete: {manifest.n_done} of {len(manifest.shards)} shards are done and the "
             f"data set was never closed; run `gensig resume {folder}`"
         )
-    needed, found = [CONFIG, PLAN, OVERRIDES], []
+    needed, present = [CONFIG, PLAN, OVERRIDES], []
     if manifest.is_complete:
         needed.append(INDEX)
-        found = sorted(f"{SPLITS}/{path.name}" for path in (folder / SPLITS).glob("*"))
+        present = sorted(
+            f"{SPLITS}/{path.name}" for path in (folder / SPLITS).glob("*")
+        )
     for name in needed:
         if name not in manifest.files:
             problems.append(f"the manifest does not list {name}; it is damaged")
     for name in manifest.files:
         if not (folder / name).is_file():
             problems.append(f"{name} is missing")
-    for name in found:
+    for name in present:
         if name not in manifest.files:
             problems.append(f"{name!a} is extra: the manifest does not list it")
     return problems
@@ -207,8 +211,8 @@ def _splits(folder: Path, manifest: Manifest, plan: Plan) -> list[str]:
         if path.parent.name != SPLITS or not path.is_file():
             continue
         try:
-            found = split_problems(path.stem, read_split(path), plan)
-            problems += [f"{SPLITS}/{line}" for line in found]
+            lines = split_problems(path.stem, read_split(path), plan)
+            problems += [f"{SPLITS}/{line}" for line in lines]
         except DatasetError as error:
             problems.append(str(error))
     return problems
@@ -221,8 +225,8 @@ def _bytes_differ(
         return [f"{entry.name} is missing"]
     size = path.stat().st_size
     if size != entry.bytes:
-        found = "truncated" if size < entry.bytes else "not the recorded file"
-        return [f"{entry.name} is {found}: {size} bytes, recorded are {entry.bytes}"]
+        state = "truncated" if size < entry.bytes else "not the recorded file"
+        return [f"{entry.name} is {state}: {size} bytes, recorded are {entry.bytes}"]
     if quick:
         return []
     digest = sha256_file(path)
@@ -248,12 +252,12 @@ def _description(file: h5py.File, path: Path) -> dict:
 
 def _description_differs(file: h5py.File, path: Path, reference: dict) -> list[str]:
     problems = []
-    for part, found in _description(file, path).items():
+    for part, actual in _description(file, path).items():
         expected = reference[part]
         names = [
             name
-            for name in sorted(found | expected)
-            if repr(found.get(name)) != repr(expected.get(name))
+            for name in sorted(actual | expected)
+            if repr(actual.get(name)) != repr(expected.get(name))
         ]
         if names:
             problems.append(
@@ -279,12 +283,12 @@ def _rows_differ(
         if column.name not in plan.columns or column.name not in file:
             continue
         planned = plan.columns[column.name][start : start + n]
-        found = read_rows(file[column.name])
-        wrong = np.flatnonzero(planned != found)
+        stored = read_rows(file[column.name])
+        wrong = np.flatnonzero(planned != stored)
         if wrong.size:
             i = int(wrong[0])
             problems.append(
-                f"{name} row {i}: {column.name} is {found[i].item()!a}, the plan says "
+                f"{name} row {i}: {column.name} is {stored[i].item()!a}, the plan says "
                 f"{planned[i].item()!a} ({wrong.size} such rows)"
             )
             if column.name == "record_id":

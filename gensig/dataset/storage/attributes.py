@@ -64,7 +64,7 @@ def _text_array(texts: list[str], name: str) -> np.ndarray:
 
 def read_attributes(target: h5py.HLObject) -> dict:
     """Attributes as text, int, float or lists of them; those of any other type are left out."""
-    found: dict = {}
+    attributes: dict = {}
     for name in target.attrs:
         # A damaged name comes as bytes.
         kind = target.attrs.get_id(name).dtype.kind if isinstance(name, str) else ""
@@ -73,8 +73,8 @@ def read_attributes(target: h5py.HLObject) -> dict:
         value = np.asarray(target.attrs[name])
         if kind == "S" or value.dtype.kind == "O":
             value = decoded(value)
-        found[name] = value.tolist()
-    return found
+        attributes[name] = value.tolist()
+    return attributes
 
 
 def decoded(values: np.ndarray) -> np.ndarray:

@@ -78,20 +78,20 @@ def read_checksums(folder: Path) -> dict[str, str]:
             "write it where you trust the folder as it is"
         )
     text = read_text(path, limit=TEXT_BYTES_LIMIT)
-    found: dict[str, str] = {}
+    digests: dict[str, str] = {}
     for number, line in enumerate(text.split("\n")[:-1], start=1):
         match = _LINE.fullmatch(line)
-        if match is None or match[2] in found:
+        if match is None or match[2] in digests:
             raise DatasetError(
                 f"{CHECKSUMS} was altered: line {number} is none of a data set; restore it from "
                 "a copy"
             )
-        found[match[2]] = match[1]
+        digests[match[2]] = match[1]
     if not text.endswith("\n"):
         raise DatasetError(
             f"{CHECKSUMS} was altered: its end is missing; restore it from a copy"
         )
-    return found
+    return digests
 
 
 def differences(
@@ -109,28 +109,28 @@ def differences(
     except DatasetError as error:
         return [Difference(name=CHECKSUMS, line=str(error))]
     recorded = _recorded(manifest)
-    found = []
+    different = []
     for name in (MANIFEST, *recorded, CARD, CROISSANT, *_unlisted(folder)):
         if name not in listed:
             listed[name] = ""
             line = f"{CHECKSUMS} does not list {name}; one of them was altered"
-            found.append(Difference(name=CHECKSUMS, line=line))
+            different.append(Difference(name=CHECKSUMS, line=line))
     for name, digest in listed.items():
         path = folder / name
         if name in recorded:
             if digest and digest != recorded[name]:
                 both = f"{CHECKSUMS} and {MANIFEST}"
                 line = f"{both} have different sha256 of {name}; one was altered"
-                found.append(Difference(name=CHECKSUMS, line=line))
+                different.append(Difference(name=CHECKSUMS, line=line))
         elif not path.is_file() or not path.resolve().is_relative_to(folder.resolve()):
             line = f"{name} is missing; {CHECKSUMS} lists it"
-            found.append(Difference(name=name, line=line))
+            different.append(Difference(name=name, line=line))
         elif digest and (name == MANIFEST or not quick) and sha256_file(path) != digest:
             line = f"{name} was altered: its sha256 is not the one in {CHECKSUMS}"
             if name in EDITABLE:
                 line += f"; if you edited it, `gensig finalize {folder}` accepts it"
-            found.append(Difference(name=name, line=line))
-    return found
+            different.append(Difference(name=name, line=line))
+    return different
 
 
 def accept_edits(folder: Path) -> list[str]:
@@ -146,17 +146,17 @@ def accept_edits(folder: Path) -> list[str]:
             raise DatasetError(
                 f"{folder} is incomplete; run `gensig resume {folder}` first"
             )
-        found = differences(folder, manifest)
+        different = differences(folder, manifest)
         missing = not (folder / CHECKSUMS).exists()
         refused = [
-            one
-            for one in found
-            if one.name not in EDITABLE or not (folder / one.name).is_file()
+            each
+            for each in different
+            if each.name not in EDITABLE or not (folder / each.name).is_file()
         ]
         if refused and not missing:
             raise DatasetError(
                 f"{refused[0].line}; only {' and '.join(EDITABLE)} may be edited"
             )
-        if found:
+        if different:
             write_checksums(folder, manifest, sha256_file(folder / MANIFEST))
-        return [one.name for one in found]
+        return [each.name for each in different]

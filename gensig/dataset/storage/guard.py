@@ -76,11 +76,11 @@ def same_file(path: Path) -> tuple[int, ...]:
     () where there is none.
     """
     try:
-        found, link = path.stat(), path.lstat()
+        target, link = path.stat(), path.lstat()
     except OSError:
         return ()
-    times = (found.st_mtime_ns, found.st_ctime_ns)
-    return (found.st_dev, found.st_ino, found.st_size, *times, link.st_ino)
+    times = (target.st_mtime_ns, target.st_ctime_ns)
+    return (target.st_dev, target.st_ino, target.st_size, *times, link.st_ino)
 
 
 def check_shard(file: h5py.File, path: Path) -> None:
@@ -94,17 +94,17 @@ def check_shard(file: h5py.File, path: Path) -> None:
                     that reads it
     """
     try:
-        found = datasets(file, path)
-        missing = [name for name in REQUIRED if name not in found]
+        contents = datasets(file, path)
+        missing = [name for name in REQUIRED if name not in contents]
         if missing:
             raise DatasetError(
                 f"{path} has no data set {', '.join(missing)}; it is no gensig shard"
             )
-        n_records = row_count(found["record_id"])
-        for name, data in found.items():
+        n_records = row_count(contents["record_id"])
+        for name, data in contents.items():
             _check_dataset(name, data, n_records, path)
         for name, scale in SCALES.items():
-            _check_scale(found, name, scale, path)
+            _check_scale(contents, name, scale, path)
         _check_attributes(file, path)
     except HDF5_ERRORS as error:
         raise DatasetError(
@@ -117,7 +117,7 @@ def datasets(file: h5py.File, path: Path) -> dict[str, h5py.Dataset]:
 
     DatasetError for links and other objects.
     """
-    found: dict[str, h5py.Dataset] = {}
+    contents: dict[str, h5py.Dataset] = {}
 
     def collect(group: h5py.Group, prefix: str, *, deeper: bool) -> None:
         for key in group:
@@ -131,7 +131,7 @@ def datasets(file: h5py.File, path: Path) -> dict[str, h5py.Dataset]:
                 )
             item = group[key]
             if isinstance(item, h5py.Dataset):
-                found[prefix + key] = item
+                contents[prefix + key] = item
             elif isinstance(item, h5py.Group) and deeper:
                 collect(item, f"{prefix}{key}/", deeper=False)
             else:
@@ -141,7 +141,7 @@ def datasets(file: h5py.File, path: Path) -> dict[str, h5py.Dataset]:
                 )
 
     collect(file, "", deeper=True)
-    return found
+    return contents
 
 
 def row_count(data: h5py.Dataset) -> int:
@@ -218,18 +218,18 @@ def _is_stored(data: h5py.Dataset, used: set[int]) -> bool:
 
 
 def _check_scale(
-    found: dict[str, h5py.Dataset], name: str, scale: str, path: Path
+    contents: dict[str, h5py.Dataset], name: str, scale: str, path: Path
 ) -> None:
     """Refuse counts without their scale, one a record and channel."""
-    if name not in found or found[name].dtype.kind == "f":
+    if name not in contents or contents[name].dtype.kind == "f":
         return
-    if scale not in found:
+    if scale not in contents:
         raise DatasetError(
             f"{path}: {name} is int16 and there is no data set {scale}; its values are unknown"
         )
-    if found[scale].shape != found[name].shape[:2]:
+    if contents[scale].shape != contents[name].shape[:2]:
         raise DatasetError(
-            f"{path}: {scale} has shape {found[scale].shape}, {name} has {found[name].shape[:2]} "
+            f"{path}: {scale} has shape {contents[scale].shape}, {name} has {contents[name].shape[:2]} "
             "records and channels"
         )
 
@@ -239,13 +239,13 @@ def _check_attributes(file: h5py.File, path: Path) -> None:
         raise DatasetError(
             f"{path} has {len(file.attrs)} attributes; it is no gensig shard"
         )
-    found = read_attributes(file)
-    missing = [name for name in REQUIRED_ATTRIBUTES if name not in found]
+    attributes = read_attributes(file)
+    missing = [name for name in REQUIRED_ATTRIBUTES if name not in attributes]
     if missing:
         raise DatasetError(
             f"{path} has no root attribute {', '.join(missing)}; it is no gensig shard"
         )
-    version, rate = found["schema_version"], found["sampling_rate_hz"]
+    version, rate = attributes["schema_version"], attributes["sampling_rate_hz"]
     if version != SCHEMA_VERSION:
         raise DatasetError(
             f"{path} has format version {version}; this gensig reads {SCHEMA_VERSION}, get a "
@@ -256,10 +256,13 @@ def _check_attributes(file: h5py.File, path: Path) -> None:
             f"{path}: sampling_rate_hz is {rate}; it must be a positive number"
         )
     for name in ("channel_names", "class_names"):
-        value = found[name]
+        value = attributes[name]
         if not isinstance(value, list) or {*map(type, value)} - {str}:
             raise DatasetError(f"{path}: attribute {name} must be a list of text")
-    n_names, n_channels = len(found["channel_names"]), file["acceleration"].shape[1]
+    n_names, n_channels = (
+        len(attributes["channel_names"]),
+        file["acceleration"].shape[1],
+    )
     if n_names != n_channels:
         raise DatasetError(f"{path}: {n_names} channel names for {n_channels} channels")
 

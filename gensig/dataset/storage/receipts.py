@@ -70,16 +70,16 @@ def read_receipt(folder: Path, shard_index: int) -> ShardEntry | None:
 def collect_receipts(folder: Path) -> int:
     """Enter every shard that has a receipt in the manifest; returns how many there were."""
     manifest = read_manifest(folder)
-    found = {}
+    entries = {}
     for index, planned in enumerate(manifest.shards):
         if planned.state != "done":
             entry = read_receipt(folder, index)
             if entry is not None and entry.rows == planned.rows:
-                found[index] = entry
-    if found:
-        record_shards(folder, found)
+                entries[index] = entry
+    if entries:
+        record_shards(folder, entries)
     if not manifest.is_complete:
         for index in range(len(manifest.shards)):
             with suppress(FileNotFoundError):
                 receipt_path(folder, index).unlink()
-    return len(found)
+    return len(entries)
