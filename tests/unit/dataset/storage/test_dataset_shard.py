@@ -191,6 +191,24 @@ def _attribute(name: str, value: object) -> object:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
+        (
+            lambda file: file.__setitem__("params/more", h5py.SoftLink("/label")),
+            "'params/more' is a link",
+        ),
+        (
+            _replace("torque_nm", shape=(10,), dtype="f8", external="/tmp/no.bin"),
+            "in another file",
+        ),
+        (
+            _replace("label_name", data=["x"] * 10, dtype=h5py.string_dtype()),
+            "has type object",
+        ),
+        (
+            _replace(
+                "acceleration", shape=(10, 2, 10**9), dtype="f4", chunks=(1, 2, 9)
+            ),
+            "bomb",
+        ),
         (_replace("torque_nm", data=np.zeros(9)), "has shape"),
         (_replace("torque_nm", data=np.zeros((10, 1))), "axes"),
         (_replace("label", data=np.zeros(10)), "has type"),
