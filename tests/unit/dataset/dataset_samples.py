@@ -13,6 +13,7 @@ from gensig.dataset.folder.layout import shard_path
 from gensig.dataset.folder.manifest import finalize, identity_hash, record_shard
 from gensig.dataset.folder.verify import verify
 from gensig.dataset.plan import Plan, record_ids, shard_places
+from gensig.dataset.splitting.splits import SUBSETS, SplitTable
 from gensig.dataset.storage.atomic import sha256_file
 from gensig.dataset.storage.checksums import accept_edits
 from gensig.dataset.storage.shard import ShardWriter
@@ -189,3 +190,11 @@ def build(
     if close:
         finalize(out, figures=figures)
     return out
+
+
+def sides(table: SplitTable, plan: Plan, column: str) -> list[np.ndarray]:
+    """Values of a plan column in train, validation and test."""
+    ids = plan.columns["record_id"]
+    record = np.argsort(ids)[np.searchsorted(np.sort(ids), table.record_id)]
+    values = plan.columns[column][record]
+    return [values[table.subset == subset] for subset in SUBSETS]

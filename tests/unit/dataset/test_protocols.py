@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from dataset_samples import sides
 
 from gensig.dataset.plan import Plan, record_ids, shard_places
 from gensig.dataset.splitting.protocols import PROTOCOLS, make_splits, why_left_out
@@ -58,23 +59,6 @@ def random_plan(seed: int, **fixed: int) -> Plan:
         else np.full(n, np.nan),
     }
     return Plan(columns=columns)
-
-
-def sides(table: SplitTable, plan: Plan, column: str) -> list[np.ndarray]:
-    """Values of a plan column in train, validation and test."""
-    value = dict(
-        zip(
-            plan.columns["record_id"].tolist(),
-            plan.columns[column].tolist(),
-            strict=True,
-        )
-    )
-    return [
-        np.array(
-            [value[name] for name in table.record_id[table.subset == subset].tolist()]
-        )
-        for subset in SUBSETS
-    ]
 
 
 PLANS = [random_plan(seed) for seed in range(60)]
