@@ -203,6 +203,7 @@ def test_two_tasks_at_a_time_make_the_same_bytes(
         "generate",
         "--quiet",
         "executor=slurm",
+        "executor.n_workers=1",
         "executor.shard_count=2",
         f"out={out}",
     ]
@@ -217,9 +218,8 @@ def test_two_tasks_at_a_time_make_the_same_bytes(
     assert not verify(out).complete
     assert other.wait(timeout=300) == 0
     assert (out / "manifest.json").read_bytes() == frozen  # tasks leave it alone
-    (
-        out / "shards" / ".shard-00003.h5.done"
-    ).unlink()  # as if that task had been killed just then
+    # As if that task had been killed just before its receipt.
+    (out / "shards" / ".shard-00003.h5.done").unlink()
     assert main(["finalize", str(out)]) == 2
     assert (
         "5 of 6 shards are done, shard-00003.h5 is planned" in capsys.readouterr().err

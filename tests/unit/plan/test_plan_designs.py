@@ -3,23 +3,20 @@
 import itertools
 import re
 from collections import Counter, defaultdict
-from importlib.resources import files
 
 import numpy as np
 import pytest
-import yaml
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import qmc
 
 from gensig.dataset.plan import plan_text
 from gensig.dataset.splitting.protocols import make_splits
 from gensig.errors import ConfigError
-from gensig.options.configuration import FIXED_KEYS, Configuration
+from gensig.options.configuration import Configuration
 from gensig.plan.make import describe_design, make_plan
 from gensig.plan.request import read_request
 from gensig.record.simulate import simulate_records
 from gensig.record.streams import Stream, stream
-from gensig.units import split_unit
 
 CLASSES = ("healthy", "crack", "pitting", "missing_tooth")
 SPEED = {"distribution": "choice", "values": [1200, 1800, 2400]}
@@ -429,79 +426,3 @@ class TestSobol:
     def test_the_conditions_are_still_those_of_the_sequence(self, plan):
         speed = np.unique(plan.columns["speed_set_rpm"])
         assert_array_equal(np.floor((speed - 1200.0) / 1200.0 * 256), np.arange(256))
-
-
-# Keys of the configuration that are pure numbers; every other that can be drawn ends in its unit.
-NUMBERS = {
-    "poisson_ratio",
-    "damping_ratio",
-    "friction_coefficient",
-    "friction_transition",
-    "points_per_pitch",
-    "oversampling",
-    "max_error",
-    "iso1328_grade",
-    "used_share_low",
-    "used_share_high",
-    "tooth_share",
-    "undulation_share",
-    "undulation_waves",
-    "backlash_scatter",
-    "support_stiffness_scatter",
-    "support_damping_scatter",
-    "drive_damping_ratio",
-    "gain_scatter",
-    "tooth",
-    "pitted_share",
-    "diameter_scatter",
-    "depth_ratio",
-    "region_low",
-    "region_high",
-    "pit_seed",
-    "profile_waves",
-    "sensitivity_tolerance",
-    "transverse_sensitivity",
-    "resonance_damping_ratio",
-    "max_clipped_fraction",
-    "dropped_fraction",
-    "dropped_run_samples",
-    "course_seed",
-    "drift_scatter",
-}
-
-
-def numbers_in(tree, path=""):
-    """Dotted keys of a configuration that hold a number."""
-    for key, value in tree.items():
-        if isinstance(value, dict):
-            yield from numbers_in(value, f"{path}{key}.")
-        elif isinstance(value, int | float) and not isinstance(value, bool):
-            yield f"{path}{key}"
-
-
-def has_unit(key):
-    leaf = key.rpartition(".")[2]
-    return split_unit(leaf)[1] is not None or leaf.endswith(("_kg_per_m3", "_m_per_s2"))
-
-
-def test_whatever_can_be_drawn_carries_its_unit():
-    keys = [
-        key
-        for key in numbers_in(read_request([]).config.plain())
-        if not key.startswith((*FIXED_KEYS, "classes.", "fault."))
-    ]
-    assert len(keys) > 15
-    assert {key.rpartition(".")[2] for key in keys if not has_unit(key)} <= NUMBERS
-    options = [
-        file
-        for file in (files("gensig.configs") / "fault").iterdir()
-        if file.name.endswith(".yaml")
-    ]
-    assert len(options) > 10
-    for file in options:
-        fault = {
-            key: value
-            for key, value in yaml.safe_load(file.read_text()).items()
-            if key != "vary"
-        }
-        assert {key for key in numbers_in(fault) if not has_unit(key)} <= NUMBERS
