@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from diagnose.baselines.base import Baseline, Input, MethodText, Parts, Role, Source
 from diagnose.baselines.estimators import ChosenModel, boosted_trees
 from diagnose.baselines.features import FeatureTable
-from gensig.dataset.schema import COLUMNS, SIGNALS
+from gensig.dataset.columns import COLUMNS
+from gensig.dataset.schema import SIGNALS
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset

@@ -23,8 +23,8 @@ from gensig.record.inputs import (
     InputReader,
     RecordInputs,
     Row,
+    draw_start,
     simulate_motions,
-    twin_start,
 )
 from gensig.record.options import read_plan_options
 from gensig.record.streams import Stream, stream
@@ -289,7 +289,7 @@ def _contrasts(
     """
     reader = InputReader(config)
     inputs = [reader.inputs(row) for row in rows]
-    starts = [twin_start(each.machine, each.stream(Stream.TWIN)) for each in inputs]
+    starts = [draw_start(each.machine, each.stream(Stream.TWIN)) for each in inputs]
     faulty = [
         each.from_start(start) for each, start in zip(inputs, starts, strict=True)
     ]

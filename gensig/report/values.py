@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.dataset.columns import COLUMNS
 from gensig.dataset.reader import Dataset
-from gensig.dataset.schema import COLUMNS, PARAMS
+from gensig.dataset.schema import PARAMS
 from gensig.errors import DatasetError
 from gensig.report.packing import pack_floats, packed
 from gensig.report.rotation_frequencies import Rotation

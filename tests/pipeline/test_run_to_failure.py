@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from gensig import generate, open_dataset, stream
 from gensig.cli import main
+from gensig.dataset.columns import LIFE_COLUMNS
 from gensig.dataset.plan import plan_text
-from gensig.dataset.schema import LIFE_COLUMNS
 from gensig.dataset.splitting.protocols import make_splits
 from gensig.dataset.splitting.split_check import split_problems
 from gensig.errors import ConfigError
