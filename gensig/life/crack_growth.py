@@ -68,14 +68,16 @@ class CrackGrowthOptions(GrowthOptions):
             )
         if self.end_share > DEEPEST:
             raise ConfigError(
-                f"life.crack.end_share = {self.end_share:g}: cracks are known up to {DEEPEST:g} of the root chord"
+                f"life.crack.end_share = {self.end_share:g}: cracks are known up to {DEEPEST:g} "
+                "of the root chord"
             )
         smallest, largest = (
             self.start_share * factor for factor in (1.0 / self.most, self.most)
         )
         if smallest < LEAST_DEPTH or largest >= self.end_share:
             raise ConfigError(
-                f"life.crack.start_share = {self.start_share:g} spreads from {smallest:.3g} to {largest:.3g} among "
+                f"life.crack.start_share = {self.start_share:g} spreads from {smallest:.3g} to "
+                f"{largest:.3g} among "
                 f"units; it must stay from {LEAST_DEPTH:g} to below end_share = {self.end_share:g}"
             )
 
@@ -98,7 +100,8 @@ class CrackGrowth(GrowthLaw):
     ----------
     sizes : (node,) m               depth
     width : (node,) m               along the face that goes with it
-    torques : (torque,) N m         of the pinion, ascending, at which the next is known; one where it does not matter
+    torques : (torque,) N m         of the pinion, ascending, at which the next is known; one where
+        it does not matter
     intensity : (torque, node) Pa sqrt(m)    stress-intensity range at 1 N m on the pinion
     meshes : float                  of the cracked tooth in a turn of the pinion
     """
@@ -172,8 +175,10 @@ def crack_growth(
     require_open(crack)
     if pair.transverse_contact_ratio >= 2.0 or pair.pinion.helix_angle != 0.0:
         raise ConfigError(
-            f"life: crack growth of system=spur_pair asks for spur gears of which one pair carries everything "
-            f"somewhere, and the transverse contact ratio is {pair.transverse_contact_ratio:.3f}; take "
+            "life: crack growth of system=spur_pair asks for spur gears of which one pair "
+            "carries everything "
+            "somewhere, and the transverse contact ratio is "
+            f"{pair.transverse_contact_ratio:.3f}; take "
             f"system=helical_pair, whose pairs share the load"
         )
     gear = pair.gears[crack.gear]
@@ -283,6 +288,7 @@ def crack_widths(face: float, options: CrackGrowthOptions) -> Array:
     widths = face * np.arange(WIDTH_STEP, N_STRIPS + 1, WIDTH_STEP) / N_STRIPS
     if options.width_share * face < widths[0]:
         raise ConfigError(
-            f"life.crack.width_share = {options.width_share:g} must be {WIDTH_STEP / N_STRIPS:g} or more of the face"
+            f"life.crack.width_share = {options.width_share:g} must be {WIDTH_STEP / N_STRIPS:g} "
+            "or more of the face"
         )
     return widths

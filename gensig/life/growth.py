@@ -55,7 +55,8 @@ class GrowthLaw(ABC):
 
         Parameters
         ----------
-        torque : (setpoint,) N m, or for each set-point those of its load spectrum, (mesh,) N m, all equally likely
+        torque : (setpoint,) N m, or for each set-point those of its load spectrum, (mesh,) N m,
+            all equally likely
         """
         middle, width = 0.5 * (self.sizes[1:] + self.sizes[:-1]), np.diff(self.sizes)
         rates = np.array(
@@ -81,9 +82,11 @@ class Course:
     clock, running : (knot,) s       since the machine was new, and of that the time in which it ran
     turns : (knot,)                  of the pinion
     size : (knot,)
-    setpoint : (knot,) int           at which the machine ran from this knot on; of the last, until it
+    setpoint : (knot,) int           at which the machine ran from this knot on; of the last, until
+        it
     growing : (knot,) bool           whether the size grew from this knot on; of the last, until it
-    has_failed : bool                whether the end was reached; else the life is censored where the history ends
+    has_failed : bool                whether the end was reached; else the life is censored where
+        the history ends
     """
 
     clock: Array

@@ -114,7 +114,8 @@ class FittedLaw:
         Raises
         ------
         ExtrapolationError    beyond the fitted range, unless allowed
-        SimulationError       where the formula gives no life at all, which it may even inside its range
+        SimulationError       where the formula gives no life at all, which it may even inside its
+        range
         """
         for name, value, (low, high) in (
             ("torque", torque, self.torque),
@@ -126,13 +127,15 @@ class FittedLaw:
             ):
                 unit = "N m" if name == "torque" else "rad/s"
                 raise ExtrapolationError(
-                    f"the {self.form} law was fitted for a {name} of {low:g} to {high:g} {unit}, not {value:g}; take "
+                    f"the {self.form} law was fitted for a {name} of {low:g} to {high:g} {unit}, "
+                    f"not {value:g}; take "
                     f"gensig wear-life itself there"
                 )
         found = float(self.formula(torque, speed))
         if not found > 0.0:
             raise SimulationError(
-                f"the {self.form} law gives a life of {found:.4g} hours at {torque:g} N m: it is a fit, not physics"
+                f"the {self.form} law gives a life of {found:.4g} hours at {torque:g} N m: it is "
+                "a fit, not physics"
             )
         return found
 

@@ -56,7 +56,8 @@ class LifeOptions:
     horizon : clock time at which a life that has not failed is censored
     snapshot_count, snapshot_spacing, snapshot_every : as in ``snapshot_times``
     drawn : how blocks are drawn
-    blocks : (begin s, end s, speed rad/s, torque N m) each, the same for every unit; None draws them
+    blocks : (begin s, end s, speed rad/s, torque N m) each, the same for every unit; None draws
+        them
     drift : by configuration key
     laws : by the kind of the fault that grows
     """
@@ -92,7 +93,8 @@ class LifeOptions:
             self.snapshot_every > 0.0 and self.snapshot_spacing == "linear"
         ):
             raise ConfigError(
-                f"life.snapshot_every_h = {self.snapshot_every / 3600.0:g} must be positive, and goes with "
+                f"life.snapshot_every_h = {self.snapshot_every / 3600.0:g} must be positive, and "
+                "goes with "
                 f"life.snapshot_spacing=linear only"
             )
 
@@ -124,7 +126,8 @@ def read_life(life: Mapping[str, Any]) -> LifeOptions:
     drift = own.pop("drift", None) or {}
     if not isinstance(drift, Mapping):
         raise ConfigError(
-            f"life.drift = {drift!r} must be a group of configuration keys, each with change, time_h and scatter"
+            f"life.drift = {drift!r} must be a group of configuration keys, each with change, "
+            "time_h and scatter"
         )
     drawn = DrawnBlocks(
         shortest=_hours(own, "block_low_h"),

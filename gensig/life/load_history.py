@@ -23,7 +23,8 @@ class History:
 
     Parameters
     ----------
-    begin, end : (block,) s       clock time since the machine was new; between two blocks it stands still
+    begin, end : (block,) s       clock time since the machine was new; between two blocks it
+        stands still
     setpoint : (block,) int       which of the set-points it runs at
     speed, torque : (setpoint,)   of the driving pinion, rad/s and N m
     """
@@ -41,11 +42,13 @@ class History:
             or (self.begin[1:] < self.end[:-1]).any()
         ):
             raise ConfigError(
-                "a history needs blocks that end after they begin and do not overlap, in order of time"
+                "a history needs blocks that end after they begin and do not overlap, in order "
+                "of time"
             )
         if self.begin[0] < 0.0:
             raise ConfigError(
-                f"a history begins at {self.begin[0] / 3600.0:g} h; times count from 0, the new machine"
+                f"a history begins at {self.begin[0] / 3600.0:g} h; times count from 0, the new "
+                "machine"
             )
         if not (self.speed > 0.0).all() or not (self.torque > 0.0).all():
             raise ConfigError(
@@ -84,7 +87,8 @@ class DrawnBlocks:
         ):
             if not 0.0 < low <= high:
                 raise ConfigError(
-                    f"life.{name}_low_h = {low / 3600.0:g} and life.{name}_high_h = {high / 3600.0:g} must be positive "
+                    f"life.{name}_low_h = {low / 3600.0:g} and life.{name}_high_h = "
+                    f"{high / 3600.0:g} must be positive "
                     f"and in order"
                 )
         if not 0.0 <= self.gap_chance < 1.0:
@@ -111,7 +115,8 @@ def draw_history(
     if most > MOST_BLOCKS:
         raise ConfigError(
             f"life.horizon_h = {horizon / 3600.0:g} may hold {most:,} blocks of life.block_low_h = "
-            f"{blocks.shortest / 3600.0:g}, more than {MOST_BLOCKS:,}; take longer blocks or a nearer horizon"
+            f"{blocks.shortest / 3600.0:g}, more than {MOST_BLOCKS:,}; take longer blocks or a "
+            "nearer horizon"
         )
     lengths = rng.uniform(blocks.shortest, blocks.longest, most)
     gaps = np.where(

@@ -36,17 +36,21 @@ class WearOptions:
 
     Parameters
     ----------
-    rule : ``band``, the contact passes a flank point with its width 2a, or ``fixed_intervals``, the wear-life paper's:
-        a point wears for 1 / ``n_intervals`` of the time a pair needs for the path of contact
+    rule : ``band``, the contact passes a flank point with its width 2a, or ``fixed_intervals``,
+        the wear-life paper's: a point wears for 1 / ``n_intervals`` of the time a pair needs for
+        the path of contact
     threshold : depth normal to the flank at which the life ends
     transmission_error_limit : from peak to peak, or None
-    vibration_limit_m_per_s2, vibration_rise : RMS of a clean record, and its rise over new flanks in dB, or None;
-        whatever of these and the threshold comes first ends the life
-    criterion : ``first``, the first flank to the threshold, or ``sum``, both flanks of a contact point together
+    vibration_limit_m_per_s2, vibration_rise : RMS of a clean record, and its rise over new flanks
+        in dB, or None; whatever of these and the threshold comes first ends the life
+    criterion : ``first``, the first flank to the threshold, or ``sum``, both flanks of a contact
+        point together
     coefficient, hardness : k, and H in Pa, of both gears; ``pinion`` and ``wheel`` override them
-    sharing : ``mesh`` or ``one_pair``; None is the mesh, and one pair where the contact ratio is below 1
+    sharing : ``mesh`` or ``one_pair``; None is the mesh, and one pair where the contact ratio is
+        below 1
     geometry : ``worn``, sharing and pressure follow the flanks as they wear, or ``unworn``
-    load_radius : the arm of the force, ``base`` circle or ``reference`` circle (the wear-life paper's eq. 12)
+    load_radius : the arm of the force, ``base`` circle or ``reference`` circle (the wear-life
+        paper's eq. 12)
     step : greatest depth worn between two looks at the flanks
     """
 
@@ -96,13 +100,15 @@ class WearOptions:
         ):
             if values.coefficient is not None and values.coefficient > 1.0:
                 raise ConfigError(
-                    f"{place}.coefficient = {values.coefficient:g} must be at most 1: it is the share of the meetings "
+                    f"{place}.coefficient = {values.coefficient:g} must be at most 1: it is the "
+                    "share of the meetings "
                     "of asperities that wear something off (Archard, J. Appl. Phys. 24, 1953)"
                 )
         follows_mesh = self.geometry == "worn" and self.sharing != "one_pair"
         if self.transmission_error_limit is not None and not follows_mesh:
             raise ConfigError(
-                "wear.transmission_error_limit_um is reached by worn flanks in mesh: it needs wear.geometry=worn and "
+                "wear.transmission_error_limit_um is reached by worn flanks in mesh: it needs "
+                "wear.geometry=worn and "
                 "wear.sharing=mesh"
             )
 

@@ -71,7 +71,8 @@ class PitGrowth(GrowthLaw):
 
     Parameters
     ----------
-    torques : (torque,) N m         of the pinion, ascending, at which the next is known; one where it does not matter
+    torques : (torque,) N m         of the pinion, ascending, at which the next is known; one where
+        it does not matter
     stress_at_one : (torque,) Pa    contact stress at 1 N m; it goes with the root of the torque
     first_diameter : float   median diameter of the first pits, m
     spread_area : float      mean area of a pit over that of one of median diameter
@@ -190,7 +191,8 @@ def pit_growth(
     most = 0.7 * (pits.region_high - pits.region_low)
     if options.end_share > most:
         raise ConfigError(
-            f"life.pitting.end_share = {options.end_share:g} must be {most:.3g} or less, 0.7 of the region of the pits"
+            f"life.pitting.end_share = {options.end_share:g} must be {most:.3g} or less, 0.7 of "
+            "the region of the pits"
         )
     end = 2.0
     while law.share(end) < options.end_share:

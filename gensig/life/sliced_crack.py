@@ -32,7 +32,8 @@ MeshOf = Callable[[Sequence[Fault]], SlicedMesh]
 DEPTH_STEP = 10  # nodes of the law between two depths at which the mesh is solved
 N_PHASES = 16  # a base pitch, of the first look
 N_CLOSER = 16  # between the neighbours of the greatest of them
-JUST = 1e-9  # base pitches before the next pair enters, and after one has left: there the others carry most
+# base pitches before the next pair enters, and after one has left: there the others carry most
+JUST = 1e-9
 DEPTH_SHARE = (
     1e-3  # of the depth, on either side, over which the energy is differentiated
 )
@@ -53,7 +54,8 @@ def sliced_crack_growth(
     Parameters
     ----------
     mesh_of : the pair with faults; its cracks are the calibrated ones, beyond the checked range too
-    torques : (torque,) N m    of the pinion, ascending, where the mesh is solved: how the load is shared hangs on it
+    torques : (torque,) N m    of the pinion, ascending, where the mesh is solved: how the load is
+        shared hangs on it
 
     Energy release rate at constant load G = dU / dA as in ``crack_growth``, with the loads of all
     slices from the equilibrium of the mesh with the crack in it. Every equilibrium is the least

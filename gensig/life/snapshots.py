@@ -20,10 +20,11 @@ def snapshot_times(
 
     Parameters
     ----------
-    spacing : ``linear``, equal steps of running time; ``logarithmic``, the time left falls by equal factors to
-        ``LAST_SHARE`` of the life and then to 0, so that looks crowd at the end; ``adaptive``, equal steps of the size,
-        and of the running time where it does not grow
-    every : s between looks, the same for all lives, with ``linear`` and ``count`` the most there may be
+    spacing : ``linear``, equal steps of running time; ``logarithmic``, the time left falls by
+        equal factors to ``LAST_SHARE`` of the life and then to 0, so that looks crowd at the end;
+        ``adaptive``, equal steps of the size, and of the running time where it does not grow
+    every : s between looks, the same for all lives, with ``linear`` and ``count`` the most there
+        may be
     """
     life = float(course.running[-1])
     if every is not None:

@@ -23,12 +23,14 @@ LATEST = 1e6  # s
 SHORTEST_PIECE = (
     1e-3  # s; the integration takes the course as straight through every millisecond
 )
-FASTEST_RIPPLE = 150.0  # Hz; straight pieces of 1 ms take sinc^2(0.15) of it, 7.2 % too little; points are exact
+# Hz; straight pieces of 1 ms take sinc^2(0.15) of it, 7.2 % too little; points are exact
+FASTEST_RIPPLE = 150.0
 EARLIEST = -2.0  # s; a walk begins here, before any machine begins to settle
 POINTS_PER_CORRELATION_TIME = (
     20  # straight lines between points take 1.6 % of the variance
 )
-WALK_LIMIT = 4.0  # standard deviations at which a walk is cut, so that its slowest is known; 6e-5 of the time
+# standard deviations at which a walk is cut, so that its slowest is known; 6e-5 of the time
+WALK_LIMIT = 4.0
 MOST_SCATTER = 0.2
 
 
@@ -56,12 +58,14 @@ class Profile:
         ):
             if not (abs(time) <= LATEST and math.isfinite(factor)):
                 raise ConfigError(
-                    f"point {place} = [{time:g}, {factor:g}]; give a time within {LATEST:g} s and a finite factor"
+                    f"point {place} = [{time:g}, {factor:g}]; give a time within {LATEST:g} s "
+                    "and a finite factor"
                 )
         for earlier, later in itertools.pairwise(self.times):
             if not later - earlier >= SHORTEST_PIECE * (1.0 - 1e-9):
                 raise ConfigError(
-                    f"the time {later:g} s follows {earlier:g} s; times must increase, by {SHORTEST_PIECE:g} s or more"
+                    f"the time {later:g} s follows {earlier:g} s; times must increase, by "
+                    f"{SHORTEST_PIECE:g} s or more"
                 )
 
     @property
@@ -157,7 +161,8 @@ class RandomWalk:
                 / (MOST_POINTS - 2)
             )
             raise ConfigError(
-                f"correlation_time_s = {self.correlation_time:g} needs {n_points} points for {duration:g} s, more than "
+                f"correlation_time_s = {self.correlation_time:g} needs {n_points} points for "
+                f"{duration:g} s, more than "
                 f"{MOST_POINTS}; give {least:.3g} or more"
             )
         rho = math.exp(-step / self.correlation_time)

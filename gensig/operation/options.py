@@ -48,7 +48,8 @@ class FileCourse:
         first, last = self.profile_given.times[0], self.profile_given.times[-1]
         if first > 0.0 or last + self.step < duration * (1.0 - 1e-9):
             raise ConfigError(
-                f"{self.key}.file = {self.file} is too short: it runs from {first:g} s to {last:g} s, the record from "
+                f"{self.key}.file = {self.file} is too short: it runs from {first:g} s to "
+                f"{last:g} s, the record from "
                 f"0 to {duration:g} s; give times that cover it, or a shorter operating.duration_s"
             )
         return self.profile_given
@@ -126,7 +127,8 @@ def read_course(values: Section, key: str) -> Course | None:
 
     Raises
     ------
-    ConfigError    for anything else than a list of [time_s, factor] pairs or a group with a known kind
+    ConfigError    for anything else than a list of [time_s, factor] pairs or a group with a known
+        kind
     """
     where, value = f"operating.{key}", values.get(key)
     if not isinstance(value, Mapping):
@@ -158,7 +160,8 @@ def read_profile(key: str, value: Any) -> Profile | None:
         return None
     if not isinstance(value, list | tuple):
         raise ConfigError(
-            f"{key} = {value!r} is no list; give [time_s, factor] pairs, a group with a kind, or null for a constant"
+            f"{key} = {value!r} is no list; give [time_s, factor] pairs, a group with a kind, or "
+            "null for a constant"
         )
     for place, point in enumerate(value):
         if not (
@@ -205,7 +208,8 @@ def _read_file(
     value = quantity if quantity in names else "factor"
     if value == "factor" and "factor" not in names:
         raise ConfigError(
-            f"{key} = {file}: no column {quantity} or factor; it must have time_s and one of the two"
+            f"{key} = {file}: no column {quantity} or factor; it must have time_s and one of the "
+            "two"
         )
     check_columns(key, file, names, ["time_s", value])
     times, factors = columns[names.index("time_s")], columns[names.index(value)]

@@ -70,11 +70,13 @@ class Operating:
             )
         if self.speed_profile is not None and not min(self.speed_profile.factors) > 0.0:
             raise ConfigError(
-                f"operating.speed_profile: factor {min(self.speed_profile.factors):g} must be positive"
+                f"operating.speed_profile: factor {min(self.speed_profile.factors):g} must be "
+                "positive"
             )
         if self.torque_profile is not None and min(self.torque_profile.factors) < 0.0:
             raise ConfigError(
-                f"operating.torque_profile: factor {min(self.torque_profile.factors):g} must not be negative"
+                f"operating.torque_profile: factor {min(self.torque_profile.factors):g} must not "
+                "be negative"
             )
         for key, ripple in (
             ("speed_ripple", self.speed_ripple),
@@ -93,7 +95,8 @@ class Operating:
                 else f"order {ripple.order:g} makes up to "
             )
             raise ConfigError(
-                f"{key}: {told}{fastest:g} Hz, above {FASTEST_RIPPLE:g} Hz; the course runs straight through every "
+                f"{key}: {told}{fastest:g} Hz, above {FASTEST_RIPPLE:g} Hz; the course runs "
+                "straight through every "
                 f"{SHORTEST_PIECE * 1e3:g} ms, which is too coarse for it"
             )
 

@@ -1,8 +1,8 @@
-"""How far two solutions of one motion agree in what people use of them.
+"""Agreement of two solutions of one motion, in the quantities that people use.
 
-Point values of teeth that bounce mean little: a landing that comes later by a microsecond changes
+Point values of teeth that bounce mean little. A landing that comes later by a microsecond changes
 every sample after it, and nothing that anybody measures. Where bouncing is chaotic, no two
-solutions follow each other at any step; they are samples of one random process, and narrow bands
+solutions follow each other at any step. They are samples of one random process, and narrow bands
 differ: those of noise by 8.6 dB over the root of width x duration.
 """
 
@@ -40,7 +40,7 @@ class Agreement:
 
     @property
     def agrees(self) -> NDArray[np.bool_]:
-        """Whether both lie within their limits, (lane,)."""
+        """True where both lie within their limits, (lane,)."""
         return np.asarray(
             (self.third_octave_db <= THIRD_OCTAVE_DB) & (self.indicators <= INDICATORS)
         )
@@ -55,11 +55,11 @@ def agreement(found: Array, exact: Array, sampling_rate: float) -> Agreement:
 
 
 def third_octave_bands(n_samples: int, sampling_rate: float) -> tuple[Array, Array]:
-    """Lower and upper edges of the bands that a signal resolves, from that at 20 Hz to the usable
-    band's end, Hz.
+    """Lower and upper edges of the third-octave bands that a signal resolves, Hz.
 
-    The usable band's end cuts the highest. Bands narrower than four lines of the signal's
-    spectrum are left out: a second resolves them from 20 Hz on, 50 ms from 400 Hz on.
+    They reach from the band at 20 Hz to the usable band's end, which cuts the highest. Bands
+    narrower than four lines of the signal's spectrum are left out: a second resolves them from 20
+    Hz on, 50 ms from 400 Hz on.
 
     Raises
     ------
@@ -69,9 +69,8 @@ def third_octave_bands(n_samples: int, sampling_rate: float) -> tuple[Array, Arr
     = 10^0.3.
     """
     highest = usable_band(sampling_rate)[1]
-    lower = 1000.0 * 10.0 ** (
-        (np.arange(LOWEST_BAND, math.log10(highest / 1000.0) * 10.0 + 1.0) - 0.5) / 10.0
-    )
+    numbers = np.arange(LOWEST_BAND, math.log10(highest / 1000.0) * 10.0 + 1.0)
+    lower = 1000.0 * 10.0 ** ((numbers - 0.5) / 10.0)
     upper = np.minimum(10.0**0.1 * lower, highest)
     resolved = upper - lower >= LINES * sampling_rate / n_samples
     if not resolved.any():
@@ -84,7 +83,7 @@ def third_octave_bands(n_samples: int, sampling_rate: float) -> tuple[Array, Arr
 def third_octave_power(signal: Array, sampling_rate: float) -> Array:
     """Mean square by third-octave band, (..., sample) to (..., band).
 
-    Of the power spectrum under a Hann window; a line that an edge crosses is shared in
+    It is that of the power spectrum under a Hann window. A line that an edge crosses is shared in
     proportion. Bands as ``third_octave_bands``.
     """
     n_samples = signal.shape[-1]
@@ -95,9 +94,8 @@ def third_octave_power(signal: Array, sampling_rate: float) -> Array:
     below = np.cumsum(lines, axis=-1)
 
     def power_below(edge: Array) -> Array:
-        place = (
-            edge * n_samples / sampling_rate + 0.5
-        )  # line k reaches from k - 0.5 to k + 0.5
+        # line k reaches from k - 0.5 to k + 0.5
+        place = edge * n_samples / sampling_rate + 0.5
         line = place.astype(np.int64)
         return np.asarray(below[..., line] - (line + 1 - place) * lines[..., line])
 

@@ -29,9 +29,11 @@ from gensig.units import from_si, unit
 
 Array = NDArray[np.float64]
 
-FORM_WAVES = 3  # most waves of the form deviation from end to end; whole ones have no slope of their own
+# most waves of the form deviation from end to end; whole ones have no slope of their own
+FORM_WAVES = 3
 SUPPORT_SCATTERS = ("support_stiffness_scatter", "support_damping_scatter")
-RUNOUT_STEPS = 20  # in which the eccentricity is made smaller until the index deviation fits its limit
+# in which the eccentricity is made smaller until the index deviation fits its limit
+RUNOUT_STEPS = 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,7 +101,8 @@ class Quality:
             low is not None and high is not None and not 0.0 < low <= high <= 1.0
         ):
             raise ConfigError(
-                f"quality.support_damping_ratio_low = {low} and support_damping_ratio_high = {high} must be ordered, "
+                f"quality.support_damping_ratio_low = {low} and support_damping_ratio_high = "
+                f"{high} must be ordered, "
                 "above 0 and at most 1, or both null"
             )
 
@@ -125,8 +128,10 @@ class Specimen:
 
     Parameters
     ----------
-    pinion_error, wheel_error : (tooth,) m    how far every tooth stands back at the pitch point, as a gap
-    pinion_tilt, wheel_tilt : (tooth,) m/m    how fast that grows with the contact's position along the path; 0: nowhere
+    pinion_error, wheel_error : (tooth,) m    how far every tooth stands back at the pitch point,
+        as a gap
+    pinion_tilt, wheel_tilt : (tooth,) m/m    how fast that grows with the contact's position along
+        the path; 0: nowhere
     forms : what the flanks of all teeth share, as transforms that come before a record's own faults
     backlash_factor : on the nominal backlash
     """

@@ -48,7 +48,8 @@ def resample_to_angle(
     signal : (..., sample)
     sampling_rate : Hz
     rotation_frequency : Hz    turns of the shaft per second
-    samples_per_turn : int     default: `samples_per_turn_for`; fewer alias what lies above half of them per turn
+    samples_per_turn : int     default: `samples_per_turn_for`; fewer alias what lies above half of
+        them per turn
 
     Returns
     -------
@@ -60,9 +61,9 @@ def resample_to_angle(
 
     Notes
     -----
-    Cubic B-spline interpolation: M. Unser (1999), "Splines: a perfect fit for signal and image processing", IEEE
-    Signal Processing Magazine 16 (6), 22-38. Largest error for a sine: 0.1 % of its amplitude at an eighth of the
-    sampling rate, 0.4 % at a sixth, 2.5 % at a quarter.
+    Cubic B-spline interpolation: M. Unser (1999), "Splines: a perfect fit for signal and image
+    processing", IEEE Signal Processing Magazine 16 (6), 22-38. Largest error for a sine: 0.1 % of
+    its amplitude at an eighth of the sampling rate, 0.4 % at a sixth, 2.5 % at a quarter.
     """
     x = np.asarray(signal, dtype=float)
     n_samples = x.shape[-1]
@@ -165,7 +166,8 @@ def remove_orders(average: ArrayLike, orders: Iterable[int]) -> FloatArray:
     Parameters
     ----------
     average : (..., sample)    one turn
-    orders : whole multiples of the rotation frequency; those above half the samples of a turn are ignored
+    orders : whole multiples of the rotation frequency; those above half the samples of a turn are
+        ignored
     """
     turn = np.asarray(average, dtype=float)
     spectrum = np.fft.rfft(turn, axis=-1)
@@ -188,8 +190,8 @@ def regular_signal(
 
     Notes
     -----
-    With 1 it is what `difference_signal` takes away, less the mean and the shaft orders: for the energy ratio those of
-    unbalance and misalignment are no sign of the mesh.
+    With 1 it is what `difference_signal` takes away, less the mean and the shaft orders: for the
+    energy ratio those of unbalance and misalignment are no sign of the mesh.
 
     Source: regular mesh components of M. Lebold, K. McClintic, R. Campbell, C. Byington & K.
     Maynard (2000), "Review of vibration analysis methods for gearbox diagnostics and

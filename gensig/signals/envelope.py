@@ -90,7 +90,8 @@ def mesh_envelope(
     average : (..., sample)    time-synchronous average of one turn of the gear
     n_teeth : teeth of the gear
     harmonic : of the mesh
-    n_sidebands : taken on either side; default: all that are nearer to this harmonic than to another
+    n_sidebands : taken on either side; default: all that are nearer to this harmonic than to
+        another
 
     Returns
     -------

@@ -29,14 +29,15 @@ def na4(averages: ArrayLike, n_teeth: int) -> FloatArray:
 
     Parameters
     ----------
-    averages : (..., record, sample)    time-synchronous averages of one turn of the gear, in the order of time
+    averages : (..., record, sample)    time-synchronous averages of one turn of the gear, in the
+        order of time
     n_teeth : teeth of the gear
 
     Returns
     -------
-    (..., record) dimensionless: 3 for Gaussian noise that stays, and for the first record the kurtosis of its residual;
-                  NaN where nothing is left without the mesh. Records that are NaN, those of too few turns, are passed
-                  over.
+    (..., record) dimensionless: 3 for Gaussian noise that stays, and for the first record the
+        kurtosis of its residual; NaN where nothing is left without the mesh. Records that are NaN,
+        those of too few turns, are passed over.
 
     Source: NA4 of NASA TM-105950 (1993).
     """
@@ -56,10 +57,11 @@ def nb4(
 
     Parameters
     ----------
-    averages : (..., record, sample)    time-synchronous averages of one turn of the gear, in the order of time
+    averages : (..., record, sample)    time-synchronous averages of one turn of the gear, in the
+        order of time
     n_teeth : teeth of the gear
-    harmonic, n_sidebands : the band, see `gensig.signals.envelope.mesh_envelope`; the sources take the strongest
-                            harmonic and the sidebands that lie symmetrically about it
+    harmonic, n_sidebands : the band, see `gensig.signals.envelope.mesh_envelope`; the sources take
+        the strongest harmonic and the sidebands that lie symmetrically about it
 
     Returns
     -------
@@ -83,7 +85,8 @@ def _over_mean_variance(signal: FloatArray, level: FloatArray) -> FloatArray:
     Parameters
     ----------
     signal : (..., record, sample)
-    level : (..., record)    RMS of what the signal was taken from: what is smaller than its rounding counts as zero
+    level : (..., record)    RMS of what the signal was taken from: what is smaller than its
+        rounding counts as zero
     """
     squared = np.square(signal - signal.mean(axis=-1, keepdims=True))
     variance = squared.mean(axis=-1)

@@ -30,7 +30,8 @@ def impacts_per_turn(
     ----------
     turns : (..., turn, sample)    residual turns
     n_teeth : teeth of the gear; impacts nearer together than one tooth count as one
-    threshold : times the deviation of the residual between impacts, which is told by the median of its envelope
+    threshold : times the deviation of the residual between impacts, which is told by the median of
+        its envelope
 
     Returns
     -------
@@ -38,8 +39,8 @@ def impacts_per_turn(
 
     Notes
     -----
-    In Gaussian noise an independent sample passes a threshold of 5 with a probability of exp(-12.5): about one record
-    of 5,000 samples in a hundred has a false impact.
+    In Gaussian noise an independent sample passes a threshold of 5 with a probability of
+    exp(-12.5): about one record of 5,000 samples in a hundred has a false impact.
     """
     from scipy.signal import find_peaks
 
@@ -64,7 +65,8 @@ def peak_over_rms(turns: ArrayLike) -> FloatArray:
 
     Returns
     -------
-    (...) dimensionless: median over the turns of each one's largest magnitude, over the RMS of all; NaN for silence
+    (...) dimensionless: median over the turns of each one's largest magnitude, over the RMS of
+    all; NaN for silence
     """
     x = np.asarray(turns, dtype=float)
     peak = np.median(np.max(np.abs(x), axis=-1), axis=-1)
@@ -84,13 +86,15 @@ def impact_decay(turns: ArrayLike, turn_duration: float) -> FloatArray:
 
     Returns
     -------
-    (...) s; NaN where nothing stands out of the rest of the turn by a factor of two in power, or it never falls so far
+    (...) s; NaN where nothing stands out of the rest of the turn by a factor of two in power, or
+    it never falls so far
 
     Notes
     -----
-    The squared envelope is averaged over the turns, so that turns whose ringing differs in phase do not cancel; its
-    median over the turn is taken for the power between impacts and subtracted. The first passage through 1/e counts:
-    beating of two modes can shorten it. Times below about five samples come out short: 0.7 ms at 5 kHz as 0.54 ms.
+    The squared envelope is averaged over the turns, so that turns whose ringing differs in phase
+    do not cancel; its median over the turn is taken for the power between impacts and subtracted.
+    The first passage through 1/e counts: beating of two modes can shorten it. Times below about
+    five samples come out short: 0.7 ms at 5 kHz as 0.54 ms.
     """
     x = np.asarray(turns, dtype=float)
     per_turn = x.shape[-1]

@@ -15,7 +15,8 @@ from gensig.signals.synchronous import mesh_harmonics
 
 FloatArray = NDArray[np.floating]
 
-ROUNDING = 1e-12  # of the average's RMS: what is left of a transform forth and back where nothing is
+# of the average's RMS: what is left of a transform forth and back where nothing is
+ROUNDING = 1e-12
 
 
 def rms(signal: ArrayLike) -> FloatArray:
@@ -73,7 +74,8 @@ def fm0(
     ----------
     average : (..., sample)    time-synchronous average of one turn of the gear
     n_teeth : teeth of the gear
-    n_harmonics : mesh harmonics counted, from the first; default: all below half the samples of a turn
+    n_harmonics : mesh harmonics counted, from the first; default: all below half the samples of a
+        turn
 
     Returns
     -------
@@ -194,7 +196,8 @@ def sideband_ratio(
     centers = centers[centers + reach < amplitude.shape[-1]]
     if centers.size == 0:
         raise ValueError(
-            f"{np.shape(average)[-1]} samples a turn cannot hold mesh order {n_teeth} and its sidebands"
+            f"{np.shape(average)[-1]} samples a turn cannot hold mesh order {n_teeth} and its "
+            "sidebands"
         )
     steps = np.arange(1, reach + 1)
     sidebands = (centers[:, None] + np.concatenate([-steps, steps])).ravel()

@@ -99,13 +99,15 @@ def find_motion(
     nominal = speed_rpm / 60.0 * teeth.driving
     if nominal * (1.0 + SEARCH) > highest:
         raise ConfigError(
-            f"the mesh frequency of {nominal:.5g} Hz lies above the usable band of {highest:.5g} Hz of this recording; "
+            f"the mesh frequency of {nominal:.5g} Hz lies above the usable band of {highest:.5g} "
+            "Hz of this recording; "
             f"record faster, or check {options}"
         )
     turns = recording.duration * nominal / teeth.most
     if turns < least_turns:
         raise ConfigError(
-            f"too short: {recording.duration:.3g} s are {turns:.1f} turns of the slower gear, at least {least_turns:g} "
+            f"too short: {recording.duration:.3g} s are {turns:.1f} turns of the slower gear, at "
+            f"least {least_turns:g} "
             f"are needed; {longer}{in_hertz(speed_rpm)}"
         )
     mesh, line_db = _search(recording, teeth, nominal, highest)
@@ -113,8 +115,10 @@ def find_motion(
     heard = np.flatnonzero(line_db >= least) + 1
     if not np.any(heard <= FIRST_HARMONICS):
         raise ConfigError(
-            f"no sign of the mesh: none of its first {FIRST_HARMONICS} harmonics within {100 * SEARCH:g} % of "
-            f"{nominal:.5g} Hz stands {least:.1f} dB above its surroundings; check {options}{in_hertz(speed_rpm)}"
+            f"no sign of the mesh: none of its first {FIRST_HARMONICS} harmonics within "
+            f"{100 * SEARCH:g} % of "
+            f"{nominal:.5g} Hz stands {least:.1f} dB above its surroundings; check "
+            f"{options}{in_hertz(speed_rpm)}"
         )
     return _follow(recording, teeth, mesh, heard, line_db)
 

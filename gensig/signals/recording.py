@@ -112,8 +112,9 @@ def read_file(
 
     Parameters
     ----------
-    file : CSV of one column a sensor, with or without ``time_s``; WAV; .npy of (sample,) or (sensor, sample); .npz,
-        HDF5 or MATLAB (version 5 or 7.3) with such an array and, if it likes, its rate as ``sampling_rate_hz``
+    file : CSV of one column a sensor, with or without ``time_s``; WAV; .npy of (sample,) or
+        (sensor, sample); .npz, HDF5 or MATLAB (version 5 or 7.3) with such an array and, if it
+        likes, its rate as ``sampling_rate_hz``
     rate : Hz    samples per second; needed where the file does not tell
     array : name of the array in a .npz, HDF5 or MATLAB file; None is ``acceleration``
     rate_option : how the user's command calls `rate`
@@ -283,7 +284,8 @@ def _factor(file: str, name: str, unit: str) -> float:
     lower = name.lower()
     if wrong := [suffix for suffix in WRONG_SUFFIXES if lower.endswith(suffix)]:
         raise ConfigError(
-            f"{file}: {name} ends in {wrong[0]}, which is no acceleration; choose others with --channels, or rename it"
+            f"{file}: {name} ends in {wrong[0]}, which is no acceleration; choose others with "
+            "--channels, or rename it"
         )
     return next(
         (factor for suffix, factor in SUFFIXES.items() if lower.endswith(suffix)),

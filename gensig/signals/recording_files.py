@@ -151,7 +151,8 @@ def _one_line(file: str, what: str) -> Iterator[None]:
         raise ConfigError(
             f"{file} cannot be read: {(error.errno and error.strerror) or what}"
         ) from None
-    except Exception:  # the parsers of scipy and h5py raise nearly any on bytes that were made to mislead them
+    # the parsers of scipy and h5py raise nearly any on bytes that were made to mislead them
+    except Exception:
         raise ConfigError(f"{file} cannot be read: {what}") from None
 
 

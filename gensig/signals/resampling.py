@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.floating]
 
-PASS_SHARE = 0.390625  # of the lower rate, as in gensig.dynamics.decimation: recorders of 2.56 samples a cycle
+# of the lower rate, as in gensig.dynamics.decimation: recorders of 2.56 samples a cycle
+PASS_SHARE = 0.390625
 ATTENUATION_DB = 100.0
 MOST_STEPS = 1000  # of the ratio of two rates; leaves an error of 0.0005 at most
 

@@ -15,7 +15,8 @@ from gensig.signals.averaging import interpolate
 
 FloatArray = NDArray[np.floating]
 
-RIDGE = 1e-3  # of one passage of a tooth: decides what passes too seldom to be told apart, and nothing else
+# of one passage of a tooth: decides what passes too seldom to be told apart, and nothing else
+RIDGE = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +26,8 @@ class GearTurns:
 
     Attributes
     ----------
-    driving, driven : (..., sample)    one turn of the gear, ``samples_per_tooth`` for each tooth in the order of mesh
+    driving, driven : (..., sample)    one turn of the gear, ``samples_per_tooth`` for each tooth
+        in the order of mesh
     mesh : (..., sample)               mean of all passages: ``samples_per_tooth``
     """
 
@@ -62,9 +64,10 @@ def separate_gears(
 
     Notes
     -----
-    Passage n is mesh + driving[n mod z1] + driven[n mod z2] + rest, solved for by least squares over all passages. A
-    time-synchronous average is the same without the other gear, whose teeth it takes for noise: in a second of 8 turns
-    they weigh as much as the noise. The teeth of either gear are 0 in the mean; one that never passes is 0.
+    Passage n is mesh + driving[n mod z1] + driven[n mod z2] + rest, solved for by least squares
+    over all passages. A time-synchronous average is the same without the other gear, whose teeth
+    it takes for noise: in a second of 8 turns they weigh as much as the noise. The teeth of either
+    gear are 0 in the mean; one that never passes is 0.
 
     Two-way layout without interaction: H. Scheffe (1959), "The analysis of variance", chapter 4.
     """
@@ -78,7 +81,8 @@ def separate_gears(
     n_passages = math.floor((x.shape[-1] + 1e-6) / in_a_passage)
     if n_passages < n_teeth[0]:
         raise ValueError(
-            f"{x.shape[-1]} samples hold {n_passages} passages of a tooth, less than {n_teeth[0]}: a turn"
+            f"{x.shape[-1]} samples hold {n_passages} passages of a tooth, less than "
+            f"{n_teeth[0]}: a turn"
         )
     fine = samples_per_tooth * max(
         math.ceil(in_a_passage / samples_per_tooth), 1

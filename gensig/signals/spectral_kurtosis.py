@@ -24,13 +24,13 @@ def spectral_kurtosis(
     ----------
     signal : (..., sample) m/s^2
     sampling_rate : Hz
-    window_samples : of the Hann window, moved by a quarter of it; shorter than the time between impacts, longer than
-                     their ringing
+    window_samples : of the Hann window, moved by a quarter of it; shorter than the time between
+        impacts, longer than their ringing
 
     Returns
     -------
-    frequency : (bin,) Hz           those nearer than two lines to 0 or to half the sampling rate, where a real signal
-                                    meets its mirror image, are left out
+    frequency : (bin,) Hz           those nearer than two lines to 0 or to half the sampling rate,
+        where a real signal meets its mirror image, are left out
     kurtosis : (..., bin) dimensionless; NaN for silence
 
     Raises
@@ -39,9 +39,10 @@ def spectral_kurtosis(
 
     Notes
     -----
-    Antoni's estimator, mean fourth power over squared mean square, less 2. In Gaussian noise, with n windows side by
-    side in the signal, it scatters by 1.2 / sqrt(n) and lies 1 / n to 2 / n below 0 (measured). A mesh that is there
-    all the time pulls a line towards -1, so take residual turns where bursts are to be found under it.
+    Antoni's estimator, mean fourth power over squared mean square, less 2. In Gaussian noise, with
+    n windows side by side in the signal, it scatters by 1.2 / sqrt(n) and lies 1 / n to 2 / n
+    below 0 (measured). A mesh that is there all the time pulls a line towards -1, so take residual
+    turns where bursts are to be found under it.
     """
     from scipy.signal import (
         stft,
@@ -50,7 +51,8 @@ def spectral_kurtosis(
     x = np.asarray(signal, dtype=float)
     if window_samples < 8 or x.shape[-1] < 2 * window_samples:
         raise ValueError(
-            f"a window of {window_samples} samples does not suit {x.shape[-1]}: take at least 8, at most half of them"
+            f"a window of {window_samples} samples does not suit {x.shape[-1]}: take at least 8, "
+            "at most half of them"
         )
     frequency, _, lines = stft(
         x,

@@ -30,7 +30,8 @@ LEAST_LINE_DB = 18.0  # of the strongest of the first harmonics,
 LEAST_MEAN_DB = 10.0  # or of all of them on the average
 FIRST_HARMONICS = 5
 FINE = 0.25  # candidates lie this share of a bin apart at the highest harmonic
-STEP_SHARE = 0.003  # assumed: standard deviation of the relative change of speed from one frame to the next
+# assumed: standard deviation of the relative change of speed from one frame to the next
+STEP_SHARE = 0.003
 
 
 def wandering_mesh_cycles(
@@ -47,7 +48,8 @@ def wandering_mesh_cycles(
 
     Parameters
     ----------
-    speed_rpm : r/min    of the driving gear; the speed lies within `mesh_motion.SEARCH` of it throughout
+    speed_rpm : r/min    of the driving gear; the speed lies within `mesh_motion.SEARCH` of it
+        throughout
     highest, options, longer : see `gensig.signals.mesh_motion.find_motion`
 
     Raises
@@ -56,8 +58,9 @@ def wandering_mesh_cycles(
 
     Notes
     -----
-    The course of `mesh_frequency_course` makes the speed nearly steady; `find_motion` follows what is left. A course
-    finds something that stands out in noise too, so that the lines must stand out more than for a steady speed.
+    The course of `mesh_frequency_course` makes the speed nearly steady; `find_motion` follows what
+    is left. A course finds something that stands out in noise too, so that the lines must stand
+    out more than for a steady speed.
     """
     rate, n_samples = recording.sampling_rate, recording.acceleration.shape[1]
     mesh = speed_rpm / 60.0 * teeth.driving
@@ -68,12 +71,14 @@ def wandering_mesh_cycles(
         )
     if SEARCH * fewest >= 1.0:
         raise ConfigError(
-            f"{fewest} teeth: within {100 * SEARCH:g} % of the speed sidebands look like the mesh; give a tachometer"
+            f"{fewest} teeth: within {100 * SEARCH:g} % of the speed sidebands look like the "
+            "mesh; give a tachometer"
         )
     turns = recording.duration * mesh / teeth.most
     if turns < LEAST_TURNS:
         raise ConfigError(
-            f"too short: {recording.duration:.3g} s are {turns:.1f} turns of the slower gear, at least {LEAST_TURNS} "
+            f"too short: {recording.duration:.3g} s are {turns:.1f} turns of the slower gear, at "
+            f"least {LEAST_TURNS} "
             f"are needed; {longer}{in_hertz(speed_rpm)}"
         )
     time, course = mesh_frequency_course(
@@ -102,8 +107,10 @@ def wandering_mesh_cycles(
     first = motion.line_db[:FIRST_HARMONICS]
     if first.max() < LEAST_LINE_DB and first.mean() < LEAST_MEAN_DB:
         raise ConfigError(
-            f"no sure sign of the mesh near {mesh:.5g} Hz: followed, its lines stand at most {first.max():.0f} dB over "
-            f"their surroundings, {LEAST_LINE_DB:g} are needed; check {options}, or give a tachometer"
+            f"no sure sign of the mesh near {mesh:.5g} Hz: followed, its lines stand at most "
+            f"{first.max():.0f} dB over "
+            f"their surroundings, {LEAST_LINE_DB:g} are needed; check {options}, or give a "
+            "tachometer"
         )
     return np.interp(warped, samples, motion.cycles)
 
@@ -125,7 +132,8 @@ def mesh_frequency_course(
     sampling_rate : Hz
     n_teeth : teeth of the gear that turns faster
     mesh_frequency : Hz           as stated
-    search : share of it, to which the course is held on either side; below 1 / n_teeth, where sidebands are
+    search : share of it, to which the course is held on either side; below 1 / n_teeth, where
+        sidebands are
     highest : Hz                  harmonics above are not looked at
 
     Returns
@@ -135,7 +143,8 @@ def mesh_frequency_course(
 
     Raises
     ------
-    ValueError    if the recording is shorter than a frame, or the search reaches sidebands or ``highest``
+    ValueError    if the recording is shorter than a frame, or the search reaches sidebands or
+        ``highest``
 
     Source: Q. Leclere, H. Andre & J. Antoni (2016), "A multi-order probabilistic approach for
     instantaneous angular speed tracking", Mechanical Systems and Signal Processing 81, 375-386:

@@ -40,11 +40,13 @@ def nonsynchronous_share(turns: ArrayLike) -> FloatArray:
 
     Parameters
     ----------
-    turns : (..., turn, sample)    as from `resample_by_angle` or `resample_to_angle`, two turns or more
+    turns : (..., turn, sample)    as from `resample_by_angle` or `resample_to_angle`, two turns or
+        more
 
     Returns
     -------
-    (...) from 0, the same turn again and again, to 1 on the average for noise; NaN for a constant signal
+    (...) from 0, the same turn again and again, to 1 on the average for noise; NaN for a constant
+    signal
 
     Raises
     ------
@@ -52,8 +54,9 @@ def nonsynchronous_share(turns: ArrayLike) -> FloatArray:
 
     Notes
     -----
-    With synchronous power S and other power N, an average of T turns holds S + N / T, the turns S + N: solved for N,
-    so that few turns do not make noise look synchronous. What turns with another shaft alone counts as not repeating.
+    With synchronous power S and other power N, an average of T turns holds S + N / T, the turns S
+    + N: solved for N, so that few turns do not make noise look synchronous. What turns with
+    another shaft alone counts as not repeating.
     """
     x = np.asarray(turns, dtype=float)
     n_turns = x.shape[-2]

@@ -39,7 +39,8 @@ def tooth_levels(
     rotation_frequency : Hz   turns of the gear per second
     n_teeth : of the gear
     band : (low, high) Hz
-    start : teeth that have come into mesh at the first sample, counted from tooth 0; a phase mark on the shaft tells it
+    start : teeth that have come into mesh at the first sample, counted from tooth 0; a phase mark
+        on the shaft tells it
 
     Returns
     -------
@@ -47,11 +48,13 @@ def tooth_levels(
 
     Raises
     ------
-    ValueError    for less than a turn from the first tooth that passes whole, or a band that is none
+    ValueError    for less than a turn from the first tooth that passes whole, or a band that is
+        none
 
     Notes
     -----
-    Decibels before the mean: impacts of rattling teeth scatter by factors, and one of them would outweigh all turns.
+    Decibels before the mean: impacts of rattling teeth scatter by factors, and one of them would
+    outweigh all turns.
     """
     x = band_pass(signal, sampling_rate, band)
     first = math.ceil(start - 1e-9)
@@ -74,11 +77,13 @@ def changed_teeth(levels: ArrayLike, reference: ArrayLike) -> FloatArray:
 
     Parameters
     ----------
-    levels, reference : (..., tooth) dB    of `tooth_levels`, the same band, gear and operating point
+    levels, reference : (..., tooth) dB    of `tooth_levels`, the same band, gear and operating
+        point
 
     Returns
     -------
-    (..., tooth)    less the median of the teeth, over their robust standard deviation; 0 where nothing changed
+    (..., tooth)    less the median of the teeth, over their robust standard deviation; 0 where
+        nothing changed
     """
     change = np.asarray(levels, dtype=float) - np.asarray(reference, dtype=float)
     change = change - np.median(change, axis=-1, keepdims=True)

@@ -94,7 +94,8 @@ def check(
 
     Parameters
     ----------
-    config : the configuration of the twin, with ``operating.duration_s`` as ``held_out_duration`` says
+    config : the configuration of the twin, with ``operating.duration_s`` as ``held_out_duration``
+        says
     motion : the mesh in ``held_out``
 
     Raises

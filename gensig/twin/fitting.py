@@ -31,7 +31,8 @@ from gensig.units import from_si, to_si
 
 Array = NDArray[np.float64]
 
-SOURCE_CHANNEL = "pinion_y"  # the driving gear's bearing along the line of action, where the path begins
+# the driving gear's bearing along the line of action, where the path begins
+SOURCE_CHANNEL = "pinion_y"
 INTERNAL_RATE = (
     256_000.0  # Hz; least rate of the integration, that of the default configuration
 )
@@ -48,7 +49,8 @@ FINE = (
     1.0 / 24.0
 )  # where lines are counted too: those of shafts stand far above what is beside them
 LEAST_FREE, LEAST_ALL = 20, 2
-CLEAR = 2.0  # a drift is written where the speed scatters this many times as much as pitch errors make it
+# a drift is written where the speed scatters this many times as much as pitch errors make it
+CLEAR = 2.0
 LEAST_SHARE = (
     0.1  # of the floor, left as noise where the model alone explains the power
 )
@@ -103,7 +105,8 @@ def fit(
 
     Parameters
     ----------
-    system : the machine as far as it is known; its speed, rate, channels, grade and scatter are replaced
+    system : the machine as far as it is known; its speed, rate, channels, grade and scatter are
+        replaced
     speed_rpm : r/min of the driving gear, within 3 %
     tell : takes a line on what is done, while it is done
 
@@ -170,7 +173,8 @@ def oversampling(sampling_rate: float, at_least: int) -> int:
 def fitting_system(
     system: Machine, recording: Recording, mesh_frequency: float, teeth: Teeth
 ) -> Machine:
-    """The machine at the speed that was found, heard by one ideal sensor at the recording's rate."""
+    """The machine at the speed that was found, heard by one ideal sensor at the recording's
+    rate."""
     sampling_rate, solver = recording.sampling_rate, system.solver
     least, most = (turns * teeth.most / mesh_frequency for turns in SIMULATED_TURNS)
     duration = min(max(recording.duration, least), most)

@@ -14,7 +14,8 @@ def find_motion(recording: Recording, teeth: Teeth, speed_rpm: float) -> Motion:
 
     Raises
     ------
-    ConfigError    where the recording is too short to fit or to check, or there is no sign of the mesh
+    ConfigError    where the recording is too short to fit or to check, or there is no sign of the
+        mesh
     """
     return mesh_motion.find_motion(
         recording,

@@ -95,13 +95,16 @@ def root_factors(
 
     Parameters
     ----------
-    load_point : ``outer_single_pair`` (Method B of ISO 6336-3) or ``tip``, the whole load there times Y_eps
+    load_point : ``outer_single_pair`` (Method B of ISO 6336-3) or ``tip``, the whole load there
+        times Y_eps
     edition : of ISO 6336-3; 2006 has neither f_eps nor 1 / cos^3(beta) in Y_beta
-    grade : of ISO 1328, None for perfect gears; only fine teeth with a high contact ratio have a Y_DT below 1
+    grade : of ISO 1328, None for perfect gears; only fine teeth with a high contact ratio have a
+        Y_DT below 1
 
     Raises
     ------
-    ConfigError, GeometryError, ExtrapolationError    for unknown choices, too thin a rim, a notch out of range
+    ConfigError, GeometryError, ExtrapolationError    for unknown choices, too thin a rim, a notch
+        out of range
 
     Source: ISO 6336-3, 6 to 10, external gears; the tip with Y_eps = 0.25 + 0.75 / eps_alpha_n is
     its former Method C (also DIN 3990-3). Y_DT is taken with the edition 2006 only: f_eps of 2019
@@ -123,7 +126,8 @@ def root_factors(
         loading = root_loading(gear, place, allow_extrapolation=allow_extrapolation)
         if not loading.lever_arm[0] > 0.0:
             raise GeometryError(
-                f"{name}: the outer point of single pair contact lies below the critical section (contact ratio "
+                f"{name}: the outer point of single pair contact lies below the critical section "
+                "(contact ratio "
                 f"{ratio:.4g}); take strength.load_point=tip"
             )
         found[name] = RootFactors(
@@ -181,7 +185,8 @@ def rim_thickness_factor(gear: Gear) -> float:
     )
     if rim <= RIM_SHARES[0] * height:
         raise GeometryError(
-            f"{gear.name}: the rim between bore and root is {rim * 1e3:.3g} mm, {rim / height:.2g} tooth heights; ISO "
+            f"{gear.name}: the rim between bore and root is {rim * 1e3:.3g} mm, "
+            f"{rim / height:.2g} tooth heights; ISO "
             f"6336-3 covers more than {RIM_SHARES[0]:g}; reduce bore_radius_mm"
         )
     return (
@@ -208,11 +213,13 @@ def stress_factor_on_path(
 
     Parameters
     ----------
-    position : m    from A in the transverse section; beyond the path the tip's corner touches, so its ends count
+    position : m    from A in the transverse section; beyond the path the tip's corner touches, so
+        its ends count
 
     Returns
     -------
-    of the shape of ``position``; in the normal section the way from the tip is 1 / cos(beta_b) longer
+    of the shape of ``position``; in the normal section the way from the tip is 1 / cos(beta_b)
+    longer
     """
     on_path = np.clip(position, 0.0, pair.path_of_contact)
     from_tip = pair.path_of_contact - on_path if gear is pair.pinion else on_path
@@ -251,7 +258,8 @@ def spread_along_face(own: Array, structure: Array, coupling: float) -> Array:
     ----------
     own : (..., slice)              what each slice's own load would do to it
     structure : (..., slice) m2/N   compliance of teeth and bodies per width
-    coupling : squared length over which slices couple, over the squared width of a slice; 0 leaves ``own`` as it is
+    coupling : squared length over which slices couple, over the squared width of a slice; 0 leaves
+        ``own`` as it is
 
     The reaction k w of the foundation with shear that the mesh has for its slices, k w - (k
     coupling w')' = own, k = 1 / structure, w' = 0 at both ends: the sum over the face stays.

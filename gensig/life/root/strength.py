@@ -70,7 +70,8 @@ class Strength:
     test_gear_stress_correction : Y_ST
     n_load_cycles : of each tooth
     life_factor : Y_NT; None takes that of case-hardened steel at ``n_load_cycles``
-    relative_notch_sensitivity : Y_delta_rel_T; None takes that of case-hardened steel at the gear's own notch
+    relative_notch_sensitivity : Y_delta_rel_T; None takes that of case-hardened steel at the
+        gear's own notch
     relative_surface_factor : Y_R_rel_T
     size_factor : Y_X; None takes that of case-hardened steel at the module
     mean_stress_factor : Y_M, 0.7 for teeth that are bent both ways alike
@@ -107,7 +108,8 @@ class Strength:
         for key, allowed in (("load_point", LOAD_POINTS), ("edition", EDITIONS)):
             if getattr(self, key) not in allowed:
                 raise ConfigError(
-                    f"strength.{key} = {getattr(self, key)!r}; allowed: {', '.join(map(str, allowed))}"
+                    f"strength.{key} = {getattr(self, key)!r}; allowed: "
+                    f"{', '.join(map(str, allowed))}"
                 )
 
     @property

@@ -145,7 +145,8 @@ def _settled_theta(gear: Gear, z: float, g: float, h: float) -> float:
         if abs(theta - before) <= SETTLED:
             return theta
     raise GeometryError(
-        f"{gear.name}: the 30 degree tangent of ISO 6336-3 finds no root fillet with {gear.n_teeth} teeth and profile "
+        f"{gear.name}: the 30 degree tangent of ISO 6336-3 finds no root fillet with "
+        f"{gear.n_teeth} teeth and profile "
         f"shift {gear.profile_shift:g}; change them or cutter_tip_radius_coefficient"
     )
 
@@ -157,7 +158,8 @@ def root_loading(
 
     Parameters
     ----------
-    tip_distance : (point,) m    of the contact from the gear's tip along the line of action in the normal section
+    tip_distance : (point,) m    of the contact from the gear's tip along the line of action in the
+        normal section
     allow_extrapolation : use the stress correction factor beyond its range without an error
 
     Raises
@@ -173,8 +175,10 @@ def root_loading(
     notch = section.notch_parameter
     if not NOTCH[0] <= notch < NOTCH[1] and not allow_extrapolation:
         raise ExtrapolationError(
-            f"{gear.name}: the notch parameter s_Fn / (2 rho_F) = {notch:.3g} lies outside {NOTCH[0]:g}..{NOTCH[1]:g}, "
-            f"where the stress correction factor of ISO 6336-3 holds; change cutter_tip_radius_coefficient, or set "
+            f"{gear.name}: the notch parameter s_Fn / (2 rho_F) = {notch:.3g} lies outside "
+            f"{NOTCH[0]:g}..{NOTCH[1]:g}, "
+            "where the stress correction factor of ISO 6336-3 holds; change "
+            "cutter_tip_radius_coefficient, or set "
             f"mesh.allow_extrapolation=true"
         )
     curvature = virtual.tip_curvature_radius - np.atleast_1d(

@@ -149,8 +149,9 @@ def flank_radii(
 
     Returns
     -------
-    ``new``; ``worn``, that of the worn profile itself, negative where it is hollow and infinite where flat; and
-    ``by_eq_22``, the wear-life paper's rho - h / 2 with the depth h of both flanks, which is a shift and no curvature
+    ``new``; ``worn``, that of the worn profile itself, negative where it is hollow and infinite
+    where flat; and ``by_eq_22``, the wear-life paper's rho - h / 2 with the depth h of both
+    flanks, which is a shift and no curvature
     """
     new = path.curvature / math.cos(path.pair.base_helix_angle)
     added = worn_curvature(path, depth, band_half_width(path, line_load, material))
@@ -203,7 +204,8 @@ def depth_per_mesh(
     Parameters
     ----------
     line_load : (slice, node) N/m
-    pressure : (slice, node) Pa    largest; ``fixed_intervals`` takes it, ``band`` knows it from the load
+    pressure : (slice, node) Pa    largest; ``fixed_intervals`` takes it, ``band`` knows it from
+        the load
 
     ``band``: the integral of Archard's dh = (k / H) p ds over the passage of the contact, whose
     band 2a takes 2a / v_i to pass a point of flank i, while the flanks slide |v_1 - v_2| 2a / v_i

@@ -59,7 +59,8 @@ class WearCase:
     def __post_init__(self) -> None:
         if not self.torque > 0.0:
             raise ConfigError(
-                f"operating.torque_nm = {self.torque:g} must be positive: flanks that bear nothing last"
+                f"operating.torque_nm = {self.torque:g} must be positive: flanks that bear "
+                "nothing last"
             )
 
     @property
@@ -165,14 +166,15 @@ def wear_case(
 
     Raises
     ------
-    ConfigError    for a torque that does not drive, a threshold deeper than the tooth, or a limit of the transmission
-        error where one pair carries everything
+    ConfigError    for a torque that does not drive, a threshold deeper than the tooth, or a limit
+        of the transmission error where one pair carries everything
     """
     pair, path = mesh.pair, flank_path(mesh.pair, n_nodes or N_NODES[options.rule])
     thinnest = min(tip_thickness(pair.pinion), tip_thickness(pair.wheel))
     if options.threshold >= thinnest:
         raise ConfigError(
-            f"wear.threshold_um = {options.threshold * 1e6:g} is deeper than the tooth, whose tip is "
+            f"wear.threshold_um = {options.threshold * 1e6:g} is deeper than the tooth, whose "
+            "tip is "
             f"{thinnest * 1e6:.4g} um thick; give less"
         )
     by_mesh = options.sharing == "mesh" or (
@@ -180,7 +182,8 @@ def wear_case(
     )
     if options.transmission_error_limit is not None and not by_mesh:
         raise ConfigError(
-            f"wear.transmission_error_limit_um: with a contact ratio of {pair.transverse_contact_ratio:.4f}, below 1, "
+            "wear.transmission_error_limit_um: with a contact ratio of "
+            f"{pair.transverse_contact_ratio:.4f}, below 1, "
             f"it needs wear.sharing=mesh"
         )
     roll = pair.base_pitch * (np.arange(ERROR_PHASES) + 0.5) / ERROR_PHASES

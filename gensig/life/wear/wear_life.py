@@ -25,7 +25,8 @@ Array = NDArray[np.float64]
 ACCURACY = {"band": (1e-3, 2e-9), "fixed_intervals": (1e-3, 1e-9)}
 BANDWIDTH = 13
 LARGEST_SHARE = 0.1  # of the threshold, worn in one step
-HORIZON = 50.0  # times the life at the rate of new flanks: sharing slows wear down, but never so much
+# times the life at the rate of new flanks: sharing slows wear down, but never so much
+HORIZON = 50.0
 N_SNAPSHOTS = 41
 
 
@@ -91,7 +92,8 @@ def wear_life(case: WearCase) -> WearLife:
         least = case.error_range(case.new_flanks())
         if least >= limit:
             raise ConfigError(
-                f"wear.transmission_error_limit_um = {limit * 1e6:g} is reached by new flanks already: theirs is "
+                f"wear.transmission_error_limit_um = {limit * 1e6:g} is reached by new flanks "
+                "already: theirs is "
                 f"{least * 1e6:.4g} um from peak to peak; give more"
             )
         ends.append(lambda depth: case.error_range(depth) / limit - 1.0)
@@ -100,7 +102,8 @@ def wear_life(case: WearCase) -> WearLife:
     )
     if solution.status != 1:
         raise SimulationError(
-            f"the flanks do not wear to the threshold in {HORIZON * at_first_rate:.4g} turns: {solution.message}"
+            f"the flanks do not wear to the threshold in {HORIZON * at_first_rate:.4g} turns: "
+            f"{solution.message}"
         )
     turns = np.linspace(0.0, float(solution.t[-1]), N_SNAPSHOTS)
     depth = np.stack([_depth(case, solution.sol(turn)) for turn in turns])
@@ -127,8 +130,8 @@ def worn_flanks(
     Parameters
     ----------
     turns : (time,) of the pinion from ``start`` on, not falling
-    torque : (time,) N m    of the time that ends at each, from the one before (the first: from 0); None is the case's
-        own throughout
+    torque : (time,) N m    of the time that ends at each, from the one before (the first: from 0);
+        None is the case's own throughout
     start : (2, slice, node) m    what is off already; None is nothing
 
     Returns

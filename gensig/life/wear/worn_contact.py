@@ -26,7 +26,8 @@ from gensig.mesh.sliced.slices import (
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-PHASES_PER_PITCH = 24  # of a mesh in several slices, whose slices pass the nodes at other phases than these
+# of a mesh in several slices, whose slices pass the nodes at other phases than these
+PHASES_PER_PITCH = 24
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -66,8 +67,10 @@ class WornContact:
             )
         except GeometryError:
             raise SimulationError(
-                f"worn {depth.max() * 1e6:.3g} um deep, the flanks find no settled contact: what is left at the pitch "
-                f"point carries all of the load; give a smaller wear.threshold_um or fewer mesh.n_slices"
+                f"worn {depth.max() * 1e6:.3g} um deep, the flanks find no settled contact: what "
+                "is left at the pitch "
+                "point carries all of the load; give a smaller wear.threshold_um or fewer "
+                "mesh.n_slices"
             ) from None
 
 

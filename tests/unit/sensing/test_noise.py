@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gensig.errors import ConfigError
-from gensig.sensing.noise import PARTS, Place, band_power, read_noise
+from gensig.sensing.noise import PARTS, Receiver, band_power, read_noise
 
 RATE = 51200.0
 MACHINE = {
@@ -34,7 +34,7 @@ def place(n_samples=51200):
     def through_path(rng):
         return np.cumsum(rng.standard_normal((2, n_samples)), axis=1)
 
-    return Place(
+    return Receiver(
         sensors=("a", "b"),
         n_samples=n_samples,
         sampling_rate=RATE,
