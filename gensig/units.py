@@ -6,6 +6,7 @@ suffix is a number without unit (``n_teeth``, ``damping_ratio``), taken as it is
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import difflib
 import functools
@@ -13,7 +14,7 @@ import math
 import sys
 import types
 import typing
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any, TypeVar
 
 from gensig.errors import ConfigError
@@ -57,8 +58,14 @@ TURNING = ("rotation", "tilt_x", "tilt_y")
 # how channels end that are the speed of a shaft, less its nominal one
 SPEED = "_speed"
 
+# types of lists in files by that of their entries
+LISTS: dict[type, Any] = {
+    float: tuple[float, ...],
+    int: tuple[int, ...],
+    str: tuple[str, ...],
+}
 # a type as a user calls it
-TYPES = {
+TYPES: dict[Any, str] = {
     float: "a number",
     int: "a whole number",
     bool: "true or false",
@@ -169,15 +176,21 @@ def read_kind(kinds: Mapping[str, type[T]], values: Any, where: str) -> T:
     if isinstance(values, Mapping):
         rest.update(values)
     kind = rest.pop("kind", None)
-    if kind not in list(kinds):
-        raise ConfigError(f"{where}: kind = {kind!r}; allowed: {', '.join(kinds)}")
-    try:
+    check_choice(f"{where}: kind", kind, list(kinds))
+    with naming(f"{where}."):
         return read(kinds[kind], rest, where)
+
+
+@contextlib.contextmanager
+def naming(where: str) -> Iterator[None]:
+    """Put ``where`` before a ConfigError whose text does not begin with its group."""
+    group, dot, _ = where.partition(".")
+    try:
+        yield
     except ConfigError as error:
-        text = str(error)
-        if text.startswith(where):
+        if str(error).startswith(group + dot):
             raise
-        raise ConfigError(f"{where}.{text}") from None
+        raise ConfigError(f"{where}{error}") from None
 
 
 def is_number(value: Any, *, finite: bool = True) -> bool:
@@ -278,8 +291,8 @@ def _convert(place: str, key: str, value: Any, hint: Any) -> Any:
         return float(value) * factor
     if any(_is_a(kind, value) for kind in (int, bool, str) if kind in kinds):
         return value
-    for kind in (float, int, str):
-        is_list = tuple[kind, ...] in kinds and isinstance(value, list | tuple)
+    for kind, row in LISTS.items():
+        is_list = row in kinds and isinstance(value, list | tuple)
         if is_list and all(_is_a(kind, entry) for entry in value):
             if kind is float:
                 return tuple(float(entry) * factor for entry in value)

@@ -58,8 +58,8 @@ def third_octave_bands(n_samples: int, sampling_rate: float) -> tuple[Array, Arr
     """Lower and upper edges of the third-octave bands that a signal resolves, Hz.
 
     They reach from the band at 20 Hz to the usable band's end, which cuts the highest. Bands
-    narrower than four lines of the signal's spectrum are left out: a second resolves them from 20
-    Hz on, 50 ms from 400 Hz on.
+    narrower than four lines of the signal's spectrum are left out: a second resolves them from
+    20 Hz on, 50 ms from 400 Hz on.
 
     Raises
     ------

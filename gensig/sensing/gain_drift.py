@@ -24,8 +24,8 @@ def draw_drift(
     """Factor of each sensor at every sample, (sensor, sample).
 
     It is the exponential of a mean-reverting walk. The walk is stationary, so it also holds the
-    state of mounting and temperature at the first sample. It is drawn exactly at even points, x(k
-    + 1) = a x(k) + scatter sqrt(1 - a^2) n(k) with a = exp(-step / correlation time), and is
+    state of mounting and temperature at the first sample. It is drawn exactly at even points,
+    x(k + 1) = a x(k) + scatter sqrt(1 - a^2) n(k) with a = exp(-step / correlation time), and is
     straight between them.
 
     Parameters

@@ -48,7 +48,8 @@ class Receiver:
     @property
     def frequency(self) -> Array:
         """Frequencies of the record's spectrum, (line,) Hz."""
-        return np.fft.rfftfreq(self.n_samples, 1.0 / self.sampling_rate)
+        step = 1.0 / self.sampling_rate
+        return np.asarray(np.fft.rfftfreq(self.n_samples, step), dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -20,7 +20,7 @@ from gensig.units import check_limits, unit
 Array = NDArray[np.float64]
 
 MOST_TEETH = 1000
-SLOWEST_CLOCK = 1e4  # Hz
+SLOWEST_CLOCK, FASTEST_CLOCK = 1e4, 1e12  # Hz
 GROUP = "toothed_wheel."
 
 
@@ -46,7 +46,7 @@ class ToothedWheel:
             GROUP,
             eccentricity_error=(0.0, MOST_ECCENTRICITY * (1.0 + 1e-9)),
             tooth_error=(0.0, MOST_LINE_SHARE * self.spacing * (1.0 + 1e-9)),
-            clock_frequency=(SLOWEST_CLOCK, math.inf),
+            clock_frequency=(SLOWEST_CLOCK, FASTEST_CLOCK),
         )
 
     @property
