@@ -1,5 +1,4 @@
-"""Indicators of a history: each record of a machine judged by all records of it up to then, in
-the order of time.
+"""Indicators of a history: each record of a machine judged by its records up to then.
 
 J. J. Zakrajsek, D. P. Townsend & H. J. Decker (1993), "An analysis of gear fault detection
 methods as applied to pitting fatigue failure data", NASA TM-105950 (NA4); J. J. Zakrajsek, R. F.
@@ -20,8 +19,7 @@ FloatArray = NDArray[np.floating]
 
 
 def na4(averages: ArrayLike, n_teeth: int) -> FloatArray:
-    """Fourth moment of the residual signal over the squared mean variance of all records up to
-    then.
+    """Fourth moment of the residual signal over the squared mean variance of the records up to it.
 
     Where damage grows, the moment grows with the fourth power of the residual and the mean
     variance follows late. So it goes on rising where FM4, whose own variance rises too, falls
@@ -52,8 +50,9 @@ def nb4(
     harmonic: int = 1,
     n_sidebands: int | None = None,
 ) -> FloatArray:
-    """As `na4`, of the envelope of one mesh harmonic: teeth under load that share it differently
-    modulate the mesh.
+    """`na4` of the envelope of one mesh harmonic.
+
+    Teeth that share the load differently modulate the mesh.
 
     Parameters
     ----------
@@ -74,9 +73,8 @@ def nb4(
     Source: NB4 of NASA TM-106467 (1994).
     """
     x = np.asarray(averages, dtype=float)
-    return _over_mean_variance(
-        mesh_envelope(x, n_teeth, harmonic=harmonic, n_sidebands=n_sidebands), rms(x)
-    )
+    magnitude = mesh_envelope(x, n_teeth, harmonic=harmonic, n_sidebands=n_sidebands)
+    return _over_mean_variance(magnitude, rms(x))
 
 
 def _over_mean_variance(signal: FloatArray, level: FloatArray) -> FloatArray:
@@ -96,9 +94,5 @@ def _over_mean_variance(signal: FloatArray, level: FloatArray) -> FloatArray:
     mean_variance = total / np.maximum(np.cumsum(known, axis=-1), 1)
     moment = np.where(above, np.mean(np.square(squared), axis=-1), 0.0)
     indicator = np.full(variance.shape, np.nan)
-    return np.divide(
-        moment,
-        np.square(mean_variance),
-        out=indicator,
-        where=known & (mean_variance > 0.0),
-    )
+    defined = known & (mean_variance > 0.0)
+    return np.divide(moment, np.square(mean_variance), out=indicator, where=defined)

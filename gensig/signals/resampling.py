@@ -1,7 +1,7 @@
-"""From one rate to another, by the low-pass of the simulated recorder: flat to 0.39 of the lower
-rate, shut from half.
+"""Change of sampling rate by the low-pass of the simulated recorder.
 
-Rates may be samples a second or samples a turn.
+It is flat to 0.39 of the lower rate and shut from half. Rates may be samples a second or samples
+a turn.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class RateChange:
 
     @property
     def is_none(self) -> bool:
-        """Whether both rates are the same."""
+        """True where both rates are the same."""
         return self.up == self.down
 
     def n_samples(self, n_found: int) -> int:
@@ -88,14 +88,13 @@ class RateChange:
     def _taps(self) -> FloatArray:
         from scipy.signal import firwin, kaiserord
 
-        lower = 1.0 / max(
-            self.up, self.down
-        )  # lower of both rates over the rate that both divide
+        # lower of both rates over the rate that both divide
+        lower = 1.0 / max(self.up, self.down)
         n_taps, beta = kaiserord(ATTENUATION_DB, 2.0 * (0.5 - PASS_SHARE) * lower)
         return firwin(n_taps | 1, (PASS_SHARE + 0.5) * lower, window=("kaiser", beta))
 
 
 def rate_change(found: float, wanted: float) -> RateChange:
-    """From one rate to the nearest one that a ratio of whole numbers up to `MOST_STEPS` gives."""
+    """Change to the nearest rate that a ratio of whole numbers up to `MOST_STEPS` gives."""
     ratio = Fraction(wanted / found).limit_denominator(MOST_STEPS)
     return RateChange(up=ratio.numerator, down=ratio.denominator)

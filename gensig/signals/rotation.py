@@ -1,5 +1,4 @@
-"""The angle domain of a shaft whose speed varies, by its angle, or without a tachometer by the
-phase of the mesh.
+"""Angle domain of a shaft whose speed varies, by its angle or by the phase of the mesh.
 
 Phase demodulation as a tachometer: F. Bonnardot, M. El Badaoui, R. B. Randall, J. Daniere & F.
 Guillet (2005), "Use of the acceleration signal of a gearbox in order to perform angular
@@ -18,9 +17,8 @@ from gensig.signals.averaging import interpolate, samples_per_turn_for
 FloatArray = NDArray[np.floating]
 
 PADDING = 8  # bins of the searched spectrum for one of the record's
-FADED = (
-    0.2  # of the median amplitude; band-limited noise is below it for 3 % of the time
-)
+# of the median amplitude; band-limited noise is below it for 3 % of the time
+FADED = 0.2
 
 
 def resample_by_angle(
@@ -124,14 +122,13 @@ def find_mesh_frequency(
     searched = np.arange(
         (1.0 - share) * expected, (1.0 + share) * expected, spacing / n_harmonics
     )
-    lines = [
-        np.interp(harmonic * searched / spacing, np.arange(amplitude.size), amplitude)
-        for harmonic in range(1, n_harmonics + 1)
-        if harmonic * searched[-1] < 0.5 * sampling_rate
+    bins = np.arange(amplitude.size)
+    held = [
+        k for k in range(1, n_harmonics + 1) if k * searched[-1] < 0.5 * sampling_rate
     ]
-    over = np.array(
-        [line / floor for line in lines if (floor := np.median(line)) > 0.0]
-    ).reshape(-1, searched.size)
+    lines = [np.interp(k * searched / spacing, bins, amplitude) for k in held]
+    relative = [line / floor for line in lines if (floor := np.median(line)) > 0.0]
+    over = np.array(relative).reshape(-1, searched.size)
     coarse = searched[np.argmax(np.sum(np.log(np.maximum(over, 1.0)), axis=0))]
     near = np.abs(searched - coarse) <= PADDING * spacing
     return float(searched[near][np.argmax(np.sum(np.square(over), axis=0)[near])])
@@ -181,9 +178,8 @@ def mesh_phase_angle(
     )
     band = oaconvolve((x - x.mean()) * np.exp(-1j * steady), window, mode="same")
     phase, magnitude = steady + np.unwrap(np.angle(band)), np.abs(band)
-    if magnitude.min() <= FADED * np.median(magnitude) or not np.all(
-        np.diff(phase) > 0.0
-    ):
+    is_faded = magnitude.min() <= FADED * np.median(magnitude)
+    if is_faded or not np.all(np.diff(phase) > 0.0):
         raise ValueError(
             f"no steady line stands out at {harmonic * mesh_frequency:.5g} Hz; try another "
             "harmonic or channel"

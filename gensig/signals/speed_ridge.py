@@ -1,6 +1,6 @@
-"""A speed that wanders, read off the harmonics of the mesh in a spectrogram.
+"""Course of a wandering speed, read off the harmonics of the mesh in a spectrogram.
 
-Coarse, but sure of its lines.
+It is coarse, but sure of its lines.
 """
 
 from __future__ import annotations
@@ -18,9 +18,8 @@ from gensig.signals.recording import Recording
 
 FloatArray = NDArray[np.floating]
 
-TURNS_A_FRAME = (
-    3  # of the faster gear: its sidebands, one turn away, are told from the mesh
-)
+# of the faster gear: its sidebands, one turn away, are resolved from the mesh
+TURNS_A_FRAME = 3
 FRAMES_A_FRAME = 4  # hop is a quarter of the frame
 MOST_HARMONICS = 10
 FINER_SPECTRUM = 2  # bins of the frame's spectrum for one of the frame
@@ -43,8 +42,7 @@ def wandering_mesh_cycles(
     options: str,
     longer: str,
 ) -> FloatArray:
-    """Mesh cycles since the first sample, (sample,), where the speed stays near a stated one but
-    wanders.
+    """Mesh cycles since the first sample, (sample,), where the speed wanders near a stated one.
 
     Parameters
     ----------
@@ -86,17 +84,13 @@ def wandering_mesh_cycles(
     )
     samples = np.arange(n_samples)
     frequency = np.interp(samples / rate, time, course)
-    coarse = (
-        np.concatenate([[0.0], np.cumsum(0.5 * (frequency[1:] + frequency[:-1]))])
-        / rate
-    )
+    steps = 0.5 * (frequency[1:] + frequency[:-1])
+    coarse = np.concatenate([[0.0], np.cumsum(steps)]) / rate
     mean = float(coarse[-1] * rate / (n_samples - 1))
     warped = coarse / mean * rate  # place of every sample once the speed is steady
-    steady = np.stack(
-        [np.interp(samples, warped, row) for row in recording.acceleration]
-    )
+    rows = [np.interp(samples, warped, row) for row in recording.acceleration]
     motion = find_motion(
-        replace(recording, acceleration=steady),
+        replace(recording, acceleration=np.stack(rows)),
         teeth,
         mean / teeth.driving * 60.0,
         highest=highest,
@@ -180,15 +174,10 @@ def mesh_frequency_course(
     candidates = np.arange(-search, search + 0.5 * step, step)
     harmonic = np.arange(1, n_harmonics + 1)[:, None]
     place = harmonic * (1.0 + candidates) * mesh_frequency / frequency[1]
-    likelihood = np.stack(
-        [
-            np.interp(place, np.arange(frequency.size), row).sum(axis=0)
-            for row in standing.T
-        ]
-    )
-    return time, (
-        1.0 + candidates[_most_probable(likelihood, candidates)]
-    ) * mesh_frequency
+    bins = np.arange(frequency.size)
+    likelihood = [np.interp(place, bins, row).sum(axis=0) for row in standing.T]
+    best = _most_probable(np.stack(likelihood), candidates)
+    return time, (1.0 + candidates[best]) * mesh_frequency
 
 
 def _floor(power: FloatArray) -> FloatArray:
@@ -203,12 +192,13 @@ def _floor(power: FloatArray) -> FloatArray:
 
 
 def _most_probable(likelihood: FloatArray, candidates: FloatArray) -> NDArray[np.intp]:
-    """(frame,) indices of the candidates along the best course, logarithms of probability (frame,
-    candidate).
+    """Indices of the candidates along the best course, (frame,).
+
+    ``likelihood`` (frame, candidate) are logarithms of probability.
     """
-    change = -0.5 * np.square(
-        (candidates[:, None] - candidates[None, :]) / STEP_SHARE
-    )  # to, from
+    # (to, from)
+    distance = candidates[:, None] - candidates[None, :]
+    change = -0.5 * np.square(distance / STEP_SHARE)
     total, origin = likelihood[0], []
     for row in likelihood[1:]:
         reached = change + total[None, :]

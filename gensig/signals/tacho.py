@@ -1,4 +1,4 @@
-"""From a tachometer's pulses to speed and to the angle domain: computed order tracking.
+"""Speed and angle domain from a tachometer's pulses: computed order tracking.
 
 K. R. Fyfe & E. D. S. Munck (1997), "Analysis of computed order tracking", Mechanical Systems and
 Signal Processing 11 (2), 187-205.
@@ -54,9 +54,8 @@ def speed_of_pulses(
     rotation_frequency : (pulse - 1,) Hz
     """
     instants = np.asarray(times, dtype=float)
-    return 0.5 * (instants[1:] + instants[:-1]), 1.0 / (
-        pulses_per_turn * np.diff(instants)
-    )
+    middles = 0.5 * (instants[1:] + instants[:-1])
+    return middles, 1.0 / (pulses_per_turn * np.diff(instants))
 
 
 def resample_by_pulses(
