@@ -121,18 +121,6 @@ def test_the_life_falls_with_the_load_to_the_paris_exponent(law, exponent):
     assert_allclose(slope, -exponent, rtol=1e-9)
 
 
-def test_the_rate_goes_with_the_stress_intensity_to_the_paris_exponent(law):
-    depths = np.geomspace(0.5e-3, 2.5e-3, 9)
-    rates = np.log(law.rate(depths, 150.0))
-    ranges = np.log(
-        [
-            law.measures(depth, 150.0)["stress_intensity_range_mpa_sqrt_m"]
-            for depth in depths
-        ]
-    )
-    assert_allclose(np.polyfit(ranges, rates, 1)[0], law.options.exponent, rtol=1e-9)
-
-
 def test_the_course_converges_with_the_cells(law):
     """Half as many cells move the life by less than 0.1 %."""
     fine = life_turns(law, 120.0, law.sizes[20])

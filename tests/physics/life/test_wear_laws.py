@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from gensig.life.options import FlankMaterial, read_wear_options
 from gensig.life.wear.archard import depth_per_mesh, flank_path, meshes_per_turn
 from gensig.life.wear.wear_case import wear_case
-from gensig.life.wear.wear_life import wear_life, worn_flanks
+from gensig.life.wear.wear_life import wear_life
 from gensig.mesh.sliced.slice_pressure import contact_pressure
 from gensig.mesh.sliced.slices import loaded_contact
 from gensig.options.compose import compose
@@ -204,26 +204,6 @@ def test_worn_places_give_their_load_away():
     # the pinion no longer wears most at its root
     assert life.depth[-1][0, 0].argmax() > 10
     assert case.wear_per_mesh(case.new_flanks())[0, 0].argmax() == 0
-
-
-@pytest.mark.parametrize("rule", ["band", "fixed_intervals"])
-def test_a_history_is_the_same_in_one_go_or_many(rule):
-    case = case_of(*FULL, f"wear.rule={rule}", "wear.threshold_um=5")
-    life = wear_life(case)
-    turns = life.turns[[0, 4, 4, 20, 40]]
-    at_once = worn_flanks(case, turns)
-    assert_allclose(at_once[-1], life.depth[-1], atol=2e-3 * life.depth.max())
-    assert_allclose(at_once[1], at_once[2], atol=0.0)
-    assert not at_once[0].any()
-    assert (np.diff(at_once, axis=0) >= -1e-12).all()
-    steady = worn_flanks(case, turns, torque=np.full(5, case.torque))
-    assert_allclose(steady, at_once, atol=2e-3 * life.depth.max())
-    later = worn_flanks(case, turns[3:] - turns[2], start=at_once[2])
-    assert_allclose(later, at_once[3:], atol=2e-3 * life.depth.max())
-    heavier = worn_flanks(
-        case, turns, torque=case.torque * np.array([1.0, 1.0, 1.0, 2.0, 1.0])
-    )
-    assert heavier[3].max() > 1.2 * at_once[3].max()
 
 
 def test_a_path_has_the_pitch_point_for_a_node():

@@ -176,15 +176,6 @@ def test_a_twin_made_later_has_the_nuisances_of_its_record(shaking):
     np.testing.assert_allclose(noise, same, rtol=0, atol=1e-3 * same.std())
 
 
-def test_the_option_makes_records_through_path_and_sensor():
-    config = read_request(["sensing=machine", "plan.n_records=2", "plan.classes=[healthy,crack]",
-                           "operating.duration_s=0.1"]).config  # fmt: skip
-    for record in made(config):
-        assert record.values.get("status", "ok") == "ok"
-        assert record.signals["acceleration"].shape == (3, 5120)
-        assert np.all(np.isfinite(record.signals["acceleration"]))
-
-
 def test_a_configuration_without_the_key_is_told(config_with):
     config = config_with()
     config = config.with_entries(sensing=config["sensing"].without("nuisances"))

@@ -30,7 +30,7 @@ KINDS = {
 }
 
 
-def place(n_samples=51200):
+def receiver(n_samples=51200):
     def through_path(rng):
         return np.cumsum(rng.standard_normal((2, n_samples)), axis=1)
 
@@ -68,7 +68,7 @@ def test_every_kind_is_tested():
 )
 def test_power_is_exact(kinds, n_samples):
     power = np.array([2.0, 0.3])
-    made = noise(*kinds).make(power, np.random.default_rng(1), place(n_samples))
+    made = noise(*kinds).make(power, np.random.default_rng(1), receiver(n_samples))
     assert_allclose(np.var(made, axis=1), power, rtol=1e-9, atol=0)
     assert_allclose(made.mean(axis=1), 0.0, rtol=0, atol=1e-9)
 
@@ -80,7 +80,7 @@ def test_power_in_a_band(kinds):
     from scipy.signal import butter, sosfilt
 
     made = noise(*kinds, band=[300.0, 8000.0]).make(
-        np.array([2.0, 0.3]), np.random.default_rng(1), place()
+        np.array([2.0, 0.3]), np.random.default_rng(1), receiver()
     )
     within = sosfilt(
         butter(8, [300.0, 8000.0], "bandpass", fs=RATE, output="sos"), made, axis=1
@@ -104,7 +104,7 @@ def test_band_power_of_a_tone():
 def test_shares_are_of_the_power():
     parts = [{**KINDS["white"], "share": 3.0}, {**KINDS["hum"], "share": 1.0}]
     made = read_noise({"parts": parts, "band_hz": None}).make(
-        np.ones(2), np.random.default_rng(2), place()
+        np.ones(2), np.random.default_rng(2), receiver()
     )
     lines = 2.0 * density(made)[:, [50, 100, 150]] / 51200**2
     assert_allclose(lines.sum(axis=1), 0.25, rtol=0.02, atol=0)
@@ -112,19 +112,19 @@ def test_shares_are_of_the_power():
 
 
 def test_pink_falls_by_three_decibel_an_octave():
-    made = noise("pink").make(np.ones(2), np.random.default_rng(3), place())
+    made = noise("pink").make(np.ones(2), np.random.default_rng(3), receiver())
     octaves = [density(made)[:, low : 2 * low].mean() for low in (64, 256, 1024, 4096)]
     assert_allclose(np.array(octaves[1:]) / octaves[:-1], 0.25, rtol=0.15, atol=0)
 
 
 def test_impulsive_has_a_high_kurtosis_and_rings_where_it_says():
-    made = noise("impulsive").make(np.ones(2), np.random.default_rng(4), place())
+    made = noise("impulsive").make(np.ones(2), np.random.default_rng(4), receiver())
     assert np.all(np.mean(made**4, axis=1) > 20.0)
     assert abs(np.argmax(density(made).sum(axis=0)) - 3000) < 200
 
 
 def test_another_machine_has_its_orders_and_nothing_else():
-    made = noise("machine").make(np.ones(2), np.random.default_rng(5), place())
+    made = noise("machine").make(np.ones(2), np.random.default_rng(5), receiver())
     orders = [*range(1, 4), *(3.6 * k + s for k in range(1, 5) for s in (-1, 0, 1)),
               *(31 * k + s for k in range(1, 4) for s in (-1, 0, 1))]  # fmt: skip
     lines = density(made).sum(axis=0)
@@ -137,7 +137,7 @@ def test_background_takes_a_stretch(tmp_path):
     recording = np.random.default_rng(6).standard_normal((2, 5000))
     part = background(tmp_path / "two.csv", recording, names=("a", "b"))
     made = read_noise({"parts": [part], "band_hz": None}).make(
-        np.ones(2), np.random.default_rng(7), place(1000)
+        np.ones(2), np.random.default_rng(7), receiver(1000)
     )
     starts = [
         int(np.argmax(np.correlate(recording[k], made[k], "valid"))) for k in range(2)
@@ -169,7 +169,7 @@ def test_spectrum_has_the_density_of_its_file(tmp_path):
         names=("a", "b"),
     )
     noise = read_noise({"parts": [part], "band_hz": None})
-    made = noise.make(np.array([2.0, 0.3]), np.random.default_rng(3), place())
+    made = noise.make(np.array([2.0, 0.3]), np.random.default_rng(3), receiver())
     assert_allclose(np.var(made, axis=1), [2.0, 0.3], rtol=1e-9, atol=0)
     found = density(made)
     flat, high = found[:, 200:900].mean(axis=1), found[:, 3000:9000].mean(axis=1)
@@ -177,7 +177,7 @@ def test_spectrum_has_the_density_of_its_file(tmp_path):
         high[0] / flat[0], 9.0, rtol=0.15
     )  # straight between the lines, held beyond the last
     assert_allclose(found[0, 1400:1600].mean() / flat[0], 5.0, rtol=0.25)
-    other = noise.make(np.array([2.0, 0.3]), np.random.default_rng(4), place())
+    other = noise.make(np.array([2.0, 0.3]), np.random.default_rng(4), receiver())
     assert abs(np.corrcoef(made[0], other[0])[0, 1]) < 0.05
 
 
@@ -199,7 +199,7 @@ def test_refused_spectra(tmp_path):
         part = spectrum(tmp_path / f"{number}.csv", columns, names=names)
         with pytest.raises(ConfigError, match=re.escape(text)) as caught:
             read_noise({"parts": [part], "band_hz": None}).make(
-                np.ones(2), np.random.default_rng(1), place()
+                np.ones(2), np.random.default_rng(1), receiver()
             )
         assert "\n" not in str(caught.value)
 
@@ -224,29 +224,27 @@ def test_refused_backgrounds(tmp_path):
     for text, part in cases.items():
         found = read_noise({"parts": [part], "band_hz": None})
         with pytest.raises(ConfigError, match=re.escape(text)):
-            found.make(np.ones(2), rng, place(1000))
+            found.make(np.ones(2), rng, receiver(1000))
+
+
+WHITE = [KINDS["white"]]
 
 
 @pytest.mark.parametrize(
     ("parts", "band", "text"),
     [
-        ([], None, "sensing.noise.parts = [] has no part"),
-        ("white", None, "must be a list"),
-        (
-            [{"kind": "brown", "share": 1}],
-            None,
-            "sensing.noise.parts[0]: kind = 'brown'; allowed: white, pink",
-        ),
+        ([], None, ".parts = [] has no part"),
+        ("white", None, ".parts = 'white' must be a list"),
+        ([{"kind": "brown"}], None, ".parts[0]: kind = 'brown'; allowed: white, pink"),
         (
             [{"kind": "white", "share": 0.0}],
             None,
-            "sensing.noise.parts[0].share = 0 must be positive",
+            ".parts[0].share = 0 must be positive",
         ),
-        ([{"kind": "white"}], None, "sensing.noise.parts[0]: missing share"),
         (
-            [KINDS["white"], {"kind": "pink", "share": 1, "lowest": 2}],
+            [*WHITE, {**KINDS["pink"], "lowest": 2}],
             None,
-            "write it as 'lowest_hz'",
+            ".parts[1]: 'lowest' has the wrong unit",
         ),
         (
             [{**KINDS["impulsive"], "damping_ratio": 2.0}],
@@ -258,17 +256,33 @@ def test_refused_backgrounds(tmp_path):
             None,
             "frequency_scatter = 0.9 must lie in 0..0.5",
         ),
+        (WHITE, [100.0], ".band_hz = [100.0] must be [low, high]"),
         (
-            [KINDS["white"]],
-            [100.0],
-            "sensing.noise.band_hz = [100.0] must be [low, high]",
+            WHITE,
+            [200.0, 100.0],
+            ".band_hz = [200.0, 100.0] must be [low, high], ordered",
         ),
-        ([KINDS["white"]], [200.0, 100.0], "must be [low, high], ordered"),
-        ([KINDS["white"]], "all", "must be [low, high] in Hz, or null"),
-        ([KINDS["hum"]], [100.0, 200.0], "tones alone may miss the band"),
+        (WHITE, "all", ".band_hz = 'all' must be [low, high] in Hz, or null"),
+        ([KINDS["hum"]], [100.0, 200.0], ".band_hz: tones alone may miss the band"),
     ],
 )
-def test_mistakes(parts, band, text):
+def test_refusals(parts, band, text):
     with pytest.raises(ConfigError, match=re.escape(text)) as caught:
         read_noise({"parts": parts, "band_hz": band})
-    assert "\n" not in str(caught.value)
+    assert str(caught.value).startswith("sensing.noise")
+
+
+def test_offsets_make_a_sensor_louder(machine, xiamen):
+    changes = {"sensing.channels": ["pinion_x", "pinion_y"]}
+    offset = {"sensing.noise.offsets_db": [3.0, -7.0]}
+    sensing = machine(changes | offset).sensing
+    levels = 10.0 * np.log10(sensing.noise_factor(20.0))
+    assert_allclose(levels, [-17.0, -27.0], rtol=0, atol=1e-9)
+    assert np.all(xiamen.sensing.noise_factor(13.7) == 10.0 ** (-13.7 / 10.0))
+    with pytest.raises(ConfigError, match="has 2 values for 4 sensors"):
+        machine(offset)
+    for value in ("loud", ["x"], [True], [float("nan")]):
+        with pytest.raises(
+            ConfigError, match=r"must be a list of numbers, one a sensor"
+        ):
+            read_noise({"parts": WHITE, "band_hz": None, "offsets_db": value})

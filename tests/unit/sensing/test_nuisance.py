@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -222,50 +223,59 @@ def test_ranges_are_filled_and_kept(dynamics):
     assert free * 0.98 <= min(cages) < max(cages) <= free
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_numbers_stay_within_their_limits(kind):
+    cls = KINDS[kind]
+    (part,) = read_nuisances([PARTS[kind]])
+    for name, (low, high) in cls.limits.items():
+        for value in (low - 1, 2 * high):
+            with pytest.raises(ConfigError, match=rf"^{name}.* must lie in"):
+                replace(part, **{name: value})
+    for name, (low, high) in cls.ranges.items():
+        for ends in ((low - 1, high), (high, low), (low, 2 * high), (low,)):
+            with pytest.raises(ConfigError, match=rf"^{name}.* must be two ordered"):
+                replace(part, **{name: ends})
+
+
 @pytest.mark.parametrize(
-    ("kind", "change", "told"),
+    ("kind", "change", "text"),
     [
-        ("unbalance", {"gear": "ring"}, "sensing.nuisances[0].gear = 'ring'; allowed: pinion, wheel"),
-        ("unbalance", {"iso21940_grade": 0}, "iso21940_grade = 0 must lie in 0.1..4000"),
-        ("unbalance", {"used_share": [0.5, 0.1]}, "used_share = [0.5, 0.1] must be two ordered numbers, [low, high]"),
-        ("unbalance", {"used_share": 0.5}, "used_share = 0.5 is not a list of numbers"),
-        ("unbalance", {"rated_speed_rpm": -1}, "rated_speed_rpm = -1 must lie in 1..1e+06"),
-        ("unbalance", {"rotor_mass_kg": 0}, "rotor_mass_kg = 0 must lie in 0.001..100000"),
-        ("coupling_misalignment", {"force_share": [0.0, 0.1]}, "force_share = [0.0, 0.1] must be two ordered"),
-        ("coupling_misalignment", {"order_shares": []}, "number of order_shares = 0 must lie in 1..50"),
-        ("coupling_misalignment", {"order_shares": [-1.0]}, "order_shares = -1 must lie in 0..100"),
-        ("looseness", {"n_orders": 0}, "n_orders = 0 must lie in 1..50"),
-        ("looseness", {"harmonic_exponent": -1}, "harmonic_exponent = -1 must lie in 0..10"),
-        ("bearing", {"n_balls": 2}, "n_balls = 2 must lie in 3..200"),
-        ("bearing", {"ball_diameter_mm": 20}, "9 balls of ball_diameter_mm = 20 do not fit on pitch_diameter_mm"),
-        ("bearing", {"contact_angle_deg": 70}, "contact_angle_deg = 70 must lie in 0..60"),
-        ("bearing", {"waviness_um": [0, 1]}, "waviness_um = [0.0, 1.0] must be two ordered numbers"),
-        ("bearing", {"slip": [0.0, 0.5]}, "slip = [0.0, 0.5] must be two ordered numbers, [low, high], in 0..0.2"),
-        ("bearing", {"waviness_mm": [0.1, 0.1]}, "'waviness_mm' has the wrong unit; write it as 'waviness_um'"),
-        ("neighbour_mesh", {"n_teeth": 2.5}, "n_teeth = 2.5 is not a whole number"),
-        ("neighbour_mesh", {"n_teeth_mate": 1}, "n_teeth_mate = 1 must lie in 5..1000"),
-        ("neighbour_mesh", {"sideband_share": [0.0, 2.0]}, "sideband_share = [0.0, 2.0] must be two ordered"),
-        ("neighbour_mesh", {"kind": "neighbor"}, "sensing.nuisances[0]: kind = 'neighbor'; allowed: unbalance"),
+        ("unbalance", {"gear": "ring"}, ".gear = 'ring'; allowed: pinion, wheel"),
+        (
+            "unbalance",
+            {"rated_speed_rpm": -1},
+            ".rated_speed_rpm = -1 must lie in 1..1e+06",
+        ),
+        (
+            "coupling_misalignment",
+            {"order_shares": []},
+            ".number of order_shares = 0 must lie",
+        ),
+        (
+            "coupling_misalignment",
+            {"order_shares": [-1.0]},
+            ".order_shares = -1 must lie in 0..100",
+        ),
+        (
+            "bearing",
+            {"ball_diameter_mm": 20},
+            ".9 balls of ball_diameter_mm = 20 do not fit on",
+        ),
+        ("bearing", {"waviness_mm": [0.1, 0.1]}, ": 'waviness_mm' has the wrong unit"),
+        ("neighbour_mesh", {"n_teeth": 2.5}, ".n_teeth = 2.5 is not a whole number"),
+        (
+            "neighbour_mesh",
+            {"kind": "neighbor"},
+            ": kind = 'neighbor'; allowed: unbalance",
+        ),
     ],
-)  # fmt: skip
-def test_bad_input_is_told_in_one_line(kind, change, told):
-    with pytest.raises(ConfigError, match=re.escape(told)) as caught:
+)
+def test_bad_input_names_the_part(kind, change, text):
+    with pytest.raises(ConfigError, match=re.escape(f"sensing.nuisances[0]{text}")):
         read_nuisances([{**PARTS[kind], **change}])
-    assert str(caught.value).startswith("sensing.nuisances[0]")
-    assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("values", [None, "bearing", {"kind": "bearing"}, 3])
+@pytest.mark.parametrize("values", [None, "bearing", {"kind": "bearing"}])
 def test_only_a_list_is_a_list(values):
     with pytest.raises(ConfigError, match="must be a list of parts"):
         read_nuisances(values)
-
-
-def test_a_missing_key_is_named():
-    part = {
-        key: value for key, value in PARTS["looseness"].items() if key != "half_share"
-    }
-    with pytest.raises(
-        ConfigError, match=re.escape("sensing.nuisances[1]: missing half_share")
-    ):
-        read_nuisances([PARTS["unbalance"], part])

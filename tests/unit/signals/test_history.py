@@ -78,12 +78,3 @@ def test_records_without_residual_and_the_first_that_has_one():
     found = na4(averages, TEETH)
     assert np.isnan(found[:2]).all()
     assert_allclose(found[2], 1.5 * 3**2, rtol=1e-6)  # its variance counts a third
-
-
-def test_leading_axes_are_kept():
-    averages = np.stack([history([1.0, 2.0], seed=seed) for seed in range(3)])
-    for indicator in (na4, nb4):
-        assert indicator(averages, TEETH).shape == (3, 2)
-        assert_allclose(
-            indicator(averages, TEETH)[1], indicator(averages[1], TEETH), rtol=1e-12
-        )
