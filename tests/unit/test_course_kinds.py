@@ -153,8 +153,12 @@ class TestRipple:
     def test_later_is_the_same_function_of_time(self, name):
         ripple, times, speed, delay = RIPPLES[name], np.linspace(-1, 1, 9), 30.0, 0.37
         moved = ripple.later(delay, speed * delay)
-        assert_allclose(moved.psi(times + delay, speed * (times + delay)), ripple.psi(times, speed * times),
-                        rtol=0, atol=1e-12)  # fmt: skip
+        assert_allclose(
+            moved.psi(times + delay, speed * (times + delay)),
+            ripple.psi(times, speed * times),
+            rtol=0,
+            atol=1e-12,
+        )
 
     @pytest.mark.parametrize(
         ("values", "text"),

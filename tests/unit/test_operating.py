@@ -1,4 +1,5 @@
-"""Profiles of speed and torque: their mathematics, what they mean for a machine, and what is refused."""
+"""Profiles of speed and torque: their mathematics, what they mean for a machine, and what is
+refused."""
 
 import math
 import re
@@ -51,8 +52,12 @@ def profiles():
 
 class TestCurve:
     def test_linear_between_the_points_and_held_outside(self):
-        assert_allclose(PROFILE.curve()([-9, -0.2, 0.05, 0.3, 0.5, 1.0, 40]), [0.5, 0.5, 0.65, 0.8, 0.9, 0.25, 0.25],
-                        rtol=1e-12, atol=0)  # fmt: skip
+        assert_allclose(
+            PROFILE.curve()([-9, -0.2, 0.05, 0.3, 0.5, 1.0, 40]),
+            [0.5, 0.5, 0.65, 0.8, 0.9, 0.25, 0.25],
+            rtol=1e-12,
+            atol=0,
+        )
 
     def test_its_slope_is_that_of_the_piece_that_begins(self):
         slope = PROFILE.curve().derivative()([-9, -0.2, 0.1, 0.3, 0.7, 1.0, 40])
@@ -113,8 +118,12 @@ class TestNominal:
         )
 
     def test_the_angle_is_negative_before_time_0(self, operating):
-        assert_allclose(operating.nominal(np.array([-0.4, -0.2])).angle / operating.speed,
-                        [-0.2 * (0.5 + 0.62) / 2 - 0.1, -0.2 * (0.5 + 0.62) / 2], rtol=1e-12, atol=0)  # fmt: skip
+        assert_allclose(
+            operating.nominal(np.array([-0.4, -0.2])).angle / operating.speed,
+            [-0.2 * (0.5 + 0.62) / 2 - 0.1, -0.2 * (0.5 + 0.62) / 2],
+            rtol=1e-12,
+            atol=0,
+        )
 
     def test_speed_and_acceleration_are_its_derivatives(self, operating):
         times, h = np.array([-0.3, 0.1, 0.5, 0.9, 1.4]), 1e-6

@@ -1,4 +1,5 @@
-"""The group ``operating``: kinds of courses as configurations give them, users' files, and what is refused."""
+"""The group ``operating``: kinds of courses as configurations give them, users' files, and what is
+refused."""
 
 import math
 import re
@@ -220,8 +221,14 @@ class TestRipple:
         "ripple", [{"share": 0.1, "order": 2}, {"share": 0.2, "frequency_hz": 9}]
     )
     def test_speed_and_slopes_are_derivatives(self, operating, ripple):
-        found = operating({SPEED: WALK, TORQUE: RAMP, "operating.speed_ripple": ripple,
-                           "operating.torque_ripple": {**ripple, "phase_deg": 30}})  # fmt: skip
+        found = operating(
+            {
+                SPEED: WALK,
+                TORQUE: RAMP,
+                "operating.speed_ripple": ripple,
+                "operating.torque_ripple": {**ripple, "phase_deg": 30},
+            }
+        )
         times, h = np.array([-0.2512, 0.1013, 0.5017, 0.9123]), 1e-6
         before, at, after = (found.nominal(times + shift) for shift in (-h, 0.0, h))
         assert_allclose(
@@ -241,7 +248,8 @@ class TestRipple:
         )
 
     def test_the_order_follows_the_set_angle_of_both_shafts_courses(self, operating):
-        """On a ramp a torque ripple of order 2 has two periods a turn of the pinion, whatever the speed."""
+        """On a ramp a torque ripple of order 2 has two periods a turn of the pinion, whatever the
+        speed."""
         found = operating(
             {SPEED: RAMP, "operating.torque_ripple": {"share": 0.1, "order": 2}}
         )
@@ -260,8 +268,13 @@ class TestRipple:
     [{"share": 0.02, "order": 2}, {"share": 0.02, "frequency_hz": 50, "phase_deg": 20}],
 )
 def test_a_lead_in_shifts_all_courses_alike(machine, ripple):
-    changes = {SPEED: WALK, TORQUE: WALK, "operating.speed_ripple": ripple, "operating.torque_ripple": ripple,
-               "sensing.sensor.low_cutoff_hz": 2.0}  # fmt: skip
+    changes = {
+        SPEED: WALK,
+        TORQUE: WALK,
+        "operating.speed_ripple": ripple,
+        "operating.torque_ripple": ripple,
+        "sensing.sensor.low_cutoff_hz": 2.0,
+    }
     run = Run(system=machine(changes), faults=())
     lead = run.system.sensing.n_lead / run.system.sensing.sampling_rate
     assert lead > 0.05

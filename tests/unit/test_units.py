@@ -250,18 +250,42 @@ def test_missing_keys_are_named():
 
 
 FAULTS = [
-    (lambda one: check_positive(one, "gear.", "share", "length"), {"length": 0.0},
-     "gear.length_mm = 0 must be positive"),
-    (lambda one: check_limits(one, "gear.", length=(1e-3, 0.1)), {"length": 0.2},
-     "gear.length_mm = 200 must lie in 1..100"),
-    (lambda one: check_limits(one, "gear.", share=(0.0, 1.0)), {"share": math.nan},
-     "gear.share = nan must lie in 0..1"),
-    (lambda one: check_ranges(one, "", seats=(0.0, 0.1)), {"seats": (0.05, 0.2)},
-     "seats_mm = [50, 200] must be two ordered numbers, [low, high], in 0..100"),
-    (lambda one: check_ranges(one, "", seats=(0.0, 0.1)), {"seats": (0.05, 0.02)}, "two ordered"),
-    (lambda one: check_ranges(one, "", seats=(0.0, 0.1)), {"seats": (0.05,)}, "two ordered"),
-    (lambda one: check_choice("gear.name", one.name, ("a", 1)), {}, "gear.name = 'shaft'; allowed: a, 1"),
-]  # fmt: skip
+    (
+        lambda one: check_positive(one, "gear.", "share", "length"),
+        {"length": 0.0},
+        "gear.length_mm = 0 must be positive",
+    ),
+    (
+        lambda one: check_limits(one, "gear.", length=(1e-3, 0.1)),
+        {"length": 0.2},
+        "gear.length_mm = 200 must lie in 1..100",
+    ),
+    (
+        lambda one: check_limits(one, "gear.", share=(0.0, 1.0)),
+        {"share": math.nan},
+        "gear.share = nan must lie in 0..1",
+    ),
+    (
+        lambda one: check_ranges(one, "", seats=(0.0, 0.1)),
+        {"seats": (0.05, 0.2)},
+        "seats_mm = [50, 200] must be two ordered numbers, [low, high], in 0..100",
+    ),
+    (
+        lambda one: check_ranges(one, "", seats=(0.0, 0.1)),
+        {"seats": (0.05, 0.02)},
+        "two ordered",
+    ),
+    (
+        lambda one: check_ranges(one, "", seats=(0.0, 0.1)),
+        {"seats": (0.05,)},
+        "two ordered",
+    ),
+    (
+        lambda one: check_choice("gear.name", one.name, ("a", 1)),
+        {},
+        "gear.name = 'shaft'; allowed: a, 1",
+    ),
+]
 
 
 @pytest.mark.parametrize(("check", "changes", "text"), FAULTS)

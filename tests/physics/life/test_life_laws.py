@@ -1,4 +1,5 @@
-"""Laws of growth: thresholds, exponents, monotone courses, histories with standstills, censoring."""
+"""Laws of growth: thresholds, exponents, monotone courses, histories with standstills,
+censoring."""
 
 import math
 from dataclasses import replace
@@ -125,9 +126,13 @@ def test_the_course_converges_with_the_cells(law):
     """Half as many cells move the life by less than 0.1 %."""
     fine = life_turns(law, 120.0, law.sizes[20])
     coarse = grow(
-        law.sizes[::2], replace(law, sizes=law.sizes[::2], intensity=law.intensity[:, ::2]).turns(np.array([120.0])),
-        steady(120.0, 1e6), law.sizes[20],
-    )  # fmt: skip
+        law.sizes[::2],
+        replace(law, sizes=law.sizes[::2], intensity=law.intensity[:, ::2]).turns(
+            np.array([120.0])
+        ),
+        steady(120.0, 1e6),
+        law.sizes[20],
+    )
     assert_allclose(coarse.turns[-1], fine, rtol=1e-3)
 
 

@@ -1,4 +1,5 @@
-"""Laws of wear: Archard's, the two rules, sharing, hunting, what a worn flank does to its own wear."""
+"""Laws of wear: Archard's, the two rules, sharing, hunting, what a worn flank does to its own
+wear."""
 
 import math
 from dataclasses import replace
@@ -37,7 +38,8 @@ def at_pitch(case):
 
 
 def test_the_band_rule_is_the_integral_over_the_passing_contact():
-    """Archard's law integrated over time at one point of the pinion, the Hertzian ellipse going over it."""
+    """Archard's law integrated over time at one point of the pinion, the Hertzian ellipse going
+    over it."""
     case = case_of(*PAPER)
     load = case.line_load(case.new_flanks())
     found = case.wear_per_mesh(case.new_flanks())[0, 0]
@@ -115,7 +117,8 @@ def test_fixed_intervals_does_not_converge_and_the_band_does_not_ask():
 
 
 def test_the_mesh_shares_the_load():
-    """Without corner contact both pairs of the double zone carry all of it, and one pair where there is one."""
+    """Without corner contact both pairs of the double zone carry all of it, and one pair where
+    there is one."""
     case = case_of(*FULL, "mesh.law=paper")
     load, place, pitch = (
         case.line_load(case.new_flanks())[0],

@@ -1,4 +1,5 @@
-"""Nuisances in records: the same for every class of a unit, whatever they are made beside; none changes no bit."""
+"""Nuisances in records: the same for every class of a unit, whatever they are made beside; none
+changes no bit."""
 
 from dataclasses import replace
 
@@ -15,9 +16,17 @@ from gensig.record.simulate import forget_twins, simulate_record, simulate_recor
 from gensig.systems.nuisances import with_nuisances
 from gensig.systems.run import CleanRecord
 
-BASE = ("plan.n_records=4", "plan.n_units=1", "plan.classes=[healthy,missing_tooth]", "operating.duration_s=0.1",
-        "dataset.store_source=true", "dataset.store_clean=true", "dataset.store_shaft_angle=true",
-        "sensing.noise.band_hz=null", "quality.iso1328_grade=null")  # fmt: skip
+BASE = (
+    "plan.n_records=4",
+    "plan.n_units=1",
+    "plan.classes=[healthy,missing_tooth]",
+    "operating.duration_s=0.1",
+    "dataset.store_source=true",
+    "dataset.store_clean=true",
+    "dataset.store_shaft_angle=true",
+    "sensing.noise.band_hz=null",
+    "quality.iso1328_grade=null",
+)
 
 
 @pytest.fixture(scope="module")
@@ -89,15 +98,22 @@ def with_nuisances_of(inputs, motion):
 
 
 def test_no_class_has_others(shaking):
-    """At the same angle of the shaft a faulty machine and a sound one are shaken by the same bits."""
+    """At the same angle of the shaft a faulty machine and a sound one are shaken by the same
+    bits."""
     faulty = next(
         row for row in rows_of(shaking) if row["label_name"] == "missing_tooth"
     )
     reader = InputReader(shaking)
     system = reader.inputs(faulty).machine
     angle = system.operating.speed * np.arange(5120) / system.sensing.sampling_rate
-    motion = CleanRecord(acceleration=np.zeros((4, 5120)), shaft_angle=angle, mean_speed=system.operating.speed,
-                         contact_loss_fraction=0.0, integration_error=0.0, integration_check="none")  # fmt: skip
+    motion = CleanRecord(
+        acceleration=np.zeros((4, 5120)),
+        shaft_angle=angle,
+        mean_speed=system.operating.speed,
+        contact_loss_fraction=0.0,
+        integration_error=0.0,
+        integration_check="none",
+    )
     found = []
     for row in (faulty, {**faulty, "faults_json": "[]", "label_name": "healthy"}):
         inputs = reader.inputs(row)

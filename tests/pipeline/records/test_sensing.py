@@ -1,4 +1,5 @@
-"""Data sets of housing sensors: the same promises as of bearings, and the stories their columns tell."""
+"""Data sets of housing sensors: the same promises as of bearings, and the stories their columns
+tell."""
 
 from functools import partial
 
@@ -55,8 +56,15 @@ def test_channels_are_the_sensors(folder):
 
 
 def test_a_stream_gives_the_same(folder):
-    config = read_request([*SET, *STORED, "plan.n_records=6", "plan.classes=[healthy,crack]",
-                           "dataset.records_per_shard=1"]).config  # fmt: skip
+    config = read_request(
+        [
+            *SET,
+            *STORED,
+            "plan.n_records=6",
+            "plan.classes=[healthy,crack]",
+            "dataset.records_per_shard=1",
+        ]
+    ).config
     streamed = open_stream(config)
     assert streamed.channel_names == SENSORS
     record = streamed[2]
@@ -83,8 +91,13 @@ def test_reading_for_diagnosis(folder):
 
 
 def test_the_floor_is_the_same_for_all_classes_and_at_the_ratio_asked_for():
-    sharp = ("sensing=housing", "sensing.sensor.adc_bits=null", "sensing.sensor.adc_range_m_per_s2=null",
-             "sensing.sensor.dc_offset_m_per_s2=0", "dataset.store_clean=true")  # fmt: skip
+    sharp = (
+        "sensing=housing",
+        "sensing.sensor.adc_bits=null",
+        "sensing.sensor.adc_range_m_per_s2=null",
+        "sensing.sensor.dc_offset_m_per_s2=0",
+        "dataset.store_clean=true",
+    )
     config, rows, made = records(*sharp)
     floors = {}
     for row, record in zip(rows, made, strict=True):
@@ -121,7 +134,8 @@ def test_the_source_is_that_of_a_sensor_on_the_bearing():
             other.signals["acceleration_clean"],
         )
         sound = one.values["label_name"] == "healthy"
-        # a crack that is in mesh where the machine starts moves its static equilibrium, to which the drive is anchored
+        # a crack that is in mesh where the machine starts moves its static equilibrium, to which
+        # the drive is anchored
         assert np.all(
             (ours - theirs).std(axis=1) < (2e-3 if sound else 0.05) * theirs.std(axis=1)
         )

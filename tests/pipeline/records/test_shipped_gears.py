@@ -12,8 +12,11 @@ from gensig.systems.registry import read_pair
 
 INTERRUPTED = "harbin_38_55"  # contact ratio below 1, as its paper prints it
 TEETH = {"fzg_c_16_24": (16, 24), "uconn_32_80": (32, 80), "phm09_16_48": (16, 48)}
-LINES = {"two_stage_gearbox": (32, 96, 48, 80), "uconn_two_stage": (32, 80, 48, 64),
-         "phm09_helical_two_stage": (16, 48, 24, 40)}  # fmt: skip
+LINES = {
+    "two_stage_gearbox": (32, 96, 48, 80),
+    "uconn_two_stage": (32, 80, 48, 64),
+    "phm09_helical_two_stage": (16, 48, 24, 40),
+}
 
 
 def words_for(name):

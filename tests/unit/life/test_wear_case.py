@@ -1,4 +1,5 @@
-"""Parts of the wear life: curvature of what is worn off, limits, fitted laws, the way into a fault, what is refused."""
+"""Parts of the wear life: curvature of what is worn off, limits, fitted laws, the way into a
+fault, what is refused."""
 
 from dataclasses import replace
 
@@ -41,7 +42,8 @@ def test_curvature_of_a_parabola_and_of_a_straight_wear(full):
     depth = 4.0 * (arc - middle) ** 2
     assert_allclose(worn_curvature(full.path, depth, reach)[:, 8:-8], 8.0, rtol=0.1)
     assert_allclose(worn_curvature(full.path, 3e-3 * arc, reach), 0.0, atol=1e-6)
-    # a wave as long as the half width, to which its second difference over the half width alone is blind
+    # a wave as long as the half width, to which its second difference over the half width alone is
+    # blind
     wave = 1e-6 * np.cos(2.0 * np.pi * (arc - arc[:, :1]) / 6e-4)
     felt = worn_curvature(full.path, wave, np.full(arc.shape[1], 6e-4))
     assert np.all(

@@ -11,10 +11,21 @@ from gensig.sensing.accelerometer import LIMITS, Accelerometer, draw_sensors
 
 RATE = 51200.0
 IDEAL = Accelerometer(
-    sensitivity_tolerance=0.0, transverse_sensitivity=0.0, mounted_resonance=None, resonance_damping_ratio=0.02,
-    low_cutoff=None, dc_offset_m_per_s2=0.0, adc_range_m_per_s2=None, adc_bits=None, max_clipped_fraction=0.001,
-    drift_scatter=0.0, drift_time=10.0, dropped_fraction=0.0, dropped_run_samples=64, dropped_fill="hold",
-)  # fmt: skip
+    sensitivity_tolerance=0.0,
+    transverse_sensitivity=0.0,
+    mounted_resonance=None,
+    resonance_damping_ratio=0.02,
+    low_cutoff=None,
+    dc_offset_m_per_s2=0.0,
+    adc_range_m_per_s2=None,
+    adc_bits=None,
+    max_clipped_fraction=0.001,
+    drift_scatter=0.0,
+    drift_time=10.0,
+    dropped_fraction=0.0,
+    dropped_run_samples=64,
+    dropped_fill="hold",
+)
 
 
 def gain(sensor, frequency):

@@ -48,13 +48,15 @@ def largest_step(error):
 
 
 def once_per_turn(error):
-    """Amplitude of the once-per-turn part, and the tooth, no whole number, that stands back most."""
+    """Amplitude of the once-per-turn part, and the tooth, no whole number, that stands back
+    most."""
     part = np.fft.rfft(error)[1]
     return 2.0 / len(error) * abs(part), -np.angle(part) * len(error) / (2.0 * np.pi)
 
 
 def eccentric_tilt(gear, error):
-    """How the offsets of an eccentric gear grow along the path, from those at the pitch point, (tooth,) m/m."""
+    """How the offsets of an eccentric gear grow along the path, from those at the pitch point,
+    (tooth,) m/m."""
     eccentricity, most = once_per_turn(error)
     return (
         -eccentricity
@@ -64,7 +66,8 @@ def eccentric_tilt(gear, error):
 
 
 def profile_of(pair, specimen, name):
-    """Slope of every tooth over the involute, and form of all, by least squares as the standard has it."""
+    """Slope of every tooth over the involute, and form of all, by least squares as the standard
+    has it."""
     tooth = faulty_teeth(pair, specimen.forms).get((name, 0))
     gear = getattr(pair, name)
     if tooth is None:
@@ -91,13 +94,15 @@ def used(pair, specimen, grade):
             gear.pressure_angle
         )  # offsets are along the line of action
         slopes, form = profile_of(pair, specimen, name)
-        shares[name] = np.array([
-            largest_step(arc) / single_pitch_limit(gear, grade),
-            np.ptp(arc) / cumulative_pitch_limit(gear, grade),
-            np.abs(slopes).max() / profile_slope_limit(gear, grade),
-            form / profile_form_limit(gear, grade),
-            2.0 * once_per_turn(error)[0] / runout_limit(gear, grade),
-        ])  # fmt: skip
+        shares[name] = np.array(
+            [
+                largest_step(arc) / single_pitch_limit(gear, grade),
+                np.ptp(arc) / cumulative_pitch_limit(gear, grade),
+                np.abs(slopes).max() / profile_slope_limit(gear, grade),
+                form / profile_form_limit(gear, grade),
+                2.0 * once_per_turn(error)[0] / runout_limit(gear, grade),
+            ]
+        )
     return shares
 
 
@@ -194,7 +199,8 @@ class TestWhatIsDrawn:
                 )
 
     def test_eccentricity_is_the_only_once_per_turn_part(self, xiamen, quality):
-        """Without the tooth-to-tooth slopes the tilts are those of an eccentric circle: it is there once, not twice."""
+        """Without the tooth-to-tooth slopes the tilts are those of an eccentric circle: it is
+        there once, not twice."""
         for seed in range(10):
             specimen = draw(xiamen.pair, quality(tooth_share=0.0), seed)
             for name in GEARS:
@@ -262,9 +268,14 @@ class TestWhatIsDrawn:
 
     @pytest.mark.parametrize(
         "changes",
-        [{"profile_errors": False}, {"tooth_share": 0.0}, {"undulation_share": 0.5}, {"misalignment": 5 * UM},
-         {"backlash_scatter": 0.0}],
-    )  # fmt: skip
+        [
+            {"profile_errors": False},
+            {"tooth_share": 0.0},
+            {"undulation_share": 0.5},
+            {"misalignment": 5 * UM},
+            {"backlash_scatter": 0.0},
+        ],
+    )
     def test_one_key_leaves_the_rest_alone(self, xiamen, quality, changes):
         one, other = (
             draw(xiamen.pair, quality(), 7),

@@ -92,17 +92,25 @@ def test_refused_files(tmp_path):
         "unknown column wheel_z_to_housing": impulse_file(
             file.with_stem("a"), [*taps, taps[0]], names=(*PAIRS, "wheel_z_to_housing")
         ),
-        "no column wheel_y_to_housing": impulse_file(file.with_stem("b"), taps[:1], names=PAIRS[:1]),
+        "no column wheel_y_to_housing": impulse_file(
+            file.with_stem("b"), taps[:1], names=PAIRS[:1]
+        ),
         "row 4, column wheel_y_to_housing is no finite number": impulse_file(
             file.with_stem("c"), [taps[0], np.where(np.arange(32) == 2, np.nan, 1.0)]
         ),
-        "too short: 8 rows, at least 16": impulse_file(file.with_stem("d"), taps[:, :8]),
+        "too short: 8 rows, at least 16": impulse_file(
+            file.with_stem("d"), taps[:, :8]
+        ),
         "has 25600 samples a second, sensing.sampling_rate_hz = 51200": impulse_file(
             file.with_stem("e"), taps, rate=25_600
         ),
-        "reaches from 0 to 5000 Hz; 20 to 20000 Hz is needed": frequency_file(file.with_stem("f"), mode, high=5000.0),
-        "comes before time 0": frequency_file(file.with_stem("g"), lambda f: np.conj(mode(f))),
-    }  # fmt: skip
+        "reaches from 0 to 5000 Hz; 20 to 20000 Hz is needed": frequency_file(
+            file.with_stem("f"), mode, high=5000.0
+        ),
+        "comes before time 0": frequency_file(
+            file.with_stem("g"), lambda f: np.conj(mode(f))
+        ),
+    }
     backwards = write(
         file.with_stem("i"), ["time_s", *PAIRS], [-np.arange(32) / RATE, *taps]
     )

@@ -11,9 +11,16 @@ from gensig.sensing.noise import PARTS, Receiver, band_power, read_noise
 
 RATE = 51200.0
 MACHINE = {
-    "kind": "machine", "share": 1.0, "shaft_hz": 25.0, "frequency_scatter": 0.0, "n_shaft_orders": 3,
-    "bearing_order": 3.6, "n_bearing_harmonics": 4, "n_teeth": 31, "n_mesh_harmonics": 3,
-}  # fmt: skip
+    "kind": "machine",
+    "share": 1.0,
+    "shaft_hz": 25.0,
+    "frequency_scatter": 0.0,
+    "n_shaft_orders": 3,
+    "bearing_order": 3.6,
+    "n_bearing_harmonics": 4,
+    "n_teeth": 31,
+    "n_mesh_harmonics": 3,
+}
 KINDS = {
     "white": {"kind": "white", "share": 1.0},
     "pink": {"kind": "pink", "share": 1.0, "lowest_hz": 5.0},
@@ -125,8 +132,11 @@ def test_impulsive_has_a_high_kurtosis_and_rings_where_it_says():
 
 def test_another_machine_has_its_orders_and_nothing_else():
     made = noise("machine").make(np.ones(2), np.random.default_rng(5), receiver())
-    orders = [*range(1, 4), *(3.6 * k + s for k in range(1, 5) for s in (-1, 0, 1)),
-              *(31 * k + s for k in range(1, 4) for s in (-1, 0, 1))]  # fmt: skip
+    orders = [
+        *range(1, 4),
+        *(3.6 * k + s for k in range(1, 5) for s in (-1, 0, 1)),
+        *(31 * k + s for k in range(1, 4) for s in (-1, 0, 1)),
+    ]
     lines = density(made).sum(axis=0)
     ours = lines[[round(25 * order) for order in orders]]
     assert np.all(ours > 0.0)

@@ -14,19 +14,54 @@ from gensig.sensing.nuisance import KINDS, draw_tones, read_nuisances
 from gensig.sensing.tones import SENSE
 
 PARTS = {
-    "unbalance": {"kind": "unbalance", "gear": "pinion", "iso21940_grade": 2.5, "used_share": [1.0, 1.0],
-                  "rated_speed_rpm": 3000, "rotor_mass_kg": 2.0},
-    "coupling_misalignment": {"kind": "coupling_misalignment", "gear": "pinion", "force_share": [0.01, 0.01],
-                              "order_shares": [0.5, 1.0, 0.3], "torque_share": [1e-3, 1e-3]},
-    "looseness": {"kind": "looseness", "gear": "wheel", "force_share": [0.01, 0.01], "half_share": [0.5, 0.5],
-                  "n_orders": 3, "harmonic_exponent": 1.0},
-    "bearing": {"kind": "bearing", "gear": "pinion", "n_balls": 9, "ball_diameter_mm": 7.94, "pitch_diameter_mm": 39.04,
-                "contact_angle_deg": 0, "waviness_um": [0.1, 0.1], "slip": [0.01, 0.01], "n_harmonics": 2,
-                "harmonic_exponent": 1.0},
-    "neighbour_mesh": {"kind": "neighbour_mesh", "gear": "wheel", "n_teeth": 25, "n_teeth_mate": 72,
-                       "base_radius_mm": 29.4, "line_of_action_deg": 60, "dynamic_share": [0.01, 0.01],
-                       "n_harmonics": 2, "harmonic_exponent": 1.0, "sideband_share": [0.2, 0.2]},
-}  # fmt: skip
+    "unbalance": {
+        "kind": "unbalance",
+        "gear": "pinion",
+        "iso21940_grade": 2.5,
+        "used_share": [1.0, 1.0],
+        "rated_speed_rpm": 3000,
+        "rotor_mass_kg": 2.0,
+    },
+    "coupling_misalignment": {
+        "kind": "coupling_misalignment",
+        "gear": "pinion",
+        "force_share": [0.01, 0.01],
+        "order_shares": [0.5, 1.0, 0.3],
+        "torque_share": [1e-3, 1e-3],
+    },
+    "looseness": {
+        "kind": "looseness",
+        "gear": "wheel",
+        "force_share": [0.01, 0.01],
+        "half_share": [0.5, 0.5],
+        "n_orders": 3,
+        "harmonic_exponent": 1.0,
+    },
+    "bearing": {
+        "kind": "bearing",
+        "gear": "pinion",
+        "n_balls": 9,
+        "ball_diameter_mm": 7.94,
+        "pitch_diameter_mm": 39.04,
+        "contact_angle_deg": 0,
+        "waviness_um": [0.1, 0.1],
+        "slip": [0.01, 0.01],
+        "n_harmonics": 2,
+        "harmonic_exponent": 1.0,
+    },
+    "neighbour_mesh": {
+        "kind": "neighbour_mesh",
+        "gear": "wheel",
+        "n_teeth": 25,
+        "n_teeth_mate": 72,
+        "base_radius_mm": 29.4,
+        "line_of_action_deg": 60,
+        "dynamic_share": [0.01, 0.01],
+        "n_harmonics": 2,
+        "harmonic_exponent": 1.0,
+        "sideband_share": [0.2, 0.2],
+    },
+}
 
 
 def draw(dynamics, *parts, unit=1, specimen=1, record=1):
@@ -65,7 +100,8 @@ def test_bearing_orders_are_those_of_the_textbook():
 
 
 def test_the_force_of_an_unbalance_of_grade_g2_5(dynamics):
-    """2 kg at 3000 r/min: e = 2.5 mm/s / 314.16 rad/s = 7.958 um, and 2 kg x 7.958 um x (188.5 rad/s)^2 = 0.5655 N."""
+    """2 kg at 3000 r/min: e = 2.5 mm/s / 314.16 rad/s = 7.958 um, and 2 kg x 7.958 um x (188.5
+    rad/s)^2 = 0.5655 N."""
     (tones,) = draw(dynamics, PARTS["unbalance"])
     assert tones.follows == "speed_squared"
     assert_allclose(np.abs(tones.force), [[0.5655, 0.5655, 0.0]], rtol=1e-4, atol=0)
@@ -91,9 +127,11 @@ def test_an_unbalance_turns_by_the_sense_of_its_gear(dynamics, gear, sense):
 
 
 def test_the_senses_are_those_of_the_equations_of_motion():
-    """Moment of a force (F_f, F) at the contact, arms (R_p, -rho_1): the pinion's equation has -F R_p - rho_1 F_f.
+    """Moment of a force (F_f, F) at the contact, arms (R_p, -rho_1): the pinion's equation has -F
+    R_p - rho_1 F_f.
 
-    With x to y as positive the moment is arm_x F - arm_y F_f = R_p F + rho_1 F_f, so the pinion turns from y to x.
+    With x to y as positive the moment is arm_x F - arm_y F_f = R_p F + rho_1 F_f, so the pinion
+    turns from y to x.
     """
     radius, rho, along, friction = 0.02, 0.005, 100.0, 7.0
     from_x_to_y = radius * along + rho * friction

@@ -132,25 +132,18 @@ def test_a_shaft_that_turns_back_or_too_few_teeth_are_refused():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"n_teeth": 3}, "toothed_wheel.n_teeth = 3 must lie in 4..1000"),
+        ({"n_teeth": 3}, "n_teeth = 3 must lie in 4..1000"),
         (
             {"eccentricity_error": 0.1},
-            "toothed_wheel.eccentricity_error_deg = 5.72958 must lie in 0..5",
+            "eccentricity_error_deg = 5.72958 must lie in 0..5",
         ),
-        (
-            {"tooth_error": 0.01},
-            "toothed_wheel.tooth_error_deg = 0.572958 must lie in 0..0.225",
-        ),
-        (
-            {"tooth_error": -0.01},
-            "toothed_wheel.tooth_error_deg = -0.572958 must lie in",
-        ),
+        ({"tooth_error": 0.01}, "tooth_error_deg = 0.572958 must lie in 0..0.225"),
         (
             {"clock_frequency": 100.0},
-            "toothed_wheel.clock_frequency_hz = 100 must lie in 10000..1e+12",
+            "clock_frequency_hz = 100 must lie in 10000..1e+12",
         ),
     ],
 )
-def test_wheels_that_cannot_be_are_refused(change, message):
-    with pytest.raises(ConfigError, match=re.escape(message)):
+def test_values_out_of_range(change, message):
+    with pytest.raises(ConfigError, match=re.escape(f"toothed_wheel.{message}")):
         replace(PERFECT, **change)

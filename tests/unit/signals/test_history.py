@@ -1,4 +1,5 @@
-"""NA4 and NB4: what stays gives the same value for ever, what changes shows, later records cannot reach back."""
+"""NA4 and NB4: what stays gives the same value for ever, what changes shows, later records cannot
+reach back."""
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ MESH = 4 * np.cos(TEETH * TURN) + np.cos(2 * TEETH * TURN)
 
 
 def history(size, *, seed=0):
-    """Mesh, and Gaussian noise without the orders of mesh and shaft, of a given size in each record."""
+    """Mesh, and Gaussian noise without the orders of mesh and shaft, of a given size in each
+    record."""
     noise = np.random.default_rng(seed).standard_normal((len(size), PER_TURN))
     spectrum = np.fft.rfft(noise)
     spectrum[:, [0, 1, 2, *range(TEETH, PER_TURN // 2 + 1, TEETH)]] = 0

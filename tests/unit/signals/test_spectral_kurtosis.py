@@ -36,7 +36,8 @@ def test_a_tone_is_minus_one():
 
 
 def test_noise_switched_on_for_a_share_of_the_time():
-    """Gaussian noise whose power A is random: 2 <A^2> / <A>^2 - 2, but for the windows that see both states."""
+    """Gaussian noise whose power A is random: 2 <A^2> / <A>^2 - 2, but for the windows that see
+    both states."""
     share, period = 0.2, 5000
     x = noise(1) * (np.arange(N_SAMPLES) % period < share * period)
     _, kurtosis = spectral_kurtosis(x, RATE, WINDOW)
