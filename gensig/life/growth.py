@@ -133,9 +133,9 @@ class Course:
         begin, end = self.running[piece], self.running[piece + 1]
         return piece, min(max((running - begin) / (end - begin), 0.0), 1.0)
 
-    def value(self, name: str, place: tuple[int, float]) -> float:
-        """``clock``, ``turns`` or ``size`` at a place."""
-        piece, share = place
+    def value(self, name: str, where: tuple[int, float]) -> float:
+        """``clock``, ``turns`` or ``size`` at a piece and share, as ``at`` gives them."""
+        piece, share = where
         low, high = getattr(self, name)[piece : piece + 2]
         return float(low + share * (high - low))
 

@@ -155,8 +155,8 @@ def _blocks(rows: Any) -> tuple[tuple[float, ...], ...] | None:
             f"life.blocks = {rows!r} must be {shape}, or null to draw them"
         )
     blocks = []
-    for place, row in enumerate(rows):
-        where = f"life.blocks.{place}"
+    for index, row in enumerate(rows):
+        where = f"life.blocks.{index}"
         if not isinstance(row, list | tuple) or len(row) != len(BLOCK_COLUMNS):
             raise ConfigError(f"{where} = {row!r}: life.blocks must be {shape}")
         numbers = zip(BLOCK_COLUMNS, row, strict=True)

@@ -54,10 +54,10 @@ class Profile:
         if not 2 <= n <= MOST_POINTS:
             raise ConfigError(f"{n} points; give 2 to {MOST_POINTS}")
         points = zip(self.times, self.factors, strict=True)
-        for place, (time, factor) in enumerate(points):
+        for index, (time, factor) in enumerate(points):
             if not (abs(time) <= LATEST and math.isfinite(factor)):
                 raise ConfigError(
-                    f"point {place} = [{time:g}, {factor:g}]; give a time within {LATEST:g} s "
+                    f"point {index} = [{time:g}, {factor:g}]; give a time within {LATEST:g} s "
                     "and a finite factor"
                 )
         for earlier, later in itertools.pairwise(self.times):
@@ -163,7 +163,7 @@ class RandomWalk:
         )
         scatter, most = self.scatter, WALK_LIMIT
         return Profile(
-            times=tuple(EARLIEST + step * place for place in range(n_points)),
+            times=tuple(EARLIEST + step * index for index in range(n_points)),
             factors=tuple(
                 1.0 + scatter * min(max(value, -most), most) for value in walk
             ),

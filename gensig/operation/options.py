@@ -97,9 +97,9 @@ def read_operating(values: Section) -> Operating:
     steady = read(Operating, plain, "operating")
     ripples = {key: read_ripple(values, key) for key in RIPPLES}
     profiles = {}
-    for place, key in enumerate(QUANTITIES):
+    for index, key in enumerate(QUANTITIES):
         course = read_course(values, key)
-        sequence = np.random.SeedSequence(seed, spawn_key=(place,))
+        sequence = np.random.SeedSequence(seed, spawn_key=(index,))
         rng = np.random.Generator(np.random.SFC64(sequence))
         with naming(f"operating.{key}: "):
             profiles[key] = _profile(course, steady.duration, rng)
@@ -143,11 +143,11 @@ def read_profile(key: str, value: Any) -> Profile | None:
             f"{key} = {value!r} is no list; give [time_s, factor] pairs, a group with a kind, "
             "or null for a constant"
         )
-    for place, point in enumerate(value):
+    for index, point in enumerate(value):
         is_pair = isinstance(point, list | tuple) and len(point) == 2
         if not is_pair or not all(map(is_number, point)):
             raise ConfigError(
-                f"{key}: point {place} = {point!r}; give two finite numbers, [time_s, factor]"
+                f"{key}: point {index} = {point!r}; give two finite numbers, [time_s, factor]"
             )
     with naming(f"{key}: "):
         return Profile(

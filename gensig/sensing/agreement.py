@@ -46,11 +46,11 @@ class Agreement:
         )
 
 
-def agreement(found: Array, exact: Array, sampling_rate: float) -> Agreement:
+def agreement(tested: Array, exact: Array, sampling_rate: float) -> Agreement:
     """Compare two solutions, (lane, channel, sample) each."""
     return Agreement(
-        third_octave_db=third_octave_difference(found, exact, sampling_rate),
-        indicators=indicator_difference(found, exact),
+        third_octave_db=third_octave_difference(tested, exact, sampling_rate),
+        indicators=indicator_difference(tested, exact),
     )
 
 
@@ -95,26 +95,26 @@ def third_octave_power(signal: Array, sampling_rate: float) -> Array:
 
     def power_below(edge: Array) -> Array:
         # line k reaches from k - 0.5 to k + 0.5
-        place = edge * n_samples / sampling_rate + 0.5
-        line = place.astype(np.int64)
-        return np.asarray(below[..., line] - (line + 1 - place) * lines[..., line])
+        position = edge * n_samples / sampling_rate + 0.5
+        line = position.astype(np.int64)
+        return np.asarray(below[..., line] - (line + 1 - position) * lines[..., line])
 
     lower, upper = third_octave_bands(n_samples, sampling_rate)
     return power_below(upper) - power_below(lower)
 
 
-def third_octave_difference(found: Array, exact: Array, sampling_rate: float) -> Array:
+def third_octave_difference(tested: Array, exact: Array, sampling_rate: float) -> Array:
     """Largest difference of a third-octave level over channels and bands, (lane,) dB.
 
     Parameters
     ----------
-    found, exact : (lane, channel, sample)
+    tested, exact : (lane, channel, sample)
 
     Left out are bands that lie more than 60 dB below the channel's loudest in both: noise covers
     them.
     """
     powers, expected = (
-        third_octave_power(signal, sampling_rate) for signal in (found, exact)
+        third_octave_power(signal, sampling_rate) for signal in (tested, exact)
     )
     threshold = 10.0 ** (-HEARD_DB / 10.0) * expected.max(axis=-1, keepdims=True)
     unheard = np.maximum(powers, expected) <= threshold
@@ -123,20 +123,20 @@ def third_octave_difference(found: Array, exact: Array, sampling_rate: float) ->
     return np.asarray(np.where(unheard, 0.0, difference).max(axis=(-1, -2)))
 
 
-def indicator_difference(found: Array, exact: Array) -> Array:
+def indicator_difference(tested: Array, exact: Array) -> Array:
     """Largest relative difference of RMS, kurtosis and crest factor over channels, (lane,).
 
     Parameters
     ----------
-    found, exact : (lane, channel, sample)
+    tested, exact : (lane, channel, sample)
 
     Channels that are zero in both agree.
     """
     values, expected = (
         np.stack([indicator(signal) for indicator in (rms, kurtosis, crest_factor)])
-        for signal in (found, exact)
+        for signal in (tested, exact)
     )
-    still = ~(found.any(axis=-1) | exact.any(axis=-1))
+    still = ~(tested.any(axis=-1) | exact.any(axis=-1))
     with np.errstate(divide="ignore", invalid="ignore"):
         difference = np.abs(values / expected - 1.0)
     return np.asarray(np.where(still, 0.0, difference).max(axis=(0, -1)))

@@ -29,7 +29,7 @@ from gensig.units import check_limits, from_si, unit
 
 Array = NDArray[np.float64]
 
-# most waves of the form deviation from end to end; whole ones have no slope of their own
+# most waves of the form deviation from end to end; whole ones have no slope
 FORM_WAVES = 3
 SUPPORT_SCATTERS = ("support_stiffness_scatter", "support_damping_scatter")
 # in which the eccentricity is made smaller until the index deviation fits its limit
@@ -124,7 +124,7 @@ class Specimen:
         as a gap
     pinion_tilt, wheel_tilt : (tooth,) m/m    how fast that grows with the contact's position along
         the path; 0: nowhere
-    forms : what the flanks of all teeth share, as transforms that come before a record's own faults
+    forms : deviations that the flanks of all teeth share, as transforms before a record's faults
     backlash_factor : on the nominal backlash
     """
 
@@ -253,7 +253,7 @@ def _scaled_index(
 ) -> tuple[float, Array]:
     """Eccentricity in m and random pitch errors (tooth,) m that keep to the share of three limits.
 
-    The random part has no once-per-turn part of its own, so that all runout is the
+    The random part has no once-per-turn part, so that all runout is the
     eccentricity's. It is as large as the single pitch deviation allows; the eccentricity starts
     at ``runout_share`` of what the runout allows and shrinks until the total index deviation
     fits. Arcs on the reference circle are cos(alpha) long along the line of action.

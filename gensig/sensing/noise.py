@@ -368,8 +368,8 @@ def read_noise(values: Any) -> Noise:
         )
     return Noise(
         parts=tuple(
-            read_kind(PARTS, part, f"{where}.parts[{place}]")
-            for place, part in enumerate(parts)
+            read_kind(PARTS, part, f"{where}.parts[{index}]")
+            for index, part in enumerate(parts)
         ),
         band=_numbers(f"{where}.band_hz", values["band_hz"], "[low, high] in Hz"),
         offsets=_numbers(

@@ -252,7 +252,7 @@ def read_nuisances(values: Any) -> tuple[Nuisance, ...]:
             f"{where} = {values!r} must be a list of parts, [] for none; see sensing=machine"
         )
     return tuple(
-        read_kind(KINDS, part, f"{where}[{place}]") for place, part in enumerate(values)
+        read_kind(KINDS, part, f"{where}[{index}]") for index, part in enumerate(values)
     )
 
 
@@ -271,6 +271,6 @@ def draw_tones(
     of_units = {level: rng.spawn(count) for level, rng in units.items()}
     of_record = record_rng.spawn(count)
     return [
-        part.draw(of_units[part.level][place], of_record[place], dynamics)
-        for place, part in enumerate(nuisances)
+        part.draw(of_units[part.level][index], of_record[index], dynamics)
+        for index, part in enumerate(nuisances)
     ]

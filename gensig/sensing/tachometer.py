@@ -55,9 +55,9 @@ class Tachometer:
         return 2.0 * math.pi / self.pulses_per_turn
 
 
-def check_shaft(place: str, shaft: str) -> None:
+def check_shaft(group: str, shaft: str) -> None:
     """Raise ConfigError for a shaft on which no sensor can sit."""
-    check_choice(f"sensing.{place}.shaft", shaft, SHAFTS)
+    check_choice(f"sensing.{group}.shaft", shaft, SHAFTS)
 
 
 def draw_mark(rng: np.random.Generator) -> float:

@@ -29,7 +29,7 @@ def impacts_per_turn(
     ----------
     turns : (..., turn, sample)    residual turns
     n_teeth : teeth of the gear; impacts nearer together than one tooth count as one
-    threshold : times the deviation of the residual between impacts, which is told by the median of
+    threshold : times the deviation of the residual between impacts, estimated by the median of
         its envelope
 
     Returns

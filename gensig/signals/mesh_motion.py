@@ -24,7 +24,8 @@ MOST_HARMONICS = 10
 FIRST_HARMONICS = 5  # a line of these must stand out ...
 LEAST_LINE_DB = 6.0  # ... by this much above what is around it,
 FALSE_ALARM = 1e-6  # and by more than noise would at one line with this probability
-TURNS_A_SEGMENT = 4  # of the slower gear, so that its sidebands are told from the mesh
+# of the slower gear, so that its sidebands are resolved from the mesh
+TURNS_A_SEGMENT = 4
 LEAST_TURNS = 8
 LOW_SPEED_RPM = 100.0  # assumed: a stated speed below is asked back
 # share of the slower shaft's frequency up to which the speed is followed
@@ -84,7 +85,7 @@ def find_motion(
     speed_rpm : r/min    of the driving gear, known within `SEARCH`
     highest : Hz         end of the band in which the recording can be trusted
     options : what the user's command calls teeth, speed and rate, for the line that a mistake gets
-    least_turns : of the slower gear; more where the motion is to be told well
+    least_turns : of the slower gear; more for a motion without doubt
     longer : what the user can do about a short recording
 
     Raises
@@ -232,13 +233,13 @@ def _deviation(
     n_samples = signal.shape[1]
     frequency = np.fft.fftfreq(n_samples, 1.0 / rate)
     keep = np.exp(-0.5 * (frequency / (0.5 * width)) ** 2)
-    beside = (np.abs(frequency) > 1.5 * width) & (np.abs(frequency) < 2.5 * width)
+    around = (np.abs(frequency) > 1.5 * width) & (np.abs(frequency) < 2.5 * width)
     parts = []
     for harmonic in used:
         shifted = np.fft.fft(signal * np.exp(-2j * np.pi * harmonic * cycles), axis=1)
         line = np.fft.ifft(shifted * keep, axis=1)
         turning = np.fft.ifft(shifted * keep * 2j * np.pi * frequency, axis=1)
-        noise = np.median(np.abs(shifted[:, beside]) ** 2, axis=1) + 1e-300
+        noise = np.median(np.abs(shifted[:, around]) ** 2, axis=1) + 1e-300
         top = np.sum((line.conj() * turning).imag / noise[:, None], axis=0) * harmonic
         bottom = np.sum(np.abs(line) ** 2 / noise[:, None], axis=0) * harmonic**2
         parts.append((top, bottom))

@@ -62,7 +62,7 @@ class RecordingFile:
     ----------
     file : as the user named it
     channels : names of the columns, or ``channel_0``, ``channel_1``, ... where the file has none
-    named : whether the names are the file's own
+    named : True where the names are those of the file
     values : (channel, sample) in the file's units
     sampling_rate : Hz
     has_level : False for a WAV file of whole numbers
@@ -161,7 +161,7 @@ def read_file(
     _check_agreement(file, content.rate_from, stored, rate_option, rate)
     return RecordingFile(
         file=file,
-        channels=tuple(f"channel_{place}" for place in range(len(content.values))),
+        channels=tuple(f"channel_{index}" for index in range(len(content.values))),
         named=False,
         values=content.values,
         sampling_rate=float(rate or stored or 0.0),
@@ -251,7 +251,7 @@ def _read_csv(
         mean = (len(time) - 1) / float(time[-1] - time[0])
     check_rate("recording", file, time, mean)
     _check_agreement(file, "time_s", mean, rate_option, rate)
-    kept = [place for place, name in enumerate(names) if name != "time_s"]
+    kept = [index for index, name in enumerate(names) if name != "time_s"]
     if not kept:
         raise ConfigError(
             f"{file}: there is no column beside time_s; give one a sensor"
@@ -262,7 +262,7 @@ def _read_csv(
         rate = mean
         if math.isclose(mean, round(mean), rel_tol=2e-6):
             rate = float(round(mean))
-    return [names[place] for place in kept], values[kept], rate
+    return [names[index] for index in kept], values[kept], rate
 
 
 def _check_agreement(

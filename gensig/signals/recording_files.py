@@ -32,7 +32,7 @@ class Content:
     ----------
     values : (channel, sample)
     sampling_rate : Hz    None where the file does not tell
-    rate_from : what told it, in words
+    rate_from : its source, in words
     has_level : False for samples of whole numbers without a unit
     """
 
@@ -108,7 +108,7 @@ def read_hdf5(file: str, array: str | None, *, from_matlab: bool = False) -> Con
             )
         values = chosen[()]
         rates: list[Mapping[str, Any]] = [chosen.attrs, content.attrs]
-        rate = next((place[RATE_KEY] for place in rates if RATE_KEY in place), None)
+        rate = next((group[RATE_KEY] for group in rates if RATE_KEY in group), None)
         if rate is None and RATE_KEY in arrays:
             rate = arrays[RATE_KEY][()]
     return Content(

@@ -45,9 +45,9 @@ class RateChange:
         """True where both rates are the same."""
         return self.up == self.down
 
-    def n_samples(self, n_found: int) -> int:
+    def n_samples(self, n_given: int) -> int:
         """Samples at the new rate that lie inside as many at the old one."""
-        return n_found * self.up // self.down
+        return n_given * self.up // self.down
 
     def apply(self, signal: ArrayLike) -> FloatArray:
         """Signal (..., sample) at the new rate; beyond its ends it counts as zero.
@@ -66,7 +66,7 @@ class RateChange:
     def apply_to_part(
         self,
         read: Callable[[int, int], FloatArray],
-        n_found: int,
+        n_given: int,
         start: int,
         stop: int,
     ) -> FloatArray:
@@ -76,12 +76,12 @@ class RateChange:
         Parameters
         ----------
         read : from first and last (exclusive) sample at the old rate to (..., sample)
-        n_found : samples of the whole signal at the old rate
+        n_given : samples of the whole signal at the old rate
         start, stop : in samples at the new rate
         """
         reach = math.ceil(len(self._taps()) / 2 / self.down) + 1
         first = max(start - reach, 0) // self.up * self.up  # a sample of both rates
-        last = min(math.ceil((stop + reach) * self.down / self.up), n_found)
+        last = min(math.ceil((stop + reach) * self.down / self.up), n_given)
         part = self.apply(read(first // self.up * self.down, last))
         return part[..., start - first : stop - first]
 
@@ -94,7 +94,7 @@ class RateChange:
         return firwin(n_taps | 1, (PASS_SHARE + 0.5) * lower, window=("kaiser", beta))
 
 
-def rate_change(found: float, wanted: float) -> RateChange:
+def rate_change(given: float, wanted: float) -> RateChange:
     """Change to the nearest rate that a ratio of whole numbers up to `MOST_STEPS` gives."""
-    ratio = Fraction(wanted / found).limit_denominator(MOST_STEPS)
+    ratio = Fraction(wanted / given).limit_denominator(MOST_STEPS)
     return RateChange(up=ratio.numerator, down=ratio.denominator)

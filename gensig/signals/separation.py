@@ -15,7 +15,7 @@ from gensig.signals.averaging import interpolate
 
 FloatArray = NDArray[np.floating]
 
-# of one passage of a tooth: decides what passes too seldom to be told apart, and nothing else
+# of one passage of a tooth: decides only about teeth that pass too seldom to be separated
 RIDGE = 1e-3
 
 

@@ -43,7 +43,7 @@ def spectral_kurtosis(
     Antoni's estimator, mean fourth power over squared mean square, less 2. In Gaussian noise, with
     n windows side by side in the signal, it scatters by 1.2 / sqrt(n) and lies 1 / n to 2 / n
     below 0 (measured). A mesh that is there all the time pulls a line towards -1, so take residual
-    turns where bursts are to be found under it.
+    turns to find bursts below it.
     """
     # all windows at once; ShortTimeFFT, one by one, takes up to seven times as long
     from scipy.signal import stft

@@ -23,7 +23,7 @@ TURNS_A_FRAME = 3
 FRAMES_A_FRAME = 4  # hop is a quarter of the frame
 MOST_HARMONICS = 10
 FINER_SPECTRUM = 2  # bins of the frame's spectrum for one of the frame
-LEAST_TURNS = 4  # of the slower gear, so that its sidebands are told from the mesh
+LEAST_TURNS = 4  # of the slower gear, so that its sidebands are resolved from the mesh
 # assumed: a course that follows noise reached 13.2 and 7.8 dB in 280 trials
 LEAST_LINE_DB = 18.0  # of the strongest of the first harmonics,
 LEAST_MEAN_DB = 10.0  # or of all of them on the average
@@ -87,7 +87,7 @@ def wandering_mesh_cycles(
     steps = 0.5 * (frequency[1:] + frequency[:-1])
     coarse = np.concatenate([[0.0], np.cumsum(steps)]) / rate
     mean = float(coarse[-1] * rate / (n_samples - 1))
-    warped = coarse / mean * rate  # place of every sample once the speed is steady
+    warped = coarse / mean * rate  # position of every sample once the speed is steady
     rows = [np.interp(samples, warped, row) for row in recording.acceleration]
     motion = find_motion(
         replace(recording, acceleration=np.stack(rows)),
@@ -173,9 +173,9 @@ def mesh_frequency_course(
     step = FINE / (n_harmonics * TURNS_A_FRAME * n_teeth)
     candidates = np.arange(-search, search + 0.5 * step, step)
     harmonic = np.arange(1, n_harmonics + 1)[:, None]
-    place = harmonic * (1.0 + candidates) * mesh_frequency / frequency[1]
+    at = harmonic * (1.0 + candidates) * mesh_frequency / frequency[1]
     bins = np.arange(frequency.size)
-    likelihood = [np.interp(place, bins, row).sum(axis=0) for row in standing.T]
+    likelihood = [np.interp(at, bins, row).sum(axis=0) for row in standing.T]
     best = _most_probable(np.stack(likelihood), candidates)
     return time, (1.0 + candidates[best]) * mesh_frequency
 

@@ -47,7 +47,7 @@ def nonsynchronous_share(turns: ArrayLike) -> FloatArray:
 
     Raises
     ------
-    ValueError    for a single turn, which nothing can be told from
+    ValueError    for a single turn, which does not show what repeats
 
     Notes
     -----

@@ -148,7 +148,7 @@ def _healthy_records(config: Configuration) -> list[tuple[Array, Array]]:
         store_shaft_angle=True,
     )
     drawn = make_plan(whole)
-    rows = [drawn.record(place) for place in range(N_RECORDS)]
+    rows = [drawn.record(index) for index in range(N_RECORDS)]
     records = []
     for record in simulate_records(whole, rows):
         if record.values.get("status") == "failed":

@@ -32,9 +32,9 @@ def read_recording(
 def _sensor_names(file: str, names: Sequence[str]) -> tuple[str, ...]:
     """Names as ``sensing.sensors`` takes them: letters, digits and _, at most 32."""
     made = []
-    for place, name in enumerate(names):
+    for index, name in enumerate(names):
         plain = re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_")[:32]
-        plain = plain or f"channel_{place}"
+        plain = plain or f"channel_{index}"
         if not plain[0].isalpha() or is_turning(plain):
             plain = f"s_{plain}"[:30] + "_a"
         made.append(plain)

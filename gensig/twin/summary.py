@@ -80,20 +80,20 @@ def check_lines(check: Check) -> list[str]:
     ]
     lines = ["| " + " | ".join(names) + " |", "|" + "---|" * len(names)]
     itself = np.median(np.abs(check.fitted_db - check.measured_db), axis=1)
-    for place, sensor in enumerate(check.sensors):
-        size = np.abs(check.difference_db[place])
+    for index, sensor in enumerate(check.sensors):
+        size = np.abs(check.difference_db[index])
         cells = [
             sensor,
-            f"{100 * check.share_within[place]:.0f} %",
+            f"{100 * check.share_within[index]:.0f} %",
             f"{np.median(size):.1f} dB",
             f"{size.max():.1f} dB at {check.band[int(size.argmax())]:.0f} Hz",
-            f"{itself[place]:.1f} dB",
+            f"{itself[index]:.1f} dB",
         ]
         for number, unit in enumerate(INDICATOR_UNITS):
-            twin = check.twin[:, place, number]
-            word = VERDICTS[bool(check.agrees[place, number])]
+            twin = check.twin[:, index, number]
+            word = VERDICTS[bool(check.agrees[index, number])]
             cells.append(
-                f"{check.measured[place, number]:.2f} {unit} in "
+                f"{check.measured[index, number]:.2f} {unit} in "
                 f"{twin.min():.2f}..{twin.max():.2f}: {word}"
             )
         lines.append("| " + " | ".join(" ".join(cell.split()) for cell in cells) + " |")
@@ -104,13 +104,13 @@ def check_summary(check: Check) -> list[str]:
     """The held-out check for a terminal: a line a sensor."""
     names = "".join(f"{name:>16}" for name in INDICATORS)
     lines = [f"{'sensor':<20}{'bands within':>14}{'median off':>12}{names}"]
-    for place, sensor in enumerate(check.sensors):
+    for index, sensor in enumerate(check.sensors):
         words = "".join(
-            f"{VERDICTS[bool(agrees)]:>16}" for agrees in check.agrees[place]
+            f"{VERDICTS[bool(agrees)]:>16}" for agrees in check.agrees[index]
         )
-        off = float(np.median(np.abs(check.difference_db[place])))
+        off = float(np.median(np.abs(check.difference_db[index])))
         lines.append(
-            f"{sensor:<20}{100 * check.share_within[place]:>12.0f} %{off:>9.1f} dB{words}"
+            f"{sensor:<20}{100 * check.share_within[index]:>12.0f} %{off:>9.1f} dB{words}"
         )
     return lines
 
@@ -119,8 +119,8 @@ def verdict(check: Check) -> str:
     """One sentence on what agrees."""
     n_agree, n_all = int(check.agrees.sum()), check.agrees.size
     missed = [
-        f"{INDICATORS[number]} of {check.sensors[place]}"
-        for place, number in np.argwhere(~check.agrees).tolist()
+        f"{INDICATORS[number]} of {check.sensors[index]}"
+        for index, number in np.argwhere(~check.agrees).tolist()
     ]
     text = (
         f"{100 * check.share_within.mean():.0f} % of third-octave levels and {n_agree} of {n_all} "

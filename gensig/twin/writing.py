@@ -49,7 +49,7 @@ def write_options(
     Parameters
     ----------
     gear : the group ``gear`` with all its keys
-    remarks : what stands beside a key, by its dotted name
+    remarks : comment of a key, by its dotted name
     torque_nm : of the driving gear
     duration : s of a record
     """
@@ -100,7 +100,7 @@ noise:
 
 
 def _experiment(name: str, fitted: Fit, torque_nm: float, duration: float) -> str:
-    profile, found = _drift(fitted)
+    profile, remark = _drift(fitted)
     speed = fitted.motion.mesh_frequency
     steps = oversampling(fitted.sampling_rate, DEFAULT_OVERSAMPLING)
     return f"""# gensig generate --config-dir {name} experiment={name} out=...
@@ -112,7 +112,7 @@ defaults:
 operating:
   torque_nm: {torque_nm!r}     # given, or assumed: a healthy recording does not tell it
   duration_s: {duration!r}
-  speed_profile: {profile}   # {found}
+  speed_profile: {profile}   # {remark}
 quality:
   # fitted: {fitted.grade.low:.1f} to {fitted.grade.high:.1f}
   iso1328_grade: {fitted.grade.grade:.2f}

@@ -76,7 +76,7 @@ class Strength:
     n_load_cycles : of each tooth
     life_factor : Y_NT; None takes that of case-hardened steel at ``n_load_cycles``
     relative_notch_sensitivity : Y_delta_rel_T; None takes that of case-hardened steel at the
-        gear's own notch
+        gear's notch
     relative_surface_factor : Y_R_rel_T
     size_factor : Y_X; None takes that of case-hardened steel at the module
     mean_stress_factor : Y_M, 0.7 for teeth that are bent both ways alike

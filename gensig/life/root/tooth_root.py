@@ -99,7 +99,7 @@ def root_section(gear: Gear) -> RootSection:
 
     Raises
     ------
-    GeometryError    where the tangent finds no place on the fillet
+    GeometryError    where the tangent does not touch the fillet
 
     Source: ISO 6336-3, 6.2.2, without protuberance (s_pr = 0): E, G, H, theta = 2 G tan(theta) /
     z_n - H, s_Fn, rho_F.
