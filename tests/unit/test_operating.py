@@ -117,51 +117,10 @@ class TestNominal:
             atol=1e-9 * operating.speed,
         )
 
-    def test_the_angle_is_negative_before_time_0(self, operating):
-        assert_allclose(
-            operating.nominal(np.array([-0.4, -0.2])).angle / operating.speed,
-            [-0.2 * (0.5 + 0.62) / 2 - 0.1, -0.2 * (0.5 + 0.62) / 2],
-            rtol=1e-12,
-            atol=0,
-        )
-
-    def test_speed_and_acceleration_are_its_derivatives(self, operating):
-        times, h = np.array([-0.3, 0.1, 0.5, 0.9, 1.4]), 1e-6
-        before, at, after = (operating.nominal(times + shift) for shift in (-h, 0.0, h))
-        assert_allclose(
-            at.speed, (after.angle - before.angle) / (2 * h), rtol=1e-7, atol=0
-        )
-        assert_allclose(
-            at.acceleration,
-            (after.speed - before.speed) / (2 * h),
-            rtol=1e-6,
-            atol=1e-6,
-        )
-        assert_allclose(
-            at.torque_slope,
-            (after.torque_factor - before.torque_factor) / (2 * h),
-            rtol=1e-6,
-            atol=1e-6,
-        )
-
     def test_torque_follows_its_own_profile(self, operating):
         found = operating.nominal(np.array([-1.0, 0.5, 9.0]))
         assert_allclose(found.torque_factor, [0, 0.375, 1.5], rtol=1e-12, atol=0)
         assert_allclose(found.torque_slope, [0, 0.75, 0], rtol=1e-12, atol=0)
-
-    def test_a_profile_of_ones_is_none(self, xiamen):
-        times, ones = (
-            np.linspace(-0.5, 2.0, 11),
-            Profile(times=(0.0, 0.4, 1.0), factors=(1.0, 1.0, 1.0)),
-        )
-        with_ones = replace(
-            xiamen.operating, speed_profile=ones, torque_profile=ones
-        ).nominal(times)
-        plain = xiamen.operating.nominal(times)
-        for name in ("angle", "speed", "acceleration", "torque_factor", "torque_slope"):
-            assert_allclose(
-                getattr(with_ones, name), getattr(plain, name), rtol=1e-14, atol=1e-13
-            )
 
 
 class TestConfiguration:

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gensig.life.options import FlankMaterial, read_wear_options
-from gensig.life.wear.archard import depth_per_mesh, flank_path, meshes_per_turn
+from gensig.life.wear.archard import flank_path, meshes_per_turn
 from gensig.life.wear.wear_case import wear_case
 from gensig.life.wear.wear_life import wear_life
 from gensig.mesh.sliced.slice_pressure import contact_pressure
@@ -217,12 +217,3 @@ def test_a_path_has_the_pitch_point_for_a_node():
         assert np.abs(path.position - pair.pitch_point).min() < 1e-15
         assert (np.diff(path.position) > 0.0).all()
         assert path.position[[0, -1]] == pytest.approx([0.0, pair.path_of_contact])
-
-
-def test_without_load_nothing_wears():
-    case = case_of(*PAPER)
-    nothing = np.zeros(case.shape[1:])
-    for rule in ("band", "fixed_intervals"):
-        assert not depth_per_mesh(
-            case.path, nothing, nothing, replace(case.options, rule=rule)
-        ).any()

@@ -6,12 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gensig.errors import ConfigError
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.production.reproduction import simulate_twin
 from gensig.record.inputs import InputReader
-from gensig.record.machines import read_machine
 from gensig.record.simulate import forget_twins, simulate_record, simulate_records
 from gensig.systems.nuisances import with_nuisances
 from gensig.systems.run import CleanRecord
@@ -190,10 +188,3 @@ def test_a_twin_made_later_has_the_nuisances_of_its_record(shaking):
         - original.signals["acceleration_clean"]
     )
     np.testing.assert_allclose(noise, same, rtol=0, atol=1e-3 * same.std())
-
-
-def test_a_configuration_without_the_key_is_told(config_with):
-    config = config_with()
-    config = config.with_entries(sensing=config["sensing"].without("nuisances"))
-    with pytest.raises(ConfigError, match="sensing: missing nuisances"):
-        read_machine(config)

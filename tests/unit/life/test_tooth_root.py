@@ -37,7 +37,7 @@ def gear(n_teeth, *, shift=0.0, module=3e-3, rounding=0.38, helix=0.0):
 
 
 def touching(found, angle=TANGENT):
-    """Where our own root curve makes ``angle`` with the centreline: its parameter gamma."""
+    """Parameter gamma at which our root curve makes ``angle`` with the centreline."""
 
     def slope(gamma):
         roll = (

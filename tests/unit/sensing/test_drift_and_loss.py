@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from test_instrument import BEARING, HOUSING, changed, instrument, source
 
 from gensig.errors import ConfigError
@@ -71,19 +71,9 @@ def test_the_first_packet_begins_anywhere():
 def test_filling():
     signal = np.arange(1.0, 9.0)[None] * [[1.0], [10.0]]
     dropped = np.array([1, 0, 0, 1, 1, 0, 1, 0], dtype=bool)
-    assert_allclose(
-        filled(signal, dropped, "zero")[0], [0, 2, 3, 0, 0, 6, 0, 8], rtol=0, atol=0
-    )
-    assert_allclose(
-        filled(signal, dropped, "hold")[0], [2, 2, 3, 3, 3, 6, 6, 8], rtol=0, atol=0
-    )
-    assert_allclose(
-        filled(signal, dropped, "hold")[1],
-        10.0 * filled(signal, dropped, "hold")[0],
-        rtol=0,
-        atol=0,
-    )
-    for fill in ("hold", "zero"):
+    expected = {"zero": [0, 2, 3, 0, 0, 6, 0, 8], "hold": [2, 2, 3, 3, 3, 6, 6, 8]}
+    for fill, row in expected.items():
+        assert_array_equal(filled(signal, dropped, fill), np.outer([1, 10], row))
         assert not filled(signal, np.ones(8, dtype=bool), fill).any()
 
 

@@ -25,7 +25,7 @@ def disc_of(encoder, seed=0):
 
 
 def error(encoder, seed=0, angle=ANGLE):
-    """What the encoder reads too much, counted from its index."""
+    """Excess of the reading, counted from the index."""
     disc = disc_of(encoder, seed)
     return disc.read(angle, quantised=encoder.quantised) - (angle - disc.index)
 

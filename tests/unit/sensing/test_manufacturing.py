@@ -21,7 +21,6 @@ from gensig.sensing.gear_tolerances import (
 from gensig.sensing.manufacturing import (
     draw_gearbox,
     draw_specimen,
-    nominal_gearbox,
     perfect_specimen,
 )
 
@@ -55,8 +54,7 @@ def once_per_turn(error):
 
 
 def eccentric_tilt(gear, error):
-    """How the offsets of an eccentric gear grow along the path, from those at the pitch point,
-    (tooth,) m/m."""
+    """Growth along the path of the offsets of an eccentric gear, (tooth,) m/m."""
     eccentricity, most = once_per_turn(error)
     return (
         -eccentricity
@@ -288,13 +286,6 @@ class TestWhatIsDrawn:
             for field in fields(one)
         )
 
-    def test_without_profile_errors(self, xiamen, quality):
-        specimen = draw(xiamen.pair, quality(profile_errors=False), 1)
-        assert specimen.forms == ()
-        assert_allclose(
-            profile_of(xiamen.pair, specimen, "pinion")[0], 0.0, rtol=0, atol=1e-15
-        )
-
     def test_no_grade_is_perfect(self, xiamen, quality):
         nothing = quality(
             iso1328_grade=None,
@@ -344,15 +335,6 @@ def test_gearbox_factors_scatter_as_told(xiamen):
         logarithm = np.log([getattr(gearbox, key) for gearbox in drawn])
         assert_allclose(logarithm.std(), scatter, rtol=0.06, atol=0)
         assert_allclose(logarithm.mean(), 0.0, rtol=0, atol=0.1 * scatter)
-
-
-def test_no_scatter_is_nominal(xiamen):
-    quality = replace(
-        xiamen.quality, support_stiffness_scatter=0.0, support_damping_scatter=0.0
-    )
-    drawn, nominal = draw_gearbox(rng(), 3, quality, 0.0), nominal_gearbox(3)
-    for key in ("stiffness_factor", "damping_factor", "gain"):
-        assert_allclose(getattr(drawn, key), getattr(nominal, key), rtol=0, atol=0)
 
 
 @pytest.mark.parametrize(

@@ -191,50 +191,30 @@ def test_spectrum_has_the_density_of_its_file(tmp_path):
     assert abs(np.corrcoef(made[0], other[0])[0, 1]) < 0.05
 
 
-def test_refused_spectra(tmp_path):
-    lines, good = [100.0, 1000.0], [1.0, 2.0]
-    cases = {
-        "no column b": ([lines, good], ("a",)),
-        "unknown column c": ([lines, good, good, good], ("a", "b", "c")),
-        "must rise": ([[1000.0, 100.0], good], ("background",)),
-        "must not be negative, nor 0 throughout": (
-            [lines, [1.0, -1.0]],
-            ("background",),
-        ),
-        "nor 0 throughout": ([lines, [0.0, 0.0], good], ("a", "b")),
-        "is no finite number": ([lines, [1.0, np.nan]], ("background",)),
-        "too short": ([[100.0], [1.0]], ("background",)),
-    }
-    for number, (text, (columns, names)) in enumerate(cases.items()):
-        part = spectrum(tmp_path / f"{number}.csv", columns, names=names)
-        with pytest.raises(ConfigError, match=re.escape(text)) as caught:
-            read_noise({"parts": [part], "band_hz": None}).make(
-                np.ones(2), np.random.default_rng(1), receiver()
-            )
-        assert "\n" not in str(caught.value)
-
-
-def test_refused_backgrounds(tmp_path):
+def test_refused_files(tmp_path):
+    """More of files in test_measured_path."""
+    lines, good, both = [100.0, 1000.0], [1.0, 2.0], ("a", "b")
     rng = np.random.default_rng(8)
+    long = rng.standard_normal((1, 2000))
+
+    def of_spectrum(name, *columns, names=("background",)):
+        return spectrum(tmp_path / name, columns, names=names)
+
     cases = {
-        "too short: 900 rows, at least 1000": background(
-            tmp_path / "a.csv", rng.standard_normal((1, 900))
-        ),
-        "no column a": background(
-            tmp_path / "b.csv", rng.standard_normal((1, 2000)), names=("c",)
-        ),
-        "samples a second": background(
-            tmp_path / "c.csv", rng.standard_normal((1, 2000)), rate=8000
-        ),
-        "one value throughout": background(tmp_path / "d.csv", np.ones((1, 2000))),
-        "row 2, column background is no finite number": background(
-            tmp_path / "e.csv", np.full((1, 2000), np.nan)
-        ),
+        "no column b": of_spectrum("a", lines, good, names=("a",)),
+        "must rise": of_spectrum("b", lines[::-1], good),
+        "must not be negative": of_spectrum("c", lines, [1.0, -1.0]),
+        "nor 0 throughout": of_spectrum("d", lines, [0.0, 0.0], good, names=both),
+        "no column a": background(tmp_path / "e", long, names=("c",)),
+        "samples a second": background(tmp_path / "f", long, rate=8000),
+        "one value throughout": background(tmp_path / "g", np.ones((1, 2000))),
+        "too short: 900 rows, at least 1000": background(tmp_path / "h", long[:, :900]),
     }
     for text, part in cases.items():
-        found = read_noise({"parts": [part], "band_hz": None})
-        with pytest.raises(ConfigError, match=re.escape(text)):
-            found.make(np.ones(2), rng, receiver(1000))
+        noise = read_noise({"parts": [part], "band_hz": None})
+        with pytest.raises(ConfigError, match=re.escape(text)) as caught:
+            noise.make(np.ones(2), rng, receiver(1000))
+        assert "\n" not in str(caught.value)
 
 
 WHITE = [KINDS["white"]]

@@ -98,17 +98,6 @@ def test_teeth_out_of_place_show_orders_that_the_shaft_has_not():
     assert max(by_seed) > 0.5 * np.radians(0.2) * MEAN
 
 
-def test_each_machine_has_its_own_wheel():
-    wheel = replace(PERFECT, tooth_error=np.radians(0.02))
-    one, same, other = disc_of(wheel, 1), disc_of(wheel, 1), disc_of(wheel, 2)
-    assert_allclose(one.places, same.places, atol=0)
-    assert np.max(np.abs(one.places - other.places)) > 1e-4
-    speeds = [
-        instantaneous_speed(wheel, disc, MEAN * TIME, RATE) for disc in (one, other)
-    ]
-    assert np.std(speeds[0] - speeds[1]) > 1e-3 * MEAN
-
-
 def test_passages_are_where_the_teeth_are():
     disc = Disc(index=0.3, places=np.radians([0.0, 91.0, 180.0, 270.0]))
     wheel = replace(PERFECT, n_teeth=4)

@@ -27,13 +27,6 @@ def signals(*shape):
     return np.random.default_rng(7).standard_normal(shape)
 
 
-def test_linear():
-    path, one, other = housing(), signals(2, 4, 2000)[0], signals(2, 4, 2000)[1]
-    together = path.apply(2.0 * one - 3.0 * other, RATE)
-    apart = 2.0 * path.apply(one, RATE) - 3.0 * path.apply(other, RATE)
-    assert_allclose(together, apart, rtol=0, atol=1e-12 * np.abs(together).max())
-
-
 def test_causal():
     path, source = housing(), signals(4, 2000)
     changed = source.copy()

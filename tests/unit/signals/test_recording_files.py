@@ -71,7 +71,12 @@ def test_all_formats_say_the_same(files, name):
 def test_an_array_by_its_name(tmp_path):
     io.savemat(tmp_path / "c.mat", {"X097_DE_time": SIGNAL[:1].T, "X097RPM": 1796.0})
     write_hdf5(tmp_path / "c.h5", {"run/one": SIGNAL[0]})
-    for name, array in (("c.mat", "X097_DE_time"), ("c.h5", "run/one")):
+    np.save(tmp_path / "c.npy", SIGNAL[0])
+    for name, array in (
+        ("c.mat", "X097_DE_time"),
+        ("c.h5", "run/one"),
+        ("c.npy", None),
+    ):
         found = recording_of(read_file(str(tmp_path / name), rate=RATE, array=array))
         assert_allclose(
             found.acceleration[0], SIGNAL[0] - SIGNAL[0].mean(), rtol=0, atol=1e-12

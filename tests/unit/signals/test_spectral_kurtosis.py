@@ -15,7 +15,7 @@ def noise(seed=0, shape=()):
     return np.random.default_rng(seed).standard_normal((*shape, N_SAMPLES))
 
 
-@pytest.mark.parametrize("window", [64, 65, 100, 500])
+@pytest.mark.parametrize("window", [65, 500])
 def test_gaussian_noise_is_zero_in_every_line_and_scatters_as_stated(window):
     frequency, kurtosis = spectral_kurtosis(noise(shape=(20,)), RATE, window)
     spread = 1.2 * np.sqrt(window / N_SAMPLES)

@@ -59,13 +59,13 @@ def test_cycles_are_found_to_a_fraction_of_a_tooth(depth, stated):
 
 
 def test_a_steady_line_would_miss_it():
-    """What the test above would say of an answer that does not follow."""
+    """The test above can fail: an answer that does not follow is far off."""
     _, cycles = recording(0.01)
     steady = np.arange(cycles.size) / RATE * SPEED / 60 * TEETH.driving
     assert np.std(steady - cycles) > 0.5
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_noise_is_not_followed(seed):
     noise = np.random.default_rng(seed).standard_normal(
         (1 + seed % 3, round((0.6 + seed % 4) * RATE))
