@@ -31,9 +31,8 @@ N_PHASES = 16  # a base pitch, of the first look
 N_CLOSER = 16  # between the neighbours of the greatest of them
 # base pitches before the next pair enters, and after one has left: there the others carry most
 JUST = 1e-9
-DEPTH_SHARE = (
-    1e-3  # of the depth, on either side, over which the energy is differentiated
-)
+# of the depth, on either side, over which the energy is differentiated
+DEPTH_SHARE = 1e-3
 WIDTH_STRIPS = 2  # of the crack's front, on either side, the same over the width
 
 

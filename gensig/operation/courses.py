@@ -20,15 +20,13 @@ Array = NDArray[np.float64]
 
 MOST_POINTS = 100_000
 LATEST = 1e6  # s
-SHORTEST_PIECE = (
-    1e-3  # s; the integration takes the course as straight through every millisecond
-)
+# s; the integration takes the course as straight through every millisecond
+SHORTEST_PIECE = 1e-3
 # Hz; straight pieces of 1 ms take sinc^2(0.15) of it, 7.2 % too little; points are exact
 FASTEST_RIPPLE = 150.0
 EARLIEST = -2.0  # s; a walk begins here, before any machine begins to settle
-POINTS_PER_CORRELATION_TIME = (
-    20  # straight lines between points take 1.6 % of the variance
-)
+# straight lines between points take 1.6 % of the variance
+POINTS_PER_CORRELATION_TIME = 20
 # standard deviations at which a walk is cut, so that its slowest is known; 6e-5 of the time
 WALK_LIMIT = 4.0
 MOST_SCATTER = 0.2

@@ -95,8 +95,8 @@ def find_motion(
     nominal = speed_rpm / 60.0 * teeth.driving
     if nominal * (1.0 + SEARCH) > highest:
         raise ConfigError(
-            f"the mesh frequency of {nominal:.5g} Hz lies above the usable band of {highest:.5g} Hz "
-            f"of this recording; record faster, or check {options}"
+            f"the mesh frequency of {nominal:.5g} Hz lies above the usable band of "
+            f"{highest:.5g} Hz of this recording; record faster, or check {options}"
         )
     turns = recording.duration * nominal / teeth.most
     if turns < least_turns:

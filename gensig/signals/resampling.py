@@ -95,6 +95,6 @@ class RateChange:
 
 
 def rate_change(given: float, wanted: float) -> RateChange:
-    """Change to the nearest rate that a ratio of whole numbers up to `MOST_STEPS` gives."""
+    """Change to the nearest rate by a ratio of whole numbers up to `MOST_STEPS`."""
     ratio = Fraction(wanted / given).limit_denominator(MOST_STEPS)
     return RateChange(up=ratio.numerator, down=ratio.denominator)
