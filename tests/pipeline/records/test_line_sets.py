@@ -134,6 +134,7 @@ def test_a_record_depends_on_its_row_alone_and_a_sham_has_no_fault(made):
     assert not np.array_equal(sham.signals["acceleration"], again)
 
 
+@pytest.mark.parametrize("made", ["two_stage"], indirect=True)
 def test_simulate_writes_a_record_of_the_set_and_its_twin(made, tmp_path):
     row = made.row_of("broken")
     number = int(row["record_id"].removeprefix("r"))
