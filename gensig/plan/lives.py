@@ -172,7 +172,7 @@ def _life(
         never = np.full((len(history.torque), 1), np.inf)
         course = grow(np.array([0.0, 1.0]), never, history, 0.0)
         return _Life(fault=fault, law=None, loads=(), course=course)
-    rate, first = growth.spread.draw(rng)
+    rate, first = growth.draw(rng)
     (defect,) = read_faults(fault)
     unit = LAWS[defect.growth](gears, defect, growth, history, first)
     points = zip(history.speed.tolist(), history.torque.tolist(), strict=True)

@@ -1,7 +1,4 @@
-"""Flanks over their life.
-
-Wear step by step, sharing and pressure renewed as they wear, up to a threshold.
-"""
+"""Life of worn flanks: wear step by step up to a threshold, with renewed sharing and pressure."""
 
 from __future__ import annotations
 
@@ -18,14 +15,14 @@ from gensig.life.wear.wear_case import WearCase
 
 Array = NDArray[np.float64]
 
-# What the solver may be off in one step, as a share of the depth and in m. Pressures hang on the
-# curvature of what is
-# worn off, which takes a tenth, and makes the equations stiff: they are solved backwards, with
-# the nodes next to each.
+# Error of the solver in one step, as a share of the depth and in m. Pressures depend on the
+# curvature of the worn profile, which takes a tenth. That makes the equations stiff: they are
+# solved backwards, with neighbouring nodes coupled.
 ACCURACY = {"band": (1e-3, 2e-9), "fixed_intervals": (1e-3, 1e-9)}
 BANDWIDTH = 13
 LARGEST_SHARE = 0.1  # of the threshold, worn in one step
-HORIZON = 50.0  # times the life at the rate of new flanks: sharing slows wear down, but never so much
+# times the life at the rate of new flanks: sharing slows wear down, but never so much
+HORIZON = 50.0
 N_SNAPSHOTS = 41
 
 
@@ -64,7 +61,7 @@ def hours(turns: float, speed: float) -> float:
 
 
 def wear_life(case: WearCase) -> WearLife:
-    """The life of a pair under a steady torque.
+    """Life of a pair under a steady torque.
 
     Raises
     ------
@@ -91,21 +88,22 @@ def wear_life(case: WearCase) -> WearLife:
         least = case.error_range(case.new_flanks())
         if least >= limit:
             raise ConfigError(
-                f"wear.transmission_error_limit_um = {limit * 1e6:g} is reached by new flanks already: theirs is "
+                f"wear.transmission_error_limit_um = {limit * 1e6:g} is reached by new flanks "
+                "already: theirs is "
                 f"{least * 1e6:.4g} um from peak to peak; give more"
             )
         ends.append(lambda depth: case.error_range(depth) / limit - 1.0)
-    solution = _solve(
-        case, case.new_flanks(), HORIZON * at_first_rate, ends=ends, dense_output=True
-    )
+    solution = _solve(case, HORIZON * at_first_rate, ends)
     if solution.status != 1:
         raise SimulationError(
-            f"the flanks do not wear to the threshold in {HORIZON * at_first_rate:.4g} turns: {solution.message}"
+            f"the flanks do not wear to the threshold in {HORIZON * at_first_rate:.4g} turns: "
+            f"{solution.message}"
         )
     turns = np.linspace(0.0, float(solution.t[-1]), N_SNAPSHOTS)
     depth = np.stack([_depth(case, solution.sol(turn)) for turn in turns])
-    by_error = len(ends) == 2 and len(solution.t_events[1]) > 0
-    ended_by = "transmission_error" if by_error else "depth"
+    ended_by = "depth"
+    if len(ends) == 2 and len(solution.t_events[1]) > 0:
+        ended_by = "transmission_error"
     return WearLife(
         case=case,
         turns=turns,
@@ -115,77 +113,10 @@ def wear_life(case: WearCase) -> WearLife:
     )
 
 
-def worn_flanks(
-    case: WearCase,
-    turns: Array,
-    *,
-    torque: Array | None = None,
-    start: Array | None = None,
-) -> Array:
-    """Depth off both flanks after so many turns of the pinion, whatever the threshold.
+def _solve(case: WearCase, end: float, ends: list[Callable[[Array], float]]) -> Any:
+    """Depths as an initial value problem over the turns of the pinion.
 
-    Parameters
-    ----------
-    turns : (time,) of the pinion from ``start`` on, not falling
-    torque : (time,) N m    of the time that ends at each, from the one before (the first: from 0); None is the case's
-        own throughout
-    start : (2, slice, node) m    what is off already; None is nothing
-
-    Returns
-    -------
-    (time, 2, slice, node) m
-
-    Raises
-    ------
-    ConfigError    for turns that fall, or a torque that is not positive or not one for each
-    """
-    turns = np.asarray(turns, dtype=np.float64)
-    if (
-        turns.ndim != 1
-        or not np.isfinite(turns).all()
-        or (np.diff(turns, prepend=0.0) < 0.0).any()
-    ):
-        raise ConfigError(
-            "the turns of a life must be a row of numbers that never falls, from 0 on"
-        )
-    depth = case.new_flanks() if start is None else np.array(start, dtype=np.float64)
-    if torque is None:
-        return _depth_at(case, depth, turns)
-    if np.shape(torque) != turns.shape:
-        raise ConfigError(
-            f"{np.size(torque)} torques for {len(turns)} times of a life; give one for each"
-        )
-    found = np.empty((len(turns), *case.shape))
-    for k, stretch in enumerate(np.diff(turns, prepend=0.0)):
-        depth = found[k] = _depth_at(
-            case.under(float(torque[k])), depth, np.array([stretch])
-        )[0]
-    return found
-
-
-def _depth_at(case: WearCase, start: Array, turns: Array) -> Array:
-    """Depth at each of ``turns`` under one torque, (time, 2, slice, node) m."""
-    if not case.follows_wear or not turns.any():
-        return start + turns[:, None, None, None] * case.rate(start)
-    times, place = np.unique(turns, return_inverse=True)
-    solution = _solve(case, start, float(times[-1]), t_eval=times)
-    if solution.status != 0:
-        raise SimulationError(
-            f"the flanks wear to where their wear cannot be followed: {solution.message}"
-        )
-    return np.stack([_depth(case, flat) for flat in solution.y.T])[place]
-
-
-def _solve(
-    case: WearCase,
-    start: Array,
-    end: float,
-    *,
-    ends: list[Callable[[Array], float]] | None = None,
-    **more: Any,
-) -> Any:
-    """The depths as an initial value problem over the turns of the pinion from 0 to ``end``, or
-    to the first end.
+    They go from new flanks at 0 to ``end``, or to the first of ``ends``.
     """
     from scipy.integrate import solve_ivp
 
@@ -199,25 +130,24 @@ def _solve(
         function.terminal, function.direction = True, 1.0  # type: ignore[attr-defined]
         return function
 
+    new = case.new_flanks()
     relative, absolute = ACCURACY[case.options.rule]
-    longest = min(case.options.step, LARGEST_SHARE * case.options.threshold) / float(
-        case.rate(start).max()
-    )
-    if case.options.rule == "band":
-        method: dict[str, Any] = {"method": "RK23"}  # Bogacki & Shampine
-    else:
+    step = min(case.options.step, LARGEST_SHARE * case.options.threshold)
+    longest = step / float(case.rate(new).max())
+    method: dict[str, Any] = {"method": "RK23"}  # Bogacki & Shampine
+    if case.options.rule != "band":
         method = {"method": "LSODA", "lband": BANDWIDTH, "uband": BANDWIDTH}
     return solve_ivp(
         rate,
         (0.0, end),
-        _flat(start),
+        _flat(new),
         max_step=longest,
         first_step=min(0.01 * longest, end),
         rtol=relative,
         atol=absolute,
-        events=[event(reached) for reached in ends or ()],
+        events=[event(reached) for reached in ends],
+        dense_output=True,
         **method,
-        **more,
     )
 
 
