@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib import pyplot
 from numpy.typing import NDArray
 
 from benchmarks._realism_recording import INDICATORS
 from benchmarks._realism_sets import CONTROLS
-from gensig.commands.figures.machine_figures import FAULTY, GREY, SOUND, pyplot
+from gensig.commands.figures.style import FAULTY, GREY, SOUND
 from gensig.validation.realism import Comparison, points
 
 FloatArray = NDArray[np.floating]

@@ -1,11 +1,10 @@
-"""The verb validate: what the sources print beside what we compute."""
+"""``gensig validate``: printed values of the sources and computed ones."""
 
 from __future__ import annotations
 
-import sys
 from argparse import Namespace
 
-from gensig.commands.console import replaced_file
+from gensig.commands.console import remark, replaced_file
 from gensig.validation.markdown import markdown, shortfalls, summary
 from gensig.validation.verdicts import run_validation
 
@@ -16,14 +15,8 @@ def validate(arguments: Namespace) -> int:
     if arguments.markdown:
         with replaced_file(arguments.markdown) as path:
             path.write_text(markdown(results), encoding="utf-8")
-    for line in shortfalls(results):
-        print(line)
-    print(summary(results))
-    surprises = [result for result in results if not result.as_expected]
-    if surprises:
-        print(
-            f"gensig: {len(surprises)} row(s) differ from what they declare",
-            file=sys.stderr,
-        )
-        return 1
-    return 0
+    print(*shortfalls(results), summary(results), sep="\n")
+    n_surprises = sum(not result.as_expected for result in results)
+    if n_surprises:
+        remark(f"{n_surprises} row(s) differ from what they declare")
+    return int(n_surprises > 0)
