@@ -2,12 +2,15 @@
 
 import json
 import shlex
+import shutil
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
 from matplotlib.figure import Figure
+from small_sets import make
 
 from gensig.cli import main
 
@@ -58,6 +61,21 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
 
     monkeypatch.setattr(Figure, "savefig", keep)
     return figures
+
+
+@dataclass(frozen=True)
+class TinySet:
+    """A small data set that tests share; a test that changes it works on a copy."""
+
+    folder: Path
+
+    def copy_to(self, folder: Path) -> Path:
+        return Path(shutil.copytree(self.folder, folder))
+
+
+@pytest.fixture(scope="session")
+def tiny_set(tmp_path_factory: pytest.TempPathFactory) -> TinySet:
+    return TinySet(make(tmp_path_factory.mktemp("tiny") / "data"))
 
 
 def labels(panel: Any) -> list[str]:

@@ -218,9 +218,7 @@ def test_transmission_error_is_that_of_hot_flanks(written, gensig):
     assert hot["transverse_contact_ratio"] > cold["transverse_contact_ratio"]
     assert hot["mean_um"] != pytest.approx(cold["mean_um"], rel=1e-3)
     unequal = "heat.pinion_temperature_degc=140 heat.wheel_temperature_degc=60"
-    _, warned = gensig(
-        f"transmission-error {HOT} {unequal} heat.center_distance=false"
-    )
+    _, warned = gensig(f"transmission-error {HOT} {unequal} heat.center_distance=false")
     assert "unequal growth of hot gears" in warned
 
 

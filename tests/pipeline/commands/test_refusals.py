@@ -193,8 +193,12 @@ REFUSED = {
     f"{DAMPERS}[7]": "system.dampers[0] = 7 must be a group of keys",
     damper(node=99): "system.dampers: node 99 is not in the shaft line; it has 1 to 67",
     damper(inertia=0): "system.dampers[0].ring_inertia_kg_m2 = 0 must be positive",
-    damper(damping=-1): "system.dampers[0].damping_nms_per_rad = -1 must not be negative",
-    damper(damping=0): "system.dampers[0]: without damping and stiffness nothing holds the ring",
+    damper(
+        damping=-1
+    ): "system.dampers[0].damping_nms_per_rad = -1 must not be negative",
+    damper(
+        damping=0
+    ): "system.dampers[0]: without damping and stiffness nothing holds the ring",
     damper(node="crank"): "system.dampers[0].node",
     f"{DAMPERS}'[{{node: 45, mass_kg: 1}}]'": "system.dampers[0]",
     f"gensig generate {TRAIN} out=never": "no excitation is chosen",
