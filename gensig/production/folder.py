@@ -276,7 +276,8 @@ def _check_places(
         for k, row in enumerate(rows)
     ):
         raise DatasetError(
-            f"{out / PLAN} and the manifest disagree on shard {shard_index}; restore both from a copy"
+            f"{out / PLAN} and the manifest disagree on shard {shard_index}; "
+            "restore both from a copy"
         )
 
 

@@ -43,7 +43,7 @@ class Reproduction:
                              one of both failed
     worst : str              the record with that difference, '' when all are equal
     n_refused : int          records that differ by more than is accepted
-    other : dict             deciding facts of the environment that differ: recorded and present value
+    other : dict             differing facts of the environment: recorded and present value
     """
 
     n_records: int

@@ -206,7 +206,10 @@ def open_stream(config: Configuration, *, epoch: int = 0) -> RecordStream:
 
 
 def epoch_seed(seed: int, epoch: int) -> int:
-    """Seed of one epoch, a whole number that every JSON reader takes exactly; see `RecordStream`."""
+    """Seed of one epoch, a whole number that every JSON reader takes exactly.
+
+    See `RecordStream`.
+    """
     if whole_number("epoch", epoch, at_least=0) == 0:
         return seed
     sequence = np.random.SeedSequence(seed, spawn_key=(EPOCH_STREAM, epoch))

@@ -62,7 +62,7 @@ def write_report(
 
     Raises
     ------
-    ConfigError     for a file that is there already, a folder that is not, or a number of records below 1
+    ConfigError     for a file that exists, a folder that does not, or less than one record
     DatasetError    for a folder that is no data set, incomplete or damaged
     """
     path = out or folder / REPORT

@@ -58,7 +58,7 @@ def choose(data: Dataset, per_class: int | None) -> Choice:
 
     Parameters
     ----------
-    per_class : records of a class; None takes `RECORDS_PER_CLASS`, or fewer where the page would get heavy
+    per_class : records of a class; None takes `RECORDS_PER_CLASS`, or fewer for a small page
     """
     label, usable = data.column("label_name"), data.usable
     classes = [name for name in data.class_names if np.any((label == name) & usable)]

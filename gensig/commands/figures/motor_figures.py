@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from gensig.commands.figures.style import FAULTY, SOUND, titles, zero_line
 from gensig.commands.lines.results import ResponseResult
 from gensig.driveline.engine_line import EngineLine
@@ -31,7 +33,7 @@ def motor_rows(axes: Any, line: EngineLine, found: ResponseResult) -> None:
     """Draw mean torques on the nodes and mean tooth forces of the meshes, (2,) axes."""
     torques, forces = axes
     mean = found.torques.on(line.drive.numbers).mean(axis=1)
-    colors = [(SOUND, FAULTY)[value < 0.0] for value in mean]
+    colors = np.where(mean < 0.0, FAULTY, SOUND).tolist()
     torques.bar([str(number) for number in line.drive.numbers], mean, color=colors)
     zero_line(torques)
     title = "Mean torques: given (blue) and taken (red)"
