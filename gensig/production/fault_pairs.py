@@ -171,24 +171,8 @@ def make_pairs(
     ConfigError    for a machine without fault or noise, and for numbers that cannot be used
     """
     config = config.with_entries(seed=epoch_seed(config.seed, epoch))
-    fault, sensing = config["fault"], config["sensing"]
-    parts = fault_parts(fault)
-    if not parts:
-        raise ConfigError(
-            f"fault={fault['kind']}: there is nothing to find; "
-            "choose a fault, for instance fault=crack "
-            "(plan.sham=true leaves it out as a control)"
-        )
-    if sensing["snr_db"] is None:
-        raise ConfigError(
-            "sensing.snr_db = null: without noise every fault is seen; "
-            "give a signal-to-noise ratio in dB"
-        )
-    if sensing["snr_reference"] != "healthy_twin":
-        raise ConfigError(
-            "sensing.snr_reference: noise that follows the record tells the fault; "
-            "use healthy_twin"
-        )
+    _check_fault_and_noise(config)
+    fault = config["fault"]
     whole_number("the number of units", n_units, at_least=FEWEST_UNITS)
     speeds = _levels(
         "speeds in r/min", speeds_rpm, config["operating"]["speed_rpm"], SPEED_SHARES
@@ -207,7 +191,7 @@ def make_pairs(
     planned, rows = _planned(config, speeds, torques, n_units)
     system = read_system(planned)
     teeth = {"pinion": system.pair.pinion.n_teeth, "wheel": system.pair.wheel.n_teeth}
-    faulted = dict.fromkeys(str(part["gear"]) for part in parts)
+    faulted = dict.fromkeys(str(part["gear"]) for part in fault_parts(fault))
     shape = power = None
     if not system.sensing.has_white_noise:
         shape = _noise_shape(planned, rows[:n_units])
@@ -227,6 +211,27 @@ def make_pairs(
         noise_shape=shape,
         fixed_power=power,
     )
+
+
+def _check_fault_and_noise(config: Configuration) -> None:
+    """Raise ConfigError for a machine without a fault, or without noise of the healthy twin."""
+    fault, sensing = config["fault"], config["sensing"]
+    if not fault_parts(fault):
+        raise ConfigError(
+            f"fault={fault['kind']}: there is nothing to find; "
+            "choose a fault, for instance fault=crack "
+            "(plan.sham=true leaves it out as a control)"
+        )
+    if sensing["snr_db"] is None:
+        raise ConfigError(
+            "sensing.snr_db = null: without noise every fault is seen; "
+            "give a signal-to-noise ratio in dB"
+        )
+    if sensing["snr_reference"] != "healthy_twin":
+        raise ConfigError(
+            "sensing.snr_reference: noise that follows the record tells the fault; "
+            "use healthy_twin"
+        )
 
 
 def _levels(
