@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -93,10 +93,11 @@ def wear_life(case: WearCase) -> WearLife:
                 f"{least * 1e6:.4g} um from peak to peak; give more"
             )
         ends.append(lambda depth: case.error_range(depth) / limit - 1.0)
-    solution = _solve(case, HORIZON * at_first_rate, ends)
+    horizon = HORIZON * at_first_rate
+    solution = _solve(case, case.new_flanks(), horizon, ends=ends, dense_output=True)
     if solution.status != 1:
         raise SimulationError(
-            f"the flanks do not wear to the threshold in {HORIZON * at_first_rate:.4g} turns: "
+            f"the flanks do not wear to the threshold in {horizon:.4g} turns: "
             f"{solution.message}"
         )
     turns = np.linspace(0.0, float(solution.t[-1]), N_SNAPSHOTS)
@@ -113,10 +114,79 @@ def wear_life(case: WearCase) -> WearLife:
     )
 
 
-def _solve(case: WearCase, end: float, ends: list[Callable[[Array], float]]) -> Any:
+def worn_flanks(
+    case: WearCase,
+    turns: Array,
+    *,
+    torque: Array | None = None,
+    start: Array | None = None,
+) -> Array:
+    """Depth off both flanks at given turns of the pinion, whatever the threshold.
+
+    Parameters
+    ----------
+    turns : (time,) of the pinion from ``start`` on, not falling
+    torque : (time,) N m    of the interval that ends at each; None for that of the case
+    start : (2, slice, node) m    initial depth; None for new flanks
+
+    Returns
+    -------
+    (time, 2, slice, node) m
+
+    Raises
+    ------
+    ConfigError    for turns that fall, or a torque that is not positive or not one for each
+    """
+    turns = np.asarray(turns, dtype=np.float64)
+    if turns.ndim != 1 or not np.isfinite(turns).all() or not _never_falls(turns):
+        raise ConfigError(
+            "the turns of a life must be a row of numbers that never falls, from 0 on"
+        )
+    depth = case.new_flanks() if start is None else np.array(start, dtype=np.float64)
+    if torque is None:
+        return _depth_at(case, depth, turns)
+    if np.shape(torque) != turns.shape:
+        raise ConfigError(
+            f"{np.size(torque)} torques for {len(turns)} times of a life; "
+            "give one for each"
+        )
+    depths = []
+    for interval, load in zip(np.diff(turns, prepend=0.0), torque, strict=True):
+        loaded = case.under(float(load))
+        depth = _depth_at(loaded, depth, np.array([interval]))[0]
+        depths.append(depth)
+    return np.stack(depths)
+
+
+def _never_falls(turns: Array) -> bool:
+    return not (np.diff(turns, prepend=0.0) < 0.0).any()
+
+
+def _depth_at(case: WearCase, start: Array, turns: Array) -> Array:
+    """Depth at each of ``turns`` under one torque, (time, 2, slice, node) m."""
+    if not case.follows_wear or not turns.any():
+        return start + turns[:, None, None, None] * case.rate(start)
+    times, index = np.unique(turns, return_inverse=True)
+    solution = _solve(case, start, float(times[-1]), t_eval=times)
+    if solution.status != 0:
+        raise SimulationError(
+            "the flanks wear to where their wear cannot be followed: "
+            f"{solution.message}"
+        )
+    return np.stack([_depth(case, flat) for flat in solution.y.T])[index]
+
+
+def _solve(
+    case: WearCase,
+    start: Array,
+    end: float,
+    *,
+    ends: Sequence[Callable[[Array], float]] = (),
+    **outputs: Any,
+) -> Any:
     """Depths as an initial value problem over the turns of the pinion.
 
-    They go from new flanks at 0 to ``end``, or to the first of ``ends``.
+    They go from ``start`` at 0 to ``end``, or to the first of ``ends``.
     """
     from scipy.integrate import solve_ivp
 
@@ -130,24 +200,23 @@ def _solve(case: WearCase, end: float, ends: list[Callable[[Array], float]]) -> 
         function.terminal, function.direction = True, 1.0  # type: ignore[attr-defined]
         return function
 
-    new = case.new_flanks()
     relative, absolute = ACCURACY[case.options.rule]
     step = min(case.options.step, LARGEST_SHARE * case.options.threshold)
-    longest = step / float(case.rate(new).max())
+    longest = step / float(case.rate(start).max())
     method: dict[str, Any] = {"method": "RK23"}  # Bogacki & Shampine
     if case.options.rule != "band":
         method = {"method": "LSODA", "lband": BANDWIDTH, "uband": BANDWIDTH}
     return solve_ivp(
         rate,
         (0.0, end),
-        _flat(new),
+        _flat(start),
         max_step=longest,
         first_step=min(0.01 * longest, end),
         rtol=relative,
         atol=absolute,
         events=[event(reached) for reached in ends],
-        dense_output=True,
         **method,
+        **outputs,
     )
 
 

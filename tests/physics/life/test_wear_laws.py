@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from gensig.errors import ConfigError
 from gensig.life.options import FlankMaterial, read_wear_options
 from gensig.life.wear.archard import flank_path, meshes_per_turn
 from gensig.life.wear.wear_case import wear_case
-from gensig.life.wear.wear_life import wear_life
+from gensig.life.wear.wear_life import wear_life, worn_flanks
 from gensig.mesh.sliced.slice_pressure import contact_pressure
 from gensig.mesh.sliced.slices import loaded_contact
 from gensig.options.compose import compose
@@ -217,3 +218,39 @@ def test_a_path_has_the_pitch_point_for_a_node():
         assert np.abs(path.position - pair.pitch_point).min() < 1e-15
         assert (np.diff(path.position) > 0.0).all()
         assert path.position[[0, -1]] == pytest.approx([0.0, pair.path_of_contact])
+
+
+@pytest.mark.parametrize("rule", ["band", "fixed_intervals"])
+def test_a_history_is_the_same_in_one_go_or_many(rule):
+    case = case_of(*FULL, f"wear.rule={rule}", "wear.threshold_um=5")
+    life = wear_life(case)
+    turns = life.turns[[0, 4, 4, 20, 40]]
+    at_once = worn_flanks(case, turns)
+    assert_allclose(at_once[-1], life.depth[-1], atol=2e-3 * life.depth.max())
+    assert_allclose(at_once[1], at_once[2], atol=0.0)
+    assert not at_once[0].any()
+    assert (np.diff(at_once, axis=0) >= -1e-12).all()
+    steady = worn_flanks(case, turns, torque=np.full(5, case.torque))
+    assert_allclose(steady, at_once, atol=2e-3 * life.depth.max())
+    later = worn_flanks(case, turns[3:] - turns[2], start=at_once[2])
+    assert_allclose(later, at_once[3:], atol=2e-3 * life.depth.max())
+    heavier = worn_flanks(
+        case, turns, torque=case.torque * np.array([1.0, 1.0, 1.0, 2.0, 1.0])
+    )
+    assert heavier[3].max() > 1.2 * at_once[3].max()
+
+
+@pytest.mark.parametrize(
+    ("turns", "torque", "message"),
+    [
+        ([2.0, 1.0], None, "never falls"),
+        ([-1.0, 1.0], None, "never falls"),
+        ([np.nan], None, "never falls"),
+        ([[1.0]], None, "never falls"),
+        ([1.0, 2.0], [1.0], "give one for each"),
+        ([1.0, 2.0], [1.0, -2.0], "must be positive"),
+    ],
+)
+def test_a_history_that_cannot_be_is_refused(turns, torque, message):
+    with pytest.raises(ConfigError, match=message):
+        worn_flanks(case_of(*FULL), np.array(turns), torque=torque)
