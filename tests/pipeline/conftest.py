@@ -76,8 +76,3 @@ class TinySet:
 @pytest.fixture(scope="session")
 def tiny_set(tmp_path_factory: pytest.TempPathFactory) -> TinySet:
     return TinySet(make(tmp_path_factory.mktemp("tiny") / "data"))
-
-
-def labels(panel: Any) -> list[str]:
-    """Labels of the lines and bars of a panel, as its legend has them."""
-    return list(panel.get_legend_handles_labels()[1])

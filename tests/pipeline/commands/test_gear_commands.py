@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 import yaml
-from conftest import labels
+from figure_labels import labels
 
 import gensig.commands.gears.modify
 from gensig.systems.flank_optimum import optimise

@@ -6,9 +6,9 @@ from importlib import resources
 
 import numpy as np
 import pytest
-from conftest import labels
 from docs_pages import ROOT, blocks
 from engine_cases import option, response_of
+from figure_labels import labels
 from numpy.testing import assert_allclose
 
 from gensig.cli import main

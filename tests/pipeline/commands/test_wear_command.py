@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
-from conftest import labels
+from figure_labels import labels
 from numpy.testing import assert_allclose
 
 from gensig.cli import main
