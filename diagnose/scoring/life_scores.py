@@ -191,7 +191,8 @@ def gain(
     Both are (seed, life) squared errors, scored on the same resamples of the lives. `low` and
     `high` are the 95 % interval.
     """
-    lives, seeds = drawn(*values.shape, n_bootstrap, rng)
+    n_seeds, n_lives = values.shape
+    lives, seeds = drawn(n_seeds, n_lives, n_bootstrap, rng)
     other_seeds = rng.integers(against.shape[0], size=(n_bootstrap, against.shape[0]))
     of_other = _over_drawn("rmse_h", against, lives, other_seeds)
     of_values = _over_drawn("rmse_h", values, lives, seeds)
