@@ -93,7 +93,11 @@ class FakeDataset:
 
     def split(self, protocol):
         if protocol != "by_unit":
-            fractions = {"train": (0, 0.5), "validation": (0.5, 0.75), "test": (0.75, 1)}
+            fractions = {
+                "train": (0, 0.5),
+                "validation": (0.5, 0.75),
+                "test": (0.75, 1),
+            }
             return {
                 name: [(record, *part) for record in range(self.n_records)]
                 for name, part in fractions.items()

@@ -55,8 +55,12 @@ def train(dataset, out, *words):
     """``metrics.json`` of the command on a data set in memory, or on several by their names."""
     sets = dataset if isinstance(dataset, dict) else {"good": dataset}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(gensig.dataset.reader, "open_dataset", lambda path: sets[str(path)])
-        assert main(["train", "data=good", f"out={out}", *SMALL, *TINY_CNN, *words]) == 0
+        patch.setattr(
+            gensig.dataset.reader, "open_dataset", lambda path: sets[str(path)]
+        )
+        assert (
+            main(["train", "data=good", f"out={out}", *SMALL, *TINY_CNN, *words]) == 0
+        )
     return json.loads((out / "metrics.json").read_text())
 
 

@@ -19,6 +19,8 @@ from diagnose.report.page import write_report
 from diagnose.studies.baseline_runs import baseline_predictions
 
 N_CLASSES = 4
+
+
 @pytest.fixture(scope="module")
 def source():
     """All data that a baseline may read."""
@@ -71,13 +73,17 @@ def check_seed(baseline, parts):
     np.random.default_rng().uniform()
     second, second_detail = fitted(baseline, parts)
     assert detail == second_detail
-    assert_array_equal(first.predict_proba(parts.test), second.predict_proba(parts.test))
+    assert_array_equal(
+        first.predict_proba(parts.test), second.predict_proba(parts.test)
+    )
 
 
 def check_order(baseline, parts):
     """Law: the order of the rows changes nothing but the order of the answers."""
     rng = np.random.default_rng(3)
-    orders = {name: rng.permutation(len(getattr(parts, name).label)) for name in SUBSETS}
+    orders = {
+        name: rng.permutation(len(getattr(parts, name).label)) for name in SUBSETS
+    }
     shuffled = Parts.of(lambda name: rows_of(getattr(parts, name), orders[name]))
     made, _ = fitted(baseline, parts)
     other, _ = fitted(baseline, shuffled)
@@ -97,7 +103,9 @@ def check_text(baseline):
 
 def rows_of(table, rows):
     """A table with its rows in another order."""
-    columns = {name: getattr(table, name)[rows] for name in ("values", "label", "record")}
+    columns = {
+        name: getattr(table, name)[rows] for name in ("values", "label", "record")
+    }
     return replace(table, **columns)
 
 

@@ -73,7 +73,9 @@ def test_the_default_baselines_are_registered():
 
 def test_settings_are_refused_without_loading_torch():
     """A mistake in a setting is answered at once; torch takes seconds to load."""
-    code = "import diagnose.settings, sys; print({'torch', 'sklearn'} & set(sys.modules))"
+    code = (
+        "import diagnose.settings, sys; print({'torch', 'sklearn'} & set(sys.modules))"
+    )
     shown = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )

@@ -43,7 +43,9 @@ def test_losses_are_those_of_the_study(studies):
     losses = protocols(studies / "with")["by_unit"]["validation_loss"]
     for run, expected in zip(runs[1:], losses, strict=True):
         logged = scalars(log / run)
-        np.testing.assert_allclose(logged["loss/validation_records"], expected, rtol=1e-6)
+        np.testing.assert_allclose(
+            logged["loss/validation_records"], expected, rtol=1e-6
+        )
         training = logged["loss/training_windows"]
         assert len(training) == len(expected)
         assert np.isfinite(training).all()

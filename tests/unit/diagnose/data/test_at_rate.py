@@ -50,7 +50,10 @@ def test_null_and_the_stored_rate_leave_the_data_set_alone(rate):
     ("rate", "message"),
     [
         (25600, "sampling_rate_hz=25600 is above the 12800 samples a second"),
-        (6400.123, "no ratio of small whole numbers away from 12800; the nearest .* 6400"),
+        (
+            6400.123,
+            "no ratio of small whole numbers away from 12800; the nearest .* 6400",
+        ),
         (12.8, "leaves no sample"),
     ],
 )
@@ -74,7 +77,9 @@ def test_a_model_at_a_lower_rate_takes_faster_recordings_and_refuses_slower_ones
     words = ["window_samples=600", "stride_samples=500", "shuffle_control=false"]
     metrics = train(data, out, "sampling_rate_hz=6400", "epochs=2", *words)
     model = out / "models" / "by_unit-seed0"
-    assert load_model(model)[1].sampling_rate_hz == metrics["sampling_rate_hz"] == 6400.0
+    assert (
+        load_model(model)[1].sampling_rate_hz == metrics["sampling_rate_hz"] == 6400.0
+    )
     signals = {12800: data.signals(80), 6400: at_rate(data, 6400).signals(80)}
     probabilities = []
     for rate, signal in signals.items():

@@ -123,7 +123,9 @@ def test_the_position_loss_is_small_if_the_scores_point_at_the_fault_only():
         return position_loss(places, label, gear, position, ((1, 23), (2, 84)))
 
     right = torch.zeros(2, 2, 107 * PER_TOOTH)
-    right[0, 1, 1 * PER_TOOTH] = 20.0  # 1.5 teeth after tooth 22.5: around the end of the turn
+    right[0, 1, 1 * PER_TOOTH] = (
+        20.0  # 1.5 teeth after tooth 22.5: around the end of the turn
+    )
     right[1, 1, (23 + 41) * PER_TOOTH] = 20.0
     assert loss(right) < 1e-3
     assert loss(right.flip(0)) > 10  # at the other gear

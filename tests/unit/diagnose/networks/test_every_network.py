@@ -156,5 +156,7 @@ def test_an_older_model_has_temperature_one_and_a_bad_one_is_refused(study, tmp_
     assert load_model(tmp_path)[1].temperature == 1.0
     for bad in (0, -1.0, "warm", float("nan")):
         path.write_text(json.dumps({**content, "temperature": bad}))
-        with pytest.raises(DatasetError, match=r"model\.json does not describe a model"):
+        with pytest.raises(
+            DatasetError, match=r"model\.json does not describe a model"
+        ):
             load_model(tmp_path)
