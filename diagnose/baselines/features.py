@@ -100,8 +100,10 @@ def indicators(
             averages[gear] = time_synchronous_average(
                 x, sampling_rate, rotation_frequency[gear], min_turns=min_turns
             )
-            for indicator in (fm4, sideband_ratio):
-                columns.append(indicator(averages[gear], n_teeth[gear]))
+            columns += [
+                indicator(averages[gear], n_teeth[gear])
+                for indicator in (fm4, sideband_ratio)
+            ]
         except ValueError:
             columns += [np.full(x.shape[0], np.nan)] * 2
     if features == "all":

@@ -40,7 +40,8 @@ def test_wdcnn_has_the_published_sizes():
         x = layer(x)
         if isinstance(layer, torch.nn.Conv1d | torch.nn.MaxPool1d):
             maps.append(f"{x.shape[2]}x{x.shape[1]}")
-    assert maps == "128x16 64x16 64x32 32x32 32x64 16x64 16x64 8x64 6x64 3x64".split()
+    sizes = "128x16 64x16 64x32 32x32 32x64 16x64 16x64 8x64 6x64 3x64"
+    assert " ".join(maps) == sizes
     torch.testing.assert_close(model.hidden[0](x), x, rtol=0, atol=0)
     inputs, outputs = (1, 16, 32, 64, 64), (16, 32, 64, 64, 64)
     kernels = (64, 3, 3, 3, 3)
