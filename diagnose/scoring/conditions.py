@@ -51,8 +51,9 @@ def condition_columns(dataset: Dataset, record: IntArray) -> dict[str, NDArray[A
             most = MOST_NAMES
         elif values.dtype.kind not in "fiu" or not np.isfinite(values).all():
             continue
-        repeats = any(_same_order(values, known) for known in columns.values())
-        if 2 <= np.unique(values).size <= most and not repeats:
+        if not 2 <= np.unique(values).size <= most:
+            continue
+        if not any(_same_order(values, known) for known in columns.values()):
             columns[name] = values
     return columns
 

@@ -22,7 +22,7 @@ from diagnose.baselines.indicator_models import (
     IndicatorModelWithoutLevel,
 )
 from diagnose.baselines.rms_threshold import RmsThreshold
-from diagnose.data.windows import SUBSETS, subset_segments, task_of
+from diagnose.data.windows import subset_segments, task_of
 from diagnose.report.page import without_interval
 from diagnose.report.text import score_cell
 from diagnose.scoring.metrics import (
