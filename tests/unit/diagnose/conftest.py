@@ -1,4 +1,4 @@
-"""Fixtures of the tests of `diagnose`; modules of this folder are importable from its subfolders."""
+"""Fixtures of the tests of `diagnose`; its subfolders can import the modules of this folder."""
 
 import pytest
 import torch
