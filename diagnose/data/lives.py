@@ -103,13 +103,13 @@ def life_segments(task: Task, lives: Lives, protocol: str, subset: str) -> Segme
     ------
     ConfigError    for a subset without any
     """
-    found = kept_segments(subset_segments(task, protocol, subset), lives.name != "")
-    if not found.record.size:
+    segments = kept_segments(subset_segments(task, protocol, subset), lives.name != "")
+    if not segments.record.size:
         raise ConfigError(
             f"protocol {protocol}: its {subset} part has no snapshot of a life; "
             "leave the protocol out"
         )
-    return found
+    return segments
 
 
 def kept_segments(segments: Segments, kept: NDArray[np.bool_]) -> Segments:

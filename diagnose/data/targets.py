@@ -118,8 +118,8 @@ def position_loss(
 ) -> torch.Tensor:
     """Loss of scores along a turn, which is small if they point at the tooth with the fault.
 
-    The label of a record says that some tooth of a gear is bad. A simulated record also says
-    which one. Without that a network has to find by itself which of all teeth made the label, and
+    The label of a record means that some tooth of a gear is bad. A simulated record also names
+    it. Without that a network has to find by itself which of all teeth made the label, and
     learns the sound teeth of its training gears by heart.
 
     Parameters

@@ -71,7 +71,7 @@ class Task:
         return [available.index(name) for name in self.channel_names]
 
     def part(self, protocol: str, subset: str) -> Task:
-        """The task as one subset of a protocol sees it: with channels of its own in `CROSS_SENSOR`.
+        """The task of one subset of a protocol; `CROSS_SENSOR` has other channels in each.
 
         Raises
         ------

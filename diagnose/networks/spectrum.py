@@ -22,7 +22,7 @@ def log_spectrum(windows: torch.Tensor, floor: float) -> torch.Tensor:
     ----------
     windows : (..., sample), of about unit RMS
     floor : added to the magnitude, whose root mean square is 1 for white noise of unit RMS; bins
-        below it look alike
+        below it are equal
 
     Returns
     -------
@@ -48,7 +48,7 @@ class SpectrumCnn(Network):
     input_scale : (channel,) what the input is divided by; stored with the weights
     floor : see `log_spectrum`
     widths, kernels, strides : channels after each block, its kernel in its input's bins, its stride
-    n_bands : equal parts of the frequency axis that the class scores tell apart
+    n_bands : equal parts of the frequency axis that the class scores distinguish
     dropout : share of pooled features dropped in training
     heads : see `diagnose.settings.HEADS`
     """

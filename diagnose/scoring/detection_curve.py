@@ -15,7 +15,9 @@ PRIOR_SCALE = (
 N_STEPS = 30
 
 
-def fit_curves(size: FloatArray, found: FloatArray, weight: FloatArray) -> FloatArray:
+def fit_curves(
+    size: FloatArray, detected: FloatArray, weight: FloatArray
+) -> FloatArray:
     """Logistic curves of the share found over log size, (resample, 2) intercept and slope.
 
     The log size is standardised to mean 0 and standard deviation 1. A normal prior of standard
@@ -25,7 +27,7 @@ def fit_curves(size: FloatArray, found: FloatArray, weight: FloatArray) -> Float
     Parameters
     ----------
     size : (record,) > 0, of at least two values
-    found : (resample, record) share of the trainings that find each record, 0 to 1
+    detected : (resample, record) share of the trainings that find each record, 0 to 1
     weight : (resample, record) number of times that each record was drawn
 
     Source: hit/miss model with logit link over log size of MIL-HDBK-1823A (2009), "Nondestructive
@@ -39,7 +41,7 @@ def fit_curves(size: FloatArray, found: FloatArray, weight: FloatArray) -> Float
     coefficients = np.zeros((len(weight), 2))
     for _ in range(N_STEPS):
         share = expit(coefficients[:, :1] + coefficients[:, 1:] * scaled)
-        excess = weight * (found - share)
+        excess = weight * (detected - share)
         gradient = np.stack([excess.sum(axis=1), excess @ scaled], axis=1)
         gradient -= coefficients / PRIOR_SCALE**2
         spread = weight * share * (1 - share)
@@ -51,7 +53,7 @@ def fit_curves(size: FloatArray, found: FloatArray, weight: FloatArray) -> Float
         coefficients += np.clip(step, -2.0, 2.0)
     falling = coefficients[:, 1] < 0
     total = np.maximum(weight.sum(axis=1), 1e-12)
-    level = np.clip((weight * found).sum(axis=1) / total, 1e-6, 1 - 1e-6)
+    level = np.clip((weight * detected).sum(axis=1) / total, 1e-6, 1 - 1e-6)
     coefficients[falling, 0] = np.log(level / (1 - level))[falling]
     coefficients[falling, 1] = 0.0
     return coefficients

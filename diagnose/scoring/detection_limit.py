@@ -123,7 +123,7 @@ class _Alarms:
     drawn : (1 + resample, unit) number of times that each unit was drawn
     seeds : (1 + resample, seed) trainings drawn
     weight : (1 + resample, record) number of times that each record was drawn
-    found : (1 + resample, record) share of the drawn trainings that raise an alarm
+    detected : (1 + resample, record) share of the drawn trainings that raise an alarm
     """
 
     judged: Judged
@@ -132,7 +132,7 @@ class _Alarms:
     drawn: CountArray
     seeds: IntArray
     weight: FloatArray
-    found: FloatArray
+    detected: FloatArray
 
     def n_units(self, member: BoolArray) -> int:
         """Number of units of some records."""
@@ -141,7 +141,7 @@ class _Alarms:
     def share(self, member: BoolArray) -> Interval:
         """Share of some records that raise an alarm."""
         weight = self.weight[:, member]
-        alarms = (weight * self.found[:, member]).sum(axis=1)
+        alarms = (weight * self.detected[:, member]).sum(axis=1)
         shares = _ratio(alarms, weight.sum(axis=1))
         return share_with_interval(float(shares[0]), shares[1:], self.n_units(member))
 
@@ -177,11 +177,11 @@ class _Alarms:
     def of_class(self, member: BoolArray, sizes: Sizes) -> dict[str, Any]:
         """Results of one class, without its summary."""
         n_units = self.n_units(member)
-        found, weight = self.found[:, member], self.weight[:, member]
+        detected, weight = self.detected[:, member], self.weight[:, member]
         severity = sizes.get("severity")
         limit_rows: list[dict[str, Any]] = []
         for quantity, size in sizes.items():
-            limit_rows += _limit_rows(quantity, size, found, weight, n_units)
+            limit_rows += _limit_rows(quantity, size, detected, weight, n_units)
         return {
             "n_records": int(member.sum()),
             "n_units": n_units,
@@ -189,7 +189,7 @@ class _Alarms:
             "share_found": self.share(member),
             "by_severity": self.by_severity(severity, member),
             "limits": limit_rows,
-            "curve": _curve(severity, found[:1], weight[:1]),
+            "curve": _curve(severity, detected[:1], weight[:1]),
         }
 
     def by_severity(
@@ -263,7 +263,7 @@ def detection(
         drawn=drawn,
         seeds=seeds,
         weight=drawn[:, judged.unit].astype(float),
-        found=_found(scores, thresholds, seeds),
+        detected=_detected(scores, thresholds, seeds),
     )
     false_alarms = alarms.share(alarms.healthy)
     classes = {}
@@ -313,14 +313,14 @@ def _thresholds(
     return np.stack(thresholds, axis=1), source
 
 
-def _found(
+def _detected(
     scores: FloatArray, thresholds: FloatArray, seeds: IntArray
 ) -> NDArray[np.float32]:
     """(1 + resample, record) share of the trainings drawn whose score is above their threshold."""
-    found = np.empty((len(seeds), scores.shape[1]), dtype=np.float32)
+    detected = np.empty((len(seeds), scores.shape[1]), dtype=np.float32)
     for row, drawn in enumerate(seeds):
-        found[row] = (scores[drawn] > thresholds[row, drawn, None]).mean(axis=0)
-    return found
+        detected[row] = (scores[drawn] > thresholds[row, drawn, None]).mean(axis=0)
+    return detected
 
 
 def _has_curve(size: FloatArray) -> bool:
@@ -328,12 +328,16 @@ def _has_curve(size: FloatArray) -> bool:
 
 
 def _limit_rows(
-    quantity: str, size: FloatArray, found: FloatArray, weight: FloatArray, n_units: int
+    quantity: str,
+    size: FloatArray,
+    detected: FloatArray,
+    weight: FloatArray,
+    n_units: int,
 ) -> list[dict[str, Any]]:
     """Detection limits of one class in one quantity, one row for each of `SHARES`."""
     if not _has_curve(size):
         return []
-    coefficients = fit_curves(size, found, weight)
+    coefficients = fit_curves(size, detected, weight)
     rows = []
     for share in SHARES:
         values = limits(coefficients, size, share)
@@ -360,29 +364,29 @@ def _limit_rows(
 
 
 def _curve(
-    severity: FloatArray | None, found: FloatArray, weight: FloatArray
+    severity: FloatArray | None, detected: FloatArray, weight: FloatArray
 ) -> dict[str, list[float]]:
     """The fitted curve over severity, for figures; empty if there is none."""
     if severity is None or not _has_curve(severity):
         return {"severity": [], "share_found": []}
     at = np.linspace(severity.min(), severity.max(), CURVE_POINTS)
-    share = curve_at(fit_curves(severity, found, weight), at, severity)[0]
+    share = curve_at(fit_curves(severity, detected, weight), at, severity)[0]
     return {"severity": at.tolist(), "share_found": share.tolist()}
 
 
-def _sentence(name: str, found: Mapping[str, Any], false_alarms: Interval) -> str:
-    text = f"{name}: {interval_text(found['share_found'])} of {records_behind(found)} found "
+def _sentence(name: str, result: Mapping[str, Any], false_alarms: Interval) -> str:
+    text = f"{name}: {interval_text(result['share_found'])} of {records_behind(result)} found "
     if false_alarms["mean"] is not None:
         text += f"at {false_alarms['mean']:.0%} false alarms"
-    if too_few_for_curve(found):
+    if too_few_for_curve(result):
         text += f"; from what severity on is not told: {CURVE_NEEDS}"
-    for row in found["limits"]:
+    for row in result["limits"]:
         if row["quantity"] != "severity":
             continue
         text += f"; {row['share']:.0%} are found {_limit_text(row)}"
         others = [
             f"{other['quantity']} {_ends(other)}"
-            for other in found["limits"]
+            for other in result["limits"]
             if other["share"] == row["share"]
             and other["quantity"] != "severity"
             and other["status"] == "reached"
@@ -392,14 +396,14 @@ def _sentence(name: str, found: Mapping[str, Any], false_alarms: Interval) -> st
     return text + "."
 
 
-def records_behind(found: Mapping[str, Any]) -> str:
+def records_behind(result: Mapping[str, Any]) -> str:
     """Numbers of records and machines behind the results of a class, in words."""
-    return f"{found['n_records']} records of {found['n_units']} machines"
+    return f"{result['n_records']} records of {result['n_units']} machines"
 
 
-def too_few_for_curve(found: Mapping[str, Any]) -> bool:
+def too_few_for_curve(result: Mapping[str, Any]) -> bool:
     """True if the severity of a class varies, but over too few records for a curve."""
-    return bool(found["by_severity"]) and not found["curve"]["severity"]
+    return bool(result["by_severity"]) and not result["curve"]["severity"]
 
 
 def _limit_text(row: Mapping[str, Any]) -> str:

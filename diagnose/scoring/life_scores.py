@@ -58,13 +58,14 @@ class Snapshots:
 
 
 def interval(
-    said: FloatArray, half_width: float, early_life: float
+    predicted: FloatArray, half_width: float, early_life: float
 ) -> tuple[FloatArray, FloatArray]:
     """Lower and upper ends in h about predictions, (...) each.
 
     The early level stands for itself and all longer lives.
     """
-    return np.maximum(said - half_width, 0.0), np.minimum(said + half_width, early_life)
+    low = np.maximum(predicted - half_width, 0.0)
+    return low, np.minimum(predicted + half_width, early_life)
 
 
 def intervals_hold(n_lives: int, coverage: float) -> bool:
@@ -89,7 +90,7 @@ def phm_score(error: FloatArray, early_life: float) -> FloatArray:
     return np.where(d < 0, np.expm1(-too_early / EARLY), np.expm1(too_late / LATE))
 
 
-def prognostic_horizon(true: FloatArray, said: FloatArray, band: float) -> float:
+def prognostic_horizon(true: FloatArray, predicted: FloatArray, band: float) -> float:
     """Remaining life in h from which on all predictions stay within ``band`` h; 0 if none do.
 
     Source: Saxena, Celaya, Saha, Saha & Goebel (2010), "Metrics for offline evaluation of
@@ -97,8 +98,8 @@ def prognostic_horizon(true: FloatArray, said: FloatArray, band: float) -> float
     Their band is a share of the whole life.
     """
     order = np.argsort(true, kind="stable")
-    true, said = true[order], said[order]
-    inside = np.logical_and.accumulate(np.abs(said - true) <= band)
+    true, predicted = true[order], predicted[order]
+    inside = np.logical_and.accumulate(np.abs(predicted - true) <= band)
     return float(max(true[inside], default=0.0))
 
 
@@ -120,7 +121,7 @@ def conformal_half_width(
 
     Source: Lee, Barber & Willett (2023), "Distribution-free inference with hierarchical data",
     arXiv:2306.06342. It assumes lives that are exchangeable with the calibration lives; snapshots
-    of one life may be as alike as they are.
+    of one life may be arbitrarily similar.
     """
     names, position, counts = np.unique(life, return_inverse=True, return_counts=True)
     weight = 1.0 / ((names.size + 1) * counts[position])
@@ -144,14 +145,15 @@ def by_life(snapshots: Snapshots) -> dict[str, NDArray[Any]]:
         "width_h": snapshots.high - snapshots.low,
     }
     counts = np.bincount(snapshots.life)
+    band = BAND * snapshots.early_life
     last, horizon = np.empty(counts.size), np.empty(counts.size)
     for life in range(counts.size):
         member = snapshots.life == life
-        true, said = snapshots.true[member], snapshots.said[member]
+        true, predicted = snapshots.true[member], snapshots.said[member]
         # at the failure itself there is nothing left to predict
         nearest = np.argmin(np.where(true > 0, true, np.inf))
         last[life] = rows["phm_score"][member][nearest]
-        horizon[life] = prognostic_horizon(true, said, BAND * snapshots.early_life)
+        horizon[life] = prognostic_horizon(true, predicted, band)
     means = {
         name: np.bincount(snapshots.life, weights=row) / counts
         for name, row in rows.items()

@@ -12,7 +12,7 @@ from diagnose.scoring.judged import Judged, resampled_score, score, with_interva
 from diagnose.scoring.metrics import units_drawn
 
 ACCURACY = "balanced_accuracy"
-N_PERMUTATIONS = 9999  # all of them where there are no more
+N_PERMUTATIONS = 9999  # all of them if there are fewer
 
 
 def compare(

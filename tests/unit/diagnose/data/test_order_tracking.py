@@ -1,4 +1,4 @@
-"""Recordings of varying speed, resampled to one speed by tachometer or mesh, give steady answers."""
+"""Order tracking: recordings of varying speed give the answers of steady ones."""
 
 import json
 

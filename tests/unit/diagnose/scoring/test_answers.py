@@ -97,7 +97,7 @@ def test_a_planted_weak_condition_is_named_and_no_other():
 
 
 def test_no_condition_is_named_if_all_are_equal():
-    """Never for perfect answers; for guesses in at most 5 % of studies, so that 5 of 40 are rare."""
+    """Never for perfect answers, and in at most 5 % of studies for guesses: 5 of 40 are rare."""
     label, unit = records()
     rng = np.random.default_rng(2)
     named = 0
