@@ -60,7 +60,7 @@ def typical_extremes(signals: Array, crank_angle: Array) -> tuple[Array, Array]:
         ]
     )
     least, greatest = np.median(found, axis=0)
-    return np.asarray(least), np.asarray(greatest)
+    return least, greatest
 
 
 def order_amplitudes(signals: Array, crank_angle: Array, n_orders: int) -> Array:
@@ -82,4 +82,4 @@ def order_amplitudes(signals: Array, crank_angle: Array, n_orders: int) -> Array
     orders = 0.5 * np.arange(1, n_orders + 1)
     # an order at a time: all of them for a minute of samples would fill the memory
     found = [np.abs((rest * weight) @ np.exp(-1j * order * angle)) for order in orders]
-    return np.asarray(2.0 / weight.sum() * np.array(found).T)
+    return 2.0 / weight.sum() * np.array(found).T

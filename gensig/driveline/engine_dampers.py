@@ -230,7 +230,7 @@ def crank_of_passes(
     way = (
         roll + strength.pair.base_pitch * np.array(passes)[:, None] - start
     )  # of the pinion since crank angle 0
-    return np.asarray(way / (pinion.base_radius * ratio))
+    return way / (pinion.base_radius * ratio)
 
 
 def _driving(line: EngineLine, mesh: int) -> LineGear:

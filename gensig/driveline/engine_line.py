@@ -110,9 +110,7 @@ class EngineLine:
         """Torques on the degrees of freedom, (dof, point) N m."""
         rows = torques.on(self.drive.numbers)
         n_dofs = len(self.drive.matrices().mass)
-        return np.asarray(
-            np.concatenate([rows, np.zeros((n_dofs - len(rows), rows.shape[1]))])
-        )
+        return np.concatenate([rows, np.zeros((n_dofs - len(rows), rows.shape[1]))])
 
     def response(self, speed: float, torque: float | None) -> SteadyResponse:
         """Steady vibration at a speed of the crank (rad/s) and a brake torque (N m)."""

@@ -314,7 +314,7 @@ def _tables(
 ) -> Array:
     """Torques on the degrees of freedom over the cycle of the crank, (dof, point) N m."""
     on_nodes = machine.torques(speed, torque).on(machine.drive.numbers)
-    return np.asarray(matrices.expand[: len(on_nodes)].T @ on_nodes)
+    return matrices.expand[: len(on_nodes)].T @ on_nodes
 
 
 def _torques(
@@ -385,7 +385,7 @@ def _table_times(course: EngineCourse) -> Array:
     if n_tables < 2:
         return course.time[:1]
     places = np.searchsorted(gone, np.linspace(0.0, gone[-1], n_tables)[1:-1])
-    return np.asarray(course.time[np.unique([0, *places, len(gone) - 1])])
+    return course.time[np.unique([0, *places, len(gone) - 1])]
 
 
 def _crank(machine: EngineLine, matrices: LineMatrices) -> int:

@@ -78,7 +78,7 @@ class Sweep:
     def difference(self) -> Array:
         """Fluctuation up less down over their mean, (node, bin)."""
         up, down = self.up.fluctuation, self.down.fluctuation
-        return np.asarray(2.0 * (up - down) / (up + down))
+        return 2.0 * (up - down) / (up + down)
 
     @property
     def told_apart(self) -> Array:
@@ -230,6 +230,6 @@ def amplitude_spectra(
     window = np.hanning(n_samples)
     frequencies = np.asarray(np.fft.rfftfreq(n_samples, 1.0 / RATE), dtype=np.float64)
     shown = frequencies <= highest
-    return frequencies[shown], np.asarray(
+    return frequencies[shown], (
         2.0 / window.sum() * np.abs(np.fft.rfft(rest * window))[:, shown]
     )

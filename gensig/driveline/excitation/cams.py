@@ -122,7 +122,7 @@ def follower_force(
             f"the follower leaves its cam at {speed * 30.0 / math.pi:.4g} r/min of the camshaft: the spring lacks "
             f"{-force.min():.4g} N; raise spring_preload_n or spring_rate_n_per_m"
         )
-    return np.asarray(force)
+    return force
 
 
 def cam_torque(
@@ -144,4 +144,4 @@ def cam_torque(
     force = follower_force(cam, angle, speed, load)
     lift, slope, _ = cam.motion(angle)
     friction = cam.friction_coefficient * force * (cam.base_radius + lift)
-    return np.asarray(-(force * slope + friction))
+    return -(force * slope + friction)

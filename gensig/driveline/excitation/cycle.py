@@ -76,7 +76,7 @@ class Cylinder:
     def volume(self, angle: Array) -> Array:
         """Volume of the gas, m3, at crank angles in rad."""
         clearance = self.swept_volume / (self.compression_ratio - 1.0)
-        return np.asarray(clearance + self.piston_area * self.piston_travel(angle))
+        return clearance + self.piston_area * self.piston_travel(angle)
 
     def piston_travel(self, angle: Array) -> Array:
         """Way of the piston from top dead center, m.
@@ -85,15 +85,13 @@ class Cylinder:
         """
         ratio = self.crank_to_rod_ratio
         rod = np.sqrt(1.0 - np.square(ratio * np.sin(angle)))
-        return np.asarray(
-            self.crank_radius * (1.0 - np.cos(angle) + (1.0 - rod) / ratio)
-        )
+        return self.crank_radius * (1.0 - np.cos(angle) + (1.0 - rod) / ratio)
 
     def piston_rate(self, angle: Array) -> Array:
         """Slope dx/da, m/rad."""
         ratio, sine, cosine = self.crank_to_rod_ratio, np.sin(angle), np.cos(angle)
         rod = np.sqrt(1.0 - np.square(ratio * sine))
-        return np.asarray(self.crank_radius * (sine + ratio * sine * cosine / rod))
+        return self.crank_radius * (sine + ratio * sine * cosine / rod)
 
     def piston_curvature(self, angle: Array) -> Array:
         """Second slope d2x/da2, m/rad2."""
@@ -102,7 +100,7 @@ class Cylinder:
         bend = (np.square(cosine) - np.square(sine)) / rod + np.square(
             ratio * sine * cosine
         ) / rod**3
-        return np.asarray(self.crank_radius * (cosine + ratio * bend))
+        return self.crank_radius * (cosine + ratio * bend)
 
 
 def gas_torque(
@@ -121,7 +119,7 @@ def gas_torque(
     By virtual work, so that its mean over the cycle is the work over 4 pi. Same as eq. (18) of the engine paper,
     pi/4 D^2 R times the tangential pressure. Assumes a piston pin on the cylinder's axis.
     """
-    return np.asarray(
+    return (
         (pressure - crankcase_pressure)
         * cylinder.piston_area
         * cylinder.piston_rate(angle)
@@ -145,7 +143,7 @@ def inertia_torque(cylinder: Cylinder, angle: Array, speed: float) -> Array:
     be in the inertia of the throw; that it varies with the vibration is left out.
     """
     rate, curvature = cylinder.piston_rate(angle), cylinder.piston_curvature(angle)
-    return np.asarray(-cylinder.reciprocating_mass * speed**2 * rate * curvature)
+    return -cylinder.reciprocating_mass * speed**2 * rate * curvature
 
 
 def cycle_angles(n_points: int) -> Array:
@@ -158,4 +156,4 @@ def delayed(torque: Array, delay: float) -> Array:
     angle later, (point,).
     """
     angle = cycle_angles(len(torque))
-    return np.asarray(np.interp(angle - delay, angle, torque, period=CYCLE))
+    return np.interp(angle - delay, angle, torque, period=CYCLE)

@@ -200,4 +200,4 @@ def read_pressure(given: PressureFile, n_points: int) -> Array:
         )
     if gaps[-1] < 1e-9 * CYCLE:  # both ends of the cycle are given: they are one
         angle, pressure = angle[:-1], pressure[:-1]
-    return np.asarray(np.interp(cycle_angles(n_points), angle, pressure, period=CYCLE))
+    return np.interp(cycle_angles(n_points), angle, pressure, period=CYCLE)

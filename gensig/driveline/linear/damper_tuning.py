@@ -76,7 +76,7 @@ class SeenFromNodes:
             )
         matrix = np.eye(len(self.nodes)) + stiffness[..., :, None] * self.receptance
         torque = -np.linalg.solve(matrix, (stiffness * self.angle)[..., None])[..., 0]
-        return np.asarray(self.force + np.sum(self.transfer * torque, axis=-1))
+        return self.force + np.sum(self.transfer * torque, axis=-1)
 
     def largest_force(
         self, dampers: Sequence[TorsionalDamper], *, n_points: int | None = None
@@ -87,9 +87,7 @@ class SeenFromNodes:
         """
         amplitudes = self.force_with(dampers)
         points = 8 * amplitudes.shape[-1] if n_points is None else n_points
-        return np.asarray(
-            np.abs(self.mean[:, None] + over_cycle(amplitudes, points)).max(axis=1)
-        )
+        return np.abs(self.mean[:, None] + over_cycle(amplitudes, points)).max(axis=1)
 
 
 def seen_from_nodes(

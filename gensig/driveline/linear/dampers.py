@@ -59,7 +59,7 @@ class TorsionalDamper:
         w = np.asarray(frequency, dtype=float)
         hold = self.stiffness + 1j * w * self.damping
         mass = np.square(w) * self.ring_inertia
-        return np.asarray(-mass * hold / (hold - mass))
+        return -mass * hold / (hold - mass)
 
 
 def with_dampers(

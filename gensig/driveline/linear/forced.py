@@ -59,7 +59,7 @@ class LinearLine:
         rad/s.
         """
         w = np.asarray(frequency, dtype=float)[:, None, None]
-        return np.asarray(
+        return (
             self.stiffness
             + 1j * (self.loss + w * self.damping)
             - np.square(w) * self.mass
@@ -99,11 +99,11 @@ class Elements:
 
     def stiffness_matrix(self) -> Array:
         """Sum of stiffness times d d^T, (dof, dof)."""
-        return np.asarray((self.directions.T * self.stiffness) @ self.directions)
+        return (self.directions.T * self.stiffness) @ self.directions
 
     def loss_matrix(self) -> Array:
         """Its imaginary part, (dof, dof)."""
-        return np.asarray((self.directions.T * self.loss) @ self.directions)
+        return (self.directions.T * self.loss) @ self.directions
 
 
 class Matrices(Protocol):
@@ -177,7 +177,7 @@ class SteadyResponse:
     @property
     def speed_deviation(self) -> ComplexArray:
         """Complex amplitudes of the speed, (dof, order) rad/s."""
-        return np.asarray(1j * self.speed * self.orders * self.angle)
+        return 1j * self.speed * self.orders * self.angle
 
     def speed_over_cycle(self, n_points: int) -> Array:
         """Deviation of the speed from its mean over the cycle, (dof, point) rad/s."""
@@ -188,9 +188,7 @@ class SteadyResponse:
 
         What is printed as plus or minus.
         """
-        return np.asarray(
-            0.5 * np.ptp(self.speed_over_cycle(32 * len(self.orders)), axis=1)
-        )
+        return 0.5 * np.ptp(self.speed_over_cycle(32 * len(self.orders)), axis=1)
 
     def element_forces(self, elements: Elements) -> tuple[Array, ComplexArray]:
         """Mean (element,) and complex amplitudes (element, order) of what the elements carry, N m
@@ -198,8 +196,8 @@ class SteadyResponse:
         """
         complex_stiffness = elements.stiffness + 1j * elements.loss
         return (
-            np.asarray(elements.stiffness * (elements.directions @ self.twist)),
-            np.asarray(complex_stiffness[:, None] * (elements.directions @ self.angle)),
+            (elements.stiffness * (elements.directions @ self.twist)),
+            (complex_stiffness[:, None] * (elements.directions @ self.angle)),
         )
 
 
@@ -218,7 +216,7 @@ def over_cycle(amplitudes: ComplexArray, n_points: int) -> Array:
         )
     spectrum = np.zeros((*amplitudes.shape[:-1], n_points // 2 + 1), dtype=complex)
     spectrum[..., 1 : n_orders + 1] = 0.5 * n_points * amplitudes
-    return np.asarray(np.fft.irfft(spectrum, n_points, axis=-1))
+    return np.fft.irfft(spectrum, n_points, axis=-1)
 
 
 def cycle_orders(torque: Array, n_orders: int) -> tuple[Array, ComplexArray]:
@@ -235,9 +233,7 @@ def cycle_orders(torque: Array, n_orders: int) -> tuple[Array, ComplexArray]:
             f"n_orders = {n_orders} must lie in 1..{(n_points - 1) // 2}: there are {n_points} points"
         )
     spectrum = np.fft.rfft(torque, axis=-1) / n_points
-    return np.asarray(spectrum[..., 0].real), np.asarray(
-        2.0 * spectrum[..., 1 : n_orders + 1]
-    )
+    return (spectrum[..., 0].real), (2.0 * spectrum[..., 1 : n_orders + 1])
 
 
 def steady_response(
@@ -273,7 +269,7 @@ def disturbance_response(
     """
     force = np.zeros((1, len(line.mass)), dtype=complex)
     force[0, dof] = torque
-    return np.asarray(line.response(force, np.array([frequency]))[0])
+    return line.response(force, np.array([frequency]))[0]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -366,4 +362,4 @@ def _mean_twist(line: LinearLine, mean: Array) -> Array:
         twist = twist - free @ np.linalg.solve(
             free.T @ line.mass @ free, free.T @ (line.mass @ twist)
         )
-    return np.asarray(twist)
+    return twist

@@ -53,7 +53,7 @@ class LineMatrices:
     @property
     def whole_stiffness(self) -> Array:
         """Stiffness with every mesh held at its own, (dof, dof)."""
-        return np.asarray(
+        return (
             self.stiffness + (self.directions.T * self.mesh_stiffness) @ self.directions
         )
 
@@ -62,7 +62,7 @@ class LineMatrices:
         """What each mesh has to accelerate along its line of action if all else is let go,
         (mesh,) kg.
         """
-        return np.asarray(1.0 / np.sum(self.directions**2 / np.diag(self.mass), axis=1))
+        return 1.0 / np.sum(self.directions**2 / np.diag(self.mass), axis=1)
 
 
 def line_matrices(

@@ -200,7 +200,7 @@ def loaded_gap(approach: Array, stiffness: Array, force: float) -> Array:
     ``mesh.slices`` gives them for a helical pair: e = approach - F / k, so that the mesh is where
     statics put it under that force.
     """
-    return np.asarray(approach - force / stiffness)
+    return approach - force / stiffness
 
 
 def pair_mesh(

@@ -210,7 +210,7 @@ def static_start(
         raise SimulationError(
             "line: it does not come to rest under its mean torques; give a start, or check torques and springs"
         )
-    return np.asarray(q[np.argsort(order)])
+    return q[np.argsort(order)]
 
 
 class _Run:
