@@ -12,11 +12,11 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.driveline.linear.matrices import LineMatrices
 from gensig.errors import SimulationError
 
 Array = NDArray[np.float64]
@@ -73,15 +73,13 @@ class LinearLine:
         ------
         SimulationError    where an undamped line is excited at its own frequency
         """
+        dynamic = self.dynamic_stiffness(frequency)
         try:
-            found = np.linalg.solve(
-                self.dynamic_stiffness(frequency), force[..., None]
-            )[..., 0]
+            return np.asarray(np.linalg.solve(dynamic, force[..., None])[..., 0])
         except np.linalg.LinAlgError:
             raise SimulationError(
                 "an undamped line is excited at its natural frequency; give it damping"
             ) from None
-        return np.asarray(found)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -106,43 +104,7 @@ class Elements:
         return (self.directions.T * self.loss) @ self.directions
 
 
-class Matrices(Protocol):
-    """A line with its gear meshes apart, each with a direction (dof,) along its line of action."""
-
-    @property
-    def mass(self) -> Array:
-        """(dof, dof)."""
-
-    @property
-    def damping(self) -> Array:
-        """(dof, dof), viscous."""
-
-    @property
-    def stiffness(self) -> Array:
-        """(dof, dof), without the meshes."""
-
-    @property
-    def loss_stiffness(self) -> Array:
-        """(dof, dof), loss factor times stiffness."""
-
-    @property
-    def directions(self) -> Array:
-        """(mesh, dof)."""
-
-    @property
-    def mesh_stiffness(self) -> Array:
-        """(mesh,) N/m."""
-
-    @property
-    def mesh_loss_factor(self) -> Array:
-        """(mesh,)."""
-
-    @property
-    def mesh_damping(self) -> Array:
-        """(mesh,) N s/m."""
-
-
-def closed_line(matrices: Matrices) -> tuple[LinearLine, Elements]:
+def closed_line(matrices: LineMatrices) -> tuple[LinearLine, Elements]:
     """A line whose meshes never lose contact, each a spring of its stiffness, and those meshes."""
     meshes = Elements(
         directions=matrices.directions,
@@ -196,8 +158,8 @@ class SteadyResponse:
         """
         complex_stiffness = elements.stiffness + 1j * elements.loss
         return (
-            (elements.stiffness * (elements.directions @ self.twist)),
-            (complex_stiffness[:, None] * (elements.directions @ self.angle)),
+            elements.stiffness * (elements.directions @ self.twist),
+            complex_stiffness[:, None] * (elements.directions @ self.angle),
         )
 
 
@@ -233,7 +195,7 @@ def cycle_orders(torque: Array, n_orders: int) -> tuple[Array, ComplexArray]:
             f"n_orders = {n_orders} must lie in 1..{(n_points - 1) // 2}: there are {n_points} points"
         )
     spectrum = np.fft.rfft(torque, axis=-1) / n_points
-    return (spectrum[..., 0].real), (2.0 * spectrum[..., 1 : n_orders + 1])
+    return spectrum[..., 0].real, 2.0 * spectrum[..., 1 : n_orders + 1]
 
 
 def steady_response(
@@ -320,19 +282,20 @@ def run_of_speeds(
     -----
     Steady at every speed: a run-up that is slow against the line's decay. Up and down are then the same.
     """
-    found = [
+    responses = [
         steady_response(line, torques(speed), speed, n_orders=n_orders)
         for speed in speeds
     ]
-    if not found:
+    if not responses:
         raise ValueError("no speed is given")
-    fluctuations = [one.fluctuation() for one in found]
+    angle = np.array([response.angle for response in responses])
+    fluctuation = np.array([response.fluctuation() for response in responses])
     return [
         Waterfall(
-            speeds=np.array([one.speed for one in found]),
-            orders=found[0].orders,
-            angle=np.abs(np.array([one.angle[dof] for one in found])),
-            fluctuation=np.array([one[dof] for one in fluctuations]),
+            speeds=np.array([response.speed for response in responses]),
+            orders=responses[0].orders,
+            angle=np.abs(angle[:, dof]),
+            fluctuation=fluctuation[:, dof],
         )
         for dof in dofs
     ]
