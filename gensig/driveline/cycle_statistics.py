@@ -33,7 +33,8 @@ def whole_cycles(crank_angle: Array) -> list[slice]:
     n_cycles = int(since[-1] / CYCLE)
     if n_cycles < 1:
         raise ConfigError(
-            f"the crank turns by {since[-1]:.3g} rad, less than a cycle of two turns; simulate longer"
+            f"the crank turns by {since[-1]:.3g} rad, less than a cycle of two turns; "
+            "simulate longer"
         )
     edges = np.searchsorted(since, CYCLE * np.arange(n_cycles + 1))
     return [slice(int(a), int(b)) for a, b in pairwise(edges)]

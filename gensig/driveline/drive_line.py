@@ -1,4 +1,4 @@
-"""A drive line from two tables, or a single pair as one: what its modes are asked of."""
+"""A drive line from two tables, or from a single pair."""
 
 from __future__ import annotations
 
@@ -90,15 +90,8 @@ class DriveLine:
         """
         if self.campbell.orders is not None:
             return self.campbell.orders
-        return tuple(
-            sorted(
-                {
-                    factor * order
-                    for order in (1.0, *self.mesh_orders)
-                    for factor in (1.0, 2.0)
-                }
-            )
-        )
+        orders = 1.0, *self.mesh_orders
+        return tuple(sorted({*orders, *(2.0 * order for order in orders)}))
 
 
 def read_drive_line(config: Configuration) -> DriveLine:
@@ -111,21 +104,21 @@ def read_drive_line(config: Configuration) -> DriveLine:
     options = read_options(config.section("system"))
     if options.shafting_csv is None:
         raise ConfigError(
-            f"system.shafting_csv is required: give a path, or one of {', '.join(shipped_tables())}; "
+            "system.shafting_csv is required: give a path, or one of "
+            f"{', '.join(shipped_tables())}; "
             "docs/howto/your_drive_line.md says what is in it"
         )
     material = read_material(config)
     shafting = read_shafting("system.shafting_csv", options.shafting_csv)
-    gear_rows = (
-        []
-        if options.gears_csv is None
-        else read_gears("system.gears_csv", options.gears_csv)
-    )
+    gear_rows = []
+    if options.gears_csv is not None:
+        gear_rows = read_gears("system.gears_csv", options.gears_csv)
     node_rows = rows_of_nodes(shafting)
     numbers = tuple(node_rows)
     if options.viscous_damper_node not in (None, *numbers):
         raise ConfigError(
-            f"system.viscous_damper_node = {options.viscous_damper_node}: {options.shafting_csv} has no such node"
+            f"system.viscous_damper_node = {options.viscous_damper_node}: "
+            f"{options.shafting_csv} has no such node"
         )
     shapes = [gear_of(row) for row in gear_rows]
     gears = [
@@ -147,6 +140,9 @@ def read_drive_line(config: Configuration) -> DriveLine:
             meshes.append(mesh)
         else:
             shafts.append(shaft_of(row, ends, options.loss_factor))
+    support_force = None
+    if options.lateral:
+        support_force = options.support.force
     line = ShaftLine(
         nodes=nodes, shafts=tuple(shafts), gears=tuple(gears), meshes=tuple(meshes)
     )
@@ -164,14 +160,14 @@ def read_drive_line(config: Configuration) -> DriveLine:
         slices_helical=options.helical_meshes == "sliced",
         motor_node=options.motor_node,
         load_node=options.load_node,
-        support_force=options.support.force if options.lateral else None,
+        support_force=support_force,
     )
 
 
 def drive_line_of_pair(system: GearPairMachine, name: str) -> DriveLine:
-    """A single pair, with its motor and load, as the line of two to four nodes that it is;
-    without the soft drive.
+    """A single pair, with its motor and load, as a line of two to four nodes.
 
+    Without the soft drive.
     The mesh is held at the mean stiffness of sound teeth under the set torque.
     """
     dynamics = pair_dynamics(Run(system=system, faults=()))

@@ -63,10 +63,11 @@ class DynamicRootStress:
     ----------
     strength : the pair under the greatest force as if it stood still
     gears : ISO's stress and safety of both gears under that force
-    history : the same over the mesh, wherever the greatest force falls: the bound of what a tooth can see
-    passes : by gear (pass, point) Pa    over ``history.roll``, of each pair that meets during a cycle as the teeth are
-        keyed (``mesh_phase``); the load share is that under the greatest force, and a force that would part the mesh
-        bends nothing here
+    history : the same over the mesh, wherever the greatest force falls: the bound of what a
+        tooth can see
+    passes : by gear (pass, point) Pa    over ``history.roll``, of each pair that meets during a
+        cycle as the teeth are keyed (``mesh_phase``); the load share is that under the greatest
+        force, and a force that would part the mesh bends nothing here
     """
 
     strength: RootStrength
@@ -181,7 +182,8 @@ def dynamic_root_stress(
     """
     if not load.greatest > 0.0:
         raise ConfigError(
-            f"mesh {line.mesh_names[mesh]}: its force never closes the driving flanks; swap edge_from and edge_to of "
+            f"mesh {line.mesh_names[mesh]}: its force never closes the driving "
+            "flanks; swap edge_from and edge_to of "
             "its row"
         )
     radius = strength.pair.pinion.base_radius

@@ -64,13 +64,15 @@ def _record_mesh(engine: EngineLine) -> int:
     drive, names = engine.drive, engine.mesh_names
     if drive.record_mesh is None:
         raise ConfigError(
-            f"system.record_mesh = null: records follow the teeth of one mesh; give its two nodes, one of "
+            "system.record_mesh = null: records follow the teeth of one mesh; give "
+            "its two nodes, one of "
             f"{', '.join(names) or 'none: this line has no mesh'}"
         )
     wanted = "/".join(str(node) for node in drive.record_mesh)
     if wanted not in names:
         raise ConfigError(
-            f"system.record_mesh = {list(drive.record_mesh)}: no such mesh; there are {', '.join(names)}, the driving "
+            f"system.record_mesh = {list(drive.record_mesh)}: no such mesh; there are "
+            f"{', '.join(names)}, the driving "
             "node first"
         )
     return names.index(wanted)

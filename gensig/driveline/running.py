@@ -95,7 +95,8 @@ class EngineCourse:
             )
         if not self.speed.min() > 0.0:
             raise ConfigError(
-                f"the speed of the crank, {self.speed.min() * 30.0 / math.pi:g} r/min, must be positive"
+                f"the speed of the crank, {self.speed.min() * 30.0 / math.pi:g} "
+                "r/min, must be positive"
             )
 
 

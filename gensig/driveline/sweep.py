@@ -125,7 +125,8 @@ def sweep_response(
     if n_bins < 2:
         least = 2.0 * CYCLE * LEAST_CYCLES / low
         raise ConfigError(
-            f"a sweep in {seconds:g} s passes too few cycles at its low end; give {least:.2g} s or more"
+            f"a sweep in {seconds:g} s passes too few cycles at its low end; give "
+            f"{least:.2g} s or more"
         )
     course = sweep_course(low, high, seconds, torque)
     share = course.speed / machine.engine.reference.speed

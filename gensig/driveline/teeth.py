@@ -31,8 +31,10 @@ from gensig.sensing.manufacturing import Specimen
 
 Array = NDArray[np.float64]
 
-SOUND_NODES = 128  # most of a pitch of sound helical teeth: short tables are read faster, and these ripple slowly
-FORCES_PER_OCTAVE = 2  # at which sound helical teeth are tabulated: chords reach over all depths of bite
+# most of a pitch of sound helical teeth: short tables are read faster, and these ripple slowly
+SOUND_NODES = 128
+# at which sound helical teeth are tabulated: chords reach over all depths of bite
+FORCES_PER_OCTAVE = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,11 +78,13 @@ def require_drive(pair: GearPair, slices: SliceOptions) -> None:
         pair.require_continuous_drive()
     elif slices.slices_in_phase:
         raise ConfigError(
-            "mesh.slices_in_phase = true is for comparing statics; a line has the helix in: take false"
+            "mesh.slices_in_phase = true is for comparing statics; a line has the "
+            "helix in: take false"
         )
     elif pair.total_contact_ratio < 1.0:
         raise GeometryError(
-            f"the total contact ratio {pair.total_contact_ratio:.4f} is below 1, so the drive is interrupted at every "
+            f"the total contact ratio {pair.total_contact_ratio:.4f} is below 1, so "
+            "the drive is interrupted at every "
             f"tooth; use more teeth, a wider face or a larger helix angle"
         )
 
@@ -94,16 +98,15 @@ def sound_meshes(
     """
     n_nodes = min(law.options.points_per_pitch, SOUND_NODES)
     thin = replace(law, options=replace(law.options, points_per_pitch=n_nodes))
-    found = {}
+    meshes = {}
     for place, pair in enumerate(machine.drive.pairs):
-        if place not in besides and (
-            machine.drive.slices_helical or pair.pinion.helix_angle == 0.0
-        ):
-            own = law if pair.pinion.helix_angle == 0.0 else thin
-            found[place] = OwnMesh(
-                table=_table_in_line(machine, own, place, (), float(forces[place]))
-            )
-    return found
+        is_helical = pair.pinion.helix_angle != 0.0
+        if place in besides or (is_helical and not machine.drive.slices_helical):
+            continue
+        law_of_pair = (law, thin)[is_helical]
+        table = _table_in_line(machine, law_of_pair, place, (), float(forces[place]))
+        meshes[place] = OwnMesh(table=table)
+    return meshes
 
 
 def _table_in_line(
@@ -160,7 +163,7 @@ def neighbour_meshes(
         seen = [one for one in seen if not one.of_mounting]
         errors = [np.zeros(gear.n_teeth) for gear in _gears(machine.drive.pairs[other])]
         if here == there:
-            errors[there] = specimen.wheel_error if here else specimen.pinion_error
+            errors[there] = (specimen.pinion_error, specimen.wheel_error)[here]
         else:
             seen = [felt for one in seen if (felt := one.on_other_flank()) is not None]
         carried = tuple(replace(one, gear=SIDES[there]) for one in seen)

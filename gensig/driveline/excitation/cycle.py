@@ -46,16 +46,19 @@ class Cylinder:
                 )
         if not 0.0 < self.crank_to_rod_ratio < 1.0:
             raise ConfigError(
-                f"excitation.cylinder.crank_to_rod_ratio = {self.crank_to_rod_ratio:g} must lie between 0 and 1; "
+                "excitation.cylinder.crank_to_rod_ratio = "
+                f"{self.crank_to_rod_ratio:g} must lie between 0 and 1; "
                 "it is the crank's radius over the length of the connecting rod"
             )
         if not self.compression_ratio > 1.0:
             raise ConfigError(
-                f"excitation.cylinder.compression_ratio = {self.compression_ratio:g} must be above 1"
+                f"excitation.cylinder.compression_ratio = {self.compression_ratio:g} "
+                "must be above 1"
             )
         if not self.reciprocating_mass >= 0.0:
             raise ConfigError(
-                f"excitation.cylinder.reciprocating_mass_kg = {self.reciprocating_mass:g} must not be negative"
+                "excitation.cylinder.reciprocating_mass_kg = "
+                f"{self.reciprocating_mass:g} must not be negative"
             )
 
     @property
@@ -116,8 +119,9 @@ def gas_torque(
 
     Notes
     -----
-    By virtual work, so that its mean over the cycle is the work over 4 pi. Same as eq. (18) of the engine paper,
-    pi/4 D^2 R times the tangential pressure. Assumes a piston pin on the cylinder's axis.
+    By virtual work, so that its mean over the cycle is the work over 4 pi. Same as eq. (18) of
+    the engine paper, pi/4 D^2 R times the tangential pressure. Assumes a piston pin on the
+    cylinder's axis.
     """
     return (
         (pressure - crankcase_pressure)
@@ -137,10 +141,11 @@ def inertia_torque(cylinder: Cylinder, angle: Array, speed: float) -> Array:
 
     Notes
     -----
-    Its series to l^2 is m R^2 w^2 (l/4 sin a - 1/2 sin 2a - 3l/4 sin 3a - l^2/4 sin 4a): eq. (19) of the engine paper
-    without the minus printed before it, which makes it the torque that the mass opposes to the rotation. It is the
-    derivative of a periodic energy and does no work over a turn. The mean of the mass's varying inertia is taken to
-    be in the inertia of the throw; that it varies with the vibration is left out.
+    Its series to l^2 is m R^2 w^2 (l/4 sin a - 1/2 sin 2a - 3l/4 sin 3a - l^2/4 sin 4a): eq.
+    (19) of the engine paper without the minus printed before it, which makes it the torque that
+    the mass opposes to the rotation. It is the derivative of a periodic energy and does no work
+    over a turn. The mean of the mass's varying inertia is taken to be in the inertia of the
+    throw; that it varies with the vibration is left out.
     """
     rate, curvature = cylinder.piston_rate(angle), cylinder.piston_curvature(angle)
     return -cylinder.reciprocating_mass * speed**2 * rate * curvature

@@ -50,14 +50,11 @@ def read_engine(values: Section) -> Engine:
         )
     if "motor" in values:
         raise ConfigError(
-            f"{PLACE}.motor is of a motor, {PLACE}.kind = engine of an engine: a line is turned by one of them; take "
+            f"{PLACE}.motor is of a motor, {PLACE}.kind = engine of an engine: a line "
+            "is turned by one of them; take "
             "excitation=engine_v20 or excitation=motor_and_load"
         )
-    for key in values:
-        if key not in KEYS:
-            raise ConfigError(f"{PLACE}: unknown key '{key}'; known: {', '.join(KEYS)}")
-    if missing := [key for key in KEYS if key not in values]:
-        raise ConfigError(f"{PLACE}: missing {', '.join(missing)}")
+    check_keys(values, KEYS)
     plunger, plunger_nodes = _read_pump(values["injection_pump"])
     return Engine(
         cylinder=read(Cylinder, values["cylinder"], f"{PLACE}.cylinder"),
@@ -85,6 +82,15 @@ def read_engine(values: Section) -> Engine:
     )
 
 
+def check_keys(values: Section, keys: tuple[str, ...]) -> None:
+    """Raise for keys of the group ``excitation`` that are unknown or missing."""
+    for key in values:
+        if key not in keys:
+            raise ConfigError(f"{PLACE}: unknown key '{key}'; known: {', '.join(keys)}")
+    if missing := [key for key in keys if key not in values]:
+        raise ConfigError(f"{PLACE}: missing {', '.join(missing)}")
+
+
 def read_wheels(values: Section) -> dict[str, ToothedWheel]:
     """The toothed wheels of the group ``excitation``, by their names; none where it is null."""
     check_group(PLACE, values)
@@ -108,48 +114,38 @@ def _read_pressure(values: Any) -> WiebeCycle | PressureFile:
 
 
 def _read_train(name: str, values: Any) -> ValveTrain:
-    place = f"{PLACE}.valves.{name}"
-    check_group(place, values)
-    own = {key: one for key, one in values.items() if key != "cam"}
-    return read(
-        ValveTrain,
-        own,
-        place,
-        cam=read_named(Cam, values.get("cam"), f"valves.{name}.cam", "cam"),
-    )
+    train: ValveTrain = _read_with_cam(ValveTrain, values, f"valves.{name}")
+    return train
+
+
+def _read_with_cam(
+    cls: type[Any], values: Any, place: str, left_out: tuple[str, ...] = ()
+) -> Any:
+    """A dataclass with a cam; keys of ``left_out`` are read elsewhere."""
+    check_group(f"{PLACE}.{place}", values)
+    given = {key: values[key] for key in values if key not in ("cam", *left_out)}
+    cam = read_named(Cam, values.get("cam"), f"{place}.cam", "cam")
+    return read(cls, given, f"{PLACE}.{place}", cam=cam)
 
 
 def _read_pump(values: Any) -> tuple[Plunger | None, dict[str, int]]:
-    """The plunger and its node for each cylinder.
+    """The plunger, and for each cylinder the node of its plunger.
 
     Null is an engine without this pump, with a common rail.
     """
     if values is None:
         return None, {}
-    place = f"{PLACE}.injection_pump"
-    check_group(place, values)
-    own = {
-        key: one
-        for key, one in values.items()
-        if key not in ("cam", "nodes", "cylinders")
-    }
-    nodes, cylinders = (
-        _whole_numbers("injection_pump.nodes", values.get("nodes")),
-        values.get("cylinders"),
-    )
-    if (
-        not isinstance(cylinders, list | tuple)
-        or len(set(cylinders)) != len(nodes)
-        or len(cylinders) != len(nodes)
-    ):
+    check_group(f"{PLACE}.injection_pump", values)
+    nodes = _whole_numbers("injection_pump.nodes", values.get("nodes"))
+    cylinders = values.get("cylinders")
+    is_list = isinstance(cylinders, list | tuple)
+    if not is_list or not len(set(cylinders)) == len(cylinders) == len(nodes):
         raise ConfigError(
-            f"{place}.cylinders must name a different cylinder for each of its {len(nodes)} nodes"
+            f"{PLACE}.injection_pump.cylinders must name a different cylinder for "
+            f"each of its {len(nodes)} nodes"
         )
-    plunger = read(
-        Plunger,
-        own,
-        place,
-        cam=read_named(Cam, values.get("cam"), "injection_pump.cam", "cam"),
+    plunger = _read_with_cam(
+        Plunger, values, "injection_pump", left_out=("nodes", "cylinders")
     )
     return plunger, dict(zip(cylinders, nodes, strict=True))
 

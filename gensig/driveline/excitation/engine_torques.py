@@ -5,9 +5,10 @@ and a load.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,11 +58,13 @@ class Dynamometer:
     def __post_init__(self) -> None:
         if not 0.0 <= self.disturbance_share <= 1.0:
             raise ConfigError(
-                f"excitation.dynamometer.disturbance_share = {self.disturbance_share:g} must lie in 0..1"
+                "excitation.dynamometer.disturbance_share = "
+                f"{self.disturbance_share:g} must lie in 0..1"
             )
         if not self.disturbance_frequency > 0.0:
             raise ConfigError(
-                f"excitation.dynamometer.disturbance_frequency_hz = {self.disturbance_frequency:g} must be positive"
+                "excitation.dynamometer.disturbance_frequency_hz = "
+                f"{self.disturbance_frequency:g} must be positive"
             )
 
 
@@ -78,7 +81,7 @@ class ValveTrain:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Engine:
-    """A four-stroke engine: what its configuration says.
+    """A four-stroke engine as configured.
 
     ``throw_nodes`` (throw,) are the nodes of the throws; ``valve_nodes`` gives for each bank the
     nodes of its cams by throw, ``plunger_nodes`` for each cylinder that of its plunger. Either
@@ -103,13 +106,15 @@ class Engine:
         n_throws = len(self.layout.throw_angles)
         if len(self.throw_nodes) != n_throws or len(set(self.throw_nodes)) != n_throws:
             raise ConfigError(
-                f"excitation.throw_nodes has {len(set(self.throw_nodes))} different nodes for {n_throws} throws of "
+                f"excitation.throw_nodes has {len(set(self.throw_nodes))} different "
+                f"nodes for {n_throws} throws of "
                 "excitation.layout.throw_angles_deg"
             )
         for bank, nodes in self.valve_nodes.items():
             if bank not in self.layout.banks:
                 raise ConfigError(
-                    f"excitation.valve_nodes: no bank {bank!r}; there are {', '.join(self.layout.banks)}"
+                    f"excitation.valve_nodes: no bank {bank!r}; there are "
+                    f"{', '.join(self.layout.banks)}"
                 )
             if len(nodes) not in (0, n_throws):
                 raise ConfigError(
@@ -131,7 +136,7 @@ class Engine:
 
     @property
     def pressure_decides_torque(self) -> bool:
-        """Whether the pressure was measured, so that it says what torque the engine gives."""
+        """True with a measured pressure, which gives the torque of the engine."""
         return isinstance(self.pressure, PressureFile)
 
     @property
@@ -196,7 +201,7 @@ def engine_torques(
     *,
     n_points: int = POINTS,
 ) -> EngineTorques:
-    """What acts on the shaft line at a speed and a brake torque.
+    """Torques on the shaft line at a speed and a brake torque.
 
     Parameters
     ----------
@@ -207,12 +212,13 @@ def engine_torques(
 
     Raises
     ------
-    ConfigError    for a torque below the friction, nodes that the line has not, or a camshaft at another ratio
+    ConfigError    for a torque below the friction, nodes that the line has not, or a camshaft
+        at another ratio
 
     Notes
     -----
-    The gas does the work of the brake torque, of friction, of cams, plungers and driven machines, so that the means
-    balance and the line turns steadily.
+    The gas does the work of the brake torque, of friction, of cams, plungers and driven
+    machines, so that the means balance and the line turns steadily.
     """
     _check_nodes(engine, ratios)
     if not speed > 0.0:
@@ -239,9 +245,9 @@ def engine_torques(
         (node, delayed(pulses, firing[name]))
         for name, node in engine.plunger_nodes.items()
     ]
-    parts += [
-        (engine.dynamometer.node, np.array(-brake / ratios[engine.dynamometer.node]))
-    ]
+    dynamometer = engine.dynamometer
+    load_ratio = ratios[dynamometer.node]
+    parts.append((dynamometer.node, np.array(-brake / load_ratio)))
     parts += _cylinder_torques(engine, pressure, speed)
     nodes = tuple(sorted({node for node, _ in parts}))
     torques = np.zeros((len(nodes), n_points))
@@ -256,35 +262,29 @@ def engine_torques(
         pressure=pressure,
         nodes=nodes,
         torque=torques,
-        disturbance_node=engine.dynamometer.node,
-        disturbance_torque=engine.dynamometer.disturbance_share
-        * brake
-        / ratios[engine.dynamometer.node],
-        disturbance_frequency=engine.dynamometer.disturbance_frequency,
+        disturbance_node=dynamometer.node,
+        disturbance_torque=dynamometer.disturbance_share * brake / load_ratio,
+        disturbance_frequency=dynamometer.disturbance_frequency,
     )
 
 
 def _check_nodes(engine: Engine, ratios: Mapping[int, float]) -> None:
     """Every node is there, throws turn with the crank, cams at half its speed."""
-    cams = [node for nodes in engine.valve_nodes.values() for node in nodes] + list(
-        engine.plunger_nodes.values()
-    )
-    wanted: list[tuple[str, int, float | None]] = [
-        ("throw_nodes", node, 1.0) for node in engine.throw_nodes
+    cams = list(chain(*engine.valve_nodes.values(), engine.plunger_nodes.values()))
+    wanted: list[tuple[str, Iterable[int], float | None]] = [
+        ("throw_nodes", engine.throw_nodes, 1.0),
+        ("valve_nodes or injection_pump.nodes", cams, CAM_RATIO),
+        *((f"loads.{name}.node", [x.node], None) for name, x in engine.loads.items()),
+        ("dynamometer.node", [engine.dynamometer.node], None),
     ]
-    wanted += [
-        ("valve_nodes or injection_pump.nodes", node, CAM_RATIO) for node in cams
-    ]
-    wanted += [
-        (f"loads.{name}.node", load.node, None) for name, load in engine.loads.items()
-    ]
-    wanted += [("dynamometer.node", engine.dynamometer.node, None)]
-    for key, node, ratio in wanted:
+    expanded = [(key, node, ratio) for key, nodes, ratio in wanted for node in nodes]
+    for key, node, ratio in expanded:
         if node not in ratios:
             raise ConfigError(f"excitation.{key}: the shaft line has no node {node}")
         if ratio is not None and not math.isclose(ratios[node], ratio, rel_tol=1e-9):
             raise ConfigError(
-                f"excitation.{key}: node {node} turns {ratios[node]:.6g} times as fast as the crank; it needs {ratio:g}"
+                f"excitation.{key}: node {node} turns {ratios[node]:.6g} times as "
+                f"fast as the crank; it needs {ratio:g}"
             )
 
 
@@ -346,12 +346,8 @@ def _fuel(engine: Engine, indicated: float) -> float:
 
 def _indicated(engine: Engine, pressure: Array) -> float:
     """Mean torque of the gas in all cylinders, N m."""
-    torque = gas_torque(
-        engine.cylinder,
-        cycle_angles(len(pressure)),
-        pressure,
-        engine.crankcase_pressure,
-    )
+    angle = cycle_angles(len(pressure))
+    torque = gas_torque(engine.cylinder, angle, pressure, engine.crankcase_pressure)
     return float(np.mean(torque)) * len(engine.layout.cylinders)
 
 
@@ -371,14 +367,16 @@ def _measured(
     assert isinstance(engine.pressure, PressureFile)
     if torque is not None:
         raise ConfigError(
-            f"a torque of {torque:g} N m is given with excitation.pressure.file, which decides it; leave the torque out"
+            f"a torque of {torque:g} N m is given with excitation.pressure.file, "
+            "which decides it; leave the torque out"
         )
     pressure = read_pressure(engine.pressure, n_points)
     indicated = _indicated(engine, pressure)
     lost = taken + _taken_by(engine, one_plunger(_fuel(engine, max(indicated, 0.0))))
     if not indicated > lost:
         raise ConfigError(
-            f"excitation.pressure.file = {engine.pressure.file} gives {indicated:.4g} N m, below the {lost:.4g} N m of "
+            f"excitation.pressure.file = {engine.pressure.file} gives {indicated:.4g} "
+            f"N m, below the {lost:.4g} N m of "
             "friction and drives; lower friction_mean_pressure_mpa or give another pressure"
         )
     return pressure, indicated, indicated - lost
@@ -400,7 +398,8 @@ def _burned(
         )
     if not torque >= 0.0:
         raise ConfigError(
-            f"the brake torque {torque:g} N m is below the friction, which the engine overcomes itself; give 0 or more"
+            f"the brake torque {torque:g} N m is below the friction, which the engine "
+            "overcomes itself; give 0 or more"
         )
     power_share = torque * speed / (engine.reference.torque * engine.reference.speed)
     motored, fired = wiebe_parts(
@@ -408,20 +407,18 @@ def _burned(
     )
     indicated = torque + taken
     for _ in range(ROUNDS):
-        before, indicated = (
-            indicated,
-            torque + taken + _taken_by(engine, one_plunger(_fuel(engine, indicated))),
-        )
+        before = indicated
+        pumped = _taken_by(engine, one_plunger(_fuel(engine, before)))
+        indicated = torque + taken + pumped
         if abs(indicated - before) <= ROUNDING * indicated:
             break
-    without, unit_heat = (
-        _indicated(engine, motored),
-        _indicated(engine, engine.crankcase_pressure + fired),
-    )
+    without = _indicated(engine, motored)
+    unit_heat = _indicated(engine, engine.crankcase_pressure + fired)
     heat = (indicated - without) / unit_heat
     if not heat > 0.0:
         raise ConfigError(
-            f"the torque of the gas, {indicated:.4g} N m with friction and drives, is below the {without:.4g} N m that "
+            f"the torque of the gas, {indicated:.4g} N m with friction and drives, is "
+            f"below the {without:.4g} N m that "
             "boost and exhaust give without fuel; raise the torque or lower boost_pressure_mpa"
         )
     return motored + heat * fired, indicated, torque

@@ -36,7 +36,8 @@ class TorqueRipple:
             raise ConfigError(f"torque_ripple.share = {self.share:g} must lie in 0..1")
         if not (0.0 < self.order <= MOST_ORDER and (2.0 * self.order).is_integer()):
             raise ConfigError(
-                f"torque_ripple.order = {self.order:g}: give waves in a turn of the motor, a multiple of 0.5 up to "
+                f"torque_ripple.order = {self.order:g}: give waves in a turn of the "
+                "motor, a multiple of 0.5 up to "
                 f"{MOST_ORDER:g}"
             )
 
@@ -113,7 +114,7 @@ def motor_torques(
     *,
     n_points: int = POINTS,
 ) -> LineTorques:
-    """What acts on the shaft line at a speed of the motor and a torque that the load takes.
+    """Torques on the shaft line at a speed of the motor and a torque that the load takes.
 
     Parameters
     ----------
@@ -128,8 +129,9 @@ def motor_torques(
 
     Notes
     -----
-    The motor gives what the load and the further machines take, so that the mean powers balance: what meshes and joints
-    lose is a matter of vibration, and the slip and the governor give it.
+    The motor gives what the load and the further machines take, so that the mean powers
+    balance: what meshes and joints lose is a matter of vibration, and the slip and the governor
+    give it.
     """
     if not speed > 0.0:
         raise ConfigError(

@@ -1,5 +1,4 @@
-"""What torsional dampers do to the force of one element of a linear line, and the dampers that
-make it least.
+"""Force of one element of a linear line with torsional dampers, and the dampers that minimise it.
 
 Dampers change the dynamic stiffness at their nodes only, so that a line is solved once for all of
 them: with R the receptance between the nodes and D the dampers' dynamic stiffness, their torques
@@ -32,11 +31,10 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 LEAST_INERTIA = 0.05  # of the largest allowed: a smaller ring is no damper
-DAMPING_RATIOS = (
-    0.05,
-    5.0,
-)  # searched, of the ring on its spring; assumed: rubber has a loss factor of 0.1 and more
-RATE_MARGIN = 10.0  # by which the rate damping over inertia of a viscous damper may leave the excited frequencies
+# searched, of the ring on its spring; assumed: rubber has a loss factor of 0.1 and more
+DAMPING_RATIOS = (0.05, 5.0)
+# by which the rate damping over inertia of a viscous damper may leave the excited frequencies
+RATE_MARGIN = 10.0
 POPULATION, GENERATIONS = 10, 100  # per unknown, and at most
 SETTLED = 1e-3  # of the population's spread; the simplex goes on from there
 
@@ -86,7 +84,7 @@ class SeenFromNodes:
         ``n_points`` of the cycle; by default 8 a period of the highest order.
         """
         amplitudes = self.force_with(dampers)
-        points = 8 * amplitudes.shape[-1] if n_points is None else n_points
+        points = n_points or 8 * amplitudes.shape[-1]
         return np.abs(self.mean[:, None] + over_cycle(amplitudes, points)).max(axis=1)
 
 
@@ -153,10 +151,11 @@ def tune_dampers(
 
     Notes
     -----
-    Unknowns are the logarithms of inertia, damping ratio and the ring's own frequency, which lies between the lowest
-    and the highest excited one; for viscous dampers inertia and the rate damping over inertia. The largest of many
-    peaks has kinks and several minima: differential evolution (Storn & Price 1997), then a simplex (Nelder & Mead).
-    The seed alone decides the path.
+    Unknowns are the logarithms of inertia, damping ratio and the ring's own frequency, which
+    lies between the lowest and the highest excited one; for viscous dampers inertia and the
+    rate damping over inertia. The largest of many peaks has kinks and several minima:
+    differential evolution (Storn & Price 1997), then a simplex (Nelder & Mead). The seed alone
+    decides the path.
 
     Raises
     ------
@@ -177,10 +176,9 @@ def tune_dampers(
         if viscous:
             bounds.append((math.log(low / RATE_MARGIN), math.log(high * RATE_MARGIN)))
         else:
-            bounds += [
-                (math.log(low), math.log(high)),
-                tuple(map(math.log, DAMPING_RATIOS)),
-            ]  # type: ignore[list-item]
+            least_ratio, most_ratio = DAMPING_RATIOS
+            bounds.append((math.log(low), math.log(high)))
+            bounds.append((math.log(least_ratio), math.log(most_ratio)))
 
     def dampers(unknowns: Array) -> tuple[TorsionalDamper, ...]:
         rows = np.exp(np.reshape(unknowns, (len(seen.nodes), -1)))
@@ -208,7 +206,7 @@ def tune_dampers(
         bounds=bounds,
         options={"xatol": 1e-4, "fatol": 1e-9},
     )
-    return dampers(nearest.x if nearest.fun <= found.fun else found.x)
+    return dampers(min((nearest, found), key=lambda result: result.fun).x)
 
 
 def _damper(node: int, row: Array) -> TorsionalDamper:

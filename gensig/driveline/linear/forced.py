@@ -174,7 +174,8 @@ def over_cycle(amplitudes: ComplexArray, n_points: int) -> Array:
     n_orders = amplitudes.shape[-1]
     if n_points <= 2 * n_orders:
         raise ValueError(
-            f"{n_points} points of a cycle cannot hold {n_orders} orders; more than {2 * n_orders} can"
+            f"{n_points} points of a cycle cannot hold {n_orders} orders; more than "
+            f"{2 * n_orders} can"
         )
     spectrum = np.zeros((*amplitudes.shape[:-1], n_points // 2 + 1), dtype=complex)
     spectrum[..., 1 : n_orders + 1] = 0.5 * n_points * amplitudes
@@ -192,7 +193,8 @@ def cycle_orders(torque: Array, n_orders: int) -> tuple[Array, ComplexArray]:
     n_points = torque.shape[-1]
     if not 1 <= n_orders < n_points / 2:
         raise ValueError(
-            f"n_orders = {n_orders} must lie in 1..{(n_points - 1) // 2}: there are {n_points} points"
+            f"n_orders = {n_orders} must lie in 1..{(n_points - 1) // 2}: there are "
+            f"{n_points} points"
         )
     spectrum = np.fft.rfft(torque, axis=-1) / n_points
     return spectrum[..., 0].real, 2.0 * spectrum[..., 1 : n_orders + 1]
@@ -211,7 +213,8 @@ def steady_response(
 
     Raises
     ------
-    SimulationError    where the mean torques of a free line do not balance: it would not turn steadily
+    SimulationError    where the mean torques of a free line do not balance: it would not turn
+        steadily
     """
     if not speed > 0.0:
         raise ValueError(f"the speed, {speed:g} rad/s, must be positive")
@@ -280,7 +283,8 @@ def run_of_speeds(
 
     Notes
     -----
-    Steady at every speed: a run-up that is slow against the line's decay. Up and down are then the same.
+    Steady at every speed: a run-up that is slow against the line's decay. Up and down are then
+    the same.
     """
     responses = [
         steady_response(line, torques(speed), speed, n_orders=n_orders)
@@ -317,7 +321,8 @@ def _mean_twist(line: LinearLine, mean: Array) -> Array:
         float(np.max(np.abs(mean))), 1e-300
     ):
         raise SimulationError(
-            f"the mean torques leave {np.max(np.abs(rest)):.4g} N m on a line that nothing holds; balance them"
+            f"the mean torques leave {np.max(np.abs(rest)):.4g} N m on a line that "
+            "nothing holds; balance them"
         )
     twist = vectors[:, held] @ ((vectors[:, held].T @ mean) / values[held])
     free = vectors[:, ~held]

@@ -28,16 +28,20 @@ class LineMesh:
     as many pairs are looked at; its teeth are ``start_teeth`` + i, counted as they enter. The
     back flanks meet along the mirrored roll ``mirror`` - u.
 
-    direction : (dof,)                 gradient of the approach along the transverse line of action, m/rad or 1
+    direction : (dof,)                 gradient of the approach along the transverse line of
+        action, m/rad or 1
     gap : (row, node)                  of one pair in m; a smooth cubic between nodes
-    depth : (spring,)                  m, how deep a pair bites where each of its springs begins to bear; from 0 on
-    stiffness : (row * spring, node)   of each spring in N/m, those of one row after those of the one before
-    rows, coast_rows : (kind, kind)    the row of a pair of kinds of teeth of a and b on either flank, -1 for a pair
-                                       that never touches (a missing tooth)
+    depth : (spring,)                  m, how deep a pair bites where each of its springs begins
+        to bear; from 0 on
+    stiffness : (row * spring, node)   of each spring in N/m, those of one row after those of
+        the one before
+    rows, coast_rows : (kind, kind)    the row of a pair of kinds of teeth of a and b on either
+                                       flank, -1 for a pair that never touches (a missing tooth)
     kinds : (tooth,) of a and of b     the kind of every tooth
     errors : (tooth,) of a and of b    m, open the gaps of their teeth on the drive flank
     backlash : m                       along the line of action
-    damping : s/m                      times the rate of a pair is the share by which it raises its elastic force
+    damping : s/m                      times the rate of a pair is the share by which it raises
+        its elastic force
     shared_compliance : m/N            what all pairs in contact share
     """
 
@@ -73,13 +77,15 @@ class LineMesh:
             *self.gap.shape[1:],
         ):
             raise ConfigError(
-                f"{told}: stiffness {self.stiffness.shape} and gap {self.gap.shape} must be alike, (row, node), with "
+                f"{told}: stiffness {self.stiffness.shape} and gap {self.gap.shape} "
+                "must be alike, (row, node), with "
                 f"{len(self.depth)} springs a row"
             )
         n_rows, n_nodes = self.gap.shape
         if self.n_pairs < 1 or n_nodes < 2 or (n_nodes - 1) % self.n_pairs:
             raise ConfigError(
-                f"{told}: {n_nodes} nodes over {self.n_pairs} pitches; give a whole number of cells a pitch and one "
+                f"{told}: {n_nodes} nodes over {self.n_pairs} pitches; give a whole "
+                "number of cells a pitch and one "
                 f"node more"
             )
         for values, what in ((self.stiffness, "stiffness"), (self.gap, "gap")):
@@ -100,7 +106,8 @@ class LineMesh:
                 or rows.max() >= n_rows
             ):
                 raise ConfigError(
-                    f"{told}: {what} {rows.shape} must name rows -1..{n_rows - 1} for {counts} kinds"
+                    f"{told}: {what} {rows.shape} must name rows -1..{n_rows - 1} for "
+                    f"{counts} kinds"
                 )
         for kind, error, start in zip(
             self.kinds, self.errors, self.start_teeth, strict=True
@@ -111,7 +118,8 @@ class LineMesh:
                 or not np.isfinite(error).all()
             ):
                 raise ConfigError(
-                    f"{told}: {len(kind)} teeth need as many kinds, and finite errors, not {len(error)}"
+                    f"{told}: {len(kind)} teeth need as many kinds, and finite "
+                    f"errors, not {len(error)}"
                 )
             if not 0 <= start < len(kind):
                 raise ConfigError(
@@ -149,18 +157,19 @@ def phase_mesh(
 
     Parameters
     ----------
-    stiffness : (1, node) or (n_teeth of gear a, node) N/m    over one pitch, or pitch after pitch over a turn of gear
-        a, irregular teeth among them; the node that closes a pitch is the first of the next
-    gap : the same shape, m    static transmission error and pitch errors, by which the teeth stand back; default 0
+    stiffness : (1, node) or (n_teeth of gear a, node) N/m    over one pitch, or pitch after
+        pitch over a turn of gear a, irregular teeth among them; the node that closes a pitch is
+        the first of the next
+    gap : the same shape, m    static transmission error and pitch errors, by which the teeth
+        stand back; default 0
     """
-    gaps = (
-        np.zeros_like(stiffness)
-        if gap is None
-        else np.broadcast_to(gap, stiffness.shape)
-    )
+    gaps = np.zeros_like(stiffness)
+    if gap is not None:
+        gaps = np.broadcast_to(gap, stiffness.shape)
     if stiffness.ndim != 2 or len(stiffness) not in (1, n_teeth[0]):
         raise ConfigError(
-            f"mesh '{name}': stiffness {stiffness.shape} must be (1, node) or ({n_teeth[0]}, node), one row a tooth"
+            f"mesh '{name}': stiffness {stiffness.shape} must be (1, node) or "
+            f"({n_teeth[0]}, node), one row a tooth"
         )
     n_rows = len(stiffness)
     # the mesh has rolled u = i + s where row i is at s, and the next row begins where it ends
@@ -264,8 +273,10 @@ def mesh_start(
 
     Parameters
     ----------
-    mate_angle : rad    from the gear's center to the mate's, counted in the sense in which the gear turns
-    drives : whether the gear drives there (its leading flanks touch) or is driven (its trailing flanks)
+    mate_angle : rad    from the gear's center to the mate's, counted in the sense in which the
+        gear turns
+    drives : whether the gear drives there (its leading flanks touch) or is driven (its trailing
+        flanks)
     tooth_angle : rad   where the middle of the gear's tooth 0 stands when all angles are 0
     pitch_point : position of the pitch point in the tables of the mesh, pitches
 
@@ -299,11 +310,9 @@ def tooth_angle(
     start: tuple[int, float],
     pitch_point: float = 0.0,
 ) -> float:
-    """Where the middle of a gear's tooth 0 stands if one of its meshes begins as ``start`` says,
-    rad.
+    """Angle of the middle of a gear's tooth 0 if one of its meshes begins at ``start``, rad.
 
-    What ``mesh_start`` undoes: from a mesh whose phase is known through the mate to the other
-    meshes of the gear.
+    The inverse of ``mesh_start``, for the other meshes of a gear whose phase in one is known.
     """
     tooth, phase = start
     return (
@@ -313,8 +322,8 @@ def tooth_angle(
 
 
 def _quarter(drives: bool) -> float:
-    """How far the flank that touches stands before the middle of its tooth, pitches."""
-    return 0.25 if drives else -0.25
+    """Lead of the flank that touches over the middle of its tooth, pitches."""
+    return 0.5 * drives - 0.25
 
 
 def _summed(one: Array, other: Array) -> Array:
