@@ -1,4 +1,6 @@
-"""Small geared lines, states of a line at its internal rate, and the law of one mesh at chosen instants."""
+"""Small geared lines, states of a line at its internal rate, and the law of one mesh at chosen
+instants.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,9 @@ def two_gears(
     drive: tuple[float, float] | None = None,
     **mesh,
 ) -> GearedLine:
-    """Two inertias and one mesh between them; ``drive`` is a spring and a damper of the first to the nominal angle."""
+    """Two inertias and one mesh between them; ``drive`` is a spring and a damper of the first to
+    the nominal angle.
+    """
     table = np.full((1, 8), STIFFNESS) if stiffness is None else stiffness
     direction = np.array([RADII[0], -RADII[1]])
     held, damped = np.zeros((2, 2, 2))
@@ -102,15 +106,25 @@ def law_at(
     """What a mesh does, (N_LAW,), when it has rolled so many pitches beyond its start phase."""
     n = len(mesh.direction)
     line = GearedLine(
-        names=tuple(map(str, range(n))), mass=np.eye(n), damping=np.zeros((n, n)), stiffness=np.zeros((n, n)),
-        rotation=np.where(np.arange(n) == mesh.roll_dof, 1.0, 0.0), meshes=(),
-    )  # fmt: skip
+        names=tuple(map(str, range(n))),
+        mass=np.eye(n),
+        damping=np.zeros((n, n)),
+        stiffness=np.zeros((n, n)),
+        rotation=np.where(np.arange(n) == mesh.roll_dof, 1.0, 0.0),
+        meshes=(),
+    )
     with_mesh = _Unchecked(line, mesh)
     law = np.zeros((1, layout.N_LAW))
     mesh_law(
-        pack_meshes(with_mesh, np.arange(n)), 0, mesh.start_phase + turned, roll_rate, approach, rate, law,
+        pack_meshes(with_mesh, np.arange(n)),
+        0,
+        mesh.start_phase + turned,
+        roll_rate,
+        approach,
+        rate,
+        law,
         _scratch(with_mesh),
-    )  # fmt: skip
+    )
     return law[0]
 
 

@@ -1,4 +1,6 @@
-"""Every printed figure and claim of the sources has its expected verdict, and ``docs/validation.md`` is in step."""
+"""Every printed figure and claim of the sources has its expected verdict, and
+``docs/validation.md`` is in step.
+"""
 
 import math
 import re
@@ -42,7 +44,8 @@ def test_rows_have_their_expected_verdicts(results, source):
 
 
 def out_of_step(written: str, computed: str) -> list[str]:
-    """Lines whose words differ, or whose numbers differ by more than 0.1 % (deviations by more than 0.03 points).
+    """Lines whose words differ, or whose numbers differ by more than 0.1 % (deviations by more
+    than 0.03 points).
 
     What has a ~ before it is of a chaotic run, which the last bit scatters: 15 %, and 15 points.
     """

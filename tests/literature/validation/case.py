@@ -209,7 +209,8 @@ def record(case: Case) -> Array:
     n_samples = RECORD_TURNS * turn * system.sensing.sampling_rate
     if abs(n_samples - round(n_samples)) > 1e-6:
         raise ConfigError(
-            f"{RECORD_TURNS} turns are {n_samples:.6g} samples, not a whole number: choose another speed"
+            f"{RECORD_TURNS} turns are {n_samples:.6g} samples, not a whole number: "
+            "choose another speed"
         )
     machine = replace(
         system,

@@ -69,8 +69,9 @@ def other_root_angle(gear: Gear, where: str) -> Gear:
 
     Parameters
     ----------
-    where : ``"tangent_30deg"``, the chord where the root curve has 30 degrees to the tooth centreline;
-        ``"junction"``, where the involute begins; ``"base_circle"``, the half tooth angle there
+    where : ``"tangent_30deg"``, the chord where the root curve has 30 degrees to the tooth
+        centreline; ``"junction"``, where the involute begins; ``"base_circle"``, the half tooth
+        angle there
     """
     if where == "tangent_30deg":
 

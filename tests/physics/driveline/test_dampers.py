@@ -16,7 +16,8 @@ from gensig.driveline.linear.matrices import line_matrices
 from gensig.driveline.linear.modal import natural_modes
 from gensig.driveline.linear.shaft_line import Node, Shaft, ShaftLine
 
-STIFFNESS = 1.0  # of the spring that holds the one disc, whose inertia is 1: its frequency is 1 rad/s
+# of the spring that holds the one disc, whose inertia is 1: its frequency is 1 rad/s
+STIFFNESS = 1.0
 RATIOS = (0.1, 0.3)
 
 
@@ -43,7 +44,9 @@ def peak(seen, *dampers):
 
 @pytest.mark.parametrize("ratio", RATIOS)
 def test_the_tuned_damper_of_one_disc_is_den_hartogs(ratio):
-    """Mechanical Vibrations, 3.3: frequency 1 / (1 + mu), peak sqrt(1 + 2 / mu), damping sqrt(3 mu / 8 / (1 + mu))."""
+    """Mechanical Vibrations, 3.3: frequency 1 / (1 + mu), peak sqrt(1 + 2 / mu), damping sqrt(3 mu
+    / 8 / (1 + mu)).
+    """
     seen = one_disc(2.0 * np.linspace(0.5, 1.6, 441) + 1e-4)
     (found,) = tune_dampers(seen, [ratio])
     assert_allclose(found.ring_inertia, ratio, rtol=1e-3)  # the larger the better
@@ -65,7 +68,9 @@ def test_the_tuned_damper_of_one_disc_is_den_hartogs(ratio):
 
 @pytest.mark.parametrize("ratio", RATIOS)
 def test_the_viscous_damper_of_one_disc_is_den_hartogs(ratio):
-    """Mechanical Vibrations, 3.3 (Houdaille): peak 1 + 2 / mu at c = 2 J_ring / sqrt(2 (1 + mu) (2 + mu))."""
+    """Mechanical Vibrations, 3.3 (Houdaille): peak 1 + 2 / mu at c = 2 J_ring / sqrt(2 (1 + mu) (2
+    + mu)).
+    """
     seen = one_disc(2.0 * np.linspace(0.5, 1.6, 441) + 1e-4)
     (found,) = tune_dampers(seen, [ratio], viscous=True)
     assert found.stiffness == 0.0
@@ -138,7 +143,9 @@ def test_a_ring_held_hard_or_not_at_all_is_inertia_or_nothing():
 
 
 def test_a_damper_only_takes_energy():
-    """The imaginary part of what it adds is positive, and is the loss of its ring's motion against the node."""
+    """The imaginary part of what it adds is positive, and is the loss of its ring's motion against
+    the node.
+    """
     frequency = np.linspace(5.0, 2000.0, 50)
     for damper in DAMPERS:
         assert np.all(damper.dynamic_stiffness(frequency).imag > 0.0)

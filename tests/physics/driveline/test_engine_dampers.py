@@ -26,8 +26,10 @@ DAMPERS = (
     TorsionalDamper(node=45, ring_inertia=0.01138, damping=6.0, stiffness=143500.0),
 )
 AS_KEYS = (
-    "system.dampers=[{node: 21, ring_inertia_kg_m2: 0.0118, damping_nms_per_rad: 0.45, stiffness_nm_per_rad: 172700},"
-    "{node: 45, ring_inertia_kg_m2: 0.01138, damping_nms_per_rad: 6.0, stiffness_nm_per_rad: 143500}]"
+    "system.dampers=[{node: 21, ring_inertia_kg_m2: 0.0118, damping_nms_per_rad: "
+    "0.45, stiffness_nm_per_rad: 172700},"
+    "{node: 45, ring_inertia_kg_m2: 0.01138, damping_nms_per_rad: 6.0, "
+    "stiffness_nm_per_rad: 143500}]"
 )
 
 

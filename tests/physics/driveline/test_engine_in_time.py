@@ -1,4 +1,6 @@
-"""An engine's line in time: sweeps against the linear line, and root stress under forces that are known."""
+"""An engine's line in time: sweeps against the linear line, and root stress under forces that are
+known.
+"""
 
 from dataclasses import replace
 from functools import lru_cache
@@ -34,7 +36,9 @@ def engine(*words):
 
 @pytest.fixture(scope="module")
 def passage():
-    """Up and down through the second mode, which order 5 meets at 825 r/min, teeth that do not part."""
+    """Up and down through the second mode, which order 5 meets at 825 r/min, teeth that do not
+    part.
+    """
     line = engine("system.backlash_um=0", "system.loss_factor.gear_mesh=0")
     return line, sweep_response(
         line, LOW, HIGH, SECONDS, 0.0, own={}, nodes=(FLYWHEEL,), n_orders=20
@@ -111,10 +115,19 @@ def motion(speed, force, n_cycles):
         crank, angle, force, period=4.0 * np.pi
     )
     return TimeResponse(
-        time=crank / speed, crank_angle=crank, speed=nothing, angle=nothing, mesh_force=mesh_force,
-        fluctuation=np.zeros(1), cycle_fluctuation=np.zeros(1), contact_loss=np.zeros(8), back_contact=np.zeros(8),
-        least_force=mesh_force.min(axis=1), greatest_force=mesh_force.max(axis=1), energy_residual=0.0,
-    )  # fmt: skip
+        time=crank / speed,
+        crank_angle=crank,
+        speed=nothing,
+        angle=nothing,
+        mesh_force=mesh_force,
+        fluctuation=np.zeros(1),
+        cycle_fluctuation=np.zeros(1),
+        contact_loss=np.zeros(8),
+        back_contact=np.zeros(8),
+        least_force=mesh_force.min(axis=1),
+        greatest_force=mesh_force.max(axis=1),
+        energy_residual=0.0,
+    )
 
 
 def test_root_stress_in_time_of_a_force_that_repeats_is_that_of_one_cycle():

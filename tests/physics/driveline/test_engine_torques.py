@@ -1,4 +1,6 @@
-"""The engine's torques on its line: means that balance, orders of even firing, loads, what is refused."""
+"""The engine's torques on its line: means that balance, orders of even firing, loads, what is
+refused.
+"""
 
 import copy
 import re
@@ -124,7 +126,7 @@ def test_a_disturbance_of_the_dynamometer_is_given_apart():
     assert found.disturbance_node == 17
     assert_allclose(found.disturbance_torque, 0.05 * TORQUE)
     assert_allclose(found.disturbance_frequency, 5.0)
-    assert_allclose(found.on(NODES), torques_of(option()).on(NODES), rtol=0, atol=0)
+    assert_allclose(found.on(NODES), torques_of(option()).on(NODES), rtol=0)
 
 
 def pressure_file(folder, scale=1.0):

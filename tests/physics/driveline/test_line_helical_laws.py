@@ -1,4 +1,6 @@
-"""Helical meshes of the running engine by their own teeth: energies, phases, faults on any gear of the train."""
+"""Helical meshes of the running engine by their own teeth: energies, phases, faults on any gear of
+the train.
+"""
 
 import math
 from functools import lru_cache
@@ -25,9 +27,12 @@ SPEED, TORQUE = 1688.0 * RPM, 12680.0
 GOVERNOR = Governor(frequency=1.0, damping_ratio=0.7)
 SOLVER = LineSolver(sampling_rate=10240.0, oversampling=10, max_energy_residual=1e-3)
 RECORDS = (
-    "experiment=engine_broken_tooth", "operating.duration_s=0.1", "sensing.snr_db=null", "mesh.n_slices=12",
+    "experiment=engine_broken_tooth",
+    "operating.duration_s=0.1",
+    "sensing.snr_db=null",
+    "mesh.n_slices=12",
     "mesh.points_per_pitch=128",
-)  # fmt: skip
+)
 SIDES = ("pinion", "wheel")
 
 
@@ -69,8 +74,9 @@ def running(lateral, teeth):
 @pytest.mark.parametrize("lateral", ["false", "true"])
 def test_with_all_teeth_their_own_they_part_and_energies_balance(lateral):
     line = running(lateral, "sliced")
-    assert [len(mesh.depth) > 1 for mesh in line.line.meshes] == [bool(pair.pinion.helix_angle)
-                                                                  for pair in line.machine.drive.pairs]  # fmt: skip
+    assert [len(mesh.depth) > 1 for mesh in line.line.meshes] == [
+        bool(pair.pinion.helix_angle) for pair in line.machine.drive.pairs
+    ]
     motion = line.run(
         SOLVER, duration=0.3, channels=[("speed", line.dof(14))], settling=0.3
     )
@@ -92,7 +98,9 @@ def test_constant_stiffness_stays_a_choice_and_the_flywheel_hardly_feels_it():
 
 
 def test_our_stiffness_is_of_the_size_of_the_tables():
-    """0.97 times the printed one where that is out of line, 1.3 to 1.8 elsewhere: docs/theory/shaft_line_records.md."""
+    """0.97 times the printed one where that is out of line, 1.3 to 1.8 elsewhere:
+    docs/theory/shaft_line_records.md.
+    """
     line = running("false", "sliced")
     config = read_request(["system=engine_gear_train", "excitation=engine_v20"]).config
     own = own_meshes(line.machine, config, SPEED, TORQUE)
@@ -128,9 +136,14 @@ def test_a_fault_that_vanishes_is_the_sound_machine_and_a_missing_tooth_is_not()
 
 @pytest.mark.parametrize(
     ("mesh", "gear", "others"),
-    [("[3,66]", "pinion", {"3/18": 0}), ("[3,66]", "wheel", {"66/67": 0}), ("[19,20]", "wheel", {"20/43": 0}),
-     ("[20,43]", "wheel", {}), ("[66,67]", "pinion", {"3/66": 1})],
-)  # fmt: skip
+    [
+        ("[3,66]", "pinion", {"3/18": 0}),
+        ("[3,66]", "wheel", {"66/67": 0}),
+        ("[19,20]", "wheel", {"20/43": 0}),
+        ("[20,43]", "wheel", {}),
+        ("[66,67]", "pinion", {"3/66": 1}),
+    ],
+)
 def test_the_faulty_tooth_is_on_its_gear_in_all_its_meshes_and_nowhere_else(
     mesh, gear, others
 ):
@@ -150,7 +163,9 @@ def test_the_faulty_tooth_is_on_its_gear_in_all_its_meshes_and_nowhere_else(
     ("kind", "same", "other"), [("pitting", True, False), ("crack", True, True)]
 )
 def test_pits_stay_on_their_flank_and_cracks_are_felt_from_behind(kind, same, other):
-    """Both mates of the crank gear meet one flank of it; the idler is driven on one and drives with the other."""
+    """Both mates of the crank gear meet one flank of it; the idler is driven on one and drives
+    with the other.
+    """
     faults = {
         "pitting": {"pit_depth_mm": 0.2, "pit_width_mm": 5.0, "pit_length_mm": 1.0},
         "crack": {
@@ -171,7 +186,9 @@ def test_pits_stay_on_their_flank_and_cracks_are_felt_from_behind(kind, same, ot
 def test_a_tooth_comes_to_its_mates_when_the_gear_has_turned_from_one_to_the_other(
     mesh, turned
 ):
-    """The tooth that is at a mate goes the angle between its mates, half a pitch less or more to its other flank."""
+    """The tooth that is at a mate goes the angle between its mates, half a pitch less or more to
+    its other flank.
+    """
     record = machine(f"system.record_mesh={mesh}")
     drive, place = record.engine.drive, record.place
     pairs, meshes = drive.pairs, drive.line.meshes

@@ -88,7 +88,7 @@ class TestLinear:
                 0.5 * (b @ line.mass @ b + a @ line.stiffness @ a)
                 for a, b in (start, (q, v))
             ]
-            assert_allclose(energy[1], energy[0], rtol=1e-11, atol=0)
+            assert_allclose(energy[1], energy[0], rtol=1e-11)
             assert told.energy_residual < 1e-11
 
     def test_damping_takes_energy(self, line, start):
@@ -130,15 +130,23 @@ class TestTorquesAndCourse:
             0.05,
         )  # so small that its own twist does not shift it
         line = GearedLine(
-            names=("disc",), mass=np.array([[inertia]]), damping=np.array([[damper]]), stiffness=np.array([[spring]]),
-            rotation=np.ones(1), meshes=(),
-        )  # fmt: skip
+            names=("disc",),
+            mass=np.array([[inertia]]),
+            damping=np.array([[damper]]),
+            stiffness=np.array([[spring]]),
+            rotation=np.ones(1),
+            meshes=(),
+        )
         table = amplitude * np.cos(np.arange(4096) / 4096 * 2 * np.pi)
         motion = integrate_line(
-            line, constant_speed(SPEED), [ShaftTorque(dof=0, table=table, period=np.pi)],
-            steps(4000.0, 10), duration=2 * np.pi / SPEED * 10, lead_in=1.0,
+            line,
+            constant_speed(SPEED),
+            [ShaftTorque(dof=0, table=table, period=np.pi)],
+            steps(4000.0, 10),
+            duration=2 * np.pi / SPEED * 10,
+            lead_in=1.0,
             channels=[("angle", 0), ("speed", 0), ("acceleration", 0)],
-        )  # fmt: skip
+        )
         rate = 2 * SPEED
         response = amplitude / (spring - inertia * rate**2 + 1j * damper * rate)
         angle = motion.nominal_angle
@@ -148,12 +156,18 @@ class TestTorquesAndCourse:
             assert_allclose(found, expected, rtol=0, atol=5e-4 * np.abs(expected).max())
 
     def test_the_twist_shifts_the_torque(self):
-        """A table over the angle sees the angle itself, not the nominal one: a restoring slope is a spring."""
+        """A table over the angle sees the angle itself, not the nominal one: a restoring slope is
+        a spring.
+        """
         slope, inertia = 200.0, 0.1
         line = GearedLine(
-            names=("disc",), mass=np.array([[inertia]]), damping=np.zeros((1, 1)), stiffness=np.zeros((1, 1)),
-            rotation=np.ones(1), meshes=(),
-        )  # fmt: skip
+            names=("disc",),
+            mass=np.array([[inertia]]),
+            damping=np.zeros((1, 1)),
+            stiffness=np.zeros((1, 1)),
+            rotation=np.ones(1),
+            meshes=(),
+        )
         nodes = np.arange(4000) / 4000 * 2 * np.pi
         table = -slope * np.where(nodes < np.pi, nodes, nodes - 2 * np.pi)
         start, quarter = np.array([1e-2]), 0.5 * np.pi * math.sqrt(inertia / slope)
@@ -165,7 +179,7 @@ class TestTorquesAndCourse:
             torques=[ShaftTorque(dof=0, table=table)],
         )
         assert_allclose(q / start, 0.0, rtol=0, atol=1e-5)
-        assert_allclose(v / start, -math.sqrt(slope / inertia), rtol=1e-5, atol=0)
+        assert_allclose(v / start, -math.sqrt(slope / inertia), rtol=1e-5)
 
     def test_a_run_up_needs_the_torque_of_the_inertias_and_no_more(self):
         line, course = (
@@ -192,8 +206,8 @@ class TestTorquesAndCourse:
         q, v, _ = state_after(
             line, (np.zeros(5), np.zeros(5)), 0.1, 2000, course=course
         )
-        assert_allclose(v, -200.0 * 0.1, rtol=1e-9, atol=0)
-        assert_allclose(q, -0.5 * 200.0 * 0.1**2, rtol=1e-9, atol=0)
+        assert_allclose(v, -200.0 * 0.1, rtol=1e-9)
+        assert_allclose(q, -0.5 * 200.0 * 0.1**2, rtol=1e-9)
 
     def test_a_factor_over_the_knots_is_a_torque_over_time(self):
         line, course = (
@@ -204,15 +218,20 @@ class TestTorquesAndCourse:
         _, v, _ = state_after(
             line, (np.zeros(1), np.zeros(1)), 0.1, 500, torques=[ramp], course=course
         )
-        assert_allclose(v, 0.5 * 3.0 * 0.1 / line.mass[0, 0], rtol=1e-9, atol=0)
+        assert_allclose(v, 0.5 * 3.0 * 0.1 / line.mass[0, 0], rtol=1e-9)
 
     def test_signals_are_low_passed_states(self):
         """What a run gives out at time 0 is the state that it passes there."""
         line, start = chain(4), (np.array([1e-3, 0, 0, -1e-3]), np.zeros(4))
         motion = integrate_line(
-            line, constant_speed(SPEED), [], steps(8000.0, 8), duration=0.02,
-            channels=[("angle", 0), ("speed", 3)], start=start,
-        )  # fmt: skip
+            line,
+            constant_speed(SPEED),
+            [],
+            steps(8000.0, 8),
+            duration=0.02,
+            channels=[("angle", 0), ("speed", 3)],
+            start=start,
+        )
         margin = decimator(
             8
         ).margin  # samples before time 0, and one, at which integration begins

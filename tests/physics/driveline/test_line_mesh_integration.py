@@ -1,4 +1,6 @@
-"""Meshes of a geared line by Newmark's method: order, energy, backlash, against scipy and the pair's integrator."""
+"""Meshes of a geared line by Newmark's method: order, energy, backlash, against scipy and the
+pair's integrator.
+"""
 
 import numpy as np
 import pytest
@@ -93,9 +95,14 @@ class TestBacklash:
             return np.concatenate([y[2:], -direction * force / INERTIAS])
 
         solution = solve_ivp(
-            slope, (0, cls.DURATION), np.concatenate(cls.START), method="DOP853", rtol=1e-11, atol=1e-15,
+            slope,
+            (0, cls.DURATION),
+            np.concatenate(cls.START),
+            method="DOP853",
+            rtol=1e-11,
+            atol=1e-15,
             max_step=5e-6,
-        )  # fmt: skip
+        )
         return solution.y[:, -1]
 
     @pytest.fixture(scope="class")
@@ -139,7 +146,9 @@ class TestBacklash:
 
 
 class TestAgainstThePair:
-    """The default spur pair on its supports without friction, with tooth errors, through both integrators."""
+    """The default spur pair on its supports without friction, with tooth errors, through both
+    integrators.
+    """
 
     STEPS, N_SAMPLES = 64, 410
 
@@ -166,14 +175,22 @@ class TestAgainstThePair:
     def line(cls, dynamics):
         system = dynamics.system()
         mesh = pair_mesh(
-            "pair", dynamics.table, direction=dynamics.approach_direction(), roll_dof=2,
-            damping=dynamics.mesh_damping / dynamics.mesh_force, start_phase=dynamics.start_phase,
+            "pair",
+            dynamics.table,
+            direction=dynamics.approach_direction(),
+            roll_dof=2,
+            damping=dynamics.mesh_damping / dynamics.mesh_force,
+            start_phase=dynamics.start_phase,
             errors=(dynamics.pinion_error, dynamics.wheel_error),
-        )  # fmt: skip
+        )
         return GearedLine(
-            names=system.names, mass=np.diag(system.mass), damping=system.damping, stiffness=system.stiffness,
-            rotation=system.rotation, meshes=(mesh,),
-        )  # fmt: skip
+            names=system.names,
+            mass=np.diag(system.mass),
+            damping=system.damping,
+            stiffness=system.stiffness,
+            rotation=system.rotation,
+            meshes=(mesh,),
+        )
 
     def test_the_same_motion(self, dynamics, line):
         start, n_steps = (
@@ -183,9 +200,13 @@ class TestAgainstThePair:
         step = 1 / (51200 * self.STEPS)
         q, v, _ = advance(dynamics, *start, step, 0, n_steps)
         q_1, v_1, told = state_after(
-            line, start, n_steps * step, n_steps, torques=constant_torques(dynamics.system().force),
+            line,
+            start,
+            n_steps * step,
+            n_steps,
+            torques=constant_torques(dynamics.system().force),
             course=constant_speed(dynamics.operating.speed),
-        )  # fmt: skip
+        )
         direction = dynamics.approach_direction()
         scale = np.abs(v).max()
         assert_allclose(v_1, v, rtol=0, atol=2e-4 * scale)
@@ -204,7 +225,9 @@ class TestAgainstThePair:
 
 
 class TestLowRank:
-    """Meshes as low-rank updates against their stiffness in the matrix, which is then factored with it."""
+    """Meshes as low-rank updates against their stiffness in the matrix, which is then factored
+    with it.
+    """
 
     @pytest.fixture(scope="class")
     @classmethod
@@ -219,9 +242,13 @@ class TestLowRank:
             for mesh in engine.meshes
         )
         return GearedLine(
-            names=engine.names, mass=engine.mass, damping=engine.damping, stiffness=stiffness,
-            rotation=engine.rotation, meshes=(),
-        )  # fmt: skip
+            names=engine.names,
+            mass=engine.mass,
+            damping=engine.damping,
+            stiffness=stiffness,
+            rotation=engine.rotation,
+            meshes=(),
+        )
 
     def test_the_printed_frequencies(self, welded):
         n = 65  # rotations
@@ -256,10 +283,13 @@ class TestEngine:
     def motion(cls):
         def run(duration=0.15, oversampling=10):
             return integrate_line(
-                engine_line(), constant_speed(1688 * np.pi / 30), engine_torques(),
-                steps(10240.0, oversampling), duration=duration,
+                engine_line(),
+                constant_speed(1688 * np.pi / 30),
+                engine_torques(),
+                steps(10240.0, oversampling),
+                duration=duration,
                 channels=[("speed", 13), ("speed", 42), ("mesh_force", 5)],
-            )  # fmt: skip
+            )
 
         return run
 

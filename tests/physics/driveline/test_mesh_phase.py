@@ -25,8 +25,10 @@ def train(config, tmp_path):
         rows = [
             "node,inertia_kg_m2,stiffness_nm_per_rad,edge_from,edge_to,edge_kind,center_line_deg"
         ]
-        rows += [f"{place + 1},1e-3,1e6,{place + 1},{place + 2},gear_mesh,{angle}"
-                 for place, angle in enumerate(center_lines)]  # fmt: skip
+        rows += [
+            f"{place + 1},1e-3,1e6,{place + 1},{place + 2},gear_mesh,{angle}"
+            for place, angle in enumerate(center_lines)
+        ]
         rows.append(f"{len(teeth)},1e-3,,,,,")
         if driven_first:  # the last gear is the first node
             rows[1:] = rows[:0:-1]
@@ -49,10 +51,11 @@ def train(config, tmp_path):
 
 
 def misfit(line, turned=0.0):
-    """Distance of the flanks along the line of action of every mesh, in base pitches, from the base circles alone.
+    """Distance of the flanks along the line of action of every mesh, in base pitches, from the
+    base circles alone.
 
-    The driving flank stands rho_1 from its tangent point, the driven one rho_2 from its own; they touch where both add
-    up to the distance of the tangent points, less whole pitches.
+    The driving flank stands rho_1 from its tangent point, the driven one rho_2 from its own;
+    they touch where both add up to the distance of the tangent points, less whole pitches.
     """
     angles, found = tooth_angles(line, turned), []
     for mesh, pair in zip(line.line.meshes, line.pairs, strict=True):
@@ -111,7 +114,9 @@ def test_the_law_can_fail(train):
 
 @pytest.mark.parametrize(("z", "expected"), [(33, 0.0), (34, 0.5), (35, 0.0)])
 def test_an_idler_between_two_gears_in_line(train, z, expected):
-    """Half a pitch between its flanks, z / 2 between its sides: in phase for odd teeth, half off for even ones."""
+    """Half a pitch between its flanks, z / 2 between its sides: in phase for odd teeth, half off
+    for even ones.
+    """
     line = train((23, z, 29), (0.0, 0.0))
     pitch = line.pairs[0].base_pitch
     pitch_points = np.array([pair.pitch_point for pair in line.pairs])

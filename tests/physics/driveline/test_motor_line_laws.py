@@ -1,4 +1,6 @@
-"""A line that a motor turns: static torques by the ratios, mesh frequencies, power, and what a missing tooth does."""
+"""A line that a motor turns: static torques by the ratios, mesh frequencies, power, and what a
+missing tooth does.
+"""
 
 from dataclasses import replace
 from functools import lru_cache
@@ -95,7 +97,9 @@ def test_in_time_the_mean_forces_stay_and_the_energies_balance():
 
 @pytest.mark.parametrize("speed_rpm", [900.0, 1200.0, 1500.0, 1800.0])
 def test_energies_balance_where_steps_meet_every_pitch_at_the_same_places(speed_rpm):
-    """Steps in a pitch: 256, 192, 153.6 and 128, of 512 cells each; an even line rests on such a speed."""
+    """Steps in a pitch: 256, 192, 153.6 and 128, of 512 cells each; an even line rests on such a
+    speed.
+    """
     record = machine("operating.duration_s=0.3", f"operating.speed_rpm={speed_rpm}")
     motion = record.line(Run(system=record, faults=())).run(
         SOLVER, duration=0.3, channels=[("mesh_force", 0)], settling=0.3
@@ -148,7 +152,9 @@ def test_both_stages_sound_at_their_mesh_frequencies(name):
     [("3/4", "pinion"), ("3/4", "wheel"), ("5/6", "pinion"), ("5/6", "wheel")],
 )
 def test_a_missing_tooth_is_evident_once_a_turn_of_its_gear(name, gear):
-    """The record less its sound twin is large where the tooth should be and nowhere else, turn by turn."""
+    """The record less its sound twin is large where the tooth should be and nowhere else, turn by
+    turn.
+    """
     record = machine(
         "operating.duration_s=1", f"system.record_mesh=[{name.replace('/', ',')}]"
     )
@@ -173,8 +179,12 @@ def test_a_missing_tooth_is_evident_once_a_turn_of_its_gear(name, gear):
 def test_a_broken_height_of_nothing_is_the_sound_machine():
     record = machine()
     sound, tiny = (
-        simulated(record), simulated(record, {"kind": "broken", "gear": "pinion", "tooth": 5, "broken_height_mm": 0.0})
-    )  # fmt: skip
+        simulated(record),
+        simulated(
+            record,
+            {"kind": "broken", "gear": "pinion", "tooth": 5, "broken_height_mm": 0.0},
+        ),
+    )
     scale = np.abs(sound.acceleration).max()
     assert_allclose(tiny.acceleration, sound.acceleration, rtol=1e-9, atol=1e-9 * scale)
     gone = simulated(record, missing("pinion"))
@@ -196,7 +206,9 @@ def test_helical_stages_are_recorded_too(tmp_path):
 
 
 def test_the_other_stage_stands_where_the_teeth_allow():
-    """The gears of the idler are on one shaft: its angle, as the record mesh says it, holds for the other mesh."""
+    """The gears of the idler are on one shaft: its angle, as the record mesh says it, holds for
+    the other mesh.
+    """
     record = machine("system.record_mesh=[5,6]")
     drive, start = record.engine.drive, Start(tooth_pinion=7, tooth_wheel=3, phase=0.25)
     turned = record.crank_angle(start)

@@ -1,4 +1,4 @@
-"""Statistics over the cycles of the crank: exact for what repeats, and hardly moved by one impact."""
+"""Statistics over the cycles of the crank: exact for periodic signals, robust to one impact."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,6 @@
-"""One cylinder: kinematics, work of the gas, inertia, the Wiebe cycle's energy, measured pressures."""
+"""One cylinder: kinematics, work of the gas, inertia, the Wiebe cycle's energy, measured
+pressures.
+"""
 
 import re
 from dataclasses import replace
@@ -99,7 +101,8 @@ def test_inertia_torque_is_equation_19_without_its_leading_minus():
     printed_without_minus = 11.0 * 0.0975**2 * speed**2 * series
     torque = inertia_torque(CYLINDER, ANGLE, speed)
     assert_allclose(torque, printed_without_minus, rtol=0, atol=0.02 * np.ptp(torque))
-    # past top dead center the piston is pushed downwards by its own mass until the crank slows it: first against
+    # past top dead center the piston is pushed downwards by its own mass until the crank slows
+    # it: first against
     assert torque[N // 32] < 0.0
     assert np.max(np.abs(torque + printed_without_minus)) > 1.5 * np.max(np.abs(torque))
 

@@ -1,4 +1,6 @@
-"""What a line, its course, its torques and its solver refuse, each in one line, and runs that cannot go on."""
+"""What a line, its course, its torques and its solver refuse, each in one line, and runs that
+cannot go on.
+"""
 
 import math
 from dataclasses import replace
@@ -25,9 +27,12 @@ def refused(error: type[GensigError], told: str):
 
 def run(line, torques=(), course=None, **changes):
     return integrate_line(
-        line, course or constant_speed(10.0), torques, changes.pop("solver", SOLVER),
+        line,
+        course or constant_speed(10.0),
+        torques,
+        changes.pop("solver", SOLVER),
         **{"duration": 0.01, "channels": [("speed", 0)], **changes},
-    )  # fmt: skip
+    )
 
 
 class TestLine:
@@ -142,7 +147,7 @@ class TestTorques:
             run(line, [ShaftTorque(dof=1, table=np.ones(4))])
 
     def test_the_sense_is_that_of_rotation(self):
-        """A line whose discs turn backwards moves as the mirror image of one that turns forwards."""
+        """Discs that turn backwards move as the mirror image of those that turn forwards."""
         table = np.cos(np.arange(64) / 64 * 2 * np.pi) + 0.3 * np.sin(
             np.arange(64) / 32 * 2 * np.pi
         )
@@ -210,7 +215,9 @@ class TestRun:
             )
 
     def test_divergence(self):
-        """A free line under torques that nothing balances runs away; it is told as one, with a name."""
+        """A free line under torques that nothing balances runs away; it is told as one, with a
+        name.
+        """
         with refused(SimulationError, "left all bounds"):
             run(
                 two_gears(),
@@ -223,7 +230,9 @@ class TestRun:
             run(two_gears(), start=(np.zeros(2), np.array([1e300, 0.0])))
 
     def test_rest_of_a_free_line_is_in_its_own_acceleration(self):
-        """What is not balanced accelerates the whole line; the mesh carries what the second inertia needs."""
+        """What is not balanced accelerates the whole line; the mesh carries what the second
+        inertia needs.
+        """
         line = two_gears()
         q = static_start(line, constant_speed(10.0), constant_torques([10.0, 0.0]))
         reduced = 0.01 + 0.05 * 0.5**2

@@ -62,7 +62,7 @@ def _term(side: str, name: str, case: Case, at: str) -> float:
 
 
 def _tooth(side: str, root: str, case: Case, at: str) -> float:
-    """Bending, shear and axial compliance together, with the true root curve or the straight one."""
+    """Sum of bending, shear and axial compliance, with the true or the straight root curve."""
     parts = terms(case, side, case.curvature(side, at), root=root)
     return float(sum(parts[name][0] for name in ("bending", "shear", "axial")))
 

@@ -93,9 +93,14 @@ def _even_flash(case: HotCase, at: str) -> float:
         system.pair.face_width * system.pair.transverse_contact_ratio
     )
     rise = flash_temperature(
-        system.pair, np.array([place]), even, system.material, case.duty.heat,
-        friction=case.duty.friction, speed=case.duty.speed,
-    )  # fmt: skip
+        system.pair,
+        np.array([place]),
+        even,
+        system.material,
+        case.duty.heat,
+        friction=case.duty.friction,
+        speed=case.duty.speed,
+    )
     return float(rise[0])
 
 
