@@ -181,33 +181,17 @@ class TestTorquesAndCourse:
         assert_allclose(q / start, 0.0, rtol=0, atol=1e-5)
         assert_allclose(v / start, -math.sqrt(slope / inertia), rtol=1e-5)
 
-    def test_a_run_up_needs_the_torque_of_the_inertias_and_no_more(self):
-        line, course = (
-            chain(5),
-            LineCourse(time=np.array([0.0, 0.2]), speed=np.array([50.0, 90.0])),
-        )
-        torques = np.diag(line.mass) * 200.0
-        q, v, _ = state_after(
-            line,
-            (np.zeros(5), np.zeros(5)),
-            0.1,
-            2000,
-            torques=constant_torques(torques),
-            course=course,
-        )
-        assert_allclose(q, 0.0, rtol=0, atol=1e-15)
-        assert_allclose(v, 0.0, rtol=0, atol=1e-12)
-
-    def test_without_that_torque_it_stays_behind_at_rest(self):
-        line, course = (
-            chain(5),
-            LineCourse(time=np.array([0.0, 0.2]), speed=np.array([50.0, 90.0])),
-        )
-        q, v, _ = state_after(
-            line, (np.zeros(5), np.zeros(5)), 0.1, 2000, course=course
-        )
-        assert_allclose(v, -200.0 * 0.1, rtol=1e-9)
-        assert_allclose(q, -0.5 * 200.0 * 0.1**2, rtol=1e-9)
+    @pytest.mark.parametrize("given", [0.0, 1.0])
+    def test_a_run_up_needs_the_torque_of_the_inertias_and_no_more(self, given):
+        """Without that torque the line stays behind at rest."""
+        line = chain(5)
+        course = LineCourse(time=np.array([0.0, 0.2]), speed=np.array([50.0, 90.0]))
+        torques = constant_torques(given * np.diag(line.mass) * 200.0)
+        rest = np.zeros(5), np.zeros(5)
+        q, v, _ = state_after(line, rest, 0.1, 2000, torques=torques, course=course)
+        behind = (given - 1.0) * 200.0
+        assert_allclose(v, behind * 0.1, rtol=1e-9, atol=1e-12)
+        assert_allclose(q, 0.5 * behind * 0.1**2, rtol=1e-9, atol=1e-15)
 
     def test_a_factor_over_the_knots_is_a_torque_over_time(self):
         line, course = (
@@ -221,7 +205,7 @@ class TestTorquesAndCourse:
         assert_allclose(v, 0.5 * 3.0 * 0.1 / line.mass[0, 0], rtol=1e-9)
 
     def test_signals_are_low_passed_states(self):
-        """What a run gives out at time 0 is the state that it passes there."""
+        """A sample is the state of the line at its time."""
         line, start = chain(4), (np.array([1e-3, 0, 0, -1e-3]), np.zeros(4))
         motion = integrate_line(
             line,

@@ -1,4 +1,4 @@
-"""What short simulated records show, by the names that the rows use.
+"""Indicators of short simulated records, by the names that the rows use.
 
 A record is the acceleration of the pinion's bearing along the line of action over 15 whole turns,
 so that every shaft order falls on a bin. The *residual* is what is left without every mesh

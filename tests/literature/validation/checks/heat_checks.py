@@ -119,7 +119,7 @@ def _surface_rise(case: HotCase, at: str) -> float:
 
 
 def _teeth_per_kelvin(case: HotCase, at: str) -> float:
-    """What the teeth's growth moves the gears apart, for 1 K of both."""
+    """Distance by which the growth of the teeth moves the gears apart, for 1 K of both."""
     rise = case.state.pinion.tooth - case.duty.heat.reference_temperature
     return case.state.growth.teeth_alone(case.duty.system.pair) / rise
 
