@@ -64,11 +64,7 @@ def ratio_of_teeth():
     for row in rows():
         if row["edge_from"]:
             first, second = int(row["edge_from"]), int(row["edge_to"])
-            teeth = (
-                int(row["teeth_from"]) / int(row["teeth_to"])
-                if row["teeth_from"]
-                else 1.0
-            )
+            teeth = int(row["teeth_from"] or 1) / int(row["teeth_to"] or 1)
             found[second] = found[first] * teeth
     return {node: found[node] for node in ratios()}
 

@@ -29,7 +29,8 @@ def two_gears(
     """Two inertias and one mesh between them; ``drive`` is a spring and a damper of the first to
     the nominal angle.
     """
-    table = np.full((1, 8), STIFFNESS) if stiffness is None else stiffness
+    if stiffness is None:
+        stiffness = np.full((1, 8), STIFFNESS)
     direction = np.array([RADII[0], -RADII[1]])
     held, damped = np.zeros((2, 2, 2))
     if drive is not None:
@@ -39,7 +40,7 @@ def two_gears(
         direction=direction,
         roll_dof=0,
         n_teeth=TEETH,
-        stiffness=table,
+        stiffness=stiffness,
         damping=damping,
         **mesh,
     )
@@ -103,7 +104,7 @@ def law_at(
     rate: float = 0.0,
     roll_rate: float = 0.0,
 ) -> np.ndarray:
-    """What a mesh does, (N_LAW,), when it has rolled so many pitches beyond its start phase."""
+    """Law of a mesh, (N_LAW,), when it has rolled so many pitches beyond its start phase."""
     n = len(mesh.direction)
     line = GearedLine(
         names=tuple(map(str, range(n))),

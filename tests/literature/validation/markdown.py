@@ -322,18 +322,24 @@ def shortfalls(results: Sequence[Result]) -> list[str]:
     """One line for each value that differs and each claim that does not hold, the unexpected ones
     marked.
     """
-    return [
-        f"{'' if result.as_expected else 'UNEXPECTED '}{result.row.id}: printed "
-        f"{result.row.printed}, computed "
-        f"{_computed(result)}{' ' if result.row.unit else ''}{result.row.unit} ({result.verdict})"
-        for result in results
-        if result.verdict in (DIFFERS, FAILS) or not result.as_expected
-    ]
+    lines = []
+    for result in results:
+        if result.as_expected and result.verdict not in (DIFFERS, FAILS):
+            continue
+        row = result.row
+        mark = "UNEXPECTED " * (not result.as_expected)
+        computed = f"{_computed(result)} {row.unit}".rstrip()
+        lines.append(
+            f"{mark}{row.id}: printed {row.printed}, computed {computed} ({result.verdict})"
+        )
+    return lines
 
 
 def number(value: float) -> str:
     """Five significant digits, rounding noise as 0."""
-    return "0" if abs(value) < 1e-9 else f"{value:.5g}"
+    if abs(value) < 1e-9:
+        return "0"
+    return f"{value:.5g}"
 
 
 def _computed(result: Result) -> str:
@@ -368,10 +374,12 @@ def _table(results: Sequence[Result], *, head: str = "") -> str:
     for (line, unit, verdict, reason), members in groups.items():
         rows = [result.row for result in members]
         printed = [row.printed for row in rows]
+        if rows[0].kind == "claim":
+            printed = list(dict.fromkeys(printed))
         cells = [
             line.removeprefix(f"{head}."),
             " ".join(row.id.rpartition(".")[2] for row in rows),
-            " ".join(dict.fromkeys(printed) if rows[0].kind == "claim" else printed),
+            " ".join(printed),
             " ".join(_computed(result) for result in members),
             unit,
             _largest(
@@ -397,4 +405,6 @@ def _largest(deviations: Sequence[float], *, rough: bool) -> str:
     if rough:
         return f"~{100.0 * max(deviations, key=abs):+.0f} %"
     text = f"{100.0 * max(deviations, key=abs):+.2f}"
-    return f"{text[1:] if float(text) == 0.0 else text} %"
+    if float(text) == 0.0:
+        text = text[1:]
+    return f"{text} %"

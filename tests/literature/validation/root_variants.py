@@ -32,7 +32,7 @@ def straight_root_profile(gear: Gear) -> ToothProfile:
     tip = math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
     curvature = np.linspace(lowest, tip, N_FLANK_CELLS + 1)
     x, y = involute_point(gear, curvature)
-    n_root = N_ROOT_CELLS if gear.root_radius < gear.base_radius else 0
+    n_root = N_ROOT_CELLS * (gear.root_radius < gear.base_radius)
     root = math.sqrt(gear.root_radius**2 - float(y[0]) ** 2)
     return ToothProfile(
         gear=gear,

@@ -110,10 +110,7 @@ def test_dampers_on_the_pump_drive_lower_the_load_there_and_leave_the_flywheel(
 
 def test_a_force_that_never_closes_the_mesh_is_refused(config, line):
     mesh = mesh_between(line, (21, 45))
+    strength = read_mesh_strength(config, line, mesh)
+    load = ToothLoad(speed=SPEED, force=np.full(8, -1.0))
     with pytest.raises(ConfigError, match="its force never closes the driving flanks"):
-        dynamic_root_stress(
-            read_mesh_strength(config, line, mesh),
-            line,
-            mesh,
-            ToothLoad(speed=SPEED, force=np.full(8, -1.0)),
-        )
+        dynamic_root_stress(strength, line, mesh, load)

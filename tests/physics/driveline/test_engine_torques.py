@@ -2,7 +2,6 @@
 refused.
 """
 
-import copy
 import re
 
 import numpy as np
@@ -21,7 +20,7 @@ THROWS = range(3, 13)
 
 
 def changed(path, value):
-    values = copy.deepcopy(option())
+    values = option()
     *groups, last = path.split(".")
     place = values
     for group in groups:
@@ -133,9 +132,8 @@ def pressure_file(folder, scale=1.0):
     found = torques_of(option())
     path = folder / "measured.csv"
     table = np.column_stack([np.degrees(found.angle), scale * found.pressure * 1e-6])
-    np.savetxt(
-        path, table, delimiter=",", header="crank_angle_deg,pressure_mpa", comments=""
-    )
+    header = "crank_angle_deg,pressure_mpa"
+    np.savetxt(path, table, delimiter=",", header=header, comments="")
     return changed("pressure.file", str(path)), found
 
 
@@ -146,34 +144,21 @@ def test_a_measured_pressure_gives_the_torque_back(tmp_path):
     assert_allclose(found.on(NODES), burned.on(NODES), rtol=0, atol=1.0)
 
 
-def test_a_measured_pressure_below_the_friction_is_refused(tmp_path):
-    values, _ = pressure_file(tmp_path, scale=0.02)
-    with pytest.raises(
-        ConfigError, match=r"gives 281 N m, below the .* N m of friction and drives"
+def test_torques_that_contradict_the_pressure_are_refused(tmp_path):
+    measured, _ = pressure_file(tmp_path)
+    (tmp_path / "weak").mkdir()
+    weak, _ = pressure_file(tmp_path / "weak", scale=0.02)
+    idle = changed("friction_mean_pressure_mpa", 0.0)
+    idle.update(loads=None, injection_pump=None, valves=None)
+    for values, torque, message in (
+        (weak, None, r"gives 281 N m, below the .* N m of friction and drives"),
+        (measured, 100.0, "which decides it; leave the torque out"),
+        (option(), None, "a Wiebe cycle needs the brake torque"),
+        (option(), -10.0, r"the brake torque -10 N m is below the friction"),
+        (idle, 0.0, r"the torque of the gas, 0 N m with .* drives, is below the 2.4"),
     ):
-        torques_of(values, torque=None)
-
-
-def test_a_measured_pressure_decides_the_torque_and_a_cycle_needs_one(tmp_path):
-    values, _ = pressure_file(tmp_path)
-    with pytest.raises(ConfigError, match="which decides it; leave the torque out"):
-        torques_of(values, torque=100.0)
-    with pytest.raises(ConfigError, match="a Wiebe cycle needs the brake torque"):
-        torques_of(option(), torque=None)
-
-
-def test_a_torque_below_the_friction_is_refused():
-    with pytest.raises(
-        ConfigError, match=r"the brake torque -10 N m is below the friction"
-    ):
-        torques_of(option(), torque=-10.0)
-    values = changed("friction_mean_pressure_mpa", 0.0)
-    values["loads"], values["injection_pump"], values["valves"] = None, None, None
-    with pytest.raises(
-        ConfigError,
-        match=r"the torque of the gas, 0 N m with friction and drives, is below the 2.4",
-    ):
-        torques_of(values, torque=0.0)
+        with pytest.raises(ConfigError, match=message):
+            torques_of(values, torque=torque)
 
 
 @pytest.mark.parametrize(
@@ -315,25 +300,21 @@ def test_what_makes_no_engine_is_refused_in_one_line(path, value, message):
 
 def test_toothed_wheels_are_read_by_name():
     wheels = read_wheels(option())
-    assert {name: wheel.node for name, wheel in wheels.items()} == {
-        "flywheel": 14,
-        "pump_end": 45,
-    }
+    nodes = {name: wheel.node for name, wheel in wheels.items()}
+    assert nodes == {"flywheel": 14, "pump_end": 45}
     assert read_wheels(option(toothed_wheels=None)) == {}
-    with pytest.raises(
-        ConfigError,
-        match=r"excitation\.toothed_wheels\.flywheel\.n_teeth = 2 must lie in 4\.\.1000",
+    without_node = option()
+    del without_node["toothed_wheels"]["flywheel"]["node"]
+    for values, message in (
+        (
+            changed("toothed_wheels.flywheel.n_teeth", 2),
+            ".n_teeth = 2 must lie in 4..1000",
+        ),
+        (without_node, ": missing node"),
     ):
-        read_wheels(changed("toothed_wheels.flywheel.n_teeth", 2))
-    without_node = {
-        key: one
-        for key, one in option()["toothed_wheels"]["flywheel"].items()
-        if key != "node"
-    }
-    with pytest.raises(
-        ConfigError, match=r"excitation\.toothed_wheels\.flywheel: missing node"
-    ):
-        read_wheels(option(toothed_wheels={"flywheel": without_node}))
+        place = "excitation.toothed_wheels.flywheel"
+        with pytest.raises(ConfigError, match=re.escape(place + message)):
+            read_wheels(values)
 
 
 def test_missing_keys_are_named():

@@ -33,7 +33,8 @@ def train(config, tmp_path):
         if driven_first:  # the last gear is the first node
             rows[1:] = rows[:0:-1]
         gears = [
-            "node,n_teeth,normal_module_mm,pressure_angle_deg,helix_angle_deg,face_width_mm,profile_shift"
+            "node,n_teeth,normal_module_mm,pressure_angle_deg,helix_angle_deg,"
+            "face_width_mm,profile_shift"
         ]
         gears += [
             f"{place + 1},{z},2,20,0,20,{x}"
@@ -95,21 +96,15 @@ TRAINS = [
 def test_flanks_touch_in_every_mesh(
     train, teeth, center_lines, shifts, driven_first, turned
 ):
-    line = train(teeth, center_lines, shifts, driven_first)
-    assert_allclose(from_whole(misfit(line, turned)), 0.0, atol=1e-9)
+    gaps = misfit(train(teeth, center_lines, shifts, driven_first), turned)
+    assert_allclose(from_whole(gaps), 0.0, atol=1e-9)
+    assert np.all(from_whole(gaps + 0.01) > 0.005)
 
 
 def test_the_engine_touches_everywhere_too():
     line = read_drive_line(read_request(["system=engine_gear_train"]).config)
     assert_allclose(from_whole(misfit(line, 1.0)), 0.0, atol=1e-9)
     assert len(set(np.round(start_rolls(line) / line.pairs[0].base_pitch, 3))) > 4
-
-
-def test_the_law_can_fail(train):
-    line = train(*TRAINS[1])
-    shifted = np.array(misfit(line))
-    shifted += 0.01
-    assert np.all(from_whole(shifted) > 0.005)
 
 
 @pytest.mark.parametrize(("z", "expected"), [(33, 0.0), (34, 0.5), (35, 0.0)])

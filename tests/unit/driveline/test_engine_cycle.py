@@ -193,42 +193,29 @@ def test_cycles_that_cannot_be_are_refused(change, message):
 
 def write(folder, header, angle, pressure):
     path = folder / "pressure.csv"
-    np.savetxt(
-        path,
-        np.column_stack([angle, pressure]),
-        delimiter=",",
-        header=header,
-        comments="",
-    )
+    table = np.column_stack([angle, pressure])
+    np.savetxt(path, table, delimiter=",", header=header, comments="")
     return PressureFile(file=str(path))
 
 
+HEADER = "crank_angle_deg,pressure_mpa"
 DEGREES = np.arange(-360.0, 360.0, 1.0)
 MEGAPASCAL = 2.0 + np.cos(np.radians(DEGREES / 2.0))
 
 
-def test_a_measured_pressure_is_read_whatever_its_units_and_start(tmp_path):
-    one = read_pressure(
-        write(tmp_path, "crank_angle_deg,pressure_mpa", DEGREES, MEGAPASCAL), N
-    )
-    assert_allclose(one, 1e6 * (2.0 + np.cos(ANGLE / 2.0)), rtol=1e-4)
-    (tmp_path / "b").mkdir()
-    other = write(
-        tmp_path / "b",
-        "pressure_gpa,crank_angle_rad",
-        MEGAPASCAL * 1e-3,
-        np.radians(DEGREES),
-    )
-    assert_allclose(read_pressure(other, N), one, rtol=1e-9)
-    (tmp_path / "c").mkdir()
-    both_ends = np.append(DEGREES, 360.0), np.append(MEGAPASCAL, 1.0)
-    assert_allclose(
-        read_pressure(
-            write(tmp_path / "c", "crank_angle_deg,pressure_mpa", *both_ends), N
-        ),
-        one,
-        rtol=1e-9,
-    )
+@pytest.mark.parametrize(
+    ("header", "angle", "pressure"),
+    [
+        (HEADER, DEGREES, MEGAPASCAL),
+        ("pressure_gpa,crank_angle_rad", MEGAPASCAL * 1e-3, np.radians(DEGREES)),
+        (HEADER, np.append(DEGREES, 360.0), np.append(MEGAPASCAL, 1.0)),
+    ],
+)
+def test_a_measured_pressure_is_read_whatever_its_units_and_start(
+    tmp_path, header, angle, pressure
+):
+    found = read_pressure(write(tmp_path, header, angle, pressure), N)
+    assert_allclose(found, 1e6 * (2.0 + np.cos(ANGLE / 2.0)), rtol=1e-4)
 
 
 @pytest.mark.parametrize(

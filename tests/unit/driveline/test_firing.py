@@ -1,4 +1,4 @@
-"""When cylinders fire: even firing of the 20-cylinder engine, and layouts that cannot be."""
+"""Firing of cylinders: even firing of the 20-cylinder engine, and layouts that cannot be."""
 
 import re
 from dataclasses import replace

@@ -1,6 +1,4 @@
-"""What a line, its course, its torques and its solver refuse, each in one line, and runs that
-cannot go on.
-"""
+"""Refusals of lines, courses, torques and solvers, each in one line, and runs that fail."""
 
 import math
 from dataclasses import replace
@@ -230,9 +228,7 @@ class TestRun:
             run(two_gears(), start=(np.zeros(2), np.array([1e300, 0.0])))
 
     def test_rest_of_a_free_line_is_in_its_own_acceleration(self):
-        """What is not balanced accelerates the whole line; the mesh carries what the second
-        inertia needs.
-        """
+        """Unbalanced torques accelerate the whole line; the mesh drives the second inertia."""
         line = two_gears()
         q = static_start(line, constant_speed(10.0), constant_torques([10.0, 0.0]))
         reduced = 0.01 + 0.05 * 0.5**2

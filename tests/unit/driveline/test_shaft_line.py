@@ -94,10 +94,8 @@ def test_a_loop_that_turns_is_counted_and_one_that_locks_is_refused():
     )
     gears = (gear("a", 0, 20), gear("b", 1, 40), gear("c", 0, 30), gear("d", 1, 60))
     assert ShaftLine(nodes=nodes, gears=gears, meshes=meshes).n_loops == 1
-    with pytest.raises(
-        ConfigError,
-        match=r"row 7: this joint closes a loop that locks.* out at -0\.491803.*at -0\.5",
-    ):
+    locks = r"row 7: this joint closes a loop that locks.* out at -0\.491803.*at -0\.5"
+    with pytest.raises(ConfigError, match=locks):
         ShaftLine(nodes=nodes, gears=(*gears[:3], gear("d", 1, 61)), meshes=meshes)
     with pytest.raises(
         ConfigError, match="loop that locks"
