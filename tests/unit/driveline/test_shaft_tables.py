@@ -12,8 +12,9 @@ from gensig.errors import ConfigError
 from gensig.plan.request import read_request
 
 SHAFTING = """# a motor, two gears and a fan
-node,name,inertia_kg_m2,speed_ratio,stiffness_knm_per_rad,edge_from,edge_to,edge_kind,teeth_from,
-teeth_to,loss_factor 1,motor,0.1,1,10,1,2,coupling,,,0.2
+node,name,inertia_kg_m2,speed_ratio,stiffness_knm_per_rad,edge_from,\
+edge_to,edge_kind,teeth_from,teeth_to,loss_factor
+1,motor,0.1,1,10,1,2,coupling,,,0.2
 2,pinion,1e-3,1,1500,2,3,gear_mesh,20,40,
 3,wheel,,0.5,20,3,4,shaft,,,
 4,fan,0.2,0.5,,,,,,,
