@@ -93,8 +93,8 @@ def state_after(
     run = _Run(line, course or constant_speed(0.0), torques or [], solver, start, [])
     run.begin(0)
     run.skip(n_steps)
-    told = run.told(np.empty((0, 0)), np.empty(0), np.empty(0))
-    return *told.end, told
+    motion = run.motion(np.empty((0, 0)), np.empty(0), np.empty(0))
+    return *motion.end, motion
 
 
 def law_at(

@@ -16,8 +16,13 @@ from gensig.driveline.linear.shaft_line import (
     Shaft,
     ShaftLine,
 )
-from gensig.driveline.options import Campbell, read_options
-from gensig.driveline.shaft_tables import read_gears, read_shafting, shipped_tables
+from gensig.driveline.options import Campbell, LineOptions, read_options
+from gensig.driveline.shaft_tables import (
+    TableRow,
+    read_gears,
+    read_shafting,
+    shipped_tables,
+)
 from gensig.driveline.table_rows import (
     check_gears_in_mesh,
     check_whole,
@@ -32,6 +37,7 @@ from gensig.driveline.table_rows import (
 from gensig.dynamics.pair import Rotor
 from gensig.errors import ConfigError
 from gensig.geometry.contact import SIDES, GearPair
+from gensig.geometry.gear import Gear
 from gensig.options.configuration import Configuration
 from gensig.systems.pair_machine import GearPairMachine, pair_dynamics
 from gensig.systems.registry import read_material
@@ -129,17 +135,7 @@ def read_drive_line(config: Configuration) -> DriveLine:
         node_of(row, place, gears, shapes, options, material)
         for place, row in enumerate(node_rows.values())
     )
-    shafts, meshes, pairs = [], [], []
-    for row in shafting:
-        ends = ends_of(row, numbers)
-        if ends is None:
-            continue
-        if row.text("edge_kind") == "gear_mesh":
-            pair, mesh = mesh_of(row, ends, numbers, gears, shapes, options)
-            pairs.append(pair)
-            meshes.append(mesh)
-        else:
-            shafts.append(shaft_of(row, ends, options.loss_factor))
+    shafts, meshes, pairs = _joints(shafting, numbers, gears, shapes, options)
     support_force = None
     if options.lateral:
         support_force = options.support.force
@@ -162,6 +158,28 @@ def read_drive_line(config: Configuration) -> DriveLine:
         load_node=options.load_node,
         support_force=support_force,
     )
+
+
+def _joints(
+    shafting: list[TableRow],
+    numbers: tuple[int, ...],
+    gears: list[LineGear],
+    shapes: list[Gear],
+    options: LineOptions,
+) -> tuple[list[Shaft], list[GearMesh], list[GearPair]]:
+    """Shafts, meshes and gear pairs of the rows that join two nodes."""
+    shafts, meshes, pairs = [], [], []
+    for row in shafting:
+        ends = ends_of(row, numbers)
+        if ends is None:
+            continue
+        if row.text("edge_kind") == "gear_mesh":
+            pair, mesh = mesh_of(row, ends, numbers, gears, shapes, options)
+            pairs.append(pair)
+            meshes.append(mesh)
+        else:
+            shafts.append(shaft_of(row, ends, options.loss_factor))
+    return shafts, meshes, pairs
 
 
 def drive_line_of_pair(system: GearPairMachine, name: str) -> DriveLine:

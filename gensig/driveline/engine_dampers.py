@@ -93,9 +93,9 @@ def mesh_between(line: EngineLine, nodes: Sequence[int]) -> int:
     ConfigError    where these two do not mesh
     """
     wanted = {f"{nodes[0]}/{nodes[1]}", f"{nodes[1]}/{nodes[0]}"}
-    for place, name in enumerate(line.mesh_names):
+    for number, name in enumerate(line.mesh_names):
         if name in wanted:
-            return place
+            return number
     raise ConfigError(
         f"nodes {nodes[0]} and {nodes[1]} do not mesh; these do: {', '.join(line.mesh_names)}"
     )

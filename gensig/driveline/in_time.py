@@ -90,7 +90,7 @@ def time_response(
     )
     speeds = [("speed", line.dof(node)) for node in nodes]
     angles = [("angle", line.dof(node)) for node in nodes]
-    forces = [("mesh_force", place) for place in range(len(machine.mesh_names))]
+    forces = [("mesh_force", number) for number in range(len(machine.mesh_names))]
     motion = line.run(
         SOLVER,
         duration=duration,

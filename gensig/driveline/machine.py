@@ -374,7 +374,7 @@ class LineMachine(Machine):
             start_phase=start.phase,
         )
         sound = sound_meshes(
-            engine, self.law, forces, besides={self.place, *neighbours}
+            engine, self.law, forces, left_out={self.place, *neighbours}
         )
         governor = Governor(
             frequency=self.operating.drive_frequency,

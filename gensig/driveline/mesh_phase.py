@@ -40,15 +40,15 @@ def tooth_angles(line: DriveLine, turned: float = 0.0) -> Array:
             if len(placed) == 1:
                 by_node[shaft.first] = by_node[shaft.second] = placed[0]
         for mesh, pair in meshes:
-            one, other = gears[mesh.driving].node, gears[mesh.driven].node
-            sense = math.copysign(1.0, ratio[one])
-            known, sought = by_node[one], by_node[other]
+            driving, driven = gears[mesh.driving].node, gears[mesh.driven].node
+            sense = math.copysign(1.0, ratio[driving])
+            known, sought = by_node[driving], by_node[driven]
             if known is not None and sought is None:
-                by_node[other] = _driven_angle(
+                by_node[driven] = _driven_angle(
                     mesh, pair, sense, _past_pitch_point(mesh, pair, sense, known)
                 )
             elif sought is not None and known is None:
-                by_node[one] = _driving_angle(mesh, pair, sense, sought)
+                by_node[driving] = _driving_angle(mesh, pair, sense, sought)
         if by_node == before:
             break  # the rest belongs to no part that holds the first node
     angles = [angle or 0.0 for angle in by_node]
@@ -79,14 +79,14 @@ def first_slice_lead(pair: GearPair) -> float:
     return 0.5 * pair.face_width * math.tan(pair.base_helix_angle)
 
 
-def start_phase(line: DriveLine, place: int, turned: float = 0.0) -> float:
+def start_phase(line: DriveLine, number: int, turned: float = 0.0) -> float:
     """Pitches that the first slice of a pair of one mesh is past A.
 
     What a mesh table takes as its start.
     """
-    pair = line.pairs[place]
+    pair = line.pairs[number]
     return (
-        float(start_rolls(line, turned)[place] + first_slice_lead(pair))
+        float(start_rolls(line, turned)[number] + first_slice_lead(pair))
         / pair.base_pitch
     )
 

@@ -223,12 +223,12 @@ def named_by_side(pair: GearPair) -> GearPair:
     return replace(pair, pinion=pinion, wheel=wheel)
 
 
-def reference_force(machine: EngineLine, place: int, force: float) -> float:
+def reference_force(machine: EngineLine, number: int, force: float) -> float:
     """The force at which a mesh's contact and damping are taken, N.
 
     Its mean, and what closes it by 2 um at least.
     """
-    return max(abs(force), machine.drive.line.meshes[place].stiffness * LEAST_APPROACH)
+    return max(abs(force), machine.drive.line.meshes[number].stiffness * LEAST_APPROACH)
 
 
 def _geared(
@@ -251,8 +251,8 @@ def _geared(
         stiffness=matrices.stiffness + rate**2 * rigid,
         rotation=rotation,
         meshes=tuple(
-            _mesh(machine, matrices, place, float(force), own.get(place), float(roll))
-            for place, (force, roll) in enumerate(zip(forces, phases, strict=True))
+            _mesh(machine, matrices, number, float(force), own.get(number), float(roll))
+            for number, (force, roll) in enumerate(zip(forces, phases, strict=True))
         ),
     )
 
@@ -260,29 +260,29 @@ def _geared(
 def _mesh(
     machine: EngineLine,
     matrices: LineMatrices,
-    place: int,
+    number: int,
     force: float,
     own: OwnMesh | None,
     roll: float,
 ) -> LineMesh:
     drive = machine.drive
-    pair, mesh = drive.pairs[place], drive.line.meshes[place]
-    reference = reference_force(machine, place, force)
+    pair, mesh = drive.pairs[number], drive.line.meshes[number]
+    reference = reference_force(machine, number, force)
     phase = (roll + first_slice_lead(pair)) / pair.base_pitch
     common: dict[str, Any] = {
-        "name": machine.mesh_names[place],
-        "direction": matrices.directions[place],
+        "name": machine.mesh_names[number],
+        "direction": matrices.directions[number],
         "roll_dof": _dof(matrices, drive.line.gears[mesh.driving].node),
         # so many N s/m under the mean force; a mesh that carries less is damped less
-        "damping": float(matrices.mesh_damping[place]) / reference,
+        "damping": float(matrices.mesh_damping[number]) / reference,
         "start_phase": phase,
     }
     if own is None:
-        stiffness = float(matrices.mesh_stiffness[place])
+        stiffness = float(matrices.mesh_stiffness[number])
         return phase_mesh(
             n_teeth=(pair.pinion.n_teeth, pair.wheel.n_teeth),
             stiffness=np.full((1, CONSTANT_NODES), stiffness),
-            backlash=float(matrices.backlash[place]),
+            backlash=float(matrices.backlash[number]),
             mirror=2.0 * pair.pitch_point / pair.base_pitch + 0.5,
             **common,
         )
@@ -294,9 +294,9 @@ def _mesh(
     return pair_mesh(table=own.table, **common)
 
 
-def _dof(matrices: LineMatrices, place: int) -> int:
+def _dof(matrices: LineMatrices, number: int) -> int:
     """Degree of freedom that a node, by its place in the line, turns with."""
-    return int(np.argmax(matrices.expand[place]))
+    return int(np.argmax(matrices.expand[number]))
 
 
 def _tables(
@@ -320,14 +320,14 @@ def _torques(
     crank = abs(float(rotation[throws[0]]))
     knots = _table_times(course)
     torques: list[ShaftTorque] = []
-    for place, time in enumerate(knots):
+    for number, time in enumerate(knots):
         tables, share = first, None
-        if place > 0:
+        if number > 0:
             speed = float(np.interp(time, course.time, course.speed))
             torque = float(np.interp(time, course.time, course.torque))
             tables = _tables(machine, matrices, speed, torque)
         if len(knots) > 1:
-            share = np.interp(course.time, knots, np.eye(len(knots))[place])
+            share = np.interp(course.time, knots, np.eye(len(knots))[number])
         least = ROUNDED * float(np.abs(tables).max())
         for dof in np.flatnonzero(np.any(tables != 0.0, axis=1)):
             table, ratio = tables[dof], abs(float(rotation[dof])) / crank
@@ -358,20 +358,22 @@ def _table_times(course: EngineCourse) -> Array:
     greatest = max(float(np.abs(course.torque).max()), 1e-9)
     steps = np.abs(np.diff(course.speed)) / TABLE_STEP
     steps = steps + np.abs(np.diff(course.torque)) / (TABLE_SHARE * greatest)
-    gone = np.concatenate([[0.0], np.cumsum(steps)])
-    n_tables = min(MOST_TABLES, 1 + math.ceil(gone[-1]))
+    travelled = np.concatenate([[0.0], np.cumsum(steps)])
+    n_tables = min(MOST_TABLES, 1 + math.ceil(travelled[-1]))
     if n_tables < 2:
         return course.time[:1]
-    places = np.searchsorted(gone, np.linspace(0.0, gone[-1], n_tables)[1:-1])
-    return course.time[np.unique([0, *places, len(gone) - 1])]
+    knots_at = np.searchsorted(
+        travelled, np.linspace(0.0, travelled[-1], n_tables)[1:-1]
+    )
+    return course.time[np.unique([0, *knots_at, len(travelled) - 1])]
 
 
 def with_supports(
-    machine: EngineLine, place: int, supports: Sequence[object]
+    machine: EngineLine, number: int, supports: Sequence[object]
 ) -> EngineLine:
     """The same with other supports of the two gears of a mesh, driving and driven."""
     drive = machine.drive
-    mesh, gears = drive.line.meshes[place], list(drive.line.gears)
+    mesh, gears = drive.line.meshes[number], list(drive.line.gears)
     for gear, support in zip((mesh.driving, mesh.driven), supports, strict=True):
         gears[gear] = replace(gears[gear], support=support)  # type: ignore[arg-type]
     line = replace(drive.line, gears=tuple(gears))

@@ -133,7 +133,7 @@ def sweep_response(
     course = replace(course, torque=machine.load_at(torque, share))
     line = running_line(machine, course, governor=GOVERNOR, own=own)
     names = [(kind, line.dof(node)) for kind in ("angle", "speed") for node in nodes]
-    names += [("mesh_force", place) for place in range(len(machine.mesh_names))]
+    names += [("mesh_force", number) for number in range(len(machine.mesh_names))]
     motion = line.run(
         SOLVER,
         duration=2.0 * seconds,

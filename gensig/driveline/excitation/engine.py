@@ -65,18 +65,18 @@ def read_engine(values: Section) -> Engine:
         reference=read(Reference, values["reference"], f"{PLACE}.reference"),
         throw_nodes=_whole_numbers("throw_nodes", values["throw_nodes"]),
         valve_trains={
-            name: _read_train(name, one)
-            for name, one in named_groups("valves", values["valves"])
+            name: _read_train(name, value)
+            for name, value in named_groups("valves", values["valves"])
         },
         valve_nodes={
-            name: _whole_numbers(f"valve_nodes.{name}", one)
-            for name, one in named_groups("valve_nodes", values["valve_nodes"])
+            name: _whole_numbers(f"valve_nodes.{name}", value)
+            for name, value in named_groups("valve_nodes", values["valve_nodes"])
         },
         plunger=plunger,
         plunger_nodes=plunger_nodes,
         loads={
-            name: read_named(Load, one, f"loads.{name}", "load")
-            for name, one in named_groups("loads", values["loads"])
+            name: read_named(Load, value, f"loads.{name}", "load")
+            for name, value in named_groups("loads", values["loads"])
         },
         dynamometer=read(Dynamometer, values["dynamometer"], f"{PLACE}.dynamometer"),
     )
@@ -95,8 +95,8 @@ def read_wheels(values: Section) -> dict[str, ToothedWheel]:
     """The toothed wheels of the group ``excitation``, by their names; none where it is null."""
     check_group(PLACE, values)
     return {
-        name: read_named(ToothedWheel, one, f"toothed_wheels.{name}", "toothed_wheel")
-        for name, one in named_groups("toothed_wheels", values.get("toothed_wheels"))
+        name: read_named(ToothedWheel, value, f"toothed_wheels.{name}", "toothed_wheel")
+        for name, value in named_groups("toothed_wheels", values.get("toothed_wheels"))
     }
 
 
@@ -105,7 +105,7 @@ def _read_pressure(values: Any) -> WiebeCycle | PressureFile:
     check_group(f"{PLACE}.pressure", values)
     cycle = read(
         WiebeCycle,
-        {key: one for key, one in values.items() if key != "file"},
+        {key: value for key, value in values.items() if key != "file"},
         f"{PLACE}.pressure",
     )
     if values.get("file") is None:
@@ -164,7 +164,7 @@ def named_groups(key: str, values: Any) -> list[tuple[str, Any]]:
     if values is None:
         return []
     check_group(f"{PLACE}.{key}", values)
-    return [(str(name), one) for name, one in values.items()]
+    return [(str(name), value) for name, value in values.items()]
 
 
 def check_group(place: str, values: Any) -> None:
@@ -177,7 +177,7 @@ def check_group(place: str, values: Any) -> None:
 
 def _whole_numbers(key: str, values: Any) -> tuple[int, ...]:
     if not isinstance(values, list | tuple) or not all(
-        type(one) is int for one in values
+        type(value) is int for value in values
     ):
         raise ConfigError(f"{PLACE}.{key} = {values!r} is not a list of whole numbers")
     return tuple(values)

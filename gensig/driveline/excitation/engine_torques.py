@@ -206,19 +206,17 @@ def engine_torques(
     Parameters
     ----------
     speed : rad/s      of the crank
-    torque : N m       brake torque at the crank; None with a measured pressure, which decides it
+    torque : N m       brake torque at the crank; None with a measured pressure
     ratios : speed of each node over the crank's
     n_points : of the cycle
 
     Raises
     ------
-    ConfigError    for a torque below the friction, nodes that the line has not, or a camshaft
-        at another ratio
+    ConfigError    for a torque below the friction, unknown nodes, or a camshaft at another ratio
 
     Notes
     -----
-    The gas does the work of the brake torque, of friction, of cams, plungers and driven
-    machines, so that the means balance and the line turns steadily.
+    The gas does the work of brake, friction, cams, plungers and driven machines: means balance.
     """
     _check_nodes(engine, ratios)
     if not speed > 0.0:
@@ -227,32 +225,22 @@ def engine_torques(
         )
     share = speed / engine.reference.speed
     parts = [*_loads(engine, share), *_valve_torques(engine, speed, n_points)]
-    taken = engine.friction_torque - sum(
-        ratios[node] * float(np.mean(row)) for node, row in parts
-    )
-    one_plunger = partial(_plunger_torque, engine, speed, share, n_points=n_points)
-    if isinstance(engine.pressure, PressureFile):
-        pressure, indicated, brake = _measured(
-            engine, torque, taken, one_plunger, n_points
-        )
-    else:
-        pressure, indicated, brake = _burned(
-            engine, speed, torque, taken, one_plunger, n_points
-        )
+    driven = sum(ratios[node] * float(np.mean(row)) for node, row in parts)
+    taken = engine.friction_torque - driven
+    plunger_at = partial(_plunger_torque, engine, speed, share, n_points=n_points)
+    work = partial(_measured, engine)
+    if isinstance(engine.pressure, WiebeCycle):
+        work = partial(_burned, engine, speed)
+    pressure, indicated, brake = work(torque, taken, plunger_at, n_points)
     volume = _fuel(engine, indicated)
-    pulses, firing = one_plunger(volume), engine.layout.firing_angles()
-    parts += [
-        (node, delayed(pulses, firing[name]))
-        for name, node in engine.plunger_nodes.items()
-    ]
+    pulses, firing = plunger_at(volume), engine.layout.firing_angles()
+    plungers = engine.plunger_nodes.items()
+    parts += [(node, delayed(pulses, firing[name])) for name, node in plungers]
     dynamometer = engine.dynamometer
     load_ratio = ratios[dynamometer.node]
     parts.append((dynamometer.node, np.array(-brake / load_ratio)))
     parts += _cylinder_torques(engine, pressure, speed)
-    nodes = tuple(sorted({node for node, _ in parts}))
-    torques = np.zeros((len(nodes), n_points))
-    for node, row in parts:
-        torques[nodes.index(node)] += row
+    nodes, torques = _by_node(parts, n_points)
     return EngineTorques(
         speed=speed,
         brake_torque=brake,
@@ -266,6 +254,17 @@ def engine_torques(
         disturbance_torque=dynamometer.disturbance_share * brake / load_ratio,
         disturbance_frequency=dynamometer.disturbance_frequency,
     )
+
+
+def _by_node(
+    parts: list[tuple[int, Array]], n_points: int
+) -> tuple[tuple[int, ...], Array]:
+    """Nodes of some torques in ascending order, and the sum on each, (node, point)."""
+    nodes = tuple(sorted({node for node, _ in parts}))
+    torques = np.zeros((len(nodes), n_points))
+    for node, row in parts:
+        torques[nodes.index(node)] += row
+    return nodes, torques
 
 
 def _check_nodes(engine: Engine, ratios: Mapping[int, float]) -> None:
@@ -303,10 +302,10 @@ def _valve_torques(
     firing, parts = engine.layout.firing_angles(), []
     for train in engine.valve_trains.values():
         angle = CAM_RATIO * (cycle_angles(n_points) - train.opening)
-        one = cam_torque(train.cam, angle, CAM_RATIO * speed)
+        torque_of_one = cam_torque(train.cam, angle, CAM_RATIO * speed)
         for bank, nodes in engine.valve_nodes.items():
             parts += [
-                (node, delayed(one, firing[f"{bank}{throw + 1}"]))
+                (node, delayed(torque_of_one, firing[f"{bank}{throw + 1}"]))
                 for throw, node in enumerate(nodes)
             ]
     return parts
@@ -327,12 +326,12 @@ def _cylinder_torques(
 ) -> list[tuple[int, Array]]:
     """Gas, inertia and friction torques of the cylinders on the throws, (point,) each."""
     angle = cycle_angles(len(pressure))
-    one = gas_torque(engine.cylinder, angle, pressure, engine.crankcase_pressure)
-    one = one + inertia_torque(engine.cylinder, angle, speed)
-    one = one - engine.friction_torque / len(engine.layout.cylinders)
+    torque = gas_torque(engine.cylinder, angle, pressure, engine.crankcase_pressure)
+    torque = torque + inertia_torque(engine.cylinder, angle, speed)
+    torque = torque - engine.friction_torque / len(engine.layout.cylinders)
     firing = engine.layout.firing_angles()
     return [
-        (engine.throw_nodes[engine.layout.throw(name)], delayed(one, firing[name]))
+        (engine.throw_nodes[engine.layout.throw(name)], delayed(torque, firing[name]))
         for name in engine.layout.cylinders
     ]
 
@@ -351,16 +350,16 @@ def _indicated(engine: Engine, pressure: Array) -> float:
     return float(np.mean(torque)) * len(engine.layout.cylinders)
 
 
-def _taken_by(engine: Engine, one_plunger: Array) -> float:
+def _taken_by(engine: Engine, torque: Array) -> float:
     """Mean torque of all plungers at the crank, N m."""
-    return -CAM_RATIO * len(engine.plunger_nodes) * float(np.mean(one_plunger))
+    return -CAM_RATIO * len(engine.plunger_nodes) * float(np.mean(torque))
 
 
 def _measured(
     engine: Engine,
     torque: float | None,
     taken: float,
-    one_plunger: partial[Array],
+    plunger_at: partial[Array],
     n_points: int,
 ) -> tuple[Array, float, float]:
     """Pressure, indicated and brake torque with a measured pressure."""
@@ -372,7 +371,7 @@ def _measured(
         )
     pressure = read_pressure(engine.pressure, n_points)
     indicated = _indicated(engine, pressure)
-    lost = taken + _taken_by(engine, one_plunger(_fuel(engine, max(indicated, 0.0))))
+    lost = taken + _taken_by(engine, plunger_at(_fuel(engine, max(indicated, 0.0))))
     if not indicated > lost:
         raise ConfigError(
             f"excitation.pressure.file = {engine.pressure.file} gives {indicated:.4g} "
@@ -387,7 +386,7 @@ def _burned(
     speed: float,
     torque: float | None,
     taken: float,
-    one_plunger: partial[Array],
+    plunger_at: partial[Array],
     n_points: int,
 ) -> tuple[Array, float, float]:
     """Pressure, indicated and brake torque with a Wiebe cycle."""
@@ -408,7 +407,7 @@ def _burned(
     indicated = torque + taken
     for _ in range(ROUNDS):
         before = indicated
-        pumped = _taken_by(engine, one_plunger(_fuel(engine, before)))
+        pumped = _taken_by(engine, plunger_at(_fuel(engine, before)))
         indicated = torque + taken + pumped
         if abs(indicated - before) <= ROUNDING * indicated:
             break

@@ -44,18 +44,18 @@ class Layout:
                 "excitation.layout.throw_angles_deg is empty; give one angle for every throw"
             )
         known = self.cylinders
-        for place, name in enumerate(self.firing_order):
+        for position, name in enumerate(self.firing_order):
             if name not in known:
                 raise ConfigError(
                     f"excitation.layout.firing_order: no cylinder {name!r} (place "
-                    f"{place + 1}); there are "
+                    f"{position + 1}); there are "
                     f"{known[0]} to {known[-1]}"
                 )
-            if name in self.firing_order[:place]:
+            if name in self.firing_order[:position]:
                 first = self.firing_order.index(name) + 1
                 raise ConfigError(
                     f"excitation.layout.firing_order repeats {name} (places {first} "
-                    f"and {place + 1}); "
+                    f"and {position + 1}); "
                     "every cylinder fires once a cycle"
                 )
         if missing := [name for name in known if name not in self.firing_order]:
@@ -114,12 +114,13 @@ class Layout:
         """
         gaps = self._gaps()
         total = sum(gaps)
-        same = [place for place, gap in enumerate(gaps) if gap == TURN]
+        same = [position for position, gap in enumerate(gaps) if gap == TURN]
         if abs(total - 2.0 * TURN) <= TOGETHER:
             return
         if same and abs(total - len(same) * TURN - 2.0 * TURN) <= TOGETHER:
             names = [
-                self.firing_order[place % len(gaps)] for place in (same[0], same[0] + 1)
+                self.firing_order[position % len(gaps)]
+                for position in (same[0], same[0] + 1)
             ]
             raise ConfigError(
                 f"excitation.layout: {' and '.join(names)} fire together with these "

@@ -96,14 +96,14 @@ class MotorDrive:
         same at every speed. Of the loads it is n T / omega of their laws there.
         """
         speed, torque = self.reference.speed, self.reference.torque
-        found = {self.motor_node: torque * (1.0 - self.slip) / (self.slip * speed)}
+        slopes = {self.motor_node: torque * (1.0 - self.slip) / (self.slip * speed)}
         taken = [(self.load_node, self.load_law, torque / ratios[self.load_node])]
         taken += [(load.node, load.law, load.torque) for load in self.loads.values()]
-        for node, law, own in taken:
-            found[node] = found.get(node, 0.0) + LAWS[law] * own / (
+        for node, law, torque_there in taken:
+            slopes[node] = slopes.get(node, 0.0) + LAWS[law] * torque_there / (
                 speed * ratios[node]
             )
-        return found
+        return slopes
 
 
 def motor_torques(

@@ -151,11 +151,10 @@ def tune_dampers(
 
     Notes
     -----
-    Unknowns are the logarithms of inertia, damping ratio and the ring's own frequency, which
-    lies between the lowest and the highest excited one; for viscous dampers inertia and the
-    rate damping over inertia. The largest of many peaks has kinks and several minima:
-    differential evolution (Storn & Price 1997), then a simplex (Nelder & Mead). The seed alone
-    decides the path.
+    Unknowns are the logarithms of inertia, frequency of the ring within the excited ones, and
+    damping ratio; for viscous dampers inertia and the rate damping over inertia. The largest of
+    many peaks has kinks and several minima: differential evolution (Storn & Price 1997), then a
+    simplex (Nelder & Mead). The seed alone decides the path.
 
     Raises
     ------
@@ -169,27 +168,16 @@ def tune_dampers(
         raise ConfigError(
             f"largest inertias {list(most_inertia)} kg m2: give a positive one for each damper"
         )
-    low, high = float(seen.frequency.min()), float(seen.frequency.max())
-    bounds: list[tuple[float, float]] = []
-    for most in most_inertia:
-        bounds.append((math.log(LEAST_INERTIA * most), math.log(most)))
-        if viscous:
-            bounds.append((math.log(low / RATE_MARGIN), math.log(high * RATE_MARGIN)))
-        else:
-            least_ratio, most_ratio = DAMPING_RATIOS
-            bounds.append((math.log(low), math.log(high)))
-            bounds.append((math.log(least_ratio), math.log(most_ratio)))
+    bounds = _bounds(seen, most_inertia, viscous=viscous)
 
     def dampers(unknowns: Array) -> tuple[TorsionalDamper, ...]:
         rows = np.exp(np.reshape(unknowns, (len(seen.nodes), -1)))
-        return tuple(
-            _damper(node, row) for node, row in zip(seen.nodes, rows, strict=True)
-        )
+        return tuple(map(_damper, seen.nodes, rows))
 
     def worst(unknowns: Array) -> float:
         return float(seen.largest_force(dampers(unknowns)).max())
 
-    found = differential_evolution(
+    coarse = differential_evolution(
         worst,
         bounds,
         popsize=POPULATION,
@@ -199,14 +187,29 @@ def tune_dampers(
         polish=False,
         init="sobol",
     )
-    nearest = minimize(
+    fine = minimize(
         worst,
-        found.x,
+        coarse.x,
         method="Nelder-Mead",
         bounds=bounds,
         options={"xatol": 1e-4, "fatol": 1e-9},
     )
-    return dampers(min((nearest, found), key=lambda result: result.fun).x)
+    return dampers(min((fine, coarse), key=lambda result: result.fun).x)
+
+
+def _bounds(
+    seen: SeenFromNodes, most_inertia: Sequence[float], *, viscous: bool
+) -> list[tuple[float, float]]:
+    """Least and most of every unknown, logarithms."""
+    low, high = float(seen.frequency.min()), float(seen.frequency.max())
+    bounds = []
+    for most in most_inertia:
+        bounds.append((LEAST_INERTIA * most, most))
+        if viscous:
+            bounds.append((low / RATE_MARGIN, high * RATE_MARGIN))
+        else:
+            bounds += [(low, high), DAMPING_RATIOS]
+    return [(math.log(least), math.log(most)) for least, most in bounds]
 
 
 def _damper(node: int, row: Array) -> TorsionalDamper:

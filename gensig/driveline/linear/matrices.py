@@ -88,7 +88,6 @@ def line_matrices(
     for dof, nodes in enumerate(compounds):
         expand[list(nodes), dof] = 1.0
     expand[n_nodes:, n_rotations:] = np.eye(2 * len(moving))
-
     mass = np.array([node.inertia for node in line.nodes])
     stiffness, damping, loss = np.zeros((3, n_coordinates, n_coordinates))
     for shaft in line.shafts:
@@ -96,10 +95,9 @@ def line_matrices(
             _join(stiffness, shaft, shaft.stiffness)
             _join(loss, shaft, shaft.loss_factor * shaft.stiffness)
             _join(damping, shaft, shaft.damping)
-    for x, gear in enumerate(moving):
-        held = _support(gear)
+    for gear in moving:
+        held, here = _support(gear), [len(mass), len(mass) + 1]
         mass = np.append(mass, [gear.mass, gear.mass])
-        here = [n_nodes + 2 * x, n_nodes + 2 * x + 1]
         stiffness[here, here] = held.stiffness_x, held.stiffness_y
         damping[here, here] = held.damping_x, held.damping_y
     rotation = np.zeros((len(line.elastic_parts), n_coordinates))

@@ -65,71 +65,62 @@ class LineMesh:
     depth: Array = field(default_factory=lambda: np.zeros(1))
 
     def __post_init__(self) -> None:
-        told = f"mesh '{self.name}'"
-        if (
-            not len(self.depth)
-            or self.depth[0] != 0.0
-            or not np.all(np.diff(self.depth) > 0.0)
-        ):
-            raise ConfigError(f"{told}: depth {self.depth} must begin at 0 and grow")
-        if self.stiffness.ndim != 2 or self.stiffness.shape != (
-            len(self.gap) * len(self.depth),
-            *self.gap.shape[1:],
-        ):
-            raise ConfigError(
-                f"{told}: stiffness {self.stiffness.shape} and gap {self.gap.shape} "
-                "must be alike, (row, node), with "
-                f"{len(self.depth)} springs a row"
+        self._check_tables()
+        self._check_teeth()
+        for key in ("backlash", "damping", "shared_compliance"):
+            if not 0.0 <= getattr(self, key) < math.inf:
+                raise self._error(f"{key} {getattr(self, key):g} must not be negative")
+
+    def _error(self, message: str) -> ConfigError:
+        return ConfigError(f"mesh '{self.name}': {message}")
+
+    def _check_tables(self) -> None:
+        """Raise for springs, stiffnesses and gaps that make no table."""
+        n_springs = len(self.depth)
+        grows = np.all(np.diff(self.depth) > 0.0)
+        if not n_springs or self.depth[0] != 0.0 or not grows:
+            raise self._error(f"depth {self.depth} must begin at 0 and grow")
+        expected = len(self.gap) * n_springs, *self.gap.shape[1:]
+        if self.stiffness.ndim != 2 or self.stiffness.shape != expected:
+            raise self._error(
+                f"stiffness {self.stiffness.shape} and gap {self.gap.shape} must be "
+                f"alike, (row, node), with {n_springs} springs a row"
             )
-        n_rows, n_nodes = self.gap.shape
+        n_nodes = self.gap.shape[1]
         if self.n_pairs < 1 or n_nodes < 2 or (n_nodes - 1) % self.n_pairs:
-            raise ConfigError(
-                f"{told}: {n_nodes} nodes over {self.n_pairs} pitches; give a whole "
-                "number of cells a pitch and one "
-                f"node more"
+            raise self._error(
+                f"{n_nodes} nodes over {self.n_pairs} pitches; give a whole number of "
+                "cells a pitch and one node more"
             )
         for values, what in ((self.stiffness, "stiffness"), (self.gap, "gap")):
             if not np.isfinite(values).all():
-                raise ConfigError(
-                    f"{told}: {what} is not finite; a pair that never touches is row -1"
+                raise self._error(
+                    f"{what} is not finite; a pair that never touches is row -1"
                 )
         if self.stiffness.min() < 0.0:
-            raise ConfigError(
-                f"{told}: stiffness {self.stiffness.min():g} N/m must not be negative"
+            raise self._error(
+                f"stiffness {self.stiffness.min():g} N/m must not be negative"
             )
+
+    def _check_teeth(self) -> None:
+        """Raise for kinds, errors and start teeth that do not fit the tables."""
         counts = tuple(int(kind.max()) + 1 for kind in self.kinds)
+        last = len(self.gap) - 1
         for rows, what in ((self.rows, "rows"), (self.coast_rows, "coast_rows")):
-            if (
-                rows.shape[0] < counts[0]
-                or rows.shape[1] < counts[1]
-                or rows.min() < -1
-                or rows.max() >= n_rows
-            ):
-                raise ConfigError(
-                    f"{told}: {what} {rows.shape} must name rows -1..{n_rows - 1} for "
-                    f"{counts} kinds"
+            is_small = rows.shape[0] < counts[0] or rows.shape[1] < counts[1]
+            if is_small or rows.min() < -1 or rows.max() > last:
+                raise self._error(
+                    f"{what} {rows.shape} must name rows -1..{last} for {counts} kinds"
                 )
-        for kind, error, start in zip(
-            self.kinds, self.errors, self.start_teeth, strict=True
-        ):
-            if (
-                len(kind) != len(error)
-                or kind.min() < 0
-                or not np.isfinite(error).all()
-            ):
-                raise ConfigError(
-                    f"{told}: {len(kind)} teeth need as many kinds, and finite "
-                    f"errors, not {len(error)}"
+        teeth = zip(self.kinds, self.errors, self.start_teeth, strict=True)
+        for kind, error, start in teeth:
+            n = len(kind)
+            if n != len(error) or kind.min() < 0 or not np.isfinite(error).all():
+                raise self._error(
+                    f"{n} teeth need as many kinds, and finite errors, not {len(error)}"
                 )
-            if not 0 <= start < len(kind):
-                raise ConfigError(
-                    f"{told}: start tooth {start} must lie in 0..{len(kind) - 1}"
-                )
-        for key in ("backlash", "damping", "shared_compliance"):
-            if not 0.0 <= getattr(self, key) < math.inf:
-                raise ConfigError(
-                    f"{told}: {key} {getattr(self, key):g} must not be negative"
-                )
+            if not 0 <= start < n:
+                raise self._error(f"start tooth {start} must lie in 0..{n - 1}")
 
     @property
     def n_teeth(self) -> tuple[int, int]:
@@ -153,10 +144,9 @@ def phase_mesh(
 ) -> LineMesh:
     """A mesh whose whole stiffness is known over its phase: one spring k(u) behind one gap e(u).
 
-    Gear a is either of the two, the irregular one where there is one.
-
     Parameters
     ----------
+    n_teeth : of gears a and b; gear a is the irregular one where there is one
     stiffness : (1, node) or (n_teeth of gear a, node) N/m    over one pitch, or pitch after
         pitch over a turn of gear a, irregular teeth among them; the node that closes a pitch is
         the first of the next
@@ -177,10 +167,8 @@ def phase_mesh(
         np.hstack([part, np.roll(part[:, :1], -1, axis=0)])
         for part in (stiffness, gaps)
     )
-    kinds = np.arange(n_teeth[0]) % n_rows, np.zeros(n_teeth[1], dtype=np.int64)
     rows = np.arange(n_rows)[:, None]
-    # the mirrored roll reads every row backwards, one tooth further on, for it begins there where
-    # the row ends
+    # the mirrored roll reads every row backwards, one tooth further on
     backwards = (rows - 1) % n_rows + n_rows
     return LineMesh(
         name=name,
@@ -190,7 +178,7 @@ def phase_mesh(
         gap=np.vstack([closed_gap, np.zeros_like(closed_gap)]),
         rows=rows,
         coast_rows=backwards,
-        kinds=kinds,
+        kinds=(np.arange(n_teeth[0]) % n_rows, np.zeros(n_teeth[1], dtype=np.int64)),
         errors=(np.zeros(n_teeth[0]), np.zeros(n_teeth[1])),
         n_pairs=1,
         first_pitch=0,

@@ -136,12 +136,11 @@ def integrate_line(
         raise ConfigError(
             f"line: duration {duration:g} s and lead-in {lead_in:g} s hold no sample, or no start"
         )
-    if start is not None and any(
-        part.shape != (n,) or not np.isfinite(part).all() for part in start
-    ):
-        raise ConfigError(
-            f"line: start must be finite deviations and rates, ({n},) each"
-        )
+    for part in start or ():
+        if part.shape != (n,) or not np.isfinite(part).all():
+            raise ConfigError(
+                f"line: start must be finite deviations and rates, ({n},) each"
+            )
     step, low_pass = solver.step, decimator(solver.oversampling)
     _check_step(line, course, step)
     first_sample = -max(low_pass.margin + 1, math.ceil(lead_in * solver.sampling_rate))
@@ -153,17 +152,21 @@ def integrate_line(
     run.skip((-low_pass.margin - first_sample) * solver.oversampling - 1)
     signals = run.record(n_samples)
     angle, speed = course.nominal(np.arange(n_samples) / solver.sampling_rate)
-    motion = run.told(signals, angle, speed)
-    if not motion.energy_residual <= solver.max_energy_residual:
-        missed = _told_above(motion.energy_residual, solver.max_energy_residual)
-        raise StepError(
-            f"line: the energy balance misses {missed} of what goes through, more than "
-            f"{solver.max_energy_residual:g}; raise the oversampling above {solver.oversampling}"
-        )
+    motion = run.motion(signals, angle, speed)
+    _check_balance(motion.energy_residual, solver)
     return motion
 
 
-def _told_above(value: float, limit: float) -> str:
+def _check_balance(residual: float, solver: LineSolver) -> None:
+    most = solver.max_energy_residual
+    if not residual <= most:
+        raise StepError(
+            f"line: the energy balance misses {_rounded_above(residual, most)} of what goes "
+            f"through, more than {most:g}; raise the oversampling above {solver.oversampling}"
+        )
+
+
+def _rounded_above(value: float, limit: float) -> str:
     """A value in three digits, or in as many as show that it is above a limit."""
     texts = (f"{value:.{digits}g}" for digits in range(3, 18))
     return next((text for text in texts if float(text) > limit), f"{value:.3g}")
@@ -317,8 +320,8 @@ class _Run:
             means[:n_kept] = means[n_now * factor : n_now * factor + n_kept].copy()
         return samples.T
 
-    def told(self, signals: Array, angle: Array, speed: Array) -> LineMotion:
-        """The motion, and what the run tells about itself."""
+    def motion(self, signals: Array, angle: Array, speed: Array) -> LineMotion:
+        """The motion, with the energy balance and the contact statistics of the run."""
         q, v, *_ = self.state
         into = self.sums[layout.INPUT] + self.sums[layout.PASSING]
         # a free vibration has no input: what it began with goes through it

@@ -257,8 +257,8 @@ class TestPhasesBetweenMeshes:
         ({"start_teeth": (20, 0)}, r"start tooth 20 must lie in 0\.\.19"),
     ],
 )
-def test_bad_tables(changes, told):
-    with pytest.raises(ConfigError, match=told) as error:
+def test_bad_tables(changes, message):
+    with pytest.raises(ConfigError, match=message) as error:
         phases(**changes)
     assert "mesh 'm'" in str(error.value)
     assert "\n" not in str(error.value)
@@ -273,6 +273,6 @@ def test_bad_tables(changes, told):
         ({"gap": np.zeros((1, 3))}, "must be alike"),
     ],
 )
-def test_bad_meshes(changes, told):
-    with pytest.raises(ConfigError, match=told):
+def test_bad_meshes(changes, message):
+    with pytest.raises(ConfigError, match=message):
         replace(phases(), **changes)

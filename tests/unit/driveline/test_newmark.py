@@ -10,7 +10,7 @@ from line_tools import chain, constant_torques, state_after, two_gears
 from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
 from gensig.driveline.time.newmark import (
     LineSolver,
-    _told_above,
+    _rounded_above,
     integrate_line,
     static_start,
 )
@@ -19,8 +19,8 @@ from gensig.errors import ConfigError, GensigError, SimulationError
 SOLVER = LineSolver(sampling_rate=10240.0, oversampling=4, max_energy_residual=1e-3)
 
 
-def refused(error: type[GensigError], told: str):
-    return pytest.raises(error, match=f"(?s)^(?!.*\n).*{told}")
+def refused(error: type[GensigError], message: str):
+    return pytest.raises(error, match=f"(?s)^(?!.*\n).*{message}")
 
 
 def run(line, torques=(), course=None, **changes):
@@ -71,8 +71,8 @@ class TestLine:
             ),
         ],
     )
-    def test_refused(self, changes, error, told):
-        with refused(error, told):
+    def test_refused(self, changes, error, message):
+        with refused(error, message):
             replace(two_gears(), **changes)
 
     def test_a_mesh_of_another_line(self):
@@ -91,8 +91,8 @@ class TestCourse:
             ([], [], "must be alike"),
         ],
     )
-    def test_refused(self, time, speed, told):
-        with refused(ConfigError, told):
+    def test_refused(self, time, speed, message):
+        with refused(ConfigError, message):
             LineCourse(time=np.array(time), speed=np.array(speed))
 
     def test_angle_and_speed(self):
@@ -116,8 +116,8 @@ class TestTorques:
             ),
         ],
     )
-    def test_refused_by_the_line(self, torque, told):
-        with refused(ConfigError, told):
+    def test_refused_by_the_line(self, torque, message):
+        with refused(ConfigError, message):
             run(two_gears(), [ShaftTorque(**torque)])
 
     @pytest.mark.parametrize(
@@ -132,8 +132,8 @@ class TestTorques:
             ),
         ],
     )
-    def test_refused(self, torque, told):
-        with refused(ConfigError, told):
+    def test_refused(self, torque, message):
+        with refused(ConfigError, message):
             ShaftTorque(dof=0, **torque)
 
     def test_an_angle_that_does_not_turn(self):
@@ -178,8 +178,8 @@ class TestRun:
             ),
         ],
     )
-    def test_refused(self, changes, told):
-        with refused(ConfigError, told):
+    def test_refused(self, changes, message):
+        with refused(ConfigError, message):
             run(two_gears(), **changes)
 
     @pytest.mark.parametrize(
@@ -268,5 +268,5 @@ class TestRun:
         (1e-3, "0.001"),
     ],
 )
-def test_a_residual_just_above_what_is_allowed_reads_above_it(missed, told):
-    assert _told_above(missed, 1e-3) == told
+def test_a_residual_just_above_what_is_allowed_reads_above_it(missed, message):
+    assert _rounded_above(missed, 1e-3) == message
