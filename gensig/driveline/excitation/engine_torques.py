@@ -236,8 +236,7 @@ def engine_torques(
     pulses, firing = plunger_at(volume), engine.layout.firing_angles()
     plungers = engine.plunger_nodes.items()
     parts += [(node, delayed(pulses, firing[name])) for name, node in plungers]
-    dynamometer = engine.dynamometer
-    load_ratio = ratios[dynamometer.node]
+    dynamometer, load_ratio = engine.dynamometer, ratios[engine.dynamometer.node]
     parts.append((dynamometer.node, np.array(-brake / load_ratio)))
     parts += _cylinder_torques(engine, pressure, speed)
     nodes, torques = _by_node(parts, n_points)

@@ -243,7 +243,7 @@ class TestPhasesBetweenMeshes:
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "message"),
     [
         ({"stiffness": np.full((3, 8), 1e8)}, r"must be \(1, node\) or \(20, node\)"),
         ({"stiffness": np.full((1, 8), -1e8)}, "must not be negative"),
@@ -265,7 +265,7 @@ def test_bad_tables(changes, message):
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "message"),
     [
         ({"n_pairs": 3}, "whole number of cells"),
         ({"rows": np.array([[7]])}, "must name rows"),

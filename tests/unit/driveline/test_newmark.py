@@ -35,7 +35,7 @@ def run(line, torques=(), course=None, **changes):
 
 class TestLine:
     @pytest.mark.parametrize(
-        ("changes", "error", "told"),
+        ("changes", "error", "message"),
         [
             (
                 {"mass": np.eye(3)},
@@ -83,7 +83,7 @@ class TestLine:
 
 class TestCourse:
     @pytest.mark.parametrize(
-        ("time", "speed", "told"),
+        ("time", "speed", "message"),
         [
             ([0.0, 0.0], [1.0, 1.0], "times of its knots must increase"),
             ([0.0, 1.0], [1.0], "must be alike"),
@@ -104,7 +104,7 @@ class TestCourse:
 
 class TestTorques:
     @pytest.mark.parametrize(
-        ("torque", "told"),
+        ("torque", "message"),
         [
             (
                 {"dof": 5, "table": np.ones(1)},
@@ -121,7 +121,7 @@ class TestTorques:
             run(two_gears(), [ShaftTorque(**torque)])
 
     @pytest.mark.parametrize(
-        ("torque", "told"),
+        ("torque", "message"),
         [
             ({"table": np.array([math.inf])}, "finite numbers"),
             ({"table": np.empty(0)}, "finite numbers"),
@@ -161,7 +161,7 @@ class TestTorques:
 
 class TestRun:
     @pytest.mark.parametrize(
-        ("changes", "told"),
+        ("changes", "message"),
         [
             ({"channels": []}, "no channel to give out"),
             (
@@ -260,7 +260,7 @@ class TestRun:
 
 
 @pytest.mark.parametrize(
-    ("missed", "told"),
+    ("missed", "message"),
     [
         (0.0123456, "0.0123"),
         (1.0004e-3, "0.0010004"),
