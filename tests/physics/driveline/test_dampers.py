@@ -45,17 +45,17 @@ def test_the_tuned_damper_of_one_disc_is_den_hartogs(ratio):
     / 8 / (1 + mu)).
     """
     seen = one_disc()
-    (found,) = tune_dampers(seen, [ratio])
-    assert_allclose(found.ring_inertia, ratio, rtol=1e-3)  # the larger the better
-    assert_allclose(peak(seen, found), np.sqrt(1.0 + 2.0 / ratio), rtol=0.02)
-    own = np.sqrt(found.stiffness / found.ring_inertia)
+    (computed,) = tune_dampers(seen, [ratio])
+    assert_allclose(computed.ring_inertia, ratio, rtol=1e-3)  # the larger the better
+    assert_allclose(peak(seen, computed), np.sqrt(1.0 + 2.0 / ratio), rtol=0.02)
+    own = np.sqrt(computed.stiffness / computed.ring_inertia)
     assert_allclose(own, 1.0 / (1.0 + ratio), rtol=0.01)
-    damping_ratio = found.damping / (2.0 * found.ring_inertia * own)
+    damping_ratio = computed.damping / (2.0 * computed.ring_inertia * own)
     assert_allclose(
         damping_ratio, np.sqrt(3.0 * ratio / (8.0 * (1.0 + ratio))), rtol=0.1
     )
-    other = replace(found, stiffness=1.2 * found.stiffness)
-    assert peak(seen, other) > 1.1 * peak(seen, found)
+    other = replace(computed, stiffness=1.2 * computed.stiffness)
+    assert peak(seen, other) > 1.1 * peak(seen, computed)
 
 
 @pytest.mark.parametrize("ratio", RATIOS)
@@ -64,11 +64,11 @@ def test_the_viscous_damper_of_one_disc_is_den_hartogs(ratio):
     + mu)).
     """
     seen = one_disc()
-    (found,) = tune_dampers(seen, [ratio], viscous=True)
-    assert found.stiffness == 0.0
-    assert_allclose(peak(seen, found), 1.0 + 2.0 / ratio, rtol=2e-3)
+    (computed,) = tune_dampers(seen, [ratio], viscous=True)
+    assert computed.stiffness == 0.0
+    assert_allclose(peak(seen, computed), 1.0 + 2.0 / ratio, rtol=2e-3)
     assert_allclose(
-        found.damping,
+        computed.damping,
         2.0 * ratio / np.sqrt(2.0 * (1.0 + ratio) * (2.0 + ratio)),
         rtol=0.02,
     )

@@ -70,19 +70,19 @@ def test_dampers_of_the_configuration_are_those_added_and_those_tuned_with(line)
 def test_root_stress_follows_the_tooth_force(config, line, load):
     mesh = mesh_between(line, (21, 45))
     strength = read_mesh_strength(config, line, mesh)
-    found = dynamic_root_stress(strength, line, mesh, load)
+    computed = dynamic_root_stress(strength, line, mesh, load)
     # ISO: F_t Y_F Y_S / (b m), engine reference, section 4: 2.498 at 20 mm and 3 mm
     assert_allclose(
-        found.gears["wheel"].stress,
+        computed.gears["wheel"].stress,
         load.greatest * np.cos(np.radians(20.0)) * 2.498 / 6e-5,
         rtol=1e-3,
     )
-    for name, stress in found.passes.items():
+    for name, stress in computed.passes.items():
         assert (
             stress.shape[0] == 54
         )  # 54 teeth meet in a cycle, which is one turn of the pump
-        assert np.all(stress <= found.history.stress[name] * (1.0 + 1e-12))
-        assert stress.max() > 0.8 * found.history.stress[name].max()
+        assert np.all(stress <= computed.history.stress[name] * (1.0 + 1e-12))
+        assert stress.max() > 0.8 * computed.history.stress[name].max()
     steady = ToothLoad(speed=SPEED, force=np.full(5760, load.greatest))
     same = dynamic_root_stress(strength, line, mesh, steady)
     for name, stress in same.passes.items():

@@ -148,9 +148,11 @@ def test_root_stress_in_time_of_a_force_that_repeats_is_that_of_one_cycle(pump_d
     load = ToothLoad(speed=1688 * RPM, force=force)
     once = dynamic_root_stress(strength, line, mesh, load)
     response = motion(load.speed, force, 4.1)
-    found = root_stress_in_time(strength, line, mesh, response)
-    assert_allclose(found.gears["wheel"].stress, once.gears["wheel"].stress, rtol=1e-4)
-    passes, one = found.passes["wheel"], once.passes["wheel"]
+    computed = root_stress_in_time(strength, line, mesh, response)
+    assert_allclose(
+        computed.gears["wheel"].stress, once.gears["wheel"].stress, rtol=1e-4
+    )
+    passes, one = computed.passes["wheel"], once.passes["wheel"]
     assert 3 * 54 <= len(passes) <= 4 * 54
     assert_allclose(passes[54:108].max(), one.max(), rtol=2e-3)
     assert_allclose(typical_largest(passes, 54), one.max(), rtol=2e-3)

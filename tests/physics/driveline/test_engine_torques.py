@@ -33,25 +33,25 @@ def changed(path, value):
     ("rpm", "torque"), [(650, 0.0), (1200, 3000.0), (1688, 12680.0), (1750, 13600.0)]
 )
 def test_power_of_the_gas_is_that_of_all_it_drives(rpm, torque):
-    found = torques_of(option(), rpm * RPM, torque)
+    computed = torques_of(option(), rpm * RPM, torque)
     ratio = np.array(list(ratio_of_teeth().values()))
     assert (
-        abs(np.sum(ratio * found.on(NODES).mean(axis=1)))
-        < 1e-6 * found.indicated_torque
+        abs(np.sum(ratio * computed.on(NODES).mean(axis=1)))
+        < 1e-6 * computed.indicated_torque
     )
-    assert found.brake_torque == torque
-    assert found.indicated_torque > torque + 1000.0
-    assert_allclose(found.on(NODES)[16].mean(), -torque, atol=1e-9)
+    assert computed.brake_torque == torque
+    assert computed.indicated_torque > torque + 1000.0
+    assert_allclose(computed.on(NODES)[16].mean(), -torque, atol=1e-9)
 
 
 def test_reference_point_is_that_of_the_class():
-    found = torques_of(option())
-    assert_allclose(found.pressure.max() * 1e-6, 17.0, rtol=0.01)
+    computed = torques_of(option())
+    assert_allclose(computed.pressure.max() * 1e-6, 17.0, rtol=0.01)
     assert_allclose(
-        found.indicated_torque / 20, 697.0, rtol=0.02
+        computed.indicated_torque / 20, 697.0, rtol=0.02
     )  # the independent estimate with the same sizes
     consumption = (
-        found.fuel_volume * 840 * 20 / CYCLE * SPEED / (TORQUE * SPEED)
+        computed.fuel_volume * 840 * 20 / CYCLE * SPEED / (TORQUE * SPEED)
     )  # kg/J
     assert 0.18 < consumption * 3.6e9 / 1e3 < 0.22  # kg/kWh of a good diesel
 
@@ -68,10 +68,10 @@ def test_harmonics_of_one_cylinder_are_as_estimated_independently():
     values["throw_nodes"], values["valve_nodes"] = [13], {"A": []}
     values["reference"]["torque_nm"] = TORQUE / 20
     values["loads"] = None
-    found = torques_of(values, torque=TORQUE / 20)
-    mean, amplitude = cycle_orders(found.on(NODES)[12], 20)
+    computed = torques_of(values, torque=TORQUE / 20)
+    mean, amplitude = cycle_orders(computed.on(NODES)[12], 20)
     estimated = [2.33, 3.44, 2.89, 2.70, 2.22, 1.86, 1.56, 1.27, 1.01, 0.81, 0.65, 0.53]
-    gas = found.indicated_torque
+    gas = computed.indicated_torque
     assert_allclose(np.abs(amplitude[:12]) / gas, estimated, rtol=0.08)
     assert (
         0.05 < abs(amplitude[19]) / gas < 0.15
@@ -121,27 +121,29 @@ def test_quadratic_loads_follow_the_speed_and_constant_ones_do_not():
 
 def test_a_disturbance_of_the_dynamometer_is_given_apart():
     values = changed("dynamometer.disturbance_share", 0.05)
-    found = torques_of(values)
-    assert found.disturbance_node == 17
-    assert_allclose(found.disturbance_torque, 0.05 * TORQUE)
-    assert_allclose(found.disturbance_frequency, 5.0)
-    assert_allclose(found.on(NODES), torques_of(option()).on(NODES), rtol=0)
+    computed = torques_of(values)
+    assert computed.disturbance_node == 17
+    assert_allclose(computed.disturbance_torque, 0.05 * TORQUE)
+    assert_allclose(computed.disturbance_frequency, 5.0)
+    assert_allclose(computed.on(NODES), torques_of(option()).on(NODES), rtol=0)
 
 
 def pressure_file(folder, scale=1.0):
-    found = torques_of(option())
+    computed = torques_of(option())
     path = folder / "measured.csv"
-    table = np.column_stack([np.degrees(found.angle), scale * found.pressure * 1e-6])
+    table = np.column_stack(
+        [np.degrees(computed.angle), scale * computed.pressure * 1e-6]
+    )
     header = "crank_angle_deg,pressure_mpa"
     np.savetxt(path, table, delimiter=",", header=header, comments="")
-    return changed("pressure.file", str(path)), found
+    return changed("pressure.file", str(path)), computed
 
 
 def test_a_measured_pressure_gives_the_torque_back(tmp_path):
     values, burned = pressure_file(tmp_path)
-    found = torques_of(values, torque=None)
-    assert_allclose(found.brake_torque, TORQUE, rtol=1e-4)
-    assert_allclose(found.on(NODES), burned.on(NODES), rtol=0, atol=1.0)
+    computed = torques_of(values, torque=None)
+    assert_allclose(computed.brake_torque, TORQUE, rtol=1e-4)
+    assert_allclose(computed.on(NODES), burned.on(NODES), rtol=0, atol=1.0)
 
 
 def test_torques_that_contradict_the_pressure_are_refused(tmp_path):

@@ -61,9 +61,9 @@ def cycle_torque(seed=0, n_orders=12, n_dofs=3):
 
 def test_orders_of_a_torque_give_it_back():
     torque, amplitudes = cycle_torque()
-    mean, found = cycle_orders(torque + 3.0, 12)
+    mean, computed = cycle_orders(torque + 3.0, 12)
     assert_allclose(mean, 3.0, rtol=1e-12)
-    assert_allclose(found, amplitudes, rtol=1e-9)
+    assert_allclose(computed, amplitudes, rtol=1e-9)
     angle = cycle_angles(N)
     by_hand = sum(
         np.real(c * np.exp(0.5j * k * angle))
@@ -97,20 +97,20 @@ def test_one_disc_on_a_shaft_is_the_closed_form():
         damping=np.array([[3.0]]),
     )
     w = np.array([5.0, 20.0, 70.0])
-    found = one.response(np.ones((3, 1), dtype=complex), w)[:, 0]
-    assert_allclose(found, 1.0 / (800 + 40j + 3j * w - 2 * w**2), rtol=1e-12)
+    computed = one.response(np.ones((3, 1), dtype=complex), w)[:, 0]
+    assert_allclose(computed, 1.0 / (800 + 40j + 3j * w - 2 * w**2), rtol=1e-12)
 
 
 def test_mean_power_in_is_what_the_damping_takes():
     line, _ = chain(loss_factor=0.05, damping=1e-4)
     torque, amplitudes = cycle_torque()
     speed = 60.0
-    found = steady_response(line, torque, speed, n_orders=12)
-    power_in = 0.5 * np.sum(np.real(np.conj(found.speed_deviation) * amplitudes))
-    w = speed * found.orders
+    computed = steady_response(line, torque, speed, n_orders=12)
+    power_in = 0.5 * np.sum(np.real(np.conj(computed.speed_deviation) * amplitudes))
+    w = speed * computed.orders
     lost = line.loss[..., None] * w + line.damping[..., None] * w**2
     power_lost = 0.5 * np.real(
-        np.einsum("io,ijo,jo->", np.conj(found.angle), lost, found.angle)
+        np.einsum("io,ijo,jo->", np.conj(computed.angle), lost, computed.angle)
     )
     assert power_in > 0.0
     assert_allclose(power_in, power_lost, rtol=1e-9)
@@ -164,10 +164,10 @@ def test_mean_torques_are_carried_through_and_must_balance():
     torque, _ = cycle_torque()
     torque[0] += 50.0
     torque[2] -= 50.0
-    found = steady_response(line, torque, 60.0, n_orders=12)
-    mean, _ = found.element_forces(springs)
+    computed = steady_response(line, torque, 60.0, n_orders=12)
+    mean, _ = computed.element_forces(springs)
     assert_allclose(mean, [50.0, 50.0], rtol=1e-9)
-    assert abs(np.sum(np.diag(line.mass) * found.twist)) < 1e-12
+    assert abs(np.sum(np.diag(line.mass) * computed.twist)) < 1e-12
     torque[2] += 1.0
     with pytest.raises(
         SimulationError,
@@ -187,9 +187,9 @@ def test_a_free_line_turns_as_one_under_slow_torques():
 
 
 def test_fluctuation_is_half_the_peak_to_peak():
-    found = response_of(option())
-    speeds = found.speed_over_cycle(28_800)
-    assert_allclose(found.fluctuation(), 0.5 * np.ptp(speeds, axis=1), rtol=2e-3)
+    computed = response_of(option())
+    speeds = computed.speed_over_cycle(28_800)
+    assert_allclose(computed.fluctuation(), 0.5 * np.ptp(speeds, axis=1), rtol=2e-3)
     assert_allclose(speeds.mean(axis=1), 0.0, atol=1e-9)
 
 

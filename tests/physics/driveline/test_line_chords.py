@@ -66,14 +66,14 @@ class TestLaw:
         table, force = helical
         rolls = np.linspace(0.05, 30.05, 61)
         errors = dict(zip(("pinion_error", "wheel_error"), mesh.errors, strict=True))
-        found = chord_equilibrium(
+        computed = chord_equilibrium(
             table,
             chord_states(table, rolls * table.pair.base_pitch, **errors),
             share * force,
         )
         forces = [
             law_at(mesh, turned, approach)[0]
-            for turned, approach in zip(rolls, found.approach, strict=True)
+            for turned, approach in zip(rolls, computed.approach, strict=True)
         ]
         assert_allclose(forces, share * force, rtol=1e-3)
 
@@ -83,19 +83,19 @@ class TestLaw:
     ):
         mesh = replace(mesh, backlash=1e-4)
         for turned in (0.313, 2.711, 9.173):
-            found = law_at(mesh, turned, approach)
+            computed = law_at(mesh, turned, approach)
             below, above = (
                 law_at(mesh, turned + off, approach)[layout.STORED]
                 for off in (-1e-7, 1e-7)
             )
             assert_allclose(
-                found[layout.ALONG], -(above - below) / 2e-7, rtol=1e-3, atol=1e-6
+                computed[layout.ALONG], -(above - below) / 2e-7, rtol=1e-3, atol=1e-6
             )
             below, above = (
                 law_at(mesh, turned, approach + off)[layout.STORED]
                 for off in (-1e-10, 1e-10)
             )
-            assert_allclose(found[layout.FORCE], (above - below) / 2e-10, rtol=1e-4)
+            assert_allclose(computed[layout.FORCE], (above - below) / 2e-10, rtol=1e-4)
 
     def test_all_springs_of_a_pair_are_damped_by_its_first_touch(self, mesh):
         still, fast = law_at(mesh, 0.4, 3e-5), law_at(mesh, 0.4, 3e-5, rate=10.0)
@@ -193,7 +193,7 @@ class TestZeroHelix:
         force = spur.mesh_force
         own = loaded_pair_table(spur.pair, spur.material, spur.mesh, force=force)
         cut = sliced_table(spur.pair, spur.material, spur.mesh, slices, force=force)
-        told = {
+        placement = {
             "direction": dynamics.approach_direction(),
             "roll_dof": 2,
             "damping": DAMPING,
@@ -201,13 +201,13 @@ class TestZeroHelix:
         (q, v, one), (q_1, v_1, other) = (
             moved(line_of(dynamics, mesh), dynamics)
             for mesh in (
-                pair_mesh("m", own, **told),
-                sliced_pair_mesh("m", cut, **told),
+                pair_mesh("m", own, **placement),
+                sliced_pair_mesh("m", cut, **placement),
             )
         )
         assert max(one.energy_residual, other.energy_residual) < 1e-4
         assert_allclose(
-            q_1 @ told["direction"], q @ told["direction"], rtol=0, atol=2e-8
+            q_1 @ placement["direction"], q @ placement["direction"], rtol=0, atol=2e-8
         )
         assert_allclose(v_1, v, rtol=0, atol=5e-3 * np.abs(v).max())
 
@@ -273,10 +273,10 @@ class TestAgainstThePair:
             start_phase=dynamics.start_phase,
             errors=(dynamics.pinion_error, dynamics.wheel_error),
         )
-        q_1, v_1, told = moved(line_of(dynamics, mesh), dynamics)
+        q_1, v_1, motion = moved(line_of(dynamics, mesh), dynamics)
         start = dynamics.static_start(0.0), np.zeros(len(dynamics.dofs))
         q, v, _ = advance(dynamics, *start, 1 / (51200 * STEPS), 0, STEPS * N_SAMPLES)
         direction = dynamics.approach_direction()
-        assert told.energy_residual < 1e-4
+        assert motion.energy_residual < 1e-4
         assert_allclose(v_1, v, rtol=0, atol=2e-3 * np.abs(v).max())
         assert_allclose(q_1 @ direction, q @ direction, rtol=0, atol=5e-8)

@@ -83,22 +83,22 @@ class TestLinear:
     def test_undamped_vibration_keeps_its_energy_whatever_the_step(self, start):
         line = chain(6, loss=0.0)
         for n_steps in (50, 5000):
-            q, v, told = state_after(line, start, self.DURATION, n_steps)
+            q, v, motion = state_after(line, start, self.DURATION, n_steps)
             energy = [
                 0.5 * (b @ line.mass @ b + a @ line.stiffness @ a)
                 for a, b in (start, (q, v))
             ]
             assert_allclose(energy[1], energy[0], rtol=1e-11)
-            assert told.energy_residual < 1e-11
+            assert motion.energy_residual < 1e-11
 
     def test_damping_takes_energy(self, line, start):
-        q, v, told = state_after(line, start, self.DURATION, 5000)
+        q, v, motion = state_after(line, start, self.DURATION, 5000)
         energy = [
             0.5 * (b @ line.mass @ b + a @ line.stiffness @ a)
             for a, b in (start, (q, v))
         ]
         assert energy[1] < 0.9 * energy[0]
-        assert told.energy_residual < 1e-11
+        assert motion.energy_residual < 1e-11
 
     def test_a_full_mass_matrix_is_taken(self, line, start):
         """The same chain in other coordinates."""
@@ -152,8 +152,10 @@ class TestTorquesAndCourse:
         angle = motion.nominal_angle
         for power, name in enumerate(("angle", "speed", "acceleration")):
             expected = ((1j * rate) ** power * response * np.exp(2j * angle)).real
-            found = motion.signals[name, 0]
-            assert_allclose(found, expected, rtol=0, atol=5e-4 * np.abs(expected).max())
+            computed = motion.signals[name, 0]
+            assert_allclose(
+                computed, expected, rtol=0, atol=5e-4 * np.abs(expected).max()
+            )
 
     def test_the_twist_shifts_the_torque(self):
         """A table over the angle sees the angle itself, not the nominal one: a restoring slope is

@@ -71,21 +71,23 @@ def test_without_play_it_is_the_linear_line():
             twist=share * whole.linear.twist,
         )
         line = replace(whole, torques=torques, linear=linear)
-        _, found, exact = deviations(line, (14, 17, 13), settling=0.0)
-        for one, other in zip(found, exact, strict=True):
+        _, computed, exact = deviations(line, (14, 17, 13), settling=0.0)
+        for one, other in zip(computed, exact, strict=True):
             assert np.std(one - one.mean() - other) < most * np.std(other)
 
 
 def test_with_play_its_teeth_part_and_its_energies_balance():
     line = running_line(engine(), steady_course(SPEED, TORQUE), governor=GOVERNOR)
-    motion, found, linear = deviations(line, (14, 45), settling=0.3)
+    motion, computed, linear = deviations(line, (14, 45), settling=0.3)
     drive = line.machine.mesh_names.index("21/45")
     assert motion.contact_loss[drive] > 0.1
     assert motion.energy_residual < 1e-3
-    assert np.std(found[0]) == pytest.approx(
+    assert np.std(computed[0]) == pytest.approx(
         np.std(linear[0]), rel=0.1
     )  # the flywheel hardly feels the gears
-    assert np.std(found[1]) > 1.3 * np.std(linear[1])  # a pump gear that is let go does
+    assert np.std(computed[1]) > 1.3 * np.std(
+        linear[1]
+    )  # a pump gear that is let go does
 
 
 def test_the_crank_turns_by_the_pitch_of_the_camshaft_to_the_next_tooth():
@@ -116,13 +118,13 @@ def test_a_run_up_follows_its_course_and_drives_its_own_inertia():
 def test_a_record_is_repeatable_and_turns_with_the_gear_ratio():
     """The driving gear's shaft has half the crank's speed."""
     record = machine()
-    found = record.simulate()
+    computed = record.simulate()
     assert record.operating.speed == pytest.approx(0.5 * SPEED)
-    assert found.mean_speed == pytest.approx(0.5 * SPEED, rel=0.02)
-    assert np.all(np.diff(found.shaft_angle) > 0.0)
-    assert found.integration_check == "energy"
-    assert found.integration_error < 1e-3
-    np.testing.assert_array_equal(found.acceleration, record.simulate().acceleration)
+    assert computed.mean_speed == pytest.approx(0.5 * SPEED, rel=0.02)
+    assert np.all(np.diff(computed.shaft_angle) > 0.0)
+    assert computed.integration_check == "energy"
+    assert computed.integration_error < 1e-3
+    np.testing.assert_array_equal(computed.acceleration, record.simulate().acceleration)
 
 
 def test_a_fine_wheel_without_errors_shows_the_shaft():

@@ -62,9 +62,9 @@ class TestRippledMesh:
         assert run(16000)[2].energy_residual < 1e-5
 
     def test_the_ripple_is_felt(self, run):
-        told = run(4000)[2]
-        assert told.largest_force[0] > 1.1 * 200.0 / RADII[0]
-        assert told.least_force[0] < 0.9 * 200.0 / RADII[0]
+        motion = run(4000)[2]
+        assert motion.largest_force[0] > 1.1 * 200.0 / RADII[0]
+        assert motion.least_force[0] < 0.9 * 200.0 / RADII[0]
 
 
 class TestBacklash:
@@ -128,11 +128,11 @@ class TestBacklash:
         assert error(80000) < 1e-3
 
     def test_both_flanks_are_hit(self, run):
-        _, _, told = run(8000)
-        assert told.contact_loss[0] > 0.2
-        assert told.back_contact[0] > 0.05
-        assert told.largest_force[0] > 1e3
-        assert told.least_force[0] < -1e3
+        _, _, motion = run(8000)
+        assert motion.contact_loss[0] > 0.2
+        assert motion.back_contact[0] > 0.05
+        assert motion.largest_force[0] > 1e3
+        assert motion.least_force[0] < -1e3
 
     def test_error_falls_with_the_square_of_the_step(self, error):
         """On average: what a landing costs depends on where in a step it falls."""
@@ -195,7 +195,7 @@ class TestAgainstThePair:
         )
         step = 1 / (51200 * self.STEPS)
         q, v, _ = advance(dynamics, *start, step, 0, n_steps)
-        q_1, v_1, told = state_after(
+        q_1, v_1, motion = state_after(
             line,
             start,
             n_steps * step,
@@ -207,17 +207,17 @@ class TestAgainstThePair:
         scale = np.abs(v).max()
         assert_allclose(v_1, v, rtol=0, atol=2e-4 * scale)
         assert_allclose(q_1 @ direction, q @ direction, rtol=0, atol=2e-8)
-        assert told.energy_residual < 1e-4
+        assert motion.energy_residual < 1e-4
 
     def test_the_same_rest(self, dynamics, line):
-        found = static_start(
+        computed = static_start(
             line,
             constant_speed(dynamics.operating.speed),
             constant_torques(dynamics.system().force),
             time=0.0,
         )
         expected = dynamics.static_start(0.0)
-        assert_allclose(found, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+        assert_allclose(computed, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
 
 
 class TestLowRank:
@@ -248,12 +248,14 @@ class TestLowRank:
 
     def test_the_printed_frequencies(self, welded):
         n = 65  # rotations
-        found = np.sqrt(
+        computed = np.sqrt(
             np.abs(
                 eigh(welded.stiffness[:n, :n], welded.mass[:n, :n], eigvals_only=True)
             )
         ) / (2 * np.pi)
-        assert_allclose(found[1:5], [28.31, 68.72, 162.06, 215.97], rtol=0, atol=0.01)
+        assert_allclose(
+            computed[1:5], [28.31, 68.72, 162.06, 215.97], rtol=0, atol=0.01
+        )
 
     def test_the_same_motion(self, engine, welded):
         """A gear train without backlash is linear."""
@@ -263,12 +265,12 @@ class TestLowRank:
             rng.normal(0, 0.1, len(engine.names)),
         )
         n_steps, duration = 4000, 0.04
-        (q, v, told), (q_1, v_1, _) = (
+        (q, v, motion), (q_1, v_1, _) = (
             state_after(line, start, duration, n_steps) for line in (engine, welded)
         )
         assert_allclose(q, q_1, rtol=0, atol=1e-8 * np.abs(q_1).max())
         assert_allclose(v, v_1, rtol=0, atol=1e-8 * np.abs(v_1).max())
-        assert told.energy_residual < 1e-6
+        assert motion.energy_residual < 1e-6
 
 
 class TestEngine:

@@ -58,7 +58,7 @@ def misfit(line, turned=0.0):
     The driving flank stands rho_1 from its tangent point, the driven one rho_2 from its own;
     they touch where both add up to the distance of the tangent points, less whole pitches.
     """
-    angles, found = tooth_angles(line, turned), []
+    angles, computed = tooth_angles(line, turned), []
     for mesh, pair in zip(line.line.meshes, line.pairs, strict=True):
         sense = math.copysign(
             1.0, line.line.speed_ratio[line.line.gears[mesh.driving].node]
@@ -75,8 +75,8 @@ def misfit(line, turned=0.0):
             - (mesh.center_line + math.pi - tilt)
         )
         reach = sense * (pair.pinion.base_radius * one + pair.wheel.base_radius * other)
-        found.append((reach - pair.tangent_length) / pair.base_pitch)
-    return np.array(found)
+        computed.append((reach - pair.tangent_length) / pair.base_pitch)
+    return np.array(computed)
 
 
 def from_whole(value):

@@ -117,9 +117,9 @@ def test_a_record_whose_steps_are_too_long_is_made_with_half_of_them():
     )
     with pytest.raises(StepError, match="the energy balance misses"):
         integrate_line(line.line, line.course, line.torques, as_told[0], **as_told[1])
-    found = simulated(long)
-    assert found.integration_error < 1e-3
-    np.testing.assert_array_equal(found.acceleration, simulated(short).acceleration)
+    computed = simulated(long)
+    assert computed.integration_error < 1e-3
+    np.testing.assert_array_equal(computed.acceleration, simulated(short).acceleration)
 
 
 @pytest.mark.parametrize("name", list(TEETH))
@@ -154,7 +154,7 @@ def test_a_missing_tooth_is_evident_once_a_turn_of_its_gear(name):
         tooth = (np.floor(pitches) % n_teeth).astype(int)
         by_tooth = np.bincount(tooth, excess, minlength=n_teeth)
         assert by_tooth[5:9].sum() > 0.6 * by_tooth.sum()
-        peaks = [np.abs(found.acceleration[2]).max() for found in (gone, sound)]
+        peaks = [np.abs(computed.acceleration[2]).max() for computed in (gone, sound)]
         assert peaks[0] ** 2 > 2.0 * peaks[1] ** 2
 
 
@@ -247,5 +247,5 @@ def test_ripple_in_time_is_that_of_the_linear_line():
     motion = line.run(SOLVER, duration=0.2, channels=[("speed", dof)], settling=0.3)
     at = line.linear.orders * (line.turned + motion.nominal_angle[:, None])
     linear = np.real(np.exp(1j * at) @ line.linear.speed_deviation[dof])
-    found = motion.signals["speed", dof]
-    assert np.std(found - found.mean() - linear) < 0.1 * np.std(linear)
+    computed = motion.signals["speed", dof]
+    assert np.std(computed - computed.mean() - linear) < 0.1 * np.std(linear)

@@ -50,15 +50,17 @@ def line(lines, request):
 
 
 def test_a_free_line_has_one_rigid_mode_in_the_gear_ratios(line):
-    found, matrices = line.modes(), line.matrices()
-    assert found.n_rigid == 1
-    assert found.frequency[0] == 0.0
-    assert np.all(np.diff(found.frequency) >= 0.0)
-    turning = (matrices.expand @ found.shapes[0])[: len(line.numbers)]
+    computed, matrices = line.modes(), line.matrices()
+    assert computed.n_rigid == 1
+    assert computed.frequency[0] == 0.0
+    assert np.all(np.diff(computed.frequency) >= 0.0)
+    turning = (matrices.expand @ computed.shapes[0])[: len(line.numbers)]
     assert_allclose(turning / turning[0], np.abs(line.line.speed_ratio), rtol=1e-12)
-    scale = np.abs(matrices.whole_stiffness).sum(axis=1) * np.abs(found.shapes[0]).max()
-    assert np.all(np.abs(matrices.whole_stiffness @ found.shapes[0]) < 1e-12 * scale)
-    wrong = found.shapes[0].copy()
+    scale = (
+        np.abs(matrices.whole_stiffness).sum(axis=1) * np.abs(computed.shapes[0]).max()
+    )
+    assert np.all(np.abs(matrices.whole_stiffness @ computed.shapes[0]) < 1e-12 * scale)
+    wrong = computed.shapes[0].copy()
     wrong[1] *= 1.01
     assert not np.all(np.abs(matrices.whole_stiffness @ wrong) < 1e-6 * scale)
 
@@ -76,18 +78,18 @@ def test_matrices_are_symmetric_and_store_no_negative_energy(line):
 
 
 def test_modes_are_orthogonal_and_hold_as_much_strain_as_kinetic_energy(line):
-    found, matrices = line.modes(), line.matrices()
+    computed, matrices = line.modes(), line.matrices()
     assert_allclose(
-        found.shapes @ matrices.mass @ found.shapes.T,
-        np.eye(len(found.shapes)),
+        computed.shapes @ matrices.mass @ computed.shapes.T,
+        np.eye(len(computed.shapes)),
         atol=1e-8,
     )
-    square = (2.0 * np.pi * found.frequency) ** 2
-    strain = found.shapes @ matrices.whole_stiffness @ found.shapes.T
+    square = (2.0 * np.pi * computed.frequency) ** 2
+    strain = computed.shapes @ matrices.whole_stiffness @ computed.shapes.T
     assert_allclose(strain, np.diag(square), atol=1e-8 * square.max())
-    assert_allclose(found.kinetic_share.sum(axis=1), 1.0, rtol=1e-12)
-    assert np.all(found.mesh_strain_share >= 0.0)
-    assert np.all(found.mesh_strain_share.sum(axis=1) <= 1.0 + 1e-9)
+    assert_allclose(computed.kinetic_share.sum(axis=1), 1.0, rtol=1e-12)
+    assert np.all(computed.mesh_strain_share >= 0.0)
+    assert np.all(computed.mesh_strain_share.sum(axis=1) <= 1.0 + 1e-9)
 
 
 def test_equal_loss_factors_damp_every_mode_by_half_of_it(lines):
@@ -97,9 +99,9 @@ def test_equal_loss_factors_damp_every_mode_by_half_of_it(lines):
         loss_stiffness=0.06 * matrices.stiffness,
         mesh_loss_factor=np.full_like(matrices.mesh_stiffness, 0.06),
     )
-    found = natural_modes(uniform)
-    assert_allclose(found.damping_ratio[1:], 0.03, rtol=1e-5)
-    assert found.damping_ratio[0] == 0.0
+    computed = natural_modes(uniform)
+    assert_allclose(computed.damping_ratio[1:], 0.03, rtol=1e-5)
+    assert computed.damping_ratio[0] == 0.0
 
 
 def test_viscous_losses_damp_each_mode_as_its_loss_factors_do(lines):
@@ -128,8 +130,8 @@ def test_viscous_losses_damp_each_mode_as_its_loss_factors_do(lines):
 
 def test_a_mesh_on_its_own_gets_half_of_its_loss_factor():
     pair = two_discs(loss_factor=0.1)
-    found = natural_modes(with_viscous_losses(line_matrices(pair)))
-    assert_allclose(found.damping_ratio, [0.0, 0.05], rtol=1e-12)
+    computed = natural_modes(with_viscous_losses(line_matrices(pair)))
+    assert_allclose(computed.damping_ratio, [0.0, 0.05], rtol=1e-12)
 
 
 def two_discs(loss_factor=0.0):
@@ -150,9 +152,9 @@ def test_two_discs_in_mesh_have_the_textbook_frequency():
         gear.base_radius**2 / node.inertia
         for gear, node in zip(line.gears, line.nodes, strict=True)
     )
-    found = natural_modes(line_matrices(line))
+    computed = natural_modes(line_matrices(line))
     assert_allclose(
-        found.frequency,
+        computed.frequency,
         [0.0, np.sqrt(2e8 / equivalent) / (2.0 * np.pi)],
         rtol=1e-12,
     )
@@ -242,10 +244,10 @@ def test_stiff_supports_leave_the_torsional_line(lines):
             )
             for gear in lateral.gears
         )
-        found = natural_modes(
+        computed = natural_modes(
             line_matrices(replace(lateral, gears=gears), lateral=True)
         ).frequency[:12]
-        apart.append(np.abs(found[1:] / torsion[1:] - 1.0).max())
+        apart.append(np.abs(computed[1:] / torsion[1:] - 1.0).max())
     assert apart[0] > 0.02
     assert apart[1] < 0.02 * 0.2
     assert apart[2] < 1e-4

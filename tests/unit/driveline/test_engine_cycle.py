@@ -214,8 +214,8 @@ MEGAPASCAL = 2.0 + np.cos(np.radians(DEGREES / 2.0))
 def test_a_measured_pressure_is_read_whatever_its_units_and_start(
     tmp_path, header, angle, pressure
 ):
-    found = read_pressure(write(tmp_path, header, angle, pressure), N)
-    assert_allclose(found, 1e6 * (2.0 + np.cos(ANGLE / 2.0)), rtol=1e-4)
+    computed = read_pressure(write(tmp_path, header, angle, pressure), N)
+    assert_allclose(computed, 1e6 * (2.0 + np.cos(ANGLE / 2.0)), rtol=1e-4)
 
 
 @pytest.mark.parametrize(

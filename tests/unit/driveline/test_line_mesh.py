@@ -167,8 +167,10 @@ class TestHelicalStatics:
             .contact
         )
         for place, approach in enumerate(other.approach):
-            found = law_at(mesh, place / 16, approach)[layout.FORCE] - pair.mesh_force
-            assert_allclose(found, 0.02 * pair.mesh_force, rtol=0.02)
+            computed = (
+                law_at(mesh, place / 16, approach)[layout.FORCE] - pair.mesh_force
+            )
+            assert_allclose(computed, 0.02 * pair.mesh_force, rtol=0.02)
 
 
 class TestPairs:
@@ -176,11 +178,11 @@ class TestPairs:
         """Every pair with its own teeth, the missing one too, and the shared body."""
         rolls = np.linspace(0.05, 30.05, 61)
         errors = dict(zip(("pinion_error", "wheel_error"), pairs.errors, strict=True))
-        found = static_mesh(
+        computed = static_mesh(
             table, pair_states(table, rolls * table.pair.base_pitch, **errors), 500.0
         )
         for turned, approach, load in zip(
-            rolls, found.approach, found.load, strict=True
+            rolls, computed.approach, computed.load, strict=True
         ):
             law = law_at(pairs, turned, approach)
             assert_allclose(law[layout.FORCE], load.sum(), rtol=2e-5)
@@ -230,11 +232,11 @@ class TestPhasesBetweenMeshes:
         start = mesh_start(
             59, mate_angle=2.2, drives=drives, tooth_angle=0.71, pitch_point=0.4
         )
-        found = tooth_angle(
+        computed = tooth_angle(
             59, mate_angle=2.2, drives=drives, start=start, pitch_point=0.4
         )
         assert_allclose(
-            (found - 0.71 + math.pi) % (2 * math.pi), math.pi, rtol=0, atol=1e-12
+            (computed - 0.71 + math.pi) % (2 * math.pi), math.pi, rtol=0, atol=1e-12
         )
 
     def test_no_teeth(self):

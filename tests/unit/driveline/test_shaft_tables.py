@@ -120,7 +120,11 @@ def test_a_bare_name_is_a_shipped_table():
 
 
 def test_shafts_alone_need_no_gears(line_of):
-    plain = "node,inertia_kg_m2,stiffness_nm_per_rad,edge_from,edge_to,edge_kind\n1,1,5,1,2,shaft\n2,1,,,,\n"
+    plain = (
+        "node,inertia_kg_m2,stiffness_nm_per_rad,edge_from,edge_to,edge_kind\n"
+        "1,1,5,1,2,shaft\n"
+        "2,1,,,,\n"
+    )
     assert line_of(plain, gears_csv=None).line.n_loops == 0
 
 
