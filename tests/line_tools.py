@@ -14,6 +14,7 @@ from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
 from gensig.driveline.time.geared_line import GearedLine, pack_meshes
 from gensig.driveline.time.line_mesh import LineMesh, phase_mesh
 from gensig.driveline.time.newmark import LineMotion, LineSolver, _Run, _scratch
+from gensig.dynamics.pair import PairDynamics
 
 RADII, INERTIAS, TEETH = (0.05, 0.1), (0.01, 0.05), (20, 40)
 STIFFNESS = 3e8  # N/m
@@ -68,6 +69,19 @@ def chain(n: int, *, loss: float = 2e-5, seed: int = 0) -> GearedLine:
         stiffness=stiffness,
         rotation=np.ones(n),
         meshes=(),
+    )
+
+
+def pair_line(dynamics: PairDynamics, mesh: LineMesh) -> GearedLine:
+    """A gear pair with its supports and drive as a line with one mesh."""
+    system = dynamics.system()
+    return GearedLine(
+        names=system.names,
+        mass=np.diag(system.mass),
+        damping=system.damping,
+        stiffness=system.stiffness,
+        rotation=system.rotation,
+        meshes=(mesh,),
     )
 
 

@@ -19,7 +19,11 @@ from gensig.driveline import loads
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.engine_torques import Engine
 from gensig.driveline.line_gears import line_bodies, line_gears, line_meshes
-from gensig.driveline.machine_checks import check_settings, warn_of_supports
+from gensig.driveline.machine_checks import (
+    check_sensing,
+    check_solver,
+    warn_of_supports,
+)
 from gensig.driveline.mesh_phase import start_phase
 from gensig.driveline.running import (
     EngineCourse,
@@ -223,8 +227,9 @@ class LineMachine(Machine):
     def check(self) -> None:
         """Raise for what would stop every record."""
         self.require_drive()
-        check_settings(self)
-        warn_of_supports(self)
+        check_sensing(self.sensing, self.channels, self.engine)
+        check_solver(self.mesh, self.solver)
+        warn_of_supports(self.engine, self.mesh_forces)
         self.quality.check_covered(self.pair.pinion, self.pair.wheel)
         check_memory(
             self.operating.duration,

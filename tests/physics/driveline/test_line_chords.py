@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 from chord_tables import Slices, as_chords, with_table
 from lane_tools import advance
-from line_tools import constant_torques, law_at, state_after
+from line_tools import constant_torques, law_at, pair_line, state_after
 from numpy.testing import assert_allclose
 
 from gensig.driveline.time import _layout as layout
 from gensig.driveline.time.chords import sliced_pair_mesh
 from gensig.driveline.time.course import constant_speed
-from gensig.driveline.time.geared_line import GearedLine
 from gensig.driveline.time.line_mesh import pair_mesh
 from gensig.errors import ConfigError
 from gensig.faults.broken import MissingTooth
@@ -199,7 +198,7 @@ class TestZeroHelix:
             "damping": DAMPING,
         }
         (q, v, one), (q_1, v_1, other) = (
-            moved(line_of(dynamics, mesh), dynamics)
+            moved(pair_line(dynamics, mesh), dynamics)
             for mesh in (
                 pair_mesh("m", own, **placement),
                 sliced_pair_mesh("m", cut, **placement),
@@ -210,18 +209,6 @@ class TestZeroHelix:
             q_1 @ placement["direction"], q @ placement["direction"], rtol=0, atol=2e-8
         )
         assert_allclose(v_1, v, rtol=0, atol=5e-3 * np.abs(v).max())
-
-
-def line_of(dynamics, mesh):
-    system = dynamics.system()
-    return GearedLine(
-        names=system.names,
-        mass=np.diag(system.mass),
-        damping=system.damping,
-        stiffness=system.stiffness,
-        rotation=system.rotation,
-        meshes=(mesh,),
-    )
 
 
 def moved(line, dynamics):
@@ -273,7 +260,7 @@ class TestAgainstThePair:
             start_phase=dynamics.start_phase,
             errors=(dynamics.pinion_error, dynamics.wheel_error),
         )
-        q_1, v_1, motion = moved(line_of(dynamics, mesh), dynamics)
+        q_1, v_1, motion = moved(pair_line(dynamics, mesh), dynamics)
         start = dynamics.static_start(0.0), np.zeros(len(dynamics.dofs))
         q, v, _ = advance(dynamics, *start, 1 / (51200 * STEPS), 0, STEPS * N_SAMPLES)
         direction = dynamics.approach_direction()

@@ -2,6 +2,8 @@
 pair's integrator.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from lane_tools import advance
@@ -11,6 +13,7 @@ from line_tools import (
     STIFFNESS,
     constant_torques,
     order_of,
+    pair_line,
     state_after,
     steps,
     two_gears,
@@ -21,7 +24,6 @@ from scipy.linalg import eigh
 
 from benchmarks._engine_line import engine_line, engine_torques
 from gensig.driveline.time.course import constant_speed
-from gensig.driveline.time.geared_line import GearedLine
 from gensig.driveline.time.line_mesh import pair_mesh
 from gensig.driveline.time.newmark import integrate_line, static_start
 from gensig.faults.broken import MissingTooth
@@ -169,7 +171,6 @@ class TestAgainstThePair:
     @pytest.fixture(scope="class")
     @classmethod
     def line(cls, dynamics):
-        system = dynamics.system()
         mesh = pair_mesh(
             "pair",
             dynamics.table,
@@ -179,14 +180,7 @@ class TestAgainstThePair:
             start_phase=dynamics.start_phase,
             errors=(dynamics.pinion_error, dynamics.wheel_error),
         )
-        return GearedLine(
-            names=system.names,
-            mass=np.diag(system.mass),
-            damping=system.damping,
-            stiffness=system.stiffness,
-            rotation=system.rotation,
-            meshes=(mesh,),
-        )
+        return pair_line(dynamics, mesh)
 
     def test_the_same_motion(self, dynamics, line):
         start, n_steps = (
@@ -237,14 +231,7 @@ class TestLowRank:
             mesh.stiffness[0, 0] * np.outer(mesh.direction, mesh.direction)
             for mesh in engine.meshes
         )
-        return GearedLine(
-            names=engine.names,
-            mass=engine.mass,
-            damping=engine.damping,
-            stiffness=stiffness,
-            rotation=engine.rotation,
-            meshes=(),
-        )
+        return replace(engine, stiffness=stiffness, meshes=())
 
     def test_the_printed_frequencies(self, welded):
         n = 65  # rotations

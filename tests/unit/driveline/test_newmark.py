@@ -213,9 +213,7 @@ class TestRun:
             )
 
     def test_divergence(self):
-        """A free line under torques that nothing balances runs away; it is told as one, with a
-        name.
-        """
+        """A free line under torques that nothing balances runs away."""
         with refused(SimulationError, "left all bounds"):
             run(
                 two_gears(),
