@@ -79,16 +79,16 @@ AXES = ("x", "y")
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LineMachine(Machine):
-    """An engine or a motor on its drive line; ``place`` is the number of the followed mesh."""
+    """An engine or a motor on its drive line; ``mesh_number`` that of the followed mesh."""
 
     engine: EngineLine
-    place: int
+    mesh_number: int
     slices: SliceOptions
 
     @property
     def pair(self) -> GearPair:
         """Driving and driven gear of the followed mesh, as pinion and wheel."""
-        return named_by_side(self.engine.drive.pairs[self.place])
+        return named_by_side(self.engine.drive.pairs[self.mesh_number])
 
     @property
     def gears(self) -> dict[str, Gear]:
@@ -96,12 +96,12 @@ class LineMachine(Machine):
 
         Pinion and wheel of the followed mesh, the others as in the tables.
         """
-        return line_gears(self.engine.drive, self.place)
+        return line_gears(self.engine.drive, self.mesh_number)
 
     @property
     def bodies(self) -> dict[str, Body]:
         """Mass and support of every gear, and the inertia of its node."""
-        return line_bodies(self.engine.drive, self.place)
+        return line_bodies(self.engine.drive, self.mesh_number)
 
     @property
     def pinion(self) -> Body:
@@ -116,7 +116,7 @@ class LineMachine(Machine):
     @property
     def meshes(self) -> tuple[MachineMesh, ...]:
         """All meshes of the line; records follow one of them."""
-        return line_meshes(self.engine.drive, self.place)
+        return line_meshes(self.engine.drive, self.mesh_number)
 
     @property
     def ratio(self) -> float:
@@ -127,7 +127,7 @@ class LineMachine(Machine):
     def driving_node(self) -> int:
         """Number of the node that carries the driving gear of the record mesh."""
         drive = self.engine.drive
-        gear = drive.line.meshes[self.place].driving
+        gear = drive.line.meshes[self.mesh_number].driving
         return drive.numbers[drive.line.gears[gear].node]
 
     @property
@@ -173,7 +173,7 @@ class LineMachine(Machine):
     def mesh_force(self) -> float:
         """Mean normal force of the mesh at the set-point, N, or what closes it by 2 um."""
         return reference_force(
-            self.engine, self.place, float(self.mesh_forces[self.place])
+            self.engine, self.mesh_number, float(self.mesh_forces[self.mesh_number])
         )
 
     @property
@@ -206,7 +206,7 @@ class LineMachine(Machine):
         table = self.mesh_table(faults)
         if not isinstance(table, PairTable):
             raise ConfigError(
-                f"system.record_mesh {self.engine.mesh_names[self.place]} is of helical gears, "
+                f"system.record_mesh {self.engine.mesh_names[self.mesh_number]} is of helical gears, "
                 "which have their stiffness slice by slice; choose a spur mesh, or take its gears "
                 "with gensig stiffness system=helical_pair"
             )
@@ -292,7 +292,7 @@ class LineMachine(Machine):
             self, operating=replace(self.operating, speed=speed, torque=torque)
         )
         line = machine.line(Run(system=machine, faults=()))
-        force = "mesh_force", machine.place
+        force = "mesh_force", machine.mesh_number
         motion, angle = machine._integrate(line, loads.SECONDS, [force])
         return loads.greatest_loads(machine.pair, angle, motion.signals[force])
 
@@ -330,7 +330,7 @@ class LineMachine(Machine):
             acceleration=np.array(rows),
             shaft_angle=angle,
             mean_speed=turned * self.sensing.sampling_rate / max(len(angle) - 1, 1),
-            contact_loss_fraction=float(motion.contact_loss[self.place]),
+            contact_loss_fraction=float(motion.contact_loss[self.mesh_number]),
             integration_error=motion.energy_residual,
             integration_check="energy",
         )
@@ -359,14 +359,14 @@ class LineMachine(Machine):
                 in_gearbox(body, run.gearbox, axes, self.quality).support
                 for body, axes in bodies
             ]
-            engine = with_supports(engine, self.place, held)
+            engine = with_supports(engine, self.mesh_number, held)
         turned, forces = self.crank_angle(start), self.mesh_forces
         teeth = start.tooth_pinion, start.tooth_wheel
         neighbours = neighbour_meshes(
             engine,
             self.law,
             forces,
-            self.place,
+            self.mesh_number,
             start_of(self.pair, teeth, start.phase),
             faults=run.faults,
             specimen=specimen,
@@ -379,7 +379,7 @@ class LineMachine(Machine):
             start_phase=start.phase,
         )
         sound = sound_meshes(
-            engine, self.law, forces, left_out={self.place, *neighbours}
+            engine, self.law, forces, left_out={self.mesh_number, *neighbours}
         )
         governor = Governor(
             frequency=self.operating.drive_frequency,
@@ -389,7 +389,7 @@ class LineMachine(Machine):
             engine,
             self._course(),
             governor=governor,
-            own={**sound, **neighbours, self.place: own},
+            own={**sound, **neighbours, self.mesh_number: own},
             turned=turned,
         )
 
@@ -404,7 +404,7 @@ class LineMachine(Machine):
         pitches = (
             start.tooth_pinion
             + start.phase
-            - start_phase(self.engine.drive, self.place)
+            - start_phase(self.engine.drive, self.mesh_number)
         )
         turns = pitches / self.pair.pinion.n_teeth
         if not isinstance(self.engine.engine, Engine):
@@ -431,7 +431,7 @@ class LineMachine(Machine):
             return "angle", line.dof(self._wheel(name)[1].node)
         side, _, quantity = name.rpartition("_")
         drive = self.engine.drive
-        mesh = drive.line.meshes[self.place]
+        mesh = drive.line.meshes[self.mesh_number]
         number = {"pinion": mesh.driving, "wheel": mesh.driven}[side]
         gear = drive.line.gears[number]
         if quantity in AXES:

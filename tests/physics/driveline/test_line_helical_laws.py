@@ -134,7 +134,7 @@ def test_the_faulty_tooth_is_on_its_gear_in_all_its_meshes_and_nowhere_else(
     fault = {"kind": "missing_tooth", "gear": gear, "tooth": 10}
     record, line = line_with(fault, f"system.record_mesh={mesh}")
     names = record.engine.mesh_names
-    faulty = {names[record.place]: SIDES.index(gear), **others}
+    faulty = {names[record.mesh_number]: SIDES.index(gear), **others}
     for name, one in zip(names, line.meshes, strict=True):
         odd = {
             side: np.flatnonzero(kinds != np.bincount(kinds).argmax()).tolist()
@@ -178,7 +178,7 @@ def test_a_tooth_comes_to_its_mates_when_the_gear_has_turned_from_one_to_the_oth
     its other flank.
     """
     record = machine(f"system.record_mesh={mesh}")
-    drive, place = record.engine.drive, record.place
+    drive, place = record.engine.drive, record.mesh_number
     pairs, meshes = drive.pairs, drive.line.meshes
     teeth = 7, 5
     start = ToothStart(
@@ -218,7 +218,7 @@ def test_meshes_stand_where_the_crank_puts_them():
     ):
         turned = record.crank_angle(start)
         assert_allclose(
-            (start_phase(drive, record.place, turned) - start.phase + 0.5) % 1.0,
+            (start_phase(drive, record.mesh_number, turned) - start.phase + 0.5) % 1.0,
             0.5,
             atol=1e-9,
         )

@@ -154,7 +154,7 @@ def test_supports_of_a_gearbox_reach_the_lateral_line():
     )
     scattered = record.line(replace(run, gearbox=stiffer))
     name = record.engine.drive.line.gears[
-        record.engine.drive.line.meshes[record.place].driven
+        record.engine.drive.line.meshes[record.mesh_number].driven
     ].name
     at = nominal.matrices.names.index(f"{name} x")
     ratio = scattered.matrices.stiffness[at, at] / nominal.matrices.stiffness[at, at]

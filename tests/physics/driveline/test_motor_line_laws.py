@@ -190,7 +190,7 @@ def test_the_other_stage_stands_where_the_teeth_allow():
     record = machine("system.record_mesh=[5,6]")
     drive, start = record.engine.drive, Start(tooth_pinion=7, tooth_wheel=3, phase=0.25)
     turned = record.crank_angle(start)
-    roll = start_rolls(drive, turned)[record.place] / record.pair.base_pitch
+    roll = start_rolls(drive, turned)[record.mesh_number] / record.pair.base_pitch
     assert_allclose(roll, start.phase, atol=1e-9)
     later = record.crank_angle(Start(tooth_pinion=8, tooth_wheel=3, phase=0.25))
     assert_allclose(later - turned, 2.0 * np.pi / 48.0 * 3.0, rtol=1e-9)
