@@ -1,4 +1,6 @@
-"""The engine of the paper: its shaft line as plain arrays, its excitation as configured, other firing orders."""
+"""The engine of the paper: its shaft line as plain arrays, its excitation as configured, other
+firing orders.
+"""
 
 import copy
 import csv
@@ -62,18 +64,16 @@ def ratio_of_teeth():
     for row in rows():
         if row["edge_from"]:
             first, second = int(row["edge_from"]), int(row["edge_to"])
-            teeth = (
-                int(row["teeth_from"]) / int(row["teeth_to"])
-                if row["teeth_from"]
-                else 1.0
-            )
+            teeth = int(row["teeth_from"] or 1) / int(row["teeth_to"] or 1)
             found[second] = found[first] * teeth
     return {node: found[node] for node in ratios()}
 
 
 @lru_cache(maxsize=8)
 def engine_line(damper="as_printed"):
-    """The line (67 torsional degrees of freedom) and its 66 joints, with ``ends`` as (from, to) node numbers."""
+    """The line (67 torsional degrees of freedom) and its 66 joints, with ``ends`` as (from, to)
+    node numbers.
+    """
     ratio, joints = ratio_of_teeth(), [row for row in rows() if row["edge_from"]]
     inertia = np.array([float(row["inertia_kg_m2"]) for row in rows()])
     inertia[0] *= DAMPER_STATES[damper]
@@ -117,7 +117,9 @@ def torques_of(values, speed=SPEED, torque=TORQUE):
 
 
 def response_of(values, damper="as_printed", speed=SPEED, torque=TORQUE):
-    """Steady vibration of the whole line; fluctuation in rad/s by node number through ``node - 1``."""
+    """Steady vibration of the whole line; fluctuation in rad/s by node number through ``node -
+    1``.
+    """
     line, _, _ = engine_line(damper)
     return steady_response(
         line, torques_of(values, speed, torque).on(tuple(ratios())), speed

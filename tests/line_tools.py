@@ -1,4 +1,6 @@
-"""Small geared lines, states of a line at its internal rate, and the law of one mesh at chosen instants."""
+"""Small geared lines, states of a line at its internal rate, and the law of one mesh at chosen
+instants.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +14,7 @@ from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
 from gensig.driveline.time.geared_line import GearedLine, pack_meshes
 from gensig.driveline.time.line_mesh import LineMesh, phase_mesh
 from gensig.driveline.time.newmark import LineMotion, LineSolver, _Run, _scratch
+from gensig.dynamics.pair import PairDynamics
 
 RADII, INERTIAS, TEETH = (0.05, 0.1), (0.01, 0.05), (20, 40)
 STIFFNESS = 3e8  # N/m
@@ -24,8 +27,11 @@ def two_gears(
     drive: tuple[float, float] | None = None,
     **mesh,
 ) -> GearedLine:
-    """Two inertias and one mesh between them; ``drive`` is a spring and a damper of the first to the nominal angle."""
-    table = np.full((1, 8), STIFFNESS) if stiffness is None else stiffness
+    """Two inertias and one mesh between them; ``drive`` is a spring and a damper of the first to
+    the nominal angle.
+    """
+    if stiffness is None:
+        stiffness = np.full((1, 8), STIFFNESS)
     direction = np.array([RADII[0], -RADII[1]])
     held, damped = np.zeros((2, 2, 2))
     if drive is not None:
@@ -35,7 +41,7 @@ def two_gears(
         direction=direction,
         roll_dof=0,
         n_teeth=TEETH,
-        stiffness=table,
+        stiffness=stiffness,
         damping=damping,
         **mesh,
     )
@@ -66,6 +72,19 @@ def chain(n: int, *, loss: float = 2e-5, seed: int = 0) -> GearedLine:
     )
 
 
+def pair_line(dynamics: PairDynamics, mesh: LineMesh) -> GearedLine:
+    """A gear pair with its supports and drive as a line with one mesh."""
+    system = dynamics.system()
+    return GearedLine(
+        names=system.names,
+        mass=np.diag(system.mass),
+        damping=system.damping,
+        stiffness=system.stiffness,
+        rotation=system.rotation,
+        meshes=(mesh,),
+    )
+
+
 def constant_torques(values: np.ndarray) -> list[ShaftTorque]:
     return [
         ShaftTorque(dof=i, table=np.array([value])) for i, value in enumerate(values)
@@ -88,8 +107,8 @@ def state_after(
     run = _Run(line, course or constant_speed(0.0), torques or [], solver, start, [])
     run.begin(0)
     run.skip(n_steps)
-    told = run.told(np.empty((0, 0)), np.empty(0), np.empty(0))
-    return *told.end, told
+    motion = run.motion(np.empty((0, 0)), np.empty(0), np.empty(0))
+    return *motion.end, motion
 
 
 def law_at(
@@ -99,18 +118,28 @@ def law_at(
     rate: float = 0.0,
     roll_rate: float = 0.0,
 ) -> np.ndarray:
-    """What a mesh does, (N_LAW,), when it has rolled so many pitches beyond its start phase."""
+    """Law of a mesh, (N_LAW,), when it has rolled so many pitches beyond its start phase."""
     n = len(mesh.direction)
     line = GearedLine(
-        names=tuple(map(str, range(n))), mass=np.eye(n), damping=np.zeros((n, n)), stiffness=np.zeros((n, n)),
-        rotation=np.where(np.arange(n) == mesh.roll_dof, 1.0, 0.0), meshes=(),
-    )  # fmt: skip
+        names=tuple(map(str, range(n))),
+        mass=np.eye(n),
+        damping=np.zeros((n, n)),
+        stiffness=np.zeros((n, n)),
+        rotation=np.where(np.arange(n) == mesh.roll_dof, 1.0, 0.0),
+        meshes=(),
+    )
     with_mesh = _Unchecked(line, mesh)
     law = np.zeros((1, layout.N_LAW))
     mesh_law(
-        pack_meshes(with_mesh, np.arange(n)), 0, mesh.start_phase + turned, roll_rate, approach, rate, law,
+        pack_meshes(with_mesh, np.arange(n)),
+        0,
+        mesh.start_phase + turned,
+        roll_rate,
+        approach,
+        rate,
+        law,
         _scratch(with_mesh),
-    )  # fmt: skip
+    )
     return law[0]
 
 

@@ -1,4 +1,4 @@
-"""A drive line from two tables, or a single pair as one: what its modes are asked of."""
+"""A drive line from two tables, or from a single pair."""
 
 from __future__ import annotations
 
@@ -16,8 +16,13 @@ from gensig.driveline.linear.shaft_line import (
     Shaft,
     ShaftLine,
 )
-from gensig.driveline.options import Campbell, read_options
-from gensig.driveline.shaft_tables import read_gears, read_shafting, shipped_tables
+from gensig.driveline.options import Campbell, LineOptions, read_options
+from gensig.driveline.shaft_tables import (
+    TableRow,
+    read_gears,
+    read_shafting,
+    shipped_tables,
+)
 from gensig.driveline.table_rows import (
     check_gears_in_mesh,
     check_whole,
@@ -32,6 +37,7 @@ from gensig.driveline.table_rows import (
 from gensig.dynamics.pair import Rotor
 from gensig.errors import ConfigError
 from gensig.geometry.contact import SIDES, GearPair
+from gensig.geometry.gear import Gear
 from gensig.options.configuration import Configuration
 from gensig.systems.pair_machine import GearPairMachine, pair_dynamics
 from gensig.systems.registry import read_material
@@ -90,15 +96,8 @@ class DriveLine:
         """
         if self.campbell.orders is not None:
             return self.campbell.orders
-        return tuple(
-            sorted(
-                {
-                    factor * order
-                    for order in (1.0, *self.mesh_orders)
-                    for factor in (1.0, 2.0)
-                }
-            )
-        )
+        orders = 1.0, *self.mesh_orders
+        return tuple(sorted({*orders, *(2.0 * order for order in orders)}))
 
 
 def read_drive_line(config: Configuration) -> DriveLine:
@@ -111,21 +110,21 @@ def read_drive_line(config: Configuration) -> DriveLine:
     options = read_options(config.section("system"))
     if options.shafting_csv is None:
         raise ConfigError(
-            f"system.shafting_csv is required: give a path, or one of {', '.join(shipped_tables())}; "
+            "system.shafting_csv is required: give a path, or one of "
+            f"{', '.join(shipped_tables())}; "
             "docs/howto/your_drive_line.md says what is in it"
         )
     material = read_material(config)
     shafting = read_shafting("system.shafting_csv", options.shafting_csv)
-    gear_rows = (
-        []
-        if options.gears_csv is None
-        else read_gears("system.gears_csv", options.gears_csv)
-    )
+    gear_rows = []
+    if options.gears_csv is not None:
+        gear_rows = read_gears("system.gears_csv", options.gears_csv)
     node_rows = rows_of_nodes(shafting)
     numbers = tuple(node_rows)
     if options.viscous_damper_node not in (None, *numbers):
         raise ConfigError(
-            f"system.viscous_damper_node = {options.viscous_damper_node}: {options.shafting_csv} has no such node"
+            f"system.viscous_damper_node = {options.viscous_damper_node}: "
+            f"{options.shafting_csv} has no such node"
         )
     shapes = [gear_of(row) for row in gear_rows]
     gears = [
@@ -136,17 +135,10 @@ def read_drive_line(config: Configuration) -> DriveLine:
         node_of(row, place, gears, shapes, options, material)
         for place, row in enumerate(node_rows.values())
     )
-    shafts, meshes, pairs = [], [], []
-    for row in shafting:
-        ends = ends_of(row, numbers)
-        if ends is None:
-            continue
-        if row.text("edge_kind") == "gear_mesh":
-            pair, mesh = mesh_of(row, ends, numbers, gears, shapes, options)
-            pairs.append(pair)
-            meshes.append(mesh)
-        else:
-            shafts.append(shaft_of(row, ends, options.loss_factor))
+    shafts, meshes, pairs = _joints(shafting, numbers, gears, shapes, options)
+    support_force = None
+    if options.lateral:
+        support_force = options.support.force
     line = ShaftLine(
         nodes=nodes, shafts=tuple(shafts), gears=tuple(gears), meshes=tuple(meshes)
     )
@@ -164,14 +156,36 @@ def read_drive_line(config: Configuration) -> DriveLine:
         slices_helical=options.helical_meshes == "sliced",
         motor_node=options.motor_node,
         load_node=options.load_node,
-        support_force=options.support.force if options.lateral else None,
+        support_force=support_force,
     )
 
 
-def drive_line_of_pair(system: GearPairMachine, name: str) -> DriveLine:
-    """A single pair, with its motor and load, as the line of two to four nodes that it is;
-    without the soft drive.
+def _joints(
+    shafting: list[TableRow],
+    numbers: tuple[int, ...],
+    gears: list[LineGear],
+    shapes: list[Gear],
+    options: LineOptions,
+) -> tuple[list[Shaft], list[GearMesh], list[GearPair]]:
+    """Shafts, meshes and gear pairs of the rows that join two nodes."""
+    shafts, meshes, pairs = [], [], []
+    for row in shafting:
+        ends = ends_of(row, numbers)
+        if ends is None:
+            continue
+        if row.text("edge_kind") == "gear_mesh":
+            pair, mesh = mesh_of(row, ends, numbers, gears, shapes, options)
+            pairs.append(pair)
+            meshes.append(mesh)
+        else:
+            shafts.append(shaft_of(row, ends, options.loss_factor))
+    return shafts, meshes, pairs
 
+
+def drive_line_of_pair(system: GearPairMachine, name: str) -> DriveLine:
+    """A single pair, with its motor and load, as a line of two to four nodes.
+
+    Without the soft drive.
     The mesh is held at the mean stiffness of sound teeth under the set torque.
     """
     dynamics = pair_dynamics(Run(system=system, faults=()))

@@ -63,10 +63,11 @@ class DynamicRootStress:
     ----------
     strength : the pair under the greatest force as if it stood still
     gears : ISO's stress and safety of both gears under that force
-    history : the same over the mesh, wherever the greatest force falls: the bound of what a tooth can see
-    passes : by gear (pass, point) Pa    over ``history.roll``, of each pair that meets during a cycle as the teeth are
-        keyed (``mesh_phase``); the load share is that under the greatest force, and a force that would part the mesh
-        bends nothing here
+    history : the same over the mesh, wherever the greatest force falls: the bound of what a
+        tooth can see
+    passes : by gear (pass, point) Pa    over ``history.roll``, of each pair that meets during a
+        cycle as the teeth are keyed (``mesh_phase``); the load share is that under the greatest
+        force, and a force that would part the mesh bends nothing here
     """
 
     strength: RootStrength
@@ -92,9 +93,9 @@ def mesh_between(line: EngineLine, nodes: Sequence[int]) -> int:
     ConfigError    where these two do not mesh
     """
     wanted = {f"{nodes[0]}/{nodes[1]}", f"{nodes[1]}/{nodes[0]}"}
-    for place, name in enumerate(line.mesh_names):
+    for number, name in enumerate(line.mesh_names):
         if name in wanted:
-            return place
+            return number
     raise ConfigError(
         f"nodes {nodes[0]} and {nodes[1]} do not mesh; these do: {', '.join(line.mesh_names)}"
     )
@@ -181,7 +182,8 @@ def dynamic_root_stress(
     """
     if not load.greatest > 0.0:
         raise ConfigError(
-            f"mesh {line.mesh_names[mesh]}: its force never closes the driving flanks; swap edge_from and edge_to of "
+            f"mesh {line.mesh_names[mesh]}: its force never closes the driving "
+            "flanks; swap edge_from and edge_to of "
             "its row"
         )
     radius = strength.pair.pinion.base_radius
@@ -230,7 +232,7 @@ def crank_of_passes(
     way = (
         roll + strength.pair.base_pitch * np.array(passes)[:, None] - start
     )  # of the pinion since crank angle 0
-    return np.asarray(way / (pinion.base_radius * ratio))
+    return way / (pinion.base_radius * ratio)
 
 
 def _driving(line: EngineLine, mesh: int) -> LineGear:

@@ -41,8 +41,9 @@ SEEN_CYCLES = 6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EngineLine:
-    """A drive line and the engine that turns it; degrees of freedom are the nodes, then lateral
-    motion if any.
+    """A drive line and the engine that turns it.
+
+    Degrees of freedom are the nodes, then lateral motion if any.
 
     ``engine`` may be a motor with its load: the crank is then the motor's shaft, the brake torque
     what the load takes.
@@ -55,16 +56,9 @@ class EngineLine:
     @property
     def ratios(self) -> dict[int, float]:
         """Speed of every node over the crank's, by its number, positive."""
-        crank = abs(
-            self.drive.line.speed_ratio[
-                self._place(self.engine.driving_nodes[0], "throw_nodes")
-            ]
-        )
-        ratios = np.abs(self.drive.line.speed_ratio) / crank
-        return {
-            number: float(ratio)
-            for number, ratio in zip(self.drive.numbers, ratios, strict=True)
-        }
+        speeds = np.abs(self.drive.line.speed_ratio)
+        crank = speeds[self._place(self.engine.driving_nodes[0], "throw_nodes")]
+        return dict(zip(self.drive.numbers, (speeds / crank).tolist(), strict=True))
 
     @property
     def mesh_names(self) -> tuple[str, ...]:
@@ -80,11 +74,9 @@ class EngineLine:
         return closed_line(self.matrices())
 
     def matrices(self, *, merge_rigid: bool = False) -> LineMatrices:
-        """Those of the line, with what the torques of motor and loads give way to speed."""
-        matrices, slopes = (
-            self.drive.matrices(merge_rigid=merge_rigid),
-            self.engine.dampers(self.ratios),
-        )
+        """Matrices of the line with the slopes of motor and load torques over speed."""
+        matrices = self.drive.matrices(merge_rigid=merge_rigid)
+        slopes = self.engine.dampers(self.ratios)
         if not slopes:
             return matrices
         damping = matrices.damping.copy()
@@ -94,7 +86,7 @@ class EngineLine:
         return replace(matrices, damping=damping)
 
     def torques(self, speed: float, torque: float | None) -> LineTorques:
-        """What acts at a speed of the crank (rad/s) and a brake torque (N m)."""
+        """Torques on the line at a speed of the crank (rad/s) and a brake torque (N m)."""
         if isinstance(self.engine, Engine):
             return engine_torques(self.engine, speed, torque, self.ratios)
         assert torque is not None
@@ -110,9 +102,7 @@ class EngineLine:
         """Torques on the degrees of freedom, (dof, point) N m."""
         rows = torques.on(self.drive.numbers)
         n_dofs = len(self.drive.matrices().mass)
-        return np.asarray(
-            np.concatenate([rows, np.zeros((n_dofs - len(rows), rows.shape[1]))])
-        )
+        return np.concatenate([rows, np.zeros((n_dofs - len(rows), rows.shape[1]))])
 
     def response(self, speed: float, torque: float | None) -> SteadyResponse:
         """Steady vibration at a speed of the crank (rad/s) and a brake torque (N m)."""
@@ -127,12 +117,10 @@ class EngineLine:
         rad/s.
         """
         place = self._place(wheel.node, "toothed_wheels")
-        one = over_cycle(response.angle[place], SAMPLES_PER_CYCLE)
+        deviation = over_cycle(response.angle[place], SAMPLES_PER_CYCLE)
         crank = CYCLE / SAMPLES_PER_CYCLE * np.arange(SEEN_CYCLES * SAMPLES_PER_CYCLE)
-        angle = np.asarray(
-            self.ratios[wheel.node] * crank + np.tile(one, SEEN_CYCLES),
-            dtype=np.float64,
-        )
+        turned = self.ratios[wheel.node] * crank + np.tile(deviation, SEEN_CYCLES)
+        angle = np.asarray(turned, dtype=np.float64)
         rate = SAMPLES_PER_CYCLE * response.speed / CYCLE
         return instantaneous_speed(wheel, draw_wheel(rng, wheel), angle, rate)
 
@@ -147,21 +135,26 @@ def read_engine_line(config: Configuration) -> EngineLine:
 
     Raises
     ------
-    ConfigError    for a system that is no drive line, none or an ill excitation, nodes that the tables have not
+    ConfigError    for a system that is no drive line, none or an ill excitation, nodes that the
+        tables have not
     """
     kind = config.section("system").get("kind")
     if kind != LINE:
         raise ConfigError(
-            f"system.kind = {kind!r} is no drive line; take system=engine_gear_train, two_stage_gearbox or shaft_line"
+            f"system.kind = {kind!r} is no drive line; take system=engine_gear_train, "
+            "two_stage_gearbox or shaft_line"
         )
     if config.get("excitation") is None:
         raise ConfigError(
-            "no excitation is chosen; take excitation=engine_v20, motor_and_load, or your own option of that group"
+            "no excitation is chosen; take excitation=engine_v20, motor_and_load, or "
+            "your own option of that group"
         )
     values = config["excitation"]
     check_group("excitation", values)
     drive = read_drive_line(config)
-    engine = (
-        read_motor(values, drive) if values.get("kind") == KIND else read_engine(values)
-    )
+    engine: Engine | MotorDrive
+    if values.get("kind") == KIND:
+        engine = read_motor(values, drive)
+    else:
+        engine = read_engine(values)
     return EngineLine(drive=drive, engine=engine, wheels=read_wheels(values))

@@ -1,4 +1,4 @@
-"""What an engine's drive line does in time at one operating point, its teeth free to part."""
+"""Motion of an engine's drive line in time at one operating point, its teeth free to part."""
 
 from __future__ import annotations
 
@@ -24,13 +24,12 @@ from gensig.systems.registry import read_material
 
 Array = NDArray[np.float64]
 
-RATE = 10240.0  # Hz, of what is given out: flat to 4 kHz
-STEPS = 10  # to a sample: 9.8 us
+RATE = 10240.0  # Hz, of the signals: flat to 4 kHz
 SETTLING = 0.5  # s
-MOST_ENERGY_RESIDUAL = 1e-3
-GOVERNOR = Governor(
-    frequency=1.0, damping_ratio=0.7
-)  # assumed; it holds the mean speed and feels no vibration
+# ten steps to a sample: 9.8 us
+SOLVER = LineSolver(sampling_rate=RATE, oversampling=10, max_energy_residual=1e-3)
+# assumed; it holds the mean speed and feels no vibration
+GOVERNOR = Governor(frequency=1.0, damping_ratio=0.7)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -61,9 +60,7 @@ class TimeResponse:
 def own_meshes(
     machine: EngineLine, config: Configuration, speed: float, torque: float
 ) -> dict[int, OwnMesh]:
-    """Tables of sound teeth of the meshes that have any, by their place, each under its mean
-    force.
-    """
+    """Tables of sound teeth by the place of their mesh, each under its mean force."""
     mesh = config["mesh"]
     law = ToothLaw(
         material=read_material(config),
@@ -86,39 +83,35 @@ def time_response(
 
     Raises
     ------
-    SimulationError    where the energies do not balance to `MOST_ENERGY_RESIDUAL`
+    SimulationError    where the energies do not balance to 1e-3
     """
     line = running_line(
         machine, steady_course(speed, torque), governor=GOVERNOR, own=own
     )
-    speeds, angles = (
-        [(kind, line.dof(node)) for node in nodes] for kind in ("speed", "angle")
-    )
-    forces = [("mesh_force", place) for place in range(len(machine.mesh_names))]
-    solver = LineSolver(
-        sampling_rate=RATE, oversampling=STEPS, max_energy_residual=MOST_ENERGY_RESIDUAL
-    )
+    speeds = [("speed", line.dof(node)) for node in nodes]
+    angles = [("angle", line.dof(node)) for node in nodes]
+    forces = [("mesh_force", number) for number in range(len(machine.mesh_names))]
     motion = line.run(
-        solver,
+        SOLVER,
         duration=duration,
         channels=list(dict.fromkeys([*speeds, *angles, *forces])),
         settling=SETTLING,
     )
-    found, angle, force = (
-        np.array([motion.signals[one] for one in channels])
+    speed_of_nodes, angle, force = (
+        np.array([motion.signals[channel] for channel in channels])
         for channels in (speeds, angles, forces)
     )
+    mean_cycle = _mean_cycle(speed_of_nodes, motion.nominal_angle)
     # teeth that never meet on their back flanks cannot pull: below 0 is what the low-pass rings
     force = np.where(motion.back_contact[:, None] > 0.0, force, np.maximum(force, 0.0))
     return TimeResponse(
-        time=np.arange(found.shape[1]) / RATE,
+        time=np.arange(len(motion.nominal_angle)) / RATE,
         crank_angle=motion.nominal_angle,
-        speed=found,
+        speed=speed_of_nodes,
         angle=angle,
         mesh_force=force,
-        fluctuation=0.5 * np.ptp(found, axis=1),
-        cycle_fluctuation=0.5
-        * np.ptp(_mean_cycle(found, motion.nominal_angle), axis=1),
+        fluctuation=0.5 * np.ptp(speed_of_nodes, axis=1),
+        cycle_fluctuation=0.5 * np.ptp(mean_cycle, axis=1),
         contact_loss=motion.contact_loss,
         back_contact=motion.back_contact,
         least_force=force.min(axis=1),
@@ -132,9 +125,7 @@ def _mean_cycle(signals: Array, angle: Array, n_points: int = 1440) -> Array:
     period = 4.0 * np.pi
     n_cycles = max(1, int((angle[-1] - angle[0]) // period))
     at = angle[0] + period * (np.arange(n_cycles * n_points) / n_points)
-    return np.array(
-        [
-            np.interp(at, angle, one).reshape(n_cycles, n_points).mean(axis=0)
-            for one in signals
-        ]
-    )
+    cycles = [
+        np.interp(at, angle, signal).reshape(n_cycles, n_points) for signal in signals
+    ]
+    return np.array([cycle.mean(axis=0) for cycle in cycles])

@@ -64,7 +64,9 @@ def line_meshes(drive: DriveLine, followed: int) -> tuple[MachineMesh, ...]:
             driving=names[mesh.driving],
             driven=names[mesh.driven],
             pair=pair,
-            followed=place == followed,
+            followed=number == followed,
         )
-        for place, (mesh, pair) in enumerate(zip(drive.line.meshes, pairs, strict=True))
+        for number, (mesh, pair) in enumerate(
+            zip(drive.line.meshes, pairs, strict=True)
+        )
     )

@@ -44,13 +44,13 @@ def greatest_loads(pair: GearPair, angle: Array, force: Array) -> Array:
         )
         * pair.base_pitch
     )
-    found = []
+    loads = []
     for entry in entered[entered + pair.path_of_contact <= roll[-1]]:
-        place = roll - entry
-        engaged = (place >= 0.0) & (place <= pair.path_of_contact)
-        alone = (place > pair.path_of_contact - pair.base_pitch) & (
-            place < pair.base_pitch
+        position = roll - entry
+        engaged = (position >= 0.0) & (position <= pair.path_of_contact)
+        alone = (position > pair.path_of_contact - pair.base_pitch) & (
+            position < pair.base_pitch
         )
         load = np.where(alone, 1.0, SHARED)[engaged] * np.maximum(force[engaged], 0.0)
-        found.append(float(load.max(initial=0.0)))
-    return np.maximum(np.array(found) * pair.pinion.base_radius, LEAST_TORQUE)
+        loads.append(float(load.max(initial=0.0)))
+    return np.maximum(np.array(loads) * pair.pinion.base_radius, LEAST_TORQUE)

@@ -1,15 +1,13 @@
-"""The machine of an engine or a motor on its drive line, one mesh of which records follow tooth
-by tooth.
+"""An engine or a motor on its drive line as a machine of which records are made.
 
-Its ``pair`` is the driving and the driven gear of that mesh. ``operating`` is the motion of the
-driving gear's shaft.
+Records follow one mesh tooth by tooth. Its ``pair`` is the driving and the driven gear of that
+mesh; ``operating`` is the motion of the driving gear's shaft.
 ``docs/theory/shaft_line_records.md``.
 """
 
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self, final
@@ -21,6 +19,11 @@ from gensig.driveline import loads
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.engine_torques import Engine
 from gensig.driveline.line_gears import line_bodies, line_gears, line_meshes
+from gensig.driveline.machine_checks import (
+    check_sensing,
+    check_solver,
+    warn_of_supports,
+)
 from gensig.driveline.mesh_phase import start_phase
 from gensig.driveline.running import (
     EngineCourse,
@@ -44,7 +47,6 @@ from gensig.driveline.teeth import (
     tooth_table,
 )
 from gensig.driveline.time.newmark import LineMotion, LineSolver
-from gensig.dynamics.backends.registry import DEFAULT_BACKEND
 from gensig.dynamics.integrator import check_memory
 from gensig.dynamics.pair import Body
 from gensig.errors import ConfigError, SimulationError
@@ -66,30 +68,27 @@ from gensig.units import SPEED
 
 Array = NDArray[np.float64]
 
-SETTLING = (
-    0.3  # s before a record, until the start from the linear vibration has died away
-)
+# s before a record, until the start from the linear vibration has died away
+SETTLING = 0.3
 MOST_ENERGY_RESIDUAL = 1e-3
 KNOT = 5e-3  # s between the knots of a course that changes
 AFTER = 0.2  # s that a course goes on after a record: the low-pass looks ahead
-# times the force of the supports; the stiffness of a ball bearing follows its third root
-FAR_ABOVE = 3.0
 AXES = ("x", "y")
 
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LineMachine(Machine):
-    """An engine or a motor on its drive line; ``place`` is the number of the followed mesh."""
+    """An engine or a motor on its drive line; ``mesh_number`` that of the followed mesh."""
 
     engine: EngineLine
-    place: int
+    mesh_number: int
     slices: SliceOptions
 
     @property
     def pair(self) -> GearPair:
         """Driving and driven gear of the followed mesh, as pinion and wheel."""
-        return named_by_side(self.engine.drive.pairs[self.place])
+        return named_by_side(self.engine.drive.pairs[self.mesh_number])
 
     @property
     def gears(self) -> dict[str, Gear]:
@@ -97,12 +96,12 @@ class LineMachine(Machine):
 
         Pinion and wheel of the followed mesh, the others as in the tables.
         """
-        return line_gears(self.engine.drive, self.place)
+        return line_gears(self.engine.drive, self.mesh_number)
 
     @property
     def bodies(self) -> dict[str, Body]:
         """Mass and support of every gear, and the inertia of its node."""
-        return line_bodies(self.engine.drive, self.place)
+        return line_bodies(self.engine.drive, self.mesh_number)
 
     @property
     def pinion(self) -> Body:
@@ -117,7 +116,7 @@ class LineMachine(Machine):
     @property
     def meshes(self) -> tuple[MachineMesh, ...]:
         """All meshes of the line; records follow one of them."""
-        return line_meshes(self.engine.drive, self.place)
+        return line_meshes(self.engine.drive, self.mesh_number)
 
     @property
     def ratio(self) -> float:
@@ -128,9 +127,8 @@ class LineMachine(Machine):
     def driving_node(self) -> int:
         """Number of the node that carries the driving gear of the record mesh."""
         drive = self.engine.drive
-        return drive.numbers[
-            drive.line.gears[drive.line.meshes[self.place].driving].node
-        ]
+        gear = drive.line.meshes[self.mesh_number].driving
+        return drive.numbers[drive.line.gears[gear].node]
 
     @property
     def line_solver(self) -> LineSolver:
@@ -143,10 +141,9 @@ class LineMachine(Machine):
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Rotation of both gears of the followed mesh, their bearings', and the toothed wheels'
-        speeds.
+        """Rotation of both gears of the followed mesh, speeds of the toothed wheels.
 
-        Bearings move only with lateral motion.
+        With lateral motion also the bearings of both gears.
         """
         rotations = [f"{side}_rotation" for side in SIDES]
         bearings = [f"{side}_{axis}" for side in SIDES for axis in AXES]
@@ -176,7 +173,7 @@ class LineMachine(Machine):
     def mesh_force(self) -> float:
         """Mean normal force of the mesh at the set-point, N, or what closes it by 2 um."""
         return reference_force(
-            self.engine, self.place, float(self.mesh_forces[self.place])
+            self.engine, self.mesh_number, float(self.mesh_forces[self.mesh_number])
         )
 
     @property
@@ -209,9 +206,9 @@ class LineMachine(Machine):
         table = self.mesh_table(faults)
         if not isinstance(table, PairTable):
             raise ConfigError(
-                f"system.record_mesh {self.engine.mesh_names[self.place]} is of helical gears, which have their "
-                "stiffness slice by slice; choose a spur mesh, or take its gears with gensig stiffness "
-                "system=helical_pair"
+                f"system.record_mesh {self.engine.mesh_names[self.mesh_number]} is of helical gears, "
+                "which have their stiffness slice by slice; choose a spur mesh, or take its gears "
+                "with gensig stiffness system=helical_pair"
             )
         whole = sound_teeth(self.pair, PLAIN)
         return stiffness_curves(
@@ -230,23 +227,9 @@ class LineMachine(Machine):
     def check(self) -> None:
         """Raise for what would stop every record."""
         self.require_drive()
-        self._check_sensing()
-        if self.mesh.law != "one_sided":
-            raise ConfigError(
-                f"mesh.law = {self.mesh.law}: the meshes of a drive line are one-sided; "
-                "take mesh.law=one_sided"
-            )
-        if self.solver.precision != "float64":
-            raise ConfigError(
-                f"solver.precision = {self.solver.precision}: a drive line is integrated in "
-                "float64; take solver.precision=float64"
-            )
-        if self.solver.backend != DEFAULT_BACKEND:
-            raise ConfigError(
-                f"solver.backend = {self.solver.backend}: a drive line has an integrator of "
-                f"its own; take solver.backend={DEFAULT_BACKEND}"
-            )
-        self._warn_of_supports()
+        check_sensing(self.sensing, self.channels, self.engine)
+        check_solver(self.mesh, self.solver)
+        warn_of_supports(self.engine, self.mesh_forces)
         self.quality.check_covered(self.pair.pinion, self.pair.wheel)
         check_memory(
             self.operating.duration,
@@ -255,46 +238,6 @@ class LineMachine(Machine):
             self.solver,
         )
         self.mesh_table()
-
-    def _check_sensing(self) -> None:
-        """Raise for channels and sensors that a drive line does not have."""
-        sensing = self.sensing
-        if unknown := [name for name in sensing.channels if name not in self.channels]:
-            more = ""
-            if not self.engine.drive.lateral:
-                more = "; with system.lateral=true also pinion_x and the like"
-            raise ConfigError(
-                f"sensing.channels: no channel {', '.join(unknown)}; "
-                f"allowed: {', '.join(self.channels)}{more}"
-            )
-        if sensing.path is not None or sensing.n_lead or sensing.nuisances:
-            option = "shaft_line" if self.engine.wheels else "geared_line"
-            raise ConfigError(
-                "sensing: records of a drive line have no transfer path, nuisances or sensor "
-                f"dynamics; take sensing={option}"
-            )
-
-    def _warn_of_supports(self) -> None:
-        """Warn of mesh forces far above the force for which the support of all gears is taken."""
-        drive, rated = self.engine.drive, self.engine.drive.support_force
-        if rated is None:
-            return
-        force = np.abs(self.mesh_forces)
-        heavy = [
-            place for place in range(len(force)) if force[place] > FAR_ABOVE * rated
-        ]
-        if heavy:
-            names = self.engine.mesh_names
-            listed = ", ".join(
-                f"{names[place]} {force[place]:.0f} N" for place in heavy
-            )
-            warnings.warn(
-                f"{drive.name}: mean tooth forces of meshes {listed}, but every gear is on a support for "
-                f"system.support.force_n = {rated:g} N, less stiff than bearings so loaded; set it, and bearing and "
-                "shaft, to those of the gears of system.record_mesh",
-                UserWarning,
-                stacklevel=2,
-            )
 
     def driven_tooth(self, tooth_pinion: int, drawn: int) -> int:
         """Tooth of the driven gear at the start.
@@ -338,7 +281,8 @@ class LineMachine(Machine):
         """
         if self.pair.pinion.helix_angle != 0.0:
             raise ConfigError(
-                "life: on a drive line damage grows in a spur record mesh; choose one, system.record_mesh"
+                "life: on a drive line damage grows in a spur record mesh; "
+                "choose one, system.record_mesh"
             )
         if not self.operating.is_steady:
             raise ConfigError(
@@ -348,17 +292,9 @@ class LineMachine(Machine):
             self, operating=replace(self.operating, speed=speed, torque=torque)
         )
         line = machine.line(Run(system=machine, faults=()))
-        shaft = line.dof(machine.driving_node)
-        motion = line.run(
-            machine.line_solver,
-            duration=loads.SECONDS,
-            channels=[("mesh_force", machine.place), ("angle", shaft)],
-            settling=SETTLING,
-        )
-        angle = machine.ratio * motion.nominal_angle + motion.signals["angle", shaft]
-        return loads.greatest_loads(
-            machine.pair, angle, motion.signals["mesh_force", machine.place]
-        )
+        force = "mesh_force", machine.mesh_number
+        motion, angle = machine._integrate(line, loads.SECONDS, [force])
+        return loads.greatest_loads(machine.pair, angle, motion.signals[force])
 
     @classmethod
     def simulate_runs(
@@ -375,32 +311,42 @@ class LineMachine(Machine):
 
     @one_thread
     def _record(self, run: Run[LineMachine]) -> CleanRecord:
-        sensing, rate = self.sensing, self.sensing.sampling_rate
         line = self.line(run)
-        kinds = {name: self._channel(line, name) for name in sensing.channels}
-        shaft = line.dof(self.driving_node)
-        motion = line.run(
-            self.line_solver,
-            duration=self.operating.duration,
-            channels=list(dict.fromkeys([*kinds.values(), ("angle", shaft)])),
-            settling=SETTLING,
+        kinds = {name: self._channel(line, name) for name in self.sensing.channels}
+        motion, angle = self._integrate(
+            line, self.operating.duration, list(kinds.values())
         )
-        angle = self.ratio * motion.nominal_angle + motion.signals["angle", shaft]
-        gain = np.ones(len(kinds)) if run.gearbox is None else run.gearbox.gain
-        rows = [
-            self._seen(run, line, motion, name, kind)
-            if kind[0] == "angle"
-            else own * motion.signals[kind]
-            for (name, kind), own in zip(kinds.items(), gain, strict=True)
-        ]
+        gains = np.ones(len(kinds))
+        if run.gearbox is not None:
+            gains = run.gearbox.gain
+        rows = []
+        for (name, kind), gain in zip(kinds.items(), gains, strict=True):
+            if kind[0] == "angle":
+                rows.append(self._wheel_speed(run, line, motion, name, kind))
+            else:
+                rows.append(gain * motion.signals[kind])
+        turned = float(angle[-1] - angle[0])
         return CleanRecord(
             acceleration=np.array(rows),
             shaft_angle=angle,
-            mean_speed=float(angle[-1] - angle[0]) * rate / max(len(angle) - 1, 1),
-            contact_loss_fraction=float(motion.contact_loss[self.place]),
+            mean_speed=turned * self.sensing.sampling_rate / max(len(angle) - 1, 1),
+            contact_loss_fraction=float(motion.contact_loss[self.mesh_number]),
             integration_error=motion.energy_residual,
             integration_check="energy",
         )
+
+    def _integrate(
+        self, line: RunningLine, duration: float, channels: list[tuple[str, int]]
+    ) -> tuple[LineMotion, Array]:
+        """Motion of a line, and the angle of the driving gear's shaft, (sample,) rad."""
+        shaft = "angle", line.dof(self.driving_node)
+        motion = line.run(
+            self.line_solver,
+            duration=duration,
+            channels=list(dict.fromkeys([*channels, shaft])),
+            settling=SETTLING,
+        )
+        return motion, self.ratio * motion.nominal_angle + motion.signals[shaft]
 
     def line(self, run: Run[LineMachine]) -> RunningLine:
         """The line of one run, ready to be integrated."""
@@ -413,14 +359,14 @@ class LineMachine(Machine):
                 in_gearbox(body, run.gearbox, axes, self.quality).support
                 for body, axes in bodies
             ]
-            engine = with_supports(engine, self.place, held)
+            engine = with_supports(engine, self.mesh_number, held)
         turned, forces = self.crank_angle(start), self.mesh_forces
         teeth = start.tooth_pinion, start.tooth_wheel
-        beside = neighbour_meshes(
+        neighbours = neighbour_meshes(
             engine,
             self.law,
             forces,
-            self.place,
+            self.mesh_number,
             start_of(self.pair, teeth, start.phase),
             faults=run.faults,
             specimen=specimen,
@@ -432,16 +378,18 @@ class LineMachine(Machine):
             start_teeth=teeth,
             start_phase=start.phase,
         )
-        sound = sound_meshes(engine, self.law, forces, besides={self.place, *beside})
-        frequency, ratio = (
-            self.operating.drive_frequency,
-            self.operating.drive_damping_ratio,
+        sound = sound_meshes(
+            engine, self.law, forces, left_out={self.mesh_number, *neighbours}
+        )
+        governor = Governor(
+            frequency=self.operating.drive_frequency,
+            damping_ratio=self.operating.drive_damping_ratio,
         )
         return running_line(
             engine,
             self._course(),
-            governor=Governor(frequency=frequency, damping_ratio=ratio),
-            own={**sound, **beside, self.place: own},
+            governor=governor,
+            own={**sound, **neighbours, self.mesh_number: own},
             turned=turned,
         )
 
@@ -456,18 +404,12 @@ class LineMachine(Machine):
         pitches = (
             start.tooth_pinion
             + start.phase
-            - start_phase(self.engine.drive, self.place)
+            - start_phase(self.engine.drive, self.mesh_number)
         )
+        turns = pitches / self.pair.pinion.n_teeth
         if not isinstance(self.engine.engine, Engine):
-            return (
-                2.0
-                * math.pi
-                * (pitches / self.pair.pinion.n_teeth + start.tooth_wheel)
-                / self.ratio
-            )
-        turns = pitches / self.pair.pinion.n_teeth + start.tooth_wheel % max(
-            1, round(2.0 * self.ratio)
-        )
+            return 2.0 * math.pi * (turns + start.tooth_wheel) / self.ratio
+        turns += start.tooth_wheel % max(1, round(2.0 * self.ratio))
         return 2.0 * math.pi * turns / self.ratio % (4.0 * math.pi)
 
     def _course(self) -> EngineCourse:
@@ -487,25 +429,22 @@ class LineMachine(Machine):
         """Signal of the integration for a channel: a kind and a degree of freedom."""
         if name.endswith(SPEED):
             return "angle", line.dof(self._wheel(name)[1].node)
-        side, _, what = name.rpartition("_")
+        side, _, quantity = name.rpartition("_")
         drive = self.engine.drive
-        mesh = drive.line.meshes[self.place]
-        gear = dict(zip(SIDES, (mesh.driving, mesh.driven), strict=True))[side]
-        if what in AXES:
-            return "acceleration", line.matrices.names.index(
-                f"{drive.line.gears[gear].name} {what}"
-            )
-        return "acceleration", line.dof(drive.numbers[drive.line.gears[gear].node])
+        mesh = drive.line.meshes[self.mesh_number]
+        number = {"pinion": mesh.driving, "wheel": mesh.driven}[side]
+        gear = drive.line.gears[number]
+        if quantity in AXES:
+            return "acceleration", line.matrices.names.index(f"{gear.name} {quantity}")
+        return "acceleration", line.dof(drive.numbers[gear.node])
 
     def _wheel(self, name: str) -> tuple[int, ToothedWheel]:
+        """Number of a toothed wheel among those of the line, and the wheel, by its channel."""
+        wheels = self.engine.wheels
         wanted = name.removesuffix(SPEED)
-        return next(
-            (k, wheel)
-            for k, (own, wheel) in enumerate(self.engine.wheels.items())
-            if own == wanted
-        )
+        return list(wheels).index(wanted), wheels[wanted]
 
-    def _seen(
+    def _wheel_speed(
         self,
         run: Run[LineMachine],
         line: RunningLine,
@@ -513,16 +452,12 @@ class LineMachine(Machine):
         name: str,
         kind: tuple[str, int],
     ) -> Array:
-        """Deviation from the nominal speed that a toothed wheel shows, (sample,) rad/s."""
-        place, wheel = self._wheel(name)
-        disc = (
-            run.discs[place]
-            if run.discs
-            else Disc(index=0.0, places=wheel.spacing * np.arange(float(wheel.n_teeth)))
-        )
+        """Deviation from the nominal speed that a toothed wheel measures, (sample,) rad/s."""
+        number, wheel = self._wheel(name)
+        disc = Disc(index=0.0, places=wheel.spacing * np.arange(float(wheel.n_teeth)))
+        if run.discs:
+            disc = run.discs[number]
         ratio = self.engine.ratios[wheel.node]
         angle = ratio * (line.turned + motion.nominal_angle) + motion.signals[kind]
-        return (
-            instantaneous_speed(wheel, disc, angle, self.sensing.sampling_rate)
-            - ratio * motion.nominal_speed
-        )
+        speed = instantaneous_speed(wheel, disc, angle, self.sensing.sampling_rate)
+        return speed - ratio * motion.nominal_speed

@@ -1,9 +1,8 @@
-"""Where each mesh of a line stands when the line starts: the meshes of one gear are not in phase
-by chance.
+"""Phases of the meshes of a line when it starts.
 
-A gear has one set of teeth, so that its meshes follow from each other by the directions of its
-mates. Angles are those of tooth centres in the common plane, counted against the clock;
-``docs/theory/shaft_line.md``.
+A gear has one set of teeth, so that the phases of its meshes follow from each other by the
+directions of its mates. Angles are those of tooth centres in the common plane, counted against
+the clock; ``docs/theory/shaft_line.md``.
 """
 
 from __future__ import annotations
@@ -32,25 +31,27 @@ def tooth_angles(line: DriveLine, turned: float = 0.0) -> Array:
     gears, ratio = line.line.gears, line.line.speed_ratio
     by_node: list[float | None] = [None] * len(line.line.nodes)
     by_node[0] = 0.0
-    joints = list(line.line.shafts)
     meshes = list(zip(line.line.meshes, line.pairs, strict=True))
     while any(angle is None for angle in by_node):
         before = list(by_node)
-        for shaft in joints:
-            _spread(by_node, shaft.first, shaft.second)
+        for shaft in line.line.shafts:  # gears on one shaft have a tooth at one angle
+            ends = shaft.first, shaft.second
+            placed = [by_node[end] for end in ends if by_node[end] is not None]
+            if len(placed) == 1:
+                by_node[shaft.first] = by_node[shaft.second] = placed[0]
         for mesh, pair in meshes:
-            one, other = gears[mesh.driving].node, gears[mesh.driven].node
-            sense = math.copysign(1.0, ratio[one])
-            known, sought = by_node[one], by_node[other]
+            driving, driven = gears[mesh.driving].node, gears[mesh.driven].node
+            sense = math.copysign(1.0, ratio[driving])
+            known, sought = by_node[driving], by_node[driven]
             if known is not None and sought is None:
-                by_node[other] = _driven_angle(
+                by_node[driven] = _driven_angle(
                     mesh, pair, sense, _past_pitch_point(mesh, pair, sense, known)
                 )
             elif sought is not None and known is None:
-                by_node[one] = _driving_angle(mesh, pair, sense, sought)
+                by_node[driving] = _driving_angle(mesh, pair, sense, sought)
         if by_node == before:
             break  # the rest belongs to no part that holds the first node
-    angles = np.array([0.0 if angle is None else angle for angle in by_node])
+    angles = [angle or 0.0 for angle in by_node]
     return np.array([angles[gear.node] + turned * ratio[gear.node] for gear in gears])
 
 
@@ -74,30 +75,20 @@ def start_rolls(line: DriveLine, turned: float = 0.0) -> Array:
 
 
 def first_slice_lead(pair: GearPair) -> float:
-    """How far the slice that enters first is ahead of the middle of the face, where teeth are
-    told, m; spur: 0.
-    """
+    """Lead of the slice that enters first over the middle of the face, m; spur: 0."""
     return 0.5 * pair.face_width * math.tan(pair.base_helix_angle)
 
 
-def start_phase(line: DriveLine, place: int, turned: float = 0.0) -> float:
+def start_phase(line: DriveLine, number: int, turned: float = 0.0) -> float:
     """Pitches that the first slice of a pair of one mesh is past A.
 
     What a mesh table takes as its start.
     """
-    pair = line.pairs[place]
+    pair = line.pairs[number]
     return (
-        float(start_rolls(line, turned)[place] + first_slice_lead(pair))
+        float(start_rolls(line, turned)[number] + first_slice_lead(pair))
         / pair.base_pitch
     )
-
-
-def _spread(by_node: list[float | None], one: int, other: int) -> None:
-    """Gears on one shaft have a tooth at one angle."""
-    if by_node[one] is None:
-        by_node[one] = by_node[other]
-    elif by_node[other] is None:
-        by_node[other] = by_node[one]
 
 
 def _half_teeth(pair: GearPair) -> tuple[float, float]:

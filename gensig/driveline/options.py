@@ -52,16 +52,14 @@ class Campbell:
             )
         if self.orders is not None and (not self.orders or min(self.orders) <= 0.0):
             raise ConfigError(
-                "system.campbell.orders: give orders of the first node, all positive, such as [1, 2], or null"
+                "system.campbell.orders: give orders of the first node, all positive, "
+                "such as [1, 2], or null"
             )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearHolding:
-    """What holds every gear of a line sideways.
-
-    Two bearings, a shaft, one static force on it, a damping ratio.
-    """
+    """Lateral support of every gear: two bearings, a shaft, a static force, a damping ratio."""
 
     bearing: BallBearing
     shaft: BearingShaft
@@ -141,7 +139,8 @@ def read_options(machine: Section) -> LineOptions:
     options = read(LineOptions, own, "system", **groups)
     if options.helical_meshes not in HELICAL_MESHES:
         raise ConfigError(
-            f"system.helical_meshes = {options.helical_meshes!r}; allowed: {', '.join(HELICAL_MESHES)}"
+            f"system.helical_meshes = {options.helical_meshes!r}; allowed: "
+            f"{', '.join(HELICAL_MESHES)}"
         )
     if options.backlash < 0.0:
         raise ConfigError(
@@ -156,13 +155,13 @@ def _read_dampers(values: Any) -> tuple[TorsionalDamper, ...]:
         raise ConfigError(
             f"system.dampers = {values!r} must be a list of dampers, [] for none"
         )
-    found = []
-    for place, one in enumerate(values):
+    dampers = []
+    for place, keys in enumerate(values):
         where = f"system.dampers[{place}]"
-        if not isinstance(one, Mapping):
-            raise ConfigError(f"{where} = {one!r} must be a group of keys")
+        if not isinstance(keys, Mapping):
+            raise ConfigError(f"{where} = {keys!r} must be a group of keys")
         try:
-            found.append(read(TorsionalDamper, one, "damper"))
+            dampers.append(read(TorsionalDamper, keys, "damper"))
         except ConfigError as error:
             raise ConfigError(f"{where}{str(error).removeprefix('damper')}") from None
-    return tuple(found)
+    return tuple(dampers)

@@ -25,7 +25,7 @@ def read_line_machine(config: Configuration) -> LineMachine:
     ConfigError    for keys or tables that make no engine, and for a mesh that has no records
     """
     engine = read_engine_line(_with_lateral_motion(config))
-    place = _record_mesh(engine)
+    mesh_number = _record_mesh(engine)
     if read_heat(config).is_any or read_modification(config).is_any:
         raise ConfigError(
             "heat and modification are of a single gear pair; a drive line takes "
@@ -43,7 +43,7 @@ def read_line_machine(config: Configuration) -> LineMachine:
         quality=quality,
         solver=read(Solver, config.section("solver"), "solver"),
         engine=engine,
-        place=place,
+        mesh_number=mesh_number,
         slices=read_slice_options(config.section("mesh")),
     )
     return replace(
@@ -64,13 +64,15 @@ def _record_mesh(engine: EngineLine) -> int:
     drive, names = engine.drive, engine.mesh_names
     if drive.record_mesh is None:
         raise ConfigError(
-            f"system.record_mesh = null: records follow the teeth of one mesh; give its two nodes, one of "
+            "system.record_mesh = null: records follow the teeth of one mesh; give "
+            "its two nodes, one of "
             f"{', '.join(names) or 'none: this line has no mesh'}"
         )
     wanted = "/".join(str(node) for node in drive.record_mesh)
     if wanted not in names:
         raise ConfigError(
-            f"system.record_mesh = {list(drive.record_mesh)}: no such mesh; there are {', '.join(names)}, the driving "
+            f"system.record_mesh = {list(drive.record_mesh)}: no such mesh; there are "
+            f"{', '.join(names)}, the driving "
             "node first"
         )
     return names.index(wanted)

@@ -1,5 +1,6 @@
-"""An engine's drive line in time: one-sided meshes with backlash, some from tables of their
-teeth; steady and run-up.
+"""An engine's drive line in time, steady or along a run-up.
+
+Meshes are one-sided with backlash, some from tables of their teeth.
 
 ``docs/theory/shaft_line_records.md``.
 """
@@ -7,8 +8,9 @@ teeth; steady and run-up.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,9 +41,7 @@ Array = NDArray[np.float64]
 
 CONSTANT_NODES = 8  # of a pitch whose stiffness is constant
 LEAST_APPROACH = 2e-6  # m, at which a mesh that carries next to nothing is taken
-TABLE_STEP = (
-    100.0 * math.pi / 30.0
-)  # rad/s of the crank between torques that a run-up goes over
+TABLE_STEP = 100.0 * math.pi / 30.0  # rad/s of the crank between tables of a run-up
 TABLE_SHARE = 0.1  # of the largest torque between them
 MOST_TABLES = 24
 MOST_STEPS = 64  # per sample, that are tried where steps turn out to be too long
@@ -55,9 +55,9 @@ one_thread = threadpool_limits.wrap(limits=1)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Governor:
-    """What holds the mean speed.
+    """Spring and damper that hold the mean speed.
 
-    A spring and a damper on the rigid motion alone, so that no vibration feels it.
+    They act on the rigid motion alone, so that no vibration feels them.
     """
 
     frequency: float
@@ -66,8 +66,7 @@ class Governor:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class OwnMesh:
-    """A mesh by its own teeth: table, errors of the teeth (tooth,) m, and teeth that enter at the
-    start.
+    """A mesh with tabulated teeth: table, errors of the teeth (tooth,) m, teeth at the start.
 
     ``start_phase`` in pitches must agree with where the crank stands; None follows from it.
     """
@@ -96,7 +95,8 @@ class EngineCourse:
             )
         if not self.speed.min() > 0.0:
             raise ConfigError(
-                f"the speed of the crank, {self.speed.min() * 30.0 / math.pi:g} r/min, must be positive"
+                f"the speed of the crank, {self.speed.min() * 30.0 / math.pi:g} "
+                "r/min, must be positive"
             )
 
 
@@ -126,9 +126,7 @@ class RunningLine:
 
     def dof(self, node: int) -> int:
         """Place of the degree of freedom that a node, by its number, turns with."""
-        return int(
-            np.argmax(self.matrices.expand[self.machine.drive.numbers.index(node)])
-        )
+        return _dof(self.matrices, self.machine.drive.numbers.index(node))
 
     @one_thread
     def run(
@@ -139,23 +137,18 @@ class RunningLine:
         channels: Sequence[tuple[str, int]],
         settling: float,
     ) -> LineMotion:
-        """Integrate, from the static place with the linear vibration on it, at least ``settling``
-        s before time 0.
+        """Motion from the static deflection with the linear vibration on it.
 
-        What turns out to be too long a step is halved, as a gear pair's, up to ``MOST_STEPS`` a
-        sample.
+        Integration begins at least ``settling`` s before time 0. A step that turns out to be too
+        long is halved, as a gear pair's, up to ``MOST_STEPS`` a sample.
         """
         lead = max(settling, LEAD_SAMPLES / solver.sampling_rate)
         lead = math.ceil(lead * solver.sampling_rate) / solver.sampling_rate
-        turned, speed = (
-            float(one[0]) for one in self.course.nominal(np.array([-lead]))
-        )
-        phasor = np.exp(1j * self.linear.orders * (self.turned + turned))
+        angle, speed = self.course.nominal(np.array([-lead]))
+        phasor = np.exp(1j * self.linear.orders * (self.turned + float(angle[0])))
+        rates = 1j * self.linear.orders * float(speed[0]) * self.linear.angle
         still = static_start(self.line, self.course, self.torques, time=-lead)
-        start = (
-            still + np.real(self.linear.angle @ phasor),
-            np.real((1j * self.linear.orders * speed * self.linear.angle) @ phasor),
-        )
+        start = still + np.real(self.linear.angle @ phasor), np.real(rates @ phasor)
         while True:
             try:
                 return integrate_line(
@@ -183,29 +176,31 @@ def running_line(
     own: Mapping[int, OwnMesh] | None = None,
     turned: float = 0.0,
 ) -> RunningLine:
-    """The line of an engine with what turns and loads it along a course.
+    """The line of an engine with its torques along a course.
 
     Parameters
     ----------
     own : by the place of a mesh its teeth; all others hold the stiffness of the table
-    turned : rad, where the crank stands in its cycle at time 0; all meshes and torques follow from it
+    turned : rad, angle of the crank in its cycle at time 0; all meshes and torques follow from it
 
     Raises
     ------
     ConfigError    for courses that the engine cannot run
     """
     matrices = with_viscous_losses(machine.matrices(merge_rigid=True))
-    first = _tables(machine, matrices, float(course.speed[0]), float(course.torque[0]))
+    speed, torque = float(course.speed[0]), float(course.torque[0])
+    first = _tables(machine, matrices, speed, torque)
     closed, elements = closed_line(matrices)
-    linear = steady_response(closed, first, float(course.speed[0]))
+    linear = steady_response(closed, first, speed)
     mesh_force = linear.element_forces(elements)[0]
+    nominal = constant_speed(speed)
+    if len(course.time) > 1:
+        nominal = LineCourse(time=course.time, speed=course.speed)
     return RunningLine(
         machine=machine,
         matrices=matrices,
         line=_geared(machine, matrices, governor, mesh_force, own or {}, turned),
-        course=constant_speed(float(course.speed[0]))
-        if len(course.time) == 1
-        else LineCourse(time=course.time, speed=course.speed),
+        course=nominal,
         torques=_torques(machine, matrices, course, turned, first),
         linear=linear,
         mesh_force=mesh_force,
@@ -228,12 +223,12 @@ def named_by_side(pair: GearPair) -> GearPair:
     return replace(pair, pinion=pinion, wheel=wheel)
 
 
-def reference_force(machine: EngineLine, place: int, force: float) -> float:
+def reference_force(machine: EngineLine, number: int, force: float) -> float:
     """The force at which a mesh's contact and damping are taken, N.
 
     Its mean, and what closes it by 2 um at least.
     """
-    return max(abs(force), machine.drive.line.meshes[place].stiffness * LEAST_APPROACH)
+    return max(abs(force), machine.drive.line.meshes[number].stiffness * LEAST_APPROACH)
 
 
 def _geared(
@@ -256,8 +251,8 @@ def _geared(
         stiffness=matrices.stiffness + rate**2 * rigid,
         rotation=rotation,
         meshes=tuple(
-            _mesh(machine, matrices, place, float(force), own.get(place), float(roll))
-            for place, (force, roll) in enumerate(zip(forces, phases, strict=True))
+            _mesh(machine, matrices, number, float(force), own.get(number), float(roll))
+            for number, (force, roll) in enumerate(zip(forces, phases, strict=True))
         ),
     )
 
@@ -265,48 +260,43 @@ def _geared(
 def _mesh(
     machine: EngineLine,
     matrices: LineMatrices,
-    place: int,
+    number: int,
     force: float,
     own: OwnMesh | None,
     roll: float,
 ) -> LineMesh:
     drive = machine.drive
-    pair, mesh = drive.pairs[place], drive.line.meshes[place]
-    direction = matrices.directions[place]
-    roll_dof = int(np.argmax(matrices.expand[drive.line.gears[mesh.driving].node]))
-    # so many N s/m under the mean force; a mesh that carries less is damped less
-    damping = float(matrices.mesh_damping[place]) / reference_force(
-        machine, place, force
-    )
-    name, phase = (
-        machine.mesh_names[place],
-        (roll + first_slice_lead(pair)) / pair.base_pitch,
-    )
-    if own is not None:
-        make: Callable[..., LineMesh] = (
-            sliced_pair_mesh if isinstance(own.table, SlicedTable) else pair_mesh
+    pair, mesh = drive.pairs[number], drive.line.meshes[number]
+    reference = reference_force(machine, number, force)
+    phase = (roll + first_slice_lead(pair)) / pair.base_pitch
+    common: dict[str, Any] = {
+        "name": machine.mesh_names[number],
+        "direction": matrices.directions[number],
+        "roll_dof": _dof(matrices, drive.line.gears[mesh.driving].node),
+        # so many N s/m under the mean force; a mesh that carries less is damped less
+        "damping": float(matrices.mesh_damping[number]) / reference,
+        "start_phase": phase,
+    }
+    if own is None:
+        stiffness = float(matrices.mesh_stiffness[number])
+        return phase_mesh(
+            n_teeth=(pair.pinion.n_teeth, pair.wheel.n_teeth),
+            stiffness=np.full((1, CONSTANT_NODES), stiffness),
+            backlash=float(matrices.backlash[number]),
+            mirror=2.0 * pair.pitch_point / pair.base_pitch + 0.5,
+            **common,
         )
-        return make(
-            name,
-            own.table,
-            direction=direction,
-            roll_dof=roll_dof,
-            damping=damping,
-            errors=own.errors,
-            start_teeth=own.start_teeth,
-            start_phase=phase if own.start_phase is None else own.start_phase,
-        )
-    return phase_mesh(
-        name,
-        direction=direction,
-        roll_dof=roll_dof,
-        n_teeth=(pair.pinion.n_teeth, pair.wheel.n_teeth),
-        stiffness=np.full((1, CONSTANT_NODES), float(matrices.mesh_stiffness[place])),
-        backlash=float(matrices.backlash[place]),
-        damping=damping,
-        start_phase=phase,
-        mirror=2.0 * pair.pitch_point / pair.base_pitch + 0.5,
-    )
+    common |= {"errors": own.errors, "start_teeth": own.start_teeth}
+    if own.start_phase is not None:
+        common["start_phase"] = own.start_phase
+    if isinstance(own.table, SlicedTable):
+        return sliced_pair_mesh(table=own.table, **common)
+    return pair_mesh(table=own.table, **common)
+
+
+def _dof(matrices: LineMatrices, number: int) -> int:
+    """Degree of freedom that a node, by its place in the line, turns with."""
+    return int(np.argmax(matrices.expand[number]))
 
 
 def _tables(
@@ -314,7 +304,7 @@ def _tables(
 ) -> Array:
     """Torques on the degrees of freedom over the cycle of the crank, (dof, point) N m."""
     on_nodes = machine.torques(speed, torque).on(machine.drive.numbers)
-    return np.asarray(matrices.expand[: len(on_nodes)].T @ on_nodes)
+    return matrices.expand[: len(on_nodes)].T @ on_nodes
 
 
 def _torques(
@@ -324,52 +314,41 @@ def _torques(
     turned: float,
     first: Array,
 ) -> tuple[ShaftTorque, ...]:
-    """The torques of the engine along a course: between tables at some times they go straight."""
-    rotation, crank = (
-        matrices.rigid[0],
-        abs(float(matrices.rigid[0][_crank(machine, matrices)])),
-    )
-    at = _table_times(course)
-    found: list[ShaftTorque] = []
-    for place, time in enumerate(at):
-        speed, torque = (
-            float(np.interp(time, course.time, one))
-            for one in (course.speed, course.torque)
-        )
-        tables = first if place == 0 else _tables(machine, matrices, speed, torque)
-        share = (
-            np.interp(course.time, at, np.eye(len(at))[place]) if len(at) > 1 else None
-        )
+    """Torques of the engine along a course, straight between tables at some times."""
+    rotation, numbers = matrices.rigid[0], machine.drive.numbers
+    throws = [_dof(matrices, numbers.index(n)) for n in machine.engine.driving_nodes]
+    crank = abs(float(rotation[throws[0]]))
+    knots = _table_times(course)
+    torques: list[ShaftTorque] = []
+    for number, time in enumerate(knots):
+        tables, share = first, None
+        if number > 0:
+            speed = float(np.interp(time, course.time, course.speed))
+            torque = float(np.interp(time, course.time, course.torque))
+            tables = _tables(machine, matrices, speed, torque)
+        if len(knots) > 1:
+            share = np.interp(course.time, knots, np.eye(len(knots))[number])
         least = ROUNDED * float(np.abs(tables).max())
         for dof in np.flatnonzero(np.any(tables != 0.0, axis=1)):
             table, ratio = tables[dof], abs(float(rotation[dof])) / crank
-            constant = np.ptp(table) <= least
-            found.append(
+            if np.ptp(table) <= least:
+                table = table[:1]
+            torques.append(
                 ShaftTorque(
                     dof=int(dof),
-                    table=table[:1] if constant else table,
+                    table=table,
                     period=CYCLE * ratio,
                     phase=turned * ratio % (CYCLE * ratio),
                     factor=share,
                 )
             )
-    if (
-        len(course.time) > 1
-    ):  # what speeds the whole line up comes from the throws, or the motor
-        rise = (
-            float(rotation @ matrices.mass @ rotation)
-            / crank
-            * np.gradient(course.speed / crank, course.time)
-        )
-        driving = machine.engine.driving_nodes
-        for node in driving:
-            throw = int(np.argmax(matrices.expand[machine.drive.numbers.index(node)]))
-            found.append(
-                ShaftTorque(
-                    dof=throw, table=np.array([1.0 / len(driving)]), factor=rise
-                )
-            )
-    return tuple(found)
+    if len(course.time) > 1:
+        # the throws, or the motor, also speed up the whole line
+        inertia = float(rotation @ matrices.mass @ rotation) / crank
+        rise = inertia * np.gradient(course.speed / crank, course.time)
+        even = np.array([1.0 / len(throws)])
+        torques += [ShaftTorque(dof=dof, table=even, factor=rise) for dof in throws]
+    return tuple(torques)
 
 
 def _table_times(course: EngineCourse) -> Array:
@@ -377,35 +356,25 @@ def _table_times(course: EngineCourse) -> Array:
     if len(course.time) == 1:
         return course.time
     greatest = max(float(np.abs(course.torque).max()), 1e-9)
-    steps = np.abs(np.diff(course.speed)) / TABLE_STEP + np.abs(
-        np.diff(course.torque)
-    ) / (TABLE_SHARE * greatest)
-    gone = np.concatenate([[0.0], np.cumsum(steps)])
-    n_tables = min(MOST_TABLES, 1 + math.ceil(gone[-1]))
+    steps = np.abs(np.diff(course.speed)) / TABLE_STEP
+    steps = steps + np.abs(np.diff(course.torque)) / (TABLE_SHARE * greatest)
+    travelled = np.concatenate([[0.0], np.cumsum(steps)])
+    n_tables = min(MOST_TABLES, 1 + math.ceil(travelled[-1]))
     if n_tables < 2:
         return course.time[:1]
-    places = np.searchsorted(gone, np.linspace(0.0, gone[-1], n_tables)[1:-1])
-    return np.asarray(course.time[np.unique([0, *places, len(gone) - 1])])
-
-
-def _crank(machine: EngineLine, matrices: LineMatrices) -> int:
-    return int(
-        np.argmax(
-            matrices.expand[
-                machine.drive.numbers.index(machine.engine.driving_nodes[0])
-            ]
-        )
+    knots_at = np.searchsorted(
+        travelled, np.linspace(0.0, travelled[-1], n_tables)[1:-1]
     )
+    return course.time[np.unique([0, *knots_at, len(travelled) - 1])]
 
 
 def with_supports(
-    machine: EngineLine, place: int, supports: Sequence[object]
+    machine: EngineLine, number: int, supports: Sequence[object]
 ) -> EngineLine:
     """The same with other supports of the two gears of a mesh, driving and driven."""
-    line = machine.drive.line
-    mesh, gears = line.meshes[place], list(line.gears)
+    drive = machine.drive
+    mesh, gears = drive.line.meshes[number], list(drive.line.gears)
     for gear, support in zip((mesh.driving, mesh.driven), supports, strict=True):
         gears[gear] = replace(gears[gear], support=support)  # type: ignore[arg-type]
-    return replace(
-        machine, drive=replace(machine.drive, line=replace(line, gears=tuple(gears)))
-    )
+    line = replace(drive.line, gears=tuple(gears))
+    return replace(machine, drive=replace(drive, line=line))

@@ -1,8 +1,7 @@
-"""The two CSV tables of a drive line: every header with its unit, every mistake with its row and
-column.
+"""The two CSV tables of a drive line.
 
-A row number is that of the line in the file, the header's included. Lines that begin with # are
-notes.
+Headers carry their units; errors name row and column. A row number is that of the line in the
+file, the header's included. Lines that begin with # are notes.
 """
 
 from __future__ import annotations
@@ -25,15 +24,17 @@ LEAST, MOST = 1e-12, 1e15  # SI, of anything but 0
 
 # bare name of a column: the unit that it is shown with, "" for a plain number, None for text
 SHAFTING_COLUMNS: dict[str, str | None] = {
-    "node": "", "inertia": "kg_m2", "speed_ratio": "", "stiffness": "nm_per_rad", "mesh_stiffness": "n_per_m",
-    "edge_from": "", "edge_to": "", "edge_kind": None, "teeth_from": "", "teeth_to": "", "loss_factor": "",
-    "damping": "nms_per_rad", "backlash": "um", "center_line": "deg",
+    "node": "", "inertia": "kg_m2", "speed_ratio": "", "stiffness": "nm_per_rad",
+    "mesh_stiffness": "n_per_m", "edge_from": "", "edge_to": "", "edge_kind": None,
+    "teeth_from": "", "teeth_to": "", "loss_factor": "", "damping": "nms_per_rad",
+    "backlash": "um", "center_line": "deg",
 }  # fmt: skip
 SHAFTING_NEEDED = ("node", "inertia", "edge_from", "edge_to", "edge_kind", "stiffness")
 GEAR_COLUMNS: dict[str, str | None] = {
-    "node": "", "n_teeth": "", "normal_module": "mm", "pressure_angle": "deg", "helix_angle": "deg",
-    "face_width": "mm", "mass": "kg", "profile_shift": "", "bore_radius": "mm", "addendum_coefficient": "",
-    "clearance_coefficient": "", "cutter_tip_radius_coefficient": "",
+    "node": "", "n_teeth": "", "normal_module": "mm", "pressure_angle": "deg",
+    "helix_angle": "deg", "face_width": "mm", "mass": "kg", "profile_shift": "",
+    "bore_radius": "mm", "addendum_coefficient": "", "clearance_coefficient": "",
+    "cutter_tip_radius_coefficient": "",
 }  # fmt: skip
 GEARS_NEEDED = (
     "node",
@@ -55,11 +56,13 @@ class TableRow:
     cells: Mapping[str, str]
 
     def place(self, column: str = "") -> str:
-        """Where this is, for a message."""
-        node = f" (node {self.cells['node']})" if self.cells.get("node") else ""
-        return f"{self.table}, row {self.line}{node}" + (
-            f", column {self.headers.get(column, column)}" if column else ""
-        )
+        """Place of a cell, or of the row, for a message."""
+        place = f"{self.table}, row {self.line}"
+        if node := self.text("node"):
+            place += f" (node {node})"
+        if column:
+            place += f", column {self.headers.get(column, column)}"
+        return place
 
     def text(self, column: str) -> str:
         """A cell as it is, empty where there is none."""
@@ -92,10 +95,12 @@ class TableRow:
             )
         return value
 
-    def not_negative(self, column: str) -> float | None:
-        """A number of at least 0, None where the cell is empty."""
+    def not_negative(self, column: str, default: float) -> float:
+        """A number of at least 0, the default where the cell is empty."""
         value = self.number(column)
-        if value is not None and value < 0.0:
+        if value is None:
+            return default
+        if value < 0.0:
             raise ConfigError(
                 f"{self.place(column)}: {self.text(column)} must not be negative"
             )
@@ -111,6 +116,13 @@ class TableRow:
                 f"{self.place(column)}: {self.text(column)} must be a whole number of at least 1"
             )
         return round(value)
+
+    def error(self, error: Exception, placed: str) -> ConfigError:
+        """An error as it is if it names this table, else the text that does."""
+        text = str(error)
+        if text.startswith(self.table):
+            return ConfigError(text)
+        return ConfigError(placed)
 
     def given(self, column: str, value: float | None) -> float:
         """The value of a cell that must not be empty."""
@@ -141,18 +153,17 @@ def _tables() -> resources.abc.Traversable:  # type: ignore[name-defined]
 
 
 def _text_of(key: str, file: str) -> str:
-    """What a file holds: a bare name is one of the shipped tables, anything else a path."""
-    bare = file if file.endswith(".csv") else f"{file}.csv"
+    """Text of a file: a bare name is one of the shipped tables, anything else a path."""
+    bare = file.removesuffix(".csv") + ".csv"
     if bare in shipped_tables():
         return str(_tables().joinpath(bare).read_text(encoding="utf-8"))
     try:
         return Path(file).expanduser().read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        reason = (
-            error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
-        )
+        reason = getattr(error, "strerror", "it is no text in UTF-8")
         raise ConfigError(
-            f"{key} = {file} cannot be read: {reason}; give a path, or one of {', '.join(shipped_tables())}"
+            f"{key} = {file} cannot be read: {reason}; give a path, or one of "
+            f"{', '.join(shipped_tables())}"
         ) from None
 
 
@@ -199,7 +210,8 @@ def _cells(place: str, line: str) -> list[str]:
         (row,) = csv.reader([line], strict=True)
     except csv.Error:
         raise ConfigError(
-            f"{place}: a double quote is open or out of place; give cells between commas, text with commas in quotes"
+            f"{place}: a double quote is open or out of place; give cells between "
+            "commas, text with commas in quotes"
         ) from None
     return [cell.strip() for cell in row]
 
@@ -242,7 +254,8 @@ def _column(place: str, written: str, columns: Mapping[str, str | None]) -> str:
     if shown and suffix is not None:
         if UNITS[suffix][1] != UNITS[shown][1]:
             raise ConfigError(
-                f"{place}: {UNITS[suffix][1]}, not {UNITS[shown][1]}; write {_choices(bare, columns)}"
+                f"{place}: {UNITS[suffix][1]}, not {UNITS[shown][1]}; write "
+                f"{_choices(bare, columns)}"
             )
         return bare
     for name, unit in columns.items():  # a unit that there is not
@@ -251,16 +264,14 @@ def _column(place: str, written: str, columns: Mapping[str, str | None]) -> str:
                 f"{place}: no unit known here; write {_choices(name, columns)}"
             )
     close = difflib.get_close_matches(written, [*_shown(columns), *columns], n=1)
-    hint = (
-        f"did you mean {close[0]}?"
-        if close
-        else f"known: {', '.join(_shown(columns))}, and name or note for text"
-    )
+    hint = f"known: {', '.join(_shown(columns))}, and name or note for text"
+    if close:
+        hint = f"did you mean {close[0]}?"
     raise ConfigError(f"{place}: unknown; {hint}")
 
 
 def _suffixed(name: str, unit: str | None) -> str:
-    return f"{name}_{unit}" if unit else name
+    return f"{name}_{unit or ''}".removesuffix("_")
 
 
 def _shown(columns: Mapping[str, str | None]) -> list[str]:

@@ -1,6 +1,6 @@
-"""A run-up and a run-down of an engine's drive line in time, its teeth free to part.
+"""Run-up and run-down of an engine's drive line in time, its teeth free to part.
 
-Orders, spectra, tooth forces.
+Orders, spectra and tooth forces by the speed of the crank.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -17,32 +18,30 @@ from gensig.driveline.cycle_statistics import (
     fluctuations,
     order_amplitudes,
     typical_extremes,
+    without_trend,
 )
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.cycle import CYCLE
 from gensig.driveline.in_time import (
     GOVERNOR,
-    MOST_ENERGY_RESIDUAL,
     RATE,
     SETTLING,
-    STEPS,
+    SOLVER,
 )
 from gensig.driveline.running import EngineCourse, OwnMesh, running_line
-from gensig.driveline.time.newmark import LineMotion, LineSolver
+from gensig.driveline.time.newmark import LineMotion
 from gensig.errors import ConfigError
 
 Array = NDArray[np.float64]
 
 KNOT = 0.02  # s between the knots of the course
 MOST_BINS = 44  # of speed: 25 r/min over 650 to 1750 r/min
-LEAST_CYCLES = (
-    2.2  # of the crank at its lowest speed in a bin: two whole ones wherever they begin
-)
+# of the crank at its lowest speed in a bin: two whole ones wherever they begin
+LEAST_CYCLES = 2.2
 SPECTRUM_WINDOW = 0.5  # s, Hann: 4 Hz wide at half height
 SPECTRUM_HZ = 700.0
-APART = (
-    3.0  # standard errors of the difference, beyond which up and down are told apart
-)
+# standard errors of the difference, beyond which up and down differ
+APART = 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -78,11 +77,11 @@ class Sweep:
     def difference(self) -> Array:
         """Fluctuation up less down over their mean, (node, bin)."""
         up, down = self.up.fluctuation, self.down.fluctuation
-        return np.asarray(2.0 * (up - down) / (up + down))
+        return 2.0 * (up - down) / (up + down)
 
     @property
     def told_apart(self) -> Array:
-        """Where up and down differ by more than their cycles scatter, (node, bin) of bool."""
+        """True where up and down differ by more than their cycles scatter, (node, bin)."""
         error = np.hypot(self.up.scatter, self.down.scatter)
         return np.asarray(
             np.abs(self.up.fluctuation - self.down.fluctuation) > APART * error
@@ -126,46 +125,30 @@ def sweep_response(
     if n_bins < 2:
         least = 2.0 * CYCLE * LEAST_CYCLES / low
         raise ConfigError(
-            f"a sweep in {seconds:g} s passes too few cycles at its low end; give {least:.2g} s or more"
+            f"a sweep in {seconds:g} s passes too few cycles at its low end; give "
+            f"{least:.2g} s or more"
         )
     course = sweep_course(low, high, seconds, torque)
-    course = replace(
-        course,
-        torque=machine.load_at(torque, course.speed / machine.engine.reference.speed),
-    )
+    share = course.speed / machine.engine.reference.speed
+    course = replace(course, torque=machine.load_at(torque, share))
     line = running_line(machine, course, governor=GOVERNOR, own=own)
-    solver = LineSolver(
-        sampling_rate=RATE, oversampling=STEPS, max_energy_residual=MOST_ENERGY_RESIDUAL
-    )
     names = [(kind, line.dof(node)) for kind in ("angle", "speed") for node in nodes]
-    names += [("mesh_force", place) for place in range(len(machine.mesh_names))]
+    names += [("mesh_force", number) for number in range(len(machine.mesh_names))]
     motion = line.run(
-        solver,
+        SOLVER,
         duration=2.0 * seconds,
         channels=list(dict.fromkeys(names)),
         settling=SETTLING,
     )
     signals = np.array([motion.signals[name] for name in names])
     edges = seconds * np.arange(n_bins + 1) / n_bins
-    rise = (high - low) / seconds
+    gained = 0.5 * ((high - low) / seconds) * (edges[1:] + edges[:-1])
+    back = (2.0 * seconds - edges)[::-1]
+    way = partial(_way, motion, signals, len(nodes), n_orders)
     return Sweep(
         seconds=seconds,
-        up=_way(
-            motion,
-            signals,
-            len(nodes),
-            edges,
-            low + 0.5 * rise * (edges[1:] + edges[:-1]),
-            n_orders,
-        ),
-        down=_way(
-            motion,
-            signals,
-            len(nodes),
-            (2.0 * seconds - edges)[::-1],
-            high - 0.5 * rise * (edges[1:] + edges[:-1]),
-            n_orders,
-        ),
+        up=way(edges, low + gained),
+        down=way(back, high - gained),
         energy_residual=motion.energy_residual,
     )
 
@@ -174,18 +157,16 @@ def _way(
     motion: LineMotion,
     signals: Array,
     n_nodes: int,
+    n_orders: int,
     edges: Array,
     speeds: Array,
-    n_orders: int,
 ) -> SweepWay:
     """One way: ``edges`` (bin + 1,) s of its bins, ``speeds`` (bin,) in their middles."""
     found: dict[str, list[Array]] = {
         key: [] for key in ("angle", "mean", "scatter", "force", "spectra")
     }
-    frequencies, n_window = (
-        np.zeros(0),
-        min(round(SPECTRUM_WINDOW * RATE), signals.shape[1]),
-    )
+    frequencies = np.zeros(0)
+    n_window = min(round(SPECTRUM_WINDOW * RATE), signals.shape[1])
     for begin, end in pairwise(edges):
         inside = slice(math.ceil(begin * RATE), math.floor(end * RATE))
         crank, part = motion.nominal_angle[inside], signals[:, inside]
@@ -225,11 +206,9 @@ def amplitude_spectra(
     Under Hann's window, straight trends taken off; a steady line has its amplitude.
     """
     n_samples = signals.shape[1]
-    base = np.vander(np.linspace(-1.0, 1.0, n_samples), 2)
-    rest = signals - (base @ np.linalg.lstsq(base, signals.T, rcond=None)[0]).T
+    rest = without_trend(signals, np.linspace(-1.0, 1.0, n_samples))
     window = np.hanning(n_samples)
     frequencies = np.asarray(np.fft.rfftfreq(n_samples, 1.0 / RATE), dtype=np.float64)
     shown = frequencies <= highest
-    return frequencies[shown], np.asarray(
-        2.0 / window.sum() * np.abs(np.fft.rfft(rest * window))[:, shown]
-    )
+    amplitudes = 2.0 / window.sum() * np.abs(np.fft.rfft(rest * window))
+    return frequencies[shown], amplitudes[:, shown]

@@ -68,11 +68,14 @@ def node_of(
         ]
         if not own:
             raise ConfigError(
-                f"{row.place('inertia')}: it is empty and node {number} has no gear to derive it from"
+                f"{row.place('inertia')}: it is empty and node {number} has no gear "
+                "to derive it from"
             )
         inertia = sum(_disc(shape, material)[1] for shape in own)
     if number == options.viscous_damper_node:
-        inertia *= 0.5  # Den Hartog, Mechanical Vibrations: at the best damping J + J_ring / 2 meets the fixed point
+        # Den Hartog, Mechanical Vibrations: at the best damping J + J_ring / 2 meets the fixed
+        # point
+        inertia *= 0.5
     return Node(
         name=row.text("name") or f"node {number}",
         inertia=inertia,
@@ -107,7 +110,7 @@ def gear_of(row: TableRow) -> Gear:
         "cutter_tip_radius_coefficient": 0.38,
         "bore_radius": 0.25 * module * n_teeth / math.cos(helix),
     }
-    given = {key: row.number(key) for key in defaults}
+    given = {key: row.number(key) for key in defaults if row.text(key)}
     try:
         return Gear(
             name=row.text("name") or f"gear on node {row.text('node')}",
@@ -116,16 +119,10 @@ def gear_of(row: TableRow) -> Gear:
             helix_angle=abs(helix),
             pressure_angle=row.given("pressure_angle", row.number("pressure_angle")),
             face_width=row.given("face_width", row.positive("face_width")),
-            **{
-                key: default if given[key] is None else given[key]
-                for key, default in defaults.items()
-            },  # type: ignore[arg-type]
+            **defaults | given,  # type: ignore[arg-type]
         )
     except GensigError as error:
-        message = str(error)
-        raise ConfigError(
-            message if message.startswith(row.table) else f"{row.place()}: {message}"
-        ) from None
+        raise row.error(error, f"{row.place()}: {error}") from None
 
 
 def line_gear(
@@ -144,13 +141,16 @@ def line_gear(
             f"{row.place('node')}: {options.shafting_csv} has no node {number}"
         )
     mass = row.positive("mass") or _disc(shape, material)[0]
+    support = None
+    if options.lateral:
+        support = options.support.under(mass, material)
     return LineGear(
         name=shape.name,
         node=numbers.index(number),
         n_teeth=shape.n_teeth,
         base_radius=shape.base_radius,
         mass=mass,
-        support=options.support.under(mass, material) if options.lateral else None,
+        support=support,
     )
 
 
@@ -182,7 +182,7 @@ def ends_of(row: TableRow, numbers: tuple[int, ...]) -> tuple[int, int] | None:
 
 
 def shaft_of(row: TableRow, ends: tuple[int, int], losses: LossFactors) -> Shaft:
-    """What joins two nodes of one speed: a shaft, a coupling or a rigid compound."""
+    """A joint of two nodes of one speed: a shaft, a coupling or a rigid compound."""
     kind = row.text("edge_kind")
     for column in ("teeth_from", "teeth_to", "mesh_stiffness", "backlash"):
         if row.text(column):
@@ -193,14 +193,13 @@ def shaft_of(row: TableRow, ends: tuple[int, int], losses: LossFactors) -> Shaft
     if kind != "rigid":
         row.given("stiffness", stiffness)
     usual = {"shaft": losses.shaft, "coupling": losses.coupling, "rigid": 0.0}[kind]
-    own = row.not_negative("loss_factor")
     return Shaft(
         first=ends[0],
         second=ends[1],
         stiffness=stiffness,
         rigid=kind == "rigid",
-        damping=row.not_negative("damping") or 0.0,
-        loss_factor=usual if own is None else own,
+        damping=row.not_negative("damping", 0.0),
+        loss_factor=row.not_negative("loss_factor", usual),
         place=row.place("edge_to"),
     )
 
@@ -221,28 +220,24 @@ def mesh_of(
         _gear_at(row, node, numbers[node], end, gears, options)
         for node, end in zip(ends, ("from", "to"), strict=True)
     )
-    own_backlash = row.not_negative("backlash")
-    backlash = options.backlash if own_backlash is None else own_backlash
+    backlash = row.not_negative("backlash", options.backlash)
     try:
         wheel = replace(shapes[driven], helix_angle=-shapes[driven].helix_angle)
         pair = GearPair(pinion=shapes[driving], wheel=wheel, backlash=backlash)
         stiffness = _mesh_stiffness(row, pair)
     except GensigError as error:
-        text = str(error)
-        named = f"{gears[driving].name} and {gears[driven].name}: {text}"
-        raise ConfigError(
-            text if text.startswith(row.table) else f"{row.place('edge_to')}: {named}"
-        ) from None
+        names = f"{gears[driving].name} and {gears[driven].name}"
+        raise row.error(error, f"{row.place('edge_to')}: {names}: {error}") from None
     if row.text("damping"):
         raise ConfigError(
-            f"{row.place('damping')}: torsional damping is of shafts; a gear_mesh has its loss_factor"
+            f"{row.place('damping')}: torsional damping is of shafts; a gear_mesh has "
+            "its loss_factor"
         )
-    own = row.not_negative("loss_factor")
     return pair, GearMesh(
         driving=driving,
         driven=driven,
         stiffness=stiffness,
-        loss_factor=options.loss_factor.gear_mesh if own is None else own,
+        loss_factor=row.not_negative("loss_factor", options.loss_factor.gear_mesh),
         backlash=backlash,
         center_line=row.number("center_line") or 0.0,
         pressure_angle=pair.working_pressure_angle,
@@ -255,7 +250,8 @@ def _mesh_stiffness(row: TableRow, pair: GearPair) -> float:
     torsional, linear = row.positive("stiffness"), row.positive("mesh_stiffness")
     if torsional is not None and linear is not None:
         raise ConfigError(
-            f"{row.place('mesh_stiffness')}: the row has a torsional stiffness too; give one of them"
+            f"{row.place('mesh_stiffness')}: the row has a torsional stiffness too; "
+            "give one of them"
         )
     if torsional is not None:
         return torsional / (pair.pinion.base_radius * pair.wheel.base_radius)
@@ -288,7 +284,8 @@ def _gear_at(
         )
     if not there:
         raise ConfigError(
-            f"{row.place(f'edge_{end}')}: system.gears_csv = {options.gears_csv} has no gear on node {number}"
+            f"{row.place(f'edge_{end}')}: system.gears_csv = {options.gears_csv} has "
+            f"no gear on node {number}"
         )
     meant = [place for place in there if n_teeth in (None, gears[place].n_teeth)]
     if not meant:
@@ -296,11 +293,13 @@ def _gear_at(
             f"{gears[place].name} with {gears[place].n_teeth}" for place in there
         )
         raise ConfigError(
-            f"{row.place(f'teeth_{end}')}: {n_teeth}, but on node {number} the gears table has {has} teeth"
+            f"{row.place(f'teeth_{end}')}: {n_teeth}, but on node {number} the gears "
+            f"table has {has} teeth"
         )
     if len(meant) > 1:
         raise ConfigError(
-            f"{row.place(f'teeth_{end}')}: node {number} has {len(meant)} such gears; say which by teeth"
+            f"{row.place(f'teeth_{end}')}: node {number} has {len(meant)} such gears; "
+            "say which by teeth"
         )
     return meant[0]
 
@@ -321,12 +320,15 @@ def check_whole(
     """Raise for a line that falls apart, and for speed ratios that the teeth contradict."""
     if len(line.parts) > 1:
         lost = line.parts[1]
-        named = ", ".join(str(numbers[node]) for node in lost[:5]) + (
-            ", ..." if len(lost) > 5 else ""
+        named = ", ".join(
+            [str(numbers[node]) for node in lost[:5]] + ["..."] * (len(lost) > 5)
         )
+        plural = "s" * (len(lost) > 1)
         raise ConfigError(
-            f"{rows[lost[0]].place('edge_from')}: nothing joins node{'s' if len(lost) > 1 else ''} {named} to node "
-            f"{numbers[0]}: the line falls into {len(line.parts)} parts with a rigid mode each; join them"
+            f"{rows[lost[0]].place('edge_from')}: nothing joins "
+            f"node{plural} {named} to node "
+            f"{numbers[0]}: the line falls into {len(line.parts)} parts with a rigid "
+            "mode each; join them"
         )
     for row, number, ratio in zip(rows, numbers, np.abs(line.speed_ratio), strict=True):
         given = row.positive("speed_ratio")
@@ -334,6 +336,7 @@ def check_whole(
             given, ratio, rel_tol=RATIO_TOLERANCE
         ):
             raise ConfigError(
-                f"{row.place('speed_ratio')}: {given:g} contradicts the tooth counts, by which node {number} turns at "
+                f"{row.place('speed_ratio')}: {given:g} contradicts the tooth counts, "
+                f"by which node {number} turns at "
                 f"{ratio:.6g} of node {numbers[0]}"
             )

@@ -31,8 +31,10 @@ from gensig.sensing.manufacturing import Specimen
 
 Array = NDArray[np.float64]
 
-SOUND_NODES = 128  # most of a pitch of sound helical teeth: short tables are read faster, and these ripple slowly
-FORCES_PER_OCTAVE = 2  # at which sound helical teeth are tabulated: chords reach over all depths of bite
+# most of a pitch of sound helical teeth: short tables are read faster, and these ripple slowly
+SOUND_NODES = 128
+# at which sound helical teeth are tabulated: chords reach over all depths of bite
+FORCES_PER_OCTAVE = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,44 +78,45 @@ def require_drive(pair: GearPair, slices: SliceOptions) -> None:
         pair.require_continuous_drive()
     elif slices.slices_in_phase:
         raise ConfigError(
-            "mesh.slices_in_phase = true is for comparing statics; a line has the helix in: take false"
+            "mesh.slices_in_phase = true is for comparing statics; a line has the "
+            "helix in: take false"
         )
     elif pair.total_contact_ratio < 1.0:
         raise GeometryError(
-            f"the total contact ratio {pair.total_contact_ratio:.4f} is below 1, so the drive is interrupted at every "
+            f"the total contact ratio {pair.total_contact_ratio:.4f} is below 1, so "
+            "the drive is interrupted at every "
             f"tooth; use more teeth, a wider face or a larger helix angle"
         )
 
 
 def sound_meshes(
-    machine: EngineLine, law: ToothLaw, forces: Array, *, besides: Collection[int] = ()
+    machine: EngineLine, law: ToothLaw, forces: Array, *, left_out: Collection[int] = ()
 ) -> dict[int, OwnMesh]:
     """Sound teeth of the meshes by their place, each under its mean force of ``forces`` (mesh,) N.
 
-    Helical meshes only with ``system.helical_meshes=sliced``; those of ``besides`` are left out.
+    Helical meshes only with ``system.helical_meshes=sliced``; those of ``left_out`` are left out.
     """
     n_nodes = min(law.options.points_per_pitch, SOUND_NODES)
     thin = replace(law, options=replace(law.options, points_per_pitch=n_nodes))
-    found = {}
-    for place, pair in enumerate(machine.drive.pairs):
-        if place not in besides and (
-            machine.drive.slices_helical or pair.pinion.helix_angle == 0.0
-        ):
-            own = law if pair.pinion.helix_angle == 0.0 else thin
-            found[place] = OwnMesh(
-                table=_table_in_line(machine, own, place, (), float(forces[place]))
-            )
-    return found
+    meshes = {}
+    for number, pair in enumerate(machine.drive.pairs):
+        is_helical = pair.pinion.helix_angle != 0.0
+        if number in left_out or (is_helical and not machine.drive.slices_helical):
+            continue
+        law_of_pair = (law, thin)[is_helical]
+        table = _table_in_line(machine, law_of_pair, number, (), float(forces[number]))
+        meshes[number] = OwnMesh(table=table)
+    return meshes
 
 
 def _table_in_line(
     machine: EngineLine,
     law: ToothLaw,
-    place: int,
+    number: int,
     faults: tuple[Fault, ...],
     force: float,
 ) -> PairTable | SlicedTable:
-    pair, force = machine.drive.pairs[place], reference_force(machine, place, force)
+    pair, force = machine.drive.pairs[number], reference_force(machine, number, force)
     require_drive(pair, law.slices)
     if pair.pinion.helix_angle:
         force = 2.0 ** (
@@ -122,24 +125,26 @@ def _table_in_line(
     return tooth_table(law, named_by_side(pair), faults, force)
 
 
-def neighbours(drive: DriveLine, place: int) -> dict[int, tuple[int, int]]:
+def neighbours(drive: DriveLine, number: int) -> dict[int, tuple[int, int]]:
     """Other meshes of the two gears of a mesh.
 
     By place, the side of the gear in this mesh and in the other one.
     """
-    found, own = {}, (drive.line.meshes[place].driving, drive.line.meshes[place].driven)
+    meshes_of = {}
+    followed = drive.line.meshes[number]
+    gears = followed.driving, followed.driven
     for other, mesh in enumerate(drive.line.meshes):
         for there, gear in enumerate((mesh.driving, mesh.driven)):
-            if other != place and gear in own:
-                found[other] = own.index(gear), there
-    return found
+            if other != number and gear in gears:
+                meshes_of[other] = gears.index(gear), there
+    return meshes_of
 
 
 def neighbour_meshes(
     machine: EngineLine,
     law: ToothLaw,
     forces: Array,
-    place: int,
+    number: int,
     start: ToothStart,
     *,
     faults: Sequence[Fault],
@@ -154,26 +159,30 @@ def neighbour_meshes(
     which are without errors, and feel of the faults what ``Fault.on_other_flank`` says. Mates are
     perfect.
     """
-    found = {}
-    for other, (here, there) in neighbours(machine.drive, place).items():
-        seen = [one for one in (*specimen.forms, *faults) if one.gear == SIDES[here]]
-        seen = [one for one in seen if not one.of_mounting]
+    meshes_of = {}
+    for other, (here, there) in neighbours(machine.drive, number).items():
+        features = [
+            feature
+            for feature in (*specimen.forms, *faults)
+            if feature.gear == SIDES[here] and not feature.of_mounting
+        ]
         errors = [np.zeros(gear.n_teeth) for gear in _gears(machine.drive.pairs[other])]
         if here == there:
-            errors[there] = specimen.wheel_error if here else specimen.pinion_error
+            errors[there] = (specimen.pinion_error, specimen.wheel_error)[here]
         else:
-            seen = [felt for one in seen if (felt := one.on_other_flank()) is not None]
-        carried = tuple(replace(one, gear=SIDES[there]) for one in seen)
+            other_flanks = [feature.on_other_flank() for feature in features]
+            features = [flank for flank in other_flanks if flank is not None]
+        carried = tuple(replace(feature, gear=SIDES[there]) for feature in features)
         teeth = [0, 0]
         teeth[there] = tooth_there(
-            machine.drive, (place, here), (other, there), start, turned
+            machine.drive, (number, here), (other, there), start, turned
         )
-        found[other] = OwnMesh(
+        meshes_of[other] = OwnMesh(
             table=_table_in_line(machine, law, other, carried, float(forces[other])),
             errors=(errors[0], errors[1]),
             start_teeth=(teeth[0], teeth[1]),
         )
-    return found
+    return meshes_of
 
 
 def tooth_there(
@@ -203,10 +212,10 @@ def tooth_there(
         tooth_angle=angle,
         pitch_point=_pitch_point(drive, there[0]),
     )
-    place, pair = there[0], drive.pairs[there[0]]
+    number, pair = there[0], drive.pairs[there[0]]
     # where the line says that a tooth is; play and profile shift move it by some hundredths of a
     # pitch
-    in_place = float(start_rolls(drive, turned)[place]) / pair.base_pitch
+    in_place = float(start_rolls(drive, turned)[number]) / pair.base_pitch
     return round(tooth + phase - in_place) % n_teeth
 
 
@@ -214,13 +223,13 @@ def _gears(pair: GearPair) -> tuple:
     return pair.pinion, pair.wheel
 
 
-def _pitch_point(drive: DriveLine, place: int) -> float:
-    return drive.pairs[place].pitch_point / drive.pairs[place].base_pitch
+def _pitch_point(drive: DriveLine, number: int) -> float:
+    return drive.pairs[number].pitch_point / drive.pairs[number].base_pitch
 
 
-def _mate_angle(drive: DriveLine, place: int, side: int) -> float:
+def _mate_angle(drive: DriveLine, number: int, side: int) -> float:
     """From a gear's centre to its mate's, counted as the gear turns, rad."""
-    mesh, gears = drive.line.meshes[place], drive.line.gears
+    mesh, gears = drive.line.meshes[number], drive.line.gears
     gear = (mesh.driving, mesh.driven)[side]
     sense = math.copysign(1.0, drive.line.speed_ratio[gears[gear].node])
     return sense * (mesh.center_line + side * math.pi)

@@ -21,7 +21,9 @@ BASE_RADIUS = 0.081 * np.cos(
 
 
 def test_the_table_reader_and_plain_arrays_give_the_same_response():
-    """The tests' own line, from the table's torsional stiffnesses, against the one that the program builds."""
+    """The tests' own line, from the table's torsional stiffnesses, against the one that the
+    program builds.
+    """
     case = read_forced_case(("system=engine_gear_train", "excitation=engine_v20"))
     own = response_of(option())
     assert_allclose(case.response.fluctuation(), own.fluctuation(), rtol=1e-6)
@@ -48,7 +50,9 @@ def test_flywheel_is_in_the_range_of_an_independent_estimate(damper):
 
 
 def test_firing_orders_span_the_estimate_at_every_place():
-    """Crank gear 46 to 54 and pump end 28 r/min from the engine alone: near the middle of what firing orders do."""
+    """Crank gear 46 to 54 and pump end 28 r/min from the engine alone: near the middle of what
+    firing orders do.
+    """
     alone, rng, found = option(injection_pump=None), np.random.default_rng(0), []
     for _ in range(24):
         order = (1, *(int(one) for one in rng.permutation(np.arange(2, 11))))
@@ -77,7 +81,8 @@ def test_order_1_dominates_at_the_flywheel_near_the_first_mode():
         )
         for rpm in speeds
     ]
-    # 28.3 Hz at order 1 is 1699 r/min; with 7 % of damping the speed's peak lies above it, inside the range run
+    # 28.3 Hz at order 1 is 1699 r/min; with 7 % of damping the speed's peak lies above it,
+    # inside the range run
     assert 1690.0 <= speeds[np.argmax(at_order_1)] <= 1750.0
 
 

@@ -1,4 +1,6 @@
-"""The rows that ``gensig validate`` reads: unique, explained, able to fail. The verdicts: test_validation_document."""
+"""The rows that ``gensig validate`` reads: unique, explained, able to fail. The verdicts:
+test_validation_document.
+"""
 
 import re
 from dataclasses import replace

@@ -75,7 +75,8 @@ class Cam:
             )
         if (self.follower == "roller") != (self.roller_radius > 0.0):
             raise ConfigError(
-                f"cam.roller_radius_mm = {self.roller_radius * 1e3:g} with follower = {self.follower}; a roller has a "
+                f"cam.roller_radius_mm = {self.roller_radius * 1e3:g} with follower = "
+                f"{self.follower}; a roller has a "
                 "radius, a flat follower none (0)"
             )
 
@@ -119,10 +120,11 @@ def follower_force(
     force = np.where(on, spring + cam.moving_mass * speed**2 * curvature + load, 0.0)
     if force.min() < 0.0:
         raise ConfigError(
-            f"the follower leaves its cam at {speed * 30.0 / math.pi:.4g} r/min of the camshaft: the spring lacks "
+            f"the follower leaves its cam at {speed * 30.0 / math.pi:.4g} r/min of "
+            "the camshaft: the spring lacks "
             f"{-force.min():.4g} N; raise spring_preload_n or spring_rate_n_per_m"
         )
-    return np.asarray(force)
+    return force
 
 
 def cam_torque(
@@ -137,11 +139,12 @@ def cam_torque(
 
     Notes
     -----
-    Eq. (20) of the engine paper for a flat follower, F_z e + F_s (h + R_1): its contact is e = dh/da off the axis. For
-    a roller eq. (21), F (r_0 + r_1 + h) tan a_3, with F the force along the plunger (the paper's text says the side
-    force), is F dh/da: tan a_3 = (dh/da) / (r_0 + r_1 + h). Friction always opposes the rotation.
+    Eq. (20) of the engine paper for a flat follower, F_z e + F_s (h + R_1): its contact is e =
+    dh/da off the axis. For a roller eq. (21), F (r_0 + r_1 + h) tan a_3, with F the force along
+    the plunger (the paper's text says the side force), is F dh/da: tan a_3 = (dh/da) / (r_0 +
+    r_1 + h). Friction always opposes the rotation.
     """
     force = follower_force(cam, angle, speed, load)
     lift, slope, _ = cam.motion(angle)
     friction = cam.friction_coefficient * force * (cam.base_radius + lift)
-    return np.asarray(-(force * slope + friction))
+    return -(force * slope + friction)

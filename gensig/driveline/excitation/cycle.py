@@ -46,16 +46,19 @@ class Cylinder:
                 )
         if not 0.0 < self.crank_to_rod_ratio < 1.0:
             raise ConfigError(
-                f"excitation.cylinder.crank_to_rod_ratio = {self.crank_to_rod_ratio:g} must lie between 0 and 1; "
+                "excitation.cylinder.crank_to_rod_ratio = "
+                f"{self.crank_to_rod_ratio:g} must lie between 0 and 1; "
                 "it is the crank's radius over the length of the connecting rod"
             )
         if not self.compression_ratio > 1.0:
             raise ConfigError(
-                f"excitation.cylinder.compression_ratio = {self.compression_ratio:g} must be above 1"
+                f"excitation.cylinder.compression_ratio = {self.compression_ratio:g} "
+                "must be above 1"
             )
         if not self.reciprocating_mass >= 0.0:
             raise ConfigError(
-                f"excitation.cylinder.reciprocating_mass_kg = {self.reciprocating_mass:g} must not be negative"
+                "excitation.cylinder.reciprocating_mass_kg = "
+                f"{self.reciprocating_mass:g} must not be negative"
             )
 
     @property
@@ -76,7 +79,7 @@ class Cylinder:
     def volume(self, angle: Array) -> Array:
         """Volume of the gas, m3, at crank angles in rad."""
         clearance = self.swept_volume / (self.compression_ratio - 1.0)
-        return np.asarray(clearance + self.piston_area * self.piston_travel(angle))
+        return clearance + self.piston_area * self.piston_travel(angle)
 
     def piston_travel(self, angle: Array) -> Array:
         """Way of the piston from top dead center, m.
@@ -85,15 +88,13 @@ class Cylinder:
         """
         ratio = self.crank_to_rod_ratio
         rod = np.sqrt(1.0 - np.square(ratio * np.sin(angle)))
-        return np.asarray(
-            self.crank_radius * (1.0 - np.cos(angle) + (1.0 - rod) / ratio)
-        )
+        return self.crank_radius * (1.0 - np.cos(angle) + (1.0 - rod) / ratio)
 
     def piston_rate(self, angle: Array) -> Array:
         """Slope dx/da, m/rad."""
         ratio, sine, cosine = self.crank_to_rod_ratio, np.sin(angle), np.cos(angle)
         rod = np.sqrt(1.0 - np.square(ratio * sine))
-        return np.asarray(self.crank_radius * (sine + ratio * sine * cosine / rod))
+        return self.crank_radius * (sine + ratio * sine * cosine / rod)
 
     def piston_curvature(self, angle: Array) -> Array:
         """Second slope d2x/da2, m/rad2."""
@@ -102,7 +103,7 @@ class Cylinder:
         bend = (np.square(cosine) - np.square(sine)) / rod + np.square(
             ratio * sine * cosine
         ) / rod**3
-        return np.asarray(self.crank_radius * (cosine + ratio * bend))
+        return self.crank_radius * (cosine + ratio * bend)
 
 
 def gas_torque(
@@ -118,10 +119,11 @@ def gas_torque(
 
     Notes
     -----
-    By virtual work, so that its mean over the cycle is the work over 4 pi. Same as eq. (18) of the engine paper,
-    pi/4 D^2 R times the tangential pressure. Assumes a piston pin on the cylinder's axis.
+    By virtual work, so that its mean over the cycle is the work over 4 pi. Same as eq. (18) of
+    the engine paper, pi/4 D^2 R times the tangential pressure. Assumes a piston pin on the
+    cylinder's axis.
     """
-    return np.asarray(
+    return (
         (pressure - crankcase_pressure)
         * cylinder.piston_area
         * cylinder.piston_rate(angle)
@@ -139,13 +141,14 @@ def inertia_torque(cylinder: Cylinder, angle: Array, speed: float) -> Array:
 
     Notes
     -----
-    Its series to l^2 is m R^2 w^2 (l/4 sin a - 1/2 sin 2a - 3l/4 sin 3a - l^2/4 sin 4a): eq. (19) of the engine paper
-    without the minus printed before it, which makes it the torque that the mass opposes to the rotation. It is the
-    derivative of a periodic energy and does no work over a turn. The mean of the mass's varying inertia is taken to
-    be in the inertia of the throw; that it varies with the vibration is left out.
+    Its series to l^2 is m R^2 w^2 (l/4 sin a - 1/2 sin 2a - 3l/4 sin 3a - l^2/4 sin 4a): eq.
+    (19) of the engine paper without the minus printed before it, which makes it the torque that
+    the mass opposes to the rotation. It is the derivative of a periodic energy and does no work
+    over a turn. The mean of the mass's varying inertia is taken to be in the inertia of the
+    throw; that it varies with the vibration is left out.
     """
     rate, curvature = cylinder.piston_rate(angle), cylinder.piston_curvature(angle)
-    return np.asarray(-cylinder.reciprocating_mass * speed**2 * rate * curvature)
+    return -cylinder.reciprocating_mass * speed**2 * rate * curvature
 
 
 def cycle_angles(n_points: int) -> Array:
@@ -158,4 +161,4 @@ def delayed(torque: Array, delay: float) -> Array:
     angle later, (point,).
     """
     angle = cycle_angles(len(torque))
-    return np.asarray(np.interp(angle - delay, angle, torque, period=CYCLE))
+    return np.interp(angle - delay, angle, torque, period=CYCLE)

@@ -50,14 +50,11 @@ def read_engine(values: Section) -> Engine:
         )
     if "motor" in values:
         raise ConfigError(
-            f"{PLACE}.motor is of a motor, {PLACE}.kind = engine of an engine: a line is turned by one of them; take "
+            f"{PLACE}.motor is of a motor, {PLACE}.kind = engine of an engine: a line "
+            "is turned by one of them; take "
             "excitation=engine_v20 or excitation=motor_and_load"
         )
-    for key in values:
-        if key not in KEYS:
-            raise ConfigError(f"{PLACE}: unknown key '{key}'; known: {', '.join(KEYS)}")
-    if missing := [key for key in KEYS if key not in values]:
-        raise ConfigError(f"{PLACE}: missing {', '.join(missing)}")
+    check_keys(values, KEYS)
     plunger, plunger_nodes = _read_pump(values["injection_pump"])
     return Engine(
         cylinder=read(Cylinder, values["cylinder"], f"{PLACE}.cylinder"),
@@ -68,29 +65,38 @@ def read_engine(values: Section) -> Engine:
         reference=read(Reference, values["reference"], f"{PLACE}.reference"),
         throw_nodes=_whole_numbers("throw_nodes", values["throw_nodes"]),
         valve_trains={
-            name: _read_train(name, one)
-            for name, one in named_groups("valves", values["valves"])
+            name: _read_train(name, value)
+            for name, value in named_groups("valves", values["valves"])
         },
         valve_nodes={
-            name: _whole_numbers(f"valve_nodes.{name}", one)
-            for name, one in named_groups("valve_nodes", values["valve_nodes"])
+            name: _whole_numbers(f"valve_nodes.{name}", value)
+            for name, value in named_groups("valve_nodes", values["valve_nodes"])
         },
         plunger=plunger,
         plunger_nodes=plunger_nodes,
         loads={
-            name: read_named(Load, one, f"loads.{name}", "load")
-            for name, one in named_groups("loads", values["loads"])
+            name: read_named(Load, value, f"loads.{name}", "load")
+            for name, value in named_groups("loads", values["loads"])
         },
         dynamometer=read(Dynamometer, values["dynamometer"], f"{PLACE}.dynamometer"),
     )
+
+
+def check_keys(values: Section, keys: tuple[str, ...]) -> None:
+    """Raise for keys of the group ``excitation`` that are unknown or missing."""
+    for key in values:
+        if key not in keys:
+            raise ConfigError(f"{PLACE}: unknown key '{key}'; known: {', '.join(keys)}")
+    if missing := [key for key in keys if key not in values]:
+        raise ConfigError(f"{PLACE}: missing {', '.join(missing)}")
 
 
 def read_wheels(values: Section) -> dict[str, ToothedWheel]:
     """The toothed wheels of the group ``excitation``, by their names; none where it is null."""
     check_group(PLACE, values)
     return {
-        name: read_named(ToothedWheel, one, f"toothed_wheels.{name}", "toothed_wheel")
-        for name, one in named_groups("toothed_wheels", values.get("toothed_wheels"))
+        name: read_named(ToothedWheel, value, f"toothed_wheels.{name}", "toothed_wheel")
+        for name, value in named_groups("toothed_wheels", values.get("toothed_wheels"))
     }
 
 
@@ -99,7 +105,7 @@ def _read_pressure(values: Any) -> WiebeCycle | PressureFile:
     check_group(f"{PLACE}.pressure", values)
     cycle = read(
         WiebeCycle,
-        {key: one for key, one in values.items() if key != "file"},
+        {key: value for key, value in values.items() if key != "file"},
         f"{PLACE}.pressure",
     )
     if values.get("file") is None:
@@ -108,48 +114,38 @@ def _read_pressure(values: Any) -> WiebeCycle | PressureFile:
 
 
 def _read_train(name: str, values: Any) -> ValveTrain:
-    place = f"{PLACE}.valves.{name}"
-    check_group(place, values)
-    own = {key: one for key, one in values.items() if key != "cam"}
-    return read(
-        ValveTrain,
-        own,
-        place,
-        cam=read_named(Cam, values.get("cam"), f"valves.{name}.cam", "cam"),
-    )
+    train: ValveTrain = _read_with_cam(ValveTrain, values, f"valves.{name}")
+    return train
+
+
+def _read_with_cam(
+    cls: type[Any], values: Any, place: str, left_out: tuple[str, ...] = ()
+) -> Any:
+    """A dataclass with a cam; keys of ``left_out`` are read elsewhere."""
+    check_group(f"{PLACE}.{place}", values)
+    given = {key: values[key] for key in values if key not in ("cam", *left_out)}
+    cam = read_named(Cam, values.get("cam"), f"{place}.cam", "cam")
+    return read(cls, given, f"{PLACE}.{place}", cam=cam)
 
 
 def _read_pump(values: Any) -> tuple[Plunger | None, dict[str, int]]:
-    """The plunger and its node for each cylinder.
+    """The plunger, and for each cylinder the node of its plunger.
 
     Null is an engine without this pump, with a common rail.
     """
     if values is None:
         return None, {}
-    place = f"{PLACE}.injection_pump"
-    check_group(place, values)
-    own = {
-        key: one
-        for key, one in values.items()
-        if key not in ("cam", "nodes", "cylinders")
-    }
-    nodes, cylinders = (
-        _whole_numbers("injection_pump.nodes", values.get("nodes")),
-        values.get("cylinders"),
-    )
-    if (
-        not isinstance(cylinders, list | tuple)
-        or len(set(cylinders)) != len(nodes)
-        or len(cylinders) != len(nodes)
-    ):
+    check_group(f"{PLACE}.injection_pump", values)
+    nodes = _whole_numbers("injection_pump.nodes", values.get("nodes"))
+    cylinders = values.get("cylinders")
+    is_list = isinstance(cylinders, list | tuple)
+    if not is_list or not len(set(cylinders)) == len(cylinders) == len(nodes):
         raise ConfigError(
-            f"{place}.cylinders must name a different cylinder for each of its {len(nodes)} nodes"
+            f"{PLACE}.injection_pump.cylinders must name a different cylinder for "
+            f"each of its {len(nodes)} nodes"
         )
-    plunger = read(
-        Plunger,
-        own,
-        place,
-        cam=read_named(Cam, values.get("cam"), "injection_pump.cam", "cam"),
+    plunger = _read_with_cam(
+        Plunger, values, "injection_pump", left_out=("nodes", "cylinders")
     )
     return plunger, dict(zip(cylinders, nodes, strict=True))
 
@@ -168,7 +164,7 @@ def named_groups(key: str, values: Any) -> list[tuple[str, Any]]:
     if values is None:
         return []
     check_group(f"{PLACE}.{key}", values)
-    return [(str(name), one) for name, one in values.items()]
+    return [(str(name), value) for name, value in values.items()]
 
 
 def check_group(place: str, values: Any) -> None:
@@ -181,7 +177,7 @@ def check_group(place: str, values: Any) -> None:
 
 def _whole_numbers(key: str, values: Any) -> tuple[int, ...]:
     if not isinstance(values, list | tuple) or not all(
-        type(one) is int for one in values
+        type(value) is int for value in values
     ):
         raise ConfigError(f"{PLACE}.{key} = {values!r} is not a list of whole numbers")
     return tuple(values)

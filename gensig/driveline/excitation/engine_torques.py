@@ -5,9 +5,10 @@ and a load.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,11 +58,13 @@ class Dynamometer:
     def __post_init__(self) -> None:
         if not 0.0 <= self.disturbance_share <= 1.0:
             raise ConfigError(
-                f"excitation.dynamometer.disturbance_share = {self.disturbance_share:g} must lie in 0..1"
+                "excitation.dynamometer.disturbance_share = "
+                f"{self.disturbance_share:g} must lie in 0..1"
             )
         if not self.disturbance_frequency > 0.0:
             raise ConfigError(
-                f"excitation.dynamometer.disturbance_frequency_hz = {self.disturbance_frequency:g} must be positive"
+                "excitation.dynamometer.disturbance_frequency_hz = "
+                f"{self.disturbance_frequency:g} must be positive"
             )
 
 
@@ -78,7 +81,7 @@ class ValveTrain:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Engine:
-    """A four-stroke engine: what its configuration says.
+    """A four-stroke engine as configured.
 
     ``throw_nodes`` (throw,) are the nodes of the throws; ``valve_nodes`` gives for each bank the
     nodes of its cams by throw, ``plunger_nodes`` for each cylinder that of its plunger. Either
@@ -103,13 +106,15 @@ class Engine:
         n_throws = len(self.layout.throw_angles)
         if len(self.throw_nodes) != n_throws or len(set(self.throw_nodes)) != n_throws:
             raise ConfigError(
-                f"excitation.throw_nodes has {len(set(self.throw_nodes))} different nodes for {n_throws} throws of "
+                f"excitation.throw_nodes has {len(set(self.throw_nodes))} different "
+                f"nodes for {n_throws} throws of "
                 "excitation.layout.throw_angles_deg"
             )
         for bank, nodes in self.valve_nodes.items():
             if bank not in self.layout.banks:
                 raise ConfigError(
-                    f"excitation.valve_nodes: no bank {bank!r}; there are {', '.join(self.layout.banks)}"
+                    f"excitation.valve_nodes: no bank {bank!r}; there are "
+                    f"{', '.join(self.layout.banks)}"
                 )
             if len(nodes) not in (0, n_throws):
                 raise ConfigError(
@@ -131,7 +136,7 @@ class Engine:
 
     @property
     def pressure_decides_torque(self) -> bool:
-        """Whether the pressure was measured, so that it says what torque the engine gives."""
+        """True with a measured pressure, which gives the torque of the engine."""
         return isinstance(self.pressure, PressureFile)
 
     @property
@@ -196,23 +201,22 @@ def engine_torques(
     *,
     n_points: int = POINTS,
 ) -> EngineTorques:
-    """What acts on the shaft line at a speed and a brake torque.
+    """Torques on the shaft line at a speed and a brake torque.
 
     Parameters
     ----------
     speed : rad/s      of the crank
-    torque : N m       brake torque at the crank; None with a measured pressure, which decides it
+    torque : N m       brake torque at the crank; None with a measured pressure
     ratios : speed of each node over the crank's
     n_points : of the cycle
 
     Raises
     ------
-    ConfigError    for a torque below the friction, nodes that the line has not, or a camshaft at another ratio
+    ConfigError    for a torque below the friction, unknown nodes, or a camshaft at another ratio
 
     Notes
     -----
-    The gas does the work of the brake torque, of friction, of cams, plungers and driven machines, so that the means
-    balance and the line turns steadily.
+    The gas does the work of brake, friction, cams, plungers and driven machines: means balance.
     """
     _check_nodes(engine, ratios)
     if not speed > 0.0:
@@ -221,32 +225,21 @@ def engine_torques(
         )
     share = speed / engine.reference.speed
     parts = [*_loads(engine, share), *_valve_torques(engine, speed, n_points)]
-    taken = engine.friction_torque - sum(
-        ratios[node] * float(np.mean(row)) for node, row in parts
-    )
-    one_plunger = partial(_plunger_torque, engine, speed, share, n_points=n_points)
-    if isinstance(engine.pressure, PressureFile):
-        pressure, indicated, brake = _measured(
-            engine, torque, taken, one_plunger, n_points
-        )
-    else:
-        pressure, indicated, brake = _burned(
-            engine, speed, torque, taken, one_plunger, n_points
-        )
+    driven = sum(ratios[node] * float(np.mean(row)) for node, row in parts)
+    taken = engine.friction_torque - driven
+    plunger_at = partial(_plunger_torque, engine, speed, share, n_points=n_points)
+    work = partial(_measured, engine)
+    if isinstance(engine.pressure, WiebeCycle):
+        work = partial(_burned, engine, speed)
+    pressure, indicated, brake = work(torque, taken, plunger_at, n_points)
     volume = _fuel(engine, indicated)
-    pulses, firing = one_plunger(volume), engine.layout.firing_angles()
-    parts += [
-        (node, delayed(pulses, firing[name]))
-        for name, node in engine.plunger_nodes.items()
-    ]
-    parts += [
-        (engine.dynamometer.node, np.array(-brake / ratios[engine.dynamometer.node]))
-    ]
+    pulses, firing = plunger_at(volume), engine.layout.firing_angles()
+    plungers = engine.plunger_nodes.items()
+    parts += [(node, delayed(pulses, firing[name])) for name, node in plungers]
+    dynamometer, load_ratio = engine.dynamometer, ratios[engine.dynamometer.node]
+    parts.append((dynamometer.node, np.array(-brake / load_ratio)))
     parts += _cylinder_torques(engine, pressure, speed)
-    nodes = tuple(sorted({node for node, _ in parts}))
-    torques = np.zeros((len(nodes), n_points))
-    for node, row in parts:
-        torques[nodes.index(node)] += row
+    nodes, torques = _by_node(parts, n_points)
     return EngineTorques(
         speed=speed,
         brake_torque=brake,
@@ -256,35 +249,40 @@ def engine_torques(
         pressure=pressure,
         nodes=nodes,
         torque=torques,
-        disturbance_node=engine.dynamometer.node,
-        disturbance_torque=engine.dynamometer.disturbance_share
-        * brake
-        / ratios[engine.dynamometer.node],
-        disturbance_frequency=engine.dynamometer.disturbance_frequency,
+        disturbance_node=dynamometer.node,
+        disturbance_torque=dynamometer.disturbance_share * brake / load_ratio,
+        disturbance_frequency=dynamometer.disturbance_frequency,
     )
+
+
+def _by_node(
+    parts: list[tuple[int, Array]], n_points: int
+) -> tuple[tuple[int, ...], Array]:
+    """Nodes of some torques in ascending order, and the sum on each, (node, point)."""
+    nodes = tuple(sorted({node for node, _ in parts}))
+    torques = np.zeros((len(nodes), n_points))
+    for node, row in parts:
+        torques[nodes.index(node)] += row
+    return nodes, torques
 
 
 def _check_nodes(engine: Engine, ratios: Mapping[int, float]) -> None:
     """Every node is there, throws turn with the crank, cams at half its speed."""
-    cams = [node for nodes in engine.valve_nodes.values() for node in nodes] + list(
-        engine.plunger_nodes.values()
-    )
-    wanted: list[tuple[str, int, float | None]] = [
-        ("throw_nodes", node, 1.0) for node in engine.throw_nodes
+    cams = list(chain(*engine.valve_nodes.values(), engine.plunger_nodes.values()))
+    wanted: list[tuple[str, Iterable[int], float | None]] = [
+        ("throw_nodes", engine.throw_nodes, 1.0),
+        ("valve_nodes or injection_pump.nodes", cams, CAM_RATIO),
+        *((f"loads.{name}.node", [x.node], None) for name, x in engine.loads.items()),
+        ("dynamometer.node", [engine.dynamometer.node], None),
     ]
-    wanted += [
-        ("valve_nodes or injection_pump.nodes", node, CAM_RATIO) for node in cams
-    ]
-    wanted += [
-        (f"loads.{name}.node", load.node, None) for name, load in engine.loads.items()
-    ]
-    wanted += [("dynamometer.node", engine.dynamometer.node, None)]
-    for key, node, ratio in wanted:
+    expanded = [(key, node, ratio) for key, nodes, ratio in wanted for node in nodes]
+    for key, node, ratio in expanded:
         if node not in ratios:
             raise ConfigError(f"excitation.{key}: the shaft line has no node {node}")
         if ratio is not None and not math.isclose(ratios[node], ratio, rel_tol=1e-9):
             raise ConfigError(
-                f"excitation.{key}: node {node} turns {ratios[node]:.6g} times as fast as the crank; it needs {ratio:g}"
+                f"excitation.{key}: node {node} turns {ratios[node]:.6g} times as "
+                f"fast as the crank; it needs {ratio:g}"
             )
 
 
@@ -303,10 +301,10 @@ def _valve_torques(
     firing, parts = engine.layout.firing_angles(), []
     for train in engine.valve_trains.values():
         angle = CAM_RATIO * (cycle_angles(n_points) - train.opening)
-        one = cam_torque(train.cam, angle, CAM_RATIO * speed)
+        torque_of_one = cam_torque(train.cam, angle, CAM_RATIO * speed)
         for bank, nodes in engine.valve_nodes.items():
             parts += [
-                (node, delayed(one, firing[f"{bank}{throw + 1}"]))
+                (node, delayed(torque_of_one, firing[f"{bank}{throw + 1}"]))
                 for throw, node in enumerate(nodes)
             ]
     return parts
@@ -327,12 +325,12 @@ def _cylinder_torques(
 ) -> list[tuple[int, Array]]:
     """Gas, inertia and friction torques of the cylinders on the throws, (point,) each."""
     angle = cycle_angles(len(pressure))
-    one = gas_torque(engine.cylinder, angle, pressure, engine.crankcase_pressure)
-    one = one + inertia_torque(engine.cylinder, angle, speed)
-    one = one - engine.friction_torque / len(engine.layout.cylinders)
+    torque = gas_torque(engine.cylinder, angle, pressure, engine.crankcase_pressure)
+    torque = torque + inertia_torque(engine.cylinder, angle, speed)
+    torque = torque - engine.friction_torque / len(engine.layout.cylinders)
     firing = engine.layout.firing_angles()
     return [
-        (engine.throw_nodes[engine.layout.throw(name)], delayed(one, firing[name]))
+        (engine.throw_nodes[engine.layout.throw(name)], delayed(torque, firing[name]))
         for name in engine.layout.cylinders
     ]
 
@@ -346,39 +344,37 @@ def _fuel(engine: Engine, indicated: float) -> float:
 
 def _indicated(engine: Engine, pressure: Array) -> float:
     """Mean torque of the gas in all cylinders, N m."""
-    torque = gas_torque(
-        engine.cylinder,
-        cycle_angles(len(pressure)),
-        pressure,
-        engine.crankcase_pressure,
-    )
+    angle = cycle_angles(len(pressure))
+    torque = gas_torque(engine.cylinder, angle, pressure, engine.crankcase_pressure)
     return float(np.mean(torque)) * len(engine.layout.cylinders)
 
 
-def _taken_by(engine: Engine, one_plunger: Array) -> float:
+def _taken_by(engine: Engine, torque: Array) -> float:
     """Mean torque of all plungers at the crank, N m."""
-    return -CAM_RATIO * len(engine.plunger_nodes) * float(np.mean(one_plunger))
+    return -CAM_RATIO * len(engine.plunger_nodes) * float(np.mean(torque))
 
 
 def _measured(
     engine: Engine,
     torque: float | None,
     taken: float,
-    one_plunger: partial[Array],
+    plunger_at: partial[Array],
     n_points: int,
 ) -> tuple[Array, float, float]:
     """Pressure, indicated and brake torque with a measured pressure."""
     assert isinstance(engine.pressure, PressureFile)
     if torque is not None:
         raise ConfigError(
-            f"a torque of {torque:g} N m is given with excitation.pressure.file, which decides it; leave the torque out"
+            f"a torque of {torque:g} N m is given with excitation.pressure.file, "
+            "which decides it; leave the torque out"
         )
     pressure = read_pressure(engine.pressure, n_points)
     indicated = _indicated(engine, pressure)
-    lost = taken + _taken_by(engine, one_plunger(_fuel(engine, max(indicated, 0.0))))
+    lost = taken + _taken_by(engine, plunger_at(_fuel(engine, max(indicated, 0.0))))
     if not indicated > lost:
         raise ConfigError(
-            f"excitation.pressure.file = {engine.pressure.file} gives {indicated:.4g} N m, below the {lost:.4g} N m of "
+            f"excitation.pressure.file = {engine.pressure.file} gives {indicated:.4g} "
+            f"N m, below the {lost:.4g} N m of "
             "friction and drives; lower friction_mean_pressure_mpa or give another pressure"
         )
     return pressure, indicated, indicated - lost
@@ -389,7 +385,7 @@ def _burned(
     speed: float,
     torque: float | None,
     taken: float,
-    one_plunger: partial[Array],
+    plunger_at: partial[Array],
     n_points: int,
 ) -> tuple[Array, float, float]:
     """Pressure, indicated and brake torque with a Wiebe cycle."""
@@ -400,7 +396,8 @@ def _burned(
         )
     if not torque >= 0.0:
         raise ConfigError(
-            f"the brake torque {torque:g} N m is below the friction, which the engine overcomes itself; give 0 or more"
+            f"the brake torque {torque:g} N m is below the friction, which the engine "
+            "overcomes itself; give 0 or more"
         )
     power_share = torque * speed / (engine.reference.torque * engine.reference.speed)
     motored, fired = wiebe_parts(
@@ -408,20 +405,18 @@ def _burned(
     )
     indicated = torque + taken
     for _ in range(ROUNDS):
-        before, indicated = (
-            indicated,
-            torque + taken + _taken_by(engine, one_plunger(_fuel(engine, indicated))),
-        )
+        before = indicated
+        pumped = _taken_by(engine, plunger_at(_fuel(engine, before)))
+        indicated = torque + taken + pumped
         if abs(indicated - before) <= ROUNDING * indicated:
             break
-    without, unit_heat = (
-        _indicated(engine, motored),
-        _indicated(engine, engine.crankcase_pressure + fired),
-    )
+    without = _indicated(engine, motored)
+    unit_heat = _indicated(engine, engine.crankcase_pressure + fired)
     heat = (indicated - without) / unit_heat
     if not heat > 0.0:
         raise ConfigError(
-            f"the torque of the gas, {indicated:.4g} N m with friction and drives, is below the {without:.4g} N m that "
+            f"the torque of the gas, {indicated:.4g} N m with friction and drives, is "
+            f"below the {without:.4g} N m that "
             "boost and exhaust give without fuel; raise the torque or lower boost_pressure_mpa"
         )
     return motored + heat * fired, indicated, torque

@@ -1,9 +1,11 @@
-"""When each cylinder of an engine fires: banks, throws of the crank and the firing order."""
+"""Firing of the cylinders of an engine: banks, throws of the crank and the firing order."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+
+import numpy as np
 
 from gensig.errors import ConfigError
 from gensig.units import unit
@@ -29,32 +31,37 @@ class Layout:
     def __post_init__(self) -> None:
         if not self.banks or len(set(self.banks)) != len(self.banks):
             raise ConfigError(
-                f"excitation.layout.banks = {', '.join(self.banks)}: name at least one bank, each once"
+                f"excitation.layout.banks = {', '.join(self.banks)}: name at least "
+                "one bank, each once"
             )
         if len(self.bank_angles) != len(self.banks):
             raise ConfigError(
-                f"excitation.layout.bank_angles_deg has {len(self.bank_angles)} values for {len(self.banks)} banks"
+                f"excitation.layout.bank_angles_deg has {len(self.bank_angles)} "
+                f"values for {len(self.banks)} banks"
             )
         if not self.throw_angles:
             raise ConfigError(
                 "excitation.layout.throw_angles_deg is empty; give one angle for every throw"
             )
         known = self.cylinders
-        for place, name in enumerate(self.firing_order):
+        for position, name in enumerate(self.firing_order):
             if name not in known:
                 raise ConfigError(
-                    f"excitation.layout.firing_order: no cylinder {name!r} (place {place + 1}); there are "
+                    f"excitation.layout.firing_order: no cylinder {name!r} (place "
+                    f"{position + 1}); there are "
                     f"{known[0]} to {known[-1]}"
                 )
-            if name in self.firing_order[:place]:
+            if name in self.firing_order[:position]:
                 first = self.firing_order.index(name) + 1
                 raise ConfigError(
-                    f"excitation.layout.firing_order repeats {name} (places {first} and {place + 1}); "
+                    f"excitation.layout.firing_order repeats {name} (places {first} "
+                    f"and {position + 1}); "
                     "every cylinder fires once a cycle"
                 )
         if missing := [name for name in known if name not in self.firing_order]:
             raise ConfigError(
-                f"excitation.layout.firing_order lacks {', '.join(missing)}; every cylinder fires once"
+                f"excitation.layout.firing_order lacks {', '.join(missing)}; every "
+                "cylinder fires once"
             )
         self._check_turns()
 
@@ -96,32 +103,32 @@ class Layout:
         if len(self.firing_order) == 1:
             return [2.0 * TURN]
         centers = [self.dead_center(name) for name in self.firing_order]
-        gaps = [
-            (after - before) % TURN
-            for before, after in zip(centers, [*centers[1:], centers[0]], strict=True)
-        ]
-        return [TURN if min(gap, TURN - gap) < TOGETHER else gap for gap in gaps]
+        gaps = np.roll(centers, -1) - centers
+        gaps %= TURN
+        gaps[np.minimum(gaps, TURN - gaps) < TOGETHER] = TURN
+        return [float(gap) for gap in gaps]
 
     def _check_turns(self) -> None:
         """Refuse cylinders that fire together, and orders that these throws cannot fire in two
         turns.
         """
         gaps = self._gaps()
-        total, same = (
-            sum(gaps),
-            [place for place, gap in enumerate(gaps) if gap == TURN],
-        )
+        total = sum(gaps)
+        same = [position for position, gap in enumerate(gaps) if gap == TURN]
         if abs(total - 2.0 * TURN) <= TOGETHER:
             return
         if same and abs(total - len(same) * TURN - 2.0 * TURN) <= TOGETHER:
             names = [
-                self.firing_order[place % len(gaps)] for place in (same[0], same[0] + 1)
+                self.firing_order[position % len(gaps)]
+                for position in (same[0], same[0] + 1)
             ]
             raise ConfigError(
-                f"excitation.layout: {' and '.join(names)} fire together with these bank_angles_deg and "
+                f"excitation.layout: {' and '.join(names)} fire together with these "
+                "bank_angles_deg and "
                 "throw_angles_deg; change one of them or the firing order"
             )
         raise ConfigError(
-            f"excitation.layout.firing_order takes {math.degrees(total):.6g} degrees with these throw and bank "
+            f"excitation.layout.firing_order takes {math.degrees(total):.6g} degrees "
+            "with these throw and bank "
             "angles; a four-stroke engine fires every cylinder once in 720"
         )

@@ -58,11 +58,13 @@ class Plunger:
             )
         if not 0.0 < self.indicated_efficiency < 1.0:
             raise ConfigError(
-                f"{place}.indicated_efficiency = {self.indicated_efficiency:g} must lie between 0 and 1"
+                f"{place}.indicated_efficiency = {self.indicated_efficiency:g} must "
+                "lie between 0 and 1"
             )
         if not 0.0 <= self.lift_at_delivery < self.cam.lift:
             raise ConfigError(
-                f"{place}.lift_at_delivery_mm = {self.lift_at_delivery * 1e3:g} must be at least 0 and below the cam's "
+                f"{place}.lift_at_delivery_mm = {self.lift_at_delivery * 1e3:g} must "
+                "be at least 0 and below the cam's "
                 f"lift of {self.cam.lift * 1e3:g} mm"
             )
 
@@ -93,7 +95,8 @@ class Plunger:
         stroke = volume / self.area
         if self.lift_at_delivery + stroke > self.cam.lift:
             raise ConfigError(
-                f"excitation.injection_pump: {volume * 1e9:.4g} mm3 of fuel need {stroke * 1e3:.4g} mm of the plunger "
+                f"excitation.injection_pump: {volume * 1e9:.4g} mm3 of fuel need "
+                f"{stroke * 1e3:.4g} mm of the plunger "
                 f"from lift_at_delivery_mm = {self.lift_at_delivery * 1e3:g} on, and the cam lifts "
                 f"{self.cam.lift * 1e3:g} mm; enlarge diameter_mm or the cam's lift_mm"
             )
@@ -127,8 +130,9 @@ def plunger_torque(
 
     Notes
     -----
-    Eq. (21) of the engine paper: pressure times plunger area times the cam's slope. So the work of a stroke is the
-    integral of p dV, whatever the cam. Fuel is taken to be incompressible, and the line's waves are left out.
+    Eq. (21) of the engine paper: pressure times plunger area times the cam's slope. So the work
+    of a stroke is the integral of p dV, whatever the cam. Fuel is taken to be incompressible,
+    and the line's waves are left out.
     """
     turned = angle + plunger.lead
     lift, slope, _ = plunger.cam.motion(turned)

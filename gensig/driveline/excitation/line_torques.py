@@ -1,7 +1,4 @@
-"""What engines and motors have in common.
-
-Torques on the nodes of a line at an operating point, and driven machines.
-"""
+"""Torques on the nodes of a line at an operating point, of an engine or a motor."""
 
 from __future__ import annotations
 
@@ -39,7 +36,7 @@ class Reference:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Load:
-    """What a driven machine takes from its own shaft; ``torque`` is that at the reference speed."""
+    """A driven machine; ``torque`` on its shaft is that at the reference speed."""
 
     node: int
     law: str

@@ -12,6 +12,7 @@ from gensig.driveline.excitation.engine import KEYS as ENGINE_KEYS
 from gensig.driveline.excitation.engine import (
     PLACE,
     check_group,
+    check_keys,
     named_groups,
     read_named,
 )
@@ -23,7 +24,10 @@ from gensig.units import read
 
 KIND = "motor_and_load"
 KEYS = ("kind", "reference", "motor", "load", "loads", "toothed_wheels")
-TOGETHER = "the tables want system.motor_node, system.load_node and, for records, system.record_mesh of their own"
+TOGETHER = (
+    "the tables want system.motor_node, system.load_node and, for records, "
+    "system.record_mesh of their own"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,29 +50,28 @@ def read_motor(values: Section, drive: DriveLine) -> MotorDrive:
 
     Raises
     ------
-    ConfigError    for unknown or missing keys, nodes that the line has not, an engine beside the motor
+    ConfigError    for unknown or missing keys, nodes that the line has not, an engine beside
+        the motor
     """
     if both := [key for key in values if key in ENGINE_KEYS and key not in KEYS]:
         raise ConfigError(
-            f"{PLACE}.{both[0]} is of an engine, {PLACE}.kind = {KIND} of a motor: a line is turned by one of them; "
+            f"{PLACE}.{both[0]} is of an engine, {PLACE}.kind = {KIND} of a motor: a "
+            "line is turned by one of them; "
             "take excitation=motor_and_load or excitation=engine_v20"
         )
-    for key in values:
-        if key not in KEYS:
-            raise ConfigError(f"{PLACE}: unknown key '{key}'; known: {', '.join(KEYS)}")
-    if missing := [key for key in KEYS if key not in values]:
-        raise ConfigError(f"{PLACE}: missing {', '.join(missing)}")
+    check_keys(values, KEYS)
     given = values["motor"]
     check_group(f"{PLACE}.motor", given)
     ripple = given.get("torque_ripple")
-    own = {key: one for key, one in given.items() if key != "torque_ripple"}
+    if ripple is not None:
+        ripple = read_named(
+            TorqueRipple, ripple, "motor.torque_ripple", "torque_ripple"
+        )
     motor = read(
         _Motor,
-        own,
+        {key: value for key, value in given.items() if key != "torque_ripple"},
         f"{PLACE}.motor",
-        torque_ripple=None
-        if ripple is None
-        else read_named(TorqueRipple, ripple, "motor.torque_ripple", "torque_ripple"),
+        torque_ripple=ripple,
     )
     loads = {
         name: read_named(Load, one, f"loads.{name}", "load")
@@ -95,14 +98,16 @@ def _node(drive: DriveLine, key: str, what: str, node: int | None) -> int:
     if node is None:
         numbers = ", ".join(map(str, drive.numbers))
         raise ConfigError(
-            f"system.{key} = null: {PLACE}={KIND} needs the node of {what}, one of {numbers}; {TOGETHER}"
+            f"system.{key} = null: {PLACE}={KIND} needs the node of {what}, one of "
+            f"{numbers}; {TOGETHER}"
         )
     if node not in drive.numbers:
         raise ConfigError(f"system.{key} = {node}: {_no_node(drive, node)}; {TOGETHER}")
     ratio = abs(float(drive.line.speed_ratio[drive.numbers.index(node)]))
     if key == "motor_node" and abs(ratio - 1.0) > 1e-9:
         raise ConfigError(
-            f"system.motor_node = {node} turns {ratio:.4g} times as fast as the first node, to which speeds refer; put "
+            f"system.motor_node = {node} turns {ratio:.4g} times as fast as the first "
+            "node, to which speeds refer; put "
             "the motor's row first in system.shafting_csv"
         )
     return node

@@ -36,7 +36,8 @@ class TorqueRipple:
             raise ConfigError(f"torque_ripple.share = {self.share:g} must lie in 0..1")
         if not (0.0 < self.order <= MOST_ORDER and (2.0 * self.order).is_integer()):
             raise ConfigError(
-                f"torque_ripple.order = {self.order:g}: give waves in a turn of the motor, a multiple of 0.5 up to "
+                f"torque_ripple.order = {self.order:g}: give waves in a turn of the "
+                "motor, a multiple of 0.5 up to "
                 f"{MOST_ORDER:g}"
             )
 
@@ -95,14 +96,14 @@ class MotorDrive:
         same at every speed. Of the loads it is n T / omega of their laws there.
         """
         speed, torque = self.reference.speed, self.reference.torque
-        found = {self.motor_node: torque * (1.0 - self.slip) / (self.slip * speed)}
+        slopes = {self.motor_node: torque * (1.0 - self.slip) / (self.slip * speed)}
         taken = [(self.load_node, self.load_law, torque / ratios[self.load_node])]
         taken += [(load.node, load.law, load.torque) for load in self.loads.values()]
-        for node, law, own in taken:
-            found[node] = found.get(node, 0.0) + LAWS[law] * own / (
+        for node, law, torque_there in taken:
+            slopes[node] = slopes.get(node, 0.0) + LAWS[law] * torque_there / (
                 speed * ratios[node]
             )
-        return found
+        return slopes
 
 
 def motor_torques(
@@ -113,7 +114,7 @@ def motor_torques(
     *,
     n_points: int = POINTS,
 ) -> LineTorques:
-    """What acts on the shaft line at a speed of the motor and a torque that the load takes.
+    """Torques on the shaft line at a speed of the motor and a torque that the load takes.
 
     Parameters
     ----------
@@ -128,8 +129,9 @@ def motor_torques(
 
     Notes
     -----
-    The motor gives what the load and the further machines take, so that the mean powers balance: what meshes and joints
-    lose is a matter of vibration, and the slip and the governor give it.
+    The motor gives what the load and the further machines take, so that the mean powers
+    balance: what meshes and joints lose is a matter of vibration, and the slip and the governor
+    give it.
     """
     if not speed > 0.0:
         raise ConfigError(

@@ -86,7 +86,8 @@ class WiebeCycle:
         ):
             end = math.degrees(self.combustion_begin + self.combustion_duration)
             raise ConfigError(
-                f"{place}: combustion ends {end:g} degrees after top dead center, past exhaust_opening_deg = "
+                f"{place}: combustion ends {end:g} degrees after top dead center, "
+                "past exhaust_opening_deg = "
                 f"{math.degrees(self.exhaust_opening):g}; shorten combustion_duration_deg"
             )
 
@@ -119,9 +120,10 @@ def wiebe_parts(
     Notes
     -----
     First law with one exponent, dp = -n p dV/V + (n - 1) dQ/V, is linear in the heat:
-    d(p V^n) = (n - 1) V^(n-1) dQ. So p = p_motored + Q p_unit, and the heat follows from the work that is wanted
-    without iteration. After the exhaust opens the pressure falls exponentially to the exhaust's; from gas-exchange top
-    dead center on it is the boost. Heat is net: what the walls take is left out of it.
+    d(p V^n) = (n - 1) V^(n-1) dQ. So p = p_motored + Q p_unit, and the heat follows from the
+    work that is wanted without iteration. After the exhaust opens the pressure falls
+    exponentially to the exhaust's; from gas-exchange top dead center on it is the boost. Heat
+    is net: what the walls take is left out of it.
     """
     boost, exhaust = cycle.gas_exchange(power_share)
     angle = cycle_angles(n_points)
@@ -158,8 +160,8 @@ def read_pressure(given: PressureFile, n_points: int) -> Array:
 
     Raises
     ------
-    ConfigError    for columns without a unit or unknown ones, angles that do not rise, leave a gap or pass the cycle,
-                   and pressures that are not positive
+    ConfigError    for columns without a unit or unknown ones, angles that do not rise, leave a
+                   gap or pass the cycle, and pressures that are not positive
     """
     names, values = read_table(FILE_KEY, given.file, least_rows=LEAST_POINTS)
     where = f"{FILE_KEY} = {given.file}"
@@ -186,12 +188,14 @@ def read_pressure(given: PressureFile, n_points: int) -> Array:
         raise ConfigError(f"{where}: row {row}, crank_angle must rise from row to row")
     if gaps[-1] < -1e-9 * CYCLE:
         raise ConfigError(
-            f"{where}: crank_angle runs over {math.degrees(CYCLE - gaps[-1]):g} degrees, at most 720"
+            f"{where}: crank_angle runs over {math.degrees(CYCLE - gaps[-1]):g} "
+            "degrees, at most 720"
         )
     if gaps.max() > WIDEST_GAP:
         row = int(np.argmax(gaps)) + 2
         raise ConfigError(
-            f"{where}: {math.degrees(gaps.max()):.4g} degrees without a point after row {row}; the whole cycle of 720 "
+            f"{where}: {math.degrees(gaps.max()):.4g} degrees without a point after "
+            f"row {row}; the whole cycle of 720 "
             f"degrees is needed, at most {math.degrees(WIDEST_GAP):g} between points"
         )
     if not np.all(pressure > 0.0):
@@ -200,4 +204,4 @@ def read_pressure(given: PressureFile, n_points: int) -> Array:
         )
     if gaps[-1] < 1e-9 * CYCLE:  # both ends of the cycle are given: they are one
         angle, pressure = angle[:-1], pressure[:-1]
-    return np.asarray(np.interp(cycle_angles(n_points), angle, pressure, period=CYCLE))
+    return np.interp(cycle_angles(n_points), angle, pressure, period=CYCLE)

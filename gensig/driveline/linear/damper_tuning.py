@@ -1,5 +1,4 @@
-"""What torsional dampers do to the force of one element of a linear line, and the dampers that
-make it least.
+"""Force of one element of a linear line with torsional dampers, and the dampers that minimise it.
 
 Dampers change the dynamic stiffness at their nodes only, so that a line is solved once for all of
 them: with R the receptance between the nodes and D the dampers' dynamic stiffness, their torques
@@ -32,11 +31,10 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 LEAST_INERTIA = 0.05  # of the largest allowed: a smaller ring is no damper
-DAMPING_RATIOS = (
-    0.05,
-    5.0,
-)  # searched, of the ring on its spring; assumed: rubber has a loss factor of 0.1 and more
-RATE_MARGIN = 10.0  # by which the rate damping over inertia of a viscous damper may leave the excited frequencies
+# searched, of the ring on its spring; assumed: rubber has a loss factor of 0.1 and more
+DAMPING_RATIOS = (0.05, 5.0)
+# by which the rate damping over inertia of a viscous damper may leave the excited frequencies
+RATE_MARGIN = 10.0
 POPULATION, GENERATIONS = 10, 100  # per unknown, and at most
 SETTLED = 1e-3  # of the population's spread; the simplex goes on from there
 
@@ -76,7 +74,7 @@ class SeenFromNodes:
             )
         matrix = np.eye(len(self.nodes)) + stiffness[..., :, None] * self.receptance
         torque = -np.linalg.solve(matrix, (stiffness * self.angle)[..., None])[..., 0]
-        return np.asarray(self.force + np.sum(self.transfer * torque, axis=-1))
+        return self.force + np.sum(self.transfer * torque, axis=-1)
 
     def largest_force(
         self, dampers: Sequence[TorsionalDamper], *, n_points: int | None = None
@@ -86,10 +84,8 @@ class SeenFromNodes:
         ``n_points`` of the cycle; by default 8 a period of the highest order.
         """
         amplitudes = self.force_with(dampers)
-        points = 8 * amplitudes.shape[-1] if n_points is None else n_points
-        return np.asarray(
-            np.abs(self.mean[:, None] + over_cycle(amplitudes, points)).max(axis=1)
-        )
+        points = n_points or 8 * amplitudes.shape[-1]
+        return np.abs(self.mean[:, None] + over_cycle(amplitudes, points)).max(axis=1)
 
 
 def seen_from_nodes(
@@ -155,10 +151,10 @@ def tune_dampers(
 
     Notes
     -----
-    Unknowns are the logarithms of inertia, damping ratio and the ring's own frequency, which lies between the lowest
-    and the highest excited one; for viscous dampers inertia and the rate damping over inertia. The largest of many
-    peaks has kinks and several minima: differential evolution (Storn & Price 1997), then a simplex (Nelder & Mead).
-    The seed alone decides the path.
+    Unknowns are the logarithms of inertia, frequency of the ring within the excited ones, and
+    damping ratio; for viscous dampers inertia and the rate damping over inertia. The largest of
+    many peaks has kinks and several minima: differential evolution (Storn & Price 1997), then a
+    simplex (Nelder & Mead). The seed alone decides the path.
 
     Raises
     ------
@@ -172,28 +168,16 @@ def tune_dampers(
         raise ConfigError(
             f"largest inertias {list(most_inertia)} kg m2: give a positive one for each damper"
         )
-    low, high = float(seen.frequency.min()), float(seen.frequency.max())
-    bounds: list[tuple[float, float]] = []
-    for most in most_inertia:
-        bounds.append((math.log(LEAST_INERTIA * most), math.log(most)))
-        if viscous:
-            bounds.append((math.log(low / RATE_MARGIN), math.log(high * RATE_MARGIN)))
-        else:
-            bounds += [
-                (math.log(low), math.log(high)),
-                tuple(map(math.log, DAMPING_RATIOS)),
-            ]  # type: ignore[list-item]
+    bounds = _bounds(seen, most_inertia, viscous=viscous)
 
     def dampers(unknowns: Array) -> tuple[TorsionalDamper, ...]:
         rows = np.exp(np.reshape(unknowns, (len(seen.nodes), -1)))
-        return tuple(
-            _damper(node, row) for node, row in zip(seen.nodes, rows, strict=True)
-        )
+        return tuple(map(_damper, seen.nodes, rows))
 
     def worst(unknowns: Array) -> float:
         return float(seen.largest_force(dampers(unknowns)).max())
 
-    found = differential_evolution(
+    coarse = differential_evolution(
         worst,
         bounds,
         popsize=POPULATION,
@@ -203,14 +187,29 @@ def tune_dampers(
         polish=False,
         init="sobol",
     )
-    nearest = minimize(
+    fine = minimize(
         worst,
-        found.x,
+        coarse.x,
         method="Nelder-Mead",
         bounds=bounds,
         options={"xatol": 1e-4, "fatol": 1e-9},
     )
-    return dampers(nearest.x if nearest.fun <= found.fun else found.x)
+    return dampers(min((fine, coarse), key=lambda result: result.fun).x)
+
+
+def _bounds(
+    seen: SeenFromNodes, most_inertia: Sequence[float], *, viscous: bool
+) -> list[tuple[float, float]]:
+    """Least and most of every unknown, logarithms."""
+    low, high = float(seen.frequency.min()), float(seen.frequency.max())
+    bounds = []
+    for most in most_inertia:
+        bounds.append((LEAST_INERTIA * most, most))
+        if viscous:
+            bounds.append((low / RATE_MARGIN, high * RATE_MARGIN))
+        else:
+            bounds += [(low, high), DAMPING_RATIOS]
+    return [(math.log(least), math.log(most)) for least, most in bounds]
 
 
 def _damper(node: int, row: Array) -> TorsionalDamper:

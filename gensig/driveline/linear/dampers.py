@@ -51,15 +51,14 @@ class TorsionalDamper:
             )
 
     def dynamic_stiffness(self, frequency: NDArray[np.float64]) -> ComplexArray:
-        """What it adds to the dynamic stiffness of its node at angular frequencies in rad/s, N
-        m/rad.
+        """Dynamic stiffness that it adds to its node at angular frequencies in rad/s, N m/rad.
 
         The ring's equation solved for the ring: -w^2 J (k + i w c) / (k + i w c - w^2 J).
         """
         w = np.asarray(frequency, dtype=float)
         hold = self.stiffness + 1j * w * self.damping
         mass = np.square(w) * self.ring_inertia
-        return np.asarray(-mass * hold / (hold - mass))
+        return -mass * hold / (hold - mass)
 
 
 def with_dampers(
@@ -76,7 +75,8 @@ def with_dampers(
     for damper in dampers:
         if damper.node not in numbers:
             raise ConfigError(
-                f"system.dampers: node {damper.node} is not in the shaft line; it has {min(numbers)} to {max(numbers)}"
+                f"system.dampers: node {damper.node} is not in the shaft line; it has "
+                f"{min(numbers)} to {max(numbers)}"
             )
         hub = numbers.index(damper.node)
         name = f"Damper ring on {line.nodes[hub].name}"

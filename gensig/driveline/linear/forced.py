@@ -12,11 +12,11 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.driveline.linear.matrices import LineMatrices
 from gensig.errors import SimulationError
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ class LinearLine:
         rad/s.
         """
         w = np.asarray(frequency, dtype=float)[:, None, None]
-        return np.asarray(
+        return (
             self.stiffness
             + 1j * (self.loss + w * self.damping)
             - np.square(w) * self.mass
@@ -73,15 +73,13 @@ class LinearLine:
         ------
         SimulationError    where an undamped line is excited at its own frequency
         """
+        dynamic = self.dynamic_stiffness(frequency)
         try:
-            found = np.linalg.solve(
-                self.dynamic_stiffness(frequency), force[..., None]
-            )[..., 0]
+            return np.asarray(np.linalg.solve(dynamic, force[..., None])[..., 0])
         except np.linalg.LinAlgError:
             raise SimulationError(
                 "an undamped line is excited at its natural frequency; give it damping"
             ) from None
-        return np.asarray(found)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -99,50 +97,14 @@ class Elements:
 
     def stiffness_matrix(self) -> Array:
         """Sum of stiffness times d d^T, (dof, dof)."""
-        return np.asarray((self.directions.T * self.stiffness) @ self.directions)
+        return (self.directions.T * self.stiffness) @ self.directions
 
     def loss_matrix(self) -> Array:
         """Its imaginary part, (dof, dof)."""
-        return np.asarray((self.directions.T * self.loss) @ self.directions)
+        return (self.directions.T * self.loss) @ self.directions
 
 
-class Matrices(Protocol):
-    """A line with its gear meshes apart, each with a direction (dof,) along its line of action."""
-
-    @property
-    def mass(self) -> Array:
-        """(dof, dof)."""
-
-    @property
-    def damping(self) -> Array:
-        """(dof, dof), viscous."""
-
-    @property
-    def stiffness(self) -> Array:
-        """(dof, dof), without the meshes."""
-
-    @property
-    def loss_stiffness(self) -> Array:
-        """(dof, dof), loss factor times stiffness."""
-
-    @property
-    def directions(self) -> Array:
-        """(mesh, dof)."""
-
-    @property
-    def mesh_stiffness(self) -> Array:
-        """(mesh,) N/m."""
-
-    @property
-    def mesh_loss_factor(self) -> Array:
-        """(mesh,)."""
-
-    @property
-    def mesh_damping(self) -> Array:
-        """(mesh,) N s/m."""
-
-
-def closed_line(matrices: Matrices) -> tuple[LinearLine, Elements]:
+def closed_line(matrices: LineMatrices) -> tuple[LinearLine, Elements]:
     """A line whose meshes never lose contact, each a spring of its stiffness, and those meshes."""
     meshes = Elements(
         directions=matrices.directions,
@@ -177,7 +139,7 @@ class SteadyResponse:
     @property
     def speed_deviation(self) -> ComplexArray:
         """Complex amplitudes of the speed, (dof, order) rad/s."""
-        return np.asarray(1j * self.speed * self.orders * self.angle)
+        return 1j * self.speed * self.orders * self.angle
 
     def speed_over_cycle(self, n_points: int) -> Array:
         """Deviation of the speed from its mean over the cycle, (dof, point) rad/s."""
@@ -188,9 +150,7 @@ class SteadyResponse:
 
         What is printed as plus or minus.
         """
-        return np.asarray(
-            0.5 * np.ptp(self.speed_over_cycle(32 * len(self.orders)), axis=1)
-        )
+        return 0.5 * np.ptp(self.speed_over_cycle(32 * len(self.orders)), axis=1)
 
     def element_forces(self, elements: Elements) -> tuple[Array, ComplexArray]:
         """Mean (element,) and complex amplitudes (element, order) of what the elements carry, N m
@@ -198,8 +158,8 @@ class SteadyResponse:
         """
         complex_stiffness = elements.stiffness + 1j * elements.loss
         return (
-            np.asarray(elements.stiffness * (elements.directions @ self.twist)),
-            np.asarray(complex_stiffness[:, None] * (elements.directions @ self.angle)),
+            elements.stiffness * (elements.directions @ self.twist),
+            complex_stiffness[:, None] * (elements.directions @ self.angle),
         )
 
 
@@ -214,11 +174,12 @@ def over_cycle(amplitudes: ComplexArray, n_points: int) -> Array:
     n_orders = amplitudes.shape[-1]
     if n_points <= 2 * n_orders:
         raise ValueError(
-            f"{n_points} points of a cycle cannot hold {n_orders} orders; more than {2 * n_orders} can"
+            f"{n_points} points of a cycle cannot hold {n_orders} orders; more than "
+            f"{2 * n_orders} can"
         )
     spectrum = np.zeros((*amplitudes.shape[:-1], n_points // 2 + 1), dtype=complex)
     spectrum[..., 1 : n_orders + 1] = 0.5 * n_points * amplitudes
-    return np.asarray(np.fft.irfft(spectrum, n_points, axis=-1))
+    return np.fft.irfft(spectrum, n_points, axis=-1)
 
 
 def cycle_orders(torque: Array, n_orders: int) -> tuple[Array, ComplexArray]:
@@ -232,12 +193,11 @@ def cycle_orders(torque: Array, n_orders: int) -> tuple[Array, ComplexArray]:
     n_points = torque.shape[-1]
     if not 1 <= n_orders < n_points / 2:
         raise ValueError(
-            f"n_orders = {n_orders} must lie in 1..{(n_points - 1) // 2}: there are {n_points} points"
+            f"n_orders = {n_orders} must lie in 1..{(n_points - 1) // 2}: there are "
+            f"{n_points} points"
         )
     spectrum = np.fft.rfft(torque, axis=-1) / n_points
-    return np.asarray(spectrum[..., 0].real), np.asarray(
-        2.0 * spectrum[..., 1 : n_orders + 1]
-    )
+    return spectrum[..., 0].real, 2.0 * spectrum[..., 1 : n_orders + 1]
 
 
 def steady_response(
@@ -253,7 +213,8 @@ def steady_response(
 
     Raises
     ------
-    SimulationError    where the mean torques of a free line do not balance: it would not turn steadily
+    SimulationError    where the mean torques of a free line do not balance: it would not turn
+        steadily
     """
     if not speed > 0.0:
         raise ValueError(f"the speed, {speed:g} rad/s, must be positive")
@@ -273,7 +234,7 @@ def disturbance_response(
     """
     force = np.zeros((1, len(line.mass)), dtype=complex)
     force[0, dof] = torque
-    return np.asarray(line.response(force, np.array([frequency]))[0])
+    return line.response(force, np.array([frequency]))[0]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -322,21 +283,23 @@ def run_of_speeds(
 
     Notes
     -----
-    Steady at every speed: a run-up that is slow against the line's decay. Up and down are then the same.
+    Steady at every speed: a run-up that is slow against the line's decay. Up and down are then
+    the same.
     """
-    found = [
+    responses = [
         steady_response(line, torques(speed), speed, n_orders=n_orders)
         for speed in speeds
     ]
-    if not found:
+    if not responses:
         raise ValueError("no speed is given")
-    fluctuations = [one.fluctuation() for one in found]
+    angle = np.array([response.angle for response in responses])
+    fluctuation = np.array([response.fluctuation() for response in responses])
     return [
         Waterfall(
-            speeds=np.array([one.speed for one in found]),
-            orders=found[0].orders,
-            angle=np.abs(np.array([one.angle[dof] for one in found])),
-            fluctuation=np.array([one[dof] for one in fluctuations]),
+            speeds=np.array([response.speed for response in responses]),
+            orders=responses[0].orders,
+            angle=np.abs(angle[:, dof]),
+            fluctuation=fluctuation[:, dof],
         )
         for dof in dofs
     ]
@@ -358,7 +321,8 @@ def _mean_twist(line: LinearLine, mean: Array) -> Array:
         float(np.max(np.abs(mean))), 1e-300
     ):
         raise SimulationError(
-            f"the mean torques leave {np.max(np.abs(rest)):.4g} N m on a line that nothing holds; balance them"
+            f"the mean torques leave {np.max(np.abs(rest)):.4g} N m on a line that "
+            "nothing holds; balance them"
         )
     twist = vectors[:, held] @ ((vectors[:, held].T @ mean) / values[held])
     free = vectors[:, ~held]
@@ -366,4 +330,4 @@ def _mean_twist(line: LinearLine, mean: Array) -> Array:
         twist = twist - free @ np.linalg.solve(
             free.T @ line.mass @ free, free.T @ (line.mass @ twist)
         )
-    return np.asarray(twist)
+    return twist

@@ -139,4 +139,4 @@ def with_viscous_losses(matrices: LineMatrices) -> LineMatrices:
 
 def _quadratic(shapes: Array, matrix: Array) -> Array:
     """phi' A phi of every shape, (mode,)."""
-    return np.asarray(np.einsum("md,de,me->m", shapes, matrix, shapes))
+    return np.einsum("md,de,me->m", shapes, matrix, shapes)

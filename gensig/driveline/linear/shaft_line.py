@@ -9,6 +9,7 @@ stiffnesses are those of their own shaft, none is referred to another one.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -20,6 +21,7 @@ from gensig.dynamics.pair import Support
 from gensig.errors import ConfigError
 
 Array = NDArray[np.float64]
+Groups = tuple[tuple[int, ...], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,9 +41,9 @@ class Node:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shaft:
-    """A torsional spring between two nodes: stiffness in N m/rad, viscous damping in N m s/rad,
-    loss factor.
+    """A torsional spring between two nodes.
 
+    Stiffness in N m/rad, viscous damping in N m s/rad, loss factor.
     A ``rigid`` one is a compound that may be merged; one whose stiffness is None always is. One
     of stiffness 0 is a damper alone.
     """
@@ -98,12 +100,12 @@ class LineGear:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearMesh:
-    """Two external gears in mesh, places in ``ShaftLine.gears``; ``stiffness`` N/m along the
-    transverse line of action.
+    """Two external gears in mesh, by their numbers in ``ShaftLine.gears``.
 
-    ``backlash`` m is the play along it that is left to the coast flank. ``center_line`` rad is
-    the direction from the driving to the driven gear's centre in the common plane and
-    ``pressure_angle`` rad the transverse working one: lateral motion needs both.
+    ``stiffness`` N/m is along the transverse line of action. ``backlash`` m is the play along it
+    that is left to the coast flank. ``center_line`` rad is the direction from the driving to the
+    driven gear's centre in the common plane and ``pressure_angle`` rad the transverse working
+    one: lateral motion needs both.
     """
 
     driving: int
@@ -135,13 +137,21 @@ def _check_losses(place: str, damping: float, loss_factor: float) -> None:
             raise ConfigError(f"{place}: {name} {value:g} must not be negative")
 
 
+def _check_numbers(name: str, numbers: tuple[int, ...], count: int, kind: str) -> None:
+    for number in numbers:
+        if not 0 <= number < count:
+            raise ConfigError(
+                f"{name}: there is no {kind} {number}, only 0..{count - 1}"
+            )
+
+
 @dataclass(frozen=True, kw_only=True)
 class ShaftLine:
-    """Nodes and all that joins them; places count from 0. No slots: what is derived is kept.
+    """Nodes and all that joins them; numbers count from 0. No slots: derived values are kept.
 
     Raises
     ------
-    ConfigError    for joints of nodes or gears that there are not, and for loops whose gears would lock
+    ConfigError    for joints of nodes or gears that do not exist, and for loops whose gears lock
     """
 
     nodes: tuple[Node, ...]
@@ -152,145 +162,118 @@ class ShaftLine:
     def __post_init__(self) -> None:
         if not self.nodes:
             raise ConfigError("a shaft line needs at least one node")
+        n_nodes, n_gears = len(self.nodes), len(self.gears)
         for shaft in self.shafts:
-            self._check_places(
-                shaft.place or "a shaft",
-                (shaft.first, shaft.second),
-                len(self.nodes),
-                "node",
-            )
+            ends = shaft.first, shaft.second
+            _check_numbers(shaft.place or "a shaft", ends, n_nodes, "node")
         for gear in self.gears:
-            self._check_places(gear.name, (gear.node,), len(self.nodes), "node")
+            _check_numbers(gear.name, (gear.node,), n_nodes, "node")
         for mesh in self.meshes:
-            self._check_places(
-                mesh.place or "a mesh",
-                (mesh.driving, mesh.driven),
-                len(self.gears),
-                "gear",
-            )
+            place = mesh.place or "a mesh"
+            _check_numbers(place, (mesh.driving, mesh.driven), n_gears, "gear")
             one, other = self.gears[mesh.driving], self.gears[mesh.driven]
             if one.node == other.node:
                 raise ConfigError(
-                    f"{mesh.place or 'a mesh'}: {one.name} and {other.name} turn with the same node"
+                    f"{place}: {one.name} and {other.name} turn with the same node"
                 )
+            expected = one.base_radius * other.n_teeth
             if not math.isclose(
-                one.base_radius * other.n_teeth,
-                other.base_radius * one.n_teeth,
-                rel_tol=1e-9,
+                expected, other.base_radius * one.n_teeth, rel_tol=1e-9
             ):
                 raise ConfigError(
-                    f"{mesh.place or 'a mesh'}: the base radii of {one.name} and {other.name} are not as their teeth, "
-                    f"{one.n_teeth} and {other.n_teeth}; they have another module, pressure angle or helix angle"
+                    f"{place}: the base radii of {one.name} and {other.name} are not as their "
+                    f"teeth, {one.n_teeth} and {other.n_teeth}; they have another module, "
+                    "pressure angle or helix angle"
                 )
-        _ = self._turning  # refuses loops that lock
-
-    @staticmethod
-    def _check_places(
-        what: str, places: tuple[int, ...], count: int, kind: str
-    ) -> None:
-        for place in places:
-            if not 0 <= place < count:
-                raise ConfigError(
-                    f"{what}: there is no {kind} {place}, only 0..{count - 1}"
-                )
+        _ = self._speeds  # refuses loops that lock
 
     @cached_property
-    def _turning(self) -> tuple[tuple[Fraction, ...], tuple[int, ...]]:
-        """Signed speed of every node over that of the first of its part, exactly, and the number
-        of its part.
-        """
+    def _speeds(self) -> tuple[Fraction, ...]:
+        """Signed speed of every node over that of the first of its part, exactly, (node,)."""
         joints: list[list[tuple[int, Fraction, str]]] = [[] for _ in self.nodes]
         for shaft in self.shafts:
             joints[shaft.first].append((shaft.second, Fraction(1), shaft.place))
             joints[shaft.second].append((shaft.first, Fraction(1), shaft.place))
         for mesh in self.meshes:
             one, other = self.gears[mesh.driving], self.gears[mesh.driven]
-            joints[one.node].append(
-                (other.node, Fraction(-one.n_teeth, other.n_teeth), mesh.place)
-            )
-            joints[other.node].append(
-                (one.node, Fraction(-other.n_teeth, one.n_teeth), mesh.place)
-            )
-        speed: list[Fraction | None] = [None] * len(self.nodes)
-        part = [-1] * len(self.nodes)
+            ratio = Fraction(-one.n_teeth, other.n_teeth)
+            joints[one.node].append((other.node, ratio, mesh.place))
+            joints[other.node].append((one.node, 1 / ratio, mesh.place))
+        speeds: dict[int, Fraction] = {}
         for first in range(len(self.nodes)):
-            if speed[first] is not None:
+            if first in speeds:
                 continue
-            speed[first], part[first], waiting = Fraction(1), max(part) + 1, [first]
+            speeds[first] = Fraction(1)
+            waiting = [first]
             while waiting:
                 node = waiting.pop()
-                own = speed[node]
-                assert own is not None
                 for mate, ratio, place in joints[node]:
-                    known = speed[mate]
-                    if known is None:
-                        speed[mate], part[mate] = own * ratio, part[first]
+                    speed = speeds[node] * ratio
+                    if mate not in speeds:
+                        speeds[mate] = speed
                         waiting.append(mate)
-                    elif known != own * ratio:
+                    elif speeds[mate] != speed:
                         raise ConfigError(
-                            f"{place or 'a loop'}: this joint closes a loop that locks: it would turn "
-                            f"{self.nodes[mate].name} at {float(own * ratio):g} of the first node's speed, the rest of "
-                            f"the loop at {float(known):g}; change teeth or leave the joint out"
+                            f"{place or 'a loop'}: this joint closes a loop that locks: it would "
+                            f"turn {self.nodes[mate].name} at {float(speed):g} of the first "
+                            f"node's speed, the rest of the loop at {float(speeds[mate]):g}; "
+                            "change teeth or leave the joint out"
                         )
-        return tuple(value for value in speed if value is not None), tuple(part)
+        return tuple(speeds[node] for node in range(len(self.nodes)))
 
     @property
     def speed_ratio(self) -> Array:
-        """Speed of every node over that of the first of its part, negative where it turns the
-        other way, (node,).
+        """Speed of every node over that of the first of its part, (node,).
+
+        Negative where it turns the other way.
         """
-        return np.array([float(value) for value in self._turning[0]])
+        return np.array([float(speed) for speed in self._speeds])
+
+    def _joined(self, shafts: Iterable[Shaft], *, with_meshes: bool) -> Groups:
+        """Nodes that chains of some shafts, and of all meshes, join; by their first nodes."""
+        joints = [(shaft.first, shaft.second) for shaft in shafts]
+        if with_meshes:
+            joints += [
+                (self.gears[mesh.driving].node, self.gears[mesh.driven].node)
+                for mesh in self.meshes
+            ]
+        leader = np.arange(len(self.nodes))
+        for first, second in joints:
+            one, other = sorted((leader[first], leader[second]))
+            leader[leader == other] = one
+        return tuple(
+            tuple(np.flatnonzero(leader == first).tolist())
+            for first in np.unique(leader)
+        )
 
     @property
-    def parts(self) -> tuple[tuple[int, ...], ...]:
+    def parts(self) -> Groups:
         """Nodes of each part of the line that nothing joins to the others.
 
         A free line has a rigid mode for each.
         """
-        part = self._turning[1]
-        return tuple(
-            tuple(n for n, own in enumerate(part) if own == one)
-            for one in range(max(part) + 1)
-        )
+        return self._joined(self.shafts, with_meshes=True)
 
     @property
-    def elastic_parts(self) -> tuple[tuple[int, ...], ...]:
-        """Nodes that springs, compounds and meshes hold to each other: the parts, less rings that
-        only a fluid holds.
+    def elastic_parts(self) -> Groups:
+        """Nodes that springs, compounds and meshes hold to each other.
 
-        Each turns as one without deforming anything, first that of the first node.
+        The parts, less rings that only a fluid holds. Each turns as one without deforming
+        anything, first that of the first node.
         """
-        leader = list(range(len(self.nodes)))
-        joints = [
-            (shaft.first, shaft.second)
-            for shaft in self.shafts
-            if shaft.stiffness != 0.0
-        ]
-        joints += [
-            (self.gears[mesh.driving].node, self.gears[mesh.driven].node)
-            for mesh in self.meshes
-        ]
-        for first, second in joints:
-            one, other = sorted((leader[first], leader[second]))
-            leader = [one if own == other else own for own in leader]
-        return tuple(
-            tuple(n for n, own in enumerate(leader) if own == one)
-            for one in sorted(set(leader))
-        )
+        springs = [shaft for shaft in self.shafts if shaft.stiffness != 0.0]
+        return self._joined(springs, with_meshes=True)
 
     @property
     def n_loops(self) -> int:
         """Independent closed loops: joints beyond those of a tree."""
         return len(self.shafts) + len(self.meshes) - len(self.nodes) + len(self.parts)
 
-    def compounds(self, *, merge_rigid: bool) -> tuple[tuple[int, ...], ...]:
+    def compounds(self, *, merge_rigid: bool) -> Groups:
         """Nodes that turn as one, in the order of their first node."""
-        leader = list(range(len(self.nodes)))
-        for shaft in self.shafts:
-            if shaft.stiffness is None or (merge_rigid and shaft.rigid):
-                one, other = sorted((leader[shaft.first], leader[shaft.second]))
-                leader = [one if own == other else own for own in leader]
-        return tuple(
-            tuple(n for n, own in enumerate(leader) if own == one)
-            for one in sorted(set(leader))
-        )
+        rigid = [
+            shaft
+            for shaft in self.shafts
+            if shaft.stiffness is None or (merge_rigid and shaft.rigid)
+        ]
+        return self._joined(rigid, with_meshes=False)

@@ -1,4 +1,4 @@
-"""Where the numbers of a geared shaft line lie in the arrays of its compiled core."""
+"""Layout of the arrays of a geared shaft line's compiled core."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from gensig.dynamics._vector import inlined
 
 # numbers of a mesh
 (
-    BACKLASH, DAMPING, SHARED, START, NOMINAL_PITCHES, PITCHES_PER_RAD, MIRROR, LEAST_GAP, LEAST_COAST_GAP,
-    N_NUMBERS,
+    BACKLASH, DAMPING, SHARED, START, NOMINAL_PITCHES, PITCHES_PER_RAD, MIRROR,
+    LEAST_GAP, LEAST_COAST_GAP, N_NUMBERS,
 ) = range(10)  # fmt: skip
 # whole numbers of a mesh; those called AT_ say where a flat array begins
 (
-    ROLL_DOF, N_PAIRS, FIRST, NODES, AT_TABLE, AT_ROWS, AT_COAST_ROWS, TEETH_A, TEETH_B, AT_KIND_A, AT_KIND_B,
-    AT_ERROR_A, AT_ERROR_B, START_A, START_B, N_KINDS_B, N_SPRINGS, AT_DEPTH, N_PLACES,
+    ROLL_DOF, N_PAIRS, FIRST, NODES, AT_TABLE, AT_ROWS, AT_COAST_ROWS, TEETH_A, TEETH_B,
+    AT_KIND_A, AT_KIND_B, AT_ERROR_A, AT_ERROR_B, START_A, START_B, N_KINDS_B, N_SPRINGS,
+    AT_DEPTH, N_PLACES,
 ) = range(19)  # fmt: skip
 # what is gathered of a pair: gap and stiffness of each of its springs, each with how fast it
 # grows as the mesh rolls on

@@ -110,8 +110,8 @@ def flank_law(pairs, depth, damping, shared, within, rate, roll_rate):
 
     Returns
     -------
-    what ``_layout.N_LAW`` names: force, its slopes over approach and rate, stored energy, power lost, force along
-    the roll
+    what ``_layout.N_LAW`` names: force, its slopes over approach and rate, stored energy, power
+    lost, force along the roll
     """
     total, least = 0.0, 0.0
     for _ in range(len(pairs) * len(depth) + 1):
@@ -239,9 +239,11 @@ def solve_contact(
     Parameters
     ----------
     compliance : (mesh, mesh) m/N   W, symmetric and positive: what forces take off the approaches
-    free : (mesh,) m                approaches if the meshes went on with the forces ``carried`` (mesh, N_LAW)
+    free : (mesh,) m                approaches if the meshes went on with the forces ``carried``
+        (mesh, N_LAW)
     before, rate_before : (mesh,)   approaches and their rates where the step began
-    per_step : 1/s                  2 / h: the rate is per_step (delta - before) - rate_before; 0 for statics
+    per_step : 1/s                  2 / h: the rate is per_step (delta - before) - rate_before;
+        0 for statics
     approach : (mesh,) m            first guess, takes the solution
     law : (mesh, N_LAW)             what the meshes do there, at the guess and then at the solution
     work : ``Work``

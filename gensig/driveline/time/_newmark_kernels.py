@@ -1,5 +1,4 @@
-"""Compiled core: Newmark's average acceleration for a geared shaft line, and where the line is at
-rest.
+"""Compiled core: Newmark's average acceleration for a geared shaft line, and its state at rest.
 
 The symbols are those of ``docs/theory/shaft_line_integration.md``. Scalar code without
 reassociation, own loops instead of library calls: bits depend on nothing but the numbers given.
@@ -191,7 +190,7 @@ def push(line, torques, angle, gain, knot, share, q, force):
 
 @compiled
 def roll(meshes, angle, speed, q, v, turned, roll_rate):
-    """Where the meshes have rolled to, in pitches, and how fast, (mesh,) each."""
+    """Roll of the meshes in pitches, and its rate, (mesh,) each."""
     for m in range(len(turned)):
         number, dof = meshes.number[m], meshes.place[m, layout.ROLL_DOF]
         per_angle, per_rad = (
@@ -241,8 +240,8 @@ def advance(
 
     Parameters
     ----------
-    state : q, v, mean acceleration over the last step, torques (dof,), approach, its rate (mesh,), law (mesh, N_LAW)
-        as ``look`` makes them; all advanced in place
+    state : q, v, mean acceleration over the last step, torques (dof,), approach, its rate
+        (mesh,), law (mesh, N_LAW) as ``look`` makes them; all advanced in place
     channels : (channel, 2)    kind and index
     out : (step, column)    takes the channels' means over every step in its first columns
     tally, sums : (mesh, N_TALLY), (N_SUMS,)    are added to
@@ -370,7 +369,7 @@ def advance(
 
 @compiled
 def rest(line, meshes, force, angle, q, law, work):
-    """Where the line stands still under ``force`` (dof,) at a nominal angle: q in place.
+    """Deviations q at rest under ``force`` (dof,) at a nominal angle, in place.
 
     ``line`` holds the factor of sigma M + K. Each round solves (sigma M + K) q = f + sigma M
     q_before - D^T F(q), a step towards the least of a convex energy that leaves sigma / (sigma +

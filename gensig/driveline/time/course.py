@@ -1,7 +1,4 @@
-"""What drives a shaft line over time.
-
-Its nominal rotation, and torques over the angle of their shafts.
-"""
+"""Nominal rotation of a shaft line over time, and torques over the angle of their shafts."""
 
 from __future__ import annotations
 
@@ -37,13 +34,15 @@ class LineCourse:
             or len(self.time) < 1
         ):
             raise ConfigError(
-                f"course: time {self.time.shape} and speed {self.speed.shape} must be alike, (knot,)"
+                f"course: time {self.time.shape} and speed {self.speed.shape} must be "
+                "alike, (knot,)"
             )
         if not np.isfinite(self.time).all() or np.any(np.diff(self.time) <= 0.0):
             raise ConfigError("course: the times of its knots must increase")
         if not np.isfinite(self.speed).all() or self.speed.min() < 0.0:
             raise ConfigError(
-                f"course: speed {from_si('speed_rpm', float(self.speed.min())):g} r/min must not be negative"
+                f"course: speed {from_si('speed_rpm', float(self.speed.min())):g} "
+                "r/min must not be negative"
             )
 
     @cached_property
@@ -97,7 +96,8 @@ class ShaftTorque:
             )
         if not 0.0 < self.period < np.inf:
             raise ConfigError(
-                f"torque on degree of freedom {self.dof}: period {self.period:g} rad must be positive"
+                f"torque on degree of freedom {self.dof}: period {self.period:g} rad "
+                "must be positive"
             )
         if self.factor is not None and not np.isfinite(self.factor).all():
             raise ConfigError(

@@ -19,11 +19,11 @@ from gensig.mesh.pair_table import SMOOTHED_GAP, SMOOTHED_SHARE
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-CLOSING = (
-    1e-6  # of its terms, by which nominal rotation may close a mesh: radii come rounded
-)
+# of its terms, by which nominal rotation may close a mesh: radii come rounded
+CLOSING = 1e-6
 SYMMETRIC = 1e-9
-FULL = 0.5  # of a matrix that is filled, or of a triangle of its factor: from there on, all of it costs less
+# of a matrix that is filled, or of a triangle of its factor: from there on, all of it costs less
+FULL = 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,11 +45,8 @@ class GearedLine:
 
     def __post_init__(self) -> None:
         n = len(self.names)
-        for matrix, what in (
-            (self.mass, "mass"),
-            (self.damping, "damping"),
-            (self.stiffness, "stiffness"),
-        ):
+        for what in ("mass", "damping", "stiffness"):
+            matrix = getattr(self, what)
             if matrix.shape != (n, n) or not np.isfinite(matrix).all():
                 raise ConfigError(
                     f"line: the {what} matrix {matrix.shape} must be ({n}, {n}), all finite"
@@ -77,7 +74,8 @@ class GearedLine:
         n = len(self.names)
         if mesh.direction.shape != (n,) or not np.isfinite(mesh.direction).all():
             raise ConfigError(
-                f"mesh '{mesh.name}': direction {mesh.direction.shape} must be ({n},), one a freedom"
+                f"mesh '{mesh.name}': direction {mesh.direction.shape} must be "
+                f"({n},), one a freedom"
             )
         if (
             not 0 <= mesh.roll_dof < n
@@ -85,12 +83,14 @@ class GearedLine:
             or mesh.direction[mesh.roll_dof] == 0.0
         ):
             raise ConfigError(
-                f"mesh '{mesh.name}': roll_dof {mesh.roll_dof} must be the rotation of its gear a, in 0..{n - 1}"
+                f"mesh '{mesh.name}': roll_dof {mesh.roll_dof} must be the rotation "
+                f"of its gear a, in 0..{n - 1}"
             )
         closing = mesh.direction * self.rotation
         if abs(closing.sum()) > CLOSING * np.abs(closing).sum():
             raise ConfigError(
-                f"mesh '{mesh.name}': nominal rotation closes it by {closing.sum():g} m/rad; its base radii "
+                f"mesh '{mesh.name}': nominal rotation closes it by {closing.sum():g} "
+                "m/rad; its base radii "
                 f"contradict the speed ratios"
             )
 
@@ -106,16 +106,11 @@ def pack_line(
         for part in (line.mass, line.damping, line.stiffness)
     )
     direction = _direction(line, order)
-    answer, compliance = (
-        np.empty(direction.shape),
-        np.empty((len(direction), len(direction))),
-    )
+    answer = np.empty(direction.shape)
+    compliance = np.empty((len(direction), len(direction)))
     rows = _rows(direction)
-    factor = _factor(
-        mass_share * mass + damping_share * damping + stiffness,
-        [line.names[i] for i in order],
-        step,
-    )
+    dynamic = mass_share * mass + damping_share * damping + stiffness
+    factor = _factor(dynamic, [line.names[i] for i in order], step)
     kernels.respond(factor, rows, answer, compliance)
     rotation = line.rotation[order]
     sparse_mass, carried = _padded(mass), np.zeros(len(order))
@@ -151,8 +146,13 @@ def pack_meshes(line: GearedLine, order: Index) -> Meshes:
     """All meshes of the line, its degrees of freedom in ``order``."""
     number = np.zeros((len(line.meshes), layout.N_NUMBERS))
     place = np.zeros((len(line.meshes), layout.N_PLACES), dtype=np.int64)
+    numbers, indices = np.empty(0), np.empty(0, dtype=np.int64)
     parts: dict[str, list[NDArray]] = {
-        name: [] for name in ("table", "depth", "rows", "kind", "error")
+        "table": [numbers],
+        "depth": [numbers],
+        "rows": [indices],
+        "kind": [indices],
+        "error": [numbers],
     }
     at_of = np.argsort(order)
 
@@ -165,32 +165,22 @@ def pack_meshes(line: GearedLine, order: Index) -> Meshes:
         turning, (n_a, n_b) = float(line.rotation[mesh.roll_dof]), mesh.n_teeth
         per_rad, least_gap = n_a / (2.0 * np.pi), mesh.gap.min() - 0.25 * SMOOTHED_GAP
         number[m] = (
-            mesh.backlash, mesh.damping, mesh.shared_compliance, mesh.start_phase, abs(turning) * per_rad,
-            np.sign(turning) * per_rad, mesh.mirror, least_gap + sum(error.min() for error in mesh.errors), least_gap,
+            mesh.backlash, mesh.damping, mesh.shared_compliance, mesh.start_phase,
+            abs(turning) * per_rad, np.sign(turning) * per_rad, mesh.mirror,
+            least_gap + sum(error.min() for error in mesh.errors), least_gap,
         )  # fmt: skip
         place[m] = (
-            at_of[mesh.roll_dof], mesh.n_pairs, mesh.first_pitch, (mesh.stiffness.shape[1] - 1) // mesh.n_pairs,
-            put("table", _columns(mesh).ravel()),
+            at_of[mesh.roll_dof], mesh.n_pairs, mesh.first_pitch,
+            (mesh.stiffness.shape[1] - 1) // mesh.n_pairs, put("table", _columns(mesh).ravel()),
             put("rows", mesh.rows.ravel()), put("rows", mesh.coast_rows.ravel()), n_a, n_b,
             put("kind", mesh.kinds[0]), put("kind", mesh.kinds[1]),
-            put("error", mesh.errors[0]), put("error", mesh.errors[1]), *mesh.start_teeth, mesh.rows.shape[1],
-            len(mesh.depth), put("depth", mesh.depth),
+            put("error", mesh.errors[0]), put("error", mesh.errors[1]), *mesh.start_teeth,
+            mesh.rows.shape[1], len(mesh.depth), put("depth", mesh.depth),
         )  # fmt: skip
         if mesh.rows.shape != mesh.coast_rows.shape:
             raise ConfigError(f"mesh '{mesh.name}': rows and coast_rows must be alike")
-    return Meshes(
-        number=number,
-        place=place,
-        table=np.concatenate([*parts["table"], np.empty(0)]),
-        depth=np.concatenate([*parts["depth"], np.empty(0)]),
-        rows=np.concatenate([*parts["rows"], np.empty(0, dtype=np.int64)]).astype(
-            np.int64
-        ),
-        kind=np.concatenate([*parts["kind"], np.empty(0, dtype=np.int64)]).astype(
-            np.int64
-        ),
-        error=np.concatenate([*parts["error"], np.empty(0)]),
-    )
+    flat = {name: np.concatenate(values) for name, values in parts.items()}
+    return Meshes(number=number, place=place, **flat)
 
 
 def _columns(mesh: LineMesh) -> Array:
@@ -239,21 +229,22 @@ def pack_torques(
             raise ConfigError(
                 f"torque {j}: degree of freedom {torque.dof} must lie in 0..{n - 1}"
             )
-        told, turning = (
-            f"torque on '{line.names[torque.dof]}'",
-            float(line.rotation[torque.dof]),
-        )
+        name = f"torque on '{line.names[torque.dof]}'"
+        turning = float(line.rotation[torque.dof])
         if len(torque.table) > 1 and turning == 0.0:
             raise ConfigError(
-                f"{told}: a table over its angle needs a degree of freedom that turns; give one number"
+                f"{name}: a table over its angle needs a degree of freedom that "
+                "turns; give one number"
             )
         if torque.factor is not None:
             if torque.factor.shape != (n_knots,):
                 raise ConfigError(
-                    f"{told}: factor {torque.factor.shape} must be ({n_knots},), the course's knots"
+                    f"{name}: factor {torque.factor.shape} must be ({n_knots},), the course's knots"
                 )
             factor[j] = torque.factor
-        sense = -1.0 if turning < 0.0 else 1.0
+        sense = 1.0
+        if turning < 0.0:
+            sense = -1.0
         factor[j] *= sense
         per_rad[j] = sense * len(torque.table) / torque.period
         shift[j] = torque.phase * len(torque.table) / torque.period
@@ -278,7 +269,7 @@ def _direction(line: GearedLine, order: Index) -> Array:
 
 
 def _rows(matrix: Array) -> Rows:
-    """What is not 0 of a matrix, row by row."""
+    """Entries of a matrix other than 0, row by row."""
     filled = matrix != 0.0
     return Rows(
         first=np.concatenate([[0], np.cumsum(filled.sum(axis=1))]).astype(np.int64),

@@ -28,16 +28,20 @@ class LineMesh:
     as many pairs are looked at; its teeth are ``start_teeth`` + i, counted as they enter. The
     back flanks meet along the mirrored roll ``mirror`` - u.
 
-    direction : (dof,)                 gradient of the approach along the transverse line of action, m/rad or 1
+    direction : (dof,)                 gradient of the approach along the transverse line of
+        action, m/rad or 1
     gap : (row, node)                  of one pair in m; a smooth cubic between nodes
-    depth : (spring,)                  m, how deep a pair bites where each of its springs begins to bear; from 0 on
-    stiffness : (row * spring, node)   of each spring in N/m, those of one row after those of the one before
-    rows, coast_rows : (kind, kind)    the row of a pair of kinds of teeth of a and b on either flank, -1 for a pair
-                                       that never touches (a missing tooth)
+    depth : (spring,)                  m, how deep a pair bites where each of its springs begins
+        to bear; from 0 on
+    stiffness : (row * spring, node)   of each spring in N/m, those of one row after those of
+        the one before
+    rows, coast_rows : (kind, kind)    the row of a pair of kinds of teeth of a and b on either
+                                       flank, -1 for a pair that never touches (a missing tooth)
     kinds : (tooth,) of a and of b     the kind of every tooth
     errors : (tooth,) of a and of b    m, open the gaps of their teeth on the drive flank
     backlash : m                       along the line of action
-    damping : s/m                      times the rate of a pair is the share by which it raises its elastic force
+    damping : s/m                      times the rate of a pair is the share by which it raises
+        its elastic force
     shared_compliance : m/N            what all pairs in contact share
     """
 
@@ -61,67 +65,62 @@ class LineMesh:
     depth: Array = field(default_factory=lambda: np.zeros(1))
 
     def __post_init__(self) -> None:
-        told = f"mesh '{self.name}'"
-        if (
-            not len(self.depth)
-            or self.depth[0] != 0.0
-            or not np.all(np.diff(self.depth) > 0.0)
-        ):
-            raise ConfigError(f"{told}: depth {self.depth} must begin at 0 and grow")
-        if self.stiffness.ndim != 2 or self.stiffness.shape != (
-            len(self.gap) * len(self.depth),
-            *self.gap.shape[1:],
-        ):
-            raise ConfigError(
-                f"{told}: stiffness {self.stiffness.shape} and gap {self.gap.shape} must be alike, (row, node), with "
-                f"{len(self.depth)} springs a row"
+        self._check_tables()
+        self._check_teeth()
+        for key in ("backlash", "damping", "shared_compliance"):
+            if not 0.0 <= getattr(self, key) < math.inf:
+                raise self._error(f"{key} {getattr(self, key):g} must not be negative")
+
+    def _error(self, message: str) -> ConfigError:
+        return ConfigError(f"mesh '{self.name}': {message}")
+
+    def _check_tables(self) -> None:
+        """Raise for springs, stiffnesses and gaps that make no table."""
+        n_springs = len(self.depth)
+        grows = np.all(np.diff(self.depth) > 0.0)
+        if not n_springs or self.depth[0] != 0.0 or not grows:
+            raise self._error(f"depth {self.depth} must begin at 0 and grow")
+        expected = len(self.gap) * n_springs, *self.gap.shape[1:]
+        if self.stiffness.ndim != 2 or self.stiffness.shape != expected:
+            raise self._error(
+                f"stiffness {self.stiffness.shape} and gap {self.gap.shape} must be "
+                f"alike, (row, node), with {n_springs} springs a row"
             )
-        n_rows, n_nodes = self.gap.shape
+        n_nodes = self.gap.shape[1]
         if self.n_pairs < 1 or n_nodes < 2 or (n_nodes - 1) % self.n_pairs:
-            raise ConfigError(
-                f"{told}: {n_nodes} nodes over {self.n_pairs} pitches; give a whole number of cells a pitch and one "
-                f"node more"
+            raise self._error(
+                f"{n_nodes} nodes over {self.n_pairs} pitches; give a whole number of "
+                "cells a pitch and one node more"
             )
         for values, what in ((self.stiffness, "stiffness"), (self.gap, "gap")):
             if not np.isfinite(values).all():
-                raise ConfigError(
-                    f"{told}: {what} is not finite; a pair that never touches is row -1"
+                raise self._error(
+                    f"{what} is not finite; a pair that never touches is row -1"
                 )
         if self.stiffness.min() < 0.0:
-            raise ConfigError(
-                f"{told}: stiffness {self.stiffness.min():g} N/m must not be negative"
+            raise self._error(
+                f"stiffness {self.stiffness.min():g} N/m must not be negative"
             )
+
+    def _check_teeth(self) -> None:
+        """Raise for kinds, errors and start teeth that do not fit the tables."""
         counts = tuple(int(kind.max()) + 1 for kind in self.kinds)
+        last = len(self.gap) - 1
         for rows, what in ((self.rows, "rows"), (self.coast_rows, "coast_rows")):
-            if (
-                rows.shape[0] < counts[0]
-                or rows.shape[1] < counts[1]
-                or rows.min() < -1
-                or rows.max() >= n_rows
-            ):
-                raise ConfigError(
-                    f"{told}: {what} {rows.shape} must name rows -1..{n_rows - 1} for {counts} kinds"
+            is_small = rows.shape[0] < counts[0] or rows.shape[1] < counts[1]
+            if is_small or rows.min() < -1 or rows.max() > last:
+                raise self._error(
+                    f"{what} {rows.shape} must name rows -1..{last} for {counts} kinds"
                 )
-        for kind, error, start in zip(
-            self.kinds, self.errors, self.start_teeth, strict=True
-        ):
-            if (
-                len(kind) != len(error)
-                or kind.min() < 0
-                or not np.isfinite(error).all()
-            ):
-                raise ConfigError(
-                    f"{told}: {len(kind)} teeth need as many kinds, and finite errors, not {len(error)}"
+        teeth = zip(self.kinds, self.errors, self.start_teeth, strict=True)
+        for kind, error, start in teeth:
+            n = len(kind)
+            if n != len(error) or kind.min() < 0 or not np.isfinite(error).all():
+                raise self._error(
+                    f"{n} teeth need as many kinds, and finite errors, not {len(error)}"
                 )
-            if not 0 <= start < len(kind):
-                raise ConfigError(
-                    f"{told}: start tooth {start} must lie in 0..{len(kind) - 1}"
-                )
-        for key in ("backlash", "damping", "shared_compliance"):
-            if not 0.0 <= getattr(self, key) < math.inf:
-                raise ConfigError(
-                    f"{told}: {key} {getattr(self, key):g} must not be negative"
-                )
+            if not 0 <= start < n:
+                raise self._error(f"start tooth {start} must lie in 0..{n - 1}")
 
     @property
     def n_teeth(self) -> tuple[int, int]:
@@ -145,22 +144,22 @@ def phase_mesh(
 ) -> LineMesh:
     """A mesh whose whole stiffness is known over its phase: one spring k(u) behind one gap e(u).
 
-    Gear a is either of the two, the irregular one where there is one.
-
     Parameters
     ----------
-    stiffness : (1, node) or (n_teeth of gear a, node) N/m    over one pitch, or pitch after pitch over a turn of gear
-        a, irregular teeth among them; the node that closes a pitch is the first of the next
-    gap : the same shape, m    static transmission error and pitch errors, by which the teeth stand back; default 0
+    n_teeth : of gears a and b; gear a is the irregular one where there is one
+    stiffness : (1, node) or (n_teeth of gear a, node) N/m    over one pitch, or pitch after
+        pitch over a turn of gear a, irregular teeth among them; the node that closes a pitch is
+        the first of the next
+    gap : the same shape, m    static transmission error and pitch errors, by which the teeth
+        stand back; default 0
     """
-    gaps = (
-        np.zeros_like(stiffness)
-        if gap is None
-        else np.broadcast_to(gap, stiffness.shape)
-    )
+    gaps = np.zeros_like(stiffness)
+    if gap is not None:
+        gaps = np.broadcast_to(gap, stiffness.shape)
     if stiffness.ndim != 2 or len(stiffness) not in (1, n_teeth[0]):
         raise ConfigError(
-            f"mesh '{name}': stiffness {stiffness.shape} must be (1, node) or ({n_teeth[0]}, node), one row a tooth"
+            f"mesh '{name}': stiffness {stiffness.shape} must be (1, node) or "
+            f"({n_teeth[0]}, node), one row a tooth"
         )
     n_rows = len(stiffness)
     # the mesh has rolled u = i + s where row i is at s, and the next row begins where it ends
@@ -168,10 +167,8 @@ def phase_mesh(
         np.hstack([part, np.roll(part[:, :1], -1, axis=0)])
         for part in (stiffness, gaps)
     )
-    kinds = np.arange(n_teeth[0]) % n_rows, np.zeros(n_teeth[1], dtype=np.int64)
     rows = np.arange(n_rows)[:, None]
-    # the mirrored roll reads every row backwards, one tooth further on, for it begins there where
-    # the row ends
+    # the mirrored roll reads every row backwards, one tooth further on
     backwards = (rows - 1) % n_rows + n_rows
     return LineMesh(
         name=name,
@@ -181,7 +178,7 @@ def phase_mesh(
         gap=np.vstack([closed_gap, np.zeros_like(closed_gap)]),
         rows=rows,
         coast_rows=backwards,
-        kinds=kinds,
+        kinds=(np.arange(n_teeth[0]) % n_rows, np.zeros(n_teeth[1], dtype=np.int64)),
         errors=(np.zeros(n_teeth[0]), np.zeros(n_teeth[1])),
         n_pairs=1,
         first_pitch=0,
@@ -200,7 +197,7 @@ def loaded_gap(approach: Array, stiffness: Array, force: float) -> Array:
     ``mesh.slices`` gives them for a helical pair: e = approach - F / k, so that the mesh is where
     statics put it under that force.
     """
-    return np.asarray(approach - force / stiffness)
+    return approach - force / stiffness
 
 
 def pair_mesh(
@@ -264,8 +261,10 @@ def mesh_start(
 
     Parameters
     ----------
-    mate_angle : rad    from the gear's center to the mate's, counted in the sense in which the gear turns
-    drives : whether the gear drives there (its leading flanks touch) or is driven (its trailing flanks)
+    mate_angle : rad    from the gear's center to the mate's, counted in the sense in which the
+        gear turns
+    drives : whether the gear drives there (its leading flanks touch) or is driven (its trailing
+        flanks)
     tooth_angle : rad   where the middle of the gear's tooth 0 stands when all angles are 0
     pitch_point : position of the pitch point in the tables of the mesh, pitches
 
@@ -299,11 +298,9 @@ def tooth_angle(
     start: tuple[int, float],
     pitch_point: float = 0.0,
 ) -> float:
-    """Where the middle of a gear's tooth 0 stands if one of its meshes begins as ``start`` says,
-    rad.
+    """Angle of the middle of a gear's tooth 0 if one of its meshes begins at ``start``, rad.
 
-    What ``mesh_start`` undoes: from a mesh whose phase is known through the mate to the other
-    meshes of the gear.
+    The inverse of ``mesh_start``, for the other meshes of a gear whose phase in one is known.
     """
     tooth, phase = start
     return (
@@ -313,8 +310,8 @@ def tooth_angle(
 
 
 def _quarter(drives: bool) -> float:
-    """How far the flank that touches stands before the middle of its tooth, pitches."""
-    return 0.25 if drives else -0.25
+    """Lead of the flank that touches over the middle of its tooth, pitches."""
+    return 0.5 * drives - 0.25
 
 
 def _summed(one: Array, other: Array) -> Array:

@@ -34,14 +34,13 @@ KINDS = ("angle", "speed", "acceleration", "mesh_force")
 BLOCK = 512  # output samples that are integrated between two passes of the low-pass
 OUT_OF_BOUNDS = 1e6  # m, rad, m/s or rad/s
 LONGEST_STEP = 0.25  # pitches that a mesh may roll in a step
-STILL = (
-    2.0 * math.pi
-) ** 2  # 1/s2, below elastic modes but not so far that rounding moves a free line
+# 1/s2, below elastic modes but not so far that rounding moves a free line
+STILL = (2.0 * math.pi) ** 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LineSolver:
-    """How finely to integrate: ``oversampling`` steps per sample at ``sampling_rate``.
+    """Steps of an integration: ``oversampling`` per sample at ``sampling_rate``.
 
     A run whose energy residual exceeds ``max_energy_residual`` is an error.
     """
@@ -72,14 +71,16 @@ class LineSolver:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LineMotion:
-    """What a line did.
+    """Motion of a line.
 
-    signals : by channel, (sample,)    deviations from nominal rotation in rad, rad/s, rad/s2 (m for a translation), and
-        mesh forces in N; low-passed means, flat to 0.39 of the sampling rate
+    signals : by channel, (sample,)    deviations from nominal rotation in rad, rad/s, rad/s2 (m
+        for a translation), and mesh forces in N; low-passed means, flat to 0.39 of the sampling
+        rate
     nominal_angle, nominal_speed : (sample,)    of the reference, rad and rad/s
-    energy_residual : input - dissipated - change of what is stored, over ``throughput`` in J, from the start of the
-        integration to its end
-    contact_loss, back_contact : (mesh,)    shares of the steps without contact, and on the back flanks
+    energy_residual : input - dissipated - change of what is stored, over ``throughput`` in J,
+        from the start of the integration to its end
+    contact_loss, back_contact : (mesh,)    shares of the steps without contact, and on the back
+        flanks
     largest_force, least_force : (mesh,) N  at the internal rate
     newton_rounds : mean of a step
     end : (2, dof)    deviations and their rates where the integration ended
@@ -115,7 +116,8 @@ def integrate_line(
     Parameters
     ----------
     channels : ("angle" | "speed" | "acceleration", degree of freedom) or ("mesh_force", mesh)
-    start : deviations and their rates, (dof,) each, where the integration begins; None is ``static_start``
+    start : deviations and their rates, (dof,) each, where the integration begins; None is
+        ``static_start``
 
     The low-pass looks ahead and back: integration begins at least ``decimation.Decimator.margin``
     samples and one before time 0, and ends as many after the last.
@@ -123,7 +125,8 @@ def integrate_line(
     Raises
     ------
     ConfigError        for channels, torques or starts that the line has not
-    StepError          where the contact does not converge, the energies do not balance, or a step passes a tooth
+    StepError          where the contact does not converge, the energies do not balance, or a
+        step passes a tooth
     SimulationError    where the motion leaves all bounds
     """
     n = len(line.names)
@@ -133,38 +136,37 @@ def integrate_line(
         raise ConfigError(
             f"line: duration {duration:g} s and lead-in {lead_in:g} s hold no sample, or no start"
         )
-    if start is not None and any(
-        part.shape != (n,) or not np.isfinite(part).all() for part in start
-    ):
-        raise ConfigError(
-            f"line: start must be finite deviations and rates, ({n},) each"
-        )
+    for part in start or ():
+        if part.shape != (n,) or not np.isfinite(part).all():
+            raise ConfigError(
+                f"line: start must be finite deviations and rates, ({n},) each"
+            )
     step, low_pass = solver.step, decimator(solver.oversampling)
     _check_step(line, course, step)
     first_sample = -max(low_pass.margin + 1, math.ceil(lead_in * solver.sampling_rate))
     if start is None:
-        start = (
-            static_start(
-                line, course, torques, time=first_sample / solver.sampling_rate
-            ),
-            np.zeros(n),
-        )
+        begin = first_sample / solver.sampling_rate
+        start = static_start(line, course, torques, time=begin), np.zeros(n)
     run = _Run(line, course, torques, solver, start, channels)
     run.begin(first_sample * solver.oversampling)
     run.skip((-low_pass.margin - first_sample) * solver.oversampling - 1)
     signals = run.record(n_samples)
     angle, speed = course.nominal(np.arange(n_samples) / solver.sampling_rate)
-    motion = run.told(signals, angle, speed)
-    if not motion.energy_residual <= solver.max_energy_residual:
-        missed = _told_above(motion.energy_residual, solver.max_energy_residual)
-        raise StepError(
-            f"line: the energy balance misses {missed} of what goes through, more than "
-            f"{solver.max_energy_residual:g}; raise the oversampling above {solver.oversampling}"
-        )
+    motion = run.motion(signals, angle, speed)
+    _check_balance(motion.energy_residual, solver)
     return motion
 
 
-def _told_above(value: float, limit: float) -> str:
+def _check_balance(residual: float, solver: LineSolver) -> None:
+    most = solver.max_energy_residual
+    if not residual <= most:
+        raise StepError(
+            f"line: the energy balance misses {_rounded_above(residual, most)} of what goes "
+            f"through, more than {most:g}; raise the oversampling above {solver.oversampling}"
+        )
+
+
+def _rounded_above(value: float, limit: float) -> str:
     """A value in three digits, or in as many as show that it is above a limit."""
     texts = (f"{value:.{digits}g}" for digits in range(3, 18))
     return next((text for text in texts if float(text) > limit), f"{value:.3g}")
@@ -189,28 +191,25 @@ def static_start(
     """
     order = elimination_order(line)
     still = pack_line(line, order, STILL, 0.0, "at rest")
-    meshes, pushed = (
-        pack_meshes(line, order),
-        pack_torques(line, order, torques, course),
-    )
+    meshes = pack_meshes(line, order)
+    pushed = pack_torques(line, order, torques, course)
     means = np.array([torque.table.mean() for torque in torques])
     pushed = pushed._replace(first=np.arange(len(torques) + 1), table=means)
     angle, _, gain, knot, share = kernels.nominal(course.knots, time, 0)
     q, force = np.zeros((2, len(order)))
     kernels.push(still, pushed, angle, gain, knot, share, q, force)
     free = line.rotation @ line.stiffness @ line.rotation
-    if free <= 1e-12 * float(
-        np.abs(line.rotation) @ np.abs(line.stiffness) @ np.abs(line.rotation)
-    ):
-        force -= (
-            still.carried * (force @ still.rotation) / (still.carried @ still.rotation)
-        )
+    size = np.abs(line.rotation)
+    if free <= 1e-12 * float(size @ np.abs(line.stiffness) @ size):
+        unbalanced = still.carried * (force @ still.rotation)
+        force -= unbalanced / (still.carried @ still.rotation)
     law = np.zeros((len(line.meshes), layout.N_LAW))
     if kernels.rest(still, meshes, force, angle, q, law, _scratch(line)) < 0:
         raise SimulationError(
-            "line: it does not come to rest under its mean torques; give a start, or check torques and springs"
+            "line: it does not come to rest under its mean torques; give a start, or "
+            "check torques and springs"
         )
-    return np.asarray(q[np.argsort(order)])
+    return q[np.argsort(order)]
 
 
 class _Run:
@@ -225,12 +224,8 @@ class _Run:
         start: tuple[Array, Array],
         channels: Sequence[tuple[str, int]],
     ) -> None:
-        self.line, self.course, self.solver, self.channels = (
-            line,
-            course.knots,
-            solver,
-            tuple(channels),
-        )
+        self.line, self.course, self.solver = line, course.knots, solver
+        self.channels = tuple(channels)
         self.order = elimination_order(line)
         at_of, step = np.argsort(self.order), solver.step
         self.packed = pack_line(
@@ -249,13 +244,11 @@ class _Run:
         self.state = q, v, mean, force, approach, rate, self.law
         self.tally = np.zeros((len(line.meshes), layout.N_TALLY))
         self.sums = np.zeros(layout.N_SUMS)
-        self.chosen = np.array(
-            [
-                (KINDS.index(kind), i if kind == "mesh_force" else at_of[i])
-                for kind, i in channels
-            ],
-            dtype=np.int64,
-        ).reshape(-1, 2)
+        self.chosen = np.empty((len(channels), 2), dtype=np.int64)
+        for row, (kind, number) in zip(self.chosen, channels, strict=True):
+            row[:] = KINDS.index(kind), number
+            if kind != "mesh_force":
+                row[1] = at_of[number]
         self.place, self.n_steps, self.energy = 0, 0, 0.0
 
     def begin(self, place: int) -> None:
@@ -280,13 +273,15 @@ class _Run:
     def advance(self, n_steps: int, channels: NDArray[np.int64], out: Array) -> None:
         """Integrate on, and give out the means of channels over every step, (step, column)."""
         failed = kernels.advance(
-            self.packed, self.meshes, self.torques, self.course, self.state, self.solver.step, self.place, n_steps,
-            channels, out, self.tally, self.sums, self.work,
-        )  # fmt: skip
+            *(self.packed, self.meshes, self.torques, self.course, self.state),
+            *(self.solver.step, self.place, n_steps, channels, out),
+            *(self.tally, self.sums, self.work),
+        )
         q, v, *_ = self.state
         if failed >= 0:
             raise StepError(
-                f"line: the mesh forces do not converge at {failed * self.solver.step:.6g} s; raise the oversampling"
+                "line: the mesh forces do not converge at "
+                f"{failed * self.solver.step:.6g} s; raise the oversampling"
             )
         self.place += n_steps
         self.n_steps += n_steps
@@ -295,16 +290,15 @@ class _Run:
                 self.order[int(np.argmax(np.maximum(np.abs(q), np.abs(v))))]
             ]
             raise SimulationError(
-                f"line: '{worst}' left all bounds before {self.place * self.solver.step:.6g} s; the torques are not "
+                f"line: '{worst}' left all bounds before "
+                f"{self.place * self.solver.step:.6g} s; the torques are not "
                 f"balanced, or the step is too long"
             )
 
     def skip(self, n_steps: int) -> None:
         """Integrate on and give out nothing."""
-        nothing, n_block = (
-            np.empty((0, 2), dtype=np.int64),
-            BLOCK * self.solver.oversampling,
-        )
+        nothing = np.empty((0, 2), dtype=np.int64)
+        n_block = BLOCK * self.solver.oversampling
         while n_steps > 0:
             self.advance(min(n_steps, n_block), nothing, np.empty((0, 0)))
             n_steps -= n_block
@@ -326,13 +320,16 @@ class _Run:
             means[:n_kept] = means[n_now * factor : n_now * factor + n_kept].copy()
         return samples.T
 
-    def told(self, signals: Array, angle: Array, speed: Array) -> LineMotion:
-        """The motion, and what the run tells about itself."""
+    def motion(self, signals: Array, angle: Array, speed: Array) -> LineMotion:
+        """The motion, with the energy balance and the contact statistics of the run."""
         q, v, *_ = self.state
         into = self.sums[layout.INPUT] + self.sums[layout.PASSING]
         # a free vibration has no input: what it began with goes through it
         throughput = self.sums[layout.THROUGHPUT] + self.energy
         residual = into - self.sums[layout.DISSIPATED] - (self._energy() - self.energy)
+        energy_residual = 0.0
+        if throughput > 0.0:
+            energy_residual = abs(residual) / throughput
         at_of = np.argsort(self.order)
         return LineMotion(
             signals={
@@ -341,7 +338,7 @@ class _Run:
             },
             nominal_angle=angle,
             nominal_speed=speed,
-            energy_residual=abs(residual) / throughput if throughput > 0.0 else 0.0,
+            energy_residual=energy_residual,
             throughput=float(throughput),
             contact_loss=self.tally[:, layout.APART] / self.n_steps,
             back_contact=self.tally[:, layout.BEHIND] / self.n_steps,
@@ -355,28 +352,17 @@ class _Run:
 def _scratch(line: GearedLine) -> Work:
     n, m = len(line.names), len(line.meshes)
     most = max([1, *[mesh.n_pairs for mesh in line.meshes]])
-    n_columns = layout.STIFFNESS + layout.PER_SPRING * max(
-        [1, *[len(mesh.depth) for mesh in line.meshes]]
-    )
-    ahead_q, ahead_v, moved, force = np.zeros((4, n))
-    turned, roll_rate, free, approach, before, rate, right, near = np.zeros((8, m))
-    return Work(
-        ahead_q=ahead_q,
-        ahead_v=ahead_v,
-        moved=moved,
-        force=force,
-        turned=turned,
-        roll_rate=roll_rate,
-        free=free,
-        approach=approach,
-        before=before,
-        rate=rate,
-        right=right,
-        near=near,
-        matrix=np.zeros((m, m)),
-        law=np.zeros((m, layout.N_LAW)),
-        pairs=np.zeros((m, layout.N_FLANKS, most, n_columns)),
-        reach=np.full((m, layout.N_FLANKS), -math.inf),
+    most_springs = max([1, *[len(mesh.depth) for mesh in line.meshes]])
+    n_columns = layout.STIFFNESS + layout.PER_SPRING * most_springs
+    return Work._make(
+        [
+            *np.zeros((4, n)),
+            *np.zeros((8, m)),
+            np.zeros((m, m)),
+            np.zeros((m, layout.N_LAW)),
+            np.zeros((m, layout.N_FLANKS, most, n_columns)),
+            np.full((m, layout.N_FLANKS), -math.inf),
+        ]
     )
 
 
@@ -384,7 +370,9 @@ def _check_channels(line: GearedLine, channels: Sequence[tuple[str, int]]) -> No
     if not channels:
         raise ConfigError("line: no channel to give out; name at least one")
     for kind, i in channels:
-        n = len(line.meshes) if kind == "mesh_force" else len(line.names)
+        n = len(line.names)
+        if kind == "mesh_force":
+            n = len(line.meshes)
         if kind not in KINDS or not 0 <= i < n:
             raise ConfigError(
                 f"line: no channel ({kind!r}, {i}); allowed: {', '.join(KINDS)} of 0..{n - 1}"
@@ -393,14 +381,11 @@ def _check_channels(line: GearedLine, channels: Sequence[tuple[str, int]]) -> No
 
 def _check_step(line: GearedLine, course: LineCourse, step: float) -> None:
     for mesh in line.meshes:
-        rate = (
-            mesh.n_teeth[0]
-            * abs(float(line.rotation[mesh.roll_dof]))
-            / (2.0 * math.pi)
-            * course.speed.max()
-        )
+        pitches_per_rad = mesh.n_teeth[0] * abs(float(line.rotation[mesh.roll_dof]))
+        rate = pitches_per_rad / (2.0 * math.pi) * course.speed.max()
         if rate * step > LONGEST_STEP:
             raise StepError(
-                f"mesh '{mesh.name}' rolls {rate * step:.2g} pitches in a step, its teeth pass at {rate:.4g} Hz; raise "
+                f"mesh '{mesh.name}' rolls {rate * step:.2g} pitches in a step, its "
+                f"teeth pass at {rate:.4g} Hz; raise "
                 f"the oversampling {math.ceil(rate * step / LONGEST_STEP)} times"
             )

@@ -1,6 +1,4 @@
-"""The machine that a row speaks of, composed from its overrides and kept for the rows that
-follow.
-"""
+"""The machine of a row, composed from its overrides and kept for the rows that follow."""
 
 from __future__ import annotations
 
@@ -68,14 +66,14 @@ class Case:
         if not self.faults:
             return {}
         fault = self.faults[0]
-        side = self.table.pinion if fault.gear == "pinion" else self.table.wheel
-        return {
-            f"{fault.gear}_kind": int(side.kind[fault.teeth(self.gear(fault.gear))[0]])
-        }
+        tooth = fault.teeth(self.gear(fault.gear))[0]
+        side = getattr(self.table, fault.gear)
+        return {f"{fault.gear}_kind": int(side.kind[tooth])}
 
     def gear(self, name: str) -> Gear:
         """The pinion or the wheel."""
-        return self.pair.pinion if name == "pinion" else self.pair.wheel
+        gear: Gear = getattr(self.pair, name)
+        return gear
 
     def position(self, point: str) -> float:
         """Distance of a named point from A along the line of action, m; C is the pitch point."""
@@ -93,12 +91,12 @@ class Case:
 
     def curvature(self, gear: str, point: str) -> Array:
         """Curvature radius of a gear's flank at a named point, (1,) m."""
-        position = np.array([self.position(point)])
-        return np.asarray(
-            self.pair.pinion_curvature(position)
-            if gear == "pinion"
-            else self.pair.wheel_curvature(position)
-        )
+        return self.curvature_at(gear, np.array([self.position(point)]))
+
+    def curvature_at(self, gear: str, position: Array) -> Array:
+        """Curvature radius of a gear's flank, (phase,) m, at positions on the line of action."""
+        curvature: Array = getattr(self.pair, f"{gear}_curvature")(position)
+        return curvature
 
 
 @lru_cache(maxsize=512)
@@ -209,7 +207,8 @@ def record(case: Case) -> Array:
     n_samples = RECORD_TURNS * turn * system.sensing.sampling_rate
     if abs(n_samples - round(n_samples)) > 1e-6:
         raise ConfigError(
-            f"{RECORD_TURNS} turns are {n_samples:.6g} samples, not a whole number: choose another speed"
+            f"{RECORD_TURNS} turns are {n_samples:.6g} samples, not a whole number: "
+            "choose another speed"
         )
     machine = replace(
         system,

@@ -32,7 +32,7 @@ def straight_root_profile(gear: Gear) -> ToothProfile:
     tip = math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
     curvature = np.linspace(lowest, tip, N_FLANK_CELLS + 1)
     x, y = involute_point(gear, curvature)
-    n_root = N_ROOT_CELLS if gear.root_radius < gear.base_radius else 0
+    n_root = N_ROOT_CELLS * (gear.root_radius < gear.base_radius)
     root = math.sqrt(gear.root_radius**2 - float(y[0]) ** 2)
     return ToothProfile(
         gear=gear,
@@ -69,8 +69,9 @@ def other_root_angle(gear: Gear, where: str) -> Gear:
 
     Parameters
     ----------
-    where : ``"tangent_30deg"``, the chord where the root curve has 30 degrees to the tooth centreline;
-        ``"junction"``, where the involute begins; ``"base_circle"``, the half tooth angle there
+    where : ``"tangent_30deg"``, the chord where the root curve has 30 degrees to the tooth
+        centreline; ``"junction"``, where the involute begins; ``"base_circle"``, the half tooth
+        angle there
     """
     if where == "tangent_30deg":
 

@@ -14,6 +14,7 @@ printed.
 from __future__ import annotations
 
 import csv
+import operator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -96,37 +97,34 @@ class Row:
     reason: str
 
     def __post_init__(self) -> None:
-        if self.kind not in ("value", "claim"):
-            raise ConfigError(
-                f"{self.origin}.csv, {self.id}: kind = {self.kind!r}; allowed: value, claim"
-            )
-        if self.unit not in UNITS:
-            raise ConfigError(
-                f"{self.origin}.csv, {self.id}: unit = {self.unit!r}; allowed: {', '.join(UNITS)}"
-            )
-        if self.expected not in VERDICTS:
-            raise ConfigError(
-                f"{self.origin}.csv, {self.id}: expected = {self.expected!r}; allowed: {VERDICTS}"
-            )
-        if (self.tolerance is not None) != (
-            self.kind == "value" and bool(self.printed)
+        has_figure = self.kind == "value" and bool(self.printed)
+        is_bad_claim = self.kind == "claim" and self.printed[:2] not in ("", "> ", "< ")
+        for is_wrong, message in (
+            (
+                self.kind not in ("value", "claim"),
+                f"kind = {self.kind!r}; allowed: value, claim",
+            ),
+            (
+                self.unit not in UNITS,
+                f"unit = {self.unit!r}; allowed: {', '.join(UNITS)}",
+            ),
+            (
+                self.expected not in VERDICTS,
+                f"expected = {self.expected!r}; allowed: {VERDICTS}",
+            ),
+            (
+                (self.tolerance is not None) != has_figure,
+                "a printed value, and nothing else, has a tolerance",
+            ),
+            (is_bad_claim, "a claim prints '> number' or '< number'"),
         ):
-            raise ConfigError(
-                f"{self.origin}.csv, {self.id}: a printed value, and nothing else, has a tolerance"
-            )
-        if (
-            self.kind == "claim"
-            and self.printed
-            and self.printed.split()[0] not in (">", "<")
-        ):
-            raise ConfigError(
-                f"{self.origin}.csv, {self.id}: a claim prints '> number' or '< number'"
-            )
+            if is_wrong:
+                raise ConfigError(f"{self.origin}.csv, {self.id}: {message}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """What became of one row.
+    """Computed value and verdict of one row.
 
     ``computed`` is in the row's unit, ``deviation`` relative to the printed value.
     """
@@ -138,7 +136,7 @@ class Result:
 
     @property
     def as_expected(self) -> bool:
-        """Whether the verdict is the good one, or the one that the row declares and explains."""
+        """True for the verdict that the row declares and explains, by default the good one."""
         return self.verdict == self.row.expected
 
 
@@ -174,20 +172,15 @@ def judge(row: Row, value: float) -> Result:
         verdict = NOT_PRINTED
     elif row.kind == "claim":
         sign, bound = row.printed.split()
-        verdict = (
-            HOLDS
-            if (computed > float(bound) if sign == ">" else computed < float(bound))
-            else FAILS
-        )
+        compare = {">": operator.gt, "<": operator.lt}[sign]
+        verdict = (FAILS, HOLDS)[compare(computed, float(bound))]
     else:
         printed = float(row.printed)
-        allowed = max(
-            (row.tolerance or 0.0) * abs(printed), half_last_digit(row.printed)
-        )
-        deviation = (computed - printed) / abs(printed) if printed else None
-        verdict = (
-            REPRODUCED if abs(computed - printed) <= allowed * (1.0 + 1e-9) else DIFFERS
-        )
+        relative = (row.tolerance or 0.0) * abs(printed)
+        allowed = max(relative, half_last_digit(row.printed)) * (1.0 + 1e-9)
+        if printed:
+            deviation = (computed - printed) / abs(printed)
+        verdict = (DIFFERS, REPRODUCED)[abs(computed - printed) <= allowed]
     return Result(row=row, computed=computed, deviation=deviation, verdict=verdict)
 
 
@@ -199,13 +192,11 @@ def half_last_digit(printed: str) -> float:
 
 
 def _row(source: str, values: dict[str, str]) -> Row:
-    good = (
-        NOT_PRINTED
-        if not values["printed"]
-        else REPRODUCED
-        if values["kind"] == "value"
-        else HOLDS
-    )
+    good, tolerance = NOT_PRINTED, None
+    if values["printed"]:
+        good = {"value": REPRODUCED}.get(values["kind"], HOLDS)
+    if values["tolerance"]:
+        tolerance = float(values["tolerance"])
     return Row(
         origin=source,
         id=values["id"],
@@ -214,7 +205,7 @@ def _row(source: str, values: dict[str, str]) -> Row:
         overrides=tuple(values["overrides"].split()),
         printed=values["printed"],
         unit=values["unit"],
-        tolerance=float(values["tolerance"]) if values["tolerance"] else None,
+        tolerance=tolerance,
         kind=values["kind"],
         expected=values["expected"] or good,
         source=values["source"],

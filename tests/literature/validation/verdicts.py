@@ -66,7 +66,9 @@ def run_validation(
     on_row : called after each row, for progress
     """
     results = []
-    for source in SOURCES if sources is None else sources:
+    if sources is None:
+        sources = SOURCES
+    for source in sources:
         for row in read_rows(source):
             results.append(evaluate(row))
             if on_row is not None:

@@ -1,5 +1,7 @@
 """Torsional dampers: Den Hartog's optima, the line solved again, limits, losses."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -16,24 +18,20 @@ from gensig.driveline.linear.matrices import line_matrices
 from gensig.driveline.linear.modal import natural_modes
 from gensig.driveline.linear.shaft_line import Node, Shaft, ShaftLine
 
-STIFFNESS = 1.0  # of the spring that holds the one disc, whose inertia is 1: its frequency is 1 rad/s
+# of the spring that holds the one disc, whose inertia is 1: its frequency is 1 rad/s
+STIFFNESS = 1.0
 RATIOS = (0.1, 0.3)
 
 
-def one_disc(speeds):
+def one_disc():
     """A disc on a spring to the ground under one harmonic torque of 1 N m at half the speed."""
-    line = LinearLine(
-        mass=np.eye(1),
-        stiffness=STIFFNESS * np.eye(1),
-        loss=np.zeros((1, 1)),
-        damping=np.zeros((1, 1)),
-    )
-    spring = Elements(
-        directions=np.ones((1, 1)), stiffness=np.array([STIFFNESS]), loss=np.zeros(1)
-    )
+    one, zero = np.eye(1), np.zeros((1, 1))
+    line = LinearLine(mass=one, stiffness=STIFFNESS * one, loss=zero, damping=zero)
+    spring = Elements(directions=one, stiffness=np.array([STIFFNESS]), loss=np.zeros(1))
     torque = np.cos(2.0 * np.pi * np.arange(64) / 64)[None]
+    speeds = 2.0 * np.linspace(0.5, 1.6, 441) + 1e-4
     return seen_from_nodes(
-        line, spring, 0, lambda speed: torque, speeds, {1: 0}, n_orders=1
+        line, spring, 0, lambda _: torque, speeds, {1: 0}, n_orders=1
     )
 
 
@@ -43,35 +41,34 @@ def peak(seen, *dampers):
 
 @pytest.mark.parametrize("ratio", RATIOS)
 def test_the_tuned_damper_of_one_disc_is_den_hartogs(ratio):
-    """Mechanical Vibrations, 3.3: frequency 1 / (1 + mu), peak sqrt(1 + 2 / mu), damping sqrt(3 mu / 8 / (1 + mu))."""
-    seen = one_disc(2.0 * np.linspace(0.5, 1.6, 441) + 1e-4)
-    (found,) = tune_dampers(seen, [ratio])
-    assert_allclose(found.ring_inertia, ratio, rtol=1e-3)  # the larger the better
-    assert_allclose(peak(seen, found), np.sqrt(1.0 + 2.0 / ratio), rtol=0.02)
-    own = np.sqrt(found.stiffness / found.ring_inertia)
+    """Mechanical Vibrations, 3.3: frequency 1 / (1 + mu), peak sqrt(1 + 2 / mu), damping sqrt(3 mu
+    / 8 / (1 + mu)).
+    """
+    seen = one_disc()
+    (computed,) = tune_dampers(seen, [ratio])
+    assert_allclose(computed.ring_inertia, ratio, rtol=1e-3)  # the larger the better
+    assert_allclose(peak(seen, computed), np.sqrt(1.0 + 2.0 / ratio), rtol=0.02)
+    own = np.sqrt(computed.stiffness / computed.ring_inertia)
     assert_allclose(own, 1.0 / (1.0 + ratio), rtol=0.01)
-    damping_ratio = found.damping / (2.0 * found.ring_inertia * own)
+    damping_ratio = computed.damping / (2.0 * computed.ring_inertia * own)
     assert_allclose(
         damping_ratio, np.sqrt(3.0 * ratio / (8.0 * (1.0 + ratio))), rtol=0.1
     )
-    other = TorsionalDamper(
-        node=1,
-        ring_inertia=ratio,
-        damping=found.damping,
-        stiffness=1.2 * found.stiffness,
-    )
-    assert peak(seen, other) > 1.1 * peak(seen, found)
+    other = replace(computed, stiffness=1.2 * computed.stiffness)
+    assert peak(seen, other) > 1.1 * peak(seen, computed)
 
 
 @pytest.mark.parametrize("ratio", RATIOS)
 def test_the_viscous_damper_of_one_disc_is_den_hartogs(ratio):
-    """Mechanical Vibrations, 3.3 (Houdaille): peak 1 + 2 / mu at c = 2 J_ring / sqrt(2 (1 + mu) (2 + mu))."""
-    seen = one_disc(2.0 * np.linspace(0.5, 1.6, 441) + 1e-4)
-    (found,) = tune_dampers(seen, [ratio], viscous=True)
-    assert found.stiffness == 0.0
-    assert_allclose(peak(seen, found), 1.0 + 2.0 / ratio, rtol=2e-3)
+    """Mechanical Vibrations, 3.3 (Houdaille): peak 1 + 2 / mu at c = 2 J_ring / sqrt(2 (1 + mu) (2
+    + mu)).
+    """
+    seen = one_disc()
+    (computed,) = tune_dampers(seen, [ratio], viscous=True)
+    assert computed.stiffness == 0.0
+    assert_allclose(peak(seen, computed), 1.0 + 2.0 / ratio, rtol=2e-3)
     assert_allclose(
-        found.damping,
+        computed.damping,
         2.0 * ratio / np.sqrt(2.0 * (1.0 + ratio) * (2.0 + ratio)),
         rtol=0.02,
     )
@@ -138,7 +135,9 @@ def test_a_ring_held_hard_or_not_at_all_is_inertia_or_nothing():
 
 
 def test_a_damper_only_takes_energy():
-    """The imaginary part of what it adds is positive, and is the loss of its ring's motion against the node."""
+    """The imaginary part of what it adds is positive, and is the loss of its ring's motion against
+    the node.
+    """
     frequency = np.linspace(5.0, 2000.0, 50)
     for damper in DAMPERS:
         assert np.all(damper.dynamic_stiffness(frequency).imag > 0.0)

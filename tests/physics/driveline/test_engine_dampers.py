@@ -26,8 +26,10 @@ DAMPERS = (
     TorsionalDamper(node=45, ring_inertia=0.01138, damping=6.0, stiffness=143500.0),
 )
 AS_KEYS = (
-    "system.dampers=[{node: 21, ring_inertia_kg_m2: 0.0118, damping_nms_per_rad: 0.45, stiffness_nm_per_rad: 172700},"
-    "{node: 45, ring_inertia_kg_m2: 0.01138, damping_nms_per_rad: 6.0, stiffness_nm_per_rad: 143500}]"
+    "system.dampers=[{node: 21, ring_inertia_kg_m2: 0.0118, damping_nms_per_rad: "
+    "0.45, stiffness_nm_per_rad: 172700},"
+    "{node: 45, ring_inertia_kg_m2: 0.01138, damping_nms_per_rad: 6.0, "
+    "stiffness_nm_per_rad: 143500}]"
 )
 
 
@@ -68,19 +70,19 @@ def test_dampers_of_the_configuration_are_those_added_and_those_tuned_with(line)
 def test_root_stress_follows_the_tooth_force(config, line, load):
     mesh = mesh_between(line, (21, 45))
     strength = read_mesh_strength(config, line, mesh)
-    found = dynamic_root_stress(strength, line, mesh, load)
+    computed = dynamic_root_stress(strength, line, mesh, load)
     # ISO: F_t Y_F Y_S / (b m), engine reference, section 4: 2.498 at 20 mm and 3 mm
     assert_allclose(
-        found.gears["wheel"].stress,
+        computed.gears["wheel"].stress,
         load.greatest * np.cos(np.radians(20.0)) * 2.498 / 6e-5,
         rtol=1e-3,
     )
-    for name, stress in found.passes.items():
+    for name, stress in computed.passes.items():
         assert (
             stress.shape[0] == 54
         )  # 54 teeth meet in a cycle, which is one turn of the pump
-        assert np.all(stress <= found.history.stress[name] * (1.0 + 1e-12))
-        assert stress.max() > 0.8 * found.history.stress[name].max()
+        assert np.all(stress <= computed.history.stress[name] * (1.0 + 1e-12))
+        assert stress.max() > 0.8 * computed.history.stress[name].max()
     steady = ToothLoad(speed=SPEED, force=np.full(5760, load.greatest))
     same = dynamic_root_stress(strength, line, mesh, steady)
     for name, stress in same.passes.items():
@@ -108,10 +110,7 @@ def test_dampers_on_the_pump_drive_lower_the_load_there_and_leave_the_flywheel(
 
 def test_a_force_that_never_closes_the_mesh_is_refused(config, line):
     mesh = mesh_between(line, (21, 45))
+    strength = read_mesh_strength(config, line, mesh)
+    load = ToothLoad(speed=SPEED, force=np.full(8, -1.0))
     with pytest.raises(ConfigError, match="its force never closes the driving flanks"):
-        dynamic_root_stress(
-            read_mesh_strength(config, line, mesh),
-            line,
-            mesh,
-            ToothLoad(speed=SPEED, force=np.full(8, -1.0)),
-        )
+        dynamic_root_stress(strength, line, mesh, load)

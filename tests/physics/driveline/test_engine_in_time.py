@@ -1,6 +1,7 @@
-"""An engine's line in time: sweeps against the linear line, and root stress under forces that are known."""
+"""An engine's line in time: sweeps against the linear line, and root stress under forces that are
+known.
+"""
 
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -8,10 +9,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gensig.driveline.engine_dampers import (
+    ToothLoad,
     dynamic_root_stress,
     mesh_between,
     read_mesh_strength,
-    tooth_load,
 )
 from gensig.driveline.engine_line import read_engine_line
 from gensig.driveline.in_time import RATE, TimeResponse
@@ -34,7 +35,7 @@ def engine(*words):
 
 @pytest.fixture(scope="module")
 def passage():
-    """Up and down through the second mode, which order 5 meets at 825 r/min, teeth that do not part."""
+    """Sweep through the second mode, which order 5 meets at 825 r/min; teeth do not part."""
     line = engine("system.backlash_um=0", "system.loss_factor.gear_mesh=0")
     return line, sweep_response(
         line, LOW, HIGH, SECONDS, 0.0, own={}, nodes=(FLYWHEEL,), n_orders=20
@@ -79,16 +80,24 @@ def test_the_course_goes_up_and_comes_back():
     assert np.all(course.torque == 500.0)
 
 
-def test_too_short_a_sweep_is_refused():
-    with pytest.raises(
-        ConfigError, match=r"passes too few cycles at its low end; give 0\.81 s or more"
-    ):
+@pytest.mark.parametrize(
+    ("low", "high", "seconds", "message"),
+    [
+        (650, 1750, 0.2, r"too few cycles at its low end; give 0\.81 s or more"),
+        (1750, 650, 5.0, "from a positive speed up to a higher one"),
+    ],
+)
+def test_speeds_that_make_no_sweep_are_refused(low, high, seconds, message):
+    with pytest.raises(ConfigError, match=message):
         sweep_response(
-            engine(), 650 * RPM, 1750 * RPM, 0.2, 0.0, own={}, nodes=(14,), n_orders=10
-        )
-    with pytest.raises(ConfigError, match="from a positive speed up to a higher one"):
-        sweep_response(
-            engine(), 1750 * RPM, 650 * RPM, 5.0, 0.0, own={}, nodes=(14,), n_orders=10
+            engine(),
+            low * RPM,
+            high * RPM,
+            seconds,
+            0.0,
+            own={},
+            nodes=(FLYWHEEL,),
+            n_orders=10,
         )
 
 
@@ -111,53 +120,59 @@ def motion(speed, force, n_cycles):
         crank, angle, force, period=4.0 * np.pi
     )
     return TimeResponse(
-        time=crank / speed, crank_angle=crank, speed=nothing, angle=nothing, mesh_force=mesh_force,
-        fluctuation=np.zeros(1), cycle_fluctuation=np.zeros(1), contact_loss=np.zeros(8), back_contact=np.zeros(8),
-        least_force=mesh_force.min(axis=1), greatest_force=mesh_force.max(axis=1), energy_residual=0.0,
-    )  # fmt: skip
+        time=crank / speed,
+        crank_angle=crank,
+        speed=nothing,
+        angle=nothing,
+        mesh_force=mesh_force,
+        fluctuation=np.zeros(1),
+        cycle_fluctuation=np.zeros(1),
+        contact_loss=np.zeros(8),
+        back_contact=np.zeros(8),
+        least_force=mesh_force.min(axis=1),
+        greatest_force=mesh_force.max(axis=1),
+        energy_residual=0.0,
+    )
 
 
-def test_root_stress_in_time_of_a_force_that_repeats_is_that_of_one_cycle():
-    config, line = compose("generate", ENGINE), engine()
+@pytest.fixture(scope="module")
+def pump_drive():
+    line = engine()
     mesh = mesh_between(line, (21, 45))
-    strength = read_mesh_strength(config, line, mesh)
-    load = tooth_load(line, mesh, line.response(1688 * RPM, 12680.0))
-    smooth = replace(
-        load, force=1500.0 + 4000.0 * np.cos(4.0 * np.pi * np.arange(5760) / 5760)
+    return line, mesh, read_mesh_strength(compose("generate", ENGINE), line, mesh)
+
+
+def test_root_stress_in_time_of_a_force_that_repeats_is_that_of_one_cycle(pump_drive):
+    line, mesh, strength = pump_drive
+    force = 1500.0 + 4000.0 * np.cos(4.0 * np.pi * np.arange(5760) / 5760)
+    load = ToothLoad(speed=1688 * RPM, force=force)
+    once = dynamic_root_stress(strength, line, mesh, load)
+    response = motion(load.speed, force, 4.1)
+    computed = root_stress_in_time(strength, line, mesh, response)
+    assert_allclose(
+        computed.gears["wheel"].stress, once.gears["wheel"].stress, rtol=1e-4
     )
-    once = dynamic_root_stress(strength, line, mesh, smooth)
-    found = root_stress_in_time(
-        strength, line, mesh, motion(load.speed, smooth.force, 4.1)
-    )
-    assert_allclose(found.gears["wheel"].stress, once.gears["wheel"].stress, rtol=1e-4)
-    passes, one = found.passes["wheel"], once.passes["wheel"]
+    passes, one = computed.passes["wheel"], once.passes["wheel"]
     assert 3 * 54 <= len(passes) <= 4 * 54
     assert_allclose(passes[54:108].max(), one.max(), rtol=2e-3)
     assert_allclose(typical_largest(passes, 54), one.max(), rtol=2e-3)
-    shift = int(
-        np.flatnonzero(
-            [
-                np.allclose(
-                    np.roll(one, -k, axis=0)[:50], passes[:50], atol=0.01 * one.max()
-                )
-                for k in range(54)
-            ]
-        )[0]
-    )
-    assert_allclose(
-        np.roll(one, -shift, axis=0)[:54], passes[54:108], atol=0.01 * one.max()
-    )
+    atol = 0.01 * one.max()
+    shifted = [np.roll(one, -shift, axis=0) for shift in range(54)]
+    (alike, *_) = [
+        turn for turn in shifted if np.allclose(turn[:50], passes[:50], atol=atol)
+    ]
+    assert_allclose(alike, passes[54:108], atol=atol)
 
 
-def test_a_run_too_short_for_its_teeth_is_refused():
-    config, line = compose("generate", ENGINE), engine()
-    mesh = mesh_between(line, (21, 45))
-    strength = read_mesh_strength(config, line, mesh)
-    with pytest.raises(ConfigError, match="two cycles of the crank at least"):
-        root_stress_in_time(
-            strength, line, mesh, motion(1688 * RPM, np.full(64, 1000.0), 1.02)
-        )
-    with pytest.raises(ConfigError, match="nothing closes its driving flanks in time"):
-        root_stress_in_time(
-            strength, line, mesh, motion(1688 * RPM, np.full(64, -1000.0), 3.0)
-        )
+@pytest.mark.parametrize(
+    ("force", "n_cycles", "message"),
+    [
+        (1000.0, 1.02, "two cycles of the crank at least"),
+        (-1000.0, 3.0, "nothing closes its driving flanks in time"),
+    ],
+)
+def test_a_run_without_root_stress_is_refused(pump_drive, force, n_cycles, message):
+    line, mesh, strength = pump_drive
+    response = motion(1688 * RPM, np.full(64, force), n_cycles)
+    with pytest.raises(ConfigError, match=message):
+        root_stress_in_time(strength, line, mesh, response)

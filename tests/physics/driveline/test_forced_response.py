@@ -1,6 +1,9 @@
-"""Forced vibration by orders: reciprocity, power, exact solutions, integration in time, waterfalls."""
+"""Forced vibration by orders: reciprocity, power, exact solutions, integration in time,
+waterfalls.
+"""
 
-from dataclasses import dataclass
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -35,8 +38,9 @@ N = 2880
 
 def chain(loss_factor=0.0, damping=0.0, grounded=True):
     """Three discs on two shafts, the first on a third to ground."""
-    directions = np.array([[1.0, 0, 0], [1, -1, 0], [0, 1, -1]])[0 if grounded else 1 :]
-    stiffness = np.array([3e4, 2e4, 1e4])[0 if grounded else 1 :]
+    used = slice(1 - grounded, None)
+    directions = np.array([[1.0, 0, 0], [1, -1, 0], [0, 1, -1]])[used]
+    stiffness = np.array([3e4, 2e4, 1e4])[used]
     springs = Elements(
         directions=directions, stiffness=stiffness, loss=loss_factor * stiffness
     )
@@ -50,18 +54,16 @@ def chain(loss_factor=0.0, damping=0.0, grounded=True):
 
 
 def cycle_torque(seed=0, n_orders=12, n_dofs=3):
-    rng = np.random.default_rng(seed)
-    amplitudes = rng.standard_normal((n_dofs, n_orders)) + 1j * rng.standard_normal(
-        (n_dofs, n_orders)
-    )
+    parts = np.random.default_rng(seed).standard_normal((2, n_dofs, n_orders))
+    amplitudes = parts[0] + 1j * parts[1]
     return over_cycle(amplitudes, N), amplitudes
 
 
 def test_orders_of_a_torque_give_it_back():
     torque, amplitudes = cycle_torque()
-    mean, found = cycle_orders(torque + 3.0, 12)
+    mean, computed = cycle_orders(torque + 3.0, 12)
     assert_allclose(mean, 3.0, rtol=1e-12)
-    assert_allclose(found, amplitudes, rtol=1e-9)
+    assert_allclose(computed, amplitudes, rtol=1e-9)
     angle = cycle_angles(N)
     by_hand = sum(
         np.real(c * np.exp(0.5j * k * angle))
@@ -95,59 +97,47 @@ def test_one_disc_on_a_shaft_is_the_closed_form():
         damping=np.array([[3.0]]),
     )
     w = np.array([5.0, 20.0, 70.0])
-    found = one.response(np.ones((3, 1), dtype=complex), w)[:, 0]
-    assert_allclose(found, 1.0 / (800 + 40j + 3j * w - 2 * w**2), rtol=1e-12)
+    computed = one.response(np.ones((3, 1), dtype=complex), w)[:, 0]
+    assert_allclose(computed, 1.0 / (800 + 40j + 3j * w - 2 * w**2), rtol=1e-12)
 
 
 def test_mean_power_in_is_what_the_damping_takes():
     line, _ = chain(loss_factor=0.05, damping=1e-4)
     torque, amplitudes = cycle_torque()
     speed = 60.0
-    found = steady_response(line, torque, speed, n_orders=12)
-    power_in = 0.5 * np.sum(np.real(np.conj(found.speed_deviation) * amplitudes))
-    w = speed * found.orders
+    computed = steady_response(line, torque, speed, n_orders=12)
+    power_in = 0.5 * np.sum(np.real(np.conj(computed.speed_deviation) * amplitudes))
+    w = speed * computed.orders
     lost = line.loss[..., None] * w + line.damping[..., None] * w**2
     power_lost = 0.5 * np.real(
-        np.einsum("io,ijo,jo->", np.conj(found.angle), lost, found.angle)
+        np.einsum("io,ijo,jo->", np.conj(computed.angle), lost, computed.angle)
     )
     assert power_in > 0.0
     assert_allclose(power_in, power_lost, rtol=1e-9)
 
 
-def test_the_whole_engine_takes_no_more_than_it_gets():
-    line, _, _ = engine_line()
-    torque = torques_of(option()).on(NODES)
-    _, amplitudes = cycle_orders(torque, 80)
-    found = steady_response(line, torque, SPEED, n_orders=80)
-    power_in = 0.5 * np.sum(np.real(np.conj(found.speed_deviation) * amplitudes))
-    w = SPEED * found.orders
-    power_lost = 0.5 * np.real(
-        np.einsum("io,ij,jo,o->", np.conj(found.angle), line.loss, found.angle, w)
-    )
-    assert_allclose(power_in, power_lost, rtol=1e-6)
-
-
-def test_integration_in_time_settles_to_the_same():
+def test_integration_in_time_stays_on_the_steady_response():
     from scipy.integrate import solve_ivp
 
     line, _ = chain(damping=4e-4)
     torque, amplitudes = cycle_torque()
     speed = 100.0
-    found = steady_response(line, torque, speed, n_orders=12)
-    orders = found.orders
+    steady = steady_response(line, torque, speed, n_orders=12)
+    rates = 1j * steady.orders * speed
     inverse = np.linalg.inv(line.mass)
 
     def slope(t, state):
-        force = np.real(amplitudes @ np.exp(1j * orders * speed * t))
+        force = np.real(amplitudes @ np.exp(rates * t))
         rest = force - line.stiffness @ state[:3] - line.damping @ state[3:]
         return np.concatenate([state[3:], inverse @ rest])
 
     cycle = 4 * np.pi / speed
-    times = 60 * cycle + np.arange(64) * cycle / 64
+    times = np.arange(64) * cycle / 64
+    start = np.real([steady.angle.sum(axis=1), steady.speed_deviation.sum(axis=1)])
     run = solve_ivp(
-        slope, (0.0, times[-1]), np.zeros(6), t_eval=times, rtol=1e-9, atol=1e-12
+        slope, (0.0, cycle), start.ravel(), t_eval=times, rtol=1e-8, atol=1e-11
     )
-    speeds = found.speed_over_cycle(64)
+    speeds = steady.speed_over_cycle(64)
     assert_allclose(run.y[3:], speeds, rtol=0, atol=1e-5 * np.ptp(speeds))
 
 
@@ -174,10 +164,10 @@ def test_mean_torques_are_carried_through_and_must_balance():
     torque, _ = cycle_torque()
     torque[0] += 50.0
     torque[2] -= 50.0
-    found = steady_response(line, torque, 60.0, n_orders=12)
-    mean, _ = found.element_forces(springs)
+    computed = steady_response(line, torque, 60.0, n_orders=12)
+    mean, _ = computed.element_forces(springs)
     assert_allclose(mean, [50.0, 50.0], rtol=1e-9)
-    assert abs(np.sum(np.diag(line.mass) * found.twist)) < 1e-12
+    assert abs(np.sum(np.diag(line.mass) * computed.twist)) < 1e-12
     torque[2] += 1.0
     with pytest.raises(
         SimulationError,
@@ -197,9 +187,9 @@ def test_a_free_line_turns_as_one_under_slow_torques():
 
 
 def test_fluctuation_is_half_the_peak_to_peak():
-    found = response_of(option())
-    speeds = found.speed_over_cycle(28_800)
-    assert_allclose(found.fluctuation(), 0.5 * np.ptp(speeds, axis=1), rtol=2e-3)
+    computed = response_of(option())
+    speeds = computed.speed_over_cycle(28_800)
+    assert_allclose(computed.fluctuation(), 0.5 * np.ptp(speeds, axis=1), rtol=2e-3)
     assert_allclose(speeds.mean(axis=1), 0.0, atol=1e-9)
 
 
@@ -247,69 +237,46 @@ def test_a_disturbance_at_5_hz_moves_the_flywheel_more_than_its_own_turns():
     assert_allclose(doubled, 2.0 * moved, rtol=1e-12)
 
 
-@dataclass(frozen=True)
-class Apart:
-    """A line with one mesh apart, as a table reader gives it."""
-
-    mass: np.ndarray
-    damping: np.ndarray
-    stiffness: np.ndarray
-    loss_stiffness: np.ndarray
-    directions: np.ndarray
-    mesh_stiffness: np.ndarray
-    mesh_loss_factor: np.ndarray
-    mesh_damping: np.ndarray
-
-
 def test_meshes_given_apart_are_springs_of_the_line():
     whole, springs = chain(loss_factor=0.05, damping=1e-4)
-    d, zero = springs.directions, np.zeros((3, 3))
-    mesh = np.outer(d[2], d[2])
-    apart = Apart(
+    direction = springs.directions[2:]
+    mesh = direction.T @ direction
+    apart = SimpleNamespace(
         mass=whole.mass,
         damping=whole.damping - 1.0 * mesh,
         stiffness=whole.stiffness - 1e4 * mesh,
         loss_stiffness=whole.loss - 500.0 * mesh,
-        directions=d[2:],
+        directions=direction,
         mesh_stiffness=np.array([1e4]),
         mesh_loss_factor=np.array([0.05]),
         mesh_damping=np.array([1.0]),
     )
     line, meshes = closed_line(apart)
     for name in ("mass", "damping", "stiffness", "loss"):
-        assert_allclose(
-            getattr(line, name), getattr(whole, name), atol=1e-9, err_msg=name
-        )
+        assert_allclose(getattr(line, name), getattr(whole, name), atol=1e-9)
     assert_allclose(meshes.loss, [500.0])
-    assert np.any(zero != line.loss)
 
 
-def test_what_is_no_line_is_refused():
+def test_matrices_and_orders_that_make_no_line_are_refused():
     line, _ = chain()
-    skew = line.stiffness.copy()
-    skew[0, 1] *= 2.0
-    with pytest.raises(ValueError, match="stiffness must be symmetric"):
-        LinearLine(mass=line.mass, stiffness=skew, loss=line.loss, damping=line.damping)
-    with pytest.raises(
-        ValueError, match=r"loss \(2, 2\) must be a finite matrix \(3, 3\)"
+    skew = line.stiffness + np.eye(3, k=1)
+    torque = np.zeros((3, 64))
+    for refused, message in (
+        (lambda: replace(line, stiffness=skew), "stiffness must be symmetric"),
+        (
+            lambda: replace(line, loss=np.zeros((2, 2))),
+            r"loss \(2, 2\) must be a finite matrix \(3, 3\)",
+        ),
+        (lambda: cycle_orders(torque, 40), r"n_orders = 40 must lie in 1\.\.31"),
+        (
+            lambda: over_cycle(np.zeros((3, 12), dtype=complex), 24),
+            "24 points of a cycle cannot hold 12 orders",
+        ),
+        (lambda: steady_response(line, torque, 0.0, n_orders=4), "must be positive"),
     ):
-        LinearLine(
-            mass=line.mass,
-            stiffness=line.stiffness,
-            loss=np.zeros((2, 2)),
-            damping=line.damping,
-        )
-    with pytest.raises(ValueError, match=r"n_orders = 40 must lie in 1\.\.31"):
-        cycle_orders(np.zeros((3, 64)), 40)
-    with pytest.raises(ValueError, match="24 points of a cycle cannot hold 12 orders"):
-        over_cycle(np.zeros((3, 12), dtype=complex), 24)
-    with pytest.raises(ValueError, match="must be positive"):
-        steady_response(line, np.zeros((3, 64)), 0.0, n_orders=4)
-    undamped = LinearLine(
-        mass=np.eye(1),
-        stiffness=np.eye(1),
-        loss=np.zeros((1, 1)),
-        damping=np.zeros((1, 1)),
-    )
+        with pytest.raises(ValueError, match=message):
+            refused()
+    one, zero = np.eye(1), np.zeros((1, 1))
+    undamped = LinearLine(mass=one, stiffness=one, loss=zero, damping=zero)
     with pytest.raises(SimulationError, match="excited at its natural frequency"):
         undamped.response(np.ones((1, 1), dtype=complex), np.array([1.0]))

@@ -1,4 +1,6 @@
-"""Sliced teeth in a line's mesh: springs side by side are the chords, from one potential; the pair dynamics' motion."""
+"""Sliced teeth in a line's mesh: springs side by side are the chords, from one potential; the pair
+dynamics' motion.
+"""
 
 import math
 from dataclasses import replace
@@ -7,13 +9,12 @@ import numpy as np
 import pytest
 from chord_tables import Slices, as_chords, with_table
 from lane_tools import advance
-from line_tools import constant_torques, law_at, state_after
+from line_tools import constant_torques, law_at, pair_line, state_after
 from numpy.testing import assert_allclose
 
 from gensig.driveline.time import _layout as layout
 from gensig.driveline.time.chords import sliced_pair_mesh
 from gensig.driveline.time.course import constant_speed
-from gensig.driveline.time.geared_line import GearedLine
 from gensig.driveline.time.line_mesh import pair_mesh
 from gensig.errors import ConfigError
 from gensig.faults.broken import MissingTooth
@@ -58,20 +59,22 @@ def mesh(helical):
 class TestLaw:
     @pytest.mark.parametrize("share", [0.02, 0.3, 1.0, 2.5])
     def test_statics_agree_whatever_the_load(self, helical, mesh, share):
-        """Chords that are interpolated on their own meet at their depths but for the smoothing of their kinks."""
+        """Chords that are interpolated on their own meet at their depths but for the smoothing of
+        their kinks.
+        """
         table, force = helical
         rolls = np.linspace(0.05, 30.05, 61)
         errors = dict(zip(("pinion_error", "wheel_error"), mesh.errors, strict=True))
-        found = chord_equilibrium(
+        computed = chord_equilibrium(
             table,
             chord_states(table, rolls * table.pair.base_pitch, **errors),
             share * force,
         )
         forces = [
             law_at(mesh, turned, approach)[0]
-            for turned, approach in zip(rolls, found.approach, strict=True)
+            for turned, approach in zip(rolls, computed.approach, strict=True)
         ]
-        assert_allclose(forces, share * force, rtol=1e-3, atol=0)
+        assert_allclose(forces, share * force, rtol=1e-3)
 
     @pytest.mark.parametrize("approach", [2e-5, 6e-5, -1.5e-4])
     def test_force_and_torque_of_the_passing_teeth_are_slopes_of_one_potential(
@@ -79,21 +82,19 @@ class TestLaw:
     ):
         mesh = replace(mesh, backlash=1e-4)
         for turned in (0.313, 2.711, 9.173):
-            found = law_at(mesh, turned, approach)
+            computed = law_at(mesh, turned, approach)
             below, above = (
                 law_at(mesh, turned + off, approach)[layout.STORED]
                 for off in (-1e-7, 1e-7)
             )
             assert_allclose(
-                found[layout.ALONG], -(above - below) / 2e-7, rtol=1e-3, atol=1e-6
+                computed[layout.ALONG], -(above - below) / 2e-7, rtol=1e-3, atol=1e-6
             )
             below, above = (
                 law_at(mesh, turned, approach + off)[layout.STORED]
                 for off in (-1e-10, 1e-10)
             )
-            assert_allclose(
-                found[layout.FORCE], (above - below) / 2e-10, rtol=1e-4, atol=0
-            )
+            assert_allclose(computed[layout.FORCE], (above - below) / 2e-10, rtol=1e-4)
 
     def test_all_springs_of_a_pair_are_damped_by_its_first_touch(self, mesh):
         still, fast = law_at(mesh, 0.4, 3e-5), law_at(mesh, 0.4, 3e-5, rate=10.0)
@@ -101,7 +102,6 @@ class TestLaw:
             fast[layout.FORCE],
             (1.0 + 10.0 * DAMPING) * still[layout.FORCE],
             rtol=1e-12,
-            atol=0,
         )
         assert law_at(mesh, 0.4, 3e-5, rate=-1e4)[layout.FORCE] == pytest.approx(
             0.0, abs=0.0
@@ -117,16 +117,21 @@ class TestLaw:
             coast_rows=np.zeros_like(mesh.coast_rows),
         )
         for approach in (3e-5, -mesh.backlash - 3e-5):
-            ratio = np.array([
-                law_at(mesh, turned, approach)[0] / law_at(sound, turned, approach)[0]
-                for turned in np.arange(0.5, n_teeth + 0.5, 0.25)
-            ])  # fmt: skip
+            ratio = np.array(
+                [
+                    law_at(mesh, turned, approach)[0]
+                    / law_at(sound, turned, approach)[0]
+                    for turned in np.arange(0.5, n_teeth + 0.5, 0.25)
+                ]
+            )
             lost = ratio < 0.999
             assert 0 < lost.sum() < 5 * 4
             assert ratio.min() < 0.8
 
     def test_slices_enter_from_the_other_end_on_the_back_flanks(self, helical):
-        """The middle of the face meets the mate half a pitch from where it does on the front, about the pitch point."""
+        """The middle of the face meets the mate half a pitch from where it does on the front,
+        about the pitch point.
+        """
         table, _ = helical
         mesh = placed(sliced_pair_mesh, table)
         pair, pitch = table.pair, table.pair.base_pitch
@@ -142,7 +147,7 @@ class TestLaw:
                 law_at(mesh, front + 9.0, 3e-5)[0],
                 law_at(mesh, back + 9.0, -mesh.backlash - 3e-5)[0],
             )
-            assert_allclose(other, -one, rtol=1e-9, atol=0)
+            assert_allclose(other, -one, rtol=1e-9)
 
     def test_springs_begin_at_0_and_grow(self, mesh):
         with pytest.raises(ConfigError, match="must begin at 0 and grow"):
@@ -170,49 +175,53 @@ class TestZeroHelix:
                 )
 
     def test_spur_teeth_in_slices_move_as_the_spur_mesh(self, machine, dynamics_of):
-        """As their statics, to 1e-4 of the approach with linear contact: docs/theory/helical_mesh.md."""
+        """As their statics, to 1e-4 of the approach with linear contact:
+        docs/theory/helical_mesh.md.
+        """
         spur = machine({"mesh.contact": "linear", "mesh.friction_coefficient": 0.0})
-        dynamics, slices = dynamics_of(spur), SliceOptions(
-            n_slices=8, slice_coupling="coupled", coupling_modules=1.0, slices_in_phase=False,
-            independent_faulty_slices=False,
-        )  # fmt: skip
+        dynamics, slices = (
+            dynamics_of(spur),
+            SliceOptions(
+                n_slices=8,
+                slice_coupling="coupled",
+                coupling_modules=1.0,
+                slices_in_phase=False,
+                independent_faulty_slices=False,
+            ),
+        )
         force = spur.mesh_force
         own = loaded_pair_table(spur.pair, spur.material, spur.mesh, force=force)
         cut = sliced_table(spur.pair, spur.material, spur.mesh, slices, force=force)
-        told = {
+        placement = {
             "direction": dynamics.approach_direction(),
             "roll_dof": 2,
             "damping": DAMPING,
         }
         (q, v, one), (q_1, v_1, other) = (
-            moved(line_of(dynamics, mesh), dynamics)
+            moved(pair_line(dynamics, mesh), dynamics)
             for mesh in (
-                pair_mesh("m", own, **told),
-                sliced_pair_mesh("m", cut, **told),
+                pair_mesh("m", own, **placement),
+                sliced_pair_mesh("m", cut, **placement),
             )
         )
         assert max(one.energy_residual, other.energy_residual) < 1e-4
         assert_allclose(
-            q_1 @ told["direction"], q @ told["direction"], rtol=0, atol=2e-8
+            q_1 @ placement["direction"], q @ placement["direction"], rtol=0, atol=2e-8
         )
         assert_allclose(v_1, v, rtol=0, atol=5e-3 * np.abs(v).max())
-
-
-def line_of(dynamics, mesh):
-    system = dynamics.system()
-    return GearedLine(
-        names=system.names, mass=np.diag(system.mass), damping=system.damping, stiffness=system.stiffness,
-        rotation=system.rotation, meshes=(mesh,),
-    )  # fmt: skip
 
 
 def moved(line, dynamics):
     start = dynamics.static_start(0.0), np.zeros(len(line.names))
     n_steps = STEPS * N_SAMPLES
     return state_after(
-        line, start, n_steps / (51200 * STEPS), n_steps, torques=constant_torques(dynamics.system().force),
+        line,
+        start,
+        n_steps / (51200 * STEPS),
+        n_steps,
+        torques=constant_torques(dynamics.system().force),
         course=constant_speed(dynamics.operating.speed),
-    )  # fmt: skip
+    )
 
 
 class TestAgainstThePair:
@@ -243,14 +252,18 @@ class TestAgainstThePair:
 
     def test_the_same_motion(self, dynamics):
         mesh = sliced_pair_mesh(
-            "pair", dynamics.table, direction=dynamics.approach_direction(), roll_dof=2,
-            damping=dynamics.mesh_damping / dynamics.mesh_force, start_phase=dynamics.start_phase,
+            "pair",
+            dynamics.table,
+            direction=dynamics.approach_direction(),
+            roll_dof=2,
+            damping=dynamics.mesh_damping / dynamics.mesh_force,
+            start_phase=dynamics.start_phase,
             errors=(dynamics.pinion_error, dynamics.wheel_error),
-        )  # fmt: skip
-        q_1, v_1, told = moved(line_of(dynamics, mesh), dynamics)
+        )
+        q_1, v_1, motion = moved(pair_line(dynamics, mesh), dynamics)
         start = dynamics.static_start(0.0), np.zeros(len(dynamics.dofs))
         q, v, _ = advance(dynamics, *start, 1 / (51200 * STEPS), 0, STEPS * N_SAMPLES)
         direction = dynamics.approach_direction()
-        assert told.energy_residual < 1e-4
+        assert motion.energy_residual < 1e-4
         assert_allclose(v_1, v, rtol=0, atol=2e-3 * np.abs(v).max())
         assert_allclose(q_1 @ direction, q @ direction, rtol=0, atol=5e-8)

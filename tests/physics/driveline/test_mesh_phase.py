@@ -25,13 +25,16 @@ def train(config, tmp_path):
         rows = [
             "node,inertia_kg_m2,stiffness_nm_per_rad,edge_from,edge_to,edge_kind,center_line_deg"
         ]
-        rows += [f"{place + 1},1e-3,1e6,{place + 1},{place + 2},gear_mesh,{angle}"
-                 for place, angle in enumerate(center_lines)]  # fmt: skip
+        rows += [
+            f"{place + 1},1e-3,1e6,{place + 1},{place + 2},gear_mesh,{angle}"
+            for place, angle in enumerate(center_lines)
+        ]
         rows.append(f"{len(teeth)},1e-3,,,,,")
         if driven_first:  # the last gear is the first node
             rows[1:] = rows[:0:-1]
         gears = [
-            "node,n_teeth,normal_module_mm,pressure_angle_deg,helix_angle_deg,face_width_mm,profile_shift"
+            "node,n_teeth,normal_module_mm,pressure_angle_deg,helix_angle_deg,"
+            "face_width_mm,profile_shift"
         ]
         gears += [
             f"{place + 1},{z},2,20,0,20,{x}"
@@ -49,12 +52,13 @@ def train(config, tmp_path):
 
 
 def misfit(line, turned=0.0):
-    """Distance of the flanks along the line of action of every mesh, in base pitches, from the base circles alone.
+    """Distance of the flanks along the line of action of every mesh, in base pitches, from the
+    base circles alone.
 
-    The driving flank stands rho_1 from its tangent point, the driven one rho_2 from its own; they touch where both add
-    up to the distance of the tangent points, less whole pitches.
+    The driving flank stands rho_1 from its tangent point, the driven one rho_2 from its own;
+    they touch where both add up to the distance of the tangent points, less whole pitches.
     """
-    angles, found = tooth_angles(line, turned), []
+    angles, computed = tooth_angles(line, turned), []
     for mesh, pair in zip(line.line.meshes, line.pairs, strict=True):
         sense = math.copysign(
             1.0, line.line.speed_ratio[line.line.gears[mesh.driving].node]
@@ -71,8 +75,8 @@ def misfit(line, turned=0.0):
             - (mesh.center_line + math.pi - tilt)
         )
         reach = sense * (pair.pinion.base_radius * one + pair.wheel.base_radius * other)
-        found.append((reach - pair.tangent_length) / pair.base_pitch)
-    return np.array(found)
+        computed.append((reach - pair.tangent_length) / pair.base_pitch)
+    return np.array(computed)
 
 
 def from_whole(value):
@@ -92,8 +96,9 @@ TRAINS = [
 def test_flanks_touch_in_every_mesh(
     train, teeth, center_lines, shifts, driven_first, turned
 ):
-    line = train(teeth, center_lines, shifts, driven_first)
-    assert_allclose(from_whole(misfit(line, turned)), 0.0, atol=1e-9)
+    gaps = misfit(train(teeth, center_lines, shifts, driven_first), turned)
+    assert_allclose(from_whole(gaps), 0.0, atol=1e-9)
+    assert np.all(from_whole(gaps + 0.01) > 0.005)
 
 
 def test_the_engine_touches_everywhere_too():
@@ -102,16 +107,11 @@ def test_the_engine_touches_everywhere_too():
     assert len(set(np.round(start_rolls(line) / line.pairs[0].base_pitch, 3))) > 4
 
 
-def test_the_law_can_fail(train):
-    line = train(*TRAINS[1])
-    shifted = np.array(misfit(line))
-    shifted += 0.01
-    assert np.all(from_whole(shifted) > 0.005)
-
-
 @pytest.mark.parametrize(("z", "expected"), [(33, 0.0), (34, 0.5), (35, 0.0)])
 def test_an_idler_between_two_gears_in_line(train, z, expected):
-    """Half a pitch between its flanks, z / 2 between its sides: in phase for odd teeth, half off for even ones."""
+    """Half a pitch between its flanks, z / 2 between its sides: in phase for odd teeth, half off
+    for even ones.
+    """
     line = train((23, z, 29), (0.0, 0.0))
     pitch = line.pairs[0].base_pitch
     pitch_points = np.array([pair.pitch_point for pair in line.pairs])

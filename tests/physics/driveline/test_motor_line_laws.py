@@ -1,4 +1,6 @@
-"""A line that a motor turns: static torques by the ratios, mesh frequencies, power, and what a missing tooth does."""
+"""A line that a motor turns: static torques by the ratios, mesh frequencies, power, and what a
+missing tooth does.
+"""
 
 from dataclasses import replace
 from functools import lru_cache
@@ -93,9 +95,11 @@ def test_in_time_the_mean_forces_stay_and_the_energies_balance():
     assert motion.energy_residual < 1e-3
 
 
-@pytest.mark.parametrize("speed_rpm", [900.0, 1200.0, 1500.0, 1800.0])
+@pytest.mark.parametrize("speed_rpm", [900.0, 1500.0])
 def test_energies_balance_where_steps_meet_every_pitch_at_the_same_places(speed_rpm):
-    """Steps in a pitch: 256, 192, 153.6 and 128, of 512 cells each; an even line rests on such a speed."""
+    """Steps in a pitch: 256 and 153.6, of 512 cells each; an even line rests on such a
+    speed.
+    """
     record = machine("operating.duration_s=0.3", f"operating.speed_rpm={speed_rpm}")
     motion = record.line(Run(system=record, faults=())).run(
         SOLVER, duration=0.3, channels=[("mesh_force", 0)], settling=0.3
@@ -113,72 +117,56 @@ def test_a_record_whose_steps_are_too_long_is_made_with_half_of_them():
     )
     with pytest.raises(StepError, match="the energy balance misses"):
         integrate_line(line.line, line.course, line.torques, as_told[0], **as_told[1])
-    found = simulated(long)
-    assert found.integration_error < 1e-3
-    np.testing.assert_array_equal(found.acceleration, simulated(short).acceleration)
+    computed = simulated(long)
+    assert computed.integration_error < 1e-3
+    np.testing.assert_array_equal(computed.acceleration, simulated(short).acceleration)
 
 
 @pytest.mark.parametrize("name", list(TEETH))
 def test_both_stages_sound_at_their_mesh_frequencies(name):
-    record = machine(
-        "operating.duration_s=1", f"system.record_mesh=[{name.replace('/', ',')}]"
-    )
-    rate = record.sensing.sampling_rate
+    record = machine(f"system.record_mesh=[{name.replace('/', ',')}]")
     line = record.line(Run(system=record, faults=()))
-    place = line.machine.mesh_names.index(name)
-    motion = line.run(
-        SOLVER, duration=1.0, channels=[("mesh_force", place)], settling=0.3
-    )
-    force = motion.signals["mesh_force", place]
+    channel = "mesh_force", line.machine.mesh_names.index(name)
+    motion = line.run(SOLVER, duration=1.0, channels=[channel], settling=0.3)
+    force = motion.signals[channel]
     spectrum = np.abs(np.fft.rfft((force - force.mean()) * np.hanning(len(force))))
-    frequency = np.fft.rfftfreq(len(force), 1.0 / rate)
-    wanted = TEETH[name][0] * RATIO[name] * SPEED / (2.0 * np.pi)
+    mesh_frequency = TEETH[name][0] * RATIO[name] * SPEED / (2.0 * np.pi)
     assert record.operating.speed == pytest.approx(RATIO[name] * SPEED)
-    at = round(wanted * len(force) / rate)
-    assert spectrum[at - 1 : at + 2].max() > 20.0 * np.median(
-        spectrum[frequency < 4000.0]
-    )
-    own = spectrum[at - 1 : at + 2].max()
-    between = spectrum[(frequency > 1.1 * wanted) & (frequency < 1.4 * wanted)]
-    assert own > 10.0 * between.max()
+    at = round(mesh_frequency)  # one second: lines are 1 Hz apart
+    largest = spectrum[at - 1 : at + 2].max()
+    assert largest > 20.0 * np.median(spectrum[:4000])
+    between = spectrum[int(1.1 * mesh_frequency) + 1 : int(1.4 * mesh_frequency)]
+    assert largest > 10.0 * between.max()
 
 
-@pytest.mark.parametrize(
-    ("name", "gear"),
-    [("3/4", "pinion"), ("3/4", "wheel"), ("5/6", "pinion"), ("5/6", "wheel")],
-)
-def test_a_missing_tooth_is_evident_once_a_turn_of_its_gear(name, gear):
-    """The record less its sound twin is large where the tooth should be and nowhere else, turn by turn."""
+@pytest.mark.parametrize("name", list(TEETH))
+def test_a_missing_tooth_is_evident_once_a_turn_of_its_gear(name):
+    """The record less its sound twin is large near the tooth and nowhere else, turn by turn."""
     record = machine(
         "operating.duration_s=1", f"system.record_mesh=[{name.replace('/', ',')}]"
     )
     start = Start(tooth_pinion=0, tooth_wheel=0, phase=0.0)
-    sound, gone = (
-        simulated(record, start=start),
-        simulated(record, missing(gear), start=start),
-    )
-    excess = np.square(gone.acceleration[2] - sound.acceleration[2])
-    n_teeth = TEETH[name][("pinion", "wheel").index(gear)]
+    sound = simulated(record, start=start)
     pitches = record.pair.pinion.n_teeth * sound.shaft_angle / (2.0 * np.pi)
-    tooth = np.floor(pitches) % n_teeth
-    by_tooth = np.bincount(tooth.astype(int), excess, minlength=n_teeth)
-    near = by_tooth[5:9].sum()
-    assert near > 0.6 * by_tooth.sum()
-    assert (
-        np.square(gone.acceleration[2]).max()
-        > 2.0 * np.square(sound.acceleration[2]).max()
-    )
+    for gear, n_teeth in zip(("pinion", "wheel"), TEETH[name], strict=True):
+        gone = simulated(record, missing(gear), start=start)
+        excess = np.square(gone.acceleration[2] - sound.acceleration[2])
+        tooth = (np.floor(pitches) % n_teeth).astype(int)
+        by_tooth = np.bincount(tooth, excess, minlength=n_teeth)
+        assert by_tooth[5:9].sum() > 0.6 * by_tooth.sum()
+        peaks = [np.abs(computed.acceleration[2]).max() for computed in (gone, sound)]
+        assert peaks[0] ** 2 > 2.0 * peaks[1] ** 2
 
 
 def test_a_broken_height_of_nothing_is_the_sound_machine():
     record = machine()
-    sound, tiny = (
-        simulated(record), simulated(record, {"kind": "broken", "gear": "pinion", "tooth": 5, "broken_height_mm": 0.0})
-    )  # fmt: skip
-    scale = np.abs(sound.acceleration).max()
-    assert_allclose(tiny.acceleration, sound.acceleration, rtol=1e-9, atol=1e-9 * scale)
-    gone = simulated(record, missing("pinion"))
-    assert np.abs(gone.acceleration - sound.acceleration).max() > 0.1 * scale
+    fault = {"gear": "pinion", "tooth": 5}
+    sound = simulated(record).acceleration
+    tiny = simulated(record, {"kind": "broken", "broken_height_mm": 0.0, **fault})
+    gone = simulated(record, {"kind": "missing_tooth", **fault})
+    scale = np.abs(sound).max()
+    assert_allclose(tiny.acceleration, sound, rtol=1e-9, atol=1e-9 * scale)
+    assert np.abs(gone.acceleration - sound).max() > 0.1 * scale
 
 
 def test_helical_stages_are_recorded_too(tmp_path):
@@ -196,11 +184,13 @@ def test_helical_stages_are_recorded_too(tmp_path):
 
 
 def test_the_other_stage_stands_where_the_teeth_allow():
-    """The gears of the idler are on one shaft: its angle, as the record mesh says it, holds for the other mesh."""
+    """The gears of the idler are on one shaft: its angle, as the record mesh says it, holds for
+    the other mesh.
+    """
     record = machine("system.record_mesh=[5,6]")
     drive, start = record.engine.drive, Start(tooth_pinion=7, tooth_wheel=3, phase=0.25)
     turned = record.crank_angle(start)
-    roll = start_rolls(drive, turned)[record.place] / record.pair.base_pitch
+    roll = start_rolls(drive, turned)[record.mesh_number] / record.pair.base_pitch
     assert_allclose(roll, start.phase, atol=1e-9)
     later = record.crank_angle(Start(tooth_pinion=8, tooth_wheel=3, phase=0.25))
     assert_allclose(later - turned, 2.0 * np.pi / 48.0 * 3.0, rtol=1e-9)
@@ -210,36 +200,28 @@ def test_the_other_stage_stands_where_the_teeth_allow():
     ("law", "exponent"), [("constant", 0), ("linear", 1), ("quadratic", 2)]
 )
 def test_a_run_up_follows_its_course_and_its_load_the_law(law, exponent):
-    words = (
+    record = machine(
         f"excitation.load.law={law}",
         "operating=ramp",
         "operating.speed_profile.first_factor=0.5",
-    )
-    record = machine(
-        *words,
         "operating.speed_rpm=1746",
         "operating.torque_nm=60",
         "operating.duration_s=0.4",
     )
     line = record.line(Run(system=record, faults=()))
-    channels = [("angle", line.dof(8)), ("mesh_force", 0)]
+    load = "angle", line.dof(8)
+    channels = [load, ("mesh_force", 0)]
     motion = line.run(SOLVER, duration=0.4, channels=channels, settling=0.3)
-    force = motion.signals["mesh_force", 0]
-    speed = motion.nominal_speed / SPEED
+    speed = motion.nominal_speed
     # the first mesh also speeds up what is behind it
-    line_inertia = np.diag(line.matrices.mass) * line.line.rotation**2
-    behind = line_inertia.sum() - sum(line_inertia[: line.dof(3) + 1])
-    taken = TORQUE * speed**exponent + behind * np.gradient(
-        motion.nominal_speed, 1.0 / 10240.0
-    )
-    early, late = slice(500, 1500), slice(-1500, -500)
-    for part in (early, late):
-        assert_allclose(
-            force[part].mean() * record.pair.pinion.base_radius,
-            taken[part].mean(),
-            rtol=0.02,
-        )
-    assert np.abs(motion.signals["angle", line.dof(8)]).max() < 0.2
+    inertia = np.diag(line.matrices.mass) * line.line.rotation**2
+    behind = inertia.sum() - sum(inertia[: line.dof(3) + 1])
+    taken = TORQUE * (speed / SPEED) ** exponent
+    taken += behind * np.gradient(speed, 1.0 / 10240.0)
+    given = motion.signals["mesh_force", 0] * record.pair.pinion.base_radius
+    for part in (slice(500, 1500), slice(-1500, -500)):
+        assert_allclose(given[part].mean(), taken[part].mean(), rtol=0.02)
+    assert np.abs(motion.signals[load]).max() < 0.2
 
 
 def test_slip_damps_the_rigid_motion_and_ripple_shakes_at_its_order():
@@ -265,5 +247,5 @@ def test_ripple_in_time_is_that_of_the_linear_line():
     motion = line.run(SOLVER, duration=0.2, channels=[("speed", dof)], settling=0.3)
     at = line.linear.orders * (line.turned + motion.nominal_angle[:, None])
     linear = np.real(np.exp(1j * at) @ line.linear.speed_deviation[dof])
-    found = motion.signals["speed", dof]
-    assert np.std(found - found.mean() - linear) < 0.1 * np.std(linear)
+    computed = motion.signals["speed", dof]
+    assert np.std(computed - computed.mean() - linear) < 0.1 * np.std(linear)

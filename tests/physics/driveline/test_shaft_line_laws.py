@@ -32,10 +32,14 @@ ROTORS = {"system.motor.inertia_kg_m2": 0.01, "system.load.inertia_kg_m2": 0.03}
 @pytest.fixture(scope="module")
 def lines(machine):
     engine, gearbox = (
-        [read_drive_line(read_request([f"system={name}", f"system.lateral={lateral}"]).config)
-         for lateral in ("false", "true")]
+        [
+            read_drive_line(
+                read_request([f"system={name}", f"system.lateral={lateral}"]).config
+            )
+            for lateral in ("false", "true")
+        ]
         for name in ("engine_gear_train", "two_stage_gearbox")
-    )  # fmt: skip
+    )
     pairs = [drive_line_of_pair(machine(changes), "pair") for changes in ({}, ROTORS)]
     return dict(zip(LINES, (*engine, *gearbox, *pairs), strict=True))
 
@@ -46,17 +50,17 @@ def line(lines, request):
 
 
 def test_a_free_line_has_one_rigid_mode_in_the_gear_ratios(line):
-    found, matrices = line.modes(), line.matrices()
-    assert found.n_rigid == 1
-    assert found.frequency[0] == 0.0
-    assert np.all(np.diff(found.frequency) >= 0.0)
-    turning = (matrices.expand @ found.shapes[0])[: len(line.numbers)]
-    assert_allclose(
-        turning / turning[0], np.abs(line.line.speed_ratio), rtol=1e-12, atol=0
+    computed, matrices = line.modes(), line.matrices()
+    assert computed.n_rigid == 1
+    assert computed.frequency[0] == 0.0
+    assert np.all(np.diff(computed.frequency) >= 0.0)
+    turning = (matrices.expand @ computed.shapes[0])[: len(line.numbers)]
+    assert_allclose(turning / turning[0], np.abs(line.line.speed_ratio), rtol=1e-12)
+    scale = (
+        np.abs(matrices.whole_stiffness).sum(axis=1) * np.abs(computed.shapes[0]).max()
     )
-    scale = np.abs(matrices.whole_stiffness).sum(axis=1) * np.abs(found.shapes[0]).max()
-    assert np.all(np.abs(matrices.whole_stiffness @ found.shapes[0]) < 1e-12 * scale)
-    wrong = found.shapes[0].copy()
+    assert np.all(np.abs(matrices.whole_stiffness @ computed.shapes[0]) < 1e-12 * scale)
+    wrong = computed.shapes[0].copy()
     wrong[1] *= 1.01
     assert not np.all(np.abs(matrices.whole_stiffness @ wrong) < 1e-6 * scale)
 
@@ -74,29 +78,18 @@ def test_matrices_are_symmetric_and_store_no_negative_energy(line):
 
 
 def test_modes_are_orthogonal_and_hold_as_much_strain_as_kinetic_energy(line):
-    found, matrices = line.modes(), line.matrices()
+    computed, matrices = line.modes(), line.matrices()
     assert_allclose(
-        found.shapes @ matrices.mass @ found.shapes.T,
-        np.eye(len(found.shapes)),
+        computed.shapes @ matrices.mass @ computed.shapes.T,
+        np.eye(len(computed.shapes)),
         atol=1e-8,
     )
-    square = (2.0 * np.pi * found.frequency) ** 2
-    strain = found.shapes @ matrices.whole_stiffness @ found.shapes.T
+    square = (2.0 * np.pi * computed.frequency) ** 2
+    strain = computed.shapes @ matrices.whole_stiffness @ computed.shapes.T
     assert_allclose(strain, np.diag(square), atol=1e-8 * square.max())
-    assert_allclose(found.kinetic_share.sum(axis=1), 1.0, rtol=1e-12, atol=0)
-    assert np.all(found.mesh_strain_share >= 0.0)
-    assert np.all(found.mesh_strain_share.sum(axis=1) <= 1.0 + 1e-9)
-
-
-def test_the_response_is_reciprocal(line):
-    matrices, omega = line.matrices(merge_rigid=True), 2.0 * np.pi * 61.0
-    dynamic = (
-        matrices.whole_stiffness
-        + 1j * (matrices.loss_stiffness + omega * matrices.damping)
-        - omega**2 * matrices.mass
-    )
-    response = np.linalg.inv(dynamic)
-    assert_allclose(response, response.T, rtol=0, atol=1e-9 * np.abs(response).max())
+    assert_allclose(computed.kinetic_share.sum(axis=1), 1.0, rtol=1e-12)
+    assert np.all(computed.mesh_strain_share >= 0.0)
+    assert np.all(computed.mesh_strain_share.sum(axis=1) <= 1.0 + 1e-9)
 
 
 def test_equal_loss_factors_damp_every_mode_by_half_of_it(lines):
@@ -106,9 +99,9 @@ def test_equal_loss_factors_damp_every_mode_by_half_of_it(lines):
         loss_stiffness=0.06 * matrices.stiffness,
         mesh_loss_factor=np.full_like(matrices.mesh_stiffness, 0.06),
     )
-    found = natural_modes(uniform)
-    assert_allclose(found.damping_ratio[1:], 0.03, rtol=1e-5, atol=0)
-    assert found.damping_ratio[0] == 0.0
+    computed = natural_modes(uniform)
+    assert_allclose(computed.damping_ratio[1:], 0.03, rtol=1e-5)
+    assert computed.damping_ratio[0] == 0.0
 
 
 def test_viscous_losses_damp_each_mode_as_its_loss_factors_do(lines):
@@ -126,7 +119,7 @@ def test_viscous_losses_damp_each_mode_as_its_loss_factors_do(lines):
     rates = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-k, -c]]))
     ringing = rates[rates.imag > 1.0]
     ringing = ringing[np.argsort(np.abs(ringing))]
-    assert_allclose(-ringing.real / np.abs(ringing), ratio[1:], rtol=1e-6, atol=0)
+    assert_allclose(-ringing.real / np.abs(ringing), ratio[1:], rtol=1e-6)
     assert_allclose(
         viscous.damping @ matrices.rigid.T,
         0.0,
@@ -137,18 +130,20 @@ def test_viscous_losses_damp_each_mode_as_its_loss_factors_do(lines):
 
 def test_a_mesh_on_its_own_gets_half_of_its_loss_factor():
     pair = two_discs(loss_factor=0.1)
-    found = natural_modes(with_viscous_losses(line_matrices(pair)))
-    assert_allclose(found.damping_ratio, [0.0, 0.05], rtol=1e-12, atol=0)
+    computed = natural_modes(with_viscous_losses(line_matrices(pair)))
+    assert_allclose(computed.damping_ratio, [0.0, 0.05], rtol=1e-12)
 
 
-def two_discs(z=(20, 50), inertia=(1e-3, 2e-2), loss_factor=0.0):
-    radius = [0.47 * 2e-3 * count for count in z]
+def two_discs(loss_factor=0.0):
+    gears = [
+        LineGear(name=name, node=node, n_teeth=count, base_radius=0.47 * 2e-3 * count)
+        for node, (name, count) in enumerate((("a", 20), ("b", 50)))
+    ]
     return ShaftLine(
-        nodes=tuple(Node(name=name, inertia=value) for name, value in zip("ab", inertia, strict=True)),
-        gears=tuple(LineGear(name=name, node=place, n_teeth=count, base_radius=r)
-                    for place, (name, count, r) in enumerate(zip("ab", z, radius, strict=True))),
+        nodes=(Node(name="a", inertia=1e-3), Node(name="b", inertia=2e-2)),
+        gears=tuple(gears),
         meshes=(GearMesh(driving=0, driven=1, stiffness=2e8, loss_factor=loss_factor),),
-    )  # fmt: skip
+    )
 
 
 def test_two_discs_in_mesh_have_the_textbook_frequency():
@@ -157,17 +152,18 @@ def test_two_discs_in_mesh_have_the_textbook_frequency():
         gear.base_radius**2 / node.inertia
         for gear, node in zip(line.gears, line.nodes, strict=True)
     )
-    found = natural_modes(line_matrices(line))
+    computed = natural_modes(line_matrices(line))
     assert_allclose(
-        found.frequency,
+        computed.frequency,
         [0.0, np.sqrt(2e8 / equivalent) / (2.0 * np.pi)],
         rtol=1e-12,
-        atol=0,
     )
 
 
 def test_a_geared_line_has_the_frequencies_of_the_line_referred_to_one_shaft():
-    """Inertias and stiffnesses behind a ratio count times its square: the classical equivalent shaft."""
+    """Inertias and stiffnesses behind a ratio count times its square: the classical equivalent
+    shaft.
+    """
     ratio, (a, b) = 20 / 50, two_discs().gears
     inertia, springs = (0.3, 1e-3, 2e-2, 0.5), (1e4, 2e8, 3e4)
     geared = ShaftLine(
@@ -183,45 +179,20 @@ def test_a_geared_line_has_the_frequencies_of_the_line_referred_to_one_shaft():
     )
     behind = np.array([1.0, 1.0, ratio**2, ratio**2])
     referred = ShaftLine(
-        nodes=tuple(Node(name=str(place), inertia=value) for place, value in enumerate(inertia * behind)),
-        shafts=tuple(Shaft(first=place, second=place + 1, stiffness=value) for place, value in
-                     enumerate((springs[0], springs[1] * a.base_radius**2, springs[2] * ratio**2))),
-    )  # fmt: skip
+        nodes=tuple(
+            Node(name=str(place), inertia=value)
+            for place, value in enumerate(inertia * behind)
+        ),
+        shafts=tuple(
+            Shaft(first=place, second=place + 1, stiffness=value)
+            for place, value in enumerate(
+                (springs[0], springs[1] * a.base_radius**2, springs[2] * ratio**2)
+            )
+        ),
+    )
     one, other = (natural_modes(line_matrices(line)) for line in (geared, referred))
-    assert_allclose(one.frequency, other.frequency, rtol=1e-9, atol=0)
+    assert_allclose(one.frequency, other.frequency, rtol=1e-9)
     assert_allclose(one.kinetic_share, other.kinetic_share, rtol=0, atol=1e-9)
-
-
-def test_half_of_the_ring_is_where_a_best_viscous_damper_has_its_peak():
-    """Den Hartog: free and locked ring answer alike there, and the best damping peaks there."""
-    disc, ring, spring = 2.0, 1.2, 3e5
-    square = spring / (disc + 0.5 * ring)
-
-    def answer(omega, damper):
-        carried = (
-            -(omega**2)
-            * ring
-            * 1j
-            * omega
-            * damper
-            / (-(omega**2) * ring + 1j * omega * damper)
-        )
-        return np.abs(1.0 / (spring - omega**2 * disc + carried))
-
-    at_half = [answer(np.sqrt(square), damper) for damper in (1e-3, 10.0, 300.0, 1e8)]
-    assert_allclose(at_half, at_half[0], rtol=1e-6, atol=0)
-    share = ring / disc
-    best = (
-        2.0
-        * ring
-        * np.sqrt(spring / disc)
-        / np.sqrt(2.0 * (1.0 + share) * (2.0 + share))
-    )
-    omega = np.linspace(0.5, 1.5, 20001) * np.sqrt(square)
-    assert_allclose(
-        omega[answer(omega, best).argmax()], np.sqrt(square), rtol=1e-3, atol=0
-    )
-    assert answer(omega, 0.5 * best).max() > 1.05 * answer(omega, best).max()
 
 
 def test_frequencies_do_not_depend_on_the_order_of_the_nodes(lines):
@@ -240,17 +211,19 @@ def test_frequencies_do_not_depend_on_the_order_of_the_nodes(lines):
     one, other = (
         natural_modes(line_matrices(each)).frequency for each in (line, mixed)
     )
-    assert_allclose(one[1:], other[1:], rtol=1e-7, atol=0)
+    assert_allclose(one[1:], other[1:], rtol=1e-7)
 
 
 def test_merging_compounds_takes_only_what_they_alone_do(lines):
-    """The printed 1000 MN m/rad stand for rigid: merged, all modes below 5 kHz stay and the highest are gone."""
+    """The printed 1000 MN m/rad stand for rigid: merged, all modes below 5 kHz stay and the
+    highest are gone.
+    """
     matrices = [lines["engine"].matrices(merge_rigid=merge) for merge in (False, True)]
     as_printed, merged = (natural_modes(one).frequency for one in matrices)
     assert len(as_printed) == 67
     assert len(merged) == 65
     low = as_printed < 5e3
-    assert_allclose(merged[: low.sum()], as_printed[low], rtol=1e-3, atol=0)
+    assert_allclose(merged[: low.sum()], as_printed[low], rtol=1e-3)
     assert as_printed[-1] > 8e4
     assert merged[-1] < 3e4
 
@@ -261,14 +234,20 @@ def test_stiff_supports_leave_the_torsional_line(lines):
     apart = []
     for factor in (1.0, 1e2, 1e4):
         gears = tuple(
-            replace(gear, support=replace(gear.support, stiffness_x=gear.support.stiffness_x * factor,
-                                          stiffness_y=gear.support.stiffness_y * factor))
+            replace(
+                gear,
+                support=replace(
+                    gear.support,
+                    stiffness_x=gear.support.stiffness_x * factor,
+                    stiffness_y=gear.support.stiffness_y * factor,
+                ),
+            )
             for gear in lateral.gears
-        )  # fmt: skip
-        found = natural_modes(
+        )
+        computed = natural_modes(
             line_matrices(replace(lateral, gears=gears), lateral=True)
         ).frequency[:12]
-        apart.append(np.abs(found[1:] / torsion[1:] - 1.0).max())
+        apart.append(np.abs(computed[1:] / torsion[1:] - 1.0).max())
     assert apart[0] > 0.02
     assert apart[1] < 0.02 * 0.2
     assert apart[2] < 1e-4
@@ -294,69 +273,32 @@ def test_softer_meshes_and_heavier_discs_lower_every_mode(lines):
 
 @pytest.mark.parametrize("rotors", [{}, ROTORS], ids=["pair", "with_rotors"])
 def test_the_single_pair_is_the_same_code_with_two_nodes(machine, dynamics_of, rotors):
-    """Matrices and frequencies of the line equal those of the pair's equations without their soft drive."""
+    """Matrices and frequencies of the line are those of the pair without its soft drive."""
     system = machine(rotors)
     dynamics, line = dynamics_of(system), drive_line_of_pair(system, "pair")
     own, matrices = dynamics.system(), line.matrices()
-    places = {
-        "pinion": "pinion_rotation",
-        "wheel": "wheel_rotation",
-        "motor": "motor_rotation",
-        "load": "load_rotation",
-    }
-    places |= {
-        f"{gear} {axis}": f"{gear}_{axis}"
-        for gear in ("pinion", "wheel")
-        for axis in "xy"
-    }
-    order = [own.names.index(places[name]) for name in matrices.names]
-    stiffness, damping = own.stiffness.copy(), own.damping.copy()
+    order = []
+    for name in matrices.names:
+        gear, _, axis = name.partition(" ")
+        order.append(own.names.index(f"{gear}_{axis or 'rotation'}"))
+    stiffness = own.stiffness.copy()
     driver = own.names.index("motor_rotation" if rotors else "pinion_rotation")
     stiffness[driver, driver] -= dynamics.drive_stiffness
-    damping[driver, driver] = damping[driver, driver] if rotors else 0.0
-    assert_allclose(np.diag(matrices.mass), own.mass[order], rtol=1e-14, atol=0)
+    expected = np.ix_(order, order)
+    assert_allclose(np.diag(matrices.mass), own.mass[order], rtol=1e-14)
     assert_allclose(
-        matrices.stiffness,
-        stiffness[np.ix_(order, order)],
-        rtol=1e-9,
-        atol=1e-9 * stiffness.max(),
+        matrices.stiffness, stiffness[expected], rtol=1e-9, atol=1e-9 * stiffness.max()
     )
-    without_driver = [place for place, name in enumerate(order) if name != driver]
+    without_driver = ~(np.equal.outer(order, order) & np.equal(order, driver))
+    damping = own.damping[expected]
     assert_allclose(
-        matrices.damping[np.ix_(without_driver, without_driver)],
-        damping[np.ix_(order, order)][np.ix_(without_driver, without_driver)],
-        rtol=1e-12,
-        atol=0,
+        matrices.damping[without_driver], damping[without_driver], rtol=1e-12
     )
-    assert_allclose(
-        matrices.directions[0],
-        dynamics.approach_direction()[order],
-        rtol=1e-12,
-        atol=1e-15,
-    )
-    assert_allclose(
-        matrices.mesh_stiffness, [dynamics.mean_mesh_stiffness], rtol=0, atol=0
-    )
-    assert_allclose(matrices.mesh_damping, [dynamics.mesh_damping], rtol=0, atol=0)
     direction = dynamics.approach_direction()
-    whole = (
-        stiffness + dynamics.mean_mesh_stiffness * np.outer(direction, direction)
-    ) / own.mass[:, None]
-    square = np.sort(np.abs(np.linalg.eigvals(whole)))
-    assert_allclose(
-        line.modes().frequency[1:],
-        np.sqrt(square[1:]) / (2.0 * np.pi),
-        rtol=1e-6,
-        atol=0,
-    )
-
-
-def test_torsion_alone_of_the_pair_is_its_equivalent_mass_on_the_mesh(
-    machine, dynamics_of
-):
-    dynamics = dynamics_of(machine())
-    found = natural_modes(line_matrices(drive_line_of_pair(machine(), "pair").line))
-    expected = np.sqrt(dynamics.mean_mesh_stiffness / dynamics.equivalent_mass) / (
-        2.0 * np.pi
-    )
-    assert_allclose(found.frequency, [0.0, expected], rtol=1e-12, atol=0)
+    assert_allclose(matrices.directions[0], direction[order], rtol=1e-12, atol=1e-15)
+    assert matrices.mesh_stiffness == [dynamics.mean_mesh_stiffness]
+    assert matrices.mesh_damping == [dynamics.mesh_damping]
+    mesh = dynamics.mean_mesh_stiffness * np.outer(direction, direction)
+    square = np.sort(np.abs(np.linalg.eigvals((stiffness + mesh) / own.mass[:, None])))
+    frequency = np.sqrt(square[1:]) / (2.0 * np.pi)
+    assert_allclose(line.modes().frequency[1:], frequency, rtol=1e-6)

@@ -1,4 +1,6 @@
-"""A drive that turns once a cycle keeps its teeth: its marks of timing say which meet; other pairs are put on anew."""
+"""A drive that turns once a cycle keeps its teeth: its marks of timing say which meet; other pairs
+are put on anew.
+"""
 
 import pytest
 

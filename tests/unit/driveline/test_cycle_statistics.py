@@ -1,4 +1,4 @@
-"""Statistics over the cycles of the crank: exact for what repeats, and hardly moved by one impact."""
+"""Statistics over the cycles of the crank: exact for periodic signals, robust to one impact."""
 
 import numpy as np
 import pytest
@@ -30,20 +30,20 @@ def test_orders_are_found_whatever_the_speed_and_the_trend(rise):
         + 3.0
         + 0.01 * angle
     )
-    found = order_amplitudes(np.array([signal, -signal]), angle, 40)
+    computed = order_amplitudes(np.array([signal, -signal]), angle, 40)
     expected = np.zeros(40)
     expected[0], expected[19] = 2.0, 0.5
-    assert_allclose(found, [expected, expected], atol=0.02)
+    assert_allclose(computed, [expected, expected], atol=0.02)
 
 
 def test_fluctuation_is_half_the_peak_to_peak_of_each_cycle():
     angle = crank(5.5)
     assert [one.stop for one in whole_cycles(angle)][-1] < len(angle)
-    found = fluctuations(
+    computed = fluctuations(
         np.array([np.sin(angle), 3.0 * np.sin(0.5 * angle) + 7.0]), angle
     )
-    assert found.shape == (2, 5)
-    assert_allclose(found, np.array([[1.0], [3.0]]) * np.ones((2, 5)), rtol=1e-5)
+    assert computed.shape == (2, 5)
+    assert_allclose(computed, np.array([[1.0], [3.0]]) * np.ones((2, 5)), rtol=1e-5)
 
 
 def test_one_impact_moves_the_extremes_of_a_run_but_not_the_typical_ones():

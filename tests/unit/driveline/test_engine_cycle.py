@@ -1,4 +1,6 @@
-"""One cylinder: kinematics, work of the gas, inertia, the Wiebe cycle's energy, measured pressures."""
+"""One cylinder: kinematics, work of the gas, inertia, the Wiebe cycle's energy, measured
+pressures.
+"""
 
 import re
 from dataclasses import replace
@@ -99,7 +101,8 @@ def test_inertia_torque_is_equation_19_without_its_leading_minus():
     printed_without_minus = 11.0 * 0.0975**2 * speed**2 * series
     torque = inertia_torque(CYLINDER, ANGLE, speed)
     assert_allclose(torque, printed_without_minus, rtol=0, atol=0.02 * np.ptp(torque))
-    # past top dead center the piston is pushed downwards by its own mass until the crank slows it: first against
+    # past top dead center the piston is pushed downwards by its own mass until the crank slows
+    # it: first against
     assert torque[N // 32] < 0.0
     assert np.max(np.abs(torque + printed_without_minus)) > 1.5 * np.max(np.abs(torque))
 
@@ -190,42 +193,29 @@ def test_cycles_that_cannot_be_are_refused(change, message):
 
 def write(folder, header, angle, pressure):
     path = folder / "pressure.csv"
-    np.savetxt(
-        path,
-        np.column_stack([angle, pressure]),
-        delimiter=",",
-        header=header,
-        comments="",
-    )
+    table = np.column_stack([angle, pressure])
+    np.savetxt(path, table, delimiter=",", header=header, comments="")
     return PressureFile(file=str(path))
 
 
+HEADER = "crank_angle_deg,pressure_mpa"
 DEGREES = np.arange(-360.0, 360.0, 1.0)
 MEGAPASCAL = 2.0 + np.cos(np.radians(DEGREES / 2.0))
 
 
-def test_a_measured_pressure_is_read_whatever_its_units_and_start(tmp_path):
-    one = read_pressure(
-        write(tmp_path, "crank_angle_deg,pressure_mpa", DEGREES, MEGAPASCAL), N
-    )
-    assert_allclose(one, 1e6 * (2.0 + np.cos(ANGLE / 2.0)), rtol=1e-4)
-    (tmp_path / "b").mkdir()
-    other = write(
-        tmp_path / "b",
-        "pressure_gpa,crank_angle_rad",
-        MEGAPASCAL * 1e-3,
-        np.radians(DEGREES),
-    )
-    assert_allclose(read_pressure(other, N), one, rtol=1e-9)
-    (tmp_path / "c").mkdir()
-    both_ends = np.append(DEGREES, 360.0), np.append(MEGAPASCAL, 1.0)
-    assert_allclose(
-        read_pressure(
-            write(tmp_path / "c", "crank_angle_deg,pressure_mpa", *both_ends), N
-        ),
-        one,
-        rtol=1e-9,
-    )
+@pytest.mark.parametrize(
+    ("header", "angle", "pressure"),
+    [
+        (HEADER, DEGREES, MEGAPASCAL),
+        ("pressure_gpa,crank_angle_rad", MEGAPASCAL * 1e-3, np.radians(DEGREES)),
+        (HEADER, np.append(DEGREES, 360.0), np.append(MEGAPASCAL, 1.0)),
+    ],
+)
+def test_a_measured_pressure_is_read_whatever_its_units_and_start(
+    tmp_path, header, angle, pressure
+):
+    computed = read_pressure(write(tmp_path, header, angle, pressure), N)
+    assert_allclose(computed, 1e6 * (2.0 + np.cos(ANGLE / 2.0)), rtol=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""When cylinders fire: even firing of the 20-cylinder engine, and layouts that cannot be."""
+"""Firing of cylinders: even firing of the 20-cylinder engine, and layouts that cannot be."""
 
 import re
 from dataclasses import replace
@@ -61,8 +61,8 @@ def test_the_default_crank_has_no_first_order_couple_and_that_in_sequence_has():
 def test_a_bank_angle_of_90_fires_18_and_54_degrees_apart():
     order = V20.firing_order
     layout = replace(V20, bank_angles=(0.0, np.radians(90.0)), firing_order=order)
-    found = np.sort(np.unique(gaps(layout).round(6)))
-    assert_allclose(found, [18.0, 36.0, 54.0], atol=1e-6)
+    computed = np.sort(np.unique(gaps(layout).round(6)))
+    assert_allclose(computed, [18.0, 36.0, 54.0], atol=1e-6)
 
 
 def test_a_parallel_twin_and_a_single_fire_a_turn_and_two_apart():

@@ -1,4 +1,4 @@
-"""What a line, its course, its torques and its solver refuse, each in one line, and runs that cannot go on."""
+"""Refusals of lines, courses, torques and solvers, each in one line, and runs that fail."""
 
 import math
 from dataclasses import replace
@@ -10,7 +10,7 @@ from line_tools import chain, constant_torques, state_after, two_gears
 from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
 from gensig.driveline.time.newmark import (
     LineSolver,
-    _told_above,
+    _rounded_above,
     integrate_line,
     static_start,
 )
@@ -19,20 +19,23 @@ from gensig.errors import ConfigError, GensigError, SimulationError
 SOLVER = LineSolver(sampling_rate=10240.0, oversampling=4, max_energy_residual=1e-3)
 
 
-def refused(error: type[GensigError], told: str):
-    return pytest.raises(error, match=f"(?s)^(?!.*\n).*{told}")
+def refused(error: type[GensigError], message: str):
+    return pytest.raises(error, match=f"(?s)^(?!.*\n).*{message}")
 
 
 def run(line, torques=(), course=None, **changes):
     return integrate_line(
-        line, course or constant_speed(10.0), torques, changes.pop("solver", SOLVER),
+        line,
+        course or constant_speed(10.0),
+        torques,
+        changes.pop("solver", SOLVER),
         **{"duration": 0.01, "channels": [("speed", 0)], **changes},
-    )  # fmt: skip
+    )
 
 
 class TestLine:
     @pytest.mark.parametrize(
-        ("changes", "error", "told"),
+        ("changes", "error", "message"),
         [
             (
                 {"mass": np.eye(3)},
@@ -68,8 +71,8 @@ class TestLine:
             ),
         ],
     )
-    def test_refused(self, changes, error, told):
-        with refused(error, told):
+    def test_refused(self, changes, error, message):
+        with refused(error, message):
             replace(two_gears(), **changes)
 
     def test_a_mesh_of_another_line(self):
@@ -80,7 +83,7 @@ class TestLine:
 
 class TestCourse:
     @pytest.mark.parametrize(
-        ("time", "speed", "told"),
+        ("time", "speed", "message"),
         [
             ([0.0, 0.0], [1.0, 1.0], "times of its knots must increase"),
             ([0.0, 1.0], [1.0], "must be alike"),
@@ -88,8 +91,8 @@ class TestCourse:
             ([], [], "must be alike"),
         ],
     )
-    def test_refused(self, time, speed, told):
-        with refused(ConfigError, told):
+    def test_refused(self, time, speed, message):
+        with refused(ConfigError, message):
             LineCourse(time=np.array(time), speed=np.array(speed))
 
     def test_angle_and_speed(self):
@@ -101,7 +104,7 @@ class TestCourse:
 
 class TestTorques:
     @pytest.mark.parametrize(
-        ("torque", "told"),
+        ("torque", "message"),
         [
             (
                 {"dof": 5, "table": np.ones(1)},
@@ -113,12 +116,12 @@ class TestTorques:
             ),
         ],
     )
-    def test_refused_by_the_line(self, torque, told):
-        with refused(ConfigError, told):
+    def test_refused_by_the_line(self, torque, message):
+        with refused(ConfigError, message):
             run(two_gears(), [ShaftTorque(**torque)])
 
     @pytest.mark.parametrize(
-        ("torque", "told"),
+        ("torque", "message"),
         [
             ({"table": np.array([math.inf])}, "finite numbers"),
             ({"table": np.empty(0)}, "finite numbers"),
@@ -129,8 +132,8 @@ class TestTorques:
             ),
         ],
     )
-    def test_refused(self, torque, told):
-        with refused(ConfigError, told):
+    def test_refused(self, torque, message):
+        with refused(ConfigError, message):
             ShaftTorque(dof=0, **torque)
 
     def test_an_angle_that_does_not_turn(self):
@@ -142,7 +145,7 @@ class TestTorques:
             run(line, [ShaftTorque(dof=1, table=np.ones(4))])
 
     def test_the_sense_is_that_of_rotation(self):
-        """A line whose discs turn backwards moves as the mirror image of one that turns forwards."""
+        """Discs that turn backwards move as the mirror image of those that turn forwards."""
         table = np.cos(np.arange(64) / 64 * 2 * np.pi) + 0.3 * np.sin(
             np.arange(64) / 32 * 2 * np.pi
         )
@@ -158,7 +161,7 @@ class TestTorques:
 
 class TestRun:
     @pytest.mark.parametrize(
-        ("changes", "told"),
+        ("changes", "message"),
         [
             ({"channels": []}, "no channel to give out"),
             (
@@ -175,8 +178,8 @@ class TestRun:
             ),
         ],
     )
-    def test_refused(self, changes, told):
-        with refused(ConfigError, told):
+    def test_refused(self, changes, message):
+        with refused(ConfigError, message):
             run(two_gears(), **changes)
 
     @pytest.mark.parametrize(
@@ -210,7 +213,7 @@ class TestRun:
             )
 
     def test_divergence(self):
-        """A free line under torques that nothing balances runs away; it is told as one, with a name."""
+        """A free line under torques that nothing balances runs away."""
         with refused(SimulationError, "left all bounds"):
             run(
                 two_gears(),
@@ -223,7 +226,7 @@ class TestRun:
             run(two_gears(), start=(np.zeros(2), np.array([1e300, 0.0])))
 
     def test_rest_of_a_free_line_is_in_its_own_acceleration(self):
-        """What is not balanced accelerates the whole line; the mesh carries what the second inertia needs."""
+        """Unbalanced torques accelerate the whole line; the mesh drives the second inertia."""
         line = two_gears()
         q = static_start(line, constant_speed(10.0), constant_torques([10.0, 0.0]))
         reduced = 0.01 + 0.05 * 0.5**2
@@ -255,7 +258,7 @@ class TestRun:
 
 
 @pytest.mark.parametrize(
-    ("missed", "told"),
+    ("missed", "message"),
     [
         (0.0123456, "0.0123"),
         (1.0004e-3, "0.0010004"),
@@ -263,5 +266,5 @@ class TestRun:
         (1e-3, "0.001"),
     ],
 )
-def test_a_residual_just_above_what_is_allowed_reads_above_it(missed, told):
-    assert _told_above(missed, 1e-3) == told
+def test_a_residual_just_above_what_is_allowed_reads_above_it(missed, message):
+    assert _rounded_above(missed, 1e-3) == message

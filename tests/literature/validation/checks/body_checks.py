@@ -44,7 +44,8 @@ def terms(
 
     ``root`` may be ``straight``.
     """
-    tooth = (_straight_tooth if root == "straight" else healthy_tooth)(case.gear(side))
+    make = {"true": healthy_tooth, "straight": _straight_tooth}[root]
+    tooth = make(case.gear(side))
     return structural_terms(tooth, curvature, case.structure_material, case.system.mesh)
 
 
@@ -62,7 +63,7 @@ def _term(side: str, name: str, case: Case, at: str) -> float:
 
 
 def _tooth(side: str, root: str, case: Case, at: str) -> float:
-    """Bending, shear and axial compliance together, with the true root curve or the straight one."""
+    """Sum of bending, shear and axial compliance, with the true or the straight root curve."""
     parts = terms(case, side, case.curvature(side, at), root=root)
     return float(sum(parts[name][0] for name in ("bending", "shear", "axial")))
 
@@ -107,17 +108,13 @@ def _double_zone(case: Case, at: str) -> tuple[Array, Array]:
     """
     pair = case.pair
     zone = pair.path_of_contact - pair.base_pitch
-    share = (np.arange(N_MEAN) + 0.5) / N_MEAN if at == "mean" else np.array([0.5])
-    entering = share * zone if at in ("mean", "mid") else np.array([float(at) * 1e-3])
+    if at == "mean":
+        entering = (np.arange(N_MEAN) + 0.5) / N_MEAN * zone
+    elif at == "mid":
+        entering = np.array([0.5 * zone])
+    else:
+        entering = np.array([float(at) * 1e-3])
     return entering, np.minimum(entering + pair.base_pitch, pair.path_of_contact)
-
-
-def _curvature(case: Case, side: str, position: Array) -> Array:
-    return np.asarray(
-        (case.pair.pinion_curvature if side == "pinion" else case.pair.wheel_curvature)(
-            position
-        )
-    )
 
 
 def _pair_structure(which: int, case: Case, at: str) -> float:
@@ -125,7 +122,8 @@ def _pair_structure(which: int, case: Case, at: str) -> float:
     position = _double_zone(case, at)[which]
     return float(
         sum(
-            structure(case, side, _curvature(case, side, position))[0] for side in SIDES
+            structure(case, side, case.curvature_at(side, position))[0]
+            for side in SIDES
         )
     )
 
@@ -134,15 +132,12 @@ def _cross(side: str, case: Case, at: str) -> float:
     """Body compliance between the two pairs of the double zone."""
     gear = case.gear(side)
     angles = [
-        load_angle(gear, _curvature(case, side, position))
+        load_angle(gear, case.curvature_at(side, position))
         for position in _double_zone(case, at)
     ]
-    pitches = 1 if side == "pinion" else -1
-    return float(
-        cross_compliance(
-            gear, case.structure_material, angles[0], angles[1], pitches=pitches
-        )[0]
-    )
+    pitches = {"pinion": 1, "wheel": -1}[side]
+    material = case.structure_material
+    return float(cross_compliance(gear, material, *angles, pitches=pitches)[0])
 
 
 def _cross_over_body(side: str, case: Case, at: str) -> float:
@@ -150,7 +145,7 @@ def _cross_over_body(side: str, case: Case, at: str) -> float:
     zone.
     """
     bodies = [
-        terms(case, side, _curvature(case, side, place))["foundation"][0]
+        terms(case, side, case.curvature_at(side, place))["foundation"][0]
         for place in _double_zone(case, "mid")
     ]
     return _cross(side, case, "mid") / float(np.mean(bodies))
@@ -161,7 +156,7 @@ def _stiffness_body_once(case: Case, at: str) -> float:
     by side, in series with the mean of the bodies under either pair."""
     own, body = [], []
     for position in _double_zone(case, "mean"):
-        parts = [terms(case, side, _curvature(case, side, position)) for side in SIDES]
+        parts = [terms(case, side, case.curvature_at(side, position)) for side in SIDES]
         body.append(sum(part["foundation"] for part in parts))
         own.append(
             contact_compliance(case, position)

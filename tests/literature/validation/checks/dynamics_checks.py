@@ -1,4 +1,4 @@
-"""What short simulated records show, by the names that the rows use.
+"""Indicators of short simulated records, by the names that the rows use.
 
 A record is the acceleration of the pinion's bearing along the line of action over 15 whole turns,
 so that every shaft order falls on a bin. The *residual* is what is left without every mesh
@@ -127,7 +127,7 @@ def _tooth_segment_ratio(case: Case, at: str) -> float:
 
 
 def _classical_change(case: Case, at: str) -> float:
-    """Relative change of an indicator where the torque that keeps the energy balance is left out."""
+    """Relative change of an indicator without the torque that keeps the energy balance."""
     classical = with_words(case, "mesh.roll_torque=classical")
     indicator = {"rms": _rms, "kurtosis": _kurtosis}[at]
     return indicator(classical, at) / indicator(case, at) - 1.0

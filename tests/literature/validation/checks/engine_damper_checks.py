@@ -75,7 +75,7 @@ class DamperCase:
 
     @cached_property
     def waterfalls(self) -> dict[int, Waterfall]:
-        """Of a run of steady speeds over the range of the Campbell diagram without load, by node."""
+        """Steady response over the speeds of the Campbell diagram without load, by node."""
         campbell, numbers = self.line.drive.campbell, self.line.drive.numbers
         found = run_of_speeds(
             self.line.linear()[0],

@@ -63,7 +63,7 @@ class ForcedCase:
 
     @cached_property
     def torques(self) -> EngineTorques:
-        """What acts on the line."""
+        """Torques on the line."""
         reference = self.engine.reference
         return engine_torques(
             self.engine, reference.speed, reference.torque, self.ratios

@@ -1,4 +1,4 @@
-"""What faults do to teeth, flanks and stiffness, by the names that the rows use."""
+"""Effects of faults on teeth, flanks and stiffness, by the names that the rows use."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def _faulty_tooth(case: Case) -> Tooth:
 
 
 def _fault_increment(case: Case, at: str) -> float:
-    """What the fault adds to the compliance of its tooth and body."""
+    """Compliance that the fault adds to its tooth and body."""
     side = case.faults[0].gear
     curvature = case.curvature(side, at)
     faulty = structural_compliance(
@@ -89,10 +89,9 @@ def _pit_end(case: Case, at: str) -> float:
     """
     tooth = _faulty_tooth(case)
     flank = tooth.profile.abscissa[tooth.profile.n_root_cells :]
-    length = next(
-        fault.pit_length for fault in case.faults if isinstance(fault, Pitting)
-    )
-    end = pitch_abscissa(tooth.gear) + (0.5 if at == "upper" else -0.5) * length
+    (pit,) = (fault for fault in case.faults if isinstance(fault, Pitting))
+    share = {"lower": -0.5, "upper": 0.5}[at]
+    end = pitch_abscissa(tooth.gear) + share * pit.pit_length
     return float(np.interp(end, flank, tooth.profile.curvature_radius))
 
 
@@ -101,19 +100,19 @@ def _pit_abscissa(case: Case, at: str) -> float:
     chord.
     """
     gear = case.gear(case.faults[0].gear)
-    return pitch_abscissa(gear) - (
-        root_chord_abscissa(gear) if at == "root_chord" else 0.0
-    )
+    middle = pitch_abscissa(gear)
+    if at == "root_chord":
+        middle -= root_chord_abscissa(gear)
+    return middle
 
 
 def _gap_opening(case: Case, at: str) -> float:
     """Largest gap that the fault opens between its flank and the mate on the path of contact."""
     table, fault = case.table, case.faults[0]
-    side = table.pinion if fault.gear == "pinion" else table.wheel
+    gap = getattr(table, fault.gear).gap
+    opening = gap[case.faulty_kinds[f"{fault.gear}_kind"]] - gap[0]
     on_path = (table.position >= 0.0) & (table.position <= case.pair.path_of_contact)
-    return float(
-        (side.gap[case.faulty_kinds[f"{fault.gear}_kind"]] - side.gap[0])[on_path].max()
-    )
+    return float(opening[on_path].max())
 
 
 def _share_without_stiffness(case: Case, at: str) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from operator import attrgetter
 
 import numpy as np
 
@@ -19,14 +20,29 @@ from validation.case import Case, pair_dynamics
 
 Check = Callable[[Case, str], float]
 
+GEAR_PROPERTIES = (
+    "pitch_radius",
+    "base_radius",
+    "tip_radius",
+    "root_radius",
+    "half_tooth_angle_base",
+    "root_half_angle",
+    "rounding_center_depth",
+    "rounding_center_offset",
+    "junction_curvature_radius",
+)
+PAIR_PROPERTIES = ("tangent_length", "base_pitch", "transverse_contact_ratio")
+
 
 def _of_gear(value: Callable[[Gear], float]) -> Check:
     """A quantity of one gear; the row's ``at`` names it."""
 
-    def check(case: Case, at: str) -> float:
-        return value(case.gear(at))
+    return lambda case, at: value(case.gear(at))
 
-    return check
+
+def _of_pair(name: str) -> Check:
+    """A property of the pair."""
+    return lambda case, at: float(getattr(case.pair, name))
 
 
 def _junction(gear: Gear, axis: int) -> float:
@@ -57,13 +73,14 @@ def _junction_slope_step(gear: Gear) -> float:
 def _zone_share(case: Case, at: str) -> float:
     """Share of the mesh cycle with one (``single``) or two (``double``) pairs in contact."""
     double = case.pair.transverse_contact_ratio - 1.0
-    return double if at == "double" else 1.0 - double
+    return {"double": double, "single": 1.0 - double}[at]
 
 
 def _corner_gap(case: Case, at: str) -> float:
     """Gap at a distance in mm beyond an end of the path: negative before A, positive after E."""
-    distance = float(at) * 1e-3
-    position = distance if distance < 0.0 else case.pair.path_of_contact + distance
+    position = float(at) * 1e-3
+    if position >= 0.0:
+        position += case.pair.path_of_contact
     return float(corner_gap(case.pair, np.array([position]))[0])
 
 
@@ -75,20 +92,15 @@ def _smaller_corner_gap(case: Case, at: str) -> float:
     entering = corner_gap(pair, pair.path_of_contact + after - 2.0 * pair.base_pitch)
     smaller = np.minimum(leaving, entering)
     peak = int(np.argmax(smaller))
-    return float(smaller[peak] if at == "gap" else after[peak])
+    if at == "gap":
+        return float(smaller[peak])
+    return float(after[peak])
 
 
 GEOMETRY: dict[str, Check] = {
-    "pitch_radius": _of_gear(lambda gear: gear.pitch_radius),
-    "base_radius": _of_gear(lambda gear: gear.base_radius),
-    "tip_radius": _of_gear(lambda gear: gear.tip_radius),
-    "root_radius": _of_gear(lambda gear: gear.root_radius),
-    "half_tooth_angle_base": _of_gear(lambda gear: gear.half_tooth_angle_base),
-    "root_half_angle": _of_gear(lambda gear: gear.root_half_angle),
-    "rounding_center_depth": _of_gear(lambda gear: gear.rounding_center_depth),
-    "rounding_center_offset": _of_gear(lambda gear: gear.rounding_center_offset),
+    **{name: _of_gear(attrgetter(name)) for name in GEAR_PROPERTIES},
+    **{name: _of_pair(name) for name in PAIR_PROPERTIES},
     "half_pitch_angle": _of_gear(lambda gear: float(np.pi / gear.n_teeth)),
-    "junction_curvature_radius": _of_gear(lambda gear: gear.junction_curvature_radius),
     "root_chord_abscissa": _of_gear(
         lambda gear: float(tooth_profile(gear).abscissa[0])
     ),
@@ -109,9 +121,6 @@ GEOMETRY: dict[str, Check] = {
     "arc_mid_half_thickness": _of_gear(
         lambda gear: root_curve_point(gear, "arc_mid")[1]
     ),
-    "tangent_length": lambda case, at: case.pair.tangent_length,
-    "base_pitch": lambda case, at: case.pair.base_pitch,
-    "transverse_contact_ratio": lambda case, at: case.pair.transverse_contact_ratio,
     "single_zone_length": lambda case, at: (
         2.0 * case.pair.base_pitch - case.pair.path_of_contact
     ),

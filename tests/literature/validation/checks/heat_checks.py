@@ -93,9 +93,14 @@ def _even_flash(case: HotCase, at: str) -> float:
         system.pair.face_width * system.pair.transverse_contact_ratio
     )
     rise = flash_temperature(
-        system.pair, np.array([place]), even, system.material, case.duty.heat,
-        friction=case.duty.friction, speed=case.duty.speed,
-    )  # fmt: skip
+        system.pair,
+        np.array([place]),
+        even,
+        system.material,
+        case.duty.heat,
+        friction=case.duty.friction,
+        speed=case.duty.speed,
+    )
     return float(rise[0])
 
 
@@ -114,7 +119,7 @@ def _surface_rise(case: HotCase, at: str) -> float:
 
 
 def _teeth_per_kelvin(case: HotCase, at: str) -> float:
-    """What the teeth's growth moves the gears apart, for 1 K of both."""
+    """Distance by which the growth of the teeth moves the gears apart, for 1 K of both."""
     rise = case.state.pinion.tooth - case.duty.heat.reference_temperature
     return case.state.growth.teeth_alone(case.duty.system.pair) / rise
 

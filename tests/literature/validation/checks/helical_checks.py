@@ -16,6 +16,14 @@ from gensig.systems.sliced_pair import SlicedPair, TransmissionError
 
 SlicedCheck = Callable[["SlicedCase", str], float]
 
+PAIR_PROPERTIES = (
+    "center_distance",
+    "overlap_ratio",
+    "transverse_contact_ratio",
+    "total_contact_ratio",
+    "working_pressure_angle",
+)
+
 
 @dataclass(frozen=True, eq=False)
 class SlicedCase:
@@ -33,6 +41,11 @@ class SlicedCase:
 def read_sliced_case(overrides: tuple[str, ...]) -> SlicedCase:
     """Compose the pair of a row."""
     return SlicedCase(system=read_sliced_pair(compose("generate", overrides)))
+
+
+def _of_pair(name: str) -> SlicedCheck:
+    """A property of the pair."""
+    return lambda case, at: float(getattr(case.system.pair, name))
 
 
 def _tangential_force(case: SlicedCase, at: str) -> float:
@@ -57,15 +70,7 @@ def _depth_of_all(case: SlicedCase, at: str) -> float:
 
 
 SLICED: dict[str, SlicedCheck] = {
-    "sliced.center_distance": lambda case, at: case.system.pair.center_distance,
-    "sliced.overlap_ratio": lambda case, at: case.system.pair.overlap_ratio,
-    "sliced.transverse_contact_ratio": lambda case, at: (
-        case.system.pair.transverse_contact_ratio
-    ),
-    "sliced.total_contact_ratio": lambda case, at: case.system.pair.total_contact_ratio,
-    "sliced.working_pressure_angle": lambda case, at: (
-        case.system.pair.working_pressure_angle
-    ),
+    **{f"sliced.{name}": _of_pair(name) for name in PAIR_PROPERTIES},
     "sliced.mesh_period": lambda case, at: (
         2.0 * math.pi / case.system.pair.wheel.n_teeth
     ),

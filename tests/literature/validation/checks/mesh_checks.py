@@ -43,13 +43,10 @@ def single_pair_stiffness(case: Case, at: str) -> float:
 
 def _zone(case: Case, name: str) -> tuple[float, float]:
     """First and last roll of a zone of the mesh cycle, m."""
-    pitch, double = (
-        case.pair.base_pitch,
-        case.pair.path_of_contact - case.pair.base_pitch,
-    )
-    return {"cycle": (0.0, pitch), "single": (double, pitch), "double": (0.0, double)}[
-        name
-    ]
+    pitch = case.pair.base_pitch
+    double = case.pair.path_of_contact - pitch
+    zones = {"cycle": (0.0, pitch), "single": (double, pitch), "double": (0.0, double)}
+    return zones[name]
 
 
 def _mean_stiffness(case: Case, at: str) -> float:
@@ -92,11 +89,8 @@ def _mesh_stiffness_at(case: Case, at: str) -> float:
 def mean_mesh_stiffness(case: Case, at: str) -> float:
     """Mean tangent stiffness over a cycle, the single or the double zone."""
     first, last = _zone(case, at)
-    return float(
-        mesh_stiffness(
-            case, first + (last - first) * (np.arange(N_MEAN) + 0.5) / N_MEAN
-        ).mean()
-    )
+    roll = first + (last - first) * (np.arange(N_MEAN) + 0.5) / N_MEAN
+    return float(mesh_stiffness(case, roll).mean())
 
 
 def _double_roll(case: Case, at: str) -> Array:
@@ -107,11 +101,8 @@ def _double_roll(case: Case, at: str) -> Array:
 def _double_zone_stiffness(case: Case, at: str) -> float:
     """At a share of the double zone, or its largest value."""
     if at == "max":
-        return float(
-            mesh_stiffness(
-                case, np.linspace(0.001, 0.999, 999) * _zone(case, "double")[1]
-            ).max()
-        )
+        roll = np.linspace(0.001, 0.999, 999) * _zone(case, "double")[1]
+        return float(mesh_stiffness(case, roll).max())
     return float(mesh_stiffness(case, _double_roll(case, at))[0])
 
 
@@ -128,7 +119,7 @@ def _coupled_over_sum(case: Case, at: str) -> float:
 
 
 def _sum_over_coupled(case: Case, at: str) -> float:
-    """How much the plain sum is too stiff on the mean of the double zone."""
+    """Excess of the plain sum on the mean of the double zone."""
     total = with_words(case, "mesh.pair_coupling=sum")
     return (
         mean_mesh_stiffness(total, "double") / mean_mesh_stiffness(case, "double") - 1.0

@@ -70,9 +70,9 @@ class RunUpCase:
     def beside(self, variant: str | None) -> RunUpCase:
         """The same machine with another modification; None: with plain flanks."""
         others = tuple(word for word in self.overrides if not word.startswith(GROUP))
-        return read_run_up_case(
-            others if variant is None else (*others, GROUP + variant)
-        )
+        if variant is not None:
+            others = *others, GROUP + variant
+        return read_run_up_case(others)
 
 
 @lru_cache(maxsize=32)

@@ -22,17 +22,16 @@ def _line_load(case: Case, at: str = "") -> float:
 
 
 def _per_width(stiffness: Callable[..., float]) -> Check:
-    """``at`` is ``stiff``, at 100 N/mm or more.
-
-    ``own_load``, at that of the torque; or ``theoretical``, C_M = 1.
+    """``at`` is ``stiff``, at 100 N/mm or more; ``own_load``, at that of the torque; or
+    ``theoretical``, C_M = 1.
     """
 
     def check(case: Case, at: str) -> float:
-        return stiffness(
-            case.pair,
-            line_load=_line_load(case) if at == "own_load" else None,
-            correction_factor=1.0 if at == "theoretical" else iso6336.CORRECTION_FACTOR,
-        )
+        if at == "own_load":
+            return stiffness(case.pair, line_load=_line_load(case))
+        if at == "theoretical":
+            return stiffness(case.pair, correction_factor=1.0)
+        return stiffness(case.pair)
 
     return check
 

@@ -69,10 +69,10 @@ def _hours(case: RootStrength, at: str) -> float:
 
 
 def _place_of_largest(case: RootStrength, at: str) -> float:
-    """Where the decisive gear's largest stress lies in the zone of single contact, from 0 at B to
-    1 at D.
-    """
-    loaded = _under(case, at) if at else case
+    """Place of the decisive gear's largest stress in the zone of single contact, 0 at B, 1 at D."""
+    loaded = case
+    if at:
+        loaded = _under(case, at)
     history = loaded.history()
     place = history.roll[history.stress[loaded.decisive].argmax()]
     begin = loaded.pair.path_of_contact - loaded.pair.base_pitch

@@ -95,10 +95,12 @@ def _pressure(point: WearPoint, at: str) -> float:
     return point.at(point.case.pressure(point.load, point.case.new_flanks())[0], at)
 
 
-def _per_mesh(side: int | None) -> WearCheck:
+def _per_mesh(*sides: int) -> WearCheck:
+    """Depth that a mesh wears off some of the flanks, m."""
+
     def check(point: WearPoint, at: str) -> float:
         depth = point.case.wear_per_mesh(point.case.new_flanks())[:, 0]
-        return point.at(depth.sum(axis=0) if side is None else depth[side], at)
+        return point.at(depth[list(sides)].sum(axis=0), at)
 
     return check
 
@@ -181,7 +183,9 @@ def _fit(point: WearPoint, at: str) -> float:
     Level over slope of the logarithm, or decay of the exponential.
     """
     _, logarithm, exponential = fitted_laws(point.lives, TORQUES[-1], SPEEDS[-1])
-    return logarithm.a / logarithm.b if at == "logarithm" else exponential.b
+    if at == "logarithm":
+        return logarithm.a / logarithm.b
+    return exponential.b
 
 
 def _printed_exponent(point: WearPoint, at: str) -> float:
@@ -225,7 +229,7 @@ WEAR: dict[str, WearCheck] = {
     "wear.equation_15": _equation_15,
     "wear.pinion_per_mesh": _per_mesh(0),
     "wear.wheel_per_mesh": _per_mesh(1),
-    "wear.both_per_mesh": _per_mesh(None),
+    "wear.both_per_mesh": _per_mesh(0, 1),
     "wear.pitch_over": lambda point, at: (
         _per_mesh(0)(point, "C") / _per_mesh(0)(point, at)
     ),

@@ -1,0 +1,81 @@
+"""Checks of a drive line before its records are made: sensing, solver, supports."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.driveline.engine_line import EngineLine
+from gensig.dynamics.backends.registry import DEFAULT_BACKEND
+from gensig.dynamics.integrator import Solver
+from gensig.errors import ConfigError
+from gensig.mesh.options import MeshOptions
+from gensig.sensing.chain import Sensing
+
+Array = NDArray[np.float64]
+
+# times the force of the supports; the stiffness of a ball bearing follows its third root
+FAR_ABOVE = 3.0
+
+
+def check_solver(mesh: MeshOptions, solver: Solver) -> None:
+    """Raise for mesh laws and solver options that a drive line does not have."""
+    if mesh.law != "one_sided":
+        raise ConfigError(
+            f"mesh.law = {mesh.law}: the meshes of a drive line are one-sided; "
+            "take mesh.law=one_sided"
+        )
+    if solver.precision != "float64":
+        raise ConfigError(
+            f"solver.precision = {solver.precision}: a drive line is integrated in "
+            "float64; take solver.precision=float64"
+        )
+    if solver.backend != DEFAULT_BACKEND:
+        raise ConfigError(
+            f"solver.backend = {solver.backend}: a drive line has an integrator of "
+            f"its own; take solver.backend={DEFAULT_BACKEND}"
+        )
+
+
+def check_sensing(
+    sensing: Sensing, channels: tuple[str, ...], engine: EngineLine
+) -> None:
+    """Raise for channels and sensors that a drive line does not have."""
+    if unknown := [name for name in sensing.channels if name not in channels]:
+        more = ""
+        if not engine.drive.lateral:
+            more = "; with system.lateral=true also pinion_x and the like"
+        raise ConfigError(
+            f"sensing.channels: no channel {', '.join(unknown)}; "
+            f"allowed: {', '.join(channels)}{more}"
+        )
+    if sensing.path is not None or sensing.n_lead or sensing.nuisances:
+        option = "geared_line"
+        if engine.wheels:
+            option = "shaft_line"
+        raise ConfigError(
+            "sensing: records of a drive line have no transfer path, nuisances or sensor "
+            f"dynamics; take sensing={option}"
+        )
+
+
+def warn_of_supports(engine: EngineLine, mesh_forces: Array) -> None:
+    """Warn of mesh forces far above the force for which the support of all gears is taken."""
+    rated = engine.drive.support_force
+    if rated is None:
+        return
+    forces = zip(engine.mesh_names, np.abs(mesh_forces), strict=True)
+    heavy = [
+        f"{name} {force:.0f} N" for name, force in forces if force > FAR_ABOVE * rated
+    ]
+    if heavy:
+        warnings.warn(
+            f"{engine.drive.name}: mean tooth forces of meshes {', '.join(heavy)}, "
+            f"but every gear is on a support for system.support.force_n = {rated:g} N, "
+            "less stiff than bearings so loaded; set it, and bearing and shaft, to those of "
+            "the gears of system.record_mesh",
+            UserWarning,
+            stacklevel=3,
+        )
