@@ -22,7 +22,6 @@ from gensig.dataset.folder.inspection import inspect
 from gensig.dataset.folder.layout import read_manifest
 from gensig.dataset.folder.verify import verify
 from gensig.dataset.reader import open_dataset
-from gensig.dataset.storage.index import open_index
 from gensig.errors import DatasetError
 
 METHOD = "spawn"
@@ -58,7 +57,6 @@ def judge(folder: Path, mutant: Mutant, whole: dict[str, Any]) -> tuple[str, boo
     checked = attempt("verify", lambda: lines.extend(verify(folder).problems))
     attempt("verify --quick", lambda: verify(folder, quick=True))
     attempt("inspect", lambda: inspect(folder))
-    attempt("open_index", lambda: open_index(folder).close())
     read = attempt("read", lambda: _read_all(folder))
     for path in sorted((folder / "shards").iterdir()):
         attempt("inspect a shard", lambda path=path: inspect(path))

@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib import pyplot
 from numpy.typing import NDArray
 
 from benchmarks._realism_recording import INDICATORS
 from benchmarks._realism_sets import CONTROLS
-from gensig.commands.figures.machine_figures import FAULTY, GREY, SOUND, pyplot
+from gensig.commands.figures.style import FAULTY, GREY, SOUND
 from gensig.report.realism import Comparison, points
 
 FloatArray = NDArray[np.floating]
@@ -20,10 +21,7 @@ LEAST = 0.05  # shown at this where a value is 0 or less: the axis is logarithmi
 
 
 def plot_yardstick(found: Sequence[Comparison], path: Path) -> None:
-    """Every quantity on one logarithmic axis.
-
-    Measured ranges as bands, simulated medians with their 5 to 95 %.
-    """
+    """Every quantity on one logarithmic axis: measured ranges as bands, simulated medians with their 5 to 95 %."""
     figure, axes = pyplot.subplots(
         figsize=(10, 1.2 + 0.3 * len(found)), layout="constrained"
     )
@@ -69,10 +67,7 @@ def plot_recording(
     recorded: Mapping[str, FloatArray] | None,
     path: Path,
 ) -> None:
-    """A panel an indicator.
-
-    Simulated intervals, right and wrong on purpose, and the channels of the recording.
-    """
+    """A panel an indicator: simulated intervals, right and wrong on purpose, and the channels of the recording."""
     figure, grid = pyplot.subplots(
         len(INDICATORS), 1, figsize=(9, 1.35 * len(INDICATORS)), layout="constrained"
     )

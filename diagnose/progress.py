@@ -1,4 +1,4 @@
-"""How far a long run is: a bar on a terminal, plain lines elsewhere."""
+"""Progress of long runs: a bar on a terminal, plain lines elsewhere."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def progress(n_steps: int, what: str = "training") -> Iterator[Callable[[str], None]]:
-    """Give a function to call with one line for each finished step."""
+    """Yield a function to call with one line for each finished step."""
     started = time.perf_counter()
     if sys.stderr.isatty():
         with _bar(n_steps, what) as advance:
@@ -21,10 +21,8 @@ def progress(n_steps: int, what: str = "training") -> Iterator[Callable[[str], N
     def write(line: str) -> None:
         nonlocal done
         done += 1
-        elapsed = time.perf_counter() - started
-        print(
-            f"[{done}/{n_steps}] {elapsed:.0f} s  {line}", file=sys.stderr, flush=True
-        )
+        elapsed = f"{time.perf_counter() - started:.0f} s"
+        print(f"[{done}/{n_steps}] {elapsed}  {line}", file=sys.stderr, flush=True)
 
     yield write
 

@@ -18,16 +18,24 @@ DEVICES = ("auto", "cpu", "cuda")
 HEADS = ("severity", "gear")
 TASKS = ("classes", "remaining_life")
 BOTH = (
-    "both"  # of normalise: without the level, and beside it a second training with it
+    "both"  # value of normalise: one training without the level, a second one with it
 )
+# Least values of whole numbers.
+LEAST = {
+    "epochs": 1,
+    "patience": 1,
+    "n_seeds_control": 1,
+    "n_bootstrap": 1,
+    "batch_size": 2,
+    "minirocket_features": len(KERNELS),
+}
+LISTS = ("protocols", "classes", "channels", "test_channels", "seeds")
+CHOICES = ("baselines", "heads")  # lists that may be false or empty
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LifeSettings:
-    """What ``task=remaining_life`` is told beside.
-
-    Each key is explained in ``configs/train.yaml``.
-    """
+    """Settings of ``task=remaining_life``; each key is explained in ``configs/train.yaml``."""
 
     early_life_h: float | None
     early_life_share: float
@@ -35,12 +43,18 @@ class LifeSettings:
     with_age: bool
 
     def __post_init__(self) -> None:
-        if self.early_life_h is not None:
-            _check_between(
-                "remaining_life.early_life_h", self.early_life_h, most=float("inf")
+        if self.early_life_h is not None and not _is_positive(self.early_life_h):
+            raise ConfigError(
+                "remaining_life.early_life_h must be a number above 0, "
+                f"not {self.early_life_h!r}"
             )
-        _check_between("remaining_life.early_life_share", self.early_life_share, most=1)
-        _check_between("remaining_life.coverage", self.coverage, most=1)
+        for name in ("early_life_share", "coverage"):
+            value = getattr(self, name)
+            if not _is_positive(value, below=1):
+                raise ConfigError(
+                    f"remaining_life.{name} must be a number above 0 and below 1, "
+                    f"not {value!r}"
+                )
         if not isinstance(self.with_age, bool):
             raise ConfigError(
                 f"remaining_life.with_age must be true or false, not {self.with_age!r}"
@@ -49,7 +63,7 @@ class LifeSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainSettings:
-    """What ``diagnose train`` is told; each key is explained in ``configs/train.yaml``."""
+    """Settings of ``diagnose train``; each key is explained in ``configs/train.yaml``."""
 
     data: str
     out: str
@@ -86,26 +100,23 @@ class TrainSettings:
     remaining_life: LifeSettings
 
     def __post_init__(self) -> None:
-        if self.task not in TASKS:
-            raise ConfigError(
-                f"task must be one of {', '.join(TASKS)}, not {self.task!r}"
-            )
-        for name in ("epochs", "patience", "n_seeds_control", "n_bootstrap"):
-            _check_whole(name, getattr(self, name), least=1)
-        for name in ("window_samples", "stride_samples"):
+        for name, least in LEAST.items():
+            _check_whole(name, getattr(self, name), least=least)
+        for name in ("window_samples", "stride_samples", "n_threads"):
             if getattr(self, name) is not None:
                 _check_whole(name, getattr(self, name), least=1)
-        _check_whole("batch_size", self.batch_size, least=2)
-        _check_whole(
-            "minirocket_features", self.minirocket_features, least=len(KERNELS)
-        )
-        if self.n_threads is not None:
-            _check_whole("n_threads", self.n_threads, least=1)
-        if self.sampling_rate_hz is not None:
-            _check_rate("sampling_rate_hz", self.sampling_rate_hz)
+        if self.sampling_rate_hz is not None and not _is_positive(
+            self.sampling_rate_hz
+        ):
+            raise ConfigError(
+                "sampling_rate_hz must be null or a number of samples a second, "
+                f"not {self.sampling_rate_hz!r}"
+            )
         for name in ("learning_rate", "weight_decay", "epoch_fraction"):
-            _check_number(name, getattr(self, name))
-        for name in ("protocols", "classes", "channels", "test_channels", "seeds"):
+            value = getattr(self, name)
+            if not (_is_number(value) and 0 <= value <= 1):
+                raise ConfigError(f"{name} must be a number from 0 to 1, not {value!r}")
+        for name in LISTS:
             values = getattr(self, name)
             if values is not None and (not values or len(set(values)) < len(values)):
                 raise ConfigError(
@@ -118,30 +129,30 @@ class TrainSettings:
                 raise ConfigError(
                     f"{name} must be true or false, not {getattr(self, name)!r}"
                 )
-        if self.oracle not in ("auto", False):
-            raise ConfigError(f"oracle must be auto or false, not {self.oracle!r}")
         if self.sham is not None and (not isinstance(self.sham, str) or not self.sham):
             raise ConfigError(
-                f"sham must be the folder of a data set made with plan.sham=true, not {self.sham!r}"
+                "sham must be the folder of a data set made with plan.sham=true, "
+                f"not {self.sham!r}"
             )
         self._check_list("baselines", baseline_names(Role.RIVAL))
         self._check_list("heads", HEADS)
-        if self.features not in tuple(FEATURES):
-            raise ConfigError(
-                f"features must be {' or '.join(FEATURES)}, not {self.features!r}"
-            )
-        if self.device not in DEVICES:
-            raise ConfigError(
-                f"device must be one of {', '.join(DEVICES)}, not {self.device!r}"
-            )
+        self._check_one("task", TASKS, f"one of {', '.join(TASKS)}")
+        self._check_one("oracle", ("auto", False), "auto or false")
+        self._check_one("features", tuple(FEATURES), " or ".join(FEATURES))
+        self._check_one("device", DEVICES, f"one of {', '.join(DEVICES)}")
+
+    def _check_one(self, key: str, allowed: Sequence[Any], text: str) -> None:
+        """Refuse a value that is not allowed."""
+        if getattr(self, key) not in allowed:
+            raise ConfigError(f"{key} must be {text}, not {getattr(self, key)!r}")
 
     def _check_list(self, key: str, allowed: Sequence[str]) -> None:
         """Refuse a list with a name twice or one that is not allowed."""
         names = getattr(self, key)
         if len(set(names)) < len(names) or not set(names) <= set(allowed):
             raise ConfigError(
-                f"{key} must be false or a list of different names out of {', '.join(allowed)}, "
-                f"not {', '.join(str(name) for name in names)}"
+                f"{key} must be false or a list of different names "
+                f"out of {', '.join(allowed)}, not {', '.join(map(str, names))}"
             )
 
 
@@ -157,18 +168,14 @@ def settings_from(config: Configuration) -> TrainSettings:
         raise ConfigError(f"diagnose train knows no key '{unknown[0]}'")
     values = config.plain()
     values["model"] = config.section("model")
-    for name in ("protocols", "classes", "channels", "test_channels", "seeds"):
+    for name in LISTS:
         values[name] = _as_tuple(name, values[name])
     if values["seeds"] is None:
         raise ConfigError("seeds must be a list of different values, at least one")
-    values["baselines"] = (
-        ()
-        if values["baselines"] is False
-        else _as_tuple("baselines", values["baselines"]) or ()
-    )
-    values["heads"] = (
-        () if values["heads"] is False else _as_tuple("heads", values["heads"]) or ()
-    )
+    for name in CHOICES:
+        if values[name] is False:
+            values[name] = None
+        values[name] = _as_tuple(name, values[name]) or ()
     values["remaining_life"] = _life_settings(values["remaining_life"])
     values["data"], values["out"] = str(values["data"]), str(values["out"])
     return TrainSettings(**values)
@@ -180,16 +187,18 @@ def _life_settings(value: Any) -> LifeSettings:
         raise ConfigError(
             f"remaining_life must hold {', '.join(known)} and nothing else"
         )
-    return LifeSettings(**{str(key): given for key, given in value.items()})
+    return LifeSettings(**value)
 
 
 def _as_tuple(name: str, value: Any) -> tuple[Any, ...] | None:
-    """None stays, one value becomes a list of one."""
+    """A list as a tuple, and a single value as a tuple of one; None stays None."""
     if value is None:
         return None
     if isinstance(value, Mapping):
         raise ConfigError(f"{name} must be a list, for instance {name}=[a,b]")
-    return tuple(value) if isinstance(value, list) else (value,)
+    if isinstance(value, list):
+        return tuple(value)
+    return (value,)
 
 
 def _check_whole(name: str, value: Any, *, least: int) -> None:
@@ -199,33 +208,9 @@ def _check_whole(name: str, value: Any, *, least: int) -> None:
         )
 
 
-def _check_rate(name: str, value: Any) -> None:
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, int | float)
-        or not 0 < value < float("inf")
-    ):
-        raise ConfigError(
-            f"{name} must be null or a number of samples a second, not {value!r}"
-        )
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _check_number(name: str, value: Any) -> None:
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, int | float)
-        or not 0 <= value <= 1
-    ):
-        raise ConfigError(f"{name} must be a number from 0 to 1, not {value!r}")
-
-
-def _check_between(name: str, value: Any, *, most: float) -> None:
-    """Refuse what is not above 0 and below `most`; for 1 that is a share."""
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, int | float)
-        or not 0 < value < most
-    ):
-        raise ConfigError(
-            f"{name} must be a number above 0{' and below 1' if most == 1 else ''}, not {value!r}"
-        )
+def _is_positive(value: Any, *, below: float = float("inf")) -> bool:
+    return _is_number(value) and 0 < value < below

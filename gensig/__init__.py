@@ -86,7 +86,7 @@ def generate(
 
     Raises
     ------
-    gensig.errors.GensigError    for anything that cannot be used, and where a shard could not be made
+    gensig.errors.GensigError    for anything that cannot be used, and for a shard that fails
     """
     from gensig.errors import ConfigError, SimulationError
     from gensig.execution.registry import read_executor
@@ -111,12 +111,13 @@ def generate(
 def stream(
     *overrides: str, epoch: int = 0, config_dir: str | Path | None = None
 ) -> RecordStream:
-    """The records that ``generate`` would write, made while one iterates and never stored.
+    """The records that ``generate`` would write, simulated in a loop and never stored.
 
     Parameters
     ----------
     overrides : as for ``gensig generate``; ``out`` and ``executor`` change nothing
-    epoch : 0 gives the bits of ``generate``, any other number as many records with new draws, units included
+    epoch : 0 gives the bits of ``generate``; any other number as many records with new draws,
+            units included
 
     Raises
     ------

@@ -9,7 +9,7 @@ import importlib
 import sys
 from collections.abc import Sequence
 
-from gensig.commands.arguments import OVERRIDES
+from gensig.commands.flags import OVERRIDES_HELP
 from gensig.commands.verbs import VERBS
 from gensig.terminal.program import HELP_FLAGS, Parser, exit_text, guarded, refuse_verb
 from gensig.version import __version__
@@ -26,7 +26,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     from gensig.terminal.completion import answer, is_asked
 
     if is_asked():
-        verbs = {name: (verb.summary, verb.arguments) for name, verb in VERBS.items()}
+        verbs = {
+            name: (verb.summary, verb.add_arguments) for name, verb in VERBS.items()
+        }
         answer(PROGRAM, verbs, primary="generate")
     words = list(sys.argv[1:] if argv is None else argv)
     interrupted = (
@@ -38,18 +40,25 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(words: list[str]) -> int:
     if words[:1] == ["help"]:
         words = [*words[1:2], HELP_FLAGS[1]]
-    if not words or words[0] in HELP_FLAGS:
-        print(_help(), file=sys.stdout if words else sys.stderr)
-        return 0 if words else 2
-    if words[0] in ("-V", "--version"):
+    if not words:
+        print(_help(), file=sys.stderr)
+        return 2
+    name, *arguments = words
+    if name in HELP_FLAGS:
+        print(_help())
+        return 0
+    if name in ("-V", "--version"):
         print(f"gensig {__version__}")
         return 0
-    name = words[0]
     if name not in VERBS:
         refuse_verb(PROGRAM, name, VERBS, "diagnose", OF_DIAGNOSE)
-    verb, parser = VERBS[name], verb_parser(name)
+    return _run_verb(name, arguments)
+
+
+def _run_verb(name: str, words: list[str]) -> int:
+    verb = VERBS[name]
     try:
-        arguments = parser.parse_intermixed_args(words[1:])
+        arguments = verb_parser(name).parse_intermixed_args(words)
     except SystemExit as leaving:
         return int(leaving.code or 0)
     from gensig.commands.console import one_line_warnings
@@ -58,24 +67,24 @@ def _run(words: list[str]) -> int:
     with one_line_warnings(PROGRAM):
         status = int(getattr(importlib.import_module(module), function)(arguments))
     if verb.instead is not None:
-        from gensig.commands.request import say_unread
+        from gensig.commands.request import print_unread
 
-        say_unread(arguments, verb.reads, verb.instead)
+        print_unread(arguments, verb.reads, verb.instead)
     return status
 
 
 def verb_parser(name: str) -> Parser:
     """The parser of a verb, with its help."""
     verb = VERBS[name]
-    exits = {} if verb.one is None else {1: verb.one}
-    summary = f"{verb.summary[0].upper()}{verb.summary[1:]}".rstrip(".") + (
-        "" if verb.summary.endswith("?") else "."
-    )
-    heading = "examples" if "\n" in verb.example else "example"
-    parser = Parser(
-        f"{PROGRAM} {name}", summary, f"{heading}:\n  {verb.example}", exits
-    )
-    verb.arguments(parser)
+    exits = {}
+    if verb.status_1 is not None:
+        exits[1] = verb.status_1
+    summary = f"{verb.summary[0].upper()}{verb.summary[1:]}"
+    if not summary.endswith("?"):
+        summary += "."
+    examples = [f"example{'s' * (len(verb.examples) > 1)}:", *verb.examples]
+    parser = Parser(f"{PROGRAM} {name}", summary, "\n  ".join(examples), exits)
+    verb.add_arguments(parser)
     parser.set_defaults(verb=name)
     return parser
 
@@ -92,7 +101,7 @@ def _help() -> str:
         "usage: gensig COMMAND [ARGUMENTS]\n\n"
         "Labelled gear-fault vibration data sets from physics.\n\n"
         f"commands:\n{verbs}\n\n"
-        f"{OVERRIDES}\n"
+        f"{OVERRIDES_HELP}\n"
         "gensig options lists the groups, their options and their keys.\n"
         f"gensig COMMAND --help explains each, with an example.\n\n{statuses}"
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gensig.errors import ConfigError
-from gensig.units import unit
+from gensig.units import check_positive, unit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -17,24 +17,17 @@ class Material:
     density_kg_per_m3: float
 
     def __post_init__(self) -> None:
-        if not self.youngs_modulus > 0.0:
-            raise ConfigError(
-                f"material.youngs_modulus_gpa = {self.youngs_modulus / 1e9:g} must be positive"
-            )
+        check_positive(self, "material.", "youngs_modulus", "density_kg_per_m3")
         if not 0.0 <= self.poisson_ratio < 1.0:
             raise ConfigError(
                 f"material.poisson_ratio = {self.poisson_ratio:g} must be at least 0 and below 1"
             )
-        if not self.density_kg_per_m3 > 0.0:
-            raise ConfigError(
-                f"material.density_kg_per_m3 = {self.density_kg_per_m3:g} must be positive"
-            )
 
     def in_plane(self, elasticity: str) -> Material:
-        """The material whose plane-stress formulas are those of this one under ``plane_stress``
-        or ``plane_strain``.
+        """Material whose plane-stress formulas describe this one under ``elasticity``.
 
-        Plane strain is plane stress with E / (1 - nu^2) and nu / (1 - nu); the shear modulus stays.
+        ``elasticity`` is ``plane_stress`` or ``plane_strain``. Plane strain is plane stress with
+        E / (1 - nu^2) and nu / (1 - nu); the shear modulus stays.
         """
         if elasticity == "plane_stress":
             return self

@@ -1,4 +1,4 @@
-"""The one converter between unit-suffixed names at the file boundary and SI inside.
+"""Conversion between unit-suffixed names in files and SI inside, with checks of values.
 
 ``normal_module_mm: 2`` in a file is ``normal_module = 0.002`` in the code. A name without a known
 suffix is a number without unit (``n_teeth``, ``damping_ratio``), taken as it is.
@@ -6,13 +6,15 @@ suffix is a number without unit (``n_teeth``, ``damping_ratio``), taken as it is
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import difflib
 import functools
 import math
+import sys
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any, TypeVar
 
 from gensig.errors import ConfigError
@@ -25,10 +27,8 @@ UNITS: dict[str, tuple[float, str]] = {
     "w_per_mk": (1.0, "thermal conductivity"),
     "j_per_kgk": (1.0, "specific heat"),
     "per_k": (1.0, "thermal expansion"),
-    "degc": (
-        1.0,
-        "temperature",
-    ),  # degrees Celsius inside too: only differences and tables of steel are asked
+    # degrees Celsius inside too: only differences and tables of steel are needed
+    "degc": (1.0, "temperature"),
     "n_per_m": (1.0, "stiffness"),
     "ns_per_m": (1.0, "damping"),
     "nm_per_rad": (1.0, "torsional stiffness"),
@@ -58,12 +58,29 @@ TURNING = ("rotation", "tilt_x", "tilt_y")
 # how channels end that are the speed of a shaft, less its nominal one
 SPEED = "_speed"
 
+# types of lists in files by that of their entries
+LISTS: dict[type, Any] = {
+    float: tuple[float, ...],
+    int: tuple[int, ...],
+    str: tuple[str, ...],
+}
+# a type as a user calls it
+TYPES: dict[Any, str] = {
+    float: "a number",
+    int: "a whole number",
+    bool: "true or false",
+    str: "text",
+    tuple[float, ...]: "a list of numbers",
+    tuple[int, ...]: "a list of whole numbers",
+    tuple[str, ...]: "a list of names",
+}
+
 T = TypeVar("T")
 
 
 @functools.lru_cache(maxsize=1024)
 def split_unit(name: str) -> tuple[str, str | None]:
-    """Split a boundary name into its bare name and its unit suffix (None where it has none)."""
+    """Split a boundary name into its bare name and its unit suffix (None without one)."""
     for suffix in UNITS:
         if name.endswith("_" + suffix):
             return name[: -len(suffix) - 1], suffix
@@ -73,17 +90,21 @@ def split_unit(name: str) -> tuple[str, str | None]:
 def to_si(name: str, value: float) -> float:
     """Value of a suffixed name in SI units."""
     _, suffix = split_unit(name)
-    return value if suffix is None else value * UNITS[suffix][0]
+    if suffix is None:
+        return value
+    return value * UNITS[suffix][0]
 
 
 def from_si(name: str, value: float) -> float:
-    """SI value in the unit that the suffixed name states."""
+    """SI value in the unit of the suffixed name."""
     _, suffix = split_unit(name)
-    return value if suffix is None else value / UNITS[suffix][0]
+    if suffix is None:
+        return value
+    return value / UNITS[suffix][0]
 
 
 def is_turning(channel: str) -> bool:
-    """Whether a channel's acceleration is that of an angle, in rad/s2."""
+    """True for a channel that is the acceleration of an angle, in rad/s2."""
     return channel.endswith(TURNING)
 
 
@@ -91,7 +112,14 @@ def channel_unit(channel: str) -> str:
     """Unit of a channel by its name."""
     if channel.endswith(SPEED):
         return "rad/s"
-    return "rad/s^2" if is_turning(channel) else "m/s^2"
+    if is_turning(channel):
+        return "rad/s^2"
+    return "m/s^2"
+
+
+def unit(suffix: str, *, default: Any = dataclasses.MISSING) -> Any:
+    """Dataclass field with ``suffix`` in its boundary name."""
+    return dataclasses.field(default=default, metadata={"unit": suffix})
 
 
 def read(cls: type[T], values: Mapping[str, Any], where: str, **given: Any) -> T:
@@ -99,31 +127,30 @@ def read(cls: type[T], values: Mapping[str, Any], where: str, **given: Any) -> T
 
     Parameters
     ----------
-    cls : dataclass whose fields are SI quantities without suffix; ``metadata={"unit": "mm"}`` names the suffix
-        that files use (a field without it is a plain number, text or flag)
+    cls : dataclass whose fields are SI quantities without suffix. ``metadata={"unit": "mm"}``
+        names the suffix in files. A field without it is a plain number, text or flag.
     values : keys with suffixes, as in a configuration
-    where : how to name the place in an error, for instance ``"gear.pinion"``
+    where : name of the group in an error, for instance ``"gear.pinion"``
     given : fields that do not come from ``values``
 
     Raises
     ------
     ConfigError    for an unknown or missing key, a wrong suffix or a value of the wrong type
     """
-    names = {
-        key: field
-        for key, field in _boundary_fields(cls).items()
-        if field.name not in given
-    }  # type: ignore[arg-type]
-    hints = _hints(cls)  # type: ignore[arg-type]
     if not isinstance(values, Mapping):
         raise ConfigError(
             f"{where} = {values!r} must be a group of keys, not one value"
         )
+    names = {
+        key: field
+        for key, field in _boundary_fields(cls).items()  # type: ignore[arg-type]
+        if field.name not in given
+    }
+    hints = _hints(cls)  # type: ignore[arg-type]
     result = dict(given)
     for key, value in values.items():
         if key not in names:
-            fields = {field.name: field for field in names.values()}
-            raise ConfigError(f"{where}: {_unknown(key, fields, list(names))}")
+            raise ConfigError(f"{where}: {_unknown(key, names)}")
         field = names[key]
         result[field.name] = _convert(f"{where}.{key}", key, value, hints[field.name])
     missing = [
@@ -138,6 +165,92 @@ def read(cls: type[T], values: Mapping[str, Any], where: str, **given: Any) -> T
     return cls(**result)
 
 
+def read_kind(kinds: Mapping[str, type[T]], values: Any, where: str) -> T:
+    """Build the dataclass that the key ``kind`` of a group names, from its other keys.
+
+    Raises
+    ------
+    ConfigError    for unknown kinds, keys or values, naming ``where``
+    """
+    rest: dict[str, Any] = {}
+    if isinstance(values, Mapping):
+        rest.update(values)
+    kind = rest.pop("kind", None)
+    check_choice(f"{where}: kind", kind, list(kinds))
+    with naming(f"{where}."):
+        return read(kinds[kind], rest, where)
+
+
+@contextlib.contextmanager
+def naming(where: str) -> Iterator[None]:
+    """Put ``where`` before a ConfigError whose text does not begin with its group."""
+    group, dot, _ = where.partition(".")
+    try:
+        yield
+    except ConfigError as error:
+        if str(error).startswith(group + dot):
+            raise
+        raise ConfigError(f"{where}{error}") from None
+
+
+def is_number(value: Any, *, finite: bool = True) -> bool:
+    """True for a number of a file; true and false are none."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return not finite or abs(value) <= sys.float_info.max
+
+
+def check_positive(group: Any, where: str, *names: str) -> None:
+    """Raise ConfigError unless fields of a group are positive or None."""
+    for name in names:
+        value = getattr(group, name)
+        if value is not None and not value > 0.0:
+            key, (shown,) = _shown(group, name, value)
+            raise ConfigError(f"{where}{key} = {shown} must be positive")
+
+
+def check_limits(group: Any, where: str, **limits: tuple[float, float]) -> None:
+    """Raise ConfigError unless fields of a group are None or within (low, high), both included.
+
+    Parameters
+    ----------
+    group : dataclass in SI
+    where : before the field's boundary name in the error, for instance ``"sensing.sensor."``
+    limits : in SI, by field name
+    """
+    for name, (low, high) in limits.items():
+        value = getattr(group, name)
+        if value is not None and not low <= value <= high:
+            key, shown = _shown(group, name, value, low, high)
+            raise ConfigError(
+                f"{where}{key} = {shown[0]} must lie in {shown[1]}..{shown[2]}"
+            )
+
+
+def check_ranges(group: Any, where: str, **limits: tuple[float, float]) -> None:
+    """Raise ConfigError unless fields are two ordered numbers, [low, high], within limits."""
+    for name, (low, high) in limits.items():
+        ends = getattr(group, name)
+        if len(ends) != 2 or not low <= ends[0] <= ends[1] <= high:
+            key, (least, most, *shown) = _shown(group, name, low, high, *ends)
+            raise ConfigError(
+                f"{where}{key} = [{', '.join(shown)}] must be two ordered numbers, "
+                f"[low, high], in {least}..{most}"
+            )
+
+
+def check_choice(key: str, value: Any, allowed: Collection[Any]) -> None:
+    """Raise ConfigError for a value that is not one of ``allowed``."""
+    if value not in allowed:
+        raise ConfigError(f"{key} = {value!r}; allowed: {', '.join(map(str, allowed))}")
+
+
+def _shown(group: Any, name: str, *values: float) -> tuple[str, list[str]]:
+    """Boundary name of a dataclass's field, and its SI values as text in that unit."""
+    key = _boundary_name(type(group).__dataclass_fields__[name])
+    return key, [f"{from_si(key, value):g}" for value in values]
+
+
 @functools.lru_cache(maxsize=64)
 def _boundary_fields(cls: type) -> dict[str, dataclasses.Field[Any]]:
     """Fields of a dataclass by their boundary names."""
@@ -146,89 +259,52 @@ def _boundary_fields(cls: type) -> dict[str, dataclasses.Field[Any]]:
 
 @functools.lru_cache(maxsize=64)
 def _hints(cls: type) -> dict[str, Any]:
-    """Types of a dataclass's fields; looking them up costs more than all else in reading one."""
+    """Types of a dataclass's fields; their lookup costs more than all else in reading one."""
     return typing.get_type_hints(cls)
 
 
-def unit(suffix: str, *, default: Any = dataclasses.MISSING) -> Any:
-    """Dataclass field whose boundary name carries ``suffix``."""
-    return dataclasses.field(default=default, metadata={"unit": suffix})
-
-
 def _boundary_name(field: dataclasses.Field[Any]) -> str:
-    suffix = field.metadata.get("unit")
-    return field.name if suffix is None else f"{field.name}_{suffix}"
+    return "_".join([field.name, *field.metadata.values()])
 
 
-def _unknown(key: str, fields: Mapping[str, Any], names: list[str]) -> str:
-    bare, _ = split_unit(key)
-    if bare in fields or key in fields:
-        right = _boundary_name(fields[bare if bare in fields else key])
-        return f"'{key}' has the wrong unit; write it as '{right}'"
+def _unknown(key: str, names: Mapping[str, dataclasses.Field[Any]]) -> str:
+    for right, field in names.items():
+        if field.name in (key, split_unit(key)[0]):
+            return f"'{key}' has the wrong unit; write it as '{right}'"
     close = difflib.get_close_matches(key, names, n=1)
-    hint = f"did you mean '{close[0]}'?" if close else f"known: {', '.join(names)}"
+    hint = f"known: {', '.join(names)}"
+    if close:
+        hint = f"did you mean '{close[0]}'?"
     return f"unknown key '{key}'; {hint}"
 
 
 def _convert(place: str, key: str, value: Any, hint: Any) -> Any:
-    kinds = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
+    kinds = (hint,)
+    if isinstance(hint, types.UnionType):
+        kinds = typing.get_args(hint)
+    if value is None and type(None) in kinds:
+        return None
     if value is None:
-        if type(None) in kinds:
-            return None
         raise ConfigError(f"{place} is null; give a value")
-    if isinstance(value, list | tuple):
-        items = {
-            typing.get_args(kind)[0]
-            for kind in kinds
-            if typing.get_origin(kind) is tuple
-        }
-        for item in items & {str, int, float}:
-            if item is float and all(
-                type(entry) is float and math.isfinite(entry) for entry in value
-            ):
-                suffix = split_unit(key)[1]  # looked up once: profiles are long
-                return (
-                    tuple(value)
-                    if suffix is None
-                    else tuple(entry * UNITS[suffix][0] for entry in value)
-                )
-            if all(_is_a(item, entry) for entry in value):
-                return tuple(
-                    to_si(key, float(entry)) if item is float else entry
-                    for entry in value
-                )
-    for kind in (float, int, bool, str):
-        if kind in kinds and _is_a(kind, value):
-            return to_si(key, float(value)) if kind is float else value
-    if float in kinds and _is_a(float, value, finite=False):
+    factor = to_si(key, 1.0)
+    if float in kinds and is_number(value):
+        return float(value) * factor
+    if any(_is_a(kind, value) for kind in (int, bool, str) if kind in kinds):
+        return value
+    for kind, row in LISTS.items():
+        is_list = row in kinds and isinstance(value, list | tuple)
+        if is_list and all(_is_a(kind, entry) for entry in value):
+            if kind is float:
+                return tuple(float(entry) * factor for entry in value)
+            return tuple(value)
+    if float in kinds and is_number(value, finite=False):
         raise ConfigError(f"{place} = {value} is not finite")
-    raise ConfigError(
-        f"{place} = {value!r} is not {' or '.join(_named(kind) for kind in kinds if kind is not None)}"
-    )
+    wanted = " or ".join(TYPES.get(kind, "null") for kind in kinds)
+    raise ConfigError(f"{place} = {value!r} is not {wanted}")
 
 
-def _is_a(kind: type, value: Any, *, finite: bool = True) -> bool:
-    """Whether a value of a file stands for ``kind``.
-
-    Whole numbers are numbers too, true and false are none.
-    """
+def _is_a(kind: Any, value: Any) -> bool:
+    """True for a value of a file that stands for ``kind``; whole numbers are numbers too."""
     if kind is float:
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        return number and (not finite or math.isfinite(value))
+        return is_number(value)
     return isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
-
-
-def _named(kind: Any) -> str:
-    """What a user calls a type."""
-    if typing.get_origin(kind) is tuple:
-        return {
-            str: "a list of names",
-            int: "a list of whole numbers",
-            float: "a list of numbers",
-        }[typing.get_args(kind)[0]]
-    return {
-        float: "a number",
-        int: "a whole number",
-        bool: "true or false",
-        str: "text",
-    }.get(kind, "null")

@@ -1,4 +1,4 @@
-"""The lists in docs/api, made from the docstrings: ``python tests/api_pages.py`` writes them, a test compares them."""
+"""The lists in docs/api, made from the docstrings. ``python tests/api_pages.py`` writes them."""
 
 import inspect
 import re
@@ -13,7 +13,7 @@ BEGIN, END = "<!-- made by tests/api_pages.py -->", "<!-- end of what is made --
 
 
 def page(path: Path) -> str:
-    """The page with what each of its ``::: name`` stands for, and the public names of those that are modules."""
+    """The page with a line for each ``::: name``, and for the public names of modules."""
     text = path.read_text(encoding="utf-8")
     lines = [
         line for name in re.findall(r"^::: (\S+)$", text, re.M) for line in _lines(name)

@@ -15,7 +15,7 @@ COMMANDS = ("gensig", "diagnose")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Block:
-    """A fenced or indented block: its line (from 1), language ("" where none is told), code, and the comment above."""
+    """A fenced or indented block: line (from 1), language or "", code, and the comment above."""
 
     line: int
     language: str
@@ -24,7 +24,7 @@ class Block:
 
 
 def blocks(text: str) -> Iterator[Block]:
-    """Blocks of a page; an indented one follows an empty line or a heading, and is no part of a list."""
+    """Blocks of a page; indented blocks follow an empty line or a heading outside of lists."""
     lines = text.split("\n")
     place, in_list = 0, False
     while place < len(lines):
@@ -72,7 +72,7 @@ def without_blocks(text: str) -> str:
 
 
 def command_lines(text: str) -> Iterator[tuple[int, list[str]]]:
-    """Line and words of every gensig and diagnose command in a page's blocks of shell, ends of lines joined."""
+    """Line and words of every gensig and diagnose command in the shell blocks of a page."""
     for block in blocks(text):
         if block.language not in ("", "sh", "bash"):
             continue

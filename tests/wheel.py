@@ -1,10 +1,9 @@
-"""A source distribution and a wheel of this tree, an environment with that wheel, and all tests
-run in it.
+"""A source distribution and a wheel of this tree, and all tests run with that wheel.
 
     python -m tests.wheel [options of pytest]      # or: make wheel-test
 
-The tests run from an unpacked source distribution out of which the packages were taken: what
-they import, and the options that they read, are those of the wheel.
+The tests run from an unpacked source distribution without its packages. Their imports and options
+are those of the wheel.
 """
 
 import os
@@ -30,24 +29,20 @@ OF_THE_TREE = (
     "tests/pipeline/test_packaging.py",
     "tests/unit/docs/test_docs_pages.py",
 )
-# gensig is that of the wheel, and the cache of Numba lies beside its files, wherever those of
-# this run lie
+# gensig is that of the wheel, and so is the cache of Numba
 ENVIRONMENT = {
     key: value
     for key, value in os.environ.items()
     if key not in ("PYTHONPATH", "NUMBA_CACHE_DIR")
 }
 BACKEND = (
-    "import sys; from setuptools import build_meta; print(getattr(build_meta, "
-    "sys.argv[1])(sys.argv[2]))"
+    "import sys; from setuptools import build_meta; "
+    "print(getattr(build_meta, sys.argv[1])(sys.argv[2]))"
 )
 
 
 def files_of_the_tree() -> list[str]:
-    """What belongs to the project, relative to its root.
-
-    By git, or by the list that a source distribution carries.
-    """
+    """Files of the project by git, or by the list of a source distribution; relative paths."""
     if (ROOT / ".git").exists():
         command = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
         names = subprocess.run(
@@ -111,8 +106,7 @@ def environment_with(wheel: Path, folder: Path) -> Path:
         "--no-compile",
     ]
     subprocess.run([*command, str(wheel)], check=True, capture_output=True)
-    # a path line appends the folder without reading its own .pth files, so the editable gensig
-    # there stays unseen
+    # A path line does not read the .pth files of its folder, so the editable gensig stays unseen.
     (site_packages(python) / "test_environment.pth").write_text(
         sysconfig.get_paths()["purelib"] + "\n"
     )
@@ -120,10 +114,7 @@ def environment_with(wheel: Path, folder: Path) -> Path:
 
 
 def lend_compiled(python: Path) -> None:
-    """What this environment has compiled serves the wheel, whose files are the same.
-
-    Compiling anew takes a minute.
-    """
+    """Copy the compiled kernels of this environment to the wheel, whose files are the same."""
     from gensig.dynamics._kernels import integrate
     from gensig.mesh._kernels import lower_envelope
 
@@ -149,10 +140,7 @@ def site_packages(python: Path) -> Path:
 
 
 def take_packages_out(source: Path, python: Path) -> None:
-    """Leave in an unpacked source distribution only what is not installed.
-
-    The options are those of the wheel.
-    """
+    """Remove the packages of an unpacked source distribution; its options become the wheel's."""
     for folder in PACKAGES:
         shutil.rmtree(source / folder)
     (source / "configs").symlink_to(site_packages(python) / PACKAGES["configs"])

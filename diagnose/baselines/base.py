@@ -1,4 +1,4 @@
-"""Interface of baselines: fit, probabilities, the input they read, and their words on the page."""
+"""Interface of baselines: fit, probabilities, input, and texts of the page."""
 
 from __future__ import annotations
 
@@ -6,29 +6,32 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnose.baselines.features import Cache, FeatureTable
-from diagnose.data.windows import Segments, Task, subset_segments
-
-if TYPE_CHECKING:
-    from diagnose.data.windows import WindowSet
-
-FloatArray = NDArray[np.floating]
+from diagnose.data.windows import (
+    SUBSETS,
+    FloatArray,
+    Segments,
+    Task,
+    WindowSet,
+    subset_segments,
+)
 
 
 class Role(Enum):
-    """Purpose of a baseline; it decides when it runs and in which table of the page it is."""
+    """Purpose of a baseline; it decides when it runs and in which table of the page it is.
 
-    RIVAL = "the network must beat it"  # runs where the key `baselines` names it
-    AT_CHANCE = (
-        "it must be at chance, else something leaks"  # runs with metadata_probe=true
-    )
-    FOLLOWER = "it is at chance unless faults change its input"  # runs with metadata_probe=true
-    BOUND = "its input tells more than the network's"  # runs with oracle=auto
+    A rival runs if the key `baselines` names it, AT_CHANCE and FOLLOWER with
+    ``metadata_probe=true``, BOUND with ``oracle=auto``.
+    """
+
+    RIVAL = "the network must beat it"
+    AT_CHANCE = "it must be at chance, else something leaks"
+    FOLLOWER = "it is at chance unless faults change its input"
+    BOUND = "its input tells more than the network's"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +62,7 @@ class Source:
     features : key of `diagnose.baselines.features.FEATURES`
     minirocket_features : number of features
     windows : returns the windows of each subset
-    caches : by name of the input, filled and used, so that protocols share what they have in common
+    caches : by name of the input, filled and used, so that protocols share common values
     """
 
     task: Task
@@ -70,7 +73,7 @@ class Source:
     caches: dict[str, Cache]
 
     def part(self, subset: str) -> Task:
-        """The task as a subset sees it."""
+        """The task with the channels of a subset."""
         return self.task.part(self.protocol, subset)
 
     def segments(self, subset: str) -> Segments:
@@ -85,6 +88,11 @@ class Parts:
     train: FeatureTable
     validation: FeatureTable
     test: FeatureTable
+
+    @classmethod
+    def of(cls, table: Callable[[str], FeatureTable]) -> Parts:
+        """Tables that a function makes for each subset."""
+        return cls(**{subset: table(subset) for subset in SUBSETS})
 
     def judged(self) -> FeatureTable:
         """Validation and test rows; test rows alone if a record is in both, as in a leaky split."""
@@ -130,7 +138,7 @@ class Baseline(ABC):
 
         Returns
         -------
-        what was fitted, in words
+        description of the fit
         """
 
     @abstractmethod

@@ -1,17 +1,13 @@
-"""Baselines that are the better one of a linear model and boosted trees on a table of features."""
+"""Baselines that are the better of a linear model and boosted trees on a table of features."""
 
 from __future__ import annotations
 
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from diagnose.baselines.base import Baseline
-from diagnose.baselines.estimators import ChosenModel, choose_model
+from diagnose.baselines.estimators import FittedModel, choose_model
 from diagnose.baselines.features import FeatureTable
-
-FloatArray = NDArray[np.floating]
+from diagnose.data.windows import FloatArray
 
 
 class ChosenModelBaseline(Baseline):
@@ -19,11 +15,11 @@ class ChosenModelBaseline(Baseline):
 
     Attributes
     ----------
-    without : columns whose names end so are left out; None keeps all
+    without : columns whose names end in this text are left out; None keeps all
     """
 
     without: ClassVar[str | None] = None
-    _model: ChosenModel
+    _model: FittedModel
 
     def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:
         """Fit all candidates and keep the best one."""

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnose.baselines.features import FeatureTable
+from diagnose.data.windows import FloatArray, IntArray
 from diagnose.scoring.metrics import balanced_accuracy, confusion_by_unit, over_records
 
-FloatArray = NDArray[np.floating]
-IntArray = NDArray[np.integer]
 LEAST_PROBABILITY = 1e-9  # so that the logarithm is finite
+BOOSTING = "gradient boosting"
+# Candidates of logistic regression: name -> inverse strength of the penalty. The first wins ties.
+_LOGISTIC = {f"logistic regression, C={value:g}": value for value in (0.1, 1.0, 10.0)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ChosenModel:
+class FittedModel:
     """Fitted estimator of scikit-learn with the columns that it reads."""
 
     name: str
@@ -28,9 +28,12 @@ class ChosenModel:
 
     def probability(self, table: FeatureTable) -> FloatArray:
         """Probabilities (row, class)."""
-        return class_probability(
-            self.model, table.values[:, self.columns], self.n_classes
-        )
+        values = table.values[:, self.columns]
+        return class_probability(self.model, values, self.n_classes)
+
+    def accuracy(self, table: FeatureTable) -> float:
+        """Balanced accuracy over the records of a table."""
+        return record_accuracy(self.probability(table), table)
 
 
 def choose_model(
@@ -39,47 +42,34 @@ def choose_model(
     n_classes: int,
     *,
     without: str | None = None,
-) -> ChosenModel:
+) -> FittedModel:
     """Logistic regression or gradient boosting, the better one on the validation units.
 
     Parameters
     ----------
     train, validation : tables with the same columns
     n_classes : of the task
-    without : columns whose names end so are left out
+    without : columns whose names end in this text are left out; None keeps all
     """
-    columns = known_columns(train)
+    columns = known_columns(train.values)
     if without is not None:
         columns = [
             index for index in columns if not train.names[index].endswith(without)
         ]
-    best, best_accuracy = None, -1.0
-    for name, make in _candidates().items():
-        model = make().fit(train.values[:, columns], train.label)
-        chosen = ChosenModel(
-            name=name, model=model, columns=columns, n_classes=n_classes
-        )
-        accuracy = record_accuracy(chosen.probability(validation), validation)
-        if accuracy > best_accuracy:
-            best, best_accuracy = chosen, accuracy
-    assert best is not None
-    return best
-
-
-def boosted_trees(train: FeatureTable, n_classes: int) -> ChosenModel:
-    """Gradient boosting without a choice."""
-    columns = known_columns(train)
-    model = _boosting().fit(train.values[:, columns], train.label)
-    return ChosenModel(
-        name="gradient boosting", model=model, columns=columns, n_classes=n_classes
-    )
-
-
-def known_columns(table: FeatureTable) -> list[int]:
-    """Columns with a finite value; the bins of the boosting need one."""
-    return [
-        int(index) for index in np.flatnonzero(np.isfinite(table.values).any(axis=0))
+    fitted = [
+        _fitted(name, train, columns, n_classes) for name in (*_LOGISTIC, BOOSTING)
     ]
+    return max(fitted, key=lambda model: model.accuracy(validation))
+
+
+def boosted_trees(train: FeatureTable, n_classes: int) -> FittedModel:
+    """Gradient boosting on all columns with values."""
+    return _fitted(BOOSTING, train, known_columns(train.values), n_classes)
+
+
+def known_columns(values: FloatArray) -> list[int]:
+    """Columns of (row, column) values with a finite one; the bins of the boosting need it."""
+    return np.flatnonzero(np.isfinite(values).any(axis=0)).tolist()
 
 
 def class_probability(model: Any, values: FloatArray, n_classes: int) -> FloatArray:
@@ -98,23 +88,21 @@ def record_scores(
 
 def record_accuracy(probability: FloatArray, table: FeatureTable) -> float:
     """Balanced accuracy over the records of a table, whose rows have these probabilities."""
-    records, scores = record_scores(probability, table.record)
-    label_of = dict(zip(table.record.tolist(), table.label.tolist(), strict=True))
-    label = np.array([label_of[record] for record in records.tolist()], dtype=np.int64)
+    _, scores = record_scores(probability, table.record)
+    _, first = np.unique(table.record, return_index=True)
+    label, predicted = table.label[first], scores.argmax(axis=1)
     one_unit = np.zeros_like(label)
-    n_classes = probability.shape[1]
-    confusion = confusion_by_unit(label, scores.argmax(axis=1), one_unit, n_classes)
+    confusion = confusion_by_unit(label, predicted, one_unit, probability.shape[1])
     return float(balanced_accuracy(confusion[0]))
 
 
-def _candidates() -> dict[str, Callable[[], Any]]:
-    """Untrained models by name, the first winning ties."""
-    return {
-        "logistic regression, C=0.1": lambda: _logistic(0.1),
-        "logistic regression, C=1": lambda: _logistic(1.0),
-        "logistic regression, C=10": lambda: _logistic(10.0),
-        "gradient boosting": _boosting,
-    }
+def _fitted(
+    name: str, train: FeatureTable, columns: list[int], n_classes: int
+) -> FittedModel:
+    """Candidate of a name, fitted to some columns of a table."""
+    model = _boosting() if name == BOOSTING else _logistic(_LOGISTIC[name])
+    model.fit(train.values[:, columns], train.label)
+    return FittedModel(name=name, model=model, columns=columns, n_classes=n_classes)
 
 
 def _logistic(strength: float) -> Any:

@@ -1,20 +1,20 @@
 """Condition indicators of whole stretches of signal, for the baselines.
 
-A stretch (a whole record, or what the split gives to the subset) rather than a short window:
-averaging needs turns.
+A stretch is a whole record, or the part that the split gives to the subset. Short windows are not
+enough: averaging needs turns.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import itertools
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from diagnose.data.windows import Segments, Task, read_signal
+from diagnose.data.windows import FloatArray, IntArray, Segments, Task, read_signal
 from gensig.errors import DatasetError
 from gensig.signals.averaging import MIN_TURNS, time_synchronous_average
 from gensig.signals.history import na4, nb4
@@ -31,31 +31,27 @@ from gensig.signals.indicators import (
 )
 from gensig.signals.spectral_kurtosis import spectral_kurtosis
 
-FloatArray = NDArray[np.floating]
-IntArray = NDArray[np.integer]
 GEARS = ("pinion", "wheel")
 LEVEL = "log_rms"  # at the end of the names of columns
-INDICATORS = (
-    LEVEL,
-    "kurtosis",
-    "crest_factor",
-    *(f"{name}_{gear}" for gear in GEARS for name in ("fm4", "sideband_ratio")),
-)
+
+
+def _of_gears(*names: str) -> tuple[str, ...]:
+    return tuple(f"{name}_{gear}" for gear in GEARS for name in names)
+
+
+INDICATORS = (LEVEL, "kurtosis", "crest_factor", *_of_gears("fm4", "sideband_ratio"))
 FURTHER = (
     "spectral_kurtosis",
-    *(
-        f"{name}_{gear}"
-        for gear in GEARS
-        for name in ("fm0", "m6a", "m8a", "energy_ratio", "na4", "nb4")
-    ),
+    *_of_gears("fm0", "m6a", "m8a", "energy_ratio", "na4", "nb4"),
 )
 FEATURES = {"basic": INDICATORS, "all": INDICATORS + FURTHER}
+BLOCK = 32  # stretches in memory at once
 BURST_WINDOW = (
-    0.005  # s, assumed: shorter than a turn, longer than a gearbox mode rings
+    0.005  # s, assumed: shorter than a turn, longer than the decay of a gearbox mode
 )
-Cache = dict[
-    tuple[tuple[str, ...], int, int, int], FloatArray
-]  # channels, record, first and last sample
+# channels, record, first sample and sample after the last -> values
+Key = tuple[tuple[str, ...], int, int, int]
+Cache = dict[Key, FloatArray]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,28 +80,29 @@ def indicators(
     sampling_rate : Hz
     rotation_frequency : Hz, of each of `GEARS`
     n_teeth : of each of `GEARS`
-    features : of `FEATURES`; "all" takes no average of fewer than `gensig.signals.averaging.MIN_TURNS` turns, has the
-               largest line of the spectral kurtosis, and NA4 and NB4 of a stretch that has no history
+    features : of `FEATURES`; "all" takes no average of fewer than
+        `gensig.signals.averaging.MIN_TURNS` turns, has the largest line of the spectral kurtosis,
+        and NA4 and NB4 of a stretch that has no history
 
     Returns
     -------
-    (channel, indicator); NaN where the stretch holds no whole turn of the gear, or too few
+    (channel, indicator); NaN if the stretch holds no whole turn of the gear, or too few
     """
     x = np.asarray(signal, dtype=float)
     x = x - x.mean(axis=-1, keepdims=True)
     with np.errstate(divide="ignore"):
         columns = [np.log(rms(x)), kurtosis(x), crest_factor(x)]
     min_turns = 1 if features == "basic" else MIN_TURNS
-    averages = {gear: np.full((x.shape[0], 1), np.nan) for gear in GEARS}
+    averages = {}
     for gear in GEARS:
+        averages[gear] = np.full((x.shape[0], 1), np.nan)
         try:
-            average = time_synchronous_average(
+            averages[gear] = time_synchronous_average(
                 x, sampling_rate, rotation_frequency[gear], min_turns=min_turns
             )
-            averages[gear] = average
             columns += [
-                fm4(average, n_teeth[gear]),
-                sideband_ratio(average, n_teeth[gear]),
+                indicator(averages[gear], n_teeth[gear])
+                for indicator in (fm4, sideband_ratio)
             ]
         except ValueError:
             columns += [np.full(x.shape[0], np.nan)] * 2
@@ -124,28 +121,25 @@ def _further(
     """Columns of `FURTHER`, (channel,) each."""
     columns = [_or_unknown(_bursts, x, sampling_rate)]
     for gear in GEARS:
+        average, teeth = averages[gear], n_teeth[gear]
         for indicator in (fm0, m6a, m8a, energy_ratio):
-            columns.append(_or_unknown(indicator, averages[gear], n_teeth[gear]))
+            columns.append(_or_unknown(indicator, average, teeth))
         for of_history in (na4, nb4):
-            columns.append(
-                _or_unknown(of_history, averages[gear][:, None], n_teeth[gear]).reshape(
-                    -1
-                )
-            )
+            column = _or_unknown(of_history, average[:, None], teeth)
+            columns.append(column.reshape(-1))
     return columns
 
 
 def _bursts(x: FloatArray, sampling_rate: float) -> FloatArray:
     """(channel,) largest line of the spectral kurtosis."""
-    return spectral_kurtosis(x, sampling_rate, round(BURST_WINDOW * sampling_rate))[
-        1
-    ].max(axis=-1)
+    n_window = round(BURST_WINDOW * sampling_rate)
+    return spectral_kurtosis(x, sampling_rate, n_window)[1].max(axis=-1)
 
 
 def _or_unknown(
     indicator: Callable[..., FloatArray], signal: FloatArray, *values: float
 ) -> FloatArray:
-    """The indicator, NaN where the signal is too short for it."""
+    """The indicator, or NaN if the signal is too short for it."""
     try:
         return indicator(signal, *values)
     except ValueError:
@@ -164,59 +158,62 @@ def feature_table(
 
     Parameters
     ----------
-    task, segments : which signals
+    task, segments : stretches of the signals
     features : of `FEATURES`
-    cache : filled and used, so that protocols share what they have in common; for the same features
+    cache : filled and used, so that protocols share common values; for the same features
     n_threads : stretches computed at once; the values do not depend on it
     """
-    known: Cache = {} if cache is None else cache
+    if cache is None:
+        cache = {}
     speed, n_teeth = known_rotation(task)
-    keys = list(
-        zip(
-            segments.record.tolist(),
-            segments.start.tolist(),
-            segments.stop.tolist(),
-            strict=True,
-        )
-    )
+    rate = task.dataset.sampling_rate
 
-    def compute(key: tuple[int, int, int]) -> FloatArray:
-        frequency = {gear: values[key[0]] for gear, values in speed.items()}
-        return indicators(
-            signals[key],
-            task.dataset.sampling_rate,
-            frequency,
-            n_teeth,
-            features=features,
-        ).ravel()
+    def compute(key: Key) -> FloatArray:
+        signal, frequency = signals[key], frequencies_at(speed, key[1])
+        return indicators(signal, rate, frequency, n_teeth, features=features).ravel()
 
-    missing = [key for key in keys if (task.channel_names, *key) not in known]
+    keys = keys_of(task, segments)
+    missing = [key for key in keys if key not in cache]
     with ThreadPoolExecutor(max_workers=n_threads) as pool:
-        for first in range(0, len(missing), 32):
-            block = missing[first : first + 32]
-            signals = {key: read_signal(task, *key) for key in block}
-            names = [(task.channel_names, *key) for key in block]
-            known.update(zip(names, pool.map(compute, block), strict=True))
+        for first in range(0, len(missing), BLOCK):
+            block = missing[first : first + BLOCK]
+            signals = {key: read_signal(task, *key[1:]) for key in block}
+            cache.update(zip(block, pool.map(compute, block), strict=True))
+    return table_of(task, segments, [cache[key] for key in keys], FEATURES[features])
+
+
+def keys_of(task: Task, segments: Segments) -> list[Key]:
+    """Keys of a `Cache`, one for each stretch."""
+    return [(task.channel_names, *row) for row in segments.rows()]
+
+
+def table_of(
+    task: Task,
+    segments: Segments,
+    rows: Sequence[FloatArray],
+    of_channel: Sequence[str],
+) -> FeatureTable:
+    """Table of rows of the stretches, with the columns `of_channel` for each channel."""
+    columns = itertools.product(task.channel_names, of_channel)
     return FeatureTable(
-        values=np.stack([known[(task.channel_names, *key)] for key in keys]),
-        names=tuple(
-            f"{channel}/{name}"
-            for channel in task.channel_names
-            for name in FEATURES[features]
-        ),
+        values=np.stack(rows),
+        names=tuple("/".join(names) for names in columns),
         label=task.labels()[segments.record],
         record=segments.record,
     )
+
+
+def frequencies_at(speed: Mapping[str, FloatArray], record: int) -> dict[str, float]:
+    """Rotation frequency of each of `GEARS` in one record, from those of `known_rotation`."""
+    return {gear: values[record] for gear, values in speed.items()}
 
 
 def known_rotation(task: Task) -> tuple[dict[str, FloatArray], dict[str, int]]:
     """Rotation frequency in Hz, (record,), and number of teeth of each of `GEARS`."""
     pinion = np.asarray(task.dataset.column("speed_rpm"), dtype=float) / 60
     n_teeth = {gear: _n_teeth(task.dataset.attributes, gear) for gear in GEARS}
-    return {
-        "pinion": pinion,
-        "wheel": pinion * n_teeth["pinion"] / n_teeth["wheel"],
-    }, n_teeth
+    wheel = pinion * n_teeth["pinion"] / n_teeth["wheel"]
+    return {"pinion": pinion, "wheel": wheel}, n_teeth
 
 
 def _n_teeth(attributes: Mapping[str, Any], gear: str) -> int:
@@ -224,5 +221,6 @@ def _n_teeth(attributes: Mapping[str, Any], gear: str) -> int:
         return int(attributes[f"n_teeth_{gear}"])
     except KeyError:
         raise DatasetError(
-            f"the data set does not say n_teeth_{gear}; indicators need it (baselines=false)"
+            f"the data set does not say n_teeth_{gear}; "
+            "indicators need it (baselines=false)"
         ) from None

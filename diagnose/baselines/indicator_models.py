@@ -4,14 +4,9 @@ from __future__ import annotations
 
 from typing import final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from diagnose.baselines.base import Input, MethodText, Parts, Role, Source
 from diagnose.baselines.chosen_model import ChosenModelBaseline
 from diagnose.baselines.features import LEVEL, FeatureTable, feature_table
-
-FloatArray = NDArray[np.floating]
 
 
 def indicator_tables(source: Source) -> Parts:
@@ -19,15 +14,11 @@ def indicator_tables(source: Source) -> Parts:
     cache = source.caches.setdefault(INDICATOR_INPUT.name, {})
 
     def table(subset: str) -> FeatureTable:
-        segments = source.segments(subset)
-        features = source.features
-        return feature_table(
-            source.part(subset), segments, features=features, cache=cache
-        )
+        segments, features = source.segments(subset), source.features
+        task = source.part(subset)
+        return feature_table(task, segments, features=features, cache=cache)
 
-    return Parts(
-        train=table("train"), validation=table("validation"), test=table("test")
-    )
+    return Parts.of(table)
 
 
 INDICATOR_INPUT = Input(name="indicators", make=indicator_tables)

@@ -1,12 +1,13 @@
 """MiniRocket: ridge regression on shares of positive values of fixed convolutions.
 
-The transform is written here. The libraries that hold it bring a whole toolbox along (sktime,
-aeon) or have no second release.
+The transform is implemented here. The libraries with it depend on many others (sktime, aeon) or
+have no second release.
 """
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, final
 
@@ -17,20 +18,15 @@ from diagnose.baselines.base import Baseline, Input, MethodText, Parts, Role, So
 from diagnose.baselines.estimators import record_accuracy
 from diagnose.baselines.features import FeatureTable
 from diagnose.baselines.window_features import over_stretches
-from diagnose.data.windows import WindowSet
+from diagnose.data.windows import FloatArray, WindowSet
 
 if TYPE_CHECKING:
     import torch
 
-FloatArray = NDArray[np.floating]
 KERNEL_LENGTH = 9
-# (84, 9): -1 everywhere but 2 at three places, all ways to choose them
-KERNELS = np.array(
-    [
-        [2.0 if place in chosen else -1.0 for place in range(KERNEL_LENGTH)]
-        for chosen in itertools.combinations(range(KERNEL_LENGTH), 3)
-    ]
-)
+# (84, 9): weights 2 at three taps, all ways to choose them, and -1 elsewhere
+_TAPS = np.array(list(itertools.combinations(range(KERNEL_LENGTH), 3)))
+KERNELS = 3.0 * np.eye(KERNEL_LENGTH)[_TAPS].sum(axis=1) - 1.0
 MAX_DILATIONS = 32
 GOLDEN_RATIO = (1 + np.sqrt(5)) / 2
 N_EXAMPLES = 512  # windows that thresholds may be taken from
@@ -44,9 +40,9 @@ class Bank:
     Attributes
     ----------
     dilation : samples from one weight to the next
-    weight : (84, channel, 9) zero for the channels that a kernel does not see
+    weight : (84, channel, 9) zero for the channels outside the set of a kernel
     bias : (84, feature) thresholds
-    padded : (84,) whether a kernel also counts where it reaches over the ends of the window
+    padded : (84,) True if positions count at which the kernel reaches beyond the window
     """
 
     dilation: int
@@ -68,61 +64,53 @@ def fit_minirocket(
 
     Source: Dempster, Schmidt & Webb (2021), "MiniRocket: a very fast (almost) deterministic
     transform for time series classification", KDD; several channels as in the authors' later
-    code: each kernel sees a drawn set of channels, the logarithm of whose number is uniform.
+    code: each kernel uses a drawn set of channels, the logarithm of whose number is uniform.
     """
     import torch
 
     n_windows, n_channels, n_samples = windows.shape
-    per_kernel = max(n_features // len(KERNELS), 1)
-    quantile = np.arange(1, per_kernel * len(KERNELS) + 1) * GOLDEN_RATIO % 1
+    n_kernels = len(KERNELS)
+    per_kernel = max(n_features // n_kernels, 1)
+    quantile = np.arange(1, per_kernel * n_kernels + 1) * GOLDEN_RATIO % 1
     banks, used = [], 0
     for index, (dilation, count) in enumerate(_dilations(n_samples, per_kernel)):
         weight = _kernels_on_channels(n_channels, rng)
-        example = torch.from_numpy(windows[rng.integers(n_windows, size=len(KERNELS))])
+        example = torch.from_numpy(windows[rng.integers(n_windows, size=n_kernels)])
         output = torch.nn.functional.conv1d(
             example.reshape(1, -1, n_samples),
             weight,
             dilation=dilation,
             padding=4 * dilation,
-            groups=len(KERNELS),
+            groups=n_kernels,
         )[0]
-        share = quantile[used : used + len(KERNELS) * count].reshape(
-            len(KERNELS), count
-        )
-        bias = np.stack(
-            [
-                np.quantile(row, part)
-                for row, part in zip(output.numpy(), share, strict=True)
-            ]
-        )
+        shares = quantile[used : used + n_kernels * count].reshape(n_kernels, count)
+        rows = zip(output.numpy(), shares, strict=True)
+        bias = np.stack([np.quantile(values, share) for values, share in rows])
         banks.append(
             Bank(
                 dilation=dilation,
                 weight=weight,
                 bias=bias.astype(np.float32),
-                padded=(index + np.arange(len(KERNELS))) % 2 == 0,
+                padded=(index + np.arange(n_kernels)) % 2 == 0,
             )
         )
-        used += len(KERNELS) * count
+        used += n_kernels * count
     return banks
 
 
 def minirocket_features(windows: FloatArray, banks: list[Bank]) -> FloatArray:
-    """(window, feature) share of positive values of every convolution less its threshold, of
-    float32 windows.
+    """(window, feature) share of positive values of every convolution less its threshold.
 
-    Two windows at a time stay in the cache of a processor; sums of bytes are ten times as fast in
-    numpy as in torch.
+    The windows are float32. Two at a time stay in the cache of a processor. Sums of bytes are ten
+    times as fast in numpy as in torch.
     """
     import torch
 
-    blocks = torch.from_numpy(windows).split(2)
-    return np.concatenate(
-        [
-            np.concatenate([_shares(block, bank) for bank in banks], axis=1)
-            for block in blocks
-        ]
-    )
+    rows = []
+    for block in torch.from_numpy(windows).split(2):
+        shares = [_shares(block, bank) for bank in banks]
+        rows.append(np.concatenate(shares, axis=1))
+    return np.concatenate(rows)
 
 
 def _shares(windows: torch.Tensor, bank: Bank) -> FloatArray:
@@ -135,24 +123,23 @@ def _shares(windows: torch.Tensor, bank: Bank) -> FloatArray:
         padded[..., tap * bank.dilation :][..., :n_samples]
         for tap in range(KERNEL_LENGTH)
     ]
-    output = torch.matmul(
-        bank.weight.flatten(1), torch.stack(taps, dim=2).flatten(1, 2)
-    ).numpy()
+    columns = torch.stack(taps, dim=2).flatten(1, 2)
+    output = torch.matmul(bank.weight.flatten(1), columns).numpy()
     shares = np.empty((len(windows), *bank.bias.shape), dtype=np.float32)
     for ends, span in ((True, slice(None)), (False, slice(margin, n_samples - margin))):
         kernels = np.flatnonzero(bank.padded == ends)
         part = output[:, kernels, span]
         for index, bias in enumerate(bank.bias[kernels].T):
             above = (part > bias[:, None]).view(np.uint8)
-            shares[:, kernels, index] = (
-                above.sum(axis=-1, dtype=np.uint32) / part.shape[-1]
-            )
+            count = above.sum(axis=-1, dtype=np.uint32)
+            shares[:, kernels, index] = count / part.shape[-1]
     return shares.reshape(len(windows), -1)
 
 
 def _dilations(n_samples: int, per_kernel: int) -> list[tuple[int, int]]:
-    """Dilations, spread evenly on a logarithmic scale up to the whole window, and features a
-    kernel at each.
+    """Dilations and the number of features a kernel at each.
+
+    They are evenly spaced on a logarithmic scale, up to the whole window.
     """
     n_exponents = min(per_kernel, MAX_DILATIONS)
     longest = max((n_samples - 1) / (KERNEL_LENGTH - 1), 1)
@@ -168,37 +155,30 @@ def _kernels_on_channels(n_channels: int, rng: np.random.Generator) -> torch.Ten
     import torch
 
     most = min(n_channels, KERNEL_LENGTH)
-    n_seen = np.floor(2 ** rng.uniform(0, np.log2(most + 1), len(KERNELS))).astype(int)
-    seen = np.stack([rng.permutation(n_channels) < n for n in n_seen])
-    return torch.from_numpy((KERNELS[:, None, :] * seen[:, :, None]).astype(np.float32))
+    n_used = np.floor(2 ** rng.uniform(0, np.log2(most + 1), len(KERNELS))).astype(int)
+    used = np.stack([rng.permutation(n_channels) < n for n in n_used])
+    return torch.from_numpy((KERNELS[:, None, :] * used[:, :, None]).astype(np.float32))
 
 
-def rocket_tables(
-    train: WindowSet,
-    validation: WindowSet,
-    test: WindowSet,
-    *,
-    n_features: int,
-) -> Parts:
-    """Features of the stretches of three subsets, means over their windows.
+def rocket_tables(sets: Mapping[str, WindowSet], *, n_features: int) -> Parts:
+    """Features of the stretches of every subset, means over their windows.
 
     Everything is chosen on the training windows. The draws are those of seed 0: the features
     hardly depend on them.
     """
+    train = sets["train"]
     rng = np.random.default_rng(0)
     examples = np.sort(rng.permutation(len(train))[:N_EXAMPLES])
     banks = fit_minirocket(train.cut(examples), n_features=n_features, rng=rng)
 
-    def table(windows: WindowSet) -> FeatureTable:
-        return over_stretches(
-            windows, lambda block: minirocket_features(block, banks), "rocket"
-        )
+    def features(block: NDArray[np.float32]) -> FloatArray:
+        return minirocket_features(block, banks)
 
-    return Parts(train=table(train), validation=table(validation), test=table(test))
+    return Parts.of(lambda subset: over_stretches(sets[subset], features, "rocket"))
 
 
 def _make(source: Source) -> Parts:
-    return rocket_tables(**source.windows(), n_features=source.minirocket_features)
+    return rocket_tables(source.windows(), n_features=source.minirocket_features)
 
 
 ROCKET_INPUT = Input(name="rockets", make=_make)
@@ -223,17 +203,16 @@ class MiniRocket(Baseline):
     def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:
         """Fit with each penalty and keep the best one; the largest wins ties."""
         self._n_classes = n_classes
-        best, best_penalty, best_accuracy = None, 0.0, -1.0
+        scored = []
         for penalty in PENALTIES:
             self._model = _ridge(penalty).fit(train.values, train.label)
             accuracy = record_accuracy(self.predict_proba(validation), validation)
-            if accuracy > best_accuracy:
-                best, best_penalty, best_accuracy = self._model, penalty, accuracy
-        self._model = best
+            scored.append((accuracy, penalty, self._model))
+        _, best_penalty, self._model = max(scored, key=lambda row: row[0])
         return f"ridge, penalty {best_penalty:g}"
 
     def predict_proba(self, table: FeatureTable) -> FloatArray:
-        """Softmax (row, class) of the scores, which ranks as they do."""
+        """Softmax (row, class) of the scores, which keeps their order."""
         from scipy.special import softmax
 
         score = self._model.decision_function(table.values)

@@ -1,4 +1,4 @@
-"""Nearest training spectrum: whether a split lets a method recognise machines."""
+"""Nearest training spectrum, which shows if a split lets a method recognise machines."""
 
 from __future__ import annotations
 
@@ -12,15 +12,13 @@ from diagnose.baselines.base import Baseline, Input, MethodText, Parts, Role, So
 from diagnose.baselines.estimators import class_probability
 from diagnose.baselines.features import FeatureTable
 from diagnose.baselines.window_features import over_stretches
-from diagnose.data.windows import WindowSet, input_scale
+from diagnose.data.windows import FloatArray, WindowSet, input_scale
 
 if TYPE_CHECKING:
     from sklearn.neighbors import KNeighborsClassifier
 
-FloatArray = NDArray[np.floating]
-SPECTRUM_FLOOR = (
-    0.01  # 40 dB below white noise of the same RMS, as in configs/model/spectrum.yaml
-)
+# 40 dB below white noise of the same RMS, as in configs/model/spectrum.yaml
+SPECTRUM_FLOOR = 0.01
 
 
 def spectrum_table(windows: WindowSet, scale: Sequence[float]) -> FeatureTable:
@@ -45,15 +43,10 @@ def spectrum_table(windows: WindowSet, scale: Sequence[float]) -> FeatureTable:
 
 
 def spectrum_tables(source: Source) -> Parts:
-    """Spectra of the windows of every subset, divided alike."""
+    """Spectra of the windows of every subset, with the same divisor."""
     sets = source.windows()
     scale = input_scale(sets["train"])
-    tables = {
-        subset: spectrum_table(windows, scale) for subset, windows in sets.items()
-    }
-    return Parts(
-        train=tables["train"], validation=tables["validation"], test=tables["test"]
-    )
+    return Parts.of(lambda subset: spectrum_table(sets[subset], scale))
 
 
 SPECTRUM_INPUT = Input(name="spectra", make=spectrum_tables)
@@ -67,7 +60,8 @@ class NearestSpectrum(Baseline):
         name="nearest_spectrum",
         label="1-NN on spectra",
         card_label="1-NN on spectra",
-        meaning="the class of the training signal with the nearest log-magnitude spectrum, mean over the windows.",
+        meaning="the class of the training signal with the nearest log-magnitude spectrum, "
+        "mean over the windows.",
     )
     role = Role.RIVAL
     reads = SPECTRUM_INPUT

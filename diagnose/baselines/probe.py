@@ -1,25 +1,26 @@
-"""What a record's row and place in the file tell of its class, without its signal.
+"""Probes: prediction of the class from the row of a record and its position, without its signal.
 
-It must be nothing.
+They must be at chance.
 """
 
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.baselines.base import Baseline, Input, MethodText, Parts, Role, Source
-from diagnose.baselines.estimators import ChosenModel, boosted_trees
+from diagnose.baselines.estimators import FittedModel, boosted_trees
 from diagnose.baselines.features import FeatureTable
-from gensig.dataset.schema import COLUMNS, SIGNALS
+from diagnose.data.windows import FloatArray
+from gensig.dataset.columns import COLUMNS
+from gensig.dataset.schema import SIGNALS
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
 
-FloatArray = NDArray[np.floating]
 # Never probed, and why. By the role that the schema gives a column ...
 LABELS = {
     "label": "it is the class",
@@ -37,22 +38,22 @@ EXCLUDED = {
     "acceleration_clean_scale": "the peak of the signal itself",
     "healthy_twin_scale": "the peak of a signal",
 }
-# Results that a user reads off the machine. All others only the simulation knows: they are read by
-# `ResultProbe` alone.
+# Results that are measured on a machine. All others are known to the simulation only: they are read
+# by `ResultProbe` alone.
 READ_OFF = ("speed_rpm", "mesh_frequency_hz")
 
 
 def probed_columns(dataset: Dataset, *, results: bool) -> list[str]:
-    """Names of the columns that tell of a record without its signal.
+    """Names of the columns that describe a record without its signal.
 
-    With ``results`` what the simulation adds.
+    `results` adds those that only the simulation knows.
     """
     return [name for name in dataset.column_names if _is_probed(name, results)]
 
 
 def _is_probed(name: str, results: bool) -> bool:
     known = COLUMNS.get(name) or SIGNALS.get(name)
-    role = "condition" if known is None else known.role
+    role = known.role if known else "condition"
     if name in EXCLUDED or role in LABELS or name.startswith(FAULT_PARAMETERS):
         return False
     return results or role != "result" or name in READ_OFF
@@ -61,39 +62,34 @@ def _is_probed(name: str, results: bool) -> bool:
 def probe_values(
     dataset: Dataset, n_classes: int, *, results: bool
 ) -> tuple[FloatArray, tuple[str, ...]]:
-    """Values (record, feature) of all records and their names: columns, text as numbers, and the
-    place in the file.
+    """Values (record, feature) of all records and their names.
 
-    All records are of one length, so that length tells nothing.
+    They are the columns, with text as numbers, and the position in the file. All records are of
+    one length, which therefore says nothing.
     """
-    place = np.arange(dataset.n_records)
-    parts: dict[str, NDArray] = {
-        "place": place,
-        "place_modulo_classes": place % n_classes,
+    position = np.arange(dataset.n_records)
+    parts: dict[str, NDArray[Any]] = {
+        "place": position,
+        "place_modulo_classes": position % n_classes,
     }
     if "condition_id" in dataset.column_names:
-        parts["place_in_condition"] = _count_before(
-            np.asarray(dataset.column("condition_id"))
-        )
+        condition = np.asarray(dataset.column("condition_id"))
+        parts["place_in_condition"] = _count_before(condition)
     for name in probed_columns(dataset, results=results):
         values = np.asarray(dataset.column(name))
-        numbers = (
-            np.unique(values, return_inverse=True)[1]
-            if values.dtype.kind in "US"
-            else values
-        )
-        rows = numbers.reshape(dataset.n_records, -1)
-        parts |= {
-            name if rows.shape[1] == 1 else f"{name}/{k}": rows[:, k]
-            for k in range(rows.shape[1])
-        }
-    return np.stack([part.astype(float) for part in parts.values()], axis=1), tuple(
-        parts
-    )
+        if values.dtype.kind in "US":
+            values = np.unique(values, return_inverse=True)[1]
+        columns = values.reshape(dataset.n_records, -1).T
+        if len(columns) == 1:
+            parts[name] = columns[0]
+        else:
+            parts |= {f"{name}/{k}": column for k, column in enumerate(columns)}
+    values = np.stack([part.astype(float) for part in parts.values()], axis=1)
+    return values, tuple(parts)
 
 
-def _count_before(names: NDArray) -> NDArray[np.integer]:
-    """How many earlier entries are the same, for each entry."""
+def _count_before(names: NDArray[Any]) -> NDArray[np.integer]:
+    """Number of earlier entries that are the same, for each entry."""
     order = np.argsort(names, kind="stable")
     first = np.searchsorted(names[order], names[order], side="left")
     count = np.empty(names.size, dtype=np.int64)
@@ -106,25 +102,38 @@ def _probe_tables(source: Source, *, results: bool) -> Parts:
     task = source.task
     n_classes = len(task.class_names)
     values, names = probe_values(task.dataset, n_classes, results=results)
+    labels = task.labels()
 
     def table(subset: str) -> FeatureTable:
         record = np.unique(source.segments(subset).record)
-        label = task.labels()[record]
         return FeatureTable(
-            values=values[record], names=names, label=label, record=record
+            values=values[record], names=names, label=labels[record], record=record
         )
 
-    return Parts(
-        train=table("train"), validation=table("validation"), test=table("test")
-    )
+    return Parts.of(table)
 
 
 METADATA_INPUT = Input(name="metadata", make=partial(_probe_tables, results=False))
 RESULT_INPUT = Input(name="results", make=partial(_probe_tables, results=True))
 
 
+class _Probe(Baseline):
+    """Gradient boosting on a table of rows."""
+
+    _model: FittedModel
+
+    def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:
+        """Fit to the training rows; there is no choice."""
+        self._model = boosted_trees(train, n_classes)
+        return f"gradient boosting on {len(self._model.columns)} columns"
+
+    def predict_proba(self, table: FeatureTable) -> FloatArray:
+        """Probabilities (row, class) of the boosted trees."""
+        return self._model.probability(table)
+
+
 @final
-class MetadataProbe(Baseline):
+class MetadataProbe(_Probe):
     """Gradient boosting on the rows of the training records."""
 
     text = MethodText(
@@ -137,23 +146,13 @@ class MetadataProbe(Baseline):
     )
     role = Role.AT_CHANCE
     reads = METADATA_INPUT
-    _model: ChosenModel
-
-    def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:
-        """Fit to the training rows; there is no choice."""
-        self._model = boosted_trees(train, n_classes)
-        return f"gradient boosting on {len(self._model.columns)} columns"
-
-    def predict_proba(self, table: FeatureTable) -> FloatArray:
-        """Probabilities (row, class) of the boosted trees."""
-        return self._model.probability(table)
 
 
 @final
-class ResultProbe(Baseline):
+class ResultProbe(_Probe):
     """The same with results that only the simulation knows, such as the integration error.
 
-    A fault changes the motion, and may so change these: such a column is no input of a classifier.
+    A fault changes the motion and may change these: such a column is no input of a classifier.
     """
 
     text = MethodText(
@@ -166,13 +165,3 @@ class ResultProbe(Baseline):
     )
     role = Role.FOLLOWER
     reads = RESULT_INPUT
-    _model: ChosenModel
-
-    def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:
-        """Fit to the training rows; there is no choice."""
-        self._model = boosted_trees(train, n_classes)
-        return f"gradient boosting on {len(self._model.columns)} columns"
-
-    def predict_proba(self, table: FeatureTable) -> FloatArray:
-        """Probabilities (row, class) of the boosted trees."""
-        return self._model.probability(table)

@@ -1,7 +1,6 @@
-"""Records against a sound record of the same machine: which tooth changed, band by band; for
-machines with a history.
+"""Changes of teeth against a sound record of the same machine, band by band.
 
-A model that is given what a monitored machine has and a new one has not.
+The model needs a history, which a monitored machine has and a new one lacks.
 ``docs/howto/engine_faults.md``.
 """
 
@@ -10,77 +9,66 @@ from __future__ import annotations
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnose.baselines.base import Input, MethodText, Parts, Role, Source
 from diagnose.baselines.chosen_model import ChosenModelBaseline
-from diagnose.baselines.features import GEARS, FeatureTable, known_rotation
-from diagnose.data.windows import Segments, Task, read_signal
+from diagnose.baselines.features import (
+    GEARS,
+    FeatureTable,
+    Key,
+    keys_of,
+    known_rotation,
+)
+from diagnose.data.windows import FloatArray, IntArray, Segments, Task, read_signal
 from gensig.errors import ConfigError
 from gensig.signals.resampling import PASS_SHARE
 from gensig.signals.tooth_levels import changed_teeth, tooth_levels
 
-FloatArray = NDArray[np.floating]
-IntArray = NDArray[np.integer]
-
-BANDS = (
-    (0.01, 0.125),
-    (0.125, 0.25),
-    (0.25, 0.5),
-    (0.5, 0.999),
-)  # of what the recorder passes, `PASS_SHARE` of the rate
-OF_CHANNEL = (
-    "rise",
-    "fall",
-)  # largest and smallest change of a tooth, in standard deviations
-OF_ALL = "outstanding"  # of the channels' mean square changes: logarithm of the largest tooth over the median one
-NEEDED = (
-    "unit_id",
-    "fault_gear",
-    "start_phase",
-    "start_tooth_pinion",
-    "start_tooth_wheel",
-)
+# Shares of the band that the recorder passes, `PASS_SHARE` of the rate.
+BANDS = ((0.01, 0.125), (0.125, 0.25), (0.25, 0.5), (0.5, 0.999))
 _BANDS = range(len(BANDS))
-Levels = dict[
-    tuple[tuple[str, ...], int, int, int], dict[str, FloatArray]
-]  # by channels, record, first and last sample
+# Largest and smallest change of a tooth, in standard deviations.
+OF_CHANNEL = ("rise", "fall")
+# Log ratio of the largest tooth and the median one, of the channels' mean square changes.
+OF_ALL = "outstanding"
+START = ("start_phase", "start_tooth_pinion", "start_tooth_wheel")
+NEEDED = ("unit_id", "fault_gear", *START)
+Levels = dict[Key, dict[str, FloatArray]]
 
 
 def references(task: Task) -> IntArray:
-    """(record,) another sound record of the same unit, nearest in speed; -1 in units of fewer
-    than two.
+    """(record,) another sound record of the same unit, nearest in speed.
+
+    It is -1 in units with fewer than two sound records. With only one, that record alone would
+    have no reference, which would reveal its class.
 
     Raises
     ------
-    ConfigError    for a data set that does not tell its units and the places of its teeth
+    ConfigError    for a data set without the units or the positions of the teeth
     """
     if missing := [name for name in NEEDED if name not in task.dataset.column_names]:
         raise ConfigError(
-            f"baseline reference: the data set does not say {missing[0]}; leave that baseline out"
+            f"baseline reference: the data set does not say {missing[0]}; "
+            "leave that baseline out"
         )
     unit = np.asarray(task.dataset.column("unit_id"))
     speed = np.asarray(task.dataset.column("speed_rpm"), dtype=float)
-    sound = np.flatnonzero(
-        (np.asarray(task.dataset.column("fault_gear")) == "")
-        & np.asarray(task.dataset.usable, dtype=bool)
-    )
-    found = np.full(unit.size, -1)
+    usable = np.asarray(task.dataset.usable, dtype=bool)
+    sound = (np.asarray(task.dataset.column("fault_gear")) == "") & usable
+    nearest = np.full(unit.size, -1)
     for record in range(unit.size):
-        own = sound[unit[sound] == unit[record]]
-        if (
-            own.size >= 2
-        ):  # of one alone its own sound record would have no reference, which tells the class
-            others = own[own != record]
-            found[record] = others[np.argmin(np.abs(speed[others] - speed[record]))]
-    return found
+        of_unit = np.flatnonzero(sound & (unit == unit[record]))
+        if of_unit.size >= 2:
+            others = of_unit[of_unit != record]
+            nearest[record] = others[np.argmin(np.abs(speed[others] - speed[record]))]
+    return nearest
 
 
 def reference_table(task: Task, segments: Segments, known: Levels) -> FeatureTable:
-    """Changes of the teeth of both gears, stretch by stretch, columns as of `_names`.
+    """Changes of the teeth of both gears, stretch by stretch, with the columns `_names`.
 
-    The reference is the whole sound record, also where a stretch is a part of one. ``known`` is
-    filled and used.
+    The reference is the whole sound record, also for a stretch that is part of a record.
+    ``known`` is filled and used.
 
     Raises
     ------
@@ -89,30 +77,22 @@ def reference_table(task: Task, segments: Segments, known: Levels) -> FeatureTab
     reference = references(task)
     if (reference[segments.record] < 0).all():
         raise ConfigError(
-            "baseline reference: no machine has a sound record beside the one that is judged; make the data set with "
-            "plan.n_repeats=2, or leave that baseline out"
+            "baseline reference: no machine has a sound record beside the one that is "
+            "judged; make the data set with plan.n_repeats=2, or leave that baseline out"
         )
-    rows = []
-    for key in zip(
-        segments.record.tolist(),
-        segments.start.tolist(),
-        segments.stop.tolist(),
-        strict=True,
-    ):
-        other = int(reference[key[0]])
-        own = _levels(task, known, *key)
-        if other < 0:
-            rows.append(np.full(len(_names(task)), np.nan))
-            continue
-        whole = _levels(task, known, other, 0, int(task.dataset.n_samples))
-        rows.append(
-            np.concatenate(
-                [_measures(changed_teeth(own[gear], whole[gear])) for gear in GEARS]
-            )
-        )
+    names = _names(task)
+    values = np.full((segments.record.size, len(names)), np.nan)
+    for row, key in zip(values, keys_of(task, segments), strict=True):
+        other = int(reference[key[1]])
+        if other >= 0:
+            here = _levels(task, known, key)
+            whole = (task.channel_names, other, 0, int(task.dataset.n_samples))
+            there = _levels(task, known, whole)
+            changes = [changed_teeth(here[gear], there[gear]) for gear in GEARS]
+            row[:] = np.concatenate([_measures(change) for change in changes])
     return FeatureTable(
-        values=np.array(rows),
-        names=_names(task),
+        values=values,
+        names=names,
         label=task.labels()[segments.record],
         record=segments.record,
     )
@@ -125,9 +105,7 @@ def reference_tables(source: Source) -> Parts:
     def table(subset: str) -> FeatureTable:
         return reference_table(source.part(subset), source.segments(subset), known)
 
-    return Parts(
-        train=table("train"), validation=table("validation"), test=table("test")
-    )
+    return Parts.of(table)
 
 
 TOOTH_INPUT = Input(name="tooth_changes", make=reference_tables)
@@ -150,12 +128,12 @@ class Reference(ChosenModelBaseline):
 
 
 def _names(task: Task) -> tuple[str, ...]:
-    """Of the columns, in the order of `_measures`, gear by gear."""
+    """Names of the columns, in the order of `_measures`, gear by gear."""
     names = []
     for gear in GEARS:
         names += [
-            f"{name}/{gear}/{band}/{one}"
-            for one in OF_CHANNEL
+            f"{name}/{gear}/{band}/{extreme}"
+            for extreme in OF_CHANNEL
             for name in task.channel_names
             for band in _BANDS
         ]
@@ -169,54 +147,40 @@ def _measures(changes: FloatArray) -> FloatArray:
     joint = np.concatenate([power.mean(axis=0), power.mean(axis=(0, 1))[None]])
     with np.errstate(divide="ignore", invalid="ignore"):
         outstanding = np.log(joint.max(axis=-1) / np.median(joint, axis=-1))
-    columns = np.concatenate(
-        [changes.max(axis=-1).ravel(), changes.min(axis=-1).ravel(), outstanding]
-    )
+    rise, fall = changes.max(axis=-1), changes.min(axis=-1)
+    columns = np.concatenate([rise.ravel(), fall.ravel(), outstanding])
     return np.where(np.isfinite(columns), columns, np.nan)
 
 
-def _levels(
-    task: Task, known: Levels, record: int, start: int, stop: int
-) -> dict[str, FloatArray]:
+def _levels(task: Task, known: Levels, key: Key) -> dict[str, FloatArray]:
     """Levels (channel, band, tooth) of either gear, tooth 0 first.
 
-    NaN for one that makes no turn in the stretch.
+    NaN for a gear that makes no turn in the stretch.
     """
-    key = (task.channel_names, record, start, stop)
     if key not in known:
-        column = {name: float(task.dataset.column(name)[record]) for name in NEEDED[2:]}
+        _, record, start, _ = key
+        column = {name: float(task.dataset.column(name)[record]) for name in START}
         speed, n_teeth = known_rotation(task)
-        rate, signal = (
-            float(task.dataset.sampling_rate),
-            read_signal(task, record, start, stop),
-        )
-        passed = (
-            column["start_phase"]
-            + start / rate * float(speed["pinion"][record]) * n_teeth["pinion"]
-        )
-        known[key] = {
-            gear: _of_gear(
-                signal,
-                rate,
-                float(speed[gear][record]),
-                n_teeth[gear],
-                column[f"start_tooth_{gear}"] + passed,
-            )
-            for gear in GEARS
-        }
+        rate, signal = float(task.dataset.sampling_rate), read_signal(task, *key[1:])
+        passages = start / rate * float(speed["pinion"][record]) * n_teeth["pinion"]
+        passed = column["start_phase"] + passages
+        known[key] = {}
+        for gear in GEARS:
+            first = column[f"start_tooth_{gear}"] + passed
+            rotation = float(speed[gear][record])
+            known[key][gear] = _of_gear(signal, rate, rotation, n_teeth[gear], first)
     return known[key]
 
 
 def _of_gear(
     signal: FloatArray, rate: float, rotation: float, n_teeth: int, start: float
 ) -> FloatArray:
-    shares = [
-        (low * PASS_SHARE * rate, high * PASS_SHARE * rate) for low, high in BANDS
-    ]
+    """Levels (channel, band, tooth) of one gear, whose tooth `start` is in mesh first."""
+    bands = [(low * PASS_SHARE * rate, high * PASS_SHARE * rate) for low, high in BANDS]
     try:
         levels = [
             tooth_levels(signal, rate, rotation, n_teeth, band=band, start=start)
-            for band in shares
+            for band in bands
         ]
     except ValueError:
         return np.full((len(signal), len(BANDS), n_teeth), np.nan)

@@ -1,4 +1,4 @@
-"""The baselines there are, by their names in ``metrics.json``, in the order of the page."""
+"""Registry of baselines by their names in ``metrics.json``, in the order of the page."""
 
 from __future__ import annotations
 

@@ -5,17 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnose.baselines.base import Baseline, MethodText, Role
 from diagnose.baselines.estimators import class_probability
 from diagnose.baselines.features import LEVEL, FeatureTable
 from diagnose.baselines.indicator_models import INDICATOR_INPUT
+from diagnose.data.windows import FloatArray
 
 if TYPE_CHECKING:
     from sklearn.tree import DecisionTreeClassifier
 
-FloatArray = NDArray[np.floating]
 LOG_RMS_OF_SILENCE = -50.0
 
 
@@ -46,12 +45,9 @@ class RmsThreshold(Baseline):
         )
         self._tree.fit(_level(train), train.label)
         nodes = self._tree.tree_
-        thresholds = sorted(
-            float(np.exp(cut)) for cut in nodes.threshold[nodes.feature >= 0]
-        )
-        return (
-            "thresholds " + ", ".join(f"{value:.3g}" for value in thresholds) + " m/s^2"
-        )
+        thresholds = np.sort(np.exp(nodes.threshold[nodes.feature >= 0]))
+        values = ", ".join(f"{value:.3g}" for value in thresholds)
+        return f"thresholds {values} m/s^2"
 
     def predict_proba(self, table: FeatureTable) -> FloatArray:
         """Shares (row, class) of the training rows in the interval of each row."""

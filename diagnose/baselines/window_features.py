@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.baselines.features import FeatureTable
-from diagnose.data.windows import WindowSet
+from diagnose.data.windows import FloatArray, WindowSet
 
-FloatArray = NDArray[np.floating]
 BLOCK = 16  # windows at once, so that they stay in the cache of a processor
 
 
@@ -30,14 +29,12 @@ def over_stretches(
     stretch, first, position = np.unique(
         windows.segment, return_index=True, return_inverse=True
     )
-    every = np.arange(len(windows))
-    total: FloatArray | None = None
-    for block in np.array_split(every, -(-every.size // BLOCK)):
+    total = np.zeros((stretch.size, 0))
+    for block in windows.blocks(BLOCK):
         values = features(windows.cut(block))
-        if total is None:
+        if not total.size:
             total = np.zeros((stretch.size, values.shape[1]))
         np.add.at(total, position[block], values)
-    assert total is not None
     return FeatureTable(
         values=total / np.bincount(position)[:, None],
         names=tuple(f"{name}_{index}" for index in range(total.shape[1])),

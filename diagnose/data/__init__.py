@@ -11,7 +11,7 @@ __all__ = ["StreamingDataset", "VibrationDataset"]
 
 
 def __getattr__(name: str) -> Any:
-    """The data sets for torch, which is imported when one of them is asked for."""
+    """The data sets for torch, which is imported on their first use."""
     if name in __all__:
         from diagnose.data import torch_sets
 

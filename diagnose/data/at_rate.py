@@ -1,6 +1,6 @@
-"""A data set as one that was recorded slower.
+"""Data sets read at a lower sampling rate.
 
-Training at 5, 12.8 or 25.6 kHz on data of 51.2 kHz.
+They serve for training at 5, 12.8 or 25.6 kHz on data of 51.2 kHz.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ EXACT = 1e-9  # relative
 
 
 def at_rate(dataset: Dataset, sampling_rate: float | None) -> Dataset:
-    """The data set, its accelerations low-passed and decimated whenever they are read.
+    """The data set with accelerations that are low-passed and decimated when they are read.
 
     Parameters
     ----------
@@ -29,33 +29,35 @@ def at_rate(dataset: Dataset, sampling_rate: float | None) -> Dataset:
 
     Returns
     -------
-    what reads like a data set: ``sampling_rate``, ``n_samples`` and ``signals`` are those of the lower rate, all else
-    is the data set's. Other traces and ``attributes`` keep their rate
+    object with the interface of a data set: ``sampling_rate``, ``n_samples`` and ``signals``
+    are those of the lower rate, all else is the data set's. Other traces and ``attributes``
+    keep their rate
 
     Raises
     ------
-    ConfigError    for a rate above that of the data set, or one that is no ratio of small numbers away from it
+    ConfigError    for a rate above that of the data set, or one whose ratio to it is not of
+        small whole numbers
 
     Notes
     -----
-    The low-pass is that of the simulated recorder, so that the samples are those of a set made at the lower rate. A
-    sample needs what lies up to 30 samples around it: in a split that cuts records (the leaky one) that much crosses
-    the cut.
+    The low-pass is that of the simulated recorder, so that the samples are those of a set made
+    at the lower rate. A sample depends on up to 30 samples on either side of it. In a split that
+    cuts records (the leaky one) these lie beyond the cut.
     """
-    found = float(dataset.sampling_rate)
-    if sampling_rate is None or abs(sampling_rate / found - 1) < EXACT:
+    stored = float(dataset.sampling_rate)
+    if sampling_rate is None or abs(sampling_rate / stored - 1) < EXACT:
         return dataset
-    if sampling_rate > found:
+    if sampling_rate > stored:
         raise ConfigError(
-            f"sampling_rate_hz={sampling_rate:g} is above the {found:g} samples a second of {dataset.folder}; "
-            "give a lower one or null"
+            f"sampling_rate_hz={sampling_rate:g} is above the {stored:g} samples a second "
+            f"of {dataset.folder}; give a lower one or null"
         )
-    change = rate_change(found, sampling_rate)
-    if abs(found * change.up / change.down / sampling_rate - 1) > EXACT:
-        near = found * change.up / change.down
+    change = rate_change(stored, sampling_rate)
+    nearest = stored * change.up / change.down
+    if abs(nearest / sampling_rate - 1) > EXACT:
         raise ConfigError(
-            f"sampling_rate_hz={sampling_rate:g} is no ratio of small whole numbers away from {found:g}; "
-            f"the nearest that is: {near:.9g}"
+            f"sampling_rate_hz={sampling_rate:g} is no ratio of small whole numbers "
+            f"away from {stored:g}; the nearest that is: {nearest:.9g}"
         )
     if change.n_samples(int(dataset.n_samples)) < 1:
         raise ConfigError(
@@ -65,10 +67,10 @@ def at_rate(dataset: Dataset, sampling_rate: float | None) -> Dataset:
 
 
 def at_rate_of(dataset: Dataset, other: Dataset) -> Dataset:
-    """A data set read at a lower rate where the other one is; else as it is."""
-    return (
-        at_rate(dataset, other.sampling_rate) if isinstance(other, _Slower) else dataset
-    )
+    """A data set read at the rate of another one, if that one is read at a lower rate."""
+    if isinstance(other, _Slower):
+        return at_rate(dataset, other.sampling_rate)
+    return dataset
 
 
 class _Slower:
@@ -93,8 +95,9 @@ class _Slower:
         channels: Sequence[int | str] | None = None,
         **which: Any,
     ) -> np.ndarray:
-        """Acceleration of one record, (channel, sample) float32 in m/s^2, start and stop counted
-        at this rate.
+        """Acceleration of one record, (channel, sample) float32 in m/s^2.
+
+        `start` and `stop` count samples of this rate.
         """
 
         def read(first: int, last: int) -> np.ndarray:
@@ -102,8 +105,8 @@ class _Slower:
                 self._dataset.signals(record_index, first, last, channels, **which)
             )
 
-        last = self.n_samples if stop is None else stop
-        part = self._change.apply_to_part(
-            read, int(self._dataset.n_samples), start, last
-        )
+        if stop is None:
+            stop = self.n_samples
+        n_stored = int(self._dataset.n_samples)
+        part = self._change.apply_to_part(read, n_stored, start, stop)
         return part.astype(np.float32)

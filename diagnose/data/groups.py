@@ -1,7 +1,4 @@
-"""Records in a few groups by a value.
-
-What every curve over a condition or a severity is drawn from.
-"""
+"""Groups of records by a value, for curves over a condition or a severity."""
 
 from __future__ import annotations
 
@@ -33,43 +30,33 @@ class Group:
         """The group in words."""
         if self.name is not None:
             return self.name
-        return (
-            f"{self.low:.4g}"
-            if self.low == self.high
-            else f"{self.low:.4g} to {self.high:.4g}"
-        )
+        if self.low == self.high:
+            return f"{self.low:.4g}"
+        return f"{self.low:.4g} to {self.high:.4g}"
 
 
 def groups_of(values: NDArray[Any], *, most: int) -> list[Group]:
-    """Groups of numbers with about as many records each, equal values together; of names, one
-    group a name.
+    """Groups of numbers with about as many records each, or one group for each name.
+
+    Equal values are in one group.
 
     Parameters
     ----------
     values : (record,) numbers or names
-    most : number of groups; fewer where values are equal. Names are not brought together
+    most : number of groups; fewer where values are equal. Names are not merged
     """
     if values.dtype.kind in "US":
         return [
             Group(member=values == name, low=None, high=None, name=str(name))
             for name in np.unique(values)
         ]
-    different = np.unique(values)
-    if different.size <= most:
-        place = np.searchsorted(different, values)
-    else:
+    edges = np.unique(values)
+    if edges.size > most:
         edges = np.unique(np.quantile(values, np.linspace(0, 1, most + 1)[1:-1]))
-        place = np.searchsorted(edges, values, side="left")
+    position = np.searchsorted(edges, values)
     groups = []
-    for index in np.unique(place):
-        member = place == index
-        inside = values[member]
-        groups.append(
-            Group(
-                member=member,
-                low=float(inside.min()),
-                high=float(inside.max()),
-                name=None,
-            )
-        )
+    for index in np.unique(position):
+        member = position == index
+        low, high = float(values[member].min()), float(values[member].max())
+        groups.append(Group(member=member, low=low, high=high, name=None))
     return groups

@@ -22,7 +22,7 @@ class RecordedSignal:
     ----------
     signal : (channel, sample) m/s^2
     sampling_rate : Hz
-    speed_rpm : of the driving shaft; None where nobody knows it
+    speed_rpm : of the driving shaft; None if it is not known
     file : name of the recording, for messages
     window_samples, stride_samples, normalise : as in `diagnose.data.windows.Task`
     """
@@ -58,11 +58,11 @@ class NetworkInput(ABC):
         model_config: Section,
         attributes: Mapping[str, Any],
     ) -> Section:
-        """Configuration of a network with what its input takes of a data set's attributes.
+        """Configuration of a network with the values that its input takes of a data set.
 
         Raises
         ------
-        ConfigError    if the data set does not say it
+        ConfigError    if the data set lacks one of them
         """
 
     @classmethod
@@ -96,7 +96,7 @@ class NetworkInput(ABC):
 
         Parameters
         ----------
-        training : whether a kind may add inputs that only a training profits from
+        training : True if inputs may be added that only a training profits from
         read : signal of a stretch
         """
 
@@ -111,4 +111,4 @@ class NetworkInput(ABC):
 
     @abstractmethod
     def seconds(self, *, window: float, recording: float) -> float:
-        """Seconds that one input is about, of a window's and a whole recording's."""
+        """Duration of one input, given those of a window and of a whole recording, in s."""

@@ -1,10 +1,8 @@
-"""Records as snapshots of machines that run to failure.
-
-Whose life, how old, how long it still runs.
-"""
+"""Lives of machines that run to failure, whose snapshots the records of a data set are."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,24 +11,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.protocols import OPEN_PROTOCOLS, choose_protocols
-from diagnose.data.windows import CROSS_SENSOR, SUBSETS, Segments, Task, subset_segments
+from diagnose.data.windows import (
+    CROSS_SENSOR,
+    SUBSETS,
+    FloatArray,
+    IntArray,
+    Segments,
+    Task,
+    subset_segments,
+)
 from gensig.errors import ConfigError, DatasetError
 
-FloatArray = NDArray[np.floating]
-IntArray = NDArray[np.integer]
 COLUMNS = ("life_id", "life_time_h", "remaining_life_h", "life_failed")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lives:
-    """What a data set says of the lives that its records belong to.
+    """Age and remaining life of the records of a data set.
 
     Attributes
     ----------
-    name : (record,) text, "" for a record that is no snapshot of a life, or that failed in simulation
+    name : (record,) name of the life; "" for a record that is no snapshot of one, or that
+        failed in simulation
     age : (record,) h of operation when it was taken
-    remaining : (record,) h from then to the failure; of a life that did not fail, to the end of its history
-    failed : (record,) bool whether its life ended in failure; where not, it is censored and `remaining` a lower bound
+    remaining : (record,) h from then to the failure, or to the end of the history of a life that
+        did not fail
+    failed : (record,) bool, True if the life ended in failure. Else the life is censored, and
+        `remaining` is a lower bound
     """
 
     name: NDArray[Any]
@@ -39,9 +46,9 @@ class Lives:
     failed: NDArray[np.bool_]
 
     def known(self, early_life: float) -> NDArray[np.bool_]:
-        """(record,) whether the remaining life, cut at ``early_life`` h, is known.
+        """(record,) True if the remaining life, cut at ``early_life`` h, is known.
 
-        A bound above the cut says it.
+        A lower bound above the cut is enough.
         """
         return (self.name != "") & (self.failed | (self.remaining >= early_life))
 
@@ -51,13 +58,15 @@ def lives_of(task: Task) -> Lives:
 
     Raises
     ------
-    DatasetError    for a data set whose records are no snapshots of lives, or whose columns contradict each other
+    DatasetError    for a data set whose records are no snapshots of lives, or whose columns
+        contradict each other
     """
     dataset = task.dataset
     if missing := [name for name in COLUMNS if name not in dataset.column_names]:
         raise DatasetError(
-            f"{dataset.folder} has no column {missing[0]}: its records are no snapshots of lives, which "
-            "task=remaining_life needs; make one with gensig generate experiment=run_to_failure"
+            f"{dataset.folder} has no column {missing[0]}: its records are no snapshots of "
+            "lives, which task=remaining_life needs; make one with "
+            "gensig generate experiment=run_to_failure"
         )
     name, age, remaining, failed = (
         np.asarray(dataset.column(column)) for column in COLUMNS
@@ -72,13 +81,15 @@ def lives_of(task: Task) -> Lives:
         )
     if (wrong := np.flatnonzero(used & ((age < 0) | (remaining < 0)))).size:
         raise DatasetError(
-            f"{dataset.folder}, record {dataset.column('record_id')[wrong[0]]}: life_time_h {age[wrong[0]]:g} and "
-            f"remaining_life_h {remaining[wrong[0]]:g} must not be below 0"
+            f"{dataset.folder}, record {dataset.column('record_id')[wrong[0]]}: "
+            f"life_time_h {age[wrong[0]]:g} and remaining_life_h {remaining[wrong[0]]:g} "
+            "must not be below 0"
         )
     for life in np.unique(name[used]):
         if np.unique(failed[used & (name == life)]).size > 1:
             raise DatasetError(
-                f"{dataset.folder}: life {life} has failed in some of its records and not in others",
+                f"{dataset.folder}: life {life} has failed in some of its records "
+                "and not in others"
             )
     return Lives(
         name=np.where(used, name, ""), age=age, remaining=remaining, failed=failed == 1
@@ -92,22 +103,18 @@ def life_segments(task: Task, lives: Lives, protocol: str, subset: str) -> Segme
     ------
     ConfigError    for a subset without any
     """
-    found = kept_segments(subset_segments(task, protocol, subset), lives.name != "")
-    if not found.record.size:
+    segments = kept_segments(subset_segments(task, protocol, subset), lives.name != "")
+    if not segments.record.size:
         raise ConfigError(
-            f"protocol {protocol}: its {subset} part has no snapshot of a life; leave the protocol out",
+            f"protocol {protocol}: its {subset} part has no snapshot of a life; "
+            "leave the protocol out"
         )
-    return found
+    return segments
 
 
 def kept_segments(segments: Segments, kept: NDArray[np.bool_]) -> Segments:
     """Stretches of the records that are kept, (record,) of the data set."""
-    chosen = kept[segments.record]
-    return Segments(
-        record=segments.record[chosen],
-        start=segments.start[chosen],
-        stop=segments.stop[chosen],
-    )
+    return segments.of(kept[segments.record])
 
 
 def choose_life_protocols(
@@ -115,8 +122,7 @@ def choose_life_protocols(
     lives: Lives,
     wanted: Sequence[str] | None,
 ) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Protocols that keep every life whole on one side, and of the others wanted, why they are
-    left out.
+    """Protocols that keep every life in one subset, and why the others are left out.
 
     Raises
     ------
@@ -129,7 +135,7 @@ def choose_life_protocols(
         if reason is None:
             kept.append(protocol)
         else:
-            left_out = {**left_out, protocol: reason}
+            left_out[protocol] = reason
     if not kept:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in left_out.items())
         raise ConfigError(
@@ -145,27 +151,25 @@ def _why_not(task: Task, lives: Lives, protocol: str) -> str | None:
         subset: life_segments(task, lives, protocol, subset).record
         for subset in SUBSETS
     }
-    names = {
-        subset: set(lives.name[record].tolist()) for subset, record in records.items()
-    }
-    for one, other in (
-        ("train", "validation"),
-        ("train", "test"),
-        ("validation", "test"),
-    ):
-        if both := sorted(names[one] & names[other]):
-            return f"life {both[0]} is in its {one} and its {other} part"
+    for first, second in itertools.combinations(SUBSETS, 2):
+        both = np.intersect1d(lives.name[records[first]], lives.name[records[second]])
+        if both.size:
+            return f"life {both[0]} is in its {first} and its {second} part"
     for subset, record in records.items():
         if not lives.failed[record].any():
-            return f"no life of its {subset} part failed; make more lives or a longer horizon"
+            return (
+                f"no life of its {subset} part failed; "
+                "make more lives or a longer horizon"
+            )
     return None
 
 
 def early_level(
     lives: Lives, record: IntArray, *, level_h: float | None, share: float
 ) -> float:
-    """Level in h at which the remaining life is cut: long before its failure a machine shows
-    nothing of it.
+    """Level in h at which the remaining life is cut.
+
+    Long before its failure a machine shows no sign of it.
 
     Parameters
     ----------
@@ -194,9 +198,10 @@ def early_level(
 
 
 def balanced_weights(name: NDArray[Any]) -> FloatArray:
-    """(record,) weights of mean 1 by which every life counts the same, from (record,) names of
-    lives.
+    """(record,) weights of mean 1 that sum to the same for every life.
+
+    `name` (record,) is the life of each record.
     """
-    _, place, counts = np.unique(name, return_inverse=True, return_counts=True)
-    weight = 1.0 / counts[place]
+    _, position, counts = np.unique(name, return_inverse=True, return_counts=True)
+    weight = 1.0 / counts[position]
     return np.asarray(weight / weight.mean())

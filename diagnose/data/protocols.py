@@ -1,9 +1,8 @@
-"""Which protocols of a data set a study runs, why others are left out, and what a score on each
-says.
-"""
+"""Protocols of a data set that a study runs, and the meaning of a score on each."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -25,7 +24,8 @@ MEANING = {
     "cross_torque": "on machines never seen, at torques above all of training",
     CROSS_SENSOR: "on machines never seen, with sensors never trained on",
     "cross_snr": "on machines never seen, in more noise than all of training",
-    "unseen_severity_inner": "on machines never seen, with severities in a gap in the middle of those of training; "
+    "unseen_severity_inner": "on machines never seen, "
+    "with severities in a gap in the middle of those of training; "
     "healthy records and faults of one severity as in by_unit",
     "unseen_severity_outer": "on machines never seen, with severities above all of training; "
     "healthy records and faults of one severity as in by_unit",
@@ -35,12 +35,13 @@ MEANING = {
 def choose_protocols(
     task: Task, wanted: Sequence[str] | None
 ) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Protocols to run, and of those wanted that cannot be run, why.
+    """Protocols to run, and the reason for each wanted one that cannot be run.
 
     Parameters
     ----------
     task : of an open data set
-    wanted : names, or None for every protocol that the set has, `OPEN_PROTOCOLS` and `CROSS_SENSOR` too
+    wanted : names, or None for every protocol that the set has, with `OPEN_PROTOCOLS` and
+        `CROSS_SENSOR`
 
     Raises
     ------
@@ -55,19 +56,18 @@ def choose_protocols(
     if wanted is None:
         wanted = offered
     check_names("protocol", wanted, [*offered, *left_out])
-    left_out |= {
-        name: why
-        for name in wanted
-        if name in offered and (why := _why_no_window(task, name))
-    }
+    for name in wanted:
+        if name in offered and (reason := _why_no_window(task, name)):
+            left_out[name] = reason
     absent = {name: left_out[name] for name in wanted if name in left_out}
-    found = tuple(name for name in wanted if name not in absent)
-    if not found:
+    chosen = tuple(name for name in wanted if name not in absent)
+    if not chosen:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in absent.items())
         raise ConfigError(
-            f"{dataset.folder} has none of the protocols to train on ({reasons or 'it has no splits'})"
+            f"{dataset.folder} has none of the protocols to train on "
+            f"({reasons or 'it has no splits'})"
         )
-    return found, absent
+    return chosen, absent
 
 
 def channels_to_cross(
@@ -75,27 +75,29 @@ def channels_to_cross(
     channels: Sequence[str] | None,
     test_channels: Sequence[str] | None,
 ) -> tuple[tuple[str, ...], tuple[str, ...]] | str:
-    """Channels that `CROSS_SENSOR` trains and tests on, the same number, or in one line why there
-    are none.
+    """Channels that `CROSS_SENSOR` trains and tests on, or in one line why there are none.
 
-    Without a word of the user the first half of the channels is trained on and as many of the
-    second half are tested on: data sets list the sensors of one place side by side, so that a
-    pair of directions stays a pair. With `channels` alone those are tested on that come first
-    among the others.
+    Both are as many. By default the first half of the channels is trained on and as many of the
+    second half are tested on. Data sets list the sensors of one position in a row, so that both
+    directions of a position are in the same half. With `channels` alone, the first of the other
+    channels are tested on.
 
     Raises
     ------
     ConfigError    for test channels that do not exist, are trained on, or are not as many
     """
     if test_channels is None:
-        n = len(available) // 2 if channels is None else len(channels)
-        trained = tuple(available[:n] if channels is None else channels)
-        others = [name for name in available if name not in trained]
-        if n == 0:
+        if channels is None:
+            channels = available[: len(available) // 2]
+        others = [name for name in available if name not in channels]
+        if not channels:
             return f"the data set has {len(available)} channel, and 2 are needed"
-        if len(others) < n:
-            return f"{len(others)} channel(s) are left beside channels={','.join(trained)}; name fewer"
-        return trained, tuple(others[:n])
+        if len(others) < len(channels):
+            return (
+                f"{len(others)} channel(s) are left beside channels={','.join(channels)}; "
+                "name fewer"
+            )
+        return tuple(channels), tuple(others[: len(channels)])
     if channels is None or len(channels) != len(test_channels):
         raise ConfigError(
             "test_channels needs channels beside it, the same number of them"
@@ -109,17 +111,11 @@ def channels_to_cross(
 
 
 def _why_no_window(task: Task, name: str) -> str | None:
-    """Why a protocol that cuts records has no place for a window."""
+    """Reason why the stretches of a protocol that cuts records hold no window."""
     if name == CROSS_SENSOR:
         return None  # whole records
-    longest = max(
-        (
-            stop - start
-            for rows in task.dataset.split(name).values()
-            for _, start, stop in rows
-        ),
-        default=1.0,
-    )
+    stretches = itertools.chain(*task.dataset.split(name).values())
+    longest = max((stop - start for _, start, stop in stretches), default=1.0)
     held = int(longest * n_samples(task.dataset) + 1e-6)
     if longest == 1.0 or held >= task.window_samples:
         return None

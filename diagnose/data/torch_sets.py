@@ -1,7 +1,4 @@
-"""Data sets for torch.
-
-One window at a time, from files or from records made meanwhile, for loops of your own.
-"""
+"""Data sets for torch: windows of stored records, or of records simulated during training."""
 
 from __future__ import annotations
 
@@ -29,10 +26,13 @@ if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
 
 
-class VibrationDataset(torch.utils.data.Dataset[tuple[torch.Tensor, int]]):
-    """Windows of one subset of a split, read when asked for; safe in forked and spawned workers.
+Item = tuple[torch.Tensor, int]
 
-    Windows are cut after the split: each lies inside the stretch that the split gives to its
+
+class VibrationDataset(torch.utils.data.Dataset[Item]):
+    """Windows of one subset of a split, read on demand; safe in forked and spawned workers.
+
+    Windows are cut after the split. Each lies inside the stretch that the split gives to its
     subset.
 
     Parameters
@@ -50,8 +50,8 @@ class VibrationDataset(torch.utils.data.Dataset[tuple[torch.Tensor, int]]):
 
     Notes
     -----
-    An item is ``(window, label)``: (channel, sample) float32 and an index into ``class_names``. ``record`` gives the
-    record of every window, so that predictions can be averaged over a record.
+    An item is ``(window, label)``: (channel, sample) float32 and an index into ``class_names``.
+    ``record`` (window,) is the record of every window, for averages of predictions over records.
     """
 
     def __init__(
@@ -83,38 +83,30 @@ class VibrationDataset(torch.utils.data.Dataset[tuple[torch.Tensor, int]]):
     def __len__(self) -> int:
         return int(self.record.size)
 
-    def __getitem__(self, index: int) -> tuple[torch.Tensor, int]:
-        start = int(self.start[index])
-        signal = read_signal(
-            self._task,
-            int(self.record[index]),
-            start,
-            start + self._task.window_samples,
-        )
-        return torch.from_numpy(normalised(signal, self._task.normalise)), int(
-            self.label[index]
-        )
-
-
-Item = tuple[torch.Tensor, int]
+    def __getitem__(self, index: int) -> Item:
+        task, start = self._task, int(self.start[index])
+        stop = start + task.window_samples
+        signal = read_signal(task, int(self.record[index]), start, stop)
+        window = torch.from_numpy(normalised(signal, task.normalise))
+        return window, int(self.label[index])
 
 
 class StreamingDataset(torch.utils.data.IterableDataset[Item]):
-    """Windows of records that are made while the network trains, nothing stored; safe in forked
-    and spawned workers.
+    """Windows of records that are simulated during training; safe in forked and spawned workers.
 
-    The workers of a loader share the records out, each record to one of them; for several
-    machines give each its ``stream.shard(rank, n_machines)``. Without ``shuffle_buffer`` and
-    workers, the items are those of `VibrationDataset` on the stored data set, in the same order
-    and with the same bits.
+    Nothing is stored. Each record goes to one of the workers of a loader. On several computers,
+    give each its ``stream.shard(rank, n_machines)``. Without ``shuffle_buffer`` and workers, the
+    items are those of `VibrationDataset` on the stored data set, in the same order and with the
+    same bits.
 
     Parameters
     ----------
     stream : as made by ``gensig.stream``, or a part of it
-    protocol, subset : as for `VibrationDataset`; all records where both are None
+    protocol, subset : as for `VibrationDataset`; all records if both are None
     window_samples, stride_samples, channels, classes, normalise : as for `VibrationDataset`
-    n_epochs : epochs in one pass, each with draws of its own, units included; None never ends
-    shuffle_buffer : windows that every worker holds back and draws from at random; 0 keeps the plan's order
+    n_epochs : epochs in one pass, each with other random draws, of units too; None never ends
+    shuffle_buffer : windows that every worker holds back and draws from at random; 0 keeps the
+        plan's order
 
     Raises
     ------
@@ -122,9 +114,10 @@ class StreamingDataset(torch.utils.data.IterableDataset[Item]):
 
     Notes
     -----
-    A pass begins at the epoch of ``set_epoch``, else at that of the stream: without ``set_epoch`` every pass is the
-    same. Which windows come depends on nothing else, their order only on the number of workers. Records that failed
-    are left out. ``n_windows`` is what an epoch holds if none fails.
+    A pass begins at the epoch of ``set_epoch``, else at that of the stream: without
+    ``set_epoch`` every pass is the same. The set of windows depends on nothing else, and their
+    order only on the number of workers. Records that failed are left out. ``n_windows`` is the
+    number of windows of an epoch in which no record fails.
     """
 
     def __init__(
@@ -159,7 +152,7 @@ class StreamingDataset(torch.utils.data.IterableDataset[Item]):
         task, windows = self._plan(stream)
         self.class_names = task.class_names
         self.n_windows = sum(len(starts) for starts in windows.values())
-        # shared, so that workers that stay alive between passes see what set_epoch says
+        # shared memory, so that workers that stay alive between passes see a new epoch
         self._epoch = torch.tensor(stream.epoch).share_memory_()
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -179,40 +172,37 @@ class StreamingDataset(torch.utils.data.IterableDataset[Item]):
 
     def __iter__(self) -> Iterator[Item]:
         worker = torch.utils.data.get_worker_info()
-        place, n_workers = (0, 1) if worker is None else (worker.id, worker.num_workers)
+        index, n_workers = 0, 1
+        if worker is not None:
+            index, n_workers = worker.id, worker.num_workers
         epoch = self.epoch
-        items = self._items(epoch, place, n_workers)
+        items = self._items(epoch, index, n_workers)
         if self.shuffle_buffer:
-            rng = np.random.default_rng([self._stream.seed, epoch, place])
+            rng = np.random.default_rng([self._stream.seed, epoch, index])
             items = _shuffled(items, self.shuffle_buffer, rng)
         return items
 
-    def _items(self, first_epoch: int, place: int, n_workers: int) -> Iterator[Item]:
+    def _items(self, first_epoch: int, worker: int, n_workers: int) -> Iterator[Item]:
         """The items of one worker in the plan's order."""
         for epoch in itertools.count(first_epoch):
             if self.n_epochs is not None and epoch == first_epoch + self.n_epochs:
                 return
             stream = self._stream.at_epoch(epoch)
             task, windows = self._plan(stream)
-            mine = stream.take(sorted(windows)).shard(place, n_workers)
-            if self.n_epochs is None and not len(mine):
-                return  # fewer conditions than workers: nothing will ever come
-            record_of = dict(
-                zip(
-                    stream.column("record_id").tolist(), range(len(stream)), strict=True
-                )
-            )
+            part = stream.take(sorted(windows)).shard(worker, n_workers)
+            if self.n_epochs is None and not len(part):
+                return  # fewer conditions than workers: no record will ever come
+            record_ids = stream.column("record_id").tolist()
+            index_of = {name: index for index, name in enumerate(record_ids)}
             labels = task.labels()
-            for record in mine:
+            for record in part:
                 if record.values["status"] == "ok":
-                    index = record_of[record.values["record_id"]]
+                    index = index_of[record.values["record_id"]]
                     for window in _cut(task, record, windows[index]):
                         yield window, int(labels[index])
 
     def _plan(self, stream: Any) -> tuple[Task, dict[int, IntArray]]:
-        """The task of one epoch, and the first samples of the windows of each record that has
-        any.
-        """
+        """Task of one epoch; record -> first samples of its windows, without empty ones."""
         task = task_of(stream, **self._options)
         protocol, subset = self._part
         if protocol is None or subset is None:
@@ -222,11 +212,11 @@ class StreamingDataset(torch.utils.data.IterableDataset[Item]):
         segment, start = plan_windows(
             segments, task.window_samples, task.stride_samples
         )
-        order = np.argsort(segments.record[segment], kind="stable")
-        records, first = np.unique(segments.record[segment][order], return_index=True)
-        return task, dict(
-            zip(records.tolist(), np.split(start[order], first[1:]), strict=True)
-        )
+        record = segments.record[segment]
+        order = np.argsort(record, kind="stable")
+        records, first = np.unique(record[order], return_index=True)
+        starts = np.split(start[order], first[1:])
+        return task, dict(zip(records.tolist(), starts, strict=True))
 
 
 def _whole_records(task: Task) -> Segments:
@@ -234,7 +224,8 @@ def _whole_records(task: Task) -> Segments:
     record = np.flatnonzero(task.labels() >= 0)
     if record.size == 0:
         raise ConfigError(
-            f"the stream has no record of {', '.join(task.class_names)}; give a larger part of it"
+            f"the stream has no record of {', '.join(task.class_names)}; "
+            "give a larger part of it"
         )
     return Segments(
         record=record,
@@ -251,7 +242,8 @@ def _cut(task: Task, record: Any, starts: IntArray) -> Iterator[torch.Tensor]:
     signal = record.signals["acceleration"][task.channels]
     if not np.isfinite(signal).all():
         raise DatasetError(
-            f"record {record.values['record_id']}: its signal holds values that are not finite"
+            f"record {record.values['record_id']}: "
+            "its signal holds values that are not finite"
         )
     for start in starts:
         window = np.ascontiguousarray(signal[:, start : start + task.window_samples])
@@ -261,13 +253,13 @@ def _cut(task: Task, record: Any, starts: IntArray) -> Iterator[torch.Tensor]:
 def _shuffled(
     items: Iterable[Item], n_held: int, rng: np.random.Generator
 ) -> Iterator[Item]:
-    """The same items, each drawn at random from those held back, ``n_held`` of them."""
+    """The same items, each drawn at random from ``n_held`` that are held back."""
     held: list[Item] = []
     for item in items:
         if len(held) < n_held:
             held.append(item)
             continue
-        place = int(rng.integers(n_held))
-        yield held[place]
-        held[place] = item
-    yield from (held[place] for place in rng.permutation(len(held)))
+        drawn = int(rng.integers(n_held))
+        yield held[drawn]
+        held[drawn] = item
+    yield from (held[index] for index in rng.permutation(len(held)))

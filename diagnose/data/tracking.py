@@ -1,15 +1,12 @@
-"""Order tracking.
-
-A recording as the machine would have made it at one speed, by a tachometer or by the mesh.
-"""
+"""Order tracking: a recording as it would be at constant speed, by tachometer or by mesh."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from diagnose.data.windows import FloatArray
 from gensig.errors import ConfigError
 from gensig.signals.mesh_motion import Teeth
 from gensig.signals.recording import Recording
@@ -17,8 +14,6 @@ from gensig.signals.resampling import PASS_SHARE, rate_change
 from gensig.signals.rotation import resample_by_angle
 from gensig.signals.speed_ridge import wandering_mesh_cycles
 from gensig.signals.tacho import pulse_times, resample_by_pulses, speed_of_pulses
-
-FloatArray = NDArray[np.floating]
 
 FINER = 2  # upsampling before the interpolation to angle, whose error grows towards half the rate
 MOST_JUMP = 1.5  # from one interval between pulses to the next; a lost or false pulse makes it 2
@@ -47,12 +42,11 @@ class Tracked:
 def track_by_tacho(
     recording: Recording, tacho: FloatArray, name: str, *, pulses_per_turn: int
 ) -> Tracked:
-    """Follow the pulses of a tachometer on the driving shaft; what lies before the first and
-    after the last is lost.
+    """Track the pulses of a tachometer on the driving shaft, from the first to the last pulse.
 
     Parameters
     ----------
-    tacho : (sample,)    as recorded beside the accelerations
+    tacho : (sample,)    as recorded with the accelerations
     name : of the tachometer's channel
 
     Raises
@@ -61,22 +55,22 @@ def track_by_tacho(
     """
     rate = recording.sampling_rate
     if not np.all(np.isfinite(tacho)):
-        raise ConfigError(
-            f"--tacho {name}: sample {int(np.argmin(np.isfinite(tacho)))} is no finite number"
-        )
+        wrong = int(np.argmin(np.isfinite(tacho)))
+        raise ConfigError(f"--tacho {name}: sample {wrong} is no finite number")
     times = pulse_times(tacho, rate)
     if len(times) < 2 * pulses_per_turn + 1:
         raise ConfigError(
-            f"--tacho {name}: {len(times)} pulses at {pulses_per_turn} a turn span no two turns; check channel and "
-            "--pulses-per-turn, or leave --tacho out"
+            f"--tacho {name}: {len(times)} pulses at {pulses_per_turn} a turn "
+            "span no two turns; check channel and --pulses-per-turn, or leave --tacho out"
         )
     between = np.diff(times)
     jump = np.maximum(between[1:] / between[:-1], between[:-1] / between[1:])
     if jump.max() > MOST_JUMP:
         instant = times[1 + int(jump.argmax())]
         raise ConfigError(
-            f"--tacho {name}: at {instant:.4g} s the time between pulses jumps by {jump.max():.3g}, "
-            "a pulse too few or too many; mend the channel, or leave --tacho out"
+            f"--tacho {name}: at {instant:.4g} s the time between pulses "
+            f"jumps by {jump.max():.3g}, a pulse too few or too many; "
+            "mend the channel, or leave --tacho out"
         )
     turns = resample_by_pulses(
         _finer(recording), FINER * rate, times, pulses_per_turn=pulses_per_turn
@@ -88,8 +82,9 @@ def track_by_tacho(
 
 
 def track_by_mesh(recording: Recording, teeth: Teeth, speed_rpm: float) -> Tracked:
-    """Follow the harmonics of the mesh of a speed that stays within 3 % of the stated one and
-    changes in many turns.
+    """Track the harmonics of the mesh.
+
+    The speed must stay within 3 % of the stated one and change slowly, over many turns.
 
     Raises
     ------
@@ -105,30 +100,25 @@ def track_by_mesh(recording: Recording, teeth: Teeth, speed_rpm: float) -> Track
         longer="record longer, or give --as-recorded",
     )
     turned = cycles / teeth.driving
-    fine = np.interp(
-        np.arange(FINER * (turned.size - 1) + 1) / FINER, np.arange(turned.size), turned
-    )
+    sample = np.arange(turned.size)
+    fine_sample = np.arange(FINER * (turned.size - 1) + 1) / FINER
+    fine = np.interp(fine_sample, sample, turned)
     turns = resample_by_angle(_finer(recording)[:, : fine.size], 2.0 * np.pi * fine)
-    passed = np.interp(
-        np.arange(turns.shape[-2] + 1), turned, np.arange(turned.size) / rate
-    )
-    return _tracked(
-        "mesh",
-        turns,
-        float(60.0 * turned[-1] / (turned.size - 1) * rate),
-        60.0 / np.diff(passed),
-    )
+    passed = np.interp(np.arange(turns.shape[-2] + 1), turned, sample / rate)
+    mean = 60.0 * turned[-1] / (turned.size - 1) * rate
+    return _tracked("mesh", turns, float(mean), 60.0 / np.diff(passed))
 
 
 def at_constant_speed(
     tracked: Tracked, sampling_rate: float, speed_rpm: float
 ) -> FloatArray:
-    """What the machine would have given at one speed, if nothing but the gears' orders were in it.
+    """Signal that the machine would give at constant speed, if it held the gears' orders alone.
 
     Parameters
     ----------
     sampling_rate : Hz     of the signal made
-    speed_rpm : r/min      that it is played at; all frequencies move by its ratio to the true one, resonances too
+    speed_rpm : r/min      constant speed of the result; all frequencies are scaled by its ratio
+        to the true one, those of resonances too
 
     Returns
     -------

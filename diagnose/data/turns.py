@@ -10,8 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.inputs import NetworkInput, RecordedSignal
-from diagnose.data.targets import fault_places, record_targets
-from diagnose.data.windows import Read, Segments, Task, WindowSet, read_signal
+from diagnose.data.targets import fault_positions, record_targets
+from diagnose.data.windows import (
+    FloatArray,
+    Read,
+    Segments,
+    Task,
+    WindowSet,
+    read_signal,
+)
 from gensig.errors import ConfigError, DatasetError
 from gensig.options.configuration import Section
 from gensig.signals.separation import separate_gears
@@ -35,7 +42,8 @@ class Turns(NetworkInput):
 
     has_window_length: ClassVar[bool] = False
     why_not_exported: ClassVar[str | None] = (
-        "this model looks at turns, which are made before the network: export one that reads windows"
+        "this model looks at turns, which are made before the network: "
+        "export one that reads windows"
     )
 
     @classmethod
@@ -49,7 +57,8 @@ class Turns(NetworkInput):
             teeth = [int(attributes[f"n_teeth_{gear}"]) for gear in ("pinion", "wheel")]
         except KeyError as error:
             raise ConfigError(
-                f"the data set does not say {error.args[0]}, which this model needs: model=cnn",
+                f"the data set does not say {error.args[0]}, "
+                "which this model needs: model=cnn"
             ) from None
         return model_config | {N_TEETH: teeth}
 
@@ -61,16 +70,14 @@ class Turns(NetworkInput):
 
     def check(self, task: Task, segments: Segments, network: str) -> None:
         """Refuse stretches that hold no turn of the driving gear, with the shortest one."""
-        speed = np.asarray(task.dataset.column("speed_rpm"), dtype=float)[
-            segments.record
-        ]
-        turns = (
-            (segments.stop - segments.start) / task.dataset.sampling_rate * speed / 60
-        )
+        speed = _speed_rpm(task)[segments.record]
+        seconds = (segments.stop - segments.start) / task.dataset.sampling_rate
+        turns = seconds * speed / 60
         if turns.min() < 1:
             raise ConfigError(
-                f"a stretch holds {turns.min():.2g} turns of the pinion, and model {network} "
-                "needs a whole one: leave the protocol out, make longer records or choose another model"
+                f"a stretch holds {turns.min():.2g} turns of the pinion, "
+                f"and model {network} needs a whole one: leave the protocol out, "
+                "make longer records or choose another model"
             )
 
     def n_points(self, window_samples: int) -> int:
@@ -92,34 +99,33 @@ class Turns(NetworkInput):
         DatasetError    for a stretch without a whole turn
         """
         rate = task.dataset.sampling_rate
-        speed = np.asarray(task.dataset.column("speed_rpm"), dtype=float)
+        speed_rpm = _speed_rpm(task).tolist()
         turns: list[NDArray[np.float32]] = []
         records: list[int] = []
         passages: list[float] = []
-        for row in zip(segments.record, segments.start, segments.stop, strict=True):
-            record, start, stop = (int(value) for value in row)
-            signal = read(task, record, start, stop)
+        for row in segments.rows():
+            record, start, _ = row
+            signal = read(task, *row)
+            speed = speed_rpm[record]
+            passages_per_sample = speed / 60 * self.n_teeth[0] / rate
             for first, part in _parts(signal, halves=training):
                 try:
-                    packed = self.packed(part, rate, float(speed[record]))
+                    turns.append(self.packed(part, rate, speed))
                 except ValueError as error:
                     if part is signal:
                         raise DatasetError(
-                            f"record {record}: {error}; this model needs longer records",
+                            f"record {record}: {error}; this model needs longer records"
                         ) from None
                     continue  # half a stretch may be too short
-                turns.append(packed)
                 records.append(record)
-                passages_per_sample = float(speed[record]) / 60 * self.n_teeth[0] / rate
                 passages.append((start + first) * passages_per_sample)
-        record_of = np.array(records)
+        record_of, passage = np.array(records), np.array(passages)
         targets = record_targets(task.dataset, record_of)
-        targets["place"] = fault_places(
-            task.dataset, record_of, np.array(passages), self.n_teeth
+        targets["position"] = fault_positions(
+            task.dataset, record_of, passage, self.n_teeth
         )
-        windows = _turn_set(
-            tuple(turns), task.labels()[record_of], record_of, task.normalise
-        )
+        label = task.labels()[record_of]
+        windows = _turn_set(tuple(turns), label, record_of, task.normalise)
         return replace(windows, targets=targets)
 
     def of_recording(self, recording: RecordedSignal) -> WindowSet:
@@ -127,12 +133,13 @@ class Turns(NetworkInput):
 
         Raises
         ------
-        ConfigError    for a speed that nobody knows, or less than a turn
+        ConfigError    for an unknown speed, or less than a turn
         """
         file, speed_rpm = recording.file, recording.speed_rpm
         if speed_rpm is None:
             raise ConfigError(
-                f"this model looks at turns and must know the speed: say --speed-rpm of {file}",
+                "this model looks at turns and must know the speed: "
+                f"say --speed-rpm of {file}"
             )
         try:
             turns = self.packed(recording.signal, recording.sampling_rate, speed_rpm)
@@ -147,7 +154,7 @@ class Turns(NetworkInput):
 
     def packed(
         self,
-        signal: NDArray[np.floating],
+        signal: FloatArray,
         sampling_rate: float,
         speed_rpm: float,
     ) -> NDArray[np.float32]:
@@ -167,29 +174,31 @@ class Turns(NetworkInput):
         ------
         ValueError    for less than a turn of the driving gear
         """
-        found = separate_gears(
+        gears = separate_gears(
             signal,
             sampling_rate,
             speed_rpm / 60 * self.n_teeth[0],
             self.n_teeth,
             samples_per_tooth=self.samples_per_tooth,
         )
-        packed = np.concatenate([found.driving, found.driven, found.mesh], axis=-1)
+        packed = np.concatenate([gears.driving, gears.driven, gears.mesh], axis=-1)
         return packed.astype(np.float32)
+
+
+def _speed_rpm(task: Task) -> FloatArray:
+    """(record,) speed of the driving gear."""
+    return np.asarray(task.dataset.column("speed_rpm"), dtype=float)
 
 
 def _parts(
     signal: NDArray[np.float32], *, halves: bool
 ) -> list[tuple[int, NDArray[np.float32]]]:
-    """First sample and signal of the whole and, where wanted, of its two halves."""
-    if not halves:
-        return [(0, signal)]
-    middle = signal.shape[-1] // 2
-    return [
-        (0, signal),
-        (0, signal[:, :middle]),
-        (middle, signal[:, middle : 2 * middle]),
-    ]
+    """First sample and signal of the whole and, if wanted, of its two halves."""
+    parts = [(0, signal)]
+    if halves:
+        middle = signal.shape[-1] // 2
+        parts += [(0, signal[:, :middle]), (middle, signal[:, middle : 2 * middle])]
+    return parts
 
 
 def _turn_set(

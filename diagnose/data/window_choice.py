@@ -1,7 +1,4 @@
-"""How long a window is where nobody says.
-
-Long enough for the faulty tooth to pass, whatever the rate and the speed.
-"""
+"""Default length of a window: the faulty tooth passes in it at any rate and speed."""
 
 from __future__ import annotations
 
@@ -17,13 +14,12 @@ if TYPE_CHECKING:
 
 TURNS = 1.25  # of the slowest gear with faults at the slowest speed: a fault shows once a turn
 LEAST = 0.125  # s, in which gears that turn faster pass more often
-NO_FAULT = "pinion"  # whose turns count where no record tells a faulty gear
+NO_FAULT = "pinion"  # its turns count if no record names a faulty gear
 ROUNDING = 1e-6  # of a sample
 
 
 def chosen_window(dataset: Dataset) -> tuple[int, str | None]:
-    """Length of a window, in samples, that suits the records of a data set, and in one line why
-    if it is not `LEAST`.
+    """Length of a window in samples, and a line that explains it if it is not `LEAST`.
 
     It holds `TURNS` turns of the slowest gear that any record has a fault on, at the slowest
     speed of all, at least `LEAST` and at most a record.
@@ -38,43 +34,39 @@ def chosen_window(dataset: Dataset) -> tuple[int, str | None]:
     wanted = math.ceil(seconds * rate - ROUNDING)
     if wanted > n_record:
         return n_record, (
-            f"windows are whole records of {n_record / rate:.3g} s: {seconds:.3g} s would hold {TURNS:g} turns of the "
-            f"{gear} at the slowest speed"
+            f"windows are whole records of {n_record / rate:.3g} s: {seconds:.3g} s "
+            f"would hold {TURNS:g} turns of the {gear} at the slowest speed"
         )
     if seconds == LEAST:
         return wanted, None
     return wanted, (
-        f"windows of {seconds:.3g} s ({wanted} samples): {TURNS:g} turns of the {gear} at the slowest speed; "
-        "window_samples=N takes another length"
+        f"windows of {seconds:.3g} s ({wanted} samples): {TURNS:g} turns of the {gear} "
+        "at the slowest speed; window_samples=N takes another length"
     )
 
 
 def _slowest_turn(dataset: Dataset) -> tuple[str, float]:
-    """The gear that a fault passes most seldom on, and the longest time that it takes for a turn,
-    s.
-    """
+    """Gear with faults whose turn takes longest, and the longest time of its turns, s."""
     names = dataset.column_names
     if "speed_rpm" not in names:
         raise DatasetError(
-            f"{dataset.folder} does not say speed_rpm, which the length of windows follows from"
+            f"{dataset.folder} does not say speed_rpm, "
+            "which the length of windows follows from"
         )
-    speed = np.asarray(dataset.column("speed_rpm"), dtype=float)[
-        np.asarray(dataset.usable, dtype=bool)
-    ]
-    slowest = 60.0 / float(speed.min()) if speed.size and speed.min() > 0 else 0.0
-    faulty = (
-        {str(name) for name in dataset.column("fault_gear")}
-        if "fault_gear" in names
-        else set()
+    usable = np.asarray(dataset.usable, dtype=bool)
+    speed = np.asarray(dataset.column("speed_rpm"), dtype=float)[usable]
+    of_pinion = 0.0
+    if speed.size and speed.min() > 0:
+        of_pinion = 60.0 / float(speed.min())
+    faulty = set()
+    if "fault_gear" in names:
+        faulty = {str(name) for name in dataset.column("fault_gear")}
+    n_pinion, n_wheel = (
+        dataset.attributes.get(f"n_teeth_{gear}") for gear in ("pinion", "wheel")
     )
-    teeth = {
-        gear: dataset.attributes.get(f"n_teeth_{gear}") for gear in ("pinion", "wheel")
-    }
-    if "wheel" not in faulty or not (teeth["pinion"] and teeth["wheel"]):
-        return NO_FAULT, slowest
-    of_wheel = slowest * float(teeth["wheel"]) / float(teeth["pinion"])
-    return (
-        ("pinion", slowest)
-        if "pinion" in faulty and slowest > of_wheel
-        else ("wheel", of_wheel)
-    )
+    if "wheel" not in faulty or not (n_pinion and n_wheel):
+        return NO_FAULT, of_pinion
+    of_wheel = of_pinion * float(n_wheel) / float(n_pinion)
+    if "pinion" in faulty and of_pinion > of_wheel:
+        return "pinion", of_pinion
+    return "wheel", of_wheel

@@ -26,7 +26,7 @@ from gensig.options.configuration import Section
 @final
 @dataclass(frozen=True, slots=True)
 class Windows(NetworkInput):
-    """Windows of a fixed number of samples, side by side or overlapping."""
+    """Windows of a fixed number of samples, adjacent or overlapping."""
 
     has_window_length: ClassVar[bool] = True
     why_not_exported: ClassVar[str | None] = None
@@ -78,17 +78,17 @@ class Windows(NetworkInput):
                 f"{recording.file} is too short: {n_samples / rate:.3g} s, "
                 f"a window of the model is {recording.window_samples / rate:.3g} s"
             )
-        start, stop = np.array([0]), np.array([n_samples])
-        whole = Segments(record=np.array([0]), start=start, stop=stop)
-        segment, start = plan_windows(
+        zero = np.array([0])
+        whole = Segments(record=zero, start=zero, stop=np.array([n_samples]))
+        zeros, start = plan_windows(
             whole, recording.window_samples, recording.stride_samples
         )
         return WindowSet(
             signals=(recording.signal,),
-            segment=segment,
+            segment=zeros,
             start=start,
-            label=np.zeros_like(segment),
-            record=np.zeros_like(segment),
+            label=zeros,
+            record=zeros,
             window_samples=recording.window_samples,
             normalise=recording.normalise,
         )

@@ -1,5 +1,6 @@
-"""Which stretches of which records belong to a subset, and the windows cut from them, always
-after the split.
+"""Stretches of records in each subset of a split, and the windows cut from them.
+
+Windows are always cut after the split.
 """
 
 from __future__ import annotations
@@ -17,16 +18,17 @@ from gensig.errors import ConfigError, DatasetError
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
 
+IntArray = NDArray[np.integer]
+FloatArray = NDArray[np.floating]
 SUBSETS = ("train", "validation", "test")
 NORMALISATIONS = ("rms", "none")
 CROSS_SENSOR = "cross_sensor"  # the units of by_unit, tested on other channels
-IntArray = NDArray[np.integer]
-FloatArray = NDArray[np.floating]
+ROUNDING = 1e-6  # of a sample
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Task:
-    """A data set as one classification task: which classes and channels, and how records are cut.
+    """A data set as one classification task: its classes, channels and windows.
 
     Attributes
     ----------
@@ -35,8 +37,9 @@ class Task:
     channel_names : in the order of the network's input
     window_samples, stride_samples : length of a window and step from one to the next, in samples
     normalise : ``"rms"`` divides each channel of each window by its RMS, ``"none"`` keeps m/s^2
-    one_class : whether one class will do, for what is no classification
-    cross_channels : channels that `CROSS_SENSOR` trains and tests on, or in one line why there are none
+    one_class : True if one class is enough, because classes are not what is learnt
+    cross_channels : channels that `CROSS_SENSOR` trains and tests on,
+        or the reason why there are none, in one line
     """
 
     dataset: Dataset
@@ -68,7 +71,7 @@ class Task:
         return [available.index(name) for name in self.channel_names]
 
     def part(self, protocol: str, subset: str) -> Task:
-        """The task as one subset of a protocol sees it: with channels of its own in `CROSS_SENSOR`.
+        """The task of one subset of a protocol; `CROSS_SENSOR` has other channels in each.
 
         Raises
         ------
@@ -100,6 +103,19 @@ class Segments:
     start: IntArray
     stop: IntArray
 
+    def rows(self) -> list[tuple[int, int, int]]:
+        """Record, first sample and sample after the last of each stretch."""
+        columns = (self.record.tolist(), self.start.tolist(), self.stop.tolist())
+        return list(zip(*columns, strict=True))
+
+    def of(self, chosen: IntArray | NDArray[np.bool_]) -> Segments:
+        """The chosen stretches."""
+        return Segments(
+            record=self.record[chosen],
+            start=self.start[chosen],
+            stop=self.stop[chosen],
+        )
+
 
 def task_of(
     dataset: Dataset,
@@ -112,10 +128,14 @@ def task_of(
     one_class: bool = False,
 ) -> Task:
     """Task over the named classes and channels, all of the data set's where None."""
+    if classes is None:
+        classes = dataset.class_names
+    if channels is None:
+        channels = dataset.channel_names
     return Task(
         dataset=dataset,
-        class_names=tuple(dataset.class_names if classes is None else classes),
-        channel_names=tuple(dataset.channel_names if channels is None else channels),
+        class_names=tuple(classes),
+        channel_names=tuple(channels),
         window_samples=window_samples,
         stride_samples=stride_samples,
         normalise=normalise,
@@ -135,20 +155,19 @@ def subset_segments(task: Task, protocol: str, subset: str) -> Segments:
     check_names("subset", (subset,), SUBSETS)
     labels, length = task.labels(), n_samples(task.dataset)
     rows = [
-        (
-            record,
-            int(np.ceil(start * length - 1e-6)),
-            int(np.floor(stop * length + 1e-6)),
-        )
-        for record, start, stop in task.dataset.split(stored).get(subset, [])
-        if labels[record] >= 0
+        row for row in task.dataset.split(stored).get(subset, []) if labels[row[0]] >= 0
     ]
     if not rows:
         raise ConfigError(
-            f"protocol {protocol}: its {subset} part is empty; make more records or leave the protocol out"
+            f"protocol {protocol}: its {subset} part is empty; "
+            "make more records or leave the protocol out"
         )
-    record, start, stop = np.array(rows, dtype=np.int64).T
-    return Segments(record=record, start=start, stop=stop)
+    record, start, stop = np.array(rows, dtype=float).T
+    return Segments(
+        record=record.astype(np.int64),
+        start=np.ceil(start * length - ROUNDING).astype(np.int64),
+        stop=np.floor(stop * length + ROUNDING).astype(np.int64),
+    )
 
 
 def all_segments(task: Task) -> Segments:
@@ -182,7 +201,8 @@ def plan_windows(
     counts = np.maximum((lengths - window_samples) // stride_samples + 1, 0)
     if counts.sum() == 0:
         raise ConfigError(
-            f"window_samples={window_samples} is too long: the longest stretch holds {lengths.max()} samples"
+            f"window_samples={window_samples} is too long: "
+            f"the longest stretch holds {lengths.max()} samples"
         )
     segment = np.repeat(np.arange(counts.size), counts)
     step = np.concatenate([np.arange(count) for count in counts])
@@ -199,7 +219,7 @@ class WindowSet:
     segment, start : (window,) segment of each window, and its first sample in that segment
     label, record : (window,)
     window_samples, normalise : as in `Task`
-    targets : what is known beside the label, one value a window; see `diagnose.data.targets`
+    targets : further (window,) values to learn; see `diagnose.data.targets`
     """
 
     signals: tuple[NDArray[np.float32], ...]
@@ -214,6 +234,22 @@ class WindowSet:
     def __len__(self) -> int:
         return int(self.segment.size)
 
+    def blocks(self, size: int) -> list[IntArray]:
+        """Numbers of all windows, in blocks of about equal length, at most `size` each."""
+        return np.array_split(np.arange(len(self)), -(-len(self) // size))
+
+    def subset(self, chosen: IntArray) -> WindowSet:
+        """The chosen windows, on the same signals."""
+        targets = {name: values[chosen] for name, values in self.targets.items()}
+        return replace(
+            self,
+            segment=self.segment[chosen],
+            start=self.start[chosen],
+            label=self.label[chosen],
+            record=self.record[chosen],
+            targets=targets,
+        )
+
     def cut(
         self, windows: IntArray, rng: np.random.Generator | None = None
     ) -> NDArray[np.float32]:
@@ -223,49 +259,18 @@ class WindowSet:
         -------
         (window, channel, sample) float32, normalised
         """
-        chosen = np.empty(
-            (len(windows), self.signals[0].shape[0], self.window_samples),
-            dtype=np.float32,
-        )
+        n_channels, length = self.signals[0].shape[0], self.window_samples
+        chosen = np.empty((len(windows), n_channels, length), dtype=np.float32)
         for row, window in enumerate(windows):
             signal = self.signals[self.segment[window]]
-            last = signal.shape[-1] - self.window_samples
-            start = (
-                int(self.start[window]) if rng is None else int(rng.integers(last + 1))
-            )
-            chosen[row] = signal[:, start : start + self.window_samples]
+            start = int(self.start[window])
+            if rng is not None:
+                start = int(rng.integers(signal.shape[-1] - length + 1))
+            chosen[row] = signal[:, start : start + length]
         return normalised(chosen, self.normalise)
 
 
 Read = Callable[["Task", int, int, int], NDArray[np.float32]]
-
-
-def load_windows(
-    task: Task, segments: Segments, *, read: Read | None = None
-) -> WindowSet:
-    """Read the stretches into memory (4 bytes a sample), by `read_signal` or ``read``, and plan
-    their windows.
-
-    Raises
-    ------
-    DatasetError    for a signal that is not finite
-    """
-    segment, start = plan_windows(segments, task.window_samples, task.stride_samples)
-    used, segment = np.unique(segment, return_inverse=True)
-    rows = [
-        (int(segments.record[i]), int(segments.start[i]), int(segments.stop[i]))
-        for i in used
-    ]
-    record = segments.record[used][segment]
-    return WindowSet(
-        signals=tuple((read or read_signal)(task, *row) for row in rows),
-        segment=segment,
-        start=start - segments.start[used][segment],
-        label=task.labels()[record],
-        record=record,
-        window_samples=task.window_samples,
-        normalise=task.normalise,
-    )
 
 
 def read_signal(
@@ -277,16 +282,42 @@ def read_signal(
         dtype=np.float32,
     )
     if not np.isfinite(signal).all():
-        which = task.dataset.column("record_id")[record]
+        record_id = task.dataset.column("record_id")[record]
         raise DatasetError(
-            f"record {which} of {task.dataset.folder}: its signal holds values that are not finite"
+            f"record {record_id} of {task.dataset.folder}: "
+            "its signal holds values that are not finite"
         )
     return signal
 
 
+def load_windows(
+    task: Task, segments: Segments, *, read: Read = read_signal
+) -> WindowSet:
+    """Windows of stretches, whose signals are read into memory (4 bytes a sample) by `read`.
+
+    Raises
+    ------
+    DatasetError    for a signal that is not finite
+    """
+    segment, start = plan_windows(segments, task.window_samples, task.stride_samples)
+    used, segment = np.unique(segment, return_inverse=True)
+    stretches = segments.of(used)
+    record = stretches.record[segment]
+    return WindowSet(
+        signals=tuple(read(task, *row) for row in stretches.rows()),
+        segment=segment,
+        start=start - stretches.start[segment],
+        label=task.labels()[record],
+        record=record,
+        window_samples=task.window_samples,
+        normalise=task.normalise,
+    )
+
+
 def normalised(windows: NDArray[np.float32], how: str) -> NDArray[np.float32]:
-    """Windows (..., channel, sample) less their mean and, for ``"rms"``, divided by their RMS
-    channel by channel.
+    """Windows (..., channel, sample) without their mean; for ``"rms"`` divided by their RMS.
+
+    Both are taken channel by channel.
     """
     centered = windows - windows.mean(axis=-1, keepdims=True)
     if how == "none":
@@ -299,7 +330,7 @@ def normalised(windows: NDArray[np.float32], how: str) -> NDArray[np.float32]:
 
 
 def input_scale(windows: WindowSet) -> list[float]:
-    """RMS of each channel over the signals; 1 if windows are divided by theirs, or it is silent."""
+    """RMS of each channel over the signals; 1 for a silent one, and under ``"rms"``."""
     if windows.normalise == "rms":
         return [1.0] * windows.signals[0].shape[0]
     power = np.mean([np.var(signal, axis=-1) for signal in windows.signals], axis=0)
@@ -315,10 +346,7 @@ def check_names(kind: str, wanted: Sequence[Any], available: Sequence[str]) -> N
     """Refuse a name that does not exist, with the nearest ones."""
     for name in wanted:
         if name not in available:
-            close = difflib.get_close_matches(str(name), list(available), n=2)
-            hint = (
-                f"did you mean {' or '.join(close)}?"
-                if close
-                else f"there is {', '.join(available)}"
-            )
+            hint = f"there is {', '.join(available)}"
+            if close := difflib.get_close_matches(str(name), list(available), n=2):
+                hint = f"did you mean {' or '.join(close)}?"
             raise ConfigError(f"no {kind} '{name}'; {hint}")

@@ -1,7 +1,4 @@
-"""What a network was trained on.
-
-How far the spectrum of a window lies from those of the training windows.
-"""
+"""Domain of a network: the distance of a window's spectrum from those of the training windows."""
 
 from __future__ import annotations
 
@@ -15,16 +12,14 @@ from numpy.typing import NDArray
 from gensig.errors import DatasetError
 
 if TYPE_CHECKING:
-    from diagnose.data.windows import WindowSet
-
-FloatArray = NDArray[np.floating]
+    from diagnose.data.windows import FloatArray, IntArray, WindowSet
 
 METHOD = "nearest_band_levels"
-QUANTILE = 0.99  # of the validation windows; one in a hundred of the known kind is called unlike
+QUANTILE = 0.99  # of the validation windows; 1 % of the known kind is called unlike
 N_BANDS = 12  # of equal ratio, from the fourth bin to half the sampling rate
 LOWEST_BIN = 4  # the window function spreads the mean over the bins below
-FLOOR = 1e-12  # of the mean power: what is silent has a level still
-N_NEIGHBORS = 5  # so that one odd training record does not make what is like it known
+FLOOR = 1e-12  # of the mean power, so that silence has a finite level
+N_NEIGHBORS = 5  # so that one odd training record does not make windows like it known
 MOST_WINDOWS = 1000  # stored, evenly spaced over the training
 TENSOR = "domain.levels"
 
@@ -35,9 +30,9 @@ class Domain:
 
     Attributes
     ----------
-    levels : (window, feature) of training windows, the bands of one channel after those of another
+    levels : (window, feature) of training windows, the bands of the first channel first
     threshold : distance that the share `QUANTILE` of the validation windows does not exceed
-    n_validation_windows : that it comes from
+    n_validation_windows : number of windows behind the threshold
     """
 
     levels: NDArray[np.float32]
@@ -45,11 +40,8 @@ class Domain:
     n_validation_windows: int
 
     def __post_init__(self) -> None:
-        if (
-            self.levels.ndim != 2
-            or self.levels.size == 0
-            or not np.isfinite(self.levels).all()
-        ):
+        is_table = self.levels.ndim == 2 and self.levels.size > 0
+        if not (is_table and np.isfinite(self.levels).all()):
             raise DatasetError(
                 "the tensor of its out-of-distribution flag holds no levels of windows"
             )
@@ -59,11 +51,11 @@ class Domain:
             )
 
     def tensors(self) -> dict[str, NDArray[np.float32]]:
-        """What is stored beside the weights."""
+        """Name -> array, stored with the weights."""
         return {TENSOR: self.levels}
 
     def facts(self) -> dict[str, Any]:
-        """What is stored in the description."""
+        """Entries of the description in ``model.json``."""
         return {
             "method": METHOD,
             "quantile": QUANTILE,
@@ -83,7 +75,8 @@ def domain_from(
     """
     if facts.get("method") != METHOD:
         raise DatasetError(
-            f"its out-of-distribution flag is {facts.get('method')!r}, this program knows {METHOD}"
+            f"its out-of-distribution flag is {facts.get('method')!r}, "
+            f"this program knows {METHOD}"
         )
     try:
         return Domain(
@@ -98,25 +91,19 @@ def domain_from(
 
 
 def fit_domain(train: WindowSet, validation: WindowSet) -> Domain:
-    """Levels of training windows, and the threshold from windows of units that were not trained on.
+    """Levels of training windows, and the threshold from windows of units not trained on.
 
-    The distance is that to the fifth nearest training window, which asks for no distribution:
-    speeds and loads make the levels lie in several clouds. It is held on the input, not on the
-    network's features: a network that was never shown noise alone maps it beside quiet records.
+    The distance is that to the fifth nearest training window. It assumes no distribution: speeds
+    and loads make the levels lie in several clouds. It is taken on the input, not on the
+    network's features: a network that never saw noise alone maps it close to quiet records.
 
     Source: Ramaswamy, Rastogi & Shim (2000), "Efficient algorithms for mining outliers from large
     data sets", SIGMOD, section 3; threshold on held-out known data as in Sun, Ming, Zhu & Li
     (2022), "Out-of-distribution detection with deep nearest neighbors", ICML, section 3.
     """
-    kept = np.unique(
-        np.linspace(0, len(train) - 1, min(len(train), MOST_WINDOWS))
-        .round()
-        .astype(int)
-    )
-    levels = window_levels(train, kept).astype(np.float32)
-    distance = neighbor_distance(
-        window_levels(validation, np.arange(len(validation))), levels
-    )
+    kept = train.subset(evenly_spaced(len(train), MOST_WINDOWS))
+    levels = window_levels(kept).astype(np.float32)
+    distance = neighbor_distance(window_levels(validation), levels)
     return Domain(
         levels=levels,
         threshold=float(np.quantile(distance, QUANTILE, method="higher")),
@@ -124,37 +111,39 @@ def fit_domain(train: WindowSet, validation: WindowSet) -> Domain:
     )
 
 
+def evenly_spaced(n: int, most: int) -> IntArray:
+    """Whole numbers from 0 to n - 1, at most `most`, evenly spaced."""
+    return np.linspace(0, n - 1, min(n, most)).round().astype(int)
+
+
 def distances(domain: Domain, windows: WindowSet) -> FloatArray:
-    """(window,) to the fifth nearest training window, root of the summed squares of nepers of
-    power.
+    """(window,) distance from the fifth nearest training window.
+
+    It is the root of the summed squares of differences of levels, in nepers of power.
 
     Raises
     ------
     DatasetError    if the domain belongs to other channels
     """
-    levels = window_levels(windows, np.arange(len(windows)))
+    levels = window_levels(windows)
     if levels.shape[1] != domain.levels.shape[1]:
         raise DatasetError(
-            f"the model's out-of-distribution flag has {domain.levels.shape[1]} levels, a window {levels.shape[1]}"
+            f"the model's out-of-distribution flag has {domain.levels.shape[1]} levels, "
+            f"a window {levels.shape[1]}"
         )
     return neighbor_distance(levels, domain.levels)
 
 
-def window_levels(
-    windows: WindowSet, chosen: NDArray[np.integer], *, batch_size: int = 64
-) -> FloatArray:
-    """(window, feature) `band_levels` of chosen windows at their planned starts, channel after
-    channel.
-    """
-    blocks = np.array_split(chosen, -(-chosen.size // batch_size))
-    return np.concatenate(
-        [band_levels(windows.cut(block)).reshape(block.size, -1) for block in blocks]
-    )
+def window_levels(windows: WindowSet, *, batch_size: int = 64) -> FloatArray:
+    """(window, feature) `band_levels` at the planned starts, the first channel first."""
+    levels = [band_levels(windows.cut(block)) for block in windows.blocks(batch_size)]
+    return np.concatenate(levels).reshape(len(windows), -1)
 
 
-def band_levels(windows: NDArray[np.floating]) -> FloatArray:
-    """(..., band) natural logarithm of the mean power in bands of equal ratio, of windows (...,
-    sample).
+def band_levels(windows: FloatArray) -> FloatArray:
+    """(..., band) natural logarithm of the mean power in bands of equal ratio.
+
+    `windows` has the axes (..., sample).
     """
     n = windows.shape[-1]
     power = np.abs(np.fft.rfft(windows * np.hanning(n), axis=-1)) ** 2
@@ -166,12 +155,9 @@ def band_levels(windows: NDArray[np.floating]) -> FloatArray:
 
 
 def neighbor_distance(levels: FloatArray, known: FloatArray) -> FloatArray:
-    """(window,) from each row to the fifth nearest of the known ones, the last where there are
-    fewer.
-    """
+    """(window,) distance of each row from the fifth nearest known row, or from the farthest."""
     from sklearn.neighbors import NearestNeighbors
 
-    neighbors = NearestNeighbors(n_neighbors=min(N_NEIGHBORS, len(known))).fit(
-        known.astype(float)
-    )
+    neighbors = NearestNeighbors(n_neighbors=min(N_NEIGHBORS, len(known)))
+    neighbors.fit(known.astype(float))
     return neighbors.kneighbors(levels)[0][:, -1]

@@ -1,12 +1,9 @@
-"""What the networks have in common.
-
-Scaled inputs, features, class scores, and further heads on the same features.
-"""
+"""Base class of networks: scaled inputs, features, class scores and further heads."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 import torch
@@ -24,11 +21,12 @@ class Network(nn.Module, ABC):
 
     Parameters
     ----------
-    input_scale : (channel,) typical RMS of each channel, which the input is divided by; stored with the weights
+    input_scale : (channel,) typical RMS of each channel, which the input is divided by; stored
+        with the weights
 
     Attributes
     ----------
-    inputs : kind of input that the network reads; the only place where this is said
+    inputs : kind of input that the network reads; nothing else declares it
     """
 
     inputs: ClassVar[type[NetworkInput]]
@@ -44,14 +42,14 @@ class Network(nn.Module, ABC):
         )
         self.further = nn.ModuleDict()
         self.places = None
-        self.turns: tuple[
-            tuple[int, int], ...
-        ] = ()  # (index in GEARS, teeth) of each gear that places run around
+        # (index in GEARS, teeth) of each gear that the scores of `places` run around
+        self.turns: tuple[tuple[int, int], ...] = ()
 
     @abstractmethod
     def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor | None]:
-        """Features (window, feature) of scaled windows, and what they are the maximum of,
-        (window, map, place).
+        """Features (window, feature) of scaled windows.
+
+        Also the maps (window, map, position) that they are the maximum of, or None.
         """
 
     def forward(self, windows: torch.Tensor) -> torch.Tensor:
@@ -59,29 +57,25 @@ class Network(nn.Module, ABC):
         return self.head(self.look(windows / self.input_scale)[0])
 
     def answers(self, windows: torch.Tensor) -> dict[str, torch.Tensor]:
-        """Everything that the network says of windows, unnormalised.
+        """All outputs of the network for windows, unnormalised.
 
         Returns
         -------
         classes : (window, class)
-        severity, gear : (window, output) of the further heads that there are, see `add_heads`
-        places : (window, class, place) where the network sees a class, for one that looks at turns
+        severity, gear : (window, output) of further heads, if there are any; see `add_heads`
+        places : (window, class, position) class scores along the turns, for a network on turns
         """
         features, maps = self.look(windows / self.input_scale)
-        said = {
-            "classes": self.head(features),
-            **{name: head(features) for name, head in self.further.items()},
-        }
-        return (
-            said
-            if maps is None or self.places is None
-            else {**said, "places": self.places(maps)}
-        )
+        answers = {"classes": self.head(features)}
+        answers |= {name: head(features) for name, head in self.further.items()}
+        if maps is not None and self.places is not None:
+            answers["places"] = self.places(maps)
+        return answers
 
     def add_heads(self, names: Sequence[str], n_features: int, n_classes: int) -> None:
         """Add linear heads: a severity for each class, a score for each of `GEARS`.
 
-        They are drawn last, so that the other weights start as they do without.
+        They are drawn last, so that the other weights start as without them.
 
         Raises
         ------
@@ -104,5 +98,35 @@ def check_blocks(*options: Sequence[int]) -> None:
     lengths = {len(values) for values in options}
     if len(lengths) > 1 or 0 in lengths:
         raise ConfigError(
-            "model: widths, kernels and strides must be lists of the same length, one entry a block",
+            "model: widths, kernels and strides must be lists of the same length, "
+            "one entry a block"
         )
+
+
+def convolution_blocks(
+    n_channels: int,
+    widths: Sequence[int],
+    kernels: Sequence[int],
+    strides: Sequence[int],
+    start: Callable[[torch.Tensor], None] = lambda weight: None,
+) -> nn.Sequential:
+    """Convolutions padded by half their kernels, each with batch normalisation and ReLU.
+
+    Parameters
+    ----------
+    n_channels : of the input
+    widths, kernels, strides : channels after each block, its kernel in its input's samples, its
+        stride
+    start : fills the weights of the first convolution, before those of the others are drawn
+    """
+    check_blocks(widths, kernels, strides)
+    layers: list[nn.Module] = []
+    for n_out, kernel, stride in zip(widths, kernels, strides, strict=True):
+        convolution = nn.Conv1d(
+            n_channels, n_out, kernel, stride, padding=kernel // 2, bias=False
+        )
+        if not layers:
+            start(convolution.weight)
+        layers += [convolution, nn.BatchNorm1d(n_out), nn.ReLU()]
+        n_channels = n_out
+    return nn.Sequential(*layers)

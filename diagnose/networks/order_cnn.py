@@ -1,7 +1,4 @@
-"""A network on the turns of both gears.
-
-The same filters look at every tooth, the most conspicuous one decides.
-"""
+"""A network on the turns of both gears: the same filters on every tooth, then the maximum."""
 
 from __future__ import annotations
 
@@ -20,13 +17,13 @@ from gensig.errors import ConfigError
 
 
 class OrderCnn(Network):
-    """Convolutions around the turn of either gear, compared with the gear's mean, and the maximum
-    over its teeth.
+    """Convolutions around the turn of either gear, compared with the gear's mean; maximum over
+    its teeth.
 
-    The input is `diagnose.data.turns.Turns.packed`: what each tooth adds to the mean passage,
-    gear by gear, and that passage. It is the same at every speed but for the frequency response.
-    Responses of the first filters are compressed by the inverse hyperbolic sine: impacts of tooth
-    engagement are 30 dB above what cracks and pits do between them.
+    The input is `diagnose.data.turns.Turns.packed`: the difference of each tooth from the mean
+    passage, gear by gear, and that passage. It is the same at every speed, except for the
+    frequency response. Responses of the first filters are compressed by the inverse hyperbolic
+    sine: impacts of tooth engagement are 30 dB above the effects of cracks and pits between them.
 
     Parameters
     ----------
@@ -35,8 +32,10 @@ class OrderCnn(Network):
     n_teeth : of the driving and the driven gear
     samples_per_tooth : of the turns
     gears : whose turns are looked at, pinion or wheel or both
-    widths, kernels, strides : channels after each block, its kernel in its input's samples, its stride
-    compression : what the first responses are multiplied by before they are compressed, at the start of a training
+    widths, kernels, strides : channels after each block, its kernel in its input's samples, its
+        stride
+    compression : factor on the first responses before they are compressed, at the start of a
+        training
     dropout : share of pooled features dropped in training
     heads : see `diagnose.settings.HEADS`
     """
@@ -67,23 +66,19 @@ class OrderCnn(Network):
             )
         self.n_points = [teeth * samples_per_tooth for teeth in (*n_teeth, 1)]
         self.n_teeth = list(n_teeth)
-        if (
-            not gears
-            or not set(gears) <= set(GEARS[1:])
-            or len(set(gears)) < len(gears)
-        ):
+        known, named = set(GEARS[1:]), set(gears)
+        if not named or not named <= known or len(named) < len(gears):
             raise ConfigError(
                 f"model: gears must be a list out of {', '.join(GEARS[1:])}"
             )
         self.gears = [GEARS.index(gear) - 1 for gear in gears]
         self.turns = tuple((gear + 1, n_teeth[gear]) for gear in self.gears)
         self.kernels = list(kernels)
-        inputs = (2 * n_channels, *widths)
+        inputs = (2 * n_channels, *widths[:-1])
+        blocks = zip(inputs, widths, kernels, strides, strict=True)
         self.convolutions = nn.ModuleList(
             nn.Conv1d(n_in, n_out, kernel, stride=stride, bias=False)
-            for n_in, n_out, kernel, stride in zip(
-                inputs, widths, kernels, strides, strict=False
-            )
+            for n_in, n_out, kernel, stride in blocks
         )
         self.norms = nn.ModuleList(nn.BatchNorm1d(width) for width in widths)
         self.compression = nn.Parameter(torch.full((widths[0], 1), float(compression)))
@@ -95,31 +90,25 @@ class OrderCnn(Network):
         self.add_heads(heads, n_features, n_classes)
 
     def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Maximum over the places of each gear's turn, one gear after the other.
-
-        The maps of all turns.
-        """
+        """Maximum over each gear's turn, one gear after the other, and the maps of all turns."""
         *turns, mesh = windows.split(self.n_points, dim=-1)
-        looked_at = [(turns[gear], self.n_teeth[gear]) for gear in self.gears]
-        parts = [
-            torch.cat([turn, mesh.repeat(1, 1, n_teeth)], dim=1)
-            for turn, n_teeth in looked_at
-        ]
-        for index, (convolution, norm) in enumerate(
-            zip(self.convolutions, self.norms, strict=True),
-        ):
-            parts = [convolution(_around(part, self.kernels[index])) for part in parts]
+        parts = []
+        for gear in self.gears:
+            mean_passage = mesh.repeat(1, 1, self.n_teeth[gear])
+            parts.append(torch.cat([turns[gear], mean_passage], dim=1))
+        blocks = zip(self.convolutions, self.norms, self.kernels, strict=True)
+        for index, (convolution, norm, kernel) in enumerate(blocks):
+            parts = [convolution(_around(part, kernel)) for part in parts]
             if index == 0:
                 parts = [torch.asinh(self.compression * part) for part in parts]
             parts = _together(norm, parts)
-        usual = [
-            torch.cat([part, part.mean(dim=-1, keepdim=True).expand_as(part)], dim=1)
-            for part in parts
-        ]
-        parts = _together(self.compare_norm, [self.compare(part) for part in usual])
-        return torch.cat([part.amax(dim=-1) for part in parts], dim=1), torch.cat(
-            parts, dim=-1
-        )
+        compared = []
+        for part in parts:
+            mean = part.mean(dim=-1, keepdim=True).expand_as(part)
+            compared.append(self.compare(torch.cat([part, mean], dim=1)))
+        parts = _together(self.compare_norm, compared)
+        features = torch.cat([part.amax(dim=-1) for part in parts], dim=1)
+        return features, torch.cat(parts, dim=-1)
 
 
 def _together(norm: nn.Module, parts: Sequence[torch.Tensor]) -> list[torch.Tensor]:
@@ -129,5 +118,5 @@ def _together(norm: nn.Module, parts: Sequence[torch.Tensor]) -> list[torch.Tens
 
 
 def _around(x: torch.Tensor, kernel: int) -> torch.Tensor:
-    """A turn that goes on where it ends, by half a kernel on either side."""
+    """A turn continued periodically by half a kernel on either side."""
     return pad(x, (kernel // 2, kernel // 2), mode="circular")

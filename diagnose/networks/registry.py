@@ -1,4 +1,4 @@
-"""Networks: vibration windows in, class scores out."""
+"""Registry of networks, and networks built from configurations."""
 
 from __future__ import annotations
 
@@ -37,22 +37,26 @@ def build_model(
 
     Parameters
     ----------
-    config : beside ``kind`` and ``name``, which is only shown, it holds parameters
+    config : parameters, ``kind``, and ``name``, which is only shown
     n_channels, n_classes : of the data
-    input_scale : (channel,) what inputs are divided by; 1 where None
+    input_scale : (channel,) divisor of the inputs; 1 if None
 
     Raises
     ------
     ConfigError    for an unknown kind or parameters that it does not take
     """
     make: Callable[..., Network] = _network_class(config)
-    parameters = {
-        key: value for key, value in config.items() if key not in ("kind", "name")
-    }
-    scale = [1.0] * n_channels if input_scale is None else input_scale
+    parameters = dict(config)
+    del parameters["kind"]
+    parameters.pop("name", None)
+    if input_scale is None:
+        input_scale = [1.0] * n_channels
     try:
         return make(
-            n_channels=n_channels, n_classes=n_classes, input_scale=scale, **parameters
+            n_channels=n_channels,
+            n_classes=n_classes,
+            input_scale=input_scale,
+            **parameters,
         )
     except (TypeError, ValueError, RuntimeError) as error:
         reason = " ".join(str(error).split())
@@ -60,7 +64,7 @@ def build_model(
 
 
 def input_of(config: Section) -> NetworkInput:
-    """What the network of a completed configuration reads.
+    """Input of the network of a completed configuration.
 
     Raises
     ------
@@ -84,14 +88,15 @@ def completed(
     attributes: Mapping[str, Any],
     heads: Sequence[str],
 ) -> Section:
-    """Configuration with its further heads, and with what its input takes of a data set.
+    """Configuration with its further heads, and the values that its input takes of a data set.
 
     Raises
     ------
     ConfigError    for an unknown kind, or a data set whose attributes lack what the input needs
     """
-    with_heads = config | {"heads": list(heads)} if heads else config
-    return _network_class(config).inputs.completed(with_heads, attributes)
+    if heads:
+        config = config | {"heads": list(heads)}
+    return _network_class(config).inputs.completed(config, attributes)
 
 
 def check_window(model: nn.Module, n_channels: int, window_samples: int) -> None:
@@ -106,7 +111,8 @@ def check_window(model: nn.Module, n_channels: int, window_samples: int) -> None
             model.eval()(torch.zeros(1, n_channels, window_samples))
     except RuntimeError:
         raise ConfigError(
-            f"window_samples={window_samples} is too short for this network; make it longer or choose another model",
+            f"window_samples={window_samples} is too short for this network; "
+            "make it longer or choose another model"
         ) from None
 
 

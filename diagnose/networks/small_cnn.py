@@ -11,7 +11,7 @@ from torch import nn
 
 from diagnose.data.inputs import NetworkInput
 from diagnose.data.window_input import Windows
-from diagnose.networks.network import Network, check_blocks
+from diagnose.networks.network import Network, convolution_blocks
 
 
 class SmallCnn(Network):
@@ -50,31 +50,12 @@ class SmallCnn(Network):
         heads: Sequence[str] = (),
     ) -> None:
         super().__init__(input_scale)
-        check_blocks(widths, kernels, strides)
-        blocks: list[nn.Module] = []
-        for n_in, n_out, kernel, stride in zip(
-            (n_channels, *widths),
-            widths,
-            kernels,
-            strides,
-            strict=False,
-        ):
-            convolution = nn.Conv1d(
-                n_in,
-                n_out,
-                kernel,
-                stride=stride,
-                padding=kernel // 2,
-                bias=False,
-            )
-            if not blocks:
-                _start_as_band_passes(convolution.weight)
-            blocks += [convolution, nn.BatchNorm1d(n_out), nn.ReLU()]
-        self.blocks = nn.Sequential(*blocks)
-        self.head = nn.Sequential(
-            nn.Dropout(dropout), nn.Linear(2 * widths[-1], n_classes)
+        self.blocks = convolution_blocks(
+            n_channels, widths, kernels, strides, _start_as_band_passes
         )
-        self.add_heads(heads, 2 * widths[-1], n_classes)
+        n_features = 2 * widths[-1]
+        self.head = nn.Sequential(nn.Dropout(dropout), nn.Linear(n_features, n_classes))
+        self.add_heads(heads, n_features, n_classes)
 
     def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, None]:
         """Mean and maximum over the window of the last block."""
@@ -85,8 +66,8 @@ class SmallCnn(Network):
 def _start_as_band_passes(weight: torch.Tensor) -> None:
     """Fill (filter, channel, sample) with windowed cosines of random phase and size.
 
-    Their frequencies are evenly spaced. Random kernels all hear the mesh tones first, and learning
-    to listen elsewhere takes most of a training.
+    Their frequencies are evenly spaced. Random kernels all respond to the mesh tones first, and
+    learning other frequencies takes most of a training.
 
     Source: the initialisation of SincNet, Ravanelli & Bengio (2018), "Speaker recognition from raw
     waveform with SincNet".

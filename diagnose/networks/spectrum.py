@@ -1,4 +1,4 @@
-"""Spectra of windows, and a network that sees nothing else."""
+"""Log-magnitude spectra of windows, and a network on them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from torch import nn
 
 from diagnose.data.inputs import NetworkInput
 from diagnose.data.window_input import Windows
-from diagnose.networks.network import Network, check_blocks
+from diagnose.networks.network import Network, convolution_blocks
 from gensig.errors import ConfigError
 
 
@@ -21,7 +21,8 @@ def log_spectrum(windows: torch.Tensor, floor: float) -> torch.Tensor:
     Parameters
     ----------
     windows : (..., sample), of about unit RMS
-    floor : added to the magnitude, whose root mean square is 1 for white noise of unit RMS; bins below it look alike
+    floor : added to the magnitude, whose root mean square is 1 for white noise of unit RMS; bins
+        below it are equal
 
     Returns
     -------
@@ -29,19 +30,17 @@ def log_spectrum(windows: torch.Tensor, floor: float) -> torch.Tensor:
     """
     n = windows.shape[-1]
     taper = torch.hann_window(n, dtype=windows.dtype, device=windows.device)
-    magnitude = torch.fft.rfft(windows * taper).abs() / math.sqrt(
-        3 * n / 8,
-    )  # 3/8: mean square of the taper
+    # 3/8 is the mean square of the taper
+    magnitude = torch.fft.rfft(windows * taper).abs() / math.sqrt(3 * n / 8)
     return torch.log(magnitude + floor)
 
 
 class SpectrumCnn(Network):
-    """Small convolutional network on the log-magnitude spectrum of the window: blind to phase and
-    to where in time.
+    """Small convolutional network on the log-magnitude spectrum of the window.
 
-    The spectrum has the mean over its bins taken off, channel by channel, so that gain does not
-    tell. The last map is pooled to a fixed number of bands, mean and maximum of each: unlike
-    time, frequency is not interchangeable.
+    It is blind to phase and to position in time. The mean over the bins is subtracted from the
+    spectrum, channel by channel, so that gain has no effect. The last map is pooled to a fixed
+    number of bands, mean and maximum of each: unlike time, frequency is not interchangeable.
 
     Parameters
     ----------
@@ -49,7 +48,7 @@ class SpectrumCnn(Network):
     input_scale : (channel,) what the input is divided by; stored with the weights
     floor : see `log_spectrum`
     widths, kernels, strides : channels after each block, its kernel in its input's bins, its stride
-    n_bands : equal parts of the frequency axis that the class scores tell apart
+    n_bands : equal parts of the frequency axis that the class scores distinguish
     dropout : share of pooled features dropped in training
     heads : see `diagnose.settings.HEADS`
     """
@@ -71,43 +70,21 @@ class SpectrumCnn(Network):
         heads: Sequence[str] = (),
     ) -> None:
         super().__init__(input_scale)
-        check_blocks(widths, kernels, strides)
         if not floor > 0:
             raise ConfigError(f"model: floor must be greater than 0, not {floor!r}")
         self.floor = float(floor)
-        blocks: list[nn.Module] = []
-        for n_in, n_out, kernel, stride in zip(
-            (n_channels, *widths),
-            widths,
-            kernels,
-            strides,
-            strict=False,
-        ):
-            convolution = nn.Conv1d(
-                n_in,
-                n_out,
-                kernel,
-                stride=stride,
-                padding=kernel // 2,
-                bias=False,
-            )
-            blocks += [convolution, nn.BatchNorm1d(n_out), nn.ReLU()]
-        self.blocks = nn.Sequential(*blocks)
-        self.mean, self.maximum = (
-            nn.AdaptiveAvgPool1d(n_bands),
-            nn.AdaptiveMaxPool1d(n_bands),
-        )
+        self.blocks = convolution_blocks(n_channels, widths, kernels, strides)
+        self.mean = nn.AdaptiveAvgPool1d(n_bands)
+        self.maximum = nn.AdaptiveMaxPool1d(n_bands)
+        n_features = 2 * widths[-1] * n_bands
         self.head = nn.Sequential(
-            nn.Flatten(),
-            nn.Dropout(dropout),
-            nn.Linear(2 * widths[-1] * n_bands, n_classes),
+            nn.Flatten(), nn.Dropout(dropout), nn.Linear(n_features, n_classes)
         )
-        self.add_heads(heads, 2 * widths[-1] * n_bands, n_classes)
+        self.add_heads(heads, n_features, n_classes)
 
     def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, None]:
         """Mean and maximum of every band of the last block."""
         spectrum = log_spectrum(windows, self.floor)
         maps = self.blocks(spectrum - spectrum.mean(dim=-1, keepdim=True))
-        return torch.cat([self.mean(maps), self.maximum(maps)], dim=1).flatten(
-            start_dim=1
-        ), None
+        bands = torch.cat([self.mean(maps), self.maximum(maps)], dim=1)
+        return bands.flatten(start_dim=1), None

@@ -16,16 +16,15 @@ FIRST_KERNEL, FIRST_STRIDE, FIRST_PADDING = 64, 16, 24
 
 
 class Wdcnn(Network):
-    """Deep convolutional network with a wide first kernel, as published; several channels enter
-    side by side.
+    """Deep convolutional network with a wide first kernel, as published, for several channels.
 
     A first convolution of 64 samples with stride 16, then convolutions of 3 samples, the last one
     without padding. Each is followed by batch normalisation, ReLU and a maximum over 2; a hidden
-    layer and the class scores follow. The weights start as torch starts them.
+    layer and the class scores follow. The initial weights are the defaults of torch.
 
     For one channel and the published 2048 samples, layers and sizes are those of the paper. Its
     hidden layer sees the 3 positions that such a window leaves. Other windows leave more or
-    fewer: their last map is brought to the same number of positions by the maximum over equal
+    fewer. Their last map is pooled to the same number of positions by the maximum over equal
     parts. This is ours, and does nothing at 2048 samples.
 
     Parameters
@@ -57,25 +56,19 @@ class Wdcnn(Network):
     ) -> None:
         super().__init__(input_scale)
         layers: list[nn.Module] = []
-        for index, (n_in, n_out) in enumerate(
-            zip((n_channels, *widths), widths, strict=False)
-        ):
+        for index, n_out in enumerate(widths):
+            kernel, stride, padding = 3, 1, 1
             if index == 0:
-                convolution = nn.Conv1d(
-                    n_in,
-                    n_out,
-                    FIRST_KERNEL,
-                    stride=FIRST_STRIDE,
-                    padding=FIRST_PADDING,
-                )
-            else:
-                convolution = nn.Conv1d(
-                    n_in,
-                    n_out,
-                    3,
-                    padding=0 if index == len(widths) - 1 else 1,
-                )
-            layers += [convolution, nn.BatchNorm1d(n_out), nn.ReLU(), nn.MaxPool1d(2)]
+                kernel, stride, padding = FIRST_KERNEL, FIRST_STRIDE, FIRST_PADDING
+            elif index == len(widths) - 1:
+                padding = 0
+            layers += [
+                nn.Conv1d(n_channels, n_out, kernel, stride, padding),
+                nn.BatchNorm1d(n_out),
+                nn.ReLU(),
+                nn.MaxPool1d(2),
+            ]
+            n_channels = n_out
         self.blocks = nn.Sequential(*layers)
         self.hidden = nn.Sequential(
             nn.AdaptiveMaxPool1d(n_positions),

@@ -1,7 +1,4 @@
-"""Which condition fails.
-
-Scores against noise, speed, load, gearbox and whatever else varies from record to record.
-"""
+"""Scores by condition: noise, speed, load, gearbox and all else that varies between records."""
 
 from __future__ import annotations
 
@@ -12,15 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.groups import Group, groups_of
+from diagnose.data.windows import FloatArray, IntArray
 from diagnose.scoring.judged import (
     Judged,
     finite,
     interval_text,
     resampled_score,
     score,
-    units_drawn,
     with_interval,
 )
+from diagnose.scoring.metrics import CountArray, units_drawn
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
@@ -30,44 +28,33 @@ RECORDS_A_GROUP = 20  # fewer say little of four classes
 MOST_GROUPS = 5
 MOST_NAMES = 12  # more gearboxes than this are units, not a condition to compare
 LEAST_A_CLASS = 5  # records of each class that balanced accuracy needs in each group
-LEAST_UNITS_TESTED = (
-    4  # on both sides of a comparison; the spread of fewer is guesswork
-)
+LEAST_UNITS_TESTED = 4  # on both sides of a comparison, for an estimate of the spread
 
 
-def condition_columns(
-    dataset: Dataset, record: NDArray[np.integer]
-) -> dict[str, NDArray[Any]]:
-    """Columns that say under which condition a record was taken and differ among the records,
-    (record,) each.
+def condition_columns(dataset: Dataset, record: IntArray) -> dict[str, NDArray[Any]]:
+    """Columns of the conditions that differ among the records, (record,) each.
 
     The parameters of faults, seeds and columns that only repeat an earlier one are left out.
     """
-    drawn = [
-        name
-        for name in dataset.column_names
-        if name.startswith("params/")
-        and not name.startswith("params/fault.")
-        and not name.endswith("_seed")
-    ]
+    names = [name for name in BASE_COLUMNS if name in dataset.column_names]
+    for name in dataset.column_names:
+        is_drawn = name.startswith("params/") and not name.endswith("_seed")
+        if is_drawn and not name.startswith("params/fault."):
+            names.append(name)
     columns: dict[str, NDArray[Any]] = {}
-    for name in [
-        known for known in BASE_COLUMNS if known in dataset.column_names
-    ] + drawn:
+    for name in names:
         values = np.asarray(dataset.column(name))[record]
-        is_name = values.dtype.kind in "US"
-        if values.ndim != 1 or not (
-            is_name or (values.dtype.kind in "fiu" and np.isfinite(values).all())
-        ):
+        if values.ndim != 1:
             continue
-        different = np.unique(values).size
-        if (
-            different < 2
-            or (is_name and different > MOST_NAMES)
-            or any(_repeats(values, k) for k in columns.values())
-        ):
+        most = values.size
+        if values.dtype.kind in "US":
+            most = MOST_NAMES
+        elif values.dtype.kind not in "fiu" or not np.isfinite(values).all():
             continue
-        columns[name] = values
+        if not 2 <= np.unique(values).size <= most:
+            continue
+        if not any(_same_order(values, known) for known in columns.values()):
+            columns[name] = values
     return columns
 
 
@@ -78,11 +65,10 @@ def by_condition(
     n_bootstrap: int,
     rng: np.random.Generator,
 ) -> dict[str, Any]:
-    """Scores of groups of test records, and the groups that the first method finds harder than
-    the rest.
+    """Scores of groups of test records, and the groups that are harder for the first method.
 
-    Balanced accuracy where every group of a column has `LEAST_A_CLASS` records of each class of
-    the test part, else the share of records that are right.
+    The score is balanced accuracy if every group of a column has `LEAST_A_CLASS` records of each
+    class of the test part, else the share of records that are right.
 
     Parameters
     ----------
@@ -93,18 +79,18 @@ def by_condition(
 
     Returns
     -------
-    rows : one a group, with the scores of every method and, of the first one, its difference from the rest
+    rows : one a group, with the scores of every method and the difference of the first one from
+        the rest
     weakest : names of the groups that are weaker beyond chance, weakest first
     summary : one sentence
 
     Notes
     -----
-    Looking at many groups, one is always the lowest. A group is named only if the upper end of its difference from the
-    rest lies below 0, where the ends hold for all the groups at once.
+    Among many groups one is always the lowest. A group is named only if the upper end of its
+    difference from the rest lies below 0. The ends hold for all groups at once.
 
     The standard error is that of the resamples, and no smaller than that of independent records
-    which are as often right as all are: a group that is low by luck shows too small a spread of
-    its own.
+    which are as often right as all are. A group that is low by luck shows too small a spread.
 
     Source: standard error of resampled units with Student's t of as many degrees of freedom as
     the group has units, less one, as Cameron, Gelbach & Miller (2008), "Bootstrap-based
@@ -114,7 +100,7 @@ def by_condition(
     network = methods[0]
     drawn = units_drawn(network.n_units, n_bootstrap, rng)
     rows: list[dict[str, Any]] = []
-    differences: list[NDArray[np.floating]] = []
+    tested: list[tuple[dict[str, Any], FloatArray]] = []
     n_groups = int(np.clip(network.label.size // RECORDS_A_GROUP, 1, MOST_GROUPS))
     for column, values in columns.items():
         groups = groups_of(values, most=n_groups)
@@ -122,37 +108,20 @@ def by_condition(
             continue
         measure = _measure(network.label, groups)
         for group in groups:
-            row, resampled = _row(column, group, measure, methods, drawn, rng)
+            row, differences = _row(column, group, measure, methods, drawn, rng)
             rows.append(row)
-            differences.append(resampled)
-    tested = [
-        index
-        for index, row in enumerate(rows)
-        if row["difference_from_rest"] is not None
-    ]
-    for index in tested:
-        row = rows[index]
-        overall = score(network, row["measure"])
-        spread = _spread(
-            differences[index],
-            overall,
-            row["n_records"],
-            network.label.size,
-            row["n_units"],
-        )
-        row["difference_at_most"] = (
-            row["difference_from_rest"] + _factor(len(tested), row["n_units"]) * spread
-        )
-    weak = [
-        row
-        for row in rows
-        if row["difference_at_most"] is not None and row["difference_at_most"] < 0
-    ]
+            if row["difference_from_rest"] is not None:
+                tested.append((row, differences))
+    for row, differences in tested:
+        spread = _standard_error(network, row, differences)
+        factor = _factor(len(tested), row["n_units"])
+        row["difference_at_most"] = row["difference_from_rest"] + factor * spread
+    weak = [row for row, _ in tested if row["difference_at_most"] < 0]
     weak.sort(key=lambda row: row["difference_at_most"])
     return {
         "rows": rows,
         "n_groups_compared": len(tested),
-        "weakest": [f"{row['column']} {row['group']}" for row in weak],
+        "weakest": [_group_name(row) for row in weak],
         "summary": _sentence(network.method, weak, len(tested)),
     }
 
@@ -162,20 +131,24 @@ def _row(
     group: Group,
     measure: str,
     methods: Sequence[Judged],
-    drawn: NDArray[np.int64],
+    drawn: CountArray,
     rng: np.random.Generator,
-) -> tuple[dict[str, Any], NDArray[np.floating]]:
+) -> tuple[dict[str, Any], FloatArray]:
     """Row of one group, and the resampled differences of the first method from the rest."""
-    scores, inside = {}, []
-    n_units = int(np.unique(methods[0].unit[group.member]).size)
+    network = methods[0]
+    scores, resampled = {}, []
+    n_units = int(np.unique(network.unit[group.member]).size)
     for method in methods:
         part = method.of(group.member)
-        inside.append(resampled_score(part, measure, drawn, rng))
-        scores[method.method] = with_interval(score(part, measure), inside[-1], n_units)
-    rest = methods[0].of(~group.member)
-    differences = inside[0] - resampled_score(rest, measure, drawn, rng)
-    enough = min(n_units, np.unique(rest.unit).size) >= LEAST_UNITS_TESTED
-    difference = score(methods[0].of(group.member), measure) - score(rest, measure)
+        values = resampled_score(part, measure, drawn, rng)
+        scores[method.method] = with_interval(score(part, measure), values, n_units)
+        resampled.append(values)
+    rest = network.of(~group.member)
+    differences = resampled[0] - resampled_score(rest, measure, drawn, rng)
+    difference = None
+    if min(n_units, np.unique(rest.unit).size) >= LEAST_UNITS_TESTED:
+        inside = score(network.of(group.member), measure)
+        difference = finite(inside - score(rest, measure))
     row = {
         "column": column,
         "group": group.text,
@@ -185,38 +158,35 @@ def _row(
         "n_units": n_units,
         "measure": measure,
         "scores": scores,
-        "difference_from_rest": finite(difference) if enough else None,
+        "difference_from_rest": difference,
         "difference_at_most": None,
     }
     return row, differences
 
 
-def _measure(label: NDArray[np.integer], groups: Sequence[Group]) -> str:
-    present = np.unique(label)
-    fewest = min(
-        int((label[group.member] == name).sum()) for group in groups for name in present
-    )
-    return "balanced_accuracy" if fewest >= LEAST_A_CLASS else "share_right"
+def _measure(label: IntArray, groups: Sequence[Group]) -> str:
+    """Score that all groups of a column have enough records for."""
+    for group in groups:
+        for present in np.unique(label):
+            if (label[group.member] == present).sum() < LEAST_A_CLASS:
+                return "share_right"
+    return "balanced_accuracy"
 
 
-def _spread(
-    differences: NDArray[np.floating],
-    overall: float,
-    n_inside: int,
-    n_records: int,
-    n_units: int,
+def _standard_error(
+    network: Judged, row: Mapping[str, Any], differences: FloatArray
 ) -> float:
-    """Standard error of a difference between a group and the rest."""
-    of_records = np.sqrt(
-        overall * (1 - overall) * (1 / n_inside + 1 / (n_records - n_inside))
-    )
-    return float(
-        max(np.nanstd(differences) * np.sqrt(n_units / (n_units - 1)), of_records)
-    )
+    """Standard error of the difference between the group of a row and the rest."""
+    overall = score(network, row["measure"])
+    n_inside, n_units = row["n_records"], row["n_units"]
+    n_outside = network.label.size - n_inside
+    of_records = np.sqrt(overall * (1 - overall) * (1 / n_inside + 1 / n_outside))
+    of_units = np.nanstd(differences) * np.sqrt(n_units / (n_units - 1))
+    return float(max(of_units, of_records))
 
 
 def _factor(n_compared: int, n_units: int) -> float:
-    """How many standard errors the ends are off, so that all hold together with 95 % confidence."""
+    """Distance of the ends in standard errors, for 95 % confidence in all of them together."""
     from scipy.stats import t
 
     return float(t.ppf(1 - 0.05 / n_compared, n_units - 1))
@@ -226,23 +196,30 @@ def _sentence(method: str, weak: Sequence[Mapping[str, Any]], n_tested: int) -> 
     if not n_tested:
         return "Too few test records or units to compare conditions."
     if not weak:
-        return f"No condition stands out: none of {n_tested} groups scores below the rest beyond chance."
-    row = weak[0]
+        return (
+            f"No condition stands out: none of {n_tested} groups "
+            "scores below the rest beyond chance."
+        )
+    row, *others = weak
     measure = row["measure"].replace("_", " ")
-    others = (
-        "; also weak: " + ", ".join(f"{o['column']} {o['group']}" for o in weak[1:])
-        if weak[1:]
-        else ""
-    )
+    also = ""
+    if others:
+        also = "; also weak: " + ", ".join(_group_name(other) for other in others)
     return (
-        f"{method} is weakest at {row['column']} {row['group']}: {measure} {interval_text(row['scores'][method])}, "
-        f"{-row['difference_from_rest']:.2f} below the rest (at least {-row['difference_at_most']:.2f}, with 95 % "
-        f"confidence over all {n_tested} groups){others}."
+        f"{method} is weakest at {_group_name(row)}: {measure} "
+        f"{interval_text(row['scores'][method])}, "
+        f"{-row['difference_from_rest']:.2f} below the rest "
+        f"(at least {-row['difference_at_most']:.2f}, with 95 % confidence "
+        f"over all {n_tested} groups){also}."
     )
 
 
-def _repeats(values: NDArray[Any], known: NDArray[Any]) -> bool:
-    """Whether two columns order the records alike, or one of them in reverse."""
+def _group_name(row: Mapping[str, Any]) -> str:
+    return f"{row['column']} {row['group']}"
+
+
+def _same_order(values: NDArray[Any], known: NDArray[Any]) -> bool:
+    """True if two columns order the records in the same way, or one of them in reverse."""
     if values.dtype.kind in "US" or known.dtype.kind in "US":
         return False
     correlation = np.corrcoef(values, known)[0, 1]

@@ -1,14 +1,16 @@
-"""From what severity a fault is found at 5 % false alarms, whatever class it is then given."""
+"""Detection limits: severities from which a fault of any class is found at 5 % false alarms."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.groups import groups_of
+from diagnose.data.windows import FloatArray, IntArray
 from diagnose.scoring.detection_curve import (
     LEAST_RECORDS,
     LEAST_SIZES,
@@ -22,29 +24,32 @@ from diagnose.scoring.judged import (
     Judged,
     interval_text,
     share_with_interval,
-    units_drawn,
     with_interval,
 )
+from diagnose.scoring.metrics import CountArray, is_above, units_drawn
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
 
-IntArray = NDArray[np.integer]
-FloatArray = NDArray[np.floating]
+BoolArray = NDArray[np.bool_]
+Sizes = Mapping[
+    str, FloatArray
+]  # quantity -> (record,) values of the records of a class
 HEALTHY = "healthy"
 FALSE_ALARMS = 0.05
-RECORDS_A_GROUP = 8  # fewer say nothing of a share
+RECORDS_A_GROUP = 8  # fewer make a share meaningless
 MOST_GROUPS = 5
 CURVE_POINTS = 41
 CURVE_NEEDS = f"a curve needs {LEAST_RECORDS} records of {LEAST_SIZES} severities"
 SIZE_FOLLOWS_SEVERITY = (
-    0.95  # least rank correlation of a fault parameter that is called its size
+    0.95  # least rank correlation of a fault parameter that is its size
 )
 
 
 def detection_score(log_probability: FloatArray, healthy: int) -> FloatArray:
-    """(...) log P(any fault) - log P(healthy), from log-probabilities (..., class) of any common
-    offset.
+    """(...) log P(any fault) - log P(healthy), from log-probabilities (..., class).
+
+    A common offset of the log-probabilities has no effect.
     """
     from scipy.special import logsumexp
 
@@ -52,19 +57,17 @@ def detection_score(log_probability: FloatArray, healthy: int) -> FloatArray:
     return logsumexp(faulty, axis=-1) - log_probability[..., healthy]
 
 
-def alarm_threshold(
-    scores: FloatArray, weight: NDArray[np.int64], *, new: bool
-) -> FloatArray:
+def alarm_threshold(scores: FloatArray, weight: CountArray, *, new: bool) -> FloatArray:
     """(resample,) score above which at most 5 % of healthy records lie.
 
-    With `new`, of healthy records like these but not among them: the score of rank ceil(0.95 (n +
-    1)), for which n must be at least 19, else the highest one. Without it, of these records
-    themselves: rank ceil(0.95 n).
+    With `new`, these are other healthy records of the same kind: the score of rank
+    ceil(0.95 (n + 1)), for which n must be at least 19, else the highest one. Without it, these
+    are the given records: rank ceil(0.95 n).
 
     Parameters
     ----------
     scores : (record,) of healthy records
-    weight : (resample, record) how often each was drawn
+    weight : (resample, record) number of times that each was drawn
 
     Source: Vovk, Gammerman & Shafer (2005), "Algorithmic learning in a random world", chapter 2
     (conformal prediction).
@@ -79,33 +82,148 @@ def alarm_threshold(
 def size_columns(
     dataset: Dataset, record: IntArray, severity: FloatArray
 ) -> dict[str, FloatArray]:
-    """Parameters of one fault class that grow with its severity, (record,) each: its size in
-    physical units.
+    """Parameters of one fault class that grow with its severity: its size in physical units.
 
     Parameters
     ----------
     dataset : with columns ``params/fault.NAME_UNIT``
     record : records of the class
     severity : (record,) of them
+
+    Returns
+    -------
+    parameter -> (record,) values
     """
     from scipy.stats import spearmanr
 
-    found = {}
+    sizes = {}
     for name in dataset.column_names:
         if not name.startswith("params/fault."):
             continue
         values = np.asarray(dataset.column(name))[record]
-        if (
-            values.ndim != 1
-            or values.dtype.kind != "f"
-            or not np.isfinite(values).all()
-            or (values <= 0).any()
-        ):
+        if values.ndim != 1 or values.dtype.kind != "f":
+            continue
+        if not (np.isfinite(values).all() and (values > 0).all()):
             continue
         enough = min(np.unique(values).size, np.unique(severity).size) >= LEAST_SIZES
         if enough and spearmanr(values, severity).statistic >= SIZE_FOLLOWS_SEVERITY:
-            found[name.removeprefix("params/fault.")] = values
-    return found
+            sizes[name.removeprefix("params/fault.")] = values
+    return sizes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Alarms:
+    """Alarms of one method on all units, then on resampled units and trainings.
+
+    Attributes
+    ----------
+    judged : the method on the test records
+    healthy : (record,) bool
+    scores : (seed, record) of `detection_score`
+    drawn : (1 + resample, unit) number of times that each unit was drawn
+    seeds : (1 + resample, seed) trainings drawn
+    weight : (1 + resample, record) number of times that each record was drawn
+    detected : (1 + resample, record) share of the drawn trainings that raise an alarm
+    """
+
+    judged: Judged
+    healthy: BoolArray
+    scores: FloatArray
+    drawn: CountArray
+    seeds: IntArray
+    weight: FloatArray
+    detected: FloatArray
+
+    def n_units(self, member: BoolArray) -> int:
+        """Number of units of some records."""
+        return int(np.unique(self.judged.unit[member]).size)
+
+    def share(self, member: BoolArray) -> Interval:
+        """Share of some records that raise an alarm."""
+        weight = self.weight[:, member]
+        alarms = (weight * self.detected[:, member]).sum(axis=1)
+        shares = _ratio(alarms, weight.sum(axis=1))
+        return share_with_interval(float(shares[0]), shares[1:], self.n_units(member))
+
+    def area(self, faulty: BoolArray) -> Interval:
+        """Area under the ROC curve, mean over the trainings drawn.
+
+        It is the share of pairs of a faulty and a healthy record in which the faulty one scores
+        higher; ties count half. Pairs are counted once for each pair of units, then weighted by
+        the number of times that both were drawn.
+        """
+        judged, healthy = self.judged, self.healthy
+        pairs = np.zeros((judged.n_units, judged.n_units))
+        unit = judged.unit
+        np.add.at(pairs, (unit[healthy][:, None], unit[faulty][None]), 1.0)
+        n_pairs = self._over_pairs(pairs)
+        areas = np.full((len(self.drawn), judged.n_seeds), np.nan)
+        for seed, values in enumerate(self.scores):
+            won = np.zeros_like(pairs)
+            for index in np.unique(unit[healthy]):
+                ordered = np.sort(values[healthy & (unit == index)])
+                smaller = np.searchsorted(ordered, values[faulty], "left")
+                not_larger = np.searchsorted(ordered, values[faulty], "right")
+                below = (smaller + not_larger) / 2
+                won[index] = np.bincount(unit[faulty], below, judged.n_units)
+            areas[:, seed] = _ratio(self._over_pairs(won), n_pairs)
+        area = np.take_along_axis(areas, self.seeds, axis=1).mean(axis=1)
+        return with_interval(area[0], area[1:], self.n_units(faulty))
+
+    def _over_pairs(self, pairs: FloatArray) -> FloatArray:
+        """(1 + resample,) sum of a table of pairs of units."""
+        return np.einsum("bu,bv,uv->b", self.drawn, self.drawn, pairs, optimize=True)
+
+    def of_class(self, member: BoolArray, sizes: Sizes) -> dict[str, Any]:
+        """Results of one class, without its summary."""
+        n_units = self.n_units(member)
+        detected, weight = self.detected[:, member], self.weight[:, member]
+        severity = sizes.get("severity")
+        limit_rows: list[dict[str, Any]] = []
+        for quantity, size in sizes.items():
+            limit_rows += _limit_rows(quantity, size, detected, weight, n_units)
+        return {
+            "n_records": int(member.sum()),
+            "n_units": n_units,
+            "auroc": self.area(member),
+            "share_found": self.share(member),
+            "by_severity": self.by_severity(severity, member),
+            "limits": limit_rows,
+            "curve": _curve(severity, detected[:1], weight[:1]),
+        }
+
+    def by_severity(
+        self, severity: FloatArray | None, member: BoolArray
+    ) -> list[dict[str, Any]]:
+        """Share found and share given the right class in groups of severity.
+
+        Empty if it does not vary.
+        """
+        if severity is None or np.unique(severity).size < 2:
+            return []
+        judged = self.judged
+        rows = []
+        right = (judged.predicted == judged.label).mean(axis=0)
+        most = int(np.clip(severity.size // RECORDS_A_GROUP, 2, MOST_GROUPS))
+        for group in groups_of(severity, most=most):
+            inside = np.zeros_like(member)
+            inside[np.flatnonzero(member)[group.member]] = True
+            rows.append(
+                {
+                    "severity_low": group.low,
+                    "severity_high": group.high,
+                    "n_records": int(inside.sum()),
+                    "n_units": self.n_units(inside),
+                    "share_found": self.share(inside),
+                    "share_right_class": float(right[inside].mean()),
+                }
+            )
+        return rows
+
+
+def _ratio(part: FloatArray, total: FloatArray) -> FloatArray:
+    """Quotient of two arrays; NaN for a total of 0."""
+    return np.divide(part, total, out=np.full(total.shape, np.nan), where=total > 0)
 
 
 def detection(
@@ -113,90 +231,59 @@ def detection(
     validation: Judged | None,
     *,
     class_names: Sequence[str],
-    sizes: Mapping[str, Mapping[str, FloatArray]],
+    sizes: Mapping[str, Sizes],
     n_bootstrap: int,
     rng: np.random.Generator,
 ) -> dict[str, Any]:
-    """How many faults one method finds at 5 % false alarms: by class, by size, and from what size
-    on.
+    """Faults that one method finds at 5 % false alarms, by class and by size, and its limits.
 
-    The threshold of each training is set on the healthy validation records; on the healthy test
-    records where there are fewer than 19 of the former, which is said under ``threshold_from``.
+    The threshold of each training is set on the healthy validation records. For fewer than 19 of
+    them it is set on the healthy test records, as ``threshold_from`` says.
 
     Parameters
     ----------
     judged : one method on the test records
-    validation : the same on the validation records; None where they were not judged
+    validation : the same on the validation records; None if they were not predicted
     class_names : one of them "healthy"
     sizes : for each class, sizes (record,) of its test records in their order, by name
-    n_bootstrap : resamples of the units of both parts, so that the intervals hold for the threshold too
+    n_bootstrap : resamples of the units of both parts, so that the intervals include the
+        uncertainty of the threshold
     rng : source of the resamples
     """
     healthy = list(class_names).index(HEALTHY)
     scores = detection_score(judged.log_probability, healthy)
     drawn = _drawn(judged, n_bootstrap, rng)
     thresholds, source = _thresholds(judged, validation, scores, drawn, healthy, rng)
-    seeds = rng.integers(judged.n_seeds, size=(n_bootstrap, judged.n_seeds))
-    seeds = np.concatenate([np.arange(judged.n_seeds)[None], seeds])
-    found = _found(scores, thresholds, seeds)
-    weight = drawn[:, judged.unit].astype(float)
-
-    def share(member: NDArray[np.bool_]) -> Interval:
-        inside = weight[:, member]
-        total = inside.sum(axis=1)
-        values = np.divide(
-            (inside * found[:, member]).sum(axis=1),
-            total,
-            out=np.full(total.shape, np.nan),
-            where=total > 0,
-        )
-        return share_with_interval(
-            float(values[0]), values[1:], np.unique(judged.unit[member]).size
-        )
-
-    false_alarms = share(judged.label == healthy)
+    resampled_seeds = rng.integers(judged.n_seeds, size=(n_bootstrap, judged.n_seeds))
+    seeds = np.concatenate([np.arange(judged.n_seeds)[None], resampled_seeds])
+    alarms = _Alarms(
+        judged=judged,
+        healthy=judged.label == healthy,
+        scores=scores,
+        drawn=drawn,
+        seeds=seeds,
+        weight=drawn[:, judged.unit].astype(float),
+        detected=_detected(scores, thresholds, seeds),
+    )
+    false_alarms = alarms.share(alarms.healthy)
     classes = {}
     for index, name in enumerate(class_names):
         member = judged.label == index
-        if index == healthy or not member.any():
-            continue
-        area = _area(scores, judged, member, judged.label == healthy, drawn, seeds)
-        n_units = np.unique(judged.unit[member]).size
-        by_size = sizes.get(name, {})
-        classes[name] = {
-            "n_records": int(member.sum()),
-            "n_units": int(n_units),
-            "auroc": with_interval(
-                area[0], area[1:], min(n_units, np.unique(judged.unit).size)
-            ),
-            "share_found": share(member),
-            "by_severity": _by_severity(by_size.get("severity"), member, judged, share),
-            "limits": [
-                row
-                for quantity, size in by_size.items()
-                for row in _limit_rows(
-                    quantity, size, found[:, member], weight[:, member], int(n_units)
-                )
-            ],
-            "curve": _curve(
-                by_size.get("severity"), found[:1, member], weight[:1, member]
-            ),
-        }
-        classes[name]["summary"] = _sentence(name, classes[name], false_alarms)
+        if index != healthy and member.any():
+            result = alarms.of_class(member, sizes.get(name, {}))
+            result["summary"] = _sentence(name, result, false_alarms)
+            classes[name] = result
     return {
         "method": judged.method,
         "false_alarms_wanted": FALSE_ALARMS,
         "threshold_from": source,
         "false_alarms": false_alarms,
-        "too_many_false_alarms": false_alarms["low"] is not None
-        and false_alarms["low"] > FALSE_ALARMS,
+        "too_many_false_alarms": is_above(false_alarms, FALSE_ALARMS),
         "classes": classes,
     }
 
 
-def _drawn(
-    judged: Judged, n_bootstrap: int, rng: np.random.Generator
-) -> NDArray[np.int64]:
+def _drawn(judged: Judged, n_bootstrap: int, rng: np.random.Generator) -> CountArray:
     """All units once, then the resamples: (1 + resample, unit)."""
     once = np.ones((1, judged.n_units), dtype=np.int64)
     return np.concatenate([once, units_drawn(judged.n_units, n_bootstrap, rng)])
@@ -206,129 +293,60 @@ def _thresholds(
     judged: Judged,
     validation: Judged | None,
     scores: FloatArray,
-    drawn: NDArray[np.int64],
+    drawn: CountArray,
     healthy: int,
     rng: np.random.Generator,
 ) -> tuple[FloatArray, str]:
     """(1 + resample, seed) thresholds, and the part that they were set on."""
-    new = (
-        validation is not None
-        and (validation.label == healthy).sum() + 1 >= 1 / FALSE_ALARMS - 1e-9
-    )
-    if new and validation is not None:
+    member = judged.label == healthy
+    weight, values = drawn[:, judged.unit[member]], scores[:, member]
+    new, source = False, "healthy test records"
+    if validation is not None:
         part = validation.of(validation.label == healthy)
-        weight = _drawn(part, len(drawn) - 1, rng)[:, part.unit]
-        weight[weight.sum(axis=1) == 0] = 1  # a resample without a healthy record
-        values = detection_score(part.log_probability, healthy)
-    else:
-        member = judged.label == healthy
-        weight, values = drawn[:, judged.unit[member]].copy(), scores[:, member]
-        weight[weight.sum(axis=1) == 0] = 1
-    thresholds = np.stack(
-        [alarm_threshold(row, weight, new=new) for row in values], axis=1
-    )
-    return thresholds, "healthy validation records" if new else "healthy test records"
+        new = part.label.size + 1 >= 1 / FALSE_ALARMS - 1e-9
+        if new:
+            source = "healthy validation records"
+            weight = _drawn(part, len(drawn) - 1, rng)[:, part.unit]
+            values = detection_score(part.log_probability, healthy)
+    weight[weight.sum(axis=1) == 0] = 1  # a resample without a healthy record
+    thresholds = [alarm_threshold(row, weight, new=new) for row in values]
+    return np.stack(thresholds, axis=1), source
 
 
-def _found(
+def _detected(
     scores: FloatArray, thresholds: FloatArray, seeds: IntArray
 ) -> NDArray[np.float32]:
     """(1 + resample, record) share of the trainings drawn whose score is above their threshold."""
-    found = np.empty((len(seeds), scores.shape[1]), dtype=np.float32)
+    detected = np.empty((len(seeds), scores.shape[1]), dtype=np.float32)
     for row, drawn in enumerate(seeds):
-        found[row] = (scores[drawn] > thresholds[row, drawn, None]).mean(axis=0)
-    return found
+        detected[row] = (scores[drawn] > thresholds[row, drawn, None]).mean(axis=0)
+    return detected
 
 
-def _area(
-    scores: FloatArray,
-    judged: Judged,
-    faulty: NDArray[np.bool_],
-    healthy: NDArray[np.bool_],
-    drawn: NDArray[np.int64],
-    seeds: IntArray,
-) -> FloatArray:
-    """(1 + resample,) area under the ROC curve, mean over the trainings drawn.
-
-    The share of pairs, one faulty and one healthy record, in which the faulty one scores higher,
-    ties counting half: counted once for each pair of units, then weighted by how often both were
-    drawn.
-    """
-    pairs = np.zeros((judged.n_units, judged.n_units))
-    np.add.at(pairs, (judged.unit[healthy][:, None], judged.unit[faulty][None]), 1.0)
-    n_pairs = np.einsum("bu,bv,uv->b", drawn, drawn, pairs, optimize=True)
-    areas = np.full((len(drawn), judged.n_seeds), np.nan)
-    for seed, values in enumerate(scores):
-        won = np.zeros_like(pairs)
-        for unit in np.unique(judged.unit[healthy]):
-            ordered = np.sort(values[healthy & (judged.unit == unit)])
-            smaller, not_larger = (
-                np.searchsorted(ordered, values[faulty], side)
-                for side in ("left", "right")
-            )
-            below = (smaller + not_larger) / 2
-            won[unit] = np.bincount(
-                judged.unit[faulty], weights=below, minlength=judged.n_units
-            )
-        n_won = np.einsum("bu,bv,uv->b", drawn, drawn, won, optimize=True)
-        areas[:, seed] = np.divide(
-            n_won, n_pairs, out=np.full(len(drawn), np.nan), where=n_pairs > 0
-        )
-    return np.take_along_axis(areas, seeds, axis=1).mean(axis=1)
-
-
-def _by_severity(
-    severity: FloatArray | None, member: NDArray[np.bool_], judged: Judged, share: Any
-) -> list[dict[str, Any]]:
-    """Share found and share given the right class in groups of severity.
-
-    Empty where it does not vary.
-    """
-    if severity is None or np.unique(severity).size < 2:
-        return []
-    rows = []
-    place = np.flatnonzero(member)
-    right = (judged.predicted == judged.label).mean(axis=0)
-    for group in groups_of(
-        severity, most=int(np.clip(severity.size // RECORDS_A_GROUP, 2, MOST_GROUPS))
-    ):
-        inside = np.zeros_like(member)
-        inside[place[group.member]] = True
-        rows.append(
-            {
-                "severity_low": group.low,
-                "severity_high": group.high,
-                "n_records": int(inside.sum()),
-                "n_units": int(np.unique(judged.unit[inside]).size),
-                "share_found": share(inside),
-                "share_right_class": float(right[inside].mean()),
-            }
-        )
-    return rows
-
-
-def _has_curve(size: FloatArray | None) -> bool:
-    return (
-        size is not None
-        and size.size >= LEAST_RECORDS
-        and np.unique(size).size >= LEAST_SIZES
-    )
+def _has_curve(size: FloatArray) -> bool:
+    return size.size >= LEAST_RECORDS and np.unique(size).size >= LEAST_SIZES
 
 
 def _limit_rows(
-    quantity: str, size: FloatArray, found: FloatArray, weight: FloatArray, n_units: int
+    quantity: str,
+    size: FloatArray,
+    detected: FloatArray,
+    weight: FloatArray,
+    n_units: int,
 ) -> list[dict[str, Any]]:
     """Detection limits of one class in one quantity, one row for each of `SHARES`."""
     if not _has_curve(size):
         return []
-    coefficients = fit_curves(size, found, weight)
+    coefficients = fit_curves(size, detected, weight)
     rows = []
     for share in SHARES:
         values = limits(coefficients, size, share)
         interval = with_interval(values[0], values[1:], n_units)
-        status = "reached" if np.isfinite(values[0]) else "not_reached"
+        status = "reached"
         if values[0] == size.min():
             status = "at_smallest_tested"
+        elif np.isinf(values[0]):
+            status = "not_reached"
         rows.append(
             {
                 "quantity": quantity,
@@ -346,52 +364,46 @@ def _limit_rows(
 
 
 def _curve(
-    severity: FloatArray | None, found: FloatArray, weight: FloatArray
+    severity: FloatArray | None, detected: FloatArray, weight: FloatArray
 ) -> dict[str, list[float]]:
-    """The fitted curve over severity, for figures; empty where there is none."""
+    """The fitted curve over severity, for figures; empty if there is none."""
     if severity is None or not _has_curve(severity):
         return {"severity": [], "share_found": []}
     at = np.linspace(severity.min(), severity.max(), CURVE_POINTS)
-    share = curve_at(fit_curves(severity, found, weight), at, severity)[0]
+    share = curve_at(fit_curves(severity, detected, weight), at, severity)[0]
     return {"severity": at.tolist(), "share_found": share.tolist()}
 
 
-def _sentence(name: str, found: Mapping[str, Any], false_alarms: Interval) -> str:
-    rows = [row for row in found["limits"] if row["quantity"] == "severity"]
-    alarms = (
-        f"at {false_alarms['mean']:.0%} false alarms"
-        if false_alarms["mean"] is not None
-        else ""
-    )
-    text = f"{name}: {interval_text(found['share_found'])} of {records_behind(found)} found {alarms}"
-    if too_few_for_curve(found):
+def _sentence(name: str, result: Mapping[str, Any], false_alarms: Interval) -> str:
+    text = f"{name}: {interval_text(result['share_found'])} of {records_behind(result)} found "
+    if false_alarms["mean"] is not None:
+        text += f"at {false_alarms['mean']:.0%} false alarms"
+    if too_few_for_curve(result):
         text += f"; from what severity on is not told: {CURVE_NEEDS}"
-    for row in rows:
+    for row in result["limits"]:
+        if row["quantity"] != "severity":
+            continue
         text += f"; {row['share']:.0%} are found {_limit_text(row)}"
         others = [
-            other
-            for other in found["limits"]
+            f"{other['quantity']} {_ends(other)}"
+            for other in result["limits"]
             if other["share"] == row["share"]
             and other["quantity"] != "severity"
             and other["status"] == "reached"
         ]
         if row["status"] == "reached" and others:
-            text += (
-                " ("
-                + ", ".join(f"{other['quantity']} {_ends(other)}" for other in others)
-                + ")"
-            )
+            text += f" ({', '.join(others)})"
     return text + "."
 
 
-def records_behind(found: Mapping[str, Any]) -> str:
-    """What a class's figures rest on."""
-    return f"{found['n_records']} records of {found['n_units']} machines"
+def records_behind(result: Mapping[str, Any]) -> str:
+    """Numbers of records and machines behind the results of a class, in words."""
+    return f"{result['n_records']} records of {result['n_units']} machines"
 
 
-def too_few_for_curve(found: Mapping[str, Any]) -> bool:
-    """Whether the severity of a class varies, over too few records for a curve."""
-    return bool(found["by_severity"]) and not found["curve"]["severity"]
+def too_few_for_curve(result: Mapping[str, Any]) -> bool:
+    """True if the severity of a class varies, but over too few records for a curve."""
+    return bool(result["by_severity"]) and not result["curve"]["severity"]
 
 
 def _limit_text(row: Mapping[str, Any]) -> str:
@@ -406,5 +418,7 @@ def _ends(row: Mapping[str, Any]) -> str:
     """Limit with its interval; an open upper end lies beyond what was tested."""
     if row["low"] is None and row["high"] is None:
         return f"{row['value']:.2f}"
-    high = "beyond the largest tested" if row["high"] is None else f"{row['high']:.2f}"
+    high = "beyond the largest tested"
+    if row["high"] is not None:
+        high = f"{row['high']:.2f}"
     return f"{row['value']:.2f} [{row['low']:.2f}, {high}]"

@@ -1,6 +1,4 @@
-"""What a method said of the test records of a protocol, and its scores on resampled units, alike
-for every question.
-"""
+"""Predictions of a method for the test records of a protocol, and scores on resampled units."""
 
 from __future__ import annotations
 
@@ -11,27 +9,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.scoring.metrics import LEAST_UNITS, balanced_accuracy
+from diagnose.data.windows import FloatArray, IntArray
+from diagnose.scoring.metrics import (
+    LEAST_UNITS,
+    CountArray,
+    balanced_accuracy,
+    over_drawn_seeds,
+)
 
-IntArray = NDArray[np.integer]
-FloatArray = NDArray[np.floating]
-BoolArray = NDArray[np.bool_]
 Interval = dict[str, float | None]
 
 NO_INTERVAL = "[too few machines]"
 
 
-def share_right(confusion: NDArray[np.integer]) -> FloatArray:
-    """(...) share of records given their own class, from counts (..., true, predicted).
+def share_right(confusion: CountArray) -> FloatArray:
+    """(...) share of right predictions, from counts (..., true, predicted).
 
-    NaN where there is none.
+    NaN without any record.
     """
     total = confusion.sum(axis=(-2, -1))
     right = np.trace(confusion, axis1=-2, axis2=-1).astype(float)
     return np.divide(right, total, out=np.full(total.shape, np.nan), where=total > 0)
 
 
-MEASURES: dict[str, Callable[[NDArray[np.integer]], FloatArray]] = {
+MEASURES: dict[str, Callable[[CountArray], FloatArray]] = {
     "balanced_accuracy": balanced_accuracy,
     "share_right": share_right,
 }
@@ -39,7 +40,7 @@ MEASURES: dict[str, Callable[[NDArray[np.integer]], FloatArray]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judged:
-    """One method on test records.
+    """Predictions of one method for test records.
 
     Attributes
     ----------
@@ -47,7 +48,8 @@ class Judged:
     label : (record,) true class
     unit : (record,) 0 to n_units - 1, the unit of each record
     n_units : of the whole test part
-    log_probability : (seed, record, class), or scores that rank alike; one seed where the method has none
+    log_probability : (seed, record, class), or scores that rank in the same order; one seed for a
+        method without seeds
     """
 
     method: str
@@ -63,11 +65,11 @@ class Judged:
 
     @property
     def n_seeds(self) -> int:
-        """Trainings."""
+        """Number of trainings."""
         return int(self.log_probability.shape[0])
 
-    def of(self, records: IntArray | BoolArray) -> Judged:
-        """The same method on some of the records, the units numbered as before."""
+    def of(self, records: IntArray | NDArray[np.bool_]) -> Judged:
+        """The same method on some of the records, with the same numbers of the units."""
         return replace(
             self,
             label=self.label[records],
@@ -75,7 +77,7 @@ class Judged:
             log_probability=self.log_probability[:, records],
         )
 
-    def confusion(self) -> NDArray[np.int64]:
+    def confusion(self) -> CountArray:
         """Counts of records, (seed, unit, true class, predicted class)."""
         n_classes = self.log_probability.shape[-1]
         counts = np.zeros(
@@ -86,34 +88,21 @@ class Judged:
         return counts
 
 
-def units_drawn(
-    n_units: int, n_bootstrap: int, rng: np.random.Generator
-) -> NDArray[np.int64]:
-    """How often each resample holds each unit, (resample, unit): as many draws with replacement
-    as there are units.
-
-    Source: Efron & Tibshirani (1993), "An introduction to the bootstrap", section 8.3 (units, not
-    records, are drawn).
-    """
-    return rng.multinomial(n_units, np.full(n_units, 1 / n_units), size=n_bootstrap)
-
-
 def resampled_score(
-    judged: Judged, measure: str, drawn: NDArray[np.int64], rng: np.random.Generator
+    judged: Judged, measure: str, drawn: CountArray, rng: np.random.Generator
 ) -> FloatArray:
-    """(resample,) score of `MEASURES`, mean over seeds that are drawn anew too; NaN where no
-    record was drawn.
+    """(resample,) score of `MEASURES`, mean over resampled seeds; NaN without a drawn record.
 
     Parameters
     ----------
     judged : the method on the records to score
     measure : key of `MEASURES`
-    drawn : (resample, unit) of `units_drawn`, the same for scores that are to be compared
+    drawn : (resample, unit) of `diagnose.scoring.metrics.units_drawn`, the same for all scores of
+        a comparison
     rng : draws the seeds
     """
-    per_seed = MEASURES[measure](np.einsum("bu,sutp->bstp", drawn, judged.confusion()))
-    seeds = rng.integers(judged.n_seeds, size=per_seed.shape)
-    return np.take_along_axis(per_seed, seeds, axis=1).mean(axis=1)
+    counts = np.einsum("bu,sutp->bstp", drawn, judged.confusion())
+    return over_drawn_seeds(MEASURES[measure](counts), rng)
 
 
 def score(judged: Judged, measure: str) -> float:
@@ -122,29 +111,28 @@ def score(judged: Judged, measure: str) -> float:
 
 
 def with_interval(value: float, resampled: FloatArray, n_units: int) -> Interval:
-    """Value with its 95 % percentile interval; None for fewer units than
-    `diagnose.scoring.metrics.LEAST_UNITS`.
+    """Value with its 95 % percentile interval, which is None for few units.
 
     Parameters
     ----------
     value : of all units
-    resampled : (resample,) values of resampled units; NaN where a resample has none
-    n_units : that the value rests on
+    resampled : (resample,) values of resampled units; NaN if a resample has none
+    n_units : number of units behind the value; `diagnose.scoring.metrics.LEAST_UNITS` are needed
 
     Source: Efron & Tibshirani (1993), section 13.3.
     """
     known = resampled[~np.isnan(resampled)]
-    if n_units < LEAST_UNITS or not known.size:
-        return {"mean": finite(value), "low": None, "high": None}
-    low, high = np.quantile(known, [0.025, 0.975], method="inverted_cdf")
+    low, high = np.nan, np.nan
+    if n_units >= LEAST_UNITS and known.size:
+        low, high = np.quantile(known, [0.025, 0.975], method="inverted_cdf")
     return {"mean": finite(value), "low": finite(low), "high": finite(high)}
 
 
 def share_with_interval(value: float, resampled: FloatArray, n_units: int) -> Interval:
-    """A share with its interval; none or all of few units do not show that it is 0 or 1.
+    """A share with its interval, also for 0 or 1.
 
-    As `with_interval`, and for a share of 0 or 1, which no resample can leave, also what so many
-    units say if each of them is one trial.
+    As `with_interval`. All resamples of a share of 0 or 1 are the same. Its interval is therefore
+    extended to that of as many independent trials as there are units.
 
     Source: Clopper & Pearson (1934), "The use of confidence or fiducial limits illustrated in the
     case of the binomial", Biometrika 26 (4).
@@ -152,16 +140,12 @@ def share_with_interval(value: float, resampled: FloatArray, n_units: int) -> In
     from scipy.stats import binomtest
 
     interval = with_interval(value, resampled, n_units)
-    if (
-        value in (0.0, 1.0)
-        and interval["low"] is not None
-        and interval["high"] is not None
-    ):
-        exact = binomtest(round(value * n_units), n_units).proportion_ci(
-            0.95, method="exact"
-        )
-        interval["low"] = min(interval["low"], float(exact.low))
-        interval["high"] = max(interval["high"], float(exact.high))
+    low, high = interval["low"], interval["high"]
+    if value in (0.0, 1.0) and low is not None and high is not None:
+        trials = binomtest(round(value * n_units), n_units)
+        exact = trials.proportion_ci(0.95, method="exact")
+        interval["low"] = min(low, float(exact.low))
+        interval["high"] = max(high, float(exact.high))
     return interval
 
 
@@ -171,9 +155,7 @@ def finite(value: float) -> float | None:
 
 
 def interval_text(scored: Mapping[str, Any], form: str = ".2f") -> str:
-    """Value and interval in words, as ``0.53 [0.46, 0.59]``, or `NO_INTERVAL` behind a value that
-    has none.
-    """
+    """Value and interval in words, as ``0.53 [0.46, 0.59]``, or with `NO_INTERVAL`."""
     mean, low, high = (scored[key] for key in ("mean", "low", "high"))
     if mean is None:
         return "unknown"

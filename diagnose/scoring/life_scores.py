@@ -1,7 +1,4 @@
-"""Scores of predicted remaining lives.
-
-Errors, the PHM 2008 score, horizons and intervals, life by life.
-"""
+"""Scores of predicted remaining lives: errors, PHM 2008 score, horizons and intervals."""
 
 from __future__ import annotations
 
@@ -12,9 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.floating]
+from diagnose.data.windows import FloatArray
+from diagnose.scoring.metrics import units_drawn
+
 EARLY, LATE = 13.0, 10.0  # units of error in which the score grows e-fold, of PHM 2008
-UNITS = 125.0  # units of the score in the early level: the cycles at which C-MAPSS studies usually cut
+UNITS = 125.0  # of the score in the early level: cycles at which C-MAPSS studies usually cut
 BAND = (
     0.2  # of the early level, about the true remaining life, for the horizon; assumed
 )
@@ -31,13 +30,13 @@ MEASURES = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Snapshots:
-    """Test records of lives that failed, with what one trained method says of them.
+    """Test records of lives that failed, with the predictions of one trained method.
 
     Attributes
     ----------
     life : (record,) 0 to n_lives - 1
-    true, said : (record,) h, both cut at the early level
-    half_width : h, of the interval about what is said
+    true, said : (record,) h, true and predicted remaining life, both cut at the early level
+    half_width : h, of the interval about the prediction
     early_life : h
     """
 
@@ -59,29 +58,27 @@ class Snapshots:
 
 
 def interval(
-    said: FloatArray, half_width: float, early_life: float
+    predicted: FloatArray, half_width: float, early_life: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Lower and upper ends in h about what is said, (...) each.
+    """Lower and upper ends in h about predictions, (...) each.
 
-    The early level stands for itself and all above it.
+    The early level stands for itself and all longer lives.
     """
-    return np.maximum(said - half_width, 0.0), np.minimum(said + half_width, early_life)
+    low = np.maximum(predicted - half_width, 0.0)
+    return low, np.minimum(predicted + half_width, early_life)
 
 
 def intervals_hold(n_lives: int, coverage: float) -> bool:
-    """Whether so many calibration lives are enough for intervals of a coverage, see
-    `conformal_half_width`.
-    """
+    """True if the calibration lives are enough for a coverage, see `conformal_half_width`."""
     return bool((n_lives + 1) * (1 - coverage) >= 1 - 1e-9)
 
 
 def phm_score(error: FloatArray, early_life: float) -> FloatArray:
-    """Asymmetric score of PHM 2008, (...) for errors (...) in h: exp(-d/13) - 1 if d < 0, else
-    exp(d/10) - 1.
+    """Asymmetric score of PHM 2008: exp(-d/13) - 1 if d < 0, else exp(d/10) - 1.
 
-    d is what is predicted less what is true, so that d > 0, too late a warning, costs more. The
-    score was made for cycles of engines; here its unit is 1/125 of the early level, which is cut
-    at 125 cycles in most studies of them.
+    d is the error (...) in h, predicted less true, so that d > 0, too late a warning, costs more.
+    The score was made for cycles of engines. Here its unit is 1/125 of the early level, which is
+    125 cycles in most studies of them.
 
     Source: Saxena, Goebel, Simon & Eklund (2008), "Damage propagation modeling for aircraft
     engine run-to-failure simulation", International Conference on Prognostics and Health
@@ -89,56 +86,54 @@ def phm_score(error: FloatArray, early_life: float) -> FloatArray:
     each stopped at one snapshot. The unit is ours.
     """
     d = np.asarray(error, dtype=float) * (UNITS / early_life)
-    return np.where(
-        d < 0, np.expm1(-np.minimum(d, 0) / EARLY), np.expm1(np.maximum(d, 0) / LATE)
-    )
+    too_early, too_late = np.minimum(d, 0), np.maximum(d, 0)
+    return np.where(d < 0, np.expm1(-too_early / EARLY), np.expm1(too_late / LATE))
 
 
-def prognostic_horizon(true: FloatArray, said: FloatArray, band: float) -> float:
-    """Remaining life in h from which on everything said of a life stays within ``band`` h of it;
-    0 if not at its end.
+def prognostic_horizon(true: FloatArray, predicted: FloatArray, band: float) -> float:
+    """Remaining life in h from which on all predictions stay within ``band`` h; 0 if none do.
 
     Source: Saxena, Celaya, Saha, Saha & Goebel (2010), "Metrics for offline evaluation of
     prognostic performance", International Journal of Prognostics and Health Management 1 (1).
     Their band is a share of the whole life.
     """
     order = np.argsort(true, kind="stable")
-    outside = np.abs(said - true)[order] > band
-    n_inside = int(np.argmax(outside)) if outside.any() else outside.size
-    return float(true[order][n_inside - 1]) if n_inside else 0.0
+    true, predicted = true[order], predicted[order]
+    inside = np.logical_and.accumulate(np.abs(predicted - true) <= band)
+    return float(max(true[inside], default=0.0))
 
 
 def conformal_half_width(
     error: FloatArray, life: NDArray[Any], coverage: float
 ) -> float:
-    """Half width of intervals that hold a random snapshot of a new life with at least the
-    probability ``coverage``.
+    """Half width of intervals that hold a random snapshot of a new life at least with a
+    probability.
 
-    Every calibration life has the same weight 1/(n + 1), shared by its snapshots, and the new
-    life the last one at infinity: where n lives are too few, n + 1 < 1/(1 - coverage), the half
-    width is infinite.
+    Every calibration life has the same weight 1/(n + 1), shared by its snapshots. The new life
+    has the last weight, at infinity: for too few lives, n + 1 < 1/(1 - coverage), the half width
+    is infinite.
 
     Parameters
     ----------
     error : (record,) h absolute errors on lives that took no part in the fit
-    life : (record,) which life
-    coverage : from 0 to 1
+    life : (record,) name of the life
+    coverage : the probability, from 0 to 1
 
     Source: Lee, Barber & Willett (2023), "Distribution-free inference with hierarchical data",
     arXiv:2306.06342. It assumes lives that are exchangeable with the calibration lives; snapshots
-    of one life may be as alike as they are.
+    of one life may be arbitrarily similar.
     """
-    names, place, counts = np.unique(life, return_inverse=True, return_counts=True)
-    weight = 1.0 / ((names.size + 1) * counts[place])
+    names, position, counts = np.unique(life, return_inverse=True, return_counts=True)
+    weight = 1.0 / ((names.size + 1) * counts[position])
     order = np.argsort(error, kind="stable")
     reached = np.cumsum(weight[order]) >= coverage - 1e-9
-    return float(error[order][np.argmax(reached)]) if reached.any() else float("inf")
+    return float(min(error[order][reached], default=np.inf))
 
 
 def by_life(snapshots: Snapshots) -> dict[str, NDArray[Any]]:
-    """What `MEASURES` are made of, (life,) each.
+    """Values (life,) behind each of `MEASURES`: means over the snapshots of a life.
 
-    Means over the snapshots of a life, squared errors for the RMSE.
+    For the RMSE they are mean squared errors.
     """
     error = snapshots.said - snapshots.true
     inside = (snapshots.low <= snapshots.true) & (snapshots.true <= snapshots.high)
@@ -150,23 +145,20 @@ def by_life(snapshots: Snapshots) -> dict[str, NDArray[Any]]:
         "width_h": snapshots.high - snapshots.low,
     }
     counts = np.bincount(snapshots.life)
-    found = {
+    band = BAND * snapshots.early_life
+    last, horizon = np.empty(counts.size), np.empty(counts.size)
+    for life in range(counts.size):
+        member = snapshots.life == life
+        true, predicted = snapshots.true[member], snapshots.said[member]
+        # at the failure itself there is nothing left to predict
+        nearest = np.argmin(np.where(true > 0, true, np.inf))
+        last[life] = rows["phm_score"][member][nearest]
+        horizon[life] = prognostic_horizon(true, predicted, band)
+    means = {
         name: np.bincount(snapshots.life, weights=row) / counts
         for name, row in rows.items()
     }
-    last, horizon = np.empty(counts.size), np.empty(counts.size)
-    for life in range(counts.size):
-        mine = np.flatnonzero(snapshots.life == life)
-        before = mine[
-            snapshots.true[mine] > 0
-        ]  # at the failure itself there is nothing left to predict
-        at = before[np.argmin(snapshots.true[before])] if before.size else mine[0]
-        last[life] = rows["phm_score"][at]
-        band = BAND * snapshots.early_life
-        horizon[life] = prognostic_horizon(
-            snapshots.true[mine], snapshots.said[mine], band
-        )
-    return found | {"phm_score_last": last, "horizon_h": horizon}
+    return means | {"phm_score_last": last, "horizon_h": horizon}
 
 
 def life_scores(
@@ -177,18 +169,16 @@ def life_scores(
     Parameters
     ----------
     values : measure -> (seed, life) of `by_life`; the same seeds and lives for every measure
-    n_bootstrap : resamples, each drawing as many lives as there are, with all their snapshots, and as many seeds
+    n_bootstrap : resamples of the lives, with all their snapshots, and of the seeds
     rng : source of the resamples, the same draws for every measure
     """
-    some = next(iter(values.values()))
-    lives, seeds = drawn(some.shape[0], some.shape[1], n_bootstrap, rng)
-    found = {}
+    n_seeds, n_lives = next(iter(values.values())).shape
+    lives, seeds = drawn(n_seeds, n_lives, n_bootstrap, rng)
+    scores = {}
     for name, table in values.items():
-        resampled = _over_drawn(name, table, lives, seeds)
-        low, high = np.quantile(resampled, [0.025, 0.975])
-        mean = float(_finished(name, table.mean(axis=1)).mean())
-        found[name] = {"mean": mean, "low": float(low), "high": float(high)}
-    return found
+        mean = _finished(name, table.mean(axis=1)).mean()
+        scores[name] = _interval(mean, _over_drawn(name, table, lives, seeds))
+    return scores
 
 
 def gain(
@@ -198,31 +188,35 @@ def gain(
     n_bootstrap: int,
     rng: np.random.Generator,
 ) -> dict[str, float]:
-    """RMSE of ``against`` less that of ``values``, (seed, life) squared errors each, in h: above
-    0 is better.
+    """RMSE of ``against`` less that of ``values``, in h: above 0 is better.
 
-    Both on the same resamples of the lives; `low` and `high` are the 95 % interval.
+    Both are (seed, life) squared errors, scored on the same resamples of the lives. `low` and
+    `high` are the 95 % interval.
     """
-    lives, seeds = drawn(values.shape[0], values.shape[1], n_bootstrap, rng)
+    n_seeds, n_lives = values.shape
+    lives, seeds = drawn(n_seeds, n_lives, n_bootstrap, rng)
     other_seeds = rng.integers(against.shape[0], size=(n_bootstrap, against.shape[0]))
-    difference = _over_drawn("rmse_h", against, lives, other_seeds) - _over_drawn(
-        "rmse_h", values, lives, seeds
-    )
-    low, high = np.quantile(difference, [0.025, 0.975])
+    of_other = _over_drawn("rmse_h", against, lives, other_seeds)
+    of_values = _over_drawn("rmse_h", values, lives, seeds)
     mean = np.sqrt(against.mean(axis=1)).mean() - np.sqrt(values.mean(axis=1)).mean()
-    return {"mean": float(mean), "low": float(low), "high": float(high)}
+    return _interval(mean, of_other - of_values)
 
 
 def drawn(
     n_seeds: int, n_lives: int, n_bootstrap: int, rng: np.random.Generator
 ) -> tuple[Any, Any]:
-    """How often each life is drawn, (draw, life), and which seeds, (draw, seed).
+    """Counts of each life in each resample, (draw, life), and drawn seeds, (draw, seed).
 
     Source: percentile interval of Efron & Tibshirani (1993), "An introduction to the bootstrap",
     section 13.3.
     """
-    lives = rng.multinomial(n_lives, np.full(n_lives, 1 / n_lives), size=n_bootstrap)
+    lives = units_drawn(n_lives, n_bootstrap, rng)
     return lives, rng.integers(n_seeds, size=(n_bootstrap, n_seeds))
+
+
+def _interval(mean: float, resampled: FloatArray) -> dict[str, float]:
+    low, high = np.quantile(resampled, [0.025, 0.975])
+    return {"mean": float(mean), "low": float(low), "high": float(high)}
 
 
 def _over_drawn(name: str, table: FloatArray, lives: Any, seeds: Any) -> FloatArray:
@@ -232,4 +226,6 @@ def _over_drawn(name: str, table: FloatArray, lives: Any, seeds: Any) -> FloatAr
 
 
 def _finished(name: str, mean: FloatArray) -> FloatArray:
-    return np.sqrt(mean) if name == "rmse_h" else mean
+    if name == "rmse_h":
+        return np.sqrt(mean)
+    return mean

@@ -1,7 +1,4 @@
-"""Scores over records with intervals over units.
-
-Windows of one machine are no independent witnesses.
-"""
+"""Scores over records with intervals over units: windows of one machine are not independent."""
 
 from __future__ import annotations
 
@@ -13,20 +10,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-IntArray = NDArray[np.integer]
-FloatArray = NDArray[np.floating]
-CountArray = NDArray[np.integer]
+from diagnose.data.windows import FloatArray, IntArray
 
-# Of n units one resample in n^n holds the worst alone: of three or fewer more than 2.5 % do, and
-# a 95 % interval would
-# end at the worst and the best unit, of zero width where they agree.
+CountArray = NDArray[np.int64]
+
+# Of n units one resample in n^n holds the worst alone. For three or fewer that is more than
+# 2.5 %, and a 95 % interval would end at the worst and the best unit.
 LEAST_UNITS = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Score:
-    """Mean over seeds, its 95 % interval over units (None for fewer than `LEAST_UNITS`), and each
-    seed's own value.
+    """Mean over seeds, the value of each seed, and the 95 % interval over units.
+
+    The interval is None for fewer units than `LEAST_UNITS`.
     """
 
     mean: float
@@ -57,11 +54,9 @@ def over_records(
 
 
 def confusion_by_unit(
-    label: IntArray, predicted: IntArray, unit: NDArray, n_classes: int
-) -> NDArray[np.int64]:
-    """Counts (unit, true class, predicted class) from three (record,) arrays, units in sorted
-    order.
-    """
+    label: IntArray, predicted: IntArray, unit: NDArray[Any], n_classes: int
+) -> CountArray:
+    """Counts (unit, true class, predicted class) of three (record,) arrays, units sorted."""
     names, position = np.unique(unit, return_inverse=True)
     counts = np.zeros((names.size, n_classes, n_classes), dtype=np.int64)
     np.add.at(counts, (position, label, predicted), 1)
@@ -97,9 +92,20 @@ def macro_f1(confusion: CountArray) -> FloatArray:
 SCORES = {"balanced_accuracy": balanced_accuracy, "macro_f1": macro_f1}
 
 
+def units_drawn(n_units: int, n_bootstrap: int, rng: np.random.Generator) -> CountArray:
+    """Number of times that each resample holds each unit, (resample, unit).
+
+    A resample has as many draws with replacement as there are units.
+
+    Source: Efron & Tibshirani (1993), "An introduction to the bootstrap", section 8.3 (units, not
+    records, are drawn).
+    """
+    return rng.multinomial(n_units, np.full(n_units, 1 / n_units), size=n_bootstrap)
+
+
 def score_with_interval(
     name: str,
-    confusion: NDArray[np.int64],
+    confusion: CountArray,
     *,
     n_bootstrap: int,
     rng: np.random.Generator,
@@ -111,9 +117,9 @@ def score_with_interval(
     ----------
     name : key of `SCORES`
     confusion : (seed, unit, true class, predicted class) counts of records
-    n_bootstrap : resamples, each drawing as many units as there are, with all their records, and as many seeds
+    n_bootstrap : resamples of the units, with all their records, and of the seeds
     rng : source of the resamples
-    shuffled : whether the labels of the training were shuffled; the interval then covers the luck of the shuffle too
+    shuffled : True for shuffled training labels; the interval then covers the luck of the shuffle
 
     Source: percentile interval of Efron & Tibshirani (1993), "An introduction to the bootstrap",
     section 13.3. With few units it is too narrow: it is no wider than what the units at hand
@@ -122,23 +128,15 @@ def score_with_interval(
     score = SCORES[name]
     per_seed = score(confusion.sum(axis=1))
     n_units = confusion.shape[1]
-    times_drawn = rng.multinomial(
-        n_units, np.full(n_units, 1 / n_units), size=n_bootstrap
-    )
-    resampled = score(np.einsum("bu,sutp->bstp", times_drawn, confusion))
+    drawn = units_drawn(n_units, n_bootstrap, rng)
+    resampled = score(np.einsum("bu,sutp->bstp", drawn, confusion))
     if shuffled:
-        resampled = resampled + _renaming_luck(
-            name, confusion.sum(axis=1), n_bootstrap, rng
-        )
-    low, high = percentile_interval(
-        np.clip(_over_drawn_seeds(resampled, rng), 0, 1), n_units
-    )
-    return Score(
-        mean=float(np.mean(per_seed)),
-        low=low,
-        high=high,
-        per_seed=tuple(float(v) for v in per_seed),
-    )
+        luck = _renaming_luck(name, confusion.sum(axis=1), n_bootstrap, rng)
+        resampled = resampled + luck
+    values = np.clip(over_drawn_seeds(resampled, rng), 0, 1)
+    low, high = percentile_interval(values, n_units)
+    mean, by_seed = float(np.mean(per_seed)), tuple(per_seed.tolist())
+    return Score(mean=mean, low=low, high=high, per_seed=by_seed)
 
 
 def percentile_interval(
@@ -152,25 +150,25 @@ def percentile_interval(
 
 
 def is_above(score: Mapping[str, Any], level: float) -> bool:
-    """Whether a whole interval lies above a level; False where there is no interval."""
+    """True if a whole interval lies above a level; False without an interval."""
     return score["low"] is not None and bool(score["low"] > level)
 
 
 def ratio_with_interval(
     name: str,
-    confusion: NDArray[np.int64],
-    reference: NDArray[np.int64],
+    confusion: CountArray,
+    reference: CountArray,
     *,
     n_bootstrap: int,
     rng: np.random.Generator,
 ) -> dict[str, float | None]:
-    """Score over that of a reference on the same units, each a mean over its seeds, with a 95 %
-    interval.
+    """Ratio of a score to that of a reference on the same units, with a 95 % interval.
 
     Parameters
     ----------
     name : key of `SCORES`
-    confusion, reference : (seed, unit, true class, predicted class) counts of records; the same units in the same order
+    confusion, reference : (seed, unit, true class, predicted class) counts of records; the same
+        units in the same order. Both scores are means over their seeds
     n_bootstrap : resamples; each draws the units once for both, and the seeds of each
     rng : source of the resamples
 
@@ -179,36 +177,32 @@ def ratio_with_interval(
     ``mean``, ``low``, ``high``; the last two None for fewer than `LEAST_UNITS`
     """
     score, n_units = SCORES[name], confusion.shape[1]
-    times_drawn = rng.multinomial(
-        n_units, np.full(n_units, 1 / n_units), size=n_bootstrap
-    )
-    above, below = (
-        _over_drawn_seeds(score(np.einsum("bu,sutp->bstp", times_drawn, counts)), rng)
-        for counts in (confusion, reference)
-    )
-    least = np.finfo(float).tiny  # a reference that finds nothing in a resample
-    low, high = percentile_interval(above / np.maximum(below, least), n_units)
-    mean = np.mean(score(confusion.sum(axis=1))) / max(
-        np.mean(score(reference.sum(axis=1))), least
-    )
-    return {"mean": float(mean), "low": low, "high": high}
+    drawn = units_drawn(n_units, n_bootstrap, rng)
+    means, resampled = [], []
+    for counts in (confusion, reference):
+        values = score(np.einsum("bu,sutp->bstp", drawn, counts))
+        resampled.append(over_drawn_seeds(values, rng))
+        means.append(np.mean(score(counts.sum(axis=1))))
+    least = np.finfo(float).tiny  # for a reference that finds nothing in a resample
+    ratios = resampled[0] / np.maximum(resampled[1], least)
+    low, high = percentile_interval(ratios, n_units)
+    return {"mean": float(means[0] / max(means[1], least)), "low": low, "high": high}
 
 
-def _over_drawn_seeds(resampled: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """(draw,) mean over as many seeds as there are, drawn anew for each draw, from (draw, seed)."""
+def over_drawn_seeds(resampled: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """(draw,) means of (draw, seed) values over as many seeds, drawn for each draw."""
     seeds = rng.integers(resampled.shape[1], size=resampled.shape)
     return np.take_along_axis(resampled, seeds, axis=1).mean(axis=1)
 
 
 def _renaming_luck(
-    name: str, confusion: NDArray[np.int64], n_draws: int, rng: np.random.Generator
-) -> NDArray[np.floating]:
-    """How far a score strays, (draw, seed), when the predicted classes (last axis) are renamed at
-    random.
+    name: str, confusion: CountArray, n_draws: int, rng: np.random.Generator
+) -> FloatArray:
+    """Deviation of a score, (draw, seed), if the predicted classes are renamed at random.
 
-    A network that finds the groups but was told nothing of their names scores by luck: all of a
-    class right or wrong. Without a leak every naming is as likely, so that the namings not seen
-    show the spread of the one that was.
+    A network that finds the groups without their names scores by luck: all of a class right or
+    wrong. Without a leak all namings are equally likely, so that the other namings show the
+    spread of the one at hand.
     """
     n_seeds, n_classes = confusion.shape[:2]
     names = rng.permuted(np.tile(np.arange(n_classes), (n_draws, n_seeds, 1)), axis=2)

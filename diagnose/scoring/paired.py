@@ -1,4 +1,4 @@
-"""Is one method better than another: both judged on the same units, each unit one witness."""
+"""Paired comparison of two methods on the same units."""
 
 from __future__ import annotations
 
@@ -6,18 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from diagnose.scoring.judged import (
-    Judged,
-    resampled_score,
-    score,
-    units_drawn,
-    with_interval,
-)
+from diagnose.data.windows import FloatArray
+from diagnose.scoring.judged import Judged, resampled_score, score, with_interval
+from diagnose.scoring.metrics import units_drawn
 
-FloatArray = NDArray[np.floating]
-N_PERMUTATIONS = 9999  # all of them where there are no more
+ACCURACY = "balanced_accuracy"
+N_PERMUTATIONS = 9999  # all of them if there are fewer
 
 
 def compare(
@@ -29,11 +24,10 @@ def compare(
 ) -> list[dict[str, Any]]:
     """Difference of balanced accuracy, network less another method, one row a method.
 
-    The interval comes of resampled units (the same for both) and seeds. The p-value is that of a
-    permutation test over units: if the two were alike, swapping what they say of all records of a
-    unit would change nothing. McNemar's test would count every record as a witness of its own,
-    and records of one unit are none. The p-values are of the trainings at hand, corrected for the
-    number of rows.
+    The interval is that of resampled units (the same for both) and seeds. The p-value is that of
+    a permutation test over units: for equal methods, swapping their predictions for all records
+    of a unit changes nothing. McNemar's test would treat the records of a unit as independent.
+    The p-values are those of the trainings at hand, corrected for the number of rows.
 
     Parameters
     ----------
@@ -47,13 +41,11 @@ def compare(
     rejective multiple test procedure", Scandinavian Journal of Statistics 6 (2).
     """
     drawn = units_drawn(network.n_units, n_bootstrap, rng)
-    mine = resampled_score(network, "balanced_accuracy", drawn, rng)
+    of_network = resampled_score(network, ACCURACY, drawn, rng)
     rows: list[dict[str, Any]] = []
     for other in others:
-        difference = score(network, "balanced_accuracy") - score(
-            other, "balanced_accuracy"
-        )
-        resampled = mine - resampled_score(other, "balanced_accuracy", drawn, rng)
+        difference = score(network, ACCURACY) - score(other, ACCURACY)
+        resampled = of_network - resampled_score(other, ACCURACY, drawn, rng)
         rows.append(
             {
                 "method": network.method,
@@ -72,20 +64,18 @@ def compare(
 def permutation_p_value(
     first: Judged, second: Judged, rng: np.random.Generator
 ) -> float:
-    """Two-sided p-value that two methods have the same balanced accuracy, by swapping them unit
-    by unit.
+    """Two-sided p-value of equal balanced accuracy; 1 for a single unit.
 
     Balanced accuracy is a sum over units (each class counts by its records in the whole test
-    part), so that swapping two methods in a unit changes the sign of the unit's part of the
-    difference. 1 for a single unit.
+    part). Swapping two methods in a unit therefore changes the sign of the unit's part of the
+    difference.
     """
     from scipy.stats import permutation_test
 
     if first.n_units < 2:
         return 1.0
-    parts = (_part_of_unit(first), _part_of_unit(second))
     result = permutation_test(
-        parts,
+        (_part_of_unit(first), _part_of_unit(second)),
         lambda a, b, axis: np.sum(a - b, axis=axis),
         permutation_type="samples",
         vectorized=True,
@@ -96,20 +86,19 @@ def permutation_p_value(
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
-    """The same p-values, corrected so that the chance of any false finding among them is kept.
+    """P-values corrected for their number, so that the chance of any false one is kept.
 
     Source: Holm (1979).
     """
     values = np.asarray(p_values, dtype=float)
     order = np.argsort(values, kind="stable")
     stepped = np.maximum.accumulate(values[order] * np.arange(values.size, 0, -1))
-    adjusted = np.empty_like(values)
-    adjusted[order] = np.minimum(stepped, 1.0)
-    return [float(value) for value in adjusted]
+    values[order] = np.minimum(stepped, 1.0)
+    return values.tolist()
 
 
 def _part_of_unit(judged: Judged) -> FloatArray:
-    """(unit,) what each unit adds to the balanced accuracy, mean over the seeds."""
+    """(unit,) contribution of each unit to the balanced accuracy, mean over the seeds."""
     hits = np.diagonal(judged.confusion(), axis1=-2, axis2=-1).mean(axis=0)
     totals = np.bincount(judged.label, minlength=hits.shape[1])
     present = totals > 0
@@ -117,20 +106,17 @@ def _part_of_unit(judged: Judged) -> FloatArray:
 
 
 def _sentence(row: dict[str, Any]) -> str:
-    difference = row["difference"]
-    what = f"{row['method']} against {row['against'].replace('_', ' ')}: {difference['mean']:+.2f}"
-    if difference["low"] is None:
-        return f"{what}; one unit shows no spread, so that nothing can be said"
-    sure = (
-        row["p_value_holm"] < 0.05 and not difference["low"] <= 0 <= difference["high"]
-    )
-    p_value = (
-        "p < 0.001" if row["p_value_holm"] < 0.001 else f"p = {row['p_value_holm']:.3f}"
-    )
-    verdict = (
-        ("better" if difference["mean"] > 0 else "worse") if sure else "not told apart"
-    )
+    mean, low, high = (row["difference"][key] for key in ("mean", "low", "high"))
+    methods = f"{row['method']} against {row['against'].replace('_', ' ')}: {mean:+.2f}"
+    if low is None:
+        return f"{methods}; one unit shows no spread, so that nothing can be said"
+    p_value = f"p = {row['p_value_holm']:.3f}"
+    if row["p_value_holm"] < 0.001:
+        p_value = "p < 0.001"
+    verdict = "not told apart"
+    if row["p_value_holm"] < 0.05 and not low <= 0 <= high:
+        verdict = "better" if mean > 0 else "worse"
     return (
-        f"{what} [{difference['low']:+.2f}, {difference['high']:+.2f}] balanced accuracy, "
+        f"{methods} [{low:+.2f}, {high:+.2f}] balanced accuracy, "
         f"{p_value} (permutation of {row['n_units']} units, Holm): {verdict}"
     )

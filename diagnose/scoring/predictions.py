@@ -1,7 +1,4 @@
-"""What each method said of each test record, of which every score is made.
-
-``predictions.csv`` for other programs.
-"""
+"""Predictions of each method for each test record, and ``predictions.csv``."""
 
 from __future__ import annotations
 
@@ -15,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from diagnose.data.windows import Task
+    from diagnose.data.windows import FloatArray, IntArray, Task
     from diagnose.networks.adaptation import Statistics
     from diagnose.networks.domain import Domain
 
-# Columns of the data set beside each prediction, as far as it has them.
+# Columns of the data set that are written with each prediction, if it has them.
 CONDITION_COLUMNS = (
     "unit_id",
     "specimen_id",
@@ -33,37 +30,35 @@ CONDITION_COLUMNS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rows:
-    """What a method says of records, or of windows in time order.
+    """Record (row,) and log-probabilities (row, class) of records, or of windows in time order."""
 
-    Record (row,) and log-probabilities (row, class).
-    """
-
-    record: NDArray[np.integer]
-    log_probability: NDArray[np.floating]
+    record: IntArray
+    log_probability: FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prediction:
-    """Test records of a protocol with what one method, trained with one seed, says of them.
+    """Predictions of one method, trained with one seed, for the test records of a protocol.
 
     Attributes
     ----------
-    record : (record,) place in the data set, sorted, each once
-    log_probability : (record, class) mean over the windows; of ridge regression a score that ranks alike
-    detail : what was fitted or trained, in words
-    validation : the same for the validation records; None where they are test records too
+    record : (record,) index in the data set, sorted, each once
+    log_probability : (record, class) mean over the windows; for ridge regression a score that
+        ranks in the same order
+    detail : description of the fit or training
+    validation : the same for the validation records; None if they are test records too
     windows : of networks only, for each window of the test records
-    weights, domain, healthy, best_epoch, validation_loss, temperature, last_predicted : of networks only;
-        `temperature` as in `diagnose.networks.calibration`, `last_predicted` (record,) the labels
-        that the weights of the last epoch give
+    weights, domain, healthy, best_epoch, validation_loss, temperature, last_predicted : of
+        networks only; `temperature` as in `diagnose.networks.calibration`, `last_predicted`
+        (record,) the labels by the weights of the last epoch
     heads : of a network that has them, `diagnose.training.heads.predict_heads`
     """
 
     protocol: str
     method: str
     seed: int
-    record: NDArray[np.integer]
-    log_probability: NDArray[np.floating]
+    record: IntArray
+    log_probability: FloatArray
     detail: str
     validation: Rows | None = None
     windows: Rows | None = None
@@ -73,11 +68,11 @@ class Prediction:
     best_epoch: int = 0
     validation_loss: tuple[float, ...] = ()
     temperature: float = 1.0
-    last_predicted: NDArray[np.integer] | None = None
-    heads: Mapping[str, NDArray[np.floating]] = field(default_factory=dict)
+    last_predicted: IntArray | None = None
+    heads: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @property
-    def predicted(self) -> NDArray[np.integer]:
+    def predicted(self) -> IntArray:
         """(record,) the most probable class."""
         return self.log_probability.argmax(axis=1)
 
@@ -85,9 +80,10 @@ class Prediction:
 def write_predictions(
     path: Path, task: Task, predictions: Sequence[Prediction]
 ) -> None:
-    """Write one row a prediction.
+    """Write one row for each prediction of a record.
 
-    Protocol, method, seed, record, its true class and condition, log-probabilities.
+    It holds protocol, method, seed, record and its condition, true and predicted class, and the
+    log-probabilities.
     """
     dataset, labels = task.dataset, task.labels()
     known = [name for name in CONDITION_COLUMNS if name in dataset.column_names]
@@ -99,15 +95,12 @@ def write_predictions(
             + [f"log_probability_{name}" for name in task.class_names]
         )
         for prediction in predictions:
-            for record, guess, scores in zip(
-                prediction.record,
-                prediction.predicted,
-                prediction.log_probability,
-                strict=True,
-            ):
+            trained = [prediction.protocol, prediction.method, prediction.seed]
+            rows = (prediction.record, prediction.predicted, prediction.log_probability)
+            for record, label, scores in zip(*rows, strict=True):
                 writer.writerow(
-                    [prediction.protocol, prediction.method, prediction.seed]
+                    trained
                     + [column[record] for column in columns.values()]
-                    + [task.class_names[labels[record]], task.class_names[guess]]
+                    + [task.class_names[labels[record]], task.class_names[label]]
                     + [f"{score:.5g}" for score in scores]
                 )

@@ -1,7 +1,4 @@
-"""How much a longer signal helps.
-
-Records judged by their first windows only, with the networks as trained.
-"""
+"""Scores of records by their first windows only: the effect of a longer signal."""
 
 from __future__ import annotations
 
@@ -10,20 +7,16 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from diagnose.data.windows import FloatArray, IntArray
 from diagnose.scoring.judged import (
     Judged,
     interval_text,
     resampled_score,
     score,
-    units_drawn,
     with_interval,
 )
-from diagnose.scoring.metrics import over_records
-
-IntArray = NDArray[np.integer]
-FloatArray = NDArray[np.floating]
+from diagnose.scoring.metrics import over_records, units_drawn
 
 
 def by_window_length(
@@ -35,51 +28,48 @@ def by_window_length(
     n_bootstrap: int,
     rng: np.random.Generator,
 ) -> dict[str, Any]:
-    """Balanced accuracy of records judged by their first 1, 2, 4, ... windows and by all of them.
+    """Balanced accuracy by the first 1, 2, 4, ... windows of each record, and by all of them.
 
     Parameters
     ----------
     judged : the network on the test records, these sorted by their number
-    windows : for each seed, record (window,) and log-probabilities (window, class), windows of a record in time order
-    window_seconds, step_seconds : length of a window and from one to the next, s
+    windows : for each seed, record (window,) and log-probabilities (window, class), windows of a
+        record in time order
+    window_seconds, step_seconds : length of a window and step to the next one, s
     n_bootstrap, rng : resamples of the units and their source
 
     Returns
     -------
     rows : windows, seconds of signal, score with interval
-    gain : what all windows bring over the first one, from the same resamples
+    gain : score by all windows less that by the first one, from the same resamples
     summary : one sentence
     """
-    place = [_place_in_record(record) for record, _ in windows]
-    longest = int(max(order.max() for order in place)) + 1
-    counts = [
-        2**power for power in range(longest.bit_length()) if 2**power < longest
-    ] + [longest]
+    positions = [_position_in_record(record) for record, _ in windows]
+    longest = int(max(position.max() for position in positions)) + 1
+    counts = [1 << power for power in range((longest - 1).bit_length())] + [longest]
     drawn = units_drawn(judged.n_units, n_bootstrap, rng)
     rows, resampled, scores = [], [], []
     for count in counts:
-        by_record = [
-            over_records(scored[order < count], record[order < count])[1]
-            for (record, scored), order in zip(windows, place, strict=True)
-        ]
+        by_record = []
+        for (record, scored), position in zip(windows, positions, strict=True):
+            first = position < count
+            by_record.append(over_records(scored[first], record[first])[1])
         part = replace(judged, log_probability=np.stack(by_record))
-        # the same seeds in every row: what differs is the length alone
-        resampled.append(
-            resampled_score(part, "balanced_accuracy", drawn, np.random.default_rng(0))
-        )
-        scores.append(score(part, "balanced_accuracy"))
+        # the same seeds in every row, so that only the length differs
+        seeds = np.random.default_rng(0)
+        values = resampled_score(part, "balanced_accuracy", drawn, seeds)
+        mean = score(part, "balanced_accuracy")
         rows.append(
             {
                 "n_windows": count,
                 "seconds": window_seconds + (count - 1) * step_seconds,
-                "balanced_accuracy": with_interval(
-                    scores[-1], resampled[-1], judged.n_units
-                ),
+                "balanced_accuracy": with_interval(mean, values, judged.n_units),
             }
         )
-    gain = with_interval(
-        scores[-1] - scores[0], resampled[-1] - resampled[0], judged.n_units
-    )
+        resampled.append(values)
+        scores.append(mean)
+    differences = resampled[-1] - resampled[0]
+    gain = with_interval(scores[-1] - scores[0], differences, judged.n_units)
     return {
         "method": judged.method,
         "rows": rows,
@@ -88,13 +78,13 @@ def by_window_length(
     }
 
 
-def _place_in_record(record: IntArray) -> IntArray:
+def _position_in_record(record: IntArray) -> IntArray:
     """(window,) 0 for the first window of its record, 1 for the second, ..."""
     order = np.argsort(record, kind="stable")
     _, first, counts = np.unique(record[order], return_index=True, return_counts=True)
-    place = np.empty_like(order)
-    place[order] = np.arange(record.size) - np.repeat(first, counts)
-    return place
+    position = np.empty_like(order)
+    position[order] = np.arange(record.size) - np.repeat(first, counts)
+    return position
 
 
 def _sentence(
@@ -102,20 +92,19 @@ def _sentence(
 ) -> str:
     first, last = rows[0], rows[-1]
     if len(rows) == 1:
-        return (
-            f"Records hold one window of {first['seconds']:.3g} s: nothing to compare."
-        )
+        seconds = f"{first['seconds']:.3g} s"
+        return f"Records hold one window of {seconds}: nothing to compare."
     text = (
-        f"{method} scores {interval_text(first['balanced_accuracy'])} on the first {first['seconds']:.3g} s of a "
-        f"record and {interval_text(last['balanced_accuracy'])} on {last['seconds']:.3g} s"
+        f"{method} scores {interval_text(first['balanced_accuracy'])} "
+        f"on the first {first['seconds']:.3g} s of a record and "
+        f"{interval_text(last['balanced_accuracy'])} on {last['seconds']:.3g} s"
     )
-    if gain["low"] is None or gain["high"] is None:
+    low, high = gain["low"], gain["high"]
+    if low is None or high is None:
         return text + "."
-    verdict = (
-        "more signal helps"
-        if gain["low"] > 0
-        else "more signal hurts"
-        if gain["high"] < 0
-        else "not told apart"
-    )
-    return f"{text}: {verdict} ({gain['mean']:+.2f} [{gain['low']:+.2f}, {gain['high']:+.2f}])."
+    verdict = "not told apart"
+    if low > 0:
+        verdict = "more signal helps"
+    elif high < 0:
+        verdict = "more signal hurts"
+    return f"{text}: {verdict} ({gain['mean']:+.2f} [{low:+.2f}, {high:+.2f}])."

@@ -1,43 +1,37 @@
-"""A small convolutional autoencoder of windows.
-
-What it cannot rebuild is unlike what it was trained on.
-"""
+"""A small convolutional autoencoder of windows, whose reconstruction error shows novelty."""
 
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import nn
 
-from diagnose.data.windows import WindowSet, input_scale
+from diagnose.data.windows import FloatArray, WindowSet, input_scale
 from diagnose.settings import TrainSettings
 from diagnose.training.train import device_of
 from gensig.errors import ConfigError, SimulationError
 
-FloatArray = NDArray[np.floating]
-
-STRIDES = (
-    16,
-    4,
-    2,
-)  # assumed: the first kernel is four strides long, as that of configs/model/cnn.yaml, the others two
+# Assumed: the first kernel is four strides long, as in configs/model/cnn.yaml, the others two.
+STRIDES = (16, 4, 2)
 WIDTHS = (16, 32, 8)  # assumed: the code is 8 numbers every 128 samples
+STEP = math.prod(STRIDES)  # samples of one step of the code
 STRETCH = 64  # samples, 1.25 ms at 51.2 kHz: about one mesh period at 800 Hz
 MOST_WINDOWS = 1000  # drawn an epoch
 
 
 class WindowAutoencoder(nn.Module):
-    """Three strided convolutions, and three transposed ones that mirror them; batch normalisation
-    and ReLU between.
+    """Three strided convolutions, and three transposed ones as their mirror image.
+
+    Batch normalisation and ReLU follow each of them, except for the code and the output.
 
     Parameters
     ----------
-    scale : (channel,) what the input is divided by
+    scale : (channel,) divisor of the input
 
     Source: Masci, Meier, Ciresan & Schmidhuber (2011), "Stacked convolutional auto-encoders for
     hierarchical feature extraction", ICANN, with strides in place of pooling, trained as one.
@@ -73,19 +67,18 @@ class WindowAutoencoder(nn.Module):
         )
 
     def forward(self, windows: torch.Tensor) -> torch.Tensor:
-        """Squared error (window, sample) of the rebuilt windows (window, channel, sample), mean
-        over the channels.
+        """Squared error (window, sample) of the rebuilt windows, mean over the channels.
 
-        Samples past the last whole step of the code are left out.
+        The windows are (window, channel, sample). Samples past the last whole step of the code
+        are left out.
         """
-        step = int(np.prod(STRIDES))
-        scaled = windows[..., : windows.shape[-1] // step * step] / self.scale
+        scaled = windows[..., : windows.shape[-1] // STEP * STEP] / self.scale
         return (self.decoder(self.encoder(scaled)) - scaled).square().mean(dim=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Autoencoder:
-    """A trained autoencoder in evaluation mode; `best_epoch` of validation units counts from 1."""
+    """A trained autoencoder in evaluation mode; `best_epoch` on the validation units, from 1."""
 
     model: WindowAutoencoder
     best_epoch: int
@@ -98,24 +91,25 @@ def check_window_for_autoencoder(window_samples: int) -> None:
     ------
     ConfigError    with the least number of samples
     """
-    least = int(np.prod(STRIDES))
-    if window_samples < least:
+    if window_samples < STEP:
         raise ConfigError(
-            f"window_samples={window_samples} is too short for the autoencoder; give at least {least}"
+            f"window_samples={window_samples} is too short for the autoencoder; "
+            f"give at least {STEP}"
         )
 
 
 def fit_autoencoder(
     train: WindowSet, validation: WindowSet, *, settings: TrainSettings, seed: int
 ) -> Autoencoder:
-    """Train on windows of known kind; the weights kept are those of the least error on other
-    units of that kind.
+    """Train on windows of known kind, up to the least error on other units of that kind.
 
     Parameters
     ----------
-    train, validation : of different units; training windows start anywhere in their stretch, anew each epoch
+    train, validation : of different units; training windows start anywhere in their stretch, at
+        other samples each epoch
     settings : epochs, patience, batch size, learning rate, device
-    seed : decides initial weights, order and window starts; the same seed gives the same bits on the same processor
+    seed : decides initial weights, order and window starts; the same seed gives the same bits on
+        the same processor
 
     Raises
     ------
@@ -125,29 +119,24 @@ def fit_autoencoder(
     rng = np.random.default_rng([seed, 3])
     held_out = torch.from_numpy(validation.cut(np.arange(len(validation))))
     n_drawn = min(len(train), MOST_WINDOWS)
+    n_batches = max(n_drawn // settings.batch_size, 1)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         model = WindowAutoencoder(input_scale(train)).to(device)
         optimizer = torch.optim.Adam(model.parameters(), lr=settings.learning_rate)
-        best, best_weights, best_epoch = np.inf, model.state_dict(), 0
+        best, best_epoch, best_weights = np.inf, 0, model.state_dict()
         for epoch in range(1, settings.epochs + 1):
             model.train()
-            for batch in np.array_split(
-                rng.permutation(len(train))[:n_drawn],
-                max(n_drawn // settings.batch_size, 1),
-            ):
+            drawn = rng.permutation(len(train))[:n_drawn]
+            for batch in np.array_split(drawn, n_batches):
                 optimizer.zero_grad()
-                model(
-                    torch.from_numpy(train.cut(batch, rng)).to(device)
-                ).mean().backward()
+                windows = torch.from_numpy(train.cut(batch, rng)).to(device)
+                model(windows).mean().backward()
                 optimizer.step()
             loss = float(_errors(model, held_out).mean())
             if loss < best:
-                best, best_weights, best_epoch = (
-                    loss,
-                    copy.deepcopy(model.state_dict()),
-                    epoch,
-                )
+                best, best_epoch = loss, epoch
+                best_weights = copy.deepcopy(model.state_dict())
             if epoch - best_epoch >= settings.patience:
                 break
     if best_epoch == 0:
@@ -161,21 +150,20 @@ def fit_autoencoder(
 def reconstruction_error(
     autoencoder: Autoencoder, windows: WindowSet, *, batch_size: int = 64
 ) -> FloatArray:
-    """(window,) largest mean squared error over a stretch of `STRETCH` samples, at the planned
-    starts.
+    """(window,) largest mean squared error over `STRETCH` samples, at the planned starts.
 
-    A fault of one tooth shows for a moment once a turn: the mean over the window drowns it in the
-    noise, which no autoencoder rebuilds. The largest in place of the mean is ours.
+    A fault of one tooth shows for a moment once a turn. In the mean over the window it is hidden
+    by the noise, which no autoencoder rebuilds. The largest value instead of the mean is ours.
 
     Source of the error as novelty: Japkowicz, Myers & Gluck (1995), "A novelty detection approach
     to classification", IJCAI.
     """
-    every = np.arange(len(windows))
-    found = []
-    for block in np.array_split(every, -(-every.size // batch_size)):
+    largest = []
+    for block in windows.blocks(batch_size):
         error = _errors(autoencoder.model, torch.from_numpy(windows.cut(block)))
-        found.append(error.unfold(1, STRETCH, STRETCH // 2).mean(dim=2).amax(dim=1))
-    return torch.cat(found).numpy().astype(float)
+        means = error.unfold(1, STRETCH, STRETCH // 2).mean(dim=2)
+        largest.append(means.amax(dim=1))
+    return torch.cat(largest).numpy().astype(float)
 
 
 def _errors(
@@ -184,7 +172,6 @@ def _errors(
     """(window, sample) on the processor, in batches that stay in its cache."""
     model.eval()
     device = model.scale.device
+    blocks = windows.split(batch_size)
     with torch.inference_mode():
-        return torch.cat(
-            [model(block.to(device)).cpu() for block in windows.split(batch_size)]
-        )
+        return torch.cat([model(block.to(device)).cpu() for block in blocks])

@@ -1,4 +1,4 @@
-"""Classes as what a network learns: cross-entropy, further heads, log-probabilities of records."""
+"""Classes as learning target: cross-entropy, further heads, log-probabilities of records."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from torch import nn
 from torch.nn.functional import cross_entropy, log_softmax
 
-from diagnose.data.targets import further_loss, place_loss
-from diagnose.data.windows import WindowSet
+from diagnose.data.targets import further_loss, position_loss
+from diagnose.data.windows import FloatArray, IntArray, WindowSet
 from diagnose.networks.calibration import fit_temperature
 from diagnose.networks.network import Network
 from diagnose.networks.registry import build_model
 from diagnose.scoring.metrics import over_records
-from diagnose.training.target import FloatArray, IntArray, LearningTarget
+from diagnose.training.target import LearningTarget
 from gensig.options.configuration import Section
 
 HEADS_WEIGHT = 0.3  # of each further head against the classes; assumed
@@ -59,12 +59,11 @@ class Classes(LearningTarget[Network]):
         windows: WindowSet,
         batch: IntArray,
     ) -> torch.Tensor:
-        """Cross-entropy of the classes, and the losses of further heads and of the fault's place."""
+        """Cross-entropy of the classes, and losses of further heads and of the fault's tooth."""
         device = signals.device
         label = torch.from_numpy(windows.label[batch]).to(device)
-        weight = torch.from_numpy(_class_weights(windows.label, self.n_classes)).to(
-            device
-        )
+        weights = _class_weights(windows.label, self.n_classes)
+        weight = torch.from_numpy(weights).to(device)
         targets = {
             name: torch.from_numpy(values[batch]).to(device)
             for name, values in windows.targets.items()
@@ -74,10 +73,13 @@ class Classes(LearningTarget[Network]):
             loss = cross_entropy(answers["classes"], label, weight=weight)
             if model.further:
                 loss = loss + HEADS_WEIGHT * further_loss(answers, label, targets)
-            if "places" in answers and {"gear", "place"} <= set(targets):
-                gear, place = targets["gear"], targets["place"]
-                loss = loss + place_loss(
-                    answers["places"], label, gear, place, model.turns
+            if "places" in answers and {"gear", "position"} <= set(targets):
+                loss = loss + position_loss(
+                    answers["places"],
+                    label,
+                    targets["gear"],
+                    targets["position"],
+                    model.turns,
                 )
         return loss
 
@@ -91,9 +93,8 @@ class Classes(LearningTarget[Network]):
         """Cross-entropy of record predictions, each class present counting the same."""
         by_record, label = _over_labelled_records(answers, windows)
         losses = -by_record[np.arange(label.size), label]
-        return float(
-            np.mean([losses[label == present].mean() for present in np.unique(label)])
-        )
+        by_class = [losses[label == present].mean() for present in np.unique(label)]
+        return float(np.mean(by_class))
 
     def temperature(self, answers: FloatArray, windows: WindowSet) -> float:
         """Temperature with the least cross-entropy over the records."""
@@ -107,10 +108,11 @@ def predict_windows(
 
     The batch size changes speed only.
     """
-    every = np.arange(len(windows))
-    blocks = np.array_split(every, -(-every.size // batch_size))
-    signals = (torch.from_numpy(windows.cut(block)) for block in blocks)
-    return np.concatenate([_log_probabilities(model, block) for block in signals])
+    rows = []
+    for block in windows.blocks(batch_size):
+        signals = torch.from_numpy(windows.cut(block))
+        rows.append(_log_probabilities(model, signals))
+    return np.concatenate(rows)
 
 
 def _log_probabilities(model: nn.Module, signals: torch.Tensor) -> FloatArray:
@@ -140,13 +142,13 @@ def with_shuffled_labels(
     n_classes: int,
     rng: np.random.Generator,
 ) -> WindowSet:
-    """Windows whose labels tell nothing of the class, all of a record the same; no other targets.
+    """Windows whose labels do not depend on the class, one label a record; no other targets.
 
-    Within each true class all labels are dealt in the same proportions, in random order. A plain
-    permutation leaves every class a majority label by chance, and a network that finds the classes
-    then scores 0, 1/4, 1/2, ... at random.
+    Within each true class all labels have the same shares, in random order. A plain permutation
+    leaves every class a majority label by chance, and a network that finds the classes then
+    scores 0, 1/4, 1/2, ... at random.
     """
-    records, first, position = np.unique(
+    _, first, position = np.unique(
         windows.record, return_index=True, return_inverse=True
     )
     true = windows.label[first]
@@ -154,29 +156,22 @@ def with_shuffled_labels(
     shuffled = np.empty_like(true)
     for label in np.unique(true):
         members = np.flatnonzero(true == label)
-        dealt = np.repeat(
-            np.arange(n_classes),
-            np.floor(share * members.size + 1e-9).astype(int),
-        )
-        n_missing = members.size - dealt.size
-        left = np.flatnonzero(share > 0)
-        if n_missing <= left.size:
-            extra = rng.permutation(left)[:n_missing]
-        else:
-            extra = rng.choice(left, n_missing)
-        shuffled[members] = rng.permutation(np.concatenate([dealt, extra]))
-    assert records.size == shuffled.size
+        counts = np.floor(share * members.size + 1e-9).astype(int)
+        labels = np.repeat(np.arange(n_classes), counts)
+        n_missing = members.size - labels.size
+        extra = rng.permutation(np.flatnonzero(share > 0))[:n_missing]
+        shuffled[members] = rng.permutation(np.concatenate([labels, extra]))
     return replace(windows, label=shuffled[position], targets={})
 
 
 def _mixed_precision(device: torch.device) -> torch.autocast:
-    """Products in bfloat16 on a GPU that computes in it (capability 8), 32 bits elsewhere."""
+    """Products in bfloat16 on a GPU that supports it (capability 8), else in 32 bits."""
     capable = device.type == "cuda" and torch.cuda.get_device_capability(device)[0] >= 8
     return torch.autocast(device.type, dtype=torch.bfloat16, enabled=capable)
 
 
 def _class_weights(label: IntArray, n_classes: int) -> NDArray[np.float32]:
-    """Inverse frequency of each class, so that rare classes count the same; 0 for an absent one."""
+    """Inverse frequency of each class, so that all count the same; 0 for an absent one."""
     counts = np.bincount(label, minlength=n_classes).astype(np.float32)
     present = counts > 0
     total = counts.sum() / present.sum()

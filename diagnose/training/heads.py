@@ -1,6 +1,4 @@
-"""What a network says beside the class, how severe a fault is and on which gear, and how far that
-is right.
-"""
+"""Predictions of the further heads, severity and faulty gear, and their scores."""
 
 from __future__ import annotations
 
@@ -14,7 +12,7 @@ from numpy.typing import NDArray
 from torch.nn.functional import log_softmax
 
 from diagnose.data.targets import GEARS, record_targets
-from diagnose.data.windows import Task, WindowSet
+from diagnose.data.windows import FloatArray, IntArray, Task, WindowSet
 from diagnose.networks.network import Network
 from diagnose.scoring.judged import interval_text
 from diagnose.scoring.metrics import (
@@ -22,45 +20,42 @@ from diagnose.scoring.metrics import (
     over_records,
     percentile_interval,
     score_with_interval,
+    units_drawn,
 )
 
 if TYPE_CHECKING:
     from diagnose.scoring.predictions import Prediction
 
-FloatArray = NDArray[np.floating]
-IntArray = NDArray[np.integer]
 BOOTSTRAP_SEED = 20240608
 
 
 def predict_heads(
     model: Network, windows: WindowSet, *, batch_size: int = 64
 ) -> dict[str, FloatArray]:
-    """What the further heads say of records, in the order of
-    `diagnose.scoring.metrics.over_records`.
+    """Predictions of the further heads for records.
+
+    The records are in the order of `diagnose.scoring.metrics.over_records`.
 
     Returns
     -------
-    severity : (record, class) from 0 to 1, mean over the windows: how severe, if it is of that class
+    severity : (record, class) from 0 to 1, mean over the windows, for a record of that class
     gear : (record, gear) mean log-probability of `diagnose.data.targets.GEARS`
     """
     if not model.further:
         return {}
     model.eval()
-    said: dict[str, list[torch.Tensor]] = {name: [] for name in model.further}
-    every = np.arange(len(windows))
+    blocks = windows.blocks(batch_size)
     with torch.inference_mode():
-        for block in np.array_split(every, -(-every.size // batch_size)):
-            answers = model.answers(torch.from_numpy(windows.cut(block)))
-            for name, values in said.items():
-                values.append(
-                    answers[name].sigmoid()
-                    if name == "severity"
-                    else log_softmax(answers[name], dim=1)
-                )
-    return {
-        name: over_records(torch.cat(values).numpy().astype(float), windows.record)[1]
-        for name, values in said.items()
-    }
+        answers = [
+            model.answers(torch.from_numpy(windows.cut(block))) for block in blocks
+        ]
+    predictions = {}
+    for name in model.further:
+        output = torch.cat([answer[name] for answer in answers])
+        output = output.sigmoid() if name == "severity" else log_softmax(output, dim=1)
+        by_window = output.numpy().astype(float)
+        predictions[name] = over_records(by_window, windows.record)[1]
+    return predictions
 
 
 def head_scores(
@@ -77,63 +72,51 @@ def head_scores(
 
     Returns
     -------
-    severity_mae : class -> mean absolute error of what is said of the true class, with its interval, and ``constant``,
-        the error of the median severity of that class in the training; sound records do not count
+    severity_mae : class -> mean absolute error for the true class, with its interval, and
+        ``constant``, the error of the median severity of that class in the training; sound
+        records do not count
     faulted_gear : balanced accuracy with its interval, and chance
     """
     rng = np.random.default_rng(BOOTSTRAP_SEED)
     record = runs[0].record
-    truth, known = (
-        record_targets(task.dataset, record),
-        record_targets(task.dataset, trained_on),
-    )
+    truth = record_targets(task.dataset, record)
+    known = record_targets(task.dataset, trained_on)
     unit = np.asarray(task.dataset.column("unit_id"))[record]
-    found: dict[str, Any] = {}
+    scores: dict[str, Any] = {}
     if "severity" in truth and all("severity" in run.heads for run in runs):
         labels = task.labels()
-        said = np.stack(
-            [
-                run.heads["severity"][np.arange(record.size), labels[record]]
-                for run in runs
-            ]
-        )
-        found["severity_mae"] = {
-            name: _severity_error(
-                said[:, chosen],
-                truth["severity"][chosen],
-                known["severity"][labels[trained_on] == index],
-                unit[chosen],
-                n_bootstrap=n_bootstrap,
-                rng=rng,
-            )
-            for index, name in enumerate(task.class_names)
-            if (
-                chosen := (labels[record] == index) & ~np.isnan(truth["severity"])
-            ).any()
-        }
-    if "gear" in truth and all("gear" in run.heads for run in runs):
-        confusion = np.stack(
-            [
-                confusion_by_unit(
-                    truth["gear"], run.heads["gear"].argmax(axis=1), unit, len(GEARS)
+        label, every = labels[record], np.arange(record.size)
+        predicted = np.stack([run.heads["severity"][every, label] for run in runs])
+        scores["severity_mae"] = {}
+        for index, name in enumerate(task.class_names):
+            chosen = (label == index) & ~np.isnan(truth["severity"])
+            if chosen.any():
+                scores["severity_mae"][name] = _severity_error(
+                    predicted[:, chosen],
+                    truth["severity"][chosen],
+                    known["severity"][labels[trained_on] == index],
+                    unit[chosen],
+                    n_bootstrap=n_bootstrap,
+                    rng=rng,
                 )
-                for run in runs
-            ]
-        )
+    if "gear" in truth and all("gear" in run.heads for run in runs):
+        gears = [run.heads["gear"].argmax(axis=1) for run in runs]
+        counts = [
+            confusion_by_unit(truth["gear"], gear, unit, len(GEARS)) for gear in gears
+        ]
         score = score_with_interval(
-            "balanced_accuracy", confusion, n_bootstrap=n_bootstrap, rng=rng
+            "balanced_accuracy", np.stack(counts), n_bootstrap=n_bootstrap, rng=rng
         )
-        chance = 1.0 / np.unique(truth["gear"]).size
-        found["faulted_gear"] = {
+        scores["faulted_gear"] = {
             "balanced_accuracy": asdict(score),
-            "chance": chance,
+            "chance": 1.0 / np.unique(truth["gear"]).size,
             "gears": list(GEARS),
         }
-    return found
+    return scores
 
 
 def _severity_error(
-    said: FloatArray,
+    predicted: FloatArray,
     truth: FloatArray,
     in_training: FloatArray,
     unit: NDArray[Any],
@@ -141,50 +124,43 @@ def _severity_error(
     n_bootstrap: int,
     rng: np.random.Generator,
 ) -> dict[str, Any]:
-    """Error of one class: ``said`` is (seed, record), all else (record,)."""
-    error = np.abs(said - truth).mean(axis=0)
+    """Error of one class: ``predicted`` is (seed, record), all else (record,)."""
+    error = np.abs(predicted - truth).mean(axis=0)
     names, position = np.unique(unit, return_inverse=True)
     counts = np.bincount(position)
-    times_drawn = rng.multinomial(
-        names.size, np.full(names.size, 1 / names.size), size=n_bootstrap
-    )
-    means = (times_drawn @ np.bincount(position, weights=error)) / (
-        times_drawn @ counts
-    )
+    drawn = units_drawn(names.size, n_bootstrap, rng)
+    means = (drawn @ np.bincount(position, weights=error)) / (drawn @ counts)
     low, high = percentile_interval(means, names.size)
-    usual = in_training[~np.isnan(in_training)]
+    known = in_training[~np.isnan(in_training)]
+    constant = None
+    if known.size:
+        constant = float(np.abs(np.median(known) - truth).mean())
     return {
         "mean": float(error.mean()),
         "low": low,
         "high": high,
-        "constant": float(np.abs(np.median(usual) - truth).mean())
-        if usual.size
-        else None,
+        "constant": constant,
         "n_records": int(truth.size),
     }
 
 
 def heads_notes(clean: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Title and sentence on the further heads, by clean protocol of ``metrics.json``.
+    """Title and sentence on the further heads, for clean protocols of ``metrics.json``.
 
-    Empty where there are none.
+    Empty without further heads.
     """
     notes = []
     for name, result in clean.items():
-        said = [
-            f"severity of {kind} off by {interval_text(row, '.3f')}"
-            + (
-                ""
-                if row["constant"] is None
-                else f", by {row['constant']:.3f} if its usual one is said of all"
-            )
-            for kind, row in result["heads"].get("severity_mae", {}).items()
-        ]
+        phrases = []
+        for kind, row in result["heads"].get("severity_mae", {}).items():
+            phrase = f"severity of {kind} off by {interval_text(row, '.3f')}"
+            if row["constant"] is not None:
+                phrase += f", by {row['constant']:.3f} if its usual one is said of all"
+            phrases.append(phrase)
         if "faulted_gear" in result["heads"]:
             gear = result["heads"]["faulted_gear"]
-            said.append(
-                f"faulted gear {interval_text(gear['balanced_accuracy'], '.2f')}, {gear['chance']:.2f} by chance"
-            )
-        if said:
-            notes.append((f"{name}, severity and gear", "; ".join(said) + "."))
+            accuracy = interval_text(gear["balanced_accuracy"], ".2f")
+            phrases.append(f"faulted gear {accuracy}, {gear['chance']:.2f} by chance")
+        if phrases:
+            notes.append((f"{name}, severity and gear", "; ".join(phrases) + "."))
     return notes

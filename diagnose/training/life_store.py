@@ -1,4 +1,4 @@
-"""Networks of remaining lives on disk: the files of a classifier, with hours and intervals."""
+"""Stored networks of remaining lives: the files of a classifier, with hours and intervals."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from diagnose.training.store import (
     DESCRIPTION,
     ModelDescription,
     load_weights,
+    one_line,
     read_description,
 )
 from gensig.errors import DatasetError
@@ -31,11 +32,11 @@ class LifeFacts:
     Attributes
     ----------
     method : of the report, with or without the age
-    early_life_h : level at which lives are cut in its training
-    half_width_h : of the intervals about its answers for records
-    coverage : share of snapshots of new lives that the intervals are to hold
-    n_calibration_lives : validation lives that the intervals come from
-    told : columns that it takes beside the signal, in its order
+    early_life_h : level at which lives are cut in the training
+    half_width_h : of the intervals about the predictions for records
+    coverage : share of snapshots of new lives that the intervals should hold
+    n_calibration_lives : number of validation lives behind the intervals
+    told : columns that the network takes with the signal, in its order
     told_range : column -> least and greatest value of the training records
     """
 
@@ -48,12 +49,11 @@ class LifeFacts:
     told_range: dict[str, tuple[float, float]]
 
     def __post_init__(self) -> None:
-        if (
-            not 0 < self.early_life_h < float("inf")
-            or not 0 <= self.half_width_h <= self.early_life_h
-        ):
+        is_level = 0 < self.early_life_h < float("inf")
+        if not (is_level and 0 <= self.half_width_h <= self.early_life_h):
             raise ValueError(
-                f"early_life_h {self.early_life_h!r} and half_width_h {self.half_width_h!r} are no hours",
+                f"early_life_h {self.early_life_h!r} and half_width_h "
+                f"{self.half_width_h!r} are no hours"
             )
         if not 0 < self.coverage < 1:
             raise ValueError(f"coverage {self.coverage!r} must lie between 0 and 1")
@@ -62,7 +62,7 @@ class LifeFacts:
 
     @property
     def intervals_hold(self) -> bool:
-        """True if there were enough calibration lives for an interval that says something."""
+        """True if there were enough calibration lives for intervals of the coverage."""
         return intervals_hold(self.n_calibration_lives, self.coverage)
 
 
@@ -82,7 +82,8 @@ def load_life_model(
     description = read_description(folder)
     if description.remaining_life is None:
         raise DatasetError(
-            f"{folder} is a classifier and says no remaining life: train with task=remaining_life",
+            f"{folder} is a classifier and says no remaining life: "
+            "train with task=remaining_life"
         )
     facts = _facts(folder, description.remaining_life)
     n_told = len(facts.told)
@@ -94,25 +95,18 @@ def load_life_model(
 
 def _facts(folder: Path, content: Mapping[str, Any]) -> LifeFacts:
     try:
-        ranges = {
+        values = dict(content)
+        for name in ("early_life_h", "half_width_h", "coverage"):
+            values[name] = float(values[name])
+        values["n_calibration_lives"] = int(values["n_calibration_lives"])
+        values["told"] = tuple(map(str, values["told"]))
+        values["told_range"] = {
             str(name): (float(low), float(high))
-            for name, (low, high) in content["told_range"].items()
+            for name, (low, high) in values["told_range"].items()
         }
-        numbers = {
-            name: float(content[name])
-            for name in ("early_life_h", "half_width_h", "coverage")
-        }
-        return LifeFacts(
-            **{
-                **content,
-                **numbers,
-                "n_calibration_lives": int(content["n_calibration_lives"]),
-                "told": tuple(str(name) for name in content["told"]),
-                "told_range": ranges,
-            }
-        )
+        return LifeFacts(**values)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        reason = " ".join(str(error).split())[:160]
+        reason = one_line(error)
         raise DatasetError(
-            f"{folder / DESCRIPTION} does not describe a model of remaining lives: {reason}",
+            f"{folder / DESCRIPTION} does not describe a model of remaining lives: {reason}"
         ) from None

@@ -1,4 +1,4 @@
-"""Remaining life as what a network learns: a share of the early level, by least squares."""
+"""Remaining life as learning target: a share of the early level, by least squares."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 import torch
 from torch import nn
 
-from diagnose.data.windows import WindowSet
+from diagnose.data.windows import FloatArray, IntArray, WindowSet
 from diagnose.networks.registry import build_model
 from diagnose.scoring.metrics import over_records
-from diagnose.training.target import FloatArray, IntArray, LearningTarget
+from diagnose.training.target import LearningTarget
 from gensig.options.configuration import Section
 
 N_FEATURES = 16  # numbers that the head takes of the network; assumed
@@ -70,7 +70,7 @@ class RemainingLife(LearningTarget[LifeNetwork]):
 
     Attributes
     ----------
-    conditions : (record, column) values known beside the signal, of all records of the data set
+    conditions : (record, column) values known besides the signal, of all records of the data set
     share : (record,) remaining life as a share of the early level
     weight : (record,) weights; those of a life have the same sum for every life of a subset
     """
@@ -100,9 +100,9 @@ class RemainingLife(LearningTarget[LifeNetwork]):
         batch: IntArray,
     ) -> torch.Tensor:
         """Weighted mean of the squared errors."""
-        device, record = signals.device, windows.record[batch]
+        record = windows.record[batch]
         conditions, share, weight = (
-            torch.from_numpy(values[record].astype(np.float32)).to(device)
+            torch.from_numpy(values[record].astype(np.float32)).to(signals.device)
             for values in (self.conditions, self.share, self.weight)
         )
         error = model(signals, conditions) - share
@@ -131,13 +131,11 @@ def shares_of_windows(
     conditions: FloatArray,
 ) -> FloatArray:
     """(window,) shares of the early level, not cut; ``conditions`` (record, column)."""
-    every = np.arange(len(windows))
-    blocks = np.array_split(every, -(-every.size // AT_A_TIME))
     of_window = conditions[windows.record]
-    shares = [
-        _shares(model, torch.from_numpy(windows.cut(block)), of_window[block])
-        for block in blocks
-    ]
+    shares = []
+    for block in windows.blocks(AT_A_TIME):
+        signals = torch.from_numpy(windows.cut(block))
+        shares.append(_shares(model, signals, of_window[block]))
     return np.concatenate(shares)
 
 
@@ -158,16 +156,15 @@ def _over_records(share: FloatArray, windows: WindowSet) -> tuple[IntArray, Floa
 def _shares(
     model: LifeNetwork, signals: torch.Tensor, conditions: FloatArray
 ) -> FloatArray:
-    """(window,) shares of windows (window, channel, sample) under conditions (window, column)."""
+    """(window,) shares of windows (window, channel, sample) and conditions (window, column)."""
     model.eval()
     device = model.mean.device
     known = torch.from_numpy(conditions.astype(np.float32))
     n_blocks = -(-len(signals) // AT_A_TIME)
-    pairs = zip(
-        signals.tensor_split(n_blocks), known.tensor_split(n_blocks), strict=True
-    )
+    blocks = (signals.tensor_split(n_blocks), known.tensor_split(n_blocks))
     with torch.inference_mode():
         shares = [
-            model(part.to(device), values.to(device)).cpu() for part, values in pairs
+            model(part.to(device), values.to(device)).cpu()
+            for part, values in zip(*blocks, strict=True)
         ]
     return torch.cat(shares).numpy().astype(float)

@@ -1,7 +1,4 @@
-"""The sham control.
-
-The same training on a data set whose faults were left out and whose labels were kept.
-"""
+"""The sham control: training on a data set with the labels but without the faults."""
 
 from __future__ import annotations
 
@@ -20,8 +17,10 @@ NETWORK = "sham"
 
 
 def sham_method(method: str, network: str) -> str:
-    """Name under which a method's result on the sham set is kept beside those on the faults."""
-    return NETWORK if method == network else f"{NETWORK}_{method}"
+    """Name of the result of a method on the sham set."""
+    if method == network:
+        return NETWORK
+    return f"{NETWORK}_{method}"
 
 
 def sham_task(task: Task, folder: str) -> Task:
@@ -39,14 +38,12 @@ def sham_task(task: Task, folder: str) -> Task:
         raise ConfigError(
             f"sham={folder} has faults; make one of the same command with plan.sham=true"
         )
-    pairs: tuple[tuple[str, Sequence[str], Sequence[str]], ...] = (
-        ("classes", dataset.class_names, task.dataset.class_names),
-        ("channels", dataset.channel_names, task.dataset.channel_names),
-    )
-    for what, found, wanted in pairs:
-        if list(found) != list(wanted):
+    for kind, name in (("classes", "class_names"), ("channels", "channel_names")):
+        given, wanted = getattr(dataset, name), getattr(task.dataset, name)
+        if list(given) != list(wanted):
             raise ConfigError(
-                f"sham={folder}: its {what} are {', '.join(found)}, those of data= {', '.join(wanted)}"
+                f"sham={folder}: its {kind} are {', '.join(given)}, "
+                f"those of data= {', '.join(wanted)}"
             )
     rate = task.dataset.sampling_rate
     if abs(dataset.sampling_rate - rate) > 1e-9 * rate:
@@ -64,25 +61,24 @@ def sham_task(task: Task, folder: str) -> Task:
 
 
 def _is_sham(dataset: Dataset) -> bool:
-    """Whether the set's own configuration says so."""
+    """True if the stored configuration of the data set has ``plan.sham``."""
     try:
-        return (
-            json.loads(str(dataset.attributes["config_json"]))["plan"]["sham"] is True
-        )
+        config = json.loads(str(dataset.attributes["config_json"]))
+        return config["plan"]["sham"] is True
     except (KeyError, TypeError, ValueError):
         return False
 
 
 def sham_protocols(sham: Task, protocols: Sequence[str]) -> tuple[str, ...]:
-    """Of the protocols named those that the sham set has: one by severity it cannot have.
+    """The protocols that the sham set has; it cannot have one by severity.
 
     Raises
     ------
     ConfigError    if there is none
     """
-    found = tuple(name for name in protocols if name in sham.dataset.protocols)
-    if protocols and not found:
+    shared = tuple(name for name in protocols if name in sham.dataset.protocols)
+    if protocols and not shared:
         raise ConfigError(
             f"sham={sham.dataset.folder} has none of the protocols {', '.join(protocols)}"
         )
-    return found
+    return shared

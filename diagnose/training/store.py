@@ -1,13 +1,10 @@
-"""Trained networks on disk.
-
-``model.safetensors`` for the weights, ``model.json`` for what they mean. Never pickle.
-"""
+"""Stored networks: weights in ``model.safetensors``, description in ``model.json``, no pickle."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -28,19 +25,26 @@ if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
 
 MODEL_SCHEMA_VERSION = 2
-READABLE_VERSIONS = (
-    1,
-    MODEL_SCHEMA_VERSION,
-)  # 1: without out_of_distribution and speed_rpm_range
+# Version 1 is without out_of_distribution and speed_rpm_range.
+READABLE_VERSIONS = (1, MODEL_SCHEMA_VERSION)
 WEIGHTS, DESCRIPTION = "model.safetensors", "model.json"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModelDescription:
-    """What a network was trained on and what it expects; the content of ``model.json``.
+    """Training and input of a network; the content of ``model.json``.
 
-    ``out_of_distribution`` is `diagnose.networks.domain.Domain.facts`. It and ``speed_rpm_range``,
-    least and greatest speed of the training records in r/min, are None in older models.
+    Attributes
+    ----------
+    speed_rpm_range : least and greatest speed of the training records in r/min; None in older
+        models
+    out_of_distribution : `diagnose.networks.domain.Domain.facts`; None in older models
+    n_teeth : of the driving and the driven gear; None if unknown or not the same for all records
+    temperature : see `diagnose.networks.calibration`; 1 in older models
+    test_channel_names : of protocol cross_sensor
+    adaptation : see `diagnose.recordings.machine`; None as trained
+    test_score : see `diagnose.studies.study.test_score`; None in older models
+    remaining_life : see `diagnose.training.life_store`; None for a classifier
     """
 
     model_schema_version: int
@@ -59,28 +63,16 @@ class ModelDescription:
     n_bootstrap: int
     speed_rpm_range: tuple[float, float] | None = None
     out_of_distribution: dict[str, Any] | None = None
-    n_teeth: tuple[int, int] | None = (
-        None  # of the driving and the driven gear; None where not told or not the same
-    )
-    temperature: float = (
-        1.0  # see `diagnose.networks.calibration`; models of before have none
-    )
-    test_channel_names: tuple[str, ...] | None = None  # of protocol cross_sensor
-    adaptation: dict[str, Any] | None = (
-        None  # see `diagnose.recordings.machine`; None as trained
-    )
-    test_score: dict[str, Any] | None = (
-        None  # see `diagnose.studies.study.test_score`; models of before have none
-    )
-    remaining_life: dict[str, Any] | None = (
-        None  # see `diagnose.training.life_store`; None for a classifier
-    )
+    n_teeth: tuple[int, int] | None = None
+    temperature: float = 1.0
+    test_channel_names: tuple[str, ...] | None = None
+    adaptation: dict[str, Any] | None = None
+    test_score: dict[str, Any] | None = None
+    remaining_life: dict[str, Any] | None = None
 
     @property
     def network(self) -> Section:
-        """Kind and parameters of the network, as `diagnose.networks.registry.build_model` takes
-        them.
-        """
+        """Kind and parameters of the network, for `diagnose.networks.registry.build_model`."""
         return Section("model", self.model)
 
     @property
@@ -96,27 +88,27 @@ class ModelDescription:
 
 
 class Trained(Protocol):
-    """What a description takes of a trained network."""
+    """Facts of a trained network for its description."""
 
     @property
     def protocol(self) -> str:
-        """Split that it was trained on."""
+        """Split of the training."""
 
     @property
     def seed(self) -> int:
-        """Of its training."""
+        """Seed of the training."""
 
     @property
     def best_epoch(self) -> int:
-        """Whose weights were kept."""
+        """Epoch of the stored weights."""
 
     @property
     def domain(self) -> Domain | None:
-        """What it takes for known."""
+        """Domain of the training windows."""
 
     @property
     def temperature(self) -> float:
-        """Of its probabilities."""
+        """Temperature of the probabilities."""
 
 
 def model_description(
@@ -129,6 +121,9 @@ def model_description(
         for subset in ("train", "test")
     )
     speed = np.asarray(task.dataset.column("speed_rpm"), dtype=float)[trained_on]
+    facts = None
+    if prediction.domain is not None:
+        facts = prediction.domain.facts()
     return ModelDescription(
         model_schema_version=MODEL_SCHEMA_VERSION,
         model=dict(settings.model),
@@ -146,9 +141,7 @@ def model_description(
         n_bootstrap=settings.n_bootstrap,
         speed_rpm_range=(float(speed.min()), float(speed.max())),
         n_teeth=_n_teeth(task.dataset),
-        out_of_distribution=None
-        if prediction.domain is None
-        else prediction.domain.facts(),
+        out_of_distribution=facts,
         temperature=prediction.temperature,
         test_channel_names=None if tested == channels else tested,
     )
@@ -156,10 +149,12 @@ def model_description(
 
 def _n_teeth(dataset: Dataset) -> tuple[int, int] | None:
     """Teeth of the data set's pinion, which drives, and of its wheel."""
-    names = ("n_teeth_pinion", "n_teeth_wheel")
-    if any(dataset.attributes.get(name) is None for name in names):
+    pinion, wheel = (
+        dataset.attributes.get(f"n_teeth_{gear}") for gear in ("pinion", "wheel")
+    )
+    if pinion is None or wheel is None:
         return None
-    return int(dataset.attributes[names[0]]), int(dataset.attributes[names[1]])
+    return int(pinion), int(wheel)
 
 
 def save_model(
@@ -169,13 +164,10 @@ def save_model(
     from safetensors.numpy import save_file
 
     folder.mkdir(parents=True, exist_ok=True)
-    save_file(
-        {key: np.ascontiguousarray(value) for key, value in weights.items()},
-        folder / WEIGHTS,
-    )
-    (folder / DESCRIPTION).write_text(
-        json.dumps(asdict(description), indent=2) + "\n", encoding="utf-8"
-    )
+    arrays = {name: np.ascontiguousarray(value) for name, value in weights.items()}
+    save_file(arrays, folder / WEIGHTS)
+    text = json.dumps(asdict(description), indent=2) + "\n"
+    (folder / DESCRIPTION).write_text(text, encoding="utf-8")
 
 
 def load_model(folder: str | Path) -> tuple[Network, ModelDescription]:
@@ -183,8 +175,8 @@ def load_model(folder: str | Path) -> tuple[Network, ModelDescription]:
 
     Raises
     ------
-    DatasetError    for a folder without the two files, another schema, a network that says remaining lives, or weights
-        that do not belong to the network
+    DatasetError    for a folder without the two files, another schema, a network of remaining
+        lives, or weights that do not belong to the network
     """
     from diagnose.networks.registry import build_model
 
@@ -192,7 +184,8 @@ def load_model(folder: str | Path) -> tuple[Network, ModelDescription]:
     description = read_description(folder)
     if description.remaining_life is not None:
         raise DatasetError(
-            f"{folder} says remaining lives and is no classifier: for diagnose predict, evaluate, export"
+            f"{folder} says remaining lives and is no classifier: "
+            "for diagnose predict, evaluate, export"
         )
     model = build_model(
         description.network,
@@ -215,23 +208,21 @@ def load_weights(model: nn.Module, folder: Path) -> None:
     from diagnose.networks.adaptation import PREFIX
     from diagnose.networks.domain import TENSOR
 
-    stored = {
-        k: v
-        for k, v in tensors_of(folder).items()
-        if k != TENSOR and not k.startswith(PREFIX)
+    weights = {
+        name: torch.from_numpy(value)
+        for name, value in tensors_of(folder).items()
+        if name != TENSOR and not name.startswith(PREFIX)
     }
     try:
-        model.load_state_dict(
-            {name: torch.from_numpy(value) for name, value in stored.items()}
-        )
+        model.load_state_dict(weights)
     except (RuntimeError, TypeError) as error:
         raise DatasetError(
-            f"{folder / WEIGHTS} does not fit {DESCRIPTION}: {_one_line(error)}"
+            f"{folder / WEIGHTS} does not fit {DESCRIPTION}: {one_line(error)}"
         ) from None
 
 
 def load_domain(folder: str | Path, description: ModelDescription) -> Domain | None:
-    """What the network of a folder takes for known; None for a model that does not tell.
+    """Domain of the network of a folder; None for a model without one.
 
     Raises
     ------
@@ -248,8 +239,7 @@ def load_domain(folder: str | Path, description: ModelDescription) -> Domain | N
 
 
 def load_statistics(folder: str | Path) -> Statistics | None:
-    """What healthy training windows look like inside the network of a folder; None for one that
-    does not tell.
+    """Statistics of healthy training windows in the network of a folder; None without them.
 
     Raises
     ------
@@ -264,7 +254,7 @@ def load_statistics(folder: str | Path) -> Statistics | None:
 
 
 def tensors_of(folder: Path) -> dict[str, np.ndarray]:
-    """Everything in the file of weights."""
+    """All arrays of the file of weights, by their names."""
     from safetensors import SafetensorError
     from safetensors.numpy import load_file
 
@@ -274,21 +264,20 @@ def tensors_of(folder: Path) -> dict[str, np.ndarray]:
         raise DatasetError(f"{folder} holds no {WEIGHTS}") from None
     except (SafetensorError, OSError, KeyError) as error:
         raise DatasetError(
-            f"{folder / WEIGHTS} is not a safetensors file: {_one_line(error)}"
+            f"{folder / WEIGHTS} is not a safetensors file: {one_line(error)}"
         ) from None
 
 
 def schema_version(dataset: Dataset) -> int | None:
-    """Version of the data set's format, None where it does not say."""
+    """Version of the data set's format; None if it has none."""
     version = dataset.attributes.get("schema_version")
-    return None if version is None else int(version)
+    if version is None:
+        return None
+    return int(version)
 
 
 def data_fingerprint(dataset: Dataset) -> str:
-    """Hash over identity, label, unit and measured speed of every record.
-
-    The same data set, the same text.
-    """
+    """Hash over identity, label, unit and measured speed of every record."""
     digest = hashlib.sha256()
     for name in ("record_id", "unit_id", "label"):
         digest.update("\n".join(str(value) for value in dataset.column(name)).encode())
@@ -297,7 +286,7 @@ def data_fingerprint(dataset: Dataset) -> str:
 
 
 def read_description(folder: str | Path) -> ModelDescription:
-    """What the network of a folder was trained on.
+    """Description of the network of a folder.
 
     Raises
     ------
@@ -313,50 +302,56 @@ def read_description(folder: str | Path) -> ModelDescription:
             raise DatasetError(
                 f"{path}: model schema {version!r}, this program reads {known}"
             )
-        for name in ("class_names", "channel_names"):
-            content[name] = tuple(str(value) for value in content[name])
-        if content.get("test_channel_names") is not None:
-            content["test_channel_names"] = tuple(
-                str(value) for value in content["test_channel_names"]
-            )
-        content["sampling_rate_hz"] = float(content["sampling_rate_hz"])
-        for name in ("window_samples", "stride_samples"):
-            if not isinstance(content[name], int) or content[name] < 1:
-                raise ValueError(
-                    f"{name} {content[name]!r} is no positive whole number"
-                )
-        if content.get("speed_rpm_range") is not None:
-            low, high = content["speed_rpm_range"]
-            content["speed_rpm_range"] = (float(low), float(high))
-        if content.get("n_teeth") is not None:
-            driving, driven = content["n_teeth"]
-            content["n_teeth"] = (int(driving), int(driven))
-        for name in (
-            "out_of_distribution",
-            "adaptation",
-            "remaining_life",
-            "test_score",
-        ):
-            if content.get(name) is not None:
-                content[name] = dict(content[name])
-        return ModelDescription(**content)
+        return ModelDescription(**_typed(content))
     except FileNotFoundError:
-        inside = sorted(
-            child.name
-            for child in (folder / "models").glob("*")
-            if (child / DESCRIPTION).is_file()
-        )
-        hint = (
-            f"; choose one of its models, for instance {folder / 'models' / inside[0]}"
-            if inside
-            else ""
-        )
+        models = folder / "models"
+        inside = sorted(file.parent for file in models.glob(f"*/{DESCRIPTION}"))
+        hint = ""
+        if inside:
+            hint = f"; choose one of its models, for instance {inside[0]}"
         raise DatasetError(f"{folder} holds no {DESCRIPTION}{hint}") from None
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise DatasetError(
-            f"{path} does not describe a model: {_one_line(error)}"
+            f"{path} does not describe a model: {one_line(error)}"
         ) from None
 
 
-def _one_line(error: Exception) -> str:
+def _typed(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of ``model.json`` in the types of `ModelDescription`."""
+    values = dict(content)
+    values["sampling_rate_hz"] = float(values["sampling_rate_hz"])
+    for name in ("window_samples", "stride_samples"):
+        if not isinstance(values[name], int) or values[name] < 1:
+            raise ValueError(f"{name} {values[name]!r} is no positive whole number")
+    for name in ("class_names", "channel_names"):
+        values[name] = tuple(map(str, values[name]))
+    for name, convert in _OPTIONAL.items():
+        if values.get(name) is not None:
+            values[name] = convert(values[name])
+    return values
+
+
+def _range(values: Sequence[Any]) -> tuple[float, float]:
+    low, high = values
+    return float(low), float(high)
+
+
+def _teeth(values: Sequence[Any]) -> tuple[int, int]:
+    driving, driven = values
+    return int(driving), int(driven)
+
+
+_OPTIONAL: dict[str, Callable[[Any], Any]] = {
+    "test_channel_names": lambda names: tuple(map(str, names)),
+    "speed_rpm_range": _range,
+    "n_teeth": _teeth,
+    "out_of_distribution": dict,
+    "adaptation": dict,
+    "remaining_life": dict,
+    "test_score": dict,
+}
+
+
+def one_line(error: Exception) -> str:
+    """Text of an error on one line, cut to 160 characters."""
     return " ".join(str(error).split())[:160]

@@ -1,4 +1,4 @@
-"""What a network learns to say of a record: the interface of classes and remaining lives."""
+"""Interface of learning targets: classes and remaining lives."""
 
 from __future__ import annotations
 
@@ -6,21 +6,17 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar, Generic, TypeVar
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import nn
 
-from diagnose.data.windows import WindowSet
+from diagnose.data.windows import FloatArray, IntArray, WindowSet
 from gensig.options.configuration import Section
 
-FloatArray = NDArray[np.floating]
-IntArray = NDArray[np.integer]
 Model = TypeVar("Model", bound=nn.Module)
 
 
 class LearningTarget(ABC, Generic[Model]):
-    """Head, loss and answers of a network; `diagnose.training.train.train_network` asks it.
+    """Head, loss and answers of a network, for `diagnose.training.train.train_network`.
 
     Attributes
     ----------
@@ -51,7 +47,7 @@ class LearningTarget(ABC, Generic[Model]):
         Parameters
         ----------
         signals : (window, channel, sample) of the batch, on the network's device
-        windows, batch : the training windows, and which of them are in the batch
+        windows, batch : the training windows, and the numbers of those in the batch
         """
 
     @abstractmethod
@@ -72,4 +68,4 @@ class LearningTarget(ABC, Generic[Model]):
 
     @abstractmethod
     def temperature(self, answers: FloatArray, windows: WindowSet) -> float:
-        """Temperature of the probabilities of records; 1 of what has no probabilities."""
+        """Temperature of the probabilities of records; 1 for a target without them."""

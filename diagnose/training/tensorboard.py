@@ -1,43 +1,41 @@
-"""What TensorBoard can show of a study.
-
-Losses epoch by epoch while it runs, and the scores at its end.
-"""
+"""Logs for TensorBoard: losses of each epoch during a study, and its final scores."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gensig.errors import ConfigError
+
+if TYPE_CHECKING:
+    from diagnose.training.train import OnEpoch
 
 FOLDER = "tensorboard"
 SCORES = ("balanced_accuracy", "macro_f1")
 
-OnEpoch = Callable[[int, float, float], None]
-
 
 def need_tensorboard() -> None:
-    """Refuse to go on without the package of the extra ``tensorboard``."""
+    """Raise ConfigError without the package of the extra ``tensorboard``."""
     try:
         import torch.utils.tensorboard  # noqa: F401
     except ImportError:
         raise ConfigError(
-            "tensorboard=true needs the package tensorboard: pip install 'gensig[tensorboard]', or leave it false"
+            "tensorboard=true needs the package tensorboard: "
+            "pip install 'gensig[tensorboard]', or leave it false"
         ) from None
 
 
 @contextmanager
 def epoch_log(out: str | Path, name: str, *, wanted: bool) -> Iterator[OnEpoch]:
-    """What `diagnose.training.train.train_network` calls after each epoch; it writes below
-    ``out/tensorboard/<name>``.
+    """Yield the `on_epoch` of a training, which writes below ``out/tensorboard/<name>``.
 
     Parameters
     ----------
     out : folder of the study
     name : of the training, one folder each
-    wanted : whether anything is written
+    wanted : False for a function that writes nothing
     """
     if not wanted:
         yield lambda epoch, training, validation: None
@@ -67,8 +65,9 @@ def write_scores(out: str | Path, protocols: Mapping[str, Any]) -> None:
         with SummaryWriter(str(Path(out) / FOLDER / "scores" / protocol)) as writer:
             for method, scores in result.get("methods", {}).items():
                 for name in SCORES:
-                    score = scores.get(name)
-                    parts = {"mean": score} if isinstance(score, float) else score or {}
+                    parts = scores.get(name, {})
+                    if isinstance(parts, float):
+                        parts = {"mean": parts}
                     for part in ("mean", "low", "high"):
                         if parts.get(part) is not None:
                             writer.add_scalar(f"{name}/{method}/{part}", parts[part], 0)

@@ -11,20 +11,22 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from diagnose.data.windows import WindowSet, input_scale
+from diagnose.data.windows import IntArray, WindowSet, input_scale
 from diagnose.settings import TrainSettings
-from diagnose.training.target import IntArray, LearningTarget, Model
+from diagnose.training.target import LearningTarget, Model
 from gensig.errors import ConfigError, SimulationError
+
+OnEpoch = Callable[[int, float, float], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Training(Generic[Model]):
-    """A trained network and how it came about.
+    """A trained network and the course of its training.
 
     Attributes
     ----------
     model : in evaluation mode, weights of the best epoch, on the processor
-    last_model : the same with the weights of the last epoch; None where that is the best one
+    last_model : the same with the weights of the last epoch; None if that is the best one
     best_epoch : counted from 1
     validation_loss : one value an epoch
     temperature : of the best epoch's answers for records, see `LearningTarget.temperature`
@@ -53,26 +55,24 @@ def train_network(
     target: LearningTarget[Model],
     settings: TrainSettings,
     seed: int,
-    on_epoch: Callable[
-        [int, float, float], None
-    ] = lambda epoch, training, validation: None,
+    on_epoch: OnEpoch = lambda epoch, training, validation: None,
 ) -> Training[Model]:
     """Train with early stopping on the validation units' loss.
 
     Parameters
     ----------
     train, validation : windows of different units; training windows start anywhere in their
-        stretch, anew each epoch
+        stretch, at other samples each epoch
     target : gives the head, the loss and the answers for records
     settings : model, epochs, patience, batch size, learning rate, weight decay, share drawn an
         epoch, device
     seed : decides initial weights, order, window starts and dropout; same seed, threads and
         machine, same weights
-    on_epoch : is given number, mean training loss and validation loss of each epoch
+    on_epoch : called with number, mean training loss and validation loss of each epoch
 
     Raises
     ------
-    ConfigError    for a device that is not there
+    ConfigError    for a device that does not exist
     SimulationError    if the first epoch diverges
     """
     device = device_of(settings.device)
@@ -82,7 +82,7 @@ def train_network(
         model = target.network(settings.model, train, input_scale(train))
         model.to(
             device
-        )  # weights are drawn on the processor: the same ones on every device
+        )  # weights are drawn on the processor: the same for every device
         n_drawn = windows_an_epoch(train, settings.epoch_fraction)
         n_batches = max(n_drawn // settings.batch_size, 1)
         descent = _Descent(model, settings, n_batches)
@@ -164,18 +164,20 @@ def _epoch(
 
 
 def device_of(name: str) -> torch.device:
-    """Device of a setting: ``auto`` is a GPU if there is one, the name of a device must be there.
+    """Device of a setting: ``auto`` is a GPU if there is one.
 
     Raises
     ------
-    ConfigError    for ``cuda`` where there is none
+    ConfigError    for ``cuda`` without a GPU
     """
     present = torch.cuda.is_available()
     if name == "cuda" and not present:
         raise ConfigError(
             "device=cuda: torch finds no GPU here; use device=auto or device=cpu"
         )
-    return torch.device("cuda" if present and name != "cpu" else "cpu")
+    if present and name != "cpu":
+        return torch.device("cuda")
+    return torch.device("cpu")
 
 
 def windows_an_epoch(windows: WindowSet, fraction: float) -> int:

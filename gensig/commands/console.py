@@ -1,7 +1,4 @@
-"""What commands print while they work.
-
-A progress bar on a terminal, plain lines elsewhere, warnings as one line.
-"""
+"""Progress and warnings on stderr, and files that are replaced as a whole."""
 
 from __future__ import annotations
 
@@ -21,14 +18,14 @@ if TYPE_CHECKING:
     from gensig.production.folder import Progress
 
 LINE_SECONDS = 5.0
-LONG_SECONDS = 10.0  # without a record: time to say what may take so long
+LONG_SECONDS = 10.0  # without a record, after which the text explains the wait
 
 
 @contextmanager
 def one_line_warnings(program: str) -> Iterator[None]:
     """Print each different warning once, as one line.
 
-    Of a category with ``once`` only the first.
+    Of a category with the attribute ``once`` the first is printed only.
     """
     seen: set[object] = set()
 
@@ -36,7 +33,9 @@ def one_line_warnings(program: str) -> Iterator[None]:
         message: Warning | str, category: type[Warning], *_details: Any, **_more: Any
     ) -> None:
         text = " ".join(str(message).split())
-        key = category if getattr(category, "once", False) else text
+        key: object = text
+        if getattr(category, "once", False):
+            key = category
         if key not in seen:
             seen.add(key)
             print(f"{program}: note: {text}", file=sys.stderr)
@@ -48,17 +47,26 @@ def one_line_warnings(program: str) -> Iterator[None]:
 
 
 def note(*texts: str) -> None:
-    """One line each, as a warning: said once however often it is true."""
+    """Warn of each text; `one_line_warnings` prints it once however often it is true."""
     for text in texts:
         warnings.warn(text, stacklevel=2)
 
 
-class ShardProgress:
-    """Progress over records: a bar on a terminal, a line every few seconds elsewhere, nothing
-    when quiet.
+def remark(text: str) -> None:
+    """Print one line of the command on stderr."""
+    print(f"gensig: {text}", file=sys.stderr)
 
-    Records count when their shard is whole. Until the first is, ``n_at_work`` of ``n_shards``
-    that are to be made tell what is going on.
+
+def step(text: str) -> None:
+    """Print at once, on stderr, the step of a long command that begins now."""
+    print(text, file=sys.stderr, flush=True)
+
+
+class ShardProgress:
+    """Progress over records: a bar on a terminal, elsewhere a line every few seconds.
+
+    Records count when their shard is whole. Before the first shard is whole, the text says how
+    many of ``n_shards`` are at work.
     """
 
     def __init__(
@@ -66,7 +74,8 @@ class ShardProgress:
     ) -> None:
         self.quiet = quiet
         self.n_records = n_records
-        self.at_work = f"{min(n_at_work, n_shards)} of {n_shards} shards at work, counted when whole"
+        n_at_work = min(n_at_work, n_shards)
+        self.at_work = f"{n_at_work} of {n_shards} shards at work, counted when whole"
         self._last: Progress | None = None
         self._begin = self._last_time = time.monotonic()
         self._bar: Any = None
@@ -77,25 +86,7 @@ class ShardProgress:
         if self.quiet:
             return self
         if sys.stderr.isatty():
-            from rich.console import Console
-            from rich.progress import (
-                BarColumn,
-                MofNCompleteColumn,
-                Progress,
-                TextColumn,
-            )
-
-            self._bar = Progress(
-                TextColumn("records"),
-                BarColumn(),
-                MofNCompleteColumn(),
-                TextColumn("{task.fields[facts]}"),
-                console=Console(stderr=True),
-            )
-            self._bar.start()
-            self._task = self._bar.add_task(
-                "records", total=self.n_records, facts=self.facts()
-            )
+            self._start_bar()
         self._ticker.start()
         return self
 
@@ -109,78 +100,86 @@ class ShardProgress:
     def __call__(self, progress: Progress) -> None:
         """Take one shard that is finished or given up."""
         self._last, self._last_time = progress, time.monotonic()
-        if self._bar is not None:
-            self._show_bar()
-        elif not self.quiet and progress.n_done == progress.n_records:
-            self._print_line()
+        if self._bar is not None or self._n_done == self.n_records:
+            self._show()
+
+    @property
+    def _n_done(self) -> int:
+        if self._last is None:
+            return 0
+        return self._last.n_done
+
+    def _start_bar(self) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+        self._bar = Progress(
+            TextColumn("records"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[facts]}"),
+            console=Console(stderr=True),
+        )
+        self._bar.start()
+        self._task = self._bar.add_task(
+            "records", total=self.n_records, facts=self.facts()
+        )
 
     def _tick(self) -> None:
-        """Show the time pass, also where no shard is finished yet.
-
-        Lines come less often in a long run.
-        """
-        while not self._ended.wait(1.0 if self._bar is not None else self._pause()):
-            if self._bar is not None:
-                self._show_bar()
-            elif self._last is None or self._last.n_done < self.n_records:
-                self._print_line()
+        """Show the time pass, also while no shard is finished."""
+        while not self._ended.wait(self._pause()):
+            if self._bar is not None or self._n_done < self.n_records:
+                self._show()
 
     def _pause(self) -> float:
+        """Seconds to the next line; lines come less often in a long run."""
+        if self._bar is not None:
+            return 1.0
         return max(LINE_SECONDS, 0.01 * (time.monotonic() - self._begin))
 
-    def _show_bar(self) -> None:
-        n_done = self._last.n_done if self._last is not None else 0
-        self._bar.update(self._task, completed=n_done, facts=self.facts())
+    def _show(self) -> None:
+        if self.quiet:
+            return
+        if self._bar is not None:
+            self._bar.update(self._task, completed=self._n_done, facts=self.facts())
+            return
+        line = f"{self._n_done} of {self.n_records} records, {self.facts()}"
+        if self._n_done == self.n_records:
+            line += "; checksums, figures and card follow"
+        step(line)
 
     def facts(self) -> str:
         """Rate, bytes and time left, as far as they are known."""
-        last = self._last
+        last, now = self._last, time.monotonic()
         seconds = self._last_time - self._begin
         if last is None or not last.n_made or seconds <= 0.0:
-            waited = time.monotonic() - self._begin
-            first = (
-                "; the first run compiles for a minute or two"
-                if waited > LONG_SECONDS
-                else ""
-            )
-            return f"{waited:.0f} s; {self.at_work}{first}"
+            waited = now - self._begin
+            text = f"{waited:.0f} s; {self.at_work}"
+            if waited > LONG_SECONDS:
+                text += "; the first run compiles for a minute or two"
+            return text
         rate = last.n_made / seconds
-        left = max(
-            0.0,
-            (last.n_records - last.n_done) / rate
-            - (time.monotonic() - self._last_time),
-        )
-        failed = f", {last.n_failed} failed" if last.n_failed else ""
-        return f"{rate:.1f} records/s, {last.n_bytes / 1e6:.1f} MB, {_duration(left)} left{failed}"
-
-    def _print_line(self) -> None:
-        n_done = self._last.n_done if self._last is not None else 0
-        then = (
-            "; checksums, figures and card follow" if n_done == self.n_records else ""
-        )
-        print(
-            f"{n_done} of {self.n_records} records, {self.facts()}{then}",
-            file=sys.stderr,
-            flush=True,
-        )
+        n_left = last.n_records - last.n_done
+        left = _duration(max(0.0, n_left / rate - (now - self._last_time)))
+        text = f"{rate:.1f} records/s, {last.n_bytes / 1e6:.1f} MB, {left} left"
+        if last.n_failed:
+            text += f", {last.n_failed} failed"
+        return text
 
 
 def _duration(seconds: float) -> str:
-    """'42 s', '3 min 10 s', '2 h 5 min'."""
-    whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60} s"
-    return f"{whole // 3600} h {whole % 3600 // 60} min"
+    """A time for reading, such as '42 s', '3 min 10 s', '2 h 5 min'."""
+    minutes, seconds = divmod(round(seconds), 60)
+    if not minutes:
+        return f"{seconds} s"
+    if minutes < 60:
+        return f"{minutes} min {seconds} s"
+    return f"{minutes // 60} h {minutes % 60} min"
 
 
 @contextmanager
 def replaced_file(path: str | Path) -> Iterator[Path]:
-    """A temporary name beside ``path`` that takes its place when the block ends well.
-
-    Nothing is half written.
-    """
+    """Temporary path in the folder of ``path``; it replaces ``path`` when the block ends well."""
     target = Path(path)
     if not target.parent.is_dir():
         raise ConfigError(

@@ -1,4 +1,4 @@
-"""The verb options: which groups, options and keys there are, a line each."""
+"""``gensig options``: groups, options and keys, a line each."""
 
 from __future__ import annotations
 
@@ -24,156 +24,141 @@ from gensig.options.files import (
 )
 from gensig.text import nearest
 
-VALUE_WIDTH = 34  # a longer value is cut; --json has it whole
+VALUE_WIDTH = 34  # longer values are cut; --json has them whole
+SHOWN_KEYS = 4  # of a section in the list of groups
 READ_BY = {"generate": "gensig", "train": "diagnose train"}
+
+Listing = tuple[Any, list[str]]  # content for --json, and the lines of text
 
 
 def list_options(arguments: Namespace) -> int:
     """Print the groups, the options of one group, or the keys of one option."""
-    word, folder = arguments.what, arguments.config_dir
-    if word is None:
-        content, lines = _all_groups(folder)
+    content, lines = _listing(arguments.what, arguments.config_dir)
+    if arguments.json:
+        print(json.dumps(content, indent=1))
     else:
-        group, equals, option = word.partition("=")
-        content, lines = (
-            _one_option(group, option, folder) if equals else _one_group(group, folder)
-        )
-    print(json.dumps(content, indent=1) if arguments.json else "\n".join(lines))
+        print("\n".join(lines))
     return 0
 
 
-def _all_groups(folder: str | None) -> tuple[Any, list[str]]:
+def _listing(word: str | None, folder: str | None) -> Listing:
+    if word is None:
+        return _all_groups(folder)
+    group, equals, option = word.partition("=")
+    if equals:
+        return _one_option(group, option, folder)
+    if group in sections():
+        keys = section_keys(group)
+        content = {"section": group, "keys": [asdict(key) for key in keys]}
+        return content, _key_table(keys)
+    return _one_group(group, folder)
+
+
+def _all_groups(folder: str | None) -> Listing:
     found, parts = groups(folder), sections()
-    content = {
-        "groups": [
-            {
-                **asdict(group),
-                "options": [one.name for one in options(group.name, folder)],
-            }
-            for group in found
-        ],
-        "sections": list(parts),
-    }
-    rows = [(group.name, group.default or "-", group.about) for group in found]
+    contents = []
+    for group in found:
+        names = [option.name for option in options(group.name, folder)]
+        contents.append({**asdict(group), "options": names})
+    group_rows = [(group.name, group.default or "-", group.about) for group in found]
+    section_rows = [(name, READ_BY[parts[name]], _key_names(name)) for name in parts]
     lines = [
         "groups: choose with GROUP=OPTION; `gensig options GROUP` lists the options",
         "",
-    ]
-    lines += _table(("group", "default", "what it is"), rows)
-    lines += [
+        *_table(("group", "default", "what it is"), group_rows),
         "",
         "keys without a choice: set with KEY=VALUE; `gensig options NAME` lists them",
         "",
+        *_table(("name", "read by", "keys"), section_rows),
     ]
-    lines += _table(
-        ("name", "read by", "keys"),
-        [(name, READ_BY[parts[name]], _key_names(name)) for name in parts],
-    )
-    return content, lines
+    return {"groups": contents, "sections": list(parts)}, lines
 
 
-def _one_group(group: str, folder: str | None) -> tuple[Any, list[str]]:
-    if group in sections():
-        keys = section_keys(group)
-        return {"section": group, "keys": [asdict(key) for key in keys]}, _key_table(
-            keys
-        )
-    _check_group(group, folder)
-    found = options(group, folder)
-    content = {
-        "group": group,
-        "options": [{"name": one.name, "about": one.about} for one in found],
-    }
-    default = next(one.default for one in groups(folder) if one.name == group)
-    rows = [
-        (f"{group}={one.name}" + (" *" if one.name == default else ""), one.about)
-        for one in found
-    ]
-    star = ["", "* taken where none is typed"] if default else []
-    return content, [
-        *_table(("option", "what it is"), rows),
-        *star,
-        f"`gensig options {group}=NAME` lists its keys",
-    ]
+def _one_group(group: str, folder: str | None) -> Listing:
+    default = _defaults(group, folder)[group]
+    rows, contents = [], []
+    for option in options(group, folder):
+        contents.append({"name": option.name, "about": option.about})
+        name = f"{group}={option.name}"
+        if option.name == default:
+            name += " *"
+        rows.append((name, option.about))
+    lines = _table(("option", "what it is"), rows)
+    if default:
+        lines += ["", "* taken where none is typed"]
+    lines.append(f"`gensig options {group}=NAME` lists its keys")
+    return {"group": group, "options": contents}, lines
 
 
-def _one_option(group: str, option: str, folder: str | None) -> tuple[Any, list[str]]:
-    _check_group(group, folder)
-    found = {one.name: one for one in options(group, folder)}
-    if option not in found:
-        there = option_files.elsewhere(group, option) or nearest.hint(option, found)
-        raise ConfigError(f"no option '{option}' of {group}; {there}")
-    keys, beside = (
-        option_keys(group, option, folder),
-        chosen_beside(group, option, folder),
-    )
-    about = found[option].about
-    listed = [asdict(key) for key in keys]
+def _one_option(group: str, option: str, folder: str | None) -> Listing:
+    _defaults(group, folder)
+    abouts = {found.name: found.about for found in options(group, folder)}
+    if option not in abouts:
+        hint = option_files.elsewhere(group, option) or nearest.hint(option, abouts)
+        raise ConfigError(f"no option '{option}' of {group}; {hint}")
+    keys = option_keys(group, option, folder)
+    chosen = chosen_beside(group, option, folder)
+    about = abouts[option]
     content = {
         "group": group,
         "option": option,
         "about": about,
-        "chooses": beside,
-        "keys": listed,
+        "chooses": chosen,
+        "keys": [asdict(key) for key in keys],
     }
-    head = [f"{group}={option}: {about}"]
-    if beside:
-        head.append(
-            f"chooses too: {' '.join(f'{name}={other}' for name, other in beside.items())}"
-        )
-    return content, [*head, "", *_key_table(keys)]
+    lines = [f"{group}={option}: {about}"]
+    if chosen:
+        words = " ".join(f"{name}={other}" for name, other in chosen.items())
+        lines.append(f"chooses too: {words}")
+    return content, [*lines, "", *_key_table(keys)]
 
 
-def _check_group(group: str, folder: str | None) -> None:
-    names = [one.name for one in groups(folder)]
-    if group not in names:
-        known = [*names, *sections()]
-        having = [
-            name
-            for name in names
-            if group in [one.name for one in options(name, folder)]
-        ]
-        if having:
+def _defaults(group: str, folder: str | None) -> dict[str, Any]:
+    """Group -> default option; raises ConfigError where ``group`` is no group."""
+    defaults = {found.name: found.default for found in groups(folder)}
+    if group in defaults:
+        return defaults
+    for name in defaults:
+        if group in [option.name for option in options(name, folder)]:
             raise ConfigError(
-                f"'{group}' is an option; type gensig options {having[0]}={group}"
+                f"'{group}' is an option; type gensig options {name}={group}"
             )
-        raise ConfigError(
-            f"no group '{group}'; {nearest.hint(group, known)}; `gensig options` says what each is"
-        )
+    hint = nearest.hint(group, [*defaults, *sections()])
+    raise ConfigError(f"no group '{group}'; {hint}; `gensig options` says what each is")
 
 
 def _key_names(section: str) -> str:
-    names = [
-        key.name if section in PRIMARY else key.name.partition(".")[2]
-        for key in section_keys(section)
-    ]
-    return ", ".join(names[:4]) + (", ..." if len(names) > 4 else "")
+    names = [key.name for key in section_keys(section)]
+    if section not in PRIMARY:
+        names = [name.partition(".")[2] for name in names]
+    return ", ".join(names[:SHOWN_KEYS]) + ", ..." * (len(names) > SHOWN_KEYS)
 
 
 def _key_table(keys: Sequence[Key]) -> list[str]:
-    rows = [(key.name, _cut(key.text), key.unit, key.comment) for key in keys]
+    rows = [
+        (key.name, _cut(key.text, VALUE_WIDTH), key.unit, key.comment) for key in keys
+    ]
     return _table(("key", "value", "unit", "comment"), rows)
 
 
-def _cut(text: str) -> str:
-    return text if len(text) <= VALUE_WIDTH else f"{text[: VALUE_WIDTH - 4]} ..."
+def _cut(text: str, width: int) -> str:
+    if len(text) <= width:
+        return text
+    return f"{text[: width - 4]} ..."
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Aligned columns.
-
-    On a terminal the last one is cut to its width, so that every row is one line.
-    """
-    widths = [
-        max(len(row[place]) for row in (head, *rows)) for place in range(len(head) - 1)
-    ]
+    """Aligned columns; on a terminal every row is cut to one line."""
+    table = [head, *rows]
+    columns = list(zip(*table, strict=True))[:-1]
+    widths = [max(map(len, column)) for column in columns]
     lines = []
-    for row in (head, *rows):
-        cells = "  ".join(
-            cell.ljust(width) for cell, width in zip(row, widths, strict=False)
-        )
-        lines.append(f"{cells}  {row[-1]}".rstrip())
+    for row in table:
+        cells = [
+            cell.ljust(width) for cell, width in zip(row, [*widths, 0], strict=True)
+        ]
+        lines.append("  ".join(cells).rstrip())
     if not sys.stdout.isatty():
         return lines
     room = shutil.get_terminal_size().columns
-    return [line if len(line) <= room else f"{line[: room - 4]} ..." for line in lines]
+    return [_cut(line, room) for line in lines]

@@ -1,6 +1,7 @@
-"""What the verbs write.
+"""Files that the verbs write: numbers as JSON, a figure, an option of a group.
 
-Numbers as JSON, a figure, an option of a group. Refused before anything is computed for it.
+Names are checked before anything is computed. Options and records are replaced with ``--force``
+only. JSON files and figures are replaced.
 """
 
 from __future__ import annotations
@@ -22,10 +23,7 @@ FIGURE_TYPES = (".png", ".svg", ".pdf")
 
 
 def check_file(flag: str, name: str | None, types: tuple[str, ...] = ()) -> None:
-    """Refuse a file name that cannot be written.
-
-    Another type than ``types`` (where given), or no such folder.
-    """
+    """Raise ConfigError for a file that cannot be written, or whose name ends otherwise."""
     if name is None:
         return
     path = Path(name)
@@ -40,54 +38,47 @@ def check_file(flag: str, name: str | None, types: tuple[str, ...] = ()) -> None
 
 
 def check_outputs(arguments: Namespace) -> None:
-    """Refuse ``--json`` and ``--plot`` that cannot be written."""
+    """Raise ConfigError for a ``--json`` or ``--plot`` that cannot be written."""
     check_file("--json", arguments.json)
     check_file("--plot", arguments.plot, FIGURE_TYPES)
 
 
 def check_new(flag: str, name: str | None, *, force: bool) -> None:
-    """Refuse to replace data or options, which may be all there is of them.
-
-    Figures and JSON are made again.
-    """
+    """Raise ConfigError for a file that exists, unless it may be replaced."""
     if name is not None and Path(name).exists() and not force:
         raise ConfigError(
-            f"{flag} {name} is there already; choose another name, or add --force to replace it"
+            f"{flag} {name} is there already; choose another name, "
+            "or add --force to replace it"
         )
 
 
 def option_file(name: str, group: str, *, force: bool) -> Path:
-    """The file of a new option of a configuration group; its stem becomes the option's name."""
+    """File of a new option of a configuration group; its stem becomes the option's name."""
     target = Path(name)
     if target.suffix != ".yaml" or not target.stem.isidentifier():
         raise ConfigError(
             f"--out {name}: give a file NAME.yaml in a folder {group}, NAME without spaces"
         )
-    if (
-        target.parent.name != group or target.parent.exists()
-    ):  # a new folder of that name is made with the option
+    # A missing folder of the group's name is made with the option.
+    if target.parent.name != group or target.parent.exists():
         check_file("--out", name)
     check_new("--out", name, force=force)
     return target
 
 
 def write_option(target: Path, text: str) -> None:
-    """Write an option of a group, with its folder where that is new, and say how to take it."""
+    """Write an option of a group with its folder, and print how to select it."""
     target.parent.mkdir(parents=True, exist_ok=True)
     with replaced_file(target) as path:
         path.write_text(text, encoding="utf-8")
-    folder = target.absolute().parent
-    print(
-        f"{target}: take it with {folder.name}={target.stem} --config-dir {target.parent.parent}"
-    )
+    group, folder = target.absolute().parent.name, target.parent.parent
+    print(f"{target}: take it with {group}={target.stem} --config-dir {folder}")
 
 
 def write_outputs(
     arguments: Namespace, content: Mapping[str, Any], draw: Callable[[Path], None]
 ) -> None:
-    """Write ``content`` to ``--json`` and let ``draw`` make the figure of ``--plot``, each only
-    where asked for.
-    """
+    """Write ``content`` to ``--json``, and let ``draw`` write the figure of ``--plot``."""
     if arguments.json is not None:
         with replaced_file(arguments.json) as path:
             text = json.dumps(plain(content), indent=1, allow_nan=False)
@@ -98,17 +89,29 @@ def write_outputs(
 
 
 def plain(value: Any) -> Any:
-    """Arrays as lists, and null for what is not finite, which JSON cannot hold."""
+    """Value for JSON: arrays as lists, and null for a number that is not finite."""
     if isinstance(value, Mapping):
-        return {key: plain(one) for key, one in value.items()}
+        return {key: plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, list | tuple):
-        return [plain(one) for one in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+        return [plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def span(values: NDArray[np.float64], form: str) -> str:
+    """Least and greatest value; a value that is 0 up to rounding has no sign."""
+    ends = [
+        value * (abs(value) >= 1e-9) + 0.0 for value in (values.min(), values.max())
+    ]
+    return " .. ".join(format(value, form) for value in ends)
 
 
 def highest(sound: NDArray[np.float64], faulty: NDArray[np.float64] | None) -> str:
-    """The highest stiffness of a pair, and of the faulty one where there is one."""
-    both = "" if faulty is None else f" sound, {faulty.max():.4e} N/m faulty"
-    return f"{sound.max():.4e} N/m{both}"
+    """Highest stiffness of a tooth pair, sound and faulty."""
+    text = f"{sound.max():.4e} N/m"
+    if faulty is not None:
+        text += f" sound, {faulty.max():.4e} N/m faulty"
+    return text

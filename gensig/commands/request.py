@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
 
+from gensig.commands.console import remark
 from gensig.options.compose import override_keys
 from gensig.options.configuration import Configuration
 from gensig.plan.request import read_request
 
-CHOOSES_OTHERS = "experiment"  # its keys are those of many verbs
+CHOOSES_OTHERS = "experiment"  # read by every verb
 
 
 def read_configuration(arguments: Namespace) -> Configuration:
-    """The configuration of the typed overrides; its kind of machine is kept for `say_unread`."""
+    """Configuration of the typed overrides; keeps the kind of machine for `print_unread`."""
     config = read_request(arguments.overrides, config_dir=arguments.config_dir).config
     arguments.machine_kind = str(config["system"].get("kind"))
     return config
 
 
-def say_unread(
+def print_unread(
     arguments: Namespace,
     reads: Mapping[str, Sequence[str]] | None,
     instead: Mapping[str, str],
@@ -32,26 +32,15 @@ def say_unread(
     reads : sections that the verb reads, by the kind of machine; None where it reads all
     instead : flag to use in place of a key
     """
+    sections = None
     kind = getattr(arguments, "machine_kind", None)
-    sections = None if reads is None or kind is None else reads.get(kind, reads[""])
+    if reads is not None and kind is not None:
+        sections = {*reads.get(kind, reads[""]), CHOOSES_OTHERS}
     for key in override_keys(getattr(arguments, "overrides", ()) or ()):
-        section = key.partition(".")[0]
-        flag = next(
-            (
-                flag
-                for name, flag in instead.items()
-                if key == name or key.startswith(f"{name}.")
-            ),
-            None,
-        )
-        unread = (
-            sections is not None
-            and section not in sections
-            and section != CHOOSES_OTHERS
-        )
-        if flag is not None or unread:
-            hint = f"; use {flag}" if flag else ""
-            print(
-                f"gensig: note: {key} is not read by {arguments.verb}{hint}",
-                file=sys.stderr,
-            )
+        text = f"note: {key} is not read by {arguments.verb}"
+        replaced = [name for name in instead if f"{key}.".startswith(f"{name}.")]
+        if replaced and instead[replaced[0]]:
+            text += f"; use {instead[replaced[0]]}"
+        is_read = sections is None or key.partition(".")[0] in sections
+        if replaced or not is_read:
+            remark(text)

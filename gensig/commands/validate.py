@@ -1,4 +1,4 @@
-"""The verb validate: printed figures of the source papers compared with computed ones."""
+"""``gensig validate``: printed values of the sources and computed ones."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from gensig.commands.console import replaced_file
+from gensig.commands.console import remark, replaced_file
 from gensig.errors import ConfigError
 
 ROWS = Path(__file__).resolve().parents[2] / "tests" / "literature"
@@ -26,17 +26,11 @@ def validate(arguments: Namespace) -> int:
     if arguments.markdown:
         with replaced_file(arguments.markdown) as path:
             path.write_text(page.markdown(results), encoding="utf-8")
-    for line in page.shortfalls(results):
-        print(line)
-    print(page.summary(results))
-    surprises = [result for result in results if not result.as_expected]
-    if surprises:
-        print(
-            f"gensig: {len(surprises)} row(s) differ from what they declare",
-            file=sys.stderr,
-        )
-        return 1
-    return 0
+    print(*page.shortfalls(results), page.summary(results), sep="\n")
+    n_surprises = sum(not result.as_expected for result in results)
+    if n_surprises:
+        remark(f"{n_surprises} row(s) differ from what they declare")
+    return int(n_surprises > 0)
 
 
 def _of_checkout(module: str) -> Any:

@@ -27,13 +27,11 @@ class Distribution(ABC):
 
     Attributes
     ----------
-    key : dotted name of the key, for messages
-    levels : number of values in a grid; None draws them
+    levels : number of values in a grid; 0 where the values are drawn
     names_levels : whether the file gives ``levels``, null included
     """
 
-    key: str
-    levels: int | None
+    levels: int
     names_levels: bool
 
     @property
@@ -41,31 +39,13 @@ class Distribution(ABC):
     def least(self) -> float:
         """Smallest value."""
 
-    @property
-    @abstractmethod
-    def n_levels(self) -> int | None:
-        """Number of values that the key has in a grid; None for one that is drawn."""
-
     @abstractmethod
     def values_at(self, unit: Array) -> list[Any]:
         """Values at points of the unit interval, (point,); plain Python numbers."""
 
     @abstractmethod
     def level_values(self) -> list[Any]:
-        """Values in a grid, in order.
-
-        Raises
-        ------
-        ConfigError    for a distribution without levels
-        """
-
-    def require_levels(self) -> int:
-        """The number of levels; ConfigError where there is none."""
-        if self.n_levels is None:
-            raise ConfigError(
-                f"{self.key}: a grid needs its levels, for instance levels: 4, or distribution: {CHOICE}"
-            )
-        return self.n_levels
+        """Values in a grid, in order; none for a distribution without levels."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,11 +60,6 @@ class Range(Distribution):
         """The lower end."""
         return self.low
 
-    @property
-    def n_levels(self) -> int | None:
-        """Levels as given."""
-        return self.levels
-
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,14 +68,11 @@ class Uniform(Range):
 
     def values_at(self, unit: Array) -> list[Any]:
         """See ``Distribution``."""
-        return [float(value) for value in self.low + (self.high - self.low) * unit]
+        return (self.low + (self.high - self.low) * unit).tolist()
 
     def level_values(self) -> list[Any]:
         """See ``Distribution``."""
-        return [
-            float(value)
-            for value in np.linspace(self.low, self.high, self.require_levels())
-        ]
+        return np.linspace(self.low, self.high, self.levels).tolist()
 
 
 @final
@@ -110,14 +82,11 @@ class LogUniform(Range):
 
     def values_at(self, unit: Array) -> list[Any]:
         """See ``Distribution``."""
-        return [float(value) for value in self.low * (self.high / self.low) ** unit]
+        return (self.low * (self.high / self.low) ** unit).tolist()
 
     def level_values(self) -> list[Any]:
         """See ``Distribution``."""
-        return [
-            float(value)
-            for value in np.geomspace(self.low, self.high, self.require_levels())
-        ]
+        return np.geomspace(self.low, self.high, self.levels).tolist()
 
 
 @final
@@ -136,15 +105,11 @@ class Normal(Range):
         from scipy.stats import truncnorm
 
         a, b = (self.low - self.mean) / self.std, (self.high - self.mean) / self.std
-        return [
-            float(value)
-            for value in truncnorm.ppf(unit, a, b, loc=self.mean, scale=self.std)
-        ]
+        return truncnorm.ppf(unit, a, b, loc=self.mean, scale=self.std).tolist()
 
     def level_values(self) -> list[Any]:
         """See ``Distribution``."""
-        n = self.require_levels()
-        return self.values_at((np.arange(n) + 0.5) / n)
+        return self.values_at((np.arange(self.levels) + 0.5) / self.levels)
 
 
 @final
@@ -159,10 +124,9 @@ class Integers(Range):
 
     def level_values(self) -> list[Any]:
         """See ``Distribution``."""
-        return [
-            round(float(value))
-            for value in np.linspace(self.low, self.high, self.require_levels())
-        ]
+        return (
+            np.rint(np.linspace(self.low, self.high, self.levels)).astype(int).tolist()
+        )
 
 
 @final
@@ -180,11 +144,6 @@ class Choice(Distribution):
         """The smallest listed value."""
         return min(self.values)
 
-    @property
-    def n_levels(self) -> int | None:
-        """Number of listed values."""
-        return None if self.names_levels else len(self.values)
-
     def values_at(self, unit: Array) -> list[Any]:
         """See ``Distribution``."""
         n = len(self.values)
@@ -192,7 +151,6 @@ class Choice(Distribution):
 
     def level_values(self) -> list[Any]:
         """See ``Distribution``."""
-        self.require_levels()
         return list(self.values)
 
 
@@ -219,84 +177,74 @@ def read_distribution(key: str, spec: Any) -> Distribution:
     ------
     ConfigError    unless ``spec`` is a complete distribution
     """
-    _check_distribution(key, spec)
-    kind = spec["distribution"]
-    numbers = {
-        name: tuple(spec[name]) if kind == CHOICE else spec[name] for name in KEYS[kind]
-    }
-    return DISTRIBUTIONS[kind](
-        key=key, levels=spec.get(LEVELS), names_levels=LEVELS in spec, **numbers
-    )
-
-
-def _check_distribution(key: str, spec: Any) -> None:
-    """Raise ConfigError unless ``spec`` is a complete distribution for ``key``."""
     if not isinstance(spec, Mapping) or spec.get("distribution") not in KEYS:
         raise ConfigError(
             f"{key}: give a distribution, one of {', '.join(KEYS)}, for instance "
             f"{{distribution: uniform, low: 1, high: 2}}"
         )
-    needed = KEYS[spec["distribution"]]
-    extra = sorted(set(spec) - {"distribution", LEVELS, *needed})
-    missing = [name for name in needed if name not in spec]
-    if extra or missing:
+    kind = spec["distribution"]
+    needed = KEYS[kind]
+    if set(spec) - {"distribution", LEVELS} != set(needed):
         raise ConfigError(
-            f"{key}: {spec['distribution']} needs exactly {', '.join(needed)} (and levels, for a grid)"
+            f"{key}: {kind} needs exactly {', '.join(needed)} (and levels, for a grid)"
         )
-    if spec["distribution"] == CHOICE:
-        if not isinstance(spec["values"], list) or not spec["values"]:
-            raise ConfigError(f"{key}: values must be a list with at least one entry")
-        if not all(_is_number(value) for value in spec["values"]):
-            raise ConfigError(f"{key}: values must be finite numbers")
+    numbers = {name: spec[name] for name in needed}
+    levels = spec.get(LEVELS) or 0
+    if kind == CHOICE:
+        _check_values(key, spec["values"])
+        numbers["values"] = tuple(spec["values"])
+        if LEVELS not in spec:
+            levels = len(spec["values"])
     else:
-        _check_range(key, spec, needed)
-    _check_levels(key, spec)
+        _check_range(key, kind, numbers)
+    if spec.get(LEVELS) is not None:
+        _check_levels(key, spec)
+    return DISTRIBUTIONS[kind](levels=levels, names_levels=LEVELS in spec, **numbers)
 
 
-def _check_range(key: str, spec: Mapping[str, Any], needed: tuple[str, ...]) -> None:
-    for name in needed:
-        if not _is_number(spec[name]):
-            raise ConfigError(f"{key}: {name} = {spec[name]!r} is not a finite number")
-    kind, low, high = spec["distribution"], spec["low"], spec["high"]
-    if not low < high or (kind == "log_uniform" and low <= 0.0):
-        also = " and above 0" if kind == "log_uniform" else ""
-        raise ConfigError(
-            f"{key}: low = {low:g} and high = {high:g} are no range for {kind}; low must be below{also}"
-        )
-    if kind == "integers" and not all(
-        float(spec[name]).is_integer() for name in needed
-    ):
-        raise ConfigError(
-            f"{key}: low = {low:g} and high = {high:g} must be whole numbers"
-        )
-    if kind == "normal" and spec["std"] <= 0.0:
-        raise ConfigError(f"{key}: std = {spec['std']:g} must be positive")
+def _check_values(key: str, values: Any) -> None:
+    if not isinstance(values, list) or not values:
+        raise ConfigError(f"{key}: values must be a list with at least one entry")
+    if not all(map(_is_number, values)):
+        raise ConfigError(f"{key}: values must be finite numbers")
+
+
+def _check_range(key: str, kind: str, numbers: Mapping[str, Any]) -> None:
+    for name, value in numbers.items():
+        if not _is_number(value):
+            raise ConfigError(f"{key}: {name} = {value!r} is not a finite number")
+    low, high = numbers["low"], numbers["high"]
+    ends = f"{key}: low = {low:g} and high = {high:g}"
+    is_log = kind == "log_uniform"
+    if not low < high or (is_log and low <= 0.0):
+        also = " and above 0" * is_log
+        raise ConfigError(f"{ends} are no range for {kind}; low must be below{also}")
+    if kind == "integers" and not (low == int(low) and high == int(high)):
+        raise ConfigError(f"{ends} must be whole numbers")
+    if kind == "normal" and numbers["std"] <= 0.0:
+        raise ConfigError(f"{key}: std = {numbers['std']:g} must be positive")
 
 
 def _check_levels(key: str, spec: Mapping[str, Any]) -> None:
-    levels, kind = spec.get(LEVELS), spec["distribution"]
-    if levels is None:
-        return
+    levels, kind = spec[LEVELS], spec["distribution"]
     if kind == CHOICE:
         raise ConfigError(
             f"{key}: the levels of a choice are its values; leave levels out, or null to draw them"
         )
     if isinstance(levels, bool) or not isinstance(levels, int) or levels < 2:
         raise ConfigError(
-            f"{key}: levels = {levels!r} must be a whole number of at least 2, or null to draw the values"
+            f"{key}: levels = {levels!r} must be a whole number of at least 2, or null to draw "
+            "the values"
         )
     if kind == "integers" and levels > spec["high"] - spec["low"] + 1:
         raise ConfigError(
-            f"{key}: levels = {levels}, but there are {spec['high'] - spec['low'] + 1:g} whole numbers"
+            f"{key}: levels = {levels}, but there are {spec['high'] - spec['low'] + 1:g} whole "
+            "numbers"
         )
 
 
 def _is_number(value: Any) -> bool:
-    return (
-        isinstance(value, int | float)
-        and not isinstance(value, bool)
-        and math.isfinite(value)
-    )
+    return type(value) in (int, float) and math.isfinite(value)
 
 
 def design_points(
@@ -315,8 +263,7 @@ def design_points(
     from scipy.stats import qmc
 
     if design == "sobol":
-        points = qmc.Sobol(n_dimensions, rng=rng).random_base2(
-            max(1, math.ceil(math.log2(n_points)))
-        )[:n_points]
-        return rng.permutation(points)
+        power = max(1, math.ceil(math.log2(n_points)))
+        points = qmc.Sobol(n_dimensions, rng=rng).random_base2(power)
+        return rng.permutation(points[:n_points])
     return qmc.LatinHypercube(n_dimensions, rng=rng).random(n_points)

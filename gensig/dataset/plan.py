@@ -1,4 +1,4 @@
-"""The plan: one row a record with everything that was drawn, frozen before anything runs."""
+"""The table of a plan: one row a record with everything that was drawn, and its CSV file."""
 
 import csv
 import io
@@ -10,8 +10,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from gensig.dataset.schema import COLUMNS, kind_of
-from gensig.dataset.storage.atomic import read_text, write_text
+from gensig.dataset.columns import COLUMNS
+from gensig.dataset.schema import kind_of
+from gensig.dataset.storage.atomic import read_text
 from gensig.errors import DatasetError
 
 PLAN_BYTES_LIMIT = 4 * 1024**3
@@ -20,7 +21,9 @@ _INT = re.compile(r"[+-]?[0-9]{1,19}")
 _FLOAT = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?([eE][+-]?[0-9]+)?|nan|inf)")
 _CONTROL = re.compile(r"[\x00-\x1f\x7f\ud800-\udfff]")
 _RECORD_ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.\-]*")
-_DTYPES = {"int": np.int64, "float": np.float64}
+_DTYPES = {"str": str, "int": np.int64, "float": np.float64}
+_KINDS = {"U": "str", "T": "str", "i": "int", "u": "int", "b": "int", "f": "float"}
+REQUIRED = ("record_id", "shard", "row")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -29,34 +32,33 @@ class Plan:
 
     Parameters
     ----------
-    columns : name -> (record,) array of text, int64 or float64; `record_id`, `shard` and `row` are required
+    columns : name -> (record,) array of text, int64 or float64; `record_id`, `shard` and `row` are
+        required
 
     Raises
     ------
-    DatasetError    for missing columns, unequal lengths, repeated ids, or shards and rows that do not count up from 0
+    DatasetError    for missing columns, unequal lengths, repeated ids, or shards and rows that do
+                    not count up from 0
     """
 
     columns: Mapping[str, np.ndarray]
 
     def __post_init__(self) -> None:
-        columns = {
-            name: _normalized(name, values) for name, values in self.columns.items()
-        }
-        missing = [
-            name for name in ("record_id", "shard", "row") if name not in columns
-        ]
+        given = self.columns
+        columns = {name: _normalized(name, given[name]) for name in given}
+        missing = [name for name in REQUIRED if name not in columns]
         if missing:
             raise DatasetError(
-                f"the plan has no column {', '.join(missing)}; every plan needs record_id, shard and row"
+                f"the plan has no column {', '.join(missing)}; every plan needs record_id, shard "
+                "and row"
             )
+        n = len(columns["record_id"])
         lengths = {name: len(values) for name, values in columns.items()}
-        n = lengths["record_id"]
-        wrong = [
-            f"{name} ({length})" for name, length in lengths.items() if length != n
-        ]
+        wrong = [f"{name} ({lengths[name]})" for name in columns if lengths[name] != n]
         if n == 0 or wrong:
             raise DatasetError(
-                f"the plan has {n} records, and columns of other lengths: {wrong}; all must be equal, not 0"
+                f"the plan has {n} records, and columns of other lengths: {wrong}; all must be "
+                "equal, not 0"
             )
         _check_ids(columns["record_id"])
         _check_places(columns["shard"], columns["row"])
@@ -99,40 +101,26 @@ def _rebuild(columns: dict[str, np.ndarray]) -> Plan:
 def _normalized(name: str, values: np.ndarray) -> np.ndarray:
     """A read-only copy as text, int64 or float64; DatasetError for anything else."""
     array = np.asarray(values)
-    kind = {
-        "U": "str",
-        "T": "str",
-        "i": "int",
-        "u": "int",
-        "b": "int",
-        "f": "float",
-    }.get(array.dtype.kind)
     if array.dtype.kind == "O" and all(isinstance(value, str) for value in array.flat):
-        kind, array = "str", array.astype(str)
+        array = array.astype(str)
+    kind = _KINDS.get(array.dtype.kind)
     wanted = kind_of(name) or kind
-    if (
-        array.ndim != 1
-        or kind is None
-        or (kind != wanted and (kind, wanted) != ("int", "float"))
-    ):
+    fits = kind == wanted or (kind, wanted) == ("int", "float")
+    if array.ndim != 1 or kind is None or wanted is None or not fits:
         raise DatasetError(
             f"plan column {name} has type {array.dtype} and shape {array.shape}; "
             f"allowed is one axis of {wanted or 'text, int or float'}"
         )
+    array = array.astype(_DTYPES[wanted])  # a copy: the caller's array stays writable
     if wanted == "str":
-        array = np.asarray(array, dtype=str)
-        bad = next((value for value in array.tolist() if _CONTROL.search(value)), None)
-        if bad is not None:
-            raise DatasetError(
-                f"plan column {name} holds the text {bad!r}; control characters are not allowed"
-            )
-    array = array.astype(
-        _DTYPES.get(wanted or "", array.dtype)
-    )  # a copy: the caller's array stays writable
+        for value in array.tolist():
+            if _CONTROL.search(value):
+                raise DatasetError(
+                    f"plan column {name} holds the text {value!r}; control characters are not "
+                    "allowed"
+                )
     if wanted == "float":
-        array[np.isnan(array)] = (
-            np.nan
-        )  # one NaN only: others would not come back from text
+        array[np.isnan(array)] = np.nan  # another NaN would not come back from text
     array.flags.writeable = False
     return array
 
@@ -140,22 +128,17 @@ def _normalized(name: str, values: np.ndarray) -> np.ndarray:
 def _check_ids(ids: np.ndarray) -> None:
     values = ids.tolist()
     limit = COLUMNS["record_id"].n_bytes
-    bad = next(
-        (
-            value
-            for value in values
-            if not _RECORD_ID.fullmatch(value) or len(value) > limit
-        ),
-        None,
-    )
-    if bad is not None:
-        raise DatasetError(
-            f"record_id {bad!r} is not allowed; use letters, digits, '_', '.', '-', at most {limit}"
-        )
+    for value in values:
+        if not _RECORD_ID.fullmatch(value) or len(value) > limit:
+            raise DatasetError(
+                f"record_id {value!r} is not allowed; use letters, digits, '_', '.', '-', at most "
+                f"{limit}"
+            )
     if len(set(values)) != len(values):
         unique, counts = np.unique(ids, return_counts=True)
         raise DatasetError(
-            f"record_id {str(unique[counts > 1][0])!r} occurs more than once in the plan; ids must be unique"
+            f"record_id {str(unique[counts > 1][0])!r} occurs more than once in the plan; ids "
+            "must be unique"
         )
 
 
@@ -168,8 +151,8 @@ def _check_places(shard: np.ndarray, row: np.ndarray) -> None:
     if wrong.size:
         i = int(wrong[0])
         raise DatasetError(
-            f"plan record {i} is at shard {shard[i]} row {row[i]}, expected shard {expected_shard[i]} "
-            f"row {expected_row[i]}; shards and rows must count up from 0"
+            f"plan record {i} is at shard {shard[i]} row {row[i]}, expected shard "
+            f"{expected_shard[i]} row {expected_row[i]}; shards and rows must count up from 0"
         )
 
 
@@ -198,18 +181,12 @@ def plan_text(plan: Plan) -> str:
             raise DatasetError(
                 f"plan column name {name!r} is not allowed; use printable text"
             )
-        texts = [
-            repr(value) if values.dtype.kind == "f" else str(value)
-            for value in values.tolist()
-        ]
-        if (
-            values.dtype.kind == "U"
-            and kind_of(name) is None
-            and _infer(texts) != "str"
-        ):
+        texts = list(map(str, values.tolist()))
+        is_unknown_text = values.dtype.kind == "U" and kind_of(name) is None
+        if is_unknown_text and _infer(texts) != "str":
             raise DatasetError(
-                f"plan column {name} is text, but all its values look like numbers, such as {texts[0]!r}; "
-                "they would not come back as text: put a letter in front"
+                f"plan column {name} is text, but all its values look like numbers, such as "
+                f"{texts[0]!r}; they would not come back as text: put a letter in front"
             )
         cells.append(texts)
     buffer = io.StringIO()
@@ -217,11 +194,6 @@ def plan_text(plan: Plan) -> str:
     writer.writerow(plan.columns)
     writer.writerows(zip(*cells, strict=True))
     return buffer.getvalue()
-
-
-def write_plan(path: Path, plan: Plan) -> None:
-    """Write `plan.csv` atomically; `read_plan` gives back the same bits."""
-    write_text(path, plan_text(plan))
 
 
 def read_plan(path: Path) -> Plan:
@@ -237,27 +209,22 @@ def read_plan(path: Path) -> Plan:
         raise DatasetError(
             f"{path} has two columns of the same name; restore it from a copy"
         )
-    wrong = next((i for i, cells in enumerate(rows) if len(cells) != len(header)), None)
-    if wrong is not None:
-        raise DatasetError(
-            f"{path} record {wrong} has {len(rows[wrong])} values, the header {len(header)}; "
-            "the file is cut or damaged, restore it from a copy"
-        )
-    columns = list(zip(*rows, strict=True)) or [() for _ in header]
+    for i, cells in enumerate(rows):
+        if len(cells) != len(header):
+            raise DatasetError(
+                f"{path} record {i} has {len(cells)} values, the header {len(header)}; the file "
+                "is cut or damaged, restore it from a copy"
+            )
+    columns = list(zip(*rows, strict=True)) or [()] * len(header)
+    named = zip(header, columns, strict=True)
     try:
-        return Plan(
-            columns={
-                name: _parsed(name, cells)
-                for name, cells in zip(header, columns, strict=True)
-            }
-        )
+        return Plan(columns={name: _parsed(name, cells) for name, cells in named})
     except DatasetError as error:
         raise DatasetError(f"{path}: {error}") from error
 
 
 class PlanRows:
-    """Rows of a `plan.csv` without the others: where its lines begin is all that is kept of a
-    plan of millions.
+    """Rows of a `plan.csv` by number, without the others in memory.
 
     Parameters
     ----------
@@ -285,12 +252,8 @@ class PlanRows:
         try:
             with self.path.open("rb") as file:
                 file.seek(begin)
-                lines = (
-                    file.read(end - begin)
-                    .decode("utf-8")
-                    .removesuffix("\n")
-                    .split("\n")
-                )
+                text = file.read(end - begin).decode("utf-8")
+            lines = text.removesuffix("\n").split("\n")
             yield from csv.reader(lines, strict=True)
         except (OSError, ValueError, csv.Error) as error:
             raise DatasetError(
@@ -301,20 +264,18 @@ class PlanRows:
         """All values of some records, as `Plan.record` gives them."""
         if n_records < 1 or first + n_records > len(self._begins) - 2:
             raise DatasetError(
-                f"{self.path} has no records {first} to {first + n_records - 1}; restore it from a copy"
+                f"{self.path} has no records {first} to {first + n_records - 1}; restore it from "
+                "a copy"
             )
         rows = list(self._cells(1 + first, n_records))
-        if len(rows) != n_records or any(
-            len(cells) != len(self.names) for cells in rows
-        ):
+        if list(map(len, rows)) != [len(self.names)] * n_records:
             raise DatasetError(
                 f"{self.path} is cut or damaged near record {first}; restore it from a copy"
             )
         columns = zip(self.names, zip(*rows, strict=True), strict=True)
-        values = {name: _parsed(name, cells).tolist() for name, cells in columns}
+        values = [_parsed(name, cells).tolist() for name, cells in columns]
         return [
-            dict(zip(values, row, strict=True))
-            for row in zip(*values.values(), strict=True)
+            dict(zip(self.names, row, strict=True)) for row in zip(*values, strict=True)
         ]
 
 
@@ -328,13 +289,13 @@ def _parsed(name: str, cells: tuple[str, ...]) -> np.ndarray:
     kind = kind_of(name) or _infer(cells)
     if kind == "str":
         return np.array(cells, dtype=str)
-    pattern = _INT if kind == "int" else _FLOAT
-    bad = next((cell for cell in cells if not pattern.fullmatch(cell)), None)
-    if bad is not None:
-        raise DatasetError(f"column {name} holds {bad!r}, which is no {kind}")
+    pattern = {"int": _INT, "float": _FLOAT}[kind]
+    for cell in cells:
+        if not pattern.fullmatch(cell):
+            raise DatasetError(f"column {name} holds {cell!r}, which is no {kind}")
     if kind == "float":
-        return np.array([float(cell) for cell in cells])
+        return np.array(list(map(float, cells)))
     try:
-        return np.array([int(cell) for cell in cells], dtype=np.int64)
+        return np.array(list(map(int, cells)), dtype=np.int64)
     except OverflowError as error:
         raise DatasetError(f"column {name} holds an integer beyond 64 bits") from error

@@ -4,7 +4,6 @@ import os
 from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import h5py
@@ -46,7 +45,8 @@ def open_dataset(path: str | Path, *, allow_incomplete: bool = False) -> "Datase
     Parameters
     ----------
     path : str | Path           the folder
-    allow_incomplete : bool     open an interrupted run too; records of missing shards are not `usable`
+    allow_incomplete : bool     open an interrupted run too; records of missing shards are not
+                                `usable`
 
     Raises
     ------
@@ -56,8 +56,8 @@ def open_dataset(path: str | Path, *, allow_incomplete: bool = False) -> "Datase
     manifest = read_manifest(folder)
     if not manifest.is_complete and not allow_incomplete:
         raise DatasetError(
-            f"{folder} is incomplete: {manifest.n_done} of {len(manifest.shards)} shards are done; run "
-            f"`gensig resume {folder}`, or open it with allow_incomplete=True"
+            f"{folder} is incomplete: {manifest.n_done} of {len(manifest.shards)} shards are "
+            f"done; run `gensig resume {folder}`, or open it with allow_incomplete=True"
         )
     return Dataset(folder, manifest)
 
@@ -74,7 +74,8 @@ class Dataset:
     sampling_rate : float            Hz
     channel_names, class_names : list of text, in the order of the channel axis and of `label`
     attributes : dict                root attributes of the shards
-    sample_type, compression : str   how `signals` are stored: 'float32' or 'int16'; 'none', 'gzip', 'lzf' or 'blosc2'
+    sample_type, compression : str   how `signals` are stored: 'float32' or 'int16'; 'none',
+        'gzip', 'lzf' or 'blosc2'
     column_names, signal_names, protocols : list of text
     usable : (record,) bool          False for failed records and those of missing shards
     """
@@ -84,11 +85,8 @@ class Dataset:
         self.manifest = manifest
         self.n_records = manifest.n_records
         self._starts = np.cumsum([0, *(entry.rows for entry in manifest.shards)])
-        first_done = next(
-            (i for i, entry in enumerate(manifest.shards) if entry.state == "done"),
-            None,
-        )
-        if first_done is None:
+        done = [i for i, entry in enumerate(manifest.shards) if entry.state == "done"]
+        if not done:
             raise DatasetError(
                 f"{folder} has no finished shard yet; run `gensig resume {folder}`"
             )
@@ -97,7 +95,7 @@ class Dataset:
         self._files: OrderedDict[int, h5py.File] = OrderedDict()
         self._checked: dict[int, tuple[int, ...]] = {}
         self._pid = os.getpid()
-        first = self._file(first_done)
+        first = self._file(done[0])
         self.attributes: dict[str, Any] = read_attributes(first)
         self.sampling_rate = float(self.attributes["sampling_rate_hz"])
         self.channel_names: list[str] = list(self.attributes["channel_names"])
@@ -105,14 +103,13 @@ class Dataset:
         self.sample_type = str(first["acceleration"].dtype.name)
         self.compression = compression_of(first["acceleration"])
         self._shape: tuple[int, int] = first["acceleration"].shape[1:]
-        found = datasets(first, folder)
+        contents = datasets(first, folder)
         self.signal_names: list[str] = [
-            name for name in SIGNALS if SIGNALS[name].is_bulk and name in found
+            name for name in SIGNALS if SIGNALS[name].is_bulk and name in contents
         ]
+        columns = contents.keys() - self.signal_names
         self._types = {
-            name: (data.dtype, data.shape[1:])
-            for name, data in found.items()
-            if name not in self.signal_names
+            name: (contents[name].dtype, contents[name].shape[1:]) for name in columns
         }
 
     @property
@@ -150,25 +147,18 @@ class Dataset:
     @property
     def protocols(self) -> list[str]:
         """Names that `split` takes."""
-        return sorted(
-            Path(name).stem
-            for name in self.manifest.files
-            if name.startswith(f"{SPLITS}/")
-        )
+        files = map(Path, self.manifest.files)
+        return sorted(path.stem for path in files if path.parent.name == SPLITS)
 
     def column(self, name: str) -> np.ndarray:
         """One value (or short vector) a record, (record, ...), read-only; text as numpy strings.
 
         Records of shards that are missing hold NaN, -1 or ''.
         """
-        if name not in self._types:
-            raise unknown_name("column", name, self.column_names, self.folder)
         if name not in self._columns:
+            shards = range(len(self.manifest.shards))
             values = np.concatenate(
-                [
-                    self.shard_column(shard, name)
-                    for shard in range(len(self.manifest.shards))
-                ]
+                [self.shard_column(shard, name) for shard in shards]
             )
             values.flags.writeable = False
             self._columns[name] = values
@@ -180,13 +170,17 @@ class Dataset:
             raise unknown_name("column", name, self.column_names, self.folder)
         dtype, shape = self._types[name]
         entry = self.manifest.shards[shard]
-        if entry.state == "done":
-            return self._read_rows(shard, name, shape)
-        if dtype.kind == "S":
-            return np.full((entry.rows, *shape), "")
-        return np.full(
-            (entry.rows, *shape), np.nan if dtype.kind == "f" else -1, dtype=dtype
-        )
+        if entry.state != "done":
+            missing = {"S": "", "f": np.nan}.get(dtype.kind, -1)
+            kind = None if dtype.kind == "S" else dtype
+            return np.full((entry.rows, *shape), missing, dtype=kind)
+        try:
+            values = read_rows(self._file(shard)[name])
+        except HDF5_ERRORS as error:
+            raise self._unreadable(shard, first_line(error)) from error
+        if values.shape[1:] != shape:
+            raise self._another_shape(shard, name)
+        return values
 
     def first_record(self, shard: int) -> int:
         """Number of the record in row 0 of a shard."""
@@ -210,55 +204,52 @@ class Dataset:
         channels : sequence    names or numbers; None is all, in their order
         name : str             'acceleration', 'acceleration_clean' or 'healthy_twin'
         """
-        stop = self.n_samples if stop is None else stop
-        if name not in SCALES or name not in self.signal_names:
-            known = [known for known in self.signal_names if known in SCALES]
+        known = [known for known in self.signal_names if known in SCALES]
+        if name not in known:
             raise unknown_name("signal", name, known, self.folder)
-        shard, row = self._place(record_index, start, stop)
+        shard, row, stop = self._position(record_index, start, stop)
         file = self._file(shard)
         try:
             block = read_signal(file, name, row, start, stop)
         except HDF5_ERRORS as error:
-            raise self._unreadable(shard, error) from error
+            raise self._unreadable(shard, first_line(error)) from error
         if block.shape != (len(self.channel_names), stop - start):
-            raise self._unreadable(
-                shard, ValueError(f"{name} has another shape than in the other shards")
-            )
-        return (
-            block
-            if channels is None
-            else block[[self._channel(channel) for channel in channels]]
-        )
+            raise self._another_shape(shard, name)
+        if channels is None:
+            return block
+        return block[[self._channel(channel) for channel in channels]]
 
     def trace(
         self, record_index: int, name: str, start: int = 0, stop: int | None = None
     ) -> np.ndarray:
-        """Another signal of one record, where the data set holds it: shaft sensors and the mesh
-        state.
+        """Signal of a shaft sensor or of the mesh state of one record, as far as it is stored.
 
         'tacho', 'encoder_angle', 'shaft_angle', 'mesh_force', 'contact_lost' and 'fault_engaged'
         are (sample,), 'mesh_pinion_tooth', 'mesh_wheel_tooth' and 'mesh_load_share' (pair,
         sample).
         """
-        stop = self.n_samples if stop is None else stop
         traces = [known for known in self.signal_names if known not in SCALES]
         if name not in traces:
             raise unknown_name("trace", name, traces or ["none"], self.folder)
-        shard, row = self._place(record_index, start, stop)
+        shard, row, stop = self._position(record_index, start, stop)
         try:
             values = self._file(shard)[name][row, ..., start:stop]
         except HDF5_ERRORS as error:
-            raise self._unreadable(shard, error) from error
-        if values.shape[-1:] != (stop - start,) or values.ndim != len(
-            SIGNALS[name].axes
-        ):
-            raise self._unreadable(
-                shard, ValueError(f"{name} has another shape than in the other shards")
-            )
+            raise self._unreadable(shard, first_line(error)) from error
+        n_axes = len(SIGNALS[name].axes)
+        if values.shape[-1:] != (stop - start,) or values.ndim != n_axes:
+            raise self._another_shape(shard, name)
         return values
 
-    def _place(self, record_index: int, start: int, stop: int) -> tuple[int, int]:
-        """Shard and row of a record; refuses records and samples that do not exist."""
+    def _position(
+        self, record_index: int, start: int, stop: int | None
+    ) -> tuple[int, int, int]:
+        """Shard and row of a record, and the stop sample.
+
+        DatasetError for records and samples that do not exist.
+        """
+        if stop is None:
+            stop = self.n_samples
         if not 0 <= record_index < self.n_records:
             raise DatasetError(
                 f"record {record_index} does not exist; {self.folder} has 0 to {self.n_records - 1}"
@@ -268,25 +259,28 @@ class Dataset:
                 f"samples {start} to {stop}; a record has 0 to {self.n_samples}"
             )
         shard = int(np.searchsorted(self._starts, record_index, side="right")) - 1
-        if self.manifest.shards[shard].state != "done":
+        entry = self.manifest.shards[shard]
+        if entry.state != "done":
             raise DatasetError(
-                f"record {record_index} is in {self.manifest.shards[shard].name}, which is not made yet"
+                f"record {record_index} is in {entry.name}, which is not made yet"
             )
-        return shard, record_index - int(self._starts[shard])
+        return shard, record_index - self.first_record(shard), stop
 
     def where(self, **conditions: Any) -> Selection:
         """The records that meet all conditions; reads the columns named, no signal.
 
         Parameters
         ----------
-        conditions : column=value, where a column is one of `column_names` or of the plan, ``params/`` may be left out,
-            and ``fault`` means ``label_name``. A value is met by equality, a list by any of its values, a tuple
-            ``(low, high)`` by numbers from low to high, both included, None where a side is open. Names that are no
-            Python names go in as ``**{"params/x.y": (0, 1)}``.
+        conditions : column=value, where a column is one of `column_names` or of the plan,
+            ``params/`` may be left out, and ``fault`` means ``label_name``. A value is met by
+            equality, a list by any of its values, a tuple ``(low, high)`` by numbers from low to
+            high, both included, None where a side is open. Names that are no Python names go in as
+            ``**{"params/x.y": (0, 1)}``.
 
         Raises
         ------
-        DatasetError    for a column that does not exist and for text that no record has, with the nearest names
+        DatasetError    for a column that does not exist and for text that no record has, with the
+                        nearest names
 
         >>> data.where(fault="crack", speed_rpm=(1000, 2000), status="ok")    # doctest: +SKIP
         """
@@ -294,9 +288,11 @@ class Dataset:
 
     @property
     def left_out(self) -> dict[str, str]:
-        """Known protocol that this data set has not -> one line that says why."""
+        """Reasons in one line each, by name, of the known protocols that this data set lacks."""
         absent = [name for name in PROTOCOLS if name not in self.protocols]
-        reasons = why_left_out(self.plan, self.manifest.seed) if absent else {}
+        if not absent:
+            return {}
+        reasons = why_left_out(self.plan, self.manifest.seed)
         made_by = f"gensig {self.manifest.generator_version}, which made the set, did not know it"
         return {name: reasons.get(name, made_by) for name in absent}
 
@@ -313,23 +309,14 @@ class Dataset:
             raise unknown_name("split", protocol, self.protocols, self.folder)
         path = self.folder / SPLITS / f"{protocol}.csv"
         table = read_split(path)
-        index = {
-            record_id: i
-            for i, record_id in enumerate(self.plan.columns["record_id"].tolist())
-        }
+        ids = self.plan.columns["record_id"].tolist()
+        index = {record_id: i for i, record_id in enumerate(ids)}
         rows: SplitRows = {subset: [] for subset in SUBSETS}
-        columns = (
-            table.record_id,
-            table.start_fraction,
-            table.stop_fraction,
-            table.subset,
-        )
-        for record_id, start, stop, subset in zip(
-            *(column.tolist() for column in columns), strict=True
-        ):
+        for record_id, start, stop, subset in table.rows():
             if record_id not in index:
                 raise DatasetError(
-                    f"{path} names record {record_id[:40]!r}, which the plan has not; restore it from a copy"
+                    f"{path} names record {record_id[:40]!r}, which the plan has not; restore it "
+                    "from a copy"
                 )
             rows[subset].append((index[record_id], start, stop))
         return rows
@@ -344,12 +331,7 @@ class Dataset:
     def __enter__(self) -> "Dataset":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def __len__(self) -> int:
@@ -366,7 +348,8 @@ class Dataset:
         return {**self.__dict__, "_files": OrderedDict(), "_checked": {}}
 
     def __repr__(self) -> str:
-        return f"Dataset({str(self.folder)!r}, {self.n_records} records, classes {self.class_names})"
+        folder, n_records = str(self.folder), self.n_records
+        return f"Dataset({folder!r}, {n_records} records, classes {self.class_names})"
 
     def _file(self, shard: int) -> h5py.File:
         """The open shard.
@@ -381,9 +364,8 @@ class Dataset:
         file = self._open(shard_path(self.folder, shard), shard)
         if file["record_id"].shape[0] != self.manifest.shards[shard].rows:
             file.close()
-            raise self._unreadable(
-                shard, ValueError("another number of rows than the manifest says")
-            )
+            reason = "another number of rows than the manifest says"
+            raise self._unreadable(shard, reason)
         self._files[shard] = file
         if len(self._files) > MAX_OPEN_SHARDS:
             self._files.popitem(last=False)[1].close()
@@ -399,28 +381,21 @@ class Dataset:
             self._checked[shard] = before
         return file
 
-    def _read_rows(self, shard: int, name: str, shape: tuple[int, ...]) -> np.ndarray:
-        try:
-            values = read_rows(self._file(shard)[name])
-        except HDF5_ERRORS as error:
-            raise self._unreadable(shard, error) from error
-        if values.shape[1:] != shape:
-            raise self._unreadable(
-                shard, ValueError(f"{name} has another shape than in the other shards")
-            )
-        return values
-
     def _channel(self, channel: int | str) -> int:
-        if isinstance(channel, str) and channel in self.channel_names:
-            return self.channel_names.index(channel)
+        if channel in self.channel_names:
+            return self.channel_names.index(str(channel))
         if not isinstance(channel, str) and 0 <= channel < len(self.channel_names):
             return int(channel)
         raise DatasetError(
             f"channel {channel!r} does not exist; there are {', '.join(self.channel_names)}"
         )
 
-    def _unreadable(self, shard: int, error: Exception) -> DatasetError:
-        reason = first_line(error)
+    def _another_shape(self, shard: int, name: str) -> DatasetError:
+        reason = f"{name} has another shape than in the other shards"
+        return self._unreadable(shard, reason)
+
+    def _unreadable(self, shard: int, reason: str) -> DatasetError:
         return DatasetError(
-            f"{shard_path(self.folder, shard)} cannot be read ({reason}); run `gensig verify {self.folder}`"
+            f"{shard_path(self.folder, shard)} cannot be read ({reason}); run `gensig verify "
+            f"{self.folder}`"
         )

@@ -1,4 +1,4 @@
-"""Records of a data set that meet conditions: chosen by columns, read when asked for."""
+"""Selections: records of a data set that meet conditions on its columns."""
 
 from __future__ import annotations
 
@@ -14,37 +14,26 @@ from gensig.dataset.plan import Plan
 from gensig.dataset.schema import PARAMS
 from gensig.errors import DatasetError
 
-# Short names for columns, as users say them.
+# Short names for columns.
 ALIASES = {"fault": "label_name"}
 _STATES = ("ok", "failed")
 
 
 class RecordSource(Protocol):
-    """What a selection reads: columns of all records, and signals of one; a `Dataset` is one."""
+    """Interface of a data set that a selection reads; a `Dataset` has it."""
 
-    @property
-    def folder(self) -> Path:
-        """Folder of the data set."""
+    folder: Path
+    n_records: int
+    channel_names: list[str]
+    class_names: list[str]
 
     @property
     def plan(self) -> Plan:
         """Plan of all records."""
 
     @property
-    def n_records(self) -> int:
-        """Number of records."""
-
-    @property
     def n_samples(self) -> int:
         """Samples of one channel of one record."""
-
-    @property
-    def channel_names(self) -> list[str]:
-        """Names along the channel axis."""
-
-    @property
-    def class_names(self) -> list[str]:
-        """Names of the classes by label."""
 
     @property
     def column_names(self) -> list[str]:
@@ -70,7 +59,7 @@ class StoredRecord:
     Parameters
     ----------
     dataset : RecordSource
-    index : int       place in the plan's order
+    index : int       number in the plan's order
     values : dict     column -> Python value; a (n,) array where a column holds a short vector
     """
 
@@ -111,12 +100,10 @@ class Selection:
         return self.dataset.column(name)[self.index]
 
     def signals(
-        self, place: int, start: int = 0, stop: int | None = None, **options: Any
+        self, number: int, start: int = 0, stop: int | None = None, **options: Any
     ) -> np.ndarray:
-        """Acceleration of the record at a place of this selection, (channel, sample) float32 in
-        m/s^2.
-        """
-        return self.dataset.signals(self._record(place), start, stop, **options)
+        """Acceleration of one record by its number here, (channel, sample) float32 in m/s^2."""
+        return self.dataset.signals(self._record(number), start, stop, **options)
 
     def array(
         self,
@@ -128,13 +115,14 @@ class Selection:
 
         This is the one call that loads them all; to go through more than fits into memory, iterate.
         """
-        stop = self.dataset.n_samples if stop is None else stop
-        n_channels = len(self.dataset.channel_names if channels is None else channels)
-        block = np.empty(
-            (len(self.index), n_channels, max(0, stop - start)), dtype=np.float32
-        )
-        for place, index in enumerate(self.index.tolist()):
-            block[place] = self.dataset.signals(index, start, stop, channels)
+        if stop is None:
+            stop = self.dataset.n_samples
+        if channels is None:
+            channels = self.dataset.channel_names
+        shape = (len(self.index), len(channels), max(0, stop - start))
+        block = np.empty(shape, dtype=np.float32)
+        for number, index in enumerate(self.index.tolist()):
+            block[number] = self.dataset.signals(index, start, stop, channels)
         return block
 
     def table(self, names: Sequence[str] | None = None) -> np.ndarray:
@@ -142,38 +130,39 @@ class Selection:
 
         All those with one value a record where `names` is None.
         """
+        columns = {
+            name: self.column(name) for name in names or self.dataset.column_names
+        }
         if names is None:
-            names = [
-                name
-                for name in self.dataset.column_names
-                if self.dataset.column(name).ndim == 1
-            ]
-        return structured({name: self.column(name) for name in names})
+            columns = {name: part for name, part in columns.items() if part.ndim == 1}
+        return structured(columns)
 
     def __len__(self) -> int:
         return len(self.index)
 
-    def __getitem__(self, place: int) -> StoredRecord:
-        index = self._record(place)
-        values = {
-            name: self.dataset.column(name)[index] for name in self.dataset.column_names
-        }
-        plain = {
-            name: value.item() if np.ndim(value) == 0 else value
-            for name, value in values.items()
-        }
-        return StoredRecord(dataset=self.dataset, index=index, values=plain)
+    def __getitem__(self, number: int) -> StoredRecord:
+        index = self._record(number)
+        values = {}
+        for name in self.dataset.column_names:
+            value = self.dataset.column(name)[index]
+            if np.ndim(value) == 0:
+                value = value.item()
+            values[name] = value
+        return StoredRecord(dataset=self.dataset, index=index, values=values)
 
     def __iter__(self) -> Iterator[StoredRecord]:
-        return (self[place] for place in range(len(self)))
+        return (self[number] for number in range(len(self)))
 
     def __repr__(self) -> str:
-        return f"Selection({len(self)} of {self.dataset.n_records} records of {str(self.dataset.folder)!r})"
+        return (
+            f"Selection({len(self)} of {self.dataset.n_records} records of "
+            f"{str(self.dataset.folder)!r})"
+        )
 
-    def _record(self, place: int) -> int:
-        if not -len(self.index) <= place < len(self.index):
-            raise IndexError(f"record {place} of a selection of {len(self.index)}")
-        return int(self.index[place])
+    def _record(self, number: int) -> int:
+        if not -len(self.index) <= number < len(self.index):
+            raise IndexError(f"record {number} of a selection of {len(self.index)}")
+        return int(self.index[number])
 
 
 def structured(columns: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -188,85 +177,81 @@ def structured(columns: Mapping[str, np.ndarray]) -> np.ndarray:
 
 
 def unknown_name(
-    kind: str, name: str, known: Sequence[str], place: object
+    kind: str, name: str, known: Sequence[str], folder: Path
 ) -> DatasetError:
-    """The one line for a name that does not exist, with the nearest names first."""
-    close = difflib.get_close_matches(name, known, n=3)
-    hint = (
-        f"did you mean {' or '.join(map(repr, close))}?"
-        if close
-        else f"it has {', '.join(known)}"
-    )
-    return DatasetError(f"{kind} {name!r} does not exist in {place}; {hint}")
+    """Error of one line for a name that does not exist, with the nearest names first."""
+    hint = f"it has {', '.join(known)}"
+    if close := difflib.get_close_matches(name, known, n=3):
+        hint = f"did you mean {' or '.join(map(repr, close))}?"
+    return DatasetError(f"{kind} {name!r} does not exist in {folder}; {hint}")
 
 
 def _meets(dataset: RecordSource, name: str, wanted: Any) -> np.ndarray:
-    """(record,) bool: which records meet one condition."""
+    """(record,) bool: True for the records that meet one condition."""
     values = _values(dataset, name)
     if values.ndim != 1:
         raise DatasetError(
-            f"column {name!r} holds {values.shape[1:]} values a record; a condition needs one a record"
+            f"column {name!r} holds {values.shape[1:]} values a record; a condition needs one a "
+            "record"
         )
     if isinstance(wanted, tuple):
         return _in_range(name, values, wanted)
-    choices = (
-        [*wanted]
-        if isinstance(wanted, list | set | frozenset | range | np.ndarray)
-        else [wanted]
-    )
-    is_text = values.dtype.kind == "U"
-    for choice in choices:
-        if isinstance(choice, str | np.str_) is not is_text or not isinstance(
-            choice, str | int | float | np.generic
-        ):
-            raise DatasetError(
-                f"where {name}={choice!r}: the column holds {'text' if is_text else 'numbers'}; give a value of that "
-                "kind, a list of them"
-                + ("" if is_text else ", or a range as a tuple (low, high)")
-            )
-    if is_text:
+    choices = [wanted]
+    if isinstance(wanted, list | set | frozenset | range | np.ndarray):
+        choices = [*wanted]
+    if values.dtype.kind == "U":
+        _check_kind(
+            name, choices, str, "text; give a value of that kind, a list of them"
+        )
         _check_choices(dataset, name, values, choices)
         return np.isin(values, np.array(choices, dtype=str))
-    meets = np.isin(values, np.array(choices, dtype=np.float64))
-    if any(np.isnan(choice) for choice in choices):
+    _check_kind(
+        name,
+        choices,
+        int | float | np.number | np.bool_,
+        "numbers; give a value of that kind, a list of them, or a range as a tuple (low, high)",
+    )
+    numbers = np.array(choices, dtype=np.float64)
+    meets = np.isin(values, numbers)
+    if np.isnan(numbers).any():
         meets |= np.isnan(values)
     return meets
 
 
+def _check_kind(name: str, choices: Sequence[Any], kind: Any, held: str) -> None:
+    for choice in choices:
+        if not isinstance(choice, kind):
+            raise DatasetError(f"where {name}={choice!r}: the column holds {held}")
+
+
 def _values(dataset: RecordSource, name: str) -> np.ndarray:
-    name = ALIASES.get(name, name) if name not in dataset.column_names else name
-    if name not in dataset.column_names and f"{PARAMS}/{name}" in dataset.column_names:
-        name = f"{PARAMS}/{name}"
-    if name in dataset.column_names:
-        return dataset.column(name)
+    for full_name in (name, ALIASES.get(name), f"{PARAMS}/{name}"):
+        if full_name in dataset.column_names:
+            return dataset.column(full_name)
     if name in dataset.plan.columns:
         return dataset.plan.columns[name]
-    known = sorted({*ALIASES, *dataset.column_names, *dataset.plan.columns})
-    short = [known_name.removeprefix(f"{PARAMS}/") for known_name in known]
-    raise unknown_name(
-        "column", name, known if "/" in name else sorted({*short}), dataset.folder
-    )
+    known = {*ALIASES, *dataset.column_names, *dataset.plan.columns}
+    if "/" not in name:
+        known = {full_name.removeprefix(f"{PARAMS}/") for full_name in known}
+    raise unknown_name("column", name, sorted(known), dataset.folder)
 
 
 def _in_range(name: str, values: np.ndarray, wanted: tuple) -> np.ndarray:
     """Closed range; None leaves a side open. Missing values (NaN) are in no range."""
-    numbers = [limit for limit in wanted if limit is not None]
-    right = len(wanted) == 2 and all(
-        isinstance(limit, int | float | np.number) for limit in numbers
+    limits = [
+        infinite if limit is None else limit
+        for limit, infinite in zip(wanted, (-np.inf, np.inf), strict=False)
+    ]
+    are_numbers = all(
+        isinstance(limit, int | float | np.number) and not np.isnan(limit)
+        for limit in limits
     )
-    if (
-        values.dtype.kind == "U"
-        or not right
-        or any(np.isnan(limit) for limit in numbers)
-    ):
+    if values.dtype.kind == "U" or len(wanted) != 2 or not are_numbers:
         raise DatasetError(
-            f"where {name}={wanted!r}: a tuple is a closed range (low, high) of numbers, None where a side is open; "
-            "give a list for several values"
+            f"where {name}={wanted!r}: a tuple is a closed range (low, high) of numbers, None "
+            "where a side is open; give a list for several values"
         )
-    low, high = (
-        (-np.inf if wanted[0] is None else wanted[0]),
-        (np.inf if wanted[1] is None else wanted[1]),
-    )
+    low, high = limits
     if low > high:
         raise DatasetError(
             f"where {name}={wanted!r}: the range is empty; give the lower limit first"
@@ -277,17 +262,13 @@ def _in_range(name: str, values: np.ndarray, wanted: tuple) -> np.ndarray:
 def _check_choices(
     dataset: RecordSource, name: str, values: np.ndarray, choices: Sequence[Any]
 ) -> None:
-    """Refuse text that no record has.
+    """Raise DatasetError for text that no record has.
 
-    It is a slip of the pen. Classes and states may be absent, and so may ''.
+    Classes and states may be absent, and so may ''.
     """
-    column = ALIASES.get(name, name)
-    possible = {*values.tolist(), ""}
-    possible |= {"label_name": {*dataset.class_names}, "status": {*_STATES}}.get(
-        column, set()
-    )
-    for choice in choices:
-        if str(choice) not in possible:
-            raise unknown_name(
-                f"{name} =", str(choice), sorted(possible - {""})[:200], dataset.folder
-            )
+    may_be_absent = {"label_name": dataset.class_names, "status": _STATES}
+    possible = {*values.tolist(), *may_be_absent.get(ALIASES.get(name, name), ())}
+    for choice in map(str, choices):
+        if choice and choice not in possible:
+            known = sorted(possible - {""})[:200]
+            raise unknown_name(f"{name} =", choice, known, dataset.folder)

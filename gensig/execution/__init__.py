@@ -1,1 +1,1 @@
-"""Where shards are computed."""
+"""Executors, which compute the shards of a data set."""

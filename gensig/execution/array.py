@@ -1,7 +1,4 @@
-"""The share of one task of an array job, such as SLURM's.
-
-Every shard whose number is its own modulo the tasks.
-"""
+"""Shards of one task of an array job, such as SLURM's: each `shard_count`-th shard."""
 
 from __future__ import annotations
 
@@ -15,10 +12,7 @@ from gensig.execution.local import LocalExecutor
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArrayExecutor(Executor):
-    """Task ``shard_index`` of ``shard_count``.
-
-    Tasks know nothing of each other, and ``gensig finalize`` closes.
-    """
+    """Task ``shard_index`` of ``shard_count`` independent tasks; ``gensig finalize`` closes."""
 
     closes = False
 
@@ -29,8 +23,9 @@ class ArrayExecutor(Executor):
     def __post_init__(self) -> None:
         if self.shard_index >= self.shard_count:
             raise ConfigError(
-                f"executor.shard_index = {self.shard_index} with executor.shard_count = {self.shard_count}: tasks are "
-                f"counted from 0 to {self.shard_count - 1}; write #SBATCH --array=0-{self.shard_count - 1}"
+                f"executor.shard_index = {self.shard_index} with executor.shard_count = "
+                f"{self.shard_count}: tasks are counted from 0 to {self.shard_count - 1}; write "
+                f"#SBATCH --array=0-{self.shard_count - 1}"
             )
 
     @property
@@ -40,16 +35,12 @@ class ArrayExecutor(Executor):
 
     def share(self, shard_indices: Sequence[int]) -> list[int]:
         """The shards of this task: what others have made meanwhile does not change them."""
-        return [
-            index
-            for index in shard_indices
-            if index % self.shard_count == self.shard_index
-        ]
+        task, n_tasks = self.shard_index, self.shard_count
+        return [index for index in shard_indices if index % n_tasks == task]
 
     def run(
         self, job: Callable[[int], T], shard_indices: Sequence[int]
     ) -> Iterator[tuple[int, T | ShardFailure]]:
         """See ``Executor.run``."""
-        yield from LocalExecutor(n_workers=self.n_workers).run(
-            job, self.share(shard_indices)
-        )
+        executor = LocalExecutor(n_workers=self.n_workers)
+        yield from executor.run(job, self.share(shard_indices))

@@ -1,7 +1,4 @@
-"""What every executor promises.
-
-A job is run for each shard, and what came of it is told as it comes.
-"""
+"""Interface of executors, which run a job for each shard."""
 
 from __future__ import annotations
 
@@ -26,17 +23,18 @@ THREAD_VARIABLES = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShardFailure:
-    """What is left of a shard whose worker died or whose job raised."""
+    """Failure of a shard whose worker died or whose job raised."""
 
     reason: str
 
 
 class Executor(ABC):
-    """Where shards are computed; it decides no bit of them.
+    """Place of the computation of shards; it decides no bit of them.
 
     Attributes
     ----------
-    closes : bool    True where one call makes every shard, so that the data set can be closed afterwards
+    closes : bool    True where one call makes every shard, so that the data set can be closed
+                     afterwards
     """
 
     closes = True
@@ -76,13 +74,11 @@ def one_line(error: BaseException) -> str:
 
 
 def read_n_workers(requested: Any) -> int:
-    """Number of worker processes: as asked, else one a usable core."""
+    """Number of worker processes: as given, else one for each usable core."""
     if requested is None:
-        return (
-            len(os.sched_getaffinity(0))
-            if hasattr(os, "sched_getaffinity")
-            else os.cpu_count() or 1
-        )
+        if hasattr(os, "sched_getaffinity"):
+            return len(os.sched_getaffinity(0))
+        return os.cpu_count() or 1
     return whole_number("n_workers", requested, at_least=1)
 
 

@@ -1,7 +1,4 @@
-"""Shards on the workers of a Dask cluster.
-
-One on this machine, or any whose scheduler's address is given.
-"""
+"""Shards on the workers of a Dask cluster, on this machine or by the scheduler's address."""
 
 from __future__ import annotations
 
@@ -22,9 +19,7 @@ CONNECT_SECONDS = 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DaskExecutor(Executor):
-    """Workers of one thread each, which see the data set's folder under the same path as this
-    process.
-    """
+    """Workers of one thread each, which see the data set's folder at the same path."""
 
     n_workers: int
     address: str | None
@@ -52,10 +47,8 @@ class DaskExecutor(Executor):
                 pure=False,
                 retries=TRIES - 1,
             )
-            numbers = {
-                future.key: index
-                for future, index in zip(futures, shard_indices, strict=True)
-            }
+            keys = [future.key for future in futures]
+            numbers = dict(zip(keys, shard_indices, strict=True))
             for future in distributed.as_completed(futures, loop=client.loop):
                 try:
                     result = future.result()
@@ -71,7 +64,8 @@ class DaskExecutor(Executor):
 
             settings = {
                 "distributed.scheduler.allowed-failures": TRIES - 1,
-                "distributed.scheduler.worker-saturation": 1.0,  # none waits at a worker whose death it would share
+                # No shard waits at a worker whose death it would share.
+                "distributed.scheduler.worker-saturation": 1.0,
             }
             with (
                 dask.config.set(settings),
@@ -92,8 +86,8 @@ class DaskExecutor(Executor):
             )
         except (OSError, ValueError) as error:
             raise ConfigError(
-                f"executor.address = {self.address!r}: no Dask scheduler answers there ({one_line(error)}); start one "
-                "with `dask scheduler`"
+                f"executor.address = {self.address!r}: no Dask scheduler answers there "
+                f"({one_line(error)}); start one with `dask scheduler`"
             ) from error
         with client:
             threads = client.nthreads()
@@ -102,12 +96,11 @@ class DaskExecutor(Executor):
                     f"the Dask scheduler at {self.address} has no worker; start some with "
                     f"`dask worker {self.address} --nthreads 1`"
                 )
-            many = {worker: n for worker, n in threads.items() if n != 1}
-            if many:
-                worker, n = next(iter(many.items()))
-                raise ConfigError(
-                    f"the Dask worker {worker} has {n} threads; start each with --nthreads 1"
-                )
+            for worker, n in threads.items():
+                if n != 1:
+                    raise ConfigError(
+                        f"the Dask worker {worker} has {n} threads; start each with --nthreads 1"
+                    )
             yield client
 
 
@@ -117,6 +110,7 @@ def load_distributed() -> ModuleType:
         import distributed
     except ImportError as error:
         raise ConfigError(
-            "executor=dask needs the package distributed, which is an extra; pip install 'gensig[dask]'"
+            "executor=dask needs the package distributed, which is an extra; pip install "
+            "'gensig[dask]'"
         ) from error
     return distributed

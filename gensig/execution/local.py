@@ -1,7 +1,4 @@
-"""Shards on processes of this machine.
-
-A process that dies is replaced and only its shard runs again.
-"""
+"""Shards on processes of this machine, with replacement of a process that dies."""
 
 from __future__ import annotations
 
@@ -48,7 +45,7 @@ class LocalExecutor(Executor):
             for index in shard_indices:
                 yield index, guarded(job, index)
             return
-        strangers = set(multiprocessing.active_children())
+        before = set(multiprocessing.active_children())
         waiting, tries = deque(shard_indices), Counter[int]()
         # A pool a worker: when one dies, it is known which shard it had in hand.
         idle = [_worker() for _ in range(min(self.n_workers, len(waiting)))]
@@ -77,9 +74,8 @@ class LocalExecutor(Executor):
                     idle.append(worker)
                     yield index, result
         except BaseException:
-            # Interrupted: what is half done is a temporary file that nobody will mistake for a
-            # shard.
-            for process in set(multiprocessing.active_children()) - strangers:
+            # Interrupted: unfinished shards are temporary files.
+            for process in set(multiprocessing.active_children()) - before:
                 process.terminate()
             raise
         finally:
@@ -110,10 +106,7 @@ def _submit(
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Processes that start in this block never see Ctrl-C, not even while they import.
-
-    It is the parent's to answer.
-    """
+    """Processes that start in this block never see Ctrl-C, which the parent answers."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -133,13 +126,9 @@ def _main_unknown() -> Iterator[None]:
     importable without it.
     """
     main = sys.modules["__main__"]
-    looked_at = (
-        "__spec__",
-        "__file__",
-    )  # by multiprocessing.spawn.get_preparation_data
-    hidden: dict[str, Any] = {
-        name: vars(main)[name] for name in looked_at if name in vars(main)
-    }
+    # multiprocessing.spawn.get_preparation_data reads these two.
+    names = {"__spec__", "__file__"} & vars(main).keys()
+    hidden: dict[str, Any] = {name: vars(main)[name] for name in names}
     main.__spec__ = None
     vars(main).pop("__file__", None)
     try:
@@ -149,10 +138,7 @@ def _main_unknown() -> Iterator[None]:
 
 
 def _begin_worker() -> None:
-    """Leave Ctrl-C to the parent, and end when the parent ends.
-
-    A killed one would leave workers waiting for ever.
-    """
+    """Leave Ctrl-C to the parent, and end when the parent ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     if parent is not None:

@@ -1,4 +1,4 @@
-"""From the group ``executor`` of a configuration to an executor."""
+"""Executors by name, and the reader of the group ``executor`` of a configuration."""
 
 from __future__ import annotations
 
@@ -29,8 +29,9 @@ def _slurm(section: Section) -> Executor:
     missing = [key for key in ("shard_index", "shard_count") if section[key] is None]
     if missing:
         raise ConfigError(
-            f"executor=slurm needs executor.{missing[0]}; a task gives executor.shard_index=$SLURM_ARRAY_TASK_ID "
-            "and executor.shard_count=$SLURM_ARRAY_TASK_COUNT"
+            f"executor=slurm needs executor.{missing[0]}; a task gives "
+            "executor.shard_index=$SLURM_ARRAY_TASK_ID and "
+            "executor.shard_count=$SLURM_ARRAY_TASK_COUNT"
         )
     return ArrayExecutor(
         shard_index=whole_number("shard_index", section["shard_index"], at_least=0),

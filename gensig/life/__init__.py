@@ -1,1 +1,1 @@
-"""What gears suffer over their lives: root stress, wear, growing cracks and pits."""
+"""Life of gears: root stress, wear, growing cracks and pits."""

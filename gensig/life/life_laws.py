@@ -1,10 +1,10 @@
-"""Lives over torque and speed, and laws fitted to them that know the range they were fitted on."""
+"""Lives over torque and speed, and fitted laws with the range of their fit."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,6 @@ from gensig.life.wear.wear_life import hours, wear_life
 
 Array = NDArray[np.float64]
 
-FORMS = ("power", "logarithm", "exponential")
 EXPONENT_STEP = 0.05  # of the torque, on either side
 
 
@@ -23,7 +22,7 @@ EXPONENT_STEP = 0.05  # of the torque, on either side
 class LifeMap:
     """Lives over torques (torque,) N m and speeds (speed,) rad/s of the pinion.
 
-    ``turns`` (torque,) of the pinion do not hang on the speed: flanks slide as far in a turn,
+    ``turns`` (torque,) of the pinion do not depend on the speed: flanks slide as far in a turn,
     however fast.
     """
 
@@ -34,9 +33,8 @@ class LifeMap:
     @property
     def hours(self) -> Array:
         """(torque, speed)."""
-        return np.array(
-            [[hours(turns, speed) for speed in self.speed] for turns in self.turns]
-        )
+        rows = [[hours(turns, speed) for speed in self.speed] for turns in self.turns]
+        return np.array(rows)
 
 
 def life_map(
@@ -54,12 +52,9 @@ def life_map(
                 f"a map needs two {name} or more, all positive; {len(set(values))} different given"
             )
     torque = np.unique(np.asarray(torques, dtype=np.float64))
-    turns = np.array([_life_under(case, float(one)) for one in torque])
-    return LifeMap(
-        torque=torque,
-        speed=np.unique(np.asarray(speeds, dtype=np.float64)),
-        turns=turns,
-    )
+    speed = np.unique(np.asarray(speeds, dtype=np.float64))
+    turns = np.array([_life_under(case, float(value)) for value in torque])
+    return LifeMap(torque=torque, speed=speed, turns=turns)
 
 
 def _life_under(case: WearCase, torque: float) -> float:
@@ -71,23 +66,19 @@ def _life_under(case: WearCase, torque: float) -> float:
 
 def torque_exponent(case: WearCase) -> float:
     """Local exponent n of life ~ T^-n at the case's torque."""
-    low, high = (
-        wear_life(case.under(case.torque * (1.0 + step))).life
-        for step in (-EXPONENT_STEP, EXPONENT_STEP)
-    )
-    return -math.log(high / low) / math.log(
-        (1.0 + EXPONENT_STEP) / (1.0 - EXPONENT_STEP)
-    )
+    steps = (1.0 - EXPONENT_STEP, 1.0 + EXPONENT_STEP)
+    low, high = (wear_life(case.under(case.torque * step)).life for step in steps)
+    return -math.log(high / low) / math.log(steps[1] / steps[0])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FittedLaw:
-    """Hours of life as a formula, and where it was fitted; torque T in N m, speed w in rad/s,
-    both of the pinion.
+    """Hours of life as a formula, with the range of its fit.
 
-    ``power``: a T^-b w^-c. ``logarithm``: a - b ln(T), at one speed. ``exponential``: a exp(-b
-    w), at one torque. The last two are the forms of the wear-life paper, eqs. (25) and (26).
-    ``largest_error`` is the greatest relative deviation from the lives that it was fitted to.
+    Torque T in N m and speed w in rad/s are those of the pinion. ``power``: a T^-b w^-c.
+    ``logarithm``: a - b ln(T), at one speed. ``exponential``: a exp(-b w), at one torque. The
+    last two are the forms of the wear-life paper, eqs. (25) and (26). ``largest_error`` is the
+    greatest relative deviation from the fitted lives.
     """
 
     form: str
@@ -99,7 +90,7 @@ class FittedLaw:
     largest_error: float
 
     def formula(self, torque: Array | float, speed: Array | float) -> Array | float:
-        """What the formula says, wherever; it may be negative, which no life is."""
+        """Value of the formula anywhere; it may be negative, which no life is."""
         if self.form == "power":
             return self.a * np.asarray(torque) ** -self.b * np.asarray(speed) ** -self.c
         if self.form == "logarithm":
@@ -114,27 +105,26 @@ class FittedLaw:
         Raises
         ------
         ExtrapolationError    beyond the fitted range, unless allowed
-        SimulationError       where the formula gives no life at all, which it may even inside its range
+        SimulationError       where the formula gives no life at all, which it may even inside its
+        range
         """
-        for name, value, (low, high) in (
-            ("torque", torque, self.torque),
-            ("speed", speed, self.speed),
+        for name, unit, value, (low, high) in (
+            ("torque", "N m", torque, self.torque),
+            ("speed", "rad/s", speed, self.speed),
         ):
-            if (
-                not low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9)
-                and not allow_extrapolation
-            ):
-                unit = "N m" if name == "torque" else "rad/s"
+            is_inside = low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9)
+            if not is_inside and not allow_extrapolation:
                 raise ExtrapolationError(
-                    f"the {self.form} law was fitted for a {name} of {low:g} to {high:g} {unit}, not {value:g}; take "
-                    f"gensig wear-life itself there"
+                    f"the {self.form} law was fitted for a {name} of {low:g} to {high:g} {unit}, "
+                    f"not {value:g}; take gensig wear-life itself there"
                 )
-        found = float(self.formula(torque, speed))
-        if not found > 0.0:
+        life = float(self.formula(torque, speed))
+        if not life > 0.0:
             raise SimulationError(
-                f"the {self.form} law gives a life of {found:.4g} hours at {torque:g} N m: it is a fit, not physics"
+                f"the {self.form} law gives a life of {life:.4g} hours at {torque:g} N m: "
+                "it is a fit, not physics"
             )
-        return found
+        return life
 
     @property
     def no_life_from(self) -> float | None:
@@ -142,7 +132,9 @@ class FittedLaw:
 
         None where it always gives one.
         """
-        return math.exp(self.a / self.b) if self.form == "logarithm" else None
+        if self.form != "logarithm":
+            return None
+        return math.exp(self.a / self.b)
 
     @property
     def text(self) -> str:
@@ -168,70 +160,36 @@ def fitted_laws(lives: LifeMap, torque: float, speed: float) -> tuple[FittedLaw,
     columns = np.stack(
         [np.ones(values.size), -log_torque.ravel(), -log_speed.ravel()], axis=1
     )
-    constant, by_torque, by_speed = np.linalg.lstsq(
-        columns, np.log(values).ravel(), rcond=None
-    )[0]
+    fit = np.linalg.lstsq(columns, np.log(values).ravel(), rcond=None)[0]
+    constant, by_torque, by_speed = fit
     slope, level = np.polyfit(np.log(lives.torque), values[:, at_speed], 1)
     decay, start = np.polyfit(lives.speed, np.log(values[at_torque]), 1)
-    spans = {"torque": _span(lives.torque), "speed": _span(lives.speed)}
-    at = {
-        "torque": (lives.torque[at_torque],) * 2,
-        "speed": (lives.speed[at_speed],) * 2,
-    }
+    one_torque = replace(lives, torque=lives.torque[[at_torque]])
+    one_speed = replace(lives, speed=lives.speed[[at_speed]])
+    power = (math.exp(constant), by_torque, by_speed)
     return (
-        _law("power", (math.exp(constant), by_torque, by_speed), spans, lives, values),
-        _law(
-            "logarithm",
-            (level, -slope, 0.0),
-            spans | {"speed": at["speed"]},
-            lives,
-            values[:, at_speed, None],
-        ),
+        _law("power", power, lives, values),
+        _law("logarithm", (level, -slope, 0.0), one_speed, values[:, [at_speed]]),
         _law(
             "exponential",
             (math.exp(start), -decay, 0.0),
-            spans | {"torque": at["torque"]},
-            lives,
-            values[at_torque],
+            one_torque,
+            values[[at_torque]],
         ),
     )
 
 
 def _law(
-    form: str,
-    numbers: tuple[float, float, float],
-    spans: dict[str, tuple[float, float]],
-    lives: LifeMap,
-    values: Array,
+    form: str, numbers: tuple[float, float, float], lives: LifeMap, values: Array
 ) -> FittedLaw:
-    a, b, c = (float(number) for number in numbers)
+    """Law with the span of the map that it was fitted to; ``values`` (torque, speed) in hours."""
+    a, b, c = map(float, numbers)
+    torque, speed = (
+        (float(axis.min()), float(axis.max())) for axis in (lives.torque, lives.speed)
+    )
     law = FittedLaw(
-        form=form,
-        a=a,
-        b=b,
-        c=c,
-        largest_error=0.0,
-        torque=spans["torque"],
-        speed=spans["speed"],
+        form=form, a=a, b=b, c=c, torque=torque, speed=speed, largest_error=0.0
     )
-    found = law.formula(lives.torque[:, None], lives.speed)
-    error = np.max(
-        np.abs(
-            np.broadcast_to(found, np.broadcast_shapes(np.shape(found), values.shape))
-            / values
-            - 1.0
-        )
-    )
-    return FittedLaw(
-        form=form,
-        a=a,
-        b=b,
-        c=c,
-        largest_error=float(error),
-        torque=law.torque,
-        speed=law.speed,
-    )
-
-
-def _span(values: Array) -> tuple[float, float]:
-    return float(values.min()), float(values.max())
+    fitted = law.formula(lives.torque[:, None], lives.speed)
+    error = float(np.max(np.abs(fitted / values - 1.0)))
+    return replace(law, largest_error=error)

@@ -1,12 +1,9 @@
-"""When a machine runs, and at which speed and load.
-
-Blocks of time, each at one set-point, with standstills between.
-"""
+"""Operation of a machine over its life: blocks of time, each at one set-point, and standstills."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +20,9 @@ class History:
 
     Parameters
     ----------
-    begin, end : (block,) s       clock time since the machine was new; between two blocks it stands still
-    setpoint : (block,) int       which of the set-points it runs at
+    begin, end : (block,) s       clock time since the machine was new; it stands still between
+        two blocks
+    setpoint : (block,) int       index of the block's set-point
     speed, torque : (setpoint,)   of the driving pinion, rad/s and N m
     """
 
@@ -35,17 +33,16 @@ class History:
     torque: Array
 
     def __post_init__(self) -> None:
-        if (
-            not len(self.begin)
-            or (self.end <= self.begin).any()
-            or (self.begin[1:] < self.end[:-1]).any()
-        ):
+        overlap = (self.begin[1:] < self.end[:-1]).any()
+        if not len(self.begin) or (self.end <= self.begin).any() or overlap:
             raise ConfigError(
-                "a history needs blocks that end after they begin and do not overlap, in order of time"
+                "a history needs blocks that end after they begin and do not overlap, "
+                "in order of time"
             )
         if self.begin[0] < 0.0:
             raise ConfigError(
-                f"a history begins at {self.begin[0] / 3600.0:g} h; times count from 0, the new machine"
+                f"a history begins at {self.begin[0] / 3600.0:g} h; times count from 0, the new "
+                "machine"
             )
         if not (self.speed > 0.0).all() or not (self.torque > 0.0).all():
             raise ConfigError(
@@ -57,16 +54,10 @@ class History:
         """Time that the machine has run when each block ends, (block,) s."""
         return np.cumsum(self.end - self.begin)
 
-    @property
-    def turns_per_block(self) -> Array:
-        """Turns of the pinion in each block, (block,)."""
-        return (self.end - self.begin) * self.speed[self.setpoint] / (2.0 * math.pi)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DrawnBlocks:
-    """How blocks are drawn: lengths uniform between two limits, and how often and how long the
-    machine stands still.
+    """Distribution of blocks: uniform lengths, chance of standstills and their uniform lengths.
 
     ``gap_chance`` is that of a standstill after a block; all lengths in s.
     """
@@ -84,8 +75,8 @@ class DrawnBlocks:
         ):
             if not 0.0 < low <= high:
                 raise ConfigError(
-                    f"life.{name}_low_h = {low / 3600.0:g} and life.{name}_high_h = {high / 3600.0:g} must be positive "
-                    f"and in order"
+                    f"life.{name}_low_h = {low / 3600.0:g} and life.{name}_high_h = "
+                    f"{high / 3600.0:g} must be positive and in order"
                 )
         if not 0.0 <= self.gap_chance < 1.0:
             raise ConfigError(
@@ -111,18 +102,17 @@ def draw_history(
     if most > MOST_BLOCKS:
         raise ConfigError(
             f"life.horizon_h = {horizon / 3600.0:g} may hold {most:,} blocks of life.block_low_h = "
-            f"{blocks.shortest / 3600.0:g}, more than {MOST_BLOCKS:,}; take longer blocks or a nearer horizon"
+            f"{blocks.shortest / 3600.0:g}, more than {MOST_BLOCKS:,}; take longer blocks or a "
+            "nearer horizon"
         )
     lengths = rng.uniform(blocks.shortest, blocks.longest, most)
-    gaps = np.where(
-        rng.random(most) < blocks.gap_chance,
-        rng.uniform(blocks.gap_shortest, blocks.gap_longest, most),
-        0.0,
-    )
+    has_gap = rng.random(most) < blocks.gap_chance
+    gap = rng.uniform(blocks.gap_shortest, blocks.gap_longest, most)
+    gaps = np.where(has_gap, gap, 0.0)
     setpoint = rng.integers(len(speed), size=most)
     begin = np.concatenate([[0.0], np.cumsum(lengths + gaps)[:-1]])
-    kept = begin < horizon
     end = np.minimum(begin + lengths, horizon)
+    kept = begin < horizon
     return History(
         begin=begin[kept],
         end=end[kept],
@@ -154,10 +144,9 @@ def given_history(rows: tuple[tuple[float, ...], ...], horizon: float) -> Histor
         raise ConfigError(
             f"life.blocks: none begins before life.horizon_h = {horizon / 3600.0:g}"
         )
-    return History(
+    return replace(
+        whole,
         begin=whole.begin[kept],
         end=np.minimum(whole.end[kept], horizon),
         setpoint=whole.setpoint[kept],
-        speed=whole.speed,
-        torque=whole.torque,
     )

@@ -1,14 +1,13 @@
-"""How flanks wear and when their life ends: every convention by name."""
+"""Options of the group ``wear``: the wear law, the end of life, every convention by name."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from gensig.errors import ConfigError
 from gensig.geometry.contact import SIDES
 from gensig.options.configuration import Section
-from gensig.units import from_si, read, split_unit, unit
+from gensig.units import check_choice, check_limits, check_positive, read, unit
 
 CHOICES = {
     "rule": ("band", "fixed_intervals"),
@@ -19,12 +18,17 @@ CHOICES = {
 }
 
 
+ENDS = (
+    "threshold",
+    "transmission_error_limit",
+    "vibration_limit_m_per_s2",
+    "vibration_rise",
+)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlankMaterial:
-    """What Archard's law asks of one flank.
-
-    ``hardness`` in Pa, None stands for the value of both gears.
-    """
+    """Archard's coefficient and hardness in Pa of one flank; None stands for that of both gears."""
 
     coefficient: float | None
     hardness: float | None = unit("hbs")
@@ -36,17 +40,21 @@ class WearOptions:
 
     Parameters
     ----------
-    rule : ``band``, the contact passes a flank point with its width 2a, or ``fixed_intervals``, the wear-life paper's:
-        a point wears for 1 / ``n_intervals`` of the time a pair needs for the path of contact
+    rule : ``band``, the contact passes a flank point with its width 2a, or ``fixed_intervals``,
+        the wear-life paper's: a point wears for 1 / ``n_intervals`` of the time a pair needs for
+        the path of contact
     threshold : depth normal to the flank at which the life ends
     transmission_error_limit : from peak to peak, or None
-    vibration_limit_m_per_s2, vibration_rise : RMS of a clean record, and its rise over new flanks in dB, or None;
-        whatever of these and the threshold comes first ends the life
-    criterion : ``first``, the first flank to the threshold, or ``sum``, both flanks of a contact point together
+    vibration_limit_m_per_s2, vibration_rise : RMS of a clean record, and its rise over new flanks
+        in dB, or None; whatever of these and the threshold comes first ends the life
+    criterion : ``first``, the first flank to the threshold, or ``sum``, both flanks of a contact
+        point together
     coefficient, hardness : k, and H in Pa, of both gears; ``pinion`` and ``wheel`` override them
-    sharing : ``mesh`` or ``one_pair``; None is the mesh, and one pair where the contact ratio is below 1
+    sharing : ``mesh`` or ``one_pair``; None is the mesh, and one pair where the contact ratio is
+        below 1
     geometry : ``worn``, sharing and pressure follow the flanks as they wear, or ``unworn``
-    load_radius : the arm of the force, ``base`` circle or ``reference`` circle (the wear-life paper's eq. 12)
+    load_radius : the arm of the force, ``base`` circle or ``reference`` circle (the wear-life
+        paper's eq. 12)
     step : greatest depth worn between two looks at the flanks
     """
 
@@ -69,62 +77,42 @@ class WearOptions:
     def __post_init__(self) -> None:
         for key, allowed in CHOICES.items():
             value = getattr(self, key)
-            if value not in allowed and not (key == "sharing" and value is None):
-                raise ConfigError(
-                    f"wear.{key} = {value!r}; allowed: {', '.join(allowed)}"
-                )
-        if not 1 <= self.n_intervals <= 1_000_000:
-            raise ConfigError(
-                f"wear.n_intervals = {self.n_intervals} must lie in 1..1000000"
-            )
-        ends = (
-            "threshold_um",
-            "transmission_error_limit_um",
-            "vibration_limit_m_per_s2",
-            "vibration_rise_db",
-        )
-        _require_positive(
-            "wear", self, (*ends, "step_um", "coefficient", "hardness_hbs")
-        )
-        for name in SIDES:
-            _require_positive(
-                f"wear.{name}", getattr(self, name), ("coefficient", "hardness_hbs")
-            )
-        for place, values in (
-            ("wear", self),
-            *((f"wear.{name}", getattr(self, name)) for name in SIDES),
+            if key != "sharing" or value is not None:
+                check_choice(f"wear.{key}", value, allowed)
+        check_limits(self, "wear.", n_intervals=(1, 1_000_000))
+        check_positive(self, "wear.", *ENDS, "step")
+        for name, flank in (
+            ("", self),
+            *((f"{side}.", getattr(self, side)) for side in SIDES),
         ):
-            if values.coefficient is not None and values.coefficient > 1.0:
+            check_positive(flank, f"wear.{name}", "coefficient", "hardness")
+            coefficient = flank.coefficient
+            if coefficient is not None and coefficient > 1.0:
                 raise ConfigError(
-                    f"{place}.coefficient = {values.coefficient:g} must be at most 1: it is the share of the meetings "
-                    "of asperities that wear something off (Archard, J. Appl. Phys. 24, 1953)"
+                    f"wear.{name}coefficient = {coefficient:g} must be at most 1: it is the share "
+                    "of the meetings of asperities that wear something off "
+                    "(Archard, J. Appl. Phys. 24, 1953)"
                 )
         follows_mesh = self.geometry == "worn" and self.sharing != "one_pair"
         if self.transmission_error_limit is not None and not follows_mesh:
             raise ConfigError(
-                "wear.transmission_error_limit_um is reached by worn flanks in mesh: it needs wear.geometry=worn and "
-                "wear.sharing=mesh"
+                "wear.transmission_error_limit_um is reached by worn flanks in mesh: "
+                "it needs wear.geometry=worn and wear.sharing=mesh"
             )
 
     def wear_factor(self, name: str) -> float:
         """Archard's k / H of one gear, 1/Pa."""
-        own: FlankMaterial = getattr(self, name)
-        coefficient = self.coefficient if own.coefficient is None else own.coefficient
+        coefficient: float | None = getattr(self, name).coefficient
+        if coefficient is None:
+            coefficient = self.coefficient
         return coefficient / self.hardness_of(name)
 
     def hardness_of(self, name: str) -> float:
         """H of one gear, Pa."""
-        own: FlankMaterial = getattr(self, name)
-        return self.hardness if own.hardness is None else own.hardness
-
-
-def _require_positive(place: str, values: Any, keys: tuple[str, ...]) -> None:
-    for key in keys:
-        value = getattr(values, split_unit(key)[0])
-        if value is not None and not value > 0.0:
-            raise ConfigError(
-                f"{place}.{key} = {from_si(key, value):g} must be positive"
-            )
+        hardness: float | None = getattr(self, name).hardness
+        if hardness is None:
+            return self.hardness
+        return hardness
 
 
 def read_wear_options(values: Section) -> WearOptions:
@@ -133,5 +121,5 @@ def read_wear_options(values: Section) -> WearOptions:
         name: read(FlankMaterial, values.get(name, {}), f"wear.{name}")
         for name in SIDES
     }
-    own = {key: value for key, value in values.items() if key not in SIDES}
-    return read(WearOptions, own, "wear", **sides)
+    both = {key: value for key, value in values.items() if key not in SIDES}
+    return read(WearOptions, both, "wear", **sides)

@@ -1,12 +1,12 @@
-"""Pits that come and grow with the load cycles of a flank.
+"""Pits that appear and grow with the load cycles of a flank.
 
-Miner's sum on a pitting S-N line, then number and size.
+Miner's sum on a pitting S-N line gives the damage; number and size follow from it.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,9 +17,8 @@ from gensig.faults.flank_loss import flank_area
 from gensig.faults.pitting import DistributedPitting
 from gensig.geometry.contact import GearPair
 from gensig.life.growth import GrowthLaw, GrowthOptions
-from gensig.life.spread import Spread
 from gensig.material import Material
-from gensig.units import unit
+from gensig.units import check_limits, check_positive, unit
 
 Array = NDArray[np.float64]
 
@@ -28,12 +27,13 @@ N_SIZES = 121
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PitGrowthOptions(GrowthOptions):
-    """Pitting S-N line, what comes after its end, and how units differ.
+    """Pitting S-N line, and growth of pits after its end.
 
     ``cycles`` at the contact stress ``strength`` end a flank's life without pits; at another
     stress s they are cycles (strength / s)^exponent. From there on ``pits_per_life`` pits a tooth
-    come in as many cycles again, and their median diameter grows as the damage to the power
-    ``size_exponent``. ``end_share`` is the pitted share of the flank at which the life ends.
+    appear in as many cycles again. Their median diameter grows as the damage to the power
+    ``size_exponent``; ``start_scatter`` is that of the first pits' size. ``end_share`` is the
+    pitted share of the flank at which the life ends.
     """
 
     cycles: float
@@ -46,32 +46,31 @@ class PitGrowthOptions(GrowthOptions):
     start_scatter: float
 
     def __post_init__(self) -> None:
-        for key, high in (
-            ("cycles", 1e12), ("strength", 1e10), ("exponent", 40.0), ("pits_per_life", 1e4), ("end_share", 1.0),
-        ):  # fmt: skip
-            if not 0.0 < getattr(self, key) <= high:
-                raise ConfigError(
-                    f"life.pitting.{key} = {getattr(self, key):g} must lie above 0, to {high:g}"
-                )
-        if not 0.0 <= self.size_exponent <= 2.0:
-            raise ConfigError(
-                f"life.pitting.size_exponent = {self.size_exponent:g} must lie in 0..2"
-            )
-
-    @property
-    def spread(self) -> Spread:
-        """How units differ; the start's is that of the first pits' size."""
-        return Spread(rate_scatter=self.rate_scatter, start_scatter=self.start_scatter)
+        GrowthOptions.__post_init__(self)
+        most = {
+            "cycles": 1e12,
+            "strength": 1e10,
+            "exponent": 40.0,
+            "pits_per_life": 1e4,
+            "end_share": 1.0,
+            "size_exponent": 2.0,
+        }
+        limits = {key: (0.0, value) for key, value in most.items()}
+        check_limits(self, "life.pitting.", **limits)
+        limits.pop("size_exponent")
+        check_positive(self, "life.pitting.", *limits)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PitGrowth(GrowthLaw):
-    """The law of one gear's pits; its size is the damage, 1 where the first pits come. Made by
-    ``pit_growth``.
+    """Growth law of one gear's pits; made by ``pit_growth``.
+
+    Its size is the damage, 1 where the first pits appear.
 
     Parameters
     ----------
-    torques : (torque,) N m         of the pinion, ascending, at which the next is known; one where it does not matter
+    torques : (torque,) N m         of the pinion, ascending, at which ``stress_at_one`` is known;
+        one where it does not matter
     stress_at_one : (torque,) Pa    contact stress at 1 N m; it goes with the root of the torque
     first_diameter : float   median diameter of the first pits, m
     spread_area : float      mean area of a pit over that of one of median diameter
@@ -93,14 +92,12 @@ class PitGrowth(GrowthLaw):
             np.interp(math.log(torque), np.log(self.torques), self.stress_at_one)
         )
         stress = at_one * math.sqrt(torque)
-        lasting = (
-            self.options.cycles
-            * (self.options.strength / stress) ** self.options.exponent
-        )
+        options = self.options
+        lasting = options.cycles * (options.strength / stress) ** options.exponent
         return np.full(np.shape(size), self.meshes / lasting)
 
     def n_pits(self, size: float) -> float:
-        """Mean number of pits on a flank: as many in every further part of the life."""
+        """Mean number of pits on a flank; it grows evenly with the damage beyond 1."""
         return self.options.pits_per_life * max(size - 1.0, 0.0)
 
     def diameter(self, size: float) -> float:
@@ -109,14 +106,8 @@ class PitGrowth(GrowthLaw):
 
     def share(self, size: float) -> float:
         """Pitted share of the flank, pits side by side."""
-        return (
-            self.n_pits(size)
-            * 0.25
-            * math.pi
-            * self.diameter(size) ** 2
-            * self.spread_area
-            / self.area
-        )
+        discs = self.n_pits(size) * 0.25 * math.pi * self.diameter(size) ** 2
+        return discs * self.spread_area / self.area
 
     def fault(self, size: float) -> dict[str, Any]:
         """Pitted share and size of the pits."""
@@ -136,10 +127,8 @@ def contact_stress(pair: GearPair, material: Material, torque: float) -> float:
     Hertz's largest pressure of the two flanks at the pitch point, the whole load on one pair (ISO
     6336-2, sigma_H0).
     """
-    radii = (
-        pair.pinion_curvature(pair.pitch_point),
-        pair.wheel_curvature(pair.pitch_point),
-    )
+    pitch = pair.pitch_point
+    radii = (pair.pinion_curvature(pitch), pair.wheel_curvature(pitch))
     curvature = sum(1.0 / float(radius) for radius in radii)
     reduced = material.youngs_modulus / (1.0 - material.poisson_ratio**2)
     load = torque / pair.pinion.base_radius / pair.face_width
@@ -154,7 +143,7 @@ def pit_growth(
     first: float = 1.0,
     stresses: tuple[Array, Array] | None = None,
 ) -> PitGrowth:
-    """The law of pits like ``pits``, whose diameter is that of the first ones, times ``first``.
+    """Growth law of pits like ``pits``, with their diameter times ``first`` for the first ones.
 
     ``stresses`` are torques of the pinion in N m, ascending, and contact stresses there in Pa,
     (torque,) both; None takes the nominal ones of a spur pair.
@@ -163,16 +152,14 @@ def pit_growth(
     ------
     ConfigError    for helical gears without stresses, and an end that such pits do not reach
     """
-    if stresses is None and pair.pinion.helix_angle != 0.0:
-        raise ConfigError(
-            "life: the nominal contact stress of pit growth is that of a spur pair; take its slices"
-        )
-    torques, stress = (
-        (np.ones(1), np.array([contact_stress(pair, material, 1.0)]))
-        if stresses is None
-        else stresses
-    )
-    gear = pair.gears[pits.gear]
+    if stresses is None:
+        if pair.pinion.helix_angle != 0.0:
+            raise ConfigError(
+                "life: the nominal contact stress of pit growth is that of a spur pair; "
+                "take its slices"
+            )
+        stresses = np.ones(1), np.array([contact_stress(pair, material, 1.0)])
+    torques, stress = stresses
     law = PitGrowth(
         options=options,
         sizes=np.array([0.0, 1.0]),
@@ -181,7 +168,7 @@ def pit_growth(
         stress_at_one=stress / np.sqrt(torques),
         first_diameter=pits.pit_diameter * first,
         spread_area=math.exp(2.0 * pits.diameter_scatter**2),
-        area=flank_area(gear),
+        area=flank_area(pair.gears[pits.gear]),
     )
     if law.first_diameter <= 0.0 or not law.share(2.0) > 0.0:
         raise ConfigError(
@@ -190,25 +177,23 @@ def pit_growth(
     most = 0.7 * (pits.region_high - pits.region_low)
     if options.end_share > most:
         raise ConfigError(
-            f"life.pitting.end_share = {options.end_share:g} must be {most:.3g} or less, 0.7 of the region of the pits"
+            f"life.pitting.end_share = {options.end_share:g} must be {most:.3g} or less, "
+            "0.7 of the region of the pits"
         )
-    end = 2.0
-    while law.share(end) < options.end_share:
+    sound = np.linspace(0.0, 1.0, 20, endpoint=False)
+    pitted = np.linspace(1.0, _end(law), N_SIZES - 20)
+    return replace(law, sizes=np.concatenate([sound, pitted]))
+
+
+def _end(law: PitGrowth) -> float:
+    """Damage at which the pitted share reaches its end, by bisection."""
+    low, end = 1.0, 2.0
+    while law.share(end) < law.options.end_share:
         end *= 2.0
-    low = 1.0
     for _ in range(60):
         middle = 0.5 * (low + end)
-        low, end = (
-            (middle, end) if law.share(middle) < options.end_share else (low, middle)
-        )
-    sizes = np.concatenate(
-        [np.linspace(0.0, 1.0, 20, endpoint=False), np.linspace(1.0, end, N_SIZES - 20)]
-    )
-    return PitGrowth(
-        **{
-            name: getattr(law, name)
-            for name in law.__dataclass_fields__
-            if name != "sizes"
-        },
-        sizes=sizes,
-    )
+        if law.share(middle) < law.options.end_share:
+            low = middle
+        else:
+            end = middle
+    return end

@@ -1,7 +1,4 @@
-"""Root cracks that grow in teeth cut into slices.
-
-The Paris law under the load that the mesh gives every slice.
-"""
+"""Root cracks that grow in teeth cut into slices: the Paris law under the loads of the slices."""
 
 from __future__ import annotations
 
@@ -32,10 +29,10 @@ MeshOf = Callable[[Sequence[Fault]], SlicedMesh]
 DEPTH_STEP = 10  # nodes of the law between two depths at which the mesh is solved
 N_PHASES = 16  # a base pitch, of the first look
 N_CLOSER = 16  # between the neighbours of the greatest of them
-JUST = 1e-9  # base pitches before the next pair enters, and after one has left: there the others carry most
-DEPTH_SHARE = (
-    1e-3  # of the depth, on either side, over which the energy is differentiated
-)
+# base pitches before the next pair enters, and after one has left: there the others carry most
+JUST = 1e-9
+# of the depth, on either side, over which the energy is differentiated
+DEPTH_SHARE = 1e-3
 WIDTH_STRIPS = 2  # of the crack's front, on either side, the same over the width
 
 
@@ -47,24 +44,26 @@ def sliced_crack_growth(
     options: CrackGrowthOptions,
     torques: Array,
 ) -> CrackGrowth:
-    """The law of a crack like ``crack``, of which depth, width and front are left aside, in a
-    pair cut into slices.
+    """Growth law of a crack like ``crack`` in a pair cut into slices.
+
+    Depth, width and front of ``crack`` are not used.
 
     Parameters
     ----------
     mesh_of : the pair with faults; its cracks are the calibrated ones, beyond the checked range too
-    torques : (torque,) N m    of the pinion, ascending, where the mesh is solved: how the load is shared hangs on it
+    torques : (torque,) N m    of the pinion, ascending, where the mesh is solved: the load
+        sharing depends on them
 
     Energy release rate at constant load G = dU / dA as in ``crack_growth``, with the loads of all
     slices from the equilibrium of the mesh with the crack in it. Every equilibrium is the least
-    complementary energy, so that a change of the crack changes that energy at first order only by
-    what the same loads on the changed structure hold (envelope theorem): the derivative of the
-    structure's own energy at those loads. It is the mean over the crack's front. The greatest
-    over the engagement of the tooth counts.
+    complementary energy. So a change of the crack changes that energy at first order only by what
+    the same loads on the changed structure hold (envelope theorem): the derivative of the
+    structure's energy at those loads. It is the mean over the crack's front. The greatest over
+    the engagement of the tooth counts.
 
     Raises
     ------
-    ConfigError    for a crack on the compressed side, or a width that is not looked at
+    ConfigError    for a crack on the compressed side, or a width that is not evaluated
     """
     require_open(crack)
     gear = pair.gears[crack.gear]
@@ -72,18 +71,13 @@ def sliced_crack_growth(
     looked = sizes[::DEPTH_STEP]
 
     def cut(depth: float, width: float) -> SlicedMesh:
-        own = None if width >= face else width
-        return mesh_of(
-            (
-                replace(
-                    crack,
-                    tooth=0,
-                    crack_depth=depth,
-                    crack_width=own,
-                    crack_front="straight",
-                ),
-            )
+        part = None
+        if width < face:
+            part = width
+        given = replace(
+            crack, tooth=0, crack_depth=depth, crack_width=part, crack_front="straight"
         )
+        return mesh_of((given,))
 
     def rates(depth: float, width: float) -> Array:
         """Greatest release rate over the depth, and over the width, (torque, 2) N/m."""
@@ -93,29 +87,24 @@ def sliced_crack_growth(
         spans = [(deeper, 2.0 * DEPTH_SHARE * depth * width)]
         if width < face:
             step = WIDTH_STRIPS / N_STRIPS * face
-            ends = (width - step, min(width + step, face))
-            spans.append(
-                ([cut(depth, end) for end in ends], (ends[1] - ends[0]) * depth)
-            )
+            narrow, wide = width - step, min(width + step, face)
+            wider = [cut(depth, narrow), cut(depth, wide)]
+            spans.append((wider, (wide - narrow) * depth))
         mesh = cut(depth, width)
-        return np.array(
-            [
-                _greatest(mesh, crack.gear, spans, torque / pair.pinion.base_radius)
-                for torque in torques
-            ]
-        )
+        forces = [torque / pair.pinion.base_radius for torque in torques]
+        return np.array([_greatest(mesh, crack.gear, spans, force) for force in forces])
 
-    width, found = _followed(looked, face, options, rates)
-    greatest = np.array([_smooth(looked, column, sizes) for column in found.T])
+    width, release = _followed(looked, face, options, rates)
+    greatest = np.array([_smooth(looked, column, sizes) for column in release.T])
     strain = material.in_plane("plane_strain")
+    intensity = np.sqrt(np.maximum(greatest, 0.0) * strain.youngs_modulus)
     return CrackGrowth(
         options=options,
         crack=crack,
         sizes=sizes,
         width=_smooth(looked, width, sizes),
         torques=torques,
-        intensity=np.sqrt(np.maximum(greatest, 0.0) * strain.youngs_modulus)
-        / torques[:, None],
+        intensity=intensity / torques[:, None],
         face_width=face,
         meshes=pair.speed_ratio(crack.gear),
     )
@@ -127,11 +116,10 @@ def _greatest(
     spans: Sequence[tuple[Sequence[SlicedMesh], float]],
     force: float,
 ) -> list[float]:
-    """Greatest release rates over the engagement of the cracked pair under a force in N, (span,)
-    N/m.
+    """Greatest release rates over the engagement of the cracked pair, (span,) N/m.
 
-    ``spans`` are meshes with a little less and a little more crack, and the area between them in
-    m2.
+    ``force`` in N; ``spans`` are meshes with a little less and a little more crack, and the area
+    between them in m2.
     """
     pitch = mesh.pair.base_pitch
 
@@ -139,9 +127,9 @@ def _greatest(
         """Release rate phase by phase, (phase,) N/m."""
         phases = contact_phases(mesh, roll)
         contact = settled_contact(phases, force)
-        here = (np.arange(len(roll)), np.argmax(phases.pair_index == 0, axis=1))
-        load, position = contact.line_load[here], phases.position[here]
-        rest = phases.structure[here] - _softening(mesh, gear, position)
+        cracked = (np.arange(len(roll)), np.argmax(phases.pair_index == 0, axis=1))
+        load, position = contact.line_load[cracked], phases.position[cracked]
+        rest = phases.structure[cracked] - _softening(mesh, gear, position)
         less, more = (
             structure_energy(
                 rest + _softening(end, gear, position),
@@ -158,27 +146,21 @@ def _greatest(
     entered = pitch * ((np.arange(n_pitches * N_PHASES) + 1.0) / N_PHASES - JUST)
     left = reach - pitch * (np.arange(n_pitches) - JUST)
     coarse = np.concatenate([entered, left])
-    found = []
+    greatest = []
     for ends, area in spans:
-        seen = released(coarse, ends, area)
-        peak = coarse[int(seen.argmax())]
+        rate = released(coarse, ends, area)
+        peak = coarse[int(rate.argmax())]
         near = peak + pitch / N_PHASES * (np.arange(1 - N_CLOSER, N_CLOSER) / N_CLOSER)
-        found.append(
-            max(float(seen.max()), float(released(near, ends, area).max()), 0.0)
-        )
-    return found
+        closer = released(near, ends, area)
+        greatest.append(max(float(rate.max()), float(closer.max()), 0.0))
+    return greatest
 
 
 def _softening(mesh: SlicedMesh, gear: str, position: Array) -> Array:
-    """What the crack makes its pair softer, (phase, slice) m2/N."""
+    """Added compliance of the crack, (phase, slice) m2/N."""
     softening = mesh.sides[gear].softening[-1]
-    return np.stack(
-        [
-            np.interp(at, mesh.position, one)
-            for at, one in zip(position.T, softening, strict=True)
-        ],
-        axis=1,
-    )
+    columns = zip(position.T, softening, strict=True)
+    return np.stack([np.interp(at, mesh.position, row) for at, row in columns], axis=1)
 
 
 def _smooth(looked: Array, values: Array, sizes: Array) -> Array:
@@ -194,12 +176,11 @@ def _followed(
     options: CrackGrowthOptions,
     rates: Callable[[float, float], Array],
 ) -> tuple[Array, Array]:
-    """Width that goes with each depth at the middle torque, (depth,) m, and release rates,
-    (depth, torque) N/m.
+    """Width of each depth at the middle torque, (depth,) m, and release rates, (depth, torque) N/m.
 
     From depth to depth by the two-step method of Adams and Bashforth over the depth's logarithm.
     """
-    width, found = np.full(len(depths), options.width_share * face), []
+    width, release = np.full(len(depths), options.width_share * face), []
     if options.width_share < 1.0:
         crack_widths(face, options)  # refuses the narrowest
     steps = np.diff(np.log(depths), append=0.0)
@@ -207,19 +188,17 @@ def _followed(
     for k, depth in enumerate(depths.tolist()):
         now = float(width[k])
         both = rates(depth, now)
-        found.append(both[:, 0])
+        release.append(both[:, 0])
         if now >= face:
             width[k:] = face
             continue
         by_depth, by_width = both[len(both) // 2]
-        wider = (
-            depth * (by_width / by_depth) ** (0.5 * options.exponent)
-            if by_depth > 0.0
-            else 0.0
-        )
-        pace = (
-            wider if k == 0 else wider + 0.5 * steps[k] / steps[k - 1] * (wider - last)
-        )
+        wider = 0.0
+        if by_depth > 0.0:
+            wider = depth * (by_width / by_depth) ** (0.5 * options.exponent)
+        pace = wider
+        if k > 0:
+            pace = wider + 0.5 * steps[k] / steps[k - 1] * (wider - last)
         width[k + 1 :] = min(now + pace * float(steps[k]), face)
         last = wider
-    return width, np.array(found)
+    return width, np.array(release)

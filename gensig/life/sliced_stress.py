@@ -1,7 +1,4 @@
-"""Contact stress of a pair in slices, as the pitting line asks it.
-
-One number for the whole flank.
-"""
+"""Contact stress of a pair in slices for the pitting line: one number for the whole flank."""
 
 from __future__ import annotations
 
@@ -31,13 +28,13 @@ def sliced_contact_stress(
     """
     pair = mesh.pair
     roll = pair.pitch_point + mesh.lag
-    own = np.arange(len(roll))
-    found = []
+    slices = np.arange(len(roll))
+    stresses = []
     for torque in torques:
         contact = loaded_contact(mesh, roll, float(torque) / pair.pinion.base_radius)
         pressure = contact_pressure(mesh, contact, material)
-        passing = pressure[own, np.argmax(contact.pair_index == 0, axis=1), own]
-        found.append(
-            np.average(passing**exponent, weights=mesh.slice_width) ** (1.0 / exponent)
-        )
-    return np.array(found)
+        passing = np.argmax(contact.pair_index == 0, axis=1)
+        damage = pressure[slices, passing, slices] ** exponent
+        mean = np.average(damage, weights=mesh.slice_width)
+        stresses.append(mean ** (1.0 / exponent))
+    return np.array(stresses)

@@ -1,4 +1,4 @@
-"""Courses over time: factors that are piecewise linear, ramp or wander, and the ripple on them."""
+"""Courses over time: piecewise linear factors, ramps, random walks, and the ripple on them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import ConfigError
-from gensig.units import unit
+from gensig.units import check_limits, check_positive, unit
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -20,23 +20,23 @@ Array = NDArray[np.float64]
 
 MOST_POINTS = 100_000
 LATEST = 1e6  # s
-SHORTEST_PIECE = (
-    1e-3  # s; the integration takes the course as straight through every millisecond
-)
-FASTEST_RIPPLE = 150.0  # Hz; straight pieces of 1 ms take sinc^2(0.15) of it, 7.2 % too little; points are exact
+# s; the integration takes the course as straight through every millisecond
+SHORTEST_PIECE = 1e-3
+# Hz; straight pieces of 1 ms take sinc^2(0.15) of it, 7.2 % too little; points are exact
+FASTEST_RIPPLE = 150.0
 EARLIEST = -2.0  # s; a walk begins here, before any machine begins to settle
-POINTS_PER_CORRELATION_TIME = (
-    20  # straight lines between points take 1.6 % of the variance
-)
-WALK_LIMIT = 4.0  # standard deviations at which a walk is cut, so that its slowest is known; 6e-5 of the time
+# straight lines between points take 1.6 % of the variance
+POINTS_PER_CORRELATION_TIME = 20
+# standard deviations at which a walk is cut, so that its slowest is known; 6e-5 of the time
+WALK_LIMIT = 4.0
 MOST_SCATTER = 0.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Profile:
-    """A factor over time, piecewise linear; it holds its first value before its first time and
-    its last value after.
+    """Piecewise linear factor over time.
 
+    It holds its first value before its first time and its last value after its last time.
     ``times`` in s from the first recorded sample, ``factors`` as many shares of the set-point.
     """
 
@@ -51,17 +51,18 @@ class Profile:
             )
         if not 2 <= n <= MOST_POINTS:
             raise ConfigError(f"{n} points; give 2 to {MOST_POINTS}")
-        for place, (time, factor) in enumerate(
-            zip(self.times, self.factors, strict=True)
-        ):
+        points = zip(self.times, self.factors, strict=True)
+        for index, (time, factor) in enumerate(points):
             if not (abs(time) <= LATEST and math.isfinite(factor)):
                 raise ConfigError(
-                    f"point {place} = [{time:g}, {factor:g}]; give a time within {LATEST:g} s and a finite factor"
+                    f"point {index} = [{time:g}, {factor:g}]; give a time within {LATEST:g} s "
+                    "and a finite factor"
                 )
         for earlier, later in itertools.pairwise(self.times):
             if not later - earlier >= SHORTEST_PIECE * (1.0 - 1e-9):
                 raise ConfigError(
-                    f"the time {later:g} s follows {earlier:g} s; times must increase, by {SHORTEST_PIECE:g} s or more"
+                    f"the time {later:g} s follows {earlier:g} s; times must increase, by "
+                    f"{SHORTEST_PIECE:g} s or more"
                 )
 
     @property
@@ -70,7 +71,7 @@ class Profile:
         return min(self.factors)
 
     def curve(self) -> PPoly:
-        """The factor as a function of time in s.
+        """Factor as a function of time in s.
 
         Its derivative at a point is that of the piece that begins there.
         """
@@ -81,13 +82,13 @@ class Profile:
         return PPoly([np.diff(factors) / np.diff(times), factors[:-1]], times)
 
     def later(self, delay: float) -> Profile:
-        """The same course, ``delay`` s later."""
+        """Same course, ``delay`` s later."""
         return replace(self, times=tuple(time + delay for time in self.times))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ramp:
-    """From one factor to another, in s from the first recorded sample.
+    """Straight course from one factor to another, in s from the first recorded sample.
 
     An ``end`` of None is that of the record.
     """
@@ -103,16 +104,17 @@ class Ramp:
         return min(self.first_factor, self.last_factor)
 
     def profile(self, duration: float) -> Profile:
-        """The course of a record of ``duration`` s."""
-        end = duration if self.end is None else self.end
-        return Profile(
-            times=(self.begin, end), factors=(self.first_factor, self.last_factor)
-        )
+        """Course of a record of ``duration`` s."""
+        end = self.end
+        if end is None:
+            end = duration
+        factors = (self.first_factor, self.last_factor)
+        return Profile(times=(self.begin, end), factors=factors)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RandomWalk:
-    """A factor that wanders about 1 and comes back: an Ornstein-Uhlenbeck process.
+    """Factor that wanders about 1 and comes back: an Ornstein-Uhlenbeck process.
 
     ``scatter`` is its standard deviation, ``correlation_time`` in s the time after which its
     autocorrelation exp(-|t| / correlation_time) has fallen to 1/e.
@@ -126,15 +128,9 @@ class RandomWalk:
     correlation_time: float = unit("s")
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.scatter <= MOST_SCATTER:
-            raise ConfigError(
-                f"scatter = {self.scatter:g} must lie in 0..{MOST_SCATTER:g}"
-            )
         least = POINTS_PER_CORRELATION_TIME * SHORTEST_PIECE
-        if not least <= self.correlation_time <= LATEST:
-            raise ConfigError(
-                f"correlation_time_s = {self.correlation_time:g} must lie in {least:g}..{LATEST:g}"
-            )
+        limits = {"scatter": (0.0, MOST_SCATTER), "correlation_time": (least, LATEST)}
+        check_limits(self, "", **limits)
 
     @property
     def least(self) -> float:
@@ -142,7 +138,7 @@ class RandomWalk:
         return 1.0 - WALK_LIMIT * self.scatter
 
     def profile(self, duration: float, rng: np.random.Generator) -> Profile:
-        """A course for a record of ``duration`` s; that of a longer record goes on from it.
+        """Course of a record of ``duration`` s; that of a longer record goes on from it.
 
         It is a function of the absolute time: where the simulation of a record begins does not
         change it.
@@ -150,14 +146,11 @@ class RandomWalk:
         step = self.correlation_time / POINTS_PER_CORRELATION_TIME
         n_points = math.ceil((duration - EARLIEST) / step) + 2
         if n_points > MOST_POINTS:
-            least = (
-                1.01
-                * POINTS_PER_CORRELATION_TIME
-                * (duration - EARLIEST)
-                / (MOST_POINTS - 2)
-            )
+            longest = POINTS_PER_CORRELATION_TIME * (duration - EARLIEST)
+            least = 1.01 * longest / (MOST_POINTS - 2)
             raise ConfigError(
-                f"correlation_time_s = {self.correlation_time:g} needs {n_points} points for {duration:g} s, more than "
+                f"correlation_time_s = {self.correlation_time:g} needs {n_points} points for "
+                f"{duration:g} s, more than "
                 f"{MOST_POINTS}; give {least:.3g} or more"
             )
         rho = math.exp(-step / self.correlation_time)
@@ -166,23 +159,22 @@ class RandomWalk:
         walk = itertools.accumulate(
             normal, lambda value, draw: rho * value + fresh * draw
         )
-        factors = tuple(
-            1.0 + self.scatter * min(max(value, -WALK_LIMIT), WALK_LIMIT)
-            for value in walk
-        )
+        scatter, most = self.scatter, WALK_LIMIT
         return Profile(
-            times=tuple(EARLIEST + step * place for place in range(n_points)),
-            factors=factors,
+            times=tuple(EARLIEST + step * index for index in range(n_points)),
+            factors=tuple(
+                1.0 + scatter * min(max(value, -most), most) for value in walk
+            ),
         )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ripple:
-    """A course times 1 + ``share`` sin(psi): psi is ``order`` times the pinion's set angle, or of
-    a fixed frequency.
+    """Course times 1 + ``share`` sin(psi).
 
-    The set angle is that of the speed without its ripple, 0 at the first recorded sample;
-    ``frequency`` in Hz, ``phase`` in rad is psi at the first recorded sample.
+    psi is ``order`` times the pinion's set angle, or of a fixed ``frequency`` in Hz. The set
+    angle is that of the speed without its ripple, 0 at the first recorded sample. ``phase`` in
+    rad is psi at the first recorded sample.
     """
 
     share: float
@@ -199,9 +191,7 @@ class Ripple:
             raise ConfigError(
                 "give order (of the pinion's turn) or frequency_hz, one of the two"
             )
-        for key, value in (("order", self.order), ("frequency_hz", self.frequency)):
-            if value is not None and not value > 0.0:
-                raise ConfigError(f"{key} = {value:g} must be positive")
+        check_positive(self, "", "order", "frequency")
 
     @property
     def _fixed_rate(self) -> float:
@@ -213,7 +203,7 @@ class Ripple:
         return (self.order or 0.0) * speed + self._fixed_rate
 
     def psi(self, times: Array, set_angle: Array) -> Array:
-        """The angle of the sine at times in s with their set angles in rad, (time,) rad."""
+        """Angle of the sine at times in s with their set angles in rad, (time,) rad."""
         return (self.order or 0.0) * set_angle + self._fixed_rate * times + self.phase
 
     def gained(
@@ -226,44 +216,29 @@ class Ripple:
         on each piece the slope is constant.
         """
         if self.order is not None:
-            psi = self.psi(times, set_angle)
-            return (
-                self.share
-                / (self.order * set_speed)
-                * (math.cos(self.phase) - np.cos(psi))
-            )
+            turned = math.cos(self.phase) - np.cos(self.psi(times, set_angle))
+            return self.share / (self.order * set_speed) * turned
         rate = self._fixed_rate
         course = profile or Profile(times=(0.0, 1.0), factors=(1.0, 1.0))
         knots, factors = course.times, course.factors
 
+        sine = np.sin(rate * np.array(knots) + self.phase) / rate
+        slope = np.diff(factors) / np.diff(knots)
+        before = np.concatenate([[0.0], np.cumsum(slope * np.diff(sine))])
+
         def primitive(time: Array) -> Array:
             held = np.clip(time, knots[0], knots[-1])
-            piece = np.clip(
-                np.searchsorted(knots, held, side="right") - 1, 0, len(knots) - 2
-            )
-            sine = np.sin(rate * np.array(knots) + self.phase) / rate
-            slope = np.diff(factors) / np.diff(knots)
-            before = np.concatenate([[0.0], np.cumsum(slope * np.diff(sine))])
-            partly = before[piece] + slope[piece] * (
-                np.sin(rate * held + self.phase) / rate - sine[piece]
-            )
-            return np.asarray(
-                (
-                    partly
-                    - np.interp(time, knots, factors) * np.cos(rate * time + self.phase)
-                )
-                / rate
-            )
+            piece = np.searchsorted(knots, held, side="right") - 1
+            piece = np.clip(piece, 0, len(knots) - 2)
+            rest = np.sin(rate * held + self.phase) / rate - sine[piece]
+            partly = before[piece] + slope[piece] * rest
+            cosine = np.interp(time, knots, factors) * np.cos(rate * time + self.phase)
+            return np.asarray((partly - cosine) / rate)
 
-        return self.share * (
-            primitive(np.asarray(times, dtype=np.float64)) - primitive(np.zeros(1))
-        )
+        at_times = primitive(np.asarray(times, dtype=np.float64))
+        return self.share * (at_times - primitive(np.zeros(1)))
 
     def later(self, delay: float, set_angle: float) -> Ripple:
-        """The same ripple, ``delay`` s and ``set_angle`` rad later."""
-        return replace(
-            self,
-            phase=self.phase
-            - (self.order or 0.0) * set_angle
-            - self._fixed_rate * delay,
-        )
+        """Same ripple, ``delay`` s and ``set_angle`` rad later."""
+        turned = (self.order or 0.0) * set_angle
+        return replace(self, phase=self.phase - turned - self._fixed_rate * delay)

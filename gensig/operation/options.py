@@ -1,11 +1,7 @@
-"""The group ``operating`` of a configuration.
-
-Set-points and their courses, and what a record tells of them.
-"""
+"""Options of the group ``operating``: set-points, their courses, and the traces of a record."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -18,19 +14,20 @@ from gensig.operation.courses import Profile, Ramp, RandomWalk, Ripple
 from gensig.operation.setpoint import Operating
 from gensig.options.configuration import Section
 from gensig.text.user_file import check_columns, read_table
-from gensig.units import read, to_si
+from gensig.units import check_choice, is_number, naming, read, to_si
 
 Array = NDArray[np.float64]
 
 QUANTITIES = {"speed_profile": "speed_rpm", "torque_profile": "torque_nm"}
 RIPPLES = ("speed_ripple", "torque_ripple")
-KINDS = ("ramp", "random_walk", "file")
+KINDS = {"ramp": Ramp, "random_walk": RandomWalk}
+FILE = "file"
 TURNS_OF = ("pinion", "wheel", "faulted")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FileCourse:
-    """A course that a user gave: as factors, or absolutely, and then the set-point cancels."""
+    """Course of a user's file, as factors or absolute; absolute values do not use the set-point."""
 
     key: str
     file: str
@@ -44,12 +41,13 @@ class FileCourse:
         return self.profile_given.least
 
     def profile(self, duration: float) -> Profile:
-        """The course of a record of ``duration`` s; ConfigError unless the file covers it."""
+        """Course of a record of ``duration`` s; ConfigError unless the file covers it."""
         first, last = self.profile_given.times[0], self.profile_given.times[-1]
         if first > 0.0 or last + self.step < duration * (1.0 - 1e-9):
             raise ConfigError(
-                f"{self.key}.file = {self.file} is too short: it runs from {first:g} s to {last:g} s, the record from "
-                f"0 to {duration:g} s; give times that cover it, or a shorter operating.duration_s"
+                f"{self.key}.file = {self.file} is too short: it runs from {first:g} s to "
+                f"{last:g} s, the record from 0 to {duration:g} s; give times that cover it, "
+                "or a shorter operating.duration_s"
             )
         return self.profile_given
 
@@ -59,7 +57,7 @@ Course = Profile | Ramp | RandomWalk | FileCourse
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Schedule:
-    """How long records are where that is told in turns, and the seed of random walks."""
+    """Length of records in turns of a shaft, and the seed of random walks."""
 
     turns: float | None = None
     turns_of: str = "faulted"
@@ -70,10 +68,7 @@ class Schedule:
             raise ConfigError(
                 f"operating.turns = {self.turns:g} must be positive, or null to use duration_s"
             )
-        if self.turns_of not in TURNS_OF:
-            raise ConfigError(
-                f"operating.turns_of = {self.turns_of!r}; allowed: {', '.join(TURNS_OF)}"
-            )
+        check_choice("operating.turns_of", self.turns_of, TURNS_OF)
         if self.course_seed < 0:
             raise ConfigError(
                 f"operating.course_seed = {self.course_seed} must not be negative"
@@ -85,11 +80,8 @@ SCHEDULE_KEYS = tuple(Schedule.__dataclass_fields__)
 
 def read_schedule(values: Section) -> Schedule:
     """Turns and seed of a group ``operating``; ConfigError for what cannot be used."""
-    return read(
-        Schedule,
-        {key: values[key] for key in SCHEDULE_KEYS if key in values},
-        "operating",
-    )
+    schedule = {key: values[key] for key in SCHEDULE_KEYS if key in values}
+    return read(Schedule, schedule, "operating")
 
 
 def read_operating(values: Section) -> Operating:
@@ -100,51 +92,41 @@ def read_operating(values: Section) -> Operating:
     ConfigError    for unknown or missing keys, kinds, values and files
     """
     seed = read_schedule(values).course_seed
-    own = {
-        key: value
-        for key, value in values.items()
-        if key not in (*SCHEDULE_KEYS, *QUANTITIES, *RIPPLES)
-    }
-    steady = read(Operating, own, "operating")
+    special = (*SCHEDULE_KEYS, *QUANTITIES, *RIPPLES)
+    plain = {key: value for key, value in values.items() if key not in special}
+    steady = read(Operating, plain, "operating")
     ripples = {key: read_ripple(values, key) for key in RIPPLES}
     profiles = {}
-    for place, key in enumerate(QUANTITIES):
+    for index, key in enumerate(QUANTITIES):
         course = read_course(values, key)
-        rng = np.random.Generator(
-            np.random.SFC64(np.random.SeedSequence(seed, spawn_key=(place,)))
-        )
-        try:
+        sequence = np.random.SeedSequence(seed, spawn_key=(index,))
+        rng = np.random.Generator(np.random.SFC64(sequence))
+        with naming(f"operating.{key}: "):
             profiles[key] = _profile(course, steady.duration, rng)
-        except ConfigError as error:
-            raise ConfigError(_named(f"operating.{key}", error)) from None
-    return read(Operating, own, "operating", **profiles, **ripples)
+    return read(Operating, plain, "operating", **profiles, **ripples)
 
 
 def read_course(values: Section, key: str) -> Course | None:
-    """The course that ``key``, speed_profile or torque_profile, of a group ``operating``
-    describes; None for null.
+    """Course under ``key``, speed_profile or torque_profile, of a group ``operating``.
+
+    None for null.
 
     Raises
     ------
-    ConfigError    for anything else than a list of [time_s, factor] pairs or a group with a known kind
+    ConfigError    for anything else than a list of [time_s, factor] pairs or a group with a known
+        kind
     """
     where, value = f"operating.{key}", values.get(key)
     if not isinstance(value, Mapping):
         return read_profile(where, value)
-    kind, own = (
-        value.get("kind"),
-        {name: entry for name, entry in value.items() if name != "kind"},
-    )
-    try:
-        if kind == "ramp":
-            return read(Ramp, own, where)
-        if kind == "random_walk":
-            return read(RandomWalk, own, where)
-        if kind == "file":
-            return _read_file(where, own, QUANTITIES[key], values.get(QUANTITIES[key]))
-    except ConfigError as error:
-        raise ConfigError(_named(where, error)) from None
-    raise ConfigError(f"{where}.kind = {kind!r}; allowed: {', '.join(KINDS)}")
+    rest = dict(value)
+    kind = rest.pop("kind", None)
+    check_choice(f"{where}.kind", kind, (*KINDS, FILE))
+    with naming(f"{where}: "):
+        if kind == FILE:
+            quantity = QUANTITIES[key]
+            return _read_file(where, rest, quantity, values.get(quantity))
+        return read(KINDS[kind], rest, where)
 
 
 def read_profile(key: str, value: Any) -> Profile | None:
@@ -158,24 +140,20 @@ def read_profile(key: str, value: Any) -> Profile | None:
         return None
     if not isinstance(value, list | tuple):
         raise ConfigError(
-            f"{key} = {value!r} is no list; give [time_s, factor] pairs, a group with a kind, or null for a constant"
+            f"{key} = {value!r} is no list; give [time_s, factor] pairs, a group with a kind, "
+            "or null for a constant"
         )
-    for place, point in enumerate(value):
-        if not (
-            isinstance(point, list | tuple)
-            and len(point) == 2
-            and all(_is_number(one) for one in point)
-        ):
+    for index, point in enumerate(value):
+        is_pair = isinstance(point, list | tuple) and len(point) == 2
+        if not is_pair or not all(map(is_number, point)):
             raise ConfigError(
-                f"{key}: point {place} = {point!r}; give two finite numbers, [time_s, factor]"
+                f"{key}: point {index} = {point!r}; give two finite numbers, [time_s, factor]"
             )
-    try:
+    with naming(f"{key}: "):
         return Profile(
             times=tuple(float(time) for time, _ in value),
             factors=tuple(float(factor) for _, factor in value),
         )
-    except ConfigError as error:
-        raise ConfigError(f"{key}: {error}") from None
 
 
 def _profile(
@@ -183,80 +161,66 @@ def _profile(
 ) -> Profile | None:
     if course is None or isinstance(course, Profile):
         return course
-    return (
-        course.profile(duration, rng)
-        if isinstance(course, RandomWalk)
-        else course.profile(duration)
-    )
+    if isinstance(course, RandomWalk):
+        return course.profile(duration, rng)
+    return course.profile(duration)
 
 
 def _read_file(
-    where: str, own: Mapping[str, Any], quantity: str, set_point: Any
+    where: str, values: Mapping[str, Any], quantity: str, set_point: Any
 ) -> FileCourse:
-    """``time_s`` and ``factor``, or ``time_s`` and the quantity itself, which is divided by the
-    set-point.
+    """Course of a file with ``time_s`` and ``factor``, or ``time_s`` and the quantity.
+
+    The quantity is divided by the set-point.
     """
-    if not (set(own) == {"file"} and isinstance(own["file"], str)):
+    if not (set(values) == {"file"} and isinstance(values["file"], str)):
         raise ConfigError(
             f"{where}: kind = file needs exactly file, the name of a CSV file with a header"
         )
-    file, key = own["file"], f"{where}.file"
+    file, key = values["file"], f"{where}.file"
     names, columns = read_table(key, file, least_rows=2)
-    value = quantity if quantity in names else "factor"
-    if value == "factor" and "factor" not in names:
+    is_absolute = quantity in names
+    if not is_absolute and "factor" not in names:
         raise ConfigError(
-            f"{key} = {file}: no column {quantity} or factor; it must have time_s and one of the two"
+            f"{key} = {file}: no column {quantity} or factor; "
+            "it must have time_s and one of the two"
         )
-    check_columns(key, file, names, ["time_s", value])
-    times, factors = columns[names.index("time_s")], columns[names.index(value)]
-    if value == quantity:
-        if not (_is_number(set_point) and set_point > 0.0):
+    column = "factor"
+    if is_absolute:
+        column = quantity
+    check_columns(key, file, names, ["time_s", column])
+    times, factors = columns[names.index("time_s")], columns[names.index(column)]
+    if is_absolute:
+        if not (is_number(set_point) and set_point > 0.0):
             raise ConfigError(
                 f"operating.{quantity} = {set_point!r} must be a positive number"
             )
         factors = to_si(quantity, 1.0) * factors / to_si(quantity, float(set_point))
-    try:
+    with naming(f"{key} = {file}: "):
         profile = Profile(times=tuple(times.tolist()), factors=tuple(factors.tolist()))
-    except ConfigError as error:
-        raise ConfigError(f"{key} = {file}: {error}") from None
-    step = float(times[-1] - times[-2])
     return FileCourse(
         key=where,
         file=file,
         profile_given=profile,
-        step=step,
-        is_absolute=value == quantity,
+        step=float(times[-1] - times[-2]),
+        is_absolute=is_absolute,
     )
 
 
 def read_ripple(values: Section, key: str) -> Ripple | None:
-    """The ripple that ``key``, speed_ripple or torque_ripple, of a group ``operating`` describes;
+    """Ripple under ``key``, speed_ripple or torque_ripple, of a group ``operating``.
+
     None for null.
 
     Raises
     ------
     ConfigError    for keys and values that make no ripple
     """
-    where, own = f"operating.{key}", values.get(key)
-    if own is None:
+    where, ripple = f"operating.{key}", values.get(key)
+    if ripple is None:
         return None
-    try:
-        return read(Ripple, own, where)
-    except ConfigError as error:
-        raise ConfigError(_named(where, error)) from None
-
-
-def _named(where: str, error: ConfigError) -> str:
-    text = str(error)
-    return text if text.startswith("operating.") else f"{where}: {text}"
-
-
-def _is_number(value: Any) -> bool:
-    return (
-        isinstance(value, int | float)
-        and not isinstance(value, bool)
-        and abs(value) <= sys.float_info.max
-    )
+    with naming(f"{where}: "):
+        return read(Ripple, ripple, where)
 
 
 def operating_signals(
@@ -265,24 +229,20 @@ def operating_signals(
     shaft_angle: Array,
     load_exponent: int = 0,
 ) -> dict[str, NDArray[np.float32]]:
-    """Traces of a record, (sample,) each: ``shaft_speed`` in rad/s, as the shaft turned, and
-    ``torque_set`` in N m.
+    """Traces of a record: ``shaft_speed`` in rad/s, as the shaft turned, ``torque_set`` in N m.
 
-    The speed is the central difference of the shaft angle: it takes sin(x) / x with x = 2 pi f /
-    sampling_rate of a change at f, 1 % less at 0.039 of the rate (2 kHz of 51.2 kHz), -3 dB at
-    0.22 of it. An angle of one NaN a sample is a failed record's. ``load_exponent`` is the power
-    of the nominal speed that the torque of the load follows.
+    Each is (sample,). The speed is the central difference of the shaft angle. It takes sin(x) / x
+    with x = 2 pi f / sampling_rate of a change at f: 1 % less at 0.039 of the rate (2 kHz of
+    51.2 kHz), -3 dB at 0.22 of it. A failed record has an angle of one NaN a sample.
+    ``load_exponent`` is the power of the nominal speed that the torque of the load follows.
     """
     times = np.arange(len(shaft_angle)) / sampling_rate
     speed = np.full_like(shaft_angle, operating.speed)
     if len(shaft_angle) > 2:
         speed = np.gradient(shaft_angle, 1.0 / sampling_rate, edge_order=2)
     nominal = operating.nominal(times)
-    torque = (
-        operating.torque
-        * nominal.torque_factor
-        * (nominal.speed / operating.speed) ** load_exponent
-    )
+    slowed = (nominal.speed / operating.speed) ** load_exponent
+    torque = operating.torque * nominal.torque_factor * slowed
     return {
         "shaft_speed": speed.astype(np.float32),
         "torque_set": torque.astype(np.float32),

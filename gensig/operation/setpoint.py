@@ -1,18 +1,21 @@
-"""At what speed and load a machine runs over time, and what drives it."""
+"""Speed and load of a machine over time, and its drive."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import ConfigError
 from gensig.operation.courses import FASTEST_RIPPLE, SHORTEST_PIECE, Profile, Ripple
-from gensig.units import from_si, unit
+from gensig.units import check_positive, unit
 
 Array = NDArray[np.float64]
+
+COURSES = ("speed_profile", "torque_profile", "speed_ripple", "torque_ripple")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,91 +55,65 @@ class Operating:
     torque_ripple: Ripple | None = None
 
     def __post_init__(self) -> None:
-        for key, suffix in (
-            ("speed", "rpm"),
-            ("torque", "nm"),
-            ("duration", "s"),
-            ("drive_frequency", "hz"),
-        ):
-            value = getattr(self, key)
-            if not value > 0.0:
-                name = f"{key}_{suffix}"
-                raise ConfigError(
-                    f"operating.{name} = {from_si(name, value):g} must be positive"
-                )
+        check_positive(
+            self, "operating.", "speed", "torque", "duration", "drive_frequency"
+        )
         if not 0.0 < self.drive_damping_ratio <= 10.0:
             raise ConfigError(
                 f"operating.drive_damping_ratio = {self.drive_damping_ratio:g} must lie in 0..10"
             )
-        if self.speed_profile is not None and not min(self.speed_profile.factors) > 0.0:
+        if self.speed_profile is not None and not self.speed_profile.least > 0.0:
             raise ConfigError(
-                f"operating.speed_profile: factor {min(self.speed_profile.factors):g} must be positive"
+                f"operating.speed_profile: factor {self.speed_profile.least:g} must be positive"
             )
-        if self.torque_profile is not None and min(self.torque_profile.factors) < 0.0:
+        if self.torque_profile is not None and self.torque_profile.least < 0.0:
             raise ConfigError(
-                f"operating.torque_profile: factor {min(self.torque_profile.factors):g} must not be negative"
+                f"operating.torque_profile: factor {self.torque_profile.least:g} "
+                "must not be negative"
             )
-        for key, ripple in (
-            ("speed_ripple", self.speed_ripple),
-            ("torque_ripple", self.torque_ripple),
-        ):
-            if ripple is not None:
-                self._check_ripple(f"operating.{key}", ripple)
+        for key in ("speed_ripple", "torque_ripple"):
+            if getattr(self, key) is not None:
+                self._check_ripple(f"operating.{key}", getattr(self, key))
 
     def _check_ripple(self, key: str, ripple: Ripple) -> None:
-        most = 1.0 if self.speed_profile is None else max(self.speed_profile.factors)
+        most = 1.0
+        if self.speed_profile is not None:
+            most = max(self.speed_profile.factors)
         fastest = float(ripple.rate(np.array([most * self.speed]))[0]) / (2.0 * math.pi)
-        if fastest > FASTEST_RIPPLE:
-            told = (
-                "frequency_hz = "
-                if ripple.order is None
-                else f"order {ripple.order:g} makes up to "
-            )
-            raise ConfigError(
-                f"{key}: {told}{fastest:g} Hz, above {FASTEST_RIPPLE:g} Hz; the course runs straight through every "
-                f"{SHORTEST_PIECE * 1e3:g} ms, which is too coarse for it"
-            )
+        if fastest <= FASTEST_RIPPLE:
+            return
+        shown = "frequency_hz = "
+        if ripple.order is not None:
+            shown = f"order {ripple.order:g} makes up to "
+        raise ConfigError(
+            f"{key}: {shown}{fastest:g} Hz, above {FASTEST_RIPPLE:g} Hz; the course runs straight "
+            f"through every {SHORTEST_PIECE * 1e3:g} ms, which is too coarse for it"
+        )
 
     @property
     def is_steady(self) -> bool:
-        """Whether neither speed nor torque changes."""
-        courses = (
-            self.speed_profile,
-            self.torque_profile,
-            self.speed_ripple,
-            self.torque_ripple,
-        )
-        return all(course is None for course in courses)
+        """True where neither speed nor torque changes."""
+        return all(getattr(self, key) is None for key in COURSES)
 
     @property
     def without_ripple(self) -> Operating:
-        """The same without what goes to and fro."""
+        """Same courses without their ripple."""
         return replace(self, speed_ripple=None, torque_ripple=None)
 
     def earlier(self, lead: float, duration: float) -> Operating:
-        """The same courses as told by a record of ``duration`` s that begins ``lead`` s before
-        this one.
-        """
+        """Same courses as a record of ``duration`` s has them that begins ``lead`` s before."""
         turned = -float(self._set_angle(np.array([-lead]))[0])
-        return replace(
-            self,
-            duration=duration,
-            speed_profile=None
-            if self.speed_profile is None
-            else self.speed_profile.later(lead),
-            torque_profile=None
-            if self.torque_profile is None
-            else self.torque_profile.later(lead),
-            speed_ripple=None
-            if self.speed_ripple is None
-            else self.speed_ripple.later(lead, turned),
-            torque_ripple=None
-            if self.torque_ripple is None
-            else self.torque_ripple.later(lead, turned),
-        )
+        moved: dict[str, Any] = {}
+        for key in COURSES:
+            course = getattr(self, key)
+            if isinstance(course, Profile):
+                moved[key] = course.later(lead)
+            elif isinstance(course, Ripple):
+                moved[key] = course.later(lead, turned)
+        return replace(self, duration=duration, **moved)
 
     def _profile_time(self, times: Array) -> Array:
-        """As ``time_at_set_speed``, of the profile alone, (time,) s."""
+        """``time_at_set_speed`` of the profile alone, (time,) s."""
         if self.speed_profile is None:
             return times
         turned = self.speed_profile.curve().antiderivative()
@@ -147,8 +124,9 @@ class Operating:
         return self.speed * self._profile_time(times)
 
     def time_at_set_speed(self, times: Array) -> Array:
-        """Time in which the set speed would turn as far as the nominal motion turns from time 0,
-        (time,) s.
+        """Time in which the set speed would turn as far as the nominal motion, (time,) s.
+
+        Both turn from time 0.
         """
         smooth = self._profile_time(times)
         if self.speed_ripple is None:
@@ -198,6 +176,5 @@ def _rippled(
         return factor, slope
     psi = ripple.psi(times, set_angle)
     whole = 1.0 + ripple.share * np.sin(psi)
-    return factor * whole, slope * whole + factor * ripple.share * np.cos(
-        psi
-    ) * ripple.rate(set_speed)
+    wave_slope = factor * ripple.share * np.cos(psi) * ripple.rate(set_speed)
+    return factor * whole, slope * whole + wave_slope

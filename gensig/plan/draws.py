@@ -1,4 +1,4 @@
-"""What plans draw: values of varied keys, and whole faults with their sizes."""
+"""Draws of a plan: values of varied keys, and whole faults with their sizes."""
 
 from __future__ import annotations
 
@@ -22,15 +22,10 @@ from gensig.record.machines import read_machine
 from gensig.systems.registry import LINE, read_pair
 from gensig.units import from_si, split_unit, to_si
 
-SCALED = (
-    "low",
-    "high",
-    "mean",
-    "std",
-    "values",
-)  # of a distribution that is a share of a size
-CEILING = "at_most_of_root_chord"  # beside ``of``: the highest value, over the root chord of the faulted gear
-OWN = ("of", CEILING)
+# Keys of a distribution that are multiplied by a size where they are shares of it.
+SCALED = ("low", "high", "mean", "std", "values")
+# Key that limits the highest value to a share of the root chord of the faulted gear.
+CEILING = "at_most_of_root_chord"
 
 
 def draw_values(
@@ -45,7 +40,7 @@ def draw_values(
     are drawn together from one space-filling design.
     """
     design = config["plan"]["design"]
-    crossed = [key for key in vary if design == GRID and vary[key].n_levels is not None]
+    crossed = [key for key in vary if design == GRID and vary[key].levels]
     drawn = [key for key in vary if key not in crossed]
     unit = design_points(design, len(points), len(drawn), rng)
     values = {key: vary[key].values_at(unit[:, k]) for k, key in enumerate(drawn)}
@@ -58,20 +53,16 @@ def draw_values(
 
 
 def fault_sizes(fault: Mapping[str, Any]) -> dict[str, float]:
-    """The numbers of a fault by key; those of a compound one carry the place of their part."""
-    if "parts" in fault:
-        numbered = enumerate(fault["parts"])
-        return {
-            f"parts.{place}.{key}": value
-            for place, part in numbered
-            for key, value in fault_sizes(part).items()
-        }
-    numbers = {
-        key: value
+    """Numbers of a fault by key; the keys of a compound fault begin with the part's number."""
+    sizes = {
+        key: float(value)
         for key, value in fault.items()
         if isinstance(value, int | float) and key != "tooth"
     }
-    return {key: float(value) for key, value in numbers.items()}
+    for number, part in enumerate(fault.get("parts", ())):
+        of_part = fault_sizes(part)
+        sizes |= {f"parts.{number}.{key}": of_part[key] for key in of_part}
+    return sizes
 
 
 def fault_specs(
@@ -80,19 +71,18 @@ def fault_specs(
     """Distributions of a fault by name, and the part and key that each is of."""
     read_faults(fault)
     specs: dict[str, Distribution] = {}
-    places: dict[str, tuple[int, str]] = {}
-    for place, part in enumerate(fault_parts(fault)):
+    parts: dict[str, tuple[int, str]] = {}
+    for number, part in enumerate(fault_parts(fault)):
         for key, spec in (part.get("vary") or {}).items():
             if key not in part or key == "vary":
                 raise ConfigError(
                     f"fault.vary: '{key}' is no key of fault={part['kind']}"
                 )
-            name = f"parts.{place}.{key}" if fault["kind"] == COMPOUND else key
-            specs[name] = read_distribution(
-                f"fault.vary.{name}", _for_gear(config, part, key, spec)
-            )
-            places[name] = (place, key)
-    return specs, places
+            name = f"parts.{number}.{key}" if fault["kind"] == COMPOUND else key
+            scaled = _for_gear(config, part, key, spec)
+            specs[name] = read_distribution(f"fault.vary.{name}", scaled)
+            parts[name] = (number, key)
+    return specs, parts
 
 
 def draw_faults(
@@ -105,49 +95,42 @@ def draw_faults(
 
     One design for all parts of a compound fault.
     """
-    specs, places = fault_specs(config, fault)
-    parts = [
-        {key: value for key, value in part.items() if key != "vary"}
-        for part in fault_parts(fault)
-    ]
+    specs, part_keys = fault_specs(config, fault)
     drawn = draw_values(config, specs, points, rng)
     faults: list[dict[str, Any]] = []
     for condition in range(len(points)):
-        own = [dict(plain) for plain in parts]
+        parts = [dict(part) for part in fault_parts(fault)]
+        for part in parts:
+            part.pop("vary", None)
         for name, values in drawn.items():
-            place, key = places[name]
-            own[place][key] = values[condition]
-        faults.append(
-            {"kind": fault["kind"], "parts": own}
-            if fault["kind"] == COMPOUND
-            else (own or [dict(fault)])[0]
-        )
+            number, key = part_keys[name]
+            parts[number][key] = values[condition]
+        whole = {"kind": fault["kind"], "parts": parts}
+        if fault["kind"] != COMPOUND:
+            whole = parts[0] if parts else dict(fault)
+        faults.append(whole)
     return faults
 
 
 def _gear_sizes(config: Configuration, gear: str) -> tuple[int, dict[str, float]]:
     """Teeth of a gear, and the sizes in mm that a fault may be a share of."""
-    if config["system"]["kind"] == LINE:  # whose gears stand in a table
-        own = getattr(read_machine(config).pair, gear)
-        sizes = {"normal_module": own.normal_module, "face_width": own.face_width}
-        return own.n_teeth, {
-            name: from_si("size_mm", value) for name, value in sizes.items()
-        }
-    values = config["gear"][gear]
-    sizes = {
-        "normal_module": config["gear"]["normal_module_mm"],
-        "face_width": values["face_width_mm"],
+    if config["system"]["kind"] != LINE:
+        values = config["gear"][gear]
+        module, width = config["gear"]["normal_module_mm"], values["face_width_mm"]
+        return values["n_teeth"], {"normal_module": module, "face_width": width}
+    in_table = getattr(read_machine(config).pair, gear)
+    return in_table.n_teeth, {
+        name: from_si("size_mm", getattr(in_table, name))
+        for name in ("normal_module", "face_width")
     }
-    return values["n_teeth"], sizes
 
 
 def _root_chord(config: Configuration, gear: str) -> float:
     """Thickness of a gear's tooth in the middle of its root curve, where cracks begin, m."""
-    pair = (
-        read_machine(config).pair
-        if config["system"]["kind"] == LINE
-        else read_pair(config)
-    )
+    if config["system"]["kind"] == LINE:
+        pair = read_machine(config).pair
+    else:
+        pair = read_pair(config)
     return 2.0 * root_curve_point(getattr(pair, gear), "arc_mid")[1]
 
 
@@ -169,24 +152,23 @@ def _for_gear(
     unit = split_unit(key)[1]
     if spec["of"] not in sizes or unit not in ("mm", "um"):
         raise ConfigError(
-            f"fault.vary.{key}: of = {spec['of']!r}; a length may be drawn as a share of {', '.join(sizes)}"
+            f"fault.vary.{key}: of = {spec['of']!r}; a length may be drawn as a share of "
+            f"{', '.join(sizes)}"
         )
     size = from_si(key, to_si("size_mm", sizes[spec["of"]]))
 
-    def scaled(value: Any) -> Any:
-        return (
-            [scaled(one) for one in value] if isinstance(value, list) else value * size
-        )
-
+    drawn = dict(spec)
+    del drawn["of"]
+    ceiling = drawn.pop(CEILING, None)
     try:
-        drawn = {
-            name: scaled(value) if name in SCALED else value
-            for name, value in spec.items()
-            if name not in OWN
-        }
-        if CEILING in spec:
-            ceiling = from_si(key, spec[CEILING] * _root_chord(config, gear))
-            drawn["high"] = min(drawn["high"], ceiling)
+        for name in SCALED:
+            if isinstance(drawn.get(name), list):
+                drawn[name] = [value * size for value in drawn[name]]
+            elif name in drawn:
+                drawn[name] *= size
+        if ceiling is not None:
+            highest = from_si(key, ceiling * _root_chord(config, gear))
+            drawn["high"] = min(drawn["high"], highest)
         return drawn
     except TypeError:
         raise ConfigError(

@@ -13,12 +13,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.faults.base import Fault, Growth
+from gensig.faults.base import Growth
 from gensig.faults.crack import Crack
 from gensig.faults.flank_form import Wear
 from gensig.faults.pitting import DistributedPitting
 from gensig.life.crack_growth import CrackGrowthOptions
-from gensig.life.growth import GrowthLaw, GrowthOptions
+from gensig.life.growth import GrowthLaw
 from gensig.life.life_options import WearGrowthOptions
 from gensig.life.load_history import History
 from gensig.life.pit_growth import PitGrowthOptions
@@ -75,25 +75,6 @@ class UnitGrowth:
     start: float
 
 
-def unit_growth(
-    gears: LifeGears,
-    fault: Fault,
-    options: GrowthOptions,
-    history: History,
-    first: float,
-) -> UnitGrowth:
-    """Growth of a fault in one unit.
-
-    Parameters
-    ----------
-    fault : with a ``growth``
-    options : those of its law
-    history : of the unit
-    first : factor of the unit on the first size of its damage
-    """
-    return LAWS[fault.growth](gears, fault, options, history, first)
-
-
 def paris(
     gears: LifeGears,
     fault: Crack,
@@ -138,6 +119,8 @@ def archard(
     return UnitGrowth(law=law, start=0.0)
 
 
+# Builders take the gears, a fault with this growth, the options of its law, the unit's history of
+# loads, and the unit's factor on the first size of its damage.
 LAWS: Mapping[Growth, Callable[..., UnitGrowth]] = {
     Growth.PARIS: paris,
     Growth.PITS: pits,

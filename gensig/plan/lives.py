@@ -1,4 +1,4 @@
-"""Lives of a data set's units: each under a history of loads, until it fails or time is over."""
+"""Lives of a data set's units: each follows a history of loads until failure or the horizon."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from gensig.life.load_history import History, draw_history, given_history
 from gensig.life.snapshots import snapshot_times
 from gensig.options.configuration import Configuration, whole_number
 from gensig.plan.draws import draw_faults, draw_values
-from gensig.plan.growth_table import PAIRS_ONLY, LifeGears, unit_growth
+from gensig.plan.growth_table import LAWS, PAIRS_ONLY, LifeGears
 from gensig.record.machines import read_machine
 from gensig.record.options import read_plan_options
 from gensig.record.streams import Stream, stream
@@ -33,15 +33,15 @@ SPEED, TORQUE = "operating.speed_rpm", "operating.torque_nm"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Snapshot:
-    """One look at one unit.
+    """Snapshot of one unit.
 
     Parameters
     ----------
-    unit, label, condition : int    ``label`` is the place of the class; ``condition`` is one of the unit's set-points,
-        or the snapshot itself where the machine drifts
+    unit, label, condition : int    ``label`` is the number of the class; ``condition`` is one of
+        the unit's set-points, or the snapshot itself where the machine drifts
     values : configuration key -> value of the machine at this time
     fault : boundary keys
-    columns : what else its row of the plan has
+    columns : further columns of its row of the plan
     is_last : bool                  of its life, where the damage is largest
     """
 
@@ -55,7 +55,7 @@ class Snapshot:
 
 
 def snapshots(config: Configuration) -> Iterator[Snapshot]:
-    """All looks at all lives, life by life in order of time.
+    """All snapshots of all lives, life by life in order of time.
 
     Classes are dealt to units in turn, in an order drawn anew for each round, so that no number
     of a unit or gearbox tells the class.
@@ -64,36 +64,32 @@ def snapshots(config: Configuration) -> Iterator[Snapshot]:
     ------
     ConfigError    for a plan that lives cannot follow, and classes that do not grow
     """
-    seed, options, names = (
-        config.seed,
-        read_life(config["life"]),
-        list(config["plan"]["classes"]),
-    )
+    seed, names = config.seed, list(config["plan"]["classes"])
+    options = read_life(config["life"])
     n_units = _checked_units(config, options)
     machine = read_machine(config)
     points = _setpoints(config, options, n_units)
     n_setpoints = len(points) // n_units
     speed, torque = _speed_and_torque(machine, points, n_units)
-    faults = {
-        name: draw_faults(
-            config,
-            config["classes"][name],
-            np.arange(n_units),
-            stream(seed, Stream.FAULT, index),
-        )
-        for index, name in enumerate(names)
-    }
+    faults = []
+    for index, name in enumerate(names):
+        rng = stream(seed, Stream.FAULT, index)
+        units = np.arange(n_units)
+        faults.append(draw_faults(config, config["classes"][name], units, rng))
     gears = LifeGears(config, machine, (float(torque.min()), float(torque.max())))
     number = 0
     for unit in range(n_units):
         order = stream(seed, Stream.ORDER, unit // len(names)).permutation(len(names))
         label = int(order[unit % len(names)])
-        fault, rng = faults[names[label]][unit], stream(seed, Stream.LIFE, unit)
+        rng = stream(seed, Stream.LIFE, unit)
         past = stream(seed, Stream.LIFE_HISTORY, unit)
         history = _history(options, speed[unit], torque[unit], past)
         history = replace(history, speed=history.speed * machine.ratio)
-        life = _life(gears, options, fault, history, rng)
-        factors = _drift_factors(options, rng)
+        life = _life(gears, options, faults[label][unit], history, rng)
+        factors = {
+            key: float(np.exp(drift.scatter * rng.standard_normal()))
+            for key, drift in options.drift.items()
+        }
         times = snapshot_times(
             life.course,
             options.snapshot_spacing,
@@ -101,21 +97,19 @@ def snapshots(config: Configuration) -> Iterator[Snapshot]:
             options.snapshot_every,
         )
         for k, running in enumerate(times.tolist()):
-            place = life.course.at(running)
-            setpoint = int(life.course.setpoint[place[0]])
-            point = unit * n_setpoints + setpoint
+            at = life.course.at(running)
+            point = unit * n_setpoints + int(life.course.setpoint[at[0]])
             values = dict(points[point])
             for key, drift in options.drift.items():
-                values[key] = _number(config, key, values) * drift.factor(
-                    running, factors[key]
-                )
+                factor = drift.factor(running, factors[key])
+                values[key] = _number(config, key, values) * factor
             yield Snapshot(
                 unit=unit,
                 label=label,
                 condition=number if options.drift else point,
                 values=values,
-                fault=life.fault_at(place),
-                columns={"life_id": f"life-{unit:04d}", **life.columns_at(place)},
+                fault=life.fault_at(at),
+                columns={"life_id": f"life-{unit:04d}", **life.columns_at(at)},
                 is_last=k == len(times) - 1,
             )
             number += 1
@@ -136,36 +130,32 @@ class _Life:
     loads: tuple[Array, ...]
     course: Course
 
-    def fault_at(self, place: tuple[int, float]) -> dict[str, Any]:
-        """Boundary keys of the fault at a place of the course."""
+    def fault_at(self, at: tuple[int, float]) -> dict[str, Any]:
+        """Boundary keys of the fault at a point of the course."""
         if self.law is None:
             return dict(self.fault)
-        grown = self.law.fault(self.course.value("size", place))
-        return grown if "kind" in grown else {**self.fault, **grown}
+        grown = self.law.fault(self.course.value("size", at))
+        if "kind" in grown:
+            return grown
+        return {**self.fault, **grown}
 
-    def columns_at(self, place: tuple[int, float]) -> dict[str, Any]:
-        """Columns of the plan at a place of the course."""
+    def columns_at(self, at: tuple[int, float]) -> dict[str, Any]:
+        """Columns of the plan at a point of the course."""
         course = self.course
-        clock = course.value("clock", place)
-        return {
+        clock = course.value("clock", at)
+        remaining = max(float(course.clock[-1]) - clock, 0.0)
+        columns: dict[str, Any] = {
             "life_time_h": from_si("time_h", clock),
-            "life_cycles": course.value("turns", place),
-            "remaining_life_h": from_si(
-                "time_h", max(float(course.clock[-1]) - clock, 0.0)
-            ),
+            "life_cycles": course.value("turns", at),
+            "remaining_life_h": from_si("time_h", remaining),
             "life_failed": int(course.has_failed),
-            "life_growing": int(course.growing[place[0]]),
-            **{
-                f"params/fault.{key}": value
-                for key, value in self._measures(place).items()
-            },
+            "life_growing": int(course.growing[at[0]]),
         }
-
-    def _measures(self, place: tuple[int, float]) -> dict[str, float]:
-        if self.law is None:
-            return {}
-        torque = float(self.loads[int(self.course.setpoint[place[0]])].max())
-        return self.law.measures(self.course.value("size", place), torque)
+        if self.law is not None:
+            torque = float(self.loads[int(course.setpoint[at[0]])].max())
+            sizes = self.law.measures(course.value("size", at), torque)
+            columns |= {f"params/fault.{key}": sizes[key] for key in sizes}
+        return columns
 
 
 def _life(
@@ -182,9 +172,9 @@ def _life(
         never = np.full((len(history.torque), 1), np.inf)
         course = grow(np.array([0.0, 1.0]), never, history, 0.0)
         return _Life(fault=fault, law=None, loads=(), course=course)
-    rate, first = growth.spread.draw(rng)
+    rate, first = growth.draw(rng)
     (defect,) = read_faults(fault)
-    unit = unit_growth(gears, defect, growth, history, first)
+    unit = LAWS[defect.growth](gears, defect, growth, history, first)
     points = zip(history.speed.tolist(), history.torque.tolist(), strict=True)
     loads = tuple(gears.tooth_loads(*point) for point in points)
     course = grow(unit.law.sizes, unit.law.turns(loads) / rate, history, unit.start)
@@ -197,7 +187,8 @@ def _checked_units(config: Configuration, options: LifeOptions) -> int:
     for key in ("n_records", "conditions_per_unit"):
         if plan[key] is not None:
             raise ConfigError(
-                f"plan.{key} = {plan[key]!r}: lives and their snapshots say how many records there are; leave it null"
+                f"plan.{key} = {plan[key]!r}: lives and their snapshots say how many records "
+                "there are; leave it null"
             )
     if plan["n_repeats"] != 1 or plan["design"] == GRID:
         raise ConfigError(
@@ -205,10 +196,11 @@ def _checked_units(config: Configuration, options: LifeOptions) -> int:
         )
     for name, fault in config["classes"].items():
         kinds = {part["kind"] for part in fault_parts(fault)}
-        if kinds - set(options.laws) or len(fault_parts(fault)) > 1:
+        if kinds - options.laws.keys() or len(fault_parts(fault)) > 1:
             grown = ", ".join(("healthy", *options.laws))
             raise ConfigError(
-                f"plan.classes: nothing makes {name} grow; this life has {grown}: take life=mixed, or other classes"
+                f"plan.classes: nothing makes {name} grow; this life has {grown}: take "
+                "life=mixed, or other classes"
             )
         unfollowed = sorted(kind for kind in kinds if FAULTS[kind].growth in PAIRS_ONLY)
         if config["system"]["kind"] == LINE and unfollowed:
@@ -228,28 +220,26 @@ def _checked_units(config: Configuration, options: LifeOptions) -> int:
 def _setpoints(
     config: Configuration, options: LifeOptions, n_units: int
 ) -> list[dict[str, float]]:
-    """Values of every set-point of every unit, those of a unit beside each other."""
+    """Values of every set-point, unit by unit."""
     vary = read_plan_options(config).vary
-    blocks = options.blocks
-    if blocks is not None and (drawn := sorted({SPEED, TORQUE} & set(vary))):
-        raise ConfigError(
-            f"life.blocks gives {drawn[0]} itself, but the plan varies it; pin it, or take plan.vary={{}}"
-        )
-    given = None if blocks is None else given_history(blocks, options.horizon)
-    n_setpoints = options.n_setpoints if given is None else len(given.speed)
-    points = np.arange(n_units * n_setpoints)
-    drawn_values = draw_values(
-        config, vary, points, stream(config.seed, Stream.CONDITION)
-    )
-    found = [
-        {key: float(values[k]) for key, values in drawn_values.items()}
-        for k in points.tolist()
-    ]
+    n_setpoints, given = options.n_setpoints, None
+    if options.blocks is not None:
+        for key in (SPEED, TORQUE):
+            if key in vary:
+                raise ConfigError(
+                    f"life.blocks gives {key} itself, but the plan varies it; pin it, or take "
+                    "plan.vary={}"
+                )
+        given = given_history(options.blocks, options.horizon)
+        n_setpoints = len(given.speed)
+    numbers = np.arange(n_units * n_setpoints)
+    drawn = draw_values(config, vary, numbers, stream(config.seed, Stream.CONDITION))
+    points = [{key: float(drawn[key][k]) for key in drawn} for k in numbers.tolist()]
     if given is not None:
-        for k, values in enumerate(found):
+        for k, values in enumerate(points):
             values[SPEED] = from_si("speed_rpm", float(given.speed[k % n_setpoints]))
             values[TORQUE] = float(given.torque[k % n_setpoints])
-    return found
+    return points
 
 
 def _speed_and_torque(
@@ -259,20 +249,11 @@ def _speed_and_torque(
 ) -> tuple[Array, Array]:
     """Set speeds in rad/s and torques in N m, (unit, setpoint) each."""
     set_speed = from_si("speed_rpm", machine.operating.speed / machine.ratio)
+    set_torque = machine.operating.torque
     speed = np.array([values.get(SPEED, set_speed) for values in points])
-    torque = np.array(
-        [values.get(TORQUE, machine.operating.torque) for values in points]
-    )
+    torque = np.array([values.get(TORQUE, set_torque) for values in points])
     shape = (n_units, len(points) // n_units)
     return speed.reshape(shape) * (2.0 * np.pi / 60.0), torque.reshape(shape)
-
-
-def _drift_factors(options: LifeOptions, rng: np.random.Generator) -> dict[str, float]:
-    """Factors of one unit on the rates of its drifts, by configuration key."""
-    return {
-        key: float(np.exp(drift.scatter * rng.standard_normal()))
-        for key, drift in options.drift.items()
-    }
 
 
 def _history(

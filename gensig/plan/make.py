@@ -24,7 +24,7 @@ from gensig.mesh.pair_table import check_teeth
 from gensig.options.configuration import Configuration
 from gensig.plan.draws import draw_faults, draw_values, fault_sizes, fault_specs
 from gensig.plan.lives import snapshots
-from gensig.record.inputs import MISSING, InputReader
+from gensig.record.inputs import MISSING, InputReader, draw_start
 from gensig.record.machines import read_machine
 from gensig.record.options import PlanOptions, read_dataset_options, read_plan_options
 from gensig.record.simulate import signal_shapes
@@ -40,13 +40,14 @@ COUNT_BYTES = 2  # of a sample stored as an int16 count
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Counts:
-    """How many of everything a plan has.
+    """Numbers of records, units, gearboxes, repeats and conditions of a plan.
 
     Attributes
     ----------
     n_conditions : over all units; unit ``condition % n_units`` runs a condition
     condition_points : (condition,) int    point of the grid over ``plan.vary``
-    fault_points : (condition,) int        point of the grid over a fault's ``vary``, modulo the size that one has
+    fault_points : (condition,) int        point of the grid over a fault's ``vary``, modulo the
+        size that one has
 
     Only a grid reads the points: there every unit runs every set-point with every fault.
     """
@@ -87,55 +88,38 @@ def make_plan(config: Configuration) -> Plan:
     signal_shapes(config, machine)  # refuses what the machine does not tell
     rng = stream(seed, Stream.CONDITION)
     conditions = draw_values(config, options.vary, counts.condition_points, rng)
-    faults = {
-        name: draw_faults(
-            config, fault, counts.fault_points, stream(seed, Stream.FAULT, index)
-        )
-        for index, (name, fault) in enumerate(config["classes"].items())
-    }
-    sound = next(
-        (name for name in names if not fault_parts(config["classes"][name])), None
-    )
+    faults = {}
+    for index, (name, fault) in enumerate(config["classes"].items()):
+        rng = stream(seed, Stream.FAULT, index)
+        faults[name] = draw_faults(config, fault, counts.fault_points, rng)
+    sound = [name for name in names if not fault_parts(config["classes"][name])]
     rows: list[dict[str, Any]] = []
     for condition, repeat in itertools.product(
         range(counts.n_conditions), range(counts.n_repeats)
     ):
         unit = condition % counts.n_units
+        specimen, gearbox = divmod(unit, counts.n_gearboxes)
         values = {key: drawn[condition] for key, drawn in conditions.items()}
         if repeat == 0:
             machine = reader.machine(values)
             machine.pair.require_continuous_drive()
         order = stream(seed, Stream.ORDER, condition * counts.n_repeats + repeat)
-        for label in order.permutation(len(names)):
+        for label in order.permutation(len(names)).tolist():
             if len(rows) == counts.n_records:
                 break
-            name = names[label]
-            # The first sound record of a condition starts as the twin that sets the noise does:
-            # it is that twin.
-            is_twin = name == sound and repeat == 0
-            start = (
-                stream(seed, Stream.TWIN, condition)
-                if is_twin
-                else stream(seed, Stream.START, len(rows))
-            )
-            fault = _Fault(plain=faults[name][condition], is_sham=options.sham)
-            rows.append(
-                {
-                    "label": int(label),
-                    "label_name": name,
-                    **_unit_ids(
-                        unit, unit % counts.n_gearboxes, unit // counts.n_gearboxes
-                    ),
-                    "condition_id": f"condition-{condition:06d}",
-                    "repeat": repeat,
-                    **_row(machine, fault, values, start),
-                }
-            )
+            start = stream(seed, Stream.START, len(rows))
+            # The first sound record of a condition is the twin that sets its noise.
+            if repeat == 0 and sound[:1] == [names[label]]:
+                start = stream(seed, Stream.TWIN, condition)
+            ids = _ids(options, label, unit, gearbox, specimen, condition, repeat)
+            fault = faults[names[label]][condition]
+            drawn_columns = _row(machine, fault, values, start, sham=options.sham)
+            rows.append(ids | drawn_columns)
     return _as_plan(config, rows)
 
 
 def _plan_of_lives(config: Configuration, options: PlanOptions) -> Plan:
-    """One row a snapshot, life by life; every unit has gears of its own, as they fail only once."""
+    """One row a snapshot, life by life. Every unit has its own gears, as they fail only once."""
     machine = read_machine(config)
     machine.check()
     machine.pair.require_continuous_drive()
@@ -143,28 +127,38 @@ def _plan_of_lives(config: Configuration, options: PlanOptions) -> Plan:
     reader = InputReader(config)
     rows: list[dict[str, Any]] = []
     for look in snapshots(config):
-        start = stream(config.seed, Stream.START, len(rows))
-        fault = _Fault(plain=look.fault, is_sham=options.sham, is_checked=look.is_last)
-        rows.append(
-            {
-                "label": look.label,
-                "label_name": options.classes[look.label],
-                **_unit_ids(look.unit, look.unit % n_gearboxes, look.unit),
-                "condition_id": f"condition-{look.condition:06d}",
-                "repeat": 0,
-                **_row(reader.machine(look.values), fault, look.values, start),
-                **look.columns,
-            }
+        unit, gearbox = look.unit, look.unit % n_gearboxes
+        ids = _ids(options, look.label, unit, gearbox, unit, look.condition, 0)
+        drawn_columns = _row(
+            reader.machine(look.values),
+            look.fault,
+            look.values,
+            stream(config.seed, Stream.START, len(rows)),
+            sham=options.sham,
+            is_checked=look.is_last,
         )
+        rows.append(ids | drawn_columns | look.columns)
     return _as_plan(config, rows)
 
 
-def _unit_ids(unit: int, gearbox: int, specimen: int) -> dict[str, str]:
-    """Ids of a unit, its gearbox and its set of gears; `RecordNumbers` reads their numbers back."""
+def _ids(
+    options: PlanOptions,
+    label: int,
+    unit: int,
+    gearbox: int,
+    specimen: int,
+    condition: int,
+    repeat: int,
+) -> dict[str, Any]:
+    """Class and ids of a record; `RecordNumbers` reads the numbers of the ids back."""
     return {
+        "label": label,
+        "label_name": options.classes[label],
         "unit_id": f"unit-{unit:04d}",
         "gearbox_id": f"gearbox-{gearbox:04d}",
         "specimen_id": f"specimen-{specimen:04d}",
+        "condition_id": f"condition-{condition:06d}",
+        "repeat": repeat,
     }
 
 
@@ -191,7 +185,8 @@ def read_counts(config: Configuration) -> Counts:
     if plan.is_grid:
         if per_unit is not None:
             raise ConfigError(
-                f"plan.conditions_per_unit = {per_unit!r}: a grid's levels say how many; leave it null"
+                f"plan.conditions_per_unit = {per_unit!r}: a grid's levels say how many; leave "
+                "it null"
             )
         per_unit, n_faults = _grid_size(config, plan)
     n_records = plan.n_records
@@ -220,21 +215,19 @@ def read_counts(config: Configuration) -> Counts:
 
 
 def _grid_size(config: Configuration, plan: PlanOptions) -> tuple[int, int]:
-    """Points of the grid over the conditions, and the least number that the grids of all faults
-    divide.
-    """
+    """Points of the grid over the conditions, and the least common multiple of those of faults."""
     for key, distribution in plan.vary.items():
-        if distribution.n_levels is None and not distribution.names_levels:
+        if not (distribution.levels or distribution.names_levels):
             raise ConfigError(
-                f"plan.vary.{key}: a grid needs its levels: give levels: 4 or so, distribution: choice, or "
-                "levels: null to draw it all the same"
+                f"plan.vary.{key}: a grid needs its levels: give levels: 4 or so, distribution: "
+                "choice, or levels: null to draw it all the same"
             )
     n_faults = [_n_points(vary) for vary in _fault_varies(config).values()]
     return _n_points(plan.vary), math.lcm(*n_faults)
 
 
 def _n_points(vary: Mapping[str, Distribution]) -> int:
-    return math.prod(distribution.n_levels or 1 for distribution in vary.values())
+    return math.prod(distribution.levels or 1 for distribution in vary.values())
 
 
 def _fault_varies(config: Configuration) -> dict[str, dict[str, Distribution]]:
@@ -252,90 +245,77 @@ def describe_design(config: Configuration) -> str:
     plan = read_plan_options(config)
     if not plan.is_grid:
         return plan.design
-    of_faults = {
-        f"{name}.{key}": distribution
-        for name, vary in _fault_varies(config).items()
-        for key, distribution in vary.items()
-    }
-    keys = {
-        key: distribution.n_levels
-        for key, distribution in {**plan.vary, **of_faults}.items()
-    }
-    crossed = " x ".join(f"{key} {n}" for key, n in keys.items() if n is not None)
-    drawn = ", ".join(key for key, n in keys.items() if n is None)
-    return f"grid of {crossed or 'no key'}" + (f"; drawn: {drawn}" if drawn else "")
+    levels = {key: distribution.levels for key, distribution in plan.vary.items()}
+    for name, vary in _fault_varies(config).items():
+        levels |= {f"{name}.{key}": vary[key].levels for key in vary}
+    crossed = " x ".join(f"{key} {n}" for key, n in levels.items() if n)
+    drawn = ", ".join(key for key, n in levels.items() if not n)
+    return f"grid of {crossed or 'no key'}" + f"; drawn: {drawn}" * bool(drawn)
 
 
 def _fitting(plan: PlanOptions, n_records: int, counts: tuple[int, ...]) -> int:
-    """The number of records that follows from the others, if ``plan.n_records`` has nothing
-    against it.
+    """Number of records that follows from the other counts.
+
+    Raises ConfigError where ``plan.n_records`` is another number, or a grid is too large.
     """
     names = ("units", "conditions", "faults", "classes", "repeats")
-    product = " x ".join(
-        f"{n:,} {name}"
-        for n, name in zip((*counts, plan.n_repeats), names, strict=True)
-        if n > 1
-    )
+    named = zip((*counts, plan.n_repeats), names, strict=True)
+    product = " x ".join(f"{n:,} {name}" for n, name in named if n > 1)
     sum_of_all = f"{n_records:,} records ({product})" if product else "1 record"
     if plan.is_grid and n_records > MOST_IN_GRID:
         raise ConfigError(
-            f"the grid has {sum_of_all}, more than {MOST_IN_GRID:,}; take fewer levels, units or repeats"
+            f"the grid has {sum_of_all}, more than {MOST_IN_GRID:,}; take fewer levels, units or "
+            "repeats"
         )
     if plan.n_records not in (None, n_records):
         raise ConfigError(
-            f"plan.n_records = {plan.n_records}, but the plan has {sum_of_all}; plan.n_records=null takes them"
+            f"plan.n_records = {plan.n_records}, but the plan has {sum_of_all}; "
+            "plan.n_records=null takes them"
         )
     return n_records
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Fault:
-    """The fault of one row, with its sizes drawn.
-
-    ``is_sham`` keeps its label and gives it severity 0. The teeth of a row with a larger fault of
-    the same life need no check: ``is_checked`` is false.
-    """
-
-    plain: Mapping[str, Any]
-    is_sham: bool
-    is_checked: bool = True
-
-
 def _row(
     machine: Machine,
-    fault: _Fault,
+    fault: Mapping[str, Any],
     values: Mapping[str, float],
-    start: np.random.Generator,
+    rng: np.random.Generator,
+    *,
+    sham: bool,
+    is_checked: bool = True,
 ) -> dict[str, Any]:
-    """Columns of one record that follow from its drawn values."""
-    applied = read_faults(fault.plain)
-    if fault.is_checked:
-        check_teeth(
-            machine.pair,
-            machine.material,
-            machine.mesh,
-            faulty_teeth(machine.pair, applied),
-        )
-    parts = fault_parts(fault.plain)
-    tooth = int(start.integers(machine.pair.pinion.n_teeth))
-    mate = int(start.integers(machine.pair.wheel.n_teeth))
-    return {
-        "faults_json": json.dumps(parts, separators=(",", ":")),
-        "severity": 0.0 if fault.is_sham else severity(applied, machine.pair),
-        "fault_gear": applied[0].gear if applied else "",
-        "fault_tooth": applied[0].first_tooth if applied else -1,
-        "start_tooth_pinion": tooth,
-        "start_tooth_wheel": machine.driven_tooth(tooth, mate),
-        "start_phase": float(start.random()),
+    """Columns of one record that follow from its drawn values.
+
+    ``sham`` gives severity 0. The teeth of a record need no check where a larger fault of the
+    same life is checked: ``is_checked`` is false.
+    """
+    faults = read_faults(fault)
+    if is_checked:
+        teeth = faulty_teeth(machine.pair, faults)
+        check_teeth(machine.pair, machine.material, machine.mesh, teeth)
+    start = draw_start(machine, rng)
+    row = {
+        "faults_json": json.dumps(fault_parts(fault), separators=(",", ":")),
+        "severity": 0.0,
+        "fault_gear": "",
+        "fault_tooth": -1,
+        "start_tooth_pinion": start.tooth_pinion,
+        "start_tooth_wheel": start.tooth_wheel,
+        "start_phase": start.phase,
         "speed_set_rpm": from_si("speed_rpm", machine.operating.speed),
         "torque_nm": machine.operating.torque,
-        "snr_db": MISSING if machine.sensing.snr is None else machine.sensing.snr,
-        **{f"params/{key}": float(value) for key, value in values.items()},
-        **{
-            f"params/fault.{key}": value
-            for key, value in fault_sizes(fault.plain).items()
-        },
+        "snr_db": machine.sensing.snr,
     }
+    if row["snr_db"] is None:
+        row["snr_db"] = MISSING
+    if not sham:
+        row["severity"] = severity(faults, machine.pair)
+    if faults:
+        row["fault_gear"] = faults[0].gear
+        row["fault_tooth"] = faults[0].first_tooth
+    row |= {f"params/{key}": float(value) for key, value in values.items()}
+    row |= {f"params/fault.{key}": size for key, size in fault_sizes(fault).items()}
+    return row
 
 
 def _as_plan(config: Configuration, rows: list[dict[str, Any]]) -> Plan:
@@ -343,39 +323,34 @@ def _as_plan(config: Configuration, rows: list[dict[str, Any]]) -> Plan:
 
     A parameter that a record has not is NaN. The rows are emptied: nothing is held twice.
     """
-    names: dict[str, None] = {}
-    for row in rows:
-        names.update(dict.fromkeys(row))
-    shard, place = shard_places(len(rows), records_per_shard(config))
-    columns: dict[str, Any] = {
-        "record_id": record_ids(len(rows)),
-        "shard": shard,
-        "row": place,
-    }
+    names = dict.fromkeys(itertools.chain(*rows))
+    shard, number = shard_places(len(rows), records_per_shard(config))
+    columns: dict[str, Any] = {"record_id": record_ids(len(rows))}
+    columns |= {"shard": shard, "row": number}
     for name in names:
         columns[name] = np.array([row.pop(name, MISSING) for row in rows])
     return Plan(columns=columns)
 
 
 def records_per_shard(config: Configuration) -> int:
-    """As configured, else about 64 MB of samples."""
+    """Number of records as configured, else for about 64 MB of samples."""
     given = read_dataset_options(config).records_per_shard
-    return max(1, SHARD_BYTES // record_bytes(config)) if given is None else given
+    return given or max(1, SHARD_BYTES // record_bytes(config))
 
 
 def record_bytes(config: Configuration, *, as_stored: bool = False) -> int:
-    """Bytes of one record's samples, ``as_stored`` in the chosen type before compression, else in
-    single precision.
+    """Bytes of one record's samples in single precision.
 
-    Shards are cut by the latter, so that how samples are stored does not change a plan.
+    ``as_stored`` they are in the chosen type, before compression. Shards are cut by the former,
+    so that the chosen type does not change a plan.
     """
     shapes = signal_shapes(config, read_machine(config))
-    as_counts = as_stored and read_dataset_options(config).sample_type == "int16"
+    counts = set()
+    if as_stored and read_dataset_options(config).sample_type == "int16":
+        counts = set(SCALES)
     n_bytes = 0
     for name, shape in shapes.items():
-        if SIGNALS[name].is_bulk:
-            width = (
-                COUNT_BYTES if as_counts and name in SCALES else SIGNALS[name].n_bytes
-            )
-            n_bytes += math.prod(shape) * width
+        column = SIGNALS[name]
+        width = COUNT_BYTES if name in counts else column.n_bytes
+        n_bytes += column.is_bulk * width * math.prod(shape)
     return n_bytes

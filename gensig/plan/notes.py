@@ -1,4 +1,4 @@
-"""What a plan lacks that one may expect of it: records for every unit, splits by machine."""
+"""Notes on a plan: units without records, and splits by machine that are not possible."""
 
 from __future__ import annotations
 
@@ -15,12 +15,10 @@ BY_MACHINE = {
 
 
 def plan_notes(config: Configuration, plan: Plan) -> list[str]:
-    """At most one line.
-
-    Fewer units than asked for, and which splits by machine are not possible.
-    """
-    parts = [_units_left_out(config, plan), _splits_left_out(plan, config.seed)]
-    return ["; ".join(part for part in parts if part)] if any(parts) else []
+    """At most one line: units without records, and splits by machine that are not possible."""
+    parts = (_units_left_out(config, plan), _splits_left_out(plan, config.seed))
+    note = "; ".join(filter(None, parts))
+    return [note] * bool(note)
 
 
 def _units_left_out(config: Configuration, plan: Plan) -> str:
@@ -31,13 +29,12 @@ def _units_left_out(config: Configuration, plan: Plan) -> str:
     classes = _count(len(config["plan"]["classes"]), "class", "es")
     repeats = _count(config["plan"]["n_repeats"], "repeat")
     records = _count(plan.n_records, "record")
-    return f"{records} are {conditions} of {classes} and {repeats}: {used} of {asked} units are used"
+    counts = f"{records} are {conditions} of {classes} and {repeats}"
+    return f"{counts}: {used} of {asked} units are used"
 
 
 def _splits_left_out(plan: Plan, seed: int) -> str:
-    """The reason of the first protocol of the list, or, where whole units can be kept apart, of
-    those that cannot.
-    """
+    """Reasons why splits by machine are not possible; only that of units if there is one."""
     reasons = why_left_out(plan, seed, tuple(BY_MACHINE))
     if "by_unit" in reasons:
         reasons = {"by_unit": reasons["by_unit"]}

@@ -1,6 +1,4 @@
-"""The same machine with and without a fault, side by side, over a map of speeds and torques and
-several units.
-"""
+"""Contrasts: a machine with and without a fault, over a map of speeds and torques."""
 
 from __future__ import annotations
 
@@ -23,8 +21,8 @@ from gensig.record.inputs import (
     InputReader,
     RecordInputs,
     Row,
+    draw_start,
     simulate_motions,
-    twin_start,
 )
 from gensig.record.options import read_plan_options
 from gensig.record.streams import Stream, stream
@@ -39,23 +37,27 @@ SPEED_SHARES = (0.25, 0.5, 1.0, 1.5, 2.0)  # of the set-point, where no speeds a
 TORQUE_SHARES = (0.25, 0.5, 1.0, 2.0)
 FEWEST_UNITS = 4  # what is chosen on all but one of them needs a spread
 MOST_CELLS = 400
-NOISE_DRAWS = (
-    16  # records of noise whose spectra are averaged where it is not white ...
-)
-NOISE_BINS = 9  # ... and bins: together the mean of its inverse is right within 1 %
+# Records and bins over which spectra of colored noise are averaged: together the mean of the
+# inverse is right within 1 %.
+NOISE_DRAWS = 16
+NOISE_BINS = 9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PairCell:
-    """Pairs of all units at one speed and torque; NaN for a unit whose motion did not stay finite.
+    """Contrasts of all units at one speed and torque.
+
+    A unit whose motion did not stay finite has NaN.
 
     Attributes
     ----------
-    residual : (unit, channel, sample) m/s2     what the fault adds, without noise
-    sound, faulty : (unit, channel, sample) m/s2    as recorded; both of a unit have the same start and the same noise
+    residual : (unit, channel, sample) m/s2         faulty less sound, without noise
+    sound, faulty : (unit, channel, sample) m/s2    as recorded, with one start and one noise
     sound_angle, faulty_angle : (unit, sample) rad  of the pinion
-    noise_power : (unit, channel) (m/s2)^2          variance of the noise, in the band of the signal-to-noise ratio
-    noise_density : (unit, channel, bin) (m/s2)^2   mean of |rfft(noise)|^2 / samples; one bin for all where it is white
+    noise_power : (unit, channel) (m/s2)^2          variance of the noise, in the band of the
+                                                    signal-to-noise ratio
+    noise_density : (unit, channel, bin) (m/s2)^2   mean of |rfft(noise)|^2 / samples; one bin for
+                                                    all where the noise is white
     """
 
     residual: Array
@@ -69,18 +71,19 @@ class PairCell:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class FaultPairs:
-    """All that a map of pairs is made from; plain data, so that processes can share the cells.
+    """Plan of a map of contrasts; plain data, so that processes can share the cells.
 
     Attributes
     ----------
     config : Configuration         as composed
     speeds_rpm, torques_nm : of the pinion, rising
-    n_units : machines of the same build: each another set of gears, and another gearbox unless ``plan.n_gearboxes``
-              says how many there are
+    n_units : machines of the same build: each another set of gears, and another gearbox unless
+              ``plan.n_gearboxes`` says how many there are
     gears : name -> (teeth, turns for one of the pinion) of the gears with a fault
     rows : one of a plan for each cell and unit, cell by cell, torques fastest
-    noise_shape : (unit, channel, bin) or None    density of noise of power 1 where it is not white
-    fixed_power : (unit, channel) or None         power of the noise where it is that of the set-point everywhere
+    noise_shape : (unit, channel, bin) or None    density of noise of power 1; None where white
+    fixed_power : (unit, channel) or None         power of the noise at the set-point, where it
+                                                  holds everywhere
     """
 
     config: Configuration
@@ -102,47 +105,44 @@ class FaultPairs:
         return len(self.speeds_rpm) * len(self.torques_nm)
 
     def cell(self, place: int) -> PairCell:
-        """Simulate the cell of speed ``place // len(torques_nm)`` and torque ``place %
-        len(torques_nm)``.
-        """
+        """Simulate one cell; cells are numbered speed by speed, torques fastest."""
         rows = self.rows[place * self.n_units : (place + 1) * self.n_units]
         sound, faulty = _contrasts(self.config, rows)
         motions = simulate_motions([*sound, *faulty])
         n_samples = round(self.duration * self.sampling_rate)
         shape = (self.n_units, len(self.channel_names), n_samples)
-        signals = {
-            name: np.full(shape, np.nan) for name in ("residual", "sound", "faulty")
-        }
-        angles = {
-            name: np.full((self.n_units, n_samples), np.nan)
-            for name in ("sound_angle", "faulty_angle")
-        }
+        residual, *recorded = (np.full(shape, np.nan) for _ in range(3))
+        angles = [np.full((self.n_units, n_samples), np.nan) for _ in range(2)]
         power = np.full(shape[:2], np.nan)
         for unit, inputs in enumerate(faulty):
-            without, with_fault = motions[unit], motions[self.n_units + unit]
+            without, with_fault = motions[unit :: self.n_units]
             if isinstance(without, SimulationError) or isinstance(
                 with_fault, SimulationError
             ):
                 continue
-            power[unit] = (
-                _noise_power(inputs, without)
-                if self.fixed_power is None
-                else self.fixed_power[unit]
-            )
+            if self.fixed_power is None:
+                power[unit] = _noise_power(inputs, without)
+            else:
+                power[unit] = self.fixed_power[unit]
             clean = []
-            for name, motion in (("sound", without), ("faulty", with_fault)):
+            for motion, signal, angle in zip(
+                (without, with_fault), recorded, angles, strict=True
+            ):
                 clean.append(inputs.clean(motion.acceleration))
-                signals[name][unit] = inputs.noisy(clean[-1], power[unit])[0]
-                angles[f"{name}_angle"][unit] = motion.shaft_angle
-            signals["residual"][unit] = clean[1] - clean[0]
-        shape_of_noise = (
-            np.ones((1, 1, 1)) if self.noise_shape is None else self.noise_shape
-        )
+                signal[unit] = inputs.noisy(clean[-1], power[unit])[0]
+                angle[unit] = motion.shaft_angle
+            residual[unit] = clean[1] - clean[0]
+        density = power[:, :, None]
+        if self.noise_shape is not None:
+            density = density * self.noise_shape
         return PairCell(
-            **signals,
-            **angles,
+            residual=residual,
+            sound=recorded[0],
+            faulty=recorded[1],
+            sound_angle=angles[0],
+            faulty_angle=angles[1],
             noise_power=power,
-            noise_density=power[:, :, None] * shape_of_noise,
+            noise_density=density,
         )
 
 
@@ -155,15 +155,15 @@ def make_pairs(
     fixed_noise: bool = False,
     epoch: int = 0,
 ) -> FaultPairs:
-    """Plan pairs of the selected fault over a map, every value as configured rather than drawn.
+    """Plan contrasts of the selected fault over a map; values are as configured, not drawn.
 
     Parameters
     ----------
     config : composed configuration; of ``plan`` only ``n_gearboxes`` and ``sham`` count
     speeds_rpm, torques_nm : of the pinion; None takes shares of the set-point
     n_units : machines of the same build
-    fixed_noise : the noise that ``sensing.snr_db`` makes at the set-point everywhere, as a sensor's own noise is,
-                  rather than the same signal-to-noise ratio everywhere
+    fixed_noise : True takes the noise that ``sensing.snr_db`` makes at the set-point everywhere,
+                  as a sensor has it, rather than the same signal-to-noise ratio everywhere
     epoch : any number but 0 gives other machines, as in ``gensig.production.streaming``
 
     Raises
@@ -171,20 +171,8 @@ def make_pairs(
     ConfigError    for a machine without fault or noise, and for numbers that cannot be used
     """
     config = config.with_entries(seed=epoch_seed(config.seed, epoch))
-    fault, sensing = config["fault"], config["sensing"]
-    if not fault_parts(fault):
-        raise ConfigError(
-            f"fault={fault['kind']}: there is nothing to find; choose a fault, for instance fault=crack "
-            "(plan.sham=true leaves it out as a control)"
-        )
-    if sensing["snr_db"] is None:
-        raise ConfigError(
-            "sensing.snr_db = null: without noise every fault is seen; give a signal-to-noise ratio in dB"
-        )
-    if sensing["snr_reference"] != "healthy_twin":
-        raise ConfigError(
-            "sensing.snr_reference: noise that follows the record tells the fault; use healthy_twin"
-        )
+    _check_fault_and_noise(config)
+    fault = config["fault"]
     whole_number("the number of units", n_units, at_least=FEWEST_UNITS)
     speeds = _levels(
         "speeds in r/min", speeds_rpm, config["operating"]["speed_rpm"], SPEED_SHARES
@@ -194,16 +182,21 @@ def make_pairs(
     )
     if len(speeds) * len(torques) > MOST_CELLS:
         raise ConfigError(
-            f"{len(speeds)} speeds x {len(torques)} torques are more than {MOST_CELLS} cells; give fewer"
+            f"{len(speeds)} speeds x {len(torques)} torques "
+            f"are more than {MOST_CELLS} cells; give fewer"
         )
-    config = config.with_entries(
-        fault=without_vary(fault), classes={fault["kind"]: without_vary(fault)}
-    )
+    fixed = without_vary(fault)
+    config = config.with_entries(fault=fixed, classes={fault["kind"]: fixed})
     config = config.with_keys("dataset", store_mesh_state=False)
     planned, rows = _planned(config, speeds, torques, n_units)
     system = read_system(planned)
     teeth = {"pinion": system.pair.pinion.n_teeth, "wheel": system.pair.wheel.n_teeth}
     faulted = dict.fromkeys(str(part["gear"]) for part in fault_parts(fault))
+    shape = power = None
+    if not system.sensing.has_white_noise:
+        shape = _noise_shape(planned, rows[:n_units])
+    if fixed_noise:
+        power = _power_at_set_point(config, n_units)
     return FaultPairs(
         config=planned,
         speeds_rpm=speeds,
@@ -215,30 +208,43 @@ def make_pairs(
         usable_frequency=usable_band(system.sensing.sampling_rate)[1],
         duration=system.operating.duration,
         rows=tuple(rows),
-        noise_shape=None
-        if system.sensing.has_white_noise
-        else _noise_shape(planned, rows[:n_units]),
-        fixed_power=_power_at_set_point(config, n_units) if fixed_noise else None,
+        noise_shape=shape,
+        fixed_power=power,
     )
+
+
+def _check_fault_and_noise(config: Configuration) -> None:
+    """Raise ConfigError for a machine without a fault, or without noise of the healthy twin."""
+    fault, sensing = config["fault"], config["sensing"]
+    if not fault_parts(fault):
+        raise ConfigError(
+            f"fault={fault['kind']}: there is nothing to find; "
+            "choose a fault, for instance fault=crack "
+            "(plan.sham=true leaves it out as a control)"
+        )
+    if sensing["snr_db"] is None:
+        raise ConfigError(
+            "sensing.snr_db = null: without noise every fault is seen; "
+            "give a signal-to-noise ratio in dB"
+        )
+    if sensing["snr_reference"] != "healthy_twin":
+        raise ConfigError(
+            "sensing.snr_reference: noise that follows the record tells the fault; "
+            "use healthy_twin"
+        )
 
 
 def _levels(
     what: str, given: Sequence[float] | None, set_point: float, shares: Sequence[float]
 ) -> tuple[float, ...]:
     """The values of one axis, rising."""
-    values = (
-        [share * set_point for share in shares]
-        if given is None
-        else [float(value) for value in given]
-    )
-    if (
-        not values
-        or not all(math.isfinite(value) and value > 0.0 for value in values)
-        or len(set(values)) < len(values)
-    ):
-        raise ConfigError(
-            f"{what}: {', '.join(f'{value:g}' for value in values)}; give positive numbers, each once"
-        )
+    values = [share * set_point for share in shares]
+    if given is not None:
+        values = [float(value) for value in given]
+    are_positive = all(math.isfinite(value) and value > 0.0 for value in values)
+    if not values or not are_positive or len(set(values)) < len(values):
+        text = ", ".join(f"{value:g}" for value in values)
+        raise ConfigError(f"{what}: {text}; give positive numbers, each once")
     return tuple(sorted(values))
 
 
@@ -248,11 +254,11 @@ def _planned(
     torques: Sequence[float],
     n_units: int,
 ) -> tuple[Configuration, list[dict[str, Any]]]:
-    """The configuration with a plan of one row a cell and unit, and those rows, each unit in a
-    gearbox of its own.
-    """
+    """The configuration with a plan of one row for each cell and unit, and those rows."""
     plan = read_plan_options(config)
-    n_gearboxes = n_units if plan.n_gearboxes is None else plan.n_gearboxes
+    n_gearboxes = plan.n_gearboxes
+    if n_gearboxes is None:
+        n_gearboxes = n_units
     config = config.with_keys(
         "plan",
         n_records=None,
@@ -267,29 +273,26 @@ def _planned(
             TORQUE: {"distribution": "choice", "values": list(torques)},
         },
     )
-    config = settle_courses(config, () if SEED_KEY in plan.vary else (SEED_KEY,))
+    config = settle_courses(config, tuple({SEED_KEY} - set(plan.vary)))
     table = make_plan(config)
-    rows = [table.record(index) for index in range(table.n_records)]
-    gearboxes = [
-        f"gearbox-{index % n_units % n_gearboxes:04d}" for index in range(len(rows))
-    ]
-    return config, [
-        {**row, "gearbox_id": gearbox}
-        for row, gearbox in zip(rows, gearboxes, strict=True)
-    ]
+    rows = []
+    for index in range(table.n_records):
+        gearbox = f"gearbox-{index % n_units % n_gearboxes:04d}"
+        rows.append({**table.record(index), "gearbox_id": gearbox})
+    return config, rows
 
 
 def _contrasts(
     config: Configuration, rows: Sequence[Row]
 ) -> tuple[list[RecordInputs], list[RecordInputs]]:
-    """Each row without and with its fault, from the start of the healthy twin that sets the noise
-    of a data set.
+    """Inputs of each row without and with its fault.
 
-    Both are records: their nuisances and noise are those of the row.
+    Both begin as the healthy twin that sets the noise of a data set. Nuisances and noise are
+    those of the row.
     """
     reader = InputReader(config)
     inputs = [reader.inputs(row) for row in rows]
-    starts = [twin_start(each.machine, each.stream(Stream.TWIN)) for each in inputs]
+    starts = [draw_start(each.machine, each.stream(Stream.TWIN)) for each in inputs]
     faulty = [
         each.from_start(start) for each, start in zip(inputs, starts, strict=True)
     ]
@@ -318,8 +321,9 @@ def _power_at_set_point(config: Configuration, n_units: int) -> Array:
 
 
 def _noise_shape(config: Configuration, rows: Sequence[Row]) -> Array:
-    """Density of each unit's noise at power 1, averaged over draws and neighbouring bins, (unit,
-    channel, bin).
+    """Density of each unit's noise at power 1, averaged over draws and bins.
+
+    Shape (unit, channel, bin).
     """
     reader = InputReader(config)
     densities = []
@@ -337,19 +341,14 @@ def _noise_shape(config: Configuration, rows: Sequence[Row]) -> Array:
         noises = (
             ideal.record(silent, np.ones(len(silent)), rng)[0] for rng in children
         )
-        density = (
-            np.mean(
-                [np.abs(np.fft.rfft(noise, axis=-1)) ** 2 for noise in noises], axis=0
-            )
-            / n_samples
-        )
-        densities.append([_smoothed(line) for line in density])
+        powers = [np.abs(np.fft.rfft(noise, axis=-1)) ** 2 for noise in noises]
+        density = np.mean(powers, axis=0) / n_samples
+        densities.append([_smoothed(channel) for channel in density])
     return np.array(densities)
 
 
 def _smoothed(density: Array) -> Array:
     """Running mean; at either end of the bins that there are."""
     window = np.ones(min(NOISE_BINS, len(density)))
-    return np.convolve(density, window, mode="same") / np.convolve(
-        np.ones_like(density), window, mode="same"
-    )
+    n_averaged = np.convolve(np.ones_like(density), window, mode="same")
+    return np.convolve(density, window, mode="same") / n_averaged

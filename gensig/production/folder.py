@@ -1,4 +1,4 @@
-"""From a configuration to a data set on disk: the joint between physics and the data-set code."""
+"""Making a data set on disk from a configuration: the joint of physics and data-set code."""
 
 from __future__ import annotations
 
@@ -48,11 +48,11 @@ from gensig.version import __version__
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Progress:
-    """How far a run is when a shard is finished or given up.
+    """State of a run after a shard is finished or given up.
 
     Parameters
     ----------
-    n_done, n_records : int    records that are there, of all that shall be
+    n_done, n_records : int    records on disk, of all that are planned
     n_failed : int             records among `n_done` whose simulation failed
     n_made, n_bytes : int      records and bytes that this run has made
     reason : str               why this shard could not be made; empty when it was
@@ -89,10 +89,8 @@ def begin_folder(config: Configuration, overrides: Sequence[str], out: Path) -> 
         seed=config.seed,
         generator_version=__version__,
     )
-    log(
-        out,
-        f"gensig {__version__}: {plan.n_records} records in {plan.n_shards} shards are planned",
-    )
+    planned = f"{plan.n_records} records in {plan.n_shards} shards are planned"
+    log(out, f"gensig {__version__}: {planned}")
     return plan
 
 
@@ -103,22 +101,26 @@ def run_folder(
     on_shard: Callable[[Progress], None],
     asked: Configuration | None = None,
 ) -> tuple[int, list[str]]:
-    """Make the shards that a folder still lacks, then close it; a task of an array job makes its
-    share only.
+    """Make the shards that a folder still lacks, then close it.
+
+    A task of an array job makes its share only.
 
     Parameters
     ----------
     executor : where the shards are made; it decides no bit
     on_shard : called for every shard that is finished or could not be made
-    asked : a configuration that must be the folder's in all that decides bits; None asks for nothing
+    asked : a configuration that must agree with the folder's in all that decides bits
 
     Returns
     -------
-    number of failed records, and one line for each shard that could not be made; the folder is complete only if
-    there is none
+    number of failed records, and one line for each shard that could not be made; the folder is
+    complete only without such a line
     """
     out = out.resolve()
-    joined_folder(out, asked=None if asked is None else asked.plain())
+    if asked is None:
+        joined_folder(out)
+    else:
+        joined_folder(out, asked=asked.plain())
     if executor.closes:
         collect_receipts(out)
     manifest = read_manifest(out)
@@ -137,14 +139,11 @@ def run_folder(
     n_failed = sum(entries[index].n_failed for index in mine if index not in missing)
     problems: list[str] = []
     n_made, n_bytes = 0, 0
-    logged = (
-        executor.closes and not manifest.is_complete
-    )  # the log of a closed folder is closed too
+    # The log of a closed folder is closed too.
+    logged = executor.closes and not manifest.is_complete
     if logged:
-        log(
-            out,
-            f"gensig {__version__}, {executor}: {len(missing)} of {len(mine)} shards to make",
-        )
+        n_missing = f"{len(missing)} of {len(mine)} shards to make"
+        log(out, f"gensig {__version__}, {executor}: {n_missing}")
     try:
         for index, result in executor.run(functools.partial(write_shard, out), missing):
             if isinstance(result, ShardFailure):
@@ -162,10 +161,8 @@ def run_folder(
                         out, index, result.sha256, result.n_bytes, result.n_failed
                     )
                     receipt_path(out, index).unlink(missing_ok=True)
-                    log(
-                        out,
-                        f"shard {index}: {rows[index]} records, {result.n_failed} failed, {result.n_bytes} bytes",
-                    )
+                    sizes = f"{result.n_failed} failed, {result.n_bytes} bytes"
+                    log(out, f"shard {index}: {rows[index]} records, {sizes}")
             on_shard(
                 Progress(
                     n_done=n_done,
@@ -188,10 +185,8 @@ def run_folder(
 def _close(out: Path) -> None:
     """Close the folder; the log is closed with it, and takes no line afterwards."""
     if reasons := failure_reasons(out):
-        log(
-            out,
-            f"{len(reasons)} of {read_manifest(out).n_records} records failed: {commonest(reasons)}",
-        )
+        failed = f"{len(reasons)} of {read_manifest(out).n_records} records failed"
+        log(out, f"{failed}: {commonest(reasons)}")
     log(out, "every shard is done; closing")
     finalize(out)
 
@@ -205,8 +200,7 @@ def _is_there(out: Path, index: int, entry: ShardEntry) -> bool:
 
 
 def close_folder(out: Path) -> int:
-    """Close a folder whose shards were made by tasks of an array job; returns the number of
-    failed records.
+    """Close a folder made by tasks of an array job; returns the number of failed records.
 
     Raises
     ------
@@ -219,10 +213,8 @@ def close_folder(out: Path) -> int:
     return read_manifest(out).n_failed
 
 
-MOST_BLOCK, BLOCK_BYTES = (
-    64,
-    2**27,
-)  # records simulated and written at a time, and bytes of their samples
+# records simulated and written at a time, and bytes of their samples
+MOST_BLOCK, BLOCK_BYTES = 64, 2**27
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -235,8 +227,7 @@ class WrittenShard:
 
 
 def write_shard(out: Path, shard_index: int) -> WrittenShard:
-    """Simulate and write one shard of a folder; its bits depend on nothing but the folder's plan
-    and configuration.
+    """Simulate and write one shard; its bits depend only on the folder's plan and configuration.
 
     Raises
     ------
@@ -268,9 +259,7 @@ def write_shard(out: Path, shard_index: int) -> WrittenShard:
 def _folder_inputs(
     out: Path, _changed: int
 ) -> tuple[Configuration, PlanRows, list[int]]:
-    """Configuration, plan and records of each shard, read once by a process that makes many
-    shards of one folder.
-    """
+    """Configuration, plan and records of each shard, read once for many shards of a folder."""
     manifest, config = joined_folder(out)
     return (
         Configuration(config),
@@ -287,7 +276,8 @@ def _check_places(
         for k, row in enumerate(rows)
     ):
         raise DatasetError(
-            f"{out / PLAN} and the manifest disagree on shard {shard_index}; restore both from a copy"
+            f"{out / PLAN} and the manifest disagree on shard {shard_index}; "
+            "restore both from a copy"
         )
 
 
@@ -337,8 +327,11 @@ def _shaft_sensors(dataset: DatasetOptions, system: Machine) -> dict[str, Any]:
 
 
 def root_attributes(config: Configuration, system: Machine) -> dict[str, Any]:
-    """What is the same for every record of a data set."""
+    """Attributes that hold for every record of a data set."""
     pair = system.pair
+    torque_of = {}
+    if system.torque_of:
+        torque_of = {"torque_of": system.torque_of}
     return {
         "generator_version": __version__,
         "sampling_rate_hz": system.sensing.sampling_rate,
@@ -347,7 +340,7 @@ def root_attributes(config: Configuration, system: Machine) -> dict[str, Any]:
         "source_names": list(system.sensing.channels),
         "channel_units": [channel_unit(name) for name in system.sensing.channel_names],
         **_shaft_sensors(read_dataset_options(config), system),
-        **({"torque_of": system.torque_of} if system.torque_of else {}),
+        **torque_of,
         "class_names": list(config["plan"]["classes"]),
         "n_teeth_pinion": pair.pinion.n_teeth,
         "n_teeth_wheel": pair.wheel.n_teeth,

@@ -1,4 +1,4 @@
-"""How large a data set will be and how long it will take, from a few records made now."""
+"""Predicted size and time of a data set, from a few records made now."""
 
 from __future__ import annotations
 
@@ -19,8 +19,7 @@ from gensig.plan.notes import n_different
 from gensig.production.folder import block_length, open_shard
 from gensig.record.simulate import Record, forget_twins, simulate_records
 
-# Bytes beside shards and plan: index, cards and configuration; more for each shard, record
-# (splits) and class (figure).
+# Bytes of index, cards and configuration; more for each shard, record (splits) and class (figure).
 BESIDE, BESIDE_A_SHARD, BESIDE_A_RECORD, BESIDE_A_CLASS = 42_000, 3_000, 380, 40_000
 
 CLOSING = 2.0  # s for index, cards and figures, most of it the import of matplotlib
@@ -43,7 +42,7 @@ def predict(
 
     Parameters
     ----------
-    on_plan : called with the plan and the number of records that will be made, before the first of them is
+    on_plan : called with the plan and the number of records, before the first is made
     """
     started = time.process_time()  # what a process spends before its first record
     begin = time.monotonic()
@@ -56,19 +55,20 @@ def predict(
     simulate_records(config, probe[:1])  # compiles, or loads what was compiled
     workers = min(_n_processes(config), table.n_shards)
     # Workers import once more what this process has imported, and load what was compiled.
-    start_up = (
-        planning + started * (1 if workers == 1 else 2) + time.monotonic() - begin
-    )
+    n_imports = min(workers, 2)
+    start_up = planning + started * n_imports + time.monotonic() - begin
     forget_twins()
     begin = time.monotonic()
     records = simulate_records(config, probe)
     _warn_of_failed(records)
     n_bytes = _stored_bytes(config, table, records)
     seconds = time.monotonic() - begin
-    rounds = math.ceil(table.n_shards / workers)
+    rounds: float = math.ceil(table.n_shards / workers)
     whole = seconds * max(table.shard_sizes()) / len(probe)
     spread = table.n_records / max(table.shard_sizes()) / workers
-    total = start_up + CLOSING + whole * (rounds if rounds < 2 * spread else spread)
+    if rounds >= 2 * spread:
+        rounds = spread
+    total = start_up + CLOSING + whole * rounds
     classes = Counter(str(name) for name in table.columns["label_name"])
     return {
         "records": f"{table.n_records}",
@@ -81,8 +81,8 @@ def predict(
         "repeats": f"{config['plan']['n_repeats']}",
         "shards": f"{table.n_shards} of at most {max(table.shard_sizes())} records",
         "bytes": f"{n_bytes:,} ({n_bytes / 1e6:.3g} MB)",
-        "time": f"about {max(1, round(total))} s on {workers} worker(s), from {seconds / len(probe):.3g} s a record "
-        "measured now",
+        "time": f"about {max(1, round(total))} s on {workers} worker(s), "
+        f"from {seconds / len(probe):.3g} s a record measured now",
     }
 
 
@@ -94,7 +94,8 @@ def _warn_of_failed(records: Sequence[Record]) -> None:
     ]
     if reasons:
         warnings.warn(
-            f"{len(reasons)} of {len(records)} records made to time the plan failed: {commonest(reasons)}",
+            f"{len(reasons)} of {len(records)} records made to time the plan failed: "
+            f"{commonest(reasons)}",
             FailedRecordsWarning,
             stacklevel=3,
         )
@@ -108,7 +109,7 @@ def _n_processes(config: Configuration) -> int:
 
 
 def _stored_bytes(config: Configuration, table: Plan, records: list[Record]) -> int:
-    """Bytes of all files, from two shards of different length and what is usual beside them."""
+    """Bytes of all files, from two shards of different length and usual sizes of the others."""
     params = [
         name.removeprefix("params/")
         for name in table.columns
@@ -122,7 +123,9 @@ def _stored_bytes(config: Configuration, table: Plan, records: list[Record]) -> 
                     writer.write(row, record.signals, record.values)
             sizes.append(writer.n_bytes)
     one, many = sizes
-    per_record = (many - one) / (len(records) - 1) if len(records) > 1 else one
+    per_record: float = one
+    if len(records) > 1:
+        per_record = (many - one) / (len(records) - 1)
     shards = table.n_shards * (one - per_record) + table.n_records * per_record
     n_classes = len(config["plan"]["classes"])
     beside = (

@@ -1,4 +1,4 @@
-"""Records of a finished data set made once more, from what it records of them alone."""
+"""Records of a finished data set made once more from their recorded parameters."""
 
 from __future__ import annotations
 
@@ -25,29 +25,25 @@ from gensig.record.inputs import InputReader, simulate_motions
 from gensig.record.simulate import Record, simulate_record, simulate_records
 
 ACCEPTED = 1e-6  # of a record's RMS, where the processor or a library is another
-DECIDING = (
-    "cpu_model",
-    "python",
-    "numpy",
-    "scipy",
-    "numba",
-)  # facts of an environment that bits may depend on
+# facts of an environment that bits may depend on
+DECIDING = ("cpu_model", "python", "numpy", "scipy", "numba")
 BLOCK = 16  # records simulated at a time
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reproduction:
-    """What came of making records again.
+    """Comparison of records with those made once more.
 
     Parameters
     ----------
-    n_records : int          records made again
-    n_equal : int            of them, those with the same bits
-    n_failed : int           of them, those that failed and failed again for the same reason: they hold no signal
-    largest : float          largest difference of a sample over its channel's RMS; inf where one failed and one did not
-    worst : str              the record that has it, '' when all are equal
+    n_records : int          records made
+    n_equal : int            records with the same bits
+    n_failed : int           records that failed both times for the same reason, without signal
+    largest : float          largest difference of a sample over its channel's RMS; inf where only
+                             one of both failed
+    worst : str              the record with that difference, '' when all are equal
     n_refused : int          records that differ by more than is accepted
-    other : dict             deciding facts of the environment that differ: recorded and present value
+    other : dict             differing facts of the environment: recorded and present value
     """
 
     n_records: int
@@ -60,15 +56,15 @@ class Reproduction:
 
 
 def reproduce(folder: Path, n_records: int) -> Reproduction:
-    """Simulate records spread over a data set again and compare their samples with those on disk.
+    """Simulate records spread over a data set and compare their samples with those on disk.
 
     In the environment that made the data set every bit must agree. On another processor, or with
-    other versions of the libraries, ``ACCEPTED`` of the record's RMS is, and one count more where
-    samples are stored as counts.
+    other versions of the libraries, a difference of ``ACCEPTED`` of the record's RMS is accepted,
+    and one count more where samples are stored as counts.
 
     Raises
     ------
-    DatasetError    for a folder of another version of gensig, one that was changed, or one that is not finished
+    DatasetError    for a folder of another version of gensig, changed, or not finished
     """
     manifest, config, plan = _finished(folder)
     here = environment()
@@ -78,11 +74,8 @@ def reproduce(folder: Path, n_records: int) -> Reproduction:
         for name in DECIDING
         if recorded[name] != str(here[name])
     }
-    chosen = np.unique(
-        np.linspace(0, plan.n_records - 1, min(n_records, plan.n_records))
-        .round()
-        .astype(int)
-    )
+    n_made = min(n_records, plan.n_records)
+    chosen = np.unique(np.linspace(0, plan.n_records - 1, n_made).round().astype(int))
     differences: dict[str, float] = {}
     refused, n_failed = 0, 0
     for start in range(0, len(chosen), BLOCK):
@@ -114,7 +107,8 @@ def recorded_row(folder: Path, record: str) -> tuple[Configuration, dict[str, An
     if record.isdecimal() and int(record) < plan.n_records:
         return config, plan.record(int(record))
     raise ConfigError(
-        f"--record {record}: {folder} has records 0 to {plan.n_records - 1}, ids {ids[0]} to {ids[-1]}"
+        f"--record {record}: {folder} has records 0 to {plan.n_records - 1}, "
+        f"ids {ids[0]} to {ids[-1]}"
     )
 
 
@@ -170,9 +164,7 @@ def _finished(folder: Path) -> tuple[Manifest, Configuration, Plan]:
 def _difference(
     folder: Path, row: Mapping[str, Any], record: Record
 ) -> tuple[float, float]:
-    """Largest difference of a sample over the RMS of its channel, and what one count is on that
-    scale.
-    """
+    """Largest difference of a sample over the RMS of its channel, and one count on that scale."""
     path, place = shard_path(folder, int(row["shard"])), int(row["row"])
     largest, count = 0.0, 0.0
     with open_shard(path, folder=folder) as file:
@@ -180,49 +172,42 @@ def _difference(
         if failed != (record.values.get("status") == "failed"):
             return np.inf, 0.0
         if failed:
-            reasons = [
-                stored_reason(record.values["status_reason"]),
-                str(read_rows(file["status_reason"])[place]),
-            ]
-            return (
-                0.0 if len(set(map(without_numbers, reasons))) == 1 else np.inf
-            ), 0.0
+            made_reason = without_numbers(stored_reason(record.values["status_reason"]))
+            reason = str(read_rows(file["status_reason"])[place])
+            if made_reason != without_numbers(reason):
+                return np.inf, 0.0
+            return 0.0, 0.0
         for name, scale_name in SCALES.items():
             if name not in file:
                 continue
             stored, made = read_signal(file, name, place), record.signals[name]
             if file[name].dtype.kind == "i":
                 counts, scale = quantized(made)
-                made = np.multiply(counts, scale[:, None], dtype=np.float64).astype(
-                    np.float32
-                )
-                count = float(
-                    np.max(np.asarray(file[scale_name][place]) / _rms(stored))
-                )
+                wide = np.multiply(counts, scale[:, None], dtype=np.float64)
+                made = wide.astype(np.float32)
+                stored_scale = np.asarray(file[scale_name][place])
+                count = float(np.max(stored_scale / _rms(stored)))
             if _sha256(stored) != _sha256(made):
                 wide = stored.astype(np.float64)
-                largest = max(
-                    largest, float(np.max(np.abs(wide - made) / _rms(wide)[:, None]))
-                )
-        for name in [
-            name for name in record.signals if name in file and name not in SCALES
-        ]:
-            largest = max(
-                largest, _other_difference(file[name][place], record.signals[name])
-            )
+                difference = np.max(np.abs(wide - made) / _rms(wide)[:, None])
+                largest = max(largest, float(difference))
+        for name, values in record.signals.items():
+            if name in file and name not in SCALES:
+                largest = max(largest, _other_difference(file[name][place], values))
     return largest, count
 
 
 def _other_difference(stored: NDArray[Any], made: NDArray[Any]) -> float:
-    """Largest difference of anything else over the RMS of its values.
+    """Largest difference of other arrays over the RMS of their values.
 
     Infinite where whole numbers differ.
     """
     made = made.astype(stored.dtype)
-    if stored.dtype.kind in "iu":
-        return 0.0 if np.array_equal(stored, made) else np.inf
-    if np.array_equal(stored, made, equal_nan=True):
+    is_whole = stored.dtype.kind in "iu"
+    if np.array_equal(stored, made, equal_nan=not is_whole):
         return 0.0
+    if is_whole:
+        return np.inf
     wide = stored.astype(np.float64).reshape(1, -1)
     return float(np.max(np.abs(wide - made.reshape(1, -1)) / _rms(wide)))
 
@@ -234,6 +219,5 @@ def _rms(signal: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def _sha256(samples: NDArray[np.float32]) -> str:
-    return hashlib.sha256(
-        np.ascontiguousarray(samples, dtype="<f4").tobytes()
-    ).hexdigest()
+    content = np.ascontiguousarray(samples, dtype="<f4").tobytes()
+    return hashlib.sha256(content).hexdigest()

@@ -1,6 +1,6 @@
-"""A data set that is never stored.
+"""Streams: records of a data set that are simulated on demand and never stored.
 
-Its records, made when they are asked for, bit for bit those of ``generate``.
+Their bits are those of ``generate``.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from gensig.plan.make import make_plan
 from gensig.record.options import read_dataset_options
 from gensig.record.simulate import Record, simulate_records
 
-EPOCH_STREAM = 9100  # spawn key of the seeds of later epochs; the causes of a record and the splits have others
+# Spawn key of the seeds of later epochs. The causes of a record and the splits have others.
+EPOCH_STREAM = 9100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class RecordStream:
-    """The records of one plan, or a part of them, simulated while one iterates; made by
-    ``gensig.stream``.
+    """The records of one plan, or a part of them, simulated in a loop; made by ``gensig.stream``.
 
     Holds plain data only, so that it can be pickled, forked and spawned. A record has ``signals``
     and ``values`` by the names that a shard has, every column and array with the bits that
@@ -67,9 +67,9 @@ class RecordStream:
     def channels(self) -> list[str]:
         """Names along the channel axis."""
         sensing = self.config["sensing"]
-        return list(
-            sensing["channels"] if sensing["sensors"] is None else sensing["sensors"]
-        )
+        if sensing["sensors"] is None:
+            return list(sensing["channels"])
+        return list(sensing["sensors"])
 
     channel_names = channels  # as a stored data set calls them
 
@@ -87,10 +87,7 @@ class RecordStream:
 
     @property
     def usable(self) -> NDArray[np.bool_]:
-        """(record,) True: which records fail is known only when they are made.
-
-        See their ``status``.
-        """
+        """(record,) True; records that fail are known only when they are made, by ``status``."""
         return np.ones(len(self), dtype=bool)
 
     @property
@@ -112,8 +109,9 @@ class RecordStream:
         return sorted(make_splits(self.plan, self.seed))
 
     def split(self, protocol: str) -> dict[str, list[tuple[int, float, float]]]:
-        """Subset -> list of (place in this part, start_fraction, stop_fraction), as the stored
-        data set has it.
+        """Subset -> list of (index in this part, start_fraction, stop_fraction).
+
+        It is that of the stored data set.
         """
         tables = make_splits(self.plan, self.seed)
         if protocol not in tables:
@@ -122,38 +120,31 @@ class RecordStream:
             )
             raise DatasetError(f"split {protocol!r} does not exist; {reason}")
         table = tables[protocol]
-        places = {
-            name: place for place, name in enumerate(self.column("record_id").tolist())
-        }
+        indices = {name: k for k, name in enumerate(self.column("record_id").tolist())}
         rows: dict[str, list[tuple[int, float, float]]] = {
             subset: [] for subset in SUBSETS
         }
-        columns = (
-            table.record_id,
-            table.start_fraction,
-            table.stop_fraction,
-            table.subset,
+        windows = zip(
+            table.record_id.tolist(),
+            table.start_fraction.tolist(),
+            table.stop_fraction.tolist(),
+            table.subset.tolist(),
+            strict=True,
         )
-        for name, start, stop, subset in zip(
-            *(column.tolist() for column in columns), strict=True
-        ):
-            if name in places:
-                rows[subset].append((places[name], float(start), float(stop)))
+        for name, start, stop, subset in windows:
+            if name in indices:
+                rows[subset].append((indices[name], float(start), float(stop)))
         return rows
 
     def take(self, places: ArrayLike) -> RecordStream:
-        """Some records of this part: (record,) places in it, or True for each that is meant."""
+        """Some records of this part: (record,) indices in it, or True for each chosen one."""
         chosen = np.asarray(places)
-        return replace(
-            self,
-            numbers=self.numbers[
-                chosen if chosen.dtype == bool else chosen.astype(np.int64)
-            ],
-        )
+        if chosen.dtype != bool:
+            chosen = chosen.astype(np.int64)
+        return replace(self, numbers=self.numbers[chosen])
 
     def shard(self, index: int, count: int) -> RecordStream:
-        """The part of worker ``index`` of ``count``; together they are the whole, and no record
-        is in two of them.
+        """The part of worker ``index`` of ``count``; the parts are disjoint and together the whole.
 
         Conditions are dealt in turn, each whole: its records share the simulation of their
         healthy twin.
@@ -198,8 +189,9 @@ class RecordStream:
 
 
 def open_stream(config: Configuration, *, epoch: int = 0) -> RecordStream:
-    """All records of a composed configuration; ``out``, ``executor`` and how samples are stored
-    change nothing.
+    """All records of a composed configuration.
+
+    ``out``, ``executor`` and the storage of samples change nothing.
 
     Raises
     ------
@@ -216,7 +208,7 @@ def open_stream(config: Configuration, *, epoch: int = 0) -> RecordStream:
 def epoch_seed(seed: int, epoch: int) -> int:
     """Seed of one epoch, a whole number that every JSON reader takes exactly.
 
-    See ``RecordStream``.
+    See `RecordStream`.
     """
     if whole_number("epoch", epoch, at_least=0) == 0:
         return seed
@@ -229,14 +221,12 @@ def _at_epoch(config: Configuration, epoch: int) -> Configuration:
 
 
 def _simulate(config: Configuration, rows: Sequence[Mapping[str, Any]]) -> list[Record]:
-    """Records of some rows of a plan: the one place where this module simulates."""
+    """Records of some rows of a plan; nothing else in this module simulates."""
     return [_as_stored(record) for record in simulate_records(config, rows)]
 
 
 def _as_stored(record: Record) -> Record:
-    """The record with the values that a shard fills in, and its reason as long as a shard holds
-    it.
-    """
+    """The record with the values that a shard fills in, and its reason cut as in a shard."""
     values = {**DEFAULTS, **record.values}
     values["status_reason"] = stored_reason(values["status_reason"])
     return replace(record, values=values)

@@ -1,4 +1,4 @@
-"""Everything that one record needs, made in one place from a row of the plan.
+"""Inputs of a record, made from its row of the plan.
 
 ``docs/architecture.md`` follows one record from its row to its samples.
 """
@@ -77,24 +77,17 @@ class RecordNumbers:
 
     @classmethod
     def of(cls, row: Row) -> RecordNumbers:
-        """The numbers that the ids of a row end in, such as 3 of ``gearbox-0003`` and 7 of
-        ``r000007``.
-        """
-        return cls(
-            **{
-                name: _number(row[f"{name}_id"])
-                for name in (RECORD, CONDITION, GEARBOX, SPECIMEN)
-            }
-        )
-
-
-def _number(identifier: Any) -> int:
-    return int(str(identifier).rpartition("-")[2].lstrip("r"))
+        """Numbers at the ends of a row's ids, such as 3 of ``gearbox-0003``, 7 of ``r000007``."""
+        numbers = {}
+        for name in (RECORD, CONDITION, GEARBOX, SPECIMEN):
+            digits = str(row[f"{name}_id"]).rpartition("-")[2]
+            numbers[name] = int(digits.lstrip("r"))
+        return cls(**numbers)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RecordInputs:
-    """Everything that one record needs, drawn from streams of its own.
+    """Inputs of one record, drawn from its own random streams.
 
     Attributes
     ----------
@@ -133,19 +126,13 @@ class RecordInputs:
 
         It starts as no row of the plan decides.
         """
-        run = replace(
-            self.run,
-            faults=(),
-            tell_mesh=False,
-            start=twin_start(self.machine, self.stream(Stream.TWIN)),
-        )
-        return replace(self, run=run, is_reference=True)
+        start = draw_start(self.machine, self.stream(Stream.TWIN))
+        return replace(self.without_faults().from_start(start), is_reference=True)
 
     def nuisance_streams(
         self,
     ) -> tuple[dict[str, np.random.Generator], np.random.Generator]:
-        """Generators of the nuisances of gearbox and specimen, and of the angles that no tooth
-        fixes.
+        """Generators of the nuisances of gearbox and specimen, and of the free angles.
 
         Those angles are drawn for the record. Those of the twin are drawn for its condition, so
         that they do not depend on which record asks for it first.
@@ -154,8 +141,9 @@ class RecordInputs:
             level: stream(self.seed, Stream.NUISANCE, getattr(self.numbers, level))
             for level in (GEARBOX, SPECIMEN)
         }
-        cause = Stream.TWIN if self.is_reference else Stream.NUISANCE_RECORD
-        return units, self.stream(cause)
+        if self.is_reference:
+            return units, self.stream(Stream.TWIN)
+        return units, self.stream(Stream.NUISANCE_RECORD)
 
     def clean(self, acceleration: Array) -> Array:
         """Output of the sensors before noise, their drift included, (sensor, sample) m/s2."""
@@ -205,24 +193,20 @@ class RecordInputs:
 def simulate_motions(
     inputs: Sequence[RecordInputs],
 ) -> list[CleanRecord | SimulationError]:
-    """Accelerations at the bearings, nuisances included, side by side; an error in place of a
-    failed one.
+    """Accelerations at the bearings, nuisances included; an error for each failed record.
 
-    A record's bits do not depend on what it is simulated beside.
+    The bits of a record do not depend on the others of the call.
     """
-    runs = {
-        id(each.run): each.run for each in inputs
-    }  # a twin may share the run of a sound record
+    # A twin may share the run of a sound record.
+    runs = {id(each.run): each.run for each in inputs}
     results = dict(zip(runs, simulate_with_lead_in(list(runs.values())), strict=True))
-    return [_with_nuisances(each, results[id(each.run)]) for each in inputs]
-
-
-def _with_nuisances(
-    inputs: RecordInputs, result: CleanRecord | SimulationError
-) -> CleanRecord | SimulationError:
-    if isinstance(result, SimulationError) or not inputs.machine.sensing.nuisances:
-        return result
-    return with_nuisances(inputs.run, result, *inputs.nuisance_streams())
+    motions = []
+    for each in inputs:
+        motion = results[id(each.run)]
+        if isinstance(motion, CleanRecord) and each.machine.sensing.nuisances:
+            motion = with_nuisances(each.run, motion, *each.nuisance_streams())
+        motions.append(motion)
+    return motions
 
 
 class InputReader:
@@ -251,33 +235,30 @@ class InputReader:
             tooth_wheel=int(row["start_tooth_wheel"]),
             phase=float(row["start_phase"]),
         )
+        faults: tuple[Fault, ...] = ()
+        if not self.plan.sham:
+            faults = tuple(row_faults(row))
+        pair, gearbox = machine.pair, numbers.gearbox
         run = Run(
             system=machine,
-            faults=() if self.plan.sham else tuple(row_faults(row)),
+            faults=faults,
             start=start,
             specimen=_specimen(
-                seed,
-                numbers.specimen,
-                machine.pair.pinion,
-                machine.pair.wheel,
-                machine.quality,
+                seed, numbers.specimen, pair.pinion, pair.wheel, machine.quality
             ),
-            gearbox=_gearbox(seed, numbers.gearbox, machine),
+            gearbox=_gearbox(seed, gearbox, machine),
             tell_mesh=self.dataset.store_mesh_state,
-            discs=machine.draw_discs(
-                stream(seed, Stream.TOOTHED_WHEEL, numbers.gearbox)
-            ),
+            discs=machine.draw_discs(stream(seed, Stream.TOOTHED_WHEEL, gearbox)),
         )
-        generators = (
-            stream(seed, cause, numbers.gearbox)
-            for cause in (Stream.PATH, Stream.SENSOR)
-        )
-        instrument = draw_instrument(machine.sensing, *generators)
         return RecordInputs(
             seed=seed,
             numbers=numbers,
             run=run,
-            instrument=instrument,
+            instrument=draw_instrument(
+                machine.sensing,
+                stream(seed, Stream.PATH, gearbox),
+                stream(seed, Stream.SENSOR, gearbox),
+            ),
             dataset=self.dataset,
         )
 
@@ -300,24 +281,19 @@ def row_values(row: Row) -> dict[str, float]:
 
 def row_faults(row: Row) -> list[Fault]:
     """Faults of one row of a plan."""
-    return [
-        fault
-        for part in json.loads(str(row["faults_json"]))
-        for fault in read_faults(part, "faults_json")
-    ]
+    faults: list[Fault] = []
+    for part in json.loads(str(row["faults_json"])):
+        faults += read_faults(part, "faults_json")
+    return faults
 
 
-def twin_start(machine: Machine, rng: np.random.Generator) -> Start:
-    """Start of the healthy twin of a unit at a condition.
-
-    ``rng`` is the condition's stream TWIN.
-    """
+def draw_start(machine: Machine, rng: np.random.Generator) -> Start:
+    """Random start of a record: teeth in mesh and phase at the first sample."""
     tooth = int(rng.integers(machine.pair.pinion.n_teeth))
+    mate = int(rng.integers(machine.pair.wheel.n_teeth))
     return Start(
         tooth_pinion=tooth,
-        tooth_wheel=machine.driven_tooth(
-            tooth, int(rng.integers(machine.pair.wheel.n_teeth))
-        ),
+        tooth_wheel=machine.driven_tooth(tooth, mate),
         phase=float(rng.random()),
     )
 

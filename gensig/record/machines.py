@@ -1,4 +1,4 @@
-"""The machine of a configuration, whatever it is: a gear pair, or an engine on its drive line."""
+"""The machine of a configuration: a gear pair, or an engine on its drive line."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from gensig.systems.registry import LINE, read_system
 
 
 def read_machine(config: Configuration) -> Machine:
-    """Build what ``system.kind`` names.
+    """Machine that ``system.kind`` names.
 
     Raises
     ------
@@ -16,8 +16,6 @@ def read_machine(config: Configuration) -> Machine:
     """
     if config.section("system").get("kind") != LINE:
         return read_system(config)
-    from gensig.driveline.reading import (
-        read_line_machine,
-    )
+    from gensig.driveline.reading import read_line_machine
 
     return read_line_machine(config)

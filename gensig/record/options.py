@@ -41,7 +41,7 @@ class DatasetOptions:
 
     @property
     def needs_sound_records(self) -> bool:
-        """Whether every faulty record is simulated without its fault too."""
+        """True where every faulty record is simulated without its fault too."""
         return self.store_detectability or self.store_healthy_twin
 
 
@@ -91,7 +91,7 @@ class PlanOptions:
 
     @property
     def is_grid(self) -> bool:
-        """Whether every unit runs every combination of levels."""
+        """True where every unit runs every combination of levels."""
         return self.design == GRID
 
 

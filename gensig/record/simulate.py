@@ -1,7 +1,4 @@
-"""One record.
-
-From a row of the plan to arrays and values, by the configuration and the row alone.
-"""
+"""Simulation of records: rows of the plan to arrays and values."""
 
 from __future__ import annotations
 
@@ -53,9 +50,9 @@ def simulate_record(config: Configuration, row: Row) -> Record:
 
 
 def simulate_records(config: Configuration, rows: Sequence[Row]) -> list[Record]:
-    """Simulate rows of a plan side by side, with the healthy twins that their noise is set by.
+    """Simulate rows of a plan together with the healthy twins that set their noise.
 
-    A record's bits do not depend on what it is simulated beside. A motion that does not stay finite
+    The bits of a record do not depend on the other rows. A motion that does not stay finite
     becomes a record marked as failed.
     """
     reader = InputReader(config)
@@ -64,45 +61,39 @@ def simulate_records(config: Configuration, rows: Sequence[Row]) -> list[Record]
     twins = _missing_twins(inputs, keys)
     sound: dict[int, RecordInputs] = {}
     if reader.dataset.needs_sound_records:
-        sound = {
-            index: each.without_faults()
-            for index, each in enumerate(inputs)
-            if each.run.faults
-        }
-    motions = simulate_motions([*inputs, *twins.values(), *sound.values()])
-    of_records, others = motions[: len(inputs)], motions[len(inputs) :]
-    of_sound = dict(zip(sound, others[len(twins) :], strict=True))
-    _keep_twins(
-        keys,
-        {key: (twins[key], motion) for key, motion in zip(twins, others, strict=False)},
-    )
-    records = []
-    for index, (row, each, motion) in enumerate(
-        zip(rows, inputs, of_records, strict=True)
-    ):
-        without_faults = (
-            of_sound.get(index, motion) if reader.dataset.needs_sound_records else None
+        faulty = (k for k, each in enumerate(inputs) if each.run.faults)
+        sound = {index: inputs[index].without_faults() for index in faulty}
+    motions = iter(simulate_motions([*inputs, *twins.values(), *sound.values()]))
+    of_records = [next(motions) for _ in inputs]
+    _keep_twins(keys, {key: (twin, next(motions)) for key, twin in twins.items()})
+    of_sound = dict(zip(sound, motions, strict=True))
+    return [
+        _record(
+            config,
+            row,
+            _Measured(
+                inputs=inputs[index],
+                motion=of_records[index],
+                sound=of_sound.get(index, of_records[index]),
+                twin_power=_TWINS.get(keys[index]),
+            ),
         )
-        power = _TWINS.get(keys[index])
-        measured = _Measured(
-            inputs=each, motion=motion, sound=without_faults, twin_power=power
-        )
-        records.append(_record(config, row, measured))
-    return records
+        for index, row in enumerate(rows)
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Measured:
     """A simulated motion with what its record is made of.
 
-    ``sound`` is the motion of the same record without its faults, None where it is not needed;
-    ``twin_power`` the power of the healthy twin at the sensors, None where noise does not follow
-    it.
+    ``sound`` is the motion of the same record without its faults, the motion itself where it has
+    none or is not asked for. ``twin_power`` is the power of the healthy twin at the sensors, None
+    where noise does not follow it.
     """
 
     inputs: RecordInputs
     motion: CleanRecord | SimulationError
-    sound: CleanRecord | SimulationError | None
+    sound: CleanRecord | SimulationError
     twin_power: Array | SimulationError | None
 
     def noise_power(self, signal: Array) -> Array:
@@ -114,11 +105,9 @@ class _Measured:
         sensing = instrument.sensing
         if sensing.snr is None:
             return np.zeros(len(signal))
-        reference = (
-            instrument.power(signal)
-            if sensing.snr_reference != "healthy_twin"
-            else self.twin_power
-        )
+        reference = self.twin_power
+        if sensing.snr_reference != "healthy_twin":
+            reference = instrument.power(signal)
         if isinstance(reference, SimulationError):
             raise reference
         assert reference is not None
@@ -131,7 +120,6 @@ class _Measured:
         """
         if isinstance(self.sound, SimulationError):
             raise self.sound
-        assert self.sound is not None
         clean = self.inputs.instrument.measure(self.sound.acceleration)
         return self.inputs.noisy_twin(clean, self.noise_power(clean))
 
@@ -142,19 +130,20 @@ def _record(config: Configuration, row: Row, measured: _Measured) -> Record:
         record = _finished(measured)
     except SimulationError as error:
         record = _failed(measured, error)
-    motion = measured.motion if isinstance(measured.motion, CleanRecord) else None
     dataset, machine = measured.inputs.dataset, measured.inputs.machine
     n_samples = _n_samples(machine)
+    motion, state, angle = None, None, np.full(n_samples, MISSING)
+    if isinstance(measured.motion, CleanRecord):
+        motion = measured.motion
+        state, angle = motion.mesh, motion.shaft_angle
     signals = {**record.signals, "fault_multihot": _multihot(config, row)}
     if dataset.store_operating:
-        angle = np.full(n_samples, MISSING) if motion is None else motion.shaft_angle
         rate = machine.sensing.sampling_rate
         signals |= operating_signals(
             machine.operating, rate, angle, machine.load_exponent
         )
     signals |= measured.inputs.shaft_signals(motion)
     if dataset.store_mesh_state:
-        state = None if motion is None else motion.mesh
         signals |= mesh_signals(state, n_samples, machine.most_pairs)
     columns = {key: value for key, value in row.items() if key not in ("shard", "row")}
     return Record(signals=signals, values={**columns, **record.values})
@@ -179,13 +168,9 @@ def _finished(measured: _Measured) -> Record:
         "integration_check": motion.integration_check,
         **conversion,
     }
-    sound = measured.sound
-    if (
-        dataset.store_detectability
-        and sensing.has_white_noise
-        and isinstance(sound, CleanRecord)
-    ):
-        residual = clean - inputs.clean(sound.acceleration)
+    is_judged = dataset.store_detectability and sensing.has_white_noise
+    if is_judged and isinstance(measured.sound, CleanRecord):
+        residual = clean - inputs.clean(measured.sound.acceleration)
         values["detectability"] = detectability(residual, noise_power)
     source = motion.acceleration[:, sensing.n_lead :]
     return Record(
@@ -246,21 +231,22 @@ def signal_shapes(
     """Shape of every array of one record, by signal name."""
     dataset = read_dataset_options(config)
     n_channels, n_samples = len(machine.sensing.channel_names), _n_samples(machine)
+    sensors, samples = (n_channels, n_samples), (n_samples,)
     shapes: dict[str, tuple[int, ...]] = {
-        "acceleration": (n_channels, n_samples),
+        "acceleration": sensors,
         "fault_multihot": (len(config["plan"]["classes"]),),
         "signal_power": (n_channels,),
         "noise_power": (n_channels,),
     }
     if dataset.store_clean:
-        shapes["acceleration_clean"] = (n_channels, n_samples)
+        shapes["acceleration_clean"] = sensors
     if dataset.store_healthy_twin:
-        shapes["healthy_twin"] = (n_channels, n_samples)
+        shapes["healthy_twin"] = sensors
     if dataset.store_source:
         shapes["acceleration_source"] = (len(machine.sensing.channels), n_samples)
     if dataset.store_operating:
-        shapes |= {"shaft_speed": (n_samples,), "torque_set": (n_samples,)}
-    shapes |= dict.fromkeys(dataset.shaft_signals, (n_samples,))
+        shapes |= {"shaft_speed": samples, "torque_set": samples}
+    shapes |= dict.fromkeys(dataset.shaft_signals, samples)
     if dataset.store_mesh_state:
         state = mesh_signals(None, n_samples, machine.most_pairs)
         shapes |= {name: values.shape for name, values in state.items()}
@@ -270,7 +256,7 @@ def signal_shapes(
 def _multihot(config: Configuration, row: Row) -> NDArray[np.int8]:
     """1 for the record's class and, where its fault is compound, for the classes of its parts."""
     parts = json.loads(str(row["faults_json"]))
-    kinds = {part["kind"] for part in parts} if len(parts) > 1 else set()
+    kinds = {part["kind"] for part in parts if len(parts) > 1}
     classes = config["classes"]
     present = [
         label == int(row["label"]) or classes[name]["kind"] in kinds
@@ -306,11 +292,8 @@ def _missing_twins(
     shared: dict[TwinKey, RecordInputs] = {}
     for each, key in zip(inputs, keys, strict=True):
         sensing = each.machine.sensing
-        if (
-            sensing.snr is None
-            or sensing.snr_reference != "healthy_twin"
-            or key in _TWINS
-        ):
+        follows_twin = sensing.snr_reference == "healthy_twin"
+        if sensing.snr is None or not follows_twin or key in _TWINS:
             continue
         twin = each.healthy_twin()
         twins.setdefault(key, twin)
@@ -328,8 +311,10 @@ def _keep_twins(
     _TWINS.clear()
     _TWINS.update(known)
     for key, (inputs, motion) in simulated.items():
+        power: Array | SimulationError
         if isinstance(motion, SimulationError):
-            _TWINS[key] = motion
+            power = motion
         else:
-            instrument = inputs.instrument
-            _TWINS[key] = instrument.power(instrument.measure(motion.acceleration))
+            measured = inputs.instrument.measure(motion.acceleration)
+            power = inputs.instrument.power(measured)
+        _TWINS[key] = power

@@ -1,6 +1,4 @@
-"""Depth of wear at which the vibration of a machine reaches a limit, from clean records of worn
-flanks.
-"""
+"""Depth of wear at which the vibration of a machine reaches a limit."""
 
 from __future__ import annotations
 
@@ -37,15 +35,13 @@ ROW = {
     "faults_json": "[]",
 }
 N_LOOKS = 17  # at equal shares of the life to the threshold, new flanks and its end among them
-MOST_STEPS = (
-    10  # further records between the first look that is at the limit and the one before
-)
+MOST_STEPS = 10  # further records between the two looks around the limit
 TOLERANCE = 2e-3  # of the life to the threshold
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class WornVibration:
-    """How a machine shakes as its flanks wear.
+    """Vibration of a machine over the wear of its flanks.
 
     Parameters
     ----------
@@ -53,7 +49,8 @@ class WornVibration:
     turns : (look,) of the pinion, ascending from 0
     depth : (look,) m             by the criterion of the wear
     rms : (look, sensor) m/s2     of the clean record, without its mean
-    limit_depth : depth at which the limit is reached, m; None where the life to the threshold ends below it
+    limit_depth : depth at which the limit is reached, m; None where the life to the threshold ends
+        below it
     """
 
     sensors: tuple[str, ...]
@@ -81,24 +78,22 @@ class _Bench:
         return self.sound.machine
 
     @property
-    def heard(self) -> list[int]:
+    def sensors(self) -> list[int]:
         """Numbers of the sensors that give m/s2."""
         names = self.machine.sensing.channel_names
-        return [
-            sensor for sensor, name in enumerate(names) if channel_unit(name) == "m/s^2"
-        ]
+        return [k for k, name in enumerate(names) if channel_unit(name) == "m/s^2"]
 
     def rms(self, depths: Sequence[Array]) -> Array:
         """RMS of clean records with (2, slice, node) m off the flanks, (depth, sensor) m/s2.
 
         NaN for failed ones.
         """
-        levels = np.full((len(depths), len(self.heard)), np.nan)
+        levels = np.full((len(depths), len(self.sensors)), np.nan)
         motions = simulate_motions([self._worn_by(depth) for depth in depths])
         for k, motion in enumerate(motions):
             if not isinstance(motion, SimulationError):
                 measured = self.sound.instrument.measure(motion.acceleration)
-                levels[k] = np.sqrt(power(measured[self.heard]))
+                levels[k] = np.sqrt(power(measured[self.sensors]))
         return levels
 
     def _worn_by(self, depth: Array) -> RecordInputs:
@@ -116,8 +111,7 @@ class _Bench:
 def limited_by_vibration(
     case: WearCase, config: Configuration
 ) -> tuple[WearCase, WornVibration | None]:
-    """A case whose threshold is the depth at which the machine of its configuration reaches a
-    limit of vibration.
+    """The case with the depth of a limit of vibration as threshold, and the measured course.
 
     The case as it was, and None, where ``wear`` sets no such limit; the case as it was where the
     life to its threshold ends below the limit.
@@ -141,38 +135,33 @@ def limited_by_vibration(
     life = wear_life(case)
     turns = np.linspace(0.0, life.life, N_LOOKS)
     looks = bench.rms([_worn(life, turn) for turn in turns])
-    told = dict(zip(turns.tolist(), looks, strict=True))
+    measured = dict(zip(turns.tolist(), looks, strict=True))
     new = looks[0]
     _require_record(case, life, 0.0, new)
     _require_below(options, new)
 
     def over(turn: float) -> float:
-        if turn not in told:
-            told[turn] = bench.rms([_worn(life, turn)])[0]
-        _require_record(case, life, turn, told[turn])
-        return _share_of_limit(options, told[turn], new) - 1.0
+        if turn not in measured:
+            measured[turn] = bench.rms([_worn(life, turn)])[0]
+        _require_record(case, life, turn, measured[turn])
+        return _share_of_limit(options, measured[turn], new) - 1.0
 
     limit_depth = None
     for before, after in zip(turns[:-1].tolist(), turns[1:].tolist(), strict=True):
         if over(after) >= 0.0:
-            root = float(
-                brentq(
-                    over,
-                    before,
-                    after,
-                    xtol=TOLERANCE * life.life,
-                    maxiter=MOST_STEPS,
-                    disp=False,
-                )
+            tolerance = TOLERANCE * life.life
+            root = brentq(
+                over, before, after, xtol=tolerance, maxiter=MOST_STEPS, disp=False
             )
-            limit_depth = case.judged(_worn(life, root))
+            limit_depth = case.judged(_worn(life, float(root)))
             break
-    ordered = sorted(told)
+    ordered = sorted(measured)
+    names = bench.machine.sensing.channel_names
     course = WornVibration(
-        sensors=tuple(bench.machine.sensing.channel_names[k] for k in bench.heard),
+        sensors=tuple(names[k] for k in bench.sensors),
         turns=np.array(ordered),
         depth=np.array([case.judged(_worn(life, turn)) for turn in ordered]),
-        rms=np.array([told[turn] for turn in ordered]),
+        rms=np.array([measured[turn] for turn in ordered]),
         limit_depth=limit_depth,
     )
     if limit_depth is None:
@@ -186,19 +175,19 @@ def _bench(case: WearCase, config: Configuration) -> _Bench:
     sound = InputReader(config).inputs(ROW)
     sound.machine.check()
     bench = _Bench(sound=sound, case=case)
-    if not bench.heard:
+    if not bench.sensors:
         raise ConfigError(
-            f"sensing.channels = {list(bench.machine.sensing.channels)}: a limit of the vibration is in m/s2; name an "
-            "acceleration, such as pinion_y"
+            f"sensing.channels = {list(bench.machine.sensing.channels)}: a limit of the "
+            "vibration is in m/s2; name an acceleration, such as pinion_y"
         )
     return bench
 
 
 def _worn(life: WearLife, turn: float) -> Array:
     """Depth off both flanks after so many turns, (2, slice, node) m."""
-    place = float(np.interp(turn, life.turns, np.arange(len(life.turns))))
-    low = min(int(place), len(life.turns) - 2)
-    return life.depth[low] + (place - low) * (life.depth[low + 1] - life.depth[low])
+    step = float(np.interp(turn, life.turns, np.arange(len(life.turns))))
+    low = min(int(step), len(life.turns) - 2)
+    return life.depth[low] + (step - low) * (life.depth[low + 1] - life.depth[low])
 
 
 def _share_of_limit(options: WearOptions, rms: Array, new: Array) -> float:
@@ -220,14 +209,14 @@ def _require_below(options: WearOptions, new: Array) -> None:
     limit = options.vibration_limit_m_per_s2
     if limit is not None and new.max() >= limit:
         raise ConfigError(
-            f"wear.vibration_limit_m_per_s2 = {limit:g} is reached by new flanks already: theirs is "
-            f"{new.max():.4g} m/s2 RMS; give more"
+            f"wear.vibration_limit_m_per_s2 = {limit:g} is reached by new flanks already: theirs "
+            f"is {new.max():.4g} m/s2 RMS; give more"
         )
 
 
 def _require_record(case: WearCase, life: WearLife, turn: float, rms: Array) -> None:
     if np.isnan(rms).any():
         raise SimulationError(
-            f"worn {case.judged(_worn(life, turn)) * 1e6:.4g} um deep, the machine makes no record, and no limit was "
-            "reached before; give a smaller wear.threshold_um"
+            f"worn {case.judged(_worn(life, turn)) * 1e6:.4g} um deep, the machine makes no "
+            "record, and no limit was reached before; give a smaller wear.threshold_um"
         )

@@ -1,8 +1,10 @@
-"""The page of a data set, put together: one HTML file that needs nothing else."""
+"""The page of a data set: one HTML file that needs nothing else."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +40,9 @@ from gensig.text.page import Charts, Section, Select, Switch, interactive_page
 SCRIPT = "dataset_report.js"
 REPORT = "report.html"
 MOST_BYTES = 15_000_000
+COMPARED = ("low", "high", "median", "p5", "p95", "verdict")
 MARKS = (
+    ("decibel", "logarithmic", True),
     ("mesh", "mesh harmonics", True),
     ("sidebands", "sidebands", False),
     ("shafts", "shaft orders", False),
@@ -49,7 +53,7 @@ MARKS = (
 def write_report(
     folder: Path, out: Path | None = None, *, per_class: int | None = None
 ) -> tuple[Path, str]:
-    """Write the page of a complete data set; returns its path and one line on what it shows.
+    """Write the page of a complete data set; returns its path and a one-line summary.
 
     Parameters
     ----------
@@ -58,10 +62,10 @@ def write_report(
 
     Raises
     ------
-    ConfigError     for a file that is there already, a folder that is not, or a number of records below 1
+    ConfigError     for a file that exists, a folder that does not, or less than one record
     DatasetError    for a folder that is no data set, incomplete or damaged
     """
-    path = folder / REPORT if out is None else out
+    path = out or folder / REPORT
     if path.exists() or path.is_symlink():
         raise ConfigError(
             f"{path} exists already; remove it, or choose another --out FILE"
@@ -73,18 +77,19 @@ def write_report(
     if per_class is not None and per_class < 1:
         raise ConfigError(f"--records {per_class} must be at least 1")
     with open_dataset(folder) as data:
-        text, said = report_text(data, per_class)
+        text, summary = report_text(data, per_class)
     content = text.encode("utf-8")
     if len(content) > MOST_BYTES:
         raise ConfigError(
-            f"the page would have {len(content) / 1e6:.1f} MB, at most 15 are meant; give fewer --records"
+            f"the page would have {len(content) / 1e6:.1f} MB, at most 15 are meant; "
+            "give fewer --records"
         )
     write_bytes(path, content)
-    return path, f"{said}, {len(content) / 1e6:.1f} MB"
+    return path, f"{summary}, {len(content) / 1e6:.1f} MB"
 
 
 def report_text(data: Dataset, per_class: int | None) -> tuple[str, str]:
-    """The page, and one line on what it shows."""
+    """The page, and a one-line summary."""
     chosen = choose(data, per_class)
     rotation = read_rotation(data)
     units = dict(zip(data.channel_names, tables.channel_units(data), strict=True))
@@ -100,20 +105,26 @@ def report_text(data: Dataset, per_class: int | None) -> tuple[str, str]:
         _signals(data, chosen, rotation, content["examples"]),
         _parameters(data, content["drawn"]),
         _indicators(data, chosen, measured, content["measured"], own_units),
-        *([_lives(content["lives"])] if "lives" in content else []),
+    ]
+    if "lives" in content:
+        sections.append(_lives(content["lives"]))
+    sections += [
         _beside(compared, own_units),
         tables.splits(data),
         *tables.loading(data),
         *tables.provenance(data),
     ]
+    version = plain(data.manifest.generator_version)
     page = interactive_page(
         title=f"Data set {name}",
-        lead=[f"{data.n_records} records of {len(data.class_names)} classes, simulated and labelled by gensig "
-              f"{plain(data.manifest.generator_version)}. This page stands alone: it fetches nothing."],
+        lead=[
+            f"{data.n_records} records of {len(data.class_names)} classes, simulated and "
+            f"labelled by gensig {version}. This page stands alone: it fetches nothing."
+        ],
         sections=sections,
         script=SCRIPT,
         data=content,
-    )  # fmt: skip
+    )
     return page, f"{n_shown} records shown, {len(measured.records)} measured"
 
 
@@ -126,48 +137,73 @@ def _content(
     measured: Measured,
     compared: Sequence[Comparison],
 ) -> dict[str, Any]:
-    """What the script draws."""
+    """Data that the script of the page draws."""
     along = [name for name in ALONG if name in data.column_names]
     table = value_table(data, measured.records, along)
-    table["columns"] |= {
-        name: pack_floats(values) for name, values in measured.values.items()
-    }
+    for name, values in measured.values.items():
+        table["columns"][name] = pack_floats(values)
+    channels = zip(chosen.channels, units, strict=True)
+    indices = chain.from_iterable(chosen.records.values())
     content = {
         "classes": [plain(name) for name in data.class_names],
-        "channels": [{"name": plain(n), "unit": plain(u)} for n, u in zip(chosen.channels, units, strict=True)],
+        "channels": [
+            {"name": plain(name), "unit": plain(unit)} for name, unit in channels
+        ],
         "teeth": rotation.n_teeth,
         "top": usable_top(data),
         "examples": [
-            example(data, index, chosen.channels, rotation) for records in chosen.records.values() for index in records
+            example(data, index, chosen.channels, rotation) for index in indices
         ],
         "drawn": value_table(data, drawn, drawn_columns(data, drawn)),
         "measured": table,
-        "beside": [
-            {"name": f"{one.id}, {one.at}", "low": one.low, "high": one.high, "median": one.median, "p5": one.p5,
-             "p95": one.p95, "verdict": one.verdict} for one in compared
-        ],
-    }  # fmt: skip
+        "beside": [_comparison(comparison) for comparison in compared],
+    }
     if has_lives(data):
         content["lives"] = life_table(data)
     return content
+
+
+def _comparison(comparison: Comparison) -> dict[str, Any]:
+    values = {key: getattr(comparison, key) for key in COMPARED}
+    return {"name": f"{comparison.id}, {comparison.at}", **values}
+
+
+def _choice(
+    name: str, label: str, options: Sequence[tuple[str, str]], chosen: str = ""
+) -> Select:
+    """A drop-down of one group of (value, text)."""
+    return Select(name=name, label=label, groups=[("", options)], chosen=chosen)
+
+
+def _channel_choice(chosen: Choice) -> Select:
+    """The drop-down of channels; that of the data card's figures is shown first."""
+    options = [(str(k), plain(name)) for k, name in enumerate(chosen.channels)]
+    first = 0
+    if FIRST_CHOICE in chosen.channels:
+        first = chosen.channels.index(FIRST_CHOICE)
+    return _choice("channel", "Channel", options, str(first))
 
 
 def _signals(
     data: Dataset, chosen: Choice, rotation: Rotation, examples: list[dict[str, Any]]
 ) -> Section:
     groups: dict[str, list[tuple[str, str]]] = {}
-    for number, one in enumerate(examples):
-        severity = "unknown" if one["severity"] is None else f"{one['severity']:.2f}"
-        text = plain(
-            f"{one['class']}, severity {severity}, {one['unit']}, {one['record']}"
-        )
-        groups.setdefault(plain(one["class"]), []).append((str(number), text))
-    last = groups[list(groups)[-1]]
-    first = (
-        groups["healthy"][0][0]
-        if "healthy" in groups
-        else last[-1 if has_lives(data) else len(last) // 2][0]
-    )
+    for number, shown in enumerate(examples):
+        severity = "unknown"
+        if shown["severity"] is not None:
+            severity = f"{shown['severity']:.2f}"
+        record = f"severity {severity}, {shown['unit']}, {shown['record']}"
+        text = plain(f"{shown['class']}, {record}")
+        groups.setdefault(plain(shown["class"]), []).append((str(number), text))
+    of_last = groups[list(groups)[-1]]
+    first = of_last[len(of_last) // 2][0]
+    selection, sound = "of each class, from", ""
+    if has_lives(data):
+        first = of_last[-1][0]
+        selection = "of each class, those of one life from"
+    if "healthy" in groups:
+        first = groups["healthy"][0][0]
+        sound = "; sound ones at the conditions of the middle one of another class"
     orders = [("hz", "Hz and ms")] + [
         (name, f"orders: {words}") for name, words in rotation.references
     ]
@@ -175,21 +211,14 @@ def _signals(
     if any(name == "mesh" for name, _ in orders):
         zooms += [(f"{k}", f"around mesh harmonic {k}") for k in (1, 2, 3)]
     low, high = envelope_band(data.sampling_rate)
-    which = (
-        "of each class, those of one life from"
-        if has_lives(data)
-        else "of each class, from"
-    )
-    sound = (
-        "; sound ones at the conditions of the middle one of another class"
-        if "healthy" in groups
-        else ""
-    )
     lines = [
-        f"{len(examples)} of {data.n_records} records: {which} the least to the greatest severity{sound}.",
-        "Orders are multiples of the chosen shaft's mean speed. Amplitudes of spectra are rounded to 0.4 dB; waveform "
-        "and spectrogram are those of the first samples, up to 8192.",
+        f"{len(examples)} of {data.n_records} records: {selection} "
+        f"the least to the greatest severity{sound}.",
+        "Orders are multiples of the chosen shaft's mean speed. Amplitudes of spectra are "
+        "rounded to 0.4 dB; waveform and spectrogram are those of the first samples, "
+        "up to 8192.",
     ]
+    others = [("", "nothing"), ("same", "its machine, least damaged")]
     if chosen.remark:
         lines.insert(1, f"Shown are {chosen.remark}.")
     return Section(
@@ -199,33 +228,36 @@ def _signals(
             name="signals",
             label="Choice of signal",
             selects=[
-                Select(name="record", label="Record", groups=list(groups.items()), chosen=first),
-                Select(name="other", label="Compare with", chosen="same",
-                       groups=[("", [("", "nothing"), ("same", "its machine, least damaged")]), *groups.items()]),
-                Select(name="channel", label="Channel",
-                       groups=[("", [(str(i), plain(name)) for i, name in enumerate(chosen.channels)])],
-                       chosen=_first_channel(chosen)),
-                Select(name="axis", label="Axis", groups=[("", orders)], chosen="hz"),
-                Select(name="zoom", label="Spectrum", groups=[("", zooms)], chosen="all"),
+                Select(
+                    name="record",
+                    label="Record",
+                    groups=list(groups.items()),
+                    chosen=first,
+                ),
+                Select(
+                    name="other",
+                    label="Compare with",
+                    chosen="same",
+                    groups=[("", others), *groups.items()],
+                ),
+                _channel_choice(chosen),
+                _choice("axis", "Axis", orders, "hz"),
+                _choice("zoom", "Spectrum", zooms, "all"),
             ],
-            switches=[Switch(name="decibel", label="logarithmic", on=True),
-                      *(Switch(name=name, label=label, on=on) for name, label, on in MARKS)],
+            switches=[
+                Switch(name=name, label=label, on=on) for name, label, on in MARKS
+            ],
             plots=[
                 ("wave", "Waveform"),
                 ("spectrum", "Amplitude spectrum"),
-                ("envelope", f"Spectrum of the envelope of {low / 1e3:.3g} to {high / 1e3:.3g} kHz"),
+                (
+                    "envelope",
+                    "Spectrum of the envelope of "
+                    f"{low / 1e3:.3g} to {high / 1e3:.3g} kHz",
+                ),
                 ("spectrogram", "Spectrogram"),
             ],
         ),
-    )  # fmt: skip
-
-
-def _first_channel(chosen: Choice) -> str:
-    """Number of the channel shown first: that of the data card's figures, where there is one."""
-    return (
-        str(chosen.channels.index(FIRST_CHOICE))
-        if FIRST_CHOICE in chosen.channels
-        else "0"
     )
 
 
@@ -237,12 +269,15 @@ def _parameters(data: Dataset, table: dict[str, Any]) -> Section:
     ]
     n_rows = table["rows"]
     text = [
-        f"{_of(n_rows, data)}. A parameter is in the records to which it applies; those that never differ are left out."
+        f"{_of(n_rows, data)}. A parameter is in the records to which it applies; "
+        "those that never differ are left out."
     ]
     if not names:
         return Section(
             title="Parameters", text=["No parameter differs between the records."]
         )
+    speeds = [name for name in names if "/operating.speed" in name]
+    forms = [("histogram", "histogram"), ("boxes", "boxes and points by class")]
     return Section(
         title="Parameters",
         text=text,
@@ -250,18 +285,21 @@ def _parameters(data: Dataset, table: dict[str, Any]) -> Section:
             name="parameters",
             label="Choice of parameter",
             selects=[
-                Select(name="column", label="Parameter", groups=[("drawn", drawn), ("of the record", other)],
-                       chosen=next((name for name in names if "/operating.speed" in name), "")),
-                Select(name="form", label="Shown as",
-                       groups=[("", [("histogram", "histogram"), ("boxes", "boxes and points by class")])]),
+                Select(
+                    name="column",
+                    label="Parameter",
+                    groups=[("drawn", drawn), ("of the record", other)],
+                    chosen=[*speeds, ""][0],
+                ),
+                _choice("form", "Shown as", forms),
             ],
             plots=[("parameters", "Distribution by class")],
         ),
-    )  # fmt: skip
+    )
 
 
 def _further(signal: np.ndarray, sampling_rate: float) -> dict[str, np.ndarray]:
-    """What is measured beside the condition indicators, by channel."""
+    """Values of each channel that are measured with the condition indicators."""
     return {
         **at_measured_rate(signal, sampling_rate),
         VELOCITY: velocity_rms(signal, sampling_rate),
@@ -281,14 +319,18 @@ def _indicators(
         if np.isfinite(measured.values[name]).any()
     ]
     along = [(name, column_label(name)) for name in ALONG if name in table["columns"]]
-    text = [f"{_of(len(measured.records), data)}. Averages over turns are taken at the mean speed; where it varies, "
-            "FM4 and sideband ratios say less."]  # fmt: skip
+    text = [
+        f"{_of(len(measured.records), data)}. Averages over turns are taken at the mean "
+        "speed; where it varies, FM4 and sideband ratios say less."
+    ]
     if not known:
         return Section(title="Condition indicators", text=["No record tells one."])
     levels = level_table(data, measured, chosen.channels, units)
     if levels is not None:
-        text += ["Below: medians of each class, levels as machine monitoring states them.",
-                 *loudness(data, measured, chosen.channels, units)]  # fmt: skip
+        text += [
+            "Below: medians of each class, levels as machine monitoring states them.",
+            *loudness(data, measured, chosen.channels, units),
+        ]
     return Section(
         title="Condition indicators",
         text=text,
@@ -297,16 +339,14 @@ def _indicators(
             name="indicators",
             label="Choice of indicator",
             selects=[
-                Select(name="indicator", label="Indicator", groups=[("", known)]),
-                Select(name="along", label="Over", groups=[("", along)], chosen="severity"),
-                Select(name="channel", label="Channel",
-                       groups=[("", [(str(i), plain(name)) for i, name in enumerate(chosen.channels)])],
-                       chosen=_first_channel(chosen)),
+                _choice("indicator", "Indicator", known),
+                _choice("along", "Over", along, "severity"),
+                _channel_choice(chosen),
             ],
             switches=[Switch(name="decibel", label="logarithmic", on=False)],
             plots=[("indicators", "Indicator by class"), ("levels", "Spread by class")],
         ),
-    )  # fmt: skip
+    )
 
 
 def _lives(table: dict[str, Any]) -> Section:
@@ -315,14 +355,13 @@ def _lives(table: dict[str, Any]) -> Section:
     return Section(
         title="Lives",
         text=[
-            f"{shown} of {table['n_lives']} lives, a line each, from new to failure or to the horizon (crosses)."
+            f"{shown} of {table['n_lives']} lives, a line each, "
+            "from new to failure or to the horizon (crosses)."
         ],
         charts=Charts(
             name="lives",
             label="Choice of quantity",
-            selects=[
-                Select(name="quantity", label="Quantity", groups=[("", quantities)])
-            ],
+            selects=[_choice("quantity", "Quantity", quantities)],
             switches=[
                 Switch(name="relative", label="time as a share of the life", on=False)
             ],
@@ -340,15 +379,11 @@ def _beside(compared: Sequence[Comparison], units: Sequence[str]) -> Section:
         label="Nothing to choose",
         plots=[("beside", "Measured ranges and this set")],
     )
-    return Section(
-        title=section.title, text=section.text, table=section.table, charts=charts
-    )
+    return replace(section, charts=charts)
 
 
 def _of(n_rows: int, data: Dataset) -> str:
     n_usable = int(np.count_nonzero(data.usable))
-    return (
-        f"All {n_rows} records"
-        if n_rows == n_usable
-        else f"{n_rows} of {n_usable} records, evenly of all classes"
-    )
+    if n_rows == n_usable:
+        return f"All {n_rows} records"
+    return f"{n_rows} of {n_usable} records, evenly of all classes"

@@ -1,7 +1,4 @@
-"""The records that the page shows.
-
-Which, and their waveform, spectrum, envelope spectrum and spectrogram.
-"""
+"""Records that the page shows: their choice, waveform, spectra and spectrogram."""
 
 from __future__ import annotations
 
@@ -26,9 +23,7 @@ RECORDS_PER_CLASS = 3
 SIGNALS_BY_DEFAULT = 48  # records times channels: about 3 MB
 SIGNALS_AT_MOST = 140  # about 9 MB, plotly.js 5 MB: the page stays below 15 MB
 WAVEFORM_SAMPLES = 8192
-SPECTRUM_SAMPLES = (
-    2**20
-)  # of longer records the spectra are those of the beginning: what is read stays small
+SPECTRUM_SAMPLES = 2**20  # longer records are read up to here
 SPECTRUM_BINS = 20_000
 ENVELOPE_BINS = 4000
 ENVELOPE_MESHES = 3.2  # the envelope spectrum ends above the third harmonic of the mesh
@@ -41,8 +36,9 @@ SPECTROGRAM_COLUMNS = 96
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Choice:
-    """Records (by number) and channels (by name) that are shown, and one line on what was left
-    out, or "".
+    """Records (by number) and channels (by name) that are shown.
+
+    ``remark`` is one line on the parts that were left out, or "".
     """
 
     records: dict[str, list[int]]
@@ -52,18 +48,17 @@ class Choice:
     @property
     def n_signals(self) -> int:
         """Records times channels."""
-        return len(self.channels) * sum(
-            len(records) for records in self.records.values()
-        )
+        return len(self.channels) * sum(map(len, self.records.values()))
 
 
 def choose(data: Dataset, per_class: int | None) -> Choice:
-    """Usable records of each class, from the least to the greatest severity; sound ones of the
-    same machines.
+    """Usable records of each class, from the least to the greatest severity.
+
+    The healthy ones are of the same machines.
 
     Parameters
     ----------
-    per_class : records of a class; None takes `RECORDS_PER_CLASS`, or fewer where the page would get heavy
+    per_class : records of a class; None takes `RECORDS_PER_CLASS`, or fewer for a small page
     """
     label, usable = data.column("label_name"), data.usable
     classes = [name for name in data.class_names if np.any((label == name) & usable)]
@@ -71,28 +66,21 @@ def choose(data: Dataset, per_class: int | None) -> Choice:
         raise DatasetError(
             f"{data.folder} has no usable record to show; gensig inspect {data.folder} says why"
         )
-    limit = SIGNALS_BY_DEFAULT if per_class is None else SIGNALS_AT_MOST
-    wanted = RECORDS_PER_CLASS if per_class is None else per_class
+    limit, wanted = SIGNALS_BY_DEFAULT, RECORDS_PER_CLASS
+    if per_class is not None:
+        limit, wanted = SIGNALS_AT_MOST, per_class
     n_channels = min(len(data.channel_names), max(limit // len(classes), 1))
     n_shown = max(min(wanted, limit // (len(classes) * n_channels)), 1)
-    faulty = {
-        name: _spread(data, name, n_shown) for name in classes if name != "healthy"
-    }
-    chosen = {
-        name: faulty[name]
-        if name in faulty
-        else _sound(data, list(faulty.values())[::-1], n_shown)
-        for name in classes
-    }
-    remarks = []
+    chosen = {name: _spread(data, name, n_shown) for name in classes}
+    if "healthy" in chosen:
+        faulty = [chosen[name] for name in classes if name != "healthy"]
+        chosen["healthy"] = _sound(data, faulty[::-1], n_shown)
+    remarks, n_all = [], len(data.channel_names)
+    small = "so that the page stays small"
     if n_shown < wanted:
-        remarks.append(
-            f"{n_shown} instead of {wanted} records a class, so that the page stays small"
-        )
-    if n_channels < len(data.channel_names):
-        remarks.append(
-            f"the first {n_channels} of {len(data.channel_names)} channels, so that the page stays small"
-        )
+        remarks.append(f"{n_shown} instead of {wanted} records a class, {small}")
+    if n_channels < n_all:
+        remarks.append(f"the first {n_channels} of {n_all} channels, {small}")
     return Choice(
         records=chosen,
         channels=data.channel_names[:n_channels],
@@ -101,93 +89,74 @@ def choose(data: Dataset, per_class: int | None) -> Choice:
 
 
 def _spread(data: Dataset, name: str, n_shown: int) -> list[int]:
-    """Records of a class at even steps of the rank of their severity.
-
-    Those of one life where there are lives.
-    """
-    mine = np.flatnonzero((data.column("label_name") == name) & data.usable)
-    mine = mine[np.argsort(data.column("severity")[mine], kind="stable")]
+    """Records of a class, or of its worst life, at even steps of the rank of their severity."""
+    found = np.flatnonzero((data.column("label_name") == name) & data.usable)
+    found = found[np.argsort(data.column("severity")[found], kind="stable")]
     if has_lives(data):  # the machine that gets worst, from its beginning
-        mine = mine[data.column("life_id")[mine] == data.column("life_id")[mine[-1]]]
-    places = (
-        np.linspace(0, mine.size - 1, n_shown)
-        if n_shown > 1
-        else np.array([mine.size // 2])
-    )
-    return list(dict.fromkeys(mine[np.rint(places).astype(int)].tolist()))
+        life = data.column("life_id")[found]
+        found = found[life == life[-1]]
+    ranks = np.array([found.size // 2])
+    if n_shown > 1:
+        ranks = np.linspace(0, found.size - 1, n_shown)
+    return list(dict.fromkeys(found[np.rint(ranks).astype(int)].tolist()))
 
 
 def _sound(data: Dataset, faulty: Sequence[Sequence[int]], n_shown: int) -> list[int]:
-    """Healthy records at the conditions of the middle records of other classes, the first named
-    first; then any.
-    """
+    """Healthy records at the conditions of the middle faulty records, filled up with any."""
     condition, unit = data.column("condition_id"), data.column("unit_id")
     sound = np.flatnonzero((data.column("label_name") == "healthy") & data.usable)
     found: list[int] = []
     for records in faulty:
         middle = records[len(records) // 2]
-        same = sound[
-            (condition[sound] == condition[middle]) & (unit[sound] == unit[middle])
-        ]
-        found += [index for index in same[:1].tolist() if index not in found]
-    found = found[:n_shown]
-    return (
-        found
-        + [index for index in _spread(data, "healthy", n_shown) if index not in found][
-            : n_shown - len(found)
-        ]
-    )
+        is_same = (condition[sound] == condition[middle]) & (
+            unit[sound] == unit[middle]
+        )
+        found += sound[is_same][:1].tolist()
+    found = list(dict.fromkeys(found))[:n_shown]
+    others = _spread(data, "healthy", n_shown)
+    return list(dict.fromkeys([*found, *others]))[:n_shown]
 
 
 def example(
     data: Dataset, index: int, channels: Sequence[str], rotation: Rotation
 ) -> dict[str, Any]:
-    """What the page knows of a record: its labels, its frequencies, and of each channel four views.
+    """Labels and frequencies of a record, and four views of each channel.
 
     Raises
     ------
     DatasetError    for a record with values that are not finite
     """
-    values = {
-        name: data.column(name)[index]
-        for name in ("record_id", "label_name", "severity", "unit_id")
-    }
     n_read = min(data.n_samples, SPECTRUM_SAMPLES)
     signals = data.signals(index, stop=n_read, channels=list(channels)).astype(float)
+    record_id = str(data.column("record_id")[index])
     if not np.isfinite(signals).all():
         raise DatasetError(
-            f"record {values['record_id']} holds values that are not finite; run gensig verify"
+            f"record {record_id} holds values that are not finite; run gensig verify"
         )
+    rate, top, frequencies = data.sampling_rate, usable_top(data), rotation.of(index)
     return {
-        "record": str(values["record_id"]),
-        "class": str(values["label_name"]),
-        "severity": _finite(values["severity"]),
-        "unit": str(values["unit_id"]),
+        "record": record_id,
+        "class": str(data.column("label_name")[index]),
+        "severity": _finite(data.column("severity")[index]),
+        "unit": str(data.column("unit_id")[index]),
         "condition": str(data.column("condition_id")[index]),
         "torque": _finite(data.column("torque_nm")[index]),
-        "frequencies": rotation.of(index),
+        "frequencies": frequencies,
         "fault": rotation.fault_gear(index),
-        "views": [
-            _views(
-                signal, data.sampling_rate, usable_top(data), rotation.of(index)["mesh"]
-            )
-            for signal in signals
-        ],
+        "views": [_views(signal, rate, top, frequencies["mesh"]) for signal in signals],
     }
 
 
 def usable_top(data: Dataset) -> float:
     """Upper end of the usable band, Hz."""
-    band = data.attributes.get("usable_band_hz")
     half = data.sampling_rate / 2
     try:
-        return (
-            min(float(band[1]), half)
-            if band is not None and float(band[1]) > 0.0
-            else half
-        )
-    except (TypeError, IndexError, ValueError):
+        top = float(data.attributes["usable_band_hz"][1])
+    except (KeyError, TypeError, IndexError, ValueError):
         return half
+    if top > 0.0:
+        return min(top, half)
+    return half
 
 
 def envelope_band(sampling_rate: float) -> tuple[float, float]:
@@ -206,13 +175,12 @@ def _views(
         "spectrogram": _spectrogram(part, rate, top),
     }
     if len(signal) > 100:  # the band-pass needs more samples than its ends
+        highest = top / 8.0
+        if mesh:
+            highest = ENVELOPE_MESHES * mesh
         frequency, amplitude = envelope_spectrum(signal, rate, envelope_band(rate))
         views["envelope"] = _lines(
-            frequency,
-            amplitude,
-            ENVELOPE_MESHES * mesh if mesh else top / 8.0,
-            ENVELOPE_BINS,
-            first=1,
+            frequency, amplitude, highest, ENVELOPE_BINS, first=1
         )
     return views
 
@@ -220,13 +188,12 @@ def _views(
 def _lines(
     frequency: FloatArray, amplitude: FloatArray, top: float, most: int, first: int = 0
 ) -> dict[str, Any]:
-    """A spectrum from the bin `first` up to `top` Hz.
+    """A spectrum from the bin `first` up to `top` Hz, thinned to at most `most` bins.
 
-    Of more bins than `most`, the largest of each few.
+    A bin of the thinned spectrum is the largest of its neighbors.
     """
-    amplitude = amplitude[
-        first : max(int(np.searchsorted(frequency, top, side="right")), first + 2)
-    ]
+    end = max(int(np.searchsorted(frequency, top, side="right")), first + 2)
+    amplitude = amplitude[first:end]
     each = -(-len(amplitude) // most)
     largest = np.maximum.reduceat(amplitude, np.arange(0, len(amplitude), each))
     step = float(frequency[1] - frequency[0])
@@ -244,12 +211,10 @@ def _spectrogram(signal: FloatArray, rate: float, top: float) -> dict[str, Any]:
     n_window = max(min(WINDOW_SAMPLES, len(signal) // 8 * 2), 2)
     hop = max((len(signal) - n_window) // (SPECTROGRAM_COLUMNS - 1), 1)
     weights = get_window("hann", n_window)
-    stretches = np.lib.stride_tricks.sliding_window_view(
-        signal - signal.mean(), n_window
-    )[::hop]
-    amplitude = np.abs(np.fft.rfft(stretches * weights, axis=-1)) * (
-        2.0 / weights.sum()
-    )
+    centered = signal - signal.mean()
+    windows = np.lib.stride_tricks.sliding_window_view(centered, n_window)[::hop]
+    spectra = np.fft.rfft(windows * weights, axis=-1)
+    amplitude = np.abs(spectra) * (2.0 / weights.sum())
     amplitude = amplitude[:, : max(int(top / rate * n_window) + 1, 2)]
     return {
         **pack_amplitude(amplitude),
@@ -261,5 +226,6 @@ def _spectrogram(signal: FloatArray, rate: float, top: float) -> dict[str, Any]:
 
 
 def _finite(value: Any) -> float | None:
-    number = float(value)
-    return number if np.isfinite(number) else None
+    if np.isfinite(value):
+        return float(value)
+    return None

@@ -1,7 +1,4 @@
-"""How loud the records are, in the units of machine monitoring.
-
-What to hold beside a machine of one's own.
-"""
+"""Vibration levels of the records in the units of machine monitoring."""
 
 from __future__ import annotations
 
@@ -20,10 +17,10 @@ FloatArray = NDArray[np.floating]
 
 VELOCITY = "velocity_rms"
 BAND = (10.0, 1000.0)  # Hz, of broad-band velocity in ISO 20816-1 and -3
-HARMFUL_VELOCITY = 11.0e-3  # m/s, zone boundary C/D of ISO 20816-3 for large machines on flexible supports
-LOUD_ACCELERATION = (
-    10.0 * STANDARD_GRAVITY
-)  # assumed: published housings of sound gears stay below
+# m/s, zone boundary C/D of ISO 20816-3 for large machines on flexible supports
+HARMFUL_VELOCITY = 11.0e-3
+# assumed: published housings of sound gears stay below
+LOUD_ACCELERATION = 10.0 * STANDARD_GRAVITY
 
 
 def velocity_rms(signal: FloatArray, sampling_rate: float) -> FloatArray:
@@ -44,16 +41,13 @@ def level_table(
     data: Dataset, measured: Measured, channels: Sequence[str], units: Sequence[str]
 ) -> Table | None:
     """Medians of each class and accelerometer; None where there is no acceleration in m/s^2."""
-    rows = [
-        (
-            plain(name),
-            plain(channel),
-            f"{rms:.3g}",
-            f"{rms / STANDARD_GRAVITY:.3g}",
-            f"{1e3 * velocity:.3g}",
-        )
-        for name, channel, rms, velocity in _medians(data, measured, channels, units)
-    ]
+    rows = []
+    for name, channel, rms, velocity in _medians(data, measured, channels, units):
+        levels = (rms, rms / STANDARD_GRAVITY, 1e3 * velocity)
+        cells = [f"{level:.3g}" for level in levels]
+        rows.append((plain(name), plain(channel), *cells))
+    if not rows:
+        return None
     head = (
         "class",
         "channel",
@@ -61,7 +55,7 @@ def level_table(
         "RMS, g",
         "velocity RMS 10 to 1000 Hz, mm/s",
     )
-    return Table(head=head, rows=rows) if rows else None
+    return Table(head=head, rows=rows)
 
 
 def loudness(
@@ -81,10 +75,12 @@ def loudness(
         return []
     names = ", ".join(dict.fromkeys(plain(name) for name, *_ in loud))
     return [
-        f"Louder than most published housings: {names}. Above {LOUD_ACCELERATION / STANDARD_GRAVITY:g} g, or above "
-        f"{1e3 * HARMFUL_VELOCITY:g} mm/s, from which ISO 20816-3 expects damage of large machines on flexible "
-        "supports. Compare shapes and ratios between classes with measurements, not levels; noise is relative to the "
-        "signal, so that it is as loud."
+        f"Louder than most published housings: {names}. "
+        f"Above {LOUD_ACCELERATION / STANDARD_GRAVITY:g} g, "
+        f"or above {1e3 * HARMFUL_VELOCITY:g} mm/s, from which ISO 20816-3 expects damage "
+        "of large machines on flexible supports. Compare shapes and ratios between "
+        "classes with measurements, not levels; noise is relative to the signal, so that "
+        "it is as loud."
     ]
 
 

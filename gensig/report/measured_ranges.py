@@ -1,10 +1,12 @@
-"""How the records lie beside published measurements, as far as any data set allows it.
+"""Comparison of a data set with published measurements.
 
-``python -m benchmarks.realism`` is the whole comparison, with records made for it; here are those
-of its quantities that need no pair of records at the same set-points, or find one.
+``python -m benchmarks.realism`` is the whole comparison, with records made for it. This module has
+the quantities that need no two records at the same set-points, or find them.
 """
 
 from __future__ import annotations
+
+from collections import defaultdict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,24 +75,18 @@ def _ratios(
         data.column(name)[records].tolist()
         for name in ("gearbox_id", "speed_set_rpm", "torque_nm")
     ]
-    place = list(zip(*keys, strict=True))
-    specimen, label = (
-        data.column("specimen_id")[records],
-        data.column("label_name")[records],
-    )
-    sound: dict[tuple[object, ...], list[int]] = {}
+    condition = list(zip(*keys, strict=True))
+    specimen = data.column("specimen_id")[records]
+    label = data.column("label_name")[records]
+    sound: dict[tuple[object, ...], list[int]] = defaultdict(list)
     for row in np.flatnonzero(label == "healthy").tolist():
-        sound.setdefault(place[row], []).append(row)
-    found: dict[Place, list[FloatArray]] = {}
+        sound[condition[row]].append(row)
+    found: dict[Place, list[FloatArray]] = defaultdict(list)
     for row in np.flatnonzero(label != "healthy").tolist():
-        for other in sound.get(place[row], []):
+        for other in sound[condition[row]]:
             if specimen[row] != specimen[other]:
-                for ratio, of in (
-                    ("rms_ratio", "rms_5_khz"),
-                    ("kurtosis_ratio", "kurtosis_5_khz"),
-                ):
-                    quotient = values[of][row] / values[of][other]
-                    found.setdefault((f"{label[row]}.{ratio}", ALL), []).append(
-                        quotient
-                    )
+                for name in ("rms", "kurtosis"):
+                    level = values[f"{name}_5_khz"]
+                    ratio = level[row] / level[other]
+                    found[f"{label[row]}.{name}_ratio", ALL].append(ratio)
     return {name: np.concatenate(ratios) for name, ratios in found.items()}

@@ -1,7 +1,4 @@
-"""Long rows of numbers as short text.
-
-Base64 of little-endian bytes, which the page's script unpacks.
-"""
+"""Arrays as short text: base64 of little-endian bytes, which the page's script unpacks."""
 
 from __future__ import annotations
 
@@ -17,9 +14,9 @@ COUNTS = 32767
 
 def packed(values: ArrayLike, dtype: str) -> str:
     """Values as base64 of the little-endian numpy type, flat."""
-    return base64.b64encode(
-        np.ascontiguousarray(values, dtype=np.dtype(dtype).newbyteorder("<")).tobytes()
-    ).decode()
+    little_endian = np.dtype(dtype).newbyteorder("<")
+    content = np.ascontiguousarray(values, dtype=little_endian).tobytes()
+    return base64.b64encode(content).decode()
 
 
 def pack_floats(values: ArrayLike) -> str:
@@ -30,13 +27,12 @@ def pack_floats(values: ArrayLike) -> str:
 def pack_signal(signal: NDArray[np.floating]) -> dict[str, Any]:
     """A signal, (sample,), as 16-bit counts of `scale`."""
     scale = float(np.abs(signal).max(initial=0.0)) / COUNTS
-    counts = np.zeros(signal.shape) if scale == 0.0 else np.rint(signal / scale)
+    counts = np.rint(signal / (scale or 1.0))
     return {"scale": scale, "n": packed(counts, "i2")}
 
 
 def pack_amplitude(amplitude: NDArray[np.floating]) -> dict[str, Any]:
-    """Amplitudes as bytes: 255 is the largest, `top`, and each count less `STEP_DB` lower; 0 is
-    all below.
+    """Amplitudes as bytes in steps of `STEP_DB`: 255 is the largest, 0 is all below the range.
 
     Parameters
     ----------
@@ -47,7 +43,7 @@ def pack_amplitude(amplitude: NDArray[np.floating]) -> dict[str, Any]:
     `top`, `step_db`, and `n`, the bytes in C order
     """
     top = float(amplitude.max(initial=0.0))
-    relative = np.zeros(amplitude.shape) if top == 0.0 else amplitude / top
+    relative = amplitude / (top or 1.0)
     with np.errstate(divide="ignore"):
         counts = 255.0 + np.rint(20.0 * np.log10(relative) / STEP_DB)
     return {"top": top, "step_db": STEP_DB, "n": packed(np.maximum(counts, 0.0), "u1")}

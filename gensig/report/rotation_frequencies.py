@@ -1,4 +1,4 @@
-"""How fast what turns: the frequencies that the page marks, as far as a data set tells them."""
+"""Rotation and mesh frequencies of a data set's records, which the page marks."""
 
 from __future__ import annotations
 
@@ -10,19 +10,20 @@ from numpy.typing import NDArray
 from gensig.dataset.reader import Dataset
 
 GEARS = ("pinion", "wheel")
-SAME = 1e-3  # relative: shafts that are told apart turn less alike than this
+SAME = 1e-3  # relative difference below which two shafts turn alike
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rotation:
-    """Mean frequencies of all records, Hz; NaN where the data set does not tell them.
+    """Mean frequencies of all records, Hz; NaN where the data set does not have them.
 
     Parameters
     ----------
     mesh : (record,)      of the mesh
     drive : (record,)     turns of the driving shaft a second
     n_teeth : by gear of `GEARS`, those that are known
-    gear : (record,)      whose turn a fault repeats with, "" where there is none or every tooth has it
+    gear : (record,)      gear with whose turn a fault repeats; "" without a fault, or where every
+                          tooth has it
     """
 
     mesh: NDArray[np.floating]
@@ -38,25 +39,24 @@ class Rotation:
         """Frequencies of a record by name: mesh, drive and gears; None where unknown."""
         values = {"mesh": self.mesh[index], "drive": self.drive[index]}
         values |= {gear: self.mesh[index] / self.n_teeth[gear] for gear in self.n_teeth}
-        return {
-            name: float(value) if np.isfinite(value) and value > 0.0 else None
+        known = {
+            name: float(value)
             for name, value in values.items()
+            if np.isfinite(value) and value > 0.0
         }
+        return {name: known.get(name) for name in values}
 
     def fault_gear(self, index: int) -> str:
-        """The gear once a turn of which the fault meshes, where its frequency is known; else ""."""
+        """Gear of a record's fault where its frequency is known, else ""."""
         gear = str(self.gear[index])
-        return gear if gear in self.n_teeth else ""
+        return gear * (gear in self.n_teeth)
 
     @property
     def references(self) -> list[tuple[str, str]]:
-        """What orders can be counted in: (name of the frequency, words)."""
+        """Frequencies that orders can be multiples of: (name, words)."""
+        drive = ("drive", "turns of the driving shaft")
         if not np.any(np.isfinite(self.mesh) & (self.mesh > 0.0)):
-            return (
-                [("drive", "turns of the driving shaft")]
-                if np.any(self.drive > 0.0)
-                else []
-            )
+            return [drive] * bool(np.any(self.drive > 0.0))
         found = [(gear, f"turns of the {gear}") for gear in self.n_teeth]
         turning = (self.mesh > 0.0) & (self.drive > 0.0)
         ratios = [
@@ -65,32 +65,28 @@ class Rotation:
         if np.any(turning) and all(
             np.abs(ratio - 1.0).max() > SAME for ratio in ratios
         ):
-            found.append(("drive", "turns of the driving shaft"))
+            found.append(drive)
         return [*found, ("mesh", "meshes of a tooth")]
 
 
 def read_rotation(data: Dataset) -> Rotation:
     """The frequencies of a data set's records."""
-    unknown = np.full(data.n_records, np.nan)
     n_teeth = {}
     for gear in GEARS:
         number = data.attributes.get(f"n_teeth_{gear}")
         if isinstance(number, (int, np.integer)) and number > 0:
             n_teeth[gear] = int(number)
     names = data.column_names
-    faulty = (
-        data.column("fault_gear")
-        if "fault_gear" in names
-        else np.full(data.n_records, "")
-    )
-    if (
-        "fault_tooth" in names
-    ):  # -1: a fault of all teeth, such as wear, has no turn of its own
+    mesh, faulty = np.full(data.n_records, np.nan), np.full(data.n_records, "")
+    if "mesh_frequency_hz" in names:
+        mesh = data.column("mesh_frequency_hz")
+    if "fault_gear" in names:
+        faulty = data.column("fault_gear")
+    if "fault_tooth" in names:
+        # -1: a fault of all teeth, such as wear, has no turn of its own
         faulty = np.where(data.column("fault_tooth") == -1, "", faulty)
     return Rotation(
-        mesh=data.column("mesh_frequency_hz")
-        if "mesh_frequency_hz" in names
-        else unknown,
+        mesh=mesh,
         drive=data.column("speed_rpm") / 60.0,
         n_teeth=n_teeth,
         gear=faulty,

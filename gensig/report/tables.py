@@ -1,12 +1,10 @@
-"""Sections of the page that are text and tables.
-
-What there is, splits, where it is from, how it is loaded.
-"""
+"""Sections of text and tables: contents, splits, provenance, loading."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -45,52 +43,40 @@ IN_WORDS = {
 def channel_units(data: Dataset) -> list[str]:
     """Unit of each channel, m/s^2 where the data set does not say."""
     units = data.attributes.get("channel_units", [])
-    return [
-        str(dict(enumerate(units)).get(number, "m/s^2"))
-        for number in range(len(data.channel_names))
-    ]
+    pairs = zip_longest(data.channel_names, units, fillvalue="m/s^2")
+    return [str(unit) for _, unit in pairs][: len(data.channel_names)]
 
 
 def contents(data: Dataset) -> list[Section]:
-    """What is in the data set: facts, and classes."""
+    """Facts of the data set, and its classes."""
     n_failed = int(np.count_nonzero(~data.usable))
+    records = f"{data.n_records}"
+    if n_failed:
+        records += f", of which {n_failed} failed and are left out here"
+    duration = data.n_samples / data.sampling_rate
+    sampling = f"{data.n_samples} samples at {data.sampling_rate:g} Hz"
     channels = zip(data.channel_names, channel_units(data), strict=True)
+    units = [f"{plain(name)} ({plain(unit)})" for name, unit in channels]
+    further = [name for name in data.signal_names if name != "acceleration"]
     rows = [
-        (
-            "records",
-            f"{data.n_records}"
-            + (
-                f", of which {n_failed} failed and are left out here"
-                if n_failed
-                else ""
-            ),
-        ),
-        (
-            "a record",
-            f"{data.n_samples / data.sampling_rate:g} s, {data.n_samples} samples at {data.sampling_rate:g} Hz",
-        ),
-        (
-            "channels",
-            ", ".join(f"{plain(name)} ({plain(unit)})" for name, unit in channels),
-        ),
-        (
-            "further signals",
-            ", ".join(name for name in data.signal_names if name != "acceleration")
-            or "none",
-        ),
+        ("records", records),
+        ("a record", f"{duration:g} s, {sampling}"),
+        ("channels", ", ".join(units)),
+        ("further signals", ", ".join(further) or "none"),
     ]
     rows += [
         (IN_WORDS.get(name, name), _shown(data.attributes[name]))
         for name in GEOMETRY
         if name in data.attributes
     ]
+    counted = {
+        "units": "unit_id",
+        "sets of gears": "specimen_id",
+        "gearboxes": "gearbox_id",
+    }
     rows += [
         (name, f"{len(np.unique(data.column(column)))}")
-        for name, column in (
-            ("units", "unit_id"),
-            ("sets of gears", "specimen_id"),
-            ("gearboxes", "gearbox_id"),
-        )
+        for name, column in counted.items()
     ]
     rows += [
         ("speed of the driving shaft", value_range(data.column("speed_rpm"), "r/min")),
@@ -99,12 +85,8 @@ def contents(data: Dataset) -> list[Section]:
     if "snr_db" in data.column_names:
         rows.append(("signal-to-noise ratio", value_range(data.column("snr_db"), "dB")))
     if "life_id" in data.column_names:
-        rows.append(
-            (
-                "lives",
-                f"{len(np.unique(data.column('life_id')))}, to failure or to the horizon",
-            )
-        )
+        n_lives = len(np.unique(data.column("life_id")))
+        rows.append(("lives", f"{n_lives}, to failure or to the horizon"))
     return [
         Section(title="What is in it", table=Table(head=("fact", "value"), rows=rows)),
         Section(title="Classes", table=_classes(data)),
@@ -112,26 +94,17 @@ def contents(data: Dataset) -> list[Section]:
 
 
 def _classes(data: Dataset) -> Table:
-    label, severity, unit = (
-        data.column("label_name"),
-        data.column("severity"),
-        data.column("unit_id"),
-    )
+    label, unit = data.column("label_name"), data.column("unit_id")
     order = [*data.class_names, *sorted(set(label.tolist()) - set(data.class_names))]
     rows = []
     for name in order:
-        mine = label == name
-        values = severity[mine]
-        middle = f"{np.nanmedian(values):.3g}" if np.isfinite(values).any() else "none"
-        rows.append(
-            (
-                plain(name),
-                f"{mine.sum()}",
-                f"{len(np.unique(unit[mine]))}",
-                value_range(values, ""),
-                middle,
-            )
-        )
+        is_class = label == name
+        severity, median = data.column("severity")[is_class], "none"
+        if np.isfinite(severity).any():
+            median = f"{np.nanmedian(severity):.3g}"
+        n_units = len(np.unique(unit[is_class]))
+        spread = value_range(severity, "")
+        rows.append((plain(name), f"{is_class.sum()}", f"{n_units}", spread, median))
     return Table(
         head=("class", "records", "units", "severity", "its median"), rows=rows
     )
@@ -152,14 +125,13 @@ def splits(data: Dataset) -> Section:
             f"{sum(stop - start for _, start, stop in part):.5g} ({len(units[name])})"
             for name, part in parts.items()
         ]
-        apart = PROTOCOLS[protocol].apart if protocol in PROTOCOLS else ()
+        apart = []
+        if protocol in PROTOCOLS:
+            apart = [name.removesuffix("_id") for name in PROTOCOLS[protocol].apart]
         if not apart:
             leaky.append(len(rows))
         shared = len(units["train"] & units["test"])
-        kept = (
-            ", ".join(name.removesuffix("_id") for name in apart)
-            or "nothing: leaks on purpose"
-        )
+        kept = ", ".join(apart) or "nothing: leaks on purpose"
         rows.append((plain(protocol), *cells, f"{shared}", kept))
     head = (
         "protocol",
@@ -176,29 +148,39 @@ def splits(data: Dataset) -> Section:
     left_out = [(name, plain(reason)) for name, reason in data.left_out.items()]
     if left_out:
         text.append("Below: protocols that this set cannot have, and why.")
-    table = Table(head=head, rows=rows, quiet=leaky) if rows else None
+    table = None
+    if rows:
+        table = Table(head=head, rows=rows, quiet=leaky)
     return Section(title="Splits", text=text, table=table, notes=left_out)
 
 
 def measured_table(found: Sequence[Comparison], units: Sequence[str]) -> Section:
-    """The values beside measured ranges, or why there are none."""
+    """Values of the set with measured ranges, or the reason why there are none."""
     text = [
-        "Central 90 % of this set's values beside ranges of published recordings of a two-stage parallel spur gearbox "
-        "(5 kHz, one specimen a class), which is another machine: a miss says that they differ, not which is wrong. "
-        'RMS and kurtosis are those of the band up to 2.5 kHz; "elsewhere" is not slow and light, here all records.'
+        "Central 90 % of this set's values beside ranges of published recordings of a "
+        "two-stage parallel spur gearbox (5 kHz, one specimen a class), which is another "
+        "machine: a miss says that they differ, not which is wrong. RMS and kurtosis are "
+        'those of the band up to 2.5 kHz; "elsewhere" is not slow and light, here all '
+        "records."
     ]
     if not found:
-        reason = (
-            "no channel is an acceleration in m/s^2"
-            if "m/s^2" not in units
-            else "it has none of their quantities"
-        )
+        reason = "it has none of their quantities"
+        if "m/s^2" not in units:
+            reason = "no channel is an acceleration in m/s^2"
         text.append(f"This set cannot be put beside them: {reason}.")
         return Section(title="Beside measurements", text=text)
     rows = [
-        (one.id, one.at, shown_range(one), _number(one.median), f"{_number(one.p5)} to {_number(one.p95)}", f"{one.n}",
-         one.verdict) for one in found
-    ]  # fmt: skip
+        (
+            item.id,
+            item.at,
+            shown_range(item),
+            _number(item.median),
+            f"{_number(item.p5)} to {_number(item.p95)}",
+            f"{item.n}",
+            item.verdict,
+        )
+        for item in found
+    ]
     head = (
         "quantity",
         "at",
@@ -214,7 +196,7 @@ def measured_table(found: Sequence[Comparison], units: Sequence[str]) -> Section
 
 
 def provenance(data: Dataset) -> list[Section]:
-    """What made it, with what, and what it can be known by."""
+    """Version, environment, seed, identity, configuration and checksums of the data set."""
     manifest = data.manifest
     rows = [
         ("made by", f"gensig {plain(manifest.generator_version)}"),
@@ -256,23 +238,26 @@ def provenance(data: Dataset) -> list[Section]:
 
 
 def loading(data: Dataset) -> list[Section]:
-    """Code that reads this set, and what to mind."""
-    name = next(
-        (name for name in data.class_names if name != "healthy"), data.class_names[0]
-    )
-    protocol = "by_unit" if "by_unit" in data.protocols else (data.protocols or [""])[0]
+    """Code that reads this set, and its caveats."""
+    faulty = [name for name in data.class_names if name != "healthy"]
+    name = [*faulty, *data.class_names][0]
+    units = ", ".join(dict.fromkeys(channel_units(data)))
+    protocols = data.protocols
+    if "by_unit" in protocols:
+        protocols = ["by_unit"]
     code = [
         "import gensig",
         "",
         'with gensig.open_dataset("PATH/TO/THIS/FOLDER") as data:',
         "    print(data.class_names, data.channel_names, data.sampling_rate)",
         '    labels = data.column("label")  # (record,) index into data.class_names',
-        f"    signal = data.signals(0)  # (channel, sample) float32: {', '.join(dict.fromkeys(channel_units(data)))}",
+        f"    signal = data.signals(0)  # (channel, sample) float32: {units}",
         f"    mine = data.where(fault={name!r}, status='ok')  # by class, or by any column",
     ]
-    if protocol:
+    if protocols:
         code.append(
-            f"    train = data.split({protocol!r})['train']  # [(record, start_fraction, stop_fraction), ...]"
+            f"    train = data.split({protocols[0]!r})['train']"
+            "  # [(record, start_fraction, stop_fraction), ...]"
         )
     text = ["Every shard is plain HDF5 too: h5py, MATLAB and Octave read it."]
     caveats = [
@@ -294,12 +279,17 @@ def _file(path: Path) -> str:
 
 def _shown(value: object) -> str:
     if isinstance(value, (list, tuple, np.ndarray)):
-        return " to ".join(
-            f"{part:g}" if isinstance(part, (int, float)) else plain(part)
-            for part in value
-        )
+        return " to ".join(map(_compact, value))
     return plain(rounded(value))
 
 
+def _compact(value: object) -> str:
+    if isinstance(value, (int, float)):
+        return f"{value:g}"
+    return plain(value)
+
+
 def _number(value: float) -> str:
-    return "none" if math.isnan(value) else f"{value:.3g}"
+    if math.isnan(value):
+        return "none"
+    return f"{value:.3g}"

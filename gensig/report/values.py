@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.dataset.columns import COLUMNS
 from gensig.dataset.reader import Dataset
-from gensig.dataset.schema import COLUMNS, PARAMS
+from gensig.dataset.schema import PARAMS
 from gensig.errors import DatasetError
 from gensig.report.packing import pack_floats, packed
 from gensig.report.rotation_frequencies import Rotation
@@ -31,18 +34,27 @@ INDICATORS = (
     ("sideband_ratio_pinion", "sideband ratio, pinion"),
     ("sideband_ratio_wheel", "sideband ratio, wheel"),
 )
-# Columns beside params/ that a draw or a result of it decides.
-PLAIN = ("severity", "speed_rpm", "torque_nm", "snr_db", "start_phase", "start_tooth_pinion", "start_tooth_wheel",
-         "mesh_frequency_hz", "contact_loss_fraction", "integration_error", "clipped_fraction", "dropped_fraction",
-         "detectability", "life_time_h", "life_cycles", "remaining_life_h")  # fmt: skip
-ALONG = (
+# Columns other than params/ that a draw or a result of it decides.
+PLAIN = (
     "severity",
     "speed_rpm",
     "torque_nm",
     "snr_db",
+    "start_phase",
+    "start_tooth_pinion",
+    "start_tooth_wheel",
+    "mesh_frequency_hz",
+    "contact_loss_fraction",
+    "integration_error",
+    "clipped_fraction",
+    "dropped_fraction",
+    "detectability",
     "life_time_h",
+    "life_cycles",
     "remaining_life_h",
-)  # abscissae of indicators
+)
+# abscissae of indicators
+ALONG = (*PLAIN[:4], "life_time_h", "remaining_life_h")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +65,7 @@ class Measured:
     ----------
     records : (row,)                            numbers in the data set
     values : by indicator, (row, channel)       NaN where a record cannot tell it
-    further : what else was made of each record's signals, (row, channel)
+    further : other values of each record's signals, (row, channel)
     """
 
     records: NDArray[np.intp]
@@ -62,7 +74,7 @@ class Measured:
 
 
 def some_records(data: Dataset, most: int) -> NDArray[np.intp]:
-    """Numbers of usable records, all or evenly so many of every class, in their order."""
+    """Numbers of usable records in their order: all, or at most so many, evenly of all classes."""
     usable = np.flatnonzero(data.usable)
     if usable.size <= most:
         return usable
@@ -75,9 +87,8 @@ def value_table(
 ) -> dict[str, Any]:
     """Columns of some records for the page: class numbers, and floats by name."""
     label = data.column("label")[records]
-    if label.size and (
-        label.min() < 0 or label.max() >= min(len(data.class_names), 255)
-    ):
+    n_classes = min(len(data.class_names), 255)
+    if not np.isin(label, np.arange(n_classes)).all():
         raise DatasetError(
             f"{data.folder} has labels beyond its class names; run gensig verify {data.folder}"
         )
@@ -90,7 +101,7 @@ def value_table(
 
 
 def drawn_columns(data: Dataset, records: NDArray[np.intp]) -> list[str]:
-    """Names of the numbers that differ between records: what was drawn first, then the other."""
+    """Names of the numbers that differ between records, drawn parameters first."""
     params = [name for name in data.column_names if name.startswith(f"{PARAMS}/")]
     found = []
     for name in [*params, *(name for name in PLAIN if name in data.column_names)]:
@@ -103,15 +114,14 @@ def drawn_columns(data: Dataset, records: NDArray[np.intp]) -> list[str]:
 
 
 def column_label(name: str) -> str:
-    """A column in words with its unit, such as 'fault.crack_depth_mm' of a parameter, 'torque, N
-    m'.
-    """
+    """A column in words with its unit, such as 'torque, N m'; a parameter by its key."""
     if name.startswith(f"{PARAMS}/"):
         return name.removeprefix(f"{PARAMS}/")
-    unit = COLUMNS[name].unit if name in COLUMNS else ""
-    if unit in ("", "1"):
-        return name.replace("_", " ")
-    return f"{name.rpartition('_')[0].replace('_', ' ')}, {unit}"  # the last part of such a name is its unit
+    words = name.split("_")
+    if name not in COLUMNS or COLUMNS[name].unit in ("", "1"):
+        return " ".join(words)
+    # The last part of such a name is its unit.
+    return f"{' '.join(words[:-1])}, {COLUMNS[name].unit}"
 
 
 def measure(
@@ -128,18 +138,15 @@ def measure(
     """
     records = some_records(data, MOST_MEASURED)
     rows = list(_rows(data, rotation, channels, records, further))
-    names = [name for name, _ in INDICATORS]
-    return Measured(
-        records=records,
-        values={name: np.array([row[name] for row in rows]) for name in names},
-        further={
-            name: np.array([row[name] for row in rows])
-            for name in rows[0]
-            if name not in names
-        }
-        if rows
-        else {},
-    )
+    values: dict[str, FloatArray] = {name: np.array([]) for name, _ in INDICATORS}
+    others: dict[str, FloatArray] = {}
+    for name in dict.fromkeys(chain.from_iterable(rows)):
+        column = np.array([row[name] for row in rows])
+        if name in values:
+            values[name] = column
+        else:
+            others[name] = column
+    return Measured(records=records, values=values, further=others)
 
 
 def _rows(
@@ -151,51 +158,34 @@ def _rows(
 ) -> Iterator[dict[str, FloatArray]]:
     turns = {gear: rotation.turns(gear) for gear in rotation.n_teeth}
     for index in records.tolist():
-        x = data.signals(
-            index, stop=min(data.n_samples, MOST_SAMPLES), channels=channels
-        ).astype(float)
+        n_read = min(data.n_samples, MOST_SAMPLES)
+        x = data.signals(index, stop=n_read, channels=channels).astype(float)
         x = x - x.mean(axis=-1, keepdims=True)
         row = {"rms": rms(x), "kurtosis": kurtosis(x), "crest_factor": crest_factor(x)}
         for gear in ("pinion", "wheel"):
-            row |= _of_turns(
-                x, data.sampling_rate, gear, turns, rotation.n_teeth, index
-            )
+            fourth = sidebands = np.full(x.shape[0], np.nan)
+            if gear in turns and turns[gear][index] > 0.0:
+                # A record without a whole turn keeps NaN.
+                with suppress(ValueError):
+                    rate, n_teeth = float(turns[gear][index]), rotation.n_teeth[gear]
+                    average = time_synchronous_average(x, data.sampling_rate, rate)
+                    fourth, sidebands = (
+                        fm4(average, n_teeth),
+                        sideband_ratio(average, n_teeth),
+                    )
+            row |= {f"fm4_{gear}": fourth, f"sideband_ratio_{gear}": sidebands}
         yield {**row, **further(x, data.sampling_rate)}
 
 
-def _of_turns(
-    x: FloatArray,
-    rate: float,
-    gear: str,
-    turns: dict[str, FloatArray],
-    n_teeth: dict[str, int],
-    index: int,
-) -> dict[str, FloatArray]:
-    """Indicators of the average turn.
-
-    NaN where the record holds no whole turn, or no speed is known.
-    """
-    names = (f"fm4_{gear}", f"sideband_ratio_{gear}")
-    unknown = np.full(x.shape[0], np.nan)
-    if gear not in turns or not turns[gear][index] > 0.0:
-        return dict.fromkeys(names, unknown)
-    try:
-        average = time_synchronous_average(x, rate, float(turns[gear][index]))
-        found = (fm4(average, n_teeth[gear]), sideband_ratio(average, n_teeth[gear]))
-    except ValueError:
-        return dict.fromkeys(names, unknown)
-    return dict(zip(names, found, strict=True))
-
-
 def has_lives(data: Dataset) -> bool:
-    """Whether the records are snapshots of lives."""
+    """True when the records are snapshots of lives."""
     return {"life_id", "life_time_h", "remaining_life_h"} <= set(data.column_names)
 
 
 def life_table(data: Dataset) -> dict[str, Any]:
-    """Whole lives, as many as `MOST_ROWS` records are.
+    """Snapshots of whole lives in the order of time, each with its life's number.
 
-    Snapshots in the order of time, beside their life's number.
+    There are as many lives as `MOST_ROWS` records make.
     """
     names = data.column("life_id")
     _, first = np.unique(names, return_index=True)

@@ -1,4 +1,4 @@
-"""The accelerometer on its mount, and the converter behind it."""
+"""Accelerometers on their mounts, and the converter behind them."""
 
 from __future__ import annotations
 
@@ -11,11 +11,26 @@ from numpy.typing import NDArray
 from gensig.errors import ConfigError
 from gensig.sensing.dropped import FILLS
 from gensig.sensing.transfer_path import SETTLED
-from gensig.units import unit
+from gensig.units import check_choice, check_limits, check_positive, unit
 
 Array = NDArray[np.float64]
 
 LONGEST_LOW = 0.1  # s
+GROUP = "sensing.sensor."
+LIMITS = {
+    "sensitivity_tolerance": (0.0, 0.5),
+    "transverse_sensitivity": (0.0, 0.5),
+    "mounted_resonance": (1e3, 1e6),
+    "resonance_damping_ratio": (1e-3, 1.0),
+    "low_cutoff": (0.01, 100.0),
+    "dc_offset_m_per_s2": (0.0, 1e6),
+    "adc_bits": (4, 24),
+    "max_clipped_fraction": (0.0, 1.0),
+    "drift_scatter": (0.0, 0.5),
+    "drift_time": (0.1, 1e6),
+    "dropped_fraction": (0.0, 0.5),
+    "dropped_run_samples": (1, 1_000_000),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,10 +38,10 @@ class Accelerometer:
     """Properties of all sensors of a data set; null or 0 leaves one out.
 
     ``sensitivity_tolerance`` and ``transverse_sensitivity`` are the largest shares,
-    ``dc_offset_m_per_s2`` the largest offset; each sensor of a gearbox has its own. A record
-    whose share of samples at the ends of the converter's range is above ``max_clipped_fraction``
-    is marked. Gains drift over a record by ``drift_scatter``, see ``drift``; samples get lost in
-    runs of ``dropped_run_samples``, see ``dropped``.
+    ``dc_offset_m_per_s2`` is the largest offset. Each sensor of a gearbox draws its values
+    within them. A record is marked when more than ``max_clipped_fraction`` of its samples lie at
+    the ends of the converter's range. Gains drift over a record by ``drift_scatter``, see
+    ``gain_drift``. Samples get lost in runs of ``dropped_run_samples``, see ``dropped``.
     """
 
     sensitivity_tolerance: float
@@ -45,67 +60,17 @@ class Accelerometer:
     dropped_fill: str
 
     def __post_init__(self) -> None:
-        for key in ("sensitivity_tolerance", "transverse_sensitivity"):
-            if not 0.0 <= getattr(self, key) <= 0.5:
-                raise ConfigError(
-                    f"sensing.sensor.{key} = {getattr(self, key):g} must lie in 0..0.5"
-                )
-        if (
-            self.mounted_resonance is not None
-            and not 1e3 <= self.mounted_resonance <= 1e6
-        ):
-            raise ConfigError(
-                f"sensing.sensor.mounted_resonance_hz = {self.mounted_resonance:g} must lie in 1e3..1e6, or be null"
-            )
-        if not 1e-3 <= self.resonance_damping_ratio < 1.0:
-            raise ConfigError(
-                f"sensing.sensor.resonance_damping_ratio = {self.resonance_damping_ratio:g} must lie in 0.001..1"
-            )
-        if self.low_cutoff is not None and not 0.01 <= self.low_cutoff <= 100.0:
-            raise ConfigError(
-                f"sensing.sensor.low_cutoff_hz = {self.low_cutoff:g} must lie in 0.01..100 Hz, or be null"
-            )
-        if not 0.0 <= self.dc_offset_m_per_s2 <= 1e6:
-            raise ConfigError(
-                f"sensing.sensor.dc_offset_m_per_s2 = {self.dc_offset_m_per_s2:g} must not be negative"
-            )
+        check_limits(self, GROUP, **LIMITS)
+        check_positive(self, GROUP, "adc_range_m_per_s2")
+        check_choice(f"{GROUP}dropped_fill", self.dropped_fill, FILLS)
         if (self.adc_range_m_per_s2 is None) != (self.adc_bits is None):
             raise ConfigError(
                 "sensing.sensor: give both adc_range_m_per_s2 and adc_bits, or null for both"
             )
-        if self.adc_range_m_per_s2 is not None and not self.adc_range_m_per_s2 > 0.0:
-            raise ConfigError(
-                f"sensing.sensor.adc_range_m_per_s2 = {self.adc_range_m_per_s2:g} must be positive"
-            )
-        if self.adc_bits is not None and not 4 <= self.adc_bits <= 24:
-            raise ConfigError(
-                f"sensing.sensor.adc_bits = {self.adc_bits} must lie in 4..24"
-            )
-        if not 0.0 <= self.max_clipped_fraction <= 1.0:
-            raise ConfigError(
-                f"sensing.sensor.max_clipped_fraction = {self.max_clipped_fraction:g} must lie in 0..1"
-            )
-        self._check_drift_and_loss()
-
-    def _check_drift_and_loss(self) -> None:
-        for key, value, low, high in (
-            ("drift_scatter", self.drift_scatter, 0.0, 0.5),
-            ("drift_time_s", self.drift_time, 0.1, 1e6),
-            ("dropped_fraction", self.dropped_fraction, 0.0, 0.5),
-            ("dropped_run_samples", self.dropped_run_samples, 1, 1_000_000),
-        ):
-            if not low <= value <= high:
-                raise ConfigError(
-                    f"sensing.sensor.{key} = {value:g} must lie in {low:g}..{high:g}"
-                )
-        if self.dropped_fill not in FILLS:
-            raise ConfigError(
-                f"sensing.sensor.dropped_fill = {self.dropped_fill!r}; allowed: {', '.join(FILLS)}"
-            )
 
     @property
     def is_ideal(self) -> bool:
-        """Whether it reports the motion at its place as it is, offset and converter apart."""
+        """True where it reports the motion unchanged, offset and converter apart."""
         filters = self.mounted_resonance is not None or self.low_cutoff is not None
         return not (
             filters or self.sensitivity_tolerance or self.transverse_sensitivity
@@ -115,15 +80,13 @@ class Accelerometer:
     def memory(self) -> float:
         """Time in which filters settle, s; 0 where nothing is filtered.
 
-        The low cut-off would take long, but has little to settle from: accelerations hold next to
-        nothing so low.
+        The low cut-off takes at most ``LONGEST_LOW``: accelerations hold next to nothing so low.
         """
-        slowest = (
-            0.0
-            if self.low_cutoff is None
-            else SETTLED / (2.0 * math.pi * self.low_cutoff)
-        )
-        return max(min(slowest, LONGEST_LOW), self.memory_of_resonance)
+        longest = self.memory_of_resonance
+        if self.low_cutoff is not None:
+            slowest = SETTLED / (2.0 * math.pi * self.low_cutoff)
+            longest = max(min(slowest, LONGEST_LOW), longest)
+        return longest
 
     @property
     def memory_of_resonance(self) -> float:
@@ -137,40 +100,32 @@ class Accelerometer:
     def filtered(self, signal: Array, sampling_rate: float) -> Array:
         """Mounted resonance and low cut-off, (sensor, sample).
 
-        The resonance may lie above half the sampling rate, where no recursive filter has it: the
-        spectrum is multiplied by w^2 / (w^2 - W^2 + 2 i zeta w W), exact at every frequency that
-        the signal has.
+        The resonance may lie above half the sampling rate, where no recursive filter has it. So
+        the spectrum is multiplied by w^2 / (w^2 - W^2 + 2 i zeta w W), exact at every frequency
+        that the signal has.
         """
+        from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
         from scipy.signal import butter, sosfilt
 
         if self.mounted_resonance is not None:
-            from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
-
             n_samples = signal.shape[1]
-            n_padded = next_fast_len(
-                n_samples + math.ceil(self.memory_of_resonance * sampling_rate),
-                real=True,
-            )
+            n_tail = math.ceil(self.memory_of_resonance * sampling_rate)
+            n_padded = next_fast_len(n_samples + n_tail, real=True)
             ratio = rfftfreq(n_padded, 1.0 / sampling_rate) / self.mounted_resonance
             response = 1.0 / (
                 1.0 - ratio**2 + 2j * self.resonance_damping_ratio * ratio
             )
-            signal = irfft(rfft(signal, n_padded, axis=1) * response, n_padded, axis=1)[
-                :, :n_samples
-            ]
+            padded = irfft(rfft(signal, n_padded, axis=1) * response, n_padded, axis=1)
+            signal = padded[:, :n_samples]
         if self.low_cutoff is not None:
-            signal = sosfilt(
-                butter(1, self.low_cutoff, "highpass", fs=sampling_rate, output="sos"),
-                signal,
-                axis=1,
+            sections = butter(
+                1, self.low_cutoff, "highpass", fs=sampling_rate, output="sos"
             )
+            signal = sosfilt(sections, signal, axis=1)
         return signal
 
     def digitised(self, signal: Array) -> tuple[Array, float]:
-        """What the converter gives, and the share of samples that lie outside its range.
-
-        (sensor, sample).
-        """
+        """Converter output, (sensor, sample), and share of samples outside its range."""
         if self.adc_range_m_per_s2 is None or self.adc_bits is None:
             return signal, 0.0
         half = 2 ** (self.adc_bits - 1)
@@ -182,7 +137,7 @@ class Accelerometer:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SensorSet:
-    """The sensors of one gearbox, (sensor,) each.
+    """Sensors of one gearbox, (sensor,) each.
 
     Gain, share of the transverse motion, offset in m/s2.
     """
@@ -195,7 +150,7 @@ class SensorSet:
 def draw_sensors(
     rng: np.random.Generator, sensor: Accelerometer, n_sensors: int
 ) -> SensorSet:
-    """Uniform within what the data sheet allows."""
+    """Sensors drawn uniformly within the limits of the data sheet."""
     gain, transverse, offset = rng.uniform(-1.0, 1.0, (3, n_sensors))
     return SensorSet(
         gain=1.0 + sensor.sensitivity_tolerance * gain,

@@ -1,8 +1,8 @@
-"""How far two solutions of one motion agree in what people use of them.
+"""Agreement of two solutions of one motion, in the quantities that people use.
 
-Point values of teeth that bounce mean little: a landing that comes later by a microsecond changes
+Point values of teeth that bounce mean little. A landing that comes later by a microsecond changes
 every sample after it, and nothing that anybody measures. Where bouncing is chaotic, no two
-solutions follow each other at any step; they are samples of one random process, and narrow bands
+solutions follow each other at any step. They are samples of one random process, and narrow bands
 differ: those of noise by 8.6 dB over the root of width x duration.
 """
 
@@ -40,26 +40,26 @@ class Agreement:
 
     @property
     def agrees(self) -> NDArray[np.bool_]:
-        """Whether both lie within their limits, (lane,)."""
+        """True where both lie within their limits, (lane,)."""
         return np.asarray(
             (self.third_octave_db <= THIRD_OCTAVE_DB) & (self.indicators <= INDICATORS)
         )
 
 
-def agreement(found: Array, exact: Array, sampling_rate: float) -> Agreement:
+def agreement(tested: Array, exact: Array, sampling_rate: float) -> Agreement:
     """Compare two solutions, (lane, channel, sample) each."""
     return Agreement(
-        third_octave_db=third_octave_difference(found, exact, sampling_rate),
-        indicators=indicator_difference(found, exact),
+        third_octave_db=third_octave_difference(tested, exact, sampling_rate),
+        indicators=indicator_difference(tested, exact),
     )
 
 
 def third_octave_bands(n_samples: int, sampling_rate: float) -> tuple[Array, Array]:
-    """Lower and upper edges of the bands that a signal resolves, from that at 20 Hz to the usable
-    band's end, Hz.
+    """Lower and upper edges of the third-octave bands that a signal resolves, Hz.
 
-    The usable band's end cuts the highest. Bands narrower than four lines of the signal's
-    spectrum are left out: a second resolves them from 20 Hz on, 50 ms from 400 Hz on.
+    They reach from the band at 20 Hz to the usable band's end, which cuts the highest. Bands
+    narrower than four lines of the signal's spectrum are left out: a second resolves them from
+    20 Hz on, 50 ms from 400 Hz on.
 
     Raises
     ------
@@ -69,9 +69,8 @@ def third_octave_bands(n_samples: int, sampling_rate: float) -> tuple[Array, Arr
     = 10^0.3.
     """
     highest = usable_band(sampling_rate)[1]
-    lower = 1000.0 * 10.0 ** (
-        (np.arange(LOWEST_BAND, math.log10(highest / 1000.0) * 10.0 + 1.0) - 0.5) / 10.0
-    )
+    numbers = np.arange(LOWEST_BAND, math.log10(highest / 1000.0) * 10.0 + 1.0)
+    lower = 1000.0 * 10.0 ** ((numbers - 0.5) / 10.0)
     upper = np.minimum(10.0**0.1 * lower, highest)
     resolved = upper - lower >= LINES * sampling_rate / n_samples
     if not resolved.any():
@@ -84,7 +83,7 @@ def third_octave_bands(n_samples: int, sampling_rate: float) -> tuple[Array, Arr
 def third_octave_power(signal: Array, sampling_rate: float) -> Array:
     """Mean square by third-octave band, (..., sample) to (..., band).
 
-    Of the power spectrum under a Hann window; a line that an edge crosses is shared in
+    It is that of the power spectrum under a Hann window. A line that an edge crosses is shared in
     proportion. Bands as ``third_octave_bands``.
     """
     n_samples = signal.shape[-1]
@@ -95,28 +94,27 @@ def third_octave_power(signal: Array, sampling_rate: float) -> Array:
     below = np.cumsum(lines, axis=-1)
 
     def power_below(edge: Array) -> Array:
-        place = (
-            edge * n_samples / sampling_rate + 0.5
-        )  # line k reaches from k - 0.5 to k + 0.5
-        line = place.astype(np.int64)
-        return np.asarray(below[..., line] - (line + 1 - place) * lines[..., line])
+        # line k reaches from k - 0.5 to k + 0.5
+        position = edge * n_samples / sampling_rate + 0.5
+        line = position.astype(np.int64)
+        return np.asarray(below[..., line] - (line + 1 - position) * lines[..., line])
 
     lower, upper = third_octave_bands(n_samples, sampling_rate)
     return power_below(upper) - power_below(lower)
 
 
-def third_octave_difference(found: Array, exact: Array, sampling_rate: float) -> Array:
+def third_octave_difference(tested: Array, exact: Array, sampling_rate: float) -> Array:
     """Largest difference of a third-octave level over channels and bands, (lane,) dB.
 
     Parameters
     ----------
-    found, exact : (lane, channel, sample)
+    tested, exact : (lane, channel, sample)
 
     Left out are bands that lie more than 60 dB below the channel's loudest in both: noise covers
     them.
     """
     powers, expected = (
-        third_octave_power(signal, sampling_rate) for signal in (found, exact)
+        third_octave_power(signal, sampling_rate) for signal in (tested, exact)
     )
     threshold = 10.0 ** (-HEARD_DB / 10.0) * expected.max(axis=-1, keepdims=True)
     unheard = np.maximum(powers, expected) <= threshold
@@ -125,20 +123,20 @@ def third_octave_difference(found: Array, exact: Array, sampling_rate: float) ->
     return np.asarray(np.where(unheard, 0.0, difference).max(axis=(-1, -2)))
 
 
-def indicator_difference(found: Array, exact: Array) -> Array:
+def indicator_difference(tested: Array, exact: Array) -> Array:
     """Largest relative difference of RMS, kurtosis and crest factor over channels, (lane,).
 
     Parameters
     ----------
-    found, exact : (lane, channel, sample)
+    tested, exact : (lane, channel, sample)
 
     Channels that are zero in both agree.
     """
     values, expected = (
         np.stack([indicator(signal) for indicator in (rms, kurtosis, crest_factor)])
-        for signal in (found, exact)
+        for signal in (tested, exact)
     )
-    still = ~(found.any(axis=-1) | exact.any(axis=-1))
+    still = ~(tested.any(axis=-1) | exact.any(axis=-1))
     with np.errstate(divide="ignore", invalid="ignore"):
         difference = np.abs(values / expected - 1.0)
     return np.asarray(np.where(still, 0.0, difference).max(axis=(0, -1)))

@@ -1,9 +1,10 @@
-"""The tones of a sound ball bearing: its orders, and the waviness that drives them."""
+"""Tones of a sound ball bearing: its orders, and the waviness that drives them."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,10 +13,9 @@ from gensig.errors import ConfigError
 from gensig.sensing.tones import (
     MOST_HARMONICS,
     TURN,
+    Limits,
     Nuisance,
     Tones,
-    check_number,
-    check_range,
     fixed,
     logarithmic,
     make_tones,
@@ -79,22 +79,23 @@ class Bearing(Nuisance):
     slip: tuple[float, ...]
     n_harmonics: int
     harmonic_exponent: float
+    limits: ClassVar[Limits] = {
+        "n_balls": (3, 200),
+        "ball_diameter": (1e-4, 1.0),
+        "pitch_diameter": (1e-3, 10.0),
+        "contact_angle": (0.0, math.radians(60.0)),
+        "n_harmonics": (1, MOST_HARMONICS),
+        "harmonic_exponent": (0.0, 10.0),
+    }
+    ranges: ClassVar[Limits] = {"waviness": (1e-10, 1e-4), "slip": (0.0, 0.2)}
 
     def __post_init__(self) -> None:
         Nuisance.__post_init__(self)
-        check_number("n_balls", self.n_balls, 3, 200)
-        check_number("ball_diameter_mm", self.ball_diameter, 1e-4, 1.0)
-        check_number("pitch_diameter_mm", self.pitch_diameter, 1e-3, 10.0)
         if not self.n_balls * self.ball_diameter < math.pi * self.pitch_diameter:
             raise ConfigError(
-                f"{self.n_balls} balls of ball_diameter_mm = {1e3 * self.ball_diameter:g} do not fit on "
-                f"pitch_diameter_mm = {1e3 * self.pitch_diameter:g}"
+                f"{self.n_balls} balls of ball_diameter_mm = {1e3 * self.ball_diameter:g} "
+                f"do not fit on pitch_diameter_mm = {1e3 * self.pitch_diameter:g}"
             )
-        check_number("contact_angle_deg", self.contact_angle, 0.0, math.radians(60.0))
-        check_range("waviness_um", self.waviness, 1e-10, 1e-4)
-        check_range("slip", self.slip, 0.0, 0.2)
-        check_number("n_harmonics", self.n_harmonics, 1, MOST_HARMONICS)
-        check_number("harmonic_exponent", self.harmonic_exponent, 0.0, 10.0)
 
     def draw(
         self,
@@ -103,24 +104,22 @@ class Bearing(Nuisance):
         dynamics: PairDynamics,
     ) -> Tones:
         """As ``Nuisance.draw``."""
-        n, count = self.n_balls, self.n_harmonics
+        n = self.n_balls
         outer, inner, ball, cage = (
             logarithmic(unit_rng, self.waviness) for _ in range(4)
         )
         along = fixed(TURN * unit_rng.random())
-        phases = TURN * unit_rng.random(
-            (5, MOST_HARMONICS)
-        )  # as many whatever n_harmonics is
-        slip, cage_angle, ball_angle = (
-            uniform(record_rng, self.slip),
-            *(TURN * record_rng.random(2)),
-        )
+        # as many draws whatever n_harmonics is
+        phases = TURN * unit_rng.random((5, MOST_HARMONICS))
+        slip = uniform(record_rng, self.slip)
+        cage_angle, ball_angle = TURN * record_rng.random(2)
         orders = bearing_orders(
             n, self.ball_diameter, self.pitch_diameter, self.contact_angle, slip
         )
-        forward, backward = turning(self.gear), turning(self.gear).conj()
+        forward = turning(self.gear)
+        backward = forward.conj()
         multiples, forces = [(0, 1, 0)], [cage * np.exp(1j * phases[0, 0]) * forward]
-        for k in range(1, count + 1):
+        for k in range(1, self.n_harmonics + 1):
             size = k**-self.harmonic_exponent * np.exp(1j * phases[:, k - 1])
             multiples += [
                 (0, k * n, 0),
@@ -133,8 +132,9 @@ class Bearing(Nuisance):
                 size[0] * outer * along,
                 size[1] * inner * forward,
                 size[2] * inner * backward,
+                size[3] * ball * forward,
+                size[4] * ball * backward,
             ]
-            forces += [size[3] * ball * forward, size[4] * ball * backward]
         begin = np.exp(
             1j * np.array(multiples) @ np.array([0.0, cage_angle, ball_angle])
         )

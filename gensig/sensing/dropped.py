@@ -13,10 +13,10 @@ FILLS = ("hold", "zero")
 def draw_dropped(
     rng: np.random.Generator, share: float, n_run: int, n_samples: int
 ) -> NDArray[np.bool_]:
-    """Which samples are lost, (sample,).
+    """Mask of lost samples, (sample,).
 
-    Samples travel in packets of ``n_run``; each is lost with probability ``share``, whatever
-    befalls the others. The first packet began anywhere before the record.
+    Samples travel in packets of ``n_run``. Each packet is lost with probability ``share``,
+    independent of the others. The first packet began anywhere before the record.
     """
     begun = int(rng.integers(n_run))
     lost = rng.random((begun + n_samples - 1) // n_run + 1) < share
@@ -24,10 +24,10 @@ def draw_dropped(
 
 
 def filled(signal: Array, dropped: NDArray[np.bool_], fill: str) -> Array:
-    """The signal, (sensor, sample), with something else where it was lost.
+    """Signal, (sensor, sample), with its losses filled.
 
-    ``hold`` repeats the last sample that came, before the first one that which comes first;
-    ``zero`` is 0. So is what is held where nothing came at all.
+    ``hold`` repeats the last sample that came; before the first one it takes that one. ``zero``
+    is 0. Where nothing came at all, both give 0.
     """
     if fill == "zero" or dropped.all():
         return np.where(dropped, 0.0, signal)

@@ -1,4 +1,4 @@
-"""An incremental encoder with an index mark, read as an angle."""
+"""Incremental encoders with an index mark, read as an angle."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.errors import ConfigError
 from gensig.sensing.tachometer import check_shaft
-from gensig.units import from_si, unit
+from gensig.units import check_limits, unit
 
 Array = NDArray[np.float64]
 
 MOST_LINES = 100_000
 MOST_ECCENTRICITY = math.radians(5.0)
-MOST_LINE_SHARE = 0.1  # standard deviation of a line's place over the spacing; with WIDEST no line passes another
+# standard deviation of a line's position over the spacing; with WIDEST no line passes another
+MOST_LINE_SHARE = 0.1
 WIDEST = 4.0  # standard deviations
 
 
@@ -25,8 +25,8 @@ class Encoder:
     """A disc with lines on a gear's shaft.
 
     ``eccentricity_error`` is the largest amplitude of the once-per-turn error and ``line_error``
-    the standard deviation of the place of each line, both in rad. ``quantised`` reads the last
-    line that passed, otherwise between lines too.
+    the standard deviation of the position of each line, both in rad. ``quantised`` reads the last
+    line that passed; otherwise the angle is read between lines too.
     """
 
     shaft: str
@@ -37,24 +37,13 @@ class Encoder:
 
     def __post_init__(self) -> None:
         check_shaft("encoder", self.shaft)
-        if not 4 <= self.lines_per_turn <= MOST_LINES:
-            raise ConfigError(
-                f"sensing.encoder.lines_per_turn = {self.lines_per_turn} must lie in 4..{MOST_LINES}"
-            )
-        for key, value, most, why in (
-            ("eccentricity_error_deg", self.eccentricity_error, MOST_ECCENTRICITY, ""),
-            (
-                "line_error_deg",
-                self.line_error,
-                MOST_LINE_SHARE * self.spacing,
-                ", a tenth of the spacing of the lines",
-            ),
-        ):
-            if not 0.0 <= value <= most * (1.0 + 1e-9):
-                given, allowed = (from_si(key, one) for one in (value, most))
-                raise ConfigError(
-                    f"sensing.encoder.{key} = {given:g} must lie in 0..{allowed:g}{why}"
-                )
+        check_limits(self, "sensing.encoder.", lines_per_turn=(4, MOST_LINES))
+        check_limits(
+            self,
+            "sensing.encoder.",
+            eccentricity_error=(0.0, MOST_ECCENTRICITY * (1.0 + 1e-9)),
+            line_error=(0.0, MOST_LINE_SHARE * self.spacing * (1.0 + 1e-9)),
+        )
 
     @property
     def spacing(self) -> float:
@@ -64,20 +53,18 @@ class Encoder:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Disc:
-    """The disc of one gearbox.
+    """Disc of one gearbox.
 
-    ``index`` rad is the angle of the gear at which the encoder reads 0; ``places`` (line,) rad
-    after it are those at which its lines pass: nominally 0, 1, 2, ... times their spacing, with
-    errors also beyond either end of a turn.
+    ``index`` rad is the angle of the gear at which the encoder reads 0. ``places`` (line,) rad
+    are the angles after it at which the lines pass. Nominally they are 0, 1, 2, ... times the
+    spacing; errors may move them beyond either end of a turn.
     """
 
     index: float
     places: Array
 
     def read(self, angle: Array, *, quantised: bool) -> Array:
-        """What the encoder says, (sample,) rad from its index on, at an angle of the gear,
-        (sample,) rad.
-        """
+        """Reading, (sample,) rad from the index, at an angle of the gear, (sample,) rad."""
         n_lines = len(self.places)
         places = np.concatenate(
             [self.places + turn * 2.0 * math.pi for turn in (-1.0, 0.0, 1.0)]
@@ -91,7 +78,7 @@ class Disc:
 
 
 def draw_disc(rng: np.random.Generator, encoder: Encoder) -> Disc:
-    """The disc of an encoder, see `draw_lines`."""
+    """Disc of an encoder, see `draw_lines`."""
     return draw_lines(
         rng, encoder.lines_per_turn, encoder.eccentricity_error, encoder.line_error
     )
@@ -100,17 +87,17 @@ def draw_disc(rng: np.random.Generator, encoder: Encoder) -> Disc:
 def draw_lines(
     rng: np.random.Generator, n_lines: int, eccentricity_error: float, line_error: float
 ) -> Disc:
-    """A disc with its errors: index and eccentricity in any direction, the latter of any size up
-    to the largest.
+    """Disc with drawn errors.
 
+    Index and eccentricity have any direction; the eccentricity has any size up to the largest.
     A disc whose center is off the shaft's by e is misread by e / R sin(angle + direction) at a
     reading radius R.
     """
     index, direction = rng.uniform(0.0, 2.0 * math.pi, 2)
     amplitude = eccentricity_error * float(rng.random())
     nominal = 2.0 * math.pi / n_lines * np.arange(n_lines)
-    own = np.clip(rng.standard_normal(n_lines), -WIDEST, WIDEST)
+    scatter = np.clip(rng.standard_normal(n_lines), -WIDEST, WIDEST)
     return Disc(
         index=float(index),
-        places=nominal + amplitude * np.sin(nominal + direction) + line_error * own,
+        places=nominal + amplitude * np.sin(nominal + direction) + line_error * scatter,
     )

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-POINTS_PER_TIME = 20  # in a correlation time; between them the logarithm is straight: 2.4 % less variance midway
+# in a correlation time; between them the logarithm is straight: 2.4 % less variance midway
+POINTS_PER_TIME = 20
 
 
 def draw_drift(
@@ -20,12 +21,12 @@ def draw_drift(
     n_samples: int,
     rate: float,
 ) -> Array:
-    """Factor of each sensor at every sample, (sensor, sample): the exponential of a
-    mean-reverting walk.
+    """Factor of each sensor at every sample, (sensor, sample).
 
-    The walk is stationary, so it also holds what mounting and temperature are at the first
-    sample. It is drawn exactly at even points, x(k + 1) = a x(k) + scatter sqrt(1 - a^2) n(k)
-    with a = exp(-step / correlation time), and is straight between them.
+    It is the exponential of a mean-reverting walk. The walk is stationary, so it also holds the
+    state of mounting and temperature at the first sample. It is drawn exactly at even points,
+    x(k + 1) = a x(k) + scatter sqrt(1 - a^2) n(k) with a = exp(-step / correlation time), and is
+    straight between them.
 
     Parameters
     ----------
@@ -45,4 +46,5 @@ def draw_drift(
     for k in range(1, len(normal)):
         walk[k] = kept * walk[k - 1] + math.sqrt(1.0 - kept**2) * normal[k]
     times, points = np.arange(n_samples) / rate, step * np.arange(len(walk))
-    return np.exp(scatter * np.stack([np.interp(times, points, one) for one in walk.T]))
+    straight = np.stack([np.interp(times, points, column) for column in walk.T])
+    return np.exp(scatter * straight)

@@ -14,9 +14,8 @@ from gensig.errors import ConfigError
 from gensig.geometry.gear import Gear
 
 LOWEST_GRADE, HIGHEST_GRADE = 1, 11
-# what clause 1 covers: teeth, reference diameter and normal module in mm; face width (4 to 1200
-# mm) and helix angle
-# (to 45 degrees) stand in none of the formulas below
+# range of clause 1: teeth, reference diameter and normal module in mm; face width (4 to 1200 mm)
+# and helix angle (to 45 degrees) stand in none of the formulas below
 TEETH, DIAMETER, MODULE = (5, 1000), (5.0, 15_000.0), (0.5, 70.0)
 
 
@@ -36,11 +35,8 @@ def cumulative_pitch_limit(gear: Gear, grade: float) -> float:
     as above.
     """
     diameter = _diameter(gear)
-    return _limit(
-        gear,
-        grade,
-        0.002 * diameter + 0.55 * math.sqrt(diameter) + 0.7 * _module(gear) + 12.0,
-    )
+    total = 0.002 * diameter + 0.55 * math.sqrt(diameter) + 0.7 * _module(gear) + 12.0
+    return _limit(gear, grade, total)
 
 
 def profile_slope_limit(gear: Gear, grade: float) -> float:
@@ -76,8 +72,8 @@ def check_covered(gear: Gear) -> None:
     ):
         if not low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9):
             raise ConfigError(
-                f"quality.iso1328_grade: ISO 1328-1:2013 covers {low:g} to {high:g} {what}, the {gear.name} has "
-                f"{value:g}; set quality.iso1328_grade=null for perfect gears"
+                f"quality.iso1328_grade: ISO 1328-1:2013 covers {low:g} to {high:g} {what}, "
+                f"the {gear.name} has {value:g}; set quality.iso1328_grade=null for perfect gears"
             )
 
 

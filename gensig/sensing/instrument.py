@@ -1,12 +1,10 @@
-"""Transfer path and sensors of one gearbox.
-
-From its bearings' accelerations to what is recorded of them.
-"""
+"""Instrument of one gearbox: its transfer path and sensors, from bearings to the record."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +19,7 @@ from gensig.sensing.chain import (
 )
 from gensig.sensing.dropped import draw_dropped, filled
 from gensig.sensing.gain_drift import draw_drift
-from gensig.sensing.measured_path import ImpulseResponses, read_responses
+from gensig.sensing.measured_path import ImpulseResponses
 from gensig.sensing.noise import band_power
 from gensig.sensing.transfer_path import Housing, ModalPath, draw_housing
 
@@ -30,14 +28,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Instrument:
-    """What was drawn for one gearbox; None where its part of the chain changes nothing."""
+    """Drawn path and sensors of one gearbox; None where its part of the chain changes nothing."""
 
     sensing: Sensing
     path: Housing | ImpulseResponses | None
     sensors: SensorSet | None
 
     def measure(self, source: Array) -> Array:
-        """What the sensors put out before noise and conversion.
+        """Output of the sensors before noise and conversion.
 
         Linear. Filters start from rest and settle in the first ``sensing.n_lead`` samples, which
         are left out.
@@ -50,24 +48,25 @@ class Instrument:
         -------
         (sensor, sample) m/s2
         """
-        sensor = self.sensing.sensor
-        filters = sensor is not None and not sensor.is_ideal
+        sensor, sensors = self.sensing.sensor, self.sensors
+        filters = sensor is not None and sensors is not None and not sensor.is_ideal
         if self.path is None and not filters:
             return source
         lines = self._at_sensors(source)
         n_sensors = len(self.sensing.channel_names)
         signal = lines[:n_sensors]
-        if filters and sensor is not None and self.sensors is not None:
+        if sensor is not None and sensors is not None and filters:
             if sensor.transverse_sensitivity:
-                signal = signal + self.sensors.transverse[:, None] * lines[n_sensors:]
+                signal = signal + sensors.transverse[:, None] * lines[n_sensors:]
             signal = sensor.filtered(
-                self.sensors.gain[:, None] * signal, self.sensing.sampling_rate
+                sensors.gain[:, None] * signal, self.sensing.sampling_rate
             )
         return np.ascontiguousarray(signal[:, self.sensing.n_lead :])
 
     def drift(self, n_samples: int, rng: np.random.Generator) -> Array:
-        """Factor of each sensor's gain over one record, (sensor, sample), or (1, 1) of 1 where
-        none drifts.
+        """Factor of each sensor's gain over one record, (sensor, sample).
+
+        (1, 1) of 1 where none drifts.
         """
         sensor, n_sensors = self.sensing.sensor, len(self.sensing.channel_names)
         if sensor is None or not sensor.drift_scatter:
@@ -78,35 +77,32 @@ class Instrument:
         )
 
     def power(self, signal: Array) -> Array:
-        """Mean square without the mean in the band of the signal-to-noise ratio, (sensor,)
-        (m/s2)^2.
+        """Mean square without the mean in the band of the signal-to-noise ratio.
+
+        (sensor,) (m/s2)^2.
         """
         noise = self.sensing.noise
-        return (
-            power(signal)
-            if noise is None
-            else band_power(signal, self.sensing.sampling_rate, noise.band)
-        )
+        if noise is None:
+            return power(signal)
+        return band_power(signal, self.sensing.sampling_rate, noise.band)
 
     def record(
         self, clean: Array, noise_power: Array, rng: np.random.Generator
     ) -> tuple[Array, float]:
-        """Noise of the given power in the band added, offset and converter applied.
+        """Record with noise of the given power in the band, offset and converter.
 
-        And the share that clips.
+        Returns the signal, (sensor, sample), and the share of samples that clip.
         """
         noise, sensor = self.sensing.noise, self.sensing.sensor
+        noisy = clean
         if noise is None or noise.is_white:
             noisy = add_noise(clean, noise_power, rng)
         elif np.any(noise_power > 0.0):
-            place = self.sensing.place(clean.shape[1])
+            receiver = self.sensing.receiver(clean.shape[1])
             if self.path is not None:
-                place = replace(
-                    place, through_path=lambda own: self._coloured(own, clean.shape[1])
-                )
-            noisy = clean + noise.make(noise_power, rng, place)
-        else:
-            noisy = clean
+                coloured = partial(self._coloured, self.path, clean.shape[1])
+                receiver = replace(receiver, through_path=coloured)
+            noisy = clean + noise.make(noise_power, rng, receiver)
         if sensor is None:
             return noisy, 0.0
         if sensor.dc_offset_m_per_s2 and self.sensors is not None:
@@ -114,9 +110,9 @@ class Instrument:
         return sensor.digitised(noisy)
 
     def sent(self, signal: Array, rng: np.random.Generator) -> tuple[Array, float]:
-        """What of a record, (sensor, sample), reaches the file, losses filled.
+        """Record as it reaches the file, (sensor, sample), and the share of lost samples.
 
-        And the share of samples that do not.
+        Losses are filled.
         """
         sensor = self.sensing.sensor
         if sensor is None or not sensor.dropped_fraction:
@@ -127,44 +123,40 @@ class Instrument:
         return filled(signal, dropped, sensor.dropped_fill), float(np.mean(dropped))
 
     def _at_sensors(self, source: Array) -> Array:
-        """Motion along the sensors' own axes, then, where it is known, across them, (line,
-        sample).
-        """
+        """Motion along the sensors' main axes, then, where known, across them, (line, sample)."""
         if self.path is not None:
             return self.path.apply(source, self.sensing.sampling_rate)
         sensor, names = self.sensing.sensor, self.sensing.channels
         if sensor is None or not sensor.transverse_sensitivity:
             return source
-        return np.concatenate(
-            [source, source[[names.index(transverse_channel(name)) for name in names]]]
-        )
+        across = [names.index(transverse_channel(name)) for name in names]
+        return np.concatenate([source, source[across]])
 
-    def _coloured(self, rng: np.random.Generator, n_samples: int) -> Array:
-        if self.path is None:
-            raise ValueError("noise coloured by the path needs one")
-        n_lead = math.ceil(
-            min(self.path.memory, LONGEST_LEAD) * self.sensing.sampling_rate
-        )
-        source = rng.standard_normal((len(self.sensing.channels), n_lead + n_samples))
-        lines = self.path.apply(source, self.sensing.sampling_rate)
+    def _coloured(
+        self,
+        path: Housing | ImpulseResponses,
+        n_samples: int,
+        rng: np.random.Generator,
+    ) -> Array:
+        """White noise at the bearings as the sensors hear it through the path."""
+        rate, n_channels = self.sensing.sampling_rate, len(self.sensing.channels)
+        n_lead = math.ceil(min(path.memory, LONGEST_LEAD) * rate)
+        source = rng.standard_normal((n_channels, n_lead + n_samples))
+        lines = path.apply(source, rate)
         return lines[: len(self.sensing.channel_names), n_lead:]
 
 
 def draw_instrument(
     sensing: Sensing, path_rng: np.random.Generator, sensor_rng: np.random.Generator
 ) -> Instrument:
-    """Transfer path and sensors of one gearbox, each from its own random numbers."""
+    """Transfer path and sensors of one gearbox, each from separate random numbers."""
     n_sensors = len(sensing.channel_names)
     path: Housing | ImpulseResponses | None = None
     if isinstance(sensing.path, ModalPath):
         path = draw_housing(path_rng, sensing.path, len(sensing.channels), n_sensors)
     elif sensing.path is not None:
-        path = read_responses(
-            sensing.path, sensing.channels, sensing.channel_names, sensing.sampling_rate
-        )
-    sensors = (
-        None
-        if sensing.sensor is None
-        else draw_sensors(sensor_rng, sensing.sensor, n_sensors)
-    )
+        path = sensing.responses(sensing.path)
+    sensors = None
+    if sensing.sensor is not None:
+        sensors = draw_sensors(sensor_rng, sensing.sensor, n_sensors)
     return Instrument(sensing=sensing, path=path, sensors=sensors)

@@ -1,4 +1,4 @@
-"""What differs from one specimen and one gearbox to the next.
+"""Differences between specimens (sets of gears) and between gearboxes.
 
 See ``docs/theory/manufacturing.md``.
 """
@@ -25,13 +25,16 @@ from gensig.sensing.gear_tolerances import (
     runout_limit,
     single_pitch_limit,
 )
-from gensig.units import from_si, unit
+from gensig.units import check_limits, from_si, unit
 
 Array = NDArray[np.float64]
 
-FORM_WAVES = 3  # most waves of the form deviation from end to end; whole ones have no slope of their own
+# most waves of the form deviation from end to end; whole ones have no slope
+FORM_WAVES = 3
 SUPPORT_SCATTERS = ("support_stiffness_scatter", "support_damping_scatter")
-RUNOUT_STEPS = 20  # in which the eccentricity is made smaller until the index deviation fits its limit
+# in which the eccentricity is made smaller until the index deviation fits its limit
+# in which the eccentricity is made smaller until the index deviation fits its limit
+RUNOUT_STEPS = 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,20 +78,9 @@ class Quality:
             raise ConfigError(
                 "quality.used_share_low and used_share_high must be ordered and lie in 0..1"
             )
-        for key in (
-            "tooth_share",
-            "undulation_share",
-            "backlash_scatter",
-            *SUPPORT_SCATTERS,
-        ):
-            if not 0.0 <= getattr(self, key) <= 1.0:
-                raise ConfigError(
-                    f"quality.{key} = {getattr(self, key):g} must lie in 0..1"
-                )
-        if not 1 <= self.undulation_waves <= 50:
-            raise ConfigError(
-                f"quality.undulation_waves = {self.undulation_waves} must lie in 1..50"
-            )
+        shares = ("tooth_share", "undulation_share", "backlash_scatter")
+        limits = dict.fromkeys((*shares, *SUPPORT_SCATTERS), (0.0, 1.0))
+        check_limits(self, "quality.", **limits, undulation_waves=(1, 50))
         if self.misalignment < 0.0:
             value = from_si("misalignment_um", self.misalignment)
             raise ConfigError(
@@ -99,7 +91,8 @@ class Quality:
             low is not None and high is not None and not 0.0 < low <= high <= 1.0
         ):
             raise ConfigError(
-                f"quality.support_damping_ratio_low = {low} and support_damping_ratio_high = {high} must be ordered, "
+                f"quality.support_damping_ratio_low = {low} and support_damping_ratio_high = "
+                f"{high} must be ordered, "
                 "above 0 and at most 1, or both null"
             )
 
@@ -116,7 +109,9 @@ class Quality:
         None where supports give their damping.
         """
         low, high = self.support_damping_ratio_low, self.support_damping_ratio_high
-        return None if low is None or high is None else float(np.sqrt(low * high))
+        if low is None or high is None:
+            return None
+        return float(np.sqrt(low * high))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,9 +120,11 @@ class Specimen:
 
     Parameters
     ----------
-    pinion_error, wheel_error : (tooth,) m    how far every tooth stands back at the pitch point, as a gap
-    pinion_tilt, wheel_tilt : (tooth,) m/m    how fast that grows with the contact's position along the path; 0: nowhere
-    forms : what the flanks of all teeth share, as transforms that come before a record's own faults
+    pinion_error, wheel_error : (tooth,) m    how far every tooth stands back at the pitch point,
+        as a gap
+    pinion_tilt, wheel_tilt : (tooth,) m/m    how fast that grows with the contact's position along
+        the path; 0: nowhere
+    forms : deviations that the flanks of all teeth share, as transforms before a record's faults
     backlash_factor : on the nominal backlash
     """
 
@@ -174,22 +171,21 @@ def draw_specimen(
         (pinion_error, pinion_tilt, pinion_forms),
         (wheel_error, wheel_tilt, wheel_forms),
     ) = drawn
-    misalignment = Misalignment(
-        gear=pinion.name,
-        tooth=ALL,
-        misalignment=tilted * quality.misalignment,
-        limit=max(quality.misalignment, 1e-6),
-    )
+    forms = [*pinion_forms, *wheel_forms]
+    misalignment = tilted * quality.misalignment
+    if misalignment:
+        limit = max(quality.misalignment, 1e-6)
+        forms.append(
+            Misalignment(
+                gear=pinion.name, tooth=ALL, misalignment=misalignment, limit=limit
+            )
+        )
     return Specimen(
         pinion_error=pinion_error,
         wheel_error=wheel_error,
         pinion_tilt=pinion_tilt,
         wheel_tilt=wheel_tilt,
-        forms=(
-            *pinion_forms,
-            *wheel_forms,
-            *((misalignment,) if misalignment.misalignment else ()),
-        ),
+        forms=tuple(forms),
         backlash_factor=1.0 + play * quality.backlash_scatter,
     )
 
@@ -200,10 +196,8 @@ def _draw_gear(
     """Errors (tooth,) m, tilts (tooth,) m/m and the common form of the flanks of one gear."""
     share = rng.uniform(quality.used_share_low, quality.used_share_high)
     runout_share, angle = rng.random(), rng.uniform(0.0, 2.0 * math.pi)
-    shape, of_teeth = (
-        rng.standard_normal(gear.n_teeth),
-        rng.uniform(-1.0, 1.0, gear.n_teeth),
-    )
+    shape = rng.standard_normal(gear.n_teeth)
+    of_teeth = rng.uniform(-1.0, 1.0, gear.n_teeth)
     sign, waves = rng.choice((-1.0, 1.0)), int(rng.integers(1, FORM_WAVES + 1))
     if quality.iso1328_grade is None:
         return np.zeros(gear.n_teeth), np.zeros(gear.n_teeth), ()
@@ -223,29 +217,28 @@ def _draw_gear(
         math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
         - gear.junction_curvature_radius
     )
-    towards_tip = (
-        1.0 if gear.name == "pinion" else -1.0
-    )  # as the contact runs along the path
+    # as the contact runs along the path
+    towards_tip = -1.0
+    if gear.name == "pinion":
+        towards_tip = 1.0
     tilt = tilt + towards_tip * quality.tooth_share * slope / involute * of_teeth
+    common_slope = sign * (1.0 - quality.tooth_share) * slope
+    common_form = (1.0 - quality.undulation_share) * form
     parts = (
-        (
-            sign * (1.0 - quality.tooth_share) * slope,
-            (1.0 - quality.undulation_share) * form,
-            waves,
-        ),
+        (common_slope, common_form, waves),
         (0.0, quality.undulation_share * form, quality.undulation_waves),
     )
     forms = tuple(
         ProfileError(
             gear=gear.name,
             tooth=ALL,
-            profile_slope=float(own_slope),
+            profile_slope=float(part_slope),
             profile_form=float(height),
             profile_waves=float(n_waves),
             limit=slope + form,
         )
-        for own_slope, height, n_waves in parts
-        if own_slope or height
+        for part_slope, height, n_waves in parts
+        if part_slope or height
     )
     return error, tilt, forms
 
@@ -260,7 +253,7 @@ def _scaled_index(
 ) -> tuple[float, Array]:
     """Eccentricity in m and random pitch errors (tooth,) m that keep to the share of three limits.
 
-    The random part has no once-per-turn part of its own, so that all runout is the
+    The random part has no once-per-turn part, so that all runout is the
     eccentricity's. It is as large as the single pitch deviation allows; the eccentricity starts
     at ``runout_share`` of what the runout allows and shrinks until the total index deviation
     fits. Arcs on the reference circle are cos(alpha) long along the line of action.
@@ -271,24 +264,18 @@ def _scaled_index(
         random = random - 2.0 / gear.n_teeth * (random @ once) * once
     once = np.cos(turn - angle)
     arc = share * math.cos(gear.transverse_pressure_angle)
-    step, total = (
-        arc * single_pitch_limit(gear, grade),
-        arc * cumulative_pitch_limit(gear, grade),
-    )
+    step = arc * single_pitch_limit(gear, grade)
+    total = arc * cumulative_pitch_limit(gear, grade)
     steps, steps_once = (np.diff(part, append=part[0]) for part in (random, once))
-    tried = np.linspace(
-        0.5 * runout_share * share * runout_limit(gear, grade), 0.0, RUNOUT_STEPS + 1
-    )
+    most = 0.5 * runout_share * share * runout_limit(gear, grade)
+    tried = np.linspace(most, 0.0, RUNOUT_STEPS + 1)
     # the largest random part at which no step of the sum is above its limit
-    room = np.where(
-        np.abs(steps_once) * tried[:, None] <= step,
-        step - np.sign(steps) * tried[:, None] * steps_once,
-        0.0,
-    )
+    fits_once = np.abs(steps_once) * tried[:, None] <= step
+    left = step - np.sign(steps) * tried[:, None] * steps_once
+    room = np.where(fits_once, left, 0.0)
     height = (room / np.maximum(np.abs(steps), 1e-300)).min(axis=1)
-    fits = (
-        np.ptp(tried[:, None] * once + height[:, None] * random, axis=1) <= total
-    ) & (height > 0.0)
+    index = tried[:, None] * once + height[:, None] * random
+    fits = (np.ptp(index, axis=1) <= total) & (height > 0.0)
     if fits.any():
         first = int(fits.argmax())
         return float(tried[first]), height[first] * random
@@ -328,12 +315,12 @@ def nominal_gearbox(n_channels: int) -> Gearbox:
 def with_damping_ratio(
     gearbox: Gearbox, rng: np.random.Generator, quality: Quality
 ) -> Gearbox:
-    """The gearbox with a damping ratio for each of its four supports, log-uniform, where
-    ``quality`` has a range.
+    """Gearbox with a log-uniform damping ratio for each of its four supports.
+
+    Without a range in ``quality`` the gearbox stays as it is.
     """
     low, high = quality.support_damping_ratio_low, quality.support_damping_ratio_high
     if low is None or high is None:
         return gearbox
-    return replace(
-        gearbox, damping_ratio=np.exp(rng.uniform(np.log(low), np.log(high), 4))
-    )
+    ratio = np.exp(rng.uniform(np.log(low), np.log(high), 4))
+    return replace(gearbox, damping_ratio=ratio)

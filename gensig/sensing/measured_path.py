@@ -1,6 +1,6 @@
-"""A transfer path that a user measured.
+"""Transfer path that a user measured.
 
-Frequency or impulse responses from every bearing channel to every sensor.
+The file has frequency or impulse responses from every bearing channel to every sensor.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ NON_CAUSAL = 0.05  # share of a response's energy that may come before time 0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeasuredPath:
-    """A CSV file, accelerations at the sensors over accelerations at the bearings.
+    """CSV file of accelerations at the sensors over accelerations at the bearings.
 
-    Columns ``frequency_hz`` and ``<channel>_to_<sensor>_real`` and ``_imaginary``, or ``time_s``
-    and ``<channel>_to_<sensor>``, the response to a single sample of 1 m/s2; one for every
-    channel and sensor.
+    Its columns are ``frequency_hz`` with ``<channel>_to_<sensor>_real`` and ``_imaginary``, or
+    ``time_s`` with ``<channel>_to_<sensor>``, the response to a single sample of 1 m/s2. Every
+    channel and sensor has its columns.
     """
 
     file: str
@@ -49,8 +49,9 @@ class ImpulseResponses:
         return self.taps.shape[2] / self.sampling_rate
 
     def apply(self, source: Array, sampling_rate: float) -> Array:
-        """Accelerations at the sensors from those at the bearings, (channel, sample) to (sensor,
-        sample).
+        """Accelerations at the sensors from those at the bearings.
+
+        (channel, sample) to (sensor, sample).
         """
         from scipy.signal import oaconvolve
 
@@ -58,10 +59,8 @@ class ImpulseResponses:
             raise ValueError(
                 f"responses at {self.sampling_rate:g} Hz, signal at {sampling_rate:g} Hz"
             )
-        out: Array = oaconvolve(source[None], self.taps, axes=2)[
-            :, :, : source.shape[1]
-        ].sum(axis=1)
-        return out
+        responses: Array = oaconvolve(source[None], self.taps, axes=2)
+        return np.asarray(responses[:, :, : source.shape[1]].sum(axis=1))
 
 
 @lru_cache(maxsize=4)
@@ -102,7 +101,7 @@ def _impulse_responses(
     """Causal impulse responses of frequency responses, (pair, line) to (pair, sample).
 
     The response goes straight between the lines given and is held beyond them: records have
-    nothing above the usable band. Half of the inverse transform is time before 0; what a
+    nothing above the usable band. Half of the inverse transform is time before 0. What a
     measurement has there is left out, and refused where it is more than a trace.
     """
     where = f"{KEY} = {file}"
@@ -114,7 +113,8 @@ def _impulse_responses(
     highest = usable_band(sampling_rate)[1]
     if frequency[0] > LOWEST_HZ or frequency[-1] < highest:
         raise ConfigError(
-            f"{where} reaches from {frequency[0]:g} to {frequency[-1]:g} Hz; {LOWEST_HZ:g} to {highest:g} Hz is needed"
+            f"{where} reaches from {frequency[0]:g} to {frequency[-1]:g} Hz; "
+            f"{LOWEST_HZ:g} to {highest:g} Hz is needed"
         )
     n_taps = 2 * math.ceil(sampling_rate / float(step.min()))
     if n_taps > MOST_TAPS:
@@ -122,23 +122,15 @@ def _impulse_responses(
             f"{where}: lines {step.min():g} Hz apart are too narrow; thin them out"
         )
     grid = np.fft.rfftfreq(n_taps, 1.0 / sampling_rate)
-    even = np.stack(
-        [
-            np.interp(grid, frequency, row.real)
-            + 1j * np.interp(grid, frequency, row.imag)
-            for row in response
-        ]
-    )
+    even = np.array([np.interp(grid, frequency, row) for row in response])
     taps = np.fft.irfft(even, n_taps, axis=1)
     half = n_taps // 2
-    early = float(
-        np.max(
-            np.sum(taps[:, half:] ** 2, axis=1)
-            / np.maximum(np.sum(taps**2, axis=1), 1e-300)
-        )
-    )
+    energy = taps**2
+    share = energy[:, half:].sum(axis=1) / np.maximum(energy.sum(axis=1), 1e-300)
+    early = float(share.max())
     if early > NON_CAUSAL:
         raise ConfigError(
-            f"{where}: {100.0 * early:.0f} % of a response's energy comes before time 0; shift it to be causal"
+            f"{where}: {100.0 * early:.0f} % of a response's energy comes before time 0; "
+            "shift it to be causal"
         )
     return taps[:, :half]

@@ -1,37 +1,38 @@
-"""What else a sensor hears.
-
-Parts of noise, mixed by their shares of the power and set to one level.
-"""
+"""Noise of a sensor: parts mixed by their shares of the power and set to one level."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import lru_cache
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics.decimation import usable_band
 from gensig.errors import ConfigError
+from gensig.sensing.tones import Limits
 from gensig.sensing.transfer_path import SETTLED, mode_section
 from gensig.text.user_file import check_columns, check_rate, read_table
-from gensig.units import read, unit
+from gensig.units import check_limits, check_positive, is_number, read_kind, unit
 
 Array = NDArray[np.float64]
 
 BLOCK = 256  # samples
-SIDEBAND = 0.5  # assumed; amplitude of the first pair of sidebands of another machine's tones, over the tone's
+# assumed; amplitude of the first pair of sidebands of another machine's tones, over the tone's
+SIDEBAND = 0.5
+FILE_KEY = "sensing.noise: file"
+SHARED = "background"  # column of a file that stands for all sensors
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
-    """Where noise is heard.
+class Receiver:
+    """Sensors that hear the noise of one record.
 
-    Names of the sensors, samples, rate, and white noise at the bearings as they hear it.
+    ``through_path`` makes white noise at the bearings as the sensors hear it.
     """
 
     sensors: tuple[str, ...]
@@ -44,40 +45,45 @@ class Place:
         """(sensor, sample)."""
         return len(self.sensors), self.n_samples
 
+    @property
+    def frequency(self) -> Array:
+        """Frequencies of the record's spectrum, (line,) Hz."""
+        step = 1.0 / self.sampling_rate
+        return np.asarray(np.fft.rfftfreq(self.n_samples, step), dtype=np.float64)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part(ABC):
-    """One part of the noise; ``share`` is its power beside those of the others."""
+    """One part of the noise.
 
+    ``share`` is its power relative to the other parts. ``limits`` are those of fields that need
+    not be positive only; ``is_broad`` is True where any band has some of the noise.
+    """
+
+    limits: ClassVar[Limits] = {}
+    is_broad: ClassVar[bool] = True
     share: float
 
     def __post_init__(self) -> None:
-        for name in self.__dataclass_fields__:
-            value = getattr(self, name)
-            if (
-                isinstance(value, int | float)
-                and not value > 0
-                and name != "frequency_scatter"
-            ):
-                raise ConfigError(f"{name} = {value:g} must be positive")
-
-    @property
-    def is_broad(self) -> bool:
-        """Whether any band has some of it."""
-        return True
+        names = [field.name for field in fields(self) if field.name != "file"]
+        check_positive(self, "", *(name for name in names if name not in self.limits))
+        check_limits(self, "", **self.limits)
 
     @abstractmethod
-    def make(self, rng: np.random.Generator, place: Place) -> Array:
-        """The noise at any level, (sensor, sample)."""
+    def make(self, rng: np.random.Generator, receiver: Receiver) -> Array:
+        """Noise at any level, (sensor, sample)."""
+
+    def check(self, receiver: Receiver) -> None:  # noqa: B027  most parts have no file
+        """Raise ConfigError where a user's file does not fit the sensors of a record."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class White(Part):
     """Gaussian, independent from sensor to sensor."""
 
-    def make(self, rng: np.random.Generator, place: Place) -> Array:
+    def make(self, rng: np.random.Generator, receiver: Receiver) -> Array:
         """As ``Part.make``."""
-        return rng.standard_normal(place.shape)
+        return rng.standard_normal(receiver.shape)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,97 +92,81 @@ class Pink(Part):
 
     lowest: float = unit("hz")
 
-    def make(self, rng: np.random.Generator, place: Place) -> Array:
+    def make(self, rng: np.random.Generator, receiver: Receiver) -> Array:
         """As ``Part.make``."""
-        frequency = np.fft.rfftfreq(place.n_samples, 1.0 / place.sampling_rate)
-        spectrum = np.fft.rfft(rng.standard_normal(place.shape), axis=1)
-        return np.fft.irfft(
-            spectrum / np.sqrt(np.maximum(frequency, self.lowest)),
-            place.n_samples,
-            axis=1,
-        )
+        spectrum = np.fft.rfft(rng.standard_normal(receiver.shape), axis=1)
+        pink = spectrum / np.sqrt(np.maximum(receiver.frequency, self.lowest))
+        return np.fft.irfft(pink, receiver.n_samples, axis=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThroughPath(Part):
     """White noise at the bearings, coloured by the transfer path; sensors hear the same sources."""
 
-    def make(self, rng: np.random.Generator, place: Place) -> Array:
+    def make(self, rng: np.random.Generator, receiver: Receiver) -> Array:
         """As ``Part.make``."""
-        if place.through_path is None:
+        if receiver.through_path is None:
             raise ValueError("noise coloured by the path needs one")
-        return place.through_path(rng)
+        return receiver.through_path(rng)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hum(Part):
     """Mains pick-up.
 
-    Harmonic k has the amplitude 1 / k (assumed) and its own phase in each sensor.
+    Harmonic k has the amplitude 1 / k (assumed) and a separate phase in each sensor.
     """
 
+    is_broad: ClassVar[bool] = False
     mains: float = unit("hz")
     n_harmonics: int
 
-    @property
-    def is_broad(self) -> bool:
-        """As ``Part.is_broad``."""
-        return False
-
-    def make(self, rng: np.random.Generator, place: Place) -> Array:
+    def make(self, rng: np.random.Generator, receiver: Receiver) -> Array:
         """As ``Part.make``."""
         harmonic = np.arange(1.0, self.n_harmonics + 1.0)
-        return tones(rng, place, self.mains * harmonic, 1.0 / harmonic)
+        return tones(rng, receiver, self.mains * harmonic, 1.0 / harmonic)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Impulsive(Part):
-    """Knocks at random instants (Poisson, at least one), normal in size, each ringing at one
-    mode.
+    """Knocks at random instants, normal in size, each ringing at one mode.
+
+    The instants are Poisson distributed; a record has at least one.
     """
 
+    limits: ClassVar[Limits] = {"damping_ratio": (1e-3, 1.0)}
     knocks: float = unit("hz")
     ring: float = unit("hz")
     damping_ratio: float
 
-    def __post_init__(self) -> None:
-        Part.__post_init__(self)
-        if not 1e-3 <= self.damping_ratio < 1.0:
-            raise ConfigError(
-                f"damping_ratio = {self.damping_ratio:g} must lie in 0.001..1"
-            )
-
-    def make(self, rng: np.random.Generator, place: Place) -> Array:
+    def make(self, rng: np.random.Generator, receiver: Receiver) -> Array:
         """As ``Part.make``."""
         from scipy.signal import sosfilt
 
-        rate = place.sampling_rate
-        before = math.ceil(
-            SETTLED / (2.0 * math.pi * self.ring * self.damping_ratio) * rate
-        )
-        force = np.zeros((len(place.sensors), before + place.n_samples))
+        rate, n_sensors = receiver.sampling_rate, len(receiver.sensors)
+        settling = SETTLED / (2.0 * math.pi * self.ring * self.damping_ratio)
+        n_before = math.ceil(settling * rate)
+        force = np.zeros((n_sensors, n_before + receiver.n_samples))
         n_knocks = rng.poisson(self.knocks * force.shape[1] / rate)
         for instant in rng.integers(0, force.shape[1], n_knocks).tolist():
-            force[:, instant] += rng.standard_normal(len(force))
-        force[:, before + rng.integers(place.n_samples)] += rng.standard_normal(
-            len(force)
-        )
-        return np.asarray(
-            sosfilt(mode_section(self.ring, self.damping_ratio, rate), force, axis=1)[
-                :, before:
-            ]
-        )
+            force[:, instant] += rng.standard_normal(n_sensors)
+        certain = n_before + rng.integers(receiver.n_samples)
+        force[:, certain] += rng.standard_normal(n_sensors)
+        section = mode_section(self.ring, self.damping_ratio, rate)
+        return np.asarray(sosfilt(section, force, axis=1)[:, n_before:])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Machine(Part):
     """Another machine: shaft orders, a bearing's tone family and a mesh, a third of the power each.
 
-    Harmonic k has the amplitude 1 / k, bearing and mesh tones have sidebands at one shaft order
+    Harmonic k has the amplitude 1 / k. Bearing and mesh tones have sidebands at one shaft order
     (assumed). ``frequency_scatter`` is the largest share by which its speed differs in a record.
     Tones above the usable band are left out.
     """
 
+    is_broad: ClassVar[bool] = False
+    limits: ClassVar[Limits] = {"frequency_scatter": (0.0, 0.5)}
     shaft: float = unit("hz")
     frequency_scatter: float
     n_shaft_orders: int
@@ -185,140 +175,119 @@ class Machine(Part):
     n_teeth: int
     n_mesh_harmonics: int
 
-    def __post_init__(self) -> None:
-        Part.__post_init__(self)
-        if not 0.0 <= self.frequency_scatter <= 0.5:
-            raise ConfigError(
-                f"frequency_scatter = {self.frequency_scatter:g} must lie in 0..0.5"
-            )
-
-    @property
-    def is_broad(self) -> bool:
-        """As ``Part.is_broad``."""
-        return False
-
-    def make(self, rng: np.random.Generator, place: Place) -> Array:
+    def make(self, rng: np.random.Generator, receiver: Receiver) -> Array:
         """As ``Part.make``."""
         shaft = self.shaft * (1.0 + self.frequency_scatter * rng.uniform(-1.0, 1.0))
-        out = np.zeros(place.shape)
+        highest = usable_band(receiver.sampling_rate)[1]
+        alone = {0.0: 1.0}  # amplitude over the harmonic's, by offset in shaft orders
+        modulated = {-1.0: SIDEBAND, 0.0: 1.0, 1.0: SIDEBAND}
         families = (
-            (1.0, self.n_shaft_orders, 0.0),
-            (self.bearing_order, self.n_bearing_harmonics, SIDEBAND),
-            (float(self.n_teeth), self.n_mesh_harmonics, SIDEBAND),
+            (1.0, self.n_shaft_orders, alone),
+            (self.bearing_order, self.n_bearing_harmonics, modulated),
+            (float(self.n_teeth), self.n_mesh_harmonics, modulated),
         )
-        for order, n_harmonics, sideband in families:
-            harmonic = np.arange(1, n_harmonics + 1)
-            offsets = np.array([-1.0, 0.0, 1.0]) if sideband else np.zeros(1)
-            weight = np.where(offsets == 0.0, 1.0, sideband)
-            orders = (order * harmonic[:, None] + offsets).ravel()
-            amplitude = (weight / harmonic[:, None]).ravel()
-            heard = (orders > 0.0) & (
-                orders * shaft <= usable_band(place.sampling_rate)[1]
-            )
-            family = tones(rng, place, shaft * orders[heard], amplitude[heard])
+        out = np.zeros(receiver.shape)
+        for order, n_harmonics, lines in families:
+            harmonic = np.arange(1, n_harmonics + 1)[:, None]
+            orders = (order * harmonic + list(lines)).ravel()
+            amplitude = (np.array(list(lines.values())) / harmonic).ravel()
+            heard = (orders > 0.0) & (orders * shaft <= highest)
+            family = tones(rng, receiver, shaft * orders[heard], amplitude[heard])
             out += unit_power(family)
         return out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Background(Part):
-    """A recording of a user: ``time_s`` and one column a sensor, or one column ``background`` for
-    all.
+    """Recording of a user: ``time_s`` and one column a sensor, or one column ``background``.
 
-    A record takes a stretch that begins anywhere; with one column each sensor takes its own.
+    A record takes a stretch that begins anywhere. With one column for all sensors, each sensor
+    takes a different stretch.
     """
 
     file: str
 
-    def table(self, place: Place) -> tuple[list[str], Array]:
-        """The recording, (column, sample), checked against the sensors, rate and length of a
-        record.
-        """
-        return _background(
-            self.file, place.sensors, place.n_samples, place.sampling_rate
-        )
+    def check(self, receiver: Receiver) -> None:
+        """As ``Part.check``."""
+        _background(self.file, receiver)
 
-    def make(self, rng: np.random.Generator, place: Place) -> Array:
+    def make(self, rng: np.random.Generator, receiver: Receiver) -> Array:
         """As ``Part.make``."""
-        names, values = self.table(place)
-        last = values.shape[1] - place.n_samples
-        if names == ["background"]:
-            starts = rng.integers(0, last, len(place.sensors), endpoint=True)
-            return np.stack(
-                [values[0, start : start + place.n_samples] for start in starts]
-            )
-        start = int(rng.integers(0, last, endpoint=True))
-        return np.stack(
-            [
-                values[names.index(name), start : start + place.n_samples]
-                for name in place.sensors
-            ]
-        )
+        columns, is_shared = _background(self.file, receiver)
+        n_samples, n_sensors = receiver.n_samples, len(columns)
+        last = columns.shape[1] - n_samples
+        if is_shared:
+            starts = rng.integers(0, last, n_sensors, endpoint=True).tolist()
+        else:
+            starts = [int(rng.integers(0, last, endpoint=True))] * n_sensors
+        stretches = zip(columns, starts, strict=True)
+        return np.stack([row[start : start + n_samples] for row, start in stretches])
 
 
-@lru_cache(maxsize=4)
-def _background(
-    file: str, sensors: tuple[str, ...], n_samples: int, sampling_rate: float
-) -> tuple[list[str], Array]:
-    key = "sensing.noise: file"
-    names, values = read_table(key, file, least_rows=max(2, n_samples))
-    wanted = ["background"] if "background" in names else list(sensors)
-    check_columns(key, file, names, ["time_s", *wanted])
-    check_rate(key, file, values[names.index("time_s")], sampling_rate)
-    columns = np.stack([values[names.index(name)] for name in wanted])
+def _background(file: str, receiver: Receiver) -> tuple[Array, bool]:
+    """Recording of each sensor, (sensor, sample), and True where it is one for all."""
+    time, columns, is_shared = _user_columns(
+        file, "time_s", receiver.sensors, max(2, receiver.n_samples)
+    )
+    check_rate(FILE_KEY, file, time, receiver.sampling_rate)
     if not np.all(np.ptp(columns, axis=1) > 0.0):
         raise ConfigError(
-            f"{key} = {file}: a column holds one value throughout; give what a sensor heard"
+            f"{FILE_KEY} = {file}: a column holds one value throughout; give what a sensor heard"
         )
-    return wanted, columns
+    return columns, is_shared
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spectrum(Part):
-    """Gaussian noise of a given power density: a file with ``frequency_hz`` and one column a
-    sensor, or ``background``.
+    """Gaussian noise of a given power density.
 
-    Only the form of a column counts; its level is that of ``sensing.snr_db``. It is linear
-    between the lines given and held beyond them. Every record and sensor has its own noise.
+    The file has ``frequency_hz`` and one column a sensor, or ``background``. Only the form of a
+    column counts; its level is that of ``sensing.snr_db``. The density is linear between the
+    lines given and held beyond them. Noise differs between records and sensors.
     """
 
     file: str
 
-    def density(self, place: Place) -> tuple[Array, Array]:
-        """Frequencies (line,) in Hz and densities (sensor, line), checked against the sensors of
-        a record.
-        """
-        return _spectrum(self.file, place.sensors)
+    def check(self, receiver: Receiver) -> None:
+        """As ``Part.check``."""
+        _spectrum(self.file, receiver.sensors)
 
-    def make(self, rng: np.random.Generator, place: Place) -> Array:
+    def make(self, rng: np.random.Generator, receiver: Receiver) -> Array:
         """As ``Part.make``."""
-        frequency, density = self.density(place)
-        grid = np.fft.rfftfreq(place.n_samples, 1.0 / place.sampling_rate)
+        frequency, density = _spectrum(self.file, receiver.sensors)
+        grid = receiver.frequency
         size = np.sqrt([np.interp(grid, frequency, row) for row in density])
-        return np.fft.irfft(
-            size * np.fft.rfft(rng.standard_normal(place.shape), axis=1),
-            place.n_samples,
-            axis=1,
-        )
+        spectrum = size * np.fft.rfft(rng.standard_normal(receiver.shape), axis=1)
+        return np.fft.irfft(spectrum, receiver.n_samples, axis=1)
 
 
-@lru_cache(maxsize=4)
 def _spectrum(file: str, sensors: tuple[str, ...]) -> tuple[Array, Array]:
-    key = "sensing.noise: file"
-    names, values = read_table(key, file, least_rows=2)
-    wanted = ["background"] * len(sensors) if "background" in names else list(sensors)
-    check_columns(key, file, names, ["frequency_hz", *dict.fromkeys(wanted)])
-    frequency = values[names.index("frequency_hz")]
-    density = values[[names.index(name) for name in wanted]]
+    """Frequencies (line,) in Hz and densities (sensor, line)."""
+    frequency, density, _ = _user_columns(file, "frequency_hz", sensors, 2)
     if frequency[0] < 0.0 or not np.all(np.diff(frequency) > 0.0):
         raise ConfigError(
-            f"{key} = {file}: frequency_hz must rise from line to line and not be negative"
+            f"{FILE_KEY} = {file}: frequency_hz must rise from line to line and not be negative"
         )
     if density.min() < 0.0 or not np.all(density.max(axis=1) > 0.0):
         raise ConfigError(
-            f"{key} = {file}: a power density must not be negative, nor 0 throughout"
+            f"{FILE_KEY} = {file}: a power density must not be negative, nor 0 throughout"
         )
     return frequency, density
+
+
+@lru_cache(maxsize=4)
+def _user_columns(
+    file: str, axis: str, sensors: tuple[str, ...], least_rows: int
+) -> tuple[Array, Array, bool]:
+    """Axis (row,) and columns (sensor, row) of a file; True where sensors share one column."""
+    names, values = read_table(FILE_KEY, file, least_rows=least_rows)
+    is_shared = SHARED in names
+    wanted = list(sensors)
+    if is_shared:
+        wanted = [SHARED] * len(sensors)
+    check_columns(FILE_KEY, file, names, [axis, *dict.fromkeys(wanted)])
+    columns = values[[names.index(name) for name in wanted]]
+    return values[names.index(axis)], columns, is_shared
 
 
 PARTS: dict[str, type[Part]] = {
@@ -335,11 +304,10 @@ PARTS: dict[str, type[Part]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Noise:
-    """Parts of the noise, and the band over which the signal-to-noise ratio is meant, (low, high)
-    in Hz or all.
+    """Parts of the noise, and the band of the signal-to-noise ratio, (low, high) in Hz or all.
 
-    ``offsets`` in dB, one a sensor: that sensor's noise is so much louder than ``sensing.snr_db``
-    says. None is 0 dB.
+    ``offsets`` in dB, one a sensor: the noise of that sensor is so much louder than
+    ``sensing.snr_db`` asks for. None is 0 dB.
     """
 
     parts: tuple[Part, ...]
@@ -349,32 +317,35 @@ class Noise:
     def __post_init__(self) -> None:
         if not self.parts:
             raise ConfigError(
-                "sensing.noise.parts = [] has no part; give one, or sensing.snr_db=null for no noise"
+                "sensing.noise.parts = [] has no part; "
+                "give one, or sensing.snr_db=null for no noise"
             )
-        if self.band is not None and (
-            len(self.band) != 2 or not 0.0 <= self.band[0] < self.band[1]
-        ):
+        if self.band is None:
+            return
+        if len(self.band) != 2 or not 0.0 <= self.band[0] < self.band[1]:
             raise ConfigError(
                 f"sensing.noise.band_hz = {list(self.band)} must be [low, high], ordered, or null"
             )
-        if self.band is not None and not any(part.is_broad for part in self.parts):
+        if not any(part.is_broad for part in self.parts):
             raise ConfigError(
-                "sensing.noise.band_hz: tones alone may miss the band; add a part such as white, or null"
+                "sensing.noise.band_hz: tones alone may miss the band; "
+                "add a part such as white, or null"
             )
 
     @property
     def is_white(self) -> bool:
-        """Whether it is white noise over the whole band and nothing else."""
+        """True for white noise over the whole band and nothing else."""
         return self.band is None and all(isinstance(part, White) for part in self.parts)
 
-    def make(self, power: Array, rng: np.random.Generator, place: Place) -> Array:
-        """Noise with a mean square of ``power`` (sensor,) in the band, exactly, (sensor, sample)."""
+    def make(self, power: Array, rng: np.random.Generator, receiver: Receiver) -> Array:
+        """Noise with exactly the mean square ``power`` (sensor,) in the band, (sensor, sample)."""
         total = sum(part.share for part in self.parts)
-        mixed = np.zeros(place.shape)
+        mixed = np.zeros(receiver.shape)
         for part in self.parts:
-            mixed += math.sqrt(part.share / total) * unit_power(part.make(rng, place))
-        found = band_power(mixed, place.sampling_rate, self.band)
-        return np.asarray(mixed * np.sqrt(power / np.maximum(found, 1e-300))[:, None])
+            signal = unit_power(part.make(rng, receiver))
+            mixed += math.sqrt(part.share / total) * signal
+        made = band_power(mixed, receiver.sampling_rate, self.band)
+        return np.asarray(mixed * np.sqrt(power / np.maximum(made, 1e-300))[:, None])
 
 
 def read_noise(values: Any) -> Noise:
@@ -385,83 +356,62 @@ def read_noise(values: Any) -> Noise:
     ConfigError    for unknown kinds, keys or values, naming the part
     """
     where = "sensing.noise"
-    if not isinstance(values, Mapping) or set(values) - {"offsets_db"} != {
-        "parts",
-        "band_hz",
-    }:
+    needed = {"parts", "band_hz"}
+    if not isinstance(values, Mapping) or set(values) - {"offsets_db"} != needed:
         raise ConfigError(
             f"{where} must be a group of the keys parts and band_hz, and may have offsets_db"
         )
-    if not isinstance(values["parts"], list | tuple):
+    parts = values["parts"]
+    if not isinstance(parts, list | tuple):
         raise ConfigError(
-            f"{where}.parts = {values['parts']!r} must be a list, such as [{{kind: white, share: 1}}]"
+            f"{where}.parts = {parts!r} must be a list, such as [{{kind: white, share: 1}}]"
         )
-    parts = []
-    for number, part in enumerate(values["parts"]):
-        place = f"{where}.parts[{number}]"
-        kind = part.get("kind") if isinstance(part, Mapping) else None
-        if kind not in PARTS:
-            raise ConfigError(f"{place}: kind = {kind!r}; allowed: {', '.join(PARTS)}")
-        try:
-            parts.append(
-                read(
-                    PARTS[kind],
-                    {key: value for key, value in part.items() if key != "kind"},
-                    place,
-                )
-            )
-        except ConfigError as error:
-            text = str(error)
-            raise ConfigError(
-                text if text.startswith(place) else f"{place}.{text}"
-            ) from None
-    band = _numbers(f"{where}.band_hz", values["band_hz"], "[low, high] in Hz")
-    offsets = _numbers(
-        f"{where}.offsets_db",
-        values.get("offsets_db"),
-        "a list of numbers, one a sensor",
+    return Noise(
+        parts=tuple(
+            read_kind(PARTS, part, f"{where}.parts[{index}]")
+            for index, part in enumerate(parts)
+        ),
+        band=_numbers(f"{where}.band_hz", values["band_hz"], "[low, high] in Hz"),
+        offsets=_numbers(
+            f"{where}.offsets_db",
+            values.get("offsets_db"),
+            "a list of numbers, one a sensor",
+        ),
     )
-    return Noise(parts=tuple(parts), band=band, offsets=offsets)
 
 
 def _numbers(key: str, value: Any, what: str) -> tuple[float, ...] | None:
     if value is None:
         return None
-    if not isinstance(value, list | tuple) or not all(
-        isinstance(one, int | float)
-        and not isinstance(one, bool)
-        and math.isfinite(one)
-        for one in value
-    ):
+    if not isinstance(value, list | tuple) or not all(map(is_number, value)):
         raise ConfigError(f"{key} = {value!r} must be {what}, or null")
-    return tuple(float(one) for one in value)
+    return tuple(map(float, value))
 
 
 def tones(
-    rng: np.random.Generator, place: Place, frequency: Array, amplitude: Array
+    rng: np.random.Generator, receiver: Receiver, frequency: Array, amplitude: Array
 ) -> Array:
     """Sum of tones, each with a random phase in each sensor, (sensor, sample)."""
-    blocks = np.arange(-(-place.n_samples // BLOCK))[:, None] * BLOCK
-    phases = rng.uniform(0.0, 2.0 * np.pi, (len(place.sensors), len(frequency)))
-    out = np.zeros(place.shape)
-    for number, (one, size) in enumerate(zip(frequency, amplitude, strict=True)):
-        step = 2j * np.pi * one / place.sampling_rate
+    n_samples = receiver.n_samples
+    blocks = np.arange(-(-n_samples // BLOCK))[:, None] * BLOCK
+    phases = rng.uniform(0.0, 2.0 * np.pi, (len(receiver.sensors), len(frequency)))
+    out = np.zeros(receiver.shape)
+    for number, (line, size) in enumerate(zip(frequency, amplitude, strict=True)):
+        step = 2j * np.pi * line / receiver.sampling_rate
         # e^(i w t) as a product: two short tables in place of as many functions as samples
-        turning = (np.exp(step * blocks) * np.exp(step * np.arange(BLOCK))).ravel()[
-            : place.n_samples
-        ]
+        table = np.exp(step * blocks) * np.exp(step * np.arange(BLOCK))
+        rotating = table.ravel()[:n_samples]
         phase = phases[:, number, None]
-        out += size * (np.cos(phase) * turning.real - np.sin(phase) * turning.imag)
+        out += size * (np.cos(phase) * rotating.real - np.sin(phase) * rotating.imag)
     return out
 
 
 def unit_power(signal: Array) -> Array:
-    """The signal without its mean at mean square 1; one that is still stays so."""
+    """Signal without its mean at mean square 1; silence stays silence."""
     centred = signal - signal.mean(axis=1, keepdims=True)
     level = np.sqrt(np.mean(centred**2, axis=1, keepdims=True))
-    return np.asarray(
-        np.divide(centred, level, out=np.zeros_like(centred), where=level > 0.0)
-    )
+    silence = np.zeros_like(centred)
+    return np.asarray(np.divide(centred, level, out=silence, where=level > 0.0))
 
 
 def band_power(

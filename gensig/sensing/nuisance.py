@@ -1,6 +1,6 @@
-"""What a sound machine shakes with beside its mesh.
+"""Vibration of a sound machine besides its mesh: forces at orders of its shafts.
 
-Forces at orders of its shafts, drawn alike for every class.
+Every class draws them alike.
 """
 
 from __future__ import annotations
@@ -19,10 +19,9 @@ from gensig.sensing.tones import (
     MOST_HARMONICS,
     SENSE,
     TURN,
+    Limits,
     Nuisance,
     Tones,
-    check_number,
-    check_range,
     fixed,
     logarithmic,
     make_tones,
@@ -30,16 +29,16 @@ from gensig.sensing.tones import (
     turning,
     uniform,
 )
-from gensig.units import read, to_si, unit
+from gensig.units import read_kind, to_si, unit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Unbalance(Nuisance):
-    """A residual unbalance that turns with the shaft, at a fixed angle from tooth 0 of its gear.
+    """Residual unbalance that turns with the shaft, at a fixed angle from tooth 0 of its gear.
 
     The residual is a share, uniform in ``used_share``, of what the grade permits at
-    ``rated_speed`` of the pinion. ``rotor_mass`` is that of all that turns with the gear; None
-    takes the gear's.
+    ``rated_speed`` of the pinion. ``rotor_mass`` is the mass of all that turns with the gear;
+    None takes the gear's mass.
 
     Source: ISO 21940-11, 4.4: e w = G mm/s at the highest speed of service; the force is m e w^2.
     """
@@ -50,18 +49,12 @@ class Unbalance(Nuisance):
     rated_speed: float = unit("rpm")
     rotor_mass: float | None = unit("kg")
 
-    def __post_init__(self) -> None:
-        Nuisance.__post_init__(self)
-        check_number("iso21940_grade", self.iso21940_grade, 0.1, 4000.0)
-        check_range("used_share", self.used_share, 0.0, 1.0)
-        check_number(
-            "rated_speed_rpm",
-            self.rated_speed,
-            to_si("rated_speed_rpm", 1.0),
-            to_si("rated_speed_rpm", 1e6),
-        )
-        if self.rotor_mass is not None:
-            check_number("rotor_mass_kg", self.rotor_mass, 1e-3, 1e5)
+    limits: ClassVar[Limits] = {
+        "iso21940_grade": (0.1, 4000.0),
+        "rated_speed": (to_si("speed_rpm", 1.0), to_si("speed_rpm", 1e6)),
+        "rotor_mass": (1e-3, 1e5),
+    }
+    ranges: ClassVar[Limits] = {"used_share": (0.0, 1.0)}
 
     def draw(
         self,
@@ -71,18 +64,14 @@ class Unbalance(Nuisance):
     ) -> Tones:
         """As ``Nuisance.draw``."""
         share, angle = uniform(unit_rng, self.used_share), TURN * unit_rng.random()
+        turned = shaft(dynamics, self.gear)
         eccentricity = (
-            share
-            * 1e-3
-            * self.iso21940_grade
-            / (self.rated_speed * shaft(dynamics, self.gear).speed_ratio)
+            share * 1e-3 * self.iso21940_grade / (self.rated_speed * turned.speed_ratio)
         )
-        mass = (
-            getattr(dynamics, self.gear).mass
-            if self.rotor_mass is None
-            else self.rotor_mass
-        )
-        force = mass * eccentricity * shaft(dynamics, self.gear).speed ** 2
+        mass = self.rotor_mass
+        if mass is None:
+            mass = getattr(dynamics, self.gear).mass
+        force = mass * eccentricity * turned.speed**2
         rotating = np.exp(1j * angle) * force * turning(self.gear)
         return make_tones(self.gear, [1.0], [[1]], [rotating], "speed_squared")
 
@@ -103,15 +92,18 @@ class CouplingMisalignment(Nuisance):
     order_shares: tuple[float, ...]
     torque_share: tuple[float, ...]
 
+    limits: ClassVar[Limits] = {}
+    ranges: ClassVar[Limits] = {"force_share": (1e-6, 1.0), "torque_share": (0.0, 1.0)}
+
     def __post_init__(self) -> None:
         Nuisance.__post_init__(self)
-        check_range("force_share", self.force_share, 1e-6, 1.0)
-        check_range("torque_share", self.torque_share, 0.0, 1.0)
-        check_number(
-            "number of order_shares", len(self.order_shares), 1, MOST_HARMONICS
-        )
+        if not 1 <= len(self.order_shares) <= MOST_HARMONICS:
+            raise ConfigError(
+                f"number of order_shares = {len(self.order_shares)} must lie in 1..{MOST_HARMONICS}"
+            )
         for share in self.order_shares:
-            check_number("order_shares", share, 0.0, 100.0)
+            if not 0.0 <= share <= 100.0:
+                raise ConfigError(f"order_shares = {share:g} must lie in 0..100")
 
     def draw(
         self,
@@ -121,10 +113,10 @@ class CouplingMisalignment(Nuisance):
     ) -> Tones:
         """As ``Nuisance.draw``."""
         radial = logarithmic(unit_rng, self.force_share) * dynamics.mesh_force
-        torque = (
-            uniform(unit_rng, self.torque_share) * shaft(dynamics, self.gear).torque
-        )
-        along, twist = fixed(TURN * unit_rng.random()), np.array([0.0, 0.0, 1.0])
+        torque = uniform(unit_rng, self.torque_share)
+        torque *= shaft(dynamics, self.gear).torque
+        along = fixed(TURN * unit_rng.random())
+        twist = np.array([0.0, 0.0, 1.0])
         twisting = torque * np.exp(1j * TURN * unit_rng.random()) * twist
         phases = np.exp(1j * TURN * unit_rng.random(len(self.order_shares)))
         forces = [
@@ -154,12 +146,11 @@ class Looseness(Nuisance):
     n_orders: int
     harmonic_exponent: float
 
-    def __post_init__(self) -> None:
-        Nuisance.__post_init__(self)
-        check_range("force_share", self.force_share, 1e-6, 1.0)
-        check_range("half_share", self.half_share, 0.0, 1.0)
-        check_number("n_orders", self.n_orders, 1, MOST_HARMONICS)
-        check_number("harmonic_exponent", self.harmonic_exponent, 0.0, 10.0)
+    limits: ClassVar[Limits] = {
+        "n_orders": (1, MOST_HARMONICS),
+        "harmonic_exponent": (0.0, 10.0),
+    }
+    ranges: ClassVar[Limits] = {"force_share": (1e-6, 1.0), "half_share": (0.0, 1.0)}
 
     def draw(
         self,
@@ -169,25 +160,15 @@ class Looseness(Nuisance):
     ) -> Tones:
         """As ``Nuisance.draw``."""
         level = logarithmic(unit_rng, self.force_share) * dynamics.mesh_force
-        half_share, along = (
-            uniform(unit_rng, self.half_share),
-            fixed(TURN * unit_rng.random()),
-        )
+        half_share = uniform(unit_rng, self.half_share)
+        along = fixed(TURN * unit_rng.random())
         halves = np.arange(1, 2 * self.n_orders + 1)
-        is_half = halves % 2 == 1
-        size = (
-            np.where(is_half, half_share, 1.0)
-            * np.maximum(0.5 * halves, 1.0) ** -self.harmonic_exponent
-        )
+        size = np.maximum(0.5 * halves, 1.0) ** -self.harmonic_exponent
+        size *= np.where(halves % 2 == 1, half_share, 1.0)
         second_turn = math.pi * halves * int(record_rng.integers(2))
         phase = np.exp(1j * (TURN * unit_rng.random(len(halves)) + second_turn))
-        return make_tones(
-            self.gear,
-            [0.5],
-            halves[:, None],
-            level * (size * phase)[:, None] * along,
-            "torque",
-        )
+        force = level * (size * phase)[:, None] * along
+        return make_tones(self.gear, [0.5], halves[:, None], force, "torque")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -210,16 +191,18 @@ class NeighbourMesh(Nuisance):
     harmonic_exponent: float
     sideband_share: tuple[float, ...]
 
-    def __post_init__(self) -> None:
-        Nuisance.__post_init__(self)
-        for key in ("n_teeth", "n_teeth_mate"):
-            check_number(key, getattr(self, key), 5, 1000)
-        check_number("base_radius_mm", self.base_radius, 1e-3, 10.0)
-        check_number("line_of_action_deg", self.line_of_action, -TURN, TURN)
-        check_range("dynamic_share", self.dynamic_share, 1e-6, 1.0)
-        check_number("n_harmonics", self.n_harmonics, 1, MOST_HARMONICS)
-        check_number("harmonic_exponent", self.harmonic_exponent, 0.0, 10.0)
-        check_range("sideband_share", self.sideband_share, 0.0, 1.0)
+    limits: ClassVar[Limits] = {
+        "n_teeth": (5, 1000),
+        "n_teeth_mate": (5, 1000),
+        "base_radius": (1e-3, 10.0),
+        "line_of_action": (-TURN, TURN),
+        "n_harmonics": (1, MOST_HARMONICS),
+        "harmonic_exponent": (0.0, 10.0),
+    }
+    ranges: ClassVar[Limits] = {
+        "dynamic_share": (1e-6, 1.0),
+        "sideband_share": (0.0, 1.0),
+    }
 
     def draw(
         self,
@@ -228,15 +211,11 @@ class NeighbourMesh(Nuisance):
         dynamics: PairDynamics,
     ) -> Tones:
         """As ``Nuisance.draw``."""
-        level = (
-            logarithmic(unit_rng, self.dynamic_share)
-            * shaft(dynamics, self.gear).torque
-            / self.base_radius
-        )
-        sideband, phases = (
-            uniform(unit_rng, self.sideband_share),
-            TURN * unit_rng.random((5, MOST_HARMONICS)),
-        )
+        level = logarithmic(unit_rng, self.dynamic_share)
+        level *= shaft(dynamics, self.gear).torque
+        level /= self.base_radius
+        sideband = uniform(unit_rng, self.sideband_share)
+        phases = TURN * unit_rng.random((5, MOST_HARMONICS))
         mate_angle = TURN * record_rng.random()
         along = fixed(self.line_of_action)
         # the next stage's force holds the wheel's shaft back, that of the stage before drives the
@@ -245,9 +224,8 @@ class NeighbourMesh(Nuisance):
         offsets = np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)])
         weight = np.array([1.0, sideband, sideband, sideband, sideband])
         harmonic = np.arange(1, self.n_harmonics + 1)
-        multiples = offsets[:, None] + harmonic[:, None] * np.array(
-            [self.n_teeth, 0]
-        )  # (offset, harmonic, base)
+        # (offset, harmonic, base)
+        multiples = offsets[:, None] + harmonic[:, None] * np.array([self.n_teeth, 0])
         size = weight[:, None] * harmonic**-self.harmonic_exponent
         phase = phases[:, : self.n_harmonics] + offsets[:, 1, None] * mate_angle
         force = level * (size * np.exp(1j * phase))[:, :, None] * along
@@ -267,37 +245,15 @@ KINDS: dict[str, type[Nuisance]] = {
 
 
 def read_nuisances(values: Any) -> tuple[Nuisance, ...]:
-    """Nuisances of a configuration.
-
-    Raises
-    ------
-    ConfigError    for unknown kinds, keys or values, naming the part
-    """
+    """Nuisances of a configuration; ConfigError for what makes none, naming the part."""
     where = "sensing.nuisances"
     if not isinstance(values, list | tuple):
         raise ConfigError(
             f"{where} = {values!r} must be a list of parts, [] for none; see sensing=machine"
         )
-    parts = []
-    for number, part in enumerate(values):
-        place = f"{where}[{number}]"
-        kind = part.get("kind") if isinstance(part, Mapping) else None
-        if kind not in KINDS:
-            raise ConfigError(f"{place}: kind = {kind!r}; allowed: {', '.join(KINDS)}")
-        try:
-            parts.append(
-                read(
-                    KINDS[kind],
-                    {key: value for key, value in part.items() if key != "kind"},
-                    place,
-                )
-            )
-        except ConfigError as error:
-            text = str(error)
-            raise ConfigError(
-                text if text.startswith(place) else f"{place}.{text}"
-            ) from None
-    return tuple(parts)
+    return tuple(
+        read_kind(KINDS, part, f"{where}[{index}]") for index, part in enumerate(values)
+    )
 
 
 def draw_tones(
@@ -306,15 +262,15 @@ def draw_tones(
     units: Mapping[str, np.random.Generator],
     record_rng: np.random.Generator,
 ) -> list[Tones]:
-    """Forces of every part, each from random numbers of its own, so that a part more at the end
-    changes none.
+    """Forces of every part.
 
+    Each part has its separate random numbers, so that one more part at the end changes none.
     ``units`` has one generator a level, ``record_rng`` is that of the record.
     """
     count = len(nuisances)
-    own = {level: rng.spawn(count) for level, rng in units.items()}
-    phases = record_rng.spawn(count)
+    of_units = {level: rng.spawn(count) for level, rng in units.items()}
+    of_record = record_rng.spawn(count)
     return [
-        part.draw(own[part.level][place], phases[place], dynamics)
-        for place, part in enumerate(nuisances)
+        part.draw(of_units[part.level][index], of_record[index], dynamics)
+        for index, part in enumerate(nuisances)
     ]

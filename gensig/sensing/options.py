@@ -1,4 +1,4 @@
-"""The group ``sensing`` of a configuration."""
+"""Options of the group ``sensing`` of a configuration."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gensig.sensing.noise import read_noise
 from gensig.sensing.nuisance import read_nuisances
 from gensig.sensing.tachometer import Tachometer
 from gensig.sensing.transfer_path import ModalPath
-from gensig.units import read
+from gensig.units import check_choice, read
 
 IDENTITY = "identity"
 PATHS: dict[str, type[ModalPath] | type[MeasuredPath]] = {
@@ -49,22 +49,17 @@ def read_sensing(values: Section) -> Sensing:
 
 
 def _read_path(values: Any) -> ModalPath | MeasuredPath | None:
-    kind = values.get("kind") if isinstance(values, Mapping) else None
-    own = (
-        {key: value for key, value in values.items() if key != "kind"}
-        if isinstance(values, Mapping)
-        else {}
-    )
-    if kind == IDENTITY:
-        if own:
-            raise ConfigError(
-                f"sensing.path: unknown key '{next(iter(own))}'; kind = identity has no other key. "
-                "Where you did not type it, the file of the experiment sets it for the sensing that it chooses: keep "
-                f"that one, or add '~sensing.path.{next(iter(own))}'"
-            )
-        return None
-    if kind not in PATHS:
+    rest: dict[str, Any] = {}
+    if isinstance(values, Mapping):
+        rest.update(values)
+    kind = rest.pop("kind", None)
+    check_choice("sensing.path.kind", kind, (IDENTITY, *PATHS))
+    if kind != IDENTITY:
+        return read(PATHS[kind], rest, "sensing.path")
+    for key in rest:
         raise ConfigError(
-            f"sensing.path.kind = {kind!r}; allowed: {', '.join((IDENTITY, *PATHS))}"
+            f"sensing.path: unknown key '{key}'; kind = identity has no other key. Where you did "
+            "not type it, the file of the experiment sets it for the sensing that it chooses: "
+            f"keep that one, or add '~sensing.path.{key}'"
         )
-    return read(PATHS[kind], own, "sensing.path")
+    return None

@@ -1,4 +1,4 @@
-"""A tachometer: a sensor that gives a pulse for every mark of a shaft that passes it."""
+"""Tachometers: sensors that give a pulse for every passing mark of a shaft."""
 
 from __future__ import annotations
 
@@ -9,21 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import ConfigError
-from gensig.units import from_si, unit
+from gensig.units import check_choice, check_limits, from_si, unit
 
 Array = NDArray[np.float64]
 
 SHAFTS = ("pinion", "wheel")
 MOST_PULSES = 1000  # a turn
-JITTERS_IN_A_WIDTH = 8.0  # standard deviations that fit into a pulse or a gap, so that no edge overtakes another
+# standard deviations that fit into a pulse or a gap, so that no edge overtakes another
+JITTERS_IN_A_WIDTH = 8.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tachometer:
     """Evenly spaced marks on a gear's shaft, each ``pulse_width_share`` of their spacing wide.
 
-    ``jitter`` in rad is the standard deviation of the place at which a pulse begins, drawn anew
-    for every pulse, which ends a width later.
+    ``jitter`` in rad is the standard deviation of the angle at which a pulse begins. It is drawn
+    anew for every pulse, which ends a width later.
     """
 
     shaft: str
@@ -35,25 +36,17 @@ class Tachometer:
         check_shaft("tacho", self.shaft)
         if not 1 <= self.pulses_per_turn <= MOST_PULSES:
             raise ConfigError(
-                f"sensing.tacho.pulses_per_turn = {self.pulses_per_turn} must lie in 1..{MOST_PULSES}; "
-                "sensing.encoder has more lines"
+                f"sensing.tacho.pulses_per_turn = {self.pulses_per_turn} must lie in "
+                f"1..{MOST_PULSES}; sensing.encoder has more lines"
             )
-        if not 1e-3 <= self.pulse_width_share <= 0.999:
-            raise ConfigError(
-                f"sensing.tacho.pulse_width_share = {self.pulse_width_share:g} must lie in 0.001..0.999"
-            )
-        most = (
-            self.spacing
-            * min(self.pulse_width_share, 1.0 - self.pulse_width_share)
-            / JITTERS_IN_A_WIDTH
-        )
+        check_limits(self, "sensing.tacho.", pulse_width_share=(1e-3, 0.999))
+        narrower = min(self.pulse_width_share, 1.0 - self.pulse_width_share)
+        most = self.spacing * narrower / JITTERS_IN_A_WIDTH
         if not 0.0 <= self.jitter <= most:
-            given, allowed = (
-                from_si("jitter_deg", value) for value in (self.jitter, most)
-            )
             raise ConfigError(
-                f"sensing.tacho.jitter_deg = {given:g} must lie in 0..{allowed:g}, an eighth of the narrower of pulse "
-                "and gap; change that with pulse_width_share"
+                f"sensing.tacho.jitter_deg = {from_si('jitter_deg', self.jitter):g} must lie in "
+                f"0..{from_si('jitter_deg', most):g}, an eighth of the narrower of pulse and gap; "
+                "change that with pulse_width_share"
             )
 
     @property
@@ -62,12 +55,9 @@ class Tachometer:
         return 2.0 * math.pi / self.pulses_per_turn
 
 
-def check_shaft(place: str, shaft: str) -> None:
+def check_shaft(group: str, shaft: str) -> None:
     """Raise ConfigError for a shaft on which no sensor can sit."""
-    if shaft not in SHAFTS:
-        raise ConfigError(
-            f"sensing.{place}.shaft = {shaft!r}; allowed: {', '.join(SHAFTS)}"
-        )
+    check_choice(f"sensing.{group}.shaft", shaft, SHAFTS)
 
 
 def draw_mark(rng: np.random.Generator) -> float:
@@ -82,11 +72,10 @@ def pulse_train(
     sampling_rate: float,
     rng: np.random.Generator,
 ) -> Array:
-    """What the tachometer puts out, (sample,): 1 in a pulse, 0 between, at an edge the share that
-    is high.
+    """Output of the tachometer, (sample,): 1 in a pulse, 0 between, the high share at an edge.
 
     A sample is the mean over one sampling interval around its instant, as a converter integrates.
-    So an edge has its exact instant in the two samples around it
+    So the two samples around an edge hold its exact instant
     (``gensig.signals.tacho.pulse_times``).
 
     Parameters
@@ -103,13 +92,12 @@ def pulse_train(
     begins = (
         mark + tacho.spacing * number + tacho.jitter * rng.standard_normal(len(number))
     )
-    edges = np.column_stack(
-        [begins, begins + tacho.pulse_width_share * tacho.spacing]
-    ).ravel()
+    ends = begins + tacho.pulse_width_share * tacho.spacing
+    edges = np.column_stack([begins, ends]).ravel()
+    # in samples
     at = np.interp(
         edges, np.maximum.accumulate(turned), np.arange(-1.0, n_samples + 1.0)
-    )  # in samples
-    high = np.concatenate(
-        [[0.0], np.cumsum(np.diff(at) * (np.arange(len(at) - 1) % 2 == 0))]
     )
+    is_pulse = np.arange(len(at) - 1) % 2 == 0
+    high = np.concatenate([[0.0], np.cumsum(np.diff(at) * is_pulse)])
     return np.diff(np.interp(np.arange(n_samples + 1) - 0.5, at, high))

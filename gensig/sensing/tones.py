@@ -1,7 +1,4 @@
-"""What a nuisance is.
-
-Forces on one gear that follow angles of its machine, and how they are drawn.
-"""
+"""Nuisances: forces on one gear that follow angles of its machine, and how they are drawn."""
 
 from __future__ import annotations
 
@@ -14,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics.pair import PairDynamics
-from gensig.errors import ConfigError
-from gensig.units import from_si
+from gensig.units import check_choice, check_limits, check_ranges
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -24,6 +20,7 @@ Complex = NDArray[np.complex128]
 # +F_f along its x.
 SENSE = {"pinion": -1.0, "wheel": 1.0}
 TURN = 2.0 * math.pi
+Limits = dict[str, tuple[float, float]]
 MOST_HARMONICS = 50
 
 
@@ -32,10 +29,10 @@ class Tones:
     """Forces on one gear that follow angles: of its shaft, of what rolls on it, of what it drives.
 
     Each of ``base`` (base,) is an angle's order, its turns per turn of the gear's shaft. Tone t
-    is Re(force_t e^(i phase_t)), where the phase is the sum of ``multiple`` (tone, base) times
-    base times the shaft's angle from its tooth 0 on. ``force`` (tone, 3) acts on the gear's x and
-    y in N and on its rotation in N m; it is that at the set speed and torque, and grows as
-    ``follows`` says: speed_squared, torque or nothing.
+    is Re(force_t e^(i phase_t)). The phase is the sum of ``multiple`` (tone, base) times base
+    times the shaft's angle from its tooth 0 on. ``force`` (tone, 3) acts on the gear's x and y in
+    N and on its rotation in N m. It holds at the set speed and torque and grows with ``follows``:
+    speed_squared, torque or nothing.
     """
 
     gear: str
@@ -52,19 +49,22 @@ class Tones:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Nuisance(ABC):
-    """One cause of vibration at one gear's shaft. Ranges are [low, high]; both ends alike give
-    one value.
+    """One cause of vibration at one gear's shaft.
 
-    ``level`` says what the machine's part of it is drawn for: the gearbox, or the specimen, a set
-    of gears.
+    Ranges are [low, high]; equal ends give one value. ``level`` is the unit for which the
+    machine's part is drawn: the gearbox, or the specimen, a set of gears. ``limits`` and
+    ``ranges`` are those of the fields, in SI.
     """
 
     level: ClassVar[str] = "gearbox"
+    limits: ClassVar[Limits]
+    ranges: ClassVar[Limits]
     gear: str
 
     def __post_init__(self) -> None:
-        if self.gear not in SENSE:
-            raise ConfigError(f"gear = {self.gear!r}; allowed: {', '.join(SENSE)}")
+        check_choice("gear", self.gear, SENSE)
+        check_limits(self, "", **self.limits)
+        check_ranges(self, "", **self.ranges)
 
     @abstractmethod
     def draw(
@@ -73,16 +73,14 @@ class Nuisance(ABC):
         record_rng: np.random.Generator,
         dynamics: PairDynamics,
     ) -> Tones:
-        """The forces of one unit, and what differs from one of its records to the next.
-
-        Angles that no tooth tells.
-        """
+        """Forces of one unit, with the angles that differ between its records."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shaft:
-    """Speed in rad/s, its share of the pinion's, and torque in N m of one gear's shaft at the set
-    point.
+    """Shaft of one gear at the set point.
+
+    Speed in rad/s, its share of the pinion's speed, and torque in N m.
     """
 
     speed: float
@@ -91,8 +89,10 @@ class Shaft:
 
 
 def shaft(dynamics: PairDynamics, gear: str) -> Shaft:
-    """The shaft of one gear at the set point."""
-    ratio = 1.0 if gear == "pinion" else 1.0 / dynamics.table.pair.ratio
+    """Shaft of one gear at the set point."""
+    ratio = 1.0
+    if gear != "pinion":
+        ratio = 1.0 / dynamics.table.pair.ratio
     operating = dynamics.operating
     return Shaft(
         speed=ratio * operating.speed,
@@ -104,7 +104,7 @@ def shaft(dynamics: PairDynamics, gear: str) -> Shaft:
 def make_tones(
     gear: str, base: list[float], multiple: Any, force: Any, follows: str
 ) -> Tones:
-    """Tones of anything that arrays are made of."""
+    """Tones of lists or arrays."""
     return Tones(
         gear=gear,
         base=np.array(base),
@@ -115,15 +115,15 @@ def make_tones(
 
 
 def turning(gear: str) -> Complex:
-    """A unit force that turns with the shaft.
+    """Unit force that turns with the shaft.
 
-    Along x first, a quarter of a turn later along y by the gear's sense.
+    It acts along x first, a quarter of a turn later along y by the gear's sense.
     """
     return np.array([1.0, -1j * SENSE[gear], 0.0])
 
 
 def fixed(angle: float) -> Array:
-    """A unit force in a fixed direction, from x towards y."""
+    """Unit force in a fixed direction, from x towards y."""
     return np.array([math.cos(angle), math.sin(angle), 0.0])
 
 
@@ -135,23 +135,3 @@ def uniform(rng: np.random.Generator, ends: tuple[float, ...]) -> float:
 def logarithmic(rng: np.random.Generator, ends: tuple[float, ...]) -> float:
     """One number between two ends, uniform in its logarithm."""
     return math.exp(rng.uniform(math.log(ends[0]), math.log(ends[1])))
-
-
-def check_number(key: str, value: float, least: float, most: float) -> None:
-    """ConfigError for an SI value out of bounds.
-
-    ``key`` is its name at the file boundary, with its unit.
-    """
-    if not least <= value <= most:
-        low, given, high = (f"{from_si(key, one):g}" for one in (least, value, most))
-        raise ConfigError(f"{key} = {given} must lie in {low}..{high}")
-
-
-def check_range(key: str, ends: tuple[float, ...], least: float, most: float) -> None:
-    """The same for a range of two ordered ends."""
-    if len(ends) != 2 or not least <= ends[0] <= ends[1] <= most:
-        shown = [float(f"{from_si(key, end):g}") for end in ends]
-        raise ConfigError(
-            f"{key} = {shown} must be two ordered numbers, [low, high], in {from_si(key, least):g}.."
-            f"{from_si(key, most):g}"
-        )

@@ -1,9 +1,8 @@
-"""Instantaneous speed by a toothed wheel and a magnetic pick-up: the time from tooth to tooth,
-taken by a clock.
+"""Instantaneous speed by a toothed wheel and a magnetic pick-up.
 
-What torsional vibration of engines is measured with at a flywheel's starter ring or a gear, where
-an incremental encoder (`gensig.sensing.encoder`) has no room; the engine paper's pick-ups give a
-square wave, an edge a tooth.
+A clock takes the time from tooth to tooth. Torsional vibration of engines is measured so at a
+flywheel's starter ring or a gear, where an incremental encoder (`gensig.sensing.encoder`) has no
+room. The engine paper's pick-ups give a square wave, an edge a tooth.
 """
 
 from __future__ import annotations
@@ -14,23 +13,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.errors import ConfigError, SimulationError
+from gensig.errors import SimulationError
 from gensig.sensing.encoder import MOST_ECCENTRICITY, MOST_LINE_SHARE, Disc, draw_lines
-from gensig.units import from_si, unit
+from gensig.units import check_limits, unit
 
 Array = NDArray[np.float64]
 
 MOST_TEETH = 1000
-SLOWEST_CLOCK = 1e4  # Hz
+SLOWEST_CLOCK, FASTEST_CLOCK = 1e4, 1e12  # Hz
+GROUP = "toothed_wheel."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ToothedWheel:
-    """A wheel on a node of the shaft line, each tooth of which gives one edge.
+    """Wheel on a node of the shaft line; each tooth gives one edge.
 
     ``eccentricity_error`` is the largest amplitude of the once-per-turn error and ``tooth_error``
-    the standard deviation of the place of each tooth, both rad; ``clock_frequency`` in Hz is that
-    of the counter that takes the times of the edges.
+    the standard deviation of the position of each tooth, both in rad. ``clock_frequency`` in Hz
+    is that of the counter that takes the times of the edges.
     """
 
     node: int
@@ -40,23 +40,14 @@ class ToothedWheel:
     clock_frequency: float = unit("hz")
 
     def __post_init__(self) -> None:
-        if not 4 <= self.n_teeth <= MOST_TEETH:
-            raise ConfigError(
-                f"toothed_wheel.n_teeth = {self.n_teeth} must lie in 4..{MOST_TEETH}"
-            )
-        for key, value, most in (
-            ("eccentricity_error_deg", self.eccentricity_error, MOST_ECCENTRICITY),
-            ("tooth_error_deg", self.tooth_error, MOST_LINE_SHARE * self.spacing),
-        ):
-            if not 0.0 <= value <= most * (1.0 + 1e-9):
-                given, allowed = (from_si(key, one) for one in (value, most))
-                raise ConfigError(
-                    f"toothed_wheel.{key} = {given:g} must lie in 0..{allowed:g}"
-                )
-        if not self.clock_frequency >= SLOWEST_CLOCK:
-            raise ConfigError(
-                f"toothed_wheel.clock_frequency_hz = {self.clock_frequency:g} must be at least {SLOWEST_CLOCK:g}"
-            )
+        check_limits(self, GROUP, n_teeth=(4, MOST_TEETH))
+        check_limits(
+            self,
+            GROUP,
+            eccentricity_error=(0.0, MOST_ECCENTRICITY * (1.0 + 1e-9)),
+            tooth_error=(0.0, MOST_LINE_SHARE * self.spacing * (1.0 + 1e-9)),
+            clock_frequency=(SLOWEST_CLOCK, FASTEST_CLOCK),
+        )
 
     @property
     def spacing(self) -> float:
@@ -65,15 +56,16 @@ class ToothedWheel:
 
 
 def draw_wheel(rng: np.random.Generator, wheel: ToothedWheel) -> Disc:
-    """The wheel of one machine with its errors, as of an encoder's disc."""
+    """Wheel of one machine with its errors, as of an encoder's disc."""
     return draw_lines(rng, wheel.n_teeth, wheel.eccentricity_error, wheel.tooth_error)
 
 
 def passage_times(
     wheel: ToothedWheel, disc: Disc, angle: Array, sampling_rate: float
 ) -> Array:
-    """Times at which teeth pass the pick-up, (passage,) s from the first sample, as the clock
-    reads them.
+    """Times at which teeth pass the pick-up, (passage,) s from the first sample.
+
+    They are whole ticks of the clock.
 
     Parameters
     ----------
@@ -106,21 +98,23 @@ def instantaneous_speed(
 
     Notes
     -----
-    One tooth spacing over the time between two teeth, at the middle of that time; straight between, held at either end.
-    It is a mean over one spacing and holds orders of the shaft below half the number of teeth.
+    One tooth spacing over the time between two teeth, at the middle of that time. It is straight
+    between these instants and held at either end. It is a mean over one spacing and holds orders
+    of the shaft below half the number of teeth.
 
     Raises
     ------
-    SimulationError    as `passage_times`, and where fewer than three teeth pass or two within one tick of the clock
+    SimulationError    as `passage_times`; also where fewer than three teeth pass, or two within
+        one tick of the clock
     """
     times = passage_times(wheel, disc, angle, sampling_rate)
     gaps = np.diff(times)
     if len(gaps) < 2 or gaps.min() <= 0.0:
         raise SimulationError(
-            f"{len(times)} teeth of {wheel.n_teeth} pass in {len(angle) / sampling_rate:.3g} s at a clock of "
-            f"{wheel.clock_frequency:g} Hz, too few or too fast; change n_teeth or clock_frequency_hz"
+            f"{len(times)} teeth of {wheel.n_teeth} pass in {len(angle) / sampling_rate:.3g} s "
+            f"at a clock of {wheel.clock_frequency:g} Hz, too few or too fast; "
+            "change n_teeth or clock_frequency_hz"
         )
     sample_times = np.arange(len(angle)) / sampling_rate
-    return np.asarray(
-        np.interp(sample_times, 0.5 * (times[1:] + times[:-1]), wheel.spacing / gaps)
-    )
+    middles = 0.5 * (times[1:] + times[:-1])
+    return np.asarray(np.interp(sample_times, middles, wheel.spacing / gaps))

@@ -1,6 +1,6 @@
-"""From the bearings to the sensor positions.
+"""Transfer paths from the bearings to the sensors, and modes of the housing.
 
-Nothing, a bank of housing modes, or what a user measured.
+A path is none, a bank of housing modes (here), or one that a user measured (``measured_path``).
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.errors import ConfigError
-from gensig.units import unit
+from gensig.units import check_limits, check_positive, check_ranges, unit
 
 Array = NDArray[np.float64]
 
+GROUP = "sensing.path."
 MOST_MODES = 200
 SETTLED = 5.0  # time constants after which 0.7 % of a transient is left
 
@@ -25,7 +25,7 @@ SETTLED = 5.0  # time constants after which 0.7 % of a transient is left
 class ModalPath:
     """Ranges from which the housing of a gearbox is drawn, [low, high] each.
 
-    The number of modes is uniform over whole numbers, frequencies and damping ratios are uniform
+    The number of modes is uniform over whole numbers. Frequencies and damping ratios are uniform
     in their logarithm. ``transmissibility`` is the RMS gain from one bearing channel to a sensor
     well below all modes.
     """
@@ -36,13 +36,15 @@ class ModalPath:
     transmissibility: float
 
     def __post_init__(self) -> None:
-        _check_range("n_modes", self.n_modes, 1, MOST_MODES)
-        _check_range("natural_frequency_hz", self.natural_frequency, 1.0, 1e6)
-        _check_range("damping_ratio", self.damping_ratio, 1e-4, 0.5)
-        if not 0.0 < self.transmissibility <= 1e3:
-            raise ConfigError(
-                f"sensing.path.transmissibility = {self.transmissibility:g} must lie in 0..1000"
-            )
+        check_ranges(
+            self,
+            GROUP,
+            n_modes=(1, MOST_MODES),
+            natural_frequency=(1.0, 1e6),
+            damping_ratio=(1e-4, 0.5),
+        )
+        check_positive(self, GROUP, "transmissibility")
+        check_limits(self, GROUP, transmissibility=(0.0, 1e3))
 
     @property
     def memory(self) -> float:
@@ -52,20 +54,13 @@ class ModalPath:
         )
 
 
-def _check_range(key: str, ends: tuple[float, ...], least: float, most: float) -> None:
-    if len(ends) != 2 or not least <= ends[0] <= ends[1] <= most:
-        raise ConfigError(
-            f"sensing.path.{key} = {list(ends)} must be two ordered numbers, [low, high], in {least:g}..{most:g}"
-        )
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Housing:
-    """The modes of one housing.
+    """Modes of one housing.
 
-    ``natural_frequency`` (mode,) Hz, ``damping_ratio`` (mode,), ``from_bearings`` (mode, channel)
-    and ``to_sensors`` (line, mode), the participations; the lines are the sensors' own axes, then
-    their transverse axes.
+    ``natural_frequency`` (mode,) Hz, ``damping_ratio`` (mode,). ``from_bearings`` (mode, channel)
+    and ``to_sensors`` (line, mode) are the participations. The lines are the sensors' main axes,
+    then their transverse axes.
     """
 
     natural_frequency: Array
@@ -81,23 +76,20 @@ class Housing:
         )
 
     def apply(self, source: Array, sampling_rate: float) -> Array:
-        """Accelerations at the sensors from those at the bearings, (channel, sample) to (line,
-        sample).
+        """Accelerations at the sensors from those at the bearings.
 
-        Each mode is the ramp-invariant form of w^2 / (s^2 + 2 zeta w s + w^2): exact for inputs
-        that go straight from sample to sample, poles where the continuous ones are. Linear and
-        causal.
+        (channel, sample) to (line, sample). Each mode is the ramp-invariant form of
+        w^2 / (s^2 + 2 zeta w s + w^2): exact for inputs that go straight from sample to sample,
+        with poles where the continuous ones are. Linear and causal.
         """
         from scipy.signal import sosfilt
 
         out = np.zeros((len(self.to_sensors), source.shape[1]))
-        for mode, (frequency, damping) in enumerate(
-            zip(self.natural_frequency, self.damping_ratio, strict=True)
-        ):
+        modes = zip(self.natural_frequency, self.damping_ratio, strict=True)
+        for mode, (frequency, damping) in enumerate(modes):
             section = mode_section(float(frequency), float(damping), sampling_rate)
-            out += self.to_sensors[:, mode, None] * sosfilt(
-                section, self.from_bearings[mode] @ source
-            )
+            response = sosfilt(section, self.from_bearings[mode] @ source)
+            out += self.to_sensors[:, mode, None] * response
         return out
 
 
@@ -122,19 +114,17 @@ def mode_section(
 def draw_housing(
     rng: np.random.Generator, path: ModalPath, n_channels: int, n_sensors: int
 ) -> Housing:
-    """The modes of one gearbox.
+    """Modes of one gearbox, sorted by frequency.
 
-    Modes are sorted by frequency, signs and sizes of participations are normal.
+    Participations are normal in sign and size.
     """
     n_modes = int(rng.integers(path.n_modes[0], path.n_modes[1], endpoint=True))
 
     def logarithmic(ends: tuple[float, ...]) -> Array:
         return np.exp(rng.uniform(math.log(ends[0]), math.log(ends[1]), n_modes))
 
-    frequency, damping = (
-        np.sort(logarithmic(path.natural_frequency)),
-        logarithmic(path.damping_ratio),
-    )
+    frequency = np.sort(logarithmic(path.natural_frequency))
+    damping = logarithmic(path.damping_ratio)
     scale = path.transmissibility / math.sqrt(n_modes)
     return Housing(
         natural_frequency=frequency,

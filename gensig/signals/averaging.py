@@ -1,5 +1,4 @@
-"""Synchronous averaging: the angle domain at constant speed, the average turn, its regular part
-and what is left.
+"""Synchronous averaging: angle domain at constant speed, average turn, regular part, residual.
 
 Time-synchronous averaging: S. Braun (1975), Acustica 32, 69-77; P. D. McFadden (1989),
 "Interpolation techniques for time domain averaging of gear vibration", Mechanical Systems and
@@ -16,9 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.floating]
 
-MIN_TURNS = (
-    20  # an average of fewer holds more than 1/20 of the power of what does not repeat
-)
+# an average of fewer turns holds more than 1/20 of the power of what does not repeat
+MIN_TURNS = 20
 
 
 def samples_per_turn_for(sampling_rate: float, rotation_frequency: float) -> int:
@@ -48,7 +46,8 @@ def resample_to_angle(
     signal : (..., sample)
     sampling_rate : Hz
     rotation_frequency : Hz    turns of the shaft per second
-    samples_per_turn : int     default: `samples_per_turn_for`; fewer alias what lies above half of them per turn
+    samples_per_turn : int     default: `samples_per_turn_for`; fewer alias what lies above half of
+        them per turn
 
     Returns
     -------
@@ -60,9 +59,9 @@ def resample_to_angle(
 
     Notes
     -----
-    Cubic B-spline interpolation: M. Unser (1999), "Splines: a perfect fit for signal and image processing", IEEE
-    Signal Processing Magazine 16 (6), 22-38. Largest error for a sine: 0.1 % of its amplitude at an eighth of the
-    sampling rate, 0.4 % at a sixth, 2.5 % at a quarter.
+    Cubic B-spline interpolation: M. Unser (1999), "Splines: a perfect fit for signal and image
+    processing", IEEE Signal Processing Magazine 16 (6), 22-38. Largest error for a sine: 0.1 % of
+    its amplitude at an eighth of the sampling rate, 0.4 % at a sixth, 2.5 % at a quarter.
     """
     x = np.asarray(signal, dtype=float)
     n_samples = x.shape[-1]
@@ -72,9 +71,8 @@ def resample_to_angle(
         raise ValueError(
             f"{n_samples} samples hold no whole turn of {samples_in_a_turn:.1f} samples"
         )
-    per_turn = samples_per_turn or samples_per_turn_for(
-        sampling_rate, rotation_frequency
-    )
+    default = samples_per_turn_for(sampling_rate, rotation_frequency)
+    per_turn = samples_per_turn or default
     position = np.arange(n_turns * per_turn) * (samples_in_a_turn / per_turn)
     return interpolate(x, position.reshape(n_turns, per_turn))
 
@@ -96,15 +94,8 @@ def interpolate(x: FloatArray, position: FloatArray) -> FloatArray:
     index = np.minimum(position.astype(np.intp), x.shape[-1] - 1)
     u = position - index
     coefficients = spline_filter1d(x, order=3, axis=-1, mode="mirror")
-    padded = np.concatenate(
-        [
-            coefficients[..., 1:2],
-            coefficients,
-            coefficients[..., -2:-1],
-            coefficients[..., -3:-2],
-        ],
-        axis=-1,
-    )
+    ends = [coefficients[..., -2:-1], coefficients[..., -3:-2]]
+    padded = np.concatenate([coefficients[..., 1:2], coefficients, *ends], axis=-1)
     squared = u * u
     cubed = squared * u
     rest = 1 - u
@@ -139,8 +130,9 @@ def time_synchronous_average(
 
 
 def average_turn(turns: ArrayLike, *, min_turns: int = MIN_TURNS) -> FloatArray:
-    """Mean turn of a shaft: what repeats every turn stays, the rest falls with the square root of
-    the turns.
+    """Mean turn of a shaft.
+
+    What repeats every turn stays; the rest falls with the square root of the turns.
 
     Parameters
     ----------
@@ -165,7 +157,8 @@ def remove_orders(average: ArrayLike, orders: Iterable[int]) -> FloatArray:
     Parameters
     ----------
     average : (..., sample)    one turn
-    orders : whole multiples of the rotation frequency; those above half the samples of a turn are ignored
+    orders : whole multiples of the rotation frequency; those above half the samples of a turn are
+        ignored
     """
     turn = np.asarray(average, dtype=float)
     spectrum = np.fft.rfft(turn, axis=-1)
@@ -177,8 +170,9 @@ def remove_orders(average: ArrayLike, orders: Iterable[int]) -> FloatArray:
 def regular_signal(
     average: ArrayLike, n_teeth: int, *, n_sidebands: int = 1
 ) -> FloatArray:
-    """What a sound gear makes: every mesh harmonic with the lowest sidebands, without the lowest
-    shaft orders.
+    """Regular mesh of a sound gear: every mesh harmonic with the lowest sidebands.
+
+    The lowest shaft orders are left out.
 
     Parameters
     ----------
@@ -188,8 +182,8 @@ def regular_signal(
 
     Notes
     -----
-    With 1 it is what `difference_signal` takes away, less the mean and the shaft orders: for the energy ratio those of
-    unbalance and misalignment are no sign of the mesh.
+    With 1 it is what `difference_signal` takes away, less the mean and the shaft orders: for the
+    energy ratio those of unbalance and misalignment are no sign of the mesh.
 
     Source: regular mesh components of M. Lebold, K. McClintic, R. Campbell, C. Byington & K.
     Maynard (2000), "Review of vibration analysis methods for gearbox diagnostics and
@@ -212,9 +206,7 @@ def residual_signal(
 
     Source: residual signal of Zakrajsek, Townsend & Decker (1993), NASA TM-105950, sidebands kept.
     """
-    return remove_orders(
-        average, _mesh_orders(average, n_teeth, 0).union(range(n_shaft_orders + 1))
-    )
+    return _without_mesh(average, n_teeth, 0, n_shaft_orders)
 
 
 def difference_signal(
@@ -227,15 +219,18 @@ def difference_signal(
     Source: difference signal of Zakrajsek, Townsend & Decker (1993), NASA TM-105950, after R. M.
     Stewart (1977).
     """
-    return remove_orders(
-        average, _mesh_orders(average, n_teeth, 1).union(range(n_shaft_orders + 1))
-    )
+    return _without_mesh(average, n_teeth, 1, n_shaft_orders)
+
+
+def _without_mesh(
+    average: ArrayLike, n_teeth: int, n_sidebands: int, n_shaft_orders: int
+) -> FloatArray:
+    mesh = _mesh_orders(average, n_teeth, n_sidebands)
+    return remove_orders(average, mesh.union(range(n_shaft_orders + 1)))
 
 
 def _mesh_orders(average: ArrayLike, n_teeth: int, n_sidebands: int) -> set[int]:
-    """Orders of the mesh harmonics and their sidebands, of those that half the samples of a turn
-    can hold.
-    """
+    """Orders of the mesh harmonics and their sidebands within half the samples of a turn."""
     top = np.shape(average)[-1] // 2
     mesh = range(n_teeth, top + n_sidebands + 1, n_teeth)
     return {order + k for order in mesh for k in range(-n_sidebands, n_sidebands + 1)}

@@ -22,8 +22,9 @@ def band_pass(
     *,
     order: int = 4,
 ) -> FloatArray:
-    """Butterworth band-pass run forwards and backwards: no phase shift, twice the order in
-    attenuation.
+    """Butterworth band-pass run forwards and backwards.
+
+    It has no phase shift and twice the order in attenuation.
 
     Parameters
     ----------
@@ -51,8 +52,7 @@ def band_pass(
 def envelope(
     signal: ArrayLike, sampling_rate: float, band: tuple[float, float] | None = None
 ) -> FloatArray:
-    """Magnitude of the analytic signal, of the band if one is given and otherwise of the signal
-    less its mean.
+    """Magnitude of the analytic signal, of a band or of the signal less its mean.
 
     Parameters
     ----------
@@ -67,11 +67,10 @@ def envelope(
     from scipy.signal import hilbert
 
     x = np.asarray(signal, dtype=float)
-    x = (
-        x - x.mean(axis=-1, keepdims=True)
-        if band is None
-        else band_pass(x, sampling_rate, band)
-    )
+    if band is None:
+        x = x - x.mean(axis=-1, keepdims=True)
+    else:
+        x = band_pass(x, sampling_rate, band)
     return np.abs(hilbert(x, axis=-1))
 
 
@@ -82,15 +81,15 @@ def mesh_envelope(
     harmonic: int = 1,
     n_sidebands: int | None = None,
 ) -> FloatArray:
-    """Amplitude of one mesh harmonic over a turn, from the band of its sidebands: amplitude
-    demodulation.
+    """Amplitude of one mesh harmonic over a turn, by demodulation of the band of its sidebands.
 
     Parameters
     ----------
     average : (..., sample)    time-synchronous average of one turn of the gear
     n_teeth : teeth of the gear
     harmonic : of the mesh
-    n_sidebands : taken on either side; default: all that are nearer to this harmonic than to another
+    n_sidebands : taken on either side; default: all that are nearer to this harmonic than to
+        another
 
     Returns
     -------
@@ -106,7 +105,9 @@ def mesh_envelope(
     """
     turn = np.asarray(average, dtype=float)
     n_samples = turn.shape[-1]
-    reach = (n_teeth - 1) // 2 if n_sidebands is None else n_sidebands
+    reach = n_sidebands
+    if reach is None:
+        reach = (n_teeth - 1) // 2
     low, high = harmonic * n_teeth - reach, harmonic * n_teeth + reach
     if not 0 < low <= high < n_samples / 2:
         raise ValueError(

@@ -1,5 +1,4 @@
-"""Indicators of a history: each record of a machine judged by all records of it up to then, in
-the order of time.
+"""Indicators of a history: each record of a machine judged by its records up to then.
 
 J. J. Zakrajsek, D. P. Townsend & H. J. Decker (1993), "An analysis of gear fault detection
 methods as applied to pitting fatigue failure data", NASA TM-105950 (NA4); J. J. Zakrajsek, R. F.
@@ -20,8 +19,7 @@ FloatArray = NDArray[np.floating]
 
 
 def na4(averages: ArrayLike, n_teeth: int) -> FloatArray:
-    """Fourth moment of the residual signal over the squared mean variance of all records up to
-    then.
+    """Fourth moment of the residual signal over the squared mean variance of the records up to it.
 
     Where damage grows, the moment grows with the fourth power of the residual and the mean
     variance follows late. So it goes on rising where FM4, whose own variance rises too, falls
@@ -29,14 +27,15 @@ def na4(averages: ArrayLike, n_teeth: int) -> FloatArray:
 
     Parameters
     ----------
-    averages : (..., record, sample)    time-synchronous averages of one turn of the gear, in the order of time
+    averages : (..., record, sample)    time-synchronous averages of one turn of the gear, in the
+        order of time
     n_teeth : teeth of the gear
 
     Returns
     -------
-    (..., record) dimensionless: 3 for Gaussian noise that stays, and for the first record the kurtosis of its residual;
-                  NaN where nothing is left without the mesh. Records that are NaN, those of too few turns, are passed
-                  over.
+    (..., record) dimensionless: 3 for Gaussian noise that stays, and for the first record the
+        kurtosis of its residual; NaN where nothing is left without the mesh. Records that are NaN,
+        those of too few turns, are passed over.
 
     Source: NA4 of NASA TM-105950 (1993).
     """
@@ -51,15 +50,17 @@ def nb4(
     harmonic: int = 1,
     n_sidebands: int | None = None,
 ) -> FloatArray:
-    """As `na4`, of the envelope of one mesh harmonic: teeth under load that share it differently
-    modulate the mesh.
+    """`na4` of the envelope of one mesh harmonic.
+
+    Teeth that share the load differently modulate the mesh.
 
     Parameters
     ----------
-    averages : (..., record, sample)    time-synchronous averages of one turn of the gear, in the order of time
+    averages : (..., record, sample)    time-synchronous averages of one turn of the gear, in the
+        order of time
     n_teeth : teeth of the gear
-    harmonic, n_sidebands : the band, see `gensig.signals.envelope.mesh_envelope`; the sources take the strongest
-                            harmonic and the sidebands that lie symmetrically about it
+    harmonic, n_sidebands : the band, see `gensig.signals.envelope.mesh_envelope`; the sources take
+        the strongest harmonic and the sidebands that lie symmetrically about it
 
     Returns
     -------
@@ -72,9 +73,8 @@ def nb4(
     Source: NB4 of NASA TM-106467 (1994).
     """
     x = np.asarray(averages, dtype=float)
-    return _over_mean_variance(
-        mesh_envelope(x, n_teeth, harmonic=harmonic, n_sidebands=n_sidebands), rms(x)
-    )
+    magnitude = mesh_envelope(x, n_teeth, harmonic=harmonic, n_sidebands=n_sidebands)
+    return _over_mean_variance(magnitude, rms(x))
 
 
 def _over_mean_variance(signal: FloatArray, level: FloatArray) -> FloatArray:
@@ -83,7 +83,8 @@ def _over_mean_variance(signal: FloatArray, level: FloatArray) -> FloatArray:
     Parameters
     ----------
     signal : (..., record, sample)
-    level : (..., record)    RMS of what the signal was taken from: what is smaller than its rounding counts as zero
+    level : (..., record)    RMS of what the signal was taken from: what is smaller than its
+        rounding counts as zero
     """
     squared = np.square(signal - signal.mean(axis=-1, keepdims=True))
     variance = squared.mean(axis=-1)
@@ -93,9 +94,5 @@ def _over_mean_variance(signal: FloatArray, level: FloatArray) -> FloatArray:
     mean_variance = total / np.maximum(np.cumsum(known, axis=-1), 1)
     moment = np.where(above, np.mean(np.square(squared), axis=-1), 0.0)
     indicator = np.full(variance.shape, np.nan)
-    return np.divide(
-        moment,
-        np.square(mean_variance),
-        out=indicator,
-        where=known & (mean_variance > 0.0),
-    )
+    defined = known & (mean_variance > 0.0)
+    return np.divide(moment, np.square(mean_variance), out=indicator, where=defined)

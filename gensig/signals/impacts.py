@@ -1,4 +1,4 @@
-"""Impacts of a faulted tooth: how many a turn, how far they stand out, and how fast they ring down.
+"""Impacts of a faulted tooth: number per turn, height over the residual, and decay.
 
 All functions take the residual turns of the faulted shaft
 (`gensig.signals.synchronous.residual_turns`).
@@ -16,21 +16,21 @@ from gensig.signals.indicators import rms
 
 FloatArray = NDArray[np.floating]
 
-RAYLEIGH_MEDIAN = math.sqrt(
-    2.0 * math.log(2.0)
-)  # median of the envelope of Gaussian noise of deviation 1
+# median of the envelope of Gaussian noise of deviation 1
+RAYLEIGH_MEDIAN = math.sqrt(2.0 * math.log(2.0))
 
 
 def impacts_per_turn(
     turns: ArrayLike, n_teeth: int, *, threshold: float = 5.0
 ) -> FloatArray:
-    """Impacts that stand out of what is between them, a turn.
+    """Impacts per turn that stand out of the signal between them.
 
     Parameters
     ----------
     turns : (..., turn, sample)    residual turns
     n_teeth : teeth of the gear; impacts nearer together than one tooth count as one
-    threshold : times the deviation of the residual between impacts, which is told by the median of its envelope
+    threshold : times the deviation of the residual between impacts, estimated by the median of
+        its envelope
 
     Returns
     -------
@@ -38,8 +38,8 @@ def impacts_per_turn(
 
     Notes
     -----
-    In Gaussian noise an independent sample passes a threshold of 5 with a probability of exp(-12.5): about one record
-    of 5,000 samples in a hundred has a false impact.
+    In Gaussian noise an independent sample passes a threshold of 5 with a probability of
+    exp(-12.5): about one record of 5,000 samples in a hundred has a false impact.
     """
     from scipy.signal import find_peaks
 
@@ -47,16 +47,15 @@ def impacts_per_turn(
     n_turns, per_turn = x.shape[-2:]
     magnitude = envelope(x.reshape(*x.shape[:-2], -1), 1.0)
     level = threshold / RAYLEIGH_MEDIAN * np.median(magnitude, axis=-1, keepdims=True)
-    rows = (magnitude / np.where(level > 0.0, level, np.inf)).reshape(
-        -1, n_turns * per_turn
-    )
+    relative = magnitude / np.where(level > 0.0, level, np.inf)
+    rows = relative.reshape(-1, n_turns * per_turn)
     apart = max(1, round(per_turn / n_teeth))
     counts = [len(find_peaks(row, height=1.0, distance=apart)[0]) for row in rows]
     return np.reshape(counts, x.shape[:-2]) / n_turns
 
 
 def peak_over_rms(turns: ArrayLike) -> FloatArray:
-    """How far the largest peak of a turn stands out of the residual.
+    """Largest peak of a turn over the RMS of the residual.
 
     Parameters
     ----------
@@ -64,14 +63,14 @@ def peak_over_rms(turns: ArrayLike) -> FloatArray:
 
     Returns
     -------
-    (...) dimensionless: median over the turns of each one's largest magnitude, over the RMS of all; NaN for silence
+    (...) dimensionless: median over the turns of each one's largest magnitude, over the RMS of
+    all; NaN for silence
     """
     x = np.asarray(turns, dtype=float)
     peak = np.median(np.max(np.abs(x), axis=-1), axis=-1)
     level = rms(x.reshape(*x.shape[:-2], -1))
-    return np.divide(
-        peak, level, out=np.full(np.shape(level), np.nan), where=level > 0.0
-    )
+    silent = np.full(np.shape(level), np.nan)
+    return np.divide(peak, level, out=silent, where=level > 0.0)
 
 
 def impact_decay(turns: ArrayLike, turn_duration: float) -> FloatArray:
@@ -84,23 +83,24 @@ def impact_decay(turns: ArrayLike, turn_duration: float) -> FloatArray:
 
     Returns
     -------
-    (...) s; NaN where nothing stands out of the rest of the turn by a factor of two in power, or it never falls so far
+    (...) s; NaN where nothing stands out of the rest of the turn by a factor of two in power, or
+    it never falls so far
 
     Notes
     -----
-    The squared envelope is averaged over the turns, so that turns whose ringing differs in phase do not cancel; its
-    median over the turn is taken for the power between impacts and subtracted. The first passage through 1/e counts:
-    beating of two modes can shorten it. Times below about five samples come out short: 0.7 ms at 5 kHz as 0.54 ms.
+    The squared envelope is averaged over the turns, so that turns whose ringing differs in phase
+    do not cancel; its median over the turn is taken for the power between impacts and subtracted.
+    The first passage through 1/e counts: beating of two modes can shorten it. Times below about
+    five samples come out short: 0.7 ms at 5 kHz as 0.54 ms.
     """
     x = np.asarray(turns, dtype=float)
     per_turn = x.shape[-1]
-    power = np.mean(
-        np.square(envelope(x.reshape(*x.shape[:-2], -1), 1.0)).reshape(x.shape), axis=-2
-    )
+    squared = np.square(envelope(x.reshape(*x.shape[:-2], -1), 1.0))
+    power = np.mean(squared.reshape(x.shape), axis=-2)
     floor = np.median(power, axis=-1, keepdims=True)
     rows, floors = power.reshape(-1, per_turn), floor.reshape(-1)
-    found = [_fall(row, level) for row, level in zip(rows, floors, strict=True)]
-    return np.reshape(found, x.shape[:-2]) * (turn_duration / per_turn)
+    falls = [_fall(row, level) for row, level in zip(rows, floors, strict=True)]
+    return np.reshape(falls, x.shape[:-2]) * (turn_duration / per_turn)
 
 
 def _fall(power: FloatArray, floor: float) -> float:

@@ -1,8 +1,7 @@
-"""Condition indicators: one number for a signal, or for the average turn of a gear. Batched over
-leading axes.
+"""Condition indicators: one number for a signal, or for the average turn of a gear.
 
-What each is blind to: ``docs/theory/indicators.md``. Those of an average are NaN where it is NaN:
-of too few turns.
+Batched over leading axes. Limits of each: ``docs/theory/indicators.md``. Indicators of an average
+are NaN where it is NaN: of too few turns.
 """
 
 from __future__ import annotations
@@ -15,7 +14,8 @@ from gensig.signals.synchronous import mesh_harmonics
 
 FloatArray = NDArray[np.floating]
 
-ROUNDING = 1e-12  # of the average's RMS: what is left of a transform forth and back where nothing is
+# of the average's RMS: what is left of a transform forth and back where nothing is
+ROUNDING = 1e-12
 
 
 def rms(signal: ArrayLike) -> FloatArray:
@@ -66,14 +66,16 @@ def crest_factor(signal: ArrayLike) -> FloatArray:
 def fm0(
     average: ArrayLike, n_teeth: int, *, n_harmonics: int | None = None
 ) -> FloatArray:
-    """Peak to peak of the average turn over the sum of the mesh's amplitudes: 2 for a mesh that
-    is one sine.
+    """Peak to peak of the average turn over the sum of the mesh's amplitudes.
+
+    It is 2 for a mesh that is one sine.
 
     Parameters
     ----------
     average : (..., sample)    time-synchronous average of one turn of the gear
     n_teeth : teeth of the gear
-    n_harmonics : mesh harmonics counted, from the first; default: all below half the samples of a turn
+    n_harmonics : mesh harmonics counted, from the first; default: all below half the samples of a
+        turn
 
     Returns
     -------
@@ -92,17 +94,14 @@ def fm0(
         raise ValueError(
             f"{turn.shape[-1]} samples a turn cannot hold mesh order {n_teeth}"
         )
-    mesh = mesh_harmonics(turn, n_teeth, min(n_harmonics or n_held, n_held)).sum(
-        axis=-1
-    )
-    return _ratio(
-        np.ptp(turn, axis=-1), np.where(mesh > ROUNDING * rms(turn), mesh, 0.0)
-    )
+    amplitudes = mesh_harmonics(turn, n_teeth, min(n_harmonics or n_held, n_held))
+    return _ratio(np.ptp(turn, axis=-1), _above_rounding(amplitudes.sum(axis=-1), turn))
 
 
 def fm4(average: ArrayLike, n_teeth: int) -> FloatArray:
-    """Kurtosis of the difference signal: a fault of one or two teeth makes it peak; 3 for
-    Gaussian noise.
+    """Kurtosis of the difference signal, which a fault of one or two teeth raises.
+
+    It is 3 for Gaussian noise.
 
     Parameters
     ----------
@@ -120,8 +119,9 @@ def fm4(average: ArrayLike, n_teeth: int) -> FloatArray:
 
 
 def m6a(average: ArrayLike, n_teeth: int) -> FloatArray:
-    """Sixth moment of the difference signal over its cubed variance, 15 for noise: peaks count
-    more than in `fm4`.
+    """Sixth moment of the difference signal over its cubed variance.
+
+    It is 15 for noise. Peaks count more than in `fm4`.
 
     Parameters, returns : as `fm4`
 
@@ -132,8 +132,9 @@ def m6a(average: ArrayLike, n_teeth: int) -> FloatArray:
 
 
 def m8a(average: ArrayLike, n_teeth: int) -> FloatArray:
-    """Eighth moment of the difference signal over the fourth power of its variance: 105 for
-    Gaussian noise.
+    """Eighth moment of the difference signal over the fourth power of its variance.
+
+    It is 105 for Gaussian noise.
 
     Parameters, returns, source : as `m6a`
     """
@@ -141,8 +142,9 @@ def m8a(average: ArrayLike, n_teeth: int) -> FloatArray:
 
 
 def energy_ratio(average: ArrayLike, n_teeth: int) -> FloatArray:
-    """RMS of the difference signal over that of the regular mesh with its first sidebands: wear
-    of all teeth raises it.
+    """RMS of the difference signal over that of the regular mesh with its first sidebands.
+
+    Wear of all teeth raises it.
 
     Parameters
     ----------
@@ -158,11 +160,13 @@ def energy_ratio(average: ArrayLike, n_teeth: int) -> FloatArray:
     `gensig.signals.averaging.regular_signal`.
     """
     turn = np.asarray(average, dtype=float)
-    mesh = rms(regular_signal(turn, n_teeth))
-    return _ratio(
-        rms(_difference(turn, n_teeth)),
-        np.where(mesh > ROUNDING * rms(turn), mesh, 0.0),
-    )
+    mesh = _above_rounding(rms(regular_signal(turn, n_teeth)), turn)
+    return _ratio(rms(_difference(turn, n_teeth)), mesh)
+
+
+def _above_rounding(level: FloatArray, turn: FloatArray) -> FloatArray:
+    """Level of a part of a turn, exactly zero where only rounding is left."""
+    return np.where(level > ROUNDING * rms(turn), level, 0.0)
 
 
 def sideband_ratio(
@@ -194,7 +198,8 @@ def sideband_ratio(
     centers = centers[centers + reach < amplitude.shape[-1]]
     if centers.size == 0:
         raise ValueError(
-            f"{np.shape(average)[-1]} samples a turn cannot hold mesh order {n_teeth} and its sidebands"
+            f"{np.shape(average)[-1]} samples a turn cannot hold mesh order {n_teeth} and its "
+            "sidebands"
         )
     steps = np.arange(1, reach + 1)
     sidebands = (centers[:, None] + np.concatenate([-steps, steps])).ravel()
@@ -207,9 +212,8 @@ def _difference(average: ArrayLike, n_teeth: int) -> FloatArray:
     """Difference signal, exactly zero where only rounding is left."""
     turn = np.asarray(average, dtype=float)
     difference = difference_signal(turn, n_teeth)
-    return np.where(
-        (rms(difference) > ROUNDING * rms(turn))[..., None], difference, 0.0
-    )
+    is_more = rms(difference) > ROUNDING * rms(turn)
+    return np.where(is_more[..., None], difference, 0.0)
 
 
 def _standardised_moment(signal: ArrayLike, half_order: int) -> FloatArray:
@@ -219,14 +223,12 @@ def _standardised_moment(signal: ArrayLike, half_order: int) -> FloatArray:
     """
     x = np.asarray(signal, dtype=float)
     squared = np.square(x - x.mean(axis=-1, keepdims=True))
-    return _ratio(
-        np.mean(squared**half_order, axis=-1), squared.mean(axis=-1) ** half_order
-    )
+    moment = np.mean(squared**half_order, axis=-1)
+    return _ratio(moment, squared.mean(axis=-1) ** half_order)
 
 
 def _ratio(numerator: FloatArray, denominator: FloatArray) -> FloatArray:
     """Quotient, NaN where the denominator is zero."""
     quotient = np.full(np.shape(numerator), np.nan)
-    return np.divide(
-        numerator, denominator, out=quotient, where=np.asarray(denominator) > 0
-    )
+    defined = np.asarray(denominator) > 0
+    return np.divide(numerator, denominator, out=quotient, where=defined)

@@ -1,9 +1,9 @@
-"""Speed from the mesh: where its harmonics stand, and how their phase wanders.
+"""Speed from the mesh: the position of its harmonics, and the drift of their phase.
 
 Search over a comb of harmonics, then demodulation of the phase: R. B. Randall (2011),
-"Vibration-based condition monitoring", Wiley, sections 3.3 and 3.6.2; several harmonics weighted
-as by F. Bonnardot, M. El Badaoui, R. B. Randall, J. Daniere & F. Guillet (2005), Mechanical
-Systems and Signal Processing 19 (4), 766-785.
+"Vibration-based condition monitoring", Wiley, sections 3.3 and 3.6.2. Several harmonics are
+weighted as by F. Bonnardot, M. El Badaoui, R. B. Randall, J. Daniere & F. Guillet (2005),
+Mechanical Systems and Signal Processing 19 (4), 766-785.
 """
 
 from __future__ import annotations
@@ -24,18 +24,14 @@ MOST_HARMONICS = 10
 FIRST_HARMONICS = 5  # a line of these must stand out ...
 LEAST_LINE_DB = 6.0  # ... by this much above what is around it,
 FALSE_ALARM = 1e-6  # and by more than noise would at one line with this probability
-TURNS_A_SEGMENT = 4  # of the slower gear, so that its sidebands are told from the mesh
+# of the slower gear, so that its sidebands are resolved from the mesh
+TURNS_A_SEGMENT = 4
 LEAST_TURNS = 8
 LOW_SPEED_RPM = 100.0  # assumed: a stated speed below is asked back
-FOLLOWED = (
-    0.4  # share of the slower shaft's frequency up to which the speed is followed
-)
-PASSES = (
-    1,
-    2,
-    4,
-    8,
-)  # harmonics followed in each round: a coarse phase first, then a fine one
+# share of the slower shaft's frequency up to which the speed is followed
+FOLLOWED = 0.4
+# harmonics followed in each round: a coarse phase first, then a fine one
+PASSES = (1, 2, 4, 8)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,14 +49,14 @@ class Teeth:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motion:
-    """How the mesh moves through a recording.
+    """Motion of the mesh in a recording.
 
     ``mesh_frequency`` Hz, mean; ``cycles`` (sample,) mesh cycles since the first sample.
-    ``scatter`` is the standard deviation of the speed over its mean, ``correlation_time`` s; both
-    None where the speed is steadier than ``detection_limit``, the scatter that would have been
-    seen, which is None where one harmonic alone was heard. ``followed_time`` s is the correlation
-    time that noise has after the lines are followed: a drift has a longer one. ``line_db``
-    (harmonic,) dB is how far the lines stand out, at the sensor that hears each best.
+    ``scatter`` is the standard deviation of the speed over its mean, ``correlation_time`` s. Both
+    are None where the speed is steadier than ``detection_limit``, the least visible scatter, which
+    is None where only one harmonic is visible. ``followed_time`` s is the correlation time that
+    noise has after the lines are followed: a drift has a longer one. ``line_db`` (harmonic,) dB
+    is the height of the lines over their surroundings, at the best sensor for each.
     """
 
     mesh_frequency: float
@@ -89,7 +85,7 @@ def find_motion(
     speed_rpm : r/min    of the driving gear, known within `SEARCH`
     highest : Hz         end of the band in which the recording can be trusted
     options : what the user's command calls teeth, speed and rate, for the line that a mistake gets
-    least_turns : of the slower gear; more where the motion is to be told well
+    least_turns : of the slower gear; more for a motion without doubt
     longer : what the user can do about a short recording
 
     Raises
@@ -99,37 +95,38 @@ def find_motion(
     nominal = speed_rpm / 60.0 * teeth.driving
     if nominal * (1.0 + SEARCH) > highest:
         raise ConfigError(
-            f"the mesh frequency of {nominal:.5g} Hz lies above the usable band of {highest:.5g} Hz of this recording; "
-            f"record faster, or check {options}"
+            f"the mesh frequency of {nominal:.5g} Hz lies above the usable band of "
+            f"{highest:.5g} Hz of this recording; record faster, or check {options}"
         )
     turns = recording.duration * nominal / teeth.most
     if turns < least_turns:
         raise ConfigError(
-            f"too short: {recording.duration:.3g} s are {turns:.1f} turns of the slower gear, at least {least_turns:g} "
-            f"are needed; {longer}{in_hertz(speed_rpm)}"
+            f"too short: {recording.duration:.3g} s are {turns:.1f} turns of the slower gear, "
+            f"at least {least_turns:g} are needed; {longer}{in_hertz(speed_rpm)}"
         )
     mesh, line_db = _search(recording, teeth, nominal, highest)
     least = _least_line_db(turns)
-    heard = np.flatnonzero(line_db >= least) + 1
-    if not np.any(heard <= FIRST_HARMONICS):
+    visible = np.flatnonzero(line_db >= least) + 1
+    if not np.any(visible <= FIRST_HARMONICS):
         raise ConfigError(
-            f"no sign of the mesh: none of its first {FIRST_HARMONICS} harmonics within {100 * SEARCH:g} % of "
-            f"{nominal:.5g} Hz stands {least:.1f} dB above its surroundings; check {options}{in_hertz(speed_rpm)}"
+            f"no sign of the mesh: none of its first {FIRST_HARMONICS} harmonics within "
+            f"{100 * SEARCH:g} % of {nominal:.5g} Hz stands {least:.1f} dB above its "
+            f"surroundings; check {options}{in_hertz(speed_rpm)}"
         )
-    return _follow(recording, teeth, mesh, heard, line_db)
+    return _follow(recording, teeth, mesh, visible, line_db)
 
 
 def in_hertz(speed_rpm: float) -> str:
-    """A question behind a message, where a speed in r/min looks like one in Hz."""
+    """Question at the end of a message, where a speed in r/min looks like one in Hz."""
     if speed_rpm > LOW_SPEED_RPM:
         return ""
     return f"; is {speed_rpm:g} r/min in Hz? Then say {60.0 * speed_rpm:.5g}"
 
 
 def _least_line_db(turns: float) -> float:
-    """What a line must stand above the median beside it.
+    """Least height of a line above the median of its surroundings, dB.
 
-    In few segments noise alone does so too.
+    In few segments noise alone reaches it too.
     """
     from scipy.stats import gamma
 
@@ -141,9 +138,7 @@ def _least_line_db(turns: float) -> float:
 def _search(
     recording: Recording, teeth: Teeth, nominal: float, highest: float
 ) -> tuple[float, Array]:
-    """Mesh frequency to a fraction of a line, and how far its harmonics stand out, (harmonic,)
-    dB.
-    """
+    """Mesh frequency to a fraction of a line, and height of its harmonics, (harmonic,) dB."""
     from scipy.ndimage import median_filter
     from scipy.signal import welch
 
@@ -162,113 +157,99 @@ def _search(
     harmonics = np.arange(1, n_harmonics + 1)
     at_lines = np.interp(harmonics[:, None] * candidates, frequency, standing)
     best = int(np.argmax(np.log10(np.maximum(at_lines, 1.0)).sum(axis=0)))
-    return float(candidates[best]), 10.0 * np.log10(
-        np.maximum(at_lines[:, best], 1e-300)
-    )
+    height = np.maximum(at_lines[:, best], 1e-300)
+    return float(candidates[best]), 10.0 * np.log10(height)
 
 
 def _follow(
     recording: Recording,
     teeth: Teeth,
     mesh: float,
-    heard: NDArray[np.intp],
+    visible: NDArray[np.intp],
     line_db: Array,
 ) -> Motion:
-    """Phase of the harmonics that are heard, in rounds.
-
-    Then what they agree on beyond their noise.
-    """
+    """Phase of the visible harmonics, followed in rounds, and its drift beyond their noise."""
     rate, n_samples = recording.sampling_rate, recording.acceleration.shape[1]
     cycles: Array = mesh * np.arange(n_samples, dtype=np.float64) / rate
     slow = mesh / teeth.most
     fast = mesh / min(teeth.driving, teeth.driven)
     groups = np.empty((0, n_samples))
-    edge = math.ceil(1.5 / slow * rate)
+    edge = min(math.ceil(1.5 / slow * rate), n_samples // 8)
+    inner = slice(edge, n_samples - edge)
     for most in PASSES:
-        used = [int(harmonic) for harmonic in heard if harmonic <= max(most, heard[0])]
-        width = FOLLOWED * (fast if most == PASSES[0] else slow)
+        used = visible[visible <= max(most, visible[0])].tolist()
+        width = FOLLOWED * slow
+        if most == PASSES[0]:
+            width = FOLLOWED * fast
         groups = _deviation(recording.acceleration, cycles, used, width, rate)
-        deviation = groups[0]
-        inner = slice(min(edge, n_samples // 8), n_samples - min(edge, n_samples // 8))
-        deviation = np.concatenate([  # a filter knows nothing beyond the ends
-            np.full(inner.start, deviation[inner.start]), deviation[inner],
-            np.full(n_samples - inner.stop, deviation[inner.stop - 1]),
-        ])  # fmt: skip
+        # a filter knows nothing beyond the ends
+        deviation = np.pad(groups[0][inner], edge, mode="edge")
         cycles = cycles + np.concatenate([[0.0], np.cumsum(deviation[:-1])]) / rate
     mean = float((cycles[-1] - cycles[0]) * rate / (n_samples - 1))
     instantaneous: Array = np.gradient(cycles[inner]) * rate / mean - 1.0
-    noise = (
-        0.5 * (groups[1, inner] - groups[2, inner]) / mean if len(groups) == 3 else None
-    )
-    return _told(instantaneous, noise, mean, cycles, rate, slow, line_db)
-
-
-def _deviation(
-    signal: Array, cycles: Array, used: list[int], width: float, rate: float
-) -> Array:
-    """What the mesh frequency is above that of ``cycles``, (group, sample) Hz: of all lines, then
-    of every other one.
-
-    Each line is shifted to rest and kept within ``width`` Hz; its frequency is Im(z* dz/dt) /
-    |z|^2. Lines are averaged with the weight harmonic^2 power / noise, which is that of the least
-    squares fit of one common frequency.
-    """
-    n_samples = signal.shape[1]
-    frequency = np.fft.fftfreq(n_samples, 1.0 / rate)
-    keep = np.exp(-0.5 * (frequency / (0.5 * width)) ** 2)
-    beside = (np.abs(frequency) > 1.5 * width) & (np.abs(frequency) < 2.5 * width)
-    parts = []
-    for harmonic in used:
-        shifted = np.fft.fft(signal * np.exp(-2j * np.pi * harmonic * cycles), axis=1)
-        line = np.fft.ifft(shifted * keep, axis=1)
-        turning = np.fft.ifft(shifted * keep * 2j * np.pi * frequency, axis=1)
-        noise = np.median(np.abs(shifted[:, beside]) ** 2, axis=1) + 1e-300
-        top = np.sum((line.conj() * turning).imag / noise[:, None], axis=0) * harmonic
-        bottom = np.sum(np.abs(line) ** 2 / noise[:, None], axis=0) * harmonic**2
-        parts.append((top, bottom))
-    parts.sort(key=lambda part: -float(part[1].mean()))
-    groups = [parts, parts[::2], parts[1::2]] if len(parts) > 1 else [parts]
-    return np.stack(
-        [
-            sum(top for top, _ in some)
-            / sum(bottom for _, bottom in some)
-            / (2.0 * np.pi)
-            for some in groups
-        ]
-    )
-
-
-def _told(
-    deviation: Array,
-    noise: Array | None,
-    mean: float,
-    cycles: Array,
-    rate: float,
-    slow: float,
-    line_db: Array,
-) -> Motion:
-    """Drift where it is above the noise of the lines.
-
-    Its correlation time is where the correlation falls to 1/e.
-    """
-    variance = float(np.var(deviation))
-    limit = None if noise is None else float(np.sqrt(np.mean(noise**2)))
-    scatter = correlation = None
-    if limit is not None and variance > (2.0 * limit) ** 2:
-        scatter = math.sqrt(variance - limit**2)
-        step = max(1, int(rate / (20.0 * slow)))
-        coarse = deviation[::step] - deviation.mean()
-        lags = np.correlate(coarse, coarse, "full")[len(coarse) - 1 :] / np.arange(
-            len(coarse), 0, -1
-        )
-        below = np.flatnonzero(lags[: len(coarse) // 2] < lags[0] / math.e)
-        correlation = float(below[0] if len(below) else len(coarse) // 2) * step / rate
+    limit = scatter = correlation = None
+    if len(groups) == 3:
+        noise = 0.5 * (groups[1, inner] - groups[2, inner]) / mean
+        level = float(np.sqrt(np.mean(noise**2)))
+        limit = 2.0 * level
+        variance = float(np.var(instantaneous))
+        if variance > limit**2:
+            scatter = math.sqrt(variance - level**2)
+            correlation = _correlation_time(instantaneous, rate, slow)
     return Motion(
         mesh_frequency=mean,
         cycles=cycles,
         scatter=scatter,
         correlation_time=correlation,
-        detection_limit=None if limit is None else 2.0 * limit,
+        detection_limit=limit,
         followed_time=1.0 / (math.pi * 0.5 * FOLLOWED * slow),
         line_db=line_db,
     )
+
+
+def _correlation_time(deviation: Array, rate: float, slow: float) -> float:
+    """Lag at which the correlation of a deviation falls to 1/e, s."""
+    step = max(1, int(rate / (20.0 * slow)))
+    coarse = deviation[::step] - deviation.mean()
+    n_points = len(coarse)
+    sums = np.correlate(coarse, coarse, "full")[n_points - 1 :]
+    lags = sums / np.arange(n_points, 0, -1)
+    below = np.flatnonzero(lags[: n_points // 2] < lags[0] / math.e)
+    lag = n_points // 2
+    if len(below):
+        lag = below[0]
+    return float(lag) * step / rate
+
+
+def _deviation(
+    signal: Array, cycles: Array, used: list[int], width: float, rate: float
+) -> Array:
+    """Excess of the mesh frequency over that of ``cycles``, (group, sample) Hz.
+
+    The groups are all lines, then every other one. Each line is shifted to rest and kept within
+    ``width`` Hz; its frequency is Im(z* dz/dt) / |z|^2. Lines are averaged with the weight
+    harmonic^2 power / noise, that of the least squares fit of one common frequency.
+    """
+    n_samples = signal.shape[1]
+    frequency = np.fft.fftfreq(n_samples, 1.0 / rate)
+    keep = np.exp(-0.5 * (frequency / (0.5 * width)) ** 2)
+    around = (np.abs(frequency) > 1.5 * width) & (np.abs(frequency) < 2.5 * width)
+    parts = []
+    for harmonic in used:
+        shifted = np.fft.fft(signal * np.exp(-2j * np.pi * harmonic * cycles), axis=1)
+        line = np.fft.ifft(shifted * keep, axis=1)
+        turning = np.fft.ifft(shifted * keep * 2j * np.pi * frequency, axis=1)
+        noise = np.median(np.abs(shifted[:, around]) ** 2, axis=1) + 1e-300
+        top = np.sum((line.conj() * turning).imag / noise[:, None], axis=0) * harmonic
+        bottom = np.sum(np.abs(line) ** 2 / noise[:, None], axis=0) * harmonic**2
+        parts.append((top, bottom))
+    parts.sort(key=lambda part: -float(part[1].mean()))
+    groups = [parts]
+    if len(parts) > 1:
+        groups += [parts[::2], parts[1::2]]
+    deviations = []
+    for group in groups:
+        total_top = sum(top for top, _ in group)
+        total_bottom = sum(bottom for _, bottom in group)
+        deviations.append(total_top / total_bottom / (2.0 * np.pi))
+    return np.stack(deviations)

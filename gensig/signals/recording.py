@@ -1,6 +1,6 @@
-"""Recordings of users: accelerations of some sensors at one rate. Their content is data.
+"""Recordings of users: accelerations of some sensors at one rate.
 
-Every mistake is one line.
+Every mistake is answered by one line.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class RecordingFile:
     ----------
     file : as the user named it
     channels : names of the columns, or ``channel_0``, ``channel_1``, ... where the file has none
-    named : whether the names are the file's own
+    named : True where the names are those of the file
     values : (channel, sample) in the file's units
     sampling_rate : Hz
     has_level : False for a WAV file of whole numbers
@@ -78,7 +78,7 @@ class RecordingFile:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recording:
-    """What some sensors felt.
+    """Accelerations of some sensors.
 
     Names, (sensor, sample) m/s2 without the mean, and samples per second.
     """
@@ -112,8 +112,9 @@ def read_file(
 
     Parameters
     ----------
-    file : CSV of one column a sensor, with or without ``time_s``; WAV; .npy of (sample,) or (sensor, sample); .npz,
-        HDF5 or MATLAB (version 5 or 7.3) with such an array and, if it likes, its rate as ``sampling_rate_hz``
+    file : CSV of one column a sensor, with or without ``time_s``; WAV; .npy of (sample,) or
+        (sensor, sample); .npz, HDF5 or MATLAB (version 5 or 7.3) with such an array and, if it
+        likes, its rate as ``sampling_rate_hz``
     rate : Hz    samples per second; needed where the file does not tell
     array : name of the array in a .npz, HDF5 or MATLAB file; None is ``acceleration``
     rate_option : how the user's command calls `rate`
@@ -122,11 +123,13 @@ def read_file(
     ------
     ConfigError    with one line, for files, arrays and rates that cannot be used
     """
-    _check_range(rate, f"{rate_option} {rate:g}" if rate is not None else "")
+    if rate is not None:
+        _check_range(rate, f"{rate_option} {rate:g}")
     suffix = Path(file).suffix.lower()
     if suffix not in TYPES:
         raise ConfigError(
-            f"{file}: the name must end in {', '.join(TYPES)}; write the recording as one of these"
+            f"{file}: the name must end in {', '.join(TYPES)}; "
+            "write the recording as one of these"
         )
     if suffix == ".csv":
         if array is not None:
@@ -147,26 +150,21 @@ def read_file(
     except OSError as error:
         raise ConfigError(f"{file} cannot be read: {error.strerror}") from None
     content = READERS[suffix](file, array)
-    found = content.sampling_rate
+    stored = content.sampling_rate
     _check_range(
-        found, f"{file}: {content.rate_from} has {found} samples a second, which"
+        stored, f"{file}: {content.rate_from} has {stored} samples a second, which"
     )
-    if found is None and rate is None:
+    if stored is None and rate is None:
         raise ConfigError(
             f"{file}: an array tells no rate; give the samples a second with {rate_option}"
         )
-    if (
-        found is not None
-        and rate is not None
-        and not math.isclose(found, rate, rel_tol=1e-3)
-    ):
-        raise ConfigError(_disagree(file, content.rate_from, found, rate_option, rate))
+    _check_agreement(file, content.rate_from, stored, rate_option, rate)
     return RecordingFile(
         file=file,
-        channels=tuple(f"channel_{place}" for place in range(len(content.values))),
+        channels=tuple(f"channel_{index}" for index in range(len(content.values))),
         named=False,
         values=content.values,
-        sampling_rate=float(rate or found or 0.0),
+        sampling_rate=float(rate or stored or 0.0),
         has_level=content.has_level,
     )
 
@@ -231,9 +229,10 @@ def recording_of(
 
 def without_unit(name: str) -> str:
     """Name of a column less the unit at its end."""
-    return next(
-        (name[: -len(end)] for end in SUFFIXES if name.lower().endswith(end)), name
-    )
+    for end in SUFFIXES:
+        if name.lower().endswith(end):
+            return name[: -len(end)]
+    return name
 
 
 def _read_csv(
@@ -247,30 +246,34 @@ def _read_csv(
             )
         return names, values, rate
     time = values[names.index("time_s")]
-    found = (
-        (len(time) - 1) / float(time[-1] - time[0]) if time[-1] > time[0] else math.nan
-    )
-    check_rate("recording", file, time, found)
-    if rate is not None and not math.isclose(found, rate, rel_tol=1e-3):
-        raise ConfigError(_disagree(file, "time_s", found, rate_option, rate))
-    kept = [place for place, name in enumerate(names) if name != "time_s"]
+    mean = math.nan
+    if time[-1] > time[0]:
+        mean = (len(time) - 1) / float(time[-1] - time[0])
+    check_rate("recording", file, time, mean)
+    _check_agreement(file, "time_s", mean, rate_option, rate)
+    kept = [index for index, name in enumerate(names) if name != "time_s"]
     if not kept:
         raise ConfigError(
             f"{file}: there is no column beside time_s; give one a sensor"
         )
-    # times are often printed with few digits: a rate within their rounding of a whole number is
-    # that number
-    whole = round(found)
-    precise = float(whole) if math.isclose(found, whole, rel_tol=2e-6) else found
-    return (
-        [names[place] for place in kept],
-        values[kept],
-        rate if rate is not None else precise,
+    if rate is None:
+        # times are often printed with few digits: a rate within their rounding of a whole number
+        # is that number
+        rate = mean
+        if math.isclose(mean, round(mean), rel_tol=2e-6):
+            rate = float(round(mean))
+    return [names[index] for index in kept], values[kept], rate
+
+
+def _check_agreement(
+    file: str, source: str, stored: float | None, option: str, rate: float | None
+) -> None:
+    if stored is None or rate is None or math.isclose(stored, rate, rel_tol=1e-3):
+        return
+    raise ConfigError(
+        f"{file}: {source} has {stored:g} samples a second, {option} says {rate:g}; "
+        f"leave {option} out"
     )
-
-
-def _disagree(file: str, source: str, found: float, option: str, rate: float) -> str:
-    return f"{file}: {source} has {found:g} samples a second, {option} says {rate:g}; leave {option} out"
 
 
 def _check_range(rate: float | None, what: str) -> None:
@@ -283,9 +286,10 @@ def _factor(file: str, name: str, unit: str) -> float:
     lower = name.lower()
     if wrong := [suffix for suffix in WRONG_SUFFIXES if lower.endswith(suffix)]:
         raise ConfigError(
-            f"{file}: {name} ends in {wrong[0]}, which is no acceleration; choose others with --channels, or rename it"
+            f"{file}: {name} ends in {wrong[0]}, which is no acceleration; choose others with "
+            "--channels, or rename it"
         )
-    return next(
-        (factor for suffix, factor in SUFFIXES.items() if lower.endswith(suffix)),
-        UNITS[unit],
-    )
+    for suffix, factor in SUFFIXES.items():
+        if lower.endswith(suffix):
+            return factor
+    return UNITS[unit]

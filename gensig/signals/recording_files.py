@@ -1,12 +1,11 @@
-"""Files of recordings.
+"""Files of recordings: WAV, numpy, HDF5 and MATLAB.
 
-WAV, numpy, HDF5 and MATLAB. Numbers only: nothing is unpickled, no link is followed.
+Numbers only: nothing is unpickled, no link is followed.
 """
 
 from __future__ import annotations
 
 import warnings
-import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -27,13 +26,13 @@ RATE_KEY = "sampling_rate_hz"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Content:
-    """What a file without column names holds.
+    """Content of a file without column names.
 
     Attributes
     ----------
     values : (channel, sample)
     sampling_rate : Hz    None where the file does not tell
-    rate_from : what told it, in words
+    rate_from : its source, in words
     has_level : False for samples of whole numbers without a unit
     """
 
@@ -49,9 +48,8 @@ def read_wav(file: str, array: str | None) -> Content:
 
     _no_array_name(file, array)
     with _one_line(file, "it is no WAV file"), warnings.catch_warnings():
-        warnings.simplefilter(
-            "ignore", wavfile.WavFileWarning
-        )  # chunks that are no samples
+        # chunks that are no samples
+        warnings.simplefilter("ignore", wavfile.WavFileWarning)
         rate, samples = wavfile.read(Path(file).expanduser())
     rows = np.atleast_2d(np.asarray(samples).T).astype(np.float64)
     return Content(
@@ -80,10 +78,7 @@ def read_npz(file: str, array: str | None) -> Content:
             raise ValueError
         with content:
             name = _chosen(file, array, content.files)
-            values, rate = (
-                content[name],
-                content[RATE_KEY] if RATE_KEY in content.files else None,
-            )
+            values, rate = content[name], content.get(RATE_KEY)
     return Content(values=_rows(file, values), sampling_rate=_rate(file, rate))
 
 
@@ -98,21 +93,24 @@ def read_hdf5(file: str, array: str | None, *, from_matlab: bool = False) -> Con
         _one_line(file, "it is no HDF5 file"),
         h5py.File(Path(file).expanduser(), "r") as content,
     ):
-        found: dict[str, Any] = {}
-        # visits what the file itself holds: neither soft nor external links
-        content.visititems(
-            lambda name, item: found.update({name: item}) if _is_plain(item) else None
-        )
-        chosen = found[_chosen(file, array, found)]
+        arrays: dict[str, Any] = {}
+
+        def keep(name: str, item: Any) -> None:
+            if _is_plain(item):
+                arrays[name] = item
+
+        # visits the items of the file alone: neither soft nor external links
+        content.visititems(keep)
+        chosen = arrays[_chosen(file, array, arrays)]
         if 8 * chosen.size > MOST_BYTES:
             raise ConfigError(
                 f"{file}: {chosen.name} is larger than {MOST_BYTES // 1_000_000} MB; cut it"
             )
         values = chosen[()]
         rates: list[Mapping[str, Any]] = [chosen.attrs, content.attrs]
-        rate = next((place[RATE_KEY] for place in rates if RATE_KEY in place), None)
-        if rate is None and RATE_KEY in found:
-            rate = found[RATE_KEY][()]
+        rate = next((group[RATE_KEY] for group in rates if RATE_KEY in group), None)
+        if rate is None and RATE_KEY in arrays:
+            rate = arrays[RATE_KEY][()]
     return Content(
         values=_rows(file, values, from_matlab=from_matlab),
         sampling_rate=_rate(file, rate),
@@ -120,8 +118,9 @@ def read_hdf5(file: str, array: str | None, *, from_matlab: bool = False) -> Con
 
 
 def read_mat(file: str, array: str | None) -> Content:
-    """One array of a MATLAB file of version 4, 5 or 7 (scipy) or 7.3 (HDF5), samples along its
-    longer side.
+    """One array of a MATLAB file, samples along its longer side.
+
+    Versions 4, 5 and 7 are read by scipy, 7.3 is HDF5.
     """
     import h5py
     from scipy import io
@@ -140,18 +139,18 @@ def read_mat(file: str, array: str | None) -> Content:
 
 @contextmanager
 def _one_line(file: str, what: str) -> Iterator[None]:
-    """Whatever a reader raises on a damaged file, one line; our own messages pass."""
+    """Turn what a reader raises on a damaged file into one line; a ConfigError passes."""
     try:
         yield
     except ConfigError:
         raise
-    except zipfile.BadZipFile:
-        raise ConfigError(f"{file} cannot be read: {what}") from None
     except OSError as error:
-        raise ConfigError(
-            f"{file} cannot be read: {(error.errno and error.strerror) or what}"
-        ) from None
-    except Exception:  # the parsers of scipy and h5py raise nearly any on bytes that were made to mislead them
+        reason = what
+        if error.errno and error.strerror:
+            reason = error.strerror
+        raise ConfigError(f"{file} cannot be read: {reason}") from None
+    # the parsers of scipy and h5py raise nearly any on bytes that were made to mislead them
+    except Exception:
         raise ConfigError(f"{file} cannot be read: {what}") from None
 
 
@@ -168,10 +167,12 @@ def _is_plain(item: Any) -> bool:
 
 
 def _chosen(file: str, array: str | None, names: Any) -> str:
-    wanted = ARRAY_KEY if array is None else array
+    wanted = array or ARRAY_KEY
     if wanted not in names:
         has = ", ".join(sorted(names)[:12]) or "nothing"
-        hint = "; name one with --array" if array is None and names else ""
+        hint = ""
+        if array is None and names:
+            hint = "; name one with --array"
         raise ConfigError(f"{file}: no array {wanted}; it has {has}{hint}")
     return wanted
 
@@ -185,11 +186,8 @@ def _no_array_name(file: str, array: str | None) -> None:
 
 def _rows(file: str, content: Any, *, from_matlab: bool = False) -> Array:
     """(channel, sample) of an array; those of MATLAB may stand either way."""
-    if (
-        not isinstance(content, np.ndarray)
-        or content.dtype.kind not in "fiu"
-        or content.ndim not in (1, 2)
-    ):
+    is_array = isinstance(content, np.ndarray) and content.dtype.kind in "fiu"
+    if not is_array or content.ndim not in (1, 2):
         raise ConfigError(
             f"{file}: give one array of real numbers, (sample,) or (sensor, sample)"
         )
@@ -204,7 +202,7 @@ def _rows(file: str, content: Any, *, from_matlab: bool = False) -> Array:
 
 
 def _rate(file: str, content: Any) -> float | None:
-    """One number, whatever it is wrapped in."""
+    """Rate as one number, also from an array of one value."""
     if content is None:
         return None
     numbers = np.asarray(content)

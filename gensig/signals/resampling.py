@@ -1,7 +1,7 @@
-"""From one rate to another, by the low-pass of the simulated recorder: flat to 0.39 of the lower
-rate, shut from half.
+"""Change of sampling rate by the low-pass of the simulated recorder.
 
-Rates may be samples a second or samples a turn.
+It is flat to 0.39 of the lower rate and shut from half. Rates may be samples a second or samples
+a turn.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.floating]
 
-PASS_SHARE = 0.390625  # of the lower rate, as in gensig.dynamics.decimation: recorders of 2.56 samples a cycle
+# of the lower rate, as in gensig.dynamics.decimation: recorders of 2.56 samples a cycle
+PASS_SHARE = 0.390625
 ATTENUATION_DB = 100.0
 MOST_STEPS = 1000  # of the ratio of two rates; leaves an error of 0.0005 at most
 
@@ -41,12 +42,12 @@ class RateChange:
 
     @property
     def is_none(self) -> bool:
-        """Whether both rates are the same."""
+        """True where both rates are the same."""
         return self.up == self.down
 
-    def n_samples(self, n_found: int) -> int:
+    def n_samples(self, n_given: int) -> int:
         """Samples at the new rate that lie inside as many at the old one."""
-        return n_found * self.up // self.down
+        return n_given * self.up // self.down
 
     def apply(self, signal: ArrayLike) -> FloatArray:
         """Signal (..., sample) at the new rate; beyond its ends it counts as zero.
@@ -65,7 +66,7 @@ class RateChange:
     def apply_to_part(
         self,
         read: Callable[[int, int], FloatArray],
-        n_found: int,
+        n_given: int,
         start: int,
         stop: int,
     ) -> FloatArray:
@@ -75,26 +76,25 @@ class RateChange:
         Parameters
         ----------
         read : from first and last (exclusive) sample at the old rate to (..., sample)
-        n_found : samples of the whole signal at the old rate
+        n_given : samples of the whole signal at the old rate
         start, stop : in samples at the new rate
         """
         reach = math.ceil(len(self._taps()) / 2 / self.down) + 1
         first = max(start - reach, 0) // self.up * self.up  # a sample of both rates
-        last = min(math.ceil((stop + reach) * self.down / self.up), n_found)
+        last = min(math.ceil((stop + reach) * self.down / self.up), n_given)
         part = self.apply(read(first // self.up * self.down, last))
         return part[..., start - first : stop - first]
 
     def _taps(self) -> FloatArray:
         from scipy.signal import firwin, kaiserord
 
-        lower = 1.0 / max(
-            self.up, self.down
-        )  # lower of both rates over the rate that both divide
+        # lower of both rates over the rate that both divide
+        lower = 1.0 / max(self.up, self.down)
         n_taps, beta = kaiserord(ATTENUATION_DB, 2.0 * (0.5 - PASS_SHARE) * lower)
         return firwin(n_taps | 1, (PASS_SHARE + 0.5) * lower, window=("kaiser", beta))
 
 
-def rate_change(found: float, wanted: float) -> RateChange:
-    """From one rate to the nearest one that a ratio of whole numbers up to `MOST_STEPS` gives."""
-    ratio = Fraction(wanted / found).limit_denominator(MOST_STEPS)
+def rate_change(given: float, wanted: float) -> RateChange:
+    """Change to the nearest rate by a ratio of whole numbers up to `MOST_STEPS`."""
+    ratio = Fraction(wanted / given).limit_denominator(MOST_STEPS)
     return RateChange(up=ratio.numerator, down=ratio.denominator)

@@ -1,5 +1,4 @@
-"""The angle domain of a shaft whose speed varies, by its angle, or without a tachometer by the
-phase of the mesh.
+"""Angle domain of a shaft whose speed varies, by its angle or by the phase of the mesh.
 
 Phase demodulation as a tachometer: F. Bonnardot, M. El Badaoui, R. B. Randall, J. Daniere & F.
 Guillet (2005), "Use of the acceleration signal of a gearbox in order to perform angular
@@ -18,9 +17,8 @@ from gensig.signals.averaging import interpolate, samples_per_turn_for
 FloatArray = NDArray[np.floating]
 
 PADDING = 8  # bins of the searched spectrum for one of the record's
-FADED = (
-    0.2  # of the median amplitude; band-limited noise is below it for 3 % of the time
-)
+# of the median amplitude; band-limited noise is below it for 3 % of the time
+FADED = 0.2
 
 
 def resample_by_angle(
@@ -31,7 +29,8 @@ def resample_by_angle(
     Parameters
     ----------
     signal : (..., sample)
-    angle : (sample,) rad      of the shaft at every sample, rising; its first value is where the first turn starts
+    angle : (sample,) rad      of the shaft at every sample, rising; its first value is where the
+        first turn starts
     samples_per_turn : int     default: `samples_per_turn_for` the slowest turn; fewer alias
 
     Returns
@@ -40,7 +39,8 @@ def resample_by_angle(
 
     Raises
     ------
-    ValueError    if the angle does not rise, has another length than the signal, or makes no whole turn
+    ValueError    if the angle does not rise, has another length than the signal, or makes no whole
+        turn
 
     Notes
     -----
@@ -50,7 +50,8 @@ def resample_by_angle(
     x, turned = np.asarray(signal, dtype=float), np.asarray(angle, dtype=float)
     if turned.shape != x.shape[-1:] or not np.all(np.diff(turned) > 0.0):
         raise ValueError(
-            "the angle must rise from sample to sample, and have a value for every sample of the signal"
+            "the angle must rise from sample to sample, and have a value for every sample of the "
+            "signal"
         )
     turned = (turned - turned[0]) / (2.0 * math.pi)
     n_turns = math.floor(turned[-1] + 1e-9)
@@ -91,14 +92,16 @@ def find_mesh_frequency(
 
     Raises
     ------
-    ValueError    if the search reaches the sidebands one shaft order away, or half the sampling rate
+    ValueError    if the search reaches the sidebands one shaft order away, or half the sampling
+        rate
 
     Notes
     -----
-    First the largest sum over the harmonics of the logarithm of amplitude over its median in the searched band, so that
-    a foreign tone near one harmonic does not outweigh the mesh in the others; then, within a bin of the record, of the
-    squares, so that the strongest lines tell the place. Assumes a constant speed: one that drifts by more than a bin
-    over the record blunts the peak.
+    First the largest sum over the harmonics of the logarithm of amplitude over its median in the
+    searched band, so that a foreign tone near one harmonic does not outweigh the mesh in the
+    others; then, within a bin of the record, of the squares, so that the strongest lines tell the
+    place. Assumes a constant speed: one that drifts by more than a bin over the record blunts the
+    peak.
     """
     x = np.asarray(signal, dtype=float)
     x = (x - x.mean(axis=-1, keepdims=True)).reshape(-1, x.shape[-1])
@@ -109,7 +112,8 @@ def find_mesh_frequency(
         )
     if (1.0 + share) * expected >= 0.5 * sampling_rate:
         raise ValueError(
-            f"the mesh frequency {expected:g} Hz lies above half the sampling rate {sampling_rate:g} Hz"
+            f"the mesh frequency {expected:g} Hz lies above half the sampling rate "
+            f"{sampling_rate:g} Hz"
         )
     n_bins = PADDING * x.shape[-1]
     spectrum = np.abs(np.fft.rfft(x * np.hanning(x.shape[-1]), n=n_bins, axis=-1))
@@ -118,14 +122,13 @@ def find_mesh_frequency(
     searched = np.arange(
         (1.0 - share) * expected, (1.0 + share) * expected, spacing / n_harmonics
     )
-    lines = [
-        np.interp(harmonic * searched / spacing, np.arange(amplitude.size), amplitude)
-        for harmonic in range(1, n_harmonics + 1)
-        if harmonic * searched[-1] < 0.5 * sampling_rate
+    bins = np.arange(amplitude.size)
+    held = [
+        k for k in range(1, n_harmonics + 1) if k * searched[-1] < 0.5 * sampling_rate
     ]
-    over = np.array(
-        [line / floor for line in lines if (floor := np.median(line)) > 0.0]
-    ).reshape(-1, searched.size)
+    lines = [np.interp(k * searched / spacing, bins, amplitude) for k in held]
+    relative = [line / floor for line in lines if (floor := np.median(line)) > 0.0]
+    over = np.array(relative).reshape(-1, searched.size)
     coarse = searched[np.argmax(np.sum(np.log(np.maximum(over, 1.0)), axis=0))]
     near = np.abs(searched - coarse) <= PADDING * spacing
     return float(searched[near][np.argmax(np.sum(np.square(over), axis=0)[near])])
@@ -155,15 +158,16 @@ def mesh_phase_angle(
 
     Raises
     ------
-    ValueError    where the line fades below a fifth of its median amplitude, or its phase runs backwards: noise does
-                  so, and teeth would be miscounted
+    ValueError    where the line fades below a fifth of its median amplitude, or its phase runs
+        backwards: noise does so, and teeth would be miscounted
 
     Notes
     -----
-    The harmonic, shifted to frequency 0, is averaged over two turns with a Hann window, which is zero at the sidebands
-    of whole orders of the shaft. So it follows what changes slower than once in four turns, and cannot see a speed that
-    varies within a turn. A speed that drifts by more than the share 1 / (2 n_teeth harmonic) loses the line. At either
-    end one turn is averaged over fewer samples. Where a turn begins is arbitrary.
+    The harmonic, shifted to frequency 0, is averaged over two turns with a Hann window, which is
+    zero at the sidebands of whole orders of the shaft. So it follows what changes slower than once
+    in four turns, and cannot see a speed that varies within a turn. A speed that drifts by more
+    than the share 1 / (2 n_teeth harmonic) loses the line. At either end one turn is averaged over
+    fewer samples. Where a turn begins is arbitrary.
     """
     from scipy.signal import get_window, oaconvolve
 
@@ -174,10 +178,10 @@ def mesh_phase_angle(
     )
     band = oaconvolve((x - x.mean()) * np.exp(-1j * steady), window, mode="same")
     phase, magnitude = steady + np.unwrap(np.angle(band)), np.abs(band)
-    if magnitude.min() <= FADED * np.median(magnitude) or not np.all(
-        np.diff(phase) > 0.0
-    ):
+    is_faded = magnitude.min() <= FADED * np.median(magnitude)
+    if is_faded or not np.all(np.diff(phase) > 0.0):
         raise ValueError(
-            f"no steady line stands out at {harmonic * mesh_frequency:.5g} Hz; try another harmonic or channel"
+            f"no steady line stands out at {harmonic * mesh_frequency:.5g} Hz; try another "
+            "harmonic or channel"
         )
     return (phase - phase[0]) / (harmonic * n_teeth)

@@ -1,4 +1,4 @@
-"""What repeats with either gear of a pair, told apart tooth by tooth.
+"""Separation of the parts of a signal that repeat with either gear of a pair, tooth by tooth.
 
 Neither average holds a part of the other's.
 """
@@ -15,17 +15,18 @@ from gensig.signals.averaging import interpolate
 
 FloatArray = NDArray[np.floating]
 
-RIDGE = 1e-3  # of one passage of a tooth: decides what passes too seldom to be told apart, and nothing else
+# of one passage of a tooth: decides only about teeth that pass too seldom to be separated
+RIDGE = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearTurns:
-    """A signal taken apart into the mean passage of a mesh and what each tooth of either gear
-    adds to it.
+    """Signal as the mean passage of a mesh and the addition of each tooth of either gear.
 
     Attributes
     ----------
-    driving, driven : (..., sample)    one turn of the gear, ``samples_per_tooth`` for each tooth in the order of mesh
+    driving, driven : (..., sample)    one turn of the gear, ``samples_per_tooth`` for each tooth
+        in the order of mesh
     mesh : (..., sample)               mean of all passages: ``samples_per_tooth``
     """
 
@@ -62,9 +63,10 @@ def separate_gears(
 
     Notes
     -----
-    Passage n is mesh + driving[n mod z1] + driven[n mod z2] + rest, solved for by least squares over all passages. A
-    time-synchronous average is the same without the other gear, whose teeth it takes for noise: in a second of 8 turns
-    they weigh as much as the noise. The teeth of either gear are 0 in the mean; one that never passes is 0.
+    Passage n is mesh + driving[n mod z1] + driven[n mod z2] + rest, solved for by least squares
+    over all passages. A time-synchronous average is the same without the other gear, whose teeth
+    it takes for noise: in a second of 8 turns they weigh as much as the noise. The teeth of either
+    gear are 0 in the mean; one that never passes is 0.
 
     Two-way layout without interaction: H. Scheffe (1959), "The analysis of variance", chapter 4.
     """
@@ -78,27 +80,23 @@ def separate_gears(
     n_passages = math.floor((x.shape[-1] + 1e-6) / in_a_passage)
     if n_passages < n_teeth[0]:
         raise ValueError(
-            f"{x.shape[-1]} samples hold {n_passages} passages of a tooth, less than {n_teeth[0]}: a turn"
+            f"{x.shape[-1]} samples hold {n_passages} passages of a tooth, less than "
+            f"{n_teeth[0]}: a turn"
         )
-    fine = samples_per_tooth * max(
-        math.ceil(in_a_passage / samples_per_tooth), 1
-    )  # nothing aliases
-    position = np.arange(n_passages * fine).reshape(n_passages, fine) * (
-        in_a_passage / fine
-    )
+    # nothing aliases
+    fine = samples_per_tooth * max(math.ceil(in_a_passage / samples_per_tooth), 1)
+    points = np.arange(n_passages * fine).reshape(n_passages, fine)
+    position = points * (in_a_passage / fine)
     passages = np.moveaxis(interpolate(x, position), -2, 0)
     mesh = passages.mean(axis=0)
-    teeth = _tooth_parts((passages - mesh).reshape(n_passages, -1), n_teeth).reshape(
-        -1, *mesh.shape
-    )
-    for first, last in (
-        (0, n_teeth[0]),
-        (n_teeth[0], min(sum(n_teeth), n_teeth[0] + n_passages)),
-    ):
-        common = teeth[first:last].mean(
-            axis=0
-        )  # of the teeth that pass: it belongs to no tooth
-        teeth[first:last] -= common
+    deviations = (passages - mesh).reshape(n_passages, -1)
+    teeth = _tooth_parts(deviations, n_teeth).reshape(-1, *mesh.shape)
+    n_driving = n_teeth[0]
+    last_driven = min(sum(n_teeth), n_driving + n_passages)
+    for of_gear in (slice(0, n_driving), slice(n_driving, last_driven)):
+        # of the teeth that pass: it belongs to no tooth
+        common = teeth[of_gear].mean(axis=0)
+        teeth[of_gear] -= common
         mesh = mesh + common
 
     def turn(of_teeth: FloatArray) -> FloatArray:
@@ -106,8 +104,8 @@ def separate_gears(
         return _fewer_samples(whole, whole.shape[-1] // fine * samples_per_tooth)
 
     return GearTurns(
-        driving=turn(teeth[: n_teeth[0]]),
-        driven=turn(teeth[n_teeth[0] :]),
+        driving=turn(teeth[:n_driving]),
+        driven=turn(teeth[n_driving:]),
         mesh=turn(mesh[None]),
     )
 

@@ -65,14 +65,14 @@ def order_spectrum(
     ------
     ValueError    if the signal holds no whole turn
     """
-    return spectrum_of_turns(
-        resample_to_angle(signal, sampling_rate, rotation_frequency, samples_per_turn)
+    turns = resample_to_angle(
+        signal, sampling_rate, rotation_frequency, samples_per_turn
     )
+    return spectrum_of_turns(turns)
 
 
 def spectrum_of_turns(turns: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Amplitude spectrum over the orders of a shaft, of turns cut at any course of the speed:
-    order tracking.
+    """Amplitude spectrum over the orders of a shaft, of turns cut at any course of the speed.
 
     Parameters
     ----------
@@ -85,6 +85,5 @@ def spectrum_of_turns(turns: ArrayLike) -> tuple[FloatArray, FloatArray]:
     amplitude : (..., bin) m/s^2, no window: whole orders fall on bins
     """
     x = np.asarray(turns, dtype=float)
-    return amplitude_spectrum(
-        x.reshape(*x.shape[:-2], -1), x.shape[-1], window="boxcar"
-    )
+    flat = x.reshape(*x.shape[:-2], -1)
+    return amplitude_spectrum(flat, x.shape[-1], window="boxcar")

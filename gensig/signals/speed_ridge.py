@@ -1,6 +1,6 @@
-"""A speed that wanders, read off the harmonics of the mesh in a spectrogram.
+"""Course of a wandering speed, read off the harmonics of the mesh in a spectrogram.
 
-Coarse, but sure of its lines.
+It is coarse, but sure of its lines.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from gensig.signals.recording import Recording
 
 FloatArray = NDArray[np.floating]
 
-TURNS_A_FRAME = (
-    3  # of the faster gear: its sidebands, one turn away, are told from the mesh
-)
+# of the faster gear: its sidebands, one turn away, are resolved from the mesh
+TURNS_A_FRAME = 3
 FRAMES_A_FRAME = 4  # hop is a quarter of the frame
 MOST_HARMONICS = 10
 FINER_SPECTRUM = 2  # bins of the frame's spectrum for one of the frame
-LEAST_TURNS = 4  # of the slower gear, so that its sidebands are told from the mesh
+LEAST_TURNS = 4  # of the slower gear, so that its sidebands are resolved from the mesh
 # assumed: a course that follows noise reached 13.2 and 7.8 dB in 280 trials
 LEAST_LINE_DB = 18.0  # of the strongest of the first harmonics,
 LEAST_MEAN_DB = 10.0  # or of all of them on the average
 FIRST_HARMONICS = 5
 FINE = 0.25  # candidates lie this share of a bin apart at the highest harmonic
-STEP_SHARE = 0.003  # assumed: standard deviation of the relative change of speed from one frame to the next
+# assumed: standard deviation of the relative change of speed from one frame to the next
+STEP_SHARE = 0.003
 
 
 def wandering_mesh_cycles(
@@ -42,12 +42,12 @@ def wandering_mesh_cycles(
     options: str,
     longer: str,
 ) -> FloatArray:
-    """Mesh cycles since the first sample, (sample,), where the speed stays near a stated one but
-    wanders.
+    """Mesh cycles since the first sample, (sample,), where the speed wanders near a stated one.
 
     Parameters
     ----------
-    speed_rpm : r/min    of the driving gear; the speed lies within `mesh_motion.SEARCH` of it throughout
+    speed_rpm : r/min    of the driving gear; the speed lies within `mesh_motion.SEARCH` of it
+        throughout
     highest, options, longer : see `gensig.signals.mesh_motion.find_motion`
 
     Raises
@@ -56,8 +56,9 @@ def wandering_mesh_cycles(
 
     Notes
     -----
-    The course of `mesh_frequency_course` makes the speed nearly steady; `find_motion` follows what is left. A course
-    finds something that stands out in noise too, so that the lines must stand out more than for a steady speed.
+    The course of `mesh_frequency_course` makes the speed nearly steady; `find_motion` follows what
+    is left. A course finds something that stands out in noise too, so that the lines must stand
+    out more than for a steady speed.
     """
     rate, n_samples = recording.sampling_rate, recording.acceleration.shape[1]
     mesh = speed_rpm / 60.0 * teeth.driving
@@ -68,12 +69,14 @@ def wandering_mesh_cycles(
         )
     if SEARCH * fewest >= 1.0:
         raise ConfigError(
-            f"{fewest} teeth: within {100 * SEARCH:g} % of the speed sidebands look like the mesh; give a tachometer"
+            f"{fewest} teeth: within {100 * SEARCH:g} % of the speed sidebands look like the "
+            "mesh; give a tachometer"
         )
     turns = recording.duration * mesh / teeth.most
     if turns < LEAST_TURNS:
         raise ConfigError(
-            f"too short: {recording.duration:.3g} s are {turns:.1f} turns of the slower gear, at least {LEAST_TURNS} "
+            f"too short: {recording.duration:.3g} s are {turns:.1f} turns of the slower gear, at "
+            f"least {LEAST_TURNS} "
             f"are needed; {longer}{in_hertz(speed_rpm)}"
         )
     time, course = mesh_frequency_course(
@@ -81,17 +84,13 @@ def wandering_mesh_cycles(
     )
     samples = np.arange(n_samples)
     frequency = np.interp(samples / rate, time, course)
-    coarse = (
-        np.concatenate([[0.0], np.cumsum(0.5 * (frequency[1:] + frequency[:-1]))])
-        / rate
-    )
+    steps = 0.5 * (frequency[1:] + frequency[:-1])
+    coarse = np.concatenate([[0.0], np.cumsum(steps)]) / rate
     mean = float(coarse[-1] * rate / (n_samples - 1))
-    warped = coarse / mean * rate  # place of every sample once the speed is steady
-    steady = np.stack(
-        [np.interp(samples, warped, row) for row in recording.acceleration]
-    )
+    warped = coarse / mean * rate  # position of every sample once the speed is steady
+    rows = [np.interp(samples, warped, row) for row in recording.acceleration]
     motion = find_motion(
-        replace(recording, acceleration=steady),
+        replace(recording, acceleration=np.stack(rows)),
         teeth,
         mean / teeth.driving * 60.0,
         highest=highest,
@@ -102,8 +101,10 @@ def wandering_mesh_cycles(
     first = motion.line_db[:FIRST_HARMONICS]
     if first.max() < LEAST_LINE_DB and first.mean() < LEAST_MEAN_DB:
         raise ConfigError(
-            f"no sure sign of the mesh near {mesh:.5g} Hz: followed, its lines stand at most {first.max():.0f} dB over "
-            f"their surroundings, {LEAST_LINE_DB:g} are needed; check {options}, or give a tachometer"
+            f"no sure sign of the mesh near {mesh:.5g} Hz: followed, its lines stand at most "
+            f"{first.max():.0f} dB over "
+            f"their surroundings, {LEAST_LINE_DB:g} are needed; check {options}, or give a "
+            "tachometer"
         )
     return np.interp(warped, samples, motion.cycles)
 
@@ -125,7 +126,8 @@ def mesh_frequency_course(
     sampling_rate : Hz
     n_teeth : teeth of the gear that turns faster
     mesh_frequency : Hz           as stated
-    search : share of it, to which the course is held on either side; below 1 / n_teeth, where sidebands are
+    search : share of it, to which the course is held on either side; below 1 / n_teeth, where
+        sidebands are
     highest : Hz                  harmonics above are not looked at
 
     Returns
@@ -135,7 +137,8 @@ def mesh_frequency_course(
 
     Raises
     ------
-    ValueError    if the recording is shorter than a frame, or the search reaches sidebands or ``highest``
+    ValueError    if the recording is shorter than a frame, or the search reaches sidebands or
+        ``highest``
 
     Source: Q. Leclere, H. Andre & J. Antoni (2016), "A multi-order probabilistic approach for
     instantaneous angular speed tracking", Mechanical Systems and Signal Processing 81, 375-386:
@@ -170,16 +173,11 @@ def mesh_frequency_course(
     step = FINE / (n_harmonics * TURNS_A_FRAME * n_teeth)
     candidates = np.arange(-search, search + 0.5 * step, step)
     harmonic = np.arange(1, n_harmonics + 1)[:, None]
-    place = harmonic * (1.0 + candidates) * mesh_frequency / frequency[1]
-    likelihood = np.stack(
-        [
-            np.interp(place, np.arange(frequency.size), row).sum(axis=0)
-            for row in standing.T
-        ]
-    )
-    return time, (
-        1.0 + candidates[_most_probable(likelihood, candidates)]
-    ) * mesh_frequency
+    at = harmonic * (1.0 + candidates) * mesh_frequency / frequency[1]
+    bins = np.arange(frequency.size)
+    likelihood = [np.interp(at, bins, row).sum(axis=0) for row in standing.T]
+    best = _most_probable(np.stack(likelihood), candidates)
+    return time, (1.0 + candidates[best]) * mesh_frequency
 
 
 def _floor(power: FloatArray) -> FloatArray:
@@ -194,12 +192,13 @@ def _floor(power: FloatArray) -> FloatArray:
 
 
 def _most_probable(likelihood: FloatArray, candidates: FloatArray) -> NDArray[np.intp]:
-    """(frame,) indices of the candidates along the best course, logarithms of probability (frame,
-    candidate).
+    """Indices of the candidates along the best course, (frame,).
+
+    ``likelihood`` (frame, candidate) are logarithms of probability.
     """
-    change = -0.5 * np.square(
-        (candidates[:, None] - candidates[None, :]) / STEP_SHARE
-    )  # to, from
+    # (to, from)
+    distance = candidates[:, None] - candidates[None, :]
+    change = -0.5 * np.square(distance / STEP_SHARE)
     total, origin = likelihood[0], []
     for row in likelihood[1:]:
         reached = change + total[None, :]

@@ -1,7 +1,4 @@
-"""What a signal holds of a shaft's turns.
-
-Mesh harmonics by order, and the share that does not repeat.
-"""
+"""Parts of a signal by a shaft's turns: mesh harmonics, residual, share that does not repeat."""
 
 from __future__ import annotations
 
@@ -40,20 +37,23 @@ def nonsynchronous_share(turns: ArrayLike) -> FloatArray:
 
     Parameters
     ----------
-    turns : (..., turn, sample)    as from `resample_by_angle` or `resample_to_angle`, two turns or more
+    turns : (..., turn, sample)    as from `resample_by_angle` or `resample_to_angle`, two turns or
+        more
 
     Returns
     -------
-    (...) from 0, the same turn again and again, to 1 on the average for noise; NaN for a constant signal
+    (...) from 0, the same turn again and again, to 1 on the average for noise; NaN for a constant
+    signal
 
     Raises
     ------
-    ValueError    for a single turn, which nothing can be told from
+    ValueError    for a single turn, which does not show what repeats
 
     Notes
     -----
-    With synchronous power S and other power N, an average of T turns holds S + N / T, the turns S + N: solved for N,
-    so that few turns do not make noise look synchronous. What turns with another shaft alone counts as not repeating.
+    With synchronous power S and other power N, an average of T turns holds S + N / T, the turns S
+    + N: solved for N, so that few turns do not make noise look synchronous. What turns with
+    another shaft alone counts as not repeating.
     """
     x = np.asarray(turns, dtype=float)
     n_turns = x.shape[-2]
@@ -62,20 +62,17 @@ def nonsynchronous_share(turns: ArrayLike) -> FloatArray:
     x = x - x.mean(axis=(-2, -1), keepdims=True)
     whole = np.mean(np.square(x), axis=(-2, -1))
     averaged = np.mean(np.square(x.mean(axis=-2)), axis=-1)
+    other = (whole - averaged) * n_turns / (n_turns - 1)
     share = np.full(np.shape(whole), np.nan)
-    return np.divide(
-        (whole - averaged) * n_turns / (n_turns - 1),
-        whole,
-        out=share,
-        where=whole > 0.0,
-    )
+    return np.divide(other, whole, out=share, where=whole > 0.0)
 
 
 def residual_turns(
     turns: ArrayLike, n_teeth: int, *, n_shaft_orders: int = 2
 ) -> FloatArray:
-    """Turns without the mean, the lowest shaft orders and every mesh harmonic; what does not
-    repeat stays.
+    """Turns without the mean, the lowest shaft orders and every mesh harmonic.
+
+    What does not repeat stays.
 
     Parameters
     ----------
@@ -94,7 +91,6 @@ def residual_turns(
     x = np.asarray(turns, dtype=float)
     n_turns, per_turn = x.shape[-2:]
     orders = {*range(n_shaft_orders + 1), *range(n_teeth, per_turn // 2 + 1, n_teeth)}
-    flat = remove_orders(
-        x.reshape(*x.shape[:-2], -1), [n_turns * order for order in orders]
-    )
-    return flat.reshape(x.shape)
+    flat = x.reshape(*x.shape[:-2], -1)
+    residual = remove_orders(flat, [n_turns * order for order in orders])
+    return residual.reshape(x.shape)

@@ -1,4 +1,4 @@
-"""From a tachometer's pulses to speed and to the angle domain: computed order tracking.
+"""Speed and angle domain from a tachometer's pulses: computed order tracking.
 
 K. R. Fyfe & E. D. S. Munck (1997), "Analysis of computed order tracking", Mechanical Systems and
 Signal Processing 11 (2), 187-205.
@@ -19,14 +19,16 @@ def pulse_times(tacho: ArrayLike, sampling_rate: float) -> FloatArray:
 
     Parameters
     ----------
-    tacho : (sample,)    low between pulses and high in them; what lies halfway between its extremes is the threshold
+    tacho : (sample,)    low between pulses and high in them; what lies halfway between its
+        extremes is the threshold
     sampling_rate : Hz
 
     Notes
     -----
-    What the two samples around an edge have in common with the high level tells where it is: exact, but for rounding,
-    where a sample is the mean over its interval, as in a data set's ``tacho``, and pulses and gaps last two samples or
-    more. A train of zeros and ones has its edges half a sample before the first high one, within half a sample.
+    What the two samples around an edge have in common with the high level tells where it is:
+    exact, but for rounding, where a sample is the mean over its interval, as in a data set's
+    ``tacho``, and pulses and gaps last two samples or more. A train of zeros and ones has its
+    edges half a sample before the first high one, within half a sample.
     """
     signal = np.asarray(tacho, dtype=float)
     low, high = float(signal.min()), float(signal.max())
@@ -52,9 +54,8 @@ def speed_of_pulses(
     rotation_frequency : (pulse - 1,) Hz
     """
     instants = np.asarray(times, dtype=float)
-    return 0.5 * (instants[1:] + instants[:-1]), 1.0 / (
-        pulses_per_turn * np.diff(instants)
-    )
+    middles = 0.5 * (instants[1:] + instants[:-1])
+    return middles, 1.0 / (pulses_per_turn * np.diff(instants))
 
 
 def resample_by_pulses(
@@ -87,8 +88,9 @@ def resample_by_pulses(
 
     Notes
     -----
-    Time over angle is the cubic spline through the pulses (not-a-knot: with three pulses the parabola of constant
-    acceleration that Fyfe and Munck take). The signal is interpolated as in `resample_to_angle`.
+    Time over angle is the cubic spline through the pulses (not-a-knot: with three pulses the
+    parabola of constant acceleration that Fyfe and Munck take). The signal is interpolated as in
+    `resample_to_angle`.
     """
     from scipy.interpolate import CubicSpline
 

@@ -1,1 +1,1 @@
-"""What both commands share: exit statuses, one line for a mistake, shell completion."""
+"""Parts that both commands share: parser, exit statuses, error line, shell completion."""

@@ -1,15 +1,15 @@
-"""Shell completion: the verb that prints what to source, and the candidates for a half-typed word.
+"""Shell completion: the verb that prints the shell code, and candidates for a half-typed word.
 
-``argcomplete`` asks the command itself at a press of the tab key; nothing of it is loaded at any
-other time.
+``argcomplete`` asks the command itself at a press of the tab key. It is loaded at no other time.
 """
 
 from __future__ import annotations
 
 import argparse
+import functools
 import os
 from argparse import Namespace
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 COMMANDS = ("gensig", "diagnose")
@@ -24,7 +24,7 @@ def completion(arguments: Namespace) -> int:
 
 
 def is_asked() -> bool:
-    """Whether this run is a press of the tab key."""
+    """True when this run is a press of the tab key."""
     return "_ARGCOMPLETE" in os.environ
 
 
@@ -49,32 +49,23 @@ def answer(
     for name, (summary, add_arguments) in verbs.items():
         parser = choices.add_parser(name, help=summary)
         add_arguments(parser)
+        of_verb = {"detectability": "generate"}.get(name, primary)
+        completers = {
+            "overrides": functools.partial(candidates, primary=of_verb),
+            "what": what_candidates,
+        }
         for action in parser._actions:
-            _offer(action, name, primary)
+            if action.dest in completers:
+                action.completer = completers[action.dest]  # type: ignore[attr-defined]
     argcomplete.autocomplete(top, always_complete_options="long")
 
 
-def _offer(action: argparse.Action, verb: str, primary: str) -> None:
-    """Give an argument its candidates."""
-    if action.dest == "overrides":
-        action.completer = lambda prefix, parsed_args, **_: candidates(  # type: ignore[attr-defined]
-            prefix,
-            list(parsed_args.overrides or ()),
-            parsed_args,
-            "generate" if verb == "detectability" else primary,
-        )
-    elif action.dest == "what":
-        action.completer = lambda prefix, parsed_args, **_: what_candidates(
-            prefix, parsed_args
-        )  # type: ignore[attr-defined]
-
-
 def candidates(
-    prefix: str, typed: Sequence[str], arguments: Any, primary: str
+    prefix: str, parsed_args: Any, *, primary: str, **_: Any
 ) -> dict[str, str]:
-    """Groups, their options, keys of the chosen options, each with its line.
+    """Groups, options and keys that a half-typed override may become, each with its remark.
 
-    Paths for the keys that take one.
+    Keys that take a path get the files and folders.
     """
     from argcomplete.completers import FilesCompleter
 
@@ -86,40 +77,46 @@ def candidates(
         sections,
     )
 
-    folder = getattr(arguments, "config_dir", None)
-    offered = [group for group in groups(folder) if group.primary == primary]
+    folder = getattr(parsed_args, "config_dir", None)
+    offered = {
+        group.name: group for group in groups(folder) if group.primary == primary
+    }
     name, equals, value = prefix.partition("=")
     if equals and (name in ("data", "out") or name.endswith("_csv")):
         return {f"{name}={path}": "" for path in FilesCompleter()(value)}
+    if equals and name not in offered:
+        return {}
     if equals:
-        known = (
-            options(name, folder) if name in [group.name for group in offered] else []
-        )
-        return {f"{name}={one.name}": one.about for one in known}
-    found = {f"{group.name}=": group.about for group in offered}
-    chosen = dict(word.partition("=")[::2] for word in typed)
-    for section in (section for section, file in sections().items() if file == primary):
-        found |= {f"{key.name}=": key.comment for key in section_keys(section)}
-    for group in offered:
-        option = chosen.get(group.name) or group.default
-        if prefix.startswith(group.name[: len(prefix)]) and option in [
-            one.name for one in options(group.name, folder)
-        ]:
-            found |= {
-                f"{key.name}=": key.comment
-                for key in option_keys(group.name, str(option), folder)
-            }
-    return found
+        return _options_of(name, folder)
+    found = {f"{group.name}=": group.about for group in offered.values()}
+    keys = [
+        key
+        for section, file in sections().items()
+        if file == primary
+        for key in section_keys(section)
+    ]
+    chosen = dict(word.partition("=")[::2] for word in parsed_args.overrides or ())
+    for group in offered.values():
+        option = str(chosen.get(group.name) or group.default)
+        known = {option.name for option in options(group.name, folder)}
+        if prefix.startswith(group.name[: len(prefix)]) and option in known:
+            keys += option_keys(group.name, option, folder)
+    return found | {f"{key.name}=": key.comment for key in keys}
 
 
-def what_candidates(prefix: str, arguments: Any) -> dict[str, str]:
-    """Groups, parts of the configuration, and options of a group, for ``gensig options``."""
-    from gensig.options.files import groups, options, sections
+def what_candidates(prefix: str, parsed_args: Any, **_: Any) -> dict[str, str]:
+    """Candidates for ``gensig options``: groups, sections, and options of a group."""
+    from gensig.options.files import groups, sections
 
-    folder = getattr(arguments, "config_dir", None)
-    name, equals, _ = prefix.partition("=")
+    folder = getattr(parsed_args, "config_dir", None)
+    name, equals, _value = prefix.partition("=")
     if equals:
-        return {f"{name}={one.name}": one.about for one in options(name, folder)}
-    return {group.name: group.about for group in groups(folder)} | dict.fromkeys(
-        sections(), "keys without a choice"
-    )
+        return _options_of(name, folder)
+    found = {group.name: group.about for group in groups(folder)}
+    return found | dict.fromkeys(sections(), "keys without a choice")
+
+
+def _options_of(group: str, folder: str | None) -> dict[str, str]:
+    from gensig.options.files import options
+
+    return {f"{group}={option.name}": option.about for option in options(group, folder)}

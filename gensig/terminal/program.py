@@ -1,13 +1,9 @@
-"""What both commands have in common.
-
-One line for a mistake, exit statuses, nearest names for flags.
-"""
+"""Parser, exit statuses and error line of both commands."""
 
 from __future__ import annotations
 
 import argparse
 import os
-import re
 import sys
 from collections.abc import Callable, Mapping
 from typing import Any, NoReturn
@@ -22,16 +18,20 @@ EXITS = {
     INTERRUPTED: "interrupted",
 }
 HELP_FLAGS = ("-h", "--help")
+# how argparse begins what it says of words that it does not know, and of words that it misses
+UNKNOWN = "unrecognized arguments: "
+MISSING = "the following arguments are required: "
+NUMBERS: dict[Any, str] = {int: "whole number", float: "number"}
 
 
 class Parser(argparse.ArgumentParser):
-    """Parser of one verb, whose complaints are the one line of `guarded`.
+    """Parser of one verb; raises ConfigError where argparse would print and exit.
 
     Parameters
     ----------
     prog : command and verb
-    description, examples : what ``--help`` says above and below the arguments
-    exits : what exit statuses mean that only this verb has
+    description, examples : texts of ``--help`` above and below the arguments
+    exits : meanings of exit statuses that only this verb has
     """
 
     def __init__(
@@ -46,87 +46,87 @@ class Parser(argparse.ArgumentParser):
         )
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """As usual, but a flag that does not exist is named before one that is missing."""
+        """Parse as argparse does, but name an unknown flag before a missing one."""
         for word in sys.argv[1:] if args is None else args:
             if word == "--":
                 break
-            if (
-                word.startswith("--")
-                and word.partition("=")[0] not in self._option_string_actions
-            ):
-                self.error(f"unrecognized arguments: {word}")
+            name = word.partition("=")[0]
+            if name.startswith("--") and name not in self._option_string_actions:
+                self.error(f"{UNKNOWN}{word}")
         return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:
-        """Refuse the words."""
-        raise ConfigError(f"{self._mended(message)}; see {self.prog} --help")
+        """Raise ConfigError in place of the usual message and exit."""
+        if message.startswith(UNKNOWN):
+            message = self._unknown(message.removeprefix(UNKNOWN).split())
+        elif message.startswith(MISSING):
+            names = message.removeprefix(MISSING).split(", ")
+            wanted = [f"{name} {self._values_of(name)}".strip() for name in names]
+            message = f"missing: {', '.join(wanted)}"
+        raise ConfigError(f"{message}; see {self.prog} --help")
 
-    def _mended(self, message: str) -> str:
-        """The complaint with what was given, what is allowed and what to do."""
-        if found := re.match(r"unrecognized arguments: (.*)", message):
-            return self._unknown(found.group(1).split())
-        if found := re.match(
-            r"argument (\S+): invalid (float|int) value: '(.*)'", message
-        ):
-            flag, kind, given = found.groups()
-            text = f"{flag} {given} is not a {'whole ' if kind == 'int' else ''}number"
-            return (
-                f"{text}; key=value words stand before {flag}" if "=" in given else text
-            )
-        if found := re.match(
-            r"argument (\S+): invalid choice: '(.*?)' \(choose from (.*)\)", message
-        ):
-            flag, given, known = found.groups()
-            names = [name.strip(" '") for name in known.split(",")]
-            return f"{flag} {given} is not one of {', '.join(names)}"
-        if found := re.match(r"argument (\S+?)(?:/\S+)?: expected (.*)", message):
-            flag, wanted = found.groups()
-            return f"{flag} needs {self._wanted(flag) or wanted}"
-        if found := re.match(r"the following arguments are required: (.*)", message):
-            names = found.group(1).split(", ")
-            return f"missing: {', '.join(f'{name} {self._wanted(name)}'.strip() for name in names)}"
-        return message
+    def _get_value(self, action: argparse.Action, arg_string: str) -> Any:
+        try:
+            return super()._get_value(action, arg_string)
+        except argparse.ArgumentError:
+            kind = NUMBERS.get(action.type)
+            if kind is None:
+                raise
+            name = _shown_name(action)
+            message = f"{name} {arg_string} is not a {kind}"
+            if "=" in arg_string:
+                message += f"; key=value words stand before {name}"
+            self.error(message)
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            known = ", ".join(map(str, action.choices))
+            self.error(f"{_shown_name(action)} {value} is not one of {known}")
+
+    def _match_argument(self, action: argparse.Action, arg_strings_pattern: str) -> int:
+        try:
+            return super()._match_argument(action, arg_strings_pattern)
+        except argparse.ArgumentError as error:
+            name = action.option_strings[0]
+            wanted = self._values_of(name) or error.message.removeprefix("expected ")
+            self.error(f"{name} needs {wanted}")
 
     def _unknown(self, words: list[str]) -> str:
-        word = next((one for one in words if one.startswith("-")), words[0])
+        word = next((word for word in words if word.startswith("-")), words[0])
         if not word.startswith("-"):
             return f"'{word}' is one word too many"
-        flags = [
-            flag
-            for action in self._actions
-            for flag in action.option_strings
-            if flag.startswith("--")
-        ]
-        if "=" in word and not nearest.near(word.partition("=")[0], flags):
-            return (
-                f"no flag '{word}'; groups and keys have no dashes: {word.lstrip('-')}"
-            )
-        return f"no flag '{word}'; {nearest.hint(word.partition('=')[0], flags)}"
+        known = [name for name in self._option_string_actions if name.startswith("--")]
+        name, equals, _ = word.partition("=")
+        if equals and not nearest.near(name, known):
+            text = word.lstrip("-")
+            return f"no flag '{word}'; groups and keys have no dashes: {text}"
+        return f"no flag '{word}'; {nearest.hint(name, known)}"
 
-    def _wanted(self, name: str) -> str:
-        """The values of a flag as the help names them."""
-        for action in self._actions:
-            if name in action.option_strings and action.nargs != 0:
-                names = (
-                    action.metavar
-                    if isinstance(action.metavar, tuple)
-                    else (str(action.metavar or action.dest),)
-                )
-                names = (
-                    names * action.nargs
-                    if isinstance(action.nargs, int) and len(names) == 1
-                    else names
-                )
-                return " ".join(names) + (" ..." if action.nargs == "+" else "")
-        return ""
+    def _values_of(self, name: str) -> str:
+        """The values that a flag takes, as its help names them; empty for a switch."""
+        action = self._option_string_actions.get(name)
+        if action is None or action.nargs == 0:
+            return ""
+        if isinstance(action.metavar, tuple):
+            return " ".join(action.metavar)
+        value = str(action.metavar or action.dest)
+        if action.nargs == "+":
+            return f"{value} ..."
+        if isinstance(action.nargs, int):
+            return " ".join([value] * action.nargs)
+        return value
+
+
+def _shown_name(action: argparse.Action) -> str:
+    """The flag as it is typed; a positional argument by its name in the help."""
+    names = action.option_strings or [str(action.metavar or action.dest)]
+    return "/".join(names)
 
 
 def exit_text(exits: Mapping[int, str]) -> str:
-    """The exit statuses of a verb, a line each, for its help."""
-    lines = [
-        f"  {status:<4} {meaning}"
-        for status, meaning in sorted({**EXITS, **exits}.items())
-    ]
+    """Lines of a help text with the exit statuses of a verb."""
+    meanings = sorted({**EXITS, **exits}.items())
+    lines = [f"  {status:<4} {meaning}" for status, meaning in meanings]
     return "\n".join(["exit status:", *lines])
 
 
@@ -137,7 +137,10 @@ def refuse_verb(
     other: str,
     other_verbs: tuple[str, ...],
 ) -> None:
-    """Raise for a first word that is no verb, with the nearest ones or the command that has it."""
+    """Raise ConfigError for a first word that is no verb.
+
+    The message names the nearest verbs, or the command that has the verb.
+    """
     if word in other_verbs:
         raise ConfigError(f"'{word}' is a command of {other}; type {other} {word}")
     if word.startswith("-") or "=" in word:
@@ -148,9 +151,9 @@ def refuse_verb(
 
 
 def guarded(program: str, run: Callable[[], int], *, interrupted: str) -> int:
-    """Exit status of ``run``.
+    """Run a command and return its exit status.
 
-    A mistake, a file that cannot be used and an interruption are one line on stderr.
+    A mistake, a file that cannot be used and an interruption become one line on stderr.
     """
     try:
         status = run()
@@ -158,18 +161,21 @@ def guarded(program: str, run: Callable[[], int], *, interrupted: str) -> int:
         return status
     except GensigError as error:
         return complain(program, str(error))
-    except BrokenPipeError:  # the reader of a pipe has gone, as head does: nothing to say, and nowhere to say it
+    except BrokenPipeError:
+        # The reader of a pipe has gone, as head does. Nobody is there to be told.
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 0
     except OSError as error:
-        where = f"{error.filename}: " if error.filename else ""
-        return complain(program, f"{where}{error.strerror or error}")
+        message = error.strerror or str(error)
+        if error.filename:
+            message = f"{error.filename}: {message}"
+        return complain(program, message)
     except KeyboardInterrupt:
         complain(program, interrupted)
         return INTERRUPTED
 
 
 def complain(program: str, message: str) -> int:
-    """Print one line on stderr; gives the exit status of a mistake."""
+    """Print one line on stderr and return the exit status of a mistake."""
     print(f"{program}: {' '.join(message.split())}", file=sys.stderr)
     return MISTAKE

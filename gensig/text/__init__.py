@@ -1,1 +1,1 @@
-"""Words and pages: nearest names, HTML pages, tables that users give, options as files."""
+"""Texts: nearest names, HTML pages, tables of users, options as files."""

@@ -1,4 +1,4 @@
-"""Options as files: what may be their name, and values as YAML with a remark beside each."""
+"""Options as files: their names, and their values as YAML with a remark on each."""
 
 from __future__ import annotations
 
@@ -8,18 +8,12 @@ from collections.abc import Mapping
 from typing import Any
 
 OPTION_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
-NO_NAMES = (
-    "null",
-    "none",
-    "true",
-    "false",
-    "nan",
-    "inf",
-)  # what YAML or Hydra takes for something else
+# names that YAML or Hydra takes for something else
+NO_NAMES = ("null", "none", "true", "false", "nan", "inf")
 
 
 def is_option_name(name: str) -> bool:
-    """Whether a group can have an option of that name, and a folder a file."""
+    """True for a name that an option of a group and its file can have."""
     return OPTION_NAME.fullmatch(name) is not None and name.lower() not in NO_NAMES
 
 
@@ -32,16 +26,13 @@ def option_lines(
     """Nested values as lines of YAML; ``remarks`` are by dotted name and stand behind the value."""
     lines = []
     for key, value in values.items():
-        place = f"{above}{key}"
+        name = f"{above}{key}"
         if isinstance(value, Mapping):
-            lines += [
-                f"{indent}{key}:",
-                *option_lines(value, remarks, f"{place}.", indent + "  "),
-            ]
-        else:
-            remark = remarks.get(place)
-            lines.append(
-                f"{indent}{key}: {json.dumps(value)}"
-                + (f"   # {remark}" if remark else "")
-            )
+            lines.append(f"{indent}{key}:")
+            lines += option_lines(value, remarks, f"{name}.", f"{indent}  ")
+            continue
+        line = f"{indent}{key}: {json.dumps(value)}"
+        if remarks.get(name):
+            line += f"   # {remarks[name]}"
+        lines.append(line)
     return lines

@@ -1,9 +1,8 @@
-"""One self-contained HTML page out of sections of text, tables, figures and charts; every text is
-escaped.
+"""Self-contained HTML pages of text, tables, figures and charts; every text is escaped.
 
 Charts are drawn in the browser by plotly.js, which is copied into the page once, from data that
-is copied into it too. The page reads nothing else: its content security policy lets no script run
-but those two, and nothing be fetched.
+is copied into it too. The page reads nothing else: its content security policy lets only those two
+scripts run, and nothing be fetched.
 """
 
 from __future__ import annotations
@@ -30,10 +29,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Card:
-    """One answer in large type.
-
-    What it is about, the number, its interval, what it says, and what it claims.
-    """
+    """One answer in large type: title, number, interval, verdict, and its meaning."""
 
     title: str
     value: str
@@ -96,9 +92,9 @@ class Section:
     text : paragraphs
     notes : points of a list, each a term in bold, or "", and what is said of it
     figures : (file in the folder of the page, what it shows)
-    side_by_side : whether figures share a line
-    code : what can be copied, set as it is
-    folded : whether the reader opens it by a click
+    side_by_side : True for figures that share a line
+    code : text to copy, set as it is
+    folded : True for a section that the reader opens by a click
     """
 
     title: str
@@ -116,15 +112,10 @@ class Section:
 def write_page(
     path: Path, *, title: str, lead: Sequence[str], sections: Sequence[Section]
 ) -> None:
-    """Write the page.
-
-    The figures lie beside it and are copied into it, so that it can be sent alone.
-    """
+    """Write the page with copies of its figures, which lie in its folder."""
 
     def embedded(name: str) -> str:
-        return "data:image/png;base64," + base64.b64encode(
-            (path.parent / name).read_bytes()
-        ).decode("ascii")
+        return f"data:image/png;base64,{_base64((path.parent / name).read_bytes())}"
 
     text = _render(
         title=title,
@@ -150,7 +141,7 @@ def interactive_page(
     Parameters
     ----------
     script : file in the folder ``templates`` whose functions draw the charts
-    data : JSON, without NaN, that the script draws; see ``gensig.report.packing`` for long rows of numbers
+    data : JSON, without NaN, that the script draws; see ``gensig.report.packing`` for arrays
     """
     from plotly.offline import get_plotlyjs
 
@@ -184,20 +175,18 @@ def _render(*, scripts: Sequence[str], **content: Any) -> str:
         undefined=StrictUndefined,
         trim_blocks=True,
     )
-    hashes = [
-        base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")
-        for text in scripts
-    ]
-    policy = (
-        "script-src " + " ".join(f"'sha256-{text}'" for text in hashes) + "; "
-        if scripts
-        else ""
-    )
-    content["data"] = Markup(content["data"])
-    template = environment.get_template("page.html")
-    return (
-        template.render(
-            **content, scripts=[Markup(text) for text in scripts], policy=Markup(policy)
-        )
-        + "\n"
-    )
+    policy = ""
+    if scripts:
+        digests = [_base64(hashlib.sha256(text.encode()).digest()) for text in scripts]
+        policy = " ".join(["script-src", *(f"'sha256-{text}'" for text in digests)])
+        policy += "; "
+    content |= {
+        "data": Markup(content["data"]),
+        "scripts": [Markup(text) for text in scripts],
+        "policy": Markup(policy),
+    }
+    return environment.get_template("page.html").render(content) + "\n"
+
+
+def _base64(content: bytes) -> str:
+    return base64.b64encode(content).decode("ascii")

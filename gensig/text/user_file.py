@@ -26,7 +26,7 @@ def read_table(key: str, file: str, *, least_rows: int) -> tuple[list[str], Arra
 
     Raises
     ------
-    ConfigError    naming ``key`` and the file: not there, no numbers, NaN, rows of other lengths, too short
+    ConfigError    naming ``key`` and the file: missing, no numbers, NaN, uneven or too few rows
     """
     path = Path(file).expanduser()
     where = f"{key} = {file}"
@@ -39,17 +39,15 @@ def read_table(key: str, file: str, *, least_rows: int) -> tuple[list[str], Arra
             names = _header(where, stream)
             values = np.loadtxt(stream, delimiter=",", ndmin=2, dtype=np.float64)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = (
-            error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
-        )
+        reason = getattr(error, "strerror", "it is no text in UTF-8")
         raise ConfigError(f"{where} cannot be read: {reason}") from None
     except ValueError as error:
-        raise ConfigError(
-            f"{where}: {str(error).splitlines()[0].rstrip('.')}; give numbers under one header"
-        ) from None
+        first = str(error).splitlines()[0].rstrip(".")
+        raise ConfigError(f"{where}: {first}; give numbers under one header") from None
     if len(names) != len(set(names)) or (values.size and values.shape[1] != len(names)):
         raise ConfigError(
-            f"{where}: {len(names)} names in the header for {values.shape[1]} columns; name each, once"
+            f"{where}: {len(names)} names in the header for {values.shape[1]} columns; "
+            "name each, once"
         )
     if len(values) < least_rows:
         raise ConfigError(
@@ -70,13 +68,14 @@ def _header(where: str, stream: TextIO) -> list[str]:
     for separator, called in ((";", "';'"), ("\t", "tabs")):
         if separator in line:
             raise ConfigError(
-                f"{where}: its columns are separated by {called}: save it with commas, decimals with points"
+                f"{where}: its columns are separated by {called}: "
+                "save it with commas, decimals with points"
             )
     names = [name.strip() for name in next(csv.reader([line]), [])]
     if any(map(_is_number, names)):
         raise ConfigError(
-            f"{where}: its first line holds numbers, not names; put a line before it that names each column, for "
-            "instance time_s,housing"
+            f"{where}: its first line holds numbers, not names; "
+            "put a line before it that names each column, for instance time_s,housing"
         )
     return names
 
@@ -92,9 +91,11 @@ def check_columns(key: str, file: str, found: list[str], wanted: list[str]) -> N
     """Raise ConfigError unless the file has exactly these columns, in any order."""
     missing = [name for name in wanted if name not in found]
     unknown = [name for name in found if name not in wanted]
-    if missing or unknown:
-        what = f"no column {missing[0]}" if missing else f"unknown column {unknown[0]}"
-        raise ConfigError(f"{key} = {file}: {what}; it must have {', '.join(wanted)}")
+    problems = [f"no column {name}" for name in missing]
+    problems += [f"unknown column {name}" for name in unknown]
+    if problems:
+        columns = ", ".join(wanted)
+        raise ConfigError(f"{key} = {file}: {problems[0]}; it must have {columns}")
 
 
 def check_rate(key: str, file: str, time: Array, sampling_rate: float) -> None:
@@ -105,6 +106,6 @@ def check_rate(key: str, file: str, time: Array, sampling_rate: float) -> None:
         raise ConfigError(f"{key} = {file}: time_s must rise in even steps")
     if not math.isclose(1.0 / mean, sampling_rate, rel_tol=RATE_TOLERANCE):
         raise ConfigError(
-            f"{key} = {file} has {1.0 / mean:g} samples a second, sensing.sampling_rate_hz = {sampling_rate:g}; "
-            "resample it first"
+            f"{key} = {file} has {1.0 / mean:g} samples a second, "
+            f"sensing.sampling_rate_hz = {sampling_rate:g}; resample it first"
         )

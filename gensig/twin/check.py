@@ -1,10 +1,10 @@
-"""Does the twin agree with measurements that nothing was fitted to? Levels by band and
-indicators, by sensor.
+"""Check of a fitted machine against measurements that nothing was fitted to.
+
+It compares levels by band and indicators, by sensor.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,15 +19,14 @@ from gensig.sensing.agreement import third_octave_bands, third_octave_power
 from gensig.signals.indicators import crest_factor, kurtosis, rms
 from gensig.signals.mesh_motion import Motion, Teeth
 from gensig.signals.recording import Recording
-from gensig.twin.grade import sideband_ratios
+from gensig.twin.grade import median_of_finite, sideband_ratios
 from gensig.twin.lines import find_lines
 
 Array = NDArray[np.float64]
 
 N_RECORDS = 12
-EXPECTED = (N_RECORDS - 1) / (
-    N_RECORDS + 1
-)  # share of equals that lies between the least and the greatest of them
+# share of equals that lies between the least and the greatest of them
+EXPECTED = (N_RECORDS - 1) / (N_RECORDS + 1)
 LONGEST = 2.0  # s of the held-out recording that are compared
 INDICATORS = ("level", "kurtosis", "crest factor", "sideband ratio")
 INDICATOR_UNITS = ("dB", "", "", "dB")
@@ -35,12 +34,12 @@ INDICATOR_UNITS = ("dB", "", "", "dB")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
-    """Held-out measurement beside healthy records of the twin.
+    """Held-out measurement and healthy records of the fitted machine.
 
-    ``band`` (band,) Hz mid-bands; ``measured_db`` (sensor, band) and ``twin_db`` (record, sensor,
-    band) third-octave levels over 1 m/s2; ``fitted_db`` (sensor, band) those of what was fitted
-    to. ``measured`` (sensor, indicator) and ``twin`` (record, sensor, indicator) as
-    ``INDICATORS``; the level is the RMS over 1 m/s2.
+    ``band`` (band,) Hz mid-bands. ``measured_db`` (sensor, band) and ``twin_db`` (record, sensor,
+    band) are third-octave levels over 1 m/s2; ``fitted_db`` (sensor, band) are those of the
+    recording of the fit. ``measured`` (sensor, indicator) and ``twin`` (record, sensor,
+    indicator) as ``INDICATORS``; the level is the RMS over 1 m/s2.
     """
 
     sensors: tuple[str, ...]
@@ -59,23 +58,21 @@ class Check:
 
     @property
     def share_within(self) -> Array:
-        """Share of bands in which the measurement lies between the twin's least and greatest,
-        (sensor,).
-        """
-        within = (self.measured_db >= self.twin_db.min(axis=0)) & (
-            self.measured_db <= self.twin_db.max(axis=0)
-        )
-        return np.asarray(within.mean(axis=1))
+        """Share of bands with the measurement between the twin's least and greatest, (sensor,)."""
+        return np.asarray(_within(self.measured_db, self.twin_db).mean(axis=1))
 
     @property
     def agrees(self) -> NDArray[np.bool_]:
-        """Whether the measured indicator lies between the twin's least and greatest, (sensor,
-        indicator).
+        """True where the measured indicator lies between the twin's least and greatest.
+
+        (sensor, indicator).
         """
-        return np.asarray(
-            (self.measured >= self.twin.min(axis=0))
-            & (self.measured <= self.twin.max(axis=0))
-        )
+        return _within(self.measured, self.twin)
+
+
+def _within(measured: Array, records: Array) -> NDArray[np.bool_]:
+    low, high = records.min(axis=0), records.max(axis=0)
+    return np.asarray((measured >= low) & (measured <= high))
 
 
 def held_out_duration(held_out: Recording, fitted: Recording) -> float:
@@ -94,7 +91,7 @@ def check(
 
     Parameters
     ----------
-    config : the configuration of the twin, with ``operating.duration_s`` as ``held_out_duration`` says
+    config : the configuration of the twin, with ``operating.duration_s`` of ``held_out_duration``
     motion : the mesh in ``held_out``
 
     Raises
@@ -103,80 +100,80 @@ def check(
     """
     rate, duration = held_out.sampling_rate, float(config["operating"]["duration_s"])
     n_samples = round(duration * rate)
-    stretches = [one.acceleration[:, :n_samples] for one in (held_out, fitted)]
-    cycles = motion.cycles[:n_samples]
-    signals, angles = _healthy_records(config)
-    lower, upper = third_octave_bands(n_samples, rate)
-    measured_db, fitted_db = (
-        _decibel(third_octave_power(stretch, rate)) for stretch in stretches
+    measured, before = (
+        recording.acceleration[:, :n_samples] for recording in (held_out, fitted)
     )
+    records = _healthy_records(config)
+    lower, upper = third_octave_bands(n_samples, rate)
+    n_driving = teeth.driving
     return Check(
         sensors=held_out.sensors,
         band=np.sqrt(lower * upper),
-        measured_db=measured_db,
-        fitted_db=fitted_db,
-        twin_db=np.stack(
-            [_decibel(third_octave_power(signal, rate)) for signal in signals]
-        ),
-        measured=_indicators(stretches[0], cycles, rate, teeth),
+        measured_db=_levels(measured, rate),
+        fitted_db=_levels(before, rate),
+        twin_db=np.stack([_levels(signal, rate) for signal, _ in records]),
+        measured=_indicators(measured, motion.cycles[:n_samples], rate, teeth),
         twin=np.stack(
             [
-                _indicators(signal, angle * teeth.driving / (2.0 * np.pi), rate, teeth)
-                for signal, angle in zip(signals, angles, strict=True)
+                _indicators(signal, angle * n_driving / (2.0 * np.pi), rate, teeth)
+                for signal, angle in records
             ]
         ),
         duration=duration,
     )
 
 
-def _healthy_records(config: Configuration) -> tuple[Sequence[Array], Sequence[Array]]:
-    """Accelerations (sensor, sample) and shaft angles (sample,) of healthy records, each of
-    another set of gears.
+def _healthy_records(config: Configuration) -> list[tuple[Array, Array]]:
+    """Accelerations (sensor, sample) and shaft angles (sample,) of healthy records.
+
+    Each has a different set of gears.
     """
     plan: dict[str, Any] = {
-        "n_records": N_RECORDS, "n_units": N_RECORDS, "n_gearboxes": 1, "conditions_per_unit": None, "n_repeats": 1,
-        "classes": ["healthy"], "design": "latin_hypercube", "vary": {}, "sham": False,
-    }  # fmt: skip
-    unused = dict.fromkeys(
-        ("store_mesh_state", "store_detectability", "store_healthy_twin"), False
+        "n_records": N_RECORDS,
+        "n_units": N_RECORDS,
+        "n_gearboxes": 1,
+        "conditions_per_unit": None,
+        "n_repeats": 1,
+        "classes": ["healthy"],
+        "design": "latin_hypercube",
+        "vary": {},
+        "sham": False,
+    }
+    classes = {"healthy": {"kind": "healthy", "vary": {}}}
+    whole = config.with_entries(plan=plan, classes=classes).with_keys(
+        "dataset",
+        store_mesh_state=False,
+        store_detectability=False,
+        store_healthy_twin=False,
+        store_shaft_angle=True,
     )
-    whole = config.with_entries(
-        plan=plan, classes={"healthy": {"kind": "healthy", "vary": {}}}
-    )
-    whole = whole.with_keys("dataset", **unused, store_shaft_angle=True)
     drawn = make_plan(whole)
-    records = simulate_records(
-        whole, [drawn.record(place) for place in range(N_RECORDS)]
-    )
-    failed = [
-        record.values["status_reason"]
-        for record in records
-        if record.values.get("status") == "failed"
-    ]
-    if failed:
-        raise SimulationError(f"a healthy record of the twin failed: {failed[0]}")
-    signals = [record.signals["acceleration"].astype(np.float64) for record in records]
-    return signals, [record.signals["shaft_angle"] for record in records]
+    rows = [drawn.record(index) for index in range(N_RECORDS)]
+    records = []
+    for record in simulate_records(whole, rows):
+        if record.values.get("status") == "failed":
+            reason = record.values["status_reason"]
+            raise SimulationError(f"a healthy record of the twin failed: {reason}")
+        signals = record.signals
+        acceleration = signals["acceleration"].astype(np.float64)
+        records.append((acceleration, signals["shaft_angle"]))
+    return records
 
 
 def _indicators(signal: Array, cycles: Array, rate: float, teeth: Teeth) -> Array:
     """(sensor, indicator) as ``INDICATORS``."""
     centred = signal - signal.mean(axis=1, keepdims=True)
     ratios = sideband_ratios(find_lines(centred, cycles, rate, teeth), teeth)
-    middle = np.array(
-        [
-            np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else np.nan
-            for row in ratios
-        ]
-    )
     columns = [
         20.0 * np.log10(rms(centred)),
         kurtosis(centred),
         crest_factor(centred),
-        middle,
+        np.array([median_of_finite(row) for row in ratios]),
     ]
     return np.stack(columns, axis=1)
 
 
-def _decibel(power: Array) -> Array:
+def _levels(signal: Array, rate: float) -> Array:
+    """Third-octave levels over 1 m/s2, (sensor, band) dB."""
+    power = third_octave_power(signal, rate)
     return np.asarray(10.0 * np.log10(np.maximum(power, 1e-300)))

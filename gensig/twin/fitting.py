@@ -1,7 +1,4 @@
-"""From a healthy recording to the values of a configuration.
-
-Speed and drift, grade, transfer path, noise.
-"""
+"""Fit of configuration values to a healthy recording: speed and drift, grade, path, noise."""
 
 from __future__ import annotations
 
@@ -31,40 +28,36 @@ from gensig.units import from_si, to_si
 
 Array = NDArray[np.float64]
 
-SOURCE_CHANNEL = "pinion_y"  # the driving gear's bearing along the line of action, where the path begins
-INTERNAL_RATE = (
-    256_000.0  # Hz; least rate of the integration, that of the default configuration
-)
-SIMULATED_TURNS = (
-    12,
-    32,
-)  # of the slower gear, in each simulated record: as many as measured, within these
+# the driving gear's bearing along the line of action, where the path begins
+SOURCE_CHANNEL = "pinion_y"
+# Hz; least rate of the integration, that of the default configuration
+INTERNAL_RATE = 256_000.0
+# of the slower gear, in each simulated record: as many as measured, within these
+SIMULATED_TURNS = (12, 32)
 SEED = 0
 LOWEST_NOISE = 20.0  # Hz
-THIRD = (
-    1.0 / 6.0
-)  # octaves to either side over which a density is averaged, and at least some bins
-FINE = (
-    1.0 / 24.0
-)  # where lines are counted too: those of shafts stand far above what is beside them
+# octaves to either side over which a density is averaged, and at least some bins
+THIRD = 1.0 / 6.0
+# where lines are counted too: those of shafts stand far above their surroundings
+FINE = 1.0 / 24.0
 LEAST_FREE, LEAST_ALL = 20, 2
-CLEAR = 2.0  # a drift is written where the speed scatters this many times as much as pitch errors make it
-LEAST_SHARE = (
-    0.1  # of the floor, left as noise where the model alone explains the power
-)
+# a drift is written where the speed scatters this many times as much as pitch errors make it
+CLEAR = 2.0
+# of the floor, left as noise where the model alone explains the power
+LEAST_SHARE = 0.1
 SURE = 3.0  # standard deviations above the floor from which the power of lines counts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fit:
-    """What a recording tells of its machine.
+    """Values of a machine that were fitted to its recording.
 
     ``own_scatter`` is the scatter of the speed, over its mean, that the pitch errors of the
-    fitted grade make by themselves: the same estimate of simulated records that have no other.
-    ``gain`` (sensor, band) is the size of the transfer path at ``gain_frequency`` (band,) Hz,
-    ``heard`` (sensor, band) where it was measured rather than filled in; ``density`` (sensor,
-    line) (m/s2)^2/Hz the noise at ``noise_frequency`` (line,) Hz; ``snr`` (sensor,) dB over the
-    whole band.
+    fitted grade make alone: the same estimate of simulated records that have no other scatter.
+    ``gain`` (sensor, band) is the size of the transfer path at ``gain_frequency`` (band,) Hz.
+    ``heard`` (sensor, band) is True where it was measured rather than filled in. ``density``
+    (sensor, line) (m/s2)^2/Hz is the noise at ``noise_frequency`` (line,) Hz. ``snr`` (sensor,)
+    is in dB over the whole band.
     """
 
     sensors: tuple[str, ...]
@@ -81,10 +74,7 @@ class Fit:
 
     @property
     def drift(self) -> float | None:
-        """Scatter of the speed beyond that of the pitch errors.
-
-        None where there is none to be seen.
-        """
+        """Scatter of the speed beyond that of the pitch errors; None where none is visible."""
         scatter, correlation = self.motion.scatter, self.motion.correlation_time
         if scatter is None or scatter < CLEAR * self.own_scatter:
             return None
@@ -103,7 +93,8 @@ def fit(
 
     Parameters
     ----------
-    system : the machine as far as it is known; its speed, rate, channels, grade and scatter are replaced
+    system : the machine as far as it is known; its speed, rate, channels, grade and scatter are
+        replaced
     speed_rpm : r/min of the driving gear, within 3 %
     tell : takes a line on what is done, while it is done
 
@@ -121,14 +112,11 @@ def fit(
         f"speed {60.0 * motion.mesh_frequency / teeth.driving:.3f} r/min; simulating grades"
     )
     graded = simulated_records(model, GRADES, N_SPECIMENS, SEED)
-    grade = fit_grade(
-        measured,
-        [[simulated_lines(one, model) for one in row] for row in graded],
-        teeth,
-    )
+    lines_of = [[simulated_lines(record, model) for record in row] for row in graded]
+    grade = fit_grade(measured, lines_of, teeth)
     tell(f"grade {grade.grade:.1f}; simulating that grade")
     (records,) = simulated_records(model, [grade.grade], 2 * N_SPECIMENS, SEED + 1)
-    simulated = [simulated_lines(one, model) for one in records]
+    simulated = [simulated_lines(record, model) for record in records]
     frequency, gain, heard = fit_path(measured, simulated, recording)
     lines, density, snr = fit_noise(measured, simulated, recording, frequency, gain)
     return Fit(
@@ -147,19 +135,16 @@ def fit(
 
 
 def _own_scatter(records: Sequence[CleanRecord], model: Machine, teeth: Teeth) -> float:
-    rate, speed_rpm = (
-        model.sensing.sampling_rate,
-        from_si("speed_rpm", model.operating.speed),
-    )
-    found = []
+    speed_rpm = from_si("speed_rpm", model.operating.speed)
+    scatters = []
     for record in records:
-        heard = Recording(
+        recording = Recording(
             sensors=(SOURCE_CHANNEL,),
             acceleration=record.acceleration,
-            sampling_rate=rate,
+            sampling_rate=model.sensing.sampling_rate,
         )
-        found.append(find_motion(heard, teeth, speed_rpm).scatter or 0.0)
-    return float(np.median(found))
+        scatters.append(find_motion(recording, teeth, speed_rpm).scatter or 0.0)
+    return float(np.median(scatters))
 
 
 def oversampling(sampling_rate: float, at_least: int) -> int:
@@ -170,29 +155,28 @@ def oversampling(sampling_rate: float, at_least: int) -> int:
 def fitting_system(
     system: Machine, recording: Recording, mesh_frequency: float, teeth: Teeth
 ) -> Machine:
-    """The machine at the speed that was found, heard by one ideal sensor at the recording's rate."""
-    sampling_rate, solver = recording.sampling_rate, system.solver
+    """Machine at the fitted speed, with one ideal sensor at the recording's rate."""
+    rate, solver = recording.sampling_rate, system.solver
     least, most = (turns * teeth.most / mesh_frequency for turns in SIMULATED_TURNS)
     duration = min(max(recording.duration, least), most)
+    operating = replace(
+        system.operating,
+        speed=to_si("speed_rpm", 60.0 * mesh_frequency / teeth.driving),
+        duration=math.ceil(duration * rate) / rate,
+    )
+    sensing = replace(
+        system.sensing,
+        sampling_rate=rate,
+        channels=(SOURCE_CHANNEL,),
+        sensors=None,
+        path=None,
+    )
+    steps = oversampling(rate, solver.oversampling)
     return replace(
         system,
-        operating=replace(
-            system.operating,
-            speed=to_si("speed_rpm", 60.0 * mesh_frequency / teeth.driving),
-            duration=math.ceil(duration * sampling_rate) / sampling_rate,
-        ),
-        sensing=replace(
-            system.sensing,
-            sampling_rate=sampling_rate,
-            channels=(SOURCE_CHANNEL,),
-            sensors=None,
-            path=None,
-        ),
-        solver=replace(
-            solver,
-            oversampling=oversampling(sampling_rate, solver.oversampling),
-            max_error=None,
-        ),
+        operating=operating,
+        sensing=sensing,
+        solver=replace(solver, oversampling=steps, max_error=None),
     )
 
 
@@ -201,44 +185,41 @@ def fit_path(
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Gain from the simulated bearing to each sensor, from half the mesh frequency up.
 
-    Root of the measured over the simulated power of the shafts' orders, in sixths of an octave.
-    Where the orders are not heard the gain is interpolated, but not above what would have been
-    heard.
+    It is the root of the measured over the simulated power of the shafts' orders, in sixths of an
+    octave. Where the orders do not stand out, the gain is interpolated, but not above the level
+    at which they would.
 
     Returns
     -------
     frequency (band,) Hz, gain (sensor, band), heard (sensor, band)
     """
+    bins = measured.frequency
     centers = band_centers(0.5 * measured.mesh_frequency, recording.sampling_rate)
-    power = band_sums(measured.synchronous, measured.frequency, centers)
-    n_bins = np.maximum(
-        band_sums(measured.is_line[None].astype(float), measured.frequency, centers),
-        1.0,
-    )
-    floor = band_sums(
-        np.where(measured.is_line, measured.floor, 0.0), measured.frequency, centers
-    )
-    spread = floor / np.sqrt(
-        n_bins / 2.0
-    )  # two bins of a Hann window are about one of their own
+    power = band_sums(measured.synchronous, bins, centers)
+    n_bins = band_sums(measured.is_line[None].astype(float), bins, centers)
+    line_floor = np.where(measured.is_line, measured.floor, 0.0)
+    # two bins of a Hann window are about one independent bin
+    independent = np.maximum(n_bins, 1.0) / 2.0
+    spread = band_sums(line_floor, bins, centers) / np.sqrt(independent)
     model = _mean(
-        [band_sums(one.synchronous, one.frequency, centers)[0] for one in simulated]
+        [
+            band_sums(lines.synchronous, lines.frequency, centers)[0]
+            for lines in simulated
+        ]
     )
     heard = (power > SURE * spread) & (model > 0.0)
     gain = np.empty_like(power)
-    for sensor, (row, noise, known) in enumerate(
-        zip(power, spread, heard, strict=True)
-    ):
+    logs = np.log(centers)
+    for sensor, known in enumerate(heard):
         if not known.any():
             name = recording.sensors[sensor]
             raise ConfigError(
                 f"{name} hears nothing of the gears; leave it out with --channels"
             )
-        squared = row[known] / model[known]
-        filled = np.exp(
-            np.interp(np.log(centers), np.log(centers[known]), np.log(squared))
-        )
-        most = (np.maximum(row, 0.0) + SURE * noise) / np.maximum(model, 1e-300)
+        squared = np.log(power[sensor][known] / model[known])
+        filled = np.exp(np.interp(logs, logs[known], squared))
+        limit = np.maximum(power[sensor], 0.0) + SURE * spread[sensor]
+        most = limit / np.maximum(model, 1e-300)
         gain[sensor] = np.sqrt(np.where(known, filled, np.minimum(filled, most)))
     return centers, gain, heard
 
@@ -252,97 +233,81 @@ def fit_noise(
 ) -> tuple[Array, Array, Array]:
     """Density of what does not turn with the gears, and the signal-to-noise ratio.
 
-    Above half the mesh frequency that is the mean between the shafts' orders, less what the model
-    has there (orders that both gears make together). Below, the model has next to nothing of what
-    a machine does (unbalance, alignment, couplings): all that it lacks is counted as noise. Where
-    the model explains all, a tenth of the floor is left.
+    Above half the mesh frequency the density is the mean between the shafts' orders, less that of
+    the model (orders that both gears make together). Below, the model has next to nothing of a
+    machine's vibration (unbalance, alignment, couplings): all that it lacks is counted as noise.
+    Where the model explains all, a tenth of the floor is left.
 
     Returns
     -------
     frequency (line,) Hz, density (sensor, line) (m/s2)^2/Hz, snr (sensor,) dB
     """
-    own = [_through(one, frequency, gain) for one in simulated]
-    n_octaves = math.log2(0.5 * recording.sampling_rate / LOWEST_NOISE)
+    model = [_through(spectrum, frequency, gain) for spectrum in simulated]
+    half = 0.5 * recording.sampling_rate
+    n_octaves = math.log2(half / LOWEST_NOISE)
     lines = LOWEST_NOISE * 2.0 ** np.linspace(0.0, n_octaves, round(24 * n_octaves))
 
-    def between(one: Lines, power: Array) -> Array:
-        counted = (~one.is_line).astype(float)
-        return _mean_density(one, power * counted, counted, lines, THIRD, LEAST_FREE)
+    def between(spectrum: Lines, power: Array) -> Array:
+        counted = (~spectrum.is_line).astype(float)
+        weighted = power * counted
+        return _mean_density(spectrum, weighted, counted, lines, THIRD, LEAST_FREE)
 
-    def all_of(one: Lines, power: Array) -> Array:
-        return _mean_density(
-            one, power, np.ones(len(one.frequency)), lines, FINE, LEAST_ALL
-        )
+    def all_of(spectrum: Lines, power: Array) -> Array:
+        counted = np.ones(len(spectrum.frequency))
+        return _mean_density(spectrum, power, counted, lines, FINE, LEAST_ALL)
 
     def lacking(density: Callable[[Lines, Array], Array]) -> Array:
-        explained = _mean(
-            [density(one, values) for one, values in zip(simulated, own, strict=True)]
-        )
-        return np.maximum(
-            density(measured, measured.power) - explained,
-            LEAST_SHARE * between(measured, measured.floor),
-        )
+        explained = _mean(list(map(density, simulated, model)))
+        rest = density(measured, measured.power) - explained
+        return np.maximum(rest, LEAST_SHARE * between(measured, measured.floor))
 
     low = lines < 0.5 * measured.mesh_frequency
     density = lacking(between)
     density[:, low] = np.maximum(density, lacking(all_of))[:, low]
-    signal = _mean([values.sum(axis=1) for values in own])
-    grid = np.linspace(0.0, 0.5 * recording.sampling_rate, 8192)
-    noise = (
-        np.array([np.interp(grid, lines, row).mean() for row in density])
-        * 0.5
-        * recording.sampling_rate
-    )
+    signal = _mean([power.sum(axis=1) for power in model])
+    grid = np.linspace(0.0, half, 8192)
+    mean_density = [np.interp(grid, lines, row).mean() for row in density]
+    noise = np.array(mean_density) * 0.5 * recording.sampling_rate
     return lines, density, 10.0 * np.log10(signal / noise)
 
 
 def _through(simulated: Lines, frequency: Array, gain: Array) -> Array:
     """Power of simulated lines at the sensors, (sensor, bin)."""
-    return np.stack(
-        [
-            gain_at(simulated.frequency, frequency, row) ** 2 * simulated.power[0]
-            for row in gain
-        ]
-    )
+    bins, power = simulated.frequency, simulated.power[0]
+    return np.stack([gain_at(bins, frequency, row) ** 2 * power for row in gain])
 
 
 def gain_at(wanted: Array, frequency: Array, gain: Array) -> Array:
-    """A gain between the frequencies at which it is known.
+    """Gain between the frequencies at which it is known.
 
-    Straight in the logarithms, held beyond them.
+    It is straight in the logarithms and held beyond them.
     """
     axis = np.log(np.maximum(wanted, 1e-3))
-    return np.asarray(
-        np.exp(np.interp(axis, np.log(frequency), np.log(np.maximum(gain, 1e-300))))
-    )
+    logarithm = np.log(np.maximum(gain, 1e-300))
+    return np.asarray(np.exp(np.interp(axis, np.log(frequency), logarithm)))
 
 
 def _mean_density(
     lines: Lines, power: Array, counted: Array, wanted: Array, half: float, least: int
 ) -> Array:
-    """Mean over ``half`` octaves and ``least`` bins to either side of the bins counted, (sensor,
-    line) 1/Hz.
+    """Mean over ``half`` octaves and ``least`` bins to either side, (sensor, line) 1/Hz.
+
+    It is that of the bins counted.
     """
-    reach = least * lines.width
-    first = np.searchsorted(
-        lines.frequency, np.minimum(wanted * 2.0**-half, wanted - reach)
-    )
-    last = np.searchsorted(
-        lines.frequency, np.maximum(wanted * 2.0**half, wanted + reach)
-    )
+    reach, bins = least * lines.width, lines.frequency
+    low = np.minimum(wanted * 2.0**-half, wanted - reach)
+    high = np.maximum(wanted * 2.0**half, wanted + reach)
+    ends = np.stack([np.searchsorted(bins, low), np.searchsorted(bins, high)])
 
     def between(row: Array) -> Array:
-        return np.diff(
-            np.concatenate([[0.0], np.cumsum(row)])[np.stack([first, last])], axis=0
-        )[0]
+        sums = np.concatenate([[0.0], np.cumsum(row)])
+        return np.diff(sums[ends], axis=0)[0]
 
     n_bins = between(counted)
     known = n_bins > 0
     means = [between(row)[known] / n_bins[known] for row in power]
-    return (
-        np.stack([np.interp(wanted, wanted[known], mean) for mean in means])
-        / lines.width
-    )
+    density = np.stack([np.interp(wanted, wanted[known], mean) for mean in means])
+    return density / lines.width
 
 
 def _mean(powers: Sequence[Array]) -> Array:
@@ -352,8 +317,9 @@ def _mean(powers: Sequence[Array]) -> Array:
 def minimum_phase(
     frequency: Array, gain: Array, sampling_rate: float, step: float
 ) -> tuple[Array, NDArray[np.complex128]]:
-    """Causal response with the given gain and the least delay, at even frequencies from 0 to half
-    the rate.
+    """Causal response with the given gain and the least delay.
+
+    Its frequencies are even from 0 to half the rate.
 
     Returns
     -------
@@ -362,23 +328,16 @@ def minimum_phase(
     Source: A. V. Oppenheim & R. W. Schafer, "Discrete-time signal processing", real cepstrum
     folded to positive times.
     """
-    n_lines = math.floor(0.5 * sampling_rate / step)
-    n_fft = (
-        2 * 8 * n_lines
-    )  # eight lines between those given, so that the cepstrum does not fold
-    logarithm: Array = np.log(
-        gain_at(
-            np.arange(n_fft // 2 + 1) * (0.5 * sampling_rate) / (n_fft // 2),
-            frequency,
-            gain,
-        )
-    )
+    half = 0.5 * sampling_rate
+    n_lines = math.floor(half / step)
+    # eight lines between those given, so that the cepstrum does not fold
+    n_fft = 2 * 8 * n_lines
+    fine = np.arange(n_fft // 2 + 1) * half / (n_fft // 2)
+    logarithm: Array = np.log(gain_at(fine, frequency, gain))
     cepstrum: Array = np.fft.irfft(logarithm, n_fft)
     fold = np.zeros(n_fft)
     fold[0] = fold[n_fft // 2] = 1.0
     fold[1 : n_fft // 2] = 2.0
     response = np.exp(np.fft.rfft(cepstrum * fold))[::8]
-    even: Array = np.arange(n_lines + 1, dtype=np.float64) * (
-        0.5 * sampling_rate / n_lines
-    )
+    even: Array = np.arange(n_lines + 1, dtype=np.float64) * (half / n_lines)
     return even, np.asarray(response, dtype=np.complex128)

@@ -1,6 +1,6 @@
 """Pitch errors from the sidebands of the mesh.
 
-How strong they are beside it, against the same in simulations.
+Their strength over the mesh is compared with that of simulations.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ AUDIBLE = 4.0  # a harmonic counts where it is this many times its floor
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grade:
-    """ISO 1328 grade at which simulated sidebands are as strong as measured ones, and the grades
-    between which 90 % of the simulated sets of gears agree with the measurement.
+    """ISO 1328 grade at which simulated sidebands are as strong as measured ones.
 
+    90 % of the simulated sets of gears agree with the measurement between ``low`` and ``high``.
     ``ratio_db`` is the median over sensors and harmonics of sideband over mesh power,
-    ``n_ratios`` their number; ``is_bounded`` False where the measurement lies beyond what any
-    grade gives, or nothing was heard.
+    ``n_ratios`` their number. ``is_bounded`` is False where no grade gives the measurement, or
+    there are no ratios.
     """
 
     grade: float
@@ -48,22 +48,16 @@ class Grade:
 def sideband_orders(teeth: Teeth, harmonic: int) -> Array:
     """Mesh orders of the sidebands of a harmonic, each once, (line,)."""
     steps = np.arange(1, N_SIDEBANDS + 1)
-    offsets = np.concatenate(
-        [
-            side * steps / n
-            for n in (teeth.driving, teeth.driven)
-            for side in (-1.0, 1.0)
-        ]
-    )
+    one_side = np.concatenate([steps / n for n in (teeth.driving, teeth.driven)])
+    offsets = np.concatenate([-one_side, one_side])
     return harmonic + np.unique(np.round(offsets, 9))
 
 
 def sideband_ratios(lines: Lines, teeth: Teeth) -> Array:
-    """Power of the sidebands over that of the mesh line, (sensor, harmonic) dB; NaN where the
-    mesh is not heard.
+    """Power of the sidebands over that of the mesh line, (sensor, harmonic) dB.
 
-    A ratio of neighbours on the frequency axis: a transfer path that changes little between them
-    leaves it alone.
+    NaN where the mesh is not visible. A transfer path that changes little between neighbours on
+    the frequency axis does not change their ratio.
     """
     highest = float(lines.frequency[-1]) / lines.mesh_frequency
     ratios = np.full((len(lines.power), N_HARMONICS), np.nan)
@@ -82,8 +76,9 @@ def sideband_ratios(lines: Lines, teeth: Teeth) -> Array:
 def simulated_records(
     system: Machine, grades: Sequence[float], n_specimens: int, seed: int
 ) -> list[list[CleanRecord]]:
-    """Healthy records of the simulated bearing, by grade and specimen; specimens are the same for
-    every grade.
+    """Healthy records of the simulated bearing, by grade and specimen.
+
+    The specimens are the same for every grade.
 
     Raises
     ------
@@ -102,11 +97,8 @@ def simulated_records(
             )
             specimen = draw_specimen(rng, pair.pinion, pair.wheel, quality)
             runs.append(Run(system=system, faults=(), start=start, specimen=specimen))
-    made = [_finite(record) for record in simulate_together(runs)]
-    return [
-        made[place * n_specimens : (place + 1) * n_specimens]
-        for place in range(len(grades))
-    ]
+    records = iter(simulate_together(runs))
+    return [[_finite(next(records)) for _ in range(n_specimens)] for _ in grades]
 
 
 def _finite(record: CleanRecord | SimulationError) -> CleanRecord:
@@ -125,8 +117,7 @@ def simulated_lines(record: CleanRecord, system: Machine) -> Lines:
 def fit_grade(
     measured: Lines, simulated: Sequence[Sequence[Lines]], teeth: Teeth
 ) -> Grade:
-    """Grade at which the median difference of measured and simulated ratios is zero, and its
-    interval.
+    """Grade with a median difference of zero between measured and simulated ratios.
 
     Parameters
     ----------
@@ -134,11 +125,10 @@ def fit_grade(
     """
     ratios = sideband_ratios(measured, teeth)
     n_ratios = int(np.isfinite(ratios).sum())
-    # (grade, specimen): by how much a simulated set of gears has stronger sidebands than the
-    # measured one
+    # (grade, specimen): by how much sidebands of a simulated set of gears are stronger
     excess = np.array(
         [
-            [_excess(sideband_ratios(one, teeth), ratios) for one in row]
+            [median_of_finite(sideband_ratios(lines, teeth) - ratios) for lines in row]
             for row in simulated
         ]
     )
@@ -164,18 +154,15 @@ def fit_grade(
     )
 
 
-def _excess(simulated: Array, measured: Array) -> float:
-    difference = simulated - measured
-    return (
-        float(np.median(difference[np.isfinite(difference)]))
-        if np.isfinite(difference).any()
-        else np.nan
-    )
+def median_of_finite(values: Array) -> float:
+    """Median of the finite values; NaN without any."""
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return np.nan
+    return float(np.median(finite))
 
 
 def _crossing(excess: Array) -> float:
-    """Grade at which a curve that rises with the grade passes zero, between the ends of
-    ``GRADES``.
-    """
+    """Grade at which a curve that rises with the grade passes zero, within ``GRADES``."""
     rising = np.maximum.accumulate(excess) + 1e-9 * np.arange(len(excess))
     return float(np.interp(0.0, rising, GRADES))

@@ -1,7 +1,4 @@
-"""What turns with the gears and what does not.
-
-Power at the orders of both shafts, and the density between them.
-"""
+"""Separation of what turns with the gears: power at the orders of both shafts, density between."""
 
 from __future__ import annotations
 
@@ -16,14 +13,12 @@ from gensig.signals.mesh_motion import Teeth
 
 Array = NDArray[np.float64]
 
-SPREAD = (
-    2  # bins to either side of a line in which a Hann window leaves 99.9 % of its power
-)
+# bins to either side of a line in which a Hann window leaves 99.9 % of its power
+SPREAD = 2
 FINER = 2  # upsampling before the interpolation to angle, whose error grows towards half the rate
 BANDS_AN_OCTAVE = 12
-HALF_BAND = (
-    1.0 / 12.0
-)  # octaves to either side; a mode of 5 % damping is a seventh of an octave wide
+# octaves to either side; a mode of 5 % damping is a seventh of an octave wide
+HALF_BAND = 1.0 / 12.0
 LEAST_FREE = 40  # bins free of lines on which a floor rests
 
 
@@ -58,11 +53,11 @@ class Lines:
 
         It may be negative.
         """
-        bins = np.rint(orders * self.n_cycles).astype(np.intp)[:, None] + np.arange(
-            -SPREAD, SPREAD + 1
+        center = np.rint(orders * self.n_cycles).astype(np.intp)[:, None]
+        bins = np.clip(
+            center + np.arange(-SPREAD, SPREAD + 1), 0, len(self.frequency) - 1
         )
-        inside = np.clip(bins, 0, len(self.frequency) - 1)
-        return np.asarray((self.power - self.floor)[:, inside].sum(axis=2))
+        return np.asarray((self.power - self.floor)[:, bins].sum(axis=2))
 
 
 def find_lines(
@@ -101,9 +96,8 @@ def find_lines(
     power, frequency, order = power[:, kept], frequency[kept], order[kept]
     is_line = np.zeros(len(order), dtype=bool)
     for n_teeth in (teeth.driving, teeth.driven):
-        distance = (
-            np.abs(order * n_teeth - np.rint(order * n_teeth)) * n_cycles / n_teeth
-        )  # bins
+        turns = order * n_teeth
+        distance = np.abs(turns - np.rint(turns)) * n_cycles / n_teeth  # bins
         is_line |= distance <= SPREAD + 0.5
     return Lines(
         power=power,
@@ -116,25 +110,21 @@ def find_lines(
 
 
 def _floor(power: Array, is_line: NDArray[np.bool_]) -> Array:
-    """Median of the bins without lines over ln 2, the mean of noise that lines of others do not
-    raise, in stretches.
+    """Mean of noise in stretches of bins without lines, (sensor, bin).
+
+    It is the median over ln 2, which lines of others do not raise.
     """
     free = np.flatnonzero(~is_line)
-    n_stretches = max(1, len(free) // LEAST_FREE)
-    stretches = np.array_split(free, n_stretches)
+    stretches = np.array_split(free, max(1, len(free) // LEAST_FREE))
     middle = np.array([stretch.mean() for stretch in stretches])
-    levels = np.stack(
-        [np.median(power[:, stretch], axis=1) for stretch in stretches], axis=1
-    ) / math.log(2.0)
-    return np.stack(
-        [np.interp(np.arange(power.shape[1]), middle, row) for row in levels]
-    )
+    medians = [np.median(power[:, stretch], axis=1) for stretch in stretches]
+    levels = np.stack(medians, axis=1) / math.log(2.0)
+    bins = np.arange(power.shape[1])
+    return np.stack([np.interp(bins, middle, row) for row in levels])
 
 
 def band_centers(lowest: float, sampling_rate: float) -> Array:
-    """Centers of overlapping bands, twelve an octave, up to the end of the usable band, (band,)
-    Hz.
-    """
+    """Centers of overlapping bands, twelve an octave, up to the usable band's end, (band,) Hz."""
     highest = usable_band(sampling_rate)[1]
     n_bands = max(2, math.floor(BANDS_AN_OCTAVE * math.log2(highest / lowest)) + 1)
     return np.asarray(highest * 2.0 ** (np.arange(-n_bands + 1, 1) / BANDS_AN_OCTAVE))
@@ -142,11 +132,7 @@ def band_centers(lowest: float, sampling_rate: float) -> Array:
 
 def band_sums(values: Array, frequency: Array, centers: Array) -> Array:
     """Sums over the sixth of an octave around each center, (row, bin) to (row, band)."""
-    sums = np.concatenate(
-        [np.zeros((len(values), 1)), np.cumsum(values, axis=1)], axis=1
-    )
-    first, last = (
-        np.searchsorted(frequency, centers * 2.0**half)
-        for half in (-HALF_BAND, HALF_BAND)
-    )
+    sums = np.pad(np.cumsum(values, axis=1), ((0, 0), (1, 0)))
+    first = np.searchsorted(frequency, centers * 2.0**-HALF_BAND)
+    last = np.searchsorted(frequency, centers * 2.0**HALF_BAND)
     return np.asarray(sums[:, last] - sums[:, first])

@@ -1,6 +1,6 @@
-"""The recording of a twin.
+"""Recording of a machine for a fit.
 
-Read like any other, its channels named as sensors of a configuration.
+It is read like any other; its channels get names of sensors of a configuration.
 """
 
 from __future__ import annotations
@@ -32,15 +32,12 @@ def read_recording(
 def _sensor_names(file: str, names: Sequence[str]) -> tuple[str, ...]:
     """Names as ``sensing.sensors`` takes them: letters, digits and _, at most 32."""
     made = []
-    for place, name in enumerate(names):
-        plain = (
-            re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_")[:32] or f"channel_{place}"
-        )
-        made.append(
-            plain
-            if plain[0].isalpha() and not is_turning(plain)
-            else f"s_{plain}"[:30] + "_a"
-        )
+    for index, name in enumerate(names):
+        plain = re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_")[:32]
+        plain = plain or f"channel_{index}"
+        if not plain[0].isalpha() or is_turning(plain):
+            plain = f"s_{plain}"[:30] + "_a"
+        made.append(plain)
     if len(set(made)) < len(made):
         raise ConfigError(
             f"{file}: the names {', '.join(names)} differ in nothing but signs; rename the columns"

@@ -1,4 +1,4 @@
-"""Where the lines of the gears stand in a recording of a twin, and how their phase wanders."""
+"""Speed and drift of a machine's recording, from the lines of its gears."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from gensig.signals.recording import Recording
 
 
 def find_motion(recording: Recording, teeth: Teeth, speed_rpm: float) -> Motion:
-    """Speed and its drift, see `gensig.signals.mesh_motion.find_motion`, in the band that the
-    twin has too.
+    """Speed and its drift within the band that the twin has too.
+
+    See `gensig.signals.mesh_motion.find_motion`.
 
     Raises
     ------
-    ConfigError    where the recording is too short to fit or to check, or there is no sign of the mesh
+    ConfigError    where the recording is too short to fit or to check, or shows no mesh
     """
     return mesh_motion.find_motion(
         recording,

@@ -1,4 +1,4 @@
-"""What the twin says of itself: fitted, assumed, and held beside what it was not fitted to."""
+"""Report of a fitted machine: fitted values, assumptions, and the held-out check."""
 
 from __future__ import annotations
 
@@ -11,35 +11,44 @@ from gensig.twin.fitting import Fit
 
 UNKNOWN = """## What healthy data cannot tell
 
-How a fault of this machine sounds: faults follow from the model and the geometry above, not from the recording. The
-load, the stiffness of teeth and bearings, backlash, and tip relief: they are given or assumed, and what they do wrong
-the fitted path and grade make up for at this speed and load only. The path begins at one bearing, along the line of
-action; what reaches the sensors by other ways is in it. Below half the mesh frequency everything that the model lacks
-is counted as noise. The grade is the one whose sidebands are as strong: eccentricity, couplings and load that varies
-make it look coarser.
+How a fault of this machine sounds: faults follow from the model and the geometry above, not from
+the recording. The load, the stiffness of teeth and bearings, backlash, and tip relief: they are
+given or assumed, and what they do wrong the fitted path and grade make up for at this speed and
+load only. The path begins at one bearing, along the line of action; what reaches the sensors by
+other ways is in it. Below half the mesh frequency everything that the model lacks is counted as
+noise. The grade is the one whose sidebands are as strong: eccentricity, couplings and load that
+varies make it look coarser.
 """
 
 
+VERDICTS = {True: "agrees", False: "NO"}
+
+
 def fitted_rows(fitted: Fit, n_driving: int) -> list[tuple[str, str]]:
-    """What was fitted, by name."""
+    """Fitted values by name."""
     motion, grade = fitted.motion, fitted.grade
-    seen = "" if motion.scatter is None else f"{100 * motion.scatter:.4f} % seen"
-    errors = f"pitch errors of that grade make {100 * fitted.own_scatter:.4f} % by themselves"
-    if fitted.drift is not None and motion.correlation_time is not None:
-        spread = f"{100 * fitted.drift:.4f} % (standard deviation)"
-        drift = f"{spread} over {motion.correlation_time:.3g} s; {seen}, {errors}"
-    elif seen:
+    own = f"pitch errors of that grade make {100 * fitted.own_scatter:.4f} % by themselves"
+    drift = (
+        "none written: one harmonic alone is heard, which does not tell it from noise"
+    )
+    if motion.scatter is not None:
+        seen = f"{100 * motion.scatter:.4f} % seen"
+        time = f"over {motion.correlation_time:.3g} s"
         fast = (
             f"; changes within {motion.followed_time:.2g} s are the gears' own or noise"
         )
-        drift = (
-            f"none written: {seen} over {motion.correlation_time:.3g} s, {errors}{fast}"
-        )
+        drift = f"none written: {seen} {time}, {own}{fast}"
+        if fitted.drift is not None:
+            spread = f"{100 * fitted.drift:.4f} % (standard deviation)"
+            drift = f"{spread} {time}; {seen}, {own}"
     elif motion.detection_limit is not None:
-        drift = f"none written: below the detection limit of {100 * motion.detection_limit:.4f} %"
-    else:
-        drift = "none written: one harmonic alone is heard, which does not tell it from noise"
-    quality = f"{grade.grade:.1f}, 90 % of simulated sets of gears: {grade.low:.1f} to {grade.high:.1f}"
+        limit = f"{100 * motion.detection_limit:.4f} %"
+        drift = f"none written: below the detection limit of {limit}"
+    speed = 60.0 * motion.mesh_frequency / n_driving
+    quality = (
+        f"{grade.grade:.1f}, 90 % of simulated sets of gears: "
+        f"{grade.low:.1f} to {grade.high:.1f}"
+    )
     if not grade.is_bounded:
         quality += "; NOT BOUNDED: no grade from 1 to 11 gives such sidebands, or none are heard"
     heard = ", ".join(
@@ -51,10 +60,7 @@ def fitted_rows(fitted: Fit, n_driving: int) -> list[tuple[str, str]]:
         for name, one in zip(fitted.sensors, fitted.snr, strict=True)
     )
     return [
-        (
-            "speed",
-            f"{60.0 * motion.mesh_frequency / n_driving:.4f} r/min, mesh {motion.mesh_frequency:.4f} Hz",
-        ),
+        ("speed", f"{speed:.4f} r/min, mesh {motion.mesh_frequency:.4f} Hz"),
         ("drift", drift),
         ("ISO 1328 grade", quality),
         ("path", f"share of bands in which the gears are heard: {heard}"),
@@ -74,23 +80,21 @@ def check_lines(check: Check) -> list[str]:
     ]
     lines = ["| " + " | ".join(names) + " |", "|" + "---|" * len(names)]
     itself = np.median(np.abs(check.fitted_db - check.measured_db), axis=1)
-    for place, sensor in enumerate(check.sensors):
-        size = np.abs(check.difference_db[place])
+    for index, sensor in enumerate(check.sensors):
+        size = np.abs(check.difference_db[index])
         cells = [
             sensor,
-            f"{100 * check.share_within[place]:.0f} %",
+            f"{100 * check.share_within[index]:.0f} %",
             f"{np.median(size):.1f} dB",
             f"{size.max():.1f} dB at {check.band[int(size.argmax())]:.0f} Hz",
-            f"{itself[place]:.1f} dB",
+            f"{itself[index]:.1f} dB",
         ]
         for number, unit in enumerate(INDICATOR_UNITS):
-            low, high = (
-                check.twin[:, place, number].min(),
-                check.twin[:, place, number].max(),
-            )
-            word = "agrees" if check.agrees[place, number] else "NO"
+            twin = check.twin[:, index, number]
+            word = VERDICTS[bool(check.agrees[index, number])]
             cells.append(
-                f"{check.measured[place, number]:.2f} {unit} in {low:.2f}..{high:.2f}: {word}"
+                f"{check.measured[index, number]:.2f} {unit} in "
+                f"{twin.min():.2f}..{twin.max():.2f}: {word}"
             )
         lines.append("| " + " | ".join(" ".join(cell.split()) for cell in cells) + " |")
     return lines
@@ -98,17 +102,15 @@ def check_lines(check: Check) -> list[str]:
 
 def check_summary(check: Check) -> list[str]:
     """The held-out check for a terminal: a line a sensor."""
-    head = f"{'sensor':<20}{'bands within':>14}{'median off':>12}" + "".join(
-        f"{name:>16}" for name in INDICATORS
-    )
-    lines = [head]
-    for place, sensor in enumerate(check.sensors):
+    names = "".join(f"{name:>16}" for name in INDICATORS)
+    lines = [f"{'sensor':<20}{'bands within':>14}{'median off':>12}{names}"]
+    for index, sensor in enumerate(check.sensors):
         words = "".join(
-            f"{'agrees' if agrees else 'NO':>16}" for agrees in check.agrees[place]
+            f"{VERDICTS[bool(agrees)]:>16}" for agrees in check.agrees[index]
         )
-        off = float(np.median(np.abs(check.difference_db[place])))
+        off = float(np.median(np.abs(check.difference_db[index])))
         lines.append(
-            f"{sensor:<20}{100 * check.share_within[place]:>12.0f} %{off:>9.1f} dB{words}"
+            f"{sensor:<20}{100 * check.share_within[index]:>12.0f} %{off:>9.1f} dB{words}"
         )
     return lines
 
@@ -117,15 +119,17 @@ def verdict(check: Check) -> str:
     """One sentence on what agrees."""
     n_agree, n_all = int(check.agrees.sum()), check.agrees.size
     missed = [
-        f"{INDICATORS[number]} of {check.sensors[place]}"
-        for place, number in np.argwhere(~check.agrees).tolist()
+        f"{INDICATORS[number]} of {check.sensors[index]}"
+        for index, number in np.argwhere(~check.agrees).tolist()
     ]
-    return (
-        f"{100 * check.share_within.mean():.0f} % of third-octave levels and {n_agree} of {n_all} indicators lie "
-        f"between the least and the greatest of {N_RECORDS} healthy records of the twin; {100 * EXPECTED:.0f} % would, "
-        "were they of one of them."
-        + (f" What does not agree: {', '.join(missed)}." if missed else "")
+    text = (
+        f"{100 * check.share_within.mean():.0f} % of third-octave levels and {n_agree} of {n_all} "
+        f"indicators lie between the least and the greatest of {N_RECORDS} healthy records of the "
+        f"twin; {100 * EXPECTED:.0f} % would, were they of one of them."
     )
+    if missed:
+        text += f" What does not agree: {', '.join(missed)}."
+    return text
 
 
 def report_text(
@@ -162,9 +166,10 @@ Made by: `gensig twin {" ".join(words)}`
 
 ## Held out
 
-{held_out}, {check.duration:.3g} s, and {N_RECORDS} healthy records of the twin, each of another set of gears.
-Third-octave levels from {check.band[0]:.0f} to {check.band[-1]:.0f} Hz. "Machine against itself" is the median
-difference between the held-out stretch and the one fitted to. A range is that of the twin's records.
+{held_out}, {check.duration:.3g} s, and {N_RECORDS} healthy records of the twin, each of another
+set of gears. Third-octave levels from {check.band[0]:.0f} to {check.band[-1]:.0f} Hz. "Machine
+against itself" is the median difference between the held-out stretch and the one fitted to. A
+range is that of the twin's records.
 
 {table}
 
@@ -173,6 +178,6 @@ difference between the held-out stretch and the one fitted to. A range is that o
 ![levels](report.png)
 
 {UNKNOWN}
-The files that the options name stand in this folder by their whole path: after moving it, change `path.file` and
-`noise.parts` in `sensing/{name}.yaml`.
+The files that the options name stand in this folder by their whole path: after moving it, change
+`path.file` and `noise.parts` in `sensing/{name}.yaml`.
 """

@@ -1,4 +1,4 @@
-"""The twin on disk: options that ``--config-dir`` takes, the files that they name, and a report."""
+"""Files of a fitted machine: options for ``--config-dir``, their tables, and a report."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from gensig.errors import ConfigError
 from gensig.text.option_writing import is_option_name, option_lines
 from gensig.twin.fitting import SOURCE_CHANNEL, Fit, minimum_phase, oversampling
 
-PATH_STEP = 20.0  # Hz between the lines of the path's file; its gain is smooth over a sixth of an octave
+# Hz between the lines of the path's file; its gain is smooth over a sixth of an octave
+PATH_STEP = 20.0
 DEFAULT_OVERSAMPLING = 5  # solver.oversampling of configs/generate.yaml
 PATH_FILE, NOISE_FILE = "path.csv", "noise.csv"
 
@@ -48,14 +49,17 @@ def write_options(
     Parameters
     ----------
     gear : the group ``gear`` with all its keys
-    remarks : what stands beside a key, by its dotted name
+    remarks : comment of a key, by its dotted name
     torque_nm : of the driving gear
     duration : s of a record
     """
     name = option_name(out)
     for group in ("gear", "sensing", "experiment"):
         (out / group).mkdir(parents=True, exist_ok=True)
-    head = "# Written by gensig twin; report.md beside this folder's options says what was fitted and what assumed.\n"
+    head = (
+        "# Written by gensig twin; report.md beside this folder's options says what was fitted "
+        "and what assumed.\n"
+    )
     (out / "gear" / f"{name}.yaml").write_text(
         head + "\n".join(option_lines(gear, remarks)) + "\n", encoding="utf-8"
     )
@@ -78,7 +82,8 @@ def _sensing(out: Path, fitted: Fit) -> str:
   - _self_
 
 sampling_rate_hz: {fitted.sampling_rate!r}   # of the recording
-channels: [{SOURCE_CHANNEL}]                 # where the fitted path begins: the driving gear's bearing, line of action
+# where the fitted path begins: the driving gear's bearing, line of action
+channels: [{SOURCE_CHANNEL}]
 sensors: {json.dumps(fitted.sensors)}
 gain_scatter: 0.0              # one machine
 snr_db: {snr:.2f}              # fitted; the median sensor's
@@ -95,11 +100,9 @@ noise:
 
 
 def _experiment(name: str, fitted: Fit, torque_nm: float, duration: float) -> str:
-    profile, found = _drift(fitted)
-    speed, steps = (
-        fitted.motion.mesh_frequency,
-        oversampling(fitted.sampling_rate, DEFAULT_OVERSAMPLING),
-    )
+    profile, remark = _drift(fitted)
+    speed = fitted.motion.mesh_frequency
+    steps = oversampling(fitted.sampling_rate, DEFAULT_OVERSAMPLING)
     return f"""# gensig generate --config-dir {name} experiment={name} out=...
 defaults:
   - override /gear: {name}
@@ -109,9 +112,10 @@ defaults:
 operating:
   torque_nm: {torque_nm!r}     # given, or assumed: a healthy recording does not tell it
   duration_s: {duration!r}
-  speed_profile: {profile}   # {found}
+  speed_profile: {profile}   # {remark}
 quality:
-  iso1328_grade: {fitted.grade.grade:.2f}          # fitted: {fitted.grade.low:.1f} to {fitted.grade.high:.1f}
+  # fitted: {fitted.grade.low:.1f} to {fitted.grade.high:.1f}
+  iso1328_grade: {fitted.grade.grade:.2f}
   support_stiffness_scatter: 0 # one machine
   support_damping_scatter: 0
 solver:
@@ -129,8 +133,9 @@ def _drift(fitted: Fit) -> tuple[str, str]:
     """``operating.speed_profile`` as YAML and what to say of it."""
     if fitted.drift is None or fitted.motion.correlation_time is None:
         return "null", "no drift to be seen; report.md says why"
-    walk = f"kind: random_walk, scatter: {fitted.drift:.3g}, correlation_time_s: {fitted.motion.correlation_time:.3g}"
-    return f"{{{walk}}}", "fitted; drawn anew for each condition"
+    time = f"correlation_time_s: {fitted.motion.correlation_time:.3g}"
+    walk = f"{{kind: random_walk, scatter: {fitted.drift:.3g}, {time}}}"
+    return walk, "fitted; drawn anew for each condition"
 
 
 def _write_path(file: Path, fitted: Fit) -> None:

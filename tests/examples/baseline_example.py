@@ -1,4 +1,4 @@
-"""A baseline of one's own: the module that a newcomer writes, and nothing else of gensig changes.
+"""Example of a new baseline: one module, and one line in the registry.
 
 In a checkout this file would be ``diagnose/baselines/nearest_crest.py``. One step follows: the
 entry `NearestCrest` in `diagnose.baselines.registry.BASELINES`. Then ``baselines=[nearest_crest]``

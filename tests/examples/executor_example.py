@@ -1,4 +1,4 @@
-"""Worked example of a new executor: shards one after another in this process, as a debugger wants it.
+"""Worked example of a new executor: shards one after another in this process, for debugging.
 
 An executor is three files: this module in ``gensig/execution``, an entry of ``EXECUTORS`` in
 ``gensig/execution/registry.py``, and ``serial.yaml`` beside this file in ``configs/executor``.

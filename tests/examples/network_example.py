@@ -1,4 +1,4 @@
-"""A network of one's own: the module that a newcomer writes, and nothing else of gensig changes.
+"""Example of a new network: one module, one line in the registry, and one YAML file.
 
 In a checkout this file would be ``diagnose/networks/envelope_cnn.py``. Two steps follow. One is
 the entry ``"envelope_cnn": EnvelopeCnn`` in `diagnose.networks.registry.MODELS`. The other is the
@@ -21,20 +21,18 @@ CONFIG = {"name": "envelope", "kind": "envelope_cnn", "kernel": 16, "width": 8}
 
 
 class EnvelopeCnn(Network):
-    """Learned band-pass filters, and how strong their outputs are on average and at most.
+    """Learned band-pass filters, with the mean and the maximum of their outputs.
 
     Parameters
     ----------
     n_channels, n_classes : of the data
-    input_scale : (channel,) what the input is divided by; stored with the weights
+    input_scale : (channel,) divisor of the input; stored with the weights
     kernel : samples of a filter
     width : number of filters
     heads : see `diagnose.settings.HEADS`
     """
 
-    inputs: ClassVar[type[NetworkInput]] = (
-        Windows  # or Turns: what a training is to feed it
-    )
+    inputs: ClassVar[type[NetworkInput]] = Windows  # or Turns
 
     def __init__(
         self,
@@ -49,12 +47,11 @@ class EnvelopeCnn(Network):
         super().__init__(input_scale)
         self.filters = nn.Conv1d(n_channels, width, kernel, bias=False)
         self.norm = nn.BatchNorm1d(width)
-        self.head = nn.Linear(
-            2 * width, n_classes
-        )  # adaptation and novelty expect this name
+        # adaptation and novelty expect the name "head"
+        self.head = nn.Linear(2 * width, n_classes)
         self.add_heads(heads, 2 * width, n_classes)
 
     def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, None]:
-        """Mean and maximum of every filter's envelope; no map of places on a turn."""
+        """Mean and maximum of every filter's envelope; no map of positions on a turn."""
         envelope = self.norm(self.filters(windows)).abs()
         return torch.cat([envelope.mean(dim=-1), envelope.amax(dim=-1)], dim=1), None

@@ -10,14 +10,18 @@ from gensig.cli import main
 from gensig.execution.registry import EXECUTORS
 
 WORDS = [
-    "fault=healthy", "plan.n_records=4", "plan.n_units=2", "operating.duration_s=0.02",
-    "dataset.records_per_shard=2", "executor.n_workers=1",
-]  # fmt: skip
+    "fault=healthy",
+    "plan.n_records=4",
+    "plan.n_units=2",
+    "operating.duration_s=0.02",
+    "dataset.records_per_shard=2",
+    "executor.n_workers=1",
+]
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder of own options that has the executor; the entry of the registry is there for the test."""
+    """A folder of options with the executor, which the registry has during the test."""
     monkeypatch.setitem(EXECUTORS, "serial", read_serial)
     (tmp_path / "mine" / "executor").mkdir(parents=True)
     shutil.copy(Path(__file__).with_name("serial.yaml"), tmp_path / "mine" / "executor")

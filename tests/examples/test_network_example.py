@@ -16,11 +16,7 @@ from diagnose.training.store import load_model
 
 sys.path.append(str(Path(__file__).parent.parent / "unit" / "diagnose"))
 from fake_dataset import FakeDataset
-
-SMALL = [
-    "window_samples=1200", "epochs=1", "seeds=[0]", "n_bootstrap=20", "n_threads=1",
-    "protocols=[by_unit]", "shuffle_control=false", "metadata_probe=false", "baselines=false",
-]  # fmt: skip
+from small_studies import NETWORK_ALONE, SMALL
 
 
 @pytest.fixture
@@ -34,44 +30,39 @@ def data(monkeypatch):
 
 
 @pytest.fixture
-def options(tmp_path):
-    """A folder of configuration with the network's YAML."""
+def words(tmp_path):
+    """Words of a study with a folder of configuration that has the network's YAML."""
     folder = tmp_path / "mine" / "model"
     folder.mkdir(parents=True)
-    lines = [f"{key}: {value}" for key, value in CONFIG.items()]
-    (folder / "envelope.yaml").write_text("\n".join(lines) + "\n")
-    return str(folder.parent)
-
-
-def test_it_is_trained_stored_and_loaded(data, options, tmp_path):
-    out = tmp_path / "out"
-    words = [
+    lines = [f"{key}: {value}\n" for key, value in CONFIG.items()]
+    (folder / "envelope.yaml").write_text("".join(lines))
+    options = ["model=envelope", f"--config-dir={folder.parent}", "epochs=1"]
+    return [
+        "train",
         "data=any",
-        f"out={out}",
-        "model=envelope",
-        f"--config-dir={options}",
+        f"out={tmp_path / 'out'}",
         *SMALL,
+        *options,
+        *NETWORK_ALONE,
     ]
-    assert main(["train", *words]) == 0
-    assert "envelope" in (out / "report.html").read_text()
 
-    model, description = load_model(out / "models" / "by_unit-seed0")
+
+def test_it_is_trained_stored_and_loaded(data, words, tmp_path):
+    assert main(words) == 0
+    assert "envelope" in (tmp_path / "out" / "report.html").read_text()
+    folder = tmp_path / "out" / "models" / "by_unit-seed0"
+    model, description = load_model(folder)
     assert isinstance(model, EnvelopeCnn)
-    np.savez(
-        tmp_path / "a.npz",
-        acceleration=data.signals(0),
-        sampling_rate_hz=data.sampling_rate,
-    )
-    words = ["--model", str(out / "models" / "by_unit-seed0"), str(tmp_path / "a.npz")]
-    assert main(["predict", *words]) in (0, 3)
-    assert main(["evaluate", "data=any", f"model_dir={words[1]}"]) == 0
     assert description.model == CONFIG
+    file, rate = tmp_path / "a.npz", data.sampling_rate
+    np.savez(file, acceleration=data.signals(0), sampling_rate_hz=rate)
+    assert main(["predict", "--model", str(folder), str(file)]) in (0, 3)
+    assert main(["evaluate", "data=any", f"model_dir={folder}"]) == 0
 
 
-def test_it_is_deterministic_and_reads_what_it_declares(data):
-    model = EnvelopeCnn(
-        n_channels=1, n_classes=4, input_scale=[1.0], kernel=16, width=8
-    ).eval()
+def test_it_is_deterministic_and_reads_the_declared_input(data):
+    sizes = {"kernel": 16, "width": 8}
+    model = EnvelopeCnn(n_channels=1, n_classes=4, input_scale=[1.0], **sizes).eval()
     inputs = input_of(CONFIG)
     assert isinstance(inputs, EnvelopeCnn.inputs)
     assert inputs.n_points(1200) == 1200
@@ -80,15 +71,7 @@ def test_it_is_deterministic_and_reads_what_it_declares(data):
         assert_allclose(model(x), model(x.clone()), rtol=0, atol=0)
 
 
-def test_a_network_that_is_not_registered_is_refused(
-    data, options, tmp_path, monkeypatch, capsys
-):
+def test_a_network_that_is_not_registered_is_refused(data, words, monkeypatch, capsys):
     monkeypatch.delitem(MODELS, CONFIG["kind"])
-    words = [
-        "data=any",
-        f"out={tmp_path / 'out'}",
-        "model=envelope",
-        f"--config-dir={options}",
-    ]
-    assert main(["train", *words, *SMALL]) == 2
+    assert main(words) == 2
     assert "no model kind 'envelope_cnn'; there is small_cnn" in capsys.readouterr().err

@@ -1,1 +1,78 @@
-"""Modules of this folder are importable from its subfolders."""
+"""Commands as they are typed; modules of this folder are importable from its subfolders."""
+
+import json
+import shlex
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from matplotlib.figure import Figure
+from small_sets import make
+
+from gensig.cli import main
+
+
+def run(line: str, *more: str | Path) -> None:
+    """Run a command of gensig that must succeed; ``more`` are words that need no quotes."""
+    words = [*shlex.split(line), *map(str, more)]
+    assert main(words) == 0, words
+
+
+@pytest.fixture
+def gensig(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., tuple[str, str]]:
+    """Run a command in an empty folder; returns what it prints, on stdout and on stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def printed(line: str, *more: str | Path) -> tuple[str, str]:
+        capsys.readouterr()
+        run(line, *more)
+        return capsys.readouterr()
+
+    return printed
+
+
+@pytest.fixture
+def written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., dict[str, Any]]:
+    """Run a command in an empty folder; returns the content of its JSON file."""
+    monkeypatch.chdir(tmp_path)
+
+    def content(line: str, *more: str | Path) -> dict[str, Any]:
+        run(line, *more, "--json", "written.json")
+        return dict(json.loads(Path("written.json").read_text()))
+
+    return content
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
+    """The panels of each figure by their titles; figures are not rendered."""
+    figures = []
+
+    def keep(figure: Figure, path: Path, **_: Any) -> None:
+        path.write_text("drawn")
+        figures.append({panel.get_title(): panel for panel in figure.axes})
+
+    monkeypatch.setattr(Figure, "savefig", keep)
+    return figures
+
+
+@dataclass(frozen=True)
+class TinySet:
+    """A small data set that tests share; a test that changes it works on a copy."""
+
+    folder: Path
+
+    def copy_to(self, folder: Path) -> Path:
+        return Path(shutil.copytree(self.folder, folder))
+
+
+@pytest.fixture(scope="session")
+def tiny_set(tmp_path_factory: pytest.TempPathFactory) -> TinySet:
+    return TinySet(make(tmp_path_factory.mktemp("tiny") / "data"))

@@ -1,4 +1,4 @@
-"""A data set that is made in a moment, and what counts as being byte-equal to it."""
+"""A data set that is made in a moment, and the bytes that make two of them equal."""
 
 from pathlib import Path
 
@@ -15,19 +15,8 @@ PARTS = ("plan.csv", "index.h5", "shards/*", "splits/*")
 
 
 def make(out: Path, *overrides: str) -> Path:
-    assert (
-        main(
-            [
-                "generate",
-                "--quiet",
-                *TINY,
-                "executor.n_workers=1",
-                *overrides,
-                f"out={out}",
-            ]
-        )
-        == 0
-    )
+    words = [*TINY, "executor.n_workers=1", *overrides, f"out={out}"]
+    assert main(["generate", "--quiet", *words]) == 0
     return out
 
 

@@ -1,7 +1,8 @@
-"""The Python of the pages compiles and, but for what says why not above it, runs as it stands.
+"""The Python of the pages compiles, and runs as it stands.
 
-``<!-- not run: REASON -->`` or ``<!-- run by tests/... -->`` above a block excepts it; README.md has tests of its own.
-The blocks of a page run in order, in one namespace, beside a small data set under the names that pages use.
+A block below ``<!-- not run: REASON -->`` or ``<!-- run by tests/... -->`` is not run. README.md has
+its own tests. The blocks of a page run in order, in one namespace, with a small data set under the
+names that pages use.
 """
 
 import re

@@ -1,4 +1,4 @@
-"""Executors: every shard once, a dead worker replaced, and the same bytes wherever they are made."""
+"""Executors: every shard once, a dead worker replaced, and the same bytes from all."""
 
 import functools
 import os
@@ -94,8 +94,9 @@ def announce(notes: Path, index: int) -> None:
 
 def test_workers_end_with_a_killed_parent(tmp_path: Path) -> None:
     code = (
-        "import functools, pathlib, test_executors as t\n"
-        f"list(t.LOCAL.run(functools.partial(t.announce, pathlib.Path({str(tmp_path)!r})), range(2)))"
+        "import functools, pathlib, test_executors as "
+        f"t\nlist(t.LOCAL.run(functools.partial(t.announce, pathlib.Path({str(tmp_path)!r})), "
+        "range(2)))"
     )
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}
     process = subprocess.Popen([sys.executable, "-c", code], env=environment)
@@ -202,6 +203,7 @@ def test_two_tasks_at_a_time_make_the_same_bytes(
         "generate",
         "--quiet",
         "executor=slurm",
+        "executor.n_workers=1",
         "executor.shard_count=2",
         f"out={out}",
     ]
@@ -216,9 +218,8 @@ def test_two_tasks_at_a_time_make_the_same_bytes(
     assert not verify(out).complete
     assert other.wait(timeout=300) == 0
     assert (out / "manifest.json").read_bytes() == frozen  # tasks leave it alone
-    (
-        out / "shards" / ".shard-00003.h5.done"
-    ).unlink()  # as if that task had been killed just then
+    # As if that task had been killed just before its receipt.
+    (out / "shards" / ".shard-00003.h5.done").unlink()
     assert main(["finalize", str(out)]) == 2
     assert (
         "5 of 6 shards are done, shard-00003.h5 is planned" in capsys.readouterr().err
@@ -227,26 +228,6 @@ def test_two_tasks_at_a_time_make_the_same_bytes(
     assert main(["finalize", str(out)]) == 0
     assert verify(out).problems == []
     assert contents(out) == contents(reference)
-
-
-@pytest.mark.parametrize(
-    "words", [(), ("dataset.compression=gzip", "dataset.sample_type=int16")]
-)
-def test_plan_predicts_bytes(
-    tmp_path: Path, words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
-) -> None:
-    overrides = ("dataset.records_per_shard=2", *words)
-    out = make(tmp_path / "data", *overrides)
-    n_bytes = sum(path.stat().st_size for path in out.rglob("*") if path.is_file())
-    capsys.readouterr()
-    assert main(["plan", *TINY, *overrides]) == 0
-    (line,) = [
-        line
-        for line in capsys.readouterr().out.splitlines()
-        if line.startswith("bytes")
-    ]
-    predicted = int(line.split()[1].replace(",", ""))
-    assert 1 / 1.5 < predicted / n_bytes < 1.5
 
 
 def test_a_task_needs_a_frozen_folder(
@@ -351,7 +332,7 @@ def test_dask_on_this_machine_gives_up_a_shard_that_always_kills(
     assert isinstance(failure, ShardFailure)
     assert "KilledWorker" in failure.reason
     assert results == {index: 10 * index for index in (0, 1, 3, 4, 5)}
-    # Dask counts a worker that is lost before it has begun the shard too; on a busy machine that happens.
+    # Dask also counts a worker that is lost before it has begun the shard, on a busy machine.
     assert 1 <= begun[2] <= TRIES
 
 

@@ -1,4 +1,4 @@
-"""What is given away: a source distribution and a wheel hold what they should, and the wheel works in any folder."""
+"""Source distribution and wheel: their files, and the wheel at work in any folder."""
 
 import re
 import subprocess
@@ -128,7 +128,10 @@ def test_wheel_runs_from_another_folder(python: Path, tmp_path: Path) -> None:
         assert done.returncode == 0, done.stderr
         return done.stdout
 
-    code = "import gensig, gensig.configs, diagnose; print(gensig.__file__, gensig.configs.__file__, diagnose.__file__)"
+    code = (
+        "import gensig, gensig.configs, diagnose; "
+        "print(gensig.__file__, gensig.configs.__file__, diagnose.__file__)"
+    )
     paths = run(python, "-W", "error", "-c", code).split()
     assert all(path.startswith(str(python.parents[1])) for path in paths)
     gensig = python.parent / "gensig"

@@ -1,4 +1,4 @@
-"""Repeats on disk: a column tells them, and the whole set is made from counts alone."""
+"""Repeats on disk: a column counts them, and the whole set is made from counts alone."""
 
 from pathlib import Path
 
@@ -46,15 +46,5 @@ def test_one_record_of_a_plan_with_repeats_can_be_looked_at(tmp_path: Path) -> N
         WORDS,
         ("plan.design=grid", "plan.n_repeats=3", "operating.duration_s=0.02"),
     ):
-        assert (
-            main(
-                [
-                    "simulate",
-                    *words,
-                    "--output",
-                    str(tmp_path / "record.csv"),
-                    "--force",
-                ]
-            )
-            == 0
-        )
+        output = str(tmp_path / "record.csv")
+        assert main(["simulate", *words, "--output", output, "--force"]) == 0

@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from gensig import generate, open_dataset, stream
 from gensig.cli import main
+from gensig.dataset.columns import LIFE_COLUMNS
 from gensig.dataset.plan import plan_text
-from gensig.dataset.schema import LIFE_COLUMNS
 from gensig.dataset.splitting.protocols import make_splits
 from gensig.dataset.splitting.split_check import split_problems
 from gensig.errors import ConfigError
@@ -25,9 +25,13 @@ LIVES = (
     "life.snapshot_count=8",
 )
 SMALL = (
-    "experiment=run_to_failure", "plan.n_units=2", "plan.classes=[crack,wear]", "life.snapshot_count=3",
-    "operating.duration_s=0.02", "executor.n_workers=1",
-)  # fmt: skip
+    "experiment=run_to_failure",
+    "plan.n_units=2",
+    "plan.classes=[crack,wear]",
+    "life.snapshot_count=3",
+    "operating.duration_s=0.02",
+    "executor.n_workers=1",
+)
 
 
 def planned(*overrides):
@@ -125,13 +129,8 @@ def test_splits_keep_a_life_whole_on_one_side():
     assert {"by_unit", "cross_specimen", "cross_gearbox"} <= set(tables)
     for name in ("by_unit", "cross_specimen", "cross_gearbox"):
         assert split_problems(name, tables[name], plan) == []
-        sides = dict(
-            zip(
-                tables[name].record_id.tolist(),
-                tables[name].subset.tolist(),
-                strict=True,
-            )
-        )
+        table = tables[name]
+        sides = dict(zip(table.record_id.tolist(), table.subset.tolist(), strict=True))
         ids = plan.columns["record_id"]
         assert all(
             len({sides[ids[row]] for row in rows}) == 1 for rows in lives(plan).values()

@@ -1,4 +1,5 @@
-"""Profiles of speed and torque: their mathematics, what they mean for a machine, and what is refused."""
+"""Profiles of speed and torque: their mathematics, what they mean for a machine, and what is
+refused."""
 
 import math
 import re
@@ -51,8 +52,12 @@ def profiles():
 
 class TestCurve:
     def test_linear_between_the_points_and_held_outside(self):
-        assert_allclose(PROFILE.curve()([-9, -0.2, 0.05, 0.3, 0.5, 1.0, 40]), [0.5, 0.5, 0.65, 0.8, 0.9, 0.25, 0.25],
-                        rtol=1e-12, atol=0)  # fmt: skip
+        assert_allclose(
+            PROFILE.curve()([-9, -0.2, 0.05, 0.3, 0.5, 1.0, 40]),
+            [0.5, 0.5, 0.65, 0.8, 0.9, 0.25, 0.25],
+            rtol=1e-12,
+            atol=0,
+        )
 
     def test_its_slope_is_that_of_the_piece_that_begins(self):
         slope = PROFILE.curve().derivative()([-9, -0.2, 0.1, 0.3, 0.7, 1.0, 40])
@@ -112,47 +117,10 @@ class TestNominal:
             atol=1e-9 * operating.speed,
         )
 
-    def test_the_angle_is_negative_before_time_0(self, operating):
-        assert_allclose(operating.nominal(np.array([-0.4, -0.2])).angle / operating.speed,
-                        [-0.2 * (0.5 + 0.62) / 2 - 0.1, -0.2 * (0.5 + 0.62) / 2], rtol=1e-12, atol=0)  # fmt: skip
-
-    def test_speed_and_acceleration_are_its_derivatives(self, operating):
-        times, h = np.array([-0.3, 0.1, 0.5, 0.9, 1.4]), 1e-6
-        before, at, after = (operating.nominal(times + shift) for shift in (-h, 0.0, h))
-        assert_allclose(
-            at.speed, (after.angle - before.angle) / (2 * h), rtol=1e-7, atol=0
-        )
-        assert_allclose(
-            at.acceleration,
-            (after.speed - before.speed) / (2 * h),
-            rtol=1e-6,
-            atol=1e-6,
-        )
-        assert_allclose(
-            at.torque_slope,
-            (after.torque_factor - before.torque_factor) / (2 * h),
-            rtol=1e-6,
-            atol=1e-6,
-        )
-
     def test_torque_follows_its_own_profile(self, operating):
         found = operating.nominal(np.array([-1.0, 0.5, 9.0]))
         assert_allclose(found.torque_factor, [0, 0.375, 1.5], rtol=1e-12, atol=0)
         assert_allclose(found.torque_slope, [0, 0.75, 0], rtol=1e-12, atol=0)
-
-    def test_a_profile_of_ones_is_none(self, xiamen):
-        times, ones = (
-            np.linspace(-0.5, 2.0, 11),
-            Profile(times=(0.0, 0.4, 1.0), factors=(1.0, 1.0, 1.0)),
-        )
-        with_ones = replace(
-            xiamen.operating, speed_profile=ones, torque_profile=ones
-        ).nominal(times)
-        plain = xiamen.operating.nominal(times)
-        for name in ("angle", "speed", "acceleration", "torque_factor", "torque_slope"):
-            assert_allclose(
-                getattr(with_ones, name), getattr(plain, name), rtol=1e-14, atol=1e-13
-            )
 
 
 class TestConfiguration:
@@ -168,14 +136,6 @@ class TestConfiguration:
         assert operating.torque_profile == Profile(
             times=(0.1, 0.2, 1.0), factors=(0.0, 1.5, 1.0)
         )
-
-    def test_constant_by_default(self, xiamen, composed_config):
-        assert (
-            composed_config["operating"]["speed_profile"]
-            is composed_config["operating"]["torque_profile"]
-            is None
-        )
-        assert xiamen.operating.speed_profile is xiamen.operating.torque_profile is None
 
     def test_a_drawn_speed_scales_the_profile(self, config_with):
         config = config_with({"operating.speed_profile": [[0, 0.5], [1, 1]]})
@@ -205,54 +165,29 @@ class TestConfiguration:
     @pytest.mark.parametrize(
         ("value", "text"),
         [
-            (
-                3,
-                " = 3 is no list; give [time_s, factor] pairs, a group with a kind, or null for a constant",
-            ),
-            ("ramp", " = 'ramp' is no list; give [time_s, factor] pairs"),
+            (3, " = 3 is no list; give [time_s, factor] pairs, a group with a kind"),
             ({"a": 1}, ".kind = None; allowed: ramp, random_walk, file"),
             ({"kind": "sine"}, ".kind = 'sine'; allowed: ramp, random_walk, file"),
-            ([], ": 0 points; give 2 to 100000"),
             ([[0, 1]], ": 1 points; give 2 to 100000"),
-            (
-                [[place, 1] for place in range(100_001)],
-                ": 100001 points; give 2 to 100000",
-            ),
+            ([[k, 1] for k in range(100_001)], ": 100001 points; give 2 to 100000"),
             ([0, 1], ": point 0 = 0; give two finite numbers, [time_s, factor]"),
-            (
-                [[0, 1], [1]],
-                ": point 1 = [1]; give two finite numbers, [time_s, factor]",
-            ),
             ([[0, 1], [1, 1, 1]], ": point 1 = [1, 1, 1]; give two finite numbers"),
-            ([[0, 1], [1, "x"]], ": point 1 = [1, 'x']; give two finite numbers"),
             ([[0, True], [1, 1]], ": point 0 = [0, True]; give two finite numbers"),
-            ([[0, None], [1, 1]], ": point 0 = [0, None]; give two finite numbers"),
             ([[0, math.nan], [1, 1]], ": point 0 = [0, nan]; give two finite numbers"),
-            ([[0, 1], [math.inf, 1]], ": point 1 = [inf, 1]; give two finite numbers"),
-            (
-                [[0, 1], [2e6, 1]],
-                ": point 1 = [2e+06, 1]; give a time within 1e+06 s and a finite factor",
-            ),
-            (
-                [[0, 1], [0, 2]],
-                ": the time 0 s follows 0 s; times must increase, by 0.001 s or more",
-            ),
+            ([[0, 1], [1, 10**400]], ": point 1 = [1, 1000"),
+            ([[0, 1], [2e6, 1]], ": point 1 = [2e+06, 1]; give a time within 1e+06 s"),
             (
                 [[0, 1], [1, 1], [0.5, 1]],
                 ": the time 0.5 s follows 1 s; times must increase",
             ),
-            (
-                [[0, 1], [1e-5, 1]],
-                ": the time 1e-05 s follows 0 s; times must increase, by 0.001 s or more",
-            ),
+            ([[0, 1], [1e-5, 1]], "times must increase, by 0.001 s or more"),
             ([[0, 1], [1, -0.5]], ": factor -0.5 must "),
         ],
     )
     def test_refusals(self, config_with, key, value, text):
-        with pytest.raises(
-            ConfigError, match=re.escape(f"operating.{key}{text}")
-        ) as caught:
+        with pytest.raises(ConfigError, match=re.escape(text)) as caught:
             read_system(config_with({f"operating.{key}": value}))
+        assert str(caught.value).startswith(f"operating.{key}")
         assert "\n" not in str(caught.value)
 
     def test_a_torque_may_fall_to_nothing_but_no_speed(self, machine):
@@ -266,10 +201,6 @@ class TestConfiguration:
             match=re.escape("operating.speed_profile: factor 0 must be positive"),
         ):
             machine({"operating.speed_profile": value})
-
-    def test_a_number_too_large_for_a_computer(self):
-        with pytest.raises(ConfigError, match="point 1 = "):
-            read_profile("operating.torque_profile", [[0, 1], [1, 10**400]])
 
     @pytest.mark.parametrize("factors", [(1.0,), (1.0, math.nan), (1.0, math.inf)])
     def test_profiles_made_in_python_are_checked_too(self, factors):

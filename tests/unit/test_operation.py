@@ -1,4 +1,5 @@
-"""The group ``operating``: kinds of courses as configurations give them, users' files, and what is refused."""
+"""The group ``operating``: kinds of courses as configurations give them, users' files, and what is
+refused."""
 
 import math
 import re
@@ -33,10 +34,6 @@ def saved(folder, text):
 
 
 class TestKinds:
-    def test_a_ramp_ends_with_the_record(self, operating):
-        found = operating({SPEED: RAMP, "operating.duration_s": 2.0})
-        assert found.speed_profile == Profile(times=(0.0, 2.0), factors=(0.5, 1.0))
-
     def test_walks_of_speed_and_torque_are_different(self, operating):
         found = operating({SPEED: WALK, TORQUE: WALK})
         one, other = (
@@ -67,13 +64,6 @@ class TestKinds:
         )
         assert not found.is_steady
         assert read_system(read_request([]).config).operating.is_steady
-
-    def test_kinds_can_be_typed(self):
-        words = ["operating.speed_profile={kind: random_walk, scatter: 0.01, correlation_time_s: 0.5}",
-                 "operating.torque_ripple={share: 0.05, frequency_hz: 12}"]  # fmt: skip
-        found = read_system(read_request(words).config).operating
-        assert_allclose(found.torque_ripple.frequency, 12.0, rtol=0, atol=0)
-        assert found.speed_profile is not None
 
     def test_a_file_of_factors(self, operating, tmp_path):
         own = saved(tmp_path, "factor,time_s\n0.5,-1\n0.5,0\n1,1\n")
@@ -112,26 +102,25 @@ class TestKinds:
         )
 
 
+def read_refused(config, start, text):
+    with pytest.raises(ConfigError, match=re.escape(text)) as caught:
+        read_system(config)
+    assert str(caught.value).startswith(start)
+    assert "\n" not in str(caught.value)
+
+
 class TestRefusals:
     @pytest.mark.parametrize(
         ("value", "text"),
         [
             (
                 {**RAMP, "slope": 1},
-                ": unknown key 'slope'; known: first_factor, last_factor, begin_s, end_s",
+                ": unknown key 'slope'; known: first_factor, last_factor",
             ),
-            ({"kind": "ramp", "first_factor": 1}, ": missing last_factor"),
-            ({**RAMP, "end": 1}, ": 'end' has the wrong unit; write it as 'end_s'"),
             ({**RAMP, "end_s": 0}, ": the time 0 s follows 0 s; times must increase"),
             ({**RAMP, "last_factor": -1}, ": factor -1 must "),
             ({**RAMP, "last_factor": "x"}, ".last_factor = 'x' is not a number"),
             ({**WALK, "scatter": 1}, ": scatter = 1 must lie in 0..0.2"),
-            ({**WALK, "scatter": math.nan}, ".scatter = nan is not finite"),
-            (
-                {**WALK, "seed": 1},
-                ": unknown key 'seed'; known: scatter, correlation_time_s",
-            ),
-            ({"kind": "file"}, ": kind = file needs exactly file"),
             ({"kind": "file", "file": 3}, ": kind = file needs exactly file"),
             (
                 {"kind": "file", "file": "none.csv"},
@@ -141,55 +130,42 @@ class TestRefusals:
     )
     @pytest.mark.parametrize("key", [SPEED, TORQUE])
     def test_of_profiles(self, config_with, key, value, text):
-        with pytest.raises(ConfigError, match=re.escape(f"{key}{text}")) as caught:
-            read_system(config_with({key: value}))
-        assert "\n" not in str(caught.value)
+        read_refused(config_with({key: value}), key, f"{key}{text}")
 
     @pytest.mark.parametrize(
-        ("text", "told"),
+        ("table", "text"),
         [
             (
-                "time_s,rpm\n0,1\n1,1\n",
-                "no column speed_rpm or factor; it must have time_s and one of the two",
+                "time_s,rpm 0,1 1,1",
+                "no column speed_rpm or factor; it must have time_s and one",
             ),
-            ("time_s,speed_hz\n0,1\n1,1\n", "no column speed_rpm or factor"),
             (
-                "time_s,speed_rpm,factor\n0,1,1\n1,1,1\n",
-                "unknown column factor; it must have time_s, speed_rpm",
+                "time_s,speed_rpm,factor 0,1,1 1,1,1",
+                "unknown column factor; it must have time_s",
             ),
-            ("t,factor\n0,1\n1,1\n", "no column time_s; it must have time_s, factor"),
-            ("time_s,factor\n0,1\n1,nan\n", "row 3, column factor is no finite number"),
-            ("time_s,factor\n0,1\n1,fast\n", "give numbers under one header"),
-            ("time_s,factor\n0,1\n1\n", "give numbers under one header"),
-            ("time_s,factor\n0,1\n", "is too short: 1 rows, at least 2 are needed"),
+            ("t,factor 0,1 1,1", "no column time_s; it must have time_s, factor"),
+            ("time_s,factor 0,1 1,nan", "row 3, column factor is no finite number"),
             (
-                "time_s,factor\n0,1\n2,1\n1,1\n",
+                "time_s,factor 0,1 2,1 1,1",
                 "the time 1 s follows 2 s; times must increase",
             ),
             (
-                "time_s,factor\n0,1\n1e-4,1\n1,1\n",
-                "the time 0.0001 s follows 0 s; times must increase, by 0.001 s",
+                "time_s,factor 0,1 0.2,1 0.4,1",
+                "runs from 0 s to 0.4 s, the record from 0 to 1 s",
             ),
             (
-                "time_s,factor\n0,1\n0.2,1\n0.4,1\n",
-                "is too short: it runs from 0 s to 0.4 s, the record from 0 to 1 s",
+                "time_s,factor 0.1,1 2,1",
+                "too short: it runs from 0.1 s to 2 s, the record",
             ),
             (
-                "time_s,factor\n0.1,1\n2,1\n",
-                "is too short: it runs from 0.1 s to 2 s, the record from 0 to 1 s",
-            ),
-            (
-                "time_s,speed_rpm\n0,100\n1,0\n",
+                "time_s,speed_rpm 0,100 1,0",
                 "operating.speed_profile: factor 0 must be positive",
             ),
         ],
     )
-    def test_of_files(self, config_with, tmp_path, text, told):
-        own = saved(tmp_path, text)
-        with pytest.raises(ConfigError, match=re.escape(told)) as caught:
-            read_system(config_with({SPEED: own}))
-        assert "\n" not in str(caught.value)
-        assert str(caught.value).startswith("operating.speed_profile")
+    def test_of_files(self, config_with, tmp_path, table, text):
+        course = saved(tmp_path, table.replace(" ", "\n") + "\n")
+        read_refused(config_with({SPEED: course}), SPEED, text)
 
     @pytest.mark.parametrize(
         ("value", "text"),
@@ -198,27 +174,17 @@ class TestRefusals:
             ({"share": 0.1}, ": give order (of the pinion's turn) or frequency_hz"),
             ({"share": "x", "order": 1}, ".share = 'x' is not a number"),
             (
-                {"share": 0.1, "orders": 1},
-                ": unknown key 'orders'; did you mean 'order'?",
-            ),
-            (
-                {"share": 0.1, "frequency": 1},
-                ": 'frequency' has the wrong unit; write it as 'frequency_hz'",
-            ),
-            (
                 {"share": 0.1, "frequency_hz": 151},
-                ": frequency_hz = 151 Hz, above 150 Hz; the course runs straight",
+                ": frequency_hz = 151 Hz, above 150 Hz",
             ),
             ({"share": 0.1, "order": 6}, ": order 6 makes up to 180 Hz, above 150 Hz"),
         ],
     )
     @pytest.mark.parametrize(
-        "key", ["operating.speed_ripple", "operating.torque_ripple"]
+        "key", [f"operating.{side}_ripple" for side in ("speed", "torque")]
     )
     def test_of_ripples(self, config_with, key, value, text):
-        with pytest.raises(ConfigError, match=re.escape(f"{key}{text}")) as caught:
-            read_system(config_with({key: value}))
-        assert "\n" not in str(caught.value)
+        read_refused(config_with({key: value}), key, f"{key}{text}")
 
     def test_an_order_is_judged_at_the_fastest(self, operating):
         ripple = {"share": 0.1, "order": 4}
@@ -229,25 +195,15 @@ class TestRefusals:
     @pytest.mark.parametrize(
         ("key", "value", "text"),
         [
-            (
-                "turns",
-                0,
-                "operating.turns = 0 must be positive, or null to use duration_s",
-            ),
-            ("turns", "ten", "operating.turns = 'ten' is not a number"),
-            (
-                "turns_of",
-                "gear",
-                "operating.turns_of = 'gear'; allowed: pinion, wheel, faulted",
-            ),
-            ("turns_of", None, "operating.turns_of is null; give a value"),
-            ("course_seed", 1.5, "operating.course_seed = 1.5 is not a whole number"),
-            ("course_seed", -1, "operating.course_seed = -1 must not be negative"),
+            ("turns", 0, " = 0 must be positive, or null to use duration_s"),
+            ("turns", "ten", " = 'ten' is not a number"),
+            ("turns_of", "gear", " = 'gear'; allowed: pinion, wheel, faulted"),
+            ("course_seed", -1, " = -1 must not be negative"),
         ],
     )
     def test_of_turns_and_seeds(self, config_with, key, value, text):
-        with pytest.raises(ConfigError, match=re.escape(text)):
-            read_system(config_with({f"operating.{key}": value}))
+        key = f"operating.{key}"
+        read_refused(config_with({key: value}), key, f"{key}{text}")
 
 
 class TestRipple:
@@ -265,8 +221,14 @@ class TestRipple:
         "ripple", [{"share": 0.1, "order": 2}, {"share": 0.2, "frequency_hz": 9}]
     )
     def test_speed_and_slopes_are_derivatives(self, operating, ripple):
-        found = operating({SPEED: WALK, TORQUE: RAMP, "operating.speed_ripple": ripple,
-                           "operating.torque_ripple": {**ripple, "phase_deg": 30}})  # fmt: skip
+        found = operating(
+            {
+                SPEED: WALK,
+                TORQUE: RAMP,
+                "operating.speed_ripple": ripple,
+                "operating.torque_ripple": {**ripple, "phase_deg": 30},
+            }
+        )
         times, h = np.array([-0.2512, 0.1013, 0.5017, 0.9123]), 1e-6
         before, at, after = (found.nominal(times + shift) for shift in (-h, 0.0, h))
         assert_allclose(
@@ -286,7 +248,8 @@ class TestRipple:
         )
 
     def test_the_order_follows_the_set_angle_of_both_shafts_courses(self, operating):
-        """On a ramp a torque ripple of order 2 has two periods a turn of the pinion, whatever the speed."""
+        """On a ramp a torque ripple of order 2 has two periods a turn of the pinion, whatever the
+        speed."""
         found = operating(
             {SPEED: RAMP, "operating.torque_ripple": {"share": 0.1, "order": 2}}
         )
@@ -305,8 +268,13 @@ class TestRipple:
     [{"share": 0.02, "order": 2}, {"share": 0.02, "frequency_hz": 50, "phase_deg": 20}],
 )
 def test_a_lead_in_shifts_all_courses_alike(machine, ripple):
-    changes = {SPEED: WALK, TORQUE: WALK, "operating.speed_ripple": ripple, "operating.torque_ripple": ripple,
-               "sensing.sensor.low_cutoff_hz": 2.0}  # fmt: skip
+    changes = {
+        SPEED: WALK,
+        TORQUE: WALK,
+        "operating.speed_ripple": ripple,
+        "operating.torque_ripple": ripple,
+        "sensing.sensor.low_cutoff_hz": 2.0,
+    }
     run = Run(system=machine(changes), faults=())
     lead = run.system.sensing.n_lead / run.system.sensing.sampling_rate
     assert lead > 0.05

@@ -2,7 +2,7 @@
 
 import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import pytest
 from hypothesis import given
@@ -10,7 +10,20 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from gensig.errors import ConfigError
-from gensig.units import UNITS, from_si, read, split_unit, to_si, unit
+from gensig.units import (
+    UNITS,
+    check_choice,
+    check_limits,
+    check_positive,
+    check_ranges,
+    from_si,
+    naming,
+    read,
+    read_kind,
+    split_unit,
+    to_si,
+    unit,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -234,3 +247,80 @@ def test_missing_keys_are_named():
             "gear.shaft",
             name="shaft",
         )
+
+
+FAULTS = [
+    (
+        lambda one: check_positive(one, "gear.", "share", "length"),
+        {"length": 0.0},
+        "gear.length_mm = 0 must be positive",
+    ),
+    (
+        lambda one: check_limits(one, "gear.", length=(1e-3, 0.1)),
+        {"length": 0.2},
+        "gear.length_mm = 200 must lie in 1..100",
+    ),
+    (
+        lambda one: check_limits(one, "gear.", share=(0.0, 1.0)),
+        {"share": math.nan},
+        "gear.share = nan must lie in 0..1",
+    ),
+    (
+        lambda one: check_ranges(one, "", seats=(0.0, 0.1)),
+        {"seats": (0.05, 0.2)},
+        "seats_mm = [50, 200] must be two ordered numbers, [low, high], in 0..100",
+    ),
+    (
+        lambda one: check_ranges(one, "", seats=(0.0, 0.1)),
+        {"seats": (0.05, 0.02)},
+        "two ordered",
+    ),
+    (
+        lambda one: check_ranges(one, "", seats=(0.0, 0.1)),
+        {"seats": (0.05,)},
+        "two ordered",
+    ),
+    (
+        lambda one: check_choice("gear.name", one.name, ("a", 1)),
+        {},
+        "gear.name = 'shaft'; allowed: a, 1",
+    ),
+]
+
+
+@pytest.mark.parametrize(("check", "changes", "text"), FAULTS)
+def test_checks_name_the_field_in_its_unit(check, changes, text):
+    with pytest.raises(ConfigError, match=re.escape(text)):
+        check(replace(shaft(), **changes))
+
+
+def test_checks_pass_what_is_allowed():
+    one = replace(shaft(), seats=(0.0, 0.1), angle=None)
+    check_positive(one, "", "length", "angle")
+    check_limits(one, "", length=(one.length, one.length), angle=(0.0, 1.0))
+    check_ranges(one, "", seats=(0.0, 0.1))
+    check_choice("name", one.name, ("shaft",))
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ({**GOOD, "kind": "x"}, "gear.part: kind = 'x'; allowed: shaft"),
+        ("shaft", "gear.part: kind = None"),
+        ({**GOOD, "kind": ["shaft"]}, "gear.part: kind = ['shaft']"),
+        ({**GOOD, "kind": "shaft", "name": 3}, "gear.part.name = 3 is not text"),
+    ],
+)
+def test_a_kind_is_read_by_its_name(values, text):
+    kinds = {"shaft": Shaft}
+    given = {**GOOD, "name": "a", "kind": "shaft"}
+    assert read_kind(kinds, given, "gear.part") == replace(shaft(), name="a")
+    with pytest.raises(ConfigError, match=re.escape(text)):
+        read_kind(kinds, values, "gear.part")
+
+
+def test_an_error_without_its_group_gets_a_name():
+    for text, named in (("low", "gear.part: low"), ("gear.x: low", "gear.x: low")):
+        with pytest.raises(ConfigError) as caught, naming("gear.part: "):
+            raise ConfigError(text)
+        assert str(caught.value) == named

@@ -1,21 +1,31 @@
-"""Figure of an engine's dampers.
-
-Tooth force over the speeds and over a cycle, and root stress over the mesh.
-"""
+"""Figure of an engine's dampers: tooth force over speed, cycle and orders, and root stress."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.commands.figures.machine_figures import FAULTY, GREY, SOUND, pyplot, save
-from gensig.commands.lines.results import DamperState
+from gensig.commands.figures.style import (
+    FAULTY,
+    SMALL,
+    SOUND,
+    curve,
+    cycle_ticks,
+    panels,
+    save,
+    titles,
+    zero_line,
+)
+from gensig.commands.lines.results import (
+    RPM,
+    DamperState,
+    heaviest_pass,
+    roll_degrees,
+)
 from gensig.driveline.linear.dampers import TorsionalDamper
-from gensig.units import from_si
 
 LOOKS = {"before": (FAULTY, 1.1), "after": (SOUND, 1.5)}
 
@@ -27,69 +37,47 @@ def plot_dampers(
     speeds: NDArray[np.float64],
     path: Path,
 ) -> None:
-    """Worst tooth force over the run, tooth force over a cycle, orders of it, and root stress
-    over the mesh.
-    """
-    figure, axes = pyplot.subplots(2, 2, figsize=(12, 7.6), layout="constrained")
+    """Draw the largest tooth force, its cycle and orders, and root stress, before and after."""
+    figure, axes = panels(2, 2, 12, 7.6)
+    (by_speed, by_angle), (by_order, stress) = axes
     for name, state in states.items():
-        colour, width = LOOKS[name]
-        look: dict[str, Any] = {"color": colour, "linewidth": width, "label": name}
-        axes[0, 0].plot(from_si("speed_rpm", 1.0) * speeds, state.largest / 1e3, **look)
-        angle = np.linspace(0.0, 720.0, len(state.load.force), endpoint=False)
-        axes[0, 1].plot(angle, state.load.force / 1e3, **look)
+        color, width = LOOKS[name]
+        curve(by_speed, RPM * speeds, state.largest / 1e3, color, name, width=width)
+        force, root = state.load.force, state.root
+        angle = np.linspace(0.0, 720.0, len(force), endpoint=False)
+        curve(by_angle, angle, force / 1e3, color, name, width=width)
         _, amplitudes = state.response.element_forces(state.line.linear()[1])
-        axes[1, 0].plot(state.response.orders, np.abs(amplitudes[mesh]) / 1e3, **look)
-        root = state.root
-        decisive, pair = root.strength.decisive, root.strength.pair
-        roll = np.degrees(root.history.roll / pair.pinion.base_radius)
-        passes = root.passes[decisive] * 1e-6
-        axes[1, 1].plot(roll, passes[int(passes.max(axis=1).argmax())], **look)
-        axes[1, 1].plot(
-            roll,
-            root.history.stress[decisive] * 1e-6,
-            color=colour,
-            linewidth=0.8,
-            linestyle=":",
-            label=f"{name}: greatest force all the way",
-        )
+        order_force = np.abs(amplitudes[mesh]) / 1e3
+        curve(by_order, state.response.orders, order_force, color, name, width=width)
+        roll, constant = roll_degrees(root), root.history.stress[root.strength.decisive]
+        curve(stress, roll, heaviest_pass(root) * 1e-6, color, name, width=width)
+        label = f"{name}: greatest force all the way"
+        curve(stress, roll, constant * 1e-6, color, label, style=":", width=0.8)
     first = states["before"]
-    rpm = from_si("speed_rpm", first.load.speed)
-    axes[0, 0].set(
-        title="Largest tooth force of a cycle",
-        xlabel="speed of the crank, r/min",
-        ylabel="kN",
+    at_speed = f"at {RPM * first.load.speed:g} r/min"
+    titles(
+        by_speed, "Largest tooth force of a cycle", "speed of the crank, r/min", "kN"
     )
-    axes[0, 0].set_ylim(0.0, None)
-    axes[0, 1].axhline(0.0, color=GREY, linewidth=0.8)
-    axes[0, 1].set(
-        title=f"Tooth force at {rpm:g} r/min (below 0 the teeth would part)",
-        xlabel="crank angle, degrees",
-        ylabel="kN",
-        xlim=(0, 720),
-        xticks=range(0, 721, 90),
-    )
-    axes[0, 1].set_ylim(None, 1.35 * first.load.greatest / 1e3)  # room for the legend
-    axes[1, 0].set(
-        title=f"Tooth force by orders at {rpm:g} r/min",
-        xlabel="order",
-        ylabel="amplitude, kN",
-        xlim=(0, 60),
-    )
-    gear = first.root.strength.decisive
-    axes[1, 1].set(
-        title=f"Root stress of the pair that bears most, {gear}",
-        xlabel="roll of the pinion since contact begins, deg",
-        ylabel="MPa",
-    )
-    axes[1, 1].margins(y=0.3)
-    axes[1, 1].set_ylim(0.0, None)
-    for one in axes.flat:
-        one.legend(fontsize=8, loc="upper left" if one is axes[0, 0] else "upper right")
+    by_speed.set_ylim(0.0, None)
+    zero_line(by_angle)
+    title = f"Tooth force {at_speed} (below 0 the teeth would part)"
+    titles(by_angle, title, "crank angle, degrees", "kN")
+    cycle_ticks(by_angle)
+    by_angle.set_ylim(None, 1.35 * first.load.greatest / 1e3)  # room for the legend
+    title = f"Tooth force by orders {at_speed}"
+    titles(by_order, title, "order", "amplitude, kN", xlim=(0, 60))
+    title = f"Root stress of the pair that bears most, {first.root.strength.decisive}"
+    titles(stress, title, "roll of the pinion since contact begins, deg", "MPa")
+    stress.margins(y=0.3)
+    stress.set_ylim(0.0, None)
+    by_speed.legend(fontsize=SMALL, loc="upper left")
+    for panel in (by_angle, by_order, stress):
+        panel.legend(fontsize=SMALL, loc="upper right")
     sizes = "; ".join(
-        f"node {one.node}: {one.ring_inertia:.3g} kg m$^2$, {one.damping:.3g} N m s/rad, {one.stiffness:.3g} N m/rad"
-        for one in dampers
+        f"node {damper.node}: {damper.ring_inertia:.3g} kg m$^2$, "
+        f"{damper.damping:.3g} N m s/rad, {damper.stiffness:.3g} N m/rad"
+        for damper in dampers
     )
-    figure.suptitle(
-        f"{first.line.drive.name}, mesh {first.line.mesh_names[mesh]}\n{sizes}"
-    )
+    name = f"{first.line.drive.name}, mesh {first.line.mesh_names[mesh]}"
+    figure.suptitle(f"{name}\n{sizes}")
     save(figure, path)

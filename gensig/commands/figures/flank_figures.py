@@ -10,7 +10,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.commands.figures.machine_figures import COLOURS, GREY, SOUND, pyplot, save
+from gensig.commands.figures.style import (
+    COLORS,
+    FAULTY,
+    FIRST_SLICE,
+    GREY,
+    MESH_PERIODS,
+    SOUND,
+    STIFFNESS,
+    curve,
+    panels,
+    save,
+    titles,
+)
 from gensig.systems.flank_optimum import Optimum
 from gensig.systems.sliced_pair import SlicedPair, TransmissionError
 
@@ -20,12 +32,16 @@ Array = NDArray[np.float64]
 def plot_transmission_error(
     system: SlicedPair, result: TransmissionError, path: Path
 ) -> None:
-    """Transmission error over two periods, its orders, load over the flank and load sharing."""
-    figure, axes = pyplot.subplots(2, 2, figsize=(11, 7.6), layout="constrained")
-    _error(axes[0, 0], system, result)
-    _orders(axes[0, 1], result)
-    _load_map(figure, axes[1, 0], system, result)
-    _sharing(axes[1, 1], system, result)
+    """Draw transmission error, its orders, load over the flank and load sharing."""
+    figure, axes = panels(2, 2, 11, 7.6)
+    (error, orders), (load, sharing) = axes
+    _error(error, system, result)
+    _orders(orders, result)
+    _load_map(figure, load, system, result)
+    if result.odd_pairs is None:
+        _sharing(sharing, result)
+    else:
+        _sharing_with_fault(sharing, system, result, result.odd_pairs)
     figure.suptitle(_title(system))
     save(figure, path)
 
@@ -37,48 +53,27 @@ def plot_front(
     front: Sequence[Optimum],
     path: Path,
 ) -> None:
-    """The front, and transmission error and load over the flank before and after."""
-    figure, axes = pyplot.subplots(2, 2, figsize=(11, 7.6), layout="constrained")
-    ripple = [one.ripple * 1e6 for one in front]
-    axes[0, 0].plot(
-        ripple,
-        [one.line_load * 1e-3 for one in front],
-        "o-",
-        color=SOUND,
-        label="front",
-    )
-    for one, marker, colour, name in (
-        (before, "s", GREY, "before"),
-        (chosen, "D", COLOURS[1], "chosen"),
-    ):
-        axes[0, 0].plot(
-            one.ripple * 1e6, one.line_load * 1e-3, marker, color=colour, label=name
-        )
-    axes[0, 0].set(
-        title="Worst of all cases",
-        xlabel="transmission error, peak to peak, um",
-        ylabel="largest line load, N/mm",
-    )
-    axes[0, 0].legend()
-    for place, one, colour, name in (
-        (0, before, GREY, "before"),
-        (1, chosen, COLOURS[1], "chosen"),
-    ):
-        changed = replace(system, modification=one.modification)
+    """Draw the front, and transmission error and load over the flank before and after."""
+    figure, axes = panels(2, 2, 11, 7.6)
+    worst, error = axes[0]
+    line_loads = [optimum.line_load * 1e-3 for optimum in front]
+    ripples = [optimum.ripple * 1e6 for optimum in front]
+    curve(worst, ripples, line_loads, SOUND, "front", style="o-")
+    states = ((before, "s", GREY, "before"), (chosen, "D", FAULTY, "chosen"))
+    for panel, (optimum, marker, color, name) in zip(axes[1], states, strict=True):
+        ripple, line_load = optimum.ripple * 1e6, optimum.line_load * 1e-3
+        worst.plot(ripple, line_load, marker, color=color, label=name)
+        changed = replace(system, modification=optimum.modification)
         result = changed.transmission_error()
-        phase = np.arange(2 * len(result.error)) / len(result.error)
-        axes[0, 1].plot(
-            phase,
-            np.tile(result.error - result.error.mean(), 2) * 1e6,
-            color=colour,
-            label=name,
-        )
-        _load_map(figure, axes[1, place], changed, result)
-        axes[1, place].set_title(f"Load over the flank, {name}")
-    axes[0, 1].set(
-        title="Transmission error less its mean", xlabel="mesh periods", ylabel="um"
-    )
-    axes[0, 1].legend()
+        deviation = (result.error - result.error.mean()) * 1e6
+        curve(error, *_twice(deviation), color, name)
+        _load_map(figure, panel, changed, result)
+        panel.set_title(f"Load over the flank, {name}")
+    abscissa = "transmission error, peak to peak, um"
+    titles(worst, "Worst of all cases", abscissa, "largest line load, N/mm")
+    worst.legend()
+    titles(error, "Transmission error less its mean", MESH_PERIODS, "um")
+    error.legend()
     figure.suptitle(_title(system))
     save(figure, path)
 
@@ -93,172 +88,132 @@ def plot_sliced_stiffness(
     sound: TransmissionError,
     faulty: Array | None = None,
 ) -> None:
-    """Stiffness of one pair along its way, faulty too, and of the mesh over two periods or all
-    that see a fault.
+    """Draw the stiffness of one tooth pair and of the mesh, sound and faulty.
 
-    ``sound`` is the mesh without the fault, drawn beside it.
+    ``sound`` is the mesh without the fault.
     """
-    figure, axes = pyplot.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
-    axes[0].plot(
-        position / system.pair.base_pitch, single / 1e9, color=SOUND, label="sound"
-    )
-    if faulty is not None:
-        axes[0].plot(
-            position / system.pair.base_pitch,
-            faulty / 1e9,
-            color=COLOURS[1],
-            label="faulty",
-        )
-        axes[0].legend()
-    axes[0].set(
-        title="One pair, slices on the path",
-        xlabel="position of the first slice, base pitches",
-        ylabel="stiffness, 10$^9$ N/m",
-    )
-    stiffness = result.contact.stiffness
-    if faulty is not None:
+    figure, axes = panels(1, 2, 11, 4.2)
+    pair, mesh = axes[0]
+    pitches = position / system.pair.base_pitch
+    stiffness = result.contact.stiffness / 1e9
+    curve(pair, pitches, single / 1e9, SOUND, "sound")
+    if faulty is None:
+        curve(mesh, *_over_periods(system, result, stiffness), SOUND, "sound")
+    else:
+        curve(pair, pitches, faulty / 1e9, FAULTY, "faulty")
+        pair.legend()
         without = np.resize(sound.contact.stiffness, stiffness.shape) / 1e9
-        axes[1].plot(
-            *_over_periods(system, result, without),
-            color=GREY,
-            linewidth=0.8,
-            label="sound",
-        )
-    colour, label = (SOUND, "sound") if faulty is None else (COLOURS[1], "faulty")
-    axes[1].plot(
-        *_over_periods(system, result, stiffness / 1e9), color=colour, label=label
-    )
-    if faulty is not None:
-        axes[1].legend()
-    axes[1].set(title="Mesh", xlabel="mesh periods", ylabel="stiffness, 10$^9$ N/m")
+        periods = _over_periods(system, result, without)
+        curve(mesh, *periods, GREY, "sound", width=0.8)
+        curve(mesh, *_over_periods(system, result, stiffness), FAULTY, "faulty")
+        mesh.legend()
+    titles(pair, "One pair, slices on the path", FIRST_SLICE, STIFFNESS)
+    titles(mesh, "Mesh", MESH_PERIODS, STIFFNESS)
     figure.suptitle(_title(system))
     save(figure, path)
 
 
 def _title(system: SlicedPair) -> str:
     pair = system.pair
+    helix = abs(np.degrees(pair.pinion.helix_angle))
     return (
-        f"{pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth, helix {abs(np.degrees(pair.pinion.helix_angle)):g} deg, "
-        f"contact ratio {pair.transverse_contact_ratio:.3f} + {pair.overlap_ratio:.3f}, {system.torque:g} N m, "
-        f"slices {system.slices.slice_coupling}"
+        f"{pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth, helix {helix:g} deg, "
+        f"contact ratio {pair.transverse_contact_ratio:.3f} + {pair.overlap_ratio:.3f}, "
+        f"{system.torque:g} N m, slices {system.slices.slice_coupling}"
     )
+
+
+def _twice(values: Array) -> tuple[Array, Array]:
+    """Mesh periods and values of one period, drawn twice."""
+    return np.arange(2 * len(values)) / len(values), np.tile(values, 2)
 
 
 def _over_periods(
     system: SlicedPair, result: TransmissionError, values: Array
 ) -> tuple[Array, Array]:
-    """Mesh periods of roll and values: one period twice, or all that see a fault."""
+    """Mesh periods of roll and values: one period twice, or all periods that see a fault."""
     if result.n_periods > 1:
         return result.contact.roll / system.pair.base_pitch, values
-    return np.arange(2 * len(values)) / len(values), np.tile(values, 2)
+    return _twice(values)
 
 
 def _error(axes: Any, system: SlicedPair, result: TransmissionError) -> None:
-    axes.plot(*_over_periods(system, result, result.error * 1e6), color=SOUND)
-    axes.set(
-        title=f"Transmission error, {np.ptp(result.error) * 1e6:.3g} um from peak to peak",
-        xlabel="mesh periods",
-        ylabel="approach along the line of action, um",
-    )
+    curve(axes, *_over_periods(system, result, result.error * 1e6), SOUND)
+    ripple = np.ptp(result.error) * 1e6
+    title = f"Transmission error, {ripple:.3g} um from peak to peak"
+    titles(axes, title, MESH_PERIODS, "approach along the line of action, um")
     axes.ticklabel_format(axis="y", useOffset=False)
 
 
 def _orders(axes: Any, result: TransmissionError) -> None:
     order = np.arange(1, len(result.harmonics) + 1)
     axes.bar(order, result.harmonics * 1e6, color=SOUND)
-    axes.set(
-        title="Its mesh orders",
-        xlabel="order of the mesh frequency",
-        ylabel="amplitude, um",
-    )
+    titles(axes, "Its mesh orders", "order of the mesh frequency", "amplitude, um")
 
 
 def _load_map(
     figure: Any, axes: Any, system: SlicedPair, result: TransmissionError
 ) -> None:
-    """Largest load of every place of the flank over the period, as a pair passes it."""
+    """Largest load of every point of the flank over the period, as a pair passes it."""
     pitch, contact = system.pair.base_pitch, result.contact
-    low, high = -0.15, system.pair.transverse_contact_ratio + 0.15
-    edges = np.linspace(low, high, 121)
+    end = system.pair.transverse_contact_ratio
+    edges = np.linspace(-0.15, end + 0.15, 121)
     grid = np.zeros((len(edges) - 1, len(result.slice_place)))
     row = np.searchsorted(edges, contact.position / pitch) - 1
     column = np.broadcast_to(np.arange(grid.shape[1]), row.shape)
     inside = (row >= 0) & (row < len(grid))
+    title = "Load over the flank (dotted: ends of the path of contact)"
     if result.odd_pairs is not None:
-        inside &= (
-            (contact.pair_index >= result.odd_pairs[0])
-            & (contact.pair_index <= result.odd_pairs[1])
-        )[..., None]
+        first, last = result.odd_pairs
+        is_odd = (contact.pair_index >= first) & (contact.pair_index <= last)
+        inside &= is_odd[..., None]
+        title = "Load over the faulty flanks"
     np.maximum.at(grid, (row[inside], column[inside]), contact.line_load[inside] * 1e-3)
-    image = axes.pcolormesh(
-        result.slice_edges * 1e3,
-        edges,
-        np.where(grid > 0.0, grid, np.nan),
-        cmap="cividis",
-        vmin=0.0,
-    )
-    for end in (0.0, system.pair.transverse_contact_ratio):
-        axes.axhline(end, color=GREY, linestyle=":")
-    whose = (
-        "the flank (dotted: ends of the path of contact)"
-        if result.odd_pairs is None
-        else "the faulty flanks"
-    )
-    axes.set(
-        title=f"Load over {whose}",
-        xlabel="place across the face from the end that enters first, mm",
-        ylabel="contact position, base pitches",
-    )
+    loaded = np.where(grid > 0.0, grid, np.nan)
+    across = result.slice_edges * 1e3
+    image = axes.pcolormesh(across, edges, loaded, cmap="cividis", vmin=0.0)
+    for limit in (0.0, end):
+        axes.axhline(limit, color=GREY, linestyle=":")
+    abscissa = "place across the face from the end that enters first, mm"
+    titles(axes, title, abscissa, "contact position, base pitches")
     figure.colorbar(image, ax=axes, label="N/mm")
 
 
-def _sharing(axes: Any, system: SlicedPair, result: TransmissionError) -> None:
-    """Share of one pair from its first touch to its last, put together from the pairs of one
-    period; or of all pairs while a fault is seen."""
-    if result.odd_pairs is not None:
-        _sharing_of_all(axes, system, result)
-        return
+def _sharing(axes: Any, result: TransmissionError) -> None:
+    """Load share of one pair from its first contact to its last, and of its neighbors."""
     n_phases, n_pairs = result.load_share.shape
-    place = (np.arange(n_phases) + 0.5) / n_phases + np.arange(n_pairs)[:, None]
-    share = result.load_share.T
-    axes.plot(place.ravel() - 1.0, share.ravel(), color=SOUND, label="one pair")
-    for shift, colour in zip((-1, 1), COLOURS[1:], strict=False):
-        axes.plot(
-            place.ravel() - 1.0 + shift,
-            share.ravel(),
-            ":",
-            color=colour,
-            label=f"pair {shift:+d}",
-        )
-    axes.set(
-        title="Load sharing", xlabel="roll since the first slice passed A, base pitches", ylabel="share of the load",
-        xlim=(-0.5, n_pairs - 1.0),
-    )  # fmt: skip
+    phase = (np.arange(n_phases) + 0.5) / n_phases
+    roll = (phase + np.arange(n_pairs)[:, None]).ravel() - 1.0
+    share = result.load_share.T.ravel()
+    curve(axes, roll, share, SOUND, "one pair")
+    for shift, color in zip((-1, 1), COLORS[1:], strict=False):
+        curve(axes, roll + shift, share, color, f"pair {shift:+d}", style=":")
+    abscissa = "roll since the first slice passed A, base pitches"
+    titles(axes, "Load sharing", abscissa, "share of the load")
+    axes.set_xlim(-0.5, n_pairs - 1.0)
     axes.legend()
 
 
-def _sharing_of_all(axes: Any, system: SlicedPair, result: TransmissionError) -> None:
-    assert result.odd_pairs is not None
-    roll, index = (
-        result.contact.roll / system.pair.base_pitch,
-        result.contact.pair_index,
-    )
-    first, last = result.odd_pairs
+def _sharing_with_fault(
+    axes: Any, system: SlicedPair, result: TransmissionError, odd_pairs: tuple[int, int]
+) -> None:
+    """Load shares of all pairs over the periods that see a fault."""
+    roll = result.contact.roll / system.pair.base_pitch
+    index = result.contact.pair_index
+    first, last = odd_pairs
+    labels = {first: "pair of faulty teeth", first - 1: "sound pairs"}
     for pair in range(index.min(), index.max() + 1):
         share = np.where(index == pair, result.load_share, 0.0).sum(axis=1)
-        followed = (index == pair).any(axis=1) & (share > 0.0)
+        in_contact = (index == pair).any(axis=1) & (share > 0.0)
         is_odd = first <= pair <= last
-        name = {first: "pair of faulty teeth", first - 1: "sound pairs"}.get(pair)
-        share = np.where(followed, share, np.nan)
         axes.plot(
             roll,
-            share,
-            color=COLOURS[1] if is_odd else GREY,
+            np.where(in_contact, share, np.nan),
+            color=(GREY, FAULTY)[is_odd],
             zorder=2 + is_odd,
-            label=name,
+            label=labels.get(pair),
         )
-    axes.set(
-        title="Load sharing", xlabel="mesh periods; the faulty tooth enters at 0", ylabel="share of the load",
-        xlim=(roll[0], roll[-1]), ylim=(0.0, None),
-    )  # fmt: skip
+    abscissa = "mesh periods; the faulty tooth enters at 0"
+    titles(axes, "Load sharing", abscissa, "share of the load")
+    axes.set(xlim=(roll[0], roll[-1]), ylim=(0.0, None))
     axes.legend(loc="lower left")

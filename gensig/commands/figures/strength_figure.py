@@ -9,13 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from gensig.commands.figures.machine_figures import (
+from gensig.commands.figures.style import (
     FAULTY,
     GREY,
+    SMALL,
     SOUND,
     THIRD,
-    pyplot,
+    curve,
+    panels,
     save,
+    titles,
 )
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth_profile import tooth_profile
@@ -32,63 +35,49 @@ from gensig.systems.root_strength import GearStress, RootHistory, RootStrength
 def plot_root_stress(
     system: RootStrength, gears: dict[str, GearStress], history: RootHistory, path: Path
 ) -> None:
-    """Root stress of both gears over the mesh, the load share of the pair, and the tooth of the
-    decisive gear.
-    """
-    figure, axes = pyplot.subplots(1, 2, figsize=(11, 4.8), layout="constrained")
-    _stress(axes[0], system, gears, history)
-    _tooth(axes[1], system, gears[system.decisive])
+    """Draw root stress of both gears over the mesh, and the tooth of the decisive gear."""
+    figure, axes = panels(1, 2, 11, 4.8)
+    _stress(axes[0, 0], system, gears, history)
+    _tooth(axes[0, 1], system, gears[system.decisive])
     pair = system.pair
+    helix = abs(math.degrees(pair.pinion.helix_angle))
     figure.suptitle(
-        f"{pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth, helix {abs(math.degrees(pair.pinion.helix_angle)):g} deg, "
-        f"{system.flanks.torque:.5g} N m, tangential force {system.tangential_force:.5g} N"
+        f"{pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth, helix {helix:g} deg, "
+        f"{system.flanks.torque:.5g} N m, "
+        f"tangential force {system.tangential_force:.5g} N"
     )
     save(figure, path)
 
 
 def _stress(
-    axis: Any, system: RootStrength, gears: dict[str, GearStress], history: RootHistory
+    axes: Any, system: RootStrength, gears: dict[str, GearStress], history: RootHistory
 ) -> None:
+    """Stress of both gears, that of ISO 6336-3, and the load share of the pair."""
     roll = np.degrees(history.roll / system.pair.pinion.base_radius)
-    for (name, values), colour in zip(
+    highest = 0.0
+    for (name, values), color in zip(
         history.stress.items(), (SOUND, FAULTY), strict=True
     ):
-        axis.plot(roll, values * 1e-6, color=colour, label=f"{name}, through the mesh")
-        axis.axhline(
-            gears[name].stress * 1e-6,
-            color=colour,
-            linestyle="--",
-            linewidth=1.0,
-            label=f"{name}, ISO 6336-3",
-        )
-    axis.set(
-        title="Root stress of one tooth pair",
-        xlabel="roll of the pinion since contact begins, deg",
-        ylabel="MPa",
-    )
-    highest = max(
-        max(values.max() for values in history.stress.values()),
-        max(one.stress for one in gears.values()),
-    )
-    axis.set_ylim(0.0, 1.45e-6 * highest)  # room for the legend
-    share = axis.twinx()
-    share.plot(
-        roll, history.share, color=GREY, linestyle=":", label="load share of the pair"
-    )
+        iso = gears[name].stress * 1e-6
+        curve(axes, roll, values * 1e-6, color, f"{name}, through the mesh")
+        look = {"color": color, "linestyle": "--", "linewidth": 1.0}
+        axes.axhline(iso, label=f"{name}, ISO 6336-3", **look)
+        highest = max(highest, values.max(), gears[name].stress)
+    abscissa = "roll of the pinion since contact begins, deg"
+    titles(axes, "Root stress of one tooth pair", abscissa, "MPa")
+    axes.set_ylim(0.0, 1.45e-6 * highest)  # room for the legend
+    share = axes.twinx()
+    label = "load share of the pair"
+    curve(share, roll, history.share, GREY, label, style=":")
     share.set(ylabel="share of the load", ylim=(0.0, 1.45))
-    lines = [line for side in (axis, share) for line in side.get_lines()]
-    axis.legend(
-        lines,
-        [line.get_label() for line in lines],
-        loc="upper center",
-        ncols=2,
-        fontsize=8,
-    )
+    lines = [*axes.get_lines(), *share.get_lines()]
+    axes.legend(handles=lines, loc="upper center", ncols=2, fontsize=SMALL)
 
 
-def _tooth(axis: Any, system: RootStrength, found: GearStress) -> None:
-    """Outline in the normal section with the 30 degree tangents, mm from the centreline and above
-    the root circle.
+def _tooth(axes: Any, system: RootStrength, found: GearStress) -> None:
+    """Outline in the normal section with the 30 degree tangents, the load and its lever arm.
+
+    Millimetres from the centerline and above the root circle.
     """
     real = system.pair.gears[system.decisive]
     virtual, section = virtual_gear(real), root_section(real)
@@ -96,57 +85,44 @@ def _tooth(axis: Any, system: RootStrength, found: GearStress) -> None:
     outline = tooth_profile(_spur(real))
     scale = outline.abscissa[0] - floor  # the drawn tooth has a whole number of teeth
     y, x = (outline.abscissa - scale - floor) * 1e3, outline.half_thickness * 1e3
-    for side in (-1.0, 1.0):
-        axis.plot(side * x, y, color="black", linewidth=1.5)
     half, height = 0.5e3 * section.thickness, (section.height - floor) * 1e3
-    axis.plot(
-        [-half, half],
-        [height, height],
-        color=FAULTY,
-        label=f"critical section, {2.0 * half:.3g} mm",
-    )
     reach = half / math.tan(TANGENT)
-    for side in (-1.0, 1.0):
-        axis.plot(
-            [side * half * 1.25, 0.0], [height - 0.25 * reach, height + reach], color=THIRD, linewidth=1.0,
-            label="tangents at 30 deg" if side > 0.0 else None,
-        )  # fmt: skip
-    at_tip = system.strength.load_point == "tip"
-    pitch = math.pi * real.normal_module * math.cos(real.pressure_angle)
-    loading = root_loading(
-        real,
-        0.0 if at_tip else pitch * (normal_contact_ratio(system.pair) - 1.0),
-        allow_extrapolation=True,
-    )
-    top, slope = (
-        height + float(loading.lever_arm[0]) * 1e3,
-        math.tan(float(loading.load_angle[0])),
-    )
-    axis.annotate(
-        "", xy=(0.0, top), xytext=(1.6 * half, top + 1.6 * half * slope),
+    for side, label in ((-1.0, None), (1.0, "tangents at 30 deg")):
+        curve(axes, side * x, y, "black", width=1.5)
+        tangent = [height - 0.25 * reach, height + reach]
+        curve(axes, [side * half * 1.25, 0.0], tangent, THIRD, label, width=1.0)
+    label = f"critical section, {2.0 * half:.3g} mm"
+    curve(axes, [-half, half], [height, height], FAULTY, label)
+    load_height = 0.0
+    if system.strength.load_point != "tip":
+        pitch = math.pi * real.normal_module * math.cos(real.pressure_angle)
+        load_height = pitch * (normal_contact_ratio(system.pair) - 1.0)
+    loading = root_loading(real, load_height, allow_extrapolation=True)
+    top = height + float(loading.lever_arm[0]) * 1e3
+    slope = math.tan(float(loading.load_angle[0]))
+    axes.annotate(
+        "",
+        xy=(0.0, top),
+        xytext=(1.6 * half, top + 1.6 * half * slope),
         arrowprops={"arrowstyle": "->", "color": SOUND, "linewidth": 1.8},
-    )  # fmt: skip
-    axis.plot(
-        [0.0, 0.0],
-        [height, top],
-        color=GREY,
-        linestyle="--",
-        label=f"lever arm, {top - height:.3g} mm",
     )
-    axis.set(
-        title=f"Tooth of the {system.decisive}: Y_F {found.factors.form_factor:.3f}, Y_S "
-        f"{found.factors.stress_correction_factor:.3f}\nsafety {found.safety.paper:.2f} (paper), "
-        f"{found.safety.iso:.2f} (ISO 6336-3)",
-        xlabel="mm", ylabel="mm above the root", aspect="equal",
-    )  # fmt: skip
-    axis.legend(loc="lower center", fontsize=8)
+    label = f"lever arm, {top - height:.3g} mm"
+    curve(axes, [0.0, 0.0], [height, top], GREY, label, style="--")
+    factors, safety = found.factors, found.safety
+    title = (
+        f"Tooth of the {system.decisive}: Y_F {factors.form_factor:.3f}, "
+        f"Y_S {factors.stress_correction_factor:.3f}\n"
+        f"safety {safety.paper:.2f} (paper), {safety.iso:.2f} (ISO 6336-3)"
+    )
+    titles(axes, title, "mm", "mm above the root", aspect="equal")
+    axes.legend(loc="lower center", fontsize=SMALL)
 
 
 def _spur(gear: Gear) -> Gear:
-    """The spur gear with, to the nearest whole number of teeth, the tooth form of the normal
-    section.
+    """The spur gear with the tooth form of the normal section.
+
+    Its number of teeth is the nearest whole one.
     """
     n_teeth = round(virtual_gear(gear).n_teeth)
-    return replace(
-        gear, n_teeth=n_teeth, helix_angle=0.0, bore_radius=0.1 * gear.normal_module
-    )
+    bore = 0.1 * gear.normal_module
+    return replace(gear, n_teeth=n_teeth, helix_angle=0.0, bore_radius=bore)

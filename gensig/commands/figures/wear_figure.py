@@ -1,7 +1,4 @@
-"""Figure of a wear life.
-
-Sliding and pressure, wear along both flanks, curvature, and the way to the end.
-"""
+"""Figure of a wear life: sliding, pressure, wear along both flanks, curvature, history."""
 
 from __future__ import annotations
 
@@ -13,14 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.commands.figures.machine_figures import (
-    COLOURS,
+from gensig.commands.figures.style import (
+    COLORS,
     FAULTY,
     GREY,
     SOUND,
     THIRD,
-    pyplot,
+    curve,
+    panels,
     save,
+    titles,
 )
 from gensig.life.life_laws import LifeMap
 from gensig.life.options import SIDES
@@ -28,7 +27,8 @@ from gensig.life.wear.wear_life import WearLife
 
 Array = NDArray[np.float64]
 
-TALLEST = 1.6  # times the largest radius of new flanks; flatter and hollow places are left out
+TALLEST = 1.6  # times the largest radius of new flanks; flatter and hollow points are left out
+POSITION = "place on the path of contact from A, mm (dotted: pitch point)"
 ENDED_BY = {
     "depth": "",
     "transmission_error": ", limit of the transmission error",
@@ -44,155 +44,112 @@ def plot_wear_life(
     lives: LifeMap | None,
     path: Path,
 ) -> None:
-    """Six panels.
-
-    The last is the map of lives where there is one, else the greatest depths over time.
-    """
-    figure, axes = pyplot.subplots(2, 3, figsize=(15, 8), layout="constrained")
-    place = np.array(content["position_mm"])
-    _sliding(axes[0, 0], place, content)
-    _pressure(axes[0, 1], place, content)
-    _per_mesh(axes[0, 2], place, content)
-    _depth(axes[1, 0], place, life)
-    _radii(axes[1, 1], place, content)
+    """Draw six panels; the last is the map of lives where there is one, else the history."""
+    figure, axes = panels(2, 3, 15, 8)
+    position = np.array(content["position_mm"])
+    sliding, pressure, per_mesh, depth, radii, last = axes.flat
+    _sliding(sliding, position, content)
+    _pressure(pressure, position, content)
+    _per_mesh(per_mesh, position, content)
+    _depth(depth, position, life)
+    _radii(radii, position, content)
     if lives is None:
-        _history(axes[1, 2], content)
+        _history(last, content)
     else:
-        _map(figure, axes[1, 2], lives, content)
-    pitch = life.case.pair.pitch_point * 1e3
-    for axis in axes.ravel()[:5]:
-        axis.axvline(pitch, color=GREY, linewidth=0.6, linestyle=":")
-        axis.set_xlabel("place on the path of contact from A, mm (dotted: pitch point)")
+        _map(figure, last, lives, content)
     pair = life.case.pair
+    for panel in axes.flat[:5]:
+        panel.axvline(pair.pitch_point * 1e3, color=GREY, linewidth=0.6, linestyle=":")
+        panel.set_xlabel(POSITION)
     figure.suptitle(
-        f"{pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth, {life.case.torque:g} N m, {content['speed_rpm']:g} r/min: "
-        f"{content['life_hours']:.4g} h to {content['threshold_um']:.4g} um{ENDED_BY[content['ended_by']]} (rule "
-        f"{content['rule']}, sharing {content['sharing']}, geometry {content['geometry']})"
+        f"{pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth, {life.case.torque:g} N m, "
+        f"{content['speed_rpm']:g} r/min: {content['life_hours']:.4g} h "
+        f"to {content['threshold_um']:.4g} um{ENDED_BY[content['ended_by']]} "
+        f"(rule {content['rule']}, sharing {content['sharing']}, "
+        f"geometry {content['geometry']})"
     )
     save(figure, path)
 
 
-def _sliding(axes: Any, place: Array, content: Mapping[str, Any]) -> None:
-    axes.plot(place, content["sliding_velocity_mm_per_s"], color=SOUND)
+def _sliding(axes: Any, position: Array, content: Mapping[str, Any]) -> None:
+    curve(axes, position, content["sliding_velocity_mm_per_s"], SOUND)
     axes.axhline(0.0, color=GREY, linewidth=0.6)
     axes.set(title="Sliding, wheel's speed less pinion's", ylabel="mm/s")
 
 
-def _pressure(axes: Any, place: Array, content: Mapping[str, Any]) -> None:
-    axes.plot(place, content["contact_pressure_mpa"], color=SOUND, label="new flanks")
-    axes.plot(
-        place,
-        content["contact_pressure_at_end_mpa"],
-        "--",
-        color=FAULTY,
-        label="at the end of the life",
-    )
+def _pressure(axes: Any, position: Array, content: Mapping[str, Any]) -> None:
+    curve(axes, position, content["contact_pressure_mpa"], SOUND, "new flanks")
+    worn, label = content["contact_pressure_at_end_mpa"], "at the end of the life"
+    curve(axes, position, worn, FAULTY, label, style="--")
     axes.set(title="Largest contact pressure", ylabel="MPa")
     axes.set_ylim(bottom=0.0)
     axes.legend()
 
 
-def _per_mesh(axes: Any, place: Array, content: Mapping[str, Any]) -> None:
-    for name, colour in zip(SIDES, COLOURS, strict=False):
-        axes.plot(place, content[f"{name}_wear_per_mesh_nm"], color=colour, label=name)
+def _per_mesh(axes: Any, position: Array, content: Mapping[str, Any]) -> None:
+    for name, color in zip(SIDES, COLORS, strict=False):
+        curve(axes, position, content[f"{name}_wear_per_mesh_nm"], color, name)
     axes.set(title="Wear of a mesh, new flanks", ylabel="nm")
     axes.legend()
 
 
-def _depth(axes: Any, place: Array, life: WearLife) -> None:
+def _depth(axes: Any, position: Array, life: WearLife) -> None:
     """Both flanks at the quarters of the life; the thinner, the earlier."""
-    for side, (name, colour) in enumerate(zip(SIDES, COLOURS, strict=False)):
-        for number, snapshot in enumerate(SHOWN):
+    for side, (name, color) in enumerate(zip(SIDES, COLORS, strict=False)):
+        labels = (None, None, None, name)
+        for quarter, (snapshot, label) in enumerate(zip(SHOWN, labels, strict=True)):
             depth = life.depth[snapshot, side].max(axis=0) * 1e6
-            last = number == len(SHOWN) - 1
-            axes.plot(
-                place,
-                depth,
-                color=colour,
-                linewidth=0.5 + 0.5 * number,
-                label=name if last else None,
-            )
+            curve(axes, position, depth, color, label, width=0.5 + 0.5 * quarter)
     axes.invert_yaxis()
-    axes.set(
-        title="Worn off at each quarter of the life",
-        ylabel="depth normal to the flank, um",
-    )
+    title = "Worn off at each quarter of the life"
+    axes.set(title=title, ylabel="depth normal to the flank, um")
     axes.legend()
 
 
-def _radii(axes: Any, place: Array, content: Mapping[str, Any]) -> None:
+def _radii(axes: Any, position: Array, content: Mapping[str, Any]) -> None:
     highest = 0.0
-    for name, colour in zip(SIDES, COLOURS, strict=False):
-        new = np.array(content[f"{name}_curvature_radius_new_mm"])
-        worn = np.array(
-            [
-                math.nan if one is None else one
-                for one in content[f"{name}_curvature_radius_worn_mm"]
-            ]
+    for name, color in zip(SIDES, COLORS, strict=False):
+        new, worn, by_paper = (
+            np.array(content[f"{name}_curvature_radius_{state}_mm"], dtype=float)
+            for state in ("new", "worn", "by_eq_22")
         )
         shown = np.where((worn > 0.0) & (worn < TALLEST * new.max()), worn, np.nan)
         highest = max(highest, new.max())
-        axes.plot(place, new, color=colour, label=f"{name}, new")
-        axes.plot(place, shown, "--", color=colour, label=f"{name}, worn profile")
-        axes.plot(
-            place,
-            content[f"{name}_curvature_radius_by_eq_22_mm"],
-            ":",
-            color=THIRD,
-            label=None,
-        )
-    axes.set(
-        title="Curvature radius (green: eq. 22 of the paper)",
-        ylabel="mm",
-        ylim=(0.0, TALLEST * highest),
-    )
+        curve(axes, position, new, color, f"{name}, new")
+        curve(axes, position, shown, color, f"{name}, worn profile", style="--")
+        curve(axes, position, by_paper, THIRD, style=":")
+    title = "Curvature radius (green: eq. 22 of the paper)"
+    axes.set(title=title, ylabel="mm", ylim=(0.0, TALLEST * highest))
     axes.legend(fontsize="small")
 
 
 def _history(axes: Any, content: Mapping[str, Any]) -> None:
-    history = content["history"]
-    for name, colour in zip(SIDES, COLOURS, strict=False):
-        axes.plot(
-            history["hours"], history[f"{name}_depth_um"], color=colour, label=name
-        )
-    axes.set(title="Deepest place over time", xlabel="hours", ylabel="um")
+    history, vibration = content["history"], content.get("vibration")
+    for name, color in zip(SIDES, COLORS, strict=False):
+        curve(axes, history["hours"], history[f"{name}_depth_um"], color, name)
+    titles(axes, "Deepest place over time", "hours", "um")
     axes.legend(loc="upper left")
-    error, vibration = (
-        history["transmission_error_peak_to_peak_um"],
-        content.get("vibration"),
-    )
+    error = history["transmission_error_peak_to_peak_um"]
     if vibration is not None:
-        beside = axes.twinx()
+        second = axes.twinx()
+        hours = np.array(vibration["hours"])
         loudest = np.array(vibration["rms_m_per_s2"]).max(axis=1)
-        shown = np.array(vibration["hours"]) <= content["life_hours"] * 1.001
-        beside.plot(
-            np.array(vibration["hours"])[shown],
-            loudest[shown],
-            ":o",
-            color=GREY,
-            markersize=3,
-        )
-        beside.set_ylabel("RMS of the loudest sensor (dotted), m/s2")
-        beside.set_ylim(bottom=0.0)
-    elif error[0] is not None:
-        beside = axes.twinx()
-        beside.plot(history["hours"], error, ":", color=GREY)
-        beside.set_ylabel("transmission error, peak to peak (dotted), um")
-        beside.set_ylim(bottom=0.0)
+        shown = hours <= content["life_hours"] * 1.001
+        second.plot(hours[shown], loudest[shown], ":o", color=GREY, markersize=3)
+        second.set_ylabel("RMS of the loudest sensor (dotted), m/s2")
+        second.set_ylim(bottom=0.0)
+    elif math.isfinite(error[0]):
+        second = axes.twinx()
+        curve(second, history["hours"], error, GREY, style=":")
+        second.set_ylabel("transmission error, peak to peak (dotted), um")
+        second.set_ylim(bottom=0.0)
 
 
 def _map(figure: Any, axes: Any, lives: LifeMap, content: Mapping[str, Any]) -> None:
-    rpm = lives.speed * 30.0 / math.pi
-    image = axes.contourf(
-        rpm, lives.torque, np.log10(lives.hours), levels=14, cmap="cividis"
-    )
-    axes.plot(
-        content["speed_rpm"], content["torque_nm"], "o", color=FAULTY, clip_on=False
-    )
-    axes.set(
-        title="Life",
-        xlabel="speed of the pinion, r/min",
-        ylabel="torque of the pinion, N m",
-    )
-    axes.set(xscale="log", yscale="log")
+    rpm, hours = lives.speed * 30.0 / math.pi, np.log10(lives.hours)
+    image = axes.contourf(rpm, lives.torque, hours, levels=14, cmap="cividis")
+    point = content["speed_rpm"], content["torque_nm"]
+    axes.plot(*point, "o", color=FAULTY, clip_on=False)
+    speed, torque = "speed of the pinion, r/min", "torque of the pinion, N m"
+    titles(axes, "Life", speed, torque, xscale="log", yscale="log")
     figure.colorbar(image, ax=axes, label="log$_{10}$ of the hours")

@@ -1,12 +1,11 @@
-"""What ``gensig stiffness`` tells of hot gears: temperatures, and stiffness effect by effect."""
+"""Hot gears in ``gensig stiffness``: temperatures, and stiffness effect by effect."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
+from gensig.mesh.thermal.body_heat import BodyHeat
 from gensig.options.configuration import Configuration
 from gensig.systems.hot_pair import (
     APPARENT,
@@ -34,7 +33,7 @@ NAMES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class HeatReport:
-    """A pair at work, how hot it is and how stiff."""
+    """Temperatures of a pair at work, and its stiffness with each effect of heat."""
 
     duty: Duty
     state: HotState
@@ -50,85 +49,81 @@ def heat_report(config: Configuration) -> HeatReport | None:
     return HeatReport(duty=duty, state=state, variants=stiffness_variants(duty, state))
 
 
+def _bodies(state: HotState) -> dict[str, BodyHeat]:
+    return {"pinion": state.pinion, "wheel": state.wheel}
+
+
 def heat_content(report: HeatReport) -> dict[str, Any]:
     """The key ``heat`` of ``gensig stiffness --json``."""
     duty, state, pair = report.duty, report.state, report.duty.system.pair
-    pinion_strain, wheel_strain = state.growth.pitch_strains(pair)
-    housing = duty.heat.expansion * (
-        duty.heat.housing_temperature - duty.heat.reference_temperature
-    )
+    heat, growth = duty.heat, state.growth
+    pinion_strain, wheel_strain = growth.pitch_strains(pair)
+    difference = (pinion_strain - wheel_strain) * pair.base_pitch
+    housing = heat.expansion * (heat.housing_temperature - heat.reference_temperature)
     return {
         "friction_heat_w": state.friction_heat,
         "bulk": {
             name: {
-                "radius_mm": (body.radius * 1e3).tolist(),
-                "temperature_degc": body.temperature.tolist(),
+                "radius_mm": body.radius * 1e3,
+                "temperature_degc": body.temperature,
                 "tooth_temperature_degc": body.tooth,
                 "heat_w": body.input,
                 "heat_to_oil_w": body.to_oil,
                 "heat_to_bore_w": body.to_bore,
             }
-            for name, body in (("pinion", state.pinion), ("wheel", state.wheel))
+            for name, body in _bodies(state).items()
         },
-        "flash_contact_position": (state.flash_position / pair.base_pitch).tolist(),
-        "flash_temperature_k": state.flash.tolist(),
+        "flash_contact_position": state.flash_position / pair.base_pitch,
+        "flash_temperature_k": state.flash,
         "flash_skin_growth_um": flash_skin_growth(duty, state) * 1e6,
-        "base_pitch_difference_um": (pinion_strain - wheel_strain)
-        * pair.base_pitch
-        * 1e6,
-        "backlash_taken_um": state.growth.closing(pair, housing) * 1e6,
-        "tooth_growth_um": state.growth.teeth_alone(pair) * 1e6,
+        "base_pitch_difference_um": difference * 1e6,
+        "backlash_taken_um": growth.closing(pair, housing) * 1e6,
+        "tooth_growth_um": growth.teeth_alone(pair) * 1e6,
         "variants": {
-            name: _variant_content(variant) for name, variant in report.variants.items()
+            name: {
+                "transverse_contact_ratio": variant.transverse_contact_ratio,
+                "mesh_stiffness_mean_n_per_m": variant.mesh.mean(),
+                "mesh_stiffness_n_per_m": variant.mesh,
+                "approach_mean_um": variant.approach.mean() * 1e6,
+                "contact_position": variant.position,
+                "single_pair_stiffness_n_per_m": variant.single,
+                "single_pair_highest_n_per_m": variant.single.max(),
+            }
+            for name, variant in report.variants.items()
         },
-    }
-
-
-def _variant_content(variant: Variant) -> dict[str, Any]:
-    return {
-        "transverse_contact_ratio": variant.transverse_contact_ratio,
-        "mesh_stiffness_mean_n_per_m": float(variant.mesh.mean()),
-        "mesh_stiffness_n_per_m": variant.mesh.tolist(),
-        "approach_mean_um": float(variant.approach.mean()) * 1e6,
-        "contact_position": variant.position.tolist(),
-        "single_pair_stiffness_n_per_m": variant.single.tolist(),
-        "single_pair_highest_n_per_m": float(variant.single.max()),
     }
 
 
 def print_heat(report: HeatReport) -> None:
-    """The summary on the terminal."""
-    state = report.state
+    """Print friction heat, temperatures, and stiffness effect by effect."""
+    state, variants = report.state, report.variants
     print(f"friction heat              {state.friction_heat / 1e3:.3f} kW")
-    for name, body in (("pinion", state.pinion), ("wheel", state.wheel)):
-        print(
-            f"{name + ', bore to teeth':<27}{body.temperature[0]:.1f} .. {body.tooth:.1f} degrees Celsius"
-        )
-    print(
-        f"flash temperature          up to {state.flash.max():.1f} K above the teeth's"
-    )
-    cold = report.variants[COLD]
+    for name, body in _bodies(state).items():
+        temperatures = f"{body.temperature[0]:.1f} .. {body.tooth:.1f}"
+        print(f"{name + ', bore to teeth':<27}{temperatures} degrees Celsius")
+    flash = state.flash.max()
+    print(f"flash temperature          up to {flash:.1f} K above the teeth's")
+    cold = variants[COLD]
     print(f"{'':<27}{'contact ratio':>13}{'mesh, mean':>18}{'single, highest':>28}")
     for key, name in NAMES.items():
-        if key in report.variants:
-            print(f"{name:<27}{_variant_line(report.variants[key], cold)}")
-    thermal = state.growth.teeth_alone(report.duty.system.pair)
-    if APPARENT in report.variants:
-        print(
-            f"{'':<27}apparent: force over the approach less {thermal * 1e6:.1f} um of tooth growth; no stiffness"
-        )
+        if key in variants:
+            print(f"{name:<27}{_variant_line(variants[key], cold)}")
+    growth = f"{state.growth.teeth_alone(report.duty.system.pair) * 1e6:.1f} um"
+    if APPARENT in variants:
+        text = f"force over the approach less {growth} of tooth growth; no stiffness"
+        print(f"{'':<27}apparent: {text}")
     elif report.duty.heat.growth:
-        print(f"{NAMES[APPARENT]:<27}none: teeth grow {thermal * 1e6:.1f} um, more than the approach of "
-              f"{cold.approach.mean() * 1e6:.1f} um")  # fmt: skip
+        approach = cold.approach.mean() * 1e6
+        text = f"teeth grow {growth}, more than the approach of {approach:.1f} um"
+        print(f"{NAMES[APPARENT]:<27}none: {text}")
 
 
 def _variant_line(variant: Variant, cold: Variant) -> str:
-    mesh, single = float(variant.mesh.mean()), float(np.max(variant.single))
-    changes = [
-        100.0 * (value / float(of) - 1.0)
-        for value, of in ((mesh, cold.mesh.mean()), (single, cold.single.max()))
-    ]
+    mesh, single = variant.mesh.mean(), variant.single.max()
+    mesh_change = 100.0 * (mesh / cold.mesh.mean() - 1.0)
+    single_change = 100.0 * (single / cold.single.max() - 1.0)
     return (
-        f"{variant.transverse_contact_ratio:>13.4f}{mesh:>14.4e} N/m {changes[0]:>+8.2f} %"
-        f"{single:>14.4e} N/m {changes[1]:>+8.2f} %"
+        f"{variant.transverse_contact_ratio:>13.4f}"
+        f"{mesh:>14.4e} N/m {mesh_change:>+8.2f} %"
+        f"{single:>14.4e} N/m {single_change:>+8.2f} %"
     )

@@ -1,18 +1,15 @@
-"""``gensig modify-flank``.
-
-The modifications of a pair that are best for a range of torques and misalignments.
-"""
+"""``gensig modify-flank``: the best modifications for a range of torques and misalignments."""
 
 from __future__ import annotations
 
-import sys
 from argparse import Namespace
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from gensig.commands.console import one_line_warnings
+from gensig.commands.console import one_line_warnings, step
+from gensig.commands.figures.flank_figures import plot_front
 from gensig.commands.gears.flanks import sound_pair
 from gensig.commands.output import (
     check_outputs,
@@ -28,15 +25,15 @@ from gensig.systems.sliced_pair import SlicedPair
 from gensig.units import from_si
 
 GROUP = "modification"
+DIGITS = {"um": 3, "mm": 4}  # of the keys that are written: 1 nm and 0.1 um
 
 
 def modify_flank(arguments: Namespace) -> int:
-    """Search, print the front, write the chosen modification as an option of the group
-    ``modification``.
-    """
+    """Search the front, print it, and write the chosen modification as an option."""
     if arguments.points < 1:
         raise ConfigError(
-            f"--points {arguments.points}: give 1 for the least ripple alone, 3 or more for a front"
+            f"--points {arguments.points}: give 1 for the least ripple alone, "
+            "3 or more for a front"
         )
     check_outputs(arguments)
     target = option_file(arguments.out, GROUP, force=arguments.force)
@@ -44,71 +41,69 @@ def modify_flank(arguments: Namespace) -> int:
     with one_line_warnings("gensig"):
         system = sound_pair(config)
         given = system.modification.misalignment
+        misalignments = (given + value * 1e-6 for value in arguments.misalignments)
         cases = Cases(
             torques=tuple(arguments.torques or (system.torque,)),
-            misalignments=tuple(
-                given + value * 1e-6 for value in arguments.misalignments
-            ),
+            misalignments=tuple(misalignments),
         )
-        plain = replace(system.modification, misalignment=0.0)
-        before = judge(system, plain, cases)
+        aligned = replace(system.modification, misalignment=0.0)
+        before = judge(system, aligned, cases)
         front = optimise(
-            system, cases, n_front=arguments.points, seed=arguments.seed, on_done=_say
+            system,
+            cases,
+            n_front=arguments.points,
+            seed=arguments.seed,
+            on_done=lambda done, total: step(f"{done} of {total} points"),
         )
-    chosen = _chosen(front, before)
+    chosen = _knee(front, before)
     content = {
         "before": _content(before),
         "chosen": _content(chosen),
-        "front": [_content(one) for one in front],
+        "front": [_content(optimum) for optimum in front],
     }
 
     def draw(path: Path) -> None:
-        from gensig.commands.figures.flank_figures import plot_front
-
         plot_front(system, before, chosen, front, path)
 
     write_outputs(arguments, content, draw)
     print(f"{'':<12}{'peak to peak':>14}{'line load':>16}   worst of {_cases(cases)}")
-    for name, one in (
-        ("before", before),
-        *((("chosen" if one is chosen else "front"), one) for one in front),
-    ):
-        print(
-            f"{name:<12}{one.ripple * 1e6:>11.4f} um{one.line_load * 1e-3:>11.2f} N/mm"
-        )
+    _print("before", before)
+    for optimum in front:
+        _print(("front", "chosen")[optimum is chosen], optimum)
     write_option(target, option_text(chosen, system, cases))
     return 0
 
 
-def _say(done: int, total: int) -> None:
-    print(f"{done} of {total} points", file=sys.stderr, flush=True)
+def _print(name: str, optimum: Optimum) -> None:
+    ripple, line_load = optimum.ripple * 1e6, optimum.line_load * 1e-3
+    print(f"{name:<12}{ripple:>11.4f} um{line_load:>11.2f} N/mm")
 
 
-def _chosen(front: Sequence[Optimum], before: Optimum) -> Optimum:
-    """The point nearest to none of both, each counted by its value before.
+def _knee(front: Sequence[Optimum], before: Optimum) -> Optimum:
+    """The point of the front nearest to the origin, both axes over their values before."""
 
-    The knee of the front.
-    """
-    return min(
-        front,
-        key=lambda one: (
-            (one.ripple / before.ripple) ** 2 + (one.line_load / before.line_load) ** 2
-        ),
-    )
+    def distance(optimum: Optimum) -> float:
+        ripple = optimum.ripple / before.ripple
+        line_load = optimum.line_load / before.line_load
+        return ripple**2 + line_load**2
+
+    return min(front, key=distance)
 
 
 def _cases(cases: Cases) -> str:
     torques = ", ".join(f"{value:g}" for value in cases.torques)
-    askew = ", ".join(f"{value * 1e6:g}" for value in cases.misalignments)
-    return f"{torques} N m with misalignments of {askew} um"
+    misalignments = ", ".join(f"{value * 1e6:g}" for value in cases.misalignments)
+    return f"{torques} N m with misalignments of {misalignments} um"
 
 
 def option_text(optimum: Optimum, system: SlicedPair, cases: Cases) -> str:
     """The modification as YAML that the group ``modification`` takes."""
     pair = system.pair
+    teeth = f"{pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth"
+    ripple, line_load = optimum.ripple * 1e6, optimum.line_load * 1e-3
     lines = [
-        f"# Found by gensig modify-flank for {pair.pinion.n_teeth}/{pair.wheel.n_teeth} teeth, {_cases(cases)}:",
-        f"# {optimum.ripple * 1e6:.4f} um from peak to peak and {optimum.line_load * 1e-3:.2f} N/mm at the worst.",
+        f"# Found by gensig modify-flank for {teeth}, {_cases(cases)}:",
+        f"# {ripple:.4f} um from peak to peak and {line_load:.2f} N/mm at the worst.",
         "misalignment_um: 0",
     ]
     for name, keys in _keys(optimum.modification).items():
@@ -117,19 +112,17 @@ def option_text(optimum: Optimum, system: SlicedPair, cases: Cases) -> str:
 
 
 def _keys(modification: PairModification) -> dict[str, dict[str, Any]]:
-    """Boundary keys of both gears; rounded to 1 nm and 0.1 um."""
-    sides = {}
-    for name, side in (("pinion", modification.pinion), ("wheel", modification.wheel)):
-        values: dict[str, Any] = {}
+    """Boundary keys of both gears, rounded as they are written."""
+    sides: dict[str, dict[str, Any]] = {}
+    for name in ("pinion", "wheel"):
+        side, values = getattr(modification, name), {}
         for field in fields(FlankModification):
-            suffix = field.metadata.get("unit")
-            key = field.name if suffix is None else f"{field.name}_{suffix}"
-            value = getattr(side, field.name)
-            values[key] = (
-                value
-                if suffix is None
-                else round(from_si(key, value), {"um": 3, "mm": 4}[suffix])
-            )
+            unit, value = field.metadata.get("unit"), getattr(side, field.name)
+            if unit is None:
+                values[field.name] = value
+            else:
+                key = f"{field.name}_{unit}"
+                values[key] = round(from_si(key, value), DIGITS[unit])
         sides[name] = values
     return sides
 

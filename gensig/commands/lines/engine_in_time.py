@@ -1,7 +1,4 @@
-"""What ``gensig forced-response`` finds with teeth free to part.
-
-An operating point, a sweep, root stress.
-"""
+"""Results of ``gensig forced-response`` with teeth free to part: point, sweep, root stress."""
 
 from __future__ import annotations
 
@@ -10,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gensig.commands.lines.results import MPA, RPM, strength_content
 from gensig.driveline.cycle_statistics import (
     fluctuations,
     order_amplitudes,
@@ -56,14 +54,14 @@ def simulate_sweep(
     torque: float,
     n_orders: int,
 ) -> Sweep:
-    """A run-up and a run-down in time; the teeth's tables are those of the middle speed."""
+    """A run-up and a run-down in time; the tables of teeth are those of the middle speed."""
     low, high = (to_si("speed_rpm", value) for value in given[:2])
     seconds = given[2]
     if not (0.0 < low < high < np.inf and 0.0 < seconds <= LONGEST_TIME):
         text = " ".join(f"{value:g}" for value in given)
         raise ConfigError(
-            f"--sweep {text}: give low and high speed in r/min and the seconds from one to the other, at most "
-            f"{LONGEST_TIME:g}"
+            f"--sweep {text}: give low and high speed in r/min "
+            f"and the seconds from one to the other, at most {LONGEST_TIME:g}"
         )
     own = own_meshes(line, config, 0.5 * (low + high), torque)
     return sweep_response(
@@ -77,18 +75,17 @@ def without_dampers(config: Configuration) -> EngineLine:
 
 
 def time_content(response: TimeResponse) -> dict[str, Any]:
-    """What ``--time`` adds; typical is the median over the cycles."""
-    rpm = from_si("speed_rpm", 1.0)
-    least, greatest = typical_extremes(response.mesh_force, response.crank_angle)
+    """JSON keys of ``--time``; typical is the median over the cycles."""
+    crank = response.crank_angle
+    least, greatest = typical_extremes(response.mesh_force, crank)
+    by_cycle = fluctuations(response.speed, crank)
+    angle = order_amplitudes(response.angle, crank, TIME_ORDERS)
     return {
-        "time_speed_fluctuation_rpm": rpm * response.fluctuation,
-        "time_typical_fluctuation_rpm": rpm
-        * np.median(fluctuations(response.speed, response.crank_angle), axis=1),
-        "time_mean_cycle_fluctuation_rpm": rpm * response.cycle_fluctuation,
+        "time_speed_fluctuation_rpm": RPM * response.fluctuation,
+        "time_typical_fluctuation_rpm": RPM * np.median(by_cycle, axis=1),
+        "time_mean_cycle_fluctuation_rpm": RPM * response.cycle_fluctuation,
         "time_orders": 0.5 * np.arange(1, TIME_ORDERS + 1),
-        "time_angle_deg": np.degrees(
-            order_amplitudes(response.angle, response.crank_angle, TIME_ORDERS)
-        ),
+        "time_angle_deg": np.degrees(angle),
         "time_contact_loss_fraction": response.contact_loss,
         "time_back_contact_fraction": response.back_contact,
         "time_least_tooth_force_n": response.least_force,
@@ -100,9 +97,9 @@ def time_content(response: TimeResponse) -> dict[str, Any]:
 
 
 def sweep_content(sweep: Sweep) -> dict[str, Any]:
-    """What ``--sweep`` adds."""
-    speeds = from_si("speed_rpm", 1.0) * sweep.up.speeds
-    difference, apart = sweep.difference, sweep.told_apart
+    """JSON keys of ``--sweep``."""
+    speeds = RPM * sweep.up.speeds
+    difference = sweep.difference
     most = np.abs(difference).argmax(axis=1)
     return {
         "sweep_seconds_each_way": sweep.seconds,
@@ -111,7 +108,7 @@ def sweep_content(sweep: Sweep) -> dict[str, Any]:
         "sweep_up": _way_content(sweep.up),
         "sweep_down": _way_content(sweep.down),
         "sweep_up_less_down": difference,
-        "sweep_told_apart": apart.tolist(),
+        "sweep_told_apart": sweep.told_apart,
         "sweep_largest_difference": difference[np.arange(len(most)), most],
         "sweep_largest_difference_at_rpm": speeds[most],
         "sweep_energy_residual": sweep.energy_residual,
@@ -119,12 +116,11 @@ def sweep_content(sweep: Sweep) -> dict[str, Any]:
 
 
 def _way_content(way: SweepWay) -> dict[str, Any]:
-    rpm = from_si("speed_rpm", 1.0)
     return {
-        "speed_fluctuation_rpm": (rpm * way.fluctuation).tolist(),
-        "standard_error_rpm": (rpm * way.scatter).tolist(),
-        "angle_deg": np.degrees(way.angle).tolist(),
-        "typical_greatest_tooth_force_n": way.greatest_force.tolist(),
+        "speed_fluctuation_rpm": RPM * way.fluctuation,
+        "standard_error_rpm": RPM * way.scatter,
+        "angle_deg": np.degrees(way.angle),
+        "typical_greatest_tooth_force_n": way.greatest_force,
     }
 
 
@@ -133,102 +129,85 @@ def root_content(
 ) -> dict[str, Any]:
     """Root stress of the decisive gear of a mesh under one dynamic load."""
     name = root.strength.decisive
-    gear, passes = root.gears[name], root.passes[name]
-    in_cycle = passes_of_a_cycle(line, mesh)
+    passes, safety = root.passes[name], root.gears[name].safety
+    largest = typical_largest(passes, passes_of_a_cycle(line, mesh))
     return {
-        "decisive_gear": name,
+        **strength_content(root),
         "greatest_tooth_force_n": root.strength.flanks.mesh_force,
-        "iso_root_stress_mpa": from_si("stress_mpa", gear.stress),
-        "largest_root_stress_mpa": from_si(
-            "stress_mpa", typical_largest(passes, in_cycle)
-        ),
-        "roll_angle_deg": np.degrees(
-            root.history.roll / root.strength.pair.pinion.base_radius
-        ).tolist(),
-        "root_stress_mpa": (
-            from_si("stress_mpa", 1.0) * passes[int(passes.max(axis=1).argmax())]
-        ).tolist(),
-        "largest_root_stress_of_passes_mpa": (
-            from_si("stress_mpa", 1.0) * passes.max(axis=1)
-        ).tolist(),
-        "safety_factor_paper": gear.safety.paper,
-        "reliability_paper": reliability(gear.safety.paper),
-        "safety_factor_iso": gear.safety.iso,
-        "reliability_iso": reliability(gear.safety.iso),
+        "largest_root_stress_mpa": from_si("stress_mpa", largest),
+        "largest_root_stress_of_passes_mpa": MPA * passes.max(axis=1),
+        "reliability_iso": reliability(safety.iso),
     }
 
 
 def print_in_time(content: Mapping[str, Any]) -> None:
-    """A summary of ``--time``."""
-    print(
-        f"in time, teeth free to part (energy residual {content['time_energy_residual']:.1g}):"
-    )
-    kinds = (
-        "typical_fluctuation_rpm",
-        "speed_fluctuation_rpm",
-        "mean_cycle_fluctuation_rpm",
-    )
+    """Print the summary of ``--time``."""
+    residual = content["time_energy_residual"]
+    print(f"in time, teeth free to part (energy residual {residual:.1g}):")
     nodes = zip(
         content["shown_nodes"],
-        *(content[f"time_{kind}"] for kind in kinds),
+        content["time_typical_fluctuation_rpm"],
+        content["time_speed_fluctuation_rpm"],
+        content["time_mean_cycle_fluctuation_rpm"],
         strict=True,
     )
     for node, typical, whole, cycle in nodes:
         print(
-            f"  node {node:>3} +- {typical:.2f} r/min in a cycle, {whole:.2f} in all, {cycle:.2f} of the mean cycle"
+            f"  node {node:>3} +- {typical:.2f} r/min in a cycle, {whole:.2f} in all, "
+            f"{cycle:.2f} of the mean cycle"
         )
-    ends = ("typical_least", "typical_greatest", "least", "greatest")
-    keys = (
-        *(f"{end}_tooth_force_n" for end in ends),
-        "contact_loss_fraction",
-        "back_contact_fraction",
+    meshes = zip(
+        content["meshes"],
+        content["time_typical_least_tooth_force_n"],
+        content["time_typical_greatest_tooth_force_n"],
+        content["time_least_tooth_force_n"],
+        content["time_greatest_tooth_force_n"],
+        content["time_contact_loss_fraction"],
+        content["time_back_contact_fraction"],
+        strict=True,
     )
-    rows = zip(
-        content["meshes"], *(content[f"time_{key}"] for key in keys), strict=True
-    )
-    for name, least, greatest, low, high, apart, back in rows:
+    for name, least, greatest, low, high, apart, back in meshes:
         print(
-            f"  mesh {name:>6} {least:7.0f} .. {greatest:.0f} N in a cycle, {low:.0f} .. {high:.0f} in all, "
+            f"  mesh {name:>6} {least:7.0f} .. {greatest:.0f} N in a cycle, "
+            f"{low:.0f} .. {high:.0f} in all, "
             f"apart {apart:.1%}, on the back flanks {back:.1%}"
         )
 
 
 def print_roots(content: Mapping[str, Any]) -> None:
-    """A summary of ``--mesh``."""
-    roots = content["root_stress"]
-    print(
-        f"root stress of mesh {content['root_stress_mesh']}, {roots['linear']['decisive_gear']}:"
-    )
+    """Print the summary of ``--mesh``."""
+    roots, mesh = content["root_stress"], content["root_stress_mesh"]
+    print(f"root stress of mesh {mesh}, {roots['linear']['decisive_gear']}:")
     for name, root in roots.items():
-        change = ""
+        change, stress = "", root["iso_root_stress_mpa"]
         if name + WITHOUT in roots:
             before = roots[name + WITHOUT]["iso_root_stress_mpa"]
-            change = (
-                f", {root['iso_root_stress_mpa'] / before - 1.0:+.1%} by the dampers"
-            )
+            change = f", {stress / before - 1.0:+.1%} by the dampers"
         print(
             f"  {name.replace('_', ' '):<24} {root['greatest_tooth_force_n']:7.0f} N, "
-            f"{root['iso_root_stress_mpa']:.1f} MPa by ISO 6336-3, "
+            f"{stress:.1f} MPa by ISO 6336-3, "
             f"{root['largest_root_stress_mpa']:.1f} over the mesh{change}"
         )
+        paper, iso = root["safety_factor_paper"], root["safety_factor_iso"]
         print(
-            f"  {'':<24} safety {root['safety_factor_paper']:.3f} ({root['reliability_paper']}) by the paper, "
-            f"{root['safety_factor_iso']:.3f} ({root['reliability_iso']}) by ISO 6336-3"
+            f"  {'':<24} safety {paper:.3f} ({root['reliability_paper']}) by the paper, "
+            f"{iso:.3f} ({root['reliability_iso']}) by ISO 6336-3"
         )
-    classes = ", ".join(
-        f"{one.name} from {one.least_safety:.2f} on" for one in RELIABILITY
-    )
-    print(f"  reliability: {classes}")
+    classes = [f"{rank.name} from {rank.least_safety:.2f} on" for rank in RELIABILITY]
+    print(f"  reliability: {', '.join(classes)}")
 
 
 def print_sweep(content: Mapping[str, Any]) -> None:
-    """A summary of ``--sweep``."""
-    speeds = content["sweep_speeds_rpm"]
-    print(
-        f"sweep up and down, {content['sweep_seconds_each_way']:g} s each way (energy residual "
-        f"{content['sweep_energy_residual']:.1g}):"
+    """Print the summary of ``--sweep``."""
+    n_speeds = len(content["sweep_speeds_rpm"])
+    seconds, residual = (
+        content["sweep_seconds_each_way"],
+        content["sweep_energy_residual"],
     )
-    shown = zip(
+    print(
+        f"sweep up and down, {seconds:g} s each way (energy residual {residual:.1g}):"
+    )
+    nodes = zip(
         content["shown_nodes"],
         content["sweep_up"]["speed_fluctuation_rpm"],
         content["sweep_down"]["speed_fluctuation_rpm"],
@@ -237,8 +216,9 @@ def print_sweep(content: Mapping[str, Any]) -> None:
         content["sweep_largest_difference_at_rpm"],
         strict=True,
     )
-    for node, up, down, apart, most, at in shown:
+    for node, up, down, apart, most, speed in nodes:
         print(
-            f"  node {node:>3} +- up to {max(up):.1f} r/min going up, {max(down):.1f} going down; up less down at most "
-            f"{most:+.0%}, at {at:.0f} r/min; told apart at {sum(apart)} of {len(speeds)} speeds"
+            f"  node {node:>3} +- up to {max(up):.1f} r/min going up, "
+            f"{max(down):.1f} going down; up less down at most {most:+.0%}, "
+            f"at {speed:.0f} r/min; told apart at {sum(apart)} of {n_speeds} speeds"
         )

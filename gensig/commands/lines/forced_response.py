@@ -1,17 +1,17 @@
-"""The verb forced-response.
-
-What an engine's torques do to its drive line, steadily, at one speed and over a run.
-"""
+"""``gensig forced-response``: vibration of a drive line under its engine or motor."""
 
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from gensig.commands.figures.engine_figures import plot_response
 from gensig.commands.lines.engine_in_time import (
     print_in_time,
     print_roots,
@@ -23,7 +23,7 @@ from gensig.commands.lines.engine_in_time import (
     time_content,
     without_dampers,
 )
-from gensig.commands.lines.results import ResponseResult
+from gensig.commands.lines.results import RPM, ResponseResult, spaced, speed_steps
 from gensig.commands.output import check_outputs, plain, write_outputs
 from gensig.commands.request import read_configuration
 from gensig.driveline.engine_dampers import (
@@ -48,33 +48,29 @@ from gensig.options.configuration import Configuration
 from gensig.units import from_si, to_si
 
 CYCLE_POINTS = 5760
-MOST_SPEEDS = 2000
 RUN_ORDERS = 80  # half orders of a run: up to order 40
 
 
 def forced_response(arguments: Namespace) -> int:
-    """Speed fluctuation, spectra and tooth forces: JSON, a figure, or a summary."""
+    """Write speed fluctuation, spectra and tooth forces as JSON and figure; print a summary."""
     check_outputs(arguments)
     config = read_configuration(arguments)
     line = read_engine_line(config)
-    found = _find(line, arguments, config["seed"])
-    if (arguments.time, arguments.sweep) != (
-        None,
-        None,
-    ) and line.engine.pressure_decides_torque:
+    found = _steady(line, arguments, config.seed)
+    in_time = arguments.time is not None or arguments.sweep is not None
+    if in_time and line.engine.pressure_decides_torque:
         raise ConfigError(
             "excitation.pressure.file decides the torque; leave --time and --sweep out"
         )
     if arguments.time is not None:
-        found = replace(
-            found,
-            in_time=simulate_time(
-                line, config, found.torques, found.nodes, arguments.time
-            ),
+        response = simulate_time(
+            line, config, found.torques, found.nodes, arguments.time
         )
+        found = replace(found, in_time=response)
     if arguments.mesh is not None:
-        found = replace(found, mesh=mesh_between(line, arguments.mesh))
-        found = replace(found, roots=_roots(line, config, found, arguments.time))
+        mesh = mesh_between(line, arguments.mesh)
+        roots = _roots(line, config, found, mesh, arguments.time)
+        found = replace(found, mesh=mesh, roots=roots)
     if arguments.sweep is not None:
         sweep = simulate_sweep(
             line, config, found.nodes, arguments.sweep, arguments.run_torque, RUN_ORDERS
@@ -83,8 +79,6 @@ def forced_response(arguments: Namespace) -> int:
     content = response_content(line, found)
 
     def draw(path: Path) -> None:
-        from gensig.commands.figures.engine_figures import plot_response
-
         plot_response(line, found, path)
 
     write_outputs(arguments, content, draw)
@@ -96,47 +90,43 @@ def response_content(line: EngineLine, found: ResponseResult) -> dict[str, Any]:
     """The keys of ``gensig forced-response --json``."""
     response, torques = found.response, found.torques
     numbers = line.drive.numbers
-    places = [numbers.index(node) for node in found.nodes]
+    shown = [numbers.index(node) for node in found.nodes]
     linear, meshes = line.linear()
     mean, amplitudes = response.element_forces(meshes)
     forces = mean[:, None] + over_cycle(amplitudes, CYCLE_POINTS)
+    rpm = from_si("speed_rpm", response.speed)
     content: dict[str, Any] = {
-        "speed_rpm": from_si("speed_rpm", response.speed),
+        "speed_rpm": rpm,
         "torque_nm": torques.brake_torque,
-        "node_numbers": list(numbers),
+        "node_numbers": numbers,
         "nodes": [node.name for node in line.drive.line.nodes],
-        "mean_speed_rpm": [
-            line.ratios[number] * from_si("speed_rpm", response.speed)
-            for number in numbers
-        ],
-        "speed_fluctuation_rpm": from_si("speed_rpm", 1.0)
-        * response.fluctuation()[: len(numbers)],
+        "mean_speed_rpm": [line.ratios[number] * rpm for number in numbers],
+        "speed_fluctuation_rpm": RPM * response.fluctuation()[: len(numbers)],
         "toothed_wheel_fluctuation_rpm": {
             name: from_si("speed_rpm", value) for name, value in found.seen.items()
         },
         "orders": response.orders,
-        "shown_nodes": list(found.nodes),
-        "angle_deg": np.degrees(np.abs(response.angle[places])),
-        "meshes": list(line.mesh_names),
+        "shown_nodes": found.nodes,
+        "angle_deg": np.degrees(np.abs(response.angle[shown])),
+        "meshes": line.mesh_names,
         "mean_tooth_force_n": mean,
         "least_tooth_force_n": forces.min(axis=1),
         "greatest_tooth_force_n": forces.max(axis=1),
     }
     if isinstance(torques, EngineTorques):
+        peak = from_si("pressure_mpa", float(torques.pressure.max()))
         content["indicated_torque_nm"] = torques.indicated_torque
-        content["peak_pressure_mpa"] = from_si(
-            "pressure_mpa", float(torques.pressure.max())
-        )
-    if isinstance(torques, EngineTorques) and torques.disturbance_torque:
-        place = numbers.index(torques.disturbance_node)
-        moved = disturbance_response(
-            linear,
-            place,
-            torques.disturbance_torque,
-            2.0 * np.pi * torques.disturbance_frequency,
-        )
-        content["disturbance_frequency_hz"] = torques.disturbance_frequency
-        content["disturbance_angle_deg"] = np.degrees(np.abs(moved[places]))
+        content["peak_pressure_mpa"] = peak
+        if torques.disturbance_torque:
+            hz = torques.disturbance_frequency
+            moved = disturbance_response(
+                linear,
+                numbers.index(torques.disturbance_node),
+                torques.disturbance_torque,
+                2.0 * np.pi * hz,
+            )
+            content["disturbance_frequency_hz"] = hz
+            content["disturbance_angle_deg"] = np.degrees(np.abs(moved[shown]))
     if found.in_time is not None:
         content |= time_content(found.in_time)
     if found.sweep is not None:
@@ -148,11 +138,11 @@ def response_content(line: EngineLine, found: ResponseResult) -> dict[str, Any]:
             for name, root in found.roots.items()
         }
     if found.run:
-        content["run_speeds_rpm"] = from_si("speed_rpm", 1.0) * found.run[0].speeds
+        content["run_speeds_rpm"] = RPM * found.run[0].speeds
         content["run_speed_fluctuation_rpm"] = [
-            from_si("speed_rpm", 1.0) * one.fluctuation for one in found.run
+            RPM * run.fluctuation for run in found.run
         ]
-        content["run_angle_deg"] = [np.degrees(one.angle) for one in found.run]
+        content["run_angle_deg"] = [np.degrees(run.angle) for run in found.run]
     return {key: plain(value) for key, value in content.items()}
 
 
@@ -160,92 +150,36 @@ def _roots(
     line: EngineLine,
     config: Configuration,
     found: ResponseResult,
+    mesh: int,
     duration: float | None,
 ) -> dict[str, DynamicRootStress]:
-    """Root stress of the mesh asked for, without the dampers too where there are any."""
-    mesh = found.mesh
-    assert mesh is not None
+    """Root stress of a mesh, and without the dampers too where there are any."""
     strength = read_mesh_strength(config, line, mesh)
-    roots = {
-        "linear": dynamic_root_stress(
-            strength, line, mesh, tooth_load(line, mesh, found.response)
-        )
-    }
+    load = tooth_load(line, mesh, found.response)
+    roots = {"linear": dynamic_root_stress(strength, line, mesh, load)}
     if found.in_time is not None:
         roots["in_time"] = root_stress_in_time(strength, line, mesh, found.in_time)
     if not config["system"]["dampers"]:
         return roots
     bare, torques = without_dampers(config), found.torques
-    response = bare.response(torques.speed, torques.brake_torque)
-    roots["linear_without_dampers"] = dynamic_root_stress(
-        strength, bare, mesh, tooth_load(bare, mesh, response)
-    )
+    load = tooth_load(bare, mesh, bare.response(torques.speed, torques.brake_torque))
+    stress = dynamic_root_stress(strength, bare, mesh, load)
+    roots["linear_without_dampers"] = stress
     if duration is not None:
         undamped = simulate_time(bare, config, torques, found.nodes, duration)
-        roots["in_time_without_dampers"] = root_stress_in_time(
-            strength, bare, mesh, undamped
-        )
+        stress = root_stress_in_time(strength, bare, mesh, undamped)
+        roots["in_time_without_dampers"] = stress
     return roots
 
 
-def _find(line: EngineLine, arguments: Namespace, seed: int) -> ResponseResult:
-    reference, ratios = line.engine.reference, line.ratios
-    speed = (
-        reference.speed
-        if arguments.speed is None
-        else to_si("speed_rpm", arguments.speed)
-    )
-    measured = line.engine.pressure_decides_torque
-    torque = (
-        None
-        if measured
-        else reference.torque
-        if arguments.torque is None
-        else arguments.torque
-    )
-    if measured and (arguments.torque is not None or arguments.run is not None):
-        raise ConfigError(
-            "excitation.pressure.file decides the torque; leave --torque and --run out"
-        )
-    measured_nodes = tuple(wheel.node for wheel in line.wheels.values())
-    nodes = tuple(
-        arguments.nodes
-        or measured_nodes
-        or (line.engine.driving_nodes[0], line.engine.load_node)
-    )
-    for node in nodes:
-        if node not in ratios:
-            raise ConfigError(
-                f"--nodes {node}: the shaft line has no such node; it has {min(ratios)} to {max(ratios)}"
-            )
+def _steady(line: EngineLine, arguments: Namespace, seed: int) -> ResponseResult:
+    """Steady vibration at the operating point, and the run of speeds that is asked for."""
+    speed, torque = _operating_point(line, arguments)
+    nodes = _shown_nodes(line, arguments.nodes)
     torques = line.torques(speed, torque)
-    linear, _ = line.linear()
-    places = [line.drive.numbers.index(node) for node in nodes]
-    run: list[Waterfall] = []
+    run: Sequence[Waterfall] = ()
     if arguments.run is not None:
-        if isinstance(line.engine, MotorDrive) and line.engine.ripple is None:
-            raise ConfigError(
-                "--run: a line whose meshes never part turns evenly without excitation.motor.torque_ripple; give one, "
-                "or take --sweep"
-            )
-        low, high, step = (to_si("speed_rpm", value) for value in arguments.run)
-        if not (0.0 < low < high and step > 0.0 and (high - low) / step < MOST_SPEEDS):
-            given = " ".join(f"{value:g}" for value in arguments.run)
-            raise ConfigError(
-                f"--run {given}: give low, high and step in r/min, fewer than {MOST_SPEEDS} speeds"
-            )
-        speeds = np.arange(low, high + 0.5 * step, step)
-        run = run_of_speeds(
-            linear,
-            lambda one: line.on_line(
-                line.torques(
-                    one, line.load_at(arguments.run_torque, one / reference.speed)
-                )
-            ),
-            speeds,
-            places,
-            n_orders=RUN_ORDERS,
-        )
+        run = _run(line, nodes, arguments.run, arguments.run_torque)
     response, rng = line.response(speed, torque), np.random.default_rng(seed)
     seen = {
         name: 0.5 * float(np.ptp(line.seen_by(wheel, response, rng)))
@@ -256,36 +190,94 @@ def _find(line: EngineLine, arguments: Namespace, seed: int) -> ResponseResult:
     )
 
 
+def _operating_point(
+    line: EngineLine, arguments: Namespace
+) -> tuple[float, float | None]:
+    """Speed in rad/s and brake torque; no torque where a measured pressure decides it."""
+    reference = line.engine.reference
+    speed, torque = reference.speed, reference.torque
+    if arguments.speed is not None:
+        speed = to_si("speed_rpm", arguments.speed)
+    if not line.engine.pressure_decides_torque:
+        if arguments.torque is not None:
+            torque = arguments.torque
+        return speed, torque
+    if arguments.torque is not None or arguments.run is not None:
+        raise ConfigError(
+            "excitation.pressure.file decides the torque; leave --torque and --run out"
+        )
+    return speed, None
+
+
+def _shown_nodes(line: EngineLine, given: Sequence[int] | None) -> tuple[int, ...]:
+    """The nodes that are asked for, else those with toothed wheels, else both ends."""
+    with_wheels = [wheel.node for wheel in line.wheels.values()]
+    ends = (line.engine.driving_nodes[0], line.engine.load_node)
+    nodes = tuple(given or with_wheels or ends)
+    for node in nodes:
+        if node not in line.ratios:
+            first, last = min(line.ratios), max(line.ratios)
+            raise ConfigError(
+                f"--nodes {node}: the shaft line has no such node; it has {first} to {last}"
+            )
+    return nodes
+
+
+def _run(
+    line: EngineLine, nodes: Sequence[int], given: Sequence[float], run_torque: float
+) -> list[Waterfall]:
+    """Waterfalls of the nodes over a run of speeds."""
+    if isinstance(line.engine, MotorDrive) and line.engine.ripple is None:
+        raise ConfigError(
+            "--run: a line whose meshes never part turns evenly without "
+            "excitation.motor.torque_ripple; give one, or take --sweep"
+        )
+    low, high, step = (to_si("speed_rpm", value) for value in speed_steps(given))
+    linear, _ = line.linear()
+    indices = [line.drive.numbers.index(node) for node in nodes]
+
+    def torques_at(speed: float) -> NDArray[np.float64]:
+        load = line.load_at(run_torque, speed / line.engine.reference.speed)
+        return line.on_line(line.torques(speed, load))
+
+    speeds = spaced(low, high, step)
+    return run_of_speeds(linear, torques_at, speeds, indices, n_orders=RUN_ORDERS)
+
+
 def _print(content: dict[str, Any]) -> None:
+    point = f"{content['speed_rpm']:g} r/min, {content['torque_nm']:.6g} N m"
     if "indicated_torque_nm" in content:
+        indicated, peak = content["indicated_torque_nm"], content["peak_pressure_mpa"]
         print(
-            f"{content['speed_rpm']:g} r/min, {content['torque_nm']:.6g} N m at the crank, "
-            f"{content['indicated_torque_nm']:.5g} N m indicated, peak {content['peak_pressure_mpa']:.4g} MPa"
+            f"{point} at the crank, {indicated:.5g} N m indicated, peak {peak:.4g} MPa"
         )
     else:
-        print(
-            f"{content['speed_rpm']:g} r/min, {content['torque_nm']:.6g} N m of the load at the motor"
-        )
-    by_number = dict(
-        zip(content["node_numbers"], range(len(content["nodes"])), strict=True)
+        print(f"{point} of the load at the motor")
+    nodes = zip(
+        content["node_numbers"],
+        content["nodes"],
+        content["mean_speed_rpm"],
+        content["speed_fluctuation_rpm"],
+        strict=True,
     )
-    for node in content["shown_nodes"]:
-        place = by_number[node]
-        print(
-            f"  node {node:>3} {content['nodes'][place]:<34} {content['mean_speed_rpm'][place]:8.1f} r/min "
-            f"+- {content['speed_fluctuation_rpm'][place]:.2f}"
-        )
+    rows = {number: row for number, *row in nodes}
+    for number in content["shown_nodes"]:
+        name, mean, half = rows[number]
+        print(f"  node {number:>3} {name:<34} {mean:8.1f} r/min +- {half:.2f}")
     for name, value in content["toothed_wheel_fluctuation_rpm"].items():
         print(f"  toothed wheel {name} shows +- {value:.2f} r/min")
-    for name, low, mean, high in zip(
+    forces = zip(
         content["meshes"],
         content["least_tooth_force_n"],
         content["mean_tooth_force_n"],
         content["greatest_tooth_force_n"],
         strict=True,
-    ):
-        parts = " (would part)" if min(low * mean, high * mean) < 0.0 else ""
-        print(f"  mesh {name:>6} {low:9.0f} .. {high:.0f} N, mean {mean:.0f} N{parts}")
+    )
+    for name, low, mean, high in forces:
+        line = f"  mesh {name:>6} {low:9.0f} .. {high:.0f} N, mean {mean:.0f} N"
+        if min(low * mean, high * mean) < 0.0:
+            line += " (would part)"
+        print(line)
     if "time_energy_residual" in content:
         print_in_time(content)
     if "root_stress" in content:

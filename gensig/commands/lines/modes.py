@@ -1,4 +1,4 @@
-"""The verb modes: natural modes of a single pair or of a drive line."""
+"""``gensig modes``: natural modes of a single pair or of a drive line."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from gensig.commands.figures.mode_figures import plot_modes
 from gensig.commands.output import check_outputs, write_outputs
 from gensig.commands.request import read_configuration
 from gensig.driveline.drive_line import DriveLine, drive_line_of_pair, read_drive_line
@@ -19,13 +20,12 @@ from gensig.options.configuration import Configuration
 from gensig.systems.registry import LINE, read_system
 
 SHOWN = 12  # modes in the summary
+MOST_MOTIONS = 3  # of a mode in the summary
+LEAST_SHARE = 0.05  # of the kinetic energy of a motion in the summary
 
 
 def modes(arguments: Namespace) -> int:
-    """Natural frequencies, damping ratios, shapes and energy shares.
-
-    JSON, a figure, or a summary.
-    """
+    """Write frequencies, damping, shapes and energy shares as JSON and figure, and print them."""
     check_outputs(arguments)
     config = read_configuration(arguments)
     line = read_line(config)
@@ -33,23 +33,20 @@ def modes(arguments: Namespace) -> int:
     content = modes_content(line, found)
 
     def draw(path: Path) -> None:
-        from gensig.commands.figures.mode_figures import plot_modes
-
         plot_modes(line, found, path)
 
     write_outputs(arguments, content, draw)
+    _print_sizes(line, content)
     _print_modes(line, found, content)
     return 0
 
 
 def read_line(config: Configuration) -> DriveLine:
-    """The drive line of a configuration.
-
-    A single pair is one of two nodes, or more with a motor and a load.
-    """
+    """The drive line of a configuration; a single pair becomes one of two nodes and more."""
     if read_faults(config["fault"]):
         raise ConfigError(
-            f"fault={config['fault']['kind']}: modes are those of sound teeth at mean stiffness; take fault=healthy"
+            f"fault={config['fault']['kind']}: modes are those of sound teeth at mean "
+            "stiffness; take fault=healthy"
         )
     kind = config.section("system").get("kind")
     if kind == LINE:
@@ -59,45 +56,36 @@ def read_line(config: Configuration) -> DriveLine:
 
 def modes_content(line: DriveLine, found: Modes) -> dict[str, Any]:
     """The keys of ``gensig modes --json``."""
-    matrices, nodes = line.matrices(), line.line.nodes
-    by_node = np.zeros((len(found.frequency), len(nodes)))
+    matrices, tables = line.matrices(), line.line
+    by_node = np.zeros((len(found.frequency), len(tables.nodes)))
     np.add.at(by_node.T, matrices.coordinate_node, found.kinetic_share.T)
-    shapes = found.shapes / np.abs(found.shapes).max(axis=1, keepdims=True)
+    gears = tables.gears
     return {
         "system": line.name,
         "lateral": line.lateral,
-        "nodes": [node.name for node in nodes],
-        "node_numbers": list(line.numbers),
-        "speed_ratio": line.line.speed_ratio.tolist(),
-        "degrees_of_freedom": list(matrices.names),
-        "meshes": mesh_names(line),
-        "mesh_stiffness_n_per_m": matrices.mesh_stiffness.tolist(),
-        "mesh_orders": list(line.mesh_orders),
+        "nodes": [node.name for node in tables.nodes],
+        "node_numbers": line.numbers,
+        "speed_ratio": tables.speed_ratio,
+        "degrees_of_freedom": matrices.names,
+        "meshes": [
+            f"{gears[mesh.driving].name} / {gears[mesh.driven].name}"
+            for mesh in tables.meshes
+        ],
+        "mesh_stiffness_n_per_m": matrices.mesh_stiffness,
+        "mesh_orders": line.mesh_orders,
         "n_rigid_modes": found.n_rigid,
-        "n_loops": line.line.n_loops,
-        "natural_frequencies_hz": found.frequency.tolist(),
-        "damping_ratio": found.damping_ratio.tolist(),
-        "shapes": shapes.tolist(),
-        "kinetic_energy_share": by_node.tolist(),
-        "mesh_strain_energy_share": found.mesh_strain_share.tolist(),
+        "n_loops": tables.n_loops,
+        "natural_frequencies_hz": found.frequency,
+        "damping_ratio": found.damping_ratio,
+        "shapes": found.shapes / np.abs(found.shapes).max(axis=1, keepdims=True),
+        "kinetic_energy_share": by_node,
+        "mesh_strain_energy_share": found.mesh_strain_share,
     }
 
 
-def mesh_names(line: DriveLine) -> list[str]:
-    """Names of the two gears of every mesh."""
-    gears = line.line.gears
-    return [
-        f"{gears[mesh.driving].name} / {gears[mesh.driven].name}"
-        for mesh in line.line.meshes
-    ]
-
-
-def _print_modes(line: DriveLine, found: Modes, content: Mapping[str, Any]) -> None:
-    """The lowest modes, each with the motions that have most of the kinetic energy, and where a
-    mesh is the spring.
-    """
-    matrices, n_nodes = line.matrices(), len(line.line.nodes)
-    n_lateral = len(matrices.coordinate_names) - n_nodes
+def _print_sizes(line: DriveLine, content: Mapping[str, Any]) -> None:
+    n_nodes = len(line.line.nodes)
+    n_lateral = len(line.matrices().coordinate_names) - n_nodes
     counts = {
         "inertias": n_nodes,
         "lateral motions of gears (y along the line of action, x across it)": n_lateral,
@@ -106,36 +94,34 @@ def _print_modes(line: DriveLine, found: Modes, content: Mapping[str, Any]) -> N
         "loops": content["n_loops"],
         "rigid mode(s)": content["n_rigid_modes"],
     }
-    print(
-        f"{content['system']}: "
-        + ", ".join(f"{count} {what}" for what, count in counts.items() if count)
-    )
-    motions = [
-        f"{name} rotation" if n_lateral and k < n_nodes else name
-        for k, name in enumerate(matrices.coordinate_names)
-    ]
+    sizes = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+    print(f"{content['system']}: {sizes}")
+
+
+def _print_modes(line: DriveLine, found: Modes, content: Mapping[str, Any]) -> None:
+    """Print the lowest modes with the motions that have most of the kinetic energy."""
+    motions, n_nodes = list(line.matrices().coordinate_names), len(line.line.nodes)
+    if len(motions) > n_nodes:
+        motions[:n_nodes] = [f"{name} rotation" for name in motions[:n_nodes]]
+    frequencies = content["natural_frequencies_hz"]
     print(f"{'mode':>4} {'Hz':>10} {'damping':>8}  kinetic energy")
-    for mode, frequency in enumerate(content["natural_frequencies_hz"][:SHOWN]):
+    for mode, frequency in enumerate(frequencies[:SHOWN]):
         share = found.kinetic_share[mode]
-        most = [
-            place
-            for place in np.argsort(-share, kind="stable")[:3]
-            if share[place] > 0.05
-        ]
-        where = ", ".join(f"{share[place]:.0%} {motions[place]}" for place in most)
+        largest = np.argsort(-share, kind="stable")[:MOST_MOTIONS]
+        text = ", ".join(
+            f"{share[index]:.0%} {motions[index]}"
+            for index in largest
+            if share[index] > LEAST_SHARE
+        )
         strain = max(content["mesh_strain_energy_share"][mode], default=0.0)
-        where += (
-            "; turns freely"
-            if frequency == 0.0
-            else f"; {strain:.0%} of the strain in a mesh"
-            if strain > 0.5
-            else ""
-        )
+        if frequency == 0.0:
+            text += "; turns freely"
+        elif strain > 0.5:
+            text += f"; {strain:.0%} of the strain in a mesh"
+        damping = content["damping_ratio"][mode]
+        print(f"{mode:>4} {frequency:>10.2f} {damping:>8.4f}  {text}")
+    n_more = len(frequencies) - SHOWN
+    if n_more > 0:
         print(
-            f"{mode:>4} {frequency:>10.2f} {content['damping_ratio'][mode]:>8.4f}  {where}"
-        )
-    if len(content["natural_frequencies_hz"]) > SHOWN:
-        last = content["natural_frequencies_hz"][-1]
-        print(
-            f"and {len(content['natural_frequencies_hz']) - SHOWN} more, up to {last:.0f} Hz; --json FILE has them all"
+            f"and {n_more} more, up to {frequencies[-1]:.0f} Hz; --json FILE has them all"
         )

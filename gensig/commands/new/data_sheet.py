@@ -1,7 +1,4 @@
-"""A pair of gears from its data sheet.
-
-What a sheet does not print is derived or assumed, and said so.
-"""
+"""A pair of gears from its data sheet: given values, and derived or assumed ones."""
 
 from __future__ import annotations
 
@@ -25,14 +22,34 @@ WIDTH_IN_MODULES = 10.0
 BORE_SHARE = 0.4  # of the pinion's pitch diameter
 DAMPING_RATIO = 0.03  # of each gear on its support
 LARGEST_ROUNDING = 0.38  # of the rack's tip, ISO 53-A
-ADDENDUM, CLEARANCE = 1.0, 0.25
-GIVEN = "given"
+PRESSURE_ANGLE, ADDENDUM, CLEARANCE = 20.0, 1.0, 0.25
 MODULES = (0.1, 50.0)  # mm
+GIVEN = "given"
+# keys of a support before it is derived
+PLANE_SUPPORT = (
+    "stiffness_x_n_per_m",
+    "stiffness_y_n_per_m",
+    "damping_x_ns_per_m",
+    "damping_y_ns_per_m",
+)
+AXIAL_SUPPORT = (
+    "stiffness_z_n_per_m",
+    "damping_z_ns_per_m",
+    "stiffness_tilt_nm_per_rad",
+    "damping_tilt_nms_per_rad",
+)
+
+
+def check_positive(flag: str, *values: float | None) -> None:
+    """Raise ConfigError for a value of a flag that is not positive and finite."""
+    for value in values:
+        if value is not None and not (value > 0.0 and math.isfinite(value)):
+            raise ConfigError(f"{flag} {value:g} must be positive")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DataSheet:
-    """What is known of a pair of gears, in the units of data sheets; pairs are of pinion and wheel.
+    """Known values of a gear pair, in the units of data sheets; pairs are of pinion and wheel.
 
     ``bores`` are diameters in mm, ``supports`` radial stiffness in N/m, speed and torque those of
     the pinion.
@@ -52,34 +69,25 @@ class DataSheet:
     supports: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        for flag, values in (
-            ("--module", (self.module,)),
-            ("--speed", (self.speed,)),
-            ("--torque", (self.torque,)),
-            ("--widths", self.widths or ()),
-            ("--bores", self.bores or ()),
-            ("--supports", self.supports or ()),
-        ):
-            if wrong := [
-                value for value in values if not (value > 0.0 and math.isfinite(value))
-            ]:
-                raise ConfigError(f"{flag} {wrong[0]:g} must be positive")
-        if not MODULES[0] <= self.module <= MODULES[1]:
+        for name in ("module", "speed", "torque"):
+            check_positive(f"--{name}", getattr(self, name))
+        for name in ("widths", "bores", "supports"):
+            check_positive(f"--{name}", *(getattr(self, name) or ()))
+        low, high = MODULES
+        if not low <= self.module <= high:
             raise ConfigError(
-                f"--module {self.module:g} must lie in {MODULES[0]:g} to {MODULES[1]:g}: it is in mm"
+                f"--module {self.module:g} must lie in {low:g} to {high:g}: it is in mm"
             )
 
     @property
     def is_helical(self) -> bool:
-        """Whether its teeth have a helix."""
+        """True when its teeth have a helix."""
         return self.helix_angle != 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearOption:
-    """The group ``gear`` of a configuration, a remark for each of its values, and the machine
-    that it makes.
-    """
+    """The group ``gear``, a remark for each value, and the machine of these values."""
 
     gear: dict[str, Any]
     remarks: dict[str, str]
@@ -93,72 +101,79 @@ class GearOption:
 
     def text(self) -> str:
         """The option as a file."""
-        system = (
-            "\n# Helical: take it with system=helical_pair gear=" + self.gear["name"]
-            if self.is_helical
-            else ""
-        )
-        head = (
-            f"# Written by gensig new gearbox. What is not given is derived or assumed, as each line says; put in what "
-            f"you know.{system}\n"
-        )
-        return head + "\n".join(option_lines(self.gear, self.remarks)) + "\n"
+        lines = [
+            "# Written by gensig new gearbox. What is not given is derived or assumed, "
+            "as each line says; put in what you know."
+        ]
+        if self.is_helical:
+            name = self.gear["name"]
+            lines.append(f"# Helical: take it with system=helical_pair gear={name}")
+        lines += option_lines(self.gear, self.remarks)
+        return "\n".join(lines) + "\n"
 
     def bearings(self) -> dict[str, str]:
-        """The bearings beside each gear."""
+        """Descriptions of the bearings beside each gear."""
         return {
             side: bearing_for(2.0 * self.gear[side]["bore_radius_mm"]).describes
             for side in SIDES
         }
 
     def derived(self) -> dict[str, float | None]:
-        """What follows from the sheet, by key with its unit; None where there is none.
+        """Values that follow from the sheet, by key with unit; None where there is none.
 
         The root stress is sigma_F0 of ISO 6336-3 of the more stressed gear, without load factors.
         """
         pair, machine = self.pair, self.machine
+        pinion, wheel = pair.pinion, pair.wheel
         speed, torque = self.gear["rated_speed_rpm"], self.gear["rated_torque_nm"]
-        ratio = pair.wheel.n_teeth / pair.pinion.n_teeth
-        force = torque / pair.pinion.pitch_radius
-        width = min(pair.pinion.face_width, pair.wheel.face_width)
-        try:
-            factors = root_factors(pair, allow_extrapolation=True).values()
-            stress = 1e-6 * force * max(one.stress_per_force for one in factors)
-        except GensigError:  # such as a contact ratio below 1, or a thin rim
-            stress = None
-        return {
+        ratio = wheel.n_teeth / pinion.n_teeth
+        force = torque / pinion.pitch_radius
+        width = min(pinion.face_width, wheel.face_width)
+        content = {
             "wheel_speed_rpm": speed / ratio,
             "wheel_torque_nm": torque * ratio,
             "power_kw": 1e-3 * to_si("speed_rpm", speed) * torque,
-            "pitch_line_speed_m_per_s": to_si("speed_rpm", speed)
-            * pair.pinion.pitch_radius,
+            "pitch_line_speed_m_per_s": to_si("speed_rpm", speed) * pinion.pitch_radius,
             "tooth_force_per_width_n_per_mm": 1e-3 * force / width,
-            "nominal_root_stress_mpa": stress,
+            "nominal_root_stress_mpa": self._root_stress(force),
             "center_distance_mm": pair.center_distance * 1e3,
             "transverse_contact_ratio": pair.transverse_contact_ratio,
-            **({"overlap_ratio": pair.overlap_ratio} if self.is_helical else {}),
-            "mesh_frequency_hz": pair.pinion.n_teeth * speed / 60.0,
+        }
+        if self.is_helical:
+            content["overlap_ratio"] = pair.overlap_ratio
+        return {
+            **content,
+            "mesh_frequency_hz": pinion.n_teeth * speed / 60.0,
             "pinion_mass_kg": machine.pinion.mass,
             "wheel_mass_kg": machine.wheel.mass,
             "pinion_inertia_kg_m2": machine.pinion.inertia,
             "wheel_inertia_kg_m2": machine.wheel.inertia,
             "backlash_um": self.gear["backlash_um"],
-            **{
-                f"{side}_bore_mm": 2.0 * self.gear[side]["bore_radius_mm"]
-                for side in SIDES
-            },
+            "pinion_bore_mm": 2.0 * self.gear["pinion"]["bore_radius_mm"],
+            "wheel_bore_mm": 2.0 * self.gear["wheel"]["bore_radius_mm"],
         }
+
+    def _root_stress(self, force: float) -> float | None:
+        """Nominal root stress, MPa; None as for a contact ratio below 1, or a thin rim."""
+        try:
+            factors = root_factors(self.pair, allow_extrapolation=True).values()
+        except GensigError:
+            return None
+        return 1e-6 * force * max(factor.stress_per_force for factor in factors)
 
 
 def gear_option(sheet: DataSheet) -> GearOption:
-    """Derive or assume what a data sheet leaves out, and check the gears.
+    """The gears of a data sheet, with what it leaves out derived or assumed, and checked.
 
     Raises
     ------
     ConfigError, GeometryError    for gears that cannot be made or cannot mesh
     """
-    pressure_angle = 20.0 if sheet.pressure_angle is None else sheet.pressure_angle
-    addendum = ADDENDUM if sheet.addendum is None else sheet.addendum
+    pressure_angle, addendum = sheet.pressure_angle, sheet.addendum
+    if pressure_angle is None:
+        pressure_angle = PRESSURE_ANGLE
+    if addendum is None:
+        addendum = ADDENDUM
     gear: dict[str, Any] = {
         "name": sheet.name,
         "rated_speed_rpm": sheet.speed,
@@ -184,26 +199,17 @@ def gear_option(sheet: DataSheet) -> GearOption:
             "bore_radius_mm": round(0.5 * bores[index], 4),
             "mass_kg": None,
             "inertia_kg_m2": None,
-            "support": _no_support(sheet.is_helical),
+            "support": dict.fromkeys(PLANE_SUPPORT, 1.0),
             "bearing": _bearing(bearings[index]),
             "shaft": {"diameter_mm": None, "span_mm": span},
         }
+        if sheet.is_helical:
+            gear[side]["support"] |= dict.fromkeys(AXIAL_SUPPORT)
     center_distance = read_pair(Configuration({"gear": gear})).center_distance * 1e3
     gear["backlash_um"] = least_backlash(center_distance, sheet.module)
-    held = read_system(_config(sheet, gear, on_bearings=sheet.supports is None))
-    for index, side in enumerate(SIDES):
-        body = getattr(held, side)
-        stiffness = body.support.stiffness_x, body.support.stiffness_y
-        if sheet.supports is not None:
-            stiffness = (sheet.supports[index],) * 2
-        for axis, value in zip("xy", stiffness, strict=True):
-            gear[side]["support"] |= {
-                f"stiffness_{axis}_n_per_m": _short(value),
-                f"damping_{axis}_ns_per_m": _short(
-                    2.0 * DAMPING_RATIO * math.sqrt(value * body.mass)
-                ),
-            }
-    machine = read_system(_config(sheet, gear, on_bearings=False))
+    for side, support in zip(SIDES, _supports(sheet, gear), strict=True):
+        gear[side]["support"] |= support
+    machine = read_system(_config(sheet, gear, supports="as_given"))
     return GearOption(
         gear=gear,
         remarks=_remarks(sheet, machine, bearings),
@@ -223,47 +229,46 @@ def least_backlash(center_distance_mm: float, module_mm: float) -> float:
 
 
 def tip_rounding(pressure_angle_deg: float, addendum: float = ADDENDUM) -> float:
-    """Rounding of the rack's tip over the module: that of ISO 53-A, or what its tip has room for
-    at other angles.
+    """Rounding of the rack's tip over the module: that of ISO 53-A, or what its tip has room for.
 
     The circle may reach neither the working flank, c / (1 - sin(alpha)), nor over the middle of
     the rack's tip, (pi / 4 - (h_a + c) tan(alpha)) cos(alpha) / (1 - sin(alpha)).
     """
     alpha = math.radians(pressure_angle_deg)
-    if not 10.0 <= pressure_angle_deg <= 35.0:  # the geometry says so
+    if not 10.0 <= pressure_angle_deg <= 35.0:  # the geometry refuses it
         return LARGEST_ROUNDING
     room = 1.0 - math.sin(alpha)
-    middle = (
-        (math.pi / 4.0 - (addendum + CLEARANCE) * math.tan(alpha))
-        * math.cos(alpha)
-        / room
-    )
-    return max(
-        0.01,
-        min(
-            LARGEST_ROUNDING, math.floor(100.1 * min(CLEARANCE / room, middle)) / 100.0
-        ),
-    )
+    half_tip = math.pi / 4.0 - (addendum + CLEARANCE) * math.tan(alpha)
+    middle = half_tip * math.cos(alpha) / room
+    largest = math.floor(100.1 * min(CLEARANCE / room, middle)) / 100.0
+    return max(0.01, min(LARGEST_ROUNDING, largest))
 
 
 def _bores(sheet: DataSheet) -> tuple[float, float]:
     """Diameters of two shafts that are twisted to the same stress, mm."""
     pinion = BORE_SHARE * sheet.module * sheet.teeth[0]
-    return round(pinion, 1), round(
-        pinion * (sheet.teeth[1] / sheet.teeth[0]) ** (1.0 / 3.0), 1
-    )
+    wheel = pinion * (sheet.teeth[1] / sheet.teeth[0]) ** (1.0 / 3.0)
+    return round(pinion, 1), round(wheel, 1)
 
 
-def _no_support(is_helical: bool) -> dict[str, float | None]:
-    keys = [f"{name}_{axis}_{unit}" for name, unit in (("stiffness", "n_per_m"), ("damping", "ns_per_m"))
-            for axis in "xy"]  # fmt: skip
-    axial = (
-        "stiffness_z_n_per_m",
-        "damping_z_ns_per_m",
-        "stiffness_tilt_nm_per_rad",
-        "damping_tilt_nms_per_rad",
-    )
-    return {**dict.fromkeys(keys, 1.0), **(dict.fromkeys(axial) if is_helical else {})}
+def _supports(sheet: DataSheet, gear: Mapping[str, Any]) -> list[dict[str, float]]:
+    """Radial stiffness and damping of both supports, as given or of bearings and shafts."""
+    origin = "bearings"
+    if sheet.supports is not None:
+        origin = "as_given"
+    held = read_system(_config(sheet, gear, supports=origin))
+    supports = []
+    for index, body in enumerate((held.pinion, held.wheel)):
+        values = {"x": body.support.stiffness_x, "y": body.support.stiffness_y}
+        if sheet.supports is not None:
+            values = dict.fromkeys("xy", sheet.supports[index])
+        support = {}
+        for axis, stiffness in values.items():
+            damping = 2.0 * DAMPING_RATIO * math.sqrt(stiffness * body.mass)
+            support[f"stiffness_{axis}_n_per_m"] = _short(stiffness)
+            support[f"damping_{axis}_ns_per_m"] = _short(damping)
+        supports.append(support)
+    return supports
 
 
 def _bearing(size: BearingSize) -> dict[str, Any]:
@@ -278,79 +283,91 @@ def _bearing(size: BearingSize) -> dict[str, Any]:
 
 
 def _config(
-    sheet: DataSheet, gear: Mapping[str, Any], *, on_bearings: bool
+    sheet: DataSheet, gear: Mapping[str, Any], *, supports: str
 ) -> Configuration:
-    config = read_request(["system=helical_pair"] if sheet.is_helical else []).config
-    config = config.with_entries(gear=gear)
-    config = config.with_keys(
-        "system", supports="bearings" if on_bearings else "as_given"
-    )
+    words = []
+    if sheet.is_helical:
+        words.append("system=helical_pair")
+    config = read_request(words).config.with_entries(gear=gear)
+    config = config.with_keys("system", supports=supports)
     config = config.with_keys(
         "operating", speed_rpm=sheet.speed, torque_nm=sheet.torque
     )
-    limits = {
-        "support_damping_ratio_low": DAMPING_RATIO,
-        "support_damping_ratio_high": DAMPING_RATIO,
-    }
-    return config.with_keys("quality", **limits)
+    return config.with_keys(
+        "quality",
+        support_damping_ratio_low=DAMPING_RATIO,
+        support_damping_ratio_high=DAMPING_RATIO,
+    )
 
 
 def _short(value: float) -> float:
     return float(f"{value:.4g}")
 
 
+def _origin(given: object, otherwise: str) -> str:
+    """The remark on a value of the sheet."""
+    if given is None:
+        return otherwise
+    return GIVEN
+
+
 def _remarks(
     sheet: DataSheet, machine: GearPairMachine, bearings: Sequence[BearingSize]
 ) -> dict[str, str]:
+    """Dotted key -> origin of its value."""
+    rack = "assumed, basic rack of ISO 53-A"
+    helix = "spur"
+    if sheet.is_helical:
+        helix = "given; of the pinion, right-handed; the wheel's is the opposite"
     remarks = {
         "rated_speed_rpm": "given; of the pinion",
         "rated_torque_nm": "given; of the pinion",
         "normal_module_mm": GIVEN,
-        "pressure_angle_deg": "assumed, basic rack of ISO 53"
-        if sheet.pressure_angle is None
-        else GIVEN,
-        "helix_angle_deg": "given; of the pinion, right-handed; the wheel's is the opposite"
-        if sheet.is_helical
-        else "spur",
-        "addendum_coefficient": "assumed, basic rack of ISO 53-A"
-        if sheet.addendum is None
-        else GIVEN,
-        "clearance_coefficient": "assumed, basic rack of ISO 53-A",
-        "cutter_tip_radius_coefficient": "assumed, basic rack of ISO 53-A, or what its tip has room for",
-        "backlash_um": "assumed, along the line of action: ISO/TR 10064-2, 2/3 (0.06 + 0.0005 a + 0.03 m) mm",
+        "pressure_angle_deg": _origin(
+            sheet.pressure_angle, "assumed, basic rack of ISO 53"
+        ),
+        "helix_angle_deg": helix,
+        "addendum_coefficient": _origin(sheet.addendum, rack),
+        "clearance_coefficient": rack,
+        "cutter_tip_radius_coefficient": f"{rack}, or what its tip has room for",
+        "backlash_um": "assumed, along the line of action: ISO/TR 10064-2, "
+        "2/3 (0.06 + 0.0005 a + 0.03 m) mm",
     }
-    for index, side in enumerate(SIDES):
-        body = getattr(machine, side)
-        held = (
-            "derived from bearing and shaft at the rated torque"
-            if sheet.supports is None
-            else GIVEN
-        )
-        bore = f"assumed: a shaft of {BORE_SHARE:g} pitch diameters of the pinion" if index == 0 else (
-            "assumed: a shaft twisted to the same stress as the pinion's"
-        )  # fmt: skip
-        own = {
+    support = _origin(
+        sheet.supports, "derived from bearing and shaft at the rated torque"
+    )
+    width = _origin(sheet.widths, f"assumed: {WIDTH_IN_MODULES:g} modules")
+    shafts = (
+        f"assumed: a shaft of {BORE_SHARE:g} pitch diameters of the pinion",
+        "assumed: a shaft twisted to the same stress as the pinion's",
+    )
+    bodies = (machine.pinion, machine.wheel)
+    for side, body, bearing, shaft in zip(SIDES, bodies, bearings, shafts, strict=True):
+        of_side = {
             "n_teeth": GIVEN,
-            "profile_shift": "assumed" if sheet.profile_shifts is None else GIVEN,
-            "face_width_mm": f"assumed: {WIDTH_IN_MODULES:g} modules"
-            if sheet.widths is None
-            else GIVEN,
-            "bore_radius_mm": bore if sheet.bores is None else GIVEN,
-            "mass_kg": f"null: of a steel disc, rho pi (r^2 - r_bore^2) b = {body.mass:.4g} kg",
+            "profile_shift": _origin(sheet.profile_shifts, "assumed"),
+            "face_width_mm": width,
+            "bore_radius_mm": _origin(sheet.bores, shaft),
+            "mass_kg": "null: of a steel disc, "
+            f"rho pi (r^2 - r_bore^2) b = {body.mass:.4g} kg",
             "inertia_kg_m2": f"null: m (r^2 + r_bore^2) / 2 = {body.inertia:.4g} kg m2",
-            "support.stiffness_x_n_per_m": f"across the line of action; {held}",
-            "support.stiffness_y_n_per_m": f"along it; {held}",
-            "support.damping_x_ns_per_m": f"assumed: a ratio of {DAMPING_RATIO:g} of the gear on its support alone",
+            "support.stiffness_x_n_per_m": f"across the line of action; {support}",
+            "support.stiffness_y_n_per_m": f"along it; {support}",
+            "support.damping_x_ns_per_m": f"assumed: a ratio of {DAMPING_RATIO:g} "
+            "of the gear on its support alone",
             "support.damping_y_ns_per_m": "assumed, as above",
-            "support.stiffness_z_n_per_m": "null: derived, docs/theory/supports.md; so are the next three",
-            "bearing.n_balls": f"assumed; {bearings[index].describes}, the largest for this bore",
+            "support.stiffness_z_n_per_m": "null: derived, docs/theory/supports.md; "
+            "so are the next three",
+            "bearing.n_balls": f"assumed; {bearing.describes}, the largest for this bore",
             "bearing.ball_diameter_mm": "assumed: 0.3 of outside diameter less bore",
             "bearing.pitch_diameter_mm": "assumed: in the middle between both",
             "bearing.inner_groove_conformity": "assumed",
             "bearing.outer_groove_conformity": "assumed",
-            "bearing.radial_clearance_um": "assumed: least of ISO 5753-1 group N, mounted and warm",
+            "bearing.radial_clearance_um": "assumed: least of ISO 5753-1 group N, "
+            "mounted and warm",
             "shaft.diameter_mm": "null: fills the bore",
-            "shaft.span_mm": "assumed: two face widths and a shaft diameter, the gear in the middle",
+            "shaft.span_mm": "assumed: two face widths and a shaft diameter, "
+            "the gear in the middle",
         }
-        remarks |= {f"{side}.{key}": text for key, text in own.items()}
+        remarks |= {f"{side}.{key}": text for key, text in of_side.items()}
     return remarks

@@ -1,7 +1,4 @@
-"""The experiment of a gearbox of one's own.
-
-A plan over its rated speed and torque, at the bearings or as measured.
-"""
+"""The experiment of a new gearbox: a plan over its rated speed and torque."""
 
 from __future__ import annotations
 
@@ -11,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from gensig.commands.new.data_sheet import GearOption
+from gensig.commands.new.data_sheet import GearOption, check_positive
 from gensig.dynamics.decimation import usable_band
 from gensig.errors import ConfigError
 from gensig.options.configuration import Configuration
@@ -19,24 +16,20 @@ from gensig.plan.request import read_request
 
 PLAIN, REALISTIC = "plain", "realistic"
 LEAST_TURNS = 10  # of the pinion in a record at the slowest speed
-SPEED_SHARES, TORQUE_SHARES = (
-    (0.5, 1.2),
-    (0.3, 1.2),
-)  # of the rated ones, over which a plan draws
+# shares of the rated speed and torque over which a plan draws
+SPEED_SHARES = (0.5, 1.2)
+TORQUE_SHARES = (0.3, 1.2)
 LARGEST_SHARE = 3.0
-N_UNITS = (
-    16  # a quarter of them is tested: four machines, the fewest that make an interval
-)
+# A quarter of the units is tested: four machines, the fewest that make an interval.
+N_UNITS = 16
 CLASSES = ("healthy", "crack", "pitting", "chipped", "missing_tooth")
-GRADE_STEP = math.sqrt(2.0)  # between the limits of neighbouring grades of ISO 1328-1
+GRADE_STEP = math.sqrt(2.0)  # between the limits of neighboring grades of ISO 1328-1
+LOWEST_SNR = {PLAIN: 10, REALISTIC: 5}  # dB
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wishes:
-    """What was asked of the experiment.
-
-    None where it was left out. Ranges are shares of the rated values.
-    """
+    """Flags on the experiment; None where left out. Ranges are shares of the rated values."""
 
     base: str = PLAIN
     rate: float | None = None
@@ -52,60 +45,66 @@ class Wishes:
             raise ConfigError(
                 f"--sensors are on a housing: add --experiment {REALISTIC}"
             )
-        for flag, shares in (
-            ("--speed-range", self.speed_range),
-            ("--torque-range", self.torque_range),
-        ):
+        check_positive("--duration", self.duration)
+        ranges = {
+            "--speed-range": self.speed_range,
+            "--torque-range": self.torque_range,
+        }
+        for flag, shares in ranges.items():
             if shares is not None and not 0.0 < shares[0] < shares[1] <= LARGEST_SHARE:
                 raise ConfigError(
-                    f"{flag} {shares[0]:g} {shares[1]:g}: give shares of the rated value, lowest first, for instance "
-                    f"{flag} 0.95 1.05"
+                    f"{flag} {shares[0]:g} {shares[1]:g}: give shares of the rated value, "
+                    f"lowest first, for instance {flag} 0.95 1.05"
                 )
+
+    @property
+    def is_realistic(self) -> bool:
+        """True for signals as measured, False for clean signals at the bearings."""
+        return self.base == REALISTIC
+
+    @property
+    def speed_shares(self) -> Sequence[float]:
+        """Lowest and highest speed over the rated one."""
+        return self.speed_range or SPEED_SHARES
 
 
 def read_wishes(arguments: Namespace) -> Wishes:
     """The flags of the verb that are about the experiment."""
-    names = (
-        "rate",
-        "duration",
-        "grade",
-        "classes",
-        "sensors",
-        "speed_range",
-        "torque_range",
-    )
-    return Wishes(
-        base=arguments.experiment, **{name: getattr(arguments, name) for name in names}
-    )
+    names = set(Wishes.__dataclass_fields__) - {"base"}
+    values = {name: getattr(arguments, name) for name in names}
+    return Wishes(base=arguments.experiment, **values)
 
 
 def experiment_text(option: GearOption, wishes: Wishes) -> str:
-    """The file of the experiment, each value with where it is from."""
+    """The file of the experiment, with the origin of each value."""
     _check_rate(option, wishes)
     name = option.gear["name"]
     classes = list(wishes.classes or CLASSES)
     n_records = N_UNITS * len(classes)
-    about = (
-        f"{n_records} records of {name}, {len(classes)} classes from {N_UNITS} units"
-    )
-    realistic = wishes.base == REALISTIC
     lines = [
         "# @package _global_",
-        f"# Written by gensig new gearbox: {about}. Faults are drawn in shares of a tooth.",
-        *([f"# All else is that of experiment={REALISTIC}, assumed; so are the rotors of its unbalance, 1 and 4 kg."]
-          if realistic else []),
-        "defaults:",
-        *([f"  - {REALISTIC}"] if realistic else []),
-        *(["  - override /system: helical_pair"] if option.is_helical else []),
-        f"  - override /gear: {name}",
-        "  - _self_",
-        "",
-        *_operating(option, wishes),
-        *(_quality(wishes) if wishes.grade is not None else []),
-        *(_couplings(option) if realistic else []),
-        *(_housing(wishes) if realistic else _bearings(option, wishes)),
-        *_plan(option, wishes, classes, n_records),
-    ]  # fmt: skip
+        f"# Written by gensig new gearbox: {n_records} records of {name}, "
+        f"{len(classes)} classes from {N_UNITS} units. "
+        "Faults are drawn in shares of a tooth.",
+    ]
+    defaults = []
+    if wishes.is_realistic:
+        lines.append(
+            f"# All else is that of experiment={REALISTIC}, assumed; "
+            "so are the rotors of its unbalance, 1 and 4 kg."
+        )
+        defaults.append(f"  - {REALISTIC}")
+    if option.is_helical:
+        defaults.append("  - override /system: helical_pair")
+    lines += ["defaults:", *defaults, f"  - override /gear: {name}", "  - _self_", ""]
+    lines += _operating(option, wishes)
+    if wishes.grade is not None:
+        lines += _quality(wishes, wishes.grade)
+    if wishes.is_realistic:
+        lines += [*_couplings(option), *_housing(wishes)]
+    else:
+        lines += _bearings(option, wishes)
+    lines += _plan(option, wishes, classes, n_records)
     return "\n".join(lines) + "\n"
 
 
@@ -118,81 +117,66 @@ def _short(value: float) -> str:
 
 
 def _check_rate(option: GearOption, wishes: Wishes) -> None:
-    """Raise where the mesh is not heard."""
-    fastest = (
-        (wishes.speed_range or SPEED_SHARES)[1] * option.gear["rated_speed_rpm"] / 60.0
-    )
+    """Raise ConfigError where the mesh frequency lies above the usable band."""
+    fastest = wishes.speed_shares[1] * option.gear["rated_speed_rpm"] / 60.0
     mesh = fastest * option.pair.pinion.n_teeth
     if wishes.rate is not None and not usable_band(wishes.rate)[1] > mesh:
         raise ConfigError(
-            f"--rate {wishes.rate:g}: the mesh frequency reaches {mesh:.4g} Hz, above the usable band of "
-            f"{usable_band(wishes.rate)[1]:.4g} Hz; give a rate of several times {mesh / usable_band(1.0)[1]:.0f} Hz"
+            f"--rate {wishes.rate:g}: the mesh frequency reaches {mesh:.4g} Hz, "
+            f"above the usable band of {usable_band(wishes.rate)[1]:.4g} Hz; "
+            f"give a rate of several times {mesh / usable_band(1.0)[1]:.0f} Hz"
         )
 
 
 def _origin(given: object) -> str:
-    return "assumed" if given is None else "given"
+    if given is None:
+        return "assumed"
+    return "given"
 
 
 def _operating(option: GearOption, wishes: Wishes) -> list[str]:
-    slowest = (wishes.speed_range or SPEED_SHARES)[0] * option.gear["rated_speed_rpm"]
-    least = LEAST_TURNS * 60.0 / slowest
-    duration = (
-        max(1.0, math.ceil(10.0 * least) / 10.0)
-        if wishes.duration is None
-        else wishes.duration
-    )
-    if not (math.isfinite(duration) and duration > 0.0):
-        raise ConfigError(f"--duration {duration:g} must be positive")
-    derived = (
-        f"derived: at least {LEAST_TURNS} turns of the pinion at the slowest speed"
-    )
-    return [
-        "operating:",
-        _line(
-            f"  duration_s: {duration:g}",
-            derived if wishes.duration is None else "given",
-        ),
-    ]
+    duration, remark = wishes.duration, "given"
+    if duration is None:
+        slowest = wishes.speed_shares[0] * option.gear["rated_speed_rpm"]
+        least = LEAST_TURNS * 60.0 / slowest
+        duration = max(1.0, math.ceil(10.0 * least) / 10.0)
+        turns = f"{LEAST_TURNS} turns of the pinion"
+        remark = f"derived: at least {turns} at the slowest speed"
+    return ["operating:", _line(f"  duration_s: {duration:g}", remark)]
 
 
-def _quality(wishes: Wishes) -> list[str]:
-    lines = ["quality:", _line(f"  iso1328_grade: {wishes.grade}", "given")]
-    if wishes.base == REALISTIC and wishes.grade is not None:
-        quality = _realistic()["quality"]
-        steps = wishes.grade - quality["iso1328_grade"]
-        tilt = quality["misalignment_um"] * GRADE_STEP**steps
-        there = f"{quality['misalignment_um']:g} at grade {quality['iso1328_grade']}"
-        remark = f"assumed: {there}, a factor of sqrt(2) a grade as in ISO 1328-1"
+def _quality(wishes: Wishes, grade: int) -> list[str]:
+    lines = ["quality:", _line(f"  iso1328_grade: {grade}", "given")]
+    if wishes.is_realistic:
+        base = _realistic()["quality"]
+        base_grade, base_tilt = base["iso1328_grade"], base["misalignment_um"]
+        tilt = base_tilt * GRADE_STEP ** (grade - base_grade)
+        remark = (
+            f"assumed: {base_tilt:g} at grade {base_grade}, "
+            "a factor of sqrt(2) a grade as in ISO 1328-1"
+        )
         lines.append(_line(f"  misalignment_um: {tilt:.3g}", remark))
     return lines
 
 
 def _couplings(option: GearOption) -> list[str]:
-    """Motor and load of the realistic experiment, as bodies of the same shape for the rated
-    torque.
-    """
+    """Motor and load of the realistic experiment, scaled as bodies of one shape."""
     base = _realistic()
-    torque = option.gear["rated_torque_nm"]
+    gear, base_gear = option.gear, base["gear"]
+    ratios = {"motor": (1.0, 1.0), "load": (_ratio(gear), _ratio(base_gear))}
     lines = ["system:"]
-    for name, ratio, there_ratio in (
-        ("motor", 1.0, 1.0),
-        ("load", _ratio(option.gear), _ratio(base["gear"])),
-    ):
-        body, there = (
-            base["system"][name],
-            base["gear"]["rated_torque_nm"] * there_ratio,
-        )
-        size = torque * ratio / there
-        inertia, stiffness = (
-            body["inertia_kg_m2"],
-            body["coupling_stiffness_nm_per_rad"],
-        )
+    for name, (ratio, base_ratio) in ratios.items():
+        body = base["system"][name]
+        base_torque = base_gear["rated_torque_nm"] * base_ratio
+        size = gear["rated_torque_nm"] * ratio / base_torque
+        inertia = body["inertia_kg_m2"]
+        stiffness = body["coupling_stiffness_nm_per_rad"]
         lines += [
             f"  {name}:",
             _line(
                 f"    inertia_kg_m2: {_short(inertia * size ** (5 / 3))}",
-                f"assumed: {inertia:g} at {there:.3g} N m, times torque^(5/3), bodies of one shape",
+                f"assumed: {inertia:g} at {base_torque:.3g} N m, times torque^(5/3), "
+                "bodies of one shape",
             ),
             _line(
                 f"    coupling_stiffness_nm_per_rad: {_short(stiffness * size)}",
@@ -207,77 +191,46 @@ def _ratio(gear: Mapping[str, Any]) -> float:
 
 
 def _housing(wishes: Wishes) -> list[str]:
-    sensing = _realistic()["sensing"]
-    rate = sensing["sampling_rate_hz"] if wishes.rate is None else wishes.rate
+    """Sensors on the housing, their path and noise cut to the sampling rate."""
+    sensing, rate = _realistic()["sensing"], wishes.rate
+    if rate is None:
+        rate = sensing["sampling_rate_hz"]
     lines = ["sensing:", _line(f"  sampling_rate_hz: {rate:g}", _origin(wishes.rate))]
     if wishes.sensors is not None:
         lines.append(_line(f"  sensors: [{', '.join(wishes.sensors)}]", "given"))
-    (lowest, highest), band = (
-        sensing["path"]["natural_frequency_hz"],
-        sensing["noise"]["band_hz"],
-    )
+    lowest, highest = sensing["path"]["natural_frequency_hz"]
     usable = usable_band(rate)[1]
     if highest > usable:
-        lines += [
-            "  path:",
-            _line(
-                f"    natural_frequency_hz: [{min(lowest, 0.5 * usable):g}, {usable:g}]",
-                f"assumed, {highest:g} cut to the usable band of the rate",
-            ),
-        ]
-    if band[1] > 0.5 * rate:
-        lines += [
-            "  noise:",
-            _line(
-                f"    band_hz: [{band[0]:g}, {0.5 * rate:g}]",
-                f"assumed, {band[1]:g} cut to half the rate",
-            ),
-        ]
+        low = min(lowest, 0.5 * usable)
+        band = f"    natural_frequency_hz: [{low:g}, {usable:g}]"
+        remark = f"assumed, {highest:g} cut to the usable band of the rate"
+        lines += ["  path:", _line(band, remark)]
+    low, high = sensing["noise"]["band_hz"]
+    if high > 0.5 * rate:
+        band = f"    band_hz: [{low:g}, {0.5 * rate:g}]"
+        lines += ["  noise:", _line(band, f"assumed, {high:g} cut to half the rate")]
     return lines
 
 
 def _bearings(option: GearOption, wishes: Wishes) -> list[str]:
-    axes = "yz" if option.is_helical else "xy"
-    channels = ", ".join(
-        f"{gear}_{axis}" for gear in ("pinion", "wheel") for axis in axes
-    )
-    rate = (
-        []
-        if wishes.rate is None
-        else [_line(f"  sampling_rate_hz: {wishes.rate:g}", "given")]
-    )
-    return ["sensing:", *rate, _line(f"  channels: [{channels}]", "at the bearings")]
+    axes = "xy"
+    if option.is_helical:
+        axes = "yz"
+    channels = [f"{gear}_{axis}" for gear in ("pinion", "wheel") for axis in axes]
+    lines = ["sensing:"]
+    if wishes.rate is not None:
+        lines.append(_line(f"  sampling_rate_hz: {wishes.rate:g}", "given"))
+    lines.append(_line(f"  channels: [{', '.join(channels)}]", "at the bearings"))
+    return lines
 
 
 def _plan(
     option: GearOption, wishes: Wishes, classes: list[str], n_records: int
 ) -> list[str]:
-    ranges = []
-    for key, rated, given, assumed in (
-        ("speed_rpm", option.gear["rated_speed_rpm"], wishes.speed_range, SPEED_SHARES),
-        (
-            "torque_nm",
-            option.gear["rated_torque_nm"],
-            wishes.torque_range,
-            TORQUE_SHARES,
-        ),
-    ):
-        low, high = given or assumed
-        ranges.append(
-            _line(
-                f"    operating.{key}: {{distribution: uniform, low: {low * rated:.6g}, high: {high * rated:.6g}}}",
-                f"{_origin(given)}: {low:g} to {high:g} of the rated",
-            )
-        )
-    lowest = 5 if wishes.base == REALISTIC else 10
-    shards = [
-        "dataset:",
-        _line(
-            f"  records_per_shard: {4 * len(classes)}",
-            "whole groups; small shards keep two workers busy to the end",
-        ),
-    ]
-    return [
+    speed, torque = option.gear["rated_speed_rpm"], option.gear["rated_torque_nm"]
+    torque_shares = wishes.torque_range or TORQUE_SHARES
+    lowest = LOWEST_SNR[wishes.base]
+    lines = [
         "plan:",
         _line(f"  n_records: {n_records}", "assumed: one of each class and unit"),
         _line(
@@ -290,13 +243,27 @@ def _plan(
         ),
         _line(f"  classes: [{', '.join(classes)}]", _origin(wishes.classes)),
         "  vary:",
-        *ranges,
+        _drawn("speed_rpm", speed, wishes.speed_shares, wishes.speed_range),
+        _drawn("torque_nm", torque, torque_shares, wishes.torque_range),
         _line(
             f"    sensing.snr_db: {{distribution: uniform, low: {lowest}, high: 30}}",
             "assumed",
         ),
-        *(shards if wishes.base == REALISTIC else []),
     ]
+    if wishes.is_realistic:
+        remark = "whole groups; small shards keep two workers busy to the end"
+        lines += ["dataset:", _line(f"  records_per_shard: {4 * len(classes)}", remark)]
+    return lines
+
+
+def _drawn(key: str, rated: float, shares: Sequence[float], given: object) -> str:
+    """A line of ``plan.vary`` for a range of shares of a rated value."""
+    low, high = shares
+    ends = f"low: {low * rated:.6g}, high: {high * rated:.6g}"
+    return _line(
+        f"    operating.{key}: {{distribution: uniform, {ends}}}",
+        f"{_origin(given)}: {low:g} to {high:g} of the rated",
+    )
 
 
 def _realistic() -> Configuration:

@@ -1,7 +1,4 @@
-"""The data card.
-
-README.md and croissant.json of a folder, facts from the files beside caveats that always hold.
-"""
+"""The data card: README.md and croissant.json with facts from the files, and caveats."""
 
 import html
 import re
@@ -15,13 +12,22 @@ from gensig.dataset.cards.class_figures import write_class_figures
 from gensig.dataset.cards.croissant import croissant_text
 from gensig.dataset.folder.layout import CARD, CROISSANT, SHARDS
 from gensig.dataset.reader import Dataset, open_dataset
+from gensig.dataset.splitting.splits import SUBSETS
 from gensig.dataset.storage.atomic import write_text
 
 GEOMETRY = (
-    "n_teeth_pinion", "n_teeth_wheel", "normal_module_mm", "pressure_angle_deg", "helix_angle_deg",
-    "face_width_pinion_mm", "face_width_wheel_mm", "center_distance_mm", "transverse_contact_ratio", "overlap_ratio",
+    "n_teeth_pinion",
+    "n_teeth_wheel",
+    "normal_module_mm",
+    "pressure_angle_deg",
+    "helix_angle_deg",
+    "face_width_pinion_mm",
+    "face_width_wheel_mm",
+    "center_distance_mm",
+    "transverse_contact_ratio",
+    "overlap_ratio",
     "usable_band_hz",
-)  # fmt: skip
+)
 
 LOAD = """```python
 import gensig
@@ -31,8 +37,10 @@ with gensig.open_dataset("PATH/TO/THIS/FOLDER") as data:
     signal = data.signals(0)                         # (channel, sample) float32, m/s^2
     parts = data.split("by_unit" if "by_unit" in data.protocols else data.protocols[0])
 ```
-Without gensig: every shard is plain HDF5, see `docs/format.md` of gensig. Hugging Face `datasets` takes the folder
-as it is, `load_dataset("PATH/TO/THIS/FOLDER")`; its one split, `train`, is all records, and `splits/` says which are
+Without gensig: every shard is plain HDF5, see `docs/format.md` of gensig. \
+Hugging Face `datasets` takes the folder
+as it is, `load_dataset("PATH/TO/THIS/FOLDER")`; its one split, `train`, is all records, \
+and `splits/` says which are
 for training. `croissant.json` describes the files for machines.
 """
 
@@ -54,15 +62,19 @@ TAGS = (
     "simulation",
 )
 
-LICENCE = """Data licence: CC BY 4.0 (https://creativecommons.org/licenses/by/4.0/): free to use, name the source.
+LICENCE = """Data licence: CC BY 4.0 (https://creativecommons.org/licenses/by/4.0/): \
+free to use, name the source.
 """
 
-CAVEATS = """- The records are simulated. A model trained on them alone has proved nothing about measured signals.
+CAVEATS = """- The records are simulated. \
+A model trained on them alone has proved nothing about measured signals.
 - `random_window_leaky` puts windows of one record on every side on purpose. Never report it
   without a clean split beside it.
-- The speed and the signal power of a record are results: a fault may change them. Report results with and
+- The speed and the signal power of a record are results: \
+a fault may change them. Report results with and
   without RMS normalization.
-- Columns of role label, fault or result (`docs/format.md`) and fault parameters in `params/` must not be
+- Columns of role label, fault or result (`docs/format.md`) \
+and fault parameters in `params/` must not be
   inputs of a classifier.
 - Records with status 'failed' are kept with their parameters; leave them out with `data.usable`.
 - Only the band given as usable is meant to be used; above it the anti-alias filter acts.
@@ -70,9 +82,7 @@ CAVEATS = """- The records are simulated. A model trained on them alone has prov
 
 
 def write_card(out: Path, *, figures: bool = True) -> None:
-    """Write `README.md`, its figures and `croissant.json` of a data-set folder whose shards are
-    all done.
-    """
+    """Write `README.md`, its figures and `croissant.json` of a folder whose shards are done."""
     with open_dataset(out, allow_incomplete=True) as data:
         pictures = write_class_figures(data) if figures else {}
         write_text(out / CROISSANT, croissant_text(data, CAVEATS))
@@ -80,25 +90,23 @@ def write_card(out: Path, *, figures: bool = True) -> None:
 
 
 def card_text(data: Dataset, pictures: Mapping[str, str] | None = None) -> str:
-    """The card as Markdown after Hugging Face front matter; every text that comes from a file is
-    escaped.
+    """Card as Markdown after Hugging Face front matter, with text from files escaped.
 
     Parameters
     ----------
     pictures : path in the folder by class name
     """
+    version = escape(data.manifest.generator_version)
     sections = [
         front_matter(data),
         f"# {escape(data.folder.resolve().name)}",
-        "Gear vibration, simulated and labelled by gensig "
-        + escape(data.manifest.generator_version)
-        + ".",
+        f"Gear vibration, simulated and labelled by gensig {version}.",
         _table(("fact", "value"), _facts(data)),
         "## Classes",
         _table(("class", "records", "severity"), _classes(data)),
         _gallery(pictures or {}),
         "## Splits",
-        _table(("protocol", *("train", "validation", "test")), _splits(data)),
+        _table(("protocol", *SUBSETS), _splits(data)),
         "## Load it",
         LOAD,
         "## Caveats",
@@ -110,24 +118,20 @@ def card_text(data: Dataset, pictures: Mapping[str, str] | None = None) -> str:
 
 
 def _gallery(pictures: Mapping[str, str]) -> str:
-    """A picture a class, with what all of them show."""
+    """One picture for each class, under a common title."""
     if not pictures:
         return ""
-    shown = [f"![{escape(name)}]({path})" for name, path in pictures.items()]
-    return "\n\n".join(
-        [
-            "The record of median severity of each class, noise included, on the same axes:",
-            *shown,
-        ]
+    title = (
+        "The record of median severity of each class, noise included, on the same axes:"
     )
+    shown = [f"![{escape(name)}]({path})" for name, path in pictures.items()]
+    return "\n\n".join([title, *shown])
 
 
 def front_matter(data: Dataset) -> str:
-    """YAML that the Hugging Face hub and its `load_dataset` read.
-
-    Licence, tags, size, and where the records are.
-    """
-    size = next((name for limit, name in SIZES if data.n_records < limit), "n>10M")
+    """YAML for the Hugging Face hub and `load_dataset`: licence, tags, size, record files."""
+    sizes = [name for limit, name in SIZES if data.n_records < limit]
+    size = (*sizes, "n>10M")[0]
     content = {
         "pretty_name": plain(data.folder.resolve().name),
         "license": "cc-by-4.0",
@@ -162,59 +166,37 @@ def _table(header: tuple[str, ...], rows: list[tuple[object, ...]]) -> str:
 
 def _facts(data: Dataset) -> list[tuple[object, ...]]:
     units = data.attributes.get("channel_units", ["m/s^2"] * len(data.channel_names))
-    channels = ", ".join(
-        f"{name} ({unit})"
-        for name, unit in zip(data.channel_names, units, strict=False)
-    )
-    n_failed = int(np.count_nonzero(~data.usable))
-    rows: list[tuple[object, ...]] = [
-        (
-            "records",
-            f"{data.n_records}" + (f", of which {n_failed} failed" if n_failed else ""),
-        ),
-        (
-            "duration of a record",
-            f"{data.n_samples / data.sampling_rate:g} s ({data.n_samples} samples)",
-        ),
-        ("sampling rate", f"{data.sampling_rate:g} Hz"),
-        ("channels", channels),
-    ]
-    rows += [
-        (name, rounded(data.attributes[name]))
-        for name in GEOMETRY
-        if name in data.attributes
-    ]
-    rows += [
-        (name, len(np.unique(data.column(column))))
-        for name, column in (
-            ("units", "unit_id"),
-            ("specimens", "specimen_id"),
-            ("gearboxes", "gearbox_id"),
-        )
-    ]
-    rows += [
-        ("speed of the driving shaft", value_range(data.column("speed_rpm"), "r/min")),
-        (torque_words(data), value_range(data.column("torque_nm"), "N m")),
-    ]
+    pairs = zip(data.channel_names, units, strict=False)
+    records, n_failed = str(data.n_records), int(np.count_nonzero(~data.usable))
+    if n_failed:
+        records += f", of which {n_failed} failed"
+    seconds = data.n_samples / data.sampling_rate
+    facts: dict[str, object] = {
+        "records": records,
+        "duration of a record": f"{seconds:g} s ({data.n_samples} samples)",
+        "sampling rate": f"{data.sampling_rate:g} Hz",
+        "channels": ", ".join(f"{name} ({unit})" for name, unit in pairs),
+    }
+    for name in GEOMETRY:
+        if name in data.attributes:
+            facts[name] = rounded(data.attributes[name])
+    for part in ("unit", "specimen", "gearbox"):
+        plural = f"{part}{'e' * part.endswith('x')}s"
+        facts[plural] = len(np.unique(data.column(f"{part}_id")))
+    speed, torque = data.column("speed_rpm"), data.column("torque_nm")
+    facts["speed of the driving shaft"] = value_range(speed, "r/min")
+    facts[torque_words(data)] = value_range(torque, "N m")
     if "snr_db" in data.column_names:
-        rows.append(("signal-to-noise ratio", value_range(data.column("snr_db"), "dB")))
+        facts["signal-to-noise ratio"] = value_range(data.column("snr_db"), "dB")
     if data.sample_type == "int16":
-        rows.append(
-            (
-                "acceleration in the shards",
-                "int16; times acceleration_scale of record and channel it is m/s^2",
-            )
-        )
+        scaled = "int16; times acceleration_scale of record and channel it is m/s^2"
+        facts["acceleration in the shards"] = scaled
     if data.compression != "none":
-        rows.append(
-            (
-                "compression",
-                data.compression
-                + " (read with hdf5plugin)" * (data.compression == "blosc2"),
-            )
-        )
-    rows += [("seed", data.manifest.seed), ("identity", data.manifest.identity)]
-    return rows
+        facts["compression"] = data.compression
+    if data.compression == "blosc2":
+        facts["compression"] = "blosc2 (read with hdf5plugin)"
+    facts |= {"seed": data.manifest.seed, "identity": data.manifest.identity}
+    return list(facts.items())
 
 
 def _classes(data: Dataset) -> list[tuple[object, ...]]:
@@ -230,24 +212,16 @@ def _classes(data: Dataset) -> list[tuple[object, ...]]:
 def _splits(data: Dataset) -> list[tuple[object, ...]]:
     rows: list[tuple[object, ...]] = []
     for protocol in data.protocols:
-        parts = data.split(protocol)
-        rows.append(
-            (
-                protocol,
-                *(
-                    f"{sum(stop - start for _, start, stop in part):g} records"
-                    for part in parts.values()
-                ),
-            )
-        )
+        sizes = [
+            sum(stop - start for _, start, stop in part)
+            for part in data.split(protocol).values()
+        ]
+        rows.append((protocol, *(f"{size:g} records" for size in sizes)))
     return rows
 
 
 def torque_words(data: Dataset) -> str:
-    """Whose torque `torque_nm` is.
-
-    A drive line's is that of its load, whichever mesh its records follow.
-    """
+    """Name of the quantity in `torque_nm`, which for a drive line is the torque of its load."""
     return f"torque of the {plain(data.attributes.get('torque_of', 'driving shaft'))}"
 
 
@@ -261,5 +235,5 @@ def value_range(values: np.ndarray, unit: str) -> str:
     finite = values[np.isfinite(values)]
     if not finite.size:
         return "none"
-    low, high = f"{finite.min():.6g}", f"{finite.max():.6g}"
-    return (low if low == high else f"{low} to {high}") + (f" {unit}" if unit else "")
+    ends = dict.fromkeys((f"{finite.min():.6g}", f"{finite.max():.6g}"))
+    return f"{' to '.join(ends)} {unit}".rstrip()

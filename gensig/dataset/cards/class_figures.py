@@ -1,7 +1,4 @@
-"""One small picture a class.
-
-A record of it over two turns of the driving shaft, and its spectrum, on common axes.
-"""
+"""Figures of a card: one record of each class over two turns, and its spectrum."""
 
 from __future__ import annotations
 
@@ -19,14 +16,11 @@ from gensig.dataset.storage.atomic import cannot_write, write_bytes
 from gensig.signals.spectrum import amplitude_spectrum
 
 BLUE, ORANGE = "#0072B2", "#D55E00"
-FIRST_CHOICE = (
-    "pinion_y"  # along the line of centers, next to the faulted gear of most sets
-)
+# Along the line of centers, next to the faulted gear of most sets.
+FIRST_CHOICE = "pinion_y"
 TURNS = 2.0
 DECADES = 4.0  # of the spectrum's amplitude axis
-N_BINS = (
-    500  # the largest line of each is drawn: more than there are pixels helps nobody
-)
+N_BINS = 500  # the largest amplitude of each is drawn
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,28 +46,21 @@ class ClassExample:
 
 
 def write_class_figures(data: Dataset) -> dict[str, str]:
-    """Write a PNG for each class that has a usable record; path in the folder by class name, {}
-    without matplotlib.
+    """Write a PNG for each class that has a usable record.
 
-    The same records, with the same version of matplotlib, give the same bytes.
+    Returns paths in the folder by class name, {} without matplotlib. The same records, with the
+    same version of matplotlib, give the same bytes.
     """
     try:
         import matplotlib
     except ImportError:
         return {}
-    channel = (
-        FIRST_CHOICE if FIRST_CHOICE in data.channel_names else data.channel_names[0]
-    )
-    units = data.attributes.get("channel_units", [])
-    unit = (
-        dict(zip(data.channel_names, units, strict=False))
-        .get(channel, "m/s^2")
-        .replace("^2", "²")
-    )
-    examples = {
-        name: _example(data, index, channel)
-        for name, index in example_records(data).items()
-    }
+    names = data.channel_names
+    channel = FIRST_CHOICE if FIRST_CHOICE in names else names[0]
+    units = dict(zip(names, data.attributes.get("channel_units", []), strict=False))
+    unit = units.get(channel, "m/s^2").replace("^2", "²")
+    records = example_records(data)
+    examples = {name: _example(data, records[name], channel) for name in records}
     if not examples:
         return {}
     folder = data.folder / FIGURES
@@ -89,59 +76,43 @@ def write_class_figures(data: Dataset) -> dict[str, str]:
         for name, example in examples.items():
             slug = re.sub(r"[^a-z0-9_]+", "-", name.lower())[:40]
             paths[name] = f"{FIGURES}/{data.class_names.index(name)}-{slug}.png"
-            write_bytes(
-                data.folder / paths[name],
-                _png(example, f"{channel}, {unit}", largest or 1.0, highest or 1.0),
+            picture = _png(
+                example, f"{channel}, {unit}", largest or 1.0, highest or 1.0
             )
+            write_bytes(data.folder / paths[name], picture)
     return paths
 
 
 def example_records(data: Dataset) -> dict[str, int]:
     """Number of one record a class, by class name: the usable one of median severity."""
-    label, severity, usable = (
-        data.column("label_name"),
-        data.column("severity"),
-        data.usable,
-    )
+    label, severity = data.column("label_name"), data.column("severity")
     chosen = {}
     for name in data.class_names:
-        mine = np.flatnonzero((label == name) & usable)
-        if mine.size:
-            chosen[name] = int(
-                mine[np.argsort(severity[mine], kind="stable")[mine.size // 2]]
-            )
+        records = np.flatnonzero((label == name) & data.usable)
+        if records.size:
+            order = np.argsort(severity[records], kind="stable")
+            chosen[name] = int(records[order[records.size // 2]])
     return chosen
 
 
 def _example(data: Dataset, index: int, channel: str) -> ClassExample:
-    values = {
-        name: data.column(name)[index]
-        for name in ("record_id", "label_name", "severity", "speed_rpm")
-    }
-    torque = data.column("torque_nm")[index]
+    values = data[index].values
+    speed = values["speed_rpm"]
     signal = data.signals(index, channels=[channel])[0].astype(float)
     frequency, amplitude = amplitude_spectrum(signal, data.sampling_rate)
     step = -(-len(amplitude) // N_BINS)
     starts = np.arange(0, len(amplitude), step)
-    mesh = (
-        data.column("mesh_frequency_hz")[index]
-        if "mesh_frequency_hz" in data.column_names
-        else np.nan
-    )
-    shown = (
-        int(TURNS * 60.0 / values["speed_rpm"] * data.sampling_rate)
-        if values["speed_rpm"] > 0.0
-        else len(signal)
-    )
-    signal = signal[: max(shown, 2)]
+    if speed > 0.0:
+        shown = int(TURNS * 60.0 / speed * data.sampling_rate)
+        signal = signal[: max(shown, 2)]
     return ClassExample(
-        title=f"{values['label_name']}, severity {values['severity']:.2f} (record {values['record_id']}, "
-        f"{values['speed_rpm']:.0f} r/min, {torque:.3g} N m)",
+        title=f"{values['label_name']}, severity {values['severity']:.2f} (record "
+        f"{values['record_id']}, {speed:.0f} r/min, {values['torque_nm']:.3g} N m)",
         time=np.arange(len(signal)) / data.sampling_rate * 1e3,
         signal=signal,
         frequency=frequency[np.minimum(starts + step, len(frequency)) - 1] / 1e3,
         amplitude=np.maximum.reduceat(amplitude, starts),
-        mesh_frequency=float(mesh) / 1e3,
+        mesh_frequency=float(values.get("mesh_frequency_hz", np.nan)) / 1e3,
     )
 
 
@@ -168,28 +139,18 @@ def _waveform(axes: Any, example: ClassExample, ordinate: str, limit: float) -> 
 
 
 def _spectrum(axes: Any, example: ClassExample, ordinate: str, limit: float) -> None:
-    axes.semilogy(
-        example.frequency,
-        np.maximum(example.amplitude, limit * 10.0**-DECADES),
-        color=BLUE,
-        linewidth=0.7,
-    )
+    lowest = limit * 10.0**-DECADES
+    amplitude = np.maximum(example.amplitude, lowest)
+    axes.semilogy(example.frequency, amplitude, color=BLUE, linewidth=0.7)
     top = float(example.frequency[-1])
     if np.isfinite(example.mesh_frequency) and example.mesh_frequency > 0.0:
-        harmonics = (
-            np.arange(1, min(60, int(top / example.mesh_frequency)) + 1)
-            * example.mesh_frequency
-        )
-        axes.plot(
-            harmonics,
-            np.full(len(harmonics), limit / 1.5),
-            "v",
-            color=ORANGE,
-            markersize=2.5,
-        )
+        n_harmonics = min(60, int(top / example.mesh_frequency))
+        harmonics = np.arange(1, n_harmonics + 1) * example.mesh_frequency
+        height = np.full(n_harmonics, limit / 1.5)
+        axes.plot(harmonics, height, "v", color=ORANGE, markersize=2.5)
     axes.set(
         xlim=(0.0, top),
-        ylim=(limit * 10.0**-DECADES, limit),
+        ylim=(lowest, limit),
         xlabel="frequency, kHz; triangles: harmonics of the mesh",
     )
     axes.set_ylabel(f"amplitude of {ordinate.partition(',')[0]}", parse_math=False)

@@ -1,56 +1,57 @@
-"""croissant.json.
-
-The data set described for machines (MLCommons Croissant 1.0, with the Responsible-AI fields).
-"""
+"""croissant.json: MLCommons Croissant 1.0, with the Responsible-AI fields."""
 
 import json
 from typing import Any
 
 import numpy as np
 
+from gensig.dataset.columns import COLUMNS
 from gensig.dataset.folder.layout import MANIFEST, PLAN, SHARDS, SPLITS
 from gensig.dataset.plan import Plan
 from gensig.dataset.reader import Dataset
-from gensig.dataset.schema import COLUMNS, PARAMS
+from gensig.dataset.schema import PARAMS
 
+_TERMS = (
+    "citeAs",
+    "column",
+    "equivalentProperty",
+    "extract",
+    "field",
+    "fileObject",
+    "fileProperty",
+    "fileSet",
+    "format",
+    "includes",
+    "isLiveDataset",
+    "jsonPath",
+    "key",
+    "md5",
+    "parentField",
+    "path",
+    "recordSet",
+    "references",
+    "regex",
+    "repeated",
+    "replace",
+    "samplingRate",
+    "separator",
+    "source",
+    "subField",
+    "transform",
+)
 _CONTEXT: dict[str, Any] = {
     "@language": "en",
     "@vocab": "https://schema.org/",
-    "citeAs": "cr:citeAs",
-    "column": "cr:column",
     "conformsTo": "dct:conformsTo",
     "cr": "http://mlcommons.org/croissant/",
     "data": {"@id": "cr:data", "@type": "@json"},
     "dataType": {"@id": "cr:dataType", "@type": "@vocab"},
     "dct": "http://purl.org/dc/terms/",
-    "equivalentProperty": "cr:equivalentProperty",
     "examples": {"@id": "cr:examples", "@type": "@json"},
-    "extract": "cr:extract",
-    "field": "cr:field",
-    "fileObject": "cr:fileObject",
-    "fileProperty": "cr:fileProperty",
-    "fileSet": "cr:fileSet",
-    "format": "cr:format",
-    "includes": "cr:includes",
-    "isLiveDataset": "cr:isLiveDataset",
-    "jsonPath": "cr:jsonPath",
-    "key": "cr:key",
-    "md5": "cr:md5",
-    "parentField": "cr:parentField",
-    "path": "cr:path",
     "rai": "http://mlcommons.org/croissant/RAI/",
-    "recordSet": "cr:recordSet",
-    "references": "cr:references",
-    "regex": "cr:regex",
-    "repeated": "cr:repeated",
-    "replace": "cr:replace",
-    "samplingRate": "cr:samplingRate",
     "sc": "https://schema.org/",
-    "separator": "cr:separator",
-    "source": "cr:source",
-    "subField": "cr:subField",
-    "transform": "cr:transform",
 }
+_CONTEXT |= {term: f"cr:{term}" for term in _TERMS}
 _TYPES = {"U": "sc:Text", "i": "sc:Integer", "f": "sc:Float"}
 
 
@@ -66,19 +67,25 @@ def croissant_text(data: Dataset, caveats: str) -> str:
         f"{len(data.channel_names)} channels, classes {', '.join(data.class_names)}"
     )
     content: dict[str, Any] = {
-        "@context": _CONTEXT,
+        "@context": dict(sorted(_CONTEXT.items())),
         "@type": "sc:Dataset",
         "conformsTo": [
             "http://mlcommons.org/croissant/1.0",
             "http://mlcommons.org/croissant/RAI/1.0",
         ],
         "name": name,
-        "description": f"Gear vibration, simulated and labelled by gensig {manifest.generator_version}: {facts}.",
+        "description": (
+            f"Gear vibration, simulated and labelled by gensig {manifest.generator_version}: "
+            f"{facts}."
+        ),
         "license": "https://creativecommons.org/licenses/by/4.0/",
         "version": "1.0.0",
         "keywords": ["vibration", "gear", "fault diagnosis", "synthetic"],
         "isLiveDataset": False,
-        "citeAs": f"{name}: simulated gear vibration, gensig {manifest.generator_version}, {manifest.identity[:16]}",
+        "citeAs": (
+            f"{name}: simulated gear vibration, gensig {manifest.generator_version}, "
+            f"{manifest.identity[:16]}"
+        ),
         "datePublished": str(manifest.environment.get("created", ""))[:10]
         or "1970-01-01",
         **_responsible_ai(data, facts, caveats),
@@ -89,26 +96,28 @@ def croissant_text(data: Dataset, caveats: str) -> str:
 
 
 def _responsible_ai(data: Dataset, facts: str, caveats: str) -> dict[str, Any]:
-    """The fields that say how the data came to be and what they are not good for."""
+    """Fields on the origin of the data and the limits of their use."""
     names, counts = np.unique(data.column("label_name"), return_counts=True)
-    classes = ", ".join(
-        f"{name} {count}"
-        for name, count in zip(names.tolist(), counts.tolist(), strict=True)
-    )
+    pairs = zip(names.tolist(), counts.tolist(), strict=True)
+    classes = ", ".join(f"{name} {count}" for name, count in pairs)
     failed = int(np.count_nonzero(~data.usable))
-    limits = [
-        line.removeprefix("- ")
-        for line in caveats.replace("\n  ", " ").strip().splitlines()
-    ]
+    lines = caveats.replace("\n  ", " ").strip().splitlines()
+    limits = [line.removeprefix("- ") for line in lines]
     return {
-        "rai:dataCollection": "Simulated from physics; nothing was measured. config.yaml and plan.csv hold every "
-        f"parameter; gensig makes the same bytes from them again (seed {data.manifest.seed}).",
+        "rai:dataCollection": (
+            "Simulated from physics; nothing was measured. config.yaml and plan.csv hold every "
+            "parameter; gensig makes the same bytes from them again (seed "
+            f"{data.manifest.seed})."
+        ),
         "rai:dataCollectionType": ["Software Collection", "Others: physics simulation"],
         "rai:dataCollectionRawData": facts,
-        "rai:dataAnnotationProtocol": "Labels are the inputs of the simulation, not judgements: each record states the "
-        "fault that was put into its gear, its size and its tooth.",
+        "rai:dataAnnotationProtocol": (
+            "Labels are the inputs of the simulation, not judgements: each record states the "
+            "fault that was put into its gear, its size and its tooth."
+        ),
         "rai:dataPreprocessingProtocol": [
-            "Integrated at a multiple of the sampling rate, low-passed and decimated; noise added at the stated ratio."
+            "Integrated at a multiple of the sampling rate, low-passed and decimated; noise "
+            "added at the stated ratio."
         ],
         "rai:dataLimitations": limits,
         "rai:dataBiases": [
@@ -120,13 +129,18 @@ def _responsible_ai(data: Dataset, facts: str, caveats: str) -> dict[str, Any]:
         ],
         "rai:dataUseCases": [
             "Developing and comparing methods of gear-fault diagnosis under known truth.",
-            "Not validated: deciding on a real machine with a model trained on these records alone.",
+            "Not validated: deciding on a real machine with a model trained on these records "
+            "alone.",
         ],
-        "rai:dataSocialImpact": "A model that was never tried on measured signals may miss a dangerous fault.",
+        "rai:dataSocialImpact": (
+            "A model that was never tried on measured signals may miss a dangerous fault."
+        ),
         "rai:personalSensitiveInformation": [
             "None: no person, place or machine of anyone is in the data."
         ],
-        "rai:dataReleaseMaintenancePlan": "Never changed once complete: manifest.json holds the sha256 of every file.",
+        "rai:dataReleaseMaintenancePlan": (
+            "Never changed once complete: manifest.json holds the sha256 of every file."
+        ),
     }
 
 
@@ -152,21 +166,19 @@ def _distribution(data: Dataset) -> list[dict[str, Any]]:
 
 
 def _plan_records(plan: Plan) -> dict[str, Any]:
-    """What is known of each record before it is simulated.
+    """Record set of the plan: inputs of each record.
 
     The shards, as HDF5, Croissant can list but not read.
     """
     fields = []
     for name, values in plan.columns.items():
-        column = COLUMNS.get(name)
-        unit = f" ({column.unit})" if column and column.unit not in ("", "1") else ""
+        identifier = f"records/{name.replace('/', '.')}"
         fields.append(
             {
                 "@type": "cr:Field",
-                "@id": f"records/{name.replace('/', '.')}",
-                "name": f"records/{name.replace('/', '.')}",
-                "description": (column.description if column else _meaning(name))
-                + unit,
+                "@id": identifier,
+                "name": identifier,
+                "description": _meaning(name),
                 "dataType": _TYPES[values.dtype.kind],
                 "source": {"fileObject": {"@id": PLAN}, "extract": {"column": name}},
             }
@@ -175,18 +187,21 @@ def _plan_records(plan: Plan) -> dict[str, Any]:
         "@type": "cr:RecordSet",
         "@id": "records",
         "name": "records",
-        "description": f"One row a record of {PLAN}: labels and inputs. Its signals are in row `row` of "
-        f"{SHARDS}/shard-<shard>.h5, and {MANIFEST} lists those files.",
+        "description": (
+            f"One row a record of {PLAN}: labels and inputs. Its signals are in row `row` of "
+            f"{SHARDS}/shard-<shard>.h5, and {MANIFEST} lists those files."
+        ),
         "key": {"@id": "records/record_id"},
         "field": fields,
     }
 
 
 def _meaning(name: str) -> str:
+    if name in COLUMNS:
+        column = COLUMNS[name]
+        return column.description + f" ({column.unit})" * (column.unit not in ("", "1"))
     if name in ("shard", "row"):
         return f"{name} that holds the record, counted from 0"
-    return (
-        "drawn or swept value, unit in the name"
-        if name.startswith(f"{PARAMS}/")
-        else "input of the simulation"
-    )
+    if name.startswith(f"{PARAMS}/"):
+        return "drawn or swept value, unit in the name"
+    return "input of the simulation"

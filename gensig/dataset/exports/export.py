@@ -1,28 +1,26 @@
-"""A data set in other formats: one HDF5 file, Parquet, npz, wav.
-
-Record by record, so that memory stays small.
-"""
+"""Export of a data set to one HDF5 file, Parquet, npz or wav, with few records in memory."""
 
 import csv
+import re
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import NoReturn
 
 import h5py
 import numpy as np
 
+from gensig.dataset.columns import COLUMNS
 from gensig.dataset.exports.export_tables import (
     attributes_json,
     column_names,
-    signal_layout,
+    record_bytes,
     signal_row,
     unit_of,
     write_npz,
     write_parquet,
 )
 from gensig.dataset.reader import Dataset, open_dataset
-from gensig.dataset.schema import COLUMNS, SIGNALS
+from gensig.dataset.schema import SIGNALS
 from gensig.dataset.storage.atomic import (
     publish,
     sync_file,
@@ -46,14 +44,13 @@ def export(
     samples: bool = False,
     one_channel: bool = False,
 ) -> dict[str, int]:
-    """Write a data set in another format, under a name that does not exist yet; whole or not at
-    all.
+    """Write a data set in another format, whole or not at all, under a new name.
 
     Parameters
     ----------
     folder : str | Path     a complete data set; it is left alone
-    to : str                'hdf5': one shard of all records; 'parquet' or 'npz': one file; 'wav': a folder with one
-                            file a record and a table labels.csv
+    to : str                'hdf5': one shard of all records; 'parquet' or 'npz': one file; 'wav':
+                            a folder with one file a record and a table labels.csv
     out : str | Path        file or, for wav, folder to make
     samples : bool          parquet: time signals too, not only the labels
     one_channel : bool      wav: one file a record and channel, instead of one a record
@@ -64,8 +61,9 @@ def export(
 
     Raises
     ------
-    DatasetError    for a format or option that does not exist, a data set that is incomplete or damaged, a name that is
-                    taken or lies in the data set's folder, and a disk that is full
+    DatasetError    for a format or option that does not exist, a data set that is incomplete or
+                    damaged, a name that is taken or lies in the data set's folder, and a disk that
+                    is full
 
     Accelerations are float32 in m/s^2 however they are stored: nothing is lost, and int16 scales
     are left out.
@@ -87,17 +85,15 @@ def export(
             writers[to](data, temporary)
             _publish(temporary, out)
         except HDF5_ERRORS as error:
-            _cannot_write(out, error)
+            reason = getattr(error, "strerror", None) or first_line(error)
+            raise DatasetError(f"cannot write {out}: {reason}") from error
         finally:
             if temporary.is_dir():
                 shutil.rmtree(temporary, ignore_errors=True)
             temporary.unlink(missing_ok=True)
-        files = sorted(path for path in out.iterdir()) if out.is_dir() else [out]
-        return {
-            "records": data.n_records,
-            "files": len(files),
-            "bytes": sum(path.stat().st_size for path in files),
-        }
+        files = list(out.iterdir()) if out.is_dir() else [out]
+        n_bytes = sum(path.stat().st_size for path in files)
+        return {"records": data.n_records, "files": len(files), "bytes": n_bytes}
 
 
 def _check_request(
@@ -119,36 +115,31 @@ def _check_request(
         raise DatasetError(f"{out}: there is no folder {out.parent}; make it first")
     if out.resolve().is_relative_to(folder.resolve()):
         raise DatasetError(
-            f"{out} lies in the data set {folder}, which holds its own files only; choose another place"
+            f"{out} lies in the data set {folder}, which holds its own files only; choose "
+            "another place"
         )
 
 
 def _check_ids(data: Dataset) -> None:
-    """Refuse rows that are not those of the plan.
+    """Raise DatasetError for rows that are not those of the plan.
 
-    Ids become file names, and only the plan's were checked.
+    Ids become file names, and only the ids of the plan were checked.
     """
     if not np.array_equal(data.column("record_id"), data.plan.columns["record_id"]):
         raise DatasetError(
-            f"{data.folder}: shards and plan have different record ids; run `gensig verify {data.folder}`"
+            f"{data.folder}: shards and plan have different record ids; run `gensig verify "
+            f"{data.folder}`"
         )
 
 
 def _check_space(data: Dataset, out: Path) -> None:
-    """Refuse before writing what cannot fit: HDF5 crashes the process on a full disk."""
-    n_bytes = data.n_records * sum(
-        signal_row(data, 0, name).nbytes for name in data.signal_names
-    )
+    """Raise DatasetError where the export cannot fit: HDF5 crashes on a full disk."""
+    n_bytes = data.n_records * record_bytes(data)
     free = shutil.disk_usage(out.parent).free
     if n_bytes > free:
         raise DatasetError(
             f"{out} needs about {n_bytes} bytes and {free} are free; choose another disk"
         )
-
-
-def _cannot_write(out: Path, error: Exception) -> NoReturn:
-    reason = getattr(error, "strerror", None) or first_line(error)
-    raise DatasetError(f"cannot write {out}: {reason}") from error
 
 
 def _publish(temporary: Path, out: Path) -> None:
@@ -170,16 +161,13 @@ def _write_hdf5(data: Dataset, path: Path) -> None:
         for name in column_names(data):
             column = SIGNALS.get(name) or COLUMNS.get(name)
             sample = data.shard_column(0, name)
-            dtype = sample.dtype
+            shape, dtype = (data.n_records, *sample.shape[1:]), sample.dtype
             if dtype.kind == "U":
-                plain = all(
-                    text.isascii() for text in np.unique(data.column(name)).tolist()
-                )
-                dtype = h5py.string_dtype(
-                    "ascii" if plain else "utf-8",
-                    column.n_bytes if column else TEXT_BYTES,
-                )
-            item = file.create_dataset(name, (data.n_records, *sample.shape[1:]), dtype)
+                is_ascii = "".join(np.unique(data.column(name))).isascii()
+                encoding = "ascii" if is_ascii else "utf-8"
+                n_bytes = column.n_bytes if column else TEXT_BYTES
+                dtype = h5py.string_dtype(encoding, n_bytes)
+            item = file.create_dataset(name, shape, dtype)
             set_attribute(item, "unit", unit_of(data, name))
             for shard, entry in enumerate(data.manifest.shards):
                 values = data.shard_column(shard, name)
@@ -188,54 +176,51 @@ def _write_hdf5(data: Dataset, path: Path) -> None:
                     values = np.char.encode(values, "utf-8").astype(item.dtype)
                 item[start : start + entry.rows] = values
         for name in data.signal_names:
-            shape, dtype = signal_layout(data, name)
-            item = file.create_dataset(
-                name, (data.n_records, *shape), dtype, chunks=(1, *shape)
-            )
+            first = signal_row(data, 0, name)
+            shape, chunks = (data.n_records, *first.shape), (1, *first.shape)
+            item = file.create_dataset(name, shape, first.dtype, chunks=chunks)
             set_attribute(item, "unit", unit_of(data, name))
             for index in range(data.n_records):
                 item[index] = signal_row(data, index, name)
 
 
 def _write_wav(data: Dataset, folder: Path, *, one_channel: bool) -> None:
-    """Float32 files in m/s^2: values beyond 1 are no mistake, but a player would clip them."""
+    """Float32 files in m/s^2. Values beyond 1 are right, but a player would clip them."""
     from scipy.io import wavfile
 
     rate = round(data.sampling_rate)
     if rate != data.sampling_rate:
         raise DatasetError(
-            f"sampling rate {data.sampling_rate} Hz: a wav file holds whole hertz only; use another format"
+            f"sampling rate {data.sampling_rate} Hz: a wav file holds whole hertz only; use "
+            "another format"
         )
     folder.mkdir()
-    names = [
-        name for name in column_names(data) if data.shard_column(0, name).ndim == 1
-    ]
+    names = column_names(data)
+    names = [name for name in names if data.shard_column(0, name).ndim == 1]
     with (folder / "labels.csv").open("w", encoding="utf-8", newline="") as stream:
         table = csv.writer(stream, lineterminator="\n")
-        table.writerow(["file", *(["channel"] if one_channel else []), *names])
+        table.writerow(["file", *["channel"] * one_channel, *names])
         for shard in range(len(data.manifest.shards)):
             columns = [data.shard_column(shard, name).tolist() for name in names]
             for row, values in enumerate(zip(*columns, strict=True)):
-                record_id, signal = (
-                    values[names.index("record_id")],
-                    data.signals(data.first_record(shard) + row),
-                )
-                for name, channel, block in _wav_files(
-                    data, record_id, signal, one_channel=one_channel
-                ):
-                    wavfile.write(folder / name, rate, np.ascontiguousarray(block.T))
-                    table.writerow([name, *channel, *values])
-    (folder / "attributes.json").write_text(
-        attributes_json(data.attributes), encoding="utf-8"
-    )
+                signal = data.signals(data.first_record(shard) + row)
+                files: list[tuple[str, list[str], np.ndarray]] = [("", [], signal)]
+                if one_channel:
+                    files = _channels(data.channel_names, signal)
+                for suffix, channel, block in files:
+                    file = f"{values[names.index('record_id')]}{suffix}.wav"
+                    wavfile.write(folder / file, rate, np.ascontiguousarray(block.T))
+                    table.writerow([file, *channel, *values])
+    text = attributes_json(data.attributes)
+    (folder / "attributes.json").write_text(text, encoding="utf-8")
 
 
-def _wav_files(
-    data: Dataset, record_id: str, signal: np.ndarray, *, one_channel: bool
-) -> Iterator[tuple[str, list[str], np.ndarray]]:
-    if not one_channel:
-        yield f"{record_id}.wav", [], signal
-        return
-    for number, name in enumerate(data.channel_names):
-        plain = "".join(c if c.isascii() and c.isalnum() else "_" for c in name)[:40]
-        yield f"{record_id}.{number}-{plain}.wav", [name], signal[number]
+def _channels(
+    names: list[str], signal: np.ndarray
+) -> list[tuple[str, list[str], np.ndarray]]:
+    """End of the file's name, name and samples of each channel."""
+    files = []
+    for number, name in enumerate(names):
+        plain = re.sub(r"[^A-Za-z0-9]", "_", name)[:40]
+        files.append((f".{number}-{plain}", [name], signal[number]))
+    return files

@@ -1,7 +1,4 @@
-"""Data sets as npz and Parquet, and what all exporters share.
-
-Which columns go out, and time signals by record.
-"""
+"""Data sets as npz and Parquet; columns and time signals of all exports."""
 
 import json
 import zipfile
@@ -11,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from gensig.dataset.columns import COLUMNS
 from gensig.dataset.reader import Dataset
-from gensig.dataset.schema import COLUMNS, SCALES, SIGNALS, unit_in_file
+from gensig.dataset.schema import SCALES, SIGNALS, unit_in_file
 from gensig.errors import DatasetError
 
 ROW_GROUP_BYTES = 16 * 1024**2
@@ -35,10 +33,9 @@ def attributes_json(attributes: Mapping[str, Any]) -> str:
     return json.dumps(dict(attributes), indent=1, ensure_ascii=False) + "\n"
 
 
-def signal_layout(data: Dataset, name: str) -> tuple[tuple[int, ...], np.dtype]:
-    """Shape and type of one record's time signal, as `signal_row` gives it."""
-    row = signal_row(data, 0, name)
-    return row.shape, row.dtype
+def record_bytes(data: Dataset) -> int:
+    """Bytes of the time signals of one record."""
+    return sum(signal_row(data, 0, name).nbytes for name in data.signal_names)
 
 
 def signal_row(data: Dataset, index: int, name: str) -> np.ndarray:
@@ -46,7 +43,9 @@ def signal_row(data: Dataset, index: int, name: str) -> np.ndarray:
 
     Accelerations (channel, sample) float32 in m/s^2, others (sample,) as stored.
     """
-    return data.signals(index, name=name) if name in SCALES else data.trace(index, name)
+    if name in SCALES:
+        return data.signals(index, name=name)
+    return data.trace(index, name)
 
 
 def write_npz(data: Dataset, path: Path) -> None:
@@ -60,9 +59,10 @@ def write_npz(data: Dataset, path: Path) -> None:
         for name, values in arrays.items():
             _write_npy(archive, name, values.shape, values.dtype, [values])
         for name in data.signal_names:
-            shape, dtype = signal_layout(data, name)
+            first = signal_row(data, 0, name)
+            shape = (data.n_records, *first.shape)
             rows = (signal_row(data, index, name) for index in range(data.n_records))
-            _write_npy(archive, name, (data.n_records, *shape), dtype, rows)
+            _write_npy(archive, name, shape, first.dtype, rows)
 
 
 def _write_npy(
@@ -111,26 +111,22 @@ def write_parquet(data: Dataset, path: Path, *, samples: bool) -> None:
             name: nested(data.shard_column(shard, name)[start:stop])
             for name in column_names(data)
         }
-        for name in data.signal_names if samples else []:
+        for name in data.signal_names * samples:
             rows = [signal_row(data, first + row, name) for row in range(start, stop)]
             arrays[name] = nested(np.stack(rows))
-        fields = [
-            pyarrow.field(
-                name,
-                array.type,
-                metadata={"unit": unit} if (unit := unit_of(data, name)) else None,
-            )
-            for name, array in arrays.items()
-        ]
-        return pyarrow.RecordBatch.from_arrays(
-            list(arrays.values()), schema=pyarrow.schema(fields)
-        )
+        fields = []
+        for name, array in arrays.items():
+            unit = unit_of(data, name)
+            metadata = {"unit": unit} if unit else None
+            fields.append(pyarrow.field(name, array.type, metadata=metadata))
+        schema = pyarrow.schema(fields)
+        return pyarrow.RecordBatch.from_arrays(list(arrays.values()), schema=schema)
 
-    n_bytes = sum(signal_row(data, 0, name).nbytes for name in data.signal_names)
-    step = max(1, ROW_GROUP_BYTES // n_bytes) if samples else ROWS_LIMIT
-    schema = batch(0, 0, 1).schema.with_metadata(
-        {"gensig": attributes_json(data.attributes)}
-    )
+    step = ROWS_LIMIT
+    if samples:
+        step = max(1, ROW_GROUP_BYTES // record_bytes(data))
+    notes = {"gensig": attributes_json(data.attributes)}
+    schema = batch(0, 0, 1).schema.with_metadata(notes)
     # Samples hardly repeat: looking for repetitions takes memory and time for nothing.
     texts = [field.name for field in schema if pyarrow.types.is_string(field.type)]
     with parquet.ParquetWriter(path, schema, use_dictionary=texts) as writer:

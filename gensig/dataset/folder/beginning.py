@@ -1,7 +1,4 @@
-"""The beginning of a data-set folder: its plan, its splits and, last, the manifest.
-
-Or nothing that anyone mistakes.
-"""
+"""Creation of a data-set folder: plan, splits and, last, the manifest."""
 
 import hashlib
 from collections.abc import Sequence
@@ -54,7 +51,8 @@ def create_folder(
 
     Parameters
     ----------
-    out : Path           a folder that does not exist, is empty, or was left by a call that was killed
+    out : Path           a folder that does not exist, is empty, or was left by a call that was
+                         killed
     config : dict        resolved configuration, plain values
     overrides : list     what the user typed
     plan : Plan          all records; it fixes the shards
@@ -64,27 +62,24 @@ def create_folder(
 
     Raises
     ------
-    DatasetError    when `out` holds anything else, before anything is touched; when the disk refuses, after which
-                    nothing new is left
+    DatasetError    when `out` holds anything else, before anything is touched; when the disk
+                    refuses, after which nothing new is left
     """
     out = Path(out)
     if identity != identity_hash(config, generator_version):
         raise DatasetError(
-            f"identity {identity[:12]} does not belong to this configuration; use identity_hash(config, ...)"
+            f"identity {identity[:12]} does not belong to this configuration; use "
+            "identity_hash(config, ...)"
         )
+    stored, typed = stored_config(config), list(map(str, overrides))
     texts = {
-        CONFIG: yaml.safe_dump(
-            stored_config(config), sort_keys=False, allow_unicode=True
-        ),
-        OVERRIDES: yaml.safe_dump(
-            [str(item) for item in overrides], allow_unicode=True
-        ),
+        CONFIG: yaml.safe_dump(stored, sort_keys=False, allow_unicode=True),
+        OVERRIDES: yaml.safe_dump(typed, allow_unicode=True),
         PLAN: plan_text(plan),
-        **{
-            f"{SPLITS}/{name}.csv": table.to_csv()
-            for name, table in make_splits(plan, seed).items()
-        },
     }
+    for name, table in make_splits(plan, seed).items():
+        texts[f"{SPLITS}/{name}.csv"] = table.to_csv()
+    note = {BEGINNING: "This folder is being made by gensig.\n"}
     manifest = Manifest(
         generator_version=generator_version,
         identity=identity,
@@ -94,27 +89,19 @@ def create_folder(
             ShardEntry(name=shard_name(i), rows=rows)
             for i, rows in enumerate(plan.shard_sizes())
         ),
-        files={
-            name: hashlib.sha256(text.encode()).hexdigest()
-            for name, text in texts.items()
-        },
+        files={name: _digest(text) for name, text in texts.items()},
         configuration=deciding(config),
         environment=environment(),
     )
     made: list[Path] = []
     try:
         refuse_used(out)
-        _make_folders(
-            [folder for folder in (*reversed(out.parents), out) if not folder.exists()],
-            made,
-        )
+        folders = (*reversed(out.parents), out)
+        _make_folders([folder for folder in folders if not folder.exists()], made)
         with locked(out):
             refuse_used(out)  # another process may have been faster
             _clear(out)
-            for name, text in {
-                BEGINNING: "This folder is being made by gensig.\n",
-                **texts,
-            }.items():
+            for name, text in (note | texts).items():
                 made.append(out / name)
                 if not (out / name).parent.exists():
                     _make_folders([(out / name).parent], made)
@@ -125,34 +112,38 @@ def create_folder(
     except BaseException as error:
         for path in reversed(made):
             with suppress(OSError):
-                path.rmdir() if path.is_dir() else path.unlink(missing_ok=True)
+                _remove(path)
         if isinstance(error, OSError):
             raise cannot_write(out, error) from error
         raise
 
 
 def refuse_used(out: Path) -> None:
-    """Raise DatasetError where a folder exists and holds something, other than a beginning that
-    was killed.
-    """
+    """Raise DatasetError where a folder holds anything but a beginning that was killed."""
     if out.is_dir():
         if any(out.iterdir()) and not _is_killed_beginning(out):
-            raise DatasetError(f"{out} {_what_it_holds(out)}")
+            raise DatasetError(f"{out} {_contents(out)}")
     elif out.exists() or out.is_symlink():
         raise DatasetError(f"{out} exists and is no folder; choose another out=DIR")
 
 
-def _what_it_holds(out: Path) -> str:
-    """What stands in the way of a new data set, and what to do."""
+def _contents(out: Path) -> str:
+    """Words on the contents that stand in the way of a new data set, and on the remedy."""
     try:
         manifest = read_manifest(out)
     except DatasetError:
         return "exists and is not empty; choose another out=DIR or empty it first"
     if manifest.is_complete:
-        return f"is not empty: a complete data set of {manifest.n_records} records; choose another out=DIR"
+        return (
+            f"is not empty: a complete data set of {manifest.n_records} records; choose another "
+            "out=DIR"
+        )
     kind = "an interrupted" if manifest.n_done else "a planned"
     done = f"{manifest.n_made} of {manifest.n_records} records done"
-    return f"is not empty: {kind} data set, {done}; `gensig resume {out}` finishes it, another out=DIR begins one"
+    return (
+        f"is not empty: {kind} data set, {done}; `gensig resume {out}` finishes it, another "
+        "out=DIR begins one"
+    )
 
 
 def _make_folders(folders: Sequence[Path], made: list[Path]) -> None:
@@ -163,9 +154,7 @@ def _make_folders(folders: Sequence[Path], made: list[Path]) -> None:
 
 
 def _is_killed_beginning(out: Path) -> bool:
-    """True for a folder that holds the note of `create_folder` and nothing but what that writes
-    before the manifest.
-    """
+    """True for a folder with the note of `create_folder` and files from before its manifest."""
     names = {path.name for path in out.iterdir() if not _is_temporary(path)}
     if not names:  # killed while it wrote the note
         return all(path.name.startswith(f".{BEGINNING}.") for path in out.iterdir())
@@ -184,11 +173,7 @@ def _is_killed_beginning(out: Path) -> bool:
 
 
 def _is_temporary(path: Path) -> bool:
-    return (
-        path.name.startswith(".")
-        and path.name.endswith(TEMPORARY_SUFFIX)
-        and path.is_file()
-    )
+    return path.match(f".*{TEMPORARY_SUFFIX}") and path.is_file()
 
 
 def _clear(out: Path) -> None:
@@ -199,4 +184,15 @@ def _clear(out: Path) -> None:
         reverse=True,
     )
     for path in paths:
-        path.rmdir() if path.is_dir() and not path.is_symlink() else path.unlink()
+        _remove(path)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        path.rmdir()
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()

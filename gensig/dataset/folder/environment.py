@@ -1,6 +1,7 @@
-"""Where and with what a data set was made: kept in the manifest for people, decides no bit."""
+"""Environment of a run, kept in the manifest for people; it decides no bit."""
 
 import platform
+import re
 import subprocess
 from datetime import UTC, datetime
 from importlib import metadata
@@ -13,9 +14,7 @@ PACKAGES = ("numpy", "scipy", "numba", "h5py", "hdf5plugin")
 
 
 def environment() -> dict[str, Any]:
-    """Versions of Python and the packages, processor, platform, git commit ('' when none) and the
-    time now (UTC).
-    """
+    """Versions of Python and packages, processor, platform, git commit or '', and time (UTC)."""
     return {
         "python": platform.python_version(),
         **{name: _version(name) for name in PACKAGES},
@@ -41,21 +40,11 @@ def _version(package: str) -> str:
 
 def _cpu_model() -> str:
     try:
-        lines = (
-            Path("/proc/cpuinfo")
-            .read_text(encoding="utf-8", errors="replace")
-            .splitlines()
-        )
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
     except OSError:
         return platform.processor()
-    return next(
-        (
-            line.partition(":")[2].strip()
-            for line in lines
-            if line.startswith("model name")
-        ),
-        platform.machine(),
-    )
+    match = re.search(r"^model name.*?:(.*)", text, re.MULTILINE)
+    return match[1].strip() if match else platform.machine()
 
 
 def _git_commit() -> str:
@@ -76,4 +65,4 @@ def _git_commit() -> str:
         )
     except (OSError, subprocess.SubprocessError):
         return ""
-    return run.stdout.strip() if run.returncode == 0 else ""
+    return "" if run.returncode else run.stdout.strip()

@@ -1,4 +1,4 @@
-"""Why records of a data set failed, in one line."""
+"""Reasons of failed records of a data set."""
 
 import re
 from collections import Counter
@@ -12,8 +12,7 @@ _NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", re.IGNORECASE)
 
 
 def commonest(reasons: Iterable[str]) -> str:
-    """The reason that most share but for its numbers, in the words of the first; with their count
-    where others differ.
+    """The most frequent reason but for its numbers; with its count where others differ.
 
     >>> commonest(["torque 3 N m: no end", "torque 5 N m: no end", "not finite"])
     'torque 3 N m: no end (2 of 3)'
@@ -21,24 +20,23 @@ def commonest(reasons: Iterable[str]) -> str:
     kept = list(reasons)
     kind, n = Counter(map(without_numbers, kept)).most_common(1)[0]
     first = next(reason for reason in kept if without_numbers(reason) == kind)
-    return first if n == len(kept) else f"{first} ({n} of {len(kept)})"
+    if n == len(kept):
+        return first
+    return f"{first} ({n} of {len(kept)})"
 
 
 def without_numbers(reason: str) -> str:
-    """What two records have in common that failed for the same reason."""
+    """A reason with '#' for each of its numbers."""
     return _NUMBER.sub("#", reason)
 
 
 def failure_reasons(folder: Path) -> list[str]:
-    """`status_reason` of every failed record of the shards that are done.
-
-    [] where a shard does not tell it.
-    """
-    found: list[str] = []
+    """`status_reason` of every failed record of the finished shards that store it."""
+    reasons: list[str] = []
     for index, entry in enumerate(read_manifest(folder).shards):
         if entry.state == "done" and entry.n_failed:
             with open_shard(shard_path(folder, index), folder=folder) as file:
                 if "status_reason" in file:
                     failed = read_rows(file["status"]) == "failed"
-                    found += read_rows(file["status_reason"])[failed].tolist()
-    return found
+                    reasons += read_rows(file["status_reason"])[failed].tolist()
+    return reasons

@@ -1,4 +1,4 @@
-"""What is in this file or folder: readable text, for data sets, shards and any other HDF5 file."""
+"""Descriptions in text of data sets, shards and other HDF5 files."""
 
 from pathlib import Path
 
@@ -32,15 +32,8 @@ def inspect(path: Path) -> str:
         )
     with open_file(path) as file:
         try:
-            return (
-                "\n".join(
-                    [
-                        f"{_show(path)}: HDF5 file, {path.stat().st_size} bytes",
-                        *_objects(file),
-                    ]
-                )
-                + "\n"
-            )
+            title = f"{_show(path)}: HDF5 file, {path.stat().st_size} bytes"
+            return "\n".join([title, *_objects(file), ""])
         except HDF5_ERRORS as error:
             raise DatasetError(
                 f"{path} is damaged ({_show(error)}); restore it from a copy"
@@ -49,33 +42,30 @@ def inspect(path: Path) -> str:
 
 def _folder(folder: Path) -> str:
     manifest = read_manifest(folder)
-    lines = [
-        f"{_show(folder)}: data set, format version {manifest.schema_version}, {manifest.state}",
-        *_how_to_finish(folder, manifest),
-        *_manifest_lines(folder, manifest),
-    ]
+    name = _show(folder)
+    version = f"format version {manifest.schema_version}"
+    lines = [f"{name}: data set, {version}, {manifest.state}"]
+    if not manifest.is_complete:
+        done = f"{manifest.n_made} of {manifest.n_records} records"
+        lines.append(f"  done         {done}; `gensig resume {name}` finishes it")
+    lines += _manifest_lines(folder, manifest)
     if manifest.n_done:
         with open_dataset(folder, allow_incomplete=True) as data:
             lines += _dataset_lines(data)
-    return "\n".join(lines) + "\n"
-
-
-def _how_to_finish(folder: Path, manifest: Manifest) -> list[str]:
-    if manifest.is_complete:
-        return []
-    done = f"{manifest.n_made} of {manifest.n_records} records"
-    return [f"  done         {done}; `gensig resume {_show(folder)}` finishes it"]
+    return "\n".join([*lines, ""])
 
 
 def _manifest_lines(folder: Path, manifest: Manifest) -> list[str]:
-    states = {
-        state: sum(entry.state == state for entry in manifest.shards)
+    states = [entry.state for entry in manifest.shards]
+    counts = [
+        f"{states.count(state)} {state}"
         for state in ("planned", "done", "failed")
-    }
+        if state in states
+    ]
     n_bytes = sum(entry.bytes for entry in manifest.shards)
     return [
         f"  records      {manifest.n_records}, {manifest.n_failed} failed",
-        f"  shards       {', '.join(f'{n} {state}' for state, n in states.items() if n)}; {n_bytes} bytes",
+        f"  shards       {', '.join(counts)}; {n_bytes} bytes",
         f"  made by      gensig {_show(manifest.generator_version)}, seed {manifest.seed}, "
         f"{_show(manifest.environment.get('created', ''))}",
         f"  identity     {manifest.identity}",
@@ -86,17 +76,13 @@ def _manifest_lines(folder: Path, manifest: Manifest) -> list[str]:
 def _dataset_lines(data: Dataset) -> list[str]:
     usable = data.usable
     duration = data.n_samples / data.sampling_rate
-    units = " and ".join(
-        map(_show, dict.fromkeys(data.attributes.get("channel_units", ["m/s^2"])))
-    )
-    of_what = (
-        f", of the {_show(data.attributes['torque_of'])}"
-        if "torque_of" in data.attributes
-        else ""
-    )
+    units = dict.fromkeys(data.attributes.get("channel_units", ["m/s^2"]))
+    of_what = ""
+    if "torque_of" in data.attributes:
+        of_what = f", of the {_show(data.attributes['torque_of'])}"
     lines = [
-        f"  signal       acceleration ({len(data.channel_names)}, {data.n_samples}) float32, {units}, "
-        f"{data.sampling_rate:g} Hz, {duration:g} s",
+        f"  signal       acceleration ({len(data.channel_names)}, {data.n_samples}) float32, "
+        f"{' and '.join(map(_show, units))}, {data.sampling_rate:g} Hz, {duration:g} s",
         f"  stored as    {data.sample_type}{' with a scale' * (data.sample_type == 'int16')}, "
         f"compression {data.compression}",
         f"  channels     {', '.join(map(_show, data.channel_names))}",
@@ -120,11 +106,10 @@ def _dataset_lines(data: Dataset) -> list[str]:
 
 def _counts(values: np.ndarray) -> str:
     names, counts = np.unique(values[values != ""], return_counts=True)
-    shown = [
-        f"{_show(name)} {count}"
-        for name, count in zip(names[:12].tolist(), counts[:12].tolist(), strict=True)
-    ]
-    return f"{len(names)}: " + ", ".join(shown) + (", ..." if len(names) > 12 else "")
+    pairs = zip(names[:12].tolist(), counts[:12].tolist(), strict=True)
+    shown = [f"{_show(name)} {count}" for name, count in pairs]
+    shown += ["..."] * (len(names) > 12)
+    return f"{len(names)}: {', '.join(shown)}"
 
 
 def _objects(file: h5py.File) -> list[str]:
@@ -138,8 +123,9 @@ def _objects(file: h5py.File) -> list[str]:
         prefix, group = pending.pop()
         for key in group:
             name = f"{prefix}/{key}"
-            link = group.get(key, getlink=True)
-            item = group[key] if isinstance(link, h5py.HardLink) else None
+            link, item = group.get(key, getlink=True), None
+            if isinstance(link, h5py.HardLink):
+                item = group[key]
             if isinstance(item, h5py.Group):
                 if item.id.__hash__() not in seen:
                     seen.add(item.id.__hash__())
@@ -151,23 +137,24 @@ def _objects(file: h5py.File) -> list[str]:
                 )
             else:
                 lines.append(f"  {_show(name)} -> {type(link).__name__}, not followed")
-    return lines if len(lines) < OBJECTS_LIMIT else [*lines[:OBJECTS_LIMIT], "  ..."]
+    if len(lines) < OBJECTS_LIMIT:
+        return lines
+    return [*lines[:OBJECTS_LIMIT], "  ..."]
 
 
 def _dataset_notes(data: h5py.Dataset) -> str:
-    found = read_attributes(data)
-    unit = found.pop("unit", "")
-    unit = f", {_show(unit)}" if unit else ""
-    virtual = (
-        ", virtual"
-        if data.is_virtual
-        else ", data in another file, not read"
-        if data.external
-        else ""
-    )
-    rest = "".join(f", {_show(name)}={_show(value)}" for name, value in found.items())
-    small = data.size == 1 and data.dtype.kind in "iuf" and holds_its_data(data)
-    return unit + virtual + rest + (f", value {data[()]}" if small else "")
+    attributes = read_attributes(data)
+    notes = [""]
+    if unit := attributes.pop("unit", ""):
+        notes.append(_show(unit))
+    if data.is_virtual:
+        notes.append("virtual")
+    elif data.external:
+        notes.append("data in another file, not read")
+    notes += [f"{_show(name)}={_show(value)}" for name, value in attributes.items()]
+    if data.size == 1 and data.dtype.kind in "iuf" and holds_its_data(data):
+        notes.append(f"value {data[()]}")
+    return ", ".join(notes)
 
 
 def _show(value: object) -> str:
@@ -176,4 +163,6 @@ def _show(value: object) -> str:
     Text from files cannot steer the terminal.
     """
     text = "".join(c if c.isprintable() else "?" for c in str(value))
-    return text if len(text) <= WIDTH else text[: WIDTH - 3] + "..."
+    if len(text) > WIDTH:
+        return f"{text[: WIDTH - 3]}..."
+    return text

@@ -1,7 +1,4 @@
-"""Joining a data-set folder.
-
-Only the version and configuration that began it may go on, for the bits' sake.
-"""
+"""Continuation of a data-set folder by the version and configuration that began it."""
 
 from __future__ import annotations
 
@@ -34,37 +31,35 @@ def joined_folder(
 
     Raises
     ------
-    DatasetError    for another version, a configuration or plan that was changed (with the keys that differ), and a
-                    compression whose package is missing
+    DatasetError    for another version, a configuration or plan that was changed (with the keys
+                    that differ), and a compression whose package is missing
     """
     manifest, config = read_manifest(out), read_config(out)
     if manifest.generator_version != __version__:
         raise DatasetError(
-            f"{out} was begun by gensig {manifest.generator_version}, this is gensig {__version__}, whose bits may "
-            "differ: go on with that version, or start a new folder"
+            f"{out} was begun by gensig {manifest.generator_version}, this is gensig "
+            f"{__version__}, whose bits may differ: go on with that version, or start a new "
+            "folder"
         )
     if identity_hash(config, __version__) != manifest.identity:
-        begun = manifest.configuration
-        told = (
-            begun
-            and identity_hash(begun, manifest.generator_version) == manifest.identity
-        )
-        where = f" in {_listed(differing_keys(begun, config))}" if told else ""
+        begun, where = manifest.configuration, ""
+        if begun and identity_hash(begun, __version__) == manifest.identity:
+            where = f" in {_listed(differing_keys(begun, config))}"
         raise DatasetError(
-            f"{out / CONFIG} was changed{where} since the folder was begun; undo that, or start a new folder"
+            f"{out / CONFIG} was changed{where} since the folder was begun; undo that, or start "
+            "a new folder"
         )
     if asked is not None and (keys := differing_keys(config, asked)):
         raise DatasetError(
-            f"{out} was begun with another {_listed(keys)}; leave that out, or start a new folder: only executor.* may "
-            "change"
+            f"{out} was begun with another {_listed(keys)}; leave that out, or start a new "
+            "folder: only executor.* may change"
         )
     if manifest.files.get(PLAN) != sha256_file(out / PLAN):
         raise DatasetError(
-            f"{out / PLAN} was changed since the folder was begun; restore it, or start a new folder"
+            f"{out / PLAN} was changed since the folder was begun; restore it, or start a new "
+            "folder"
         )
-    creation_options(
-        config["dataset"]["compression"]
-    )  # refuses one whose package is missing
+    creation_options(config["dataset"]["compression"])  # its package may be missing
     return manifest, config
 
 

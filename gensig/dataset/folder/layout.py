@@ -1,4 +1,4 @@
-"""What lies where in a data-set folder, and its manifest: the list of shards and their states."""
+"""Names of the files in a data-set folder, and its manifest with the states of the shards."""
 
 import json
 import re
@@ -46,9 +46,8 @@ def shard_path(folder: Path, index: int) -> Path:
     return folder / SHARDS / shard_name(index)
 
 
-# Content of config.yaml: nested mappings, lists, text, numbers, booleans and null. It is a
-# stranger's
-# data until `gensig.options.configuration.Configuration` takes it.
+# Content of config.yaml: nested mappings, lists, text, numbers, booleans and null. It is
+# unchecked until `gensig.options.configuration.Configuration` takes it.
 ConfigContent = dict[str, Any]
 
 
@@ -77,7 +76,8 @@ class Manifest:
     state : str            'incomplete', or 'complete' once everything else is on disk
     shards : tuple         one entry a shard, in order
     files : dict           sha256 of the other files that decide or list the records
-    configuration : dict   what `identity` was made of, so that keys changed since can be named; {} in older folders
+    configuration : dict   what `identity` was made of, so that keys changed since can be named; {}
+                           in older folders
     environment : dict     versions, machine and times; decides nothing
     """
 
@@ -114,11 +114,9 @@ class Manifest:
 
 
 def manifest_text(manifest: Manifest) -> str:
-    """What `manifest.json` holds."""
-    return (
-        json.dumps(asdict(manifest), indent=1, ensure_ascii=False, allow_nan=False)
-        + "\n"
-    )
+    """Text of `manifest.json`."""
+    content = asdict(manifest)
+    return f"{json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)}\n"
 
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:
@@ -131,48 +129,42 @@ def read_manifest(folder: Path) -> Manifest:
 
     Raises
     ------
-    DatasetError    when the folder is no data set, or the manifest is damaged, newer than this gensig, or names a file
-                    that is not one of a data set (such as '../other')
+    DatasetError    when the folder is no data set, or the manifest is damaged, newer than this
+                    gensig, or names a file that is not one of a data set (such as '../other')
     """
     folder = Path(folder)
     path = folder / MANIFEST
     if not path.is_file():
         if (folder / BEGINNING).is_file():
             raise DatasetError(
-                f"{folder} holds no record: its run was killed before the plan was on disk; give the same "
-                f"`gensig generate` or `gensig plan --freeze` with out={folder} again"
+                f"{folder} holds no record: its run was killed before the plan was on disk; give "
+                f"the same `gensig generate` or `gensig plan --freeze` with out={folder} again"
             )
         raise DatasetError(
-            f"{folder} is no gensig data set: it has no {MANIFEST}; give the folder that `gensig generate` made"
+            f"{folder} is no gensig data set: it has no {MANIFEST}; give the folder that `gensig "
+            "generate` made"
         )
     try:
         content = json.loads(read_text(path, limit=TEXT_BYTES_LIMIT))
         version = _get(content, "schema_version", int)
         if version != SCHEMA_VERSION:
             raise DatasetError(
-                f"format version {version}; this gensig reads {SCHEMA_VERSION}, install a matching one"
+                f"format version {version}; this gensig reads {SCHEMA_VERSION}, install a "
+                "matching one"
             )
-        shards = tuple(
-            shard_entry(i, entry)
-            for i, entry in enumerate(_get(content, "shards", list))
-        )
+        entries = enumerate(_get(content, "shards", list))
+        files = _get(content, "files", dict)
+        state = _get(content, "state", str)
         manifest = Manifest(
             schema_version=version,
             generator_version=_get(content, "generator_version", str),
             identity=_hash(_get(content, "identity", str), "identity"),
             seed=_get(content, "seed", int),
             n_records=_get(content, "n_records", int),
-            state=_one_of(
-                _get(content, "state", str), ("incomplete", "complete"), "state"
-            ),
-            shards=shards,
-            files={
-                name: _hash(value, name)
-                for name, value in _get(content, "files", dict).items()
-            },
-            configuration=_get(content, "configuration", dict)
-            if "configuration" in content
-            else {},
+            state=_choice(state, ("incomplete", "complete"), "state"),
+            shards=tuple(shard_entry(i, entry) for i, entry in entries),
+            files={name: _hash(value, name) for name, value in files.items()},
+            configuration=_get({"configuration": {}} | content, "configuration", dict),
             environment=_get(content, "environment", dict),
         )
         _check_manifest(manifest)
@@ -191,11 +183,11 @@ def _check_manifest(manifest: Manifest) -> None:
         raise DatasetError(
             f"n_records is {manifest.n_records}, the shards hold {rows}; the manifest is damaged"
         )
-    bad = [name for name in manifest.files if not _FILE.fullmatch(name)]
-    if bad:
-        raise DatasetError(
-            f"file {bad[0]!r} is not one of a data set; the manifest is damaged or forged"
-        )
+    for name in manifest.files:
+        if not _FILE.fullmatch(name):
+            raise DatasetError(
+                f"file {name!r} is not one of a data set; the manifest is damaged or forged"
+            )
     if manifest.is_complete and manifest.n_done < len(manifest.shards):
         raise DatasetError(
             "state is complete, but not every shard is done; the manifest is damaged"
@@ -206,7 +198,8 @@ def _get(content: Any, key: str, kind: type) -> Any:
     value = content.get(key) if isinstance(content, dict) else None
     if not isinstance(value, kind) or isinstance(value, bool):
         raise DatasetError(
-            f"'{key}' is missing or no {kind.__name__}; the manifest is damaged, restore it from a copy"
+            f"'{key}' is missing or no {kind.__name__}; the manifest is damaged, restore it from "
+            "a copy"
         )
     if isinstance(value, int) and value < 0:
         raise DatasetError(f"'{key}' is {value}; it cannot be negative")
@@ -221,7 +214,7 @@ def _hash(value: Any, name: str) -> str:
     return value
 
 
-def _one_of(value: str, allowed: tuple[str, ...], name: str) -> str:
+def _choice(value: str, allowed: tuple[str, ...], name: str) -> str:
     if value not in allowed:
         raise DatasetError(
             f"{name} is {value[:40]!r}; allowed are {', '.join(allowed)}"
@@ -232,15 +225,13 @@ def _one_of(value: str, allowed: tuple[str, ...], name: str) -> str:
 def shard_entry(index: int, content: Any) -> ShardEntry:
     """One entry of the list of shards, every name and type checked."""
     name = _get(content, "name", str)
-    if name != shard_name(
-        index
-    ):  # an exact match leaves no room for a path that leads out of the folder
+    # An exact match leaves no room for a path that leads out of the folder.
+    if name != shard_name(index):
         raise DatasetError(
             f"shard {index} is named {name[:80]!r}; the only name allowed is {shard_name(index)!r}"
         )
-    state = _one_of(
-        _get(content, "state", str), ("planned", "done", "failed"), f"state of {name}"
-    )
+    state = _get(content, "state", str)
+    _choice(state, ("planned", "done", "failed"), f"state of {name}")
     digest = _get(content, "sha256", str)
     entry = ShardEntry(
         name=name,
@@ -277,17 +268,17 @@ def read_config(folder: Path) -> ConfigContent:
 
 
 def _refuse_yaml_bombs(text: str, path: Path) -> None:
-    """Aliases make a small file expand without bound, deep nesting makes parsing take for ever."""
+    """Raise DatasetError for aliases, which expand without bound, and for very deep nesting."""
     depth = 0
     for event in yaml.parse(text, Loader=yaml.SafeLoader):
         if isinstance(event, yaml.AliasEvent):
             raise DatasetError(
                 f"{path} uses YAML aliases; a gensig configuration has none"
             )
-        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(
-            event, yaml.CollectionEndEvent
-        )
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
         if depth > CONFIG_DEPTH_LIMIT:
             raise DatasetError(
-                f"{path} is nested deeper than {CONFIG_DEPTH_LIMIT} levels; it is no gensig configuration"
+                f"{path} is nested deeper than {CONFIG_DEPTH_LIMIT} levels; it is no gensig "
+                "configuration"
             )

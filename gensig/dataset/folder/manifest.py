@@ -1,7 +1,4 @@
-"""The life of a data-set folder that has begun.
-
-Filled shard by shard, closed. Only closing makes it look whole.
-"""
+"""Changes of a data-set folder: entries of shards in its manifest, and its closing."""
 
 import hashlib
 import json
@@ -47,9 +44,8 @@ __all__ = [
 
 # These change where and how a data set is made, not one bit of it.
 NOT_IDENTITY = ("out", "executor", "verbosity")
-# Keys that came after 0.9.0 and the value that they have where they are missing. At that value
-# they are not stored and
-# no part of the identity: a folder that was begun without the key is the same data set.
+# Keys that came after 0.9.0 and their values where they are missing. At that value they are not
+# stored and no part of the identity: a folder that was begun without the key is the same data set.
 SINCE_0_9 = {"solver.backend": "runge_kutta"}
 RECEIPT_SUFFIX = ".done"
 
@@ -60,7 +56,8 @@ def identity_hash(config: ConfigContent, generator_version: str) -> str:
 
     Raises
     ------
-    DatasetError    when the configuration holds something other than text, numbers, booleans, null, lists and mappings
+    DatasetError    when the configuration holds something other than text, numbers, booleans,
+                    null, lists and mappings
     """
     content = {
         "config": deciding(config),
@@ -74,12 +71,9 @@ def identity_hash(config: ConfigContent, generator_version: str) -> str:
 
 
 def deciding(config: ConfigContent) -> dict[str, Any]:
-    """The part of a configuration that decides bits, as plain data of its own."""
-    return {
-        key: value
-        for key, value in stored_config(config).items()
-        if key not in NOT_IDENTITY
-    }
+    """The part of a configuration that decides bits, as a copy of plain data."""
+    stored = stored_config(config)
+    return {key: stored[key] for key in stored if key not in NOT_IDENTITY}
 
 
 def stored_config(config: dict[str, Any]) -> dict[str, Any]:
@@ -96,14 +90,14 @@ def stored_config(config: dict[str, Any]) -> dict[str, Any]:
     return stored
 
 
-def differing_keys(one: ConfigContent, other: ConfigContent) -> list[str]:
+def differing_keys(config: ConfigContent, other: ConfigContent) -> list[str]:
     """Dotted keys that decide bits and whose values differ between two configurations, in order."""
-    ours, theirs = SINCE_0_9 | _leaves(one), SINCE_0_9 | _leaves(other)
-    absent = object()
+    ours, theirs = SINCE_0_9 | _leaves(config), SINCE_0_9 | _leaves(other)
+    missing = object()
     return [
         key
-        for key in sorted({*ours, *theirs})
-        if repr(ours.get(key, absent)) != repr(theirs.get(key, absent))
+        for key in sorted(ours | theirs)
+        if repr(ours.get(key, missing)) != repr(theirs.get(key, missing))
     ]
 
 
@@ -126,20 +120,13 @@ def record_shard(
 
     Local processes may do so at once.
     """
-    _record(
-        out, {shard_index: {"sha256": sha256, "bytes": bytes, "n_failed": n_failed}}
-    )
+    facts = {"sha256": sha256, "bytes": bytes, "n_failed": n_failed}
+    _record(out, {shard_index: facts})
 
 
 def record_shards(out: Path, entries: Mapping[int, ShardEntry]) -> None:
     """Enter finished shards in the manifest in one go."""
-    _record(
-        out,
-        {
-            i: {"sha256": one.sha256, "bytes": one.bytes, "n_failed": one.n_failed}
-            for i, one in entries.items()
-        },
-    )
+    _record(out, {index: asdict(entry) for index, entry in entries.items()})
 
 
 def _record(out: Path, facts: Mapping[int, Mapping[str, Any]]) -> None:
@@ -148,7 +135,7 @@ def _record(out: Path, facts: Mapping[int, Mapping[str, Any]]) -> None:
             raise DatasetError(
                 f"{shard_path(out, index)} does not exist; a shard is written before it is recorded"
             )
-    _update(out, {index: {"state": "done", **fact} for index, fact in facts.items()})
+    _update(out, {index: {**fact, "state": "done"} for index, fact in facts.items()})
 
 
 def record_failed_shard(out: Path, shard_index: int) -> None:
@@ -156,9 +143,8 @@ def record_failed_shard(out: Path, shard_index: int) -> None:
 
     The data set cannot be closed until it is.
     """
-    _update(
-        out, {shard_index: {"state": "failed", "sha256": "", "bytes": 0, "n_failed": 0}}
-    )
+    failed = {"state": "failed", "sha256": "", "bytes": 0, "n_failed": 0}
+    _update(out, {shard_index: failed})
 
 
 def _update(out: Path, changes: Mapping[int, Mapping[str, Any]]) -> None:
@@ -179,8 +165,7 @@ def _update(out: Path, changes: Mapping[int, Mapping[str, Any]]) -> None:
 
 
 def finalize(out: Path, *, figures: bool = True) -> None:
-    """Close a data set whose shards are all done: index, card, checksums, and the state
-    'complete' last of all.
+    """Close a data set whose shards are all done: index, card, checksums, and last the state.
 
     Parameters
     ----------
@@ -200,14 +185,15 @@ def finalize(out: Path, *, figures: bool = True) -> None:
             named = ", ".join(f"{entry.name} is {entry.state}" for entry in missing[:3])
             more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
             raise DatasetError(
-                f"{out}: {manifest.n_done} of {len(manifest.shards)} shards are done, {named}{more}; run `gensig "
-                f"resume {out}` first"
+                f"{out}: {manifest.n_done} of {len(manifest.shards)} shards are done, "
+                f"{named}{more}; run `gensig resume {out}` first"
             )
         for i, entry in enumerate(manifest.shards):
             path = shard_path(out, i)
             if not path.is_file() or path.stat().st_size != entry.bytes:
                 raise DatasetError(
-                    f"{path} is missing or has not the {entry.bytes} bytes recorded; run `gensig resume {out}`"
+                    f"{path} is missing or has not the {entry.bytes} bytes recorded; run `gensig "
+                    f"resume {out}`"
                 )
         _remove_leftovers(out)
         closed = replace(
@@ -217,9 +203,8 @@ def finalize(out: Path, *, figures: bool = True) -> None:
             environment={**manifest.environment, "finished": now()},
         )
         write_card(out, figures=figures)
-        write_checksums(
-            out, closed, hashlib.sha256(manifest_text(closed).encode()).hexdigest()
-        )
+        text = manifest_text(closed)
+        write_checksums(out, closed, hashlib.sha256(text.encode()).hexdigest())
         write_manifest(out, closed)
 
 
@@ -240,7 +225,8 @@ def file_digests(folder: Path, manifest: Manifest) -> Iterator[tuple[str, str, s
     for name, recorded in manifest.files.items():
         path = folder / name
         inside = path.is_file() and path.resolve().is_relative_to(folder.resolve())
-        yield name, recorded, sha256_file(path) if inside else ""
+        digest = sha256_file(path) if inside else ""
+        yield name, recorded, digest
 
 
 def plain_data(config: ConfigContent) -> dict[str, Any]:
@@ -249,5 +235,6 @@ def plain_data(config: ConfigContent) -> dict[str, Any]:
         return json.loads(json.dumps(config))
     except (TypeError, ValueError, RecursionError) as error:
         raise DatasetError(
-            f"the configuration holds a value that is no plain data ({error}); use text, numbers, lists"
+            f"the configuration holds a value that is no plain data ({error}); use text, "
+            "numbers, lists"
         ) from error

@@ -1,4 +1,4 @@
-"""run.log: what happened to a data set while it was made, one line each, with the time in UTC."""
+"""run.log: events while a data set is made, one line each, with the time in UTC."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Is a data set whole and unaltered? Every difference is named; nothing is repaired."""
+"""Verification that a data set is whole and unaltered; nothing is repaired."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,6 +6,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from gensig.dataset.columns import COLUMNS
 from gensig.dataset.folder.inspection import inspect
 from gensig.dataset.folder.layout import (
     CONFIG,
@@ -22,7 +23,7 @@ from gensig.dataset.folder.layout import (
 )
 from gensig.dataset.folder.manifest import file_digests, identity_hash
 from gensig.dataset.plan import Plan, read_plan
-from gensig.dataset.schema import COLUMNS, SCALES
+from gensig.dataset.schema import SCALES
 from gensig.dataset.splitting.split_check import split_problems
 from gensig.dataset.splitting.splits import read_split
 from gensig.dataset.storage.atomic import sha256_file
@@ -37,14 +38,15 @@ __all__ = ["VerifyResult", "inspect", "verify"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VerifyResult:
-    """What `verify` found.
+    """Result of `verify`.
 
     Parameters
     ----------
     complete : bool       True only for a closed data set without any problem
     problems : list       one line each; empty exactly when `complete`
     n_records : int       records the data set is meant to have
-    n_failed : int        records whose simulation failed; they are no problem, but no silence either
+    n_failed : int        records whose simulation failed; they are no problem, but no silence
+                          either
     """
 
     complete: bool
@@ -54,8 +56,7 @@ class VerifyResult:
 
 
 def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
-    """Check a data-set folder: state, sha256, sizes, rows, schema, plan against rows, splits,
-    scales, finite values.
+    """Check state, sha256, sizes, rows, schema, plan, splits, scales and values of a data set.
 
     Parameters
     ----------
@@ -77,13 +78,15 @@ def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
         )
     problems = _state(folder, manifest) + _extra_files(folder, manifest)
     if manifest.is_complete:
-        problems += [one.line for one in differences(folder, manifest, quick=quick)]
+        problems += [
+            difference.line for difference in differences(folder, manifest, quick=quick)
+        ]
     plan = None
     if not quick:
-        found, plan = _beside_shards(folder, manifest)
-        problems += found + (
-            _splits(folder, manifest, plan) if plan is not None else []
-        )
+        lines, plan = _tables(folder, manifest)
+        problems += lines
+        if plan is not None:
+            problems += _splits(folder, manifest, plan)
     starts = np.cumsum([0, *(entry.rows for entry in manifest.shards)])
     reference: dict | None = None
     for i, entry in enumerate(manifest.shards):
@@ -99,10 +102,11 @@ def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
                 if not damage:
                     reference = reference or _description(file, path)
                     problems += _description_differs(file, path, reference)
-                found = _rows_differ(file, entry, plan, int(starts[i]))
-                # A file whose bytes are wrong can have thousands of wrong rows; the first line
-                # tells.
-                problems += found[:1] if damage else found
+                lines = _rows_differ(file, entry, plan, int(starts[i]))
+                # A damaged file can have thousands of wrong rows: one line is enough.
+                if damage:
+                    lines = lines[:1]
+                problems += lines
         except DatasetError as error:
             problems.append(str(error))
         except HDF5_ERRORS as error:
@@ -125,25 +129,24 @@ def _state(folder: Path, manifest: Manifest) -> list[str]:
     ]
     if not manifest.is_complete:
         problems.append(
-            f"incomplete: {manifest.n_done} of {len(manifest.shards)} shards are done and the data set was "
-            f"never closed; run `gensig resume {folder}`"
+            f"incomplete: {manifest.n_done} of {len(manifest.shards)} shards are done and the "
+            f"data set was never closed; run `gensig resume {folder}`"
         )
-    needed = [CONFIG, PLAN, OVERRIDES, *([INDEX] if manifest.is_complete else [])]
-    problems += [
-        f"the manifest does not list {name}; it is damaged"
-        for name in needed
-        if name not in manifest.files
-    ]
-    problems += [
-        f"{name} is missing" for name in manifest.files if not (folder / name).is_file()
-    ]
+    needed, present = [CONFIG, PLAN, OVERRIDES], []
     if manifest.is_complete:
-        found = sorted(f"{SPLITS}/{path.name}" for path in (folder / SPLITS).glob("*"))
-        problems += [
-            f"{name!a} is extra: the manifest does not list it"
-            for name in found
-            if name not in manifest.files
-        ]
+        needed.append(INDEX)
+        present = sorted(
+            f"{SPLITS}/{path.name}" for path in (folder / SPLITS).glob("*")
+        )
+    for name in needed:
+        if name not in manifest.files:
+            problems.append(f"the manifest does not list {name}; it is damaged")
+    for name in manifest.files:
+        if not (folder / name).is_file():
+            problems.append(f"{name} is missing")
+    for name in present:
+        if name not in manifest.files:
+            problems.append(f"{name!a} is extra: the manifest does not list it")
     return problems
 
 
@@ -165,30 +168,29 @@ def _extra_files(folder: Path, manifest: Manifest) -> list[str]:
     ]
 
 
-def _beside_shards(folder: Path, manifest: Manifest) -> tuple[list[str], Plan | None]:
+def _tables(folder: Path, manifest: Manifest) -> tuple[list[str], Plan | None]:
     """Plan, configuration, splits and index against the manifest."""
     problems = [
         f"{name} was altered: its sha256 is not the one in the manifest"
         for name, recorded, actual in file_digests(folder, manifest)
         if actual and actual != recorded
     ]
+    version, identity = manifest.generator_version, manifest.identity
     try:
         config = read_config(folder)
-        if identity_hash(config, manifest.generator_version) != manifest.identity:
+        if identity_hash(config, version) != identity:
             problems.append(
                 f"{CONFIG} and the identity in the manifest do not belong together; one was altered"
             )
         begun = manifest.configuration
-        if (
-            begun
-            and identity_hash(begun, manifest.generator_version) != manifest.identity
-        ):
+        if begun and identity_hash(begun, version) != identity:
             problems.append(
                 f"{MANIFEST} has a configuration and an identity that do not belong together"
             )
         if "seed" in config and config["seed"] != manifest.seed:
             problems.append(
-                f"{CONFIG} has seed {config['seed']!r} and the manifest {manifest.seed}; one was altered"
+                f"{CONFIG} has seed {config['seed']!r} and the manifest {manifest.seed}; one was "
+                "altered"
             )
     except DatasetError as error:
         problems.append(str(error))
@@ -197,28 +199,20 @@ def _beside_shards(folder: Path, manifest: Manifest) -> tuple[list[str], Plan | 
     except DatasetError as error:
         return [*problems, str(error)], None
     if plan.shard_sizes() != [entry.rows for entry in manifest.shards]:
-        return [
-            *problems,
-            f"{PLAN} and the manifest have different shards; one was altered",
-        ], None
+        line = f"{PLAN} and the manifest have different shards; one was altered"
+        return [*problems, line], None
     return problems, plan
 
 
 def _splits(folder: Path, manifest: Manifest, plan: Plan) -> list[str]:
     """Splits that do not keep apart what their protocol says."""
     problems = []
-    for name in sorted(
-        name
-        for name in manifest.files
-        if name.startswith(f"{SPLITS}/") and (folder / name).is_file()
-    ):
+    for path in sorted(folder / name for name in manifest.files):
+        if path.parent.name != SPLITS or not path.is_file():
+            continue
         try:
-            problems += [
-                f"{SPLITS}/{line}"
-                for line in split_problems(
-                    Path(name).stem, read_split(folder / name), plan
-                )
-            ]
+            lines = split_problems(path.stem, read_split(path), plan)
+            problems += [f"{SPLITS}/{line}" for line in lines]
         except DatasetError as error:
             problems.append(str(error))
     return problems
@@ -231,23 +225,24 @@ def _bytes_differ(
         return [f"{entry.name} is missing"]
     size = path.stat().st_size
     if size != entry.bytes:
-        found = "truncated" if size < entry.bytes else "not the recorded file"
-        return [f"{entry.name} is {found}: {size} bytes, recorded are {entry.bytes}"]
+        state = "truncated" if size < entry.bytes else "not the recorded file"
+        return [f"{entry.name} is {state}: {size} bytes, recorded are {entry.bytes}"]
     if quick:
         return []
     digest = sha256_file(path)
     if digest == entry.sha256:
         return []
-    other = next((e.name for e in manifest.shards if e.sha256 == digest), None)
-    if other is not None:
-        return [f"{entry.name} is swapped: it holds what belongs in {other}"]
+    for other in manifest.shards:
+        if other.sha256 == digest:
+            return [f"{entry.name} is swapped: it holds what belongs in {other.name}"]
     return [
-        f"{entry.name} was altered: its sha256 is {digest[:12]}..., recorded is {entry.sha256[:12]}..."
+        f"{entry.name} was altered: its sha256 is {digest[:12]}..., recorded is "
+        f"{entry.sha256[:12]}..."
     ]
 
 
 def _description(file: h5py.File, path: Path) -> dict:
-    """What all shards of one data set have in common."""
+    """Types, shapes and attributes, which all shards of one data set share."""
     shapes = {
         name: (str(data.dtype), data.shape[1:])
         for name, data in datasets(file, path).items()
@@ -257,16 +252,17 @@ def _description(file: h5py.File, path: Path) -> dict:
 
 def _description_differs(file: h5py.File, path: Path, reference: dict) -> list[str]:
     problems = []
-    for part, found in _description(file, path).items():
+    for part, actual in _description(file, path).items():
         expected = reference[part]
-        names = sorted(
+        names = [
             name
-            for name in {*found, *expected}
-            if repr(found.get(name)) != repr(expected.get(name))
-        )
+            for name in sorted(actual | expected)
+            if repr(actual.get(name)) != repr(expected.get(name))
+        ]
         if names:
             problems.append(
-                f"{path.name} is foreign: its {part} {', '.join(names)} differ from those of the other shards"
+                f"{path.name} is foreign: its {part} {', '.join(names)} differ from those of the "
+                "other shards"
             )
     return problems
 
@@ -280,25 +276,20 @@ def _rows_differ(
     if n != entry.rows:
         return [f"{name} has {n} rows, recorded are {entry.rows}"]
     problems = []
-    planned_columns = plan.columns if plan is not None else {}
     for column in COLUMNS.values():
         # Other inputs may be refined while simulating; names and labels never.
-        if (
-            column.role not in ("id", "label", "unit")
-            or column.name not in planned_columns
-            or column.name not in file
-        ):
+        if plan is None or column.role not in ("id", "label", "unit"):
             continue
-        planned, found = (
-            planned_columns[column.name][start : start + n],
-            read_rows(file[column.name]),
-        )
-        wrong = np.flatnonzero(planned != found)
+        if column.name not in plan.columns or column.name not in file:
+            continue
+        planned = plan.columns[column.name][start : start + n]
+        stored = read_rows(file[column.name])
+        wrong = np.flatnonzero(planned != stored)
         if wrong.size:
             i = int(wrong[0])
             problems.append(
-                f"{name} row {i}: {column.name} is {found[i].item()!a}, the plan says {planned[i].item()!a} "
-                f"({wrong.size} such rows)"
+                f"{name} row {i}: {column.name} is {stored[i].item()!a}, the plan says "
+                f"{planned[i].item()!a} ({wrong.size} such rows)"
             )
             if column.name == "record_id":
                 return problems
@@ -308,15 +299,13 @@ def _rows_differ(
             f"{name} has {int(failed.sum())} failed records, recorded are {entry.n_failed}"
         )
     for row, is_failed in enumerate(failed.tolist()):
-        problems += [
-            f"{name} row {row}: {problem}"
-            for problem in _signal_problems(file, row, failed=is_failed)
-        ]
+        lines = _signal_problems(file, row, failed=is_failed)
+        problems += [f"{name} row {row}: {line}" for line in lines]
     return problems
 
 
 def _signal_problems(file: h5py.File, row: int, *, failed: bool) -> list[str]:
-    """Scales that are none, and signals that are not finite although the record did not fail."""
+    """Invalid scales, and signals that are not finite although the record did not fail."""
     problems = []
     for name, scale_name in SCALES.items():
         if name not in file:

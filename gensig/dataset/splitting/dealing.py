@@ -1,4 +1,4 @@
-"""Whole groups dealt to train, validation and test, and the records that each side may then use."""
+"""Deals of whole groups to train, validation and test."""
 
 from dataclasses import dataclass
 
@@ -17,16 +17,20 @@ _ATTEMPTS = 200
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Deal:
-    """What a protocol asks of a deal of whole groups.
+    """Demands of a protocol on a deal of whole groups.
 
     Parameters
     ----------
     column : text                         plan column of the groups; none of them is on two sides
-    usable : (subset, record) bool        whether a record is used if its group is dealt to that subset
+    usable : (subset, record) bool        whether a record is used if its group is dealt to that
+        subset
     min_groups : int                      fewer groups are no deal
-    test_share : float                    of the groups; `MIN_TESTED` where that is no more than `MAX_FOR_TESTS`
-    for_test : (record,) float or None    groups of the largest sum are tested on, as long as all classes are there
-    every_class : bool                    whether a subset needs every class of the plan, or only those it may use
+    test_share : float                    of the groups; `MIN_TESTED` where that is no more than
+        `MAX_FOR_TESTS`
+    for_test : (record,) float or None    groups of the largest sum are tested on, as long as all
+        classes are there
+    every_class : bool                    whether a subset needs every class of the plan, or only
+        those it may use
     """
 
     column: str
@@ -38,14 +42,11 @@ class Deal:
 
 
 def deal_groups(plan: Plan, deal: Deal, rng: np.random.Generator) -> SplitTable | str:
-    """The table of one deal in which every subset has every class that it needs, or in one line
-    why there is none.
+    """Table of one deal in which every subset has every class that it needs.
 
-    A record that its group's side may not use is in no subset. Of the groups at least one is
-    dealt to each side.
+    One line with the reason where there is none. A record that its group's side may not use is in
+    no subset. Of the groups at least one is dealt to each side.
     """
-    if deal.column not in plan.columns:
-        return f"the plan has no column {deal.column}"
     names, group = np.unique(plan.columns[deal.column], return_inverse=True)
     if len(names) < deal.min_groups:
         return f"{len(names)} {deal.column} in the plan, and at least {deal.min_groups} are needed"
@@ -54,37 +55,22 @@ def deal_groups(plan: Plan, deal: Deal, rng: np.random.Generator) -> SplitTable 
     for subset, usable in enumerate(deal.usable):
         holds[subset, group[usable], label[usable]] = True
     needed = holds.any(axis=1) | deal.every_class
-    if lacking := [
-        name
-        for name, found in zip(SUBSETS, holds.any(axis=1) >= needed, strict=True)
-        if not found.all()
-    ]:
-        return f"a class has no record that may be used for {lacking[0]}"
-    n_validation, n_test = (
-        max(1, round(share * len(names)))
-        for share in (VALIDATION_SHARE, deal.test_share)
-    )
+    for name, usable_classes in zip(SUBSETS, holds.any(axis=1) >= needed, strict=True):
+        if not usable_classes.all():
+            return f"a class has no record that may be used for {name}"
+    n_validation = max(1, round(VALIDATION_SHARE * len(names)))
+    n_test = max(1, round(deal.test_share * len(names)))
     if MAX_FOR_TESTS * len(names) >= MIN_TESTED:
         n_test = max(n_test, MIN_TESTED)
-    in_order = np.repeat(
-        np.arange(len(SUBSETS)),
-        [len(names) - n_validation - n_test, n_validation, n_test],
-    )
-    worth = (
-        None
-        if deal.for_test is None
-        else np.bincount(group, weights=deal.for_test).astype(float)
-    )
+    n_train = len(names) - n_validation - n_test
+    in_order = np.repeat([TRAIN, VALIDATION, TEST], [n_train, n_validation, n_test])
     for attempt in range(_ATTEMPTS):
         side = rng.permutation(in_order)
-        if worth is not None and attempt < _ATTEMPTS // 2:
+        if deal.for_test is not None and attempt < _ATTEMPTS // 2:
+            worth = np.bincount(group, deal.for_test).astype(float)
             side = _best_tested(side, worth, rng)
-        present = np.stack(
-            [
-                holds[subset, side == subset].any(axis=0)
-                for subset in range(len(SUBSETS))
-            ]
-        )
+        sides = enumerate(holds)
+        present = np.stack([held[side == k].any(axis=0) for k, held in sides])
         if (present >= needed).all():
             return _table(plan, side[group], deal.usable)
     return f"no deal of {len(names)} {deal.column} found that gives every subset all its classes"

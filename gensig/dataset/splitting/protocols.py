@@ -1,5 +1,4 @@
-"""Protocols of splits: what a test score claims, from machines never seen to speeds, severities
-and faults never seen.
+"""Protocols of splits, which test on unseen machines, speeds, loads, severities and faults.
 
 Every protocol but the leaky one keeps whole units together, and with them their conditions and
 noise seeds. One that also holds out a range of values trains and validates outside it and tests
@@ -36,82 +35,73 @@ HEALTHY = "[]"  # `faults_json` of a record without fault
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Protocol:
-    """How a split is made and what it keeps apart.
+    """Definition of a split and of the groups that it keeps apart.
 
     Parameters
     ----------
     stream : int                   of its random numbers; adding a protocol leaves the others alone
     apart : tuple of text          plan columns of which no two subsets share a value
-    make : (plan, rng) -> table    or one line that says why the plan cannot have it
+    needs : tuple of text          further plan columns that it reads
+    make : (plan, rng) -> table    or one line with the reason why the plan cannot have it
     every_class : bool             whether every class is in every subset, as a classifier needs it
     """
 
     stream: int
-    apart: tuple[str, ...]
     make: Callable[[Plan, np.random.Generator], Outcome]
+    apart: tuple[str, ...] = ("unit_id",)
+    needs: tuple[str, ...] = ()
     every_class: bool = True
+
+    def outcome(self, plan: Plan, seed: int) -> Outcome:
+        """Table of a plan, or one line with the reason why it cannot have one."""
+        for column in ("label", *self.apart, *self.needs):
+            if column not in plan.columns and self.apart:
+                return f"the plan has no column {column}"
+        sequence = np.random.SeedSequence(seed, spawn_key=(self.stream,))
+        return self.make(plan, np.random.Generator(np.random.Philox(sequence)))
 
 
 def make_splits(plan: Plan, seed: int) -> dict[str, SplitTable]:
-    """The protocols this plan can have; one whose subsets could not all hold their classes is
-    left out.
+    """Tables, by protocol, of the protocols that a plan can have.
+
+    A protocol whose subsets could not all hold their classes is left out.
 
     Parameters
     ----------
-    plan : Plan    with `label` and, for the clean protocols, `unit_id` and the columns that they hold out
+    plan : Plan    with `label` and, for the clean protocols, `unit_id` and the columns that they
+                   hold out
     seed : int     the same plan and seed give the same splits
 
     Returns
     -------
     protocol -> SplitTable, a subset of `PROTOCOLS`
     """
-    return {
-        name: table
-        for name, table in _outcomes(plan, seed)
-        if isinstance(table, SplitTable)
-    }
+    tables = {}
+    for name, protocol in PROTOCOLS.items():
+        outcome = protocol.outcome(plan, seed)
+        if isinstance(outcome, SplitTable):
+            tables[name] = outcome
+    return tables
 
 
 def why_left_out(
     plan: Plan, seed: int, names: Collection[str] | None = None
 ) -> dict[str, str]:
-    """Protocol -> one line that says why this plan cannot have it, for those that `make_splits`
-    leaves out.
+    """Reasons in one line each, by protocol, for those that `make_splits` leaves out.
 
     ``names`` are the protocols to ask about, None all of them.
     """
-    return {
-        name: reason
-        for name, reason in _outcomes(plan, seed, names)
-        if isinstance(reason, str)
-    }
-
-
-def _outcomes(
-    plan: Plan, seed: int, names: Collection[str] | None = None
-) -> list[tuple[str, Outcome]]:
-    found: list[tuple[str, Outcome]] = []
+    reasons = {}
     for name, protocol in PROTOCOLS.items():
-        if names is not None and name not in names:
-            continue
-        sequence = np.random.SeedSequence(seed, spawn_key=(protocol.stream,))
-        rng = np.random.Generator(np.random.Philox(sequence))
-        missing = [
-            column
-            for column in ("label", *protocol.apart)
-            if column not in plan.columns
-        ]
-        if missing and protocol.apart:
-            found.append((name, f"the plan has no column {missing[0]}"))
-        else:
-            found.append((name, protocol.make(plan, rng)))
-    return found
+        if names is None or name in names:
+            outcome = protocol.outcome(plan, seed)
+            if isinstance(outcome, str):
+                reasons[name] = outcome
+    return reasons
 
 
 def _random_windows(plan: Plan, rng: np.random.Generator) -> SplitTable:
-    """Eight windows of every record scattered over the subsets, so that a record is on every
-    side: leaks on purpose.
-    """
+    """Eight windows of every record, scattered over the subsets: leaks on purpose."""
     n = plan.n_records
     # 5 windows train; the other three 2 + 1 or 1 + 2, which gives shares of 62.5 / 18.75 / 18.75
     # % on average.
@@ -135,23 +125,22 @@ def _by_group(
     Of 40 to 49, ten are tested on, see `gensig.dataset.splitting.dealing`.
     """
     usable = np.ones((len(SUBSETS), plan.n_records), dtype=bool)
-    return deal_groups(
-        plan, Deal(column=column, usable=usable, min_groups=min_groups), rng
-    )
+    deal = Deal(column=column, usable=usable, min_groups=min_groups)
+    return deal_groups(plan, deal, rng)
 
 
 def _cross_range(
-    column: str, hold: str, plan: Plan, rng: np.random.Generator
+    column: str, sign: float, plan: Plan, rng: np.random.Generator
 ) -> Outcome:
-    """The highest or lowest quarter of a condition's values tested on, in units that are not
-    trained on.
+    """The quarter of a condition's values that is highest, times ``sign``, tested on.
+
+    It is tested in units that are not trained on.
     """
-    if column not in plan.columns:
-        return f"the plan has no column {column}"
     values = np.asarray(plan.columns[column], dtype=float)
-    if not np.isfinite(values).all():
-        return f"{column} is not a number in {int((~np.isfinite(values)).sum())} of {values.size} records"
-    held = _outer(values if hold == "highest" else -values)
+    n_missing = int((~np.isfinite(values)).sum())
+    if n_missing:
+        return f"{column} is not a number in {n_missing} of {values.size} records"
+    held = _outer(sign * values)
     if not held.any():
         return f"{column} is {values[0]:g} in all records"
     deal = Deal(
@@ -170,13 +159,8 @@ def _unseen_severity(
 
     Healthy records and those of a fault that has no severity to hold out are on every side.
     """
-    if "severity" not in plan.columns:
-        return "the plan has no column severity"
     severity = np.asarray(plan.columns["severity"], dtype=float)
-    held, varies = (
-        np.zeros(plan.n_records, dtype=bool),
-        np.zeros(plan.n_records, dtype=bool),
-    )
+    held, varies = np.zeros((2, plan.n_records), dtype=bool)
     for label in np.unique(plan.columns["label"]):
         records = np.flatnonzero(plan.columns["label"] == label)
         held[records] = hold(severity[records])
@@ -194,16 +178,12 @@ def _unseen_severity(
 
 def _healthy_only(plan: Plan, rng: np.random.Generator) -> Outcome:
     """Healthy records alone for training and validation, all records of the tested units."""
-    if "faults_json" not in plan.columns:
-        return "the plan has no column faults_json"
     healthy = plan.columns["faults_json"] == HEALTHY
-    if healthy.all() or not healthy.any():
-        return f"the plan has no {'faulty' if healthy.all() else 'healthy'} records"
-    everything = np.ones(plan.n_records, dtype=bool)
-    usable = np.stack([healthy, healthy, everything])
-    return deal_groups(
-        plan, Deal(column="unit_id", usable=usable, every_class=False), rng
-    )
+    if healthy.all():
+        return "the plan has no faulty records"
+    if not healthy.any():
+        return "the plan has no healthy records"
+    return _tested_on_everything(plan, healthy, rng)
 
 
 def _open_set(plan: Plan, rng: np.random.Generator) -> Outcome:
@@ -211,24 +191,25 @@ def _open_set(plan: Plan, rng: np.random.Generator) -> Outcome:
 
     At least two classes remain to be told apart.
     """
-    if "faults_json" not in plan.columns:
-        return "the plan has no column faults_json"
     label = plan.columns["label"]
     faulty = np.unique(label[plan.columns["faults_json"] != HEALTHY])
     if not faulty.size or len(np.unique(label)) < 3:
         return "it needs three classes, one of them faulty: two to tell apart and one to withhold"
     known = label != rng.choice(faulty)
-    everything = np.ones(plan.n_records, dtype=bool)
-    usable = np.stack([known, known, everything])
-    return deal_groups(
-        plan, Deal(column="unit_id", usable=usable, every_class=False), rng
-    )
+    return _tested_on_everything(plan, known, rng)
+
+
+def _tested_on_everything(plan: Plan, known: Mask, rng: np.random.Generator) -> Outcome:
+    """Known records alone for training and validation, all records of the tested units."""
+    usable = np.stack([known, known, np.ones_like(known)])
+    deal = Deal(column="unit_id", usable=usable, every_class=False)
+    return deal_groups(plan, deal, rng)
 
 
 def _outer(values: NDArray[np.float64]) -> Mask:
-    """(record,) whether a value is above the cut that leaves nearest to a quarter above it.
+    """(record,) True above the cut that leaves nearest to a quarter of the values above it.
 
-    None if all are equal.
+    No value if all are equal.
     """
     distinct, counts = np.unique(values, return_counts=True)
     if len(distinct) < 2:
@@ -239,11 +220,11 @@ def _outer(values: NDArray[np.float64]) -> Mask:
 
 
 def _inner(values: NDArray[np.float64]) -> Mask:
-    """(record,) whether a value is in the middle quarter by rank.
+    """(record,) True in the middle quarter by rank.
 
     At least one value, never the least or largest.
     """
-    distinct, place, counts = np.unique(values, return_inverse=True, return_counts=True)
+    distinct, rank, counts = np.unique(values, return_inverse=True, return_counts=True)
     if len(distinct) < 3:
         return np.zeros(len(values), dtype=bool)
     middle = (np.cumsum(counts) - counts / 2) / len(values)
@@ -251,46 +232,40 @@ def _inner(values: NDArray[np.float64]) -> Mask:
     away[[0, -1]] = np.inf
     held = away < HELD_OUT / 2
     held[away.argmin()] = True
-    return held[place]
+    return held[rank]
 
 
-def _cross(column: str, hold: str) -> Callable[[Plan, np.random.Generator], Outcome]:
-    return functools.partial(_cross_range, column, hold)
+def _by(column: str, min_groups: int, stream: int) -> Protocol:
+    make = functools.partial(_by_group, column, min_groups)
+    return Protocol(stream=stream, make=make, apart=(column,))
 
 
-_UNIT = ("unit_id",)
+def _cross(column: str, sign: float, stream: int) -> Protocol:
+    make = functools.partial(_cross_range, column, sign)
+    return Protocol(stream=stream, make=make, needs=(column,))
+
+
+def _severity(hold: Callable[[NDArray[np.float64]], Mask], stream: int) -> Protocol:
+    make = functools.partial(_unseen_severity, hold)
+    return Protocol(stream=stream, make=make, needs=("severity",))
+
+
+def _partly_trained(
+    make: Callable[[Plan, np.random.Generator], Outcome], stream: int
+) -> Protocol:
+    return Protocol(stream=stream, make=make, needs=("faults_json",), every_class=False)
+
+
 PROTOCOLS = {
-    "random_window_leaky": Protocol(stream=9001, apart=(), make=_random_windows),
-    "by_unit": Protocol(
-        stream=9002,
-        apart=_UNIT,
-        make=functools.partial(_by_group, "unit_id", len(SUBSETS)),
-    ),
-    "cross_specimen": Protocol(
-        stream=9003,
-        apart=("specimen_id",),
-        make=functools.partial(_by_group, "specimen_id", MIN_SPECIMENS),
-    ),
-    "cross_gearbox": Protocol(
-        stream=9004,
-        apart=("gearbox_id",),
-        make=functools.partial(_by_group, "gearbox_id", len(SUBSETS)),
-    ),
-    "cross_speed": Protocol(
-        stream=9005, apart=_UNIT, make=_cross("speed_set_rpm", "highest")
-    ),
-    "cross_torque": Protocol(
-        stream=9006, apart=_UNIT, make=_cross("torque_nm", "highest")
-    ),
-    "cross_snr": Protocol(stream=9007, apart=_UNIT, make=_cross("snr_db", "lowest")),
-    "unseen_severity_inner": Protocol(
-        stream=9008, apart=_UNIT, make=functools.partial(_unseen_severity, _inner)
-    ),
-    "unseen_severity_outer": Protocol(
-        stream=9009, apart=_UNIT, make=functools.partial(_unseen_severity, _outer)
-    ),
-    "healthy_only": Protocol(
-        stream=9010, apart=_UNIT, make=_healthy_only, every_class=False
-    ),
-    "open_set": Protocol(stream=9011, apart=_UNIT, make=_open_set, every_class=False),
+    "random_window_leaky": Protocol(stream=9001, make=_random_windows, apart=()),
+    "by_unit": _by("unit_id", len(SUBSETS), 9002),
+    "cross_specimen": _by("specimen_id", MIN_SPECIMENS, 9003),
+    "cross_gearbox": _by("gearbox_id", len(SUBSETS), 9004),
+    "cross_speed": _cross("speed_set_rpm", 1.0, 9005),
+    "cross_torque": _cross("torque_nm", 1.0, 9006),
+    "cross_snr": _cross("snr_db", -1.0, 9007),
+    "unseen_severity_inner": _severity(_inner, 9008),
+    "unseen_severity_outer": _severity(_outer, 9009),
+    "healthy_only": _partly_trained(_healthy_only, 9010),
+    "open_set": _partly_trained(_open_set, 9011),
 }

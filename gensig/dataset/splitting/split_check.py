@@ -1,4 +1,4 @@
-"""Does a split keep apart what its protocol says? Looked at in the table itself, whoever made it."""
+"""Check of split tables against the groups that their protocols keep apart."""
 
 from collections.abc import Sequence
 
@@ -10,8 +10,7 @@ from gensig.dataset.splitting.splits import SplitTable
 
 
 def split_problems(protocol: str, table: SplitTable, plan: Plan) -> list[str]:
-    """What is on two sides although the protocol says that it is not; one line each, empty if it
-    keeps its word.
+    """Groups on two sides of a split that its protocol keeps apart; one line each.
 
     No part of a record is ever given twice. Clean protocols also keep apart whole records, and
     with them their noise seeds, which follow from the record alone, and the groups of
@@ -19,10 +18,8 @@ def split_problems(protocol: str, table: SplitTable, plan: Plan) -> list[str]:
     """
     ids = plan.columns["record_id"]
     order = np.argsort(ids, kind="stable")
-    place = np.minimum(
-        np.searchsorted(ids, table.record_id, sorter=order), plan.n_records - 1
-    )
-    record = order[place]
+    rank = np.searchsorted(ids, table.record_id, sorter=order)
+    record = order[np.minimum(rank, plan.n_records - 1)]
     unknown = table.record_id[ids[record] != table.record_id]
     if unknown.size:
         return [f"{protocol}: record {str(unknown[0])[:40]!r} is not in the plan"]
@@ -53,9 +50,6 @@ def split_problems(protocol: str, table: SplitTable, plan: Plan) -> list[str]:
 def _overlapping(record: np.ndarray, table: SplitTable) -> Sequence[int]:
     """Records of which two rows share a part."""
     order = np.lexsort((table.start_fraction, record))
-    record, start, stop = (
-        record[order],
-        table.start_fraction[order],
-        table.stop_fraction[order],
-    )
-    return record[1:][(record[1:] == record[:-1]) & (start[1:] < stop[:-1])].tolist()
+    record = record[order]
+    overlaps = table.start_fraction[order][1:] < table.stop_fraction[order][:-1]
+    return record[1:][(record[1:] == record[:-1]) & overlaps].tolist()

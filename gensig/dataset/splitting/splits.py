@@ -1,10 +1,8 @@
-"""The table that says which part of which record is for training, validation and test.
-
-`protocols` makes it.
-"""
+"""Split tables: the subset of each part of each record, and their CSV files."""
 
 import csv
 import io
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +18,7 @@ HEADER = ("record_id", "start_fraction", "stop_fraction", "subset")
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SplitTable:
-    """Which part of which record belongs to which subset; one row a (part of a) record.
+    """Assignment of records, or parts of them, to subsets; one row a part.
 
     Parameters
     ----------
@@ -39,9 +37,13 @@ class SplitTable:
         buffer = io.StringIO()
         writer = csv.writer(buffer, lineterminator="\n")
         writer.writerow(HEADER)
-        columns = (self.record_id, self.start_fraction, self.stop_fraction, self.subset)
-        writer.writerows(zip(*(column.tolist() for column in columns), strict=True))
+        writer.writerows(self.rows())
         return buffer.getvalue()
+
+    def rows(self) -> Iterator[tuple[str, float, float, str]]:
+        """Rows of the table as plain Python values."""
+        columns = (getattr(self, name).tolist() for name in HEADER)
+        return zip(*columns, strict=True)
 
 
 def read_split(path: Path) -> SplitTable:

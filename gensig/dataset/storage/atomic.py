@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all, and files of strangers read with a limit."""
+"""Files that are written whole or not at all, and text read with a limit of its size."""
 
 import fcntl
 import hashlib
@@ -18,9 +18,8 @@ def temporary_name(path: Path) -> Path:
 
     Hidden, ending in `TEMPORARY_SUFFIX`.
     """
-    return path.with_name(
-        f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}{TEMPORARY_SUFFIX}"
-    )
+    unique = f"{os.getpid()}-{secrets.token_hex(4)}"
+    return path.with_name(f".{path.name}.{unique}{TEMPORARY_SUFFIX}")
 
 
 @contextmanager
@@ -36,9 +35,8 @@ def locked(folder: Path) -> Iterator[None]:
             f"{folder} cannot be opened: {error.strerror}; give the folder of a data set"
         ) from error
     try:
-        with suppress(
-            OSError
-        ):  # a file system without locks: one writer at a time is then the caller's duty
+        # On a file system without locks, one writer at a time is the caller's duty.
+        with suppress(OSError):
             fcntl.flock(descriptor, fcntl.LOCK_EX)
         yield
     finally:
@@ -91,7 +89,7 @@ def write_bytes(path: Path, content: bytes) -> None:
 
 
 def cannot_write(path: Path, error: Exception) -> DatasetError:
-    """The one line for a disk that is full or a folder that may not be written."""
+    """Error of one line for a full disk or a folder without the right to write."""
     reason = getattr(error, "strerror", None) or str(error).splitlines()[0]
     return DatasetError(
         f"cannot write {path}: {reason}; free some space or choose another out=DIR"
@@ -106,12 +104,14 @@ def read_text(path: Path, *, limit: int) -> str:
     try:
         if not path.is_file():
             raise DatasetError(
-                f"{path} is missing or no ordinary file; the folder is damaged or no gensig data set"
+                f"{path} is missing or no ordinary file; the folder is damaged or no gensig data "
+                "set"
             )
         size = path.stat().st_size
         if size > limit:
             raise DatasetError(
-                f"{path} has {size} bytes, at most {limit} are allowed; it is no file of a gensig data set"
+                f"{path} has {size} bytes, at most {limit} are allowed; it is no file of a "
+                "gensig data set"
             )
         return path.read_bytes().decode("utf-8")
     except UnicodeDecodeError as error:

@@ -41,18 +41,17 @@ def set_attribute(target: h5py.HLObject, name: str, value: Attribute) -> None:
             data = data.astype(np.int8)
         if data.dtype.kind not in "if":
             raise DatasetError(
-                f"attribute {name} is {value!r}; allowed are text, int, float and lists of one of them"
+                f"attribute {name} is {value!r}; allowed are text, int, float and lists of one "
+                "of them"
             )
     if data.nbytes > ATTRIBUTE_BYTES_LIMIT:
         raise DatasetError(
             f"attribute {name} has {data.nbytes} bytes, HDF5 allows about {ATTRIBUTE_BYTES_LIMIT}; "
             "make it a column or a file beside the shards"
         )
-    dtype = (
-        h5py.string_dtype("utf-8", data.dtype.itemsize)
-        if data.dtype.kind == "S"
-        else data.dtype
-    )
+    dtype = data.dtype
+    if dtype.kind == "S":
+        dtype = h5py.string_dtype("utf-8", dtype.itemsize)
     target.attrs.create(name, data, shape=data.shape, dtype=dtype)
 
 
@@ -65,17 +64,17 @@ def _text_array(texts: list[str], name: str) -> np.ndarray:
 
 def read_attributes(target: h5py.HLObject) -> dict:
     """Attributes as text, int, float or lists of them; those of any other type are left out."""
-    found: dict = {}
+    attributes: dict = {}
     for name in target.attrs:
         # A damaged name comes as bytes.
         kind = target.attrs.get_id(name).dtype.kind if isinstance(name, str) else ""
         if kind not in ("S", "i", "u", "f"):
             continue
         value = np.asarray(target.attrs[name])
-        found[name] = (
-            decoded(value) if kind == "S" or value.dtype.kind == "O" else value
-        ).tolist()
-    return found
+        if kind == "S" or value.dtype.kind == "O":
+            value = decoded(value)
+        attributes[name] = value.tolist()
+    return attributes
 
 
 def decoded(values: np.ndarray) -> np.ndarray:

@@ -1,7 +1,4 @@
-"""Compression of the time signals.
-
-What may be asked for, how HDF5 is told, and the filter that is no part of HDF5.
-"""
+"""Compression of the time signals, Blosc2 included, which is no part of HDF5."""
 
 import os
 from collections.abc import Iterator
@@ -38,9 +35,8 @@ def creation_options(compression: str) -> dict[str, Any]:
         return {}
     if compression == "blosc2":
         plugin = load_blosc2("dataset.compression=blosc2")
-        return dict(
-            plugin.Blosc2(cname="lz4", clevel=5, filters=plugin.Blosc2.BITSHUFFLE)
-        )
+        shuffle = plugin.Blosc2.BITSHUFFLE
+        return dict(plugin.Blosc2(cname="lz4", clevel=5, filters=shuffle))
     return {"compression": compression, "shuffle": True}
 
 
@@ -64,11 +60,8 @@ def fixed_settings() -> Iterator[None]:
 
     Blosc2 obeys them before its arguments, and they change the bytes.
     """
-    hidden = {
-        name: os.environ.pop(name)
-        for name in list(os.environ)
-        if name.startswith("BLOSC_")
-    }
+    names = [name for name in os.environ if name.startswith("BLOSC_")]
+    hidden = {name: os.environ.pop(name) for name in names}
     try:
         yield
     finally:
@@ -82,7 +75,6 @@ def filters(data: h5py.Dataset) -> set[int]:
 
 
 def compression_of(data: h5py.Dataset) -> str:
-    """Which of `COMPRESSIONS` a data set of a checked shard is stored with."""
-    return next(
-        (_NAMES[number] for number in filters(data) if number in _NAMES), "none"
-    )
+    """Compression of a data set of a checked shard, one of `COMPRESSIONS`."""
+    names = [_NAMES[number] for number in filters(data) if number in _NAMES]
+    return (*names, "none")[0]

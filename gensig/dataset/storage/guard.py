@@ -1,7 +1,4 @@
-"""Opening a shard that may come from a stranger.
-
-Checked before anything is read, and never trusted afterwards.
-"""
+"""Opening of shards from unknown sources, with a check before anything is read."""
 
 import math
 from pathlib import Path
@@ -9,8 +6,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from gensig.dataset.columns import COLUMNS
 from gensig.dataset.schema import (
-    COLUMNS,
     REQUIRED,
     REQUIRED_ATTRIBUTES,
     SAMPLE_TYPES,
@@ -33,8 +30,12 @@ EXPANSION_LIMIT = 1100
 ATTRIBUTES_LIMIT = 1000
 
 _FILTERS = {
-    h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32, h5py.h5z.FILTER_LZF, BLOSC2_FILTER,
-}  # fmt: skip
+    h5py.h5z.FILTER_DEFLATE,
+    h5py.h5z.FILTER_SHUFFLE,
+    h5py.h5z.FILTER_FLETCHER32,
+    h5py.h5z.FILTER_LZF,
+    BLOSC2_FILTER,
+}
 
 
 def open_file(path: Path) -> h5py.File:
@@ -75,40 +76,35 @@ def same_file(path: Path) -> tuple[int, ...]:
     () where there is none.
     """
     try:
-        found, link = path.stat(), path.lstat()
+        target, link = path.stat(), path.lstat()
     except OSError:
         return ()
-    return (
-        found.st_dev,
-        found.st_ino,
-        found.st_size,
-        found.st_mtime_ns,
-        found.st_ctime_ns,
-        link.st_ino,
-    )
+    times = (target.st_mtime_ns, target.st_ctime_ns)
+    return (target.st_dev, target.st_ino, target.st_size, *times, link.st_ino)
 
 
 def check_shard(file: h5py.File, path: Path) -> None:
-    """Refuse, with one line, whatever a shard of format version 1 cannot contain.
+    """Check that a file is a shard of format version 1.
 
     Raises
     ------
-    DatasetError    for soft or external links, types that are no plain numbers or text, data outside the file, filters
-                    other than gzip, lzf and blosc2, shapes larger than what is stored, missing columns, unequal row
-                    counts, blosc2 without the package that reads it
+    DatasetError    for soft or external links, types that are no plain numbers or text, data
+                    outside the file, filters other than gzip, lzf and blosc2, shapes larger than
+                    what is stored, missing columns, unequal row counts, blosc2 without the package
+                    that reads it
     """
     try:
-        found = datasets(file, path)
-        missing = [name for name in REQUIRED if name not in found]
+        contents = datasets(file, path)
+        missing = [name for name in REQUIRED if name not in contents]
         if missing:
             raise DatasetError(
                 f"{path} has no data set {', '.join(missing)}; it is no gensig shard"
             )
-        n_records = row_count(found["record_id"])
-        for name, data in found.items():
+        n_records = row_count(contents["record_id"])
+        for name, data in contents.items():
             _check_dataset(name, data, n_records, path)
         for name, scale in SCALES.items():
-            _check_scale(found, name, scale, path)
+            _check_scale(contents, name, scale, path)
         _check_attributes(file, path)
     except HDF5_ERRORS as error:
         raise DatasetError(
@@ -121,7 +117,7 @@ def datasets(file: h5py.File, path: Path) -> dict[str, h5py.Dataset]:
 
     DatasetError for links and other objects.
     """
-    found: dict[str, h5py.Dataset] = {}
+    contents: dict[str, h5py.Dataset] = {}
 
     def collect(group: h5py.Group, prefix: str, *, deeper: bool) -> None:
         for key in group:
@@ -135,21 +131,22 @@ def datasets(file: h5py.File, path: Path) -> dict[str, h5py.Dataset]:
                 )
             item = group[key]
             if isinstance(item, h5py.Dataset):
-                found[prefix + key] = item
+                contents[prefix + key] = item
             elif isinstance(item, h5py.Group) and deeper:
                 collect(item, f"{prefix}{key}/", deeper=False)
             else:
                 raise DatasetError(
-                    f"{path}: '{_plain(prefix + key)}' is neither a data set nor a group of data sets"
+                    f"{path}: '{_plain(prefix + key)}' is neither a data set nor a group of data "
+                    "sets"
                 )
 
     collect(file, "", deeper=True)
-    return found
+    return contents
 
 
 def row_count(data: h5py.Dataset) -> int:
     """Length of axis 0; 0 for a scalar."""
-    return int(data.shape[0]) if data.shape else 0
+    return int((*data.shape, 0)[0])
 
 
 def _check_dataset(name: str, data: h5py.Dataset, n_records: int, path: Path) -> None:
@@ -165,7 +162,8 @@ def _check_dataset(name: str, data: h5py.Dataset, n_records: int, path: Path) ->
         )
     if n_records == 0 or row_count(data) != n_records:
         raise DatasetError(
-            f"{label} has shape {data.shape}, record_id has {n_records} rows; all must be equal, not 0"
+            f"{label} has shape {data.shape}, record_id has {n_records} rows; all must be equal, "
+            "not 0"
         )
     used = filters(data)
     if not used <= _FILTERS:
@@ -176,25 +174,26 @@ def _check_dataset(name: str, data: h5py.Dataset, n_records: int, path: Path) ->
         load_blosc2(f"{path} is compressed with blosc2; reading it")
     if not _is_stored(data, used):
         raise DatasetError(
-            f"{label} declares {data.size * dtype.itemsize} bytes and stores {data.id.get_storage_size()}; "
-            "it was never written or is a bomb"
+            f"{label} declares {data.size * dtype.itemsize} bytes and stores "
+            f"{data.id.get_storage_size()}; it was never written or is a bomb"
         )
     column = SIGNALS.get(name) or COLUMNS.get(name)
-    if column is not None:
-        same_kind = dtype.kind == column.storage_dtype.kind
-        if name in SCALES and dtype.kind == "i":
-            same_kind = dtype.itemsize == 2
-        if not same_kind or data.ndim != 1 + len(column.axes):
-            raise DatasetError(
-                f"{label} has type {dtype} and {data.ndim} axes; format version 1 wants "
-                f"{' or '.join(SAMPLE_TYPES) if name in SCALES else column.dtype} and {1 + len(column.axes)}"
-            )
+    if column is None:
+        return
+    wanted, n_axes = column.dtype, 1 + len(column.axes)
+    is_wanted = dtype.kind == column.storage_dtype.kind
+    if name in SCALES:
+        wanted = " or ".join(SAMPLE_TYPES)
+        is_wanted |= dtype.kind == "i" and dtype.itemsize == 2
+    if not is_wanted or data.ndim != n_axes:
+        raise DatasetError(
+            f"{label} has type {dtype} and {data.ndim} axes; format version 1 wants {wanted} and "
+            f"{n_axes}"
+        )
 
 
 def holds_its_data(data: h5py.Dataset) -> bool:
-    """True for a data set whose values are all in its own file, in no more bytes than it
-    declares.
-    """
+    """True for a data set whose values are all stored in its file, as declared."""
     used = filters(data)
     return (
         not data.is_virtual
@@ -206,32 +205,32 @@ def holds_its_data(data: h5py.Dataset) -> bool:
 
 def _is_stored(data: h5py.Dataset, used: set[int]) -> bool:
     """False for what declares more than its bytes in the file can hold, in all or in one chunk."""
-    item, chunks = data.dtype.itemsize, data.chunks
-    chunk = math.prod(chunks) * item if chunks else 0
+    item, chunks = data.dtype.itemsize, data.chunks or (0,)
+    chunk = math.prod(chunks) * item
     if BLOSC2_FILTER in used:
-        counts = (
-            -(-length // step) for length, step in zip(data.shape, chunks, strict=True)
-        )
-        return chunk <= BLOSC2_CHUNK_LIMIT and data.id.get_num_chunks() == math.prod(
-            counts
-        )
-    limit = data.id.get_storage_size() * (EXPANSION_LIMIT if used else 1)
+        sizes = zip(data.shape, chunks, strict=True)
+        n_chunks = math.prod(-(-length // step) for length, step in sizes)
+        return chunk <= BLOSC2_CHUNK_LIMIT and data.id.get_num_chunks() == n_chunks
+    limit = data.id.get_storage_size()
+    if used:
+        limit *= EXPANSION_LIMIT
     return max(data.size * item, chunk) <= limit
 
 
 def _check_scale(
-    found: dict[str, h5py.Dataset], name: str, scale: str, path: Path
+    contents: dict[str, h5py.Dataset], name: str, scale: str, path: Path
 ) -> None:
     """Refuse counts without their scale, one a record and channel."""
-    if name not in found or found[name].dtype.kind == "f":
+    if name not in contents or contents[name].dtype.kind == "f":
         return
-    if scale not in found:
+    if scale not in contents:
         raise DatasetError(
             f"{path}: {name} is int16 and there is no data set {scale}; its values are unknown"
         )
-    if found[scale].shape != found[name].shape[:2]:
+    if contents[scale].shape != contents[name].shape[:2]:
         raise DatasetError(
-            f"{path}: {scale} has shape {found[scale].shape}, {name} has {found[name].shape[:2]} records and channels"
+            f"{path}: {scale} has shape {contents[scale].shape}, {name} has {contents[name].shape[:2]} "
+            "records and channels"
         )
 
 
@@ -240,37 +239,40 @@ def _check_attributes(file: h5py.File, path: Path) -> None:
         raise DatasetError(
             f"{path} has {len(file.attrs)} attributes; it is no gensig shard"
         )
-    found = read_attributes(file)
-    missing = [name for name in REQUIRED_ATTRIBUTES if name not in found]
+    attributes = read_attributes(file)
+    missing = [name for name in REQUIRED_ATTRIBUTES if name not in attributes]
     if missing:
         raise DatasetError(
             f"{path} has no root attribute {', '.join(missing)}; it is no gensig shard"
         )
-    version, rate = found["schema_version"], found["sampling_rate_hz"]
+    version, rate = attributes["schema_version"], attributes["sampling_rate_hz"]
     if version != SCHEMA_VERSION:
         raise DatasetError(
-            f"{path} has format version {version}; this gensig reads {SCHEMA_VERSION}, get a matching one"
+            f"{path} has format version {version}; this gensig reads {SCHEMA_VERSION}, get a "
+            "matching one"
         )
     if not isinstance(rate, int | float) or not 0 < rate < float("inf"):
         raise DatasetError(
             f"{path}: sampling_rate_hz is {rate}; it must be a positive number"
         )
     for name in ("channel_names", "class_names"):
-        value = found[name]
-        if not isinstance(value, list) or not all(
-            isinstance(item, str) for item in value
-        ):
+        value = attributes[name]
+        if not isinstance(value, list) or {*map(type, value)} - {str}:
             raise DatasetError(f"{path}: attribute {name} must be a list of text")
-    if len(found["channel_names"]) != file["acceleration"].shape[1]:
-        raise DatasetError(
-            f"{path}: {len(found['channel_names'])} channel names for {file['acceleration'].shape[1]} channels"
-        )
+    n_names, n_channels = (
+        len(attributes["channel_names"]),
+        file["acceleration"].shape[1],
+    )
+    if n_names != n_channels:
+        raise DatasetError(f"{path}: {n_names} channel names for {n_channels} channels")
 
 
 def read_rows(data: h5py.Dataset) -> np.ndarray:
     """The whole of a small data set, text decoded."""
     values = data[...]
-    return decoded(values) if values.dtype.kind == "S" else values
+    if values.dtype.kind == "S":
+        return decoded(values)
+    return values
 
 
 def first_line(error: Exception) -> str:

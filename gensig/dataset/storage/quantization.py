@@ -8,14 +8,11 @@ import numpy as np
 
 from gensig.dataset.schema import SCALES
 
-COUNTS = (
-    32767  # of the largest value of a channel, so that both signs have the same range
-)
+COUNTS = 32767  # of the largest value of a channel; both signs have the same range
 
 
 def quantized(signal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Counts and the value of one count, so that `counts * scale` is the signal but for half a
-    count.
+    """Counts and the value of one count; `counts * scale` is the signal to half a count.
 
     Parameters
     ----------
@@ -24,8 +21,8 @@ def quantized(signal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Returns
     -------
     counts : (channel, sample) int16    -32767 to 32767, which the largest value of each channel has
-    scale : (channel,) float64          unit of the signal; 1 for a channel of zeros, NaN (and counts of 0) for one that
-                                        is not finite throughout
+    scale : (channel,) float64          unit of the signal; 1 for a channel of zeros, NaN (and
+        counts of 0) for one that is not finite throughout
 
     The error is at most half a count: 1 / 65534 of the channel's peak, 96.3 dB below it.
     """
@@ -76,7 +73,6 @@ def read_signal(
         raise ValueError(
             f"{SCALES[name]} of row {row} is {scale[wrong][0]}; a scale is positive and finite"
         )
-    with np.errstate(
-        over="ignore"
-    ):  # of a forged scale; the infinite values are found where signals are checked
+    # A forged scale may overflow; infinite values are found where signals are checked.
+    with np.errstate(over="ignore"):
         return np.multiply(stored, scale[:, None], dtype=np.float64).astype(np.float32)

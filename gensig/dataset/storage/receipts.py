@@ -1,9 +1,8 @@
-"""A note beside each finished shard until the manifest has taken it in, so that writers never
-share a file.
+"""Receipts of finished shards, which wait beside them for their entry in the manifest.
 
-Processes that may not see each other, such as the tasks of an array job, each write shards and
-receipts of their own; one process enters them in the manifest. A shard whose writer was killed
-before its receipt is made again.
+Processes that may not see each other, such as the tasks of an array job, write separate shards and
+receipts, and so never share a file. One process enters the receipts in the manifest. A shard whose
+writer was killed before its receipt is made again.
 """
 
 import json
@@ -40,7 +39,7 @@ def write_receipt(
     n_bytes: int,
     n_failed: int,
 ) -> None:
-    """Say that a shard is whole under its final name."""
+    """Write the receipt of a shard that is whole under its final name."""
     entry = ShardEntry(
         name=shard_name(shard_index),
         rows=rows,
@@ -53,10 +52,7 @@ def write_receipt(
 
 
 def read_receipt(folder: Path, shard_index: int) -> ShardEntry | None:
-    """What the receipt of a shard says.
-
-    None without one, or where the shard has another size than it says.
-    """
+    """Entry of a shard by its receipt; None without one, or for a shard of another size."""
     path, shard = receipt_path(folder, shard_index), shard_path(folder, shard_index)
     if not path.is_file():
         return None
@@ -66,26 +62,24 @@ def read_receipt(folder: Path, shard_index: int) -> ShardEntry | None:
         )
     except (DatasetError, ValueError, RecursionError):
         return None  # damaged: the shard is made again
-    whole = (
-        entry.state == "done"
-        and shard.is_file()
-        and shard.stat().st_size == entry.bytes
-    )
-    return entry if whole else None
+    if entry.state != "done" or not shard.is_file():
+        return None
+    return entry if shard.stat().st_size == entry.bytes else None
 
 
 def collect_receipts(folder: Path) -> int:
     """Enter every shard that has a receipt in the manifest; returns how many there were."""
     manifest = read_manifest(folder)
-    found = {}
+    entries = {}
     for index, planned in enumerate(manifest.shards):
-        entry = None if planned.state == "done" else read_receipt(folder, index)
-        if entry is not None and entry.rows == planned.rows:
-            found[index] = entry
-    if found:
-        record_shards(folder, found)
+        if planned.state != "done":
+            entry = read_receipt(folder, index)
+            if entry is not None and entry.rows == planned.rows:
+                entries[index] = entry
+    if entries:
+        record_shards(folder, entries)
     if not manifest.is_complete:
         for index in range(len(manifest.shards)):
             with suppress(FileNotFoundError):
                 receipt_path(folder, index).unlink()
-    return len(found)
+    return len(entries)

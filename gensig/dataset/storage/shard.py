@@ -9,22 +9,19 @@ import operator
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
 
 import h5py
 import numpy as np
 
+from gensig.dataset.columns import COLUMNS, LIFE_COLUMNS, Column
 from gensig.dataset.schema import (
-    COLUMNS,
     DEFAULTS,
-    LIFE_COLUMNS,
     PARAMS,
     REQUIRED_ATTRIBUTES,
     SAMPLE_TYPES,
     SCALES,
     SCHEMA_VERSION,
     SIGNALS,
-    Column,
     stored_reason,
     unit_in_file,
 )
@@ -47,13 +44,17 @@ class ShardWriter:
 
     Parameters
     ----------
-    path : Path          the shard's final name; nothing appears under it before the block ends cleanly
+    path : Path          the shard's final name; nothing appears under it before the block ends
+                         cleanly
     n_records : int      number of rows
-    signals : name -> shape of one record's array, such as {"acceleration": (4, 51200), "noise_power": (4,)}
+    signals : name -> shape of one record's array, such as {"acceleration": (4, 51200),
+        "noise_power": (4,)}
     params : list        names of the `params/<name>` columns
-    attributes : dict    root attributes; `sampling_rate_hz`, `channel_names` and `class_names` are required
+    attributes : dict    root attributes; `sampling_rate_hz`, `channel_names` and `class_names` are
+                         required
     compression : str    one of `COMPRESSIONS`, for the time signals
-    sample_type : str    'float32', or 'int16': accelerations become counts, and the writer adds their scales
+    sample_type : str    'float32', or 'int16': accelerations become counts, and the writer adds
+                         their scales
     lives : bool         whether records are snapshots of lives, with `LIFE_COLUMNS`
 
     Attributes
@@ -62,7 +63,8 @@ class ShardWriter:
 
     Raises
     ------
-    DatasetError    for unknown names, wrong shapes or types, a row written twice or never, a disk that is full
+    DatasetError    for unknown names, wrong shapes or types, a row written twice or never, a disk
+                    that is full
 
     The bytes depend neither on time, folder nor process; with `compression='none'` not on the
     order of `write` either. The shard is built in memory, about twice its size at the end, and
@@ -87,16 +89,13 @@ class ShardWriter:
         self.attributes = {"schema_version": SCHEMA_VERSION, **attributes}
         self.compression = compression
         self.sample_type = sample_type
-        self.scales = {
-            name: SCALES[name]
-            for name in signals
-            if name in SCALES and sample_type == "int16"
-        }
-        self.columns = {
-            name: column
-            for name, column in COLUMNS.items()
-            if lives or name not in LIFE_COLUMNS
-        }
+        self.scales: dict[str, str] = {}
+        if sample_type == "int16":
+            self.scales = {name: SCALES[name] for name in SCALES if name in signals}
+        self.columns = dict(COLUMNS)
+        if not lives:
+            for name in LIFE_COLUMNS:
+                del self.columns[name]
         for name in params:
             full_name = f"{PARAMS}/{name}"
             self.columns[full_name] = Column(
@@ -112,20 +111,15 @@ class ShardWriter:
         self.n_bytes = 0
         self.n_failed = 0
         self._rows = {
-            **{
-                name: np.zeros(n_records, column.storage_dtype)
-                for name, column in self.columns.items()
-            },
-            **{
-                name: np.zeros((n_records, *shape), SIGNALS[name].storage_dtype)
-                for name, shape in self.signals.items()
-                if not SIGNALS[name].is_bulk
-            },
-            **{
-                scale: np.zeros((n_records, self.signals[name][0]), "<f8")
-                for name, scale in self.scales.items()
-            },
+            name: np.zeros(n_records, column.storage_dtype)
+            for name, column in self.columns.items()
         }
+        for name, shape in self.signals.items():
+            if not SIGNALS[name].is_bulk:
+                dtype = SIGNALS[name].storage_dtype
+                self._rows[name] = np.zeros((n_records, *shape), dtype)
+        for name, scale in self.scales.items():
+            self._rows[scale] = np.zeros((n_records, self.signals[name][0]), "<f8")
         self._written = np.zeros(n_records, dtype=bool)
         self._file: h5py.File | None = None
 
@@ -142,12 +136,7 @@ class ShardWriter:
             raise
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         try:
             if kind is None:
                 self._finish()
@@ -165,8 +154,10 @@ class ShardWriter:
         Parameters
         ----------
         row : int        0 to n_records - 1, each exactly once
-        signals : dict   every declared signal; a record with status 'failed' may leave floating-point ones out (NaN)
-        values : dict    every column of `COLUMNS` but those in `DEFAULTS`; `params/<name>` left out become NaN
+        signals : dict   every declared signal; a record with status 'failed' may leave
+                         floating-point ones out (NaN)
+        values : dict    every column of `COLUMNS` but those in `DEFAULTS`; `params/<name>` left
+                         out become NaN
         """
         if self._file is None:
             raise DatasetError(
@@ -208,7 +199,8 @@ class ShardWriter:
             if failed and column.storage_dtype.kind == "f":
                 return np.full(shape, np.nan, column.storage_dtype)
             raise DatasetError(
-                f"{self.path.name}: signal {name} is missing; only a record with status 'failed' may omit it"
+                f"{self.path.name}: signal {name} is missing; only a record with status 'failed' "
+                "may omit it"
             )
         given = np.asarray(signals[name])
         if given.shape != shape or given.dtype.kind not in "fiub":
@@ -228,6 +220,9 @@ class ShardWriter:
         assert self._file is not None
         column = SIGNALS[name]
         scale = self.scales.get(name)
+        dtype, unit = column.storage_dtype, unit_in_file(column, self.attributes)
+        if scale is not None:
+            dtype, unit = np.dtype("<i2"), "1"
         properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
         if self.compression == "none":
             # Space is laid out now, in row order, and not filled first: every row is written
@@ -237,27 +232,20 @@ class ShardWriter:
         data = self._file.create_dataset(
             name,
             shape=(self.n_records, *shape),
-            dtype=column.storage_dtype if scale is None else "<i2",
+            dtype=dtype,
             chunks=(1, *shape),
             track_times=False,
             dcpl=properties,
             **self._options,
         )
-        set_attribute(
-            data,
-            "unit",
-            unit_in_file(column, self.attributes) if scale is None else "1",
-        )
+        set_attribute(data, "unit", unit)
         if scale is not None:
             set_attribute(data, "scale", scale)
 
     def _refuse_unknown(self, given: Mapping, known: Mapping) -> None:
         for name in given:
             if name not in known:
-                near = (
-                    difflib.get_close_matches(name, list(known), n=3)
-                    or sorted(known)[:5]
-                )
+                near = difflib.get_close_matches(name, known, n=3) or sorted(known)[:5]
                 raise DatasetError(
                     f"{self.path.name}: '{name}' is not declared; did you mean {', '.join(near)}?"
                 )
@@ -291,7 +279,7 @@ class ShardWriter:
 
 
 def _check_declaration(writer: ShardWriter, params: Sequence[str]) -> None:
-    """Refuse what could not be read back."""
+    """Raise DatasetError for a declaration that could not be read back."""
     name = writer.path.name
     for key, given, known in (
         ("compression", writer.compression, COMPRESSIONS),
@@ -306,53 +294,53 @@ def _check_declaration(writer: ShardWriter, params: Sequence[str]) -> None:
             f"{name}: {writer.n_records} records; a shard needs at least 1"
         )
     for signal, shape in writer.signals.items():
-        own = {
-            key: column for key, column in SIGNALS.items() if key not in SCALES.values()
+        axes = {
+            key: column.axes
+            for key, column in SIGNALS.items()
+            if key not in SCALES.values()
         }
-        if signal not in own or len(shape) != len(own[signal].axes) or min(shape) < 1:
-            allowed = ", ".join(
-                f"{key} ({', '.join(column.axes)})" for key, column in own.items()
-            )
+        if len(shape) != len(axes.get(signal, ())) or min(shape) < 1:
+            allowed = ", ".join(f"{key} ({', '.join(axes[key])})" for key in axes)
             raise DatasetError(
                 f"{name}: signal {signal} of shape {shape} is not allowed; allowed are {allowed}"
             )
-        n_bytes = math.prod(shape) * own[signal].n_bytes
+        n_bytes = math.prod(shape) * SIGNALS[signal].n_bytes
         if writer.compression == "blosc2" and n_bytes > BLOSC2_CHUNK_LIMIT:
             raise DatasetError(
-                f"{name}: a record's {signal} has {n_bytes} bytes, blosc2 takes {BLOSC2_CHUNK_LIMIT}; make shorter "
-                "records or choose another compression"
+                f"{name}: a record's {signal} has {n_bytes} bytes, blosc2 takes "
+                f"{BLOSC2_CHUNK_LIMIT}; make shorter records or choose another compression"
             )
     missing = [key for key in REQUIRED_ATTRIBUTES if key not in writer.attributes]
     if missing or "acceleration" not in writer.signals:
         raise DatasetError(
-            f"{name}: root attributes missing: {missing or 'none'}; they and the signal acceleration are required"
+            f"{name}: root attributes missing: {missing or 'none'}; they and the signal "
+            "acceleration are required"
         )
     if writer.attributes["schema_version"] != SCHEMA_VERSION:
         raise DatasetError(
-            f"{name}: schema_version {writer.attributes['schema_version']}, this writer makes {SCHEMA_VERSION}"
+            f"{name}: schema_version {writer.attributes['schema_version']}, this writer makes "
+            f"{SCHEMA_VERSION}"
         )
     channels = writer.attributes["channel_names"]
-    if (
-        not isinstance(channels, Sequence)
-        or len(channels) != writer.signals["acceleration"][0]
-    ):
+    n_channels = writer.signals["acceleration"][0]
+    if not isinstance(channels, Sequence) or len(channels) != n_channels:
         raise DatasetError(
-            f"{name}: channel_names {channels!r} for {writer.signals['acceleration'][0]} channels"
+            f"{name}: channel_names {channels!r} for {n_channels} channels"
         )
     bad = [param for param in params if not _PARAM_NAME.fullmatch(param)]
     if bad or len(set(params)) != len(params):
         raise DatasetError(
-            f"{name}: params {bad or list(params)} are refused; use distinct names of letters, digits, '_', '.', '-'"
+            f"{name}: params {bad or list(params)} are refused; use distinct names of letters, "
+            "digits, '_', '.', '-'"
         )
 
 
 def _value(
     column: Column, values: Mapping[str, str | int | float]
 ) -> str | int | float:
-    if column.name in values:
-        return values[column.name]
-    if column.name in DEFAULTS:
-        return DEFAULTS[column.name]
+    for known in (values, DEFAULTS):
+        if column.name in known:
+            return known[column.name]
     if column.name.startswith(f"{PARAMS}/"):
         return math.nan
     raise DatasetError(
@@ -375,17 +363,16 @@ def _encoded(column: Column, value: str | int | float) -> bytes | int | float:
         if column.storage_dtype.kind == "f":
             if isinstance(value, str):
                 raise TypeError
-            return math.nan if math.isnan(value) else float(value)
+            number = float(value)
+            return math.nan if math.isnan(number) else number
         integer = operator.index(value)  # type: ignore[arg-type]
         if not np.iinfo(column.dtype).min <= integer <= np.iinfo(column.dtype).max:
             raise OverflowError
         return integer
     except (TypeError, ValueError, OverflowError) as error:
-        kind = (
-            f"ASCII text of at most {column.n_bytes} bytes"
-            if column.is_text
-            else f"value of type {column.dtype}"
-        )
+        kind = f"value of type {column.dtype}"
+        if column.is_text:
+            kind = f"ASCII text of at most {column.n_bytes} bytes"
         raise DatasetError(
             f"column {column.name}: {value!a} is no {kind}; give {column.description}"
         ) from error

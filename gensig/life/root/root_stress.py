@@ -1,5 +1,4 @@
-"""Bending stress at the tooth's root: ISO 6336-3 at its own load point, and through the mesh
-under given loads.
+"""Bending stress at the tooth's root: ISO 6336-3 at its load point, and through the mesh.
 
 Theory, limits and choices: ``docs/theory/root_stress.md``.
 """
@@ -12,10 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.errors import ConfigError, GeometryError
+from gensig.errors import GeometryError
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.life.root.tooth_root import root_loading, root_section
+from gensig.units import check_choice
 
 Array = NDArray[np.float64]
 
@@ -23,17 +23,14 @@ LOAD_POINTS = ("outer_single_pair", "tip")
 EDITIONS = (2019, 2006)
 DEEP_TOOTH_RATIOS = (2.05, 2.5)  # of eps_alpha_n, between which Y_DT falls
 DEEP_TOOTH_GRADE = 4  # the coarsest ISO 1328 grade whose teeth share the load that well
-RIM_SHARES = (
-    0.5,
-    1.2,
-)  # of the tooth height: no thinner rims; from here on the rim does not matter
+# of the tooth height: no thinner rims; from the second on the rim does not matter
+RIM_SHARES = (0.5, 1.2)
 OVERHANG_MODULES = 1.0  # of a wider gear at either end that helps its root
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RootFactors:
-    """Every factor of the nominal root stress of one gear, sigma_F0 = F_t / (b m_n) times their
-    product.
+    """Factors of the nominal root stress of one gear, sigma_F0 = F_t / (b m_n) times their product.
 
     ``width`` b in m, at most one normal module wider than the mate at either end; ``form_factor``
     Y_F (without f_eps), ``stress_correction_factor`` Y_S, ``load_distribution_factor`` f_eps,
@@ -73,14 +70,12 @@ def normal_contact_ratio(pair: GearPair) -> float:
 
 
 def root_width(pair: GearPair, gear: Gear) -> float:
-    """Width that bears at the root, m.
-
-    The gear's own, of a wider one no more than a module beyond either end.
-    """
-    mate = pair.wheel if gear is pair.pinion else pair.pinion
-    return min(
-        gear.face_width, mate.face_width + 2.0 * OVERHANG_MODULES * gear.normal_module
-    )
+    """Width that bears at the root, m: the gear's, at most a module beyond its mate's ends."""
+    mate = pair.wheel
+    if gear is not pair.pinion:
+        mate = pair.pinion
+    overhang = 2.0 * OVERHANG_MODULES * gear.normal_module
+    return min(gear.face_width, mate.face_width + overhang)
 
 
 def root_factors(
@@ -95,58 +90,62 @@ def root_factors(
 
     Parameters
     ----------
-    load_point : ``outer_single_pair`` (Method B of ISO 6336-3) or ``tip``, the whole load there times Y_eps
+    load_point : ``outer_single_pair`` (Method B of ISO 6336-3) or ``tip``, the whole load there
+        times Y_eps
     edition : of ISO 6336-3; 2006 has neither f_eps nor 1 / cos^3(beta) in Y_beta
-    grade : of ISO 1328, None for perfect gears; only fine teeth with a high contact ratio have a Y_DT below 1
+    grade : of ISO 1328, None for perfect gears; only fine teeth with a high contact ratio have a
+        Y_DT below 1
 
     Raises
     ------
-    ConfigError, GeometryError, ExtrapolationError    for unknown choices, too thin a rim, a notch out of range
+    ConfigError, GeometryError, ExtrapolationError    for unknown choices, too thin a rim, a notch
+        out of range
 
     Source: ISO 6336-3, 6 to 10, external gears; the tip with Y_eps = 0.25 + 0.75 / eps_alpha_n is
     its former Method C (also DIN 3990-3). Y_DT is taken with the edition 2006 only: f_eps of 2019
     already shares the load.
     """
-    if load_point not in LOAD_POINTS:
-        raise ConfigError(
-            f"strength.load_point = {load_point!r}; allowed: {', '.join(LOAD_POINTS)}"
-        )
-    if edition not in EDITIONS:
-        raise ConfigError(
-            f"strength.edition = {edition!r}; allowed: {', '.join(map(str, EDITIONS))}"
-        )
-    ratio, at_tip = normal_contact_ratio(pair), load_point == "tip"
-    found = {}
+    check_choice("strength.load_point", load_point, LOAD_POINTS)
+    check_choice("strength.edition", edition, EDITIONS)
+    ratio = normal_contact_ratio(pair)
+    distribution = contact_ratio = deep_tooth = 1.0
+    tip_distance = 0.0  # in base pitches
+    if load_point == "tip":
+        contact_ratio = 0.25 + 0.75 / max(ratio, 1.0)
+    else:
+        tip_distance = ratio - 1.0
+        if edition == 2006:
+            deep_tooth = deep_tooth_factor(ratio, grade)
+        else:
+            distribution = load_distribution_factor(pair)
+    factors = {}
     for name, gear in pair.gears.items():
         normal_pitch = math.pi * gear.normal_module * math.cos(gear.pressure_angle)
-        place = 0.0 if at_tip else normal_pitch * (ratio - 1.0)
-        loading = root_loading(gear, place, allow_extrapolation=allow_extrapolation)
+        loading = root_loading(
+            gear, normal_pitch * tip_distance, allow_extrapolation=allow_extrapolation
+        )
         if not loading.lever_arm[0] > 0.0:
             raise GeometryError(
-                f"{name}: the outer point of single pair contact lies below the critical section (contact ratio "
-                f"{ratio:.4g}); take strength.load_point=tip"
+                f"{name}: the outer point of single pair contact lies below the critical section "
+                f"(contact ratio {ratio:.4g}); take strength.load_point=tip"
             )
-        found[name] = RootFactors(
+        factors[name] = RootFactors(
             width=root_width(pair, gear),
             normal_module=gear.normal_module,
             form_factor=float(loading.form_factor[0]),
             stress_correction_factor=float(loading.stress_correction_factor[0]),
-            load_distribution_factor=1.0
-            if at_tip or edition == 2006
-            else load_distribution_factor(pair),
-            contact_ratio_factor=0.25 + 0.75 / max(ratio, 1.0) if at_tip else 1.0,
+            load_distribution_factor=distribution,
+            contact_ratio_factor=contact_ratio,
             helix_factor=helix_factor(pair, edition=edition),
             rim_thickness_factor=rim_thickness_factor(gear),
-            deep_tooth_factor=1.0
-            if at_tip or edition == 2019
-            else deep_tooth_factor(ratio, grade),
+            deep_tooth_factor=deep_tooth,
             notch_parameter=root_section(gear).notch_parameter,
         )
-    return found
+    return factors
 
 
 def load_distribution_factor(pair: GearPair) -> float:
-    """f_eps: how the pairs in contact share the load, as the overlap grows from 0 to 1.
+    """f_eps, the load sharing of the pairs in contact as the overlap grows from 0 to 1.
 
     Source: ISO 6336-3:2019, 6.2: 1 (0.7 from eps_alpha_n = 2 on) without overlap,
     eps_alpha_n^-0.5 from 1 on.
@@ -154,51 +153,60 @@ def load_distribution_factor(pair: GearPair) -> float:
     ratio, overlap = normal_contact_ratio(pair), min(pair.overlap_ratio, 1.0)
     if overlap == 0.0 and ratio >= 2.0:
         return 0.7
-    alone = 1.0 if ratio < 2.0 else 0.5
+    alone = 1.0
+    if ratio >= 2.0:
+        alone = 0.5
     return math.sqrt((1.0 - overlap) * alone + overlap / ratio)
 
 
 def helix_factor(pair: GearPair, *, edition: int) -> float:
-    """Y_beta = 1 - eps_beta beta / 120 degrees, over cos^3(beta) from 2019 on; overlap up to 1,
-    helix up to 30 degrees.
+    """Y_beta = 1 - eps_beta beta / 120 degrees, over cos^3(beta) from 2019 on.
+
+    The overlap counts up to 1, the helix up to 30 degrees.
 
     Source: ISO 6336-3, 8.
     """
     helix = min(abs(pair.pinion.helix_angle), math.radians(30.0))
     factor = 1.0 - min(pair.overlap_ratio, 1.0) * math.degrees(helix) / 120.0
-    return factor if edition == 2006 else factor / math.cos(helix) ** 3
+    if edition == 2006:
+        return factor
+    return factor / math.cos(helix) ** 3
 
 
 def rim_thickness_factor(gear: Gear) -> float:
-    """Y_B of the ring between bore and root: 1 from 1.2 tooth heights on, 1.6 ln(2.242 h_t / s_R)
-    below.
+    """Y_B of the ring between bore and root.
+
+    It is 1 from 1.2 tooth heights on, 1.6 ln(2.242 h_t / s_R) below.
 
     Source: ISO 6336-3, 9, external gears; no thinner rims than half a tooth height.
     """
-    height, rim = (
-        gear.tip_radius - gear.root_radius,
-        gear.root_radius - gear.bore_radius,
-    )
-    if rim <= RIM_SHARES[0] * height:
+    height = gear.tip_radius - gear.root_radius
+    rim = gear.root_radius - gear.bore_radius
+    least, enough = RIM_SHARES
+    if rim <= least * height:
         raise GeometryError(
-            f"{gear.name}: the rim between bore and root is {rim * 1e3:.3g} mm, {rim / height:.2g} tooth heights; ISO "
-            f"6336-3 covers more than {RIM_SHARES[0]:g}; reduce bore_radius_mm"
+            f"{gear.name}: the rim between bore and root is {rim * 1e3:.3g} mm, "
+            f"{rim / height:.2g} tooth heights; ISO 6336-3 covers more than {least:g}; "
+            "reduce bore_radius_mm"
         )
-    return (
-        1.0 if rim >= RIM_SHARES[1] * height else 1.6 * math.log(2.242 * height / rim)
-    )
+    if rim >= enough * height:
+        return 1.0
+    return 1.6 * math.log(2.242 * height / rim)
 
 
 def deep_tooth_factor(ratio: float, grade: float | None) -> float:
-    """Y_DT of teeth of ISO 1328 grade 4 or finer (None: perfect) with a contact ratio eps_alpha_n
-    above 2.05.
+    """Y_DT of teeth of ISO 1328 grade 4 or finer (None: perfect).
+
+    It is below 1 for a contact ratio eps_alpha_n above 2.05.
 
     Source: ISO 6336-3:2006, 10: -0.666 eps_alpha_n + 2.366 up to 2.5, 0.7 beyond.
     """
     low, high = DEEP_TOOTH_RATIOS
     if ratio <= low or (grade is not None and grade > DEEP_TOOTH_GRADE):
         return 1.0
-    return 2.366 - 0.666 * ratio if ratio <= high else 0.7
+    if ratio > high:
+        return 0.7
+    return 2.366 - 0.666 * ratio
 
 
 def stress_factor_on_path(
@@ -208,17 +216,21 @@ def stress_factor_on_path(
 
     Parameters
     ----------
-    position : m    from A in the transverse section; beyond the path the tip's corner touches, so its ends count
+    position : m    from A in the transverse section; beyond the path the tip's corner touches, so
+        its ends count
 
     Returns
     -------
-    of the shape of ``position``; in the normal section the way from the tip is 1 / cos(beta_b) longer
+    of the shape of ``position``; in the normal section the way from the tip is 1 / cos(beta_b)
+    longer
     """
     on_path = np.clip(position, 0.0, pair.path_of_contact)
-    from_tip = pair.path_of_contact - on_path if gear is pair.pinion else on_path
+    from_tip = on_path
+    if gear is pair.pinion:
+        from_tip = pair.path_of_contact - on_path
     distance = np.ravel(from_tip) / math.cos(pair.base_helix_angle)
-    found = root_loading(gear, distance, allow_extrapolation=allow_extrapolation)
-    return found.stress_factor.reshape(np.shape(position))
+    loading = root_loading(gear, distance, allow_extrapolation=allow_extrapolation)
+    return loading.stress_factor.reshape(np.shape(position))
 
 
 def pair_root_stress(
@@ -229,13 +241,12 @@ def pair_root_stress(
     *,
     allow_extrapolation: bool = False,
 ) -> Array:
-    """Root stress of a spur tooth under the load of its pair, static or dynamic, of the shape of
-    ``position``, Pa.
+    """Root stress of a spur tooth under the load of its pair, of the shape of ``position``, Pa.
 
     Parameters
     ----------
     position : m    of the contact from A
-    load : N        of this pair along the line of action
+    load : N        of this pair along the line of action, static or dynamic
     """
     factor = stress_factor_on_path(
         pair, gear, position, allow_extrapolation=allow_extrapolation
@@ -244,33 +255,33 @@ def pair_root_stress(
     return tangential * factor / (root_width(pair, gear) * gear.normal_module)
 
 
-def spread_along_face(own: Array, structure: Array, coupling: float) -> Array:
-    """What the root carries where slices bend their neighbours, (..., slice).
+def spread_along_face(load: Array, structure: Array, coupling: float) -> Array:
+    """Load of the root where slices bend their neighbours, (..., slice).
 
     Parameters
     ----------
-    own : (..., slice)              what each slice's own load would do to it
+    load : (..., slice)             of each slice without its neighbours
     structure : (..., slice) m2/N   compliance of teeth and bodies per width
-    coupling : squared length over which slices couple, over the squared width of a slice; 0 leaves ``own`` as it is
+    coupling : squared length over which slices couple, over the squared width of a slice; 0
+        leaves ``load`` as it is
 
     The reaction k w of the foundation with shear that the mesh has for its slices, k w - (k
-    coupling w')' = own, k = 1 / structure, w' = 0 at both ends: the sum over the face stays.
+    coupling w')' = load, k = 1 / structure, w' = 0 at both ends: the sum over the face stays.
     Thomas's algorithm, whose pivots are positive.
     """
-    if coupling == 0.0 or own.shape[-1] == 1:
-        return own
+    if coupling == 0.0 or load.shape[-1] == 1:
+        return load
     between = 2.0 * coupling / (structure[..., 1:] + structure[..., :-1])
-    pivot, deflection = 1.0 / structure, own.copy()
+    pivot, deflection = 1.0 / structure, load.copy()
     pivot[..., 1:] += between
     pivot[..., :-1] += between
-    n_slices = own.shape[-1]
+    n_slices = load.shape[-1]
     for j in range(1, n_slices):
         ratio = between[..., j - 1] / pivot[..., j - 1]
         pivot[..., j] -= ratio * between[..., j - 1]
         deflection[..., j] += ratio * deflection[..., j - 1]
     deflection[..., -1] /= pivot[..., -1]
     for j in range(n_slices - 2, -1, -1):
-        deflection[..., j] = (
-            deflection[..., j] + between[..., j] * deflection[..., j + 1]
-        ) / pivot[..., j]
+        deflection[..., j] += between[..., j] * deflection[..., j + 1]
+        deflection[..., j] /= pivot[..., j]
     return deflection / structure

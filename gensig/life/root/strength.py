@@ -1,7 +1,4 @@
-"""Strength of the tooth's root against fatigue.
-
-Material values, every factor by name, safety and reliability.
-"""
+"""Fatigue strength of the tooth's root: material values, factors, safety and reliability."""
 
 from __future__ import annotations
 
@@ -13,23 +10,30 @@ import numpy as np
 
 from gensig.errors import ConfigError
 from gensig.life.root.root_stress import EDITIONS, LOAD_POINTS
-from gensig.units import from_si, unit
+from gensig.units import check_choice, check_positive, unit
 
 # ISO 6336-3, case-hardened steel: life factor over load cycles, straight lines between these on
 # logarithmic axes
 LIFE_CYCLES, LIFE_FACTORS = (1e3, 3e6, 1e10), (2.5, 1.0, 0.85)
 SLIP_LAYER = 3e-6  # m, rho' of case-hardened steel
 NOTCH_OF_TEST_GEAR = 2.5  # q_sT
-SIZE_MODULES, SMALLEST_SIZE_FACTOR = (
-    (5e-3, 25e-3),
-    0.8,
-)  # m; Y_X of case-hardened steel falls between these
+# m; Y_X of case-hardened steel falls between these, to the smallest factor
+SIZE_MODULES, SMALLEST_SIZE_FACTOR = (5e-3, 25e-3), 0.8
 
 FACTORS = (
-    "paper_life_factor", "test_gear_stress_correction", "life_factor", "relative_notch_sensitivity",
-    "relative_surface_factor", "size_factor", "mean_stress_factor", "application_factor", "mesh_load_factor",
-    "dynamic_factor", "face_load_factor", "transverse_load_factor",
-)  # fmt: skip
+    "paper_life_factor",
+    "test_gear_stress_correction",
+    "life_factor",
+    "relative_notch_sensitivity",
+    "relative_surface_factor",
+    "size_factor",
+    "mean_stress_factor",
+    "application_factor",
+    "mesh_load_factor",
+    "dynamic_factor",
+    "face_load_factor",
+    "transverse_load_factor",
+)
 
 
 class Reliability(NamedTuple):
@@ -54,9 +58,10 @@ def reliability(safety: float) -> str:
     Source: engine paper, table 3 (high, higher, general and low reliability from 2.00, 1.60, 1.25
     and 1.00 on).
     """
-    return next(
-        (found.name for found in RELIABILITY if safety >= found.least_safety), BELOW_ALL
-    )
+    for grade in RELIABILITY:
+        if safety >= grade.least_safety:
+            return grade.name
+    return BELOW_ALL
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +75,8 @@ class Strength:
     test_gear_stress_correction : Y_ST
     n_load_cycles : of each tooth
     life_factor : Y_NT; None takes that of case-hardened steel at ``n_load_cycles``
-    relative_notch_sensitivity : Y_delta_rel_T; None takes that of case-hardened steel at the gear's own notch
+    relative_notch_sensitivity : Y_delta_rel_T; None takes that of case-hardened steel at the
+        gear's notch
     relative_surface_factor : Y_R_rel_T
     size_factor : Y_X; None takes that of case-hardened steel at the module
     mean_stress_factor : Y_M, 0.7 for teeth that are bent both ways alike
@@ -98,17 +104,9 @@ class Strength:
     edition: int
 
     def __post_init__(self) -> None:
-        for key in ("bending_limit_mpa", "n_load_cycles", *FACTORS):
-            value = getattr(self, key.removesuffix("_mpa"))
-            if value is not None and not value > 0.0:
-                raise ConfigError(
-                    f"strength.{key} = {from_si(key, value):g} must be positive"
-                )
-        for key, allowed in (("load_point", LOAD_POINTS), ("edition", EDITIONS)):
-            if getattr(self, key) not in allowed:
-                raise ConfigError(
-                    f"strength.{key} = {getattr(self, key)!r}; allowed: {', '.join(map(str, allowed))}"
-                )
+        check_positive(self, "strength.", "bending_limit", "n_load_cycles", *FACTORS)
+        check_choice("strength.load_point", self.load_point, LOAD_POINTS)
+        check_choice("strength.edition", self.edition, EDITIONS)
 
     @property
     def force_factor(self) -> float:
@@ -123,7 +121,7 @@ class Strength:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Safety:
-    """Safety of one gear's root; both conventions with their factors.
+    """Safety of one gear's root by both conventions, with their factors.
 
     ``paper`` = sigma_Flim K_FN / sigma_F, ``iso`` = sigma_Flim Y_ST Y_NT Y_delta_rel_T Y_R_rel_T
     Y_X Y_M / sigma_F.
@@ -149,15 +147,16 @@ def safety(
             f"the root stress is {stress * 1e-6:g} MPa and must be positive"
         )
     life = strength.life_factor
+    if life is None:
+        life = life_factor(strength.n_load_cycles)
     notch = strength.relative_notch_sensitivity
+    if notch is None:
+        notch = relative_notch_sensitivity(notch_parameter)
     size = strength.size_factor
-    life = life_factor(strength.n_load_cycles) if life is None else life
-    notch = relative_notch_sensitivity(notch_parameter) if notch is None else notch
-    size = size_factor(normal_module) if size is None else size
-    iso = (
-        strength.test_gear_stress_correction * life * notch
-        * strength.relative_surface_factor * size * strength.mean_stress_factor
-    )  # fmt: skip
+    if size is None:
+        size = size_factor(normal_module)
+    iso = strength.test_gear_stress_correction * life * notch
+    iso = iso * strength.relative_surface_factor * size * strength.mean_stress_factor
     return Safety(
         paper=strength.bending_limit * strength.paper_life_factor / stress,
         iso=strength.bending_limit * iso / stress,
@@ -172,13 +171,10 @@ def life_factor(n_load_cycles: float) -> float:
 
     Source: ISO 6336-3, 12, the lower of its two lines beyond 3e6.
     """
-    return float(
-        np.exp(
-            np.interp(
-                math.log(n_load_cycles), np.log(LIFE_CYCLES), np.log(LIFE_FACTORS)
-            )
-        )
+    logarithm = np.interp(
+        math.log(n_load_cycles), np.log(LIFE_CYCLES), np.log(LIFE_FACTORS)
     )
+    return float(np.exp(logarithm))
 
 
 def relative_notch_sensitivity(notch_parameter: float) -> float:

@@ -1,5 +1,4 @@
-"""The tooth's root as ISO 6336-3 sees it: critical section at the 30 degree tangent, form and
-stress correction.
+"""The tooth's root of ISO 6336-3: critical section, form and stress correction factors.
 
 Everything is of the normal section, on the virtual spur gear of a helical one. Theory:
 ``docs/theory/root_stress.md``.
@@ -19,9 +18,8 @@ from gensig.geometry.involute import involute
 
 Array = NDArray[np.float64]
 
-TANGENT = (
-    math.pi / 6.0
-)  # rad, of the root's tangent to the tooth centreline at the critical section
+# rad, of the root's tangent to the tooth centreline at the critical section
+TANGENT = math.pi / 6.0
 ROUNDS = 500  # at most, of the iteration for theta
 SETTLED = 1e-14
 NOTCH = (1.0, 8.0)  # range of q_s on which the stress correction factor was fitted
@@ -29,8 +27,7 @@ NOTCH = (1.0, 8.0)  # range of q_s on which the stress correction factor was fit
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VirtualGear:
-    """The spur gear with the tooth form of the normal section; for a spur gear it is the gear
-    itself.
+    """Spur gear with the tooth form of the normal section; for a spur gear it is the gear itself.
 
     ``n_teeth`` z_n need not be whole; ``tip_radius`` and ``base_radius`` m.
 
@@ -50,9 +47,9 @@ class VirtualGear:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RootSection:
-    """Critical section of a tooth: where the tangents at 30 degrees to its centreline touch the
-    root fillets.
+    """Critical section of a tooth.
 
+    There the tangents at 30 degrees to its centreline touch the root fillets.
     ``thickness`` s_Fn and ``fillet_radius`` rho_F in m, ``height`` of the section above the
     virtual gear's centre in m, ``theta`` rad.
     """
@@ -70,7 +67,7 @@ class RootSection:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RootLoading:
-    """What a force at some points of the flank does to the critical section, (point,) each.
+    """Load of the critical section by a force at some points of the flank, (point,) each.
 
     ``load_angle`` alpha_Fen in rad and ``lever_arm`` h_Fe in m; ``form_factor`` Y_F,
     ``stress_correction_factor`` Y_S and their product ``stress_factor``, which stays finite where
@@ -85,7 +82,7 @@ class RootLoading:
 
 
 def virtual_gear(gear: Gear) -> VirtualGear:
-    """The virtual spur gear of a gear."""
+    """Virtual spur gear of a gear."""
     n_teeth = gear.n_teeth / (
         math.cos(gear.base_helix_angle) ** 2 * math.cos(gear.helix_angle)
     )
@@ -102,7 +99,7 @@ def root_section(gear: Gear) -> RootSection:
 
     Raises
     ------
-    GeometryError    where the tangent finds no place on the fillet
+    GeometryError    where the tangent does not touch the fillet
 
     Source: ISO 6336-3, 6.2.2, without protuberance (s_pr = 0): E, G, H, theta = 2 G tan(theta) /
     z_n - H, s_Fn, rho_F.
@@ -110,23 +107,16 @@ def root_section(gear: Gear) -> RootSection:
     z, alpha = virtual_gear(gear).n_teeth, gear.pressure_angle
     rounding = gear.cutter_tip_radius_coefficient
     dedendum = gear.addendum_coefficient + gear.clearance_coefficient
-    e = (
-        math.pi / 4.0
-        - dedendum * math.tan(alpha)
-        - (1.0 - math.sin(alpha)) * rounding / math.cos(alpha)
-    )
+    tip_corner = (1.0 - math.sin(alpha)) * rounding / math.cos(alpha)
+    e = math.pi / 4.0 - dedendum * math.tan(alpha) - tip_corner
     g = rounding - dedendum + gear.profile_shift
     h = 2.0 / z * (math.pi / 2.0 - e) - math.pi / 3.0
     theta = _settled_theta(gear, z, g, h)
-    thickness = z * math.sin(math.pi / 3.0 - theta) + math.sqrt(3.0) * (
-        g / math.cos(theta) - rounding
-    )
-    fillet = rounding + 2.0 * g**2 / (
-        math.cos(theta) * (z * math.cos(theta) ** 2 - 2.0 * g)
-    )
-    height = 0.5 * (
-        z * math.cos(math.pi / 3.0 - theta) + g / math.cos(theta) - rounding
-    )
+    angle, cosine = math.pi / 3.0 - theta, math.cos(theta)
+    beyond = g / cosine - rounding
+    thickness = z * math.sin(angle) + math.sqrt(3.0) * beyond
+    fillet = rounding + 2.0 * g**2 / (cosine * (z * cosine**2 - 2.0 * g))
+    height = 0.5 * (z * math.cos(angle) + g / cosine - rounding)
     module = gear.normal_module
     return RootSection(
         thickness=module * thickness,
@@ -145,7 +135,8 @@ def _settled_theta(gear: Gear, z: float, g: float, h: float) -> float:
         if abs(theta - before) <= SETTLED:
             return theta
     raise GeometryError(
-        f"{gear.name}: the 30 degree tangent of ISO 6336-3 finds no root fillet with {gear.n_teeth} teeth and profile "
+        f"{gear.name}: the 30 degree tangent of ISO 6336-3 finds no root fillet with "
+        f"{gear.n_teeth} teeth and profile "
         f"shift {gear.profile_shift:g}; change them or cutter_tip_radius_coefficient"
     )
 
@@ -157,7 +148,8 @@ def root_loading(
 
     Parameters
     ----------
-    tip_distance : (point,) m    of the contact from the gear's tip along the line of action in the normal section
+    tip_distance : (point,) m    of the contact from the gear's tip along the line of action in the
+        normal section
     allow_extrapolation : use the stress correction factor beyond its range without an error
 
     Raises
@@ -173,34 +165,30 @@ def root_loading(
     notch = section.notch_parameter
     if not NOTCH[0] <= notch < NOTCH[1] and not allow_extrapolation:
         raise ExtrapolationError(
-            f"{gear.name}: the notch parameter s_Fn / (2 rho_F) = {notch:.3g} lies outside {NOTCH[0]:g}..{NOTCH[1]:g}, "
-            f"where the stress correction factor of ISO 6336-3 holds; change cutter_tip_radius_coefficient, or set "
+            f"{gear.name}: the notch parameter s_Fn / (2 rho_F) = {notch:.3g} lies outside "
+            f"{NOTCH[0]:g}..{NOTCH[1]:g}, "
+            "where the stress correction factor of ISO 6336-3 holds; change "
+            "cutter_tip_radius_coefficient, or set "
             f"mesh.allow_extrapolation=true"
         )
-    curvature = virtual.tip_curvature_radius - np.atleast_1d(
-        np.asarray(tip_distance, dtype=np.float64)
-    )
+    distance = np.atleast_1d(np.asarray(tip_distance, dtype=np.float64))
+    curvature = virtual.tip_curvature_radius - distance
     roll = curvature / virtual.base_radius  # tan(alpha_en)
     alpha = gear.pressure_angle
-    half_thickness = (
-        0.5 * math.pi + 2.0 * gear.profile_shift * math.tan(alpha)
-    ) / virtual.n_teeth + involute(alpha)
+    tooth_width = 0.5 * math.pi + 2.0 * gear.profile_shift * math.tan(alpha)
+    half_thickness = tooth_width / virtual.n_teeth + involute(alpha)
     gamma = half_thickness - (roll - np.arctan(roll))
     load_angle = np.arctan(roll) - gamma
     radius = np.hypot(virtual.base_radius, curvature)
     arm = (np.cos(gamma) - np.sin(gamma) * np.tan(load_angle)) * radius - section.height
-    per_arm = (
-        6.0
-        * gear.normal_module
-        * np.cos(load_angle)
-        / (section.thickness**2 * math.cos(alpha))  # Y_F = per_arm * h_Fe
-    )
+    # Y_F = per_arm * h_Fe
+    per_arm = 6.0 * gear.normal_module * np.cos(load_angle)
+    per_arm = per_arm / (section.thickness**2 * math.cos(alpha))
     power = 1.0 / (1.21 + 2.3 * np.maximum(arm, 0.0) / section.thickness)
     lifted = np.maximum(1.2 * arm + 0.13 * section.thickness, 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        correction = np.where(
-            arm > 0.0, (1.2 + 0.13 * section.thickness / arm) * notch**power, np.nan
-        )
+        slenderness = 1.2 + 0.13 * section.thickness / arm
+        correction = np.where(arm > 0.0, slenderness * notch**power, np.nan)
     return RootLoading(
         load_angle=load_angle,
         lever_arm=arm,

@@ -1,7 +1,6 @@
-"""Archard wear where two flanks slide: sliding, contact pressure, and the depth that one mesh
-takes off either flank.
+"""Archard wear of sliding flanks: sliding, contact pressure, and depth worn off by one mesh.
 
-Depths are normal to the flank, places are positions s along the path of contact as in
+Depths are normal to the flank. Positions s are along the path of contact as in
 ``geometry.contact``. Theory, sources and limits: ``docs/theory/wear.md``.
 """
 
@@ -20,20 +19,18 @@ from gensig.material import Material
 
 Array = NDArray[np.float64]
 
-# conforming flanks, where the sum of worn and new curvature falls towards 0, press at least as
-# flat cylinders of this
-# share of the new curvature: Hertz's theory ends there
+# conforming flanks, where the sum of worn and new curvature falls towards 0, press at least like
+# cylinders of this share of the new curvature: Hertz's theory ends there
 LEAST_CURVATURE_SHARE = 0.1
 
 
-@dataclass(
-    frozen=True, kw_only=True, eq=False
-)  # no slots: a life asks for the same curves some thousand times
+# no slots: a life asks for the same curves some thousand times
+@dataclass(frozen=True, kw_only=True, eq=False)
 class FlankPath:
-    """Places along the path of contact where wear is followed, ``position`` (node,) m from A to E.
+    """Nodes along the path of contact where wear is followed, ``position`` (node,) m from A to E.
 
-    The pitch point is one of them where it lies on the path. A place of either flank meets the
-    same place of its mate's in every mesh, so that one row of nodes serves both.
+    The pitch point is one of them where it lies on the path. A node of either flank meets the
+    same node of its mate in every mesh, so that one row of nodes serves both.
     """
 
     pair: GearPair
@@ -42,12 +39,8 @@ class FlankPath:
     @cached_property
     def curvature(self) -> Array:
         """Curvature radii of new flanks in the transverse section, (2, node) m: pinion, wheel."""
-        return np.array(
-            [
-                self.pair.pinion_curvature(self.position),
-                self.pair.wheel_curvature(self.position),
-            ]
-        )
+        pinion = self.pair.pinion_curvature(self.position)
+        return np.array([pinion, self.pair.wheel_curvature(self.position)])
 
     @cached_property
     def arc(self) -> Array:
@@ -62,9 +55,8 @@ class FlankPath:
     @cached_property
     def relative_curvature(self) -> Array:
         """Sum of both flanks' curvatures in the section normal to the contact line, (node,) 1/m."""
-        return math.cos(self.pair.base_helix_angle) * np.sum(
-            1.0 / self.curvature, axis=0
-        )
+        transverse = np.sum(1.0 / self.curvature, axis=0)
+        return math.cos(self.pair.base_helix_angle) * transverse
 
     @cached_property
     def rolling(self) -> Array:
@@ -73,17 +65,16 @@ class FlankPath:
 
     @cached_property
     def sliding(self) -> Array:
-        """Wheel's less pinion's, so positive at the pinion's root, (node,) m for a pinion of 1
-        rad/s.
+        """Rolling of the wheel less that of the pinion, (node,) m for a pinion of 1 rad/s.
+
+        It is positive at the pinion's root.
         """
         pinion, wheel = self.rolling
         return wheel - pinion
 
     @cached_property
     def slide_roll(self) -> Array:
-        """Sliding over the speed of either flank itself (specific sliding without its sign), (2,
-        node).
-        """
+        """Specific sliding without its sign: sliding over the speed of either flank, (2, node)."""
         return np.abs(self.sliding) / self.rolling
 
 
@@ -93,13 +84,9 @@ def flank_path(pair: GearPair, n_nodes: int = 101) -> FlankPath:
     if not 0.0 < pitch < path:
         return FlankPath(pair=pair, position=np.linspace(0.0, path, n_nodes))
     before = min(max(round(n_nodes * pitch / path), 2), n_nodes - 2)
-    nodes = np.concatenate(
-        [
-            np.linspace(0.0, pitch, before)[:-1],
-            np.linspace(pitch, path, n_nodes + 1 - before),
-        ]
-    )
-    return FlankPath(pair=pair, position=nodes)
+    root = np.linspace(0.0, pitch, before)[:-1]
+    tip = np.linspace(pitch, path, n_nodes + 1 - before)
+    return FlankPath(pair=pair, position=np.concatenate([root, tip]))
 
 
 def hertz_pressure(
@@ -120,15 +107,12 @@ def hertz_pressure(
     if depth is None or not depth.any():
         return np.sqrt(line_load * scaled * new)
     half_width = band_half_width(path, line_load, material)
-    worn = np.stack(
-        [
-            worn_curvature(path, depth[:, j], half_width[j]).sum(axis=0)
-            for j in range(len(line_load))
-        ]
-    )
-    return np.sqrt(
-        line_load * scaled * np.maximum(new + worn, LEAST_CURVATURE_SHARE * new)
-    )
+    worn = [
+        worn_curvature(path, depth[:, j], half_width[j]).sum(axis=0)
+        for j in range(len(line_load))
+    ]
+    curvature = np.maximum(new + np.stack(worn), LEAST_CURVATURE_SHARE * new)
+    return np.sqrt(line_load * scaled * curvature)
 
 
 def band_half_width(path: FlankPath, line_load: Array, material: Material) -> Array:
@@ -149,8 +133,9 @@ def flank_radii(
 
     Returns
     -------
-    ``new``; ``worn``, that of the worn profile itself, negative where it is hollow and infinite where flat; and
-    ``by_eq_22``, the wear-life paper's rho - h / 2 with the depth h of both flanks, which is a shift and no curvature
+    ``new``; ``worn``, that of the worn profile itself, negative where it is hollow and infinite
+    where flat; and ``by_eq_22``, the wear-life paper's rho - h / 2 with the depth h of both
+    flanks, which is a shift and no curvature
     """
     new = path.curvature / math.cos(path.pair.base_helix_angle)
     added = worn_curvature(path, depth, band_half_width(path, line_load, material))
@@ -160,8 +145,9 @@ def flank_radii(
 
 
 def worn_curvature(path: FlankPath, depth: Array, half_width: Array) -> Array:
-    """What wear adds to the curvature of either flank, (2, node) 1/m, positive where the flank
-    has become rounder.
+    """Curvature that wear adds to either flank, (2, node) 1/m.
+
+    It is positive where the flank has become rounder.
 
     Parameters
     ----------
@@ -173,26 +159,25 @@ def worn_curvature(path: FlankPath, depth: Array, half_width: Array) -> Array:
     less than a node's distance. One difference alone would be blind to waves as long as itself,
     which then grow. Beyond A and E the profile is taken to go on straight.
     """
-    found = np.empty_like(depth)
+    added = np.empty_like(depth)
     for side, (arc, worn) in enumerate(zip(path.arc, depth, strict=True)):
-        order = slice(None) if arc[0] < arc[-1] else slice(None, None, -1)
+        order = slice(None)
+        if arc[0] >= arc[-1]:
+            order = slice(None, None, -1)
         length, back = arc[order], worn[order]
         whole = np.maximum(half_width[order], 2.0 * np.gradient(length))
         ends = [2.0 * length[0] - length[-1], 2.0 * length[-1] - length[0]]
-        slopes = (
-            np.diff(back)[[0, -1]] / np.diff(length)[[0, -1]] * (length[-1] - length[0])
-        )
+        slopes = np.diff(back)[[0, -1]] / np.diff(length)[[0, -1]]
+        beyond = slopes * (length[-1] - length[0])
         wide = np.concatenate([ends[:1], length, ends[1:]])
-        long = np.concatenate([[back[0] - slopes[0]], back, [back[-1] + slopes[1]]])
+        long = np.concatenate([[back[0] - beyond[0]], back, [back[-1] + beyond[1]]])
         parts = []
         for reach in (whole, 0.5 * whole):
-            before, after = (
-                np.interp(length - reach, wide, long),
-                np.interp(length + reach, wide, long),
-            )
+            before = np.interp(length - reach, wide, long)
+            after = np.interp(length + reach, wide, long)
             parts.append((before - 2.0 * back + after) / reach**2)
-        found[side][order] = 0.5 * (parts[0] + parts[1])
-    return found
+        added[side][order] = 0.5 * (parts[0] + parts[1])
+    return added
 
 
 def depth_per_mesh(
@@ -203,7 +188,8 @@ def depth_per_mesh(
     Parameters
     ----------
     line_load : (slice, node) N/m
-    pressure : (slice, node) Pa    largest; ``fixed_intervals`` takes it, ``band`` knows it from the load
+    pressure : (slice, node) Pa    largest; ``fixed_intervals`` takes it, ``band`` knows it from
+        the load
 
     ``band``: the integral of Archard's dh = (k / H) p ds over the passage of the contact, whose
     band 2a takes 2a / v_i to pass a point of flank i, while the flanks slide |v_1 - v_2| 2a / v_i
@@ -219,15 +205,15 @@ def depth_per_mesh(
     if options.rule == "band":
         slip = path.slide_roll
         return np.stack([factor[side] * slip[side] * line_load for side in (0, 1)])
-    interval = path.pair.path_of_contact / (
-        path.pair.pinion.base_radius * options.n_intervals
-    )  # rad of the pinion
+    pair = path.pair
+    # rad of the pinion
+    interval = pair.path_of_contact / (pair.pinion.base_radius * options.n_intervals)
     both = pressure * np.abs(path.sliding) * interval
     return np.stack([0.5 * factor[side] * both for side in (0, 1)])
 
 
 def meshes_per_turn(pair: GearPair) -> Array:
-    """How often one tooth of the pinion and of the wheel meshes in a turn of the pinion, (2,)."""
+    """Meshes of one tooth of the pinion and of the wheel in a turn of the pinion, (2,)."""
     return np.array([1.0, 1.0 / pair.ratio])
 
 

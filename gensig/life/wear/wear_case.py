@@ -1,7 +1,4 @@
-"""One gear pair that wears.
-
-Which load each place of its flanks carries, new or worn, and how fast it is worn off.
-"""
+"""One gear pair that wears: load of each node of its flanks, new or worn, and rate of wear."""
 
 from __future__ import annotations
 
@@ -32,16 +29,14 @@ from gensig.mesh.sliced.slices import SlicedMesh
 
 Array = NDArray[np.float64]
 
-N_NODES = {
-    "band": 101,
-    "fixed_intervals": 51,
-}  # the second is stiff, and does not converge anyhow
+# the second is stiff, and does not converge anyhow
+N_NODES = {"band": 101, "fixed_intervals": 51}
 ERROR_PHASES = 32
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class WearCase:
-    """A pair under one torque with its wear law; make it by ``wear_case``.
+    """Pair under one torque with its wear law; made by ``wear_case``.
 
     ``mesh`` has new flanks, modified or not, and sound teeth, which go on bending as such.
     ``loads`` and ``period`` (over one mesh period) are its prepared contact, None where one pair
@@ -59,7 +54,8 @@ class WearCase:
     def __post_init__(self) -> None:
         if not self.torque > 0.0:
             raise ConfigError(
-                f"operating.torque_nm = {self.torque:g} must be positive: flanks that bear nothing last"
+                f"operating.torque_nm = {self.torque:g} must be positive: flanks that bear "
+                "nothing last"
             )
 
     @property
@@ -69,7 +65,7 @@ class WearCase:
 
     @property
     def follows_wear(self) -> bool:
-        """Whether wear changes how fast the flanks wear."""
+        """True where wear changes the rate of wear."""
         return self.options.geometry == "worn" and (
             self.loads is not None or self.options.rule != "band"
         )
@@ -78,11 +74,10 @@ class WearCase:
     def force(self) -> float:
         """Total force along the transverse line of action, N."""
         pinion = self.pair.pinion
-        return self.torque / (
-            pinion.base_radius
-            if self.options.load_radius == "base"
-            else pinion.pitch_radius
-        )
+        radius = pinion.pitch_radius
+        if self.options.load_radius == "base":
+            radius = pinion.base_radius
+        return self.torque / radius
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -94,12 +89,11 @@ class WearCase:
         return np.zeros(self.shape)
 
     def under(self, torque: float) -> WearCase:
-        """The same under another torque in N m."""
+        """Same case with another torque in N m."""
         return replace(self, torque=torque)
 
     def line_load(self, depth: Array) -> Array:
-        """Load per width that each place of the flanks carries as it meshes, (slice, node) N/m,
-        transverse.
+        """Load per width of each node of the flanks as it meshes, (slice, node) N/m, transverse.
 
         Raises
         ------
@@ -107,21 +101,25 @@ class WearCase:
         """
         if self.loads is None:
             return np.full(depth.shape[1:], self.force / self.pair.face_width)
-        return self.loads.line_load(
-            depth if self.options.geometry == "worn" else self.new_flanks(), self.force
-        )
+        if self.options.geometry != "worn":
+            depth = self.new_flanks()
+        return self.loads.line_load(depth, self.force)
 
     def pressure(self, line_load: Array, depth: Array) -> Array:
-        """Largest Hertzian pressure of each place, (slice, node) Pa."""
-        worn = depth if self.options.geometry == "worn" else None
+        """Largest Hertzian pressure of each node, (slice, node) Pa."""
+        worn = None
+        if self.options.geometry == "worn":
+            worn = depth
         return hertz_pressure(self.path, line_load, self.material, worn)
 
     def wear_per_mesh(self, depth: Array) -> Array:
-        """Depth that the next mesh takes off either flank, (2, slice, node) m, when ``depth`` is
-        off already.
+        """Depth that the next mesh takes off either flank, (2, slice, node) m.
+
+        ``depth`` is off already.
         """
-        load = self.line_load(depth)
-        pressure = load if self.options.rule == "band" else self.pressure(load, depth)
+        load = pressure = self.line_load(depth)
+        if self.options.rule != "band":
+            pressure = self.pressure(load, depth)
         return depth_per_mesh(self.path, load, pressure, self.options)
 
     def rate(self, depth: Array) -> Array:
@@ -136,20 +134,18 @@ class WearCase:
 
         NaN where one pair carries.
         """
-        return (
-            np.nan
-            if self.period is None
-            else float(np.ptp(self.period.settled(depth, self.force).approach))
-        )
+        if self.period is None:
+            return np.nan
+        return float(np.ptp(self.period.settled(depth, self.force).approach))
 
     def judged(self, depth: Array) -> float:
-        """What is compared with the threshold, m.
+        """Depth that is compared with the threshold, m.
 
-        The deepest place of either flank, or of both together.
+        It is that of the deepest node of either flank, or of both together.
         """
-        return float(
-            depth.sum(axis=0).max() if self.options.criterion == "sum" else depth.max()
-        )
+        if self.options.criterion == "sum":
+            depth = depth.sum(axis=0)
+        return float(depth.max())
 
 
 def wear_case(
@@ -160,38 +156,40 @@ def wear_case(
     *,
     n_nodes: int | None = None,
 ) -> WearCase:
-    """A pair that wears under the pinion's torque in N m; ``n_nodes`` along the path of contact,
-    None as many as the rule needs.
+    """Pair that wears under the pinion's torque in N m.
+
+    ``n_nodes`` are along the path of contact; None takes as many as the rule needs.
 
     Raises
     ------
-    ConfigError    for a torque that does not drive, a threshold deeper than the tooth, or a limit of the transmission
-        error where one pair carries everything
+    ConfigError    for a torque that does not drive, a threshold deeper than the tooth, or a limit
+        of the transmission error where one pair carries everything
     """
     pair, path = mesh.pair, flank_path(mesh.pair, n_nodes or N_NODES[options.rule])
     thinnest = min(tip_thickness(pair.pinion), tip_thickness(pair.wheel))
     if options.threshold >= thinnest:
         raise ConfigError(
-            f"wear.threshold_um = {options.threshold * 1e6:g} is deeper than the tooth, whose tip is "
-            f"{thinnest * 1e6:.4g} um thick; give less"
+            f"wear.threshold_um = {options.threshold * 1e6:g} is deeper than the tooth, whose tip "
+            f"is {thinnest * 1e6:.4g} um thick; give less"
         )
-    by_mesh = options.sharing == "mesh" or (
-        options.sharing is None and pair.transverse_contact_ratio >= 1.0
-    )
-    if options.transmission_error_limit is not None and not by_mesh:
+    ratio = pair.transverse_contact_ratio
+    loads = period = None
+    if options.sharing == "mesh" or (options.sharing is None and ratio >= 1.0):
+        roll = pair.base_pitch * (np.arange(ERROR_PHASES) + 0.5) / ERROR_PHASES
+        loads, period = path_loads(mesh, path), worn_contact(mesh, path, roll)
+    elif options.transmission_error_limit is not None:
         raise ConfigError(
-            f"wear.transmission_error_limit_um: with a contact ratio of {pair.transverse_contact_ratio:.4f}, below 1, "
-            f"it needs wear.sharing=mesh"
+            f"wear.transmission_error_limit_um: with a contact ratio of {ratio:.4f}, below 1, "
+            "it needs wear.sharing=mesh"
         )
-    roll = pair.base_pitch * (np.arange(ERROR_PHASES) + 0.5) / ERROR_PHASES
     return WearCase(
         mesh=mesh,
         material=material,
         options=options,
         path=path,
         torque=torque,
-        loads=path_loads(mesh, path) if by_mesh else None,
-        period=worn_contact(mesh, path, roll) if by_mesh else None,
+        loads=loads,
+        period=period,
     )
 
 

@@ -23,8 +23,8 @@ N_TORQUES = 3  # life goes nearly as a power of the torque
 class WearTable:
     """Lives under steady torques (torque,) N m, ascending; made by ``wear_table``.
 
-    ``turns`` (torque, node) of the pinion to each of the depths ``sizes`` (node,) m by the case's
-    criterion; ``reached`` (time,) m are those at which each life tells its flanks.
+    ``turns`` (torque, node) are those of the pinion to each of the depths ``sizes`` (node,) m by
+    the case's criterion. ``reached`` (time,) m are the depths at the times of each life.
     """
 
     torque: Array
@@ -34,18 +34,12 @@ class WearTable:
     turns: Array
 
     def worn(self, size: float, torque: float) -> Array:
-        """Depth off both flanks, (2, slice, node) m, of a steady torque's life where its depth is
-        ``size``.
-        """
-        found = []
+        """Depth off both flanks, (2, slice, node) m, where a steady life has the depth ``size``."""
+        depths = []
         for life, reached in zip(self.lives, self.reached, strict=True):
-            place = float(np.interp(size, reached, np.arange(len(reached))))
-            low = min(int(place), len(reached) - 2)
-            found.append(
-                life.depth[low]
-                + (place - low) * (life.depth[low + 1] - life.depth[low])
-            )
-        return _between(self.torque, np.array(found), torque)
+            at = float(np.interp(size, reached, np.arange(len(reached))))
+            depths.append(_row(life.depth, at))
+        return _between(self.torque, np.array(depths), torque)
 
 
 def wear_table(case: WearCase, least: float, greatest: float) -> WearTable:
@@ -55,11 +49,9 @@ def wear_table(case: WearCase, least: float, greatest: float) -> WearTable:
     ------
     GensigError    for what ``wear_life`` refuses
     """
-    torques = (
-        np.array([least])
-        if least == greatest
-        else np.geomspace(least, greatest, N_TORQUES)
-    )
+    torques = np.array([least])
+    if least != greatest:
+        torques = np.geomspace(least, greatest, N_TORQUES)
     lives = tuple(wear_life(case.under(float(torque))) for torque in torques)
     # a limit of the transmission error may end lives at unlike depths: the least of them ends all
     sizes = np.linspace(0.0, min(life.threshold for life in lives), N_DEPTHS)
@@ -79,10 +71,10 @@ def wear_table(case: WearCase, least: float, greatest: float) -> WearTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class WearGrowth(GrowthLaw):
-    """The law of one unit's flanks; its size is the depth that the wear criterion looks at, m.
+    """Growth law of one unit's flanks; its size is the depth of the wear criterion, m.
 
-    ``torque`` in N m is the unit's mean one, whose steady life gives the worn profile: the order
-    of the loads changes how fast a flank wears, and its shape not (assumed; all loads take off
+    ``torque`` in N m is the unit's mean one, whose steady life gives the worn profile. The order
+    of the loads changes the rate of wear, but not the worn shape (assumed; all loads take off
     most where flanks slide most). ``as_fault`` makes a fault of the depth off both flanks.
     """
 
@@ -99,9 +91,8 @@ class WearGrowth(GrowthLaw):
         """Depth a turn of the pinion, (size,) m."""
         taken = np.diff(self.table.turns, axis=1)
         turns = np.exp(_between(self.table.torque, np.log(taken), torque))
-        return (np.diff(self.sizes) / turns)[
-            np.clip(np.searchsorted(self.sizes, size) - 1, 0, len(turns) - 1)
-        ]
+        cell = np.clip(np.searchsorted(self.sizes, size) - 1, 0, len(turns) - 1)
+        return (np.diff(self.sizes) / turns)[cell]
 
     def fault(self, size: float) -> dict[str, Any]:
         """Both flanks."""
@@ -116,6 +107,11 @@ def _between(torques: Array, values: Array, torque: float) -> Array:
     """Values (torque, ...) at one torque, linear over its logarithm."""
     if len(torques) == 1:
         return values[0]
-    place = float(np.interp(np.log(torque), np.log(torques), np.arange(len(torques))))
-    low = min(int(place), len(torques) - 2)
-    return values[low] + (place - low) * (values[low + 1] - values[low])
+    at = float(np.interp(np.log(torque), np.log(torques), np.arange(len(torques))))
+    return _row(values, at)
+
+
+def _row(values: Array, at: float) -> Array:
+    """Row of ``values`` (row, ...) at a place between rows, linear."""
+    low = min(int(at), len(values) - 2)
+    return values[low] + (at - low) * (values[low + 1] - values[low])

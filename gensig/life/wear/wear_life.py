@@ -1,12 +1,9 @@
-"""Flanks over their life.
-
-Wear step by step, sharing and pressure renewed as they wear, up to a threshold.
-"""
+"""Life of worn flanks: wear step by step up to a threshold, with renewed sharing and pressure."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,14 +15,14 @@ from gensig.life.wear.wear_case import WearCase
 
 Array = NDArray[np.float64]
 
-# What the solver may be off in one step, as a share of the depth and in m. Pressures hang on the
-# curvature of what is
-# worn off, which takes a tenth, and makes the equations stiff: they are solved backwards, with
-# the nodes next to each.
+# Error of the solver in one step, as a share of the depth and in m. Pressures depend on the
+# curvature of the worn profile, which takes a tenth. That makes the equations stiff: they are
+# solved backwards, with neighbouring nodes coupled.
 ACCURACY = {"band": (1e-3, 2e-9), "fixed_intervals": (1e-3, 1e-9)}
 BANDWIDTH = 13
 LARGEST_SHARE = 0.1  # of the threshold, worn in one step
-HORIZON = 50.0  # times the life at the rate of new flanks: sharing slows wear down, but never so much
+# times the life at the rate of new flanks: sharing slows wear down, but never so much
+HORIZON = 50.0
 N_SNAPSHOTS = 41
 
 
@@ -64,7 +61,7 @@ def hours(turns: float, speed: float) -> float:
 
 
 def wear_life(case: WearCase) -> WearLife:
-    """The life of a pair under a steady torque.
+    """Life of a pair under a steady torque.
 
     Raises
     ------
@@ -91,21 +88,23 @@ def wear_life(case: WearCase) -> WearLife:
         least = case.error_range(case.new_flanks())
         if least >= limit:
             raise ConfigError(
-                f"wear.transmission_error_limit_um = {limit * 1e6:g} is reached by new flanks already: theirs is "
+                f"wear.transmission_error_limit_um = {limit * 1e6:g} is reached by new flanks "
+                "already: theirs is "
                 f"{least * 1e6:.4g} um from peak to peak; give more"
             )
         ends.append(lambda depth: case.error_range(depth) / limit - 1.0)
-    solution = _solve(
-        case, case.new_flanks(), HORIZON * at_first_rate, ends=ends, dense_output=True
-    )
+    horizon = HORIZON * at_first_rate
+    solution = _solve(case, case.new_flanks(), horizon, ends=ends, dense_output=True)
     if solution.status != 1:
         raise SimulationError(
-            f"the flanks do not wear to the threshold in {HORIZON * at_first_rate:.4g} turns: {solution.message}"
+            f"the flanks do not wear to the threshold in {horizon:.4g} turns: "
+            f"{solution.message}"
         )
     turns = np.linspace(0.0, float(solution.t[-1]), N_SNAPSHOTS)
     depth = np.stack([_depth(case, solution.sol(turn)) for turn in turns])
-    by_error = len(ends) == 2 and len(solution.t_events[1]) > 0
-    ended_by = "transmission_error" if by_error else "depth"
+    ended_by = "depth"
+    if len(ends) == 2 and len(solution.t_events[1]) > 0:
+        ended_by = "transmission_error"
     return WearLife(
         case=case,
         turns=turns,
@@ -122,14 +121,13 @@ def worn_flanks(
     torque: Array | None = None,
     start: Array | None = None,
 ) -> Array:
-    """Depth off both flanks after so many turns of the pinion, whatever the threshold.
+    """Depth off both flanks at given turns of the pinion, whatever the threshold.
 
     Parameters
     ----------
     turns : (time,) of the pinion from ``start`` on, not falling
-    torque : (time,) N m    of the time that ends at each, from the one before (the first: from 0); None is the case's
-        own throughout
-    start : (2, slice, node) m    what is off already; None is nothing
+    torque : (time,) N m    of the interval that ends at each; None for that of the case
+    start : (2, slice, node) m    initial depth; None for new flanks
 
     Returns
     -------
@@ -140,11 +138,7 @@ def worn_flanks(
     ConfigError    for turns that fall, or a torque that is not positive or not one for each
     """
     turns = np.asarray(turns, dtype=np.float64)
-    if (
-        turns.ndim != 1
-        or not np.isfinite(turns).all()
-        or (np.diff(turns, prepend=0.0) < 0.0).any()
-    ):
+    if turns.ndim != 1 or not np.isfinite(turns).all() or not _never_falls(turns):
         raise ConfigError(
             "the turns of a life must be a row of numbers that never falls, from 0 on"
         )
@@ -153,27 +147,33 @@ def worn_flanks(
         return _depth_at(case, depth, turns)
     if np.shape(torque) != turns.shape:
         raise ConfigError(
-            f"{np.size(torque)} torques for {len(turns)} times of a life; give one for each"
+            f"{np.size(torque)} torques for {len(turns)} times of a life; "
+            "give one for each"
         )
-    found = np.empty((len(turns), *case.shape))
-    for k, stretch in enumerate(np.diff(turns, prepend=0.0)):
-        depth = found[k] = _depth_at(
-            case.under(float(torque[k])), depth, np.array([stretch])
-        )[0]
-    return found
+    depths = []
+    for interval, load in zip(np.diff(turns, prepend=0.0), torque, strict=True):
+        loaded = case.under(float(load))
+        depth = _depth_at(loaded, depth, np.array([interval]))[0]
+        depths.append(depth)
+    return np.stack(depths)
+
+
+def _never_falls(turns: Array) -> bool:
+    return not (np.diff(turns, prepend=0.0) < 0.0).any()
 
 
 def _depth_at(case: WearCase, start: Array, turns: Array) -> Array:
     """Depth at each of ``turns`` under one torque, (time, 2, slice, node) m."""
     if not case.follows_wear or not turns.any():
         return start + turns[:, None, None, None] * case.rate(start)
-    times, place = np.unique(turns, return_inverse=True)
+    times, index = np.unique(turns, return_inverse=True)
     solution = _solve(case, start, float(times[-1]), t_eval=times)
     if solution.status != 0:
         raise SimulationError(
-            f"the flanks wear to where their wear cannot be followed: {solution.message}"
+            "the flanks wear to where their wear cannot be followed: "
+            f"{solution.message}"
         )
-    return np.stack([_depth(case, flat) for flat in solution.y.T])[place]
+    return np.stack([_depth(case, flat) for flat in solution.y.T])[index]
 
 
 def _solve(
@@ -181,11 +181,12 @@ def _solve(
     start: Array,
     end: float,
     *,
-    ends: list[Callable[[Array], float]] | None = None,
-    **more: Any,
+    ends: Sequence[Callable[[Array], float]] = (),
+    **outputs: Any,
 ) -> Any:
-    """The depths as an initial value problem over the turns of the pinion from 0 to ``end``, or
-    to the first end.
+    """Depths as an initial value problem over the turns of the pinion.
+
+    They go from ``start`` at 0 to ``end``, or to the first of ``ends``.
     """
     from scipy.integrate import solve_ivp
 
@@ -200,12 +201,10 @@ def _solve(
         return function
 
     relative, absolute = ACCURACY[case.options.rule]
-    longest = min(case.options.step, LARGEST_SHARE * case.options.threshold) / float(
-        case.rate(start).max()
-    )
-    if case.options.rule == "band":
-        method: dict[str, Any] = {"method": "RK23"}  # Bogacki & Shampine
-    else:
+    step = min(case.options.step, LARGEST_SHARE * case.options.threshold)
+    longest = step / float(case.rate(start).max())
+    method: dict[str, Any] = {"method": "RK23"}  # Bogacki & Shampine
+    if case.options.rule != "band":
         method = {"method": "LSODA", "lband": BANDWIDTH, "uband": BANDWIDTH}
     return solve_ivp(
         rate,
@@ -215,9 +214,9 @@ def _solve(
         first_step=min(0.01 * longest, end),
         rtol=relative,
         atol=absolute,
-        events=[event(reached) for reached in ends or ()],
+        events=[event(reached) for reached in ends],
         **method,
-        **more,
+        **outputs,
     )
 
 

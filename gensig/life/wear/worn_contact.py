@@ -1,5 +1,4 @@
-"""The loaded mesh with worn flanks: what is worn off opens the gaps, and the load of each place
-of the flanks follows.
+"""Loaded mesh with worn flanks: the worn depth opens the gaps, and the loads follow.
 
 Rolls, positions and interpolations are prepared once: a life asks for the same phases some
 hundred times.
@@ -26,17 +25,17 @@ from gensig.mesh.sliced.slices import (
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-PHASES_PER_PITCH = 24  # of a mesh in several slices, whose slices pass the nodes at other phases than these
+# of a mesh in several slices, whose slices pass the nodes at other phases than these
+PHASES_PER_PITCH = 24
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class WornContact:
-    """Phases of a mesh with new flanks, and where each of its slices lies among the nodes of the
-    path.
+    """Phases of a mesh with new flanks, and position of its slices among the nodes of the path.
 
     Parameters
     ----------
-    node, share : (phase, pair, slice)    node before the contact, and how far on to the next
+    node, share : (phase, pair, slice)    node before the contact, and share of the way to the next
     """
 
     phases: ContactPhases
@@ -57,44 +56,39 @@ class WornContact:
             return settled_contact(self.phases, force)
         back = depth.sum(axis=0) / math.cos(self.phases.mesh.pair.base_helix_angle)
         row = np.arange(len(back))
-        worn = (1.0 - self.share) * back[row, self.node] + self.share * back[
-            row, self.node + 1
-        ]
+        before, after = back[row, self.node], back[row, self.node + 1]
+        worn = (1.0 - self.share) * before + self.share * after
+        phases = replace(self.phases, gap=self.phases.gap + worn)
         try:
-            return settled_contact(
-                replace(self.phases, gap=self.phases.gap + worn), force
-            )
+            return settled_contact(phases, force)
         except GeometryError:
             raise SimulationError(
-                f"worn {depth.max() * 1e6:.3g} um deep, the flanks find no settled contact: what is left at the pitch "
-                f"point carries all of the load; give a smaller wear.threshold_um or fewer mesh.n_slices"
+                f"worn {depth.max() * 1e6:.3g} um deep, the flanks find no settled contact: what "
+                "is left at the pitch "
+                "point carries all of the load; give a smaller wear.threshold_um or fewer "
+                "mesh.n_slices"
             ) from None
 
 
 def worn_contact(mesh: SlicedMesh, path: FlankPath, roll: Array) -> WornContact:
     """Prepare a mesh with new flanks at rolls, (phase,) m."""
     phases = contact_phases(mesh, roll)
-    place = np.clip(phases.position, path.position[0], path.position[-1])
-    node = np.clip(
-        np.searchsorted(path.position, place, side="right") - 1,
-        0,
-        len(path.position) - 2,
-    )
-    share = (place - path.position[node]) / (
-        path.position[node + 1] - path.position[node]
-    )
+    nodes = path.position
+    at = np.clip(phases.position, nodes[0], nodes[-1])
+    node = np.searchsorted(nodes, at, side="right") - 1
+    node = np.clip(node, 0, len(nodes) - 2)
+    share = (at - nodes[node]) / (nodes[node + 1] - nodes[node])
     return WornContact(phases=phases, node=node, share=share)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PathLoads:
-    """Loads of the phases, read at the nodes of the path: at ``before`` and ``after`` of all of
-    them, in order.
+    """Loads of the phases, read at the nodes of the path.
 
     Parameters
     ----------
-    before, after : (slice, node)    places in a flat (phase, pair, slice)
-    share : (slice, node)            how far on from the one to the other
+    before, after : (slice, node)    indices in a flat (phase, pair, slice), in order
+    share : (slice, node)            share of the way from the one to the other
     """
 
     contact: WornContact
@@ -103,8 +97,9 @@ class PathLoads:
     share: Array
 
     def line_load(self, depth: Array, force: float) -> Array:
-        """Load of each place of the flanks as it meshes, (slice, node) N/m, when (2, slice, node)
-        m is worn off.
+        """Load of each node of the flanks as it meshes, (slice, node) N/m.
+
+        (2, slice, node) m is worn off.
         """
         load = self.contact.settled(depth, force).line_load.ravel()
         return (1.0 - self.share) * load[self.before] + self.share * load[self.after]
@@ -115,29 +110,26 @@ def path_loads(mesh: SlicedMesh, path: FlankPath) -> PathLoads:
 
     Phases at the nodes themselves for one slice, else equally spaced.
     """
-    n_slices, pitch = len(mesh.slice_place), mesh.pair.base_pitch
-    one = n_slices == 1
-    roll = (
-        path.position
-        if one
-        else pitch * (np.arange(PHASES_PER_PITCH) + 0.5) / PHASES_PER_PITCH
-    )
+    n_slices, nodes = len(mesh.slice_place), path.position
+    roll = nodes
+    if n_slices > 1:
+        roll = (
+            mesh.pair.base_pitch
+            * (np.arange(PHASES_PER_PITCH) + 0.5)
+            / PHASES_PER_PITCH
+        )
     contact = worn_contact(mesh, path, roll)
-    before, after = np.empty((2, n_slices, len(path.position)), dtype=np.int64)
+    before, after = np.empty((2, n_slices, len(nodes)), dtype=np.int64)
     share = np.empty(before.shape)
     for j in range(n_slices):
-        place = contact.phases.position[..., j].ravel()
-        order = np.argsort(place, kind="stable")
+        at = contact.phases.position[..., j].ravel()
+        order = np.argsort(at, kind="stable")
         if mesh.options.law == "paper":  # no contact beyond the path, and a step there
-            order = order[
-                (place[order] >= 0.0) & (place[order] <= mesh.pair.path_of_contact)
-            ]
-        right = np.clip(np.searchsorted(place[order], path.position), 1, len(order) - 1)
+            on_path = (at[order] >= 0.0) & (at[order] <= mesh.pair.path_of_contact)
+            order = order[on_path]
+        right = np.clip(np.searchsorted(at[order], nodes), 1, len(order) - 1)
         low, high = order[right - 1], order[right]
-        share[j] = np.clip(
-            (path.position - place[low]) / np.maximum(place[high] - place[low], 1e-15),
-            0.0,
-            1.0,
-        )
+        width = np.maximum(at[high] - at[low], 1e-15)
+        share[j] = np.clip((nodes - at[low]) / width, 0.0, 1.0)
         before[j], after[j] = low * n_slices + j, high * n_slices + j
     return PathLoads(contact=contact, before=before, after=after, share=share)

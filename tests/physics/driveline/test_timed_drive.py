@@ -4,7 +4,7 @@ import pytest
 
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
-from gensig.record.inputs import twin_start
+from gensig.record.inputs import draw_start
 from gensig.record.machines import read_machine
 from gensig.record.streams import Stream, stream
 
@@ -17,7 +17,7 @@ def engine():
 def test_the_pump_gear_meets_the_same_tooth_at_the_same_firing(engine):
     machine = read_machine(engine)
     assert [machine.driven_tooth(tooth, 30) for tooth in (0, 7, 53)] == [0, 7, 53]
-    start = twin_start(machine, stream(engine.seed, Stream.TWIN, 3))
+    start = draw_start(machine, stream(engine.seed, Stream.TWIN, 3))
     assert start.tooth_pinion == start.tooth_wheel
 
 

@@ -1,4 +1,5 @@
-"""Form and stress correction factors of ISO 6336-3 against the stored finite elements of ``tests/reference``."""
+"""Form and stress correction factors of ISO 6336-3 against the stored finite elements of
+``tests/reference``."""
 
 import csv
 import math
@@ -15,7 +16,8 @@ CASES = ("z17_x03", "z23", "z25_sharp", "z30_alpha25", "z30_long", "z40", "z54",
 
 
 def compared(case):
-    """Places from the tip in base pitches, our factor over F / (b m), and that of finite elements."""
+    """Places from the tip in base pitches, our factor over F / (b m), and that of finite
+    elements."""
     with FILE.open(encoding="utf-8", newline="") as file:
         rows = [row for row in csv.DictReader(file) if row["case"] == case]
     gear = reference_gear(rows[0])
@@ -31,7 +33,8 @@ def compared(case):
 
 @pytest.mark.parametrize("case", CASES)
 def test_iso_is_near_finite_elements_where_it_takes_the_load(case):
-    """Between the tip and the outer point of single contact; lower down its fixed section sees too little."""
+    """Between the tip and the outer point of single contact; lower down its fixed section sees too
+    little."""
     place, ours, exact, _ = compared(case)
     high = place < 0.8
     np.testing.assert_allclose(ours[high], exact[high], rtol=0.105)

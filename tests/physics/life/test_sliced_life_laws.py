@@ -1,4 +1,5 @@
-"""Cracks and pits that grow in teeth cut into slices, and under the load spectrum of a drive line."""
+"""Cracks and pits that grow in teeth cut into slices, and under the load spectrum of a drive
+line."""
 
 import math
 from dataclasses import replace
@@ -82,7 +83,8 @@ def test_without_a_helix_a_crack_over_part_of_the_face_grows_as_on_the_spur_pair
 
 
 def test_the_release_rate_is_the_change_of_the_energy_at_constant_load(helical):
-    """Against the approach of the whole mesh, solved anew: with a linear contact U = F approach / 2."""
+    """Against the approach of the whole mesh, solved anew: with a linear contact U = F approach /
+    2."""
     machine, laws, crack = helical
     flanks = _for_lives(machine.flanks)
     flanks = replace(flanks, mesh=replace(flanks.mesh, contact="linear"))
@@ -181,7 +183,8 @@ def test_pits_of_a_helical_pair_come_by_their_slices(helical):
         pit_law(one, pits, options, 1.0, (50.0, 200.0))
         for one in (machine, parts(*HELICAL, "modification.misalignment_um=10")[0])
     )
-    # nearly as the root of the load where flanks are even; where they are not, one end carries all of a small one
+    # nearly as the root of the load where flanks are even; where they are not, one end carries all
+    # of a small one
     ratio = even.rate(np.zeros(1), 200.0) / even.rate(np.zeros(1), 50.0)
     assert_allclose(
         math.log(ratio[0]) / math.log(4.0), 0.5 * options.exponent, rtol=0.02

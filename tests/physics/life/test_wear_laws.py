@@ -1,4 +1,5 @@
-"""Laws of wear: Archard's, the two rules, sharing, hunting, what a worn flank does to its own wear."""
+"""Laws of wear: Archard's, the two rules, sharing, hunting, what a worn flank does to its own
+wear."""
 
 import math
 from dataclasses import replace
@@ -7,8 +8,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from gensig.errors import ConfigError
 from gensig.life.options import FlankMaterial, read_wear_options
-from gensig.life.wear.archard import depth_per_mesh, flank_path, meshes_per_turn
+from gensig.life.wear.archard import flank_path, meshes_per_turn
 from gensig.life.wear.wear_case import wear_case
 from gensig.life.wear.wear_life import wear_life, worn_flanks
 from gensig.mesh.sliced.slice_pressure import contact_pressure
@@ -37,7 +39,8 @@ def at_pitch(case):
 
 
 def test_the_band_rule_is_the_integral_over_the_passing_contact():
-    """Archard's law integrated over time at one point of the pinion, the Hertzian ellipse going over it."""
+    """Archard's law integrated over time at one point of the pinion, the Hertzian ellipse going
+    over it."""
     case = case_of(*PAPER)
     load = case.line_load(case.new_flanks())
     found = case.wear_per_mesh(case.new_flanks())[0, 0]
@@ -115,7 +118,8 @@ def test_fixed_intervals_does_not_converge_and_the_band_does_not_ask():
 
 
 def test_the_mesh_shares_the_load():
-    """Without corner contact both pairs of the double zone carry all of it, and one pair where there is one."""
+    """Without corner contact both pairs of the double zone carry all of it, and one pair where
+    there is one."""
     case = case_of(*FULL, "mesh.law=paper")
     load, place, pitch = (
         case.line_load(case.new_flanks())[0],
@@ -206,6 +210,16 @@ def test_worn_places_give_their_load_away():
     assert case.wear_per_mesh(case.new_flanks())[0, 0].argmax() == 0
 
 
+def test_a_path_has_the_pitch_point_for_a_node():
+    pair = case_of("wear.geometry=unworn").pair
+    for n_nodes in (11, 50, 101):
+        path = flank_path(pair, n_nodes)
+        assert len(path.position) == n_nodes
+        assert np.abs(path.position - pair.pitch_point).min() < 1e-15
+        assert (np.diff(path.position) > 0.0).all()
+        assert path.position[[0, -1]] == pytest.approx([0.0, pair.path_of_contact])
+
+
 @pytest.mark.parametrize("rule", ["band", "fixed_intervals"])
 def test_a_history_is_the_same_in_one_go_or_many(rule):
     case = case_of(*FULL, f"wear.rule={rule}", "wear.threshold_um=5")
@@ -226,20 +240,17 @@ def test_a_history_is_the_same_in_one_go_or_many(rule):
     assert heavier[3].max() > 1.2 * at_once[3].max()
 
 
-def test_a_path_has_the_pitch_point_for_a_node():
-    pair = case_of("wear.geometry=unworn").pair
-    for n_nodes in (11, 50, 101):
-        path = flank_path(pair, n_nodes)
-        assert len(path.position) == n_nodes
-        assert np.abs(path.position - pair.pitch_point).min() < 1e-15
-        assert (np.diff(path.position) > 0.0).all()
-        assert path.position[[0, -1]] == pytest.approx([0.0, pair.path_of_contact])
-
-
-def test_without_load_nothing_wears():
-    case = case_of(*PAPER)
-    nothing = np.zeros(case.shape[1:])
-    for rule in ("band", "fixed_intervals"):
-        assert not depth_per_mesh(
-            case.path, nothing, nothing, replace(case.options, rule=rule)
-        ).any()
+@pytest.mark.parametrize(
+    ("turns", "torque", "message"),
+    [
+        ([2.0, 1.0], None, "never falls"),
+        ([-1.0, 1.0], None, "never falls"),
+        ([np.nan], None, "never falls"),
+        ([[1.0]], None, "never falls"),
+        ([1.0, 2.0], [1.0], "give one for each"),
+        ([1.0, 2.0], [1.0, -2.0], "must be positive"),
+    ],
+)
+def test_a_history_that_cannot_be_is_refused(turns, torque, message):
+    with pytest.raises(ConfigError, match=message):
+        worn_flanks(case_of(*FULL), np.array(turns), torque=torque)

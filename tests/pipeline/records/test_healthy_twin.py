@@ -1,4 +1,4 @@
-"""The healthy twin of every record: nothing in it depends on the fault, and its noise is its own."""
+"""Healthy twins of records: independent of the fault, with separate noise."""
 
 from pathlib import Path
 
@@ -9,6 +9,7 @@ from small_sets import make
 
 import gensig
 from gensig.cli import main
+from gensig.errors import ConfigError
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.record.simulate import forget_twins, simulate_records
@@ -16,13 +17,23 @@ from gensig.record.streams import Stream, stream
 
 SWITCH = "dataset.store_healthy_twin=true"
 SMALL = (
-    "experiment=quickstart", "plan.n_records=8", "plan.n_units=2", "operating.duration_s=0.2", SWITCH,
+    "experiment=quickstart",
+    "plan.n_records=8",
+    "plan.n_units=2",
+    "operating.duration_s=0.2",
+    SWITCH,
     "dataset.store_clean=true",
-)  # fmt: skip
+)
 REALISTIC = (
-    "experiment=realistic", "plan.n_records=5", "plan.n_units=1", "operating.duration_s=0.1", SWITCH,
-    "sensing.sensor.drift_scatter=0.1", "sensing.sensor.dropped_fraction=0.05", "dataset.store_clean=true",
-)  # fmt: skip
+    "experiment=realistic",
+    "plan.n_records=5",
+    "plan.n_units=1",
+    "operating.duration_s=0.1",
+    SWITCH,
+    "sensing.sensor.drift_scatter=0.1",
+    "sensing.sensor.dropped_fraction=0.05",
+    "dataset.store_clean=true",
+)
 
 
 def records(*overrides: str, sham: bool = False) -> list:
@@ -40,10 +51,14 @@ def found() -> list:
     return records(*SMALL)
 
 
-@pytest.mark.parametrize("reference", ["healthy_twin", "record"])
-def test_it_has_the_same_bits_whatever_the_fault(reference: str) -> None:
-    """Severity zero changes no bit of it, so that it cannot tell the class; it does change the faulty records."""
-    words = (*SMALL, f"sensing.snr_reference={reference}")
+@pytest.mark.parametrize(
+    "words",
+    [SMALL, (*SMALL, "sensing.snr_reference=record"), REALISTIC],
+    ids=["healthy_twin", "record", "nuisances, drift and lost samples"],
+)
+def test_it_has_the_same_bits_whatever_the_fault(words: tuple[str, ...]) -> None:
+    """Severity zero changes no bit of it, so that it cannot tell the class; it does change the
+    faulty records."""
     for faulty, sound in zip(records(*words), records(*words, sham=True), strict=True):
         assert (
             faulty.signals["healthy_twin"].tobytes()
@@ -54,16 +69,6 @@ def test_it_has_the_same_bits_whatever_the_fault(reference: str) -> None:
             != sound.signals["acceleration"].tobytes()
         )
         assert changed == (faulty.values["label_name"] != "healthy")
-
-
-def test_nor_with_nuisances_drift_and_lost_samples() -> None:
-    for faulty, sound in zip(
-        records(*REALISTIC), records(*REALISTIC, sham=True), strict=True
-    ):
-        assert (
-            faulty.signals["healthy_twin"].tobytes()
-            == sound.signals["healthy_twin"].tobytes()
-        )
 
 
 def test_its_noise_is_as_loud_and_has_nothing_to_do_with_that_of_the_record(
@@ -87,7 +92,8 @@ def test_its_noise_is_as_loud_and_has_nothing_to_do_with_that_of_the_record(
 
 
 def test_a_healthy_record_has_one_that_differs_by_noise_alone(found: list) -> None:
-    """The difference of a healthy record and its twin holds twice the noise; that of a missing tooth holds more."""
+    """The difference of a healthy record and its twin holds twice the noise; that of a missing
+    tooth holds more."""
     ratio = {
         record.values["label_name"]: np.var(
             record.signals["acceleration"].astype(float)
@@ -180,39 +186,13 @@ def test_the_other_bits_are_those_of_a_set_without(
             assert np.isnan(data.column("detectability")).all()
 
 
-@pytest.mark.parametrize("kind", ["npz", "parquet", "hdf5", "wav"])
-def test_exports_of_it(stored: Path, tmp_path: Path, kind: str) -> None:
-    pytest.importorskip("pyarrow")
-    out = tmp_path / "out"
-    assert main(["export", str(stored), "--to", kind, "--out", str(out)]) == 0
-    if kind == "npz":
-        arrays = np.load(next(tmp_path.rglob("*.npz")) if out.is_dir() else out)
-        with gensig.open_dataset(stored) as data:
-            np.testing.assert_array_equal(
-                arrays["healthy_twin"][2], data.signals(2, name="healthy_twin")
-            )
-
-
-def test_a_switch_that_is_none_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert (
-        main(
-            [
-                "generate",
-                "dataset.store_healthy_twin=perhaps",
-                f"out={tmp_path / 'set'}",
-            ]
-        )
-        != 0
-    )
-    assert (
-        "dataset.store_healthy_twin = 'perhaps' must be true or false"
-        in capsys.readouterr().err
-    )
-
-
 def test_its_draws_have_a_stream_of_their_own() -> None:
 
     values = [stream(0, cause, 3).random() for cause in Stream]
     assert len(set(values)) == len(Stream) == len(set(Stream))
+
+
+@pytest.mark.parametrize("key", ["store_healthy_twin", "store_mesh_state"])
+def test_a_switch_is_true_or_false(key: str) -> None:
+    with pytest.raises(ConfigError, match=f"dataset.{key} = 'perhaps' must be true or"):
+        make_plan(read_request([f"dataset.{key}=perhaps"]).config)

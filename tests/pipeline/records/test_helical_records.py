@@ -1,4 +1,5 @@
-"""Data sets of helical pairs: the same engine, channels along the shafts too, faults over part of the face."""
+"""Data sets of helical pairs: the same engine, channels along the shafts too, faults over part of
+the face."""
 
 from pathlib import Path
 
@@ -19,10 +20,17 @@ from gensig.systems.registry import read_system
 from gensig.systems.run import Run
 
 SMALL = (
-    "experiment=helical", "plan.n_records=10", "plan.n_units=2", "plan.n_gearboxes=2", "operating.duration_s=0.05",
-    "mesh.n_slices=16", "dataset.store_mesh_state=true", "sensing.channels=[pinion_y,pinion_z,wheel_y,wheel_z]",
-    "plan.classes=[healthy,crack,pitting,chipped,missing_tooth]", "sensing.snr_db=30",
-)  # fmt: skip
+    "experiment=helical",
+    "plan.n_records=10",
+    "plan.n_units=2",
+    "plan.n_gearboxes=2",
+    "operating.duration_s=0.05",
+    "mesh.n_slices=16",
+    "dataset.store_mesh_state=true",
+    "sensing.channels=[pinion_y,pinion_z,wheel_y,wheel_z]",
+    "plan.classes=[healthy,crack,pitting,chipped,missing_tooth]",
+    "sensing.snr_db=30",
+)
 
 
 @pytest.fixture(scope="module")

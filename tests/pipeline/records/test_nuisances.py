@@ -1,23 +1,30 @@
-"""Nuisances in records: the same for every class of a unit, whatever they are made beside; none changes no bit."""
+"""Nuisances in records: the same for every class of a unit, whatever they are made beside; none
+changes no bit."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from gensig.errors import ConfigError
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.production.reproduction import simulate_twin
 from gensig.record.inputs import InputReader
-from gensig.record.machines import read_machine
 from gensig.record.simulate import forget_twins, simulate_record, simulate_records
 from gensig.systems.nuisances import with_nuisances
 from gensig.systems.run import CleanRecord
 
-BASE = ("plan.n_records=4", "plan.n_units=1", "plan.classes=[healthy,missing_tooth]", "operating.duration_s=0.1",
-        "dataset.store_source=true", "dataset.store_clean=true", "dataset.store_shaft_angle=true",
-        "sensing.noise.band_hz=null", "quality.iso1328_grade=null")  # fmt: skip
+BASE = (
+    "plan.n_records=4",
+    "plan.n_units=1",
+    "plan.classes=[healthy,missing_tooth]",
+    "operating.duration_s=0.1",
+    "dataset.store_source=true",
+    "dataset.store_clean=true",
+    "dataset.store_shaft_angle=true",
+    "sensing.noise.band_hz=null",
+    "quality.iso1328_grade=null",
+)
 
 
 @pytest.fixture(scope="module")
@@ -89,15 +96,22 @@ def with_nuisances_of(inputs, motion):
 
 
 def test_no_class_has_others(shaking):
-    """At the same angle of the shaft a faulty machine and a sound one are shaken by the same bits."""
+    """At the same angle of the shaft a faulty machine and a sound one are shaken by the same
+    bits."""
     faulty = next(
         row for row in rows_of(shaking) if row["label_name"] == "missing_tooth"
     )
     reader = InputReader(shaking)
     system = reader.inputs(faulty).machine
     angle = system.operating.speed * np.arange(5120) / system.sensing.sampling_rate
-    motion = CleanRecord(acceleration=np.zeros((4, 5120)), shaft_angle=angle, mean_speed=system.operating.speed,
-                         contact_loss_fraction=0.0, integration_error=0.0, integration_check="none")  # fmt: skip
+    motion = CleanRecord(
+        acceleration=np.zeros((4, 5120)),
+        shaft_angle=angle,
+        mean_speed=system.operating.speed,
+        contact_loss_fraction=0.0,
+        integration_error=0.0,
+        integration_check="none",
+    )
     found = []
     for row in (faulty, {**faulty, "faults_json": "[]", "label_name": "healthy"}):
         inputs = reader.inputs(row)
@@ -174,19 +188,3 @@ def test_a_twin_made_later_has_the_nuisances_of_its_record(shaking):
         - original.signals["acceleration_clean"]
     )
     np.testing.assert_allclose(noise, same, rtol=0, atol=1e-3 * same.std())
-
-
-def test_the_option_makes_records_through_path_and_sensor():
-    config = read_request(["sensing=machine", "plan.n_records=2", "plan.classes=[healthy,crack]",
-                           "operating.duration_s=0.1"]).config  # fmt: skip
-    for record in made(config):
-        assert record.values.get("status", "ok") == "ok"
-        assert record.signals["acceleration"].shape == (3, 5120)
-        assert np.all(np.isfinite(record.signals["acceleration"]))
-
-
-def test_a_configuration_without_the_key_is_told(config_with):
-    config = config_with()
-    config = config.with_entries(sensing=config["sensing"].without("nuisances"))
-    with pytest.raises(ConfigError, match="sensing: missing nuisances"):
-        read_machine(config)

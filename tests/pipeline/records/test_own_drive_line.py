@@ -1,4 +1,5 @@
-"""The example of docs/howto/your_drive_line.md from two tables to records: its files and its commands, made short."""
+"""The example of docs/howto/your_drive_line.md from two tables to records: its files and its
+commands, made short."""
 
 import shlex
 

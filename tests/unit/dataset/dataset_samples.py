@@ -1,13 +1,21 @@
 """A small data set, made the way generation makes one, without any physics."""
 
+import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import h5py
 import numpy as np
 
 from gensig.dataset.folder.beginning import create_folder
 from gensig.dataset.folder.layout import shard_path
 from gensig.dataset.folder.manifest import finalize, identity_hash, record_shard
+from gensig.dataset.folder.verify import verify
 from gensig.dataset.plan import Plan, record_ids, shard_places
+from gensig.dataset.splitting.splits import SUBSETS, SplitTable
+from gensig.dataset.storage.atomic import sha256_file
+from gensig.dataset.storage.checksums import accept_edits
 from gensig.dataset.storage.shard import ShardWriter
 
 CLASSES = ["healthy", "crack", "pitting"]
@@ -22,6 +30,7 @@ ATTRIBUTES = {
     "usable_band_hz": [10.0, 400.0],
     "config_json": '{"a": 1}',
 }
+FAULT_COLUMNS = ("faults_json", "severity", "fault_gear", "fault_tooth")
 SIGNALS = {
     "acceleration": (2, 200),
     "fault_multihot": (3,),
@@ -69,6 +78,8 @@ def row_of(
     """Signals and values of one record."""
     record = plan.record(index)
     label = int(record["label"])
+    faults = ("[]", 0.0, "", -1), ('[{"kind": "crack"}]', 0.25, "pinion", 3)
+    fault = faults[label > 0]
     rng = np.random.default_rng(index)
     signals = {
         "acceleration": rng.normal(size=(2, 200)).astype(np.float32),
@@ -79,10 +90,7 @@ def row_of(
     values = {
         name: value for name, value in record.items() if name not in ("shard", "row")
     } | {
-        "faults_json": "[]" if label == 0 else '[{"kind": "crack"}]',
-        "severity": 0.0 if label == 0 else 0.25,
-        "fault_gear": "" if label == 0 else "pinion",
-        "fault_tooth": -1 if label == 0 else 3,
+        **dict(zip(FAULT_COLUMNS, fault, strict=True)),
         "start_tooth_pinion": 1,
         "start_tooth_wheel": 2,
         "start_phase": 0.5,
@@ -96,6 +104,35 @@ def row_of(
     return signals, values
 
 
+def writer_of(path: Path, n_records: int = 1, **changes: Any) -> ShardWriter:
+    """The writer of a small shard; keywords replace its declaration."""
+    given = {
+        "signals": SIGNALS,
+        "params": ["crack_depth_mm"],
+        "attributes": ATTRIBUTES,
+    }
+    return ShardWriter(path, n_records=n_records, **(given | changes))
+
+
+def forge(folder: Path, shard: int, change: Callable[[h5py.File], None]) -> str:
+    """Change a shard, make every sha256 and size agree, and return the problems found."""
+    path = shard_path(folder, shard)
+    with h5py.File(path, "r+") as file:
+        change(file)
+    manifest = json.loads((folder / "manifest.json").read_text())
+    facts = {"sha256": sha256_file(path), "bytes": path.stat().st_size}
+    manifest["shards"][shard] |= facts
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    (folder / "SHA256SUMS").unlink()
+    accept_edits(folder)
+    return "\n".join(verify(folder).problems)
+
+
+def setting(name: str, at: object, value: object) -> Callable[[h5py.File], None]:
+    """A change of values of a data set."""
+    return lambda file: file[name].__setitem__(at, value)
+
+
 def write_shard(
     path: Path,
     plan: Plan,
@@ -105,21 +142,16 @@ def write_shard(
     clean: bool = False,
     **changes,
 ) -> ShardWriter:
-    """With ``clean``, every record's signal is stored a second time as the one without noise, at half its size."""
+    """With ``clean``, every record's signal is stored a second time as the one without noise, at
+    half its size."""
     rows = plan.rows(shard)
-    writer = ShardWriter(
-        path,
-        n_records=len(rows),
-        signals=SIGNALS | ({"acceleration_clean": (2, 200)} if clean else {}),
-        params=["crack_depth_mm"],
-        attributes=changes.pop("attributes", ATTRIBUTES),
-        **changes,
-    )
+    if clean:
+        changes["signals"] = SIGNALS | {"acceleration_clean": (2, 200)}
+    writer = writer_of(path, len(rows), **changes)
     with writer:
         for row, index in enumerate(rows.tolist()):
-            signals, values = row_of(
-                plan, index, status="failed" if index == failed else "ok"
-            )
+            status = "failed" if index == failed else "ok"
+            signals, values = row_of(plan, index, status=status)
             if clean and index != failed:
                 signals["acceleration_clean"] = signals["acceleration"] / 2
             if index == failed:
@@ -158,3 +190,11 @@ def build(
     if close:
         finalize(out, figures=figures)
     return out
+
+
+def sides(table: SplitTable, plan: Plan, column: str) -> list[np.ndarray]:
+    """Values of a plan column in train, validation and test."""
+    ids = plan.columns["record_id"]
+    record = np.argsort(ids)[np.searchsorted(np.sort(ids), table.record_id)]
+    values = plan.columns[column][record]
+    return [values[table.subset == subset] for subset in SUBSETS]

@@ -8,33 +8,38 @@ import numpy as np
 import pytest
 from dataset_samples import build, row_of
 
+from gensig.dataset.columns import COLUMNS, LIFE_COLUMNS, Column
 from gensig.dataset.folder.layout import read_manifest
 from gensig.dataset.plan import Plan
 from gensig.dataset.reader import open_dataset
 from gensig.dataset.schema import (
-    COLUMNS,
-    LIFE_COLUMNS,
     REQUIRED,
     REQUIRED_ATTRIBUTES,
     SAMPLE_TYPES,
+    SCALES,
     SCHEMA_VERSION,
     SIGNALS,
-    Column,
-    column_table,
 )
 from gensig.errors import DatasetError
 
 TEXT = (Path(__file__).parents[3] / "docs" / "format.md").read_text(encoding="utf-8")
 
 
-def test_columns_are_in_step() -> None:
-    table = re.search(
-        r"<!-- columns:.*?-->\n(.*?)<!-- end of columns -->", TEXT, re.DOTALL
+def test_every_data_set_is_described_in_a_row_of_its_own() -> None:
+    """The rows between the two comments are those of the tables, in their order."""
+    rows = []
+    for column in (*SIGNALS.values(), *COLUMNS.values()):
+        kind = f"ASCII, {column.n_bytes} bytes" if column.is_text else column.dtype
+        if column.name in SCALES:
+            kind = " or ".join(SAMPLE_TYPES)
+        name = f"`{column.name}`{' *' * (column.name in REQUIRED)}"
+        shape = ", ".join(("record", *column.axes))
+        cells = (name, f"({shape})", kind, column.unit, column.role, column.description)
+        rows.append(f"| {' | '.join(cells)} |")
+    found = re.search(
+        r"<!-- columns:.*?-->\n.*?\n.*?\n(.*)\n.*?\n<!-- end", TEXT, re.DOTALL
     )
-    assert table is not None
-    assert (
-        table.group(1) == column_table()
-    )  # to renew: paste the output of column_table()
+    assert found[1].splitlines() == rows
     assert f"version {SCHEMA_VERSION}\n" in TEXT.splitlines(keepends=True)[0]
 
 

@@ -1,6 +1,5 @@
-"""Reading: what was written, in plan order, from any process, and never from an unfinished set by mistake."""
+"""Reading of data sets in plan order, from several processes, finished or not."""
 
-import multiprocessing
 import pickle
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from dataset_samples import CLASSES, build, row_of
 import gensig.dataset.reader as reader_module
 from gensig.dataset.folder.layout import shard_path
 from gensig.dataset.plan import Plan
-from gensig.dataset.reader import Dataset, open_dataset
+from gensig.dataset.reader import open_dataset
 from gensig.errors import DatasetError
 
 
@@ -115,25 +114,6 @@ def test_incomplete_set_is_refused_unless_asked_for(tmp_path: Path, plan: Plan) 
             build(tmp_path / "b", plan, shards=range(0), close=False),
             allow_incomplete=True,
         )
-
-
-def _first_sample(data: Dataset, index: int) -> float:
-    return float(data.signals(index)[0, 0])
-
-
-@pytest.mark.parametrize("method", ["fork", "spawn"])
-def test_several_processes_read_at_once(folder: Path, plan: Plan, method: str) -> None:
-    expected = [
-        float(row_of(plan, i)[0]["acceleration"][0, 0]) for i in (0, 12, 24, 35)
-    ]
-    with open_dataset(folder) as data:
-        data.signals(0)
-        with multiprocessing.get_context(method).Pool(2) as pool:
-            assert (
-                pool.starmap(_first_sample, [(data, i) for i in (0, 12, 24, 35)])
-                == expected
-            )
-        assert _first_sample(data, 0) == expected[0]
 
 
 def test_pickle_drops_open_files(folder: Path) -> None:

@@ -1,7 +1,8 @@
-"""Protocols over random plans: nothing is on two sides, held-out values are held out, and no subset lacks a class."""
+"""Protocols over random plans: groups and held-out values apart, every class in each subset."""
 
 import numpy as np
 import pytest
+from dataset_samples import sides
 
 from gensig.dataset.plan import Plan, record_ids, shard_places
 from gensig.dataset.splitting.protocols import PROTOCOLS, make_splits, why_left_out
@@ -17,7 +18,8 @@ SEVERITIES = ("unseen_severity_inner", "unseen_severity_outer")
 
 
 def random_plan(seed: int, **fixed: int) -> Plan:
-    """Conditions of units, each with one record a class, cut anywhere; values drawn, in levels, or all equal."""
+    """Conditions of units, each with one record a class, cut anywhere; values drawn, in levels, or
+    all equal."""
     rng = np.random.default_rng(seed)
     n_units, n_classes = (
         fixed.get("n_units", int(rng.integers(1, 25))),
@@ -57,23 +59,6 @@ def random_plan(seed: int, **fixed: int) -> Plan:
         else np.full(n, np.nan),
     }
     return Plan(columns=columns)
-
-
-def sides(table: SplitTable, plan: Plan, column: str) -> list[np.ndarray]:
-    """Values of a plan column in train, validation and test."""
-    value = dict(
-        zip(
-            plan.columns["record_id"].tolist(),
-            plan.columns[column].tolist(),
-            strict=True,
-        )
-    )
-    return [
-        np.array(
-            [value[name] for name in table.record_id[table.subset == subset].tolist()]
-        )
-        for subset in SUBSETS
-    ]
 
 
 PLANS = [random_plan(seed) for seed in range(60)]
@@ -188,6 +173,27 @@ def test_one_condition_a_unit_loses_no_record() -> None:
         8 * 4,
         10 * 4,
     ]
+
+
+@pytest.mark.parametrize(
+    ("n_units", "n_train", "n_tested"),
+    [
+        (5, 3, 1),
+        (10, 6, 2),
+        (20, 12, 4),
+        (39, 23, 8),
+        (40, 22, 10),
+        (49, 29, 10),
+        (100, 60, 20),
+    ],
+)
+def test_ten_units_are_tested_on_where_a_quarter_is_ten(
+    n_units: int, n_train: int, n_tested: int
+) -> None:
+    plan = random_plan(3, n_units=n_units, n_classes=4, n_records=800)
+    units = sides(make_splits(plan, 0)["by_unit"], plan, "unit_id")
+    sizes = [len(set(part.tolist())) for part in units]
+    assert sizes == [n_train, n_units - n_train - n_tested, n_tested]
 
 
 def test_levels_are_held_out_whole() -> None:

@@ -1,4 +1,4 @@
-"""Choosing records by their columns: what meets the conditions, in plan order, and a hint for every slip of the pen."""
+"""Selections of records by their columns, in plan order, with a hint for every mistake."""
 
 import os
 import time
@@ -76,6 +76,7 @@ def test_records_tables_and_arrays(folder: Path, plan: Plan) -> None:
         np.testing.assert_array_equal(
             chosen.signals(-1), row_of(plan, 35)[0]["acceleration"]
         )
+        assert chosen.array().shape == (12, 2, 200)
         block = chosen.array(0, 50, ["wheel_ü"])
         assert (block.shape, block.dtype) == ((12, 1, 50), np.float32)
         for place, index in enumerate(chosen.index.tolist()):

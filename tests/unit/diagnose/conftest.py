@@ -1,1 +1,29 @@
-"""Modules of this folder are importable from its subfolders."""
+"""Fixtures of the tests of `diagnose`; its subfolders can import the modules of this folder."""
+
+import pytest
+import torch
+from fake_dataset import FakeDataset
+from small_studies import NETWORK_ALONE, train
+from threadpoolctl import threadpool_limits
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_thread():
+    """Small work, for which threads cost more than they gain."""
+    torch.set_num_threads(1)
+    with threadpool_limits(1):
+        yield
+
+
+def two_channels(**changes):
+    """The data of `two_channel_model`."""
+    values = {"n_units": 12, "records_per_unit": 8, "duration": 0.5, "n_channels": 2}
+    return FakeDataset(**(values | changes))
+
+
+@pytest.fixture(scope="session")
+def two_channel_model(tmp_path_factory):
+    """Folder of a network that the command trained on two channels."""
+    out = tmp_path_factory.mktemp("study") / "out"
+    train(two_channels(), out, "epochs=5", *NETWORK_ALONE)
+    return str(out / "models" / "by_unit-seed0")

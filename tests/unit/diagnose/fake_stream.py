@@ -1,4 +1,4 @@
-"""A fake data set with the interface of ``gensig.stream``: no physics, any process makes the same records."""
+"""A fake data set with the interface of ``gensig.stream``: any process makes the same records."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,7 +15,7 @@ class FakeRecord:
 
 @dataclass(frozen=True)
 class FakeStream:
-    """Four classes a condition; another epoch is another seed; records in ``failed`` are marked so."""
+    """Four classes for each condition; an epoch is a seed; records in ``failed`` are marked so."""
 
     epoch: int = 0
     numbers: tuple[int, ...] = tuple(range(16))
@@ -24,13 +24,8 @@ class FakeStream:
 
     @property
     def dataset(self):
-        return FakeDataset(
-            n_units=4,
-            records_per_unit=4,
-            n_channels=2,
-            noise=self.noise,
-            seed=self.epoch,
-        )
+        shape = {"n_units": 4, "records_per_unit": 4, "n_channels": 2}
+        return FakeDataset(**shape, noise=self.noise, seed=self.epoch)
 
     def __getattr__(self, name):
         if name in ("class_names", "channel_names", "n_samples", "protocols"):
@@ -56,12 +51,8 @@ class FakeStream:
         return replace(self, numbers=tuple(self.numbers[place] for place in places))
 
     def shard(self, index, count):
-        return replace(
-            self,
-            numbers=tuple(
-                number for number in self.numbers if number // 4 % count == index
-            ),
-        )
+        numbers = tuple(n for n in self.numbers if n // 4 % count == index)
+        return replace(self, numbers=numbers)
 
     def at_epoch(self, epoch):
         return replace(self, epoch=epoch)
@@ -72,8 +63,9 @@ class FakeStream:
     def __iter__(self):
         dataset = self.dataset
         for number in self.numbers:
-            values = {"record_id": str(dataset.column("record_id")[number])}
-            values["status"] = "failed" if number in self.failed else "ok"
+            status = "failed" if number in self.failed else "ok"
+            record_id = str(dataset.column("record_id")[number])
             yield FakeRecord(
-                signals={"acceleration": dataset.signals(number)}, values=values
+                signals={"acceleration": dataset.signals(number)},
+                values={"record_id": record_id, "status": status},
             )

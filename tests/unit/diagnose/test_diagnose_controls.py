@@ -20,7 +20,8 @@ from diagnose.scoring.predictions import Prediction, Rows
 from diagnose.studies.baseline_runs import baseline_predictions
 from diagnose.studies.controls import chosen_oracle, control_jobs
 from diagnose.studies.study import task_from
-from gensig.dataset.schema import COLUMNS, SIGNALS
+from gensig.dataset.columns import COLUMNS
+from gensig.dataset.schema import SIGNALS
 from gensig.errors import ConfigError
 
 FAST = (*QUICK, "protocols=[by_unit]", "baselines=[rms_threshold]")

@@ -1,4 +1,4 @@
-"""Every gensig and diagnose command that a page shows is one: verb and flags parse, its overrides compose."""
+"""Every command that a page shows can be typed: verb and flags parse, overrides compose."""
 
 import argparse
 import functools
@@ -45,7 +45,7 @@ def stopped_after_parsing(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @functools.cache
 def _compose(verb: str, job: tuple[str, ...]) -> None:
-    """Compose as the verb would; a fault's keys are put into each class, which takes a composition for each."""
+    """Compose as the verb would; keys of a fault go into each class, one composition each."""
     if verb == "train":
         compose("train", [*job, "data=DIR", "out=DIR"])
     elif any(word.startswith(("fault.", "plan.vary")) for word in job):

@@ -1,4 +1,4 @@
-"""The pages hang together: links, figures, equations, navigation, and the configuration keys that they name."""
+"""Links, figures, equations, navigation and configuration keys of the pages."""
 
 import re
 from itertools import pairwise
@@ -49,15 +49,15 @@ def test_every_link_leads_somewhere(page: Path) -> None:
     assert not wrong
 
 
-def test_every_figure_is_told_in_words() -> None:
-    told = [
+def test_every_figure_has_an_alternative_text() -> None:
+    texts = [
         (page.name, text)
         for page in PAGES
         for image, text, _ in LINK.findall(page.read_text(encoding="utf-8"))
         if image
     ]
-    assert len(told) > 10
-    assert not [(name, text) for name, text in told if len(text.split()) < 2]
+    assert len(texts) > 10
+    assert not [(name, text) for name, text in texts if len(text.split()) < 2]
 
 
 def test_the_site_has_every_page_once() -> None:
@@ -169,8 +169,9 @@ def test_configuration_keys_that_the_pages_name_exist() -> None:
 
 def test_a_page_is_cut_where_it_should_be() -> None:
     page = (
-        "# A `b` c\n\ntext `[no](link.md)` [yes](other.md#x)\n\n    gensig plan fault=crack  # note\n\n"
-        "- item\n\n    no block\n\nend\n\n<!-- not run: why -->\n\n```python\n[no](link.md)\n```\n\n"
+        "# A `b` c\n\ntext `[no](link.md)` [yes](other.md#x)\n\n"
+        "    gensig plan fault=crack  # note\n\n- item\n\n    no block\n\nend\n\n"
+        "<!-- not run: why -->\n\n```python\n[no](link.md)\n```\n\n"
         "## Twice\n\n## Twice\n"
     )
     indented, fenced = blocks(page)

@@ -1,4 +1,4 @@
-"""The files around the code say what is so: version, citation, licences, the data card of the first data set."""
+"""Version, citation, licences and the first data card agree with the code."""
 
 import re
 import tomllib
@@ -56,7 +56,7 @@ def test_every_package_that_is_needed_has_its_licence_told() -> None:
 
 
 def test_card_of_the_first_data_set_is_that_of_this_version() -> None:
-    """Its identity names all that decides bits: a new key changes it, and the card has to follow."""
+    """A new key changes the identity, and the card has to follow."""
     identity = identity_hash(
         read_request(["experiment=quickstart"]).config.with_entries(out=None).plain(),
         __version__,

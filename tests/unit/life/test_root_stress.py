@@ -1,4 +1,5 @@
-"""Root stress of pairs: scale laws, limits, symmetry, the mesh's own load sharing, and what is refused."""
+"""Root stress of pairs: scale laws, limits, symmetry, the mesh's own load sharing, and what is
+refused."""
 
 import math
 from dataclasses import replace
@@ -35,7 +36,8 @@ def pair(*words):
 
 
 def test_figures_of_the_pump_drive():
-    """Computed independently of this project for 54/54, m 3, b 20: factors and the forces that give the stress."""
+    """Computed independently of this project for 54/54, m 3, b 20: factors and the forces that
+    give the stress."""
     outer, tip = (
         case(PUMP, f"strength.load_point={point}")
         for point in ("outer_single_pair", "tip")
@@ -179,7 +181,8 @@ def test_rim_and_deep_teeth():
 
 
 def test_the_papers_mesh_peaks_at_isos_load_point():
-    """Without contact beyond the path one pair is alone between B and D, and its end is ISO's load point."""
+    """Without contact beyond the path one pair is alone between B and D, and its end is ISO's load
+    point."""
     loaded = case(PUMP, *PAPER_LAW).under(349.39e6)
     history, gears = loaded.history(), loaded.gears()
     for name, place in (

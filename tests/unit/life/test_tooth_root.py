@@ -1,4 +1,5 @@
-"""Form and stress correction factors of ISO 6336-3: against our own tooth, handbooks, other programs, and limits."""
+"""Form and stress correction factors of ISO 6336-3: against our own tooth, handbooks, other
+programs, and limits."""
 
 import math
 from dataclasses import replace
@@ -36,7 +37,7 @@ def gear(n_teeth, *, shift=0.0, module=3e-3, rounding=0.38, helix=0.0):
 
 
 def touching(found, angle=TANGENT):
-    """Where our own root curve makes ``angle`` with the centreline: its parameter gamma."""
+    """Parameter gamma at which our root curve makes ``angle`` with the centreline."""
 
     def slope(gamma):
         roll = (
@@ -96,11 +97,22 @@ def test_the_lever_arm_is_that_of_our_own_flank(n_teeth, shift, rounding):
     )
 
 
-# load at the tip, rack alpha 20 degrees, h_a 1, c 0.25, rho 0.38: table of Chinese design handbooks (DIN 3990 charts)
+# load at the tip, rack alpha 20 degrees, h_a 1, c 0.25, rho 0.38: table of Chinese design
+# handbooks (DIN 3990 charts)
 HANDBOOK = [
-    (18, 2.91, 1.53), (19, 2.85, 1.54), (20, 2.80, 1.55), (22, 2.72, 1.57), (25, 2.62, 1.59), (30, 2.52, 1.625),
-    (40, 2.40, 1.67), (50, 2.32, 1.70), (60, 2.28, 1.73), (80, 2.22, 1.77), (100, 2.18, 1.79), (200, 2.12, 1.865),
-]  # fmt: skip
+    (18, 2.91, 1.53),
+    (19, 2.85, 1.54),
+    (20, 2.80, 1.55),
+    (22, 2.72, 1.57),
+    (25, 2.62, 1.59),
+    (30, 2.52, 1.625),
+    (40, 2.40, 1.67),
+    (50, 2.32, 1.70),
+    (60, 2.28, 1.73),
+    (80, 2.22, 1.77),
+    (100, 2.18, 1.79),
+    (200, 2.12, 1.865),
+]
 
 
 @pytest.mark.parametrize(("n_teeth", "form", "correction"), HANDBOOK)
@@ -111,7 +123,8 @@ def test_handbook_factors(n_teeth, form, correction):
 
 
 def test_another_program():
-    """din3990 (a DIN 3990-11 calculation, public on GitHub under hanslhansl), its test 1: load at the tip."""
+    """din3990 (a DIN 3990-11 calculation, public on GitHub under hanslhansl), its test 1: load at
+    the tip."""
     for n_teeth, shift, thickness, arm, fillet, form, correction in (
         (19, 0.50, 8.748743, 8.174658, 1.316148, 2.246336, 1.914726),
         (104, 0.15, 9.239505, 7.834246, 1.325999, 2.161657, 2.008782),
@@ -128,9 +141,11 @@ def test_another_program():
 
 
 def test_many_teeth_are_a_rack():
-    """The rack's own section: straight sides at 20 degrees down to a circle of the rounding's radius."""
+    """The rack's own section: straight sides at 20 degrees down to a circle of the rounding's
+    radius."""
     alpha, rounding, found = math.radians(20.0), 0.38, gear(10**6, module=1e-3)
-    # centre of the circle: b from the centreline, a below the pitch line; tangent at 30 degrees to the centreline
+    # centre of the circle: b from the centreline, a below the pitch line; tangent at 30 degrees to
+    # the centreline
     a = 1.25 - rounding
     b = (
         math.pi / 4.0

@@ -1,4 +1,5 @@
-"""Parts of the wear life: curvature of what is worn off, limits, fitted laws, the way into a fault, what is refused."""
+"""Parts of the wear life: curvature of what is worn off, limits, fitted laws, the way into a
+fault, what is refused."""
 
 from dataclasses import replace
 
@@ -18,7 +19,7 @@ from gensig.life.wear.archard import (
     hunting_turns,
     worn_curvature,
 )
-from gensig.life.wear.wear_life import wear_life, worn_flanks
+from gensig.life.wear.wear_life import wear_life
 from gensig.options.compose import compose
 from gensig.systems.wear import read_wear_case, wear_fault
 
@@ -41,7 +42,8 @@ def test_curvature_of_a_parabola_and_of_a_straight_wear(full):
     depth = 4.0 * (arc - middle) ** 2
     assert_allclose(worn_curvature(full.path, depth, reach)[:, 8:-8], 8.0, rtol=0.1)
     assert_allclose(worn_curvature(full.path, 3e-3 * arc, reach), 0.0, atol=1e-6)
-    # a wave as long as the half width, to which its second difference over the half width alone is blind
+    # a wave as long as the half width, to which its second difference over the half width alone is
+    # blind
     wave = 1e-6 * np.cos(2.0 * np.pi * (arc - arc[:, :1]) / 6e-4)
     felt = worn_curvature(full.path, wave, np.full(arc.shape[1], 6e-4))
     assert np.all(
@@ -179,6 +181,9 @@ def test_turns_until_the_same_teeth_meet(full):
     assert hunting_turns(case_of("gear.pinion.n_teeth=42").pair) == 2
 
 
+LIMIT = "wear.transmission_error_limit_um=9"
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -186,42 +191,20 @@ def test_turns_until_the_same_teeth_meet(full):
             ["wear.rule=archard"],
             "wear.rule = 'archard'; allowed: band, fixed_intervals",
         ),
-        (["wear.criterion=both"], "allowed: first, sum"),
-        (["wear.sharing=none"], "allowed: mesh, one_pair"),
-        (["wear.geometry=old"], "allowed: worn, unworn"),
-        (["wear.load_radius=tip"], "allowed: base, reference"),
-        (["wear.n_intervals=0"], "must lie in 1"),
-        (["wear.n_intervals=2.5"], "is not a whole number"),
+        (["wear.sharing=none"], "wear.sharing = 'none'; allowed: mesh, one_pair"),
+        (["wear.n_intervals=0"], "wear.n_intervals = 0 must lie in 1..1e+06"),
         (["wear.threshold_um=0"], "wear.threshold_um = 0 must be positive"),
-        (["wear.threshold_um=-3"], "wear.threshold_um = -3 must be positive"),
-        (["wear.threshold_um=nan"], "is not finite"),
         (["wear.threshold_um=2000"], "is deeper than the tooth"),
-        (["wear.coefficient=0"], "wear.coefficient = 0 must be positive"),
         (["wear.hardness_hbs=-1"], "wear.hardness_hbs = -1 must be positive"),
         (
             ["wear.pinion.hardness_hbs=0"],
             "wear.pinion.hardness_hbs = 0 must be positive",
         ),
-        (
-            ["wear.wheel.coefficient=-1e-6"],
-            "wear.wheel.coefficient = -1e-06 must be positive",
-        ),
-        (["wear.wheel.coefficient=hard"], "is not a number"),
-        (["wear.step_um=0"], "wear.step_um = 0 must be positive"),
+        (["wear.wheel.coefficient=3"], "wear.wheel.coefficient = 3 must be at most 1"),
         (["wear.wheel=3"], "wear.wheel = 3 must be a group of keys"),
-        (["wear.transmission_error_limit_um=0"], "must be positive"),
-        (
-            ["wear.transmission_error_limit_um=9", "wear.geometry=unworn"],
-            "needs wear.geometry=worn",
-        ),
-        (
-            ["wear.transmission_error_limit_um=9", "wear.sharing=one_pair"],
-            "wear.sharing=mesh",
-        ),
-        (
-            ["wear.transmission_error_limit_um=9", "gear=harbin_38_55"],
-            "needs wear.sharing=mesh",
-        ),
+        ([LIMIT, "wear.geometry=unworn"], "needs wear.geometry=worn"),
+        ([LIMIT, "wear.sharing=one_pair"], "wear.sharing=mesh"),
+        ([LIMIT, "gear=harbin_38_55"], "needs wear.sharing=mesh"),
         (["operating.torque_nm=0"], "operating.torque_nm = 0 must be positive"),
         (["fault=crack"], "a life begins with sound flanks"),
     ],
@@ -231,16 +214,6 @@ def test_bad_input_is_one_line(words, message):
         case_of(*words)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_a_history_with_gaps_is_refused(full):
-    for turns in ([2.0, 1.0], [-1.0, 1.0], [np.nan], [[1.0]]):
-        with pytest.raises(ConfigError, match="never falls"):
-            worn_flanks(full, np.array(turns))
-    with pytest.raises(ConfigError, match="give one for each"):
-        worn_flanks(full, np.array([1.0, 2.0]), torque=np.array([1.0]))
-    with pytest.raises(ConfigError, match="must be positive"):
-        worn_flanks(full, np.array([1.0, 2.0]), torque=np.array([1.0, -2.0]))
 
 
 def test_values_of_a_gear_override_those_of_both():

@@ -1,4 +1,4 @@
-"""From overrides to one plain configuration: what is typed, what follows from it, and every mistake in one line."""
+"""Requests: typed overrides, derived values, and every mistake in one line."""
 
 import json
 import re
@@ -129,7 +129,8 @@ class TestMistakes:
 def test_own_options_are_found(tmp_path):
     (tmp_path / "operating").mkdir()
     (tmp_path / "operating" / "slow.yaml").write_text(
-        "speed_rpm: 600\ntorque_nm: 5\nduration_s: 1\ndrive_frequency_hz: 5\ndrive_damping_ratio: 0.7\n"
+        "speed_rpm: 600\ntorque_nm: 5\nduration_s: 1\ndrive_frequency_hz: "
+        "5\ndrive_damping_ratio: 0.7\n"
     )
     config = read_request(["operating=slow"], config_dir=tmp_path).config
     assert config["operating"]["speed_rpm"] == 600
@@ -193,7 +194,8 @@ class TestEveryFaultOption:
 
     @pytest.mark.parametrize("name", options("fault"))
     def test_every_draw_that_it_offers_fits(self, classes, name, xiamen):
-        """The ends of what plans vary, on either gear: nothing leaves its tooth, nothing is above its limit."""
+        """The ends of what plans vary, on either gear: nothing leaves its tooth, nothing is above
+        its limit."""
         for gear in ("pinion", "wheel"):
             for end in ("low", "high"):
                 faults = read_faults(at_end(with_keys(classes[name], gear=gear), end))
@@ -220,7 +222,8 @@ def with_keys(fault, **changes):
 
 
 def at_end(fault, end):
-    """A fault with everything that plans vary at one end of its range; teeth are left where they are."""
+    """A fault with everything that plans vary at one end of its range; teeth are left where they
+    are."""
     if "parts" in fault:
         return {**fault, "parts": [at_end(part, end) for part in fault["parts"]]}
     return {
@@ -243,7 +246,10 @@ class TestCompound:
         own = (
             "{kind: wear, vary: {limit_um: {distribution: uniform, low: 90, high: 99}}}"
         )
-        parts = f"fault.parts=[{{kind: crack, tooth: 3}}, {{kind: spalling, spall_width_mm: 4}}, {own}]"
+        parts = (
+            "fault.parts=[{kind: crack, tooth: 3}, {kind: spalling, spall_width_mm: 4}, "
+            f"{own}]"
+        )
         parts = read_request(["fault=compound", parts]).config["fault"]["parts"]
         assert [set(part["vary"]) for part in parts] == [
             {"crack_depth_mm"},
@@ -441,7 +447,15 @@ def test_paper_experiment_means_every_convention_of_the_paper():
         "bending",
     )
     assert [getattr(mesh, key) for key in keys] == [
-        "paper", "sum", "linear", "plane_stress", "sainsot", "to_contact", "paper", "whole"]  # fmt: skip
+        "paper",
+        "sum",
+        "linear",
+        "plane_stress",
+        "sainsot",
+        "to_contact",
+        "paper",
+        "whole",
+    ]
 
 
 def test_three_keys_mean_the_papers_conventions_for_ever():

@@ -1,4 +1,4 @@
-"""Records of so many turns, and a random walk for each condition."""
+"""Records of a number of turns, and one random walk for each condition."""
 
 import math
 import re
@@ -33,19 +33,44 @@ class TestTurns:
             (["fault=crack"], 10 / 30),
             (["fault=crack", "fault.gear=wheel"], 10 / 30 * 84 / 23),
             (["plan.classes=[healthy,crack]"], 10 / 30),
-            (["plan.classes=[healthy,crack,pitting]", "fault.gear=wheel"], 10 / 30 * 84 / 23),
-            (["fault=compound", "fault.parts=[{kind: crack, gear: pinion},{kind: pitting, gear: wheel}]"],
-             10 / 30 * 84 / 23),
+            (
+                ["plan.classes=[healthy,crack,pitting]", "fault.gear=wheel"],
+                10 / 30 * 84 / 23,
+            ),
+            (
+                [
+                    "fault=compound",
+                    "fault.parts=[{kind: crack, gear: pinion},{kind: pitting, gear: wheel}]",
+                ],
+                10 / 30 * 84 / 23,
+            ),
             (["operating.speed_rpm=600"], 1.0),
             (["experiment=quickstart"], 0.5),
             (["experiment=quickstart", "operating.speed_rpm=600"], 1.0),
-            (["plan.vary={operating.speed_rpm: {distribution: choice, values: [1800, 900, 1200]}}"], 10 / 15),
+            (
+                [
+                    "plan.vary={operating.speed_rpm: {distribution: choice, values: [1800, 900, "
+                    "1200]}}"
+                ],
+                10 / 15,
+            ),
             (["operating.speed_profile=[[0,1.2],[1,0.5]]"], 10 / 15),
-            (["operating.speed_profile={kind: ramp, first_factor: 0.25, last_factor: 1}"], 10 / 7.5),
-            (["operating.speed_profile={kind: random_walk, scatter: 0.05, correlation_time_s: 1}"], 10 / 24),
+            (
+                [
+                    "operating.speed_profile={kind: ramp, first_factor: 0.25, last_factor: 1}"
+                ],
+                10 / 7.5,
+            ),
+            (
+                [
+                    "operating.speed_profile={kind: random_walk, scatter: 0.05, "
+                    "correlation_time_s: 1}"
+                ],
+                10 / 24,
+            ),
             (["operating.speed_ripple={share: 0.2, order: 1}"], 10 / 24),
         ],
-    )  # fmt: skip
+    )
     def test_at_the_slowest_speed(self, words, seconds):
         found = config("operating.turns=10", *words)
         assert found["operating"]["duration_s"] == pytest.approx(
@@ -70,16 +95,35 @@ class TestTurns:
     @pytest.mark.parametrize(
         ("words", "text"),
         [
-            (["operating.duration_s=1"], "operating.duration_s and operating.turns are both given; leave one out"),
-            (["plan.vary={operating.speed_ripple.share: {distribution: uniform, low: 0, high: 0.1}}",
-              "operating.speed_ripple={share: 0, order: 1}"],
-             "operating.turns: the plan draws operating.speed_ripple.share, so the slowest turn is not known"),
-            (["plan.vary={operating.speed_rpm: {distribution: uniform, low: 0, high: 100}}"],
-             "operating.turns: the slowest speed of the plan must be positive"),
-            (["plan.vary={operating.speed_rpm: {distribution: uniform, low: 5}}"], "uniform needs exactly low, high"),
-            (["operating.speed_profile=[[0,1],[1,0]]"], "the slowest speed of the plan must be positive"),
+            (
+                ["operating.duration_s=1"],
+                "operating.duration_s and operating.turns are both given; leave one out",
+            ),
+            (
+                [
+                    "plan.vary={operating.speed_ripple.share: {distribution: uniform, low: 0, "
+                    "high: 0.1}}",
+                    "operating.speed_ripple={share: 0, order: 1}",
+                ],
+                "operating.turns: the plan draws operating.speed_ripple.share, so the slowest turn "
+                "is not known",
+            ),
+            (
+                [
+                    "plan.vary={operating.speed_rpm: {distribution: uniform, low: 0, high: 100}}"
+                ],
+                "operating.turns: the slowest speed of the plan must be positive",
+            ),
+            (
+                ["plan.vary={operating.speed_rpm: {distribution: uniform, low: 5}}"],
+                "uniform needs exactly low, high",
+            ),
+            (
+                ["operating.speed_profile=[[0,1],[1,0]]"],
+                "the slowest speed of the plan must be positive",
+            ),
         ],
-    )  # fmt: skip
+    )
     def test_refusals(self, words, text):
         with pytest.raises(ConfigError, match=re.escape(text)) as caught:
             config("operating.turns=10", *words)

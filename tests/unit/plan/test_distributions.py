@@ -13,7 +13,6 @@ from numpy.testing import assert_allclose
 from scipy.stats import qmc
 
 from gensig.dataset.distributions import (
-    DISTRIBUTIONS,
     KEYS,
     design_points,
     read_distribution,
@@ -36,17 +35,19 @@ SPECS = {
 POINTS = (np.arange(4000) + 0.5) / 4000
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=40)
 @given(
-    st.sampled_from(sorted(SPECS)), st.lists(st.floats(0, 1), min_size=1, max_size=20)
+    st.sampled_from(sorted(KEYS)), st.lists(st.floats(0, 1), min_size=1, max_size=20)
 )
 def test_values_stay_in_range(kind, points):
     spec = SPECS[kind]
-    values = read_distribution("key", spec).values_at(np.array(points))
+    distribution = read_distribution("key", spec)
+    values = distribution.values_at(np.array(points))
+    assert min(values) >= distribution.least - 1e-12
     if kind == "choice":
         assert set(values) <= set(spec["values"])
     else:
-        assert min(values) >= spec["low"] - 1e-12
+        assert distribution.least == spec["low"]
         assert max(values) <= spec["high"] + 1e-12
     assert all(type(value) in (int, float) for value in values)
 
@@ -113,18 +114,6 @@ def test_a_cut_normal_has_the_normal_density_between_its_ends(numbers):
     )
 
 
-@pytest.mark.parametrize("design", ["latin_hypercube", "sobol"])
-def test_a_cut_normal_stays_space_filling(design):
-    """One value in each of 64 parts of equal probability: nothing is drawn and thrown away."""
-    for numbers in NORMALS[:2]:
-        points = design_points(design, 64, 1, np.random.default_rng(3))
-        values = read_distribution(
-            "key", {"distribution": "normal", **numbers}
-        ).values_at(points[:, 0])
-        parts = [int(64 * cut_normal_share(value, **numbers)) for value in values]
-        assert sorted(parts) == list(range(64))
-
-
 def test_scipy_is_imported_only_when_it_draws():
     code = "import sys, gensig.dataset.distributions; sys.exit('scipy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
@@ -137,23 +126,33 @@ class TestLevels:
             ({**SPECS["uniform"], "levels": 5}, [-1.0, 0.0, 1.0, 2.0, 3.0]),
             ({**SPECS["log_uniform"], "levels": 3}, [0.1, 1.0, 10.0]),
             ({**SPECS["integers"], "levels": 4}, [2, 3, 4, 5]),
-            ({"distribution": "integers", "low": 0, "high": 22, "levels": 3}, [0, 11, 22]),
+            (
+                {"distribution": "integers", "low": 0, "high": 22, "levels": 3},
+                [0, 11, 22],
+            ),
             (SPECS["choice"], [1.0, 2.5, 7]),
-            ({"distribution": "normal", "mean": 2.0, "std": 1.0, "low": -7.0, "high": 11.0, "levels": 3},
-             [2.0 - 0.96742157, 2.0, 2.0 + 0.96742157]),
+            (
+                {
+                    "distribution": "normal",
+                    "mean": 2.0,
+                    "std": 1.0,
+                    "low": -7.0,
+                    "high": 11.0,
+                    "levels": 3,
+                },
+                [2.0 - 0.96742157, 2.0, 2.0 + 0.96742157],
+            ),
         ],
-    )  # fmt: skip
+    )
     def test_values(self, spec, levels):
-        assert read_distribution("key", spec).n_levels == len(levels)
+        assert read_distribution("key", spec).levels == len(levels)
         assert_allclose(
             read_distribution("key", spec).level_values(), levels, rtol=1e-7, atol=1e-12
         )
 
     @pytest.mark.parametrize("kind", sorted(SPECS))
     def test_null_has_none(self, kind):
-        assert (
-            read_distribution("key", {**SPECS[kind], "levels": None}).n_levels is None
-        )
+        assert read_distribution("key", {**SPECS[kind], "levels": None}).levels == 0
 
     @pytest.mark.parametrize("kind", sorted(SPECS))
     def test_designs_that_draw_pass_over_them(self, kind):
@@ -238,17 +237,13 @@ class TestLevels:
             "values must be a list with at least one entry",
         ),
         ({"distribution": "choice", "values": ["a"]}, "values must be finite numbers"),
+        ({**SPECS["integers"], "low": 0.5}, "low = 0.5 and high = 5 must be whole"),
     ],
 )
 def test_mistakes_are_answered(spec, text):
     with pytest.raises(ConfigError, match=re.escape(text)) as caught:
         read_distribution("operating.speed_rpm", spec)
     assert "operating.speed_rpm" in str(caught.value)
-
-
-def test_whole_numbers_need_whole_ends():
-    with pytest.raises(ConfigError, match=r"0\.5"):
-        read_distribution("key", {"distribution": "integers", "low": 0.5, "high": 2.5})
 
 
 @pytest.mark.parametrize("design", ["latin_hypercube", "sobol"])
@@ -277,7 +272,8 @@ class TestDesigns:
 
 
 def test_two_designs_of_one_size_have_nothing_in_common():
-    """Of 16 x 16 cells about 163 are hit by chance; Sobol points in the order of the sequence hit 16."""
+    """Of 16 x 16 cells about 163 are hit by chance; Sobol points in the order of the sequence hit
+    16."""
 
     def n_cells(one, other):
         return len(
@@ -310,13 +306,3 @@ def test_unknown_designs_list_the_known(n_dimensions):
         match=r"plan.design = 'factorial'; allowed: latin_hypercube, sobol, grid",
     ):
         design_points("factorial", 4, n_dimensions, np.random.default_rng(0))
-
-
-def test_every_kind_has_its_class_and_keys():
-    assert set(DISTRIBUTIONS) == set(KEYS) == set(SPECS)
-
-
-@pytest.mark.parametrize("kind", sorted(DISTRIBUTIONS))
-def test_no_value_is_below_the_least(kind):
-    distribution = read_distribution("key", SPECS[kind])
-    assert min(distribution.values_at(POINTS)) >= distribution.least

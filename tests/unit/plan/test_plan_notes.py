@@ -1,4 +1,4 @@
-"""What a plan leaves out of what was asked, or undoes of an option, is told in a line."""
+"""Notes on a plan: units without records, impossible splits, and replaced settings."""
 
 import pytest
 
@@ -25,8 +25,8 @@ def test_units_without_a_record_are_told() -> None:
         "plan.n_repeats=2",
     )
     assert line == (
-        "12 records are 2 conditions of 3 classes and 2 repeats: 2 of 4 units are used; no split by unit is possible "
-        "(2 unit_id in the plan, and at least 3 are needed)"
+        "12 records are 2 conditions of 3 classes and 2 repeats: 2 of 4 units are used; no "
+        "split by unit is possible (2 unit_id in the plan, and at least 3 are needed)"
     )
 
 

@@ -1,4 +1,4 @@
-"""Protocols of real plans: what a unit draws stays on one side, noise included, whatever the design."""
+"""Protocols of real plans: units, conditions and noise stay on one side."""
 
 import numpy as np
 import pytest
@@ -70,45 +70,11 @@ def test_quickstart_has_all_protocols_with_ten_units_to_test_what_is_held_out() 
     plan = planned()
     tables = make_splits(plan, 0)
     assert set(tables) == set(PROTOCOLS)
-    unit = dict(
-        zip(
-            plan.columns["record_id"].tolist(),
-            plan.columns["unit_id"].tolist(),
-            strict=True,
-        )
-    )
-    for name in set(CLEAN) - {
-        "cross_specimen"
-    }:  # ten sets of gears: two are tested on, in eight units
-        test = tables[name].record_id[tables[name].subset == "test"].tolist()
-        assert len({unit[record] for record in test}) >= 10
-        assert len(test) >= 40
-
-
-@pytest.mark.parametrize(
-    ("n_units", "n_tested"),
-    [(5, 1), (20, 4), (39, 8), (40, 10), (49, 10), (50, 10), (100, 20)],
-)
-def test_ten_units_are_tested_on_where_a_quarter_is_ten(
-    n_units: int, n_tested: int
-) -> None:
-    plan = planned(
-        "plan.n_records=800", f"plan.n_units={n_units}", "plan.n_gearboxes=1"
-    )
-    table = make_splits(plan, 0)["by_unit"]
-    unit = dict(
-        zip(
-            plan.columns["record_id"].tolist(),
-            plan.columns["unit_id"].tolist(),
-            strict=True,
-        )
-    )
-    sides = {
-        name: {unit[record] for record in table.record_id[table.subset == name]}
-        for name in set(table.subset)
-    }
-    assert len(sides["test"]) == n_tested
-    assert len(sides["train"]) >= n_units / 2
+    for name in set(CLEAN) - {"cross_specimen"}:  # two sets of gears, in eight units
+        test = tables[name].record_id[tables[name].subset == "test"]
+        tested = np.isin(plan.columns["record_id"], test)
+        assert len(np.unique(plan.columns["unit_id"][tested])) >= 10
+        assert tested.sum() >= 40
 
 
 def test_a_sham_plan_has_no_severity_to_hold_out_and_keeps_the_others() -> None:

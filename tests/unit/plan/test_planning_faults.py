@@ -1,4 +1,4 @@
-"""Plans of faults on one tooth, on all of them, and of several at once: what is recorded, and what is refused."""
+"""Plans of faults on one tooth, on all teeth, and of several faults at once."""
 
 import json
 import re
@@ -188,7 +188,8 @@ class TestManyKindsOfFaults:
         ],
     )
     def test_every_class_of_a_compound_is_hot(self, mixed, hot, name, expected):
-        """The classes that are present: the compound one and those of its parts; a single fault brings one."""
+        """The classes that are present: the compound one and those of its parts; a single fault
+        brings one."""
         assert hot(self.of(mixed, name)[0]) == expected
 
     def test_two_cracks_are_a_crack(self, mixed, hot):
@@ -198,7 +199,8 @@ class TestManyKindsOfFaults:
         assert hot({**row, "faults_json": both}) == {"compound", "crack"}
 
     def test_another_class_of_the_same_kind_is_not(self, config, mixed, hot):
-        """Two options of one kind, say small and large cracks: a single fault is of its own class alone."""
+        """Two options of one kind, say small and large cracks: a single fault is of its own class
+        alone."""
         assert hot(self.of(mixed, "crack")[0], wear=config["classes"]["crack"]) == {
             "crack"
         }

@@ -1,4 +1,4 @@
-"""What `gensig plan` foretells is what `gensig generate` makes."""
+"""Prediction of a data set: counts, and bytes near those that are made."""
 
 import functools
 from pathlib import Path
@@ -14,20 +14,30 @@ from gensig.record import inputs as records
 CLASSES = "plan.classes=[healthy,crack,pitting,missing_tooth]"
 SPEEDS = "plan.vary={operating.speed_rpm: {distribution: choice, values: [1200, 1800, 2400]}}"
 SETS = {
-    "a few records": ("plan.n_records=4", CLASSES, "operating.duration_s=0.25"),
-    "many shards": ("plan.n_records=20", CLASSES, "dataset.records_per_shard=2", "operating.duration_s=0.05"),
-    "counts, compressed": (
-        "plan.n_records=12", CLASSES, "operating.duration_s=0.25", "dataset.sample_type=int16",
-        "dataset.compression=gzip",
+    "many shards": (
+        "plan.n_records=20",
+        CLASSES,
+        "dataset.records_per_shard=2",
+        "operating.duration_s=0.05",
     ),
-    "all signals": (
-        "plan.n_records=4", CLASSES, "operating.duration_s=0.25", "dataset.store_clean=true",
+    "counts, compressed": (
+        "plan.n_records=8",
+        CLASSES,
+        "operating.duration_s=0.25",
+        "dataset.sample_type=int16",
+        "dataset.compression=gzip",
+        "dataset.store_clean=true",
         "dataset.store_shaft_angle=true",
     ),
     "a grid": (
-        "plan.design=grid", "plan.n_records=null", "plan.n_units=2", SPEEDS, CLASSES, "operating.duration_s=0.05",
+        "plan.design=grid",
+        "plan.n_records=null",
+        "plan.n_units=2",
+        SPEEDS,
+        CLASSES,
+        "operating.duration_s=0.05",
     ),
-}  # fmt: skip
+}
 
 
 @functools.cache

@@ -53,7 +53,8 @@ def test_a_length_in_millimetres_is_taken_as_it_is():
     [
         (
             "{crack_depth_mm: {distribution: uniform, low: 0, high: 1, of: tooth}}",
-            "fault.vary.crack_depth_mm: of = 'tooth'; a length may be drawn as a share of normal_module, face_width",
+            "fault.vary.crack_depth_mm: of = 'tooth'; a length may be drawn as a share of "
+            "normal_module, face_width",
         ),
         (
             "{crack_angle_deg: {distribution: uniform, low: 0, high: 1, of: face_width}}",

@@ -1,6 +1,5 @@
 """An accelerometer's response, its scatter and its converter."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -8,14 +7,25 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gensig.errors import ConfigError
-from gensig.sensing.accelerometer import Accelerometer, draw_sensors
+from gensig.sensing.accelerometer import LIMITS, Accelerometer, draw_sensors
 
 RATE = 51200.0
 IDEAL = Accelerometer(
-    sensitivity_tolerance=0.0, transverse_sensitivity=0.0, mounted_resonance=None, resonance_damping_ratio=0.02,
-    low_cutoff=None, dc_offset_m_per_s2=0.0, adc_range_m_per_s2=None, adc_bits=None, max_clipped_fraction=0.001,
-    drift_scatter=0.0, drift_time=10.0, dropped_fraction=0.0, dropped_run_samples=64, dropped_fill="hold",
-)  # fmt: skip
+    sensitivity_tolerance=0.0,
+    transverse_sensitivity=0.0,
+    mounted_resonance=None,
+    resonance_damping_ratio=0.02,
+    low_cutoff=None,
+    dc_offset_m_per_s2=0.0,
+    adc_range_m_per_s2=None,
+    adc_bits=None,
+    max_clipped_fraction=0.001,
+    drift_scatter=0.0,
+    drift_time=10.0,
+    dropped_fraction=0.0,
+    dropped_run_samples=64,
+    dropped_fill="hold",
+)
 
 
 def gain(sensor, frequency):
@@ -87,36 +97,24 @@ def test_scatter_stays_within_the_data_sheet():
         assert abs(values.mean()) < 0.1 * most
 
 
+@pytest.mark.parametrize("name", LIMITS)
+def test_limits(name):
+    low, high = LIMITS[name]
+    for value in (low - 1, 2 * high):
+        with pytest.raises(
+            ConfigError, match=rf"sensing\.sensor\.{name}.* must lie in"
+        ):
+            replace(IDEAL, **{"adc_range_m_per_s2": 1.0, "adc_bits": 12, name: value})
+
+
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        (
-            {"sensitivity_tolerance": 0.6},
-            "sensing.sensor.sensitivity_tolerance = 0.6 must lie in 0..0.5",
-        ),
-        (
-            {"transverse_sensitivity": -0.1},
-            "sensing.sensor.transverse_sensitivity = -0.1",
-        ),
-        ({"mounted_resonance": 10.0}, "sensing.sensor.mounted_resonance_hz = 10"),
-        (
-            {"resonance_damping_ratio": 0.0},
-            "sensing.sensor.resonance_damping_ratio = 0",
-        ),
-        ({"low_cutoff": 0.0}, "sensing.sensor.low_cutoff_hz = 0"),
-        ({"dc_offset_m_per_s2": -1.0}, "sensing.sensor.dc_offset_m_per_s2 = -1"),
         ({"adc_bits": 12}, "give both adc_range_m_per_s2 and adc_bits"),
-        (
-            {"adc_bits": 30, "adc_range_m_per_s2": 1.0},
-            "sensing.sensor.adc_bits = 30 must lie in 4..24",
-        ),
-        (
-            {"adc_bits": 12, "adc_range_m_per_s2": 0.0},
-            "sensing.sensor.adc_range_m_per_s2 = 0 must be positive",
-        ),
-        ({"max_clipped_fraction": 2.0}, "sensing.sensor.max_clipped_fraction = 2"),
+        ({"adc_range_m_per_s2": 0.0}, "adc_range_m_per_s2 = 0 must be positive"),
+        ({"dropped_fill": "nan"}, "dropped_fill = 'nan'; allowed: hold, zero"),
     ],
 )
-def test_values_out_of_range(changes, text):
-    with pytest.raises(ConfigError, match=re.escape(text)):
+def test_refusals(changes, text):
+    with pytest.raises(ConfigError, match=text):
         replace(IDEAL, **changes)

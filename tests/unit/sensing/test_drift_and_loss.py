@@ -1,10 +1,8 @@
 """Gains that drift over a record, and samples that get lost."""
 
-import re
-
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from test_instrument import BEARING, HOUSING, changed, instrument, source
 
 from gensig.errors import ConfigError
@@ -73,19 +71,9 @@ def test_the_first_packet_begins_anywhere():
 def test_filling():
     signal = np.arange(1.0, 9.0)[None] * [[1.0], [10.0]]
     dropped = np.array([1, 0, 0, 1, 1, 0, 1, 0], dtype=bool)
-    assert_allclose(
-        filled(signal, dropped, "zero")[0], [0, 2, 3, 0, 0, 6, 0, 8], rtol=0, atol=0
-    )
-    assert_allclose(
-        filled(signal, dropped, "hold")[0], [2, 2, 3, 3, 3, 6, 6, 8], rtol=0, atol=0
-    )
-    assert_allclose(
-        filled(signal, dropped, "hold")[1],
-        10.0 * filled(signal, dropped, "hold")[0],
-        rtol=0,
-        atol=0,
-    )
-    for fill in ("hold", "zero"):
+    expected = {"zero": [0, 2, 3, 0, 0, 6, 0, 8], "hold": [2, 2, 3, 3, 3, 6, 6, 8]}
+    for fill, row in expected.items():
+        assert_array_equal(filled(signal, dropped, fill), np.outer([1, 10], row))
         assert not filled(signal, np.ones(8, dtype=bool), fill).any()
 
 
@@ -99,59 +87,14 @@ def test_none_changes_no_bit():
         assert share == 0.0
 
 
-def test_an_instrument_that_has_them():
-    one = instrument(
-        changed(HOUSING, sensor__drift_scatter=0.05, sensor__dropped_fraction=0.2)
-    )
-    drift = one.drift(4000, np.random.default_rng(0))
-    assert drift.shape == (3, 4000)
-    assert np.abs(np.log(drift)).max() < 0.25
-    signal = source(one.sensing, 4000)[:3, :4000]
-    sent, share = one.sent(signal, np.random.default_rng(1))
-    changed_samples = np.any(sent != signal, axis=0)
-    assert share == np.mean(changed_samples) > 0.0
-
-
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        (
-            {"sensor__drift_scatter": 0.6},
-            "sensing.sensor.drift_scatter = 0.6 must lie in 0..0.5",
-        ),
-        (
-            {"sensor__drift_time_s": 0.01},
-            "sensing.sensor.drift_time_s = 0.01 must lie in 0.1..1e+06",
-        ),
-        (
-            {"sensor__dropped_fraction": -0.1},
-            "sensing.sensor.dropped_fraction = -0.1 must lie in 0..0.5",
-        ),
-        (
-            {"sensor__dropped_run_samples": 0},
-            "sensing.sensor.dropped_run_samples = 0 must lie in 1..1e+06",
-        ),
-        (
-            {"sensor__dropped_run_samples": 2.5},
-            "sensing.sensor.dropped_run_samples = 2.5 is not a whole number",
-        ),
-        (
-            {"sensor__dropped_fill": "nan"},
-            "sensing.sensor.dropped_fill = 'nan'; allowed: hold, zero",
-        ),
         ({"tacho": None}, "sensing.tacho = None must be a group of keys"),
-        (
-            {"tacho": {"shaft": "pinion"}},
-            "sensing.tacho: missing pulses_per_turn, pulse_width_share, jitter_deg",
-        ),
-        (
-            {"encoder__shaft": "x"},
-            "sensing.encoder.shaft = 'x'; allowed: pinion, wheel",
-        ),
+        ({"tacho": {"shaft": "pinion"}}, "sensing.tacho: missing pulses_per_turn"),
         ({"encoder": {"lines": 3}}, "sensing.encoder: unknown key 'lines'"),
     ],
 )
-def test_mistakes(changes, text):
-    with pytest.raises(ConfigError, match=re.escape(text)) as caught:
+def test_groups_that_cannot_be_read(changes, text):
+    with pytest.raises(ConfigError, match=text):
         read_sensing(changed(BEARING, **changes))
-    assert "\n" not in str(caught.value)

@@ -25,7 +25,7 @@ def disc_of(encoder, seed=0):
 
 
 def error(encoder, seed=0, angle=ANGLE):
-    """What the encoder reads too much, counted from its index."""
+    """Excess of the reading, counted from the index."""
     disc = disc_of(encoder, seed)
     return disc.read(angle, quantised=encoder.quantised) - (angle - disc.index)
 
@@ -130,7 +130,7 @@ def test_a_line_is_read_where_it_passes():
         ({"eccentricity_error": 0.1}, "sensing.encoder.eccentricity_error_deg = 5.7"),
         (
             {"line_error": 0.01},
-            "must lie in 0..0.036, a tenth of the spacing of the lines",
+            "sensing.encoder.line_error_deg = 0.572958 must lie in 0..0.036",
         ),
     ],
 )

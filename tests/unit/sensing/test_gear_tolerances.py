@@ -49,14 +49,6 @@ def test_two_grades_are_a_factor_of_two(xiamen, limit):
         )
 
 
-def test_runout_is_nine_tenths_of_the_cumulative_pitch(xiamen):
-    for grade in (1, 6.3, 11):
-        ratio = runout_limit(xiamen.pair.wheel, grade) / cumulative_pitch_limit(
-            xiamen.pair.wheel, grade
-        )
-        assert_allclose(ratio, 0.9, rtol=1e-12, atol=0)
-
-
 @pytest.mark.parametrize("limit", LIMITS)
 @pytest.mark.parametrize("grade", [0.9, 12])
 def test_grades_that_there_are_not(xiamen, limit, grade):

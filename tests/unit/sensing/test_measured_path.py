@@ -86,30 +86,34 @@ def test_frequency_response_of_a_mode_rings_as_the_mode_does(tmp_path):
 
 
 def test_refused_files(tmp_path):
-    taps, file = np.ones((2, 32)), tmp_path / "h.csv"
-    cases = {
-        "cannot be read": str(tmp_path / "none.csv"),
-        "unknown column wheel_z_to_housing": impulse_file(
-            file.with_stem("a"), [*taps, taps[0]], names=(*PAIRS, "wheel_z_to_housing")
-        ),
-        "no column wheel_y_to_housing": impulse_file(file.with_stem("b"), taps[:1], names=PAIRS[:1]),
-        "row 4, column wheel_y_to_housing is no finite number": impulse_file(
-            file.with_stem("c"), [taps[0], np.where(np.arange(32) == 2, np.nan, 1.0)]
-        ),
-        "too short: 8 rows, at least 16": impulse_file(file.with_stem("d"), taps[:, :8]),
-        "has 25600 samples a second, sensing.sampling_rate_hz = 51200": impulse_file(
-            file.with_stem("e"), taps, rate=25_600
-        ),
-        "reaches from 0 to 5000 Hz; 20 to 20000 Hz is needed": frequency_file(file.with_stem("f"), mode, high=5000.0),
-        "comes before time 0": frequency_file(file.with_stem("g"), lambda f: np.conj(mode(f))),
-    }  # fmt: skip
-    backwards = write(
-        file.with_stem("i"), ["time_s", *PAIRS], [-np.arange(32) / RATE, *taps]
-    )
-    cases["time_s must rise in even steps"] = backwards
-    words = tmp_path / "words.csv"
+    taps, words = np.ones((2, 32)), tmp_path / "words"
     words.write_text("time_s,a\n1,two\n" * 20)
-    cases["give numbers under one header"] = str(words)
+    broken = [taps[0], np.where(np.arange(32) == 2, np.nan, 1.0)]
+    more = (*PAIRS, "wheel_z_to_housing")
+    late = frequency_file(tmp_path / "a", lambda line: np.conj(mode(line)))
+    time = -np.arange(32) / RATE
+    cases = {
+        "cannot be read": str(tmp_path / "none"),
+        "unknown column wheel_z_to_housing": impulse_file(
+            tmp_path / "b", [*taps, taps[0]], names=more
+        ),
+        "no column wheel_y_to_housing": impulse_file(
+            tmp_path / "c", taps[:1], names=PAIRS[:1]
+        ),
+        "row 4, column wheel_y_to_housing is no finite number": impulse_file(
+            tmp_path / "d", broken
+        ),
+        "too short: 8 rows, at least 16": impulse_file(tmp_path / "e", taps[:, :8]),
+        "has 25600 samples a second": impulse_file(tmp_path / "f", taps, rate=25_600),
+        "reaches from 0 to 5000 Hz; 20 to 20000 Hz is needed": frequency_file(
+            tmp_path / "g", mode, high=5000.0
+        ),
+        "comes before time 0": late,
+        "time_s must rise in even steps": write(
+            tmp_path / "h", ["time_s", *PAIRS], [time, *taps]
+        ),
+        "give numbers under one header": str(words),
+    }
     for text, name in cases.items():
         with pytest.raises(ConfigError, match=re.escape(text)) as caught:
             read(name)

@@ -7,13 +7,20 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gensig.errors import ConfigError
-from gensig.sensing.noise import PARTS, Place, band_power, read_noise
+from gensig.sensing.noise import PARTS, Receiver, band_power, read_noise
 
 RATE = 51200.0
 MACHINE = {
-    "kind": "machine", "share": 1.0, "shaft_hz": 25.0, "frequency_scatter": 0.0, "n_shaft_orders": 3,
-    "bearing_order": 3.6, "n_bearing_harmonics": 4, "n_teeth": 31, "n_mesh_harmonics": 3,
-}  # fmt: skip
+    "kind": "machine",
+    "share": 1.0,
+    "shaft_hz": 25.0,
+    "frequency_scatter": 0.0,
+    "n_shaft_orders": 3,
+    "bearing_order": 3.6,
+    "n_bearing_harmonics": 4,
+    "n_teeth": 31,
+    "n_mesh_harmonics": 3,
+}
 KINDS = {
     "white": {"kind": "white", "share": 1.0},
     "pink": {"kind": "pink", "share": 1.0, "lowest_hz": 5.0},
@@ -30,11 +37,11 @@ KINDS = {
 }
 
 
-def place(n_samples=51200):
+def receiver(n_samples=51200):
     def through_path(rng):
         return np.cumsum(rng.standard_normal((2, n_samples)), axis=1)
 
-    return Place(
+    return Receiver(
         sensors=("a", "b"),
         n_samples=n_samples,
         sampling_rate=RATE,
@@ -68,7 +75,7 @@ def test_every_kind_is_tested():
 )
 def test_power_is_exact(kinds, n_samples):
     power = np.array([2.0, 0.3])
-    made = noise(*kinds).make(power, np.random.default_rng(1), place(n_samples))
+    made = noise(*kinds).make(power, np.random.default_rng(1), receiver(n_samples))
     assert_allclose(np.var(made, axis=1), power, rtol=1e-9, atol=0)
     assert_allclose(made.mean(axis=1), 0.0, rtol=0, atol=1e-9)
 
@@ -80,7 +87,7 @@ def test_power_in_a_band(kinds):
     from scipy.signal import butter, sosfilt
 
     made = noise(*kinds, band=[300.0, 8000.0]).make(
-        np.array([2.0, 0.3]), np.random.default_rng(1), place()
+        np.array([2.0, 0.3]), np.random.default_rng(1), receiver()
     )
     within = sosfilt(
         butter(8, [300.0, 8000.0], "bandpass", fs=RATE, output="sos"), made, axis=1
@@ -104,7 +111,7 @@ def test_band_power_of_a_tone():
 def test_shares_are_of_the_power():
     parts = [{**KINDS["white"], "share": 3.0}, {**KINDS["hum"], "share": 1.0}]
     made = read_noise({"parts": parts, "band_hz": None}).make(
-        np.ones(2), np.random.default_rng(2), place()
+        np.ones(2), np.random.default_rng(2), receiver()
     )
     lines = 2.0 * density(made)[:, [50, 100, 150]] / 51200**2
     assert_allclose(lines.sum(axis=1), 0.25, rtol=0.02, atol=0)
@@ -112,21 +119,24 @@ def test_shares_are_of_the_power():
 
 
 def test_pink_falls_by_three_decibel_an_octave():
-    made = noise("pink").make(np.ones(2), np.random.default_rng(3), place())
+    made = noise("pink").make(np.ones(2), np.random.default_rng(3), receiver())
     octaves = [density(made)[:, low : 2 * low].mean() for low in (64, 256, 1024, 4096)]
     assert_allclose(np.array(octaves[1:]) / octaves[:-1], 0.25, rtol=0.15, atol=0)
 
 
 def test_impulsive_has_a_high_kurtosis_and_rings_where_it_says():
-    made = noise("impulsive").make(np.ones(2), np.random.default_rng(4), place())
+    made = noise("impulsive").make(np.ones(2), np.random.default_rng(4), receiver())
     assert np.all(np.mean(made**4, axis=1) > 20.0)
     assert abs(np.argmax(density(made).sum(axis=0)) - 3000) < 200
 
 
 def test_another_machine_has_its_orders_and_nothing_else():
-    made = noise("machine").make(np.ones(2), np.random.default_rng(5), place())
-    orders = [*range(1, 4), *(3.6 * k + s for k in range(1, 5) for s in (-1, 0, 1)),
-              *(31 * k + s for k in range(1, 4) for s in (-1, 0, 1))]  # fmt: skip
+    made = noise("machine").make(np.ones(2), np.random.default_rng(5), receiver())
+    orders = [
+        *range(1, 4),
+        *(3.6 * k + s for k in range(1, 5) for s in (-1, 0, 1)),
+        *(31 * k + s for k in range(1, 4) for s in (-1, 0, 1)),
+    ]
     lines = density(made).sum(axis=0)
     ours = lines[[round(25 * order) for order in orders]]
     assert np.all(ours > 0.0)
@@ -137,7 +147,7 @@ def test_background_takes_a_stretch(tmp_path):
     recording = np.random.default_rng(6).standard_normal((2, 5000))
     part = background(tmp_path / "two.csv", recording, names=("a", "b"))
     made = read_noise({"parts": [part], "band_hz": None}).make(
-        np.ones(2), np.random.default_rng(7), place(1000)
+        np.ones(2), np.random.default_rng(7), receiver(1000)
     )
     starts = [
         int(np.argmax(np.correlate(recording[k], made[k], "valid"))) for k in range(2)
@@ -169,7 +179,7 @@ def test_spectrum_has_the_density_of_its_file(tmp_path):
         names=("a", "b"),
     )
     noise = read_noise({"parts": [part], "band_hz": None})
-    made = noise.make(np.array([2.0, 0.3]), np.random.default_rng(3), place())
+    made = noise.make(np.array([2.0, 0.3]), np.random.default_rng(3), receiver())
     assert_allclose(np.var(made, axis=1), [2.0, 0.3], rtol=1e-9, atol=0)
     found = density(made)
     flat, high = found[:, 200:900].mean(axis=1), found[:, 3000:9000].mean(axis=1)
@@ -177,76 +187,54 @@ def test_spectrum_has_the_density_of_its_file(tmp_path):
         high[0] / flat[0], 9.0, rtol=0.15
     )  # straight between the lines, held beyond the last
     assert_allclose(found[0, 1400:1600].mean() / flat[0], 5.0, rtol=0.25)
-    other = noise.make(np.array([2.0, 0.3]), np.random.default_rng(4), place())
+    other = noise.make(np.array([2.0, 0.3]), np.random.default_rng(4), receiver())
     assert abs(np.corrcoef(made[0], other[0])[0, 1]) < 0.05
 
 
-def test_refused_spectra(tmp_path):
-    lines, good = [100.0, 1000.0], [1.0, 2.0]
+def test_refused_files(tmp_path):
+    """More of files in test_measured_path."""
+    lines, good, both = [100.0, 1000.0], [1.0, 2.0], ("a", "b")
+    rng = np.random.default_rng(8)
+    long = rng.standard_normal((1, 2000))
+
+    def of_spectrum(name, *columns, names=("background",)):
+        return spectrum(tmp_path / name, columns, names=names)
+
     cases = {
-        "no column b": ([lines, good], ("a",)),
-        "unknown column c": ([lines, good, good, good], ("a", "b", "c")),
-        "must rise": ([[1000.0, 100.0], good], ("background",)),
-        "must not be negative, nor 0 throughout": (
-            [lines, [1.0, -1.0]],
-            ("background",),
-        ),
-        "nor 0 throughout": ([lines, [0.0, 0.0], good], ("a", "b")),
-        "is no finite number": ([lines, [1.0, np.nan]], ("background",)),
-        "too short": ([[100.0], [1.0]], ("background",)),
+        "no column b": of_spectrum("a", lines, good, names=("a",)),
+        "must rise": of_spectrum("b", lines[::-1], good),
+        "must not be negative": of_spectrum("c", lines, [1.0, -1.0]),
+        "nor 0 throughout": of_spectrum("d", lines, [0.0, 0.0], good, names=both),
+        "no column a": background(tmp_path / "e", long, names=("c",)),
+        "samples a second": background(tmp_path / "f", long, rate=8000),
+        "one value throughout": background(tmp_path / "g", np.ones((1, 2000))),
+        "too short: 900 rows, at least 1000": background(tmp_path / "h", long[:, :900]),
     }
-    for number, (text, (columns, names)) in enumerate(cases.items()):
-        part = spectrum(tmp_path / f"{number}.csv", columns, names=names)
+    for text, part in cases.items():
+        noise = read_noise({"parts": [part], "band_hz": None})
         with pytest.raises(ConfigError, match=re.escape(text)) as caught:
-            read_noise({"parts": [part], "band_hz": None}).make(
-                np.ones(2), np.random.default_rng(1), place()
-            )
+            noise.make(np.ones(2), rng, receiver(1000))
         assert "\n" not in str(caught.value)
 
 
-def test_refused_backgrounds(tmp_path):
-    rng = np.random.default_rng(8)
-    cases = {
-        "too short: 900 rows, at least 1000": background(
-            tmp_path / "a.csv", rng.standard_normal((1, 900))
-        ),
-        "no column a": background(
-            tmp_path / "b.csv", rng.standard_normal((1, 2000)), names=("c",)
-        ),
-        "samples a second": background(
-            tmp_path / "c.csv", rng.standard_normal((1, 2000)), rate=8000
-        ),
-        "one value throughout": background(tmp_path / "d.csv", np.ones((1, 2000))),
-        "row 2, column background is no finite number": background(
-            tmp_path / "e.csv", np.full((1, 2000), np.nan)
-        ),
-    }
-    for text, part in cases.items():
-        found = read_noise({"parts": [part], "band_hz": None})
-        with pytest.raises(ConfigError, match=re.escape(text)):
-            found.make(np.ones(2), rng, place(1000))
+WHITE = [KINDS["white"]]
 
 
 @pytest.mark.parametrize(
     ("parts", "band", "text"),
     [
-        ([], None, "sensing.noise.parts = [] has no part"),
-        ("white", None, "must be a list"),
-        (
-            [{"kind": "brown", "share": 1}],
-            None,
-            "sensing.noise.parts[0]: kind = 'brown'; allowed: white, pink",
-        ),
+        ([], None, ".parts = [] has no part"),
+        ("white", None, ".parts = 'white' must be a list"),
+        ([{"kind": "brown"}], None, ".parts[0]: kind = 'brown'; allowed: white, pink"),
         (
             [{"kind": "white", "share": 0.0}],
             None,
-            "sensing.noise.parts[0].share = 0 must be positive",
+            ".parts[0].share = 0 must be positive",
         ),
-        ([{"kind": "white"}], None, "sensing.noise.parts[0]: missing share"),
         (
-            [KINDS["white"], {"kind": "pink", "share": 1, "lowest": 2}],
+            [*WHITE, {**KINDS["pink"], "lowest": 2}],
             None,
-            "write it as 'lowest_hz'",
+            ".parts[1]: 'lowest' has the wrong unit",
         ),
         (
             [{**KINDS["impulsive"], "damping_ratio": 2.0}],
@@ -258,17 +246,33 @@ def test_refused_backgrounds(tmp_path):
             None,
             "frequency_scatter = 0.9 must lie in 0..0.5",
         ),
+        (WHITE, [100.0], ".band_hz = [100.0] must be [low, high]"),
         (
-            [KINDS["white"]],
-            [100.0],
-            "sensing.noise.band_hz = [100.0] must be [low, high]",
+            WHITE,
+            [200.0, 100.0],
+            ".band_hz = [200.0, 100.0] must be [low, high], ordered",
         ),
-        ([KINDS["white"]], [200.0, 100.0], "must be [low, high], ordered"),
-        ([KINDS["white"]], "all", "must be [low, high] in Hz, or null"),
-        ([KINDS["hum"]], [100.0, 200.0], "tones alone may miss the band"),
+        (WHITE, "all", ".band_hz = 'all' must be [low, high] in Hz, or null"),
+        ([KINDS["hum"]], [100.0, 200.0], ".band_hz: tones alone may miss the band"),
     ],
 )
-def test_mistakes(parts, band, text):
+def test_refusals(parts, band, text):
     with pytest.raises(ConfigError, match=re.escape(text)) as caught:
         read_noise({"parts": parts, "band_hz": band})
-    assert "\n" not in str(caught.value)
+    assert str(caught.value).startswith("sensing.noise")
+
+
+def test_offsets_make_a_sensor_louder(machine, xiamen):
+    changes = {"sensing.channels": ["pinion_x", "pinion_y"]}
+    offset = {"sensing.noise.offsets_db": [3.0, -7.0]}
+    sensing = machine(changes | offset).sensing
+    levels = 10.0 * np.log10(sensing.noise_factor(20.0))
+    assert_allclose(levels, [-17.0, -27.0], rtol=0, atol=1e-9)
+    assert np.all(xiamen.sensing.noise_factor(13.7) == 10.0 ** (-13.7 / 10.0))
+    with pytest.raises(ConfigError, match="has 2 values for 4 sensors"):
+        machine(offset)
+    for value in ("loud", ["x"], [True], [float("nan")]):
+        with pytest.raises(
+            ConfigError, match=r"must be a list of numbers, one a sensor"
+        ):
+            read_noise({"parts": WHITE, "band_hz": None, "offsets_db": value})

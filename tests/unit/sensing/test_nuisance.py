@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,19 +14,54 @@ from gensig.sensing.nuisance import KINDS, draw_tones, read_nuisances
 from gensig.sensing.tones import SENSE
 
 PARTS = {
-    "unbalance": {"kind": "unbalance", "gear": "pinion", "iso21940_grade": 2.5, "used_share": [1.0, 1.0],
-                  "rated_speed_rpm": 3000, "rotor_mass_kg": 2.0},
-    "coupling_misalignment": {"kind": "coupling_misalignment", "gear": "pinion", "force_share": [0.01, 0.01],
-                              "order_shares": [0.5, 1.0, 0.3], "torque_share": [1e-3, 1e-3]},
-    "looseness": {"kind": "looseness", "gear": "wheel", "force_share": [0.01, 0.01], "half_share": [0.5, 0.5],
-                  "n_orders": 3, "harmonic_exponent": 1.0},
-    "bearing": {"kind": "bearing", "gear": "pinion", "n_balls": 9, "ball_diameter_mm": 7.94, "pitch_diameter_mm": 39.04,
-                "contact_angle_deg": 0, "waviness_um": [0.1, 0.1], "slip": [0.01, 0.01], "n_harmonics": 2,
-                "harmonic_exponent": 1.0},
-    "neighbour_mesh": {"kind": "neighbour_mesh", "gear": "wheel", "n_teeth": 25, "n_teeth_mate": 72,
-                       "base_radius_mm": 29.4, "line_of_action_deg": 60, "dynamic_share": [0.01, 0.01],
-                       "n_harmonics": 2, "harmonic_exponent": 1.0, "sideband_share": [0.2, 0.2]},
-}  # fmt: skip
+    "unbalance": {
+        "kind": "unbalance",
+        "gear": "pinion",
+        "iso21940_grade": 2.5,
+        "used_share": [1.0, 1.0],
+        "rated_speed_rpm": 3000,
+        "rotor_mass_kg": 2.0,
+    },
+    "coupling_misalignment": {
+        "kind": "coupling_misalignment",
+        "gear": "pinion",
+        "force_share": [0.01, 0.01],
+        "order_shares": [0.5, 1.0, 0.3],
+        "torque_share": [1e-3, 1e-3],
+    },
+    "looseness": {
+        "kind": "looseness",
+        "gear": "wheel",
+        "force_share": [0.01, 0.01],
+        "half_share": [0.5, 0.5],
+        "n_orders": 3,
+        "harmonic_exponent": 1.0,
+    },
+    "bearing": {
+        "kind": "bearing",
+        "gear": "pinion",
+        "n_balls": 9,
+        "ball_diameter_mm": 7.94,
+        "pitch_diameter_mm": 39.04,
+        "contact_angle_deg": 0,
+        "waviness_um": [0.1, 0.1],
+        "slip": [0.01, 0.01],
+        "n_harmonics": 2,
+        "harmonic_exponent": 1.0,
+    },
+    "neighbour_mesh": {
+        "kind": "neighbour_mesh",
+        "gear": "wheel",
+        "n_teeth": 25,
+        "n_teeth_mate": 72,
+        "base_radius_mm": 29.4,
+        "line_of_action_deg": 60,
+        "dynamic_share": [0.01, 0.01],
+        "n_harmonics": 2,
+        "harmonic_exponent": 1.0,
+        "sideband_share": [0.2, 0.2],
+    },
+}
 
 
 def draw(dynamics, *parts, unit=1, specimen=1, record=1):
@@ -64,7 +100,8 @@ def test_bearing_orders_are_those_of_the_textbook():
 
 
 def test_the_force_of_an_unbalance_of_grade_g2_5(dynamics):
-    """2 kg at 3000 r/min: e = 2.5 mm/s / 314.16 rad/s = 7.958 um, and 2 kg x 7.958 um x (188.5 rad/s)^2 = 0.5655 N."""
+    """2 kg at 3000 r/min: e = 2.5 mm/s / 314.16 rad/s = 7.958 um, and 2 kg x 7.958 um x (188.5
+    rad/s)^2 = 0.5655 N."""
     (tones,) = draw(dynamics, PARTS["unbalance"])
     assert tones.follows == "speed_squared"
     assert_allclose(np.abs(tones.force), [[0.5655, 0.5655, 0.0]], rtol=1e-4, atol=0)
@@ -90,9 +127,11 @@ def test_an_unbalance_turns_by_the_sense_of_its_gear(dynamics, gear, sense):
 
 
 def test_the_senses_are_those_of_the_equations_of_motion():
-    """Moment of a force (F_f, F) at the contact, arms (R_p, -rho_1): the pinion's equation has -F R_p - rho_1 F_f.
+    """Moment of a force (F_f, F) at the contact, arms (R_p, -rho_1): the pinion's equation has -F
+    R_p - rho_1 F_f.
 
-    With x to y as positive the moment is arm_x F - arm_y F_f = R_p F + rho_1 F_f, so the pinion turns from y to x.
+    With x to y as positive the moment is arm_x F - arm_y F_f = R_p F + rho_1 F_f, so the pinion
+    turns from y to x.
     """
     radius, rho, along, friction = 0.02, 0.005, 100.0, 7.0
     from_x_to_y = radius * along + rho * friction
@@ -222,50 +261,59 @@ def test_ranges_are_filled_and_kept(dynamics):
     assert free * 0.98 <= min(cages) < max(cages) <= free
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_numbers_stay_within_their_limits(kind):
+    cls = KINDS[kind]
+    (part,) = read_nuisances([PARTS[kind]])
+    for name, (low, high) in cls.limits.items():
+        for value in (low - 1, 2 * high):
+            with pytest.raises(ConfigError, match=rf"^{name}.* must lie in"):
+                replace(part, **{name: value})
+    for name, (low, high) in cls.ranges.items():
+        for ends in ((low - 1, high), (high, low), (low, 2 * high), (low,)):
+            with pytest.raises(ConfigError, match=rf"^{name}.* must be two ordered"):
+                replace(part, **{name: ends})
+
+
 @pytest.mark.parametrize(
-    ("kind", "change", "told"),
+    ("kind", "change", "text"),
     [
-        ("unbalance", {"gear": "ring"}, "sensing.nuisances[0].gear = 'ring'; allowed: pinion, wheel"),
-        ("unbalance", {"iso21940_grade": 0}, "iso21940_grade = 0 must lie in 0.1..4000"),
-        ("unbalance", {"used_share": [0.5, 0.1]}, "used_share = [0.5, 0.1] must be two ordered numbers, [low, high]"),
-        ("unbalance", {"used_share": 0.5}, "used_share = 0.5 is not a list of numbers"),
-        ("unbalance", {"rated_speed_rpm": -1}, "rated_speed_rpm = -1 must lie in 1..1e+06"),
-        ("unbalance", {"rotor_mass_kg": 0}, "rotor_mass_kg = 0 must lie in 0.001..100000"),
-        ("coupling_misalignment", {"force_share": [0.0, 0.1]}, "force_share = [0.0, 0.1] must be two ordered"),
-        ("coupling_misalignment", {"order_shares": []}, "number of order_shares = 0 must lie in 1..50"),
-        ("coupling_misalignment", {"order_shares": [-1.0]}, "order_shares = -1 must lie in 0..100"),
-        ("looseness", {"n_orders": 0}, "n_orders = 0 must lie in 1..50"),
-        ("looseness", {"harmonic_exponent": -1}, "harmonic_exponent = -1 must lie in 0..10"),
-        ("bearing", {"n_balls": 2}, "n_balls = 2 must lie in 3..200"),
-        ("bearing", {"ball_diameter_mm": 20}, "9 balls of ball_diameter_mm = 20 do not fit on pitch_diameter_mm"),
-        ("bearing", {"contact_angle_deg": 70}, "contact_angle_deg = 70 must lie in 0..60"),
-        ("bearing", {"waviness_um": [0, 1]}, "waviness_um = [0.0, 1.0] must be two ordered numbers"),
-        ("bearing", {"slip": [0.0, 0.5]}, "slip = [0.0, 0.5] must be two ordered numbers, [low, high], in 0..0.2"),
-        ("bearing", {"waviness_mm": [0.1, 0.1]}, "'waviness_mm' has the wrong unit; write it as 'waviness_um'"),
-        ("neighbour_mesh", {"n_teeth": 2.5}, "n_teeth = 2.5 is not a whole number"),
-        ("neighbour_mesh", {"n_teeth_mate": 1}, "n_teeth_mate = 1 must lie in 5..1000"),
-        ("neighbour_mesh", {"sideband_share": [0.0, 2.0]}, "sideband_share = [0.0, 2.0] must be two ordered"),
-        ("neighbour_mesh", {"kind": "neighbor"}, "sensing.nuisances[0]: kind = 'neighbor'; allowed: unbalance"),
+        ("unbalance", {"gear": "ring"}, ".gear = 'ring'; allowed: pinion, wheel"),
+        (
+            "unbalance",
+            {"rated_speed_rpm": -1},
+            ".rated_speed_rpm = -1 must lie in 1..1e+06",
+        ),
+        (
+            "coupling_misalignment",
+            {"order_shares": []},
+            ".number of order_shares = 0 must lie",
+        ),
+        (
+            "coupling_misalignment",
+            {"order_shares": [-1.0]},
+            ".order_shares = -1 must lie in 0..100",
+        ),
+        (
+            "bearing",
+            {"ball_diameter_mm": 20},
+            ".9 balls of ball_diameter_mm = 20 do not fit on",
+        ),
+        ("bearing", {"waviness_mm": [0.1, 0.1]}, ": 'waviness_mm' has the wrong unit"),
+        ("neighbour_mesh", {"n_teeth": 2.5}, ".n_teeth = 2.5 is not a whole number"),
+        (
+            "neighbour_mesh",
+            {"kind": "neighbor"},
+            ": kind = 'neighbor'; allowed: unbalance",
+        ),
     ],
-)  # fmt: skip
-def test_bad_input_is_told_in_one_line(kind, change, told):
-    with pytest.raises(ConfigError, match=re.escape(told)) as caught:
+)
+def test_bad_input_names_the_part(kind, change, text):
+    with pytest.raises(ConfigError, match=re.escape(f"sensing.nuisances[0]{text}")):
         read_nuisances([{**PARTS[kind], **change}])
-    assert str(caught.value).startswith("sensing.nuisances[0]")
-    assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("values", [None, "bearing", {"kind": "bearing"}, 3])
+@pytest.mark.parametrize("values", [None, "bearing", {"kind": "bearing"}])
 def test_only_a_list_is_a_list(values):
     with pytest.raises(ConfigError, match="must be a list of parts"):
         read_nuisances(values)
-
-
-def test_a_missing_key_is_named():
-    part = {
-        key: value for key, value in PARTS["looseness"].items() if key != "half_share"
-    }
-    with pytest.raises(
-        ConfigError, match=re.escape("sensing.nuisances[1]: missing half_share")
-    ):
-        read_nuisances([PARTS["unbalance"], part])

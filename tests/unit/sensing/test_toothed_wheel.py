@@ -98,17 +98,6 @@ def test_teeth_out_of_place_show_orders_that_the_shaft_has_not():
     assert max(by_seed) > 0.5 * np.radians(0.2) * MEAN
 
 
-def test_each_machine_has_its_own_wheel():
-    wheel = replace(PERFECT, tooth_error=np.radians(0.02))
-    one, same, other = disc_of(wheel, 1), disc_of(wheel, 1), disc_of(wheel, 2)
-    assert_allclose(one.places, same.places, atol=0)
-    assert np.max(np.abs(one.places - other.places)) > 1e-4
-    speeds = [
-        instantaneous_speed(wheel, disc, MEAN * TIME, RATE) for disc in (one, other)
-    ]
-    assert np.std(speeds[0] - speeds[1]) > 1e-3 * MEAN
-
-
 def test_passages_are_where_the_teeth_are():
     disc = Disc(index=0.3, places=np.radians([0.0, 91.0, 180.0, 270.0]))
     wheel = replace(PERFECT, n_teeth=4)
@@ -132,25 +121,18 @@ def test_a_shaft_that_turns_back_or_too_few_teeth_are_refused():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"n_teeth": 3}, "toothed_wheel.n_teeth = 3 must lie in 4..1000"),
+        ({"n_teeth": 3}, "n_teeth = 3 must lie in 4..1000"),
         (
             {"eccentricity_error": 0.1},
-            "toothed_wheel.eccentricity_error_deg = 5.72958 must lie in 0..5",
+            "eccentricity_error_deg = 5.72958 must lie in 0..5",
         ),
-        (
-            {"tooth_error": 0.01},
-            "toothed_wheel.tooth_error_deg = 0.572958 must lie in 0..0.225",
-        ),
-        (
-            {"tooth_error": -0.01},
-            "toothed_wheel.tooth_error_deg = -0.572958 must lie in",
-        ),
+        ({"tooth_error": 0.01}, "tooth_error_deg = 0.572958 must lie in 0..0.225"),
         (
             {"clock_frequency": 100.0},
-            "toothed_wheel.clock_frequency_hz = 100 must be at least 10000",
+            "clock_frequency_hz = 100 must lie in 10000..1e+12",
         ),
     ],
 )
-def test_wheels_that_cannot_be_are_refused(change, message):
-    with pytest.raises(ConfigError, match=re.escape(message)):
+def test_values_out_of_range(change, message):
+    with pytest.raises(ConfigError, match=re.escape(f"toothed_wheel.{message}")):
         replace(PERFECT, **change)

@@ -31,7 +31,8 @@ every = pytest.mark.parametrize("name", OF_ONE_TURN)
 
 
 def gear(turn=TURN):
-    """A mesh with sidebands, unbalance, and orders that do not belong to it; all below a sixteenth of the samples."""
+    """A mesh with sidebands, unbalance, and orders that do not belong to it; all below a sixteenth
+    of the samples."""
     mesh = (
         5 * np.cos(TEETH * turn + 1)
         + 2 * np.cos(2 * TEETH * turn)
@@ -166,7 +167,8 @@ def test_moments_of_gaussian_noise():
 
 
 def test_moments_of_one_impact():
-    """With n samples a single one has a moment of n to the power of half its order less one, but for its mean."""
+    """With n samples a single one has a moment of n to the power of half its order less one, but
+    for its mean."""
     p = 1.0 / PER_TURN
     for indicator, half in ((fm4, 2), (m6a, 3), (m8a, 4)):
         exact = ((1 - p) ** (2 * half) * p + p ** (2 * half) * (1 - p)) / (

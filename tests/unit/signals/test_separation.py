@@ -1,4 +1,5 @@
-"""Taking a mesh apart by the teeth of both gears: each gear gets its own part, whatever the other does."""
+"""Taking a mesh apart by the teeth of both gears: each gear gets its own part, whatever the other
+does."""
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ MESH_HZ = 100.0  # 64 samples a passage
 
 
 def a_pair(n_passages, *, teeth=TEETH, noise=0.0, seed=0):
-    """Signal (2, sample) and its parts: sines of three orders of the mesh, of another size on every tooth."""
+    """Signal (2, sample) and its parts: sines of three orders of the mesh, of another size on
+    every tooth."""
     rng = np.random.default_rng(seed)
     sizes = [rng.standard_normal((z, 2, 3)) for z in teeth]
     sizes = [size - size.mean(axis=0) for size in sizes]
@@ -56,7 +58,8 @@ def test_every_part_comes_back():
 
 
 def test_neither_gear_leaks_into_the_other_as_it_does_into_an_average():
-    """In passages that are no whole number of the other's turns an average keeps a share of them."""
+    """In passages that are no whole number of the other's turns an average keeps a share of
+    them."""
     signal, (driving, _, _) = a_pair(44)
     own = separate(signal).driving
     averaged = time_synchronous_average(

@@ -15,7 +15,7 @@ def noise(seed=0, shape=()):
     return np.random.default_rng(seed).standard_normal((*shape, N_SAMPLES))
 
 
-@pytest.mark.parametrize("window", [64, 65, 100, 500])
+@pytest.mark.parametrize("window", [65, 500])
 def test_gaussian_noise_is_zero_in_every_line_and_scatters_as_stated(window):
     frequency, kurtosis = spectral_kurtosis(noise(shape=(20,)), RATE, window)
     spread = 1.2 * np.sqrt(window / N_SAMPLES)
@@ -36,7 +36,8 @@ def test_a_tone_is_minus_one():
 
 
 def test_noise_switched_on_for_a_share_of_the_time():
-    """Gaussian noise whose power A is random: 2 <A^2> / <A>^2 - 2, but for the windows that see both states."""
+    """Gaussian noise whose power A is random: 2 <A^2> / <A>^2 - 2, but for the windows that see
+    both states."""
     share, period = 0.2, 5000
     x = noise(1) * (np.arange(N_SAMPLES) % period < share * period)
     _, kurtosis = spectral_kurtosis(x, RATE, WINDOW)

@@ -1,4 +1,5 @@
-"""The mesh of a wandering speed is followed to a fraction of a tooth; noise and other speeds are not followed."""
+"""The mesh of a wandering speed is followed to a fraction of a tooth; noise and other speeds are
+not followed."""
 
 import numpy as np
 import pytest
@@ -11,10 +12,13 @@ from gensig.signals.speed_ridge import mesh_frequency_course, wandering_mesh_cyc
 RATE = 25600.0
 TEETH = Teeth(driving=23, driven=57)
 SPEED = 1500.0  # r/min
+RATIO = TEETH.driving / TEETH.driven
+ORDERS = {0.0: 1.0, 1.0: 0.15, -1.0: 0.15, RATIO: 0.15, -RATIO: 0.15}
 
 
 def recording(depth, *, noise=1.0, duration=3.0, seed=0):
-    """Mesh of four harmonics with sidebands of both shafts, and its cycles, at a speed that swings by a share."""
+    """Mesh of four harmonics with sidebands of both shafts, and its cycles, at a speed that swings
+    by a share."""
     rng = np.random.default_rng(seed)
     time = np.arange(round(duration * RATE)) / RATE
     swing = 2 * np.pi * 0.7
@@ -22,22 +26,11 @@ def recording(depth, *, noise=1.0, duration=3.0, seed=0):
     cycles = TEETH.driving * turned
     signal = np.zeros((2, time.size))
     for harmonic in range(1, 5):
-        for orders in (
-            0.0,
-            1.0,
-            -1.0,
-            TEETH.driving / TEETH.driven,
-            -TEETH.driving / TEETH.driven,
-        ):
-            height = (
-                (1.0 if orders == 0 else 0.15)
-                / harmonic
-                * rng.uniform(0.5, 1.5, (2, 1))
-            )
+        for orders, share in ORDERS.items():
+            height = share / harmonic * rng.uniform(0.5, 1.5, (2, 1))
             phase = rng.uniform(0, 2 * np.pi, (2, 1))
-            signal += height * np.cos(
-                2 * np.pi * (harmonic * cycles + orders * turned) + phase
-            )
+            angle = 2 * np.pi * (harmonic * cycles + orders * turned)
+            signal += height * np.cos(angle + phase)
     signal += noise * rng.standard_normal(signal.shape)
     return Recording(
         sensors=("a", "b"), acceleration=signal, sampling_rate=RATE
@@ -55,8 +48,9 @@ def followed(made, speed_rpm=SPEED):
     )
 
 
-@pytest.mark.parametrize("depth", [0.0, 0.003, 0.01, 0.02])
-@pytest.mark.parametrize("stated", [0.995, 1.0, 1.005])
+@pytest.mark.parametrize(
+    ("depth", "stated"), [(0.0, 1.0), (0.003, 1.005), (0.02, 0.995)]
+)
 def test_cycles_are_found_to_a_fraction_of_a_tooth(depth, stated):
     made, cycles = recording(depth)
     error = followed(made, stated * SPEED) - cycles
@@ -65,13 +59,13 @@ def test_cycles_are_found_to_a_fraction_of_a_tooth(depth, stated):
 
 
 def test_a_steady_line_would_miss_it():
-    """What the test above would say of an answer that does not follow."""
+    """The test above can fail: an answer that does not follow is far off."""
     _, cycles = recording(0.01)
     steady = np.arange(cycles.size) / RATE * SPEED / 60 * TEETH.driving
     assert np.std(steady - cycles) > 0.5
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_noise_is_not_followed(seed):
     noise = np.random.default_rng(seed).standard_normal(
         (1 + seed % 3, round((0.6 + seed % 4) * RATE))

@@ -1,4 +1,5 @@
-"""Levels by tooth: the tooth that changed is named, wherever the record starts and however loud the sensor is."""
+"""Levels by tooth: the tooth that changed is named, wherever the record starts and however loud
+the sensor is."""
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ RATE, ROTATION, TEETH, BAND = 10_000.0, 5.0, 20, (1000.0, 3000.0)
 
 
 def rattle(*, start=0.0, gains=None, seconds=4.0, seed=0):
-    """Noise whose amplitude follows the tooth in mesh; the first sample is `start` teeth after tooth 0 came in."""
+    """Noise whose amplitude follows the tooth in mesh; the first sample is `start` teeth after
+    tooth 0 came in."""
     time = np.arange(round(seconds * RATE)) / RATE
     tooth = np.floor(time * ROTATION * TEETH + start).astype(int) % TEETH
     gains = np.ones(TEETH) if gains is None else gains

@@ -40,21 +40,36 @@ def drifting(scatter, correlation_time, duration, seed):
 def measured(*, duration=2.4, seed=5, profile=None, snr=SNR, grade=GRADE, path=True):
     """A healthy machine of known speed, grade, path and noise."""
     words = [
-        f"gear.wheel.n_teeth={TEETH[1]}", "gear.wheel.bore_radius_mm=10", "gear.wheel.mass_kg=null",
-        "gear.wheel.inertia_kg_m2=null", f"operating.speed_rpm={SPEED}", f"operating.duration_s={duration}",
-        f"sensing.sampling_rate_hz={RATE}", "sensing.channels=[pinion_y,wheel_y]", "sensing.gain_scatter=0",
-        "solver.oversampling=10", "solver.max_error=null", f"quality.iso1328_grade={grade}", f"seed={seed}",
-        "quality.used_share_low=0.6", "quality.used_share_high=0.6",
-        f"sensing.snr_db={'null' if snr is None else snr}", "dataset.store_shaft_angle=true",
-        "plan.n_records=1", "plan.n_units=1",
-    ]  # fmt: skip
+        f"gear.wheel.n_teeth={TEETH[1]}",
+        "gear.wheel.bore_radius_mm=10",
+        "gear.wheel.mass_kg=null",
+        "gear.wheel.inertia_kg_m2=null",
+        f"operating.speed_rpm={SPEED}",
+        f"operating.duration_s={duration}",
+        f"sensing.sampling_rate_hz={RATE}",
+        "sensing.channels=[pinion_y,wheel_y]",
+        "sensing.gain_scatter=0",
+        "solver.oversampling=10",
+        "solver.max_error=null",
+        f"quality.iso1328_grade={grade}",
+        f"seed={seed}",
+        "quality.used_share_low=0.6",
+        "quality.used_share_high=0.6",
+        f"sensing.snr_db={'null' if snr is None else snr}",
+        "dataset.store_shaft_angle=true",
+        "plan.n_records=1",
+        "plan.n_units=1",
+    ]
     config = read_request(words).config
     config = config.with_keys("operating", speed_profile=profile)
     if path:
         modal = {
-            "kind": "modal", "n_modes": [6, 6], "natural_frequency_hz": [600.0, 8000.0], "damping_ratio": [0.05, 0.1],
+            "kind": "modal",
+            "n_modes": [6, 6],
+            "natural_frequency_hz": [600.0, 8000.0],
+            "damping_ratio": [0.05, 0.1],
             "transmissibility": 0.5,
-        }  # fmt: skip
+        }
         config = config.with_keys("sensing", path=modal, sensors=["case", "lid"])
     record = simulate_record(config, make_plan(config).record(0))
     assert record.values.get("status") != "failed"

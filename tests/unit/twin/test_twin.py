@@ -26,7 +26,8 @@ def known():
 def twin(known, tmp_path_factory):
     """Folder of the twin, and what the command printed."""
     folder = tmp_path_factory.mktemp("twin")
-    np.savez(folder / "healthy.npz", acceleration=known.signal)
+    file = str(folder / "healthy.npz")
+    np.savez(file, acceleration=known.signal)
     words = [
         "--teeth",
         *map(str, TEETH),
@@ -35,12 +36,7 @@ def twin(known, tmp_path_factory):
         "--rate",
         f"{RATE:g}",
     ]
-    assert (
-        main(
-            ["twin", str(folder / "healthy.npz"), *words, "--out", str(folder / "mine")]
-        )
-        == 0
-    )
+    assert main(["twin", file, *words, "--out", str(folder / "mine")]) == 0
     return folder / "mine"
 
 
@@ -115,26 +111,9 @@ def test_nothing_measured_is_copied(known, twin):
 
 def test_faults_are_generated_for_it(twin, tmp_path):
     out = tmp_path / "set"
-    words = [
-        "plan.n_records=4",
-        "plan.n_units=1",
-        "operating.duration_s=0.2",
-        "executor.n_workers=1",
-    ]
-    assert (
-        main(
-            [
-                "generate",
-                "--quiet",
-                "--config-dir",
-                str(twin),
-                "experiment=mine",
-                *words,
-                f"out={out}",
-            ]
-        )
-        == 0
-    )
+    plan = ("plan.n_records=4", "plan.n_units=1", "operating.duration_s=0.2")
+    source = ("--config-dir", str(twin), "experiment=mine", "executor.n_workers=1")
+    assert main(["generate", "--quiet", *source, *plan, f"out={out}"]) == 0
     data = open_dataset(out)
     names = [str(name) for name in data.column("label_name")]
     assert sorted(names) == ["crack", "healthy", "missing_tooth", "pitting"]
@@ -166,7 +145,8 @@ class TestMotion:
 
 
 def test_minimum_phase_of_a_filter_is_the_filter():
-    """Two poles and two zeros inside the unit circle are of minimum phase: their size alone gives them back."""
+    """Two poles and two zeros inside the unit circle are of minimum phase: their size alone gives
+    them back."""
     from scipy.signal import freqz, zpk2tf
 
     zeros, poles = 0.9 * np.exp([1.2j, -1.2j]), 0.95 * np.exp([0.5j, -0.5j])

@@ -1,4 +1,4 @@
-"""The data card is read by those it is for: Croissant's validator, Hugging Face, and people."""
+"""Data cards, read by the Croissant validator, by Hugging Face and by people."""
 
 import json
 from pathlib import Path
@@ -91,8 +91,16 @@ def test_croissant_lists_every_file_with_its_digest(folder: Path) -> None:
 def test_responsible_ai_fields_state_facts_and_caveats(tmp_path: Path) -> None:
     folder = build(tmp_path / "a", make_plan(), failed=12)
     content = json.loads((folder / "croissant.json").read_text(encoding="utf-8"))
-    for field in ("dataCollection", "dataLimitations", "dataBiases", "dataUseCases", "personalSensitiveInformation",
-                  "dataSocialImpact", "dataAnnotationProtocol", "dataReleaseMaintenancePlan"):  # fmt: skip
+    for field in (
+        "dataCollection",
+        "dataLimitations",
+        "dataBiases",
+        "dataUseCases",
+        "personalSensitiveInformation",
+        "dataSocialImpact",
+        "dataAnnotationProtocol",
+        "dataReleaseMaintenancePlan",
+    ):
         assert content[f"rai:{field}"], field
     assert "crack 12, healthy 12, pitting 12" in content["rai:dataBiases"][0]
     assert "1 records failed" in content["rai:dataBiases"][2]

@@ -1,4 +1,4 @@
-"""A picture a class: of a record that stands for it, the same bytes for the same records, and no trap in a name."""
+"""Class figures: chosen record, reproducible bytes, and harmless names."""
 
 import builtins
 import shutil

@@ -1,7 +1,7 @@
 """The page of a data set in headless Chromium: no errors, and each control does what it says.
 
-Needs the package ``playwright`` and a Chromium: ``GENSIG_CHROMIUM=/path/to/chromium``, or one on the path, or the one
-that ``playwright install chromium`` fetches; without them the test is skipped.
+Needs the package ``playwright`` and a Chromium: ``GENSIG_CHROMIUM=/path/to/chromium``, or one on
+the path, or the one that ``playwright install chromium`` fetches; without them the test is skipped.
 """
 
 import os
@@ -91,7 +91,10 @@ def test_it_loads_and_fits(page: Any) -> None:
 
 def test_legends_are_clear_of_the_toolbar(page: Any) -> None:
     """Below the drawing, whose upper edge leaves room for the toolbar."""
-    box = "([plot, part]) => document.querySelector(`#plot-${plot} ${part}`).getBoundingClientRect().toJSON()"
+    box = (
+        "([plot, part]) => document.querySelector(`#plot-${plot} "
+        "${part}`).getBoundingClientRect().toJSON()"
+    )
     legend, drawing, whole = (
         page.evaluate(box, ["indicators", part])
         for part in (".legend", ".nsewdrag", ".main-svg")

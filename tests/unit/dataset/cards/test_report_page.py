@@ -1,4 +1,4 @@
-"""The page of a data set stands alone, says what the files say, and takes no text of theirs for markup."""
+"""The report page: one file, facts from the data set, and no text taken for markup."""
 
 import base64
 import hashlib
@@ -28,7 +28,7 @@ HOSTILE = "</script><img src=x onerror=alert(1)>&amp;"
 
 
 class Page(HTMLParser):
-    """What a browser would make of the page, as far as it matters here."""
+    """Tags, scripts and words of a page, as a browser reads them."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -151,7 +151,8 @@ def test_structure(made: tuple[Path, Page]) -> None:
 
 
 def test_every_option_has_its_data(made: tuple[Path, Page]) -> None:
-    """Each record, channel, parameter and indicator of the drop-downs is in the data of the page."""
+    """Each record, channel, parameter and indicator of the drop-downs is in the data of the
+    page."""
     page, data = made[1], made[1].data
     values = [attributes.get("value") for attributes in page.all("option")]
     assert set(map(str, range(len(data["examples"])))) <= set(values)
@@ -290,11 +291,14 @@ def test_few_of_many_records_are_of_all_classes(made: tuple[Path, Page]) -> None
 
 
 def test_frequencies_of_a_geared_engine() -> None:
-    """A shaft that is none of the gears' is a reference of its own; a gear that turns with the crank is not."""
+    """A shaft that is none of the gears' is a reference of its own; a gear that turns with the
+    crank is not."""
     rotation = Rotation(
-        mesh=np.array([100.0, np.nan]), drive=np.array([5.0, np.nan]), n_teeth={"pinion": 10, "wheel": 40},
+        mesh=np.array([100.0, np.nan]),
+        drive=np.array([5.0, np.nan]),
+        n_teeth={"pinion": 10, "wheel": 40},
         gear=np.array(["wheel", ""]),
-    )  # fmt: skip
+    )
     assert rotation.of(0) == {"mesh": 100.0, "drive": 5.0, "pinion": 10.0, "wheel": 2.5}
     assert set(rotation.of(1).values()) == {None}
     assert [name for name, _ in rotation.references] == [
@@ -441,8 +445,9 @@ def test_levels_are_stated_in_g_and_mm_s_and_loud_ones_are_named(
         table = level_table(data, measured, ["case", "shaft"], units)
         assert table is not None
         assert list(map(list, table.rows)) == [
-            ["healthy", "case", "97", "9.89", "2"], ["crack", "case", "98.2", "10", "4"]
-        ]  # fmt: skip
+            ["healthy", "case", "97", "9.89", "2"],
+            ["crack", "case", "98.2", "10", "4"],
+        ]
         (line,) = loudness(data, measured, ["case", "shaft"], units)
         assert line.startswith("Louder than most published housings: crack. Above 10 g")
         measured.further["velocity_rms"][0, 0] = 12e-3

@@ -1,4 +1,4 @@
-"""A folder whose process is killed while it is being begun is no data set, is known, and is begun anew."""
+"""A folder whose creation was killed is no data set, is recognized, and is begun anew."""
 
 import os
 import signal
@@ -23,7 +23,7 @@ def begin(out: Path) -> None:
         out,
         config=CONFIG,
         overrides=[],
-        plan=make_plan(),
+        plan=make_plan(n_records=9, n_units=3),
         identity=identity,
         seed=7,
         generator_version="0.1.0",
@@ -31,7 +31,8 @@ def begin(out: Path) -> None:
 
 
 def killed_before(number: int, work: Callable[[], None]) -> bool:
-    """Do the work in a process of its own that is killed before its change of this number; False if it has fewer."""
+    """Do the work in a process of its own that is killed before its change of this number; False if
+    it has fewer."""
     process = os.fork()
     if process == 0:
         left = [number]

@@ -1,4 +1,4 @@
-"""No byte of a closed data set changes unnoticed, and only what is meant for hand-written words may be accepted."""
+"""Every changed byte of a closed data set is found; only edits of the card are accepted."""
 
 import hashlib
 import json
@@ -16,9 +16,19 @@ from gensig.dataset.storage.checksums import accept_edits, read_checksums
 from gensig.errors import DatasetError
 
 FILES = (
-    "README.md", "SHA256SUMS", "config.yaml", "croissant.json", "index.h5", "manifest.json", "overrides.yaml",
-    "plan.csv", "run.log", "figures/0-healthy.png", "shards/shard-00000.h5", "splits/by_unit.csv",
-)  # fmt: skip
+    "README.md",
+    "SHA256SUMS",
+    "config.yaml",
+    "croissant.json",
+    "index.h5",
+    "manifest.json",
+    "overrides.yaml",
+    "plan.csv",
+    "run.log",
+    "figures/0-healthy.png",
+    "shards/shard-00000.h5",
+    "splits/by_unit.csv",
+)
 
 
 @pytest.fixture(scope="module")

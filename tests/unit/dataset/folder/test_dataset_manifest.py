@@ -1,4 +1,4 @@
-"""A folder's life: made, filled, closed; nothing that existed is touched, nothing unfinished looks whole."""
+"""Folders: creation, entry of shards and closing; existing files are not touched."""
 
 import json
 import multiprocessing
@@ -67,7 +67,8 @@ def with_backend(name: str) -> dict:
 
 
 def test_a_key_that_came_after_0_9_counts_only_where_it_is_not_at_its_default() -> None:
-    """A folder that was begun without the key goes on, and is another data set than one of another backend."""
+    """A folder that was begun without the key goes on, and is another data set than one of another
+    backend."""
     before = CONFIG | {"solver": {"oversampling": 5}}
     default = with_backend("runge_kutta")
     assert stored_config(default) == before
@@ -83,11 +84,20 @@ def test_a_key_that_came_after_0_9_counts_only_where_it_is_not_at_its_default() 
 
 def test_folder_holds_what_is_needed(folder: Path, plan: Plan) -> None:
     assert set(_tree(folder)) == {
-        "config.yaml", "overrides.yaml", "plan.csv", "manifest.json", "index.h5", "README.md", "croissant.json",
+        "config.yaml",
+        "overrides.yaml",
+        "plan.csv",
+        "manifest.json",
+        "index.h5",
+        "README.md",
+        "croissant.json",
         "SHA256SUMS",
-        "splits/by_unit.csv", "splits/cross_gearbox.csv", "splits/cross_specimen.csv", "splits/random_window_leaky.csv",
+        "splits/by_unit.csv",
+        "splits/cross_gearbox.csv",
+        "splits/cross_specimen.csv",
+        "splits/random_window_leaky.csv",
         *(f"shards/shard-0000{i}.h5" for i in range(4)),
-    }  # fmt: skip
+    }
     manifest = read_manifest(folder)
     assert manifest.is_complete
     assert (manifest.seed, manifest.n_records, manifest.n_done) == (7, 36, 4)
@@ -200,9 +210,10 @@ def test_index_shows_all_shards_from_any_folder_and_nan_for_a_missing_one(
 ) -> None:
     shard_path(folder, 1).unlink()
     code = (
-        "import h5py, sys; f = h5py.File(sys.argv[1], locking=False); a = f['acceleration'];"
-        "print(a.shape, f['record_id'][35].decode(), (a[10:20] != a[10:20]).all(), (a[20:] == a[20:]).all(),"
-        " f['label'][10], f['params/crack_depth_mm'].shape)"
+        "import h5py, sys; f = h5py.File(sys.argv[1], locking=False); a = "
+        "f['acceleration'];print(a.shape, f['record_id'][35].decode(), (a[10:20] != "
+        "a[10:20]).all(), (a[20:] == a[20:]).all(), f['label'][10], "
+        "f['params/crack_depth_mm'].shape)"
     )
     run = subprocess.run(
         [os.sys.executable, "-c", code, str(folder / "index.h5")],

@@ -1,4 +1,4 @@
-"""Other formats give back the same numbers, to the libraries that people read them with."""
+"""Exports hold the same numbers for the libraries that read them."""
 
 import csv
 import json
@@ -168,33 +168,31 @@ def test_a_full_disk_is_said_before_anything_is_written(
     assert not (tmp_path / "all.h5").exists()
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("--to matlab --out OUT/x", "allowed are hdf5, parquet, npz, wav"),
+        ("--to npz --out OUT/no/x", "there is no folder"),
+        ("--to npz --out OUT/set/x.npz", "lies in the data set"),
+        ("--to npz --samples --out OUT/x", "'samples' belongs to parquet"),
+        ("--to npz --one-channel --out OUT/x", "'one_channel' to wav"),
+    ],
+)
 def test_mistakes_are_one_line(
+    folder: Path, capsys: pytest.CaptureFixture[str], words: str, message: str
+) -> None:
+    arguments = words.replace("OUT", str(folder.parent)).split()
+    assert main(["export", str(folder), *arguments]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+
+
+def test_the_command_names_what_it_wrote(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for arguments, message in (
-        (
-            ["--to", "matlab", "--out", str(tmp_path / "x")],
-            "allowed are hdf5, parquet, npz, wav",
-        ),
-        (["--to", "npz", "--out", str(tmp_path / "no" / "x")], "there is no folder"),
-        (["--to", "npz", "--out", str(folder / "x.npz")], "lies in the data set"),
-        (
-            ["--to", "npz", "--samples", "--out", str(tmp_path / "x")],
-            "'samples' belongs to parquet",
-        ),
-        (
-            ["--to", "npz", "--one-channel", "--out", str(tmp_path / "x")],
-            "'one_channel' to wav",
-        ),
-    ):
-        assert main(["export", str(folder), *arguments]) == 2
-        error = capsys.readouterr().err
-        assert message in error
-        assert error.count("\n") == 1
-    assert (
-        main(["export", str(folder), "--to", "npz", "--out", str(tmp_path / "x.npz")])
-        == 0
-    )
+    out = str(tmp_path / "x.npz")
+    assert main(["export", str(folder), "--to", "npz", "--out", out]) == 0
     assert "36 records as npz, 1 file(s)" in capsys.readouterr().out
 
 

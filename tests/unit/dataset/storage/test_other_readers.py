@@ -1,4 +1,4 @@
-"""A shard loads with what people have: Hugging Face `datasets`, pandas, and programs that know plain HDF5 only."""
+"""Shards load with Hugging Face `datasets`, pandas and plain HDF5 programs."""
 
 import re
 from pathlib import Path
@@ -51,7 +51,8 @@ def test_hugging_face_example_of_the_format(
 
 
 def test_hugging_face_takes_the_folder_by_its_card(folder: Path) -> None:
-    """The front matter of README.md says where the records are, so that splits and index are no records."""
+    """The front matter of README.md says where the records are, so that splits and index are no
+    records."""
     records = datasets.load_dataset(str(folder), split="train")
     assert len(records) == 36
     assert "start_fraction" not in records.column_names
@@ -59,7 +60,8 @@ def test_hugging_face_takes_the_folder_by_its_card(folder: Path) -> None:
 
 
 def test_pandas(folder: Path, plan: Plan) -> None:
-    """The example in docs/format.md: every column with one value a record becomes one of a frame."""
+    """The example in docs/format.md: every column with one value a record becomes one of a
+    frame."""
     (code,) = [
         example
         for example in re.findall(r"```python\n(.*?)```", FORMAT, re.DOTALL)
@@ -78,7 +80,8 @@ def test_pandas(folder: Path, plan: Plan) -> None:
 
 @pytest.mark.parametrize("sample_type", ["float32", "int16"])
 def test_types_are_those_old_programs_know(tmp_path: Path, sample_type: str) -> None:
-    """MATLAB and Octave are not run here: what their HDF5 readers cannot take is looked for in the file itself."""
+    """MATLAB and Octave are not run here: what their HDF5 readers cannot take is looked for in the
+    file itself."""
     folder = build(
         tmp_path / "set",
         make_plan(n_records=4, records_per_shard=4),
@@ -139,7 +142,8 @@ def test_types_are_those_old_programs_know(tmp_path: Path, sample_type: str) -> 
 
 
 def test_text_is_read_the_way_octave_asks_for_it(folder: Path, plan: Plan) -> None:
-    """Octave's `load` wants every text as NUL-terminated ASCII and gives up at the first that cannot be had so."""
+    """Octave's `load` wants every text as NUL-terminated ASCII and gives up at the first that
+    cannot be had so."""
     with h5py.File(shard_path(folder, 0), locking=False) as file:
         texts = [
             name

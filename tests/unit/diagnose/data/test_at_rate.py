@@ -1,4 +1,4 @@
-"""Training at a lower rate: the samples of a slower recorder, and a model that knows its rate."""
+"""Training at a lower rate: the samples of a slower recorder, and the rate of the model."""
 
 import json
 import pickle
@@ -7,19 +7,13 @@ import numpy as np
 import pytest
 from fake_dataset import FakeDataset
 from numpy.testing import assert_allclose, assert_array_equal
+from small_studies import command, train, windows_of
 
 import gensig.dataset.reader
-from diagnose.cli import main
 from diagnose.data.at_rate import at_rate
-from diagnose.data.windows import load_windows, subset_segments, task_of
+from diagnose.data.windows import task_of
 from diagnose.training.store import load_model
 from gensig.errors import ConfigError
-
-FAST = [
-    "window_samples=600", "stride_samples=500", "epochs=2", "seeds=[0]", "n_bootstrap=20", "n_threads=1",
-    "model.widths=[8,16]", "model.kernels=[32,5]", "model.strides=[8,4]", "protocols=[by_unit]",
-    "shuffle_control=false",
-]  # fmt: skip
 
 
 def test_rate_length_and_samples_are_those_of_the_lower_rate():
@@ -28,132 +22,78 @@ def test_rate_length_and_samples_are_those_of_the_lower_rate():
     assert (slower.sampling_rate, slower.n_samples) == (6400.0, dataset.n_samples // 2)
     assert slower.n_records == dataset.n_records
     assert_array_equal(slower.column("label"), dataset.column("label"))
-    healthy = int(
-        np.flatnonzero(dataset.column("label") == 0)[0]
-    )  # its tones lie below 0.39 of 6400 Hz
+    healthy = 0  # its tones lie below 0.39 of 6400 Hz
     inner = slice(50, -50)
-    kept = dataset.signals(healthy)[:, ::2]
-    assert_allclose(
-        slower.signals(healthy)[:, inner], kept[:, inner], rtol=0, atol=2e-3
-    )
-    assert slower.signals(healthy).dtype == np.float32
+    expected = dataset.signals(healthy)[:, ::2][:, inner]
+    decimated = slower.signals(healthy)
+    assert_allclose(decimated[:, inner], expected, rtol=0, atol=2e-3)
+    assert decimated.dtype == np.float32
 
 
 def test_parts_channels_and_copies_read_the_same():
     slower = at_rate(FakeDataset(n_channels=3), 5000)
     whole = slower.signals(1)
-    assert_allclose(
-        slower.signals(1, 100, 300, [2, 0]), whole[[2, 0], 100:300], rtol=0, atol=1e-6
-    )
+    part = slower.signals(1, 100, 300, [2, 0])
+    assert_allclose(part, whole[[2, 0], 100:300], rtol=0, atol=1e-6)
     copied = pickle.loads(pickle.dumps(slower))
     assert_array_equal(copied.signals(1), whole)
     assert copied.class_names == slower.class_names
 
 
-def test_null_and_its_own_rate_leave_the_data_set_alone():
+@pytest.mark.parametrize("rate", [None, 12800])
+def test_null_and_the_stored_rate_leave_the_data_set_alone(rate):
     dataset = FakeDataset()
-    assert at_rate(dataset, None) is dataset
-    assert at_rate(dataset, 12800) is dataset
+    assert at_rate(dataset, rate) is dataset
 
 
-def test_rates_that_cannot_be_are_refused():
-    dataset = FakeDataset()
-    for rate, message in [
+@pytest.mark.parametrize(
+    ("rate", "message"),
+    [
         (25600, "sampling_rate_hz=25600 is above the 12800 samples a second"),
         (
             6400.123,
-            "is no ratio of small whole numbers away from 12800; the nearest that is: 6400",
+            "no ratio of small whole numbers away from 12800; the nearest .* 6400",
         ),
         (12.8, "leaves no sample"),
-    ]:
-        with pytest.raises(ConfigError, match=message):
-            at_rate(FakeDataset(duration=0.05) if rate == 12.8 else dataset, rate)
+    ],
+)
+def test_impossible_rates_are_refused(rate, message):
+    with pytest.raises(ConfigError, match=message):
+        at_rate(FakeDataset(duration=0.05), rate)
 
 
 def test_windows_are_cut_at_the_lower_rate():
-    task = task_of(
-        at_rate(FakeDataset(), 6400),
-        window_samples=600,
-        stride_samples=500,
-        normalise="rms",
-    )
-    windows = load_windows(task, subset_segments(task, "random_window_leaky", "train"))
+    dataset = at_rate(FakeDataset(), 6400)
+    task = task_of(dataset, window_samples=600, stride_samples=500, normalise="rms")
+    (windows,) = windows_of(task, "train", protocol="random_window_leaky")
     assert {signal.shape for signal in windows.signals} == {(1, 800)}
 
 
-@pytest.fixture(scope="module")
-def trained(tmp_path_factory):
-    """A model at 6.4 kHz of data at 12.8 kHz, with the baselines."""
-    folder = tmp_path_factory.mktemp("slow")
-    data = FakeDataset(n_units=12, records_per_unit=8, duration=0.5)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(gensig.dataset.reader, "open_dataset", lambda path: data)
-        words = ["data=good", f"out={folder / 'out'}", "sampling_rate_hz=6400", *FAST]
-        assert main(["train", *words]) == 0
-    return folder / "out"
-
-
-def test_the_model_and_the_report_carry_the_rate(trained):
-    assert (
-        load_model(trained / "models" / "by_unit-seed0")[1].sampling_rate_hz == 6400.0
-    )
-    assert (
-        json.loads((trained / "metrics.json").read_text())["sampling_rate_hz"] == 6400.0
-    )
-
-
-def test_predict_and_evaluate_take_what_is_as_fast_and_refuse_what_is_slower(
-    trained, tmp_path, monkeypatch, capsys
+def test_a_model_at_a_lower_rate_takes_faster_recordings_and_refuses_slower_ones(
+    tmp_path, monkeypatch, capsys
 ):
-    model = str(trained / "models" / "by_unit-seed0")
     data = FakeDataset(n_units=12, records_per_unit=8, duration=0.5)
-    np.savez(
-        tmp_path / "fast.npz", acceleration=data.signals(80), sampling_rate_hz=12800
-    )
-    np.savez(
-        tmp_path / "own.npz",
-        acceleration=at_rate(data, 6400).signals(80),
-        sampling_rate_hz=6400,
-    )
-    np.savez(
-        tmp_path / "slow.npz", acceleration=data.signals(80), sampling_rate_hz=5120
-    )
-    capsys.readouterr()
-    shown = []
-    for name in ("fast", "own"):
-        assert main(
-            ["predict", "--model", model, str(tmp_path / f"{name}.npz"), "--json"]
-        ) in (
-            0,
-            3,
-        )
-        shown.append(json.loads(capsys.readouterr().out))
-    first, second = (list(result["probabilities"].values()) for result in shown)
-    assert_allclose(first, second, rtol=0, atol=1e-4)
-    assert main(["predict", "--model", model, str(tmp_path / "slow.npz")]) == 2
-    assert "the model was trained at 6400" in capsys.readouterr().err
-    monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path: data)
-    assert main(["evaluate", "data=good", f"model_dir={model}"]) == 0
-    expected = json.loads((trained / "metrics.json").read_text())["protocols"][
-        "by_unit"
-    ]["methods"]["cnn"]
+    out = tmp_path / "out"
+    words = ["window_samples=600", "stride_samples=500", "shuffle_control=false"]
+    metrics = train(data, out, "sampling_rate_hz=6400", "epochs=2", *words)
+    model = out / "models" / "by_unit-seed0"
     assert (
-        f"balanced_accuracy {expected['balanced_accuracy']['mean']:.3f}"
-        in capsys.readouterr().out
+        load_model(model)[1].sampling_rate_hz == metrics["sampling_rate_hz"] == 6400.0
     )
-
-
-def test_a_rate_that_is_no_number_is_refused(tmp_path, capsys):
-    for value in ("fast", "0", "-5", "true", "inf"):
-        assert (
-            main(
-                [
-                    "train",
-                    "data=x",
-                    f"out={tmp_path / 'o'}",
-                    f"sampling_rate_hz={value}",
-                ]
-            )
-            == 2
-        )
-        assert "sampling_rate_hz must be null or a number" in capsys.readouterr().err
+    signals = {12800: data.signals(80), 6400: at_rate(data, 6400).signals(80)}
+    probabilities = []
+    for rate, signal in signals.items():
+        file = tmp_path / f"{rate}.npz"
+        np.savez(file, acceleration=signal, sampling_rate_hz=rate)
+        _, text, _ = command(capsys, "predict", "--model", model, file, "--json")
+        probabilities.append(list(json.loads(text)["probabilities"].values()))
+    assert_allclose(*probabilities, rtol=0, atol=1e-4)
+    slow = tmp_path / "slow.npz"
+    np.savez(slow, acceleration=signals[12800], sampling_rate_hz=5120)
+    status, _, error = command(capsys, "predict", "--model", model, slow)
+    assert status == 2
+    assert "the model was trained at 6400" in error
+    monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path: data)
+    _, text, _ = command(capsys, "evaluate", "data=good", f"model_dir={model}")
+    score = metrics["protocols"]["by_unit"]["methods"]["cnn"]["balanced_accuracy"]
+    assert f"balanced_accuracy {score['mean']:.3f}" in text

@@ -1,4 +1,4 @@
-"""Windows of a stream: those of the stored set, shared out between workers, another draw every epoch."""
+"""Windows of a stream: those of the stored set, shared between workers, other draws every epoch."""
 
 import itertools
 import pickle
@@ -15,8 +15,22 @@ from gensig.errors import ConfigError, DatasetError
 WINDOW = {"window_samples": 700, "stride_samples": 300}
 
 
+def streamed(stream=None, *part, **changes):
+    if stream is None:
+        stream = FakeStream()
+    return StreamingDataset(stream, *part, **{**WINDOW, **changes})
+
+
+def stored(*part, **changes):
+    return VibrationDataset(FakeStream().dataset, *part, **WINDOW, **changes)
+
+
 def bits(items):
     return [(window.numpy().tobytes(), int(label)) for window, label in items]
+
+
+def stored_bits(windows):
+    return bits(windows[index] for index in range(len(windows)))
 
 
 def loader(windows, n_workers, **options):
@@ -36,46 +50,40 @@ def loader(windows, n_workers, **options):
     ],
 )
 def test_items_are_those_of_the_stored_set(protocol, changes):
-    stream = FakeStream()
-    stored = VibrationDataset(stream.dataset, protocol, "train", **WINDOW, **changes)
-    windows = StreamingDataset(stream, protocol, "train", **WINDOW, **changes)
-    assert windows.class_names == stored.class_names
-    assert windows.n_windows == len(stored)
-    assert bits(windows) == bits(stored[index] for index in range(len(stored)))
+    expected = stored(protocol, "train", **changes)
+    windows = streamed(None, protocol, "train", **changes)
+    assert windows.class_names == expected.class_names
+    assert windows.n_windows == len(expected)
+    assert bits(windows) == stored_bits(expected)
 
 
 def test_without_a_protocol_every_record_is_cut_whole():
-    windows = StreamingDataset(FakeStream(), **WINDOW)
-    stored = [
-        VibrationDataset(FakeStream().dataset, "by_unit", subset, **WINDOW)
-        for subset in ("train", "validation")
-    ]
+    windows = streamed()
     assert windows.n_windows == 16 * 9
-    assert bits(windows)[: 12 * 9] == [
-        item for part in stored for item in bits(part[i] for i in range(len(part)))
+    expected = [
+        stored_bits(stored("by_unit", name)) for name in ("train", "validation")
     ]
+    assert bits(windows)[: 12 * 9] == expected[0] + expected[1]
 
 
-def test_workers_share_the_records_out_in_a_fixed_order():
-    windows = StreamingDataset(FakeStream(), **WINDOW)
+def test_workers_share_the_records_in_a_fixed_order():
+    windows = streamed()
     alone, shared = bits(windows), bits(loader(windows, 2))
     assert shared != alone
-    assert Counter(shared) == Counter(alone)
     assert bits(loader(windows, 2)) == shared
-    first, second = (
-        [alone[i] for i in range(16 * 9) if i // 36 % 2 == worker] for worker in (0, 1)
-    )
-    assert shared == [item for pair in zip(first, second, strict=True) for item in pair]
+    halves = ([alone[i] for i in range(16 * 9) if i // 36 % 2 == k] for k in (0, 1))
+    expected = itertools.chain.from_iterable(zip(*halves, strict=True))
+    assert shared == list(expected)
 
 
-def test_machines_and_workers_share_the_records_out():
-    parts = [StreamingDataset(FakeStream().shard(rank, 2), **WINDOW) for rank in (0, 1)]
+def test_computers_and_workers_share_the_records():
+    parts = [streamed(FakeStream().shard(rank, 2)) for rank in (0, 1)]
     shared = [item for part in parts for item in bits(loader(part, 2))]
-    assert Counter(shared) == Counter(bits(StreamingDataset(FakeStream(), **WINDOW)))
+    assert Counter(shared) == Counter(bits(streamed()))
 
 
 def test_set_epoch_reaches_workers_that_stay_alive():
-    windows = pickle.loads(pickle.dumps(StreamingDataset(FakeStream(), **WINDOW)))
+    windows = pickle.loads(pickle.dumps(streamed()))
     batches = loader(windows, 2, persistent_workers=True)
     passes = []
     for epoch in (0, 1, 1, 0):
@@ -83,52 +91,41 @@ def test_set_epoch_reaches_workers_that_stay_alive():
         assert windows.epoch == epoch
         passes.append(bits(batches))
     assert passes[0] == passes[3] != passes[1] == passes[2]
-    assert Counter(passes[1]) == Counter(
-        bits(StreamingDataset(FakeStream(epoch=1), **WINDOW))
-    )
+    assert Counter(passes[1]) == Counter(bits(streamed(FakeStream(epoch=1))))
 
 
 def test_epochs_follow_one_another_in_one_pass():
-    one = [
-        bits(StreamingDataset(FakeStream(epoch=epoch), **WINDOW)) for epoch in (1, 2)
-    ]
-    two = bits(StreamingDataset(FakeStream(epoch=1), **WINDOW, n_epochs=2))
-    endless = StreamingDataset(FakeStream(epoch=1), **WINDOW, n_epochs=None)
-    assert two == one[0] + one[1] == bits(itertools.islice(endless, len(two)))
+    first, second = (bits(streamed(FakeStream(epoch=epoch))) for epoch in (1, 2))
+    both = bits(streamed(FakeStream(epoch=1), n_epochs=2))
+    endless = streamed(FakeStream(epoch=1), n_epochs=None)
+    assert both == first + second == bits(itertools.islice(endless, len(both)))
 
 
-def test_endless_worker_that_gets_nothing_stops():
-    windows = StreamingDataset(
-        FakeStream(), "by_unit", "test", **WINDOW, n_epochs=None
-    )  # one condition
+def test_an_endless_worker_without_records_stops():
+    windows = streamed(None, "by_unit", "test", n_epochs=None)  # one condition
     assert len(bits(itertools.islice(loader(windows, 2), 50))) == 50
 
 
-def test_shuffle_buffer_keeps_the_items_and_mixes_them():
-    plain = bits(StreamingDataset(FakeStream(), **WINDOW))
-    windows = StreamingDataset(FakeStream(), **WINDOW, shuffle_buffer=60)
+def test_the_shuffle_buffer_keeps_the_items_and_mixes_them():
+    plain, windows = bits(streamed()), streamed(shuffle_buffer=60)
     mixed = bits(windows)
     assert Counter(mixed) == Counter(plain)
-    assert mixed != plain
-    assert bits(windows) == mixed
-    assert len({label for _, label in mixed[:16]}) > len(
-        {label for _, label in plain[:16]}
+    assert bits(windows) == mixed != plain
+    n_mixed, n_plain = (
+        len({label for _, label in items[:16]}) for items in (mixed, plain)
     )
+    assert n_mixed > n_plain
 
 
 def test_failed_records_are_left_out_and_others_must_be_finite():
-    whole, less = FakeStream(), FakeStream(failed=(3, 5))
-    alone = bits(StreamingDataset(whole, **WINDOW))
-    kept = [item for place, item in enumerate(alone) if place // 9 not in (3, 5)]
-    assert bits(StreamingDataset(less, **WINDOW)) == kept
-    with pytest.raises(
-        DatasetError, match="record r00000: its signal holds values that are not finite"
-    ):
-        next(iter(StreamingDataset(FakeStream(noise=np.nan), **WINDOW)))
+    kept = [item for i, item in enumerate(bits(streamed())) if i // 9 not in (3, 5)]
+    assert bits(streamed(FakeStream(failed=(3, 5)))) == kept
+    with pytest.raises(DatasetError, match=r"record r00000: .* not finite"):
+        next(iter(streamed(FakeStream(noise=np.nan))))
 
 
 @pytest.mark.parametrize(
-    ("words", "changes", "message"),
+    ("part", "changes", "message"),
     [
         (
             (),
@@ -142,10 +139,13 @@ def test_failed_records_are_left_out_and_others_must_be_finite():
         ((), {"n_epochs": 0}, "n_epochs must be at least 1"),
     ],
 )
-def test_mistakes_are_refused_at_once(words, changes, message):
+def test_mistakes_are_refused_at_once(part, changes, message):
     with pytest.raises(ConfigError, match=message):
-        StreamingDataset(FakeStream(), *words, **{**WINDOW, **changes})
+        streamed(None, *part, **changes)
+
+
+def test_negative_epochs_and_empty_streams_are_refused():
     with pytest.raises(ConfigError, match="epoch = -1"):
-        StreamingDataset(FakeStream(), **WINDOW).set_epoch(-1)
+        streamed().set_epoch(-1)
     with pytest.raises(ConfigError, match="no record of healthy, crack"):
-        StreamingDataset(FakeStream().take([]), **WINDOW, classes=["healthy", "crack"])
+        streamed(FakeStream().take([]), classes=["healthy", "crack"])

@@ -1,4 +1,4 @@
-"""Temperature scaling: recovers what was put in, changes no label, and is not certain of everything."""
+"""Temperature scaling recovers a given temperature, changes no label, and keeps some doubt."""
 
 import numpy as np
 import pytest
@@ -18,14 +18,13 @@ def make_records(temperature, n=4000, seed=0):
     """Log-probabilities whose labels are drawn at a temperature."""
     rng = np.random.default_rng(seed)
     scores = 2 * rng.standard_normal((n, 4))
-    share = np.exp(scores / temperature)
-    share /= share.sum(axis=1, keepdims=True)
+    share = probabilities(scores, temperature)
     label = (rng.uniform(size=(n, 1)) > np.cumsum(share, axis=1)).sum(axis=1)
     return scores, label
 
 
 @pytest.mark.parametrize("temperature", [0.4, 1.0, 3.0])
-def test_the_temperature_put_in_comes_out(temperature):
+def test_the_given_temperature_is_recovered(temperature):
     assert_allclose(fit_temperature(*make_records(temperature)), temperature, rtol=0.1)
 
 
@@ -35,33 +34,28 @@ def test_scaling_changes_no_label_and_keeps_probabilities():
         scaled = probabilities(scores, temperature)
         assert_allclose(scaled.sum(axis=1), 1.0, rtol=1e-12)
         assert (scaled.argmax(axis=1) == scores.argmax(axis=1)).all()
-    # a constant in a row is no information; very small log-probabilities are no zeros over zeros
+    # a constant in a row has no effect, and very small log-probabilities give no 0/0
     assert_allclose(probabilities(scores - 5000.0), probabilities(scores), rtol=1e-9)
 
 
 def test_no_error_on_few_records_is_no_certainty():
-    log_probability = np.log(np.where(np.eye(2)[np.arange(8) % 2] > 0, 0.9, 0.1))
     label = np.arange(8) % 2
-    temperature = fit_temperature(log_probability, label)
-    assert 0.2 < temperature < 1.0
-    # the more records, the surer
-    assert (
-        fit_temperature(np.tile(log_probability, (50, 1)), np.tile(label, 50))
-        < 0.7 * temperature
-    )
+    log_probability = np.log(np.where(np.eye(2)[label] > 0, 0.9, 0.1))
+    few = fit_temperature(log_probability, label)
+    many = fit_temperature(np.tile(log_probability, (50, 1)), np.tile(label, 50))
+    assert 0.2 < few < 1.0
+    assert many < 0.7 * few
 
 
-def test_calibration_error_in_closed_form():
-    right = np.arange(10) < 8
-    assert calibration_error(reliability(np.full(10, 0.8), right)) == pytest.approx(
-        0.0, abs=1e-12
-    )
-    assert calibration_error(reliability(np.full(10, 0.95), right)) == pytest.approx(
-        0.15
-    )
-    rows = reliability(
-        np.array([0.31, 0.39, 1.0, 1.0]), np.array([True, False, True, True])
-    )
+@pytest.mark.parametrize(("sure", "expected"), [(0.8, 0.0), (0.95, 0.15)])
+def test_calibration_error_in_closed_form(sure, expected):
+    rows = reliability(np.full(10, sure), np.arange(10) < 8)
+    assert calibration_error(rows) == pytest.approx(expected, abs=1e-12)
+
+
+def test_reliability_has_a_row_for_each_bin_with_records():
+    right = np.array([True, False, True, True])
+    rows = reliability(np.array([0.31, 0.39, 1.0, 1.0]), right)
     assert [row["n_records"] for row in rows] == [2, 2]
     assert rows[0]["confidence"] == pytest.approx(0.35)
     assert calibration_error(rows) == pytest.approx(0.5 * 0.15)
@@ -74,7 +68,7 @@ def test_error_by_chance_falls_with_the_root_of_the_records():
     assert_allclose(small, np.sqrt(1 / (2 * np.pi * 25)), rtol=0.2)
 
 
-def test_scaling_by_other_records_mends_too_sure_a_network():
+def test_scaling_by_other_records_corrects_an_overconfident_network():
     scores, label = make_records(3.0)
     temperature = fit_temperature(*make_records(3.0, seed=1))
     result = calibration_scores([scores, scores], [label, label], [temperature, 1.0])

@@ -1,5 +1,6 @@
-"""Laws of every registered network: its shape, its declared input, its way to disk, its bits."""
+"""Laws of every registered network: its shape, its declared input, its stored form, its bits."""
 
+import json
 from dataclasses import replace
 from typing import ClassVar
 
@@ -7,18 +8,17 @@ import numpy as np
 import pytest
 import torch
 from fake_dataset import FakeDataset
+from small_studies import run, study_of
 
 from diagnose.data.inputs import NetworkInput, RecordedSignal
 from diagnose.data.turns import Turns
 from diagnose.data.window_input import Windows
 from diagnose.data.windows import subset_segments
 from diagnose.networks.registry import MODELS, build_model, check_window, input_of
-from diagnose.settings import settings_from
-from diagnose.studies.jobs import Job, run_jobs
-from diagnose.studies.study import settings_for, task_from
+from diagnose.studies.jobs import Job
 from diagnose.training.classes import predict_windows
 from diagnose.training.store import load_model, model_description, save_model
-from gensig.options.compose import compose
+from gensig.errors import DatasetError
 
 OPTIONS = {
     "small_cnn": ["model=cnn"],
@@ -26,56 +26,53 @@ OPTIONS = {
     "spectrum_cnn": ["model=spectrum"],
     "order_cnn": ["model=order", "model.samples_per_tooth=16", "model.kernels=[9,5,5]"],
 }
-DECLARED = {
-    "small_cnn": Windows,
-    "wdcnn": Windows,
-    "spectrum_cnn": Windows,
-    "order_cnn": Turns,
-}
-QUICK = [
-    "window_samples=1200", "stride_samples=1000", "seeds=[0]", "n_threads=1", "n_bootstrap=50",
-    "epochs=1", "epoch_fraction=0.2", "protocols=[by_unit]",
-]  # fmt: skip
-TRAINING = Job(protocols=("by_unit",), seed=0)
+QUICK = ["epochs=1", "epoch_fraction=0.2"]
 
 
 @pytest.fixture(scope="module")
 def dataset():
-    torch.set_num_threads(1)
     return FakeDataset(n_units=8, records_per_unit=4, n_channels=2, duration=0.2)
 
 
-@pytest.fixture(params=MODELS)
+@pytest.fixture(scope="module", params=MODELS)
 def study(request, dataset):
-    """Task and settings of a study with one kind of network."""
-    words = ["data=x", "out=y", *QUICK, *OPTIONS[request.param]]
-    settings = settings_for(dataset, settings_from(compose("train", words)))
-    return task_from(dataset, settings), settings
+    """Task, settings, input and prediction of a study with one kind of network."""
+    network = MODELS[request.param]
+    task, settings = study_of(dataset, *QUICK, *OPTIONS[request.param])
+    shapes = set()
+    with pytest.MonkeyPatch.context() as patch:
+        watch(patch, network, shapes)
+        prediction = trained(task, settings)
+    return task, settings, prediction, shapes
+
+
+def watch(patch, network, shapes):
+    """Add the shapes of all windows that a network gets to a set."""
+    look = network.look
+
+    def watched(self, windows):
+        shapes.add(tuple(windows.shape[1:]))
+        return look(self, windows)
+
+    patch.setattr(network, "look", watched)
 
 
 def trained(task, settings, seed=0):
-    (found,) = run_jobs(
-        task,
-        settings,
-        [replace(TRAINING, seed=seed)],
-        n_workers=1,
-        on_done=lambda _: None,
-    )
-    return found
+    (prediction,) = run(task, settings, Job(protocols=("by_unit",), seed=seed))
+    return prediction
 
 
-def built(settings):
-    torch.manual_seed(0)
-    return build_model(settings.model, n_channels=2, n_classes=4).eval()
-
-
-def test_every_network_declares_what_it_reads():
-    assert {kind: network.inputs for kind, network in MODELS.items()} == DECLARED
+def test_every_network_declares_its_input():
+    inputs = {kind: network.inputs for kind, network in MODELS.items()}
+    windows = dict.fromkeys(("small_cnn", "wdcnn", "spectrum_cnn"), Windows)
+    assert inputs == windows | {"order_cnn": Turns}
 
 
 def test_scores_have_their_shape_for_the_declared_input(study):
-    task, settings = study
-    inputs, model = input_of(settings.model), built(settings)
+    task, settings, *_ = study
+    torch.manual_seed(0)
+    model = build_model(settings.model, n_channels=2, n_classes=4).eval()
+    inputs = input_of(settings.model)
     n_points = inputs.n_points(task.window_samples)
     check_window(model, 2, n_points)
     windows = inputs.load(task, subset_segments(task, "by_unit", "test"))
@@ -86,31 +83,14 @@ def test_scores_have_their_shape_for_the_declared_input(study):
         assert model.answers(batch)["classes"].equal(model(batch))
 
 
-def fed_to(network, monkeypatch, task, settings):
-    """Shapes of the batches that a training gives to the network."""
-    shapes = set()
-    forward = network.look
-
-    def look(self, windows):
-        shapes.add(tuple(windows.shape[1:]))
-        return forward(self, windows)
-
-    monkeypatch.setattr(network, "look", look)
-    trained(task, settings)
-    return shapes
+def test_a_training_feeds_the_declared_input(study):
+    task, settings, _, shapes = study
+    assert shapes == {(2, input_of(settings.model).n_points(task.window_samples))}
 
 
-def test_a_training_feeds_the_declared_input(study, monkeypatch):
-    task, settings = study
-    expected = {(2, input_of(settings.model).n_points(task.window_samples))}
-    assert (
-        fed_to(MODELS[settings.model["kind"]], monkeypatch, task, settings) == expected
-    )
-
-
-def test_a_network_that_declares_another_input_is_fed_that(dataset, monkeypatch):
-    """The twin of the law above: the declaration decides, not the name of the network."""
-
+def test_the_declaration_decides_the_input_not_the_name_of_the_network(
+    dataset, monkeypatch
+):
     class OnTurns(MODELS["small_cnn"]):
         inputs: ClassVar[type[NetworkInput]] = Turns
 
@@ -118,27 +98,27 @@ def test_a_network_that_declares_another_input_is_fed_that(dataset, monkeypatch)
             super().__init__(**parameters)
 
     monkeypatch.setitem(MODELS, "small_cnn", OnTurns)
-    words = ["data=x", "out=y", *QUICK, "model=cnn", "+model.samples_per_tooth=16"]
-    settings = settings_for(dataset, settings_from(compose("train", words)))
-    task = task_from(dataset, settings)
+    words = ["model=cnn", "+model.samples_per_tooth=16"]
+    task, settings = study_of(dataset, *QUICK, *words)
     assert settings.model["n_teeth"] == [23, 84]
-    fed = fed_to(OnTurns, monkeypatch, task, settings)
-    assert fed == {(2, 16 * (23 + 84 + 1))}
-    assert fed != {(2, task.window_samples)}
+    shapes = set()
+    watch(monkeypatch, OnTurns, shapes)
+    trained(task, settings)
+    assert shapes == {(2, 16 * (23 + 84 + 1))}
 
 
-def test_stored_and_loaded_it_says_the_same_of_records_and_recordings(study, tmp_path):
-    task, settings = study
-    found = trained(task, settings)
-    save_model(tmp_path / "m", found.weights, model_description(task, settings, found))
-    model, description = load_model(tmp_path / "m")
+def test_stored_and_loaded_it_predicts_the_same(study, tmp_path):
+    task, settings, prediction, _ = study
+    description = model_description(task, settings, prediction)
+    save_model(tmp_path, prediction.weights, description)
+    model, description = load_model(tmp_path)
+    assert description.temperature == prediction.temperature
     inputs = input_of(description.model)
     assert inputs == input_of(settings.model)
     windows = inputs.load(task, subset_segments(task, "by_unit", "test"))
-    said = predict_windows(model, windows)
-    np.testing.assert_allclose(
-        said, found.windows.log_probability, rtol=1e-4, atol=1e-5
-    )
+    log_probability = predict_windows(model, windows)
+    expected = prediction.windows.log_probability
+    np.testing.assert_allclose(log_probability, expected, rtol=1e-4, atol=1e-5)
     record = int(windows.record[0])
     recorded = RecordedSignal(
         signal=task.dataset.signals(record),
@@ -149,19 +129,34 @@ def test_stored_and_loaded_it_says_the_same_of_records_and_recordings(study, tmp
         stride_samples=description.stride_samples,
         normalise=description.normalise,
     )
-    mine = np.flatnonzero(windows.record == record)
-    of_recording = inputs.of_recording(recorded)
-    np.testing.assert_array_equal(
-        of_recording.cut(np.arange(mine.size)), windows.cut(mine)
-    )
+    stored = windows.cut(np.flatnonzero(windows.record == record))
+    of_recording = inputs.of_recording(recorded).cut(np.arange(len(stored)))
+    np.testing.assert_array_equal(of_recording, stored)
     faster = inputs.of_recording(replace(recorded, speed_rpm=1.01 * recorded.speed_rpm))
-    same = np.array_equal(faster.cut(np.arange(1)), windows.cut(mine[:1]))
+    same = np.array_equal(faster.cut(np.arange(1)), stored[:1])
     assert same == inputs.has_window_length  # turns depend on the speed, windows do not
 
 
 def test_the_same_seed_gives_the_same_bits(study):
-    task, settings = study
-    first, again = (trained(task, settings).weights for _ in range(2))
-    assert all(np.array_equal(first[name], again[name]) for name in first)
+    task, settings, prediction, _ = study
+    first, second = prediction.weights, trained(task, settings).weights
+    assert all(np.array_equal(first[name], second[name]) for name in first)
     other = trained(task, settings, seed=1).weights
     assert any(not np.array_equal(first[name], other[name]) for name in first)
+
+
+def test_an_older_model_has_temperature_one_and_a_bad_one_is_refused(study, tmp_path):
+    task, settings, prediction, _ = study
+    description = model_description(task, settings, prediction)
+    save_model(tmp_path, prediction.weights, description)
+    path = tmp_path / "model.json"
+    content = json.loads(path.read_text())
+    del content["temperature"]
+    path.write_text(json.dumps(content))
+    assert load_model(tmp_path)[1].temperature == 1.0
+    for bad in (0, -1.0, "warm", float("nan")):
+        path.write_text(json.dumps({**content, "temperature": bad}))
+        with pytest.raises(
+            DatasetError, match=r"model\.json does not describe a model"
+        ):
+            load_model(tmp_path)

@@ -1,19 +1,16 @@
-"""Scores of novelty: nothing new is chance, something plain is found, alarms are as rare as promised."""
+"""Scores of novelty: chance without faults, visible faults found, alarms as rare as promised."""
 
 import dataclasses
-import json
 
 import numpy as np
 import pytest
 import torch
 from novelty_sets import OpenDataset
 from scipy.stats import norm
+from small_studies import LEARNS, TINY_CNN, run, study_of, train, windows_of
 
-import gensig.dataset.reader
-from diagnose.cli import main
-from diagnose.data.windows import load_windows, subset_segments
-from diagnose.settings import settings_from
-from diagnose.studies.jobs import Job, run_jobs
+from diagnose.data.windows import subset_segments
+from diagnose.studies.jobs import Job
 from diagnose.studies.novelty import NoveltyRun, network_outputs
 from diagnose.studies.novelty_metrics import (
     alarm_threshold,
@@ -21,7 +18,7 @@ from diagnose.studies.novelty_metrics import (
     novelty_protocol_result,
     novelty_result,
 )
-from diagnose.studies.study import plan_study, task_from
+from diagnose.studies.study import plan_study
 from diagnose.training.autoencoder import (
     WindowAutoencoder,
     fit_autoencoder,
@@ -30,58 +27,40 @@ from diagnose.training.autoencoder import (
 from diagnose.training.classes import Classes, predict_windows
 from diagnose.training.train import train_network
 from gensig.errors import ConfigError
-from gensig.options.compose import compose
 
-FAST = [
-    "window_samples=1200", "stride_samples=1000", "epochs=3", "seeds=[0]", "n_bootstrap=200", "n_threads=1",
-    "model.widths=[8,16]", "model.kernels=[32,5]", "model.strides=[8,4]",
-]  # fmt: skip
-
-
-def settings_of(*overrides):
-    return settings_from(compose("train", ["data=x", "out=y", *FAST, *overrides]))
-
-
-def result_of(task, protocol, runs):
-    return novelty_protocol_result(task, protocol, runs, n_bootstrap=200, seed=0)
+BOTH = "protocols=[healthy_only,open_set]"
 
 
 @pytest.fixture(scope="module")
 def studies():
-    """Results of both protocols on a set with plain faults and on one with none but in name."""
-    torch.set_num_threads(1)
-    found = {}
+    """Results of both protocols with visible faults and with faults in name only."""
+    results = {}
     for name, strength in (("plain", 4.0), ("none", 0.0)):
-        settings = settings_of(
-            "protocols=[healthy_only,open_set]",
-            "epochs=8",
-            "learning_rate=0.01",
-            "epoch_fraction=0.6",
-        )
-        task = task_from(OpenDataset(strength=strength, n_units=24), settings)
+        dataset = OpenDataset(strength=strength, n_units=24)
+        task, settings = study_of(dataset, BOTH, *TINY_CNN, *LEARNS)
         protocols, jobs = plan_study(task, settings)
-        runs = run_jobs(task, settings, jobs, n_workers=1, on_done=lambda _: None)
-        found[name] = {
-            protocol: result_of(task, protocol, runs) for protocol in protocols
+        runs = run(task, settings, *jobs)
+        results[name] = {
+            protocol: novelty_protocol_result(
+                task, protocol, runs, n_bootstrap=200, seed=0
+            )
+            for protocol in protocols
         }
-    return found
+    return results
 
 
-def test_a_plain_fault_is_found_by_those_who_know_only_health(studies):
+def test_a_visible_fault_is_found_by_methods_that_know_only_healthy_records(studies):
     result = studies["plain"]["healthy_only"]
     assert (result["known_classes"], len(result["novel_classes"])) == (["healthy"], 3)
-    assert set(result["methods"]) == {
-        "nearest_band_levels", "nearest_indicators", "forest_indicators", "nearest_indicators_without_level",
-        "forest_indicators_without_level", "autoencoder",
-    }  # fmt: skip
+    tables = ("indicators", "indicators_without_level")
+    names = {f"{kind}_{table}" for kind in ("nearest", "forest") for table in tables}
+    assert set(result["methods"]) == names | {"nearest_band_levels", "autoencoder"}
     for method in result["methods"].values():
         assert method["auroc_by_class"]["missing_tooth"]["low"] > 0.9
         assert method["found"]["missing_tooth"]["mean"] > 0.6
 
 
-def test_a_plain_class_never_shown_is_noticed_and_the_known_ones_are_told_apart(
-    studies,
-):
+def test_a_visible_new_class_is_noticed_and_the_known_ones_are_told_apart(studies):
     result = studies["plain"]["open_set"]
     assert result["novel_classes"] == ["missing_tooth"]
     assert result["methods"]["nearest_band_levels"]["auroc"]["low"] > 0.8
@@ -89,16 +68,12 @@ def test_a_plain_class_never_shown_is_noticed_and_the_known_ones_are_told_apart(
         rate = result["methods"][name]["fpr95"]
         assert 0 <= rate["low"] <= rate["mean"] <= rate["high"] <= 1
     for method in result["methods"].values():
-        parts = [
-            area["mean"] for area in method["auroc_by_known_class"].values()
-        ]  # as many records of each class
+        # the classes have the same number of records
+        parts = [area["mean"] for area in method["auroc_by_known_class"].values()]
         assert len(parts) == 3
         assert method["auroc"]["mean"] == pytest.approx(np.mean(parts))
-    assert (
-        result["known"]["balanced_accuracy"]["mean"]
-        > result["known"]["chance"]
-        == pytest.approx(1 / 3)
-    )
+    known = result["known"]
+    assert known["balanced_accuracy"]["mean"] > known["chance"] == pytest.approx(1 / 3)
 
 
 @pytest.mark.parametrize("protocol", ["healthy_only", "open_set"])
@@ -106,29 +81,33 @@ def test_a_fault_in_name_only_is_not_found(studies, protocol):
     result = studies["none"][protocol]
     n = result["n_records"]["test"]
     n_known = n // 4 * len(result["known_classes"])
-    deviation = np.sqrt(
-        (n + 1) / (12 * n_known * (n - n_known))
-    )  # of the Mann-Whitney statistic when nothing differs
+    # of the Mann-Whitney statistic if nothing differs
+    deviation = np.sqrt((n + 1) / (12 * n_known * (n - n_known)))
     for name, method in result["methods"].items():
         assert abs(method["auroc"]["mean"] - 0.5) < 3.5 * deviation < 0.4, name
 
 
 @pytest.fixture
 def labelled():
-    """Task and a way to score its test records."""
-    task = task_from(OpenDataset(n_units=16), settings_of())
+    """Function that gives the result of scores, novel records, task and test records."""
+    task, _ = study_of(OpenDataset(n_units=16))
     record = np.unique(subset_segments(task, "healthy_only", "test").record)
     novel = task.labels()[record] > 0
 
-    def judge(*scores, validation=None, predicted=None):
-        known = np.linspace(0, 1, 40) if validation is None else validation
+    def judge(*scores, predicted=None):
         runs = [
             NoveltyRun(
-                protocol="healthy_only", method="m", seed=seed, detail="", record=record, score=score,
-                validation_score=known, predicted=predicted,
+                protocol="healthy_only",
+                method="m",
+                seed=seed,
+                detail="",
+                record=record,
+                score=score,
+                validation_score=np.linspace(0, 1, 40),
+                predicted=predicted,
             )
             for seed, score in enumerate(scores)
-        ]  # fmt: skip
+        ]
         return novelty_result(task, runs, [0], 300, np.random.default_rng(0))
 
     return judge, novel, task, record
@@ -141,9 +120,7 @@ def test_perfect_and_empty_scores(labelled):
     assert perfect["false_alarms"]["mean"] == perfect["fpr95"]["mean"] == 0
     assert all(found["low"] == 1 for found in perfect["found"].values())
     empty = judge(np.zeros(novel.size), predicted=record)
-    assert (
-        empty["auroc"]["mean"] == empty["auroc"]["low"] == empty["auroc"]["high"] == 0.5
-    )
+    assert {empty["auroc"][key] for key in ("mean", "low", "high")} == {0.5}
     assert empty["fpr95"]["mean"] == 1
     assert "fpr95" not in judge(np.zeros(novel.size))
 
@@ -151,14 +128,11 @@ def test_perfect_and_empty_scores(labelled):
 def test_units_that_are_copies_leave_nothing_to_resample(labelled):
     judge, novel, task, record = labelled
     units = np.asarray(task.dataset.column("unit_id"))[record]
-    score = np.concatenate(
-        [np.arange(np.sum(units == unit)) ** 2 % 5 for unit in np.unique(units)]
-    ).astype(float)
+    copies = [np.arange(np.sum(units == unit)) ** 2 % 5.0 for unit in np.unique(units)]
+    score = np.concatenate(copies)
     area = judge(score)["auroc"]
     assert 0 < area["mean"] < 1
-    np.testing.assert_allclose(
-        [area["low"], area["high"]], area["mean"], rtol=1e-12, atol=0
-    )
+    assert [area["low"], area["high"]] == pytest.approx([area["mean"]] * 2, rel=1e-12)
     uneven = judge(score + (units == units[0]) * np.where(novel, 3, 0))["auroc"]
     assert uneven["low"] < uneven["mean"] < uneven["high"]
 
@@ -173,9 +147,8 @@ def test_interval_covers_the_seeds(labelled):
 @pytest.mark.parametrize("n", [19, 20, 21, 58, 400])
 def test_new_known_records_raise_no_more_alarms_than_promised(n):
     rng = np.random.default_rng(n)
-    shares = [
-        1 - norm.cdf(alarm_threshold(rng.standard_normal(n))) for _ in range(4000)
-    ]
+    thresholds = [alarm_threshold(rng.standard_normal(n)) for _ in range(4000)]
+    shares = norm.sf(thresholds)
     assert 0.05 - 1 / (n + 1) < np.mean(shares) < 0.05 + 4 * np.std(shares) / 63
 
 
@@ -195,29 +168,27 @@ def test_false_positive_rate_of_two_normal_scores(shift):
     assert false_positive_rate_95(novel, score, weight) < expected
 
 
-def test_features_and_outputs_are_those_of_the_last_layer():
-    settings = settings_of()
-    task = task_from(OpenDataset(), settings)
-    train, validation = (
-        load_windows(task, subset_segments(task, "by_unit", part))
-        for part in ("train", "validation")
+@pytest.fixture(scope="module")
+def open_study():
+    """Task and settings of a short study."""
+    return study_of(OpenDataset(), BOTH, "epochs=3", *TINY_CNN)
+
+
+def test_features_and_outputs_are_those_of_the_last_layer(open_study):
+    task, settings = open_study
+    train_set, validation = windows_of(task, "train", "validation")
+    target = Classes(n_classes=4)
+    training = train_network(
+        train_set, validation, target=target, settings=settings, seed=0
     )
-    model = train_network(
-        train, validation, target=Classes(n_classes=4), settings=settings, seed=0
-    ).model
-    every = np.arange(len(validation))
-    features, logits = network_outputs(model, validation, every)
+    model = training.model
+    features, logits = network_outputs(model, validation, np.arange(len(validation)))
     layer = model.head[-1]
-    rebuilt = features @ layer.weight.detach().numpy().T + layer.bias.detach().numpy()
-    np.testing.assert_allclose(logits, rebuilt, rtol=1e-4, atol=1e-5)
+    weight, bias = layer.weight.detach().numpy(), layer.bias.detach().numpy()
+    np.testing.assert_allclose(logits, features @ weight.T + bias, rtol=1e-4, atol=1e-5)
     scaled = logits - np.logaddexp.reduce(logits, axis=1, keepdims=True)
-    np.testing.assert_allclose(
-        predict_windows(model, validation), scaled, rtol=1e-4, atol=1e-5
-    )
-
-
-def healthy_windows(task, subset):
-    return load_windows(task, subset_segments(task, "healthy_only", subset))
+    expected = predict_windows(model, validation)
+    np.testing.assert_allclose(expected, scaled, rtol=1e-4, atol=1e-5)
 
 
 @pytest.mark.parametrize("window", [128, 1200, 6400])
@@ -231,172 +202,135 @@ def test_the_autoencoder_answers_for_every_whole_step(window):
     torch.testing.assert_close(doubled(2 * windows), model(windows))
 
 
-def test_the_autoencoder_is_the_same_for_the_same_seed():
-    settings = settings_of()
-    task = task_from(OpenDataset(), settings)
-    train, validation = (
-        healthy_windows(task, part) for part in ("train", "validation")
+@pytest.fixture(scope="module")
+def healthy(open_study):
+    """Healthy training and validation windows."""
+    return windows_of(open_study[0], "train", "validation", protocol="healthy_only")
+
+
+def test_the_autoencoder_is_the_same_for_the_same_seed(healthy, open_study):
+    validation, settings = healthy[1], open_study[1]
+    state = torch.random.get_rng_state()
+    first, second, other = (
+        fit_autoencoder(*healthy, settings=settings, seed=seed) for seed in (1, 1, 2)
     )
-    before = torch.random.get_rng_state()
-    first, again, other = (
-        fit_autoencoder(train, validation, settings=settings, seed=seed)
-        for seed in (1, 1, 2)
-    )
-    assert torch.equal(before, torch.random.get_rng_state())
+    assert torch.equal(state, torch.random.get_rng_state())
     error = reconstruction_error(first, validation)
-    np.testing.assert_array_equal(error, reconstruction_error(again, validation))
+    np.testing.assert_array_equal(error, reconstruction_error(second, validation))
     few = reconstruction_error(first, validation, batch_size=3)
     np.testing.assert_allclose(error, few, rtol=1e-4, atol=0)
     assert not np.array_equal(error, reconstruction_error(other, validation))
 
 
-def test_the_autoencoder_learns_and_a_moment_that_it_cannot_rebuild_is_seen():
-    task = task_from(OpenDataset(), settings_of())
-    train, validation = (
-        healthy_windows(task, part) for part in ("train", "validation")
-    )
-    short, long = (
-        fit_autoencoder(
-            train,
-            validation,
-            settings=settings_of(f"epochs={n}", "patience=30"),
-            seed=0,
-        )
-        for n in (1, 30)
-    )
+def test_the_autoencoder_learns_and_shows_a_moment_that_it_cannot_rebuild(
+    healthy, open_study
+):
+    _, validation = healthy
     windows = torch.from_numpy(validation.cut(np.arange(9)))
+
+    def fitted(n_epochs):
+        epochs = {"epochs": n_epochs, "patience": 30}
+        settings = dataclasses.replace(open_study[1], **epochs)
+        return fit_autoencoder(*healthy, settings=settings, seed=0)
+
+    short, long = fitted(1), fitted(30)
     mean = [part.model(windows).mean().item() for part in (short, long)]
     assert mean[1] < 0.7 * mean[0]
-    burst = dataclasses.replace(
-        validation, signals=tuple(signal.copy() for signal in validation.signals)
-    )
-    for signal in burst.signals:
+    signals = tuple(signal.copy() for signal in validation.signals)
+    for signal in signals:
         signal[:, 1100:1164] += 3 * np.sin(np.arange(64))
-    seen = validation.start <= 1000  # the burst lies whole in these windows
-    assert (
-        reconstruction_error(long, burst) > 1.5 * reconstruction_error(long, validation)
-    )[seen].all()
-
-
-def test_two_processes_give_what_one_gives():
-    settings = settings_of("seeds=[3]")
-    task = task_from(OpenDataset(), settings)
-    jobs = [
-        Job(protocols=(name,), seed=seed)
-        for name in ("healthy_only", "open_set")
-        for seed in (None, 3)
-    ]
-    one, two = (
-        run_jobs(task, settings, jobs, n_workers=n, on_done=lambda _: None)
-        for n in (1, 2)
+    burst = dataclasses.replace(validation, signals=signals)
+    with_burst, without = (
+        reconstruction_error(long, part) for part in (burst, validation)
     )
-    assert [run.method for run in one] == [run.method for run in two]
-    assert len(one) == 10
-    for a, b in zip(one, two, strict=True):
-        np.testing.assert_array_equal(a.score, b.score)
-        np.testing.assert_array_equal(a.validation_score, b.validation_score)
+    whole = validation.start <= 1000  # windows that hold the whole burst
+    assert (with_burst > 1.5 * without)[whole].all()
+
+
+def test_two_processes_give_the_results_of_one(open_study):
+    """Of all kinds of jobs: novelty with and without a network, classes, shuffled labels."""
+    task, settings = open_study
+    kinds = [
+        ("healthy_only", None),
+        ("healthy_only", 3),
+        ("open_set", None),
+        ("open_set", 3),
+        ("by_unit", 5),
+    ]
+    jobs = [Job(protocols=(name,), seed=seed) for name, seed in kinds]
+    jobs.append(Job(protocols=("by_unit",), seed=6, shuffled=True))
+    one, two = (run(task, settings, *jobs, n_workers=n) for n in (1, 2))
+    assert [result.method for result in one] == [result.method for result in two]
+    novelty = [result for result in one if isinstance(result, NoveltyRun)]
+    assert len(novelty) == 10
+    for first, second in zip(one, two, strict=True):
+        if isinstance(first, NoveltyRun):
+            np.testing.assert_array_equal(first.score, second.score)
+            np.testing.assert_array_equal(
+                first.validation_score, second.validation_score
+            )
+        else:
+            np.testing.assert_array_equal(first.log_probability, second.log_probability)
+            assert first.validation_loss == second.validation_loss
 
 
 @pytest.mark.parametrize(
-    ("changes", "overrides", "message"),
+    ("overrides", "message"),
     [
-        ({}, ["protocols=[healthy_only]", "window_samples=100"], "at least 128"),
+        (["protocols=[healthy_only]", "window_samples=100"], "at least 128"),
         (
-            {},
             ["protocols=[open_set]", "classes=[healthy,crack,pitting]"],
             "it needs known and new ones",
         ),
         (
-            {},
             ["protocols=[open_set]", "classes=[healthy,missing_tooth]"],
             "one known class only",
         ),
         (
-            {},
             ["protocols=[healthy_only]", "classes=[crack,pitting]"],
             "its train part is empty",
         ),
     ],
 )
-def test_mistakes(changes, overrides, message):
-    settings = settings_of(*overrides)
-    task = task_from(OpenDataset(**changes), settings)
+def test_studies_without_known_or_new_classes_are_refused(overrides, message):
     with pytest.raises(ConfigError, match=message):
-        plan_study(task, settings)
+        plan_study(*study_of(OpenDataset(), *TINY_CNN, *overrides))
 
 
-def test_the_command_reports_novelty_alone(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(
-        gensig.dataset.reader, "open_dataset", lambda path: OpenDataset()
-    )
-    out = tmp_path / "out"
-    assert (
-        main(
-            [
-                "train",
-                "data=x",
-                f"out={out}",
-                *FAST,
-                "protocols=[healthy_only,open_set]",
-            ]
-        )
-        == 0
-    )
+def test_the_command_reports_novelty_alone(tmp_path, capsys):
+    metrics = train(OpenDataset(), tmp_path, "epochs=1", BOTH)
     assert "**healthy_only**: Trained on" in capsys.readouterr().out
-    metrics = json.loads((out / "metrics.json").read_text())
     assert metrics["protocols"] == {}
     assert list(metrics["novelty"]) == ["healthy_only", "open_set"]
-    page = (out / "report.html").read_text()
+    page = (tmp_path / "report.html").read_text()
+    heads = ("FPR95", "false alarms", "missing_tooth found")
     for text in (
         "noticed by who knows health alone (healthy_only)",
-        '<th scope="col">FPR95</th><th scope="col">false alarms</th><th scope="col">missing_tooth found',
-        "Balanced accuracy of the network on the known classes", "healthy_only: only 3 test unit(s)", "Caveats",
+        "</th>".join(f'<th scope="col">{head}' for head in heads),
+        "Balanced accuracy of the network on the known classes",
+        "healthy_only: only 3 test unit(s)",
+        "Caveats",
         "<b>AUROC of energy</b>: against healthy ",
         "validation record(s); with fewer than 19",
-    ):  # fmt: skip
+    ):
         assert text in page, text
-    for text in ("LEAKY", "In short", "nan ["):
-        assert text not in page
-    rows = [line.split(",") for line in (out / "novelty.csv").read_text().splitlines()]
-    assert rows[0] == [
-        "protocol",
-        "method",
-        "seed",
-        "record_id",
-        "unit_id",
-        "label",
-        "score",
-        "threshold",
-    ]
-    mine = [
-        row
-        for row in rows
-        if row[:2] == ["healthy_only", "autoencoder"] and row[5] == "missing_tooth"
-    ]
-    found = metrics["novelty"]["healthy_only"]["methods"]["autoencoder"]["found"][
-        "missing_tooth"
-    ]["mean"]
-    assert np.mean([float(row[6]) > float(row[7]) for row in mine]) == pytest.approx(
-        found
-    )
+    assert not any(text in page for text in ("LEAKY", "In short", "nan ["))
+    head, *lines = (tmp_path / "novelty.csv").read_text().splitlines()
+    assert head == "protocol,method,seed,record_id,unit_id,label,score,threshold"
+    rows = [line.split(",") for line in lines]
+    kind = ["healthy_only", "autoencoder", "missing_tooth"]
+    scores = np.array([row[6:] for row in rows if [*row[:2], row[5]] == kind], float)
+    method = metrics["novelty"]["healthy_only"]["methods"]["autoencoder"]
+    share = np.mean(scores[:, 0] > scores[:, 1])
+    assert share == pytest.approx(method["found"]["missing_tooth"]["mean"])
 
 
-def test_null_runs_everything_and_both_kinds_share_a_report(monkeypatch, tmp_path):
-    monkeypatch.setattr(
-        gensig.dataset.reader, "open_dataset", lambda path: OpenDataset(n_channels=2)
-    )
-    out = tmp_path / "out"
-    few = [
-        "protocols=null",
-        "shuffle_control=false",
-        "baselines=[rms_threshold]",
-        "epochs=1",
-    ]
-    assert main(["train", "data=x", f"out={out}", *FAST, *few]) == 0
-    metrics = json.loads((out / "metrics.json").read_text())
+def test_null_runs_all_protocols_and_both_kinds_share_a_report(tmp_path):
+    words = ["protocols=null", "shuffle_control=false", "baselines=[rms_threshold]"]
+    metrics = train(OpenDataset(n_channels=2), tmp_path, "epochs=1", *words)
     assert list(metrics["protocols"]) == ["by_unit", "cross_sensor"]
     assert list(metrics["novelty"]) == ["healthy_only", "open_set"]
-    page = (out / "report.html").read_text()
+    page = (tmp_path / "report.html").read_text()
     assert "Which faults are found" in page
     assert "never trained on (open_set)" in page
     assert "trained on channel_0, tested on channel_1" in page

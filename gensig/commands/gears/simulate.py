@@ -1,0 +1,135 @@
+"""``gensig simulate``: one record of a configuration or of a data set."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+
+import numpy as np
+
+from gensig.commands.console import remark, replaced_file
+from gensig.commands.figures.machine_figures import plot_record
+from gensig.commands.output import FIGURE_TYPES, check_file, check_new
+from gensig.errors import ConfigError
+from gensig.faults.registry import without_vary
+from gensig.options.configuration import Configuration
+from gensig.plan.make import make_plan
+from gensig.plan.request import read_request
+from gensig.production.folder import open_shard
+from gensig.production.reproduction import recorded_row, simulate_twin
+from gensig.record.machines import read_machine
+from gensig.record.simulate import Record, simulate_record
+from gensig.signals.indicators import crest_factor, kurtosis, rms
+from gensig.systems.base import Machine
+from gensig.units import channel_unit
+
+RECORD_TYPES = (".h5", ".hdf5", ".csv")
+
+
+def simulate(arguments: Namespace) -> int:
+    """Simulate one record as ``generate`` does, write and draw it, and print its levels.
+
+    Every value is as configured rather than drawn.
+    """
+    check_file("--plot", arguments.plot, FIGURE_TYPES)
+    check_file("--output", arguments.output, RECORD_TYPES)
+    check_new("--output", arguments.output, force=arguments.force)
+    if arguments.folder is not None:
+        return _simulate_recorded(arguments)
+    if arguments.record is not None or arguments.twin:
+        raise ConfigError(
+            "--record and --twin are of a data set; give it with --from DIR"
+        )
+    config = read_request(arguments.overrides, config_dir=arguments.config_dir).config
+    name = config["fault"]["kind"]
+    config = config.with_keys(
+        "plan",
+        n_records=1,
+        n_units=1,
+        n_gearboxes=1,
+        conditions_per_unit=None,
+        n_repeats=1,
+        classes=[name],
+        design="latin_hypercube",
+        vary={},
+    )
+    config = config.with_entries(classes={name: without_vary(config["fault"])})
+    record = simulate_record(config, make_plan(config).record(0))
+    return _show(config, record, arguments)
+
+
+def _simulate_recorded(arguments: Namespace) -> int:
+    """Simulate a record of a data set anew, or with --twin the same without its faults."""
+    if arguments.overrides or arguments.config_dir:
+        raise ConfigError(
+            "--from takes everything from the data set; "
+            "give no overrides and no --config-dir with it"
+        )
+    if arguments.record is None:
+        raise ConfigError("--from needs --record I, the number or id of a record")
+    config, row = recorded_row(Path(arguments.folder), arguments.record)
+    if not arguments.twin:
+        return _show(config, simulate_record(config, row), arguments)
+    name = f"healthy twin of {row['record_id']} ({row['label_name']})"
+    return _show(config, simulate_twin(config, row), arguments, name)
+
+
+def _show(
+    config: Configuration, record: Record, arguments: Namespace, name: str | None = None
+) -> int:
+    """Write, draw and print one record; a record without a name has its class and severity."""
+    values, acceleration = record.values, record.signals.get("acceleration")
+    if values.get("status") == "failed" or acceleration is None:
+        remark(f"{values['status_reason']}")
+        return 1
+    system = read_machine(config)
+    if arguments.output:
+        with replaced_file(arguments.output) as path:
+            if path.suffix == ".csv":
+                _write_csv(system, acceleration, path)
+            else:
+                _write_shard(config, record, path)
+    if arguments.plot:
+        with replaced_file(arguments.plot) as path:
+            plot_record(system, acceleration, values, path, name=name)
+    print(name or f"class {values['label_name']}, severity {values['severity']:.3f}")
+    speed, mesh = values["speed_rpm"], values["mesh_frequency_hz"]
+    print(f"speed {speed:.3f} r/min, mesh frequency {mesh:.2f} Hz")
+    _print_levels(system, acceleration)
+    return 0
+
+
+def _write_shard(config: Configuration, record: Record, path: Path) -> None:
+    """Write one record as a shard of one row."""
+    params = [
+        name.removeprefix("params/")
+        for name in record.values
+        if name.startswith("params/")
+    ]
+    with open_shard(path, config, 1, params) as writer:
+        writer.write(0, record.signals, record.values)
+
+
+def _write_csv(system: Machine, acceleration: np.ndarray, path: Path) -> None:
+    """Write one record as a table of time and channels."""
+    header = ["time_s"]
+    for name in system.sensing.channel_names:
+        unit = channel_unit(name).replace("/", "_per_").replace("^", "")
+        header.append(f"{name}_{unit}")
+    time = np.arange(acceleration.shape[1]) / system.sensing.sampling_rate
+    table = np.column_stack([time, *acceleration])
+    np.savetxt(path, table, "%.9g", ",", header=",".join(header), comments="")
+
+
+def _print_levels(system: Machine, acceleration: np.ndarray) -> None:
+    print(f"{'channel':<16}{'RMS':>12} {'':<8}{'kurtosis':>12}{'crest':>12}")
+    table = zip(
+        system.sensing.channel_names,
+        rms(acceleration),
+        kurtosis(acceleration),
+        crest_factor(acceleration),
+        strict=True,
+    )
+    for name, level, fourth, crest in table:
+        unit = channel_unit(name).replace("^", "")
+        print(f"{name:<16}{level:>12.4g} {unit:<8}{fourth:>12.3f}{crest:>12.3f}")

@@ -1,0 +1,294 @@
+"""Verbs on data sets and on options, with their arguments and examples."""
+
+from __future__ import annotations
+
+from gensig.commands.flags import (
+    CONFIG_DIR,
+    CONFIGURATION,
+    FOLDER,
+    QUIET,
+    Argument,
+    Verb,
+    count,
+    counts,
+    number,
+    numbers,
+    overrides,
+    required_out,
+    switch,
+    text,
+)
+
+INCOMPLETE = (
+    "records failed and are marked so, or the set is incomplete: "
+    "gensig resume DIR goes on"
+)
+ENDS = ("LOW", "HIGH")
+
+NEW_GEARBOX = (
+    Argument(("what",), {"choices": ("gearbox",), "help": "what to make"}),
+    text("name", "NAME", "of the options that are written"),
+    counts("--teeth", ("PINION", "WHEEL"), "needed; teeth of both gears"),
+    number("--module", "MM", "needed; normal module"),
+    number("--speed", "RPM", "needed; rated speed of the pinion"),
+    number("--torque", "NM", "needed; rated torque of the pinion"),
+    numbers("--widths", "MM", "face width of both or each (default: 10 modules)"),
+    numbers("--bores", "MM", "bore diameters (default: by the torque)"),
+    number("--helix", "DEG", "helix angle of the pinion (default: 0, spur)"),
+    number("--pressure-angle", "DEG", "of the basic rack (default: 20)"),
+    numbers("--profile-shifts", "X", "profile shifts (default: 0)"),
+    number("--addendum", "X", "of the teeth, over the module (default: 1)"),
+    numbers(
+        "--supports",
+        "N_PER_M",
+        "radial stiffness of what holds each gear (default: of ball bearings and shafts)",
+    ),
+    Argument(
+        ("--experiment",),
+        {
+            "choices": ("plain", "realistic"),
+            "default": "plain",
+            "help": "what the plan is made on: clean signals at the bearings, "
+            "or as measured (default: plain)",
+        },
+    ),
+    number("--rate", "HZ", "samples a second (default: 51200)"),
+    number("--duration", "S", "of a record (default: at least 10 turns)"),
+    count("--grade", "N", "of ISO 1328 (default: that of the experiment)"),
+    text("--classes", "FAULT", "healthy and faults (default: five)", nargs="+"),
+    text("--sensors", "NAME", "on the housing, with --experiment realistic", nargs="+"),
+    numbers("--speed-range", ENDS, "shares of the rated speed (default: 0.5 1.2)"),
+    numbers("--torque-range", ENDS, "shares of the rated torque (default: 0.3 1.2)"),
+    Argument(
+        ("--dir",),
+        {
+            "default": "configs",
+            "help": "folder of your options (default: configs)",
+        },
+    ),
+    switch("--json", help="print what was derived as JSON"),
+)
+
+TWIN = (
+    text(
+        "recording",
+        "RECORDING",
+        "healthy recording: .csv (time_s and sensors), .npy, .npz, .wav, .h5, .mat",
+    ),
+    overrides("what you know of the gears: gear.pinion.face_width_mm=15"),
+    counts(
+        "--teeth",
+        ("DRIVING", "DRIVEN"),
+        "teeth of both gears",
+        required=True,
+    ),
+    number("--speed", "RPM", "of the driving gear, within 3 %%", required=True),
+    required_out("DIR", "folder for the options; its name becomes theirs"),
+    number("--rate", "HZ", "samples a second, where the file does not tell"),
+    Argument(
+        ("--unit",),
+        {
+            "default": "m/s2",
+            "help": "m/s2 or g, where the column does not say (default: m/s2)",
+        },
+    ),
+    text("--channels", "NAME", "columns to use (default: all)", nargs="+"),
+    text(
+        "--array", "NAME", "array of a .npz, .h5 or .mat file (default: acceleration)"
+    ),
+    number("--module", "MM", "normal module (default: 2, assumed)"),
+    number("--torque", "NM", "of the driving gear (default: assumed by size)"),
+    text("--check", "FILE", "healthy recording held out (default: the second half)"),
+)
+
+SET_VERBS = {
+    "options": Verb(
+        summary="groups, their options, and the keys of an option, a line each",
+        examples=(
+            "gensig options",
+            "gensig options fault",
+            "gensig options fault=crack --json",
+        ),
+        runs="gensig.commands.options:list_options",
+        arguments=(
+            text(
+                "what",
+                "GROUP[=OPTION]",
+                "options of a group, or keys of an option",
+                nargs="?",
+            ),
+            CONFIG_DIR,
+            switch("--json", help="print as JSON"),
+        ),
+    ),
+    "generate": Verb(
+        summary="make a labelled data set",
+        examples=(
+            "gensig generate experiment=quickstart out=runs/quickstart",
+            "gensig generate -m fault=healthy,crack plan.n_records=20 out=runs/two",
+        ),
+        runs="gensig.commands.sets.datasets:generate",
+        arguments=(
+            *CONFIGURATION,
+            switch(
+                "-m",
+                "--multirun",
+                help="one data set for each combination of values a,b",
+            ),
+            QUIET,
+        ),
+        status_1=INCOMPLETE,
+    ),
+    "plan": Verb(
+        summary="dry run: records, bytes, predicted time",
+        examples=(
+            "gensig plan experiment=quickstart plan.n_records=2000",
+            "gensig plan experiment=quickstart out=runs/large --freeze",
+        ),
+        runs="gensig.commands.sets.datasets:plan",
+        arguments=(
+            *CONFIGURATION,
+            switch(
+                "--freeze",
+                help="make the folder out=DIR, ready for resume or array jobs",
+            ),
+        ),
+    ),
+    "new": Verb(
+        summary="options of a gearbox of your own, from its data sheet",
+        examples=(
+            "gensig new gearbox mine --teeth 20 45 --module 3 --speed 1500 --torque 60",
+        ),
+        runs="gensig.commands.new.gearbox:new",
+        arguments=NEW_GEARBOX,
+    ),
+    "resume": Verb(
+        summary="finish an interrupted data set",
+        examples=(
+            "gensig resume runs/quickstart",
+            "gensig resume runs/quickstart executor=dask executor.n_workers=4",
+        ),
+        runs="gensig.commands.sets.datasets:resume",
+        arguments=(
+            FOLDER,
+            overrides("executor=... and executor.key=...; other keys must agree"),
+            count("--workers", "N", "worker processes (default: one a core)"),
+            QUIET,
+        ),
+        status_1=INCOMPLETE,
+    ),
+    "finalize": Verb(
+        summary="close a data set made by array jobs, or accept an edited card",
+        examples=("gensig finalize runs/large",),
+        runs="gensig.commands.sets.datasets:finalize",
+        arguments=(FOLDER,),
+        status_1="records failed and are marked so in the closed set",
+    ),
+    "verify": Verb(
+        summary="is a data set whole and unaltered?",
+        examples=("gensig verify runs/quickstart",),
+        runs="gensig.commands.sets.checks:verify",
+        arguments=(FOLDER, switch("--quick", help="sizes and manifest only")),
+        status_1="damaged, altered or incomplete; every problem is printed",
+    ),
+    "reproduce": Verb(
+        summary="simulate records of a data set again and compare",
+        examples=("gensig reproduce runs/quickstart --records 20",),
+        runs="gensig.commands.sets.checks:reproduce",
+        arguments=(
+            FOLDER,
+            count(
+                "--records",
+                "N",
+                "records, spread evenly (default: 10)",
+                default=10,
+            ),
+        ),
+        status_1="records came out otherwise than recorded",
+    ),
+    "inspect": Verb(
+        summary="what is in a data set or file",
+        examples=("gensig inspect runs/quickstart/shards/shard-00000.h5",),
+        runs="gensig.commands.sets.checks:inspect",
+        arguments=(text("path", "PATH", "folder of a data set, or an HDF5 file"),),
+    ),
+    "report": Verb(
+        summary="a data set as one HTML page: signals, spectra, parameters, indicators, splits",
+        examples=(
+            "gensig report runs/quickstart",
+            "gensig report runs/quickstart --out quickstart.html --records 5",
+        ),
+        runs="gensig.commands.sets.export:report",
+        arguments=(
+            text("folder", "DIR", "folder of a complete data set"),
+            text(
+                "--out",
+                "FILE",
+                "page to write, a new file (default: DIR/report.html)",
+            ),
+            count(
+                "--records",
+                "N",
+                "records shown of each class (default: up to 3)",
+            ),
+        ),
+    ),
+    "export": Verb(
+        summary="a data set as one HDF5 file, Parquet, npz or wav",
+        examples=(
+            "gensig export runs/quickstart --to parquet --out quickstart.parquet",
+        ),
+        runs="gensig.commands.sets.export:export",
+        arguments=(
+            text("folder", "DIR", "folder of a complete data set; it is left alone"),
+            text("--to", "FORMAT", "hdf5, parquet, npz or wav", required=True),
+            required_out("PATH", "file (wav: folder) that does not exist yet"),
+            switch("--samples", help="parquet: time signals too, not only the labels"),
+            switch("--one-channel", help="wav: one file a channel, not one a record"),
+        ),
+    ),
+}
+
+OTHER_VERBS = {
+    "twin": Verb(
+        summary="a configuration like a measured healthy machine",
+        examples=(
+            "gensig twin healthy.csv --teeth 23 46 --speed 2000 --module 2 --torque 20"
+            " --out my_machine",
+            "gensig generate --config-dir my_machine experiment=my_machine out=runs/my_machine",
+        ),
+        runs="gensig.commands.sets.twin:twin",
+        arguments=TWIN,
+    ),
+    "completion": Verb(
+        summary="what to source so that the tab key completes both commands",
+        examples=(
+            "gensig completion bash",
+            'eval "$(gensig completion zsh)"',
+            "gensig completion fish",
+        ),
+        runs="gensig.terminal.completion:completion",
+        arguments=(
+            Argument(
+                ("shell",),
+                {
+                    "choices": ("bash", "zsh", "fish"),
+                    "help": "the shell that reads it",
+                },
+            ),
+        ),
+    ),
+    "validate": Verb(
+        summary="every printed figure of the source papers against ours",
+        examples=("gensig validate --markdown docs/validation.md",),
+        runs="gensig.commands.validate:validate",
+        arguments=(
+            text(
+                "--markdown",
+                "FILE",
+                "write the whole comparison as a Markdown page",
+            ),
+        ),
+        status_1="rows have another verdict than they declare",
+    ),
+}

@@ -1,0 +1,61 @@
+"""``gensig verify``, ``reproduce`` and ``inspect``: checks of a data set on disk."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+
+from gensig.dataset.folder.inspection import inspect as inspect_path
+from gensig.dataset.folder.verify import verify as verify_folder
+from gensig.errors import ConfigError
+
+
+def verify(arguments: Namespace) -> int:
+    """Print every problem of a data set; the exit status is 0 for a whole and unaltered one."""
+    folder, depth = arguments.folder, "every byte"
+    result = verify_folder(Path(folder), quick=arguments.quick)
+    for problem in result.problems:
+        print(problem)
+    if result.problems:
+        print(f"{folder} is NOT whole: {len(result.problems)} problem(s)")
+        return 1
+    if arguments.quick:
+        depth = "sizes and manifest"
+    records = f"{result.n_records} records"
+    if result.n_failed:
+        records += f", {result.n_failed} marked failed"
+    print(f"{folder} is whole and unaltered ({depth} checked): {records}")
+    return 0
+
+
+def reproduce(arguments: Namespace) -> int:
+    """Simulate records anew from their parameters and compare; exit status 0 where they agree."""
+    from gensig.production.reproduction import ACCEPTED
+    from gensig.production.reproduction import reproduce as reproduce_records
+
+    if arguments.records < 1:
+        raise ConfigError(f"--records {arguments.records} must be at least 1")
+    found = reproduce_records(Path(arguments.folder), arguments.records)
+    for name, (recorded, present) in found.other.items():
+        recorded, present = recorded or "unknown", present or "unknown"
+        print(f"made with {name} {recorded}, here is {present}")
+    line = f"{found.n_equal} of {found.n_records} records have the same bits"
+    if found.n_failed:
+        line += (
+            f"; {found.n_failed} failed again for the same reason and hold no signal"
+        )
+    print(line)
+    if found.worst:
+        accepted = "here every bit must agree"
+        if found.other:
+            accepted = f"{ACCEPTED:g} is accepted"
+        largest, worst = found.largest, found.worst
+        print(f"largest difference {largest:.2g} of the record's RMS, in {worst}")
+        print(f"{found.n_refused} record(s) NOT reproduced; {accepted}")
+    return int(found.n_refused > 0)
+
+
+def inspect(arguments: Namespace) -> int:
+    """Print what a data set or an HDF5 file holds."""
+    print(inspect_path(Path(arguments.path)))
+    return 0

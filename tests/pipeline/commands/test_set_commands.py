@@ -1,0 +1,63 @@
+"""simulate, plan and generate as a user types them; see test_progress.py for what they print."""
+
+import re
+
+import h5py
+import numpy as np
+import pytest
+
+from gensig.cli import main
+
+
+@pytest.mark.parametrize("suffix", [".h5", ".csv"])
+def test_simulate_writes_one_record(gensig, drawn, suffix, tmp_path, capsys):
+    file = tmp_path / f"record{suffix}"
+    line = (
+        "simulate fault=missing_tooth operating.duration_s=0.1 "
+        f"sensing.channels=[pinion_y,wheel_y] --output {file.name}"
+    )
+    gensig(f"{line} --plot r.png")
+    if suffix == ".h5":
+        with h5py.File(file) as shard:
+            assert shard["acceleration"].shape == (1, 2, 5120)
+            assert shard.attrs["sampling_rate_hz"] == 51200.0
+            assert shard["label_name"].asstr()[0] == "missing_tooth"
+        gensig("inspect record.h5")
+    else:
+        table = np.genfromtxt(file, delimiter=",", names=True)
+        assert table.dtype.names == ("time_s", "pinion_y_m_per_s2", "wheel_y_m_per_s2")
+        assert len(table) == 5120
+    wave, spectrum, envelope = drawn[0].values()
+    assert wave.get_xlabel() == "time, s"
+    assert wave.get_ylabel() == "acceleration, m/s$^2$"
+    assert spectrum.get_title().endswith("harmonics of the mesh frequency 690.0 Hz")
+    assert len(envelope.lines) == 12  # the spectrum and eleven turns of the pinion
+    before = file.stat().st_mtime_ns
+    assert main(line.split()) == 2
+    assert "choose another name, or add --force" in capsys.readouterr().err
+    assert file.stat().st_mtime_ns == before
+    gensig(f"{line} --force")
+    assert file.stat().st_mtime_ns > before
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_plan_predicts_without_writing(gensig, tmp_path):
+    line = "plan experiment=quickstart operating.duration_s=0.02"
+    said, notes = gensig(f"{line} out=x")
+    assert "records    400" in said
+    assert "healthy 100" in said
+    assert re.fullmatch(r"making \d+ of 400 records to time them\n", notes)
+    assert not list(tmp_path.iterdir())
+    said, notes = gensig(f"{line} fault=crack")
+    assert "crack 400" in said
+    classes = "[healthy, crack, pitting, missing_tooth]"
+    assert f"gensig: note: fault=crack replaces plan.classes {classes}\n" in notes
+
+
+def test_existing_folder_is_refused_and_untouched(tmp_path, capsys):
+    precious = tmp_path / "precious.txt"
+    precious.write_text("mine")
+    assert main(["generate", f"out={tmp_path}"]) == 2
+    assert "not empty" in capsys.readouterr().err
+    assert precious.read_text() == "mine"
+    assert list(tmp_path.iterdir()) == [precious]

@@ -1,0 +1,58 @@
+"""Simulated records that several tests look at, and runs of the command."""
+
+from functools import lru_cache
+
+import h5py
+import numpy as np
+
+from gensig.cli import main
+from gensig.plan.make import make_plan
+from gensig.plan.request import read_request
+from gensig.record.simulate import forget_twins, simulate_records
+
+
+@lru_cache(maxsize=32)
+def records(*overrides):
+    """Configuration, rows and records of a small plan; not to be changed."""
+    small = ("plan.n_records=4", "plan.classes=[healthy,missing_tooth]")
+    config = read_request([*small, *overrides]).config
+    plan = make_plan(config)
+    rows = [plan.record(place) for place in range(plan.n_records)]
+    forget_twins()
+    return config, rows, simulate_records(config, rows)
+
+
+def run(*words):
+    assert main([str(word) for word in words]) == 0
+
+
+def refused(capsys, *words):
+    """The one line with which the command refuses words."""
+    assert main([str(word) for word in words]) != 0
+    error = capsys.readouterr().err.strip()
+    assert "\n" not in error
+    return error
+
+
+def shard(folder):
+    return h5py.File(folder / "shards" / "shard-00000.h5", locking=False)
+
+
+def texts(values):
+    """Texts of a dataset or attribute of a file."""
+    return [value.decode() for value in values]
+
+
+def check_labels(file, classes, n_teeth):
+    """One record of each class is there and ok; a faulty one names a tooth of the wheel."""
+    names = texts(file["label_name"][:])
+    assert set(texts(file["status"][:])) == {"ok"}
+    assert set(names) == set(classes)
+    assert np.all(file["integration_error"][:] < 1e-3)
+    gears, teeth = texts(file["fault_gear"][:]), file["fault_tooth"][:]
+    for name, gear, tooth in zip(names, gears, teeth, strict=True):
+        is_faulty = name != "healthy"
+        assert (gear == "wheel", 0 <= tooth < n_teeth) == (is_faulty, is_faulty)
+    signals = file["acceleration"][:]
+    assert np.isfinite(signals).all()
+    assert np.all(signals.std(axis=-1) > 0.0)

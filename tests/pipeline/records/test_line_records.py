@@ -1,0 +1,301 @@
+"""Single records, lives and statics of drive lines, and what is refused in one line."""
+
+import json
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from record_sets import refused, run, shard
+from test_line_sets import ENGINE, TWO_STAGE
+
+from gensig.commands.figures import engine_figures
+from gensig.driveline import in_time as line_time
+from gensig.driveline import loads as line_loads
+from gensig.dynamics.backends.registry import BACKENDS, DEFAULT_BACKEND
+from gensig.plan.make import make_plan
+from gensig.plan.request import read_request
+from gensig.record.machines import read_machine
+from gensig.systems.spur_pair import SpurPair
+
+MOTOR = ("system=two_stage_gearbox", "excitation=motor_and_load")
+TRAIN = ("system=engine_gear_train", "excitation=engine_v20")
+LIFE = (
+    "experiment=two_stage",
+    "plan.n_records=null",
+    "plan.n_repeats=1",
+    "plan.n_units=2",
+    "plan.n_gearboxes=1",
+    "plan.vary={}",
+    "life.snapshot_count=3",
+    "life.n_setpoints=1",
+    "operating.torque_nm=150",
+)
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """Figures of lines that the command draws."""
+    figures = []
+
+    def keep(figure, path):
+        figures.append(figure)
+        path.write_bytes(b"0")
+
+    monkeypatch.setattr(engine_figures, "save", keep)
+    return figures
+
+
+@pytest.mark.parametrize(
+    ("words", "texts", "header"),
+    [
+        (
+            ENGINE[:2],
+            ("flywheel_speed", "rad/s "),
+            "time_s,flywheel_speed_rad_per_s,pump_end_speed_rad_per_s,pinion_rotation_rad_per_s2",
+        ),
+        (
+            (*TWO_STAGE[:2], "fault=missing_tooth"),
+            ("class missing_tooth", "speed 174"),
+            "time_s,pinion_rotation_rad_per_s2,wheel_rotation_rad_per_s2,pinion_y_m_per_s2",
+        ),
+    ],
+)
+def test_simulate_shows_and_writes_a_record(words, texts, header, tmp_path, capsys):
+    out = tmp_path / "one.csv"
+    run("simulate", *words, "--plot", tmp_path / "one.png", "--output", out)
+    printed = capsys.readouterr().out
+    assert all(text in printed for text in texts)
+    assert out.read_text().startswith(header)
+    assert (tmp_path / "one.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("life", "kind"), [("crack_growth", "crack"), ("pit_growth", "distributed_pitting")]
+)
+def test_lives_grow_under_the_steady_loads_of_the_mesh(life, kind, monkeypatch):
+    monkeypatch.setattr(line_loads, "SECONDS", 0.1)
+    words = [*LIFE, f"life={life}", f"plan.classes=[healthy,{kind}]"]
+    columns = make_plan(read_request(words).config).columns
+    grown = columns["label_name"] == kind
+    assert columns["severity"][grown].max() > columns["severity"][grown].min()
+    assert (columns["severity"][~grown] == 0.0).all()
+
+
+def test_loads_of_a_steady_mesh_are_its_static_torque(monkeypatch):
+    monkeypatch.setattr(line_loads, "SECONDS", 0.1)
+    machine = read_machine(read_request(["experiment=two_stage"]).config)
+    loads = machine.mesh_torques(machine.operating.speed, 30.0)
+    assert_allclose(loads, 30.0, rtol=0.35)
+
+
+def test_gears_that_bear_far_more_than_their_support_is_for_are_named():
+    words = ["experiment=two_stage", "operating.torque_nm=60"]
+    named = "meshes 3/4 1995 N, 5/6 3991 N, but every gear is on a support for .* 500 N"
+    with pytest.warns(UserWarning, match=named):
+        read_machine(read_request(words).config).check()
+    torsion = (
+        "system.lateral=false",
+        "sensing.channels=[pinion_rotation,wheel_rotation]",
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for more in (["system.support.force_n=2000"], torsion):
+            read_machine(read_request([*words, *more]).config).check()
+
+
+def test_stiffness_is_that_of_the_record_mesh(tmp_path):
+    words = (*MOTOR, "system.record_mesh=[5,6]", "operating.torque_nm=60")
+    out = tmp_path / "curves.json"
+    run("stiffness", *words, "fault=crack", "--json", out)
+    content = json.loads(out.read_text())
+    # the same teeth as a pair, under what the first stage makes of the torque
+    line = read_machine(read_request(list(words)).config)
+    alone = SpurPair(
+        pair=line.pair,
+        material=line.material,
+        mesh=line.mesh,
+        pinion=line.pinion,
+        wheel=line.wheel,
+        operating=replace(line.operating, torque=180.0),
+        sensing=line.sensing,
+        quality=line.quality,
+        solver=line.solver,
+    ).stiffness_curves()
+    stiffness = line.stiffness_curves().mesh_stiffness
+    assert_allclose(stiffness, alone.mesh_stiffness, rtol=1e-9)
+    faulty, sound = (
+        min(content[f"{kind}_pair_stiffness_n_per_m"]) for kind in ("faulty", "single")
+    )
+    assert faulty < sound
+
+
+def test_a_toothed_wheel_and_the_torque_of_the_load_are_stored(tmp_path):
+    errors = (
+        "eccentricity_error_deg: 0, tooth_error_deg: 0, clock_frequency_hz: 100000000"
+    )
+    words = (
+        f"excitation.toothed_wheels={{motor: {{node: 1, n_teeth: 60, {errors}}}}}",
+        "sensing.channels=[motor_speed, wheel_rotation]",
+        "excitation.load.law=quadratic",
+        "operating=ramp",
+        "operating.speed_profile.first_factor=0.5",
+        "dataset.store_operating=true",
+        "operating.speed_rpm=1746",
+        "operating.torque_nm=30",
+        "operating.duration_s=0.1",
+        "plan.n_records=4",
+        "plan.n_units=1",
+    )
+    out = tmp_path / "set"
+    run("generate", *TWO_STAGE, *words, f"out={out}")
+    with shard(out) as file:
+        torque = file["torque_set"][:]
+    assert_allclose(torque[:, 0], 0.25 * 30.0, rtol=1e-3)
+    assert_allclose(torque[:, -1], 30.0, rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["system.record_mesh=null"], "give its two nodes, one of 3/18, 19/20"),
+        (["system.record_mesh=[18,3]"], "no such mesh; there are 3/18, 19/20"),
+        (["system.helical_meshes=rigid"], "allowed: sliced, constant"),
+        (["system.record_mesh=[3,18]", "mesh.slices_in_phase=true"], "take false"),
+        (["sensing.channels=[pinion_x]"], "with system.lateral=true also pinion_x"),
+        (
+            ["sensing.channels=[crank_speed]"],
+            "allowed: pinion_rotation, wheel_rotation, fly",
+        ),
+        (["sensing=housing"], "no channel pinion_x"),
+        (["sensing.sensor.low_cutoff_hz=1"], "take sensing=shaft_line"),
+        (["mesh.law=paper"], "the meshes of a drive line are one-sided"),
+        (["solver.precision=float32"], "integrated in float64"),
+        (["solver.backend=euler"], "solver.backend = 'euler'; allowed: runge_kutta"),
+        (
+            ["solver.backend=other"],
+            "a drive line has an integrator of its own; leave it out",
+        ),
+        (["dataset.store_mesh_state=true"], "take false"),
+        (["heat=chongqing_rated"], "a drive line takes heat=none"),
+        (["operating.torque_nm=-5"], "must be positive"),
+        (["fault.tooth=60"], "whose teeth are 0..53"),
+    ],
+)
+def test_refused_sets_of_an_engine(words, text, tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(BACKENDS, "other", BACKENDS[DEFAULT_BACKEND])
+    out = tmp_path / "set"
+    few = (*ENGINE, "plan.classes=[crack]")
+    assert text in refused(capsys, "generate", *few, *words, f"out={out}")
+    assert not out.exists()
+
+
+MOTOR_KEY = "excitation.motor"
+FAN = "excitation.loads={{fan: {{node: {}, law: {}, torque_nm: 1}}}}"
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (
+            ["system.motor_node=null"],
+            "the tables want system.motor_node, system.load_node",
+        ),
+        (
+            ["system.motor_node=99"],
+            "= 99: the shaft line has no node 99; it has 1, 2, 3",
+        ),
+        (["system.motor_node=8"], "turns 0.2 times as fast as the first node"),
+        (
+            ["system.load_node=null"],
+            "excitation=motor_and_load needs the node of its load",
+        ),
+        (
+            ["system.load_node=99"],
+            "system.motor_node, system.load_node and, for records",
+        ),
+        ([FAN.format(99, "linear")], "excitation.loads.fan.node: the shaft line"),
+        ([FAN.format(2, "cubic")], "excitation.loads.fan.law = 'cubic'"),
+        (["+excitation.cylinder={bore_mm: 100}"], "a line is turned by one of them"),
+        (
+            ["excitation=engine_v20", f"+{MOTOR_KEY}={{slip: 0.1}}"],
+            "a line is turned by one",
+        ),
+        (["excitation=engine_v20"], "the shaft line has no node 13"),
+        (["excitation.kind=turbine"], "allowed: engine, motor_and_load"),
+        ([f"{MOTOR_KEY}.slip=0"], f"{MOTOR_KEY}.slip = 0 must lie between 0 and 1"),
+        (
+            [f"{MOTOR_KEY}.torque_ripple={{share: 2, order: 6}}"],
+            "share = 2 must lie in 0..1",
+        ),
+        (
+            [f"{MOTOR_KEY}.torque_ripple={{share: 0.1, order: 0.7}}"],
+            "a multiple of 0.5 up to 100",
+        ),
+        ([f"+{MOTOR_KEY}.node=1"], "unknown key 'node'"),
+        (["excitation.load.law=cubic"], "allowed: constant, linear, quadratic"),
+        (
+            ["excitation.reference.torque_nm=0"],
+            "speed_rpm and torque_nm must be positive",
+        ),
+        ([f"{MOTOR_KEY}=3"], f"{MOTOR_KEY} = 3 must be a group of keys"),
+        (
+            ["--run", "500", "1000", "100"],
+            f"turns evenly without {MOTOR_KEY}.torque_ripple",
+        ),
+        (["--time=0"], "give seconds above 0"),
+        (["--time=nan"], "give seconds above 0"),
+        (["--time=1000"], "give seconds above 0"),
+    ],
+)
+def test_refused_responses_of_a_motor_line(words, text, capsys):
+    assert text in refused(capsys, "forced-response", *MOTOR, *words)
+
+
+def test_a_helical_mesh_has_no_stiffness_command(capsys):
+    words = (*TRAIN, "system.record_mesh=[3,18]")
+    error = refused(capsys, "stiffness", *words)
+    assert "system.record_mesh 3/18 is of helical gears" in error
+
+
+def test_the_figure_shows_the_forces_of_every_mesh(monkeypatch, drawn, tmp_path):
+    monkeypatch.setattr(line_time, "SETTLING", 0.02)
+    figure = tmp_path / "response.png"
+    run("forced-response", *MOTOR, "--time", 0.1, "--plot", figure)
+    panels = {axes.get_title(): axes for axes in drawn[0].axes}
+    assert len(panels) == 6
+    low, high = panels["Tooth force of the meshes, least to greatest"].get_ylim()
+    assert low <= 0.0
+    assert high > 3.991
+    labels = {axes.get_xlabel() for axes in panels.values()}
+    assert {label for label in labels if "angle" in label} == {
+        "angle of the motor, degrees"
+    }
+
+
+def test_forced_response_prints_torque_and_meshes(drawn, tmp_path, capsys):
+    figure = ("--plot", tmp_path / "response.png")
+    run("forced-response", *MOTOR, *figure)
+    printed = capsys.readouterr().out
+    assert "60 N m of the load at the motor" in printed
+    assert "mean 1995 N" in printed
+    ripple = f"{MOTOR_KEY}.torque_ripple={{share: 0.02, order: 12}}"
+    run_up = ("--run", 500, 1000, 100, "--run-torque", 30)
+    run("forced-response", *MOTOR, ripple, *run_up, *figure)
+    assert len(drawn) == 2
+
+
+def test_forced_response_in_time_says_what_parts(tmp_path, capsys):
+    out = tmp_path / "response.json"
+    words = ("--nodes", 14, 45, "--time", 0.3, "--json", out)
+    run("forced-response", *TRAIN, *words)
+    content = json.loads(out.read_text())
+    drive = content["meshes"].index("21/45")
+    assert content["time_energy_residual"] < 1e-3
+    assert content["time_contact_loss_fraction"][drive] > 0.1
+    fluctuation = content["speed_fluctuation_rpm"][44]
+    assert content["time_speed_fluctuation_rpm"][1] > 1.5 * fluctuation
+    greatest = np.array(content["time_greatest_tooth_force_n"])
+    assert greatest[drive] > content["mean_tooth_force_n"][drive]
+    assert "on the back flanks" in capsys.readouterr().out

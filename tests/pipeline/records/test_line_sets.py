@@ -1,0 +1,150 @@
+"""Small data sets of drive lines through every verb: two engine meshes and a two-stage gearbox."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from record_sets import check_labels, run, shard, texts
+
+from gensig.dataset.folder.layout import PLAN
+from gensig.dataset.plan import PlanRows
+from gensig.plan.request import read_request
+from gensig.record.simulate import simulate_record
+
+ENGINE = (
+    "experiment=engine_broken_tooth",
+    "operating.duration_s=0.05",
+    "plan.n_records=4",
+    "plan.n_units=1",
+)
+TWO_STAGE = (
+    "experiment=two_stage",
+    "operating.duration_s=0.1",
+    "plan.n_records=8",
+    "plan.n_units=2",
+    "plan.n_gearboxes=1",
+)
+
+
+@dataclass(frozen=True)
+class Line:
+    """Words of a set, and what its file must say.
+
+    ``teeth`` of the driving and the driven gear; ``ratio`` of the driving shaft's speed to the
+    set one; ``report`` is in the output of ``inspect``.
+    """
+
+    words: tuple[str, ...]
+    classes: tuple[str, ...]
+    teeth: tuple[int, int]
+    ratio: float
+    units: tuple[str, ...]
+    report: str
+
+
+LINES = {
+    # the driving shaft of the mesh is the camshaft, at half the crank's speed
+    "engine": Line(
+        words=ENGINE,
+        classes=("broken", "crack", "healthy", "missing_tooth"),
+        teeth=(54, 54),
+        ratio=0.5,
+        units=("rad/s", "rad/s", "rad/s^2", "rad/s^2"),
+        report="flywheel_speed, pump_end_speed",
+    ),
+    # the crank gear drives an idler
+    "engine_helical": Line(
+        words=(
+            *ENGINE,
+            "system.record_mesh=[3,66]",
+            "mesh.n_slices=12",
+            "mesh.points_per_pitch=128",
+            "plan.classes=[healthy,crack,broken,chipped]",
+        ),
+        classes=("broken", "chipped", "crack", "healthy"),
+        teeth=(59, 68),
+        ratio=1.0,
+        units=("rad/s", "rad/s", "rad/s^2", "rad/s^2"),
+        report="flywheel_speed, pump_end_speed",
+    ),
+    "two_stage": Line(
+        words=(*TWO_STAGE, "system.record_mesh=[5,6]", "fault.gear=wheel"),
+        classes=("broken", "crack", "healthy", "missing_tooth"),
+        teeth=(48, 80),
+        ratio=1.0 / 3.0,
+        units=("rad/s^2", "rad/s^2", "m/s^2", "m/s^2"),
+        report="of the load, as the motor feels it",
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Made:
+    line: Line
+    folder: Path
+
+    def row_of(self, name):
+        rows = PlanRows(self.folder / PLAN).records(0, len(self.line.classes))
+        return next(row for row in rows if row["label_name"] == name)
+
+    def stored(self, row):
+        with shard(self.folder) as file:
+            return file["acceleration"][int(row["row"])]
+
+
+@pytest.fixture(scope="module", params=LINES)
+def made(request, tmp_path_factory):
+    line = LINES[request.param]
+    folder = tmp_path_factory.mktemp(request.param) / "set"
+    run("generate", *line.words, f"out={folder}")
+    return Made(line, folder)
+
+
+def test_a_set_is_whole_and_comes_again(made, capsys):
+    run("verify", made.folder)
+    run("reproduce", made.folder, "--records", 1)
+    capsys.readouterr()
+    run("inspect", made.folder)
+    assert made.line.report in capsys.readouterr().out
+    if "torque" in made.line.report:
+        assert f"{made.line.report} |" in (made.folder / "README.md").read_text()
+
+
+def test_labels_units_and_columns_name_gear_tooth_and_shaft(made):
+    line = made.line
+    with shard(made.folder) as file:
+        check_labels(file, line.classes, line.teeth[1])
+        assert texts(file.attrs["channel_units"]) == list(line.units)
+        assert set(texts(file["integration_check"][:])) == {"energy"}
+        set_speed = file["params/operating.speed_rpm"][:]
+        assert_allclose(file["speed_set_rpm"][:], line.ratio * set_speed)
+        mesh = line.teeth[0] * file["speed_rpm"][:] / 60
+        assert_allclose(file["mesh_frequency_hz"][:], mesh)
+
+
+def test_a_record_depends_on_its_row_alone_and_a_sham_has_no_fault(made):
+    config = read_request([*made.line.words]).config
+    row = made.row_of("broken")
+    again = simulate_record(config, row).signals["acceleration"]
+    assert_array_equal(again, made.stored(row))
+    sham = simulate_record(config.with_keys("plan", sham=True), row)
+    assert not np.array_equal(sham.signals["acceleration"], again)
+
+
+@pytest.mark.parametrize("made", ["two_stage"], indirect=True)
+def test_simulate_writes_a_record_of_the_set_and_its_twin(made, tmp_path):
+    row = made.row_of("broken")
+    number = int(row["record_id"].removeprefix("r"))
+    again = ("simulate", "--from", made.folder, "--record", number, "--output")
+    run(*again, tmp_path / "again.h5")
+    run(*again, tmp_path / "twin.h5", "--twin")
+    with (
+        h5py.File(tmp_path / "again.h5") as record,
+        h5py.File(tmp_path / "twin.h5") as twin,
+    ):
+        assert_array_equal(record["acceleration"][0], made.stored(row))
+        assert twin["severity"][0] == 0.0
+        assert not np.array_equal(twin["acceleration"][0], made.stored(row))

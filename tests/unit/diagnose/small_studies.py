@@ -1,0 +1,79 @@
+"""Small settings, trainings and scores that the tests of `diagnose` share."""
+
+import json
+
+import numpy as np
+import pytest
+
+import gensig.dataset.reader
+from diagnose.cli import main
+from diagnose.data.windows import load_windows, subset_segments
+from diagnose.scoring.metrics import balanced_accuracy, confusion_by_unit
+from diagnose.settings import settings_from
+from diagnose.studies.jobs import Job, run_jobs
+from diagnose.studies.study import settings_for, task_from
+from gensig.options.compose import compose
+
+SMALL = [
+    "window_samples=1200",
+    "stride_samples=1000",
+    "seeds=[0]",
+    "n_threads=1",
+    "n_bootstrap=50",
+    "protocols=[by_unit]",
+]
+TINY_CNN = ["model.widths=[8,16]", "model.kernels=[32,5]", "model.strides=[8,4]"]
+NETWORK_ALONE = ["shuffle_control=false", "baselines=false"]
+LEARNS = ["epochs=8", "epoch_fraction=0.6", "learning_rate=0.01"]
+
+
+def settings_of(*overrides):
+    return settings_from(compose("train", ["data=x", "out=y", *SMALL, *overrides]))
+
+
+def study_of(dataset, *overrides):
+    """Task and settings of a study."""
+    settings = settings_for(dataset, settings_of(*overrides))
+    return task_from(dataset, settings), settings
+
+
+def windows_of(task, *subsets, protocol="by_unit"):
+    """Windows of each subset."""
+    return [
+        load_windows(task, subset_segments(task, protocol, subset))
+        for subset in subsets
+    ]
+
+
+def run(task, settings, *jobs, n_workers=1):
+    """Predictions of jobs, by default one training on by_unit."""
+    jobs = jobs or (Job(protocols=("by_unit",), seed=0),)
+    return run_jobs(task, settings, jobs, n_workers=n_workers, on_done=lambda _: None)
+
+
+def train(dataset, out, *words):
+    """``metrics.json`` of the command on a data set in memory, or on several by their names."""
+    sets = dataset if isinstance(dataset, dict) else {"good": dataset}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            gensig.dataset.reader, "open_dataset", lambda path: sets[str(path)]
+        )
+        assert (
+            main(["train", "data=good", f"out={out}", *SMALL, *TINY_CNN, *words]) == 0
+        )
+    return json.loads((out / "metrics.json").read_text())
+
+
+def accuracy(task, record, predicted):
+    """Balanced accuracy of predicted labels (record,)."""
+    label = task.labels()[record]
+    one_unit, n_classes = np.zeros_like(label), len(task.class_names)
+    confusion = confusion_by_unit(label, predicted, one_unit, n_classes)
+    return float(balanced_accuracy(confusion[0]))
+
+
+def command(capsys, *words):
+    """Status, output and error text of a command."""
+    capsys.readouterr()
+    status = main([str(word) for word in words])
+    return status, *capsys.readouterr()

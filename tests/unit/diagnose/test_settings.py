@@ -1,0 +1,82 @@
+"""Settings of a training: refusals in one line, and values that may be left out."""
+
+import subprocess
+import sys
+
+import pytest
+from small_studies import settings_of
+
+from diagnose.baselines.base import Role
+from diagnose.baselines.registry import baseline_names
+from gensig.errors import ConfigError
+from gensig.options.compose import compose
+
+WHOLE = "must be a whole number of at least 1"
+LIST = "must be false or a list of different names"
+REFUSALS = [
+    ("epochs=0", f"epochs {WHOLE}"),
+    ("n_threads=0", f"n_threads {WHOLE}"),
+    ("window_samples=0", f"window_samples {WHOLE}"),
+    ("window_samples=1.5", WHOLE),
+    ("window_samples=long", WHOLE),
+    ("stride_samples=-1", f"stride_samples {WHOLE}"),
+    ("minirocket_features=83", "must be a whole number of at least 84"),
+    ("batch_size=1", "must be a whole number of at least 2"),
+    ("seeds=[]", "seeds must be a list"),
+    ("seeds=null", "seeds must be a list"),
+    ("seeds=[1,1]", "seeds must be a list of different"),
+    ("epoch_fraction=2", "epoch_fraction must be a number from 0 to 1"),
+    ("learning_rate=high", "learning_rate must be a number"),
+    ("+extra=1", "knows no key 'extra'"),
+    ("shuffle_control=3", "shuffle_control must be true or false"),
+    ("tensorboard=2", "tensorboard must be true or false, not 2"),
+    ("device=tpu", "device must be one of auto, cpu, cuda"),
+    ("task=cooking", "task must be one of classes, remaining_life"),
+    ("oracle=true", "oracle must be auto or false"),
+    ("sham=3", "sham must be the folder of a data set made with plan.sham=true"),
+    ("features=some", "features must be basic or all"),
+    ("baselines=[minirockets]", f"baselines {LIST}"),
+    ("baselines=[minirocket,minirocket]", f"baselines {LIST}"),
+    ("baselines=true", f"baselines {LIST}"),
+    ("heads=[tooth]", f"heads {LIST} out of severity, gear"),
+    ("heads=[gear,gear]", f"heads {LIST}"),
+    ("classes={a: 1}", r"classes must be a list, for instance classes=\[a,b\]"),
+    *(
+        (f"sampling_rate_hz={value}", "sampling_rate_hz must be null or a number")
+        for value in ("fast", "0", "-5", "true", "inf")
+    ),
+    ("remaining_life.early_life_h=0", "early_life_h must be a number above 0, not 0"),
+    ("remaining_life.coverage=1", "coverage must be a number above 0 and below 1"),
+    ("remaining_life.with_age=2", "with_age must be true or false"),
+    ("remaining_life=3", "remaining_life must hold"),
+]
+
+
+@pytest.mark.parametrize(("override", "message"), REFUSALS)
+def test_mistakes_are_refused(override, message):
+    with pytest.raises(ConfigError, match=message):
+        settings_of(override)
+
+
+@pytest.mark.parametrize(
+    ("override", "expected"),
+    [("false", ()), ("[]", ()), ("minirocket", ("minirocket",))],
+)
+def test_baselines_may_be_left_out_or_be_one(override, expected):
+    assert settings_of(f"baselines={override}").baselines == expected
+
+
+def test_the_default_baselines_are_registered():
+    config = compose("train", ["data=x", "out=y"])
+    assert set(config["baselines"]) <= set(baseline_names(Role.RIVAL))
+
+
+def test_settings_are_refused_without_loading_torch():
+    """A mistake in a setting is answered at once; torch takes seconds to load."""
+    code = (
+        "import diagnose.settings, sys; print({'torch', 'sklearn'} & set(sys.modules))"
+    )
+    shown = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert shown.stdout.strip() == "set()"
