@@ -206,7 +206,8 @@ class LineMachine(Machine):
         table = self.mesh_table(faults)
         if not isinstance(table, PairTable):
             raise ConfigError(
-                f"system.record_mesh {self.engine.mesh_names[self.mesh_number]} is of helical gears, "
+                f"system.record_mesh {self.engine.mesh_names[self.mesh_number]} is of "
+                "helical gears, "
                 "which have their stiffness slice by slice; choose a spur mesh, or take its gears "
                 "with gensig stiffness system=helical_pair"
             )

@@ -120,7 +120,8 @@ def override_keys(overrides: Sequence[str]) -> dict[str, str]:
     for override in _parse(overrides):
         if override.is_sweep_override():
             raise ConfigError(
-                f"{override.input_line}: several values need -m (one data set for each){_one_value(override)}"
+                f"{override.input_line}: several values need -m (one data set for "
+                f"each){_one_value(override)}"
             )
         keys[str(override.key_or_group)] = override.get_value_element_as_str()
     return keys
@@ -151,7 +152,7 @@ def _default(key: str) -> Any:
 
 
 def typed_mapping(overrides: Sequence[str], key: str) -> dict[str, Any]:
-    """What was typed as ``key={name: value, ...}``.
+    """Mapping that was typed as ``key={name: value, ...}``.
 
     Such a mapping may have names that no option has yet.
     """
@@ -199,7 +200,8 @@ def _parse(overrides: Sequence[str]) -> list[Any]:
     for word in overrides:
         if not isinstance(word, str):
             raise ConfigError(
-                f"an override is a text such as 'seed=1', not {word!r}; give each as its own argument"
+                f"an override is a text such as 'seed=1', not {word!r}; give each as its "
+                "own argument"
             )
         if "=" not in word and not word.startswith("~"):
             text = (

@@ -177,7 +177,8 @@ class Configuration(Mapping[str, Any]):
         """Set a dotted key that must exist and hold a number."""
         if key.startswith(FIXED_KEYS):
             raise ConfigError(
-                f"plan.vary: '{key}' is one value for a whole data set; give several with -m instead"
+                f"plan.vary: '{key}' is one value for a whole data set; give several with "
+                "-m instead"
             )
         *parents, leaf = key.split(".")
         node: Any = changed
@@ -216,7 +217,7 @@ def _group(name: str, value: Any) -> Mapping[str, Any]:
 
 
 def _is_number(value: Any) -> bool:
-    """Whether a key may be varied: it holds a number, or null where a number can stand."""
+    """True for a value that may be varied: a number, or null where a number can stand."""
     return not isinstance(value, dict | list | str | bool)
 
 

@@ -116,7 +116,7 @@ class _File:
 
     @property
     def is_global(self) -> bool:
-        """Whether its keys are those of the whole configuration."""
+        """True where its keys are those of the whole configuration."""
         head = [line.replace(" ", "") for line in self.lines[:3]]
         return "#@package_global_" in head
 
@@ -380,9 +380,9 @@ def _is_comment(line: str) -> bool:
 
 
 def _is_separate(lines: Sequence[str]) -> bool:
-    """Whether the comment that ends ``lines`` continues no comment after a value.
+    """True where the comment that ends ``lines`` continues no comment after a value.
 
-    False for the head of the file too.
+    False for the head of the file.
     """
     first = len(lines)
     while first and _is_comment(lines[first - 1]):

@@ -112,7 +112,7 @@ class _Words:
     others: tuple[str, ...]
 
     def clears(self, key: str) -> bool:
-        """Whether an empty mapping was typed for ``plan.vary`` or ``fault.vary``."""
+        """Return whether an empty mapping was typed for ``plan.vary`` or ``fault.vary``."""
         return key in self.keys and not (
             self.plan_vary if key == "plan.vary" else self.fault_vary
         )
@@ -181,8 +181,9 @@ def _class_fault(
     if typed:
         option = _fault_option(words, name, tuple(typed.values()), config_dir)
     known = {key: spec for key, spec in words.fault_vary.items() if key in option}
-    vary = {} if words.clears("fault.vary") else option.get("vary") or {}
-    vary = {**vary, **known}
+    vary = dict(known)
+    if not words.clears("fault.vary"):
+        vary = {**(option.get("vary") or {}), **known}
     left = {key: spec for key, spec in vary.items() if f"fault.{key}" not in typed}
     return _ClassFault(
         option=_with_whole_parts({**option, "vary": left}, words, config_dir),
@@ -227,7 +228,7 @@ def _fault_option(
 def _experiment_sets_fault(
     experiment: str | None, config_dir: str | Path | None
 ) -> bool:
-    """Whether the file of an experiment sets keys of whatever fault is chosen, such as its gear."""
+    """True where an experiment's file sets keys of any chosen fault, such as its gear."""
     if experiment in (None, "null"):
         return False
     keys = option_files.option_keys("experiment", experiment, config_dir)
@@ -282,16 +283,32 @@ def _refuse_unused(words: _Words, faults: Sequence[_ClassFault]) -> None:
 
 def _pin_varied(words: _Words, plan: dict[str, Any]) -> list[str]:
     """Put what is drawn into ``plan``; returns the typed keys, which are no longer drawn."""
-    option = {} if words.clears("plan.vary") else plan["vary"] or {}
-    vary = {**option, **words.plan_vary}
+    vary = dict(words.plan_vary)
+    if not words.clears("plan.vary"):
+        vary = {**(plan["vary"] or {}), **vary}
     plan["vary"] = {key: spec for key, spec in vary.items() if key not in words.keys}
     return [key for key in vary if key in words.keys]
 
 
 SECTIONS = (
-    "system", "gear", "material", "strength", "modification", "heat", "fault", "operating", "sensing", "plan", "life",
-    "executor", "mesh", "wear", "solver", "quality", "dataset",
-)  # fmt: skip
+    "system",
+    "gear",
+    "material",
+    "strength",
+    "modification",
+    "heat",
+    "fault",
+    "operating",
+    "sensing",
+    "plan",
+    "life",
+    "executor",
+    "mesh",
+    "wear",
+    "solver",
+    "quality",
+    "dataset",
+)
 OPTIONAL_SECTIONS = ("excitation",)
 PLAIN_KEYS = ("seed", "out")
 
@@ -301,7 +318,8 @@ def _check_shape(composed: Mapping[str, Any]) -> None:
     for key in SECTIONS:
         if not isinstance(composed.get(key), dict):
             raise ConfigError(
-                f"{key} = {composed.get(key)!r} must be a group of keys; choose an option or leave it alone"
+                f"{key} = {composed.get(key)!r} must be a group of keys; choose an option "
+                "or leave it alone"
             )
     for key in composed:
         if key not in SECTIONS + OPTIONAL_SECTIONS + PLAIN_KEYS:
@@ -318,8 +336,11 @@ def _no_such_fault_key(key: str, selected: Mapping[str, Any]) -> str:
     )  # a slip, not another fault's key
     if close:
         return f"unknown key '{key}'; did you mean 'fault.{close[0]}'?"
-    has = f"it has {', '.join(known)}" if known else "it has no keys"
-    return f"unknown key '{key}' for fault={selected['kind']}, {has}; fault offers: {', '.join(options('fault'))}"
+    has = f"it has {', '.join(known) or 'no keys'}"
+    return (
+        f"unknown key '{key}' for fault={selected['kind']}, {has}; fault offers: "
+        f"{', '.join(options('fault'))}"
+    )
 
 
 def _reset_derived(gear: dict[str, Any], touched: set[str]) -> None:
@@ -346,7 +367,10 @@ def _reset_derived(gear: dict[str, Any], touched: set[str]) -> None:
             gear[side][key] = None
         if lost:
             warnings.warn(
-                f"{', '.join(changed)} changed: {' and '.join(lost)} of the {side} are derived from a solid disc now",
+                (
+                    f"{', '.join(changed)} changed: {' and '.join(lost)} of the {side} are "
+                    "derived from a solid disc now"
+                ),
                 DerivedValueWarning,
                 stacklevel=3,
             )

@@ -79,23 +79,23 @@ class Comparison(Range):
 
     @property
     def place(self) -> Place:
-        """What names a row."""
+        """The key of a row: its id and its conditions."""
         return self.id, self.at
 
 
 def judge(low: float | None, high: float | None, p5: float, p95: float) -> str:
-    """*Inside*: the central 90 % lie within the range.
-
-    *overlaps*: a part of them; *misses*: none.
-    """
+    """Verdict on a central 90 %: inside the range, overlapping it, or missing it."""
     if math.isnan(p5) or math.isnan(p95):
         return NOTHING
     if low is None and high is None:
         return WITHOUT
-    bottom, top = -math.inf if low is None else low, math.inf if high is None else high
+    bottom = -math.inf if low is None else low
+    top = math.inf if high is None else high
     if bottom <= p5 and p95 <= top:
         return INSIDE
-    return OVERLAPS if p5 <= top and p95 >= bottom else MISSES
+    if p5 <= top and p95 >= bottom:
+        return OVERLAPS
+    return MISSES
 
 
 def points(values: ArrayLike) -> tuple[float, float, float, int]:
@@ -109,7 +109,7 @@ def points(values: ArrayLike) -> tuple[float, float, float, int]:
 
 
 def compare(measured: Range, values: ArrayLike) -> Comparison:
-    """Put simulated values beside a measured range."""
+    """Simulated values compared with a measured range."""
     median, p5, p95, n = points(values)
     verdict = judge(measured.low, measured.high, p5, p95)
     return Comparison(
@@ -120,27 +120,23 @@ def compare(measured: Range, values: ArrayLike) -> Comparison:
 def read_ranges(path: Path = RANGES) -> dict[Place, Range]:
     """The measured ranges, by id and conditions, in the order of the file."""
     with path.open(encoding="utf-8", newline="") as file:
-        found = [Range(**_read(line, ("low", "high"))) for line in csv.DictReader(file)]
-    return {(one.id, one.at): one for one in found}
+        rows = [Range(**_read(line, ("low", "high"))) for line in csv.DictReader(file)]
+    return {(row.id, row.at): row for row in rows}
 
 
-def write_results(path: Path, heading: str, found: Sequence[Comparison]) -> None:
-    """Store comparisons under one line that says what they are.
-
-    The reasons of a former file stay.
-    """
-    former = (
-        {one.place: one.reason for one in read_results(path)[1]}
-        if path.exists()
-        else {}
-    )
+def write_results(path: Path, heading: str, rows: Sequence[Comparison]) -> None:
+    """Store comparisons below a heading of one line; reasons of a former file stay."""
+    reasons: dict[Place, str] = {}
+    if path.exists():
+        reasons = {row.place: row.reason for row in read_results(path)[1]}
     names = [field.name for field in fields(Comparison)]
     with path.open("w", encoding="utf-8", newline="") as file:
         file.write(f"# {' '.join(heading.split())}\n")
         writer = csv.DictWriter(file, names, lineterminator="\n")
         writer.writeheader()
-        for one in found:
-            values = {**asdict(one), "reason": one.reason or former.get(one.place, "")}
+        for row in rows:
+            values = asdict(row)
+            values["reason"] = row.reason or reasons.get(row.place, "")
             writer.writerow({name: _written(value) for name, value in values.items()})
 
 
@@ -156,123 +152,35 @@ def read_results(path: Path = RESULTS) -> tuple[str, list[Comparison]]:
         raise ConfigError(
             f"{path.name} must begin with a line '# ' that says what was compared; make it again"
         )
-    found = [
-        Comparison(
-            **{**_read(line, ("low", "high", "median", "p5", "p95")), **_points(line)}
-        )
-        for line in csv.DictReader(lines[1:])
-    ]
-    return lines[0][2:], found
+    numbers = ("low", "high", "median", "p5", "p95")
+    rows = []
+    for line in csv.DictReader(lines[1:]):
+        values = _read(line, numbers)
+        rows.append(Comparison(**{**values, "n": int(line["n"])}))
+    return lines[0][2:], rows
 
 
-def realism_lines(path: Path = RESULTS) -> list[str]:
-    """The section of ``docs/validation.md``; empty where nothing has been compared yet."""
-    if not path.exists():
-        return []
-    heading, found = read_results(path)
-    lines = [
-        "",
-        "## Realism: beside measurements",
-        "",
-        TEXT,
-        "",
-        f"Compared: {heading}",
-        "",
-    ]
-    yardstick = [one for one in found if not one.id.startswith(RECORDING)]
-    recording = [one for one in found if one.id.startswith(RECORDING)]
-    for title, text, figure, rows in (
-        ("Yardstick", YARDSTICK_TEXT, "realism_yardstick.png", yardstick),
-        ("A healthy recording", RECORDING_TEXT, "realism_recording.png", recording),
-    ):
-        if rows:
-            lines += [
-                f"### {title}",
-                "",
-                text,
-                "",
-                f"![{title}: simulated beside measured](figures/{figure})",
-                "",
-                *table(rows),
-                "",
-            ]
-    return lines[:-1]
-
-
-def table(found: Sequence[Comparison]) -> list[str]:
-    """Comparisons as lines of a Markdown table."""
-    lines = [
-        "| quantity | at | beside | median | 5 to 95 % | values | verdict | source | reason |",
-        "|---" * 9 + "|",
-    ]
-    for one in found:
-        name, spread = (
-            f"{one.id}, {one.unit}".rstrip(", "),
-            f"{_number(one.p5)} to {_number(one.p95)}",
-        )
-        cells = (
-            name,
-            one.at,
-            shown_range(one),
-            _number(one.median),
-            spread,
-            str(one.n),
-            one.verdict,
-            one.source,
-        )
-        lines.append(f"| {' | '.join((*cells, one.reason))} |")
-    return lines
-
-
-def shown_range(one: Range) -> str:
+def shown_range(measured: Range) -> str:
     """A range in words."""
-    if one.low is None and one.high is None:
+    low, high = measured.low, measured.high
+    if low is None and high is None:
         return ""
-    if one.low is None:
-        return f"below {one.high:.3g}"
-    if one.high is None:
-        return f"above {one.low:.3g}"
-    return f"{one.low:.3g} to {one.high:.3g}"
-
-
-def _number(value: float) -> str:
-    return "none" if math.isnan(value) else f"{value:.3g}"
+    if low is None:
+        return f"below {high:.3g}"
+    if high is None:
+        return f"above {low:.3g}"
+    return f"{low:.3g} to {high:.3g}"
 
 
 def _written(value: Any) -> Any:
-    return (
-        "" if value is None else f"{value:.6g}" if isinstance(value, float) else value
-    )
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return "" if value is None else value
 
 
 def _read(line: Mapping[str, str], numbers: Sequence[str]) -> dict[str, Any]:
-    return {
-        key: (float(text) if text else None) if key in numbers else text
-        for key, text in line.items()
-    }
-
-
-def _points(line: Mapping[str, str]) -> dict[str, Any]:
-    return {"n": int(line["n"])}
-
-
-TEXT = """Made by `python -m benchmarks.realism --stored`, which simulates the records and stores what it finds; this
-page shows it. No parameter was chosen by these numbers: all ranges of the simulation were frozen before, in the commit
-named here. *Inside*: the central 90 % of the simulated values lie within what is beside them; *overlaps*: a part of
-them; *misses*: none; *no value*: nothing could be measured. A miss stays visible, with its reason."""
-
-YARDSTICK_TEXT = """Beside: published recordings of a two-stage parallel spur gearbox, fault on the intermediate shaft,
-three speeds x two loads x two sensors, 5 kHz, one specimen a class, so that class and assembly are confounded and one
-RMS ratio is known to about 15 %. Ours: every unit runs three speeds (1/3, 2/3 and all of the rated) at two torques
-(10 % and all of the rated), records of at least ten turns of the faulted shaft, every sensor, resampled to 5 kHz.
-Ratios are those of a faulty record over the healthy record of *another* specimen in the same gearbox at the same speed
-and torque; `same_unit`: of the same specimen; `full_band`: as simulated, not resampled. *Slow and light*: a third of
-the rated speed and 10 % of the rated torque."""
-
-RECORDING_TEXT = """*Channels*: beside is the range over the channels of one public recording of a healthy pair of 23
-and 46 teeth at 2000 r/min, 25.6 kHz; the verdict says whether the channels lie within the simulated 5 to 95 %. Its
-module, torque, bearings and error grade are not known: assumed, the grade as the middle of what the experiment draws.
-*Width*: the simulated interval over the range of the channels, at most 2 asked. *Wrong teeth*, *errors / 3*,
-*errors x 3*: simulated so on purpose, beside the 5 to 95 % of the right simulation; *told apart* where the wrong median
-lies outside. Gain changes none of the indicators; rotation is read off the mesh's phase, in simulation and recording
-alike."""
+    """A line of a file; empty cells of number columns are None."""
+    values: dict[str, Any] = dict(line)
+    for name in numbers:
+        values[name] = float(line[name]) if line[name] else None
+    return values

@@ -1,8 +1,8 @@
 """The Python of the pages compiles, and runs as it stands.
 
-A block below ``<!-- not run: REASON -->`` or ``<!-- run by tests/... -->`` is not run. README.md has
-its own tests. The blocks of a page run in order, in one namespace, with a small data set under the
-names that pages use.
+A block below ``<!-- not run: REASON -->`` or ``<!-- run by tests/... -->`` is not run.
+README.md has its own tests. The blocks of a page run in order, in one namespace, with a small
+data set under the names that pages use.
 """
 
 import re

@@ -229,7 +229,8 @@ def _check_scale(
         )
     if contents[scale].shape != contents[name].shape[:2]:
         raise DatasetError(
-            f"{path}: {scale} has shape {contents[scale].shape}, {name} has {contents[name].shape[:2]} "
+            f"{path}: {scale} has shape {contents[scale].shape}, {name} has "
+            f"{contents[name].shape[:2]} "
             "records and channels"
         )
 

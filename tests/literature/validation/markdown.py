@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from gensig.report.realism import realism_lines
+from validation.realism_section import realism_lines
 from validation.rows import DIFFERS, FAILS, ROUGH, VERDICTS, Result
 
 SOURCE_TITLES = {

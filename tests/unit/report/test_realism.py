@@ -1,14 +1,17 @@
-"""Measured ranges and stored results: how they are judged, kept and shown. All numbers here are made up."""
+"""Measured ranges and stored results.
+
+How they are judged, kept and shown. All numbers here are made up.
+"""
 
 import csv
 import math
+from dataclasses import replace
 
 import pytest
 
 from gensig.errors import ConfigError
 from gensig.report import realism
 from gensig.report.realism import (
-    Comparison,
     Range,
     compare,
     judge,
@@ -79,8 +82,7 @@ def test_a_range_upside_down_and_a_verdict_there_is_not_are_refused():
     with pytest.raises(ConfigError, match="low = 3 lies above high = 2"):
         measured(low=3.0)
     with pytest.raises(ConfigError, match="verdict = 'fine'; allowed: inside"):
-        Comparison(**{name: getattr(measured(), name) for name in ("id", "at", "unit", "low", "high", "source")},
-                   median=1.0, p5=1.0, p95=1.0, n=1, verdict="fine")  # fmt: skip
+        replace(compare(measured(), [1.0]), verdict="fine")
 
 
 def test_results_come_back_and_reasons_stay(tmp_path):
@@ -105,24 +107,3 @@ def test_a_file_without_its_heading_is_refused(tmp_path):
     path.write_text("id,at\n")
     with pytest.raises(ConfigError, match="must begin with a line '# '"):
         read_results(path)
-
-
-def test_section(tmp_path):
-    path = tmp_path / "results.csv"
-    assert realism.realism_lines(path) == []
-    write_results(
-        path,
-        "told so",
-        [compare(measured(), [1.5, 1.6]), compare(measured(id="recording.x"), [9.0])],
-    )
-    lines = realism.realism_lines(path)
-    assert "Compared: told so" in lines
-    assert any(
-        line.startswith("| a.b, ms | here | 1 to 2 | 1.55 | ")
-        and " inside | rig |" in line
-        for line in lines
-    )
-    assert lines.index("### Yardstick") < lines.index("### A healthy recording")
-    assert {line.count("|") for line in lines if line.startswith("| ")} == {10}
-    write_results(path, "told so", [compare(measured(), [1.5])])
-    assert "### A healthy recording" not in realism.realism_lines(path)

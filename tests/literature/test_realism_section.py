@@ -1,0 +1,40 @@
+"""The section of docs/validation.md on simulated records and measured ranges."""
+
+from validation.realism_section import realism_lines
+
+from gensig.report.realism import Range, compare, write_results
+
+
+def measured(**changes) -> Range:
+    return Range(
+        **{
+            "id": "a.b",
+            "at": "here",
+            "unit": "ms",
+            "low": 1.0,
+            "high": 2.0,
+            "source": "rig",
+            **changes,
+        }
+    )
+
+
+def test_section(tmp_path):
+    path = tmp_path / "results.csv"
+    assert realism_lines(path) == []
+    write_results(
+        path,
+        "a comparison",
+        [compare(measured(), [1.5, 1.6]), compare(measured(id="recording.x"), [9.0])],
+    )
+    lines = realism_lines(path)
+    assert "Compared: a comparison" in lines
+    assert any(
+        line.startswith("| a.b, ms | here | 1 to 2 | 1.55 | ")
+        and " inside | rig |" in line
+        for line in lines
+    )
+    assert lines.index("### Yardstick") < lines.index("### A healthy recording")
+    assert {line.count("|") for line in lines if line.startswith("| ")} == {10}
+    write_results(path, "a comparison", [compare(measured(), [1.5])])
+    assert "### A healthy recording" not in realism_lines(path)
