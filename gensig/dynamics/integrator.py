@@ -43,14 +43,10 @@ def integrate(
     channels: tuple[str, ...],
     tell_mesh: bool = False,
 ) -> Motions:
-    """Settles every machine by itself, then records ``duration`` s from time 0 on.
+    """Motions of machines that have settled, from time 0 on for ``duration`` s, one row a machine.
 
-    The machines share their degrees of freedom and the kind of their mesh law. A motion does not
-    depend on the other machines of the call.
-
-    Returns
-    -------
-    motions, one row a machine, by the backend that ``solver.backend`` names
+    The backend is ``solver.backend``. The machines share their degrees of freedom and the kind of
+    their mesh law. A motion does not depend on the other machines of the call.
 
     Raises
     ------
@@ -93,14 +89,14 @@ def check_memory(
     if n_bytes > MOST_BYTES:
         longest = duration * MOST_BYTES / n_bytes
         raise ConfigError(
-            f"operating.duration_s = {duration:g}: {together} records side by side with {n_channels} channels at "
-            f"{sampling_rate:g} Hz take {n_bytes / 2**20:.0f} MiB, more than {MOST_BYTES / 2**20:.0f}; record at most "
-            f"{longest:.3g} s at a time"
+            f"operating.duration_s = {duration:g}: {together} records side by side with "
+            f"{n_channels} channels at {sampling_rate:g} Hz take {n_bytes / 2**20:.0f} MiB, "
+            f"more than {MOST_BYTES / 2**20:.0f}; record at most {longest:.3g} s at a time"
         )
 
 
 def check_channels(channels: tuple[str, ...], dofs: tuple[str, ...] = DOFS) -> None:
-    """Raise ConfigError for a channel that a machine has not."""
+    """Raise ConfigError for a channel that a machine does not have."""
     unknown = [name for name in channels if name not in dofs]
     if unknown:
         raise ConfigError(

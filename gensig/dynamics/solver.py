@@ -19,8 +19,8 @@ class Solver:
     ----------
     oversampling : internal steps per output sample
     precision : of the numbers, ``float64`` or ``float32``
-    max_error : a record whose error is above it is integrated again with twice as many steps, up to 64; None does not
-        look at the error
+    max_error : a record with a larger error is integrated again with twice as many steps, up to
+        64; None does not compute the error
     backend : the method, a name in ``BACKENDS``
     """
 
