@@ -50,8 +50,18 @@ def law_at(group, motion, work, wide, near, law_rows):
             break
         first, last = _kernels.near_pairs(layout.EVEN, n, near)
         law = mesh_law(
-            group, first, last, layout.EVEN, layout.MARGIN, zero, approach, rate, roll_rate, work, wide
-        )  # fmt: skip
+            group,
+            first,
+            last,
+            layout.EVEN,
+            layout.MARGIN,
+            zero,
+            approach,
+            rate,
+            roll_rate,
+            work,
+            wide,
+        )
         for row in range(layout.N_LAW):
             set_row(law_rows, row, law[row])
         if not helical:
@@ -107,7 +117,7 @@ def motion_of(dynamics, times, q, v):
 
 
 def advance(dynamics, q, v, step, first_step, n_steps, channels=()):
-    """q and v (dof,) after some steps, and mean accelerations over each of them, (channel, step)."""
+    """q and v (dof,) after some steps, and mean accelerations over each, (channel, step)."""
     return _advance(pack([dynamics], step), q, v, step, first_step, n_steps, channels)
 
 
@@ -118,9 +128,21 @@ def _advance(group, q, v, step, first_step, n_steps, channels=()):
     means = np.empty((n_steps, len(index), LANES))
     work, wide, near = _kernels.scratch(len(q), len(index))
     _kernels.integrate(
-        group, state.ravel(), np.zeros(LANES), np.ones(LANES), step, first_step, n_steps, index,
-        means.ravel(), 0, *NO_MEANS, work, wide, near,
-    )  # fmt: skip
+        group,
+        state.ravel(),
+        np.zeros(LANES),
+        np.ones(LANES),
+        step,
+        first_step,
+        n_steps,
+        index,
+        means.ravel(),
+        0,
+        *NO_MEANS,
+        work,
+        wide,
+        near,
+    )
     center = wide.reshape(-1, LANES)[layout.CENTER, 0]
     rotation = group.rotation.reshape(-1, LANES)[:, 0]
     whole = state[0, :, 0] + group.rest[:, 0] + center * rotation

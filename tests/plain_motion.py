@@ -49,7 +49,9 @@ def solved(
     """States at some times, (time, state); ``start`` is the state at the first."""
     span, steps = (times[0], times[-1]), {"first_step": 1e-7, "max_step": 2e-5}
     atol = 10 * rtol * LIKELY
-    return solve_ivp(slope, span, start, method, times, rtol=rtol, atol=atol, **steps).y.T
+    return solve_ivp(
+        slope, span, start, method, times, rtol=rtol, atol=atol, **steps
+    ).y.T
 
 
 def at_rest(dynamics: PairDynamics, time: float = 0.0) -> np.ndarray:

@@ -53,8 +53,8 @@ class BallBearing:
         if not self.pitch_diameter > least:
             diameter = from_si("pitch_diameter_mm", self.pitch_diameter)
             raise ConfigError(
-                f"bearing.pitch_diameter_mm = {diameter:g}: {self.n_balls} balls of this size touch "
-                f"each other; give more than {from_si('pitch_diameter_mm', least):.4g}"
+                f"bearing.pitch_diameter_mm = {diameter:g}: {self.n_balls} balls of this size "
+                f"touch each other; give more than {from_si('pitch_diameter_mm', least):.4g}"
             )
         for key in ("inner_groove_conformity", "outer_groove_conformity"):
             if not 0.505 <= getattr(self, key) <= 0.6:
@@ -86,7 +86,10 @@ class BallBearing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shaft:
-    """A round shaft of the gears' material, a bearing at each end of ``span``, gear in the middle."""
+    """A round shaft of the gears' material, with a bearing at each end of ``span``.
+
+    The gear is in the middle.
+    """
 
     diameter: float = unit("mm")
     span: float = unit("mm")

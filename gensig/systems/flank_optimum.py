@@ -38,7 +38,7 @@ REFUSED = 1e3  # times the unmodified value, for flanks that overlap or lose con
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cases:
-    """Load cases of a modification: every torque (N m) with every misalignment (m over the face)."""
+    """Load cases: every torque (N m) with every misalignment (m over the face)."""
 
     torques: tuple[float, ...]
     misalignments: tuple[float, ...]

@@ -46,8 +46,8 @@ class HelicalPair(GearPairMachine):
     ) -> StiffnessCurves:
         """Raise ConfigError: these curves are of whole teeth, and a helical pair has slices."""
         raise ConfigError(
-            "stiffness_curves are those of system=spur_pair; a helical pair has its stiffness slice "
-            "by slice: flanks.transmission_error(), or gensig stiffness system=helical_pair"
+            "stiffness_curves are those of system=spur_pair; a helical pair has its stiffness "
+            "slice by slice: flanks.transmission_error(), or gensig stiffness system=helical_pair"
         )
 
     @property

@@ -323,9 +323,10 @@ def _in_housing(
     closing = growth.closing(cold, housing)
     if closing > cold.backlash:
         raise GeometryError(
-            f"the gears jam: heat makes them grow {closing * 1e6:.0f} um more than the housing lets "
-            f"them, along the line of action, and gear.backlash_um is {cold.backlash * 1e6:g}; "
-            "raise it, cool the gears, or warm the housing (heat.housing_temperature_degc)"
+            f"the gears jam: heat makes them grow {closing * 1e6:.0f} um more than the housing "
+            "lets them, along the line of action, and gear.backlash_um is "
+            f"{cold.backlash * 1e6:g}; raise it, cool the gears, or warm the housing "
+            "(heat.housing_temperature_degc)"
         )
     # relative to gears that have, or have not, grown in this description
     scale = pair.pinion.normal_module / cold.pinion.normal_module

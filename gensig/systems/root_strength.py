@@ -147,8 +147,8 @@ class RootStrength:
         force = self.tangential_force
         if not force > 0.0:
             raise ConfigError(
-                f"operating.torque_nm = {self.flanks.torque:g} must be positive: the pinion drives; "
-                "or give --stress"
+                f"operating.torque_nm = {self.flanks.torque:g} must be positive: the pinion "
+                "drives; or give --stress"
             )
         stresses = {}
         for name, factors in self.factors.items():

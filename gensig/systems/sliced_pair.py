@@ -181,7 +181,7 @@ class SlicedPair:
 
 
 def _seen(mesh: SlicedMesh) -> tuple[int, int, Meeting, tuple[int, int] | None]:
-    """First mesh period, number of periods, meeting teeth, and odd pairs of a transmission error."""
+    """First mesh period, number of periods, meeting teeth, and odd pairs."""
     start, span, turn = [0, 0], -1, 0
     for gear, side in enumerate((mesh.pinion, mesh.wheel)):
         count = np.bincount(side.kind)

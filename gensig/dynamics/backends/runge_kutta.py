@@ -50,7 +50,7 @@ class RungeKutta(Backend):
         oversampling: int,
         max_error: float | None,
     ) -> None:
-        """Raise SimulationError for an unstable step; warn of a coarse one without ``max_error``."""
+        """Raise SimulationError for an unstable step; warn of a coarse unchecked one."""
         check_step(machine, sampling_rate, oversampling, max_error)
 
     def records_together(self, precision: str) -> int:

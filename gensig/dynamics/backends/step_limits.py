@@ -63,7 +63,7 @@ def check_step(
     oversampling: int,
     max_error: float | None = None,
 ) -> None:
-    """Raise SimulationError for an unstable step of RK4; warn of a coarse one without ``max_error``.
+    """Raise SimulationError for an unstable step; warn of a coarse one without ``max_error``.
 
     With a ``max_error``, records with a larger error are integrated again at half the step.
     """
@@ -72,8 +72,9 @@ def check_step(
     if fastest * step > STABILITY_LIMIT:
         raise SimulationError(
             f"solver.oversampling = {oversampling} makes internal steps of {step:.3g} s, too long "
-            f"for the stiffest motion at {fastest / (2 * math.pi):.4g} Hz; raise solver.oversampling "
-            f"to at least {math.ceil(oversampling * fastest * step / STABILITY_LIMIT)}"
+            f"for the stiffest motion at {fastest / (2 * math.pi):.4g} Hz; raise "
+            "solver.oversampling to at least "
+            f"{math.ceil(oversampling * fastest * step / STABILITY_LIMIT)}"
         )
     oscillating = float(np.abs(np.imag(rates)).max())
     if max_error is None and oscillating * step > LONG_STEP:

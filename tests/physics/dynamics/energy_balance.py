@@ -31,7 +31,9 @@ def balance(dynamics, step, n_steps):
     start = dynamics.static_start(0.0)
     q, v = trajectory(dynamics, start, np.zeros(len(start)), step, n_steps)
     motions = motion_of(dynamics, step * np.arange(len(q)), q, v)
-    _, friction, moment_p, moment_w, _, stored, lost, _ = laws(dynamics, motions, step).T
+    _, friction, moment_p, moment_w, _, stored, lost, _ = laws(
+        dynamics, motions, step
+    ).T
     system = dynamics.system()
     speeds = v + dynamics.operating.speed * system.rotation
     springs = [dof for dof in range(len(start)) if dof not in (2, 5)]

@@ -20,9 +20,15 @@ from gensig.systems.base import simulate_together
 from gensig.systems.run import Run, Start
 from gensig.units import read
 
-ACCURACY = 1e-3  # of a channel's spectrum: accuracy of the compiled core at its default step
-QUICK = {"operating.duration_s": 0.03, "operating.drive_frequency_hz": 20,
-         "gear.pinion.support.damping_x_ns_per_m": 100, "gear.wheel.support.damping_x_ns_per_m": 500}  # fmt: skip
+ACCURACY = (
+    1e-3  # of a channel's spectrum: accuracy of the compiled core at its default step
+)
+QUICK = {
+    "operating.duration_s": 0.03,
+    "operating.drive_frequency_hz": 20,
+    "gear.pinion.support.damping_x_ns_per_m": 100,
+    "gear.wheel.support.damping_x_ns_per_m": 500,
+}
 MORE_DAMPED = {"mesh.damping_ratio": 0.0735}  # by a twentieth
 LEAST_RATE = 1e4  # Hz, lowest sampling rate of the backend below
 
@@ -82,7 +88,9 @@ def record(machine):
     def simulated(backend, **changes):
         system = machine({**QUICK, **changes})
         system = replace(system, solver=replace(system.solver, backend=backend))
-        return simulate_together([Run(system=system, faults=(), start=Start(phase=0.3))])[0]
+        return simulate_together(
+            [Run(system=system, faults=(), start=Start(phase=0.3))]
+        )[0]
 
     return simulated
 
@@ -93,7 +101,8 @@ def test_both_backends_agree(record, lsoda):
     damped = record(DEFAULT_BACKEND, **MORE_DAMPED)
     exact = other.acceleration[None]
     error, shown = (
-        in_band_error(each.acceleration[None], exact, 51200.0)[0] for each in (core, damped)
+        in_band_error(each.acceleration[None], exact, 51200.0)[0]
+        for each in (core, damped)
     )
     assert 0.0 < error < ACCURACY < 0.2 * shown
     assert np.abs(core.shaft_angle - other.shaft_angle).max() < 1e-6

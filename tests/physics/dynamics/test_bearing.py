@@ -132,14 +132,16 @@ class TestStiffness:
 
     @BOTH
     def test_it_grows_with_the_cube_root_of_the_load(self, bearing):
-        low, high = (np.array(bearing_stiffness(bearing, STEEL, load)) for load in (50.0, 400.0))
+        low, high = (
+            np.array(bearing_stiffness(bearing, STEEL, load)) for load in (50.0, 400.0)
+        )
         assert_close(high / low, 2.0, 1e-6)
         loose = replace(bearing, radial_clearance=10e-6)
         low, high = (bearing_stiffness(loose, STEEL, load)[0] for load in (50.0, 400.0))
         assert high / low > 2.2
 
     def test_many_balls_without_clearance(self):
-        """Half of the ring loaded by cos^1.5: across over along is (I_0.5 - I_2.5) / I_2.5 = 2/3."""
+        """Half of the ring loaded by cos^1.5: the ratio is (I_0.5 - I_2.5) / I_2.5 = 2/3."""
         many = replace(SMALL, n_balls=50, pitch_diameter=0.2)
         across, along = bearing_stiffness(many, STEEL, 460.0)
         assert_close(across / along, 2 / 3, 2e-3)
@@ -167,10 +169,26 @@ def test_a_support_is_two_bearings_in_series_with_a_beam(span):
     ("part", "changes", "text"),
     [
         (SMALL, {"n_balls": 3}, "bearing.n_balls = 3 must lie in 5..60"),
-        (SMALL, {"ball_diameter": 0.0}, "bearing.ball_diameter_mm = 0 must be positive"),
-        (SMALL, {"pitch_diameter": 15e-3}, "size touch each other; give more than 17.63"),
-        (SMALL, {"inner_groove_conformity": 0.5}, "conformity = 0.5 must lie in 0.505..0.6"),
-        (SMALL, {"outer_groove_conformity": 0.7}, "conformity = 0.7 must lie in 0.505..0.6"),
+        (
+            SMALL,
+            {"ball_diameter": 0.0},
+            "bearing.ball_diameter_mm = 0 must be positive",
+        ),
+        (
+            SMALL,
+            {"pitch_diameter": 15e-3},
+            "size touch each other; give more than 17.63",
+        ),
+        (
+            SMALL,
+            {"inner_groove_conformity": 0.5},
+            "conformity = 0.5 must lie in 0.505..0.6",
+        ),
+        (
+            SMALL,
+            {"outer_groove_conformity": 0.7},
+            "conformity = 0.7 must lie in 0.505..0.6",
+        ),
         (SMALL, {"radial_clearance": 2e-4}, "clearance_um = 200 must lie in -20..100"),
         (SHAFT, {"diameter": 0.0}, "shaft.diameter_mm = 0 must be positive"),
         (SHAFT, {"span": 0.0}, "shaft.span_mm = 0 must be positive"),

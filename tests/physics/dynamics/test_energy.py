@@ -70,7 +70,10 @@ def test_coarse_tables_balance_too(machine, dynamics_of):
 
 def test_friction_of_rigid_gears_dissipates_at_every_position(xiamen, dynamics_of):
     speed, pair, rng = xiamen.operating.speed, xiamen.pair, np.random.default_rng(1)
-    roll, approach = rng.uniform(0, 50, 500) * pair.base_pitch, rng.uniform(0, 20e-6, 500)
+    roll, approach = (
+        rng.uniform(0, 50, 500) * pair.base_pitch,
+        rng.uniform(0, 20e-6, 500),
+    )
     motions = roll, approach, rng.normal(0, 1e-3, 500), pair.pinion.base_radius * speed
     normal, _, moment_p, moment_w, _, _, lost, _ = laws(dynamics_of(xiamen), motions).T
     assert np.all(moment_p * speed + moment_w * speed / pair.ratio <= 1e-9)

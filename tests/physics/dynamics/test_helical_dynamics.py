@@ -138,8 +138,11 @@ class TestForces:
             assert_close(force[moments], expected, 1e-6, atol=tolerance)
 
     def test_the_thrust_of_a_driver_follows_its_hand(self, gears, hand):
-        """Fingers of the hand of the helix along the rotation, about -z: the thumb is the thrust."""
-        start, held = gears.static_start(0.0), (gears.pinion.support, gears.wheel.support)
+        """Fingers of the hand of the helix along the rotation: the thumb is the thrust."""
+        start, held = (
+            gears.static_start(0.0),
+            (gears.pinion.support, gears.wheel.support),
+        )
         assert math.copysign(1.0, start[6]) == -hand
         thrust = start[6] * held[0].stiffness_z
         assert_close(thrust, -start[9] * held[1].stiffness_z, 1e-9)
@@ -147,7 +150,7 @@ class TestForces:
 
 class TestStatics:
     def test_chords_carry_the_load_of_the_slices(self, slices):
-        """Against the slices, solved by bracketing; the error of chords is the depth of their sag."""
+        """Against the slices, by bracketing; the error of chords is the depth of their sag."""
         table, pitch = slices.table(DEPTH), slices.pair.base_pitch
         roll = pitch * (np.arange(12) + 0.4) / 4
         n_pairs = table.last_pitch - table.first_pitch
@@ -193,7 +196,8 @@ class TestStatics:
         roll = slow.start_roll + slow.table.pair.pinion.base_radius * angle
         approach, states = (q @ slow.approach_direction())[late], slow.states(roll)
         static, wrong = (
-            slow.static(states, factor * slow.mesh_force).approach for factor in (1, 1.05)
+            slow.static(states, factor * slow.mesh_force).approach
+            for factor in (1, 1.05)
         )
         assert_close(approach, static, 0.01)
         assert np.abs(approach / wrong - 1).max() > 0.01
@@ -299,7 +303,11 @@ class TestRecords:
     def test_records_are_independent_and_move_in_the_axes(self, helical, xiamen, spur):
         narrow = with_table(spur, Slices(xiamen, 0.5 * HELIX).table(DEPTH[:3]))
         errors = np.random.default_rng(1).normal(0, 2e-6, 23)
-        machines = [helical, narrow, replace(helical, start_phase=0.9, pinion_error=errors)]
+        machines = [
+            helical,
+            narrow,
+            replace(helical, start_phase=0.9, pinion_error=errors),
+        ]
         signals = {}
         for precision in ("float64", "float32"):
             together = self.motions(machines, precision).acceleration

@@ -26,7 +26,11 @@ def test_the_error_falls_with_the_fourth_power_of_the_step(machine, composed_con
     """As docs/theory/spur_dynamics.md tabulates it, against 64 steps a sample."""
 
     def spectrum(steps):
-        options = {DURATION: 0.05, "solver.oversampling": steps, "solver.max_error": None}
+        options = {
+            DURATION: 0.05,
+            "solver.oversampling": steps,
+            "solver.max_error": None,
+        }
         return in_band(machine(options).simulate().acceleration)
 
     exact, errors = spectrum(64), {}
@@ -41,7 +45,11 @@ def test_the_error_falls_with_the_fourth_power_of_the_step(machine, composed_con
 
 @pytest.mark.parametrize(("speed_rpm", "per_turn"), [(1500, 2048), (1200, 2560)])
 def test_settled_turns_agree(machine, speed_rpm, per_turn):
-    signal = machine({SPEED: speed_rpm, DURATION: 4 * per_turn / RATE}).simulate().acceleration
+    signal = (
+        machine({SPEED: speed_rpm, DURATION: 4 * per_turn / RATE})
+        .simulate()
+        .acceleration
+    )
     level = signal.std(axis=1)
     turns = np.diff(signal.reshape(4, 4, per_turn), axis=1)
     assert np.all(np.sqrt(np.mean(turns**2, axis=-1)).max(axis=1) < 1e-3 * level)
@@ -74,8 +82,13 @@ def test_perfect_healthy_teeth_have_no_sidebands(machine, speed_rpm, turns):
         Order spectrum over whole turns, no window; below half the mesh order is the drive.
         """
         options = {f"solver.{key}": value for key, value in solver.items()}
-        system = machine({SPEED: speed_rpm, DURATION: turns * 60 / speed_rpm, **options})
-        signal, n_teeth = system.simulate(faults).acceleration, system.pair.pinion.n_teeth
+        system = machine(
+            {SPEED: speed_rpm, DURATION: turns * 60 / speed_rpm, **options}
+        )
+        signal, n_teeth = (
+            system.simulate(faults).acceleration,
+            system.pair.pinion.n_teeth,
+        )
         amplitude = np.abs(np.fft.rfft(signal, axis=-1))[:, ::turns]
         order = np.arange(amplitude.shape[1])
         usable = (order > n_teeth // 2) & (order * speed_rpm / 60 <= 20e3)

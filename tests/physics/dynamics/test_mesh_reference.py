@@ -19,15 +19,18 @@ from scipy.integrate import solve_ivp
 
 from gensig.dynamics._layout import DAMPING, SHARED
 from gensig.dynamics._vector import LANES
-from gensig.dynamics.core_numbers import mesh_numbers
-from gensig.dynamics.lanes import pack
+from gensig.dynamics.lanes import mesh_numbers, pack
 from gensig.faults.broken import MissingTooth
 
 CRACK = one("crack", tooth=2, crack_depth_mm=2)
 FAULTS = {
     "healthy": (),
     "crack": (CRACK,),
-    "missing": (CRACK, MissingTooth(gear="pinion", tooth=4), MissingTooth(gear="wheel", tooth=1)),
+    "missing": (
+        CRACK,
+        MissingTooth(gear="pinion", tooth=4),
+        MissingTooth(gear="wheel", tooth=1),
+    ),
     # gaps of both signs that vary along the path, one tooth without its tip
     "flanks": (
         one("pitch_error", tooth=2, pitch_error_um=-15),
@@ -35,7 +38,7 @@ FAULTS = {
         one("runout", gear="wheel", tooth=3, eccentricity_um=8),
         one("wear", gear="wheel", tooth="all", wear_depth_um=4),
     ),
-}  # fmt: skip
+}
 # sizes of normal, friction, two moments, force along the roll, energy and lost power, over N
 SCALE = np.array([1, 1, 0.1, 0.1, 1, 1e-5, 1e-2])
 
@@ -89,12 +92,19 @@ class Reference:
         index = index[self.present(index)]
         position = roll - index * self.pair.base_pitch
         values = np.zeros((4, len(index)))
-        errors = (self.d.pinion_error, self.d.pinion_tilt), (self.d.wheel_error, self.d.wheel_tilt)  # fmt: skip
+        errors = (
+            (self.d.pinion_error, self.d.pinion_tilt),
+            (self.d.wheel_error, self.d.wheel_tilt),
+        )
         for (side, start), (error, tilt) in zip(self.sides, errors, strict=True):
             for k, tooth in enumerate((index + start) % len(side.kind)):
                 at = position[k : k + 1]
-                values[:, k] += columns(side, side.kind[tooth], at, self.table.position)[:, 0]
-                values[2, k] += error[tooth] + tilt[tooth] * (at[0] - self.pair.pitch_point)
+                values[:, k] += columns(
+                    side, side.kind[tooth], at, self.table.position
+                )[:, 0]
+                values[2, k] += error[tooth] + tilt[tooth] * (
+                    at[0] - self.pair.pitch_point
+                )
                 values[3, k] += tilt[tooth]
         return position, *values
 
@@ -113,7 +123,9 @@ class Reference:
         """F >= 0 with C F = approach - gap where F > 0 and C F >= approach - gap elsewhere."""
         n, squeezed = len(gap), approach - gap
         flexibility = np.diag(compliance - self.shared) + self.shared
-        sets = chain.from_iterable(combinations(range(n), size) for size in range(n + 1))
+        sets = chain.from_iterable(
+            combinations(range(n), size) for size in range(n + 1)
+        )
         for chosen in map(list, sets):
             force = np.zeros(n)
             block = flexibility[np.ix_(chosen, chosen)]
@@ -141,13 +153,26 @@ class Reference:
         The mirror image of a sound pair that turns backwards: the back flanks of a space are half
         a pitch further, teeth count down, missing ones stay missing; no errors, no friction.
         """
-        pitch, position, n = self.pair.base_pitch, self.table.position, np.arange(-40, 41)
+        pitch, position, n = (
+            self.pair.base_pitch,
+            self.table.position,
+            np.arange(-40, 41),
+        )
         at = 2 * self.pair.pitch_point + 0.5 * pitch - roll - n * pitch
         chosen = (at >= position[0]) & (at < position[-1]) & self.present(-n)
         values = sum(columns(side, 0, at[chosen], position) for side, _ in self.sides)
         squeezed = -approach - self.pair.backlash
         load, along, stored, lost = self.law(values, squeezed, -rate, -roll_rate)
-        return -load.sum(), 0.0, 0.0, 0.0, -along, stored, lost, -float(np.sum(load > 0))
+        return (
+            -load.sum(),
+            0.0,
+            0.0,
+            0.0,
+            -along,
+            stored,
+            lost,
+            -float(np.sum(load > 0)),
+        )
 
     def acceleration(self, time, q, v, mesh=None):
         """q'' at one instant; ``mesh`` may replace the reference's mesh law."""
@@ -157,7 +182,8 @@ class Reference:
         force = system.force - system.stiffness @ q - system.damping @ v
         force = force - normal * self.d.approach_direction()
         turning = moment_p + self.pair.pinion.base_radius * along
-        return (force + [friction, 0, turning, -friction, 0, moment_w]) / system.mass
+        mesh = np.array([friction, 0, turning, -friction, 0, moment_w])
+        return (force + mesh) / system.mass
 
 
 @pytest.fixture(scope="module", params=FAULTS)
@@ -175,7 +201,10 @@ def random_states(dynamics, n, seed):
     """Roll, approach, its rate and the rate of the roll, (n, 4)."""
     rng, pair = np.random.default_rng(seed), dynamics.table.pair
     speed = dynamics.operating.speed * pair.pinion.base_radius
-    roll, approach = rng.uniform(0, 8, n) * pair.base_pitch, rng.uniform(-2e-6, 40e-6, n)
+    roll, approach = (
+        rng.uniform(0, 8, n) * pair.base_pitch,
+        rng.uniform(-2e-6, 40e-6, n),
+    )
     rates = rng.normal(0, 2e-2, n), rng.normal(speed, 0.01 * speed, n)
     return np.column_stack([roll, approach, *rates])
 
@@ -225,7 +254,9 @@ def test_the_right_hand_side_agrees(dynamics):
 
 
 @pytest.mark.parametrize("roll_torque", ["consistent", "classical"])
-def test_only_the_consistent_law_has_a_force_along_the_roll(machine, dynamics_of, roll_torque):
+def test_only_the_consistent_law_has_a_force_along_the_roll(
+    machine, dynamics_of, roll_torque
+):
     dynamics = dynamics_of(machine({"mesh.roll_torque": roll_torque}), (CRACK,))
     states = random_states(dynamics, 40, seed=19)
     states[1::2, 1] = -dynamics.table.pair.backlash - states[1::2, 1]
@@ -285,7 +316,9 @@ def runge_kutta(slope, time, y, step, n_parts):
 
 
 @pytest.mark.parametrize("oversampling", [5, 16])
-def test_a_step_with_an_entry_or_exit_is_taken_in_parts(machine, dynamics_of, oversampling):
+def test_a_step_with_an_entry_or_exit_is_taken_in_parts(
+    machine, dynamics_of, oversampling
+):
     """Every step of two mesh periods is one of Runge and Kutta's, or two that meet at the event.
 
     With linear contact: the load-dependent term has a cusp where the load of a pair falls to 0,
@@ -308,7 +341,9 @@ def test_a_step_with_an_entry_or_exit_is_taken_in_parts(machine, dynamics_of, ov
         return np.concatenate([y[6:], reference.acceleration(t, y[:6], y[6:], law)])
 
     def off(steps, n_parts):
-        expected = [runge_kutta(slope, n * step, states[n], step, n_parts) for n in steps]
+        expected = [
+            runge_kutta(slope, n * step, states[n], step, n_parts) for n in steps
+        ]
         return np.abs((states[steps + 1] - expected) / scale).max(axis=1)
 
     in_parts = off(events, 64)

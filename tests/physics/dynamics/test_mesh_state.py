@@ -44,7 +44,12 @@ def mesh(record, request):
 
 def test_shares_of_the_loaded_teeth_sum_to_one(mesh, xiamen):
     shape = N_PAIRS, 5120
-    assert mesh.load_share.shape == mesh.pinion_tooth.shape == mesh.wheel_tooth.shape == shape
+    assert (
+        mesh.load_share.shape
+        == mesh.pinion_tooth.shape
+        == mesh.wheel_tooth.shape
+        == shape
+    )
     assert_close(mesh.load_share.sum(axis=0), 1.0, atol=1e-12)
     for teeth in (mesh.pinion_tooth, mesh.wheel_tooth):
         assert ((teeth == NO_TOOTH) == (mesh.load_share == 0.0)).all()

@@ -18,11 +18,26 @@ from gensig.systems.run import Run, Start
 RATE, DURATION = 51200.0, 0.2
 TIMES = np.arange(round(DURATION * RATE)) / RATE
 RATIO = {"pinion": 1.0, "wheel": 23 / 84}
-UNBALANCE = {"kind": "unbalance", "gear": "pinion", "iso21940_grade": 6.3, "used_share": [1.0, 1.0],
-             "rated_speed_rpm": 1800, "rotor_mass_kg": None}  # fmt: skip
-MESH = {"kind": "neighbour_mesh", "gear": "wheel", "n_teeth": 25, "n_teeth_mate": 72, "base_radius_mm": 29.4,
-        "line_of_action_deg": 60, "dynamic_share": [0.01, 0.01], "n_harmonics": 3, "harmonic_exponent": 1.0,
-        "sideband_share": [0.3, 0.3]}  # fmt: skip
+UNBALANCE = {
+    "kind": "unbalance",
+    "gear": "pinion",
+    "iso21940_grade": 6.3,
+    "used_share": [1.0, 1.0],
+    "rated_speed_rpm": 1800,
+    "rotor_mass_kg": None,
+}
+MESH = {
+    "kind": "neighbour_mesh",
+    "gear": "wheel",
+    "n_teeth": 25,
+    "n_teeth_mate": 72,
+    "base_radius_mm": 29.4,
+    "line_of_action_deg": 60,
+    "dynamic_share": [0.01, 0.01],
+    "n_harmonics": 3,
+    "harmonic_exponent": 1.0,
+    "sideband_share": [0.3, 0.3],
+}
 
 
 def tones_of(run, part):
@@ -52,8 +67,13 @@ def at(machine):
     """A run at a speed, with courses if they are given."""
 
     def make(speed_rpm=1800.0, start=None, low_cutoff_hz=None, **courses):
-        system = machine({"operating.speed_rpm": speed_rpm, "operating.duration_s": DURATION,
-                          "sensing.sensor.low_cutoff_hz": low_cutoff_hz})  # fmt: skip
+        system = machine(
+            {
+                "operating.speed_rpm": speed_rpm,
+                "operating.duration_s": DURATION,
+                "sensing.sensor.low_cutoff_hz": low_cutoff_hz,
+            }
+        )
         operating = replace(system.operating, **courses)
         return Run(system=replace(system, operating=operating), faults=(), start=start)
 
@@ -74,8 +94,12 @@ def test_unbalance_grows_with_the_square_of_the_speed(at, gear):
         force = np.zeros((1, 6), dtype=complex)
         force[0, [0, 1] if gear == "pinion" else [3, 4]] = 1.0, -1j * SENSE[gear]
         unit = accelerations(pair_dynamics(run), np.array([w]), force)[0, [0, 1, 3, 4]]
-        waves = np.stack([np.cos(w * TIMES), -np.sin(w * TIMES), np.ones_like(TIMES)], axis=1)
-        fit = np.linalg.lstsq(waves, response(run, tones, w * TIMES / RATIO[gear]).T, rcond=None)[0]  # fmt: skip
+        waves = np.stack(
+            [np.cos(w * TIMES), -np.sin(w * TIMES), np.ones_like(TIMES)], axis=1
+        )
+        fit = np.linalg.lstsq(
+            waves, response(run, tones, w * TIMES / RATIO[gear]).T, rcond=None
+        )[0]
         amplitude = (fit[0] + 1j * fit[1])[axes] / unit[axes]
         assert_close(np.abs(amplitude) / w**2, expected, 1e-4)
 
@@ -118,7 +142,11 @@ def test_a_neighbour_has_its_orders_on_a_shaft_with_wobble(at):
 def test_on_a_ramp_it_is_the_response_in_time(at):
     """m e w(t)^2 cos(angle(t)) on the pinion's x, one mass on its support, solved in time."""
     run = at(3600.0, speed_profile=Profile(times=(0.0, DURATION), factors=(0.5, 1.5)))
-    tones, body, operating = tones_of(run, UNBALANCE), run.system.pinion, run.system.operating
+    tones, body, operating = (
+        tones_of(run, UNBALANCE),
+        run.system.pinion,
+        run.system.operating,
+    )
     times = np.arange(-2000, len(TIMES)) / RATE
     nominal = operating.nominal(times)
     wave = np.real(tones[0].force[0, 0] * np.exp(1j * nominal.angle))
@@ -137,7 +165,9 @@ def test_only_loads_follow_torque_courses(at):
     half = Profile(times=(-1.0, 1.0), factors=(0.5, 0.5))
     for part, factor in ((MESH, 0.5), (UNBALANCE, 1.0)):
         tones = tones_of(at(), part)
-        assert_same(response(at(torque_profile=half), tones), factor * response(at(), tones))
+        assert_same(
+            response(at(torque_profile=half), tones), factor * response(at(), tones)
+        )
 
 
 def test_a_lead_in_continues_into_the_record(at):

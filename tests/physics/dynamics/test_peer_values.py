@@ -19,7 +19,10 @@ from closeness import assert_close
 from gensig.geometry.tooth import healthy_tooth
 from gensig.geometry.tooth_profile import involute_point, load_angle
 from gensig.mesh.compliance import tooth_compliance
-from gensig.mesh.fillet_foundation import body_coefficients, fillet_foundation_compliance
+from gensig.mesh.fillet_foundation import (
+    body_coefficients,
+    fillet_foundation_compliance,
+)
 from gensig.systems.spur_pair import SpurPair
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -82,7 +85,9 @@ def body(gear, curvature, material, *, half_angle=None, to_contact=False):
     angle = load_angle(gear, curvature)
     if to_contact:
         other.base_radius = involute_point(gear, curvature)[0] * np.cos(angle)
-    return fillet_foundation_compliance(other, angle, material, allow_extrapolation=True)
+    return fillet_foundation_compliance(
+        other, angle, material, allow_extrapolation=True
+    )
 
 
 def pair_stiffness(peer, *curvatures):
@@ -94,7 +99,9 @@ def pair_stiffness(peer, *curvatures):
         gear = peer.gear(side)
         angle = ross_half_angle(gear)
         total = total + tooth_compliance(healthy_tooth(gear), curvature, material).total
-        total = total + body(gear, curvature, material, half_angle=angle, to_contact=True)
+        total = total + body(
+            gear, curvature, material, half_angle=angle, to_contact=True
+        )
     return 1 / total
 
 
@@ -108,7 +115,10 @@ def ross_path(peer, share):
     advance = share * (math.acos(pinion.base_radius / pinion.tip_radius) - start)
     wheel_advance = advance * pinion.n_teeth / wheel.n_teeth
     from_tip = math.acos(wheel.base_radius / wheel.tip_radius) - wheel_advance
-    radii = pinion.base_radius * np.tan(start + advance), wheel.base_radius * np.tan(from_tip)
+    radii = (
+        pinion.base_radius * np.tan(start + advance),
+        wheel.base_radius * np.tan(from_tip),
+    )
     return radii
 
 
@@ -130,7 +140,9 @@ def test_every_stored_pair_is_compared(stored):
 
 
 def test_the_line_of_action_agrees(peer):
-    assert_close(peer.ross("contact_ratio"), peer.system.pair.transverse_contact_ratio, 1e-8)
+    assert_close(
+        peer.ross("contact_ratio"), peer.system.pair.transverse_contact_ratio, 1e-8
+    )
 
 
 @EACH_SIDE
@@ -159,7 +171,7 @@ def test_the_contact_term_agrees(peer):
 
 @EACH_SIDE
 def test_the_body_fit_agrees_at_the_same_half_angle(peer, side):
-    """ROSS's root curve meets the root circle at our theta_f; its body term has another, without c*."""
+    """ROSS's root curve has our theta_f on the root circle; its body term omits c*."""
     gear = peer.gear(side)
     curve = peer.ross(f"{side}_root_curve_half_angle")[0]
     half_angle = peer.ross(f"{side}_root_half_angle")[0]
@@ -231,7 +243,8 @@ def test_the_document_shows_the_stored_values(stored):
     """Every line of docs/peers.md has ROSS's stored value to the digits shown."""
     scales = {"1e-12 m/N": 1e12, "1e8 N/m": 1e-8, "rad": 1.0, "": 1.0}
     known = {
-        (row["pair"], row["quantity"], row["point"]): float(row["value"]) for row in stored
+        (row["pair"], row["quantity"], row["point"]): float(row["value"])
+        for row in stored
     }
     pair, n_lines = "", 0
     text = (ROOT / "docs" / "peers.md").read_text(encoding="utf-8")
@@ -240,9 +253,8 @@ def test_the_document_shows_the_stored_values(stored):
         if line.startswith("### "):
             pair = line.removeprefix("### ")
         cells = [cell.strip() for cell in line.strip("|").split("|")]
-        if len(cells) > 4 and (pair, cells[0], cells[1]) in known:
-            if re.fullmatch(r"[\d.]+", cells[3]):
-                expected = known[pair, cells[0], cells[1]] * scales[cells[2]]
-                assert_close(float(cells[3]), expected, 6e-5)
-                n_lines += 1
+        key = (pair, *cells[:2])
+        if len(cells) > 4 and key in known and re.fullmatch(r"[\d.]+", cells[3]):
+            assert_close(float(cells[3]), known[key] * scales[cells[2]], 6e-5)
+            n_lines += 1
     assert n_lines > 40

@@ -11,7 +11,12 @@ from gensig.record.inputs import InputReader
 from gensig.record.simulate import simulate_record, simulate_records
 
 ORDER = (5, 0, 3, 6, 1, 7, 2, 4)
-WORDS = ["experiment=quickstart", "plan.n_records=8", "plan.n_units=2", "operating.duration_s=0.05"]  # fmt: skip
+WORDS = [
+    "experiment=quickstart",
+    "plan.n_records=8",
+    "plan.n_units=2",
+    "operating.duration_s=0.05",
+]
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +125,9 @@ class TestNoise:
 def test_a_sham_record_is_healthy_under_its_label(config, rows, in_order):
     index = next(k for k in range(8) if rows[k]["label_name"] == "missing_tooth")
     sham = simulate_record(config.with_keys("plan", sham=True), rows[index])
-    labels = [found.signals["fault_multihot"].tolist() for found in (sham, in_order[index])]
+    labels = [
+        found.signals["fault_multihot"].tolist() for found in (sham, in_order[index])
+    ]
     assert labels[0] == labels[1]
     assert np.abs(clean(sham)).max() < np.abs(clean(in_order[index])).max()
 

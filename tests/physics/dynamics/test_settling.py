@@ -24,7 +24,11 @@ from gensig.systems.run import Run
 RATE = 51200.0
 LEFT = 5e-4  # of a spectrum; measured 4e-4 at 600 r/min, 2e-4 at other speeds
 SPEED = "operating.speed_rpm"
-LINE = {"system.motor.inertia_kg_m2": 2e-3, "system.load.inertia_kg_m2": 0.05, SPEED: 1500}
+LINE = {
+    "system.motor.inertia_kg_m2": 2e-3,
+    "system.load.inertia_kg_m2": 0.05,
+    SPEED: 1500,
+}
 
 
 @pytest.fixture(scope="module")
@@ -36,8 +40,12 @@ def run(machine):
         system, rng = machine(options), np.random.default_rng(1)
         pair, quality, sensing = system.pair, system.quality, system.sensing
         specimen = draw_specimen(rng, pair.pinion, pair.wheel, quality)
-        gearbox = draw_gearbox(rng, len(sensing.channels), quality, sensing.gain_scatter)
-        return Run(system=system, faults=tuple(faults), specimen=specimen, gearbox=gearbox)
+        gearbox = draw_gearbox(
+            rng, len(sensing.channels), quality, sensing.gain_scatter
+        )
+        return Run(
+            system=system, faults=tuple(faults), specimen=specimen, gearbox=gearbox
+        )
 
     return make
 

@@ -8,7 +8,7 @@ from closeness import assert_close
 from fault_cases import GEARS, on_path, one
 
 from gensig.dynamics._layout import BACKLASH
-from gensig.dynamics.core_numbers import mesh_numbers
+from gensig.dynamics.lanes import mesh_numbers
 from gensig.faults.flank_form import ProfileError
 from gensig.sensing.manufacturing import draw_specimen, perfect_specimen
 from gensig.systems.base import simulate_together
@@ -29,7 +29,9 @@ def eccentric(xiamen, perfect, name, most, *, smooth=True):
     gear = getattr(xiamen.pair, name)
     turn = 2 * np.pi / gear.n_teeth * (np.arange(gear.n_teeth) - most)
     tilt = -SIZE / gear.base_radius * np.sin(turn) * smooth
-    return replace(perfect, **{f"{name}_error": SIZE * np.cos(turn), f"{name}_tilt": tilt})
+    return replace(
+        perfect, **{f"{name}_error": SIZE * np.cos(turn), f"{name}_tilt": tilt}
+    )
 
 
 def dynamics_with(system, specimen, faults=()):
@@ -90,7 +92,9 @@ class TestProfile:
 
     def involute(self, gear):
         """Least and greatest curvature radius of the flank, m."""
-        return gear.junction_curvature_radius, np.sqrt(gear.tip_radius**2 - gear.base_radius**2)
+        return gear.junction_curvature_radius, np.sqrt(
+            gear.tip_radius**2 - gear.base_radius**2
+        )
 
     def deviation(self, pair, position):
         """Recess of both flanks together at a position on the path, m."""
@@ -106,14 +110,18 @@ class TestProfile:
     def test_in_single_contact_the_wheel_lags_by_the_deviation(self, xiamen, perfect):
         pair, specimen = xiamen.pair, replace(perfect, forms=self.FORMS)
         position, pitch = rolls(xiamen) % pair.base_pitch, pair.base_pitch
-        alone = (position > pair.path_of_contact - 0.9 * pitch) & (position < 0.9 * pitch)
+        alone = (position > pair.path_of_contact - 0.9 * pitch) & (
+            position < 0.9 * pitch
+        )
         assert alone.mean() > 0.09
         error = late(xiamen, specimen)[alone]
         assert_close(error, self.deviation(pair, position[alone]), atol=0.02 * UM)
         assert np.abs(error).max() > 0.5 * UM
 
     @pytest.mark.parametrize(("name", "to_tip"), [("pinion", 1.0), ("wheel", -1.0)])
-    def test_the_tilt_of_the_teeth_is_a_profile_slope(self, xiamen, perfect, name, to_tip):
+    def test_the_tilt_of_the_teeth_is_a_profile_slope(
+        self, xiamen, perfect, name, to_tip
+    ):
         """The tooth-to-tooth part: a slope about the pitch point, here the same on all teeth."""
         slope, (low, high) = 3 * UM, self.involute(getattr(xiamen.pair, name))
         tilt = {f"{name}_tilt": to_tip * slope / (high - low)}
@@ -133,7 +141,9 @@ class TestProfile:
         assert np.array_equal(gaps[3], sound.pinion.gap[1])
         assert_close((gaps[4] - sound.pinion.gap[1])[on_path(sound)], 12 * UM, 1e-9)
 
-    def test_the_stiffness_of_the_damping_is_that_of_the_commonest_teeth(self, xiamen, perfect):
+    def test_the_stiffness_of_the_damping_is_that_of_the_commonest_teeth(
+        self, xiamen, perfect
+    ):
         """With the specimen's form the second pair touches later: softer than perfect gears."""
         specimen = replace(perfect, forms=self.FORMS)
         sound = dynamics_with(xiamen, specimen).mean_mesh_stiffness
@@ -184,7 +194,9 @@ def test_small_errors_of_the_teeth_move_the_motion_in_proportion(machine, perfec
     pinion, wheel = rng.normal(0, 1e-8, 23), rng.normal(0, 1e-8, 84)
     plain, small, twice = (
         system.simulate(
-            specimen=replace(perfect, pinion_error=size * pinion, wheel_error=size * wheel)
+            specimen=replace(
+                perfect, pinion_error=size * pinion, wheel_error=size * wheel
+            )
         ).acceleration
         for size in (0, 1, 2)
     )

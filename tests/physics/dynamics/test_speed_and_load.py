@@ -16,7 +16,11 @@ from gensig.systems.run import Run
 
 RATE = 51200.0
 # without friction and errors only the course moves the shaft
-PLAIN = {"solver.max_error": None, "mesh.friction_coefficient": 0, "quality.iso1328_grade": None}
+PLAIN = {
+    "solver.max_error": None,
+    "mesh.friction_coefficient": 0,
+    "quality.iso1328_grade": None,
+}
 SPEED, TORQUE = "operating.speed_profile", "operating.torque_profile"
 DURATION = "operating.duration_s"
 WALK = {"kind": "random_walk", "scatter": 0.02, "correlation_time_s": 0.2}
@@ -95,14 +99,21 @@ def test_a_torque_ripple_is_in_the_force_on_the_teeth(run):
 
 def test_a_lead_in_changes_neither_walk_nor_ripple(run):
     """Of perfect gears, whose motion is the same from any start; see docs/theory/sensing.md."""
-    courses = {SPEED: WALK, TORQUE: WALK, "operating.torque_ripple": {"share": 0.1, "order": 2},
-               "operating.speed_ripple": {"share": 0.01, "order": 2}, DURATION: 0.2}  # fmt: skip
+    courses = {
+        SPEED: WALK,
+        TORQUE: WALK,
+        "operating.torque_ripple": {"share": 0.1, "order": 2},
+        "operating.speed_ripple": {"share": 0.01, "order": 2},
+        DURATION: 0.2,
+    }
     led = run({**courses, "sensing.sensor.low_cutoff_hz": 5.0})
     n_lead = led.system.sensing.n_lead
     assert n_lead > 4000
     (long,) = simulate_with_lead_in([led])
     expected = record(run(courses))
-    speed, wanted = (np.gradient(each.shaft_angle, 1 / RATE) for each in (long, expected))
+    speed, wanted = (
+        np.gradient(each.shaft_angle, 1 / RATE) for each in (long, expected)
+    )
     assert_close(speed, wanted, atol=0.02 * wanted.std())
     assert_close(long.mean_speed, expected.mean_speed, 2e-6)
     other = record(run({**courses, "operating.course_seed": 1})).mean_speed
@@ -117,8 +128,15 @@ class TestStored:
     @classmethod
     def stored(cls):
         """Rows of a plan and their records."""
-        words = ["operating=drifting", "plan.n_records=4", "plan.n_units=2", "plan.classes=[healthy,crack]",
-                 "operating.duration_s=0.1", "dataset.store_operating=true", "dataset.store_shaft_angle=true"]  # fmt: skip
+        words = [
+            "operating=drifting",
+            "plan.n_records=4",
+            "plan.n_units=2",
+            "plan.classes=[healthy,crack]",
+            "operating.duration_s=0.1",
+            "dataset.store_operating=true",
+            "dataset.store_shaft_angle=true",
+        ]
         config = read_request(words).config
         plan = make_plan(config)
         rows = [plan.record(index) for index in range(plan.n_records)]
@@ -130,7 +148,10 @@ class TestStored:
             for name in ("shaft_speed", "torque_set"):
                 assert found.signals[name].shape == (5120,)
                 assert found.signals[name].dtype == np.float32
-            speed, angle = found.signals["shaft_speed"].astype(float), found.signals["shaft_angle"]
+            speed, angle = (
+                found.signals["shaft_speed"].astype(float),
+                found.signals["shaft_angle"],
+            )
             grown = np.cumsum(0.5 * (speed[1:] + speed[:-1])) / RATE
             assert_close(np.append(0.0, grown), angle - angle[0], atol=2e-4)
             mean = found.values["speed_rpm"]
@@ -138,7 +159,7 @@ class TestStored:
             assert abs(mean / row["speed_set_rpm"] - 1) > 1e-5
 
     def test_all_classes_of_a_condition_have_its_torque(self, stored):
-        """Which ripples twice a turn."""
+        """The torque ripples twice a turn."""
         torques = {}
         for row, found in stored:
             torque = found.signals["torque_set"]

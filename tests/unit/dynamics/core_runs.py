@@ -13,8 +13,15 @@ class CoreRun(GroupRun):
     """Runs one group; the lanes start at rest in static equilibrium at ``first_step``."""
 
     def __init__(
-        self, machines, step, *, channels=(1, 5), precision="float64", first_step=0, span=(0.0, 0.0)
-    ):  # fmt: skip
+        self,
+        machines,
+        step,
+        *,
+        channels=(1, 5),
+        precision="float64",
+        first_step=0,
+        span=(0.0, 0.0),
+    ):
         self.machines = fill_lanes(machines, precision)
         self.step, self.now = step, first_step
         self.group = pack(machines, step, precision, span)
@@ -40,8 +47,23 @@ class CoreRun(GroupRun):
         shape = n_steps, len(self.channels), self.n_lanes
         means, nothing = np.empty(shape, dtype=self.precision), np.empty(0)
         _kernels.integrate(
-            self.group, self.state.ravel(), self.lost, self.fresh, self.step, self.now, n_steps,
-            self.channels, means.ravel(), 0, nothing, -1, 1, nothing, self.work, self.wide, self.near,
-        )  # fmt: skip
+            self.group,
+            self.state.ravel(),
+            self.lost,
+            self.fresh,
+            self.step,
+            self.now,
+            n_steps,
+            self.channels,
+            means.ravel(),
+            0,
+            nothing,
+            -1,
+            1,
+            nothing,
+            self.work,
+            self.wide,
+            self.near,
+        )
         self.now, self.fresh[:] = self.now + n_steps, 0.0
         return means

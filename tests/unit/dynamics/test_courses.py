@@ -16,15 +16,22 @@ from gensig.systems.run import Run
 
 RATE, DRIVE = 51200.0, 20.0
 DRIVE_HZ = "operating.drive_frequency_hz"
-QUICK = {"operating.duration_s": 0.03, "solver.max_error": None, DRIVE_HZ: DRIVE,
-         "gear.pinion.support.damping_x_ns_per_m": 100, "gear.wheel.support.damping_x_ns_per_m": 500}  # fmt: skip
+QUICK = {
+    "operating.duration_s": 0.03,
+    "solver.max_error": None,
+    DRIVE_HZ: DRIVE,
+    "gear.pinion.support.damping_x_ns_per_m": 100,
+    "gear.wheel.support.damping_x_ns_per_m": 500,
+}
 SPEED, TORQUE = "operating.speed_profile", "operating.torque_profile"
 RAMP = [[-0.4, 0.4], [0.4, 1.6]]
 SET_SPEED = 60 * math.pi
 MISSING = (MissingTooth(gear="pinion", tooth=3),)
 ROTATIONS = {"sensing.channels": ["pinion_rotation", "wheel_rotation"]}
 ROTORS = {"system.motor.inertia_kg_m2": 5e-4, "system.load.inertia_kg_m2": 5e-3}
-WITH_ROTORS = pytest.mark.parametrize("rotors", [{}, ROTORS], ids=["pair", "motor_and_load"])
+WITH_ROTORS = pytest.mark.parametrize(
+    "rotors", [{}, ROTORS], ids=["pair", "motor_and_load"]
+)
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +103,9 @@ class TestRamp:
         lag = deviation - (turned(run(still), n) - record(still).shaft_angle)
         dynamics = pair_dynamics(ramp)
         twist = self.ACCELERATION * dynamics.reduced_inertia / dynamics.drive_stiffness
-        if rotors:  # the drive holds the motor, whose coupling turns the pinion further back
+        if (
+            rotors
+        ):  # the drive holds the motor, whose coupling turns the pinion further back
             motor = ramp.system.motor
             driven = dynamics.reduced_inertia - motor.inertia
             twist += self.ACCELERATION * driven / motor.coupling_stiffness
@@ -107,7 +116,10 @@ class TestRamp:
 
     def test_accelerations_are_those_of_the_rotating_shafts(self, record):
         """Not of the deviations from nominal rotation."""
-        means = [record({**ROTATIONS, **course}).acceleration[1].mean() for course in ({SPEED: RAMP}, {})]  # fmt: skip
+        means = [
+            record({**ROTATIONS, **course}).acceleration[1].mean()
+            for course in ({SPEED: RAMP}, {})
+        ]
         assert_close(means[0] - means[1], self.ACCELERATION * 23 / 84, 5e-2)
 
     @pytest.mark.parametrize("kink", [0.01, 0.0105])
@@ -159,7 +171,11 @@ class TestTorque:
 
 
 def bits(record):
-    return record.acceleration.tobytes(), record.shaft_angle.tobytes(), record.mean_speed
+    return (
+        record.acceleration.tobytes(),
+        record.shaft_angle.tobytes(),
+        record.mean_speed,
+    )
 
 
 def assert_independent(runs, orders):
@@ -179,7 +195,10 @@ class TestNeighbours:
 
     def test_next_to_longer_settling(self, run):
         """The course of all is tabled from the begin of the slowest."""
-        speed, torque = [[-0.1, 0.8], [0.01, 0.9], [0.03, 1.2]], [[0.0, 1.0], [0.02, 1.1]]
+        speed, torque = (
+            [[-0.1, 0.8], [0.01, 0.9], [0.03, 1.2]],
+            [[0.0, 1.0], [0.02, 1.1]],
+        )
         changing = {SPEED: speed, TORQUE: torque}
         runs = [run({**changing, DRIVE_HZ: rate}) for rate in (20, 5, 7.3)]
         assert_independent(runs, list(permutations(range(3)))[::2])
@@ -189,6 +208,8 @@ def test_machines_with_rotors_move_in_every_channel(run):
     """Eight degrees of freedom, on a ramp of speed and torque."""
     ends = [f"{name}_rotation" for name in ("pinion", "wheel", "motor", "load")]
     channels = {"sensing.channels": ["pinion_y", *ends]}
-    (record,) = simulate_together([run({**ROTORS, SPEED: RAMP, TORQUE: RAMP, **channels}, MISSING)])  # fmt: skip
+    (record,) = simulate_together(
+        [run({**ROTORS, SPEED: RAMP, TORQUE: RAMP, **channels}, MISSING)]
+    )
     assert record.acceleration.shape == (5, 1536)
     assert (record.acceleration.std(axis=-1) > 1.0).all()

@@ -26,9 +26,13 @@ N_SAMPLES = 2048
 def decimated(frequency, factor, phase=0.4):
     """A sine as means over internal steps through the decimator, and sampled at the output rate."""
     low_pass, turn = decimator(factor), 2 * np.pi * frequency
-    steps = np.arange(-low_pass.margin * factor - 1, (N_SAMPLES + low_pass.margin) * factor + 1)
+    steps = np.arange(
+        -low_pass.margin * factor - 1, (N_SAMPLES + low_pass.margin) * factor + 1
+    )
     edge = steps / (RATE * factor)
-    integral = -np.cos(turn * edge + phase) / turn if frequency else edge * np.sin(phase)
+    integral = (
+        -np.cos(turn * edge + phase) / turn if frequency else edge * np.sin(phase)
+    )
     means = np.diff(integral) * RATE * factor
     samples = low_pass.apply_to_columns(means[:, None])[:, 0]
     return samples, np.sin(turn * np.arange(N_SAMPLES) / RATE + phase)
@@ -48,7 +52,9 @@ def test_aliases_are_78_db_down(factor):
             if frequency < 0.5 * factor * RATE:
                 assert np.abs(decimated(frequency, factor)[0]).max() < 10 ** (-78 / 20)
     times = np.arange(N_SAMPLES) / RATE
-    assert np.abs(np.sin(2 * np.pi * (RATE - 690.0) * times)).max() > 0.9  # without the filter
+    assert (
+        np.abs(np.sin(2 * np.pi * (RATE - 690.0) * times)).max() > 0.9
+    )  # without the filter
 
 
 @pytest.mark.parametrize("factor", FACTORS)
@@ -148,5 +154,7 @@ class TestInBandError:
         signal = exact + 1e-4 * rng.standard_normal(exact.shape)
         together = in_band_error(signal, exact, RATE)
         for n in (1, 2, 3):
-            assert np.array_equal(in_band_error(signal[:n], exact[:n], RATE), together[:n])
+            assert np.array_equal(
+                in_band_error(signal[:n], exact[:n], RATE), together[:n]
+            )
         assert np.unique(together).size == 8

@@ -19,8 +19,13 @@ from gensig.systems.run import Run, Start
 
 LANES = n_lanes("float32")
 RATE = 51200.0
-QUICK = {"operating.duration_s": 0.05, "solver.max_error": None, "operating.drive_frequency_hz": 20,
-         "gear.pinion.support.damping_x_ns_per_m": 100, "gear.wheel.support.damping_x_ns_per_m": 500}  # fmt: skip
+QUICK = {
+    "operating.duration_s": 0.05,
+    "solver.max_error": None,
+    "operating.drive_frequency_hz": 20,
+    "gear.pinion.support.damping_x_ns_per_m": 100,
+    "gear.wheel.support.damping_x_ns_per_m": 500,
+}
 BRIEF = {"operating.duration_s": 0.01}
 PAPER = {"mesh.law": "paper", "mesh.pair_coupling": "sum", "mesh.contact": "linear"}
 MISSING = (MissingTooth(gear="pinion", tooth=3),)

@@ -19,8 +19,18 @@ from gensig.sensing.manufacturing import nominal_gearbox
 from gensig.systems.supports import in_gearbox
 from gensig.units import is_turning, read
 
-SUPPORT = {"stiffness_x_n_per_m": 1e8, "stiffness_y_n_per_m": 1e8, "damping_x_ns_per_m": 1.0, "damping_y_ns_per_m": 1.0}  # fmt: skip
-AXIAL = {"stiffness_z_n_per_m": 2e7, "stiffness_tilt_nm_per_rad": 3e4, "damping_z_ns_per_m": 5.0, "damping_tilt_nms_per_rad": 0.1}  # fmt: skip
+SUPPORT = {
+    "stiffness_x_n_per_m": 1e8,
+    "stiffness_y_n_per_m": 1e8,
+    "damping_x_ns_per_m": 1.0,
+    "damping_y_ns_per_m": 1.0,
+}
+AXIAL = {
+    "stiffness_z_n_per_m": 2e7,
+    "stiffness_tilt_nm_per_rad": 3e4,
+    "damping_z_ns_per_m": 5.0,
+    "damping_tilt_nms_per_rad": 0.1,
+}
 ROTORS = {"system.motor.inertia_kg_m2": 2e-3, "system.load.inertia_kg_m2": 0.05}
 
 
@@ -134,7 +144,9 @@ def test_pairs_and_lag_follow_the_table(helical, spur):
     first, last = pitches(helical.table)
     assert pack([helical], 1e-6).n_pairs == last - first > 4
     pair = helical.table.pair
-    assert_close(2.0 * half_lag(helical.table), pair.overlap_ratio * pair.base_pitch, 1e-12)
+    assert_close(
+        2.0 * half_lag(helical.table), pair.overlap_ratio * pair.base_pitch, 1e-12
+    )
 
 
 def test_sliding_turns_with_the_middle_of_the_face_at_the_pitch_point(helical):

@@ -19,8 +19,17 @@ from gensig.systems.run import CleanRecord, Run, Start
 
 CLASSICAL = {"mesh.roll_torque": "classical"}
 PAPER = {"mesh.law": "paper", "mesh.pair_coupling": "sum", "mesh.contact": "linear"}
-LAWS = {"one_sided": {}, "classical": CLASSICAL, "paper": PAPER, "paper_classical": {**PAPER, **CLASSICAL}}  # fmt: skip
-SPEED, TORQUE, BACKLASH = "operating.speed_rpm", "operating.torque_nm", "gear.backlash_um"
+LAWS = {
+    "one_sided": {},
+    "classical": CLASSICAL,
+    "paper": PAPER,
+    "paper_classical": {**PAPER, **CLASSICAL},
+}
+SPEED, TORQUE, BACKLASH = (
+    "operating.speed_rpm",
+    "operating.torque_nm",
+    "gear.backlash_um",
+)
 PINION_STIFFNESS = "gear.pinion.support.stiffness_y_n_per_m"
 MISSING = (MissingTooth(gear="pinion", tooth=3),)
 TWO_MISSING = (*MISSING, MissingTooth(gear="pinion", tooth=4))
@@ -31,11 +40,22 @@ MANY_PITS = tuple(
     for tooth in range(n_teeth)
 )
 # one well-damped drive for all: the same short settling
-QUICK = {"operating.duration_s": 0.02, "solver.max_error": None, "solver.oversampling": 8,
-         "operating.drive_frequency_hz": 20, "gear.pinion.support.damping_x_ns_per_m": 100,
-         "gear.wheel.support.damping_x_ns_per_m": 500}  # fmt: skip
-GEOMETRY = {"gear.pinion.n_teeth": 31, "gear.pinion.bore_radius_mm": 12, "gear.wheel.n_teeth": 61,
-            BACKLASH: 10, "mesh.points_per_pitch": 256, "mesh.damping_ratio": 0.03}  # fmt: skip
+QUICK = {
+    "operating.duration_s": 0.02,
+    "solver.max_error": None,
+    "solver.oversampling": 8,
+    "operating.drive_frequency_hz": 20,
+    "gear.pinion.support.damping_x_ns_per_m": 100,
+    "gear.wheel.support.damping_x_ns_per_m": 500,
+}
+GEOMETRY = {
+    "gear.pinion.n_teeth": 31,
+    "gear.pinion.bore_radius_mm": 12,
+    "gear.wheel.n_teeth": 61,
+    BACKLASH: 10,
+    "mesh.points_per_pitch": 256,
+    "mesh.damping_ratio": 0.03,
+}
 # a damper across the mesh that the light pinion overshoots in a step
 OVERDAMPED = {"mesh.damping_ratio": 1.0, "gear.pinion.mass_kg": 0.006}
 COARSE_STEP = pytest.mark.filterwarnings(
@@ -202,7 +222,9 @@ class TestFailures:
     @pytest.mark.parametrize("law", ["one_sided", "paper"])
     def test_divergence_leaves_the_neighbours(self, run, mixed, law, lane):
         runs, expected = mixed(law)
-        runs[lane] = diverging(run()) if law == "one_sided" else run({**PAPER, **OVERDAMPED})  # fmt: skip
+        runs[lane] = (
+            diverging(run()) if law == "one_sided" else run({**PAPER, **OVERDAMPED})
+        )
         together = simulate_together(runs)
         failed = together.pop(lane)
         assert isinstance(failed, SimulationError)
@@ -252,8 +274,13 @@ class TestError:
     @pytest.fixture(scope="class")
     @classmethod
     def runs(cls, run):
-        fast = {SPEED: 6000, TORQUE: 60, "solver.oversampling": 5, "solver.max_error": LIMIT,
-                "operating.duration_s": 0.1}  # fmt: skip
+        fast = {
+            SPEED: 6000,
+            TORQUE: 60,
+            "solver.oversampling": 5,
+            "solver.max_error": LIMIT,
+            "operating.duration_s": 0.1,
+        }
         calm, light = {**fast, SPEED: 1200}, {**fast, TORQUE: 5}
         changes = (calm, ()), (fast, MISSING), (calm, MISSING), (fast, ())
         return [run(*each) for each in (*changes, (light, TWO_MISSING))]
@@ -295,7 +322,11 @@ def with_solver(run, **changes):
     return replace(run, system=replace(run.system, solver=solver))
 
 
-RECORD = {"sampling_rate": 51200.0, "duration": 0.005, "channels": ("wheel_y", "pinion_rotation")}  # fmt: skip
+RECORD = {
+    "sampling_rate": 51200.0,
+    "duration": 0.005,
+    "channels": ("wheel_y", "pinion_rotation"),
+}
 SOLVER = {"oversampling": 4, "precision": "float64", "max_error": None}
 BRIEF = Integration(**RECORD, **SOLVER, tell_mesh=False)
 
@@ -310,9 +341,11 @@ class TestMotions:
 
     @COARSE_STEP
     def test_any_number_of_machines_in_order(self, machine, dynamics_of):
-        """More than a group, of two kinds of settling; every motion is that of the machine alone."""
+        """More than a group, of two kinds of settling; motions are those of machines alone."""
         systems = [machine(), machine({PINION_STIFFNESS: 2e9}), machine()]
-        machines = [dynamics_of(systems[k % 3], phase=0.05 * k) for k in range(LANES + 3)]
+        machines = [
+            dynamics_of(systems[k % 3], phase=0.05 * k) for k in range(LANES + 3)
+        ]
         assert [len(group) for group in lane_groups(machines, BRIEF)] == [7, 4]
         together = integrate(machines, Solver(**SOLVER), **RECORD)
         assert together.acceleration.shape == (LANES + 3, 2, 256)

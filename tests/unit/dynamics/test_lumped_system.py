@@ -21,18 +21,31 @@ OSCILLATOR = LumpedSystem(
     force=np.zeros(2),
     rotation=np.zeros(2),
 )
-SOFT = {"gear.pinion.support.stiffness_x_n_per_m": 0.0, "gear.wheel.support.damping_y_ns_per_m": 0.0}  # fmt: skip
+SOFT = {
+    "gear.pinion.support.stiffness_x_n_per_m": 0.0,
+    "gear.wheel.support.damping_y_ns_per_m": 0.0,
+}
 STIFF = {"gear.pinion.support.stiffness_x_n_per_m": 9e5, "operating.torque_nm": 31.0}
 ROTORS = {"system.motor.inertia_kg_m2": 2e-3, "system.load.inertia_kg_m2": 5e-2}
-LIGHT = {**ROTORS, "system.motor.coupling_stiffness_nm_per_rad": 500, "system.load.coupling_damping_ratio": 0.2}  # fmt: skip
+LIGHT = {
+    **ROTORS,
+    "system.motor.coupling_stiffness_nm_per_rad": 500,
+    "system.load.coupling_damping_ratio": 0.2,
+}
 
 
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
         ({"mass": np.array([1.0, 0.0])}, "mass or inertia of 'b' must be positive"),
-        ({"stiffness": np.array([[5.0, -5.0], [0.0, 5.0]])}, "stiffness matrix is not symmetric"),
-        ({"damping": np.array([[0.0, 1.0], [-1.0, 0.0]])}, "damping matrix is not symmetric"),
+        (
+            {"stiffness": np.array([[5.0, -5.0], [0.0, 5.0]])},
+            "stiffness matrix is not symmetric",
+        ),
+        (
+            {"damping": np.array([[0.0, 1.0], [-1.0, 0.0]])},
+            "damping matrix is not symmetric",
+        ),
         ({"damping": np.diag([-1.0, 0.0])}, "damping matrix would feed energy in"),
         ({"stiffness": np.diag([1.0, -1.0])}, "stiffness matrix would feed energy in"),
     ],
@@ -50,7 +63,9 @@ def test_slowest_decay_of_an_oscillator():
 
 
 @pytest.mark.parametrize(
-    "kinds", [(SOFT, {}, STIFF), (ROTORS, LIGHT, {**STIFF, **ROTORS})], ids=["pair", "rotors"]
+    "kinds",
+    [(SOFT, {}, STIFF), (ROTORS, LIGHT, {**STIFF, **ROTORS})],
+    ids=["pair", "rotors"],
 )
 def test_a_group_holds_the_matrices_of_each_machine(machine, dynamics_of, kinds):
     """Also where a machine lacks an entry of its neighbour; empty lanes repeat the first."""
@@ -62,7 +77,9 @@ def test_a_group_holds_the_matrices_of_each_machine(machine, dynamics_of, kinds)
         system = dynamics.system()
         for name in ("stiffness", "damping"):
             matrix = np.diag(getattr(group, name)[lane::LANES])
-            matrix[row, group.other_column] = getattr(group, f"other_{name}")[lane::LANES]
+            matrix[row, group.other_column] = getattr(group, f"other_{name}")[
+                lane::LANES
+            ]
             assert np.array_equal(matrix, getattr(system, name))
         expected = {
             "inverse_mass": 1 / system.mass,
@@ -82,8 +99,12 @@ def test_one_compiled_program_takes_every_machine(machine, dynamics_of):
     assert len({numba.typeof(group) for group in groups}) == 1
 
 
-@pytest.mark.parametrize("time", [0.0, (10**8 + 6) * BRIEF], ids=["recentred", "as_it_is"])
-@pytest.mark.parametrize("changes", [{}, ROTORS, LIGHT], ids=["pair", "rotors", "light"])
+@pytest.mark.parametrize(
+    "time", [0.0, (10**8 + 6) * BRIEF], ids=["recentred", "as_it_is"]
+)
+@pytest.mark.parametrize(
+    "changes", [{}, ROTORS, LIGHT], ids=["pair", "rotors", "light"]
+)
 def test_the_compiled_right_hand_side_is_that_of_the_matrices(
     machine, dynamics_of, changes, time
 ):
@@ -106,7 +127,9 @@ def test_the_compiled_right_hand_side_is_that_of_the_matrices(
         springs, dampers = system.stiffness @ q, system.damping @ v
         expected = (system.force - springs - dampers + mesh) / system.mass
         off = right_hand_side(dynamics, time, q, v) - expected
-        terms = np.abs(system.force) + np.abs(system.stiffness) @ np.abs(q) + np.abs(mesh)
+        terms = (
+            np.abs(system.force) + np.abs(system.stiffness) @ np.abs(q) + np.abs(mesh)
+        )
         assert np.abs(off * system.mass / terms).max() < 1e-9
 
 

@@ -28,7 +28,12 @@ MISSING = (MissingTooth(gear="pinion", tooth=3),)
 
 
 def recorded(system, dynamics, **changes):
-    values = {"sampling_rate": RATE, "duration": 0.1, "channels": ("pinion_y",), **changes}
+    values = {
+        "sampling_rate": RATE,
+        "duration": 0.1,
+        "channels": ("pinion_y",),
+        **changes,
+    }
     return integrate([dynamics], values.pop("solver", system.solver), **values)
 
 
@@ -54,13 +59,17 @@ def test_reduced_values(xiamen, dynamics_of):
     assert_close(faulty, xiamen.stiffness_curves().mesh_stiffness.mean(), 1e-3)
 
 
-def test_friction_torque_is_the_imbalance_of_drive_and_load(xiamen, dynamics_of, machine):
+def test_friction_torque_is_the_imbalance_of_drive_and_load(
+    xiamen, dynamics_of, machine
+):
     dynamics = dynamics_of(xiamen)
     torque, force = dynamics.friction_torque(), dynamics.system().force
     # Niemann & Winter: loss factor of a constant load over the path of contact
     pair, pitch = xiamen.pair, xiamen.pair.base_pitch
     recess = (pair.path_of_contact - pair.pitch_point) / pitch
-    shares = 1 - pair.path_of_contact / pitch + recess**2 + (pair.pitch_point / pitch) ** 2
+    shares = (
+        1 - pair.path_of_contact / pitch + recess**2 + (pair.pitch_point / pitch) ** 2
+    )
     loss = 0.05 * math.pi * (1 / 23 + 1 / 84) * shares
     assert_close(torque / xiamen.operating.torque, loss, 0.05)
     rough = dynamics_of(machine({"mesh.friction_coefficient": 0.1}))
@@ -69,8 +78,11 @@ def test_friction_torque_is_the_imbalance_of_drive_and_load(xiamen, dynamics_of,
 
 
 def test_settling_follows_the_slowest_motion_up_to_a_limit(machine, dynamics_of):
-    quick = {"operating.drive_frequency_hz": 20, "gear.pinion.support.damping_x_ns_per_m": 100,
-             "gear.wheel.support.damping_x_ns_per_m": 500}  # fmt: skip
+    quick = {
+        "operating.drive_frequency_hz": 20,
+        "gear.pinion.support.damping_x_ns_per_m": 100,
+        "gear.wheel.support.damping_x_ns_per_m": 500,
+    }
     decay = math.log(1e4) / (2 * math.pi * 0.7)
     for changes, expected in (
         ({}, decay / 5),
@@ -88,7 +100,9 @@ def test_solid_disc():
 
 class TestRefusals:
     @pytest.mark.filterwarnings("ignore::gensig.dynamics.integrator.CoarseStepWarning")
-    @pytest.mark.parametrize(("rate", "steps"), [(6e3, 2), (6e3, 3), (1e3, 17), (10.0, 2)])
+    @pytest.mark.parametrize(
+        ("rate", "steps"), [(6e3, 2), (6e3, 3), (1e3, 17), (10.0, 2)]
+    )
     def test_an_unstable_step_names_the_longest_stable_one(
         self, xiamen, dynamics_of, rate, steps
     ):
@@ -96,7 +110,9 @@ class TestRefusals:
         with pytest.raises(SimulationError) as caught:
             check_step(dynamics, rate, steps)
         text = str(caught.value)
-        assert text.startswith(f"solver.oversampling = {steps} makes internal steps of ")
+        assert text.startswith(
+            f"solver.oversampling = {steps} makes internal steps of "
+        )
         assert "\n" not in text
         enough = int(re.search(r"to at least (\d+)$", text)[1])
         check_step(dynamics, rate, enough)
@@ -144,7 +160,10 @@ class TestRefusals:
     def test_integrations(self, xiamen, dynamics_of):
         dynamics = dynamics_of(xiamen)
         for changes, text in (
-            ({"channels": ("housing",)}, "no channel housing; allowed: pinion_x, pinion_y"),
+            (
+                {"channels": ("housing",)},
+                "no channel housing; allowed: pinion_x, pinion_y",
+            ),
             ({"duration": 1e-6}, "operating.duration_s = 1e-06 holds no sample"),
         ):
             with pytest.raises(ConfigError, match=re.escape(text)):
@@ -153,16 +172,48 @@ class TestRefusals:
     @pytest.mark.parametrize(
         ("part", "changes", "text"),
         [
-            ("solver", {"oversampling": 0}, "solver.oversampling = 0 must lie in 2..256"),
-            ("solver", {"oversampling": 257}, "solver.oversampling = 257 must lie in 2..256"),
-            ("solver", {"precision": "float16"}, "'float16'; allowed: float64, float32"),
+            (
+                "solver",
+                {"oversampling": 0},
+                "solver.oversampling = 0 must lie in 2..256",
+            ),
+            (
+                "solver",
+                {"oversampling": 257},
+                "solver.oversampling = 257 must lie in 2..256",
+            ),
+            (
+                "solver",
+                {"precision": "float16"},
+                "'float16'; allowed: float64, float32",
+            ),
             ("solver", {"max_error": 0.0}, "= 0 must lie in 1e-6..1, or be null"),
-            ("support", {"stiffness_x": -1.0}, "stiffness_x_n_per_m = -1 must not be negative"),
-            ("support", {"damping_y": -1.0}, "damping_y_ns_per_m = -1 must not be negative"),
+            (
+                "support",
+                {"stiffness_x": -1.0},
+                "stiffness_x_n_per_m = -1 must not be negative",
+            ),
+            (
+                "support",
+                {"damping_y": -1.0},
+                "damping_y_ns_per_m = -1 must not be negative",
+            ),
             ("operating", {"speed": 0.0}, "operating.speed_rpm = 0 must be positive"),
-            ("operating", {"torque": -5.0}, "operating.torque_nm = -5 must be positive"),
-            ("operating", {"duration": -1.0}, "operating.duration_s = -1 must be positive"),
-            ("operating", {"drive_damping_ratio": 0.0}, "drive_damping_ratio = 0 must lie in"),
+            (
+                "operating",
+                {"torque": -5.0},
+                "operating.torque_nm = -5 must be positive",
+            ),
+            (
+                "operating",
+                {"duration": -1.0},
+                "operating.duration_s = -1 must be positive",
+            ),
+            (
+                "operating",
+                {"drive_damping_ratio": 0.0},
+                "drive_damping_ratio = 0 must lie in",
+            ),
         ],
     )
     def test_options(self, xiamen, part, changes, text):
@@ -201,19 +252,34 @@ class TestRecord:
         ]
         assert lost[0] > lost[1] >= 0
 
-    @pytest.mark.parametrize(("law", "coupling"), [("one_sided", "coupled"), ("paper", "sum")])
+    @pytest.mark.parametrize(
+        ("law", "coupling"), [("one_sided", "coupled"), ("paper", "sum")]
+    )
     def test_a_missing_tooth_jolts_once_a_turn(self, machine, law, coupling):
-        system = machine({"mesh.law": law, "mesh.pair_coupling": coupling, "operating.speed_rpm": 1500,
-                          "operating.duration_s": 4 * 2048 / RATE})  # fmt: skip
+        system = machine(
+            {
+                "mesh.law": law,
+                "mesh.pair_coupling": coupling,
+                "operating.speed_rpm": 1500,
+                "operating.duration_s": 4 * 2048 / RATE,
+            }
+        )
         signal = np.abs(system.simulate(MISSING).acceleration[1])
         assert np.ptp(signal.reshape(4, 2048).argmax(axis=1)) <= 3
         assert signal.max() > 2 * np.abs(system.simulate().acceleration[1]).max()
 
     def test_the_reference_rise_of_a_missing_tooth(self, machine):
         """Spur reference (docs/validation.md), table 5.2, "gap" rows: pairs not coupled."""
-        system = machine({"mesh.contact": "linear", "mesh.elasticity": "plane_stress",
-                          "mesh.body": "sainsot", "mesh.tooth": "to_contact",
-                          "mesh.pair_coupling": "sum", "operating.duration_s": 0.3})  # fmt: skip
+        system = machine(
+            {
+                "mesh.contact": "linear",
+                "mesh.elasticity": "plane_stress",
+                "mesh.body": "sainsot",
+                "mesh.tooth": "to_contact",
+                "mesh.pair_coupling": "sum",
+                "operating.duration_s": 0.3,
+            }
+        )
         healthy, missing = (
             system.simulate(faults).acceleration[1] for faults in ((), MISSING)
         )

@@ -23,7 +23,9 @@ def responses(dynamics, frequencies, dof):
     return accelerations(dynamics, np.array(frequencies), force)
 
 
-def test_across_the_line_of_action_a_gear_is_one_mass_on_its_support(xiamen, dynamics_of):
+def test_across_the_line_of_action_a_gear_is_one_mass_on_its_support(
+    xiamen, dynamics_of
+):
     w, body = np.array([10.0, 1e3, 1e5]), xiamen.pinion
     response = responses(dynamics_of(xiamen), w, PINION_X)
     stiffness, damping = body.support.stiffness_x, body.support.damping_x

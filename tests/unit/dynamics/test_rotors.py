@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from gensig.dynamics import mesh_statics
-from gensig.dynamics.core_numbers import near_positions
+from gensig.dynamics.lanes import near_positions
 from gensig.dynamics.pair import DOFS, PAIR_DOFS, Rotor
 from gensig.dynamics.system import eigenvalues
 from gensig.errors import ConfigError
@@ -21,7 +21,12 @@ from gensig.systems.registry import read_system
 
 MOTOR = Rotor(inertia=2e-3, coupling_stiffness=3e3, coupling_damping_ratio=0.05)
 LOAD = Rotor(inertia=8e-2, coupling_stiffness=1e4, coupling_damping_ratio=0.03)
-MACHINES = {"pair": {}, "motor": {"motor": MOTOR}, "load": {"load": LOAD}, "both": {"motor": MOTOR, "load": LOAD}}  # fmt: skip
+MACHINES = {
+    "pair": {},
+    "motor": {"motor": MOTOR},
+    "load": {"load": LOAD},
+    "both": {"motor": MOTOR, "load": LOAD},
+}
 RATIO = 84 / 23
 
 
@@ -88,7 +93,10 @@ def drive_matrices(dynamics):
 def residual(dynamics, time, q):
     """Remaining forces and torques at a state at rest in the rotating frame, (dof,)."""
     system, nominal = dynamics.system(), dynamics.nominal(np.array([time]))
-    radius, direction = dynamics.table.pair.pinion.base_radius, dynamics.approach_direction()
+    radius, direction = (
+        dynamics.table.pair.pinion.base_radius,
+        dynamics.approach_direction(),
+    )
     states = dynamics.states(dynamics.start_roll + radius * (nominal.angle + q[2]))
 
     def excess(force):
@@ -109,7 +117,12 @@ class TestEquations:
         assert system.mass[6:].tolist() == [rotor.inertia for rotor in rotors.values()]
         assert direction.shape == (len(dynamics.dofs),)
         assert np.all(direction[6:] == 0)
-        turning = {"pinion_rotation": 1, "motor_rotation": 1, "wheel_rotation": 1 / RATIO, "load_rotation": 1 / RATIO}  # fmt: skip
+        turning = {
+            "pinion_rotation": 1,
+            "motor_rotation": 1,
+            "wheel_rotation": 1 / RATIO,
+            "load_rotation": 1 / RATIO,
+        }
         expected = [turning.get(name, 0) for name in dynamics.dofs]
         assert_close(system.rotation, expected, 1e-15)
 
@@ -137,7 +150,9 @@ class TestEquations:
         rate = math.sqrt(rotation @ system.stiffness @ rotation / inertia)
         damping = rotation @ system.damping @ rotation
         assert_close(rate / (2 * math.pi), operating.drive_frequency, 1e-12)
-        assert_close(damping / (2 * inertia * rate), operating.drive_damping_ratio, 1e-12)
+        assert_close(
+            damping / (2 * inertia * rate), operating.drive_damping_ratio, 1e-12
+        )
 
     def test_torques_act_at_the_ends_and_balance(self, dynamics, smooth):
         system, lead = dynamics.system(), np.zeros(len(dynamics.dofs))
@@ -270,16 +285,25 @@ def test_power_is_stored_and_dissipated_on_a_ramp(whole):
 
 KEYS = ("inertia_kg_m2", "coupling_stiffness_nm_per_rad", "coupling_damping_ratio")
 REFUSALS = [
-    ({f"system.{side}.{key}": value for key, value in values.items()}, f"system.{side}{text}")
+    (
+        {f"system.{side}.{key}": value for key, value in values.items()},
+        f"system.{side}{text}",
+    )
     for side in ("motor", "load")
     for values, text in [
         ({KEYS[0]: 0}, ".inertia_kg_m2 = 0 must be positive"),
         ({KEYS[0]: -1e-3}, ".inertia_kg_m2 = -0.001 must be positive"),
         ({KEYS[0]: "big"}, ".inertia_kg_m2 = 'big' is not a number"),
         ({KEYS[0]: math.nan}, ".inertia_kg_m2 = nan is not finite"),
-        ({KEYS[0]: 1, KEYS[1]: 0}, ".coupling_stiffness_nm_per_rad = 0 must be positive"),
+        (
+            {KEYS[0]: 1, KEYS[1]: 0},
+            ".coupling_stiffness_nm_per_rad = 0 must be positive",
+        ),
         ({KEYS[0]: 1, KEYS[1]: None}, ".coupling_stiffness_nm_per_rad is null"),
-        ({KEYS[0]: 1, KEYS[2]: -0.1}, ".coupling_damping_ratio = -0.1 must be positive"),
+        (
+            {KEYS[0]: 1, KEYS[2]: -0.1},
+            ".coupling_damping_ratio = -0.1 must be positive",
+        ),
     ]
 ] + [
     ({"system.motor": 5}, "system.motor = 5 must be a group of keys"),
@@ -288,18 +312,23 @@ REFUSALS = [
         "system.load: 'inertia' has the wrong unit; write it as 'inertia_kg_m2'",
     ),
     ({"system.motor": {KEYS[0]: 1.0}}, f"system.motor: missing {KEYS[1]}"),
-]  # fmt: skip
+]
 
 
 class TestConfiguration:
-    def test_motor_and_load_are_optional(self, machine, xiamen, dynamics_of, config_with):
+    def test_motor_and_load_are_optional(
+        self, machine, xiamen, dynamics_of, config_with
+    ):
         assert xiamen.motor is xiamen.load is None
         assert dynamics_of(xiamen).dofs == PAIR_DOFS
         config = config_with({"system.motor": None})
         section = config["system"].without("load")
         system = read_system(config.with_entries(system=section))
         assert system.motor is system.load is None
-        load = {f"system.load.{key}": value for key, value in zip(KEYS, (0.5, 2.5e4, 0.2), strict=True)}  # fmt: skip
+        load = {
+            f"system.load.{key}": value
+            for key, value in zip(KEYS, (0.5, 2.5e4, 0.2), strict=True)
+        }
         system = machine({"system.motor.inertia_kg_m2": 2e-3, **load})
         assert system.motor == MOTOR
         assert [system.load.inertia, system.load.coupling_stiffness] == [0.5, 2.5e4]

@@ -48,7 +48,10 @@ def test_the_classical_scheme_is_of_fourth_order() -> None:
 
 def test_the_middle_of_a_cubic_is_exact() -> None:
     cubic, (begin, end) = np.polynomial.Polynomial([0.3, -1.2, 0.7, 2.1]), (-0.4, 0.9)
-    values, slopes = cubic(np.array([begin, end])), cubic.deriv()(np.array([begin, end]))
+    values, slopes = (
+        cubic(np.array([begin, end])),
+        cubic.deriv()(np.array([begin, end])),
+    )
     middle, d = 0.5 * (begin + end), end - begin
     by_values, by_slopes, slope_by_values, slope_by_slopes = CUBIC_MIDDLE
     value = by_values * values.sum() - by_slopes * d * np.diff(slopes)[0]
@@ -67,7 +70,9 @@ def test_newmark_keeps_the_energy_of_an_oscillator() -> None:
     assert_close(q_1**2 + v_1**2, q**2 + v**2, 1e-14)
     mean = (0.5 - NEWMARK.beta) * -q + NEWMARK.beta * -q_1
     assert_close(q_1, q + h * v + h**2 * mean, 1e-14)
-    assert_close(v_1, v + h * ((1.0 - NEWMARK.gamma) * -q + NEWMARK.gamma * -q_1), 1e-14)
+    assert_close(
+        v_1, v + h * ((1.0 - NEWMARK.gamma) * -q + NEWMARK.gamma * -q_1), 1e-14
+    )
 
 
 @pytest.mark.parametrize(("beta", "gamma"), [(1 / 6, 0.5), (0.25, 0.6), (0.3025, 0.6)])

@@ -1,4 +1,4 @@
-"""Tables of distinct teeth in the compiled core: sums by pair where few, single teeth where many."""
+"""Distinct teeth in the tables of the compiled core: sums by pair, or single teeth if many."""
 
 import numpy as np
 import pytest
@@ -15,8 +15,12 @@ from gensig.faults.broken import MissingTooth
 LAWS = {
     "one_sided": {},
     "classical": {"mesh.roll_torque": "classical"},
-    "paper": {"mesh.law": "paper", "mesh.pair_coupling": "sum", "mesh.contact": "linear"},
-}  # fmt: skip
+    "paper": {
+        "mesh.law": "paper",
+        "mesh.pair_coupling": "sum",
+        "mesh.contact": "linear",
+    },
+}
 PITS = tuple(
     one("pitting", gear=gear, tooth=tooth, pit_width_mm=3.0 + 2.0 * tooth)
     for gear, n_teeth in (("pinion", 5), ("wheel", 6))

@@ -25,7 +25,10 @@ from gensig.dynamics._vector import (
 
 N_GROUPS = 400
 SPECIAL = [np.inf, -np.inf, np.nan, 0.0, -0.0, 1.0]
-ODD = {"float64": [*SPECIAL, 5e-324, -1e-310, 1.7e308], "float32": [*SPECIAL, 1e-45, -1e-40, 3.4e38]}  # fmt: skip
+ODD = {
+    "float64": [*SPECIAL, 5e-324, -1e-310, 1.7e308],
+    "float32": [*SPECIAL, 1e-45, -1e-40, 3.4e38],
+}
 EXPONENTS = {"float64": 200, "float32": 25}
 OPERATIONS = operator.add, operator.sub, operator.mul, operator.truediv
 N_RESULTS = 13
@@ -43,10 +46,19 @@ def lane_by_lane(read, per_row, n):
             a, b = read(rows, here), read(rows, here + per_row)
             yes, no = read(rows, here + 2 * per_row), read(rows, here + 3 * per_row)
             results = (
-                (a + b, a - b, a * b, a / b)
-                + (a + x, a - x, a * x, a / x)
-                + (x + a, x - a, x * a, x / a)
-                + (where_above(a, b, yes, no),)
+                a + b,
+                a - b,
+                a * b,
+                a / b,
+                a + x,
+                a - x,
+                a * x,
+                a / x,
+                x + a,
+                x - a,
+                x * a,
+                x / a,
+                where_above(a, b, yes, no),
             )
             for row in range(N_RESULTS):
                 store(out, there + row * n, results[row])
@@ -123,7 +135,10 @@ def assert_same(numbers, expected):
 def test_operations_lane_by_lane(precision, shape):
     kind = precision, shape
     n = SHAPES[kind][1]
-    rows, scalars = draw(precision, N_GROUPS, 4, n).astype(precision), draw(precision, N_GROUPS)  # fmt: skip
+    rows, scalars = (
+        draw(precision, N_GROUPS, 4, n).astype(precision),
+        draw(precision, N_GROUPS),
+    )
     rows[::5, 1] = rows[::5, 0]
     results, above = compute(kind, rows, scalars)
     a, b, yes, no = rows.swapaxes(0, 1)
@@ -131,7 +146,9 @@ def test_operations_lane_by_lane(precision, shape):
     operands = (a, b), (a, x), (x, a)
     with np.errstate(all="ignore"):
         expected = [apply(*pair) for pair in operands for apply in OPERATIONS]
-    for values, wanted in zip(results, [*expected, np.where(a > b, yes, no)], strict=True):
+    for values, wanted in zip(
+        results, [*expected, np.where(a > b, yes, no)], strict=True
+    ):
         assert_same(values, wanted)
     assert all(np.isnan(values).any() for values in (*expected, x))
     assert 0.2 < (a > b).mean() < 0.8

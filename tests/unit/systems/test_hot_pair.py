@@ -21,10 +21,15 @@ from gensig.systems.hot_pair import (
 from gensig.systems.registry import read_duty, read_sliced_pair
 
 MESH = [
-    "system=helical_pair", "gear=chongqing_40_162", "mesh.law=paper", "mesh.pair_coupling=sum",
-    "mesh.contact=linear", "mesh.slice_coupling=independent", "mesh.allow_extrapolation=true",
+    "system=helical_pair",
+    "gear=chongqing_40_162",
+    "mesh.law=paper",
+    "mesh.pair_coupling=sum",
+    "mesh.contact=linear",
+    "mesh.slice_coupling=independent",
+    "mesh.allow_extrapolation=true",
     "mesh.n_slices=20",
-]  # fmt: skip
+]
 FRICTION = "mesh.friction_coefficient"
 
 
@@ -87,12 +92,16 @@ def test_gears_hotter_than_the_housing_have_a_longer_path_of_contact(pinion, whe
     duty = duty_of(*at(pinion, wheel, 30), "gear.backlash_um=2000")
     cold, expansion = duty.system.pair, duty.heat.expansion
     pair = heated_by(duty, growth=True, center_distance=True).pair
-    gears = (cold.pinion, 1 + (pinion - 20) * expansion), (cold.wheel, 1 + (wheel - 20) * expansion)
+    gears = (
+        (cold.pinion, 1 + (pinion - 20) * expansion),
+        (cold.wheel, 1 + (wheel - 20) * expansion),
+    )
     base = sum(gear.base_radius * growth for gear, growth in gears)
     distance = cold.center_distance * (1 + 10 * expansion)
     assert_close(pair.center_distance, distance, 1e-9)
     flanks = sum(
-        growth * math.sqrt(gear.tip_radius**2 - gear.base_radius**2) for gear, growth in gears
+        growth * math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
+        for gear, growth in gears
     )
     path = flanks - math.sqrt(distance**2 - base**2)
     exact = path / (2 * math.pi * base / (cold.pinion.n_teeth + cold.wheel.n_teeth))
@@ -144,7 +153,9 @@ def test_sweeps():
         sweep(duty, "oil", [1.0])
 
 
-@pytest.mark.parametrize(("known_at", "power", "rtol"), [("null", 1.0, 1e-9), ("600", 0.5, 0.02)])
+@pytest.mark.parametrize(
+    ("known_at", "power", "rtol"), [("null", 1.0, 1e-9), ("600", 0.5, 0.02)]
+)
 def test_cooling_grows_with_the_root_of_the_speed(known_at, power, rtol):
     """Friction heat grows with the speed; with weak cooling the temperature keeps its shape."""
     words = f"heat.convection_speed_rpm={known_at}", "heat.conductivity_w_per_mk=500"
@@ -153,7 +164,9 @@ def test_cooling_grows_with_the_root_of_the_speed(known_at, power, rtol):
     def tooth(duty, speed):
         return hot_state(replace(duty, speed=speed)).pinion.tooth
 
-    slow, fast = (tooth(duty, speed) - duty.heat.oil_temperature for speed in (60.0, 240.0))
+    slow, fast = (
+        tooth(duty, speed) - duty.heat.oil_temperature for speed in (60.0, 240.0)
+    )
     assert_close(fast / slow, 4.0**power, rtol)
     fixed = replace(duty, heat=replace(duty.heat, convection_speed=None))
     assert_close(tooth(fixed, 20.0 * math.pi), tooth(duty, 20.0 * math.pi), 1e-12)

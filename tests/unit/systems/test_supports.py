@@ -40,12 +40,20 @@ def stiffness_of(side):
 
 def supports(system, gearbox=None):
     """Stiffness and damping of pinion x, y and wheel x, y, (support,), and damping ratios."""
-    run = system if isinstance(system, Run) else Run(system=system, faults=(), gearbox=gearbox)
+    run = (
+        system
+        if isinstance(system, Run)
+        else Run(system=system, faults=(), gearbox=gearbox)
+    )
     dynamics = pair_dynamics(run)
     sides = dynamics.pinion, dynamics.wheel
     stiffness = np.concatenate([stiffness_of(side) for side in sides])
     damping = np.array(
-        [each for side in sides for each in (side.support.damping_x, side.support.damping_y)]
+        [
+            each
+            for side in sides
+            for each in (side.support.damping_x, side.support.damping_y)
+        ]
     )
     mass = np.repeat([side.mass for side in sides], 2)
     return stiffness, damping, damping / (2 * np.sqrt(stiffness * mass))
@@ -53,7 +61,9 @@ def supports(system, gearbox=None):
 
 class TestStiffness:
     @pytest.mark.parametrize("torque", [2.0, 20.0])
-    def test_it_is_that_of_the_bearings_at_the_set_torque(self, machine, config_with, torque):
+    def test_it_is_that_of_the_bearings_at_the_set_torque(
+        self, machine, config_with, torque
+    ):
         system = machine({**BEARINGS, TORQUE: torque})
         softer = machine({**BEARINGS, TORQUE: 0.05 * torque})
         for side in SIDES:
@@ -67,14 +77,18 @@ class TestStiffness:
 
     def test_a_shaft_without_a_diameter_fills_the_bore(self, machine):
         filling, given = (
-            machine({**BEARINGS, "gear.pinion.shaft": {"diameter_mm": value, "span_mm": 80}})
+            machine(
+                {**BEARINGS, "gear.pinion.shaft": {"diameter_mm": value, "span_mm": 80}}
+            )
             for value in (None, 18.0)
         )
         assert_close(stiffness_of(filling.pinion), stiffness_of(given.pinion), 1e-12)
 
     def test_the_table_of_the_docs(self, machine):
         """docs/theory/supports.md prints stiffness in N/um and frequencies in Hz."""
-        lines = [line.strip("| ").split(" | ") for line in DOCS.read_text().splitlines()]
+        lines = [
+            line.strip("| ").split(" | ") for line in DOCS.read_text().splitlines()
+        ]
         rows = [line for line in lines if len(line) > 5 and line[1] in SIDES]
         assert len(rows) == 8
         for torque, side, *printed in rows:
@@ -156,7 +170,9 @@ class TestRecords:
         assert [len(ratios) for ratios in boxes.values()] == [1, 1]
         (first,), (second,) = boxes.values()
         assert not np.any(np.array(first) == second)
-        assert all(each == set(realistic["plan"]["classes"]) for each in classes.values())
+        assert all(
+            each == set(realistic["plan"]["classes"]) for each in classes.values()
+        )
         assert [len(held) for held in conditions.values()] == [5] * 4
         assert all(len(set(held)) == 1 for held in conditions.values())
 
@@ -181,17 +197,41 @@ class TestRecords:
     ("changes", "text"),
     [
         ({"system.supports": "springs"}, "'springs'; allowed: as_given, bearings"),
-        ({"system.supports": "bearings"}, "= bearings says nothing of damping; give quality."),
-        ({**BEARINGS, LOW: 0.2}, f"{LOW} = 0.2 and support_damping_ratio_high = 0.1 must be"),
+        (
+            {"system.supports": "bearings"},
+            "= bearings says nothing of damping; give quality.",
+        ),
+        (
+            {**BEARINGS, LOW: 0.2},
+            f"{LOW} = 0.2 and support_damping_ratio_high = 0.1 must be",
+        ),
         ({LOW: 0.1}, "must be ordered, above 0 and at most 1, or both null"),
         ({LOW: 0.5, HIGH: 1.5}, "at most 1"),
-        ({**BEARINGS, "gear.wheel.bearing": None}, "gear.wheel.bearing = null: system.supports"),
-        ({**BEARINGS, "gear.pinion.shaft": None}, "gear.pinion.shaft = null: system.supports"),
+        (
+            {**BEARINGS, "gear.wheel.bearing": None},
+            "gear.wheel.bearing = null: system.supports",
+        ),
+        (
+            {**BEARINGS, "gear.pinion.shaft": None},
+            "gear.pinion.shaft = null: system.supports",
+        ),
         ({"gear.pinion.bearing.n_balls": 8.5}, "n_balls = 8.5 is not a whole number"),
-        ({"gear.pinion.bearing.n_balls": 2}, "gear.pinion.bearing.n_balls = 2 must lie in 5..60"),
-        ({"gear.wheel.bearing": 6205}, "gear.wheel.bearing = 6205 must be a group of keys"),
-        ({"gear.wheel.shaft": {"span_mm": 80}}, "gear.wheel.shaft: missing diameter_mm"),
-        ({"gear.wheel.shaft.span_mm": -1}, "gear.wheel.shaft.span_mm = -1 must be positive"),
+        (
+            {"gear.pinion.bearing.n_balls": 2},
+            "gear.pinion.bearing.n_balls = 2 must lie in 5..60",
+        ),
+        (
+            {"gear.wheel.bearing": 6205},
+            "gear.wheel.bearing = 6205 must be a group of keys",
+        ),
+        (
+            {"gear.wheel.shaft": {"span_mm": 80}},
+            "gear.wheel.shaft: missing diameter_mm",
+        ),
+        (
+            {"gear.wheel.shaft.span_mm": -1},
+            "gear.wheel.shaft.span_mm = -1 must be positive",
+        ),
     ],
 )
 def test_refusals(config_with, changes, text):
