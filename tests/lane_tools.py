@@ -8,64 +8,13 @@ import numpy as np
 
 from gensig.dynamics import _kernels
 from gensig.dynamics import _layout as layout
-from gensig.dynamics._mesh_kernels import mesh_law
-from gensig.dynamics._tables import gather
-from gensig.dynamics._vector import LANES, at, compiled, get_row, set_row, spread, width
+from gensig.dynamics._vector import LANES
 from gensig.dynamics.lanes import pack
 from gensig.dynamics.pair import PairDynamics
 
 LAW = layout.Law._fields
 BRIEF = 1e-11  # s; the square of a change over such a step is 0, the slope of a gap over it is not
-ROUNDS = 20  # in which chords and the deflection they share converge
 NO_MEANS = np.empty(0), -1, 1, np.empty(0)
-
-
-@compiled
-def law_at(group, motion, work, wide, near, law_rows):
-    """Every lane's law at one instant, to ``law_rows``.
-
-    Rows of ``motion`` are roll, approach, its rate, the rate of the roll. The integrator reads
-    the tables, and chooses chords, less often.
-    """
-    n = width(work)
-    approach, rate, roll_rate = (
-        get_row(motion, 1),
-        get_row(motion, 2),
-        get_row(motion, 3),
-    )
-    for lane in range(n):
-        near[at(layout.NEWEST, lane, n)] = layout.NO_PAIR
-        wide[at(layout.BASE, lane, n)] = motion[at(0, lane, n)]
-        wide[at(layout.ROLL + layout.EVEN, lane, n)] = motion[at(0, lane, n)]
-        within = motion[at(1, lane, n)] if group.one_sided else 2.0 * layout.FAR
-        work[at(layout.WITHIN, lane, n)] = within
-    zero = spread(work, 0.0)
-    set_row(work, layout.AHEAD + layout.EVEN, zero)
-    set_row(work, layout.TOTAL, zero)
-    helical = layout.is_helical(group)
-    for _ in range(ROUNDS):
-        bent = get_row(group.numbers, layout.SHARED) * get_row(work, layout.TOTAL)
-        set_row(work, layout.LOCAL, approach - bent)
-        if not gather(group, layout.EVEN, True, work, wide, near) and helical:
-            break
-        first, last = _kernels.near_pairs(layout.EVEN, n, near)
-        law = mesh_law(
-            group,
-            first,
-            last,
-            layout.EVEN,
-            layout.MARGIN,
-            zero,
-            approach,
-            rate,
-            roll_rate,
-            work,
-            wide,
-        )
-        for row in range(layout.N_LAW):
-            set_row(law_rows, row, law[row])
-        if not helical:
-            break
 
 
 def laws(dynamics: PairDynamics, motions: np.ndarray, step: float = 1e-6) -> np.ndarray:
@@ -88,7 +37,9 @@ def group_laws(group: layout.Group, motions: np.ndarray) -> np.ndarray:
     laws = np.empty((len(padded), layout.N_LAW, LANES))
     scratch = _kernels.scratch(len(group.force) // LANES, 0)
     for motion, law in zip(padded, laws, strict=True):
-        law_at(group, np.ascontiguousarray(motion.T).ravel(), *scratch, law.ravel())
+        _kernels.law_at(
+            group, np.ascontiguousarray(motion.T).ravel(), *scratch, law.ravel()
+        )
     return laws.transpose(0, 2, 1).reshape(-1, layout.N_LAW)[:n]
 
 
@@ -102,7 +53,7 @@ def law_of(dynamics: PairDynamics, step: float = 1e-6) -> Callable[..., np.ndarr
 
     def law(*state: float) -> np.ndarray:
         motion[:] = np.array(state)[:, None]
-        law_at(group, motion.ravel(), *scratch, result.ravel())
+        _kernels.law_at(group, motion.ravel(), *scratch, result.ravel())
         return result[:, 0]
 
     return law

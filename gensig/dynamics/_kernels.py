@@ -50,6 +50,7 @@ from gensig.dynamics._vector import (
 )
 
 RECENTER = 256  # steps between two removals of the drift of the rotations, to keep numbers small
+ROUNDS = 20  # of ``law_at``, in which chords and the deflection they share converge
 N_STAGES = len(RK4.node)
 LAST_STAGE = N_STAGES - 1
 
@@ -350,8 +351,53 @@ def write_mesh(seen, row, normal, work, near):
             seen[at(first + layout.SEEN_PAIRS + k, lane, n)] = force
 
 
+@compiled
+def law_at(group, motion, work, wide, near, law_rows):
+    """Every lane's law at one instant, to ``law_rows``.
+
+    Rows of ``motion`` are roll, approach, its rate, the rate of the roll. The integrator reads
+    the tables, and chooses chords, less often.
+    """
+    n = width(work)
+    approach, rate = get_row(motion, 1), get_row(motion, 2)
+    roll_rate = get_row(motion, 3)
+    for lane in range(n):
+        near[at(layout.NEWEST, lane, n)] = layout.NO_PAIR
+        wide[at(BASE, lane, n)] = motion[at(0, lane, n)]
+        wide[at(ROLL + EVEN, lane, n)] = motion[at(0, lane, n)]
+        within = motion[at(1, lane, n)] if group.one_sided else 2.0 * layout.FAR
+        work[at(layout.WITHIN, lane, n)] = within
+    zero = spread(work, 0.0)
+    set_row(work, AHEAD + EVEN, zero)
+    set_row(work, layout.TOTAL, zero)
+    helical = is_helical(group)
+    for _ in range(ROUNDS):
+        bent = get_row(group.numbers, layout.SHARED) * get_row(work, layout.TOTAL)
+        set_row(work, layout.LOCAL, approach - bent)
+        if not gather(group, EVEN, True, work, wide, near) and helical:
+            break
+        first, last = near_pairs(EVEN, n, near)
+        law = mesh_law(
+            group,
+            first,
+            last,
+            EVEN,
+            layout.MARGIN,
+            zero,
+            approach,
+            rate,
+            roll_rate,
+            work,
+            wide,
+        )
+        for row in range(layout.N_LAW):
+            set_row(law_rows, row, law[row])
+        if not helical:
+            break
+
+
 def scratch(n_dof, n_channels, precision="float64"):
-    """Work rows, float64 rows and integer rows of ``integrate``."""
+    """Work rows, float64 rows and integer rows of ``integrate`` and ``law_at``."""
     n = n_lanes(precision)
     n_machine = layout.BEHIND * n_dof + layout.N_DRIVE + n_dof + 2 * n_channels
     near = np.zeros((layout.N_COUNTS, n), dtype=np.int64)
