@@ -1,4 +1,4 @@
-"""The equations of motion of a spur pair as scipy takes them; the mesh law is that of the compiled core."""
+"""The equations of motion of a spur pair for scipy, on the mesh law of the compiled core."""
 
 from __future__ import annotations
 
@@ -12,37 +12,33 @@ from gensig.dynamics.pair import PairDynamics
 
 Slope = Callable[[float, np.ndarray], np.ndarray]
 
-LIKELY = np.repeat([1e-6, 1e-2], 6) * np.tile(
-    [1, 1, 20, 1, 1, 20], 2
-)  # m, rad, m/s, rad/s: usual sizes
+# usual sizes: m, rad, m/s, rad/s
+LIKELY = np.repeat([1e-6, 1e-2], 6) * np.tile([1, 1, 20, 1, 1, 20], 2)
 
 
 def equations(dynamics: PairDynamics) -> tuple[Slope, np.ndarray]:
     """y' as a function of t and y = (q, q'), and the matrix of its linear part without the mesh."""
-    system, direction, law = (
-        dynamics.system(),
-        dynamics.approach_direction(),
-        law_of(dynamics),
-    )
+    system, direction = dynamics.system(), dynamics.approach_direction()
+    law, mass = law_of(dynamics), system.mass[:, None]
     radius, speed = dynamics.table.pair.pinion.base_radius, dynamics.operating.speed
     free = np.eye(12, k=6)
-    free[6:] = -np.hstack([system.stiffness, system.damping]) / system.mass[:, None]
+    free[6:] = -np.hstack([system.stiffness, system.damping]) / mass
     pushed = np.concatenate([np.zeros(6), system.force / system.mass])
-    # motion of the mesh by state; state by normal force, friction force, its moments, force on the roll
-    seen, felt = np.zeros((4, 12)), np.zeros((12, 5))
-    seen[1, :6] = seen[2, 6:] = direction
-    seen[0, 2] = seen[3, 8] = radius
-    felt[6:, 0] = -direction
-    felt[[6, 9], 1] = 1, -1
-    felt[[8, 11, 8], [2, 3, 4]] = 1, 1, radius
-    felt[6:] /= system.mass[:, None]
-    start, rate = (
-        np.array([dynamics.start_roll, 0, 0, radius * speed]),
-        np.array([radius * speed, 0, 0, 0]),
-    )
+    # motion of the mesh by state
+    motion = np.zeros((4, 12))
+    motion[1, :6] = motion[2, 6:] = direction
+    motion[0, 2] = motion[3, 8] = radius
+    # state by normal force, friction force, its moments, force on the roll
+    forces = np.zeros((12, 5))
+    forces[6:, 0] = -direction
+    forces[[6, 9], 1] = 1, -1
+    forces[[8, 11, 8], [2, 3, 4]] = 1, 1, radius
+    forces[6:] /= mass
+    start = np.array([dynamics.start_roll, 0, 0, radius * speed])
+    rate = np.array([radius * speed, 0, 0, 0])
 
     def slope(t, y):
-        return free @ y + pushed + felt @ law(*(start + rate * t + seen @ y))[:5]
+        return free @ y + pushed + forces @ law(*(start + rate * t + motion @ y))[:5]
 
     return slope, free
 
@@ -51,19 +47,11 @@ def solved(
     slope: Slope, start: np.ndarray, times: np.ndarray, method: str, rtol: float
 ) -> np.ndarray:
     """States at some times, (time, state); ``start`` is the state at the first."""
-    span = times[0], times[-1]
-    solution = solve_ivp(
-        slope,
-        span,
-        start,
-        method=method,
-        rtol=rtol,
-        atol=10 * rtol * LIKELY,
-        t_eval=times,
-        first_step=1e-7,
-        max_step=2e-5,
-    )
-    return solution.y.T
+    span, steps = (times[0], times[-1]), {"first_step": 1e-7, "max_step": 2e-5}
+    atol = 10 * rtol * LIKELY
+    return solve_ivp(
+        slope, span, start, method, times, rtol=rtol, atol=atol, **steps
+    ).y.T
 
 
 def at_rest(dynamics: PairDynamics, time: float = 0.0) -> np.ndarray:

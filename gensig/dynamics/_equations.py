@@ -9,18 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from gensig.dynamics import _layout as layout
-from gensig.dynamics._layout import (
-    BASE,
-    CENTER,
-    DRIVE_CENTER,
-    DRIVE_GAIN,
-    DRIVE_SPEED,
-    DRIVE_TORQUE,
-    MARGIN,
-    MOST_PAIRS,
-    NOMINAL,
-    is_helical,
-)
+from gensig.dynamics._layout import CENTER, MARGIN, MOST_PAIRS, is_helical
 from gensig.dynamics._vector import (
     at,
     get_row,
@@ -31,8 +20,7 @@ from gensig.dynamics._vector import (
     width,
 )
 
-# degrees of freedom of the two gears that every machine begins with; helical gears have more
-# behind them
+# degrees of freedom of the two gears, first in every machine; helical gears have more after them
 P_X, P_Y, P_TURN, W_X, W_Y, W_TURN, N_IN_PLANE = range(7)
 N_GEARS = 12
 EARLIEST, LATEST = 0.02, 0.98  # share of a step at which it may be cut in two
@@ -47,14 +35,12 @@ def _n_gears(group):
 def motion(group, q, v, work):
     """Approach and its rate, from the rows of a state."""
     numbers = group.numbers
-    pinion_radius = get_row(numbers, layout.PINION_RADIUS)
-    wheel_radius = get_row(numbers, layout.WHEEL_RADIUS)
-    approach = pinion_radius * get_row(work, q + P_TURN) - wheel_radius * get_row(
-        work, q + W_TURN
-    )
-    rate = pinion_radius * get_row(work, v + P_TURN) - wheel_radius * get_row(
-        work, v + W_TURN
-    )
+    radius_p = get_row(numbers, layout.PINION_RADIUS)
+    radius_w = get_row(numbers, layout.WHEEL_RADIUS)
+    turned_p, turned_w = get_row(work, q + P_TURN), get_row(work, q + W_TURN)
+    approach = radius_p * turned_p - radius_w * turned_w
+    speed_p, speed_w = get_row(work, v + P_TURN), get_row(work, v + W_TURN)
+    rate = radius_p * speed_p - radius_w * speed_w
     deviation = approach - get_row(work, q + P_Y) + get_row(work, q + W_Y)
     approach = get_row(numbers, layout.REST_APPROACH) + deviation
     rate = rate - get_row(work, v + P_Y) + get_row(work, v + W_Y)
@@ -67,11 +53,11 @@ def motion(group, q, v, work):
 
 @inlined
 def set_out(group, time, q, drive, forces, work, wide):
-    """Write what stays the same over a step: nominal motion, the roll at its begin, and every
-    force but the mesh's.
+    """Write what stays constant over a step.
 
     Rows ``drive`` take the nominal speed, its change, the share of the set torque and the
-    pinion's turn; rows ``forces`` the forces.
+    pinion's rotation; rows ``forces`` every force but the mesh's. ``wide`` takes the nominal
+    angle and the roll at the begin of the step.
     """
     n = width(work)
     n_dof = len(group.force) // n
@@ -84,40 +70,28 @@ def set_out(group, time, q, drive, forces, work, wide):
     for lane in range(n):
         speed = profile[at(first + layout.NOMINAL_SPEED, lane, n)]
         gain = profile[at(first + layout.NOMINAL_ACCELERATION, lane, n)]
-        turned = profile[at(first + layout.NOMINAL_ANGLE, lane, n)] + since * (
-            speed + 0.5 * gain * since
-        )
-        torque, slope = (
-            profile[at(first + layout.TORQUE, lane, n)],
-            profile[at(first + layout.TORQUE_SLOPE, lane, n)],
-        )
-        work[at(drive + DRIVE_SPEED, lane, n)] = speed + gain * since
-        work[at(drive + DRIVE_GAIN, lane, n)] = gain
-        work[at(drive + DRIVE_TORQUE, lane, n)] = torque + since * slope
-        work[at(drive + DRIVE_CENTER, lane, n)] = wide[at(CENTER, lane, n)]
-        turned += wide[at(CENTER, lane, n)]
-        wide[at(NOMINAL, lane, n)] = turned
-        start_roll, radius = (
-            exact[at(layout.START_ROLL, lane, n)],
-            exact[at(layout.EXACT_RADIUS, lane, n)],
-        )
-        wide[at(BASE, lane, n)] = start_roll + radius * (
-            turned + work[at(q + P_TURN, lane, n)]
-        )
-    gain, torque = (
-        get_row(work, drive + DRIVE_GAIN),
-        get_row(work, drive + DRIVE_TORQUE),
-    )
-    center = get_row(work, drive + DRIVE_CENTER)
+        turned = since * (speed + 0.5 * gain * since)
+        turned = profile[at(first + layout.NOMINAL_ANGLE, lane, n)] + turned
+        slope = profile[at(first + layout.TORQUE_SLOPE, lane, n)]
+        torque = profile[at(first + layout.TORQUE, lane, n)] + since * slope
+        center = wide[at(layout.CENTER, lane, n)]
+        work[at(drive + layout.DRIVE_SPEED, lane, n)] = speed + gain * since
+        work[at(drive + layout.DRIVE_GAIN, lane, n)] = gain
+        work[at(drive + layout.DRIVE_TORQUE, lane, n)] = torque
+        work[at(drive + layout.DRIVE_CENTER, lane, n)] = center
+        turned += center
+        wide[at(layout.NOMINAL, lane, n)] = turned
+        roll = turned + work[at(q + P_TURN, lane, n)]
+        roll = exact[at(layout.EXACT_RADIUS, lane, n)] * roll
+        roll = exact[at(layout.START_ROLL, lane, n)] + roll
+        wide[at(layout.BASE, lane, n)] = roll
+    gain = get_row(work, drive + layout.DRIVE_GAIN)
+    torque = get_row(work, drive + layout.DRIVE_TORQUE)
+    center = get_row(work, drive + layout.DRIVE_CENTER)
     for d in range(n_dof):
         held = center * get_row(group.held, d) + gain * get_row(group.carried, d)
-        set_row(
-            work,
-            forces + d,
-            get_row(group.force, d)
-            + get_row(group.set_force, d) * (torque - 1.0)
-            - held,
-        )
+        added = get_row(group.set_force, d) * (torque - 1.0)
+        set_row(work, forces + d, get_row(group.force, d) + added - held)
 
 
 @inlined
@@ -125,18 +99,14 @@ def accelerate(group, law, q, v, torque, forces, a, work):
     """Fill the rows ``a`` with q'' under the forces of a mesh law."""
     n_dof, numbers = len(group.force) // width(work), group.numbers
     normal = law.normal - get_row(numbers, layout.MEAN_FORCE) * torque
+    arm_p = get_row(numbers, layout.PINION_RADIUS)
+    arm_w = get_row(numbers, layout.WHEEL_RADIUS)
     set_row(work, a + P_X, law.friction)
     set_row(work, a + P_Y, normal)
-    set_row(
-        work,
-        a + P_TURN,
-        get_row(numbers, layout.PINION_RADIUS) * (law.along - normal) + law.moment_p,
-    )
+    set_row(work, a + P_TURN, arm_p * (law.along - normal) + law.moment_p)
     set_row(work, a + W_X, 0.0 - law.friction)
     set_row(work, a + W_Y, 0.0 - normal)
-    set_row(
-        work, a + W_TURN, get_row(numbers, layout.WHEEL_RADIUS) * normal + law.moment_w
-    )
+    set_row(work, a + W_TURN, arm_w * normal + law.moment_w)
     n_gears = _n_gears(group)
     for d in range(N_IN_PLANE, n_gears):
         set_row(work, a + d, 0.0 - get_row(group.reach, d) * normal)
@@ -155,9 +125,9 @@ def accelerate(group, law, q, v, torque, forces, a, work):
 
 @inlined
 def recenter(group, q, n_dof, work, wide):
-    """Take the pinion's turn out of all rotations together, into ``CENTER``.
+    """Move the pinion's rotation from all rotations of the state into ``CENTER``.
 
-    No spring but the drive's sees it.
+    Only the drive's spring depends on a common rotation.
     """
     n = width(work)
     turn = get_row(work, q + P_TURN)
@@ -168,37 +138,36 @@ def recenter(group, q, n_dof, work, wide):
 
 
 @inlined
-def _crossing(before, after, zero, one):
-    """Share of the step at which a number changes its sign, 1 where it does not."""
-    share = before / (before - after)
-    return where_above(zero, before * after, share, one)
+def _earlier_crossing(earliest, before, after, fall, zero, one):
+    """The lesser of ``earliest`` and the share of the step at which a number crosses 0.
+
+    ``fall`` is ``before`` less ``after``.
+    """
+    share = where_above(zero, before * after, before / fall, one)
+    return where_above(earliest, share, share, earliest)
 
 
 @inlined
 def event(group, first, last, work):
-    """Share of the step at which the first pair takes up or lets go of its load, from the margins
-    at both ends.
+    """Share of the step at which the first pair takes up or releases its load.
+
+    From the margins at both ends of the step.
     """
     zero, one = spread(work, 0.0), spread(work, 1.0)
     earliest = one
     for k in range(first, last):
-        before, after = (
-            get_row(work, MARGIN + k),
-            get_row(work, MARGIN + MOST_PAIRS + k),
-        )
-        share = _crossing(before, after, zero, one)
-        earliest = where_above(earliest, share, share, earliest)
-        if not group.one_sided:  # and where the pair is wholly in
-            share = (before - 1.0) / (before - after)
-            share = where_above(zero, (before - 1.0) * (after - 1.0), share, one)
-            earliest = where_above(earliest, share, share, earliest)
+        before = get_row(work, MARGIN + k)
+        after = get_row(work, MARGIN + MOST_PAIRS + k)
+        fall = before - after
+        earliest = _earlier_crossing(earliest, before, after, fall, zero, one)
+        if not group.one_sided:  # and where the pair is wholly in contact
+            before, after = before - 1.0, after - 1.0
+            earliest = _earlier_crossing(earliest, before, after, fall, zero, one)
     play = get_row(group.numbers, layout.BACKLASH)
-    before, after = (
-        get_row(work, layout.WITHIN) + play,
-        get_row(work, layout.STEP_APPROACH) + play,
-    )
-    share = _crossing(before, after, zero, one)
-    earliest = where_above(earliest, share, share, earliest)
+    before = get_row(work, layout.WITHIN) + play
+    after = get_row(work, layout.STEP_APPROACH) + play
+    fall = before - after
+    earliest = _earlier_crossing(earliest, before, after, fall, zero, one)
     earliest = where_above(one, earliest, earliest, spread(work, 0.5))
     low, high = spread(work, EARLIEST), spread(work, LATEST)
     earliest = where_above(low, earliest, low, earliest)

@@ -1,8 +1,7 @@
-"""Compiled core: a fixed-step fourth-order Runge-Kutta integrator and its low-pass, several
-records side by side.
+"""Compiled core: fixed-step fourth-order Runge-Kutta integrator, several records side by side.
 
 Every number of a record lies in its own lane of a vector, and no instruction mixes lanes or
-reorders sums: a record's bits depend on nothing but its own numbers. Arrays are flat; a row is
+reorders sums: a record's bits depend on nothing but its own numbers. Arrays are flat; a row holds
 one number for every record of the group.
 """
 
@@ -23,8 +22,6 @@ from gensig.dynamics._layout import (
     AHEAD,
     BASE,
     EVEN,
-    FIRST_NEAR_PAIR,
-    LAST_NEAR_PAIR,
     MIDDLE,
     NOMINAL,
     ODD,
@@ -34,11 +31,11 @@ from gensig.dynamics._layout import (
     is_helical,
     machine_rows,
     pair_rows,
-    span_place,
+    span_index,
 )
 from gensig.dynamics._mesh_kernels import mesh_law
 from gensig.dynamics._tableau import RK4
-from gensig.dynamics._tables import beside_between, between, cover, gather
+from gensig.dynamics._tables import between, chords_between, cover, gather
 from gensig.dynamics._vector import (
     any_above,
     at,
@@ -46,46 +43,60 @@ from gensig.dynamics._vector import (
     get_row,
     inlined,
     n_lanes,
-    plus_product,
     set_row,
     spread,
     where_above,
     width,
 )
 
-RECENTER = 256  # steps after which the drift of the rotations is taken out of them, so that small numbers stay small
-BLOCK = 64  # output samples between two passes of the low-pass: what it reads is still in the cache
-ROUNDS = 20  # in which chords and the deflection they share find each other
-TOGETHER = 4  # samples of the low-pass that are summed side by side; divides BLOCK
+RECENTER = 256  # steps between two removals of the drift of the rotations, to keep numbers small
+ROUNDS = 20  # of ``law_at``, in which chords and the deflection they share converge
 N_STAGES = len(RK4.node)
 LAST_STAGE = N_STAGES - 1
 
 
 @compiled
 def integrate(
-    group, state, lost, fresh, step, first_step, n_steps, channels, out, out_row, angle, angle_row, per_angle, seen,
-    work, wide, near,
-):  # fmt: skip
+    group,
+    state,
+    lost,
+    fresh,
+    step,
+    first_step,
+    n_steps,
+    channels,
+    out,
+    out_row,
+    angle,
+    angle_row,
+    per_angle,
+    seen,
+    work,
+    wide,
+    near,
+):
     """Advance every lane by ``n_steps`` of classical RK4.
 
-    The tables are read once a step, at the roll where it will end; the middle follows from both
-    ends, and what little the stages differ from there by the slope of the gap. A step in which a
-    pair takes up or lets go of its load is taken again in two parts that meet there, in the lanes
-    where it does: the force has a kink there, which would otherwise set the accuracy of
-    everything.
+    The tables are read once a step, at the roll where it will end. The middle follows from both
+    ends, and the small differences between stages from the slope of the gap. A step in which a
+    pair takes up or releases its load is repeated in two parts that meet there, in the lanes
+    where that happens: the force has a kink there, which would otherwise limit the accuracy.
 
     Parameters
     ----------
-    state : (2, dof, lane)    q and v, advanced in place; the pinion has turned by ``wide[CENTER]`` besides
+    state : (2, dof, lane)    q and v, advanced in place; the pinion has also turned by
+        ``wide[CENTER]``
     lost : (lane,)            the number of steps without contact is added
-    fresh : (lane,)           1 where the state is new: its tables are read first. 0 goes on as if the last call of this
-        group, step and scratch had not ended; so where calls end leaves no trace
-    out : (step, channel, lane)    takes, from row ``out_row`` on, the mean acceleration over each step (what the
-        equations add to the velocity, over the step: kinks then alias far less than point values would); a negative
-        row stores nothing
-    angle : (sample, lane)    takes, from row ``angle_row`` on, the pinion's angle in rad since time 0 at the begin of
-        every step whose number ``per_angle`` divides; a negative row stores nothing
-    seen : (sample, N_SEEN, lane)    takes at the same places what the pairs do; may be empty
+    fresh : (lane,)           1 where the state is new: its tables are read first. 0 continues as
+        if the last call of this group, step and scratch had not ended, so the ends of calls leave
+        no trace
+    out : (step, channel, lane)    takes, from row ``out_row`` on, the mean acceleration over each
+        step: velocity gained by the equations, over the step. Kinks then alias far less than with
+        point values. A negative row stores nothing
+    angle : (sample, lane)    takes, from row ``angle_row`` on, the pinion's angle in rad since
+        time 0 at the begin of every step whose number ``per_angle`` divides; a negative row
+        stores nothing
+    seen : (sample, N_SEEN, lane)    takes the state of the pairs at the same steps; may be empty
     work, wide, near : ``scratch`` of the group
 
     Returns
@@ -98,14 +109,14 @@ def integrate(
     n_channels = len(channels) if out_row >= 0 else 0
     zero, one = spread(work, 0.0), spread(work, 1.0)
     # rows of states, each q and then v; see _layout
-    now, single = machine_rows(layout.NOW, n_dof), machine_rows(layout.SINGLE, n_dof)
+    now = machine_rows(layout.NOW, n_dof)
+    single = machine_rows(layout.SINGLE, n_dof)
     parted = machine_rows(layout.PARTED, n_dof)
-    trial_a, trial_b = (
-        machine_rows(layout.TRIAL_A, n_dof),
-        machine_rows(layout.TRIAL_B, n_dof),
-    )
+    trial_a = machine_rows(layout.TRIAL_A, n_dof)
+    trial_b = machine_rows(layout.TRIAL_B, n_dof)
     a = machine_rows(layout.ACCELERATIONS, n_dof)
-    sum_q, sum_v = machine_rows(layout.SUM_Q, n_dof), machine_rows(layout.SUM_V, n_dof)
+    sum_q = machine_rows(layout.SUM_Q, n_dof)
+    sum_v = machine_rows(layout.SUM_V, n_dof)
     drive = machine_rows(layout.BEHIND, n_dof)
     forces = drive + layout.N_DRIVE
     mean = forces + n_dof
@@ -117,7 +128,7 @@ def integrate(
         set_row(work, now + i, get_row(state, i))
     for lane in range(n):
         if fresh[lane] > 0.0:
-            near[at(layout.NEWEST, lane, n)] = layout.NOBODY
+            near[at(layout.NEWEST, lane, n)] = layout.NO_PAIR
     for number in range(first_step, first_step + n_steps):
         if number % RECENTER == 0:
             recenter(group, now, n_dof, work, wide)
@@ -125,18 +136,15 @@ def integrate(
         seen_row = -1
         if angle_row >= 0 and number % per_angle == 0:
             for lane in range(n):
-                angle[at(angle_row, lane, n)] = (
-                    wide[at(NOMINAL, lane, n)] + work[at(now + P_TURN, lane, n)]
-                )
+                turned = wide[at(NOMINAL, lane, n)] + work[at(now + P_TURN, lane, n)]
+                angle[at(angle_row, lane, n)] = turned
             if len(seen) > 0:
                 seen_row = angle_row
                 for k in range(layout.MOST_PAIRS):
                     set_row(work, layout.PAIR_FORCE + k, zero)
             angle_row += 1
-        speed, gain = (
-            get_row(work, drive + layout.DRIVE_SPEED),
-            get_row(work, drive + layout.DRIVE_GAIN),
-        )
+        speed = get_row(work, drive + layout.DRIVE_SPEED)
+        gain = get_row(work, drive + layout.DRIVE_GAIN)
         approach, rate = motion(group, now, now + n_dof, work)
         set_row(work, layout.WITHIN, approach + margin)
         turning = radius * (speed + get_row(work, now + n_dof + P_TURN))
@@ -145,33 +153,23 @@ def integrate(
             for lane in range(n):
                 if fresh[lane] > 0.0:
                     wide[at(ROLL + begin, lane, n)] = wide[at(BASE, lane, n)]
-                    work[at(layout.LAST_TOTAL, lane, n)] = numbers[
-                        at(layout.MEAN_FORCE, lane, n)
-                    ]
+                    mean_force = numbers[at(layout.MEAN_FORCE, lane, n)]
+                    work[at(layout.LAST_TOTAL, lane, n)] = mean_force
         if is_helical(group):
             bent = get_row(numbers, layout.SHARED) * get_row(work, layout.LAST_TOTAL)
             set_row(work, layout.LOCAL, approach + 0.5 * step * rate - bent)
         if number == first_step:
             gather(group, begin, True, work, wide, near)
-        for lane in range(n):
-            wide[at(ROLL + end, lane, n)] = (
-                wide[at(BASE, lane, n)] + work[at(AHEAD + end, lane, n)]
-            )
+        roll_ahead(end, work, wide)
         if gather(group, end, True, work, wide, near):
             set_row(work, layout.FLAGS, one)
             gather(group, begin, False, work, wide, near)
         for lane in range(n):
-            work[at(AHEAD + begin, lane, n)] = (
-                wide[at(ROLL + begin, lane, n)] - wide[at(BASE, lane, n)]
-            )
-        first = min(
-            near[span_place(begin, n) + FIRST_NEAR_PAIR],
-            near[span_place(end, n) + FIRST_NEAR_PAIR],
-        )
-        last = max(
-            near[span_place(begin, n) + LAST_NEAR_PAIR],
-            near[span_place(end, n) + LAST_NEAR_PAIR],
-        )
+            ahead = wide[at(ROLL + begin, lane, n)] - wide[at(BASE, lane, n)]
+            work[at(AHEAD + begin, lane, n)] = ahead
+        first, last = near_pairs(begin, n, near)
+        first_end, last_end = near_pairs(end, n, near)
+        first, last = min(first, first_end), max(last, last_end)
         cover(begin, first, last, work, near)
         cover(end, first, last, work, near)
         q_0 = get_row(work, now + P_TURN)
@@ -183,18 +181,13 @@ def integrate(
             if part == 1:
                 target, slot_1, h = parted, PART, share * step
             elif part == 2:
-                source, target, slot_0, h, offset = (
-                    parted,
-                    parted,
-                    PART,
-                    (1.0 - share) * step,
-                    share * step,
-                )
+                source, target, slot_0 = parted, parted, PART
+                h, offset = (1.0 - share) * step, share * step
             between(slot_0, slot_1, MIDDLE, first, last, work)
             if is_helical(group):
-                beside_between(slot_0, slot_1, MIDDLE, first, last, work)
+                chords_between(slot_0, slot_1, MIDDLE, first, last, work)
             half = RK4.node[1] * h
-            at_stage, ahead = source, trial_a
+            at_stage, next_stage, spare = source, trial_a, trial_b
             loaded = zero
             for stage in range(N_STAGES):
                 # the stages in the middle are alike
@@ -206,10 +199,8 @@ def integrate(
                 since = offset + since
                 q, v = at_stage, at_stage + n_dof
                 approach, rate = motion(group, q, v, work)
-                turned = radius * (
-                    (speed + 0.5 * gain * since) * since
-                    + (get_row(work, q + P_TURN) - q_0)
-                )
+                deviation = get_row(work, q + P_TURN) - q_0
+                turned = radius * ((speed + 0.5 * gain * since) * since + deviation)
                 roll_rate = radius * (speed + gain * since + get_row(work, v + P_TURN))
                 law = mesh_law(
                     group,
@@ -224,66 +215,45 @@ def integrate(
                     work,
                     wide,
                 )
-                accelerate(
-                    group,
-                    law,
-                    q,
-                    v,
-                    get_row(work, drive + layout.DRIVE_TORQUE),
-                    forces,
-                    a,
-                    work,
-                )
-                if part == 0:
-                    if stage == 0:
-                        loaded = law.loaded
-                        if seen_row >= 0:
-                            tell(seen, seen_row, law.normal, work, near)
-                        apart = where_above(law.normal * law.normal, zero, zero, one)
-                        set_row(lost, 0, get_row(lost, 0) + apart)
-                    else:
-                        differs = law.loaded - loaded
-                        changed = where_above(differs * differs, zero, one, changed)
-                        set_row(work, layout.STEP_APPROACH, approach)
-                        if stage == LAST_STAGE and is_helical(group):
-                            set_row(
-                                work, layout.LAST_TOTAL, get_row(work, layout.TOTAL)
-                            )
+                torque = get_row(work, drive + layout.DRIVE_TORQUE)
+                accelerate(group, law, q, v, torque, forces, a, work)
+                if part == 0 and stage == 0:
+                    loaded = law.loaded
+                    if seen_row >= 0:
+                        write_mesh(seen, seen_row, law.normal, work, near)
+                    apart = where_above(law.normal * law.normal, zero, zero, one)
+                    set_row(lost, 0, get_row(lost, 0) + apart)
+                elif part == 0:
+                    differs = law.loaded - loaded
+                    changed = where_above(differs * differs, zero, one, changed)
+                    set_row(work, layout.STEP_APPROACH, approach)
+                    if stage == LAST_STAGE and is_helical(group):
+                        total = get_row(work, layout.TOTAL)
+                        set_row(work, layout.LAST_TOTAL, total)
                 if stage == LAST_STAGE:
                     break
-                reach = h if stage == LAST_STAGE - 1 else half
+                reach = half
+                if stage == LAST_STAGE - 1:
+                    reach = h
                 for d in range(n_dof):
                     gained = get_row(work, a + d)
-                    set_row(
-                        work,
-                        ahead + d,
-                        get_row(work, source + d) + reach * get_row(work, v + d),
-                    )
-                    set_row(
-                        work,
-                        ahead + n_dof + d,
-                        get_row(work, source + n_dof + d) + reach * gained,
-                    )
+                    moved = get_row(work, source + d) + reach * get_row(work, v + d)
+                    set_row(work, next_stage + d, moved)
+                    speed_0 = get_row(work, source + n_dof + d)
+                    set_row(work, next_stage + n_dof + d, speed_0 + reach * gained)
                     if stage == 0:
                         set_row(work, sum_q + d, RK4.position[0] * gained)
                         set_row(work, sum_v + d, RK4.weight[0] * gained)
                     else:
-                        set_row(
-                            work,
-                            sum_q + d,
-                            get_row(work, sum_q + d) + RK4.position[1] * gained,
-                        )
-                        set_row(
-                            work,
-                            sum_v + d,
-                            get_row(work, sum_v + d) + RK4.weight[1] * gained,
-                        )
-                at_stage, ahead = ahead, trial_b if ahead == trial_a else trial_a
+                        more_q = get_row(work, sum_q + d) + RK4.position[1] * gained
+                        more_v = get_row(work, sum_v + d) + RK4.weight[1] * gained
+                        set_row(work, sum_q + d, more_q)
+                        set_row(work, sum_v + d, more_v)
+                at_stage, next_stage, spare = next_stage, spare, next_stage
             per_sum = h * RK4.share
             for d in range(n_dof):
-                gained = get_row(work, sum_v + d) + RK4.weight[LAST_STAGE] * get_row(
-                    work, a + d
-                )
+                last_gained = RK4.weight[LAST_STAGE] * get_row(work, a + d)
+                gained = get_row(work, sum_v + d) + last_gained
                 set_row(work, sum_v + d, gained)
                 speed_0 = get_row(work, source + n_dof + d)
                 moved = h * (speed_0 + per_sum * get_row(work, sum_q + d))
@@ -307,27 +277,16 @@ def integrate(
                 set_row(work, layout.WITHIN, get_row(work, layout.WITHIN) + margin)
                 set_row(work, layout.FLAGS, changed)
                 set_row(work, AHEAD + PART, share * get_row(work, AHEAD + end))
-                for lane in range(n):
-                    wide[at(ROLL + PART, lane, n)] = (
-                        wide[at(BASE, lane, n)] + work[at(AHEAD + PART, lane, n)]
-                    )
+                roll_ahead(PART, work, wide)
                 gather(group, PART, False, work, wide, near)
-                first = min(first, near[span_place(PART, n) + FIRST_NEAR_PAIR])
-                last = max(last, near[span_place(PART, n) + LAST_NEAR_PAIR])
+                first_part, last_part = near_pairs(PART, n, near)
+                first, last = min(first, first_part), max(last, last_part)
                 cover(begin, first, last, work, near)
                 cover(PART, first, last, work, near)
                 cover(end, first, last, work, near)
         if n_parts > 1:
-            for i in range(2 * n_dof):
-                chosen = where_above(
-                    changed, zero, get_row(work, parted + i), get_row(work, single + i)
-                )
-                set_row(work, single + i, chosen)
-            for c in range(n_channels):
-                chosen = where_above(
-                    changed, zero, get_row(work, part_mean + c), get_row(work, mean + c)
-                )
-                set_row(work, mean + c, chosen)
+            choose_rows(changed, parted, single, 2 * n_dof, work)
+            choose_rows(changed, part_mean, mean, n_channels, work)
         out_first = (out_row + number - first_step) * n_channels
         for c in range(n_channels):
             set_row(out, out_first + c, get_row(work, mean + c))
@@ -341,162 +300,90 @@ def integrate(
 
 
 @inlined
+def roll_ahead(slot, work, wide):
+    """Set the roll of a slot to that at the begin of the step plus ``AHEAD``."""
+    n = width(work)
+    for lane in range(n):
+        roll = wide[at(BASE, lane, n)] + work[at(AHEAD + slot, lane, n)]
+        wide[at(ROLL + slot, lane, n)] = roll
+
+
+@inlined
+def near_pairs(slot, n, near):
+    """First pair near its mate in a slot, and the number behind the last one."""
+    span = span_index(slot, n)
+    return near[span + layout.FIRST_NEAR_PAIR], near[span + layout.LAST_NEAR_PAIR]
+
+
+@inlined
+def choose_rows(flags, source, target, n_rows, work):
+    """Copy rows from ``source`` to ``target`` in the lanes whose flag is above 0."""
+    zero = spread(work, 0.0)
+    for i in range(n_rows):
+        taken, kept = get_row(work, source + i), get_row(work, target + i)
+        set_row(work, target + i, where_above(flags, zero, taken, kept))
+
+
+@inlined
 def keep_begin(work, wide, near):
-    """Copy what was read at the begin of the next step from the slot ``ODD`` to ``EVEN``, where a
-    call begins.
-    """
+    """Copy the slot of the next step's begin from ``ODD`` to ``EVEN``, where a call begins."""
     n = width(work)
     for i in range(layout.SLOT_ROWS):
         set_row(work, pair_rows(EVEN, 0) + i, get_row(work, pair_rows(ODD, 0) + i))
-    for i in range(layout.BESIDE_ROWS):
+    for i in range(layout.CHORD_SLOT_ROWS):
         set_row(work, chord_rows(EVEN, 0) + i, get_row(work, chord_rows(ODD, 0) + i))
     for lane in range(n):
         wide[at(ROLL + EVEN, lane, n)] = wide[at(ROLL + ODD, lane, n)]
     for k in range(layout.N_SPAN):
-        near[span_place(EVEN, n) + k] = near[span_place(ODD, n) + k]
+        near[span_index(EVEN, n) + k] = near[span_index(ODD, n) + k]
 
 
 @inlined
-def tell(seen, row, normal, work, near):
-    """Write what the pairs do at an instant."""
+def write_mesh(seen, row, normal, work, near):
+    """Write the state of the pairs at an instant."""
     n, first = width(work), row * layout.N_SEEN
     set_row(work, layout.LAW, normal)
     for lane in range(n):
         seen[at(first + layout.SEEN_NEWEST, lane, n)] = near[at(layout.NEWEST, lane, n)]
         seen[at(first + layout.SEEN_FORCE, lane, n)] = work[at(layout.LAW, lane, n)]
         for k in range(layout.MOST_PAIRS):
-            seen[at(first + layout.SEEN_PAIRS + k, lane, n)] = work[
-                at(layout.PAIR_FORCE + k, lane, n)
-            ]
+            force = work[at(layout.PAIR_FORCE + k, lane, n)]
+            seen[at(first + layout.SEEN_PAIRS + k, lane, n)] = force
 
 
 @compiled
-def low_pass(means, first, taps, factor, n_channels, n_samples, out, out_row):
-    """Every ``factor``-th value of the filtered series of every channel.
+def law_at(group, motion, work, wide, near, law_rows):
+    """Every lane's law at one instant, to ``law_rows``.
 
-    ``means`` (step, channel, lane) and, from row ``out_row`` on, ``out`` (sample, channel, lane),
-    flat; ``first`` is the step under the first tap of the first sample. ``TOGETHER`` samples at a
-    time share what they read: before and behind ``taps`` stand as many zeros as the first and the
-    last of them lie apart.
-    """
-    apart = (TOGETHER - 1) * factor
-    n_taps = len(taps) - 2 * apart
-    for s in range(0, n_samples, TOGETHER):
-        n_read = n_taps + (min(TOGETHER, n_samples - s) - 1) * factor
-        for c in range(n_channels):
-            zero = spread(means, 0.0)
-            p, q, r, t = zero, zero, zero, zero
-            for k in range(n_read):
-                value, tap = (
-                    get_row(means, (first + s * factor + k) * n_channels + c),
-                    apart + k,
-                )
-                p, q = (
-                    plus_product(p, taps, tap, value),
-                    plus_product(q, taps, tap - factor, value),
-                )
-                r = plus_product(r, taps, tap - 2 * factor, value)
-                t = plus_product(t, taps, tap - 3 * factor, value)
-            sample = (out_row + s) * n_channels + c
-            set_row(out, sample, p)
-            if s + 1 < n_samples:
-                set_row(out, sample + n_channels, q)
-            if s + 2 < n_samples:
-                set_row(out, sample + 2 * n_channels, r)
-            if s + 3 < n_samples:
-                set_row(out, sample + 3 * n_channels, t)
-
-
-@compiled
-def record(
-    group, state, lost, fresh, step, first_step, n_samples, factor, taps, channels, out, angle, seen, means, work, wide,
-    near,
-):  # fmt: skip
-    """Integrate and decimate block by block, so that nothing at the internal rate leaves the cache.
-
-    ``out`` (lane, channel, sample) float64 takes ``n_samples``; the first tap of the first stands
-    on the step after ``first_step``. ``means`` is a scratch of ``mean_rows`` rows of channels, of
-    which the last ``BLOCK`` take samples.
-    """
-    n, n_channels, n_kept = (
-        width(work),
-        len(channels),
-        len(taps) - (2 * TOGETHER - 1) * factor,
-    )
-    angle_row, now, done = 0, first_step, 0
-    samples = n_kept + BLOCK * factor
-    n_steps, out_row = (
-        1,
-        -1,
-    )  # then what the first sample needs before its last steps, then block by block
-    while True:
-        angle_row = integrate(
-            group, state, lost, fresh, step, now, n_steps, channels, means, out_row, angle, angle_row, factor, seen,
-            work, wide, near,
-        )  # fmt: skip
-        now += n_steps
-        for lane in range(n):
-            fresh[lane] = 0.0
-        if out_row == n_kept:
-            n_block = n_steps // factor
-            low_pass(means, 0, taps, factor, n_channels, n_block, means, samples)
-            for lane in range(n):
-                for c in range(n_channels):
-                    series = (lane * n_channels + c) * n_samples
-                    for s in range(n_block):
-                        out[series + done + s] = means[
-                            at((samples + s) * n_channels + c, lane, n)
-                        ]
-            for i in range(n_kept * n_channels):
-                set_row(means, i, get_row(means, n_steps * n_channels + i))
-            done += n_block
-        if done == n_samples:
-            break
-        n_steps, out_row = (
-            (n_kept, 0)
-            if out_row < 0
-            else (min(BLOCK, n_samples - done) * factor, n_kept)
-        )
-
-
-@compiled
-def law_at(group, motion, work, wide, near, found):
-    """Every lane's law at one instant; rows of ``motion`` are roll, approach, its rate, the
-    roll's rate.
-
-    ``found`` takes the rows of the law. For tests: the integrator reads the tables, and chooses
-    chords, less often.
+    Rows of ``motion`` are roll, approach, its rate, the rate of the roll. The integrator reads
+    the tables, and chooses chords, less often.
     """
     n = width(work)
-    approach, rate, roll_rate = (
-        get_row(motion, 1),
-        get_row(motion, 2),
-        get_row(motion, 3),
-    )
+    approach, rate = get_row(motion, 1), get_row(motion, 2)
+    roll_rate = get_row(motion, 3)
     for lane in range(n):
-        near[at(layout.NEWEST, lane, n)] = layout.NOBODY
+        near[at(layout.NEWEST, lane, n)] = layout.NO_PAIR
         wide[at(BASE, lane, n)] = motion[at(0, lane, n)]
         wide[at(ROLL + EVEN, lane, n)] = motion[at(0, lane, n)]
-        work[at(layout.WITHIN, lane, n)] = (
-            motion[at(1, lane, n)] if group.one_sided else 2.0 * layout.FAR
-        )
-    set_row(work, AHEAD + EVEN, spread(work, 0.0))
-    set_row(work, layout.TOTAL, spread(work, 0.0))
-    span = span_place(EVEN, n)
+        within = motion[at(1, lane, n)] if group.one_sided else 2.0 * layout.FAR
+        work[at(layout.WITHIN, lane, n)] = within
+    zero = spread(work, 0.0)
+    set_row(work, AHEAD + EVEN, zero)
+    set_row(work, layout.TOTAL, zero)
+    helical = is_helical(group)
     for _ in range(ROUNDS):
         bent = get_row(group.numbers, layout.SHARED) * get_row(work, layout.TOTAL)
         set_row(work, layout.LOCAL, approach - bent)
-        if not gather(group, EVEN, True, work, wide, near) and is_helical(group):
+        if not gather(group, EVEN, True, work, wide, near) and helical:
             break
-        first, last = near[span + FIRST_NEAR_PAIR], near[span + LAST_NEAR_PAIR]
-        turned = spread(work, 0.0)
+        first, last = near_pairs(EVEN, n, near)
         law = mesh_law(
             group,
             first,
             last,
             EVEN,
             layout.MARGIN,
-            turned,
+            zero,
             approach,
             rate,
             roll_rate,
@@ -504,28 +391,18 @@ def law_at(group, motion, work, wide, near, found):
             wide,
         )
         for row in range(layout.N_LAW):
-            set_row(found, row, law[row])
-        if not is_helical(group):
+            set_row(law_rows, row, law[row])
+        if not helical:
             break
 
 
-def mean_rows(n_taps, factor):
-    """Rows of channels that ``record`` needs for its steps, for taps with their zeros."""
-    return n_taps - (2 * TOGETHER - 1) * factor + BLOCK * factor + BLOCK
-
-
 def scratch(n_dof, n_channels, precision="float64"):
-    """Work rows, float64 rows and whole numbers of ``integrate`` and ``law_at``."""
+    """Work rows, float64 rows and integer rows of ``integrate`` and ``law_at``."""
     n = n_lanes(precision)
-    n_rows = (
-        layout.N_MESH + layout.BEHIND * n_dof + layout.N_DRIVE + n_dof + 2 * n_channels
-    )
+    n_machine = layout.BEHIND * n_dof + layout.N_DRIVE + n_dof + 2 * n_channels
     near = np.zeros((layout.N_COUNTS, n), dtype=np.int64)
     near[layout.NEWEST] = (
-        layout.NOBODY
-    )  # no pair: the first look at the tables finds the teeth
-    return (
-        np.zeros(n_rows * n, dtype=precision),
-        np.zeros(layout.N_WIDE * n),
-        near.ravel(),
-    )
+        layout.NO_PAIR
+    )  # the first reading of the tables finds the teeth
+    work = np.zeros((layout.N_MESH + n_machine) * n, dtype=precision)
+    return work, np.zeros(layout.N_WIDE * n), near.ravel()

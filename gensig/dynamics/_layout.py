@@ -1,7 +1,7 @@
-"""Compiled core: the rows of its arrays by name.
+"""Row names of the arrays of the compiled core.
 
-Arrays are flat, and a row is one number for every record of the group: ``get_row``, ``set_row``
-and ``at`` of ``_vector`` turn a row into a place. A slot is an instant at which the tables were
+Arrays are flat. A row holds one number for every record of the group: ``get_row``, ``set_row``
+and ``at`` of ``_vector`` turn a row into an index. A slot is an instant at which the tables were
 read.
 """
 
@@ -16,50 +16,91 @@ from gensig.dynamics._vector import FOUR, inlined
 from gensig.mesh.pair_table import N_PAIRS
 
 MOST_PAIRS = 8  # that may be followed at once; spur gears have 4
-# pairs this much further apart than the approach are followed through a step, m: none comes
-# closer as fast
+# m: a pair is followed through a step if its gap exceeds the approach by less than this;
+# no pair approaches faster
 NEAR = 2e-5
-FAR, YIELDING = 1.0, 1e30  # gap in m and compliance in m/N of a pair that is not there
-FAR_NEAR = 1e-4  # approaches below are asked of the pairs between FIRST_NEAR and LAST_NEAR only, m
+FAR, YIELDING = 1.0, 1e30  # gap in m and compliance in m/N of an absent pair
+FAR_NEAR = (
+    1e-4  # m: approaches below need only the pairs between FIRST_NEAR and LAST_NEAR
+)
 
 # rows of Group.numbers
 (
-    PINION_RADIUS, WHEEL_RADIUS, PATH, PITCH_POINT, START_CURVATURE, TANGENT_LENGTH, SHARED, DAMPING, FRICTION,
-    PER_FRICTION_WIDTH, PER_SWITCH_WIDTH, BACKLASH, MEAN_FORCE, REST_APPROACH, HALF_LAG, MIDDLE_POINT, N_NUMBERS,
-) = range(17)  # fmt: skip
-# rows of Group.exact, float64 whatever the precision: where pairs stand must not be lost in a
-# long roll
+    PINION_RADIUS,
+    WHEEL_RADIUS,
+    PATH,
+    PITCH_POINT,
+    START_CURVATURE,
+    TANGENT_LENGTH,
+    SHARED,
+    DAMPING,
+    FRICTION,
+    PER_FRICTION_WIDTH,
+    PER_SWITCH_WIDTH,
+    BACKLASH,
+    MEAN_FORCE,
+    REST_APPROACH,
+    HALF_LAG,
+    MIDDLE_POINT,
+    N_NUMBERS,
+) = range(17)
+# rows of Group.exact, float64 in every precision: a long roll must not lose the pairs' positions
 (
-    EXACT_RADIUS, PITCH, PER_PITCH, NODES_PER_METER, START_ROLL, FIRST_NEAR, LAST_NEAR, TABLE_START, N_EXACT,
-) = range(9)  # fmt: skip
-# rows of Group.places
+    EXACT_RADIUS,
+    PITCH,
+    PER_PITCH,
+    NODES_PER_METER,
+    START_ROLL,
+    FIRST_NEAR,
+    LAST_NEAR,
+    TABLE_START,
+    N_EXACT,
+) = range(9)
+# rows of Group.indices
 (
-    PINION_TEETH, WHEEL_TEETH, START_PINION, START_WHEEL, PINION_TOOTH, WHEEL_TOOTH, TABLE, STRIDE, LAST_CELL,
-    PINION_ROWS, WHEEL_ROWS, FIRST_PITCH, FOLLOWED, CHORD_STRIDE, COAST_TABLE, N_PLACES,
-) = range(16)  # fmt: skip
+    PINION_TEETH,
+    WHEEL_TEETH,
+    START_PINION,
+    START_WHEEL,
+    PINION_TOOTH,
+    WHEEL_TOOTH,
+    TABLE,
+    STRIDE,
+    LAST_CELL,
+    PINION_ROWS,
+    WHEEL_ROWS,
+    FIRST_PITCH,
+    FOLLOWED,
+    CHORD_STRIDE,
+    COAST_TABLE,
+    N_INDICES,
+) = range(16)
 # rows of a cell of Group.profile
-NOMINAL_ANGLE, NOMINAL_SPEED, NOMINAL_ACCELERATION, TORQUE, TORQUE_SLOPE, N_PROFILE = (
-    range(6)
-)
+(
+    NOMINAL_ANGLE,
+    NOMINAL_SPEED,
+    NOMINAL_ACCELERATION,
+    TORQUE,
+    TORQUE_SLOPE,
+    N_PROFILE,
+) = range(6)
 
 # rows of one pair in a slot of the scratch
-OWN, OWN_SLOPE, GAP, GAP_SLOPE, STIFFNESS, POSITION, N_KEPT = range(7)
-# slots; the second and the third take turns as begin and end of a step
+COMPLIANCE, COMPLIANCE_SLOPE, GAP, GAP_SLOPE, STIFFNESS, POSITION, N_KEPT = range(7)
+# slots; EVEN and ODD alternate as begin and end of a step
 COAST, EVEN, ODD, MIDDLE, PART, N_SLOTS = range(6)
 SLOT_ROWS = MOST_PAIRS * N_KEPT
 COLUMNS = FOUR  # of a table: compliance, its slope, gap, its slope
 # rows of the scratch behind the slots
-BITE = N_SLOTS * SLOT_ROWS
-MARGIN = (
-    BITE + MOST_PAIRS
-)  # twice as many: at the first and at the last stage of a step
+BITE = N_SLOTS * SLOT_ROWS  # penetration of each pair
+MARGIN = BITE + MOST_PAIRS  # two blocks: at the first and at the last stage of a step
 ERROR = MARGIN + 2 * MOST_PAIRS
 TILT = ERROR + MOST_PAIRS
 AHEAD = TILT + MOST_PAIRS  # roll of a slot, less that at the begin of the step
 WITHIN = AHEAD + N_SLOTS
 FLAGS = WITHIN + 1
 STEP_APPROACH = FLAGS + 1  # the approach at the last stage of a step
-# the motion of the mesh at a stage; the roll is counted from the begin of the step
+# motion of the mesh at a stage; the roll is counted from the begin of the step
 MOTION_ROLL, MOTION_APPROACH, MOTION_RATE, MOTION_ROLL_RATE = range(
     STEP_APPROACH + 1, STEP_APPROACH + 5
 )
@@ -67,46 +108,33 @@ N_LAW = 8
 LAW = MOTION_ROLL_RATE + 1  # fields of ``Law``
 RAW = LAW + N_LAW  # table rows as they are read, lane by lane
 PAIR_FORCE = RAW + MOST_PAIRS * COLUMNS
-# of chords only: the force that bends what pairs share, the same at the last step's end, the
-# approach less that
-# deflection in the middle of the step, table rows as they are read, and the same by slot and pair
+# of chords only: force that bends the shared structure, the same at the end of the last step,
+# approach less that deflection in the middle of the step, table rows as read, and by slot and pair
 TOTAL = PAIR_FORCE + MOST_PAIRS
-LAST_TOTAL, LOCAL, RAW_BESIDE = TOTAL + 1, TOTAL + 2, TOTAL + 3
-BESIDE = RAW_BESIDE + MOST_PAIRS * COLUMNS
+LAST_TOTAL, LOCAL, RAW_CHORD = TOTAL + 1, TOTAL + 2, TOTAL + 3
+CHORD_DATA = RAW_CHORD + MOST_PAIRS * COLUMNS
 LEFT_OUT, LEFT_OUT_SLOPE, TOUCH, TOUCH_SLOPE = range(COLUMNS)
-BESIDE_ROWS = MOST_PAIRS * COLUMNS
-N_MESH = BESIDE + N_SLOTS * BESIDE_ROWS
+CHORD_SLOT_ROWS = MOST_PAIRS * COLUMNS
+N_MESH = CHORD_DATA + N_SLOTS * CHORD_SLOT_ROWS
 # blocks of the machine behind the rows of the mesh, in rows per degree of freedom: five states,
-# each q and then v; the
-# accelerations of a stage and their sums for q and v. Behind them the rows of the drive, the
-# forces, and the mean
-# accelerations of a step and of its first part
-NOW, SINGLE, PARTED, TRIAL_A, TRIAL_B, ACCELERATIONS, SUM_Q, SUM_V, BEHIND = (
-    0,
-    2,
-    4,
-    6,
-    8,
-    10,
-    11,
-    12,
-    13,
-)
+# each q and then v; the accelerations of a stage and their sums for q and v. Behind them follow
+# the rows of the drive, the forces, and the mean accelerations of a step and of its first part
+NOW, SINGLE, PARTED, TRIAL_A, TRIAL_B, ACCELERATIONS = range(0, 12, 2)
+SUM_Q, SUM_V, BEHIND = 11, 12, 13
 # rows of the drive at the begin of a step: nominal speed, its change, share of the set torque,
-# the pinion's turn
+# rotation of the pinion
 DRIVE_SPEED, DRIVE_GAIN, DRIVE_TORQUE, DRIVE_CENTER, N_DRIVE = range(5)
-# what is told of the mesh at an output sample: the newest pair, the normal force, and that of
-# every pair
+# rows of the mesh at an output sample: the newest pair, the normal force, that of every pair
 SEEN_NEWEST, SEEN_FORCE, SEEN_PAIRS, N_SEEN = 0, 1, 2, 2 + MOST_PAIRS
 # rows of the float64 scratch
 BASE, CENTER, NOMINAL, ROLL, N_WIDE = 0, 1, 2, 3, 3 + N_SLOTS
-# rows of the whole numbers of the scratch
+# rows of the integer scratch
 NEWEST, AT_PINION, AT_WHEEL, CHORD = 0, 1, 1 + MOST_PAIRS, 1 + 2 * MOST_PAIRS
 SPAN = CHORD + MOST_PAIRS
 N_COUNTS = SPAN + N_SLOTS
-# spans of pairs in a slot: those that were read, and those that come near their mates
+# spans of pairs in a slot: pairs that were read, and pairs that come near their mates
 FIRST_READ, LAST_READ, FIRST_NEAR_PAIR, LAST_NEAR_PAIR, N_SPAN = range(5)
-NOBODY = -(2**62)
+NO_PAIR = -(2**62)
 
 
 class Law(NamedTuple):
@@ -133,39 +161,39 @@ class Law(NamedTuple):
 
 
 class Group(NamedTuple):
-    """Gear meshes of the same kind side by side, with the machines around them.
+    """Gear meshes of one kind side by side, with the machines around them.
 
-    ``numbers``, ``exact`` and ``places`` hold rows as named above. ``table`` holds, lane after
-    lane, the pairs of distinct teeth (pinion's times wheel's, node, [c, c', g, g']), or where
-    those are many the distinct teeth of the pinion and then those of the wheel, whose
-    ``WHEEL_ROWS`` is then not 0. Helical pairs have ``n_chords`` of them, one behind the other,
-    ``depth`` (lane, chord) m says from which bite on each holds, and ``beside`` has the places of
-    the table and holds [energy in J that the chord's spring leaves out, its slope, gap of the
-    first touch, its slope]. ``n_pairs`` are followed at once. ``bend`` (lane, 4) is half the
-    distance of nodes where a column is followed by its slope, else 0: values bend between nodes
-    as their slopes say. ``tooth_row`` is the row of every tooth (-1 for a missing one),
-    ``tooth_error`` its gap in m at the pitch point, ``tooth_tilt`` how fast that grows along the
-    path in m/m.
+    ``numbers``, ``exact`` and ``indices`` hold rows as named above. ``table`` holds, lane after
+    lane, the pairs of distinct teeth (pinion's times wheel's, node, [c, c', g, g']). Where those
+    are many it holds the distinct teeth of the pinion and then those of the wheel, and
+    ``WHEEL_ROWS`` is not 0. Helical pairs have ``n_chords`` chords, one behind the other.
+    ``depth`` (lane, chord) m is the penetration from which each chord holds. ``chord_table`` has
+    the layout of the table and holds [energy in J that the chord's spring leaves out, its slope,
+    gap of the first touch, its slope]. ``n_pairs`` are followed at once. ``bend`` (lane, 4) is
+    half the distance of nodes where a column is followed by its slope, else 0: values bend
+    between nodes as their slopes say. ``tooth_row`` is the row of every tooth (-1 for a missing
+    one), ``tooth_error`` its gap in m at the pitch point, ``tooth_tilt`` the growth of that gap
+    along the path in m/m.
 
     The machine is M q'' + C q' + K q = f + mesh forces; q is the deviation from nominal rotation
     and begins with pinion x, y, rotation, wheel x, y, rotation. The state is q less ``rest``
-    (dof, lane), a static equilibrium, so that it stays small. K and C stand as diagonals and as
-    rows of what else there is (``other_first`` (dof + 1,), ``other_column``). ``set_force`` is f
-    and the mean mesh force, ``force`` the same less what holds the rest; the mean mesh force is
-    taken off the mesh force again: large forces and torques balance before they are rounded.
-    ``held`` is K times, and ``carried`` M times, how far each degree of freedom turns with the
-    pinion (``rotation``). ``reach`` (dof, lane) is the gradient of the approach. ``profile``
-    (cell, 5, lane) tells the nominal motion and the torque, cell ``profile_first`` first.
+    (dof, lane), a static equilibrium, so that it stays small. K and C are stored as diagonals and
+    as rows of their other entries (``other_first`` (dof + 1,), ``other_column``). ``set_force``
+    is f plus the mean mesh force, ``force`` the same less the force that holds the rest. The mean
+    mesh force is subtracted from the mesh force: large forces and torques balance before they are
+    rounded. ``held`` is K times, and ``carried`` M times, the rotation of each degree of freedom
+    with the pinion (``rotation``). ``reach`` (dof, lane) is the gradient of the approach.
+    ``profile`` (cell, 5, lane) holds nominal motion and torque, from cell ``profile_first`` on.
     """
 
     numbers: Any
     exact: Any
-    places: Any
+    indices: Any
     n_pairs: int
     n_chords: int
     table: Any
     depth: Any
-    beside: Any
+    chord_table: Any
     bend: Any
     tooth_row: Any
     tooth_error: Any
@@ -194,7 +222,7 @@ class Group(NamedTuple):
 class HelicalGroup(Group):
     """Helical gears.
 
-    A type of its own, so that spur gears are compiled without what these alone need.
+    A type of its own, so that spur gears are compiled without the code of helical ones.
     """
 
 
@@ -203,7 +231,7 @@ _intrinsic: Any = intrinsic
 
 @_intrinsic
 def is_helical(typing_context: Any, group: Any) -> Any:
-    """Whether a group is one of helical gears; known when the code is compiled."""
+    """True for a group of helical gears; a constant of the compiled code."""
     answer = issubclass(group.instance_class, HelicalGroup)
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -220,27 +248,28 @@ def followed(group):
 
 @inlined
 def pair_rows(slot, pair):
-    """First row of a pair in a slot; ``OWN`` to ``POSITION`` count from there."""
+    """First row of a pair in a slot; ``COMPLIANCE`` to ``POSITION`` count from there."""
     return slot * SLOT_ROWS + pair * N_KEPT
 
 
 @inlined
 def chord_rows(slot, pair):
     """First row of a pair's chord in a slot; ``LEFT_OUT`` to ``TOUCH_SLOPE`` count from there."""
-    return BESIDE + slot * BESIDE_ROWS + pair * COLUMNS
+    return CHORD_DATA + slot * CHORD_SLOT_ROWS + pair * COLUMNS
 
 
 @inlined
-def raw_place(block, pair, lane, n):
-    """Place of the table row that was read for a pair of one record, in ``RAW`` or
-    ``RAW_BESIDE``.
+def raw_index(block, pair, lane, n):
+    """Index of the table row that was read for a pair of one record.
+
+    ``block`` is ``RAW`` or ``RAW_CHORD``.
     """
     return block * n + (pair * n + lane) * COLUMNS
 
 
 @inlined
-def span_place(slot, n):
-    """Place of the spans of a slot; ``FIRST_READ`` to ``LAST_NEAR_PAIR`` count from there."""
+def span_index(slot, n):
+    """Index of the spans of a slot; ``FIRST_READ`` to ``LAST_NEAR_PAIR`` count from there."""
     return SPAN * n + N_SPAN * slot
 
 

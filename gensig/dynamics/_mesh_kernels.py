@@ -7,57 +7,23 @@ from __future__ import annotations
 
 import numpy as np
 
+from gensig.dynamics import _layout as layout
 from gensig.dynamics._layout import (
-    AHEAD,
     BACKLASH,
-    BASE,
     BITE,
     COAST,
-    COAST_TABLE,
     COLUMNS,
-    DAMPING,
-    FIRST_PITCH,
-    FOLLOWED,
-    FRICTION,
+    COMPLIANCE,
+    COMPLIANCE_SLOPE,
     GAP,
     GAP_SLOPE,
-    HALF_LAG,
-    LAST_CELL,
     LAW,
-    LEFT_OUT,
-    LEFT_OUT_SLOPE,
-    MIDDLE_POINT,
     MOST_PAIRS,
-    MOTION_APPROACH,
-    MOTION_RATE,
-    MOTION_ROLL,
-    MOTION_ROLL_RATE,
     N_LAW,
-    NODES_PER_METER,
-    OWN,
-    OWN_SLOPE,
     PAIR_FORCE,
-    PATH,
-    PER_FRICTION_WIDTH,
-    PER_SWITCH_WIDTH,
-    PINION_TEETH,
-    PINION_TOOTH,
-    PITCH,
-    PITCH_POINT,
     POSITION,
     SHARED,
-    START_CURVATURE,
-    START_PINION,
-    START_WHEEL,
     STIFFNESS,
-    STRIDE,
-    TABLE_START,
-    TANGENT_LENGTH,
-    TOTAL,
-    TOUCH_SLOPE,
-    WHEEL_ROWS,
-    WHEEL_TEETH,
-    WHEEL_TOOTH,
     Law,
     chord_rows,
     is_helical,
@@ -86,30 +52,29 @@ def _clip(x, low, high):
 @inlined
 def _sliding(numbers, position):
     """Direction of sliding, smooth through the pitch point, -1 before it and 1 after it."""
-    x = (position - get_row(numbers, PITCH_POINT)) * get_row(
-        numbers, PER_FRICTION_WIDTH
-    )
+    beyond = position - get_row(numbers, layout.PITCH_POINT)
+    x = beyond * get_row(numbers, layout.PER_FRICTION_WIDTH)
     x = _clip(x, spread(numbers, -1.0), spread(numbers, 1.0))
     return x * (1.5 - 0.5 * x * x)
 
 
 @inlined
-def _rubbed(numbers, position, load_of_pair):
-    """Friction force, and its moments about pinion and wheel."""
-    force = get_row(numbers, FRICTION) * load_of_pair * _sliding(numbers, position)
-    arm = get_row(numbers, START_CURVATURE) + _clip(
-        position, spread(numbers, 0.0), get_row(numbers, PATH)
-    )
-    return force, 0.0 - force * arm, force * (get_row(numbers, TANGENT_LENGTH) - arm)
+def _rubbed(numbers, position, load):
+    """Friction force of a pair, and its moments about pinion and wheel."""
+    coefficient = get_row(numbers, layout.FRICTION)
+    force = coefficient * load * _sliding(numbers, position)
+    on_path = _clip(position, spread(numbers, 0.0), get_row(numbers, layout.PATH))
+    arm = get_row(numbers, layout.START_CURVATURE) + on_path
+    arm_w = get_row(numbers, layout.TANGENT_LENGTH) - arm
+    return force, 0.0 - force * arm, force * arm_w
 
 
 @inlined
 def _total_load(numbers, rounds, first, last, slot, work):
-    """Load of all pairs, and the sum of their stiffnesses; those that the shared deflection lifts
-    off get a bite of 0.
+    """Load of all pairs, and the sum of their stiffnesses.
 
-    Each that leaves raises the total, so the loop ends after at most as many rounds as there are
-    pairs.
+    Pairs that the shared deflection lifts off get a bite of 0. Each of them raises the total, so
+    the loop ends after at most as many rounds as there are pairs.
     """
     zero, shared = spread(work, 0.0), get_row(numbers, SHARED)
     total, stiffness = zero, zero
@@ -117,9 +82,9 @@ def _total_load(numbers, rounds, first, last, slot, work):
         stiffness, force = zero, zero
         for k in range(first, last):
             bite = get_row(work, BITE + k)
-            own = get_row(work, pair_rows(slot, k) + STIFFNESS)
-            stiffness = stiffness + where_above(bite, zero, own, zero)
-            force = force + bite * own
+            of_pair = get_row(work, pair_rows(slot, k) + STIFFNESS)
+            stiffness = stiffness + where_above(bite, zero, of_pair, zero)
+            force = force + bite * of_pair
         total = force / (1.0 + shared * stiffness)
         lifted = zero
         for k in range(first, last):
@@ -134,93 +99,88 @@ def _total_load(numbers, rounds, first, last, slot, work):
 
 @inlined
 def one_sided_law(
-    numbers, consistent, helical, first, last, slot, margin, ahead, approach, approach_rate, roll_rate, work
-):  # fmt: skip
-    """One-sided contact of the gathered pairs, ``ahead`` m of roll after the instant they were
-    gathered at.
+    numbers,
+    consistent,
+    helical,
+    first,
+    last,
+    slot,
+    margin,
+    ahead,
+    approach,
+    approach_rate,
+    roll_rate,
+    work,
+):
+    """One-sided contact of the gathered pairs, ``ahead`` m of roll after their reading.
 
-    Rows ``margin`` take how deep every pair bites into the body that the others deflect, negative
-    where it does not, and ``PAIR_FORCE`` its normal force; none if negative. Helical teeth are
-    damped by the gap of their first touch, for those of chords jump from one to the next, and the
-    energy that the springs of chords leave out is stored too.
+    Rows ``margin`` take the penetration of every pair into the body that the others deflect,
+    negative without contact, and ``PAIR_FORCE`` its normal force; none if ``margin`` is negative.
+    The damping of helical teeth follows the gap of their first touch, because the gaps of chords
+    jump from one to the next. The energy that the springs of chords leave out is stored too.
     """
     zero, one = spread(work, 0.0), spread(work, 1.0)
-    shared, damping = get_row(numbers, SHARED), get_row(numbers, DAMPING)
+    shared, damping = get_row(numbers, SHARED), get_row(numbers, layout.DAMPING)
     middle = ahead
     if helical:
-        middle = ahead - get_row(numbers, HALF_LAG)
-    # beyond half the backlash the teeth touch on their back flanks, if at all
+        middle = ahead - get_row(numbers, layout.HALF_LAG)
+    # beyond half the backlash only the back flanks can touch
     driven = approach + 0.5 * get_row(numbers, BACKLASH)
     for k in range(first, last):
         pair = pair_rows(slot, k)
-        bite = approach - (
-            get_row(work, pair + GAP) + ahead * get_row(work, pair + GAP_SLOPE)
-        )
+        grown = ahead * get_row(work, pair + GAP_SLOPE)
+        bite = approach - (get_row(work, pair + GAP) + grown)
         if margin >= 0:
             set_row(work, margin + k, bite)
         bite = where_above(bite, zero, bite, zero)
         set_row(work, BITE + k, where_above(driven, zero, bite, zero))
     rounds = MOST_PAIRS if helical else N_PAIRS
     total, stiffness = _total_load(numbers, rounds, first, last, slot, work)
-    normal, friction, moment_p, moment_w, along, lost, loaded = (
-        zero,
-        zero,
-        zero,
-        zero,
-        zero,
-        zero,
-        zero,
-    )
+    normal, along, lost, loaded = zero, zero, zero, zero
+    friction, moment_p, moment_w = zero, zero, zero
     stored = 0.0 - 0.5 * shared * total * total
     for k in range(first, last):
         pair = pair_rows(slot, k)
-        bite = get_row(work, BITE + k)
+        bite, spring = get_row(work, BITE + k), get_row(work, pair + STIFFNESS)
         if margin >= 0:
-            others = stiffness - where_above(
-                bite, zero, get_row(work, pair + STIFFNESS), zero
-            )
+            others = stiffness - where_above(bite, zero, spring, zero)
             deep = get_row(work, margin + k) - shared * total
             alone = deep * ((1.0 + shared * stiffness) / (1.0 + shared * others))
             set_row(work, margin + k, where_above(bite, zero, alone, deep))
         slope = get_row(work, pair + GAP_SLOPE)
-        elastic = (bite - shared * total) * get_row(work, pair + STIFFNESS)
-        elastic = where_above(bite, zero, elastic, zero)
-        felt = slope
+        elastic = where_above(bite, zero, (bite - shared * total) * spring, zero)
+        damped_slope = slope
         if helical:
-            felt = get_row(work, chord_rows(slot, k) + TOUCH_SLOPE)
-        rate = approach_rate - felt * roll_rate
+            damped_slope = get_row(work, chord_rows(slot, k) + layout.TOUCH_SLOPE)
+        rate = approach_rate - damped_slope * roll_rate
         force = elastic * (1.0 + damping * rate)
         force = where_above(force, zero, force, zero)
         if margin >= 0:
             set_row(work, PAIR_FORCE + k, force)
         normal = normal + force
         loaded = loaded + where_above(force, zero, one, zero)
-        stored = stored + elastic * (bite - 0.5 * get_row(work, pair + OWN) * elastic)
+        compliance = get_row(work, pair + COMPLIANCE)
+        stored = stored + elastic * (bite - 0.5 * compliance * elastic)
         lost = lost + (force - elastic) * rate
-        along = (
-            along
-            + force * slope
-            + 0.5 * elastic * elastic * get_row(work, pair + OWN_SLOPE)
-        )
+        softening = 0.5 * elastic * elastic * get_row(work, pair + COMPLIANCE_SLOPE)
+        along = along + force * slope + softening
         position = get_row(work, pair + POSITION) + middle
         sliding, moment, reaction = _rubbed(numbers, position, force)
-        friction, moment_p, moment_w = (
-            friction + sliding,
-            moment_p + moment,
-            moment_w + reaction,
-        )
+        friction, moment_p = friction + sliding, moment_p + moment
+        moment_w = moment_w + reaction
     if helical:
-        set_row(work, TOTAL, total)
+        set_row(work, layout.TOTAL, total)
         for k in range(first, last):
             pair, chord = pair_rows(slot, k), chord_rows(slot, k)
-            bite, slope = get_row(work, BITE + k), get_row(work, chord + LEFT_OUT_SLOPE)
-            left_out = get_row(work, chord + LEFT_OUT) + ahead * slope
+            bite = get_row(work, BITE + k)
+            slope = get_row(work, chord + layout.LEFT_OUT_SLOPE)
+            left_out = get_row(work, chord + layout.LEFT_OUT) + ahead * slope
             elastic = (bite - shared * total) * get_row(work, pair + STIFFNESS)
-            felt = get_row(work, chord + TOUCH_SLOPE)
-            rate = approach_rate - felt * roll_rate
+            damped_slope = get_row(work, chord + layout.TOUCH_SLOPE)
+            rate = approach_rate - damped_slope * roll_rate
             force = elastic * (1.0 + damping * rate)
             damped = where_above(force, zero, force, zero) - elastic
-            turned = damped * (felt - get_row(work, pair + GAP_SLOPE)) - slope
+            turned = damped * (damped_slope - get_row(work, pair + GAP_SLOPE)) - slope
             stored = stored + where_above(bite, zero, left_out, zero)
             along = along + where_above(bite, zero, turned, zero)
     if not consistent:
@@ -232,47 +192,37 @@ def one_sided_law(
 def papers_law(
     numbers, first, last, slot, margin, ahead, approach, approach_rate, work
 ):
-    """F = k(t) delta + c_m delta': two-sided, no gap, pairs in and out over one integration step.
+    """F = k(t) delta + c_m delta': two-sided, no gap, pairs switched over one integration step.
 
-    Rows ``margin`` take how far every pair is in, from 0 to 1 and beyond, ``PAIR_FORCE`` its
-    force; none if negative.
+    Rows ``margin`` take the share of every pair in contact, from 0 to 1 and beyond, ``PAIR_FORCE``
+    its force; none if ``margin`` is negative.
     """
     zero, one = spread(work, 0.0), spread(work, 1.0)
-    shared, damping, half_lag = (
-        get_row(numbers, SHARED),
-        get_row(numbers, DAMPING),
-        get_row(numbers, HALF_LAG),
-    )
-    path = get_row(numbers, PATH) + 2.0 * half_lag
+    shared, damping = get_row(numbers, SHARED), get_row(numbers, layout.DAMPING)
+    half_lag = get_row(numbers, layout.HALF_LAG)
+    per_width = get_row(numbers, layout.PER_SWITCH_WIDTH)
+    path = get_row(numbers, layout.PATH) + 2.0 * half_lag
+    least, absent = spread(work, 1e-20), spread(work, -1.0)
     stiffness, loaded = zero, zero
     for k in range(first, last):
         pair = pair_rows(slot, k)
         position = get_row(work, pair + POSITION) + ahead
+        spring = get_row(work, pair + STIFFNESS)
         inside = where_above(position, path - position, path - position, position)
-        share = 0.5 * (1.0 + inside * get_row(numbers, PER_SWITCH_WIDTH))
-        # a pair that is not there is never in
-        share = where_above(
-            get_row(work, pair + STIFFNESS),
-            spread(work, 1e-20),
-            share,
-            spread(work, -1.0),
-        )
+        share = 0.5 * (1.0 + inside * per_width)
+        share = where_above(spring, least, share, absent)
         if margin >= 0:
             set_row(work, margin + k, share)
         share = _clip(share, zero, one)
-        loaded = (
-            loaded
-            + where_above(share, zero, one, zero)
-            + where_above(one, share, zero, one)
-        )
-        own = share * get_row(work, pair + STIFFNESS)
-        set_row(work, BITE + k, own)
-        stiffness = stiffness + own
+        entered = where_above(share, zero, one, zero)
+        loaded = loaded + entered + where_above(one, share, zero, one)
+        of_pair = share * spring
+        set_row(work, BITE + k, of_pair)
+        stiffness = stiffness + of_pair
     together = stiffness / (1.0 + shared * stiffness)
     normal = together * approach + damping * approach_rate
-    per_stiffness = where_above(
-        stiffness, zero, 1.0 / where_above(stiffness, zero, stiffness, one), zero
-    )
+    divisor = where_above(stiffness, zero, stiffness, one)
+    per_stiffness = where_above(stiffness, zero, 1.0 / divisor, zero)
     friction, moment_p, moment_w = zero, zero, zero
     for k in range(first, last):
         position = get_row(work, pair_rows(slot, k) + POSITION) + (ahead - half_lag)
@@ -280,131 +230,108 @@ def papers_law(
         if margin >= 0:
             set_row(work, PAIR_FORCE + k, part)
         sliding, moment, reaction = _rubbed(numbers, position, part)
-        friction, moment_p, moment_w = (
-            friction + sliding,
-            moment_p + moment,
-            moment_w + reaction,
-        )
-    stored, lost = (
-        0.5 * together * approach * approach,
-        damping * approach_rate * approach_rate,
-    )
+        friction, moment_p = friction + sliding, moment_p + moment
+        moment_w = moment_w + reaction
+    stored = 0.5 * together * approach * approach
+    lost = damping * approach_rate * approach_rate
     return Law(normal, friction, moment_p, moment_w, zero, stored, lost, loaded)
 
 
 @compiled
-def coast_law(group, lane, roll, approach, rate, roll_rate, work):
-    """Contact on the back flanks of one lane, written over its drive law; sound teeth without
-    errors, no friction.
+def coast_law(group, lane, work, wide):
+    """Contact on the back flanks of one lane, written over its drive law.
 
-    Teeth count backwards along the mirrored roll. What is kept of the pairs goes to slot
-    ``COAST`` and the bites.
+    Sound teeth without errors, no friction. Teeth count backwards along the mirrored roll. The
+    pairs are kept in slot ``COAST`` and in the bites.
     """
     n = width(work)
-    numbers, exact, places, table = (
-        group.numbers,
-        group.exact,
-        group.places,
-        group.table,
-    )
-    pitch, shared = exact[at(PITCH, lane, n)], numbers[at(SHARED, lane, n)]
-    mirrored = 2.0 * numbers[at(MIDDLE_POINT, lane, n)] + 0.5 * pitch - roll
-    within = -approach - numbers[at(BACKLASH, lane, n)]
-    newest = int(np.floor(mirrored / pitch)) - places[at(FIRST_PITCH, lane, n)]
-    start, stride = places[at(COAST_TABLE, lane, n)], places[at(STRIDE, lane, n)]
-    n_pairs = places[at(FOLLOWED, lane, n)] if is_helical(group) else N_PAIRS
-    wheel = places[at(WHEEL_ROWS, lane, n)] * stride
+    # the rows of this lane
+    numbers, exact = group.numbers[lane::n], group.exact[lane::n]
+    indices, rows = group.indices[lane::n], work[lane::n]
+    table, tooth_row = group.table, group.tooth_row
+    roll = wide[at(layout.BASE, lane, n)] + rows[layout.MOTION_ROLL]
+    rate, roll_rate = rows[layout.MOTION_RATE], rows[layout.MOTION_ROLL_RATE]
+    pitch, shared = exact[layout.PITCH], numbers[SHARED]
+    mirrored = 2.0 * numbers[layout.MIDDLE_POINT] + 0.5 * pitch - roll
+    within = -rows[layout.MOTION_APPROACH] - numbers[BACKLASH]
+    newest = int(np.floor(mirrored / pitch)) - indices[layout.FIRST_PITCH]
+    n_pairs = N_PAIRS
+    if is_helical(group):
+        n_pairs = indices[layout.FOLLOWED]
+    wheel = indices[layout.WHEEL_ROWS] * indices[layout.STRIDE]
+    first_p, first_w = indices[layout.PINION_TOOTH], indices[layout.WHEEL_TOOTH]
+    start_p, start_w = indices[layout.START_PINION], indices[layout.START_WHEEL]
     for k in range(n_pairs):
-        tooth_p = (places[at(START_PINION, lane, n)] - newest + k) % places[
-            at(PINION_TEETH, lane, n)
-        ]
-        tooth_w = (places[at(START_WHEEL, lane, n)] - newest + k) % places[
-            at(WHEEL_TEETH, lane, n)
-        ]
-        there = (
-            group.tooth_row[places[at(PINION_TOOTH, lane, n)] + tooth_p] >= 0
-            and group.tooth_row[places[at(WHEEL_TOOTH, lane, n)] + tooth_w] >= 0
-        )
-        x = (mirrored - (newest - k) * pitch - exact[at(TABLE_START, lane, n)]) * exact[
-            at(NODES_PER_METER, lane, n)
-        ]
-        cell = min(max(int(x), 0), places[at(LAST_CELL, lane, n)])
-        p = start + cell * COLUMNS
+        index = newest - k
+        tooth_p = (start_p - index) % indices[layout.PINION_TEETH]
+        tooth_w = (start_w - index) % indices[layout.WHEEL_TEETH]
+        x = mirrored - index * pitch - exact[layout.TABLE_START]
+        x = x * exact[layout.NODES_PER_METER]
+        cell = min(max(int(x), 0), indices[layout.LAST_CELL])
+        p = indices[layout.COAST_TABLE] + cell * COLUMNS
         pair = pair_rows(COAST, k)
         for column in range(COLUMNS):
             low, high = table[p + column], table[p + COLUMNS + column]
             if wheel > 0:
                 low += table[p + wheel + column]
                 high += table[p + wheel + COLUMNS + column]
-            work[at(pair + column, lane, n)] = low + (x - cell) * (high - low)
-            if column in (OWN_SLOPE, GAP_SLOPE):
-                bent = (
-                    (x - cell)
-                    * (1.0 - (x - cell))
-                    * group.bend[lane * COLUMNS + column - 1]
-                )
-                work[at(pair + column - 1, lane, n)] -= bent * (high - low)
-        work[at(pair + OWN, lane, n)] -= shared
-        bite = within - work[at(pair + GAP, lane, n)]
-        work[at(BITE + k, lane, n)] = bite if there and bite > 0.0 else 0.0
+            rows[pair + column] = low + (x - cell) * (high - low)
+            if column in (COMPLIANCE_SLOPE, GAP_SLOPE):
+                bend = group.bend[lane * COLUMNS + column - 1]
+                bent = (x - cell) * (1.0 - (x - cell)) * bend
+                rows[pair + column - 1] -= bent * (high - low)
+        rows[pair + COMPLIANCE] -= shared
+        row_p, row_w = tooth_row[first_p + tooth_p], tooth_row[first_w + tooth_w]
+        bite = within - rows[pair + GAP]
+        rows[BITE + k] = 0.0
+        if row_p >= 0 and row_w >= 0 and bite > 0.0:
+            rows[BITE + k] = bite
     total = 0.0
     for _ in range(n_pairs):
         stiffness, force, lifted = 0.0, 0.0, False
         for k in range(n_pairs):
-            if work[at(BITE + k, lane, n)] > 0.0:
-                own = work[at(pair_rows(COAST, k) + OWN, lane, n)]
-                stiffness += 1.0 / own
-                force += work[at(BITE + k, lane, n)] / own
+            if rows[BITE + k] > 0.0:
+                compliance = rows[pair_rows(COAST, k) + COMPLIANCE]
+                stiffness += 1.0 / compliance
+                force += rows[BITE + k] / compliance
         total = force / (1.0 + shared * stiffness)
         for k in range(n_pairs):
-            if 0.0 < work[at(BITE + k, lane, n)] <= shared * total:
-                work[at(BITE + k, lane, n)] = 0.0
+            if 0.0 < rows[BITE + k] <= shared * total:
+                rows[BITE + k] = 0.0
                 lifted = True
         if not lifted:
             break
-    normal, along, stored, lost, loaded = (
-        0.0,
-        0.0,
-        -0.5 * shared * total * total,
-        0.0,
-        0.0,
-    )
+    normal, along, lost, loaded = 0.0, 0.0, 0.0, 0.0
+    stored = -0.5 * shared * total * total
     for k in range(n_pairs):
-        bite, pair = work[at(BITE + k, lane, n)], pair_rows(COAST, k)
+        bite, pair = rows[BITE + k], pair_rows(COAST, k)
         if bite > 0.0:
-            own, slope = (
-                work[at(pair + OWN, lane, n)],
-                work[at(pair + GAP_SLOPE, lane, n)],
-            )
-            elastic = (bite - shared * total) / own
+            compliance, slope = rows[pair + COMPLIANCE], rows[pair + GAP_SLOPE]
+            elastic = (bite - shared * total) / compliance
             pair_rate = slope * roll_rate - rate
-            part = max(0.0, elastic * (1.0 + numbers[at(DAMPING, lane, n)] * pair_rate))
+            damping = 1.0 + numbers[layout.DAMPING] * pair_rate
+            part = max(0.0, elastic * damping)
             normal += part
             loaded += part > 0.0
-            stored += elastic * (bite - 0.5 * own * elastic)
+            stored += elastic * (bite - 0.5 * compliance * elastic)
             lost += (part - elastic) * pair_rate
-            along += (
-                part * slope
-                + 0.5 * elastic * elastic * work[at(pair + OWN_SLOPE, lane, n)]
-            )
+            softening = 0.5 * elastic * elastic * rows[pair + COMPLIANCE_SLOPE]
+            along += part * slope + softening
     mirrored_along = 0.0
     if group.consistent:
         mirrored_along = -along
-    values = Law(-normal, 0.0, 0.0, 0.0, mirrored_along, stored, lost, -loaded)
+    law = Law(-normal, 0.0, 0.0, 0.0, mirrored_along, stored, lost, -loaded)
     for row in range(N_LAW):
-        work[at(LAW + row, lane, n)] = values[row]
+        rows[LAW + row] = law[row]
 
 
 @inlined
 def mesh_law(
     group, first, last, slot, margin, turned, approach, rate, roll_rate, work, wide
 ):
-    """The law of the chosen kind in every lane, on whichever flank it touches, ``turned`` m of
-    roll after ``BASE``.
-    """
-    n = width(work)
+    """The law of the chosen kind in every lane, on either flank, ``turned`` m after ``BASE``."""
     numbers = group.numbers
-    ahead = turned - get_row(work, AHEAD + slot)
+    ahead = turned - get_row(work, layout.AHEAD + slot)
     if group.one_sided:
         law = one_sided_law(
             numbers,
@@ -420,25 +347,17 @@ def mesh_law(
             roll_rate,
             work,
         )
-        play = 0.0 - get_row(numbers, BACKLASH)
-        if any_above(play, approach):
+        if any_above(0.0 - get_row(numbers, BACKLASH), approach):
             for row in range(N_LAW):
                 set_row(work, LAW + row, law[row])
-            set_row(work, MOTION_ROLL, turned)
-            set_row(work, MOTION_APPROACH, approach)
-            set_row(work, MOTION_RATE, rate)
-            set_row(work, MOTION_ROLL_RATE, roll_rate)
-            for lane in range(n):
-                if work[at(MOTION_APPROACH, lane, n)] < -numbers[at(BACKLASH, lane, n)]:
-                    coast_law(
-                        group,
-                        lane,
-                        wide[at(BASE, lane, n)] + work[at(MOTION_ROLL, lane, n)],
-                        work[at(MOTION_APPROACH, lane, n)],
-                        work[at(MOTION_RATE, lane, n)],
-                        work[at(MOTION_ROLL_RATE, lane, n)],
-                        work,
-                    )
+            set_row(work, layout.MOTION_ROLL, turned)
+            set_row(work, layout.MOTION_APPROACH, approach)
+            set_row(work, layout.MOTION_RATE, rate)
+            set_row(work, layout.MOTION_ROLL_RATE, roll_rate)
+            for lane in range(width(work)):
+                coast = work[at(layout.MOTION_APPROACH, lane, width(work))]
+                if coast < -numbers[at(BACKLASH, lane, width(work))]:
+                    coast_law(group, lane, work, wide)
             law = Law(
                 get_row(work, LAW),
                 get_row(work, LAW + 1),

@@ -11,14 +11,14 @@ from typing import NamedTuple
 class Tableau(NamedTuple):
     """Coefficients of a Runge-Kutta scheme of four stages for q'' = a(t, q, q').
 
-    Stage i is at ``node[i]`` of the step, and its state lies ``node[i]`` of the step away along the
+    Stage i is at ``node[i]`` of the step; its state is ``node[i]`` of the step away along the
     slopes of the stage before. The two stages in the middle are alike. Over a step h
 
         q_1 = q_0 + h (v_0 + h share sum position[i] a_i)
         v_1 = v_0 + h share sum weight[i] a_i
 
     so that the mean acceleration of the step is share sum weight[i] a_i. ``position[i]`` follows
-    from the weights and nodes of the stages behind i.
+    from the weights and nodes of the later stages.
     """
 
     node: tuple[float, float, float, float]
@@ -46,7 +46,7 @@ class LowPass(NamedTuple):
     """Low-pass between the internal rate and the output rate, in shares of the output rate.
 
     ``pass_share`` is the end of the pass band, ``stop_share`` the begin of the stop band,
-    ``attenuation_db`` what the latter takes.
+    ``attenuation_db`` the attenuation of the stop band.
     """
 
     pass_share: float
@@ -55,12 +55,11 @@ class LowPass(NamedTuple):
 
 
 class Newmark(NamedTuple):
-    """Newmark's method with beta and gamma, and the numbers of the average acceleration that follow
-    from them.
+    """Newmark's method with beta and gamma, and two numbers that follow from them.
 
-    A step h solves (``mass`` M / h^2 + ``damping`` C / h + K) dq = right-hand side, and ends at the
-    speed v_1 = ``damping`` dq / h - v_0: v_1 and v_0 have the mean dq / h, which only gamma = 2
-    beta = 1/2 makes true.
+    A step h solves (``mass`` M / h^2 + ``damping`` C / h + K) dq = right-hand side, and ends at
+    the speed v_1 = ``damping`` dq / h - v_0. The mean of v_1 and v_0 is dq / h, which holds only
+    for gamma = 2 beta = 1/2, the average acceleration.
     """
 
     beta: float
@@ -73,7 +72,8 @@ def average_acceleration(beta: float, gamma: float) -> Newmark:
     """Newmark's coefficients; ValueError for others than those of the average acceleration."""
     if gamma != 0.5 or beta != 0.5 * gamma:
         raise ValueError(
-            f"beta = {beta}, gamma = {gamma}: the core is written for the average acceleration, 1/4, 1/2"
+            f"beta = {beta}, gamma = {gamma}: the core is written for the average "
+            "acceleration, 1/4, 1/2"
         )
     return Newmark(beta=beta, gamma=gamma, mass=1.0 / beta, damping=gamma / beta)
 

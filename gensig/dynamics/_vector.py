@@ -1,11 +1,12 @@
 """Several numbers side by side as one Numba value, one for each record of a group.
 
 Numba cannot be told that arrays do not overlap, so LLVM seldom vectorises its loops. A value of
-LLVM's own vector type needs no luck, and its lanes cannot touch each other: a record's bits do
-not depend on its neighbours. No fast-math.
+LLVM's own vector type always is a vector, and its lanes cannot affect each other: a record's bits
+do not depend on its neighbours. No fast-math.
 
 A group is 64 bytes wide: two AVX registers, so that each waits less for the other. Rows of tables
-are vectors of four.
+are vectors of four. Functions with ``typing_context`` are Numba intrinsics: they return a
+signature and a function that builds the code.
 """
 
 from __future__ import annotations
@@ -13,7 +14,6 @@ from __future__ import annotations
 import functools
 import hashlib
 import operator
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -29,15 +29,13 @@ PRECISIONS = ("float64", "float32")
 GROUP_BYTES = 64
 FOUR = 4
 
-# Without Numba's reference counting (arrays are borrowed, none is made here) a step costs a third
-# less.
+# A step costs a third less without Numba's reference counting, which these kernels do not need:
+# arrays are borrowed, none is made.
 _OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
 
 
 def source_stamp(folder: Path) -> str:
-    """Hash of all private modules below a folder, whose compiled functions call each other across
-    files.
-    """
+    """Hash of all private modules below a folder, whose compiled functions call each other."""
     digest = hashlib.sha256()
     for path in sorted(folder.rglob("_*.py")):
         name = str(path.relative_to(folder))
@@ -48,18 +46,18 @@ def source_stamp(folder: Path) -> str:
 _STAMP = source_stamp(Path(__file__).parents[1])  # of the whole package
 
 
-def _stamped(decorator: Callable[[Any], Any]) -> Any:
+def _stamped(decorator):
     """The decorator, with a cache that is stale after a change of any of the files.
 
-    Numba looks at a function's own file alone, and would go on with what was compiled of another
-    one's former content.
+    Numba checks only the file of the function itself, and would use code that was compiled of the
+    former content of another file.
     """
 
-    def decorate(function: Any) -> Any:
-        made = decorator(function)
-        if hasattr(made, "_cache"):  # not where NUMBA_DISABLE_JIT is set
-            made._cache._cache_file._source_stamp = _STAMP
-        return made
+    def decorate(function):
+        dispatcher = decorator(function)
+        if hasattr(dispatcher, "_cache"):  # not where NUMBA_DISABLE_JIT is set
+            dispatcher._cache._cache_file._source_stamp = _STAMP
+        return dispatcher
 
     return decorate
 
@@ -77,282 +75,240 @@ def n_lanes(precision: str) -> int:
 
 
 LANES = n_lanes("float64")
+_ELEMENTS = {"float64": types.float64, "float32": types.float32}
+_NUMBERS = {types.float64: ir.DoubleType(), types.float32: ir.FloatType()}
 
 
 class Vector(types.Type):  # type: ignore[misc]
-    """The Numba type of some numbers of one kind."""
+    """The Numba type of several numbers of one kind."""
 
-    def __init__(self, element: Any, count: int) -> None:
+    def __init__(self, element, count: int) -> None:
         self.element, self.count = element, count
-        self.llvm = ir.VectorType(
-            ir.DoubleType() if element is types.float64 else ir.FloatType(), count
-        )
+        self.llvm = ir.VectorType(_NUMBERS[element], count)
         super().__init__(name=f"{element}x{count}")
 
 
 @register_model(Vector)
 class _Model(models.PrimitiveModel):  # type: ignore[misc]
-    def __init__(self, manager: Any, kind: Any) -> None:
+    def __init__(self, manager, kind) -> None:
         super().__init__(manager, kind, kind.llvm)
 
 
-_ELEMENTS = {name: getattr(types, name) for name in PRECISIONS}
-GROUPS = {
-    element: Vector(element, n_lanes(name)) for name, element in _ELEMENTS.items()
-}
-ROWS = {element: Vector(element, FOUR) for element in _ELEMENTS.values()}
+GROUPS = {kind: Vector(kind, n_lanes(name)) for name, kind in _ELEMENTS.items()}
+ROWS = {kind: Vector(kind, FOUR) for kind in _ELEMENTS.values()}
 VECTORS = (*GROUPS.values(), *ROWS.values())
 
 
-def _filled(builder: Any, kind: Vector, number: Any) -> Any:
-    """A float64 in every place of a vector."""
-    return _repeated(
-        builder,
-        kind,
-        builder.fptrunc(number, ir.FloatType())
-        if kind.element is types.float32
-        else number,
-    )
+def _constants(numbers):
+    return ir.Constant(ir.VectorType(_INDEX, len(numbers)), numbers)
 
 
-def _repeated(builder: Any, kind: Vector, number: Any) -> Any:
-    """A number of a vector's kind in every place."""
+def _filled(builder, kind, number):
+    """A float64 in every lane of a vector."""
+    if kind.element is types.float32:
+        number = builder.fptrunc(number, ir.FloatType())
+    return _repeated(builder, kind, number)
+
+
+def _repeated(builder, kind, number):
+    """A number of a vector's kind in every lane."""
     nothing = ir.Constant(kind.llvm, ir.Undefined)
-    one = builder.insert_element(nothing, number, ir.Constant(_INDEX, 0))
-    return builder.shuffle_vector(
-        one, nothing, ir.Constant(ir.VectorType(_INDEX, kind.count), [0] * kind.count)
-    )
+    first = builder.insert_element(nothing, number, ir.Constant(_INDEX, 0))
+    return builder.shuffle_vector(first, nothing, _constants([0] * kind.count))
 
 
-def _binary(function: Any, instruction: str) -> None:
+def _binary(function, instruction: str) -> None:
     @infer_global(function)
     class _Typed(ConcreteTemplate):  # type: ignore[misc]
         cases = [  # noqa: RUF012
-            signature(kind, *given)
+            signature(kind, *arguments)
             for kind in VECTORS
-            for given in ((kind, kind), (kind, types.float64), (types.float64, kind))
+            for arguments in (
+                (kind, kind),
+                (kind, types.float64),
+                (types.float64, kind),
+            )
         ]
 
     for kind in VECTORS:
 
         @lower_builtin(function, kind, kind)  # type: ignore[untyped-decorator]
-        def _both(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            return getattr(builder, instruction)(*args)
-
         @lower_builtin(function, kind, types.float64)  # type: ignore[untyped-decorator]
         @lower_builtin(function, types.float64, kind)  # type: ignore[untyped-decorator]
-        def _mixed(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            vectors = [
-                value
-                if given is sig.return_type
-                else _filled(builder, sig.return_type, value)
-                for given, value in zip(sig.args, args, strict=True)
-            ]
+        def _build(context, builder, sig, args):
+            vectors = list(args)
+            for position, given in enumerate(sig.args):
+                if given is types.float64:
+                    vectors[position] = _filled(
+                        builder, sig.return_type, args[position]
+                    )
             return getattr(builder, instruction)(*vectors)
 
 
-for _function, _instruction in (
-    (operator.add, "fadd"),
-    (operator.sub, "fsub"),
-    (operator.mul, "fmul"),
-    (operator.truediv, "fdiv"),
-):
-    _binary(_function, _instruction)
+_binary(operator.add, "fadd")
+_binary(operator.sub, "fsub")
+_binary(operator.mul, "fmul")
+_binary(operator.truediv, "fdiv")
 
 
-_NUMBERS = {types.float64: ir.DoubleType(), types.float32: ir.FloatType()}
+def _address(context, builder, kind, array, index, llvm):
+    """Address of a number or vector of LLVM type ``llvm`` in an array."""
+    # the plain field: a proxy of the whole array at every access would take most of the
+    # compiler's time
+    position = context.data_model_manager[kind].get_field_position("data")
+    data = builder.extract_value(array, position)
+    return builder.bitcast(builder.gep(data, [index]), llvm.as_pointer())
 
 
-def _address(
-    context: Any, builder: Any, kind: Any, array: Any, place: Any, read: Any
-) -> Any:
-    """Where a vector, or a single number, lies."""
-    # the plain field: a proxy of the whole array at every access would cost the compiler most of
-    # its time
-    data = builder.extract_value(
-        array, context.data_model_manager[kind].get_field_position("data")
-    )
-    llvm = read.llvm if isinstance(read, Vector) else _NUMBERS[read]
-    return builder.bitcast(builder.gep(data, [place]), llvm.as_pointer())
+def _loading(vector, array, per_index: int):
+    """Signature and code of loading a vector from ``per_index`` times an index on."""
 
-
-@_intrinsic
-def load_four(typing_context: Any, array: Any, place: Any) -> Any:
-    """Four numbers from ``place`` on."""
-    vector = ROWS[array.dtype]
-
-    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        address = _address(context, builder, sig.args[0], args[0], args[1], vector)
+    def build(context, builder, sig, args):
+        index = builder.mul(args[1], ir.Constant(args[1].type, per_index))
+        address = _address(context, builder, sig.args[0], args[0], index, vector.llvm)
         return builder.load(address, align=vector.element.bitwidth // 8)
 
     return vector(array, types.intp), build
 
 
-@_intrinsic
-def store(typing_context: Any, array: Any, place: Any, value: Any) -> Any:
-    """Write a vector from ``place`` of a one-dimensional array of its kind on."""
-    if array.dtype is not value.element:
-        raise TypeError(f"{value} does not fit an array of {array.dtype}")
+def _storing(vector, array, per_index: int):
+    """Signature and code of storing a vector from ``per_index`` times an index on."""
 
-    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        size = sig.args[2].element.bitwidth // 8
-        builder.store(
-            args[2],
-            _address(context, builder, sig.args[0], args[0], args[1], sig.args[2]),
-            align=size,
-        )
+    def build(context, builder, sig, args):
+        index = builder.mul(args[1], ir.Constant(args[1].type, per_index))
+        address = _address(context, builder, sig.args[0], args[0], index, vector.llvm)
+        builder.store(args[2], address, align=vector.element.bitwidth // 8)
         return context.get_dummy_value()
 
-    return types.void(array, types.intp, value), build
-
-
-def _row_place(builder: Any, vector: Vector, row: Any) -> Any:
-    """The place at which a row of a flat array begins."""
-    return builder.mul(row, ir.Constant(row.type, vector.count))
+    return types.void(array, types.intp, vector), build
 
 
 @_intrinsic
-def get_row(typing_context: Any, array: Any, row: Any) -> Any:
+def load_four(typing_context, array, index):
+    """Four numbers from ``index`` on."""
+    return _loading(ROWS[array.dtype], array, 1)
+
+
+@_intrinsic
+def store(typing_context, array, index, value):
+    """Write a vector from ``index`` of a one-dimensional array of its kind on."""
+    if array.dtype is not value.element:
+        raise TypeError(f"{value} does not fit an array of {array.dtype}")
+    return _storing(value, array, 1)
+
+
+@_intrinsic
+def get_row(typing_context, array, row):
     """A row of a flat array: one number for every record of the group."""
     vector = GROUPS[array.dtype]
-
-    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        place = _row_place(builder, vector, args[1])
-        address = _address(context, builder, sig.args[0], args[0], place, vector)
-        return builder.load(address, align=vector.element.bitwidth // 8)
-
-    return vector(array, types.intp), build
+    return _loading(vector, array, vector.count)
 
 
 @_intrinsic
-def set_row(typing_context: Any, array: Any, row: Any, value: Any) -> Any:
+def set_row(typing_context, array, row, value):
     """Write a row of a flat array."""
     vector = GROUPS[array.dtype]
     if value is not vector:
         raise TypeError(f"{value} is no row of an array of {array.dtype}")
-
-    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        place = _row_place(builder, vector, args[1])
-        address = _address(context, builder, sig.args[0], args[0], place, vector)
-        builder.store(args[2], address, align=vector.element.bitwidth // 8)
-        return context.get_dummy_value()
-
-    return types.void(array, types.intp, value), build
+    return _storing(vector, array, vector.count)
 
 
 @_intrinsic
-def at(typing_context: Any, row: Any, lane: Any, n_lanes: Any) -> Any:
-    """The place of one record's number in a flat array.
+def at(typing_context, row, lane, n_lanes):
+    """Index of one record's number in a flat array: row ``row``, record ``lane``."""
 
-    Row ``row``, record ``lane`` of ``n_lanes``.
-    """
-
-    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def build(context, builder, sig, args):
         return builder.add(builder.mul(args[0], args[2]), args[1])
 
     return types.intp(types.intp, types.intp, types.intp), build
 
 
 @_intrinsic
-def width(typing_context: Any, array: Any) -> Any:
+def width(typing_context, array):
     """Records of a group whose numbers have the array's kind."""
 
-    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def build(context, builder, sig, args):
         return context.get_constant(types.intp, GROUPS[sig.args[0].dtype].count)
 
     return types.intp(array), build
 
 
 @_intrinsic
-def spread(typing_context: Any, array: Any, value: Any) -> Any:
+def spread(typing_context, array, value):
     """The same number in every lane, of the array's kind."""
 
-    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def build(context, builder, sig, args):
         return _filled(builder, sig.return_type, args[1])
 
     return GROUPS[array.dtype](array, types.float64), build
 
 
 @_intrinsic
-def where_above(typing_context: Any, a: Any, b: Any, yes: Any, no: Any) -> Any:
+def where_above(typing_context, a, b, yes, no):
     """``yes`` in the lanes where a > b, ``no`` elsewhere."""
 
-    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.select(
-            builder.fcmp_ordered(">", args[0], args[1]), args[2], args[3]
-        )
+    def build(context, builder, sig, args):
+        above = builder.fcmp_ordered(">", args[0], args[1])
+        return builder.select(above, args[2], args[3])
 
     return a(a, a, a, a), build
 
 
 @_intrinsic
-def plus_product(
-    typing_context: Any, total: Any, factors: Any, place: Any, value: Any
-) -> Any:
-    """``total + factors[place] * value``, rounded once.
+def plus_product(typing_context, total, factors, index, value):
+    """``total + factors[index] * value``, rounded once.
 
     ``factors`` is an array of the vectors' kind.
     """
 
-    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def build(context, builder, sig, args):
         kind = sig.return_type
-        number = builder.load(
-            _address(context, builder, sig.args[1], args[1], args[2], kind.element)
-        )
+        llvm = _NUMBERS[kind.element]
+        address = _address(context, builder, sig.args[1], args[1], args[2], llvm)
+        factor = _repeated(builder, kind, builder.load(address))
         name = f"llvm.fma.v{kind.count}f{kind.element.bitwidth}"
-        fma = get_or_insert_function(
-            builder.module, ir.FunctionType(kind.llvm, (kind.llvm,) * 3), name
-        )
-        return builder.call(fma, (_repeated(builder, kind, number), args[3], args[0]))
+        function_type = ir.FunctionType(kind.llvm, (kind.llvm,) * 3)
+        fma = get_or_insert_function(builder.module, function_type, name)
+        return builder.call(fma, (factor, args[3], args[0]))
 
     return total(total, factors, types.intp, total), build
 
 
 @_intrinsic
-def any_above(typing_context: Any, a: Any, b: Any) -> Any:
-    """Whether a > b in any lane."""
+def any_above(typing_context, a, b):
+    """True if a > b in any lane."""
 
-    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def build(context, builder, sig, args):
         bits = ir.IntType(sig.args[0].count)
-        return builder.icmp_unsigned(
-            "!=",
-            builder.bitcast(builder.fcmp_ordered(">", args[0], args[1]), bits),
-            ir.Constant(bits, 0),
-        )
+        above = builder.bitcast(builder.fcmp_ordered(">", args[0], args[1]), bits)
+        return builder.icmp_unsigned("!=", above, ir.Constant(bits, 0))
 
     return types.boolean(a, a), build
 
 
 @_intrinsic
-def transpose(typing_context: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
+def transpose(typing_context, a, b, c, d):
     """Four rows of four as four columns."""
 
-    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        def mixed(x: Any, y: Any, places: list[int]) -> Any:
-            return builder.shuffle_vector(
-                x, y, ir.Constant(ir.VectorType(_INDEX, FOUR), places)
-            )
+    def build(context, builder, sig, args):
+        def interleaved(x, y):
+            low = builder.shuffle_vector(x, y, _constants([0, 4, 1, 5]))
+            return low, builder.shuffle_vector(x, y, _constants([2, 6, 3, 7]))
 
-        low, high = [0, 4, 1, 5], [2, 6, 3, 7]
-        ac_low, bd_low = mixed(args[0], args[2], low), mixed(args[1], args[3], low)
-        ac_high, bd_high = mixed(args[0], args[2], high), mixed(args[1], args[3], high)
-        columns = [
-            mixed(ac_low, bd_low, low), mixed(ac_low, bd_low, high), mixed(ac_high, bd_high, low),
-            mixed(ac_high, bd_high, high),
-        ]  # fmt: skip
+        ac_low, ac_high = interleaved(args[0], args[2])
+        bd_low, bd_high = interleaved(args[1], args[3])
+        columns = [*interleaved(ac_low, bd_low), *interleaved(ac_high, bd_high)]
         return context.make_tuple(builder, sig.return_type, columns)
 
     return types.UniTuple(a, FOUR)(a, a, a, a), build
 
 
 @_intrinsic
-def second_and_fourth(typing_context: Any, row: Any) -> Any:
+def second_and_fourth(typing_context, row):
     """(b, b, d, d) of a row (a, b, c, d)."""
 
-    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        places = ir.Constant(ir.VectorType(_INDEX, FOUR), [1, 1, 3, 3])
-        return builder.shuffle_vector(
-            args[0], ir.Constant(sig.args[0].llvm, ir.Undefined), places
-        )
+    def build(context, builder, sig, args):
+        nothing = ir.Constant(sig.args[0].llvm, ir.Undefined)
+        return builder.shuffle_vector(args[0], nothing, _constants([1, 1, 3, 3]))
 
     return row(row), build

@@ -1,6 +1,4 @@
-"""Deep-groove ball bearings under a radial load, and the stiffness of a gear's support made of
-two and their shaft.
-"""
+"""Deep-groove ball bearings under a radial load, and the support of a gear by two and a shaft."""
 
 from __future__ import annotations
 
@@ -22,16 +20,17 @@ CAGE_POSITIONS = (
 )
 MOST_STEPS = 200
 BALANCED = 1e-10  # of the load
-SOFTEST = 1e-12  # of a loaded ball's stiffness; keeps a Newton step finite where one ball alone carries the load
+# of a loaded ball's stiffness; keeps a Newton step finite where one ball alone carries the load
+SOFTEST = 1e-12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BallBearing:
     """A deep-groove ball bearing that carries no thrust, so that its contact angle is 0.
 
-    The conformities are the radii of the grooves' cross sections over the ball's diameter;
-    ``radial_clearance`` is how far one ring can move across the other, from stop to stop, mounted
-    and warm; negative is preload. Balls and rings are of the gears' material, the rings round and
+    The conformities are the radii of the grooves' cross sections over the ball's diameter.
+    ``radial_clearance`` is the play of one ring across the other, from stop to stop, mounted and
+    warm; negative is preload. Balls and rings are of the gears' material, the rings round and
     rigid but for the contacts.
     """
 
@@ -46,14 +45,16 @@ class BallBearing:
         if not 5 <= self.n_balls <= 60:
             raise ConfigError(f"bearing.n_balls = {self.n_balls} must lie in 5..60")
         if not self.ball_diameter > 0.0:
+            diameter = from_si("ball_diameter_mm", self.ball_diameter)
             raise ConfigError(
-                f"bearing.ball_diameter_mm = {from_si('ball_diameter_mm', self.ball_diameter):g} must be positive"
+                f"bearing.ball_diameter_mm = {diameter:g} must be positive"
             )
         least = self.ball_diameter / math.sin(math.pi / self.n_balls)
         if not self.pitch_diameter > least:
+            diameter = from_si("pitch_diameter_mm", self.pitch_diameter)
             raise ConfigError(
-                f"bearing.pitch_diameter_mm = {from_si('pitch_diameter_mm', self.pitch_diameter):g}: {self.n_balls} "
-                f"balls of this size touch each other; give more than {from_si('pitch_diameter_mm', least):.4g}"
+                f"bearing.pitch_diameter_mm = {diameter:g}: {self.n_balls} balls of this size "
+                f"touch each other; give more than {from_si('pitch_diameter_mm', least):.4g}"
             )
         for key in ("inner_groove_conformity", "outer_groove_conformity"):
             if not 0.505 <= getattr(self, key) <= 0.6:
@@ -67,27 +68,27 @@ class BallBearing:
             )
 
     def groove_curvatures(self, race: str) -> tuple[float, float, float, float]:
-        """Principal curvatures 1/m of the ball (twice), then of the "inner" or "outer" groove
-        along and across.
+        """Principal curvatures 1/m of the ball (twice), then of the groove along and across.
+
+        ``race`` is "inner" or "outer".
 
         Source: Harris, Rolling Bearing Analysis, 4th ed., section 2.4, with contact angle 0: the
         groove's curvature along the race is 2 / (d_m - D) inside and -2 / (d_m + D) outside,
         across it -1 / (f D).
         """
-        ball, sign = 2.0 / self.ball_diameter, 1.0 if race == "inner" else -1.0
-        conformity = (
-            self.inner_groove_conformity
-            if race == "inner"
-            else self.outer_groove_conformity
-        )
+        ball = 2.0 / self.ball_diameter
+        sign, conformity = 1.0, self.inner_groove_conformity
+        if race == "outer":
+            sign, conformity = -1.0, self.outer_groove_conformity
         along = sign * 2.0 / (self.pitch_diameter - sign * self.ball_diameter)
         return ball, ball, along, -1.0 / (conformity * self.ball_diameter)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shaft:
-    """A round shaft of the gears' material on a bearing at each end of ``span``, its gear in the
-    middle.
+    """A round shaft of the gears' material, with a bearing at each end of ``span``.
+
+    The gear is in the middle.
     """
 
     diameter: float = unit("mm")
@@ -100,8 +101,9 @@ class Shaft:
                 raise ConfigError(f"shaft.{key} = {value:g} must be positive")
 
     def bending_stiffness(self, youngs_modulus: float) -> float:
-        """Force over deflection in the middle, 48 E I / L^3 with I = pi d^4 / 64 of a simply
-        supported beam, N/m.
+        """Force over deflection in the middle of a simply supported beam, N/m.
+
+        48 E I / L^3 with I = pi d^4 / 64.
         """
         return 0.75 * math.pi * youngs_modulus * self.diameter**4 / self.span**3
 
@@ -113,24 +115,20 @@ def point_contact_coefficient(
 
     Parameters
     ----------
-    curvatures : 1/m    of the first body, then of the second, the principal planes of the two bodies coinciding, and
-        within each body in the same order of planes; concave is negative
+    curvatures : 1/m    of the first body, then of the second, with coinciding principal planes,
+        in the same order of planes; concave is negative
 
     Source: Harris, Rolling Bearing Analysis, 4th ed., section 6.3: the ellipticity kappa solves
     F(rho) = ((kappa^2 + 1) E - 2 K) / ((kappa^2 - 1) E) with the complete elliptic integrals of
     modulus 1 - 1 / kappa^2, and delta = delta* (3 Q (1 - nu^2) / (E' sum rho))^(2/3) sum rho / 2
     with delta* = (2 K / pi) (pi / (2 kappa^2 E))^(1/3). Solved exactly, no fit.
     """
-    one, two = curvatures[0] + curvatures[2], curvatures[1] + curvatures[3]
-    total = one + two
-    ellipticity = _ellipticity(abs(one - two) / total)
+    along, across = curvatures[0] + curvatures[2], curvatures[1] + curvatures[3]
+    total = along + across
+    ellipticity = _ellipticity(abs(along - across) / total)
     first, second = _elliptic_integrals(ellipticity)
-    deflection = (
-        2.0
-        * first
-        / math.pi
-        * (math.pi / (2.0 * ellipticity**2 * second)) ** (1.0 / 3.0)
-    )
+    root = (math.pi / (2.0 * ellipticity**2 * second)) ** (1.0 / 3.0)
+    deflection = 2.0 * first / math.pi * root
     compliance = (1.0 - material.poisson_ratio**2) / material.youngs_modulus
     unit_load = deflection * (3.0 * compliance / total) ** (2.0 / 3.0) * 0.5 * total
     return float(unit_load**-1.5)
@@ -144,8 +142,9 @@ def _elliptic_integrals(ellipticity: float) -> tuple[float, float]:
 
 
 def _ellipticity(difference: float) -> float:
-    """Ratio of the axes of the contact ellipse, at least 1, for a curvature difference F(rho) in
-    0..1.
+    """Ratio of the axes of the contact ellipse, at least 1.
+
+    ``difference`` is the curvature difference F(rho) in 0..1.
     """
     if difference < 1e-6:  # a circle; the equation below is 0 / 0 there
         return 1.0
@@ -154,9 +153,8 @@ def _ellipticity(difference: float) -> float:
     def excess(logarithm: float) -> float:
         square = math.exp(2.0 * logarithm)
         first, second = _elliptic_integrals(math.exp(logarithm))
-        return ((square + 1.0) * second - 2.0 * first) / (
-            (square - 1.0) * second
-        ) - difference
+        numerator = (square + 1.0) * second - 2.0 * first
+        return numerator / ((square - 1.0) * second) - difference
 
     return math.exp(brentq(excess, 1e-4, 12.0, xtol=1e-12))
 
@@ -188,82 +186,73 @@ class BearingState:
 
 
 def cage_positions(bearing: BallBearing) -> Array:
-    """Angles of a ball from the load, over half of the angle between two balls without its ends,
-    (position,) rad.
+    """Angles of a ball from the load, (position,) rad.
+
+    Over half of the angle between two balls, without its ends.
     """
-    return (
-        (np.arange(CAGE_POSITIONS) + 0.5) / CAGE_POSITIONS * math.pi / bearing.n_balls
-    )
+    shares = (np.arange(CAGE_POSITIONS) + 0.5) / CAGE_POSITIONS
+    return shares * math.pi / bearing.n_balls
 
 
 def bearing_equilibrium(
     bearing: BallBearing, material: Material, load: float, positions: Array
 ) -> BearingState:
-    """Where the inner ring rests under a radial ``load`` in N along y, for cage ``positions``
-    (position,) rad.
+    """Equilibria of the inner ring under a radial ``load`` in N along y.
 
-    Ball j at theta_j = position + 2 pi j / Z from y is pressed by delta_j = x sin(theta_j) + y
-    cos(theta_j) - P / 2, P the clearance, and answers with K max(0, delta_j)^1.5. Newton's method
-    over x and y on the potential energy, which is convex, with steps halved until it falls.
+    ``positions`` (position,) rad are those of the cage. Ball j at theta_j = position + 2 pi j / Z
+    from y is pressed by delta_j = x sin(theta_j) + y cos(theta_j) - P / 2, P the clearance, with
+    the force K max(0, delta_j)^1.5. Newton's method over x and y on the potential energy, which
+    is convex, with steps halved until it falls.
 
     Source: Harris, Rolling Bearing Analysis, 4th ed., section 7.3, without his sums over a ball
     on the load's line.
 
     Raises
     ------
-    SimulationError    where no equilibrium is found
+    SimulationError    without an equilibrium
     """
-    coefficient, gap = (
-        ball_coefficient(bearing, material),
-        0.5 * bearing.radial_clearance,
-    )
-    angle = (
-        positions[:, None]
-        + 2.0 * math.pi * np.arange(bearing.n_balls) / bearing.n_balls
-    )
+    coefficient = ball_coefficient(bearing, material)
+    gap = 0.5 * bearing.radial_clearance
+    balls = 2.0 * math.pi * np.arange(bearing.n_balls) / bearing.n_balls
+    angle = positions[:, None] + balls
     direction = np.stack(
         [np.sin(angle), np.cos(angle)], axis=-1
     )  # (position, ball, axis)
     force = np.array([0.0, load])
 
-    def pressed(place: Array) -> Array:
-        return np.maximum(0.0, np.einsum("pba,pa->pb", direction, place) - gap)
+    def pressed(ring: Array) -> Array:
+        return np.maximum(0.0, np.einsum("pba,pa->pb", direction, ring) - gap)
 
-    def energy(place: Array) -> Array:
-        return 0.4 * coefficient * (pressed(place) ** 2.5).sum(axis=1) - place @ force
-
-    def tangent(delta: Array) -> Array:
-        return np.einsum(
-            "pb,pba,pbc->pac", 1.5 * coefficient * np.sqrt(delta), direction, direction
-        )
+    def energy(ring: Array) -> Array:
+        return 0.4 * coefficient * (pressed(ring) ** 2.5).sum(axis=1) - ring @ force
 
     largest = (5.0 * load / (bearing.n_balls * coefficient)) ** (2.0 / 3.0)
-    place = np.tile([0.0, gap + largest], (len(positions), 1))
+    ring = np.tile([0.0, gap + largest], (len(positions), 1))
     softest = SOFTEST * coefficient * math.sqrt(largest) * np.eye(2)
     for _ in range(MOST_STEPS):
-        delta = pressed(place)
-        rest = np.einsum("pb,pba->pa", coefficient * delta**1.5, direction) - force
+        delta = pressed(ring)
+        ball_load = coefficient * delta**1.5
+        springs = 1.5 * coefficient * np.sqrt(delta)
+        tangent = np.einsum("pb,pba,pbc->pac", springs, direction, direction)
+        rest = np.einsum("pb,pba->pa", ball_load, direction) - force
         if np.abs(rest).max() <= BALANCED * load:
             return BearingState(
-                displacement=place,
-                ball_load=coefficient * delta**1.5,
-                stiffness=tangent(delta),
+                displacement=ring, ball_load=ball_load, stiffness=tangent
             )
-        step = np.linalg.solve(tangent(delta) + softest, -rest[:, :, None])[:, :, 0]
+        step = np.linalg.solve(tangent + softest, -rest[:, :, None])[:, :, 0]
         longest = np.abs(step).max(axis=1, keepdims=True)
-        step *= np.minimum(
-            1.0, (abs(gap) + 4.0 * largest) / np.maximum(longest, 1e-300)
-        )
-        before, share = energy(place), np.ones((len(place), 1))
+        allowed = abs(gap) + 4.0 * largest
+        step *= np.minimum(1.0, allowed / np.maximum(longest, 1e-300))
+        before, share = energy(ring), np.ones((len(ring), 1))
         slope = np.einsum("pa,pa->p", rest, step)
         for _ in range(40):
-            worse = energy(place + share * step) > before + 1e-4 * share[
-                :, 0
-            ] * slope + 1e-14 * np.abs(before)
+            decrease = 1e-4 * share[:, 0] * slope
+            bound = before + decrease + 1e-14 * np.abs(before)
+            worse = energy(ring + share * step) > bound
             if not worse.any():
                 break
             share[worse] *= 0.5
-        place = place + share * step
+        ring = ring + share * step
     raise SimulationError(
         f"a bearing finds no equilibrium under {load:g} N; check its sizes and its clearance"
     )
@@ -272,10 +261,9 @@ def bearing_equilibrium(
 def bearing_stiffness(
     bearing: BallBearing, material: Material, load: float
 ) -> tuple[float, float]:
-    """Tangent stiffness across and along a radial load in N, averaged over the position of the
-    cage, N/m.
+    """Tangent stiffness across and along a radial load in N, N/m.
 
-    The coupling between the two averages to 0, since a cage position and its mirror image do.
+    Averaged over the position of the cage. The coupling of the two averages to 0 by symmetry.
     """
     state = bearing_equilibrium(bearing, material, load, cage_positions(bearing))
     across, along = np.diagonal(state.stiffness.mean(axis=0)).tolist()
@@ -286,15 +274,11 @@ def bearing_stiffness(
 def support_stiffness(
     bearing: BallBearing, shaft: Shaft, material: Material, force: float
 ) -> tuple[float, float]:
-    """Stiffness under a gear across and along its static force in N, N/m: two bearings, in series
-    with their shaft.
+    """Stiffness under a gear across and along its static force in N, N/m.
 
-    Each bearing carries half, since the gear is in the middle of the span. Housing and seats are
-    rigid.
+    Two bearings in series with their shaft. Each carries half of the force, since the gear is in
+    the middle of the span. Housing and seats are rigid.
     """
     bending = shaft.bending_stiffness(material.youngs_modulus)
-    across, along = (
-        1.0 / (0.5 / one + 1.0 / bending)
-        for one in bearing_stiffness(bearing, material, 0.5 * force)
-    )
-    return across, along
+    across, along = bearing_stiffness(bearing, material, 0.5 * force)
+    return 1.0 / (0.5 / across + 1.0 / bending), 1.0 / (0.5 / along + 1.0 / bending)

@@ -1,4 +1,4 @@
-"""From the internal rate to the output rate without folding anything into the usable band."""
+"""Decimation from the internal rate to the output rate, without aliases in the usable band."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics._kernels import TOGETHER, low_pass
+from gensig.dynamics._record_kernels import TOGETHER, low_pass
 from gensig.dynamics._tableau import LOW_PASS
 from gensig.dynamics._vector import LANES
 
@@ -20,15 +20,14 @@ Array = NDArray[np.float64]
 
 PASS_SHARE, STOP_SHARE, ATTENUATION_DB = LOW_PASS
 LOWEST_HZ = 20.0
-STORED = Path(__file__).with_name(
-    "low_pass.json"
-)  # first halves of symmetric taps, by oversampling
+# first halves of symmetric taps, by oversampling
+STORED = Path(__file__).with_name("low_pass.json")
 
 
 def usable_band(sampling_rate: float) -> tuple[float, float]:
     """Band in Hz in which the recorded signal is flat to 0.01 dB.
 
-    Nothing folds above -100 dB at any frequency.
+    All aliases are below -100 dB.
     """
     return 0.0, PASS_SHARE * sampling_rate
 
@@ -50,7 +49,8 @@ class Decimator:
 
         Parameters
         ----------
-        means : (step, channel, lane)    the first step ends ``margin`` output samples before the first output sample
+        means : (step, channel, lane)    the first step ends ``margin`` output samples before
+            the first output sample
 
         Returns
         -------
@@ -60,16 +60,8 @@ class Decimator:
         n_samples = (n_steps - 1) // self.oversampling - 2 * self.margin
         out = np.empty((n_samples, n_channels, n_lanes), dtype=means.dtype)
         taps = self.padded(means.dtype.name)
-        low_pass(
-            means.ravel(),
-            1,
-            taps,
-            self.oversampling,
-            n_channels,
-            n_samples,
-            out.ravel(),
-            0,
-        )
+        flat, step = means.ravel(), self.oversampling
+        low_pass(flat, 1, taps, step, n_channels, n_samples, out.ravel(), 0)
         return np.ascontiguousarray(out.transpose(2, 1, 0), dtype=np.float64)
 
     def apply_to_columns(self, means: Array) -> Array:
@@ -84,29 +76,25 @@ class Decimator:
 
 @lru_cache(maxsize=16)
 def decimator(oversampling: int) -> Decimator:
-    """The low-pass.
+    """The low-pass of ``design``.
 
-    See ``design``, whose import takes longer than a first record: that of the default is stored.
+    Those of the default are stored, because the import of scipy.signal takes longer than a record.
     """
     stored = json.loads(STORED.read_text("utf-8")).get(str(oversampling))
     if stored is None:
         return design(oversampling)
-    return Decimator(
-        np.array([*stored, *reversed(stored)]),
-        oversampling,
-        len(stored) // oversampling,
-    )
+    taps = np.array([*stored, *reversed(stored)])
+    return Decimator(taps, oversampling, len(stored) // oversampling)
 
 
 def design(oversampling: int) -> Decimator:
-    """Kaiser-window design: pass to 0.39 of the output rate, stop from half of it, so that
-    nothing folds anywhere.
+    """Kaiser-window design: pass to 0.39 of the output rate, stop from half of it.
 
-    An even number of taps puts samples at the ends of steps, whose means lie half a step earlier;
-    the pass band makes up for what the mean over a step takes (0.03 dB at 20 kHz for 8 steps a
-    sample). A stop band that began where content folds into the pass band would need half the
-    taps, but would leave mesh harmonics of 20 to 31 kHz in 20 to 25.6 kHz, between the mesh
-    lines, where residuals see them.
+    An even number of taps puts samples at the ends of steps, whose means are centred half a step
+    earlier. The pass band compensates the attenuation of the mean over a step (0.03 dB at 20 kHz
+    for 8 steps a sample). A stop band from where aliases reach the pass band would need half the
+    taps. But it would leave mesh harmonics of 20 to 31 kHz in 20 to 25.6 kHz, between the mesh
+    lines, where residuals show them.
     """
     from scipy.signal import firwin2, kaiserord
 
@@ -118,40 +106,33 @@ def design(oversampling: int) -> Decimator:
     gain = np.append(1.0 / np.sinc(frequency[:65] / oversampling), [0.0, 0.0])
     n_grid = max(16385, 1 + 2 ** math.ceil(math.log2(256 * oversampling)))
     window = ("kaiser", beta)
-    taps = firwin2(
-        2 * margin * oversampling,
-        frequency,
-        gain,
-        nfreqs=n_grid,
-        window=window,
-        fs=2.0 * nyquist,
-    )
+    length, rate = 2 * margin * oversampling, 2.0 * nyquist
+    taps = firwin2(length, frequency, gain, nfreqs=n_grid, window=window, fs=rate)
     return Decimator(taps, oversampling, margin)
 
 
-def in_band_error(found: Array, exact: Array, sampling_rate: float) -> Array:
-    """Largest relative error of a channel's spectrum from 20 Hz to the end of the usable band,
-    (lane,).
+def in_band_error(signal: Array, exact: Array, sampling_rate: float) -> Array:
+    """Largest relative error of a channel's spectrum, (lane,).
+
+    From 20 Hz to the end of the usable band, under a Hann window; 0 for channels without any
+    signal. A value does not depend on the other lanes.
 
     Parameters
     ----------
-    found, exact : (lane, channel, sample)
-
-    Under a Hann window; 0 for channels that are still. A value does not depend on the other lanes.
+    signal, exact : (lane, channel, sample)
     """
     if exact.shape[:2] == (1, 1):
         # numpy sums a single spectrum in another order than several side by side
-        found, exact = (np.concatenate([signal, signal]) for signal in (found, exact))
-        return in_band_error(found, exact, sampling_rate)[:1]
+        twice = np.repeat(signal, 2, axis=0), np.repeat(exact, 2, axis=0)
+        return in_band_error(*twice, sampling_rate)[:1]
     n_samples = exact.shape[-1]
     frequency = np.fft.rfftfreq(n_samples, 1.0 / sampling_rate)
     inside = (frequency >= LOWEST_HZ) & (frequency <= usable_band(sampling_rate)[1])
     window = np.hanning(n_samples)
     spectra = [
-        np.fft.rfft(signal * window, axis=-1)[..., inside]
-        for signal in (found - exact, exact)
+        np.fft.rfft(values * window, axis=-1)[..., inside]
+        for values in (signal - exact, exact)
     ]
     off, level = (np.linalg.norm(spectrum, axis=-1) for spectrum in spectra)
-    return np.asarray(
-        np.divide(off, level, out=np.zeros_like(off), where=level != 0.0).max(axis=-1)
-    )
+    ratio = np.divide(off, level, out=np.zeros_like(off), where=level != 0.0)
+    return np.asarray(ratio.max(axis=-1))

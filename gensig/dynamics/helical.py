@@ -1,6 +1,6 @@
-"""What helical gears add to a pair.
+"""Motion of helical gears along their axes, and their tilts.
 
-Motion along the axis and tilts. Derived in ``docs/theory/helical_dynamics.md``.
+Derived in ``docs/theory/helical_dynamics.md``.
 """
 
 from __future__ import annotations
@@ -38,23 +38,24 @@ def axial_reach(pair: GearPair) -> Array:
     slant = math.copysign(math.tan(pair.base_helix_angle), pair.pinion.helix_angle)
     across = math.tan(pair.working_pressure_angle)
     pinion, wheel = pair.pinion.base_radius, pair.wheel.base_radius
-    return slant * np.array(
-        [1.0, -pinion * across, -pinion, -1.0, -wheel * across, -wheel]
+    on_pinion, on_wheel = (
+        (1.0, -pinion * across, -pinion),
+        (-1.0, -wheel * across, -wheel),
     )
+    return slant * np.array([*on_pinion, *on_wheel])
 
 
 def half_lag(table: PairTable | SlicedTable) -> float:
-    """How much later than the slice that enters first the middle of the face meets a phase, m
-    along the path.
-    """
+    """Distance along the path from the slice that enters first to the middle of the face, m."""
     if isinstance(table, PairTable):
         return 0.0
     return 0.5 * table.pair.face_width * math.tan(table.pair.base_helix_angle)
 
 
 def pitches(table: PairTable | SlicedTable) -> tuple[int, int]:
-    """Whole base pitches from A at which a table begins and ends; pairs followed at once are the
-    difference.
+    """Whole base pitches from A at which a table begins and ends.
+
+    The difference is the number of pairs followed at once.
 
     Raises
     ------
@@ -65,7 +66,8 @@ def pitches(table: PairTable | SlicedTable) -> tuple[int, int]:
     n_pairs = table.last_pitch - table.first_pitch
     if n_pairs > MOST_PAIRS:
         raise ConfigError(
-            f"{n_pairs} pairs of teeth would have to be followed at once, of a total contact ratio of "
-            f"{table.pair.total_contact_ratio:.3g}; at most {MOST_PAIRS} are: reduce face_width_mm or helix_angle_deg"
+            f"{n_pairs} pairs of teeth would have to be followed at once, of a total contact "
+            f"ratio of {table.pair.total_contact_ratio:.3g}; at most {MOST_PAIRS} are: reduce "
+            "face_width_mm or helix_angle_deg"
         )
     return table.first_pitch, table.last_pitch

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
+from gensig.dynamics._vector import PRECISIONS
 from gensig.dynamics.backends.base import BOUNCING, Integration, Motions, count_samples
-from gensig.dynamics.backends.registry import BACKENDS
+from gensig.dynamics.backends.registry import BACKENDS, DEFAULT_BACKEND
 from gensig.dynamics.backends.step_limits import (
     CoarseStepWarning,
     check_step,
     settling_time,
 )
 from gensig.dynamics.pair import DOFS, PairDynamics
-from gensig.dynamics.solver import FINEST, Solver
 from gensig.errors import ConfigError
 
 __all__ = [
@@ -32,6 +33,44 @@ __all__ = [
 ]
 
 MOST_BYTES = 2**28  # of the samples of the records that are simulated side by side
+FINEST = 64  # steps per sample that are tried where the error is too large
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Solver:
+    """Options of the integration.
+
+    Parameters
+    ----------
+    oversampling : internal steps per output sample
+    precision : of the numbers, ``float64`` or ``float32``
+    max_error : a record with a larger error is integrated again with twice as many steps, up to
+        64; None does not compute the error
+    backend : the method, a name in ``BACKENDS``
+    """
+
+    oversampling: int
+    precision: str
+    max_error: float | None = None
+    backend: str = DEFAULT_BACKEND
+
+    def __post_init__(self) -> None:
+        if not 2 <= self.oversampling <= 256:
+            raise ConfigError(
+                f"solver.oversampling = {self.oversampling} must lie in 2..256"
+            )
+        if self.precision not in PRECISIONS:
+            raise ConfigError(
+                f"solver.precision = {self.precision!r}; allowed: {', '.join(PRECISIONS)}"
+            )
+        if self.max_error is not None and not 1e-6 <= self.max_error <= 1.0:
+            raise ConfigError(
+                f"solver.max_error = {self.max_error:g} must lie in 1e-6..1, or be null"
+            )
+        if self.backend not in BACKENDS:
+            raise ConfigError(
+                f"solver.backend = {self.backend!r}; allowed: {', '.join(BACKENDS)}"
+            )
 
 
 def integrate(
@@ -43,14 +82,10 @@ def integrate(
     channels: tuple[str, ...],
     tell_mesh: bool = False,
 ) -> Motions:
-    """Settles every machine by itself, then records ``duration`` s from time 0 on.
+    """Motions of machines that have settled, from time 0 on for ``duration`` s, one row a machine.
 
-    The machines share their degrees of freedom and the kind of their mesh law. A motion does not
-    depend on the other machines of the call.
-
-    Returns
-    -------
-    motions, one row a machine, by the backend that ``solver.backend`` names
+    The backend is ``solver.backend``. The machines share their degrees of freedom and the kind of
+    their mesh law. A motion does not depend on the other machines of the call.
 
     Raises
     ------
@@ -93,14 +128,14 @@ def check_memory(
     if n_bytes > MOST_BYTES:
         longest = duration * MOST_BYTES / n_bytes
         raise ConfigError(
-            f"operating.duration_s = {duration:g}: {together} records side by side with {n_channels} channels at "
-            f"{sampling_rate:g} Hz take {n_bytes / 2**20:.0f} MiB, more than {MOST_BYTES / 2**20:.0f}; record at most "
-            f"{longest:.3g} s at a time"
+            f"operating.duration_s = {duration:g}: {together} records side by side with "
+            f"{n_channels} channels at {sampling_rate:g} Hz take {n_bytes / 2**20:.0f} MiB, "
+            f"more than {MOST_BYTES / 2**20:.0f}; record at most {longest:.3g} s at a time"
         )
 
 
 def check_channels(channels: tuple[str, ...], dofs: tuple[str, ...] = DOFS) -> None:
-    """Raise ConfigError for a channel that a machine has not."""
+    """Raise ConfigError for a channel that a machine does not have."""
     unknown = [name for name in channels if name not in dofs]
     if unknown:
         raise ConfigError(

@@ -3,30 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics._layout import (
-    COLUMNS,
-    FOLLOWED,
-    N_EXACT,
-    N_NUMBERS,
-    N_PLACES,
-    N_PROFILE,
-    NODES_PER_METER,
-    NOMINAL_ACCELERATION,
-    NOMINAL_ANGLE,
-    NOMINAL_SPEED,
-    PER_SWITCH_WIDTH,
-    TORQUE,
-    TORQUE_SLOPE,
-    Group,
-    HelicalGroup,
-)
+from gensig.dynamics import _layout as layout
+from gensig.dynamics._layout import COLUMNS, FAR_NEAR, Group, HelicalGroup
 from gensig.dynamics._vector import n_lanes
-from gensig.dynamics.helical import pitches
+from gensig.dynamics.helical import half_lag, pitches
+from gensig.dynamics.mesh_statics import least_gaps
 from gensig.dynamics.pair import PairDynamics
 from gensig.mesh.pair_table import GearTable, PairTable
 from gensig.mesh.sliced.sliced_statics import left_out_energy
@@ -34,7 +21,26 @@ from gensig.mesh.sliced.sliced_table import SlicedTable
 
 Array = NDArray[np.float64]
 
-CELLS_PER_SECOND = 1000.0  # in which speed and torque run straight
+CELLS_PER_SECOND = 1000.0  # speed and torque are linear in each cell
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToothRows:
+    """Distinct teeth of one mesh, as rows of the core's table.
+
+    Parameters
+    ----------
+    values : (row, chord, node, column)    the first row is that of sound teeth; helical teeth
+        have the columns of ``Group.chord_table`` after those of ``Group.table``
+    row : (tooth,)    row of every tooth of pinion and wheel, -1 for a missing one
+    pinion_stride : rows from one pinion tooth to the next
+    wheel_first : first row of the wheel where teeth are stored one by one, else 0
+    """
+
+    values: Array
+    row: NDArray[np.int64]
+    pinion_stride: int
+    wheel_first: int
 
 
 def fill_lanes(dynamics: Sequence[PairDynamics], precision: str) -> list[PairDynamics]:
@@ -53,110 +59,82 @@ def pack(
     Parameters
     ----------
     step : s    of integration, over which the paper's law switches a pair
-    span : s    from when to when the course of speed and torque is needed, where they change
+    span : s    begin and end of the required course of speed and torque, where they change
     """
     lanes = fill_lanes(dynamics, precision)
-    tables, rows, steps = zip(*[_rows(one.table) for one in lanes], strict=True)
-    sizes, depth = [table[..., :COLUMNS].size for table in tables], _depths(lanes)
-    teeth = [len(row) for row in rows]
-    numbers, exact = (
-        np.empty((N_NUMBERS, len(lanes)), dtype=precision),
-        np.empty((N_EXACT, len(lanes))),
-    )
-    places = np.empty((N_PLACES, len(lanes)), dtype=np.int64)
-    rests = [one.rest() for one in lanes]
-    for lane, one in enumerate(lanes):
-        numbers[:, lane], exact[:, lane] = (
-            one.numbers(step, rests[lane]),
-            one.exact_numbers(),
-        )
-        first_tooth, (_, n_chords, n_nodes, _) = sum(teeth[:lane]), tables[lane].shape
-        first_table, per_chord = sum(sizes[:lane]), n_nodes * COLUMNS
-        first_pitch, last_pitch = pitches(one.table)
-        n_pinion = one.table.pair.pinion.n_teeth
-        places[:, lane] = (
-            n_pinion,
-            one.table.pair.wheel.n_teeth,
-            one.start_tooth_pinion,
-            one.start_tooth_wheel,
-            first_tooth,
-            first_tooth + n_pinion,
-            first_table,
-            n_chords * per_chord,
-            n_nodes - 2,
-            *steps[lane],
-            first_pitch,
-            last_pitch - first_pitch,
-            per_chord,
-            first_table
-            + per_chord
-            * (one.table.set_chord if isinstance(one.table, SlicedTable) else 0),
-        )
-    systems = [one.system() for one in lanes]
-    stiffness = np.stack([system.stiffness for system in systems])
-    damping = np.stack([system.damping for system in systems])
-    mass, rotation = (
-        np.stack([getattr(system, name) for system in systems])
-        for name in ("mass", "rotation")
-    )
-    n_dof = mass.shape[1]
-    coupled = np.any((stiffness != 0.0) | (damping != 0.0), axis=0) & ~np.eye(
-        n_dof, dtype=bool
-    )
-    row, column = np.nonzero(coupled)
-    profile, profile_first, cells_per_second = _nominal(lanes, span)
-
-    def side_by_side(values: Array) -> NDArray[np.floating]:
-        """(lane, row...) flat, one lane beside the other."""
-        return np.ascontiguousarray(np.moveaxis(values, 0, -1), dtype=precision).ravel()
-
-    diagonal = np.arange(n_dof)
-    set_force = np.stack(
+    teeth = [tooth_rows(machine.table) for machine in lanes]
+    systems = [machine.system() for machine in lanes]
+    rests = np.stack([machine.rest() for machine in lanes])
+    reach = np.stack([machine.approach_direction() for machine in lanes])
+    mean_force = np.array([machine.mesh_force for machine in lanes])
+    numbers = np.array(
         [
-            system.force - one.mesh_force * one.approach_direction()
-            for system, one in zip(systems, lanes, strict=True)
+            mesh_numbers(machine, step, rest)
+            for machine, rest in zip(lanes, rests, strict=True)
         ]
     )
+    exact = np.array([exact_numbers(machine) for machine in lanes])
+    indices = _indices(lanes, teeth)
+    depth = _depths(lanes)
+    bend = np.outer(0.5 / exact[:, layout.NODES_PER_METER], [1.0, 0.0, 1.0, 0.0])
+
+    def joined(values: Callable[[ToothRows], Array]) -> NDArray[np.floating]:
+        return np.concatenate([values(rows).ravel() for rows in teeth]).astype(
+            precision
+        )
+
+    def of_teeth(key: str) -> Array:
+        return np.concatenate(
+            [
+                getattr(machine, f"{gear}_{key}")
+                for machine in lanes
+                for gear in ("pinion", "wheel")
+            ]
+        )
+
+    def side_by_side(values: Array) -> NDArray[np.floating]:
+        """Values (lane, row...) flat, with the lanes along the last axis."""
+        return np.ascontiguousarray(np.moveaxis(values, 0, -1), dtype=precision).ravel()
+
+    def stacked(name: str) -> Array:
+        return np.stack([getattr(system, name) for system in systems])
+
+    mass, rotation = stacked("mass"), stacked("rotation")
+    stiffness, damping = stacked("stiffness"), stacked("damping")
+    dofs = np.arange(mass.shape[1])
+    coupled = np.any((stiffness != 0.0) | (damping != 0.0), axis=0)
+    coupled[dofs, dofs] = False
+    row, column = np.nonzero(coupled)
+    set_force = stacked("force") - mean_force[:, None] * reach
+    profile, profile_first, cells_per_second = _profile(lanes, span)
     options = lanes[0].table.options
     kind = HelicalGroup if lanes[0].is_helical else Group
     return kind(
-        numbers=numbers.ravel(),
-        exact=exact.ravel(),
-        places=places.ravel(),
-        n_pairs=int(places[FOLLOWED].max()),
-        n_chords=len(depth[0]),
-        table=np.concatenate([table[..., :COLUMNS].ravel() for table in tables]).astype(
-            precision
-        ),
+        numbers=side_by_side(numbers),
+        exact=exact.T.ravel(),
+        indices=indices.T.ravel(),
+        n_pairs=int(indices[:, layout.FOLLOWED].max()),
+        n_chords=depth.shape[1],
+        table=joined(lambda rows: rows.values[..., :COLUMNS]),
         depth=depth.astype(precision).ravel(),
-        beside=np.concatenate(
-            [table[..., COLUMNS:].ravel() for table in tables]
-        ).astype(precision),
-        bend=np.outer(0.5 / exact[NODES_PER_METER], [1.0, 0.0, 1.0, 0.0])
-        .astype(precision)
-        .ravel(),
-        tooth_row=np.concatenate(rows),
-        tooth_error=np.concatenate(
-            [error for one in lanes for error in (one.pinion_error, one.wheel_error)]
-        ),
-        tooth_tilt=np.concatenate(
-            [tilt for one in lanes for tilt in (one.pinion_tilt, one.wheel_tilt)]
-        ),
+        chord_table=joined(lambda rows: rows.values[..., COLUMNS:]),
+        bend=bend.astype(precision).ravel(),
+        tooth_row=np.concatenate([rows.row for rows in teeth]),
+        tooth_error=of_teeth("error"),
+        tooth_tilt=of_teeth("tilt"),
         one_sided=options.law == "one_sided",
         consistent=options.roll_torque == "consistent",
-        reach=side_by_side(np.stack([one.approach_direction() for one in lanes])),
+        reach=side_by_side(reach),
         inverse_mass=side_by_side(1.0 / mass),
-        stiffness=side_by_side(stiffness[:, diagonal, diagonal]),
-        damping=side_by_side(damping[:, diagonal, diagonal]),
-        other_first=np.searchsorted(row, np.arange(n_dof + 1)),
+        stiffness=side_by_side(stiffness[:, dofs, dofs]),
+        damping=side_by_side(damping[:, dofs, dofs]),
+        other_first=np.searchsorted(row, np.arange(len(dofs) + 1)),
         other_column=np.ascontiguousarray(column),
         other_stiffness=side_by_side(stiffness[:, row, column]),
         other_damping=side_by_side(damping[:, row, column]),
-        force=side_by_side(
-            set_force - np.einsum("lij,lj->li", stiffness, np.stack(rests))
-        ),
+        force=side_by_side(set_force - np.einsum("lij,lj->li", stiffness, rests)),
         set_force=side_by_side(set_force),
-        rest=np.stack(rests, axis=-1),
+        rest=np.ascontiguousarray(rests.T),
         rotation=side_by_side(rotation),
         held=side_by_side(np.einsum("lij,lj->li", stiffness, rotation)),
         carried=side_by_side(mass * rotation),
@@ -166,170 +144,227 @@ def pack(
     )
 
 
-def _nominal(
+def at_step(group: Group, before: float, after: float) -> Group:
+    """The same group for another step, s."""
+    numbers = group.numbers.copy().reshape(layout.N_NUMBERS, -1)
+    numbers[layout.PER_SWITCH_WIDTH] *= before / after
+    return group._replace(numbers=numbers.ravel())
+
+
+def mesh_numbers(dynamics: PairDynamics, step: float, rest: Array) -> tuple[float, ...]:
+    """The mesh as numbers, in the order of the rows of ``_layout.Group.numbers``.
+
+    Parameters
+    ----------
+    step : s    of the integration
+    rest : (dof,)    the equilibrium from which the state is counted
+    """
+    table, options, pair = dynamics.table, dynamics.table.options, dynamics.table.pair
+    lag, damping = half_lag(table), dynamics.mesh_damping
+    if options.law == "one_sided":
+        damping = damping / dynamics.mesh_force
+    speed = pair.pinion.base_radius * dynamics.operating.speed
+    return (
+        pair.pinion.base_radius,
+        pair.wheel.base_radius,
+        pair.path_of_contact,
+        pair.pitch_point,
+        pair.start_curvature_radius,
+        pair.tangent_length,
+        table.shared_compliance,
+        damping,
+        options.friction_coefficient,
+        2.0 / (options.friction_transition * pair.base_pitch + 2.0 * lag),
+        2.0 / (speed * step),
+        pair.backlash,
+        dynamics.mesh_force,
+        float(dynamics.approach_direction() @ rest),
+        lag,
+        pair.pitch_point + lag,
+    )
+
+
+def exact_numbers(dynamics: PairDynamics) -> tuple[float, ...]:
+    """Numbers that locate the pairs, in the order of the rows of ``_layout.Group.exact``."""
+    options, pair = dynamics.table.options, dynamics.table.pair
+    near = -math.inf, math.inf
+    if options.law == "one_sided":
+        near = near_positions(dynamics)
+    return (
+        pair.pinion.base_radius,
+        pair.base_pitch,
+        1.0 / pair.base_pitch,
+        options.points_per_pitch / pair.base_pitch,
+        dynamics.start_roll,
+        *near,
+        pitches(dynamics.table)[0] * pair.base_pitch,
+    )
+
+
+def near_positions(dynamics: PairDynamics) -> tuple[float, float]:
+    """Positions s outside of which no pair comes within ``FAR_NEAR`` of touching, m."""
+    table = dynamics.table
+    beyond = table.position - table.pair.pitch_point - half_lag(table)
+    teeth = (
+        (dynamics.pinion_error, dynamics.pinion_tilt),
+        (dynamics.wheel_error, dynamics.wheel_tilt),
+    )
+    nearest = [
+        flank + error.min() + np.minimum(tilt.min() * beyond, tilt.max() * beyond)
+        for flank, (error, tilt) in zip(least_gaps(table), teeth, strict=True)
+    ]
+    near = np.flatnonzero(nearest[0] + nearest[1] < FAR_NEAR)
+    first, last = 0, len(table.position) - 1
+    if len(near) > 0:  # else every pair may be as near as any other
+        first, last = max(near[0] - 1, first), min(near[-1] + 1, last)
+    return float(table.position[first]), float(table.position[last])
+
+
+def _indices(
+    lanes: Sequence[PairDynamics], teeth: Sequence[ToothRows]
+) -> NDArray[np.int64]:
+    """Indices of every lane into the tables, (lane, row of ``Group.indices``)."""
+    indices = []
+    first_tooth, first_value = 0, 0
+    for machine, rows in zip(lanes, teeth, strict=True):
+        table, pair = machine.table, machine.table.pair
+        _, n_chords, n_nodes, _ = rows.values.shape
+        first_pitch, last_pitch = pitches(table)
+        per_chord = n_nodes * COLUMNS
+        coast = first_value
+        if isinstance(table, SlicedTable):
+            coast += per_chord * table.set_chord
+        indices.append(
+            (
+                pair.pinion.n_teeth,
+                pair.wheel.n_teeth,
+                machine.start_tooth_pinion,
+                machine.start_tooth_wheel,
+                first_tooth,
+                first_tooth + pair.pinion.n_teeth,
+                first_value,
+                n_chords * per_chord,
+                n_nodes - 2,
+                rows.pinion_stride,
+                rows.wheel_first,
+                first_pitch,
+                last_pitch - first_pitch,
+                per_chord,
+                coast,
+            )
+        )
+        first_tooth += len(rows.row)
+        first_value += len(rows.values) * n_chords * per_chord
+    return np.array(indices, dtype=np.int64)
+
+
+def _profile(
     lanes: Sequence[PairDynamics], span: tuple[float, float]
 ) -> tuple[Array, int, float]:
-    """Nominal motion and torque by cells of time, (cell, 5, lane) flat, the number of the first,
-    and cells a second.
+    """Nominal motion and torque by cells of time, the number of the first cell, cells a second.
 
-    Speed and torque run straight through a cell; where neither changes there is one cell.
+    Values are (cell, 5, lane) flat. Speed and torque are linear in a cell; where neither changes
+    there is one cell.
     """
-    if all(one.operating.is_steady for one in lanes):
-        profile = np.zeros((1, N_PROFILE, len(lanes)))
-        profile[0, NOMINAL_SPEED], profile[0, TORQUE] = (
-            [one.operating.speed for one in lanes],
-            1.0,
-        )
+    if all(machine.operating.is_steady for machine in lanes):
+        profile = np.zeros((1, layout.N_PROFILE, len(lanes)))
+        profile[0, layout.NOMINAL_SPEED] = [
+            machine.operating.speed for machine in lanes
+        ]
+        profile[0, layout.TORQUE] = 1.0
         return profile.ravel(), 0, 1.0
-    # cells begin at multiples of their length, so that the same instants have the same bits
-    # whatever the span
+    # cells begin at multiples of their length, so that an instant has the same bits in any span
     first = math.floor(span[0] * CELLS_PER_SECOND)
     last = max(math.ceil(span[1] * CELLS_PER_SECOND), first + 1)
     edges = np.arange(first, last + 1) / CELLS_PER_SECOND
-    profile = np.empty((last - first, N_PROFILE, len(lanes)))
-    for lane, one in enumerate(lanes):
-        nominal = one.nominal(edges)
-        gain, slope = (
-            np.diff(values) * CELLS_PER_SECOND
-            for values in (nominal.speed, nominal.torque_factor)
-        )
-        turned = 0.5 * (nominal.speed[1:] + nominal.speed[:-1]) / CELLS_PER_SECOND
-        before, after = turned[:-first], turned[-first:]
-        angle = np.concatenate(
-            [-np.cumsum(before[::-1])[::-1], [0.0], np.cumsum(after)]
-        )
-        profile[:, NOMINAL_ANGLE, lane], profile[:, NOMINAL_SPEED, lane] = (
-            angle[:-1],
-            nominal.speed[:-1],
-        )
-        profile[:, NOMINAL_ACCELERATION, lane] = gain
-        profile[:, TORQUE, lane], profile[:, TORQUE_SLOPE, lane] = (
-            nominal.torque_factor[:-1],
-            slope,
-        )
+    profile = np.empty((last - first, layout.N_PROFILE, len(lanes)))
+    for lane, machine in enumerate(lanes):
+        nominal = machine.nominal(edges)
+        speed, torque = nominal.speed, nominal.torque_factor
+        turned = 0.5 * (speed[1:] + speed[:-1]) / CELLS_PER_SECOND
+        before = -np.cumsum(turned[:-first][::-1])[::-1]
+        angle = np.concatenate([before, [0.0], np.cumsum(turned[-first:])])
+        profile[:, layout.NOMINAL_ANGLE, lane] = angle[:-1]
+        profile[:, layout.NOMINAL_SPEED, lane] = speed[:-1]
+        gain = np.diff(speed) * CELLS_PER_SECOND
+        profile[:, layout.NOMINAL_ACCELERATION, lane] = gain
+        profile[:, layout.TORQUE, lane] = torque[:-1]
+        profile[:, layout.TORQUE_SLOPE, lane] = np.diff(torque) * CELLS_PER_SECOND
     return profile.ravel(), first, CELLS_PER_SECOND
 
 
 def _depths(lanes: Sequence[PairDynamics]) -> Array:
-    """Bites from which on chords hold, (lane, chord) m, infinite for those that a lane has not."""
-    own = [
-        one.table.depth if isinstance(one.table, SlicedTable) else np.zeros(1)
-        for one in lanes
-    ]
-    depth = np.full((len(lanes), max(len(values) for values in own)), np.inf)
-    for row, values in zip(depth, own, strict=True):
-        row[: len(values)] = values
-    return depth
+    """Penetrations from which chords hold, (lane, chord) m, infinite for absent chords."""
+    depths = [getattr(machine.table, "depth", np.zeros(1)) for machine in lanes]
+    filled = np.full((len(lanes), max(len(depth) for depth in depths)), np.inf)
+    for row, depth in zip(filled, depths, strict=True):
+        row[: len(depth)] = depth
+    return filled
 
 
-def _rows(
-    table: PairTable | SlicedTable,
-) -> tuple[Array, NDArray[np.int64], tuple[int, int]]:
-    """As ``_table_rows``, rows (row, chord, node, column); behind the columns of helical teeth
-    what stands beside them."""
-    if isinstance(table, PairTable):
-        rows, row, steps = _table_rows(table)
-        return rows[:, None], row, steps
-    (pinion, pinion_row), (wheel, wheel_row) = (
-        np.unique(kind, return_inverse=True)
-        for kind in (table.pinion_kind, table.wheel_kind)
+def tooth_rows(table: PairTable | SlicedTable) -> ToothRows:
+    """Rows of the distinct pairs of teeth.
+
+    Spur teeth are stored one by one where pairs of them would take much more memory.
+    """
+    if isinstance(table, SlicedTable):
+        kinds = table.pinion_kind, table.wheel_kind
+        present = table.pinion_present[kinds[0]], table.wheel_present[kinds[1]]
+    else:
+        sides = table.pinion, table.wheel
+        kinds = table.pinion.kind, table.wheel.kind
+        present = table.pinion.present[kinds[0]], table.wheel.present[kinds[1]]
+        if _are_many(table):
+            values = np.concatenate([_columns(side) for side in sides])
+            return ToothRows(
+                values=values[:, None],
+                row=np.where(np.concatenate(present), np.concatenate(kinds), -1),
+                pinion_stride=1,
+                wheel_first=len(table.pinion.compliance),
+            )
+    pinion_kinds, pinion_row = np.unique(kinds[0], return_inverse=True)
+    wheel_kinds, wheel_row = np.unique(kinds[1], return_inverse=True)
+    pinion = np.repeat(pinion_kinds, len(wheel_kinds))
+    wheel = np.tile(wheel_kinds, len(pinion_kinds))
+    if pinion[0] != 0 or wheel[0] != 0:  # back flanks are those of sound teeth
+        pinion, wheel = np.append(0, pinion), np.append(0, wheel)
+        wheel_row = wheel_row + 1
+    if isinstance(table, SlicedTable):
+        columns = _sliced_columns(table)
+        values = np.stack([column[pinion, wheel] for column in columns], axis=-1)
+    else:
+        values = _columns(table.pinion)[pinion] + _columns(table.wheel)[wheel]
+        values = values[:, None]
+    row = np.concatenate([pinion_row, wheel_row])
+    return ToothRows(
+        values=values,
+        row=np.where(np.concatenate(present), row, -1),
+        pinion_stride=len(wheel_kinds),
+        wheel_first=0,
     )
-    touch = [
-        np.broadcast_to(value[:, :, :1], value.shape)
-        for value in (table.gap, table.gap_slope)
-    ]
-    values = [
+
+
+def _are_many(table: PairTable) -> bool:
+    """True if all pairs of distinct teeth would take much more memory than the teeth."""
+    n_pinion = len(np.unique(table.pinion.kind))
+    n_wheel = len(np.unique(table.wheel.kind))
+    return n_pinion * n_wheel > 2 * (n_pinion + n_wheel)
+
+
+def _columns(side: GearTable) -> Array:
+    """Table columns [c, c', g, g'], (distinct, node, 4)."""
+    columns = side.compliance, side.compliance_slope, side.gap, side.gap_slope
+    return np.stack(columns, axis=-1)
+
+
+def _sliced_columns(table: SlicedTable) -> list[Array]:
+    """Columns of ``Group.table`` and ``Group.chord_table``, (pinion, wheel, chord, node) each."""
+    touch = table.gap[:, :, :1], table.gap_slope[:, :, :1]
+    return [
         table.compliance,
         table.compliance_slope,
         table.gap,
         table.gap_slope,
         *left_out_energy(table),
-        *touch,
+        *[np.broadcast_to(values, table.gap.shape) for values in touch],
     ]
-    pairs = np.stack(
-        [
-            value[np.ix_(pinion, wheel)].reshape(-1, *value.shape[2:])
-            for value in values
-        ],
-        axis=-1,
-    )
-    if pinion[0] != 0 or wheel[0] != 0:  # back flanks are those of sound teeth
-        pairs = np.concatenate(
-            [np.stack([value[0, 0] for value in values], axis=-1)[None], pairs]
-        )
-        wheel_row = wheel_row + 1
-    sides = (
-        (table.pinion_kind, table.pinion_present, pinion_row),
-        (table.wheel_kind, table.wheel_present, wheel_row),
-    )
-    return (
-        pairs,
-        np.concatenate(
-            [np.where(present[kind], row, -1) for kind, present, row in sides]
-        ),
-        (len(wheel), 0),
-    )
-
-
-def _columns(side: GearTable) -> Array:
-    """Table columns [c, c', g, g'], (distinct, node, 4)."""
-    return np.stack(
-        [side.compliance, side.compliance_slope, side.gap, side.gap_slope], axis=-1
-    )
-
-
-def at_step(group: Group, before: float, after: float) -> Group:
-    """The same group for another step, s."""
-    numbers = group.numbers.copy().reshape(N_NUMBERS, -1)
-    numbers[PER_SWITCH_WIDTH] *= before / after
-    return group._replace(numbers=numbers.ravel())
-
-
-def _table_rows(table: PairTable) -> tuple[Array, NDArray[np.int64], tuple[int, int]]:
-    """Rows (row, node, 4) of which the first is that of sound teeth, row (tooth,) of every tooth,
-    and two steps.
-
-    Rows are pairs of the distinct teeth that the gears have, or, where those would take much more
-    memory, the teeth themselves. The steps lead from one pinion tooth to the next and, where
-    teeth stand by themselves, to the wheel's.
-    """
-    (pinion, pinion_row), (wheel, wheel_row) = _used(table.pinion), _used(table.wheel)
-    if _are_many(table):
-        everything = np.concatenate([_columns(table.pinion), _columns(table.wheel)])
-        row = np.concatenate(
-            [_present(side, side.kind) for side in (table.pinion, table.wheel)]
-        )
-        return everything, row, (1, len(table.pinion.compliance))
-    pairs = (pinion[:, None] + wheel[None]).reshape(-1, *pinion.shape[1:])
-    if not (
-        np.any(table.pinion.kind == 0) and np.any(table.wheel.kind == 0)
-    ):  # back flanks are those of sound teeth
-        pairs = np.concatenate(
-            [(_columns(table.pinion)[0] + _columns(table.wheel)[0])[None], pairs]
-        )
-        wheel_row = wheel_row + 1
-    row = np.concatenate(
-        [_present(table.pinion, pinion_row), _present(table.wheel, wheel_row)]
-    )
-    return pairs, row, (len(wheel), 0)
-
-
-def _are_many(table: PairTable) -> bool:
-    """Whether all pairs of distinct teeth would take much more memory than the teeth."""
-    n_pinion, n_wheel = (
-        len(np.unique(side.kind)) for side in (table.pinion, table.wheel)
-    )
-    return n_pinion * n_wheel > 2 * (n_pinion + n_wheel)
-
-
-def _used(side: GearTable) -> tuple[Array, NDArray[np.int64]]:
-    """Columns of the distinct teeth that the gear has, (distinct, node, 4), and which of them
-    every tooth is.
-    """
-    used, row = np.unique(side.kind, return_inverse=True)
-    return _columns(side)[used], row
-
-
-def _present(side: GearTable, row: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Row of every tooth, -1 for a missing one, (tooth,)."""
-    return np.where(side.present[side.kind], row, -1)

@@ -1,7 +1,4 @@
-"""Which teeth carry what at every output sample.
-
-The ground truth of where a vibration comes from.
-"""
+"""Loads of the teeth at every output sample: the ground truth of a vibration's origin."""
 
 from __future__ import annotations
 
@@ -24,16 +21,17 @@ NO_TOOTH = -1
 class MeshState:
     """The gear mesh at every output sample.
 
-    A pair of teeth keeps its place along the pair axis as long as it is followed.
+    A pair of teeth keeps its row of the pair axis as long as it is followed.
 
     Parameters
     ----------
-    pinion_tooth, wheel_tooth : (pair, sample) int16    the teeth that carry load, from 0; -1 where the pair has none
+    pinion_tooth, wheel_tooth : (pair, sample) int16    the teeth that carry load, from 0; -1 where
+        the pair has none
     load_share : (pair, sample)     normal force of the pair over that of all
-    force : (sample,) N             normal force of all pairs; negative where the teeth touch on their back flanks, of
-                                    which nothing else is told
+    force : (sample,) N             normal force of all pairs; negative where the teeth touch on
+        their back flanks, whose pairs are not listed
     contact_lost : (sample,) bool   no tooth touches another
-    fault_engaged : (sample,) bool  a faulty tooth carries load or stands on the path of contact
+    fault_engaged : (sample,) bool  a faulty tooth carries load or is on the path of contact
     """
 
     pinion_tooth: NDArray[np.int16]
@@ -50,7 +48,7 @@ def mesh_state(
     angle: Array,
     faulty: Collection[tuple[str, int]] = (),
 ) -> MeshState:
-    """Read what the compiled core tells of the mesh of one machine.
+    """Mesh state of one machine, from the rows of the compiled core.
 
     Parameters
     ----------
@@ -68,29 +66,21 @@ def mesh_state(
     force, forces = seen[SEEN_FORCE], seen[SEEN_PAIRS : SEEN_PAIRS + n_pairs]
     total = forces.sum(axis=0)
     share = np.divide(forces, total, out=np.zeros_like(forces), where=total > 0.0)
-    teeth = {
-        "pinion": (index + dynamics.start_tooth_pinion) % pair.pinion.n_teeth,
-        "wheel": (index + dynamics.start_tooth_wheel) % pair.wheel.n_teeth,
-    }
-    last_place = pair.path_of_contact + 2.0 * half_lag(dynamics.table)
-    near = (forces > 0.0) | ((position >= 0.0) & (position <= last_place))
+    pinion = (index + dynamics.start_tooth_pinion) % pair.pinion.n_teeth
+    wheel = (index + dynamics.start_tooth_wheel) % pair.wheel.n_teeth
+    path_end = pair.path_of_contact + 2.0 * half_lag(dynamics.table)
+    loaded = forces > 0.0
+    near = loaded | ((position >= 0.0) & (position <= path_end))
     odd = np.zeros(near.shape, dtype=bool)
-    for gear, tooth in teeth.items():
-        odd |= np.isin(tooth, [number for name, number in faulty if name == gear])
-    # a pair keeps its place while others come and go: by its number, not by its age
+    for gear, tooth in faulty:
+        odd |= (pinion if gear == "pinion" else wheel) == tooth
+    # a pair keeps its row while others come and go: by its number, not by its age
     order = np.argsort(index % n_pairs, axis=0)
-
-    def placed(rows: NDArray[np.generic]) -> NDArray[np.generic]:
-        return np.take_along_axis(rows, order, axis=0)
-
-    loaded = {
-        gear: placed(np.where(forces > 0.0, tooth, NO_TOOTH)).astype(np.int16)
-        for gear, tooth in teeth.items()
-    }
+    loaded_teeth = np.where(loaded, [pinion, wheel], NO_TOOTH).astype(np.int16)
     return MeshState(
-        pinion_tooth=loaded["pinion"],
-        wheel_tooth=loaded["wheel"],
-        load_share=np.asarray(placed(share), dtype=np.float64),
+        pinion_tooth=np.take_along_axis(loaded_teeth[0], order, axis=0),
+        wheel_tooth=np.take_along_axis(loaded_teeth[1], order, axis=0),
+        load_share=np.take_along_axis(share, order, axis=0),
         force=force.copy(),
         contact_lost=force == 0.0,
         fault_engaged=np.asarray((near & odd).any(axis=0)),

@@ -1,4 +1,4 @@
-"""What statics tell the equations of motion of a mesh, spur or helical.
+"""Static properties of a mesh, spur or helical, in its equations of motion.
 
 Stiffness, gaps, arms of friction.
 """
@@ -18,13 +18,15 @@ from gensig.mesh.sliced.sliced_table import SlicedTable
 
 Array = NDArray[np.float64]
 
+PER_PITCH = 32  # phases of a base pitch over which the stiffness is averaged
+
 
 def loss_arm(table: PairTable | SlicedTable, position: Array) -> Array:
-    """Moment of unit friction on pairs at positions s, reduced to the pinion, of the shape of
-    ``position``, m.
+    """Moment of unit friction on pairs at positions s, reduced to the pinion, m.
 
-    Sliding turns at the pitch point. The contact of helical teeth spans a part of the path, and
-    the mean over the face turns as gently as the compiled core has it.
+    The shape is that of ``position``. Sliding turns at the pitch point. The contact of helical
+    teeth spans a part of the path, and the mean over the face turns as gently as in the compiled
+    core.
     """
     pair, lag = table.pair, half_lag(table)
     middle = position - lag
@@ -38,22 +40,19 @@ def loss_arm(table: PairTable | SlicedTable, position: Array) -> Array:
 
 
 def least_gaps(table: PairTable | SlicedTable) -> list[Array]:
-    """Two gaps by node of which no pair of teeth has less than the sum, (node,) m each."""
+    """Two gaps by node whose sum is the least of all pairs of teeth, (node,) m each."""
     if isinstance(table, SlicedTable):
-        touch = table.gap[np.ix_(table.pinion_present, table.wheel_present)][
-            :, :, 0
-        ].min(axis=(0, 1))
+        present = np.ix_(table.pinion_present, table.wheel_present)
+        touch = table.gap[present][:, :, 0].min(axis=(0, 1))
         return [touch, np.zeros_like(touch)]
-    return [
-        np.asarray(side.gap[side.present].min(axis=0))
-        for side in (table.pinion, table.wheel)
-    ]
+    sides = table.pinion, table.wheel
+    return [np.asarray(side.gap[side.present].min(axis=0)) for side in sides]
 
 
 def mean_mesh_stiffness(table: PairTable | SlicedTable, force: float) -> float:
     """Mean tangent stiffness over a base pitch under a force in N, N/m.
 
-    Over the teeth that most are, which are the sound ones; where all differ, the median over the
+    Of the kind of most teeth, the sound ones. Where no kind has a majority, the median over the
     teeth.
     """
     if isinstance(table, SlicedTable):
@@ -61,32 +60,28 @@ def mean_mesh_stiffness(table: PairTable | SlicedTable, force: float) -> float:
     else:
         kinds = table.pinion.kind, table.wheel.kind
     pinion, wheel = (_commonest(kind) for kind in kinds)
-    n_pitches = table.pair.pinion.n_teeth if pinion is None or wheel is None else 1
-    roll = table.pair.base_pitch * (np.arange(n_pitches * 32) + 0.5) / 32
-    if isinstance(table, SlicedTable):
-        chords = table
-        if pinion is not None and wheel is not None:
-            chords = replace(table, pinion_kind=pinion, wheel_kind=wheel)
-        stiffness = chord_equilibrium(
-            chords, chord_states(chords, roll), force
-        ).stiffness
-    else:
-        mesh = table
-        if pinion is not None and wheel is not None:
-            mesh = replace(
+    n_pitches = table.pair.pinion.n_teeth
+    if pinion is not None and wheel is not None:
+        n_pitches = 1
+        if isinstance(table, SlicedTable):
+            table = replace(table, pinion_kind=pinion, wheel_kind=wheel)
+        else:
+            table = replace(
                 table,
                 pinion=replace(table.pinion, kind=pinion),
                 wheel=replace(table.wheel, kind=wheel),
             )
-        stiffness = static_mesh(mesh, pair_states(mesh, roll), force).stiffness
-    return float(np.median(stiffness.reshape(-1, 32), axis=0).mean())
+    roll = table.pair.base_pitch * (np.arange(n_pitches * PER_PITCH) + 0.5) / PER_PITCH
+    if isinstance(table, SlicedTable):
+        static = chord_equilibrium(table, chord_states(table, roll), force)
+    else:
+        static = static_mesh(table, pair_states(table, roll), force)
+    by_pitch = static.stiffness.reshape(-1, PER_PITCH)
+    return float(np.median(by_pitch, axis=0).mean())
 
 
 def _commonest(kind: NDArray[np.int64]) -> NDArray[np.int64] | None:
-    """Kinds of a gear whose teeth are all what most of them are, (tooth,).
-
-    None where there is no such kind.
-    """
+    """The kind of most teeth, for all teeth of a gear, (tooth,); None without a majority."""
     counts = np.bincount(kind)
     if counts.max() <= len(kind) // 2:
         return None

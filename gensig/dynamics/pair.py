@@ -1,21 +1,19 @@
 """A gear pair on its supports as a lumped system.
 
-One mesh, a soft speed source, a motor and a load if there are.
+One mesh, a soft speed source, and optionally a motor and a load.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics._layout import FAR_NEAR
-from gensig.dynamics.helical import AXIAL_DOFS, axial_reach, half_lag, pitches
-from gensig.dynamics.mesh_statics import least_gaps, loss_arm, mean_mesh_stiffness
+from gensig.dynamics.helical import AXIAL_DOFS, axial_reach, pitches
+from gensig.dynamics.mesh_statics import loss_arm, mean_mesh_stiffness
 from gensig.dynamics.system import LumpedSystem, eigenvalues
 from gensig.errors import ConfigError
 from gensig.mesh.load_distribution import (
@@ -25,7 +23,11 @@ from gensig.mesh.load_distribution import (
     static_mesh,
 )
 from gensig.mesh.pair_table import PairTable
-from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
+from gensig.mesh.sliced.sliced_statics import (
+    ChordStates,
+    chord_equilibrium,
+    chord_states,
+)
 from gensig.mesh.sliced.sliced_table import SlicedTable
 from gensig.operation.setpoint import Nominal, Operating
 from gensig.units import split_unit, unit
@@ -40,22 +42,31 @@ PAIR_DOFS = (
     "wheel_y",
     "wheel_rotation",
 )
-# all that a machine may have; ``PairDynamics.dofs`` says which
+# all that a machine may have; ``PairDynamics.dofs`` lists its own
 DOFS = (*PAIR_DOFS, *AXIAL_DOFS, "motor_rotation", "load_rotation")
 APPROACH_SIGN = (0.0, -1.0, 1.0, 0.0, 1.0, -1.0)
-# a prime: no tooth is looked at where the last one was, so that few places a tooth show all of
-# its path
-FRICTION_PLACES = 509
-PINION_X, PINION_Y, PINION_ROTATION, WHEEL_X, WHEEL_Y, WHEEL_ROTATION = range(
-    6
-)  # places in PAIR_DOFS
-PINION_Z, WHEEL_Z = 6, 9  # of helical gears, each with its tilts behind it
+# a prime, so that the rolls sample each tooth at other positions than the last
+FRICTION_POSITIONS = 509
+# fields of the teeth that meet, and arguments of the statics
+TOOTH_FIELDS = (
+    "start_tooth_pinion",
+    "start_tooth_wheel",
+    "pinion_error",
+    "wheel_error",
+    "pinion_tilt",
+    "wheel_tilt",
+)
+# indices in PAIR_DOFS
+PINION_X, PINION_Y, PINION_ROTATION, WHEEL_X, WHEEL_Y, WHEEL_ROTATION = range(6)
+PINION_Z, WHEEL_Z = 6, 9  # of helical gears, each followed by its tilts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Support:
-    """Bearings and shaft under one gear: x across the line of action, y along it, and for helical
-    gears z along the axis and tilts about x and y."""
+    """Bearings and shaft under one gear: x across the line of action, y along it.
+
+    For helical gears also z along the axis and tilts about x and y.
+    """
 
     stiffness_x: float = unit("n_per_m")
     stiffness_y: float = unit("n_per_m")
@@ -67,39 +78,33 @@ class Support:
     damping_tilt: float = unit("nms_per_rad", default=0.0)
 
     def __post_init__(self) -> None:
-        for name, suffixes in (
-            ("stiffness", ("n_per_m", "nm_per_rad")),
-            ("damping", ("ns_per_m", "nms_per_rad")),
-        ):
-            keys = [
-                f"{name}_{axis}_{suffixes[axis == 'tilt']}"
-                for axis in ("x", "y", "z", "tilt")
-            ]
-            for key in keys:
-                value = getattr(self, split_unit(key)[0])
-                if value < 0.0:
-                    raise ConfigError(f"support.{key} = {value:g} must not be negative")
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if value < 0.0:
+                key = f"{field.name}_{field.metadata['unit']}"
+                raise ConfigError(f"support.{key} = {value:g} must not be negative")
 
     def damped(self, body: Body, ratio_x: float, ratio_y: float) -> Support:
-        """The support with c = 2 zeta sqrt(k m) for a gear on it alone; along the axis and
-        against tilting with the mean of the two ratios."""
+        """The support with c = 2 zeta sqrt(k m) for a gear on it alone.
+
+        Axial and tilt damping take the mean of the two ratios.
+        """
         mean = 0.5 * (ratio_x + ratio_y)
+        tilt = math.sqrt(self.stiffness_tilt * body.tilt_inertia)
         return replace(
             self,
             damping_x=2.0 * ratio_x * math.sqrt(self.stiffness_x * body.mass),
             damping_y=2.0 * ratio_y * math.sqrt(self.stiffness_y * body.mass),
             damping_z=2.0 * mean * math.sqrt(self.stiffness_z * body.mass),
-            damping_tilt=2.0
-            * mean
-            * math.sqrt(self.stiffness_tilt * body.tilt_inertia),
+            damping_tilt=2.0 * mean * tilt,
         )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Body:
-    """What a gear weighs and how it is held.
+    """Mass in kg, moment of inertia in kg m2 and support of a gear.
 
-    ``tilt_inertia`` about a diameter in kg m2 is asked of helical gears.
+    ``tilt_inertia`` about a diameter in kg m2 is needed for helical gears.
     """
 
     mass: float
@@ -110,9 +115,9 @@ class Body:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rotor:
-    """A motor or a load.
+    """A motor or a load: a disc coupled to the shaft of its gear.
 
-    A disc that a coupling, a torsional spring and damper, holds to the shaft of its gear.
+    The coupling is a torsional spring and damper.
     """
 
     inertia: float = unit("kg_m2")
@@ -132,11 +137,8 @@ class Rotor:
     def coupling_damping(self, gear_inertia: float) -> float:
         """Damping of the coupling for its ratio on the two inertias it joins, N m s/rad."""
         joined = self.inertia * gear_inertia / (self.inertia + gear_inertia)
-        return (
-            2.0
-            * self.coupling_damping_ratio
-            * math.sqrt(self.coupling_stiffness * joined)
-        )
+        root = math.sqrt(self.coupling_stiffness * joined)
+        return 2.0 * self.coupling_damping_ratio * root
 
 
 def solid_disc(
@@ -152,12 +154,11 @@ def solid_disc(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PairDynamics:
-    """Everything that decides the motion of one gear pair. No slots: the equations are kept once
-    they are made.
+    """All parameters of the motion of one gear pair.
 
-    ``pinion_error``, ``wheel_error`` (tooth,) m open the gaps of their teeth at the pitch point,
-    ``pinion_tilt``, ``wheel_tilt`` (tooth,) m/m by as much more for every metre that the contact
-    is further along the path.
+    No slots: the equations are cached. ``pinion_error``, ``wheel_error`` (tooth,) m open the gaps
+    of their teeth at the pitch point; ``pinion_tilt``, ``wheel_tilt`` (tooth,) m/m is the growth
+    of these gaps along the path.
     """
 
     table: PairTable | SlicedTable
@@ -179,43 +180,42 @@ class PairDynamics:
         if not self.is_helical:
             return
         for name, body in (("pinion", self.pinion), ("wheel", self.wheel)):
-            support = body.support
-            if not (
-                body.tilt_inertia > 0.0
-                and support.stiffness_z > 0.0
-                and support.stiffness_tilt > 0.0
-            ):
+            axial, tilt = body.support.stiffness_z, body.support.stiffness_tilt
+            if not min(body.tilt_inertia, axial, tilt) > 0.0:
                 raise ConfigError(
-                    f"gear.{name}: a helical pair needs support.stiffness_z_n_per_m = {support.stiffness_z:g}, "
-                    f"stiffness_tilt_nm_per_rad = {support.stiffness_tilt:g} and the inertia of tilting "
-                    f"{body.tilt_inertia:g} kg m2 to be positive"
+                    f"gear.{name}: a helical pair needs support.stiffness_z_n_per_m = "
+                    f"{axial:g}, stiffness_tilt_nm_per_rad = {tilt:g} and the inertia of "
+                    f"tilting {body.tilt_inertia:g} kg m2 to be positive"
                 )
 
     @property
     def is_helical(self) -> bool:
-        """Whether the gears move along their axes and tilt."""
+        """True if the gears move along their axes and tilt."""
         return isinstance(self.table, SlicedTable)
 
     @property
     def gear_dofs(self) -> tuple[str, ...]:
-        """The first degrees of freedom: those that the mesh may push."""
-        return (*PAIR_DOFS, *AXIAL_DOFS) if self.is_helical else PAIR_DOFS
+        """The first degrees of freedom: those that the mesh force may act on."""
+        if self.is_helical:
+            return (*PAIR_DOFS, *AXIAL_DOFS)
+        return PAIR_DOFS
 
     @property
     def dofs(self) -> tuple[str, ...]:
         """Names of the degrees of freedom, in the order of every (dof,) array."""
-        rotors = (("motor_rotation", self.motor), ("load_rotation", self.load))
-        return (*self.gear_dofs, *[name for name, rotor in rotors if rotor is not None])
+        rotors = {"motor_rotation": self.motor, "load_rotation": self.load}
+        present = [name for name, rotor in rotors.items() if rotor is not None]
+        return (*self.gear_dofs, *present)
 
     @property
     def _ends(self) -> tuple[int, int]:
-        """Degrees of freedom that the drive and the load torque act on."""
-        driver = (
-            PINION_ROTATION if self.motor is None else self.dofs.index("motor_rotation")
-        )
-        return driver, WHEEL_ROTATION if self.load is None else self.dofs.index(
-            "load_rotation"
-        )
+        """Degrees of freedom that the drive torque and the load torque act on."""
+        driver, driven = PINION_ROTATION, WHEEL_ROTATION
+        if self.motor is not None:
+            driver = self.dofs.index("motor_rotation")
+        if self.load is not None:
+            driven = self.dofs.index("load_rotation")
+        return driver, driven
 
     @property
     def equivalent_mass(self) -> float:
@@ -244,14 +244,16 @@ class PairDynamics:
     @property
     def driven_inertia(self) -> float:
         """Inertia of the wheel and its load, kg m2."""
-        return self.wheel.inertia + (0.0 if self.load is None else self.load.inertia)
+        if self.load is None:
+            return self.wheel.inertia
+        return self.wheel.inertia + self.load.inertia
 
     @property
     def reduced_inertia(self) -> float:
-        """Inertia of all that turns, reduced to the pinion, kg m2."""
-        driving = self.pinion.inertia + (
-            0.0 if self.motor is None else self.motor.inertia
-        )
+        """Inertia of all rotating bodies, reduced to the pinion, kg m2."""
+        driving = self.pinion.inertia
+        if self.motor is not None:
+            driving += self.motor.inertia
         return driving + self.driven_inertia / self.table.pair.ratio**2
 
     @property
@@ -261,18 +263,17 @@ class PairDynamics:
 
     @property
     def _drive_rate(self) -> float:
-        """Circular frequency of the soft speed source on all that turns, rad/s."""
+        """Circular frequency of the soft speed source on all rotating bodies, rad/s."""
         return 2.0 * math.pi * self.operating.drive_frequency
 
     def system(self) -> LumpedSystem:
-        """Equations (1) of the spur paper with the signs put right, without the mesh, and those
-        of motor and load.
+        """Equations (1) of the spur paper with corrected signs, motor and load, without the mesh.
 
         Action and reaction on both gears, mesh force driving the wheel:
         ``docs/theory/spur_dynamics.md``. The soft speed source acts on the deviation from the set
-        rotation, so it is a spring and a damper there, of the motor if there is one, else of the
-        pinion; its set angle leads by what the mean torque winds up, so that the mean deviation
-        of the pinion is about 0.
+        rotation, so it is a spring and a damper on the motor if there is one, else on the pinion.
+        Its set angle leads by the wind-up of the mean torque, so that the mean deviation of the
+        pinion is about 0.
         """
         return self._system
 
@@ -283,37 +284,31 @@ class PairDynamics:
         stiffness, damping = np.zeros((2, len(dofs), len(dofs)))
         mass[: len(PAIR_DOFS)] = p.mass, p.mass, p.inertia, w.mass, w.mass, w.inertia
         rotation[PINION_ROTATION], rotation[WHEEL_ROTATION] = 1.0, 1.0 / ratio
-        for x, support in ((PINION_X, p.support), (WHEEL_X, w.support)):
-            stiffness[[x, x + 1], [x, x + 1]] = support.stiffness_x, support.stiffness_y
-            damping[[x, x + 1], [x, x + 1]] = support.damping_x, support.damping_y
-        for z, body in ((PINION_Z, p), (WHEEL_Z, w)) if self.is_helical else ():
-            mass[z : z + 3] = body.mass, body.tilt_inertia, body.tilt_inertia
-            held, axes = body.support, np.arange(z, z + 3)
-            stiffness[axes, axes] = (
-                held.stiffness_z,
-                held.stiffness_tilt,
-                held.stiffness_tilt,
-            )
-            damping[axes, axes] = held.damping_z, held.damping_tilt, held.damping_tilt
+        spring, damper = np.einsum("ii->i", stiffness), np.einsum("ii->i", damping)
+        for x, z, body in ((PINION_X, PINION_Z, p), (WHEEL_X, WHEEL_Z, w)):
+            held = body.support
+            spring[x : x + 2] = held.stiffness_x, held.stiffness_y
+            damper[x : x + 2] = held.damping_x, held.damping_y
+            if self.is_helical:
+                mass[z : z + 3] = body.mass, body.tilt_inertia, body.tilt_inertia
+                spring[z], spring[z + 1 : z + 3] = held.stiffness_z, held.stiffness_tilt
+                damper[z], damper[z + 1 : z + 3] = held.damping_z, held.damping_tilt
         driver, driven = self._ends
-        for rotor, place, gear in (
+        for rotor, dof, gear in (
             (self.motor, driver, PINION_ROTATION),
             (self.load, driven, WHEEL_ROTATION),
         ):
             if rotor is not None:
-                mass[place], rotation[place] = rotor.inertia, rotation[gear]
-                _couple(stiffness, place, gear, rotor.coupling_stiffness)
-                _couple(damping, place, gear, rotor.coupling_damping(mass[gear]))
-        drive_stiffness, reduced = self.drive_stiffness, self.reduced_inertia
-        stiffness[driver, driver] += drive_stiffness
-        damping[driver, driver] += (
-            2.0 * self.operating.drive_damping_ratio * reduced * self._drive_rate
-        )
+                mass[dof], rotation[dof] = rotor.inertia, rotation[gear]
+                _couple(stiffness, dof, gear, rotor.coupling_stiffness)
+                _couple(damping, dof, gear, rotor.coupling_damping(mass[gear]))
+        spring[driver] += self.drive_stiffness
+        ratio_and_inertia = self.operating.drive_damping_ratio * self.reduced_inertia
+        damper[driver] += 2.0 * ratio_and_inertia * self._drive_rate
         force[driver] = self.operating.torque + self.friction_torque()
         if self.motor is not None:
-            force[driver] += (
-                drive_stiffness * force[driver] / self.motor.coupling_stiffness
-            )
+            lead = self.drive_stiffness * force[driver] / self.motor.coupling_stiffness
+            force[driver] += lead
         force[driven] = -self.operating.torque * ratio
         return LumpedSystem(
             names=dofs,
@@ -330,22 +325,12 @@ class PairDynamics:
 
     def approach_direction(self) -> Array:
         """Gradient of the approach along the line of action, (dof,)."""
-        direction = np.zeros(len(self.dofs))
-        radii = np.array(
-            [
-                1.0,
-                1.0,
-                self.table.pair.pinion.base_radius,
-                1.0,
-                1.0,
-                self.table.pair.wheel.base_radius,
-            ]
-        )
-        direction[: len(PAIR_DOFS)] = np.array(APPROACH_SIGN) * radii
+        pair, direction = self.table.pair, np.zeros(len(self.dofs))
+        direction[: len(PAIR_DOFS)] = APPROACH_SIGN
+        direction[PINION_ROTATION] *= pair.pinion.base_radius
+        direction[WHEEL_ROTATION] *= pair.wheel.base_radius
         if self.is_helical:
-            direction[len(PAIR_DOFS) : len(self.gear_dofs)] = axial_reach(
-                self.table.pair
-            )
+            direction[PINION_Z : len(self.gear_dofs)] = axial_reach(pair)
         return direction
 
     @cached_property
@@ -355,188 +340,97 @@ class PairDynamics:
 
     @property
     def mesh_damping(self) -> float:
-        """Damper along the line of action that the mesh's damping is on average, N s/m."""
-        return (
-            2.0
-            * self.table.options.damping_ratio
-            * math.sqrt(self.mean_mesh_stiffness * self.equivalent_mass)
-        )
+        """Mean damping of the mesh along the line of action, N s/m."""
+        root = math.sqrt(self.mean_mesh_stiffness * self.equivalent_mass)
+        return 2.0 * self.table.options.damping_ratio * root
 
     @cached_property
     def stiff_rates(self) -> NDArray[np.complex128]:
-        """Eigenvalues with the mesh held somewhat above its mean stiffness, 1/s."""
-        return eigenvalues(
-            self.system(), self.approach_direction(), 1.2 * self.mean_mesh_stiffness
-        )
-
-    def numbers(self, step: float, rest: Array) -> tuple[float, ...]:
-        """The mesh as numbers, in the order of the rows of ``_layout.Group.numbers``."""
-        table, options, pair = self.table, self.table.options, self.table.pair
-        viscous, lag = self.mesh_damping, half_lag(table)
-        return (
-            pair.pinion.base_radius,
-            pair.wheel.base_radius,
-            pair.path_of_contact,
-            pair.pitch_point,
-            pair.start_curvature_radius,
-            pair.tangent_length,
-            table.shared_compliance,
-            viscous / self.mesh_force if options.law == "one_sided" else viscous,
-            options.friction_coefficient,
-            2.0 / (options.friction_transition * pair.base_pitch + 2.0 * lag),
-            2.0 / (pair.pinion.base_radius * self.operating.speed * step),
-            pair.backlash,
-            self.mesh_force,
-            float(self.approach_direction() @ rest),
-            lag,
-            pair.pitch_point + lag,
-        )
-
-    def exact_numbers(self) -> tuple[float, ...]:
-        """What decides where pairs stand, in the order of the rows of ``_layout.Group.exact``."""
-        options, pair = self.table.options, self.table.pair
-        near = (
-            self._near_positions()
-            if options.law == "one_sided"
-            else (-math.inf, math.inf)
-        )
-        return (
-            pair.pinion.base_radius,
-            pair.base_pitch,
-            1.0 / pair.base_pitch,
-            options.points_per_pitch / pair.base_pitch,
-            self.start_roll,
-            *near,
-            pitches(self.table)[0] * pair.base_pitch,
-        )
-
-    def _near_positions(self) -> tuple[float, float]:
-        """Positions s outside of which no pair comes within ``FAR_NEAR`` of touching, m."""
-        table = self.table
-        beyond = table.position - table.pair.pitch_point - half_lag(table)
-        teeth = (
-            (self.pinion_error, self.pinion_tilt),
-            (self.wheel_error, self.wheel_tilt),
-        )
-        nearest = [
-            flank + error.min() + np.minimum(tilt.min() * beyond, tilt.max() * beyond)
-            for flank, (error, tilt) in zip(least_gaps(table), teeth, strict=True)
-        ]
-        near = np.flatnonzero(nearest[0] + nearest[1] < FAR_NEAR)
-        if len(near) == 0:  # every pair may be as near as any other
-            return float(table.position[0]), float(table.position[-1])
-        first, last = max(near[0] - 1, 0), min(near[-1] + 1, len(table.position) - 1)
-        return float(table.position[first]), float(table.position[last])
+        """Eigenvalues with the mesh held at 1.2 times its mean stiffness, 1/s."""
+        stiffness = 1.2 * self.mean_mesh_stiffness
+        return eigenvalues(self.system(), self.approach_direction(), stiffness)
 
     def friction_torque(self) -> float:
-        """Mean friction torque reduced to the pinion, from the static loads over one turn of the
-        wheel, N m.
+        """Mean friction torque reduced to the pinion, N m.
+
+        From the static loads over one turn of the wheel.
         """
         pair = self.table.pair
-        places = (np.arange(FRICTION_PLACES) + 0.5) / FRICTION_PLACES
-        position, static = self._statics(
-            pair.base_pitch * pair.wheel.n_teeth * places, self.mesh_force
-        )
-        return self.table.options.friction_coefficient * float(
-            np.mean((static.load * loss_arm(self.table, position)).sum(axis=1))
-        )
+        shares = (np.arange(FRICTION_POSITIONS) + 0.5) / FRICTION_POSITIONS
+        states = self.states(pair.base_pitch * pair.wheel.n_teeth * shares)
+        load = self.static(states, self.mesh_force).load
+        lost = (load * loss_arm(self.table, states.position)).sum(axis=1)
+        return self.table.options.friction_coefficient * float(np.mean(lost))
 
     def rest(self) -> Array:
-        """Deflections of supports and couplings about which the machine moves.
+        """Deflections of supports and couplings about which the machine moves, (dof,).
 
-        The pinion has not turned, (dof,).
+        The pinion has not turned.
         """
         start = self.static_start(0.0)
         return np.asarray(start - self.system().rotation * start[PINION_ROTATION])
 
     def static_start(self, time: float) -> Array:
-        """Equilibrium at a nominal time: deflected supports and couplings, approach of the pairs
-        in contact, (dof,).
+        """Equilibrium at a nominal time: deflected supports and couplings, approach, (dof,).
 
-        Under a nominal acceleration it is that of the accelerated machine; a ripple is too quick
-        to be at rest with.
+        Under a nominal acceleration it is that of the accelerated machine. A ripple is left out:
+        it is too fast for an equilibrium.
         """
         pair, system, (driver, driven) = self.table.pair, self.system(), self._ends
-        nominal, smooth = (
-            one.nominal(np.array([time]))
-            for one in (self.operating, self.operating.without_ripple)
-        )
-        factor, acceleration = (
-            float(nominal.torque_factor[0]),
-            float(smooth.acceleration[0]),
-        )
+        times, radius = np.array([time]), pair.pinion.base_radius
+        smooth = self.operating.without_ripple.nominal(times)
+        factor = float(self.operating.nominal(times).torque_factor[0])
+        acceleration = float(smooth.acceleration[0])
         wheel_acceleration = acceleration / pair.ratio
-        force = (
-            factor * self.mesh_force
-            + wheel_acceleration * self.driven_inertia / pair.wheel.base_radius
-        )
+        inertia_torque = wheel_acceleration * self.driven_inertia
+        force = factor * self.mesh_force + inertia_torque / pair.wheel.base_radius
         start = np.zeros(len(system.mass))
         start[PINION_ROTATION] -= acceleration / self._drive_rate**2
         if self.motor is not None:
             lead = factor * system.force[driver] / system.stiffness[driver, driver]
             start[driver] = start[PINION_ROTATION] + lead
-            driven_inertia = self.reduced_inertia - self.motor.inertia
-            start[PINION_ROTATION] -= (
-                acceleration * driven_inertia / self.motor.coupling_stiffness
-            )
-        advance = pair.pinion.base_radius * start[PINION_ROTATION]
-        elapsed = float(self.operating.time_at_set_speed(np.array([time]))[0])
-        roll = (
-            self.start_roll
-            + pair.pinion.base_radius * self.operating.speed * elapsed
-            + advance
-        )
-        approach = float(self._statics(np.array([roll]), force)[1].approach[0])
-        axial, reach = (
-            range(len(PAIR_DOFS), len(self.gear_dofs)),
-            self.approach_direction(),
-        )
+            torque = acceleration * (self.reduced_inertia - self.motor.inertia)
+            start[PINION_ROTATION] -= torque / self.motor.coupling_stiffness
+        advance = radius * start[PINION_ROTATION]
+        elapsed = float(self.operating.time_at_set_speed(times)[0])
+        roll = self.start_roll + radius * self.operating.speed * elapsed + advance
+        static = self.static(self.states(np.array([roll])), force)
+        approach = float(static.approach[0])
+        if not math.isfinite(approach):
+            approach = 0.0
+        reach = self.approach_direction()
+        axial = range(len(PAIR_DOFS), len(self.gear_dofs))
         for dof in (PINION_Y, WHEEL_Y, *axial):
             if system.stiffness[dof, dof] > 0.0:
                 start[dof] = -reach[dof] * force / system.stiffness[dof, dof]
-        closed = approach if math.isfinite(approach) else 0.0
         pushed = start[WHEEL_Y] - start[PINION_Y]
         for dof in axial:
             pushed += reach[dof] * start[dof]
-        start[WHEEL_ROTATION] = (pushed - closed + advance) / pair.wheel.base_radius
+        start[WHEEL_ROTATION] = (pushed - approach + advance) / pair.wheel.base_radius
         if self.load is not None:
-            torque = (
-                factor * system.force[driven] - wheel_acceleration * self.load.inertia
-            )
-            start[driven] = (
-                start[WHEEL_ROTATION] + torque / self.load.coupling_stiffness
-            )
+            inertia_torque = wheel_acceleration * self.load.inertia
+            torque = factor * system.force[driven] - inertia_torque
+            twist = torque / self.load.coupling_stiffness
+            start[driven] = start[WHEEL_ROTATION] + twist
         return start
 
-    def _statics(self, roll: Array, force: float) -> tuple[Array, StaticMesh]:
-        """Positions s of the pairs at some rolls, (phase, pair) m, and their equilibrium under a
-        force in N.
-        """
+    def states(self, roll: Array) -> PairStates | ChordStates:
+        """Pairs of teeth at rolls of the pinion in m, (phase,)."""
+        teeth = {name: getattr(self, name) for name in TOOTH_FIELDS}
         if isinstance(self.table, SlicedTable):
-            chords = chord_states(self.table, roll, **self._teeth)
-            return chords.position, chord_equilibrium(self.table, chords, force)
-        states = self._states(roll)
-        return states.position, static_mesh(self.table, states, force)
+            return chord_states(self.table, roll, **teeth)
+        return pair_states(self.table, roll, **teeth)
 
-    def _states(self, roll: Array) -> PairStates:
-        assert isinstance(self.table, PairTable)
-        return pair_states(self.table, roll, **self._teeth)
-
-    @property
-    def _teeth(self) -> dict[str, Any]:
-        """Which teeth meet, and their errors, as the statics ask for them."""
-        names = (
-            "start_tooth_pinion",
-            "start_tooth_wheel",
-            "pinion_error",
-            "wheel_error",
-            "pinion_tilt",
-            "wheel_tilt",
-        )
-        return {name: getattr(self, name) for name in names}
+    def static(self, states: PairStates | ChordStates, force: float) -> StaticMesh:
+        """Equilibrium of pairs of teeth under a normal force in N."""
+        if isinstance(self.table, SlicedTable):
+            assert isinstance(states, ChordStates)
+            return chord_equilibrium(self.table, states, force)
+        assert isinstance(states, PairStates)
+        return static_mesh(self.table, states, force)
 
 
-def _couple(matrix: Array, one: int, other: int, value: float) -> None:
+def _couple(matrix: Array, first: int, second: int, value: float) -> None:
     """Put a spring or a damper between two degrees of freedom."""
-    matrix[[one, other], [one, other]] += value
-    matrix[[one, other], [other, one]] -= value
+    matrix[[first, second], [first, second]] += value
+    matrix[[first, second], [second, first]] -= value

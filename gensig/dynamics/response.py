@@ -1,7 +1,4 @@
-"""What a gear pair answers to small forces beside that of its mesh.
-
-Its linear frequency response.
-"""
+"""Linear frequency response of a gear pair to small forces."""
 
 from __future__ import annotations
 
@@ -27,16 +24,13 @@ def accelerations(dynamics: PairDynamics, frequency: Array, force: Complex) -> C
     (line, dof) m/s2 or rad/s2, complex
 
     Source: -w^2 (K + i w C - w^2 M)^-1 F of the linear system, K and C with the mesh's k h h^T
-    and c h h^T. Assumes forces so small that teeth stay in contact and stand where they would
-    without them.
+    and c h h^T. Assumes forces so small that teeth stay in contact at the same positions.
     """
     system, direction = dynamics.system(), dynamics.approach_direction()
     mesh = np.outer(direction, direction)
     w = np.asarray(frequency, dtype=np.float64)[:, None, None]
-    dynamic = (system.stiffness + dynamics.mean_mesh_stiffness * mesh) - w**2 * np.diag(
-        system.mass
-    )
-    dynamic = dynamic + 1j * w * (system.damping + dynamics.mesh_damping * mesh)
-    return np.asarray(
-        -(w[:, :, 0] ** 2) * np.linalg.solve(dynamic, force[:, :, None])[:, :, 0]
-    )
+    stiffness = system.stiffness + dynamics.mean_mesh_stiffness * mesh
+    damping = system.damping + dynamics.mesh_damping * mesh
+    dynamic = stiffness - w**2 * np.diag(system.mass) + 1j * w * damping
+    displacement = np.linalg.solve(dynamic, force[:, :, None])[:, :, 0]
+    return np.asarray(-(w[:, :, 0] ** 2) * displacement)

@@ -17,10 +17,10 @@ class LumpedSystem:
     """Masses, springs, dampers and forces; rotations are deviations from the nominal rotation.
 
     ``mass`` (dof,) kg or kg m2, ``stiffness`` and ``damping`` (dof, dof); ``force`` (dof,) at the
-    set torque, all of it follows a torque profile. ``rotation`` (dof,) says how far each turns
+    set torque, all of it follows a torque profile. ``rotation`` (dof,) is the rotation of each
     with the nominal rotation of the pinion, 0 for a translation: under its acceleration the
-    equations get the inertia force -mass * rotation * acceleration. ``names`` name the degrees of
-    freedom, as channels call them.
+    equations get the inertia force -mass * rotation * acceleration. ``names`` are the degrees of
+    freedom, and the names of channels.
     """
 
     names: tuple[str, ...]
@@ -34,14 +34,13 @@ class LumpedSystem:
         if np.any(self.mass <= 0.0):
             worst = self.names[int(np.argmin(self.mass))]
             raise SimulationError(f"the mass or inertia of '{worst}' must be positive")
-        for matrix, what in ((self.stiffness, "stiffness"), (self.damping, "damping")):
+        for name, matrix in (("stiffness", self.stiffness), ("damping", self.damping)):
             if not np.allclose(matrix, matrix.T, rtol=1e-12, atol=0.0):
-                raise SimulationError(f"the {what} matrix is not symmetric")
-            if np.linalg.eigvalsh(matrix).min() < -1e-9 * max(
-                1.0, float(np.abs(matrix).max())
-            ):
+                raise SimulationError(f"the {name} matrix is not symmetric")
+            scale = max(1.0, float(np.abs(matrix).max()))
+            if np.linalg.eigvalsh(matrix).min() < -1e-9 * scale:
                 raise SimulationError(
-                    f"the {what} matrix would feed energy in; check the signs of the supports"
+                    f"the {name} matrix would feed energy in; check the signs of the supports"
                 )
 
 
@@ -52,14 +51,11 @@ def eigenvalues(
 
     ``direction`` (dof,) is the gradient of the approach.
     """
-    n = len(system.mass)
-    k = (
-        system.stiffness + mesh_stiffness * np.outer(direction, direction)
-    ) / system.mass[:, None]
+    n, mesh = len(system.mass), np.outer(direction, direction)
+    k = (system.stiffness + mesh_stiffness * mesh) / system.mass[:, None]
     c = system.damping / system.mass[:, None]
-    return np.linalg.eigvals(
-        np.block([[np.zeros((n, n)), np.eye(n)], [-k, -c]])
-    ).astype(np.complex128)
+    state = np.block([[np.zeros((n, n)), np.eye(n)], [-k, -c]])
+    return np.linalg.eigvals(state).astype(np.complex128)
 
 
 def slowest_decay(
@@ -71,5 +67,4 @@ def slowest_decay(
     force is left out.
     """
     rates = -np.real(eigenvalues(system, direction, mesh_stiffness))
-    moving = rates[rates > 1e-3]
-    return float(moving.min()) if len(moving) else np.inf
+    return float(rates[rates > 1e-3].min(initial=np.inf))

@@ -1,6 +1,6 @@
 """The machine: gears by name, bodies, meshes, set-point and sensors.
 
-Records, plans, lives and commands need no more of any machine than is declared here.
+The interface of all machines for records, plans, lives and commands.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 class MachineMesh:
     """A mesh of a machine: the names of its driving and its driven gear, and their geometry.
 
-    ``followed`` says that records follow its teeth one by one, with their faults and errors.
+    ``followed`` is True for the mesh whose single teeth, with faults and errors, are in records.
     """
 
     driving: str
@@ -48,10 +48,9 @@ class MachineMesh:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Machine(ABC):
-    """A machine with gears: material, set-point, sensors, quality and solver; each kind says how
-    it moves.
+    """A machine with gears: material, set-point, sensors, quality and solver.
 
-    The kinds are final: none overrides a method that another one defines.
+    Each kind defines its motion. Kinds are final: none overrides a method that another defines.
     """
 
     material: Material
@@ -69,7 +68,7 @@ class Machine(ABC):
     @property
     @abstractmethod
     def gears(self) -> Mapping[str, Gear]:
-        """All gears by name, those that records follow first."""
+        """All gears by name, those of the followed mesh first."""
 
     @property
     @abstractmethod
@@ -89,25 +88,22 @@ class Machine(ABC):
     @property
     @abstractmethod
     def most_pairs(self) -> int:
-        """Number of tooth pairs whose loads can be recorded at once; 0 where they are not known."""
+        """Most tooth pairs whose loads can be recorded at once; 0 where they are not known."""
 
     @property
     @abstractmethod
     def ratio(self) -> float:
-        """Speed of the pinion's shaft over that of the shaft whose speed the configuration gives."""
+        """Speed of the pinion's shaft over the speed that the configuration gives."""
 
     @property
     @abstractmethod
     def torque_of(self) -> str:
-        """The torque that ``operating`` sets, in words.
-
-        Empty where it is the driving shaft's own.
-        """
+        """Name of the torque that ``operating`` sets; empty if it is the driving shaft's."""
 
     @property
     @abstractmethod
     def load_exponent(self) -> int:
-        """Power of the speed that the set torque follows along a course, beyond its own profile."""
+        """Exponent of the speed in the set torque along a course, besides the torque profile."""
 
     @property
     @abstractmethod
@@ -116,7 +112,7 @@ class Machine(ABC):
 
     @abstractmethod
     def mesh_torques(self, speed: float, torque: float) -> Array:
-        """Loads of a tooth at a set-point, one for each time it meshes, all equally likely.
+        """Loads of a tooth at a set-point, one for each mesh of the tooth, all equally likely.
 
         Parameters
         ----------
@@ -146,7 +142,7 @@ class Machine(ABC):
     def driven_tooth(self, tooth_pinion: int, drawn: int) -> int:
         """Tooth of the driven gear that meets one of the pinion at the start.
 
-        ``drawn`` if any may.
+        ``drawn`` if the machine allows any.
         """
 
     @abstractmethod
@@ -155,7 +151,7 @@ class Machine(ABC):
 
     @abstractmethod
     def check(self) -> None:
-        """Raise for what would stop every record: drive, channels, options and steps."""
+        """Raise for errors of every record: drive, channels, options and steps."""
 
     @classmethod
     @abstractmethod
@@ -175,9 +171,9 @@ class Machine(ABC):
         specimen: Specimen | None = None,
         gearbox: Gearbox | None = None,
     ) -> CleanRecord:
-        """Simulate one record.
+        """Clean record of one run.
 
-        What is not given is perfect, nominal, and starts with teeth 0 at A.
+        Without further arguments the machine is perfect, nominal, and starts with teeth 0 at A.
         """
         run = Run(
             system=self,
@@ -197,9 +193,9 @@ def specimen_table(
     faults: Sequence[Fault],
     specimen: Specimen,
 ) -> PairTable | SlicedTable:
-    """Mesh table of a specimen's gears with the faults on them, at its own backlash.
+    """Mesh table of a specimen's gears with faults, at the specimen's backlash.
 
-    Sound tables are shared: the backlash is put in afterwards.
+    Sound tables are shared: the backlash is set afterwards.
     """
     table = machine.mesh_table((*specimen.forms, *faults))
     backlash = machine.pair.backlash * specimen.backlash_factor
@@ -207,10 +203,10 @@ def specimen_table(
 
 
 def simulate_together(runs: Sequence[Run[Any]]) -> list[CleanRecord | SimulationError]:
-    """Simulate runs of any machines, those of one kind together; in the order given.
+    """Records of runs of any machines, in the order of the runs.
 
-    A record's bits do not depend on the other runs. A motion that does not stay finite gives its
-    error instead of a record.
+    Machines of one kind are simulated together. A record's bits do not depend on the other runs.
+    A motion that does not stay finite gives its error instead of a record.
     """
     by_kind: dict[type[Machine], list[int]] = {}
     for number, run in enumerate(runs):

@@ -1,6 +1,6 @@
-"""Flank modifications that are best for a range of torques and misalignments.
+"""Optimal flank modifications for a range of torques and misalignments.
 
-Least ripple, least load, and between.
+From the least ripple to the least line load.
 """
 
 from __future__ import annotations
@@ -13,36 +13,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import ConfigError, GeometryError
-from gensig.mesh.modification import FlankModification, PairModification
+from gensig.mesh.modification import PLAIN, FlankModification, PairModification
 from gensig.mesh.sliced.slices import loaded_contact
 from gensig.systems.sliced_pair import SlicedPair
 
 Array = NDArray[np.float64]
 
-# of the search, in normal modules: depth and height as the paper on transmission error takes
-# them, section 2
+# of the search, in normal modules: depth and height of section 2 of the paper on transmission
+# error
 LARGEST_DEPTH, LARGEST_HEIGHT = 0.02, 0.65
-N_VARIABLES = 9  # tip and root relief, each with depth and height, of both gears; crowning of the pair
+# tip and root relief, each with depth and height, of both gears; crowning of the pair
+N_VARIABLES = 9
 N_PHASES, N_SLICES = (
     32,
     28,
-)  # of the search; what it finds is judged with the pair's own
+)  # of the search; results are judged with the slices of the pair
 POPULATION, GENERATIONS = (
     8,
     60,
-)  # of differential evolution; the population counts for each variable
-BETWEEN = (
-    0.5  # of these generations where a search starts from the front of those before
-)
+)  # of differential evolution; the population for each variable
+BETWEEN = 0.5  # share of the generations for searches that start from the front of former ones
 REFUSED = 1e3  # times the unmodified value, for flanks that overlap or lose contact
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cases:
-    """What a modification must be good for.
-
-    Every torque (N m) with every misalignment (m over the face).
-    """
+    """Load cases: every torque (N m) with every misalignment (m over the face)."""
 
     torques: tuple[float, ...]
     misalignments: tuple[float, ...]
@@ -56,7 +52,7 @@ class Cases:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Optimum:
-    """A modification with the worst of all cases: ripple (m, peak to peak) and line load (N/m)."""
+    """A modification with its worst ripple (m, peak to peak) and line load (N/m) of all cases."""
 
     modification: PairModification
     ripple: float
@@ -76,14 +72,12 @@ def judge(
     """
     ripple, line_load = 0.0, 0.0
     for misalignment in cases.misalignments:
-        askew = replace(
-            modification, misalignment=modification.misalignment + misalignment
-        )
+        total = modification.misalignment + misalignment
+        askew = replace(modification, misalignment=total)
         mesh = replace(system, modification=askew).sliced_mesh()
         for torque in cases.torques:
-            contact = loaded_contact(
-                mesh, system.phases(n_phases), torque / system.pair.pinion.base_radius
-            )
+            force = torque / system.pair.pinion.base_radius
+            contact = loaded_contact(mesh, system.phases(n_phases), force)
             ripple = max(ripple, float(np.ptp(contact.approach)))
             line_load = max(line_load, float(contact.line_load.max()))
     return Optimum(modification=modification, ripple=ripple, line_load=line_load)
@@ -102,24 +96,23 @@ def optimise(
 
     Parameters
     ----------
-    system : its own modification is replaced; slices and mesh law are kept
-    n_front : 1 for the least ripple alone, 2 for it and the least line load, more for points between: the least ripple
-        under a bound on the line load (epsilon constraint), so also where the front is hollow; of all that was tried,
-        what nothing beats is spread over the front
+    system : its modification is replaced; slices and mesh law are kept
+    n_front : 1 for the least ripple alone, 2 for it and the least line load, more for points
+        between. These are the least ripple under a bound on the line load (epsilon constraint),
+        which also finds hollow fronts. The result is spread over the non-dominated points of all
+        searches
     seed : of the search; the same seed gives the same result
 
     Returns
     -------
-    optima that none of the others beats in both, by rising ripple
+    non-dominated optima by rising ripple
 
     Source: differential evolution of Storn & Price (1997) as
     ``scipy.optimize.differential_evolution`` has it.
     """
-    search = replace(
-        system,
-        slices=replace(system.slices, n_slices=min(N_SLICES, system.slices.n_slices)),
-    )
-    plain = judge(search, _plain(), cases, n_phases=N_PHASES)
+    n_slices = min(N_SLICES, system.slices.n_slices)
+    search = replace(system, slices=replace(system.slices, n_slices=n_slices))
+    plain = judge(search, PLAIN, cases, n_phases=N_PHASES)
     seen: dict[bytes, tuple[float, float]] = {}
 
     def values(point: Array) -> tuple[float, float]:
@@ -127,14 +120,18 @@ def optimise(
         key = point.tobytes()
         if key not in seen:
             try:
-                found = judge(search, unpacked(point, search), cases, n_phases=N_PHASES)
-                seen[key] = (
-                    found.ripple / plain.ripple,
-                    found.line_load / plain.line_load,
-                )
+                trial = judge(search, unpacked(point, search), cases, n_phases=N_PHASES)
+                load = trial.line_load / plain.line_load
+                seen[key] = trial.ripple / plain.ripple, load
             except (ConfigError, GeometryError):
                 seen[key] = REFUSED, REFUSED
         return seen[key]
+
+    def ripple(point: Array) -> float:
+        return values(point)[0]
+
+    def line_load(point: Array) -> float:
+        return values(point)[1]
 
     def run(
         objective: Callable[[Array], float],
@@ -148,42 +145,28 @@ def optimise(
         on_done(number + 1, n_front)
         return point
 
-    points = [
-        run(lambda point: values(point)[0], [np.zeros(N_VARIABLES)], 0, generations)
-    ]
+    zero = np.zeros(N_VARIABLES)
+    points = [run(ripple, [zero], 0, generations)]
     if n_front > 1:
-        points.append(
-            run(
-                lambda point: values(point)[1],
-                [np.zeros(N_VARIABLES), points[0]],
-                1,
-                generations,
-            )
-        )
-        most, least = values(points[0])[1], values(points[1])[1]
-        for number, bound in enumerate(
-            np.linspace(most, least, n_front)[1:-1], start=2
-        ):
+        points.append(run(line_load, [zero, points[0]], 1, generations))
+        most, least = line_load(points[0]), line_load(points[1])
+        fewer = math.ceil(BETWEEN * generations)
+        bounds = np.linspace(most, least, n_front)[1:-1].tolist()
+        for number, bound in enumerate(bounds, start=2):
 
-            def bounded(point: Array, bound: float = float(bound)) -> float:
-                ripple, load = values(point)
-                return ripple + 100.0 * max(load / bound - 1.0, 0.0)
+            def bounded(point: Array, bound: float = bound) -> float:
+                excess = max(line_load(point) / bound - 1.0, 0.0)
+                return ripple(point) + 100.0 * excess
 
-            run(
-                bounded,
-                _spread(seen, POPULATION * N_VARIABLES // 2),
-                number,
-                math.ceil(BETWEEN * generations),
-            )
+            start = _spread(seen, POPULATION * N_VARIABLES // 2)
+            run(bounded, start, number, fewer)
         points = _spread(seen, n_front)
-    found = [judge(system, unpacked(point, system), cases) for point in points]
-    return _not_beaten(found)
+    optima = [judge(system, unpacked(point, system), cases) for point in points]
+    return _not_dominated(optima)
 
 
 def _spread(seen: Mapping[bytes, tuple[float, float]], n_points: int) -> list[Array]:
-    """Points of all that were tried that no other beats, at most so many, spread evenly over the
-    front's length.
-    """
+    """At most ``n_points`` non-dominated points, spread evenly over the length of the front."""
     order = sorted(seen, key=lambda key: seen[key])
     front = [order[0]]
     for key in order:
@@ -194,7 +177,7 @@ def _spread(seen: Mapping[bytes, tuple[float, float]], n_points: int) -> list[Ar
     along = np.append(0.0, np.cumsum(np.hypot(*(np.diff(value, axis=0) / size).T)))
     wanted = np.linspace(0.0, along[-1], n_points)
     chosen = np.unique(np.abs(along[:, None] - wanted).argmin(axis=0))
-    return [np.frombuffer(front[place]) for place in chosen.tolist()]
+    return [np.frombuffer(front[index]) for index in chosen.tolist()]
 
 
 def _minimum(
@@ -204,15 +187,12 @@ def _minimum(
     seed: int,
     generations: int,
 ) -> Array:
-    """Best point of the unit box, (variable,), from a random population that holds the given
-    ones.
-    """
+    """Best point of the unit box, (variable,), from a random population with given points."""
     from scipy.optimize import differential_evolution
     from scipy.stats import qmc
 
-    population = qmc.LatinHypercube(
-        N_VARIABLES, rng=np.random.default_rng(seed)
-    ).random(POPULATION * N_VARIABLES)
+    sampler = qmc.LatinHypercube(N_VARIABLES, rng=np.random.default_rng(seed))
+    population = sampler.random(POPULATION * N_VARIABLES)
     population[: len(start)] = start
     result = differential_evolution(
         objective,
@@ -234,9 +214,9 @@ def unpacked(point: Array, system: SlicedPair) -> PairModification:
     for tip, tip_height, root, root_height in (point[:4], point[4:8]):
         sides.append(
             FlankModification(
-                tip_relief=depth * tip if tip_height > 0.0 else 0.0,
+                tip_relief=depth * tip * (tip_height > 0.0),
                 tip_relief_height=height * tip_height,
-                root_relief=depth * root if root_height > 0.0 else 0.0,
+                root_relief=depth * root * (root_height > 0.0),
                 root_relief_height=height * root_height,
             )
         )
@@ -244,23 +224,14 @@ def unpacked(point: Array, system: SlicedPair) -> PairModification:
     return PairModification(pinion=crowned, wheel=sides[1])
 
 
-def _plain() -> PairModification:
-    return PairModification(pinion=FlankModification(), wheel=FlankModification())
+def _not_dominated(optima: Sequence[Optimum]) -> list[Optimum]:
+    """The optima for which no other is as good in both values and better in one.
 
-
-def _not_beaten(found: Sequence[Optimum]) -> list[Optimum]:
-    """Those that no other is at least as good as in both and better in one, by rising ripple."""
-    kept = [
-        one
-        for one in found
-        if not any(
-            other.ripple <= one.ripple
-            and other.line_load <= one.line_load
-            and (other.ripple, other.line_load) != (one.ripple, one.line_load)
-            for other in found
-        )
-    ]
-    return sorted(
-        {(one.ripple, one.line_load): one for one in kept}.values(),
-        key=lambda one: one.ripple,
-    )
+    By rising ripple, without duplicates.
+    """
+    by_values = {(optimum.ripple, optimum.line_load): optimum for optimum in optima}
+    front: list[Optimum] = []
+    for _, optimum in sorted(by_values.items(), key=lambda item: item[0]):
+        if not front or optimum.line_load < front[-1].line_load:
+            front.append(optimum)
+    return front

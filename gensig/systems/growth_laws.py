@@ -1,6 +1,6 @@
-"""Laws of growth of a machine's gears.
+"""Laws of growth of cracks and pits on a machine's gears.
 
-Of a spur mesh by its one pair in contact, of slices by their own loads.
+Of a spur mesh by its single pair in contact, of slices by the load of each.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from gensig.systems.sliced_pair import SlicedPair
 
 Array = NDArray[np.float64]
 
-N_TORQUES = 3  # how slices share the load hangs little on the torque
+N_TORQUES = 3  # the shares of slices depend little on the torque
 
 
 def crack_law(
@@ -36,7 +36,7 @@ def crack_law(
 ) -> CrackGrowth:
     """The law of a crack like ``crack``.
 
-    ``torques`` in N m are the least and the greatest that it meets.
+    ``torques`` in N m are the least and the greatest of the life.
     """
     if not isinstance(machine, HelicalPair):
         return _spur_crack_law(machine.pair, machine.material, crack, options)
@@ -56,20 +56,15 @@ def pit_law(
     """
     if not isinstance(machine, HelicalPair):
         return pit_growth(machine.pair, machine.material, pits, options, first)
-    looked = _between(torques)
-    stress = _stresses(
-        _for_lives(machine.flanks), tuple(looked.tolist()), options.exponent
-    )
-    return pit_growth(
-        machine.pair, machine.material, pits, options, first, (looked, stress)
-    )
+    between = _between(torques)
+    flanks = _for_lives(machine.flanks)
+    stress = _stresses(flanks, tuple(between.tolist()), options.exponent)
+    table = between, stress
+    return pit_growth(machine.pair, machine.material, pits, options, first, table)
 
 
 def _for_lives(flanks: SlicedPair) -> SlicedPair:
-    """The pair as laws of growth take it.
-
-    Contact on its path only, like the spur laws, and calibrated cracks.
-    """
+    """The pair for laws of growth: contact on its path only, and calibrated cracks."""
     mesh = replace(
         flanks.mesh, law="paper", crack="calibrated", allow_extrapolation=True
     )
@@ -78,11 +73,9 @@ def _for_lives(flanks: SlicedPair) -> SlicedPair:
 
 def _between(torques: tuple[float, float]) -> Array:
     least, greatest = torques
-    return (
-        np.array([least])
-        if least == greatest
-        else np.geomspace(least, greatest, N_TORQUES)
-    )
+    if least == greatest:
+        return np.array([least])
+    return np.geomspace(least, greatest, N_TORQUES)
 
 
 @lru_cache(maxsize=32)
@@ -102,10 +95,9 @@ def _sliced_crack_law(
     options: CrackGrowthOptions,
     torques: tuple[float, float],
 ) -> CrackGrowth:
-    mesh_of = flanks.sliced_mesh
-    looked = _between(torques)
+    mesh_of, between = flanks.sliced_mesh, _between(torques)
     return sliced_crack_growth(
-        flanks.pair, flanks.material, mesh_of, crack, options, looked
+        flanks.pair, flanks.material, mesh_of, crack, options, between
     )
 
 

@@ -1,7 +1,4 @@
-"""A helical gear pair on its bearings.
-
-The slices of its flanks, its records, and both from one configuration.
-"""
+"""A helical gear pair on its bearings: slices of its flanks, and records."""
 
 from __future__ import annotations
 
@@ -23,18 +20,17 @@ from gensig.systems.stiffness_curves import StiffnessCurves
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HelicalPair(GearPairMachine):
-    """One machine whose teeth are cut into slices; with no helix it is a spur pair that also
-    moves along its axes.
+    """A machine whose teeth are cut into slices.
 
-    ``flanks`` is the same pair at rest, for its transmission error, load over the flanks and
-    stiffness.
+    Without a helix it is a spur pair that also moves along its axes. ``flanks`` is the same pair
+    at rest, for transmission error, load over the flanks and stiffness.
     """
 
     flanks: SlicedPair
 
     @property
     def gear_channels(self) -> tuple[str, ...]:
-        """Both gears also move along their axes and tilt."""
+        """Motions of both gears, also along their axes, and tilts."""
         return (*PAIR_DOFS, *AXIAL_DOFS)
 
     def mesh_table(self, faults: Sequence[Fault] = ()) -> SlicedTable:
@@ -50,23 +46,25 @@ class HelicalPair(GearPairMachine):
     ) -> StiffnessCurves:
         """Raise ConfigError: these curves are of whole teeth, and a helical pair has slices."""
         raise ConfigError(
-            "stiffness_curves are those of system=spur_pair; a helical pair has its stiffness slice by slice: "
-            "flanks.transmission_error(), or gensig stiffness system=helical_pair"
+            "stiffness_curves are those of system=spur_pair; a helical pair has its stiffness "
+            "slice by slice: flanks.transmission_error(), or gensig stiffness system=helical_pair"
         )
 
     @property
     def most_pairs(self) -> int:
-        """Pairs of teeth that may be followed at once; how many are depends on the load."""
+        """Pairs of teeth that may be followed at once."""
         return MOST_PAIRS
 
     def require_drive(self) -> None:
         """Raise unless at least one pair is always in contact, by the overlap of the face too."""
         if self.flanks.slices.slices_in_phase:
             raise ConfigError(
-                "mesh.slices_in_phase = true is for comparing statics; records have the helix in: take false"
+                "mesh.slices_in_phase = true is for comparing statics; records have the helix in: "
+                "take false"
             )
         if self.pair.total_contact_ratio < 1.0:
             raise GeometryError(
-                f"the total contact ratio {self.pair.total_contact_ratio:.4f} is below 1, so the drive is interrupted "
-                f"at every tooth; use more teeth, a wider face, a larger helix angle or a larger addendum_coefficient"
+                f"the total contact ratio {self.pair.total_contact_ratio:.4f} is below 1, so the "
+                "drive is interrupted at every tooth; use more teeth, a wider face, a larger helix "
+                "angle or a larger addendum_coefficient"
             )

@@ -1,7 +1,4 @@
-"""A sliced pair at work.
-
-How hot its gears get, what each effect of heat does to its mesh stiffness.
-"""
+"""A sliced pair at work: temperatures of its gears, and effects of heat on mesh stiffness."""
 
 from __future__ import annotations
 
@@ -29,19 +26,14 @@ from gensig.systems.sliced_pair import SlicedPair
 
 Array = NDArray[np.float64]
 
-COLD, TRUE, CONTACT_RATIO, APPARENT, SOFTENED = (
-    "cold",
-    "true",
-    "contact_ratio",
-    "apparent",
-    "softened",
-)
+COLD, TRUE, CONTACT_RATIO = "cold", "true", "contact_ratio"
+APPARENT, SOFTENED = "apparent", "softened"
 N_FLASH_POSITIONS = 60
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Duty:
-    """A cold pair, how it is heated and cooled, and the pinion's speed in rad/s."""
+    """A cold pair, its heating and cooling, and the pinion's speed in rad/s."""
 
     system: SlicedPair
     heat: Heat
@@ -50,7 +42,8 @@ class Duty:
     def __post_init__(self) -> None:
         if not self.speed > 0.0:
             raise ConfigError(
-                f"operating.speed_rpm = {self.speed * 30.0 / math.pi:g} must be positive to heat gears"
+                f"operating.speed_rpm = {self.speed * 30.0 / math.pi:g} must be positive to heat "
+                "gears"
             )
 
     @property
@@ -61,7 +54,7 @@ class Duty:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class HotState:
-    """How hot a pair is, from the loads that its cold flanks have.
+    """Temperatures of a pair, from the loads on its cold flanks.
 
     Parameters
     ----------
@@ -69,8 +62,8 @@ class HotState:
     friction_heat : W
     pinion, wheel : BodyHeat
     flash_position : (position,) m    on the path of contact, from A
-    flash : (position,) K             largest of all slices that pass there, above the teeth's temperature; corners
-        that bear beyond the path are left out
+    flash : (position,) K             largest of all slices there, above the teeth's temperature;
+        contact beyond the path is left out
     growth : PairGrowth
     """
 
@@ -85,7 +78,7 @@ class HotState:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Variant:
-    """Mesh stiffness with some effects of heat.
+    """Mesh stiffness with a choice of effects of heat.
 
     Parameters
     ----------
@@ -108,30 +101,22 @@ def hot_state(duty: Duty) -> HotState:
 
     Raises
     ------
-    ConfigError          where nothing cools a gear
+    ConfigError          for a gear without cooling
     ExtrapolationError   for temperatures beyond the material's data
     """
     system, heat = duty.system, duty.heat
     contact = loaded_contact(system.sliced_mesh(), system.phases(), system.mesh_force)
     loss = friction_heat(
-        system.pair, contact.position, contact.line_load,
-        force=system.mesh_force, friction=duty.friction, speed=duty.speed,
-    )  # fmt: skip
+        system.pair,
+        contact.position,
+        contact.line_load,
+        force=system.mesh_force,
+        friction=duty.friction,
+        speed=duty.speed,
+    )
     share, cooling = heat.pinion_heat_share, heat.at_speed(duty.speed)
-    pinion = _body(
-        system.pair.pinion,
-        share * loss,
-        cooling,
-        heat.pinion_temperature,
-        heat.pinion_bore_temperature,
-    )
-    wheel = _body(
-        system.pair.wheel,
-        (1.0 - share) * loss,
-        cooling,
-        heat.wheel_temperature,
-        heat.wheel_bore_temperature,
-    )
+    pinion = _body(system.pair.pinion, share * loss, cooling)
+    wheel = _body(system.pair.wheel, (1.0 - share) * loss, cooling)
     position, flash = _flash_along_path(duty, contact)
     return HotState(
         contact=contact,
@@ -147,104 +132,100 @@ def hot_state(duty: Duty) -> HotState:
 def heated(
     duty: Duty, state: HotState, *, growth: bool, center_distance: bool, softening: bool
 ) -> SlicedPair:
-    """The pair with the effects of heat that are asked for.
+    """The pair with chosen effects of heat.
 
-    growth : the pair grows as a whole by the strain of its base pitches, housing and shafts alike; what its gears
-        differ from that, in base pitch and between body and teeth, is a deviation of the flanks
-    center_distance : the shafts keep the distance that the housing's own temperature gives them
+    Parameters
+    ----------
+    growth : the pair grows as a whole by the strain of its base pitches, housing and shafts alike;
+        the remaining differences of its gears, in base pitch and between body and teeth, are a
+        deviation of the flanks
+    center_distance : the shafts have the distance of the housing at its own temperature
     softening : Young's modulus at the teeth's temperatures; 1 / E is the mean of both gears'
 
     Raises
     ------
-    GeometryError    where the gears grow more than the backlash lets them
+    GeometryError    for growth beyond the backlash
     """
-    system = duty.system
-    if growth or center_distance:
-        strain = state.growth.strain(system.pair)
-        housing = duty.heat.expansion * (
-            duty.heat.housing_temperature - duty.heat.reference_temperature
-        )
-        pair = _grown(system.pair, state.growth, strain) if growth else system.pair
-        if center_distance:
-            pair = _in_housing(system.pair, pair, state.growth, strain, housing)
-        system = replace(system, pair=pair, growth=state.growth if growth else None)
+    system, heat = duty.system, duty.heat
+    cold, material = system.pair, system.material
+    strain = state.growth.strain(cold)
+    if growth:
+        pair = _grown(cold, state.growth, strain)
+        system = replace(system, pair=pair, growth=state.growth)
+    elif center_distance:
+        system = replace(system, growth=None)
+    if center_distance:
+        rise = heat.housing_temperature - heat.reference_temperature
+        housing = heat.expansion * rise
+        pair = _in_housing(cold, system.pair, state.growth, strain, housing)
+        system = replace(system, pair=pair)
     if softening:
-        ratios = [
-            duty.heat.modulus_ratio(body.tooth) for body in (state.pinion, state.wheel)
-        ]
-        modulus = (
-            system.material.youngs_modulus * 2.0 / sum(1.0 / ratio for ratio in ratios)
-        )
-        system = replace(
-            system, material=replace(system.material, youngs_modulus=modulus)
-        )
+        bodies = state.pinion, state.wheel
+        compliance = sum(1.0 / heat.modulus_ratio(body.tooth) for body in bodies)
+        modulus = material.youngs_modulus * 2.0 / compliance
+        system = replace(system, material=replace(material, youngs_modulus=modulus))
     return system
 
 
 def as_configured(duty: Duty) -> SlicedPair:
-    """The pair with the effects that its ``heat`` switches on.
-
-    The pair itself where it switches none.
-    """
+    """The pair with the effects that its ``heat`` switches on; the cold pair without any."""
     heat = duty.heat
     if not heat.is_any:
         return duty.system
     return heated(
-        duty, hot_state(duty),
-        growth=heat.growth, center_distance=heat.center_distance, softening=heat.softening,
-    )  # fmt: skip
+        duty,
+        hot_state(duty),
+        growth=heat.growth,
+        center_distance=heat.center_distance,
+        softening=heat.softening,
+    )
 
 
 def stiffness_variants(duty: Duty, state: HotState) -> dict[str, Variant]:
-    """Mesh stiffness, each effect of heat for itself; effects that are switched off are left out.
+    """Mesh stiffness with each effect of heat; effects that are switched off are left out.
 
     cold : no heat
     true : the gears grow, the housing with them
     contact_ratio : the gears grow, the housing has its own temperature
-    apparent : force over approach with the thermal part in it, eq. (35) of the thermal paper: the cold approach less
-        what the teeth's growth moves the gears apart. A preload, no stiffness. Left out where the growth is larger
+    apparent : force over approach including the thermal part, eq. (35) of the thermal paper: the
+        cold approach less the distance by which the teeth's growth separates the gears. A preload,
+        not a stiffness. Left out if the growth is larger than the approach
     softened : as ``true``, with Young's modulus at temperature
     """
-    heat = duty.heat
-    found = {COLD: _variant(duty.system)}
+
+    def variant(*, center_distance: bool = False, softening: bool = False) -> Variant:
+        effects = {"center_distance": center_distance, "softening": softening}
+        return _variant(heated(duty, state, growth=duty.heat.growth, **effects))
+
+    heat, cold = duty.heat, _variant(duty.system)
+    variants = {COLD: cold}
     if heat.growth:
-        found[TRUE] = _variant(
-            heated(duty, state, growth=True, center_distance=False, softening=False)
-        )
+        variants[TRUE] = variant()
     if heat.center_distance:
-        found[CONTACT_RATIO] = _variant(
-            heated(
-                duty, state, growth=heat.growth, center_distance=True, softening=False
-            )
+        variants[CONTACT_RATIO] = variant(center_distance=True)
+    thermal = state.growth.teeth_alone(duty.system.pair)
+    if heat.growth and thermal < float(cold.approach.min()):
+        left = cold.approach - thermal
+        factor = float(cold.approach.mean() / left.mean())
+        variants[APPARENT] = replace(
+            cold,
+            approach=left,
+            mesh=duty.system.mesh_force / left,
+            single=cold.single * factor,
         )
-    if heat.growth:
-        cold, thermal = found[COLD], state.growth.teeth_alone(duty.system.pair)
-        if thermal < float(cold.approach.min()):
-            left = cold.approach - thermal
-            factor = float(cold.approach.mean() / left.mean())
-            found[APPARENT] = replace(
-                cold,
-                approach=left,
-                mesh=duty.system.mesh_force / left,
-                single=cold.single * factor,
-            )
     if heat.softening:
-        found[SOFTENED] = _variant(
-            heated(
-                duty, state, growth=heat.growth, center_distance=False, softening=True
-            )
-        )
-    return found
+        variants[SOFTENED] = variant(softening=True)
+    return variants
 
 
 def sweep(duty: Duty, name: str, values: Sequence[float]) -> list[dict[str, Variant]]:
-    """Stiffness variants over one working condition, the others kept.
+    """Stiffness variants over one working condition, the others constant.
 
     Parameters
     ----------
-    name : ``friction`` (coefficient), ``torque`` (N m, of the pinion) or ``speed`` (rad/s, of the pinion)
+    name : ``friction`` (coefficient), ``torque`` (N m) or ``speed`` (rad/s) of the pinion
     """
-    found = []
+    variants = []
     for value in values:
         if name == "friction":
             mesh = replace(duty.system.mesh, friction_coefficient=value)
@@ -257,44 +238,38 @@ def sweep(duty: Duty, name: str, values: Sequence[float]) -> list[dict[str, Vari
             raise ConfigError(
                 f"a sweep over {name!r}; allowed: friction, torque, speed"
             )
-        found.append(stiffness_variants(changed, hot_state(changed)))
-    return found
+        variants.append(stiffness_variants(changed, hot_state(changed)))
+    return variants
 
 
 def flash_skin_growth(duty: Duty, state: HotState) -> float:
-    """How far the flash temperature lifts the surface of a flank, m: an upper bound.
+    """Upper bound of the lift of a flank's surface by the flash temperature, m.
 
-    The heat of one passing contact reaches sqrt(g t / (rho c)) deep in the time t that the
-    contact's width takes to pass; that skin, held by the cold tooth around it, expands by (1 +
-    nu) / (1 - nu) times its free expansion.
+    The heat of one passing contact reaches sqrt(g t / (rho c)) deep in the time t in which the
+    contact's width passes. That skin, held by the cold tooth around it, expands by (1 + nu) /
+    (1 - nu) times its free expansion.
     """
     pair, material, heat = duty.system.pair, duty.system.material, duty.heat
     load = float(state.contact.line_load.max())
     hottest = state.flash_position[[int(np.argmax(state.flash))]]
     width = 2.0 * float(contact_half_width(pair, hottest, load, material)[0])
-    slowest = min(float(one[0]) for one in rolling_speeds(pair, hottest, duty.speed))
-    depth = math.sqrt(
-        heat.conductivity
-        * width
-        / (slowest * material.density_kg_per_m3 * heat.specific_heat)
-    )
+    slowest = min(float(v[0]) for v in rolling_speeds(pair, hottest, duty.speed))
+    capacity = slowest * material.density_kg_per_m3 * heat.specific_heat
+    depth = math.sqrt(heat.conductivity * width / capacity)
     held = (1.0 + material.poisson_ratio) / (1.0 - material.poisson_ratio)
     return held * heat.expansion * float(state.flash.max()) * depth
 
 
-def _body(
-    gear: Gear, input_heat: float, heat: Heat, known: float | None, bore: float | None
-) -> BodyHeat:
-    body = (
-        uniform_body(gear, known)
-        if known is not None
-        else solved_body(gear, input_heat, heat, bore_temperature=bore)
-    )
-    for temperature in (body.tooth, float(body.temperature[0])):
-        heat.require_known(
-            temperature,
-            f"{gear.name}: a temperature of {temperature:.4g} degrees Celsius",
-        )
+def _body(gear: Gear, input_heat: float, heat: Heat) -> BodyHeat:
+    temperature = getattr(heat, f"{gear.name}_temperature")
+    if temperature is not None:
+        body = uniform_body(gear, temperature)
+    else:
+        bore = getattr(heat, f"{gear.name}_bore_temperature")
+        body = solved_body(gear, input_heat, heat, bore_temperature=bore)
+    for value in (body.tooth, float(body.temperature[0])):
+        text = f"{gear.name}: a temperature of {value:.4g} degrees Celsius"
+        heat.require_known(value, text)
     return body
 
 
@@ -309,60 +284,59 @@ def _flash_along_path(duty: Duty, contact: LoadedContact) -> tuple[Array, Array]
     """Largest flash temperature of every stretch of the path, (position,) m and K."""
     pair = duty.system.pair
     flash = flash_temperature(
-        pair, contact.position, contact.line_load, duty.system.material, duty.heat,
-        friction=duty.friction, speed=duty.speed,
-    )  # fmt: skip
+        pair,
+        contact.position,
+        contact.line_load,
+        duty.system.material,
+        duty.heat,
+        friction=duty.friction,
+        speed=duty.speed,
+    )
     edges = np.linspace(0.0, pair.path_of_contact, N_FLASH_POSITIONS + 1)
-    place = np.searchsorted(edges, contact.position) - 1
-    inside = (place >= 0) & (place < N_FLASH_POSITIONS)
+    stretch = np.searchsorted(edges, contact.position) - 1
+    inside = (stretch >= 0) & (stretch < N_FLASH_POSITIONS)
     largest = np.zeros(N_FLASH_POSITIONS)
-    np.maximum.at(largest, place[inside], flash[inside])
+    np.maximum.at(largest, stretch[inside], flash[inside])
     return 0.5 * (edges[1:] + edges[:-1]), largest
 
 
 def _grown(pair: GearPair, growth: PairGrowth, strain: float) -> GearPair:
-    """The pair made larger by its common strain, each gear as wide as its teeth and with the bore
-    that its body has.
-    """
+    """The pair enlarged by its common strain, with the width of its teeth and the bores grown."""
+    sides = (pair.pinion, growth.pinion), (pair.wheel, growth.wheel)
     pinion, wheel = (
         replace(
             gear,
             normal_module=gear.normal_module * (1.0 + strain),
-            face_width=gear.face_width * (1.0 + own.tooth),
-            bore_radius=gear.bore_radius * (1.0 + own.body),
+            face_width=gear.face_width * (1.0 + of_gear.tooth),
+            bore_radius=gear.bore_radius * (1.0 + of_gear.body),
         )
-        for gear, own in ((pair.pinion, growth.pinion), (pair.wheel, growth.wheel))
+        for gear, of_gear in sides
     )
-    return replace(
-        pair,
-        pinion=pinion,
-        wheel=wheel,
-        center_distance_change=pair.center_distance_change,
-    )
+    change = pair.center_distance_change
+    return replace(pair, pinion=pinion, wheel=wheel, center_distance_change=change)
 
 
 def _in_housing(
     cold: GearPair, pair: GearPair, growth: PairGrowth, strain: float, housing: float
 ) -> GearPair:
-    """The pair at the shafts' distance in a housing with its own strain."""
+    """The pair at the shafts' distance of a housing with a strain of its own."""
     closing = growth.closing(cold, housing)
     if closing > cold.backlash:
         raise GeometryError(
-            f"the gears jam: heat makes them grow {closing * 1e6:.0f} um more than the housing lets them, along the "
-            f"line of action, and gear.backlash_um is {cold.backlash * 1e6:g}; raise it, cool the gears, or warm the "
-            f"housing (heat.housing_temperature_degc)"
+            f"the gears jam: heat makes them grow {closing * 1e6:.0f} um more than the housing "
+            "lets them, along the line of action, and gear.backlash_um is "
+            f"{cold.backlash * 1e6:g}; raise it, cool the gears, or warm the housing "
+            "(heat.housing_temperature_degc)"
         )
     # relative to gears that have, or have not, grown in this description
     scale = pair.pinion.normal_module / cold.pinion.normal_module
     change = cold.center_distance * scale * ((1.0 + housing) / (1.0 + strain) - 1.0)
+    backlash = cold.backlash - closing
     try:
-        return replace(
-            pair, backlash=cold.backlash - closing, center_distance_change=change
-        )
+        return replace(pair, backlash=backlash, center_distance_change=change)
     except GeometryError as error:
-        raise GeometryError(
-            f"gears grown against the housing by heat: {error}"
-        ) from None
+        text = f"gears grown against the housing by heat: {error}"
+        raise GeometryError(text) from None
 
 
 def _variant(system: SlicedPair) -> Variant:

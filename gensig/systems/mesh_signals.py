@@ -1,4 +1,4 @@
-"""The loads of the teeth as a shard takes them."""
+"""Loads of the teeth as signals of a shard."""
 
 from __future__ import annotations
 
@@ -14,12 +14,11 @@ from gensig.errors import ConfigError
 def mesh_signals(
     mesh: MeshState | None, n_samples: int, n_pairs: int
 ) -> dict[str, NDArray[Any]]:
-    """The mesh state as a shard takes it, ``n_pairs`` rows of pairs; of a failed record nothing
-    is known.
+    """Signals of a mesh state with ``n_pairs`` rows of pairs; without values for a failed record.
 
     Raises
     ------
-    ConfigError    for a machine that does not know the loads of its teeth: no pairs
+    ConfigError    for a machine without loads of its teeth: no pairs
     """
     if n_pairs == 0:
         raise ConfigError(
@@ -27,15 +26,16 @@ def mesh_signals(
             "take dataset.store_mesh_state=false"
         )
     if mesh is None:
-        nobody = np.full((n_pairs, n_samples), NO_TOOTH, dtype=np.int16)
-        return {
-            "mesh_pinion_tooth": nobody,
-            "mesh_wheel_tooth": nobody,
-            "mesh_load_share": np.full((n_pairs, n_samples), np.nan, dtype=np.float32),
-            "mesh_force": np.full(n_samples, np.nan, dtype=np.float32),
-            "contact_lost": np.zeros(n_samples, dtype=np.int8),
-            "fault_engaged": np.zeros(n_samples, dtype=np.int8),
-        }
+        teeth = np.full((n_pairs, n_samples), NO_TOOTH, dtype=np.int16)
+        unknown, no = np.full(n_samples, np.nan), np.zeros(n_samples, dtype=np.bool_)
+        mesh = MeshState(
+            pinion_tooth=teeth,
+            wheel_tooth=teeth,
+            load_share=np.full((n_pairs, n_samples), np.nan),
+            force=unknown,
+            contact_lost=no,
+            fault_engaged=no,
+        )
     free = ((0, n_pairs - len(mesh.load_share)), (0, 0))
     return {
         "mesh_pinion_tooth": np.pad(mesh.pinion_tooth, free, constant_values=NO_TOOTH),

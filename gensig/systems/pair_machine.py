@@ -1,4 +1,4 @@
-"""One gear pair that runs: its lateral and torsional motion, many records side by side."""
+"""Machines with one gear pair: lateral and torsional motion, many records side by side."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from gensig.dynamics.integrator import (
     check_memory,
     integrate,
 )
-from gensig.dynamics.mesh_state import MeshState, mesh_state
+from gensig.dynamics.mesh_state import mesh_state
 from gensig.dynamics.pair import Body, PairDynamics, Rotor
 from gensig.errors import FaultError, SimulationError
 from gensig.faults.base import Fault, faulty_teeth
@@ -38,7 +38,7 @@ from gensig.units import from_si
 Array = NDArray[np.float64]
 
 FINEST_BOUNCING = (
-    20  # steps per sample above which what bounces does not come nearer to anything
+    20  # steps per sample above which bouncing records do not converge further
 )
 PairMachine = Machine  # the name of version 0.9
 
@@ -57,7 +57,7 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearPairMachine(Machine):
-    """One gear pair with its supports, drive, motor and load; subclasses say how its teeth mesh."""
+    """One gear pair with its supports, drive, motor and load; subclasses define the mesh."""
 
     pair: GearPair = field()
     pinion: Body
@@ -68,7 +68,7 @@ class GearPairMachine(Machine):
     @property
     @abstractmethod
     def gear_channels(self) -> tuple[str, ...]:
-        """Channels of the two gears: every motion that they have."""
+        """Channels of the two gears: all of their motions."""
 
     @abstractmethod
     def require_drive(self) -> None:
@@ -126,7 +126,7 @@ class GearPairMachine(Machine):
         return np.array([torque])
 
     def driven_tooth(self, tooth_pinion: int, drawn: int) -> int:
-        """The drawn tooth: the gears are put on anew for every record."""
+        """The drawn tooth: the gears are mounted anew for every record."""
         return drawn
 
     def draw_discs(self, rng: np.random.Generator) -> tuple[Disc, ...]:
@@ -134,30 +134,23 @@ class GearPairMachine(Machine):
         return ()
 
     def check(self) -> None:
-        """Raise for what would stop every record.
-
-        Drive, fits out of range, channels, step length.
-        """
+        """Raise for errors of every record: drive, fits out of range, channels, step length."""
         self.require_drive()
         self.mesh_table()
         self.quality.check_covered(self.pair.pinion, self.pair.wheel)
         sensing, operating = self.sensing, self.operating
-        check_memory(
-            operating.duration,
-            sensing.sampling_rate,
-            len(sensing.channels),
-            self.solver,
-        )
+        n_channels, rate = len(sensing.channels), sensing.sampling_rate
+        check_memory(operating.duration, rate, n_channels, self.solver)
         nominal = pair_dynamics(Run(system=self, faults=()))
         check_channels(sensing.channels, self.channels)
         sensing.check(operating.duration)
-        check_machine(nominal, self.solver, sensing.sampling_rate)
+        check_machine(nominal, self.solver, rate)
 
     @classmethod
     def simulate_runs(
         cls, runs: Sequence[Run[Self]]
     ) -> list[CleanRecord | SimulationError]:
-        """Simulate runs, those that share rate, duration and law side by side."""
+        """Records of runs; those that share rate, duration and law are simulated side by side."""
         return simulate_pairs(runs)
 
 
@@ -176,7 +169,7 @@ def severity(faults: Sequence[Fault], pair: GearPair) -> float:
 
 
 def pair_dynamics(run: PairRun) -> PairDynamics:
-    """Equations of motion of a run with its specimen and gearbox; GeometryError for no drive."""
+    """Equations of motion of a run with its specimen and gearbox; GeometryError without a drive."""
     machine, pair = run.system, run.system.pair
     machine.require_drive()
     start = run.start or Start()
@@ -200,22 +193,21 @@ def pair_dynamics(run: PairRun) -> PairDynamics:
 
 
 def _kind(run: PairRun) -> tuple[object, ...]:
-    """Everything that runs must share to be integrated in one call."""
+    """All values that runs must share to be integrated in one call."""
     system = run.system
-    operating = system.operating
-    sensing = (
+    return (
         system.sensing.sampling_rate,
         system.sensing.channels,
-        operating.duration,
-    )
-    machine = (
+        system.operating.duration,
         type(system),
         system.motor is None,
         system.load is None,
-        operating.is_steady,
+        system.operating.is_steady,
         run.tell_mesh,
+        system.solver,
+        system.mesh.law,
+        system.mesh.roll_torque,
     )
-    return (*sensing, *machine, system.solver, system.mesh.law, system.mesh.roll_torque)
 
 
 def _finer(run: PairRun) -> PairRun:
@@ -226,72 +218,59 @@ def _finer(run: PairRun) -> PairRun:
 
 
 def simulate_pairs(runs: Sequence[PairRun]) -> list[CleanRecord | SimulationError]:
-    """Records of runs, in the order given; runs that share rate, duration and law are integrated
-    in one call.
+    """Records of runs, in the order of the runs.
 
-    The bits of a record do not depend on the other runs. A motion that does not stay finite gives
-    its error in place of its record.
+    Runs that share rate, duration and law are integrated in one call. The bits of a record do not
+    depend on the other runs. A motion that does not stay finite gives its error in place of its
+    record.
     """
-    found: dict[int, CleanRecord | SimulationError] = {}
+    results: dict[int, CleanRecord | SimulationError] = {}
     machines: dict[int, PairDynamics] = {}
     kinds: dict[tuple[object, ...], list[int]] = {}
-    for place, run in enumerate(runs):
+    for index, run in enumerate(runs):
         system = run.system
         try:
-            machines[place] = pair_dynamics(run)
-            check_machine(machines[place], system.solver, system.sensing.sampling_rate)
+            machines[index] = pair_dynamics(run)
+            check_machine(machines[index], system.solver, system.sensing.sampling_rate)
         except SimulationError as error:
-            found[place] = error
+            results[index] = error
         else:
-            kinds.setdefault(_kind(run), []).append(place)
-    for places in kinds.values():
-        records = _side_by_side(
-            [runs[place] for place in places], [machines[place] for place in places]
-        )
-        found.update(zip(places, records, strict=True))
-    coarse = [
-        place for place, record in found.items() if _is_too_coarse(runs[place], record)
-    ]
+            kinds.setdefault(_kind(run), []).append(index)
+    for kind in kinds.values():
+        records = _side_by_side([runs[i] for i in kind], [machines[i] for i in kind])
+        results.update(zip(kind, records, strict=True))
+    coarse = [i for i, record in results.items() if _is_too_coarse(runs[i], record)]
     if coarse:
-        found.update(
-            zip(
-                coarse,
-                simulate_pairs([_finer(runs[place]) for place in coarse]),
-                strict=True,
-            )
-        )
-    return [found[place] for place in range(len(runs))]
+        finer = simulate_pairs([_finer(runs[i]) for i in coarse])
+        results.update(zip(coarse, finer, strict=True))
+    return [results[index] for index in range(len(runs))]
 
 
 def _is_too_coarse(run: PairRun, record: CleanRecord | SimulationError) -> bool:
     if isinstance(record, SimulationError) or record.integration_check != "unresolved":
         return False
-    finest = FINEST_BOUNCING if record.contact_loss_fraction > BOUNCING else FINEST
+    finest = FINEST
+    if record.contact_loss_fraction > BOUNCING:
+        finest = FINEST_BOUNCING
     return 2 * run.system.solver.oversampling <= finest
 
 
 def _checks(
     motions: Motions, solver: Solver, sampling_rate: float
 ) -> tuple[Array, list[str]]:
-    """Relative error in the band of every motion, and its meaning."""
-    exact, kept = motions.check, motions.finite
+    """Relative error in the band of every motion, and the result of its check."""
+    exact, finite = motions.check, motions.finite
     errors = np.full(len(exact), np.nan)
     if solver.max_error is None:
         return errors, ["none"] * len(exact)
-    found = motions.acceleration[:, :, : exact.shape[2]]
-    errors[kept] = in_band_error(found[kept], exact[kept], sampling_rate)
-    checks = [
-        "error" if error <= solver.max_error else "unresolved" for error in errors
-    ]
-    for index, check in enumerate(checks):
-        if (
-            check == "unresolved"
-            and kept[index]
-            and motions.contact_loss_fraction[index] > BOUNCING
-        ):
-            one = slice(index, index + 1)
-            if agreement(found[one], exact[one], sampling_rate).agrees[0]:
-                checks[index] = "levels"
+    signal = motions.acceleration[:, :, : exact.shape[2]]
+    errors[finite] = in_band_error(signal[finite], exact[finite], sampling_rate)
+    checks = np.where(errors <= solver.max_error, "error", "unresolved").tolist()
+    bouncing = motions.contact_loss_fraction > BOUNCING
+    for index in np.flatnonzero(finite & bouncing & ~(errors <= solver.max_error)):
+        row = slice(index, index + 1)
+        if agreement(signal[row], exact[row], sampling_rate).agrees[0]:
+            checks[index] = "levels"
     return errors, checks
 
 
@@ -299,45 +278,46 @@ def _side_by_side(
     runs: Sequence[PairRun], machines: Sequence[PairDynamics]
 ) -> list[CleanRecord | SimulationError]:
     system = runs[0].system
+    rate = system.sensing.sampling_rate
     motions = integrate(
         machines,
         system.solver,
-        sampling_rate=system.sensing.sampling_rate,
+        sampling_rate=rate,
         duration=system.operating.duration,
         channels=system.sensing.channels,
         tell_mesh=runs[0].tell_mesh,
     )
-    errors, checks = _checks(motions, system.solver, system.sensing.sampling_rate)
+    errors, checks = _checks(motions, system.solver, rate)
     records: list[CleanRecord | SimulationError] = []
     for index, run in enumerate(runs):
-        gain = 1.0 if run.gearbox is None else run.gearbox.gain[:, None]
-        operating = run.system.operating
-        if motions.finite[index]:
-            records.append(
-                CleanRecord(
-                    acceleration=motions.acceleration[index] * gain,
-                    shaft_angle=motions.shaft_angle[index],
-                    mean_speed=float(motions.mean_speed[index]),
-                    contact_loss_fraction=float(motions.contact_loss_fraction[index]),
-                    integration_error=float(errors[index]),
-                    integration_check=checks[index],
-                    mesh=_mesh_state(run, machines[index], motions, index)
-                    if run.tell_mesh
-                    else None,
-                )
+        if not motions.finite[index]:
+            records.append(_not_finite(run))
+            continue
+        acceleration, angle = motions.acceleration[index], motions.shaft_angle[index]
+        if run.gearbox is not None:
+            acceleration = acceleration * run.gearbox.gain[:, None]
+        mesh = None
+        if run.tell_mesh:
+            faulty = faulty_teeth(run.system.pair, run.faults)
+            mesh = mesh_state(machines[index], motions.seen[index], angle, faulty)
+        records.append(
+            CleanRecord(
+                acceleration=acceleration,
+                shaft_angle=angle,
+                mean_speed=float(motions.mean_speed[index]),
+                contact_loss_fraction=float(motions.contact_loss_fraction[index]),
+                integration_error=float(errors[index]),
+                integration_check=checks[index],
+                mesh=mesh,
             )
-        else:
-            records.append(
-                SimulationError(
-                    f"the motion stopped being finite (speed {from_si('speed_rpm', operating.speed):g} r/min, torque "
-                    f"{operating.torque:g} N m); raise solver.oversampling above {system.solver.oversampling}"
-                )
-            )
+        )
     return records
 
 
-def _mesh_state(
-    run: PairRun, dynamics: PairDynamics, motions: Motions, index: int
-) -> MeshState:
-    faulty = faulty_teeth(run.system.pair, run.faults)
-    return mesh_state(dynamics, motions.seen[index], motions.shaft_angle[index], faulty)
+def _not_finite(run: PairRun) -> SimulationError:
+    operating = run.system.operating
+    return SimulationError(
+        f"the motion stopped being finite (speed {from_si('speed_rpm', operating.speed):g} "
+        f"r/min, torque {operating.torque:g} N m); raise solver.oversampling above "
+        f"{run.system.solver.oversampling}"
+    )

@@ -1,4 +1,4 @@
-"""Systems by the name that configurations use, each built from one resolved configuration."""
+"""Systems by their names in configurations, each built from one resolved configuration."""
 
 from __future__ import annotations
 
@@ -51,18 +51,20 @@ def read_spur_pair(config: Configuration) -> SpurPair:
     gear = config.section("gear")
     if _number("gear.helix_angle_deg", gear["helix_angle_deg"]) != 0.0:
         raise ConfigError(
-            f"gear.helix_angle_deg = {gear['helix_angle_deg']:g}: system=spur_pair takes spur gears, 0; helical ones "
-            f"have system=helical_pair"
+            f"gear.helix_angle_deg = {gear['helix_angle_deg']:g}: system=spur_pair takes spur "
+            "gears, 0; helical ones have system=helical_pair"
         )
     if read_heat(config).is_any:
         raise ConfigError(
-            "heat: system=spur_pair has gears as they are drawn; system=helical_pair takes heat, and spur gears too"
+            "heat: system=spur_pair has gears as they are drawn; system=helical_pair takes heat, "
+            "and spur gears too"
         )
     pair = read_pair(config)
     machine = _read_machine(config, pair)
     if modification.is_any and machine["mesh"].law == "paper":
         raise ConfigError(
-            "modification opens gaps, which mesh.law=paper does not know: take mesh.law=one_sided"
+            "modification opens gaps, which mesh.law=paper does not know: take "
+            "mesh.law=one_sided"
         )
     sound_teeth(pair, modification)  # raises for reliefs that overlap
     return SpurPair(pair=pair, modification=modification, **machine)
@@ -80,30 +82,26 @@ def read_helical_pair(config: Configuration) -> HelicalPair:
 
 
 def _read_machine(config: Configuration, pair: GearPair) -> dict[str, Any]:
-    """What a pair's machine has whatever its teeth, by the fields of ``GearPairMachine``."""
+    """Common fields of the machines of spur and helical pairs, by the names of the fields."""
     material = read_material(config)
-    sides = {name: config.section("gear", name) for name in SIDES}
     machine = config.section("system")
     for key in machine:
         if key not in SYSTEM_KEYS:
-            raise ConfigError(
-                f"system: unknown key '{key}'; known: {', '.join(SYSTEM_KEYS)}"
-            )
-    gears = pair.gears
-    operating, quality = (
-        read_operating(config.section("operating")),
-        read(Quality, config.section("quality"), "quality"),
-    )
-    bodies = {name: _read_body(gears[name], sides[name], material) for name in SIDES}
-    held = {name: read_holding(gears[name], sides[name]) for name in SIDES}
+            known = ", ".join(SYSTEM_KEYS)
+            raise ConfigError(f"system: unknown key '{key}'; known: {known}")
+    operating = read_operating(config.section("operating"))
+    quality = read(Quality, config.section("quality"), "quality")
+    bodies, holdings = {}, {}
+    for name, gear in pair.gears.items():
+        side = config.section("gear", name)
+        bodies[name] = _read_body(gear, side, material)
+        holdings[name] = read_holding(gear, side)
     if on_bearings(machine.get("supports", AS_GIVEN), quality):
         force = operating.torque / pair.pinion.base_radius
-        bodies = {
-            name: put_on_bearings(
-                bodies[name], gears[name], held[name], material, force
+        for name, gear in pair.gears.items():
+            bodies[name] = put_on_bearings(
+                bodies[name], gear, holdings[name], material, force
             )
-            for name in SIDES
-        }
     return {
         "material": material,
         "mesh": read_mesh_options(config.section("mesh")),
@@ -118,21 +116,24 @@ def _read_machine(config: Configuration, pair: GearPair) -> dict[str, Any]:
 
 
 def read_sliced_pair(config: Configuration) -> SlicedPair:
-    """Build a spur or helical pair cut into slices from the boundary keys of a configuration,
-    whatever its system; as hot as its ``heat`` makes it."""
+    """Build a spur or helical pair cut into slices, of any system of pairs.
+
+    The pair has the effects of heat of the configuration.
+    """
     _refuse_line(config)
-    heat = read_heat(config)
-    return as_configured(read_duty(config)) if heat.is_any else read_cold_pair(config)
+    if read_heat(config).is_any:
+        return as_configured(read_duty(config))
+    return read_cold_pair(config)
 
 
 def read_duty(config: Configuration) -> Duty:
-    """The cold pair of a configuration with what heats and cools it."""
+    """The cold pair of a configuration with its heating and cooling."""
     speed = _number("operating.speed_rpm", config.section("operating")["speed_rpm"])
     return Duty(system=read_cold_pair(config), heat=read_heat(config), speed=speed)
 
 
 def read_cold_pair(config: Configuration) -> SlicedPair:
-    """The same pair as it is drawn."""
+    """The sliced pair of a configuration without heat."""
     mesh = config.section("mesh")
     return SlicedPair(
         pair=read_pair(config),
@@ -145,7 +146,7 @@ def read_cold_pair(config: Configuration) -> SlicedPair:
 
 
 def read_pair(config: Configuration) -> GearPair:
-    """The two gears of a configuration; a wheel has the opposite hand unless it says otherwise."""
+    """The two gears of a configuration; by default the wheel has the opposite hand."""
     gear = config.section("gear")
     helix = _number("gear.helix_angle_deg", gear["helix_angle_deg"])
     pinion, wheel = (
@@ -162,41 +163,31 @@ def read_pair(config: Configuration) -> GearPair:
 def read_material(config: Configuration) -> Material:
     """The material of a configuration."""
     material = read(Material, config.section("material"), "material")
-    if material.poisson_ratio >= 0.5:
-        raise ConfigError(
-            f"material.poisson_ratio = {material.poisson_ratio:g} must be below 0.5"
-        )
+    ratio = material.poisson_ratio
+    if ratio >= 0.5:
+        raise ConfigError(f"material.poisson_ratio = {ratio:g} must be below 0.5")
     return material
 
 
 def read_heat(config: Configuration) -> Heat:
-    """Which effects of heat a configuration has, and what they take."""
+    """Effects of heat of a configuration, and their parameters."""
     return read(Heat, config.section("heat"), "heat")
 
 
 def read_modification(config: Configuration) -> PairModification:
-    """What is ground off the flanks of a configuration's gears."""
+    """Flank modifications of a configuration's gears."""
     sides = {}
     for name in SIDES:
         try:
-            sides[name] = read(
-                FlankModification,
-                config.section("modification", name),
-                f"modification.{name}",
-            )
+            side = config.section("modification", name)
+            sides[name] = read(FlankModification, side, f"modification.{name}")
         except ConfigError as error:
             text = str(error)
-            raise ConfigError(
-                text
-                if text.startswith("modification")
-                else f"modification.{name}.{text}"
-            ) from None
-    own = {
-        key: value
-        for key, value in config.section("modification").items()
-        if key not in SIDES
-    }
-    return read(PairModification, own, "modification", **sides)
+            if not text.startswith("modification"):
+                text = f"modification.{name}.{text}"
+            raise ConfigError(text) from None
+    common = config.section("modification").without(*SIDES)
+    return read(PairModification, common, "modification", **sides)
 
 
 SYSTEMS: dict[str, Callable[[Configuration], GearPairMachine]] = {
@@ -210,77 +201,70 @@ def read_system(config: Configuration) -> GearPairMachine:
 
     Raises
     ------
-    ConfigError, GeometryError    for keys or values that make no machine
+    ConfigError, GeometryError    for invalid keys or values
     """
     kind = config.section("system").get("kind")
     _refuse_line(config)
     if config.get("excitation") is not None:
         raise ConfigError(
-            f"excitation turns a drive line (system=engine_gear_train, gensig forced-response); system={kind} turns "
-            "as operating says, leave excitation out"
+            "excitation turns a drive line (system=engine_gear_train, gensig forced-response); "
+            f"system={kind} turns as operating says, leave excitation out"
         )
     if kind not in SYSTEMS:
-        raise ConfigError(
-            f"system.kind = {kind!r}; allowed: {', '.join((*SYSTEMS, LINE))}"
-        )
+        allowed = ", ".join((*SYSTEMS, LINE))
+        raise ConfigError(f"system.kind = {kind!r}; allowed: {allowed}")
     return SYSTEMS[kind](config)
 
 
 def _refuse_line(config: Configuration) -> None:
-    """Raise for a drive line where a single pair is wanted."""
+    """Raise ConfigError for a drive line."""
     machine = config.section("system")
     if machine.get("kind") == LINE:
         raise ConfigError(
-            f"system={machine.get('name')} is a drive line from tables, for gensig modes, forced-response, stiffness, "
-            f"simulate, generate; this is done with system={', '.join(SYSTEMS)}"
+            f"system={machine.get('name')} is a drive line from tables, for gensig modes, "
+            "forced-response, stiffness, simulate, generate; this is done with "
+            f"system={', '.join(SYSTEMS)}"
         )
 
 
 def _read_gear(name: str, gear: Section, helix_angle: float) -> Gear:
-    own = gear.section(name).without(*BODY_KEYS)
-    given = {} if "helix_angle_deg" in own else {"helix_angle": helix_angle}
-    return read(
-        Gear,
-        {**{key: gear[key] for key in COMMON_GEAR_KEYS}, **own},
-        f"gear.{name}",
-        name=name,
-        **given,
-    )
+    side = gear.section(name).without(*BODY_KEYS)
+    values = {**{key: gear[key] for key in COMMON_GEAR_KEYS}, **side}
+    if "helix_angle_deg" in side:
+        return read(Gear, values, f"gear.{name}", name=name)
+    return read(Gear, values, f"gear.{name}", name=name, helix_angle=helix_angle)
 
 
 def _read_body(gear: Gear, values: Section, material: Material) -> Body:
-    """Mass and inertia as given, or those of a solid disc on the pitch circle less the bore where
-    null.
+    """Mass, inertia and support of a gear.
+
+    Mass and inertia that are null are those of a solid disc on the pitch circle less the bore.
     """
-    derived = solid_disc(
-        gear.pitch_radius, gear.bore_radius, gear.face_width, material.density_kg_per_m3
-    )
-    given = [values["mass_kg"], values["inertia_kg_m2"]]
-    mass, inertia = (
-        fallback if value is None else _number(f"gear.{gear.name}.{key}", value)
-        for value, fallback, key in zip(
-            given, derived, ("mass_kg", "inertia_kg_m2"), strict=True
-        )
-    )
-    for key, value in (("mass_kg", mass), ("inertia_kg_m2", inertia)):
+    place, density = f"gear.{gear.name}", material.density_kg_per_m3
+    disc = solid_disc(gear.pitch_radius, gear.bore_radius, gear.face_width, density)
+    inertias = dict(zip(("mass_kg", "inertia_kg_m2"), disc, strict=True))
+    for key in inertias:
+        if values[key] is not None:
+            inertias[key] = _number(f"{place}.{key}", values[key])
+    for key, value in inertias.items():
         if not value > 0.0:
             raise ConfigError(
-                f"gear.{gear.name}.{key} = {value:g} must be positive, or null to derive it"
+                f"{place}.{key} = {value:g} must be positive, or null to derive it"
             )
-    given_support = {
-        key: value
-        for key, value in values.section("support").items()
-        if value is not None
-    }
-    support = read(Support, given_support, f"gear.{gear.name}.support")
-    return Body(mass=mass, inertia=inertia, support=support)
+    support = values.section("support")
+    nulls = [key for key, value in support.items() if value is None]
+    return Body(
+        mass=inertias["mass_kg"],
+        inertia=inertias["inertia_kg_m2"],
+        support=read(Support, support.without(*nulls), f"{place}.support"),
+    )
 
 
 def _read_rotor(place: str, values: Any) -> Rotor | None:
-    """A motor or a load; None where it is null, or its inertia."""
-    if values is None or (
-        isinstance(values, Mapping) and values.get("inertia_kg_m2", 0.0) is None
-    ):
+    """A motor or a load; None if it is null, or its inertia."""
+    if values is None:
+        return None
+    if isinstance(values, Mapping) and values.get("inertia_kg_m2", 0.0) is None:
         return None
     try:
         return read(Rotor, values, "rotor")

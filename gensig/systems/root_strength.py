@@ -1,6 +1,6 @@
-"""Root stress of a gear pair.
+"""Root stress of a gear pair: at ISO's load point, and through the mesh.
 
-At ISO's load point, and through the mesh under the loads that its flanks share.
+Through the mesh the loads are those that the flanks share.
 """
 
 from __future__ import annotations
@@ -34,8 +34,10 @@ from gensig.units import read
 Array = NDArray[np.float64]
 
 N_PHASES = 200  # of one mesh period
-EDGE = 1e-9  # base pitches from where a pair enters or leaves to the phases beside it
-WIDEST = 64.0  # times the force at ISO's load point: the search for the force over the mesh goes no further
+EDGE = 1e-9  # base pitches between entry or exit of a pair and the added phases
+WIDEST = (
+    64.0  # largest force of the search over the mesh, over that at ISO's load point
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -54,9 +56,7 @@ class RootHistory:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearStress:
-    """Nominal stress sigma_F0 and sigma_F with the load factors in Pa, every factor, and the
-    safety of one gear.
-    """
+    """Nominal stress sigma_F0, sigma_F with load factors in Pa, factors and safety of one gear."""
 
     factors: RootFactors
     nominal: float
@@ -68,8 +68,8 @@ class GearStress:
 class RootStrength:
     """A pair with sound teeth, its strength and the torque on its pinion in N m.
 
-    ``sliced`` says that the face is cut into slices: helical pairs, and spur ones with modified
-    flanks.
+    ``sliced`` is True where the face is cut into slices: helical pairs, and spur pairs with
+    modified flanks.
     """
 
     flanks: SlicedPair
@@ -104,37 +104,29 @@ class RootStrength:
         return max(self.factors, key=lambda name: self.factors[name].stress_per_force)
 
     def force_for(self, stress: float) -> float:
-        """Tangential force F_t in N that gives the decisive gear this sigma_F in Pa, load factors
-        included.
-        """
+        """Tangential force F_t in N for a sigma_F in Pa of the decisive gear, with load factors."""
         if not (math.isfinite(stress) and stress > 0.0):
             raise ConfigError(
                 f"a root stress of {stress * 1e-6:g} MPa cannot be asked for; give a positive one"
             )
-        return stress / (
-            self.factors[self.decisive].stress_per_force * self.strength.load_factor
-        )
+        per_force = self.factors[self.decisive].stress_per_force
+        return stress / (per_force * self.strength.load_factor)
 
     def under(self, stress: float) -> RootStrength:
-        """The same pair under the torque that gives the decisive gear this sigma_F in Pa."""
-        torque = self.force_for(stress) * self.pair.pinion.pitch_radius
+        """The same pair with the torque for a sigma_F in Pa of the decisive gear."""
+        return self._with_force(self.force_for(stress))
+
+    def _with_force(self, force: float) -> RootStrength:
+        torque = force * self.pair.pinion.pitch_radius
         return replace(self, flanks=replace(self.flanks, torque=torque))
 
     def force_over_mesh_for(self, stress: float) -> float:
-        """Tangential force F_t in N under which the largest stress over the mesh, of either gear,
-        is ``stress`` Pa.
-        """
+        """Tangential force F_t in N for a largest stress of ``stress`` Pa over the mesh."""
         from scipy.optimize import brentq
 
-        radius = self.pair.pinion.pitch_radius
-
         def excess(force: float) -> float:
-            loaded = replace(self, flanks=replace(self.flanks, torque=force * radius))
-            return (
-                max(float(values.max()) for values in loaded.history().stress.values())
-                / stress
-                - 1.0
-            )
+            stresses = self._with_force(force).history().stress.values()
+            return max(float(values.max()) for values in stresses) / stress - 1.0
 
         low = high = self.force_for(stress)
         while excess(low) > 0.0:
@@ -143,22 +135,26 @@ class RootStrength:
             high *= 2.0
             if high > WIDEST * low:
                 raise ConfigError(
-                    f"no force gives {stress * 1e-6:g} MPa through this mesh: at {high:.4g} N it is less; ask for less"
+                    f"no force gives {stress * 1e-6:g} MPa through this mesh: at {high:.4g} N it "
+                    "is less; ask for less"
                 )
-        return float(brentq(excess, low, high, rtol=1e-6)) if high > low else low
+        if high == low:
+            return low
+        return float(brentq(excess, low, high, rtol=1e-6))
 
     def gears(self) -> dict[str, GearStress]:
         """Stress and safety of both gears at the load point of ``strength``, by name."""
         force = self.tangential_force
         if not force > 0.0:
             raise ConfigError(
-                f"operating.torque_nm = {self.flanks.torque:g} must be positive: the pinion drives; or give --stress"
+                f"operating.torque_nm = {self.flanks.torque:g} must be positive: the pinion "
+                "drives; or give --stress"
             )
-        found = {}
+        stresses = {}
         for name, factors in self.factors.items():
             nominal = force * factors.stress_per_force
             stress = nominal * self.strength.load_factor
-            found[name] = GearStress(
+            stresses[name] = GearStress(
                 factors=factors,
                 nominal=nominal,
                 stress=stress,
@@ -169,25 +165,22 @@ class RootStrength:
                     normal_module=self.pair.pinion.normal_module,
                 ),
             )
-        return found
+        return stresses
 
     def history(self, *, n_phases: int = N_PHASES) -> RootHistory:
-        """Root stress through the mesh under the static loads of the flanks, K_A, K_gamma and K_v
-        in the force.
+        """Root stress through the mesh under the static loads of the flanks.
 
-        Of the face and transverse load factors it knows nothing: the loads that the mesh finds
-        are in their place.
+        The force includes K_A, K_gamma and K_v. The computed loads replace the face and transverse
+        load factors.
         """
         force = self.flanks.mesh_force * self.strength.force_factor
         pitch = self.pair.base_pitch
-        ends = np.array(
-            [0.0, self.pair.path_of_contact % pitch]
-        )  # where a pair enters or leaves, and a jump may be
+        # the load may jump where a pair enters or leaves
+        ends = np.array([0.0, self.pair.path_of_contact % pitch])
         near = (ends[:, None] + pitch * EDGE * np.array([-1.0, 1.0])).ravel() % pitch
         phases = np.sort(np.concatenate([self.flanks.phases(n_phases), near]))
-        roll, share, stress = (
-            self._sliced(phases, force) if self.sliced else self._whole(phases, force)
-        )
+        loads = self._sliced if self.sliced else self._whole
+        roll, share, stress = loads(phases, force)
         order = np.argsort(roll)
         roll, share = roll[order], share[order]
         bears = np.flatnonzero(share > 0.0)
@@ -201,61 +194,46 @@ class RootStrength:
     def _whole(
         self, phases: Array, force: float
     ) -> tuple[Array, Array, dict[str, Array]]:
-        """Pairs of a spur pair as wholes.
-
-        Roll, share of the load and stress by gear, (point,) each.
-        """
-        mesh = self.flanks.mesh
-        flanks = self.flanks
+        """Roll, share of the load and stress by gear, (point,) each, of whole spur teeth."""
+        pair, flanks, mesh = self.pair, self.flanks, self.flanks.mesh
         table = loaded_pair_table(
-            self.pair,
-            flanks.material,
-            mesh,
-            force=force,
-            modification=flanks.modification,
+            pair, flanks.material, mesh, force=force, modification=flanks.modification
         )
         states = pair_states(table, phases)
-        load = static_mesh(table, states, force).load
-        stress = {
-            name: pair_root_stress(
-                self.pair,
-                gear,
-                states.position,
-                load,
-                allow_extrapolation=mesh.allow_extrapolation,
+        position, load = states.position, static_mesh(table, states, force).load
+        allowed, stress = mesh.allow_extrapolation, {}
+        for name, gear in pair.gears.items():
+            stress[name] = pair_root_stress(
+                pair, gear, position, load, allow_extrapolation=allowed
             ).ravel()
-            for name, gear in self.pair.gears.items()
-        }
-        return states.position.ravel(), load.ravel() / force, stress
+        return position.ravel(), load.ravel() / force, stress
 
     def _sliced(
         self, phases: Array, force: float
     ) -> tuple[Array, Array, dict[str, Array]]:
-        """The same slice by slice, the largest of the face.
+        """The same slice by slice, with the largest stress of the face.
 
         Slices bend each other as in the mesh.
         """
         mesh, pair, slices = self.flanks.sliced_mesh(), self.pair, self.flanks.slices
         contact = loaded_contact(mesh, phases, force)
-        roll = contact.position[:, :, 0] + mesh.lag[0]
-        structure = np.interp(contact.position, mesh.position, mesh.structure)
-        coupled = slices.slice_coupling == "coupled"
-        length = slices.coupling_modules * pair.pinion.normal_module
-        coupling = (length / float(mesh.slice_width[0])) ** 2 if coupled else 0.0
-        stress = {}
+        position = contact.position
+        roll = position[:, :, 0] + mesh.lag[0]
+        structure = np.interp(position, mesh.position, mesh.structure)
+        coupling = 0.0
+        if slices.slice_coupling == "coupled":
+            length = slices.coupling_modules * pair.pinion.normal_module
+            coupling = (length / float(mesh.slice_width[0])) ** 2
+        allowed, stress = self.flanks.mesh.allow_extrapolation, {}
         for name, gear in pair.gears.items():
             factor = stress_factor_on_path(
-                pair,
-                gear,
-                contact.position,
-                allow_extrapolation=self.flanks.mesh.allow_extrapolation,
+                pair, gear, position, allow_extrapolation=allowed
             )
             tangential = contact.line_load * math.cos(gear.transverse_pressure_angle)
             common = pair.face_width / root_width(pair, gear)
-            own = tangential * common * factor / gear.normal_module
-            stress[name] = (
-                spread_along_face(own, structure, coupling).max(axis=2).ravel()
-            )
+            of_slice = tangential * common * factor / gear.normal_module
+            spread = spread_along_face(of_slice, structure, coupling)
+            stress[name] = spread.max(axis=2).ravel()
         share = (contact.line_load * mesh.slice_width).sum(axis=2)
         return roll.ravel(), (share / share.sum(axis=1, keepdims=True)).ravel(), stress
 
@@ -265,11 +243,11 @@ def read_root_strength(config: Configuration) -> RootStrength:
 
     Raises
     ------
-    ConfigError, GeometryError    for keys or values that make no machine or no strength
+    ConfigError, GeometryError    for invalid keys or values
     """
     sliced = config.section("system").get("kind") == SLICED
     if not sliced:
-        read_system(config)  # refuses what a spur pair cannot have
+        read_system(config)  # raises for values that a spur pair cannot have
     flanks = read_sliced_pair(config)
     return RootStrength(
         flanks=flanks,

@@ -1,4 +1,4 @@
-"""One record of a machine: what is asked for, and the clean record that the simulation gives."""
+"""Input and result of one simulation: a run of a machine, and its clean record."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ class Start:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run(Generic[MachineT_co]):
-    """One record to be simulated; what is None is perfect, nominal, and starts with teeth 0 at A.
+    """One record to be simulated.
 
-    ``tell_mesh`` asks for the loads of the teeth at every sample. ``discs`` are the toothed wheels
-    of a drive line.
+    None means a perfect specimen, a nominal gearbox, a start with teeth 0 at A. ``tell_mesh`` asks
+    for the loads of the teeth at every sample. ``discs`` are the toothed wheels of a drive line.
     """
 
     system: MachineT_co
@@ -67,7 +67,7 @@ class CleanRecord:
     shaft_angle : (sample,) rad    of the pinion, from its nominal place at the first sample on
     mean_speed : rad/s
     integration_check : one of ``CHECKS``
-    mesh : loads of the teeth, where the run asks for them
+    mesh : loads of the teeth, if the run asks for them
     """
 
     acceleration: Array

@@ -1,4 +1,4 @@
-"""What sensors on the gears' shafts see: the gears' angles, counted from their own tooth 0."""
+"""Signals of sensors on the gears' shafts; angles are counted from tooth 0 of each gear."""
 
 from __future__ import annotations
 
@@ -23,11 +23,10 @@ SWITCHES = {
 
 
 def gear_angle(system: Machine, shaft: str, start: Start, shaft_angle: Array) -> Array:
-    """Angle of a gear in its own sense of rotation, 0 where its tooth 0 enters contact, (sample,)
-    rad.
+    """Angle of a gear in its sense of rotation, 0 where its tooth 0 enters contact, (sample,) rad.
 
-    The wheel's is that of the pinion over the ratio: its lag under load and its own vibration are
-    left out.
+    The wheel's is that of the pinion over the ratio: its lag under load and its vibration are left
+    out.
 
     Parameters
     ----------
@@ -51,32 +50,29 @@ def shaft_signals(
     Parameters
     ----------
     names : signals that are stored, of the values of ``SWITCHES``
-    gearbox_rng : where mark and disc sit, and the disc's errors
-    record_rng : the jitter
+    gearbox_rng : for the angles of mark and disc, and the disc's errors
+    record_rng : for the jitter
     """
     sensing = system.sensing
     n_samples = round(system.operating.duration * sensing.sampling_rate)
     if record is None or not names:
         return {name: np.full(n_samples, np.nan).astype(_type(name)) for name in names}
-    mark = draw_mark(
-        gearbox_rng
-    )  # also where it is not asked for: what is stored moves nothing
-    found = {"shaft_angle": record.shaft_angle}
+    # drawn in any case: the choice of stored signals must not change other draws
+    mark = draw_mark(gearbox_rng)
+    signals = {"shaft_angle": record.shaft_angle}
     if "tacho" in names:
         angle = gear_angle(system, sensing.tacho.shaft, start, record.shaft_angle)
-        found["tacho"] = pulse_train(
-            sensing.tacho, mark, angle, sensing.sampling_rate, record_rng
-        )
+        rate = sensing.sampling_rate
+        signals["tacho"] = pulse_train(sensing.tacho, mark, angle, rate, record_rng)
     if "encoder_angle" in names:
         angle = gear_angle(system, sensing.encoder.shaft, start, record.shaft_angle)
         disc = draw_disc(gearbox_rng, sensing.encoder)
-        before = (
-            2.0 * math.pi * math.floor((angle[0] - disc.index) / (2.0 * math.pi))
-        )  # turns that nobody counted
-        found["encoder_angle"] = disc.read(
-            angle - before, quantised=sensing.encoder.quantised
-        )
-    return {name: found[name].astype(_type(name)) for name in names}
+        # whole turns before the record are not counted
+        n_turns = math.floor((angle[0] - disc.index) / (2.0 * math.pi))
+        angle = angle - 2.0 * math.pi * n_turns
+        quantised = sensing.encoder.quantised
+        signals["encoder_angle"] = disc.read(angle, quantised=quantised)
+    return {name: signals[name].astype(_type(name)) for name in names}
 
 
 def _type(name: str) -> type[np.floating[Any]]:

@@ -1,7 +1,4 @@
-"""A spur or helical pair at rest.
-
-What its loaded flanks do over one mesh period, slice by slice.
-"""
+"""A spur or helical pair at rest: loaded flanks over one mesh period, slice by slice."""
 
 from __future__ import annotations
 
@@ -36,19 +33,21 @@ Array = NDArray[np.float64]
 
 N_PHASES = 64  # per mesh period
 N_HARMONICS = 10
-SOUND_PERIODS = 2  # told on either side of a fault
+SOUND_PERIODS = 2  # shown on either side of a fault
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TransmissionError:
-    """Static transmission error under load and what goes with it, over one mesh period, or as
-    many as see a fault.
+    """Static transmission error under load, loads and pressures.
+
+    Over one mesh period, or over all periods in which a fault is in contact.
 
     Parameters
     ----------
-    contact : LoadedContact          64 phases a period, equally spaced; the first faulty teeth enter at roll 0
+    contact : LoadedContact          64 phases a period, equally spaced; the first faulty teeth
+        enter at roll 0
     n_periods : mesh periods
-    odd_pairs : numbers of the first and the last pair with a tooth unlike the others; None without any
+    odd_pairs : numbers of the first and the last pair with a tooth unlike the others, or None
     slice_edges : (slice + 1,) m     from the end that enters first
     slice_place : (slice,) m         middles
     error : (phase,) m               approach along the transverse line of action
@@ -74,7 +73,7 @@ class TransmissionError:
 class SlicedPair:
     """A gear pair with sound teeth, its flank modification, and the pinion's torque in N m.
 
-    ``growth`` is what heat does to flanks beyond growing the pair as a whole, see
+    ``growth`` is the deviation of flanks by heat, beyond the growth of the pair as a whole, see
     ``gensig.systems.hot_pair``.
     """
 
@@ -93,68 +92,55 @@ class SlicedPair:
 
     def sliced_mesh(self, faults: Sequence[Fault] = ()) -> SlicedMesh:
         """The pair cut into slices, modified flanks and faulty teeth included."""
-        teeth = faulty_teeth(self.pair, faults)
-        return sliced_mesh(
-            self.pair,
-            self.material,
-            self.mesh,
-            self.slices,
-            deviation=self.deviation(),
-            teeth=teeth,
-        )
+        options = self.material, self.mesh, self.slices
+        deviation, teeth = self.deviation(), faulty_teeth(self.pair, faults)
+        return sliced_mesh(self.pair, *options, deviation=deviation, teeth=teeth)
 
     def deviation(self) -> Array | None:
-        """How far all flanks stand back at the table's positions, (slice, node) m.
-
-        None for perfect ones.
-        """
+        """Recess of all flanks at the table's positions, (slice, node) m; None for perfect ones."""
         if not self.modification.is_any and self.growth is None:
             return None
-        position, place = (
-            node_positions(self.pair, self.mesh),
-            slice_places(self.pair, self.slices),
-        )
-        back = np.zeros((len(place), len(position)))
+        position = node_positions(self.pair, self.mesh)
+        middles = slice_places(self.pair, self.slices)
+        back = np.zeros((len(middles), len(position)))
         if self.modification.is_any:
-            back = back + self.modification.deviation(self.pair, position, place)
-        return (
-            back
-            if self.growth is None
-            else back + self.growth.deviation(self.pair, position)
-        )
+            back = back + self.modification.deviation(self.pair, position, middles)
+        if self.growth is not None:
+            back = back + self.growth.deviation(self.pair, position)
+        return back
 
     def mesh_table(self, faults: Sequence[Fault] = ()) -> SlicedTable:
-        """What the dynamics asks of the mesh with the given faults."""
+        """Chord table of the mesh with the given faults."""
         return _mesh_table(self, tuple(faults))
 
     def phases(
         self, n_phases: int = N_PHASES, *, first_period: int = 0, n_periods: int = 1
     ) -> Array:
         """Rolls of equally spaced phases of mesh periods, (phase,) m; ``n_phases`` to each."""
-        return self.pair.base_pitch * (
-            first_period + (np.arange(n_periods * n_phases) + 0.5) / n_phases
-        )
+        shares = (np.arange(n_periods * n_phases) + 0.5) / n_phases
+        return self.pair.base_pitch * (first_period + shares)
 
     def transmission_error(
         self, faults: Sequence[Fault] = (), *, n_phases: int = N_PHASES
     ) -> TransmissionError:
-        """Loaded contact over one mesh period, or over all in which a fault is seen and two sound
-        ones on either side.
+        """Loaded contact over one mesh period.
 
-        The first faulty tooth of either gear meets that of the other, or a sound one.
+        With faults, over all periods in which one is in contact, and two sound ones on either
+        side. The first faulty tooth of either gear meets that of the other, or a sound one.
 
         Raises
         ------
-        ConfigError, GeometryError    for a torque that does not drive, or flanks that nothing brings into contact
+        ConfigError, GeometryError    for a torque that does not drive, or flanks out of contact
         """
         mesh = self.sliced_mesh(faults)
         first_period, n_periods, meeting, odd_pairs = _seen(mesh)
         roll = self.phases(n_phases, first_period=first_period, n_periods=n_periods)
         contact = loaded_contact(mesh, roll, self.mesh_force, meeting)
         load = (contact.line_load * mesh.slice_width).sum(axis=2)
-        on_path = (contact.position >= 0.0) & (
-            contact.position <= self.pair.path_of_contact
-        )
+        position = contact.position
+        on_path = (position >= 0.0) & (position <= self.pair.path_of_contact)
+        loaded = on_path & (contact.line_load > 0.0)
+        bearing = (mesh.slice_width * loaded).sum() / (mesh.slice_width * on_path).sum()
         spectrum = 2.0 * np.abs(np.fft.rfft(contact.approach)) / len(roll)
         return TransmissionError(
             contact=contact,
@@ -163,46 +149,39 @@ class SlicedPair:
             slice_edges=mesh.edges,
             slice_place=mesh.slice_place,
             error=contact.approach,
-            harmonics=spectrum[n_periods :: n_periods][:N_HARMONICS],
+            harmonics=spectrum[n_periods::n_periods][:N_HARMONICS],
             pressure=contact_pressure(mesh, contact, self.material),
             load_share=load / load.sum(axis=1, keepdims=True),
-            bearing=float((mesh.slice_width * (on_path & (contact.line_load > 0.0))).sum()
-                          / (mesh.slice_width * on_path).sum()),
-        )  # fmt: skip
+            bearing=float(bearing),
+        )
 
     def single_pair(self, n_positions: int = 401) -> tuple[Array, Array]:
-        """Stiffness of one pair from its first touch to its last.
+        """Positions s of the first slice in m, and stiffness of one pair there, N/m.
 
-        Positions s of the first slice in m, and N/m.
+        From the first touch of the pair to its last.
         """
         mesh = self.sliced_mesh()
-        position = np.linspace(
-            0.0, self.pair.path_of_contact + float(mesh.lag.max()), n_positions
-        )
+        last = self.pair.path_of_contact + float(mesh.lag.max())
+        position = np.linspace(0.0, last, n_positions)
         return position, single_pair_stiffness(mesh, position, self.mesh_force)
 
     def faulty_pair(self, faults: Sequence[Fault], position: Array) -> Array:
-        """The same at given positions for the first faulty teeth, slices that the set torque
-        closes, (phase,) N/m.
+        """Stiffness of the pair of the first faulty teeth at given positions, (phase,) N/m.
+
+        Of the slices that the set torque brings into contact.
         """
-        mesh, sound = self.sliced_mesh(faults), self.sliced_mesh()
-        within = float(
-            loaded_contact(sound, self.phases(), self.mesh_force).approach.mean()
-        )
+        mesh, force = self.sliced_mesh(faults), self.mesh_force
+        sound = loaded_contact(self.sliced_mesh(), self.phases(), force)
         pinion, wheel = (
-            int(side.kind[side.kind > 0][0]) if side.kind.any() else 0
+            int(next((kind for kind in side.kind if kind > 0), 0))
             for side in (mesh.pinion, mesh.wheel)
         )
-        closed = within - mesh.shared_compliance * self.mesh_force
-        return single_pair_stiffness(
-            mesh, position, self.mesh_force, (pinion, wheel), closed
-        )
+        closed = float(sound.approach.mean()) - mesh.shared_compliance * force
+        return single_pair_stiffness(mesh, position, force, (pinion, wheel), closed)
 
 
 def _seen(mesh: SlicedMesh) -> tuple[int, int, Meeting, tuple[int, int] | None]:
-    """First mesh period and number of those that show what is unlike in the teeth, what meets,
-    and the odd pairs.
-    """
+    """First mesh period, number of periods, meeting teeth, and odd pairs."""
     start, span, turn = [0, 0], -1, 0
     for gear, side in enumerate((mesh.pinion, mesh.wheel)):
         count = np.bincount(side.kind)

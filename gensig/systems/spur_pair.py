@@ -8,11 +8,13 @@ from functools import lru_cache
 from typing import final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gensig.dynamics.pair import PAIR_DOFS
 from gensig.errors import GeometryError
 from gensig.faults.base import Fault, faulty_teeth
 from gensig.geometry.contact import GearPair
+from gensig.geometry.gear import Gear
 from gensig.material import Material
 from gensig.mesh.load_distribution import loaded_pair_table
 from gensig.mesh.modification import (
@@ -30,6 +32,8 @@ from gensig.systems.stiffness_curves import (
     stiffness_curves,
 )
 
+Array = NDArray[np.float64]
+
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,12 +44,12 @@ class SpurPair(GearPairMachine):
 
     @property
     def gear_channels(self) -> tuple[str, ...]:
-        """Both gears move across and along the line of action and turn."""
+        """Motions of both gears across and along the line of action, and rotations."""
         return PAIR_DOFS
 
     @property
     def most_pairs(self) -> int:
-        """Pairs of teeth that the table covers at once."""
+        """Pairs of teeth that are followed at once."""
         return N_PAIRS
 
     def require_drive(self) -> None:
@@ -54,14 +58,8 @@ class SpurPair(GearPairMachine):
 
     def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable:
         """Compliance and gap tables with the given faults."""
-        return _mesh_table(
-            self.pair,
-            self.material,
-            self.mesh,
-            tuple(faults),
-            self.mesh_force,
-            self.modification,
-        )
+        machine = self.pair, self.material, self.mesh
+        return _mesh_table(*machine, tuple(faults), self.mesh_force, self.modification)
 
     def stiffness_curves(
         self,
@@ -70,33 +68,26 @@ class SpurPair(GearPairMachine):
         n_positions: int = 201,
         points_per_tooth: int = 100,
     ) -> StiffnessCurves:
-        """Single-pair and mesh stiffness with their parts.
-
-        Contact ratios below 1 are allowed, nothing need turn.
-        """
-        table, whole = (
-            self.mesh_table(faults),
-            sound_teeth(self.pair, self.modification),
-        )
+        """Single-pair and mesh stiffness with their parts; contact ratios below 1 are allowed."""
         return stiffness_curves(
             self,
-            table,
+            self.mesh_table(faults),
             faults,
-            whole,
+            sound_teeth(self.pair, self.modification),
             n_positions=n_positions,
             points_per_tooth=points_per_tooth,
         )
 
     def long_relief(self) -> PairModification:
-        """Linear tip reliefs that make up for the deflection under the set torque, of teeth as cut.
+        """Linear tip reliefs that compensate the deflection of unmodified teeth at the set torque.
 
-        From the tips down to where a pair begins to carry alone (point B of the wheel, D of the
-        pinion), as deep as the pair deflects there less the body's part, which the next pair
-        shares.
+        From the tips down to the begin of single-pair contact (point B of the wheel, D of the
+        pinion), as deep as the deflection of the pair there less the body's part, which the next
+        pair shares.
 
         Raises
         ------
-        GeometryError    for a contact ratio outside 1..2: no pair, or none but one, ever carries alone
+        GeometryError    for a contact ratio outside 1..2: without single-pair contact
 
         Source: Welbourn's rule as in Lin, Oswald & Townsend (1989), see
         ``docs/theory/spur_mesh.md``; the shared part is ours.
@@ -104,27 +95,29 @@ class SpurPair(GearPairMachine):
         pair = self.pair
         if not 1.0 <= pair.transverse_contact_ratio < 2.0:
             raise GeometryError(
-                f"the transverse contact ratio {pair.transverse_contact_ratio:.4f} lies outside 1..2, where a pair "
-                f"carries alone for a while: that is where these reliefs begin"
+                f"the transverse contact ratio {pair.transverse_contact_ratio:.4f} lies outside "
+                "1..2, where a pair carries alone for a while: that is where these reliefs begin"
             )
         alone = np.array([pair.base_pitch, pair.path_of_contact - pair.base_pitch])
         plain = replace(self, modification=PLAIN)
         shared = plain.mesh_table().shared_compliance
         sound = single_pair(plain, alone, (), sound_teeth(pair, PLAIN))
         depth = self.mesh_force * (1.0 / sound.stiffness - shared)
-        starts = (
-            (pair.pinion, pair.pinion_curvature(alone[0])),
-            (pair.wheel, pair.wheel_curvature(alone[1])),
+        pinion_start = pair.pinion_curvature(alone[0])
+        wheel_start = pair.wheel_curvature(alone[1])
+        return PairModification(
+            pinion=_tip_relief(pair.pinion, depth[0], pinion_start),
+            wheel=_tip_relief(pair.wheel, depth[1], wheel_start),
         )
-        pinion, wheel = (
-            FlankModification(
-                tip_relief=float(back),
-                tip_relief_height=gear.tip_radius
-                - float(np.hypot(gear.base_radius, curvature)),
-            )
-            for (gear, curvature), back in zip(starts, depth, strict=True)
-        )
-        return PairModification(pinion=pinion, wheel=wheel)
+
+
+def _tip_relief(
+    gear: Gear, depth: float, curvature: Array | float
+) -> FlankModification:
+    """Tip relief from a curvature radius in m up."""
+    start_radius = float(np.hypot(gear.base_radius, curvature))
+    height = gear.tip_radius - start_radius
+    return FlankModification(tip_relief=float(depth), tip_relief_height=height)
 
 
 @lru_cache(maxsize=32)

@@ -1,7 +1,4 @@
-"""Quasi-static curves of one mesh of spur teeth.
-
-Of a pair, or of the mesh of a drive line that records follow.
-"""
+"""Quasi-static stiffness curves of one mesh of spur teeth, of a pair or a drive line."""
 
 from __future__ import annotations
 
@@ -29,10 +26,7 @@ Array = NDArray[np.float64]
 
 
 class LoadedMesh(Protocol):
-    """A mesh under a set torque.
-
-    Geometry, material, mesh options, and the force along the line of action in N.
-    """
+    """A mesh under a set torque: geometry, material, mesh options and normal force in N."""
 
     @property
     def pair(self) -> GearPair:
@@ -53,13 +47,12 @@ class LoadedMesh(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StiffnessCurves:
-    """Quasi-static mesh of one pair.
+    """Quasi-static mesh of one pair. SI units, angles in rad.
 
-    Per contact position (from A, base pitches): stiffness of a single pair that carries the whole
-    load, sound and (where a tooth is faulty) faulty, how much later the faulty one touches, and
-    the compliance terms by gear. The faulty pair is that of the first faulty tooth of either
-    gear. Per roll angle of the faulted gear (pinion when sound): mesh stiffness as the tangent
-    dF/d(approach) under the set torque. SI units, angles in rad.
+    By contact position (from A, base pitches): stiffness of a single pair under the whole load,
+    sound and (with faults) faulty, gap of the faulty pair, and the compliance terms by gear. The
+    faulty pair is that of the first faulty tooth of either gear. By roll angle of the faulty gear
+    (pinion when sound): mesh stiffness as the tangent dF/d(approach) under the set torque.
     """
 
     contact_position: Array
@@ -76,7 +69,7 @@ class StiffnessCurves:
 class SinglePair:
     """One pair under the whole load.
 
-    Compliance terms by gear in m/N, gap in m, 1 where it has flank to touch.
+    Compliance terms by gear in m/N, gap in m, ``touches`` 1 where both teeth have flanks.
     """
 
     terms: dict[str, dict[str, Array]]
@@ -86,9 +79,8 @@ class SinglePair:
     @property
     def stiffness(self) -> Array:
         """Force over deflection from first touch, 0 where nothing touches, (phase,) N/m."""
-        return self.touches / np.sum(
-            [values for gear in self.terms.values() for values in gear.values()], axis=0
-        )
+        terms = [values for gear in self.terms.values() for values in gear.values()]
+        return self.touches / np.sum(terms, axis=0)
 
 
 def stiffness_curves(
@@ -100,33 +92,32 @@ def stiffness_curves(
     n_positions: int,
     points_per_tooth: int,
 ) -> StiffnessCurves:
-    """Single-pair and mesh stiffness with their parts; contact ratios below 1 are allowed,
-    nothing need turn.
+    """Single-pair and mesh stiffness with their parts; contact ratios below 1 are allowed.
 
     ``whole`` are the sound teeth by gear, as designed.
     """
     pair = machine.pair
     position = np.linspace(0.0, pair.path_of_contact, n_positions)
-    sound, faulty = (
-        single_pair(machine, position, some, whole) for some in ((), faults)
-    )
-    gear = pair.gears[faults[0].gear] if faults else pair.pinion
-    roll = (
-        pair.base_pitch
-        * (np.arange(gear.n_teeth * points_per_tooth) + 0.5)
-        / points_per_tooth
-    )
+    sound = single_pair(machine, position, (), whole)
+    gear, faulty = pair.pinion, sound
+    faulty_stiffness = faulty_gap = None
+    if faults:
+        gear = pair.gears[faults[0].gear]
+        faulty = single_pair(machine, position, faults, whole)
+        faulty_stiffness, faulty_gap = faulty.stiffness, faulty.gap
+    points = np.arange(gear.n_teeth * points_per_tooth) + 0.5
+    roll = pair.base_pitch * points / points_per_tooth
     static = static_mesh(table, pair_states(table, roll), machine.mesh_force)
+    total = np.maximum(static.load.sum(axis=1, keepdims=True), 1e-30)
     return StiffnessCurves(
         contact_position=position / pair.base_pitch,
         single_pair_stiffness=sound.stiffness,
-        faulty_pair_stiffness=faulty.stiffness if faults else None,
-        faulty_pair_gap=faulty.gap if faults else None,
+        faulty_pair_stiffness=faulty_stiffness,
+        faulty_pair_gap=faulty_gap,
         compliance=faulty.terms,
         roll_angle=roll / gear.base_radius,
         mesh_stiffness=static.stiffness,
-        load_share=static.load
-        / np.maximum(static.load.sum(axis=1, keepdims=True), 1e-30),
+        load_share=static.load / total,
     )
 
 
@@ -136,38 +127,30 @@ def single_pair(
     faults: Sequence[Fault],
     whole: Mapping[str, Tooth],
 ) -> SinglePair:
-    """The pair of each gear's first faulty tooth, sound where there is none, under the whole load.
+    """The pair of each gear's first faulty tooth, or of a sound one, under the whole load.
 
-    Half of the contact term of sound flanks belongs to either gear, what a fault adds to it to
-    the faulty one.
+    Half of the contact term of sound flanks belongs to either gear. An increase by a fault belongs
+    to the faulty gear.
     """
-    odd = faulty_teeth(machine.pair, faults, whole)
-    structure = machine.material.in_plane(machine.mesh.elasticity)
-    sides = flank_sides(
-        machine.pair,
-        position,
-        machine.material,
-        machine.mesh,
-        machine.mesh_force,
-        pinion_share=0.5,
-    )
-    bending = slice_bending(machine.pair, position, machine.material, machine.mesh)
+    pair, material, mesh = machine.pair, machine.material, machine.mesh
+    odd = faulty_teeth(pair, faults, whole)
+    structure = material.in_plane(mesh.elasticity)
+    force = machine.mesh_force
+    sides = flank_sides(pair, position, material, mesh, force, pinion_share=0.5)
+    bending = slice_bending(pair, position, material, mesh)
     terms, gap, touches = {}, np.zeros_like(position), np.ones_like(position)
     for name, side in sides.items():
         mine = {number: tooth for (gear, number), tooth in odd.items() if gear == name}
-        named = [
-            fault.first_tooth
-            for fault in faults
-            if fault.gear == name and fault.first_tooth in mine
-        ]
-        tooth = mine[named[0] if named else min(mine)] if mine else whole[name]
+        firsts = [fault.first_tooth for fault in faults if fault.gear == name]
+        named = [number for number in firsts if number in mine]
+        tooth = whole[name]
+        if mine:
+            tooth = mine[(named or sorted(mine))[0]]
         tip = tooth.tip_curvature_radius
-        own_gap, contact = side.contact(tooth, bending, machine.mesh)
+        tooth_gap, contact = side.contact(tooth, bending, mesh)
         curvature = np.minimum(side.curvature, tip)
-        terms[name] = {
-            **structural_terms(tooth, curvature, structure, machine.mesh),
-            "contact": contact,
-        }
-        gap += own_gap
+        structural = structural_terms(tooth, curvature, structure, mesh)
+        terms[name] = {**structural, "contact": contact}
+        gap += tooth_gap
         touches[(side.curvature > tip + 1e-12) | (not tooth.present)] = 0.0
     return SinglePair(terms=terms, gap=gap, touches=touches)

@@ -1,6 +1,6 @@
-"""What holds a gear: supports as given, or stiffness from its bearings and shaft.
+"""Supports of gears: as given, or with stiffness from bearings and shaft.
 
-Damping as given, or from a ratio.
+Damping is as given, or from a ratio.
 """
 
 from __future__ import annotations
@@ -22,47 +22,44 @@ from gensig.units import from_si, read, to_si
 
 AS_GIVEN = "as_given"
 KINDS = (AS_GIVEN, "bearings")
-AXIAL_SHARE = 0.5  # assumed: axial over radial stiffness of a gear between rolling bearings, one of which locates
-KEYS_OF_AXIS = {
-    "stiffness_z": "stiffness_z_n_per_m",
-    "stiffness_tilt": "stiffness_tilt_nm_per_rad",
-    "damping_z": "damping_z_ns_per_m",
-    "damping_tilt": "damping_tilt_nms_per_rad",
-}
+# assumed: axial over radial stiffness of a gear between rolling bearings, one of which locates
+AXIAL_SHARE = 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Holding:
-    """Shaft of a gear and the bearing at either end of it; None where they are not known."""
+    """Shaft of a gear and the bearing at either end of it; None if not known."""
 
     bearing: BallBearing | None
     shaft: Shaft | None
 
 
 def read_holding(gear: Gear, values: Section) -> Holding:
-    """Bearing and shaft of the boundary keys of one gear; a shaft whose diameter is null fills
-    the bore.
+    """Bearing and shaft of the boundary keys of one gear.
+
+    A shaft whose diameter is null fills the bore.
 
     Raises
     ------
-    ConfigError    for sizes that make none
+    ConfigError    for impossible sizes
     """
     bearing, shaft = values.get("bearing"), values.get("shaft")
     if isinstance(shaft, Mapping) and shaft.get("diameter_mm", 0.0) is None:
         shaft = {**shaft, "diameter_mm": from_si("diameter_mm", 2.0 * gear.bore_radius)}
     try:
-        return Holding(
-            bearing=None if bearing is None else read(BallBearing, bearing, "bearing"),
-            shaft=None if shaft is None else read(Shaft, shaft, "shaft"),
-        )
+        if bearing is not None:
+            bearing = read(BallBearing, bearing, "bearing")
+        if shaft is not None:
+            shaft = read(Shaft, shaft, "shaft")
+        return Holding(bearing=bearing, shaft=shaft)
     except ConfigError as error:
         raise ConfigError(f"gear.{gear.name}.{error}") from None
 
 
 def on_bearings(kind: Any, quality: Quality) -> bool:
-    """Whether ``system.supports`` asks for stiffness from bearings.
+    """True if ``system.supports`` asks for stiffness from bearings.
 
-    ConfigError for what cannot be used.
+    ConfigError for an unknown kind, and for bearings without damping ratios.
     """
     if kind not in KINDS:
         raise ConfigError(f"system.supports = {kind!r}; allowed: {', '.join(KINDS)}")
@@ -70,8 +67,9 @@ def on_bearings(kind: Any, quality: Quality) -> bool:
         return False
     if quality.support_damping_ratio is None:
         raise ConfigError(
-            "system.supports = bearings says nothing of damping; give quality.support_damping_ratio_low and "
-            "support_damping_ratio_high, for instance 0.01 and 0.1"
+            "system.supports = bearings says nothing of damping; give "
+            "quality.support_damping_ratio_low and support_damping_ratio_high, for instance 0.01 "
+            "and 0.1"
         )
     return True
 
@@ -79,21 +77,23 @@ def on_bearings(kind: Any, quality: Quality) -> bool:
 def put_on_bearings(
     body: Body, gear: Gear, holding: Holding, material: Material, force: float
 ) -> Body:
-    """The gear held by its shaft and bearings under the static mesh ``force`` in N; its damping
-    is left to a ratio.
+    """The gear on its shaft and bearings under the static mesh ``force`` in N.
 
-    Along the axis and against tilting it is held as given: radial contact says nothing of that.
+    Damping is left to a ratio. Axial and tilt stiffness are as given: radial contact does not
+    determine them.
 
     Raises
     ------
-    ConfigError    where bearing or shaft are not known
+    ConfigError    if bearing or shaft are not known
     """
-    if holding.bearing is None or holding.shaft is None:
-        key = "bearing" if holding.bearing is None else "shaft"
-        raise ConfigError(
-            f"gear.{gear.name}.{key} = null: system.supports = bearings needs its sizes; give them, or take "
-            "system.supports=as_given"
-        )
+    for key in ("bearing", "shaft"):
+        if getattr(holding, key) is None:
+            raise ConfigError(
+                f"gear.{gear.name}.{key} = null: system.supports = bearings needs its sizes; give "
+                "them, or take system.supports=as_given"
+            )
+    assert holding.bearing is not None
+    assert holding.shaft is not None
     across, along = support_stiffness(holding.bearing, holding.shaft, material, force)
     held = replace(
         body.support,
@@ -106,74 +106,58 @@ def put_on_bearings(
 
 
 def held_axially(body: Body, gear: Gear, values: Section) -> Body:
-    """A gear that also moves along its axis and tilts; what its source does not say of that
-    follows from the rest.
+    """A gear that also moves along its axis and tilts.
 
-    Tilting is held by half of the mean radial stiffness at either end of ``shaft.span_mm``, k
-    span^2 / 4, the axis by ``AXIAL_SHARE`` of it, and dampers are to radial ones as springs are.
-    A uniform disc of the gear's mass, inertia and face width tilts with J / 2 + m b^2 / 12.
+    Keys that are null are derived. Half of the mean radial stiffness at either end of
+    ``shaft.span_mm`` gives the tilt stiffness k span^2 / 4; the axial stiffness is ``AXIAL_SHARE``
+    of it. Dampers have the ratio of damping to stiffness of the radial ones. A uniform disc of
+    the gear's mass, inertia and face width has the tilt inertia J / 2 + m b^2 / 12.
 
     Raises
     ------
-    ConfigError    where no support and no shaft says how the gear is held
+    ConfigError    if neither support nor shaft determine the stiffness
     """
     given, support = values["support"], body.support
-    radial, damping = (
-        0.5 * (support.stiffness_x + support.stiffness_y),
-        0.5 * (support.damping_x + support.damping_y),
-    )
+    radial = 0.5 * (support.stiffness_x + support.stiffness_y)
+    damping = 0.5 * (support.damping_x + support.damping_y)
     if not radial > 0.0:
         raise ConfigError(
-            f"gear.{gear.name}.support: a helical pair needs a radial stiffness above 0 on its bearings"
+            f"gear.{gear.name}.support: a helical pair needs a radial stiffness above 0 on its "
+            "bearings"
         )
-    derived = {"stiffness_z": AXIAL_SHARE * radial}
+    if given.get("stiffness_z_n_per_m") is None:
+        support = replace(support, stiffness_z=AXIAL_SHARE * radial)
     if given.get("stiffness_tilt_nm_per_rad") is None:
         shaft = values.get("shaft")
         if not isinstance(shaft, Mapping):
             raise ConfigError(
-                f"gear.{gear.name}.support.stiffness_tilt_nm_per_rad = null is derived from shaft.span_mm; give either"
+                f"gear.{gear.name}.support.stiffness_tilt_nm_per_rad = null is derived from "
+                "shaft.span_mm; give either"
             )
-        derived["stiffness_tilt"] = (
-            0.25 * radial * to_si("span_mm", shaft["span_mm"]) ** 2
-        )
-    springs = {
-        "stiffness_z": support.stiffness_z,
-        "stiffness_tilt": support.stiffness_tilt,
-    }
-    springs |= {
-        name: value
-        for name, value in derived.items()
-        if given.get(KEYS_OF_AXIS[name]) is None
-    }
-    dampers = {
-        name: getattr(support, name)
-        if given.get(KEYS_OF_AXIS[name]) is not None
-        else springs[name.replace("damping", "stiffness")] * damping / radial
-        for name in ("damping_z", "damping_tilt")
-    }
-    tilting = 0.5 * body.inertia + body.mass * gear.face_width**2 / 12.0
-    return replace(
-        body, support=replace(support, **springs, **dampers), tilt_inertia=tilting
-    )
+        tilt = 0.25 * radial * to_si("span_mm", shaft["span_mm"]) ** 2
+        support = replace(support, stiffness_tilt=tilt)
+    if given.get("damping_z_ns_per_m") is None:
+        axial = support.stiffness_z * damping / radial
+        support = replace(support, damping_z=axial)
+    if given.get("damping_tilt_nms_per_rad") is None:
+        tilt = support.stiffness_tilt * damping / radial
+        support = replace(support, damping_tilt=tilt)
+    tilt_inertia = 0.5 * body.inertia + body.mass * gear.face_width**2 / 12.0
+    return replace(body, support=support, tilt_inertia=tilt_inertia)
 
 
 def in_gearbox(body: Body, gearbox: Gearbox, axes: slice, quality: Quality) -> Body:
-    """A gear on its support in one gearbox; ``axes`` are the two places of its x and y among the
-    four supports.
+    """A gear on its support in one gearbox.
 
-    Stiffness scatters about what it is, along the axis and in tilting as the mean of both radial
-    ones. So does damping, unless ``quality`` has a range of damping ratios: then the ratio is the
-    gearbox's, and without one the middle of the range.
+    ``axes`` are the indices of its x and y among the four supports. Stiffness scatters about its
+    nominal value; axial and tilt stiffness by the geometric mean of both radial factors. So does
+    damping, unless ``quality`` has a range of damping ratios: then the ratio is the gearbox's, and
+    without one the middle of the range.
     """
-    support, stiffness, damping = (
-        body.support,
-        gearbox.stiffness_factor[axes],
-        gearbox.damping_factor[axes],
-    )
-    stiffer, more_damped = (
-        float(np.sqrt(stiffness.prod())),
-        float(np.sqrt(damping.prod())),
-    )
+    support = body.support
+    stiffness, damping = gearbox.stiffness_factor[axes], gearbox.damping_factor[axes]
+    stiffer = float(np.sqrt(stiffness.prod()))
+    more_damped = float(np.sqrt(damping.prod()))
     scattered = replace(
         support,
         stiffness_x=support.stiffness_x * float(stiffness[0]),
@@ -185,12 +169,9 @@ def in_gearbox(body: Body, gearbox: Gearbox, axes: slice, quality: Quality) -> B
         stiffness_tilt=support.stiffness_tilt * stiffer,
         damping_tilt=support.damping_tilt * more_damped,
     )
-    nominal = quality.support_damping_ratio
-    if nominal is not None:
-        ratio = (
-            np.full(2, nominal)
-            if gearbox.damping_ratio is None
-            else gearbox.damping_ratio[axes]
-        )
+    if quality.support_damping_ratio is not None:
+        ratio = np.full(2, quality.support_damping_ratio)
+        if gearbox.damping_ratio is not None:
+            ratio = gearbox.damping_ratio[axes]
         scattered = scattered.damped(body, float(ratio[0]), float(ratio[1]))
     return replace(body, support=scattered)

@@ -1,7 +1,4 @@
-"""The wear of a configuration's gears.
-
-Its mesh, its wear law, and what the life leaves on the flanks as a fault.
-"""
+"""Wear of a configuration's gears: mesh, wear law, and the worn flanks as a fault."""
 
 from __future__ import annotations
 
@@ -20,7 +17,7 @@ from gensig.systems.registry import SIDES, read_sliced_pair
 
 Array = NDArray[np.float64]
 
-N_PROFILE = 65  # depths along the flank that a fault of kind wear is given
+N_PROFILE = 65  # depths along the flank in a fault of kind wear
 
 
 def read_wear_case(config: Configuration) -> WearCase:
@@ -28,16 +25,16 @@ def read_wear_case(config: Configuration) -> WearCase:
 
     Raises
     ------
-    ConfigError    for faulty gears, and for what ``wear_case`` refuses
+    ConfigError    for faulty gears, and as ``wear_case`` raises
     """
     if read_faults(config["fault"]):
         raise ConfigError(
-            f"fault={config['fault']['kind']}: a life begins with sound flanks; take fault=healthy"
+            f"fault={config['fault']['kind']}: a life begins with sound flanks; "
+            "take fault=healthy"
         )
     system = read_sliced_pair(config)
-    if (
-        system.pair.pinion.helix_angle == 0.0 and not system.modification.is_any
-    ):  # all slices are alike
+    # all slices of plain spur teeth are alike
+    if system.pair.pinion.helix_angle == 0.0 and not system.modification.is_any:
         system = replace(system, slices=replace(system.slices, n_slices=1))
     return wear_case(
         system.sliced_mesh(),
@@ -48,12 +45,12 @@ def read_wear_case(config: Configuration) -> WearCase:
 
 
 def wear_fault(case: WearCase, depth: Array) -> dict[str, Any]:
-    """A compound fault option whose parts wear both gears' teeth as a life has worn them.
+    """A compound fault option with the wear of both gears' teeth after a life.
 
     Parameters
     ----------
-    depth : (2, slice, node) m    off both flanks; the mean over the slices counts, as a fault of kind wear is the same
-        across the face
+    depth : (2, slice, node) m    off both flanks; the mean over the slices counts, as a fault of
+        kind wear is the same across the face
 
     Depths normal to the flank become those along the transverse line of action, over cos(beta_b).
     """
@@ -62,14 +59,16 @@ def wear_fault(case: WearCase, depth: Array) -> dict[str, Any]:
     for side, name in enumerate(SIDES):
         profile = flank_profile(case, side, depth[side].mean(axis=0) / slant)
         greatest = float(profile.max())
-        shape = profile / greatest if greatest > 0.0 else np.zeros_like(profile)
+        shape = np.zeros_like(profile)
+        if greatest > 0.0:
+            shape = profile / greatest
         parts.append(
             {
                 "kind": "wear",
                 "gear": name,
                 "tooth": "all",
                 "wear_depth_um": round(greatest * 1e6, 6),
-                "wear_profile": [round(float(one), 6) for one in shape],
+                "wear_profile": [round(float(share), 6) for share in shape],
                 "limit_um": max(case.options.threshold * 1e6, greatest * 1e6),
             }
         )
@@ -79,17 +78,17 @@ def wear_fault(case: WearCase, depth: Array) -> dict[str, Any]:
 def flank_profile(
     case: WearCase, side: int, depth: Array, n_profile: int = N_PROFILE
 ) -> Array:
-    """Depth at curvature radii evenly spaced from the lower end of the involute to the tip,
-    (profile,) m.
+    """Depth at evenly spaced curvature radii from the end of the involute to the tip, (profile,) m.
 
     Parameters
     ----------
     side : 0 pinion, 1 wheel
-    depth : (node,) m    at the nodes of the path; below them the mate does not reach, and nothing is worn
+    depth : (node,) m    at the nodes of the path; the flank below is out of the mate's reach and
+        not worn
     """
     gear = (case.pair.pinion, case.pair.wheel)[side]
     tip = np.sqrt(gear.tip_radius**2 - gear.base_radius**2)
-    place = np.linspace(gear.junction_curvature_radius, tip, n_profile)
+    radii = np.linspace(gear.junction_curvature_radius, tip, n_profile)
     curvature = case.path.curvature[side]
     order = np.argsort(curvature)
-    return np.interp(place, curvature[order], depth[order], left=0.0)
+    return np.interp(radii, curvature[order], depth[order], left=0.0)

@@ -7,7 +7,7 @@ import pytest
 from fault_cases import one
 from numpy.testing import assert_allclose, assert_array_equal
 
-from gensig.dynamics.lanes import _table_rows
+from gensig.dynamics.lanes import tooth_rows
 from gensig.errors import GeometryError
 from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.modification import PLAIN, FlankModification, PairModification
@@ -80,7 +80,7 @@ def test_the_gaps_are_those_of_the_fault_of_the_same_relief(xiamen, shape):
 def test_back_flanks_are_modified_too(xiamen):
     system = relieved(xiamen, tip_relief=10 * UM, tip_relief_height=0.6 * MM)
     table = system.mesh_table((one("crack", gear="pinion", tooth=3),))
-    rows, _, _ = _table_rows(table)
+    rows = tooth_rows(table).values[:, 0]
     assert_array_equal(rows[0, :, 2], table.pinion.gap[0] + table.wheel.gap[0])
     assert rows[0, :, 2].max() > 9 * UM
 

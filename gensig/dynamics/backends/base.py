@@ -1,4 +1,4 @@
-"""The interface of a backend: the integration that it is given and the motions that it returns."""
+"""Interface of a backend: its input, one integration, and its output, the motions."""
 
 from __future__ import annotations
 
@@ -15,12 +15,13 @@ from gensig.errors import ConfigError
 Array = NDArray[np.float64]
 
 BOUNCING = 0.01  # share of the time without contact above which teeth bounce
-OUT_OF_BOUNDS = 1e6  # m, rad, m/s or rad/s: no machine; a motion that overflows may come back to finite numbers
+# m, rad, m/s or rad/s: no machine moves so far; a motion that overflows may become finite again
+OUT_OF_BOUNDS = 1e6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Integration:
-    """One integration: the record that is wanted and how accurate it must be.
+    """One integration: the record and its accuracy.
 
     Parameters
     ----------
@@ -30,7 +31,7 @@ class Integration:
     tell_mesh : also return the state of the mesh at every sample
     oversampling : internal steps per sample, or as fine as so many steps
     precision : a name in ``PRECISIONS``
-    max_error : accepted relative error, None where nobody compares it
+    max_error : accepted relative error, None without a check
     """
 
     sampling_rate: float
@@ -59,12 +60,13 @@ class Motions:
     Parameters
     ----------
     acceleration : (machine, channel, sample) m/s2 or rad/s2
-    check : (machine, channel, sample)    the beginning of the same at half the step; no sample without ``max_error``
+    check : (machine, channel, sample)    the beginning of the same at half the step; no sample
+        without ``max_error``
     shaft_angle : (machine, sample) rad   of the pinion since time 0
-    seen : (machine, row, sample)         the mesh, rows as ``_layout`` names them; no row unless asked for
+    seen : (machine, row, sample)         the mesh, rows of ``_layout``; none without ``tell_mesh``
     mean_speed : (machine,) rad/s
     contact_loss_fraction : (machine,)    share of the time without contact
-    finite : (machine,)                   whether the motion stayed within bounds
+    finite : (machine,)                   the motion stayed within bounds
     """
 
     acceleration: Array
@@ -87,17 +89,17 @@ class Backend(ABC):
         oversampling: int,
         max_error: float | None,
     ) -> None:
-        """Raise SimulationError for a machine whose motion the method cannot follow at this step."""
+        """Raise SimulationError for a machine that the method cannot integrate at this step."""
 
     @abstractmethod
     def records_together(self, precision: str) -> int:
-        """Returns the least number of records that are simulated at full speed."""
+        """Least number of records that are simulated at full speed."""
 
     @abstractmethod
     def integrate(
         self, machines: Sequence[PairDynamics], integration: Integration
     ) -> Motions:
-        """Returns the settled motions of machines that have passed ``check_step``.
+        """Settled motions of machines that have passed ``check_step``.
 
         The machines share their degrees of freedom and the kind of their mesh law. The motion of a
         machine must not depend on the other machines of the call, nor on their number.

@@ -1,6 +1,4 @@
-"""The classical Runge-Kutta method with a fixed step, several records side by side in vector
-lanes.
-"""
+"""The classical Runge-Kutta method with a fixed step, several records in vector lanes."""
 
 from __future__ import annotations
 
@@ -36,7 +34,8 @@ from gensig.dynamics.pair import PairDynamics
 Array = NDArray[np.float64]
 Stages: TypeAlias = Sequence[tuple[int, int]]
 
-CAREFUL = 3  # steps per sample in which a machine that bounced settles again: hard landings are stiff
+# steps per sample of the repeated settling of a machine that bounced: hard landings are stiff
+CAREFUL = 3
 CHECKED = 0.03  # s at the beginning of a record, integrated again at half the step
 
 
@@ -51,20 +50,17 @@ class RungeKutta(Backend):
         oversampling: int,
         max_error: float | None,
     ) -> None:
-        """Raise SimulationError for an unstable step.
-
-        Warn of a coarse one without ``max_error``.
-        """
+        """Raise SimulationError for an unstable step; warn of a coarse unchecked one."""
         check_step(machine, sampling_rate, oversampling, max_error)
 
     def records_together(self, precision: str) -> int:
-        """Returns the number of vector lanes."""
+        """Number of vector lanes."""
         return n_lanes(precision)
 
     def integrate(
         self, machines: Sequence[PairDynamics], integration: Integration
     ) -> Motions:
-        """Returns the motions of machines, integrated in groups that settle in the same stages."""
+        """Motions of machines, integrated in groups that settle in the same stages."""
         groups = lane_groups(machines, integration)
         motions = (
             (group, integrate_group([machines[i] for i in group], integration))
@@ -97,13 +93,9 @@ def in_order(groups: Iterable[tuple[list[int], Motions]], n_machines: int) -> Mo
     for indices, motions in groups:
         for field in dataclasses.fields(Motions):
             values = getattr(motions, field.name)
-            if len(indices) == n_machines:
-                rows[field.name] = values[:n_machines]
-                continue
             if field.name not in rows:
-                rows[field.name] = np.empty(
-                    (n_machines, *values.shape[1:]), dtype=values.dtype
-                )
+                shape = n_machines, *values.shape[1:]
+                rows[field.name] = np.empty(shape, dtype=values.dtype)
             rows[field.name][indices] = values[: len(indices)]
     return Motions(**rows)  # type: ignore[arg-type]
 
@@ -128,11 +120,9 @@ class GroupSteps:
 def integrate_group(
     machines: Sequence[PairDynamics], integration: Integration
 ) -> Motions:
-    """Settles machines and records them from time 0 on, in one group.
+    """Motions of machines in one group, from time 0 on, after they have settled.
 
-    Returns
-    -------
-    one row a lane: lanes without a machine repeat the first
+    One row a lane: lanes without a machine repeat the first.
     """
     rate, oversampling = integration.sampling_rate, integration.oversampling
     precision = integration.precision
@@ -141,7 +131,7 @@ def integrate_group(
     settling = settling_stages(machines[0], oversampling, rate)
     stages = [(n_steps, -low_pass.margin - before) for n_steps, before in settling]
     end = stages[-1][1]
-    # every lane begins in its own time; until then it integrates what nobody looks at
+    # every lane begins at a time of its own; its motion before is not used
     durations = [math.ceil(settling_time(machine) * rate) for machine in lanes]
     begins = [min(end - 1, -low_pass.margin - n) for n in durations]
     span = min(begins) / rate, integration.duration + low_pass.margin / rate
@@ -165,9 +155,9 @@ def settled(
     steps: GroupSteps,
     oversampling: int,
 ) -> GroupRun:
-    """Returns the machines at the end of the last stage.
+    """Machines at the end of the last stage.
 
-    What bounced has settled in finer steps.
+    Those that bounced have settled in finer steps.
     """
     run, bounced = run_stages(run, lanes, begins, stages, steps)
     careful = [(min(oversampling, max(CAREFUL, n)), until) for n, until in stages]
@@ -183,7 +173,7 @@ def run_stages(
     stages: Stages,
     steps: GroupSteps,
 ) -> tuple[GroupRun, NDArray[np.bool_]]:
-    """Integrates machines through the stages of the settling.
+    """Integrate machines through the stages of the settling.
 
     Parameters
     ----------
@@ -192,8 +182,8 @@ def run_stages(
 
     Returns
     -------
-    the machines at the end of the last stage, and which of them were out of contact or bounds on
-    the way, (lane,)
+    the machines at the end of the last stage, and flags of those that bounced or went out of
+    bounds, (lane,)
     """
     now, lost = min(begins), np.zeros(len(lanes))
     for n_steps, until in stages:
@@ -202,24 +192,22 @@ def run_stages(
             run.advance(group, step, now * n_steps, (begin - now) * n_steps)
             for lane, dynamics in enumerate(lanes):
                 if begins[lane] == begin:
-                    run.begin(
-                        group, lane, dynamics.static_start(begin * n_steps * step)
-                    )
+                    start = dynamics.static_start(begin * n_steps * step)
+                    run.begin(group, lane, start)
                     lost[lane] = 0.0
             now = begin
         if now < until:
             run.advance(group, step, now * n_steps, (until - now) * n_steps)
             now = until
         lost += run.lost / n_steps
-    return run, ~run.is_within(OUT_OF_BOUNDS) | (
-        lost > BOUNCING * (now - np.array(begins))
-    )
+    bounced = lost > BOUNCING * (now - np.array(begins))
+    return run, ~run.is_within(OUT_OF_BOUNDS) | bounced
 
 
 def recorded(
     run: GroupRun, steps: GroupSteps, integration: Integration, end: int
 ) -> Motions:
-    """Records settled machines, which stand at output sample ``end``."""
+    """Motions of settled machines, which are at output sample ``end``."""
     fine, n_samples = integration.oversampling, integration.n_samples
     low_pass, (group, step) = decimator(fine), steps.at(fine)
     run.advance(group, step, end * fine, (-low_pass.margin - end) * fine - 1)
@@ -231,14 +219,15 @@ def recorded(
     check = np.empty((*acceleration.shape[:2], 0))
     if integration.max_error is not None:
         check = half_step(checking, steps, integration)
+    turned = angle[:, -1] - angle[:, 0]
+    n_steps = (n_samples + 2 * low_pass.margin - 1) * fine + 1
     return Motions(
         acceleration=acceleration,
         check=check,
         shaft_angle=angle[:, :-1],
         seen=seen,
-        mean_speed=(angle[:, -1] - angle[:, 0]) * integration.sampling_rate / n_samples,
-        contact_loss_fraction=run.lost
-        / ((n_samples + 2 * low_pass.margin - 1) * fine + 1),
+        mean_speed=turned * integration.sampling_rate / n_samples,
+        contact_loss_fraction=run.lost / n_steps,
         finite=run.is_within(OUT_OF_BOUNDS),
     )
 
@@ -248,8 +237,7 @@ def half_step(run: GroupRun, steps: GroupSteps, integration: Integration) -> Arr
     fine = integration.oversampling
     low_pass, finer_low_pass = decimator(fine), decimator(2 * fine)
     group, step = steps.at(2 * fine)
-    # the settled state stands before the step that is the first here; the finer low-pass may reach
-    # less far
+    # the settled state is before the step that is the first here; the finer low-pass may be shorter
     first = -2 * (low_pass.margin * fine + 1)
     wait = -2 * finer_low_pass.margin * fine - 1 - first
     run.advance(group, step, first, wait)

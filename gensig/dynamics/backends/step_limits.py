@@ -1,6 +1,4 @@
-"""Steps that the classical Runge-Kutta scheme can take, and the stages in which a machine
-settles.
-"""
+"""Steps that the classical Runge-Kutta scheme can take, and the stages of the settling."""
 
 from __future__ import annotations
 
@@ -15,13 +13,14 @@ from gensig.errors import SimulationError
 
 LONGEST_SETTLING = 0.45  # s
 SETTLED = 1e-4  # share of the start's transient that is left
-STABILITY_LIMIT = 2.6  # |lambda| h of the classical RK4 on the imaginary axis is 2.83, on the real axis 2.79
+STABILITY_LIMIT = (
+    2.6  # |lambda| h; RK4 has 2.83 on the imaginary axis, 2.79 on the real axis
+)
 LONG_STEP = 0.5  # of the same, above which the error may exceed 1e-3
 COARSE_STABILITY = 0.6  # share of the limit: tables may be stiffer than their mean
 # Stages of the settling: steps per sample, and the time before the record at which the stage ends,
-# s. The slow transient of the drive takes nearly all of the settling. What coarse steps do to it
-# decays in the finer steps that follow, and the last stage before the record takes the record's own
-# step.
+# s. The slow transient of the drive takes nearly all of the settling. The error of coarse steps
+# decays in the finer steps that follow. The last stage takes the step of the record.
 COARSE = ((1, 0.2), (2, 0.1), (3, 0.02))
 
 
@@ -64,25 +63,26 @@ def check_step(
     oversampling: int,
     max_error: float | None = None,
 ) -> None:
-    """Raise SimulationError for a step that RK4 cannot take, warn of a long one where nothing will
-    look at its error.
+    """Raise SimulationError for an unstable step; warn of a coarse one without ``max_error``.
 
-    With a ``max_error`` records whose error is too large are made again at half the step.
+    With a ``max_error``, records with a larger error are integrated again at half the step.
     """
     rates, step = dynamics.stiff_rates, 1.0 / (sampling_rate * oversampling)
     fastest = float(np.abs(rates).max())
     if fastest * step > STABILITY_LIMIT:
         raise SimulationError(
-            f"solver.oversampling = {oversampling} makes internal steps of {step:.3g} s, too long for the stiffest "
-            f"motion at {fastest / (2 * math.pi):.4g} Hz; raise solver.oversampling to at least "
+            f"solver.oversampling = {oversampling} makes internal steps of {step:.3g} s, too long "
+            f"for the stiffest motion at {fastest / (2 * math.pi):.4g} Hz; raise "
+            "solver.oversampling to at least "
             f"{math.ceil(oversampling * fastest * step / STABILITY_LIMIT)}"
         )
     oscillating = float(np.abs(np.imag(rates)).max())
     if max_error is None and oscillating * step > LONG_STEP:
         warnings.warn(
-            f"{2 * math.pi / (oscillating * step):.1f} internal steps to a period of the mesh mode at "
-            f"{oscillating / (2 * math.pi):.4g} Hz, and solver.max_error = null looks at no error, which may exceed "
-            f"1e-3: raise solver.oversampling to {math.ceil(oversampling * oscillating * step / LONG_STEP)}, or give "
+            f"{2 * math.pi / (oscillating * step):.1f} internal steps to a period of the mesh mode "
+            f"at {oscillating / (2 * math.pi):.4g} Hz, and solver.max_error = null looks at no "
+            "error, which may exceed 1e-3: raise solver.oversampling to "
+            f"{math.ceil(oversampling * oscillating * step / LONG_STEP)}, or give "
             "solver.max_error=1e-3",
             CoarseStepWarning,
             stacklevel=2,

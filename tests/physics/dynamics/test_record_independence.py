@@ -1,8 +1,8 @@
-"""A record depends on its own row only; noise depends on the healthy twin, and leaves the physics alone."""
+"""A record depends only on its row; noise depends on the healthy twin and not on the motion."""
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from closeness import assert_close
 
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
@@ -11,199 +11,140 @@ from gensig.record.inputs import InputReader
 from gensig.record.simulate import simulate_record, simulate_records
 
 ORDER = (5, 0, 3, 6, 1, 7, 2, 4)
+WORDS = [
+    "experiment=quickstart",
+    "plan.n_records=8",
+    "plan.n_units=2",
+    "operating.duration_s=0.05",
+]
 
 
 @pytest.fixture(scope="module")
 def config():
-    request = read_request(
-        [
-            "experiment=quickstart",
-            "plan.n_records=8",
-            "plan.n_units=2",
-            "operating.duration_s=0.05",
-        ]
-    )
-    return request.config.with_keys("dataset", store_clean=True)
+    return read_request(WORDS).config.with_keys("dataset", store_clean=True)
 
 
 @pytest.fixture(scope="module")
-def plan(config):
-    return make_plan(config)
+def rows(config):
+    plan = make_plan(config)
+    return [plan.record(index) for index in range(8)]
 
 
-def simulated(config, plan, indices):
-    """Records by index, from a process that has simulated nothing before."""
+def simulated(config, rows):
+    """Records of rows, one after the other, in a process without any twin."""
     records._TWINS.clear()
-    return {index: simulate_record(config, plan.record(index)) for index in indices}
+    return [simulate_record(config, row) for row in rows]
 
 
 @pytest.fixture(scope="module")
-def in_order(config, plan):
-    return simulated(config, plan, range(8))
+def in_order(config, rows):
+    return simulated(config, rows)
 
 
-def same(one, two):
-    return all(
-        one.signals[key].tobytes() == two.signals[key].tobytes() for key in one.signals
-    ) and str(one.values) == str(two.values)
+def bits(record):
+    signals = {name: values.tobytes() for name, values in record.signals.items()}
+    return signals, str(record.values)
 
 
-def test_alone_or_after_others_the_bits_are_the_same(config, plan, in_order):
-    shuffled = simulated(config, plan, ORDER)
-    assert all(same(in_order[index], shuffled[index]) for index in ORDER)
-    assert same(in_order[5], simulated(config, plan, [5])[5])
-    assert not same(in_order[5], in_order[4])
+def assert_same(records, expected):
+    assert [bits(record) for record in records] == [bits(record) for record in expected]
+
+
+def clean(record):
+    return record.signals["acceleration_clean"]
 
 
 @pytest.mark.parametrize("size", [1, 3, 16])
-def test_in_blocks_the_bits_are_the_same(config, plan, in_order, size):
-    """However many are simulated side by side, twins with them, from a process that knows no twin or some."""
-    for known in (False, True):
-        if not known:
-            records._TWINS.clear()
-        rows = [plan.record(index) for index in ORDER]
-        found = [
-            one
-            for first in range(0, 8, size)
-            for one in simulate_records(config, rows[first : first + size])
-        ]
-        assert [
-            index
-            for index, one in zip(ORDER, found, strict=True)
-            if not same(one, in_order[index])
-        ] == []
+def test_records_are_independent_in_any_order_and_block(config, rows, in_order, size):
+    """With known and with unknown twins."""
+    expected = [in_order[index] for index in ORDER]
+    for _ in range(2):
+        found = []
+        for first in range(0, 8, size):
+            block = [rows[index] for index in ORDER[first : first + size]]
+            found += simulate_records(config, block)
+        assert_same(found, expected)
+        records._TWINS.clear()
+    assert bits(in_order[5]) != bits(in_order[4])
+    assert_same(simulated(config, [rows[5]]), [in_order[5]])
 
 
-def test_one_that_cannot_be_leaves_its_block_alone(config, plan, in_order):
-    """A row whose step would be too long is a failed record, its neighbours' bits are theirs."""
-    rows = [plan.record(index) for index in range(4)]
-    rows[2] = {**rows[2], "params/operating.drive_frequency_hz": 1e6}
+def test_a_failure_leaves_its_block(config, rows, in_order):
+    """A row with a too long step is a failed record."""
+    stiff = {**rows[2], "params/operating.drive_frequency_hz": 1e6}
     records._TWINS.clear()
-    found = simulate_records(config, rows)
-    assert [one.values.get("status") for one in found] == [None, None, "failed", None]
-    assert "solver.oversampling" in found[2].values["status_reason"]
-    assert all(same(found[index], in_order[index]) for index in (0, 1, 3))
+    found = simulate_records(config, [*rows[:2], stiff, rows[3]])
+    failed = found.pop(2)
+    assert_same(found, [in_order[index] for index in (0, 1, 3)])
+    assert failed.values["status"] == "failed"
+    assert "solver.oversampling" in failed.values["status_reason"]
+    assert np.isnan(failed.signals["acceleration"]).all()
 
 
-def test_a_longer_plan_of_the_same_draws_keeps_a_row(config, plan, in_order):
-    """The row alone decides: another shard or row number changes nothing."""
-    row = {**plan.record(2), "shard": 7, "row": 3}
-    assert same(in_order[2], simulate_record(config, row))
+def test_a_row_keeps_its_record_in_a_longer_plan(config, rows, in_order):
+    row = {**rows[2], "shard": 7, "row": 3}
+    assert_same([simulate_record(config, row)], [in_order[2]])
 
 
 class TestNoise:
-    def test_the_noise_level_leaves_the_clean_signal_alone(
-        self, config, plan, in_order
-    ):
-        row = plan.record(3)
-        loud = simulate_record(
-            config, {**row, "params/sensing.snr_db": 0.0, "snr_db": 0.0}
-        )
-        assert (
-            loud.signals["acceleration_clean"].tobytes()
-            == in_order[3].signals["acceleration_clean"].tobytes()
-        )
-        assert (
-            loud.signals["acceleration"].tobytes()
-            != in_order[3].signals["acceleration"].tobytes()
-        )
+    def test_its_level_leaves_the_clean_signal(self, config, rows, in_order):
+        louder = {**rows[3], "params/sensing.snr_db": 0.0, "snr_db": 0.0}
+        loud, quiet = simulate_record(config, louder), in_order[3]
+        assert clean(loud).tobytes() == clean(quiet).tobytes()
+        noisy = loud.signals["acceleration"]
+        assert noisy.tobytes() != quiet.signals["acceleration"].tobytes()
 
-    def test_the_floor_is_the_same_for_every_class_of_a_group(self, plan, in_order):
-        floors = np.array(
-            [in_order[index].signals["noise_power"] for index in range(8)]
-        ).reshape(2, 4, -1)
-        assert_allclose(
-            floors, np.broadcast_to(floors[:, :1], floors.shape), rtol=1e-12, atol=0
-        )
+    def test_every_class_of_a_condition_has_its_floor(self, config, rows, in_order):
+        floors = np.array([record.signals["noise_power"] for record in in_order])
+        floors = floors.reshape(2, 4, -1)
+        assert_close(floors, np.broadcast_to(floors[:, :1], floors.shape), 1e-12)
         assert np.abs(floors[0] / floors[1] - 1).max() > 0.01
+        # floors relative to the record would reveal the class
+        relative = config.with_keys("sensing", snr_reference="record")
+        floors = [each.signals["noise_power"] for each in simulated(relative, rows[:4])]
+        assert np.abs(np.array(floors) / floors[0] - 1).max() > 0.05
 
-    def test_a_floor_that_follows_the_record_would_tell_the_class(self, config, plan):
-        own = config.with_keys("sensing", snr_reference="record")
-        floors = np.array(
-            [
-                found.signals["noise_power"]
-                for found in simulated(own, plan, range(4)).values()
-            ]
-        )
-        assert np.abs(floors / floors[0] - 1).max() > 0.05
+    def test_the_signal_to_noise_ratio_is_reached(self, config, rows):
+        """Relative to the healthy twin, which has another start: the mean over the channels."""
+        ratio = {"params/sensing.snr_db": 12.0, "snr_db": 12.0}
+        healthy = {**rows[0], **ratio, "label": 0, "faults_json": "[]"}
+        found = simulate_record(config.with_keys("operating", duration_s=0.5), healthy)
+        noise = found.signals["acceleration"].astype(float) - clean(found)
+        power = np.var(noise, axis=1)
+        assert_close(power, found.signals["noise_power"], 0.04)
+        decibels = 10 * np.log10(found.signals["signal_power"] / power)
+        assert_close(decibels.mean(), 12.0, atol=0.1)
 
-    def test_achieved_signal_to_noise_ratio(self, config, plan):
-        own = config.with_keys("operating", duration_s=0.5)
-        row = {
-            **plan.record(0),
-            "params/sensing.snr_db": 12.0,
-            "snr_db": 12.0,
-            "label": 0,
-            "faults_json": "[]",
-        }
-        found = simulate_record(own, row)
-        noise = (
-            found.signals["acceleration"].astype(float)
-            - found.signals["acceleration_clean"]
-        )
-        assert_allclose(
-            np.var(noise, axis=1), found.signals["noise_power"], rtol=0.04, atol=0
-        )
-        ratio = found.signals["signal_power"] / np.var(noise, axis=1)
-        # against the healthy twin, which runs from another start: the mean over the channels
-        assert_allclose(10 * np.log10(ratio).mean(), 12.0, rtol=0, atol=0.1)
-
-    def test_no_noise_is_the_clean_signal(self, config, plan):
-        own = config.with_keys("sensing", snr_db=None)
-        row = {
-            key: value
-            for key, value in plan.record(1).items()
-            if key != "params/sensing.snr_db"
-        }
-        found = simulate_record(own, row)
-        assert (
-            found.signals["acceleration"].tobytes()
-            == found.signals["acceleration_clean"].tobytes()
-        )
+    def test_without_noise_it_is_the_clean_signal(self, config, rows):
+        row = dict(rows[1])
+        del row["params/sensing.snr_db"]
+        found = simulate_record(config.with_keys("sensing", snr_db=None), row)
+        assert found.signals["acceleration"].tobytes() == clean(found).tobytes()
 
 
-def test_a_sham_record_is_healthy_under_its_label(config, plan, in_order):
-    sham = config.with_keys("plan", sham=True)
-    index = next(k for k in range(8) if plan.record(k)["label_name"] == "missing_tooth")
-    found, real = simulate_record(sham, plan.record(index)), in_order[index]
-    assert (
-        found.signals["fault_multihot"].tolist()
-        == real.signals["fault_multihot"].tolist()
-    )
-    assert (
-        np.abs(found.signals["acceleration_clean"]).max()
-        < np.abs(real.signals["acceleration_clean"]).max()
-    )
+def test_a_sham_record_is_healthy_under_its_label(config, rows, in_order):
+    index = next(k for k in range(8) if rows[k]["label_name"] == "missing_tooth")
+    sham = simulate_record(config.with_keys("plan", sham=True), rows[index])
+    labels = [
+        found.signals["fault_multihot"].tolist() for found in (sham, in_order[index])
+    ]
+    assert labels[0] == labels[1]
+    assert np.abs(clean(sham)).max() < np.abs(clean(in_order[index])).max()
 
 
-def test_values_of_a_record(config, plan, in_order):
-    row, found = plan.record(0), in_order[0].values
-    assert_allclose(found["speed_rpm"], row["speed_set_rpm"], rtol=1e-4, atol=0)
-    assert_allclose(
-        found["mesh_frequency_hz"], found["speed_rpm"] / 60 * 23, rtol=1e-12, atol=0
-    )
+def test_values_of_a_record(rows, in_order):
+    values = in_order[0].values
+    assert_close(values["speed_rpm"], rows[0]["speed_set_rpm"], 1e-4)
+    assert_close(values["mesh_frequency_hz"], values["speed_rpm"] / 60 * 23, 1e-12)
     assert in_order[0].signals["acceleration"].dtype == np.float32
 
 
-def test_a_run_that_cannot_be_is_a_failed_record(config, plan):
-    coarse = config.with_keys("solver", oversampling=2).with_keys(
-        "sensing", sampling_rate_hz=6_000
-    )
-    found = simulate_record(coarse, plan.record(0))
-    assert found.values["status"] == "failed"
-    assert "solver.oversampling" in found.values["status_reason"]
-    assert np.isnan(found.signals["acceleration"]).all()
-
-
-def test_a_specimen_is_the_same_whatever_its_record_is_told_to_have(config, plan):
-    """Gears of a unit have one set of deviations: sound or faulty, and of the healthy twin."""
+def test_all_records_of_a_unit_have_one_specimen(config, rows):
+    """Sound or faulty, and of the healthy twin."""
     drawn = {}
-    for row in (plan.record(index) for index in range(8)):
-        run = InputReader(config).inputs(row).run
-        assert len(run.specimen.forms) == 2
-        drawn.setdefault(row["specimen_id"], set()).add(repr(run.specimen))
-    assert all(len(some) == 1 for some in drawn.values())
-    assert (
-        len({row["label_name"] for row in (plan.record(index) for index in range(8))})
-        == 4
-    )
+    for row in rows:
+        specimen = InputReader(config).inputs(row).run.specimen
+        assert len(specimen.forms) == 2
+        drawn.setdefault(row["specimen_id"], set()).add(repr(specimen))
+    assert all(len(specimens) == 1 for specimens in drawn.values())
+    assert len({row["label_name"] for row in rows}) == 4

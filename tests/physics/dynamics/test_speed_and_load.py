@@ -1,10 +1,10 @@
-"""Speed and load over time, in records: what the shaft does, what the teeth carry, what is stored of it."""
+"""Speed and load over time in records: rotation of the shaft, load of the teeth, stored traces."""
 
 import math
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from closeness import assert_close
 
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
@@ -15,25 +15,27 @@ from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.run import Run
 
 RATE = 51200.0
-# so that nothing but the course moves the shaft
+# without friction and errors only the course moves the shaft
 PLAIN = {
     "solver.max_error": None,
     "mesh.friction_coefficient": 0,
     "quality.iso1328_grade": None,
 }
 SPEED, TORQUE = "operating.speed_profile", "operating.torque_profile"
+DURATION = "operating.duration_s"
 WALK = {"kind": "random_walk", "scatter": 0.02, "correlation_time_s": 0.2}
 
 
 @pytest.fixture(scope="module")
 def run(machine):
-    return lambda changes, **more: Run(
-        system=machine({**PLAIN, **changes}), faults=(), **more
-    )
+    def make(changes, **more):
+        return Run(system=machine({**PLAIN, **changes}), faults=(), **more)
+
+    return make
 
 
-def simulated(*runs):
-    return simulate_together(runs)
+def record(run):
+    return simulate_together([run])[0]
 
 
 def wave(values, frequency):
@@ -43,162 +45,128 @@ def wave(values, frequency):
 
 
 def followed(frequency, drive=5.0, damping=0.7):
-    """What the soft speed source lets through of a change of the set speed: a spring and a damper to it."""
+    """Transmission of the soft speed source, a spring and a damper to the set speed."""
     s = 1j * frequency / drive
     return abs((2 * damping * s + 1) / (s * s + 2 * damping * s + 1))
 
 
-def test_a_walk_without_scatter_is_none(run):
-    still, found = simulated(
-        run({"operating.duration_s": 0.05}),
-        run({"operating.duration_s": 0.05, SPEED: {**WALK, "scatter": 0.0}}),
-    )
-    assert_allclose(
-        found.acceleration,
-        still.acceleration,
-        rtol=0,
-        atol=1e-9 * still.acceleration.std(),
-    )
-    assert_allclose(found.mean_speed, still.mean_speed, rtol=1e-12, atol=0)
+def test_a_walk_without_scatter_is_constant(run):
+    still = record(run({DURATION: 0.05}))
+    walk = record(run({DURATION: 0.05, SPEED: {**WALK, "scatter": 0.0}}))
+    level = still.acceleration.std()
+    assert_close(walk.acceleration, still.acceleration, atol=1e-9 * level)
+    assert_close(walk.mean_speed, still.mean_speed, 1e-12)
 
 
 def test_the_mean_speed_is_that_of_the_course(run):
-    """What the drive's 5 Hz leave of it: the records end where they have caught up."""
+    """The record ends when the drive of 5 Hz has caught up."""
     ramp = [[-1.0, 0.5], [0.0, 0.5], [0.2, 1.0], [0.7, 1.0]]
-    courses = {SPEED: ramp, "operating.duration_s": 0.7}
-    one = run(courses)
-    (found,) = simulated(one)
-    turned = one.system.operating.nominal(np.array([0.7])).angle[0]
-    assert_allclose(found.mean_speed * 0.7, turned, rtol=1e-4, atol=0)
-    assert turned < 0.95 * one.system.operating.speed * 0.7
+    ramped = run({SPEED: ramp, DURATION: 0.7})
+    operating = ramped.system.operating
+    turned = operating.nominal(np.array([0.7])).angle[0]
+    assert_close(record(ramped).mean_speed * 0.7, turned, 1e-4)
+    assert turned < 0.95 * operating.speed * 0.7
 
 
 def test_the_shaft_follows_a_slow_walk(run):
-    one = run({SPEED: {**WALK, "correlation_time_s": 4.0}, "operating.duration_s": 0.4})
-    (found,) = simulated(one)
-    times = np.arange(len(found.shaft_angle)) / RATE
-    off = found.shaft_angle - one.system.operating.nominal(times).angle
-    course = one.system.operating.nominal(times).speed
-    assert np.ptp(course) > 2e-3 * one.system.operating.speed
-    assert np.ptp(off) < 0.2 * np.abs(
-        np.cumsum(course - one.system.operating.speed)[-1] / RATE
-    )
+    walking = run({SPEED: {**WALK, "correlation_time_s": 4.0}, DURATION: 0.4})
+    angle, operating = record(walking).shaft_angle, walking.system.operating
+    nominal = operating.nominal(np.arange(len(angle)) / RATE)
+    assert np.ptp(nominal.speed) > 2e-3 * operating.speed
+    walked = np.sum(nominal.speed - operating.speed) / RATE
+    assert np.ptp(angle - nominal.angle) < 0.2 * abs(walked)
 
 
 @pytest.mark.parametrize(
     ("ripple", "frequency"), [({"order": 1}, 30.0), ({"frequency_hz": 10}, 10.0)]
 )
-def test_of_a_speed_ripple_comes_what_the_drive_lets_through(run, ripple, frequency):
-    share, duration = 0.01, 0.2
-    one = run(
-        {
-            "operating.speed_ripple": {"share": share, **ripple},
-            "operating.duration_s": duration,
-        }
-    )
-    still = run({"operating.duration_s": duration})
-    found, plain = simulated(one, still)
-    moved = found.shaft_angle - plain.shaft_angle
-    speed = np.gradient(moved, 1 / RATE, edge_order=2) / one.system.operating.speed
-    assert_allclose(
-        wave(speed, frequency), share * followed(frequency), rtol=0.03, atol=0
-    )
+def test_the_drive_transmits_a_part_of_a_speed_ripple(run, ripple, frequency):
+    share, still = 0.01, run({DURATION: 0.2})
+    rippled = run({"operating.speed_ripple": {"share": share, **ripple}, DURATION: 0.2})
+    moved = record(rippled).shaft_angle - record(still).shaft_angle
+    speed = np.gradient(moved, 1 / RATE, edge_order=2) / still.system.operating.speed
+    assert_close(wave(speed, frequency), share * followed(frequency), 0.03)
     assert followed(frequency) < 0.95
 
 
 def test_a_torque_ripple_is_in_the_force_on_the_teeth(run):
-    share, duration = 0.1, 0.2
-    changes = {
-        "operating.torque_ripple": {"share": share, "order": 2},
-        "operating.duration_s": duration,
-    }
-    one = run(changes, tell_mesh=True)
-    (found,) = simulated(one)
-    force = found.mesh.force / pair_dynamics(one).mesh_force
-    assert_allclose(wave(force, 60.0), share, rtol=0.05, atol=0)
-    assert wave(force, 50.0) < 0.1 * share
+    ripple = {"operating.torque_ripple": {"share": 0.1, "order": 2}, DURATION: 0.2}
+    rippled = run(ripple, tell_mesh=True)
+    force = record(rippled).mesh.force / pair_dynamics(rippled).mesh_force
+    assert_close(wave(force, 60.0), 0.1, 0.05)
+    assert wave(force, 50.0) < 0.01
 
 
 def test_a_lead_in_changes_neither_walk_nor_ripple(run):
-    """Perfect gears, so that the motion is the same from wherever it starts; see docs/theory/sensing.md."""
-    courses = {SPEED: WALK, TORQUE: WALK, "operating.torque_ripple": {"share": 0.1, "order": 2},
-               "operating.speed_ripple": {"share": 0.01, "order": 2}, "operating.duration_s": 0.2}  # fmt: skip
+    """Of perfect gears, whose motion is the same from any start; see docs/theory/sensing.md."""
+    courses = {
+        SPEED: WALK,
+        TORQUE: WALK,
+        "operating.torque_ripple": {"share": 0.1, "order": 2},
+        "operating.speed_ripple": {"share": 0.01, "order": 2},
+        DURATION: 0.2,
+    }
     led = run({**courses, "sensing.sensor.low_cutoff_hz": 5.0})
     n_lead = led.system.sensing.n_lead
     assert n_lead > 4000
-    (found,) = simulate_with_lead_in([led])
-    (expected,) = simulated(run(courses))
-    still, other = simulated(
-        run({"operating.duration_s": 0.2}), run({**courses, "operating.course_seed": 1})
+    (long,) = simulate_with_lead_in([led])
+    expected = record(run(courses))
+    speed, wanted = (
+        np.gradient(each.shaft_angle, 1 / RATE) for each in (long, expected)
     )
-    speeds = [
-        np.gradient(one.shaft_angle, 1 / RATE)
-        for one in (found, expected, still, other)
-    ]
-    assert_allclose(speeds[0], speeds[1], rtol=0, atol=0.02 * speeds[1].std())
-    assert_allclose(found.mean_speed, expected.mean_speed, rtol=2e-6, atol=0)
-    for another in (still, other):
-        assert abs(another.mean_speed / expected.mean_speed - 1) > 1e-4
-    level = expected.acceleration.std(axis=1, keepdims=True)
-    assert np.all(
-        (found.acceleration[:, n_lead:] - expected.acceleration).std(axis=1)
-        <= 0.02 * level[:, 0]
-    )
-
-
-@pytest.fixture(scope="module")
-def stored():
-    words = ["operating=drifting", "plan.n_records=4", "plan.n_units=2", "plan.classes=[healthy,crack]",
-             "operating.duration_s=0.1", "dataset.store_operating=true", "dataset.store_shaft_angle=true"]  # fmt: skip
-    config = read_request(words).config
-    plan = make_plan(config)
-    rows = [plan.record(place) for place in range(plan.n_records)]
-    return rows, simulate_records(config, rows)
+    assert_close(speed, wanted, atol=0.02 * wanted.std())
+    assert_close(long.mean_speed, expected.mean_speed, 2e-6)
+    other = record(run({**courses, "operating.course_seed": 1})).mean_speed
+    for speed in (other, led.system.operating.speed):
+        assert abs(speed / expected.mean_speed - 1) > 1e-4
+    off = long.acceleration[:, n_lead:] - expected.acceleration
+    assert np.all(off.std(axis=1) <= 0.02 * expected.acceleration.std(axis=1))
 
 
 class TestStored:
-    def test_traces_are_single_precision_samples(self, stored):
-        for record in stored[1]:
-            for name in ("shaft_speed", "torque_set"):
-                assert record.signals[name].shape == (5120,)
-                assert record.signals[name].dtype == np.float32
+    @pytest.fixture(scope="class")
+    @classmethod
+    def stored(cls):
+        """Rows of a plan and their records."""
+        words = [
+            "operating=drifting",
+            "plan.n_records=4",
+            "plan.n_units=2",
+            "plan.classes=[healthy,crack]",
+            "operating.duration_s=0.1",
+            "dataset.store_operating=true",
+            "dataset.store_shaft_angle=true",
+        ]
+        config = read_request(words).config
+        plan = make_plan(config)
+        rows = [plan.record(index) for index in range(plan.n_records)]
+        return list(zip(rows, simulate_records(config, rows), strict=True))
 
     def test_the_speed_is_that_of_the_shaft(self, stored):
-        """Its integral is what the angle grows by, and its mean the record's."""
-        for record in stored[1]:
+        """Its integral is the growth of the angle, and its mean the record's."""
+        for row, found in stored:
+            for name in ("shaft_speed", "torque_set"):
+                assert found.signals[name].shape == (5120,)
+                assert found.signals[name].dtype == np.float32
             speed, angle = (
-                record.signals["shaft_speed"].astype(float),
-                record.signals["shaft_angle"],
+                found.signals["shaft_speed"].astype(float),
+                found.signals["shaft_angle"],
             )
-            grown = (
-                np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))])
-                / RATE
-            )
-            assert_allclose(grown, angle - angle[0], rtol=0, atol=2e-4)
-            assert_allclose(
-                speed.mean() * 30 / math.pi,
-                record.values["speed_rpm"],
-                rtol=2e-5,
-                atol=0,
-            )
-            assert (
-                abs(record.values["speed_rpm"] / record.values["speed_set_rpm"] - 1)
-                > 1e-5
-            )
+            grown = np.cumsum(0.5 * (speed[1:] + speed[:-1])) / RATE
+            assert_close(np.append(0.0, grown), angle - angle[0], atol=2e-4)
+            mean = found.values["speed_rpm"]
+            assert_close(speed.mean() * 30 / math.pi, mean, 2e-5)
+            assert abs(mean / row["speed_set_rpm"] - 1) > 1e-5
 
-    def test_all_classes_of_a_condition_have_its_course(self, stored):
+    def test_all_classes_of_a_condition_have_its_torque(self, stored):
+        """The torque ripples twice a turn."""
         torques = {}
-        for row, record in zip(*stored, strict=True):
-            torques.setdefault(row["condition_id"], []).append(
-                record.signals["torque_set"]
-            )
-        assert len(torques) == 2
-        for one, other in torques.values():
-            assert one.tobytes() == other.tobytes()
-        first, second = (own[0] for own in torques.values())
+        for row, found in stored:
+            torque = found.signals["torque_set"]
+            torques.setdefault(row["condition_id"], []).append(torque)
+            relative = torque.astype(float) / row["torque_nm"]
+            assert_close(wave(relative, 60.0), 0.02, 0.15)
+        (first, same_first), (second, same_second) = torques.values()
+        assert first.tobytes() == same_first.tobytes()
+        assert second.tobytes() == same_second.tobytes()
         assert np.abs(first - second).max() > 0.1
-
-    def test_the_torque_ripples_twice_a_turn(self, stored):
-        row, record = stored[0][0], stored[1][0]
-        torque = record.signals["torque_set"].astype(float) / row["torque_nm"]
-        assert_allclose(wave(torque, 60.0), 0.02, rtol=0.15, atol=0)

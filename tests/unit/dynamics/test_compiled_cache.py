@@ -1,4 +1,4 @@
-"""What is compiled is forgotten when any file of the core changes, not only a function's own."""
+"""A change of any file of the core makes all compiled functions stale."""
 
 import os
 import shutil
@@ -24,46 +24,34 @@ from gensig.dynamics._vector import compiled
 def calling(x):
     return 2.0 * called(x)
 """
-ASK = "from gensig.dynamics._calling import calling; print(calling(1.0), sum(calling.stats.cache_hits.values()))"
+PROGRAM = """
+from gensig.dynamics._calling import calling
+print(calling(1.0), sum(calling.stats.cache_hits.values()))
+"""
 
 
-def test_all_functions_know_all_files() -> None:
-    stamps = {
-        function._cache._cache_file._source_stamp
-        for function in (
-            _newmark_kernels.advance,
-            _newmark_kernels.rest,
-            _line_mesh_kernels.gather,
-        )
-    }
-    assert stamps == {source_stamp(PACKAGE)}
+def test_all_functions_have_the_stamp_of_all_files() -> None:
+    newmark = _newmark_kernels.advance, _newmark_kernels.rest
+    for function in (*newmark, _line_mesh_kernels.gather):
+        stamp = function._cache._cache_file._source_stamp
+        assert stamp == source_stamp(PACKAGE)
 
 
-def test_a_change_of_what_is_called_is_noticed(tmp_path: Path) -> None:
+def test_a_change_of_a_called_function_is_noticed(tmp_path: Path) -> None:
     package = tmp_path / "gensig" / "dynamics"
     package.mkdir(parents=True)
-    for place in (package, package.parent):
-        (place / "__init__.py").write_text("")
+    for folder in (package, package.parent):
+        (folder / "__init__.py").write_text("")
     shutil.copy(PACKAGE / "dynamics" / "_vector.py", package)
     (package / "_calling.py").write_text(CALLING)
+    paths = {"PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
 
-    def asked(called: str) -> list[str]:
+    def output(called: str) -> list[str]:
         (package / "_called.py").write_text(called)
-        told = {
-            **os.environ,
-            "PYTHONPATH": str(tmp_path),
-            "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
-        }
-        done = subprocess.run(
-            [sys.executable, "-c", ASK],
-            env=told,
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        return done.stdout.split()
+        command = [sys.executable, "-c", PROGRAM]
+        options = {"env": {**os.environ, **paths}, "cwd": tmp_path, "text": True}
+        return subprocess.check_output(command, **options).split()
 
-    assert asked(CALLED) == ["4.0", "0"]
-    assert asked(CALLED) == ["4.0", "1"]
-    assert asked(CALLED.replace("1.0", "2.0")) == ["6.0", "0"]
+    assert output(CALLED) == ["4.0", "0"]
+    assert output(CALLED) == ["4.0", "1"]
+    assert output(CALLED.replace("1.0", "2.0")) == ["6.0", "0"]

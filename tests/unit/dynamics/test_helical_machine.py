@@ -1,11 +1,11 @@
-"""What a helical machine is made of, which channels it has, and what it refuses."""
+"""Equations, channels and refusals of a helical machine."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from chord_tables import Slices, as_chords, with_table
-from numpy.testing import assert_allclose
+from closeness import assert_close
 
 from gensig.dynamics._layout import MOST_PAIRS, HelicalGroup
 from gensig.dynamics.helical import AXIAL_DOFS, half_lag, pitches
@@ -25,8 +25,13 @@ SUPPORT = {
     "damping_x_ns_per_m": 1.0,
     "damping_y_ns_per_m": 1.0,
 }
-AXIAL = {"stiffness_z_n_per_m": 2e7, "stiffness_tilt_nm_per_rad": 3e4, "damping_z_ns_per_m": 5.0,
-         "damping_tilt_nms_per_rad": 0.1}  # fmt: skip
+AXIAL = {
+    "stiffness_z_n_per_m": 2e7,
+    "stiffness_tilt_nm_per_rad": 3e4,
+    "damping_z_ns_per_m": 5.0,
+    "damping_tilt_nms_per_rad": 0.1,
+}
+ROTORS = {"system.motor.inertia_kg_m2": 2e-3, "system.load.inertia_kg_m2": 0.05}
 
 
 @pytest.fixture(scope="module")
@@ -36,119 +41,101 @@ def spur(xiamen, dynamics_of):
 
 @pytest.fixture(scope="module")
 def helical(xiamen, spur):
-    return with_table(
-        spur, Slices(xiamen, 0.35, n_slices=8).table(np.array([0.0, 3e-6, 8e-6]))
-    )
+    table = Slices(xiamen, 0.35, n_slices=8).table(np.array([0.0, 3e-6, 8e-6]))
+    return with_table(spur, table)
 
 
-def test_a_support_takes_axial_keys_or_none(xiamen):
-    assert_allclose(read(Support, SUPPORT, "support").stiffness_z, 0.0, rtol=0, atol=0)
-    found = read(Support, {**SUPPORT, **AXIAL}, "support")
-    assert_allclose(
-        [found.stiffness_z, found.stiffness_tilt, found.damping_z, found.damping_tilt],
-        [2e7, 3e4, 5.0, 0.1],
-        rtol=1e-12,
-    )
+def test_a_support_takes_axial_keys_or_none():
+    assert read(Support, SUPPORT, "support").stiffness_z == 0.0
+    held = read(Support, {**SUPPORT, **AXIAL}, "support")
+    axial = held.stiffness_z, held.stiffness_tilt, held.damping_z, held.damping_tilt
+    assert_close(axial, [2e7, 3e4, 5.0, 0.1], 1e-12)
 
 
-@pytest.mark.parametrize("key", AXIAL)
-def test_negative_axial_keys_are_named(key):
-    with pytest.raises(ConfigError, match=f"support.{key} = -1 must not be negative"):
-        read(Support, {**SUPPORT, key: -1.0}, "support")
+@pytest.mark.parametrize(
+    ("keys", "text"),
+    [
+        *[({key: -1.0}, f"support.{key} = -1 must not be negative") for key in AXIAL],
+        ({"stiffness_tilt_n_per_m": 1.0}, "has the wrong unit"),
+    ],
+)
+def test_impossible_axial_keys_are_refused(keys, text):
+    with pytest.raises(ConfigError, match=text):
+        read(Support, {**SUPPORT, **keys}, "support")
 
 
-def test_a_stiffness_with_the_unit_of_another_is_refused():
-    with pytest.raises(ConfigError, match="stiffness_tilt"):
-        read(Support, {**SUPPORT, "stiffness_tilt_n_per_m": 1.0}, "support")
-
-
-def test_masses_and_supports_stand_where_the_names_say(helical):
-    system, mass = helical.system(), {}
-    for name, gear in (("pinion", helical.pinion), ("wheel", helical.wheel)):
+def test_masses_and_supports_of_the_axial_motions(helical):
+    system = helical.system()
+    for name in AXIAL_DOFS:
+        dof, gear = helical.dofs.index(name), getattr(helical, name.partition("_")[0])
         held = gear.support
-        mass.update({f"{name}_z": (gear.mass, held.stiffness_z, held.damping_z)})
-        mass.update({f"{name}_tilt_{axis}": (gear.tilt_inertia, held.stiffness_tilt, held.damping_tilt)
-                     for axis in "xy"})  # fmt: skip
-    for name, expected in mass.items():
-        place = helical.dofs.index(name)
-        found = (
-            system.mass[place],
-            system.stiffness[place, place],
-            system.damping[place, place],
-        )
-        assert_allclose(found, expected, rtol=1e-12)
-        assert np.count_nonzero(system.stiffness[place]) == 1
-        assert abs(system.rotation[place]) == 0.0
+        expected = gear.mass, held.stiffness_z, held.damping_z
+        if "tilt" in name:
+            expected = gear.tilt_inertia, held.stiffness_tilt, held.damping_tilt
+        diagonals = system.mass, np.diag(system.stiffness), np.diag(system.damping)
+        assert_close([values[dof] for values in diagonals], expected, 1e-12)
+        assert np.count_nonzero(system.stiffness[dof]) == 1
+        assert system.rotation[dof] == 0.0
 
 
 def test_motor_and_load_follow_the_gears(helical, machine):
-    driven = machine(
-        {"system.motor.inertia_kg_m2": 2e-3, "system.load.inertia_kg_m2": 0.05}
-    )
+    driven = machine(ROTORS)
     whole = replace(helical, motor=driven.motor, load=driven.load)
     assert whole.dofs == (*PAIR_DOFS, *AXIAL_DOFS, "motor_rotation", "load_rotation")
-    assert_allclose(
-        whole.approach_direction() @ whole.system().rotation, 0.0, rtol=0, atol=1e-15
-    )
+    approach = whole.approach_direction() @ whole.system().rotation
+    assert_close(approach, 0.0, atol=1e-15)
     assert isinstance(pack([whole], 1e-6), HelicalGroup)
 
 
-def test_rest_is_where_nothing_is_pushed(helical):
-    """Supports hold the mean mesh force; the pinion has not turned."""
-    system, force, rest = helical.system(), helical.mesh_force, helical.rest()
-    held = system.stiffness @ rest + force * helical.approach_direction()
-    places = [
-        place
-        for place, name in enumerate(helical.dofs)
-        if not name.endswith("rotation")
-    ]
-    assert_allclose(held[places], 0.0, rtol=0, atol=1e-9 * force)
-    assert abs(rest[2]) == 0.0
+def test_supports_hold_the_mesh_force_at_rest(helical):
+    force, rest = helical.mesh_force, helical.rest()
+    held = helical.system().stiffness @ rest + force * helical.approach_direction()
+    moving = [not name.endswith("rotation") for name in helical.dofs]
+    assert_close(held[moving], 0.0, atol=1e-9 * force)
+    assert rest[2] == 0.0
 
 
-@pytest.mark.parametrize("left_out", ["stiffness_z", "stiffness_tilt", "tilt_inertia"])
-def test_a_gear_that_nothing_holds_is_refused(helical, left_out):
-    body = helical.wheel
-    if left_out == "tilt_inertia":
+@pytest.mark.parametrize("key", ["stiffness_z", "stiffness_tilt", "tilt_inertia"])
+def test_a_gear_without_axial_support_is_refused(helical, key):
+    body, support = helical.wheel, helical.wheel.support
+    if key == "tilt_inertia":
         loose = replace(body, tilt_inertia=0.0)
     else:
-        loose = replace(body, support=replace(body.support, **{left_out: 0.0}))
+        loose = replace(body, support=replace(support, **{key: 0.0}))
     with pytest.raises(ConfigError, match=r"gear\.wheel: a helical pair needs"):
         replace(helical, wheel=loose)
 
 
-def test_more_pairs_than_are_followed_are_refused(helical):
+def test_too_many_pairs_are_refused(helical):
     last = helical.table.first_pitch + MOST_PAIRS + 1
     with pytest.raises(ConfigError, match=f"{MOST_PAIRS + 1} pairs of teeth"):
         replace(helical, table=replace(helical.table, last_pitch=last))
 
 
-def test_channels_along_the_axis_are_those_of_helical_gears(helical, spur):
+def test_axial_channels_are_those_of_helical_gears(helical, spur):
     check_channels(("pinion_z", "wheel_z"), helical.dofs)
-    with pytest.raises(
-        ConfigError, match=r"sensing\.channels: no channel pinion_z; allowed: pinion_x"
-    ):
+    text = r"sensing\.channels: no channel pinion_z; allowed: pinion_x"
+    with pytest.raises(ConfigError, match=text):
         check_channels(("pinion_z",), spur.dofs)
-    assert [name for name in helical.dofs if is_turning(name)] == [
-        "pinion_rotation", "wheel_rotation", "pinion_tilt_x", "pinion_tilt_y", "wheel_tilt_x", "wheel_tilt_y"
-    ]  # fmt: skip
+    turning = [name for name in helical.dofs if is_turning(name)]
+    tilts = [name for name in AXIAL_DOFS if "tilt" in name]
+    assert turning == ["pinion_rotation", "wheel_rotation", *tilts]
 
 
-def test_a_gearbox_keeps_what_holds_the_axis(xiamen):
+def test_a_gearbox_keeps_the_axial_support(xiamen):
     held = read(Support, {**SUPPORT, **AXIAL}, "support")
     body = Body(mass=2.0, inertia=1e-3, support=held, tilt_inertia=6e-4)
-    gearbox = nominal_gearbox(4)
-    given = replace(
-        xiamen.quality, support_damping_ratio_low=None, support_damping_ratio_high=None
-    )
-    assert in_gearbox(body, gearbox, slice(0, 2), given).support == held
-    drawn = replace(
-        xiamen.quality, support_damping_ratio_low=0.02, support_damping_ratio_high=0.04
-    )
-    found = in_gearbox(body, gearbox, slice(0, 2), drawn).support
-    ratio = found.damping_x / (2.0 * np.sqrt(1e8 * 2.0))
-    assert_allclose(found.damping_z, 2.0 * ratio * np.sqrt(2e7 * 2.0), rtol=1e-12)
-    assert_allclose(found.damping_tilt, 2.0 * ratio * np.sqrt(3e4 * 6e-4), rtol=1e-12)
+
+    def mounted(low, high):
+        limits = {"support_damping_ratio_low": low, "support_damping_ratio_high": high}
+        quality = replace(xiamen.quality, **limits)
+        return in_gearbox(body, nominal_gearbox(4), slice(0, 2), quality).support
+
+    assert mounted(None, None) == held
+    drawn = mounted(0.02, 0.04)
+    twice_ratio = drawn.damping_x / np.sqrt(1e8 * 2.0)
+    assert_close(drawn.damping_z, twice_ratio * np.sqrt(2e7 * 2.0), 1e-12)
+    assert_close(drawn.damping_tilt, twice_ratio * np.sqrt(3e4 * 6e-4), 1e-12)
 
 
 def test_pairs_and_lag_follow_the_table(helical, spur):
@@ -157,44 +144,32 @@ def test_pairs_and_lag_follow_the_table(helical, spur):
     first, last = pitches(helical.table)
     assert pack([helical], 1e-6).n_pairs == last - first > 4
     pair = helical.table.pair
-    assert_allclose(
-        2.0 * half_lag(helical.table), pair.overlap_ratio * pair.base_pitch, rtol=1e-12
+    assert_close(
+        2.0 * half_lag(helical.table), pair.overlap_ratio * pair.base_pitch, 1e-12
     )
 
 
-def test_sliding_turns_where_the_middle_of_the_face_passes_the_pitch_point(helical):
-    table = helical.table
-    turn, lag = table.pair.pitch_point + half_lag(table), half_lag(table)
-    place = turn + np.linspace(-0.3, 0.3, 7) * lag
-    arms = loss_arm(table, place)
-    assert_allclose(
-        arms, arms[::-1], rtol=1e-9, atol=0
-    )  # against sliding on both sides
-    assert (arms[[0, 1, 2]] > 0).all()
+def test_sliding_turns_with_the_middle_of_the_face_at_the_pitch_point(helical):
+    table, lag = helical.table, half_lag(helical.table)
+    position = table.pair.pitch_point + lag + np.linspace(-0.3, 0.3, 7) * lag
+    arms = loss_arm(table, position)
+    assert_close(arms, arms[::-1], 1e-9)
+    assert (arms[:3] > 0).all()
     assert abs(arms[3]) < 1e-12
 
 
-def test_teeth_that_nobody_has_take_no_room(helical, spur):
-    """Rows are the kinds of teeth that meet; sound ones stand first for the back flanks."""
+def test_unused_kinds_of_teeth_are_not_stored(spur):
+    """Rows are the kinds of teeth that meet; sound ones come first for the back flanks."""
     table = as_chords(spur.table, 2)
-    three = {
-        name: np.concatenate([getattr(table, name)] * 3)
-        for name in ("compliance", "compliance_slope", "gap", "gap_slope")
-    }
-    kind = np.full_like(table.pinion_kind, 2)
-    odd = replace(
-        table, **three, pinion_kind=kind, pinion_present=np.array([True, True, False])
-    )
-    group, one = (
-        pack([with_table(spur, odd)], 1e-6),
-        pack([with_table(spur, table)], 1e-6),
-    )
-    assert group.table.size == 2 * one.table.size
-    assert (group.tooth_row[: len(kind)] == -1).all()
+    names = "compliance", "compliance_slope", "gap", "gap_slope"
+    three = {name: np.concatenate([getattr(table, name)] * 3) for name in names}
+    kind, present = np.full_like(table.pinion_kind, 2), np.array([True, True, False])
+    odd = replace(table, **three, pinion_kind=kind, pinion_present=present)
+    missing, sound = (pack([with_table(spur, each)], 1e-6) for each in (odd, table))
+    assert missing.table.size == 2 * sound.table.size
+    assert (missing.tooth_row[: len(kind)] == -1).all()
 
 
-def test_equal_chords_leave_nothing_out(spur, helical):
-    for values in left_out_energy(as_chords(spur.table, 3)):
-        assert np.abs(values).max() == 0.0
-    energy, _ = left_out_energy(helical.table)
-    assert energy.max() > 0.0
+def test_equal_chords_leave_no_energy_out(spur, helical):
+    assert np.all(np.array(left_out_energy(as_chords(spur.table, 3))) == 0.0)
+    assert left_out_energy(helical.table)[0].max() > 0.0

@@ -1,10 +1,11 @@
-"""Hot pairs: what each effect of heat does to mesh stiffness, and what is refused."""
+"""Hot pairs: effects of heat on mesh stiffness, and refusals."""
 
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from closeness import assert_close
 
 from gensig.errors import ConfigError, ExtrapolationError, GeometryError
 from gensig.mesh.modification import FlankModification
@@ -20,256 +21,199 @@ from gensig.systems.hot_pair import (
 from gensig.systems.registry import read_duty, read_sliced_pair
 
 MESH = [
-    "system=helical_pair", "gear=chongqing_40_162", "mesh.law=paper", "mesh.pair_coupling=sum", "mesh.contact=linear",
-    "mesh.slice_coupling=independent", "mesh.allow_extrapolation=true", "mesh.n_slices=20",
-]  # fmt: skip
-EVEN = [
-    "heat.pinion_temperature_degc=70",
-    "heat.wheel_temperature_degc=70",
-    "heat.housing_temperature_degc=70",
+    "system=helical_pair",
+    "gear=chongqing_40_162",
+    "mesh.law=paper",
+    "mesh.pair_coupling=sum",
+    "mesh.contact=linear",
+    "mesh.slice_coupling=independent",
+    "mesh.allow_extrapolation=true",
+    "mesh.n_slices=20",
 ]
+FRICTION = "mesh.friction_coefficient"
 
 
-def duty_of(*words, heat="chongqing_rated"):
-    return read_duty(compose("generate", [*MESH, f"heat={heat}", *words]))
+def at(pinion, wheel=None, housing=None):
+    """Words for temperatures of the gears in degrees, and of the housing."""
+    sides = {"pinion": pinion, "wheel": wheel or pinion, "housing": housing}
+    known = {side: value for side, value in sides.items() if value is not None}
+    return [f"heat.{side}_temperature_degc={value}" for side, value in known.items()]
 
 
-def effects(**chosen):
-    return {"growth": False, "center_distance": False, "softening": False, **chosen}
+def config_of(*words, heat="chongqing_rated"):
+    return compose("generate", [*MESH, f"heat={heat}", *words])
 
 
-def test_no_heat_is_the_same_pair_to_the_bit():
+def duty_of(*words, **options):
+    return read_duty(config_of(*words, **options))
+
+
+def variants_of(*words):
+    duty = duty_of(*words)
+    return duty, stiffness_variants(duty, hot_state(duty))
+
+
+def heated_by(duty, **chosen):
+    effects = {"growth": False, "center_distance": False, "softening": False, **chosen}
+    return heated(duty, hot_state(duty), **effects)
+
+
+def test_without_heat_it_is_the_cold_pair():
     duty = duty_of(heat="none")
     assert as_configured(duty) is duty.system
-    cold = read_sliced_pair(compose("generate", MESH))
-    assert cold == duty.system
-    np.testing.assert_array_equal(
-        cold.transmission_error().error, duty.system.transmission_error().error
-    )
+    assert read_sliced_pair(compose("generate", MESH)) == duty.system
+    for variant in variants_of(*at(20, housing=20))[1].values():
+        assert_close(variant.single, duty.system.single_pair(401)[1], 1e-12)
 
 
 def test_gears_and_housing_equally_hot_are_as_stiff_per_width():
-    """In-plane stiffness does not know the size: only the wider face makes them stiffer."""
-    duty = duty_of(*EVEN)
-    variants = stiffness_variants(duty, hot_state(duty))
-    strain = duty.heat.expansion * 50.0
+    """In-plane stiffness is independent of the size; the wider face makes them stiffer."""
+    duty, variants = variants_of(*at(70, housing=70))
+    factor = 1.0 + duty.heat.expansion * 50.0
     for name in ("true", "contact_ratio"):
-        ratio = variants[name].mesh / variants["cold"].mesh
-        np.testing.assert_allclose(ratio, 1.0 + strain, rtol=1e-7)
-        np.testing.assert_allclose(
-            variants[name].single, variants["cold"].single * (1.0 + strain), rtol=1e-7
-        )
+        for curve in ("mesh", "single"):
+            cold = getattr(variants["cold"], curve)
+            assert_close(getattr(variants[name], curve), cold * factor, 1e-7)
 
 
-def test_gears_at_the_reference_temperature_are_the_cold_pair():
-    cool = [word.replace("=70", "=20") for word in EVEN]
-    duty = duty_of(*cool)
-    variants = stiffness_variants(duty, hot_state(duty))
-    for variant in variants.values():
-        np.testing.assert_allclose(variant.single, variants["cold"].single, rtol=1e-12)
-
-
-def test_softening_is_the_modulus_s():
+def test_softening_is_that_of_the_modulus():
     """With a linear contact stiffness is proportional to Young's modulus."""
-    duty = duty_of(*EVEN, "heat.growth=false", "heat.center_distance=false")
-    variants = stiffness_variants(duty, hot_state(duty))
+    switched_off = "heat.growth=false", "heat.center_distance=false"
+    duty, variants = variants_of(*at(70, housing=70), *switched_off)
     assert set(variants) == {"cold", "softened"}
     ratio = duty.heat.modulus_ratio(70.0)
     assert 0.98 < ratio < 0.99
-    np.testing.assert_allclose(
-        variants["softened"].mesh / variants["cold"].mesh, ratio, rtol=1e-9
-    )
+    assert_close(variants["softened"].mesh, variants["cold"].mesh * ratio, 1e-9)
 
 
-@pytest.mark.parametrize(
-    ("pinion", "wheel"), [(70.0, 70.0), (90.0, 40.0), (45.0, 80.0)]
-)
-def test_gears_hotter_than_the_housing_reach_farther_into_each_other(pinion, wheel):
-    """Against the path of contact of gears that are each grown as they are, at the housing's centre distance."""
-    duty = duty_of(
-        f"heat.pinion_temperature_degc={pinion}", f"heat.wheel_temperature_degc={wheel}",
-        "heat.housing_temperature_degc=30", "gear.backlash_um=2000",
-    )  # fmt: skip
-    state, cold = hot_state(duty), duty.system.pair
-    pair = heated(duty, state, **effects(growth=True, center_distance=True)).pair
-    strain = {
-        "pinion": (pinion - 20) * duty.heat.expansion,
-        "wheel": (wheel - 20) * duty.heat.expansion,
-    }
-    base = {
-        name: getattr(cold, name).base_radius * (1 + strain[name]) for name in strain
-    }
-    tip = {name: getattr(cold, name).tip_radius * (1 + strain[name]) for name in strain}
-    distance = cold.center_distance * (1 + 10 * duty.heat.expansion)
-    assert pair.center_distance == pytest.approx(distance, rel=1e-9)
-    tangent = math.sqrt(distance**2 - sum(base.values()) ** 2)
-    path = sum(math.sqrt(tip[name] ** 2 - base[name] ** 2) for name in strain) - tangent
-    exact = path / (
-        2 * math.pi * sum(base.values()) / (cold.pinion.n_teeth + cold.wheel.n_teeth)
+@pytest.mark.parametrize(("pinion", "wheel"), [(70, 70), (90, 40), (45, 80)])
+def test_gears_hotter_than_the_housing_have_a_longer_path_of_contact(pinion, wheel):
+    """Against the path of gears that are each grown, at the housing's centre distance."""
+    duty = duty_of(*at(pinion, wheel, 30), "gear.backlash_um=2000")
+    cold, expansion = duty.system.pair, duty.heat.expansion
+    pair = heated_by(duty, growth=True, center_distance=True).pair
+    gears = (
+        (cold.pinion, 1 + (pinion - 20) * expansion),
+        (cold.wheel, 1 + (wheel - 20) * expansion),
     )
+    base = sum(gear.base_radius * growth for gear, growth in gears)
+    distance = cold.center_distance * (1 + 10 * expansion)
+    assert_close(pair.center_distance, distance, 1e-9)
+    flanks = sum(
+        growth * math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
+        for gear, growth in gears
+    )
+    path = flanks - math.sqrt(distance**2 - base**2)
+    exact = path / (2 * math.pi * base / (cold.pinion.n_teeth + cold.wheel.n_teeth))
     assert exact > cold.transverse_contact_ratio + 0.01
-    # tips are taken as grown by the common strain: wrong by the difference of the strains times their curvature
-    allowed = 1e-6 if pinion == wheel else 0.006
-    assert pair.transverse_contact_ratio == pytest.approx(exact, abs=allowed)
+    # tips grow by the common strain: an error of the difference of strains times the curvature
+    tolerance = 1e-6 if pinion == wheel else 0.006
+    assert_close(pair.transverse_contact_ratio, exact, atol=tolerance)
     assert pair.backlash < cold.backlash
 
 
-def test_a_hotter_pinion_loads_the_pair_that_leaves():
-    even = duty_of(*EVEN)
-    uneven = duty_of(
-        "heat.pinion_temperature_degc=90", "heat.wheel_temperature_degc=50"
-    )
-    loads = []
-    for duty in (even, uneven):
-        system = heated(duty, hot_state(duty), **effects(growth=True))
+def test_a_hotter_pinion_loads_the_leaving_pair():
+    early = []
+    for words in (at(70, housing=70), at(90, 50)):
+        system = heated_by(duty_of(*words), growth=True)
         contact = system.transmission_error().contact
-        early = contact.line_load[contact.position < system.pair.pitch_point].sum()
-        loads.append(early / contact.line_load.sum())
-    assert loads[1] < 0.9 * loads[0]
+        approaching = contact.position < system.pair.pitch_point
+        early.append(contact.line_load[approaching].sum() / contact.line_load.sum())
+    assert early[1] < 0.9 * early[0]
 
 
-def test_apparent_stiffness_is_force_over_what_growth_leaves_of_the_approach():
-    duty = duty_of("heat.pinion_temperature_degc=30", "heat.wheel_temperature_degc=30")
-    state = hot_state(duty)
-    variants, thermal = (
-        stiffness_variants(duty, state),
-        state.growth.teeth_alone(duty.system.pair),
-    )
+def test_apparent_stiffness_is_force_over_the_approach_less_growth():
+    duty, variants = variants_of(*at(30))
+    thermal = hot_state(duty).growth.teeth_alone(duty.system.pair)
     cold, apparent = variants["cold"], variants["apparent"]
-    assert thermal == pytest.approx(10 * 0.345e-6, rel=0.02)
-    np.testing.assert_allclose(
-        apparent.mesh, duty.system.mesh_force / (cold.approach - thermal), rtol=1e-12
-    )
+    assert_close(thermal, 10 * 0.345e-6, 0.02)
+    left = cold.approach - thermal
+    assert_close(apparent.mesh, duty.system.mesh_force / left, 1e-12)
     raised = apparent.single.max() / cold.single.max()
-    assert raised == pytest.approx(
-        cold.approach.mean() / (cold.approach.mean() - thermal), rel=1e-12
-    )
-    hotter = duty_of("heat.pinion_temperature_degc=120", "heat.wheel_temperature_degc=120", "gear.backlash_um=3000",
-                     "heat.center_distance=false")  # fmt: skip
-    assert "apparent" not in stiffness_variants(hotter, hot_state(hotter))
+    assert_close(raised, cold.approach.mean() / left.mean(), 1e-12)
+    hotter = *at(120), "gear.backlash_um=3000", "heat.center_distance=false"
+    assert "apparent" not in variants_of(*hotter)[1]
 
 
-def test_more_friction_makes_hotter_gears_and_no_other_load():
+def test_sweeps():
+    """Friction heats the gears and leaves the cold load; heat is proportional to speed."""
     duty = duty_of("heat.softening=false")
     cool, hot = sweep(duty, "friction", [0.03, 0.07])
-    np.testing.assert_array_equal(cool["cold"].mesh, hot["cold"].mesh)
-    assert (
-        hot["contact_ratio"].transverse_contact_ratio
-        > cool["contact_ratio"].transverse_contact_ratio
+    assert np.array_equal(cool["cold"].mesh, hot["cold"].mesh)
+    ratios = [each["contact_ratio"].transverse_contact_ratio for each in (cool, hot)]
+    assert ratios[1] > ratios[0]
+    slow, fast = (hot_state(replace(duty, speed=speed)) for speed in (60.0, 120.0))
+    assert_close(fast.friction_heat, 2.0 * slow.friction_heat, 1e-12)
+    light, heavy = (
+        each["cold"].approach.mean() for each in sweep(duty, "torque", [12e3, 24e3])
     )
-    states = [hot_state(replace(duty, speed=speed)) for speed in (60.0, 120.0)]
-    assert states[1].friction_heat == pytest.approx(
-        2.0 * states[0].friction_heat, rel=1e-12
-    )
-    slow, fast = sweep(duty, "torque", [12e3, 24e3])
-    assert slow["cold"].approach.mean() == pytest.approx(
-        0.5 * fast["cold"].approach.mean(), rel=1e-9
-    )
-    with pytest.raises(
-        ConfigError, match="a sweep over 'oil'; allowed: friction, torque, speed"
-    ):
+    assert_close(light, 0.5 * heavy, 1e-9)
+    text = "a sweep over 'oil'; allowed: friction, torque, speed"
+    with pytest.raises(ConfigError, match=text):
         sweep(duty, "oil", [1.0])
 
 
-@pytest.mark.parametrize(("known_at", "power"), [("null", 1.0), ("600", 0.5)])
-def test_cooling_grows_with_the_root_of_the_speed(known_at, power):
-    """Friction heat goes with speed; the faces keep their temperature's shape where cooling is so weak."""
-    duty = duty_of(
-        f"heat.convection_speed_rpm={known_at}", "heat.conductivity_w_per_mk=500"
-    )
+@pytest.mark.parametrize(
+    ("known_at", "power", "rtol"), [("null", 1.0, 1e-9), ("600", 0.5, 0.02)]
+)
+def test_cooling_grows_with_the_root_of_the_speed(known_at, power, rtol):
+    """Friction heat grows with the speed; with weak cooling the temperature keeps its shape."""
+    words = f"heat.convection_speed_rpm={known_at}", "heat.conductivity_w_per_mk=500"
+    duty = duty_of(*words)
+
+    def tooth(duty, speed):
+        return hot_state(replace(duty, speed=speed)).pinion.tooth
+
     slow, fast = (
-        hot_state(replace(duty, speed=speed)).pinion for speed in (60.0, 240.0)
+        tooth(duty, speed) - duty.heat.oil_temperature for speed in (60.0, 240.0)
     )
-    rise = [body.tooth - duty.heat.oil_temperature for body in (slow, fast)]
-    assert rise[1] / rise[0] == pytest.approx(
-        4.0**power, rel=1e-9 if known_at == "null" else 0.02
-    )
-    at_known = hot_state(replace(duty, speed=20.0 * math.pi)).pinion.tooth
-    fixed = replace(
-        duty, heat=replace(duty.heat, convection_speed=None), speed=20.0 * math.pi
-    )
-    assert hot_state(fixed).pinion.tooth == pytest.approx(at_known, rel=1e-12)
+    assert_close(fast / slow, 4.0**power, rtol)
+    fixed = replace(duty, heat=replace(duty.heat, convection_speed=None))
+    assert_close(tooth(fixed, 20.0 * math.pi), tooth(duty, 20.0 * math.pi), 1e-12)
 
 
-def test_heat_flows_to_the_wheel_what_the_pinion_leaves():
+def test_heat_is_shared_and_the_flash_lifts_a_flank_by_less_than_a_tenth_of_a_micrometre():
+    """A skin of some 30 um: no tooth grows by it."""
     duty = duty_of("heat.pinion_heat_share=0.3")
     state = hot_state(duty)
-    assert state.pinion.input == pytest.approx(0.3 * state.friction_heat)
-    assert state.wheel.input == pytest.approx(0.7 * state.friction_heat)
-
-
-def test_flash_lifts_the_flank_by_less_than_a_tenth_of_a_micrometre():
-    """A skin of some 30 um: no tooth grows by it."""
-    duty = duty_of()
-    state = hot_state(duty)
+    shares = state.pinion.input, state.wheel.input
+    assert_close(shares, np.array([0.3, 0.7]) * state.friction_heat, 1e-12)
     assert state.flash.max() > 20.0
     assert 0.0 < flash_skin_growth(duty, state) < 0.1e-6
 
 
-def test_a_modification_of_hot_flanks_adds_to_their_growth():
-    words = [
-        "heat.center_distance=false",
-        "heat.pinion_temperature_degc=90",
-        "heat.wheel_temperature_degc=50",
-    ]
-    hot = read_sliced_pair(compose("generate", [*MESH, "heat=chongqing_rated", *words]))
-    relieved = replace(
-        hot,
-        modification=replace(
-            hot.modification,
-            pinion=FlankModification(tip_relief=20e-6, tip_relief_height=6e-3),
-        ),
-    )
-    meshes = [
-        one.sliced_mesh()
-        for one in (
-            replace(hot, growth=None),
-            hot,
-            replace(relieved, growth=None),
-            relieved,
-        )
-    ]
-    plain, grown, ground, both = (
-        np.where(np.isfinite(mesh.gap), mesh.gap, 0.0) for mesh in meshes
-    )
-    assert np.ptp(grown - plain) > 1e-6
-    assert np.ptp(ground - plain) > 1e-6
-    np.testing.assert_allclose(
-        both - plain, (grown - plain) + (ground - plain), atol=1e-15
-    )
+def test_modification_and_growth_of_flanks_add():
+    words = "heat.center_distance=false", *at(90, 50)
+    hot = read_sliced_pair(config_of(*words))
+    relief = FlankModification(tip_relief=20e-6, tip_relief_height=6e-3)
+    relieved = replace(hot, modification=replace(hot.modification, pinion=relief))
+    cold, ground = replace(hot, growth=None), replace(relieved, growth=None)
+    gaps = [pair.sliced_mesh().gap for pair in (cold, hot, ground, relieved)]
+    plain, *others = (np.where(np.isfinite(gap), gap, 0.0) for gap in gaps)
+    by_heat, by_relief, by_both = (gap - plain for gap in others)
+    assert min(np.ptp(by_heat), np.ptp(by_relief)) > 1e-6
+    assert_close(by_both, by_heat + by_relief, atol=1e-15)
 
 
 @pytest.mark.parametrize(
     ("words", "error", "message"),
     [
-        (
-            ["heat.pinion_temperature_degc=120", "heat.wheel_temperature_degc=120"],
-            GeometryError,
-            "the gears jam: heat makes them grow",
-        ),
-        (
-            ["mesh.friction_coefficient=0.5"],
-            ExtrapolationError,
-            "pinion: a temperature of",
-        ),
+        (at(120), GeometryError, "the gears jam: heat makes them grow"),
+        ([f"{FRICTION}=0.5"], ExtrapolationError, "pinion: a temperature of"),
         (
             ["heat.face_convection_w_per_m2k=0", "heat.tooth_convection_w_per_m2k=0"],
             ConfigError,
             "pinion: nothing cools it",
         ),
         (
-            [
-                "heat.pinion_temperature_degc=150",
-                "heat.wheel_temperature_degc=150",
-                "gear.backlash_um=9000",
-            ],
+            [*at(150), "gear.backlash_um=9000"],
             GeometryError,
             "gears grown against the housing by heat: pinion: contact would reach",
         ),
     ],
 )
-def test_heat_that_no_pair_stands_is_one_line(words, error, message):
+def test_too_much_heat_is_refused_in_one_line(words, error, message):
     with pytest.raises(error) as caught:
-        read_sliced_pair(compose("generate", [*MESH, "heat=chongqing_rated", *words]))
+        read_sliced_pair(config_of(*words))
     assert str(caught.value).startswith(message)
     assert "\n" not in str(caught.value)

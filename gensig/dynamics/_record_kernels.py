@@ -1,0 +1,130 @@
+"""Compiled core: integration and low-pass of records, block by block."""
+
+from __future__ import annotations
+
+from gensig.dynamics._kernels import integrate
+from gensig.dynamics._vector import (
+    at,
+    compiled,
+    get_row,
+    plus_product,
+    set_row,
+    spread,
+    width,
+)
+
+BLOCK = 64  # output samples between two passes of the low-pass, whose input is still in the cache
+TOGETHER = 4  # samples of the low-pass that are summed side by side; divides BLOCK
+
+
+@compiled
+def low_pass(means, first, taps, factor, n_channels, n_samples, out, out_row):
+    """Every ``factor``-th value of the filtered series of every channel.
+
+    ``means`` (step, channel, lane) and, from row ``out_row`` on, ``out`` (sample, channel, lane)
+    are flat; ``first`` is the step at the first tap of the first sample. ``TOGETHER`` samples at a
+    time share their input: ``taps`` are padded at both ends with as many zeros as the first and
+    the last of these samples are apart.
+    """
+    apart = (TOGETHER - 1) * factor
+    n_taps = len(taps) - 2 * apart
+    for s in range(0, n_samples, TOGETHER):
+        n_read = n_taps + (min(TOGETHER, n_samples - s) - 1) * factor
+        for c in range(n_channels):
+            zero = spread(means, 0.0)
+            p, q, r, t = zero, zero, zero, zero
+            for k in range(n_read):
+                value = get_row(means, (first + s * factor + k) * n_channels + c)
+                tap = apart + k
+                p = plus_product(p, taps, tap, value)
+                q = plus_product(q, taps, tap - factor, value)
+                r = plus_product(r, taps, tap - 2 * factor, value)
+                t = plus_product(t, taps, tap - 3 * factor, value)
+            sample = (out_row + s) * n_channels + c
+            set_row(out, sample, p)
+            if s + 1 < n_samples:
+                set_row(out, sample + n_channels, q)
+            if s + 2 < n_samples:
+                set_row(out, sample + 2 * n_channels, r)
+            if s + 3 < n_samples:
+                set_row(out, sample + 3 * n_channels, t)
+
+
+@compiled
+def record(
+    group,
+    state,
+    lost,
+    fresh,
+    step,
+    first_step,
+    n_samples,
+    factor,
+    taps,
+    channels,
+    out,
+    angle,
+    seen,
+    means,
+    work,
+    wide,
+    near,
+):
+    """Integrate and decimate block by block, so that the internal rate stays in the cache.
+
+    ``out`` (lane, channel, sample) float64 takes ``n_samples``; the first tap of the first sample
+    is at the step after ``first_step``. ``means`` is a scratch of ``mean_rows`` rows of channels,
+    of which the last ``BLOCK`` take samples.
+    """
+    n, n_channels = width(work), len(channels)
+    n_kept = len(taps) - (2 * TOGETHER - 1) * factor
+    angle_row, now, done = 0, first_step, 0
+    samples = n_kept + BLOCK * factor
+    # one step, then the input of the first sample before its last steps, then block by block
+    n_steps, out_row = 1, -1
+    while True:
+        angle_row = integrate(
+            group,
+            state,
+            lost,
+            fresh,
+            step,
+            now,
+            n_steps,
+            channels,
+            means,
+            out_row,
+            angle,
+            angle_row,
+            factor,
+            seen,
+            work,
+            wide,
+            near,
+        )
+        now += n_steps
+        for lane in range(n):
+            fresh[lane] = 0.0
+        if out_row == n_kept:
+            n_block = n_steps // factor
+            low_pass(means, 0, taps, factor, n_channels, n_block, means, samples)
+            for lane in range(n):
+                for c in range(n_channels):
+                    series = (lane * n_channels + c) * n_samples + done
+                    for s in range(n_block):
+                        row = (samples + s) * n_channels + c
+                        out[series + s] = means[at(row, lane, n)]
+            for i in range(n_kept * n_channels):
+                set_row(means, i, get_row(means, n_steps * n_channels + i))
+            done += n_block
+        if done == n_samples:
+            break
+        if out_row < 0:
+            n_steps, out_row = n_kept, 0
+        else:
+            n_steps, out_row = min(BLOCK, n_samples - done) * factor, n_kept
+
+
+def mean_rows(n_taps, factor):
+    """Rows of channels that ``record`` needs for its steps, for padded taps."""
+    return n_taps - (2 * TOGETHER - 1) * factor + BLOCK * factor + BLOCK

@@ -1,0 +1,52 @@
+"""Energy and power of a gear pair along trajectories of the compiled integrator."""
+
+from typing import NamedTuple
+
+import numpy as np
+from lane_tools import laws, motion_of, trajectory
+
+
+class Balance(NamedTuple):
+    """Energy and power at every internal step, (step,)."""
+
+    energy: np.ndarray  # J, kinetic with true speeds, springs, mesh
+    supplied: np.ndarray  # W, drive and load
+    supports: np.ndarray  # W lost
+    mesh_damping: np.ndarray  # W lost
+    friction: np.ndarray  # W, negative when lost
+    stored: np.ndarray  # J, mesh only
+    step: float
+
+    @property
+    def residual(self):
+        """Largest imbalance of energy and work over the largest energy stored in the mesh."""
+        power = self.supplied - self.supports - self.mesh_damping + self.friction
+        gained = np.cumsum(0.5 * (power[1:] + power[:-1])) * self.step
+        imbalance = self.energy - self.energy[0] - np.append(0.0, gained)
+        return np.abs(imbalance).max() / self.stored.max()
+
+
+def balance(dynamics, step, n_steps):
+    """Balance of a motion from static equilibrium."""
+    start = dynamics.static_start(0.0)
+    q, v = trajectory(dynamics, start, np.zeros(len(start)), step, n_steps)
+    motions = motion_of(dynamics, step * np.arange(len(q)), q, v)
+    _, friction, moment_p, moment_w, _, stored, lost, _ = laws(
+        dynamics, motions, step
+    ).T
+    system = dynamics.system()
+    speeds = v + dynamics.operating.speed * system.rotation
+    springs = [dof for dof in range(len(start)) if dof not in (2, 5)]
+    k, c = np.diag(system.stiffness), np.diag(system.damping)
+    drive = system.force[2] - k[2] * q[:, 2] - c[2] * v[:, 2]
+    elastic = q[:, springs] ** 2 @ k[springs]
+    moments = moment_p * speeds[:, 2] + moment_w * speeds[:, 5]
+    return Balance(
+        energy=0.5 * (speeds**2 @ system.mass + elastic) + stored,
+        supplied=drive * speeds[:, 2] + system.force[5] * speeds[:, 5],
+        supports=v[:, springs] ** 2 @ c[springs],
+        mesh_damping=lost,
+        friction=friction * (v[:, 0] - v[:, 3]) + moments,
+        stored=stored,
+        step=step,
+    )
