@@ -81,7 +81,8 @@ class Fault(ABC):
             teeth = (teeth,)
         if max(teeth) >= gear.n_teeth:
             raise FaultError(
-                f"fault.tooth = {max(teeth)} is not on the {self.gear}, whose teeth are 0..{gear.n_teeth - 1}"
+                f"fault.tooth = {max(teeth)} is not on the {self.gear}, whose teeth are "
+                f"0..{gear.n_teeth - 1}"
             )
         return teeth
 

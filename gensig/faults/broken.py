@@ -103,8 +103,8 @@ class ChippedTooth(Fault):
         _require_height(self, "chip_height", self.chip_height, gear)
         if self.chip_width > gear.face_width:
             raise FaultError(
-                f"chip_width {self.chip_width * 1e3:.4g} mm is above the face width {gear.face_width * 1e3:.4g} mm of "
-                f"the {self.gear}; reduce fault.chip_width_mm"
+                f"chip_width {self.chip_width * 1e3:.4g} mm is above the face width "
+                f"{gear.face_width * 1e3:.4g} mm of the {self.gear}; reduce fault.chip_width_mm"
             )
         if self.chip_shape == "rectangular":
             sliced = tooth.split(np.array([self.chip_width]))
@@ -124,8 +124,9 @@ def _require_height(fault: Fault, key: str, height: float, gear: Gear) -> None:
     limit = tooth_height(gear)
     if height > limit * (1.0 + 1e-9):
         raise FaultError(
-            f"{key} {height * 1e3:.4g} mm is above the height {limit * 1e3:.4g} mm of the {fault.gear} tooth over its "
-            f"root chord (m = {gear.normal_module * 1e3:g} mm, z = {gear.n_teeth}); reduce fault.{key}_mm"
+            f"{key} {height * 1e3:.4g} mm is above the height {limit * 1e3:.4g} mm of the "
+            f"{fault.gear} tooth over its root chord (m = {gear.normal_module * 1e3:g} mm, z = "
+            f"{gear.n_teeth}); reduce fault.{key}_mm"
         )
 
 

@@ -67,7 +67,7 @@ class Crack(Fault):
         return 2.0 * root_curve_point(gear, self.crack_start)[1]
 
     def seed(self) -> Crack:
-        """The crack less depth, width, front, faces and tooth, which its growth law does not use."""
+        """The crack without depth, width and tooth: its growth law does not depend on them."""
         return Crack(
             gear=self.gear,
             tooth=0,
@@ -94,9 +94,9 @@ class Crack(Fault):
         abscissa, half = root_curve_point(gear, self.crack_start)
         if self.crack_depth >= 2.0 * half:
             raise FaultError(
-                f"crack_depth {self.crack_depth * 1e3:.4g} mm reaches through the root chord {2e3 * half:.4g} mm of "
-                f"the {self.gear} tooth (m = {gear.normal_module * 1e3:g} mm, z = {gear.n_teeth}); reduce "
-                f"fault.crack_depth_mm"
+                f"crack_depth {self.crack_depth * 1e3:.4g} mm reaches through the root chord "
+                f"{2e3 * half:.4g} mm of the {self.gear} tooth (m = {gear.normal_module * 1e3:g} "
+                f"mm, z = {gear.n_teeth}); reduce fault.crack_depth_mm"
             )
         crack = RootCrack(
             depth=depth,
@@ -114,8 +114,8 @@ class Crack(Fault):
         width = gear.face_width if self.crack_width is None else self.crack_width
         if not 0.0 <= width <= gear.face_width:
             raise FaultError(
-                f"fault.crack_width_mm = {width * 1e3:g} must lie in 0..{gear.face_width * 1e3:g}, the face width of "
-                f"the {self.gear}"
+                f"fault.crack_width_mm = {width * 1e3:g} must lie in "
+                f"0..{gear.face_width * 1e3:g}, the face width of the {self.gear}"
             )
         if self.crack_front == "straight" and width == gear.face_width:
             return np.array([self.crack_depth])

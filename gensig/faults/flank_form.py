@@ -200,7 +200,7 @@ class Wear(FlankForm):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TipRelief(FlankForm):
-    """A tip that stands back by ``relief``, which runs out ``relief_length`` along the line of action."""
+    """A tip relieved by ``relief``, over ``relief_length`` along the line of action."""
 
     kind: ClassVar[str] = "tip_relief"
     relief: float = unit("um")

@@ -107,21 +107,23 @@ def _require_on_flank(tooth: Tooth, patch: Patch, name: str) -> None:
     low, high = patch.abscissa - 0.5 * patch.length, patch.abscissa + 0.5 * patch.length
     if low < flank[0] - 1e-9 or high > flank[-1] + 1e-9:
         raise FaultError(
-            f"the {name} from {(low - root) * 1e3:.4g} to {(high - root) * 1e3:.4g} mm above the root chord leaves the "
-            f"flank of the {gear.name} tooth, which reaches from {(flank[0] - root) * 1e3:.4g} to "
-            f"{(flank[-1] - root) * 1e3:.4g} mm; change fault.{name}_position_mm or fault.{name}_length_mm"
+            f"the {name} from {(low - root) * 1e3:.4g} to {(high - root) * 1e3:.4g} mm above the "
+            f"root chord leaves the flank of the {gear.name} tooth, which reaches from "
+            f"{(flank[0] - root) * 1e3:.4g} to {(flank[-1] - root) * 1e3:.4g} mm; change "
+            f"fault.{name}_position_mm or fault.{name}_length_mm"
         )
     begin, end = patch.ends
     if begin < -1e-9 or end > gear.face_width + 1e-9:
         raise FaultError(
-            f"the {name} from {begin * 1e3:.4g} to {end * 1e3:.4g} mm across the face leaves the {gear.name} tooth, "
-            f"which is {gear.face_width * 1e3:.4g} mm wide; change fault.{name}_width_mm or "
-            f"fault.{name}_face_position_mm"
+            f"the {name} from {begin * 1e3:.4g} to {end * 1e3:.4g} mm across the face leaves the "
+            f"{gear.name} tooth, which is {gear.face_width * 1e3:.4g} mm wide; change "
+            f"fault.{name}_width_mm or fault.{name}_face_position_mm"
         )
     inside = (flank >= low) & (flank <= high)
     half = profile.half_thickness[profile.n_root_cells :][inside]
     if len(half) and patch.depth >= half.min():
         raise FaultError(
-            f"{name}_depth {patch.depth * 1e3:.4g} mm reaches the centreline of the {gear.name} tooth (half thickness "
-            f"{float(half.min()) * 1e3:.4g} mm there); reduce fault.{name}_depth_mm"
+            f"{name}_depth {patch.depth * 1e3:.4g} mm reaches the centreline of the {gear.name} "
+            f"tooth (half thickness {float(half.min()) * 1e3:.4g} mm there); reduce "
+            f"fault.{name}_depth_mm"
         )

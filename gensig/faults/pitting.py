@@ -91,7 +91,7 @@ class Pitting(Hole):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spalling(Hole):
-    """A spall: a larger hole, ``spall_shape`` rectangular or elliptic; positions as in ``Pitting``."""
+    """A larger hole, ``spall_shape`` rectangular or elliptic; positions as in ``Pitting``."""
 
     kind: ClassVar[str] = "spalling"
     prefix: ClassVar[str] = "spall"

@@ -44,7 +44,7 @@ COMPOUND = "compound"
 def fault_parts(
     values: Mapping[str, Any], where: str = "fault"
 ) -> list[Mapping[str, Any]]:
-    """The single faults of a configured fault: an empty list for healthy, the parts of a compound."""
+    """The single faults of a configured fault: none for healthy, the parts of a compound."""
     kind = values.get("kind")
     if kind == "healthy":
         return []
@@ -59,7 +59,8 @@ def fault_parts(
     unknown = sorted(set(values) - {"kind", "parts", "vary"})
     if unknown:
         raise FaultError(
-            f"{where}: unknown key '{unknown[0]}'; a compound fault has parts, each with its own keys"
+            f"{where}: unknown key '{unknown[0]}'; a compound fault has parts, each with its own "
+            "keys"
         )
     return list(parts)
 

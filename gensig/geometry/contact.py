@@ -46,9 +46,10 @@ class GearPair:
                 )
         if self.pinion.helix_angle != -self.wheel.helix_angle:
             raise GeometryError(
-                f"pinion and wheel cannot mesh on parallel shafts: helix_angle_deg = "
-                f"{math.degrees(self.pinion.helix_angle):g} and {math.degrees(self.wheel.helix_angle):g} must be equal "
-                f"and of opposite hand (sign)"
+                "pinion and wheel cannot mesh on parallel shafts: helix_angle_deg = "
+                f"{math.degrees(self.pinion.helix_angle):g} and "
+                f"{math.degrees(self.wheel.helix_angle):g} must be equal and of opposite hand "
+                "(sign)"
             )
         if self.backlash < 0.0:
             raise GeometryError(
@@ -64,16 +65,17 @@ class GearPair:
         ):
             if lowest < gear.junction_curvature_radius:
                 raise GeometryError(
-                    f"{gear.name}: contact would reach curvature radius {lowest * 1e3:.4g} mm, below the end of "
-                    f"its involute at {gear.junction_curvature_radius * 1e3:.4g} mm (interference); use more teeth, a "
-                    f"profile shift or a smaller addendum_coefficient of the mate"
+                    f"{gear.name}: contact would reach curvature radius {lowest * 1e3:.4g} mm, "
+                    f"below the end of its involute at {gear.junction_curvature_radius * 1e3:.4g} "
+                    "mm (interference); use more teeth, a profile shift or a smaller "
+                    "addendum_coefficient of the mate"
                 )
         for gear, mate in ((self.pinion, self.wheel), (self.wheel, self.pinion)):
             clearance = self.center_distance - gear.tip_radius - mate.root_radius
             if clearance < 0.0:
                 raise GeometryError(
-                    f"{gear.name}: its tip cuts {-clearance * 1e3:.3g} mm into the root of the {mate.name}; reduce the "
-                    f"sum of the profile shifts or addendum_coefficient"
+                    f"{gear.name}: its tip cuts {-clearance * 1e3:.3g} mm into the root of the "
+                    f"{mate.name}; reduce the sum of the profile shifts or addendum_coefficient"
                 )
 
     @property
@@ -204,8 +206,9 @@ class GearPair:
         """Raise unless at least one pair is always in contact."""
         if self.transverse_contact_ratio < 1.0:
             raise GeometryError(
-                f"the transverse contact ratio {self.transverse_contact_ratio:.4f} is below 1, so the drive is "
-                f"interrupted at every tooth; use more teeth, a smaller module or a larger addendum_coefficient"
+                f"the transverse contact ratio {self.transverse_contact_ratio:.4f} is below 1, so "
+                "the drive is interrupted at every tooth; use more teeth, a smaller module or a "
+                "larger addendum_coefficient"
             )
 
 
@@ -214,12 +217,14 @@ def corner_gap(pair: GearPair, position: Array) -> Array:
 
     Parameters
     ----------
-    position : (phase,) m    from A; negative before A (by the wheel's own rotation), above the path after E (by the
+    position : (phase,) m    from A; negative before A (by the wheel's own rotation), above the path
+        after E (by the
         pinion's own rotation)
 
     Returns
     -------
-    (phase,) m    pinion advance along the line of action at which a tip corner meets the mating flank; 0 on the path
+    (phase,) m    pinion advance along the line of action at which a tip corner meets the mating
+    flank; 0 on the path
 
     Exact for rigid involutes. Beyond E the pinion's tip corner meets the wheel's flank; before A
     the wheel's tip corner meets the pinion's flank.

@@ -48,24 +48,25 @@ class Gear:
             sine = math.sin(self.transverse_pressure_angle)
             limit = math.ceil(2.0 * depth / sine**2)
             raise GeometryError(
-                f"{self.name}: {self.n_teeth} teeth with profile shift {self.profile_shift:g} are undercut; use at "
-                f"least {limit} teeth or a larger profile_shift"
+                f"{self.name}: {self.n_teeth} teeth with profile shift {self.profile_shift:g} are "
+                f"undercut; use at least {limit} teeth or a larger profile_shift"
             )
         if self.root_half_angle >= math.pi / self.n_teeth:
             raise GeometryError(
                 f"{self.name}: a rack tip rounded by cutter_tip_radius_coefficient = "
-                f"{self.cutter_tip_radius_coefficient:g} is wider than the space between two teeth at "
-                f"{math.degrees(self.pressure_angle):g} degrees; reduce it"
+                f"{self.cutter_tip_radius_coefficient:g} is wider than the space between two "
+                f"teeth at {math.degrees(self.pressure_angle):g} degrees; reduce it"
             )
         if self.half_tooth_angle_at(self.tip_radius) <= 0.0:
             raise GeometryError(
-                f"{self.name}: the teeth are pointed below the tip radius {self.tip_radius * 1e3:.4g} mm; reduce "
-                f"profile_shift {self.profile_shift:g} or addendum_coefficient {self.addendum_coefficient:g}"
+                f"{self.name}: the teeth are pointed below the tip radius "
+                f"{self.tip_radius * 1e3:.4g} mm; reduce profile_shift {self.profile_shift:g} or "
+                f"addendum_coefficient {self.addendum_coefficient:g}"
             )
         if not 0.0 < self.bore_radius < self.root_radius:
             raise GeometryError(
-                f"{self.name}: bore_radius_mm = {self.bore_radius * 1e3:g} must lie between 0 and the root radius "
-                f"{self.root_radius * 1e3:.4g} mm"
+                f"{self.name}: bore_radius_mm = {self.bore_radius * 1e3:g} must lie between 0 and "
+                f"the root radius {self.root_radius * 1e3:.4g} mm"
             )
 
     def _check_ranges(self) -> None:
@@ -79,24 +80,26 @@ class Gear:
                 raise GeometryError(f"{self.name}: {key} = {value:g} must be positive")
         if not math.radians(10.0) <= self.pressure_angle <= math.radians(35.0):
             raise GeometryError(
-                f"{self.name}: pressure_angle_deg = {math.degrees(self.pressure_angle):g} must lie between 10 and 35"
+                f"{self.name}: pressure_angle_deg = {math.degrees(self.pressure_angle):g} must "
+                "lie between 10 and 35"
             )
         if not abs(self.helix_angle) <= math.radians(LARGEST_HELIX):
             raise GeometryError(
-                f"{self.name}: helix_angle_deg = {math.degrees(self.helix_angle):g} must lie between "
-                f"-{LARGEST_HELIX:g} and {LARGEST_HELIX:g}"
+                f"{self.name}: helix_angle_deg = {math.degrees(self.helix_angle):g} must lie "
+                f"between -{LARGEST_HELIX:g} and {LARGEST_HELIX:g}"
             )
         if not 0.0 <= self.clearance_coefficient <= 1.0:
             raise GeometryError(
-                f"{self.name}: clearance_coefficient = {self.clearance_coefficient:g} must lie in 0..1"
+                f"{self.name}: clearance_coefficient = {self.clearance_coefficient:g} must lie in "
+                "0..1"
             )
         rounding = self.cutter_tip_radius_coefficient
         sine = math.sin(self.transverse_pressure_angle)
         room = self.clearance_coefficient / (1.0 - sine)
         if not 0.0 < rounding <= room * 1.001:
             raise GeometryError(
-                f"{self.name}: cutter_tip_radius_coefficient = {rounding:g} must be positive and at most "
-                f"{room:.4g}, where the rounding reaches the working flank"
+                f"{self.name}: cutter_tip_radius_coefficient = {rounding:g} must be positive and "
+                f"at most {room:.4g}, where the rounding reaches the working flank"
             )
 
     @property

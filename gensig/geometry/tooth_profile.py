@@ -82,7 +82,7 @@ N_FLANK_CELLS = 384
 def tooth_profile(
     gear: Gear, *, n_root_cells: int = N_ROOT_CELLS, n_flank_cells: int = N_FLANK_CELLS
 ) -> ToothProfile:
-    """Outline with cells uniform in gamma on the root curve, in curvature radius on the involute."""
+    """Outline with cells uniform in gamma on the root curve, in curvature on the involute."""
     gamma = np.linspace(0.5 * np.pi, gear.transverse_pressure_angle, n_root_cells + 1)
     tip = np.sqrt(gear.tip_radius**2 - gear.base_radius**2)
     curvature = np.linspace(gear.junction_curvature_radius, tip, n_flank_cells + 1)

@@ -150,11 +150,13 @@ def _sound_mesh(pair: GearPair, material: Material, options: MeshOptions) -> _So
             for side, gear in pair.gears.items()
         },
         bending=slice_bending(pair, position, material, options),
-        shared_compliance=pair_coupling(pair, in_plane, options),
+        shared_compliance=coupling_compliance(pair, in_plane, options),
     )
 
 
-def pair_coupling(pair: GearPair, in_plane: Material, options: MeshOptions) -> float:
+def coupling_compliance(
+    pair: GearPair, in_plane: Material, options: MeshOptions
+) -> float:
     """Body compliance that tooth pairs in contact share, m/N; 0 with ``pair_coupling=sum``."""
     if options.pair_coupling == "sum":
         return 0.0

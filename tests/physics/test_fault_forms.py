@@ -15,7 +15,9 @@ UM = 1e-6
 
 
 def rows(system, fault, tooth=0):
-    """Gap beyond the sound tooth's, and compliance, of the faulty tooth at every node of the table, (node,) each."""
+    """Gap beyond the sound tooth's, and compliance, of the faulty tooth at every node of the table,
+    (node,) each.
+    """
     side = side_of(system.mesh_table((fault,)), fault.gear)
     row = side.kind[tooth]
     return side.gap[row] - side.gap[0], side.compliance[row]
@@ -33,7 +35,9 @@ def curvature(system, gear):
 
 
 def along_flank(system, gear):
-    """Place on the flank, 0 at the lower end of the involute and 1 at the tip, at the nodes on the path."""
+    """Place on the flank, 0 at the lower end of the involute and 1 at the tip, at the nodes on the
+    path.
+    """
     flank = faulty_teeth(system.pair, (one("pitch_error", gear=gear, tooth=0),))[
         gear, 0
     ].profile.curvature_radius
@@ -136,7 +140,9 @@ def patch(kind, prefix, gear, **changes):
 def test_a_broken_tooth_bends_as_the_sound_one_up_to_its_corner(
     xiamen, gear, height_mm
 ):
-    """What is gone carried nothing of a load below it; above it the corner is loaded, not what is no longer there."""
+    """What is gone carried nothing of a load below it; above it the corner is loaded, not what is
+    no longer there.
+    """
     fault = one("broken", gear=gear, tooth=0, broken_height_mm=height_mm)
     corner = faulty_teeth(xiamen.pair, (fault,))[gear, 0].tip_curvature_radius
     side = side_of(heavy_table(xiamen, fault), gear)
@@ -231,7 +237,9 @@ class TestGapsInClosedForm:
         within_second_order(xiamen, gear, rows(xiamen, fault)[0], expected)
 
     def test_the_mate_rides_on_the_start_of_a_steep_relief(self, xiamen, gear):
-        """Where slope times slope times radius is no longer small the gap is the edge's, not the relief's."""
+        """Where slope times slope times radius is no longer small the gap is the edge's, not the
+        relief's.
+        """
         gap, _ = rows(
             xiamen,
             one("tip_relief", gear=gear, tooth=0, relief_um=50, relief_length_mm=0.2),
@@ -242,7 +250,9 @@ class TestGapsInClosedForm:
 
 
 def within_second_order(system, gear, gap, expected):
-    """A mate of relative radius rho finds a deviation less at most slope^2 rho / 2, slope along the flank."""
+    """A mate of relative radius rho finds a deviation less at most slope^2 rho / 2, slope along the
+    flank.
+    """
     on, _ = path(system)
     largest = second_order(system, gear, expected).max()
     assert largest < 0.1 * np.ptp(expected)

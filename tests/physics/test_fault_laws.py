@@ -1,4 +1,6 @@
-"""What every fault must do to compliance and contact: nothing at severity zero, more with every step."""
+"""What every fault must do to compliance and contact: nothing at severity zero, more with every
+step.
+"""
 
 from dataclasses import replace
 
@@ -39,7 +41,9 @@ def test_severity_zero_is_healthy(xiamen, name, gear):
 
 @pytest.fixture(scope="module")
 def series(xiamen):
-    """Deflection and severity from nothing on, (step, node) and (step,); computed once for each case and gear."""
+    """Deflection and severity from nothing on, (step, node) and (step,); computed once for each
+    case and gear.
+    """
     known = {}
 
     def make(name, gear):
@@ -61,7 +65,9 @@ def series(xiamen):
 
 
 def steps(found):
-    """Change from each severity to the next, (step, node) m; nothing changes where no contact is left on either."""
+    """Change from each severity to the next, (step, node) m; nothing changes where no contact is
+    left on either.
+    """
     with np.errstate(invalid="ignore"):
         return np.nan_to_num(
             np.diff(found, axis=0), nan=0.0, posinf=np.inf, neginf=-np.inf
@@ -83,7 +89,9 @@ def test_the_deflection_never_falls_with_severity(series, name, gear):
 @pytest.mark.parametrize("gear", GEARS)
 @pytest.mark.parametrize("name", CASES)
 def test_more_of_it_shows(series, name, gear):
-    """Every step is seen somewhere, and each of at least a nanometre is 1000 times above the rounding."""
+    """Every step is seen somewhere, and each of at least a nanometre is 1000 times above the
+    rounding.
+    """
     change = np.abs(steps(series(name, gear)[0])).max(axis=1)
     assert np.all(change > 1e-9), change
 
@@ -111,7 +119,9 @@ class TestTheChecksCanFail:
         assert falls(series("profile_slope", "pinion")[0], 1e-9).any()
 
     def test_material_instead_of_gaps(self, xiamen):
-        """The paper's law narrows the face by the whole pit, however short; over gaps the mate rides on its edges."""
+        """The paper's law narrows the face by the whole pit, however short; over gaps the mate
+        rides on its edges.
+        """
         narrow, short = (
             replace(xiamen, mesh=replace(xiamen.mesh, law="paper")),
             one("pitting", pit_length_mm=0.05),
@@ -125,7 +135,9 @@ class TestTheChecksCanFail:
 
 @pytest.mark.parametrize("gear", GEARS)
 class TestWhoseFacesBear:
-    """The load of the drive flank presses a crack on the compression side together, whatever its severity."""
+    """The load of the drive flank presses a crack on the compression side together, whatever its
+    severity.
+    """
 
     def test_a_pressed_crack_that_breathes_costs_nothing(self, xiamen, gear):
         crack = one(
@@ -155,7 +167,9 @@ class TestWhoseFacesBear:
 
 
 class TestThePapersCrack:
-    """Eqs. (11) and (12), chosen by ``mesh.crack=paper`` alone or with the rest of the paper's conventions."""
+    """Eqs. (11) and (12), chosen by ``mesh.crack=paper`` alone or with the rest of the paper's
+    conventions.
+    """
 
     @pytest.fixture(scope="class")
     @classmethod
@@ -186,7 +200,8 @@ class TestThePapersCrack:
         ("start", "loss"), [("gamma_mid", 0.0281), ("arc_mid", 0.0403)]
     )
     def test_it_costs_what_its_formula_says(self, paper_machine, start, loss):
-        # spur reference (docs/validation.md), section 2.3: loss of pair stiffness at the pitch point, 1 mm
+        # spur reference (docs/validation.md), section 2.3: loss of pair stiffness at the pitch
+        # point, 1 mm
         assert_allclose(
             lost_at_pitch_point(paper_machine, one("crack", crack_start=start)),
             loss,
@@ -214,7 +229,9 @@ class TestThePapersPit:
     def test_slices_cost_the_same_where_the_pit_is_deeper_than_the_load(
         self, machine, paper_machine
     ):
-        """The rest of the paper's conventions under the law with gaps: the pit's slices stand clear of the mate."""
+        """The rest of the paper's conventions under the law with gaps: the pit's slices stand clear
+        of the mate.
+        """
         terms = {
             "elasticity": "plane_stress",
             "body": "sainsot",

@@ -1,4 +1,6 @@
-"""Static mesh: complementarity with the full flexibility matrix, mesh period, zones, and where a faulty tooth shows."""
+"""Static mesh: complementarity with the full flexibility matrix, mesh period, zones, and where a
+faulty tooth shows.
+"""
 
 from dataclasses import replace
 
@@ -30,7 +32,9 @@ def table(request, machine):
 
 
 def random_states(table, n=400, seed=0):
-    """Pairs with random compliances, gaps and absences, to leave nothing to the geometry's good nature."""
+    """Pairs with random compliances, gaps and absences, to leave nothing to the geometry's good
+    nature.
+    """
     rng = np.random.default_rng(seed)
     compliance = rng.uniform(4e-9, 9e-9, (n, 4)) - table.shared_compliance
     gap = rng.uniform(0, 30e-6, (n, 4)) * rng.integers(0, 2, (n, 4))
@@ -40,9 +44,11 @@ def random_states(table, n=400, seed=0):
 
 
 def violation(states, static, shared, force):
-    """Worst breach of: C F = approach - gap where F > 0, approach - C F <= gap elsewhere, F >= 0, sum F = force.
+    """Worst breach of: C F = approach - gap where F > 0, approach - C F <= gap elsewhere, F >= 0,
+    sum F = force.
 
-    C is the full flexibility matrix, own compliances on the diagonal and the shared body compliance everywhere.
+    C is the full flexibility matrix, own compliances on the diagonal and the shared body compliance
+    everywhere.
     """
     flexibility = np.einsum("ij,jk->ijk", states.compliance, np.eye(4)) + shared
     slack = (
@@ -83,7 +89,9 @@ class TestComplementarity:
 @pytest.mark.parametrize("gear", GEARS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_equilibrium_with_every_fault_over_a_turn(xiamen, kind, gear):
-    """C F = approach - gap where a pair carries, none pulls, none that could carry is left, all force is borne."""
+    """C F = approach - gap where a pair carries, none pulls, none that could carry is left, all
+    force is borne.
+    """
     faulty, force = (
         xiamen.mesh_table((one(kind, gear=gear, tooth=3),)),
         xiamen.mesh_force,
@@ -155,7 +163,9 @@ class TestMeshPeriod:
 @pytest.mark.parametrize("kind", FAULTS)
 @pytest.mark.parametrize("tooth", [0, 9])
 def test_a_faulty_tooth_shows_once_a_turn_at_its_number(xiamen, gear, kind, tooth):
-    """Tooth k enters contact at A when its gear has rolled k pitches; corner contact starts a little earlier."""
+    """Tooth k enters contact at A when its gear has rolled k pitches; corner contact starts a
+    little earlier.
+    """
     points, n_teeth = 100, getattr(xiamen.pair, gear).n_teeth
     roll = xiamen.pair.base_pitch * (np.arange(2 * n_teeth * points) + 0.5) / points
     force = xiamen.operating.torque / xiamen.pair.pinion.base_radius

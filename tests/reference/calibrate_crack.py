@@ -1,6 +1,8 @@
-"""Fit the crack's intensity factors to stored finite elements: ``python -m tests.reference.calibrate_crack``.
+"""Fit the crack's intensity factors to stored finite elements: ``python -m
+tests.reference.calibrate_crack``.
 
-Writes ``gensig/mesh/root_crack_coefficients.py`` and prints how well the fit holds, gear by gear, and how well it
+Writes ``gensig/mesh/root_crack_coefficients.py`` and prints how well the fit holds, gear by gear,
+and how well it
 holds for gears that were left out of it.
 """
 
@@ -30,7 +32,8 @@ MODULE, WIDTH, POISSON = (
     20e-3,
     0.3,
 )  # of the stored plane-strain runs, which state E W compliance
-# a crack almost along the outline cuts the tooth off: no intensity factor of the root's resultants describes it
+# a crack almost along the outline cuts the tooth off: no intensity factor of the root's resultants
+# describes it
 LEFT_OUT = {("z84", 75.0)}
 
 # the one gear with every angle from both starts: without it the others span too little to judge it
@@ -39,7 +42,9 @@ MOST_ANGLES = "z23_bore9"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Series:
-    """One crack: increments of E' W compliance at several contact points, with the fit's design matrix, (point, _)."""
+    """One crack: increments of E' W compliance at several contact points, with the fit's design
+    matrix, (point, _).
+    """
 
     case: str
     angle_deg: float
@@ -131,8 +136,7 @@ def errors(series: Sequence[Series], coefficients: Array) -> Array:
 def _told(name: str, found: Array) -> None:
     far = np.abs(found)
     print(
-        f"{name:<28}{len(found):>6}{100 * np.sqrt(np.mean(found**2)):>8.1f}{100 * np.quantile(far, 0.95):>8.1f}"
-        f"{100 * found.min():>8.1f}{100 * found.max():>8.1f}"
+        f"{name:<28}{len(found):>6}{100 * np.sqrt(np.mean(found**2)):>8.1f}{100 * np.quantile(far, 0.95):>8.1f}{100 * found.min():>8.1f}{100 * found.max():>8.1f}"
     )
 
 

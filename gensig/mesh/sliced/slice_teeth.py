@@ -69,8 +69,9 @@ def check_independent(teeth: Iterable[Tooth], slices: SliceOptions) -> None:
         and any(map(is_uneven, teeth))
     ):
         raise ConfigError(
-            "mesh.slice_coupling = 'independent' with a fault over part of the face: the tooth beside the fault would "
-            "not help to carry; take mesh.slice_coupling=coupled, or set mesh.independent_faulty_slices=true"
+            "mesh.slice_coupling = 'independent' with a fault over part of the face: the tooth "
+            "beside the fault would not help to carry; take mesh.slice_coupling=coupled, or set "
+            "mesh.independent_faulty_slices=true"
         )
 
 

@@ -112,21 +112,21 @@ class _Keyed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Setting:
-    """Inputs common to all tooth pairs of one table; ``pinion`` and ``wheel``: the commonest teeth."""
+    """Inputs common to all tooth pairs; ``pinion`` and ``wheel`` are the commonest teeth."""
 
     pair: GearPair
     material: Material
     options: MeshOptions
     slices: SliceOptions
-    deviation: _Known
+    deviation: _Keyed
     force: float
-    pinion: _Known
-    wheel: _Known
+    pinion: _Keyed
+    wheel: _Keyed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Frame:
-    """Depths (knot,) m without 0, positions (node,) m, largest tabulated gap m; see `SlicedTable`."""
+    """Depths (knot,) m without 0, positions (node,) m, largest gap m; see `SlicedTable`."""
 
     depth: Array
     position: Array
@@ -164,8 +164,9 @@ def sliced_table(
     )
     if (n_pairs := len(pinion) * len(wheel)) > MOST_PAIRS:
         raise FaultError(
-            f"{len(pinion)} different teeth of the pinion and {len(wheel)} of the wheel make {n_pairs} pairs, above "
-            f"{MOST_PAIRS}; put faults that differ from tooth to tooth on one gear or on fewer teeth"
+            f"{len(pinion)} different teeth of the pinion and {len(wheel)} of the wheel make "
+            f"{n_pairs} pairs, above {MOST_PAIRS}; put faults that differ from tooth to tooth on "
+            "one gear or on fewer teeth"
         )
     setting = _Setting(
         pair=pair,
@@ -392,7 +393,8 @@ def _forces(
     )
     if n_unsettled:
         raise GeometryError(
-            f"the bearing slices of a pair of teeth never settle at {n_unsettled} positions and depths"
+            f"the bearing slices of a pair of teeth never settle at {n_unsettled} positions and "
+            "depths"
         )
     return first, force
 

@@ -41,7 +41,9 @@ class TestReading:
         )
 
     def test_a_crack_of_three_keys_is_the_papers(self):
-        """What the first version of the format had suffices: through, straight, open, on the tension side."""
+        """What the first version of the format had suffices: through, straight, open, on the
+        tension side.
+        """
         short = {
             key: CRACK[key]
             for key in (

@@ -259,7 +259,8 @@ class TestCrackFront:
         edges = np.linspace(0.0, FULL, len(depth) + 1)
         middle = 0.5 * (edges[1:] + edges[:-1])
         assert np.all(depth[edges[:-1] >= width] <= 0)
-        # strips that lie in the crack whole; the very end of a parabola is too steep for the middle of its strip
+        # strips that lie in the crack whole; the very end of a parabola is too steep for the middle
+        # of its strip
         whole = edges[1:] <= 0.95 * width
         assert_allclose(
             depth[whole], 2e-3 * shape(middle[whole] / width), rtol=0.01, atol=0

@@ -171,8 +171,17 @@ class TestCompound:
             assert np.all(rows(two, "pinion", 0)[0] > rows(single, "pinion", 0)[0])
 
     def test_the_configuration_says_the_same(self, xiamen):
-        parts = [{"kind": "crack", "gear": "pinion", "tooth": 2, "crack_depth_mm": 1.0, "crack_angle_deg": 45,
-                  "crack_start": "arc_mid"}, {"kind": "missing_tooth", "gear": "wheel", "tooth": [7]}]  # fmt: skip
+        parts = [
+            {
+                "kind": "crack",
+                "gear": "pinion",
+                "tooth": 2,
+                "crack_depth_mm": 1.0,
+                "crack_angle_deg": 45,
+                "crack_start": "arc_mid",
+            },
+            {"kind": "missing_tooth", "gear": "wheel", "tooth": [7]},
+        ]
         table = xiamen.mesh_table(read_faults({"kind": "compound", "parts": parts}))
         assert np.flatnonzero(table.pinion.kind).tolist() == [2]
         assert np.flatnonzero(table.wheel.kind).tolist() == [7]

@@ -82,15 +82,21 @@ def test_without_convection_at_the_faces_it_is_the_paper_s_equation_4(gear, heat
 
 def test_a_good_conductor_is_evenly_warm(gear, heat):
     """Then the rise is heat over convection times surface."""
-    body = solved_body(gear, 6000.0, replace(heat, conductivity=500.0, face_convection=3.0, tooth_convection=3.0),
-                       bore_temperature=None)  # fmt: skip
+    body = solved_body(
+        gear,
+        6000.0,
+        replace(heat, conductivity=500.0, face_convection=3.0, tooth_convection=3.0),
+        bore_temperature=None,
+    )
     expected = 6000.0 / (3.0 * (face_surface(gear) + tooth_surface(gear)))
     assert body.mean - heat.oil_temperature == pytest.approx(expected, rel=2e-3)
     assert np.ptp(body.temperature) < 0.003 * expected
 
 
 def test_surfaces_are_of_the_right_size(gear):
-    """Against the length of the outline with its root curve, point by point; the reference has 0.73 m2 in all."""
+    """Against the length of the outline with its root curve, point by point; the reference has 0.73
+    m2 in all.
+    """
     profile = tooth_profile(gear)
     side = np.sum(np.hypot(np.diff(profile.abscissa), np.diff(profile.half_thickness)))
     lands = 2.0 * (gear.half_tooth_angle_at(gear.tip_radius) * gear.tip_radius)

@@ -1,4 +1,6 @@
-"""Contact over the face: the compiled envelope and load sharing against brute force, and rigid flanks against both."""
+"""Contact over the face: the compiled envelope and load sharing against brute force, and rigid
+flanks against both.
+"""
 
 from dataclasses import replace
 
@@ -19,7 +21,9 @@ UM = 1e-6
 
 
 def gap_rows(system, *faults):
-    """Gap beyond the sound tooth's of the first fault's tooth 0 at the table's nodes, and the table."""
+    """Gap beyond the sound tooth's of the first fault's tooth 0 at the table's nodes, and the
+    table.
+    """
     table = system.mesh_table(faults)
     side = side_of(table, faults[0].gear)
     return side.gap[side.kind[0]] - side.gap[0], table
@@ -33,7 +37,9 @@ class TestLowerEnvelope:
     )
     @classmethod
     def flank(cls, request):
-        """Random deviations (slice, profile) on uneven nodes, contacts within and beyond them, their radii."""
+        """Random deviations (slice, profile) on uneven nodes, contacts within and beyond them,
+        their radii.
+        """
         name, seed = request.param
         rng = np.random.default_rng(seed)
         arc = np.sort(rng.uniform(0.0, 6e-3, 80))
@@ -110,7 +116,9 @@ class TestLowerEnvelope:
 class TestRigidFlanks:
     @pytest.mark.parametrize("depth_mm", [0.05, 0.5])
     def test_a_short_pit_over_the_whole_face_opens_22_um(self, xiamen, depth_mm):
-        """The mate rides on its edges, 0.52 mm of flank to either side: x^2 / (2 rho) with rho 6.2 mm at C."""
+        """The mate rides on its edges, 0.52 mm of flank to either side: x^2 / (2 rho) with rho 6.2
+        mm at C.
+        """
         gap, table = gap_rows(
             xiamen, one("pitting", tooth=0, pit_width_mm=20, pit_depth_mm=depth_mm)
         )
@@ -127,7 +135,9 @@ class TestRigidFlanks:
 
     @pytest.mark.parametrize("height_mm", [0.2, 0.5, 1.0])
     def test_a_broken_pinion_tooth_touches_at_its_new_corner(self, xiamen, height_mm):
-        """Rigid involutes of a pinion with a smaller addendum, exact, against the second-order envelope."""
+        """Rigid involutes of a pinion with a smaller addendum, exact, against the second-order
+        envelope.
+        """
         found, exact = self.corner(xiamen, "pinion", height_mm)
         seen = exact > 0.5 * UM
         assert seen.any()
@@ -135,7 +145,9 @@ class TestRigidFlanks:
 
     @pytest.mark.parametrize("height_mm", [0.5, 1.0, 1.4])
     def test_a_broken_wheel_tooth_as_well(self, xiamen, height_mm):
-        """Its corner meets the pinion's flank near the base circle, whose radius changes fast: third order counts."""
+        """Its corner meets the pinion's flank near the base circle, whose radius changes fast:
+        third order counts.
+        """
         found, exact = self.corner(xiamen, "wheel", height_mm)
         seen = (exact > 0.5 * UM) & (exact < 5 * UM)
         assert seen.any()
@@ -143,7 +155,9 @@ class TestRigidFlanks:
 
     @staticmethod
     def corner(system, gear, height_mm):
-        """Gap of the broken tooth on the path by the slices, and by a gear whose teeth all end where it does."""
+        """Gap of the broken tooth on the path by the slices, and by a gear whose teeth all end
+        where it does.
+        """
         fault = one("broken", gear=gear, tooth=0, broken_height_mm=height_mm)
         tooth = faulty_teeth(system.pair, [fault])[gear, 0]
         body = tooth.gear
@@ -218,7 +232,9 @@ def bending(request):
 
 @pytest.fixture(scope="module")
 def random_face():
-    """Gaps (slice, node), widths (slice,) and loads (node,): from all slices in contact to the first alone."""
+    """Gaps (slice, node), widths (slice,) and loads (node,): from all slices in contact to the
+    first alone.
+    """
     rng = np.random.default_rng(8)
     gap = rng.uniform(-10 * UM, 10 * UM, (12, 10)) * np.geomspace(0.01, 3, 10)
     gap[rng.random(gap.shape) < 0.1] = np.inf
@@ -226,7 +242,9 @@ def random_face():
 
 
 def approach_by_root_finding(law, bending, node, slice_gap, width, load):
-    """Approach at which slices that each follow the contact law with their own load carry it all, m."""
+    """Approach at which slices that each follow the contact law with their own load carry it all,
+    m.
+    """
 
     def line_load(pressed):
         """Load per width q under which contact and slice give in by ``pressed``."""

@@ -22,7 +22,8 @@ from gensig.mesh.pair_table import (
     slice_bending,
 )
 
-# single pairs of the reference pair at A, B, C, D, E, 1e8 N/m (spur reference (docs/validation.md), table 2.2)
+# single pairs of the reference pair at A, B, C, D, E, 1e8 N/m (spur reference (docs/validation.md),
+# table 2.2)
 RC_MM = np.array([2.45827, 6.66082, 7.86646, 8.36253, 12.56508])
 SINGLE_PAIR = np.array([1.5692, 2.0650, 2.0929, 2.0864, 1.5779])
 
@@ -83,7 +84,9 @@ class TestFlankSides:
 
     @staticmethod
     def contact(system, share, **faults):
-        """Contact compliance of the pair at places on the path, (phase,) m/N, with a fault on either gear."""
+        """Contact compliance of the pair at places on the path, (phase,) m/N, with a fault on
+        either gear.
+        """
         at = np.linspace(0.0, system.pair.path_of_contact, 9)
         sides = flank_sides(
             system.pair,
@@ -129,7 +132,8 @@ class TestFlankSides:
         for total in totals[1:]:
             assert_allclose(total, totals[0], rtol=1e-12, atol=0)
         sound, _ = self.contact(system, 0.5)
-        # half of the face at most: the law at half the width, and there the slices' own bending once more
+        # half of the face at most: the law at half the width, and there the slices' own bending
+        # once more
         at = np.linspace(0.0, system.pair.path_of_contact, 9)
         more = slice_bending(system.pair, at, system.material, system.mesh)
         most = (
@@ -162,7 +166,9 @@ class TestFlankSides:
 
 class TestRows:
     def test_equal_structures_are_computed_once(self, xiamen, monkeypatch):
-        """Flanks that only stand elsewhere bend as the sound one does, and teeth that are one object are one row."""
+        """Flanks that only stand elsewhere bend as the sound one does, and teeth that are one
+        object are one row.
+        """
         computed, original = [], module.structural_compliance
         monkeypatch.setattr(
             module,

@@ -1,4 +1,6 @@
-"""Faulty teeth in slices: the spur pair as the special case, part of the width, more fault never stiffens."""
+"""Faulty teeth in slices: the spur pair as the special case, part of the width, more fault never
+stiffens.
+"""
 
 import functools
 
@@ -26,7 +28,9 @@ def case(*words):
 
 @functools.cache
 def approach_of(*words, n_periods=9, meeting=None):
-    """Pair, its faulty teeth, rolls, and approach in slices over mesh periods from the third before the fault on."""
+    """Pair, its faulty teeth, rolls, and approach in slices over mesh periods from the third before
+    the fault on.
+    """
     system, faults = case(*words)
     teeth = faulty_teeth(system.pair, faults)
     mesh = sliced_mesh(
@@ -127,7 +131,9 @@ def test_misalignment_is_the_spur_pair_s_while_the_whole_face_bears(misalignment
 
 
 def test_misalignment_of_teeth_is_that_of_the_shafts():
-    """As a fault of the pinion's teeth, tilted about the end that bears, and as a modification of the pair."""
+    """As a fault of the pinion's teeth, tilted about the end that bears, and as a modification of
+    the pair.
+    """
     tilted = approach_of(
         "fault=misalignment", "fault.misalignment_um=14", "gear.pinion.face_width_mm=14"
     )[3]
@@ -145,18 +151,43 @@ def added(*words):
 @pytest.mark.parametrize(
     "steps",
     [
-        [(*CRACK[:1], f"fault.crack_depth_mm={depth}") for depth in (0.1, 0.5, 1.0, 1.6)],
-        [(*CRACK[:1], "fault.crack_depth_mm=1", f"fault.crack_width_mm={width}") for width in (1.0, 4.0, 9.0, 15.0)],
-        [("fault=pitting", "fault.pit_length_mm=0.6", "fault.pit_width_mm=5", f"fault.pit_depth_mm={depth}")
-         for depth in (1e-3, 3e-3, 1e-2, 0.1)],
-        [("fault=pitting", "fault.pit_length_mm=0.6", f"fault.pit_width_mm={width}") for width in (1, 4, 8, 14)],
-        [("fault=chipped", f"fault.chip_height_mm={height}") for height in (0.2, 0.6, 1.2, 2.0)],
-        [("fault=broken", f"fault.broken_height_mm={height}") for height in (0.2, 0.8, 1.5, 2.5)],
+        [
+            (*CRACK[:1], f"fault.crack_depth_mm={depth}")
+            for depth in (0.1, 0.5, 1.0, 1.6)
+        ],
+        [
+            (*CRACK[:1], "fault.crack_depth_mm=1", f"fault.crack_width_mm={width}")
+            for width in (1.0, 4.0, 9.0, 15.0)
+        ],
+        [
+            (
+                "fault=pitting",
+                "fault.pit_length_mm=0.6",
+                "fault.pit_width_mm=5",
+                f"fault.pit_depth_mm={depth}",
+            )
+            for depth in (1e-3, 3e-3, 1e-2, 0.1)
+        ],
+        [
+            ("fault=pitting", "fault.pit_length_mm=0.6", f"fault.pit_width_mm={width}")
+            for width in (1, 4, 8, 14)
+        ],
+        [
+            ("fault=chipped", f"fault.chip_height_mm={height}")
+            for height in (0.2, 0.6, 1.2, 2.0)
+        ],
+        [
+            ("fault=broken", f"fault.broken_height_mm={height}")
+            for height in (0.2, 0.8, 1.5, 2.5)
+        ],
         [("fault=wear", f"fault.wear_depth_um={depth}") for depth in (1, 5, 15)],
-        [("fault=misalignment", f"fault.misalignment_um={size}") for size in (2, 8, 30)],
+        [
+            ("fault=misalignment", f"fault.misalignment_um={size}")
+            for size in (2, 8, 30)
+        ],
     ],
     ids=lambda steps: steps[0][0] + " " + steps[0][-1],
-)  # fmt: skip
+)
 def test_more_fault_never_stiffens(steps):
     less = np.zeros(32 * 9)
     for words in steps:
@@ -180,10 +211,15 @@ def test_more_fault_never_stiffens(steps):
         ),
         (
             ("fault=broken", "fault.broken_height_mm=1"),
-            ("fault=chipped", "fault.chip_shape=rectangular", "fault.chip_height_mm=1", "fault.chip_width_mm=14.999"),
+            (
+                "fault=chipped",
+                "fault.chip_shape=rectangular",
+                "fault.chip_height_mm=1",
+                "fault.chip_width_mm=14.999",
+            ),
         ),
     ],
-)  # fmt: skip
+)
 def test_a_fault_over_nearly_the_whole_face_is_one_over_all_of_it(whole, part):
     np.testing.assert_allclose(approach_of(*part)[3], approach_of(*whole)[3], rtol=2e-3)
 
@@ -199,7 +235,9 @@ def test_a_small_fault_is_nearly_none():
 
 
 def test_a_crack_is_felt_where_it_is():
-    """The cracked half of the face takes less of its pair's load than the same half of a sound pair."""
+    """The cracked half of the face takes less of its pair's load than the same half of a sound
+    pair.
+    """
     system, faults = case(
         "fault=crack", "fault.crack_depth_mm=1.5", "fault.crack_width_mm=7.5"
     )

@@ -1,4 +1,6 @@
-"""Chords of the force of sliced pairs: the same equilibrium as the slices, the spur table, convex and within 1 %."""
+"""Chords of the force of sliced pairs: the same equilibrium as the slices, the spur table, convex
+and within 1 %.
+"""
 
 from dataclasses import replace
 
@@ -44,7 +46,8 @@ def table_of(*words, teeth=None):
 
 
 def at_rest(table, roll, force, errors=None):
-    """Approach, and load (phase, pair) of the chords under a total force, by bisection; ``errors`` by tooth as in
+    """Approach, and load (phase, pair) of the chords under a total force, by bisection; ``errors``
+    by tooth as in
     ``Meeting``, tilts taken at the middle of the face."""
     pitch = table.pair.base_pitch
     index = np.floor(roll / pitch).astype(int)[:, None] - table.first_pitch
@@ -149,7 +152,9 @@ def test_few_slices_that_enter_over_their_width_are_many(n_slices, share):
     "words", [(), ("gear=chongqing_40_162",), ("gear=xiamen_23_84",)]
 )
 def test_chords_err_by_less_than_a_hundredth_of_the_set_force(words):
-    """One pair alone at 60 depths, to three times that of the set torque, and positions between the nodes."""
+    """One pair alone at 60 depths, to three times that of the set torque, and positions between the
+    nodes.
+    """
     system, table, mesh = table_of(*words)
     end = system.pair.path_of_contact + mesh.lag[-1]
     place = np.random.default_rng(0).uniform(-0.02, 1.02, 40) * end
@@ -165,10 +170,20 @@ def test_chords_err_by_less_than_a_hundredth_of_the_set_force(words):
     first, exact = np.empty(40), np.empty((40, 60))
     depth = table.depth[-1] * np.arange(1, 61) / 60
     bite_forces(
-        structure, mesh.contact_factor, constant, mesh.log_weight, gap.copy(), np.tile(mesh.slice_width, (40, 1)),
-        mesh.slice_width, mesh.coupling_length_squared, system.mesh_force / system.pair.face_width, depth, 1.0, first,
+        structure,
+        mesh.contact_factor,
+        constant,
+        mesh.log_weight,
+        gap.copy(),
+        np.tile(mesh.slice_width, (40, 1)),
+        mesh.slice_width,
+        mesh.coupling_length_squared,
+        system.mesh_force / system.pair.face_width,
+        depth,
+        1.0,
+        first,
         exact,
-    )  # fmt: skip
+    )
     own, far = (
         np.array([np.interp(place, table.position, row) for row in values[0, 0]])
         for values in (table.compliance - table.shared_compliance, table.gap)
@@ -212,7 +227,9 @@ def test_faulty_teeth_have_their_own_chords(fault, share):
 
 
 def test_errors_of_single_teeth_open_all_chords():
-    """Pitch errors and tilts of a good grade 5 gear; a tilt acts slice by slice, in the table at the middle."""
+    """Pitch errors and tilts of a good grade 5 gear; a tilt acts slice by slice, in the table at
+    the middle.
+    """
     system, table, mesh = table_of()
     rng = np.random.default_rng(2)
     errors = Meeting(
