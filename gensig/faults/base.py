@@ -39,7 +39,7 @@ class Fault(ABC):
     # name in configurations
     kind: ClassVar[str]
     # law by which the fault grows over a life
-    growth: ClassVar[Growth] = Growth.NONE
+    growth: ClassVar[Growth]
     # True if the fault does the same to each of its teeth
     alike: ClassVar[bool] = True
     # True for a fault of the mounting of two gears: other meshes of its gear are free of it
@@ -94,12 +94,12 @@ class Fault(ABC):
     def severity(self, gear: Gear) -> float:
         """Severity from 0 (healthy) to 1."""
 
+    @abstractmethod
     def on_other_flank(self) -> Fault | None:
-        """The fault for loads on the teeth's other flank; None, as here, for a fault of one flank.
+        """The fault for loads on the teeth's other flank; None for a fault of one flank.
 
         An idler is driven on one flank and drives with the other.
         """
-        return None
 
 
 def require(fault: Fault, key: str, holds: bool, rule: str) -> None:

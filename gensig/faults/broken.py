@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import FaultError
-from gensig.faults.base import Fault, require_choice, require_not_negative
+from gensig.faults.base import Fault, Growth, require_choice, require_not_negative
 from gensig.faults.flank_loss import root_chord_abscissa
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth
@@ -26,6 +26,7 @@ class MissingTooth(Fault):
     """A missing tooth: its tooth pair never touches."""
 
     kind: ClassVar[str] = "missing_tooth"
+    growth: ClassVar[Growth] = Growth.NONE
 
     def severity(self, gear: Gear) -> float:
         """Always 1."""
@@ -48,6 +49,7 @@ class BrokenTooth(Fault):
     """
 
     kind: ClassVar[str] = "broken"
+    growth: ClassVar[Growth] = Growth.NONE
     broken_height: float = unit("mm")
 
     def __post_init__(self) -> None:
@@ -77,6 +79,7 @@ class ChippedTooth(Fault):
     """
 
     kind: ClassVar[str] = "chipped"
+    growth: ClassVar[Growth] = Growth.NONE
     chip_height: float = unit("mm")
     chip_width: float = unit("mm")
     chip_shape: str = "triangular"

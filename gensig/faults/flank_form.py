@@ -47,12 +47,17 @@ class FlankForm(Fault):
         """Share of the declared limit."""
         return self.size() / self.limit
 
+    def on_other_flank(self) -> None:
+        """None: grinding, wear and measured errors belong to one flank."""
+        return None
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PitchError(FlankForm):
     """A tooth ``pitch_error`` behind its position along the line of action; negative: in front."""
 
     kind: ClassVar[str] = "pitch_error"
+    growth: ClassVar[Growth] = Growth.NONE
     pitch_error: float = unit("um")
 
     def size(self) -> float:
@@ -74,6 +79,7 @@ class ProfileError(FlankForm):
     """
 
     kind: ClassVar[str] = "profile_error"
+    growth: ClassVar[Growth] = Growth.NONE
     profile_slope: float = unit("um")
     profile_form: float = unit("um")
     profile_waves: float
@@ -103,6 +109,7 @@ class Runout(FlankForm):
     """
 
     kind: ClassVar[str] = "runout"
+    growth: ClassVar[Growth] = Growth.NONE
     alike: ClassVar[bool] = False
     eccentricity: float = unit("um")
 
@@ -141,6 +148,7 @@ class Misalignment(FlankForm):
     """Flanks that stand back ``misalignment`` more at one end of the face; its sign says which."""
 
     kind: ClassVar[str] = "misalignment"
+    growth: ClassVar[Growth] = Growth.NONE
     of_mounting: ClassVar[bool] = True
     misalignment: float = unit("um")
 
@@ -203,6 +211,7 @@ class TipRelief(FlankForm):
     """A tip relieved by ``relief``, over ``relief_length`` along the line of action."""
 
     kind: ClassVar[str] = "tip_relief"
+    growth: ClassVar[Growth] = Growth.NONE
     relief: float = unit("um")
     relief_length: float = unit("mm")
     relief_curve: str = "linear"

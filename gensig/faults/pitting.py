@@ -53,6 +53,10 @@ class Hole(Fault):
         """Lost share of the flank (involute height on the tooth axis times face width)."""
         return self.patch(gear).area / flank_area(gear)
 
+    def on_other_flank(self) -> None:
+        """None: a hole is in one flank."""
+        return None
+
     def apply(self, tooth: Tooth, number: int) -> Tooth:
         """The tooth with the hole."""
         return remove_patch(tooth, self.patch(tooth.gear), self.prefix)
@@ -70,6 +74,7 @@ class Pitting(Hole):
     """
 
     kind: ClassVar[str] = "pitting"
+    growth: ClassVar[Growth] = Growth.NONE
     prefix: ClassVar[str] = "pit"
     pit_length: float = unit("mm")
     pit_width: float = unit("mm")
@@ -94,6 +99,7 @@ class Spalling(Hole):
     """A larger hole, ``spall_shape`` rectangular or elliptic; positions as in ``Pitting``."""
 
     kind: ClassVar[str] = "spalling"
+    growth: ClassVar[Growth] = Growth.NONE
     prefix: ClassVar[str] = "spall"
     spall_length: float = unit("mm")
     spall_width: float = unit("mm")
@@ -180,6 +186,10 @@ class DistributedPitting(Fault):
     def severity(self, gear: Gear) -> float:
         """Pitted share of the flank."""
         return self.pitted_share
+
+    def on_other_flank(self) -> None:
+        """None: pits come in the loaded flank."""
+        return None
 
     def apply(self, tooth: Tooth, number: int) -> Tooth:
         """The tooth with pits drawn until the share is reached."""

@@ -283,7 +283,7 @@ MISFITS = [
     (
         "spalling",
         {"spall_shape": "round"},
-        "fault.spall_shape = 'round' is none of rectangular, elliptic",
+        "fault.spall_shape = 'round'; allowed: rectangular, elliptic",
     ),
     (
         "distributed_pitting",
@@ -364,7 +364,7 @@ MISFITS = [
     (
         "chipped",
         {"chip_shape": "round"},
-        "fault.chip_shape = 'round' is none of triangular, rectangular",
+        "fault.chip_shape = 'round'; allowed: triangular, rectangular",
     ),
     ("wear", {"wear_depth_um": -1}, "fault.wear_depth_um = -1 must not be negative"),
     (
@@ -431,7 +431,7 @@ MISFITS = [
     (
         "tip_relief",
         {"relief_curve": "round"},
-        "fault.relief_curve = 'round' is none of linear, parabolic",
+        "fault.relief_curve = 'round'; allowed: linear, parabolic",
     ),
     *(
         (kind, {"limit_um": limit}, f"fault.limit_um = {limit} must be positive")

@@ -63,7 +63,7 @@ def test_uneven_heat_moves_every_point_of_the_flank(pair, tooth, body):
     )
     if body == 0.0:
         np.testing.assert_allclose(
-            growth.of_tooth_alone(gear, curvature), expected, rtol=1e-9
+            growth.of_tooth_alone.along_action(gear, curvature), expected, rtol=1e-9
         )
 
 
