@@ -39,7 +39,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plane:
-    """What turns the dimensionless solution into a compliance: plane state, elastic constants, face
+    """Factors from the dimensionless solution to a compliance: plane state, elastic constants, face
     width.
     """
 
@@ -261,7 +261,7 @@ def _force(gear: Gear, radii: Array) -> Array:
 
 
 def _crossing(gear: Gear, radii: Array) -> Array:
-    """Where the line of action crosses the tooth centreline, (2, contact) in modules."""
+    """Points at which the line of action crosses the tooth centreline, (2, contact) in modules."""
     x = gear.base_radius / np.cos(load_angle(gear, radii)) / gear.normal_module
     return np.stack([x, np.zeros_like(x)])
 

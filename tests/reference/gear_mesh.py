@@ -436,7 +436,7 @@ def open_slit(mesh: MeshTri, slit: Array) -> MeshTri:
 
 
 def left_of(mesh: MeshTri, slit: Array) -> NDArray[np.bool_]:
-    """Which triangles lie on the left of the straight line from mouth to tip."""
+    """Mask of the triangles on the left of the straight line from mouth to tip."""
     direction = slit[:, -1] - slit[:, 0]
     centres = mesh.p[:, mesh.t].mean(axis=1) - slit[:, :1]
     return direction[0] * centres[1] - direction[1] * centres[0] > 0.0

@@ -378,7 +378,7 @@ def _force(gear: Gear, radius: float) -> Array:
 
 
 def _crossing(gear: Gear, radius: float) -> Array:
-    """Where the line of action crosses the tooth centreline, (2,) modules."""
+    """Points at which the line of action crosses the tooth centreline, (2,) modules."""
     angle = float(load_angle(gear, np.array([radius]))[0])
     return np.array([gear.base_radius / math.cos(angle) / gear.normal_module, 0.0])
 

@@ -179,16 +179,7 @@ def sliced_table(
         wheel=_keyed(wheel[np.bincount(wheel_kind).argmax()]),
     )
     frame = _frame(setting)
-    first = np.empty((len(pinion), len(wheel), len(frame.position)))
-    loads = np.empty((*first.shape, len(frame.depth)))
-    # no tooth need be of the sound kind, but the back flanks are sound
-    sound_met = 0 in pinion_kind and 0 in wheel_kind
-    first[:], loads[:] = _curves(setting, *_healthy(pair), sound_met)
-    for a in np.unique(pinion_kind):
-        for b in np.unique(wheel_kind):
-            if pinion[a].present and wheel[b].present:
-                both = _keyed(pinion[a]), _keyed(wheel[b])
-                first[a, b], loads[a, b] = _curves(setting, *both, True)
+    first, loads = _all_curves(setting, pinion, wheel, pinion_kind, wheel_kind)
     compliance, gap = _chords(first, loads, frame.depth)
     mesh = _mesh(setting, setting.pinion, setting.wheel)
     shared = mesh.shared_compliance
@@ -213,6 +204,28 @@ def sliced_table(
         set_chord=frame.set_chord,
         middle_lag=0.5 * float(mesh.lag[0] + mesh.lag[-1]),
     )
+
+
+def _all_curves(
+    setting: _Setting,
+    pinion: list[Tooth],
+    wheel: list[Tooth],
+    pinion_kind: NDArray[np.int64],
+    wheel_kind: NDArray[np.int64],
+) -> tuple[Array, Array]:
+    """First gap and force of every tooth pair by kinds, (pinion kind, wheel kind, ...)."""
+    frame = _frame(setting)
+    first = np.empty((len(pinion), len(wheel), len(frame.position)))
+    loads = np.empty((*first.shape, len(frame.depth)))
+    # no tooth need be of the sound kind, but the back flanks are sound
+    sound_met = 0 in pinion_kind and 0 in wheel_kind
+    first[:], loads[:] = _curves(setting, *_healthy(setting.pair), sound_met)
+    for a in np.unique(pinion_kind):
+        for b in np.unique(wheel_kind):
+            if pinion[a].present and wheel[b].present:
+                both = _keyed(pinion[a]), _keyed(wheel[b])
+                first[a, b], loads[a, b] = _curves(setting, *both, True)
+    return first, loads
 
 
 def _chords(first: Array, loads: Array, depth: Array) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""What each fault changes on its tooth, and that it changes nothing else."""
+"""Changes that each fault makes on its tooth, and no others."""
 
 from itertools import pairwise
 
@@ -111,7 +111,7 @@ class TestThePapersSections:
             assert_allclose(found, expected, rtol=0, atol=0)
 
     def test_a_crack_keeps_half_plus_h_q(self, tooth_of):
-        """Spur paper eqs. (11) and (12): sections thicker than h_q keep h_x + h_q, the others all."""
+        """Spur paper eqs. (11), (12): sections thicker than h_q keep h_x + h_q, the others all."""
         tooth = tooth_of(one("crack"))
         half, width = tooth.cell_half_thickness, tooth.gear.face_width
         h_q = 1.28475e-3  # spur reference (docs/validation.md), section 2.3, arc mid
@@ -237,7 +237,7 @@ class TestHoles:
         assert_allclose(longest, longest[::-1], rtol=0, atol=1)
 
     def test_holes_do_not_add_up_where_they_overlap(self, tooth_of):
-        """What is gone is gone: the deeper one counts, so that order is nothing."""
+        """The deeper one counts, in any order."""
         pit, spall = one("pitting"), one("spalling", spall_shape="rectangular")
         one_way, other = tooth_of(pit, spall), tooth_of(spall, pit)
         assert_allclose(one_way.slice_edges, other.slice_edges, rtol=0, atol=1e-15)

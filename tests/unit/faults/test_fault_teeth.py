@@ -1,4 +1,4 @@
-"""Which teeth a fault is on, and several faults at once: rows of the mesh tables."""
+"""Teeth that carry a fault, and several faults at once: rows of the mesh tables."""
 
 import numpy as np
 import pytest

@@ -75,7 +75,7 @@ class TestLowerEnvelope:
         assert_allclose(exact, found, rtol=0, atol=atol + 1e-15)
 
     def test_nodes_alone_are_not(self, flank):
-        """What a minimum over the nodes would miss is far above the tolerance."""
+        """A minimum over the nodes alone misses far more than the tolerance."""
         assert np.all(self.compiled(*flank) <= self.brute(*flank, 2) + 1e-18)
         missed = np.max(self.brute(*flank, 2) - self.compiled(*flank))
         assert missed > 1e-8

@@ -1,4 +1,4 @@
-"""How hot gears grow: uniform heat keeps the involute, uneven heat does not."""
+"""Thermal growth of gears: uniform heat keeps the involute, uneven heat does not."""
 
 from dataclasses import replace
 
