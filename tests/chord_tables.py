@@ -1,4 +1,6 @@
-"""Tables of chords made by hand: a spur pair's own in other clothes, and slices that touch one after the other."""
+"""Tables of chords made by hand: a spur pair's own in other clothes, and slices that touch one
+after the other.
+"""
 
 from __future__ import annotations
 
@@ -25,12 +27,23 @@ def as_chords(table: PairTable, n_chords: int = 1) -> SlicedTable:
         return np.repeat((pinion[:, None] + wheel[None])[:, :, None], n_chords, axis=2)
 
     return SlicedTable(
-        pair=table.pair, options=table.options, position=table.position, first_pitch=FIRST_PITCH,
-        last_pitch=LAST_PITCH, depth=5e-6 * np.arange(n_chords), compliance=both("compliance"),
-        compliance_slope=both("compliance_slope"), gap=both("gap"), gap_slope=both("gap_slope"),
-        pinion_kind=table.pinion.kind, wheel_kind=table.wheel.kind, pinion_present=table.pinion.present,
-        wheel_present=table.wheel.present, shared_compliance=table.shared_compliance, set_chord=n_chords - 1,
-    )  # fmt: skip
+        pair=table.pair,
+        options=table.options,
+        position=table.position,
+        first_pitch=FIRST_PITCH,
+        last_pitch=LAST_PITCH,
+        depth=5e-6 * np.arange(n_chords),
+        compliance=both("compliance"),
+        compliance_slope=both("compliance_slope"),
+        gap=both("gap"),
+        gap_slope=both("gap_slope"),
+        pinion_kind=table.pinion.kind,
+        wheel_kind=table.wheel.kind,
+        pinion_present=table.pinion.present,
+        wheel_present=table.wheel.present,
+        shared_compliance=table.shared_compliance,
+        set_chord=n_chords - 1,
+    )
 
 
 def helical_pair(pair: GearPair, helix_angle: float) -> GearPair:
@@ -43,7 +56,9 @@ def helical_pair(pair: GearPair, helix_angle: float) -> GearPair:
 
 
 class Slices:
-    """Independent slices with crowned flanks, each as soft as its share of a spur pair: forces without any table."""
+    """Independent slices with crowned flanks, each as soft as its share of a spur pair: forces
+    without any table.
+    """
 
     def __init__(
         self, system, helix_angle: float, n_slices: int = 24, crowning: float = 8e-6
@@ -87,7 +102,9 @@ class Slices:
         return LAST_PITCH + math.ceil(self.lag[-1] / self.pair.base_pitch)
 
     def table(self, depth) -> SlicedTable:
-        """Chords between depths (chord,) m, the last of which goes on as from there to once and a half as deep."""
+        """Chords between depths (chord,) m, the last of which goes on as from there to once and a
+        half as deep.
+        """
         per_pitch, pitch = self.spur.options.points_per_pitch, self.pair.base_pitch
         position = (
             pitch
@@ -103,13 +120,23 @@ class Slices:
         gap, gap_slope = smooth(gap, pitch / per_pitch, np.inf)
         counts = self.pair.pinion.n_teeth, self.pair.wheel.n_teeth
         return SlicedTable(
-            pair=self.pair, options=self.spur.options, position=position, first_pitch=FIRST_PITCH,
-            last_pitch=self.last_pitch, depth=np.asarray(depth), compliance=(own + self.shared)[None, None],
-            compliance_slope=own_slope[None, None], gap=gap[None, None], gap_slope=gap_slope[None, None],
-            pinion_kind=np.zeros(counts[0], dtype=int), wheel_kind=np.zeros(counts[1], dtype=int),
-            pinion_present=np.array([True]), wheel_present=np.array([True]), shared_compliance=self.shared,
+            pair=self.pair,
+            options=self.spur.options,
+            position=position,
+            first_pitch=FIRST_PITCH,
+            last_pitch=self.last_pitch,
+            depth=np.asarray(depth),
+            compliance=(own + self.shared)[None, None],
+            compliance_slope=own_slope[None, None],
+            gap=gap[None, None],
+            gap_slope=gap_slope[None, None],
+            pinion_kind=np.zeros(counts[0], dtype=int),
+            wheel_kind=np.zeros(counts[1], dtype=int),
+            pinion_present=np.array([True]),
+            wheel_present=np.array([True]),
+            shared_compliance=self.shared,
             set_chord=len(depth) - 1,
-        )  # fmt: skip
+        )
 
 
 def on_axial_supports(

@@ -1,4 +1,6 @@
-"""Every fault by name: doing nothing, and in rising severity. The laws of faults run over all of them."""
+"""Every fault by name: doing nothing, and in rising severity. The laws of faults run over all of
+them.
+"""
 
 from __future__ import annotations
 
@@ -22,9 +24,11 @@ FULL = 20.0  # mm, face width of the xiamen pair
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """One way in which a fault grows: its option with one key at ``nothing``, then at values that rise.
+    """One way in which a fault grows: its option with one key at ``nothing``, then at values that
+    rise.
 
-    ``grows`` is False where more of it need not mean a larger deflection: proud flanks touch earlier.
+    ``grows`` is False where more of it need not mean a larger deflection: proud flanks touch
+    earlier.
     ``slack`` is how far the deflection may fall from one step to the next, as a share of it.
     """
 
@@ -87,7 +91,8 @@ CASES = {
     "spall_width": case("spalling", "spall_width_mm", 1, 8, 16, FULL),
     "spall_length": case("spalling", "spall_length_mm", 0.3, 1.0, 2.0),
     "pitted_share": case("distributed_pitting", "pitted_share", 0.02, 0.1, 0.3),
-    # the contact of a broken tooth moves down to its corner, where the tooth is stiffer: first order in the load,
+    # the contact of a broken tooth moves down to its corner, where the tooth is stiffer: first
+    # order in the load,
     # while the corner's gap is second order in the distance
     "broken": case("broken", "broken_height_mm", 0.1, 1.0, 2.0, 3.0, 4.5, slack=2e-3),
     "chip_height": case("chipped", "chip_height_mm", 0.5, 1.5, 3.0),
@@ -153,9 +158,11 @@ def side_of(table: PairTable, gear: str) -> GearTable:
 
 
 def deflection(system: SpurPair, *faults: Fault, tooth: int = 0) -> np.ndarray:
-    """Approach under which a pair carries the whole load alone: gap plus compliance times load, on the path, (node,) m.
+    """Approach under which a pair carries the whole load alone: gap plus compliance times load, on
+    the path, (node,) m.
 
-    The pair is that of tooth ``tooth`` of the first fault's gear (the pinion without faults) and a sound mate.
+    The pair is that of tooth ``tooth`` of the first fault's gear (the pinion without faults) and a
+    sound mate.
     """
     gear = faults[0].gear if faults else "pinion"
     table = heavy_table(system, *faults)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import ClassVar
+
+import numpy as np
 
 from gensig.errors import FaultError
 from gensig.geometry.contact import SIDES, GearPair
@@ -20,12 +22,10 @@ ALL = "all"
 class Growth(Enum):
     """Laws by which faults grow over a life; ``gensig.plan.growth_table`` builds them."""
 
-    NONE = "none"  # the fault stays as it is
+    NONE = "none"  # the fault does not grow
     PARIS = "paris"  # a root crack deepens with the range of its stress intensity
-    PITS = (
-        "pits"  # contact stress damages a flank until pits come, more and larger ones
-    )
-    ARCHARD = "archard"  # sliding under pressure takes material off a flank
+    PITS = "pits"  # contact stress makes pits, more and larger ones with time
+    ARCHARD = "archard"  # sliding under pressure wears a flank
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,25 +40,25 @@ class Fault(ABC):
     kind: ClassVar[str]
     # law by which the fault grows over a life
     growth: ClassVar[Growth]
-    # the fault does the same to every tooth that it is on
+    # True if the fault does the same to each of its teeth
     alike: ClassVar[bool] = True
-    # the fault comes from how two gears are mounted: other meshes of its gear are free of it
+    # True for a fault of the mounting of two gears: other meshes of its gear are free of it
     of_mounting: ClassVar[bool] = False
     gear: str = field()
     tooth: int | str | tuple[int, ...] = field()
 
     def __post_init__(self) -> None:
-        if self.gear not in SIDES:
-            raise FaultError(f"fault.gear = {self.gear!r}; allowed: {', '.join(SIDES)}")
+        require_choice(self, "gear", SIDES)
         if isinstance(self.tooth, str) and self.tooth != ALL:
             raise FaultError(
                 f"fault.tooth = {self.tooth!r}; give a number, a list of numbers, or {ALL}"
             )
-        if isinstance(self.tooth, tuple) and not 0 < len(set(self.tooth)) == len(
-            self.tooth
-        ):
+        teeth: tuple[int, ...] = (0,)
+        if isinstance(self.tooth, tuple):
+            teeth = self.tooth
+        if not 0 < len(set(teeth)) == len(teeth):
             raise FaultError(
-                f"fault.tooth = {list(self.tooth)} must name one tooth or more, each once"
+                f"fault.tooth = {list(teeth)} must name one tooth or more, each once"
             )
         if self.first_tooth < 0 and self.tooth != ALL:
             raise FaultError(
@@ -70,16 +70,19 @@ class Fault(ABC):
         """The lowest tooth that carries the fault, -1 for all of them."""
         if isinstance(self.tooth, str):
             return -1
-        return self.tooth if isinstance(self.tooth, int) else min(self.tooth)
+        return int(np.min(self.tooth))
 
     def teeth(self, gear: Gear) -> tuple[int, ...]:
-        """The teeth of ``gear`` that carry the fault; FaultError for one that is not on it."""
-        if isinstance(self.tooth, str):
+        """The teeth of ``gear`` that carry the fault; FaultError for a number beyond them."""
+        teeth = self.tooth
+        if isinstance(teeth, str):
             return tuple(range(gear.n_teeth))
-        teeth = (self.tooth,) if isinstance(self.tooth, int) else self.tooth
+        if isinstance(teeth, int):
+            teeth = (teeth,)
         if max(teeth) >= gear.n_teeth:
             raise FaultError(
-                f"fault.tooth = {max(teeth)} is not on the {self.gear}, whose teeth are 0..{gear.n_teeth - 1}"
+                f"fault.tooth = {max(teeth)} is not on the {self.gear}, whose teeth are "
+                f"0..{gear.n_teeth - 1}"
             )
         return teeth
 
@@ -93,32 +96,33 @@ class Fault(ABC):
 
     @abstractmethod
     def on_other_flank(self) -> Fault | None:
-        """The fault for loads on the teeth's other flank, None where those loads do not feel it.
+        """The fault for loads on the teeth's other flank; None for a fault of one flank.
 
         An idler is driven on one flank and drives with the other.
         """
 
 
 def require(fault: Fault, key: str, holds: bool, rule: str) -> None:
-    """Raise a FaultError with the value of ``key`` and the rule that it breaks, unless it holds."""
-    if not holds:
-        raise FaultError(f"fault.{key} = {_shown(fault, key)} {rule}")
+    """Raise a FaultError that names ``key``, its value and the rule, unless the rule holds."""
+    if holds:
+        return
+    value = getattr(fault, split_unit(key)[0])
+    shown = f"{from_si(key, value):g}" if isinstance(value, float) else repr(value)
+    raise FaultError(f"fault.{key} = {shown} {rule}")
 
 
 def require_not_negative(fault: Fault, *keys: str) -> None:
-    """Check lengths and depths."""
+    """Raise a FaultError for a negative value."""
     for key in keys:
-        require(
-            fault,
-            key,
-            getattr(fault, split_unit(key)[0]) >= 0.0,
-            "must not be negative",
-        )
+        value = getattr(fault, split_unit(key)[0])
+        require(fault, key, value >= 0.0, "must not be negative")
 
 
-def _shown(fault: Fault, key: str) -> str:
-    value = getattr(fault, split_unit(key)[0])
-    return f"{from_si(key, value):g}" if isinstance(value, float) else repr(value)
+def require_choice(fault: Fault, key: str, allowed: Collection[str]) -> None:
+    """Raise a FaultError for a value that is not one of those allowed."""
+    value = getattr(fault, key)
+    if value not in allowed:
+        raise FaultError(f"fault.{key} = {value!r}; allowed: {', '.join(allowed)}")
 
 
 def faulty_teeth(
@@ -126,11 +130,11 @@ def faulty_teeth(
     faults: Iterable[Fault],
     sound_teeth: Mapping[str, Tooth] | None = None,
 ) -> dict[tuple[str, int], Tooth]:
-    """The teeth that differ from the sound one, by (gear, tooth); several faults of a tooth
-    compose in order.
+    """The teeth that differ from the sound tooth, by (gear, tooth).
 
-    Teeth to which the same has happened are one object: the mesh computes them once.
-    ``sound_teeth`` are those that faults happen to, by gear; None: as cut.
+    Several faults of a tooth compose in order. Teeth with equal faults are one object, so that
+    the mesh computes them once. ``sound_teeth`` are the teeth without faults, by gear; None: as
+    cut.
 
     Raises
     ------
@@ -144,7 +148,7 @@ def faulty_teeth(
         made: dict[int, Tooth] = {}
         for number in fault.teeth(gear):
             before = teeth.get((fault.gear, number), sound)
-            known = made.get(id(before)) if fault.alike else None
-            after = fault.apply(before, number) if known is None else known
-            made[id(before)] = teeth[fault.gear, number] = after
+            if not fault.alike or id(before) not in made:
+                made[id(before)] = fault.apply(before, number)
+            teeth[fault.gear, number] = made[id(before)]
     return teeth

@@ -10,7 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import FaultError
-from gensig.faults.base import Fault, Growth, require, require_not_negative
+from gensig.faults.base import (
+    Fault,
+    Growth,
+    require,
+    require_choice,
+    require_not_negative,
+)
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import RootCrack, Tooth
 from gensig.geometry.tooth_profile import root_curve_point, root_curve_slope
@@ -20,7 +26,6 @@ Array = NDArray[np.float64]
 
 CRACK_STARTS = ("arc_mid", "gamma_mid")
 CRACK_FRONTS = ("straight", "parabolic", "linear")
-CRACK_SIDES = ("tension", "compression")
 OTHER_SIDE = {"tension": "compression", "compression": "tension"}
 CRACK_FACES = ("open", "breathing")
 N_STRIPS = 64  # across the face; a front ends within one of them
@@ -31,9 +36,9 @@ class Crack(Fault):
     """Crack at ``crack_angle`` to the tooth centreline, inward and towards the root.
 
     It is ``crack_depth`` deep at one end of the face and reaches over ``crack_width`` of it
-    (None: all), with a front that is ``straight``, or falls off to 0 at ``crack_width`` in a
-    ``parabolic`` or ``linear`` way; ``crack_side`` and ``crack_faces`` as in ``RootCrack``. How
-    much softer it makes the tooth is the mesh's choice (``mesh.crack``).
+    (None: all). Its front is ``straight``, or falls off to 0 at ``crack_width`` in a
+    ``parabolic`` or ``linear`` way. ``crack_side`` and ``crack_faces`` are as in ``RootCrack``.
+    ``mesh.crack`` selects the compliance model.
     """
 
     kind: ClassVar[str] = "crack"
@@ -47,32 +52,22 @@ class Crack(Fault):
     crack_faces: str = "open"
 
     def __post_init__(self) -> None:
-        # slots make a new class, so the zero-argument super() would look at the old one
+        # super() without arguments fails: slots make a new class
         Fault.__post_init__(self)
         require_not_negative(self, "crack_depth_mm")
-        require(
-            self,
-            "crack_angle_deg",
-            0.0 < self.crack_angle <= 0.5 * math.pi,
-            "must lie in 0..90",
-        )
-        for key, allowed in (
-            ("crack_start", CRACK_STARTS),
-            ("crack_front", CRACK_FRONTS),
-            ("crack_side", CRACK_SIDES),
-            ("crack_faces", CRACK_FACES),
-        ):
-            if getattr(self, key) not in allowed:
-                raise FaultError(
-                    f"fault.{key} = {getattr(self, key)!r}; allowed: {', '.join(allowed)}"
-                )
+        is_inward = 0.0 < self.crack_angle <= 0.5 * math.pi
+        require(self, "crack_angle_deg", is_inward, "must lie in 0..90")
+        require_choice(self, "crack_start", CRACK_STARTS)
+        require_choice(self, "crack_front", CRACK_FRONTS)
+        require_choice(self, "crack_side", OTHER_SIDE)
+        require_choice(self, "crack_faces", CRACK_FACES)
 
     def root_chord(self, gear: Gear) -> float:
         """Thickness of the sound tooth where the crack starts, m."""
         return 2.0 * root_curve_point(gear, self.crack_start)[1]
 
     def seed(self) -> Crack:
-        """The crack without depth, width and tooth: these do not change the law of its growth."""
+        """The crack without depth, width and tooth: its growth law does not depend on them."""
         return Crack(
             gear=self.gear,
             tooth=0,
@@ -87,11 +82,11 @@ class Crack(Fault):
         return float(self._depth(gear).mean()) / self.root_chord(gear)
 
     def on_other_flank(self) -> Crack:
-        """The crack on its other side: loads that open it on one flank close it on the other."""
+        """The crack with its side swapped: loads on the other flank close an open crack."""
         return replace(self, crack_side=OTHER_SIDE[self.crack_side])
 
     def apply(self, tooth: Tooth, number: int) -> Tooth:
-        """Cut the root."""
+        """The tooth with the crack in its root."""
         gear = tooth.gear
         depth = self._depth(gear)
         if not depth.any():
@@ -99,9 +94,9 @@ class Crack(Fault):
         abscissa, half = root_curve_point(gear, self.crack_start)
         if self.crack_depth >= 2.0 * half:
             raise FaultError(
-                f"crack_depth {self.crack_depth * 1e3:.4g} mm reaches through the root chord {2e3 * half:.4g} mm of "
-                f"the {self.gear} tooth (m = {gear.normal_module * 1e3:g} mm, z = {gear.n_teeth}); reduce "
-                f"fault.crack_depth_mm"
+                f"crack_depth {self.crack_depth * 1e3:.4g} mm reaches through the root chord "
+                f"{2e3 * half:.4g} mm of the {self.gear} tooth (m = {gear.normal_module * 1e3:g} "
+                f"mm, z = {gear.n_teeth}); reduce fault.crack_depth_mm"
             )
         crack = RootCrack(
             depth=depth,
@@ -115,20 +110,19 @@ class Crack(Fault):
         return replace(tooth, cracks=(*tooth.cracks, crack))
 
     def _depth(self, gear: Gear) -> Array:
-        """Mean depth in every strip across the face, (strip,) m.
-
-        One strip where the front is the same all along.
-        """
+        """Mean depth in every strip across the face, (strip,) m; one strip for an even crack."""
         width = gear.face_width if self.crack_width is None else self.crack_width
         if not 0.0 <= width <= gear.face_width:
             raise FaultError(
-                f"fault.crack_width_mm = {width * 1e3:g} must lie in 0..{gear.face_width * 1e3:g}, the face width of "
-                f"the {self.gear}"
+                f"fault.crack_width_mm = {width * 1e3:g} must lie in "
+                f"0..{gear.face_width * 1e3:g}, the face width of the {self.gear}"
             )
         if self.crack_front == "straight" and width == gear.face_width:
             return np.array([self.crack_depth])
+        if width == 0.0:
+            return np.zeros(N_STRIPS)
         edges = np.minimum(np.linspace(0.0, gear.face_width, N_STRIPS + 1), width)
-        along = edges / width if width > 0.0 else edges
+        along = edges / width
         if self.crack_front == "straight":
             area = along
         elif self.crack_front == "linear":

@@ -1,7 +1,6 @@
-"""Flanks that stand where they should not: manufacturing and mounting errors, wear, and relief
-that is meant.
+"""Deviations of the flank: manufacturing and mounting errors, wear, tip relief.
 
-Each has a declared limit; its severity is the share of it that is used.
+Each has a declared limit; its severity is its size over that limit.
 """
 
 from __future__ import annotations
@@ -13,7 +12,13 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.faults.base import Fault, Growth, require, require_not_negative
+from gensig.faults.base import (
+    Fault,
+    Growth,
+    require,
+    require_choice,
+    require_not_negative,
+)
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth
 from gensig.units import unit
@@ -21,12 +26,12 @@ from gensig.units import unit
 Array = NDArray[np.float64]
 
 N_SLICES = 40  # across the face of a misaligned tooth
-RELIEF_CURVES = ("linear", "parabolic")
+RELIEF_CURVES = {"linear": 1, "parabolic": 2}  # exponent of the share of the length
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlankForm(Fault):
-    """A deviation whose ``limit`` is declared; ``size`` is what the limit bounds."""
+    """A deviation with a declared ``limit`` of its ``size``."""
 
     limit: float = unit("um")
 
@@ -36,45 +41,41 @@ class FlankForm(Fault):
 
     @abstractmethod
     def size(self) -> float:
-        """What is compared with the limit, m."""
+        """Size of the deviation, m, bounded by the limit."""
 
     def severity(self, gear: Gear) -> float:
         """Share of the declared limit."""
         return self.size() / self.limit
 
     def on_other_flank(self) -> None:
-        """None: what was ground, worn or measured on a flank stays with it."""
+        """None: grinding, wear and measured errors belong to one flank."""
         return None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PitchError(FlankForm):
-    """One tooth stands back by ``pitch_error`` along the line of action (negative: proud)."""
+    """A tooth ``pitch_error`` behind its position along the line of action; negative: in front."""
 
     kind: ClassVar[str] = "pitch_error"
     growth: ClassVar[Growth] = Growth.NONE
     pitch_error: float = unit("um")
 
     def size(self) -> float:
-        """Its size."""
+        """Absolute pitch error."""
         return abs(self.pitch_error)
 
     def apply(self, tooth: Tooth, number: int) -> Tooth:
-        """Move the flank."""
-        return (
-            tooth.with_deviation(np.array(self.pitch_error))
-            if self.pitch_error
-            else tooth
-        )
+        """The tooth with its flank moved."""
+        return tooth.with_deviation(np.array(self.pitch_error))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProfileError(FlankForm):
     """Slope and form of the profile.
 
-    ``profile_slope`` is how much more the flank stands back at its tip than at its lower end (the
-    middle stays), ``profile_form`` the height of ``profile_waves`` waves from end to end, all of
-    them back from the nominal flank.
+    ``profile_slope`` is the deviation at the tip less that at the lower end; the middle stays in
+    place. ``profile_form`` is the height of ``profile_waves`` waves from end to end, all of them
+    behind the nominal flank.
     """
 
     kind: ClassVar[str] = "profile_error"
@@ -88,23 +89,23 @@ class ProfileError(FlankForm):
         require_not_negative(self, "profile_form_um", "profile_waves")
 
     def size(self) -> float:
-        """Slope and form together, as the total profile deviation counts them."""
+        """Slope plus form, as in the total profile deviation."""
         return abs(self.profile_slope) + self.profile_form
 
     def apply(self, tooth: Tooth, number: int) -> Tooth:
-        """Bend the flank."""
+        """The tooth with the profile error."""
         share = _share(tooth)
         wave = 0.5 * (1.0 - np.cos(2.0 * np.pi * self.profile_waves * share))
         deviation = self.profile_slope * (share - 0.5) + self.profile_form * wave
-        return tooth.with_deviation(deviation) if deviation.any() else tooth
+        return tooth.with_deviation(deviation)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Runout(FlankForm):
-    """The teeth sit on a circle ``eccentricity`` off the axis; ``tooth`` stands back most, at the
-    pitch point.
+    """Teeth on a circle ``eccentricity`` off the axis: half the radial runout F_r.
 
-    Half the radial runout F_r. The change of working pressure angle is left out (second order).
+    At the pitch point ``tooth`` stands back most. The change of working pressure angle is left
+    out (second order).
     """
 
     kind: ClassVar[str] = "runout"
@@ -115,15 +116,11 @@ class Runout(FlankForm):
     def __post_init__(self) -> None:
         FlankForm.__post_init__(self)
         require_not_negative(self, "eccentricity_um")
-        require(
-            self,
-            "tooth",
-            isinstance(self.tooth, int),
-            "must be the one tooth that stands back most",
-        )
+        rule = "must be the one tooth that stands back most"
+        require(self, "tooth", isinstance(self.tooth, int), rule)
 
     def teeth(self, gear: Gear) -> tuple[int, ...]:
-        """All of them."""
+        """All teeth of the gear."""
         Fault.teeth(self, gear)
         return tuple(range(gear.n_teeth))
 
@@ -132,29 +129,23 @@ class Runout(FlankForm):
         return self.eccentricity
 
     def apply(self, tooth: Tooth, number: int) -> Tooth:
-        """Move the flank by the eccentricity's part along the line of action, which turns with
-        the gear.
+        """The tooth with its flank moved by the eccentricity's part along the line of action.
 
-        One pitch further round, a tooth touches one base pitch lower on the pinion and higher on
-        the wheel.
+        The eccentricity turns with the gear. A tooth one pitch further round touches one base
+        pitch lower on the pinion and higher on the wheel.
         """
-        if self.eccentricity == 0.0:
-            return tooth
-        assert isinstance(self.tooth, int)
         gear = tooth.gear
-        roll = tooth.profile.curvature_radius / gear.base_radius - np.tan(
-            gear.transverse_pressure_angle
-        )
-        turn = 2.0 * np.pi / gear.n_teeth * (number - self.tooth)
-        angle = roll + (turn if self.gear == "pinion" else -turn)
-        return tooth.with_deviation(self.eccentricity * np.cos(angle))
+        pitch_roll = np.tan(gear.transverse_pressure_angle)
+        roll = tooth.profile.curvature_radius / gear.base_radius - pitch_roll
+        turn = 2.0 * np.pi / gear.n_teeth * (number - self.first_tooth)
+        if self.gear == "wheel":
+            turn = -turn
+        return tooth.with_deviation(self.eccentricity * np.cos(roll + turn))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Misalignment(FlankForm):
-    """The flanks stand back by ``misalignment`` more at one end of the face than at the other
-    (its sign says which).
-    """
+    """Flanks that stand back ``misalignment`` more at one end of the face; its sign says which."""
 
     kind: ClassVar[str] = "misalignment"
     growth: ClassVar[Growth] = Growth.NONE
@@ -162,26 +153,27 @@ class Misalignment(FlankForm):
     misalignment: float = unit("um")
 
     def size(self) -> float:
-        """Its size, as the helix slope deviation counts it."""
+        """Absolute misalignment, as in the helix slope deviation."""
         return abs(self.misalignment)
 
     def apply(self, tooth: Tooth, number: int) -> Tooth:
-        """Tilt the flank about the end that bears."""
+        """The tooth with its flank tilted about the end that bears."""
         if self.misalignment == 0.0:
             return tooth
         width = tooth.gear.face_width
         sliced = tooth.split(np.linspace(0.0, width, N_SLICES + 1))
-        along = 0.5 * (sliced.slice_edges[1:] + sliced.slice_edges[:-1]) / width
-        back = self.misalignment * (along if self.misalignment > 0.0 else along - 1.0)
-        return sliced.with_deviation(back[:, None])
+        along = sliced.slice_middle / width
+        if self.misalignment < 0.0:
+            along = along - 1.0
+        return sliced.with_deviation(self.misalignment * along[:, None])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wear(FlankForm):
-    """Material worn off: ``wear_depth`` everywhere, or times ``wear_profile``.
+    """Material worn off: ``wear_depth`` times ``wear_profile``.
 
-    ``wear_profile`` gives the depth along the flank as multiples of ``wear_depth``, at curvature
-    radii evenly spaced from the lower end of the involute to the tip; None is uniform wear.
+    ``wear_profile`` holds factors at curvature radii evenly spaced from the lower end of the
+    involute to the tip; None is uniform wear.
     """
 
     kind: ClassVar[str] = "wear"
@@ -192,37 +184,31 @@ class Wear(FlankForm):
     def __post_init__(self) -> None:
         FlankForm.__post_init__(self)
         require_not_negative(self, "wear_depth_um")
-        given = self.wear_profile
+        holds = len(self.factors) >= 2 and min(self.factors) >= 0.0
         rule = "must hold two depths or more, none negative"
-        require(
-            self,
-            "wear_profile",
-            given is None or (len(given) >= 2 and min(given) >= 0.0),
-            rule,
-        )
+        require(self, "wear_profile", holds, rule)
+
+    @property
+    def factors(self) -> tuple[float, ...]:
+        """Factors of the wear depth from the lower end of the involute to the tip."""
+        if self.wear_profile is None:
+            return 1.0, 1.0
+        return self.wear_profile
 
     def size(self) -> float:
-        """The greatest depth."""
-        return self.wear_depth * (
-            1.0 if self.wear_profile is None else max(self.wear_profile)
-        )
+        """Greatest depth."""
+        return self.wear_depth * max(self.factors)
 
     def apply(self, tooth: Tooth, number: int) -> Tooth:
-        """Take the worn layer off."""
-        if self.size() == 0.0:
-            return tooth
-        shape = (1.0,) * 2 if self.wear_profile is None else self.wear_profile
-        depth = self.wear_depth * np.interp(
-            _share(tooth), np.linspace(0.0, 1.0, len(shape)), shape
-        )
+        """The tooth without the worn layer."""
+        nodes = np.linspace(0.0, 1.0, len(self.factors))
+        depth = self.wear_depth * np.interp(_share(tooth), nodes, self.factors)
         return tooth.with_loss(tooth.material_loss + depth)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TipRelief(FlankForm):
-    """The tip stands back by ``relief``, falling off to nothing ``relief_length`` below it on the
-    line of action.
-    """
+    """A tip relieved by ``relief``, over ``relief_length`` along the line of action."""
 
     kind: ClassVar[str] = "tip_relief"
     growth: ClassVar[Growth] = Growth.NONE
@@ -233,19 +219,14 @@ class TipRelief(FlankForm):
     def __post_init__(self) -> None:
         FlankForm.__post_init__(self)
         require_not_negative(self, "relief_um", "relief_length_mm")
-        require(
-            self,
-            "relief_curve",
-            self.relief_curve in RELIEF_CURVES,
-            f"is none of {', '.join(RELIEF_CURVES)}",
-        )
+        require_choice(self, "relief_curve", RELIEF_CURVES)
 
     def size(self) -> float:
-        """The relief at the tip, none without length."""
-        return self.relief if self.relief_length > 0.0 else 0.0
+        """Relief at the tip, 0 without length."""
+        return self.relief * (self.relief_length > 0.0)
 
     def apply(self, tooth: Tooth, number: int) -> Tooth:
-        """Relieve the tip."""
+        """The tooth with its tip relieved."""
         if self.relief * self.relief_length == 0.0:
             return tooth
         curvature = tooth.profile.curvature_radius
@@ -253,15 +234,11 @@ class TipRelief(FlankForm):
         rule = f"must not be above {span * 1e3:.4g} mm, the involute of the {self.gear}"
         require(self, "relief_length_mm", self.relief_length <= span, rule)
         share = np.maximum(1.0 - (curvature[-1] - curvature) / self.relief_length, 0.0)
-        return tooth.with_deviation(
-            self.relief * (share if self.relief_curve == "linear" else share**2)
-        )
+        power = RELIEF_CURVES[self.relief_curve]
+        return tooth.with_deviation(self.relief * share**power)
 
 
 def _share(tooth: Tooth) -> Array:
-    """Place along the flank.
-
-    0 at the lower end of the involute, 1 at the tip, linear in roll, (profile,).
-    """
+    """Position along the flank, linear in roll: 0 at the lower end, 1 at the tip, (profile,)."""
     curvature = tooth.profile.curvature_radius
     return (curvature - curvature[0]) / (curvature[-1] - curvature[0])

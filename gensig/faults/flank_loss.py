@@ -1,4 +1,4 @@
-"""Material that is lost from a flank in patches: what pits and spalls have in common."""
+"""Patches of material lost from a flank: the common part of pits and spalls."""
 
 from __future__ import annotations
 
@@ -15,15 +15,17 @@ from gensig.geometry.tooth_profile import involute_point, root_curve
 
 Array = NDArray[np.float64]
 
-SHAPES = ("rectangular", "elliptic")
+SHAPES = {"rectangular": 1.0, "elliptic": 0.25 * math.pi}  # share of length x width
 N_STRIPS = 24  # across an ellipse
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Patch:
-    """A hole in a flank, ``length`` along the tooth height, ``width`` along the face, ``depth``
-    inward with a flat floor; its middle at ``abscissa`` on the tooth centreline and
-    ``face_position`` from one end of the face. In m."""
+    """A hole with a flat floor in a flank, in m.
+
+    ``length`` is along the tooth height, ``width`` along the face, ``depth`` inward. The middle
+    lies at ``abscissa`` on the tooth centreline and ``face_position`` from one end of the face.
+    """
 
     shape: str
     length: float
@@ -32,8 +34,21 @@ class Patch:
     abscissa: float
     face_position: float
 
+    @property
+    def area(self) -> float:
+        """Area of the opening, m2; 0 without depth."""
+        if self.depth == 0.0:
+            return 0.0
+        return SHAPES[self.shape] * self.length * self.width
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Both ends across the face, m."""
+        half = 0.5 * self.width
+        return self.face_position - half, self.face_position + half
+
     def height_at(self, face_position: Array) -> Array:
-        """Extent along the tooth height at places across the face, m."""
+        """Extent along the tooth height at positions across the face, m."""
         across = np.abs(face_position - self.face_position) / (0.5 * self.width)
         if self.shape == "rectangular":
             return np.where(across < 1.0, self.length, 0.0)
@@ -64,58 +79,51 @@ def pitch_abscissa(gear: Gear) -> float:
 
 
 def remove_patch(tooth: Tooth, patch: Patch, name: str) -> Tooth:
-    """The tooth with one more hole; nothing happens for a patch without extent.
+    """The tooth with one more hole; the tooth itself for a patch without extent.
 
     Raises
     ------
-    FaultError    for a patch that leaves the flank or the face, or reaches the centreline; ``name`` is the prefix of
-        the fault's keys
+    FaultError    for a patch that leaves the flank or the face, or reaches the centreline;
+        ``name`` is the prefix of the fault's keys
     """
     if patch.length * patch.width * patch.depth == 0.0:
         return tooth
     _require_on_flank(tooth, patch, name)
-    begin, end = (
-        patch.face_position - 0.5 * patch.width,
-        patch.face_position + 0.5 * patch.width,
-    )
     n_strips = 1 if patch.shape == "rectangular" else N_STRIPS
-    sliced = tooth.split(np.linspace(begin, end, n_strips + 1))
+    sliced = tooth.split(np.linspace(*patch.ends, n_strips + 1))
     return sliced.with_loss(patch_loss(sliced, patch))
 
 
 def patch_loss(tooth: Tooth, patch: Patch) -> Array:
     """Depth of a patch on the nodes of the flank, (slice, profile) m."""
-    flank = tooth.profile.abscissa[tooth.profile.n_root_cells :]
-    middle = 0.5 * (tooth.slice_edges[1:] + tooth.slice_edges[:-1])
-    reach = 0.5 * patch.height_at(middle)[:, None]
-    inside = np.abs(flank - patch.abscissa) <= reach
+    reach = 0.5 * patch.height_at(tooth.slice_middle)[:, None]
+    inside = np.abs(tooth.profile.flank_abscissa - patch.abscissa) <= reach
     return np.where(inside & (reach > 0.0), patch.depth, 0.0)
 
 
 def _require_on_flank(tooth: Tooth, patch: Patch, name: str) -> None:
     gear, profile = tooth.gear, tooth.profile
-    flank, root = profile.abscissa[profile.n_root_cells :], float(profile.abscissa[0])
+    flank, root = profile.flank_abscissa, float(profile.abscissa[0])
     low, high = patch.abscissa - 0.5 * patch.length, patch.abscissa + 0.5 * patch.length
     if low < flank[0] - 1e-9 or high > flank[-1] + 1e-9:
         raise FaultError(
-            f"the {name} from {(low - root) * 1e3:.4g} to {(high - root) * 1e3:.4g} mm above the root chord leaves the "
-            f"flank of the {gear.name} tooth, which reaches from {(flank[0] - root) * 1e3:.4g} to "
-            f"{(flank[-1] - root) * 1e3:.4g} mm; change fault.{name}_position_mm or fault.{name}_length_mm"
+            f"the {name} from {(low - root) * 1e3:.4g} to {(high - root) * 1e3:.4g} mm above the "
+            f"root chord leaves the flank of the {gear.name} tooth, which reaches from "
+            f"{(flank[0] - root) * 1e3:.4g} to {(flank[-1] - root) * 1e3:.4g} mm; change "
+            f"fault.{name}_position_mm or fault.{name}_length_mm"
         )
-    begin, end = (
-        patch.face_position - 0.5 * patch.width,
-        patch.face_position + 0.5 * patch.width,
-    )
+    begin, end = patch.ends
     if begin < -1e-9 or end > gear.face_width + 1e-9:
         raise FaultError(
-            f"the {name} from {begin * 1e3:.4g} to {end * 1e3:.4g} mm across the face leaves the {gear.name} tooth, "
-            f"which is {gear.face_width * 1e3:.4g} mm wide; change fault.{name}_width_mm or "
-            f"fault.{name}_face_position_mm"
+            f"the {name} from {begin * 1e3:.4g} to {end * 1e3:.4g} mm across the face leaves the "
+            f"{gear.name} tooth, which is {gear.face_width * 1e3:.4g} mm wide; change "
+            f"fault.{name}_width_mm or fault.{name}_face_position_mm"
         )
     inside = (flank >= low) & (flank <= high)
     half = profile.half_thickness[profile.n_root_cells :][inside]
     if len(half) and patch.depth >= half.min():
         raise FaultError(
-            f"{name}_depth {patch.depth * 1e3:.4g} mm reaches the centreline of the {gear.name} tooth (half thickness "
-            f"{float(half.min()) * 1e3:.4g} mm there); reduce fault.{name}_depth_mm"
+            f"{name}_depth {patch.depth * 1e3:.4g} mm reaches the centreline of the {gear.name} "
+            f"tooth (half thickness {float(half.min()) * 1e3:.4g} mm there); reduce "
+            f"fault.{name}_depth_mm"
         )

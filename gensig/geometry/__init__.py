@@ -1,1 +1,1 @@
-"""What the teeth are: involute, root curve, line of action. No elasticity, no time."""
+"""Geometry of teeth: involute, root curve, line of action. No elasticity, no time."""

@@ -1,4 +1,4 @@
-"""Where two gears touch: line of action, contact ratio, corner contact beyond the path of contact.
+"""Contact geometry of a gear pair: line of action, contact ratio, corner contact off the path.
 
 Positions s are measured in m along the line of action from A, the start of contact of the driving
 pinion; the pinion's curvature radius there is ``start_curvature_radius + s``.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,18 +18,19 @@ from gensig.geometry.gear import Gear
 from gensig.geometry.involute import inverse_involute, involute
 
 Array = NDArray[np.float64]
+Position = TypeVar("Position", float, Array)
 
 SIDES = ("pinion", "wheel")  # the two gears of a pair, the driving one first
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearPair:
-    """A pinion that drives a wheel at the centre distance at which they mesh without play, in the
-    transverse section.
+    """A pinion and the wheel that it drives, in the transverse section.
 
+    Without ``center_distance_change`` the centre distance is the one that meshes without play.
     ``backlash`` is the play along the line of action that is left to the coast flank, m.
-    ``center_distance_change`` is how much farther apart the shafts are than that distance, m;
-    negative where they are closer, which costs backlash.
+    ``center_distance_change`` is added to the distance without play, m. A negative value brings
+    the shafts closer and takes backlash.
     """
 
     pinion: Gear
@@ -37,17 +39,17 @@ class GearPair:
     center_distance_change: float = 0.0
 
     def __post_init__(self) -> None:
-        same = ("normal_module", "pressure_angle")
-        for key in same:
+        for key in ("normal_module", "pressure_angle"):
             if getattr(self.pinion, key) != getattr(self.wheel, key):
                 raise GeometryError(
                     f"pinion and wheel cannot mesh: their {key} differs"
                 )
         if self.pinion.helix_angle != -self.wheel.helix_angle:
             raise GeometryError(
-                f"pinion and wheel cannot mesh on parallel shafts: helix_angle_deg = "
-                f"{math.degrees(self.pinion.helix_angle):g} and {math.degrees(self.wheel.helix_angle):g} must be equal "
-                f"and of opposite hand (sign)"
+                "pinion and wheel cannot mesh on parallel shafts: helix_angle_deg = "
+                f"{math.degrees(self.pinion.helix_angle):g} and "
+                f"{math.degrees(self.wheel.helix_angle):g} must be equal and of opposite hand "
+                "(sign)"
             )
         if self.backlash < 0.0:
             raise GeometryError(
@@ -63,29 +65,29 @@ class GearPair:
         ):
             if lowest < gear.junction_curvature_radius:
                 raise GeometryError(
-                    f"{gear.name}: contact would reach curvature radius {float(lowest) * 1e3:.4g} mm, below the end of "
-                    f"its involute at {gear.junction_curvature_radius * 1e3:.4g} mm (interference); use more teeth, a "
-                    f"profile shift or a smaller addendum_coefficient of the mate"
+                    f"{gear.name}: contact would reach curvature radius {lowest * 1e3:.4g} mm, "
+                    f"below the end of its involute at {gear.junction_curvature_radius * 1e3:.4g} "
+                    "mm (interference); use more teeth, a profile shift or a smaller "
+                    "addendum_coefficient of the mate"
                 )
         for gear, mate in ((self.pinion, self.wheel), (self.wheel, self.pinion)):
             clearance = self.center_distance - gear.tip_radius - mate.root_radius
             if clearance < 0.0:
                 raise GeometryError(
-                    f"{gear.name}: its tip cuts {-clearance * 1e3:.3g} mm into the root of the {mate.name}; reduce the "
-                    f"sum of the profile shifts or addendum_coefficient"
+                    f"{gear.name}: its tip cuts {-clearance * 1e3:.3g} mm into the root of the "
+                    f"{mate.name}; reduce the sum of the profile shifts or addendum_coefficient"
                 )
 
     @property
     def gears(self) -> dict[str, Gear]:
         """The gears by their side of the pair, see ``SIDES``."""
-        return dict(zip(SIDES, (self.pinion, self.wheel), strict=True))
+        return {"pinion": self.pinion, "wheel": self.wheel}
 
-    def curvature(self, side: str, position: Array | float) -> Array | float:
+    def curvature(self, side: str, position: Position) -> Position:
         """Curvature radius of a gear's flank at positions s, m."""
-        by_side = dict(
-            zip(SIDES, (self.pinion_curvature, self.wheel_curvature), strict=True)
-        )
-        return by_side[side](position)
+        if side == "pinion":
+            return self.pinion_curvature(position)
+        return self.wheel_curvature(position)
 
     def speed_ratio(self, side: str) -> float:
         """Speed of a gear over the pinion's, positive."""
@@ -192,11 +194,11 @@ class GearPair:
             - self.start_curvature_radius
         )
 
-    def pinion_curvature(self, position: Array | float) -> Array | float:
+    def pinion_curvature(self, position: Position) -> Position:
         """Curvature radius of the pinion's flank at positions s, m."""
         return self.start_curvature_radius + position
 
-    def wheel_curvature(self, position: Array | float) -> Array | float:
+    def wheel_curvature(self, position: Position) -> Position:
         """Curvature radius of the wheel's flank at positions s, m."""
         return self.tangent_length - self.start_curvature_radius - position
 
@@ -204,25 +206,28 @@ class GearPair:
         """Raise unless at least one pair is always in contact."""
         if self.transverse_contact_ratio < 1.0:
             raise GeometryError(
-                f"the transverse contact ratio {self.transverse_contact_ratio:.4f} is below 1, so the drive is "
-                f"interrupted at every tooth; use more teeth, a smaller module or a larger addendum_coefficient"
+                f"the transverse contact ratio {self.transverse_contact_ratio:.4f} is below 1, so "
+                "the drive is interrupted at every tooth; use more teeth, a smaller module or a "
+                "larger addendum_coefficient"
             )
 
 
 def corner_gap(pair: GearPair, position: Array) -> Array:
-    """Distance a pair lacks to touch where its nominal contact lies beyond the path of contact.
+    """Gap of a pair whose nominal contact lies beyond the path of contact.
 
     Parameters
     ----------
-    position : (phase,) m    from A; negative before A (by the wheel's own rotation), above the path after E (by the
+    position : (phase,) m    from A; negative before A (by the wheel's own rotation), above the path
+        after E (by the
         pinion's own rotation)
 
     Returns
     -------
-    (phase,) m    pinion advance along the line of action at which a tip corner meets the mating flank; 0 on the path
+    (phase,) m    pinion advance along the line of action at which a tip corner meets the mating
+    flank; 0 on the path
 
-    Exact for rigid involutes: beyond E the pinion's tip corner against the wheel's flank, before
-    A the wheel's tip corner against the pinion's flank.
+    Exact for rigid involutes. Beyond E the pinion's tip corner meets the wheel's flank; before A
+    the wheel's tip corner meets the pinion's flank.
     """
     gap = np.zeros_like(position)
     after = position > pair.path_of_contact
@@ -233,7 +238,7 @@ def corner_gap(pair: GearPair, position: Array) -> Array:
 
 
 def corner_gap_by_pinion(pair: GearPair, position: Array) -> Array:
-    """The same gap with both sides referred to the pinion's rotation, (phase,) m.
+    """``corner_gap`` with both sides referred to the pinion's rotation, (phase,) m.
 
     Before A the touching wheel lags the pinion by the gap itself: the fixed point of
     ``gap(position - gap)``.
@@ -264,7 +269,7 @@ def _pinion_tip_gap(pair: GearPair, position: Array) -> Array:
         np.arctan2(y, x),
         r_g,
         alpha,
-        np.asarray(pair.wheel_curvature(position)),
+        pair.wheel_curvature(position),
     )
 
 
@@ -273,10 +278,7 @@ def _wheel_tip_gap(pair: GearPair, position: Array) -> Array:
     r_p, r_g = pair.pinion.base_radius, pair.wheel.base_radius
     roll_tip = math.sqrt(radius**2 - r_g**2) / r_g
     polar = (
-        alpha
-        - np.asarray(pair.wheel_curvature(position)) / r_g
-        + roll_tip
-        - math.atan(roll_tip)
+        alpha - pair.wheel_curvature(position) / r_g + roll_tip - math.atan(roll_tip)
     )
     x, y = pair.center_distance - radius * np.cos(polar), radius * np.sin(polar)
     return r_p * _flank_lead(
@@ -284,7 +286,7 @@ def _wheel_tip_gap(pair: GearPair, position: Array) -> Array:
         -np.arctan2(y, x),
         r_p,
         alpha,
-        np.asarray(pair.pinion_curvature(position)),
+        pair.pinion_curvature(position),
     )
 
 

@@ -9,9 +9,8 @@ from gensig.errors import GeometryError
 from gensig.geometry.involute import involute
 from gensig.units import from_si, unit
 
-LARGEST_HELIX = (
-    45.0  # degrees; beyond, the slices of a tooth are no spur teeth any more
-)
+# degrees; the slices of a steeper tooth are not spur teeth
+LARGEST_HELIX = 45.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,10 +22,9 @@ class Gear:
     section, which for ``helix_angle`` 0 is the same. ``helix_angle`` is that on the reference
     cylinder, positive for a right-handed gear.
 
-    ``cutter_tip_radius_coefficient`` is the rounding of the rack's tip over the module: it makes
-    the root curve. In the transverse section of a helical gear the rounding is an ellipse; a
-    circle of the same radius is taken for it. ``name`` ("pinion" or "wheel") only serves
-    messages.
+    ``cutter_tip_radius_coefficient`` is the rounding of the rack's tip over the module; it
+    generates the root curve. In the transverse section of a helical gear the rounding is an
+    ellipse, taken as a circle of the same radius. ``name`` is "pinion" or "wheel".
 
     Source: ISO 21771-1:2024, with x tan(alpha_n) = x cos(beta) tan(alpha_t).
     """
@@ -46,30 +44,29 @@ class Gear:
     def __post_init__(self) -> None:
         self._check_ranges()
         if self.junction_curvature_radius <= 0.0:
-            limit = math.ceil(
-                2.0
-                * (self.straight_flank_depth / self.transverse_module)
-                / math.sin(self.transverse_pressure_angle) ** 2
-            )
+            depth = self.straight_flank_depth / self.transverse_module
+            sine = math.sin(self.transverse_pressure_angle)
+            limit = math.ceil(2.0 * depth / sine**2)
             raise GeometryError(
-                f"{self.name}: {self.n_teeth} teeth with profile shift {self.profile_shift:g} are undercut; use at "
-                f"least {limit} teeth or a larger profile_shift"
+                f"{self.name}: {self.n_teeth} teeth with profile shift {self.profile_shift:g} are "
+                f"undercut; use at least {limit} teeth or a larger profile_shift"
             )
         if self.root_half_angle >= math.pi / self.n_teeth:
             raise GeometryError(
                 f"{self.name}: a rack tip rounded by cutter_tip_radius_coefficient = "
-                f"{self.cutter_tip_radius_coefficient:g} is wider than the space between two teeth at "
-                f"{math.degrees(self.pressure_angle):g} degrees; reduce it"
+                f"{self.cutter_tip_radius_coefficient:g} is wider than the space between two "
+                f"teeth at {math.degrees(self.pressure_angle):g} degrees; reduce it"
             )
         if self.half_tooth_angle_at(self.tip_radius) <= 0.0:
             raise GeometryError(
-                f"{self.name}: the teeth are pointed below the tip radius {self.tip_radius * 1e3:.4g} mm; reduce "
-                f"profile_shift {self.profile_shift:g} or addendum_coefficient {self.addendum_coefficient:g}"
+                f"{self.name}: the teeth are pointed below the tip radius "
+                f"{self.tip_radius * 1e3:.4g} mm; reduce profile_shift {self.profile_shift:g} or "
+                f"addendum_coefficient {self.addendum_coefficient:g}"
             )
         if not 0.0 < self.bore_radius < self.root_radius:
             raise GeometryError(
-                f"{self.name}: bore_radius_mm = {self.bore_radius * 1e3:g} must lie between 0 and the root radius "
-                f"{self.root_radius * 1e3:.4g} mm"
+                f"{self.name}: bore_radius_mm = {self.bore_radius * 1e3:g} must lie between 0 and "
+                f"the root radius {self.root_radius * 1e3:.4g} mm"
             )
 
     def _check_ranges(self) -> None:
@@ -83,25 +80,26 @@ class Gear:
                 raise GeometryError(f"{self.name}: {key} = {value:g} must be positive")
         if not math.radians(10.0) <= self.pressure_angle <= math.radians(35.0):
             raise GeometryError(
-                f"{self.name}: pressure_angle_deg = {math.degrees(self.pressure_angle):g} must lie between 10 and 35"
+                f"{self.name}: pressure_angle_deg = {math.degrees(self.pressure_angle):g} must "
+                "lie between 10 and 35"
             )
         if not abs(self.helix_angle) <= math.radians(LARGEST_HELIX):
             raise GeometryError(
-                f"{self.name}: helix_angle_deg = {math.degrees(self.helix_angle):g} must lie between "
-                f"-{LARGEST_HELIX:g} and {LARGEST_HELIX:g}"
+                f"{self.name}: helix_angle_deg = {math.degrees(self.helix_angle):g} must lie "
+                f"between -{LARGEST_HELIX:g} and {LARGEST_HELIX:g}"
             )
         if not 0.0 <= self.clearance_coefficient <= 1.0:
             raise GeometryError(
-                f"{self.name}: clearance_coefficient = {self.clearance_coefficient:g} must lie in 0..1"
+                f"{self.name}: clearance_coefficient = {self.clearance_coefficient:g} must lie in "
+                "0..1"
             )
         rounding = self.cutter_tip_radius_coefficient
-        room = self.clearance_coefficient / (
-            1.0 - math.sin(self.transverse_pressure_angle)
-        )
+        sine = math.sin(self.transverse_pressure_angle)
+        room = self.clearance_coefficient / (1.0 - sine)
         if not 0.0 < rounding <= room * 1.001:
             raise GeometryError(
-                f"{self.name}: cutter_tip_radius_coefficient = {rounding:g} must be positive and at most "
-                f"{room:.4g}, where the rounding reaches the working flank"
+                f"{self.name}: cutter_tip_radius_coefficient = {rounding:g} must be positive and "
+                f"at most {room:.4g}, where the rounding reaches the working flank"
             )
 
     @property
@@ -142,10 +140,13 @@ class Gear:
     @property
     def root_radius(self) -> float:
         """Root radius r_f that the cutter's tip generates."""
-        depth = (
-            self.addendum_coefficient + self.clearance_coefficient - self.profile_shift
-        )
-        return self.pitch_radius - depth * self.normal_module
+        return self.pitch_radius - self._root_depth
+
+    @property
+    def _root_depth(self) -> float:
+        """Depth of the root circle below the pitch circle, m."""
+        rack_depth = self.addendum_coefficient + self.clearance_coefficient
+        return (rack_depth - self.profile_shift) * self.normal_module
 
     @property
     def base_pitch(self) -> float:
@@ -175,23 +176,16 @@ class Gear:
     @property
     def rounding_center_depth(self) -> float:
         """Distance a_1 from the pitch line to the centre of the rack's tip rounding."""
-        depth = (
-            self.addendum_coefficient + self.clearance_coefficient - self.profile_shift
-        )
-        return depth * self.normal_module - self.cutter_tip_radius
+        return self._root_depth - self.cutter_tip_radius
 
     @property
     def rounding_center_offset(self) -> float:
-        """Distance b_1 along the pitch line from the tooth centreline to the centre of the
-        rounding.
-        """
+        """Distance b_1 from the tooth centreline to the rounding's centre, along the pitch line."""
         alpha, rounding = self.transverse_pressure_angle, self.cutter_tip_radius
-        depth = (
-            self.addendum_coefficient + self.clearance_coefficient
-        ) * self.normal_module
+        rack_depth = self.addendum_coefficient + self.clearance_coefficient
         return (
             math.pi * self.transverse_module / 4.0
-            + depth * math.tan(alpha)
+            + rack_depth * self.normal_module * math.tan(alpha)
             - rounding * math.tan(alpha)
             + rounding / math.cos(alpha)
         )
@@ -215,6 +209,5 @@ class Gear:
         Not positive when undercut.
         """
         alpha = self.transverse_pressure_angle
-        return self.base_radius * math.tan(
-            alpha
-        ) - self.straight_flank_depth / math.sin(alpha)
+        below_pitch_line = self.straight_flank_depth / math.sin(alpha)
+        return self.base_radius * math.tan(alpha) - below_pitch_line

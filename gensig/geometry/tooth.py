@@ -1,6 +1,6 @@
-"""One tooth as the mesh sees it.
+"""One tooth: its outline, lost material, flank deviation and root cracks.
 
-What of it is left, where its flank stands. Faults change these and nothing else.
+Faults change only these.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ Array = NDArray[np.float64]
 class RootCrack:
     """A crack into the root, straight in every strip across the face.
 
-    ``depth`` (strip,) m in strips of equal width, 0 where there is none; the mouth lies at
-    ``mouth_abscissa`` and ``mouth_half_thickness`` of the outline, which makes ``mouth_slope``
-    with the tooth centreline there; the crack goes at ``angle`` to the centreline, inward and
-    towards the root. ``side`` is ``"tension"`` (under the loaded flank) or ``"compression"``; the
-    faces of a ``breathing`` crack bear on each other when pressed together, those of an open one
-    never touch.
+    ``depth`` (strip,) m holds the depth in strips of equal width, 0 where there is no crack. The
+    mouth lies at ``mouth_abscissa`` and ``mouth_half_thickness`` of the outline; the outline's
+    angle to the tooth centreline there is ``mouth_slope``. The crack runs inward and towards the
+    root at ``angle`` to the centreline. ``side`` is ``"tension"`` (under the loaded flank) or
+    ``"compression"``. The faces of a ``breathing`` crack bear on each other under compression;
+    those of an open crack never touch.
     """
 
     depth: Array
@@ -43,9 +43,9 @@ class Tooth:
     """A tooth on its outline, in slices across the face.
 
     ``slice_edges`` (slice + 1,) m from 0 to the face width. On the nodes of the involute, (slice,
-    profile) m: ``material_loss`` has been removed (inf where the tooth is broken off: nothing is
-    left up to its centreline and beyond), ``flank_deviation`` is how far the flank stands back
-    from its nominal place (negative: proud of it). ``present`` is False for a missing tooth.
+    profile) m: ``material_loss`` is the removed depth, inf where the tooth is broken off;
+    ``flank_deviation`` is the distance of the flank behind its nominal position, negative in front
+    of it. ``present`` is False for a missing tooth.
     """
 
     profile: ToothProfile
@@ -66,6 +66,11 @@ class Tooth:
         return np.diff(self.slice_edges)
 
     @property
+    def slice_middle(self) -> Array:
+        """Middle of the slices, (slice,) m from one end of the face."""
+        return 0.5 * (self.slice_edges[1:] + self.slice_edges[:-1])
+
+    @property
     def cell_abscissa(self) -> Array:
         """X of the cell centres, (cell,) m."""
         return 0.5 * (self.profile.abscissa[1:] + self.profile.abscissa[:-1])
@@ -80,11 +85,12 @@ class Tooth:
     @property
     def tip_curvature_radius(self) -> float:
         """Curvature radius up to which some of the flank is left, m."""
-        left = np.flatnonzero(np.isfinite(self.material_loss).any(axis=0))
-        return float(self.profile.curvature_radius[left[-1] if len(left) else 0])
+        left = np.isfinite(self.material_loss).any(axis=0)
+        remaining = self.profile.curvature_radius[left]
+        return float(max(remaining, default=self.profile.curvature_radius[0]))
 
     def split(self, edges: Array) -> Tooth:
-        """The same tooth with slices that also end at ``edges``, m."""
+        """This tooth with slices that also end at ``edges``, m."""
         inside = edges[(edges > 0.0) & (edges < self.slice_edges[-1])]
         merged = np.unique(np.concatenate([self.slice_edges, inside]))
         far = np.concatenate([[True], np.diff(merged) > 1e-9 * self.slice_edges[-1]])
@@ -98,40 +104,33 @@ class Tooth:
         )
 
     def with_loss(self, loss: Array) -> Tooth:
-        """The tooth with at least ``loss`` removed, (slice, profile) or what broadcasts to it, m."""
+        """The tooth with at least ``loss`` removed, m, broadcast to (slice, profile)."""
+        if not (loss > self.material_loss).any():
+            return self
         return replace(self, material_loss=np.maximum(self.material_loss, loss))
 
     def with_deviation(self, deviation: Array) -> Tooth:
-        """The tooth with ``deviation`` added to that of its flank, (slice, profile) or what
-        broadcasts to it, m.
-        """
+        """The tooth with a further flank ``deviation``, m, broadcast to (slice, profile)."""
+        if not deviation.any():
+            return self
         return replace(self, flank_deviation=self.flank_deviation + deviation)
 
 
-def healthy_tooth(gear: Gear, profile: ToothProfile | None = None) -> Tooth:
-    """The tooth that the cutter makes: one slice over the full width, nothing lost, no deviation.
-
-    Without an outline of its own, the one sound tooth of the gear, shared by all who ask: its
-    arrays are read-only.
-    """
-    return _sound_tooth(gear) if profile is None else _tooth_on(profile)
-
-
 @lru_cache(maxsize=16)
-def _sound_tooth(gear: Gear) -> Tooth:
-    return _tooth_on(tooth_profile(gear))
+def healthy_tooth(gear: Gear, profile: ToothProfile | None = None) -> Tooth:
+    """The tooth that the cutter makes: one slice over the full width, no loss, no deviation.
 
+    Cached: equal calls return one object with read-only arrays.
 
-def _tooth_on(profile: ToothProfile) -> Tooth:
+    Parameters
+    ----------
+    profile : outline; None samples that of the gear
+    """
+    profile = profile or tooth_profile(gear)
     nothing = np.zeros((1, len(profile.curvature_radius)))
-    edges = np.array([0.0, profile.gear.face_width])
-    for array in (
-        nothing,
-        edges,
-        profile.abscissa,
-        profile.half_thickness,
-        profile.curvature_radius,
-    ):
+    edges = np.array([0.0, gear.face_width])
+    outline = (profile.abscissa, profile.half_thickness, profile.curvature_radius)
+    for array in (nothing, edges, *outline):
         array.flags.writeable = False
     return Tooth(
         profile=profile,

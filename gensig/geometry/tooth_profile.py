@@ -36,9 +36,9 @@ def root_curve(gear: Gear, gamma: Array) -> tuple[Array, Array]:
     r = gear.pitch_radius
     phi = (a1 / np.tan(gamma) + b1) / r
     reach = a1 / np.sin(gamma) + gear.cutter_tip_radius
-    return r * np.cos(phi) - reach * np.sin(gamma - phi), r * np.sin(
-        phi
-    ) - reach * np.cos(gamma - phi)
+    x = r * np.cos(phi) - reach * np.sin(gamma - phi)
+    y = r * np.sin(phi) - reach * np.cos(gamma - phi)
+    return x, y
 
 
 def involute_point(gear: Gear, curvature_radius: Array) -> tuple[Array, Array]:
@@ -54,7 +54,7 @@ def load_angle(gear: Gear, curvature_radius: Array) -> Array:
     return curvature_radius / gear.base_radius - gear.half_tooth_angle_base
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ToothProfile:
     """Outline from the root circle to the tip, sampled for quadrature.
 
@@ -69,6 +69,11 @@ class ToothProfile:
     n_root_cells: int
     curvature_radius: Array
 
+    @property
+    def flank_abscissa(self) -> Array:
+        """Abscissa of the involute's nodes, (profile - n_root_cells,) m."""
+        return self.abscissa[self.n_root_cells :]
+
 
 N_ROOT_CELLS = 256
 N_FLANK_CELLS = 384
@@ -77,10 +82,7 @@ N_FLANK_CELLS = 384
 def tooth_profile(
     gear: Gear, *, n_root_cells: int = N_ROOT_CELLS, n_flank_cells: int = N_FLANK_CELLS
 ) -> ToothProfile:
-    """Sample the outline.
-
-    Cells uniform in gamma on the root curve, in curvature radius on the involute.
-    """
+    """Outline with cells uniform in gamma on the root curve, in curvature on the involute."""
     gamma = np.linspace(0.5 * np.pi, gear.transverse_pressure_angle, n_root_cells + 1)
     tip = np.sqrt(gear.tip_radius**2 - gear.base_radius**2)
     curvature = np.linspace(gear.junction_curvature_radius, tip, n_flank_cells + 1)
@@ -95,7 +97,7 @@ def tooth_profile(
     )
 
 
-@functools.lru_cache(maxsize=64)  # a plan asks for every cracked record
+@functools.lru_cache(maxsize=64)  # called for every cracked record of a plan
 def root_curve_middle(gear: Gear, where: str) -> float:
     """Parameter gamma of the middle of the root transition curve, rad.
 
@@ -121,11 +123,9 @@ def root_curve_point(gear: Gear, where: str) -> tuple[float, float]:
 def root_curve_slope(gear: Gear, where: str) -> float:
     """Angle of the root curve to the tooth centreline at its middle, rad.
 
-    The rack's rounding rolls on the pitch circle: the normal of what it cuts passes through the
-    pitch point, at gamma - phi to the tooth's thickness direction.
+    The rack's rounding rolls on the pitch circle. The normal of the generated curve therefore
+    passes through the pitch point, at gamma - phi to the tooth's thickness direction.
     """
     gamma = root_curve_middle(gear, where)
-    phi = (
-        gear.rounding_center_depth / np.tan(gamma) + gear.rounding_center_offset
-    ) / gear.pitch_radius
-    return float(gamma - phi)
+    rolled = gear.rounding_center_depth / np.tan(gamma) + gear.rounding_center_offset
+    return float(gamma - rolled / gear.pitch_radius)

@@ -14,21 +14,20 @@ from numba import njit
 _compiled: Any = functools.partial(njit, nogil=True, cache=True, error_model="numpy")()
 
 ROUNDS = 40  # at most, of the logarithm's load: each leaves about a tenth of the error
-LEAST_INTENSITY = (
-    1e-3  # of the even load per width: the logarithm has no limit where a slice lets go
-)
+# of the even load per width: the logarithm has no limit as a slice loses contact
+LEAST_INTENSITY = 1e-3
 
 
 @_compiled
 def lower_envelope(standing_back, arc, center, relative_radius, gap):
-    """Gap that the mating flank finds, the least of standing_back + x^2 / (2 rho) along the
-    common tangent.
+    """Gap to the mating flank: the least of standing_back + x^2 / (2 rho) along the common tangent.
 
     Parameters
     ----------
-    standing_back : (slice, profile) m    of the flank from its nominal place, straight between nodes, inf where gone
+    standing_back : (slice, profile) m    of the flank behind its nominal position, linear between
+        nodes, inf where the flank is missing
     arc : (profile,) m                    length along the flank, increasing
-    center : (node,) m                    where on that length the nominal contact lies; may lie beyond the ends
+    center : (node,) m                    nominal contact on that length; may lie beyond the ends
     relative_radius : (node,) m           relative radius of curvature there
     gap : (slice, node) m                 written
     """
@@ -61,7 +60,7 @@ def lower_envelope(standing_back, arc, center, relative_radius, gap):
 
 @_compiled
 def _between(back, arc, j, center, radius):
-    """The least between nodes j and j + 1, inf where it lies at one of them or either is gone."""
+    """Minimum between nodes j and j + 1; inf if it is at a node, or if a node is missing."""
     slope = (back[j + 1] - back[j]) / (arc[j + 1] - arc[j])
     x = -radius * slope
     if not np.isfinite(slope) or x <= arc[j] - center or x >= arc[j + 1] - center:
@@ -75,9 +74,8 @@ def share_over_slices(
 ):
     """Gap of the slice that touches first, and the secant compliance from there under the load.
 
-    Every slice carries width x (approach - its gap) / (unit compliance), the unit compliance
-    being that of the contact, factor x (constant - log_weight x ln(its load per width)), and of
-    what bends with the slice alone.
+    Every slice carries width x (approach - its gap) / (unit compliance). The unit compliance is
+    that of the contact, factor x (constant - log_weight x ln(load per width)), plus ``bending``.
 
     Parameters
     ----------
@@ -85,7 +83,7 @@ def share_over_slices(
     width : (slice,) m
     load : (node,) N
     factor : m2/N, constant : (node,), log_weight : 0 (linear) or 1 (Weber)
-    bending : (node,) m2/N    compliance of unit width that is the slice's own; left out of what is returned
+    bending : (node,) m2/N    of a slice alone, per unit width; not part of the result
     gap, compliance : (node,) m, m/N, written
     """
     n_slices, full = width.shape[0], width.sum()

@@ -1,4 +1,4 @@
-"""Compliance of the gear body under a loaded tooth, by the chosen model."""
+"""Compliance of the gear body under a loaded tooth."""
 
 from __future__ import annotations
 
@@ -19,8 +19,7 @@ from gensig.mesh.options import MeshOptions
 
 Array = NDArray[np.float64]
 
-# rim thickness over module: the ring was checked against finite elements down to 2, one case at
-# 1.75
+# rim thickness over module: checked against finite elements down to 2, in one case at 1.75
 CHECKED_RIM, THINNEST_RIM = 2.0, 1.5
 
 
@@ -31,7 +30,8 @@ def body_compliance(
 
     Raises
     ------
-    ExtrapolationError    for a bore outside the range on which the model was checked, unless allowed
+    ExtrapolationError    for a bore outside the range on which the model was checked, unless
+        allowed
     """
     if options.body == "sainsot":
         return fillet_foundation_compliance(
@@ -40,13 +40,14 @@ def body_compliance(
     rim = (gear.root_radius - gear.bore_radius) / gear.normal_module
     if rim < THINNEST_RIM and not options.allow_extrapolation:
         raise ExtrapolationError(
-            f"{gear.name}: the rim between bore and root is {rim:.3g} modules thick, below the {THINNEST_RIM:g} for "
-            f"which the elastic ring holds; reduce bore_radius_mm, or set mesh.allow_extrapolation=true"
+            f"{gear.name}: the rim between bore and root is {rim:.3g} modules thick, below the "
+            f"{THINNEST_RIM:g} for which the elastic ring holds; reduce bore_radius_mm, or set "
+            "mesh.allow_extrapolation=true"
         )
     if rim < CHECKED_RIM:
         warnings.warn(
-            f"{gear.name}: the rim between bore and root is {rim:.3g} modules thick; the elastic ring was checked "
-            f"down to {CHECKED_RIM:g}",
+            f"{gear.name}: the rim between bore and root is {rim:.3g} modules thick; the elastic "
+            f"ring was checked down to {CHECKED_RIM:g}",
             ExtrapolationWarning,
             stacklevel=4,
         )

@@ -1,5 +1,4 @@
-"""How the load on one tooth deflects the gear body under its neighbours: the clamped elastic ring
-by Fourier series.
+"""Deflection of a gear body under neighbouring teeth: the clamped elastic ring by Fourier series.
 
 Derivation, checks against finite elements and limits: ``docs/theory/spur_mesh.md``.
 """
@@ -19,64 +18,51 @@ from gensig.material import Material
 
 Array = NDArray[np.float64]
 
-STRESS_EXPONENT = 6  # shape xi (1 - xi^6) of the bending stress on the root arc: the one calibrated number
+STRESS_EXPONENT = 6  # calibrated: bending stress on the root arc goes as xi (1 - xi^6)
 SERIES_LENGTH = 12.0  # harmonics up to n theta_f = 12: cross terms to 1e-4
 
 
 @lru_cache(maxsize=64)
 def shared_body_compliance(pair: GearPair, material: Material) -> float:
-    """Cross compliance of two pairs in contact at once, through both gear bodies, m/N.
+    """Cross compliance of two tooth pairs in contact at once, through both gear bodies, m/N.
 
-    The mean over the double zone of (deflection of one pair) / (load on the other); it varies by
-    1 to 5 % there. Plane stress. Source: elastic ring clamped at the bore, loaded over the root
+    The mean over the double zone of (deflection of one pair) / (load on the other), which varies
+    by 1 to 5 % there. Plane stress. Source: elastic ring clamped at the bore, loaded over the root
     arc of a tooth.
     """
     overlap = (pair.transverse_contact_ratio - 1.0) * pair.base_pitch
     position = np.linspace(0.0, max(overlap, 0.0), 9)
-    pinion = cross_compliance(
-        pair.pinion,
-        material,
-        load_angle(pair.pinion, np.asarray(pair.pinion_curvature(position))),
-        load_angle(
-            pair.pinion, np.asarray(pair.pinion_curvature(position + pair.base_pitch))
-        ),
-        pitches=1,
-    )
-    wheel = cross_compliance(
-        pair.wheel,
-        material,
-        load_angle(pair.wheel, np.asarray(pair.wheel_curvature(position))),
-        load_angle(
-            pair.wheel, np.asarray(pair.wheel_curvature(position + pair.base_pitch))
-        ),
-        pitches=-1,
-    )
-    return float(np.mean(pinion + wheel))
+    total = np.zeros_like(position)
+    for (side, gear), pitches in zip(pair.gears.items(), (1, -1), strict=True):
+        loaded = load_angle(gear, pair.curvature(side, position))
+        probed = load_angle(gear, pair.curvature(side, position + pair.base_pitch))
+        total += cross_compliance(gear, material, loaded, probed, pitches=pitches)
+    return float(np.mean(total))
 
 
 def cross_compliance(
     gear: Gear, material: Material, loaded: Array, probed: Array, *, pitches: int
 ) -> Array:
-    """Deflection along its own line of action of the tooth ``pitches`` ahead, per load on tooth
-    0, (phase,) m/N.
+    """Deflection of the tooth ``pitches`` ahead per load on tooth 0, (phase,) m/N.
+
+    Both are along the lines of action of their own teeth.
 
     Parameters
     ----------
     loaded, probed : (phase,) rad    load angles on the loaded tooth and on the probed one
     pitches : 0 gives the body compliance under the loaded tooth itself
     """
-    flexibility = arc_flexibility(
-        gear, material, 2.0 * math.pi * pitches / gear.n_teeth
-    )
-    return np.einsum(
-        "pi,ij,pj->p", _load(gear, probed), flexibility, _load(gear, loaded)
-    )
+    angle = 2.0 * math.pi * pitches / gear.n_teeth
+    flexibility = arc_flexibility(gear, material, angle)
+    loads = _load(gear, probed), flexibility, _load(gear, loaded)
+    return np.einsum("pi,ij,pj->p", *loads)
 
 
 @lru_cache(maxsize=64)
 def arc_flexibility(gear: Gear, material: Material, angle: float) -> Array:
-    """Displacements (u_x, u_y, rotation about the centre) of a root arc per (F_x, F_y, moment) on
-    the arc at angle 0.
+    """Displacements (u_x, u_y, rotation about the centre) of a root arc per (F_x, F_y, moment).
+
+    The loaded arc is at angle 0, the displaced arc at ``angle``.
 
     Returns
     -------
@@ -119,12 +105,8 @@ def ring_harmonic(gear: Gear, material: Material, n: int) -> Array:
     r_f, r_i = gear.root_radius, gear.bore_radius
     if n == 0:
         q = (r_f / r_i) ** 2
-        return np.diag(
-            [
-                r_f * (q - 1.0) / (2.0 * (lame + mu) * q + 2.0 * mu),
-                r_f * (q - 1.0) / (2.0 * mu),
-            ]
-        )
+        radial = r_f * (q - 1.0) / (2.0 * (lame + mu) * q + 2.0 * mu)
+        return np.diag([radial, r_f * (q - 1.0) / (2.0 * mu)])
 
     # power p, amplitudes (U, V), reference radius; the logarithm replaces the third for n = 1
     powers = [
@@ -135,35 +117,23 @@ def ring_harmonic(gear: Gear, material: Material, n: int) -> Array:
     if n > 1:
         powers.insert(2, (1 - n, kappa - 1.0 + n, n - kappa - 1.0, r_i))
 
-    def column(
-        u: float, v: float, u_slope: float, v_slope: float
-    ) -> tuple[float, float]:
-        stress = (lame * (u_slope + u + n * v) + 2.0 * mu * u_slope) / r_f
-        return stress, mu * (-n * u + v_slope - v) / r_f
+    Pair = tuple[float, float]
+
+    def column(at_bore: Pair, at_root: Pair, slope: Pair) -> list[float]:
+        (u, v), (u_slope, v_slope) = at_root, slope
+        normal = (lame * (u_slope + u + n * v) + 2.0 * mu * u_slope) / r_f
+        shear = mu * (-n * u + v_slope - v) / r_f
+        return [*at_bore, normal, shear, u, v]
 
     columns = []
     for power, u, v, reference in powers:
         inner, outer = (r_i / reference) ** power, (r_f / reference) ** power
-        columns.append(
-            [
-                u * inner,
-                v * inner,
-                *column(u * outer, v * outer, power * u * outer, power * v * outer),
-                u * outer,
-                v * outer,
-            ]
-        )
+        slope = power * u * outer, power * v * outer
+        columns.append(column((u * inner, v * inner), (u * outer, v * outer), slope))
     if n == 1:
         log = 2.0 * kappa * math.log(r_i / r_f)
-        columns.append(
-            [
-                log - 1.0,
-                -log - 1.0,
-                *column(-1.0, -1.0, 2.0 * kappa, -2.0 * kappa),
-                -1.0,
-                -1.0,
-            ]
-        )
+        slope = 2.0 * kappa, -2.0 * kappa
+        columns.append(column((log - 1.0, -log - 1.0), (-1.0, -1.0), slope))
     system = np.array(columns).T
     system[2:4] /= mu  # one scale for displacements and stresses
     system /= np.abs(system).max(axis=0)
@@ -180,23 +150,15 @@ def _resultants(
     normal: Array,
     shear: Array,
 ) -> Array:
-    """(F_x, F_y, moment about the centre) of each stress shape per unit width.
-
-    Columns are shapes.
-    """
+    """(F_x, F_y, moment about the centre) per unit width, by rows; columns are stress shapes."""
     theta, measure = theta_f * nodes, r_f * theta_f * weights
-    return np.stack(
-        [
-            (normal * np.cos(theta) - shear * np.sin(theta)) @ measure,
-            (normal * np.sin(theta) + shear * np.cos(theta)) @ measure,
-            shear @ measure * r_f,
-        ]
-    )
+    cos, sin = np.cos(theta), np.sin(theta)
+    force_x = (normal * cos - shear * sin) @ measure
+    force_y = (normal * sin + shear * cos) @ measure
+    return np.stack([force_x, force_y, shear @ measure * r_f])
 
 
 def _load(gear: Gear, angle: Array) -> Array:
     """Resultants of a unit force pressing on the loaded flank, (phase, 3)."""
-    return np.stack(
-        [-np.sin(angle), -np.cos(angle), np.full_like(angle, -gear.base_radius)],
-        axis=-1,
-    )
+    moment = np.full_like(angle, -gear.base_radius)
+    return np.stack([-np.sin(angle), -np.cos(angle), moment], axis=-1)

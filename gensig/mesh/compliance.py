@@ -1,7 +1,4 @@
-"""Tooth compliance by the potential-energy method.
-
-Bending, shear and axial compression of a tapered cantilever.
-"""
+"""Tooth compliance by the potential-energy method: a tapered cantilever."""
 
 from __future__ import annotations
 
@@ -17,8 +14,7 @@ from gensig.mesh.tooth_sections import sections
 
 Array = NDArray[np.float64]
 
-# parabolic shear of a long prismatic beam, spur paper eq. (4), against even shear: see
-# tooth_compliance
+# parabolic shear of a long prismatic beam, spur paper eq. (4), or even shear: see tooth_compliance
 SHEAR_FACTORS = {"to_contact": 1.2, "to_centreline": 1.0}
 
 
@@ -49,11 +45,12 @@ def tooth_compliance(
     Parameters
     ----------
     curvature_radius : (phase,) m    of the tooth's own flank at the contact
-    reach : ``"to_contact"`` integrates up to the contact abscissa with the shear factor 1.2, as the paper does;
-        ``"to_centreline"`` up to where the load crosses the centreline, with 1: what lies between is the local
-        contact's, and a tooth as short as it is thick, held at its root and tapered, has no room for the parabolic
-        shear of a long beam (finite elements of teeth held at their root chord, ``tests/reference``)
-    papers_crack : a crack reduces the sections that it cuts, as eqs. (11) and (12) have it
+    reach : ``"to_contact"`` integrates up to the contact abscissa with the shear factor 1.2, as
+        the paper does. ``"to_centreline"`` integrates up to the load's crossing of the centreline
+        with the factor 1. The part beyond belongs to the local contact, and a short tapered tooth
+        has no room for the parabolic shear of a long beam (finite elements of teeth held at their
+        root chord, ``tests/reference``)
+    papers_crack : a crack reduces the sections that it cuts, by eqs. (11) and (12)
 
     Returns
     -------
@@ -72,17 +69,14 @@ def tooth_compliance(
     cos, sin = np.cos(angle), np.sin(angle)
     x_load, h_load = involute_point(gear, curvature_radius)
     if reach == "to_centreline":
-        # the same force, moved along its line to the centreline: arm and integral end there
-        x_load, h_load = (
-            np.maximum(x_load - h_load * np.tan(angle), root),
-            np.zeros_like(h_load),
-        )
+        # the force moved along its line to the centreline, where arm and integral end
+        x_load = np.maximum(x_load - h_load * np.tan(angle), root)
+        h_load = np.zeros_like(h_load)
     arm = x_load - root
 
     def up_to_load(cells: Array) -> Array:
-        return np.interp(
-            x_load, profile.abscissa, np.concatenate([[0.0], np.cumsum(cells)])
-        )
+        running = np.concatenate([[0.0], np.cumsum(cells)])
+        return np.interp(x_load, profile.abscissa, running)
 
     zeroth, first, second = (up_to_load(bend * x**power) for power in range(3))
     return ToothCompliance(

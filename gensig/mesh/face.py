@@ -1,7 +1,4 @@
-"""Contact over the face.
-
-Which slices of a faulty flank bear, how far they stand back, how much softer they make it.
-"""
+"""Contact over the face of a faulty flank: bearing slices, their gaps and compliance."""
 
 from __future__ import annotations
 
@@ -16,26 +13,24 @@ from gensig.mesh.local_contact import ContactLaw
 Array = NDArray[np.float64]
 
 SHAPE_DECIMALS = 15  # of a metre: rounding noise does not make two slices different
-# law=paper knows no gap: flank deeper than this share of the module below the rest of its tooth
-# does not bear
+# law=paper has no gaps: flank deeper than this share of the module does not bear
 LOST_DEPTH = 0.04
 
 
 def is_nominal(tooth: Tooth) -> bool:
-    """True for a flank that is whole and stands where it should."""
+    """True for a flank without lost material and without deviation."""
     return not (tooth.material_loss.any() or tooth.flank_deviation.any())
 
 
 def slice_gaps(tooth: Tooth, curvature_radius: Array, relative_radius: Array) -> Array:
-    """How much later than a sound flank each slice touches its mate, (slice, phase) m.
+    """Gap of each slice beyond that of a sound flank, (slice, phase) m.
 
-    The mate rides on the edges of what is short: the gap is the lower envelope of both flanks
-    along the common tangent, not the material removed. Where the flank has lost its tip its new
-    corner touches.
+    The mate rides on the edges of a hole: the gap is the lower envelope of both flanks along the
+    common tangent, not the removed depth. The new corner of a flank without its tip touches.
 
     Parameters
     ----------
-    curvature_radius : (phase,) m    of the nominal contact; beyond the tip it means contact of the tip's corner
+    curvature_radius : (phase,) m    of the nominal contact; beyond the tip: its corner touches
     relative_radius : (phase,) m     of both flanks there
     """
     base = tooth.gear.base_radius
@@ -56,20 +51,17 @@ def slice_gaps(tooth: Tooth, curvature_radius: Array, relative_radius: Array) ->
     gap = np.repeat(level, len(center), axis=1)
     if not even.all():
         shapes, which, moved = _shapes(standing_back[~even])
-        beyond = np.maximum(
-            np.maximum(center - arc[-1], arc[0] - center), 0.0
-        )  # of a nominal flank the end touches
-        gap[~even] = (envelope(shapes) - beyond**2 / (2.0 * relative_radius))[
-            which
-        ] + moved
+        # the end of a nominal flank touches
+        beyond = np.maximum(np.maximum(center - arc[-1], arc[0] - center), 0.0)
+        uneven = envelope(shapes) - beyond**2 / (2.0 * relative_radius)
+        gap[~even] = uneven[which] + moved
     return gap[:, place]
 
 
 def _shapes(standing_back: Array) -> tuple[Array, NDArray[np.int64], Array]:
-    """Rows that differ by more than how far back they stand as a whole, which of them each row
-    is, and how far back.
+    """Distinct shapes of the rows without their offsets, index of each row's shape, and offsets.
 
-    Slices of one flank that is only moved or tilted across the face share their envelope.
+    Slices of a flank that is only moved or tilted across the face share their envelope.
     """
     moved = np.where(np.isfinite(standing_back[:, :1]), standing_back[:, :1], 0.0)
     known: dict[bytes, int] = {}
@@ -90,19 +82,18 @@ def face_contact(
     load: Array,
     bending: Array,
 ) -> tuple[Array, Array]:
-    """Gap of the slice that touches first; from there, contact compliance and what partial width
-    adds to bending.
+    """Gap of the slice that touches first, and compliance from there, (phase,) m and m/N.
+
+    The compliance is that of the contact plus the bending that partial width adds.
 
     Parameters
     ----------
     curvature_radius, relative_radius : see ``slice_gaps``
     load : (phase,) N    at which the secant is taken
-    bending : (phase,) m/N    of both teeth over the whole face, where every slice bends by itself, else 0
+    bending : (phase,) m/N    of both teeth over the whole face, if slices bend alone; else 0
     """
     gaps = slice_gaps(tooth, curvature_radius, relative_radius)
-    if (
-        len(gaps) == 1 and np.isfinite(gaps).all()
-    ):  # one slice bears as a sound flank does
+    if len(gaps) == 1 and np.isfinite(gaps).all():  # bears as a sound flank
         return gaps[0], law.compliance(tooth.gear.face_width, load)
     gap, compliance = np.empty_like(load), np.empty_like(load)
     unit = bending * tooth.gear.face_width
@@ -121,19 +112,18 @@ def face_contact(
 
 
 def bearing_width(tooth: Tooth, curvature_radius: Array) -> Array:
-    """Width in contact by the paper's law, which knows no gaps: the face less what is lost,
-    (phase,) m.
+    """Width in contact by the paper's law, which has no gaps: the face less lost parts, (phase,) m.
 
     Raises
     ------
-    FaultError    where nothing is left: only gaps can tell what touches instead
+    FaultError    where no width is left, since only a law with gaps finds the contact there
     """
     loss = tooth.material_loss
     whole = loss <= loss.min() + LOST_DEPTH * tooth.gear.normal_module
     width = tooth.slice_width @ whole
     if np.any(width <= 0.0):
         raise FaultError(
-            f"a {tooth.gear.name} tooth has lost its flank over the whole face width: mesh.law=paper knows no gaps, "
-            f"take mesh.law=one_sided"
+            f"a {tooth.gear.name} tooth has lost its flank over the whole face width: "
+            "mesh.law=paper knows no gaps, take mesh.law=one_sided"
         )
     return np.interp(curvature_radius, tooth.profile.curvature_radius, width)

@@ -1,4 +1,4 @@
-"""Compliance of the gear body under one loaded tooth (Sainsot's fit of the clamped elastic ring)."""
+"""Compliance of the gear body under one loaded tooth: Sainsot's fit of the clamped ring."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ COEFFICIENTS = {
     "P": (-50.952e-5, 185.50e-3, 0.0538e-4, 53.300e-3, 0.2895, 0.9236),
     "Q": (-6.2042e-5, 9.0889e-3, -4.0964e-4, 7.8297e-3, -0.1472, 0.6904),
 }
-# where finite elements confirm the fit (docs/theory/spur_mesh.md), and where it is only plausible
+# ranges confirmed by finite elements (docs/theory/spur_mesh.md), and plausible ranges
 CHECKED = {"theta_f": (0.03, 0.14), "h_f": (1.4, 8.2)}
 PLAUSIBLE = {"theta_f": (0.01, 0.20), "h_f": (1.4, 8.2)}
 
 
 class ExtrapolationWarning(UserWarning):
-    """A fit used outside the range on which it was checked, but where it is still plausible."""
+    """A fit used outside its checked range, but within its plausible range."""
 
 
 def fillet_foundation_compliance(
@@ -60,15 +60,17 @@ def fillet_foundation_compliance(
         + values["M"] * lever
         + values["P"] * (1.0 + values["Q"] * np.tan(load_angle) ** 2)
     )
-    return (
-        np.cos(load_angle) ** 2 / (gear.face_width * material.youngs_modulus) * bracket
-    )
+    scale = gear.face_width * material.youngs_modulus
+    return np.cos(load_angle) ** 2 / scale * bracket
 
 
 def body_coefficients(gear: Gear, *, allow_extrapolation: bool) -> dict[str, float]:
     """L*, M*, P* and Q* of the gear body."""
     theta, ratio = gear.root_half_angle, gear.root_radius / gear.bore_radius
-    _check_range(gear, {"theta_f": theta, "h_f": ratio}, allow_extrapolation)
+    half_angle = f"half root angle theta_f = {theta:.3g}"
+    _check_range(gear, "theta_f", theta, half_angle, "the teeth", allow_extrapolation)
+    radii = f"root radius over bore radius h_f = {ratio:.3g}"
+    _check_range(gear, "h_f", ratio, radii, "bore_radius_mm", allow_extrapolation)
     terms = (theta**-2, ratio**2, ratio / theta, 1.0 / theta, ratio, 1.0)
     return {
         name: math.fsum(c * t for c, t in zip(row, terms, strict=True))
@@ -77,26 +79,19 @@ def body_coefficients(gear: Gear, *, allow_extrapolation: bool) -> dict[str, flo
 
 
 def _check_range(
-    gear: Gear, found: dict[str, float], allow_extrapolation: bool
+    gear: Gear, key: str, value: float, shown: str, cause: str, allowed: bool
 ) -> None:
-    for key, value in found.items():
-        low, high = PLAUSIBLE[key]
-        what = (
-            "half root angle theta_f"
-            if key == "theta_f"
-            else "root radius over bore radius h_f"
+    low, high = PLAUSIBLE[key]
+    if not low <= value <= high and not allowed:
+        raise ExtrapolationError(
+            f"{gear.name}: {shown} lies outside {low:g}..{high:g}, where the gear-body fit holds; "
+            f"change {cause}, or set mesh.allow_extrapolation=true"
         )
-        if not low <= value <= high and not allow_extrapolation:
-            mend = "change bore_radius_mm" if key == "h_f" else "change the teeth"
-            raise ExtrapolationError(
-                f"{gear.name}: {what} = {value:.3g} lies outside {low:g}..{high:g}, where the gear-body fit holds; "
-                f"{mend}, or set mesh.allow_extrapolation=true"
-            )
-        checked_low, checked_high = CHECKED[key]
-        if not checked_low <= value <= checked_high:
-            warnings.warn(
-                f"{gear.name}: {what} = {value:.3g} lies outside {checked_low:g}..{checked_high:g}, where the "
-                f"gear-body fit was checked against finite elements",
-                ExtrapolationWarning,
-                stacklevel=4,
-            )
+    low, high = CHECKED[key]
+    if not low <= value <= high:
+        warnings.warn(
+            f"{gear.name}: {shown} lies outside {low:g}..{high:g}, where the gear-body fit was "
+            f"checked against finite elements",
+            ExtrapolationWarning,
+            stacklevel=4,
+        )

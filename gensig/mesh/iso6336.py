@@ -1,7 +1,4 @@
-"""Tooth stiffness by ISO 6336-1, Method B.
-
-The standard's yardstick for the computed mesh stiffness.
-"""
+"""Tooth stiffness by ISO 6336-1, Method B: a standard value to compare with."""
 
 from __future__ import annotations
 
@@ -44,7 +41,7 @@ def single_stiffness(
 
     Parameters
     ----------
-    line_load : F_t K_A / b, N/m, at the reference circle; None for 100 N/mm or more, where it does not matter
+    line_load : F_t K_A / b, N/m, at the reference circle; None: 100 N/mm or more, without effect
     correction_factor : C_M; 1 gives the theoretical stiffness
     youngs_modulus : of both gears, Pa; the series was fitted for steel
     allow_extrapolation : use the series beyond its range without an error
@@ -70,21 +67,17 @@ def single_stiffness(
     x1, x2 = pair.pinion.profile_shift, pair.wheel.profile_shift
     if not (x1 >= x2 and low <= x1 + x2 <= high) and not allow_extrapolation:
         raise ExtrapolationError(
-            f"ISO 6336-1: profile shifts {x1:g} (pinion) and {x2:g} (wheel) lie outside x1 >= x2, {low:g} <= x1 + x2 "
-            f"<= {high:g}, where its tooth stiffness holds; change them, or allow extrapolation"
+            f"ISO 6336-1: profile shifts {x1:g} (pinion) and {x2:g} (wheel) lie outside x1 >= x2, "
+            f"{low:g} <= x1 + x2 <= {high:g}, where its tooth stiffness holds; change them, or "
+            "allow extrapolation"
         )
     rack = 0.5 * (basic_rack_factor(pair.pinion) + basic_rack_factor(pair.wheel))
-    load = 1.0 if line_load is None else min(1.0, line_load / LINEAR_LINE_LOAD) ** 0.25
+    load = 1.0
+    if line_load is not None:
+        load = min(1.0, line_load / LINEAR_LINE_LOAD) ** 0.25
     helix = math.cos(pair.pinion.helix_angle)
-    return (
-        correction_factor
-        * rack
-        * helix
-        * load
-        * youngs_modulus
-        / STEEL_YOUNGS_MODULUS
-        / flexibility(pair)
-    )
+    factors = correction_factor * rack * helix * load
+    return factors * youngs_modulus / STEEL_YOUNGS_MODULUS / flexibility(pair)
 
 
 def mesh_stiffness(
@@ -95,8 +88,9 @@ def mesh_stiffness(
     youngs_modulus: float = STEEL_YOUNGS_MODULUS,
     allow_extrapolation: bool = False,
 ) -> float:
-    """Mean mesh stiffness c_gamma = c' (0.75 eps_alpha + 0.25) per face width, N/m/m; parameters
-    as for c'.
+    """Mean mesh stiffness c_gamma = c' (0.75 eps_alpha + 0.25) per face width, N/m/m.
+
+    Parameters are those of ``single_stiffness``.
 
     Raises
     ------
@@ -105,8 +99,9 @@ def mesh_stiffness(
     ratio = pair.transverse_contact_ratio
     if ratio < LEAST_CONTACT_RATIO and not allow_extrapolation:
         raise ExtrapolationError(
-            f"ISO 6336-1: the transverse contact ratio {ratio:.4g} lies below {LEAST_CONTACT_RATIO:g}, where its mesh "
-            f"stiffness holds; use more teeth or a larger addendum_coefficient, or allow extrapolation"
+            f"ISO 6336-1: the transverse contact ratio {ratio:.4g} lies below "
+            f"{LEAST_CONTACT_RATIO:g}, where its mesh stiffness holds; use more teeth or a larger "
+            "addendum_coefficient, or allow extrapolation"
         )
     single = single_stiffness(
         pair,

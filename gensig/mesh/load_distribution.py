@@ -19,14 +19,16 @@ from gensig.mesh.pair_table import N_PAIRS, PairTable, pair_table
 Array = NDArray[np.float64]
 
 LOAD_ROUNDS = 3
-LEAST_LOAD_SHARE = 0.02  # a pair about to take load: its local compliance has no limit as the load falls to 0
+LEAST_LOAD_SHARE = 0.02  # local compliance has no limit as the load falls to 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairStates:
-    """Compliance (less the shared part) and gap of the pairs followed at each phase, (phase,
-    pair); pairs in order of entry, the one approaching A first. An absent pair has an infinite
-    gap."""
+    """Compliance (less the shared part), gap and position of the tooth pairs, (phase, pair).
+
+    Pairs are in order of entry, the pair that approaches A first. An absent pair has an infinite
+    gap.
+    """
 
     compliance: Array
     gap: Array
@@ -45,6 +47,15 @@ class StaticMesh:
     stiffness: Array
 
 
+def cells(nodes: Array, position: Array) -> tuple[NDArray[np.int64], Array]:
+    """Cells between equally spaced nodes that hold the positions, and relative positions there."""
+    n_cells = len(nodes) - 1
+    scaled = (position - nodes[0]) * (n_cells / (nodes[-1] - nodes[0]))
+    scaled = np.clip(scaled, 0.0, n_cells)
+    cell = np.minimum(scaled.astype(np.int64), n_cells - 1)
+    return cell, scaled - cell
+
+
 def pair_states(
     table: PairTable,
     roll: Array,
@@ -59,20 +70,15 @@ def pair_states(
     """Pairs at the pinion's roll, (phase,) m along the line of action; at 0 the start teeth enter
     at A.
 
-    ``pinion_error`` and ``wheel_error`` (tooth,) m open the gaps of their teeth at the pitch
-    point, ``pinion_tilt`` and ``wheel_tilt`` (tooth,) m/m by as much more for every metre that
-    the contact is further along the path.
+    ``pinion_error`` and ``wheel_error`` (tooth,) m open the gaps at the pitch point,
+    ``pinion_tilt`` and ``wheel_tilt`` (tooth,) m/m by as much more for every metre further along
+    the path.
     """
     pitch = table.pair.base_pitch
     newest = np.floor(roll / pitch).astype(np.int64)
     index = newest[:, None] + 1 - np.arange(N_PAIRS)
     position = roll[:, None] - index * pitch
-    nodes, n_cells = table.position, len(table.position) - 1
-    place = np.clip(
-        (position - nodes[0]) * (n_cells / (nodes[-1] - nodes[0])), 0.0, n_cells
-    )
-    cell = np.minimum(place.astype(np.int64), n_cells - 1)
-    part = place - cell
+    cell, part = cells(table.position, position)
     compliance = np.full(position.shape, -table.shared_compliance)
     gap = np.zeros(position.shape)
     sides = (
@@ -86,10 +92,10 @@ def pair_states(
             gap += error[teeth]
         if tilt is not None:
             gap += tilt[teeth] * (position - table.pair.pitch_point)
-        compliance += (1.0 - part) * side.compliance[
-            kinds, cell
-        ] + part * side.compliance[kinds, cell + 1]
-        gap += (1.0 - part) * side.gap[kinds, cell] + part * side.gap[kinds, cell + 1]
+        low, high = (kinds, cell), (kinds, cell + 1)
+        soft, back = side.compliance, side.gap
+        compliance += (1.0 - part) * soft[low] + part * soft[high]
+        gap += (1.0 - part) * back[low] + part * back[high]
         gap[~side.present[kinds]] = np.inf
     return PairStates(compliance=compliance, gap=gap, position=position)
 
@@ -100,36 +106,27 @@ def static_mesh(table: PairTable, states: PairStates, force: float) -> StaticMes
     ``mesh.law=paper`` has no gaps: pairs on the path share by stiffness, and where none is on it
     the stiffness is 0 and the approach infinite.
     """
+    gap = states.gap
     if table.options.law == "paper":
-        on_path = (
-            (states.position >= 0.0)
-            & (states.position <= table.pair.path_of_contact)
-            & np.isfinite(states.gap)
-        )
-        gap = np.where(on_path, 0.0, np.inf)
-    else:
-        gap = states.gap
+        end = table.pair.path_of_contact
+        on_path = (states.position >= 0.0) & (states.position <= end)
+        gap = np.where(on_path & np.isfinite(gap), 0.0, np.inf)
     order = np.argsort(gap, axis=1, kind="stable")
     sorted_gap = np.take_along_axis(gap, order, axis=1)
-    own = np.take_along_axis(states.compliance, order, axis=1)
+    compliance = np.take_along_axis(states.compliance, order, axis=1)
     touching = np.isfinite(sorted_gap)
-    stiffness = np.cumsum(np.where(touching, 1.0 / own, 0.0), axis=1)
-    reach = np.cumsum(
-        np.where(touching, np.where(touching, sorted_gap, 0.0) / own, 0.0), axis=1
-    )
+    stiffness = np.cumsum(np.where(touching, 1.0 / compliance, 0.0), axis=1)
+    closing = np.where(touching, sorted_gap, 0.0) / compliance
+    # approach less the shared deflection if the first m pairs carry
     with np.errstate(divide="ignore"):
-        local = (
-            force + reach
-        ) / stiffness  # approach less the shared deflection if the first m pairs carry
+        local = (force + np.cumsum(closing, axis=1)) / stiffness
     carried = (local > sorted_gap).sum(axis=1)
     last = np.maximum(carried - 1, 0)
     rows = np.arange(len(last))
     total, approach = stiffness[rows, last], local[rows, last]
     lost = carried == 0
-    bite = np.where(lost, 0.0, approach)[:, None] - np.where(
-        np.isfinite(gap), gap, np.inf
-    )
-    load = np.maximum(bite, 0.0) / states.compliance
+    deflection = np.where(lost, 0.0, approach)[:, None] - gap
+    load = np.maximum(deflection, 0.0) / states.compliance
     return StaticMesh(
         approach=np.where(lost, np.inf, approach + table.shared_compliance * force),
         load=np.where(lost[:, None], 0.0, load),
@@ -146,20 +143,16 @@ def loaded_pair_table(
     force: float,
     modification: PairModification = PLAIN,
 ) -> PairTable:
-    """Table whose contact term is the secant at the quasi-static load of sound pairs under a
-    total force in N.
-    """
-    load = (
-        force
-        if options.contact == "linear"
-        else sound_load(pair, material, options, force, modification)
-    )
+    """Table for a total force in N: its contact term is the secant at the load of sound pairs."""
+    load: Array | float = force
+    if options.contact != "linear":
+        load = sound_load(pair, material, options, force, modification)
     return pair_table(
         pair, material, options, teeth, load=load, modification=modification
     )
 
 
-@lru_cache(maxsize=32)  # the records of a condition share it, whatever their faults
+@lru_cache(maxsize=32)  # shared by the records of a condition
 def sound_load(
     pair: GearPair,
     material: Material,
@@ -167,11 +160,10 @@ def sound_load(
     force: float,
     modification: PairModification = PLAIN,
 ) -> Array:
-    """Quasi-static load of a sound pair at every node under a total force in N, (node,) N; not to
-    be written to.
+    """Quasi-static load of a sound tooth pair at every node, (node,) N, read-only.
 
-    Load sharing and local compliance depend on each other; the sharing moves by less than 1e-3
-    after three rounds.
+    ``force`` is the total in N. Load sharing and local compliance depend on each other; the
+    sharing changes by less than 1e-3 after three rounds.
     """
     load: Array | float = force
     for _ in range(LOAD_ROUNDS):
@@ -186,20 +178,14 @@ def sound_load(
 
 
 def _sound_states(table: PairTable) -> PairStates:
-    """Sound pairs at every node of one pitch.
-
-    In order of entry, each one pitch after the one before it.
-    """
+    """Sound tooth pairs at every node of one pitch, in order of entry."""
 
     def of_pairs(nodes: Array) -> Array:
         return nodes[:-1].reshape(N_PAIRS, table.options.points_per_pitch).T
 
+    both = table.pinion.compliance[0] + table.wheel.compliance[0]
     return PairStates(
-        compliance=of_pairs(
-            table.pinion.compliance[0]
-            + table.wheel.compliance[0]
-            - table.shared_compliance
-        ),
+        compliance=of_pairs(both - table.shared_compliance),
         gap=of_pairs(table.pinion.gap[0] + table.wheel.gap[0]),
         position=of_pairs(table.position),
     )

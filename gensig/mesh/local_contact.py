@@ -1,7 +1,4 @@
-"""Local compliance of the contact.
-
-The paper's constant term, or the load-dependent one of Weber and Banaschek.
-"""
+"""Local compliance of the contact: the paper's constant, or Weber and Banaschek's by load."""
 
 from __future__ import annotations
 
@@ -34,11 +31,8 @@ class ContactLaw:
         """Secant compliance along the line of action for a width in contact in m under a load in
         N, (phase,) m/N.
         """
-        return (
-            self.factor
-            * (self.constant - self.log_weight * np.log(np.asarray(load) / width))
-            / width
-        )
+        logarithm = np.log(np.asarray(load) / width)
+        return self.factor * (self.constant - self.log_weight * logarithm) / width
 
 
 def linear_contact(position: Array, material: Material) -> ContactLaw:
@@ -46,15 +40,13 @@ def linear_contact(position: Array, material: Material) -> ContactLaw:
 
     Source: spur paper eq. (8). About a quarter of the local compliance that finite elements find.
     """
-    factor = (
-        4.0 * (1.0 - material.poisson_ratio**2) / (math.pi * material.youngs_modulus)
-    )
+    relative = 4.0 * (1.0 - material.poisson_ratio**2)
+    factor = relative / (math.pi * material.youngs_modulus)
     return ContactLaw(factor=factor, constant=np.ones_like(position), log_weight=0.0)
 
 
 def weber_contact(pair: GearPair, position: Array, material: Material) -> ContactLaw:
-    """Load-dependent local compliance of both teeth, from the flank to the tooth centreline, as a
-    secant.
+    """Load-dependent secant compliance of both teeth, from the flank to the tooth centreline.
 
     Parameters
     ----------
@@ -67,34 +59,27 @@ def weber_contact(pair: GearPair, position: Array, material: Material) -> Contac
     """
     nu = material.poisson_ratio
     reduced = (1.0 - nu**2) / (math.pi * material.youngs_modulus)
-    constant = -nu / (1.0 - nu) - np.log(
-        8.0 * reduced * relative_radius(pair, position)
-    )
-    for gear, curvature in (
-        (pair.pinion, np.asarray(pair.pinion_curvature(position))),
-        (pair.wheel, np.asarray(pair.wheel_curvature(position))),
-    ):
-        constant += np.log(
-            2.0
-            * involute_point(gear, curvature)[1]
-            / np.cos(load_angle(gear, curvature))
-        )
+    radius = relative_radius(pair, position)
+    constant = -nu / (1.0 - nu) - np.log(8.0 * reduced * radius)
+    for side, gear in pair.gears.items():
+        curvature = pair.curvature(side, position)
+        half_thickness = involute_point(gear, curvature)[1]
+        cosine = np.cos(load_angle(gear, curvature))
+        constant += np.log(2.0 * half_thickness / cosine)
     return ContactLaw(factor=2.0 * reduced, constant=constant, log_weight=1.0)
 
 
 def relative_radius(pair: GearPair, position: Array) -> Array:
     """Relative radius of curvature of the flanks at positions on the path, (phase,) m."""
-    pinion, wheel = (
-        np.asarray(pair.pinion_curvature(position)),
-        np.asarray(pair.wheel_curvature(position)),
-    )
+    pinion = pair.pinion_curvature(position)
+    wheel = pair.wheel_curvature(position)
     return pinion * wheel / (pinion + wheel)
 
 
 def contact_law(
     pair: GearPair, position: Array, material: Material, options: MeshOptions
 ) -> ContactLaw:
-    """Local compliance by the chosen term; see the two above."""
+    """Contact law that ``options.contact`` names."""
     if options.contact == "linear":
         return linear_contact(position, material)
     return weber_contact(pair, position, material)

@@ -1,7 +1,6 @@
-"""Flanks that are ground back on purpose, or stand askew: relief, crowning, helix slope,
-misalignment.
+"""Flank modifications: tip and root relief, crowning, end relief, helix slope, misalignment.
 
-Depths are along the transverse line of action and count into the flank. Heights are radial, from
+Depths are along the transverse line of action, into the flank. Heights are radial, from
 the tip or from the lowest working point. Source of the shapes and names: ISO 21771-1:2024,
 section on flank modifications.
 """
@@ -30,18 +29,18 @@ N_SLICES = 40  # across the face of a spur tooth with a modified lead
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlankModification:
-    """What is ground off one gear's flanks, the same on every tooth; all 0 is the involute
-    helicoid.
+    """Modification of one gear's flanks, equal on every tooth; all 0 is the involute helicoid.
 
     Parameters
     ----------
     tip_relief, root_relief : m      depth at the tip and at the lowest working point
     tip_relief_height, root_relief_height : m    radial, over which they run out
-    profile_shape : ``linear`` or ``parabolic``    of both over the height
+    profile_shape : ``linear`` or ``parabolic``    of both reliefs over the height
     crowning : m                     depth at both ends of the face, parabolic
     end_relief : m                   depth at both ends of the face, linear over `end_relief_width`
     end_relief_width : m
-    helix_slope : m                  depth at the end that enters last, from none at the other, linear; may be negative
+    helix_slope : m                  depth at the end that enters last, linear from 0 at the other
+        end; may be negative
     """
 
     tip_relief: float = unit("um", default=0.0)
@@ -91,25 +90,22 @@ class FlankModification:
         radius = np.hypot(gear.base_radius, curvature_radius)
         start = float(np.hypot(gear.base_radius, lowest))
         working = gear.tip_radius - start
-        tip = self.tip_relief_height if self.tip_relief else 0.0
-        root = self.root_relief_height if self.root_relief else 0.0
+        tip = self.tip_relief_height * (self.tip_relief > 0.0)
+        root = self.root_relief_height * (self.root_relief > 0.0)
         if tip + root > working:
             raise ConfigError(
-                f"{gear.name}: tip_relief_height_mm = {tip * 1e3:g} and root_relief_height_mm = {root * 1e3:g} "
-                f"overlap: the working flank is {working * 1e3:.4g} mm high; reduce one"
+                f"{gear.name}: tip_relief_height_mm = {tip * 1e3:g} and root_relief_height_mm = "
+                f"{root * 1e3:g} overlap: the working flank is {working * 1e3:.4g} mm high; "
+                "reduce one"
             )
         power = SHAPES[self.profile_shape]
         depth = np.zeros_like(radius)
         if tip:
-            depth += (
-                self.tip_relief
-                * np.maximum((radius - gear.tip_radius + tip) / tip, 0.0) ** power
-            )
+            share = np.maximum((radius - gear.tip_radius + tip) / tip, 0.0)
+            depth += self.tip_relief * share**power
         if root:
-            depth += (
-                self.root_relief
-                * np.maximum((start + root - radius) / root, 0.0) ** power
-            )
+            share = np.maximum((start + root - radius) / root, 0.0)
+            depth += self.root_relief * share**power
         return depth
 
     def lead(self, place: Array, face_width: float) -> Array:
@@ -121,23 +117,23 @@ class FlankModification:
         """
         if self.end_relief and 2.0 * self.end_relief_width > face_width:
             raise ConfigError(
-                f"end_relief_width_mm = {self.end_relief_width * 1e3:g} at both ends overlaps on a face of "
-                f"{face_width * 1e3:g} mm; reduce it to at most half"
+                f"end_relief_width_mm = {self.end_relief_width * 1e3:g} at both ends overlaps on "
+                f"a face of {face_width * 1e3:g} mm; reduce it to at most half"
             )
         from_middle = 2.0 * place / face_width - 1.0
         depth = self.crowning * from_middle**2 + self.helix_slope * place / face_width
         if self.end_relief:
             from_end = np.minimum(place, face_width - place)
-            depth = depth + self.end_relief * np.maximum(
-                1.0 - from_end / self.end_relief_width, 0.0
-            )
+            share = np.maximum(1.0 - from_end / self.end_relief_width, 0.0)
+            depth = depth + self.end_relief * share
         return depth
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairModification:
-    """Both gears' modifications and how much the shafts are out of line, m over the face, along
-    the line of action.
+    """Both gears' modifications, and misalignment of the shafts, m over the face.
+
+    The misalignment is along the line of action.
     """
 
     pinion: FlankModification
@@ -147,11 +143,11 @@ class PairModification:
     @property
     def sides(self) -> dict[str, FlankModification]:
         """The modification of each gear, by its side of the pair."""
-        return dict(zip(SIDES, (self.pinion, self.wheel), strict=True))
+        return {"pinion": self.pinion, "wheel": self.wheel}
 
     @property
     def is_any(self) -> bool:
-        """Whether anything stands otherwise than an aligned involute helicoid."""
+        """True unless both flanks are aligned involute helicoids."""
         plain = FlankModification()
         return self.misalignment != 0.0 or any(
             replace(side, profile_shape=plain.profile_shape) != plain
@@ -159,7 +155,7 @@ class PairModification:
         )
 
     def deviation(self, pair: GearPair, position: Array, place: Array) -> Array:
-        """How far both flanks stand back where they meet, (slice, node) m; nowhere less than 0.
+        """Deviation of both flanks together where they meet, (slice, node) m, at least 0.
 
         Parameters
         ----------
@@ -167,29 +163,25 @@ class PairModification:
         place : (slice,) m      from the end that enters first
         """
         on_path = np.clip(position, 0.0, pair.path_of_contact)
-        curvature = {side: np.asarray(pair.curvature(side, on_path)) for side in SIDES}
-        profile = sum(
-            self.profile(pair, side, values) for side, values in curvature.items()
-        )
-        return profile + self.lead(pair, place)[:, None]
+        profiles = [
+            self.profile(pair, side, pair.curvature(side, on_path)) for side in SIDES
+        ]
+        return sum(profiles) + self.lead(pair, place)[:, None]
 
     def profile(self, pair: GearPair, name: str, curvature_radius: Array) -> Array:
         """Depth over the profile of the gear of that name, (point,) m.
 
         See ``FlankModification.profile``.
         """
-        lowest = dict(zip(SIDES, (0.0, pair.path_of_contact), strict=True))
-        start = float(pair.curvature(name, lowest[name]))
+        lowest = {"pinion": 0.0, "wheel": pair.path_of_contact}
+        start = pair.curvature(name, lowest[name])
         return self.sides[name].profile(pair.gears[name], curvature_radius, start)
 
     def lead(self, pair: GearPair, place: Array) -> Array:
-        """Depth of both gears together across the face, (slice,) m; nowhere less than 0."""
+        """Depth of both gears together across the face, (slice,) m, at least 0."""
         width = pair.face_width
-        lead = (
-            self.pinion.lead(place, width)
-            + self.wheel.lead(place, width)
-            + self.misalignment * place / width
-        )
+        gears = self.pinion.lead(place, width) + self.wheel.lead(place, width)
+        lead = gears + self.misalignment * place / width
         return np.asarray(lead - min(float(lead.min()), 0.0))
 
 
@@ -199,10 +191,7 @@ PLAIN = PairModification(pinion=FlankModification(), wheel=FlankModification())
 def sound_teeth(
     pair: GearPair, modification: PairModification = PLAIN
 ) -> Mapping[str, Tooth]:
-    """The tooth that all of a spur gear have before faults and errors, by gear.
-
-    As cut, or modified.
-    """
+    """The tooth of each spur gear before faults and errors, as cut or modified, by gear."""
     if modification.is_any:
         return _modified_teeth(pair, modification)
     return {side: healthy_tooth(gear) for side, gear in pair.gears.items()}
@@ -212,9 +201,9 @@ def sound_teeth(
 def _modified_teeth(
     pair: GearPair, modification: PairModification
 ) -> Mapping[str, Tooth]:
-    """A mate feels the sum of both leads only.
+    """Modified teeth by gear.
 
-    All of it stands on the gear with the narrower face.
+    Only the sum of both leads matters: all of it is put on the gear with the narrower face.
     """
     gears = pair.gears
     teeth = {name: healthy_tooth(gear) for name, gear in gears.items()}
@@ -225,5 +214,5 @@ def _modified_teeth(
         depth = modification.profile(pair, name, tooth.profile.curvature_radius)
         if name == narrow and lead.any():
             tooth, depth = tooth.split(edges), depth + lead[:, None]
-        teeth[name] = tooth.with_deviation(depth) if depth.any() else tooth
+        teeth[name] = tooth.with_deviation(depth)
     return teeth

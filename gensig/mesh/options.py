@@ -1,4 +1,4 @@
-"""Which mesh law, with which constants: every convention by name."""
+"""Options of the gear mesh: law, conventions, constants, slices."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ CHOICES = {
 
 SLICE_COUPLINGS = ("coupled", "independent")
 
-# what null stands for: the paper's law comes with the paper's conventions
+# conventions that null stands for, by law
 CONVENTIONS = {
     "paper": {
         "elasticity": "plane_stress",
@@ -45,21 +45,25 @@ CONVENTIONS = {
 class MeshOptions:
     """Conventions and assumed constants of the gear mesh.
 
-    law : ``one_sided`` solves contact with gaps (no pull, corner contact), ``paper`` is a spring k(t) without gaps
-    pair_coupling : ``coupled`` lets pairs share the gear bodies, ``sum`` adds pair stiffnesses as the paper does
-    contact : ``linear`` is the paper's constant Hertz term, ``weber`` the load-dependent local compliance, a secant at
-        the quasi-static pair load
-    elasticity : ``plane_stress`` (the paper's) or ``plane_strain``, of bending, axial and body terms
-    body : ``ring`` solves the elastic ring clamped at the bore, ``sainsot`` is the fit that the paper uses
-    tooth : ``to_centreline`` integrates up to where the load crosses the tooth centreline, from where the local contact
-        term counts; ``to_contact`` up to the contact abscissa, as the paper does
-    crack : ``calibrated`` to finite elements, the body weakened too, or ``paper``, eqs. (11) and (12)
-    bending : where only part of the face bears, ``by_slice`` lets every slice bend by itself on the shared body,
-        ``whole`` bends the tooth as one piece
-    roll_torque : ``consistent`` keeps the energy balance where compliance and gap change with roll angle,
+    law : ``one_sided`` solves contact with gaps (no pull, corner contact), ``paper`` is a spring
+        k(t) without gaps
+    pair_coupling : ``coupled`` lets tooth pairs share the gear bodies, ``sum`` adds their
+        stiffnesses as the paper does
+    contact : ``linear`` is the paper's constant Hertz term, ``weber`` the load-dependent local
+        compliance, a secant at the quasi-static load
+    elasticity : ``plane_stress`` (the paper's) or ``plane_strain``, of bending, axial, body terms
+    body : ``ring`` solves the elastic ring clamped at the bore, ``sainsot`` is the paper's fit
+    tooth : ``to_centreline`` integrates up to the load's crossing of the tooth centreline, where
+        the local contact term begins; ``to_contact`` up to the contact abscissa, as the paper does
+    crack : ``calibrated`` to finite elements, body included, or ``paper``, eqs. (11) and (12)
+    bending : of a partly loaded face; ``by_slice`` bends every slice by itself on the shared
+        body, ``whole`` bends the tooth as one piece
+    roll_torque : ``consistent`` keeps the energy balance where compliance and gap change with roll
+        angle,
         ``classical`` leaves that torque out
     damping_ratio : of the mesh mode at the mean mesh stiffness
-    friction_coefficient : of the flanks; its sign passes through zero over ``friction_transition`` base pitches
+    friction_coefficient : of the flanks; its sign passes through zero over ``friction_transition``
+        base pitches
     points_per_pitch : table nodes per base pitch
     """
 
@@ -84,28 +88,22 @@ class MeshOptions:
                 raise ConfigError(
                     f"mesh.{key} = {getattr(self, key)!r}; allowed: {', '.join(allowed)}"
                 )
-        for key, low, high in (
-            ("damping_ratio", 0.0, 1.0),
-            ("friction_coefficient", 0.0, 0.5),
-            ("friction_transition", 1e-3, 0.5),
-            ("points_per_pitch", 32, 8192),
-        ):
-            value = getattr(self, key)
-            if not low <= value <= high:
-                raise ConfigError(
-                    f"mesh.{key} = {value:g} must lie in {low:g}..{high:g}"
-                )
+        _require_range(self, "damping_ratio", 0.0, 1.0)
+        _require_range(self, "friction_coefficient", 0.0, 0.5)
+        _require_range(self, "friction_transition", 1e-3, 0.5)
+        _require_range(self, "points_per_pitch", 32, 8192)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SliceOptions:
-    """How the face of a pair is cut into slices, and what ties them together.
+    """Slices of a pair's face and their coupling.
 
     n_slices : slices of equal width over the common face
-    slice_coupling : ``coupled`` lets a slice's load bend its neighbours, ``independent`` makes each a gear of its own
+    slice_coupling : ``coupled`` lets a slice's load bend its neighbours, ``independent`` does not
     coupling_modules : length over which slices couple, in normal modules
-    slices_in_phase : True leaves out the helix of the contact lines but not that of the geometry (for comparison only)
-    independent_faulty_slices : True takes a fault over part of the face with independent slices all the same
+    slices_in_phase : True omits the helix of the contact lines, for comparison; the geometry
+        keeps it
+    independent_faulty_slices : True allows independent slices with a fault over part of the face
     """
 
     n_slices: int
@@ -117,14 +115,19 @@ class SliceOptions:
     def __post_init__(self) -> None:
         if self.slice_coupling not in SLICE_COUPLINGS:
             raise ConfigError(
-                f"mesh.slice_coupling = {self.slice_coupling!r}; allowed: {', '.join(SLICE_COUPLINGS)}"
+                f"mesh.slice_coupling = {self.slice_coupling!r}; allowed: "
+                f"{', '.join(SLICE_COUPLINGS)}"
             )
-        for key, low, high in (("n_slices", 1, 1000), ("coupling_modules", 0.0, 10.0)):
-            value = getattr(self, key)
-            if not low <= value <= high:
-                raise ConfigError(
-                    f"mesh.{key} = {value:g} must lie in {low:g}..{high:g}"
-                )
+        _require_range(self, "n_slices", 1, 1000)
+        _require_range(self, "coupling_modules", 0.0, 10.0)
+
+
+def _require_range(
+    options: MeshOptions | SliceOptions, key: str, low: float, high: float
+) -> None:
+    value = getattr(options, key)
+    if not low <= value <= high:
+        raise ConfigError(f"mesh.{key} = {value:g} must lie in {low:g}..{high:g}")
 
 
 SLICE_KEYS = frozenset(field.name for field in fields(SliceOptions))
@@ -132,11 +135,8 @@ SLICE_KEYS = frozenset(field.name for field in fields(SliceOptions))
 
 def read_slice_options(values: Section) -> SliceOptions:
     """Slices from the boundary keys of ``mesh``."""
-    return read(
-        SliceOptions,
-        {key: value for key, value in values.items() if key in SLICE_KEYS},
-        "mesh",
-    )
+    keys = {key: value for key, value in values.items() if key in SLICE_KEYS}
+    return read(SliceOptions, keys, "mesh")
 
 
 def read_mesh_options(values: Section) -> MeshOptions:
@@ -146,9 +146,8 @@ def read_mesh_options(values: Section) -> MeshOptions:
         raise ConfigError(
             f"mesh.law = {values.get('law')!r}; allowed: {', '.join(CONVENTIONS)}"
         )
-    own = {key: value for key, value in values.items() if key not in SLICE_KEYS}
-    return read(
-        MeshOptions,
-        {**own, **{k: v for k, v in convention.items() if values.get(k) is None}},
-        "mesh",
-    )
+    keys = {key: value for key, value in values.items() if key not in SLICE_KEYS}
+    for key, value in convention.items():
+        if keys.get(key) is None:
+            keys[key] = value
+    return read(MeshOptions, keys, "mesh")

@@ -1,20 +1,16 @@
-"""Compliance and gap of every distinct tooth along the line of action.
-
-All that statics and dynamics ask.
-"""
+"""Mesh table of a spur pair: compliance and gap of every distinct tooth by contact position."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import ExtrapolationError
-from gensig.geometry.contact import GearPair, corner_gap_by_pinion
+from gensig.geometry.contact import SIDES, GearPair, corner_gap_by_pinion
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth, healthy_tooth
 from gensig.geometry.tooth_profile import load_angle
@@ -31,7 +27,7 @@ from gensig.mesh.smooth_table import smooth
 
 Array = NDArray[np.float64]
 
-# pairs followed at once: positions u - 1, u, u + 1, u + 2 base pitches, u in 0..1
+# tooth pairs at once: positions u - 1, u, u + 1, u + 2 base pitches, u in 0..1
 N_PAIRS = 4
 FIRST_PITCH, LAST_PITCH = -1, 3
 # larger second differences of compliances, as a share, and of gaps in m are steps and kinks of
@@ -41,10 +37,10 @@ SMOOTHED_SHARE, SMOOTHED_GAP = 0.01, 1e-7
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearTable:
-    """One gear's side of the mesh: one row per distinct tooth, ``kind`` says which row a tooth has.
+    """One gear's side of the mesh: one row per distinct tooth; ``kind`` (tooth,) is a tooth's row.
 
-    ``compliance`` and ``gap`` are (distinct, node), m/N and m, each with its slope over position;
-    between nodes slopes go straight and values follow their integral.
+    ``compliance`` and ``gap`` are (distinct, node), m/N and m, each with its slope over position.
+    Between nodes slopes are linear and values are their integral.
     """
 
     compliance: Array
@@ -57,11 +53,11 @@ class GearTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PairTable:
-    """Both gears' tables on the node positions s of -1 to 3 base pitches, and what the pairs share.
+    """Both gears' tables on the node positions s of -1 to 3 base pitches.
 
-    The contact term stands on the pinion's side for sound flanks; each side adds what its own
-    faults cost against a sound mate. ``shared_compliance`` is the body compliance that all pairs
-    in contact share.
+    The contact term of sound flanks is on the pinion's side. Each side adds what its faults cost
+    against a sound mate. ``shared_compliance`` is the body compliance that all tooth pairs in
+    contact share.
     """
 
     pair: GearPair
@@ -91,84 +87,88 @@ def pair_table(
 
     Parameters
     ----------
-    teeth : the teeth that are not sound, by (gear, tooth), as ``faulty_teeth`` gives them
-    modification : of the flanks of all others
-    load : (node,) N    load of a pair by position, at which a load-dependent contact term is taken
+    teeth : the faulty teeth by (gear, tooth), from ``faulty_teeth``
+    modification : of the flanks of all other teeth
+    load : (node,) N    load of a tooth pair by position, for a load-dependent contact term
     """
-    odd = dict(teeth or {})
-    position = node_positions(pair, options)
-    sound = _sound_structure(pair, material, options)
-    whole = sound_teeth(pair, modification)
-    tables = {}
-    for name, side in _node_sides(pair, material, options).items():
-        mine = {tooth: odd[gear, tooth] for gear, tooth in sorted(odd) if gear == name}
-        tables[name] = _gear_table(
-            side.under(load),
-            position,
-            whole[name],
-            mine,
-            sound[name],
-            sound["bending"],
-            material.in_plane(options.elasticity),
-            options,
-        )
+    sound = _sound_mesh(pair, material, options)
+    sound_tooth = sound_teeth(pair, modification)
+    tables = {
+        side: _gear_table(sound, side, sound_tooth[side], teeth or {}, load)
+        for side in SIDES
+    }
+    shared = sound.shared_compliance
     stiffest = float(sum(table.compliance.min() for table in tables.values()))
-    if sound["shared"] >= 0.95 * stiffest:
+    if shared >= 0.95 * stiffest:
         raise ExtrapolationError(
-            f"the gear bodies share {sound['shared']:.3g} m/N of the stiffest pair's {stiffest:.3g} m/N, more than one "
-            f"pair has; use a larger bore_radius_mm or mesh.pair_coupling=sum"
+            f"the gear bodies share {shared:.3g} m/N of the stiffest pair's {stiffest:.3g} m/N, "
+            f"more than one pair has; use a larger bore_radius_mm or mesh.pair_coupling=sum"
         )
     return PairTable(
         pair=pair,
         options=options,
-        position=position,
+        position=sound.position,
         **tables,
-        shared_compliance=sound["shared"],
+        shared_compliance=shared,
     )
 
 
-@lru_cache(maxsize=16)
-def _node_sides(
-    pair: GearPair, material: Material, options: MeshOptions
-) -> dict[str, FlankSide]:
-    """The flanks at the nodes, under no load that matters."""
-    return flank_sides(pair, node_positions(pair, options), material, options, 1.0)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _SoundMesh:
+    """Quantities at the nodes that neither load nor faults change.
+
+    ``flanks``, ``corner`` (node,) m and ``structure`` (node,) m/N are by side; ``bending`` (node,)
+    m/N as from ``slice_bending``.
+    """
+
+    options: MeshOptions
+    in_plane: Material
+    position: Array
+    flanks: dict[str, FlankSide]
+    corner: dict[str, Array]
+    structure: dict[str, Array]
+    bending: Array
+    shared_compliance: float
 
 
 @lru_cache(maxsize=16)
-def _sound_structure(
-    pair: GearPair, material: Material, options: MeshOptions
-) -> dict[str, Any]:
-    """What neither load nor faults change: (corner gap, structural compliance) of either gear at
-    the nodes, (node,) each, what bends slice by slice (node,), and the shared body compliance."""
+def _sound_mesh(pair: GearPair, material: Material, options: MeshOptions) -> _SoundMesh:
     position = node_positions(pair, options)
-    structure = material.in_plane(options.elasticity)
-    on_path = np.clip(position, 0.0, pair.path_of_contact)
-    corner = (corner_gap_by_pinion(pair, position), np.zeros_like(position))
-    by_side: dict[str, Any] = {}
-    for (side, gear), gap in zip(pair.gears.items(), corner, strict=True):
-        curvature = np.asarray(pair.curvature(side, on_path))
-        by_side[side] = (
-            gap,
-            _structure_at_nodes(healthy_tooth(gear), curvature, structure, options),
-        )
-    shared = (
-        shared_body_compliance(pair, structure)
-        if options.pair_coupling == "coupled"
-        else 0.0
+    in_plane = material.in_plane(options.elasticity)
+    flanks = flank_sides(pair, position, material, options, 1.0)
+    corner = corner_gap_by_pinion(pair, position)
+    return _SoundMesh(
+        options=options,
+        in_plane=in_plane,
+        position=position,
+        flanks=flanks,
+        corner={"pinion": corner, "wheel": np.zeros_like(corner)},
+        structure={
+            side: _structure_at_nodes(
+                healthy_tooth(gear), flanks[side].curvature, in_plane, options
+            )
+            for side, gear in pair.gears.items()
+        },
+        bending=slice_bending(pair, position, material, options),
+        shared_compliance=coupling_compliance(pair, in_plane, options),
     )
-    return {
-        **by_side,
-        "bending": slice_bending(pair, position, material, options),
-        "shared": shared,
-    }
+
+
+def coupling_compliance(
+    pair: GearPair, in_plane: Material, options: MeshOptions
+) -> float:
+    """Body compliance that tooth pairs in contact share, m/N; 0 with ``pair_coupling=sum``."""
+    if options.pair_coupling == "sum":
+        return 0.0
+    return shared_body_compliance(pair, in_plane)
 
 
 def _structure_at_nodes(
     tooth: Tooth, curvature: Array, material: Material, options: MeshOptions
 ) -> Array:
-    """Structural compliance at each different curvature radius once, most nodes being held at A
-    or E, (node,).
+    """Structural compliance (node,) m/N, computed once per distinct curvature radius.
+
+    Most nodes are held at A or E.
     """
     different, place = np.unique(curvature, return_inverse=True)
     return structural_compliance(tooth, different, material, options)[place]
@@ -179,11 +179,10 @@ def structural_compliance(
 ) -> Array:
     """Tooth and body compliance of one loaded tooth, (phase,) m/N.
 
-    The material as ``Material.in_plane`` gives it.
+    The material is that of ``Material.in_plane``.
     """
-    return np.sum(
-        list(structural_terms(tooth, curvature, material, options).values()), axis=0
-    )
+    terms = structural_terms(tooth, curvature, material, options)
+    return np.sum(list(terms.values()), axis=0)
 
 
 def check_teeth(
@@ -192,45 +191,36 @@ def check_teeth(
     options: MeshOptions,
     teeth: Mapping[tuple[str, int], Tooth],
 ) -> None:
-    """Raise what ``pair_table`` would raise about faulty teeth, at the cost of one contact point
-    a tooth.
+    """Raise what ``pair_table`` would raise about faulty teeth, at one contact point per tooth.
 
     Raises
     ------
-    FaultError, ExtrapolationError    for what the chosen conventions cannot take
+    FaultError, ExtrapolationError    for a tooth outside the range of the chosen conventions
     """
-    structure, known = material.in_plane(options.elasticity), set()
-    sides = (
-        flank_sides(pair, np.array([pair.pitch_point]), material, options, 1.0)
-        if teeth
-        else {}
-    )
-    for (name, _), tooth in teeth.items():
-        if id(tooth) in known or not tooth.present:
+    in_plane = material.in_plane(options.elasticity)
+    distinct = {id(tooth): (side, tooth) for (side, _), tooth in teeth.items()}
+    for side, tooth in distinct.values():
+        if not tooth.present:
             continue
-        known.add(id(tooth))
-        side = sides[name]
-        structural_terms(
-            tooth,
-            np.minimum(side.curvature, tooth.tip_curvature_radius),
-            structure,
-            options,
-        )
+        curvature = np.array([pair.curvature(side, pair.pitch_point)])
+        reached = np.minimum(curvature, tooth.tip_curvature_radius)
+        structural_terms(tooth, reached, in_plane, options)
         if options.law == "paper" and not is_nominal(tooth):
-            bearing_width(tooth, side.curvature)
+            bearing_width(tooth, curvature)
 
 
 def structural_terms(
     tooth: Tooth, curvature: Array, material: Material, options: MeshOptions
 ) -> dict[str, Array]:
-    """The same by its parts.
+    """Terms of the structural compliance: bending, shear, axial, foundation, crack.
 
-    Bending, shear, axial, foundation, and what cracks add where they do not cut sections.
+    The last is 0 where cracks cut sections (``mesh.crack=paper``).
     """
-    gear, papers_crack = tooth.gear, options.crack == "paper"
+    papers_crack = options.crack == "paper"
     parts = tooth_compliance(
         tooth, curvature, material, reach=options.tooth, papers_crack=papers_crack
     )
+    angle = load_angle(tooth.gear, curvature)
     opened = np.zeros_like(curvature)
     if tooth.cracks and not papers_crack:
         opened = crack_compliance(
@@ -240,9 +230,7 @@ def structural_terms(
         "bending": parts.bending,
         "shear": parts.shear,
         "axial": parts.axial,
-        "foundation": body_compliance(
-            gear, load_angle(gear, curvature), material, options
-        ),
+        "foundation": body_compliance(tooth.gear, angle, material, options),
         "crack": opened,
     }
 
@@ -250,8 +238,9 @@ def structural_terms(
 def slice_bending(
     pair: GearPair, position: Array, material: Material, options: MeshOptions
 ) -> Array:
-    """Compliance of both sound teeth that belongs to the slices of the face, (phase,) m/N; 0 with
-    ``bending=whole``.
+    """Compliance of both sound teeth that every slice has for itself, (phase,) m/N.
+
+    0 with ``bending=whole``.
 
     Three-dimensional finite elements of a pinion loaded over part of its face give it 0.8
     (middle, or both ends) to 1.4 times (one end) the teeth's own bending, shear and axial
@@ -259,27 +248,23 @@ def slice_bending(
     """
     if options.bending == "whole":
         return np.zeros_like(position)
-    on_path, place = np.unique(
-        np.clip(position, 0.0, pair.path_of_contact), return_inverse=True
-    )
-    structure = material.in_plane(options.elasticity)
-    own = np.zeros_like(on_path)
-    for gear, curvature in (
-        (pair.pinion, pair.pinion_curvature),
-        (pair.wheel, pair.wheel_curvature),
-    ):
-        radius = np.asarray(curvature(on_path))
-        own += tooth_compliance(
-            healthy_tooth(gear), radius, structure, reach=options.tooth
-        ).total
-    return own[place]
+    clipped = np.clip(position, 0.0, pair.path_of_contact)
+    on_path, place = np.unique(clipped, return_inverse=True)
+    in_plane = material.in_plane(options.elasticity)
+    both = np.zeros_like(on_path)
+    for side, gear in pair.gears.items():
+        tooth, curvature = healthy_tooth(gear), pair.curvature(side, on_path)
+        both += tooth_compliance(tooth, curvature, in_plane, reach=options.tooth).total
+    return both[place]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlankSide:
-    """One gear's flank at contact positions: ``flank_curvature`` goes on beyond its tip,
-    ``curvature`` is held at A and E. ``base`` is the ``share`` of a sound pair's contact
-    compliance that the mate's side carries already."""
+    """One gear's flank at contact positions.
+
+    ``flank_curvature`` goes on beyond its tip, ``curvature`` is held at A and E. ``base`` is the
+    ``share`` of a sound pair's contact compliance that is counted on the mate's side.
+    """
 
     gear: Gear
     curvature: Array
@@ -291,42 +276,30 @@ class FlankSide:
     base: Array
 
     def under(self, load: Array | float) -> FlankSide:
-        """The same under another load of a pair in N, (phase,) or one for all."""
-        loads = np.array(
-            np.broadcast_to(np.asarray(load, dtype=np.float64), self.curvature.shape)
-        )
-        return replace(
-            self,
-            load=loads,
-            base=self.share * self.law.compliance(self.gear.face_width, loads),
-        )
+        """This flank under another load of a tooth pair in N, (phase,) or one number."""
+        loads = np.empty_like(self.curvature)
+        loads[:] = load
+        sound = self.law.compliance(self.gear.face_width, loads)
+        return replace(self, load=loads, base=self.share * sound)
 
     def contact(
         self, tooth: Tooth, bending: Array, options: MeshOptions
     ) -> tuple[Array, Array]:
-        """Gap and contact compliance of one tooth against a sound mate, (phase,) m and m/N, less
-        ``base``.
+        """Gap and contact compliance less ``base`` against a sound mate, (phase,) m and m/N.
 
-        ``bending`` (phase,) m/N is what bends slice by slice, see ``slice_bending``.
+        ``bending`` (phase,) m/N as from ``slice_bending``.
         """
-        if is_nominal(tooth) or not tooth.present:
-            return np.zeros_like(self.load), self.law.compliance(
-                self.gear.face_width, self.load
-            ) - self.base
-        if options.law == "paper":
+        width: Array | float = self.gear.face_width
+        if tooth.present and not is_nominal(tooth):
+            if options.law != "paper":
+                flank = self.flank_curvature, self.relative_radius
+                gap, compliance = face_contact(
+                    tooth, *flank, self.law, self.load, bending
+                )
+                return gap, compliance - self.base
             width = bearing_width(tooth, self.curvature)
-            return np.zeros_like(self.load), self.law.compliance(
-                width, self.load
-            ) - self.base
-        gap, compliance = face_contact(
-            tooth,
-            self.flank_curvature,
-            self.relative_radius,
-            self.law,
-            self.load,
-            bending,
-        )
-        return gap, compliance - self.base
+        compliance = self.law.compliance(width, self.load)
+        return np.zeros_like(self.load), compliance - self.base
 
 
 def flank_sides(
@@ -338,72 +311,58 @@ def flank_sides(
     *,
     pinion_share: float = 1.0,
 ) -> dict[str, FlankSide]:
-    """Both gears' flanks at positions s, (phase,) m, under the load of a pair in N.
+    """Both gears' flanks at positions s, (phase,) m, under the load of a tooth pair in N.
 
     ``pinion_share`` of the contact compliance of sound flanks is counted on the pinion's side.
     """
-    on_path = np.clip(position, 0.0, pair.path_of_contact)
-    law = contact_law(pair, on_path, material, options)
-    relative = relative_radius(pair, on_path)
+    path = pair.path_of_contact
+    on_path = np.clip(position, 0.0, path)
+    beyond_tip = np.maximum(position, 0.0), np.minimum(position, path)
+    shares = 1.0 - pinion_share, pinion_share
     return {
-        gear.name: FlankSide(
-            gear=gear,
-            curvature=np.asarray(curvature(on_path)),
-            flank_curvature=np.asarray(curvature(beyond_tip)),
-            relative_radius=relative,
-            law=law,
+        side: FlankSide(
+            gear=pair.gears[side],
+            curvature=pair.curvature(side, on_path),
+            flank_curvature=pair.curvature(side, reach),
+            relative_radius=relative_radius(pair, on_path),
+            law=contact_law(pair, on_path, material, options),
             share=share,
             load=np.empty(0),
             base=np.empty(0),
         ).under(load)
-        for gear, curvature, beyond_tip, share in (
-            (
-                pair.pinion,
-                pair.pinion_curvature,
-                np.maximum(position, 0.0),
-                1.0 - pinion_share,
-            ),
-            (
-                pair.wheel,
-                pair.wheel_curvature,
-                np.minimum(position, pair.path_of_contact),
-                pinion_share,
-            ),
-        )
+        for side, reach, share in zip(SIDES, beyond_tip, shares, strict=True)
     }
 
 
 def _gear_table(
-    side: FlankSide,
-    position: Array,
-    whole: Tooth,
-    odd: Mapping[int, Tooth],
-    sound: tuple[Array, Array],
-    bending: Array,
-    material: Material,
-    options: MeshOptions,
+    sound: _SoundMesh,
+    side: str,
+    sound_tooth: Tooth,
+    teeth: Mapping[tuple[str, int], Tooth],
+    load: Array | float,
 ) -> GearTable:
     """Rows of the distinct teeth.
 
     Teeth that are one object share a row, equal structures are computed once.
     """
-    distinct, kind = distinct_teeth(whole, odd)
-    corner, sound_row = sound
-    structures = {_structure_key(distinct[0]): sound_row}
-    compliance: Array = np.empty((len(distinct), len(position)))
+    flank, options = sound.flanks[side].under(load), sound.options
+    distinct, kind = distinct_teeth(sound_tooth, teeth)
+    structures = {_structure_key(sound_tooth): sound.structure[side]}
+    compliance: Array = np.empty((len(distinct), len(sound.position)))
     gap: Array = np.empty_like(compliance)
     for row, tooth in enumerate(distinct):
         key = _structure_key(tooth)
         if key not in structures:
-            reached = np.minimum(side.curvature, tooth.tip_curvature_radius)
-            structures[key] = _structure_at_nodes(tooth, reached, material, options)
-        own_gap, contact = side.contact(tooth, bending, options)
+            reached = np.minimum(flank.curvature, tooth.tip_curvature_radius)
+            structures[key] = _structure_at_nodes(
+                tooth, reached, sound.in_plane, options
+            )
+        flank_gap, contact = flank.contact(tooth, sound.bending, options)
         compliance[row] = structures[key] + contact
-        gap[row] = own_gap + corner
-    distance = float(position[1] - position[0])
-    compliance, compliance_slope = smooth(
-        compliance, distance, SMOOTHED_SHARE * float(compliance[0].min())
-    )
+        gap[row] = flank_gap + sound.corner[side]
+    distance = float(sound.position[1] - sound.position[0])
+    limit = SMOOTHED_SHARE * float(compliance[0].min())
+    compliance, compliance_slope = smooth(compliance, distance, limit)
     gap, gap_slope = smooth(gap, distance, SMOOTHED_GAP)
     return GearTable(
         compliance=compliance,
@@ -416,32 +375,32 @@ def _gear_table(
 
 
 def distinct_teeth(
-    sound: Tooth, odd: Mapping[int, Tooth]
+    sound: Tooth, teeth: Mapping[tuple[str, int], Tooth]
 ) -> tuple[list[Tooth], NDArray[np.int64]]:
-    """The sound tooth and those that differ, by object, and which of them each tooth of the gear
-    is, (tooth,).
+    """Distinct objects among one gear's teeth, and the index of each tooth's object, (tooth,).
+
+    The first is the sound tooth; ``teeth`` are the others by (gear, tooth).
     """
-    distinct = [sound]
+    distinct = {id(sound): sound}
     kind = np.zeros(sound.gear.n_teeth, dtype=np.int64)
-    for number, tooth in odd.items():
-        row = next(
-            (row for row, known in enumerate(distinct) if known is tooth), len(distinct)
-        )
-        if row == len(distinct):
-            distinct.append(tooth)
-        kind[number] = row
-    return distinct, kind
+    for gear, number in sorted(teeth):
+        if gear == sound.gear.name:
+            tooth = teeth[gear, number]
+            distinct.setdefault(id(tooth), tooth)
+            kind[number] = list(distinct).index(id(tooth))
+    return list(distinct.values()), kind
 
 
 def _structure_key(tooth: Tooth) -> tuple[int, ...]:
-    """Teeth whose sections are the same objects bend alike, wherever their flanks stand."""
+    """Key of a tooth's structure: teeth whose sections are the same objects bend alike."""
     return id(tooth.material_loss), id(tooth.slice_edges), id(tooth.cracks)
 
 
 def pair_compliance(
     table: PairTable, position: Array, pinion_kind: int = 0, wheel_kind: int = 0
 ) -> Array:
-    """Compliance of a single pair under the table's load, (phase,) m/N."""
-    return np.interp(
-        position, table.position, table.pinion.compliance[pinion_kind]
-    ) + np.interp(position, table.position, table.wheel.compliance[wheel_kind])
+    """Compliance of a single tooth pair under the table's load, (phase,) m/N."""
+    pinion = table.pinion.compliance[pinion_kind]
+    wheel = table.wheel.compliance[wheel_kind]
+    nodes = table.position
+    return np.interp(position, nodes, pinion) + np.interp(position, nodes, wheel)

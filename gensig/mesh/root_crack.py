@@ -17,7 +17,7 @@ from gensig.mesh.root_crack_coefficients import COEFFICIENTS
 
 Array = NDArray[np.float64]
 
-# where finite elements were compared: depth over root chord, angle to the centreline
+# range compared with finite elements: depth over root chord, angle to the centreline
 DEEPEST = 0.8
 ANGLES = (math.radians(30.0), math.radians(75.0))
 POWERS = (0.75, 1.0, 1.5)
@@ -32,7 +32,7 @@ def crack_compliance(
     *,
     allow_extrapolation: bool = False,
 ) -> Array:
-    """What the cracks of a tooth add to its compliance along the line of action, (phase,) m/N.
+    """Compliance that the cracks of a tooth add along the line of action, (phase,) m/N.
 
     Parameters
     ----------
@@ -46,16 +46,15 @@ def crack_compliance(
     the mouth. The coefficients of that function are fitted to two-dimensional finite elements of
     whole gears (``tests/reference``), so the body behind the crack gives way too.
     """
-    return sum(
-        (
-            _one(tooth, crack, curvature_radius, material, allow_extrapolation)
-            for crack in tooth.cracks
-        ),
-        start=np.zeros_like(curvature_radius),
-    )
+    total = np.zeros_like(curvature_radius)
+    for crack in tooth.cracks:
+        total = total + _crack_compliance(
+            tooth, crack, curvature_radius, material, allow_extrapolation
+        )
+    return total
 
 
-def _one(
+def _crack_compliance(
     tooth: Tooth,
     crack: RootCrack,
     curvature_radius: Array,
@@ -80,28 +79,28 @@ def _one(
 
 
 def basis(depth: Array, angle: float, slope: float) -> Array:
-    """Functions of depth over root chord, crack angle and slope at the mouth that the factors are
-    made of.
+    """Basis functions of the stress intensity factors, (depth, function); 0 at no depth.
 
-    Powers of the depth times low-order terms of the two angles about the middle of what was
-    calibrated, (depth, function); 0 at no depth.
+    Powers of depth over root chord times low-order terms of crack angle and mouth slope about the
+    middle of the calibrated range.
     """
     tilt, fillet = angle - MIDDLE_ANGLE, slope - MIDDLE_SLOPE
     angles = np.array([1.0, tilt, tilt**2, fillet, tilt * fillet])
-    return (np.power(depth[:, None], np.array(POWERS))[:, :, None] * angles).reshape(
-        len(depth), -1
-    )
+    powers = np.power(depth[:, None], np.array(POWERS))
+    return (powers[:, :, None] * angles).reshape(len(depth), -1)
 
 
 def root_loads(gear: Gear, crack: RootCrack, load_angle: Array) -> Array:
-    """Moment over chord, shear and normal force at the crack's root chord under a unit load, (3,
+    """Moment over chord, shear and normal force at the crack's root chord per unit load, (3,
     phase).
 
-    Their sense is that in which they open the crack.
+    Positive values open the crack.
     """
     chord = 2.0 * crack.mouth_half_thickness
     moment = (gear.base_radius - crack.mouth_abscissa * np.cos(load_angle)) / chord
-    normal = np.sin(load_angle) * (-1.0 if crack.side == "tension" else 1.0)
+    normal = np.sin(load_angle)
+    if crack.side == "tension":
+        normal = -normal
     return np.stack([moment, np.cos(load_angle), normal])
 
 
@@ -113,26 +112,26 @@ def _require_checked(
     chord = 2.0 * crack.mouth_half_thickness
     if depth > DEEPEST * (1.0 + 1e-6):
         raise ExtrapolationError(
-            f"crack_depth {depth * chord * 1e3:.4g} mm is {depth:.2f} of the root chord {chord * 1e3:.4g} mm of the "
-            f"{tooth.gear.name} tooth; the calibrated crack was checked up to {DEEPEST:g}, {DEEPEST * chord * 1e3:.4g} "
-            f"mm: reduce fault.crack_depth_mm, take mesh.crack=paper, or set mesh.allow_extrapolation=true"
+            f"crack_depth {depth * chord * 1e3:.4g} mm is {depth:.2f} of the root chord "
+            f"{chord * 1e3:.4g} mm of the {tooth.gear.name} tooth; the calibrated crack was "
+            f"checked up to {DEEPEST:g}, {DEEPEST * chord * 1e3:.4g} mm: reduce "
+            "fault.crack_depth_mm, take mesh.crack=paper, or set mesh.allow_extrapolation=true"
         )
     if not ANGLES[0] - 1e-9 <= crack.angle <= ANGLES[1] + 1e-9:
         raise ExtrapolationError(
-            f"fault.crack_angle_deg = {math.degrees(crack.angle):g}: the calibrated crack was checked from "
-            f"{math.degrees(ANGLES[0]):g} to {math.degrees(ANGLES[1]):g}; take mesh.crack=paper or set "
-            f"mesh.allow_extrapolation=true"
+            f"fault.crack_angle_deg = {math.degrees(crack.angle):g}: the calibrated crack was "
+            f"checked from {math.degrees(ANGLES[0]):g} to {math.degrees(ANGLES[1]):g}; take "
+            "mesh.crack=paper or set mesh.allow_extrapolation=true"
         )
 
 
 def _side_by_side(own: Array, through: Array) -> Array:
-    """Strips side by side, each a tooth's own compliance in series with its crack, less the sound
-    tooth, (phase,).
+    """Compliance of parallel strips, each in series with its crack, less the sound tooth, (phase,).
 
-    The strips share their deflection at the load, as far as the tooth between them can hold them
-    together: ``TOGETHER`` times its own compliance, calibrated to three-dimensional finite
-    elements of cracks over a quarter and half of the face (``tests/reference``), within 9 % of
-    them.
+    The strips share their deflection at the load as far as the tooth holds them together. Its
+    compliance for this is ``TOGETHER`` times that of the tooth. The factor is calibrated to
+    three-dimensional finite elements of cracks over a quarter and half of the face
+    (``tests/reference``), within 9 % of them.
     """
     together = TOGETHER * own
     return 1.0 / np.mean(1.0 / (together + through), axis=0) - together

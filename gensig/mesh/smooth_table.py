@@ -1,7 +1,4 @@
-"""Tables that parabolas between the nodes make smooth.
-
-The slope is exactly the derivative of the value.
-"""
+"""Smooth tables: quadratic splines whose slope is exactly the derivative of the value."""
 
 from __future__ import annotations
 
@@ -12,14 +9,13 @@ Array = NDArray[np.float64]
 
 
 def smooth(values: Array, distance: float, limit: float) -> tuple[Array, Array]:
-    """Values and slopes at the nodes of quadratic splines that run through nearly the given values.
+    """Values and slopes at the nodes of quadratic splines close to the given values.
 
-    Between nodes the slope goes straight, and the value follows its integral; point values and
-    slopes of a law that an integrator asks for are then consistent, and its energy balance holds
-    between nodes too. The control points are the values less a quarter of the second difference
-    of the first row, the sound tooth, which makes up for what a spline cuts off a curve; of more
-    than ``limit`` it makes up no more, so that no step rings. Where one row lies above another it
-    stays there. A step becomes as wide as three nodes.
+    Between nodes the slope is linear and the value is its integral. Values and slopes are thus
+    consistent, and the energy balance holds between nodes too. The control points are the values
+    less a quarter of the second difference of the first row, the sound tooth. This makes up for
+    the curvature that a spline cuts off. The correction is clipped at ``limit``, so that no step
+    rings. The order of rows is kept. A step becomes as wide as three nodes.
 
     Parameters
     ----------
@@ -28,7 +24,7 @@ def smooth(values: Array, distance: float, limit: float) -> tuple[Array, Array]:
     bend = np.zeros(values.shape[1])
     bend[1:-1] = np.clip(np.diff(values[0], n=2), -limit, limit)
     here = values - 0.25 * bend
-    # straight on beyond the ends; np.pad takes longer than all the rest
+    # linear beyond the ends; np.pad takes longer than all the rest
     before = np.concatenate([2.0 * here[:, :1] - here[:, 1:2], here[:, :-1]], axis=1)
     after = np.concatenate([here[:, 1:], 2.0 * here[:, -1:] - here[:, -2:-1]], axis=1)
     return 0.25 * (before + 2.0 * here + after), (after - before) / (2.0 * distance)

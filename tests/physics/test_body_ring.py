@@ -1,4 +1,6 @@
-"""The clamped elastic ring: check numbers of the reference derivation, finite-element rows, reciprocity."""
+"""The clamped elastic ring: check numbers of the reference derivation, finite-element rows,
+reciprocity.
+"""
 
 import math
 from dataclasses import replace
@@ -48,7 +50,8 @@ NEIGHBOR = {
         -5.420136e-6,
     ),
 }
-# finite elements, 1e-12 m/N, at s = 0 ... 4.203 mm from A; ring reference (docs/theory/spur_mesh.md), table 4.3
+# finite elements, 1e-12 m/N, at s = 0 ... 4.203 mm from A; ring reference
+# (docs/theory/spur_mesh.md), table 4.3
 S_MM = (0.0, 0.700, 1.401, 2.101, 2.802, 3.502, 4.203)
 CROSS_FE = {
     "pinion": (477.8, 475.7, 472.9, 469.4, 465.1, 460.0, 454.0),
@@ -166,7 +169,9 @@ def test_shared_compliance_is_the_mean_of_both_gears_over_the_double_zone(xiamen
 
 
 def test_cross_compliance_follows_the_bore(gear, xiamen):
-    """Rigid twist of the body about the bore: a larger bore couples less, by more than the change in radius."""
+    """Rigid twist of the body about the bore: a larger bore couples less, by more than the change
+    in radius.
+    """
     cross = [
         arc_flexibility(
             replace(gear, bore_radius=bore * gear.root_radius),

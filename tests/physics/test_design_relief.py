@@ -1,4 +1,6 @@
-"""Modified flanks of spur gears: on every tooth, before errors and faults, in tables, statics and records."""
+"""Modified flanks of spur gears: on every tooth, before errors and faults, in tables, statics and
+records.
+"""
 
 from dataclasses import replace
 
@@ -52,7 +54,9 @@ def test_no_depth_is_no_relief_bit_for_bit(xiamen, machine):
 
 @pytest.mark.parametrize("shape", ["linear", "parabolic"])
 def test_the_gaps_are_those_of_the_fault_of_the_same_relief(xiamen, shape):
-    """The fault falls off along the line of action, the modification over the radius: 4 % of the depth between them."""
+    """The fault falls off along the line of action, the modification over the radius: 4 % of the
+    depth between them.
+    """
     depth, height = 10 * UM, 0.6 * MM
     system = relieved(
         xiamen, tip_relief=depth, tip_relief_height=height, profile_shape=shape
@@ -97,7 +101,9 @@ def test_a_fault_comes_on_top(xiamen):
 
 
 def test_relief_of_the_deflection_takes_most_ripple_off(xiamen, machine):
-    """Where one pair leaves as the next one enters, reliefs that sum to the deflection leave it even (Harris's map)."""
+    """Where one pair leaves as the next one enters, reliefs that sum to the deflection leave it
+    even (Harris's map).
+    """
     for system in (xiamen, machine({"operating.torque_nm": 60.0})):
         best = replace(system, modification=system.long_relief())
         assert ripple(best) < 0.2 * ripple(system)
@@ -131,7 +137,9 @@ def sides(system):
     ],
 )
 def test_leads_are_those_of_the_sliced_pair(config_with, lead, share):
-    """Mean deflection of both models of one pair; the spur table is a secant, the slices bear one by one."""
+    """Mean deflection of both models of one pair; the spur table is a secant, the slices bear one
+    by one.
+    """
     config = config_with()
     spur = relieved(read_system(config), **lead)
     sliced = read_system(config.with_keys("system", kind="helical_pair"))
@@ -158,7 +166,9 @@ def test_opposite_slopes_leave_an_aligned_pair(xiamen):
 
 
 def test_relieved_gears_shake_less_along_the_line_of_action(machine):
-    """Tips that do not strike: a quarter of the acceleration along the line of action at the rated point."""
+    """Tips that do not strike: a quarter of the acceleration along the line of action at the rated
+    point.
+    """
     system = machine(
         {"operating.duration_s": 0.2, "sensing.channels": ["pinion_y", "wheel_y"]}
     )

@@ -7,7 +7,8 @@ from numpy.testing import assert_allclose
 
 from gensig.faults.base import faulty_teeth
 from gensig.faults.broken import tooth_height
-from gensig.mesh.load_distribution import pair_states, static_mesh
+from gensig.geometry.tooth import healthy_tooth
+from gensig.mesh.load_distribution import pair_states
 from gensig.mesh.local_contact import relative_radius
 from gensig.mesh.pair_table import flank_sides, slice_bending
 
@@ -15,7 +16,7 @@ UM = 1e-6
 
 
 def rows(system, fault, tooth=0):
-    """Gap beyond the sound tooth's, and compliance, of the faulty tooth at every node of the table, (node,) each."""
+    """Gap beyond the sound tooth's, and compliance, of the faulty tooth at every node, (node,)."""
     side = side_of(system.mesh_table((fault,)), fault.gear)
     row = side.kind[tooth]
     return side.gap[row] - side.gap[0], side.compliance[row]
@@ -33,10 +34,8 @@ def curvature(system, gear):
 
 
 def along_flank(system, gear):
-    """Place on the flank, 0 at the lower end of the involute and 1 at the tip, at the nodes on the path."""
-    flank = faulty_teeth(system.pair, (one("pitch_error", gear=gear, tooth=0),))[
-        gear, 0
-    ].profile.curvature_radius
+    """Position on the flank at the nodes on the path: 0 at the lower end, 1 at the tip."""
+    flank = healthy_tooth(getattr(system.pair, gear)).profile.curvature_radius
     return (curvature(system, gear) - flank[0]) / (flank[-1] - flank[0])
 
 
@@ -44,59 +43,38 @@ def along_flank(system, gear):
 class TestOneIsTheOther:
     def test_broken_at_full_height_is_missing(self, xiamen, gear):
         height_mm = 1e3 * tooth_height(getattr(xiamen.pair, gear))
-        tables = [
-            xiamen.mesh_table((fault,))
-            for fault in (
-                one("broken", gear=gear, tooth=2, broken_height_mm=height_mm),
-                one("missing_tooth", gear=gear, tooth=2),
-            )
-        ]
+        broken = one("broken", gear=gear, tooth=2, broken_height_mm=height_mm)
+        missing = one("missing_tooth", gear=gear, tooth=2)
         roll = xiamen.pair.base_pitch * np.linspace(0.0, 6.0, 601)
-        found, expected = (pair_states(table, roll) for table in tables)
-        assert_allclose(found.gap, expected.gap, rtol=0, atol=0)
-        assert np.isinf(expected.gap).any()
-        loads = [
-            static_mesh(table, pair_states(table, roll), xiamen.mesh_force).load
-            for table in tables
-        ]
-        assert_allclose(loads[0], loads[1], rtol=0, atol=1e-9)
-        there = np.isfinite(expected.gap)
-        assert_allclose(
-            found.compliance[there], expected.compliance[there], rtol=1e-12, atol=0
+        found, expected = (
+            pair_states(xiamen.mesh_table((fault,)), roll)
+            for fault in (broken, missing)
         )
+        assert_allclose(found.gap, expected.gap, rtol=0, atol=0)
+        there = np.isfinite(expected.gap)
+        assert not there.all()
+        compliance = expected.compliance[there]
+        assert_allclose(found.compliance[there], compliance, rtol=1e-12, atol=0)
 
     @pytest.mark.parametrize("height_mm", [0.5, 2.0])
     def test_chipped_over_the_whole_face_is_broken(self, xiamen, gear, height_mm):
-        chip = one(
-            "chipped",
-            gear=gear,
-            tooth=0,
-            chip_height_mm=height_mm,
-            chip_width_mm=FULL,
-            chip_shape="rectangular",
-        )
-        broken = one("broken", gear=gear, tooth=0, broken_height_mm=height_mm)
-        for found, expected in zip(
-            rows(xiamen, chip), rows(xiamen, broken), strict=True
-        ):
-            assert_allclose(found, expected, rtol=1e-12, atol=0)
-        assert chip.severity(getattr(xiamen.pair, gear)) == pytest.approx(
-            broken.severity(getattr(xiamen.pair, gear))
-        )
+        whole = {"chip_width_mm": FULL, "chip_shape": "rectangular"}
+        on = {"gear": gear, "tooth": 0}
+        chip = one("chipped", **on, chip_height_mm=height_mm, **whole)
+        broken = one("broken", **on, broken_height_mm=height_mm)
+        expected = rows(xiamen, broken)
+        assert_allclose(rows(xiamen, chip), expected, rtol=1e-12, atol=0)
+        body = getattr(xiamen.pair, gear)
+        assert chip.severity(body) == pytest.approx(broken.severity(body))
 
     def test_a_rectangular_spall_is_a_pit(self, xiamen, gear):
-        pit, spall = (
-            patch("pitting", "pit", gear),
-            patch("spalling", "spall", gear, spall_shape="rectangular"),
-        )
-        for found, expected in zip(rows(xiamen, spall), rows(xiamen, pit), strict=True):
-            assert_allclose(found, expected, rtol=0, atol=0)
+        pit = patch("pitting", "pit", gear)
+        spall = patch("spalling", "spall", gear, spall_shape="rectangular")
+        assert_allclose(rows(xiamen, spall), rows(xiamen, pit), rtol=0, atol=0)
         body = getattr(xiamen.pair, gear)
         assert spall.severity(body) == pytest.approx(pit.severity(body))
-        ellipse = patch("spalling", "spall", gear)
-        assert ellipse.severity(body) == pytest.approx(
-            0.25 * np.pi * pit.severity(body)
-        )
+        ellipse = patch("spalling", "spall", gear).severity(body)
+        assert ellipse == pytest.approx(0.25 * np.pi * pit.severity(body))
 
     def test_an_ellipse_costs_less_than_its_rectangle(self, xiamen, gear):
         inner, outer = (
@@ -121,14 +99,9 @@ PATCH = {
 
 
 def patch(kind, prefix, gear, **changes):
-    """One hole of the same size and place, as a pit or as a spall."""
-    return one(
-        kind,
-        gear=gear,
-        tooth=0,
-        **{f"{prefix}_{key}": value for key, value in PATCH.items()},
-        **changes,
-    )
+    """One hole of the same size and position, as a pit or as a spall."""
+    size = {f"{prefix}_{key}": value for key, value in PATCH.items()}
+    return one(kind, gear=gear, tooth=0, **size, **changes)
 
 
 @pytest.mark.parametrize("gear", GEARS)
@@ -136,113 +109,83 @@ def patch(kind, prefix, gear, **changes):
 def test_a_broken_tooth_bends_as_the_sound_one_up_to_its_corner(
     xiamen, gear, height_mm
 ):
-    """What is gone carried nothing of a load below it; above it the corner is loaded, not what is no longer there."""
+    """The lost part carried nothing of a load below it; a load above it is on the corner."""
     fault = one("broken", gear=gear, tooth=0, broken_height_mm=height_mm)
     corner = faulty_teeth(xiamen.pair, (fault,))[gear, 0].tip_curvature_radius
     side = side_of(heavy_table(xiamen, fault), gear)
     sound, broken = (row[path(xiamen)[0]] for row in side.compliance)
     below = curvature(xiamen, gear) <= corner
     assert_allclose(broken[below], sound[below], rtol=1e-3, atol=0)
-    # the contact term goes on to vary with the position
-    assert_allclose(
-        broken[~below], sound[below][-1 if gear == "pinion" else 0], rtol=0.05, atol=0
-    )
-    assert (sound[~below] / sound[below][-1 if gear == "pinion" else 0]).max() > 1.05
+    at_corner = sound[below][{"pinion": -1, "wheel": 0}[gear]]
+    # the contact term varies with the position
+    assert_allclose(broken[~below], at_corner, rtol=0.05, atol=0)
+    assert (sound[~below] / at_corner).max() > 1.05
 
 
 @pytest.mark.parametrize("gear", GEARS)
 class TestGapsInClosedForm:
     @pytest.mark.parametrize("depth_um", [5.0, 80.0])
     def test_uniform_wear_is_a_gap_of_its_depth(self, xiamen, gear, depth_um):
-        gap, _ = rows(
-            xiamen,
-            one("wear", gear=gear, tooth=0, wear_depth_um=depth_um, wear_profile=None),
+        wear = {"gear": gear, "tooth": 0, "wear_depth_um": depth_um}
+        even, uneven = (
+            rows(xiamen, one("wear", **wear, **shape))[0][path(xiamen)[0]]
+            for shape in ({"wear_profile": None}, {})
         )
-        assert_allclose(gap[path(xiamen)[0]], depth_um * UM, rtol=1e-12, atol=0)
-        uneven, _ = rows(
-            xiamen, one("wear", gear=gear, tooth=0, wear_depth_um=depth_um)
-        )
-        assert np.ptp(uneven[path(xiamen)[0]]) > 0.5 * depth_um * UM
+        assert_allclose(even, depth_um * UM, rtol=1e-12, atol=0)
+        assert np.ptp(uneven) > 0.5 * depth_um * UM
 
     @pytest.mark.parametrize("error_um", [20.0, -20.0, 0.5])
     def test_a_pitch_error_is_its_value_everywhere(self, xiamen, gear, error_um):
-        gap, compliance = rows(
-            xiamen, one("pitch_error", gear=gear, tooth=0, pitch_error_um=error_um)
-        )
+        error = one("pitch_error", gear=gear, tooth=0, pitch_error_um=error_um)
+        gap, compliance = rows(xiamen, error)
         # far off the path the corner gap is millimetres, whose rounding remains
         assert_allclose(gap, error_um * UM, rtol=1e-9, atol=1e-16)
-        assert_allclose(
-            compliance,
-            side_of(xiamen.mesh_table(), gear).compliance[0],
-            rtol=1e-12,
-            atol=0,
-        )
+        sound = side_of(xiamen.mesh_table(), gear).compliance[0]
+        assert_allclose(compliance, sound, rtol=1e-12, atol=0)
 
     @pytest.mark.parametrize("slope_um", [20.0, -20.0])
     def test_a_profile_slope_is_straight_in_roll(self, xiamen, gear, slope_um):
-        gap, _ = rows(
-            xiamen,
-            one(
-                "profile_error",
-                gear=gear,
-                tooth=0,
-                profile_slope_um=slope_um,
-                profile_form_um=0,
-            ),
-        )
+        slope = {"profile_slope_um": slope_um, "profile_form_um": 0}
+        gap, _ = rows(xiamen, one("profile_error", gear=gear, tooth=0, **slope))
         expected = slope_um * UM * (along_flank(xiamen, gear) - 0.5)
         within_second_order(xiamen, gear, gap, expected)
         # half of it stands back at one end of the flank, as much stands proud at the other
-        ends = (
-            gap[path(xiamen)[0]][[0, -1]]
-            * (1 if gear == "pinion" else -1)
-            * np.sign(slope_um)
-        )
-        assert ends[0] < 0 < ends[1]
+        tip, low = {"pinion": (-1, 0), "wheel": (0, -1)}[gear]
+        ends = gap[path(xiamen)[0]] * np.sign(slope_um)
+        assert ends[low] < 0 < ends[tip]
 
     @pytest.mark.parametrize("waves", [1.0, 2.0])
     def test_a_profile_form_is_waves(self, xiamen, gear, waves):
-        fault = one(
-            "profile_error",
-            gear=gear,
-            tooth=0,
-            profile_slope_um=0,
-            profile_form_um=2,
-            profile_waves=waves,
-        )
+        form = {"profile_form_um": 2, "profile_waves": waves, "profile_slope_um": 0}
+        fault = one("profile_error", gear=gear, tooth=0, **form)
         expected = 2 * UM * np.sin(np.pi * waves * along_flank(xiamen, gear)) ** 2
         within_second_order(xiamen, gear, rows(xiamen, fault)[0], expected)
 
     @pytest.mark.parametrize(("curve", "power"), [("linear", 1), ("parabolic", 2)])
     def test_tip_relief_falls_off_from_the_tip(self, xiamen, gear, curve, power):
-        fault = one(
-            "tip_relief",
-            gear=gear,
-            tooth=0,
-            relief_um=10,
-            relief_length_mm=3,
-            relief_curve=curve,
-        )
-        from_tip = np.abs(
-            path(xiamen)[1] - (xiamen.pair.path_of_contact if gear == "pinion" else 0.0)
-        )
+        relief = {"relief_um": 10, "relief_length_mm": 3, "relief_curve": curve}
+        fault = one("tip_relief", gear=gear, tooth=0, **relief)
+        tip = {"pinion": xiamen.pair.path_of_contact, "wheel": 0.0}[gear]
+        from_tip = np.abs(path(xiamen)[1] - tip)
         expected = 10 * UM * np.maximum(1 - from_tip / 3e-3, 0.0) ** power
         assert expected.max() > 9.9 * UM
         within_second_order(xiamen, gear, rows(xiamen, fault)[0], expected)
 
     def test_the_mate_rides_on_the_start_of_a_steep_relief(self, xiamen, gear):
-        """Where slope times slope times radius is no longer small the gap is the edge's, not the relief's."""
-        gap, _ = rows(
-            xiamen,
-            one("tip_relief", gear=gear, tooth=0, relief_um=50, relief_length_mm=0.2),
+        """With a large slope^2 x radius the gap is that of the edge, not of the relief."""
+        steep = one(
+            "tip_relief", gear=gear, tooth=0, relief_um=50, relief_length_mm=0.2
         )
+        gap, _ = rows(xiamen, steep)
         assert 0 < gap[path(xiamen)[0]].max() < 25 * UM
         with pytest.raises(AssertionError):
             within_second_order(xiamen, gear, gap, np.zeros_like(path(xiamen)[1]))
 
 
 def within_second_order(system, gear, gap, expected):
-    """A mate of relative radius rho finds a deviation less at most slope^2 rho / 2, slope along the flank."""
+    """A mate of relative radius rho finds a deviation less at most slope^2 rho / 2, slope along the
+    flank.
+    """
     on, _ = path(system)
     largest = second_order(system, gear, expected).max()
     assert largest < 0.1 * np.ptp(expected)
@@ -255,65 +198,40 @@ def within_second_order(system, gear, gap, expected):
 def second_order(system, gear, deviation):
     """slope^2 rho / 2 of a deviation given on the path, (node,) m."""
     arc = curvature(system, gear) ** 2 / (2 * getattr(system.pair, gear).base_radius)
-    return (
-        np.gradient(deviation, arc) ** 2
-        * relative_radius(system.pair, path(system)[1])
-        / 2
-    )
+    radius = relative_radius(system.pair, path(system)[1])
+    return np.gradient(deviation, arc) ** 2 * radius / 2
 
 
+@pytest.mark.parametrize("gear", GEARS)
 class TestRunout:
-    @pytest.mark.parametrize("gear", GEARS)
-    def test_consecutive_teeth_agree_at_the_same_roll(self, xiamen, gear):
-        """Tooth k + 1 is one base pitch behind tooth k: what moves the gear moves both."""
-        table = xiamen.mesh_table(
-            (one("runout", gear=gear, tooth=5, eccentricity_um=40),)
-        )
-        side, pitch = side_of(table, gear), xiamen.pair.base_pitch
-        both = np.linspace(pitch, xiamen.pair.path_of_contact, 50)
-        gap = side.gap - side_of(xiamen.mesh_table(), gear).gap[0]
-        n_teeth = len(side.kind)
-
-        def jump(step):
-            return max(
-                np.abs(
-                    np.interp(both, table.position, gap[side.kind[k]])
-                    - np.interp(
-                        both - pitch,
-                        table.position,
-                        gap[side.kind[(k + step) % n_teeth]],
-                    )
-                ).max()
-                for k in range(n_teeth)
-            )
-
-        second = (
-            40 * UM / curvature(xiamen, gear)
-        )  # slope of the deviation along the flank, at most
-        assert (
-            jump(1)
-            < 1.25
-            * (second**2 * relative_radius(xiamen.pair, path(xiamen)[1]) / 2).max()
-        )
-        assert jump(-1) > 2 * UM
-
-    @pytest.mark.parametrize("gear", GEARS)
-    def test_the_amplitude_is_the_eccentricity(self, xiamen, gear):
-        table = xiamen.mesh_table(
-            (one("runout", gear=gear, tooth=5, eccentricity_um=40),)
-        )
+    @staticmethod
+    def gaps(system, gear, position):
+        """Gap of every tooth beyond the sound tooth's, (tooth, position) m."""
+        runout = one("runout", gear=gear, tooth=5, eccentricity_um=40)
+        table = system.mesh_table((runout,))
         side = side_of(table, gear)
-        at_pitch_point = np.array(
-            [
-                np.interp(xiamen.pair.pitch_point, table.position, row)
-                for row in side.gap
-            ]
-        )
-        turn = 2 * np.pi * (np.arange(len(side.kind)) - 5) / len(side.kind)
-        assert_allclose(
-            at_pitch_point[side.kind], 40 * UM * np.cos(turn), rtol=0, atol=0.1 * UM
-        )
-        assert at_pitch_point[side.kind].argmax() == 5
+        gap = (side.gap - side_of(system.mesh_table(), gear).gap[0])[side.kind]
+        return np.array([np.interp(position, table.position, row) for row in gap])
+
+    def test_consecutive_teeth_agree_at_the_same_roll(self, xiamen, gear):
+        """Tooth k + 1 is one base pitch behind tooth k; the eccentricity moves both."""
+        pitch = xiamen.pair.base_pitch
+        both = np.linspace(pitch, xiamen.pair.path_of_contact, 50)
+        here, behind = (self.gaps(xiamen, gear, at) for at in (both, both - pitch))
+        jumps = [
+            np.abs(here - np.roll(behind, -step, axis=0)).max() for step in (1, -1)
+        ]
+        # slope of the deviation along the flank, at most
+        slope = 40 * UM / curvature(xiamen, gear)
+        radius = relative_radius(xiamen.pair, path(xiamen)[1])
+        assert jumps[0] < 1.25 * (slope**2 * radius / 2).max()
+        assert jumps[1] > 2 * UM
+
+    def test_the_amplitude_is_the_eccentricity(self, xiamen, gear):
+        gap = self.gaps(xiamen, gear, xiamen.pair.pitch_point)
+        turn = 2 * np.pi * (np.arange(len(gap)) - 5) / len(gap)
+        assert_allclose(gap, 40 * UM * np.cos(turn), rtol=0, atol=0.1 * UM)
+        assert gap.argmax() == 5
 
 
 class TestMisalignment:
@@ -325,14 +243,9 @@ class TestMisalignment:
         fault = one("misalignment", gear=gear, tooth=0, misalignment_um=misalignment_um)
         tooth = faulty_teeth(system.pair, (fault,))[gear, 0]
         at, force = np.array([system.pair.pitch_point]), system.mesh_force
-        side = flank_sides(
-            system.pair,
-            at,
-            system.material,
-            system.mesh,
-            force,
-            pinion_share=1.0 if gear == "pinion" else 0.0,
-        )[gear]
+        mesh = system.pair, at, system.material, system.mesh
+        share = {"pinion": 1.0, "wheel": 0.0}[gear]
+        side = flank_sides(*mesh, force, pinion_share=share)[gear]
         bending = slice_bending(system.pair, at, system.material, system.mesh)
         gap, compliance = side.contact(tooth, bending, system.mesh)
         even = side.law.compliance(FULL * 1e-3, force) + bending
@@ -340,24 +253,17 @@ class TestMisalignment:
 
     @pytest.mark.parametrize("gear", GEARS)
     @pytest.mark.parametrize("bending", ["whole", "by_slice"])
-    @pytest.mark.parametrize("ratio", [0.2, 1.0, 1.9, 2.1, 5.0, 50.0])
+    @pytest.mark.parametrize("ratio", [0.2, 1.9, 2.1, 50.0])
     def test_closed_form(self, machine, gear, bending, ratio):
         system = machine({"mesh.contact": "linear", "mesh.bending": bending})
         _, even = self.approach(system, 1.0, gear)
         tilt = ratio * even
-        expected = even + tilt / 2 if ratio < 2 else np.sqrt(2 * even * tilt)
+        expected = np.sqrt(2 * even * tilt)  # part of the face bears
+        if ratio < 2:
+            expected = even + tilt / 2
         for sign in (1, -1):
-            assert_allclose(
-                self.approach(system, sign * tilt / UM, gear)[0],
-                expected,
-                rtol=0.015,
-                atol=0,
-            )
-
-    def test_full_bearing_is_no_answer_for_a_large_tilt(self, machine):
-        system = machine({"mesh.contact": "linear", "mesh.bending": "whole"})
-        found, even = self.approach(system, 15.0)
-        assert found < 0.5 * (even + 7.5 * UM)
+            found, _ = self.approach(system, sign * tilt / UM, gear)
+            assert_allclose(found, expected, rtol=0.015, atol=0)
 
     def test_slices_that_bend_by_themselves_are_softer(self, machine):
         by_slice, whole = (
@@ -372,5 +278,4 @@ class TestMisalignment:
             rows(xiamen, one("misalignment", tooth=0, misalignment_um=d))
             for d in (15, -15)
         )
-        for found, expected in zip(one_end, other_end, strict=True):
-            assert_allclose(found, expected, rtol=1e-9, atol=1e-15)
+        assert_allclose(one_end, other_end, rtol=1e-9, atol=1e-15)

@@ -1,4 +1,6 @@
-"""Our compliances against the stored finite elements of ``tests/reference``: many gears, bores and cracks."""
+"""Our compliances against the stored finite elements of ``tests/reference``: many gears, bores and
+cracks.
+"""
 
 import csv
 import math
@@ -128,7 +130,9 @@ def test_cracks_of_many_gears(strain):
 
 
 def test_crack_on_the_compression_side(strain):
-    """An open one by the same factors with the normal force reversed: rougher. A breathing one stays shut."""
+    """An open one by the same factors with the normal force reversed: rougher. A breathing one
+    stays shut.
+    """
     rows = next(
         rows
         for key, rows in groups("crack", *CRACKS).items()
@@ -228,7 +232,9 @@ def test_partial_width_crack_in_three_dimensions(xiamen, strain, depth, extent):
 
 
 def test_partial_width_load_in_three_dimensions(machine):
-    """A pit over half of the face: the pinion's structure within 15 % of three dimensions, and not if bent as one."""
+    """A pit over half of the face: the pinion's structure within 15 % of three dimensions, and not
+    if bent as one.
+    """
     found = {}
     for bending in ("by_slice", "whole"):
         system = machine({"mesh.bending": bending, "gear.pinion.bore_radius_mm": 9})
@@ -251,7 +257,8 @@ def test_partial_width_load_in_three_dimensions(machine):
             material,
             reach="to_centreline",
         ).total
-        # half of the slices bear: what is theirs counts twice; the wheel's part is not in this reference
+        # half of the slices bear: what is theirs counts twice; the wheel's part is not in this
+        # reference
         extra = own - mate if bending == "by_slice" else own
         assert_allclose(
             extra, share if bending == "by_slice" else 0.0, rtol=1e-9, atol=0

@@ -1,4 +1,6 @@
-"""The load-dependent contact and plane strain: closed forms, laws, and the finite-element rows of the reference."""
+"""The load-dependent contact and plane strain: closed forms, laws, and the finite-element rows of
+the reference.
+"""
 
 import numpy as np
 import pytest
@@ -7,7 +9,8 @@ from numpy.testing import assert_allclose
 from gensig.mesh.load_distribution import pair_states, static_mesh
 from gensig.mesh.local_contact import linear_contact, weber_contact
 
-# spur reference, section 3.4: named points by pinion curvature radius (mm), pair in plane strain at 20 N m (1e8 N/m)
+# spur reference, section 3.4: named points by pinion curvature radius (mm), pair in plane strain at
+# 20 N m (1e8 N/m)
 CURVATURE_MM = (
     2.45827,
     4.55954,
@@ -113,7 +116,9 @@ def test_local_compliance_falls_with_load_and_width(physical):
 
 
 def test_load_sharing_and_compliance_agree(physical):
-    """The table's contact term belongs to the loads that the table itself gives: a fourth round changes nothing."""
+    """The table's contact term belongs to the loads that the table itself gives: a fourth round
+    changes nothing.
+    """
     table, force = physical.mesh_table(), physical.mesh_force
     roll = physical.pair.base_pitch * (np.arange(40) + 0.5) / 40
     states = pair_states(table, roll)

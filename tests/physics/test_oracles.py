@@ -1,6 +1,8 @@
-"""Other ways to the same motion: another method, periodic motions that nobody settled, other steps where teeth bounce.
+"""Other ways to the same motion: another method, periodic motions that nobody settled, other steps
+where teeth bounce.
 
-Equations of motion and mesh law are ours, written out in ``test_mesh_reference.py``; the methods are scipy's.
+Equations of motion and mesh law are ours, written out in ``test_mesh_reference.py``; the methods
+are scipy's.
 """
 
 import math
@@ -65,7 +67,9 @@ class TestFourMilliseconds:
         assert error(xiamen, oversampling) < limit
 
     def test_order(self, xiamen, error):
-        """Two: a contact that comes or goes inside a step costs the square of the part it is taken in."""
+        """Two: a contact that comes or goes inside a step costs the square of the part it is taken
+        in.
+        """
         assert math.log2(error(xiamen, 5) / error(xiamen, 20)) / 2 > 1.7
 
     def test_another_machine_would_show(self, machine, error):
@@ -74,7 +78,9 @@ class TestFourMilliseconds:
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A periodic motion: its period is a mesh period, or a turn of the pinion where a tooth of it is faulty."""
+    """A periodic motion: its period is a mesh period, or a turn of the pinion where a tooth of it
+    is faulty.
+    """
 
     speed_rpm: float
     faults: tuple
@@ -108,9 +114,11 @@ CASES = {
 
 
 def periodic_motion(dynamics, period, n_points):
-    """States over one period that ends where it began, (n_points + 1, 12): Newton's method on the map of the start.
+    """States over one period that ends where it began, (n_points + 1, 12): Newton's method on the
+    map of the start.
 
-    The map's slope is that of the machine with its mesh held at mean stiffness. The drive holds the pinion's angle, so
+    The map's slope is that of the machine with its mesh held at mean stiffness. The drive holds the
+    pinion's angle, so
     that what is periodic turns at the set speed, and the period is known.
     """
     slope, free = equations(dynamics)
@@ -175,7 +183,8 @@ class TestPeriodicMotion:
 
     @pytest.fixture
     def compared(self, case, tile, spectrum):
-        """How late a record is against the tile, s, and the largest relative error of a channel's lines besides.
+        """How late a record is against the tile, s, and the largest relative error of a channel's
+        lines besides.
 
         The drive is soft: a torque of 1e-7 of the set one turns the pinion on by what 1e-8 s do.
         """
@@ -240,8 +249,13 @@ class TestOutOfContact:
     def records(cls, machine):
         """At five steps a sample, at twenty, and at five under a tenth more torque."""
         missing = tuple(MissingTooth(gear="pinion", tooth=tooth) for tooth in (3, 4))
-        bouncing = {"operating.torque_nm": 1.0, "operating.speed_rpm": 3600, "operating.duration_s": 0.2,
-                    "solver.oversampling": 5, "solver.max_error": None}  # fmt: skip
+        bouncing = {
+            "operating.torque_nm": 1.0,
+            "operating.speed_rpm": 3600,
+            "operating.duration_s": 0.2,
+            "solver.oversampling": 5,
+            "solver.max_error": None,
+        }
         changes = ({}, {"solver.oversampling": 20}, {"operating.torque_nm": 1.1})
         return simulate_together(
             [

@@ -24,7 +24,9 @@ def gear(request, gear_with):
 
 
 def rack_clearance(gear, x, y):
-    """Smallest distance of a tooth point from the rack while it rolls by; 0 on the cut outline, (point,) m."""
+    """Smallest distance of a tooth point from the rack while it rolls by; 0 on the cut outline,
+    (point,) m.
+    """
     m, alpha, rounding = (
         gear.normal_module,
         gear.pressure_angle,
@@ -46,7 +48,8 @@ def rack_clearance(gear, x, y):
     def distance(roll):
         along = radius * np.sin(polar - roll) + pitch_radius * roll - center_offset
         deep = pitch_radius - radius * np.cos(polar - roll) - center_depth
-        # the rack's tooth is the wedge right of its flank and above its tip line, grown by the rounding
+        # the rack's tooth is the wedge right of its flank and above its tip line, grown by the
+        # rounding
         from_tip, from_flank = deep, -along * math.cos(alpha) + deep * math.sin(alpha)
         on_tip, on_flank = (
             along > 0,

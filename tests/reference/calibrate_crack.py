@@ -1,6 +1,8 @@
-"""Fit the crack's intensity factors to stored finite elements: ``python -m tests.reference.calibrate_crack``.
+"""Fit the crack's intensity factors to stored finite elements: ``python -m
+tests.reference.calibrate_crack``.
 
-Writes ``gensig/mesh/root_crack_coefficients.py`` and prints how well the fit holds, gear by gear, and how well it
+Writes ``gensig/mesh/root_crack_coefficients.py`` and prints how well the fit holds, gear by gear,
+and how well it
 holds for gears that were left out of it.
 """
 
@@ -30,7 +32,8 @@ MODULE, WIDTH, POISSON = (
     20e-3,
     0.3,
 )  # of the stored plane-strain runs, which state E W compliance
-# a crack almost along the outline cuts the tooth off: no intensity factor of the root's resultants describes it
+# a crack almost along the outline cuts the tooth off: no intensity factor of the root's resultants
+# describes it
 LEFT_OUT = {("z84", 75.0)}
 
 # the one gear with every angle from both starts: without it the others span too little to judge it
@@ -39,7 +42,9 @@ MOST_ANGLES = "z23_bore9"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Series:
-    """One crack: increments of E' W compliance at several contact points, with the fit's design matrix, (point, _)."""
+    """One crack: increments of E' W compliance at several contact points, with the fit's design
+    matrix, (point, _).
+    """
 
     case: str
     angle_deg: float
@@ -128,12 +133,11 @@ def errors(series: Sequence[Series], coefficients: Array) -> Array:
     )
 
 
-def _told(name: str, found: Array) -> None:
-    far = np.abs(found)
-    print(
-        f"{name:<28}{len(found):>6}{100 * np.sqrt(np.mean(found**2)):>8.1f}{100 * np.quantile(far, 0.95):>8.1f}"
-        f"{100 * found.min():>8.1f}{100 * found.max():>8.1f}"
-    )
+def _print_row(name: str, error: Array) -> None:
+    rms, far = np.sqrt(np.mean(error**2)), np.quantile(np.abs(error), 0.95)
+    percent = [100 * value for value in (rms, far, error.min(), error.max())]
+    columns = "".join(f"{value:>8.1f}" for value in percent)
+    print(f"{name:<28}{len(error):>6}{columns}")
 
 
 def main() -> None:
@@ -148,24 +152,26 @@ def main() -> None:
     )
     TARGET.write_text(
         '"""Written by ``python -m tests.reference.calibrate_crack``.\n\n'
-        'For moment, shear and normal force, one number a function of ``gensig.mesh.root_crack.basis``.\n"""\n\n'
+        "For moment, shear and normal force, one number a function of "
+        '``gensig.mesh.root_crack.basis``.\n"""\n\n'
         f"COEFFICIENTS = (\n{lines},\n)\n",
         encoding="utf-8",
     )
-    print(
-        f"{'increment over finite elements':<28}{'n':>4}{'rms %':>8}{'95 %':>8}{'least':>8}{'most':>8}"
-    )
-    _told("all that was fitted", errors(used, coefficients))
+    columns = "".join(f"{name:>8}" for name in ("rms %", "95 %", "least", "most"))
+    print(f"{'increment over finite elements':<28}{'n':>4}{columns}")
+    _print_row("all that was fitted", errors(used, coefficients))
     for case in sorted({one.case for one in used}):
-        _told(case, errors([one for one in used if one.case == case], coefficients))
+        _print_row(
+            case, errors([one for one in used if one.case == case], coefficients)
+        )
         if case != MOST_ANGLES:
             held_out = fit([one for one in used if one.case != case])
-            _told(
+            _print_row(
                 "  left out of the fit",
                 errors([one for one in used if one.case == case], held_out),
             )
     for angle in sorted({one.angle_deg for one in used}):
-        _told(
+        _print_row(
             f"angle {angle:g}",
             errors([one for one in used if one.angle_deg == angle], coefficients),
         )
@@ -178,7 +184,7 @@ def main() -> None:
         ),
     ):
         if some:
-            _told(name, errors(some, coefficients))
+            _print_row(name, errors(some, coefficients))
 
 
 if __name__ == "__main__":

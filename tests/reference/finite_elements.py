@@ -3,8 +3,10 @@
 The checker for gear body, tooth and crack models. It shares nothing with them but the geometry
 (``gensig.geometry``) and the material: quadratic triangles on the whole gear, bore clamped.
 
-A contact at curvature radius rc presses with a unit force on the +y flank of tooth 0, along the inward normal of its
-involute. The *structural* compliance is the displacement, in the direction of the force, of the point where the line
+A contact at curvature radius rc presses with a unit force on the +y flank of tooth 0, along the
+inward normal of its
+involute. The *structural* compliance is the displacement, in the direction of the force, of the
+point where the line
 of action crosses the tooth centreline: it leaves out the local indentation at the contact.
 """
 
@@ -37,7 +39,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plane:
-    """What turns the dimensionless solution into a compliance: plane state, elastic constants, face width."""
+    """Factors from the dimensionless solution to a compliance: plane state, elastic constants, face
+    width.
+    """
 
     elasticity: str
     material: Material
@@ -77,7 +81,8 @@ def structural_compliance(
 
     Parameters
     ----------
-    curvature_radius : (contact,) m    of the involute at the contact; must lie between junction and tip
+    curvature_radius : (contact,) m    of the involute at the contact; must lie between junction and
+        tip
     crack : slit in tooth 0, or None
     modelled_teeth : teeth with their outline, the others are left out down to the root circle
 
@@ -103,9 +108,11 @@ def tooth_compliance(
     *,
     resolution: Resolution | None = None,
 ) -> Array:
-    """Compliance of tooth 0 clamped at its root chord, the line through the ends of its root curves.
+    """Compliance of tooth 0 clamped at its root chord, the line through the ends of its root
+    curves.
 
-    Parameters and result as in ``structural_compliance``; zero where the line of action crosses the centreline below
+    Parameters and result as in ``structural_compliance``; zero where the line of action crosses the
+    centreline below
     the chord.
     """
     mesh = tooth_mesh(gear, curvature_radius, resolution=resolution)
@@ -131,7 +138,8 @@ def crack_increment(
 ) -> Array:
     """Structural compliance of the cracked less that of the sound gear, (contact,) m/N.
 
-    Both on the same triangles, with the slit open and closed, so that only the crack makes the difference. The faces
+    Both on the same triangles, with the slit open and closed, so that only the crack makes the
+    difference. The faces
     of the open slit are free: on the compression side they would in truth close.
     """
     compliance = []
@@ -161,8 +169,10 @@ def cross_compliance(
 
     Parameters
     ----------
-    curvature_radius : (contact,) m    at tooth 0; tooth k touches at rc + k p_b, which must lie on its involute
-    tooth : number k of the neighbour, counted towards the loaded flank (+1: a base pitch further along the involute)
+    curvature_radius : (contact,) m    at tooth 0; tooth k touches at rc + k p_b, which must lie on
+        its involute
+    tooth : number k of the neighbour, counted towards the loaded flank (+1: a base pitch further
+        along the involute)
 
     Returns
     -------
@@ -201,7 +211,9 @@ class Solution:
 def _solve(
     mesh: MeshTri, clamped: NDArray[np.int64], gear: Gear, radii: Array, plane: Plane
 ) -> Solution:
-    """Displacements under a unit force at each of the curvature radii on tooth 0, one factorisation for all."""
+    """Displacements under a unit force at each of the curvature radii on tooth 0, one factorisation
+    for all.
+    """
     basis = Basis(mesh, ElementVector(ElementTriP2()))
     stiffness = linear_elasticity(*plane.lame).assemble(basis).tocsr()
     nodes = [nearest_node(mesh, point) for point in _flank_point(gear, radii).T]
@@ -215,7 +227,9 @@ def _solve(
 
 
 def solve_definite(matrix: csr_matrix, loads: Array) -> Array:
-    """Solve a symmetric positive definite system for (dof, load) right-hand sides; MKL's Pardiso where installed."""
+    """Solve a symmetric positive definite system for (dof, load) right-hand sides; MKL's Pardiso
+    where installed.
+    """
     try:
         from pypardiso import PyPardisoSolver
     except ImportError:
@@ -247,7 +261,7 @@ def _force(gear: Gear, radii: Array) -> Array:
 
 
 def _crossing(gear: Gear, radii: Array) -> Array:
-    """Where the line of action crosses the tooth centreline, (2, contact) in modules."""
+    """Points at which the line of action crosses the tooth centreline, (2, contact) in modules."""
     x = gear.base_radius / np.cos(load_angle(gear, radii)) / gear.normal_module
     return np.stack([x, np.zeros_like(x)])
 
@@ -261,7 +275,9 @@ def _along_force(solution: Solution, gear: Gear, radii: Array) -> Array:
 
 
 def point_values(basis: Basis, points: Array) -> csr_matrix:
-    """Matrix from a solution to its values at (dimension, point) points, rows ordered component by component."""
+    """Matrix from a solution to its values at (dimension, point) points, rows ordered component by
+    component.
+    """
     return basis.probes(points).tocsr()
 
 
@@ -270,7 +286,8 @@ def contact_radii(
 ) -> Array:
     """Curvature radii spread evenly over the usable involute, (contact,) m.
 
-    ``root_margin`` is left free at the junction as a share of the involute, ``tip_margin`` at the tip in m.
+    ``root_margin`` is left free at the junction as a share of the involute, ``tip_margin`` at the
+    tip in m.
     """
     tip = math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
     start = gear.junction_curvature_radius
@@ -287,7 +304,8 @@ def root_stress_factor(
     resolution: Resolution | None = None,
     modelled_teeth: int = MODELLED_TEETH,
 ) -> tuple[Array, Array]:
-    """Largest tension along the loaded side's root curve, over F / (W m) for a force F along the line of action.
+    """Largest tension along the loaded side's root curve, over F / (W m) for a force F along the
+    line of action.
 
     Parameters
     ----------
@@ -296,7 +314,8 @@ def root_stress_factor(
     Returns
     -------
     (contact,)        stress along the free edge: E (plane strain: E / (1 - nu^2)) times its stretch
-    (contact,) rad    slope of the edge to the tooth centreline where it is largest; ISO 6336-3 takes 30 degrees
+    (contact,) rad    slope of the edge to the tooth centreline where it is largest; ISO 6336-3
+    takes 30 degrees
     """
     mesh = gear_mesh(
         gear,

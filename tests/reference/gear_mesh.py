@@ -1,7 +1,10 @@
-"""Triangle meshes of whole gears and of single teeth, with or without a crack, from the gear's exact outline.
+"""Triangle meshes of whole gears and of single teeth, with or without a crack, from the gear's
+exact outline.
 
-All lengths of a mesh are in modules (length / normal module): plane elasticity has no size of its own. Axes are those
-of ``gensig.geometry.tooth_profile``: x along the centreline of tooth 0, y towards its loaded flank, tooth k at the
+All lengths of a mesh are in modules (length / normal module): plane elasticity has no size of its
+own. Axes are those
+of ``gensig.geometry.tooth_profile``: x along the centreline of tooth 0, y towards its loaded flank,
+tooth k at the
 polar angle 2 pi k / z.
 """
 
@@ -37,7 +40,9 @@ INSIDE_DISTANCE = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Resolution:
-    """Edge lengths in modules; those of a crack (largest along its faces and at its tip) as shares of its depth."""
+    """Edge lengths in modules; those of a crack (largest along its faces and at its tip) as shares
+    of its depth.
+    """
 
     flank: float = 0.1
     root: float = 0.06
@@ -67,7 +72,8 @@ class Resolution:
 class Crack:
     """Straight slit from the root curve of tooth 0, inward and towards the gear centre.
 
-    ``start`` is "gamma_mid" or "arc_mid", ``angle`` (rad) is measured from the tooth centreline, ``depth`` in m,
+    ``start`` is "gamma_mid" or "arc_mid", ``angle`` (rad) is measured from the tooth centreline,
+    ``depth`` in m,
     ``side`` is "tension" (the loaded flank, y > 0) or "compression".
     """
 
@@ -92,7 +98,8 @@ def gear_mesh(
     ----------
     contacts : tooth -> (contact,) m    curvature radii at which the flanks of that tooth get nodes
     crack : slit in tooth 0
-    opened : whether the faces of the slit have nodes of their own, all but the tip; if not, the mesh is that of the
+    opened : whether the faces of the slit have nodes of their own, all but the tip; if not, the
+        mesh is that of the
         sound gear with edges along the slit
     modelled_teeth : number of teeth with their outline, the nearest to tooth 0
     """
@@ -112,7 +119,9 @@ def gear_mesh(
 def tooth_mesh(
     gear: Gear, contacts: Array, *, resolution: Resolution | None = None
 ) -> MeshTri:
-    """Tooth 0 alone, cut off at its root chord (the line through the gamma = pi/2 points); lengths in modules."""
+    """Tooth 0 alone, cut off at its root chord (the line through the gamma = pi/2 points); lengths
+    in modules.
+    """
     sizes = resolution or Resolution()
     tooth = tooth_outline(gear, contacts, sizes.root, sizes.flank)
     n_chord = math.ceil((tooth[1, -1] - tooth[1, 0]) / sizes.root)
@@ -129,7 +138,8 @@ def tooth_outline(
     flank_size: float,
     root_knots: Sequence[float] = (),
 ) -> Array:
-    """Outline of tooth 0 from its -y root point over the tip to its +y root point, (2, node) in modules.
+    """Outline of tooth 0 from its -y root point over the tip to its +y root point, (2, node) in
+    modules.
 
     ``contacts`` (curvature radii, m) and ``root_knots`` (gamma, rad) become nodes on both flanks.
     """
@@ -182,7 +192,9 @@ def crack_line(gear: Gear, crack: Crack, sizes: Resolution) -> Array:
 
 
 def growing_steps(length: float, first: float, largest: float) -> Array:
-    """Distances from 0 to ``length`` in steps that grow by a quarter each, from about ``first`` to ``largest``."""
+    """Distances from 0 to ``length`` in steps that grow by a quarter each, from about ``first`` to
+    ``largest``.
+    """
     distances, step = [0.0], first
     while distances[-1] < length:
         distances.append(distances[-1] + step)
@@ -208,7 +220,9 @@ def gear_outline(
     sizes: Resolution,
     modelled_teeth: int,
 ) -> Array:
-    """Outline of the whole gear counter-clockwise, (2, node) in modules; arguments as in ``gear_mesh``."""
+    """Outline of the whole gear counter-clockwise, (2, node) in modules; arguments as in
+    ``gear_mesh``.
+    """
     z, module = gear.n_teeth, gear.normal_module
     knots = () if crack is None else (crack_start_gamma(gear, crack.start),)
     pieces = []
@@ -241,7 +255,9 @@ def _tooth_sizes(distance: int, sizes: Resolution) -> tuple[float, float]:
 
 
 def _sample(curve: Curve, knots: Sequence[float], size: float) -> Array:
-    """Points of a curve, (2, node): at all knots, and between them at equal arc lengths up to ``size``."""
+    """Points of a curve, (2, node): at all knots, and between them at equal arc lengths up to
+    ``size``.
+    """
     points = [np.stack(curve(np.array([knots[0]])))]
     for start, end in pairwise(knots):
         fine = np.linspace(start, end, 201)
@@ -278,7 +294,9 @@ def _distinct(values: Sequence[float], tolerance: float) -> list[float]:
 
 @dataclass(frozen=True, slots=True)
 class Polyline:
-    """Nodes (2, node) of a boundary or an inner line, and the edge length (node,) wanted around each."""
+    """Nodes (2, node) of a boundary or an inner line, and the edge length (node,) wanted around
+    each.
+    """
 
     points: Array
     sizes: Array
@@ -308,13 +326,16 @@ class Polyline:
 def triangulate(
     loops: Sequence[Polyline], inner: Sequence[Array], inside_size: float
 ) -> MeshTri:
-    """Triangles inside the first closed loop and outside the others, with nodes and edges along the inner lines.
+    """Triangles inside the first closed loop and outside the others, with nodes and edges along the
+    inner lines.
 
-    Every edge of the lines is one edge of a triangle; elsewhere edges grow with the distance from the nearest line.
+    Every edge of the lines is one edge of a triangle; elsewhere edges grow with the distance from
+    the nearest line.
 
     Parameters
     ----------
-    inner : lines (2, node) without branches, or single points; nodes on a loop must be nodes of that loop
+    inner : lines (2, node) without branches, or single points; nodes on a loop must be nodes of
+        that loop
     inside_size : edge length at ``INSIDE_DISTANCE`` from the lines, modules
     """
     _start_gmsh()
@@ -378,7 +399,9 @@ def _start_gmsh() -> None:
 
 
 def _grow_inwards(inside_size: float) -> None:
-    """Let the edge length grow from that of the nearest line to ``inside_size`` at ``INSIDE_DISTANCE``."""
+    """Let the edge length grow from that of the nearest line to ``inside_size`` at
+    ``INSIDE_DISTANCE``.
+    """
     field = gmsh.model.mesh.field.add("Extend")
     gmsh.model.mesh.field.setNumbers(
         field, "CurvesList", [tag for _, tag in gmsh.model.getEntities(1)]
@@ -400,7 +423,9 @@ def _read_triangles() -> MeshTri:
 
 
 def open_slit(mesh: MeshTri, slit: Array) -> MeshTri:
-    """Give the two faces of a straight slit (mouth to tip) nodes of their own; the tip stays shared."""
+    """Give the two faces of a straight slit (mouth to tip) nodes of their own; the tip stays
+    shared.
+    """
     nodes = [nearest_node(mesh, point) for point in slit.T[:-1]]
     copies = np.arange(mesh.nvertices)
     copies[nodes] = mesh.nvertices + np.arange(len(nodes))
@@ -411,7 +436,7 @@ def open_slit(mesh: MeshTri, slit: Array) -> MeshTri:
 
 
 def left_of(mesh: MeshTri, slit: Array) -> NDArray[np.bool_]:
-    """Which triangles lie on the left of the straight line from mouth to tip."""
+    """Mask of the triangles on the left of the straight line from mouth to tip."""
     direction = slit[:, -1] - slit[:, 0]
     centres = mesh.p[:, mesh.t].mean(axis=1) - slit[:, :1]
     return direction[0] * centres[1] - direction[1] * centres[0] > 0.0

@@ -1,7 +1,10 @@
-"""Write the reference tables again: ``python -m tests.reference.regenerate [healthy|tooth|crack|...]``.
+"""Write the reference tables again: ``python -m tests.reference.regenerate
+[healthy|tooth|crack|...]``.
 
-Without names, all of them; see ``TABLES``. Compliances are dimensionless, compliance * E * W; a plane compliance in
-this form is the same for every module, modulus and face width, and depends on Poisson's ratio (0.3 here) and the plane
+Without names, all of them; see ``TABLES``. Compliances are dimensionless, compliance * E * W; a
+plane compliance in
+this form is the same for every module, modulus and face width, and depends on Poisson's ratio (0.3
+here) and the plane
 state.
 """
 
@@ -158,7 +161,9 @@ def _gear_columns(case: str) -> Row:
 def _contact_rows(
     head: Row, radii: Array, labels: Sequence[Row] | None = None, **compliances: Array
 ) -> Iterator[Row]:
-    """One row per contact; compliances (contact,) in m/N become dimensionless. ``labels`` adds columns per contact."""
+    """One row per contact; compliances (contact,) in m/N become dimensionless. ``labels`` adds
+    columns per contact.
+    """
     for index, radius in enumerate(radii):
         label = labels[index] if labels else {}
         values = {
@@ -246,7 +251,9 @@ def _crack_families(case: str) -> Iterator[tuple[str, float, str]]:
 
 
 def bores() -> Iterator[Row]:
-    """Self compliances at the named points and cross compliances over the double zone, over bore radii."""
+    """Self compliances at the named points and cross compliances over the double zone, over bore
+    radii.
+    """
     for elasticity in ("plane_stress", "plane_strain"):
         plane = _plane(elasticity)
         for bore_pair in BORE_PAIRS_MM:
@@ -307,7 +314,9 @@ def _pair(pinion_bore_mm: float, wheel_bore_mm: float) -> GearPair:
 
 
 def _named_positions(pair: GearPair) -> dict[str, float]:
-    """Positions s from A, m: start A and end E of contact, single zone B..D, pitch point C, midpoints."""
+    """Positions s from A, m: start A and end E of contact, single zone B..D, pitch point C,
+    midpoints.
+    """
     end, pitch = pair.path_of_contact, pair.base_pitch
     b, c, d = end - pitch, pair.pitch_point, pitch
     return {

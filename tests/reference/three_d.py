@@ -1,7 +1,9 @@
 """Three-dimensional elements: the 23-tooth pinion with faults over a part of its face width.
 
-A plane mesh of the whole pinion is extruded in layers of quadratic tetrahedra. The bore is clamped over the whole
-width, the end faces are free. Sound gear and faults share one mesh, so that only the fault makes the difference.
+A plane mesh of the whole pinion is extruded in layers of quadratic tetrahedra. The bore is clamped
+over the whole
+width, the end faces are free. Sound gear and faults share one mesh, so that only the fault makes
+the difference.
 Axes and lengths (modules) are those of ``gear_mesh``; z runs from one end face to the other.
 """
 
@@ -93,7 +95,9 @@ FAULTS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Extrusion:
-    """Plane mesh with edges along the deepest crack and the pit's walls, and the heights (plane,) of the layers."""
+    """Plane mesh with edges along the deepest crack and the pit's walls, and the heights (plane,)
+    of the layers.
+    """
 
     section: MeshTri
     slit: Array
@@ -156,7 +160,9 @@ def extrude(
     sizes: Resolution = SECTION,
     layers: Sequence[int] = LAYERS,
 ) -> Extrusion:
-    """The gear's section with nodes at contacts and on the centreline, and layers over its face width."""
+    """The gear's section with nodes at contacts and on the centreline, and layers over its face
+    width.
+    """
     module = gear.normal_module
     crack = Crack(
         start=CRACK_START, angle=CRACK_ANGLE, depth=max(CRACK_DEPTHS) * module
@@ -246,8 +252,10 @@ def _graded(edges: Array, index: int, count: int) -> Array:
 class Response:
     """Compliances over the tooth's width, each times E and face width.
 
-    ``strips`` (contact, strip measured, strip loaded): mean displacement of a strip of the centreline crossing in the
-    force direction, per force on a strip of the contact line. ``profile`` (contact, strip end): displacement under
+    ``strips`` (contact, strip measured, strip loaded): mean displacement of a strip of the
+    centreline crossing in the
+    force direction, per force on a strip of the contact line. ``profile`` (contact, strip end):
+    displacement under
     a uniform line load over the whole width.
     """
 
@@ -295,9 +303,11 @@ def solve(gear: Gear, radii: Array, mesh: MeshTet, poisson_ratio: float) -> Resp
 def _stiffness(
     mesh: MeshTet, dofs: NDArray[np.int64], lame_lambda: float, lame_mu: float
 ) -> csr_matrix:
-    """Stiffness of isotropic elasticity; ``dofs`` (3 x basis function, cell), components running fastest.
+    """Stiffness of isotropic elasticity; ``dofs`` (3 x basis function, cell), components running
+    fastest.
 
-    With D[ia, jb] the integral of d_a phi_i d_b phi_j: lambda D[ia, jb] + mu D[ib, ja] + mu delta_ab D[ic, jc].
+    With D[ia, jb] the integral of d_a phi_i d_b phi_j: lambda D[ia, jb] + mu D[ib, ja] + mu
+    delta_ab D[ic, jc].
     """
     n_dofs, n_local = int(dofs.max()) + 1, len(dofs)
     total = csr_matrix((n_dofs, n_dofs))
@@ -327,9 +337,11 @@ def _stiffness(
 
 
 def _strip_means(basis: Basis, mesh: MeshTet, place: Array, force: Array) -> Array:
-    """Vectors (dof, strip) whose product with a displacement is its mean over a strip of the line at ``place``.
+    """Vectors (dof, strip) whose product with a displacement is its mean over a strip of the line
+    at ``place``.
 
-    As loads they are uniform line loads of unit resultant. Strips where the line is interrupted get nothing.
+    As loads they are uniform line loads of unit resultant. Strips where the line is interrupted get
+    nothing.
     """
     line = _line_nodes(mesh, place)
     z = mesh.p[2, line]
@@ -366,7 +378,7 @@ def _force(gear: Gear, radius: float) -> Array:
 
 
 def _crossing(gear: Gear, radius: float) -> Array:
-    """Where the line of action crosses the tooth centreline, (2,) modules."""
+    """Points at which the line of action crosses the tooth centreline, (2,) modules."""
     angle = float(load_angle(gear, np.array([radius]))[0])
     return np.array([gear.base_radius / math.cos(angle) / gear.normal_module, 0.0])
 

@@ -1,4 +1,4 @@
-"""Compiled core of the loaded contact in slices: which slices of which pairs bear, and how much.
+"""Compiled core of the loaded contact in slices: bearing slices of all pairs and their loads.
 
 Scalar code without reassociation, in the order of the arrays.
 """
@@ -16,33 +16,45 @@ _compiled: Any = functools.partial(njit, nogil=True, cache=True, error_model="nu
 ROUNDS = 100  # at most, of the bearing slices and the logarithm's load
 SETTLED = 1e-12  # relative change of the approach that ends the rounds
 SETTLED_FORCE = 1e-4  # and of a force that goes into a table
-LEAST_INTENSITY = (
-    1e-3  # of the even load per width: the logarithm has no limit where a slice lets go
-)
+# of the even load per width: the logarithm has no limit as a slice loses contact
+LEAST_INTENSITY = 1e-3
 
 
 @_compiled
 def solve_slices(
-    structure, factor, constant, log_weight, gap, width, breadth, length_squared, shared, force, even, approach,
-    stiffness, line_load,
-):  # fmt: skip
+    structure,
+    factor,
+    constant,
+    log_weight,
+    gap,
+    width,
+    breadth,
+    length_squared,
+    shared,
+    force,
+    even,
+    approach,
+    stiffness,
+    line_load,
+):
     """Loads of all slices of all pairs at one force, phase by phase.
 
-    Slice j of pair i stands back by gap[i, j] and is as soft as structure[i, j] + contact. The
+    Slice j of pair i has the gap gap[i, j] and the compliance structure[i, j] + contact. The
     structure's deflection w along the face obeys k w - (k length^2 w')' = p for the load per
     width p, k = 1 / structure, with free ends; without length every slice bends by itself. Source
     of the differential form: Pasternak (1954), a foundation with shear.
 
     Parameters
     ----------
-    structure : (phase, pair, slice) m2/N     of teeth and bodies of both gears, per width, without what pairs share
-    factor, constant (phase, pair, slice), log_weight : contact compliance factor (constant - log_weight ln p), m2/N
+    structure : (phase, pair, slice) m2/N     of both gears per width, unshared part
+    factor, constant (phase, pair, slice), log_weight : contact compliance
+        factor (constant - log_weight ln p), m2/N
     gap : (phase, pair, slice) m              inf where there is no flank
-    width : (phase, pair, slice) m            of each slice, less where the field of action cuts it
+    width : (phase, pair, slice) m            of each slice; less at the edge of the field of action
     breadth : (slice,) m                      of each slice, whole
     length_squared : m2                       of the length over which slices couple
     shared : m/N                              body compliance that all pairs share
-    force, even : N, N/m                      total force, and the load per width that scales the logarithm
+    force, even : N, N/m                      total, and load per width that scales the logarithm
     approach, stiffness : (phase,) m, N/m     written; inf and 0 where nothing can touch
     line_load : (phase, pair, slice) N/m      written
 
@@ -146,14 +158,15 @@ def bite_forces(
     first,
     force,
 ):
-    """Force of one pair of teeth at prescribed depths of bite, position by position.
+    """Force of one tooth pair at prescribed depths, position by position.
 
     Parameters
     ----------
     structure, gap : (node, slice)            see `solve_slices`
-    factor, constant (node, slice), log_weight, breadth, length_squared, even : see `solve_slices`
+    factor, constant (node, slice), log_weight, breadth, length_squared, even :
+        see `solve_slices`
     width : (node, slice) m
-    depth : (knot,) m                         beyond the first gap of each position, increasing and positive
+    depth : (knot,) m                         beyond the first gap, increasing and positive
     reach : m                                 positions whose first gap lies beyond are left out
     first : (node,) m                         first gap, written
     force : (node, knot) N                    written; 0 where left out
@@ -228,9 +241,7 @@ def bite_forces(
 
 @_compiled
 def _stiffen(structure, breadth, length_squared, own, between):
-    """Stiffness of every slice's structure, and of what ties it to the next one, (slice,) N/m
-    each, written.
-    """
+    """Writes the stiffness of every slice's structure and of its tie to the next, (slice,) N/m."""
     n_slices = structure.shape[0]
     for j in range(n_slices):
         own[j] = breadth[j] / structure[j]
@@ -247,12 +258,12 @@ def _stiffen(structure, breadth, length_squared, own, between):
 def _deflections(
     own, between, breadth, contact, gap, first, bearing, per_pivot, lift, rest
 ):
-    """Deflection of one pair's structure, lift x (approach above the first gap) - rest, (slice,)
-    each, written.
+    """Writes the deflection of one pair's structure: lift x (approach - first gap) - rest,
+    (slice,).
 
-    Where a slice bears, its load per width is (approach - gap - w) / contact: one tridiagonal
-    system, solved for the part that goes with the approach and the one that does not (Thomas,
-    whose pivots are positive here).
+    The load per width of a bearing slice is (approach - gap - w) / contact. This is one
+    tridiagonal system, solved for the part proportional to the approach and for the rest (Thomas;
+    the pivots are positive here).
     """
     n_slices = own.shape[0]
     before = 0.0

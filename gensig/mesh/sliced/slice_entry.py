@@ -1,7 +1,4 @@
-"""Slices that enter over their width.
-
-What makes the sum over a few slices the integral over the face.
-"""
+"""Gradual entry of slices over their width: the sum over slices becomes the integral."""
 
 from __future__ import annotations
 
@@ -14,25 +11,26 @@ Array = NDArray[np.float64]
 def over_slice(
     first: Array, force: Array, depth: Array, n_looks: int, farthest: float
 ) -> tuple[Array, Array]:
-    """First gap and force of a pair over the way that a slice takes to enter, which is its own
-    width.
+    """First gap and force of a tooth pair, averaged over the entry of one slice.
 
-    A slice that stands for its middle enters whole, with a jolt, and the jolts of all slices
-    sound like a mesh of ``n_slices`` over the overlap ratio times the teeth. Over its width the
-    sum over slices is the integral over the face. Means at one approach; the first touch is that
-    of the edge that enters first.
+    A slice represented by its middle enters at once, with a jolt. The jolts of all slices excite
+    the mesh at ``n_slices`` / overlap ratio times the tooth frequency. Averaged over the width of
+    a slice, the sum over slices is the integral over the face. Means are taken at one approach;
+    the first touch is that of the edge that enters first.
 
     Parameters
     ----------
-    first : (position,) m               ``farthest`` stands for what nothing touches
+    first : (position,) m               infinite gaps become ``farthest``
     force : (position, knot) N          at the depths (knot,) m beyond the first gap
-    n_looks : of the positions' distances make the way from one slice to the next; even
+    n_looks : positions from one slice to the next; even
 
     Returns
     -------
     both at all positions but ``n_looks`` / 2 at either end
     """
     n_left, knots = len(first) - n_looks, np.append(0.0, depth)
+    weight = np.ones(n_looks + 1)
+    weight[[0, -1]] = 0.5
     begun = np.column_stack([np.zeros(len(first)), force])
     first = np.where(np.isfinite(first), first, farthest)
     least = np.lib.stride_tricks.sliding_window_view(first, n_looks + 1).min(axis=1)
@@ -45,7 +43,5 @@ def over_slice(
         )
         low, high = (np.take_along_axis(own, chord + more, axis=1) for more in (0, 1))
         share = (bite - knots[chord]) / np.diff(knots)[chord]
-        mean += (
-            (0.5 if j in (0, n_looks) else 1.0) / n_looks * (low + share * (high - low))
-        )
+        mean += weight[j] / n_looks * (low + share * (high - low))
     return least, mean

@@ -1,9 +1,8 @@
-"""Force over (phase, approach) of one pair of helical teeth, for every distinct pair of teeth, as
-the dynamics asks it.
+"""Mesh table of a helical pair: force over (phase, approach) of every distinct tooth pair.
 
-The force of a pair in slices is convex in the approach: the deeper it bites, the more slices
-bear. It is kept as chords between fixed depths of bite, so that each is a compliance and a gap
-like that of a spur pair, and the law of the mesh is one for both.
+The force of a sliced tooth pair is convex in the approach: with more depth more slices bear. The
+table keeps it as chords between fixed depths. Each chord is a compliance and a gap like those of
+a spur pair, so that both have one mesh law.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,40 +43,44 @@ Array = NDArray[np.float64]
 
 N_CHORDS = 8
 N_TRIED, N_SAMPLES = 32, 24  # depths and positions at which chords are chosen
-PER_SLICE = 4  # positions looked at from one slice's entry to the next one's
-SLICES_PER_STEP = 10  # few slices enter with a jolt: every node is looked at
-UNMET_STEP = 8  # nodes between the positions looked at for teeth that never meet on their working flanks
-DEEPEST = 3.0  # largest depth, in largest static ones
-LEAST_REACH = 1e-4  # m; first gaps up to here are tabulated, so that teeth that stand proud find their force
-FARTHEST = 1e-3  # m; first gaps beyond are all alike
+PER_SLICE = 4  # positions computed from one slice's entry to the next slice's
+SLICES_PER_STEP = 10  # fewer slices enter with a jolt: every node is computed
+UNMET_STEP = (
+    8  # nodes per computed position for teeth that never meet on working flanks
+)
+DEEPEST = 3.0  # largest depth over the largest static depth
+LEAST_REACH = 1e-4  # m; first gaps up to here are tabulated, for teeth that stand proud
+FARTHEST = 1e-3  # m; cap of first gaps
 N_PHASES = 32
-MOST_PAIRS = 400  # of different teeth, about a tenth of a second and 0.8 MB each
+MOST_PAIRS = 400  # distinct tooth pairs, about a tenth of a second and 0.8 MB each
 OFF_PATH = 1e3  # times the least compliance, where mesh.law=paper has no contact
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SlicedTable:
-    """Chords of the force of single pairs at positions s of the slice that enters first.
+    """Chords of the force of single tooth pairs at positions s of the slice that enters first.
 
-    Chord l of a pair that is alone is force = (approach - gap[l]) / compliance[l]. Beside others,
-    as for spur pairs, force = (within - gap[l]) / (compliance[l] - shared_compliance), ``within``
-    being the approach less shared_compliance x total force. It holds where within - gap[0] lies
-    between depth[l] and depth[l + 1], the last one beyond; gap[0] is where the pair touches
-    first. Neighbours meet at their common depth, and as the force is convex it is that of the
-    chord that has the largest.
+    Chord l of a single loaded pair is force = (approach - gap[l]) / compliance[l]. With other
+    pairs in contact, as for spur pairs, force = (local - gap[l]) / (compliance[l] -
+    shared_compliance), where local = approach - shared_compliance x total force. Chord l holds
+    where local - gap[0] lies between depth[l] and depth[l + 1], the last chord also beyond.
+    gap[0] is the first touch. Neighbouring chords meet at their common depth. As the force is
+    convex, it is the largest of all chords.
 
     Parameters
     ----------
-    position : (node,) m      equally spaced, ``points_per_pitch`` a base pitch, from ``first_pitch`` to ``last_pitch``
-    first_pitch, last_pitch : whole base pitches; pairs followed at once are last_pitch - first_pitch
-    depth : (chord,) m        from 0 on
-    compliance, compliance_slope, gap, gap_slope : (pinion kind, wheel kind, chord, node) m/N, 1/N, m, 1
-    pinion_kind, wheel_kind : (tooth,)    which kind every tooth is; 0 is sound
+    position : (node,) m      ``points_per_pitch`` to a base pitch, from ``first_pitch`` on
+    first_pitch, last_pitch : whole base pitches; their difference is the pairs at once
+    depth : (chord,) m        beginning with 0
+    compliance, compliance_slope, gap, gap_slope : (pinion kind, wheel kind, chord, node)
+        m/N, 1/N, m, 1
+    pinion_kind, wheel_kind : (tooth,)    kind of every tooth; 0 is sound
     pinion_present, wheel_present : (kind,)
-    shared_compliance : m/N   of the bodies, that all pairs share
-    set_chord : chord of the set torque's mean load, for what asks for one spring
-    middle_lag : m            how much further along its way the first slice is than the middle of the face: what grows
-        with the contact's position (tilts of single teeth, sliding) does so with position - middle_lag
+    shared_compliance : m/N   body compliance that all pairs share
+    set_chord : chord of the mean load at the set torque, for uses that need one spring
+    middle_lag : m            position of the first slice less that of the middle of the face;
+        quantities that grow with the contact's position (tilts of single teeth, sliding) grow
+        with position - middle_lag
     """
 
     pair: GearPair
@@ -99,36 +103,30 @@ class SlicedTable:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Known:
-    """Something large that is told apart by what it holds."""
+class _Keyed:
+    """A tooth or an array that is compared by its content."""
 
     key: bytes
-    value: Tooth | NDArray[np.float64] | None = field(compare=False)
+    value: Any = field(compare=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Setting:
-    """What all pairs of one table have in common.
-
-    ``pinion`` and ``wheel`` are the teeth that meet most.
-    """
+    """Inputs common to all tooth pairs; ``pinion`` and ``wheel`` are the commonest teeth."""
 
     pair: GearPair
     material: Material
     options: MeshOptions
     slices: SliceOptions
-    deviation: _Known
+    deviation: _Keyed
     force: float
-    pinion: _Known
-    wheel: _Known
+    pinion: _Keyed
+    wheel: _Keyed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Frame:
-    """Depths of bite (knot,) m, 0 left out.
-
-    Positions (node,) m; how far gaps are followed, m; see `SlicedTable`.
-    """
+    """Depths (knot,) m without 0, positions (node,) m, largest gap m; see `SlicedTable`."""
 
     depth: Array
     position: Array
@@ -152,61 +150,41 @@ def sliced_table(
 
     Parameters
     ----------
-    teeth : the teeth that are not sound, by (gear, tooth), as ``faulty_teeth`` gives them
-    force : N    along the transverse line of action; the depths reach three times its deepest bite
+    teeth : the faulty teeth by (gear, tooth), from ``faulty_teeth``
+    force : N    along the transverse line of action; depths reach three times its largest depth
     deviation : (slice, node) m    see ``sliced_mesh``
 
     Raises
     ------
-    ConfigError, GeometryError    for a force that is not positive, or where nothing can touch
-    FaultError    for more different pairs of teeth than can be tabulated
+    ConfigError, GeometryError    for a force that is not positive, or without any contact
+    FaultError    for more distinct tooth pairs than can be tabulated
     """
-    odd = dict(teeth or {})
     (pinion, pinion_kind), (wheel, wheel_kind) = (
-        distinct_teeth(
-            healthy_tooth(gear),
-            {
-                number: odd[name, number]
-                for name, number in sorted(odd)
-                if name == gear.name
-            },
-        )
-        for gear in (pair.pinion, pair.wheel)
+        distinct_teeth(healthy_tooth(gear), teeth or {}) for gear in pair.gears.values()
     )
     if (n_pairs := len(pinion) * len(wheel)) > MOST_PAIRS:
         raise FaultError(
-            f"{len(pinion)} different teeth of the pinion and {len(wheel)} of the wheel make {n_pairs} pairs, above "
-            f"{MOST_PAIRS}; put faults that differ from tooth to tooth on one gear or on fewer teeth"
+            f"{len(pinion)} different teeth of the pinion and {len(wheel)} of the wheel make "
+            f"{n_pairs} pairs, above {MOST_PAIRS}; put faults that differ from tooth to tooth on "
+            "one gear or on fewer teeth"
         )
     setting = _Setting(
         pair=pair,
         material=material,
         options=options,
         slices=slices,
-        deviation=_Known(key=_digest(deviation), value=deviation),
+        deviation=_Keyed(key=_digest(deviation), value=deviation),
         force=force,
-        pinion=_known(pinion[np.bincount(pinion_kind).argmax()]),
-        wheel=_known(wheel[np.bincount(wheel_kind).argmax()]),
+        pinion=_keyed(pinion[np.bincount(pinion_kind).argmax()]),
+        wheel=_keyed(wheel[np.bincount(wheel_kind).argmax()]),
     )
     frame = _frame(setting)
-    first = np.empty((len(pinion), len(wheel), len(frame.position)))
-    loads = np.empty((*first.shape, len(frame.depth)))
-    met = set(pinion_kind.tolist()), set(wheel_kind.tolist())
-    # where all teeth have a common form the sound one is met by nobody, but the back flanks are
-    # sound
-    healthy = _curves(setting, *_healthy(pair), 0 in met[0] and 0 in met[1])
-    for a, one in enumerate(pinion):
-        for b, other in enumerate(wheel):
-            asked = a in met[0] and b in met[1] and one.present and other.present
-            first[a, b], loads[a, b] = (
-                _curves(setting, _known(one), _known(other), True) if asked else healthy
-            )
+    first, loads = _all_curves(setting, pinion, wheel, pinion_kind, wheel_kind)
     compliance, gap = _chords(first, loads, frame.depth)
     mesh = _mesh(setting, setting.pinion, setting.wheel)
     shared = mesh.shared_compliance
-    columns = _smoothed(
-        compliance + shared, gap, float(frame.position[1] - frame.position[0])
-    )
+    distance = float(frame.position[1] - frame.position[0])
+    columns = _smoothed(compliance + shared, gap, distance)
     return SlicedTable(
         pair=pair,
         options=options,
@@ -228,9 +206,30 @@ def sliced_table(
     )
 
 
+def _all_curves(
+    setting: _Setting,
+    pinion: list[Tooth],
+    wheel: list[Tooth],
+    pinion_kind: NDArray[np.int64],
+    wheel_kind: NDArray[np.int64],
+) -> tuple[Array, Array]:
+    """First gap and force of every tooth pair by kinds, (pinion kind, wheel kind, ...)."""
+    frame = _frame(setting)
+    first = np.empty((len(pinion), len(wheel), len(frame.position)))
+    loads = np.empty((*first.shape, len(frame.depth)))
+    # no tooth need be of the sound kind, but the back flanks are sound
+    sound_met = 0 in pinion_kind and 0 in wheel_kind
+    first[:], loads[:] = _curves(setting, *_healthy(setting.pair), sound_met)
+    for a in np.unique(pinion_kind):
+        for b in np.unique(wheel_kind):
+            if pinion[a].present and wheel[b].present:
+                both = _keyed(pinion[a]), _keyed(wheel[b])
+                first[a, b], loads[a, b] = _curves(setting, *both, True)
+    return first, loads
+
+
 def _chords(first: Array, loads: Array, depth: Array) -> tuple[Array, Array]:
-    """Compliance less what pairs share and gap of the chords, (pinion kind, wheel kind, chord,
-    node) each.
+    """Compliance less the shared part, and gap: (pinion kind, wheel kind, chord, node) each.
 
     Parameters
     ----------
@@ -239,109 +238,93 @@ def _chords(first: Array, loads: Array, depth: Array) -> tuple[Array, Array]:
     depth : (knot,) m
     """
     knots = np.concatenate([[0.0], depth])
-    begun = np.concatenate([np.zeros((*loads.shape[:3], 1)), loads], axis=3)
-    compliance = np.diff(knots) / np.diff(begun, axis=3)
-    gap = first[..., None] + knots[:-1] - begun[..., :-1] * compliance
+    forces = np.concatenate([np.zeros((*loads.shape[:3], 1)), loads], axis=3)
+    compliance = np.diff(knots) / np.diff(forces, axis=3)
+    gap = first[..., None] + knots[:-1] - forces[..., :-1] * compliance
     return np.moveaxis(compliance, 3, 2), np.moveaxis(gap, 3, 2)
 
 
 def _smoothed(compliance: Array, gap: Array, distance: float) -> list[Array]:
-    """Compliance and gap, each with its slope, chord by chord as ``smooth`` has it."""
-    columns = [np.empty_like(compliance) for _ in range(4)]
+    """Compliance, its slope, gap and its slope, smoothed chord by chord."""
+    n_nodes, columns = compliance.shape[3], []
     for chord in range(compliance.shape[2]):
-        soft, far = (
-            values[:, :, chord].reshape(-1, values.shape[3])
-            for values in (compliance, gap)
+        soft = compliance[:, :, chord].reshape(-1, n_nodes)
+        far = gap[:, :, chord].reshape(-1, n_nodes)
+        limit = SMOOTHED_SHARE * float(soft[0].min())
+        columns.append(
+            [*smooth(soft, distance, limit), *smooth(far, distance, SMOOTHED_GAP)]
         )
-        found = (
-            *smooth(soft, distance, SMOOTHED_SHARE * float(soft[0].min())),
-            *smooth(far, distance, SMOOTHED_GAP),
-        )
-        for column, values in zip(columns, found, strict=True):
-            column[:, :, chord] = values.reshape(column[:, :, chord].shape)
-    return columns
+    kinds = compliance.shape[:2]
+    stacked = [np.stack(column, axis=1) for column in zip(*columns, strict=True)]
+    return [values.reshape(*kinds, -1, n_nodes) for values in stacked]
 
 
 def _digest(*arrays: Array | None) -> bytes:
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for array in arrays:
-        found.update(
-            b"none"
-            if array is None
-            else repr(array.shape).encode() + np.ascontiguousarray(array).tobytes()
-        )
-    return found.digest()
+        if array is not None:
+            digest.update(repr(array.shape).encode())
+            digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.digest()
 
 
-def _known(tooth: Tooth) -> _Known:
-    cracks = [
-        repr(replace(crack, depth=np.empty(0))).encode() + _digest(crack.depth)
-        for crack in tooth.cracks
-    ]
+def _keyed(tooth: Tooth) -> _Keyed:
     arrays = (tooth.slice_edges, tooth.material_loss, tooth.flank_deviation)
-    return _Known(
-        key=b"".join([_digest(*arrays), *cracks, bytes([tooth.present])]), value=tooth
-    )
+    depths = [crack.depth for crack in tooth.cracks]
+    cracks = [replace(crack, depth=np.empty(0)) for crack in tooth.cracks]
+    numbers = repr((cracks, tooth.present)).encode()
+    return _Keyed(key=_digest(*arrays, *depths) + numbers, value=tooth)
 
 
-def _healthy(pair: GearPair) -> tuple[_Known, _Known]:
-    return _known(healthy_tooth(pair.pinion)), _known(healthy_tooth(pair.wheel))
+def _healthy(pair: GearPair) -> tuple[_Keyed, _Keyed]:
+    return _keyed(healthy_tooth(pair.pinion)), _keyed(healthy_tooth(pair.wheel))
 
 
 @lru_cache(maxsize=8)
-def _mesh(setting: _Setting, pinion: _Known, wheel: _Known) -> SlicedMesh:
-    """The pair whose teeth are all the same two."""
-    deviation, odd = setting.deviation.value, {}
-    for gear, known in ((setting.pair.pinion, pinion), (setting.pair.wheel, wheel)):
-        assert isinstance(known.value, Tooth)
-        if known.key != _known(healthy_tooth(gear)).key:
-            odd.update(
-                {(gear.name, number): known.value for number in range(gear.n_teeth)}
-            )
-    assert not isinstance(deviation, Tooth)
+def _mesh(setting: _Setting, pinion: _Keyed, wheel: _Keyed) -> SlicedMesh:
+    """The sliced mesh of gears whose teeth are all alike."""
+    teeth = {}
+    for gear, tooth in ((setting.pair.pinion, pinion), (setting.pair.wheel, wheel)):
+        if tooth != _keyed(healthy_tooth(gear)):
+            for number in range(gear.n_teeth):
+                teeth[gear.name, number] = tooth.value
     return sliced_mesh(
         setting.pair,
         setting.material,
         setting.options,
         setting.slices,
-        deviation=deviation,
-        teeth=odd,
+        deviation=setting.deviation.value,
+        teeth=teeth,
     )
 
 
 @lru_cache(maxsize=8)
 def _frame(setting: _Setting) -> _Frame:
-    """Depths and positions, from the static load of the teeth that meet most."""
-    mesh, pitch = _mesh(setting, setting.pinion, setting.wheel), setting.pair.base_pitch
-    contact = loaded_contact(
-        mesh, pitch * (np.arange(N_PHASES) + 0.5) / N_PHASES, setting.force
-    )
-    per_pitch = setting.options.points_per_pitch
+    """Depths and positions, from the static load of the commonest teeth."""
+    pitch, per_pitch = setting.pair.base_pitch, setting.options.points_per_pitch
+    mesh = _mesh(setting, setting.pinion, setting.wheel)
+    phases = pitch * (np.arange(N_PHASES) + 0.5) / N_PHASES
+    contact = loaded_contact(mesh, phases, setting.force)
     highest = math.ceil(float(mesh.position[-1] + mesh.lag[-1]) / pitch)
     nodes = np.arange(FIRST_PITCH * per_pitch, highest * per_pitch + 1)
-    first = _at(mesh, nodes * pitch / per_pitch)[1].min(axis=1)
-    sound = _at(_mesh(setting, *_healthy(setting.pair)), nodes * pitch / per_pitch)[
-        1
-    ].min(axis=1)
-    bite = contact.approach - mesh.shared_compliance * setting.force - first.min()
-    set_depth, deepest = float(bite.mean()), DEEPEST * float(bite.max())
+    position = nodes * pitch / per_pitch
+    first = _at(mesh, position)[1].min(axis=1)
+    sound = _at(_mesh(setting, *_healthy(setting.pair)), position)[1].min(axis=1)
+    static = contact.approach - mesh.shared_compliance * setting.force - first.min()
+    set_depth, deepest = float(static.mean()), DEEPEST * float(static.max())
     near = nodes[sound <= sound.min() + max(LEAST_REACH, deepest)]
-    first_pitch, last_pitch = (
-        math.floor(near[0] / per_pitch),
-        math.ceil(near[-1] / per_pitch),
-    )
+    first_pitch = math.floor(near[0] / per_pitch)
+    last_pitch = math.ceil(near[-1] / per_pitch)
+    table_nodes = np.arange(first_pitch * per_pitch, last_pitch * per_pitch + 1)
     depth = np.array([set_depth])
     if setting.options.law != "paper":
-        sample = nodes[first <= first.min() + deepest]
-        sample = sample[:: max(1, len(sample) // N_SAMPLES)] * pitch / per_pitch
-        depth = _knots(
-            setting, mesh, sample, np.linspace(0.0, deepest, N_TRIED + 1)[1:]
-        )
+        sample = position[first <= first.min() + deepest]
+        sample = sample[:: max(1, len(sample) // N_SAMPLES)]
+        tried = np.linspace(0.0, deepest, N_TRIED + 1)[1:]
+        depth = _knots(setting, mesh, sample, tried)
     return _Frame(
         depth=depth,
-        position=pitch
-        / per_pitch
-        * np.arange(first_pitch * per_pitch, last_pitch * per_pitch + 1),
+        position=pitch / per_pitch * table_nodes,
         first_pitch=first_pitch,
         last_pitch=last_pitch,
         reach=float(first.min()) + max(LEAST_REACH, deepest),
@@ -350,26 +333,23 @@ def _frame(setting: _Setting) -> _Frame:
 
 
 def _knots(setting: _Setting, mesh: SlicedMesh, position: Array, tried: Array) -> Array:
-    """The ``N_CHORDS`` of the depths ``tried``, the last among them, whose chords err least, by
-    dynamic programming.
+    """The ``N_CHORDS`` of the depths ``tried`` whose chords have the least error.
 
-    The largest error over the positions counts. ``tried`` (knot,) m.
+    The last depth is always chosen. The error is the largest over the positions, minimised by
+    dynamic programming. ``tried`` (knot,) m.
     """
-    _, force = _bitten(setting, mesh, position, tried, np.inf)
-    depth, force = (
-        np.append(0.0, tried),
-        np.column_stack([np.zeros(len(position)), force]),
-    )
+    _, loads = _forces(setting, mesh, position, tried, np.inf)
+    depth = np.append(0.0, tried)
+    force = np.column_stack([np.zeros(len(position)), loads])
     n_tried = len(depth)
     error = np.full((n_tried, n_tried), np.inf)
     for begin in range(n_tried - 1):
         for end in range(begin + 1, n_tried):
-            part = (depth[begin : end + 1] - depth[begin]) / (depth[end] - depth[begin])
-            chord = (
-                force[:, begin, None]
-                + (force[:, end] - force[:, begin])[:, None] * part
-            )
-            error[begin, end] = np.abs(chord - force[:, begin : end + 1]).max()
+            span = slice(begin, end + 1)
+            part = (depth[span] - depth[begin]) / (depth[end] - depth[begin])
+            low = force[:, begin, None]
+            chord = low + (force[:, end, None] - low) * part
+            error[begin, end] = np.abs(chord - force[:, span]).max()
     least, before = error[0], []
     for _ in range(N_CHORDS - 1):
         worst = np.maximum(least[:, None], error)
@@ -382,101 +362,104 @@ def _knots(setting: _Setting, mesh: SlicedMesh, position: Array, tried: Array) -
 
 
 def _at(mesh: SlicedMesh, position: Array) -> tuple[Array, Array, Array, Array]:
-    """Structure, gap, constant of the contact and width of every slice of two teeth of ``_mesh``
-    where the first slice is at ``position``, (node, slice) each."""
-    places = position[:, None] - mesh.lag
-    share = np.ones_like(places)
+    """Structure, gap, contact constant and width of every slice of a tooth pair of ``_mesh``.
+
+    (node, slice) each, with the first slice at ``position``.
+    """
+    at_slices = position[:, None] - mesh.lag
+    share = np.ones_like(at_slices)
     if mesh.options.law == "paper":
-        places, share = cut_by_field(mesh, places)
-    structure = np.interp(places, mesh.position, mesh.structure)
-    gap = np.empty_like(places)
+        at_slices, share = cut_by_field(mesh, at_slices)
+    structure = np.interp(at_slices, mesh.position, mesh.structure)
+    gap = np.empty_like(at_slices)
     gaps = mesh.gap + mesh.pinion.gap[-1] + mesh.wheel.gap[-1]
     softer = mesh.pinion.softening[-1] + mesh.wheel.softening[-1]
     is_softer = bool(softer.any())
-    for j in range(places.shape[1]):
-        gap[:, j] = np.interp(places[:, j], mesh.position, gaps[j])
+    for j, at_slice in enumerate(at_slices.T):
+        gap[:, j] = np.interp(at_slice, mesh.position, gaps[j])
         if is_softer:
-            structure[:, j] += np.interp(places[:, j], mesh.position, softer[j])
-    constant = np.interp(places, mesh.position, mesh.contact_constant)
+            structure[:, j] += np.interp(at_slice, mesh.position, softer[j])
+    constant = np.interp(at_slices, mesh.position, mesh.contact_constant)
     return structure, gap, constant, share * mesh.slice_width
 
 
-def _bitten(
+def _forces(
     setting: _Setting, mesh: SlicedMesh, position: Array, depth: Array, reach: float
 ) -> tuple[Array, Array]:
-    """First gap (node,) m, and force (node, knot) N at depths beyond it, 0 where it is beyond
-    ``reach``.
-    """
+    """First gap (node,) m, and force (node, knot) N at depths beyond it; 0 beyond ``reach``."""
     structure, gap, constant, width = _at(mesh, position)
     first, force = np.empty(len(position)), np.empty((len(position), len(depth)))
     n_unsettled = bite_forces(
-        structure, mesh.contact_factor, constant, mesh.log_weight, np.where(gap < 0.1 * NO_FLANK, gap, np.inf), width,
-        mesh.slice_width, mesh.coupling_length_squared, setting.force / setting.pair.face_width, depth, reach, first,
+        structure,
+        mesh.contact_factor,
+        constant,
+        mesh.log_weight,
+        np.where(gap < 0.1 * NO_FLANK, gap, np.inf),
+        width,
+        mesh.slice_width,
+        mesh.coupling_length_squared,
+        setting.force / setting.pair.face_width,
+        depth,
+        reach,
+        first,
         force,
-    )  # fmt: skip
+    )
     if n_unsettled:
         raise GeometryError(
-            f"the bearing slices of a pair of teeth never settle at {n_unsettled} positions and depths"
+            f"the bearing slices of a pair of teeth never settle at {n_unsettled} positions and "
+            "depths"
         )
     return first, force
 
 
 @lru_cache(maxsize=128)
 def _curves(
-    setting: _Setting, pinion: _Known, wheel: _Known, are_met: bool
+    setting: _Setting, pinion: _Keyed, wheel: _Keyed, are_met: bool
 ) -> tuple[Array, Array]:
-    """First gap (node,) m and force (node, knot) N of one pair of teeth at the depths of the
-    frame.
-    """
+    """First gap (node,) m and force (node, knot) N of one tooth pair at the frame's depths."""
     frame, mesh = _frame(setting), _mesh(setting, pinion, wheel)
-    looked, n_looks = _looked(setting, frame.position, mesh, are_met)
-    first, force = _bitten(setting, mesh, looked, frame.depth, frame.reach)
-    if n_looks:
-        first, force = over_slice(first, force, frame.depth, n_looks, FARTHEST)
-        looked = looked[n_looks // 2 : n_looks // 2 + len(first)]
-    found = np.flatnonzero(first <= frame.reach)
-    if not len(found):  # no flank is left to touch: what is sound, out of reach
-        return np.full(len(frame.position), FARTHEST), _curves(
-            setting, *_healthy(setting.pair), False
-        )[1]
+    sample, n_per_slice = _sample(setting, frame.position, mesh, are_met)
+    first, force = _forces(setting, mesh, sample, frame.depth, frame.reach)
+    if n_per_slice:
+        first, force = over_slice(first, force, frame.depth, n_per_slice, FARTHEST)
+        sample = sample[n_per_slice // 2 : n_per_slice // 2 + len(first)]
+    within = np.flatnonzero(first <= frame.reach)
+    if not len(within):  # no flank is left: sound forces out of reach
+        _, force = _curves(setting, *_healthy(setting.pair), False)
+        return np.full(len(frame.position), FARTHEST), force
     if setting.options.law == "paper":
         first, force = np.zeros_like(first), np.maximum(force, force.max() / OFF_PATH)
     else:  # beyond reach, the forces of the nearest position within
-        nearest = np.searchsorted(0.5 * (found[1:] + found[:-1]), np.arange(len(first)))
-        first, force = np.minimum(first, FARTHEST), force[found[nearest]]
-    if len(looked) != len(frame.position) or n_looks:
-        force = np.stack(
-            [np.interp(frame.position, looked, column) for column in force.T], axis=1
-        )
-        first = np.interp(frame.position, looked, first)
+        between = 0.5 * (within[1:] + within[:-1])
+        nearest = np.searchsorted(between, np.arange(len(first)))
+        first, force = np.minimum(first, FARTHEST), force[within[nearest]]
+    if sample is not frame.position:
+        columns = [np.interp(frame.position, sample, column) for column in force.T]
+        force = np.stack(columns, axis=1)
+        first = np.interp(frame.position, sample, first)
     return first, force
 
 
-def _looked(
+def _sample(
     setting: _Setting, position: Array, mesh: SlicedMesh, are_met: bool
 ) -> tuple[Array, int]:
-    """Positions at which two teeth are looked at, m, and, where slices enter one by one, how many
-    of their distances make the way from one slice to the next, an even number; else 0."""
+    """Positions at which a tooth pair is computed, m, and their number per slice of lag.
+
+    The number is even where slices enter one by one, else 0.
+    """
+    is_cut = setting.options.law == "paper"  # the edge of the field cuts slices
+    if is_cut or not mesh.lag[-1] > 0.0:
+        if are_met:
+            return position, 0
+        return np.append(position[:-1:UNMET_STEP], position[-1]), 0
+    n_slices, pair = setting.slices.n_slices, setting.pair
+    lag = float(pair.face_width * math.tan(pair.base_helix_angle)) / n_slices
     node = position[1] - position[0]
-    if (
-        not mesh.lag[-1] > 0.0 or setting.options.law == "paper"
-    ):  # whose slices the edge of the field cuts
-        return (
-            position if are_met else np.append(position[:-1:UNMET_STEP], position[-1])
-        ), 0
-    n_slices = setting.slices.n_slices
-    later = (
-        float(setting.pair.face_width * math.tan(setting.pair.base_helix_angle))
-        / n_slices
-    )
-    apart = (
-        min(later / PER_SLICE, n_slices / SLICES_PER_STEP * node)
-        if are_met
-        else UNMET_STEP * node
-    )
-    n_looks = 2 * max(1, round(0.5 * later / max(apart, node)))
-    n_beside, distance = n_looks // 2, later / n_looks
+    step = UNMET_STEP * node
+    if are_met:
+        step = min(lag / PER_SLICE, n_slices / SLICES_PER_STEP * node)
+    n_half = max(1, round(0.5 * lag / max(step, node)))
+    distance = lag / (2 * n_half)
     n_steps = math.ceil((position[-1] - position[0]) / distance)
-    return position[0] + distance * np.arange(
-        -n_beside, n_steps + n_beside + 1
-    ), n_looks
+    steps = np.arange(-n_half, n_steps + n_half + 1)
+    return position[0] + distance * steps, 2 * n_half

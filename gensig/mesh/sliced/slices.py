@@ -1,5 +1,4 @@
-"""Loaded tooth contact of a spur or helical pair: slices of the face, each a spur pair at its own
-place of the mesh.
+"""Loaded tooth contact of a spur or helical pair in slices of the face, each a spur pair.
 
 Theory, limits and choices: ``docs/theory/helical_mesh.md``.
 """
@@ -15,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import ConfigError, ExtrapolationError, GeometryError
-from gensig.geometry.contact import SIDES, GearPair, corner_gap_by_pinion
+from gensig.geometry.contact import GearPair, corner_gap_by_pinion
 from gensig.geometry.tooth import Tooth, healthy_tooth
 from gensig.material import Material
-from gensig.mesh.body_coupling import shared_body_compliance
 from gensig.mesh.local_contact import contact_law
 from gensig.mesh.options import MeshOptions, SliceOptions
 from gensig.mesh.pair_table import (
     FIRST_PITCH,
     LAST_PITCH,
+    coupling_compliance,
     node_positions,
     structural_compliance,
 )
@@ -41,18 +40,18 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SlicedMesh:
-    """A gear pair cut into slices: what each is made of, by position s along the path.
+    """A gear pair cut into slices, by position s along the path.
 
     Parameters
     ----------
     position : (node,) m             from A, as ``node_positions``
-    structure : (node,) m2/N         compliance of both teeth and bodies per width, less what pairs share
+    structure : (node,) m2/N         compliance of both teeth and bodies per width, unshared part
     contact_factor : m2/N, contact_constant : (node,), log_weight : see ``ContactLaw``
-    gap : (slice, node) m            corner gap and what the flanks of all teeth stand back
+    gap : (slice, node) m            corner gap plus the deviation common to all teeth
     shared_compliance : m/N
-    deviation : (slice, node) m      what the flanks stand back, in slices of equal width; None: nothing
+    deviation : (slice, node) m      common deviation in slices of equal width; None: none
     edges : (slice + 1,) m           of the slices, from the end that enters first
-    pinion, wheel : what single teeth have beyond that
+    pinion, wheel : further gaps and compliance of single teeth
     """
 
     pair: GearPair
@@ -73,7 +72,7 @@ class SlicedMesh:
     @property
     def sides(self) -> dict[str, GearSlices]:
         """The slices of each gear, by its side of the pair."""
-        return dict(zip(SIDES, (self.pinion, self.wheel), strict=True))
+        return {"pinion": self.pinion, "wheel": self.wheel}
 
     @property
     def slice_width(self) -> Array:
@@ -88,12 +87,14 @@ class SlicedMesh:
     @property
     def coupling_length_squared(self) -> float:
         """Square of the length over which slices couple, m2."""
+        if self.slices.slice_coupling == "independent":
+            return 0.0
         length = self.slices.coupling_modules * self.pair.pinion.normal_module
-        return length**2 if self.slices.slice_coupling == "coupled" else 0.0
+        return length**2
 
     @property
     def lag(self) -> Array:
-        """How much later each slice meets the same phase, (slice,) m along the path."""
+        """Lag of each slice's phase, (slice,) m along the path."""
         if self.slices.slices_in_phase:
             return np.zeros_like(self.slice_place)
         return self.slice_place * math.tan(self.pair.base_helix_angle)
@@ -106,10 +107,10 @@ class LoadedContact:
     Parameters
     ----------
     roll : (phase,) m                     pinion's roll along the line of action
-    pair_index : (phase, pair)            0 is the pair whose first slice enters at roll 0, 1 the next one
+    pair_index : (phase, pair)            0: its first slice enters at roll 0; 1: the next pair
     position : (phase, pair, slice) m     from A; may lie beyond the path, where corners touch
     approach : (phase,) m                 of the gears along the transverse line of action
-    stiffness : (phase,) N/m              secant of the contact term, tangent of everything else
+    stiffness : (phase,) N/m              secant of the contact term, tangent of the structure
     line_load : (phase, pair, slice) N/m  along the transverse line of action per width
     """
 
@@ -130,42 +131,33 @@ def sliced_mesh(
     deviation: Array | None = None,
     teeth: Mapping[tuple[str, int], Tooth] | None = None,
 ) -> SlicedMesh:
-    """Cut a pair into slices: `n_slices` of equal width, and where the faults of a tooth begin
-    and end.
+    """Cut a pair into `n_slices` of equal width, and at the ends of faults.
 
     Parameters
     ----------
-    deviation : (slice, node) m    how far both flanks of all teeth together stand back of perfect ones at the table's
-        positions, in the middle of slices of equal width (`slice_places`)
-    teeth : the teeth that are not sound, by (gear, tooth), as ``faulty_teeth`` gives them
+    deviation : (slice, node) m    of both flanks of all teeth together from perfect flanks, at
+        the table's positions, in the middle of slices of equal width (`slice_places`)
+    teeth : the faulty teeth by (gear, tooth), from ``faulty_teeth``
 
     Raises
     ------
-    ConfigError    for uncoupled slices with a fault over part of the width that nobody asked for
+    ConfigError    for independent slices with a fault over part of the width, unless allowed
     """
-    odd = dict(teeth or {})
-    check_independent(odd.values(), slices)
-    edges = merged_edges(pair, slices.n_slices, odd.values())
+    teeth = teeth or {}
+    check_independent(teeth.values(), slices)
+    edges = merged_edges(pair, slices.n_slices, teeth.values())
     place = 0.5 * (edges[1:] + edges[:-1])
     position = node_positions(pair, options)
     structure, shared = _structure(pair, material, options)
-    law = contact_law(
-        pair, np.clip(position, 0.0, pair.path_of_contact), material, options
-    )
-    # the paper's law knows no corners: the edge of the field of action ends contact
-    corner = (
-        np.zeros_like(position)
-        if options.law == "paper"
-        else corner_gap_by_pinion(pair, position)
-    )
-    gap = np.repeat(corner[None], len(place), axis=0)
+    on_path = np.clip(position, 0.0, pair.path_of_contact)
+    law = contact_law(pair, on_path, material, options)
+    gap = np.zeros((len(place), len(position)))
+    if options.law != "paper":  # there the edge of the field of action ends contact
+        gap += corner_gap_by_pinion(pair, position)
     if deviation is not None:
-        gap = gap + _across(
-            slice_places(pair, slices),
-            np.broadcast_to(deviation, (slices.n_slices, len(position))),
-            place,
-        )
-    sides = slices_of_gears(pair, material, options, odd, edges, structure)
+        even = np.broadcast_to(deviation, (slices.n_slices, len(position)))
+        gap += _across(slice_places(pair, slices), even, place)
+    sides = slices_of_gears(pair, material, options, teeth, edges, structure)
     return SlicedMesh(
         pair=pair,
         options=options,
@@ -184,9 +176,7 @@ def sliced_mesh(
 
 
 def _across(known: Array, values: Array, place: Array) -> Array:
-    """Values (slice, node) at places across the face from those at known ones, straight on beyond
-    the outer two.
-    """
+    """Values (slice, node) interpolated across the face, linear beyond the outer two positions."""
     if len(place) == len(known):
         return values
     if len(known) == 1:
@@ -206,44 +196,35 @@ def slice_places(pair: GearPair, slices: SliceOptions) -> Array:
 def _structure(
     pair: GearPair, material: Material, options: MeshOptions
 ) -> tuple[Array, float]:
-    """Compliance of both sound teeth and bodies per width (node,) m2/N, and what pairs share,
-    m/N.
-    """
-    on_path, place = np.unique(
-        np.clip(node_positions(pair, options), 0.0, pair.path_of_contact),
-        return_inverse=True,
-    )
+    """Unshared compliance of sound teeth and bodies per width (node,) m2/N, and shared, m/N."""
+    clipped = np.clip(node_positions(pair, options), 0.0, pair.path_of_contact)
+    on_path, place = np.unique(clipped, return_inverse=True)
     in_plane = material.in_plane(options.elasticity)
     whole = np.zeros_like(on_path)
-    for gear, curvature in (
-        (pair.pinion, pair.pinion_curvature),
-        (pair.wheel, pair.wheel_curvature),
-    ):
-        own = structural_compliance(
-            healthy_tooth(gear), np.asarray(curvature(on_path)), in_plane, options
-        )
-        whole += own * gear.face_width
-    shared = 0.0
-    if options.pair_coupling == "coupled":
-        shared = shared_body_compliance(pair, in_plane)
+    for side, gear in pair.gears.items():
+        tooth, curvature = healthy_tooth(gear), pair.curvature(side, on_path)
+        compliance = structural_compliance(tooth, curvature, in_plane, options)
+        whole += compliance * gear.face_width
+    shared = coupling_compliance(pair, in_plane, options)
     left = whole - shared * pair.face_width
     if left.min() <= 0.05 * whole.min():
         raise ExtrapolationError(
-            f"the gear bodies share {shared:.3g} m/N of the stiffest pair's {whole.min() / pair.face_width:.3g} m/N; "
-            f"use a larger bore_radius_mm or mesh.pair_coupling=sum"
+            f"the gear bodies share {shared:.3g} m/N of the stiffest pair's "
+            f"{whole.min() / pair.face_width:.3g} m/N; use a larger bore_radius_mm or "
+            "mesh.pair_coupling=sum"
         )
     return left[place], shared
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Meeting:
-    """Which teeth meet, and how far each stands back of where its kind has it.
+    """Start teeth of a mesh, and the errors of single teeth.
 
     Parameters
     ----------
     start_tooth_pinion, start_tooth_wheel : the teeth whose first slices enter at A at roll 0
-    pinion_error, wheel_error : (tooth,) m      as a gap at the pitch point
-    pinion_tilt, wheel_tilt : (tooth,) m/m      how fast that grows with the contact's position along the path
+    pinion_error, wheel_error : (tooth,) m      gap at the pitch point
+    pinion_tilt, wheel_tilt : (tooth,) m/m      growth of the gap with the position along the path
     """
 
     start_tooth_pinion: int = 0
@@ -255,8 +236,10 @@ class Meeting:
 
 
 def pair_positions(mesh: SlicedMesh, roll: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Positions s of every pair's slices, (phase, pair, slice) m, and numbers of the pairs,
-    (phase, pair), that of roll 0 being 0; in order of entry, newest first."""
+    """Positions s of every pair's slices, (phase, pair, slice) m, and pair numbers, (phase, pair).
+
+    The pair that enters at roll 0 has number 0. Pairs are in order of entry, newest first.
+    """
     pitch = mesh.pair.base_pitch
     newest = np.floor(roll / pitch).astype(np.int64) - FIRST_PITCH
     n_pairs = math.ceil(LAST_PITCH - FIRST_PITCH + float(mesh.lag[-1]) / pitch)
@@ -266,15 +249,16 @@ def pair_positions(mesh: SlicedMesh, roll: Array) -> tuple[Array, NDArray[np.int
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ContactPhases:
-    """What every slice of every pair is at given rolls, whatever the force; new gaps are all that
-    wear changes.
+    """Properties of every slice of every pair at given rolls, for any force.
+
+    Wear changes the gaps only.
 
     Parameters
     ----------
     roll : (phase,) m
     pair_index : (phase, pair)    see ``LoadedContact``
-    position, structure, constant, gap, width : (phase, pair, slice), m, m2/N, 1, m, m: see ``SlicedMesh``; ``width`` is
-        that of the slice, less where the field of action cuts it
+    position, structure, constant, gap, width : (phase, pair, slice), m, m2/N, 1, m, m: see
+        ``SlicedMesh``; ``width`` of a slice is less where the edge of the field of action cuts it
     """
 
     mesh: SlicedMesh
@@ -296,14 +280,10 @@ def contact_phases(
     """
     position, index = pair_positions(mesh, roll)
     share = np.ones_like(position)
-    if (
-        mesh.options.law == "paper"
-    ):  # elsewhere the corners' gaps tell where contact ends
+    if mesh.options.law == "paper":  # by the other law corner gaps end contact
         position, share = cut_by_field(mesh, position)
-    structure, gap = (
-        np.interp(position, mesh.position, mesh.structure),
-        _gaps(mesh, position),
-    )
+    structure = np.interp(position, mesh.position, mesh.structure)
+    gap = _gaps(mesh, position)
     _add_teeth(mesh, position, index, meeting or Meeting(), structure, gap)
     return ContactPhases(
         mesh=mesh,
@@ -336,23 +316,36 @@ def loaded_contact(
 
 
 def settled_contact(phases: ContactPhases, force: float) -> LoadedContact:
-    """The same at rolls that are prepared already."""
+    """Loaded contact at prepared rolls, as ``loaded_contact``."""
     if not force > 0.0:
         raise ConfigError(
-            f"the mesh force is {force:g} N and must be positive; give a torque that the pinion drives with"
+            f"the mesh force is {force:g} N and must be positive; give a torque that the pinion "
+            "drives with"
         )
     mesh, roll = phases.mesh, phases.roll
     approach, stiffness = np.empty_like(roll), np.empty_like(roll)
     line_load = np.empty_like(phases.position)
     n_unsettled = solve_slices(
-        phases.structure, mesh.contact_factor, phases.constant, mesh.log_weight, phases.gap, phases.width,
-        mesh.slice_width, mesh.coupling_length_squared, mesh.shared_compliance, force, force / mesh.pair.face_width,
-        approach, stiffness, line_load,
-    )  # fmt: skip
+        phases.structure,
+        mesh.contact_factor,
+        phases.constant,
+        mesh.log_weight,
+        phases.gap,
+        phases.width,
+        mesh.slice_width,
+        mesh.coupling_length_squared,
+        mesh.shared_compliance,
+        force,
+        force / mesh.pair.face_width,
+        approach,
+        stiffness,
+        line_load,
+    )
     if n_unsettled or not np.isfinite(approach).all():
         raise GeometryError(
-            f"no contact at {int(np.sum(~np.isfinite(approach)))} and no settled one at {n_unsettled} of {len(roll)} "
-            f"phases under {force:.4g} N; reduce the modification or raise the torque"
+            f"no contact at {int(np.sum(~np.isfinite(approach)))} and no settled one at "
+            f"{n_unsettled} of {len(roll)} phases under {force:.4g} N; reduce the modification or "
+            "raise the torque"
         )
     return LoadedContact(
         roll=roll,
@@ -365,7 +358,7 @@ def settled_contact(phases: ContactPhases, force: float) -> LoadedContact:
 
 
 def _gaps(mesh: SlicedMesh, position: Array) -> Array:
-    """(phase, pair, slice) m; inf beyond the table, where no corner reaches."""
+    """Gaps without errors, (phase, pair, slice) m; inf beyond the table, out of corners' reach."""
     gap = np.empty_like(position)
     for j in range(position.shape[-1]):
         gap[..., j] = np.interp(
@@ -382,28 +375,18 @@ def _add_teeth(
     structure: Array,
     gap: Array,
 ) -> None:
-    """Add what single teeth have to structure and gap, (phase, pair, slice)."""
-    for side, start, error, tilt in (
-        (
-            mesh.pinion,
-            meeting.start_tooth_pinion,
-            meeting.pinion_error,
-            meeting.pinion_tilt,
-        ),
-        (
-            mesh.wheel,
-            meeting.start_tooth_wheel,
-            meeting.wheel_error,
-            meeting.wheel_tilt,
-        ),
-    ):
+    """Add the contributions of single teeth to structure and gap, (phase, pair, slice)."""
+    for name, side in mesh.sides.items():
+        start = getattr(meeting, f"start_tooth_{name}")
+        error = getattr(meeting, f"{name}_error")
+        tilt = getattr(meeting, f"{name}_tilt")
         tooth = (index + start) % len(side.kind)
         kinds = side.kind[tooth]
         for kind in np.unique(kinds[kinds > 0]):
             here = kinds == kind
-            softer, back = _of_kind(mesh, side, int(kind), position[here])
-            structure[here] += softer
-            gap[here] += back
+            softening, kind_gap = _of_kind(mesh, side, int(kind), position[here])
+            structure[here] += softening
+            gap[here] += kind_gap
         if error is not None:
             gap += error[tooth][:, :, None]
         if tilt is not None:
@@ -415,25 +398,21 @@ def _add_teeth(
 def _of_kind(
     mesh: SlicedMesh, side: GearSlices, kind: int, position: Array
 ) -> tuple[Array, Array]:
-    """How much softer, m2/N, and how far back, m, the slices of one kind of tooth are at
-    positions (phase, slice).
-    """
-    softer, gap = np.empty_like(position), np.empty_like(position)
-    for j in range(position.shape[1]):
-        softer[:, j] = np.interp(position[:, j], mesh.position, side.softening[kind, j])
-        gap[:, j] = np.interp(position[:, j], mesh.position, side.gap[kind, j])
-    return softer, gap
+    """Softening, m2/N, and gap, m, of one kind of tooth at positions (phase, slice)."""
+    softening, gap = np.empty_like(position), np.empty_like(position)
+    for j, at in enumerate(position.T):
+        softening[:, j] = np.interp(at, mesh.position, side.softening[kind, j])
+        gap[:, j] = np.interp(at, mesh.position, side.gap[kind, j])
+    return softening, gap
 
 
 def cut_by_field(mesh: SlicedMesh, position: Array) -> tuple[Array, Array]:
-    """Slices that the edge of the field of action cuts: the middle of what lies on the path and
-    its share of the slice, of the shape of ``position`` both."""
-    half = (
-        0.5
-        * mesh.slice_width
-        * math.tan(mesh.pair.base_helix_angle)
-        * (not mesh.slices.slices_in_phase)
-    )
+    """Middle and share of the part of each slice on the path, both of the shape of ``position``.
+
+    The edge of the field of action cuts the slices.
+    """
+    width = mesh.slice_width * (not mesh.slices.slices_in_phase)
+    half = 0.5 * width * math.tan(mesh.pair.base_helix_angle)
     path = mesh.pair.path_of_contact
     if not half.any():
         return position, ((position >= 0.0) & (position <= path)).astype(np.float64)
@@ -449,30 +428,26 @@ def single_pair_stiffness(
     kinds: tuple[int, int] = (0, 0),
     closed: float = 0.1 * NO_FLANK,
 ) -> Array:
-    """Stiffness of the slices of one pair that lie on the path, flanks taken as touching,
-    (phase,) N/m.
+    """Stiffness of the slices of one tooth pair that lie on the path, (phase,) N/m.
 
     Parameters
     ----------
     position : (phase,) m    of the first slice, from A
-    force : N                at whose even load per width a load-dependent contact term is taken
+    force : N                its even load per width is that of a load-dependent contact term
     kinds : of the pinion's and the wheel's tooth
-    closed : m               slices whose flanks stand further back than this count for nothing
+    closed : m               slices with a larger gap do not count; all others touch
 
-    The slices bend by themselves here: the sum over the face of 1 / (structure + contact).
+    Without coupling of slices: the sum over the face of 1 / (structure + contact).
     """
     middle, share = cut_by_field(mesh, position[:, None] - mesh.lag)
     constant = np.interp(middle, mesh.position, mesh.contact_constant)
-    contact = mesh.contact_factor * (
-        constant - mesh.log_weight * math.log(force / mesh.pair.face_width)
-    )
+    logarithm = math.log(force / mesh.pair.face_width)
+    contact = mesh.contact_factor * (constant - mesh.log_weight * logarithm)
     softness = np.interp(middle, mesh.position, mesh.structure) + contact
     for side, kind in zip((mesh.pinion, mesh.wheel), kinds, strict=True):
         if kind:
-            softer, gap = _of_kind(mesh, side, kind, middle)
-            softness, share = (
-                softness + softer,
-                share * (gap < closed) * side.present[kind],
-            )
+            softening, gap = _of_kind(mesh, side, kind, middle)
+            softness = softness + softening
+            share = share * (gap < closed) * side.present[kind]
     alone = np.sum(mesh.slice_width * share / softness, axis=1)
     return alone / (1.0 + mesh.shared_compliance * alone)

@@ -1,7 +1,4 @@
-"""Steady temperature of a gear.
-
-A hollow disc that teeth heat, faces and teeth cool, and the bore may hold.
-"""
+"""Steady temperature of a gear: a hollow disc heated at its teeth, cooled at teeth, faces, bore."""
 
 from __future__ import annotations
 
@@ -29,8 +26,8 @@ class BodyHeat:
     ----------
     radius : (point,) m            from the bore to the root circle
     temperature : (point,) degC    the teeth have that of the root circle
-    input : W                      friction heat that the gear takes
-    to_oil, to_bore : W            where it leaves
+    input : W                      friction heat into the gear
+    to_oil, to_bore : W            heat out of the gear
     """
 
     radius: Array
@@ -60,30 +57,21 @@ def tooth_surface(gear: Gear) -> float:
     the surface is as long as the helix.
     """
     start = max(gear.base_radius, gear.root_radius)
-    roll = [
+    inner, outer = (
         math.sqrt(radius**2 - gear.base_radius**2)
         for radius in (start, gear.tip_radius)
-    ]
-    flank = (
-        (roll[1] ** 2 - roll[0] ** 2) / (2.0 * gear.base_radius)
-        + start
-        - gear.root_radius
     )
+    involute = (outer**2 - inner**2) / (2.0 * gear.base_radius)
+    flank = involute + start - gear.root_radius
     tip_land = 2.0 * gear.half_tooth_angle_at(gear.tip_radius) * gear.tip_radius
-    root_land = (
-        2.0
-        * (math.pi / gear.n_teeth - gear.half_tooth_angle_at(start))
-        * gear.root_radius
-    )
+    half_space = math.pi / gear.n_teeth - gear.half_tooth_angle_at(start)
+    root_land = 2.0 * half_space * gear.root_radius
     outline = 2.0 * flank + tip_land + max(root_land, 0.0)
     radius = np.linspace(gear.root_radius, gear.tip_radius, N_TOOTH_HEIGHTS)
-    thickness = [
-        2.0 * gear.half_tooth_angle_at(max(one, start)) * one for one in radius
-    ]
+    thickness = [2.0 * gear.half_tooth_angle_at(max(r, start)) * r for r in radius]
     ends = 2.0 * float(np.trapezoid(thickness, radius))
-    return gear.n_teeth * (
-        outline * gear.face_width / math.cos(gear.helix_angle) + ends
-    )
+    helix_length = gear.face_width / math.cos(gear.helix_angle)
+    return gear.n_teeth * (outline * helix_length + ends)
 
 
 def face_surface(gear: Gear) -> float:
@@ -92,7 +80,7 @@ def face_surface(gear: Gear) -> float:
 
 
 def uniform_body(gear: Gear, temperature: float) -> BodyHeat:
-    """A gear whose temperature is known and the same all over."""
+    """A gear of known uniform temperature."""
     radius = np.linspace(gear.bore_radius, gear.root_radius, N_RADII)
     return BodyHeat(
         radius=radius,
@@ -108,40 +96,34 @@ def solved_body(
 ) -> BodyHeat:
     """Temperature of a gear that takes ``input_heat`` (W) at its teeth.
 
-    Source: (1/r) d/dr(r dT/dr) = 2 h (T - T_oil) / (g b), the annular fin of heat transfer text
-    books (Incropera & DeWitt, section 3.6), in modified Bessel functions. Without convection at
-    the faces it is eq. (4) of the thermal paper, which takes the temperatures of bore and rim as
-    known.
+    Source: (1/r) d/dr(r dT/dr) = 2 h (T - T_oil) / (g b), the annular fin of textbooks (Incropera
+    & DeWitt, section 3.6), in modified Bessel functions. Without convection at the faces it is
+    eq. (4) of the thermal paper, where the temperatures of bore and rim are known.
 
     Raises
     ------
     ConfigError    where nothing cools the gear
     """
-    if (
-        heat.face_convection == heat.tooth_convection == 0.0
-        and bore_temperature is None
-    ):
+    is_insulated = heat.face_convection == heat.tooth_convection == 0.0
+    if is_insulated and bore_temperature is None:
         raise ConfigError(
-            f"{gear.name}: nothing cools it; give heat.face_convection_w_per_m2k, heat.tooth_convection_w_per_m2k, "
-            f"heat.{gear.name}_bore_temperature_degc or heat.{gear.name}_temperature_degc"
+            f"{gear.name}: nothing cools it; give heat.face_convection_w_per_m2k, "
+            f"heat.tooth_convection_w_per_m2k, heat.{gear.name}_bore_temperature_degc or "
+            f"heat.{gear.name}_temperature_degc"
         )
     radius = np.linspace(gear.bore_radius, gear.root_radius, N_RADII)
-    values, slopes = _solutions(
-        radius,
-        math.sqrt(2.0 * heat.face_convection / (heat.conductivity * gear.face_width)),
-    )
-    per_slope = (
-        2.0 * math.pi * radius * gear.face_width * heat.conductivity
-    )  # W for 1 K/m through the cylinder
+    per_width = heat.conductivity * gear.face_width
+    fin = math.sqrt(2.0 * heat.face_convection / per_width)
+    values, slopes = _solutions(radius, fin)
+    # W for 1 K/m through the cylinder
+    per_slope = 2.0 * math.pi * radius * gear.face_width * heat.conductivity
     from_teeth = heat.tooth_convection * tooth_surface(gear)
-    at_bore = slopes[:, 0] if bore_temperature is None else values[:, 0]
-    bore_rise = (
-        0.0 if bore_temperature is None else bore_temperature - heat.oil_temperature
-    )
+    at_bore, bore_rise = slopes[:, 0], 0.0
+    if bore_temperature is not None:
+        at_bore, bore_rise = values[:, 0], bore_temperature - heat.oil_temperature
     at_rim = per_slope[-1] * slopes[:, -1] + from_teeth * values[:, -1]
-    weights = np.linalg.solve(
-        np.array([at_bore, at_rim]), np.array([bore_rise, input_heat])
-    )
+    conditions = np.array([at_bore, at_rim])
+    weights = np.linalg.solve(conditions, np.array([bore_rise, input_heat]))
     to_bore = float(per_slope[0] * (weights @ slopes[:, 0]))
     return BodyHeat(
         radius=radius,
@@ -153,10 +135,10 @@ def solved_body(
 
 
 def _solutions(radius: Array, fin: float) -> tuple[Array, Array]:
-    """Two solutions of the disc's equation and their slopes, (2, point) each; ``fin`` 1/m, 0
-    without convection.
+    """Two solutions of the disc's equation and their slopes, (2, point) each.
 
-    Scaled to about 1 at either end, so that they neither overflow nor run together.
+    ``fin`` 1/m is 0 without convection. The solutions are scaled to about 1 at either end, so that
+    they neither overflow nor become alike.
     """
     if fin == 0.0:
         values = np.array([np.ones_like(radius), np.log(radius / radius[-1])])

@@ -1,4 +1,4 @@
-"""What makes gears hot: the inputs of the group ``heat``, friction heat, flash temperature.
+"""Inputs of the group ``heat``, friction heat, and flash temperature.
 
 Theory, ranges and choices: ``docs/theory/heat.md``. Temperatures are in degrees Celsius, rises in
 K.
@@ -16,7 +16,7 @@ from gensig.errors import ConfigError, ExtrapolationError
 from gensig.geometry.contact import GearPair
 from gensig.material import Material
 from gensig.mesh.local_contact import relative_radius
-from gensig.units import from_si, unit
+from gensig.units import from_si, split_unit, unit
 
 Array = NDArray[np.float64]
 
@@ -26,17 +26,17 @@ BLOK_SEMI_WIDTH = 0.785
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Heat:
-    """Which effects of heat count, how gears are cooled, and what steel does with it.
+    """Effects of heat, cooling of the gears, and thermal properties of steel.
 
     Parameters
     ----------
     growth, center_distance, softening : the effects, see ``gensig.systems.hot_pair``
     reference_temperature, oil_temperature, housing_temperature : degrees Celsius
-    pinion_temperature, wheel_temperature : of the whole gear; None is solved from friction heat and cooling
-    pinion_bore_temperature, wheel_bore_temperature : None lets no heat through the bore
-    face_convection, tooth_convection : W/(m2 K)    from the faces of the body and from the teeth to the oil
-    convection_speed : rad/s    of the pinion, at which both hold; they go with its root (thermal paper, eq. 34). None
-        takes them at any speed
+    pinion_temperature, wheel_temperature : of the whole gear; None: from friction heat and cooling
+    pinion_bore_temperature, wheel_bore_temperature : None: no heat through the bore
+    face_convection, tooth_convection : W/(m2 K)    from body faces and teeth to the oil
+    convection_speed : rad/s    pinion speed of both values, which go with the root of the speed
+        (thermal paper, eq. 34); None: they hold at any speed
     pinion_heat_share : of the friction heat
     conductivity W/(m K), specific_heat J/(kg K), expansion 1/K
     modulus_temperature, modulus : Young's modulus over temperature; only its shape counts
@@ -71,34 +71,25 @@ class Heat:
             ("specific_heat_j_per_kgk", 50.0, 5000.0),
             ("expansion_per_k", 0.0, 1e-4),
         ):
-            value = next(
-                getattr(self, field.name)
-                for field in fields(self)
-                if key.startswith(field.name)
-            )
+            value = getattr(self, split_unit(key)[0])
             if not low <= value <= high:
                 raise ConfigError(
                     f"heat.{key} = {from_si(key, value):g} must lie in {low:g}..{high:g}"
                 )
         if self.convection_speed is not None and not self.convection_speed > 0.0:
             raise ConfigError(
-                f"heat.convection_speed_rpm = {from_si('convection_speed_rpm', self.convection_speed):g} must be "
-                f"positive, or null for convection that does not depend on speed"
+                "heat.convection_speed_rpm = "
+                f"{from_si('convection_speed_rpm', self.convection_speed):g} must be positive, or "
+                "null for convection that does not depend on speed"
             )
-        rising = all(
-            a < b
-            for a, b in zip(
-                self.modulus_temperature, self.modulus_temperature[1:], strict=False
-            )
-        )
-        if (
-            len(self.modulus_temperature) < 2
-            or len(self.modulus_temperature) != len(self.modulus)
-            or not rising
-        ):
+        temperatures = self.modulus_temperature
+        is_rising = bool(np.all(np.diff(temperatures) > 0.0))
+        is_table = 2 <= len(temperatures) == len(self.modulus)
+        if not (is_table and is_rising):
             raise ConfigError(
-                f"heat.modulus_temperature_degc has {len(self.modulus_temperature)} and heat.modulus_gpa "
-                f"{len(self.modulus)} values; give equally many, two or more, at temperatures that rise"
+                f"heat.modulus_temperature_degc has {len(temperatures)} and heat.modulus_gpa "
+                f"{len(self.modulus)} values; give equally many, two or more, at temperatures "
+                "that rise"
             )
         if not min(self.modulus) > 0.0:
             raise ConfigError(
@@ -111,11 +102,11 @@ class Heat:
 
     @property
     def is_any(self) -> bool:
-        """Whether heat changes anything."""
+        """True if any effect of heat is on."""
         return self.growth or self.center_distance or self.softening
 
     def at_speed(self, speed: float) -> Heat:
-        """The same with the convection of a pinion's speed in rad/s."""
+        """These inputs with the convection at a pinion speed in rad/s."""
         if self.convection_speed is None:
             return self
         factor = math.sqrt(speed / self.convection_speed)
@@ -127,30 +118,26 @@ class Heat:
         )
 
     def require_known(self, temperature: float, what: str) -> None:
-        """Raise ExtrapolationError, which begins with ``what``, for a temperature beyond the
-        material's data.
-        """
+        """Raise an ExtrapolationError that begins with ``what`` beyond the material's data."""
         low, high = self.modulus_temperature[0], self.modulus_temperature[-1]
         if not low <= temperature <= high:
             raise ExtrapolationError(
-                f"{what} lies beyond the material's data, {low:g} to {high:g} degrees Celsius; cool more, load less, "
-                f"or give heat.modulus_temperature_degc and heat.modulus_gpa that reach further"
+                f"{what} lies beyond the material's data, {low:g} to {high:g} degrees Celsius; "
+                "cool more, load less, or give heat.modulus_temperature_degc and "
+                "heat.modulus_gpa that reach further"
             )
 
     def modulus_ratio(self, temperature: float) -> float:
         """Young's modulus at a temperature over that at the reference temperature."""
-        at, reference = np.interp(
-            [temperature, self.reference_temperature],
-            self.modulus_temperature,
-            self.modulus,
-        ).tolist()
+        temperatures = [temperature, self.reference_temperature]
+        at, reference = np.interp(temperatures, self.modulus_temperature, self.modulus)
         return float(at / reference)
 
 
 def rolling_speeds(
     pair: GearPair, position: Array, speed: float
 ) -> tuple[Array, Array]:
-    """Speeds of both flanks along themselves where they touch, m/s, of the shape of ``position``.
+    """Rolling speeds of both flanks at the contact, m/s, of the shape of ``position``.
 
     Parameters
     ----------
@@ -158,10 +145,8 @@ def rolling_speeds(
     speed : rad/s    of the pinion
     """
     on_path = np.clip(position, 0.0, pair.path_of_contact)
-    return (
-        speed * np.asarray(pair.pinion_curvature(on_path)),
-        speed / pair.ratio * np.asarray(pair.wheel_curvature(on_path)),
-    )
+    pinion = speed * pair.pinion_curvature(on_path)
+    return pinion, speed / pair.ratio * pair.wheel_curvature(on_path)
 
 
 def friction_heat(
@@ -173,21 +158,20 @@ def friction_heat(
     friction: float,
     speed: float,
 ) -> float:
-    """Friction loss of the flanks, W, mean over the phases: friction x normal load x sliding
-    speed of every slice.
+    """Mean friction loss of the flanks, W: friction x normal load x sliding speed of every slice.
 
     Parameters
     ----------
     position : (phase, pair, slice) m
-    line_load : (phase, pair, slice) N/m    along the transverse line of action; its distribution counts
+    line_load : (phase, pair, slice) N/m    along the transverse line of action; only its
+        distribution counts
     force : N                               sum of all loads along the transverse line of action
     friction : coefficient
     speed : rad/s                           of the pinion
     """
     pinion, wheel = rolling_speeds(pair, position, speed)
-    sliding = np.sum(line_load * np.abs(pinion - wheel), axis=(1, 2)) / np.sum(
-        line_load, axis=(1, 2)
-    )
+    power = np.sum(line_load * np.abs(pinion - wheel), axis=(1, 2))
+    sliding = power / np.sum(line_load, axis=(1, 2))
     return friction * force / math.cos(pair.base_helix_angle) * float(sliding.mean())
 
 
@@ -201,12 +185,12 @@ def flash_temperature(
     friction: float,
     speed: float,
 ) -> Array:
-    """Rise of the flanks' surface while they touch, above the teeth's own temperature, K, of the
-    shape of ``position``.
+    """Rise of the flanks' surface in contact above the teeth, K, of the shape of ``position``.
 
     Parameters
     ----------
-    line_load : N/m    along the transverse line of action per width, which is the normal load per length of line
+    line_load : N/m    along the transverse line of action per width, equal to the normal load per
+        length of line
 
     Source: Blok (1937) for a Hertzian distribution of the heat, 0.785 f w |v1 - v2| / ((sqrt(g
     rho c v1) + sqrt(g rho c v2)) sqrt(B)) with the semi-width B of the contact. 1.11 belongs to
@@ -218,19 +202,10 @@ def flash_temperature(
         heat.conductivity * material.density_kg_per_m3 * heat.specific_heat
     )
     # sqrt(v1) - sqrt(v2) is |v1 - v2| over their sum; w / sqrt(B) goes to 0 with the load
-    loaded = np.divide(
-        line_load,
-        np.sqrt(half_width),
-        out=np.zeros_like(half_width),
-        where=half_width > 0.0,
-    )
-    return (
-        BLOK_SEMI_WIDTH
-        * friction
-        * loaded
-        * np.abs(np.sqrt(pinion) - np.sqrt(wheel))
-        / effusivity
-    )
+    loaded, touches = np.zeros_like(half_width), half_width > 0.0
+    np.divide(line_load, np.sqrt(half_width), out=loaded, where=touches)
+    sliding = np.abs(np.sqrt(pinion) - np.sqrt(wheel))
+    return BLOK_SEMI_WIDTH * friction * loaded * sliding / effusivity
 
 
 def contact_half_width(

@@ -1,8 +1,8 @@
-"""Which teeth a fault is on, and several faults at once: rows of the mesh tables."""
+"""Teeth that carry a fault, and several faults at once: rows of the mesh tables."""
 
 import numpy as np
 import pytest
-from fault_cases import GEARS, KINDS, one, side_of
+from fault_cases import GEARS, KINDS, one, option, side_of
 from numpy.testing import assert_allclose
 
 from gensig.faults.base import faulty_teeth
@@ -11,12 +11,12 @@ from gensig.geometry.tooth import healthy_tooth
 
 ALIKE = sorted(kind for kind in KINDS if FAULTS[kind].alike)
 # distributed pits are drawn tooth by tooth, which takes seconds for 84 of them
-FEW = {"pitted_share": 0.01}
+FEW = {"distributed_pitting": {"pitted_share": 0.01}}
 KEYS = ("compliance", "gap", "compliance_slope", "gap_slope", "present")
 
 
 def some(kind, **changes):
-    return one(kind, **{**(FEW if kind == "distributed_pitting" else {}), **changes})
+    return one(kind, **{**FEW.get(kind, {}), **changes})
 
 
 def rows(table, gear, tooth):
@@ -83,16 +83,8 @@ class TestSeveralTeeth:
 
     def test_a_fault_can_be_a_key(self):
         """Tables are kept by their faults."""
-        assert (
-            len(
-                {
-                    one("wear", tooth=[1, 5]),
-                    one("wear", tooth=[1, 5]),
-                    one("wear", tooth="all"),
-                }
-            )
-            == 2
-        )
+        faults = {one("wear", tooth=teeth) for teeth in ([1, 5], [1, 5], "all")}
+        assert len(faults) == 2
 
 
 class TestCompound:
@@ -139,15 +131,11 @@ class TestCompound:
 
     def test_loss_and_deviation_add_to_one_gap(self, xiamen):
         """Even wear of a misplaced tooth: the gaps add."""
-        wear, pitch = (
-            one("wear", tooth=2, wear_profile=None, wear_depth_um=10),
-            one("pitch_error", tooth=2),
-        )
-        table = xiamen.mesh_table((wear, pitch))
-        gap, at_pitch_point = rows(table, "pinion", 2)[1], xiamen.pair.pitch_point
-        assert np.interp(at_pitch_point, table.position, gap) == pytest.approx(
-            30e-6, rel=1e-9
-        )
+        wear = one("wear", tooth=2, wear_profile=None, wear_depth_um=10)
+        table = xiamen.mesh_table((wear, one("pitch_error", tooth=2)))
+        gap = rows(table, "pinion", 2)[1]
+        found = np.interp(xiamen.pair.pitch_point, table.position, gap)
+        assert found == pytest.approx(30e-6, rel=1e-9)
 
     def test_a_cracked_missing_tooth_is_missing(self, xiamen):
         for faults in (
@@ -171,8 +159,8 @@ class TestCompound:
             assert np.all(rows(two, "pinion", 0)[0] > rows(single, "pinion", 0)[0])
 
     def test_the_configuration_says_the_same(self, xiamen):
-        parts = [{"kind": "crack", "gear": "pinion", "tooth": 2, "crack_depth_mm": 1.0, "crack_angle_deg": 45,
-                  "crack_start": "arc_mid"}, {"kind": "missing_tooth", "gear": "wheel", "tooth": [7]}]  # fmt: skip
+        missing = {"kind": "missing_tooth", "gear": "wheel", "tooth": [7]}
+        parts = [{**option("crack"), "tooth": 2}, missing]
         table = xiamen.mesh_table(read_faults({"kind": "compound", "parts": parts}))
         assert np.flatnonzero(table.pinion.kind).tolist() == [2]
         assert np.flatnonzero(table.wheel.kind).tolist() == [7]

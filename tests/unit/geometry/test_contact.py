@@ -63,7 +63,9 @@ class TestShifts:
         )
 
     def test_teeth_fill_the_working_pitch_circle(self, shifted, shifts):
-        """No play at the working centre distance: both tooth thicknesses make one pitch (an independent reading)."""
+        """No play at the working centre distance: both tooth thicknesses make one pitch (an
+        independent reading).
+        """
         pair = shifted(*shifts)
         radii = [
             gear.base_radius / math.cos(pair.working_pressure_angle)
@@ -89,7 +91,8 @@ class TestShifts:
 def outline_distance(pair, pinion_position, wheel_position, corner_of):
     """Distance of a tip corner from the mating flank, both flanks placed by their own rotation, m.
 
-    Drawn on the line of action N1 N2: the flank point of curvature rho sits on it when the rotation brings it there.
+    Drawn on the line of action N1 N2: the flank point of curvature rho sits on it when the rotation
+    brings it there.
     """
     alpha = pair.working_pressure_angle
     along = np.array([math.sin(alpha), -math.cos(alpha)])

@@ -1,4 +1,6 @@
-"""Helical gears: the figures of both papers' pairs, and the laws that tie the transverse section to the normal one."""
+"""Helical gears: the figures of both papers' pairs, and the laws that tie the transverse section to
+the normal one.
+"""
 
 import dataclasses
 import math
@@ -109,7 +111,8 @@ def test_normal_and_transverse_section_tell_the_same_tooth(helix):
     assert math.tan(one.base_helix_angle) == pytest.approx(
         math.tan(beta) * math.cos(alpha_t), rel=1e-12
     )
-    # thickness on the reference cylinder, normal to the teeth, is the rack's: pi m / 2 + 2 x m tan(alpha_n)
+    # thickness on the reference cylinder, normal to the teeth, is the rack's: pi m / 2 + 2 x m
+    # tan(alpha_n)
     thickness = (
         2
         * one.pitch_radius

@@ -75,7 +75,9 @@ def test_sliding_vanishes_at_the_pitch_point_alone(duty):
 
 
 def test_flash_scales_as_blok_says(duty):
-    """Friction, load^(3/4), root of speed; the reference's 28 and 64 K over 39 to 48 for 12 and 36 kN m are that."""
+    """Friction, load^(3/4), root of speed; the reference's 28 and 64 K over 39 to 48 for 12 and 36
+    kN m are that.
+    """
     position = np.linspace(0.0, duty.system.pair.path_of_contact, 9)
     one = flash(duty, position, 3e5)
     np.testing.assert_allclose(

@@ -1,4 +1,6 @@
-"""ISO 6336-1 Method B against the values worked out by hand in the spur reference (docs/validation.md), section 4."""
+"""ISO 6336-1 Method B against the values worked out by hand in the spur reference
+(docs/validation.md), section 4.
+"""
 
 import math
 from dataclasses import replace
@@ -71,7 +73,9 @@ def test_load_matters_below_100_n_per_mm_only(pair):
 
 
 def test_profile_shift_follows_the_series(pair):
-    """q' of x1 = 0.4, x2 = -0.2 term by term; the wheel's coefficients on the wheel's shift, not the pinion's."""
+    """q' of x1 = 0.4, x2 = -0.2 term by term; the wheel's coefficients on the wheel's shift, not
+    the pinion's.
+    """
     expected = 0.04723 + (0.15551 - 0.11654 * 0.4) / 23 + (0.25791 + 0.24188 * 0.2) / 84
     expected += -0.00635 * 0.4 + 0.00193 * 0.2 + 0.00529 * 0.16 + 0.00182 * 0.04
     found = iso6336.flexibility(shifted(pair, 0.4, -0.2)) * N_PER_MM_UM

@@ -35,9 +35,12 @@ def test_reliefs_have_their_depth_at_the_ends_and_run_out_over_their_height(
     pair, shape
 ):
     side = FlankModification(
-        tip_relief=8 * MICRO, tip_relief_height=0.5 * MILLI, root_relief=3 * MICRO, root_relief_height=0.4 * MILLI,
+        tip_relief=8 * MICRO,
+        tip_relief_height=0.5 * MILLI,
+        root_relief=3 * MICRO,
+        root_relief_height=0.4 * MILLI,
         profile_shape=shape,
-    )  # fmt: skip
+    )
     position, _, deviation = at(pair, of_pair(pinion=side))
     # the pinion's tip leaves at E, its lowest point enters at A; beyond both the end counts
     np.testing.assert_allclose(

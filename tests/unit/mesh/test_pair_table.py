@@ -22,19 +22,16 @@ from gensig.mesh.pair_table import (
     slice_bending,
 )
 
-# single pairs of the reference pair at A, B, C, D, E, 1e8 N/m (spur reference (docs/validation.md), table 2.2)
+# single pairs of the reference pair at A, B, C, D, E, 1e8 N/m (spur reference (docs/validation.md),
+# table 2.2)
 RC_MM = np.array([2.45827, 6.66082, 7.86646, 8.36253, 12.56508])
 SINGLE_PAIR = np.array([1.5692, 2.0650, 2.0929, 2.0864, 1.5779])
 
 
 def test_single_pair_stiffness_of_the_reference_pair(paper_machine):
     position = RC_MM * 1e-3 - paper_machine.pair.start_curvature_radius
-    assert_allclose(
-        1e-8 / pair_compliance(paper_machine.mesh_table(), position),
-        SINGLE_PAIR,
-        rtol=1e-3,
-        atol=0,
-    )
+    found = 1e-8 / pair_compliance(paper_machine.mesh_table(), position)
+    assert_allclose(found, SINGLE_PAIR, rtol=1e-3, atol=0)
 
 
 def test_sound_teeth_have_the_corner_gap_and_nothing_else(xiamen):
@@ -42,12 +39,8 @@ def test_sound_teeth_have_the_corner_gap_and_nothing_else(xiamen):
     expected = corner_gap_by_pinion(xiamen.pair, table.position)
     near = expected < 1e-4
     # the parabolas of the table cut that much off where the gap begins
-    assert_allclose(
-        (table.pinion.gap[0] + table.wheel.gap[0])[near],
-        expected[near],
-        rtol=0,
-        atol=5e-9,
-    )
+    gap = table.pinion.gap[0] + table.wheel.gap[0]
+    assert_allclose(gap[near], expected[near], rtol=0, atol=5e-9)
     assert table.pinion.kind.tolist() == [0] * 23
     assert table.wheel.kind.tolist() == [0] * 84
 
@@ -57,15 +50,11 @@ def test_slopes_are_those_of_the_tables(xiamen):
     table = xiamen.mesh_table((one("pitting", tooth=0),))
     step = np.diff(table.position)
     for key in ("compliance", "gap"):
-        values, slopes = (
-            getattr(table.pinion, key),
-            getattr(table.pinion, f"{key}_slope"),
-        )
-        for value, slope in zip(values, slopes, strict=True):
-            climbed = np.cumsum(0.5 * (slope[1:] + slope[:-1]) * step)
-            assert_allclose(
-                climbed, value[1:] - value[0], rtol=0, atol=1e-12 * np.ptp(value)
-            )
+        values = getattr(table.pinion, key)
+        slopes = getattr(table.pinion, f"{key}_slope")
+        climbed = np.cumsum(0.5 * (slopes[:, 1:] + slopes[:, :-1]) * step, axis=1)
+        expected, atol = values[:, 1:] - values[:, :1], 1e-12 * np.ptp(values)
+        assert_allclose(climbed, expected, rtol=0, atol=atol)
 
 
 def test_only_the_faulty_tooth_has_its_own_row(xiamen):
@@ -83,61 +72,38 @@ class TestFlankSides:
 
     @staticmethod
     def contact(system, share, **faults):
-        """Contact compliance of the pair at places on the path, (phase,) m/N, with a fault on either gear."""
+        """Contact compliance of the pair along the path, (phase,) m/N, by gears' faults."""
         at = np.linspace(0.0, system.pair.path_of_contact, 9)
-        sides = flank_sides(
-            system.pair,
-            at,
-            system.material,
-            system.mesh,
-            system.mesh_force,
-            pinion_share=share,
-        )
-        bending = slice_bending(system.pair, at, system.material, system.mesh)
-        total = 0.0
+        mesh = system.pair, at, system.material, system.mesh
+        sides = flank_sides(*mesh, system.mesh_force, pinion_share=share)
+        teeth, total = faulty_teeth(system.pair, faults.values()), 0.0
         for name, side in sides.items():
-            own = [faults[name]] if name in faults else []
-            tooth = faulty_teeth(system.pair, own).get(
-                (name, 0), healthy_tooth(side.gear)
-            )
-            total = total + side.contact(tooth, bending, system.mesh)[1]
-        return total, contact_law(system.pair, at, system.material, system.mesh)
+            tooth = teeth.get((name, 0), healthy_tooth(side.gear))
+            total = total + side.contact(tooth, slice_bending(*mesh), system.mesh)[1]
+        return total, contact_law(*mesh)
 
     @pytest.mark.parametrize("contact", ["linear", "weber"])
     @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
     def test_sound_flanks_make_the_law(self, machine, contact, share):
         system = machine({"mesh.contact": contact})
         total, law = self.contact(system, share)
-        assert_allclose(
-            total, law.compliance(20e-3, system.mesh_force), rtol=1e-12, atol=0
-        )
+        expected = law.compliance(20e-3, system.mesh_force)
+        assert_allclose(total, expected, rtol=1e-12, atol=0)
 
     @pytest.mark.parametrize("gear", GEARS)
     @pytest.mark.parametrize("bending", ["whole", "by_slice"])
     def test_the_split_is_nothing_for_faulty_ones(self, machine, gear, bending):
         system = machine({"mesh.bending": bending})
-        fault = {
-            gear: one(
-                "chipped",
-                gear=gear,
-                chip_width_mm=10,
-                chip_shape="rectangular",
-                chip_height_mm=3,
-            )
-        }
+        chip = {"chip_width_mm": 10, "chip_shape": "rectangular", "chip_height_mm": 3}
+        fault = {gear: one("chipped", gear=gear, **chip)}
         totals = [self.contact(system, share, **fault)[0] for share in (0.0, 0.5, 1.0)]
         for total in totals[1:]:
             assert_allclose(total, totals[0], rtol=1e-12, atol=0)
-        sound, _ = self.contact(system, 0.5)
-        # half of the face at most: the law at half the width, and there the slices' own bending once more
+        sound, law = self.contact(system, 0.5)
+        # at most half of the face is lost: the law at half the width, the slices' bending twice
         at = np.linspace(0.0, system.pair.path_of_contact, 9)
         more = slice_bending(system.pair, at, system.material, system.mesh)
-        most = (
-            contact_law(system.pair, at, system.material, system.mesh).compliance(
-                10e-3, system.mesh_force
-            )
-            + more
-        )
+        most = law.compliance(10e-3, system.mesh_force) + more
         assert np.all(totals[0] <= most * (1 + 1e-4))
         assert_allclose((totals[0] / most).max(), 1.0, rtol=1e-3, atol=0)
         assert_allclose((totals[0] / sound).min(), 1.0, rtol=1e-9, atol=0)
@@ -146,23 +112,19 @@ class TestFlankSides:
         at = xiamen.pair.path_of_contact * np.array([-0.2, 0.5, 1.2])
         sides = flank_sides(xiamen.pair, at, xiamen.material, xiamen.mesh, 900.0)
         for name, low, high in (("pinion", 0, 2), ("wheel", 2, 0)):
-            side, tip = (
-                sides[name],
-                healthy_tooth(sides[name].gear).profile.curvature_radius[-1],
-            )
+            side = sides[name]
+            tip = healthy_tooth(side.gear).profile.curvature_radius[-1]
             assert side.curvature.max() == pytest.approx(tip, rel=1e-9)
             assert side.flank_curvature[high] > tip * 1.05
-            assert_allclose(
-                side.flank_curvature[[low, 1]],
-                side.curvature[[low, 1]],
-                rtol=1e-12,
-                atol=0,
+            found, expected = (
+                values[[low, 1]] for values in (side.flank_curvature, side.curvature)
             )
+            assert_allclose(found, expected, rtol=1e-12, atol=0)
 
 
 class TestRows:
     def test_equal_structures_are_computed_once(self, xiamen, monkeypatch):
-        """Flanks that only stand elsewhere bend as the sound one does, and teeth that are one object are one row."""
+        """Flanks with deviations only bend as the sound one; teeth of one object are one row."""
         computed, original = [], module.structural_compliance
         monkeypatch.setattr(
             module,
@@ -182,18 +144,13 @@ class TestRows:
             ),
             ((one("misalignment", gear="wheel", tooth="all"),), 2, 1),
         ):
-            pair_table(
-                xiamen.pair, xiamen.material, xiamen.mesh, load=xiamen.mesh_force
-            )  # the sound gears' own structures
+            mesh, load = (xiamen.pair, xiamen.material, xiamen.mesh), xiamen.mesh_force
+            pair_table(*mesh, load=load)  # computes the structures of the sound gears
             computed.clear()
             teeth = faulty_teeth(xiamen.pair, faults)
-            table = pair_table(
-                xiamen.pair, xiamen.material, xiamen.mesh, teeth, load=xiamen.mesh_force
-            )
-            assert (len(table.wheel.compliance), len(computed)) == (
-                n_rows,
-                n_structures,
-            )
+            table = pair_table(*mesh, teeth, load=load)
+            counts = len(table.wheel.compliance), len(computed)
+            assert counts == (n_rows, n_structures)
             assert len(table.wheel.present) == n_rows
 
     @pytest.mark.parametrize("gear", GEARS)
@@ -201,22 +158,16 @@ class TestRows:
     def test_curves_and_tables_agree(self, xiamen, kind, gear):
         """The gap of the faulty pair by ``stiffness_curves`` and by the table."""
         fault = one(kind, gear=gear, tooth=0)
-        table, curves = (
-            xiamen.mesh_table((fault,)),
-            xiamen.stiffness_curves((fault,), points_per_tooth=1),
-        )
+        table = xiamen.mesh_table((fault,))
+        curves = xiamen.stiffness_curves((fault,), points_per_tooth=1)
         side, at = (
             side_of(table, gear),
             curves.contact_position * xiamen.pair.base_pitch,
         )
         expected = np.interp(at, table.position, side.gap[side.kind[0]] - side.gap[0])
-        # straight between nodes, whose parabolas round steps off, against the value itself
-        assert_allclose(
-            curves.faulty_pair_gap,
-            expected,
-            rtol=0,
-            atol=2e-9 + 3e-3 * np.abs(expected).max(),
-        )
+        # linear between nodes, whose parabolas round off steps, against the value itself
+        atol = 2e-9 + 3e-3 * np.abs(expected).max()
+        assert_allclose(curves.faulty_pair_gap, expected, rtol=0, atol=atol)
         assert np.all(np.isfinite(side.compliance))
         assert side.compliance.min() > 0
         assert np.isfinite(side.gap[:, on_path(table)]).all()

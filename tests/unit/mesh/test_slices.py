@@ -1,4 +1,6 @@
-"""Loaded contact in slices: equilibrium, the spur pair as its special case, bounds, and the figures of both papers."""
+"""Loaded contact in slices: equilibrium, the spur pair as its special case, bounds, and the figures
+of both papers.
+"""
 
 import dataclasses
 import itertools
@@ -31,7 +33,8 @@ REFERENCE = {
     "law": "paper",
     "allow_extrapolation": True,
 }
-# The reference takes the involute down to the root circle. So does a rack with a sharp tip; a root that a rounded one
+# The reference takes the involute down to the root circle. So does a rack with a sharp tip; a root
+# that a rounded one
 # cuts makes the pair up to 10 % stiffer.
 SHARP = {"cutter_tip_radius_coefficient": 0.02}
 BODY = ("mass_kg", "inertia_kg_m2", "support", "bearing", "shaft")
@@ -49,9 +52,12 @@ def gears(name, **changes):
     for side, hand in (("pinion", 1.0), ("wheel", -1.0)):
         own = {key: value for key, value in config[side].items() if key not in BODY}
         for key in (
-            "normal_module_mm", "pressure_angle_deg", "addendum_coefficient", "clearance_coefficient",
+            "normal_module_mm",
+            "pressure_angle_deg",
+            "addendum_coefficient",
+            "clearance_coefficient",
             "cutter_tip_radius_coefficient",
-        ):  # fmt: skip
+        ):
             own[key] = config[key]
         own["helix_angle_deg"] = hand * config["helix_angle_deg"]
         values = own | {
@@ -77,7 +83,9 @@ def solved(pair, torque, keys, *, n_phases=64, deviation=None, **changes):
 
 
 def test_figures_of_the_transmission_error_paper(mesh_keys):
-    """Independent model of the project's reference: 14.3 +- 1.5 um, below 1 um, 167 +- 10 N/mm; in phase 4.2 +- 0.4."""
+    """Independent model of the project's reference: 14.3 +- 1.5 um, below 1 um, 167 +- 10 N/mm; in
+    phase 4.2 +- 0.4.
+    """
     pair = gears("beihang_61_132", **SHARP)
     _, contact = solved(pair, 178.0, mesh_keys | REFERENCE)
     assert contact.approach.mean() == pytest.approx(14.3e-6, abs=1.5e-6)
@@ -88,7 +96,9 @@ def test_figures_of_the_transmission_error_paper(mesh_keys):
 
 
 def test_figures_of_the_temperature_paper(mesh_keys):
-    """Cold: single pair 2.59e9 and mean 3.73e9 N/m within 8 %, with the paper's conventions of the tooth."""
+    """Cold: single pair 2.59e9 and mean 3.73e9 N/m within 8 %, with the paper's conventions of the
+    tooth.
+    """
     pair = gears("chongqing_40_162", **SHARP)
     mesh, contact = solved(pair, 24351.0, mesh_keys | REFERENCE)
     position = np.linspace(0.0, pair.path_of_contact + mesh.lag.max(), 201)
@@ -188,9 +198,11 @@ def test_equilibrium_is_that_of_an_independent_solver(mesh_keys, length):
     ids=["middle half", "outer halves", "one end"],
 )
 def test_coupling_length_is_that_of_finite_elements(mesh_keys, loaded, finite_elements):
-    """How much softer the spur paper's pinion (20 mm wide) is when a straight mate touches half of its face only.
+    """Ratio by which the spur paper's pinion (20 mm wide) is softer when a straight mate touches half of
+    its face only.
 
-    Three-dimensional finite elements (tests/reference) against the default coupling over what bodies do not share.
+    Three-dimensional finite elements (tests/reference) against the default coupling over what
+    bodies do not share.
     """
     pair, slices = gears("xiamen_23_84"), read_slice_options(mesh_keys)
     options = read_mesh_options(mesh_keys)
@@ -215,9 +227,20 @@ def test_coupling_length_is_that_of_finite_elements(mesh_keys, loaded, finite_el
     gap = np.where(loaded(place), 0.0, 1.0)[None]
     length = slices.coupling_modules * pair.pinion.normal_module
     bite_forces(
-        structure, 1e-6 * structure[0, 0], np.ones((1, n)), 0.0, gap, width, width[0], length**2, 1.0, np.array([1e-6]),
-        1.0, first, force,
-    )  # fmt: skip
+        structure,
+        1e-6 * structure[0, 0],
+        np.ones((1, n)),
+        0.0,
+        gap,
+        width,
+        width[0],
+        length**2,
+        1.0,
+        np.array([1e-6]),
+        1.0,
+        first,
+        force,
+    )
     softer = (1e-6 / force[0, 0] + shared) / whole
     assert softer == pytest.approx(np.mean(finite_elements), rel=0.03)
 

@@ -1,4 +1,4 @@
-"""How hot gears grow: uniform heat keeps the involute, uneven heat does not."""
+"""Thermal growth of gears: uniform heat keeps the involute, uneven heat does not."""
 
 from dataclasses import replace
 
@@ -30,7 +30,9 @@ def flank(pair, gear):
 
 @pytest.mark.parametrize("name", ["pinion", "wheel"])
 def test_uniform_heat_moves_the_flank_to_the_grown_involute(pair, name):
-    """The grown gear's involute at the same direction of the normal has a curvature radius longer by the strain."""
+    """The grown gear's involute at the same direction of the normal has a curvature radius longer
+    by the strain.
+    """
     gear, strain = getattr(pair, name), 1e-3
     curvature = flank(pair, gear)
     moved = GearGrowth(tooth=strain, body=strain).along_action(gear, curvature)
@@ -46,7 +48,9 @@ def test_uniform_heat_moves_the_flank_to_the_grown_involute(pair, name):
 
 @pytest.mark.parametrize(("tooth", "body"), [(1e-3, 4e-4), (0.0, 1e-3), (1e-3, 0.0)])
 def test_uneven_heat_moves_every_point_of_the_flank(pair, tooth, body):
-    """Root circle by the body's strain, the tooth on it by its own: projected on the flank's normal."""
+    """Root circle by the body's strain, the tooth on it by its own: projected on the flank's
+    normal.
+    """
     gear = pair.pinion
     curvature = flank(pair, gear)
     x, y = involute_point(gear, curvature)
@@ -59,7 +63,7 @@ def test_uneven_heat_moves_every_point_of_the_flank(pair, tooth, body):
     )
     if body == 0.0:
         np.testing.assert_allclose(
-            growth.of_tooth_alone(gear, curvature), expected, rtol=1e-9
+            growth.of_tooth_alone.along_action(gear, curvature), expected, rtol=1e-9
         )
 
 
@@ -72,13 +76,25 @@ def test_the_rim_grows_as_the_paper_s_equations_5_and_9_say(pair):
     inner, outer = gear.bore_radius, gear.root_radius
     rise = body.temperature - 20.0
     nu, expansion, whole = 0.3, 1.21e-5, np.trapezoid(rise * body.radius, body.radius)
-    equation_5 = expansion * whole / outer * (
-        (1 + nu) + (outer**2 * (1 - nu) + (1 + nu) * inner**2) / (outer**2 - inner**2)
-    )  # fmt: skip
+    equation_5 = (
+        expansion
+        * whole
+        / outer
+        * (
+            (1 + nu)
+            + (outer**2 * (1 - nu) + (1 + nu) * inner**2) / (outer**2 - inner**2)
+        )
+    )
     step = rise[-1] - rise[0]
-    equation_9 = expansion * outer * (
-        rise[0] + outer**2 * step / (outer**2 - inner**2) - step / (2.0 * np.log(outer / inner))
-    )  # fmt: skip
+    equation_9 = (
+        expansion
+        * outer
+        * (
+            rise[0]
+            + outer**2 * step / (outer**2 - inner**2)
+            - step / (2.0 * np.log(outer / inner))
+        )
+    )
     ours = expansion * (body.mean - 20.0) * outer
     assert ours == pytest.approx(equation_5, rel=1e-12)
     assert ours == pytest.approx(equation_9, rel=1e-5)
@@ -112,7 +128,9 @@ def test_a_hotter_pinion_makes_the_entering_pair_late(pair):
 
 
 def test_hot_teeth_on_a_cold_body_hardly_lengthen_the_base_pitch(pair):
-    """Pitches are angles times the body's radius: the teeth's own growth makes them thicker, not farther apart."""
+    """Pitches are angles times the body's radius: the teeth's own growth makes them thicker, not
+    farther apart.
+    """
     growth = PairGrowth(
         pinion=GearGrowth(tooth=1e-3, body=0.0), wheel=GearGrowth(tooth=0.0, body=0.0)
     )
