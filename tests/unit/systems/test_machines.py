@@ -206,6 +206,6 @@ def test_loads_of_teeth_are_recorded_where_they_are_known(any_machine):
     if n_pairs:
         assert mesh_signals(None, 5, n_pairs)["mesh_load_share"].shape == (n_pairs, 5)
         return
-    text = r"dataset\.store_mesh_state: a drive line does not tell"
+    text = r"dataset\.store_mesh_state: a drive line does not know"
     with pytest.raises(ConfigError, match=text):
         mesh_signals(None, 5, n_pairs)
