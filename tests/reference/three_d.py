@@ -131,7 +131,7 @@ class Extrusion:
     def _cracked(
         self, fault: Fault, points: Array, cells: NDArray[np.int64], middle: Array
     ) -> tuple[Array, NDArray[np.int64]]:
-        """Own nodes for the face on the left of the slit; those along the crack front stay shared."""
+        """Own nodes for the face left of the slit; nodes along the crack front stay shared."""
         reach = np.hypot(*(self.slit - self.slit[:, :1]))
         opened = [
             nearest_node(self.section, point)
@@ -220,7 +220,7 @@ def _slit(gear: Gear, sizes: Resolution) -> Array:
 
 
 def _pit_ends(gear: Gear, pitch: float) -> Array:
-    """Curvature radii where the pit, centred on that of the pitch point, begins and ends, (2,) m."""
+    """Curvature radii at both ends of the pit, centred on the pitch point, (2,) m."""
     centre = involute_point(gear, np.array([pitch]))[0][0]
     tip = math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
 
@@ -406,7 +406,7 @@ def rigid_compliance(strips: Array) -> float:
 def summary_rows(
     fault: Fault, response: Response, points: dict[str, float], module: float
 ) -> Iterator[Row]:
-    """Means, profiles over the width and, at the pitch point C, the compliance of a rigid contact."""
+    """Means and profiles over the width; compliance of a rigid contact at the pitch point C."""
     outside = [strip for strip in range(N_STRIPS) if strip not in PIT_STRIPS]
     for index, (point, radius) in enumerate(points.items()):
         head = _fault_columns(fault) | {
@@ -431,7 +431,7 @@ def summary_rows(
 
 
 def flexibility_rows(fault: Fault, response: Response) -> Iterator[Row]:
-    """Matrix between strips at the pitch point C; strips in the pit carry no load and are left out."""
+    """Matrix between strips at the pitch point C, without the unloaded strips in the pit."""
     for measured in range(N_STRIPS):
         for loaded in range(N_STRIPS):
             if not (fault.pitted and (measured in PIT_STRIPS or loaded in PIT_STRIPS)):

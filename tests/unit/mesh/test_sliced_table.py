@@ -188,7 +188,7 @@ def test_faulty_teeth_have_their_own_chords(fault, share):
 
 
 def test_errors_of_single_teeth_open_all_chords():
-    """Pitch errors and tilts of a grade 5 gear; the table takes a tilt at the middle of the face."""
+    """Pitch errors and tilts of a grade 5 gear; the table takes tilts at mid-face."""
     system, table, mesh = table_of()
     rng = np.random.default_rng(2)
     of_teeth = {

@@ -198,7 +198,7 @@ def test_equilibrium_is_that_of_an_independent_solver(mesh_keys, length):
     ids=["middle half", "outer halves", "one end"],
 )
 def test_coupling_length_is_that_of_finite_elements(mesh_keys, loaded, finite_elements):
-    """Ratio by which the spur paper's pinion (20 mm wide) is softer when a straight mate touches half of
+    """Softening of the spur paper's pinion (20 mm wide) when a straight mate touches half of
     its face only.
 
     Three-dimensional finite elements (tests/reference) against the default coupling over what
