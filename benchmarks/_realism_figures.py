@@ -21,7 +21,7 @@ LEAST = 0.05  # shown at this where a value is 0 or less: the axis is logarithmi
 
 
 def plot_yardstick(found: Sequence[Comparison], path: Path) -> None:
-    """Every quantity on one logarithmic axis: measured ranges as bands, simulated medians with their 5 to 95 %."""
+    """All quantities on one logarithmic axis: measured bands, simulated medians and 5 to 95 %."""
     figure, axes = pyplot.subplots(
         figsize=(10, 1.2 + 0.3 * len(found)), layout="constrained"
     )
@@ -67,7 +67,7 @@ def plot_recording(
     recorded: Mapping[str, FloatArray] | None,
     path: Path,
 ) -> None:
-    """A panel an indicator: simulated intervals, right and wrong on purpose, and the channels of the recording."""
+    """One panel for each indicator: simulated intervals and the channels of the recording."""
     figure, grid = pyplot.subplots(
         len(INDICATORS), 1, figsize=(9, 1.35 * len(INDICATORS)), layout="constrained"
     )

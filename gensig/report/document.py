@@ -184,9 +184,10 @@ def _channel_choice(chosen: Choice) -> Select:
     return _choice("channel", "Channel", options, str(first))
 
 
-def _signals(
-    data: Dataset, chosen: Choice, rotation: Rotation, examples: list[dict[str, Any]]
-) -> Section:
+def _records_by_class(
+    examples: list[dict[str, Any]],
+) -> dict[str, list[tuple[str, str]]]:
+    """Number and label of each example, by class."""
     groups: dict[str, list[tuple[str, str]]] = {}
     for number, shown in enumerate(examples):
         severity = "unknown"
@@ -195,6 +196,13 @@ def _signals(
         record = f"severity {severity}, {shown['unit']}, {shown['record']}"
         text = plain(f"{shown['class']}, {record}")
         groups.setdefault(plain(shown["class"]), []).append((str(number), text))
+    return groups
+
+
+def _signals(
+    data: Dataset, chosen: Choice, rotation: Rotation, examples: list[dict[str, Any]]
+) -> Section:
+    groups = _records_by_class(examples)
     of_last = groups[list(groups)[-1]]
     first = of_last[len(of_last) // 2][0]
     selection, sound = "of each class, from", ""
@@ -210,10 +218,9 @@ def _signals(
     zooms = [("all", "usable band")]
     if any(name == "mesh" for name, _ in orders):
         zooms += [(f"{k}", f"around mesh harmonic {k}") for k in (1, 2, 3)]
-    low, high = envelope_band(data.sampling_rate)
+    counts = f"{len(examples)} of {data.n_records} records"
     lines = [
-        f"{len(examples)} of {data.n_records} records: {selection} "
-        f"the least to the greatest severity{sound}.",
+        f"{counts}: {selection} the least to the greatest severity{sound}.",
         "Orders are multiples of the chosen shaft's mean speed. Amplitudes of spectra are "
         "rounded to 0.4 dB; waveform and spectrogram are those of the first samples, "
         "up to 8192.",
@@ -247,18 +254,21 @@ def _signals(
             switches=[
                 Switch(name=name, label=label, on=on) for name, label, on in MARKS
             ],
-            plots=[
-                ("wave", "Waveform"),
-                ("spectrum", "Amplitude spectrum"),
-                (
-                    "envelope",
-                    "Spectrum of the envelope of "
-                    f"{low / 1e3:.3g} to {high / 1e3:.3g} kHz",
-                ),
-                ("spectrogram", "Spectrogram"),
-            ],
+            plots=_plots(data.sampling_rate),
         ),
     )
+
+
+def _plots(sampling_rate: float) -> list[tuple[str, str]]:
+    """Names and titles of the plots of a signal."""
+    low, high = envelope_band(sampling_rate)
+    band = f"{low / 1e3:.3g} to {high / 1e3:.3g} kHz"
+    return [
+        ("wave", "Waveform"),
+        ("spectrum", "Amplitude spectrum"),
+        ("envelope", f"Spectrum of the envelope of {band}"),
+        ("spectrogram", "Spectrogram"),
+    ]
 
 
 def _parameters(data: Dataset, table: dict[str, Any]) -> Section:

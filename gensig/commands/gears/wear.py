@@ -143,14 +143,7 @@ def wear_life_content(
     if options.transmission_error_limit is not None:
         limit = options.transmission_error_limit * 1e6
         content["transmission_error_limit_um"] = limit
-    radii = flank_radii(path, worn.mean(axis=1), load.mean(axis=0), case.material)
-    for side, name in enumerate(SIDES):
-        content[f"{name}_wear_per_mesh_nm"] = per_mesh[side].max(axis=0) * 1e9
-        content[f"{name}_depth_um"] = worn[side].max(axis=0) * 1e6
-        if case.shape[1] > 1:
-            content[f"{name}_depth_by_slice_um"] = worn[side] * 1e6
-        for state, radius in radii.items():
-            content[f"{name}_curvature_radius_{state}_mm"] = radius[side] * 1e3
+    content |= _flank_content(case, worn, load, per_mesh)
     content["history"] = _history(life, speed)
     if vibration is not None:
         content["vibration"] = _vibration(vibration, options, speed)
@@ -161,6 +154,23 @@ def wear_life_content(
             "life_hours": lives.hours,
         }
         content["laws"] = [_law(law) for law in laws]
+    return content
+
+
+def _flank_content(
+    case: WearCase, worn: Array, load: Array, per_mesh: Array
+) -> dict[str, Any]:
+    """Wear and curvature of each gear's flank."""
+    content: dict[str, Any] = {}
+    mean_depth, mean_load = worn.mean(axis=1), load.mean(axis=0)
+    radii = flank_radii(case.path, mean_depth, mean_load, case.material)
+    for side, name in enumerate(SIDES):
+        content[f"{name}_wear_per_mesh_nm"] = per_mesh[side].max(axis=0) * 1e9
+        content[f"{name}_depth_um"] = worn[side].max(axis=0) * 1e6
+        if case.shape[1] > 1:
+            content[f"{name}_depth_by_slice_um"] = worn[side] * 1e6
+        for state, radius in radii.items():
+            content[f"{name}_curvature_radius_{state}_mm"] = radius[side] * 1e3
     return content
 
 
