@@ -54,14 +54,14 @@ def kernels(runs: int) -> dict[str, float]:
     works[KERNEL.format("float32")] = _rates.kernel(lanes, 5, "float32")
     works[SCALAR] = _rates.scalar(eight, 5)
     works |= _rates.scipy_works(eight[0])
-    found = _rates.rates(
+    result = _rates.rates(
         works, 4 * runs
     )  # they are short: many turns cost little, and one of them is undisturbed
     if (ross := stored_rate()) is not None:
-        found["ROSS run_time_response x1, as stored, by way of scalar Numba"] = (
-            ross * found[SCALAR]
+        result["ROSS run_time_response x1, as stored, by way of scalar Numba"] = (
+            ross * result[SCALAR]
         )
-    return found
+    return result
 
 
 def same_law() -> dict[str, float]:
@@ -85,7 +85,7 @@ def start_up(runs: int) -> dict[str, float]:
         )
         return time.perf_counter() - start
 
-    found = {
+    result = {
         "the interpreter alone": min(wall("pass") for _ in range(runs)),
         "import gensig": min(wall("import gensig") for _ in range(runs)),
         "first record of 1 s, compiled code cached": min(
@@ -93,39 +93,39 @@ def start_up(runs: int) -> dict[str, float]:
         ),
     }
     with tempfile.TemporaryDirectory() as cache:
-        found["first record of 1 s, nothing cached"] = wall(
+        result["first record of 1 s, nothing cached"] = wall(
             RECORD.format("float64"), NUMBA_CACHE_DIR=cache
         )
-    return found
+    return result
 
 
 def ratios(
     rates: dict[str, float], ends: dict[str, dict[str, float]]
 ) -> dict[str, float]:
     """What compares between machines."""
-    found = {
+    result = {
         f"kernel {precision} over scalar Numba": rates[KERNEL.format(precision)]
         for precision in PRECISIONS
     }
-    found = {name: value / rates[SCALAR] for name, value in found.items()}
+    result = {name: value / rates[SCALAR] for name, value in result.items()}
     end = ends["float64"][RECORDS]
-    found["float32 over float64, end to end"] = ends["float32"][RECORDS] / end
-    found["end to end over solve_ivp RK45, right-hand side compiled"] = (
+    result["float32 over float64, end to end"] = ends["float32"][RECORDS] / end
+    result["end to end over solve_ivp RK45, right-hand side compiled"] = (
         end / rates[RK45]
     )
-    found["end to end over solve_ivp RK45, NumPy around the law"] = (
+    result["end to end over solve_ivp RK45, NumPy around the law"] = (
         end / rates[RK45_NUMPY]
     )
     for precision, values in ends.items():
-        found[f"share of the kernel's rate reached, {precision}"] = (
+        result[f"share of the kernel's rate reached, {precision}"] = (
             values[RECORDS] / rates[KERNEL.format(precision)]
         )
         one, two = (values[_end_to_end.wall_name(workers)] for workers in (1, 2))
-        found[f"two workers over one, {precision}"] = two / one
+        result[f"two workers over one, {precision}"] = two / one
     for name, value in rates.items():
         if name.startswith("ROSS"):
-            found["end to end over ROSS run_time_response"] = end / value
-    return found
+            result["end to end over ROSS run_time_response"] = end / value
+    return result
 
 
 def _goal(name: str, value: float) -> str:

@@ -161,14 +161,14 @@ def judge_control(file: Path, models: Sequence[Path]) -> list[dict[str, Any]]:
     rows = []
     for channel in range(n_channels):
         for variant in (BEFORE, *METHODS):
-            found = [_judge(recorded, channel, variant, *one) for one in loaded]
+            result = [_judge(recorded, channel, variant, *one) for one in loaded]
             for load in LOADS:
                 fault = {
-                    state: np.mean([one[state, load][0] for one in found], axis=0)
+                    state: np.mean([one[state, load][0] for one in result], axis=0)
                     for state in STATES
                 }
                 beyond = {
-                    state: np.mean([one[state, load][1] for one in found], axis=0)
+                    state: np.mean([one[state, load][1] for one in result], axis=0)
                     for state in STATES
                 }
                 rows.append(
@@ -201,7 +201,7 @@ def _judge(
         key: _halves(signal[channel : channel + 1], description)
         for key, signal in recorded.items()
     }
-    found: dict[tuple[str, int], list[tuple[FloatArray, FloatArray]]] = {
+    result: dict[tuple[str, int], list[tuple[FloatArray, FloatArray]]] = {
         key: [] for key in recorded
     }
     for judged in (0, 1):
@@ -212,7 +212,7 @@ def _judge(
             region = adapt_domain(domain, statistics, given)
         for key, parts in halves.items():
             said = 1.0 - np.exp(predict_windows(network, parts[judged])[:, healthy])
-            found[key].append(
+            result[key].append(
                 (said, distances(region, parts[judged]) > region.threshold)
             )
     return {
@@ -220,7 +220,7 @@ def _judge(
             np.concatenate([said for said, _ in parts]),
             np.concatenate([beyond for _, beyond in parts]),
         )
-        for key, parts in found.items()
+        for key, parts in result.items()
     }
 
 

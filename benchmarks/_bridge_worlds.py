@@ -105,16 +105,16 @@ def judge_world(source: Dataset, world: Dataset, models: Sequence[Path]) -> Judg
         healthy = load_statistics(folder)
         assert healthy is not None
         mixture = statistics_of(model, chosen_windows(trained, np.arange(len(trained))))
-        found = {BEFORE: predict_windows(model, judged)}
+        result = {BEFORE: predict_windows(model, judged)}
         for scope in SCOPES:
             for name, statistics, method in _variants(healthy, mixture):
-                found[f"{name}, {scope}"] = _adapted(
+                result[f"{name}, {scope}"] = _adapted(
                     model, statistics, method, adapting, judged, _groups(world, scope)
                 )
         seeds.append(
             {
                 name: over_records(value, judged.record)[1]
-                for name, value in found.items()
+                for name, value in result.items()
             }
         )
     record = np.unique(judged.record)
@@ -156,17 +156,17 @@ def _adapted(
     """(window, class) log-probabilities, each group of records by the network adapted to its
     healthy ones.
     """
-    found = np.empty((len(judged), 0))
+    result = np.empty((len(judged), 0))
     for name in np.unique(group[judged.record]):
         mine, theirs = (
             np.flatnonzero(group[part.record] == name) for part in (adapting, judged)
         )
         network = adapt_network(model, source, chosen_windows(adapting, mine), method)
         said = predict_windows(network, _subset(judged, theirs))
-        if not found.size:
-            found = np.empty((len(judged), said.shape[1]))
-        found[theirs] = said
-    return found
+        if not result.size:
+            result = np.empty((len(judged), said.shape[1]))
+        result[theirs] = said
+    return result
 
 
 def scores(judged: Judged, class_names: Sequence[str]) -> dict[str, dict[str, Any]]:

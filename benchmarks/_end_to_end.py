@@ -58,7 +58,7 @@ def by_stage(precision: str, runs: int) -> dict[str, float]:
     n_samples = round(
         config["operating"]["duration_s"] * config["sensing"]["sampling_rate_hz"]
     )
-    found: list[Stages] = []
+    result: list[Stages] = []
     wall: list[float] = []
     for _ in range(runs):
         # what would not be there for records that have not been made before
@@ -71,8 +71,8 @@ def by_stage(precision: str, runs: int) -> dict[str, float]:
             with stages.watching(n_samples):
                 _complete(Path(folder) / "set", workers=1)
             wall.append(time.perf_counter() - start)
-            found.append(stages)
-    best = min(found, key=lambda stages: sum(stages.seconds.values()))
+            result.append(stages)
+    best = min(result, key=lambda stages: sum(stages.seconds.values()))
     best.separate_low_pass(precision, len(config["sensing"]["channels"]), runs)
     spent = {name: best.seconds[name] / n_records * 1e3 for name in STAGES}
     total, integration = sum(spent.values()), sum(spent[name] for name in INTEGRATION)

@@ -189,8 +189,8 @@ def ross_choices(system: SpurPair) -> Values:
             height=contact_height,
         )
         for term in TERMS:
-            found = body if term == "foundation" else getattr(parts, term)
-            values |= _by_point(f"{gear.name}_{term}_compliance", points, found)
+            result = body if term == "foundation" else getattr(parts, term)
+            values |= _by_point(f"{gear.name}_{term}_compliance", points, result)
         values[f"{gear.name}_root_half_angle", ""] = ross_half_angle(gear)
         values |= _coefficient_values(gear, ross_half_angle(gear))
     true, own = sides(pair, position), ross_path(pair, shares)
@@ -312,12 +312,12 @@ def sides(pair: GearPair, position: Array) -> list[tuple[Gear, Array]]:
 
 
 def _coefficient_values(gear: Gear, half_angle: float) -> Values:
-    found = body_coefficients(
+    result = body_coefficients(
         _stand_in(gear, root_half_angle=half_angle), allow_extrapolation=True
     )
     return {
         (f"{gear.name}_coefficient_{letter}", ""): value
-        for letter, value in found.items()
+        for letter, value in result.items()
     }
 
 

@@ -80,13 +80,13 @@ def in_turn(works: Mapping[str, Callable[[], Any]], runs: int) -> dict[str, floa
 
     They take turns, so that what disturbs the machine for a while disturbs all.
     """
-    found = dict.fromkeys(works, math.inf)
+    result = dict.fromkeys(works, math.inf)
     for _ in range(runs):
         for name, work in works.items():
             start = time.process_time()
             work()
-            found[name] = min(found[name], time.process_time() - start)
-    return found
+            result[name] = min(result[name], time.process_time() - start)
+    return result
 
 
 def print_figures(

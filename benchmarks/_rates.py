@@ -196,12 +196,12 @@ def difference(all_of: list[PairDynamics], oversampling: int) -> float:
 
 def check_same_law(all_of: list[PairDynamics]) -> float:
     """The difference at a step fine enough for either, refused where it is none of the step's."""
-    found = difference(all_of, SAME_OVERSAMPLING)
-    if not found < SAME:
+    result = difference(all_of, SAME_OVERSAMPLING)
+    if not result < SAME:
         raise AssertionError(
-            f"scalar code and compiled core differ by {found:.2g} at x{SAME_OVERSAMPLING}: two laws"
+            f"scalar and compiled code differ by {result:.2g} at x{SAME_OVERSAMPLING}"
         )
-    return found
+    return result
 
 
 def scipy_works(dynamics: PairDynamics) -> dict[str, Work]:
@@ -226,12 +226,12 @@ def scipy_works(dynamics: PairDynamics) -> dict[str, Work]:
         given = {"method": method, "rtol": SCIPY_RTOL, "atol": SCIPY_ATOL}
         return lambda: solve_ivp(slope, span, settled, **given), SCIPY_SECONDS
 
-    found = {
+    result = {
         f"solve_ivp {method}, right-hand side compiled": solve(compiled, method)
         for method in SCIPY
     }
     return {
-        **found,
+        **result,
         "solve_ivp RK45, NumPy around the compiled law": solve(plain, "RK45"),
     }
 
@@ -243,7 +243,7 @@ def _numpy_right_hand_side(dynamics: PairDynamics) -> RightHandSide:
         dynamics.approach_direction(),
     )
     n_dof, scratch = len(system.mass), _kernels.scratch(len(system.mass), 0)
-    motion, found = np.empty((4, LANES)), np.empty((N_LAW, LANES))
+    motion, result = np.empty((4, LANES)), np.empty((N_LAW, LANES))
     radius, speed = dynamics.table.pair.pinion.base_radius, dynamics.operating.speed
 
     def slope(time: float, state: Array) -> Array:
@@ -252,8 +252,8 @@ def _numpy_right_hand_side(dynamics: PairDynamics) -> RightHandSide:
         motion[:] = np.array(
             [roll, direction @ q, direction @ v, radius * (speed + v[2])]
         )[:, None]
-        _kernels.law_at(group, motion.ravel(), *scratch, found.ravel())
-        normal, friction, moment_p, moment_w, along = found[:5, 0]
+        _kernels.law_at(group, motion.ravel(), *scratch, result.ravel())
+        normal, friction, moment_p, moment_w, along = result[:5, 0]
         force = (
             system.force
             - system.stiffness @ q

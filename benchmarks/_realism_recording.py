@@ -197,19 +197,19 @@ def recording_comparisons(
     simulated : indicators by control, see ``CONTROLS``
     recorded : indicators of the recording; None leaves its rows out
     """
-    found = []
+    result = []
     for name, unit in INDICATORS.items():
         right = points(simulated[CONTROLS[0]][name])
         row = {"id": f"{RECORDING}.{name}", "unit": unit}
         if recorded is None:
-            found.append(_row(row, "simulated", (None, None), "", right, WITHOUT))
+            result.append(_row(row, "simulated", (None, None), "", right, WITHOUT))
         else:
             channels = float(np.min(recorded[name])), float(np.max(recorded[name]))
             verdict = judge(right[1], right[2], *channels)
-            found.append(_row(row, "channels", channels, SOURCE, right, verdict))
+            result.append(_row(row, "channels", channels, SOURCE, right, verdict))
             width = (right[2] - right[1]) / (channels[1] - channels[0])
             verdict = judge(None, MOST_WIDTH, width, width)
-            found.append(
+            result.append(
                 _row(
                     {**row, "unit": ""},
                     "width",
@@ -223,12 +223,12 @@ def recording_comparisons(
         for control in CONTROLS[1:]:
             wrong = points(simulated[control][name])
             told = TOLD if wrong[0] < right[1] or wrong[0] > right[2] else NOT_TOLD
-            found.append(
+            result.append(
                 _row(
                     row, control, (right[1], right[2]), "right simulation", wrong, told
                 )
             )
-    return found
+    return result
 
 
 def _row(

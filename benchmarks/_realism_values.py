@@ -145,10 +145,10 @@ def _values_at(data: Dataset, index: int) -> dict[str, FloatArray]:
 
 def quantities(table: Table) -> dict[Place, FloatArray]:
     """Every quantity of the yardstick by id and conditions, all its values in one row."""
-    found: dict[Place, list[FloatArray]] = {}
+    result: dict[Place, list[FloatArray]] = {}
     for quantity, where, values in _quantities(table):
-        found.setdefault((quantity, where), []).append(np.ravel(values))
-    return {place: np.concatenate(values) for place, values in found.items()}
+        result.setdefault((quantity, where), []).append(np.ravel(values))
+    return {place: np.concatenate(values) for place, values in result.items()}
 
 
 def _quantities(table: Table) -> Iterator[tuple[str, str, FloatArray]]:

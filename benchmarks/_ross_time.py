@@ -63,13 +63,13 @@ def store(told: dict[str, Any]) -> None:
     scalar = _rates.rates(
         {"": _rates.scalar(_rates.machines(n=8), OVERSAMPLING)}, 5 * RUNS
     )[""]
-    found = {
+    result = {
         **told,
         "ross_simulated_s_per_core_s": told["simulated_s"] / told["cpu_s"],
         "scalar_simulated_s_per_core_s": scalar,
         **{name: value for name, value in machine().items() if name in MACHINE},
     }
-    STORED.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    STORED.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
 
 
 def stored() -> dict[str, Any] | None:
@@ -79,33 +79,33 @@ def stored() -> dict[str, Any] | None:
 
 def stored_rate() -> float | None:
     """Rate of ROSS as a share of that of the scalar code, None where ROSS never ran."""
-    found = stored()
+    result = stored()
     return (
         None
-        if found is None
-        else found["ross_simulated_s_per_core_s"]
-        / found["scalar_simulated_s_per_core_s"]
+        if result is None
+        else result["ross_simulated_s_per_core_s"]
+        / result["scalar_simulated_s_per_core_s"]
     )
 
 
 def lines() -> list[str]:
     """What is stored, in words."""
-    found = stored()
-    if found is None:
+    result = stored()
+    if result is None:
         return ["ROSS's time response was never timed here."]
     rate, scalar = (
-        found["ross_simulated_s_per_core_s"],
-        found["scalar_simulated_s_per_core_s"],
+        result["ross_simulated_s_per_core_s"],
+        result["scalar_simulated_s_per_core_s"],
     )
     return [
-        f"ROSS {found['ross_version']}, run_time_response with TVMS gears: "
-        f"{found['n_dof']} degrees of freedom, "
+        f"ROSS {result['ross_version']}, run_time_response with TVMS gears: "
+        f"{result['n_dof']} degrees of freedom, "
         f"Newmark's method, one step a sample at 51.2 kHz",
-        f"{found['cpu_s']:.3g} CPU s for {found['simulated_s']:.3g} s: {rate:.3g} "
+        f"{result['cpu_s']:.3g} CPU s for {result['simulated_s']:.3g} s: {rate:.3g} "
         "simulated s per core-s; scalar Numba "
         f"RK4 x{OVERSAMPLING} in the same run {scalar:.3g}, {scalar / rate:.3g} times as many",
         (
-            f"on {found['cpu_model']} ({found['cpu_target']}), load {found['load_at_start']} "
-            f"after it, {found['created']}"
+            f"on {result['cpu_model']} ({result['cpu_target']}), load {result['load_at_start']} "
+            f"after it, {result['created']}"
         ),
     ]

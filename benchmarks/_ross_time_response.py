@@ -25,10 +25,10 @@ def main() -> None:
     pair = two_shafts(job)
     response(pair, job, 20)  # compiles
     n_steps = round(job["duration"] * job["sampling_rate"])
-    found = [timed(pair, job, n_steps) for _ in range(job["runs"])]
+    result = [timed(pair, job, n_steps) for _ in range(job["runs"])]
     told = {
         "ross_version": ross.__version__,
-        "cpu_s": min(found),
+        "cpu_s": min(result),
         "simulated_s": (n_steps - 1) / job["sampling_rate"],
         "n_dof": pair.ndof,
     }
@@ -82,11 +82,11 @@ def response(pair: Any, job: dict[str, Any], n_steps: int) -> Any:
 def timed(pair: Any, job: dict[str, Any], n_steps: int) -> float:
     """CPU seconds of one response."""
     start = time.process_time()
-    found = response(pair, job, n_steps).yout
+    result = response(pair, job, n_steps).yout
     spent = time.process_time() - start
     if not (
-        np.all(np.isfinite(found))
-        and np.ptp(found[:, pair.number_dof * MIDDLE + 1]) > 0.0
+        np.all(np.isfinite(result))
+        and np.ptp(result[:, pair.number_dof * MIDDLE + 1]) > 0.0
     ):
         raise ArithmeticError("ROSS's response is not finite, or nothing moves")
     return spent

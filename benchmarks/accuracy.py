@@ -40,7 +40,7 @@ REFERENCE = 128
 
 def runs(overrides: Sequence[str], duration: float) -> list[tuple[str, Run]]:
     """Every fault at every condition, gears of the configured quality."""
-    found = []
+    result = []
     for fault in FAULTS:
         for speed, torque in CONDITIONS:
             words = [
@@ -72,8 +72,8 @@ def runs(overrides: Sequence[str], duration: float) -> list[tuple[str, Run]]:
                     rng, n_channels, system.quality, system.sensing.gain_scatter
                 ),
             )
-            found.append((f"{fault}, {speed} r/min, {torque} N m", run))
-    return found
+            result.append((f"{fault}, {speed} r/min, {torque} N m", run))
+    return result
 
 
 def finely(run: Run, oversampling: int, precision: str) -> Run:
@@ -86,14 +86,14 @@ def records(
     all_runs: Sequence[Run], oversampling: int, precision: str
 ) -> list[CleanRecord]:
     """One record a run; the first that fails raises."""
-    found = []
+    result = []
     for record in simulate_together(
         [finely(run, oversampling, precision) for run in all_runs]
     ):
         if not isinstance(record, CleanRecord):
             raise record
-        found.append(record)
-    return found
+        result.append(record)
+    return result
 
 
 def main() -> None:
@@ -124,8 +124,8 @@ def main() -> None:
         for (name, _), one in zip(named, exact, strict=True)
     }
     for oversampling, precision in ways:
-        found = records([run for _, run in named], oversampling, precision)
-        for (name, run), one, other in zip(named, found, exact, strict=True):
+        result = records([run for _, run in named], oversampling, precision)
+        for (name, run), one, other in zip(named, result, exact, strict=True):
             rate = run.system.sensing.sampling_rate
             pair = one.acceleration[None], other.acceleration[None]
             way = f"x{oversampling} {precision}"

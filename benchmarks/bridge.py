@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     place = nullcontext(options.data) if options.data else tempfile.TemporaryDirectory()
     try:
         with place as folder, _one_thread():
-            found = {
+            result = {
                 "worlds": judge_worlds(Path(folder)),
                 "control": judge_control(Path(folder)),
             }
@@ -60,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(f"\n{time.perf_counter() - begun:.0f} s")
     if options.json:
         told = {key: named[key] for key in TOLD}
-        text = json.dumps({"machine": told, "seeds": SEEDS, **found}, indent=1)
+        text = json.dumps({"machine": told, "seeds": SEEDS, **result}, indent=1)
         options.json.write_text(text + "\n", encoding="utf-8")
     return 0
 
@@ -69,8 +69,8 @@ def judge_worlds(folder: Path) -> dict[str, Any]:
     """Scores in each world, of every variant."""
     source = worlds.open_world(folder / "source", worlds.SOURCE)
     models = trained(folder / "model", folder / "source")
-    found = {"source": _own_score(folder / "model")}
-    print(f"\nin its own world, unseen units: {_said(found['source'])}", flush=True)
+    result = {"source": _own_score(folder / "model")}
+    print(f"\nin its own world, unseen units: {_said(result['source'])}", flush=True)
     for name, words in worlds.WORLDS.items():
         world = worlds.open_world(folder / name, words)
         judged = worlds.judge_world(source, world, models)
@@ -94,13 +94,13 @@ def judge_worlds(folder: Path) -> dict[str, Any]:
         print(
             f"  {'trained there':<24}{_said(there)} on its own test units", flush=True
         )
-        found[name] = {
+        result[name] = {
             "n_records": judged.label.size,
             "n_units": n_units,
             "variants": table,
             "trained_there": there,
         }
-    return found
+    return result
 
 
 def judge_control(folder: Path) -> dict[str, Any]:
@@ -114,7 +114,7 @@ def judge_control(folder: Path) -> dict[str, Any]:
             f"\nThe negative control is left out: ${VARIABLE} names no folder that holds it."
         )
         return {}
-    found = {}
+    result = {}
     for name, (words, options) in control.training_sets(file, folder / "twin").items():
         data = folder / f"control_{name}"
         if not data.is_dir():
@@ -122,7 +122,7 @@ def judge_control(folder: Path) -> dict[str, Any]:
         models = trained(folder / f"model_{data.name}", data, *control.TRAINING)
         own = _own_score(folder / f"model_{data.name}")
         rows = control.judge_control(file, models)
-        found[name] = {"own": own, "rows": rows}
+        result[name] = {"own": own, "rows": rows}
         print(
             f"\nnegative control, trained on {name}; on its own unseen units {_said(own)}"
         )
@@ -132,7 +132,7 @@ def judge_control(folder: Path) -> dict[str, Any]:
         )
         for row in rows:
             _print_control(row)
-    return found
+    return result
 
 
 def _print_control(row: Mapping[str, Any]) -> None:

@@ -202,13 +202,13 @@ def durations(folder: Path) -> dict[bool, float]:
         ]
     ):
         raise SystemExit("an undisturbed run failed")
-    found = {}
+    result = {}
     for command in (True, False):
         begin = time.monotonic()
         if start(folder / f"undisturbed-{command}", command=command).wait(LONGEST) != 0:
             raise SystemExit("an undisturbed run failed")
-        found[command] = time.monotonic() - begin
-    return found
+        result[command] = time.monotonic() - begin
+    return result
 
 
 def n_kills_of(outcome: Counter[str]) -> int:
@@ -239,10 +239,10 @@ def campaign(n_kills: int, seed: int, folder: Path) -> tuple[Counter[str], list[
                 kill_once(start(out, command=command), out, seconds[command], rng)
             ] += 1
             if (out / "manifest.json").is_file():
-                found = verify(out)
-                if found.complete != is_whole(out):
+                result = verify(out)
+                if result.complete != is_whole(out):
                     problems.append(
-                        f"set {number}: looks whole and is not: {found.problems[0]}"
+                        f"set {number}: looks whole and is not: {result.problems[0]}"
                     )
             elif out.exists():
                 outcome["of these before the manifest"] += 1

@@ -31,15 +31,15 @@ EVERY_S = 2.0
 
 def family(process: int) -> list[int]:
     """A process and all that it started."""
-    found = [process]
+    result = [process]
     for task in Path(f"/proc/{process}/task").glob("*/children"):
         try:
-            found += [
+            result += [
                 one for child in task.read_text().split() for one in family(int(child))
             ]
         except OSError:
             continue
-    return found
+    return result
 
 
 def memory(process: int) -> int:

@@ -85,7 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     place = nullcontext(options.data) if options.data else tempfile.TemporaryDirectory()
     try:
         with place as folder:
-            found = compare_all(base, size, Path(folder), pictures)
+            result = compare_all(base, size, Path(folder), pictures)
     except (GensigError, OSError) as error:
         print(f"benchmarks.realism: {error}", file=sys.stderr)
         return 1
@@ -96,19 +96,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     print(
         "\n".join(
-            ["", heading, "", *table(found), "", f"{time.perf_counter() - begun:.0f} s"]
+            [
+                "",
+                heading,
+                "",
+                *table(result),
+                "",
+                f"{time.perf_counter() - begun:.0f} s",
+            ]
         )
     )
     if options.json:
         rows = [
-            {key: _plain(value) for key, value in asdict(one).items()} for one in found
+            {key: _plain(value) for key, value in asdict(one).items()} for one in result
         ]
         text = json.dumps(
             {"machine": named, "compared": heading, "rows": rows}, indent=1
         )
         options.json.write_text(text + "\n", encoding="utf-8")
     if options.stored:
-        write_results(RESULTS, heading, found)
+        write_results(RESULTS, heading, result)
         print(
             f"stored in {RESULTS.name}; write the reasons of misses into its last column, "
             f"then run {PAGE}"
@@ -155,14 +162,14 @@ def yardstick_comparisons(
 ) -> list[Comparison]:
     """Rows of the first table."""
     with kept(folder / "yardstick", yardstick_words(base, size)) as data:
-        found = read_table(data)
-    least = found.indicators["n_turns"].min()
+        result = read_table(data)
+    least = result.indicators["n_turns"].min()
     told = (
-        f"{data.n_records} records, {found.n_failed} failed, at least {least:.0f} turns of "
+        f"{data.n_records} records, {result.n_failed} failed, at least {least:.0f} turns of "
         "the faulted shaft"
     )
     print(f"yardstick: {told}", flush=True)
-    values = quantities(found)
+    values = quantities(result)
     return [
         compare(measured, values.get(place, math.nan))
         for place, measured in read_ranges().items()

@@ -223,11 +223,11 @@ def comparison(
         scale, unit_name = SCALES[unit]
         cells = [quantity, point, unit_name, f"{value * scale:.5g}"]
         for column in columns:
-            found = column.get((quantity, point))
+            result = column.get((quantity, point))
             cells += (
                 ["", ""]
-                if found is None
-                else [f"{found * scale:.5g}", f"{found / value:.4f}"]
+                if result is None
+                else [f"{result * scale:.5g}", f"{result / value:.4f}"]
             )
         yield _line(cells)
     for quantity in ("mesh_stiffness", "mesh_stiffness_own_path"):
@@ -235,8 +235,8 @@ def comparison(
         value = float(np.mean([ross[key][0] for key in keys]))
         cells = [quantity, "mean", SCALES["N/m"][1], f"{value * 1e-8:.5g}"]
         for column in columns:
-            found = float(np.mean([column[key] for key in keys]))
-            cells += [f"{found * 1e-8:.5g}", f"{found / value:.4f}"]
+            result = float(np.mean([column[key] for key in keys]))
+            cells += [f"{result * 1e-8:.5g}", f"{result / value:.4f}"]
         yield _line(cells)
 
 
@@ -252,7 +252,7 @@ def body_evidence(
     choices = ("as it stands", "theta_f without c*", "u_f to the contact", "both")
     yield from _head("gear", "at", *choices)
     for gear, curvature in ours.sides(system.pair, np.array(list(points.values()))):
-        found = [
+        result = [
             ours.foundation(
                 gear, curvature, system, half_angle=half_angle, height=height
             )
@@ -266,7 +266,7 @@ def body_evidence(
                     [
                         gear.name,
                         point,
-                        *(f"{values[index] / value:.4f}" for values in found),
+                        *(f"{values[index] / value:.4f}" for values in result),
                     ]
                 )
 
@@ -314,9 +314,12 @@ def steps(pair: str) -> Iterator[str]:
             change
         ] * bool(change)
         values = ours.gensig_values(ours.machine(pair, chosen))
-        found = (values["pair_stiffness", "C"], values["mesh_stiffness", "cycle 0.375"])
+        result = (
+            values["pair_stiffness", "C"],
+            values["mesh_stiffness", "cycle 0.375"],
+        )
         yield _line(
-            [change or "the paper's", *(f"{value * 1e-8:.4f}" for value in found)]
+            [change or "the paper's", *(f"{value * 1e-8:.4f}" for value in result)]
         )
 
 

@@ -149,8 +149,8 @@ def against_duration(runs: int) -> dict[str, float]:
         ]
         works[f"{duration:g} s"] = partial(simulate, timed)
     simulate(group)
-    found = in_turn(works, runs)
-    return {**found, **straight("second", DURATIONS, list(found.values()), LANES)}
+    result = in_turn(works, runs)
+    return {**result, **straight("second", DURATIONS, list(result.values()), LANES)}
 
 
 def straight(
@@ -175,25 +175,25 @@ def against_number(runs: int) -> dict[str, float]:
     """CPU milliseconds a record by the number of records of a data set, made by one process from
     plan to index.
     """
-    found = []
+    result = []
     for n_records in COUNTS:
         told = [
             alone(make_set, str(n_records), *QUICKSTART, *SHORT)
             for _ in range(runs if n_records < 1000 else 1)
         ]
-        found.append(min(spent for spent, _ in told))
+        result.append(min(spent for spent, _ in told))
     values = {
         f"{n} short records": spent / n * 1e3
-        for n, spent in zip(COUNTS, found, strict=True)
+        for n, spent in zip(COUNTS, result, strict=True)
     }
-    return {**values, **straight("record", COUNTS, found)}
+    return {**values, **straight("record", COUNTS, result)}
 
 
 def memory(_runs: int) -> dict[str, float]:
     """Peak memory in MB of the process that plans, and of a worker that makes one whole shard, by
     number of records.
     """
-    found = {}
+    result = {}
     for n_records in LONG_COUNTS:
         with tempfile.TemporaryDirectory() as folder:
             out = str(Path(folder) / "set")
@@ -202,11 +202,11 @@ def memory(_runs: int) -> dict[str, float]:
                 alone(make_shard, out),
             )
         name = f"{n_records} records of 1 s and four channels"
-        found |= {
+        result |= {
             f"{name}: planning": planning[1] / 1e6,
             f"{name}: worker": working[1] / 1e6,
         }
-    return found
+    return result
 
 
 def against_teeth(runs: int) -> tuple[dict[str, float], dict[str, float]]:
@@ -233,11 +233,11 @@ def against_teeth(runs: int) -> tuple[dict[str, float], dict[str, float]]:
     spent = in_turn(tables, runs)
     for motion in motions.values():
         motion()
-    found = {
+    result = {
         name: value / LANES * 1e3 for name, value in in_turn(motions, runs).items()
     }
     line = straight("tooth", TEETH, list(spent.values()))
-    return {**{name: value * 1e3 for name, value in spent.items()}, **line}, found
+    return {**{name: value * 1e3 for name, value in spent.items()}, **line}, result
 
 
 def against_freedom(runs: int) -> dict[str, float]:
@@ -263,9 +263,9 @@ def main() -> None:
         measure: Callable[[int], dict[str, float] | tuple[dict[str, float], ...]],
         *titles: str,
     ) -> None:
-        found = measure(arguments.runs)
+        result = measure(arguments.runs)
         for title, values in zip(
-            titles, found if isinstance(found, tuple) else (found,), strict=True
+            titles, result if isinstance(result, tuple) else (result,), strict=True
         ):
             sections[title] = values
             print_figures(title, values)

@@ -104,18 +104,18 @@ def main() -> None:
         " ".join(f"{kind} {i}" for kind, i in CHANNELS),
     )
     for oversampling in words.oversampling:
-        found, _ = engine_run(oversampling, words.checked, loaded=True)
+        result, _ = engine_run(oversampling, words.checked, loaded=True)
         errors = [
             float(
                 in_band_error(
-                    found.signals[c][None, None], exact.signals[c][None, None], RATE
+                    result.signals[c][None, None], exact.signals[c][None, None], RATE
                 )[0]
             )
             for c in CHANNELS
         ]
         told = " ".join(f"{error:.1e}" for error in errors)
         print(
-            f"{1e6 / RATE / oversampling:7.2f} | {found.energy_residual:.1e} | {told}"
+            f"{1e6 / RATE / oversampling:7.2f} | {result.energy_residual:.1e} | {told}"
         )
 
 

@@ -160,9 +160,9 @@ def main() -> None:
         [*words, f"dataset.records_per_shard={arguments.records}"]
     ).config
     records = simulated(config)
-    found: dict[str, dict[str, float]] = {}
+    result: dict[str, dict[str, float]] = {}
     with tempfile.TemporaryDirectory(dir=arguments.folder) as name:
-        found["h5py alone, contiguous float32"] = plain(
+        result["h5py alone, contiguous float32"] = plain(
             records, Path(name) / "plain.h5", arguments.runs
         )
         for sample_type in SAMPLE_TYPES:
@@ -171,13 +171,13 @@ def main() -> None:
                     "dataset", compression=compression, sample_type=sample_type
                 )
                 out = Path(name) / f"{sample_type}-{compression}"
-                found[f"{sample_type}, {compression}"] = shard(
+                result[f"{sample_type}, {compression}"] = shard(
                     stored, records, out, arguments.runs
                 )
     header = ("stored as", "write MB/s", "ratio", "read 1 record ms", "error dB")
     print("{:<32}{:>12}{:>8}{:>18}{:>10}".format(*header))
     for way, (write, ratio, read, error) in (
-        (way, values.values()) for way, values in found.items()
+        (way, values.values()) for way, values in result.items()
     ):
         shown_error = f"{error:.1f}" if error > -np.inf else "none"
         print(f"{way:<32}{write:>12.0f}{ratio:>8.2f}{read:>18.2f}{shown_error:>10}")
@@ -188,7 +188,7 @@ def main() -> None:
         }
         exact = {
             way: {k: v if np.isfinite(v) else None for k, v in values.items()}
-            for way, values in found.items()
+            for way, values in result.items()
         }
         Path(arguments.json).write_text(
             json.dumps({**machine, "ways": exact}, indent=1) + "\n", encoding="utf-8"

@@ -70,12 +70,12 @@ def export_onnx(network: StoredNetwork, file: Path) -> str:
     try:
         write_onnx(whole, two, graph.output, file)
         describe_onnx(file, description, graph.facts)
-        found = answers_of(file, inputs, graph.output) / graph.unit
+        result = answers_of(file, inputs, graph.output) / graph.unit
         taken = (normalised(windows, description.normalise), *graph.further.values())
         with torch.inference_mode():
             answer = graph.answer(network.model, *map(torch.from_numpy, taken))
         expected = answer.numpy().astype(float)
-        error = np.abs(found - expected) / np.maximum(np.abs(expected), 1.0)
+        error = np.abs(result - expected) / np.maximum(np.abs(expected), 1.0)
         difference = float(np.max(error))
         if not difference <= TOLERANCE:
             raise GensigError(

@@ -298,16 +298,18 @@ def _in_domain(
 
     Refuses a recording with less bandwidth than that.
     """
-    found, rate = recording.sampling_rate, description.sampling_rate_hz
+    result, rate = recording.sampling_rate, description.sampling_rate_hz
     file = source.file
-    if found < rate * (1 - RATE_TOLERANCE):
+    if result < rate * (1 - RATE_TOLERANCE):
         raise ConfigError(
-            f"{file} has {found:g} samples a second and so nothing above {found / 2:g} Hz; the "
+            f"{file} has {result:g} samples a second and so nothing above {result / 2:g} Hz; the "
             f"model was trained at {rate:g}: measure faster, or train a model with "
-            f"sampling_rate_hz={found:g} or below"
+            f"sampling_rate_hz={result:g} or below"
         )
     if tracked is None:
-        return rate_change(found, rate).apply(recording.acceleration).astype(np.float32)
+        return (
+            rate_change(result, rate).apply(recording.acceleration).astype(np.float32)
+        )
     from diagnose.data.tracking import at_constant_speed
 
     speed, played = tracked.speed_rpm, _played_at(tracked, source)
@@ -318,11 +320,11 @@ def _in_domain(
                 f"--to-speed {played:g} must lie in the {low:.0f} to {high:.0f} r/min of the "
                 "training",
             )
-    as_fast = found * played / speed
+    as_fast = result * played / speed
     if as_fast < rate * (1 - RATE_TOLERANCE):
         raise ConfigError(
-            f"{file}: {found:g} samples a second at {speed:.4g} r/min, played at {played:g}, are "
+            f"{file}: {result:g} samples a second at {speed:.4g} r/min, played at {played:g}, are "
             f"{as_fast:.5g}; the model was trained at {rate:g}: give a --to-speed of "
-            f"{speed * rate / found:.4g} or more"
+            f"{speed * rate / result:.4g} or more"
         )
     return at_constant_speed(tracked, rate, played).astype(np.float32)

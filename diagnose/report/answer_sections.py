@@ -42,12 +42,12 @@ def _detection_section(folder: Path, answers: Content) -> Section:
     for protocol, part in answers.items():
         for method, detection in part["detection"].items():
             alarms = interval_text(detection["false_alarms"])
-            for name, found in detection["classes"].items():
-                cells = [interval_text(found[key]) for key in ("auroc", "share_found")]
+            for name, result in detection["classes"].items():
+                cells = [interval_text(result[key]) for key in ("auroc", "share_found")]
                 source = f"{alarms} ({detection['threshold_from']})"
                 rows.append([protocol, method, name, *cells, source])
         mine = part["detection"][part["network"]]
-        notes += [(protocol, found["summary"]) for found in mine["classes"].values()]
+        notes += [(protocol, result["summary"]) for result in mine["classes"].values()]
         if mine["too_many_false_alarms"]:
             warning = (
                 "false alarms are above 5 % here, so that the shares found and the limits are "

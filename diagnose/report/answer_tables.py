@@ -87,8 +87,8 @@ def _condition_rows(answers: Content) -> Iterator[Entry]:
 def _class_rows(answers: Content, key: str) -> Iterator[tuple[Entry, Content]]:
     """Method and class, and each entry of a list of ``detection``."""
     for method, detection in answers.get("detection", {}).items():
-        for name, found in detection["classes"].items():
-            for row in found[key]:
+        for name, result in detection["classes"].items():
+            for row in result[key]:
                 yield {"method": method, "class": name}, row
 
 

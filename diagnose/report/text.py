@@ -158,18 +158,18 @@ def recall_table(clean: Content, model: str, class_names: Sequence[str]) -> Tabl
 
 def confusions(confusion: Sequence[Sequence[int]], class_names: Sequence[str]) -> str:
     """The largest off-diagonal shares, at most three."""
-    found = []
+    result = []
     for true, row in zip(class_names, confusion, strict=True):
         total = max(int(np.sum(row)), 1)
         for predicted, count in zip(class_names, row, strict=True):
             if true != predicted and count / total >= CONFUSED:
-                found.append((count / total, true, predicted))
-    if not found:
+                result.append((count / total, true, predicted))
+    if not result:
         return (
             f"no class is taken for another in {CONFUSED:.0%} of its records or more."
         )
-    found.sort(reverse=True)
-    texts = [f"{true} taken for {other} ({share:.0%})" for share, true, other in found]
+    result.sort(reverse=True)
+    texts = [f"{true} taken for {other} ({share:.0%})" for share, true, other in result]
     return "; ".join(texts[:3]) + "."
 
 

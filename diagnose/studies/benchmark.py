@@ -174,7 +174,7 @@ def _labels(
         str(name): index for index, name in enumerate(task.dataset.column("record_id"))
     }
     class_of = {name: index for index, name in enumerate(task.class_names)}
-    found: dict[tuple[str, str, str], dict[int, int]] = {}
+    result: dict[tuple[str, str, str], dict[int, int]] = {}
     for line, row in enumerate(_rows(path), start=2):
         key = (
             row.get("protocol") or protocol or "by_unit",
@@ -193,11 +193,11 @@ def _labels(
             raise ConfigError(
                 f"{where}: there is no class {predicted!r}; there is {known}"
             )
-        labels = found.setdefault(key, {})
+        labels = result.setdefault(key, {})
         if number_of[name] in labels:
             raise DatasetError(f"{where}: record {name} twice for {', '.join(key)}")
         labels[number_of[name]] = class_of[predicted]
-    return found
+    return result
 
 
 def _rows(path: Path) -> list[dict[str, str]]:

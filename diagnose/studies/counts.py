@@ -66,11 +66,11 @@ def n_different(values: NDArray[Any]) -> int:
 
 def by_method(runs: Sequence[AnyRun], protocol: str) -> dict[str, list[AnyRun]]:
     """Method -> its runs on a protocol."""
-    found: dict[str, list[AnyRun]] = {}
+    result: dict[str, list[AnyRun]] = {}
     for run in runs:
         if run.protocol == protocol:
-            found.setdefault(run.method, []).append(run)
-    return found
+            result.setdefault(run.method, []).append(run)
+    return result
 
 
 def run_notes(runs: Sequence[Run]) -> dict[str, list[Any]]:

@@ -55,12 +55,12 @@ def _listing(word: str | None, folder: str | None) -> Listing:
 
 
 def _all_groups(folder: str | None) -> Listing:
-    found, parts = groups(folder), sections()
+    result, parts = groups(folder), sections()
     contents = []
-    for group in found:
+    for group in result:
         names = [option.name for option in options(group.name, folder)]
         contents.append({**asdict(group), "options": names})
-    group_rows = [(group.name, group.default or "-", group.about) for group in found]
+    group_rows = [(group.name, group.default or "-", group.about) for group in result]
     section_rows = [(name, READ_BY[parts[name]], _key_names(name)) for name in parts]
     lines = [
         "groups: choose with GROUP=OPTION; `gensig options GROUP` lists the options",
@@ -92,7 +92,7 @@ def _one_group(group: str, folder: str | None) -> Listing:
 
 def _one_option(group: str, option: str, folder: str | None) -> Listing:
     _defaults(group, folder)
-    abouts = {found.name: found.about for found in options(group, folder)}
+    abouts = {result.name: result.about for result in options(group, folder)}
     if option not in abouts:
         hint = option_files.elsewhere(group, option) or nearest.hint(option, abouts)
         raise ConfigError(f"no option '{option}' of {group}; {hint}")
@@ -115,7 +115,7 @@ def _one_option(group: str, option: str, folder: str | None) -> Listing:
 
 def _defaults(group: str, folder: str | None) -> dict[str, Any]:
     """Group -> default option; raises ConfigError where ``group`` is no group."""
-    defaults = {found.name: found.default for found in groups(folder)}
+    defaults = {result.name: result.default for result in groups(folder)}
     if group in defaults:
         return defaults
     for name in defaults:

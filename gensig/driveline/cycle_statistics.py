@@ -73,5 +73,5 @@ def order_amplitudes(signals: Array, crank_angle: Array, n_orders: int) -> Array
     rest = without_trend(signals[:, used], angle)
     orders = 0.5 * np.arange(1, n_orders + 1)
     # an order at a time: all of them for a minute of samples would fill the memory
-    found = [np.abs((rest * weight) @ np.exp(-1j * order * angle)) for order in orders]
-    return 2.0 / weight.sum() * np.array(found).T
+    result = [np.abs((rest * weight) @ np.exp(-1j * order * angle)) for order in orders]
+    return 2.0 / weight.sum() * np.array(result).T

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.cycle import CYCLE
-from gensig.driveline.linear.damper_tuning import SeenFromNodes, seen_from_nodes
+from gensig.driveline.linear.damper_tuning import NodeResponse, response_at_nodes
 from gensig.driveline.linear.dampers import TorsionalDamper, with_dampers
 from gensig.driveline.linear.forced import USUAL_ORDERS, SteadyResponse, over_cycle
 from gensig.driveline.linear.shaft_line import LineGear
@@ -76,7 +76,7 @@ class DynamicRootStress:
     passes: dict[str, Array]
 
 
-def with_own_dampers(
+def with_further_dampers(
     line: EngineLine, dampers: Sequence[TorsionalDamper]
 ) -> EngineLine:
     """The same engine with further dampers on its line."""
@@ -110,13 +110,13 @@ def tooth_load(line: EngineLine, mesh: int, response: SteadyResponse) -> ToothLo
     )
 
 
-def seen_by_dampers(
+def response_for_dampers(
     line: EngineLine,
     mesh: int,
     nodes: Sequence[int],
     speeds: Iterable[float],
     torque: float,
-) -> SeenFromNodes:
+) -> NodeResponse:
     """Force of a mesh over a range of speeds (rad/s) at one brake torque, for dampers on ``nodes``.
 
     Raises
@@ -134,7 +134,7 @@ def seen_by_dampers(
             f"dampers on nodes {', '.join(map(str, nodes))}: name each node once"
         )
     linear, meshes = line.linear()
-    return seen_from_nodes(
+    return response_at_nodes(
         linear,
         meshes,
         mesh,

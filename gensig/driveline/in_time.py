@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.running import (
     Governor,
-    OwnMesh,
+    TabulatedMesh,
     mesh_forces,
     running_line,
     steady_course,
@@ -57,9 +57,9 @@ class TimeResponse:
     energy_residual: float
 
 
-def own_meshes(
+def tabulated_meshes(
     machine: EngineLine, config: Configuration, speed: float, torque: float
-) -> dict[int, OwnMesh]:
+) -> dict[int, TabulatedMesh]:
     """Tables of sound teeth by the place of their mesh, each under its mean force."""
     mesh = config["mesh"]
     law = ToothLaw(
@@ -75,7 +75,7 @@ def time_response(
     speed: float,
     torque: float,
     *,
-    own: dict[int, OwnMesh],
+    own: dict[int, TabulatedMesh],
     nodes: Sequence[int],
     duration: float,
 ) -> TimeResponse:

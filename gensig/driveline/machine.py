@@ -28,8 +28,8 @@ from gensig.driveline.mesh_phase import start_phase
 from gensig.driveline.running import (
     EngineCourse,
     Governor,
-    OwnMesh,
     RunningLine,
+    TabulatedMesh,
     mesh_forces,
     named_by_side,
     one_thread,
@@ -373,7 +373,7 @@ class LineMachine(Machine):
             specimen=specimen,
             turned=turned,
         )
-        own = OwnMesh(
+        own = TabulatedMesh(
             table=specimen_table(self, run.faults, specimen),
             errors=(specimen.pinion_error, specimen.wheel_error),
             start_teeth=teeth,

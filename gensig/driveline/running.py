@@ -65,7 +65,7 @@ class Governor:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class OwnMesh:
+class TabulatedMesh:
     """A mesh with tabulated teeth: table, errors of the teeth (tooth,) m, teeth at the start.
 
     ``start_phase`` in pitches must agree with where the crank stands; None follows from it.
@@ -173,7 +173,7 @@ def running_line(
     course: EngineCourse,
     *,
     governor: Governor,
-    own: Mapping[int, OwnMesh] | None = None,
+    own: Mapping[int, TabulatedMesh] | None = None,
     turned: float = 0.0,
 ) -> RunningLine:
     """The line of an engine with its torques along a course.
@@ -236,7 +236,7 @@ def _geared(
     matrices: LineMatrices,
     governor: Governor,
     forces: Array,
-    own: Mapping[int, OwnMesh],
+    own: Mapping[int, TabulatedMesh],
     turned: float,
 ) -> GearedLine:
     rotation = matrices.rigid[0]
@@ -262,7 +262,7 @@ def _mesh(
     matrices: LineMatrices,
     number: int,
     force: float,
-    own: OwnMesh | None,
+    own: TabulatedMesh | None,
     roll: float,
 ) -> LineMesh:
     drive = machine.drive

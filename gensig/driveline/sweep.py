@@ -28,7 +28,7 @@ from gensig.driveline.in_time import (
     SETTLING,
     SOLVER,
 )
-from gensig.driveline.running import EngineCourse, OwnMesh, running_line
+from gensig.driveline.running import EngineCourse, TabulatedMesh, running_line
 from gensig.driveline.time.newmark import LineMotion
 from gensig.errors import ConfigError
 
@@ -80,7 +80,7 @@ class Sweep:
         return 2.0 * (up - down) / (up + down)
 
     @property
-    def told_apart(self) -> Array:
+    def is_distinct(self) -> Array:
         """True where up and down differ by more than their cycles scatter, (node, bin)."""
         error = np.hypot(self.up.scatter, self.down.scatter)
         return np.asarray(
@@ -107,7 +107,7 @@ def sweep_response(
     seconds: float,
     torque: float,
     *,
-    own: dict[int, OwnMesh],
+    own: dict[int, TabulatedMesh],
     nodes: Sequence[int],
     n_orders: int,
 ) -> Sweep:
@@ -162,7 +162,7 @@ def _way(
     speeds: Array,
 ) -> SweepWay:
     """One way: ``edges`` (bin + 1,) s of its bins, ``speeds`` (bin,) in their middles."""
-    found: dict[str, list[Array]] = {
+    result: dict[str, list[Array]] = {
         key: [] for key in ("angle", "mean", "scatter", "force", "spectra")
     }
     frequencies = np.zeros(0)
@@ -171,19 +171,22 @@ def _way(
         inside = slice(math.ceil(begin * RATE), math.floor(end * RATE))
         crank, part = motion.nominal_angle[inside], signals[:, inside]
         cycles = fluctuations(part[n_nodes : 2 * n_nodes], crank)
-        found["angle"].append(order_amplitudes(part[:n_nodes], crank, n_orders))
-        found["mean"].append(cycles.mean(axis=1))
-        found["scatter"].append(cycles.std(axis=1, ddof=1) / math.sqrt(cycles.shape[1]))
-        found["force"].append(typical_extremes(part[2 * n_nodes :], crank)[1])
+        result["angle"].append(order_amplitudes(part[:n_nodes], crank, n_orders))
+        result["mean"].append(cycles.mean(axis=1))
+        result["scatter"].append(
+            cycles.std(axis=1, ddof=1) / math.sqrt(cycles.shape[1])
+        )
+        result["force"].append(typical_extremes(part[2 * n_nodes :], crank)[1])
         first = round(0.5 * (begin + end) * RATE) - n_window // 2
         first = min(max(first, 0), signals.shape[1] - n_window)
         frequencies, spectra = amplitude_spectra(
             signals[:n_nodes, first : first + n_window]
         )
-        found["spectra"].append(spectra)
+        result["spectra"].append(spectra)
     order = np.argsort(speeds)
     by_bin = {
-        key: np.moveaxis(np.array(values)[order], 0, 1) for key, values in found.items()
+        key: np.moveaxis(np.array(values)[order], 0, 1)
+        for key, values in result.items()
     }
     return SweepWay(
         speeds=speeds[order],

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gensig.driveline.drive_line import DriveLine
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.mesh_phase import first_slice_lead, start_rolls
-from gensig.driveline.running import OwnMesh, named_by_side, reference_force
+from gensig.driveline.running import TabulatedMesh, named_by_side, reference_force
 from gensig.driveline.time.line_mesh import mesh_start, tooth_angle
 from gensig.errors import ConfigError, GeometryError
 from gensig.faults.base import Fault, faulty_teeth
@@ -91,7 +91,7 @@ def require_drive(pair: GearPair, slices: SliceOptions) -> None:
 
 def sound_meshes(
     machine: EngineLine, law: ToothLaw, forces: Array, *, left_out: Collection[int] = ()
-) -> dict[int, OwnMesh]:
+) -> dict[int, TabulatedMesh]:
     """Sound teeth of the meshes by their place, each under its mean force of ``forces`` (mesh,) N.
 
     Helical meshes only with ``system.helical_meshes=sliced``; those of ``left_out`` are left out.
@@ -105,7 +105,7 @@ def sound_meshes(
             continue
         law_of_pair = (law, thin)[is_helical]
         table = _table_in_line(machine, law_of_pair, number, (), float(forces[number]))
-        meshes[number] = OwnMesh(table=table)
+        meshes[number] = TabulatedMesh(table=table)
     return meshes
 
 
@@ -150,7 +150,7 @@ def neighbour_meshes(
     faults: Sequence[Fault],
     specimen: Specimen,
     turned: float,
-) -> dict[int, OwnMesh]:
+) -> dict[int, TabulatedMesh]:
     """The other meshes of the two gears of a mesh with what these gears have, sound or not, by
     their place.
 
@@ -177,7 +177,7 @@ def neighbour_meshes(
         teeth[there] = tooth_there(
             machine.drive, (number, here), (other, there), start, turned
         )
-        meshes_of[other] = OwnMesh(
+        meshes_of[other] = TabulatedMesh(
             table=_table_in_line(machine, law, other, carried, float(forces[other])),
             errors=(errors[0], errors[1]),
             start_teeth=(teeth[0], teeth[1]),

@@ -80,7 +80,7 @@ def integrate(
     sampling_rate: float,
     duration: float,
     channels: tuple[str, ...],
-    tell_mesh: bool = False,
+    with_mesh_state: bool = False,
 ) -> Motions:
     """Motions of machines that have settled, from time 0 on for ``duration`` s, one row a machine.
 
@@ -99,7 +99,7 @@ def integrate(
         sampling_rate=sampling_rate,
         duration=duration,
         channels=channels,
-        tell_mesh=tell_mesh,
+        with_mesh_state=with_mesh_state,
         oversampling=solver.oversampling,
         precision=solver.precision,
         max_error=solver.max_error,

@@ -115,7 +115,7 @@ class RecordInputs:
 
     def without_faults(self) -> RecordInputs:
         """The same record of the sound machine: same start, unit and condition."""
-        return replace(self, run=replace(self.run, faults=(), tell_mesh=False))
+        return replace(self, run=replace(self.run, faults=(), with_mesh_state=False))
 
     def from_start(self, start: Start) -> RecordInputs:
         """The same record from another start."""
@@ -247,7 +247,7 @@ class InputReader:
                 seed, numbers.specimen, pair.pinion, pair.wheel, machine.quality
             ),
             gearbox=_gearbox(seed, gearbox, machine),
-            tell_mesh=self.dataset.store_mesh_state,
+            with_mesh_state=self.dataset.store_mesh_state,
             discs=machine.draw_discs(stream(seed, Stream.TOOTHED_WHEEL, gearbox)),
         )
         return RecordInputs(

@@ -18,7 +18,7 @@ from gensig.errors import ConfigError
 from gensig.report import tables
 from gensig.report.examples import Choice, choose, envelope_band, example, usable_top
 from gensig.report.levels import VELOCITY, level_table, loudness, velocity_rms
-from gensig.report.measured_ranges import at_measured_rate, beside_measurements
+from gensig.report.measured_ranges import at_measured_rate, compare_with_measurements
 from gensig.report.packing import pack_floats
 from gensig.report.realism import Comparison
 from gensig.report.rotation_frequencies import Rotation, read_rotation
@@ -96,7 +96,7 @@ def report_text(data: Dataset, per_class: int | None) -> tuple[str, str]:
     own_units = [units[name] for name in chosen.channels]
     drawn = some_records(data, MOST_ROWS)
     measured = measure(data, rotation, chosen.channels, _further)
-    compared = beside_measurements(data, measured, own_units)
+    compared = compare_with_measurements(data, measured, own_units)
     content = _content(data, chosen, rotation, own_units, drawn, measured, compared)
     name = plain(data.folder.resolve().name)
     n_shown = sum(len(records) for records in chosen.records.values())

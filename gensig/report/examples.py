@@ -90,31 +90,31 @@ def choose(data: Dataset, per_class: int | None) -> Choice:
 
 def _spread(data: Dataset, name: str, n_shown: int) -> list[int]:
     """Records of a class, or of its worst life, at even steps of the rank of their severity."""
-    found = np.flatnonzero((data.column("label_name") == name) & data.usable)
-    found = found[np.argsort(data.column("severity")[found], kind="stable")]
+    result = np.flatnonzero((data.column("label_name") == name) & data.usable)
+    result = result[np.argsort(data.column("severity")[result], kind="stable")]
     if has_lives(data):  # the machine that gets worst, from its beginning
-        life = data.column("life_id")[found]
-        found = found[life == life[-1]]
-    ranks = np.array([found.size // 2])
+        life = data.column("life_id")[result]
+        result = result[life == life[-1]]
+    ranks = np.array([result.size // 2])
     if n_shown > 1:
-        ranks = np.linspace(0, found.size - 1, n_shown)
-    return list(dict.fromkeys(found[np.rint(ranks).astype(int)].tolist()))
+        ranks = np.linspace(0, result.size - 1, n_shown)
+    return list(dict.fromkeys(result[np.rint(ranks).astype(int)].tolist()))
 
 
 def _sound(data: Dataset, faulty: Sequence[Sequence[int]], n_shown: int) -> list[int]:
     """Healthy records at the conditions of the middle faulty records, filled up with any."""
     condition, unit = data.column("condition_id"), data.column("unit_id")
     sound = np.flatnonzero((data.column("label_name") == "healthy") & data.usable)
-    found: list[int] = []
+    result: list[int] = []
     for records in faulty:
         middle = records[len(records) // 2]
         is_same = (condition[sound] == condition[middle]) & (
             unit[sound] == unit[middle]
         )
-        found += sound[is_same][:1].tolist()
-    found = list(dict.fromkeys(found))[:n_shown]
+        result += sound[is_same][:1].tolist()
+    result = list(dict.fromkeys(result))[:n_shown]
     others = _spread(data, "healthy", n_shown)
-    return list(dict.fromkeys([*found, *others]))[:n_shown]
+    return list(dict.fromkeys([*result, *others]))[:n_shown]
 
 
 def example(

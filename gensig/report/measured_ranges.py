@@ -35,7 +35,7 @@ def at_measured_rate(signal: FloatArray, sampling_rate: float) -> dict[str, Floa
     return {"rms_5_khz": rms(x), "kurtosis_5_khz": kurtosis(x)}
 
 
-def beside_measurements(
+def compare_with_measurements(
     data: Dataset, measured: Measured, units: list[str]
 ) -> list[Comparison]:
     """Every quantity with a measured range for which the data set has values.
@@ -49,16 +49,16 @@ def beside_measurements(
         return []
     values = {name: of[:, shown] for name, of in measured.further.items()}
     label = data.column("label_name")[measured.records]
-    found: dict[Place, FloatArray] = {}
+    result: dict[Place, FloatArray] = {}
     for name in data.class_names:
         mine = label == name
         for at in (ALL, ELSEWHERE):
-            found[f"{name}.kurtosis", at] = values["kurtosis_5_khz"][mine]
-    found |= _ratios(data, measured, values)
+            result[f"{name}.kurtosis", at] = values["kurtosis_5_khz"][mine]
+    result |= _ratios(data, measured, values)
     ranges = read_ranges()
     compared = [
         compare(ranges[place], of)
-        for place, of in found.items()
+        for place, of in result.items()
         if place in ranges and np.isfinite(of).any()
     ]
     return [one for one in compared if one.low is not None or one.high is not None]
@@ -81,12 +81,12 @@ def _ratios(
     sound: dict[tuple[object, ...], list[int]] = defaultdict(list)
     for row in np.flatnonzero(label == "healthy").tolist():
         sound[condition[row]].append(row)
-    found: dict[Place, list[FloatArray]] = defaultdict(list)
+    result: dict[Place, list[FloatArray]] = defaultdict(list)
     for row in np.flatnonzero(label != "healthy").tolist():
         for other in sound[condition[row]]:
             if specimen[row] != specimen[other]:
                 for name in ("rms", "kurtosis"):
                     level = values[f"{name}_5_khz"]
                     ratio = level[row] / level[other]
-                    found[f"{label[row]}.{name}_ratio", ALL].append(ratio)
-    return {name: np.concatenate(ratios) for name, ratios in found.items()}
+                    result[f"{label[row]}.{name}_ratio", ALL].append(ratio)
+    return {name: np.concatenate(ratios) for name, ratios in result.items()}

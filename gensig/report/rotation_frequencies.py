@@ -57,7 +57,7 @@ class Rotation:
         drive = ("drive", "turns of the driving shaft")
         if not np.any(np.isfinite(self.mesh) & (self.mesh > 0.0)):
             return [drive] * bool(np.any(self.drive > 0.0))
-        found = [(gear, f"turns of the {gear}") for gear in self.n_teeth]
+        result = [(gear, f"turns of the {gear}") for gear in self.n_teeth]
         turning = (self.mesh > 0.0) & (self.drive > 0.0)
         ratios = [
             self.turns(gear)[turning] / self.drive[turning] for gear in self.n_teeth
@@ -65,8 +65,8 @@ class Rotation:
         if np.any(turning) and all(
             np.abs(ratio - 1.0).max() > SAME for ratio in ratios
         ):
-            found.append(drive)
-        return [*found, ("mesh", "meshes of a tooth")]
+            result.append(drive)
+        return [*result, ("mesh", "meshes of a tooth")]
 
 
 def read_rotation(data: Dataset) -> Rotation:

@@ -103,14 +103,14 @@ def value_table(
 def drawn_columns(data: Dataset, records: NDArray[np.intp]) -> list[str]:
     """Names of the numbers that differ between records, drawn parameters first."""
     params = [name for name in data.column_names if name.startswith(f"{PARAMS}/")]
-    found = []
+    result = []
     for name in [*params, *(name for name in PLAIN if name in data.column_names)]:
         values = data.column(name)
         if values.ndim == 1 and values.dtype.kind in "iuf":
             finite = values[records][np.isfinite(values[records])]
             if finite.size and np.ptp(finite) > 0.0:
-                found.append(name)
-    return found
+                result.append(name)
+    return result
 
 
 def column_label(name: str) -> str:
@@ -196,10 +196,10 @@ def life_table(data: Dataset) -> dict[str, Any]:
     usable = np.flatnonzero(data.usable & np.isin(names, shown))
     order = np.array([number[name] for name in names[usable].tolist()], dtype=float)
     usable = usable[np.lexsort((data.column("life_time_h")[usable], order))]
-    found = value_table(
+    result = value_table(
         data, usable, ["life_time_h", "remaining_life_h", "severity", "life_failed"]
     )
-    found["columns"]["life"] = pack_floats(
+    result["columns"]["life"] = pack_floats(
         [number[name] for name in names[usable].tolist()]
     )
-    return {**found, "names": [str(name) for name in shown], "n_lives": len(lives)}
+    return {**result, "names": [str(name) for name in shown], "n_lives": len(lives)}

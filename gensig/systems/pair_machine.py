@@ -203,7 +203,7 @@ def _kind(run: PairRun) -> tuple[object, ...]:
         system.motor is None,
         system.load is None,
         system.operating.is_steady,
-        run.tell_mesh,
+        run.with_mesh_state,
         system.solver,
         system.mesh.law,
         system.mesh.roll_torque,
@@ -285,7 +285,7 @@ def _side_by_side(
         sampling_rate=rate,
         duration=system.operating.duration,
         channels=system.sensing.channels,
-        tell_mesh=runs[0].tell_mesh,
+        with_mesh_state=runs[0].with_mesh_state,
     )
     errors, checks = _checks(motions, system.solver, rate)
     records: list[CleanRecord | SimulationError] = []
@@ -297,7 +297,7 @@ def _side_by_side(
         if run.gearbox is not None:
             acceleration = acceleration * run.gearbox.gain[:, None]
         mesh = None
-        if run.tell_mesh:
+        if run.with_mesh_state:
             faulty = faulty_teeth(run.system.pair, run.faults)
             mesh = mesh_state(machines[index], motions.seen[index], angle, faulty)
         records.append(

@@ -44,8 +44,9 @@ class Start:
 class Run(Generic[MachineT_co]):
     """One record to be simulated.
 
-    None means a perfect specimen, a nominal gearbox, a start with teeth 0 at A. ``tell_mesh`` asks
-    for the loads of the teeth at every sample. ``discs`` are the toothed wheels of a drive line.
+    None means a perfect specimen, a nominal gearbox, a start with teeth 0 at A.
+    ``with_mesh_state`` asks for the loads of the teeth at every sample.
+    ``discs`` are the toothed wheels of a drive line.
     """
 
     system: MachineT_co
@@ -53,7 +54,7 @@ class Run(Generic[MachineT_co]):
     start: Start | None = None
     specimen: Specimen | None = None
     gearbox: Gearbox | None = None
-    tell_mesh: bool = False
+    with_mesh_state: bool = False
     discs: tuple[Disc, ...] = ()
 
 

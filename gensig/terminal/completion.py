@@ -88,7 +88,7 @@ def candidates(
         return {}
     if equals:
         return _options_of(name, folder)
-    found = {f"{group.name}=": group.about for group in offered.values()}
+    result = {f"{group.name}=": group.about for group in offered.values()}
     keys = [
         key
         for section, file in sections().items()
@@ -101,7 +101,7 @@ def candidates(
         known = {option.name for option in options(group.name, folder)}
         if prefix.startswith(group.name[: len(prefix)]) and option in known:
             keys += option_keys(group.name, option, folder)
-    return found | {f"{key.name}=": key.comment for key in keys}
+    return result | {f"{key.name}=": key.comment for key in keys}
 
 
 def what_candidates(prefix: str, parsed_args: Any, **_: Any) -> dict[str, str]:
@@ -112,8 +112,8 @@ def what_candidates(prefix: str, parsed_args: Any, **_: Any) -> dict[str, str]:
     name, equals, _value = prefix.partition("=")
     if equals:
         return _options_of(name, folder)
-    found = {group.name: group.about for group in groups(folder)}
-    return found | dict.fromkeys(sections(), "keys without a choice")
+    result = {group.name: group.about for group in groups(folder)}
+    return result | dict.fromkeys(sections(), "keys without a choice")
 
 
 def _options_of(group: str, folder: str | None) -> dict[str, str]:

@@ -34,7 +34,7 @@ def near(
     """At most ``n`` names that are spelled alike or begin with ``name``, whatever their case."""
     by_lower = {known.lower(): known for known in reversed(list(names))}
     wanted = str(name).lower()
-    found = difflib.get_close_matches(wanted, by_lower, n=n, cutoff=cutoff)
+    result = difflib.get_close_matches(wanted, by_lower, n=n, cutoff=cutoff)
     if len(wanted) >= 3:
-        found += [known for known in by_lower if known.startswith(wanted)]
-    return [by_lower[known] for known in dict.fromkeys(found)][:n]
+        result += [known for known in by_lower if known.startswith(wanted)]
+    return [by_lower[known] for known in dict.fromkeys(result)][:n]

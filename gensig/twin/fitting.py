@@ -52,7 +52,7 @@ SURE = 3.0  # standard deviations above the floor from which the power of lines 
 class Fit:
     """Values of a machine that were fitted to its recording.
 
-    ``own_scatter`` is the scatter of the speed, over its mean, that the pitch errors of the
+    ``pitch_error_scatter`` is the scatter of the speed, over its mean, that the pitch errors of the
     fitted grade make alone: the same estimate of simulated records that have no other scatter.
     ``gain`` (sensor, band) is the size of the transfer path at ``gain_frequency`` (band,) Hz.
     ``heard`` (sensor, band) is True where it was measured rather than filled in. ``density``
@@ -63,7 +63,7 @@ class Fit:
     sensors: tuple[str, ...]
     sampling_rate: float
     motion: Motion
-    own_scatter: float
+    pitch_error_scatter: float
     grade: Grade
     gain_frequency: Array
     gain: Array
@@ -76,11 +76,11 @@ class Fit:
     def drift(self) -> float | None:
         """Scatter of the speed beyond that of the pitch errors; None where none is visible."""
         scatter, correlation = self.motion.scatter, self.motion.correlation_time
-        if scatter is None or scatter < CLEAR * self.own_scatter:
+        if scatter is None or scatter < CLEAR * self.pitch_error_scatter:
             return None
         if correlation is None or correlation < self.motion.followed_time:
             return None
-        return math.sqrt(scatter**2 - self.own_scatter**2)
+        return math.sqrt(scatter**2 - self.pitch_error_scatter**2)
 
 
 def fit(
@@ -123,7 +123,7 @@ def fit(
         sensors=recording.sensors,
         sampling_rate=recording.sampling_rate,
         motion=motion,
-        own_scatter=_own_scatter(records, model, teeth),
+        pitch_error_scatter=_own_scatter(records, model, teeth),
         grade=grade,
         gain_frequency=frequency,
         gain=gain,

@@ -27,7 +27,7 @@ VERDICTS = {True: "agrees", False: "NO"}
 def fitted_rows(fitted: Fit, n_driving: int) -> list[tuple[str, str]]:
     """Fitted values by name."""
     motion, grade = fitted.motion, fitted.grade
-    own = f"pitch errors of that grade make {100 * fitted.own_scatter:.4f} % by themselves"
+    own = f"pitch errors of that grade make {100 * fitted.pitch_error_scatter:.4f} % by themselves"
     drift = (
         "none written: one harmonic alone is heard, which does not tell it from noise"
     )

@@ -16,7 +16,7 @@ from gensig.driveline.cycle_statistics import (
 from gensig.driveline.engine_dampers import DynamicRootStress, passes_of_a_cycle
 from gensig.driveline.engine_line import EngineLine, read_engine_line
 from gensig.driveline.excitation.line_torques import LineTorques
-from gensig.driveline.in_time import TimeResponse, own_meshes, time_response
+from gensig.driveline.in_time import TimeResponse, tabulated_meshes, time_response
 from gensig.driveline.sweep import Sweep, SweepWay, sweep_response
 from gensig.driveline.time_root_stress import typical_largest
 from gensig.errors import ConfigError
@@ -42,7 +42,7 @@ def simulate_time(
             f"--time {duration:g}: give seconds above 0, at most {LONGEST_TIME:g}"
         )
     speed, torque = torques.speed, torques.brake_torque
-    own = own_meshes(line, config, speed, torque)
+    own = tabulated_meshes(line, config, speed, torque)
     return time_response(line, speed, torque, own=own, nodes=nodes, duration=duration)
 
 
@@ -63,7 +63,7 @@ def simulate_sweep(
             f"--sweep {text}: give low and high speed in r/min "
             f"and the seconds from one to the other, at most {LONGEST_TIME:g}"
         )
-    own = own_meshes(line, config, 0.5 * (low + high), torque)
+    own = tabulated_meshes(line, config, 0.5 * (low + high), torque)
     return sweep_response(
         line, low, high, seconds, torque, own=own, nodes=nodes, n_orders=n_orders
     )
@@ -108,7 +108,7 @@ def sweep_content(sweep: Sweep) -> dict[str, Any]:
         "sweep_up": _way_content(sweep.up),
         "sweep_down": _way_content(sweep.down),
         "sweep_up_less_down": difference,
-        "sweep_told_apart": sweep.told_apart,
+        "sweep_told_apart": sweep.is_distinct,
         "sweep_largest_difference": difference[np.arange(len(most)), most],
         "sweep_largest_difference_at_rpm": speeds[most],
         "sweep_energy_residual": sweep.energy_residual,

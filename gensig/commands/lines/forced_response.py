@@ -56,7 +56,7 @@ def forced_response(arguments: Namespace) -> int:
     check_outputs(arguments)
     config = read_configuration(arguments)
     line = read_engine_line(config)
-    found = _steady(line, arguments, config.seed)
+    result = _steady(line, arguments, config.seed)
     in_time = arguments.time is not None or arguments.sweep is not None
     if in_time and line.engine.pressure_decides_torque:
         raise ConfigError(
@@ -64,22 +64,27 @@ def forced_response(arguments: Namespace) -> int:
         )
     if arguments.time is not None:
         response = simulate_time(
-            line, config, found.torques, found.nodes, arguments.time
+            line, config, result.torques, result.nodes, arguments.time
         )
-        found = replace(found, in_time=response)
+        result = replace(result, in_time=response)
     if arguments.mesh is not None:
         mesh = mesh_between(line, arguments.mesh)
-        roots = _roots(line, config, found, mesh, arguments.time)
-        found = replace(found, mesh=mesh, roots=roots)
+        roots = _roots(line, config, result, mesh, arguments.time)
+        result = replace(result, mesh=mesh, roots=roots)
     if arguments.sweep is not None:
         sweep = simulate_sweep(
-            line, config, found.nodes, arguments.sweep, arguments.run_torque, RUN_ORDERS
+            line,
+            config,
+            result.nodes,
+            arguments.sweep,
+            arguments.run_torque,
+            RUN_ORDERS,
         )
-        found = replace(found, sweep=sweep)
-    content = response_content(line, found)
+        result = replace(result, sweep=sweep)
+    content = response_content(line, result)
 
     def draw(path: Path) -> None:
-        plot_response(line, found, path)
+        plot_response(line, result, path)
 
     write_outputs(arguments, content, draw)
     _print(content)

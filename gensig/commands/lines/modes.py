@@ -29,15 +29,15 @@ def modes(arguments: Namespace) -> int:
     check_outputs(arguments)
     config = read_configuration(arguments)
     line = read_line(config)
-    found = line.modes()
-    content = modes_content(line, found)
+    result = line.modes()
+    content = modes_content(line, result)
 
     def draw(path: Path) -> None:
-        plot_modes(line, found, path)
+        plot_modes(line, result, path)
 
     write_outputs(arguments, content, draw)
     _print_sizes(line, content)
-    _print_modes(line, found, content)
+    _print_modes(line, result, content)
     return 0
 
 

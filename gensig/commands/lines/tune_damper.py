@@ -32,9 +32,9 @@ from gensig.driveline.engine_dampers import (
     dynamic_root_stress,
     mesh_between,
     read_mesh_strength,
-    seen_by_dampers,
+    response_for_dampers,
     tooth_load,
-    with_own_dampers,
+    with_further_dampers,
 )
 from gensig.driveline.engine_line import EngineLine, read_engine_line
 from gensig.driveline.linear.damper_tuning import tune_dampers
@@ -78,7 +78,7 @@ def tune_damper(arguments: Namespace) -> int:
     torque = arguments.torque
     if torque is None:
         torque = line.engine.reference.torque
-    seen = seen_by_dampers(line, mesh, nodes, speeds, torque)
+    seen = response_for_dampers(line, mesh, nodes, speeds, torque)
     most = [arguments.most_inertia] * len(nodes)
     if arguments.most_inertia is None:
         drive = line.drive
@@ -87,10 +87,10 @@ def tune_damper(arguments: Namespace) -> int:
     print(
         f"searching for dampers on nodes {names}; this takes a minute", file=sys.stderr
     )
-    found = tune_dampers(seen, most, viscous=arguments.viscous, seed=arguments.seed)
-    dampers = tuple(_rounded(damper) for damper in found)
+    result = tune_dampers(seen, most, viscous=arguments.viscous, seed=arguments.seed)
+    dampers = tuple(_rounded(damper) for damper in result)
     strength = read_mesh_strength(config, line, mesh)
-    damped = with_own_dampers(line, dampers)
+    damped = with_further_dampers(line, dampers)
     states = {
         "before": _state(line, mesh, strength, torque, seen.largest_force(())),
         "after": _state(damped, mesh, strength, torque, seen.largest_force(dampers)),

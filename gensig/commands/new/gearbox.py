@@ -172,31 +172,31 @@ def doubts(option: GearOption) -> list[str]:
 
     They often mean that another unit was meant.
     """
-    values, found = option.derived(), []
+    values, result = option.derived(), []
     gear = option.gear
     ratio = option.pair.transverse_contact_ratio
     if ratio < 1.0:
-        found.append(
+        result.append(
             f"the transverse contact ratio {ratio:.3f} is below 1: the drive is "
             "interrupted at every tooth. gensig stiffness takes these gears, records are "
             "refused; use more teeth or another profile shift"
         )
     speed = gear["rated_speed_rpm"]
     if speed < SLOWEST:
-        found.append(
+        result.append(
             f"--speed {speed:g}: the pinion turns slower than {SLOWEST:g} r/min; "
             "is it r/min, not Hz?"
         )
     line_speed, (slow, fast) = values["pitch_line_speed_m_per_s"], PITCH_LINE_SPEEDS
     if line_speed is not None and not slow <= line_speed <= fast:
-        found.append(
+        result.append(
             f"a pitch line speed of {line_speed:.3g} m/s, outside {slow:g} to {fast:g}; "
             "are --speed in r/min of the pinion and --module in mm?"
         )
     for side in SIDES:
         modules = gear[side]["face_width_mm"] / gear["normal_module_mm"]
         if not WIDTHS[0] <= modules <= WIDTHS[1]:
-            found.append(
+            result.append(
                 f"the {side} is {modules:.3g} modules wide, outside {WIDTHS[0]:g} "
                 f"to {WIDTHS[1]:g}; are --widths in mm?"
             )
@@ -205,11 +205,11 @@ def doubts(option: GearOption) -> list[str]:
         reason = "gears that do no work"
         if stress > STRONGEST:
             reason = f"no steel bears more than about {STRONGEST:g}"
-        found.append(
+        result.append(
             f"a nominal root stress of {stress:.3g} MPa: {reason}; are --torque in N m of "
             f"the pinion (the wheel has {torque:.4g}) and --widths in mm?"
         )
-    return found
+    return result
 
 
 def _check_texts(name: str, texts: Mapping[str, str]) -> None:

@@ -35,24 +35,24 @@ def reproduce(arguments: Namespace) -> int:
 
     if arguments.records < 1:
         raise ConfigError(f"--records {arguments.records} must be at least 1")
-    found = reproduce_records(Path(arguments.folder), arguments.records)
-    for name, (recorded, present) in found.other.items():
+    result = reproduce_records(Path(arguments.folder), arguments.records)
+    for name, (recorded, present) in result.other.items():
         recorded, present = recorded or "unknown", present or "unknown"
         print(f"made with {name} {recorded}, here is {present}")
-    line = f"{found.n_equal} of {found.n_records} records have the same bits"
-    if found.n_failed:
+    line = f"{result.n_equal} of {result.n_records} records have the same bits"
+    if result.n_failed:
         line += (
-            f"; {found.n_failed} failed again for the same reason and hold no signal"
+            f"; {result.n_failed} failed again for the same reason and hold no signal"
         )
     print(line)
-    if found.worst:
+    if result.worst:
         accepted = "here every bit must agree"
-        if found.other:
+        if result.other:
             accepted = f"{ACCEPTED:g} is accepted"
-        largest, worst = found.largest, found.worst
+        largest, worst = result.largest, result.worst
         print(f"largest difference {largest:.2g} of the record's RMS, in {worst}")
-        print(f"{found.n_refused} record(s) NOT reproduced; {accepted}")
-    return int(found.n_refused > 0)
+        print(f"{result.n_refused} record(s) NOT reproduced; {accepted}")
+    return int(result.n_refused > 0)
 
 
 def inspect(arguments: Namespace) -> int:

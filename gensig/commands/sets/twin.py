@@ -56,18 +56,18 @@ def twin(arguments: Namespace) -> int:
     words = [f"experiment={name}", f"operating.duration_s={duration!r}"]
     step("simulating healthy records of the twin")
     config = read_request(words, config_dir=out).config
-    found = check(config, held_out, motion, fitted_part, teeth)
+    result = check(config, held_out, motion, fitted_part, teeth)
     assumed = {f"gear.{key}": text for key, text in remarks.items() if text != "fitted"}
     typed = [arguments.recording, "--teeth", *map(str, arguments.teeth)]
     typed += ["--speed", f"{arguments.speed:g}"]
     text = report_text(
-        name, fitted, found, assumed, held_out_name, teeth.driving, typed
+        name, fitted, result, assumed, held_out_name, teeth.driving, typed
     )
     (out / "report.md").write_text(text, encoding="utf-8")
-    plot_twin(fitted, found, out / "report.png")
+    plot_twin(fitted, result, out / "report.png")
     for key, value in fitted_rows(fitted, teeth.driving):
         print(f"{key:<16}{value}")
-    print(*check_summary(found), verdict(found), sep="\n")
+    print(*check_summary(result), verdict(result), sep="\n")
     print(
         f"{out}/report.md has it all; gensig generate --config-dir {out} "
         f"experiment={name} out=runs/{name}"

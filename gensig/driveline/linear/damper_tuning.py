@@ -40,7 +40,7 @@ SETTLED = 1e-3  # of the population's spread; the simplex goes on from there
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SeenFromNodes:
+class NodeResponse:
     """Force of one element, and the motion of the nodes where dampers may sit, over speeds and
     orders.
 
@@ -88,7 +88,7 @@ class SeenFromNodes:
         return np.abs(self.mean[:, None] + over_cycle(amplitudes, points)).max(axis=1)
 
 
-def seen_from_nodes(
+def response_at_nodes(
     line: LinearLine,
     elements: Elements,
     element: int,
@@ -97,7 +97,7 @@ def seen_from_nodes(
     places: dict[int, int],
     *,
     n_orders: int,
-) -> SeenFromNodes:
+) -> NodeResponse:
     """Solve a line for its own torques and for unit torques on the nodes where dampers may sit.
 
     Parameters
@@ -124,7 +124,7 @@ def seen_from_nodes(
         solved.append(np.linalg.solve(line.dynamic_stiffness(frequency[-1]), loads))
     response = np.array(solved)  # (speed, order, dof, load)
     carried = own * np.einsum("d,sodl->sol", direction, response)
-    return SeenFromNodes(
+    return NodeResponse(
         nodes=tuple(places),
         frequency=np.array(frequency),
         mean=np.array(mean),
@@ -136,7 +136,7 @@ def seen_from_nodes(
 
 
 def tune_dampers(
-    seen: SeenFromNodes,
+    seen: NodeResponse,
     most_inertia: Sequence[float],
     *,
     viscous: bool = False,
@@ -198,7 +198,7 @@ def tune_dampers(
 
 
 def _bounds(
-    seen: SeenFromNodes, most_inertia: Sequence[float], *, viscous: bool
+    seen: NodeResponse, most_inertia: Sequence[float], *, viscous: bool
 ) -> list[tuple[float, float]]:
     """Least and most of every unknown, logarithms."""
     low, high = float(seen.frequency.min()), float(seen.frequency.max())

@@ -28,7 +28,7 @@ class Integration:
     sampling_rate : Hz    of the record
     duration : s          of the record, from time 0 on
     channels : names of degrees of freedom
-    tell_mesh : also return the state of the mesh at every sample
+    with_mesh_state : also return the state of the mesh at every sample
     oversampling : internal steps per sample, or as fine as so many steps
     precision : a name in ``PRECISIONS``
     max_error : accepted relative error, None without a check
@@ -37,7 +37,7 @@ class Integration:
     sampling_rate: float
     duration: float
     channels: tuple[str, ...]
-    tell_mesh: bool
+    with_mesh_state: bool
     oversampling: int
     precision: str
     max_error: float | None
@@ -63,7 +63,8 @@ class Motions:
     check : (machine, channel, sample)    the beginning of the same at half the step; no sample
         without ``max_error``
     shaft_angle : (machine, sample) rad   of the pinion since time 0
-    seen : (machine, row, sample)         the mesh, rows of ``_layout``; none without ``tell_mesh``
+    seen : (machine, row, sample)         the mesh, rows of ``_layout``; none without
+        ``with_mesh_state``
     mean_speed : (machine,) rad/s
     contact_loss_fraction : (machine,)    share of the time without contact
     finite : (machine,)                   the motion stayed within bounds

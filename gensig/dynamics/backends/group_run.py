@@ -88,17 +88,17 @@ class GroupRun:
         low_pass: Decimator,
         n_samples: int,
         *,
-        tell_mesh: bool = False,
+        with_mesh_state: bool = False,
     ) -> tuple[Array, Array, Array]:
         """Integrate on, from ``low_pass.margin`` samples and a step before time 0, and decimate.
 
         Returns
         -------
         accelerations (lane, channel, sample), angles of the pinions (lane, sample + 1), and
-        ``N_SEEN`` rows of the mesh (lane, row, sample); no row unless ``tell_mesh``
+        ``N_SEEN`` rows of the mesh (lane, row, sample); no row unless ``with_mesh_state``
         """
         factor, margin = low_pass.oversampling, low_pass.margin
-        n_channels, n_seen = len(self.channels), N_SEEN if tell_mesh else 0
+        n_channels, n_seen = len(self.channels), N_SEEN if with_mesh_state else 0
         out = np.empty((self.n_lanes, n_channels, n_samples))
         angle = np.empty((n_samples + 2 * margin, self.n_lanes))
         seen = np.empty((len(angle), n_seen, self.n_lanes))

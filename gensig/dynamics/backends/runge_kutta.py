@@ -214,7 +214,7 @@ def recorded(
     checking = run.again()
     run.lost[:] = 0.0
     acceleration, angle, seen = run.record(
-        group, step, low_pass, n_samples, tell_mesh=integration.tell_mesh
+        group, step, low_pass, n_samples, with_mesh_state=integration.with_mesh_state
     )
     check = np.empty((*acceleration.shape[:2], 0))
     if integration.max_error is not None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from gensig.driveline.linear.damper_tuning import seen_from_nodes, tune_dampers
+from gensig.driveline.linear.damper_tuning import response_at_nodes, tune_dampers
 from gensig.driveline.linear.dampers import TorsionalDamper, with_dampers
 from gensig.driveline.linear.forced import (
     Elements,
@@ -30,7 +30,7 @@ def one_disc():
     spring = Elements(directions=one, stiffness=np.array([STIFFNESS]), loss=np.zeros(1))
     torque = np.cos(2.0 * np.pi * np.arange(64) / 64)[None]
     speeds = 2.0 * np.linspace(0.5, 1.6, 441) + 1e-4
-    return seen_from_nodes(
+    return response_at_nodes(
         line, spring, 0, lambda _: torque, speeds, {1: 0}, n_orders=1
     )
 
@@ -104,7 +104,7 @@ def test_dampers_on_top_of_a_solution_are_the_line_solved_again():
     elements = Elements(
         directions=SPRING, stiffness=np.array([2e4]), loss=np.array([600.0])
     )
-    seen = seen_from_nodes(
+    seen = response_at_nodes(
         bare, elements, 0, lambda speed: torque, speeds, {2: 1, 3: 2}, n_orders=20
     )
     damped, numbers = chain(*DAMPERS)

@@ -9,9 +9,9 @@ from gensig.driveline.engine_dampers import (
     dynamic_root_stress,
     mesh_between,
     read_mesh_strength,
-    seen_by_dampers,
+    response_for_dampers,
     tooth_load,
-    with_own_dampers,
+    with_further_dampers,
 )
 from gensig.driveline.engine_line import read_engine_line
 from gensig.driveline.linear.dampers import TorsionalDamper
@@ -50,7 +50,7 @@ def load(line):
 
 def test_dampers_of_the_configuration_are_those_added_and_those_tuned_with(line):
     damped, read = (
-        with_own_dampers(line, DAMPERS),
+        with_further_dampers(line, DAMPERS),
         read_engine_line(compose("generate", (*ENGINE, AS_KEYS))),
     )
     assert read.drive.numbers == damped.drive.numbers == (*range(1, 68), 68, 69)
@@ -61,7 +61,7 @@ def test_dampers_of_the_configuration_are_those_added_and_those_tuned_with(line)
         for one in (damped, read)
     ]
     assert_allclose(*forces, rtol=1e-9, atol=1e-6)
-    seen = seen_by_dampers(line, mesh, (21, 45), [SPEED], TORQUE)
+    seen = response_for_dampers(line, mesh, (21, 45), [SPEED], TORQUE)
     assert_allclose(
         seen.largest_force(DAMPERS, n_points=5760), np.abs(forces[0]).max(), rtol=1e-6
     )
@@ -92,7 +92,7 @@ def test_root_stress_follows_the_tooth_force(config, line, load):
 def test_dampers_on_the_pump_drive_lower_the_load_there_and_leave_the_flywheel(
     line, load
 ):
-    damped, mesh = with_own_dampers(line, DAMPERS), mesh_between(line, (21, 45))
+    damped, mesh = with_further_dampers(line, DAMPERS), mesh_between(line, (21, 45))
     response = damped.response(SPEED, TORQUE)
     assert tooth_load(damped, mesh, response).largest < 0.75 * load.largest
     assert_allclose(
@@ -100,7 +100,7 @@ def test_dampers_on_the_pump_drive_lower_the_load_there_and_leave_the_flywheel(
         line.response(SPEED, TORQUE).fluctuation()[13],
         rtol=0.02,
     )
-    worse = with_own_dampers(
+    worse = with_further_dampers(
         line, (TorsionalDamper(node=45, ring_inertia=0.1, damping=0.0, stiffness=1e9),)
     )
     assert (

@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gensig.driveline.engine_line import read_engine_line
-from gensig.driveline.in_time import own_meshes
+from gensig.driveline.in_time import tabulated_meshes
 from gensig.driveline.mesh_phase import first_slice_lead, start_phase, start_rolls
 from gensig.driveline.running import Governor, running_line, steady_course
 from gensig.driveline.teeth import ToothStart, neighbours, tooth_there
@@ -62,7 +62,7 @@ def running(lateral, teeth):
         ["system=engine_gear_train", "excitation=engine_v20", *words]
     ).config
     engine = read_engine_line(config)
-    own = own_meshes(engine, config, SPEED, TORQUE)
+    own = tabulated_meshes(engine, config, SPEED, TORQUE)
     course = steady_course(SPEED, TORQUE)
     line = running_line(engine, course, governor=GOVERNOR, own=own)
     channels = [("speed", line.dof(14))]

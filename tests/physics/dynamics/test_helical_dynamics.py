@@ -290,14 +290,14 @@ def test_a_record_is_independent_of_the_number_of_slices(speed_rpm):
 
 
 class TestRecords:
-    def motions(self, machines, precision="float64", tell_mesh=False):
+    def motions(self, machines, precision="float64", with_mesh_state=False):
         return integrate(
             machines,
             Solver(oversampling=8, precision=precision, max_error=None),
             sampling_rate=51200.0,
             duration=0.02,
             channels=("pinion_y", "pinion_z", "wheel_z"),
-            tell_mesh=tell_mesh,
+            with_mesh_state=with_mesh_state,
         )
 
     def test_records_are_independent_and_move_in_the_axes(self, helical, xiamen, spur):
@@ -320,7 +320,7 @@ class TestRecords:
         assert_close(signals["float32"], wide, atol=2e-3 * np.abs(wide).max())
 
     def test_the_loads_of_the_teeth(self, helical):
-        motions = self.motions([helical], tell_mesh=True)
+        motions = self.motions([helical], with_mesh_state=True)
         mesh = mesh_state(helical, motions.seen[0], motions.shaft_angle[0])
         n_pairs = helical.table.last_pitch - helical.table.first_pitch
         assert mesh.load_share.shape == (n_pairs, 1024)

@@ -27,7 +27,7 @@ CRACK = (one("crack", gear="wheel", tooth=5),)
 def run(machine):
     def make(changes=None, faults=()):
         system = machine({**QUICK, **(changes or {})})
-        return Run(system=system, faults=faults, tell_mesh=True)
+        return Run(system=system, faults=faults, with_mesh_state=True)
 
     return make
 
@@ -112,7 +112,7 @@ def test_lost_contact_is_that_of_the_record(record):
 @pytest.mark.parametrize("precision", ["float64", "float32"])
 def test_the_loads_do_not_change_the_record(run, precision):
     with_loads = run({"solver.precision": precision}, MISSING)
-    plain = replace(with_loads, tell_mesh=False)
+    plain = replace(with_loads, with_mesh_state=False)
     first, second = (simulate_together([each])[0] for each in (plain, with_loads))
     assert first.mesh is None
     assert first.acceleration.tobytes() == second.acceleration.tobytes()

@@ -180,7 +180,7 @@ def test_only_faults_of_the_record_engage(machine):
     fault = one("pitch_error", tooth=3, pitch_error_um=5)
     sound, faulty = simulate_together(
         [
-            Run(system=system, faults=faults, specimen=specimen, tell_mesh=True)
+            Run(system=system, faults=faults, specimen=specimen, with_mesh_state=True)
             for faults in ((), (fault,))
         ]
     )

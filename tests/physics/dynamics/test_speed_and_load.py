@@ -91,7 +91,7 @@ def test_the_drive_transmits_a_part_of_a_speed_ripple(run, ripple, frequency):
 
 def test_a_torque_ripple_is_in_the_force_on_the_teeth(run):
     ripple = {"operating.torque_ripple": {"share": 0.1, "order": 2}, DURATION: 0.2}
-    rippled = run(ripple, tell_mesh=True)
+    rippled = run(ripple, with_mesh_state=True)
     force = record(rippled).mesh.force / pair_dynamics(rippled).mesh_force
     assert_close(wave(force, 60.0), 0.1, 0.05)
     assert wave(force, 50.0) < 0.01

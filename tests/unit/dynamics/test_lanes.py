@@ -328,7 +328,7 @@ RECORD = {
     "channels": ("wheel_y", "pinion_rotation"),
 }
 SOLVER = {"oversampling": 4, "precision": "float64", "max_error": None}
-BRIEF = Integration(**RECORD, **SOLVER, tell_mesh=False)
+BRIEF = Integration(**RECORD, **SOLVER, with_mesh_state=False)
 
 
 class TestMotions:

@@ -28,7 +28,7 @@ from gensig.driveline.engine_dampers import (
     read_mesh_strength,
 )
 from gensig.driveline.engine_line import EngineLine, read_engine_line
-from gensig.driveline.in_time import TimeResponse, own_meshes, time_response
+from gensig.driveline.in_time import TimeResponse, tabulated_meshes, time_response
 from gensig.driveline.time_root_stress import root_stress_in_time, typical_largest
 from gensig.options.compose import compose
 from gensig.options.configuration import Configuration
@@ -63,7 +63,7 @@ class TimeCase:
             self.line.engine.reference.speed,
             self.line.engine.reference.torque,
         )
-        own = own_meshes(self.line, self.config, speed, torque)
+        own = tabulated_meshes(self.line, self.config, speed, torque)
         return time_response(
             self.line, speed, torque, own=own, nodes=NODES, duration=DURATION
         )
