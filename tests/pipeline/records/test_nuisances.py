@@ -8,9 +8,8 @@ import pytest
 
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
-from gensig.production.reproduction import simulate_twin
 from gensig.record.inputs import InputReader
-from gensig.record.simulate import forget_twins, simulate_record, simulate_records
+from gensig.record.simulate import forget_twins, simulate_records
 from gensig.systems.nuisances import with_nuisances
 from gensig.systems.run import CleanRecord
 
@@ -125,15 +124,6 @@ def test_no_class_has_others(shaking):
     assert not np.array_equal(with_nuisances_of(other, motion), found[0][1])
 
 
-def test_bits_do_not_depend_on_what_a_record_is_made_beside(shaking, both):
-    rows = rows_of(shaking)
-    for place in (1, 3):
-        (alone,) = made(shaking, [rows[place]])
-        for name, values in both[0][place].signals.items():
-            np.testing.assert_array_equal(alone.signals[name], values)
-        np.testing.assert_equal(alone.values, both[0][place].values)
-
-
 def test_the_floor_of_a_condition_counts_them_and_is_one(shaking, both):
     rows = rows_of(shaking)
     floors = {}
@@ -155,36 +145,3 @@ def test_what_a_fault_adds_is_told_from_what_the_machine_has_anyway(both):
             )  # the floor has risen a little with the twin, the residual has not
         else:
             assert one.values["detectability"] == 0.0
-
-
-def test_a_part_more_leaves_the_others_alone(shaking, still):
-    nuisances = shaking["sensing"]["nuisances"]
-    fewer = shaking.with_keys("sensing", nuisances=nuisances[:-1])
-    row = rows_of(shaking)[0]
-    rest = added(made(fewer, [row])[0], made(still, [row])[0])
-    whole = added(made(shaking, [row])[0], made(still, [row])[0])
-    of_the_last = whole - rest
-    assert (
-        of_the_last[2].std() > 0.1 * whole[2].std()
-    )  # the neighbour's mesh, on the wheel
-    np.testing.assert_allclose(
-        of_the_last[0], 0.0, rtol=0, atol=1e-3 * np.abs(whole[0]).max()
-    )
-
-
-def test_a_twin_made_later_has_the_nuisances_of_its_record(shaking):
-    """Also where its noise is that of the original, not its own."""
-    config = shaking.with_keys("sensing", snr_reference="record")
-    row = rows_of(config)[1]
-    twin, original = simulate_twin(config, row), simulate_record(config, row)
-    noise = (
-        twin.signals["acceleration"].astype(float) - twin.signals["acceleration_clean"]
-    )
-    np.testing.assert_allclose(
-        noise.var(axis=1), original.signals["noise_power"], rtol=0.1, atol=0
-    )
-    same = (
-        original.signals["acceleration"].astype(float)
-        - original.signals["acceleration_clean"]
-    )
-    np.testing.assert_allclose(noise, same, rtol=0, atol=1e-3 * same.std())

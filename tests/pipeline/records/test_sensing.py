@@ -6,12 +6,10 @@ from functools import partial
 import numpy as np
 import pytest
 import record_sets
-from record_sets import refused, run
+from record_sets import refused
 from small_sets import make
 
 from gensig.dataset.reader import open_dataset
-from gensig.plan.request import read_request
-from gensig.production.streaming import open_stream
 from gensig.record.inputs import InputReader
 
 SET = (
@@ -35,12 +33,6 @@ def folder(tmp_path_factory):
     return make(tmp_path_factory.mktemp("housing") / "data", *SET, *STORED)
 
 
-def test_generate_verify_reproduce(folder, capsys):
-    run("verify", folder)
-    run("reproduce", folder, "--records", 3)
-    assert "3 of 3 records have the same bits" in capsys.readouterr().out
-
-
 def test_channels_are_the_sensors(folder):
     data = open_dataset(folder)
     assert data.channel_names == SENSORS
@@ -53,41 +45,6 @@ def test_channels_are_the_sensors(folder):
     assert data.signals(0).shape == (3, 2560)
     assert np.all(np.isnan(data.column("detectability")))
     assert np.all(data.column("clipped_fraction") == 0.0)
-
-
-def test_a_stream_gives_the_same(folder):
-    config = read_request(
-        [
-            *SET,
-            *STORED,
-            "plan.n_records=6",
-            "plan.classes=[healthy,crack]",
-            "dataset.records_per_shard=1",
-        ]
-    ).config
-    streamed = open_stream(config)
-    assert streamed.channel_names == SENSORS
-    record = streamed[2]
-    assert np.array_equal(
-        record.signals["acceleration"], open_dataset(folder).signals(2)
-    )
-    assert record.signals["acceleration_source"].shape == (4, 2560)
-
-
-def test_reading_for_diagnosis(folder):
-    torch = pytest.importorskip("torch")
-    from diagnose.data.torch_sets import VibrationDataset
-
-    options = {
-        "channels": ["housing_top"],
-        "window_samples": 256,
-        "stride_samples": 256,
-    }
-    window, label = VibrationDataset(
-        open_dataset(folder), "random_window_leaky", "train", **options
-    )[0]
-    assert tuple(torch.as_tensor(window).shape) == (1, 256)
-    assert int(label) in (0, 1)
 
 
 def test_the_floor_is_the_same_for_all_classes_and_at_the_ratio_asked_for():
@@ -167,10 +124,3 @@ def test_a_user_file_that_does_not_fit_stops_the_plan(tmp_path, capsys):
     words = ("plan", "sensing=measured", f"sensing.path.file={file}")
     error = refused(capsys, *words, "plan.n_records=1")
     assert "no column pinion_x_to_housing_real" in error
-
-
-def test_a_machine_with_nuisances_is_recorded_through_path_and_sensor():
-    for record in records("sensing=machine", "plan.n_records=2")[2]:
-        assert record.values.get("status", "ok") == "ok"
-        assert record.signals["acceleration"].shape == (3, 2560)
-        assert np.all(np.isfinite(record.signals["acceleration"]))

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from gensig.signals.averaging import time_synchronous_average
 from gensig.signals.separation import separate_gears
 
 TEETH, RATE, SAMPLES = (5, 12), 6400.0, 32
@@ -55,22 +54,6 @@ def test_every_part_comes_back():
     ):
         assert ours.shape == expected.shape
         assert_allclose(ours, expected, atol=0.03 * np.abs(signal).max())
-
-
-def test_neither_gear_leaks_into_the_other_as_it_does_into_an_average():
-    """In passages that are no whole number of the other's turns an average keeps a share of
-    them."""
-    signal, (driving, _, _) = a_pair(44)
-    own = separate(signal).driving
-    averaged = time_synchronous_average(
-        signal, RATE, MESH_HZ / TEETH[0], TEETH[0] * SAMPLES
-    )
-    averaged = averaged - np.tile(
-        averaged.reshape(2, TEETH[0], SAMPLES).mean(axis=1), (1, TEETH[0])
-    )
-    scale = np.abs(driving).max()
-    assert np.abs(own - driving).max() < 0.03 * scale
-    assert np.abs(averaged - driving).max() > 0.1 * scale
 
 
 def test_it_is_linear_and_blind_to_what_is_constant():

@@ -71,15 +71,6 @@ def test_several_pulses_a_turn_and_several_channels():
     assert_allclose(found, expected, rtol=0, atol=2e-3)
 
 
-def test_at_constant_speed_it_is_that_of_a_constant_speed():
-    signal = np.random.default_rng(0).standard_normal(5000)
-    by_speed = resample_to_angle(signal, RATE, 20.0)
-    by_pulses = resample_by_pulses(
-        signal, RATE, np.arange(5) / 20.0, samples_per_turn=1000
-    )
-    assert_allclose(by_pulses, by_speed[:4], rtol=0, atol=1e-9)
-
-
 def test_too_few_pulses():
     assert pulse_times(np.zeros(100), RATE).shape == (0,)
     with pytest.raises(ValueError, match="3 pulses at 4 a turn span no whole turn"):
