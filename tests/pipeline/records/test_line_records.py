@@ -4,7 +4,6 @@ import json
 import warnings
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from record_sets import refused, run, shard
@@ -48,30 +47,6 @@ def drawn(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("words", "texts", "header"),
-    [
-        (
-            ENGINE[:2],
-            ("flywheel_speed", "rad/s "),
-            "time_s,flywheel_speed_rad_per_s,pump_end_speed_rad_per_s,pinion_rotation_rad_per_s2",
-        ),
-        (
-            (*TWO_STAGE[:2], "fault=missing_tooth"),
-            ("class missing_tooth", "speed 174"),
-            "time_s,pinion_rotation_rad_per_s2,wheel_rotation_rad_per_s2,pinion_y_m_per_s2",
-        ),
-    ],
-)
-def test_simulate_shows_and_writes_a_record(words, texts, header, tmp_path, capsys):
-    out = tmp_path / "one.csv"
-    run("simulate", *words, "--plot", tmp_path / "one.png", "--output", out)
-    printed = capsys.readouterr().out
-    assert all(text in printed for text in texts)
-    assert out.read_text().startswith(header)
-    assert (tmp_path / "one.png").exists()
-
-
-@pytest.mark.parametrize(
     ("life", "kind"), [("crack_growth", "crack"), ("pit_growth", "distributed_pitting")]
 )
 def test_lives_grow_under_the_steady_loads_of_the_mesh(life, kind, monkeypatch):
@@ -81,13 +56,6 @@ def test_lives_grow_under_the_steady_loads_of_the_mesh(life, kind, monkeypatch):
     grown = columns["label_name"] == kind
     assert columns["severity"][grown].max() > columns["severity"][grown].min()
     assert (columns["severity"][~grown] == 0.0).all()
-
-
-def test_loads_of_a_steady_mesh_are_its_static_torque(monkeypatch):
-    monkeypatch.setattr(line_loads, "SECONDS", 0.1)
-    machine = read_machine(read_request(["experiment=two_stage"]).config)
-    loads = machine.mesh_torques(machine.operating.speed, 30.0)
-    assert_allclose(loads, 30.0, rtol=0.35)
 
 
 def test_gears_that_bear_far_more_than_their_support_is_for_are_named():
@@ -265,18 +233,3 @@ def test_forced_response_prints_torque_and_meshes(drawn, tmp_path, capsys):
     run_up = ("--run", 500, 1000, 100, "--run-torque", 30)
     run("forced-response", *MOTOR, ripple, *run_up, *figure)
     assert len(drawn) == 2
-
-
-def test_forced_response_in_time_says_what_parts(tmp_path, capsys):
-    out = tmp_path / "response.json"
-    words = ("--nodes", 14, 45, "--time", 0.3, "--json", out)
-    run("forced-response", *TRAIN, *words)
-    content = json.loads(out.read_text())
-    drive = content["meshes"].index("21/45")
-    assert content["time_energy_residual"] < 1e-3
-    assert content["time_contact_loss_fraction"][drive] > 0.1
-    fluctuation = content["speed_fluctuation_rpm"][44]
-    assert content["time_speed_fluctuation_rpm"][1] > 1.5 * fluctuation
-    greatest = np.array(content["time_greatest_tooth_force_n"])
-    assert greatest[drive] > content["mean_tooth_force_n"][drive]
-    assert "on the back flanks" in capsys.readouterr().out

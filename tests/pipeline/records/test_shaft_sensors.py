@@ -15,7 +15,6 @@ from gensig.dataset.reader import open_dataset
 from gensig.errors import ConfigError
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
-from gensig.record.inputs import InputReader
 from gensig.signals.tacho import pulse_times
 
 RATE = 51_200.0
@@ -63,20 +62,6 @@ def test_pulses_are_turns_of_the_shaft_at_one_place_of_the_gear(sensing, shaft, 
         assert_allclose(np.diff(at), TURN / 3.0, rtol=0, atol=1e-6)
         places.append(at[0] % (TURN / 3.0))
     assert_allclose(places, places[0], rtol=0, atol=1e-6)
-
-
-def test_the_mark_meets_the_same_tooth_in_every_record_of_a_gearbox():
-    """By the mesh state, which knows nothing of tachometers."""
-    state = ("dataset.store_mesh_state=true", "plan.classes=[healthy]")
-    _, _, made = records(*EXACT, *state)
-    newest = []
-    for record in made:
-        samples = np.rint(pulses_of(record) * RATE).astype(int)
-        newest += record.signals["mesh_pinion_tooth"][:, samples].max(axis=0).tolist()
-    assert len(newest) >= 20
-    assert len({record.values["start_tooth_pinion"] for record in made}) > 2
-    # a mark near the change of teeth sees it now before, now after
-    assert np.ptp(newest) <= 1
 
 
 def test_the_encoder_reads_the_angle_within_its_errors():
@@ -130,7 +115,7 @@ def test_drift_is_no_part_of_what_a_fault_does():
     drifting = records(*DRIFTING, judged, "sensing.sensor.drift_scatter=0.3")[2]
     for one, other in zip(drifting, records(judged)[2], strict=True):
         value = one.values["detectability"]
-        assert value == pytest.approx(other.values["detectability"], rel=1.0)
+        assert value == pytest.approx(other.values["detectability"], rel=0.1)
         assert (value == 0.0) == (one.values["label_name"] == "healthy")
 
 
@@ -183,15 +168,6 @@ def test_what_a_reader_has_to_know_is_one_for_the_set(key):
     vary = f"plan.vary={{{key}: {{distribution: integers, low: 8, high: 9}}}}"
     with pytest.raises(ConfigError, match=f"'{key}' is one value for a whole data set"):
         make_plan(read_request([vary]).config)
-
-
-def test_drift_and_loss_can_vary_by_condition():
-    drift = "sensing.sensor.drift_scatter: {distribution: uniform, low: 0.0, high: 0.1}"
-    config = read_request([f"plan.vary={{{drift}}}", "plan.n_records=2"]).config
-    plan = make_plan(config)
-    inputs = [InputReader(config).inputs(plan.record(k)) for k in range(2)]
-    scatters = [each.machine.sensing.sensor.drift_scatter for each in inputs]
-    assert len({*scatters, 0.0}) == 3
 
 
 class TestTorsionalChannels:

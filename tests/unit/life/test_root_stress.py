@@ -36,22 +36,6 @@ def pair(*words):
     return read_pair(compose("generate", list(words)))
 
 
-def test_figures_of_the_pump_drive():
-    """Computed independently of this project for 54/54, m 3, b 20: factors and the forces that
-    give the stress."""
-    points = ("outer_single_pair", "tip")
-    outer, tip = (case(PUMP, f"strength.load_point={point}") for point in points)
-    assert outer.decisive == tip.decisive == "wheel"
-    for loaded, expected in ((outer, (1.167, 2.141)), (tip, (2.312, 1.714))):
-        factors = loaded.factors["wheel"]
-        found = (factors.form_factor, factors.stress_correction_factor)
-        assert found == pytest.approx(expected, abs=6e-4)
-    assert factors.contact_ratio_factor == pytest.approx(0.674, abs=6e-4)
-    for stress, forces in ((349.39e6, (8393, 7847)), (292.88e6, (7036, 6578))):
-        found = (outer.force_for(stress), tip.force_for(stress))
-        assert found == pytest.approx(forces, abs=1.0)
-
-
 def test_a_force_gives_the_stress_it_was_asked_for():
     loaded = case(
         PUMP, "strength.application_factor=1.25", "strength.face_load_factor=1.2"

@@ -30,24 +30,6 @@ def safe(strength, stress=349.39e6, **changes):
 
 
 @pytest.mark.parametrize(
-    ("stress", "safety_factor", "name"),
-    [(349.39e6, 1.353, "general"), (292.88e6, 1.614, "higher")],
-)
-def test_the_papers_safety_factors(strength, stress, safety_factor, name):
-    found = safe(strength, stress).paper
-    assert found == pytest.approx(safety_factor, abs=5e-4)
-    assert reliability(found) == name
-
-
-def test_iso_counts_the_test_gears_own_notch(strength):
-    found = safe(strength)
-    assert found.iso / found.paper == pytest.approx(2.0 * life_factor(3.6e8) / 0.9)
-    assert found.iso == pytest.approx(2.7, rel=0.02)
-    assert safe(strength, mean_stress_factor=0.7).iso == pytest.approx(1.9, rel=0.02)
-    assert safe(strength, mean_stress_factor=0.7).paper == found.paper
-
-
-@pytest.mark.parametrize(
     "key",
     [
         "test_gear_stress_correction",

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from gensig.errors import ConfigError, ExtrapolationError, SimulationError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import read_faults
-from gensig.life.life_laws import fitted_laws, life_map, torque_exponent
+from gensig.life.life_laws import fitted_laws, life_map
 from gensig.life.options import read_wear_options
 from gensig.life.wear.archard import (
     LEAST_CURVATURE_SHARE,
@@ -138,11 +138,6 @@ class TestLaws:
         assert printed.no_life_from == pytest.approx(263.0, abs=0.5)
         assert printed.formula(0.999 * printed.no_life_from, 12.0) > 0.0
         assert power.no_life_from is None
-
-
-def test_local_exponent(full):
-    assert torque_exponent(case_of("gear=harbin_38_55")) == pytest.approx(1.0, abs=1e-9)
-    assert torque_exponent(full) == pytest.approx(1.0, abs=0.15)
 
 
 @pytest.mark.parametrize(
