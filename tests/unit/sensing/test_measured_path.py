@@ -52,18 +52,6 @@ def test_impulse_response_is_a_convolution(tmp_path):
     assert_allclose(found, [expected], rtol=0, atol=1e-9)
 
 
-def test_linear_and_causal(tmp_path):
-    path = read(frequency_file(tmp_path / "f.csv", mode))
-    one, other = np.random.default_rng(2).standard_normal((2, 2, 3000))
-    together = path.apply(one + 2.0 * other, RATE)
-    expected = path.apply(one, RATE) + 2.0 * path.apply(other, RATE)
-    assert_allclose(together, expected, rtol=0, atol=1e-9)
-    late = one.copy()
-    late[:, 1500:] = 0.0
-    difference = np.abs(path.apply(one, RATE) - path.apply(late, RATE))
-    assert difference[:, :1500].max() < 1e-9 * difference.max()
-
-
 def test_frequency_response_of_a_mode_rings_as_the_mode_does(tmp_path):
     from scipy.signal import sosfilt
 
