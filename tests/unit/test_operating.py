@@ -36,7 +36,7 @@ class TestCurve:
     def test_linear_between_the_points_and_held_outside(self):
         values = PROFILE.curve()([-9, -0.2, 0.05, 0.3, 0.5, 1.0, 40])
         expected = [0.5, 0.5, 0.65, 0.8, 0.9, 0.25, 0.25]
-        assert_allclose(values, expected, rtol=1e-12, atol=0)
+        assert_allclose(values, expected, rtol=1e-12)
 
     def test_its_slope_is_that_of_the_piece_that_begins(self):
         slope = PROFILE.curve().derivative()([-9, -0.2, 0.1, 0.3, 0.7, 1.0, 40])
@@ -84,5 +84,5 @@ class TestNominal:
 
     def test_torque_follows_its_own_profile(self, operating):
         found = operating.nominal(np.array([-1.0, 0.5, 9.0]))
-        assert_allclose(found.torque_factor, [0, 0.375, 1.5], rtol=1e-12, atol=0)
-        assert_allclose(found.torque_slope, [0, 0.75, 0], rtol=1e-12, atol=0)
+        assert_allclose(found.torque_factor, [0, 0.375, 1.5], rtol=1e-12)
+        assert_allclose(found.torque_slope, [0, 0.75, 0], rtol=1e-12)

@@ -74,7 +74,7 @@ class TestKinds:
             nominal = found.nominal(np.array([-0.3, 0.5, 2.0]))
             set_speed = speed * math.pi / 30
             expected = set_speed * np.array([0.5, 0.75, 1.0])
-            assert_allclose(nominal.speed, expected, rtol=1e-12, atol=0)
+            assert_allclose(nominal.speed, expected, rtol=1e-12)
 
     @pytest.mark.parametrize("speed", [600.0, 1800.0])
     def test_files_of_factors_speeds_and_torques(self, operating, tmp_path, speed):
@@ -82,15 +82,15 @@ class TestKinds:
         factors = saved(tmp_path, "factor,time_s\n0.5,-1\n0.5,0\n1,1\n")
         found = operating({SPEED: factors, **set_speed})
         share = found.nominal(TIMES[:2]).speed / found.speed
-        assert_allclose(share, 0.5, rtol=1e-12, atol=0)
+        assert_allclose(share, 0.5, rtol=1e-12)
         speeds = saved(tmp_path, "time_s,speed_rpm\n0,900\n1,1500\n")
         found = operating({SPEED: speeds, **set_speed})
         rpm = found.nominal(np.array([-1.0, 0.5, 1.0])).speed * 30 / math.pi
-        assert_allclose(rpm, [900, 1200, 1500], rtol=1e-12, atol=0)
+        assert_allclose(rpm, [900, 1200, 1500], rtol=1e-12)
         torques = saved(tmp_path, "time_s,torque_nm\n0,10\n1,40\n")
         found = operating({TORQUE: torques, **set_speed})
         factor = found.nominal(np.array([0.5])).torque_factor
-        assert_allclose(found.torque * factor, 25, rtol=1e-12, atol=0)
+        assert_allclose(found.torque * factor, 25, rtol=1e-12)
 
     def test_a_file_may_end_one_step_early(self, operating, tmp_path):
         rows = "".join(f"{k / 100},1\n" for k in range(100))
@@ -195,7 +195,7 @@ class TestRipple:
         found = operating({SPEED_RIPPLE: ripple})
         nominal = found.nominal(np.array([0.0, 0.25, 0.5]) / 30)
         share = nominal.speed / found.speed
-        assert_allclose(share, [1.1, 1.0, 0.9], rtol=1e-12, atol=0)
+        assert_allclose(share, [1.1, 1.0, 0.9], rtol=1e-12)
         assert_allclose(nominal.torque_factor, 1.0, rtol=0, atol=0)
 
     @pytest.mark.parametrize(
@@ -210,7 +210,7 @@ class TestRipple:
         def slope(name):
             return (getattr(after, name) - getattr(before, name)) / (2 * h)
 
-        assert_allclose(at.speed, slope("angle"), rtol=1e-7, atol=0)
+        assert_allclose(at.speed, slope("angle"), rtol=1e-7)
         assert_allclose(at.acceleration, slope("speed"), rtol=1e-5, atol=1e-4)
         assert_allclose(at.torque_slope, slope("torque_factor"), rtol=1e-5, atol=1e-5)
 
@@ -220,7 +220,7 @@ class TestRipple:
         found = operating({SPEED: RAMP, TORQUE_RIPPLE: {"share": 0.1, "order": 2}})
         nominal = found.nominal(np.linspace(0.0, 1.0, 2001))
         expected = 1 + 0.1 * np.sin(2 * nominal.angle)
-        assert_allclose(nominal.torque_factor, expected, rtol=0, atol=1e-9)
+        assert_allclose(nominal.torque_factor, expected, atol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -81,7 +81,7 @@ def test_a_name_without_unit_is_taken_as_it_is(value):
     ],
 )
 def test_factors(name, value, expected):
-    assert_allclose(to_si(name, value), expected, rtol=1e-14, atol=0)
+    assert_allclose(to_si(name, value), expected, rtol=1e-14)
 
 
 @pytest.mark.parametrize(

@@ -64,7 +64,7 @@ def test_loads_of_all_pairs_are_told(helical: Path) -> None:
         for k in range(data.n_records):
             share = data.trace(k, "mesh_load_share")
             assert share.shape == (MOST_PAIRS, data.n_samples)
-            np.testing.assert_allclose(share.sum(axis=0), 1.0, rtol=0, atol=1e-6)
+            np.testing.assert_allclose(share.sum(axis=0), 1.0, atol=1e-6)
             carrying = (data.trace(k, "mesh_pinion_tooth") >= 0).sum(axis=0)
             missing = data.column("label_name")[k] == "missing_tooth"
             assert 2 - missing <= carrying.min() <= carrying.max() <= 5

@@ -59,9 +59,9 @@ def test_pulses_are_turns_of_the_shaft_at_one_place_of_the_gear(sensing, shaft, 
         angle = gear_angle(config, row, record, shaft)
         at = np.interp(pulses_of(record), np.arange(len(angle)) / RATE, angle)
         assert len(at) >= least
-        assert_allclose(np.diff(at), TURN / 3.0, rtol=0, atol=1e-6)
+        assert_allclose(np.diff(at), TURN / 3.0, atol=1e-6)
         places.append(at[0] % (TURN / 3.0))
-    assert_allclose(places, places[0], rtol=0, atol=1e-6)
+    assert_allclose(places, places[0], atol=1e-6)
 
 
 def test_the_encoder_reads_the_angle_within_its_errors():
@@ -103,7 +103,7 @@ def test_drift_changes_the_signal_by_its_gain_and_not_the_floor():
         gain = np.divide(clean, still, out=np.full(still.shape, np.nan), where=is_clear)
         assert np.nanmax(np.abs(np.log(gain))) < 0.6
         assert np.all(np.nanstd(gain, axis=1) > 1e-3)
-        assert_allclose(noise, before, rtol=0, atol=1e-3 * before.std())
+        assert_allclose(noise, before, atol=1e-3 * before.std())
         assert_array_equal(one.signals["noise_power"], other.signals["noise_power"])
         gains.append(np.nanmean(gain, axis=1))
     assert np.log(gains).std() > 0.02

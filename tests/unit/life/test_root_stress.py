@@ -139,20 +139,6 @@ def test_rim_and_deep_teeth():
     assert deep_tooth_factor(2.6, None) == 0.7
 
 
-def test_the_papers_mesh_peaks_at_isos_load_point():
-    """Without contact beyond the path one pair is alone between B and D, and its end is ISO's load
-    point."""
-    loaded = case(PUMP, *PAPER_LAW).under(349.39e6)
-    history, gears = loaded.history(), loaded.gears()
-    pitch = loaded.pair.base_pitch
-    ends = {"wheel": loaded.pair.path_of_contact - pitch, "pinion": pitch}
-    for name, end in ends.items():
-        at = history.stress[name].argmax()
-        assert history.stress[name][at] == pytest.approx(gears[name].stress, rel=1e-7)
-        assert history.share[at] == pytest.approx(1.0)
-        assert history.roll[at] == pytest.approx(end, abs=1e-6 * pitch)
-
-
 def test_light_loads_come_near_it_and_heavy_ones_share_more():
     shares = []
     for torque in (1.0, 130.0, 680.0):

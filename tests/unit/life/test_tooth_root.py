@@ -90,24 +90,6 @@ def test_the_lever_arm_is_that_of_our_own_flank(n_teeth, shift, rounding):
     )
 
 
-# load at the tip, rack alpha 20 degrees, h_a 1, c 0.25, rho 0.38: table of Chinese design
-# handbooks (DIN 3990 charts)
-HANDBOOK = [
-    (18, 2.91, 1.53),
-    (25, 2.62, 1.59),
-    (40, 2.40, 1.67),
-    (80, 2.22, 1.77),
-    (200, 2.12, 1.865),
-]
-
-
-@pytest.mark.parametrize(("n_teeth", "form", "correction"), HANDBOOK)
-def test_handbook_factors(n_teeth, form, correction):
-    loading = root_loading(gear(n_teeth), 0.0)
-    assert loading.form_factor[0] == pytest.approx(form, rel=0.01)
-    assert loading.stress_correction_factor[0] == pytest.approx(correction, rel=0.01)
-
-
 @pytest.mark.parametrize(
     ("n_teeth", "shift", "thickness", "arm", "fillet", "form", "correction"),
     [

@@ -51,15 +51,13 @@ def test_mounted_resonance_also_above_half_the_rate(resonance, frequency):
     sensor = replace(IDEAL, mounted_resonance=resonance)
     ratio = frequency / resonance
     exact = 1.0 / abs(1.0 - ratio**2 + 0.04j * ratio)
-    assert_allclose(gain(sensor, frequency), exact, rtol=2e-3, atol=0)
+    assert_allclose(gain(sensor, frequency), exact, rtol=2e-3)
 
 
 @pytest.mark.parametrize("frequency", [2.0, 5.0, 10.0, 20.0, 200.0])
 def test_low_cut_off_is_of_first_order(frequency):
     exact = 1.0 / np.sqrt(1.0 + (10.0 / frequency) ** 2)
-    assert_allclose(
-        gain(replace(IDEAL, low_cutoff=10.0), frequency), exact, rtol=0.01, atol=0
-    )
+    assert_allclose(gain(replace(IDEAL, low_cutoff=10.0), frequency), exact, rtol=0.01)
 
 
 @pytest.mark.parametrize("bits", [8, 12, 16])
@@ -68,13 +66,11 @@ def test_converter_steps_and_range(bits):
     signal = np.linspace(-11.0, 11.0, 100_001)[None]
     found, clipped = sensor.digitised(signal)
     step = 10.0 / 2 ** (bits - 1)
-    assert_allclose(found / step, np.rint(found / step), rtol=0, atol=1e-9)
+    assert_allclose(found / step, np.rint(found / step), atol=1e-9)
     inside = np.abs(signal) < 10.0 - step
     assert np.abs(found - signal)[inside].max() <= 0.5 * step * (1 + 1e-9)
-    assert_allclose(
-        [found.min(), found.max()], [-10.0, 10.0 - step], rtol=1e-12, atol=0
-    )
-    assert_allclose(clipped, 2.0 / 22.0, rtol=0, atol=step)
+    assert_allclose([found.min(), found.max()], [-10.0, 10.0 - step], rtol=1e-12)
+    assert_allclose(clipped, 2.0 / 22.0, atol=step)
 
 
 def test_scatter_stays_within_the_data_sheet():

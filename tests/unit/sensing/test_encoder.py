@@ -34,15 +34,13 @@ def test_a_perfect_one_is_behind_by_at_most_a_line():
     off = error(PERFECT)
     assert off.max() <= 1e-9
     assert off.min() > -PERFECT.spacing * (1.0 + 1e-9)
-    assert_allclose(
-        read / PERFECT.spacing, np.rint(read / PERFECT.spacing), rtol=0, atol=1e-8
-    )
+    assert_allclose(read / PERFECT.spacing, np.rint(read / PERFECT.spacing), atol=1e-8)
     assert np.all(np.diff(read) >= -1e-12)
-    assert_allclose(off.std(), PERFECT.spacing / np.sqrt(12.0), rtol=0.02, atol=0)
+    assert_allclose(off.std(), PERFECT.spacing / np.sqrt(12.0), rtol=0.02)
 
 
 def test_without_quantisation_a_perfect_one_is_exact():
-    assert_allclose(error(replace(PERFECT, quantised=False)), 0.0, rtol=0, atol=1e-9)
+    assert_allclose(error(replace(PERFECT, quantised=False)), 0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("quantised", [True, False])
@@ -78,7 +76,7 @@ def test_the_pattern_repeats_every_turn_and_is_each_discs_own():
     encoder = replace(PERFECT, line_error=np.radians(0.02), quantised=False)
     turn = np.linspace(0.0, 2.0 * np.pi, 5000, endpoint=False)
     first, later = error(encoder, 3, turn), error(encoder, 3, turn + 6.0 * np.pi)
-    assert_allclose(first, later, rtol=0, atol=1e-9)
+    assert_allclose(first, later, atol=1e-9)
     assert abs(np.corrcoef(first, error(encoder, 4, turn))[0, 1]) < 0.1
     off = disc_of(encoder).places - encoder.spacing * np.arange(1000)
     assert_allclose(np.std(off), np.radians(0.02), rtol=0.1)
@@ -98,4 +96,4 @@ def test_a_line_is_read_where_it_passes():
     turned = [0.0, 0.05, 0.11, np.pi - 0.01, np.pi + 0.01, 2 * np.pi + 0.05]
     angle = 0.5 + np.array([*turned, 2 * np.pi + 0.11])
     expected = np.pi / 2 * np.array([-1, -1, 0, 1, 2, 3, 4])
-    assert_allclose(disc.read(angle, quantised=True), expected, rtol=0, atol=1e-12)
+    assert_allclose(disc.read(angle, quantised=True), expected, atol=1e-12)

@@ -31,9 +31,7 @@ def test_measuring_is_linear_and_names_the_sensors():
     )
     together = one.measure(2.0 * first - second)
     assert together.shape == (3, 2000)
-    assert_allclose(
-        together, 2.0 * one.measure(first) - one.measure(second), rtol=0, atol=1e-9
-    )
+    assert_allclose(together, 2.0 * one.measure(first) - one.measure(second), atol=1e-9)
 
 
 @pytest.mark.parametrize("n_lead", [0, None])
@@ -49,20 +47,6 @@ def test_filters_have_settled_at_the_first_sample(n_lead, monkeypatch):
         assert level < -50.0
     else:
         assert level > -30.0  # without a lead-in it shows
-
-
-@pytest.mark.parametrize(("snr_db", "n_samples"), [(-5.0, 5120), (20.0, 51_200)])
-def test_achieved_signal_to_noise_ratio_in_the_band(snr_db, n_samples):
-    no_converter = {"sensor.adc_bits": None, "sensor.adc_range_m_per_s2": None}
-    one = instrument(changed(HOUSING, no_converter))
-    clean = one.measure(source(one.sensing, n_samples))
-    asked = one.power(clean) * 10 ** (-snr_db / 10)
-    noisy, clipped = one.record(clean, asked, np.random.default_rng(3))
-    noise = noisy - clean
-    ratio = one.power(clean) / one.power(noise)
-    assert_allclose(10 * np.log10(ratio), snr_db, rtol=0, atol=0.1)
-    assert clipped == 0.0
-    assert not np.allclose(power(noise), one.power(noise), rtol=1e-3)
 
 
 def test_noise_of_the_path_has_the_resonances_of_the_path():
@@ -82,7 +66,7 @@ def test_no_noise_leaves_converter_and_offset():
     one = instrument(HOUSING)
     found = one.record(np.zeros((3, 100)), np.zeros(3), np.random.default_rng(0))[0]
     assert np.all(np.ptp(found, axis=1) == 0.0)
-    assert_allclose(found[:, 0], one.sensors.offset, rtol=0, atol=0.5 * 2000 / 2**23)
+    assert_allclose(found[:, 0], one.sensors.offset, atol=0.5 * 2000 / 2**23)
 
 
 def test_transverse_motion_of_a_bearing_sensor():
@@ -90,7 +74,7 @@ def test_transverse_motion_of_a_bearing_sensor():
     still = np.zeros((4, 300))
     still[0] = np.random.default_rng(1).standard_normal(300)  # pinion_x alone
     found = one.measure(still)
-    assert_allclose(found[1], one.sensors.transverse[1] * still[0], rtol=1e-12, atol=0)
+    assert_allclose(found[1], one.sensors.transverse[1] * still[0], rtol=1e-12)
     assert abs(one.sensors.transverse[1]) > 1e-4
     assert not found[2:].any()
 

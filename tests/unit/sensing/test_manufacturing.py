@@ -140,9 +140,9 @@ class TestLimits:
         for seed in range(8):
             specimen = draw(pairs[name], exact, seed)
             for shares in used(pairs[name], specimen, grade):
-                assert_allclose(shares[0], share, rtol=1e-9, atol=0)
+                assert_allclose(shares[0], share, rtol=1e-9)
                 # the trace is read at points
-                assert_allclose(shares[3], share, rtol=2e-3, atol=0)
+                assert_allclose(shares[3], share, rtol=2e-3)
                 assert (shares <= share * (1.0 + 1e-6)).all()
 
 
@@ -171,8 +171,8 @@ class TestWhatIsDrawn:
                 error = getattr(specimen, f"{name}_error")
                 tilt = getattr(specimen, f"{name}_tilt")
                 expected = eccentric_tilt(getattr(xiamen.pair, name), error)
-                assert_allclose(tilt, expected, rtol=0, atol=1e-9 * np.abs(tilt).max())
-                assert_allclose(error.mean(), 0.0, rtol=0, atol=1e-15)
+                assert_allclose(tilt, expected, atol=1e-9 * np.abs(tilt).max())
+                assert_allclose(error.mean(), 0.0, atol=1e-15)
 
     def test_eccentricities_phases_and_signs_scatter(self, xiamen, drawn):
         specimens = drawn(80)
@@ -189,8 +189,8 @@ class TestWhatIsDrawn:
         )
         slopes, _ = profile_of(xiamen.pair, specimen, "wheel")
         limit = profile_slope_limit(xiamen.pair.wheel, 5)
-        assert_allclose(np.abs(slopes).max(), 0.5 * limit, rtol=0.03, atol=0)
-        assert_allclose(np.ptp(slopes), 2 * 0.4 * 0.5 * limit, rtol=0.1, atol=0)
+        assert_allclose(np.abs(slopes).max(), 0.5 * limit, rtol=0.03)
+        assert_allclose(np.ptp(slopes), 2 * 0.4 * 0.5 * limit, rtol=0.1)
 
     @pytest.mark.parametrize("share", [0.0, 0.25, 1.0])
     def test_undulation_is_part_of_the_form(self, drawn, share):
@@ -257,8 +257,8 @@ def test_gearbox_factors_scatter_as_the_quality_says(quality):
     gearboxes = [draw_gearbox(rng(seed), 4, scattered, 0.05) for seed in range(400)]
     for key, scatter in scatters.items():
         logarithm = np.log([getattr(gearbox, key) for gearbox in gearboxes])
-        assert_allclose(logarithm.std(), scatter, rtol=0.06, atol=0)
-        assert_allclose(logarithm.mean(), 0.0, rtol=0, atol=0.1 * scatter)
+        assert_allclose(logarithm.std(), scatter, rtol=0.06)
+        assert_allclose(logarithm.mean(), 0.0, atol=0.1 * scatter)
 
 
 @pytest.mark.parametrize(

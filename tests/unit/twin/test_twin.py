@@ -57,7 +57,7 @@ def test_grade(config):
 def test_signal_to_noise_ratio(known, config):
     offsets = np.array(config["sensing"]["noise"]["offsets_db"])
     np.testing.assert_allclose(
-        config["sensing"]["snr_db"] - offsets, known.snr_db, rtol=0.0, atol=2.0
+        config["sensing"]["snr_db"] - offsets, known.snr_db, atol=2.0
     )
 
 
@@ -142,9 +142,7 @@ def test_minimum_phase_of_a_filter_is_the_filter():
     frequency, response = minimum_phase(known_at, gain, RATE, 20.0)
     expected = freqz(*filters, frequency, fs=RATE, include_nyquist=True)[1]
     assert frequency[1] == pytest.approx(20.0)
-    np.testing.assert_allclose(
-        response, expected, rtol=0.0, atol=1e-3 * np.abs(expected).max()
-    )
+    np.testing.assert_allclose(response, expected, atol=1e-3 * np.abs(expected).max())
     np.testing.assert_allclose(
         np.abs(response), gain_at(frequency, known_at, gain), rtol=1e-6
     )
