@@ -59,19 +59,15 @@ def test_the_floor_is_the_same_for_all_classes_and_at_the_ratio_asked_for():
     floors = {}
     for row, record in zip(rows, made, strict=True):
         instrument = InputReader(config).inputs(row).instrument
-        noisy, clean = (
-            record.signals[name].astype(float)
-            for name in ("acceleration", "acceleration_clean")
-        )
-        floors[row["condition_id"], row["label_name"]] = instrument.power(noisy - clean)
+        clean = record.signals["acceleration_clean"].astype(float)
+        floor = instrument.power(record.signals["acceleration"] - clean)
+        floors[row["condition_id"], row["label_name"]] = floor
         if row["label_name"] == "healthy":
-            ratio = record.signals["signal_power"] / instrument.power(noisy - clean)
-            snr_db = config["sensing"]["snr_db"]
-            np.testing.assert_allclose(10 * np.log10(ratio), snr_db, atol=0.1)
-    for condition, label in floors:
-        sound = floors[condition, "healthy"]
-        np.testing.assert_allclose(floors[condition, label], sound, rtol=1e-4)
+            ratio = 10 * np.log10(record.signals["signal_power"] / floor)
+            np.testing.assert_allclose(ratio, config["sensing"]["snr_db"], atol=0.1)
     assert len(floors) == 4
+    for (condition, _), floor in floors.items():
+        np.testing.assert_allclose(floor, floors[condition, "healthy"], rtol=1e-4)
 
 
 def test_the_source_is_that_of_a_sensor_on_the_bearing():
@@ -86,28 +82,24 @@ def test_the_source_is_that_of_a_sensor_on_the_bearing():
     _, _, housing = records("sensing=housing", *perfect, "dataset.store_source=true")
     _, _, bearing = records(*perfect, "dataset.store_clean=true")
     for one, other in zip(housing, bearing, strict=True):
-        ours, theirs = (
-            one.signals["acceleration_source"],
-            other.signals["acceleration_clean"],
-        )
-        sound = one.values["label_name"] == "healthy"
+        is_sound = one.values["label_name"] == "healthy"
         # a crack that is in mesh where the machine starts moves its static equilibrium, to which
         # the drive is anchored
-        assert np.all(
-            (ours - theirs).std(axis=1) < (2e-3 if sound else 0.05) * theirs.std(axis=1)
-        )
+        most = {True: 2e-3, False: 0.05}[is_sound]
+        exact = other.signals["acceleration_clean"]
+        error = one.signals["acceleration_source"] - exact
+        assert np.all(error.std(axis=1) < most * exact.std(axis=1))
         for name in ("mesh_pinion_tooth", "mesh_wheel_tooth", "fault_engaged"):
             shown, expected = (
                 np.sort(np.atleast_2d(record.signals[name]), axis=0)
                 for record in (one, other)
             )
             assert np.mean(shown != expected) < 2e-3
-        assert one.signals["fault_engaged"].any() != sound
+        assert one.signals["fault_engaged"].any() != is_sound
         angles = [record.signals["shaft_angle"] for record in (one, other)]
         np.testing.assert_allclose(*angles, atol=2e-4)
-        np.testing.assert_allclose(
-            one.values["speed_rpm"], other.values["speed_rpm"], rtol=1e-6
-        )
+        speeds = [record.values["speed_rpm"] for record in (one, other)]
+        np.testing.assert_allclose(*speeds, rtol=1e-6)
 
 
 def test_a_converter_that_clips_marks_its_records():

@@ -31,13 +31,14 @@ def strongest_comb(signal, rate, expected):
     windowed = np.hanning(len(signal)) * signal
     time = np.arange(len(signal)) / rate
     frequencies = expected * np.linspace(0.96, 1.04, 161)
-    harmonics = np.arange(1, 6)
-    harmonics = harmonics[harmonics * frequencies[-1] < 0.45 * rate, None]
-    comb = [
-        np.sum(np.abs(np.exp(-2j * np.pi * harmonics * f * time) @ windowed) ** 2)
-        for f in frequencies
-    ]
-    return frequencies[np.argmax(comb)]
+    harmonics = np.arange(1, 6)[:, None]
+    harmonics = harmonics[harmonics[:, 0] * frequencies[-1] < 0.45 * rate]
+
+    def strength(frequency):
+        waves = np.exp(-2j * np.pi * harmonics * frequency * time)
+        return np.sum(np.abs(waves @ windowed) ** 2)
+
+    return max(frequencies, key=strength)
 
 
 @pytest.mark.parametrize(
