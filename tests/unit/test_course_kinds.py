@@ -1,33 +1,23 @@
-"""Ramps, random walks and ripple: their mathematics and statistics."""
+"""Ramps and random walks: their mathematics and statistics. Ripple is in test_operation."""
 
-import itertools
 import math
 import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scipy.integrate import quad
 
 from gensig.errors import ConfigError
 from gensig.operation.courses import (
     EARLIEST,
     WALK_LIMIT,
-    Profile,
     Ramp,
     RandomWalk,
     Ripple,
 )
 
 WALK = RandomWalk(scatter=0.02, correlation_time=0.4)
-BENT = Profile(times=(-0.3, 0.1, 0.5, 0.9), factors=(0.5, 1.2, 0.8, 1.0))
-RIPPLES = {
-    "order": Ripple(share=0.1, order=2.0, phase=0.4),
-    "frequency": Ripple(share=0.1, frequency=7.0, phase=-1.0),
-}
 
 
 def walk(seed, one=WALK, duration=1.0):
@@ -89,52 +79,19 @@ class TestRandomWalk:
         assert len(allowed.times) > 90_000
 
 
-class TestRipple:
-    @pytest.mark.parametrize("profile", [None, BENT], ids=["constant", "bent"])
-    @pytest.mark.parametrize("name", list(RIPPLES))
-    @given(time=st.floats(-1.5, 2.0))
-    @settings(max_examples=25, deadline=None)
-    def test_what_it_gains_is_its_integral(self, name, profile, time):
-        ripple, set_speed = RIPPLES[name], 40.0
-        course = profile or Profile(times=(0.0, 1.0), factors=(1.0, 1.0))
-        curve = course.curve()
-        turned = curve.antiderivative()
-
-        def angle(t):
-            return set_speed * (turned(t) - turned(0.0))
-
-        def wave(t):
-            t = np.asarray(t)
-            return float(curve(t) * ripple.share * np.sin(ripple.psi(t, angle(t))))
-
-        low, high = sorted((0.0, time))
-        knots = [knot for knot in course.times if low < knot < high]
-        edges = sorted([0.0, *knots, time], reverse=time < 0.0)
-        pieces = [quad(wave, a, b, limit=200)[0] for a, b in itertools.pairwise(edges)]
-        at = np.array([time, 0.0])
-        gained = ripple.gained(at, angle(at), set_speed, profile)
-        assert_allclose(gained, [sum(pieces), 0.0], rtol=1e-8, atol=1e-10)
-
-    @pytest.mark.parametrize("name", list(RIPPLES))
-    def test_later_is_the_same_function_of_time(self, name):
-        ripple, times, speed, delay = RIPPLES[name], np.linspace(-1, 1, 9), 30.0, 0.37
-        later = times + delay
-        moved = ripple.later(delay, speed * delay).psi(later, speed * later)
-        assert_allclose(moved, ripple.psi(times, speed * times), atol=1e-12)
-
-    @pytest.mark.parametrize(
-        ("values", "text"),
-        [
-            (
-                {"share": 1.0, "order": 1.0},
-                "share = 1 must lie in 0..1, 1 not included",
-            ),
-            ({"share": -0.1, "order": 1.0}, "share = -0.1 must lie in 0..1"),
-            ({"share": 0.1, "order": 1.0, "frequency": 5.0}, "give order (of the pini"),
-            ({"share": 0.1, "order": 0.0}, "order = 0 must be positive"),
-            ({"share": 0.1, "frequency": -5.0}, "frequency_hz = -5 must be positive"),
-        ],
-    )
-    def test_refusals(self, values, text):
-        with pytest.raises(ConfigError, match=re.escape(text)):
-            Ripple(**values)
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        (
+            {"share": 1.0, "order": 1.0},
+            "share = 1 must lie in 0..1, 1 not included",
+        ),
+        ({"share": -0.1, "order": 1.0}, "share = -0.1 must lie in 0..1"),
+        ({"share": 0.1, "order": 1.0, "frequency": 5.0}, "give order (of the pini"),
+        ({"share": 0.1, "order": 0.0}, "order = 0 must be positive"),
+        ({"share": 0.1, "frequency": -5.0}, "frequency_hz = -5 must be positive"),
+    ],
+)
+def test_ripples_that_cannot_be(values, text):
+    with pytest.raises(ConfigError, match=re.escape(text)):
+        Ripple(**values)

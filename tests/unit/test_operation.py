@@ -190,8 +190,9 @@ class TestRefusals:
 
 
 class TestRipple:
-    def test_of_a_constant_speed(self, operating):
-        ripple = {"share": 0.1, "order": 1, "phase_deg": 90}
+    @pytest.mark.parametrize("rate", [{"order": 1}, {"frequency_hz": 30}])
+    def test_of_a_constant_speed(self, operating, rate):
+        ripple = {"share": 0.1, "phase_deg": 90, **rate}
         found = operating({SPEED_RIPPLE: ripple})
         nominal = found.nominal(np.array([0.0, 0.25, 0.5]) / 30)
         share = nominal.speed / found.speed
@@ -210,6 +211,7 @@ class TestRipple:
         def slope(name):
             return (getattr(after, name) - getattr(before, name)) / (2 * h)
 
+        assert found.nominal(np.zeros(1)).angle == 0.0
         assert_allclose(at.speed, slope("angle"), rtol=1e-7)
         assert_allclose(at.acceleration, slope("speed"), rtol=1e-5, atol=1e-4)
         assert_allclose(at.torque_slope, slope("torque_factor"), rtol=1e-5, atol=1e-5)
