@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from gensig.errors import ConfigError, ExtrapolationError, SimulationError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import read_faults
-from gensig.life.life_laws import fitted_laws, life_map
+from gensig.life.life_laws import fitted_laws, life_map, torque_exponent
 from gensig.life.options import read_wear_options
 from gensig.life.wear.archard import (
     LEAST_CURVATURE_SHARE,
@@ -85,6 +85,13 @@ def test_a_limit_of_the_transmission_error_finds_the_threshold(full):
     assert by_depth.threshold == pytest.approx(1e-6, rel=1e-6)
     with pytest.raises(ConfigError, match="is reached by new flanks already"):
         wear_life(case_of(*FULL, "wear.transmission_error_limit_um=0.5"))
+
+
+def test_sum_adds_both_flanks_and_the_local_exponent_is_near_one(full):
+    life = wear_life(case_of(*FULL, "wear.criterion=sum"))
+    assert life.depth[-1].sum(axis=0).max() == pytest.approx(20e-6, rel=1e-6)
+    assert life.life < 0.8 * wear_life(full).life
+    assert torque_exponent(full) == pytest.approx(1.0, abs=0.15)
 
 
 def test_sharing_follows_the_contact_ratio():
