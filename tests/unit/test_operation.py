@@ -1,5 +1,4 @@
-"""The group ``operating``: kinds of courses as configurations give them, users' files, and what is
-refused."""
+"""The group ``operating``: courses as configurations give them, users' files, and mistakes."""
 
 import math
 import re
@@ -9,14 +8,16 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gensig.errors import ConfigError
-from gensig.operation.courses import Profile
-from gensig.operation.options import read_operating
+from gensig.operation.courses import MOST_POINTS, Profile
+from gensig.operation.options import read_operating, read_profile
 from gensig.plan.request import read_request
+from gensig.record.inputs import InputReader
 from gensig.systems.lead_in import earlier
 from gensig.systems.registry import read_system
 from gensig.systems.run import Run
 
 SPEED, TORQUE = "operating.speed_profile", "operating.torque_profile"
+SPEED_RIPPLE, TORQUE_RIPPLE = "operating.speed_ripple", "operating.torque_ripple"
 WALK = {"kind": "random_walk", "scatter": 0.01, "correlation_time_s": 0.1}
 RAMP = {"kind": "ramp", "first_factor": 0.5, "last_factor": 1.0}
 TIMES = np.array([-3.0, -0.4012, 0.0013, 0.3117, 0.9012, 1.9])
@@ -35,162 +36,144 @@ def saved(folder, text):
 
 class TestKinds:
     def test_walks_of_speed_and_torque_are_different(self, operating):
-        found = operating({SPEED: WALK, TORQUE: WALK})
-        one, other = (
-            np.array(course.factors)
-            for course in (found.speed_profile, found.torque_profile)
-        )
-        assert abs(np.corrcoef(one, other)[0, 1]) < 0.5
-        assert operating({SPEED: WALK, TORQUE: WALK}) == found
-        assert (
-            operating({SPEED: WALK, "operating.course_seed": 1}).speed_profile
-            != found.speed_profile
-        )
-        assert operating({SPEED: WALK}).speed_profile == found.speed_profile
+        both = operating({SPEED: WALK, TORQUE: WALK})
+        factors = [both.speed_profile.factors, both.torque_profile.factors]
+        assert abs(np.corrcoef(factors)[0, 1]) < 0.5
+        assert operating({SPEED: WALK}).speed_profile == both.speed_profile
+        other = operating({SPEED: WALK, "operating.course_seed": 1})
+        assert other.speed_profile != both.speed_profile
 
     def test_the_options_compose(self):
-        ramp, drifting = (
-            read_request([f"operating={name}"]).config for name in ("ramp", "drifting")
+        constant, ramp, drifting = (
+            read_system(read_request(words).config).operating
+            for words in ([], ["operating=ramp"], ["operating=drifting"])
         )
-        found = read_system(ramp).operating
-        assert found.speed_profile == Profile(times=(0.0, 4.0), factors=(0.5, 1.0))
-        assert found.torque_profile is None
-        found = read_system(drifting).operating
-        assert None not in (
-            found.speed_profile,
-            found.torque_profile,
-            found.speed_ripple,
-            found.torque_ripple,
-        )
-        assert not found.is_steady
-        assert read_system(read_request([]).config).operating.is_steady
+        assert constant.is_steady
+        assert ramp.speed_profile == Profile(times=(0.0, 4.0), factors=(0.5, 1.0))
+        assert ramp.torque_profile is None
+        assert not drifting.is_steady
+        for course in (
+            "speed_profile",
+            "torque_profile",
+            "speed_ripple",
+            "torque_ripple",
+        ):
+            assert getattr(drifting, course) is not None
 
-    def test_a_file_of_factors(self, operating, tmp_path):
-        own = saved(tmp_path, "factor,time_s\n0.5,-1\n0.5,0\n1,1\n")
-        for speed in (600.0, 1800.0):
-            found = operating({SPEED: own, "operating.speed_rpm": speed})
-            assert_allclose(
-                found.nominal(TIMES[:2]).speed / found.speed, 0.5, rtol=1e-12, atol=0
-            )
+    def test_typed_profiles_compose(self):
+        words = [f"{SPEED}=[[0,0.5],[1,1]]", f"{TORQUE}=[[0.1,0],[0.2,1.5],[1,1]]"]
+        found = read_system(read_request(words).config).operating
+        assert found.speed_profile == Profile(times=(0.0, 1.0), factors=(0.5, 1.0))
+        torque = Profile(times=(0.1, 0.2, 1.0), factors=(0.0, 1.5, 1.0))
+        assert found.torque_profile == torque
 
-    def test_a_file_of_speeds_and_one_of_torques(self, operating, tmp_path):
-        own = saved(tmp_path, "time_s,speed_rpm\n0,900\n1,1500\n")
-        for speed in (600.0, 1800.0):
-            found = operating({SPEED: own, "operating.speed_rpm": speed}).nominal(
-                np.array([-1.0, 0.5, 1.0])
-            )
-            assert_allclose(
-                found.speed,
-                np.array([900, 1200, 1500]) * math.pi / 30,
-                rtol=1e-12,
-                atol=0,
-            )
-        own = saved(tmp_path, "time_s,torque_nm\n0,10\n1,40\n")
-        found = operating({TORQUE: own})
-        assert_allclose(
-            found.torque * found.nominal(np.array([0.5])).torque_factor,
-            25,
-            rtol=1e-12,
-            atol=0,
-        )
+    def test_a_drawn_speed_scales_the_profile(self, config_with):
+        reader = InputReader(config_with({SPEED: [[0, 0.5], [1, 1]]}))
+        for speed in (600.0, 1200.0):
+            found = reader.machine({"operating.speed_rpm": speed}).operating
+            nominal = found.nominal(np.array([-0.3, 0.5, 2.0]))
+            set_speed = speed * math.pi / 30
+            expected = set_speed * np.array([0.5, 0.75, 1.0])
+            assert_allclose(nominal.speed, expected, rtol=1e-12)
+
+    @pytest.mark.parametrize("speed", [600.0, 1800.0])
+    def test_files_of_factors_speeds_and_torques(self, operating, tmp_path, speed):
+        set_speed = {"operating.speed_rpm": speed}
+        factors = saved(tmp_path, "factor,time_s\n0.5,-1\n0.5,0\n1,1\n")
+        found = operating({SPEED: factors, **set_speed})
+        share = found.nominal(TIMES[:2]).speed / found.speed
+        assert_allclose(share, 0.5, rtol=1e-12)
+        speeds = saved(tmp_path, "time_s,speed_rpm\n0,900\n1,1500\n")
+        found = operating({SPEED: speeds, **set_speed})
+        rpm = found.nominal(np.array([-1.0, 0.5, 1.0])).speed * 30 / math.pi
+        assert_allclose(rpm, [900, 1200, 1500], rtol=1e-12)
+        torques = saved(tmp_path, "time_s,torque_nm\n0,10\n1,40\n")
+        found = operating({TORQUE: torques, **set_speed})
+        factor = found.nominal(np.array([0.5])).torque_factor
+        assert_allclose(found.torque * factor, 25, rtol=1e-12)
 
     def test_a_file_may_end_one_step_early(self, operating, tmp_path):
         rows = "".join(f"{k / 100},1\n" for k in range(100))
-        assert (
-            operating({SPEED: saved(tmp_path, "time_s,factor\n" + rows)}).speed_profile
-            is not None
-        )
+        course = saved(tmp_path, "time_s,factor\n" + rows)
+        assert operating({SPEED: course}).speed_profile is not None
+
+    def test_as_many_points_as_allowed(self):
+        points = [[k * 1e-3, 1.0] for k in range(MOST_POINTS)]
+        assert len(read_profile(SPEED, points).times) == MOST_POINTS
 
 
-def read_refused(config, start, text):
+def check_refused(config, start, text):
     with pytest.raises(ConfigError, match=re.escape(text)) as caught:
         read_system(config)
     assert str(caught.value).startswith(start)
     assert "\n" not in str(caught.value)
 
 
+PROFILES = [
+    (3, " = 3 is no list; give [time_s, factor] pairs, a group with a kind"),
+    ({"a": 1}, ".kind = None; allowed: ramp, random_walk, file"),
+    ([[0, 1]], ": 1 points; give 2 to 100000"),
+    ([[k, 1] for k in range(100_001)], ": 100001 points; give 2 to 100000"),
+    ([0, 1], ": point 0 = 0; give two finite numbers, [time_s, factor]"),
+    ([[0, 1], [1, 1, 1]], ": point 1 = [1, 1, 1]; give two finite numbers"),
+    ([[0, True], [1, 1]], ": point 0 = [0, True]; give two finite numbers"),
+    ([[0, math.nan], [1, 1]], ": point 0 = [0, nan]; give two finite numbers"),
+    ([[0, 1], [1, 10**400]], ": point 1 = [1, 1000"),
+    ([[0, 1], [2e6, 1]], ": point 1 = [2e+06, 1]; give a time within 1e+06 s"),
+    ([[0, 1], [1, 1], [0.5, 1]], ": the time 0.5 s follows 1 s; times must increase"),
+    ([[0, 1], [1e-5, 1]], "times must increase, by 0.001 s or more"),
+    ([[0, 1], [1, -0.5]], ": factor -0.5 must "),
+    ({**RAMP, "slope": 1}, ": unknown key 'slope'; known: first_factor, last_factor"),
+    ({**RAMP, "end_s": 0}, ": the time 0 s follows 0 s; times must increase"),
+    ({**WALK, "scatter": 1}, ": scatter = 1 must lie in 0..0.2"),
+    ({"kind": "file", "file": 3}, ": kind = file needs exactly file"),
+    ({"kind": "file", "file": "none.csv"}, ".file = none.csv cannot be read: No such"),
+]
+RIPPLES = [
+    (3, " = 3 must be a group of keys, not one value"),
+    ({"share": 0.1}, ": give order (of the pinion's turn) or frequency_hz"),
+    ({"share": "x", "order": 1}, ".share = 'x' is not a number"),
+    ({"share": 0.1, "frequency_hz": 151}, ": frequency_hz = 151 Hz, above 150 Hz"),
+    ({"share": 0.1, "order": 6}, ": order 6 makes up to 180 Hz, above 150 Hz"),
+]
+FILES = {
+    "time_s,rpm 0,1 1,1": "no column speed_rpm or factor; it must have time_s and one",
+    "time_s,speed_rpm,factor 0,1,1 1,1,1": "unknown column factor; it must have time_s",
+    "t,factor 0,1 1,1": "no column time_s; it must have time_s, factor",
+    "time_s,factor 0,1 1,nan": "row 3, column factor is no finite number",
+    "time_s,factor 0,1 2,1 1,1": "the time 1 s follows 2 s; times must increase",
+    "time_s,factor 0,1 0.2,1 0.4,1": "runs from 0 s to 0.4 s, the record from 0 to 1 s",
+    "time_s,factor 0.1,1 2,1": "too short: it runs from 0.1 s to 2 s, the record",
+    "time_s,speed_rpm 0,100 1,0": "operating.speed_profile: factor 0 must be positive",
+}
+
+
 class TestRefusals:
-    @pytest.mark.parametrize(
-        ("value", "text"),
-        [
-            (
-                {**RAMP, "slope": 1},
-                ": unknown key 'slope'; known: first_factor, last_factor",
-            ),
-            ({**RAMP, "end_s": 0}, ": the time 0 s follows 0 s; times must increase"),
-            ({**RAMP, "last_factor": -1}, ": factor -1 must "),
-            ({**RAMP, "last_factor": "x"}, ".last_factor = 'x' is not a number"),
-            ({**WALK, "scatter": 1}, ": scatter = 1 must lie in 0..0.2"),
-            ({"kind": "file", "file": 3}, ": kind = file needs exactly file"),
-            (
-                {"kind": "file", "file": "none.csv"},
-                ".file = none.csv cannot be read: No such file",
-            ),
-        ],
-    )
+    @pytest.mark.parametrize(("value", "text"), PROFILES)
     @pytest.mark.parametrize("key", [SPEED, TORQUE])
     def test_of_profiles(self, config_with, key, value, text):
-        read_refused(config_with({key: value}), key, f"{key}{text}")
+        check_refused(config_with({key: value}), key, text)
 
-    @pytest.mark.parametrize(
-        ("table", "text"),
-        [
-            (
-                "time_s,rpm 0,1 1,1",
-                "no column speed_rpm or factor; it must have time_s and one",
-            ),
-            (
-                "time_s,speed_rpm,factor 0,1,1 1,1,1",
-                "unknown column factor; it must have time_s",
-            ),
-            ("t,factor 0,1 1,1", "no column time_s; it must have time_s, factor"),
-            ("time_s,factor 0,1 1,nan", "row 3, column factor is no finite number"),
-            (
-                "time_s,factor 0,1 2,1 1,1",
-                "the time 1 s follows 2 s; times must increase",
-            ),
-            (
-                "time_s,factor 0,1 0.2,1 0.4,1",
-                "runs from 0 s to 0.4 s, the record from 0 to 1 s",
-            ),
-            (
-                "time_s,factor 0.1,1 2,1",
-                "too short: it runs from 0.1 s to 2 s, the record",
-            ),
-            (
-                "time_s,speed_rpm 0,100 1,0",
-                "operating.speed_profile: factor 0 must be positive",
-            ),
-        ],
-    )
-    def test_of_files(self, config_with, tmp_path, table, text):
+    @pytest.mark.parametrize("table", FILES)
+    def test_of_files(self, config_with, tmp_path, table):
         course = saved(tmp_path, table.replace(" ", "\n") + "\n")
-        read_refused(config_with({SPEED: course}), SPEED, text)
+        check_refused(config_with({SPEED: course}), SPEED, FILES[table])
 
-    @pytest.mark.parametrize(
-        ("value", "text"),
-        [
-            (3, " = 3 must be a group of keys, not one value"),
-            ({"share": 0.1}, ": give order (of the pinion's turn) or frequency_hz"),
-            ({"share": "x", "order": 1}, ".share = 'x' is not a number"),
-            (
-                {"share": 0.1, "frequency_hz": 151},
-                ": frequency_hz = 151 Hz, above 150 Hz",
-            ),
-            ({"share": 0.1, "order": 6}, ": order 6 makes up to 180 Hz, above 150 Hz"),
-        ],
-    )
-    @pytest.mark.parametrize(
-        "key", [f"operating.{side}_ripple" for side in ("speed", "torque")]
-    )
+    @pytest.mark.parametrize(("value", "text"), RIPPLES)
+    @pytest.mark.parametrize("key", [SPEED_RIPPLE, TORQUE_RIPPLE])
     def test_of_ripples(self, config_with, key, value, text):
-        read_refused(config_with({key: value}), key, f"{key}{text}")
+        check_refused(config_with({key: value}), key, f"{key}{text}")
 
     def test_an_order_is_judged_at_the_fastest(self, operating):
-        ripple = {"share": 0.1, "order": 4}
-        assert operating({"operating.speed_ripple": ripple}).speed_ripple.order == 4
+        ripple = {SPEED_RIPPLE: {"share": 0.1, "order": 4}}
+        assert operating(ripple).speed_ripple.order == 4
         with pytest.raises(ConfigError, match="order 4 makes up to 180 Hz"):
-            operating({"operating.speed_ripple": ripple, SPEED: [[0, 1], [1, 1.5]]})
+            operating({**ripple, SPEED: [[0, 1], [1, 1.5]]})
+
+    def test_a_torque_may_fall_to_nothing_but_no_speed(self, config_with, operating):
+        value = [[0, 1], [1, 0]]
+        assert operating({TORQUE: value}).torque_profile is not None
+        check_refused(config_with({SPEED: value}), SPEED, "factor 0 must be positive")
 
     @pytest.mark.parametrize(
         ("key", "value", "text"),
@@ -203,64 +186,43 @@ class TestRefusals:
     )
     def test_of_turns_and_seeds(self, config_with, key, value, text):
         key = f"operating.{key}"
-        read_refused(config_with({key: value}), key, f"{key}{text}")
+        check_refused(config_with({key: value}), key, f"{key}{text}")
 
 
 class TestRipple:
-    def test_of_a_constant_speed(self, operating):
-        found = operating(
-            {"operating.speed_ripple": {"share": 0.1, "order": 1, "phase_deg": 90}}
-        )
+    @pytest.mark.parametrize("rate", [{"order": 1}, {"frequency_hz": 30}])
+    def test_of_a_constant_speed(self, operating, rate):
+        ripple = {"share": 0.1, "phase_deg": 90, **rate}
+        found = operating({SPEED_RIPPLE: ripple})
         nominal = found.nominal(np.array([0.0, 0.25, 0.5]) / 30)
-        assert_allclose(
-            nominal.speed / found.speed, [1.1, 1.0, 0.9], rtol=1e-12, atol=0
-        )
+        share = nominal.speed / found.speed
+        assert_allclose(share, [1.1, 1.0, 0.9], rtol=1e-12)
         assert_allclose(nominal.torque_factor, 1.0, rtol=0, atol=0)
 
     @pytest.mark.parametrize(
         "ripple", [{"share": 0.1, "order": 2}, {"share": 0.2, "frequency_hz": 9}]
     )
     def test_speed_and_slopes_are_derivatives(self, operating, ripple):
-        found = operating(
-            {
-                SPEED: WALK,
-                TORQUE: RAMP,
-                "operating.speed_ripple": ripple,
-                "operating.torque_ripple": {**ripple, "phase_deg": 30},
-            }
-        )
+        rippled = {SPEED_RIPPLE: ripple, TORQUE_RIPPLE: {**ripple, "phase_deg": 30}}
+        found = operating({SPEED: WALK, TORQUE: RAMP, **rippled})
         times, h = np.array([-0.2512, 0.1013, 0.5017, 0.9123]), 1e-6
         before, at, after = (found.nominal(times + shift) for shift in (-h, 0.0, h))
-        assert_allclose(
-            at.speed, (after.angle - before.angle) / (2 * h), rtol=1e-7, atol=0
-        )
-        assert_allclose(
-            at.acceleration,
-            (after.speed - before.speed) / (2 * h),
-            rtol=1e-5,
-            atol=1e-4,
-        )
-        assert_allclose(
-            at.torque_slope,
-            (after.torque_factor - before.torque_factor) / (2 * h),
-            rtol=1e-5,
-            atol=1e-5,
-        )
+
+        def slope(name):
+            return (getattr(after, name) - getattr(before, name)) / (2 * h)
+
+        assert found.nominal(np.zeros(1)).angle == 0.0
+        assert_allclose(at.speed, slope("angle"), rtol=1e-7)
+        assert_allclose(at.acceleration, slope("speed"), rtol=1e-5, atol=1e-4)
+        assert_allclose(at.torque_slope, slope("torque_factor"), rtol=1e-5, atol=1e-5)
 
     def test_the_order_follows_the_set_angle_of_both_shafts_courses(self, operating):
         """On a ramp a torque ripple of order 2 has two periods a turn of the pinion, whatever the
         speed."""
-        found = operating(
-            {SPEED: RAMP, "operating.torque_ripple": {"share": 0.1, "order": 2}}
-        )
-        times = np.linspace(0.0, 1.0, 2001)
-        nominal = found.nominal(times)
-        assert_allclose(
-            nominal.torque_factor,
-            1 + 0.1 * np.sin(2 * nominal.angle),
-            rtol=0,
-            atol=1e-9,
-        )
+        found = operating({SPEED: RAMP, TORQUE_RIPPLE: {"share": 0.1, "order": 2}})
+        nominal = found.nominal(np.linspace(0.0, 1.0, 2001))
+        expected = 1 + 0.1 * np.sin(2 * nominal.angle)
+        assert_allclose(nominal.torque_factor, expected, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -268,18 +230,13 @@ class TestRipple:
     [{"share": 0.02, "order": 2}, {"share": 0.02, "frequency_hz": 50, "phase_deg": 20}],
 )
 def test_a_lead_in_shifts_all_courses_alike(machine, ripple):
-    changes = {
-        SPEED: WALK,
-        TORQUE: WALK,
-        "operating.speed_ripple": ripple,
-        "operating.torque_ripple": ripple,
-        "sensing.sensor.low_cutoff_hz": 2.0,
-    }
-    run = Run(system=machine(changes), faults=())
+    courses = {SPEED: WALK, TORQUE: WALK, SPEED_RIPPLE: ripple, TORQUE_RIPPLE: ripple}
+    filtered = {"sensing.sensor.low_cutoff_hz": 2.0}
+    run = Run(system=machine(courses | filtered), faults=())
     lead = run.system.sensing.n_lead / run.system.sensing.sampling_rate
     assert lead > 0.05
-    longer, own = earlier(run).system.operating, run.system.operating
-    there, here = longer.nominal(TIMES + lead), own.nominal(TIMES)
+    longer = earlier(run).system.operating
+    there, here = longer.nominal(TIMES + lead), run.system.operating.nominal(TIMES)
     for name in ("speed", "acceleration", "torque_factor", "torque_slope"):
         assert_allclose(getattr(there, name), getattr(here, name), rtol=1e-8, atol=1e-6)
     at_begin = longer.nominal(np.array([lead])).angle

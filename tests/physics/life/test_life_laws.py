@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
+from gensig.geometry.tooth import healthy_tooth
 from gensig.life.crack_growth import crack_growth
 from gensig.life.drift import Drift
 from gensig.life.growth import grow
@@ -17,6 +18,7 @@ from gensig.life.life_options import read_life
 from gensig.life.load_history import DrawnBlocks, draw_history, given_history
 from gensig.life.pit_growth import contact_stress, pit_growth
 from gensig.life.snapshots import snapshot_times
+from gensig.mesh.root_crack import crack_compliance
 from gensig.plan.request import read_request
 from gensig.systems.registry import read_system
 
@@ -87,37 +89,18 @@ def test_the_stress_intensity_range_is_that_of_the_reference(law, torque, low, h
 
 def test_the_stress_intensity_range_is_irwins(law, machine, crack):
     """Against a difference of the compliance itself, at the highest point of single contact."""
-    from gensig.geometry.tooth import healthy_tooth
-    from gensig.mesh.root_crack import crack_compliance
-
     pair, strain = machine.pair, machine.material.in_plane("plane_strain")
+    tooth = healthy_tooth(pair.pinion)
     place = np.array([pair.pinion_curvature(pair.base_pitch)])
     low, high = (
-        crack_compliance(
-            replace(crack, crack_depth=depth).apply(healthy_tooth(pair.pinion), 0),
-            place,
-            strain,
-        )[0]
-        for depth in (0.999e-3, 1.001e-3)
+        crack_compliance(replace(crack, crack_depth=a).apply(tooth, 0), place, strain)
+        for a in (0.999e-3, 1.001e-3)
     )
-    release = (
-        (100.0 / pair.pinion.base_radius) ** 2
-        / (2.0 * pair.face_width)
-        * (high - low)
-        / 2e-6
-    )
-    told = law.measures(1e-3, 100.0)["stress_intensity_range_mpa_sqrt_m"]
-    assert_allclose(told, math.sqrt(release * strain.youngs_modulus) / 1e6, rtol=2e-3)
-
-
-def test_below_the_threshold_a_crack_does_not_grow(law):
-    course = grow(law.sizes, law.turns(np.array([20.0])), steady(20.0, 1e5), 1e-3)
-    assert not course.has_failed
-    assert not course.growing.any()
-    assert_array_equal(course.size, 1e-3)
-    assert grow(
-        law.sizes, law.turns(np.array([100.0])), steady(100.0, 1e5), 1e-3
-    ).growing.all()
+    force = 100.0 / pair.pinion.base_radius
+    release = force**2 / (2.0 * pair.face_width) * (high[0] - low[0]) / 2e-6
+    expected = math.sqrt(release * strain.youngs_modulus) / 1e6
+    found = law.measures(1e-3, 100.0)["stress_intensity_range_mpa_sqrt_m"]
+    assert_allclose(found, expected, rtol=2e-3)
 
 
 @pytest.mark.parametrize("exponent", [2.25, 3.0])
@@ -131,28 +114,27 @@ def test_the_life_falls_with_the_load_to_the_paris_exponent(law, exponent):
 
 def test_the_course_converges_with_the_cells(law):
     """Half as many cells move the life by less than 0.1 %."""
-    fine = life_turns(law, 120.0, law.sizes[20])
-    coarse = grow(
-        law.sizes[::2],
-        replace(law, sizes=law.sizes[::2], intensity=law.intensity[:, ::2]).turns(
-            np.array([120.0])
-        ),
-        steady(120.0, 1e6),
-        law.sizes[20],
-    )
-    assert_allclose(coarse.turns[-1], fine, rtol=1e-3)
+    start = law.sizes[20]
+    half = replace(law, sizes=law.sizes[::2], intensity=law.intensity[:, ::2])
+    fine, coarse = (life_turns(one, 120.0, start) for one in (law, half))
+    assert_allclose(coarse, fine, rtol=1e-3)
+
+
+@pytest.fixture
+def law_of_share(machine, crack, options):
+    """The law of a crack that begins over a share of the face."""
+
+    def make(share):
+        changed = replace(options.laws["crack"], width_share=share)
+        return crack_growth(machine.pair, machine.material, crack, changed)
+
+    return make
 
 
 def test_a_crack_over_part_of_the_face_grows_both_ways_and_becomes_a_through_one(
-    machine, crack, options
+    law_of_share,
 ):
-    whole = crack_growth(machine.pair, machine.material, crack, options.laws["crack"])
-    part = crack_growth(
-        machine.pair,
-        machine.material,
-        crack,
-        replace(options.laws["crack"], width_share=0.25),
-    )
+    whole, part = law_of_share(1.0), law_of_share(0.25)
     assert (np.diff(part.width) >= 0.0).all()
     assert part.width[0] == pytest.approx(5e-3)
     assert part.width[-1] > 6e-3
@@ -162,16 +144,8 @@ def test_a_crack_over_part_of_the_face_grows_both_ways_and_becomes_a_through_one
     assert "crack_width_mm" not in whole.fault(1e-3)
 
 
-def test_a_nearly_through_crack_grows_as_a_through_one(machine, crack, options):
-    whole, nearly = (
-        crack_growth(
-            machine.pair,
-            machine.material,
-            crack,
-            replace(options.laws["crack"], width_share=share),
-        )
-        for share in (1.0, 0.999999)
-    )
+def test_a_nearly_through_crack_grows_as_a_through_one(law_of_share):
+    whole, nearly = law_of_share(1.0), law_of_share(0.999999)
     assert_allclose(nearly.intensity[0, 20:-8], whole.intensity[0, 20:-8], rtol=0.02)
 
 
@@ -185,51 +159,38 @@ def test_pits_come_after_the_first_life_and_go_with_the_load_to_the_exponent(
     assert_allclose(math.log2(ratio), 0.5 * pits.options.exponent, rtol=1e-9)
     assert_allclose(pits.share(pits.sizes[-1]), pits.options.end_share, rtol=1e-9)
     # Hertz: the knee of the line is reached at the torque whose stress is the strength
-    torque = (
-        pits.options.strength / contact_stress(machine.pair, machine.material, 1.0)
-    ) ** 2
-    assert_allclose(
-        pits.rate(np.array([0.5]), torque), 1.0 / pits.options.cycles, rtol=1e-9
-    )
+    stress = contact_stress(machine.pair, machine.material, 1.0)
+    torque = (pits.options.strength / stress) ** 2
+    rate = pits.rate(np.array([0.5]), torque)
+    assert_allclose(rate, 1.0 / pits.options.cycles, rtol=1e-9)
 
 
 def test_damage_adds_up_by_miner_whatever_the_order(pits):
-    rows = ((0.0, 10.0, 100.0), (10.0, 15.0, 80.0), (15.0, 27.0, 110.0))
-    courses = []
-    for order in ((0, 1, 2), (2, 0, 1)):
-        clock, blocks = 0.0, []
-        for k in order:
-            length = (rows[k][1] - rows[k][0]) * HOUR
-            blocks.append((clock, clock + length, SPEED, rows[k][2]))
-            clock += length
+    hours, torques = np.array([10.0, 5.0, 12.0]), np.array([100.0, 80.0, 110.0])
+    rates = [pits.rate(np.array([0.0]), torque)[0] for torque in torques]
+    for order in ([0, 1, 2], [2, 0, 1]):
+        end = np.cumsum(hours[order]) * HOUR
+        begin = np.append(0.0, end[:-1])
+        blocks = zip(begin, end, [SPEED] * 3, torques[order], strict=True)
         history = given_history(tuple(blocks), math.inf)
-        courses.append(grow(pits.sizes, pits.turns(history.torque), history, 0.0))
-    assert_allclose(courses[0].size[-1], courses[1].size[-1], rtol=1e-12)
-    expected = sum(
-        (end - begin) * 108_000.0 * pits.rate(np.array([0.0]), torque)[0]
-        for begin, end, torque in rows
-    )
-    assert_allclose(courses[0].size[-1], expected, rtol=1e-12)
+        course = grow(pits.sizes, pits.turns(history.torque), history, 0.0)
+        assert_allclose(course.size[-1], 108_000.0 * hours @ rates, rtol=1e-12)
 
 
 def test_a_standstill_costs_clock_time_and_nothing_else(law):
-    first = (0.0, HOUR, SPEED, 90.0)
-    histories = [
-        given_history((first, (a * HOUR, (a + 1.0) * HOUR, SPEED, 90.0)), math.inf)
-        for a in (1.0, 9.0)
-    ]
-    near, far = (
-        grow(law.sizes, law.turns(np.array([90.0])), history, 5e-4)
-        for history in histories
-    )
+    turns, courses = law.turns(np.array([90.0])), []
+    for begin in (1.0, 9.0):
+        later = (begin * HOUR, (begin + 1.0) * HOUR, SPEED, 90.0)
+        history = given_history(((0.0, HOUR, SPEED, 90.0), later), math.inf)
+        courses.append(grow(law.sizes, turns, history, 5e-4))
+    near, far = courses
     assert_array_equal(near.size[-1], far.size[-1])
     assert_array_equal(near.turns[-1], far.turns[-1])
     assert far.clock[-1] - near.clock[-1] == pytest.approx(8 * HOUR)
     # no look falls into the gap
-    looks = [
-        far.value("clock", far.at(t)) / HOUR for t in snapshot_times(far, "linear", 9)
-    ]
-    assert not any(1.0 < look < 9.0 for look in looks)
+    times = snapshot_times(far, "linear", 9)
+    looks = np.array([far.value("clock", far.at(time)) for time in times]) / HOUR
+    assert not ((looks > 1.0) & (looks < 9.0)).any()
     assert looks[-1] == pytest.approx(10.0)
 
 

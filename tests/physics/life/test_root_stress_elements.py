@@ -50,14 +50,6 @@ def test_the_pump_drives_gear_at_isos_load_point():
     )
 
 
-def test_the_order_of_gears_is_that_of_finite_elements():
-    """At 0.45 base pitches from the tip: which root is stressed more."""
-    found = {case: compared(case) for case in CASES}
-    ours = [np.interp(0.45, place, own) for place, own, _, _ in found.values()]
-    exact = [np.interp(0.45, place, fe) for place, _, fe, _ in found.values()]
-    assert np.corrcoef(ours, exact)[0, 1] > 0.95
-
-
 def test_the_critical_section_is_where_the_tension_is_largest_under_a_high_load():
     for case in CASES:
         _, _, _, rows = compared(case)

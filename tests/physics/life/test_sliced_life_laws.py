@@ -59,17 +59,13 @@ def test_without_a_helix_a_crack_lives_as_on_the_spur_pair(spur, gear):
     whole = crack_growth(machine.pair, machine.material, crack, options)
     cut = sliced(machine, crack, options)
     assert_allclose(cut.intensity[0], whole.intensity[0], rtol=1e-3)
-    lives = [
-        grow(
-            law.sizes,
-            law.turns(np.array([100.0])),
-            given_history(((0.0, 1e9, 200.0, 100.0),), math.inf),
-            5e-4,
-        )
-        for law in (whole, cut)
-    ]
-    assert lives[0].has_failed
-    assert_allclose(lives[1].turns[-1], lives[0].turns[-1], rtol=1e-3)
+    history = given_history(((0.0, 1e9, 200.0, 100.0),), math.inf)
+    lives = []
+    for law in (whole, cut):
+        course = grow(law.sizes, law.turns(np.array([100.0])), history, 5e-4)
+        assert course.has_failed
+        lives.append(course.turns[-1])
+    assert_allclose(lives[1], lives[0], rtol=1e-3)
 
 
 def test_without_a_helix_a_crack_over_part_of_the_face_grows_as_on_the_spur_pair(spur):
@@ -99,26 +95,21 @@ def test_the_release_rate_is_the_change_of_the_energy_at_constant_load(helical):
     depth, force = 1e-3, 90.0 / flanks.pair.pinion.base_radius
     roll = flanks.pair.base_pitch * np.linspace(0.01, 4.0, 400)
     low, high = (
-        loaded_contact(
-            flanks.sliced_mesh((replace(crack, tooth=0, crack_depth=one),)), roll, force
-        ).approach
-        for one in (0.995 * depth, 1.005 * depth)
+        flanks.sliced_mesh((replace(crack, tooth=0, crack_depth=share * depth),))
+        for share in (0.995, 1.005)
     )
-    release = (
+    energy = (
         0.5
         * force
-        * (high - low).max()
-        / (0.01 * depth * flanks.pair.pinion.face_width)
+        * (
+            loaded_contact(high, roll, force).approach
+            - loaded_contact(low, roll, force).approach
+        )
     )
-    expected = (
-        math.sqrt(release * flanks.material.in_plane("plane_strain").youngs_modulus)
-        / 1e6
-    )
-    assert_allclose(
-        law.measures(depth, 90.0)["stress_intensity_range_mpa_sqrt_m"],
-        expected,
-        rtol=2e-3,
-    )
+    release = energy.max() / (0.01 * depth * flanks.pair.pinion.face_width)
+    modulus = flanks.material.in_plane("plane_strain").youngs_modulus
+    found = law.measures(depth, 90.0)["stress_intensity_range_mpa_sqrt_m"]
+    assert_allclose(found, math.sqrt(release * modulus) / 1e6, rtol=2e-3)
 
 
 def test_below_the_threshold_a_crack_of_a_helical_pair_does_not_grow(helical):
@@ -142,53 +133,40 @@ def test_the_energy_of_slices_is_half_the_work_of_their_loads(length):
     rng = np.random.default_rng(0)
     width = rng.uniform(1e-3, 2e-3, 7)
     structure, load = rng.uniform(1e-11, 3e-11, (3, 7)), rng.uniform(0.0, 1e5, (3, 7))
-    for soft, pressed, energy in zip(
-        structure,
-        load,
-        structure_energy(structure, load, width, length**2),
-        strict=True,
-    ):
+    energies = structure_energy(structure, load, width, length**2)
+    for soft, pressed, energy in zip(structure, load * width, energies, strict=True):
         matrix = np.diag(width / soft)
         for j in range(6):
-            tie = (
-                length**2 * 4.0 / ((soft[j] + soft[j + 1]) * (width[j] + width[j + 1]))
-            )
+            between = 0.25 * (soft[j] + soft[j + 1]) * (width[j] + width[j + 1])
+            tie = length**2 / between
             matrix[j : j + 2, j : j + 2] += tie * np.array([[1.0, -1.0], [-1.0, 1.0]])
-        assert_allclose(
-            energy,
-            0.5 * (width * pressed) @ np.linalg.solve(matrix, width * pressed),
-            rtol=1e-9,
-        )
+        work = 0.5 * pressed @ np.linalg.solve(matrix, pressed)
+        assert_allclose(energy, work, rtol=1e-9)
 
 
 def test_the_contact_stress_of_slices_is_the_nominal_one_without_a_helix(spur):
     machine, laws, _ = spur
     torques = np.array([20.0, 100.0, 300.0])
     mesh = _for_lives(machine.flanks).sliced_mesh()
-    found = sliced_contact_stress(
-        mesh, machine.material, torques, laws["distributed_pitting"].exponent
-    )
-    assert_allclose(
-        found,
-        [contact_stress(machine.pair, machine.material, one) for one in torques],
-        rtol=1e-9,
-    )
+    exponent = laws["distributed_pitting"].exponent
+    found = sliced_contact_stress(mesh, machine.material, torques, exponent)
+    nominal = [contact_stress(machine.pair, machine.material, one) for one in torques]
+    assert_allclose(found, nominal, rtol=1e-9)
 
 
 def test_pits_of_a_helical_pair_come_by_their_slices(helical):
     machine, laws, _ = helical
     pits = read_faults(read_request(["fault=distributed_pitting"]).config["fault"])[0]
     options = laws["distributed_pitting"]
+    misaligned = parts(*HELICAL, "modification.misalignment_um=10")[0]
     even, tilted = (
-        pit_law(one, pits, options, 1.0, (50.0, 200.0))
-        for one in (machine, parts(*HELICAL, "modification.misalignment_um=10")[0])
+        pit_law(one, pits, options, 1.0, (50.0, 200.0)) for one in (machine, misaligned)
     )
     # nearly as the root of the load where flanks are even; where they are not, one end carries all
     # of a small one
     ratio = even.rate(np.zeros(1), 200.0) / even.rate(np.zeros(1), 50.0)
-    assert_allclose(
-        math.log(ratio[0]) / math.log(4.0), 0.5 * options.exponent, rtol=0.02
-    )
+    exponent = math.log(ratio[0]) / math.log(4.0)
+    assert exponent == pytest.approx(0.5 * options.exponent, rel=0.02)
     assert tilted.stress_at_one[0] > tilted.stress_at_one[2] > even.stress_at_one[2]
 
 
@@ -196,36 +174,25 @@ def test_a_spectrum_grows_at_the_mean_of_its_rates(helical):
     machine, laws, crack = helical
     law = sliced(machine, crack, laws["crack"], (100.0, 300.0))
     alone = law.turns(np.array([150.0, 300.0]))
-    assert_allclose(
-        law.turns([np.full(3, 150.0), np.full(2, 300.0)]), alone, rtol=1e-12
-    )
+    steady = law.turns([np.full(3, 150.0), np.full(2, 300.0)])
+    assert_allclose(steady, alone, rtol=1e-12)
     both = law.turns([np.array([150.0, 300.0])])[0]
     assert_allclose(1.0 / both, 0.5 * (1.0 / alone).sum(axis=0), rtol=1e-12)
 
 
 def test_the_loads_of_a_mesh_are_the_greatest_of_each_pair_of_teeth(spur):
     pair = spur[0].pair
-    pitch = pair.base_pitch / pair.pinion.base_radius
-    angle = np.linspace(0.0, 12.0 * pitch, 24001)
-    radius = pair.pinion.base_radius
-    assert_allclose(
-        greatest_loads(pair, angle, np.full(24001, 70.0)), 70.0 * radius, rtol=1e-12
-    )
-    assert_array_equal(greatest_loads(pair, angle, np.full(24001, -70.0)), LEAST_TORQUE)
+    pitch, radius = pair.base_pitch, pair.pinion.base_radius
+    angle = np.linspace(0.0, 12.0 * pitch / radius, 24001)
+    steady = np.full(24001, 70.0)
+    assert_allclose(greatest_loads(pair, angle, steady), 70.0 * radius, rtol=1e-12)
+    assert_array_equal(greatest_loads(pair, angle, -steady), LEAST_TORQUE)
     # an impact while two pairs carry is shared; alone, one has all of it
-    for place, shares in (
-        (0.1 * pair.base_pitch, (SHARED, SHARED)),
-        (pair.base_pitch * 0.9, (1.0,)),
-    ):
-        force = np.where(
-            np.abs(angle * radius - 5.0 * pair.base_pitch - place) < 1e-5, 500.0, 0.0
-        )
-        loads = greatest_loads(pair, angle, force)
-        assert_allclose(
-            np.sort(loads[loads > LEAST_TORQUE]),
-            np.array(shares) * 500.0 * radius,
-            rtol=1e-12,
-        )
+    for place, shares in ((0.1, [SHARED, SHARED]), (0.9, [1.0])):
+        distance = np.abs(angle * radius - (5.0 + place) * pitch)
+        loads = greatest_loads(pair, angle, np.where(distance < 1e-5, 500.0, 0.0))
+        expected = np.array(shares) * 500.0 * radius
+        assert_allclose(np.sort(loads[loads > LEAST_TORQUE]), expected, rtol=1e-12)
 
 
 def test_what_slices_cannot_do_is_refused(spur):

@@ -4,7 +4,6 @@ import json
 import warnings
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from record_sets import refused, run, shard
@@ -48,30 +47,6 @@ def drawn(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("words", "texts", "header"),
-    [
-        (
-            ENGINE[:2],
-            ("flywheel_speed", "rad/s "),
-            "time_s,flywheel_speed_rad_per_s,pump_end_speed_rad_per_s,pinion_rotation_rad_per_s2",
-        ),
-        (
-            (*TWO_STAGE[:2], "fault=missing_tooth"),
-            ("class missing_tooth", "speed 174"),
-            "time_s,pinion_rotation_rad_per_s2,wheel_rotation_rad_per_s2,pinion_y_m_per_s2",
-        ),
-    ],
-)
-def test_simulate_shows_and_writes_a_record(words, texts, header, tmp_path, capsys):
-    out = tmp_path / "one.csv"
-    run("simulate", *words, "--plot", tmp_path / "one.png", "--output", out)
-    printed = capsys.readouterr().out
-    assert all(text in printed for text in texts)
-    assert out.read_text().startswith(header)
-    assert (tmp_path / "one.png").exists()
-
-
-@pytest.mark.parametrize(
     ("life", "kind"), [("crack_growth", "crack"), ("pit_growth", "distributed_pitting")]
 )
 def test_lives_grow_under_the_steady_loads_of_the_mesh(life, kind, monkeypatch):
@@ -81,13 +56,6 @@ def test_lives_grow_under_the_steady_loads_of_the_mesh(life, kind, monkeypatch):
     grown = columns["label_name"] == kind
     assert columns["severity"][grown].max() > columns["severity"][grown].min()
     assert (columns["severity"][~grown] == 0.0).all()
-
-
-def test_loads_of_a_steady_mesh_are_its_static_torque(monkeypatch):
-    monkeypatch.setattr(line_loads, "SECONDS", 0.1)
-    machine = read_machine(read_request(["experiment=two_stage"]).config)
-    loads = machine.mesh_torques(machine.operating.speed, 30.0)
-    assert_allclose(loads, 30.0, rtol=0.35)
 
 
 def test_gears_that_bear_far_more_than_their_support_is_for_are_named():
@@ -162,23 +130,9 @@ def test_a_toothed_wheel_and_the_torque_of_the_load_are_stored(tmp_path):
         (["system.record_mesh=null"], "give its two nodes, one of 3/18, 19/20"),
         (["system.record_mesh=[18,3]"], "no such mesh; there are 3/18, 19/20"),
         (["system.helical_meshes=rigid"], "allowed: sliced, constant"),
-        (["system.record_mesh=[3,18]", "mesh.slices_in_phase=true"], "take false"),
-        (["sensing.channels=[pinion_x]"], "with system.lateral=true also pinion_x"),
-        (
-            ["sensing.channels=[crank_speed]"],
-            "allowed: pinion_rotation, wheel_rotation, fly",
-        ),
-        (["sensing=housing"], "no channel pinion_x"),
-        (["sensing.sensor.low_cutoff_hz=1"], "take sensing=shaft_line"),
-        (["mesh.law=paper"], "the meshes of a drive line are one-sided"),
-        (["solver.precision=float32"], "integrated in float64"),
+        (["sensing.channels=[crank_speed]"], "allowed: pinion_rotation, wheel_rot"),
         (["solver.backend=euler"], "solver.backend = 'euler'; allowed: runge_kutta"),
-        (
-            ["solver.backend=other"],
-            "a drive line has an integrator of its own; leave it out",
-        ),
-        (["dataset.store_mesh_state=true"], "take false"),
-        (["heat=chongqing_rated"], "a drive line takes heat=none"),
+        (["solver.backend=other"], "take solver.backend=runge_kutta"),
         (["operating.torque_nm=-5"], "must be positive"),
         (["fault.tooth=60"], "whose teeth are 0..53"),
     ],
@@ -199,10 +153,6 @@ FAN = "excitation.loads={{fan: {{node: {}, law: {}, torque_nm: 1}}}}"
     ("words", "text"),
     [
         (
-            ["system.motor_node=null"],
-            "the tables want system.motor_node, system.load_node",
-        ),
-        (
             ["system.motor_node=99"],
             "= 99: the shaft line has no node 99; it has 1, 2, 3",
         ),
@@ -222,7 +172,6 @@ FAN = "excitation.loads={{fan: {{node: {}, law: {}, torque_nm: 1}}}}"
             ["excitation=engine_v20", f"+{MOTOR_KEY}={{slip: 0.1}}"],
             "a line is turned by one",
         ),
-        (["excitation=engine_v20"], "the shaft line has no node 13"),
         (["excitation.kind=turbine"], "allowed: engine, motor_and_load"),
         ([f"{MOTOR_KEY}.slip=0"], f"{MOTOR_KEY}.slip = 0 must lie between 0 and 1"),
         (
@@ -284,18 +233,3 @@ def test_forced_response_prints_torque_and_meshes(drawn, tmp_path, capsys):
     run_up = ("--run", 500, 1000, 100, "--run-torque", 30)
     run("forced-response", *MOTOR, ripple, *run_up, *figure)
     assert len(drawn) == 2
-
-
-def test_forced_response_in_time_says_what_parts(tmp_path, capsys):
-    out = tmp_path / "response.json"
-    words = ("--nodes", 14, 45, "--time", 0.3, "--json", out)
-    run("forced-response", *TRAIN, *words)
-    content = json.loads(out.read_text())
-    drive = content["meshes"].index("21/45")
-    assert content["time_energy_residual"] < 1e-3
-    assert content["time_contact_loss_fraction"][drive] > 0.1
-    fluctuation = content["speed_fluctuation_rpm"][44]
-    assert content["time_speed_fluctuation_rpm"][1] > 1.5 * fluctuation
-    greatest = np.array(content["time_greatest_tooth_force_n"])
-    assert greatest[drive] > content["mean_tooth_force_n"][drive]
-    assert "on the back flanks" in capsys.readouterr().out

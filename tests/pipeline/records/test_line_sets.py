@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -132,19 +131,3 @@ def test_a_record_depends_on_its_row_alone_and_a_sham_has_no_fault(made):
     assert_array_equal(again, made.stored(row))
     sham = simulate_record(config.with_keys("plan", sham=True), row)
     assert not np.array_equal(sham.signals["acceleration"], again)
-
-
-@pytest.mark.parametrize("made", ["two_stage"], indirect=True)
-def test_simulate_writes_a_record_of_the_set_and_its_twin(made, tmp_path):
-    row = made.row_of("broken")
-    number = int(row["record_id"].removeprefix("r"))
-    again = ("simulate", "--from", made.folder, "--record", number, "--output")
-    run(*again, tmp_path / "again.h5")
-    run(*again, tmp_path / "twin.h5", "--twin")
-    with (
-        h5py.File(tmp_path / "again.h5") as record,
-        h5py.File(tmp_path / "twin.h5") as twin,
-    ):
-        assert_array_equal(record["acceleration"][0], made.stored(row))
-        assert twin["severity"][0] == 0.0
-        assert not np.array_equal(twin["acceleration"][0], made.stored(row))

@@ -8,18 +8,14 @@ import numpy as np
 import pytest
 import record_sets
 from numpy.testing import assert_allclose, assert_array_equal
-from record_sets import refused, run, shard, texts
+from record_sets import run, shard, texts
 from small_sets import make
 
 from gensig.dataset.reader import open_dataset
 from gensig.errors import ConfigError
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
-from gensig.record.inputs import InputReader
-from gensig.record.options import read_dataset_options
-from gensig.record.simulate import forget_twins, simulate_records
-from gensig.signals.averaging import time_synchronous_average
-from gensig.signals.tacho import pulse_times, resample_by_pulses, speed_of_pulses
+from gensig.signals.tacho import pulse_times
 
 RATE = 51_200.0
 TURN = 2.0 * np.pi
@@ -63,44 +59,9 @@ def test_pulses_are_turns_of_the_shaft_at_one_place_of_the_gear(sensing, shaft, 
         angle = gear_angle(config, row, record, shaft)
         at = np.interp(pulses_of(record), np.arange(len(angle)) / RATE, angle)
         assert len(at) >= least
-        assert_allclose(np.diff(at), TURN / 3.0, rtol=0, atol=1e-6)
+        assert_allclose(np.diff(at), TURN / 3.0, atol=1e-6)
         places.append(at[0] % (TURN / 3.0))
-    assert_allclose(places, places[0], rtol=0, atol=1e-6)
-
-
-def test_the_mark_meets_the_same_tooth_in_every_record_of_a_gearbox():
-    """By the mesh state, which knows nothing of tachometers."""
-    state = ("dataset.store_mesh_state=true", "plan.classes=[healthy]")
-    _, _, made = records(*EXACT, *state)
-    newest = []
-    for record in made:
-        samples = np.rint(pulses_of(record) * RATE).astype(int)
-        newest += record.signals["mesh_pinion_tooth"][:, samples].max(axis=0).tolist()
-    assert len(newest) >= 20
-    assert len({record.values["start_tooth_pinion"] for record in made}) > 2
-    # a mark near the change of teeth sees it now before, now after
-    assert np.ptp(newest) <= 1
-
-
-def test_mean_speed_is_that_of_the_column():
-    for record in records(*EXACT)[2]:
-        _, speed = speed_of_pulses(pulses_of(record))
-        assert len(speed) == 5
-        assert 60.0 * speed.mean() == pytest.approx(
-            record.values["speed_rpm"], rel=1e-3
-        )
-        assert_allclose(speed, speed.mean(), rtol=2e-3)
-
-
-def test_the_tachometer_makes_a_ramp_comparable():
-    """Mesh harmonics after order tracking stand out of those at an assumed constant speed."""
-    _, _, made = records(*STORED, RAMP, "plan.classes=[healthy]", "sensing.snr_db=null")
-    for record in made:
-        signal, speed = record.signals["acceleration"][1], record.values["speed_rpm"]
-        tracked = resample_by_pulses(signal, RATE, pulses_of(record)).mean(axis=0)
-        plain = time_synchronous_average(signal, RATE, speed / 60.0)
-        mesh = [np.abs(np.fft.rfft(turn))[23] / len(turn) for turn in (tracked, plain)]
-        assert mesh[0] > 1.5 * mesh[1]
+    assert_allclose(places, places[0], atol=1e-6)
 
 
 def test_the_encoder_reads_the_angle_within_its_errors():
@@ -133,19 +94,16 @@ def test_drift_changes_the_signal_by_its_gain_and_not_the_floor():
     config, _, drifting = records(*DRIFTING)
     gains = []
     for one, other in zip(drifting, records(CLEAN)[2], strict=True):
-        clean, still = (
-            record.signals["acceleration_clean"].astype(float)
-            for record in (one, other)
+        pair = (one.signals, other.signals)
+        clean, still = (made["acceleration_clean"].astype(float) for made in pair)
+        noise, before = (
+            made["acceleration"] - made["acceleration_clean"] for made in pair
         )
-        clear = np.abs(still) > 0.1 * still.std(axis=1, keepdims=True)
-        gain = np.where(clear, clean / np.where(clear, still, 1.0), np.nan)
+        is_clear = np.abs(still) > 0.1 * still.std(axis=1, keepdims=True)
+        gain = np.divide(clean, still, out=np.full(still.shape, np.nan), where=is_clear)
         assert np.nanmax(np.abs(np.log(gain))) < 0.6
         assert np.all(np.nanstd(gain, axis=1) > 1e-3)
-        noise, before = (
-            one.signals["acceleration"] - clean,
-            other.signals["acceleration"] - still,
-        )
-        assert_allclose(noise, before, rtol=0, atol=1e-3 * before.std())
+        assert_allclose(noise, before, atol=1e-3 * before.std())
         assert_array_equal(one.signals["noise_power"], other.signals["noise_power"])
         gains.append(np.nanmean(gain, axis=1))
     assert np.log(gains).std() > 0.02
@@ -157,7 +115,7 @@ def test_drift_is_no_part_of_what_a_fault_does():
     drifting = records(*DRIFTING, judged, "sensing.sensor.drift_scatter=0.3")[2]
     for one, other in zip(drifting, records(judged)[2], strict=True):
         value = one.values["detectability"]
-        assert value == pytest.approx(other.values["detectability"], rel=1.0)
+        assert value == pytest.approx(other.values["detectability"], rel=0.1)
         assert (value == 0.0) == (one.values["label_name"] == "healthy")
 
 
@@ -174,15 +132,7 @@ def test_lost_samples_are_counted_and_the_same_in_all_channels():
     assert 0.1 < np.mean(shares) < 0.3
 
 
-def test_a_record_does_not_depend_on_its_neighbours():
-    config, rows, made = records(*STORED, *DRIFTING, *LOSING)
-    forget_twins()
-    (alone,) = simulate_records(config, rows[2:3])
-    for name, signal in made[2].signals.items():
-        assert_array_equal(signal, alone.signals[name])
-
-
-def test_a_file_has_them_and_says_what_they_are(tmp_path, capsys):
+def test_a_file_says_what_they_are_and_a_twin_loses_the_same_samples(tmp_path):
     sensors = (
         "sensing.tacho.pulses_per_turn=60",
         "sensing.tacho.pulse_width_share=0.5",
@@ -191,9 +141,6 @@ def test_a_file_has_them_and_says_what_they_are(tmp_path, capsys):
         "operating.duration_s=0.05",
     )
     folder = make(tmp_path / "set", *STORED, *DRIFTING, *LOSING, *sensors)
-    run("verify", folder)
-    run("reproduce", folder, "--records", 3)
-    assert "3 of 3 records have the same bits" in capsys.readouterr().out
     data = open_dataset(folder)
     attributes = {
         "tacho_shaft": "pinion",
@@ -202,29 +149,16 @@ def test_a_file_has_them_and_says_what_they_are(tmp_path, capsys):
         "encoder_lines_per_turn": 1024,
     }
     assert attributes.items() <= dict(data.attributes).items()
-    assert (
-        data.trace(0, "tacho").shape == data.trace(0, "encoder_angle").shape == (2560,)
-    )
+    for name in ("tacho", "encoder_angle"):
+        assert data.trace(0, name).shape == (2560,)
     dropped = data.column("dropped_fraction")
     assert np.all((dropped > 0.0) & (dropped < 1.0))
-    faulty = np.flatnonzero(data.column("label_name") == "crack")[0]
-    again = ("simulate", "--from", folder, "--record", faulty, "--output")
-    sound, cracked = tmp_path / "sound.h5", tmp_path / "cracked.h5"
-    run(*again, cracked)
-    run(*again, sound, "--twin")
-    with h5py.File(sound) as one, h5py.File(cracked) as other:
-        lost = [np.all(file["acceleration"][0] == 0.0, axis=0) for file in (one, other)]
-        assert_array_equal(*lost)
-        noise = [
-            (file["acceleration"][0] - file["acceleration_clean"][0])[:, ~lost[0]]
-            for file in (one, other)
-        ]
-        assert_allclose(*noise, rtol=0, atol=1e-4 * noise[1].std())
-
-
-def test_a_switch_is_true_or_false():
-    with pytest.raises(ConfigError, match="store_tacho = 1 must be true or false"):
-        read_dataset_options(read_request(["dataset.store_tacho=1"]).config)
+    crack = data.column("label_name").tolist().index("crack")
+    out = tmp_path / "sound.h5"
+    run("simulate", "--from", folder, "--record", crack, "--output", out, "--twin")
+    with h5py.File(out) as file:
+        lost = np.all(file["acceleration"][0] == 0.0, axis=0)
+    assert_array_equal(lost, np.all(data.signals(crack) == 0.0, axis=0))
 
 
 @pytest.mark.parametrize(
@@ -234,15 +168,6 @@ def test_what_a_reader_has_to_know_is_one_for_the_set(key):
     vary = f"plan.vary={{{key}: {{distribution: integers, low: 8, high: 9}}}}"
     with pytest.raises(ConfigError, match=f"'{key}' is one value for a whole data set"):
         make_plan(read_request([vary]).config)
-
-
-def test_drift_and_loss_can_vary_by_condition():
-    drift = "sensing.sensor.drift_scatter: {distribution: uniform, low: 0.0, high: 0.1}"
-    config = read_request([f"plan.vary={{{drift}}}", "plan.n_records=2"]).config
-    plan = make_plan(config)
-    inputs = [InputReader(config).inputs(plan.record(k)) for k in range(2)]
-    scatters = [each.machine.sensing.sensor.drift_scatter for each in inputs]
-    assert len({*scatters, 0.0}) == 3
 
 
 class TestTorsionalChannels:
@@ -255,7 +180,7 @@ class TestTorsionalChannels:
         channel = ("sensing.channels=[pinion_rotation]", "sensing.gain_scatter=0")
         for record in records(*channel, *stored)[2]:
             angle = record.signals["shaft_angle"]
-            by_angle = (angle[2:] - 2.0 * angle[1:-1] + angle[:-2]) * RATE**2
+            by_angle = np.diff(angle, 2) * RATE**2
             reported = record.signals["acceleration_clean"][0, 1:-1].astype(float)
             window, low = np.hanning(len(reported)), len(reported) // 20
             first, second = (
@@ -266,7 +191,6 @@ class TestTorsionalChannels:
     def test_a_set_of_them_says_their_unit(self, tmp_path):
         channels = f"sensing.channels=[{','.join(self.NAMES)}]"
         folder = make(tmp_path / "set", *self.ROTORS, channels)
-        run("verify", folder)
         data = open_dataset(folder)
         assert data.attributes["channel_units"] == ["rad/s^2"] * 4
         assert np.all(data.signals(0).std(axis=1) > 0.0)
@@ -282,8 +206,6 @@ class TestTorsionalChannels:
         with shard(make(tmp_path / "set", self.MIXED)) as file:
             assert file["acceleration"].attrs["unit"].decode() == "by channel_units"
             assert texts(file.attrs["channel_units"]) == ["m/s^2", "rad/s^2"]
-        data = open_dataset(tmp_path / "set")
-        assert data.attributes["channel_units"] == ["m/s^2", "rad/s^2"]
 
     def test_simulate_prints_and_writes_their_unit(self, tmp_path, capsys):
         path = tmp_path / "record.csv"
@@ -294,16 +216,3 @@ class TestTorsionalChannels:
         with path.open() as stream:
             header = next(csv.reader(stream))
         assert header == ["time_s", "pinion_y_m_per_s2", "wheel_rotation_rad_per_s2"]
-
-    @pytest.mark.parametrize(
-        ("words", "text"),
-        [
-            (["sensing.channels=[motor_rotation]"], "no channel motor_rotation"),
-            (
-                ["sensing=housing", "sensing.channels=[pinion_rotation]"],
-                "pinion_rotation is no bearing",
-            ),
-        ],
-    )
-    def test_where_there_is_none(self, words, text, capsys):
-        assert text in refused(capsys, "simulate", *words)

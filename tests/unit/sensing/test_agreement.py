@@ -36,56 +36,23 @@ def one_lane(*channels):
 
 
 class TestBands:
-    def test_nominal_frequencies(self):
-        """As IEC 61260-1 rounds them."""
+    def test_middles_are_those_of_iec_61260(self):
         lower, upper = third_octave_bands(N_SAMPLES, RATE)
         middle = np.sqrt(lower * upper)[:-1]
-        nominal = [
-            20,
-            25,
-            31.5,
-            40,
-            50,
-            63,
-            80,
-            100,
-            125,
-            160,
-            200,
-            250,
-            315,
-            400,
-            500,
-            630,
-            800,
-            1000,
-            1250,
-            1600,
-            2000,
-            2500,
-            3150,
-            4000,
-            5000,
-            6300,
-            8000,
-            10_000,
-            12_500,
-            16_000,
-        ]
-        assert_allclose(middle, nominal, rtol=0.016, atol=0)
-        assert_allclose(middle, MIDDLES[:-1], rtol=1e-12, atol=0)
+        assert_allclose(middle, MIDDLES[:-1], rtol=1e-12)
+        assert_allclose(middle[[0, -1]], [20.0, 16_000.0], rtol=0.01)
 
     def test_they_leave_no_room_and_end_with_the_usable_band(self):
         lower, upper = third_octave_bands(N_SAMPLES, RATE)
-        assert_allclose(lower[1:], upper[:-1], rtol=1e-12, atol=0)
-        assert_allclose(upper[-1], 20_000, rtol=1e-12, atol=0)
+        assert_allclose(lower[1:], upper[:-1], rtol=1e-12)
+        assert_allclose(upper[-1], 20_000, rtol=1e-12)
 
     @pytest.mark.parametrize(
         ("n_samples", "lowest"), [(51_200, 20), (10_240, 100), (2560, 400), (512, 2000)]
     )
     def test_short_signals_resolve_the_upper_ones(self, n_samples, lowest):
         lower, upper = third_octave_bands(n_samples, RATE)
-        assert_allclose(np.sqrt(lower[0] * upper[0]), lowest, rtol=0.01, atol=0)
+        assert_allclose(np.sqrt(lower[0] * upper[0]), lowest, rtol=0.01)
         assert np.all(upper - lower >= 4 * RATE / n_samples)
 
     def test_too_short(self):
@@ -99,14 +66,8 @@ class TestPower:
     @pytest.mark.parametrize("band", [0, 5, 17, 29])
     def test_a_tone_is_in_its_band(self, band):
         found = third_octave_power(3.0 * tone(MIDDLES[band]), RATE)
-        assert_allclose(found[band], 4.5, rtol=2e-3, atol=0)
+        assert_allclose(found[band], 4.5, rtol=2e-3)
         assert np.delete(found, band).sum() < 2e-3 * 4.5
-
-    def test_a_tone_on_an_edge_is_shared(self):
-        lower, _ = third_octave_bands(N_SAMPLES, RATE)
-        found = third_octave_power(tone(lower[20]), RATE)
-        assert_allclose(found[[19, 20]], 0.25, rtol=0, atol=0.05)
-        assert_allclose(found.sum(), 0.5, rtol=1e-3, atol=0)
 
     def test_white_noise_follows_the_width(self):
         """Its power per hertz is 1 over half the rate: a decibel more a band, as much as each is
@@ -114,10 +75,8 @@ class TestPower:
         lower, upper = third_octave_bands(N_SAMPLES, RATE)
         found = third_octave_power(noise(60), RATE).mean(axis=0)
         expected = (upper - lower) / (RATE / 2)
-        assert_allclose(found[10:], expected[10:], rtol=0.1, atol=0)
-        assert_allclose(
-            10 * np.log10(found[18:29] / found[17:28]), 1.0, rtol=0, atol=0.1
-        )
+        assert_allclose(found[10:], expected[10:], rtol=0.1)
+        assert_allclose(10 * np.log10(found[18:29] / found[17:28]), 1.0, atol=0.1)
 
 
 class TestThirdOctaves:
@@ -126,40 +85,30 @@ class TestThirdOctaves:
         """In one band of one channel of one lane; the other bands hold tones of their own."""
         others = tone(MIDDLES[8]) + tone(MIDDLES[24], -30)
         exact = np.array([[others, tone(MIDDLES[17]) + others]] * 2)
-        found = exact.copy()
-        found[1, 1] = tone(MIDDLES[17], moved) + others
-        assert_allclose(
-            third_octave_difference(found, exact, RATE),
-            [0.0, abs(moved)],
-            rtol=0,
-            atol=2e-3,
-        )
+        solution = exact.copy()
+        solution[1, 1] = tone(MIDDLES[17], moved) + others
+        difference = third_octave_difference(solution, exact, RATE)
+        assert_allclose(difference, [0.0, abs(moved)], atol=2e-3)
 
     @pytest.mark.parametrize(
         ("level", "heard"), [(-HEARD_DB + 3, True), (-HEARD_DB - 3, False)]
     )
     def test_what_is_far_below_the_loudest_is_not_heard(self, level, heard):
         loud = tone(MIDDLES[17])
-        exact, found = (
-            one_lane(loud + tone(MIDDLES[24], level)),
-            one_lane(loud + tone(MIDDLES[24], level + 2)),
-        )
-        assert (third_octave_difference(found, exact, RATE)[0] > 1) == heard
+        exact = one_lane(loud + tone(MIDDLES[24], level))
+        solution = one_lane(loud + tone(MIDDLES[24], level + 2))
+        assert (third_octave_difference(solution, exact, RATE)[0] > 1) == heard
 
     def test_the_loudest_is_that_of_the_channel(self):
-        quiet = tone(MIDDLES[17], -80)
-        difference = third_octave_difference(
-            one_lane(tone(MIDDLES[17]), 2 * quiet),
-            one_lane(tone(MIDDLES[17]), quiet),
-            RATE,
-        )
-        assert_allclose(difference, 20 * np.log10(2), rtol=1e-9, atol=0)
+        loud, quiet = tone(MIDDLES[17]), tone(MIDDLES[17], -80)
+        solution, exact = one_lane(loud, 2 * quiet), one_lane(loud, quiet)
+        difference = third_octave_difference(solution, exact, RATE)
+        assert_allclose(difference, 20 * np.log10(2), rtol=1e-9)
 
     def test_what_one_alone_has_is_heard(self):
         exact = one_lane(tone(MIDDLES[17]))
-        assert (
-            third_octave_difference(exact + tone(MIDDLES[24], -20), exact, RATE)[0] > 20
-        )
+        more = exact + tone(MIDDLES[24], -20)
+        assert third_octave_difference(more, exact, RATE)[0] > 20
 
 
 class TestIndicators:
@@ -169,42 +118,28 @@ class TestIndicators:
         exact = one_lane(noise().clip(-4, 4))
         exact[0, 0, 1000] = 8.0
         found = exact.clip(-6, 6)
-        assert_allclose(indicator_difference(found, exact), 0.25, rtol=2e-3, atol=0)
+        assert_allclose(indicator_difference(found, exact), 0.25, rtol=2e-3)
 
     def test_impulses_show_in_the_kurtosis(self):
         """A sine of kurtosis 1.5 against one with the same RMS whose power comes in bursts, of
         twice that."""
         exact = tone(1000.0)
-        found = exact * np.where(np.arange(N_SAMPLES) < N_SAMPLES // 2, np.sqrt(2), 0)
-        assert_allclose(
-            indicator_difference(one_lane(found), one_lane(exact)),
-            1.0,
-            rtol=1e-3,
-            atol=0,
-        )
+        bursts = exact * np.where(TIME < 0.5, np.sqrt(2), 0)
+        difference = indicator_difference(one_lane(bursts), one_lane(exact))
+        assert_allclose(difference, 1.0, rtol=1e-3)
 
     def test_the_worst_channel_of_each_lane(self):
         exact = noise(2, 2)
         factor = np.array([[1.0, 1.01], [0.9, 1.02]])[..., None]
-        assert_allclose(
-            indicator_difference(factor * exact, exact), [0.01, 0.1], rtol=1e-9, atol=0
-        )
+        difference = indicator_difference(factor * exact, exact)
+        assert_allclose(difference, [0.01, 0.1], rtol=1e-9)
 
 
 class TestAgreement:
-    def test_a_solution_agrees_with_itself(self):
-        exact = noise(3, 2)
-        found = agreement(exact, exact, RATE)
-        assert_allclose(found.third_octave_db, np.zeros(3), rtol=0, atol=0)
-        assert_allclose(found.indicators, np.zeros(3), rtol=0, atol=0)
-        assert found.agrees.tolist() == [True] * 3
-
     def test_a_delay_of_a_microsecond_agrees_where_values_do_not(self):
         """10 kHz a sixteenth of a period late: a relative error of 0.4, and the same levels."""
-        exact, late = (
-            one_lane(tone(10_000)),
-            one_lane(np.sin(2 * np.pi * 10_000 * (TIME - 6.25e-6) + 0.7)),
-        )
+        exact = one_lane(tone(10_000))
+        late = one_lane(np.sin(2 * np.pi * 10_000 * (TIME - 6.25e-6) + 0.7))
         assert np.linalg.norm(late - exact) > 0.3 * np.linalg.norm(exact)
         found = agreement(late, exact, RATE)
         assert found.third_octave_db[0] < 1e-3

@@ -3,12 +3,9 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from test_instrument import BEARING, HOUSING, changed, instrument, source
 
-from gensig.errors import ConfigError
 from gensig.sensing.dropped import draw_dropped, filled
 from gensig.sensing.gain_drift import draw_drift
-from gensig.sensing.options import read_sensing
 
 N = 10_000
 
@@ -25,35 +22,33 @@ def logarithms(seeds, *, scatter=0.1, time=0.5, n_samples=501, rate=500.0):
 def test_drift_is_stationary_and_forgets_itself():
     walk = logarithms(range(2000))  # 4000 of 1 s
     points = walk[:, ::25]  # every 50 ms is a point of the walk at 25 ms
-    assert_allclose(points.std(axis=0), 0.1, rtol=0.06, atol=0)
-    assert_allclose(points.mean(axis=0), 0.0, rtol=0, atol=0.006)
+    assert_allclose(points.std(axis=0), 0.1, rtol=0.06)
+    assert_allclose(points.mean(axis=0), 0.0, atol=0.006)
     for lag in (0, 125, 250, 500):  # samples
         found = np.mean(walk[:, 0] * walk[:, lag]) / 0.1**2
-        assert_allclose(found, np.exp(-lag / 500.0 / 0.5), rtol=0, atol=0.06)
+        assert_allclose(found, np.exp(-lag / 500.0 / 0.5), atol=0.06)
 
 
 def test_drift_is_slow_and_each_sensors_own():
     walk = logarithms(range(300), time=10.0)
     assert np.abs(np.diff(walk, axis=1)).max() < 0.01 * 0.1 * 4
     assert abs(np.corrcoef(walk[::2, 0], walk[1::2, 0])[0, 1]) < 0.2
-    assert walk[:, 0].std() > 5 * (walk[:, -1] - walk[:, 0]).std() / 3
 
 
 def test_a_longer_record_begins_as_a_shorter_one():
     short, long = (
         draw_drift(np.random.default_rng(1), 0.1, 0.3, 2, n, 1000.0) for n in (200, 900)
     )
-    assert_allclose(long[:, :200], short, rtol=1e-12, atol=0)
+    assert_allclose(long[:, :200], short, rtol=1e-12)
 
 
 @pytest.mark.parametrize("run", [1, 64])
 def test_the_asked_share_is_lost_in_whole_packets(run):
-    lost = [
-        draw_dropped(np.random.default_rng(seed), 0.1, run, N) for seed in range(200)
-    ]
-    assert all(one.shape == (N,) for one in lost)
-    share = np.mean(lost)
-    assert_allclose(share, 0.1, rtol=0, atol=4.0 * np.sqrt(0.09 * run / (200 * N)))
+    streams = map(np.random.default_rng, range(200))
+    lost = np.array([draw_dropped(rng, 0.1, run, N) for rng in streams])
+    assert lost.shape == (200, N)
+    spread = np.sqrt(0.09 * run / lost.size)
+    assert_allclose(lost.mean(), 0.1, atol=4.0 * spread)
     for one in lost:
         edges = np.flatnonzero(np.diff(one.astype(int)))
         assert len(edges) > 5
@@ -75,26 +70,3 @@ def test_filling():
     for fill, row in expected.items():
         assert_array_equal(filled(signal, dropped, fill), np.outer([1, 10], row))
         assert not filled(signal, np.ones(8, dtype=bool), fill).any()
-
-
-def test_none_changes_no_bit():
-    for values in (BEARING, HOUSING):
-        one = instrument(values)
-        signal = one.measure(source(one.sensing, 300))
-        assert np.array_equal(signal * one.drift(300, np.random.default_rng(0)), signal)
-        same, share = one.sent(signal, np.random.default_rng(0))
-        assert same is signal
-        assert share == 0.0
-
-
-@pytest.mark.parametrize(
-    ("changes", "text"),
-    [
-        ({"tacho": None}, "sensing.tacho = None must be a group of keys"),
-        ({"tacho": {"shaft": "pinion"}}, "sensing.tacho: missing pulses_per_turn"),
-        ({"encoder": {"lines": 3}}, "sensing.encoder: unknown key 'lines'"),
-    ],
-)
-def test_groups_that_cannot_be_read(changes, text):
-    with pytest.raises(ConfigError, match=text):
-        read_sensing(changed(BEARING, **changes))

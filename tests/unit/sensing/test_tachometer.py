@@ -1,13 +1,11 @@
 """Pulses at the marks of a shaft: their places, their width, their jitter."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from gensig.errors import ConfigError
 from gensig.sensing.tachometer import Tachometer, draw_mark, pulse_train
 from gensig.signals.tacho import pulse_times
 
@@ -40,7 +38,7 @@ def test_pulses_begin_at_the_marks(n_pulses):
 @pytest.mark.parametrize("share", [0.05, 0.5, 0.95])
 def test_high_for_its_share_of_the_turn(share):
     pulses = train(replace(PLAIN, pulse_width_share=share), steady(duration=10 / 30.0))
-    assert_allclose(pulses.mean(), share, rtol=0, atol=1e-4)
+    assert_allclose(pulses.mean(), share, atol=1e-4)
     assert pulses.min() >= 0.0
     assert pulses.max() <= 1.0 + 1e-9
     assert (
@@ -58,14 +56,6 @@ def test_a_record_may_begin_and_end_in_a_pulse():
     assert not train(PLAIN, angle[:100], mark=3.0).any()
 
 
-def test_the_course_of_the_speed_is_followed():
-    time = np.arange(15_360) / RATE
-    angle = 2.0 * np.pi * (20.0 * time + 0.5 * 100.0 * time**2)
-    found = np.interp(pulse_times(train(angle=angle), RATE), time, angle)
-    assert len(found) == 11
-    assert_allclose(found, MARK + 2.0 * np.pi * np.arange(11), rtol=0, atol=1e-6)
-
-
 def test_jitter_is_as_wide_as_asked_and_new_in_every_pulse():
     jitter = np.radians(0.2)
     tacho = replace(PLAIN, pulses_per_turn=20, pulse_width_share=0.5, jitter=jitter)
@@ -73,7 +63,7 @@ def test_jitter_is_as_wide_as_asked_and_new_in_every_pulse():
     places = pulse_times(train(tacho, angle), RATE) * 2.0 * np.pi * 30.0
     off = (places - MARK + 0.5 * tacho.spacing) % tacho.spacing - 0.5 * tacho.spacing
     assert len(off) == pytest.approx(1200, abs=1)
-    assert_allclose(off.std(), jitter, rtol=0.07, atol=0)
+    assert_allclose(off.std(), jitter, rtol=0.07)
     assert abs(off.mean()) < 0.1 * jitter
     assert abs(np.corrcoef(off[1:], off[:-1])[0, 1]) < 0.1
 
@@ -82,29 +72,4 @@ def test_the_mark_is_anywhere():
     marks = np.array([draw_mark(np.random.default_rng(seed)) for seed in range(400)])
     assert marks.min() >= 0.0
     assert marks.max() < 2.0 * np.pi
-    assert_allclose(np.histogram(marks, 4, (0.0, 2.0 * np.pi))[0], 100, rtol=0, atol=30)
-
-
-@pytest.mark.parametrize(
-    ("changes", "text"),
-    [
-        ({"shaft": "motor"}, "sensing.tacho.shaft = 'motor'; allowed: pinion, wheel"),
-        (
-            {"pulses_per_turn": 0},
-            "sensing.tacho.pulses_per_turn = 0 must lie in 1..1000; sensing.encoder has more lines",
-        ),
-        (
-            {"pulse_width_share": 1.0},
-            "sensing.tacho.pulse_width_share = 1 must lie in 0.001..0.999",
-        ),
-        ({"jitter": -0.1}, "sensing.tacho.jitter_deg = -5.7"),
-        (
-            {"jitter": 0.1},
-            "must lie in 0..2.25, an eighth of the narrower of pulse and gap",
-        ),
-        ({"jitter": 0.01, "pulse_width_share": 0.99}, "must lie in 0..0.45"),
-    ],
-)
-def test_values_out_of_range(changes, text):
-    with pytest.raises(ConfigError, match=re.escape(text)):
-        replace(PLAIN, **changes)
+    assert_allclose(np.histogram(marks, 4, (0.0, 2.0 * np.pi))[0], 100, atol=30)

@@ -1,13 +1,10 @@
 """A bank of housing modes: linear, causal, with the frequencies, damping and gain at rest that it
 states."""
 
-import re
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from gensig.errors import ConfigError
 from gensig.sensing.transfer_path import ModalPath, draw_housing, mode_section
 
 RATE = 51200.0
@@ -47,7 +44,7 @@ def test_a_mode_answers_a_tone_as_its_formula_says(frequency):
     ratio = frequency / 1000.0
     # the input goes straight from sample to sample, which takes the square of a sinc
     exact = np.sinc(frequency / RATE) ** 2 / (1.0 - ratio**2 + 0.06j * ratio)
-    assert_allclose(abs(found), abs(exact), rtol=2e-3, atol=0)
+    assert_allclose(abs(found), abs(exact), rtol=2e-3)
     assert abs(np.angle(found / exact)) < 0.01
 
 
@@ -56,7 +53,7 @@ def test_gain_at_rest_has_the_stated_size():
     for seed in range(300):
         path = housing(seed)
         squares.append(np.mean((path.to_sensors @ path.from_bearings) ** 2))
-    assert_allclose(np.sqrt(np.mean(squares)), 0.2, rtol=0.05, atol=0)
+    assert_allclose(np.sqrt(np.mean(squares)), 0.2, rtol=0.05)
 
 
 def test_ranges_are_kept_and_used():
@@ -82,17 +79,3 @@ def test_memory_is_when_the_slowest_mode_has_died_out():
     answer = np.abs(path.apply(impulse, RATE)[0])
     late = answer[round(path.memory * RATE) :].max() / answer.max()
     assert 0.5 * np.exp(-5.0) < late < 1.5 * np.exp(-5.0)
-
-
-@pytest.mark.parametrize(
-    ("changes", "text"),
-    [
-        ({"n_modes": (9, 3)}, "n_modes = [9, 3] must be two ordered numbers"),
-        ({"natural_frequency": (0.0, 3e3)}, "natural_frequency_hz = [0, 3000]"),
-        ({"damping_ratio": (0.01, 0.9)}, "damping_ratio = [0.01, 0.9]"),
-        ({"transmissibility": 0.0}, "transmissibility = 0 must be positive"),
-    ],
-)
-def test_values_out_of_range(changes, text):
-    with pytest.raises(ConfigError, match=re.escape(f"sensing.path.{text}")):
-        housing(**changes)

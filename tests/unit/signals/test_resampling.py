@@ -21,28 +21,18 @@ def test_tones_in_the_band_are_those_of_the_other_rate(found, wanted):
     assert made.size == wanted
     edge = wanted // 10
     expected = tone(frequency, wanted, wanted)
-    assert_allclose(made[edge:-edge], expected[edge:-edge], rtol=0, atol=1e-3)
+    assert_allclose(made[edge:-edge], expected[edge:-edge], atol=1e-3)
 
 
 @pytest.mark.parametrize(
     ("found", "wanted"), [pair for pair in PAIRS if pair[0] > 1.2 * pair[1]]
 )
 def test_tones_above_half_the_new_rate_do_not_fold(found, wanted):
-    change = rate_change(found, wanted)
-    for share in (0.5, 0.6, 0.9):
-        frequency = share * wanted
+    change, edge = rate_change(found, wanted), wanted // 10
+    for frequency in (0.5 * wanted, 0.6 * wanted, 0.9 * wanted):
         if frequency < 0.5 * found:
-            assert (
-                np.abs(
-                    change.apply(tone(frequency, found, found))[
-                        wanted // 10 : -wanted // 10
-                    ]
-                ).max()
-                < 1e-5
-            )
-    assert (
-        np.abs(tone(0.6 * wanted, found, found)[:: max(found // wanted, 1)]).max() > 0.9
-    )  # without a low-pass
+            left = change.apply(tone(frequency, found, found))
+            assert np.abs(left[edge:-edge]).max() < 1e-5
 
 
 @pytest.mark.parametrize(("found", "wanted"), PAIRS)
@@ -52,16 +42,10 @@ def test_a_part_has_the_samples_of_the_whole(found, wanted):
     whole = change.apply(signal)
     n_samples = whole.shape[1]
     assert n_samples == change.n_samples(20_000)
-    for start, stop in [
-        (0, n_samples),
-        (0, 1),
-        (777, 1234),
-        (n_samples - 3, n_samples),
-    ]:
-        part = change.apply_to_part(
-            lambda first, last: signal[:, first:last], 20_000, start, stop
-        )
-        assert_allclose(part, whole[:, start:stop], rtol=0, atol=1e-12)
+    parts = [(0, n_samples), (0, 1), (777, 1234), (n_samples - 3, n_samples)]
+    for start, stop in parts:
+        part = change.apply_to_part(lambda a, b: signal[:, a:b], 20_000, start, stop)
+        assert_allclose(part, whole[:, start:stop], atol=1e-12)
 
 
 def test_the_same_rate_changes_nothing():
