@@ -29,6 +29,7 @@ REFUSALS = [
     ("learning_rate=high", "learning_rate must be a number"),
     ("+extra=1", "knows no key 'extra'"),
     ("shuffle_control=3", "shuffle_control must be true or false"),
+    ("metadata_probe=1", "metadata_probe must be true or false, not 1"),
     ("tensorboard=2", "tensorboard must be true or false, not 2"),
     ("device=tpu", "device must be one of auto, cpu, cuda"),
     ("task=cooking", "task must be one of classes, remaining_life"),
@@ -46,6 +47,7 @@ REFUSALS = [
         for value in ("fast", "0", "-5", "true", "inf")
     ),
     ("remaining_life.early_life_h=0", "early_life_h must be a number above 0, not 0"),
+    ("remaining_life.early_life_share=0", "early_life_share must be a number above 0"),
     ("remaining_life.coverage=1", "coverage must be a number above 0 and below 1"),
     ("remaining_life.with_age=2", "with_age must be true or false"),
     ("remaining_life=3", "remaining_life must hold"),

@@ -127,12 +127,6 @@ def test_failed_records_are_left_out_and_others_must_be_finite():
 @pytest.mark.parametrize(
     ("part", "changes", "message"),
     [
-        (
-            (),
-            {"classes": ["helthy", "crack"]},
-            "no class 'helthy'; did you mean healthy",
-        ),
-        (("by_units", "train"), {}, "no protocol 'by_units'; did you mean by_unit"),
         (("by_unit", "training"), {}, "no subset 'training'; did you mean train"),
         (("by_unit",), {}, "give protocol and subset, or neither"),
         ((), {"window_samples": 5000}, "window_samples=5000 is too long"),

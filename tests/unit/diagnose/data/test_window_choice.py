@@ -76,10 +76,3 @@ def test_a_split_that_cuts_records_shorter_is_left_out_with_the_reason():
     assert plan_study(task, settings_for(dataset, settings))[0] == ("by_unit",)
     with pytest.raises(ConfigError, match="hold no window of"):
         choose_protocols(task, ("random_window_leaky",))
-
-
-def test_a_given_length_longer_than_a_record_is_refused():
-    dataset = at_speed(1800, gear="pinion")
-    settings = settings_of("window_samples=100000")
-    with pytest.raises(ConfigError, match="window_samples=100000 is too long"):
-        plan_study(task_from(dataset, settings), settings_for(dataset, settings))

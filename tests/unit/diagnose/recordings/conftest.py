@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import torch
 from fake_dataset import FakeDataset
 from fake_lives import FakeLives
 from runs import LIFE, NETWORK_ONLY, QUICK, SMALL_CNN, model_of, train
@@ -31,14 +30,14 @@ def train_network(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def model(train_network):
-    return train_network("epochs=5")
+def model(two_channel_model):
+    return two_channel_model
 
 
 @pytest.fixture(scope="session")
 def levels_model(train_network):
     """A network that sees levels in m/s2."""
-    return train_network("epochs=5", "normalise=none")
+    return train_network("epochs=2", "normalise=none")
 
 
 @pytest.fixture(scope="session")
@@ -63,12 +62,3 @@ def recorded(tmp_path):
         return str(tmp_path / name)
 
     return write
-
-
-@pytest.fixture(scope="session", autouse=True)
-def one_thread():
-    """Small work: threads cost more than they bring."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)

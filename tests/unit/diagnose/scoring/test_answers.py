@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from fake_dataset import CLASSES, FakeDataset
 from numpy.testing import assert_allclose
-from small_studies import settings_of
+from small_studies import settings_of, task_on
 
 from diagnose.data.groups import groups_of
-from diagnose.data.windows import task_of
 from diagnose.report.answer_figures import (
     conditions_figure,
     detection_figure,
@@ -221,7 +220,7 @@ def test_window_length_shows_the_gain_of_later_windows(copied, verdict):
 def study():
     """20 units, 5 of them tested; a network and a baseline that know some of the answers."""
     dataset = FakeDataset(n_units=20, records_per_unit=16)
-    task = task_on(dataset)
+    task = task_on(dataset, 800)
     split, label = dataset.split("by_unit"), task.labels()
     test, validation = (
         np.array([row[0] for row in split[name]]) for name in ("test", "validation")
@@ -249,10 +248,6 @@ def study():
     trained = (("cnn", 0, 0.9), ("cnn", 1, 0.9), ("indicators", 0, 0.5))
     settings = settings_of("n_bootstrap=100")
     return task, settings, [prediction(*values) for values in trained]
-
-
-def task_on(dataset):
-    return task_of(dataset, window_samples=800, stride_samples=800, normalise="rms")
 
 
 def metrics_of(task, answers):
@@ -363,5 +358,5 @@ def test_parts_without_ground_are_left_out(study, tmp_path):
     assert all(part["limits"] == [] for part in classes)
     assert "by_severity.csv" not in write_tables(tmp_path, metrics_of(task, answers))
     task.dataset.class_names = ("sound", *CLASSES[1:])
-    other = protocol_answers(task_on(task.dataset), settings, alone)
+    other = protocol_answers(task_on(task.dataset, 800), settings, alone)
     assert "detection" not in other
