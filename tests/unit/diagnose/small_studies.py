@@ -2,6 +2,7 @@
 
 import numpy as np
 import runs
+from fake_dataset import FakeDataset
 from runs import SMALL_CNN
 
 from diagnose.cli import main
@@ -37,6 +38,12 @@ def study_of(dataset, *overrides):
     """Task and settings of a study."""
     settings = settings_for(dataset, settings_of(*overrides))
     return task_from(dataset, settings), settings
+
+
+def two_channels(**changes):
+    """The data of the fixture `two_channel_model`."""
+    values = {"n_units": 12, "records_per_unit": 8, "duration": 0.5, "n_channels": 2}
+    return FakeDataset(**(values | changes))
 
 
 def windows_of(task, *subsets, protocol="by_unit"):

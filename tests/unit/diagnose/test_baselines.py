@@ -23,7 +23,7 @@ N_CLASSES = 4
 @pytest.fixture(scope="module")
 def source():
     """All data that a baseline may read."""
-    dataset = CompleteDataset(records_per_unit=4)
+    dataset = CompleteDataset()
     task = task_on(dataset, normalise="none")
     sets = dict(zip(SUBSETS, windows_of(task, *SUBSETS), strict=True))
     return Source(
@@ -84,8 +84,7 @@ def check_order(baseline, parts):
         name: rng.permutation(len(getattr(parts, name).label)) for name in SUBSETS
     }
     shuffled = Parts.of(lambda name: rows_of(getattr(parts, name), orders[name]))
-    made, _ = fitted(baseline, parts)
-    other, _ = fitted(baseline, shuffled)
+    (made, _), (other, _) = fitted(baseline, parts), fitted(baseline, shuffled)
     expected = made.predict_proba(parts.test)[orders["test"]]
     assert_allclose(other.predict_proba(shuffled.test), expected, rtol=0, atol=1e-3)
 
@@ -172,10 +171,9 @@ def test_each_kind_of_input_is_made_once(source, monkeypatch):
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     """Folder of a study with every baseline, the sham set and the oracle."""
-    shape = {"n_units": 16, "records_per_unit": 4}
     sets = {
-        "good": CompleteDataset(**shape),
-        "sham": CompleteDataset(**shape, sham=True),
+        "good": CompleteDataset(),
+        "sham": CompleteDataset(sham=True),
     }
     for name, dataset in sets.items():
         dataset.folder = Path(name)

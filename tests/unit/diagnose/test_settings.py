@@ -6,10 +6,7 @@ import sys
 import pytest
 from small_studies import settings_of
 
-from diagnose.baselines.base import Role
-from diagnose.baselines.registry import baseline_names
 from gensig.errors import ConfigError
-from gensig.options.compose import compose
 
 WHOLE = "must be a whole number of at least 1"
 LIST = "must be false or a list of different names"
@@ -66,11 +63,6 @@ def test_mistakes_are_refused(override, message):
 )
 def test_baselines_may_be_left_out_or_be_one(override, expected):
     assert settings_of(f"baselines={override}").baselines == expected
-
-
-def test_the_default_baselines_are_registered():
-    config = compose("train", ["data=x", "out=y"])
-    assert set(config["baselines"]) <= set(baseline_names(Role.RIVAL))
 
 
 def test_settings_are_refused_without_loading_torch():

@@ -18,7 +18,7 @@ accumulator = pytest.importorskip(
 def studies(tmp_path_factory):
     """The same study with the log and without it."""
     folder = tmp_path_factory.mktemp("studies")
-    data = FakeDataset(n_units=8, records_per_unit=4, duration=0.2)
+    data = FakeDataset(n_units=16, records_per_unit=4, duration=0.2)
     words = ["epochs=2", "seeds=[0,1]", "baselines=[rms_threshold]"]
     train(data, folder / "with", *words, "tensorboard=true")
     train(data, folder / "without", *words)

@@ -75,12 +75,13 @@ def test_a_model_at_a_lower_rate_takes_faster_recordings_and_refuses_slower_ones
     )
     signals = {12800: data.signals(60), 6400: at_rate(data, 6400).signals(60)}
     probabilities = []
+    capsys.readouterr()
     for rate, signal in signals.items():
         file = tmp_path / f"{rate}.npz"
         np.savez(file, acceleration=signal, sampling_rate_hz=rate)
         main(["predict", "--model", str(model), str(file), "--json"])
-        text = capsys.readouterr().out
-        probabilities.append(list(json.loads(text)["probabilities"].values()))
+        answer = json.loads(capsys.readouterr().out)
+        probabilities.append([*answer["probabilities"].values()])
     assert_allclose(*probabilities, rtol=0, atol=1e-4)
     slow = tmp_path / "slow.npz"
     np.savez(slow, acceleration=signals[12800], sampling_rate_hz=5120)

@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from conftest import two_channels
 from numpy.testing import assert_allclose
 from runs import refuses, says
 from safetensors.numpy import load_file, save_file
-from small_studies import settings_of, task_on, windows_of
+from small_studies import settings_of, task_on, two_channels, windows_of
 
 import diagnose.networks.adaptation as adaptation
 from diagnose.cli import main
@@ -234,11 +233,13 @@ def test_the_command_writes_a_described_model_for_predict(
     assert all(len(row["sha256"]) == 64 for row in facts["recordings"])
     assert all(row["n_windows"] == 6 for row in facts["recordings"])
     before, after = (
-        load_file(Path(folder) / "model.safetensors") for folder in (model, out)
+        load_file(f"{folder}/model.safetensors") for folder in (model, out)
     )
     changed = {name for name in after if not np.array_equal(after[name], before[name])}
-    moments, weights = ("running_mean", "running_var"), ("head.1.weight", "head.1.bias")
-    endings = moments if method == "adabn" else weights
+    endings = {
+        "adabn": ("running_mean", "running_var"),
+        "coral": ("head.1.weight", "head.1.bias"),
+    }[method]
     assert changed
     assert all(name.endswith((*endings, "domain.levels")) for name in changed)
     assert not any(name.startswith("adaptation.") for name in after)

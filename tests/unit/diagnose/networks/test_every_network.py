@@ -9,8 +9,6 @@ from fake_dataset import FakeDataset
 from small_studies import run, study_of
 
 from diagnose.data.inputs import RecordedSignal
-from diagnose.data.turns import Turns
-from diagnose.data.window_input import Windows
 from diagnose.data.windows import subset_segments
 from diagnose.networks.registry import MODELS, build_model, check_window, input_of
 from diagnose.training.classes import predict_windows
@@ -46,12 +44,6 @@ def study(request, dataset):
         patch.setattr(network, "look", watched)
         (prediction,) = run(task, settings)
     return task, settings, prediction, shapes
-
-
-def test_every_network_declares_its_input():
-    inputs = {kind: network.inputs for kind, network in MODELS.items()}
-    windows = dict.fromkeys(("small_cnn", "wdcnn", "spectrum_cnn"), Windows)
-    assert inputs == windows | {"order_cnn": Turns}
 
 
 def test_scores_have_their_shape_for_the_declared_input(study):

@@ -2,19 +2,15 @@
 
 import numpy as np
 import pytest
-from fake_dataset import FakeDataset
 from fake_lives import FakeLives
 from runs import LIFE, NETWORK_ONLY, QUICK, SMALL_CNN, model_of, train
+from small_studies import two_channels
 
 
-def fake():
-    return FakeDataset(n_units=12, records_per_unit=8, duration=0.5, n_channels=2)
-
-
-@pytest.fixture(scope="session")
-def two_channels():
+@pytest.fixture(scope="session", name="two_channels")
+def learnt_from():
     """Data set that the networks learnt from."""
-    return fake()
+    return two_channels()
 
 
 @pytest.fixture(scope="session")
@@ -24,7 +20,7 @@ def train_network(tmp_path_factory):
     def make(*words, network=SMALL_CNN):
         out = tmp_path_factory.mktemp("study") / "out"
         words = (*QUICK, *network, *NETWORK_ONLY, *words)
-        return model_of(train(out, fake(), *words))
+        return model_of(train(out, two_channels(), *words))
 
     return make
 

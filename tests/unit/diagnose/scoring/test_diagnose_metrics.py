@@ -77,9 +77,8 @@ def test_few_units_have_no_interval(n_units):
     """Two that agree would give 0.50 [0.50, 0.50]."""
     confusion = np.ones((1, n_units, 2, 2), dtype=int)
     resampling = {"n_bootstrap": 100, "rng": np.random.default_rng(0)}
+    ratio = ratio_with_interval("balanced_accuracy", confusion, confusion, **resampling)
     score = asdict(accuracy_with_interval(confusion))
-    pair = (confusion, confusion)
-    ratio = ratio_with_interval("balanced_accuracy", *pair, **resampling)
     few = n_units < LEAST_UNITS
     for found in (score, ratio):
         assert (found["low"] is None) == (found["high"] is None) == few
@@ -261,16 +260,17 @@ def test_the_level_changes_only_the_model_with_it(parts, baseline, same):
     assert np.array_equal(scores, other) == same
 
 
-def test_rms_threshold_uses_the_level_only():
+@pytest.mark.parametrize(
+    ("names", "low", "high"),
+    [(("a/log_rms", "a/kurtosis"), 1.0, 1.0), (("a/kurtosis", "a/log_rms"), 0.0, 0.7)],
+)
+def test_rms_threshold_uses_the_level_only(names, low, high):
+    """The first column tells the class, the second is noise."""
     rng = np.random.default_rng(0)
-    label = np.arange(200) % 2
-    level, noise = np.log(1 + label + 0.1 * rng.uniform(size=200)), rng.normal(size=200)
-    names = ("a/log_rms", "a/kurtosis")
-    for columns, low, high in (((level, noise), 1.0, 1.0), ((noise, level), 0.0, 0.7)):
-        values = np.stack(columns, axis=1)
-        rows = FeatureTable(
-            values=values, names=names, label=label, record=np.arange(200)
-        )
-        detail, _, scores = fit_and_score(RmsThreshold(), Parts.of(lambda _, t=rows: t))
-        assert low <= (scores.argmax(axis=1) == label).mean() <= high
-        assert detail.startswith("thresholds 1.") == (low == 1.0)
+    record, label = np.arange(200), np.arange(200) % 2
+    level = np.log(1 + label + 0.1 * rng.uniform(size=200))
+    values = np.stack([level, rng.normal(size=200)], axis=1)
+    table = FeatureTable(values=values, names=names, label=label, record=record)
+    detail, _, scores = fit_and_score(RmsThreshold(), Parts.of(lambda _: table))
+    assert low <= (scores.argmax(axis=1) == label).mean() <= high
+    assert detail.startswith("thresholds 1.") == (low == 1.0)

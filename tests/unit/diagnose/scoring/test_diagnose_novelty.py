@@ -259,7 +259,7 @@ def test_two_processes_give_the_results_of_one(open_study):
         for shuffled in (False, True)
     ]
     one, two = (run(task, settings, *jobs, n_workers=n) for n in (1, 2))
-    assert len([result for result in one if isinstance(result, NoveltyRun)]) == 8
+    assert len([result for result in one if isinstance(result, NoveltyRun)]) == 9
     for first, second in zip(one, two, strict=True):
         np.testing.assert_equal(*map(dataclasses.asdict, (first, second)))
 
