@@ -2,8 +2,7 @@
 
 import pytest
 import torch
-from fake_dataset import FakeDataset
-from small_studies import NETWORK_ALONE, train
+from small_studies import NETWORK_ALONE, train, two_channels
 from threadpoolctl import threadpool_limits
 
 
@@ -13,12 +12,6 @@ def one_thread():
     torch.set_num_threads(1)
     with threadpool_limits(1):
         yield
-
-
-def two_channels(**changes):
-    """The data of `two_channel_model`."""
-    values = {"n_units": 12, "records_per_unit": 8, "duration": 0.5, "n_channels": 2}
-    return FakeDataset(**(values | changes))
 
 
 @pytest.fixture(scope="session")

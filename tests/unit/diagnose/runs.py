@@ -53,9 +53,10 @@ def serve(patch, datasets):
 
 
 def train(out, dataset, *words):
-    """Train on a data set into a folder and return the folder."""
+    """Train on a data set, or on several by their names, into a folder and return it."""
+    datasets = dataset if isinstance(dataset, dict) else {"good": dataset}
     with pytest.MonkeyPatch.context() as patch:
-        serve(patch, {"good": dataset})
+        serve(patch, datasets)
         assert main(["train", "data=good", f"out={out}", *words]) == 0
     return out
 
@@ -80,14 +81,14 @@ def settings_of(*words):
 def says(capsys, *words, status=0):
     """Lines that the command prints."""
     capsys.readouterr()
-    assert main(list(words)) == status
+    assert main([str(word) for word in words]) == status
     return capsys.readouterr().out
 
 
 def refuses(capsys, words, *messages):
     """The command exits with 2 and one line on stderr, which holds the messages."""
     capsys.readouterr()
-    assert main(list(words)) == 2
+    assert main([str(word) for word in words]) == 2
     captured = capsys.readouterr()
     (line,) = captured.err.strip().splitlines()
     assert captured.out == ""

@@ -1,18 +1,15 @@
 """Small settings, trainings and scores that the tests of `diagnose` share."""
 
-import json
-
 import numpy as np
-import pytest
+import runs
+from fake_dataset import FakeDataset
+from runs import SMALL_CNN
 
-import gensig.dataset.reader
 from diagnose.cli import main
-from diagnose.data.windows import load_windows, subset_segments
+from diagnose.data.windows import load_windows, subset_segments, task_of
 from diagnose.scoring.metrics import balanced_accuracy, confusion_by_unit
-from diagnose.settings import settings_from
 from diagnose.studies.jobs import Job, run_jobs
 from diagnose.studies.study import settings_for, task_from
-from gensig.options.compose import compose
 
 SMALL = [
     "window_samples=1200",
@@ -22,19 +19,31 @@ SMALL = [
     "n_bootstrap=50",
     "protocols=[by_unit]",
 ]
-TINY_CNN = ["model.widths=[8,16]", "model.kernels=[32,5]", "model.strides=[8,4]"]
+TINY_CNN = [*SMALL_CNN]
 NETWORK_ALONE = ["shuffle_control=false", "baselines=false"]
 LEARNS = ["epochs=8", "epoch_fraction=0.6", "learning_rate=0.01"]
 
 
 def settings_of(*overrides):
-    return settings_from(compose("train", ["data=x", "out=y", *SMALL, *overrides]))
+    return runs.settings_of(*SMALL, *overrides)
+
+
+def task_on(dataset, window=1200, stride=None, normalise="rms", **chosen):
+    """Task of windows that lie one after another unless a stride is given."""
+    lengths = {"window_samples": window, "stride_samples": stride or window}
+    return task_of(dataset, **lengths, normalise=normalise, **chosen)
 
 
 def study_of(dataset, *overrides):
     """Task and settings of a study."""
     settings = settings_for(dataset, settings_of(*overrides))
     return task_from(dataset, settings), settings
+
+
+def two_channels(**changes):
+    """The data of the fixture `two_channel_model`."""
+    values = {"n_units": 12, "records_per_unit": 8, "duration": 0.5, "n_channels": 2}
+    return FakeDataset(**(values | changes))
 
 
 def windows_of(task, *subsets, protocol="by_unit"):
@@ -53,15 +62,7 @@ def run(task, settings, *jobs, n_workers=1):
 
 def train(dataset, out, *words):
     """``metrics.json`` of the command on a data set in memory, or on several by their names."""
-    sets = dataset if isinstance(dataset, dict) else {"good": dataset}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            gensig.dataset.reader, "open_dataset", lambda path: sets[str(path)]
-        )
-        assert (
-            main(["train", "data=good", f"out={out}", *SMALL, *TINY_CNN, *words]) == 0
-        )
-    return json.loads((out / "metrics.json").read_text())
+    return runs.metrics_of(runs.train(out, dataset, *SMALL, *TINY_CNN, *words))
 
 
 def accuracy(task, record, predicted):

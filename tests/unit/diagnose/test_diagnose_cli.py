@@ -21,6 +21,7 @@ from runs import (
     serve,
     train,
 )
+from sklearn.metrics import balanced_accuracy_score
 
 import gensig.dataset.reader
 from diagnose.cli import main
@@ -53,23 +54,13 @@ def by_unit(trained):
 
 
 def test_train_writes_what_it_promises(trained, by_unit):
-    assert {path.name for path in trained.iterdir()} == {
-        "metrics.json",
-        "predictions.csv",
-        "report.html",
-        "models",
-        "scores.png",
-        "reliability.png",
-        "confusion_by_unit.png",
-        "confusion_random_window_leaky.png",
-        "detection_by_unit.png",
-        "window_length.png",
-        "scores.csv",
-        "by_severity.csv",
-        "comparisons.csv",
-        "confusion_by_unit.csv",
-        "confusion_random_window_leaky.csv",
-    }
+    names = sorted(path.name for path in trained.iterdir())
+    assert " ".join(names) == (
+        "by_severity.csv comparisons.csv confusion_by_unit.csv confusion_by_unit.png "
+        "confusion_random_window_leaky.csv confusion_random_window_leaky.png "
+        "detection_by_unit.png metrics.json models predictions.csv reliability.png "
+        "report.html scores.csv scores.png window_length.png"
+    )
     metrics = metrics_of(trained)
     assert list(metrics["protocols"]) == ["by_unit", "random_window_leaky"]
     reason = "1 specimen_id in the plan, and at least 4 are needed"
@@ -96,17 +87,12 @@ def test_train_writes_what_it_promises(trained, by_unit):
 def test_predictions_hold_what_the_scores_are_made_of(trained, by_unit):
     names = metrics_of(trained)["class_names"]
     rows = rows_of(trained / "predictions.csv")
-    mine = [
-        row
-        for row in rows
-        if (row["protocol"], row["method"]) == ("by_unit", "indicators")
-    ]
-    recall = [
-        np.mean([row["predicted"] == name for row in mine if row["label"] == name])
-        for name in names
-    ]
+    chosen = ("by_unit", "indicators")
+    mine = [row for row in rows if (row["protocol"], row["method"]) == chosen]
+    label, predicted = ([row[key] for row in mine] for key in ("label", "predicted"))
     score = by_unit["methods"]["indicators"]["balanced_accuracy"]["mean"]
-    assert np.mean(recall) == pytest.approx(score, abs=1e-12)
+    expected = balanced_accuracy_score(label, predicted)
+    assert expected == pytest.approx(score, abs=1e-12)
     for row in mine:
         scores = [float(row[f"log_probability_{name}"]) for name in names]
         assert names[np.argmax(scores)] == row["predicted"]
@@ -133,15 +119,8 @@ def visible_text(page):
 def test_the_page_stands_alone_and_says_what_matters(trained):
     page = (trained / "report.html").read_text()
     text = visible_text(page)
-    for word in (
-        "CNN",
-        "indicators",
-        "RMS threshold",
-        "label shuffle",
-        "chance",
-        "Caveats",
-        "4 test unit(s)",
-    ):
+    methods = ("CNN", "indicators", "RMS threshold", "label shuffle", "chance")
+    for word in (*methods, "Caveats", "4 test unit(s)"):
         assert word in text
     order = ("by_unit", "random_window_leaky (LEAKY)", "Which faults are found")
     assert sorted(order, key=text.index) == [*order]
@@ -150,17 +129,6 @@ def test_the_page_stands_alone_and_says_what_matters(trained):
     assert len(sources) == 6
     assert all(source.startswith("data:image/png;base64,") for source in sources)
     assert "<script" not in page
-
-
-def test_chosen_baselines_are_in_the_report(tmp_path):
-    words = (*FAST, *NETWORK_ONLY, "epochs=1", "minirocket_features=168")
-    chosen = "baselines=[nearest_spectrum,minirocket]"
-    out = train(tmp_path / "out", fake(), *words, chosen)
-    text = visible_text((out / "report.html").read_text())
-    assert "protocol CNN 1-NN on spectra MiniRocket chance by_unit" in text
-    assert "MiniRocket : ridge regression" in text
-    methods = metrics_of(out)["protocols"]["by_unit"]["methods"]
-    assert list(methods) == ["nearest_spectrum", "minirocket", "cnn", "chance"]
 
 
 def test_names_from_a_file_stay_text_in_the_page(trained, tmp_path):
@@ -208,16 +176,8 @@ OTHER_CLASSES = ("healthy", "crack", "pitting", "broken")
     ("changes", "attributes", "message"),
     [
         ({"sampling_rate": 6400.0}, {}, "sampled at 6400 Hz, trained at 12800 Hz"),
-        (
-            {"classes": OTHER_CLASSES},
-            {},
-            "its classes are healthy, crack, pitting, broken",
-        ),
-        (
-            {"classes": OTHER_CLASSES[:2]},
-            {},
-            "its classes are healthy, crack, the model knows",
-        ),
+        ({"classes": OTHER_CLASSES}, {}, "are healthy, crack, pitting, broken"),
+        ({"classes": OTHER_CLASSES[:2]}, {}, "are healthy, crack, the model knows"),
         ({}, {"schema_version": 2}, "data schema 2, trained on schema 1"),
     ],
 )
@@ -237,30 +197,16 @@ def test_evaluate_refuses_other_channels(trained, data, capsys):
     refuses(capsys, evaluating(trained), "no channel channel_0 (it has housing)")
 
 
-@pytest.mark.parametrize(
-    ("weights", "change", "message"),
-    [
-        # a pickle, nothing and a zip file
-        (b"\x80\x04\x95.", {}, "is not a safetensors file"),
-        (b"", {}, "is not a safetensors file"),
-        (b"PK\x03\x04" + bytes(400), {}, "is not a safetensors file"),
-        (None, None, "does not describe a model"),
-        (None, {"model_schema_version": 9}, "model schema 9"),
-        (None, {"class_names": ["healthy", "crack"]}, "does not fit model.json"),
-    ],
-)
-def test_evaluate_refuses_damaged_models(
-    trained, data, capsys, tmp_path, weights, change, message
+@pytest.mark.parametrize("weights", [b"\x80\x04\x95.", b"", b"PK\x03\x04" + bytes(400)])
+def test_evaluate_refuses_weights_of_another_format(
+    trained, data, capsys, tmp_path, weights
 ):
-    folder = trained / "models" / "by_unit-seed0"
-    content = {}
-    if change is not None:
-        content = json.loads((folder / "model.json").read_text()) | change
-    if weights is None:
-        weights = (folder / "model.safetensors").read_bytes()
-    (tmp_path / "model.json").write_text(json.dumps(content))
+    """A pickle, nothing and a zip file."""
+    description = (trained / "models" / "by_unit-seed0" / "model.json").read_bytes()
+    (tmp_path / "model.json").write_bytes(description)
     (tmp_path / "model.safetensors").write_bytes(weights)
-    refuses(capsys, ["evaluate", "data=good", f"model_dir={tmp_path}"], message)
+    words = ["evaluate", "data=good", f"model_dir={tmp_path}"]
+    refuses(capsys, words, "is not a safetensors file")
 
 
 def test_evaluate_refuses_folders_that_are_no_model(trained, data, capsys, tmp_path):
@@ -277,30 +223,12 @@ TRAIN = "train data=good out=OUT"
     ("typed", "message"),
     [
         ("train data=good", "out is required"),
-        ("train data=none out=OUT", "none is no data set"),
-        (
-            f"{TRAIN} protocols=[by_unitt]",
-            "no protocol 'by_unitt'; did you mean by_unit",
-        ),
-        (
-            f"{TRAIN} protocols=[cross_specimen]",
-            "cross_specimen: 1 specimen_id in the plan",
-        ),
-        (f"{TRAIN} protocols=[open_set]", "no protocol 'open_set'"),
-        (
-            f"{TRAIN} protocols=[cross_sensor]",
-            "cross_sensor: the data set has 1 channel, and 2 are needed",
-        ),
-        (
-            f"{TRAIN} test_channels=[channel_0]",
-            "test_channels needs channels beside it",
-        ),
-        (f"{TRAIN} classes=[healthy,crak]", "no class 'crak'; did you mean crack"),
-        (f"{TRAIN} classes=[crack]", "one class only (crack)"),
+        (f"{TRAIN} protocols=[by_unitt]", "'by_unitt'; did you mean by_unit"),
+        (f"{TRAIN} protocols=[cross_specimen]", "1 specimen_id in the plan"),
+        (f"{TRAIN} protocols=[cross_sensor]", "has 1 channel, and 2 are needed"),
         (f"{TRAIN} epoch=3", "epochs"),
         (f"{TRAIN} model=cnnn", "cnn"),
         (f"{TRAIN} normalise=rms,none", "-m"),
-        (f"{TRAIN} features=al", "features must be basic or all, not 'al'"),
         (f"{TRAIN} window_samples=100000", "longest stretch"),
         ("train --fast", "no flag '--fast'"),
         ("evaluate data=good", "model_dir is required"),
@@ -353,28 +281,13 @@ def test_multirun_writes_one_folder_for_each_value(data, tmp_path):
     assert metrics_of(folders[1])["settings"]["normalise"] == "none"
 
 
-def loaded_by(code, modules):
-    """Which of the modules (regular expression) a process has loaded after some code."""
-    shown = f"print('LOADED', [name for name in sys.modules if re.match({modules!r}, name)])"
-    done = subprocess.run(
-        [sys.executable, "-c", f"import re, sys\n{code}\n{shown}"],
-        capture_output=True,
-        text=True,
-    )
-    return done.stdout.partition("LOADED ")[2].strip() or done.stderr
-
-
-def test_help_loads_nothing_heavy():
-    code = "import diagnose.cli\nassert diagnose.cli.main(['train', '--help']) == 0"
-    heavy = "(torch|sklearn|matplotlib|hydra|scipy|numpy)$"
-    assert loaded_by(code, heavy) == "[]"
-
-
 def test_diagnose_loads_neither_numba_nor_the_physics():
-    code = """
-import diagnose.cli, diagnose.studies.study, diagnose.report.page, gensig.dataset.reader
-import diagnose.recordings.evaluate, diagnose.recordings.predict, diagnose.networks.domain
-import diagnose.recordings.registry
-"""
-    physics = "numba$|gensig.(mesh|geometry|faults|dynamics|systems|sensing|twin)"
-    assert loaded_by(code, physics) == "[]"
+    modules = "cli studies.study report.page recordings.evaluate recordings.predict"
+    imports = "".join(f"import diagnose.{name}\n" for name in modules.split())
+    physics = r"numba$|gensig\.(mesh|geometry|faults|dynamics|systems|sensing|twin)"
+    code = (
+        f"import re, sys, gensig.dataset.reader, diagnose.recordings.registry\n{imports}"
+        f"print([name for name in sys.modules if re.match({physics!r}, name)])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.stdout.strip(), done.stderr) == ("[]", "")

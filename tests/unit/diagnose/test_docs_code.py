@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 from fake_dataset import CLASSES, FakeDataset
 from runs import FAST, NETWORK_ONLY, model_of, train
 
@@ -25,25 +24,14 @@ def run_page(page):
     return names
 
 
-@pytest.fixture(autouse=True)
-def one_thread():
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
-
-
-@pytest.mark.parametrize("classes", [CLASSES, (*CLASSES, "wear")])
-def test_a_model_of_the_user_learns_and_is_judged_on_unseen_units(
-    classes, monkeypatch, capsys
-):
-    data = FakeDataset(
-        n_units=16, records_per_unit=8, duration=0.5, noise=0.2, classes=classes
-    )
+def test_a_model_of_the_user_learns_and_is_judged_on_unseen_units(monkeypatch, capsys):
+    """With five classes, of which the page knows nothing."""
+    shape = {"n_units": 16, "records_per_unit": 8, "duration": 0.5}
+    data = FakeDataset(**shape, noise=0.2, classes=(*CLASSES, "wear"))
     monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path, **_: data)
     names = run_page("train_your_model.md")
     shown = capsys.readouterr().out
-    assert float(shown.rsplit(":", 1)[1]) > 0.45  # chance is 0.25
+    assert float(shown.rsplit(":", 1)[1]) > 0.45  # chance is 0.2
     assert shown.count(" of 8: training loss") == 8
     units = data.column("unit_id")
     train_units = set(units[names["train"].record])

@@ -50,31 +50,10 @@ def test_a_tone_is_in_its_band_alone(bands, expected):
     assert_allclose(energy, expected, rtol=0, atol=1e-9)
 
 
-def test_more_bandwidth_never_lowers_detectability(residual):
-    bands = np.sort(np.random.default_rng(2).uniform(10.0, 5000.0, 40))
-    assert (np.diff(d_prime(residual, bands=bands), axis=-1) >= 0.0).all()
-
-
-def test_6_db_less_noise_or_four_times_the_record_double_it(residual):
-    expected = 2.0 * d_prime(residual)
-    assert_allclose(d_prime(residual, WHITE / 4), expected, rtol=1e-12, atol=0)
-    longer = d_prime(np.tile(residual, 4))
-    assert_allclose(longer[..., -1], expected[..., -1], rtol=1e-12, atol=0)
-
-
 def test_without_noise_there_is_no_answer(residual):
     energy = residual_energy(residual, np.array([[1.0], [0.0]]), RATE, BANDS)
     assert np.isfinite(energy[:, 0]).all()
     assert np.isnan(energy[:, 1]).all()
-
-
-def test_noise_at_other_frequencies_does_not_hide_a_tone():
-    """White noise of the same power does: the observer knows the spectrum."""
-    low = np.where(np.fft.rfftfreq(1000, 1.0 / RATE) < 500.0, 10.0 - 9e-3, 1e-3)
-    in_low, in_white = (
-        residual_energy(TONE, density, RATE, BANDS).sum() for density in (low, WHITE)
-    )
-    assert in_low > 100.0 * in_white
 
 
 def angle_of(n_samples):
@@ -163,7 +142,7 @@ def test_a_shift_is_seen_by_its_size_and_in_its_direction(shift):
 def test_the_standard_error_is_the_scatter_of_d_prime(scatter):
     """Of one indicator on many sets of 12 machines, with equal and with different effects."""
     values, errors = [], []
-    for seed in range(400):
+    for seed in range(200):
         rng = np.random.default_rng(seed)
         sound = rng.standard_normal((12, 1))
         faulty = sound + 1.0 + scatter * rng.standard_normal((12, 1))

@@ -6,10 +6,7 @@ import sys
 import pytest
 from small_studies import settings_of
 
-from diagnose.baselines.base import Role
-from diagnose.baselines.registry import baseline_names
 from gensig.errors import ConfigError
-from gensig.options.compose import compose
 
 WHOLE = "must be a whole number of at least 1"
 LIST = "must be false or a list of different names"
@@ -29,6 +26,7 @@ REFUSALS = [
     ("learning_rate=high", "learning_rate must be a number"),
     ("+extra=1", "knows no key 'extra'"),
     ("shuffle_control=3", "shuffle_control must be true or false"),
+    ("metadata_probe=1", "metadata_probe must be true or false, not 1"),
     ("tensorboard=2", "tensorboard must be true or false, not 2"),
     ("device=tpu", "device must be one of auto, cpu, cuda"),
     ("task=cooking", "task must be one of classes, remaining_life"),
@@ -46,6 +44,7 @@ REFUSALS = [
         for value in ("fast", "0", "-5", "true", "inf")
     ),
     ("remaining_life.early_life_h=0", "early_life_h must be a number above 0, not 0"),
+    ("remaining_life.early_life_share=0", "early_life_share must be a number above 0"),
     ("remaining_life.coverage=1", "coverage must be a number above 0 and below 1"),
     ("remaining_life.with_age=2", "with_age must be true or false"),
     ("remaining_life=3", "remaining_life must hold"),
@@ -64,11 +63,6 @@ def test_mistakes_are_refused(override, message):
 )
 def test_baselines_may_be_left_out_or_be_one(override, expected):
     assert settings_of(f"baselines={override}").baselines == expected
-
-
-def test_the_default_baselines_are_registered():
-    config = compose("train", ["data=x", "out=y"])
-    assert set(config["baselines"]) <= set(baseline_names(Role.RIVAL))
 
 
 def test_settings_are_refused_without_loading_torch():

@@ -16,12 +16,12 @@ accumulator = pytest.importorskip(
 
 @pytest.fixture(scope="module")
 def studies(tmp_path_factory):
-    """The same study with the log, in two processes, and without it, in this one."""
+    """The same study with the log and without it."""
     folder = tmp_path_factory.mktemp("studies")
-    data = FakeDataset(n_units=16, records_per_unit=4, duration=0.3)
+    data = FakeDataset(n_units=16, records_per_unit=4, duration=0.2)
     words = ["epochs=2", "seeds=[0,1]", "baselines=[rms_threshold]"]
-    train(data, folder / "with", *words, "n_threads=2", "tensorboard=true")
-    train(data, folder / "without", *words, "n_threads=1")
+    train(data, folder / "with", *words, "tensorboard=true")
+    train(data, folder / "without", *words)
     return folder
 
 

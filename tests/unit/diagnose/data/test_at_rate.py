@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from fake_dataset import FakeDataset
 from numpy.testing import assert_allclose, assert_array_equal
-from small_studies import command, train, windows_of
+from runs import refuses, says, serve
+from small_studies import train
 
-import gensig.dataset.reader
+from diagnose.cli import main
 from diagnose.data.at_rate import at_rate
-from diagnose.data.windows import task_of
 from diagnose.training.store import load_model
 from gensig.errors import ConfigError
 
@@ -62,38 +62,32 @@ def test_impossible_rates_are_refused(rate, message):
         at_rate(FakeDataset(duration=0.05), rate)
 
 
-def test_windows_are_cut_at_the_lower_rate():
-    dataset = at_rate(FakeDataset(), 6400)
-    task = task_of(dataset, window_samples=600, stride_samples=500, normalise="rms")
-    (windows,) = windows_of(task, "train", protocol="random_window_leaky")
-    assert {signal.shape for signal in windows.signals} == {(1, 800)}
-
-
 def test_a_model_at_a_lower_rate_takes_faster_recordings_and_refuses_slower_ones(
     tmp_path, monkeypatch, capsys
 ):
-    data = FakeDataset(n_units=12, records_per_unit=8, duration=0.5)
+    data = FakeDataset(n_units=8, records_per_unit=8, duration=0.5)
     out = tmp_path / "out"
     words = ["window_samples=600", "stride_samples=500", "shuffle_control=false"]
-    metrics = train(data, out, "sampling_rate_hz=6400", "epochs=2", *words)
+    metrics = train(data, out, "sampling_rate_hz=6400", "epochs=1", *words)
     model = out / "models" / "by_unit-seed0"
     assert (
         load_model(model)[1].sampling_rate_hz == metrics["sampling_rate_hz"] == 6400.0
     )
-    signals = {12800: data.signals(80), 6400: at_rate(data, 6400).signals(80)}
+    signals = {12800: data.signals(60), 6400: at_rate(data, 6400).signals(60)}
     probabilities = []
+    capsys.readouterr()
     for rate, signal in signals.items():
         file = tmp_path / f"{rate}.npz"
         np.savez(file, acceleration=signal, sampling_rate_hz=rate)
-        _, text, _ = command(capsys, "predict", "--model", model, file, "--json")
-        probabilities.append(list(json.loads(text)["probabilities"].values()))
+        main(["predict", "--model", str(model), str(file), "--json"])
+        answer = json.loads(capsys.readouterr().out)
+        probabilities.append([*answer["probabilities"].values()])
     assert_allclose(*probabilities, rtol=0, atol=1e-4)
     slow = tmp_path / "slow.npz"
     np.savez(slow, acceleration=signals[12800], sampling_rate_hz=5120)
-    status, _, error = command(capsys, "predict", "--model", model, slow)
-    assert status == 2
-    assert "the model was trained at 6400" in error
-    monkeypatch.setattr(gensig.dataset.reader, "open_dataset", lambda path: data)
-    _, text, _ = command(capsys, "evaluate", "data=good", f"model_dir={model}")
+    words = ["predict", "--model", model, slow]
+    refuses(capsys, words, "the model was trained at 6400")
+    serve(monkeypatch, {"good": data})
+    text = says(capsys, "evaluate", "data=good", f"model_dir={model}")
     score = metrics["protocols"]["by_unit"]["methods"]["cnn"]["balanced_accuracy"]
     assert f"balanced_accuracy {score['mean']:.3f}" in text

@@ -117,21 +117,21 @@ def test_the_position_of_a_fault_moves_with_the_window():
 
 def test_the_position_loss_is_small_if_the_scores_point_at_the_fault_only():
     label, gear = torch.tensor([1, 1]), torch.tensor([1, 2])
-    position = torch.tensor([22.5, 40.0])
-
-    def loss(places, label=label, gear=gear, position=position):
-        return position_loss(places, label, gear, position, ((1, 23), (2, 84)))
-
+    position, gears = torch.tensor([22.5, 40.0]), ((1, 23), (2, 84))
     right = torch.zeros(2, 2, 107 * PER_TOOTH)
-    right[0, 1, 1 * PER_TOOTH] = (
-        20.0  # 1.5 teeth after tooth 22.5: around the end of the turn
-    )
+    # 1.5 teeth after tooth 22.5: around the end of the turn
+    right[0, 1, 1 * PER_TOOTH] = 20.0
     right[1, 1, (23 + 41) * PER_TOOTH] = 20.0
-    assert loss(right) < 1e-3
-    assert loss(right.flip(0)) > 10  # at the other gear
-    of_other_class = loss(right, label=1 - label)
-    torch.testing.assert_close(of_other_class, loss(torch.zeros_like(right)))
-    assert loss(right, gear=0 * gear, position=position * np.nan) == 0.0
+    assert position_loss(right, label, gear, position, gears) < 1e-3
+    other_gear = right.flip(0)
+    assert position_loss(other_gear, label, gear, position, gears) > 10
+    of_other_class, blind = (
+        position_loss(places, 1 - label, gear, position, gears)
+        for places in (right, 0 * right)
+    )
+    torch.testing.assert_close(of_other_class, blind)
+    unknown = position * np.nan
+    assert position_loss(right, label, 0 * gear, unknown, gears) == 0.0
 
 
 def test_a_sound_record_has_no_severity_to_learn():

@@ -66,16 +66,6 @@ def test_without_a_protocol_every_record_is_cut_whole():
     assert bits(windows)[: 12 * 9] == expected[0] + expected[1]
 
 
-def test_workers_share_the_records_in_a_fixed_order():
-    windows = streamed()
-    alone, shared = bits(windows), bits(loader(windows, 2))
-    assert shared != alone
-    assert bits(loader(windows, 2)) == shared
-    halves = ([alone[i] for i in range(16 * 9) if i // 36 % 2 == k] for k in (0, 1))
-    expected = itertools.chain.from_iterable(zip(*halves, strict=True))
-    assert shared == list(expected)
-
-
 def test_computers_and_workers_share_the_records():
     parts = [streamed(FakeStream().shard(rank, 2)) for rank in (0, 1)]
     shared = [item for part in parts for item in bits(loader(part, 2))]
@@ -127,12 +117,6 @@ def test_failed_records_are_left_out_and_others_must_be_finite():
 @pytest.mark.parametrize(
     ("part", "changes", "message"),
     [
-        (
-            (),
-            {"classes": ["helthy", "crack"]},
-            "no class 'helthy'; did you mean healthy",
-        ),
-        (("by_units", "train"), {}, "no protocol 'by_units'; did you mean by_unit"),
         (("by_unit", "training"), {}, "no subset 'training'; did you mean train"),
         (("by_unit",), {}, "give protocol and subset, or neither"),
         ((), {"window_samples": 5000}, "window_samples=5000 is too long"),

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from conftest import two_channels
 from numpy.testing import assert_allclose
+from runs import refuses, says
 from safetensors.numpy import load_file, save_file
-from small_studies import command, settings_of, windows_of
+from small_studies import settings_of, task_on, two_channels, windows_of
 
 import diagnose.networks.adaptation as adaptation
-from diagnose.data.windows import task_of
+from diagnose.cli import main
 from diagnose.networks.adaptation import (
     METHODS,
     adapt_domain,
@@ -34,9 +34,7 @@ RATE = 12800
 @pytest.fixture(scope="module")
 def windows():
     """Windows of the training part, not normalised."""
-    lengths = {"window_samples": 2048, "stride_samples": 2048}
-    task = task_of(two_channels(), normalise="none", **lengths)
-    return windows_of(task, "train")[0]
+    return windows_of(task_on(two_channels(), 2048, normalise="none"), "train")[0]
 
 
 @pytest.fixture(scope="module")
@@ -225,8 +223,7 @@ def test_the_command_writes_a_described_model_for_predict(
 ):
     model, out = two_channel_model, tmp_path / "adapted"
     words = ["--healthy", *recordings[:2], "--method", method, "--out", out]
-    status, text, _ = command(capsys, "adapt", "--model", model, *words)
-    assert status == 0
+    text = says(capsys, "adapt", "--model", model, *words)
     assert "2 healthy recording(s)" in text
     assert "docs/howto/bridge.md" in text
     facts = json.loads((out / "model.json").read_text())["adaptation"]
@@ -236,19 +233,21 @@ def test_the_command_writes_a_described_model_for_predict(
     assert all(len(row["sha256"]) == 64 for row in facts["recordings"])
     assert all(row["n_windows"] == 6 for row in facts["recordings"])
     before, after = (
-        load_file(Path(folder) / "model.safetensors") for folder in (model, out)
+        load_file(f"{folder}/model.safetensors") for folder in (model, out)
     )
     changed = {name for name in after if not np.array_equal(after[name], before[name])}
-    moments, weights = ("running_mean", "running_var"), ("head.1.weight", "head.1.bias")
-    endings = moments if method == "adabn" else weights
+    endings = {
+        "adabn": ("running_mean", "running_var"),
+        "coral": ("head.1.weight", "head.1.bias"),
+    }[method]
     assert changed
     assert all(name.endswith((*endings, "domain.levels")) for name in changed)
     assert not any(name.startswith("adaptation.") for name in after)
     for folder, expected in ((out, facts), (model, None)):
-        words = ["--model", folder, recordings[2], "--json"]
-        assert (
-            json.loads(command(capsys, "predict", *words)[1])["adaptation"] == expected
-        )
+        words = ["predict", "--model", folder, recordings[2], "--json"]
+        main([str(word) for word in words])
+        answer = json.loads(capsys.readouterr().out)
+        assert answer["adaptation"] == expected
 
 
 def test_refusals_are_one_line(two_channel_model, recordings, tmp_path, capsys):
@@ -259,16 +258,9 @@ def test_refusals_are_one_line(two_channel_model, recordings, tmp_path, capsys):
     full, adapted, old = (tmp_path / name for name in ("full", "adapted", "old"))
     full.mkdir()
     (full / "x").write_text("mine")
-    words = [
-        "--healthy",
-        recordings[0],
-        *healthy,
-        "--method",
-        "coral",
-        "--out",
-        adapted,
-    ]
-    assert command(capsys, "adapt", "--model", model, *words)[0] == 0
+    words = ["--healthy", recordings[0], *healthy, "--method", "coral"]
+    words += ["--out", adapted]
+    says(capsys, "adapt", "--model", model, *words)
     old.mkdir()
     (old / "model.json").write_bytes((model / "model.json").read_bytes())
     tensors = load_file(model / "model.safetensors")
@@ -285,9 +277,5 @@ def test_refusals_are_one_line(two_channel_model, recordings, tmp_path, capsys):
         (old, healthy, new, [], "stores no healthy statistics"),
     ):
         given = ["--model", folder, "--healthy", *files, "--out", out]
-        words = ["--method", "adabn", *words]
-        status, _, error = command(capsys, "adapt", *given, *words)
-        assert status == 2, message
-        assert message in error
-        assert error.count("\n") == 1
+        refuses(capsys, ["adapt", *given, "--method", "adabn", *words], message)
         assert not new.exists()

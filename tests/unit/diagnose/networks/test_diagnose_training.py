@@ -42,13 +42,6 @@ def test_shuffled_labels_stay_at_chance_within_their_interval(study):
     assert result["low"] <= 0.5 <= result["high"]
 
 
-def test_early_stopping_keeps_the_best_epoch(study):
-    _, settings, predictions = study
-    losses = predictions[0].validation_loss
-    assert predictions[0].best_epoch == int(np.argmin(losses)) + 1
-    assert len(losses) <= settings.epochs
-
-
 def test_shuffled_labels_say_nothing_and_keep_records_whole(study):
     (windows,) = windows_of(study[0], "train")
     shuffled = with_shuffled_labels(windows, 2, np.random.default_rng(0))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from fake_dataset import FakeDataset
 from numpy.testing import assert_allclose
-from small_studies import accuracy, windows_of
+from small_studies import accuracy, task_on, windows_of
 
 from diagnose.baselines.base import Parts
 from diagnose.baselines.estimators import record_scores
@@ -17,7 +17,7 @@ from diagnose.baselines.minirocket import (
     rocket_tables,
 )
 from diagnose.baselines.nearest_spectrum import NearestSpectrum, spectrum_table
-from diagnose.data.windows import SUBSETS, task_of
+from diagnose.data.windows import SUBSETS
 
 
 def make_windows(n_channels=1, n=6, n_samples=400, seed=0):
@@ -33,7 +33,7 @@ def banks_of(windows, per_kernel):
 def make_sets(**changes):
     values = {"n_units": 12, "strength": 2.0, "noise": 0.2} | changes
     dataset = FakeDataset(**values)
-    task = task_of(dataset, window_samples=1000, stride_samples=1000, normalise="rms")
+    task = task_on(dataset, 1000)
     return dict(zip(SUBSETS, windows_of(task, *SUBSETS), strict=True)), task
 
 

@@ -2,20 +2,15 @@
 
 import numpy as np
 import pytest
-import torch
-from fake_dataset import FakeDataset
 from fake_lives import FakeLives
 from runs import LIFE, NETWORK_ONLY, QUICK, SMALL_CNN, model_of, train
+from small_studies import two_channels
 
 
-def fake():
-    return FakeDataset(n_units=12, records_per_unit=8, duration=0.5, n_channels=2)
-
-
-@pytest.fixture(scope="session")
-def two_channels():
+@pytest.fixture(scope="session", name="two_channels")
+def learnt_from():
     """Data set that the networks learnt from."""
-    return fake()
+    return two_channels()
 
 
 @pytest.fixture(scope="session")
@@ -25,20 +20,20 @@ def train_network(tmp_path_factory):
     def make(*words, network=SMALL_CNN):
         out = tmp_path_factory.mktemp("study") / "out"
         words = (*QUICK, *network, *NETWORK_ONLY, *words)
-        return model_of(train(out, fake(), *words))
+        return model_of(train(out, two_channels(), *words))
 
     return make
 
 
 @pytest.fixture(scope="session")
-def model(train_network):
-    return train_network("epochs=5")
+def model(two_channel_model):
+    return two_channel_model
 
 
 @pytest.fixture(scope="session")
 def levels_model(train_network):
     """A network that sees levels in m/s2."""
-    return train_network("epochs=5", "normalise=none")
+    return train_network("epochs=2", "normalise=none")
 
 
 @pytest.fixture(scope="session")
@@ -63,12 +58,3 @@ def recorded(tmp_path):
         return str(tmp_path / name)
 
     return write
-
-
-@pytest.fixture(scope="session", autouse=True)
-def one_thread():
-    """Small work: threads cost more than they bring."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)

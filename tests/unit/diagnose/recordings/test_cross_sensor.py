@@ -3,14 +3,12 @@
 import numpy as np
 import pytest
 from fake_dataset import FakeDataset
-from novelty_sets import CopiedChannels
 from runs import FAST, NETWORK_ONLY, metrics_of, refuses, serve, settings_of, train
 
 from diagnose.baselines.features import Cache, feature_table
 from diagnose.cli import main
 from diagnose.data.protocols import channels_to_cross
 from diagnose.data.windows import load_windows, subset_segments
-from diagnose.studies.jobs import Job, run_jobs
 from diagnose.studies.study import plan_study, task_from
 from diagnose.training.store import load_model
 from gensig.errors import ConfigError
@@ -86,21 +84,6 @@ def test_indicators_of_one_channel_are_not_taken_for_those_of_another():
     np.testing.assert_array_equal(second, feature_table(parts[1], segments).values)
 
 
-def test_sensors_that_hear_the_same_change_nothing():
-    settings = settings_of(*FAST, "channels=[near_x,near_y]", "baselines=[indicators]")
-    task = task_from(CopiedChannels(), settings)
-    protocols = ("by_unit", "cross_sensor")
-    jobs = [Job(protocols=protocols, seed=None)]
-    jobs += [Job(protocols=(name,), seed=0) for name in protocols]
-    found = run_jobs(task, settings, jobs, n_workers=1, on_done=lambda _: None)
-    known, other = (
-        [run for run in found if run.protocol == name] for name in protocols
-    )
-    assert len(known) == 2
-    for same, crossed in zip(known, other, strict=True):
-        np.testing.assert_array_equal(same.predicted, crossed.predicted)
-
-
 def test_one_channel_is_left_out_beside_other_protocols():
     task = task_from(FakeDataset(duration=0.5), settings_of(*FAST))
     protocols, _ = plan_study(task, settings_of(*FAST, "protocols=null"))
@@ -148,10 +131,7 @@ def test_train_and_evaluate_know_the_channels(crossed, tmp_path, monkeypatch):
     [
         ("channels=channel_0", "the model takes 2, in the order of channel_0"),
         ("channels=channel_7,channel_8", "no channel channel_7"),
-        (
-            "protocol=cross_sensor",
-            "protocol cross_sensor: no channels to test on are named",
-        ),
+        ("protocol=cross_sensor", "cross_sensor: no channels to test on are named"),
     ],
 )
 def test_evaluate_refuses_channels_that_do_not_fit(

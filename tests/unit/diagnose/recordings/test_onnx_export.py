@@ -8,8 +8,9 @@ import pytest
 import torch
 from numpy.testing import assert_allclose
 from runs import refuses, says
+from small_studies import task_on
 
-from diagnose.data.windows import Segments, load_windows, task_of
+from diagnose.data.windows import Segments, load_windows
 from diagnose.recordings import onnx_export
 from diagnose.training.classes import predict_windows
 from diagnose.training.store import load_model
@@ -27,9 +28,21 @@ def session_of(file):
     return onnxruntime.InferenceSession(str(file), providers=["CPUExecutionProvider"])
 
 
-@pytest.mark.parametrize(
-    "network", ["model", "levels_model", "model=wdcnn", "model=spectrum"]
-)
+def check_metadata(file, description):
+    """The file describes the network and takes any number of windows."""
+    stored = session_of(file).get_modelmeta().custom_metadata_map
+    assert stored.pop("normalise").startswith(description.normalise)
+    for name in ("temperature", "sampling_rate_hz", "window_samples", "stride_samples"):
+        assert json.loads(stored[name]) == getattr(description, name)
+    for name in ("class_names", "channel_names"):
+        assert json.loads(stored[name]) == list(getattr(description, name))
+    assert json.loads(stored["n_teeth"]) == [23, 84]
+    (given,) = onnx.load(file).graph.input
+    sizes = [size.dim_value for size in given.type.tensor_type.shape.dim]
+    assert sizes == [0, 2, 1200]
+
+
+@pytest.mark.parametrize("network", ["levels_model", "model=wdcnn", "model=spectrum"])
 def test_the_file_answers_like_torch(
     network, two_channels, train_network, request, tmp_path, capsys
 ):
@@ -41,10 +54,7 @@ def test_the_file_answers_like_torch(
     assert len(says(capsys, *exporting(folder, file)).strip().splitlines()) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["m.onnx"]
     model, description = load_model(folder)
-    normalise = description.normalise
-    task = task_of(
-        two_channels, window_samples=1200, stride_samples=1000, normalise=normalise
-    )
+    task = task_on(two_channels, 1200, 1000, description.normalise)
     stop = np.array([two_channels.n_samples])
     whole = Segments(record=np.array([90]), start=np.array([0]), stop=stop)
     windows = load_windows(task, whole)
@@ -54,22 +64,7 @@ def test_the_file_answers_like_torch(
     inputs = {"acceleration": raw + np.float32(0.25)}
     (found,) = session_of(file).run(None, inputs)
     assert_allclose(found, predict_windows(model, windows), rtol=0, atol=1e-4)
-
-
-def test_metadata_are_the_description(model, tmp_path, capsys):
-    file = tmp_path / "m.onnx"
-    says(capsys, *exporting(model, file))
-    description = load_model(model)[1]
-    stored = session_of(file).get_modelmeta().custom_metadata_map
-    assert stored.pop("normalise").startswith("rms")
-    assert json.loads(stored["class_names"]) == list(description.class_names)
-    assert json.loads(stored["channel_names"]) == list(description.channel_names)
-    for name in ("temperature", "sampling_rate_hz", "window_samples", "stride_samples"):
-        assert json.loads(stored[name]) == getattr(description, name)
-    assert json.loads(stored["n_teeth"]) == [23, 84]
-    (given,) = onnx.load(file).graph.input
-    sizes = [size.dim_value for size in given.type.tensor_type.shape.dim]
-    assert sizes == [0, 2, 1200]  # any number of windows
+    check_metadata(file, description)
 
 
 def test_a_file_that_answers_otherwise_is_removed(model, tmp_path, capsys, monkeypatch):
@@ -114,8 +109,5 @@ def test_without_the_extra_one_line_says_what_to_install(
     model, tmp_path, capsys, monkeypatch
 ):
     monkeypatch.setitem(sys.modules, "onnxscript", None)
-    refuses(
-        capsys,
-        exporting(model, tmp_path / "m.onnx"),
-        "diagnose: export --to onnx needs the package onnxscript: pip install 'gensig[onnx]'",
-    )
+    message = "needs the package onnxscript: pip install 'gensig[onnx]'"
+    refuses(capsys, exporting(model, tmp_path / "m.onnx"), message)

@@ -84,7 +84,7 @@ def test_at_most_one_in_twenty_new_healthy_records_is_an_alarm(n_records):
     rng = np.random.default_rng(n_records)
     once = np.ones((1, n_records), dtype=int)
     alarms = []
-    for _ in range(400):
+    for _ in range(300):
         new = rng.normal(size=200)
         threshold = alarm_threshold(rng.normal(size=n_records), once, new=True)
         alarms.append(np.mean(new > threshold[0]))

@@ -28,7 +28,6 @@ from diagnose.report.text import score_cell
 from diagnose.scoring.metrics import (
     LEAST_UNITS,
     balanced_accuracy,
-    confusion_by_unit,
     is_above,
     macro_f1,
     over_records,
@@ -52,20 +51,6 @@ def test_scores_of_a_known_confusion():
     assert_allclose(recall(confusion), [0.8, 0.5, np.nan])
     assert_allclose(balanced_accuracy(confusion), 0.65)
     assert_allclose(macro_f1(confusion), (16 / 19 + 2 / 5) / 2)
-
-
-def test_scores_agree_with_scikit_learn():
-    from sklearn.metrics import balanced_accuracy_score, f1_score
-
-    rng = np.random.default_rng(0)
-    true, predicted = rng.integers(4, size=200), rng.integers(4, size=200)
-    confusion = confusion_by_unit(true, predicted, rng.integers(5, size=200), 4)
-    assert confusion.shape == (5, 4, 4)
-    total = confusion.sum(axis=0)
-    expected = balanced_accuracy_score(true, predicted)
-    assert_allclose(balanced_accuracy(total), expected, rtol=1e-12)
-    expected = f1_score(true, predicted, average="macro")
-    assert_allclose(macro_f1(total), expected, rtol=1e-12)
 
 
 def test_record_prediction_is_the_mean_log_probability():
@@ -92,9 +77,8 @@ def test_few_units_have_no_interval(n_units):
     """Two that agree would give 0.50 [0.50, 0.50]."""
     confusion = np.ones((1, n_units, 2, 2), dtype=int)
     resampling = {"n_bootstrap": 100, "rng": np.random.default_rng(0)}
+    ratio = ratio_with_interval("balanced_accuracy", confusion, confusion, **resampling)
     score = asdict(accuracy_with_interval(confusion))
-    pair = (confusion, confusion)
-    ratio = ratio_with_interval("balanced_accuracy", *pair, **resampling)
     few = n_units < LEAST_UNITS
     for found in (score, ratio):
         assert (found["low"] is None) == (found["high"] is None) == few
@@ -117,12 +101,12 @@ def test_the_reason_for_a_missing_interval_is_given_once():
 def test_interval_covers_the_truth_about_as_often_as_it_promises():
     rng = np.random.default_rng(3)
     covered = 0
-    for _ in range(200):
+    for _ in range(100):
         right = rng.binomial(10, np.clip(rng.normal(0.7, 0.1, 20), 0, 1))
         counts = np.stack([right, 10 - right, 0 * right, 0 * right], axis=1)
         score = accuracy_with_interval(counts.reshape(1, 20, 2, 2), 400, rng=rng)
         covered += score.low <= 0.7 <= score.high
-    assert 0.86 < covered / 200 < 1.0
+    assert 0.85 < covered / 100 < 1.0
 
 
 @pytest.mark.parametrize("naming", [[0, 1, 3, 2], [1, 2, 3, 0], [0, 2, 3, 1]])
@@ -276,16 +260,17 @@ def test_the_level_changes_only_the_model_with_it(parts, baseline, same):
     assert np.array_equal(scores, other) == same
 
 
-def test_rms_threshold_uses_the_level_only():
+@pytest.mark.parametrize(
+    ("names", "low", "high"),
+    [(("a/log_rms", "a/kurtosis"), 1.0, 1.0), (("a/kurtosis", "a/log_rms"), 0.0, 0.7)],
+)
+def test_rms_threshold_uses_the_level_only(names, low, high):
+    """The first column tells the class, the second is noise."""
     rng = np.random.default_rng(0)
-    label = np.arange(200) % 2
-    level, noise = np.log(1 + label + 0.1 * rng.uniform(size=200)), rng.normal(size=200)
-    names = ("a/log_rms", "a/kurtosis")
-    for columns, low, high in (((level, noise), 1.0, 1.0), ((noise, level), 0.0, 0.7)):
-        values = np.stack(columns, axis=1)
-        rows = FeatureTable(
-            values=values, names=names, label=label, record=np.arange(200)
-        )
-        detail, _, scores = fit_and_score(RmsThreshold(), Parts.of(lambda _, t=rows: t))
-        assert low <= (scores.argmax(axis=1) == label).mean() <= high
-        assert detail.startswith("thresholds 1.") == (low == 1.0)
+    record, label = np.arange(200), np.arange(200) % 2
+    level = np.log(1 + label + 0.1 * rng.uniform(size=200))
+    values = np.stack([level, rng.normal(size=200)], axis=1)
+    table = FeatureTable(values=values, names=names, label=label, record=record)
+    detail, _, scores = fit_and_score(RmsThreshold(), Parts.of(lambda _: table))
+    assert low <= (scores.argmax(axis=1) == label).mean() <= high
+    assert detail.startswith("thresholds 1.") == (low == 1.0)

@@ -35,14 +35,15 @@ BOTH = "protocols=[healthy_only,open_set]"
 def studies():
     """Results of both protocols with visible faults and with faults in name only."""
     results = {}
-    for name, strength in (("plain", 4.0), ("none", 0.0)):
+    for name, strength, epochs in (("plain", 4.0, 5), ("none", 0.0, 1)):
         dataset = OpenDataset(strength=strength, n_units=24)
-        task, settings = study_of(dataset, BOTH, *TINY_CNN, *LEARNS)
+        words = [BOTH, *TINY_CNN, *LEARNS, f"epochs={epochs}"]
+        task, settings = study_of(dataset, *words)
         protocols, jobs = plan_study(task, settings)
         runs = run(task, settings, *jobs)
         results[name] = {
             protocol: novelty_protocol_result(
-                task, protocol, runs, n_bootstrap=200, seed=0
+                task, protocol, runs, n_bootstrap=100, seed=0
             )
             for protocol in protocols
         }
@@ -108,7 +109,7 @@ def labelled():
             )
             for seed, score in enumerate(scores)
         ]
-        return novelty_result(task, runs, [0], 300, np.random.default_rng(0))
+        return novelty_result(task, runs, [0], 100, np.random.default_rng(0))
 
     return judge, novel, task, record
 
@@ -147,9 +148,9 @@ def test_interval_covers_the_seeds(labelled):
 @pytest.mark.parametrize("n", [19, 20, 21, 58, 400])
 def test_new_known_records_raise_no_more_alarms_than_promised(n):
     rng = np.random.default_rng(n)
-    thresholds = [alarm_threshold(rng.standard_normal(n)) for _ in range(4000)]
+    thresholds = [alarm_threshold(rng.standard_normal(n)) for _ in range(2000)]
     shares = norm.sf(thresholds)
-    assert 0.05 - 1 / (n + 1) < np.mean(shares) < 0.05 + 4 * np.std(shares) / 63
+    assert 0.05 - 1 / (n + 1) < np.mean(shares) < 0.05 + 4 * np.std(shares) / 44
 
 
 def test_too_few_records_give_their_largest_score():
@@ -160,7 +161,7 @@ def test_too_few_records_give_their_largest_score():
 @pytest.mark.parametrize("shift", [0.0, 1.0, 3.0])
 def test_false_positive_rate_of_two_normal_scores(shift):
     rng = np.random.default_rng(1)
-    novel = np.arange(80000) % 2 == 1
+    novel = np.arange(40000) % 2 == 1
     score = rng.standard_normal(novel.size) + shift * novel
     expected = norm.cdf(norm.ppf(0.95) - shift)
     assert false_positive_rate_95(novel, score) == pytest.approx(expected, abs=0.01)
@@ -250,28 +251,17 @@ def test_the_autoencoder_learns_and_shows_a_moment_that_it_cannot_rebuild(
 def test_two_processes_give_the_results_of_one(open_study):
     """Of all kinds of jobs: novelty with and without a network, classes, shuffled labels."""
     task, settings = open_study
-    kinds = [
-        ("healthy_only", None),
-        ("healthy_only", 3),
-        ("open_set", None),
-        ("open_set", 3),
-        ("by_unit", 5),
+    settings = dataclasses.replace(settings, epochs=1)
+    jobs = [Job(protocols=("healthy_only",), seed=seed) for seed in (None, 3)]
+    jobs.append(Job(protocols=("open_set",), seed=3))
+    jobs += [
+        Job(protocols=("by_unit",), seed=5, shuffled=shuffled)
+        for shuffled in (False, True)
     ]
-    jobs = [Job(protocols=(name,), seed=seed) for name, seed in kinds]
-    jobs.append(Job(protocols=("by_unit",), seed=6, shuffled=True))
     one, two = (run(task, settings, *jobs, n_workers=n) for n in (1, 2))
-    assert [result.method for result in one] == [result.method for result in two]
-    novelty = [result for result in one if isinstance(result, NoveltyRun)]
-    assert len(novelty) == 10
+    assert len([result for result in one if isinstance(result, NoveltyRun)]) == 9
     for first, second in zip(one, two, strict=True):
-        if isinstance(first, NoveltyRun):
-            np.testing.assert_array_equal(first.score, second.score)
-            np.testing.assert_array_equal(
-                first.validation_score, second.validation_score
-            )
-        else:
-            np.testing.assert_array_equal(first.log_probability, second.log_probability)
-            assert first.validation_loss == second.validation_loss
+        np.testing.assert_equal(*map(dataclasses.asdict, (first, second)))
 
 
 @pytest.mark.parametrize(
@@ -327,7 +317,9 @@ def test_the_command_reports_novelty_alone(tmp_path, capsys):
 
 def test_null_runs_all_protocols_and_both_kinds_share_a_report(tmp_path):
     words = ["protocols=null", "shuffle_control=false", "baselines=[rms_threshold]"]
-    metrics = train(OpenDataset(n_channels=2), tmp_path, "epochs=1", *words)
+    metrics = train(
+        OpenDataset(n_channels=2, records_per_unit=4), tmp_path, "epochs=1", *words
+    )
     assert list(metrics["protocols"]) == ["by_unit", "cross_sensor"]
     assert list(metrics["novelty"]) == ["healthy_only", "open_set"]
     page = (tmp_path / "report.html").read_text()

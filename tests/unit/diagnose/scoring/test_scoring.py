@@ -7,11 +7,11 @@ from importlib.resources import files
 import numpy as np
 import pytest
 from fake_dataset import FakeDataset
-from small_studies import command, train
+from small_studies import command, task_on, train
 
 import diagnose.studies.benchmark
 import gensig.dataset.reader
-from diagnose.data.windows import subset_segments, task_of
+from diagnose.data.windows import subset_segments
 from diagnose.studies.benchmark import Benchmark, score_file, sha256, signal_rms
 
 
@@ -29,7 +29,7 @@ def dataset(tmp_path, monkeypatch):
 @pytest.fixture
 def truth(dataset):
     """Rows (record id, true class) of the test part of by_unit."""
-    task = task_of(dataset, window_samples=1, stride_samples=1, normalise="none")
+    task = task_on(dataset, 1)
     records = np.unique(subset_segments(task, "by_unit", "test").record)
     columns = (dataset.columns[name][records] for name in ("record_id", "label_name"))
     return [list(row) for row in zip(*columns, strict=True)]
@@ -71,6 +71,7 @@ def test_the_truth_scores_one_and_one_class_for_all_scores_chance(
 
 def test_predictions_of_a_study_score_as_in_the_study(dataset, tmp_path):
     words = ["window_samples=800", "stride_samples=800", "epochs=1", "seeds=[0,1]"]
+    words.append("baselines=[indicators,rms_threshold]")
     protocols = "protocols=[by_unit,random_window_leaky]"
     metrics = train(dataset, tmp_path / "out", *words, protocols)
     study = metrics["protocols"]["by_unit"]["methods"]
