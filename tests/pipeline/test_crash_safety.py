@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -25,12 +24,12 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
-def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def reference(tmp_path_factory):
     return make(tmp_path_factory.mktemp("reference") / "data")
 
 
 @pytest.fixture
-def begun(reference: Path, tmp_path: Path) -> Path:
+def begun(reference, tmp_path):
     """The reference as an interrupted run leaves it: shards 0 and 1 done, shard 2 unfinished."""
     out = tmp_path / "data"
     shutil.copytree(reference, out)
@@ -47,7 +46,7 @@ def begun(reference: Path, tmp_path: Path) -> Path:
     return out
 
 
-def resume(out: Path, *words: str) -> int:
+def resume(out, *words):
     """In this process, unless the words choose an executor."""
     own = (
         () if any(word.startswith("executor") for word in words) else ("--workers", "1")
@@ -55,14 +54,14 @@ def resume(out: Path, *words: str) -> int:
     return main(["resume", "--quiet", str(out), *words, *own])
 
 
-def test_killed_at_random_moments_it_ends_byte_equal() -> None:
+def test_killed_at_random_moments_it_ends_byte_equal():
     words = f"-m benchmarks.kill_campaign --kills 5 --seed {time.time_ns()}".split()
     command = [sys.executable, *words]
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert result.returncode == 0, f"{command}\n{result.stdout}{result.stderr}"
 
 
-def alive_in_group(group: int) -> list[str]:
+def alive_in_group(group):
     """Commands of a process group that still run."""
     found = []
     for path in Path("/proc").glob("[0-9]*/stat"):
@@ -73,14 +72,14 @@ def alive_in_group(group: int) -> list[str]:
     return found
 
 
-def heed_interrupts() -> None:
+def heed_interrupts():
     """Undo the disposition that a child of ``nohup`` or of a background job inherits."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def test_interrupt_from_a_terminal_reaches_all_processes_and_is_one_line(
-    reference: Path, tmp_path: Path
-) -> None:
+    reference, tmp_path
+):
     out = tmp_path / "data"
     words = ["generate", "--quiet", *TINY, "executor.n_workers=2", f"out={out}"]
     process = subprocess.Popen(
@@ -108,7 +107,7 @@ def test_interrupt_from_a_terminal_reaches_all_processes_and_is_one_line(
 
 
 @contextmanager
-def small_disk(folder: Path) -> Iterator[Callable[[int], None] | None]:
+def small_disk(folder):
     """A disk of its own that can be enlarged; None where none can be mounted."""
     folder.mkdir()
     mounted = subprocess.run(
@@ -127,9 +126,7 @@ def small_disk(folder: Path) -> Iterator[Callable[[int], None] | None]:
         subprocess.run(["umount", str(folder)], check=True)
 
 
-def test_full_disk_is_mended_by_space_and_resume(
-    reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_full_disk_is_mended_by_space_and_resume(reference, tmp_path, capsys):
     disk = tmp_path / "disk"
     out = disk / "data"
     with small_disk(disk) as enlarge:
@@ -155,7 +152,7 @@ def test_full_disk_is_mended_by_space_and_resume(
 
 
 @contextmanager
-def closed(folder: Path) -> Iterator[None]:
+def closed(folder):
     """A folder that may not be written, not even by root."""
     is_root = os.geteuid() == 0
     if is_root:
@@ -176,9 +173,7 @@ def closed(folder: Path) -> Iterator[None]:
 
 
 @pytest.mark.parametrize("part", [".", "shards"])
-def test_closed_folder_is_one_line_and_changes_nothing(
-    begun: Path, reference: Path, part: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_closed_folder_is_one_line_and_changes_nothing(begun, reference, part, capsys):
     before = contents(begun)
     with closed(begun / part):
         assert resume(begun) in (1, 2)
@@ -191,25 +186,25 @@ def test_closed_folder_is_one_line_and_changes_nothing(
     assert contents(begun) == contents(reference)
 
 
-def test_resume_on_another_executor_is_byte_equal(begun: Path, reference: Path) -> None:
+def test_resume_on_another_executor_is_byte_equal(begun, reference):
     assert resume(begun, "executor=local", "executor.n_workers=2", "seed=0") == 0
     assert contents(begun) == contents(reference)
 
 
-def change_config(out: Path) -> None:
+def change_config(out):
     path = out / "config.yaml"
     content = yaml.safe_load(path.read_text())
     content["operating"]["torque_nm"] = 21.5
     path.write_text(yaml.safe_dump(content))
 
 
-def change_version(out: Path) -> None:
+def change_version(out):
     content = json.loads((out / "manifest.json").read_text())
     content["generator_version"] = "0.0.1"
     (out / "manifest.json").write_text(json.dumps(content))
 
 
-def change_plan(out: Path) -> None:
+def change_plan(out):
     path = out / "plan.csv"
     path.write_text(path.read_text().replace("unit-0001", "unit-0002"))
 
@@ -227,13 +222,7 @@ def change_plan(out: Path) -> None:
         ),
     ],
 )
-def test_resume_with_another_identity_is_refused(
-    begun: Path,
-    change: Callable,
-    words: tuple[str, ...],
-    hints: tuple[str, ...],
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_resume_with_another_identity_is_refused(begun, change, words, hints, capsys):
     change(begun)
     before = contents(begun), (begun / "manifest.json").read_bytes()
     assert resume(begun, *words) == 2
@@ -242,9 +231,7 @@ def test_resume_with_another_identity_is_refused(
     assert (contents(begun), (begun / "manifest.json").read_bytes()) == before
 
 
-def test_what_was_begun_says_how_it_is_finished(
-    begun: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_was_begun_says_how_it_is_finished(begun, capsys):
     how = f"2 of 6 records done; `gensig resume {begun}` finishes it"
     assert main(["generate", *TINY, f"out={begun}"]) == 2
     assert how in capsys.readouterr().err
@@ -253,8 +240,8 @@ def test_what_was_begun_says_how_it_is_finished(
 
 
 def test_a_change_is_refused_where_the_options_it_began_with_are_not_known(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+    tmp_path, capsys
+):
     own = tmp_path / "own" / "experiment"
     own.mkdir(parents=True)
     (own / "mine.yaml").write_text("# @package _global_\nseed: 1\n")
@@ -268,9 +255,7 @@ def test_a_change_is_refused_where_the_options_it_began_with_are_not_known(
     assert resume(out) == 0
 
 
-def test_a_change_is_named_before_any_shard_is_done(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_change_is_named_before_any_shard_is_done(tmp_path, capsys):
     out = tmp_path / "data"
     assert main(["plan", "--freeze", *TINY, f"out={out}"]) == 0
     change_config(out)
@@ -282,8 +267,8 @@ def test_a_change_is_named_before_any_shard_is_done(
 
 
 def test_a_killed_beginning_says_what_to_do_and_is_begun_anew(
-    reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+    reference, tmp_path, capsys
+):
     """SIGKILL of the command itself as soon as it has begun its folder, before the manifest is
     there."""
     out = tmp_path / "data"
@@ -311,8 +296,8 @@ def test_a_killed_beginning_says_what_to_do_and_is_begun_anew(
 
 
 def test_resume_without_the_compression_is_refused_before_anything_runs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+    tmp_path, monkeypatch, capsys
+):
     out = tmp_path / "data"
     assert (
         main(["plan", "--freeze", *TINY, "dataset.compression=blosc2", f"out={out}"])
@@ -326,7 +311,7 @@ def test_resume_without_the_compression_is_refused_before_anything_runs(
     assert not any((out / "shards").iterdir())
 
 
-def test_a_shard_lost_since_is_made_again(begun: Path, reference: Path) -> None:
+def test_a_shard_lost_since_is_made_again(begun, reference):
     shard_path(begun, 0).unlink()
     shard_path(begun, 1).write_bytes(shard_path(begun, 1).read_bytes()[:-1])
     assert resume(begun) == 0
@@ -334,9 +319,7 @@ def test_a_shard_lost_since_is_made_again(begun: Path, reference: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", ["none", "cut shard", "no json", "other rows"])
-def test_receipts_are_taken_only_of_whole_shards(
-    begun: Path, reference: Path, damage: str
-) -> None:
+def test_receipts_are_taken_only_of_whole_shards(begun, reference, damage):
     entry = read_manifest(reference).shards[2]
     shutil.copy(shard_path(reference, 2), shard_path(begun, 2))
     rows = 2 if damage == "other rows" else 1

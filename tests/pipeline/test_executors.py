@@ -7,7 +7,6 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from gensig.cli import main
 from gensig.dataset.folder.verify import verify
 from gensig.errors import ConfigError
 from gensig.execution.array import ArrayExecutor
-from gensig.execution.base import TRIES, Executor, ShardFailure
+from gensig.execution.base import TRIES, ShardFailure
 from gensig.execution.dask import DaskExecutor
 from gensig.execution.local import LocalExecutor
 from gensig.execution.registry import read_executor
@@ -27,11 +26,11 @@ LOCAL = LocalExecutor(n_workers=2)
 
 
 @pytest.fixture(scope="module")
-def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def reference(tmp_path_factory):
     return make(tmp_path_factory.mktemp("reference") / "data")
 
 
-def deadly(notes: Path, poison: int, deaths: int, index: int) -> int:
+def deadly(notes, poison, deaths, index):
     """Ten times the index; the poisonous one kills its process the first few times."""
     begun = len(list(notes.glob(f"{index}-*")))
     (notes / f"{index}-{begun}").touch()
@@ -42,23 +41,19 @@ def deadly(notes: Path, poison: int, deaths: int, index: int) -> int:
     return 10 * index
 
 
-def outcome(
-    executor: Executor, notes: Path, deaths: int
-) -> tuple[dict, dict[int, int]]:
+def outcome(executor, notes, deaths):
     """Results by index, and how often each was begun."""
     results = dict(executor.run(functools.partial(deadly, notes, 2, deaths), range(6)))
     return results, {index: len(list(notes.glob(f"{index}-*"))) for index in range(6)}
 
 
-def test_only_the_shard_of_a_killed_worker_runs_again(tmp_path: Path) -> None:
+def test_only_the_shard_of_a_killed_worker_runs_again(tmp_path):
     results, begun = outcome(LOCAL, tmp_path, 1)
     assert results == {index: 10 * index for index in range(6)}
     assert begun == {0: 1, 1: 1, 2: 2, 3: 1, 4: 1, 5: 1}
 
 
-def test_a_shard_that_always_kills_is_given_up_and_the_others_are_made(
-    tmp_path: Path,
-) -> None:
+def test_a_shard_that_always_kills_is_given_up_and_the_others_are_made(tmp_path):
     results, begun = outcome(LOCAL, tmp_path, 99)
     failure = results.pop(2)
     assert isinstance(failure, ShardFailure)
@@ -67,7 +62,7 @@ def test_a_shard_that_always_kills_is_given_up_and_the_others_are_made(
     assert begun == {0: 1, 1: 1, 2: TRIES, 3: 1, 4: 1, 5: 1}
 
 
-def refuse(notes: Path, index: int) -> int:
+def refuse(notes, index):
     (notes / f"{index}-{time.monotonic_ns()}").touch()
     if index == 1:
         raise ValueError("no\nsuch luck")
@@ -75,9 +70,7 @@ def refuse(notes: Path, index: int) -> int:
 
 
 @pytest.mark.parametrize("n_workers", [1, 2])
-def test_an_exception_is_one_line_and_not_tried_again(
-    tmp_path: Path, n_workers: int
-) -> None:
+def test_an_exception_is_one_line_and_not_tried_again(tmp_path, n_workers):
     results = dict(
         LocalExecutor(n_workers=n_workers).run(
             functools.partial(refuse, tmp_path), range(3)
@@ -87,12 +80,12 @@ def test_an_exception_is_one_line_and_not_tried_again(
     assert len(list(tmp_path.iterdir())) == 3
 
 
-def announce(notes: Path, index: int) -> None:
+def announce(notes, index):
     (notes / f"pid-{os.getpid()}").touch()
     time.sleep(120.0)
 
 
-def test_workers_end_with_a_killed_parent(tmp_path: Path) -> None:
+def test_workers_end_with_a_killed_parent(tmp_path):
     code = (
         "import functools, pathlib, test_executors as "
         f"t\nlist(t.LOCAL.run(functools.partial(t.announce, pathlib.Path({str(tmp_path)!r})), "
@@ -107,7 +100,7 @@ def test_workers_end_with_a_killed_parent(tmp_path: Path) -> None:
     wait_until(lambda: not any(is_alive(pid) for pid in workers))
 
 
-def is_alive(pid: int) -> bool:
+def is_alive(pid):
     try:
         return (
             Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
@@ -116,9 +109,7 @@ def is_alive(pid: int) -> bool:
         return False
 
 
-def wait_until(
-    condition, process: subprocess.Popen | None = None, seconds: float = 120.0
-) -> None:
+def wait_until(condition, process=None, seconds=120.0):
     deadline = time.monotonic() + seconds
     while not condition():
         assert process is None or process.poll() is None, "the process ended too early"
@@ -126,7 +117,7 @@ def wait_until(
         time.sleep(0.01)
 
 
-def test_a_script_without_a_main_guard_runs_once(tmp_path: Path) -> None:
+def test_a_script_without_a_main_guard_runs_once(tmp_path):
     script = tmp_path / "mine.py"
     script.write_text(
         "import operator\n"
@@ -147,7 +138,7 @@ def test_a_script_without_a_main_guard_runs_once(tmp_path: Path) -> None:
     assert not ran.stderr
 
 
-def test_tasks_of_an_array_share_all_shards_out() -> None:
+def test_tasks_of_an_array_share_all_shards_out():
     tasks = [
         ArrayExecutor(shard_index=index, shard_count=3, n_workers=1)
         for index in range(3)
@@ -181,21 +172,19 @@ def test_tasks_of_an_array_share_all_shards_out() -> None:
         ),
     ],
 )
-def test_a_mistake_is_one_line(section: dict, hint: str) -> None:
+def test_a_mistake_is_one_line(section, hint):
     with pytest.raises(ConfigError, match=hint) as caught:
         read_executor(section)
     assert "\n" not in str(caught.value)
 
 
-def test_missing_dask_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_dask_is_one_line(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(ConfigError, match=r"gensig\[dask\]"):
         read_executor({"kind": "dask", "n_workers": 1, "address": None})
 
 
-def test_two_tasks_at_a_time_make_the_same_bytes(
-    reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_two_tasks_at_a_time_make_the_same_bytes(reference, tmp_path, capsys):
     out = tmp_path / "data"
     assert main(["plan", "--freeze", *TINY, "executor=slurm", f"out={out}"]) == 0
     frozen = (out / "manifest.json").read_bytes()
@@ -230,9 +219,7 @@ def test_two_tasks_at_a_time_make_the_same_bytes(
     assert contents(out) == contents(reference)
 
 
-def test_a_task_needs_a_frozen_folder(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_task_needs_a_frozen_folder(tmp_path, capsys):
     words = [
         "executor=slurm",
         "executor.shard_index=0",
@@ -247,9 +234,7 @@ def test_a_task_needs_a_frozen_folder(
 
 
 @pytest.fixture(scope="module")
-def cluster(
-    tmp_path_factory: pytest.TempPathFactory,
-) -> Iterator[tuple[str, list[subprocess.Popen]]]:
+def cluster(tmp_path_factory):
     """Address of a Dask scheduler process, and two worker processes."""
     import json
 
@@ -257,7 +242,7 @@ def cluster(
     note = folder / "scheduler.json"
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}
 
-    def start(*words: str) -> subprocess.Popen:
+    def start(*words):
         command = [
             sys.executable,
             "-m",
@@ -291,13 +276,13 @@ def cluster(
 
 
 def test_dask_survives_a_killed_worker_with_the_same_bytes(
-    reference: Path, cluster: tuple[str, list[subprocess.Popen]], tmp_path: Path
-) -> None:
+    reference, cluster, tmp_path
+):
     address, workers = cluster
     out = tmp_path / "data"
     killed = threading.Event()
 
-    def kill_in_mid_run() -> None:
+    def kill_in_mid_run():
         with suppress(AssertionError):
             wait_until(lambda: any((out / "shards").glob("shard-*.h5")))
             workers[0].kill()
@@ -324,9 +309,7 @@ def test_dask_survives_a_killed_worker_with_the_same_bytes(
     assert contents(out) == contents(reference)
 
 
-def test_dask_on_this_machine_gives_up_a_shard_that_always_kills(
-    tmp_path: Path,
-) -> None:
+def test_dask_on_this_machine_gives_up_a_shard_that_always_kills(tmp_path):
     results, begun = outcome(DaskExecutor(n_workers=2, address=None), tmp_path, 99)
     failure = results.pop(2)
     assert isinstance(failure, ShardFailure)
@@ -336,7 +319,7 @@ def test_dask_on_this_machine_gives_up_a_shard_that_always_kills(
     assert 1 <= begun[2] <= TRIES
 
 
-def test_no_scheduler_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_scheduler_is_one_line(monkeypatch):
     monkeypatch.setattr("gensig.execution.dask.CONNECT_SECONDS", 0.2)
     with pytest.raises(ConfigError, match="no Dask scheduler answers"):
         list(DaskExecutor(n_workers=1, address="tcp://127.0.0.1:9").run(abs, [1]))

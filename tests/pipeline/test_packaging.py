@@ -5,7 +5,6 @@ import subprocess
 import sys
 import tomllib
 import zipfile
-from pathlib import Path
 
 import pytest
 
@@ -64,37 +63,37 @@ gensig.load_system("fault=healthy").pear
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("packages")
 
 
 @pytest.fixture(scope="module")
-def source(folder: Path) -> Path:
+def source(folder):
     """An unpacked source distribution of this tree."""
     return unpack(build_sdist(folder), folder)
 
 
 @pytest.fixture(scope="module")
-def wheel(source: Path, folder: Path) -> Path:
+def wheel(source, folder):
     """The wheel that the source distribution makes."""
     return build_wheel(source, folder)
 
 
 @pytest.fixture(scope="module")
-def python(wheel: Path, folder: Path) -> Path:
+def python(wheel, folder):
     """Interpreter of a fresh environment: our wheel, everything else from the test environment."""
     python = environment_with(wheel, folder)
     lend_compiled(python)
     return python
 
 
-def test_source_distribution_holds_the_whole_tree(source: Path) -> None:
+def test_source_distribution_holds_the_whole_tree(source):
     assert {
         name for name in files_of_the_tree() if not (source / name).is_file()
     } == set()
 
 
-def test_wheel_holds_the_packages_and_nothing_else(wheel: Path) -> None:
+def test_wheel_holds_the_packages_and_nothing_else(wheel):
     parts = [name.split("/", 1) for name in files_of_the_tree()]
     expected = {
         f"{PACKAGES[part[0]]}/{part[1]}" for part in parts if part[0] in PACKAGES
@@ -115,8 +114,8 @@ def test_wheel_holds_the_packages_and_nothing_else(wheel: Path) -> None:
     } < files
 
 
-def test_wheel_runs_from_another_folder(python: Path, tmp_path: Path) -> None:
-    def run(*command: str | Path) -> str:
+def test_wheel_runs_from_another_folder(python, tmp_path):
+    def run(*command):
         done = subprocess.run(
             command,
             cwd=tmp_path,
@@ -141,7 +140,7 @@ def test_wheel_runs_from_another_folder(python: Path, tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["data"]
 
 
-def test_tests_run_from_the_wheel(source: Path, python: Path) -> None:
+def test_tests_run_from_the_wheel(source, python):
     """A file of them; `make wheel-test` runs all."""
     take_packages_out(source, python)
     assert (
@@ -155,7 +154,7 @@ def test_tests_run_from_the_wheel(source: Path, python: Path) -> None:
     )
 
 
-def test_types_reach_those_who_use_the_wheel(python: Path, tmp_path: Path) -> None:
+def test_types_reach_those_who_use_the_wheel(python, tmp_path):
     (tmp_path / "typed.py").write_text(TYPED)
     (tmp_path / "mistyped.py").write_text(MISTYPED)
     options = [
@@ -180,7 +179,7 @@ def test_types_reach_those_who_use_the_wheel(python: Path, tmp_path: Path) -> No
     assert errors == ["mistyped.py:4:", "mistyped.py:5:"], shown
 
 
-def test_all_is_every_extra_that_a_command_asks_for() -> None:
+def test_all_is_every_extra_that_a_command_asks_for():
     extras = PROJECT["optional-dependencies"]
     of_commands = set(extras) - NOT_FOR_COMMANDS
     assert {line for name in of_commands for line in extras[name]} <= {
@@ -212,7 +211,7 @@ def test_all_is_every_extra_that_a_command_asks_for() -> None:
     assert named <= set(extras)
 
 
-def test_this_environment_finds_its_configuration(tmp_path: Path) -> None:
+def test_this_environment_finds_its_configuration(tmp_path):
     command = [sys.executable, "-m", "gensig.cli", "stiffness", "gear=xiamen_23_84"]
     done = subprocess.run(
         command, cwd=tmp_path, capture_output=True, text=True, check=True

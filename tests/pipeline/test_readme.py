@@ -13,7 +13,7 @@ TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 PROGRAMS = {"gensig": "gensig.cli", "diagnose": "diagnose.cli"}
 
 
-def block(title: str) -> str:
+def block(title):
     """The code of the section with this title."""
     (code,) = re.findall(
         rf"^## {title}\n.*?^```\w+\n(.*?)^```", TEXT, flags=re.DOTALL | re.MULTILINE
@@ -22,7 +22,7 @@ def block(title: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     """An empty folder, and beside it the two programs of this checkout."""
     folder = tmp_path_factory.mktemp("stranger")
     (folder / "bin").mkdir()
@@ -34,7 +34,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def ran(words: list[str], folder: Path) -> str:
+def ran(words, folder):
     """What a command prints; fails where it fails."""
     paths = {
         "PATH": f"{folder / 'bin'}{os.pathsep}{os.environ['PATH']}",
@@ -52,7 +52,7 @@ def ran(words: list[str], folder: Path) -> str:
     return done.stdout
 
 
-def test_ten_lines_of_shell(folder: Path) -> None:
+def test_ten_lines_of_shell(folder):
     code = block("Ten lines of shell")
     assert len(code.strip().splitlines()) == 10
     said = ran(["sh", "-e", "-c", code], folder)
@@ -68,7 +68,7 @@ def test_ten_lines_of_shell(folder: Path) -> None:
         assert (folder / "empty" / name).stat().st_size > 1000, name
 
 
-def test_ten_lines_of_python_as_a_script(folder: Path) -> None:
+def test_ten_lines_of_python_as_a_script(folder):
     code = block("Ten lines of Python")
     assert len(code.strip().splitlines()) <= 11  # and the empty one
     script = folder / "mine.py"
@@ -80,7 +80,7 @@ def test_ten_lines_of_python_as_a_script(folder: Path) -> None:
     assert re.fullmatch(r"\(4, 12800\) [1-9]\d* True", said[-1])
 
 
-def test_the_two_commands_are_those_of_the_makefile() -> None:
+def test_the_two_commands_are_those_of_the_makefile():
     commands = [
         line.split("#")[0].split() for line in block("Two commands").splitlines()
     ]
@@ -94,7 +94,7 @@ def test_the_two_commands_are_those_of_the_makefile() -> None:
     "page",
     ["README.md", "docs/index.md", "docs/alternatives.md", "docs/tour.ipynb"],
 )
-def test_links_lead_somewhere(page: str) -> None:
+def test_links_lead_somewhere(page):
     text = (ROOT / page).read_text(encoding="utf-8")
     links = [
         link

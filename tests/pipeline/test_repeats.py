@@ -1,9 +1,6 @@
 """Repeats on disk: a column counts them, and the whole set is made from counts alone."""
 
-from pathlib import Path
-
 import numpy as np
-import pytest
 
 import gensig
 from gensig.cli import main
@@ -22,9 +19,7 @@ WORDS = (
 )
 
 
-def test_repeats_are_stored_and_told_apart(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_repeats_are_stored_and_told_apart(tmp_path, capsys):
     out = tmp_path / "data"
     assert main(["generate", *WORDS, f"out={out}"]) == 0
     assert "12 records in " in capsys.readouterr().out
@@ -41,7 +36,7 @@ def test_repeats_are_stored_and_told_apart(
         assert len(data.where(repeat=0)) == 6
 
 
-def test_one_record_of_a_plan_with_repeats_can_be_looked_at(tmp_path: Path) -> None:
+def test_one_record_of_a_plan_with_repeats_can_be_looked_at(tmp_path):
     for words in (
         WORDS,
         ("plan.design=grid", "plan.n_repeats=3", "operating.duration_s=0.02"),

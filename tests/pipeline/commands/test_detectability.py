@@ -2,7 +2,6 @@
 
 import json
 import pickle
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -213,7 +212,7 @@ def test_turns_and_random_walks_follow_the_plan():
     assert len({row["params/operating.course_seed"] for row in pairs.rows}) == 8
 
 
-def test_the_command_writes_everything(tmp_path: Path, capsys):
+def test_the_command_writes_everything(tmp_path, capsys):
     table, figure = tmp_path / "map.json", tmp_path / "map.png"
     typed = (
         "--speeds 900 1800 --torques 20 sensing.snr_db=15 --bandwidths 2000 20000 "

@@ -26,12 +26,12 @@ FLANK = f"gensig modify-flank {SLICED}"
 ERROR = f"gensig transmission-error {SLICED}"
 
 
-def uniform(key: str) -> str:
+def uniform(key):
     """An override that varies one key."""
     return f"'plan.vary={{{key}: {{distribution: uniform, low: 1, high: 2}}}}'"
 
 
-def damper(node: object = 45, inertia: float = 0.01, damping: float = 1) -> str:
+def damper(node=45, inertia=0.01, damping=1):
     """A list of one damper without a spring."""
     sizes = f"ring_inertia_kg_m2: {inertia}, damping_nms_per_rad: {damping}"
     return f"{DAMPERS}'[{{node: {node}, {sizes}, stiffness_nm_per_rad: 0}}]'"

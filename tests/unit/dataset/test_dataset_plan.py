@@ -21,7 +21,7 @@ from gensig.dataset.plan import (
 from gensig.errors import DatasetError
 
 
-def _plan(**columns) -> Plan:
+def _plan(**columns):
     n = len(next(iter(columns.values())))
     shard, row = shard_places(n, 3)
     return Plan(
@@ -29,7 +29,7 @@ def _plan(**columns) -> Plan:
     )
 
 
-def _same(a: Plan, b: Plan) -> None:
+def _same(a, b):
     assert list(a.columns) == list(b.columns)
     for name, values in a.columns.items():
         assert values.dtype.kind == b.columns[name].dtype.kind
@@ -46,7 +46,7 @@ def _same(a: Plan, b: Plan) -> None:
     integer=st.integers(-(2**63), 2**63 - 1),
     text=st.text(st.characters(blacklist_categories=("Cc", "Cs")), max_size=8),
 )
-def test_round_trip_is_exact(floats: list[float], integer: int, text: str) -> None:
+def test_round_trip_is_exact(floats, integer, text):
     n = len(floats)
     plan = _plan(
         depth_mm=np.array(floats),
@@ -68,9 +68,7 @@ def test_round_trip_is_exact(floats: list[float], integer: int, text: str) -> No
     depth=st.floats(),
     data=st.data(),
 )
-def test_some_rows_are_those_of_the_whole(
-    texts: list[str], depth: float, data: st.DataObject
-) -> None:
+def test_some_rows_are_those_of_the_whole(texts, depth, data):
     """Line separators that are no control characters (U+2028, U+0085 is one) belong to the text."""
     n = len(texts)
     plan = _plan(
@@ -89,15 +87,13 @@ def test_some_rows_are_those_of_the_whole(
 
 
 @pytest.mark.parametrize(("first", "n_records"), [(0, 0), (2, 3), (4, 1)])
-def test_rows_that_are_not_there_are_refused(
-    tmp_path: Path, first: int, n_records: int
-) -> None:
+def test_rows_that_are_not_there_are_refused(tmp_path, first, n_records):
     (tmp_path / "plan.csv").write_text(plan_text(_plan(label=np.arange(4))))
     with pytest.raises(DatasetError, match="has no records"):
         PlanRows(tmp_path / "plan.csv").records(first, n_records)
 
 
-def test_a_damaged_row_is_refused(tmp_path: Path) -> None:
+def test_a_damaged_row_is_refused(tmp_path):
     (tmp_path / "plan.csv").write_text(plan_text(_plan(label=np.arange(4))))
     lines = (tmp_path / "plan.csv").read_text().splitlines()
     (tmp_path / "plan.csv").write_text(
@@ -111,12 +107,12 @@ def test_a_damaged_row_is_refused(tmp_path: Path) -> None:
         PlanRows(tmp_path / "no.csv")
 
 
-def test_round_trip_check_can_fail() -> None:
+def test_round_trip_check_can_fail():
     with pytest.raises(AssertionError):
         _same(_plan(a=np.array([0.1])), _plan(a=np.array([np.nextafter(0.1, 1)])))
 
 
-def test_values_look_as_promised() -> None:
+def test_values_look_as_promised():
     text = plan_text(
         _plan(
             a=np.array([0.1, 1.0]), b=np.array([3, -4]), c=np.array(["x", 'say "y", z'])
@@ -128,7 +124,7 @@ def test_values_look_as_promised() -> None:
     )
 
 
-def test_text_that_would_come_back_as_numbers_is_refused() -> None:
+def test_text_that_would_come_back_as_numbers_is_refused():
     assert "7" in plan_text(
         _plan(unit_id=np.array(["7", "8"]))
     )  # known to the schema as text
@@ -136,7 +132,7 @@ def test_text_that_would_come_back_as_numbers_is_refused() -> None:
         plan_text(_plan(house=np.array(["7", "8"])))
 
 
-def test_plan_is_immutable_and_pickles() -> None:
+def test_plan_is_immutable_and_pickles():
     values = np.array([1.0, 2.0])
     plan = _plan(a=values)
     values[0] = 9.0  # the caller's array stays the caller's
@@ -148,7 +144,7 @@ def test_plan_is_immutable_and_pickles() -> None:
     _same(plan, pickle.loads(pickle.dumps(plan)))
 
 
-def test_rows_of_shards() -> None:
+def test_rows_of_shards():
     plan = make_plan()
     assert plan.n_records == 36
     assert plan.n_shards == 4
@@ -173,15 +169,13 @@ def test_rows_of_shards() -> None:
         (["a"], [0], [[0]], {}),
     ],
 )
-def test_impossible_plan_is_refused(
-    record_id: list, shard: list, row: list, more: dict
-) -> None:
+def test_impossible_plan_is_refused(record_id, shard, row, more):
     columns = {"record_id": record_id, "shard": shard, "row": row, **more}
     with pytest.raises(DatasetError):
         Plan(columns=columns)
 
 
-def test_a_plan_needs_its_columns() -> None:
+def test_a_plan_needs_its_columns():
     with pytest.raises(DatasetError, match="no column row; every plan needs"):
         Plan(columns={"record_id": ["a"], "shard": [0]})
 
@@ -198,9 +192,7 @@ def test_a_plan_needs_its_columns() -> None:
         ("r000001", '"r000001'),
     ],
 )
-def test_malformed_file_is_refused_in_one_line(
-    tmp_path: Path, old: str, new: str
-) -> None:
+def test_malformed_file_is_refused_in_one_line(tmp_path, old, new):
     path = tmp_path / "plan.csv"
     text = plan_text(_plan(a=np.array([0.5, 1.5])))
     path.write_text(text)
@@ -212,7 +204,7 @@ def test_malformed_file_is_refused_in_one_line(
 
 
 @pytest.mark.parametrize("content", [b"", b"\xff\xfe\x00", b"a\x00b\n"])
-def test_file_that_is_no_table_is_refused(tmp_path: Path, content: bytes) -> None:
+def test_file_that_is_no_table_is_refused(tmp_path, content):
     path = tmp_path / "plan.csv"
     path.write_bytes(content)
     with pytest.raises(DatasetError, match=r"plan\.csv"):

@@ -1,7 +1,6 @@
 """Reading of data sets in plan order, from several processes, finished or not."""
 
 import pickle
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,12 +8,11 @@ from dataset_samples import CLASSES, build, row_of
 
 import gensig.dataset.reader as reader_module
 from gensig.dataset.folder.layout import shard_path
-from gensig.dataset.plan import Plan
 from gensig.dataset.reader import open_dataset
 from gensig.errors import DatasetError
 
 
-def test_facts(folder: Path) -> None:
+def test_facts(folder):
     with open_dataset(str(folder)) as data:
         assert (data.n_records, len(data), data.n_samples) == (36, 36, 200)
         assert data.sampling_rate == pytest.approx(1000.0)
@@ -34,7 +32,7 @@ def test_facts(folder: Path) -> None:
         assert data.usable.all()
 
 
-def test_columns_and_signals_come_in_plan_order(folder: Path, plan: Plan) -> None:
+def test_columns_and_signals_come_in_plan_order(folder, plan):
     with open_dataset(folder) as data:
         for name in ("record_id", "label", "label_name", "params/crack_depth_mm"):
             np.testing.assert_array_equal(data.column(name), plan.columns[name])
@@ -51,7 +49,7 @@ def test_columns_and_signals_come_in_plan_order(folder: Path, plan: Plan) -> Non
         assert data.signals(3).dtype == np.float32
 
 
-def test_few_files_stay_open(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_few_files_stay_open(folder, monkeypatch):
     monkeypatch.setattr(reader_module, "MAX_OPEN_SHARDS", 2)
     with open_dataset(folder) as data:
         for index in (0, 10, 20, 30, 0):
@@ -59,7 +57,7 @@ def test_few_files_stay_open(folder: Path, monkeypatch: pytest.MonkeyPatch) -> N
         assert len(data._files) == 2
 
 
-def test_split(folder: Path, plan: Plan) -> None:
+def test_split(folder, plan):
     with open_dataset(folder) as data:
         split = data.split("by_unit")
         assert list(split) == ["train", "validation", "test"]
@@ -74,7 +72,7 @@ def test_split(folder: Path, plan: Plan) -> None:
         assert sum(map(len, data.split("random_window_leaky").values())) == 8 * 36
 
 
-def test_mistakes_are_one_line(folder: Path) -> None:
+def test_mistakes_are_one_line(folder):
     with open_dataset(folder) as data:
         for call in (
             lambda: data.column("acceleration"),
@@ -93,7 +91,7 @@ def test_mistakes_are_one_line(folder: Path) -> None:
             assert "\n" not in str(caught.value)
 
 
-def test_incomplete_set_is_refused_unless_asked_for(tmp_path: Path, plan: Plan) -> None:
+def test_incomplete_set_is_refused_unless_asked_for(tmp_path, plan):
     folder = build(tmp_path / "a", plan, shards=range(1, 3), close=False, failed=12)
     with pytest.raises(DatasetError, match="2 of 4 shards are done"):
         open_dataset(folder)
@@ -116,7 +114,7 @@ def test_incomplete_set_is_refused_unless_asked_for(tmp_path: Path, plan: Plan) 
         )
 
 
-def test_pickle_drops_open_files(folder: Path) -> None:
+def test_pickle_drops_open_files(folder):
     with open_dataset(folder) as data:
         data.signals(0)
         data.column("label")
@@ -126,7 +124,7 @@ def test_pickle_drops_open_files(folder: Path) -> None:
         copy.close()
 
 
-def test_reading_changes_nothing_and_works_read_only(folder: Path) -> None:
+def test_reading_changes_nothing_and_works_read_only(folder):
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
     for path in folder.rglob("*"):
         path.chmod(0o555 if path.is_dir() else 0o444)
@@ -138,7 +136,7 @@ def test_reading_changes_nothing_and_works_read_only(folder: Path) -> None:
     assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
 
 
-def test_damaged_shard_is_one_line(folder: Path) -> None:
+def test_damaged_shard_is_one_line(folder):
     shard_path(folder, 1).write_bytes(b"no hdf5")
     with (
         open_dataset(folder) as data,
@@ -147,7 +145,7 @@ def test_damaged_shard_is_one_line(folder: Path) -> None:
         data.signals(10)
 
 
-def test_a_protocol_that_is_left_out_is_explained(folder: Path) -> None:
+def test_a_protocol_that_is_left_out_is_explained(folder):
     with open_dataset(folder) as data:
         assert "cross_specimen" not in data.left_out
         assert data.left_out["cross_speed"] == "the plan has no column speed_set_rpm"

@@ -1,7 +1,6 @@
 """Split tables: the leaky protocol, protocols left out, and CSV files."""
 
 import hashlib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +18,7 @@ OLD_DIGESTS = {
 }
 
 
-def test_leaky_protocol_has_every_record_on_several_sides() -> None:
+def test_leaky_protocol_has_every_record_on_several_sides():
     plan = make_plan()
     table = make_splits(plan, 1)["random_window_leaky"]
     for column, n_values in (("record_id", plan.n_records), ("label", 3)):
@@ -42,7 +41,7 @@ def test_leaky_protocol_has_every_record_on_several_sides() -> None:
     )  # scattered
 
 
-def test_protocol_that_lacks_a_class_or_groups_is_left_out() -> None:
+def test_protocol_that_lacks_a_class_or_groups_is_left_out():
     assert set(make_splits(make_plan(n_units=3), 1)) == {
         "random_window_leaky",
         "by_unit",
@@ -61,7 +60,7 @@ def test_protocol_that_lacks_a_class_or_groups_is_left_out() -> None:
     assert set(make_splits(bare, 1)) == {"random_window_leaky"}
 
 
-def test_csv_round_trip_and_header(tmp_path: Path) -> None:
+def test_csv_round_trip_and_header(tmp_path):
     for name, table in make_splits(make_plan(), 5).items():
         path = tmp_path / f"{name}.csv"
         path.write_text(table.to_csv())
@@ -86,14 +85,14 @@ def test_csv_round_trip_and_header(tmp_path: Path) -> None:
         "record_id,start_fraction,stop_fraction,subset\nr0,0,1,train\nr0,0,1\n",
     ],
 )
-def test_malformed_split_is_refused(tmp_path: Path, text: str) -> None:
+def test_malformed_split_is_refused(tmp_path, text):
     path = tmp_path / "by_unit.csv"
     path.write_text(text)
     with pytest.raises(DatasetError, match=r"by_unit\.csv"):
         read_split(path)
 
 
-def test_the_first_three_protocols_keep_their_bits() -> None:
+def test_the_first_three_protocols_keep_their_bits():
     """Digests of the tables of gensig 0.5.0: data sets are compared by them."""
     digests = {
         name: hashlib.sha256(table.to_csv().encode()).hexdigest()[:16]

@@ -17,7 +17,7 @@ RANGES = {
 SEVERITIES = ("unseen_severity_inner", "unseen_severity_outer")
 
 
-def random_plan(seed: int, **fixed: int) -> Plan:
+def random_plan(seed, **fixed):
     """Conditions of units, each with one record a class, cut anywhere; values drawn, in levels, or
     all equal."""
     rng = np.random.default_rng(seed)
@@ -34,7 +34,7 @@ def random_plan(seed: int, **fixed: int) -> Plan:
     ).ravel()[:n]
     shard, row = shard_places(n, 50)
 
-    def draw(low: float, high: float) -> np.ndarray:
+    def draw(low, high):
         values = rng.uniform(low, high, size=n)
         return (values, np.round(4 * values / high) * high / 4, np.full(n, high))[
             rng.integers(3)
@@ -65,11 +65,11 @@ PLANS = [random_plan(seed) for seed in range(60)]
 
 
 @pytest.fixture(scope="module", params=range(len(PLANS)))
-def made(request: pytest.FixtureRequest) -> tuple[Plan, dict[str, SplitTable]]:
+def made(request):
     return PLANS[request.param], make_splits(PLANS[request.param], request.param)
 
 
-def test_random_plans_have_every_protocol_somewhere_and_lack_it_elsewhere() -> None:
+def test_random_plans_have_every_protocol_somewhere_and_lack_it_elsewhere():
     found = [set(make_splits(plan, seed)) for seed, plan in enumerate(PLANS)]
     counts = {name: sum(name in names for names in found) for name in PROTOCOLS}
     assert all(
@@ -79,9 +79,7 @@ def test_random_plans_have_every_protocol_somewhere_and_lack_it_elsewhere() -> N
     ), counts
 
 
-def test_a_protocol_is_made_or_its_lack_explained(
-    made: tuple[Plan, dict[str, SplitTable]],
-) -> None:
+def test_a_protocol_is_made_or_its_lack_explained(made):
     plan, tables = made
     reasons = why_left_out(plan, PLANS.index(plan))
     assert {*tables, *reasons} == set(PROTOCOLS)
@@ -89,7 +87,7 @@ def test_a_protocol_is_made_or_its_lack_explained(
     assert all(reason and "\n" not in reason for reason in reasons.values())
 
 
-def test_nothing_is_on_two_sides(made: tuple[Plan, dict[str, SplitTable]]) -> None:
+def test_nothing_is_on_two_sides(made):
     plan, tables = made
     for name, table in tables.items():
         assert split_problems(name, table, plan) == []
@@ -99,9 +97,7 @@ def test_nothing_is_on_two_sides(made: tuple[Plan, dict[str, SplitTable]]) -> No
             assert sum(map(len, parts)) == len(set.union(*parts))
 
 
-def test_every_class_is_on_every_side_of_a_closed_set(
-    made: tuple[Plan, dict[str, SplitTable]],
-) -> None:
+def test_every_class_is_on_every_side_of_a_closed_set(made):
     plan, tables = made
     classes = set(plan.columns["label"].tolist())
     for name, table in tables.items():
@@ -120,9 +116,7 @@ def test_every_class_is_on_every_side_of_a_closed_set(
             assert train == validation == classes
 
 
-def test_held_out_conditions_lie_beyond_those_of_training(
-    made: tuple[Plan, dict[str, SplitTable]],
-) -> None:
+def test_held_out_conditions_lie_beyond_those_of_training(made):
     plan, tables = made
     for name in set(RANGES) & set(tables):
         train, validation, test = sides(tables[name], plan, RANGES[name])
@@ -132,9 +126,7 @@ def test_held_out_conditions_lie_beyond_those_of_training(
         )
 
 
-def test_held_out_severities_are_in_no_training(
-    made: tuple[Plan, dict[str, SplitTable]],
-) -> None:
+def test_held_out_severities_are_in_no_training(made):
     plan, tables = made
     for name in set(SEVERITIES) & set(tables):
         labels, values = (
@@ -162,7 +154,7 @@ def test_held_out_severities_are_in_no_training(
         assert n_held
 
 
-def test_one_condition_a_unit_loses_no_record() -> None:
+def test_one_condition_a_unit_loses_no_record():
     plan = random_plan(3, n_units=40, n_classes=4, n_records=160)
     speed = np.repeat(np.random.default_rng(0).permutation(40) + 1000.0, 4)
     table = make_splits(Plan(columns={**plan.columns, "speed_set_rpm": speed}), 0)[
@@ -187,16 +179,14 @@ def test_one_condition_a_unit_loses_no_record() -> None:
         (100, 60, 20),
     ],
 )
-def test_ten_units_are_tested_on_where_a_quarter_is_ten(
-    n_units: int, n_train: int, n_tested: int
-) -> None:
+def test_ten_units_are_tested_on_where_a_quarter_is_ten(n_units, n_train, n_tested):
     plan = random_plan(3, n_units=n_units, n_classes=4, n_records=800)
     units = sides(make_splits(plan, 0)["by_unit"], plan, "unit_id")
     sizes = [len(set(part.tolist())) for part in units]
     assert sizes == [n_train, n_units - n_train - n_tested, n_tested]
 
 
-def test_levels_are_held_out_whole() -> None:
+def test_levels_are_held_out_whole():
     plan = random_plan(3, n_units=20, n_classes=2, n_records=400)
     levels = np.array([0.2, 0.3, 0.4, 0.5])
     severity = np.where(
@@ -213,7 +203,7 @@ def test_levels_are_held_out_whole() -> None:
         assert train == validation == set(levels.tolist()) - {held}
 
 
-def test_why_is_precise() -> None:
+def test_why_is_precise():
     plan = random_plan(5, n_units=12, n_classes=2, n_records=100)
     n = plan.n_records
     flat = {
@@ -240,7 +230,7 @@ def test_why_is_precise() -> None:
     assert "healthy_only" not in reasons
 
 
-def test_each_protocol_draws_from_its_own_stream() -> None:
+def test_each_protocol_draws_from_its_own_stream():
     plan = random_plan(7, n_units=24, n_classes=4, n_records=384)
     assert len({protocol.stream for protocol in PROTOCOLS.values()}) == len(PROTOCOLS)
     ones, others = make_splits(plan, 1), make_splits(plan, 2)
@@ -250,7 +240,7 @@ def test_each_protocol_draws_from_its_own_stream() -> None:
     assert all(ones[name].to_csv() != others[name].to_csv() for name in ones)
 
 
-def moved(table: SplitTable, row: int, **change: object) -> SplitTable:
+def moved(table, row, **change):
     """The table with one row more: a copy of another one, changed."""
     columns = {
         name: getattr(table, name)
@@ -261,7 +251,7 @@ def moved(table: SplitTable, row: int, **change: object) -> SplitTable:
     )
 
 
-def test_the_check_finds_what_is_on_two_sides() -> None:
+def test_the_check_finds_what_is_on_two_sides():
     plan = random_plan(7, n_units=24, n_classes=4, n_records=384)
     tables = make_splits(plan, 1)
     table = tables["by_unit"]

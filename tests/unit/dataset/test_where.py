@@ -2,7 +2,6 @@
 
 import os
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +9,6 @@ from dataset_samples import build, row_of, write_shard
 
 import gensig.dataset.reader as reader_module
 from gensig.dataset.folder.layout import shard_path
-from gensig.dataset.plan import Plan
 from gensig.dataset.reader import open_dataset
 from gensig.errors import DatasetError
 
@@ -37,7 +35,7 @@ EVERY = np.arange(36)
         ({"fault": "crack", "label": 0}, []),
     ],
 )
-def test_conditions(folder: Path, conditions: dict, expected: np.ndarray) -> None:
+def test_conditions(folder, conditions, expected):
     with open_dataset(folder) as data:
         chosen = data.where(**conditions)
         np.testing.assert_array_equal(chosen.index, expected)
@@ -47,9 +45,7 @@ def test_conditions(folder: Path, conditions: dict, expected: np.ndarray) -> Non
         )
 
 
-def test_choosing_reads_no_signal(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_choosing_reads_no_signal(folder, monkeypatch):
     monkeypatch.setattr(
         reader_module, "read_signal", lambda *_: pytest.fail("a signal was read")
     )
@@ -60,7 +56,7 @@ def test_choosing_reads_no_signal(
             chosen.signals(0)
 
 
-def test_records_tables_and_arrays(folder: Path, plan: Plan) -> None:
+def test_records_tables_and_arrays(folder, plan):
     with open_dataset(folder) as data:
         chosen = data.where(fault="pitting")
         third = chosen[2]
@@ -93,7 +89,7 @@ def test_records_tables_and_arrays(folder: Path, plan: Plan) -> None:
             data[36]
 
 
-def test_plan_is_a_structured_table(folder: Path, plan: Plan) -> None:
+def test_plan_is_a_structured_table(folder, plan):
     with open_dataset(folder) as data:
         table = data.plan_table
     assert table.dtype.names == tuple(plan.columns)
@@ -121,7 +117,7 @@ def test_plan_is_a_structured_table(folder: Path, plan: Plan) -> None:
         ({"noise_power": 1.0}, "one a record"),
     ],
 )
-def test_mistakes_have_a_hint(folder: Path, conditions: dict, message: str) -> None:
+def test_mistakes_have_a_hint(folder, conditions, message):
     with (
         open_dataset(folder) as data,
         pytest.raises(DatasetError, match=message) as caught,
@@ -130,12 +126,10 @@ def test_mistakes_have_a_hint(folder: Path, conditions: dict, message: str) -> N
     assert "\n" not in str(caught.value)
 
 
-def test_a_shard_is_checked_again_only_when_it_changed(
-    folder: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_shard_is_checked_again_only_when_it_changed(folder, plan, monkeypatch):
     with open_dataset(folder) as data:
         data.signals(10)
-        checks: list[Path] = []
+        checks = []
         whole = reader_module.open_shard
         monkeypatch.setattr(
             reader_module,
@@ -157,7 +151,7 @@ def test_a_shard_is_checked_again_only_when_it_changed(
             data.signals(10)
 
 
-def test_random_access_is_quick(folder: Path) -> None:
+def test_random_access_is_quick(folder):
     """The promise is 1 ms a record; the best of many tries on a busy machine stays below it."""
     with open_dataset(folder) as data:
         data.signals(0)
@@ -169,7 +163,7 @@ def test_random_access_is_quick(folder: Path) -> None:
     assert min(times) < 1e-3
 
 
-def test_missing_shards_meet_no_condition(tmp_path: Path, plan: Plan) -> None:
+def test_missing_shards_meet_no_condition(tmp_path, plan):
     with open_dataset(
         build(tmp_path / "a", plan, shards=range(1, 3), close=False, failed=12),
         allow_incomplete=True,

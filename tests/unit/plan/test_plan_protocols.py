@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from gensig.dataset.plan import Plan
 from gensig.dataset.splitting.protocols import PROTOCOLS, make_splits, why_left_out
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
@@ -18,7 +17,7 @@ DESIGNS = {
 }
 
 
-def planned(*overrides: str) -> Plan:
+def planned(*overrides):
     config = read_request(["experiment=quickstart", *overrides]).config
     if config["plan"]["design"] == "grid":
         for specs in (
@@ -31,7 +30,7 @@ def planned(*overrides: str) -> Plan:
 
 
 @pytest.mark.parametrize("design", DESIGNS)
-def test_unit_condition_and_noise_stay_on_one_side(design: str) -> None:
+def test_unit_condition_and_noise_stay_on_one_side(design):
     plan = planned(*DESIGNS[design])
     tables = make_splits(plan, 0)
     assert {
@@ -58,7 +57,7 @@ def test_unit_condition_and_noise_stay_on_one_side(design: str) -> None:
             )
         )
         for column, values in columns.items():
-            sides: dict[object, set[str]] = {}
+            sides = {}
             for name, value in zip(names, values.tolist(), strict=True):
                 if name in subset:
                     sides.setdefault(value, set()).add(subset[name])
@@ -66,7 +65,7 @@ def test_unit_condition_and_noise_stay_on_one_side(design: str) -> None:
             assert set.union(*sides.values()) == {"train", "validation", "test"}
 
 
-def test_quickstart_has_all_protocols_with_ten_units_to_test_what_is_held_out() -> None:
+def test_quickstart_has_all_protocols_with_ten_units_to_test_what_is_held_out():
     plan = planned()
     tables = make_splits(plan, 0)
     assert set(tables) == set(PROTOCOLS)
@@ -77,7 +76,7 @@ def test_quickstart_has_all_protocols_with_ten_units_to_test_what_is_held_out() 
         assert tested.sum() >= 40
 
 
-def test_a_sham_plan_has_no_severity_to_hold_out_and_keeps_the_others() -> None:
+def test_a_sham_plan_has_no_severity_to_hold_out_and_keeps_the_others():
     sham, real = planned("plan.sham=true"), planned()
     tables = make_splits(sham, 0)
     assert set(PROTOCOLS) - set(tables) == {

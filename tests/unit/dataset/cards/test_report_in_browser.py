@@ -6,9 +6,6 @@ the path, or the one that ``playwright install chromium`` fetches; without them 
 
 import os
 import shutil
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
 
 import pytest
 from dataset_samples import ATTRIBUTES, build, make_plan
@@ -21,7 +18,7 @@ AXIS = "name => document.getElementById('plot-' + name).layout.xaxis.title.text"
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
+def browser():
     playwright = pytest.importorskip("playwright.sync_api", reason="package playwright")
     path = (
         os.environ.get("GENSIG_CHROMIUM")
@@ -40,7 +37,7 @@ def browser() -> Iterator[Any]:
 
 
 @pytest.fixture(scope="module")
-def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def page_file(tmp_path_factory):
     """A page of 36 records and two channels, one of them with a hostile name."""
     attributes = {
         **ATTRIBUTES,
@@ -54,10 +51,8 @@ def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(params=["desktop", "phone", "dark"])
-def page(
-    browser: Any, page_file: Path, request: pytest.FixtureRequest
-) -> Iterator[Any]:
-    options: dict[str, Any] = {
+def page(browser, page_file, request):
+    options = {
         "desktop": {"viewport": {"width": 1280, "height": 900}},
         "phone": {
             "viewport": {"width": 390, "height": 844},
@@ -68,8 +63,8 @@ def page(
     }[request.param]
     context = browser.new_context(**options)
     page = context.new_page()
-    said: list[str] = []
-    asked: list[str] = []
+    said = []
+    asked = []
     page.on("console", lambda message: said.append(message.text))
     page.on("pageerror", lambda error: said.append(str(error)))
     page.on("request", lambda request: asked.append(request.url))
@@ -81,7 +76,7 @@ def page(
     context.close()
 
 
-def test_it_loads_and_fits(page: Any) -> None:
+def test_it_loads_and_fits(page):
     assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
     assert page.evaluate("document.querySelectorAll('.plot .main-svg').length") >= 6
     assert (
@@ -89,7 +84,7 @@ def test_it_loads_and_fits(page: Any) -> None:
     )  # no text became markup
 
 
-def test_legends_are_clear_of_the_toolbar(page: Any) -> None:
+def test_legends_are_clear_of_the_toolbar(page):
     """Below the drawing, whose upper edge leaves room for the toolbar."""
     box = (
         "([plot, part]) => document.querySelector(`#plot-${plot} "
@@ -103,7 +98,7 @@ def test_legends_are_clear_of_the_toolbar(page: Any) -> None:
     assert drawing["top"] - whole["top"] >= 28  # height of the toolbar
 
 
-def test_record_channel_and_comparison(page: Any) -> None:
+def test_record_channel_and_comparison(page):
     form = "#signals-controls"
     for value in ("0", "4"):
         page.select_option(f"{form} [name=record]", value)
@@ -126,7 +121,7 @@ def test_record_channel_and_comparison(page: Any) -> None:
     )
 
 
-def test_axes_marks_and_zoom(page: Any) -> None:
+def test_axes_marks_and_zoom(page):
     """690 Hz of mesh and 23 teeth: the mesh stands at order 23 of the pinion."""
     form = "#signals-controls"
     page.select_option(f"{form} [name=record]", "4")
@@ -163,7 +158,7 @@ def test_axes_marks_and_zoom(page: Any) -> None:
     )
 
 
-def test_parameters_and_indicators(page: Any) -> None:
+def test_parameters_and_indicators(page):
     page.select_option("#parameters-controls [name=column]", "params/crack_depth_mm")
     assert page.evaluate(TRACES, "parameters") == ["crack"]
     page.select_option("#parameters-controls [name=column]", "speed_rpm")

@@ -5,7 +5,6 @@ import hashlib
 import json
 import re
 from html.parser import HTMLParser
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from dataset_samples import ATTRIBUTES, build, make_plan
 
 from gensig.cli import main
 from gensig.dataset.folder.verify import verify as verify_folder
-from gensig.dataset.plan import Plan
 from gensig.dataset.reader import Dataset, open_dataset
 from gensig.errors import ConfigError, DatasetError
 from gensig.report.document import write_report
@@ -30,7 +28,7 @@ HOSTILE = "</script><img src=x onerror=alert(1)>&amp;"
 class Page(HTMLParser):
     """Tags, scripts and words of a page, as a browser reads them."""
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text):
         super().__init__()
         self.text = text
         self.tags: list[tuple[str, dict[str, str | None]]] = []
@@ -39,27 +37,27 @@ class Page(HTMLParser):
         self.inside = ""
         self.feed(text)
 
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+    def handle_starttag(self, tag, attrs):
         self.tags.append((tag, dict(attrs)))
         self.inside = tag
         if tag == "script":
             self.scripts.append((dict(attrs), ""))
 
-    def handle_endtag(self, tag: str) -> None:
+    def handle_endtag(self, tag):
         self.inside = ""
 
-    def handle_data(self, data: str) -> None:
+    def handle_data(self, data):
         if self.inside == "script":
             attributes, before = self.scripts[-1]
             self.scripts[-1] = (attributes, before + data)
         elif self.inside != "style":
             self.words.append(data)
 
-    def all(self, name: str) -> list[dict[str, str | None]]:
+    def all(self, name):
         return [attributes for tag, attributes in self.tags if tag == name]
 
     @property
-    def data(self) -> dict:
+    def data(self):
         (content,) = [
             text
             for attributes, text in self.scripts
@@ -68,12 +66,12 @@ class Page(HTMLParser):
         return json.loads(content)
 
 
-def page_of(folder: Path, out: Path) -> Page:
+def page_of(folder, out):
     path, _said = write_report(folder, out)
     return Page(path.read_text(encoding="utf-8"))
 
 
-def unpack(packed: dict) -> np.ndarray:
+def unpack(packed):
     """Amplitudes as the page's script reads them."""
     counts = np.frombuffer(base64.b64decode(packed["n"]), dtype="u1").astype(float)
     return np.where(
@@ -84,14 +82,14 @@ def unpack(packed: dict) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Page]:
+def made(tmp_path_factory):
     folder = build(
         tmp_path_factory.mktemp("report") / "set", make_plan()
     )  # without a folder of figures
     return folder, page_of(folder, folder.parent / "page.html")
 
 
-def test_the_page_stands_alone(made: tuple[Path, Page]) -> None:
+def test_the_page_stands_alone(made):
     _folder, page = made
     assert len(page.text.encode()) < 7e6
     for tag, attributes in page.tags:
@@ -104,7 +102,7 @@ def test_the_page_stands_alone(made: tuple[Path, Page]) -> None:
     assert "@import" not in style
 
 
-def test_only_its_own_scripts_may_run(made: tuple[Path, Page]) -> None:
+def test_only_its_own_scripts_may_run(made):
     (policy,) = [
         a["content"]
         for a in made[1].all("meta")
@@ -120,7 +118,7 @@ def test_only_its_own_scripts_may_run(made: tuple[Path, Page]) -> None:
     assert hashes == set(policy.split("script-src ")[1].split(";")[0].split())
 
 
-def test_structure(made: tuple[Path, Page]) -> None:
+def test_structure(made):
     page = made[1]
     ids = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
     assert len(ids) == len(set(ids))
@@ -150,7 +148,7 @@ def test_structure(made: tuple[Path, Page]) -> None:
     } <= plots
 
 
-def test_every_option_has_its_data(made: tuple[Path, Page]) -> None:
+def test_every_option_has_its_data(made):
     """Each record, channel, parameter and indicator of the drop-downs is in the data of the
     page."""
     page, data = made[1], made[1].data
@@ -178,7 +176,7 @@ def test_every_option_has_its_data(made: tuple[Path, Page]) -> None:
         )
 
 
-def test_the_signals_are_those_of_the_records(made: tuple[Path, Page]) -> None:
+def test_the_signals_are_those_of_the_records(made):
     data = made[1].data
     with open_dataset(made[0]) as source:
         ids = source.column("record_id").tolist()
@@ -202,7 +200,7 @@ def test_the_signals_are_those_of_the_records(made: tuple[Path, Page]) -> None:
             assert packed["step"] == pytest.approx(frequency[1])
 
 
-def test_of_many_bins_the_largest_is_kept() -> None:
+def test_of_many_bins_the_largest_is_kept():
     from gensig.report.examples import _lines
 
     amplitude = np.full(1001, 1e-3)
@@ -214,12 +212,12 @@ def test_of_many_bins_the_largest_is_kept() -> None:
     assert abs(at - 347 * 0.5) <= packed["step"] / 2
 
 
-def test_a_silent_signal_is_packed() -> None:
+def test_a_silent_signal_is_packed():
     assert not unpack(pack_amplitude(np.zeros(5))).any()
     assert pack_signal(np.zeros(5))["scale"] == 0.0
 
 
-def test_text_of_the_files_is_no_markup(tmp_path: Path) -> None:
+def test_text_of_the_files_is_no_markup(tmp_path):
     attributes = {
         **ATTRIBUTES,
         "channel_names": [HOSTILE, "wheel_y"],
@@ -234,21 +232,17 @@ def test_text_of_the_files_is_no_markup(tmp_path: Path) -> None:
     assert any(HOSTILE in words for words in page.words)
 
 
-def test_the_code_on_the_page_runs(
-    made: tuple[Path, Page], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_code_on_the_page_runs(made, monkeypatch):
     folder, page = made
     (code,) = re.findall(r"<code>(import gensig.*?)</code>", page.text, flags=re.DOTALL)
     code = "".join(Page(code).words).replace("PATH/TO/THIS/FOLDER", str(folder))
-    names: dict = {}
+    names = {}
     exec(compile(code, "page", "exec"), names)
     assert len(names["mine"]) == 12
     assert names["signal"].shape == (2, 200)
 
 
-def test_sound_records_of_the_same_machine_stand_beside(
-    made: tuple[Path, Page],
-) -> None:
+def test_sound_records_of_the_same_machine_stand_beside(made):
     with open_dataset(made[0]) as data:
         chosen = choose(data, None)
         assert {
@@ -272,7 +266,7 @@ def test_sound_records_of_the_same_machine_stand_beside(
         )
 
 
-def test_what_does_not_fit_is_left_out_and_said(made: tuple[Path, Page]) -> None:
+def test_what_does_not_fit_is_left_out_and_said(made):
     with open_dataset(made[0]) as data:
         chosen = choose(data, 30)
         assert chosen.n_signals <= 140
@@ -283,14 +277,14 @@ def test_what_does_not_fit_is_left_out_and_said(made: tuple[Path, Page]) -> None
         assert "of 40 channels" in chosen.remark
 
 
-def test_few_of_many_records_are_of_all_classes(made: tuple[Path, Page]) -> None:
+def test_few_of_many_records_are_of_all_classes(made):
     """Classes are dealt in turn, so that every k-th record could be of one class alone."""
     with open_dataset(made[0]) as data:
         some = some_records(data, 12)
         assert np.bincount(data.column("label")[some]).tolist() == [4, 4, 4]
 
 
-def test_frequencies_of_a_geared_engine() -> None:
+def test_frequencies_of_a_geared_engine():
     """A shaft that is none of the gears' is a reference of its own; a gear that turns with the
     crank is not."""
     rotation = Rotation(
@@ -317,9 +311,7 @@ def test_frequencies_of_a_geared_engine() -> None:
     assert [name for name, _ in same.references] == ["pinion", "wheel", "mesh"]
 
 
-def test_the_page_in_the_folder_leaves_the_set_whole(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_page_in_the_folder_leaves_the_set_whole(tmp_path, capsys):
     folder = build(tmp_path / "set", make_plan(), failed=4)
     assert main(["report", str(folder), "--records", "1"]) == 0
     assert "3 records shown, 35 measured" in capsys.readouterr().out
@@ -329,7 +321,7 @@ def test_the_page_in_the_folder_leaves_the_set_whole(
     assert not list(folder.glob(".*report*"))
 
 
-def _shorten(folder: Path) -> None:
+def _shorten(folder):
     shard = folder / "shards" / "shard-00001.h5"
     shard.write_bytes(shard.read_bytes()[:3000])
 
@@ -352,9 +344,7 @@ DAMAGE = {
 
 
 @pytest.mark.parametrize("damage", DAMAGE)
-def test_a_damaged_set_is_one_clear_line(
-    tmp_path: Path, plan: Plan, damage: str
-) -> None:
+def test_a_damaged_set_is_one_clear_line(tmp_path, plan, damage):
     folder = build(tmp_path / "set", plan)
     harm, named = DAMAGE[damage]
     harm(folder)
@@ -364,9 +354,7 @@ def test_a_damaged_set_is_one_clear_line(
     assert not (tmp_path / "page.html").exists()
 
 
-def test_an_incomplete_set_and_bad_options_are_refused(
-    tmp_path: Path, plan: Plan
-) -> None:
+def test_an_incomplete_set_and_bad_options_are_refused(tmp_path, plan):
     begun = build(tmp_path / "begun", plan, shards=range(1), close=False)
     with pytest.raises(DatasetError, match="gensig resume"):
         write_report(begun, tmp_path / "page.html")
@@ -376,9 +364,7 @@ def test_an_incomplete_set_and_bad_options_are_refused(
         write_report(begun, tmp_path / "nowhere" / "page.html")
 
 
-def test_values_that_are_not_finite_are_refused(
-    made: tuple[Path, Page], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_values_that_are_not_finite_are_refused(made, monkeypatch):
     read = Dataset.signals
     monkeypatch.setattr(
         Dataset,
@@ -389,7 +375,7 @@ def test_values_that_are_not_finite_are_refused(
         write_report(made[0], made[0].parent / "other.html")
 
 
-def test_it_opens_on_a_healthy_record(made: tuple[Path, Page]) -> None:
+def test_it_opens_on_a_healthy_record(made):
     page = made[1]
     (number,) = [
         int(a["value"])
@@ -399,9 +385,7 @@ def test_it_opens_on_a_healthy_record(made: tuple[Path, Page]) -> None:
     assert page.data["examples"][number]["class"] == "healthy"
 
 
-def test_a_fault_of_all_teeth_has_no_frequency_of_its_own(
-    made: tuple[Path, Page],
-) -> None:
+def test_a_fault_of_all_teeth_has_no_frequency_of_its_own(made):
     with open_dataset(made[0]) as data:
         before = read_rotation(data)
         faulty = np.flatnonzero(data.column("label") > 0)
@@ -412,7 +396,7 @@ def test_a_fault_of_all_teeth_has_no_frequency_of_its_own(
         assert read_rotation(data).fault_gear(faulty[0]) == ""
 
 
-def test_velocity_of_a_tone_is_its_acceleration_over_its_frequency() -> None:
+def test_velocity_of_a_tone_is_its_acceleration_over_its_frequency():
     time = np.arange(51200) / 51200.0
     tones = np.stack(
         [3.0 * np.sin(2 * np.pi * f * time + 0.3) for f in (100.25, 950.5, 5.0, 1500.0)]
@@ -429,9 +413,7 @@ def test_velocity_of_a_tone_is_its_acceleration_over_its_frequency() -> None:
     assert velocity_rms(faded[None], 51200.0)[0] < 1e-6
 
 
-def test_levels_are_stated_in_g_and_mm_s_and_loud_ones_are_named(
-    made: tuple[Path, Page],
-) -> None:
+def test_levels_are_stated_in_g_and_mm_s_and_loud_ones_are_named(made):
     with open_dataset(made[0]) as data:
         measured = Measured(
             records=np.arange(2),

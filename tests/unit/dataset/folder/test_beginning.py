@@ -2,8 +2,6 @@
 
 import os
 import signal
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 from dataset_samples import CONFIG, make_plan
@@ -17,7 +15,7 @@ from gensig.errors import DatasetError
 CHANGES = ("mkdir", "replace", "unlink", "fsync", "rename")
 
 
-def begin(out: Path) -> None:
+def begin(out):
     identity = identity_hash(CONFIG, "0.1.0")
     create_folder(
         out,
@@ -30,17 +28,17 @@ def begin(out: Path) -> None:
     )
 
 
-def killed_before(number: int, work: Callable[[], None]) -> bool:
+def killed_before(number, work):
     """Do the work in a process of its own that is killed before its change of this number; False if
     it has fewer."""
     process = os.fork()
     if process == 0:
         left = [number]
 
-        def deadly(name: str) -> Callable:
+        def deadly(name):
             real = getattr(os, name)
 
-            def change(*words: object, **options: object) -> object:
+            def change(*words, **options):
                 if left[0] == 0:
                     os.kill(os.getpid(), signal.SIGKILL)
                 left[0] -= 1
@@ -58,7 +56,7 @@ def killed_before(number: int, work: Callable[[], None]) -> bool:
     return os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGKILL
 
 
-def files(folder: Path) -> dict[str, bytes]:
+def files(folder):
     return {
         str(path.relative_to(folder)): path.read_bytes()
         for path in folder.rglob("*")
@@ -67,9 +65,7 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("exists", [False, True])
-def test_killed_at_every_change_it_is_no_data_set_and_is_begun_anew(
-    tmp_path: Path, exists: bool
-) -> None:
+def test_killed_at_every_change_it_is_no_data_set_and_is_begun_anew(tmp_path, exists):
     begin(tmp_path / "whole")
     whole = files(tmp_path / "whole")
     number, refused, finished = 0, 0, 0
@@ -111,9 +107,7 @@ def test_killed_at_every_change_it_is_no_data_set_and_is_begun_anew(
 @pytest.mark.parametrize(
     "name", ["mine.txt", "shards/mine.h5", "splits/mine.txt", "splits/deep/mine.csv"]
 )
-def test_a_killed_beginning_that_holds_anything_else_is_not_touched(
-    tmp_path: Path, name: str
-) -> None:
+def test_a_killed_beginning_that_holds_anything_else_is_not_touched(tmp_path, name):
     begin(tmp_path / "set")
     (tmp_path / "set" / "manifest.json").unlink()
     (tmp_path / "set" / BEGINNING).touch()
@@ -126,16 +120,14 @@ def test_a_killed_beginning_that_holds_anything_else_is_not_touched(
     assert files(tmp_path / "set") == before
 
 
-def test_files_of_a_data_set_without_its_manifest_are_not_touched(
-    tmp_path: Path,
-) -> None:
+def test_files_of_a_data_set_without_its_manifest_are_not_touched(tmp_path):
     begin(tmp_path / "set")
     (tmp_path / "set" / "manifest.json").unlink()
     with pytest.raises(DatasetError, match="not empty"):
         begin(tmp_path / "set")
 
 
-def test_two_processes_do_not_begin_the_same_folder(tmp_path: Path) -> None:
+def test_two_processes_do_not_begin_the_same_folder(tmp_path):
     """The second waits for the first, and then finds a data set."""
     out = tmp_path / "set"
     for _ in range(5):

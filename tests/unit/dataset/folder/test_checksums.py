@@ -11,7 +11,6 @@ from dataset_samples import build, make_plan
 
 from gensig.dataset.folder.manifest import finalize
 from gensig.dataset.folder.verify import verify
-from gensig.dataset.plan import Plan
 from gensig.dataset.storage.checksums import accept_edits, read_checksums
 from gensig.errors import DatasetError
 
@@ -32,7 +31,7 @@ FILES = (
 
 
 @pytest.fixture(scope="module")
-def logged(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def logged(tmp_path_factory):
     """A data set with everything that a run leaves in it."""
     folder = build(tmp_path_factory.mktemp("logged") / "set", make_plan(), close=False)
     (folder / "run.log").write_text("begun\n")
@@ -44,12 +43,12 @@ def logged(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def with_log(logged: Path, tmp_path: Path) -> Path:
+def with_log(logged, tmp_path):
     """The same, to be damaged."""
     return shutil.copytree(logged, tmp_path / "logged")
 
 
-def test_every_file_is_listed_as_sha256sum_does(with_log: Path) -> None:
+def test_every_file_is_listed_as_sha256sum_does(with_log):
     found = {
         str(path.relative_to(with_log))
         for path in with_log.rglob("*")
@@ -73,9 +72,7 @@ def test_every_file_is_listed_as_sha256sum_does(with_log: Path) -> None:
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_a_flipped_byte_anywhere_is_found_and_its_file_named(
-    with_log: Path, name: str
-) -> None:
+def test_a_flipped_byte_anywhere_is_found_and_its_file_named(with_log, name):
     path = with_log / name
     content = path.read_bytes()
     n = len(content)
@@ -97,7 +94,7 @@ def test_a_flipped_byte_anywhere_is_found_and_its_file_named(
 
 @pytest.mark.parametrize("name", FILES)
 @pytest.mark.parametrize("quick", [False, True])
-def test_a_missing_file_is_named(with_log: Path, name: str, quick: bool) -> None:
+def test_a_missing_file_is_named(with_log, name, quick):
     (with_log / name).unlink()
     if name == "manifest.json":
         with pytest.raises(DatasetError, match=r"no manifest\.json"):
@@ -109,7 +106,7 @@ def test_a_missing_file_is_named(with_log: Path, name: str, quick: bool) -> None
     )
 
 
-def test_environment_cannot_be_rewritten(with_log: Path) -> None:
+def test_environment_cannot_be_rewritten(with_log):
     content = json.loads((with_log / "manifest.json").read_text())
     content["environment"]["numpy"] = "9.9.9"
     (with_log / "manifest.json").write_text(json.dumps(content, indent=1) + "\n")
@@ -120,12 +117,12 @@ def test_environment_cannot_be_rewritten(with_log: Path) -> None:
         )
 
 
-def test_an_extra_figure_is_named(with_log: Path) -> None:
+def test_an_extra_figure_is_named(with_log):
     (with_log / "figures" / "7-foreign.png").write_bytes(b"x")
     assert any("7-foreign.png" in line for line in verify(with_log).problems)
 
 
-def test_hand_written_words_are_accepted_when_asked(with_log: Path) -> None:
+def test_hand_written_words_are_accepted_when_asked(with_log):
     assert accept_edits(with_log) == []
     with (with_log / "README.md").open("a") as card:
         card.write("\nOur rig has a loose bolt.\n")
@@ -141,7 +138,7 @@ def test_hand_written_words_are_accepted_when_asked(with_log: Path) -> None:
 @pytest.mark.parametrize(
     "name", ["manifest.json", "run.log", "figures/0-healthy.png", "SHA256SUMS"]
 )
-def test_nothing_else_is_accepted(with_log: Path, name: str) -> None:
+def test_nothing_else_is_accepted(with_log, name):
     content = bytearray((with_log / name).read_bytes())
     content[-2] ^= 1
     (with_log / name).write_bytes(content)
@@ -150,13 +147,13 @@ def test_nothing_else_is_accepted(with_log: Path, name: str) -> None:
     assert not verify(with_log).complete
 
 
-def test_a_card_that_is_gone_is_not_accepted(with_log: Path) -> None:
+def test_a_card_that_is_gone_is_not_accepted(with_log):
     (with_log / "README.md").unlink()
     with pytest.raises(DatasetError, match=r"README\.md is missing"):
         accept_edits(with_log)
 
 
-def test_checksums_that_are_gone_are_written_when_asked(with_log: Path) -> None:
+def test_checksums_that_are_gone_are_written_when_asked(with_log):
     before = (with_log / "SHA256SUMS").read_bytes()
     (with_log / "SHA256SUMS").unlink()
     assert any(
@@ -167,7 +164,7 @@ def test_checksums_that_are_gone_are_written_when_asked(with_log: Path) -> None:
     assert (with_log / "SHA256SUMS").read_bytes() == before
 
 
-def test_an_incomplete_set_has_nothing_to_accept(tmp_path: Path, plan: Plan) -> None:
+def test_an_incomplete_set_has_nothing_to_accept(tmp_path, plan):
     with pytest.raises(DatasetError, match="incomplete"):
         accept_edits(build(tmp_path / "a", plan, close=False))
 
@@ -181,7 +178,7 @@ def test_an_incomplete_set_has_nothing_to_accept(tmp_path: Path, plan: Plan) -> 
         "0" * 64 + " README.md",
     ],
 )
-def test_forged_lines_are_refused(with_log: Path, line: str) -> None:
+def test_forged_lines_are_refused(with_log, line):
     with (with_log / "SHA256SUMS").open("a") as file:
         file.write(line + "\n")
     with pytest.raises(DatasetError, match="none of a data set"):

@@ -4,7 +4,6 @@ import json
 import multiprocessing
 import os
 import subprocess
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -23,11 +22,11 @@ from gensig.dataset.folder.manifest import (
     record_shard,
     stored_config,
 )
-from gensig.dataset.plan import Plan, read_plan
+from gensig.dataset.plan import read_plan
 from gensig.errors import DatasetError
 
 
-def _create(out: Path, plan: Plan, **changes) -> None:
+def _create(out, plan, **changes):
     given = {
         "config": CONFIG,
         "overrides": [],
@@ -40,7 +39,7 @@ def _create(out: Path, plan: Plan, **changes) -> None:
     )
 
 
-def _tree(folder: Path) -> dict[str, bytes]:
+def _tree(folder):
     return {
         str(p.relative_to(folder)): p.read_bytes()
         for p in sorted(folder.rglob("*"))
@@ -48,7 +47,7 @@ def _tree(folder: Path) -> dict[str, bytes]:
     }
 
 
-def test_identity_covers_what_decides_the_bits() -> None:
+def test_identity_covers_what_decides_the_bits():
     base = identity_hash(CONFIG, "0.1.0")
     assert identity_hash(dict(reversed(CONFIG.items())), "0.1.0") == base
     for key in ("out", "executor", "verbosity"):
@@ -62,11 +61,11 @@ def test_identity_covers_what_decides_the_bits() -> None:
         identity_hash({"a": object()}, "0.1.0")
 
 
-def with_backend(name: str) -> dict:
+def with_backend(name):
     return CONFIG | {"solver": {"oversampling": 5, "backend": name}}
 
 
-def test_a_key_that_came_after_0_9_counts_only_where_it_is_not_at_its_default() -> None:
+def test_a_key_that_came_after_0_9_counts_only_where_it_is_not_at_its_default():
     """A folder that was begun without the key goes on, and is another data set than one of another
     backend."""
     before = CONFIG | {"solver": {"oversampling": 5}}
@@ -82,7 +81,7 @@ def test_a_key_that_came_after_0_9_counts_only_where_it_is_not_at_its_default() 
     assert differing_keys(before, with_backend("other")) == ["solver.backend"]
 
 
-def test_folder_holds_what_is_needed(folder: Path, plan: Plan) -> None:
+def test_folder_holds_what_is_needed(folder, plan):
     assert set(_tree(folder)) == {
         "config.yaml",
         "overrides.yaml",
@@ -115,7 +114,7 @@ def test_folder_holds_what_is_needed(folder: Path, plan: Plan) -> None:
     assert read_plan(folder / "plan.csv").n_records == plan.n_records
 
 
-def test_two_runs_are_byte_equal(tmp_path: Path, plan: Plan) -> None:
+def test_two_runs_are_byte_equal(tmp_path, plan):
     first, second = (_tree(build(tmp_path / name, plan)) for name in ("a", "b"))
     different = {name for name in first if first[name] != second[name]}
     assert different <= {
@@ -126,7 +125,7 @@ def test_two_runs_are_byte_equal(tmp_path: Path, plan: Plan) -> None:
     }  # times and the folder's name
 
 
-def test_existing_folder_is_not_touched(tmp_path: Path, plan: Plan) -> None:
+def test_existing_folder_is_not_touched(tmp_path, plan):
     used = tmp_path / "used"
     used.mkdir()
     (used / "mine.txt").write_text("keep")
@@ -140,10 +139,8 @@ def test_existing_folder_is_not_touched(tmp_path: Path, plan: Plan) -> None:
     assert not read_manifest(tmp_path / "empty").is_complete
 
 
-def test_failure_while_creating_leaves_nothing(
-    tmp_path: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def full_disk(*_: object) -> None:
+def test_failure_while_creating_leaves_nothing(tmp_path, plan, monkeypatch):
+    def full_disk(*_):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("gensig.dataset.storage.atomic.publish", full_disk)
@@ -152,15 +149,13 @@ def test_failure_while_creating_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_identity_of_another_configuration_is_refused(
-    tmp_path: Path, plan: Plan
-) -> None:
+def test_identity_of_another_configuration_is_refused(tmp_path, plan):
     with pytest.raises(DatasetError, match="does not belong"):
         _create(tmp_path / "a", plan, identity="0" * 64)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_unfinished_set_cannot_be_closed(tmp_path: Path, plan: Plan) -> None:
+def test_unfinished_set_cannot_be_closed(tmp_path, plan):
     folder = build(tmp_path / "a", plan, shards=range(3), close=False)
     with pytest.raises(DatasetError, match="3 of 4 shards are done"):
         finalize(folder)
@@ -178,17 +173,17 @@ def test_unfinished_set_cannot_be_closed(tmp_path: Path, plan: Plan) -> None:
     assert not read_manifest(folder).is_complete
 
 
-def test_closed_set_takes_no_more_shards(folder: Path) -> None:
+def test_closed_set_takes_no_more_shards(folder):
     finalize(folder)  # twice is harmless
     with pytest.raises(DatasetError, match="closed"):
         record_shard(folder, 0, "0" * 64, 1, 0)
 
 
-def _record(folder: Path, shard: int) -> None:
+def _record(folder, shard):
     record_shard(folder, shard, f"{shard:064d}", 10 + shard, 0)
 
 
-def test_processes_do_not_overwrite_each_other(tmp_path: Path) -> None:
+def test_processes_do_not_overwrite_each_other(tmp_path):
     folder = build(
         tmp_path / "a",
         make_plan(n_records=24, records_per_shard=1),
@@ -205,9 +200,7 @@ def test_processes_do_not_overwrite_each_other(tmp_path: Path) -> None:
     )
 
 
-def test_index_shows_all_shards_from_any_folder_and_nan_for_a_missing_one(
-    folder: Path,
-) -> None:
+def test_index_shows_all_shards_from_any_folder_and_nan_for_a_missing_one(folder):
     shard_path(folder, 1).unlink()
     code = (
         "import h5py, sys; f = h5py.File(sys.argv[1], locking=False); a = "
@@ -225,7 +218,7 @@ def test_index_shows_all_shards_from_any_folder_and_nan_for_a_missing_one(
     assert run.stdout.strip() == "(36, 2, 200) r000035 True True -1 (36,)"
 
 
-def test_index_sources_are_relative(folder: Path) -> None:
+def test_index_sources_are_relative(folder):
     with h5py.File(folder / "index.h5") as file:
         sources = [s.file_name for s in file["acceleration"].virtual_sources()]
         assert sources == [f"shards/shard-0000{i}.h5" for i in range(4)]
@@ -233,7 +226,7 @@ def test_index_sources_are_relative(folder: Path) -> None:
         assert file.attrs["sampling_rate_hz"] == pytest.approx(1000.0)
 
 
-def _damage(content: dict, path: list, value: object) -> None:
+def _damage(content, path, value):
     for key in path[:-1]:
         content = content[key]
     content[path[-1]] = value
@@ -261,9 +254,7 @@ def _damage(content: dict, path: list, value: object) -> None:
         (["identity"], "short", "sha256"),
     ],
 )
-def test_forged_manifest_is_refused_in_one_line(
-    folder: Path, path: list, value: object, message: str
-) -> None:
+def test_forged_manifest_is_refused_in_one_line(folder, path, value, message):
     content = json.loads((folder / "manifest.json").read_text())
     _damage(content, path, value)
     (folder / "manifest.json").write_text(json.dumps(content))
@@ -275,7 +266,7 @@ def test_forged_manifest_is_refused_in_one_line(
 @pytest.mark.parametrize(
     "text", ["", "{", "[]", "null", "[" * 100_000, '{"schema_version": 1}', "\0"]
 )
-def test_manifest_that_is_none_is_refused(folder: Path, text: str) -> None:
+def test_manifest_that_is_none_is_refused(folder, text):
     (folder / "manifest.json").write_text(text)
     with pytest.raises(DatasetError, match=r"manifest\.json"):
         read_manifest(folder)
@@ -292,7 +283,7 @@ def test_manifest_that_is_none_is_refused(folder: Path, text: str) -> None:
         "a: " + "[" * 20_000,
     ],
 )
-def test_configuration_that_is_not_plain_is_refused(folder: Path, text: str) -> None:
+def test_configuration_that_is_not_plain_is_refused(folder, text):
     (folder / "config.yaml").write_text(text)
     with pytest.raises(DatasetError, match=r"config\.yaml"):
         read_config(folder)

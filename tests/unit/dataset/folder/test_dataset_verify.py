@@ -2,8 +2,6 @@
 
 import os
 import shutil
-from collections.abc import Callable
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -24,13 +22,13 @@ from gensig.dataset.plan import Plan, plan_text, read_plan
 from gensig.errors import DatasetError
 
 
-def _flip(path: Path, offset: int) -> None:
+def _flip(path, offset):
     content = bytearray(path.read_bytes())
     content[offset] ^= 1
     path.write_bytes(content)
 
 
-def test_whole_set_passes(folder: Path) -> None:
+def test_whole_set_passes(folder):
     result = verify(folder)
     assert result.problems == []
     assert result.complete
@@ -38,13 +36,13 @@ def test_whole_set_passes(folder: Path) -> None:
     assert verify(folder, quick=True).complete
 
 
-def test_failed_record_is_counted_not_hidden(tmp_path: Path, plan: Plan) -> None:
+def test_failed_record_is_counted_not_hidden(tmp_path, plan):
     result = verify(build(tmp_path / "a", plan, failed=12))
     assert result.complete
     assert result.n_failed == 1
 
 
-def test_split_with_a_unit_on_two_sides_is_found(folder: Path) -> None:
+def test_split_with_a_unit_on_two_sides_is_found(folder):
     path = folder / "splits" / "by_unit.csv"
     header, first, *others = path.read_text().splitlines(keepends=True)
     record, _, subset = first.strip().partition(",0,1,")
@@ -67,9 +65,7 @@ def test_split_with_a_unit_on_two_sides_is_found(folder: Path) -> None:
     ]
 
 
-def test_truncated_swapped_extra_and_foreign_shards_are_named(
-    folder: Path, tmp_path: Path
-) -> None:
+def test_truncated_swapped_extra_and_foreign_shards_are_named(folder, tmp_path):
     path = shard_path(folder, 3)
     path.write_bytes(path.read_bytes()[:-10])
     _swap(shard_path(folder, 0), shard_path(folder, 1))
@@ -87,8 +83,8 @@ def test_truncated_swapped_extra_and_foreign_shards_are_named(
     )
 
 
-def test_quick_reads_no_record(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(path: Path, **_: object) -> str:
+def test_quick_reads_no_record(folder, monkeypatch):
+    def refuse(path, **_):
         raise AssertionError(f"{path} was read")
 
     monkeypatch.setattr("gensig.dataset.folder.verify.open_shard", refuse)
@@ -103,15 +99,13 @@ def test_quick_reads_no_record(folder: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert "shard-00001.h5 is not the recorded file" in problem
 
 
-def _swap(a: Path, b: Path) -> None:
+def _swap(a, b):
     content = a.read_bytes()
     shutil.copyfile(b, a)
     b.write_bytes(content)
 
 
-def test_foreign_shard_is_found_even_when_the_manifest_agrees(
-    folder: Path, tmp_path: Path
-) -> None:
+def test_foreign_shard_is_found_even_when_the_manifest_agrees(folder, tmp_path):
     other = tmp_path / "other.h5"
     plan = make_plan()
     renamed = Plan(
@@ -144,12 +138,12 @@ def test_foreign_shard_is_found_even_when_the_manifest_agrees(
         (lambda file: file.__delitem__("torque_nm"), "no data set torque_nm"),
     ],
 )
-def test_forged_content_is_found(folder: Path, change: Callable, message: str) -> None:
+def test_forged_content_is_found(folder, change, message):
     assert forge(folder, 2, lambda file: None) == ""  # forging alone changes nothing
     assert message in forge(folder, 2, change)
 
 
-def test_altered_plan_and_identity_are_found(folder: Path) -> None:
+def test_altered_plan_and_identity_are_found(folder):
     plan = read_plan(folder / "plan.csv")
     label = plan.columns["label"].copy()
     label[5] = 0
@@ -164,9 +158,7 @@ def test_altered_plan_and_identity_are_found(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("n_shards", [0, 2, 4])
-def test_interrupted_set_never_looks_whole(
-    tmp_path: Path, plan: Plan, n_shards: int
-) -> None:
+def test_interrupted_set_never_looks_whole(tmp_path, plan, n_shards):
     folder = build(tmp_path / "a", plan, shards=range(n_shards), close=False)
     for quick in (False, True):
         result = verify(folder, quick=quick)
@@ -178,7 +170,7 @@ def test_interrupted_set_never_looks_whole(
     assert "incomplete" in inspect(folder)
 
 
-def test_folder_that_is_no_datasetting(tmp_path: Path) -> None:
+def test_folder_that_is_no_datasetting(tmp_path):
     for path in (tmp_path, tmp_path / "none"):
         with pytest.raises(DatasetError, match="no gensig data set"):
             verify(path)
@@ -187,15 +179,13 @@ def test_folder_that_is_no_datasetting(tmp_path: Path) -> None:
         verify(tmp_path)
 
 
-def test_linked_shards_outside_the_folder_are_refused(
-    folder: Path, tmp_path: Path
-) -> None:
+def test_linked_shards_outside_the_folder_are_refused(folder, tmp_path):
     (folder / "shards").rename(tmp_path / "elsewhere")
     (folder / "shards").symlink_to(tmp_path / "elsewhere")
     assert any("leads out" in problem for problem in verify(folder).problems)
 
 
-def test_inspect_shows_what_is_there(folder: Path, tmp_path: Path) -> None:
+def test_inspect_shows_what_is_there(folder, tmp_path):
     text = inspect(folder)
     for part in (
         "complete",
@@ -230,7 +220,7 @@ def test_inspect_shows_what_is_there(folder: Path, tmp_path: Path) -> None:
             inspect(bad)
 
 
-def test_card_states_facts_and_escapes(tmp_path: Path) -> None:
+def test_card_states_facts_and_escapes(tmp_path):
     plan = make_plan()
     evil = "<script>|`*"
     units = np.where(plan.columns["label"] == 1, evil, plan.columns["label_name"])

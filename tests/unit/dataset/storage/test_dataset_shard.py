@@ -17,7 +17,7 @@ from gensig.errors import DatasetError
 
 
 @pytest.mark.parametrize("compression", ["none", "gzip", "lzf", "blosc2"])
-def test_what_goes_in_comes_out(tmp_path: Path, compression: str) -> None:
+def test_what_goes_in_comes_out(tmp_path, compression):
     plan = make_plan()
     path = tmp_path / "a.h5"
     writer = write_shard(path, plan, compression=compression)
@@ -36,7 +36,7 @@ def test_what_goes_in_comes_out(tmp_path: Path, compression: str) -> None:
         assert np.isnan(file["integration_error"][...]).all()
 
 
-def test_bytes_depend_neither_on_time_nor_name_nor_order(tmp_path: Path) -> None:
+def test_bytes_depend_neither_on_time_nor_name_nor_order(tmp_path):
     plan = make_plan()
     first = write_shard(tmp_path / "a.h5", plan).sha256
     time.sleep(1.1)  # HDF5 time stamps have a resolution of 1 s
@@ -49,10 +49,10 @@ def test_bytes_depend_neither_on_time_nor_name_nor_order(tmp_path: Path) -> None
     assert write_shard(tmp_path / "d.h5", make_plan(n_classes=2)).sha256 != first
 
 
-def test_exception_leaves_nothing(tmp_path: Path) -> None:
+def test_exception_leaves_nothing(tmp_path):
     writer = writer_of(tmp_path / "a.h5")
 
-    def crash() -> None:
+    def crash():
         with writer:
             writer.write(0, *row_of(make_plan(), 0))
             raise KeyboardInterrupt
@@ -62,10 +62,10 @@ def test_exception_leaves_nothing(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_unwritten_row_is_refused_and_leaves_nothing(tmp_path: Path) -> None:
+def test_unwritten_row_is_refused_and_leaves_nothing(tmp_path):
     plan = make_plan()
 
-    def write_one() -> None:
+    def write_one():
         with writer_of(tmp_path / "a.h5", 2) as w:
             w.write(0, *row_of(plan, 0))
 
@@ -76,7 +76,7 @@ def test_unwritten_row_is_refused_and_leaves_nothing(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_failed_record_keeps_its_parameters(tmp_path: Path) -> None:
+def test_failed_record_keeps_its_parameters(tmp_path):
     writer = write_shard(tmp_path / "a.h5", make_plan(), failed=4)
     assert writer.n_failed == 1
     with open_shard(tmp_path / "a.h5") as file:
@@ -101,9 +101,7 @@ def test_failed_record_keeps_its_parameters(tmp_path: Path) -> None:
         ({"params/unknown": 3.0}, "not declared"),
     ],
 )
-def test_value_that_does_not_fit_is_refused(
-    tmp_path: Path, change: dict, message: str
-) -> None:
+def test_value_that_does_not_fit_is_refused(tmp_path, change, message):
     signals, values = row_of(make_plan(), 0)
     with (
         writer_of(tmp_path / "a.h5") as writer,
@@ -115,7 +113,7 @@ def test_value_that_does_not_fit_is_refused(
             writer.write(0, signals, values)
 
 
-def test_missing_column_and_bad_signals_are_refused(tmp_path: Path) -> None:
+def test_missing_column_and_bad_signals_are_refused(tmp_path):
     signals, values = row_of(make_plan(), 0)
     not_finite = signals["acceleration"].copy()
     not_finite[0, 3] = np.inf
@@ -154,9 +152,7 @@ def test_missing_column_and_bad_signals_are_refused(tmp_path: Path) -> None:
         {"attributes": ATTRIBUTES | {"schema_version": 2}},
     ],
 )
-def test_declaration_that_could_not_be_read_back_is_refused(
-    tmp_path: Path, change: dict
-) -> None:
+def test_declaration_that_could_not_be_read_back_is_refused(tmp_path, change):
     with pytest.raises(DatasetError):
         writer_of(tmp_path / "a.h5", **change)
 
@@ -164,25 +160,23 @@ def test_declaration_that_could_not_be_read_back_is_refused(
 @pytest.mark.parametrize(
     "value", [{"a": 1}, None, ["a", 1, None], "a\0b", "x" * 70_000]
 )
-def test_attribute_that_would_not_come_back_is_refused(
-    tmp_path: Path, value: object
-) -> None:
+def test_attribute_that_would_not_come_back_is_refused(tmp_path, value):
     writer = writer_of(tmp_path / "a.h5", attributes=ATTRIBUTES | {"odd": value})
     with pytest.raises(DatasetError, match="odd"):
         writer.__enter__()
     assert list(tmp_path.iterdir()) == []
 
 
-def _replace(name: str, **declaration) -> object:
-    def change(file: h5py.File) -> None:
+def _replace(name, **declaration):
+    def change(file):
         del file[name]
         file.create_dataset(name, **declaration)
 
     return change
 
 
-def _attribute(name: str, value: object) -> object:
-    def change(file: h5py.File) -> None:
+def _attribute(name, value):
+    def change(file):
         file.attrs[name] = value
 
     return change
@@ -238,7 +232,7 @@ def _attribute(name: str, value: object) -> object:
         ),
     ],
 )
-def test_stranger_is_refused(tmp_path: Path, change, message: str) -> None:
+def test_stranger_is_refused(tmp_path, change, message):
     path = tmp_path / "a.h5"
     write_shard(path, make_plan())
     open_shard(path).close()
@@ -248,7 +242,7 @@ def test_stranger_is_refused(tmp_path: Path, change, message: str) -> None:
         open_shard(path)
 
 
-def test_unknown_column_is_ignored(tmp_path: Path) -> None:
+def test_unknown_column_is_ignored(tmp_path):
     path = tmp_path / "a.h5"
     write_shard(path, make_plan())
     with h5py.File(path, "r+") as file:
@@ -256,7 +250,7 @@ def test_unknown_column_is_ignored(tmp_path: Path) -> None:
     open_shard(path).close()
 
 
-def test_link_out_of_the_folder_is_refused(tmp_path: Path) -> None:
+def test_link_out_of_the_folder_is_refused(tmp_path):
     (tmp_path / "in").mkdir()
     write_shard(tmp_path / "a.h5", make_plan())
     (tmp_path / "in" / "a.h5").symlink_to(tmp_path / "a.h5")
@@ -265,7 +259,7 @@ def test_link_out_of_the_folder_is_refused(tmp_path: Path) -> None:
         open_shard(tmp_path / "in" / "a.h5", folder=tmp_path / "in")
 
 
-def test_no_hdf5_and_truncated_are_one_line(tmp_path: Path) -> None:
+def test_no_hdf5_and_truncated_are_one_line(tmp_path):
     path = tmp_path / "a.h5"
     write_shard(path, make_plan())
     path.write_bytes(path.read_bytes()[:-1000])
@@ -292,9 +286,7 @@ except DatasetError as error:
 
 
 @pytest.mark.parametrize(("limit", "fits"), [(20_000, False), (10_000_000, True)])
-def test_full_disk_is_one_line_and_leaves_nothing(
-    tmp_path: Path, limit: int, fits: bool
-) -> None:
+def test_full_disk_is_one_line_and_leaves_nothing(tmp_path, limit, fits):
     command = [sys.executable, "-c", FULL_DISK, str(tmp_path), str(limit)]
     run = subprocess.run(
         command,
@@ -309,10 +301,8 @@ def test_full_disk_is_one_line_and_leaves_nothing(
     assert fits or "cannot write" in run.stderr
 
 
-def test_exception_while_renaming_leaves_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def interrupt(*_: object) -> None:
+def test_exception_while_renaming_leaves_nothing(tmp_path, monkeypatch):
+    def interrupt(*_):
         assert len(list(tmp_path.iterdir())) == 1  # the temporary file is there
         raise KeyboardInterrupt
 
@@ -322,7 +312,7 @@ def test_exception_while_renaming_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_reason_becomes_ascii_and_is_cut(tmp_path: Path) -> None:
+def test_a_reason_becomes_ascii_and_is_cut(tmp_path):
     signals, values = row_of(make_plan(), 0, status="failed")
     with writer_of(tmp_path / "a.h5") as writer:
         writer.write(0, signals, values | {"status_reason": "gap of 3 µm " + "x" * 300})

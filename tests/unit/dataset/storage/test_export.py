@@ -3,7 +3,6 @@
 import csv
 import json
 import weakref
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -18,7 +17,6 @@ import gensig.dataset.exports.export_tables as tables_module
 from gensig.cli import main
 from gensig.dataset.exports.export import FORMATS, export
 from gensig.dataset.folder.layout import shard_path
-from gensig.dataset.plan import Plan
 from gensig.dataset.reader import Dataset, open_dataset
 from gensig.dataset.storage.attributes import read_attributes
 from gensig.dataset.storage.guard import open_shard, read_rows
@@ -28,22 +26,20 @@ NAMES = {"hdf5": "all.h5", "parquet": "all.parquet", "npz": "all.npz", "wav": "a
 
 
 @pytest.fixture(scope="module", params=["float32", "int16"])
-def stored(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Path:
+def stored(request, tmp_path_factory):
     """A data set with a failed record and clean signals, in both ways to store samples."""
     out = tmp_path_factory.mktemp("stored") / "set"
     return build(out, make_plan(), failed=12, clean=True, sample_type=request.param)
 
 
-def _signals(folder: Path, name: str = "acceleration") -> np.ndarray:
+def _signals(folder, name="acceleration"):
     with open_dataset(folder) as data:
         return np.stack(
             [data.signals(index, name=name) for index in range(data.n_records)]
         )
 
 
-def _columns(folder: Path) -> dict[str, np.ndarray]:
+def _columns(folder):
     with open_dataset(folder) as data:
         return {
             name: data.column(name)
@@ -52,7 +48,7 @@ def _columns(folder: Path) -> dict[str, np.ndarray]:
         }
 
 
-def test_hdf5_is_one_shard_in_physical_units(stored: Path, tmp_path: Path) -> None:
+def test_hdf5_is_one_shard_in_physical_units(stored, tmp_path):
     out = tmp_path / "all.h5"
     made = export(stored, "hdf5", out)
     assert made == {"records": 36, "files": 1, "bytes": out.stat().st_size}
@@ -72,7 +68,7 @@ def test_hdf5_is_one_shard_in_physical_units(stored: Path, tmp_path: Path) -> No
             ]
 
 
-def test_npz_needs_no_pickle(stored: Path, tmp_path: Path) -> None:
+def test_npz_needs_no_pickle(stored, tmp_path):
     out = tmp_path / "all.npz"
     export(stored, "npz", out)
     with np.load(out, allow_pickle=False) as arrays:
@@ -89,9 +85,7 @@ def test_npz_needs_no_pickle(stored: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("samples", [False, True])
-def test_parquet(
-    stored: Path, tmp_path: Path, samples: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_parquet(stored, tmp_path, samples, monkeypatch):
     monkeypatch.setattr(tables_module, "ROW_GROUP_BYTES", 3 * 2 * 2 * 200 * 4)
     out = tmp_path / "all.parquet"
     export(stored, "parquet", out, samples=samples)
@@ -115,7 +109,7 @@ def test_parquet(
 
 
 @pytest.mark.parametrize("one_channel", [False, True])
-def test_wav(stored: Path, tmp_path: Path, one_channel: bool) -> None:
+def test_wav(stored, tmp_path, one_channel):
     out = tmp_path / "all"
     made = export(stored, "wav", out, one_channel=one_channel)
     signals = _signals(stored)
@@ -142,8 +136,8 @@ def test_wav(stored: Path, tmp_path: Path, one_channel: bool) -> None:
 
 @pytest.mark.parametrize("to", FORMATS)
 def test_nothing_is_overwritten_and_nothing_half_written(
-    folder: Path, tmp_path: Path, to: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    folder, tmp_path, to, monkeypatch
+):
     taken = tmp_path / "taken"
     taken.write_text("mine")
     with pytest.raises(DatasetError, match="exists and is left alone"):
@@ -158,9 +152,7 @@ def test_nothing_is_overwritten_and_nothing_half_written(
     assert {path.name for path in tmp_path.iterdir()} == before
 
 
-def test_a_full_disk_is_said_before_anything_is_written(
-    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_is_said_before_anything_is_written(folder, tmp_path, monkeypatch):
     usage = type("Usage", (), {"free": 36 * 2 * 200 * 4 - 1})
     monkeypatch.setattr(export_module.shutil, "disk_usage", lambda _path: usage)
     with pytest.raises(DatasetError, match="57600 bytes and 57599 are free"):
@@ -178,9 +170,7 @@ def test_a_full_disk_is_said_before_anything_is_written(
         ("--to npz --one-channel --out OUT/x", "'one_channel' to wav"),
     ],
 )
-def test_mistakes_are_one_line(
-    folder: Path, capsys: pytest.CaptureFixture[str], words: str, message: str
-) -> None:
+def test_mistakes_are_one_line(folder, capsys, words, message):
     arguments = words.replace("OUT", str(folder.parent)).split()
     assert main(["export", str(folder), *arguments]) == 2
     error = capsys.readouterr().err
@@ -188,15 +178,13 @@ def test_mistakes_are_one_line(
     assert error.count("\n") == 1
 
 
-def test_the_command_names_what_it_wrote(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_names_what_it_wrote(folder, tmp_path, capsys):
     out = str(tmp_path / "x.npz")
     assert main(["export", str(folder), "--to", "npz", "--out", out]) == 0
     assert "36 records as npz, 1 file(s)" in capsys.readouterr().out
 
 
-def test_a_foreign_plan_names_no_file(folder: Path, tmp_path: Path) -> None:
+def test_a_foreign_plan_names_no_file(folder, tmp_path):
     """Ids become file names, so that a shard cannot choose where a wav file goes."""
     with h5py.File(shard_path(folder, 0), "r+") as file:
         file["record_id"][0] = b"../../evil"
@@ -205,9 +193,7 @@ def test_a_foreign_plan_names_no_file(folder: Path, tmp_path: Path) -> None:
     assert not list(tmp_path.rglob("evil*"))
 
 
-def test_incomplete_sets_and_odd_rates_are_refused(
-    tmp_path: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_incomplete_sets_and_odd_rates_are_refused(tmp_path, plan, monkeypatch):
     with pytest.raises(DatasetError, match="is incomplete"):
         export(build(tmp_path / "a", plan, close=False), "npz", tmp_path / "x.npz")
     monkeypatch.setitem(ATTRIBUTES, "sampling_rate_hz", 1000.5)
@@ -218,13 +204,11 @@ def test_incomplete_sets_and_odd_rates_are_refused(
 
 
 @pytest.mark.parametrize("to", FORMATS)
-def test_few_records_are_in_memory_at_once(
-    folder: Path, tmp_path: Path, to: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_few_records_are_in_memory_at_once(folder, tmp_path, to, monkeypatch):
     monkeypatch.setattr(tables_module, "ROW_GROUP_BYTES", 3 * 2 * 200 * 4)
     read, alive, most = Dataset.signals, set(), [0]
 
-    def watched(*arguments: object, **options: object) -> np.ndarray:
+    def watched(*arguments, **options):
         signal = read(*arguments, **options)
         alive.add(id(signal))
         weakref.finalize(signal, alive.discard, id(signal))

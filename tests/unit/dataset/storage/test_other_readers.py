@@ -11,13 +11,12 @@ import pytest
 from dataset_samples import build, make_plan, row_of
 
 from gensig.dataset.folder.layout import shard_path
-from gensig.dataset.plan import Plan
 
 FORMAT = (Path(__file__).parents[4] / "docs" / "format.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture(autouse=True)
-def _offline(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _offline(tmp_path, monkeypatch):
     """`datasets` keeps what it read in the test's own folder."""
     monkeypatch.setattr(datasets.config, "HF_DATASETS_CACHE", tmp_path / "cache")
     monkeypatch.setattr(datasets.config, "HF_HUB_OFFLINE", True)
@@ -25,9 +24,7 @@ def _offline(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("sample_type", ["float32", "int16"])
-def test_hugging_face_example_of_the_format(
-    tmp_path: Path, plan: Plan, sample_type: str
-) -> None:
+def test_hugging_face_example_of_the_format(tmp_path, plan, sample_type):
     """The example in docs/format.md runs, and gives every record of every shard."""
     folder = build(tmp_path / "set", plan, sample_type=sample_type)
     (code,) = [
@@ -35,7 +32,7 @@ def test_hugging_face_example_of_the_format(
         for example in re.findall(r"```python\n(.*?)```", FORMAT, re.DOTALL)
         if "load_dataset" in example
     ]
-    names: dict = {}
+    names = {}
     exec(code.replace("DIR", str(folder)), names)
     records = names["records"]
     assert len(records) == 36
@@ -50,7 +47,7 @@ def test_hugging_face_example_of_the_format(
     np.testing.assert_array_equal(records["label"][:], plan.columns["label"])
 
 
-def test_hugging_face_takes_the_folder_by_its_card(folder: Path) -> None:
+def test_hugging_face_takes_the_folder_by_its_card(folder):
     """The front matter of README.md says where the records are, so that splits and index are no
     records."""
     records = datasets.load_dataset(str(folder), split="train")
@@ -59,7 +56,7 @@ def test_hugging_face_takes_the_folder_by_its_card(folder: Path) -> None:
     assert np.array(records[7]["acceleration"]).shape == (2, 200)
 
 
-def test_pandas(folder: Path, plan: Plan) -> None:
+def test_pandas(folder, plan):
     """The example in docs/format.md: every column with one value a record becomes one of a
     frame."""
     (code,) = [
@@ -67,7 +64,7 @@ def test_pandas(folder: Path, plan: Plan) -> None:
         for example in re.findall(r"```python\n(.*?)```", FORMAT, re.DOTALL)
         if "pandas" in example
     ]
-    names: dict = {}
+    names = {}
     exec(code.replace("DIR", str(folder)), names)
     frame = names["labels"]
     assert isinstance(frame, pandas.DataFrame)
@@ -79,7 +76,7 @@ def test_pandas(folder: Path, plan: Plan) -> None:
 
 
 @pytest.mark.parametrize("sample_type", ["float32", "int16"])
-def test_types_are_those_old_programs_know(tmp_path: Path, sample_type: str) -> None:
+def test_types_are_those_old_programs_know(tmp_path, sample_type):
     """MATLAB and Octave are not run here: what their HDF5 readers cannot take is looked for in the
     file itself."""
     folder = build(
@@ -92,7 +89,7 @@ def test_types_are_those_old_programs_know(tmp_path: Path, sample_type: str) -> 
         path.read_bytes()[8] == 0
     )  # superblock version 0, which every HDF5 library reads
     with h5py.File(path, locking=False) as file:
-        found: list[str] = []
+        found = []
         file.visititems(
             lambda name, item: (
                 found.append(name) if isinstance(item, h5py.Dataset) else None
@@ -141,7 +138,7 @@ def test_types_are_those_old_programs_know(tmp_path: Path, sample_type: str) -> 
         assert layout in (h5py.h5d.CONTIGUOUS, h5py.h5d.COMPACT)
 
 
-def test_text_is_read_the_way_octave_asks_for_it(folder: Path, plan: Plan) -> None:
+def test_text_is_read_the_way_octave_asks_for_it(folder, plan):
     """Octave's `load` wants every text as NUL-terminated ASCII and gives up at the first that
     cannot be had so."""
     with h5py.File(shard_path(folder, 0), locking=False) as file:
@@ -164,7 +161,7 @@ def test_text_is_read_the_way_octave_asks_for_it(folder: Path, plan: Plan) -> No
         )
 
 
-def test_utf8_text_could_not_be_read_that_way(tmp_path: Path) -> None:
+def test_utf8_text_could_not_be_read_that_way(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["text"] = np.array([b"crack"], dtype=h5py.string_dtype("utf-8", 8))
         wanted = h5py.h5t.C_S1.copy()

@@ -5,8 +5,6 @@ import multiprocessing
 import os
 import shutil
 import sys
-from collections.abc import Callable
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -26,8 +24,7 @@ import gensig.dataset.storage.shard as shard_module
 from gensig.cli import main
 from gensig.dataset.folder.layout import shard_path
 from gensig.dataset.folder.verify import inspect, verify
-from gensig.dataset.plan import Plan
-from gensig.dataset.reader import Dataset, open_dataset
+from gensig.dataset.reader import open_dataset
 from gensig.dataset.schema import SAMPLE_TYPES, SCALES
 from gensig.dataset.storage.compression import COMPRESSIONS, compression_of
 from gensig.dataset.storage.guard import open_shard
@@ -41,7 +38,7 @@ SCALE = "acceleration_scale"
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def whole(tmp_path_factory):
     """A set of int16 with blosc2, a failed record and signals without noise; read only."""
     out = tmp_path_factory.mktemp("whole") / "set"
     return build(
@@ -54,20 +51,18 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
 
 
-def expected(index: int) -> np.ndarray:
+def expected(index):
     return row_of(make_plan(), index)[0]["acceleration"]
 
 
-def bound(signal: np.ndarray) -> np.ndarray:
+def bound(signal):
     """Half a count of the channel's peak and the rounding of float32, (channel, sample)."""
     count = np.abs(signal).max(axis=-1, keepdims=True).astype(float) / 32767
     return HALF_COUNT * count + np.finfo(np.float32).eps * np.abs(signal)
 
 
 @pytest.mark.parametrize("peak", [3e38, 1e4, 1.0, 1e-12, 1e-30, 1e-40, 1.5e-45])
-def test_quantization_uses_the_whole_range_and_errs_by_half_a_count(
-    peak: float,
-) -> None:
+def test_quantization_uses_the_whole_range_and_errs_by_half_a_count(peak):
     rng = np.random.default_rng(1)
     signal = rng.normal(size=(3, 5000))
     signal = (signal / np.abs(signal).max(axis=1, keepdims=True) * peak).astype(
@@ -87,7 +82,7 @@ def test_quantization_uses_the_whole_range_and_errs_by_half_a_count(
         ).all()  # the bound is no looser than it must be
 
 
-def test_quantization_of_zero_constant_and_not_finite_channels() -> None:
+def test_quantization_of_zero_constant_and_not_finite_channels():
     signal = np.zeros((5, 4), np.float32)
     signal[1] = -3.0
     signal[2, 1] = np.nan
@@ -101,9 +96,7 @@ def test_quantization_of_zero_constant_and_not_finite_channels() -> None:
 
 
 @pytest.mark.parametrize(("compression", "sample_type"), WAYS)
-def test_every_way_gives_the_signals_back(
-    tmp_path: Path, plan: Plan, compression: str, sample_type: str
-) -> None:
+def test_every_way_gives_the_signals_back(tmp_path, plan, compression, sample_type):
     path = tmp_path / "a.h5"
     write_shard(
         path,
@@ -145,9 +138,7 @@ def test_every_way_gives_the_signals_back(
 
 @pytest.mark.parametrize("sample_type", SAMPLE_TYPES)
 @pytest.mark.parametrize("status", ["ok", "failed"])
-def test_silent_and_failed_shards_are_read(
-    tmp_path: Path, sample_type: str, status: str
-) -> None:
+def test_silent_and_failed_shards_are_read(tmp_path, sample_type, status):
     """Blosc2 stores a constant record in so few bytes that it looks like a bomb."""
     plan, shape, path = make_plan(n_records=2), (2, 60_000), tmp_path / "a.h5"
     storage = {"compression": "blosc2", "sample_type": sample_type}
@@ -162,9 +153,7 @@ def test_silent_and_failed_shards_are_read(
     np.testing.assert_array_equal(found, np.full(shape, value))
 
 
-def test_failed_record_keeps_the_channels_that_are_finite(
-    tmp_path: Path, plan: Plan
-) -> None:
+def test_failed_record_keeps_the_channels_that_are_finite(tmp_path, plan):
     signals, values = row_of(plan, 0, status="failed")
     signals["acceleration"][1, 7] = np.inf
     shapes = {name: array.shape for name, array in signals.items()}
@@ -181,8 +170,8 @@ def test_failed_record_keeps_the_channels_that_are_finite(
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
 def test_bytes_of_int16_depend_on_the_input_alone(
-    tmp_path: Path, plan: Plan, compression: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    tmp_path, plan, compression, monkeypatch
+):
     kept = {"compression": compression, "sample_type": "int16"}
     first = write_shard(tmp_path / "a.h5", plan, **kept).sha256
     monkeypatch.setenv(
@@ -201,7 +190,7 @@ def test_bytes_of_int16_depend_on_the_input_alone(
     assert write_shard(tmp_path / "d.h5", plan, compression=compression).sha256 != first
 
 
-def test_reader_gives_physical_values(whole: Path) -> None:
+def test_reader_gives_physical_values(whole):
     with open_dataset(whole) as data:
         assert (data.sample_type, data.compression) == ("int16", "blosc2")
         for index in (0, 9, 10, 35):
@@ -223,9 +212,7 @@ def test_reader_gives_physical_values(whole: Path) -> None:
         assert data.usable.sum() == 35
 
 
-def test_index_holds_counts_and_scales_of_all_shards(
-    whole: Path, tmp_path: Path
-) -> None:
+def test_index_holds_counts_and_scales_of_all_shards(whole, tmp_path):
     copy = shutil.copytree(whole, tmp_path / "set")
     shard_path(copy, 3).unlink()
     with (
@@ -244,7 +231,7 @@ def test_index_holds_counts_and_scales_of_all_shards(
     assert np.isfinite(physical[:FAILED]).all()
 
 
-def test_descriptions_name_the_scale(whole: Path, folder: Path) -> None:
+def test_descriptions_name_the_scale(whole, folder):
     text = inspect(whole)
     assert "acceleration (2, 200) float32, m/s^2" in text
     assert "int16 with a scale, compression blosc2" in text
@@ -258,12 +245,12 @@ def test_descriptions_name_the_scale(whole: Path, folder: Path) -> None:
     assert "int16" not in (folder / "README.md").read_text()
 
 
-def _first_sample(data: Dataset, index: int) -> float:
+def _first_sample(data, index):
     return float(data.signals(index)[0, 0])
 
 
 @pytest.mark.parametrize("method", ["fork", "spawn"])
-def test_other_processes_read_blosc2(whole: Path, method: str) -> None:
+def test_other_processes_read_blosc2(whole, method):
     """A file that is open here is opened anew, with its filter, in another process."""
     with open_dataset(whole) as data:
         work = [(data, index) for index in (0, 14, 24, 35)]
@@ -273,11 +260,11 @@ def test_other_processes_read_blosc2(whole: Path, method: str) -> None:
         assert [_first_sample(*words) for words in work] == here
 
 
-def _without_scale(file: h5py.File) -> None:
+def _without_scale(file):
     del file["acceleration_scale"]
 
 
-def _narrow_scale(file: h5py.File) -> None:
+def _narrow_scale(file):
     scale = file["acceleration_scale"][:, :1]
     del file["acceleration_scale"]
     file["acceleration_scale"] = scale
@@ -306,15 +293,13 @@ def _narrow_scale(file: h5py.File) -> None:
         ),
     ],
 )
-def test_verify_finds_a_scale_that_is_none(
-    whole: Path, tmp_path: Path, change: Callable, message: str
-) -> None:
+def test_verify_finds_a_scale_that_is_none(whole, tmp_path, change, message):
     folder = shutil.copytree(whole, tmp_path / "set")
     assert forge(folder, 1, lambda file: None) == ""  # forging alone changes nothing
     assert message in forge(folder, 1, change)
 
 
-def test_verify_looks_at_signals_without_noise_too(tmp_path: Path, plan: Plan) -> None:
+def test_verify_looks_at_signals_without_noise_too(tmp_path, plan):
     folder = build(tmp_path / "set", plan, clean=True)
     assert forge(folder, 1, lambda file: None) == ""
     assert "row 4: acceleration_clean is not finite" in forge(
@@ -322,7 +307,7 @@ def test_verify_looks_at_signals_without_noise_too(tmp_path: Path, plan: Plan) -
     )
 
 
-def test_reader_refuses_a_scale_that_is_none(whole: Path, tmp_path: Path) -> None:
+def test_reader_refuses_a_scale_that_is_none(whole, tmp_path):
     folder = shutil.copytree(whole, tmp_path / "set")
     forge(folder, 1, setting(SCALE, (4, 1), 0.0))
     with open_dataset(folder) as data:
@@ -331,9 +316,7 @@ def test_reader_refuses_a_scale_that_is_none(whole: Path, tmp_path: Path) -> Non
             data.signals(14)
 
 
-def test_missing_plugin_is_one_line(
-    whole: Path, tmp_path: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_missing_plugin_is_one_line(whole, tmp_path, plan, monkeypatch):
     monkeypatch.setitem(sys.modules, "hdf5plugin", None)
     for use in (
         lambda: write_shard(tmp_path / "a.h5", plan, compression="blosc2"),
@@ -354,9 +337,7 @@ def test_missing_plugin_is_one_line(
     assert verify(tmp_path / "gzip").complete
 
 
-def test_blosc2_bombs_are_refused(
-    tmp_path: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_blosc2_bombs_are_refused(tmp_path, plan, monkeypatch):
     path = tmp_path / "a.h5"
     write_shard(path, plan, compression="blosc2")
     with h5py.File(path, "r+") as file:
@@ -393,9 +374,7 @@ SMALL = (
 )
 
 
-def test_generated_int16_is_the_float32_set_but_for_half_a_count(
-    tmp_path: Path,
-) -> None:
+def test_generated_int16_is_the_float32_set_but_for_half_a_count(tmp_path):
     ways = {
         "plain": (),
         "small": ("dataset.sample_type=int16", "dataset.compression=blosc2"),
@@ -441,12 +420,8 @@ def test_generated_int16_is_the_float32_set_but_for_half_a_count(
     ],
 )
 def test_generate_refuses_before_it_touches_anything(
-    tmp_path: Path,
-    word: str,
-    message: str,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    tmp_path, word, message, monkeypatch, capsys
+):
     monkeypatch.setitem(sys.modules, "hdf5plugin", None)
     assert main(["generate", "--quiet", *SMALL, word, f"out={tmp_path / 'set'}"]) != 0
     told = capsys.readouterr().err
