@@ -11,6 +11,7 @@ from gensig.dataset.splitting.protocols import make_splits
 from gensig.dataset.splitting.splits import SUBSETS, read_split
 from gensig.errors import DatasetError
 
+HEADER = "record_id,start_fraction,stop_fraction,subset\n"
 OLD_DIGESTS = {
     "random_window_leaky": "672ec8f53ae644fb",
     "by_unit": "960f6bfc3b8dfc14",
@@ -24,40 +25,27 @@ def test_leaky_protocol_has_every_record_on_several_sides():
     for column, n_values in (("record_id", plan.n_records), ("label", 3)):
         parts = [set(side.tolist()) for side in sides(table, plan, column)]
         assert sum(map(len, parts)) > len(set.union(*parts)) == n_values
-    assert len(table.record_id) == 8 * plan.n_records
-    first = table.record_id == "r000000"
-    np.testing.assert_array_equal(table.start_fraction[first], np.arange(8) / 8)
-    np.testing.assert_array_equal(table.stop_fraction[first], np.arange(1, 9) / 8)
-    shares = [float(np.mean(table.subset == subset)) for subset in SUBSETS]
+    subset = table.subset.reshape(plan.n_records, 8)
+    starts = table.start_fraction.reshape(subset.shape)
+    assert (starts == np.arange(8) / 8).all()
+    np.testing.assert_array_equal(table.stop_fraction, table.start_fraction + 1 / 8)
+    shares = [np.mean(subset == name) for name in SUBSETS]
     np.testing.assert_allclose(shares, [0.6, 0.2, 0.2], rtol=0, atol=0.06)
-    assert (
-        len(
-            {
-                tuple(table.subset[table.record_id == r])
-                for r in plan.columns["record_id"]
-            }
-        )
-        > 10
-    )  # scattered
+    assert len(set(map(tuple, subset.tolist()))) > 10  # scattered
 
 
 def test_protocol_that_lacks_a_class_or_groups_is_left_out():
-    assert set(make_splits(make_plan(n_units=3), 1)) == {
-        "random_window_leaky",
-        "by_unit",
-        "cross_gearbox",
-    }
-    assert set(make_splits(make_plan(n_units=2), 1)) == {"random_window_leaky"}
-    plan = make_plan(n_units=6)
-    one_unit_only = np.where(plan.columns["unit_id"] == "u0", 2, 0)
-    poor = Plan(columns={**plan.columns, "label": one_unit_only})
-    assert set(make_splits(poor, 1)) == {"random_window_leaky"}
-    bare = Plan(
-        columns={
-            name: plan.columns[name] for name in ("record_id", "shard", "row", "label")
-        }
-    )
-    assert set(make_splits(bare, 1)) == {"random_window_leaky"}
+    by_unit = {"by_unit", "cross_gearbox"}
+    columns = make_plan().columns
+    one_unit_only = np.where(columns["unit_id"] == "u0", 2, 0)
+    bare = {name: columns[name] for name in ("record_id", "shard", "row", "label")}
+    for plan, names in (
+        (make_plan(n_units=3), by_unit),
+        (make_plan(n_units=2), set()),
+        (Plan(columns={**columns, "label": one_unit_only}), set()),
+        (Plan(columns=bare), set()),
+    ):
+        assert set(make_splits(plan, 1)) == {"random_window_leaky", *names}
 
 
 def test_csv_round_trip_and_header(tmp_path):
@@ -67,9 +55,8 @@ def test_csv_round_trip_and_header(tmp_path):
         back = read_split(path)
         for field in ("record_id", "start_fraction", "stop_fraction", "subset"):
             np.testing.assert_array_equal(getattr(back, field), getattr(table, field))
-    lines = (tmp_path / "by_unit.csv").read_text().splitlines()
-    assert lines[0] == "record_id,start_fraction,stop_fraction,subset"
-    assert lines[1].startswith("r000000,0,1,")
+    text = (tmp_path / "by_unit.csv").read_text()
+    assert text.startswith(f"{HEADER}r000000,0,1,")
 
 
 @pytest.mark.parametrize(
@@ -77,12 +64,12 @@ def test_csv_round_trip_and_header(tmp_path):
     [
         "",
         "record_id,subset\nr0,train\n",
-        "record_id,start_fraction,stop_fraction,subset\n",
-        "record_id,start_fraction,stop_fraction,subset\nr0,0,1,exam\n",
-        "record_id,start_fraction,stop_fraction,subset\nr0,0.5,0.5,train\n",
-        "record_id,start_fraction,stop_fraction,subset\nr0,0,nan,train\n",
-        "record_id,start_fraction,stop_fraction,subset\nr0,0,1\n",
-        "record_id,start_fraction,stop_fraction,subset\nr0,0,1,train\nr0,0,1\n",
+        HEADER,
+        f"{HEADER}r0,0,1,exam\n",
+        f"{HEADER}r0,0.5,0.5,train\n",
+        f"{HEADER}r0,0,nan,train\n",
+        f"{HEADER}r0,0,1\n",
+        f"{HEADER}r0,0,1,train\nr0,0,1\n",
     ],
 )
 def test_malformed_split_is_refused(tmp_path, text):

@@ -34,54 +34,46 @@ def stored(request, tmp_path_factory):
 
 def _signals(folder, name="acceleration"):
     with open_dataset(folder) as data:
-        return np.stack(
-            [data.signals(index, name=name) for index in range(data.n_records)]
-        )
+        return np.stack([data.signals(index, name=name) for index in range(36)])
 
 
 def _columns(folder):
     with open_dataset(folder) as data:
-        return {
-            name: data.column(name)
-            for name in data.column_names
-            if not name.endswith("_scale")
-        }
+        names = [name for name in data.column_names if not name.endswith("_scale")]
+        return {name: data.column(name) for name in names}
+
+
+def _check_arrays(found, stored):
+    """Signals and columns are those of the data set, in physical units."""
+    for name in ("acceleration", "acceleration_clean"):
+        np.testing.assert_array_equal(found[name][...], _signals(stored, name))
+        assert found[name].dtype == np.float32
+    for name, values in _columns(stored).items():
+        np.testing.assert_array_equal(found[name][...], values)
 
 
 def test_hdf5_is_one_shard_in_physical_units(stored, tmp_path):
     out = tmp_path / "all.h5"
     made = export(stored, "hdf5", out)
     assert made == {"records": 36, "files": 1, "bytes": out.stat().st_size}
-    with open_shard(out) as file:
+    shard_file = shard_path(stored, 0)
+    with open_shard(out) as file, h5py.File(shard_file, locking=False) as shard:
         assert read_attributes(file) == {"schema_version": 1, **ATTRIBUTES}
         assert "acceleration_scale" not in file
-        for name in ("acceleration", "acceleration_clean"):
-            assert file[name].dtype == np.float32
-            np.testing.assert_array_equal(file[name][...], _signals(stored, name))
         assert file["acceleration"].attrs["unit"] == b"m/s^2"
-        for name, values in _columns(stored).items():
-            np.testing.assert_array_equal(read_rows(file[name]), values)
-        with h5py.File(shard_path(stored, 0), locking=False) as shard:
-            columns = list(_columns(stored))
-            assert [file[name].dtype for name in columns] == [
-                shard[name].dtype for name in columns
-            ]
+        columns = {name: read_rows(file[name]) for name in _columns(stored)}
+        _check_arrays({**file, **columns}, stored)
+        for name in columns:
+            assert file[name].dtype == shard[name].dtype
 
 
 def test_npz_needs_no_pickle(stored, tmp_path):
     out = tmp_path / "all.npz"
     export(stored, "npz", out)
     with np.load(out, allow_pickle=False) as arrays:
-        np.testing.assert_array_equal(arrays["acceleration"], _signals(stored))
-        np.testing.assert_array_equal(
-            arrays["acceleration_clean"], _signals(stored, "acceleration_clean")
-        )
-        for name, values in _columns(stored).items():
-            np.testing.assert_array_equal(arrays[name], values)
-        assert json.loads(str(arrays["attributes_json"])) == {
-            "schema_version": 1,
-            **ATTRIBUTES,
-        }
+        _check_arrays(arrays, stored)
+        attributes = json.loads(str(arrays["attributes_json"]))
+    assert attributes == {"schema_version": 1, **ATTRIBUTES}
 
 
 @pytest.mark.parametrize("samples", [False, True])
@@ -91,53 +83,43 @@ def test_parquet(stored, tmp_path, samples, monkeypatch):
     export(stored, "parquet", out, samples=samples)
     frame = pandas.read_parquet(out)
     for name, values in _columns(stored).items():
-        np.testing.assert_array_equal(
-            np.stack(frame[name].to_numpy()) if values.ndim > 1 else frame[name], values
-        )
+        np.testing.assert_array_equal(frame[name].tolist(), values.tolist())
     assert ("acceleration" in frame) is samples
     if samples:
-        found = np.array(frame["acceleration"].tolist()).tolist()
-        np.testing.assert_array_equal(
-            np.stack([np.stack(row) for row in found]), _signals(stored)
-        )
+        found = [np.stack(channels) for channels in frame["acceleration"]]
+        np.testing.assert_array_equal(found, _signals(stored))
     file = parquet.ParquetFile(out)
     assert file.schema_arrow.field("speed_rpm").metadata[b"unit"] == b"r/min"
     assert json.loads(file.schema_arrow.metadata[b"gensig"])["class_names"] == CLASSES
-    assert file.num_row_groups == (
-        4 * 4 - 2 if samples else 4
-    )  # 3 rows a group, 10, 10, 10 and 6 a shard
+    # with samples 3 rows a group, 10, 10, 10 and 6 a shard
+    assert file.num_row_groups == {True: 4 + 4 + 4 + 2, False: 4}[samples]
 
 
-@pytest.mark.parametrize("one_channel", [False, True])
-def test_wav(stored, tmp_path, one_channel):
+@pytest.mark.parametrize("n_files", [36, 72])
+def test_wav(stored, tmp_path, n_files):
     out = tmp_path / "all"
+    one_channel = n_files == 72
     made = export(stored, "wav", out, one_channel=one_channel)
     signals = _signals(stored)
     with (out / "labels.csv").open(encoding="utf-8", newline="") as stream:
         rows = list(csv.DictReader(stream))
-    assert len(rows) == (72 if one_channel else 36)
-    assert made["files"] == len(rows) + 2
+    assert made["files"] - 2 == len(rows) == n_files
     for number, row in enumerate(rows):
-        record, channel = divmod(number, 2) if one_channel else (number, slice(None))
+        record, channel = divmod(number, n_files // 36)
+        channels = channel if one_channel else slice(None)
         rate, samples = wavfile.read(out / row["file"])
         assert (rate, samples.dtype) == (1000, np.float32)
-        np.testing.assert_array_equal(samples.T, signals[record, channel])
+        np.testing.assert_array_equal(samples.T, signals[record, channels])
         assert row["record_id"] == f"r{record:06d}"
         assert float(row["speed_rpm"]) == 1800.0 + record
         if one_channel:
             assert row["channel"] == ATTRIBUTES["channel_names"][channel]
-    assert json.loads((out / "attributes.json").read_text(encoding="utf-8"))[
-        "channel_units"
-    ] == [
-        "m/s^2",
-        "m/s^2",
-    ]
+    attributes = json.loads((out / "attributes.json").read_text(encoding="utf-8"))
+    assert attributes["channel_units"] == ["m/s^2", "m/s^2"]
 
 
 @pytest.mark.parametrize("to", FORMATS)
-def test_nothing_is_overwritten_and_nothing_half_written(
-    folder, tmp_path, to, monkeypatch
-):
+def test_nothing_is_overwritten_and_nothing_half_written(folder, tmp_path, to):
     taken = tmp_path / "taken"
     taken.write_text("mine")
     with pytest.raises(DatasetError, match="exists and is left alone"):
