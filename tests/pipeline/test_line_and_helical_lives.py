@@ -70,7 +70,6 @@ def test_a_crack_of_a_drive_line_grows_by_the_impacts_of_its_mesh(line):
     [
         (("life=mixed", "plan.classes=[wear]"), "wear is not followed on a drive line"),
         (("operating=ramp",), "set-points are steady"),
-        (("system=two_stage_gearbox", "system.record_mesh=[3,4]"), "no node"),
     ],
 )
 def test_unknown_lives_of_a_drive_line_are_refused(overrides, message, capsys):

@@ -12,7 +12,12 @@ TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 MAIN = {"gensig": gensig.cli.main, "diagnose": diagnose.cli.main}
 SMALLER = {"plan.n_records=80": ["plan.n_records=40", "executor.n_workers=1"]}
 WRITTEN = (
-    "crack.png crack.json missing.png missing.csv twin.png runs/report/report.html"
+    "crack.png",
+    "crack.json",
+    "missing.png",
+    "missing.csv",
+    "twin.png",
+    "runs/report/report.html",
 )
 
 
@@ -31,7 +36,7 @@ def test_ten_lines_of_shell(tmp_path, monkeypatch, capsys):
         typed = [word for given in words for word in SMALLER.get(given, [given])]
         assert MAIN[command](typed) == 0, words
     assert "is whole and unaltered" in capsys.readouterr().out
-    for name in WRITTEN.split():
+    for name in WRITTEN:
         assert (tmp_path / name).stat().st_size > 1000, name
 
 

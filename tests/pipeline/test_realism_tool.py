@@ -75,8 +75,15 @@ class TestValues:
         # other gearboxes or speeds would show at once
         size *= np.where(gearboxes == "a", 1.0, 1e6)
         names = (
-            "rms kurtosis rms_full_band kurtosis_full_band fm4 nonsynchronous_share "
-            "impacts_per_turn peak_over_residual impact_decay"
+            "rms",
+            "kurtosis",
+            "rms_full_band",
+            "kurtosis_full_band",
+            "fm4",
+            "nonsynchronous_share",
+            "impacts_per_turn",
+            "peak_over_residual",
+            "impact_decay",
         )
         both = np.stack([size, 2 * size], axis=1)
         mesh = np.stack([both] * 3, axis=-1)
@@ -88,7 +95,7 @@ class TestValues:
             "torque_nm": np.full(16, 2.0),
             "unit_id": np.char.add(gearboxes, specimens),
         }
-        indicators = dict.fromkeys(names.split(), both) | {"mesh": mesh}
+        indicators = dict.fromkeys(names, both) | {"mesh": mesh}
         return values.Table(columns=columns, indicators=indicators, n_failed=0)
 
     def test_pairs_are_of_one_gearbox_and_set_point_and_of_another_specimen(self):

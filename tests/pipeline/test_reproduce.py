@@ -44,16 +44,6 @@ def test_every_record_has_the_same_bits(reference, reproduce):
     assert reproduce(reference) == (0, "6 of 6 records have the same bits\n")
 
 
-def test_a_set_of_the_default_backend_is_stored_as_by_0_9(reference):
-    """Files, identity and shards do not name the default backend."""
-    texts = [
-        (reference / name).read_text() for name in ("config.yaml", "manifest.json")
-    ]
-    with h5py.File(reference / "shards" / "shard-00000.h5") as file:
-        texts.append(str(file.attrs["config_json"]))
-    assert all("oversampling" in text and "backend" not in text for text in texts)
-
-
 def edit_manifest(folder, change):
     file = folder / "manifest.json"
     content = json.loads(file.read_text())

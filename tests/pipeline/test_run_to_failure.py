@@ -54,10 +54,17 @@ def lives(plan):
 def test_a_life_is_one_unit_with_gears_of_its_own_and_one_class(plan):
     columns = plan.columns
     assert plan.n_records == 12 * 8
-    shared = "unit_id specimen_id gearbox_id label_name life_failed fault_tooth"
+    shared = (
+        "unit_id",
+        "specimen_id",
+        "gearbox_id",
+        "label_name",
+        "life_failed",
+        "fault_tooth",
+    )
     for rows in lives(plan).values():
         assert len(rows) == 8
-        for name in shared.split():
+        for name in shared:
             assert len(set(columns[name][rows].tolist())) == 1, name
     assert len(set(columns["specimen_id"].tolist())) == 12
     names, counts = np.unique(columns["label_name"], return_counts=True)
@@ -157,6 +164,7 @@ def drift(key="mesh.damping_ratio", change=1):
     return {key: {"change": change, "time_h": 5, "scatter": 0}}
 
 
+UNIFORM = {"distribution": "uniform", "low": 1, "high": 2}
 REFUSED = [
     ("plan.n_records", 8, "plan.n_records = 8"),
     ("plan.conditions_per_unit", 8, "plan.conditions_per_unit = 8"),
@@ -187,7 +195,7 @@ REFUSED = [
     ("life.drift", drift("operating.torque_nm"), "drawn for each set-point"),
     ("life.drift", drift(change=-2), "change = -2"),
     ("life.drift", 3, "life.drift = 3"),
-    ("plan.vary", {"life.horizon_h": {}}, "a whole data set"),
+    ("plan.vary", {"life.horizon_h": UNIFORM}, "a whole data set"),
     ("life.crack", 3, "group of keys"),
     ("life.colour", "red", "unknown key 'colour'"),
 ]

@@ -153,11 +153,6 @@ def test_a_cell_of_another_process_has_the_same_bits(crack):
     np.testing.assert_array_equal(known, crack.known[1, 1])
 
 
-def test_other_machines_are_others():
-    first, second = (pairs_of(epoch=epoch).cell(0).sound for epoch in (0, 1))
-    assert not np.isin(first, second).any()
-
-
 @pytest.mark.parametrize(
     ("words", "n_gearboxes"), [((), 4), (("plan.n_gearboxes=1",), 1)]
 )
@@ -262,33 +257,19 @@ def test_a_map_without_any_value_is_refused():
         ("fault=crack sensing.snr_db=null", "sensing.snr_db = null"),
         ("fault=crack sensing.snr_reference=record", "use healthy_twin"),
         ("fault=crack --n-units 3", "must be a whole number of at least 4"),
-        (
-            "fault=crack --speeds 900 900",
-            "speeds in r/min: 900, 900; give positive numbers, each once",
-        ),
-        ("fault=crack --torques -5", "torques in N m: -5; give positive numbers"),
+        ("fault=crack --speeds 900 900", "speeds in r/min: 900, 900; give positive"),
         ("fault=crack --torques 0", "torques in N m: 0; give positive numbers"),
-        ("fault=crack --speeds fast", "--speeds fast: give numbers"),
-        (
-            f"fault=crack --speeds {' '.join(map(str, range(100, 501)))}",
-            "more than 400 cells",
-        ),
-        (
-            "fault=crack --bandwidths 30000",
-            "from 10 to half the sampling rate, 25600",
-        ),
+        (f"fault=crack --speeds {' '.join(map(str, range(100, 501)))}", "400 cells"),
+        ("fault=crack --bandwidths 30000", "to half the sampling rate, 25600"),
         ("fault=crack --workers 0", "--workers 0 must be at least 1"),
         ("fault=crack --plot map.txt", "--plot map.txt: the name must end in .png"),
-        ("fault=crack --json nowhere/map.json", "there is no folder nowhere"),
-        ("fault=crak", "no option 'crak' of fault"),
         ("fault=crack plan.n_gearboxes=0", "plan.n_gearboxes = 0"),
     ],
 )
 def test_a_mistake_is_one_line(typed, message, capsys):
     assert main(["detectability", *typed.split()]) == 2
-    error = capsys.readouterr().err
+    (error,) = capsys.readouterr().err.splitlines()
     assert message in error
-    assert error.count("\n") == 1
 
 
 def test_pairs_take_a_composed_configuration():

@@ -134,8 +134,8 @@ def test_structure(made):
             assert attributes["aria-label"]
     divs = [attributes for _, attributes in page.tags]
     plots = {found["id"] for found in divs if found.get("class") == "plot"}
-    shown = "wave spectrum envelope spectrogram parameters indicators"
-    assert {f"plot-{name}" for name in shown.split()} <= plots
+    shown = ("wave", "spectrum", "envelope", "spectrogram", "parameters", "indicators")
+    assert {f"plot-{name}" for name in shown} <= plots
 
 
 def test_every_option_has_its_data_and_a_healthy_record_is_first(made, plan):

@@ -80,10 +80,17 @@ def test_a_key_that_came_after_0_9_counts_only_where_it_is_not_at_its_default():
 
 
 def test_folder_holds_what_is_needed(folder, plan):
-    files = "config.yaml overrides.yaml plan.csv manifest.json index.h5 README.md"
+    files = (
+        "config.yaml",
+        "overrides.yaml",
+        "plan.csv",
+        "manifest.json",
+        "index.h5",
+        "README.md",
+    )
     protocols = ("by_unit", "cross_gearbox", "cross_specimen", "random_window_leaky")
     assert set(_tree(folder)) == {
-        *files.split(),
+        *files,
         "croissant.json",
         "SHA256SUMS",
         *(f"splits/{name}.csv" for name in protocols),
@@ -92,8 +99,16 @@ def test_folder_holds_what_is_needed(folder, plan):
     manifest = read_manifest(folder)
     assert manifest.is_complete
     assert (manifest.seed, manifest.n_records, manifest.n_done) == (7, 36, 4)
-    facts = "python numpy h5py cpu_model git_commit created finished"
-    assert set(manifest.environment) >= set(facts.split())
+    facts = (
+        "python",
+        "numpy",
+        "h5py",
+        "cpu_model",
+        "git_commit",
+        "created",
+        "finished",
+    )
+    assert set(manifest.environment) >= set(facts)
     assert read_config(folder) == CONFIG
     assert yaml.safe_load((folder / "overrides.yaml").read_text()) == ["seed=7"]
     assert read_plan(folder / "plan.csv").n_records == plan.n_records
