@@ -205,23 +205,6 @@ def test_two_tasks_at_a_time_make_the_same_bytes(reference, tmp_path, capsys):
     assert contents(out) == contents(reference)
 
 
-@pytest.mark.parametrize(
-    ("words", "hint"),
-    [
-        (
-            "generate executor=slurm executor.shard_index=0 executor.shard_count=1 out=x",
-            "--freeze",
-        ),
-        ("plan --freeze", "out=DIR"),
-    ],
-)
-def test_a_task_needs_a_frozen_folder(words, hint, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(words.split()) == 2
-    assert hint in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
-
-
 @pytest.fixture
 def cluster():
     """A Dask scheduler and two worker processes."""

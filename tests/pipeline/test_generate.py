@@ -3,6 +3,7 @@
 import h5py
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import gensig
 from gensig.cli import main
@@ -64,7 +65,7 @@ def test_a_data_set_is_labelled_and_whole(reference):
         assert data.attributes["n_teeth_pinion"] == 23
         assert np.all((severity == 0.0) == (label == 0))
         speeds = data.column("speed_rpm"), data.column("speed_set_rpm")
-        np.testing.assert_allclose(*speeds, rtol=2e-3, atol=0.0)
+        assert_allclose(*speeds, rtol=2e-3, atol=0.0)
         assert set(data.column("fault_gear")[label > 0]) == {"pinion"}
     with h5py.File(reference / "index.h5") as index:
         assert index["acceleration"].shape == (8, 4, 2048)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from numpy.testing import assert_allclose
 from small_sets import TINY, make
 
 from gensig.cli import main
@@ -36,9 +37,7 @@ def test_the_traces_are_in_the_file(folder):
     speed = np.array(
         [data.trace(place, "shaft_speed").mean() for place in range(data.n_records)]
     )
-    np.testing.assert_allclose(
-        speed * 30 / np.pi, data.column("speed_rpm"), rtol=1e-4, atol=0
-    )
+    assert_allclose(speed * 30 / np.pi, data.column("speed_rpm"), rtol=1e-4, atol=0)
     assert len(np.unique(data.column("params/operating.course_seed"))) == 3
 
 

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 import yaml
+from numpy.testing import assert_allclose
 from small_sets import TINY, make
 
 from gensig.cli import main
@@ -176,7 +177,7 @@ def test_record_and_twin_differ_by_the_fault_alone(reference, tmp_path, noise, c
     assert not np.array_equal(twin["acceleration_clean"], made["acceleration_clean"])
     level = np.sqrt(np.mean(np.square(stored["acceleration"], dtype=np.float64)))
     residuals = [made[name].astype(float) - twin[name] for name in names[:2]]
-    np.testing.assert_allclose(*residuals, rtol=0.0, atol=3e-6 * level)
+    assert_allclose(*residuals, rtol=0.0, atol=3e-6 * level)
 
 
 @pytest.mark.parametrize(

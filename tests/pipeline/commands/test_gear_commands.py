@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import yaml
 from figure_labels import labels
+from numpy.testing import assert_allclose
 
 import gensig.commands.gears.modify
 from gensig.systems.flank_optimum import optimise
@@ -34,7 +35,7 @@ def test_stiffness_json_has_the_promised_keys(written, drawn):
         for values in gear.values()
     ]
     assert len(terms) == 12
-    np.testing.assert_allclose(1.0 / np.sum(terms, axis=0), faulty, rtol=1e-4, atol=0.0)
+    assert_allclose(1.0 / np.sum(terms, axis=0), faulty, rtol=1e-4, atol=0.0)
     roll, mesh = content["roll_angle_deg"], content["mesh_stiffness_n_per_m"]
     assert 0.0 < roll[0] < roll[-1] < 360.0
     mean = content["mesh_stiffness_mean_n_per_m"]
@@ -91,7 +92,7 @@ def test_transmission_error_writes_what_it_promises(written, drawn, capsys):
     error, orders, load, sharing, scale = drawn[0].values()
     assert f"{ripple:.3g} um from peak to peak" in error.get_title()
     heights = [bar.get_height() for bar in orders.patches]
-    np.testing.assert_allclose(heights, content["harmonics_um"], rtol=1e-12)
+    assert_allclose(heights, content["harmonics_um"], rtol=1e-12)
     assert "ends of the path of contact" in load.get_title()
     assert labels(sharing) == ["one pair", "pair -1", "pair +1"]
     assert scale.get_ylabel() == "N/mm"
@@ -183,7 +184,7 @@ def test_stiffness_separates_the_effects_of_heat(written, drawn, capsys):
     curves = labels(panels["One pair, slices on the path"])
     assert curves[:3] == ["cold", "true stiffness", "with contact-ratio change"]
     flash = panels["Flash temperature under the slices' own loads"].lines[0]
-    np.testing.assert_allclose(flash.get_ydata(), heat["flash_temperature_k"])
+    assert_allclose(flash.get_ydata(), heat["flash_temperature_k"])
 
 
 def test_effects_of_heat_are_switched_one_by_one(written, capsys):
@@ -232,7 +233,7 @@ def test_root_stress_writes_what_it_promises(written, drawn, capsys):
     assert "8393.1 N" in capsys.readouterr().out
     over_mesh = drawn[0]["Root stress of one tooth pair"]
     assert over_mesh.get_ylabel() == "MPa"
-    np.testing.assert_allclose(over_mesh.lines[2].get_ydata(), stress)
+    assert_allclose(over_mesh.lines[2].get_ydata(), stress)
     assert any(title.startswith("Tooth of the wheel: Y_F 1.167") for title in drawn[0])
 
 

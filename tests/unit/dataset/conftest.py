@@ -5,6 +5,7 @@ import pytest
 from dataset_samples import build, make_plan
 
 from gensig.dataset.folder import beginning
+from gensig.dataset.reader import open_dataset
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -31,3 +32,10 @@ def template(tmp_path_factory):
 def folder(tmp_path, template):
     """A copy of the closed data set, to damage."""
     return shutil.copytree(template, tmp_path / "set")
+
+
+@pytest.fixture
+def data(template):
+    """A reader of the closed data set."""
+    with open_dataset(template) as found:
+        yield found

@@ -5,6 +5,7 @@ import hashlib
 import numpy as np
 import pytest
 from dataset_samples import make_plan, sides
+from numpy.testing import assert_allclose, assert_array_equal
 
 from gensig.dataset.plan import Plan
 from gensig.dataset.splitting.protocols import make_splits
@@ -28,9 +29,9 @@ def test_leaky_protocol_has_every_record_on_several_sides():
     subset = table.subset.reshape(plan.n_records, 8)
     starts = table.start_fraction.reshape(subset.shape)
     assert (starts == np.arange(8) / 8).all()
-    np.testing.assert_array_equal(table.stop_fraction, table.start_fraction + 1 / 8)
+    assert_array_equal(table.stop_fraction, table.start_fraction + 1 / 8)
     shares = [np.mean(subset == name) for name in SUBSETS]
-    np.testing.assert_allclose(shares, [0.6, 0.2, 0.2], rtol=0, atol=0.06)
+    assert_allclose(shares, [0.6, 0.2, 0.2], rtol=0, atol=0.06)
     assert len(set(map(tuple, subset.tolist()))) > 10  # scattered
 
 
@@ -54,7 +55,7 @@ def test_csv_round_trip_and_header(tmp_path):
         path.write_text(table.to_csv())
         back = read_split(path)
         for field in ("record_id", "start_fraction", "stop_fraction", "subset"):
-            np.testing.assert_array_equal(getattr(back, field), getattr(table, field))
+            assert_array_equal(getattr(back, field), getattr(table, field))
     text = (tmp_path / "by_unit.csv").read_text()
     assert text.startswith(f"{HEADER}r000000,0,1,")
 

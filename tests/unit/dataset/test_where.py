@@ -6,6 +6,7 @@ import time
 import numpy as np
 import pytest
 from dataset_samples import build, row_of, write_shard
+from numpy.testing import assert_array_equal
 
 import gensig.dataset.reader as reader_module
 from gensig.dataset.folder.layout import shard_path
@@ -36,59 +37,55 @@ EVERY = np.arange(36)
         ({"fault": "crack", "label": 0}, []),
     ],
 )
-def test_conditions(folder, conditions, expected):
-    with open_dataset(folder) as data:
-        chosen = data.where(**conditions)
-        np.testing.assert_array_equal(chosen.index, expected)
-        assert len(chosen) == len(expected)
-        np.testing.assert_array_equal(
-            chosen.column("record_id"), data.column("record_id")[chosen.index]
-        )
+def test_conditions(data, conditions, expected):
+    chosen = data.where(**conditions)
+    assert_array_equal(chosen.index, expected)
+    assert len(chosen) == len(expected)
+    assert_array_equal(
+        chosen.column("record_id"), data.column("record_id")[chosen.index]
+    )
 
 
-def test_choosing_reads_no_signal(folder, monkeypatch):
+def test_choosing_reads_no_signal(data, monkeypatch):
     monkeypatch.setattr(
         reader_module, "read_signal", lambda *_: pytest.fail("a signal was read")
     )
-    with open_dataset(folder) as data:
-        chosen = data.where(fault="crack").where(severity=0.25)
-        assert [record.values["label_name"] for record in chosen] == ["crack"] * 12
-        with pytest.raises(pytest.fail.Exception):
-            chosen.signals(0)
+    chosen = data.where(fault="crack").where(severity=0.25)
+    assert [record.values["label_name"] for record in chosen] == ["crack"] * 12
+    with pytest.raises(pytest.fail.Exception):
+        chosen.signals(0)
 
 
-def test_records_tables_and_arrays(folder, plan):
+def test_records_tables_and_arrays(data, plan):
     def stored(index, start=0, stop=None):
         return row_of(plan, index)[0]["acceleration"][:, start:stop]
 
-    with open_dataset(folder) as data:
-        chosen = data.where(fault="pitting")
-        third = chosen[2]
-        assert (third.index, third.values["record_id"]) == (8, "r000008")
-        assert third.values["speed_rpm"] == 1808.0
-        assert third.values["signal_power"].tolist() == [1.0, 2.0]
-        np.testing.assert_array_equal(third.signals(5, 9), stored(8, 5, 9))
-        np.testing.assert_array_equal(chosen.signals(-1), stored(35))
-        assert chosen.array().shape == (12, 2, 200)
-        block = chosen.array(0, 50, ["wheel_ü"])
-        expected = np.stack([stored(index, 0, 50)[1:] for index in chosen.index])
-        np.testing.assert_array_equal(block, expected, strict=True)
-        table = chosen.table(["label", "unit_id"])
-        assert (table.dtype.names, len(table)) == (("label", "unit_id"), 12)
-        assert set(table["label"].tolist()) == {2}
-        assert "noise_power" not in chosen.table().dtype.names
-        assert [record.index for record in data][:3] == [0, 1, 2]
-        assert data[35].values["record_id"] == "r000035"
-        with pytest.raises(IndexError):
-            data[36]
+    chosen = data.where(fault="pitting")
+    third = chosen[2]
+    assert (third.index, third.values["record_id"]) == (8, "r000008")
+    assert third.values["speed_rpm"] == 1808.0
+    assert third.values["signal_power"].tolist() == [1.0, 2.0]
+    assert_array_equal(third.signals(5, 9), stored(8, 5, 9))
+    assert_array_equal(chosen.signals(-1), stored(35))
+    assert chosen.array().shape == (12, 2, 200)
+    block = chosen.array(0, 50, ["wheel_ü"])
+    expected = np.stack([stored(index, 0, 50)[1:] for index in chosen.index])
+    assert_array_equal(block, expected, strict=True)
+    table = chosen.table(["label", "unit_id"])
+    assert (table.dtype.names, len(table)) == (("label", "unit_id"), 12)
+    assert set(table["label"].tolist()) == {2}
+    assert "noise_power" not in chosen.table().dtype.names
+    assert [record.index for record in data][:3] == [0, 1, 2]
+    assert data[35].values["record_id"] == "r000035"
+    with pytest.raises(IndexError):
+        data[36]
 
 
-def test_plan_is_a_structured_table(folder, plan):
-    with open_dataset(folder) as data:
-        table = data.plan_table
+def test_plan_is_a_structured_table(data, plan):
+    table = data.plan_table
     assert table.dtype.names == tuple(plan.columns)
     assert table[7]["record_id"] == "r000007"
-    np.testing.assert_array_equal(
+    assert_array_equal(
         table["params/crack_depth_mm"], plan.columns["params/crack_depth_mm"]
     )
 
@@ -144,15 +141,14 @@ def test_a_shard_is_checked_again_only_when_it_changed(folder, plan, monkeypatch
             data.signals(10)
 
 
-def test_random_access_is_quick(folder):
+def test_random_access_is_quick(data):
     """The promise is 1 ms a record; the best of many tries on a busy machine stays below it."""
-    with open_dataset(folder) as data:
-        data.signals(0)
-        times = []
-        for index in np.random.default_rng(0).integers(0, 10, 200).tolist():
-            begin = time.perf_counter()
-            data.signals(index)
-            times.append(time.perf_counter() - begin)
+    data.signals(0)
+    times = []
+    for index in np.random.default_rng(0).integers(0, 10, 200).tolist():
+        begin = time.perf_counter()
+        data.signals(index)
+        times.append(time.perf_counter() - begin)
     assert min(times) < 1e-3
 
 

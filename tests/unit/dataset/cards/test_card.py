@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import yaml
 from dataset_samples import CLASSES, build, make_plan
+from numpy.testing import assert_allclose
 
 from gensig.dataset.cards.card import card_text, front_matter
 from gensig.dataset.reader import open_dataset
@@ -32,10 +33,9 @@ def test_front_matter(folder):
 @pytest.mark.parametrize(
     ("n_records", "expected"), [(999, "n<1K"), (1000, "1K<n<10K"), (10**7, "n>10M")]
 )
-def test_size_category(folder, n_records, expected):
-    with open_dataset(folder) as data:
-        data.n_records = n_records
-        assert _front(front_matter(data) + "\n")["size_categories"] == [expected]
+def test_size_category(data, n_records, expected):
+    data.n_records = n_records
+    assert _front(front_matter(data) + "\n")["size_categories"] == [expected]
 
 
 def test_hostile_names_stay_text(tmp_path, plan):
@@ -63,9 +63,7 @@ def test_croissant_is_valid_and_gives_the_records(folder, plan):
     depths = np.array(
         [row["records/params.crack_depth_mm"] for row in rows], dtype=float
     )
-    np.testing.assert_allclose(
-        depths, plan.columns["params/crack_depth_mm"], rtol=1e-12, atol=0
-    )
+    assert_allclose(depths, plan.columns["params/crack_depth_mm"], rtol=1e-12, atol=0)
 
 
 def test_the_validator_would_find_a_mistake(folder):

@@ -20,20 +20,16 @@ AXIS = "name => document.getElementById('plot-' + name).layout.xaxis.title.text"
 @pytest.fixture(scope="module")
 def browser():
     playwright = pytest.importorskip("playwright.sync_api", reason="package playwright")
-    path = (
-        os.environ.get("GENSIG_CHROMIUM")
-        or shutil.which("chromium")
-        or shutil.which("google-chrome")
-    )
+    found = map(shutil.which, ("chromium", "google-chrome"))
+    path = os.environ.get("GENSIG_CHROMIUM") or next(filter(None, found), None)
+    words = ["--no-sandbox", "--disable-gpu"]
     with playwright.sync_playwright() as started:
         try:
-            found = started.chromium.launch(
-                executable_path=path, args=["--no-sandbox", "--disable-gpu"]
-            )
+            browser = started.chromium.launch(executable_path=path, args=words)
         except playwright.Error as error:
             pytest.skip(f"no Chromium: {str(error).splitlines()[0]}")
-        yield found
-        found.close()
+        yield browser
+        browser.close()
 
 
 @pytest.fixture(scope="module")
@@ -50,21 +46,23 @@ def page_file(tmp_path_factory):
     return write_report(folder, folder.parent / "page.html")[0]
 
 
-@pytest.fixture(params=["desktop", "phone", "dark"])
+WINDOW = {"viewport": {"width": 1280, "height": 900}}
+OPTIONS = {
+    "desktop": WINDOW,
+    "phone": {
+        "viewport": {"width": 390, "height": 844},
+        "is_mobile": True,
+        "has_touch": True,
+    },
+    "dark": {**WINDOW, "color_scheme": "dark"},
+}
+
+
+@pytest.fixture(params=OPTIONS)
 def page(browser, page_file, request):
-    options = {
-        "desktop": {"viewport": {"width": 1280, "height": 900}},
-        "phone": {
-            "viewport": {"width": 390, "height": 844},
-            "is_mobile": True,
-            "has_touch": True,
-        },
-        "dark": {"viewport": {"width": 1280, "height": 900}, "color_scheme": "dark"},
-    }[request.param]
-    context = browser.new_context(**options)
+    context = browser.new_context(**OPTIONS[request.param])
     page = context.new_page()
-    said = []
-    asked = []
+    said, asked = [], []
     page.on("console", lambda message: said.append(message.text))
     page.on("pageerror", lambda error: said.append(str(error)))
     page.on("request", lambda request: asked.append(request.url))
@@ -74,6 +72,16 @@ def page(browser, page_file, request):
     assert said == []
     assert asked == [page_file.as_uri()]
     context.close()
+
+
+def layout(page, plot, path):
+    """A value of the layout of a plot."""
+    return page.evaluate(f"document.getElementById('plot-{plot}').layout.{path}")
+
+
+def drawn(page, plot, path):
+    """A value of the first curve of a plot."""
+    return page.evaluate(f"document.getElementById('plot-{plot}').data[0].{path}")
 
 
 def test_it_loads_and_fits(page):
@@ -112,13 +120,11 @@ def test_record_channel_and_comparison(page):
     assert len(page.evaluate(TRACES, "wave")) == 2
     page.select_option(f"{form} [name=other]", "")
     assert len(page.evaluate(TRACES, "wave")) == 1
-    first = page.evaluate("document.getElementById('plot-wave').data[0].y[7]")
+    first = drawn(page, "wave", "y[7]")
     page.select_option(f"{form} [name=channel]", "1")
-    assert page.evaluate("document.getElementById('plot-wave').data[0].y[7]") != first
+    assert drawn(page, "wave", "y[7]") != first
     assert HOSTILE in page.inner_text("#signals-said")
-    assert "rad/s" in page.evaluate(
-        "document.getElementById('plot-spectrum').layout.yaxis.title.text"
-    )
+    assert "rad/s" in layout(page, "spectrum", "yaxis.title.text")
 
 
 def test_axes_marks_and_zoom(page):
@@ -145,17 +151,11 @@ def test_axes_marks_and_zoom(page):
         page.keyboard.press("Space")  # by keyboard alone
         assert (label in page.evaluate(TRACES, "envelope")) is not before
     page.locator(f"{form} [name=decibel]").uncheck()
-    assert (
-        page.evaluate("document.getElementById('plot-spectrum').layout.yaxis.type")
-        == "linear"
-    )
+    assert layout(page, "spectrum", "yaxis.type") == "linear"
     page.select_option(f"{form} [name=axis]", "hz")
-    whole = page.evaluate("document.getElementById('plot-spectrum').layout.xaxis.range")
+    whole = layout(page, "spectrum", "xaxis.range")
     page.select_option(f"{form} [name=zoom]", "1")
-    assert (
-        page.evaluate("document.getElementById('plot-spectrum').layout.xaxis.range")
-        != whole
-    )
+    assert layout(page, "spectrum", "xaxis.range") != whole
 
 
 def test_parameters_and_indicators(page):
@@ -164,21 +164,12 @@ def test_parameters_and_indicators(page):
     page.select_option("#parameters-controls [name=column]", "speed_rpm")
     assert page.evaluate(TRACES, "parameters") == ["healthy", "crack", "pitting"]
     page.select_option("#parameters-controls [name=form]", "boxes")
-    assert (
-        page.evaluate("document.getElementById('plot-parameters').data[0].type")
-        == "box"
-    )
+    assert drawn(page, "parameters", "type") == "box"
     page.select_option("#indicators-controls [name=indicator]", "kurtosis")
     page.select_option("#indicators-controls [name=along]", "speed_rpm")
     assert page.evaluate(AXIS, "indicators") == "speed, r/min"
-    first = page.evaluate("document.getElementById('plot-indicators').data[0].y[0]")
+    first = drawn(page, "indicators", "y[0]")
     page.select_option("#indicators-controls [name=channel]", "1")
-    assert (
-        page.evaluate("document.getElementById('plot-indicators').data[0].y[0]")
-        != first
-    )
+    assert drawn(page, "indicators", "y[0]") != first
     page.locator("#indicators-controls [name=decibel]").check()
-    assert (
-        page.evaluate("document.getElementById('plot-levels').layout.yaxis.type")
-        == "log"
-    )
+    assert layout(page, "levels", "yaxis.type") == "log"

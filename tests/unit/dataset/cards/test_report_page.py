@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dataset_samples import ATTRIBUTES, CLASSES, build, forge, setting
+from numpy.testing import assert_allclose
 
 from gensig.cli import main
 from gensig.dataset.folder.verify import verify as verify_folder
-from gensig.dataset.reader import open_dataset
 from gensig.errors import ConfigError, DatasetError
 from gensig.report.document import write_report
 from gensig.report.examples import _lines, choose
@@ -79,12 +79,6 @@ def unpack(packed):
 def made(template, tmp_path_factory):
     """A data set without a folder of figures, and its page."""
     return template, page_of(template, tmp_path_factory.mktemp("report") / "page.html")
-
-
-@pytest.fixture
-def data(template):
-    with open_dataset(template) as found:
-        yield found
 
 
 def replace_column(data, name, values):
@@ -152,7 +146,7 @@ def test_every_option_has_its_data_and_a_healthy_record_is_first(made, plan):
         assert len(decoded(table["class"], "u1")) == table["rows"] == 36
     name = "params/crack_depth_mm"
     column = decoded(data["drawn"]["columns"][name], "<f4")
-    np.testing.assert_allclose(column, plan.columns[name], rtol=1e-6, atol=0)
+    assert_allclose(column, plan.columns[name], rtol=1e-6, atol=0)
     selected = [found["value"] for found in options if "selected" in found]
     first = next(int(value) for value in selected if value.isdigit())
     assert examples[first]["class"] == "healthy"
@@ -165,12 +159,12 @@ def test_the_signals_are_those_of_the_records(made, data):
         view = example["views"][1]
         shown = decoded(view["wave"]["n"], "<i2") * view["wave"]["scale"]
         peak = np.abs(signal).max()
-        np.testing.assert_allclose(shown, signal, rtol=0, atol=peak / 32000)
+        assert_allclose(shown, signal, rtol=0, atol=peak / 32000)
         packed = view["spectrum"]
         frequency, amplitude = amplitude_spectrum(signal, data.sampling_rate)
         amplitude = amplitude[frequency <= 400.0]  # the usable band
         half_step = 10 ** (0.55 * STEP_DB / 20) - 1
-        np.testing.assert_allclose(unpack(packed), amplitude, rtol=half_step, atol=0)
+        assert_allclose(unpack(packed), amplitude, rtol=half_step, atol=0)
         assert packed["start"] == 0.0
         assert packed["step"] == pytest.approx(frequency[1])
 
@@ -313,7 +307,7 @@ def test_velocity_of_a_tone_is_its_acceleration_over_its_frequency():
     # neither end of the last is 0: nothing of it leaks below 1 kHz
     velocity = velocity_rms(np.stack([*tones, 40.0 * np.cos(3000.7 * angle)]), 51200.0)
     expected = 3.0 / np.sqrt(2.0) / (2 * np.pi * np.array(inside))
-    np.testing.assert_allclose(velocity[:2], expected, rtol=2e-3)
+    assert_allclose(velocity[:2], expected, rtol=2e-3)
     assert velocity[2:4].max() < 0.02 * 3.0 / (2 * np.pi * 10.0)
     assert velocity[4] < 1e-6
 

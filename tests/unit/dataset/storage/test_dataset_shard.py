@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 import pytest
 from dataset_samples import ATTRIBUTES, make_plan, row_of, write_shard, writer_of
+from numpy.testing import assert_array_equal
 
 from gensig.dataset.storage.atomic import sha256_file
 from gensig.dataset.storage.attributes import read_attributes
@@ -29,9 +30,9 @@ def test_what_goes_in_comes_out(tmp_path, compression):
         for row, index in enumerate(plan.rows(0).tolist()):
             signals, values = row_of(plan, index)
             for name, array in signals.items():
-                np.testing.assert_array_equal(file[name][row], array)
+                assert_array_equal(file[name][row], array)
             for name, value in values.items():
-                np.testing.assert_array_equal(read_rows(file[name])[row], value)
+                assert_array_equal(read_rows(file[name])[row], value)
         assert file["speed_rpm"].attrs["unit"] == b"r/min"
         assert np.isnan(file["integration_error"][...]).all()
 

@@ -9,6 +9,7 @@ import numpy as np
 import pandas
 import pytest
 from dataset_samples import ATTRIBUTES, CLASSES, build, make_plan
+from numpy.testing import assert_array_equal
 from pyarrow import parquet
 from scipy.io import wavfile
 
@@ -46,10 +47,10 @@ def _columns(folder):
 def _check_arrays(found, stored):
     """Signals and columns are those of the data set, in physical units."""
     for name in ("acceleration", "acceleration_clean"):
-        np.testing.assert_array_equal(found[name][...], _signals(stored, name))
+        assert_array_equal(found[name][...], _signals(stored, name))
         assert found[name].dtype == np.float32
     for name, values in _columns(stored).items():
-        np.testing.assert_array_equal(found[name][...], values)
+        assert_array_equal(found[name][...], values)
 
 
 def test_hdf5_is_one_shard_in_physical_units(stored, tmp_path):
@@ -83,11 +84,11 @@ def test_parquet(stored, tmp_path, samples, monkeypatch):
     export(stored, "parquet", out, samples=samples)
     frame = pandas.read_parquet(out)
     for name, values in _columns(stored).items():
-        np.testing.assert_array_equal(frame[name].tolist(), values.tolist())
+        assert_array_equal(frame[name].tolist(), values.tolist())
     assert ("acceleration" in frame) is samples
     if samples:
         found = [np.stack(channels) for channels in frame["acceleration"]]
-        np.testing.assert_array_equal(found, _signals(stored))
+        assert_array_equal(found, _signals(stored))
     file = parquet.ParquetFile(out)
     assert file.schema_arrow.field("speed_rpm").metadata[b"unit"] == b"r/min"
     assert json.loads(file.schema_arrow.metadata[b"gensig"])["class_names"] == CLASSES
@@ -109,7 +110,7 @@ def test_wav(stored, tmp_path, n_files):
         channels = channel if one_channel else slice(None)
         rate, samples = wavfile.read(out / row["file"])
         assert (rate, samples.dtype) == (1000, np.float32)
-        np.testing.assert_array_equal(samples.T, signals[record, channels])
+        assert_array_equal(samples.T, signals[record, channels])
         assert row["record_id"] == f"r{record:06d}"
         assert float(row["speed_rpm"]) == 1800.0 + record
         if one_channel:

@@ -17,6 +17,7 @@ from dataset_samples import (
     write_shard,
     writer_of,
 )
+from numpy.testing import assert_allclose, assert_array_equal
 
 import gensig.dataset.storage.guard as guard_module
 import gensig.dataset.storage.shard as shard_module
@@ -86,7 +87,7 @@ def test_quantization_of_zero_constant_and_not_finite_channels():
     assert scale[[0, 4]].tolist() == [1.0, 1.0]
     assert np.isnan(scale[[2, 3]]).all()
     assert counts[1].tolist() == [-32767] * 4
-    np.testing.assert_allclose(counts[1] * scale[1], -3.0, rtol=1e-15, atol=0)
+    assert_allclose(counts[1] * scale[1], -3.0, rtol=1e-15, atol=0)
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
@@ -105,7 +106,7 @@ def test_every_way_gives_the_signals_back(tmp_path, plan, compression, sample_ty
                 if row == FAILED - 10:
                     assert np.isnan(found).all()
                 elif sample_type == "float32":
-                    np.testing.assert_array_equal(found, signal, strict=True)
+                    assert_array_equal(found, signal, strict=True)
                 else:
                     check_close(found, signal)
         stored = file["acceleration"]
@@ -129,7 +130,7 @@ def test_silent_and_failed_shards_are_read(tmp_path, sample_type, status, value)
             writer.write(row, signals, row_of(plan, row, status=status)[1])
     with open_shard(path) as file:
         found = read_signal(file, "acceleration", 1)
-    np.testing.assert_array_equal(found, np.full(shape, value))
+    assert_array_equal(found, np.full(shape, value))
 
 
 def test_failed_record_keeps_the_channels_that_are_finite(tmp_path, plan):
@@ -166,19 +167,19 @@ def test_reader_and_index_give_physical_values(whole):
             signal, found = expected(index), data.signals(index)
             check_close(found, signal)
             part = data.signals(index, 20, 70, ["wheel_ü"])
-            np.testing.assert_array_equal(part, found[1:, 20:70])
+            assert_array_equal(part, found[1:, 20:70])
             check_close(data.signals(index, name="acceleration_clean"), signal / 2)
         assert np.isnan(data.signals(FAILED)).all()
         scale = data.column("acceleration_scale")
         assert scale.shape == (36, 2)
-        np.testing.assert_array_equal(np.isnan(scale).all(axis=1), ~data.usable)
+        assert_array_equal(np.isnan(scale).all(axis=1), ~data.usable)
         assert data.usable.sum() == 35
         signals = [data.signals(index) for index in range(36)]
     with h5py.File(whole / "index.h5", locking=False) as index:
         assert index["acceleration"].attrs["scale"] == b"acceleration_scale"
         scale = index["acceleration_scale"][...][:, :, None]
         physical = (index["acceleration"][...] * scale).astype(np.float32)
-    np.testing.assert_array_equal(physical, signals)
+    assert_array_equal(physical, signals)
 
 
 def test_index_has_no_scale_of_a_missing_shard(whole, tmp_path):
@@ -301,20 +302,10 @@ def test_blosc2_bombs_are_refused(tmp_path, plan, monkeypatch):
         write_shard(path, plan, compression="blosc2")
 
 
-@pytest.mark.parametrize(
-    ("word", "message"),
-    [
-        ("sample_type=int8", "sample_type = 'int8'; allowed: float32, int16"),
-        ("compression=zip", "compression = 'zip'; allowed: none, gzip, lzf, blosc2"),
-        ("compression=blosc2", "compression=blosc2 needs the package hdf5plugin"),
-    ],
-)
-def test_generate_refuses_before_it_touches_anything(
-    tmp_path, word, message, monkeypatch, capsys
-):
+def test_generate_refuses_before_it_touches_anything(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "hdf5plugin", None)
-    words = ["generate", "--quiet", f"dataset.{word}", f"out={tmp_path / 'set'}"]
-    assert main(words) != 0
+    words = ["--quiet", "dataset.compression=blosc2", f"out={tmp_path / 'set'}"]
+    assert main(["generate", *words]) != 0
     (error,) = capsys.readouterr().err.splitlines()
-    assert f"dataset.{message}" in error
+    assert "dataset.compression=blosc2 needs the package hdf5plugin" in error
     assert list(tmp_path.iterdir()) == []
