@@ -4,7 +4,6 @@ from importlib import resources
 
 import numpy as np
 import pytest
-from docs_pages import ROOT, blocks
 from engine_cases import option, response_of
 from figure_labels import labels
 from numpy.testing import assert_allclose
@@ -89,24 +88,6 @@ def test_your_own_tables_are_read_by_their_path(written, tmp_path):
     own = written(f"modes system=shaft_line {tables}")
     train = written(f"modes {TRAIN}")
     assert own["natural_frequencies_hz"] == train["natural_frequencies_hz"]
-
-
-def test_the_page_on_your_own_line_runs_as_it_stands(written, tmp_path, capsys):
-    page = (ROOT / "docs" / "howto" / "your_drive_line.md").read_text(encoding="utf-8")
-    code = {}
-    for block in blocks(page):
-        code.setdefault(block.language, []).append(block.code)
-    for name, text in zip(("line.csv", "gears.csv"), code["csv"], strict=False):
-        (tmp_path / name).write_text(f"{text}\n", encoding="utf-8")
-    content = written(code["sh"][0].removeprefix("gensig "))
-    assert len(content["natural_frequencies_hz"]) == 4
-    assert (tmp_path / "modes.png").read_bytes().startswith(b"\x89PNG")
-    fan = tmp_path / "mine" / "system" / "my_fan.yaml"
-    fan.parent.mkdir(parents=True)
-    fan.write_text(code["yaml"][0].replace("/data", str(tmp_path)), encoding="utf-8")
-    assert written("modes system=my_fan --config-dir mine")["system"] == "my_fan"
-    exec(compile(code["python"][0], "your_drive_line.md", "exec"), {})
-    assert "94.59" in capsys.readouterr().out
 
 
 def test_forced_response_writes_the_response_of_every_node(written, capsys):
