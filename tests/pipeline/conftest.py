@@ -3,10 +3,8 @@
 import json
 import shlex
 import shutil
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pytest
 from matplotlib.figure import Figure
@@ -15,20 +13,18 @@ from small_sets import make
 from gensig.cli import main
 
 
-def run(line: str, *more: str | Path) -> None:
+def run(line, *more):
     """Run a command of gensig that must succeed; ``more`` are words that need no quotes."""
     words = [*shlex.split(line), *map(str, more)]
     assert main(words) == 0, words
 
 
 @pytest.fixture
-def gensig(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Callable[..., tuple[str, str]]:
+def gensig(tmp_path, monkeypatch, capsys):
     """Run a command in an empty folder; returns what it prints, on stdout and on stderr."""
     monkeypatch.chdir(tmp_path)
 
-    def printed(line: str, *more: str | Path) -> tuple[str, str]:
+    def printed(line, *more):
         capsys.readouterr()
         run(line, *more)
         return capsys.readouterr()
@@ -37,13 +33,11 @@ def gensig(
 
 
 @pytest.fixture
-def written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Callable[..., dict[str, Any]]:
+def written(tmp_path, monkeypatch):
     """Run a command in an empty folder; returns the content of its JSON file."""
     monkeypatch.chdir(tmp_path)
 
-    def content(line: str, *more: str | Path) -> dict[str, Any]:
+    def content(line, *more):
         run(line, *more, "--json", "written.json")
         return dict(json.loads(Path("written.json").read_text()))
 
@@ -51,11 +45,11 @@ def written(
 
 
 @pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
+def drawn(monkeypatch):
     """The panels of each figure by their titles; figures are not rendered."""
     figures = []
 
-    def keep(figure: Figure, path: Path, **_: Any) -> None:
+    def keep(figure, path, **_):
         path.write_text("drawn")
         figures.append({panel.get_title(): panel for panel in figure.axes})
 
@@ -69,10 +63,10 @@ class TinySet:
 
     folder: Path
 
-    def copy_to(self, folder: Path) -> Path:
+    def copy_to(self, folder):
         return Path(shutil.copytree(self.folder, folder))
 
 
 @pytest.fixture(scope="session")
-def tiny_set(tmp_path_factory: pytest.TempPathFactory) -> TinySet:
+def tiny_set(tmp_path_factory):
     return TinySet(make(tmp_path_factory.mktemp("tiny") / "data"))

@@ -1,7 +1,5 @@
 """A data set that is made in a moment, and the bytes that make two of them equal."""
 
-from pathlib import Path
-
 from gensig.cli import main
 
 TINY = (
@@ -14,13 +12,13 @@ TINY = (
 PARTS = ("plan.csv", "index.h5", "shards/*", "splits/*")
 
 
-def make(out: Path, *overrides: str) -> Path:
+def make(out, *overrides):
     words = [*TINY, "executor.n_workers=1", *overrides, f"out={out}"]
     assert main(["generate", "--quiet", *words]) == 0
     return out
 
 
-def contents(folder: Path) -> dict[str, bytes]:
+def contents(folder):
     """Bytes of every file of a data set that its bits decide, unfinished ones included."""
     paths = [path for part in PARTS for path in folder.glob(part)]
     return {str(path.relative_to(folder)): path.read_bytes() for path in paths}

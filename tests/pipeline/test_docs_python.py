@@ -6,10 +6,9 @@ data set under the names that pages use.
 """
 
 import re
-from pathlib import Path
 
 import pytest
-from docs_pages import NAMES, PAGES, ROOT, Block, blocks
+from docs_pages import NAMES, PAGES, ROOT, blocks
 from small_sets import make
 
 FOLDERS = ("runs/quick", "runs/first", "runs/traced", "runs/measured", "DIR")
@@ -23,7 +22,7 @@ SMALL = (
 )
 
 
-def _python(page: Path) -> list[Block]:
+def _python(page):
     return [
         block
         for block in blocks(page.read_text(encoding="utf-8"))
@@ -31,7 +30,7 @@ def _python(page: Path) -> list[Block]:
     ]
 
 
-def _runs(block: Block) -> bool:
+def _runs(block):
     return not block.mark.startswith(("not run: ", "run by "))
 
 
@@ -43,7 +42,7 @@ RUN = [
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     """A folder whose data sets have the names that pages use; all are the same one."""
     folder = tmp_path_factory.mktemp("docs")
     (folder / "runs").mkdir()
@@ -54,7 +53,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=NAMES)
-def test_python_compiles_and_says_who_runs_it(page: Path) -> None:
+def test_python_compiles_and_says_who_runs_it(page):
     for block in _python(page):
         compile(block.code, f"{page.name}:{block.line}", "exec")
         if found := re.fullmatch(r"run by (\S+)", block.mark):
@@ -63,10 +62,8 @@ def test_python_compiles_and_says_who_runs_it(page: Path) -> None:
 
 
 @pytest.mark.parametrize("page", RUN, ids=lambda page: page.name)
-def test_python_runs_as_it_stands(
-    page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_python_runs_as_it_stands(page, folder, monkeypatch):
     monkeypatch.chdir(folder)
-    names: dict[str, object] = {}
+    names = {}
     for block in filter(_runs, _python(page)):
         exec(compile(block.code, f"{page.name}:{block.line}", "exec"), names)

@@ -10,7 +10,6 @@ from gensig.cli import main
 from gensig.driveline import loads as line_loads
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
-from gensig.record.simulate import simulate_records
 
 FEW = (
     "plan.n_records=null",
@@ -66,18 +65,11 @@ def test_a_crack_of_a_drive_line_grows_by_the_impacts_of_its_mesh(line):
     assert_array_equal(columns["torque_nm"], 12680.0)
 
 
-def test_a_worn_out_record_of_a_drive_line_is_made(line):
-    last = line.record(int(np.flatnonzero(line.columns["label_name"] == "crack")[-1]))
-    record = simulate_records(read_request(list(LINE)).config, [last])[0]
-    assert np.isfinite(record.signals["acceleration"]).all()
-
-
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [
         (("life=mixed", "plan.classes=[wear]"), "wear is not followed on a drive line"),
         (("operating=ramp",), "set-points are steady"),
-        (("system=two_stage_gearbox", "system.record_mesh=[3,4]"), "no node"),
     ],
 )
 def test_unknown_lives_of_a_drive_line_are_refused(overrides, message, capsys):
@@ -95,6 +87,3 @@ def test_cracks_and_pits_of_helical_pairs_make_lives():
     assert (np.diff(columns["severity"][crack]) > 0.0).all()
     assert columns["life_growing"].all()
     assert (np.diff(columns["params/fault.pitting_damage"][~crack]) > 0.0).all()
-    last = plan.record(int(np.flatnonzero(crack)[-1]))
-    (record,) = simulate_records(read_request(list(HELICAL)).config, [last])
-    assert np.isfinite(record.signals["acceleration"]).all()

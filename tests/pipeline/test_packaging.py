@@ -5,7 +5,6 @@ import subprocess
 import sys
 import tomllib
 import zipfile
-from pathlib import Path
 
 import pytest
 
@@ -64,67 +63,55 @@ gensig.load_system("fault=healthy").pear
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("packages")
 
 
 @pytest.fixture(scope="module")
-def source(folder: Path) -> Path:
+def source(folder):
     """An unpacked source distribution of this tree."""
     return unpack(build_sdist(folder), folder)
 
 
 @pytest.fixture(scope="module")
-def wheel(source: Path, folder: Path) -> Path:
+def wheel(source, folder):
     """The wheel that the source distribution makes."""
     return build_wheel(source, folder)
 
 
 @pytest.fixture(scope="module")
-def python(wheel: Path, folder: Path) -> Path:
+def python(wheel, folder):
     """Interpreter of a fresh environment: our wheel, everything else from the test environment."""
     python = environment_with(wheel, folder)
     lend_compiled(python)
     return python
 
 
-def test_source_distribution_holds_the_whole_tree(source: Path) -> None:
+def test_source_distribution_holds_the_whole_tree(source):
     assert {
         name for name in files_of_the_tree() if not (source / name).is_file()
     } == set()
 
 
-def test_wheel_holds_the_packages_and_nothing_else(wheel: Path) -> None:
+def test_wheel_holds_the_packages_and_nothing_else(wheel):
     parts = [name.split("/", 1) for name in files_of_the_tree()]
-    expected = {
-        f"{PACKAGES[part[0]]}/{part[1]}" for part in parts if part[0] in PACKAGES
-    }
+    packaged = [part for part in parts if part[0] in PACKAGES]
+    expected = {f"{PACKAGES[folder]}/{name}" for folder, name in packaged}
     with zipfile.ZipFile(wheel) as archive:
-        notes = {
-            name.split("/", 1)[1]
-            for name in archive.namelist()
-            if ".dist-info/" in name
-        }
-        files = {name for name in archive.namelist() if ".dist-info/" not in name}
+        names = set(archive.namelist())
+    files = {name for name in names if ".dist-info/" not in name}
     assert files == expected
+    notes = {name.split("/", 1)[1] for name in names - files}
     assert {"licenses/LICENSE", "licenses/THIRD-PARTY.md", "entry_points.txt"} < notes
-    assert {
-        "gensig/py.typed",
-        "diagnose/py.typed",
-        "gensig/configs/generate.yaml",
-    } < files
+    typed = {"gensig/py.typed", "diagnose/py.typed"}
+    assert {*typed, "gensig/configs/generate.yaml"} < files
 
 
-def test_wheel_runs_from_another_folder(python: Path, tmp_path: Path) -> None:
-    def run(*command: str | Path) -> str:
-        done = subprocess.run(
-            command,
-            cwd=tmp_path,
-            env=ENVIRONMENT,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+def test_wheel_runs_from_another_folder(python, tmp_path):
+    def run(program, *words):
+        command = [python.parent / program, *words]
+        options = {"cwd": tmp_path, "env": ENVIRONMENT, "text": True}
+        done = subprocess.run(command, capture_output=True, **options)
         assert done.returncode == 0, done.stderr
         return done.stdout
 
@@ -132,16 +119,15 @@ def test_wheel_runs_from_another_folder(python: Path, tmp_path: Path) -> None:
         "import gensig, gensig.configs, diagnose; "
         "print(gensig.__file__, gensig.configs.__file__, diagnose.__file__)"
     )
-    paths = run(python, "-W", "error", "-c", code).split()
+    paths = run("python", "-W", "error", "-c", code).split()
     assert all(path.startswith(str(python.parents[1])) for path in paths)
-    gensig = python.parent / "gensig"
-    run(gensig, *RECORD, "out=data")
-    run(gensig, "verify", "data")
-    run(python.parent / "diagnose", "--help")
+    run("gensig", *RECORD, "out=data")
+    run("gensig", "verify", "data")
+    run("diagnose", "--help")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["data"]
 
 
-def test_tests_run_from_the_wheel(source: Path, python: Path) -> None:
+def test_tests_run_from_the_wheel(source, python):
     """A file of them; `make wheel-test` runs all."""
     take_packages_out(source, python)
     assert (
@@ -155,67 +141,34 @@ def test_tests_run_from_the_wheel(source: Path, python: Path) -> None:
     )
 
 
-def test_types_reach_those_who_use_the_wheel(python: Path, tmp_path: Path) -> None:
+def test_types_reach_those_who_use_the_wheel(python, tmp_path):
     (tmp_path / "typed.py").write_text(TYPED)
     (tmp_path / "mistyped.py").write_text(MISTYPED)
-    options = [
-        "--python-executable",
-        str(python),
-        "--follow-imports=silent",
-        "--cache-dir",
-        str(tmp_path / "cache"),
-    ]
-    command = [sys.executable, "-m", "mypy", *options, "typed.py", "mistyped.py"]
+    options = "--follow-imports=silent --cache-dir cache typed.py mistyped.py"
+    command = [sys.executable, "-m", "mypy", "--python-executable", str(python)]
     shown = subprocess.run(
-        command,
+        [*command, *options.split()],
         cwd=tmp_path,
         env=ENVIRONMENT,
         capture_output=True,
         text=True,
-        check=False,
     ).stdout
-    errors = [
-        line.split(" error: ")[0] for line in shown.splitlines() if " error: " in line
-    ]
+    errors = re.findall(r"^(\S+) error: ", shown, flags=re.MULTILINE)
     assert errors == ["mistyped.py:4:", "mistyped.py:5:"], shown
 
 
-def test_all_is_every_extra_that_a_command_asks_for() -> None:
+def test_all_is_every_extra_that_a_command_asks_for():
     extras = PROJECT["optional-dependencies"]
-    of_commands = set(extras) - NOT_FOR_COMMANDS
-    assert {line for name in of_commands for line in extras[name]} <= {
-        *extras["test"],
-        "torch>=2.6",
-    }  # tests try them
-    assert extras["all"] == [
-        f"gensig[{','.join(name for name in extras if name not in NOT_FOR_COMMANDS)}]"
-    ]
-    files = [
-        path
-        for name in ("gensig", "diagnose", "configs", "docs")
-        for path in (ROOT / name).rglob("*")
-    ]
-    texts = [
-        path.read_text(encoding="utf-8")
-        for path in files
-        if path.suffix in (".py", ".yaml", ".md")
-    ]
-    named = {
-        name
-        for text in texts
-        for part in re.findall(r"gensig\[([\w, ]+)\]", text)
-        for name in part.split(",")
-    }
-    assert (
-        of_commands <= named
-    )  # whoever lacks a package is told the extra that brings it
-    assert named <= set(extras)
-
-
-def test_this_environment_finds_its_configuration(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "gensig.cli", "stiffness", "gear=xiamen_23_84"]
-    done = subprocess.run(
-        command, cwd=tmp_path, capture_output=True, text=True, check=True
-    )
-    assert "1.71178" in done.stdout
-    assert list(tmp_path.iterdir()) == []
+    of_commands = [name for name in extras if name not in NOT_FOR_COMMANDS]
+    needed = {line for name in of_commands for line in extras[name]}
+    assert needed <= {*extras["test"], "torch>=2.6"}  # tests try them
+    assert extras["all"] == [f"gensig[{','.join(of_commands)}]"]
+    named = set()
+    for name in ("gensig", "diagnose", "configs", "docs"):
+        for path in (ROOT / name).rglob("*"):
+            if path.suffix in (".py", ".yaml", ".md"):
+                text = path.read_text(encoding="utf-8")
+                found = re.findall(r"gensig\[([\w, ]+)\]", text)
+                named |= set(",".join(found).split(",")) - {""}
+    # whoever lacks a package is told the extra that brings it
+    assert set(of_commands) <= named <= set(extras)

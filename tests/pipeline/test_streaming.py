@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 from torch.utils.data import DataLoader
 
 import gensig
@@ -65,7 +66,7 @@ def test_records_are_those_of_generate_bit_for_bit(stream, records, stored):
     for name in stored.column_names:
         part = {True: "signals", False: "values"}[name in SIGNALS]
         streamed = np.array([getattr(record, part)[name] for record in records])
-        np.testing.assert_array_equal(
+        assert_array_equal(
             streamed, stored.column(name), err_msg=name, strict=name in SIGNALS
         )
     for index, record in enumerate(records):
@@ -76,7 +77,7 @@ def test_records_are_those_of_generate_bit_for_bit(stream, records, stored):
             assert streamed.tobytes() == written.tobytes()
     for name, values in stored.plan.columns.items():
         if name not in ("shard", "row"):
-            np.testing.assert_array_equal(stream.column(name), values, err_msg=name)
+            assert_array_equal(stream.column(name), values, err_msg=name)
     assert stream.protocols == stored.protocols
     for protocol in stream.protocols:
         assert stream.split(protocol) == stored.split(protocol)
@@ -132,7 +133,7 @@ def test_epochs_follow_one_another_and_keep_the_part(stream):
     assert [epoch.epoch for epoch in endless] == [0, 1, 2, 3, 4]
     assert ids(part.at_epoch(1)) == ids(later.shard(1, 2)) == ids(part)
     for name, values in part.at_epoch(1).plan.columns.items():
-        np.testing.assert_array_equal(values, later.plan.columns[name])
+        assert_array_equal(values, later.plan.columns[name])
     speeds = [each.column("speed_set_rpm") for each in (later, stream)]
     assert not np.array_equal(*speeds)
 

@@ -38,7 +38,7 @@ PHYSICS = re.compile(r"A crack|crack +\d+%|sidebands|spur|helical")
 
 
 @pytest.fixture(scope="module")
-def printed(tmp_path_factory: pytest.TempPathFactory) -> str:
+def printed(tmp_path_factory):
     """Output of all cells, once the checks of what they computed have passed."""
     folder = tmp_path_factory.mktemp("tour")
     (folder / "tour.py").write_text("\n".join([*CODE, CHECKS]), encoding="utf-8")
@@ -56,7 +56,7 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> str:
     return done.stdout
 
 
-def test_it_runs_and_the_figures_in_its_outputs_are_still_true(printed: str) -> None:
+def test_it_runs_and_the_figures_in_its_outputs_are_still_true(printed):
     now, then = (
         [
             [float(number) for number in re.findall(r"\d+\.?\d*", line)]
@@ -70,7 +70,7 @@ def test_it_runs_and_the_figures_in_its_outputs_are_still_true(printed: str) -> 
         assert new == pytest.approx(old, rel=0.02, abs=2e-3)
 
 
-def test_its_outputs_are_small_and_name_no_folder_of_a_machine() -> None:
+def test_its_outputs_are_small_and_name_no_folder_of_a_machine():
     assert NOTEBOOK.stat().st_size < 600_000
     assert sum("image/png" in output.get("data", {}) for output in OUTPUTS) == 4
     assert not re.search(r"/(tmp|home|root|Users)/", STORED)

@@ -2,11 +2,10 @@
 
 import json
 import pickle
-from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 import gensig
 import gensig.record.inputs
@@ -111,7 +110,7 @@ def test_it_is_what_a_data_set_stores():
     found = np.sqrt(np.sum(cell.residual[2] ** 2) / power[0])
     assert found == pytest.approx(record.values["detectability"], rel=1e-12)
     stored = record.signals["acceleration"]
-    np.testing.assert_array_equal(cell.faulty[2].astype(np.float32), stored)
+    assert_array_equal(cell.faulty[2].astype(np.float32), stored)
     assert_allclose(power, record.signals["noise_power"], rtol=1e-12, atol=0)
 
 
@@ -151,12 +150,7 @@ def test_a_cell_of_another_process_has_the_same_bits(crack):
     for name in ("seen", "standard_error", "auroc", "indicator", "raises"):
         assert seen[name].tobytes() == getattr(crack, name)[1, 1].tobytes()
     known = np.median(np.sqrt(np.cumsum(cell.energy, axis=-1)), axis=0)
-    np.testing.assert_array_equal(known, crack.known[1, 1])
-
-
-def test_other_machines_are_others():
-    first, second = (pairs_of(epoch=epoch).cell(0).sound for epoch in (0, 1))
-    assert not np.isin(first, second).any()
+    assert_array_equal(known, crack.known[1, 1])
 
 
 @pytest.mark.parametrize(
@@ -213,7 +207,7 @@ def test_turns_and_random_walks_follow_the_plan():
     assert len({row["params/operating.course_seed"] for row in pairs.rows}) == 8
 
 
-def test_the_command_writes_everything(tmp_path: Path, capsys):
+def test_the_command_writes_everything(tmp_path, capsys):
     table, figure = tmp_path / "map.json", tmp_path / "map.png"
     typed = (
         "--speeds 900 1800 --torques 20 sensing.snr_db=15 --bandwidths 2000 20000 "
@@ -254,42 +248,6 @@ def test_a_fault_is_named_with_its_sizes():
 def test_a_map_without_any_value_is_refused():
     with pytest.raises(GensigError, match="no pair"):
         best_and_worst(np.full((2, 2), np.nan))
-
-
-@pytest.mark.parametrize(
-    ("typed", "message"),
-    [
-        ("", "fault=healthy: there is nothing to find"),
-        ("fault=crack sensing.snr_db=null", "sensing.snr_db = null"),
-        ("fault=crack sensing.snr_reference=record", "use healthy_twin"),
-        ("fault=crack --n-units 3", "must be a whole number of at least 4"),
-        (
-            "fault=crack --speeds 900 900",
-            "speeds in r/min: 900, 900; give positive numbers, each once",
-        ),
-        ("fault=crack --torques -5", "torques in N m: -5; give positive numbers"),
-        ("fault=crack --torques 0", "torques in N m: 0; give positive numbers"),
-        ("fault=crack --speeds fast", "--speeds fast: give numbers"),
-        (
-            f"fault=crack --speeds {' '.join(map(str, range(100, 501)))}",
-            "more than 400 cells",
-        ),
-        (
-            "fault=crack --bandwidths 30000",
-            "from 10 to half the sampling rate, 25600",
-        ),
-        ("fault=crack --workers 0", "--workers 0 must be at least 1"),
-        ("fault=crack --plot map.txt", "--plot map.txt: the name must end in .png"),
-        ("fault=crack --json nowhere/map.json", "there is no folder nowhere"),
-        ("fault=crak", "no option 'crak' of fault"),
-        ("fault=crack plan.n_gearboxes=0", "plan.n_gearboxes = 0"),
-    ],
-)
-def test_a_mistake_is_one_line(typed, message, capsys):
-    assert main(["detectability", *typed.split()]) == 2
-    error = capsys.readouterr().err
-    assert message in error
-    assert error.count("\n") == 1
 
 
 def test_pairs_take_a_composed_configuration():

@@ -151,12 +151,12 @@ REALISTIC = "--experiment realistic --rate 16000 --classes healthy wear"
 HELICAL = "--helix 20"
 
 
-@pytest.mark.parametrize("more", ["", HELICAL, REALISTIC, f"{HELICAL} {REALISTIC}"])
+@pytest.mark.parametrize("more", ["", f"{HELICAL} {REALISTIC}"])
 def test_the_printed_commands_work_as_printed(more, gensig, tmp_path):
     said, _ = gensig(f"new gearbox mine {SHEET} {more}")
     lines = said.partition("next:\n")[2].splitlines()
     simulate, generate, report = (shlex.join(shlex.split(line)[1:]) for line in lines)
-    cheap = "operating.duration_s=0.1 mesh.n_slices=8"
+    cheap = "operating.duration_s=0.1 mesh.n_slices=4"
     said, _ = gensig(f"{simulate} {cheap}")
     mesh = float(re.search(r"mesh frequency (\S+)", said)[1])
     tolerance = {True: 2e-2, False: 1e-3}["realistic" in more]  # a speed that wanders

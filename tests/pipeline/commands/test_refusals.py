@@ -22,16 +22,17 @@ WORN = (
     "gensig wear-life operating.duration_s=0.1 sensing.channels=[pinion_y,wheel_y] "
     "wear.threshold_um=40"
 )
+DETECT = "diagnose detectability fault=crack"
 FLANK = f"gensig modify-flank {SLICED}"
 ERROR = f"gensig transmission-error {SLICED}"
 
 
-def uniform(key: str) -> str:
+def uniform(key):
     """An override that varies one key."""
     return f"'plan.vary={{{key}: {{distribution: uniform, low: 1, high: 2}}}}'"
 
 
-def damper(node: object = 45, inertia: float = 0.01, damping: float = 1) -> str:
+def damper(node=45, inertia=0.01, damping=1):
     """A list of one damper without a spring."""
     sizes = f"ring_inertia_kg_m2: {inertia}, damping_nms_per_rad: {damping}"
     return f"{DAMPERS}'[{{node: {node}, {sizes}, stiffness_nm_per_rad: 0}}]'"
@@ -93,6 +94,11 @@ REFUSED = {
     "gensig generate mesh.law=onesided out=x": "mesh.law = 'onesided'; allowed: paper, one_sided",
     "gensig generate sensing.channels=[pinon_x] out=x": "allowed: pinion_x",
     "gensig generate dataset.compression=zip out=x": "gzip",
+    "gensig generate dataset.sample_type=int8 out=x": "allowed: float32, int16",
+    "gensig generate executor=slurm executor.shard_index=0 executor.shard_count=1 out=x": (
+        "--freeze"
+    ),
+    "gensig plan --freeze": "out=DIR",
     "gensig generate executor=cuda out=x": "there is dask, local, slurm",
     "gensig generate executor.n_workers=0 out=x": "executor.n_workers",
     "gensig generate plan.n_records=0 out=x": "plan.n_records",
@@ -181,6 +187,19 @@ REFUSED = {
     f"{WORN} wear.vibration_rise_db=loud": "= 'loud' is not a number or null",
     f"{WORN} wear.vibration_rise=3": "did you mean 'wear.vibration_rise_db'",
     f"{WORN} wear.vibration_rise_db=3 sensing.channels=[pinion_rotation]": "name an acceleration",
+    # maps of detectability
+    "diagnose detectability": "fault=healthy: there is nothing to find",
+    f"{DETECT} sensing.snr_db=null": "sensing.snr_db = null",
+    f"{DETECT} sensing.snr_reference=record": "use healthy_twin",
+    f"{DETECT} --n-units 3": "must be a whole number of at least 4",
+    f"{DETECT} --speeds 900 900": "speeds in r/min: 900, 900; give positive numbers, each once",
+    f"{DETECT} --torques -5": "torques in N m: -5; give positive numbers",
+    f"{DETECT} --torques 0": "torques in N m: 0; give positive numbers",
+    f"{DETECT} --speeds {' '.join(map(str, range(100, 501)))}": "more than 400 cells",
+    f"{DETECT} --bandwidths 30000": "from 10 to half the sampling rate, 25600",
+    f"{DETECT} --workers 0": "--workers 0 must be at least 1",
+    f"{DETECT} --plot map.txt": "--plot map.txt: the name must end in .png",
+    f"{DETECT} plan.n_gearboxes=0": "plan.n_gearboxes = 0",
     # drive lines
     "gensig modes system=shaft_line": (
         "system.shafting_csv is required: give a path, or one of engine_gears.csv"

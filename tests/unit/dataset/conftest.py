@@ -1,17 +1,15 @@
 import functools
 import shutil
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from dataset_samples import build, make_plan
 
 from gensig.dataset.folder import beginning
-from gensig.dataset.plan import Plan
+from gensig.dataset.reader import open_dataset
 
 
 @pytest.fixture(scope="session", autouse=True)
-def environment() -> Iterator[None]:
+def environment():
     """The environment of the run, found once: it takes longer than a small data set."""
     with pytest.MonkeyPatch.context() as patch:
         cached = functools.cache(beginning.environment)
@@ -20,17 +18,24 @@ def environment() -> Iterator[None]:
 
 
 @pytest.fixture
-def plan() -> Plan:
+def plan():
     return make_plan()
 
 
 @pytest.fixture(scope="session")
-def template(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def template(tmp_path_factory):
     """A closed data set, to read only."""
     return build(tmp_path_factory.mktemp("template") / "set", make_plan())
 
 
 @pytest.fixture
-def folder(tmp_path: Path, template: Path) -> Path:
+def folder(tmp_path, template):
     """A copy of the closed data set, to damage."""
     return shutil.copytree(template, tmp_path / "set")
+
+
+@pytest.fixture
+def data(template):
+    """A reader of the closed data set."""
+    with open_dataset(template) as found:
+        yield found

@@ -1,9 +1,6 @@
 """A small data set, made the way generation makes one, without any physics."""
 
 import json
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -13,7 +10,7 @@ from gensig.dataset.folder.layout import shard_path
 from gensig.dataset.folder.manifest import finalize, identity_hash, record_shard
 from gensig.dataset.folder.verify import verify
 from gensig.dataset.plan import Plan, record_ids, shard_places
-from gensig.dataset.splitting.splits import SUBSETS, SplitTable
+from gensig.dataset.splitting.splits import SUBSETS
 from gensig.dataset.storage.atomic import sha256_file
 from gensig.dataset.storage.checksums import accept_edits
 from gensig.dataset.storage.shard import ShardWriter
@@ -47,11 +44,11 @@ CONFIG = {
 
 
 def make_plan(
-    n_records: int = 36,
-    records_per_shard: int = 10,
-    n_units: int = 6,
-    n_classes: int = 3,
-) -> Plan:
+    n_records=36,
+    records_per_shard=10,
+    n_units=6,
+    n_classes=3,
+):
     shard, row = shard_places(n_records, records_per_shard)
     index = np.arange(n_records)
     label = index % n_classes
@@ -72,9 +69,7 @@ def make_plan(
     )
 
 
-def row_of(
-    plan: Plan, index: int, *, status: str = "ok"
-) -> tuple[dict[str, np.ndarray], dict]:
+def row_of(plan, index, *, status="ok"):
     """Signals and values of one record."""
     record = plan.record(index)
     label = int(record["label"])
@@ -104,7 +99,7 @@ def row_of(
     return signals, values
 
 
-def writer_of(path: Path, n_records: int = 1, **changes: Any) -> ShardWriter:
+def writer_of(path, n_records=1, **changes):
     """The writer of a small shard; keywords replace its declaration."""
     given = {
         "signals": SIGNALS,
@@ -114,7 +109,7 @@ def writer_of(path: Path, n_records: int = 1, **changes: Any) -> ShardWriter:
     return ShardWriter(path, n_records=n_records, **(given | changes))
 
 
-def forge(folder: Path, shard: int, change: Callable[[h5py.File], None]) -> str:
+def forge(folder, shard, change):
     """Change a shard, make every sha256 and size agree, and return the problems found."""
     path = shard_path(folder, shard)
     with h5py.File(path, "r+") as file:
@@ -128,20 +123,20 @@ def forge(folder: Path, shard: int, change: Callable[[h5py.File], None]) -> str:
     return "\n".join(verify(folder).problems)
 
 
-def setting(name: str, at: object, value: object) -> Callable[[h5py.File], None]:
+def setting(name, at, value):
     """A change of values of a data set."""
     return lambda file: file[name].__setitem__(at, value)
 
 
 def write_shard(
-    path: Path,
-    plan: Plan,
-    shard: int = 0,
+    path,
+    plan,
+    shard=0,
     *,
-    failed: int | None = None,
-    clean: bool = False,
+    failed=None,
+    clean=False,
     **changes,
-) -> ShardWriter:
+):
     """With ``clean``, every record's signal is stored a second time as the one without noise, at
     half its size."""
     rows = plan.rows(shard)
@@ -161,16 +156,16 @@ def write_shard(
 
 
 def build(
-    out: Path,
-    plan: Plan,
+    out,
+    plan,
     *,
-    shards: range | None = None,
-    close: bool = True,
-    failed: int | None = None,
-    clean: bool = False,
-    figures: bool = False,
-    **storage: str,
-) -> Path:
+    shards=None,
+    close=True,
+    failed=None,
+    clean=False,
+    figures=False,
+    **storage,
+):
     """A data-set folder; fewer shards or close=False make an interrupted one."""
     identity = identity_hash(CONFIG, "0.1.0")
     create_folder(
@@ -192,7 +187,7 @@ def build(
     return out
 
 
-def sides(table: SplitTable, plan: Plan, column: str) -> list[np.ndarray]:
+def sides(table, plan, column):
     """Values of a plan column in train, validation and test."""
     ids = plan.columns["record_id"]
     record = np.argsort(ids)[np.searchsorted(np.sort(ids), table.record_id)]

@@ -1,99 +1,79 @@
 """Reading of data sets in plan order, from several processes, finished or not."""
 
 import pickle
-from pathlib import Path
 
 import numpy as np
 import pytest
 from dataset_samples import CLASSES, build, row_of
+from numpy.testing import assert_array_equal
 
 import gensig.dataset.reader as reader_module
-from gensig.dataset.folder.layout import shard_path
-from gensig.dataset.plan import Plan
 from gensig.dataset.reader import open_dataset
 from gensig.errors import DatasetError
 
 
-def test_facts(folder: Path) -> None:
-    with open_dataset(str(folder)) as data:
-        assert (data.n_records, len(data), data.n_samples) == (36, 36, 200)
-        assert data.sampling_rate == pytest.approx(1000.0)
-        assert data.channel_names == ["pinion_y", "wheel_ü"]
-        assert data.class_names == CLASSES
-        assert data.attributes["n_teeth_wheel"] == 84
-        assert data.protocols == [
-            "by_unit",
-            "cross_gearbox",
-            "cross_specimen",
-            "random_window_leaky",
-        ]
-        assert {"label", "params/crack_depth_mm", "noise_power"} <= set(
-            data.column_names
-        )
-        assert "acceleration" not in data.column_names
-        assert data.usable.all()
+def test_facts(data):
+    assert (data.n_records, len(data), data.n_samples) == (36, 36, 200)
+    assert data.sampling_rate == pytest.approx(1000.0)
+    assert data.channel_names == ["pinion_y", "wheel_ü"]
+    assert data.class_names == CLASSES
+    assert data.attributes["n_teeth_wheel"] == 84
+    names = ("by_unit", "cross_gearbox", "cross_specimen", "random_window_leaky")
+    assert data.protocols == names
+    columns = {"label", "params/crack_depth_mm", "noise_power"}
+    assert columns <= set(data.column_names)
+    assert "acceleration" not in data.column_names
+    assert data.usable.all()
 
 
-def test_columns_and_signals_come_in_plan_order(folder: Path, plan: Plan) -> None:
-    with open_dataset(folder) as data:
-        for name in ("record_id", "label", "label_name", "params/crack_depth_mm"):
-            np.testing.assert_array_equal(data.column(name), plan.columns[name])
-        assert data.column("noise_power").shape == (36, 2)
-        for index in (0, 9, 10, 35):
-            expected = row_of(plan, index)[0]["acceleration"]
-            np.testing.assert_array_equal(data.signals(index), expected)
-            np.testing.assert_array_equal(
-                data.signals(index, 20, 70, ["wheel_ü"]), expected[1:, 20:70]
-            )
-            np.testing.assert_array_equal(
-                data.signals(index, channels=[1, 0]), expected[::-1]
-            )
-        assert data.signals(3).dtype == np.float32
+def test_columns_and_signals_come_in_plan_order(data, plan):
+    for name in ("record_id", "label", "label_name", "params/crack_depth_mm"):
+        assert_array_equal(data.column(name), plan.columns[name])
+    assert data.column("noise_power").shape == (36, 2)
+    for index in (0, 9, 10, 35):
+        expected = row_of(plan, index)[0]["acceleration"]
+        assert_array_equal(data.signals(index), expected, strict=True)
+        part = data.signals(index, 20, 70, ["wheel_ü"])
+        assert_array_equal(part, expected[1:, 20:70])
+        turned = data.signals(index, channels=[1, 0])
+        assert_array_equal(turned, expected[::-1])
 
 
-def test_few_files_stay_open(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_few_files_stay_open(data, monkeypatch):
     monkeypatch.setattr(reader_module, "MAX_OPEN_SHARDS", 2)
-    with open_dataset(folder) as data:
-        for index in (0, 10, 20, 30, 0):
-            data.signals(index)
-        assert len(data._files) == 2
+    for index in (0, 10, 20, 30, 0):
+        data.signals(index)
+    assert len(data._files) == 2
 
 
-def test_split(folder: Path, plan: Plan) -> None:
-    with open_dataset(folder) as data:
-        split = data.split("by_unit")
-        assert list(split) == ["train", "validation", "test"]
-        assert sorted(i for part in split.values() for i, _, _ in part) == list(
-            range(36)
-        )
-        units = [
-            {data.column("unit_id")[i] for i, _, _ in part} for part in split.values()
-        ]
-        assert sum(map(len, units)) == len(set.union(*units)) == 6
-        assert all(part[0][1:] == (0.0, 1.0) for part in split.values())
-        assert sum(map(len, data.split("random_window_leaky").values())) == 8 * 36
+def test_split(data):
+    split = data.split("by_unit")
+    assert list(split) == ["train", "validation", "test"]
+    numbers = [number for part in split.values() for number, _, _ in part]
+    assert sorted(numbers) == list(range(36))
+    assert all(part[0][1:] == (0.0, 1.0) for part in split.values())
+    assert sum(map(len, data.split("random_window_leaky").values())) == 8 * 36
 
 
-def test_mistakes_are_one_line(folder: Path) -> None:
-    with open_dataset(folder) as data:
-        for call in (
-            lambda: data.column("acceleration"),
-            lambda: data.split("../plan"),
-            lambda: data.signals(36),
-            lambda: data.signals(-1),
-            lambda: data.signals(0, 5, 5),
-            lambda: data.signals(0, 0, 201),
-            lambda: data.signals(0, channels=["z"]),
-            lambda: data.signals(0, channels=[2]),
-            lambda: data.signals(0, name="acceleration_clean"),
-            lambda: data.signals(0, name="label"),
-        ):
-            with pytest.raises(DatasetError) as caught:
-                call()
-            assert "\n" not in str(caught.value)
+def test_mistakes_are_one_line(data):
+    for call in (
+        lambda: data.column("acceleration"),
+        lambda: data.split("../plan"),
+        lambda: data.signals(36),
+        lambda: data.signals(-1),
+        lambda: data.signals(0, 5, 5),
+        lambda: data.signals(0, 0, 201),
+        lambda: data.signals(0, channels=["z"]),
+        lambda: data.signals(0, channels=[2]),
+        lambda: data.signals(0, name="acceleration_clean"),
+        lambda: data.signals(0, name="label"),
+    ):
+        with pytest.raises(DatasetError) as caught:
+            call()
+        assert "\n" not in str(caught.value)
 
 
-def test_incomplete_set_is_refused_unless_asked_for(tmp_path: Path, plan: Plan) -> None:
+def test_incomplete_set_is_refused_unless_asked_for(tmp_path, plan):
     folder = build(tmp_path / "a", plan, shards=range(1, 3), close=False, failed=12)
     with pytest.raises(DatasetError, match="2 of 4 shards are done"):
         open_dataset(folder)
@@ -102,31 +82,26 @@ def test_incomplete_set_is_refused_unless_asked_for(tmp_path: Path, plan: Plan) 
         assert data.column("record_id")[0] == ""
         assert np.isnan(data.column("torque_nm")[:10]).all()
         assert data.column("label")[35] == -1
-        np.testing.assert_array_equal(
-            data.signals(10), row_of(plan, 10)[0]["acceleration"]
-        )
-        with pytest.raises(
-            DatasetError, match=r"shard-00000\.h5, which is not made yet"
-        ):
+        expected = row_of(plan, 10)[0]["acceleration"]
+        assert_array_equal(data.signals(10), expected)
+        missing = r"shard-00000\.h5, which is not made yet"
+        with pytest.raises(DatasetError, match=missing):
             data.signals(0)
+    empty = build(tmp_path / "b", plan, shards=range(0), close=False)
     with pytest.raises(DatasetError, match="no finished shard"):
-        open_dataset(
-            build(tmp_path / "b", plan, shards=range(0), close=False),
-            allow_incomplete=True,
-        )
+        open_dataset(empty, allow_incomplete=True)
 
 
-def test_pickle_drops_open_files(folder: Path) -> None:
-    with open_dataset(folder) as data:
-        data.signals(0)
-        data.column("label")
-        copy = pickle.loads(pickle.dumps(data))
-        assert copy._files == {}
-        np.testing.assert_array_equal(copy.signals(35), data.signals(35))
-        copy.close()
+def test_pickle_drops_open_files(data):
+    data.signals(0)
+    data.column("label")
+    copy = pickle.loads(pickle.dumps(data))
+    assert copy._files == {}
+    assert_array_equal(copy.signals(35), data.signals(35))
+    copy.close()
 
 
-def test_reading_changes_nothing_and_works_read_only(folder: Path) -> None:
+def test_reading_changes_nothing_and_works_read_only(folder):
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
     for path in folder.rglob("*"):
         path.chmod(0o555 if path.is_dir() else 0o444)
@@ -138,26 +113,13 @@ def test_reading_changes_nothing_and_works_read_only(folder: Path) -> None:
     assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
 
 
-def test_damaged_shard_is_one_line(folder: Path) -> None:
-    shard_path(folder, 1).write_bytes(b"no hdf5")
-    with (
-        open_dataset(folder) as data,
-        pytest.raises(DatasetError, match=r"shard-00001\.h5"),
-    ):
-        data.signals(10)
-
-
-def test_a_protocol_that_is_left_out_is_explained(folder: Path) -> None:
-    with open_dataset(folder) as data:
-        assert "cross_specimen" not in data.left_out
-        assert data.left_out["cross_speed"] == "the plan has no column speed_set_rpm"
-        with pytest.raises(
-            DatasetError,
-            match=r"split .cross_speed. does not exist in .*no column speed_set_rpm",
-        ):
-            data.split("cross_speed")
-        del data.manifest.files["splits/by_unit.csv"]
-        assert (
-            data.left_out["by_unit"]
-            == "gensig 0.1.0, which made the set, did not know it"
-        )
+def test_a_protocol_that_is_left_out_is_explained(data):
+    assert "cross_specimen" not in data.left_out
+    reason = "the plan has no column speed_set_rpm"
+    assert data.left_out["cross_speed"] == reason
+    text = f"split .cross_speed. does not exist in .*{reason}"
+    with pytest.raises(DatasetError, match=text):
+        data.split("cross_speed")
+    del data.manifest.files["splits/by_unit.csv"]
+    unknown = "gensig 0.1.0, which made the set, did not know it"
+    assert data.left_out["by_unit"] == unknown

@@ -4,14 +4,13 @@ may do harm."""
 import collections
 import os
 import time
-from pathlib import Path
 
 import h5py
 import pytest
 from dataset_samples import build, make_plan
 
 from benchmarks import _fuzz_judge
-from benchmarks._fuzz_judge import Verdict, verdicts
+from benchmarks._fuzz_judge import verdicts
 from benchmarks._mutants import SECRET, STRUCTURES, Mutant
 from gensig.dataset.folder.inspection import inspect
 
@@ -20,13 +19,13 @@ N_MUTANTS = 144
 
 
 @pytest.fixture(scope="module")
-def tiny(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def tiny(tmp_path_factory):
     plan = make_plan(n_records=4, records_per_shard=2, n_units=2, n_classes=2)
     return build(tmp_path_factory.mktemp("tiny") / "set", plan)
 
 
 @pytest.fixture(scope="module")
-def found(tiny: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Verdict]:
+def found(tiny, tmp_path_factory):
     """Verdicts of two processes, which begin with what is imported here."""
     scratch = tmp_path_factory.mktemp("mutants")
     halves = (range(N_MUTANTS // 2), range(N_MUTANTS // 2, N_MUTANTS))
@@ -36,7 +35,7 @@ def found(tiny: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Verdict]
         return [verdict for pair in zip(*parts, strict=True) for verdict in pair]
 
 
-def test_no_mutant_does_harm(found: list[Verdict]) -> None:
+def test_no_mutant_does_harm(found):
     assert len(found) == N_MUTANTS
     harmful = [verdict for verdict in found if verdict.fault]
     assert [
@@ -44,24 +43,24 @@ def test_no_mutant_does_harm(found: list[Verdict]) -> None:
     ] == []
 
 
-def test_every_forbidden_structure_was_tried_and_noticed(found: list[Verdict]) -> None:
+def test_every_forbidden_structure_was_tried_and_noticed(found):
     noticed = collections.Counter(verdict.kind for verdict in found if verdict.noticed)
     assert all(noticed[name] for name in STRUCTURES)
 
 
-def _no_mutation(_folder: Path, _seed: int) -> Mutant:
+def _no_mutation(_folder, _seed):
     return Mutant(kind="nothing", refused=True)
 
 
-def _die(_folder: Path) -> None:
+def _die(_folder):
     os._exit(3)
 
 
-def _hang(_folder: Path) -> None:
+def _hang(_folder):
     time.sleep(60)
 
 
-def _crash(_folder: Path) -> None:
+def _crash(_folder):
     raise KeyError("x")
 
 
@@ -74,13 +73,7 @@ def _crash(_folder: Path) -> None:
         (None, "must be refused"),
     ],
 )
-def test_the_judge_sees_harm(
-    tiny: Path,
-    tmp_path: Path,
-    reader: object,
-    message: str,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_judge_sees_harm(tiny, tmp_path, reader, message, monkeypatch):
     """A reader that dies, hangs, stumbles or takes everything is found, and the next mutant is
     tried all the same."""
     monkeypatch.setattr(_fuzz_judge, "TIME_LIMIT", 1.0)
@@ -95,7 +88,7 @@ def test_the_judge_sees_harm(
     assert all(message in verdict.fault for verdict in result)
 
 
-def test_inspect_reads_no_other_file(tmp_path: Path) -> None:
+def test_inspect_reads_no_other_file(tmp_path):
     """A value small enough to be shown may lie in another file, or be declared with a chunk of any
     size."""
     (tmp_path / "secret.bin").write_bytes(SECRET)

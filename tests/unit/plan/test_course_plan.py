@@ -12,11 +12,20 @@ from gensig.plan.request import read_request
 from gensig.systems.registry import read_system
 
 RATE = 51200.0
+OF_THE_WHEEL = 10 / 30 * 84 / 23
 WALK = "operating.speed_profile={kind: random_walk, scatter: 0.01, correlation_time_s: 0.5}"
 
 
 def config(*words):
     return read_request(list(words)).config
+
+
+@pytest.fixture
+def speeds(tmp_path):
+    """The override that takes the speed from a file."""
+    file = tmp_path / "speed.csv"
+    file.write_text("time_s,speed_rpm\n0,600\n2,1200\n")
+    return f"operating.speed_profile={{kind: file, file: '{file}'}}"
 
 
 def samples(seconds):
@@ -27,67 +36,43 @@ class TestTurns:
     @pytest.mark.parametrize(
         ("words", "seconds"),
         [
-            (["operating.turns_of=pinion"], 10 / 30),
-            (["operating.turns_of=wheel"], 10 / 30 * 84 / 23),
-            (["fault=healthy"], 10 / 30),
-            (["fault=crack"], 10 / 30),
-            (["fault=crack", "fault.gear=wheel"], 10 / 30 * 84 / 23),
-            (["plan.classes=[healthy,crack]"], 10 / 30),
+            ("operating.turns_of=pinion", 10 / 30),
+            ("operating.turns_of=wheel", OF_THE_WHEEL),
+            ("fault=crack", 10 / 30),
+            ("fault=crack fault.gear=wheel", OF_THE_WHEEL),
+            ("plan.classes=[healthy,crack]", 10 / 30),
+            ("plan.classes=[healthy,crack,pitting] fault.gear=wheel", OF_THE_WHEEL),
             (
-                ["plan.classes=[healthy,crack,pitting]", "fault.gear=wheel"],
-                10 / 30 * 84 / 23,
+                "fault=compound fault.parts=[{kind:crack},{kind:wear,gear:wheel}]",
+                OF_THE_WHEEL,
             ),
+            ("experiment=quickstart", 0.5),
+            ("experiment=quickstart operating.speed_rpm=600", 1.0),
             (
-                [
-                    "fault=compound",
-                    "fault.parts=[{kind: crack, gear: pinion},{kind: pitting, gear: wheel}]",
-                ],
-                10 / 30 * 84 / 23,
-            ),
-            (["operating.speed_rpm=600"], 1.0),
-            (["experiment=quickstart"], 0.5),
-            (["experiment=quickstart", "operating.speed_rpm=600"], 1.0),
-            (
-                [
-                    "plan.vary={operating.speed_rpm: {distribution: choice, values: [1800, 900, "
-                    "1200]}}"
-                ],
+                "plan.vary={operating.speed_rpm:{distribution:choice,values:[1800,900]}}",
                 10 / 15,
             ),
-            (["operating.speed_profile=[[0,1.2],[1,0.5]]"], 10 / 15),
+            ("operating.speed_profile=[[0,1.2],[1,0.5]]", 10 / 15),
             (
-                [
-                    "operating.speed_profile={kind: ramp, first_factor: 0.25, last_factor: 1}"
-                ],
+                "operating.speed_profile={kind:ramp,first_factor:0.25,last_factor:1}",
                 10 / 7.5,
             ),
             (
-                [
-                    "operating.speed_profile={kind: random_walk, scatter: 0.05, "
-                    "correlation_time_s: 1}"
-                ],
+                "operating.speed_profile={kind:random_walk,scatter:0.05,correlation_time_s:1}",
                 10 / 24,
             ),
-            (["operating.speed_ripple={share: 0.2, order: 1}"], 10 / 24),
+            ("operating.speed_ripple={share:0.2,order:1}", 10 / 24),
         ],
     )
     def test_at_the_slowest_speed(self, words, seconds):
-        found = config("operating.turns=10", *words)
-        assert found["operating"]["duration_s"] == pytest.approx(
-            samples(seconds), rel=1e-12
-        )
-        assert read_system(found).operating.duration == found["operating"]["duration_s"]
+        found = config("operating.turns=10", *words.split())
+        duration = found["operating"]["duration_s"]
+        assert duration == pytest.approx(samples(seconds), rel=1e-12)
+        assert read_system(found).operating.duration == duration
 
-    def test_a_file_is_as_slow_as_its_slowest(self, tmp_path):
-        file = tmp_path / "speed.csv"
-        file.write_text("time_s,speed_rpm\n0,600\n2,1200\n")
-        words = [
-            "operating.turns=10",
-            f"operating.speed_profile={{kind: file, file: '{file}'}}",
-        ]
-        assert config(*words)["operating"]["duration_s"] == pytest.approx(
-            1.0, rel=1e-12
-        )
+    def test_a_file_is_as_slow_as_its_slowest(self, speeds):
+        found = config("operating.turns=10", speeds)["operating"]["duration_s"]
+        assert found == pytest.approx(1.0, rel=1e-12)
 
     def test_without_turns_the_duration_is_the_typed_one(self):
         assert config("operating.duration_s=0.3")["operating"]["duration_s"] == 0.3
@@ -95,69 +80,46 @@ class TestTurns:
     @pytest.mark.parametrize(
         ("words", "text"),
         [
+            ("operating.duration_s=1", "are both given; leave one out"),
             (
-                ["operating.duration_s=1"],
-                "operating.duration_s and operating.turns are both given; leave one out",
-            ),
-            (
-                [
-                    "plan.vary={operating.speed_ripple.share: {distribution: uniform, low: 0, "
-                    "high: 0.1}}",
-                    "operating.speed_ripple={share: 0, order: 1}",
-                ],
+                "plan.vary={operating.speed_ripple.share:{distribution:uniform,low:0,high:0.1}} "
+                "operating.speed_ripple={share:0,order:1}",
                 "operating.turns: the plan draws operating.speed_ripple.share, so the slowest turn "
                 "is not known",
             ),
             (
-                [
-                    "plan.vary={operating.speed_rpm: {distribution: uniform, low: 0, high: 100}}"
-                ],
+                "plan.vary={operating.speed_rpm:{distribution:uniform,low:0,high:100}}",
                 "operating.turns: the slowest speed of the plan must be positive",
             ),
             (
-                ["plan.vary={operating.speed_rpm: {distribution: uniform, low: 5}}"],
+                "plan.vary={operating.speed_rpm:{distribution:uniform,low:5}}",
                 "uniform needs exactly low, high",
             ),
             (
-                ["operating.speed_profile=[[0,1],[1,0]]"],
+                "operating.speed_profile=[[0,1],[1,0]]",
                 "the slowest speed of the plan must be positive",
             ),
         ],
     )
     def test_refusals(self, words, text):
         with pytest.raises(ConfigError, match=re.escape(text)) as caught:
-            config("operating.turns=10", *words)
+            config("operating.turns=10", *words.split())
         assert "\n" not in str(caught.value)
 
 
 class TestWalks:
     def test_each_condition_has_its_own_and_all_its_classes_share_it(self):
-        plan = make_plan(
-            config(
-                WALK,
-                "plan.classes=[healthy,crack,pitting]",
-                "plan.n_records=18",
-                "plan.n_units=3",
-            )
-        )
-        seeds = {}
-        for row in (plan.record(place) for place in range(plan.n_records)):
-            seeds.setdefault(row["condition_id"], set()).add(row[f"params/{SEED_KEY}"])
-        assert len(seeds) == 6
-        assert all(len(own) == 1 for own in seeds.values())
-        assert len(set().union(*seeds.values())) == 6
+        counts = ("plan.n_records=18", "plan.n_units=3")
+        plan = make_plan(config(WALK, "plan.classes=[healthy,crack,pitting]", *counts))
+        names = ("condition_id", f"params/{SEED_KEY}")
+        pairs = set(zip(*(plan.columns[name].tolist() for name in names), strict=True))
+        conditions, seeds = map(set, zip(*pairs, strict=True))
+        assert len(pairs) == len(conditions) == len(seeds) == 6
 
     def test_also_in_a_grid(self):
         speeds = "plan.vary={operating.speed_rpm: {distribution: choice, values: [1200, 1800]}}"
-        plan = make_plan(
-            config(
-                WALK,
-                "plan.design=grid",
-                "plan.n_records=null",
-                "plan.n_units=3",
-                speeds,
-            )
-        )
+        counts = ("plan.design=grid", "plan.n_records=null", "plan.n_units=3")
+        plan = make_plan(config(WALK, *counts, speeds))
         assert len(set(plan.columns[f"params/{SEED_KEY}"])) == 6
 
     def test_a_typed_seed_or_distribution_stays(self):
@@ -175,17 +137,10 @@ class TestWalks:
             in config("operating=drifting", "experiment=quickstart")["plan"]["vary"]
         )
 
-    def test_absolute_files_do_not_go_with_varied_set_points(self, tmp_path):
-        file = tmp_path / "speed.csv"
-        file.write_text("time_s,speed_rpm\n0,600\n2,1200\n")
-        words = [
-            "experiment=quickstart",
-            f"operating.speed_profile={{kind: file, file: '{file}'}}",
-        ]
-        with pytest.raises(
-            ConfigError, match="gives speed_rpm itself, but the plan varies"
-        ):
+    def test_absolute_files_do_not_go_with_varied_set_points(self, speeds):
+        words = ["experiment=quickstart", speeds]
+        text = "gives speed_rpm itself, but the plan varies"
+        with pytest.raises(ConfigError, match=text):
             config(*words)
-        assert (
-            config(*words, "operating.speed_rpm=900")["operating"]["speed_rpm"] == 900
-        )
+        pinned = config(*words, "operating.speed_rpm=900")
+        assert pinned["operating"]["speed_rpm"] == 900

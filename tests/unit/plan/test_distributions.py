@@ -64,23 +64,17 @@ def test_values_rise_with_the_point_and_reach_both_ends(kind):
 
 def test_shapes():
     uniform, log_uniform, normal, integers, choice = (
-        np.array(read_distribution("key", SPECS[kind]).values_at(POINTS))
-        for kind in SPECS
+        np.array(read_distribution("key", spec).values_at(POINTS))
+        for spec in SPECS.values()
     )
-    assert_allclose(
-        [uniform.mean(), uniform.std()], [1.0, 4 / np.sqrt(12)], rtol=1e-3, atol=0
-    )
+    moments = [uniform.mean(), uniform.std()]
+    assert_allclose(moments, [1.0, 4 / np.sqrt(12)], rtol=1e-3, atol=0)
     assert_allclose(np.median(log_uniform), 1.0, rtol=1e-3, atol=0)
-    assert_allclose(
-        normal.mean(), 1.0 + 2 * 0.0853, rtol=0.01, atol=0
-    )  # cut at -1.5 and +2 sigma
+    # cut at -1.5 and +2 sigma
+    assert_allclose(normal.mean(), 1.0 + 2 * 0.0853, rtol=0.01, atol=0)
     assert np.unique(integers, return_counts=True)[1].tolist() == [1000] * 4
-    assert_allclose(
-        [np.mean(choice == value) for value in SPECS["choice"]["values"]],
-        1 / 3,
-        rtol=0,
-        atol=1e-3,
-    )
+    shares = np.unique(choice, return_counts=True)[1] / len(POINTS)
+    assert_allclose(shares, 1 / 3, rtol=0, atol=1e-3)
 
 
 NORMALS = (
@@ -103,15 +97,10 @@ def cut_normal_share(value, *, mean, std, low, high):
 
 @pytest.mark.parametrize("numbers", NORMALS)
 def test_a_cut_normal_has_the_normal_density_between_its_ends(numbers):
-    values = read_distribution("key", {"distribution": "normal", **numbers}).values_at(
-        POINTS
-    )
-    assert_allclose(
-        [cut_normal_share(value, **numbers) for value in values],
-        POINTS,
-        rtol=0,
-        atol=1e-8,
-    )
+    normal = read_distribution("key", {"distribution": "normal", **numbers})
+    values = normal.values_at(POINTS)
+    shares = [cut_normal_share(value, **numbers) for value in values]
+    assert_allclose(shares, POINTS, rtol=0, atol=1e-8)
 
 
 def test_scipy_is_imported_only_when_it_draws():
@@ -121,46 +110,33 @@ def test_scipy_is_imported_only_when_it_draws():
 
 class TestLevels:
     @pytest.mark.parametrize(
-        ("spec", "levels"),
+        ("kind", "levels", "expected"),
         [
-            ({**SPECS["uniform"], "levels": 5}, [-1.0, 0.0, 1.0, 2.0, 3.0]),
-            ({**SPECS["log_uniform"], "levels": 3}, [0.1, 1.0, 10.0]),
-            ({**SPECS["integers"], "levels": 4}, [2, 3, 4, 5]),
-            (
-                {"distribution": "integers", "low": 0, "high": 22, "levels": 3},
-                [0, 11, 22],
-            ),
-            (SPECS["choice"], [1.0, 2.5, 7]),
-            (
-                {
-                    "distribution": "normal",
-                    "mean": 2.0,
-                    "std": 1.0,
-                    "low": -7.0,
-                    "high": 11.0,
-                    "levels": 3,
-                },
-                [2.0 - 0.96742157, 2.0, 2.0 + 0.96742157],
-            ),
+            ("uniform", 5, [-1.0, 0.0, 1.0, 2.0, 3.0]),
+            ("log_uniform", 3, [0.1, 1.0, 10.0]),
+            ("integers", 4, [2, 3, 4, 5]),
+            ("integers", 2, [2, 5]),
         ],
     )
-    def test_values(self, spec, levels):
-        assert read_distribution("key", spec).levels == len(levels)
-        assert_allclose(
-            read_distribution("key", spec).level_values(), levels, rtol=1e-7, atol=1e-12
-        )
+    def test_values(self, kind, levels, expected):
+        found = read_distribution("key", {**SPECS[kind], "levels": levels})
+        assert_allclose(found.level_values(), expected, rtol=1e-12)
 
-    @pytest.mark.parametrize("kind", sorted(SPECS))
-    def test_null_has_none(self, kind):
-        assert read_distribution("key", {**SPECS[kind], "levels": None}).levels == 0
+    def test_levels_of_a_normal_share_its_probability(self):
+        numbers = {"mean": 2.0, "std": 1.0, "low": -7.0, "high": 11.0}
+        spec = {"distribution": "normal", **numbers, "levels": 3}
+        found = read_distribution("key", spec).level_values()
+        assert_allclose(found, 2.0 + 0.96742157 * np.array([-1, 0, 1]), rtol=1e-7)
 
-    @pytest.mark.parametrize("kind", sorted(SPECS))
+    @pytest.mark.parametrize("kind", sorted(set(SPECS) - {"choice"}))
     def test_designs_that_draw_pass_over_them(self, kind):
-        levels = None if kind == "choice" else 3
-        levelled = read_distribution("key", {**SPECS[kind], "levels": levels})
-        assert levelled.values_at(POINTS) == read_distribution(
-            "key", SPECS[kind]
-        ).values_at(POINTS)
+        free = read_distribution("key", {**SPECS[kind], "levels": None})
+        levelled = read_distribution("key", {**SPECS[kind], "levels": 3})
+        assert (free.levels, levelled.levels) == (0, 3)
+        assert levelled.values_at(POINTS) == free.values_at(POINTS)
+
+
+UNIFORM = SPECS["uniform"]
 
 
 @pytest.mark.parametrize(
@@ -173,42 +149,21 @@ class TestLevels:
         ({"low": 1, "high": 2}, "give a distribution"),
         ({"distribution": "unform", "low": 1, "high": 2}, "give a distribution"),
         ({"distribution": "uniform", "low": 1}, "uniform needs exactly low, high"),
+        ({**UNIFORM, "mean": 3}, "uniform needs exactly low, high"),
+        ({**UNIFORM, "low": 4}, "low = 4 and high = 3 are no range for uniform"),
+        ({**UNIFORM, "high": -1}, "low = -1 and high = -1 are no range for uniform"),
         (
-            {"distribution": "uniform", "low": 1, "high": 2, "mean": 3},
-            "uniform needs exactly low, high",
-        ),
-        (
-            {"distribution": "uniform", "low": 2, "high": 1},
-            "low = 2 and high = 1 are no range for uniform",
-        ),
-        (
-            {"distribution": "uniform", "low": 2, "high": 2},
-            "low = 2 and high = 2 are no range for uniform",
-        ),
-        (
-            {"distribution": "integers", "low": 3, "high": 3},
+            {**SPECS["integers"], "low": 5},
             "are no range for integers; low must be below",
         ),
+        ({**SPECS["normal"], "low": 5.0}, "are no range for normal; low must be below"),
         (
-            {**SPECS["normal"], "low": 5.0},
-            "low = 5 and high = 5 are no range for normal; low must be below",
+            {**SPECS["log_uniform"], "low": 0},
+            "for log_uniform; low must be below and above 0",
         ),
-        (
-            {"distribution": "log_uniform", "low": 0, "high": 1},
-            "no range for log_uniform; low must be below and above 0",
-        ),
-        (
-            {"distribution": "uniform", "low": "a", "high": 1},
-            "low = 'a' is not a finite number",
-        ),
-        (
-            {"distribution": "uniform", "low": 0, "high": float("inf")},
-            "high = inf is not a finite number",
-        ),
-        (
-            {"distribution": "uniform", "low": True, "high": 2},
-            "low = True is not a finite number",
-        ),
+        ({**UNIFORM, "low": "a"}, "low = 'a' is not a finite number"),
+        ({**UNIFORM, "high": float("inf")}, "high = inf is not a finite number"),
+        ({**UNIFORM, "low": True}, "low = True is not a finite number"),
         ({**SPECS["normal"], "std": 0}, "std = 0 must be positive"),
         ({**SPECS["normal"], "std": -1.5}, "std = -1.5 must be positive"),
         (
@@ -216,15 +171,12 @@ class TestLevels:
             "mean = nan is not a finite number",
         ),
         (
-            {"distribution": "normal", "mean": 1, "std": 2},
+            {"distribution": "normal", "mean": 1},
             "normal needs exactly mean, std, low, high",
         ),
+        ({**UNIFORM, "levels": 1}, "levels = 1 must be a whole number of at least 2"),
         (
-            {**SPECS["uniform"], "levels": 1},
-            "levels = 1 must be a whole number of at least 2",
-        ),
-        (
-            {**SPECS["uniform"], "levels": 2.5},
+            {**UNIFORM, "levels": 2.5},
             "levels = 2.5 must be a whole number of at least 2",
         ),
         (
@@ -232,11 +184,8 @@ class TestLevels:
             "levels = 5, but there are 4 whole numbers",
         ),
         ({**SPECS["choice"], "levels": 3}, "the levels of a choice are its values"),
-        (
-            {"distribution": "choice", "values": []},
-            "values must be a list with at least one entry",
-        ),
-        ({"distribution": "choice", "values": ["a"]}, "values must be finite numbers"),
+        ({**SPECS["choice"], "values": []}, "must be a list with at least one entry"),
+        ({**SPECS["choice"], "values": ["a"]}, "values must be finite numbers"),
         ({**SPECS["integers"], "low": 0.5}, "low = 0.5 and high = 5 must be whole"),
     ],
 )
@@ -246,63 +195,48 @@ def test_mistakes_are_answered(spec, text):
     assert "operating.speed_rpm" in str(caught.value)
 
 
+def drawn(design, n_points, seed):
+    """Points of three dimensions."""
+    return design_points(design, n_points, 3, np.random.default_rng(seed))
+
+
 @pytest.mark.parametrize("design", ["latin_hypercube", "sobol"])
 @pytest.mark.parametrize("n_points", [1, 7, 64])
 class TestDesigns:
     def test_shape_range_and_seed(self, design, n_points):
-        one, two, other = (
-            design_points(design, n_points, 3, np.random.default_rng(seed))
-            for seed in (1, 1, 2)
-        )
+        one, two, other = (drawn(design, n_points, seed) for seed in (1, 1, 2))
         assert one.shape == (n_points, 3)
-        assert one.min() >= 0
-        assert one.max() < 1
+        assert 0 <= one.min() <= one.max() < 1
         assert_allclose(one, two, rtol=0, atol=0)
         assert np.abs(one - other).max() > 0
 
     def test_every_axis_is_filled_evenly(self, design, n_points):
-        points = design_points(design, n_points, 3, np.random.default_rng(1))
-        counts = np.array(
-            [
-                np.bincount((axis * n_points).astype(int), minlength=n_points)
-                for axis in points.T
-            ]
-        )
-        assert counts.max() <= (1 if design == "latin_hypercube" else 2)
+        slots = (drawn(design, n_points, 1) * n_points).astype(int)
+        most = max(np.bincount(axis).max() for axis in slots.T)
+        assert most <= {"latin_hypercube": 1, "sobol": 2}[design]
 
 
-def test_two_designs_of_one_size_have_nothing_in_common():
-    """Of 16 x 16 cells about 163 are hit by chance; Sobol points in the order of the sequence hit
-    16."""
+def n_cells(one, other):
+    """Cells of 16 x 16 that points hit: about 163 by chance, 16 in the order of a sequence."""
+    cells = np.stack([16 * one, 16 * other]).astype(int)
+    return len(np.unique(cells, axis=1).T)
 
-    def n_cells(one, other):
-        return len(
-            set(zip((16 * one).astype(int), (16 * other).astype(int), strict=True))
-        )
 
-    for design in ("latin_hypercube", "sobol"):
-        one, other = (
-            design_points(design, 256, 2, np.random.default_rng(seed))
-            for seed in (1, 2)
-        )
-        assert min(n_cells(one[:, k], other[:, k]) for k in range(2)) > 130
-    raw = [
-        qmc.Sobol(2, rng=np.random.default_rng(seed)).random_base2(8) for seed in (1, 2)
-    ]
-    assert n_cells(raw[0][:, 0], raw[1][:, 0]) == 16
+@pytest.mark.parametrize("design", ["latin_hypercube", "sobol"])
+def test_two_designs_of_one_size_have_nothing_in_common(design):
+    one, other = (drawn(design, 256, seed).T for seed in (1, 2))
+    assert min(map(n_cells, one, other)) > 130
+    raw = (qmc.Sobol(1, rng=np.random.default_rng(seed)) for seed in (1, 2))
+    assert n_cells(*(points.random_base2(8)[:, 0] for points in raw)) == 16
 
 
 def test_no_dimension_draws_nothing():
-    assert design_points("latin_hypercube", 5, 0, np.random.default_rng(0)).shape == (
-        5,
-        0,
-    )
+    points = design_points("latin_hypercube", 5, 0, np.random.default_rng(0))
+    assert points.shape == (5, 0)
 
 
 @pytest.mark.parametrize("n_dimensions", [0, 2])
 def test_unknown_designs_list_the_known(n_dimensions):
-    with pytest.raises(
-        ConfigError,
-        match=r"plan.design = 'factorial'; allowed: latin_hypercube, sobol, grid",
-    ):
+    text = "plan.design = 'factorial'; allowed: latin_hypercube, sobol, grid"
+    with pytest.raises(ConfigError, match=text):
         design_points("factorial", 4, n_dimensions, np.random.default_rng(0))

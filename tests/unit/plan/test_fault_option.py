@@ -1,7 +1,5 @@
 """Fault options, composed alone."""
 
-from importlib import resources
-
 import pytest
 
 from gensig.options.compose import compose, options
@@ -17,16 +15,6 @@ class TestFaultOptionAlone:
         "out=x.y",
     )
 
-    def test_no_option_of_the_package_refers_to_another_group(self):
-        folder = resources.files("gensig.configs").joinpath("fault")
-        texts = [
-            path.read_text(encoding="utf-8")
-            for path in folder.iterdir()
-            if path.name.endswith(".yaml")
-        ]
-        assert len(texts) == len(options("fault"))
-        assert not any("${" in text for text in texts)
-
     @pytest.mark.parametrize("fault", options("fault"))
     def test_it_is_that_of_the_whole_configuration(self, fault):
         words = [*self.OTHERS, f"fault={fault}"]
@@ -35,15 +23,11 @@ class TestFaultOptionAlone:
             == compose("generate", words)["fault"]
         )
 
-    def test_a_reference_to_another_group_is_followed(self):
+    @pytest.mark.parametrize("choice", ["plan.classes=[crack]", "fault=crack"])
+    def test_a_reference_to_another_group_is_followed(self, choice):
         words = ["operating.torque_nm=3", "fault.crack_depth_mm=${operating.torque_nm}"]
-        for choice in ("plan.classes=[crack]", "fault=crack"):
-            assert (
-                read_request([choice, *words]).config["classes"]["crack"][
-                    "crack_depth_mm"
-                ]
-                == 3
-            )
+        classes = read_request([choice, *words]).config["classes"]
+        assert classes["crack"]["crack_depth_mm"] == 3
 
     def test_the_whole_configuration_is_composed_once(self, monkeypatch):
         composed = []
@@ -65,12 +49,3 @@ class TestFaultOptionAlone:
     def test_what_an_experiment_sets_of_every_fault_is_kept(self):
         classes = read_request(["experiment=engine_test_point"]).config["classes"]
         assert {fault["gear"] for fault in classes.values()} == {"wheel"}
-
-    @pytest.mark.parametrize(
-        "experiment", ["quickstart", "run_to_failure", "engine_broken_tooth"]
-    )
-    def test_classes_are_those_of_whole_compositions(self, experiment):
-        classes = read_request([f"experiment={experiment}"]).config["classes"]
-        for name, fault in classes.items():
-            words = [f"experiment={experiment}", f"fault={name}"]
-            assert fault == compose("generate", words)["fault"]

@@ -11,12 +11,12 @@ THREE = "plan.classes=[healthy,crack,missing_tooth]"
 SPEEDS = "plan.vary={operating.speed_rpm:{distribution:uniform,low:1200,high:2400}}"
 
 
-def said(*words: str) -> list[str]:
+def said(*words):
     config = read_request([*words, "operating.duration_s=0.02"]).config
     return plan_notes(config, make_plan(config))
 
 
-def test_units_without_a_record_are_told() -> None:
+def test_units_without_a_record_are_told():
     (line,) = said(
         THREE,
         "plan.n_units=4",
@@ -30,7 +30,7 @@ def test_units_without_a_record_are_told() -> None:
     )
 
 
-def test_a_split_by_machine_that_cannot_be_made_is_told() -> None:
+def test_a_split_by_machine_that_cannot_be_made_is_told():
     (line,) = said(FOUR, "plan.n_records=80", "plan.n_units=8", "plan.n_gearboxes=2")
     assert (
         line
@@ -41,11 +41,11 @@ def test_a_split_by_machine_that_cannot_be_made_is_told() -> None:
 @pytest.mark.parametrize(
     "words", [("experiment=quickstart",), ("experiment=run_to_failure",)]
 )
-def test_a_plan_with_all_of_it_has_no_note(words: tuple[str, ...]) -> None:
+def test_a_plan_with_all_of_it_has_no_note(words):
     assert said(*words) == []
 
 
-def test_what_overrides_undo_is_told() -> None:
+def test_what_overrides_undo_is_told():
     words = [
         "experiment=quickstart",
         "fault=crack",

@@ -1,7 +1,6 @@
 """Prediction of a data set: counts, and bytes near those that are made."""
 
 import functools
-from pathlib import Path
 
 import pytest
 
@@ -41,12 +40,12 @@ SETS = {
 
 
 @functools.cache
-def foretold(name: str) -> dict[str, str]:
+def foretold(name):
     return predict(read_request([*SETS[name], "executor.n_workers=1"]).config)
 
 
 @pytest.mark.parametrize("name", SETS)
-def test_bytes_are_within_a_factor_of_one_and_a_half(name: str, tmp_path: Path) -> None:
+def test_bytes_are_within_a_factor_of_one_and_a_half(name, tmp_path):
     expected = int(foretold(name)["bytes"].split()[0].replace(",", ""))
     gensig.generate(*SETS[name], "executor.n_workers=1", out=tmp_path / "data").close()
     made = sum(
@@ -56,7 +55,7 @@ def test_bytes_are_within_a_factor_of_one_and_a_half(name: str, tmp_path: Path) 
     assert 1 / 1.5 < expected / made < 1.5
 
 
-def test_what_a_grid_holds_is_told() -> None:
+def test_what_a_grid_holds_is_told():
     told = foretold("a grid")
     assert told["records"] == "24"
     assert told["classes"].count(" 6") == 4
@@ -67,9 +66,7 @@ def test_what_a_grid_holds_is_told() -> None:
     )
 
 
-def test_records_that_fail_while_they_are_timed_are_told(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_records_that_fail_while_they_are_timed_are_told(monkeypatch):
     whole = records.simulate_with_lead_in
     monkeypatch.setattr(
         records,

@@ -15,7 +15,7 @@ from gensig.systems.registry import read_pair
 PLAN = ("plan.n_records=48", "plan.n_units=4", "plan.classes=[healthy,crack,pitting]")
 
 
-def drawn(*overrides: str) -> dict[str, np.ndarray]:
+def drawn(*overrides):
     plan = make_plan(read_request([*PLAN, *overrides]).config)
     return {key: np.asarray(values) for key, values in plan.columns.items()}
 

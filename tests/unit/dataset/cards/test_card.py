@@ -1,27 +1,26 @@
 """Data cards, read by the Croissant validator, by Hugging Face and by people."""
 
 import json
-from pathlib import Path
 
 import mlcroissant
 import numpy as np
 import pytest
 import yaml
 from dataset_samples import CLASSES, build, make_plan
+from numpy.testing import assert_allclose
 
 from gensig.dataset.cards.card import card_text, front_matter
-from gensig.dataset.plan import Plan
 from gensig.dataset.reader import open_dataset
 from gensig.dataset.storage.atomic import sha256_file
 
 
-def _front(text: str) -> dict:
+def _front(text):
     first, matter, _rest = text.split("---\n", 2)
     assert first == ""
     return yaml.safe_load(matter)
 
 
-def test_front_matter(folder: Path) -> None:
+def test_front_matter(folder):
     front = _front((folder / "README.md").read_text(encoding="utf-8"))
     assert front["license"] == "cc-by-4.0"
     assert front["size_categories"] == ["n<1K"]
@@ -34,13 +33,12 @@ def test_front_matter(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("n_records", "expected"), [(999, "n<1K"), (1000, "1K<n<10K"), (10**7, "n>10M")]
 )
-def test_size_category(folder: Path, n_records: int, expected: str) -> None:
-    with open_dataset(folder) as data:
-        data.n_records = n_records
-        assert _front(front_matter(data) + "\n")["size_categories"] == [expected]
+def test_size_category(data, n_records, expected):
+    data.n_records = n_records
+    assert _front(front_matter(data) + "\n")["size_categories"] == [expected]
 
 
-def test_hostile_names_stay_text(tmp_path: Path, plan: Plan) -> None:
+def test_hostile_names_stay_text(tmp_path, plan):
     """A folder's name cannot add keys to the front matter or tags to the page."""
     folder = build(tmp_path / "a: [b]\nlicense: mine <b>", plan)
     text = (folder / "README.md").read_text(encoding="utf-8")
@@ -53,7 +51,7 @@ def test_hostile_names_stay_text(tmp_path: Path, plan: Plan) -> None:
     )
 
 
-def test_croissant_is_valid_and_gives_the_records(folder: Path, plan: Plan) -> None:
+def test_croissant_is_valid_and_gives_the_records(folder, plan):
     dataset = mlcroissant.Dataset(jsonld=folder / "croissant.json")  # raises on errors
     assert not dataset.metadata.ctx.issues.errors
     assert not dataset.metadata.ctx.issues.warnings
@@ -65,12 +63,10 @@ def test_croissant_is_valid_and_gives_the_records(folder: Path, plan: Plan) -> N
     depths = np.array(
         [row["records/params.crack_depth_mm"] for row in rows], dtype=float
     )
-    np.testing.assert_allclose(
-        depths, plan.columns["params/crack_depth_mm"], rtol=1e-12, atol=0
-    )
+    assert_allclose(depths, plan.columns["params/crack_depth_mm"], rtol=1e-12, atol=0)
 
 
-def test_the_validator_would_find_a_mistake(folder: Path) -> None:
+def test_the_validator_would_find_a_mistake(folder):
     content = json.loads((folder / "croissant.json").read_text(encoding="utf-8"))
     content["recordSet"][0]["field"][0]["source"]["fileObject"]["@id"] = "nowhere.csv"
     (folder / "croissant.json").write_text(json.dumps(content), encoding="utf-8")
@@ -78,7 +74,7 @@ def test_the_validator_would_find_a_mistake(folder: Path) -> None:
         mlcroissant.Dataset(jsonld=folder / "croissant.json")
 
 
-def test_croissant_lists_every_file_with_its_digest(folder: Path) -> None:
+def test_croissant_lists_every_file_with_its_digest(folder):
     content = json.loads((folder / "croissant.json").read_text(encoding="utf-8"))
     listed = {item["contentUrl"]: item["sha256"] for item in content["distribution"]}
     assert {f"shards/shard-0000{i}.h5" for i in range(4)} | {
@@ -88,7 +84,7 @@ def test_croissant_lists_every_file_with_its_digest(folder: Path) -> None:
     assert all(sha256_file(folder / name) == digest for name, digest in listed.items())
 
 
-def test_responsible_ai_fields_state_facts_and_caveats(tmp_path: Path) -> None:
+def test_responsible_ai_fields_state_facts_and_caveats(tmp_path):
     folder = build(tmp_path / "a", make_plan(), failed=12)
     content = json.loads((folder / "croissant.json").read_text(encoding="utf-8"))
     for field in (
@@ -113,6 +109,6 @@ def test_responsible_ai_fields_state_facts_and_caveats(tmp_path: Path) -> None:
     assert metadata.data_limitations is not None
 
 
-def test_card_is_the_text_written(folder: Path) -> None:
+def test_card_is_the_text_written(folder):
     with open_dataset(folder) as data:
         assert card_text(data) == (folder / "README.md").read_text(encoding="utf-8")

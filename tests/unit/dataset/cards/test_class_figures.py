@@ -2,7 +2,6 @@
 
 import builtins
 import shutil
-from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -19,13 +18,13 @@ from gensig.dataset.reader import open_dataset
 
 
 @pytest.fixture(scope="module")
-def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def drawn(tmp_path_factory):
     return build(
         tmp_path_factory.mktemp("drawn") / "set", make_plan(), figures=True, failed=18
     )
 
 
-def test_a_closed_set_has_a_picture_a_class_and_its_card_shows_it(drawn: Path) -> None:
+def test_a_closed_set_has_a_picture_a_class_and_its_card_shows_it(drawn):
     names = ["0-healthy.png", "1-crack.png", "2-pitting.png"]
     assert sorted(path.name for path in (drawn / "figures").iterdir()) == names
     card = (drawn / "README.md").read_text(encoding="utf-8")
@@ -37,7 +36,7 @@ def test_a_closed_set_has_a_picture_a_class_and_its_card_shows_it(drawn: Path) -
         assert len(np.unique(picture[..., 2])) > 20  # lines and text, not a blank page
 
 
-def test_the_record_of_median_severity_stands_for_its_class(drawn: Path) -> None:
+def test_the_record_of_median_severity_stands_for_its_class(drawn):
     with open_dataset(drawn) as data:
         label, usable = data.column("label"), data.usable.copy()
         severity = np.linspace(1.0, 0.0, data.n_records)
@@ -51,7 +50,7 @@ def test_the_record_of_median_severity_stands_for_its_class(drawn: Path) -> None
         assert severity[index] == np.sort(mine)[len(mine) // 2]
 
 
-def test_the_bytes_depend_on_nobody_s_style(drawn: Path, tmp_path: Path) -> None:
+def test_the_bytes_depend_on_nobody_s_style(drawn, tmp_path):
     folder = shutil.copytree(drawn, tmp_path / "set")
     before = {path.name: path.read_bytes() for path in (folder / "figures").iterdir()}
     with (
@@ -65,12 +64,10 @@ def test_the_bytes_depend_on_nobody_s_style(drawn: Path, tmp_path: Path) -> None
     } == before
 
 
-def test_without_matplotlib_a_card_has_no_pictures(
-    tmp_path: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_matplotlib_a_card_has_no_pictures(tmp_path, plan, monkeypatch):
     real = builtins.__import__
 
-    def missing(name: str, *words: object) -> object:
+    def missing(name, *words):
         if name.startswith("matplotlib"):
             raise ImportError(name)
         return real(name, *words)
@@ -82,7 +79,7 @@ def test_without_matplotlib_a_card_has_no_pictures(
     assert verify(folder).complete
 
 
-def test_a_class_without_a_usable_record_has_no_picture(tmp_path: Path) -> None:
+def test_a_class_without_a_usable_record_has_no_picture(tmp_path):
     folder = build(tmp_path / "set", make_plan(n_records=3), figures=True, failed=1)
     assert sorted(path.name for path in (folder / "figures").iterdir()) == [
         "0-healthy.png",
@@ -91,7 +88,7 @@ def test_a_class_without_a_usable_record_has_no_picture(tmp_path: Path) -> None:
     assert verify(folder).problems == []
 
 
-def test_hostile_class_names_stay_names(tmp_path: Path) -> None:
+def test_hostile_class_names_stay_names(tmp_path):
     """Neither a path, nor mathematics that cannot be set, nor HTML."""
     evil = "../../$\\frac{<b>x"
     plan = make_plan(n_records=6, n_classes=2)

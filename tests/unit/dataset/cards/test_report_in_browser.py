@@ -6,9 +6,6 @@ the path, or the one that ``playwright install chromium`` fetches; without them 
 
 import os
 import shutil
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
 
 import pytest
 from dataset_samples import ATTRIBUTES, build, make_plan
@@ -21,26 +18,22 @@ AXIS = "name => document.getElementById('plot-' + name).layout.xaxis.title.text"
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
+def browser():
     playwright = pytest.importorskip("playwright.sync_api", reason="package playwright")
-    path = (
-        os.environ.get("GENSIG_CHROMIUM")
-        or shutil.which("chromium")
-        or shutil.which("google-chrome")
-    )
+    found = map(shutil.which, ("chromium", "google-chrome"))
+    path = os.environ.get("GENSIG_CHROMIUM") or next(filter(None, found), None)
+    words = ["--no-sandbox", "--disable-gpu"]
     with playwright.sync_playwright() as started:
         try:
-            found = started.chromium.launch(
-                executable_path=path, args=["--no-sandbox", "--disable-gpu"]
-            )
+            browser = started.chromium.launch(executable_path=path, args=words)
         except playwright.Error as error:
             pytest.skip(f"no Chromium: {str(error).splitlines()[0]}")
-        yield found
-        found.close()
+        yield browser
+        browser.close()
 
 
 @pytest.fixture(scope="module")
-def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def page_file(tmp_path_factory):
     """A page of 36 records and two channels, one of them with a hostile name."""
     attributes = {
         **ATTRIBUTES,
@@ -53,23 +46,23 @@ def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_report(folder, folder.parent / "page.html")[0]
 
 
-@pytest.fixture(params=["desktop", "phone", "dark"])
-def page(
-    browser: Any, page_file: Path, request: pytest.FixtureRequest
-) -> Iterator[Any]:
-    options: dict[str, Any] = {
-        "desktop": {"viewport": {"width": 1280, "height": 900}},
-        "phone": {
-            "viewport": {"width": 390, "height": 844},
-            "is_mobile": True,
-            "has_touch": True,
-        },
-        "dark": {"viewport": {"width": 1280, "height": 900}, "color_scheme": "dark"},
-    }[request.param]
-    context = browser.new_context(**options)
+WINDOW = {"viewport": {"width": 1280, "height": 900}}
+OPTIONS = {
+    "desktop": WINDOW,
+    "phone": {
+        "viewport": {"width": 390, "height": 844},
+        "is_mobile": True,
+        "has_touch": True,
+    },
+    "dark": {**WINDOW, "color_scheme": "dark"},
+}
+
+
+@pytest.fixture(params=OPTIONS)
+def page(browser, page_file, request):
+    context = browser.new_context(**OPTIONS[request.param])
     page = context.new_page()
-    said: list[str] = []
-    asked: list[str] = []
+    said, asked = [], []
     page.on("console", lambda message: said.append(message.text))
     page.on("pageerror", lambda error: said.append(str(error)))
     page.on("request", lambda request: asked.append(request.url))
@@ -81,7 +74,17 @@ def page(
     context.close()
 
 
-def test_it_loads_and_fits(page: Any) -> None:
+def layout(page, plot, path):
+    """A value of the layout of a plot."""
+    return page.evaluate(f"document.getElementById('plot-{plot}').layout.{path}")
+
+
+def drawn(page, plot, path):
+    """A value of the first curve of a plot."""
+    return page.evaluate(f"document.getElementById('plot-{plot}').data[0].{path}")
+
+
+def test_it_loads_and_fits(page):
     assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
     assert page.evaluate("document.querySelectorAll('.plot .main-svg').length") >= 6
     assert (
@@ -89,7 +92,7 @@ def test_it_loads_and_fits(page: Any) -> None:
     )  # no text became markup
 
 
-def test_legends_are_clear_of_the_toolbar(page: Any) -> None:
+def test_legends_are_clear_of_the_toolbar(page):
     """Below the drawing, whose upper edge leaves room for the toolbar."""
     box = (
         "([plot, part]) => document.querySelector(`#plot-${plot} "
@@ -103,7 +106,7 @@ def test_legends_are_clear_of_the_toolbar(page: Any) -> None:
     assert drawing["top"] - whole["top"] >= 28  # height of the toolbar
 
 
-def test_record_channel_and_comparison(page: Any) -> None:
+def test_record_channel_and_comparison(page):
     form = "#signals-controls"
     for value in ("0", "4"):
         page.select_option(f"{form} [name=record]", value)
@@ -117,16 +120,14 @@ def test_record_channel_and_comparison(page: Any) -> None:
     assert len(page.evaluate(TRACES, "wave")) == 2
     page.select_option(f"{form} [name=other]", "")
     assert len(page.evaluate(TRACES, "wave")) == 1
-    first = page.evaluate("document.getElementById('plot-wave').data[0].y[7]")
+    first = drawn(page, "wave", "y[7]")
     page.select_option(f"{form} [name=channel]", "1")
-    assert page.evaluate("document.getElementById('plot-wave').data[0].y[7]") != first
+    assert drawn(page, "wave", "y[7]") != first
     assert HOSTILE in page.inner_text("#signals-said")
-    assert "rad/s" in page.evaluate(
-        "document.getElementById('plot-spectrum').layout.yaxis.title.text"
-    )
+    assert "rad/s" in layout(page, "spectrum", "yaxis.title.text")
 
 
-def test_axes_marks_and_zoom(page: Any) -> None:
+def test_axes_marks_and_zoom(page):
     """690 Hz of mesh and 23 teeth: the mesh stands at order 23 of the pinion."""
     form = "#signals-controls"
     page.select_option(f"{form} [name=record]", "4")
@@ -150,40 +151,25 @@ def test_axes_marks_and_zoom(page: Any) -> None:
         page.keyboard.press("Space")  # by keyboard alone
         assert (label in page.evaluate(TRACES, "envelope")) is not before
     page.locator(f"{form} [name=decibel]").uncheck()
-    assert (
-        page.evaluate("document.getElementById('plot-spectrum').layout.yaxis.type")
-        == "linear"
-    )
+    assert layout(page, "spectrum", "yaxis.type") == "linear"
     page.select_option(f"{form} [name=axis]", "hz")
-    whole = page.evaluate("document.getElementById('plot-spectrum').layout.xaxis.range")
+    whole = layout(page, "spectrum", "xaxis.range")
     page.select_option(f"{form} [name=zoom]", "1")
-    assert (
-        page.evaluate("document.getElementById('plot-spectrum').layout.xaxis.range")
-        != whole
-    )
+    assert layout(page, "spectrum", "xaxis.range") != whole
 
 
-def test_parameters_and_indicators(page: Any) -> None:
+def test_parameters_and_indicators(page):
     page.select_option("#parameters-controls [name=column]", "params/crack_depth_mm")
     assert page.evaluate(TRACES, "parameters") == ["crack"]
     page.select_option("#parameters-controls [name=column]", "speed_rpm")
     assert page.evaluate(TRACES, "parameters") == ["healthy", "crack", "pitting"]
     page.select_option("#parameters-controls [name=form]", "boxes")
-    assert (
-        page.evaluate("document.getElementById('plot-parameters').data[0].type")
-        == "box"
-    )
+    assert drawn(page, "parameters", "type") == "box"
     page.select_option("#indicators-controls [name=indicator]", "kurtosis")
     page.select_option("#indicators-controls [name=along]", "speed_rpm")
     assert page.evaluate(AXIS, "indicators") == "speed, r/min"
-    first = page.evaluate("document.getElementById('plot-indicators').data[0].y[0]")
+    first = drawn(page, "indicators", "y[0]")
     page.select_option("#indicators-controls [name=channel]", "1")
-    assert (
-        page.evaluate("document.getElementById('plot-indicators').data[0].y[0]")
-        != first
-    )
+    assert drawn(page, "indicators", "y[0]") != first
     page.locator("#indicators-controls [name=decibel]").check()
-    assert (
-        page.evaluate("document.getElementById('plot-levels').layout.yaxis.type")
-        == "log"
-    )
+    assert layout(page, "levels", "yaxis.type") == "log"
