@@ -23,10 +23,10 @@ def page(path: Path) -> str:
 
 
 def _lines(name: str) -> list[str]:
-    found = _resolved(name)
-    lines = [f"- `{name}`: {_summary(found)}"]
-    if isinstance(found, ModuleType):
-        lines += [f"    - `{own}`: {_summary(value)}" for own, value in _public(found)]
+    result = _resolved(name)
+    lines = [f"- `{name}`: {_summary(result)}"]
+    if isinstance(result, ModuleType):
+        lines += [f"    - `{own}`: {_summary(value)}" for own, value in _public(result)]
     return lines
 
 

@@ -31,14 +31,14 @@ def blocks(text: str) -> Iterator[Block]:
         line = lines[place]
         above = next((text for text in reversed(lines[:place]) if text.strip()), "")
         mark = above[4:-3].strip() if above.startswith("<!--") else ""
-        begin, found = place, FENCE.match(line)
-        if found:
+        begin, result = place, FENCE.match(line)
+        if result:
             while not FENCE.match(lines[place + 1]):
                 place += 1
             place += 1
             yield Block(
                 line=begin + 1,
-                language=found[1],
+                language=result[1],
                 code="\n".join(lines[begin + 1 : place]),
                 mark=mark,
             )
@@ -96,7 +96,7 @@ def command_lines(text: str) -> Iterator[tuple[int, list[str]]]:
 
 def anchors(text: str) -> set[str]:
     """Anchors of a page's headings, as code forges and the site make them."""
-    found: set[str] = set()
+    result: set[str] = set()
     fenced = False
     for line in text.split("\n"):
         if FENCE.match(line):
@@ -112,7 +112,7 @@ def anchors(text: str) -> set[str]:
             n_before = sum(
                 name == slug
                 or re.fullmatch(rf"{re.escape(slug)}-\d+", name) is not None
-                for name in found
+                for name in result
             )
-            found.add(f"{slug}-{n_before}" if n_before else slug)
-    return found
+            result.add(f"{slug}-{n_before}" if n_before else slug)
+    return result

@@ -60,13 +60,13 @@ def ratios():
 
 def ratio_of_teeth():
     """Exact ratios: those printed in the table have six digits."""
-    found = {1: 1.0}
+    result = {1: 1.0}
     for row in rows():
         if row["edge_from"]:
             first, second = int(row["edge_from"]), int(row["edge_to"])
             teeth = int(row["teeth_from"] or 1) / int(row["teeth_to"] or 1)
-            found[second] = found[first] * teeth
-    return {node: found[node] for node in ratios()}
+            result[second] = result[first] * teeth
+    return {node: result[node] for node in ratios()}
 
 
 @lru_cache(maxsize=8)

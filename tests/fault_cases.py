@@ -141,8 +141,8 @@ def option(kind: str) -> Mapping[str, Any]:
 
 def one(kind: str, **changes: Any) -> Fault:
     """One fault: its option with keys replaced, as a configuration would."""
-    (found,) = read_faults({**option(kind), **changes})
-    return found
+    (result,) = read_faults({**option(kind), **changes})
+    return result
 
 
 def heavy_table(system: SpurPair, *faults: Fault) -> PairTable:

@@ -146,12 +146,12 @@ def folder_imports(
 )
 def test_folders_import_what_they_may(graph, package, allowed) -> None:
     arrows = folder_imports(graph, package, package)
-    found = {
+    result = {
         folder: others - {folder}
         for folder, others in arrows.items()
         if others - {folder}
     }
-    assert found == {folder: set(names.split()) for folder, names in allowed.items()}
+    assert result == {folder: set(names.split()) for folder, names in allowed.items()}
 
 
 def test_diagnose_imports_no_physics(graph) -> None:
@@ -236,7 +236,7 @@ def test_conditional_expressions_are_few_and_never_nested() -> None:
 
 def test_docstrings_say_what_a_thing_is() -> None:
     asking = re.compile(r"(What|How|Where|Which|When|Whether)\b")
-    found = []
+    result = []
     for path in python_files():
         for node in ast.walk(ast.parse(path.read_text())):
             has_docstring = isinstance(
@@ -244,8 +244,8 @@ def test_docstrings_say_what_a_thing_is() -> None:
             )
             if has_docstring and asking.match(ast.get_docstring(node) or ""):
                 line = getattr(node, "lineno", 1)
-                found.append(f"{path.relative_to(ROOT)}:{line}")
-    assert found == []
+                result.append(f"{path.relative_to(ROOT)}:{line}")
+    assert result == []
 
 
 @pytest.mark.parametrize("package", ["gensig", "diagnose", "tests"])

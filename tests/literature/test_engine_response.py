@@ -40,24 +40,24 @@ def test_the_table_reader_and_plain_arrays_give_the_same_response():
 @pytest.mark.parametrize("damper", list(DAMPER_STATES))
 def test_flywheel_is_in_the_range_of_an_independent_estimate(damper):
     """13.4 to 17.9 r/min at the flywheel, over damper states and firing orders."""
-    found = (
+    result = (
         response_of(
             with_throws(option(injection_pump=None), IN_SEQUENCE), damper
         ).fluctuation()
         / RPM
     )
-    assert 13.4 <= found[FLYWHEEL] <= 17.9
+    assert 13.4 <= result[FLYWHEEL] <= 17.9
 
 
 def test_firing_orders_span_the_estimate_at_every_place():
     """Crank gear 46 to 54 and pump end 28 r/min from the engine alone: near the middle of what
     firing orders do.
     """
-    alone, rng, found = option(injection_pump=None), np.random.default_rng(0), []
+    alone, rng, result = option(injection_pump=None), np.random.default_rng(0), []
     for _ in range(24):
         order = (1, *(int(one) for one in rng.permutation(np.arange(2, 11))))
-        found.append(response_of(with_throws(alone, order)).fluctuation() / RPM)
-    low, middle, high = np.percentile(found, [10, 50, 90], axis=0)
+        result.append(response_of(with_throws(alone, order)).fluctuation() / RPM)
+    low, middle, high = np.percentile(result, [10, 50, 90], axis=0)
     for place, first, last in (
         (FLYWHEEL, 13.4, 17.9),
         (CRANK_GEAR, 46.0, 54.0),
@@ -69,9 +69,9 @@ def test_firing_orders_span_the_estimate_at_every_place():
 
 
 def test_order_1_dominates_at_the_flywheel_near_the_first_mode():
-    found = response_of(with_throws(option(), IN_SEQUENCE))
-    lines = np.abs(found.speed_deviation[FLYWHEEL])
-    assert found.orders[np.argmax(lines)] == 1.0
+    result = response_of(with_throws(option(), IN_SEQUENCE))
+    lines = np.abs(result.speed_deviation[FLYWHEEL])
+    assert result.orders[np.argmax(lines)] == 1.0
     speeds = np.arange(1640.0, 1781.0, 20.0)
     at_order_1 = [
         np.abs(

@@ -77,9 +77,9 @@ def neighbor(gear, k=1):
 
 @pytest.mark.parametrize(("side", "n"), HARMONICS)
 def test_ring_harmonics(xiamen, side, n):
-    found = ring_harmonic(getattr(xiamen.pair, side), xiamen.material, n)
+    result = ring_harmonic(getattr(xiamen.pair, side), xiamen.material, n)
     expected = np.array(HARMONICS[side, n]) * 1e-15
-    assert_allclose(found[[0, 0, 1], [0, 1, 1]], expected, rtol=5e-6, atol=6e-20)
+    assert_allclose(result[[0, 0, 1], [0, 1, 1]], expected, rtol=5e-6, atol=6e-20)
 
 
 @pytest.mark.parametrize("n", [1, 2, 7, 60, 300])
@@ -129,9 +129,9 @@ def test_body_under_the_loaded_tooth_at_the_pitch_point(gear, side, xiamen):
     angle = load_angle(
         gear, np.array([rho if side == "pinion" else xiamen.pair.tangent_length - rho])
     )
-    found = cross_compliance(gear, xiamen.material, angle, angle, pitches=0)
+    result = cross_compliance(gear, xiamen.material, angle, angle, pitches=0)
     assert_allclose(
-        found, {"pinion": 1031.22e-12, "wheel": 2372.06e-12}[side], rtol=1e-5, atol=0
+        result, {"pinion": 1031.22e-12, "wheel": 2372.06e-12}[side], rtol=1e-5, atol=0
     )
 
 
@@ -145,17 +145,17 @@ def cross_over_the_zone(pair, material, side, pitches):
 
 
 def test_cross_compliance_against_finite_elements(side, xiamen):
-    found = cross_over_the_zone(
+    result = cross_over_the_zone(
         xiamen.pair, xiamen.material, side, 1 if side == "pinion" else -1
     )
-    assert_allclose(found, np.array(CROSS_FE[side]) * 1e-12, rtol=0.01, atol=0)
+    assert_allclose(result, np.array(CROSS_FE[side]) * 1e-12, rtol=0.01, atol=0)
 
 
 def test_the_wrong_neighbor_misses_the_finite_elements(side, xiamen):
-    found = cross_over_the_zone(
+    result = cross_over_the_zone(
         xiamen.pair, xiamen.material, side, -1 if side == "pinion" else 1
     )
-    assert np.abs(found / (np.array(CROSS_FE[side]) * 1e-12) - 1).max() > 0.01
+    assert np.abs(result / (np.array(CROSS_FE[side]) * 1e-12) - 1).max() > 0.01
 
 
 def test_shared_compliance_is_the_mean_of_both_gears_over_the_double_zone(xiamen):

@@ -46,15 +46,15 @@ class TestOneIsTheOther:
         broken = one("broken", gear=gear, tooth=2, broken_height_mm=height_mm)
         missing = one("missing_tooth", gear=gear, tooth=2)
         roll = xiamen.pair.base_pitch * np.linspace(0.0, 6.0, 601)
-        found, expected = (
+        result, expected = (
             pair_states(xiamen.mesh_table((fault,)), roll)
             for fault in (broken, missing)
         )
-        assert_allclose(found.gap, expected.gap, rtol=0, atol=0)
+        assert_allclose(result.gap, expected.gap, rtol=0, atol=0)
         there = np.isfinite(expected.gap)
         assert not there.all()
         compliance = expected.compliance[there]
-        assert_allclose(found.compliance[there], compliance, rtol=1e-12, atol=0)
+        assert_allclose(result.compliance[there], compliance, rtol=1e-12, atol=0)
 
     @pytest.mark.parametrize("height_mm", [0.5, 2.0])
     def test_chipped_over_the_whole_face_is_broken(self, xiamen, gear, height_mm):
@@ -262,8 +262,8 @@ class TestMisalignment:
         if ratio < 2:
             expected = even + tilt / 2
         for sign in (1, -1):
-            found, _ = self.approach(system, sign * tilt / UM, gear)
-            assert_allclose(found, expected, rtol=0.015, atol=0)
+            result, _ = self.approach(system, sign * tilt / UM, gear)
+            assert_allclose(result, expected, rtol=0.015, atol=0)
 
     def test_slices_that_bend_by_themselves_are_softer(self, machine):
         by_slice, whole = (

@@ -30,8 +30,8 @@ def test_severity_zero_is_healthy(xiamen, name, gear):
     side, sound_side = side_of(table, gear), side_of(sound, gear)
     row = side.kind[0]
     for key in ("compliance", "gap", "compliance_slope", "gap_slope"):
-        found, expected = getattr(side, key)[row], getattr(sound_side, key)[0]
-        assert_allclose(found, expected, rtol=0, atol=0, err_msg=key)
+        result, expected = getattr(side, key)[row], getattr(sound_side, key)[0]
+        assert_allclose(result, expected, rtol=0, atol=0, err_msg=key)
     assert side.present.all()
 
 
@@ -67,8 +67,8 @@ def falls(found, slack):
 @pytest.mark.parametrize("gear", GEARS)
 @pytest.mark.parametrize("name", [name for name, case in CASES.items() if case.grows])
 def test_the_deflection_never_falls_with_severity(series, name, gear):
-    found, _ = series(name, gear)
-    assert not falls(found, CASES[name].slack).any()
+    result, _ = series(name, gear)
+    assert not falls(result, CASES[name].slack).any()
 
 
 @pytest.mark.parametrize("gear", GEARS)
@@ -95,8 +95,8 @@ def test_severity_rises_within_0_and_1(series, name, gear):
 
 class TestTheChecksCanFail:
     def test_a_series_that_falls(self, series):
-        found, _ = series("wear_uniform", "pinion")
-        assert falls(found[::-1], 1e-9).all()
+        result, _ = series("wear_uniform", "pinion")
+        assert falls(result[::-1], 1e-9).all()
 
     def test_proud_teeth_touch_earlier(self, series):
         """Why the deflection may fall for them."""
@@ -127,8 +127,8 @@ class TestWhoseFacesBear:
     def test_a_pressed_crack_that_breathes_costs_nothing(self, xiamen, gear):
         pressed = {"crack_side": "compression", "crack_faces": "breathing"}
         crack = one("crack", gear=gear, tooth=0, **pressed)
-        found = deflection(xiamen, crack)
-        assert_allclose(found, deflection(xiamen), rtol=1e-12, atol=0)
+        result = deflection(xiamen, crack)
+        assert_allclose(result, deflection(xiamen), rtol=1e-12, atol=0)
         assert crack.severity(getattr(xiamen.pair, gear)) > 0.2
 
     def test_on_the_tension_side_it_is_open(self, xiamen, gear):
@@ -157,15 +157,15 @@ class TestThePapersCrack:
             one("crack", gear=gear, tooth=0, crack_depth_mm=depth, crack_start=start)
             for depth in (0.0, 0.3, 0.5, 1.0, 1.5, 2.0, 2.5)
         ]
-        found = np.array([deflection(cut, fault) for fault in faults])
-        assert not falls(found, 1e-9).any()
-        assert np.all(steps(found).max(axis=1) > 1e-3 * found.min())
+        result = np.array([deflection(cut, fault) for fault in faults])
+        assert not falls(result, 1e-9).any()
+        assert np.all(steps(result).max(axis=1) > 1e-3 * result.min())
 
     def test_rises_with_angle(self, cut):
         angles = (15, 30, 45, 60, 90)
         faults = [one("crack", tooth=0, crack_angle_deg=angle) for angle in angles]
-        found = np.array([deflection(cut, fault) for fault in faults])
-        assert not falls(found, 1e-9).any()
+        result = np.array([deflection(cut, fault) for fault in faults])
+        assert not falls(result, 1e-9).any()
 
     @pytest.mark.parametrize(
         ("start", "loss"), [("gamma_mid", 0.0281), ("arc_mid", 0.0403)]
@@ -173,8 +173,8 @@ class TestThePapersCrack:
     def test_it_costs_what_its_formula_says(self, paper_machine, start, loss):
         # spur reference (docs/validation.md), section 2.3: loss of pair stiffness at the pitch
         # point, 1 mm
-        found = lost_at_pitch_point(paper_machine, one("crack", crack_start=start))
-        assert_allclose(found, loss, rtol=0, atol=2e-4)
+        result = lost_at_pitch_point(paper_machine, one("crack", crack_start=start))
+        assert_allclose(result, loss, rtol=0, atol=2e-4)
 
 
 def lost_at_pitch_point(system, fault):
@@ -186,8 +186,8 @@ def lost_at_pitch_point(system, fault):
 
 class TestThePapersPit:
     def test_it_costs_what_its_formula_says(self, paper_machine):
-        found = lost_at_pitch_point(paper_machine, one("pitting"))
-        assert_allclose(found, 0.0574, rtol=0, atol=2e-4)
+        result = lost_at_pitch_point(paper_machine, one("pitting"))
+        assert_allclose(result, 0.0574, rtol=0, atol=2e-4)
 
     def test_slices_cost_the_same_where_the_pit_is_deeper_than_the_load(
         self, machine, paper_machine
@@ -204,13 +204,13 @@ class TestThePapersPit:
         }
         sliced = machine({f"mesh.{key}": value for key, value in terms.items()})
         assert sliced.mesh.law == "one_sided"
-        found, expected = (
+        result, expected = (
             lost_at_pitch_point(system, one("pitting"))
             for system in (sliced, paper_machine)
         )
-        assert_allclose(found, expected, rtol=1e-3, atol=0)
+        assert_allclose(result, expected, rtol=1e-3, atol=0)
         bridged = lost_at_pitch_point(sliced, one("pitting", pit_length_mm=0.02))
-        assert bridged < 0.1 * found
+        assert bridged < 0.1 * result
 
 
 class TestTwoFaultsOnOneTooth:
@@ -244,6 +244,8 @@ class TestTwoFaultsOnOneTooth:
         )
         tooth = faulty_teeth(system.pair, faults[::order])["pinion", 0]
         sound = sections(healthy_tooth(system.pair.pinion), papers_crack=True)
-        for found, whole in zip(sections(tooth, papers_crack=True), sound, strict=True):
-            assert np.all(found > 0)
-            assert np.all(found <= whole)
+        for result, whole in zip(
+            sections(tooth, papers_crack=True), sound, strict=True
+        ):
+            assert np.all(result > 0)
+            assert np.all(result <= whole)

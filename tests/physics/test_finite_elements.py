@@ -29,11 +29,11 @@ YOUNG = 206e9
 @cache
 def groups(name, *keys):
     """Rows of a stored table by the values of ``keys``."""
-    found = defaultdict(list)
+    result = defaultdict(list)
     with (DATA / f"{name}.csv").open(encoding="utf-8", newline="") as file:
         for row in csv.DictReader(file):
-            found[tuple(row[key] for key in keys)].append(row)
-    return dict(found)
+            result[tuple(row[key] for key in keys)].append(row)
+    return dict(result)
 
 
 def column(rows, name):
@@ -119,10 +119,10 @@ def test_cracks_of_many_gears(strain):
         case, side, _, angle, _ = key
         if side != "tension" or (case, float(angle)) == ("z84", 75.0):
             continue
-        found = increments(strain, rows) / column(rows, "increment") - 1.0
-        errors.append(found)
+        result = increments(strain, rows) / column(rows, "increment") - 1.0
+        errors.append(result)
         if float(angle) == 45.0:
-            at_45.append(found)
+            at_45.append(result)
     assert len(errors) > 150
     assert np.sqrt(np.mean(np.concatenate(errors) ** 2)) < 0.045
     assert np.abs(np.concatenate(errors)).max() < 0.20
@@ -188,12 +188,15 @@ def test_ring_over_bores(xiamen, strain, stress, key):
         load_angle(own, np.asarray(curvature(entering + shift)))
         for shift in (0.0, pair.base_pitch)
     ]
-    found = cross_compliance(
+    result = cross_compliance(
         own, material, angles[0], angles[1], pitches=1 if name == "pinion" else -1
     )
     tolerance = 0.02 if float(bore) * MODULE * 1e3 in (9.0, 15.0) else 0.05
     assert_allclose(
-        found * YOUNG * WIDTH / column(cross, "compliance"), 1.0, rtol=tolerance, atol=0
+        result * YOUNG * WIDTH / column(cross, "compliance"),
+        1.0,
+        rtol=tolerance,
+        atol=0,
     )
 
 
@@ -227,15 +230,15 @@ def test_partial_width_crack_in_three_dimensions(xiamen, strain, depth, extent):
         crack_width=float(extent) * WIDTH,
     )
     tooth = crack.apply(healthy_tooth(xiamen.pair.pinion), 0)
-    found = crack_compliance(tooth, np.array([radius]), strain)[0] * YOUNG * WIDTH
-    assert_allclose(found, cracked - sound, rtol=0.15, atol=0)
+    result = crack_compliance(tooth, np.array([radius]), strain)[0] * YOUNG * WIDTH
+    assert_allclose(result, cracked - sound, rtol=0.15, atol=0)
 
 
 def test_partial_width_load_in_three_dimensions(machine):
     """A pit over half of the face: the pinion's structure within 15 % of three dimensions, and not
     if bent as one.
     """
-    found = {}
+    result = {}
     for bending in ("by_slice", "whole"):
         system = machine({"mesh.bending": bending, "gear.pinion.bore_radius_mm": 9})
         pinion, wheel = system.pair.pinion, system.pair.wheel
@@ -263,6 +266,6 @@ def test_partial_width_load_in_three_dimensions(machine):
         assert_allclose(
             extra, share if bending == "by_slice" else 0.0, rtol=1e-9, atol=0
         )
-        found[bending] = (whole + extra)[0] * YOUNG * WIDTH / pitted
-    assert_allclose(found["by_slice"], 1.0, rtol=0.15, atol=0)
-    assert found["whole"] < 0.85
+        result[bending] = (whole + extra)[0] * YOUNG * WIDTH / pitted
+    assert_allclose(result["by_slice"], 1.0, rtol=0.15, atol=0)
+    assert result["whole"] < 0.85

@@ -80,14 +80,14 @@ def test_the_papers_choice_of_any_misses_them(machine, other):
 def test_local_part_against_finite_elements(physical):
     at = positions(physical)
     width, load = physical.pair.pinion.face_width, physical.mesh_force
-    found = weber_contact(physical.pair, at, physical.material).compliance(width, load)
+    result = weber_contact(physical.pair, at, physical.material).compliance(width, load)
     assert np.all(
-        (found / (np.array(LOCAL_PART) * 1e-12) > 0.90)
-        & (found / (np.array(LOCAL_PART) * 1e-12) < 0.95)
+        (result / (np.array(LOCAL_PART) * 1e-12) > 0.90)
+        & (result / (np.array(LOCAL_PART) * 1e-12) < 0.95)
     )
     assert (
         linear_contact(at, physical.material).compliance(width, load)[0]
-        < 0.3 * found.min()
+        < 0.3 * result.min()
     )
 
 
@@ -96,10 +96,10 @@ def test_coupled_double_zone_against_finite_elements(physical):
     along_mm = np.array([0.0, 0.7, 1.401, 2.101, 2.802, 3.502, 4.203])
     expected = np.array([2.355, 2.386, 2.403, 2.408, 2.401, 2.381, 2.347]) * 1e8 * 1.04
     table = physical.mesh_table()
-    found = static_mesh(
+    result = static_mesh(
         table, pair_states(table, along_mm * 1e-3), physical.mesh_force
     ).stiffness
-    assert_allclose(found, expected, rtol=0.01, atol=0)
+    assert_allclose(result, expected, rtol=0.01, atol=0)
 
 
 def test_local_compliance_falls_with_load_and_width(physical):

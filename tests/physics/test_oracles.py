@@ -195,11 +195,11 @@ class TestPeriodicMotion:
         exact = turn * velocity
 
         def measured(*record):
-            found = spectrum(*record)[:, case.n_periods * case.lines]
+            result = spectrum(*record)[:, case.n_periods * case.lines]
             late = (
-                -np.vdot(turn * exact, found).real / np.linalg.norm(turn * exact) ** 2
+                -np.vdot(turn * exact, result).real / np.linalg.norm(turn * exact) ** 2
             )
-            off = found * np.exp(turn * late) - exact
+            off = result * np.exp(turn * late) - exact
             return late, (
                 np.linalg.norm(off, axis=1) / np.linalg.norm(exact, axis=1)
             ).max()
@@ -214,13 +214,13 @@ class TestPeriodicMotion:
         assert abs(tile[:-1, 8].mean()) < 1e-8 * 2 * np.pi * case.speed_rpm / 60
 
     def test_a_record_holds_nothing_else(self, case, spectrum, default):
-        found = spectrum(default)[
+        result = spectrum(default)[
             :, 1 : math.floor(20e3 * case.period * case.n_periods)
         ]
-        between = found.copy()
+        between = result.copy()
         between[:, case.n_periods - 1 :: case.n_periods] = 0
         assert np.all(
-            np.linalg.norm(between, axis=1) < 5e-4 * np.linalg.norm(found, axis=1)
+            np.linalg.norm(between, axis=1) < 5e-4 * np.linalg.norm(result, axis=1)
         )
 
     def test_a_record_at_the_default_oversampling(self, case, compared, default):

@@ -50,12 +50,12 @@ def test_scores_know_a_perfect_variant_from_chance():
     random = np.stack([np.log(rng.dirichlet(np.ones(4), label.size)) for _ in range(2)])
     answers = {worlds.BEFORE: random, "same": random, "perfect": np.stack([sure, sure])}
     judged = worlds.Judged(label=label, unit=unit, log_probability=answers, n_windows=1)
-    found = worlds.scores(judged, CLASSES)
-    before, perfect = found[worlds.BEFORE], found["perfect"]
+    result = worlds.scores(judged, CLASSES)
+    before, perfect = result[worlds.BEFORE], result["perfect"]
     assert perfect["balanced_accuracy"] == perfect["auroc"] == 1.0
     assert perfect["gain"] == pytest.approx(1.0 - before["balanced_accuracy"])
     assert perfect["gain_interval"][0] > 0.5
-    assert found["same"]["gain_interval"] == [0.0, 0.0]
+    assert result["same"]["gain_interval"] == [0.0, 0.0]
     low, high = before["interval"]
     assert low < 0.25 < high
 

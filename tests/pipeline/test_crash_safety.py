@@ -64,13 +64,13 @@ def test_killed_at_random_moments_it_ends_byte_equal():
 
 def alive_in_group(group):
     """Commands of a process group that still run."""
-    found = []
+    result = []
     for path in Path("/proc").glob("[0-9]*/stat"):
         with suppress(OSError):
             state, _, own_group = path.read_text().rpartition(")")[2].split()[:3]
             if int(own_group) == group and state != "Z":
-                found.append((path.parent / "cmdline").read_bytes().decode())
-    return found
+                result.append((path.parent / "cmdline").read_bytes().decode())
+    return result
 
 
 def heed_interrupts():

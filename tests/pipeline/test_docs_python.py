@@ -56,8 +56,8 @@ def folder(tmp_path_factory):
 def test_python_compiles_and_says_who_runs_it(page):
     for block in _python(page):
         compile(block.code, f"{page.name}:{block.line}", "exec")
-        if found := re.fullmatch(r"run by (\S+)", block.mark):
-            text = (ROOT / found[1]).read_text(encoding="utf-8")
+        if result := re.fullmatch(r"run by (\S+)", block.mark):
+            text = (ROOT / result[1]).read_text(encoding="utf-8")
             assert page.name in text
 
 

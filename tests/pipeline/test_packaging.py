@@ -168,7 +168,7 @@ def test_all_is_every_extra_that_a_command_asks_for():
         for path in (ROOT / name).rglob("*"):
             if path.suffix in (".py", ".yaml", ".md"):
                 text = path.read_text(encoding="utf-8")
-                found = re.findall(r"gensig\[([\w, ]+)\]", text)
-                named |= set(",".join(found).split(",")) - {""}
+                result = re.findall(r"gensig\[([\w, ]+)\]", text)
+                named |= set(",".join(result).split(",")) - {""}
     # whoever lacks a package is told the extra that brings it
     assert set(of_commands) <= named <= set(extras)

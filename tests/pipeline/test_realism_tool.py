@@ -52,12 +52,12 @@ class TestValues:
         mesh = 2.0 * np.cos(2 * np.pi * TEETH * turned)
         hiss = np.random.default_rng(0).standard_normal(TIME.size)
         x = np.stack([mesh, hiss])
-        found = values.record_values(x, 2 * np.pi * turned, RATE, 30.0, TEETH)
-        assert_allclose(found["mesh"][0], [2.0, 0.0, 0.0], atol=0.02)
-        assert_allclose(found["nonsynchronous_share"], [0.0, 1.0], atol=0.02)
-        assert_allclose(found["rms"], [np.sqrt(2), np.sqrt(5000 / RATE)], rtol=0.05)
-        assert_allclose(found["rms_full_band"], [np.sqrt(2), 1.0], rtol=0.01)
-        assert found["n_turns"][0] == np.floor(turned[-1])
+        result = values.record_values(x, 2 * np.pi * turned, RATE, 30.0, TEETH)
+        assert_allclose(result["mesh"][0], [2.0, 0.0, 0.0], atol=0.02)
+        assert_allclose(result["nonsynchronous_share"], [0.0, 1.0], atol=0.02)
+        assert_allclose(result["rms"], [np.sqrt(2), np.sqrt(5000 / RATE)], rtol=0.05)
+        assert_allclose(result["rms_full_band"], [np.sqrt(2), 1.0], rtol=0.01)
+        assert result["n_turns"][0] == np.floor(turned[-1])
 
     def test_harmonic_decades(self):
         mesh = np.array(
@@ -99,10 +99,10 @@ class TestValues:
         return values.Table(columns=columns, indicators=indicators, n_failed=0)
 
     def test_pairs_are_of_one_gearbox_and_set_point_and_of_another_specimen(self):
-        found = values.quantities(self.table())
+        result = values.quantities(self.table())
 
         def ratios(name):
-            return np.sort(found[name, values.ALL])
+            return np.sort(result[name, values.ALL])
 
         # 2 gearboxes x 2 speeds x 2 channels, each way
         assert_allclose(ratios("missing_tooth.rms_ratio"), np.repeat([0.3, 30.0], 8))
@@ -111,14 +111,14 @@ class TestValues:
         assert_allclose(mesh, [0.1, 10.0])
 
     def test_the_slow_and_light_corner_stands_apart(self):
-        found = values.quantities(self.table())
+        result = values.quantities(self.table())
         slow, rest = (
-            found["missing_tooth.kurtosis", where]
+            result["missing_tooth.kurtosis", where]
             for where in (values.SLOW, values.ELSEWHERE)
         )
         assert len(slow) == len(rest) == 8
         assert_allclose(sorted(rest), 3.0 * np.sort(slow))
-        assert len(found["missing_tooth.kurtosis", values.ALL]) == 16
+        assert len(result["missing_tooth.kurtosis", values.ALL]) == 16
 
 
 class TestSets:
@@ -168,18 +168,18 @@ class TestSets:
 class TestRecording:
     def test_indicators_do_not_know_the_gain(self):
         x = healthy()
-        found = recording.indicators(x, RATE, TEETH, SPEED)
+        result = recording.indicators(x, RATE, TEETH, SPEED)
         quiet = recording.indicators(1e-3 * x, RATE, TEETH, SPEED)
-        for name in found:
-            assert_allclose(quiet[name], found[name], rtol=1e-6, err_msg=name)
+        for name in result:
+            assert_allclose(quiet[name], result[name], rtol=1e-6, err_msg=name)
 
     def test_indicators_of_a_modulated_mesh(self):
-        found = recording.indicators(healthy(noise=0.05), RATE, TEETH, SPEED)
-        assert_allclose(found["harmonic_2_over_1"], -6.02, atol=0.2)
-        assert_allclose(found["harmonic_3_over_1"], -12.04, atol=0.4)
-        assert_allclose(found["sideband_ratio"], 20 * np.log10(0.3), atol=0.6)
+        result = recording.indicators(healthy(noise=0.05), RATE, TEETH, SPEED)
+        assert_allclose(result["harmonic_2_over_1"], -6.02, atol=0.2)
+        assert_allclose(result["harmonic_3_over_1"], -12.04, atol=0.4)
+        assert_allclose(result["sideband_ratio"], 20 * np.log10(0.3), atol=0.6)
         carrier_share = 1.0 / (1.0 + 0.3**2 / 2)
-        assert_allclose(found["mesh_share"], 10 * np.log10(carrier_share), atol=0.1)
+        assert_allclose(result["mesh_share"], 10 * np.log10(carrier_share), atol=0.1)
 
     def test_other_teeth_and_sidebands_are_told_apart_and_the_same_machine_is_not(self):
         def simulated(**changes):
@@ -193,8 +193,8 @@ class TestRecording:
         made = (right, simulated(teeth=27), simulated(depth=0.1), right)
         controls = dict(zip(sets.CONTROLS, made, strict=True))
         real = recording.indicators(healthy(1), RATE, TEETH, SPEED)
-        found = recording.recording_comparisons(controls, real)
-        verdicts = {row.place: row.verdict for row in found}
+        result = recording.recording_comparisons(controls, real)
+        verdicts = {row.place: row.verdict for row in result}
         assert verdicts["recording.mesh_share", "wrong teeth"] == "told apart"
         assert verdicts["recording.sideband_ratio", "errors / 3"] == "told apart"
         assert verdicts["recording.sideband_ratio", "errors x 3"] == "not told apart"
@@ -203,7 +203,7 @@ class TestRecording:
             return [row.at for row in rows if row.id == "recording.fm4"]
 
         names = ["channels", "width", "wrong teeth", "errors / 3", "errors x 3"]
-        assert columns(found) == names
+        assert columns(result) == names
         without = recording.recording_comparisons(controls, None)
         assert columns(without)[0] == "simulated"
 
@@ -220,8 +220,8 @@ class TestRecording:
         x = recording.find_recording()
         if x is None:
             pytest.skip(f"${recording.VARIABLE} names no folder with the recording")
-        found = recording.recording_indicators(x)
-        assert all(np.isfinite(one).all() for one in found.values())
+        result = recording.recording_indicators(x)
+        assert all(np.isfinite(one).all() for one in result.values())
         assert recording.find_mesh_frequency(x, RATE, TEETH, SPEED) == pytest.approx(
             TEETH * SPEED, rel=2e-3
         )
@@ -250,8 +250,8 @@ def test_from_nothing_to_table_and_figures(tmp_path, monkeypatch, capsys):
     assert "real recording is left out" in said
     assert "16 records, 0 failed, at least 3 turns" in said
     assert "ranges frozen in commit (none named)" in said
-    found = json.loads((tmp_path / "found.json").read_text())["rows"]
-    rows = {(row["id"], row["at"]): row for row in found}
+    result = json.loads((tmp_path / "found.json").read_text())["rows"]
+    rows = {(row["id"], row["at"]): row for row in result}
     assert set(read_ranges()) < set(rows)
     # 2 specimens each way x 2 set-points x 4 channels
     assert rows["crack.rms_ratio", "all conditions"]["n"] == 16

@@ -32,10 +32,10 @@ TRAINING = (
 def test_lives_are_made_and_learnt_whole(tmp_path):
     lives, out = make(tmp_path / "lives", *LIVES), tmp_path / "report"
     assert diagnose(["train", f"data={lives}", f"out={out}", *TRAINING]) == 0
-    found = json.loads((out / "metrics.json").read_text())["protocols"]["by_unit"]
-    assert {"constant", "age_only", "indicators", "cnn"} <= set(found["methods"])
-    assert all(found["n_lives"][part] for part in ("train", "validation", "test"))
+    result = json.loads((out / "metrics.json").read_text())["protocols"]["by_unit"]
+    assert {"constant", "age_only", "indicators", "cnn"} <= set(result["methods"])
+    assert all(result["n_lives"][part] for part in ("train", "validation", "test"))
     assert "Remaining life, by_unit" in (out / "report.html").read_text()
     with (out / "predictions.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert {row["method"] for row in rows} == set(found["methods"])
+    assert {row["method"] for row in rows} == set(result["methods"])

@@ -92,8 +92,8 @@ def test_a_difference_is_accepted_only_elsewhere_and_up_to_1e_6(
         index = int(np.argmin(np.abs(signal)))  # where single precision resolves least
         signal[index] += part * np.sqrt(np.mean(np.square(signal, dtype=np.float64)))
         file["acceleration"][1, 0] = signal
-    found, said = reproduce(folder)
-    assert found == status
+    result, said = reproduce(folder)
+    assert result == status
     assert "5 of 6 records have the same bits" in said
     assert f"largest difference {part:.2g} of the record's RMS, in r000005" in said
     assert ("made with cpu_model Another CPU" in said) == bool(environment)
@@ -108,8 +108,8 @@ def test_all_stored_arrays_are_compared(reference, tmp_path, reproduce, name):
         values = file[name][2]
         values.flat[0] += 1
         file[name][2] = values
-    found, said = reproduce(folder)
-    assert found == 1
+    result, said = reproduce(folder)
+    assert result == 1
     assert "5 of 6 records have the same bits" in said
     assert "in r000002" in said
 

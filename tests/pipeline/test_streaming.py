@@ -84,10 +84,10 @@ def test_records_are_those_of_generate_bit_for_bit(stream, records, stored):
 
 
 def test_random_access_is_iteration(stream, records):
-    found = [stream[4], stream[-1]]
+    result = [stream[4], stream[-1]]
     expected = [records[4], records[-1]]
-    assert samples(found) == samples(expected)
-    assert [record.values["record_id"] for record in found] == [
+    assert samples(result) == samples(expected)
+    assert [record.values["record_id"] for record in result] == [
         record.values["record_id"] for record in expected
     ]
     with pytest.raises(IndexError):

@@ -119,8 +119,8 @@ def fit(series: Sequence[Series]) -> Array:
     root = np.concatenate([np.sqrt(one.increment) for one in series])
     design = np.concatenate([one.design for one in series]) / root[:, None]
     scale = np.linalg.norm(design, axis=0)
-    found = np.linalg.lstsq(design / scale, np.ones(len(root)), rcond=1e-6)[0] / scale
-    return found.reshape(3, -1)
+    result = np.linalg.lstsq(design / scale, np.ones(len(root)), rcond=1e-6)[0] / scale
+    return result.reshape(3, -1)
 
 
 def errors(series: Sequence[Series], coefficients: Array) -> Array:

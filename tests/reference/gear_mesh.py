@@ -264,8 +264,8 @@ def _sample(curve: Curve, knots: Sequence[float], size: float) -> Array:
         x, y = curve(fine)
         arc = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
         n_pieces = max(1, math.ceil(arc[-1] / size - 1e-9))
-        wanted = np.interp(np.linspace(0.0, arc[-1], n_pieces + 1)[1:-1], arc, fine)
-        points.append(np.stack(curve(np.append(wanted, end))))
+        expected = np.interp(np.linspace(0.0, arc[-1], n_pieces + 1)[1:-1], arc, fine)
+        points.append(np.stack(curve(np.append(expected, end))))
     return np.hstack(points)
 
 

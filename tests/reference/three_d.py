@@ -349,18 +349,18 @@ def _strip_means(basis: Basis, mesh: MeshTet, place: Array, force: Array) -> Arr
     low, high = np.minimum(line[:-1], line[1:]), np.maximum(line[:-1], line[1:])
     keys = mesh.edges[0].astype(np.int64) * mesh.nvertices + mesh.edges[1]
     order = np.argsort(keys)
-    wanted = low * mesh.nvertices + high
-    found = order[
-        np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)
+    expected = low * mesh.nvertices + high
+    result = order[
+        np.minimum(np.searchsorted(keys, expected, sorter=order), len(keys) - 1)
     ]
     vectors = np.zeros((basis.N, N_STRIPS))
-    for layer in np.flatnonzero(keys[found] == wanted):
+    for layer in np.flatnonzero(keys[result] == expected):
         strip = int(0.5 * (z[layer] + z[layer + 1]) / strip_width)
         share = (z[layer + 1] - z[layer]) / strip_width
         for weight, dofs in (
             (1.0 / 6.0, basis.nodal_dofs[:2, line[layer]]),
             (1.0 / 6.0, basis.nodal_dofs[:2, line[layer + 1]]),
-            (4.0 / 6.0, basis.edge_dofs[:2, found[layer]]),
+            (4.0 / 6.0, basis.edge_dofs[:2, result[layer]]),
         ):
             vectors[dofs, strip] += share * weight * force
     return vectors

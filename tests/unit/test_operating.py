@@ -57,12 +57,12 @@ class TestCurve:
 class TestNominal:
     def test_constant_without_profiles(self, xiamen):
         times = np.array([-0.45, 0.0, 1e-6, 0.7])
-        found, speed = xiamen.operating.nominal(times), xiamen.operating.speed
-        np.testing.assert_array_equal(found.angle, speed * times)
-        np.testing.assert_array_equal(found.speed, speed)
-        np.testing.assert_array_equal(found.torque_factor, 1)
-        np.testing.assert_array_equal(found.acceleration, 0)
-        np.testing.assert_array_equal(found.torque_slope, 0)
+        result, speed = xiamen.operating.nominal(times), xiamen.operating.speed
+        np.testing.assert_array_equal(result.angle, speed * times)
+        np.testing.assert_array_equal(result.speed, speed)
+        np.testing.assert_array_equal(result.torque_factor, 1)
+        np.testing.assert_array_equal(result.acceleration, 0)
+        np.testing.assert_array_equal(result.torque_slope, 0)
 
     def test_whole_numbers_are_times_too(self, operating, xiamen):
         for one in (operating, xiamen.operating):
@@ -83,6 +83,6 @@ class TestNominal:
         assert_allclose(angle, expected, rtol=1e-9, atol=1e-9 * operating.speed)
 
     def test_torque_follows_its_own_profile(self, operating):
-        found = operating.nominal(np.array([-1.0, 0.5, 9.0]))
-        assert_allclose(found.torque_factor, [0, 0.375, 1.5], rtol=1e-12)
-        assert_allclose(found.torque_slope, [0, 0.75, 0], rtol=1e-12)
+        result = operating.nominal(np.array([-1.0, 0.5, 9.0]))
+        assert_allclose(result.torque_factor, [0, 0.375, 1.5], rtol=1e-12)
+        assert_allclose(result.torque_slope, [0, 0.75, 0], rtol=1e-12)

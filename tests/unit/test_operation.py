@@ -62,16 +62,16 @@ class TestKinds:
 
     def test_typed_profiles_compose(self):
         words = [f"{SPEED}=[[0,0.5],[1,1]]", f"{TORQUE}=[[0.1,0],[0.2,1.5],[1,1]]"]
-        found = read_system(read_request(words).config).operating
-        assert found.speed_profile == Profile(times=(0.0, 1.0), factors=(0.5, 1.0))
+        result = read_system(read_request(words).config).operating
+        assert result.speed_profile == Profile(times=(0.0, 1.0), factors=(0.5, 1.0))
         torque = Profile(times=(0.1, 0.2, 1.0), factors=(0.0, 1.5, 1.0))
-        assert found.torque_profile == torque
+        assert result.torque_profile == torque
 
     def test_a_drawn_speed_scales_the_profile(self, config_with):
         reader = InputReader(config_with({SPEED: [[0, 0.5], [1, 1]]}))
         for speed in (600.0, 1200.0):
-            found = reader.machine({"operating.speed_rpm": speed}).operating
-            nominal = found.nominal(np.array([-0.3, 0.5, 2.0]))
+            result = reader.machine({"operating.speed_rpm": speed}).operating
+            nominal = result.nominal(np.array([-0.3, 0.5, 2.0]))
             set_speed = speed * math.pi / 30
             expected = set_speed * np.array([0.5, 0.75, 1.0])
             assert_allclose(nominal.speed, expected, rtol=1e-12)
@@ -80,17 +80,17 @@ class TestKinds:
     def test_files_of_factors_speeds_and_torques(self, operating, tmp_path, speed):
         set_speed = {"operating.speed_rpm": speed}
         factors = saved(tmp_path, "factor,time_s\n0.5,-1\n0.5,0\n1,1\n")
-        found = operating({SPEED: factors, **set_speed})
-        share = found.nominal(TIMES[:2]).speed / found.speed
+        result = operating({SPEED: factors, **set_speed})
+        share = result.nominal(TIMES[:2]).speed / result.speed
         assert_allclose(share, 0.5, rtol=1e-12)
         speeds = saved(tmp_path, "time_s,speed_rpm\n0,900\n1,1500\n")
-        found = operating({SPEED: speeds, **set_speed})
-        rpm = found.nominal(np.array([-1.0, 0.5, 1.0])).speed * 30 / math.pi
+        result = operating({SPEED: speeds, **set_speed})
+        rpm = result.nominal(np.array([-1.0, 0.5, 1.0])).speed * 30 / math.pi
         assert_allclose(rpm, [900, 1200, 1500], rtol=1e-12)
         torques = saved(tmp_path, "time_s,torque_nm\n0,10\n1,40\n")
-        found = operating({TORQUE: torques, **set_speed})
-        factor = found.nominal(np.array([0.5])).torque_factor
-        assert_allclose(found.torque * factor, 25, rtol=1e-12)
+        result = operating({TORQUE: torques, **set_speed})
+        factor = result.nominal(np.array([0.5])).torque_factor
+        assert_allclose(result.torque * factor, 25, rtol=1e-12)
 
     def test_a_file_may_end_one_step_early(self, operating, tmp_path):
         rows = "".join(f"{k / 100},1\n" for k in range(100))
@@ -193,9 +193,9 @@ class TestRipple:
     @pytest.mark.parametrize("rate", [{"order": 1}, {"frequency_hz": 30}])
     def test_of_a_constant_speed(self, operating, rate):
         ripple = {"share": 0.1, "phase_deg": 90, **rate}
-        found = operating({SPEED_RIPPLE: ripple})
-        nominal = found.nominal(np.array([0.0, 0.25, 0.5]) / 30)
-        share = nominal.speed / found.speed
+        result = operating({SPEED_RIPPLE: ripple})
+        nominal = result.nominal(np.array([0.0, 0.25, 0.5]) / 30)
+        share = nominal.speed / result.speed
         assert_allclose(share, [1.1, 1.0, 0.9], rtol=1e-12)
         assert_allclose(nominal.torque_factor, 1.0, rtol=0, atol=0)
 
@@ -204,14 +204,14 @@ class TestRipple:
     )
     def test_speed_and_slopes_are_derivatives(self, operating, ripple):
         rippled = {SPEED_RIPPLE: ripple, TORQUE_RIPPLE: {**ripple, "phase_deg": 30}}
-        found = operating({SPEED: WALK, TORQUE: RAMP, **rippled})
+        result = operating({SPEED: WALK, TORQUE: RAMP, **rippled})
         times, h = np.array([-0.2512, 0.1013, 0.5017, 0.9123]), 1e-6
-        before, at, after = (found.nominal(times + shift) for shift in (-h, 0.0, h))
+        before, at, after = (result.nominal(times + shift) for shift in (-h, 0.0, h))
 
         def slope(name):
             return (getattr(after, name) - getattr(before, name)) / (2 * h)
 
-        assert found.nominal(np.zeros(1)).angle == 0.0
+        assert result.nominal(np.zeros(1)).angle == 0.0
         assert_allclose(at.speed, slope("angle"), rtol=1e-7)
         assert_allclose(at.acceleration, slope("speed"), rtol=1e-5, atol=1e-4)
         assert_allclose(at.torque_slope, slope("torque_factor"), rtol=1e-5, atol=1e-5)
@@ -219,8 +219,8 @@ class TestRipple:
     def test_the_order_follows_the_set_angle_of_both_shafts_courses(self, operating):
         """On a ramp a torque ripple of order 2 has two periods a turn of the pinion, whatever the
         speed."""
-        found = operating({SPEED: RAMP, TORQUE_RIPPLE: {"share": 0.1, "order": 2}})
-        nominal = found.nominal(np.linspace(0.0, 1.0, 2001))
+        result = operating({SPEED: RAMP, TORQUE_RIPPLE: {"share": 0.1, "order": 2}})
+        nominal = result.nominal(np.linspace(0.0, 1.0, 2001))
         expected = 1 + 0.1 * np.sin(2 * nominal.angle)
         assert_allclose(nominal.torque_factor, expected, atol=1e-9)
 

@@ -102,12 +102,12 @@ def test_the_longest_suffix_wins(name, parts):
 
 
 def test_read_converts_and_fills():
-    found = shaft(labels=["a", "b"], seats_mm=[1, 2.5], width_mm=4)
-    assert (found.length, found.inertia) == pytest.approx((12.5e-3, 2.0))
-    assert (found.angle, found.width) == pytest.approx((math.pi / 2, 4e-3))
-    assert found.seats == pytest.approx((1e-3, 2.5e-3))
-    assert (found.name, found.n_keys, found.hollow) == ("shaft", 2, True)
-    assert found.labels == ("a", "b")
+    result = shaft(labels=["a", "b"], seats_mm=[1, 2.5], width_mm=4)
+    assert (result.length, result.inertia) == pytest.approx((12.5e-3, 2.0))
+    assert (result.angle, result.width) == pytest.approx((math.pi / 2, 4e-3))
+    assert result.seats == pytest.approx((1e-3, 2.5e-3))
+    assert (result.name, result.n_keys, result.hollow) == ("shaft", 2, True)
+    assert result.labels == ("a", "b")
     empty = shaft(angle_deg=None, seats_mm=None)
     assert empty.angle is empty.seats is empty.width is shaft().seats is None
 
@@ -117,9 +117,9 @@ def test_read_converts_and_fills():
     [(3, 3), ("all", "all"), ([3], (3,)), ([1, 5], (1, 5)), ((1, 5), (1, 5)), ([], ())],
 )
 def test_a_number_a_word_or_a_list(value, expected):
-    found = shaft(places=value).places
-    assert found == expected
-    assert type(found) is type(expected)
+    result = shaft(places=value).places
+    assert result == expected
+    assert type(result) is type(expected)
 
 
 NUMBERS = "is not a list of numbers or null"

@@ -73,12 +73,12 @@ def test_teeth_follow_one_another_and_keep_their_row(mesh):
 
 def test_slow_gears_have_the_static_shares(run, record):
     slow = {SPEED: 60, DURATION: 0.05}
-    found, dynamics = record(slow), pair_dynamics(run(slow))
+    result, dynamics = record(slow), pair_dynamics(run(slow))
     radius = dynamics.table.pair.pinion.base_radius
-    states = dynamics.states(dynamics.start_roll + radius * found.shaft_angle)
+    states = dynamics.states(dynamics.start_roll + radius * result.shaft_angle)
     load = dynamics.static(states, dynamics.mesh_force).load
     expected = np.sort(load / load.sum(axis=1, keepdims=True), axis=1).T
-    shares = np.sort(found.mesh.load_share, axis=0)
+    shares = np.sort(result.mesh.load_share, axis=0)
     assert_close(shares.mean(axis=1), expected.mean(axis=1), atol=3e-3)
     assert np.quantile(np.abs(shares - expected).max(axis=0), 0.95) < 0.03
 
@@ -102,11 +102,11 @@ def test_a_fault_is_engaged_when_its_tooth_carries(record):
 
 def test_lost_contact_is_that_of_the_record(record):
     """Samples are one in five of the steps of the fraction."""
-    found = record({SPEED: 6000, "operating.torque_nm": 2}, MISSING)
-    lost = found.mesh.contact_lost
-    assert found.contact_loss_fraction > 0.01
-    assert_close(lost.mean(), found.contact_loss_fraction, atol=2e-3)
-    assert (found.mesh.load_share[:, lost] == 0.0).all()
+    result = record({SPEED: 6000, "operating.torque_nm": 2}, MISSING)
+    lost = result.mesh.contact_lost
+    assert result.contact_loss_fraction > 0.01
+    assert_close(lost.mean(), result.contact_loss_fraction, atol=2e-3)
+    assert (result.mesh.load_share[:, lost] == 0.0).all()
 
 
 @pytest.mark.parametrize("precision", ["float64", "float32"])

@@ -59,11 +59,11 @@ def test_records_are_independent_in_any_order_and_block(config, rows, in_order, 
     """With known and with unknown twins."""
     expected = [in_order[index] for index in ORDER]
     for _ in range(2):
-        found = []
+        result = []
         for first in range(0, 8, size):
             block = [rows[index] for index in ORDER[first : first + size]]
-            found += simulate_records(config, block)
-        assert_same(found, expected)
+            result += simulate_records(config, block)
+        assert_same(result, expected)
         records._TWINS.clear()
     assert bits(in_order[5]) != bits(in_order[4])
     assert_same(simulated(config, [rows[5]]), [in_order[5]])
@@ -73,9 +73,9 @@ def test_a_failure_leaves_its_block(config, rows, in_order):
     """A row with a too long step is a failed record."""
     stiff = {**rows[2], "params/operating.drive_frequency_hz": 1e6}
     records._TWINS.clear()
-    found = simulate_records(config, [*rows[:2], stiff, rows[3]])
-    failed = found.pop(2)
-    assert_same(found, [in_order[index] for index in (0, 1, 3)])
+    result = simulate_records(config, [*rows[:2], stiff, rows[3]])
+    failed = result.pop(2)
+    assert_same(result, [in_order[index] for index in (0, 1, 3)])
     assert failed.values["status"] == "failed"
     assert "solver.oversampling" in failed.values["status_reason"]
     assert np.isnan(failed.signals["acceleration"]).all()
@@ -108,25 +108,25 @@ class TestNoise:
         """Relative to the healthy twin, which has another start: the mean over the channels."""
         ratio = {"params/sensing.snr_db": 12.0, "snr_db": 12.0}
         healthy = {**rows[0], **ratio, "label": 0, "faults_json": "[]"}
-        found = simulate_record(config.with_keys("operating", duration_s=0.5), healthy)
-        noise = found.signals["acceleration"].astype(float) - clean(found)
+        result = simulate_record(config.with_keys("operating", duration_s=0.5), healthy)
+        noise = result.signals["acceleration"].astype(float) - clean(result)
         power = np.var(noise, axis=1)
-        assert_close(power, found.signals["noise_power"], 0.04)
-        decibels = 10 * np.log10(found.signals["signal_power"] / power)
+        assert_close(power, result.signals["noise_power"], 0.04)
+        decibels = 10 * np.log10(result.signals["signal_power"] / power)
         assert_close(decibels.mean(), 12.0, atol=0.1)
 
     def test_without_noise_it_is_the_clean_signal(self, config, rows):
         row = dict(rows[1])
         del row["params/sensing.snr_db"]
-        found = simulate_record(config.with_keys("sensing", snr_db=None), row)
-        assert found.signals["acceleration"].tobytes() == clean(found).tobytes()
+        result = simulate_record(config.with_keys("sensing", snr_db=None), row)
+        assert result.signals["acceleration"].tobytes() == clean(result).tobytes()
 
 
 def test_a_sham_record_is_healthy_under_its_label(config, rows, in_order):
     index = next(k for k in range(8) if rows[k]["label_name"] == "missing_tooth")
     sham = simulate_record(config.with_keys("plan", sham=True), rows[index])
     labels = [
-        found.signals["fault_multihot"].tolist() for found in (sham, in_order[index])
+        result.signals["fault_multihot"].tolist() for result in (sham, in_order[index])
     ]
     assert labels[0] == labels[1]
     assert np.abs(clean(sham)).max() < np.abs(clean(in_order[index])).max()

@@ -144,25 +144,25 @@ class TestStored:
 
     def test_the_speed_is_that_of_the_shaft(self, stored):
         """Its integral is the growth of the angle, and its mean the record's."""
-        for row, found in stored:
+        for row, result in stored:
             for name in ("shaft_speed", "torque_set"):
-                assert found.signals[name].shape == (5120,)
-                assert found.signals[name].dtype == np.float32
+                assert result.signals[name].shape == (5120,)
+                assert result.signals[name].dtype == np.float32
             speed, angle = (
-                found.signals["shaft_speed"].astype(float),
-                found.signals["shaft_angle"],
+                result.signals["shaft_speed"].astype(float),
+                result.signals["shaft_angle"],
             )
             grown = np.cumsum(0.5 * (speed[1:] + speed[:-1])) / RATE
             assert_close(np.append(0.0, grown), angle - angle[0], atol=2e-4)
-            mean = found.values["speed_rpm"]
+            mean = result.values["speed_rpm"]
             assert_close(speed.mean() * 30 / math.pi, mean, 2e-5)
             assert abs(mean / row["speed_set_rpm"] - 1) > 1e-5
 
     def test_all_classes_of_a_condition_have_its_torque(self, stored):
         """The torque ripples twice a turn."""
         torques = {}
-        for row, found in stored:
-            torque = found.signals["torque_set"]
+        for row, result in stored:
+            torque = result.signals["torque_set"]
             torques.setdefault(row["condition_id"], []).append(torque)
             relative = torque.astype(float) / row["torque_nm"]
             assert_close(wave(relative, 60.0), 0.02, 0.15)

@@ -99,8 +99,8 @@ def test_the_stress_intensity_range_is_irwins(law, machine, crack):
     force = 100.0 / pair.pinion.base_radius
     release = force**2 / (2.0 * pair.face_width) * (high[0] - low[0]) / 2e-6
     expected = math.sqrt(release * strain.youngs_modulus) / 1e6
-    found = law.measures(1e-3, 100.0)["stress_intensity_range_mpa_sqrt_m"]
-    assert_allclose(found, expected, rtol=2e-3)
+    result = law.measures(1e-3, 100.0)["stress_intensity_range_mpa_sqrt_m"]
+    assert_allclose(result, expected, rtol=2e-3)
 
 
 @pytest.mark.parametrize("exponent", [2.25, 3.0])

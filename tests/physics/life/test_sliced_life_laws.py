@@ -108,8 +108,8 @@ def test_the_release_rate_is_the_change_of_the_energy_at_constant_load(helical):
     )
     release = energy.max() / (0.01 * depth * flanks.pair.pinion.face_width)
     modulus = flanks.material.in_plane("plane_strain").youngs_modulus
-    found = law.measures(depth, 90.0)["stress_intensity_range_mpa_sqrt_m"]
-    assert_allclose(found, math.sqrt(release * modulus) / 1e6, rtol=2e-3)
+    result = law.measures(depth, 90.0)["stress_intensity_range_mpa_sqrt_m"]
+    assert_allclose(result, math.sqrt(release * modulus) / 1e6, rtol=2e-3)
 
 
 def test_below_the_threshold_a_crack_of_a_helical_pair_does_not_grow(helical):
@@ -149,9 +149,9 @@ def test_the_contact_stress_of_slices_is_the_nominal_one_without_a_helix(spur):
     torques = np.array([20.0, 100.0, 300.0])
     mesh = _for_lives(machine.flanks).sliced_mesh()
     exponent = laws["distributed_pitting"].exponent
-    found = sliced_contact_stress(mesh, machine.material, torques, exponent)
+    result = sliced_contact_stress(mesh, machine.material, torques, exponent)
     nominal = [contact_stress(machine.pair, machine.material, one) for one in torques]
-    assert_allclose(found, nominal, rtol=1e-9)
+    assert_allclose(result, nominal, rtol=1e-9)
 
 
 def test_pits_of_a_helical_pair_come_by_their_slices(helical):

@@ -43,7 +43,7 @@ def test_the_band_rule_is_the_integral_over_the_passing_contact():
     over it."""
     case = case_of(*PAPER)
     load = case.line_load(case.new_flanks())
-    found = case.wear_per_mesh(case.new_flanks())[0, 0]
+    result = case.wear_per_mesh(case.new_flanks())[0, 0]
     peak = case.pressure(load, case.new_flanks())[0]
     half = 2.0 * load[0] / (math.pi * peak)
     factor, speed = case.options.wear_factor("pinion"), 12.5
@@ -54,7 +54,7 @@ def test_the_band_rule_is_the_integral_over_the_passing_contact():
         pressure = peak[node] * np.sqrt(np.maximum(1.0 - place**2, 0.0))
         sliding = abs(own[node] - other[node])
         depth = np.trapezoid(factor * pressure * sliding, time)
-        assert found[node] == pytest.approx(depth, rel=1e-4)
+        assert result[node] == pytest.approx(depth, rel=1e-4)
 
 
 @pytest.mark.parametrize("rule", ["band", "fixed_intervals"])
@@ -90,8 +90,8 @@ def test_life_goes_with_threshold_and_the_wheel_meshes_less_often():
     ratio = life.depth[-1] / (case.wear_per_mesh(case.new_flanks()) * life.life + 1e-30)
     shares = meshes_per_turn(case.pair)
     assert_allclose(shares, [1.0, 38.0 / 55.0])
-    for found, share in zip(ratio, shares, strict=True):
-        assert_allclose(found[0, :10], share, rtol=1e-9)
+    for result, share in zip(ratio, shares, strict=True):
+        assert_allclose(result[0, :10], share, rtol=1e-9)
 
 
 def test_the_mesh_shares_the_load():
@@ -114,11 +114,11 @@ def test_pressure_of_new_flanks_is_that_of_the_loaded_mesh():
     system, case = read_sliced_pair(compose("generate", words)), case_of(*words)
     contact = loaded_contact(case.mesh, system.phases(96), system.mesh_force)
     pressure = contact_pressure(case.mesh, contact, case.material)
-    found = case.pressure(case.line_load(case.new_flanks()), case.new_flanks())
+    result = case.pressure(case.line_load(case.new_flanks()), case.new_flanks())
     for j in (0, 4, 7):
         place = contact.position[..., j]
         inside = (place > 0.0) & (place < case.pair.path_of_contact)
-        ours = np.interp(place[inside], case.path.position, found[j])
+        ours = np.interp(place[inside], case.path.position, result[j])
         assert_allclose(ours, pressure[..., j][inside], rtol=0.02)
 
 

@@ -77,8 +77,8 @@ def test_it_grows_with_the_fault(single):
         maps_of(f"fault.crack_depth_mm={depth}").known for depth in (0.5, 2.0, 3.0)
     ]
     missing = maps_of("fault=missing_tooth").known
-    found = np.stack([depths[0], single.known, *depths[1:], missing])
-    assert (np.diff(found, axis=0) > 0.0).all()
+    result = np.stack([depths[0], single.known, *depths[1:], missing])
+    assert (np.diff(result, axis=0) > 0.0).all()
 
 
 def test_more_bandwidth_never_tells_less(crack):
@@ -107,8 +107,8 @@ def test_it_is_what_a_data_set_stores():
     record = simulate_record(config, {**row, **begin})
     cell = pairs.cell(1)
     power = cell.noise_power[2]
-    found = np.sqrt(np.sum(cell.residual[2] ** 2) / power[0])
-    assert found == pytest.approx(record.values["detectability"], rel=1e-12)
+    result = np.sqrt(np.sum(cell.residual[2] ** 2) / power[0])
+    assert result == pytest.approx(record.values["detectability"], rel=1e-12)
     stored = record.signals["acceleration"]
     assert_array_equal(cell.faulty[2].astype(np.float32), stored)
     assert_allclose(power, record.signals["noise_power"], rtol=1e-12, atol=0)
@@ -216,10 +216,10 @@ def test_the_command_writes_everything(tmp_path, capsys):
     words = ["detectability", "fault=missing_tooth", *SMALL, *typed.split()]
     assert main(words) == 0
     lines = capsys.readouterr().out.splitlines()
-    found = json.loads(table.read_text())
-    best, tests = found["best_seen"], found["tests"]
-    assert found["summary"] == lines
-    assert found["fault"]["kind"] == "missing_tooth"
+    result = json.loads(table.read_text())
+    best, tests = result["best_seen"], result["tests"]
+    assert result["summary"] == lines
+    assert result["fault"]["kind"] == "missing_tooth"
     assert len(tests) == 2 * 1 * 1 * 2
     speed = max(tests, key=lambda test: test["d_prime_known"])["speed_rpm"]
     assert f"best at {speed:g} r/min, 20 N m, pinion_y, up to 20 kHz" in lines[1]

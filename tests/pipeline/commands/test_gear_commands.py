@@ -73,9 +73,9 @@ def test_own_config_dir_adds_options(gensig, tmp_path):
     (tmp_path / "fault" / "deep.yaml").write_text(option)
     said, _ = gensig("stiffness fault=deep --config-dir .")
     assert "faulty pair loses" in said
-    found = re.search(r"single pair, highest +(\S+) N/m sound, (\S+) N/m faulty", said)
-    assert found is not None
-    assert 0.5 < float(found[2]) / float(found[1]) < 1.0
+    result = re.search(r"single pair, highest +(\S+) N/m sound, (\S+) N/m faulty", said)
+    assert result is not None
+    assert 0.5 < float(result[2]) / float(result[1]) < 1.0
 
 
 def test_transmission_error_writes_what_it_promises(written, drawn, capsys):
@@ -141,12 +141,12 @@ def test_other_commands_take_the_option_of_modify_flank(
     monkeypatch.setattr(gensig.commands.gears.modify, "optimise", quick)
     target = tmp_path / "mine" / "modification" / "best.yaml"
     target.parent.mkdir(parents=True)
-    found = written(
+    result = written(
         f"modify-flank {FAST} --points 1 --misalignments 0 4 --seed 3 --plot f.png --out",
         target,
     )
     assert "modification=best --config-dir" in capsys.readouterr().out
-    chosen = found["chosen"]
+    chosen = result["chosen"]
     pinion = chosen["modification"]["pinion"]
     assert yaml.safe_load(target.read_text())["pinion"] == pinion
     content = written(
@@ -160,7 +160,7 @@ def test_other_commands_take_the_option_of_modify_flank(
     front = drawn[0]["Worst of all cases"]
     assert labels(front) == ["front", "before", "chosen"]
     points = [line.get_xdata()[0] for line in front.lines]
-    ripples = [found[name]["peak_to_peak_um"] for name in ("before", "chosen")]
+    ripples = [result[name]["peak_to_peak_um"] for name in ("before", "chosen")]
     assert points == [chosen["peak_to_peak_um"], *ripples]
 
 

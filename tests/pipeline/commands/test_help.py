@@ -173,9 +173,9 @@ def test_the_tab_key_knows_verbs_flags_options_keys_and_paths(
 ):
     (tmp_path / "here").mkdir()
     (tmp_path / "her.csv").touch()
-    found = completed(line.replace("@", str(tmp_path)), tmp_path)
-    assert set(offered.replace("@", str(tmp_path)).split()) <= found
-    assert absent not in found
+    result = completed(line.replace("@", str(tmp_path)), tmp_path)
+    assert set(offered.replace("@", str(tmp_path)).split()) <= result
+    assert absent not in result
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

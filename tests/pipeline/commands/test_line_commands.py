@@ -159,10 +159,10 @@ def test_loads_root_stress_and_a_sweep_in_time_are_written_and_drawn(
     speeds = content["sweep_speeds_rpm"]
     n_speeds, n_orders = len(speeds), len(content["sweep_orders"])
     for way in ("sweep_up", "sweep_down"):
-        found = content[way]
-        assert np.shape(found["angle_deg"]) == (1, n_speeds, n_orders)
-        assert np.shape(found["typical_greatest_tooth_force_n"]) == (8, n_speeds)
-        assert np.all(np.array(found["speed_fluctuation_rpm"]) > 0.0)
+        result = content[way]
+        assert np.shape(result["angle_deg"]) == (1, n_speeds, n_orders)
+        assert np.shape(result["typical_greatest_tooth_force_n"]) == (8, n_speeds)
+        assert np.all(np.array(result["speed_fluctuation_rpm"]) > 0.0)
     assert np.all(np.diff(speeds) > 0.0)
     assert "sweep up and down, 0.8 s each way" in printed
     panels = drawn[0]

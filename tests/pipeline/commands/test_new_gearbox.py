@@ -65,8 +65,8 @@ def test_derived_values_are_those_of_the_textbook():
         "tooth_force_per_width_n_per_mm": 2000.0 / 28.0,
         "mesh_frequency_hz": 500.0,
     }
-    found = [derived[key] for key in expected]
-    assert_allclose(found, list(expected.values()), rtol=1e-12)
+    result = [derived[key] for key in expected]
+    assert_allclose(result, list(expected.values()), rtol=1e-12)
 
 
 def test_every_value_of_the_option_has_a_remark_and_the_given_ones_are_kept(

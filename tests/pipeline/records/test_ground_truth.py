@@ -58,9 +58,9 @@ def test_the_mesh_state_is_there(stored: Path) -> None:
 
 def test_faults_can_be_stored_and_sound_gears_cannot(stored: Path) -> None:
     with gensig.open_dataset(stored) as data:
-        names, found = data.column("label_name"), data.column("detectability")
-    assert (found[names == "healthy"] == 0.0).all()
-    assert (found[names == "crack"] > 0.0).all()
+        names, result = data.column("label_name"), data.column("detectability")
+    assert (result[names == "healthy"] == 0.0).all()
+    assert (result[names == "crack"] > 0.0).all()
 
 
 @pytest.mark.parametrize("kind", ["npz", "parquet", "hdf5"])

@@ -57,8 +57,8 @@ def test_the_mesh_of_shipped_gears_stands_out(name):
         # around a missing tooth the sidebands may be louder than the mesh
         if record.values["label_name"] == "healthy":
             expected = n_teeth["pinion"] * speed
-            found = strongest_comb(signal[1], 51200.0, expected)
-            assert found == pytest.approx(expected, rel=2e-3)
+            result = strongest_comb(signal[1], 51200.0, expected)
+            assert result == pytest.approx(expected, rel=2e-3)
 
 
 def test_the_test_pair_has_the_centre_distance_and_tips_of_its_rig():

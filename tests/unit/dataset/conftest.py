@@ -37,5 +37,5 @@ def folder(tmp_path, template):
 @pytest.fixture
 def data(template):
     """A reader of the closed data set."""
-    with open_dataset(template) as found:
-        yield found
+    with open_dataset(template) as result:
+        yield result

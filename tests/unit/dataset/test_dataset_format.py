@@ -35,10 +35,10 @@ def test_every_data_set_is_described_in_a_row_of_its_own():
         shape = ", ".join(("record", *column.axes))
         cells = (name, f"({shape})", kind, column.unit, column.role, column.description)
         rows.append(f"| {' | '.join(cells)} |")
-    found = re.search(
+    result = re.search(
         r"<!-- columns:.*?-->\n.*?\n.*?\n(.*)\n.*?\n<!-- end", TEXT, re.DOTALL
     )
-    assert found[1].splitlines() == rows
+    assert result[1].splitlines() == rows
     assert f"version {SCHEMA_VERSION}\n" in TEXT.splitlines(keepends=True)[0]
 
 

@@ -75,8 +75,8 @@ def test_some_rows_are_those_of_the_whole(texts, depth, data):
         (Path(folder) / "plan.csv").write_text(plan_text(plan))
         rows = PlanRows(Path(folder) / "plan.csv")
         assert rows.names == list(plan.columns)
-        found = rows.records(first, n_records)
-    assert repr(found) == repr([plan.record(first + k) for k in range(n_records)])
+        result = rows.records(first, n_records)
+    assert repr(result) == repr([plan.record(first + k) for k in range(n_records)])
 
 
 @pytest.fixture

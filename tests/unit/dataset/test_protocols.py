@@ -72,9 +72,9 @@ def made(request):
 
 
 def test_random_plans_have_every_protocol_somewhere_and_lack_it_elsewhere():
-    found = [set(make_splits(plan, seed)) for seed, plan in enumerate(PLANS)]
+    result = [set(make_splits(plan, seed)) for seed, plan in enumerate(PLANS)]
     for name in set(PROTOCOLS) - {"random_window_leaky"}:
-        assert 5 < sum(name in names for names in found) < 60, name
+        assert 5 < sum(name in names for names in result) < 60, name
 
 
 def test_a_protocol_is_made_or_its_lack_explained(made):

@@ -52,10 +52,10 @@ def test_record_and_difference_have_one_divisor_which_is_the_twins(normalise):
     level = np.ones((4, 1))
     if normalise == "rms":
         level = np.tile(np.std(twin, axis=1, keepdims=True), (2, 1))
-    wanted = np.concatenate([signal, signal - twin]) / level
-    wanted = wanted[:, start : start + 1200]
-    wanted = wanted - wanted.mean(axis=1, keepdims=True)
-    np.testing.assert_allclose(cut, wanted, rtol=0, atol=1e-4)
+    expected = np.concatenate([signal, signal - twin]) / level
+    expected = expected[:, start : start + 1200]
+    expected = expected - expected.mean(axis=1, keepdims=True)
+    np.testing.assert_allclose(cut, expected, rtol=0, atol=1e-4)
     np.testing.assert_array_equal(windows.label, plain.label)
     np.testing.assert_array_equal(windows.start, plain.start)
 
@@ -116,9 +116,9 @@ def test_a_method_over_itself_is_one_and_the_interval_grows_with_the_units_sprea
 
     same = ratio(counts[:1], counts[:1])
     assert same == {"mean": 1.0, "low": 1.0, "high": 1.0}
-    found = ratio(counts, perfect)
-    assert found["low"] < found["mean"] < found["high"] < 1
-    assert found["mean"] == pytest.approx(hits.mean() / 10)
+    result = ratio(counts, perfect)
+    assert result["low"] < result["mean"] < result["high"] < 1
+    assert result["mean"] == pytest.approx(hits.mean() / 10)
     above = {"over_oracle": {"balanced_accuracy": ratio(perfect, counts)}}
     assert oracle_verdict(above).endswith("no bound here")
 
@@ -174,9 +174,9 @@ def test_a_leak_is_found_and_where_there_is_none_the_probe_is_at_chance():
     )
 
     def share(name):
-        (found,) = baseline_predictions(source, [name])
-        assert found.method == name
-        return np.mean(found.predicted == task.labels()[found.record])
+        (result,) = baseline_predictions(source, [name])
+        assert result.method == name
+        return np.mean(result.predicted == task.labels()[result.record])
 
     assert share("metadata_probe") == 1.0
     label = np.random.default_rng(3).permutation(dataset.columns["label"])
@@ -283,8 +283,8 @@ def test_a_sham_set_scores_chance_where_the_faults_score_above(study):
     chosen = ("baselines=[indicators_without_level]", "sham=sham")
     methods = by_unit(study(*FAST, *few, *chosen))["methods"]
     for name in ("sham", "sham_indicators_without_level"):
-        found = verdict(methods[name], 1 / len(CLASSES))
-        assert found != "ABOVE chance: look for a leak"
+        result = verdict(methods[name], 1 / len(CLASSES))
+        assert result != "ABOVE chance: look for a leak"
     assert methods["indicators_without_level"]["balanced_accuracy"]["low"] > 0.4
 
 

@@ -32,10 +32,10 @@ def stopped_after_parsing(monkeypatch: pytest.MonkeyPatch) -> None:
             words: Sequence[str] | None = None,
             namespace: Any = None,
         ) -> Any:
-            found, left = known(parser, words, namespace)
+            result, left = known(parser, words, namespace)
             if left:
                 parser.error(f"unrecognized arguments: {' '.join(left)}")
-            raise _Parsed(found)
+            raise _Parsed(result)
 
         return parse
 

@@ -118,10 +118,10 @@ def test_a_list_or_block_is_not_taken_for_the_paragraph_before() -> None:
 
 def _keys(tree: Any, prefix: str) -> set[str]:
     """Dotted keys of a mapping, with those of mappings within."""
-    found: set[str] = set()
+    result: set[str] = set()
     for key, value in tree.items() if isinstance(tree, dict) else ():
-        found |= {f"{prefix}{key}"} | _keys(value, f"{prefix}{key}.")
-    return found
+        result |= {f"{prefix}{key}"} | _keys(value, f"{prefix}{key}.")
+    return result
 
 
 def test_configuration_keys_that_the_pages_name_exist() -> None:

@@ -124,8 +124,8 @@ class TestRefusals:
         text = r"internal steps to a period of the mesh mode .* raise solver"
         with pytest.warns(CoarseStepWarning, match=text) as warned:
             check_step(dynamics, RATE, 2)
-        found = re.search(r"solver.oversampling to (\d+)", str(warned[0].message))
-        enough = int(found[1])
+        result = re.search(r"solver.oversampling to (\d+)", str(warned[0].message))
+        enough = int(result[1])
         with pytest.warns(CoarseStepWarning):
             check_step(dynamics, RATE, enough - 1)
         recwarn.clear()

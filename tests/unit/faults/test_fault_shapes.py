@@ -105,10 +105,10 @@ class TestThePapersSections:
         assert_allclose(
             bearing_width(tooth, rc), bearing_width(sound, rc), rtol=0, atol=0
         )
-        for found, expected in zip(
+        for result, expected in zip(
             sections(tooth, papers_crack=False), (sound_area, sound_moment), strict=True
         ):
-            assert_allclose(found, expected, rtol=0, atol=0)
+            assert_allclose(result, expected, rtol=0, atol=0)
 
     def test_a_crack_keeps_half_plus_h_q(self, tooth_of):
         """Spur paper eqs. (11), (12): sections thicker than h_q keep h_x + h_q, the others all."""
@@ -170,10 +170,10 @@ class TestThePapersSections:
         sound = sections(tooth_of(), papers_crack=False)
         for kind in (kind for kind in KINDS if "material_loss" in CHANGES[kind]):
             weakened = sections(tooth_of(one(kind)), papers_crack=False)
-            for found, whole in zip(weakened, sound, strict=True):
-                assert np.all(found > 0)
-                assert np.all(found <= whole * (1 + 1e-12))
-                assert (found < whole).any()
+            for result, whole in zip(weakened, sound, strict=True):
+                assert np.all(result > 0)
+                assert np.all(result <= whole * (1 + 1e-12))
+                assert (result < whole).any()
 
 
 class TestCrackFront:
@@ -192,8 +192,8 @@ class TestCrackFront:
         depth = tooth_of(fault).cracks[0].depth
         assert_allclose(depth.mean(), 2e-3 * mean * width / FULL, rtol=1e-12, atol=0)
         severity = depth.mean() / fault.root_chord(xiamen.pair.pinion)
-        found = fault.severity(xiamen.pair.pinion)
-        assert_allclose(found, severity, rtol=1e-12, atol=0)
+        result = fault.severity(xiamen.pair.pinion)
+        assert_allclose(result, severity, rtol=1e-12, atol=0)
         edges = np.linspace(0.0, FULL, len(depth) + 1)
         middle = 0.5 * (edges[1:] + edges[:-1])
         assert np.all(depth[edges[:-1] >= width] <= 0)

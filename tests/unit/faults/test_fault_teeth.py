@@ -25,11 +25,11 @@ def rows(table, gear, tooth):
 
 
 def assert_same_tooth(table, other, gear, tooth):
-    for key, found, expected in zip(
+    for key, result, expected in zip(
         KEYS, rows(table, gear, tooth), rows(other, gear, tooth), strict=True
     ):
         assert_allclose(
-            found, expected, rtol=1e-12, atol=1e-18, err_msg=f"{key} of tooth {tooth}"
+            result, expected, rtol=1e-12, atol=1e-18, err_msg=f"{key} of tooth {tooth}"
         )
 
 
@@ -134,8 +134,8 @@ class TestCompound:
         wear = one("wear", tooth=2, wear_profile=None, wear_depth_um=10)
         table = xiamen.mesh_table((wear, one("pitch_error", tooth=2)))
         gap = rows(table, "pinion", 2)[1]
-        found = np.interp(xiamen.pair.pitch_point, table.position, gap)
-        assert found == pytest.approx(30e-6, rel=1e-9)
+        result = np.interp(xiamen.pair.pitch_point, table.position, gap)
+        assert result == pytest.approx(30e-6, rel=1e-9)
 
     def test_a_cracked_missing_tooth_is_missing(self, xiamen):
         for faults in (

@@ -33,12 +33,12 @@ def test_reference_line_of_action(pair):
     assert_allclose(pair.transverse_contact_ratio, 1.71178, rtol=0, atol=6e-6)
     assert_allclose(pair.base_pitch, 5.90426e-3, rtol=0, atol=6e-9)
     assert_allclose(pair.tangent_length, 36.59616e-3, rtol=0, atol=6e-9)
-    found = [
+    result = [
         pair.start_curvature_radius,
         pair.end_curvature_radius,
         pair.pinion_curvature(pair.pitch_point),
     ]
-    assert_allclose(found, [2.45827e-3, 12.56508e-3, 7.86646e-3], rtol=0, atol=6e-9)
+    assert_allclose(result, [2.45827e-3, 12.56508e-3, 7.86646e-3], rtol=0, atol=6e-9)
 
 
 @pytest.mark.parametrize("shifts", [(0.0, 0.0), (0.3, -0.3), (0.3, 0.2), (-0.1, 0.4)])

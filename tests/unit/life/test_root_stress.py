@@ -40,10 +40,10 @@ def test_a_force_gives_the_stress_it_was_asked_for():
     loaded = case(
         PUMP, "strength.application_factor=1.25", "strength.face_load_factor=1.2"
     ).under(349.39e6)
-    found = loaded.gears()["wheel"]
-    assert found.stress == pytest.approx(349.39e6, rel=1e-12)
-    assert found.nominal == pytest.approx(349.39e6 / 1.5, rel=1e-12)
-    assert found.safety.paper == pytest.approx(1.353, abs=5e-4)
+    result = loaded.gears()["wheel"]
+    assert result.stress == pytest.approx(349.39e6, rel=1e-12)
+    assert result.nominal == pytest.approx(349.39e6 / 1.5, rel=1e-12)
+    assert result.safety.paper == pytest.approx(1.353, abs=5e-4)
     assert loaded.tangential_force == pytest.approx(
         case(PUMP).force_for(349.39e6) / 1.5, rel=1e-12
     )
@@ -64,11 +64,11 @@ def test_stress_goes_with_force_and_against_width_and_module_squared(words, shar
 
 
 def test_a_wider_gear_is_helped_by_a_module_at_either_end():
-    found = pair(PUMP)
-    assert root_width(found, found.wheel) == pytest.approx(20e-3)
-    assert root_width(found, found.pinion) == pytest.approx(26e-3)
-    found = pair(PUMP, "gear.pinion.face_width_mm=22")
-    assert root_width(found, found.pinion) == pytest.approx(22e-3)
+    result = pair(PUMP)
+    assert root_width(result, result.wheel) == pytest.approx(20e-3)
+    assert root_width(result, result.pinion) == pytest.approx(26e-3)
+    result = pair(PUMP, "gear.pinion.face_width_mm=22")
+    assert root_width(result, result.pinion) == pytest.approx(22e-3)
 
 
 @pytest.mark.parametrize("edition", [2019, 2006])
@@ -93,13 +93,13 @@ def test_load_distribution_goes_on_at_its_bounds():
     short, long = "gear.addendum_coefficient=0.9", "gear.addendum_coefficient=1"
     few, many = (pair("system=helical_pair", words) for words in (short, long))
     assert normal_contact_ratio(few) < 2.0 < normal_contact_ratio(many)
-    for found, without_overlap in ((few, 1.0), (many, math.sqrt(0.5))):
+    for result, without_overlap in ((few, 1.0), (many, math.sqrt(0.5))):
         widths = np.array([1e-9, 0.5, 0.999999, 1.5])
-        widths *= found.face_width / found.overlap_ratio
-        values = [load_distribution_factor(with_width(found, w)) for w in widths]
+        widths *= result.face_width / result.overlap_ratio
+        values = [load_distribution_factor(with_width(result, w)) for w in widths]
         assert values[0] == pytest.approx(without_overlap, rel=1e-6)
         assert values[2] == pytest.approx(values[3], rel=1e-5)
-        assert values[3] == pytest.approx(normal_contact_ratio(found) ** -0.5)
+        assert values[3] == pytest.approx(normal_contact_ratio(result) ** -0.5)
         assert values[0] > values[1] > values[2]
     assert load_distribution_factor(pair(PUMP)) == 1.0
     teeth = ("gear.addendum_coefficient=1.25", "gear.cutter_tip_radius_coefficient=0.2")
@@ -109,9 +109,9 @@ def test_load_distribution_goes_on_at_its_bounds():
 
 
 def test_helix_factor():
-    found = pair("system=helical_pair")  # 18 degrees, overlap above 1
-    assert helix_factor(found, edition=2006) == pytest.approx(1.0 - 18.0 / 120.0)
-    assert helix_factor(found, edition=2019) == pytest.approx(
+    result = pair("system=helical_pair")  # 18 degrees, overlap above 1
+    assert helix_factor(result, edition=2006) == pytest.approx(1.0 - 18.0 / 120.0)
+    assert helix_factor(result, edition=2019) == pytest.approx(
         0.85 / math.cos(math.radians(18.0)) ** 3
     )
     steep = pair("system=helical_pair", "gear.helix_angle_deg=38")
@@ -170,11 +170,11 @@ def test_slices_of_a_spur_pair_are_the_pair_itself(coupling, law):
     sliced = case(*words, "system=helical_pair", PUMP, *slices).history()
     inside = np.linspace(0.02, 0.98, 200) * whole.roll[-2]
     for name in ("pinion", "wheel"):
-        exact, found = (
+        exact, result = (
             np.interp(inside, history.roll, history.stress[name])
             for history in (whole, sliced)
         )
-        np.testing.assert_allclose(found, exact, rtol=2e-3, atol=2e-3 * exact.max())
+        np.testing.assert_allclose(result, exact, rtol=2e-3, atol=2e-3 * exact.max())
 
 
 def test_spreading_keeps_the_sum_and_evens_out():
@@ -211,9 +211,9 @@ def test_every_gear_option_has_a_root_stress(name):
         words = ["system=helical_pair", *words]
     loaded = case(*words)
     history = loaded.history(n_phases=40)
-    for gear, found in loaded.gears().items():
-        assert 5e6 < found.stress < 2e9
-        assert 0.4 * found.stress < history.stress[gear].max() < 1.5 * found.stress
+    for gear, result in loaded.gears().items():
+        assert 5e6 < result.stress < 2e9
+        assert 0.4 * result.stress < history.stress[gear].max() < 1.5 * result.stress
     shares_throughout = loaded.pair.total_contact_ratio > 1.2
     assert shares_throughout or 0.99 < history.share.max() <= 1.0 + 1e-9
 
@@ -222,8 +222,8 @@ def test_the_force_over_the_mesh_gives_its_stress():
     loaded = case(PUMP)
     force = loaded.force_over_mesh_for(200e6)
     torque = force * loaded.pair.pinion.pitch_radius
-    found = case(PUMP, f"operating.torque_nm={torque!r}").history().stress
-    assert max(values.max() for values in found.values()) == pytest.approx(
+    result = case(PUMP, f"operating.torque_nm={torque!r}").history().stress
+    assert max(values.max() for values in result.values()) == pytest.approx(
         200e6, rel=1e-5
     )
     assert force > loaded.force_for(200e6)

@@ -59,14 +59,14 @@ SHAPES = [
 
 @pytest.mark.parametrize(("n_teeth", "shift", "rounding"), SHAPES)
 def test_the_critical_section_lies_on_our_own_root_curve(n_teeth, shift, rounding):
-    found = gear(n_teeth, shift=shift, rounding=rounding)
-    section = root_section(found)
-    at = touching(found)
-    x, y = root_curve(found, np.array([at]))
+    result = gear(n_teeth, shift=shift, rounding=rounding)
+    section = root_section(result)
+    at = touching(result)
+    x, y = root_curve(result, np.array([at]))
     assert section.thickness == pytest.approx(2.0 * y[0], rel=1e-9)
     assert section.height == pytest.approx(x[0], rel=1e-9)
     around = at + np.linspace(-2e-2, 2e-2, 201)
-    x, y = root_curve(found, around)
+    x, y = root_curve(result, around)
     dx, dy = np.gradient(x, around), np.gradient(y, around)
     turning = dx * np.gradient(dy, around) - dy * np.gradient(dx, around)
     curvature = np.abs(turning) / np.hypot(dx, dy) ** 3
@@ -75,16 +75,16 @@ def test_the_critical_section_lies_on_our_own_root_curve(n_teeth, shift, roundin
 
 @pytest.mark.parametrize(("n_teeth", "shift", "rounding"), SHAPES)
 def test_the_lever_arm_is_that_of_our_own_flank(n_teeth, shift, rounding):
-    found = gear(n_teeth, shift=shift, rounding=rounding)
-    tip = virtual_gear(found).tip_curvature_radius
-    distance = np.linspace(0.0, 0.6 * found.base_pitch, 7)
-    loading = root_loading(found, distance)
-    x, y = involute_point(found, tip - distance)
-    angle = flank_load_angle(found, tip - distance)
+    result = gear(n_teeth, shift=shift, rounding=rounding)
+    tip = virtual_gear(result).tip_curvature_radius
+    distance = np.linspace(0.0, 0.6 * result.base_pitch, 7)
+    loading = root_loading(result, distance)
+    x, y = involute_point(result, tip - distance)
+    angle = flank_load_angle(result, tip - distance)
     np.testing.assert_allclose(loading.load_angle, angle, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(
         loading.lever_arm,
-        x - y * np.tan(angle) - root_section(found).height,
+        x - y * np.tan(angle) - root_section(result).height,
         rtol=1e-7,
         atol=1e-12,
     )

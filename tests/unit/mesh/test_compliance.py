@@ -34,14 +34,14 @@ PINION = {
 def test_terms_of_the_reference_pinion(xiamen, term):
     gear, material = xiamen.pair.pinion, xiamen.material
     if term == "foundation":
-        found = fillet_foundation_compliance(
+        result = fillet_foundation_compliance(
             gear, load_angle(gear, CURVATURE), material, allow_extrapolation=False
         )
     else:
-        found = getattr(
+        result = getattr(
             tooth_compliance(healthy_tooth(gear), CURVATURE, material), term
         )
-    assert_allclose(found, np.array(PINION[term]) * 1e-12, rtol=1e-3, atol=0.01e-12)
+    assert_allclose(result, np.array(PINION[term]) * 1e-12, rtol=1e-3, atol=0.01e-12)
 
 
 def test_running_sums_equal_direct_quadrature(xiamen):
@@ -114,10 +114,10 @@ def test_compliance_scales_with_modulus_and_width(xiamen, factor):
 
 def test_contact_term(xiamen):
     # spur reference (docs/validation.md), section 2: 281.23e-12 m/N at 20 mm
-    found = linear_contact(np.zeros(2), xiamen.material).compliance(
+    result = linear_contact(np.zeros(2), xiamen.material).compliance(
         np.array([20e-3, 10e-3]), 1.0
     )
-    assert_allclose(found, [281.23e-12, 2 * 281.23e-12], rtol=2e-5, atol=0)
+    assert_allclose(result, [281.23e-12, 2 * 281.23e-12], rtol=2e-5, atol=0)
 
 
 def test_body_coefficients_of_the_reference_pair(xiamen):
@@ -125,8 +125,8 @@ def test_body_coefficients_of_the_reference_pair(xiamen):
         (xiamen.pair.pinion, (6.88502, 1.23849, 2.92273, 0.45130)),
         (xiamen.pair.wheel, (6.94755, 1.54720, 9.06350, 0.26694)),
     ):
-        found = body_coefficients(gear, allow_extrapolation=False)
-        assert_allclose([found[key] for key in "LMPQ"], expected, rtol=0, atol=6e-6)
+        result = body_coefficients(gear, allow_extrapolation=False)
+        assert_allclose([result[key] for key in "LMPQ"], expected, rtol=0, atol=6e-6)
 
 
 class TestRangeOfTheBodyFit:

@@ -70,9 +70,9 @@ class TestLowerEnvelope:
         # a parabola between two of the fine points rises by (step / 2)^2 / (2 rho) at most
         coarsest = np.diff(flank[1]).max() / 400
         atol = coarsest**2 / (8 * flank[3].min())
-        found = self.brute(*flank, 401)
-        assert np.all(exact <= found + 1e-18)
-        assert_allclose(exact, found, rtol=0, atol=atol + 1e-15)
+        result = self.brute(*flank, 401)
+        assert np.all(exact <= result + 1e-18)
+        assert_allclose(exact, result, rtol=0, atol=atol + 1e-15)
 
     def test_nodes_alone_are_not(self, flank):
         """A minimum over the nodes alone misses far more than the tolerance."""
@@ -125,11 +125,11 @@ class TestRigidFlanks:
         The wheel's corner meets the pinion's flank near the base circle, whose radius changes
         fast: third order counts.
         """
-        found, exact = self.corner(xiamen, gear, height_mm)
+        result, exact = self.corner(xiamen, gear, height_mm)
         most, rtol = {"pinion": (np.inf, 0.02), "wheel": (5 * UM, 0.07)}[gear]
         seen = (exact > 0.5 * UM) & (exact < most)
         assert seen.any()
-        assert_allclose(found[seen], exact[seen], rtol=rtol, atol=0)
+        assert_allclose(result[seen], exact[seen], rtol=rtol, atol=0)
 
     @staticmethod
     def corner(system, gear, height_mm):
@@ -280,12 +280,12 @@ class TestShareOverSlices:
     def test_the_order_of_the_slices_is_nothing(self, law, bending, random_face):
         slice_gap, width, load = random_face
         order = np.random.default_rng(1).permutation(12)
-        for found, expected in zip(
+        for result, expected in zip(
             shared(law, slice_gap[order], width[order], load, bending),
             shared(law, slice_gap, width, load, bending),
             strict=True,
         ):
-            assert_allclose(found, expected, rtol=1e-9, atol=0)
+            assert_allclose(result, expected, rtol=1e-9, atol=0)
 
     def test_more_load_or_softer_slices_bring_more_into_contact(self, law, random_face):
         slice_gap, width, load = random_face

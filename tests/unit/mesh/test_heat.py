@@ -48,7 +48,7 @@ def test_friction_heat_is_friction_times_load_times_sliding(duty):
     """Even loads along the path: the mean of |v1 - v2| has a closed form."""
     pair, force, n = duty.system.pair, 1e5, 4000
     position = (np.arange(n) + 0.5)[None, None] / n * pair.path_of_contact
-    found = friction_heat(
+    result = friction_heat(
         pair, position, np.ones_like(position), force=force, friction=0.04, speed=SPEED
     )
     before, after = pair.pitch_point, pair.path_of_contact - pair.pitch_point
@@ -59,7 +59,7 @@ def test_friction_heat_is_friction_times_load_times_sliding(duty):
         * SPEED
         * (1.0 + 1.0 / pair.ratio)
     )
-    assert found == pytest.approx(
+    assert result == pytest.approx(
         0.04 * force / math.cos(pair.base_helix_angle) * mean, rel=1e-6
     )
 

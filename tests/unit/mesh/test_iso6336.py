@@ -49,10 +49,10 @@ def test_flexibility_and_theoretical_stiffness(pair):
     ],
 )
 def test_values_of_the_reference(pair, function, line_load, per_width, at_20_mm):
-    found = function(pair, line_load=line_load)
-    assert_allclose(found * pair.pinion.face_width, at_20_mm, rtol=2e-4, atol=0)
+    result = function(pair, line_load=line_load)
+    assert_allclose(result * pair.pinion.face_width, at_20_mm, rtol=2e-4, atol=0)
     if per_width is not None:
-        assert_allclose(found / N_PER_MM_UM, per_width, rtol=4e-5, atol=0)
+        assert_allclose(result / N_PER_MM_UM, per_width, rtol=4e-5, atol=0)
 
 
 def test_without_the_correction_factor(pair):
@@ -65,11 +65,11 @@ def test_without_the_correction_factor(pair):
 def test_load_matters_below_100_n_per_mm_only(pair):
     stiff = iso6336.single_stiffness(pair)
     loads = (1e3, 5e4, 0.999e5, 1e5, 5e5)
-    found = [iso6336.single_stiffness(pair, line_load=load) / stiff for load in loads]
-    assert found == sorted(found)
-    assert found[2] < 1.0
-    assert_allclose(found[3:], 1.0, rtol=1e-12, atol=0)
-    assert_allclose(found[1], 0.5**0.25, rtol=1e-12, atol=0)
+    result = [iso6336.single_stiffness(pair, line_load=load) / stiff for load in loads]
+    assert result == sorted(result)
+    assert result[2] < 1.0
+    assert_allclose(result[3:], 1.0, rtol=1e-12, atol=0)
+    assert_allclose(result[1], 0.5**0.25, rtol=1e-12, atol=0)
 
 
 def test_profile_shift_follows_the_series(pair):
@@ -78,9 +78,9 @@ def test_profile_shift_follows_the_series(pair):
     """
     expected = 0.04723 + (0.15551 - 0.11654 * 0.4) / 23 + (0.25791 + 0.24188 * 0.2) / 84
     expected += -0.00635 * 0.4 + 0.00193 * 0.2 + 0.00529 * 0.16 + 0.00182 * 0.04
-    found = iso6336.flexibility(shifted(pair, 0.4, -0.2)) * N_PER_MM_UM
-    assert_allclose(found, expected, rtol=1e-12, atol=0)
-    assert abs(found / 0.057062 - 1.0) > 0.02
+    result = iso6336.flexibility(shifted(pair, 0.4, -0.2)) * N_PER_MM_UM
+    assert_allclose(result, expected, rtol=1e-12, atol=0)
+    assert abs(result / 0.057062 - 1.0) > 0.02
 
 
 def test_basic_rack_factor_is_the_mean_of_both_gears(pair):

@@ -30,8 +30,8 @@ SINGLE_PAIR = np.array([1.5692, 2.0650, 2.0929, 2.0864, 1.5779])
 
 def test_single_pair_stiffness_of_the_reference_pair(paper_machine):
     position = RC_MM * 1e-3 - paper_machine.pair.start_curvature_radius
-    found = 1e-8 / pair_compliance(paper_machine.mesh_table(), position)
-    assert_allclose(found, SINGLE_PAIR, rtol=1e-3, atol=0)
+    result = 1e-8 / pair_compliance(paper_machine.mesh_table(), position)
+    assert_allclose(result, SINGLE_PAIR, rtol=1e-3, atol=0)
 
 
 def test_sound_teeth_have_the_corner_gap_and_nothing_else(xiamen):
@@ -116,10 +116,10 @@ class TestFlankSides:
             tip = healthy_tooth(side.gear).profile.curvature_radius[-1]
             assert side.curvature.max() == pytest.approx(tip, rel=1e-9)
             assert side.flank_curvature[high] > tip * 1.05
-            found, expected = (
+            result, expected = (
                 values[[low, 1]] for values in (side.flank_curvature, side.curvature)
             )
-            assert_allclose(found, expected, rtol=1e-12, atol=0)
+            assert_allclose(result, expected, rtol=1e-12, atol=0)
 
 
 class TestRows:

@@ -155,9 +155,9 @@ def test_chords_err_by_less_than_a_hundredth_of_the_set_force(words):
         for values in (table.compliance - table.shared_compliance, table.gap)
     )
     deflection = first[:, None, None] + depth[:, None] - far[:, None]
-    found = np.maximum((deflection / own[:, None]).max(axis=2), 0.0)
+    result = np.maximum((deflection / own[:, None]).max(axis=2), 0.0)
     assert exact.max() > system.mesh_force
-    np.testing.assert_allclose(found, exact, atol=0.01 * system.mesh_force)
+    np.testing.assert_allclose(result, exact, atol=0.01 * system.mesh_force)
 
 
 @pytest.mark.parametrize(
@@ -199,8 +199,8 @@ def test_errors_of_single_teeth_open_all_chords():
     errors = Meeting(**of_teeth)
     roll = system.phases(16, n_periods=20)
     exact = loaded_contact(mesh, roll, system.mesh_force, errors).approach
-    found = at_rest(table, roll, system.mesh_force, errors)[0]
-    np.testing.assert_allclose(found, exact, rtol=5e-3)
+    result = at_rest(table, roll, system.mesh_force, errors)[0]
+    np.testing.assert_allclose(result, exact, rtol=5e-3)
     assert np.ptp(exact) > 1e-6
 
 
@@ -288,8 +288,8 @@ def test_the_papers_law_has_one_chord():
     assert table.compliance.shape[2] == 1
     inside = np.linspace(0.1, 0.9, 17) * (system.pair.path_of_contact + mesh.lag[-1])
     exact = single_pair_stiffness(mesh, inside, system.mesh_force)
-    found = 1.0 / np.interp(inside, table.position, table.compliance[0, 0, 0])
+    result = 1.0 / np.interp(inside, table.position, table.compliance[0, 0, 0])
     # slices that bend each other are stiffer where only a part of the face is loaded
-    assert (found > 0.999 * exact).all()
-    np.testing.assert_allclose(found, exact, rtol=0.15)
+    assert (result > 0.999 * exact).all()
+    np.testing.assert_allclose(result, exact, rtol=0.15)
     np.testing.assert_array_equal(table.gap[0, 0, 0], 0.0)

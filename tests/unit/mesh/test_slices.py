@@ -290,8 +290,8 @@ def test_a_modification_moves_the_error_by_no_more_than_its_depth(mesh_keys):
 
 def test_more_torque_means_more_of_everything(mesh_keys):
     pair = gears("beihang_61_132")
-    found = [solved(pair, torque, mesh_keys)[1] for torque in (1.0, 20.0, 178.0)]
-    for light, heavy in itertools.pairwise(found):
+    result = [solved(pair, torque, mesh_keys)[1] for torque in (1.0, 20.0, 178.0)]
+    for light, heavy in itertools.pairwise(result):
         assert (heavy.approach > light.approach).all()
         assert heavy.line_load.max() > light.line_load.max()
 

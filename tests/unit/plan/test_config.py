@@ -108,7 +108,7 @@ class TestEveryFaultOption:
         faults = read_faults(at_end(with_keys(classes[name], gear=gear), end))
         teeth = faulty_teeth(xiamen.pair, faults)
         assert bool(teeth) == (name != "healthy")
-        assert {found for found, _ in teeth} <= {gear}
+        assert {result for result, _ in teeth} <= {gear}
         assert 0 <= severity(faults, xiamen.pair) <= 1
         xiamen.mesh_table(
             [fault for fault in faults if fault.alike or fault.kind == "runout"]

@@ -65,14 +65,14 @@ class TestTurns:
         ],
     )
     def test_at_the_slowest_speed(self, words, seconds):
-        found = config("operating.turns=10", *words.split())
-        duration = found["operating"]["duration_s"]
+        result = config("operating.turns=10", *words.split())
+        duration = result["operating"]["duration_s"]
         assert duration == pytest.approx(samples(seconds), rel=1e-12)
-        assert read_system(found).operating.duration == duration
+        assert read_system(result).operating.duration == duration
 
     def test_a_file_is_as_slow_as_its_slowest(self, speeds):
-        found = config("operating.turns=10", speeds)["operating"]["duration_s"]
-        assert found == pytest.approx(1.0, rel=1e-12)
+        result = config("operating.turns=10", speeds)["operating"]["duration_s"]
+        assert result == pytest.approx(1.0, rel=1e-12)
 
     def test_without_turns_the_duration_is_the_typed_one(self):
         assert config("operating.duration_s=0.3")["operating"]["duration_s"] == 0.3

@@ -119,14 +119,14 @@ class TestLevels:
         ],
     )
     def test_values(self, kind, levels, expected):
-        found = read_distribution("key", {**SPECS[kind], "levels": levels})
-        assert_allclose(found.level_values(), expected, rtol=1e-12)
+        result = read_distribution("key", {**SPECS[kind], "levels": levels})
+        assert_allclose(result.level_values(), expected, rtol=1e-12)
 
     def test_levels_of_a_normal_share_its_probability(self):
         numbers = {"mean": 2.0, "std": 1.0, "low": -7.0, "high": 11.0}
         spec = {"distribution": "normal", **numbers, "levels": 3}
-        found = read_distribution("key", spec).level_values()
-        assert_allclose(found, 2.0 + 0.96742157 * np.array([-1, 0, 1]), rtol=1e-7)
+        result = read_distribution("key", spec).level_values()
+        assert_allclose(result, 2.0 + 0.96742157 * np.array([-1, 0, 1]), rtol=1e-7)
 
     @pytest.mark.parametrize("kind", sorted(set(SPECS) - {"choice"}))
     def test_designs_that_draw_pass_over_them(self, kind):

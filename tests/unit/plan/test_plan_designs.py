@@ -81,11 +81,11 @@ class TestGrid:
         )
 
     def test_every_unit_runs_every_combination_with_every_class_once(self, plan):
-        found = Counter(rows(plan, "unit_id", *SET_POINT, "label_name"))
+        result = Counter(rows(plan, "unit_id", *SET_POINT, "label_name"))
         units = [f"unit-{number:04d}" for number in range(5)]
         speeds, torques = (1200.0, 1800.0, 2400.0), (10.0, 20.0, 30.0, 40.0)
         expected = itertools.product(units, speeds, torques, CLASSES)
-        assert found == dict.fromkeys(expected, 1)
+        assert result == dict.fromkeys(expected, 1)
 
     def test_what_has_no_levels_is_drawn(self, plan):
         cracks = plan.columns["label_name"] == "crack"
@@ -96,9 +96,9 @@ class TestGrid:
     def test_null_levels_leave_a_key_of_the_conditions_to_chance(self, planned):
         noise = {"distribution": "uniform", "low": 10, "high": 30, "levels": None}
         vary = {"operating.speed_rpm": SPEED, "sensing.snr_db": noise}
-        found = dict(rows(planned(**GRID, vary=vary), "condition_id", "snr_db"))
-        assert len(found) == len(set(found.values())) == 15
-        assert min(found.values()) < 12 < 28 < max(found.values())
+        result = dict(rows(planned(**GRID, vary=vary), "condition_id", "snr_db"))
+        assert len(result) == len(set(result.values())) == 15
+        assert min(result.values()) < 12 < 28 < max(result.values())
 
     @pytest.mark.parametrize(
         ("size", "levels", "n"),
@@ -108,10 +108,10 @@ class TestGrid:
         self, crossed, size, levels, n
     ):
         names = ("unit_id", "params/operating.speed_rpm", f"params/fault.{size}")
-        found = Counter(key for key in rows(crossed, *names) if key[2] == key[2])
-        assert {key[2] for key in found} == levels
-        assert len(found) == 3 * 3 * len(levels)
-        assert set(found.values()) == {n}
+        result = Counter(key for key in rows(crossed, *names) if key[2] == key[2])
+        assert {key[2] for key in result} == levels
+        assert len(result) == 3 * 3 * len(levels)
+        assert set(result.values()) == {n}
 
     def test_a_tooth_may_have_levels(self, planned):
         tooth = {"distribution": "tooth", "levels": 3}
@@ -191,11 +191,11 @@ class TestRepeats:
     @classmethod
     def families(cls, plan):
         """Repeats of one unit, condition and class, in order."""
-        found = defaultdict(list)
+        result = defaultdict(list)
         for index in range(plan.n_records):
             record = plan.record(index)
-            found[record["condition_id"], record["label_name"]].append(record)
-        return found
+            result[record["condition_id"], record["label_name"]].append(record)
+        return result
 
     def test_each_class_has_all_repeats_at_every_condition(self, families):
         assert len(families) == 20 * 4
@@ -237,9 +237,9 @@ class TestRepeats:
 
     def test_a_grid_repeats_too(self, planned):
         plan = planned(**GRID, vary={"operating.speed_rpm": SPEED}, n_repeats=2)
-        found = Counter(rows(plan, "unit_id", "speed_set_rpm", "label_name", "repeat"))
-        assert len(found) == plan.n_records == 5 * 3 * 4 * 2
-        assert set(found.values()) == {1}
+        result = Counter(rows(plan, "unit_id", "speed_set_rpm", "label_name", "repeat"))
+        assert len(result) == plan.n_records == 5 * 3 * 4 * 2
+        assert set(result.values()) == {1}
 
     def test_they_are_told_apart_by_start_and_noise_alone(self, quickstart):
         counts = {"n_records": 2, "n_repeats": 2, "classes": ["crack"]}
@@ -285,8 +285,8 @@ class TestStartOfTheSound:
     def test_of_two_sound_classes_one_is_the_twin(self, configured):
         config = configured(n_records=24, classes=["healthy", "again", "crack"])
         config = config.with_keys("classes", again=config["classes"]["healthy"])
-        found = rows(make_plan(config), "label_name", "condition_id", *self.START)
-        starts = [row[2:] for row in found if row[0] != "crack"]
+        result = rows(make_plan(config), "label_name", "condition_id", *self.START)
+        starts = [row[2:] for row in result if row[0] != "crack"]
         assert len(set(starts)) == len(starts) == 16
 
     def test_without_a_sound_class_nothing_changes(self, configured):

@@ -60,22 +60,22 @@ def test_verdicts(low, high, p5, p95, verdict):
 
 
 def test_values_that_are_unknown_do_not_count():
-    found = compare(measured(), [NAN, 1.0, 1.5, 2.0, NAN])
-    assert (found.median, found.n, found.verdict) == (1.5, 3, "inside")
-    assert (found.p5, found.p95) == pytest.approx((1.05, 1.95))
+    result = compare(measured(), [NAN, 1.0, 1.5, 2.0, NAN])
+    assert (result.median, result.n, result.verdict) == (1.5, 3, "inside")
+    assert (result.p5, result.p95) == pytest.approx((1.05, 1.95))
     assert compare(measured(), [NAN]).verdict == "no value"
 
 
 def test_every_published_range_is_read_once_and_makes_sense():
-    found = read_ranges()
+    result = read_ranges()
     with realism.RANGES.open(encoding="utf-8") as file:
-        assert len(found) == len(list(csv.DictReader(file))) > 20
+        assert len(result) == len(list(csv.DictReader(file))) > 20
     bounded = [
-        one for one in found.values() if one.low is not None or one.high is not None
+        one for one in result.values() if one.low is not None or one.high is not None
     ]
     assert all(one.source for one in bounded)
-    assert found["missing_tooth.kurtosis", "slow and light"].low == 20.0
-    assert found["missing_tooth.rms_ratio", "all conditions"].low is None
+    assert result["missing_tooth.kurtosis", "slow and light"].low == 20.0
+    assert result["missing_tooth.rms_ratio", "all conditions"].low is None
 
 
 def test_a_range_upside_down_and_a_verdict_there_is_not_are_refused():
@@ -87,14 +87,14 @@ def test_a_range_upside_down_and_a_verdict_there_is_not_are_refused():
 
 def test_results_come_back_and_reasons_stay(tmp_path):
     path = tmp_path / "results.csv"
-    found = [
+    result = [
         compare(measured(), [1.5, 1.6]),
         compare(measured(id="recording.x", low=None), [NAN]),
     ]
-    write_results(path, "base, gensig 0,\nfrozen", found)
+    write_results(path, "base, gensig 0,\nfrozen", result)
     heading, back = read_results(path)
     assert heading == "base, gensig 0, frozen"
-    assert back[0] == found[0]
+    assert back[0] == result[0]
     assert (back[1].n, back[1].verdict, back[1].low) == (0, "no value", None)
     path.write_text(path.read_text().replace("inside,", "inside,because"))
     write_results(path, "again", [compare(measured(), [9.0])])

@@ -64,12 +64,12 @@ def test_low_cut_off_is_of_first_order(frequency):
 def test_converter_steps_and_range(bits):
     sensor = replace(IDEAL, adc_range_m_per_s2=10.0, adc_bits=bits)
     signal = np.linspace(-11.0, 11.0, 100_001)[None]
-    found, clipped = sensor.digitised(signal)
+    result, clipped = sensor.digitised(signal)
     step = 10.0 / 2 ** (bits - 1)
-    assert_allclose(found / step, np.rint(found / step), atol=1e-9)
+    assert_allclose(result / step, np.rint(result / step), atol=1e-9)
     inside = np.abs(signal) < 10.0 - step
-    assert np.abs(found - signal)[inside].max() <= 0.5 * step * (1 + 1e-9)
-    assert_allclose([found.min(), found.max()], [-10.0, 10.0 - step], rtol=1e-12)
+    assert np.abs(result - signal)[inside].max() <= 0.5 * step * (1 + 1e-9)
+    assert_allclose([result.min(), result.max()], [-10.0, 10.0 - step], rtol=1e-12)
     assert_allclose(clipped, 2.0 / 22.0, atol=step)
 
 

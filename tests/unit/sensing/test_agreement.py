@@ -65,18 +65,18 @@ class TestBands:
 class TestPower:
     @pytest.mark.parametrize("band", [0, 5, 17, 29])
     def test_a_tone_is_in_its_band(self, band):
-        found = third_octave_power(3.0 * tone(MIDDLES[band]), RATE)
-        assert_allclose(found[band], 4.5, rtol=2e-3)
-        assert np.delete(found, band).sum() < 2e-3 * 4.5
+        result = third_octave_power(3.0 * tone(MIDDLES[band]), RATE)
+        assert_allclose(result[band], 4.5, rtol=2e-3)
+        assert np.delete(result, band).sum() < 2e-3 * 4.5
 
     def test_white_noise_follows_the_width(self):
         """Its power per hertz is 1 over half the rate: a decibel more a band, as much as each is
         wider."""
         lower, upper = third_octave_bands(N_SAMPLES, RATE)
-        found = third_octave_power(noise(60), RATE).mean(axis=0)
+        result = third_octave_power(noise(60), RATE).mean(axis=0)
         expected = (upper - lower) / (RATE / 2)
-        assert_allclose(found[10:], expected[10:], rtol=0.1)
-        assert_allclose(10 * np.log10(found[18:29] / found[17:28]), 1.0, atol=0.1)
+        assert_allclose(result[10:], expected[10:], rtol=0.1)
+        assert_allclose(10 * np.log10(result[18:29] / result[17:28]), 1.0, atol=0.1)
 
 
 class TestThirdOctaves:
@@ -117,8 +117,8 @@ class TestIndicators:
         kurtosis hardly change."""
         exact = one_lane(noise().clip(-4, 4))
         exact[0, 0, 1000] = 8.0
-        found = exact.clip(-6, 6)
-        assert_allclose(indicator_difference(found, exact), 0.25, rtol=2e-3)
+        result = exact.clip(-6, 6)
+        assert_allclose(indicator_difference(result, exact), 0.25, rtol=2e-3)
 
     def test_impulses_show_in_the_kurtosis(self):
         """A sine of kurtosis 1.5 against one with the same RMS whose power comes in bursts, of
@@ -141,9 +141,9 @@ class TestAgreement:
         exact = one_lane(tone(10_000))
         late = one_lane(np.sin(2 * np.pi * 10_000 * (TIME - 6.25e-6) + 0.7))
         assert np.linalg.norm(late - exact) > 0.3 * np.linalg.norm(exact)
-        found = agreement(late, exact, RATE)
-        assert found.third_octave_db[0] < 1e-3
-        assert found.agrees[0]
+        result = agreement(late, exact, RATE)
+        assert result.third_octave_db[0] < 1e-3
+        assert result.agrees[0]
 
     @pytest.mark.parametrize(
         ("third_octave_db", "indicators", "expected"),
@@ -158,21 +158,21 @@ class TestAgreement:
     )
     def test_both_limits_hold(self, third_octave_db, indicators, expected):
         """In shares of the limits."""
-        found = Agreement(
+        result = Agreement(
             third_octave_db=np.array([THIRD_OCTAVE_DB * third_octave_db]),
             indicators=np.array([INDICATORS * indicators]),
         )
-        assert found.agrees[0] == expected
+        assert result.agrees[0] == expected
 
     def test_what_is_still_in_both_agrees(self):
         still = np.zeros(N_SAMPLES)
-        found = agreement(one_lane(noise(), still), one_lane(noise(), still), RATE)
-        assert found.agrees[0]
+        result = agreement(one_lane(noise(), still), one_lane(noise(), still), RATE)
+        assert result.agrees[0]
         assert not agreement(one_lane(still), one_lane(noise()), RATE).agrees[0]
         assert not agreement(one_lane(noise()), one_lane(still), RATE).agrees[0]
 
     def test_what_is_not_finite_does_not(self):
         broken = noise()
         broken[-1] = np.nan
-        for found, exact in ((broken, noise()), (noise(), broken), (broken, broken)):
-            assert not agreement(one_lane(found), one_lane(exact), RATE).agrees[0]
+        for result, exact in ((broken, noise()), (noise(), broken), (broken, broken)):
+            assert not agreement(one_lane(result), one_lane(exact), RATE).agrees[0]

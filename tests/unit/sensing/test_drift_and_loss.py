@@ -25,8 +25,8 @@ def test_drift_is_stationary_and_forgets_itself():
     assert_allclose(points.std(axis=0), 0.1, rtol=0.06)
     assert_allclose(points.mean(axis=0), 0.0, atol=0.006)
     for lag in (0, 125, 250, 500):  # samples
-        found = np.mean(walk[:, 0] * walk[:, lag]) / 0.1**2
-        assert_allclose(found, np.exp(-lag / 500.0 / 0.5), atol=0.06)
+        result = np.mean(walk[:, 0] * walk[:, lag]) / 0.1**2
+        assert_allclose(result, np.exp(-lag / 500.0 / 0.5), atol=0.06)
 
 
 def test_drift_is_slow_and_each_sensors_own():

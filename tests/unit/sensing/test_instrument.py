@@ -64,19 +64,19 @@ def test_noise_of_the_path_has_the_resonances_of_the_path():
 
 def test_no_noise_leaves_converter_and_offset():
     one = instrument(HOUSING)
-    found = one.record(np.zeros((3, 100)), np.zeros(3), np.random.default_rng(0))[0]
-    assert np.all(np.ptp(found, axis=1) == 0.0)
-    assert_allclose(found[:, 0], one.sensors.offset, atol=0.5 * 2000 / 2**23)
+    result = one.record(np.zeros((3, 100)), np.zeros(3), np.random.default_rng(0))[0]
+    assert np.all(np.ptp(result, axis=1) == 0.0)
+    assert_allclose(result[:, 0], one.sensors.offset, atol=0.5 * 2000 / 2**23)
 
 
 def test_transverse_motion_of_a_bearing_sensor():
     one = instrument(changed(BEARING, {"sensor.transverse_sensitivity": 0.05}))
     still = np.zeros((4, 300))
     still[0] = np.random.default_rng(1).standard_normal(300)  # pinion_x alone
-    found = one.measure(still)
-    assert_allclose(found[1], one.sensors.transverse[1] * still[0], rtol=1e-12)
+    result = one.measure(still)
+    assert_allclose(result[1], one.sensors.transverse[1] * still[0], rtol=1e-12)
     assert abs(one.sensors.transverse[1]) > 1e-4
-    assert not found[2:].any()
+    assert not result[2:].any()
 
 
 def test_gearboxes_differ_and_path_and_sensor_have_their_own_numbers():

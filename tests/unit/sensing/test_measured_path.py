@@ -45,11 +45,11 @@ def mode(frequency, natural=2000.0, damping=0.03):
 def test_impulse_response_is_a_convolution(tmp_path):
     rng = np.random.default_rng(1)
     taps, source = rng.standard_normal((2, 64)), rng.standard_normal((2, 500))
-    found = read(impulse_file(tmp_path / "h.csv", taps)).apply(source, RATE)
+    result = read(impulse_file(tmp_path / "h.csv", taps)).apply(source, RATE)
     expected = sum(
         np.convolve(row, tap)[:500] for row, tap in zip(source, taps, strict=True)
     )
-    assert_allclose(found, [expected], atol=1e-9)
+    assert_allclose(result, [expected], atol=1e-9)
 
 
 def test_frequency_response_of_a_mode_rings_as_the_mode_does(tmp_path):
@@ -58,9 +58,9 @@ def test_frequency_response_of_a_mode_rings_as_the_mode_does(tmp_path):
     path = read(frequency_file(tmp_path / "f.csv", mode, step=5.0))
     time = np.arange(8000) / RATE
     smooth = np.exp(-0.5 * ((time - 0.02) / 1e-4) ** 2)
-    found = path.apply(np.stack([smooth, 0.0 * smooth]), RATE)[0]
+    result = path.apply(np.stack([smooth, 0.0 * smooth]), RATE)[0]
     expected = sosfilt(mode_section(2000.0, 0.03, RATE), smooth)
-    assert_allclose(found, expected, atol=0.01 * np.abs(expected).max())
+    assert_allclose(result, expected, atol=0.01 * np.abs(expected).max())
 
 
 def test_refused_files(tmp_path):

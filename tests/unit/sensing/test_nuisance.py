@@ -65,14 +65,14 @@ def test_every_kind_is_tested():
 
 
 def test_bearing_orders_are_those_of_the_textbook():
-    found = bearing_orders(9, 7.94e-3, 39.04e-3, 0.0)
-    assert_allclose([found.outer_race, found.inner_race], [3.585, 5.415], atol=5e-4)
-    assert_allclose([found.cage, found.ball], [0.3983, 2.357], atol=5e-4)
+    result = bearing_orders(9, 7.94e-3, 39.04e-3, 0.0)
+    assert_allclose([result.outer_race, result.inner_race], [3.585, 5.415], atol=5e-4)
+    assert_allclose([result.cage, result.ball], [0.3983, 2.357], atol=5e-4)
     ratio = 7.94 / 39.04 * math.cos(0.3)
     tilted = bearing_orders(9, 7.94e-3, 39.04e-3, 0.3)
     assert_allclose(tilted.ball, 39.04 / (2 * 7.94) * (1 - ratio**2), rtol=1e-12)
     slipping = bearing_orders(9, 7.94e-3, 39.04e-3, 0.0, slip=0.02)
-    assert_allclose(slipping.outer_race, 0.98 * found.outer_race, rtol=1e-12)
+    assert_allclose(slipping.outer_race, 0.98 * result.outer_race, rtol=1e-12)
     assert_allclose(slipping.inner_race + slipping.outer_race, 9.0, rtol=1e-12)
 
 
@@ -174,12 +174,12 @@ def test_a_part_more_at_the_end_changes_no_other(dynamics):
 
 def test_ranges_are_filled_and_kept(dynamics):
     part = {**PARTS["unbalance"], "used_share": [0.2, 0.8]}
-    found = [
+    result = [
         abs(draw(dynamics, part, specimen=k)[0].force[0, 0]) / 0.5655
         for k in range(200)
     ]
-    assert 0.2 <= min(found) < 0.23
-    assert 0.77 < max(found) <= 0.8001
+    assert 0.2 <= min(result) < 0.23
+    assert 0.77 < max(result) <= 0.8001
     part = {**PARTS["bearing"], "slip": [0.0, 0.02]}
     cages = [draw(dynamics, part, record=k)[0].base[1] for k in range(100)]
     free = bearing_orders(9, 7.94e-3, 39.04e-3, 0.0).cage

@@ -40,12 +40,12 @@ def test_causal():
 def test_a_mode_answers_a_tone_as_its_formula_says(frequency):
     from scipy.signal import sosfreqz
 
-    found = sosfreqz(mode_section(1000.0, 0.03, RATE), [frequency], fs=RATE)[1][0]
+    result = sosfreqz(mode_section(1000.0, 0.03, RATE), [frequency], fs=RATE)[1][0]
     ratio = frequency / 1000.0
     # the input goes straight from sample to sample, which takes the square of a sinc
     exact = np.sinc(frequency / RATE) ** 2 / (1.0 - ratio**2 + 0.06j * ratio)
-    assert_allclose(abs(found), abs(exact), rtol=2e-3)
-    assert abs(np.angle(found / exact)) < 0.01
+    assert_allclose(abs(result), abs(exact), rtol=2e-3)
+    assert abs(np.angle(result / exact)) < 0.01
 
 
 def test_gain_at_rest_has_the_stated_size():

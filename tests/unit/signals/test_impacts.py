@@ -43,11 +43,11 @@ def test_threshold_is_in_deviations_of_what_lies_between():
 @pytest.mark.parametrize("decay", [0.7e-3, 1.4e-3, 3e-3])
 @pytest.mark.parametrize("noise", [0.01, 2.0])
 def test_decay_is_recovered(decay, noise):
-    found = [
+    result = [
         impact_decay(rings(decay, noise=noise, seed=seed), DURATION)
         for seed in range(8)
     ]
-    assert np.mean(found) == pytest.approx(decay, rel=0.25 if decay < 1e-3 else 0.15)
+    assert np.mean(result) == pytest.approx(decay, rel=0.25 if decay < 1e-3 else 0.15)
 
 
 def test_no_impact_no_decay():

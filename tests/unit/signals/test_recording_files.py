@@ -62,8 +62,8 @@ def test_all_formats_say_the_same(files, name):
     source = read_file(str(files / name))
     assert source.sampling_rate == RATE
     assert source.named == (name == "r.csv")
-    found = recording_of(source).acceleration
-    assert_allclose(found, SIGNAL - SIGNAL.mean(axis=1, keepdims=True), atol=1e-12)
+    result = recording_of(source).acceleration
+    assert_allclose(result, SIGNAL - SIGNAL.mean(axis=1, keepdims=True), atol=1e-12)
 
 
 def test_an_array_by_its_name(tmp_path):
@@ -75,8 +75,10 @@ def test_an_array_by_its_name(tmp_path):
         ("c.h5", "run/one"),
         ("c.npy", None),
     ):
-        found = recording_of(read_file(str(tmp_path / name), rate=RATE, array=array))
-        assert_allclose(found.acceleration[0], SIGNAL[0] - SIGNAL[0].mean(), atol=1e-12)
+        result = recording_of(read_file(str(tmp_path / name), rate=RATE, array=array))
+        assert_allclose(
+            result.acceleration[0], SIGNAL[0] - SIGNAL[0].mean(), atol=1e-12
+        )
 
 
 def test_whole_numbers_of_a_wav_file_keep_their_shape_and_have_no_level(tmp_path):
@@ -84,8 +86,8 @@ def test_whole_numbers_of_a_wav_file_keep_their_shape_and_have_no_level(tmp_path
         tmp_path / "i.wav", int(RATE), np.round(1000.0 * SIGNAL.T).astype(np.int16)
     )
     source = read_file(str(tmp_path / "i.wav"))
-    found = recording_of(source, needs_level=False).acceleration
-    assert np.corrcoef(found[0], SIGNAL[0])[0, 1] > 0.99999
+    result = recording_of(source, needs_level=False).acceleration
+    assert np.corrcoef(result[0], SIGNAL[0])[0, 1] > 0.99999
     with pytest.raises(ConfigError, match="no level in m/s2"):
         recording_of(source)
 

@@ -44,9 +44,9 @@ def separate(signal, **changes):
 
 def test_every_part_comes_back():
     signal, parts = a_pair(130)
-    found = separate(signal + 7.0)
+    result = separate(signal + 7.0)
     for name, expected in zip(PARTS, parts, strict=True):
-        part = getattr(found, name)
+        part = getattr(result, name)
         assert part.shape == expected.shape
         assert_allclose(part, expected, atol=0.03 * np.abs(signal).max())
 

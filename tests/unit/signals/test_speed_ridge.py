@@ -53,9 +53,9 @@ def followed(made, speed_rpm=SPEED):
 )
 def test_cycles_are_found_to_a_fraction_of_a_tooth(depth, stated):
     made, cycles = recording(depth)
-    found = followed(made, stated * SPEED)
-    assert np.std(found - cycles) < 0.05
-    assert np.all(np.diff(found) > 0)
+    result = followed(made, stated * SPEED)
+    assert np.std(result - cycles) < 0.05
+    assert np.all(np.diff(result) > 0)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -82,9 +82,9 @@ def test_the_course_is_the_frequency_over_time():
         options = {"search": search, "highest": highest}
         return mesh_frequency_course(signal, RATE, teeth, mesh, **options)
 
-    time, found = course()
+    time, result = course()
     true = np.interp(time, np.arange(cycles.size) / RATE, np.gradient(cycles) * RATE)
-    error = found / true - 1
+    error = result / true - 1
     assert np.abs(error).max() < 6e-3
     assert np.std(error) < 2e-3
     for wrong in ({"search": 0.05}, {"highest": 500.0}):

@@ -32,13 +32,13 @@ def test_share_is_right_on_the_average_for_any_number_of_turns(n_turns):
     rng = np.random.default_rng(n_turns)
     power = 4.5 + 0.125 + 0.02
     deviation = np.sqrt(power / 3)  # a quarter of the whole
-    found = [
+    result = [
         nonsynchronous_share(
             TURNS[:n_turns] + deviation * rng.standard_normal((n_turns, 400))
         )
         for _ in range(200)
     ]
-    assert np.mean(found) == pytest.approx(0.25, abs=0.01)
+    assert np.mean(result) == pytest.approx(0.25, abs=0.01)
 
 
 def test_share_of_pure_turns_noise_silence_and_one_turn():

@@ -21,9 +21,9 @@ def ramp(n_samples=20_000, start=18.0, slope=12.0):
 
 def test_a_train_of_zeros_and_ones_is_right_within_half_a_sample():
     _, turns, instants = ramp()
-    found = pulse_times((turns % 1.0 < 0.1) * 5.0 - 2.0, RATE)
-    assert len(found) == len(instants)
-    assert np.abs(found - instants).max() <= 0.5 / RATE * (1 + 1e-9)
+    result = pulse_times((turns % 1.0 < 0.1) * 5.0 - 2.0, RATE)
+    assert len(result) == len(instants)
+    assert np.abs(result - instants).max() <= 0.5 / RATE * (1 + 1e-9)
 
 
 def test_speed_between_pulses():
@@ -59,12 +59,12 @@ def test_several_pulses_a_turn_and_several_channels():
     angle = 2.0 * np.pi * 3.0 * turns
     signals = np.stack([np.cos(angle), np.sin(angle)])
     options = {"pulses_per_turn": 4, "samples_per_turn": 64}
-    found = resample_by_pulses(signals, RATE, marks, **options)
-    assert found.shape == (2, (len(marks) - 1) // 4, 64)
+    result = resample_by_pulses(signals, RATE, marks, **options)
+    assert result.shape == (2, (len(marks) - 1) // 4, 64)
     # the first pulse is a quarter turn after the start
     angle = 2.0 * np.pi * 3.0 * (0.25 + np.arange(64) / 64.0)
     expected = np.stack([np.cos(angle), np.sin(angle)])[:, None]
-    assert np.abs(found - expected).max() < 2e-3
+    assert np.abs(result - expected).max() < 2e-3
 
 
 def test_too_few_pulses():

@@ -26,13 +26,13 @@ def levels(signal, start=0.0):
 def test_a_tooth_twice_as_loud_is_six_decibels_up_under_its_own_number(start):
     gains = np.ones(TEETH)
     gains[11] = 2.0
-    found = levels(rattle(start=start, gains=gains), start) - levels(
+    result = levels(rattle(start=start, gains=gains), start) - levels(
         rattle(start=start), start
     )
-    assert found.argmax() == 11
+    assert result.argmax() == 11
     # the filter smears the edges of a passage of 10 ms by less than one
-    np.testing.assert_allclose(found[11], 20 * np.log10(2), atol=0.6)
-    np.testing.assert_allclose(np.delete(found, [10, 11, 12]), 0.0, atol=1e-3)
+    np.testing.assert_allclose(result[11], 20 * np.log10(2), atol=0.6)
+    np.testing.assert_allclose(np.delete(result, [10, 11, 12]), 0.0, atol=1e-3)
 
 
 def test_channels_side_by_side_are_each_their_own():
@@ -55,11 +55,11 @@ def test_a_pattern_of_the_machine_goes_away_and_the_tooth_stays():
     bad = pattern.copy()
     loudest = int(pattern.argmax())
     bad[loudest] *= 0.6
-    found = changed_teeth(
+    result = changed_teeth(
         levels(rattle(gains=bad, seed=6)), levels(rattle(gains=pattern, seed=7))
     )
-    assert found.argmin() == loudest
-    assert found[loudest] < -3.0
+    assert result.argmin() == loudest
+    assert result[loudest] < -3.0
     alone = levels(rattle(gains=bad, seed=6))
     assert alone.argmin() != loudest  # without the reference the pattern hides it
 

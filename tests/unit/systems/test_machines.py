@@ -51,7 +51,7 @@ def kinds():
 
 def overridden(kind):
     """Concrete members of a base of ``kind`` that a class below it defines again."""
-    found = []
+    result = []
     for number, lower in enumerate(kind.__mro__):
         for base in filter(
             lambda base: issubclass(base, Machine), kind.__mro__[number + 1 :]
@@ -59,8 +59,8 @@ def overridden(kind):
             for name in vars(lower).keys() & vars(base).keys():
                 is_abstract = getattr(vars(base)[name], "__isabstractmethod__", False)
                 if not (is_abstract or name.startswith("__") or name == "_abc_impl"):
-                    found.append(f"{lower.__name__}.{name} of {base.__name__}")
-    return found
+                    result.append(f"{lower.__name__}.{name} of {base.__name__}")
+    return result
 
 
 def test_kinds_override_no_concrete_member_and_are_abstract_or_final(kinds):
@@ -147,12 +147,12 @@ def test_the_channels_of_a_pair_are_its_degrees_of_freedom(name, is_driven):
 
 def parts(table):
     """Every array and number of a table, by its path."""
-    found = {}
+    result = {}
     for field in fields(table):
         value = getattr(table, field.name)
         below = parts(value) if is_dataclass(value) else {"": value}
-        found |= {f"{field.name}.{name}": each for name, each in below.items()}
-    return found
+        result |= {f"{field.name}.{name}": each for name, each in below.items()}
+    return result
 
 
 def test_the_table_without_faults_is_the_sound_one(any_machine):

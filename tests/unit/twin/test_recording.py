@@ -48,23 +48,23 @@ class TestRead:
     def test_units_and_order_of_channels(self, tmp_path):
         file = timed(tmp_path / "u.csv", names=("case_g", "lid_m_per_s2"))
         size = SIGNAL.std(axis=1)
-        found = read_recording(file)
-        assert found.sensors == ("case", "lid")
+        result = read_recording(file)
+        assert result.sensors == ("case", "lid")
         expected = size * [STANDARD_GRAVITY, 1.0]
-        assert_allclose(found.acceleration.std(axis=1), expected, rtol=1e-6)
+        assert_allclose(result.acceleration.std(axis=1), expected, rtol=1e-6)
         plain = timed(tmp_path / "p.csv")
-        found = read_recording(plain, unit="g", channels=["b", "a"])
-        assert found.sensors == ("b", "a")
+        result = read_recording(plain, unit="g", channels=["b", "a"])
+        assert result.sensors == ("b", "a")
         expected = STANDARD_GRAVITY * size[::-1]
-        assert_allclose(found.acceleration.std(axis=1), expected, rtol=1e-6)
+        assert_allclose(result.acceleration.std(axis=1), expected, rtol=1e-6)
 
     def test_names_become_sensors(self, tmp_path):
-        found = read_recording(timed(tmp_path / "t.csv", names=("1 x", "gear case")))
-        assert found.sensors == ("s_1_x_a", "gear_case")
+        result = read_recording(timed(tmp_path / "t.csv", names=("1 x", "gear case")))
+        assert result.sensors == ("s_1_x_a", "gear_case")
 
     def test_halves(self, tmp_path):
-        found = read_recording(timed(tmp_path / "t.csv"))
-        first, second = found.part(0.0, 0.5), found.part(0.5, 1.0)
+        result = read_recording(timed(tmp_path / "t.csv"))
+        first, second = result.part(0.0, 0.5), result.part(0.5, 1.0)
         assert first.acceleration.shape == second.acceleration.shape == (2, 10_000)
         assert_allclose(second.acceleration.mean(axis=1), 0.0, atol=1e-12)
 
@@ -114,16 +114,16 @@ class TestNoMesh:
     TEETH = Teeth(driving=23, driven=46)
 
     def test_noise_is_no_gear(self, tmp_path):
-        found = read_recording(timed(tmp_path / "n.csv"))
+        result = read_recording(timed(tmp_path / "n.csv"))
         with pytest.raises(ConfigError, match="no sign of the mesh"):
-            find_motion(found, self.TEETH, 1200.0)
+            find_motion(result, self.TEETH, 1200.0)
 
     def test_too_short_and_too_fast(self, tmp_path):
-        found = read_recording(timed(tmp_path / "n.csv"))
+        result = read_recording(timed(tmp_path / "n.csv"))
         with pytest.raises(ConfigError, match=r"turns of the slower gear, at least 8"):
-            find_motion(found, self.TEETH, 100.0)
+            find_motion(result, self.TEETH, 100.0)
         with pytest.raises(ConfigError, match="above the usable band"):
-            find_motion(found, self.TEETH, 6000.0)
+            find_motion(result, self.TEETH, 6000.0)
 
 
 @pytest.mark.parametrize(

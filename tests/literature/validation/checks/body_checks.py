@@ -84,10 +84,10 @@ def _sainsot(gear: Gear, case: Case, side: str, point: str) -> float:
     angle = load_angle(gear, case.curvature(side, point))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ExtrapolationWarning)
-        found = fillet_foundation_compliance(
+        result = fillet_foundation_compliance(
             gear, angle, case.system.material, allow_extrapolation=True
         )
-    return float(found[0])
+    return float(result[0])
 
 
 def _sainsot_over_fe_body(side: str, case: Case, at: str) -> float:
@@ -204,14 +204,17 @@ def _straight_over_true_error(case: Case, at: str) -> float:
     what, point = at.split()
     if what == "pair":
         exact = printed_value("spur_reference", f"fe_pair_stress.{point}")
-        found = (
+        result = (
             single_pair_stiffness(case, point),
             _straight_root_stiffness(case, point),
         )
     else:
         exact = printed_value("spur_reference", f"fe_tooth.{what}.{point}")
-        found = _tooth(what, "true", case, point), _tooth(what, "straight", case, point)
-    return abs(found[1] - exact) / abs(found[0] - exact)
+        result = (
+            _tooth(what, "true", case, point),
+            _tooth(what, "straight", case, point),
+        )
+    return abs(result[1] - exact) / abs(result[0] - exact)
 
 
 def _disc(index: int, case: Case, at: str) -> float:

@@ -77,7 +77,7 @@ class DamperCase:
     def waterfalls(self) -> dict[int, Waterfall]:
         """Steady response over the speeds of the Campbell diagram without load, by node."""
         campbell, numbers = self.line.drive.campbell, self.line.drive.numbers
-        found = run_of_speeds(
+        result = run_of_speeds(
             self.line.linear()[0],
             lambda speed: self.line.on_line(self.line.torques(speed, 0.0)),
             np.arange(
@@ -86,7 +86,7 @@ class DamperCase:
             [numbers.index(node) for node in WATERFALL_NODES],
             n_orders=RUN_ORDERS,
         )
-        return dict(zip(WATERFALL_NODES, found, strict=True))
+        return dict(zip(WATERFALL_NODES, result, strict=True))
 
     def peak_on_order(self, at: str) -> float:
         """Frequency in Hz at which an order is largest over the run.

@@ -130,9 +130,9 @@ def _remaining_pair_deviation(case: Case, at: str) -> float:
     pitch, zone = case.pair.base_pitch, case.pair.path_of_contact - case.pair.base_pitch
     inside = np.linspace(0.001, 0.999, 500) * zone
     # tooth 0 enters at roll 0 while its forerunner leaves, and leaves while its follower enters
-    found = mesh_stiffness(case, np.concatenate([inside, pitch + inside]))
+    result = mesh_stiffness(case, np.concatenate([inside, pitch + inside]))
     alone = 1.0 / pair_compliance(case.table, np.concatenate([pitch + inside, inside]))
-    return float(np.abs(found / alone - 1.0).max())
+    return float(np.abs(result / alone - 1.0).max())
 
 
 FAULT: dict[str, Check] = {

@@ -43,13 +43,13 @@ def _under(case: RootStrength, at: str) -> RootStrength:
 def _safety(convention: str) -> StrengthCheck:
     def check(case: RootStrength, at: str) -> float:
         factors = case.factors[case.decisive]
-        found: Any = safety(
+        result: Any = safety(
             case.strength,
             float(at) * 1e6,
             notch_parameter=factors.notch_parameter,
             normal_module=factors.normal_module,
         )
-        return float(getattr(found, convention))
+        return float(getattr(result, convention))
 
     return check
 

@@ -20,8 +20,8 @@ AXIS = "name => document.getElementById('plot-' + name).layout.xaxis.title.text"
 @pytest.fixture(scope="module")
 def browser():
     playwright = pytest.importorskip("playwright.sync_api", reason="package playwright")
-    found = map(shutil.which, ("chromium", "google-chrome"))
-    path = os.environ.get("GENSIG_CHROMIUM") or next(filter(None, found), None)
+    result = map(shutil.which, ("chromium", "google-chrome"))
+    path = os.environ.get("GENSIG_CHROMIUM") or next(filter(None, result), None)
     words = ["--no-sandbox", "--disable-gpu"]
     with playwright.sync_playwright() as started:
         try:
@@ -110,12 +110,12 @@ def test_record_channel_and_comparison(page):
     form = "#signals-controls"
     for value in ("0", "4"):
         page.select_option(f"{form} [name=record]", value)
-        wanted = page.evaluate(
+        expected = page.evaluate(
             "i => JSON.parse(document.getElementById('data').textContent).examples[i].record",
             value,
         )
-        assert wanted in page.evaluate(TRACES, "wave")[-1]
-        assert wanted in page.inner_text("#signals-said")
+        assert expected in page.evaluate(TRACES, "wave")[-1]
+        assert expected in page.inner_text("#signals-said")
     page.select_option(f"{form} [name=other]", "1")
     assert len(page.evaluate(TRACES, "wave")) == 2
     page.select_option(f"{form} [name=other]", "")

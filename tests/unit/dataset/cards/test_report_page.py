@@ -52,7 +52,7 @@ class Page(HTMLParser):
 
     def scripts(self, kind=None):
         scripts = [piece for piece in self.pieces if piece[0] == "script"]
-        return [text for _, found, text in scripts if found.get("type") == kind]
+        return [text for _, result, text in scripts if result.get("type") == kind]
 
     @property
     def data(self):
@@ -127,7 +127,7 @@ def test_structure(made):
         if "role" in attributes:
             assert attributes["aria-label"]
     divs = [attributes for _, attributes in page.tags]
-    plots = {found["id"] for found in divs if found.get("class") == "plot"}
+    plots = {result["id"] for result in divs if result.get("class") == "plot"}
     shown = ("wave", "spectrum", "envelope", "spectrogram", "parameters", "indicators")
     assert {f"plot-{name}" for name in shown} <= plots
 
@@ -139,7 +139,9 @@ def test_every_option_has_its_data_and_a_healthy_record_is_first(made, plan):
     examples = data["examples"]
     assert set(map(str, range(len(examples)))) <= set(values)
     assert set(data["drawn"]["columns"]) <= set(values)
-    assert {len(found["views"]) for found in examples} == {2} == {len(data["channels"])}
+    assert (
+        {len(result["views"]) for result in examples} == {2} == {len(data["channels"])}
+    )
     views = set(examples[0]["views"][0])
     assert views == {"wave", "spectrum", "envelope", "spectrogram"}
     for table in (data["drawn"], data["measured"]):
@@ -147,7 +149,7 @@ def test_every_option_has_its_data_and_a_healthy_record_is_first(made, plan):
     name = "params/crack_depth_mm"
     column = decoded(data["drawn"]["columns"][name], "<f4")
     assert_allclose(column, plan.columns[name], rtol=1e-6, atol=0)
-    selected = [found["value"] for found in options if "selected" in found]
+    selected = [result["value"] for result in options if "selected" in result]
     first = next(int(value) for value in selected if value.isdigit())
     assert examples[first]["class"] == "healthy"
 
@@ -173,9 +175,9 @@ def test_of_many_bins_the_largest_is_kept():
     amplitude = np.full(1001, 1e-3)
     amplitude[347] = 5.0
     packed = _lines(np.arange(1001) * 0.5, amplitude, 500.0, 100)
-    found = unpack(packed)
-    assert found.max() == pytest.approx(5.0)
-    at = packed["start"] + packed["step"] * found.argmax()
+    result = unpack(packed)
+    assert result.max() == pytest.approx(5.0)
+    at = packed["start"] + packed["step"] * result.argmax()
     assert abs(at - 347 * 0.5) <= packed["step"] / 2
 
 
@@ -248,9 +250,9 @@ def test_frequencies_of_a_geared_engine(drive, references):
         gear=np.array(["wheel", ""]),
     )
     expected = {"mesh": 100.0, "drive": drive, "pinion": 10.0, "wheel": 2.5}
-    found = rotation.of(0)
-    assert found == {name: expected[name] for name in found}
-    assert set(found) >= set(references)
+    result = rotation.of(0)
+    assert result == {name: expected[name] for name in result}
+    assert set(result) >= set(references)
     assert set(rotation.of(1).values()) == {None}
     assert [name for name, _ in rotation.references] == references
     assert rotation.fault_gear(0) == "wheel"

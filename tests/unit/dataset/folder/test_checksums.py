@@ -50,10 +50,10 @@ def with_log(logged, tmp_path):
 
 def test_every_file_is_listed_as_sha256sum_does(with_log):
     paths = [path for path in with_log.rglob("*") if path.is_file()]
-    found = {str(path.relative_to(with_log)) for path in paths}
+    result = {str(path.relative_to(with_log)) for path in paths}
     listed = read_checksums(with_log)
-    assert listed.keys() == found - {"SHA256SUMS"}
-    assert set(FILES) <= found
+    assert listed.keys() == result - {"SHA256SUMS"}
+    assert set(FILES) <= result
     for name, digest in listed.items():
         assert hashlib.sha256((with_log / name).read_bytes()).hexdigest() == digest
     if command := shutil.which("sha256sum"):

@@ -87,8 +87,8 @@ def test_parquet(stored, tmp_path, samples, monkeypatch):
         assert_array_equal(frame[name].tolist(), values.tolist())
     assert ("acceleration" in frame) is samples
     if samples:
-        found = [np.stack(channels) for channels in frame["acceleration"]]
-        assert_array_equal(found, _signals(stored))
+        result = [np.stack(channels) for channels in frame["acceleration"]]
+        assert_array_equal(result, _signals(stored))
     file = parquet.ParquetFile(out)
     assert file.schema_arrow.field("speed_rpm").metadata[b"unit"] == b"r/min"
     assert json.loads(file.schema_arrow.metadata[b"gensig"])["class_names"] == CLASSES

@@ -41,8 +41,8 @@ def test_hugging_face_example_of_the_format(tmp_path, plan, sample_type, error):
     expected = row_of(plan, 0)[0]["acceleration"]
     assert_allclose(names["signal"], expected, rtol=0, atol=error)
     for name in ("record_id", "label_name"):
-        found = [text.decode() for text in records[name][:]]
-        assert_array_equal(found, plan.columns[name])
+        result = [text.decode() for text in records[name][:]]
+        assert_array_equal(result, plan.columns[name])
     assert_array_equal(records["label"][:], plan.columns["label"])
 
 
@@ -91,14 +91,14 @@ def test_types_are_those_old_programs_know(tmp_path, sample_type, n_bytes):
     assert path.read_bytes()[8] == 0
     with h5py.File(path, locking=False) as file:
         items = [*file.values(), *file["params"].values()]
-        found = [item for item in items if isinstance(item, h5py.Dataset)]
+        result = [item for item in items if isinstance(item, h5py.Dataset)]
         attributes = [file.attrs.get_id(name) for name in file.attrs]
-        assert len(found) > 10
-        for stored in [*(item.id for item in found), *attributes]:
+        assert len(result) > 10
+        for stored in [*(item.id for item in result), *attributes]:
             check_type(stored.get_type(), stored in attributes)
             extent = stored.get_space().get_simple_extent_type()
             assert extent in (h5py.h5s.SCALAR, h5py.h5s.SIMPLE)
-        assert not any(item.is_virtual or item.external for item in found)
+        assert not any(item.is_virtual or item.external for item in result)
         signal, label = file["acceleration"].id, file["label"].id
         assert signal.get_type().get_size() == n_bytes
         assert signal.get_create_plist().get_nfilters() == 0
@@ -112,8 +112,8 @@ def test_text_is_read_the_way_octave_asks_for_it(folder):
     with h5py.File(shard_path(folder, 0), locking=False) as file:
         for name in ("record_id", "label_name", "status_reason"):
             data = file[name]
-            wanted = h5py.h5t.C_S1.copy()
-            wanted.set_size(data.dtype.itemsize + 1)
-            values = np.zeros(data.shape, f"S{wanted.get_size()}")
-            data.id.read(h5py.h5s.ALL, h5py.h5s.ALL, values, mtype=wanted)
+            expected = h5py.h5t.C_S1.copy()
+            expected.set_size(data.dtype.itemsize + 1)
+            values = np.zeros(data.shape, f"S{expected.get_size()}")
+            data.id.read(h5py.h5s.ALL, h5py.h5s.ALL, values, mtype=expected)
             assert_array_equal(values, data[:])

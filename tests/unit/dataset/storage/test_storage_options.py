@@ -101,14 +101,14 @@ def test_every_way_gives_the_signals_back(tmp_path, plan, compression, sample_ty
             assert file[name].dtype == sample_type
             assert (SCALES[name] in file) == (sample_type == "int16")
             for row in range(10):
-                found = read_signal(file, name, row)
+                result = read_signal(file, name, row)
                 signal = factor * expected(10 + row)
                 if row == FAILED - 10:
-                    assert np.isnan(found).all()
+                    assert np.isnan(result).all()
                 elif sample_type == "float32":
-                    assert_array_equal(found, signal, strict=True)
+                    assert_array_equal(result, signal, strict=True)
                 else:
-                    check_close(found, signal)
+                    check_close(result, signal)
         stored = file["acceleration"]
         assert compression_of(stored) == compression
         if compression == "blosc2":  # as docs/format.md says: level 5, bit shuffle, LZ4
@@ -129,8 +129,8 @@ def test_silent_and_failed_shards_are_read(tmp_path, sample_type, status, value)
         for row in range(2):
             writer.write(row, signals, row_of(plan, row, status=status)[1])
     with open_shard(path) as file:
-        found = read_signal(file, "acceleration", 1)
-    assert_array_equal(found, np.full(shape, value))
+        result = read_signal(file, "acceleration", 1)
+    assert_array_equal(result, np.full(shape, value))
 
 
 def test_failed_record_keeps_the_channels_that_are_finite(tmp_path, plan):
@@ -141,9 +141,9 @@ def test_failed_record_keeps_the_channels_that_are_finite(tmp_path, plan):
     with writer_of(path, sample_type="int16") as writer:
         writer.write(0, signals, values)
     with open_shard(path) as file:
-        found = read_signal(file, "acceleration", 0)
-    check_close(found[:1], sound)
-    assert np.isnan(found[1]).all()
+        result = read_signal(file, "acceleration", 0)
+    check_close(result[:1], sound)
+    assert np.isnan(result[1]).all()
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
@@ -164,10 +164,10 @@ def test_reader_and_index_give_physical_values(whole):
     with open_dataset(whole) as data:
         assert (data.sample_type, data.compression) == ("int16", "blosc2")
         for index in (0, 9, 10, 35):
-            signal, found = expected(index), data.signals(index)
-            check_close(found, signal)
+            signal, result = expected(index), data.signals(index)
+            check_close(result, signal)
             part = data.signals(index, 20, 70, ["wheel_ü"])
-            assert_array_equal(part, found[1:, 20:70])
+            assert_array_equal(part, result[1:, 20:70])
             check_close(data.signals(index, name="acceleration_clean"), signal / 2)
         assert np.isnan(data.signals(FAILED)).all()
         scale = data.column("acceleration_scale")

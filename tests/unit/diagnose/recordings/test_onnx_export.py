@@ -62,8 +62,8 @@ def test_the_file_answers_like_torch(
     raw = np.stack([signal[:, start : start + 1200] for start in windows.start])
     # an offset counts for nothing
     inputs = {"acceleration": raw + np.float32(0.25)}
-    (found,) = session_of(file).run(None, inputs)
-    assert_allclose(found, predict_windows(model, windows), rtol=0, atol=1e-4)
+    (result,) = session_of(file).run(None, inputs)
+    assert_allclose(result, predict_windows(model, windows), rtol=0, atol=1e-4)
     check_metadata(file, description)
 
 

@@ -164,10 +164,10 @@ def test_weights_of_a_life_do_not_grow_with_its_snapshots():
 def test_a_split_that_cuts_lives_is_left_out():
     dataset = FakeLives(n_lives=12)
     task, settings = settled(dataset)
-    found = choose_life_protocols(task, lives_of(task), settings.protocols)
+    result = choose_life_protocols(task, lives_of(task), settings.protocols)
     reason = "life u00 is in its train and its validation part"
-    assert found[0] == ("by_unit",)
-    assert found[1]["random_window_leaky"] == reason
+    assert result[0] == ("by_unit",)
+    assert result[1]["random_window_leaky"] == reason
     with pytest.raises(ConfigError, match="life u00 is in its train"):
         planned(dataset, "protocols=[random_window_leaky]")
     life = dataset.columns["life_id"]

@@ -80,9 +80,9 @@ def test_few_units_have_no_interval(n_units):
     ratio = ratio_with_interval("balanced_accuracy", confusion, confusion, **resampling)
     score = asdict(accuracy_with_interval(confusion))
     few = n_units < LEAST_UNITS
-    for found in (score, ratio):
-        assert (found["low"] is None) == (found["high"] is None) == few
-        assert not is_above(found, 2.0)
+    for result in (score, ratio):
+        assert (result["low"] is None) == (result["high"] is None) == few
+        assert not is_above(result, 2.0)
     text = "0.50 [too few machines]" if few else "0.50 [0.50"
     assert score_cell({"balanced_accuracy": score}).startswith(text)
 

@@ -119,7 +119,7 @@ def test_perfect_and_empty_scores(labelled):
     perfect = judge(novel * 5.0, predicted=record)
     assert perfect["auroc"]["low"] == perfect["auroc"]["mean"] == 1
     assert perfect["false_alarms"]["mean"] == perfect["fpr95"]["mean"] == 0
-    assert all(found["low"] == 1 for found in perfect["found"].values())
+    assert all(result["low"] == 1 for result in perfect["found"].values())
     empty = judge(np.zeros(novel.size), predicted=record)
     assert {empty["auroc"][key] for key in ("mean", "low", "high")} == {0.5}
     assert empty["fpr95"]["mean"] == 1
