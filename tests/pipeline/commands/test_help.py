@@ -28,10 +28,8 @@ CHEAP = (
     "gensig options fault=crack --json",
     "gensig completion bash",
     "gensig completion fish",
-    "gensig plan experiment=quickstart plan.n_records=2000",
     "gensig modes system=engine_gear_train --json modes.json --plot modes.png",
     "gensig root-stress gear=engine_pump_drive --stress 349.39 --json root.json --plot root.png",
-    "gensig stiffness fault=crack fault.crack_depth_mm=1.5 --json crack.json --plot crack.png",
 )
 NOT_COMPOSED = ("evaluate", "resume", "twin")
 

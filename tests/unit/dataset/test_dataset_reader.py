@@ -19,7 +19,7 @@ def test_facts(data):
     assert data.class_names == CLASSES
     assert data.attributes["n_teeth_wheel"] == 84
     names = ("by_unit", "cross_gearbox", "cross_specimen", "random_window_leaky")
-    assert data.protocols == names
+    assert data.protocols == list(names)
     columns = {"label", "params/crack_depth_mm", "noise_power"}
     assert columns <= set(data.column_names)
     assert "acceleration" not in data.column_names
