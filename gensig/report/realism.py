@@ -83,6 +83,19 @@ class Comparison(Range):
         return self.id, self.at
 
 
+COLUMNS = (
+    "quantity",
+    "at",
+    "beside",
+    "median",
+    "5 to 95 %",
+    "values",
+    "verdict",
+    "source",
+    "reason",
+)
+
+
 def judge(low: float | None, high: float | None, p5: float, p95: float) -> str:
     """Verdict on a central 90 %: inside the range, overlapping it, or missing it."""
     if math.isnan(p5) or math.isnan(p95):
@@ -184,3 +197,26 @@ def _read(line: Mapping[str, str], numbers: Sequence[str]) -> dict[str, Any]:
     for name in numbers:
         values[name] = float(line[name]) if line[name] else None
     return values
+
+
+def table(rows: Sequence[Comparison]) -> list[str]:
+    """Comparisons as lines of a Markdown table."""
+    lines = [f"| {' | '.join(COLUMNS)} |", "|---" * len(COLUMNS) + "|"]
+    for row in rows:
+        cells = (
+            f"{row.id}, {row.unit}".rstrip(", "),
+            row.at,
+            shown_range(row),
+            _number(row.median),
+            f"{_number(row.p5)} to {_number(row.p95)}",
+            str(row.n),
+            row.verdict,
+            row.source,
+            row.reason,
+        )
+        lines.append(f"| {' | '.join(cells)} |")
+    return lines
+
+
+def _number(value: float) -> str:
+    return "none" if math.isnan(value) else f"{value:.3g}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from gensig.report.realism import (
     RESULTS,
     Comparison,
     read_results,
-    shown_range,
+    table,
 )
 
 TEXT = """\
@@ -41,18 +40,6 @@ purpose, beside the 5 to 95 % of the right simulation; *told apart* where the wr
 outside. Gain changes none of the indicators; rotation is read off the mesh's phase, in
 simulation and recording alike."""
 
-COLUMNS = (
-    "quantity",
-    "at",
-    "beside",
-    "median",
-    "5 to 95 %",
-    "values",
-    "verdict",
-    "source",
-    "reason",
-)
-
 
 def realism_lines(path: Path = RESULTS) -> list[str]:
     """Lines of the section; none where nothing has been compared yet."""
@@ -79,27 +66,4 @@ def _part(title: str, text: str, figure: str, rows: Sequence[Comparison]) -> lis
     if not rows:
         return []
     picture = f"![{title}: simulated beside measured](figures/realism_{figure}.png)"
-    return ["", f"### {title}", "", text, "", picture, "", *_table(rows)]
-
-
-def _table(rows: Sequence[Comparison]) -> list[str]:
-    """Comparisons as lines of a Markdown table."""
-    lines = [f"| {' | '.join(COLUMNS)} |", "|---" * len(COLUMNS) + "|"]
-    for row in rows:
-        cells = (
-            f"{row.id}, {row.unit}".rstrip(", "),
-            row.at,
-            shown_range(row),
-            _number(row.median),
-            f"{_number(row.p5)} to {_number(row.p95)}",
-            str(row.n),
-            row.verdict,
-            row.source,
-            row.reason,
-        )
-        lines.append(f"| {' | '.join(cells)} |")
-    return lines
-
-
-def _number(value: float) -> str:
-    return "none" if math.isnan(value) else f"{value:.3g}"
+    return ["", f"### {title}", "", text, "", picture, "", *table(rows)]
