@@ -18,8 +18,8 @@ SHORT = (
     "plan.n_repeats=1",
 )
 FOUND = list(blocks((ROOT / "docs" / "howto" / PAGE).read_text(encoding="utf-8")))
-CODE = next(block.code for block in FOUND if "test_own_drive_line" in block.mark)
-COMMANDS = CODE.replace("\\\n", " ").splitlines()
+PYTHON, TYPED = (block.code for block in FOUND if "test_own_drive_line" in block.mark)
+COMMANDS = TYPED.replace("\\\n", " ").splitlines()
 
 
 @pytest.fixture(scope="module")
@@ -45,3 +45,8 @@ def test_commands_of_the_page_run(line, folder, monkeypatch, capsys):
             folder / "runs" / "my_records" / "shards" / "shard-00000.h5"
         ) as file:
             assert {value.decode() for value in file["status"][:]} == {"ok"}
+
+
+def test_python_of_the_page_runs(capsys):
+    exec(compile(PYTHON, PAGE, "exec"), {})
+    assert capsys.readouterr().out.startswith("[")
