@@ -1,10 +1,12 @@
-"""Nuisances in a record: forces that follow the shafts' angles, on the linear machine."""
+"""Nuisances in a record.
+
+Their forces follow its shafts' angles, its linear machine answers, bearings hear it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cache, reduce
 from itertools import pairwise
 
 import numpy as np
@@ -23,9 +25,9 @@ from gensig.systems.shaft_sensors import gear_angle
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-# rad of the fastest tone between computed samples: the error of a cubic spline is 0.3^4 / 384
+# rad of the fastest tone from one made sample to the next: a cubic spline leaves 0.3^4 / 384
 SPLINE_PHASE = 0.3
-BLOCK = 2048  # samples over which amplitudes are linear: 40 ms at 51.2 kHz
+BLOCK = 2048  # samples over which amplitudes go straight: 40 ms at 51.2 kHz
 
 
 def with_nuisances(
@@ -34,41 +36,43 @@ def with_nuisances(
     units: Mapping[str, np.random.Generator],
     record_rng: np.random.Generator,
 ) -> CleanRecord:
-    """A record with the nuisances of ``sensing.nuisances``; without any, the record itself.
+    """A record whose bearings also feel what ``sensing.nuisances`` lists; without any, the record
+    itself.
 
-    The responding machine is the sound one for all faults: only the angle of the shaft, which the
-    forces follow, differs between classes. ``units`` has a generator a level, see ``draw_tones``.
+    The machine that answers is the sound one whatever the run's faults: nothing but the shaft's
+    own angle, which the forces follow, differs from one class to another. ``units`` has a
+    generator a level, see ``draw_tones``.
     """
     nuisances = run.system.sensing.nuisances
     if not nuisances:
         return record
     dynamics = pair_dynamics(replace(run, faults=(), specimen=None))
     tones = draw_tones(nuisances, dynamics, units, record_rng)
-    added = nuisance_acceleration(run, dynamics, tones, record.shaft_angle)
-    if run.gearbox is not None:
-        added = run.gearbox.gain[:, None] * added
-    return replace(record, acceleration=record.acceleration + added)
+    gain = 1.0 if run.gearbox is None else run.gearbox.gain[:, None]
+    heard = nuisance_acceleration(run, dynamics, tones, record.shaft_angle)
+    return replace(record, acceleration=record.acceleration + gain * heard)
 
 
 def nuisance_acceleration(
     run: PairRun, dynamics: PairDynamics, tones: Sequence[Tones], shaft_angle: Array
 ) -> Array:
-    """Accelerations of a run's channels under tones, also ``n_lead`` samples before the record.
+    """Accelerations of a run's channels under some tones, ``n_lead`` samples before the record too.
 
     Parameters
     ----------
-    dynamics : the responding machine
-    shaft_angle : (sample,) rad    of the pinion from its nominal angle at the first sample on
+    dynamics : the machine that answers
+    shaft_angle : (sample,) rad    of the pinion from its nominal place at the first sample on,
+        as a record has it
 
     Returns
     -------
     (channel, n_lead + sample) m/s2, or rad/s2 for a rotation
 
-    Every tone has the amplitude and phase lag of steady rotation at the nominal speed of the
-    instant (assumed; computed once a block, linear in between) and the phase of the shaft's actual
-    angle. Tones above the usable band are left out. Before the record the shaft follows its
-    nominal course. The sum is computed at every few samples, by the fastest tone, and interpolated
-    by cubic splines, with an error below 1e-4 except at the last few samples.
+    Every tone has the amplitude and phase lag of steady turning at the nominal speed of the
+    instant (assumed; taken once a block, straight in between) and the phase of the shaft's actual
+    angle. Tones above the usable band are left out. Before the record the shaft turns as the
+    nominal course says. The sum is made at every few samples of its fastest tone and goes by
+    cubic splines in between, which leaves less than 1e-4 of it but at the last few samples.
     """
     from scipy.interpolate import CubicSpline
 
@@ -76,10 +80,9 @@ def nuisance_acceleration(
     n_lead, rate = sensing.n_lead, sensing.sampling_rate
     before = operating.nominal(np.arange(-n_lead, 0) / rate).angle + shaft_angle[0]
     turned = np.concatenate([before, shaft_angle])
-    start, zero = run.start or Start(), np.zeros(1)
-    angle = {
-        gear: float(gear_angle(run.system, gear, start, zero)[0])
-        + shaft(dynamics, gear).speed_ratio * turned
+    begin_at = run.start or Start()
+    first = {
+        gear: float(gear_angle(run.system, gear, begin_at, np.zeros(1))[0])
         for gear in SENSE
     }
     channels = [dynamics.dofs.index(name) for name in sensing.channels]
@@ -87,47 +90,58 @@ def nuisance_acceleration(
     n_samples = len(turned)
     edges = np.arange(0, n_samples + BLOCK, BLOCK)
     nominal = operating.nominal((edges - n_lead) / rate)
-    highest = TURN * usable_band(rate)[1]
-    factors: list[Array] = []  # on cosines, then sines, of every part
-    fastest = 1.0
-    for part in tones:
-        response = _responses(dynamics, part, nominal, highest)[:, :, channels]
-        factors += [response.real, -response.imag]
-        frequency = np.abs(_frequencies(dynamics, part, nominal.speed))
-        fastest = max(fastest, float(np.max(frequency * response.any(axis=2))))
-    factor = np.concatenate(factors, axis=1)
-    every = max(1, min(BLOCK, int(SPLINE_PHASE * rate / fastest)))
-    samples = np.unique(np.append(np.arange(0, n_samples, every), n_samples - 1))
+    answers = [
+        _answers(dynamics, part, nominal, TURN * usable_band(rate)[1])[:, :, channels]
+        for part in tones
+    ]
+    factors = np.concatenate(
+        [part for one in answers for part in (one.real, -one.imag)], axis=1
+    )  # on cosines, sines
+    fastest = max(
+        float(
+            np.max(
+                np.abs(_frequencies(dynamics, part, nominal.speed)) * one.any(axis=2)
+            )
+        )
+        for part, one in zip(tones, answers, strict=True)
+    )
+    every = max(1, min(BLOCK, int(SPLINE_PHASE * rate / max(fastest, 1.0))))
+    made = np.unique(np.append(np.arange(0, n_samples, every), n_samples - 1))
 
-    coarse = np.empty((len(channels), len(samples)))
-    ends = np.searchsorted(samples, edges)
-    for block, (begin, end) in enumerate(pairwise(ends.tolist())):
-        in_block = samples[begin:end]
-        waves = _waves(tones, {gear: angle[gear][in_block] for gear in SENSE})
+    coarse = np.empty((len(channels), len(made)))
+    ends = np.searchsorted(made, edges)
+    for block, (start, stop) in enumerate(pairwise(ends.tolist())):
+        own = made[start:stop]
+        ratio = {gear: shaft(dynamics, gear).speed_ratio for gear in SENSE}
+        waves = _waves(
+            tones, {gear: first[gear] + ratio[gear] * turned[own] for gear in SENSE}
+        )
         # einsum, not @: its bits depend on no thread count
-        coarse[:, begin:end] = np.einsum("tc,ts->cs", factor[block], waves)
-        change = factor[block + 1] - factor[block]
+        coarse[:, start:stop] = np.einsum("tc,ts->cs", factors[block], waves)
+        change = factors[block + 1] - factors[block]
         if change.any():
-            share = (in_block - edges[block]) / BLOCK
-            coarse[:, begin:end] += share * np.einsum("tc,ts->cs", change, waves)
-    if every == 1 or len(samples) < 4:
+            coarse[:, start:stop] += (
+                (own - edges[block]) / BLOCK * np.einsum("tc,ts->cs", change, waves)
+            )
+    if every == 1 or len(made) < 4:
         return coarse
-    return np.asarray(CubicSpline(samples, coarse, axis=1)(np.arange(n_samples)))
+    return np.asarray(CubicSpline(made, coarse, axis=1)(np.arange(n_samples)))
 
 
 def _frequencies(dynamics: PairDynamics, tones: Tones, speed: Array) -> Array:
     """Circular frequencies at speeds of the pinion in rad/s, (speed, tone) rad/s.
 
-    Negative against the shaft's sense.
+    Below 0 against the shaft's sense.
     """
-    ratio = shaft(dynamics, tones.gear).speed_ratio
-    return np.asarray(speed[:, None] * ratio * tones.order)
+    return np.asarray(
+        speed[:, None] * shaft(dynamics, tones.gear).speed_ratio * tones.order
+    )
 
 
-def _responses(
+def _answers(
     dynamics: PairDynamics, tones: Tones, nominal: Nominal, highest: float
 ) -> Complex:
-    """Accelerations (time, tone, dof) of steady rotation; 0 for tones above ``highest`` rad/s."""
+    """Accelerations (time, tone, dof) of steady turning; 0 for tones above ``highest`` in rad/s."""
     frequency = _frequencies(dynamics, tones, nominal.speed)
     growth = {
         "speed_squared": (nominal.speed / dynamics.operating.speed) ** 2,
@@ -135,41 +149,58 @@ def _responses(
         "nothing": np.ones(len(frequency)),
     }
     force = np.zeros((*frequency.shape, len(dynamics.dofs)), dtype=np.complex128)
-    axes = [f"{tones.gear}_{axis}" for axis in ("x", "y", "rotation")]
-    dofs = [dynamics.dofs.index(name) for name in axes]
-    force[:, :, dofs] = growth[tones.follows][:, None, None] * tones.force
-    by_tone = force.reshape(-1, force.shape[2])
-    response = accelerations(dynamics, frequency.ravel(), by_tone).reshape(force.shape)
-    return response * (np.abs(frequency) <= highest)[:, :, None]
+    places = [
+        dynamics.dofs.index(f"{tones.gear}_{axis}") for axis in ("x", "y", "rotation")
+    ]
+    force[:, :, places] = growth[tones.follows][:, None, None] * tones.force
+    answer = accelerations(
+        dynamics, frequency.ravel(), force.reshape(-1, force.shape[2])
+    ).reshape(force.shape)
+    return answer * (np.abs(frequency) <= highest)[:, :, None]
 
 
 def _waves(tones: Sequence[Tones], angle: Mapping[str, Array]) -> Array:
     """Cosines, then sines of every part's phases, (2 tone, sample), from products of powers.
 
-    A power costs a fiftieth of a cosine, and parts share the powers of common angles.
+    A power costs a fiftieth of a cosine, and parts share those of the angles that they share.
     """
-
-    @cache
-    def power(gear: str, order: float, exponent: int) -> Complex:
-        if exponent == 1:
-            return np.asarray(np.exp(1j * order * angle[gear]))
-        if exponent < 0:
-            return power(gear, order, -exponent).conj()
-        half = exponent // 2
-        return power(gear, order, half) * power(gear, order, exponent - half)
-
-    rows: list[Array] = []
+    powers: dict[tuple[str, float], _Powers] = {}
+    out = np.empty(
+        (2 * sum(len(part.multiple) for part in tones), len(next(iter(angle.values()))))
+    )
+    row = 0
     for part in tones:
-        phasors = []
-        for multiples in part.multiple.tolist():
-            factors = [
-                power(part.gear, order, multiple)
-                for order, multiple in zip(part.base.tolist(), multiples, strict=True)
-                if multiple
-            ]
-            if not factors:
+        n_tones = len(part.multiple)
+        for tone, multiples in enumerate(part.multiple.tolist(), start=row):
+            phasor: Complex | None = None
+            for order, multiple in zip(part.base.tolist(), multiples, strict=True):
+                if multiple:
+                    key = (part.gear, order)
+                    if key not in powers:
+                        powers[key] = _Powers(np.exp(1j * order * angle[part.gear]))
+                    one = powers[key](multiple)
+                    if phasor is None:
+                        phasor = one
+                    else:
+                        phasor = phasor * one
+            if phasor is None:
                 raise ValueError("a tone follows at least one angle")
-            phasors.append(reduce(np.multiply, factors))
-        rows += [phasor.real for phasor in phasors]
-        rows += [phasor.imag for phasor in phasors]
-    return np.array(rows)
+            out[tone], out[tone + n_tones] = phasor.real, phasor.imag
+        row += 2 * n_tones
+    return out
+
+
+class _Powers:
+    """Whole powers of unit numbers, each made once."""
+
+    def __init__(self, base: Complex) -> None:
+        self.made: dict[int, Complex] = {1: base}
+
+    def __call__(self, exponent: int) -> Complex:
+        if exponent not in self.made:
+            if exponent < 0:
+                self.made[exponent] = self(-exponent).conj()
+            else:
+                half = exponent // 2
+                self.made[exponent] = self(half) * self(exponent - half)
+        return self.made[exponent]
