@@ -90,7 +90,7 @@ def kernel(
     )
 
     def work() -> None:
-        run = settled.again()
+        run = settled.restarted()
         state = run.state.ravel()
         for call in range(n_calls):
             _kernels.integrate(

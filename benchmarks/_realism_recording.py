@@ -25,10 +25,10 @@ from benchmarks._realism_values import to_rate
 from gensig.dataset.reader import Dataset
 from gensig.errors import DatasetError
 from gensig.report.realism import (
-    NOT_TOLD,
+    APART,
+    NOT_APART,
     NOTHING,
     RECORDING,
-    TOLD,
     WITHOUT,
     Comparison,
     judge,
@@ -222,10 +222,15 @@ def recording_comparisons(
             )
         for control in CONTROLS[1:]:
             wrong = points(simulated[control][name])
-            told = TOLD if wrong[0] < right[1] or wrong[0] > right[2] else NOT_TOLD
+            verdict = APART if wrong[0] < right[1] or wrong[0] > right[2] else NOT_APART
             result.append(
                 _row(
-                    row, control, (right[1], right[2]), "right simulation", wrong, told
+                    row,
+                    control,
+                    (right[1], right[2]),
+                    "right simulation",
+                    wrong,
+                    verdict,
                 )
             )
     return result

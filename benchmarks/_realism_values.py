@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gensig.dataset.reader import Dataset
-from gensig.report.realism import Place
+from gensig.report.realism import RangeKey
 from gensig.signals.averaging import samples_per_turn_for
 from gensig.signals.impacts import impact_decay, impacts_per_turn, peak_over_rms
 from gensig.signals.indicators import fm4, kurtosis, rms
@@ -143,9 +143,9 @@ def _values_at(data: Dataset, index: int) -> dict[str, FloatArray]:
     )
 
 
-def quantities(table: Table) -> dict[Place, FloatArray]:
+def quantities(table: Table) -> dict[RangeKey, FloatArray]:
     """Every quantity of the yardstick by id and conditions, all its values in one row."""
-    result: dict[Place, list[FloatArray]] = {}
+    result: dict[RangeKey, list[FloatArray]] = {}
     for quantity, where, values in _quantities(table):
         result.setdefault((quantity, where), []).append(np.ravel(values))
     return {place: np.concatenate(values) for place, values in result.items()}

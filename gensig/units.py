@@ -278,14 +278,14 @@ def _unknown(key: str, names: Mapping[str, dataclasses.Field[Any]]) -> str:
     return f"unknown key '{key}'; {hint}"
 
 
-def _convert(place: str, key: str, value: Any, hint: Any) -> Any:
+def _convert(name: str, key: str, value: Any, hint: Any) -> Any:
     kinds = (hint,)
     if isinstance(hint, types.UnionType):
         kinds = typing.get_args(hint)
     if value is None and type(None) in kinds:
         return None
     if value is None:
-        raise ConfigError(f"{place} is null; give a value")
+        raise ConfigError(f"{name} is null; give a value")
     factor = to_si(key, 1.0)
     if float in kinds and is_number(value):
         return float(value) * factor
@@ -298,9 +298,9 @@ def _convert(place: str, key: str, value: Any, hint: Any) -> Any:
                 return tuple(float(entry) * factor for entry in value)
             return tuple(value)
     if float in kinds and is_number(value, finite=False):
-        raise ConfigError(f"{place} = {value} is not finite")
+        raise ConfigError(f"{name} = {value} is not finite")
     wanted = " or ".join(TYPES.get(kind, "null") for kind in kinds)
-    raise ConfigError(f"{place} = {value!r} is not {wanted}")
+    raise ConfigError(f"{name} = {value!r} is not {wanted}")
 
 
 def _is_a(kind: Any, value: Any) -> bool:

@@ -15,7 +15,7 @@ from gensig.options import files as option_files
 from gensig.options.files import (
     PRIMARY,
     Key,
-    chosen_beside,
+    chosen_options,
     groups,
     option_keys,
     options,
@@ -46,12 +46,12 @@ def _listing(word: str | None, folder: str | None) -> Listing:
         return _all_groups(folder)
     group, equals, option = word.partition("=")
     if equals:
-        return _one_option(group, option, folder)
+        return _option_listing(group, option, folder)
     if group in sections():
         keys = section_keys(group)
         content = {"section": group, "keys": [asdict(key) for key in keys]}
         return content, _key_table(keys)
-    return _one_group(group, folder)
+    return _group_listing(group, folder)
 
 
 def _all_groups(folder: str | None) -> Listing:
@@ -74,7 +74,7 @@ def _all_groups(folder: str | None) -> Listing:
     return {"groups": contents, "sections": list(parts)}, lines
 
 
-def _one_group(group: str, folder: str | None) -> Listing:
+def _group_listing(group: str, folder: str | None) -> Listing:
     default = _defaults(group, folder)[group]
     rows, contents = [], []
     for option in options(group, folder):
@@ -90,14 +90,14 @@ def _one_group(group: str, folder: str | None) -> Listing:
     return {"group": group, "options": contents}, lines
 
 
-def _one_option(group: str, option: str, folder: str | None) -> Listing:
+def _option_listing(group: str, option: str, folder: str | None) -> Listing:
     _defaults(group, folder)
     abouts = {result.name: result.about for result in options(group, folder)}
     if option not in abouts:
         hint = option_files.elsewhere(group, option) or nearest.hint(option, abouts)
         raise ConfigError(f"no option '{option}' of {group}; {hint}")
     keys = option_keys(group, option, folder)
-    chosen = chosen_beside(group, option, folder)
+    chosen = chosen_options(group, option, folder)
     about = abouts[option]
     content = {
         "group": group,

@@ -61,7 +61,7 @@ class Plan:
                 "equal, not 0"
             )
         _check_ids(columns["record_id"])
-        _check_places(columns["shard"], columns["row"])
+        _check_rows(columns["shard"], columns["row"])
         object.__setattr__(self, "columns", MappingProxyType(columns))
 
     def __reduce__(self) -> tuple:
@@ -142,7 +142,7 @@ def _check_ids(ids: np.ndarray) -> None:
         )
 
 
-def _check_places(shard: np.ndarray, row: np.ndarray) -> None:
+def _check_rows(shard: np.ndarray, row: np.ndarray) -> None:
     new_shard = np.concatenate([[True], np.diff(shard) != 0])
     starts = np.flatnonzero(new_shard)
     expected_shard = np.cumsum(new_shard) - 1
@@ -161,9 +161,7 @@ def record_ids(n_records: int) -> np.ndarray:
     return np.array([f"r{i:06d}" for i in range(n_records)])
 
 
-def shard_places(
-    n_records: int, records_per_shard: int
-) -> tuple[np.ndarray, np.ndarray]:
+def shard_rows(n_records: int, records_per_shard: int) -> tuple[np.ndarray, np.ndarray]:
     """Shard and row of each record, (record,) each, filling one shard after the other."""
     if records_per_shard < 1 or n_records < 1:
         raise DatasetError(

@@ -132,8 +132,8 @@ def read_drive_line(config: Configuration) -> DriveLine:
         for row, shape in zip(gear_rows, shapes, strict=True)
     ]
     nodes = tuple(
-        node_of(row, place, gears, shapes, options, material)
-        for place, row in enumerate(node_rows.values())
+        node_of(row, index, gears, shapes, options, material)
+        for index, row in enumerate(node_rows.values())
     )
     shafts, meshes, pairs = _joints(shafting, numbers, gears, shapes, options)
     support_force = None
@@ -196,20 +196,20 @@ def drive_line_of_pair(system: GearPairMachine, name: str) -> DriveLine:
     gears = [
         LineGear(
             name=side,
-            node=place,
+            node=index,
             n_teeth=gear.n_teeth,
             base_radius=gear.base_radius,
             mass=body.mass,
             support=body.support,
         )
-        for place, (side, gear, body, _) in enumerate(sides)
+        for index, (side, gear, body, _) in enumerate(sides)
     ]
     shafts = []
-    for place, (rotor_name, (_, _, body, rotor)) in enumerate(
+    for index, (rotor_name, (_, _, body, rotor)) in enumerate(
         zip(("motor", "load"), sides, strict=True)
     ):
         if rotor is not None:
-            shafts.append(_coupling(rotor, place, len(nodes), body.inertia))
+            shafts.append(_coupling(rotor, index, len(nodes), body.inertia))
             nodes.append(Node(name=rotor_name, inertia=rotor.inertia))
     mesh = GearMesh(
         driving=0,

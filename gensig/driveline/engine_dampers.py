@@ -86,7 +86,7 @@ def with_further_dampers(
 
 
 def mesh_between(line: EngineLine, nodes: Sequence[int]) -> int:
-    """Place of the mesh between two nodes.
+    """Index of the mesh between two nodes.
 
     Raises
     ------
@@ -152,14 +152,14 @@ def read_mesh_strength(
 
     Flanks, material and strength of the configuration.
     """
-    own = config.section("mesh")
+    mesh_section = config.section("mesh")
     # the mesh code knows gears by their sides, the tables by the names of the machine
     pair = named_by_side(line.drive.pairs[mesh])
     flanks = SlicedPair(
         pair=pair,
         material=read_material(config),
-        mesh=read_mesh_options(own),
-        slices=read_slice_options(own),
+        mesh=read_mesh_options(mesh_section),
+        slices=read_slice_options(mesh_section),
         modification=read_modification(config),
         torque=0.0,
     )

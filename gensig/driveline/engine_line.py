@@ -57,7 +57,7 @@ class EngineLine:
     def ratios(self) -> dict[int, float]:
         """Speed of every node over the crank's, by its number, positive."""
         speeds = np.abs(self.drive.line.speed_ratio)
-        crank = speeds[self._place(self.engine.driving_nodes[0], "throw_nodes")]
+        crank = speeds[self._index(self.engine.driving_nodes[0], "throw_nodes")]
         return dict(zip(self.drive.numbers, (speeds / crank).tolist(), strict=True))
 
     @property
@@ -116,15 +116,15 @@ class EngineLine:
         """Speed that a toothed wheel of this machine shows, over `SEEN_CYCLES` cycles, (sample,)
         rad/s.
         """
-        place = self._place(wheel.node, "toothed_wheels")
-        deviation = over_cycle(response.angle[place], SAMPLES_PER_CYCLE)
+        index = self._index(wheel.node, "toothed_wheels")
+        deviation = over_cycle(response.angle[index], SAMPLES_PER_CYCLE)
         crank = CYCLE / SAMPLES_PER_CYCLE * np.arange(SEEN_CYCLES * SAMPLES_PER_CYCLE)
         turned = self.ratios[wheel.node] * crank + np.tile(deviation, SEEN_CYCLES)
         angle = np.asarray(turned, dtype=np.float64)
         rate = SAMPLES_PER_CYCLE * response.speed / CYCLE
         return instantaneous_speed(wheel, draw_wheel(rng, wheel), angle, rate)
 
-    def _place(self, number: int, key: str) -> int:
+    def _index(self, number: int, key: str) -> int:
         if number not in self.drive.numbers:
             raise ConfigError(f"excitation.{key}: the shaft line has no node {number}")
         return self.drive.numbers.index(number)

@@ -60,7 +60,7 @@ class TimeResponse:
 def tabulated_meshes(
     machine: EngineLine, config: Configuration, speed: float, torque: float
 ) -> dict[int, TabulatedMesh]:
-    """Tables of sound teeth by the place of their mesh, each under its mean force."""
+    """Tables of sound teeth by the index of their mesh, each under its mean force."""
     mesh = config["mesh"]
     law = ToothLaw(
         material=read_material(config),
@@ -75,7 +75,7 @@ def time_response(
     speed: float,
     torque: float,
     *,
-    own: dict[int, TabulatedMesh],
+    tabulated: dict[int, TabulatedMesh],
     nodes: Sequence[int],
     duration: float,
 ) -> TimeResponse:
@@ -86,7 +86,7 @@ def time_response(
     SimulationError    where the energies do not balance to 1e-3
     """
     line = running_line(
-        machine, steady_course(speed, torque), governor=GOVERNOR, own=own
+        machine, steady_course(speed, torque), governor=GOVERNOR, tabulated=tabulated
     )
     speeds = [("speed", line.dof(node)) for node in nodes]
     angles = [("angle", line.dof(node)) for node in nodes]

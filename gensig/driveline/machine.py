@@ -32,9 +32,9 @@ from gensig.driveline.running import (
     TabulatedMesh,
     mesh_forces,
     named_by_side,
-    one_thread,
     reference_force,
     running_line,
+    single_thread,
     steady_course,
     with_supports,
 )
@@ -310,7 +310,7 @@ class LineMachine(Machine):
                 records.append(error)
         return records
 
-    @one_thread
+    @single_thread
     def _record(self, run: Run[LineMachine]) -> CleanRecord:
         line = self.line(run)
         kinds = {name: self._channel(line, name) for name in self.sensing.channels}
@@ -373,7 +373,7 @@ class LineMachine(Machine):
             specimen=specimen,
             turned=turned,
         )
-        own = TabulatedMesh(
+        recorded = TabulatedMesh(
             table=specimen_table(self, run.faults, specimen),
             errors=(specimen.pinion_error, specimen.wheel_error),
             start_teeth=teeth,
@@ -390,7 +390,7 @@ class LineMachine(Machine):
             engine,
             self._course(),
             governor=governor,
-            own={**sound, **neighbours, self.mesh_number: own},
+            tabulated={**sound, **neighbours, self.mesh_number: recorded},
             turned=turned,
         )
 
@@ -455,7 +455,9 @@ class LineMachine(Machine):
     ) -> Array:
         """Deviation from the nominal speed that a toothed wheel measures, (sample,) rad/s."""
         number, wheel = self._wheel(name)
-        disc = Disc(index=0.0, places=wheel.spacing * np.arange(float(wheel.n_teeth)))
+        disc = Disc(
+            index=0.0, line_angles=wheel.spacing * np.arange(float(wheel.n_teeth))
+        )
         if run.discs:
             disc = run.discs[number]
         ratio = self.engine.ratios[wheel.node]

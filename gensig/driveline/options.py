@@ -76,7 +76,7 @@ class GearHolding:
                 f"system.support.damping_ratio = {self.damping_ratio:g} must lie in 0..1"
             )
 
-    def under(self, mass: float, material: Material) -> Support:
+    def for_gear(self, mass: float, material: Material) -> Support:
         """The support of a gear of ``mass`` in kg."""
         across, along = support_stiffness(
             self.bearing, self.shaft, material, self.force
@@ -122,7 +122,7 @@ def read_options(machine: Section) -> LineOptions:
         shaft = read(BearingShaft, held.get("shaft", {}), "shaft")
     except ConfigError as error:
         raise ConfigError(f"system.support.{error}") from None
-    own_support = {
+    support_values = {
         key: value for key, value in held.items() if key not in ("bearing", "shaft")
     }
     groups: dict[str, Any] = {
@@ -131,12 +131,12 @@ def read_options(machine: Section) -> LineOptions:
         ),
         "campbell": read(Campbell, machine.get("campbell", {}), "system.campbell"),
         "support": read(
-            GearHolding, own_support, "system.support", bearing=bearing, shaft=shaft
+            GearHolding, support_values, "system.support", bearing=bearing, shaft=shaft
         ),
         "dampers": _read_dampers(machine.get("dampers", ())),
     }
-    own = {key: value for key, value in machine.items() if key not in groups}
-    options = read(LineOptions, own, "system", **groups)
+    line_values = {key: value for key, value in machine.items() if key not in groups}
+    options = read(LineOptions, line_values, "system", **groups)
     if options.helical_meshes not in HELICAL_MESHES:
         raise ConfigError(
             f"system.helical_meshes = {options.helical_meshes!r}; allowed: "
@@ -156,8 +156,8 @@ def _read_dampers(values: Any) -> tuple[TorsionalDamper, ...]:
             f"system.dampers = {values!r} must be a list of dampers, [] for none"
         )
     dampers = []
-    for place, keys in enumerate(values):
-        where = f"system.dampers[{place}]"
+    for index, keys in enumerate(values):
+        where = f"system.dampers[{index}]"
         if not isinstance(keys, Mapping):
             raise ConfigError(f"{where} = {keys!r} must be a group of keys")
         try:

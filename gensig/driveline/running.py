@@ -50,7 +50,7 @@ ROUNDED = 1e-12  # of the largest torque, below which a course of it over the cy
 
 # More threads of the linear algebra sum in another order; a line that rattles makes another
 # motion of the last digit.
-one_thread = threadpool_limits.wrap(limits=1)
+single_thread = threadpool_limits.wrap(limits=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,10 +125,10 @@ class RunningLine:
     turned: float
 
     def dof(self, node: int) -> int:
-        """Place of the degree of freedom that a node, by its number, turns with."""
+        """Index of the degree of freedom that a node, by its number, turns with."""
         return _dof(self.matrices, self.machine.drive.numbers.index(node))
 
-    @one_thread
+    @single_thread
     def run(
         self,
         solver: LineSolver,
@@ -167,20 +167,20 @@ class RunningLine:
                 solver = replace(solver, oversampling=2 * solver.oversampling)
 
 
-@one_thread
+@single_thread
 def running_line(
     machine: EngineLine,
     course: EngineCourse,
     *,
     governor: Governor,
-    own: Mapping[int, TabulatedMesh] | None = None,
+    tabulated: Mapping[int, TabulatedMesh] | None = None,
     turned: float = 0.0,
 ) -> RunningLine:
     """The line of an engine with its torques along a course.
 
     Parameters
     ----------
-    own : by the place of a mesh its teeth; all others hold the stiffness of the table
+    tabulated : teeth of meshes by the index of the mesh; all others hold the stiffness of the table
     turned : rad, angle of the crank in its cycle at time 0; all meshes and torques follow from it
 
     Raises
@@ -199,7 +199,7 @@ def running_line(
     return RunningLine(
         machine=machine,
         matrices=matrices,
-        line=_geared(machine, matrices, governor, mesh_force, own or {}, turned),
+        line=_geared(machine, matrices, governor, mesh_force, tabulated or {}, turned),
         course=nominal,
         torques=_torques(machine, matrices, course, turned, first),
         linear=linear,
@@ -236,7 +236,7 @@ def _geared(
     matrices: LineMatrices,
     governor: Governor,
     forces: Array,
-    own: Mapping[int, TabulatedMesh],
+    tabulated: Mapping[int, TabulatedMesh],
     turned: float,
 ) -> GearedLine:
     rotation = matrices.rigid[0]
@@ -251,7 +251,14 @@ def _geared(
         stiffness=matrices.stiffness + rate**2 * rigid,
         rotation=rotation,
         meshes=tuple(
-            _mesh(machine, matrices, number, float(force), own.get(number), float(roll))
+            _mesh(
+                machine,
+                matrices,
+                number,
+                float(force),
+                tabulated.get(number),
+                float(roll),
+            )
             for number, (force, roll) in enumerate(zip(forces, phases, strict=True))
         ),
     )
@@ -262,7 +269,7 @@ def _mesh(
     matrices: LineMatrices,
     number: int,
     force: float,
-    own: TabulatedMesh | None,
+    tabulated: TabulatedMesh | None,
     roll: float,
 ) -> LineMesh:
     drive = machine.drive
@@ -277,7 +284,7 @@ def _mesh(
         "damping": float(matrices.mesh_damping[number]) / reference,
         "start_phase": phase,
     }
-    if own is None:
+    if tabulated is None:
         stiffness = float(matrices.mesh_stiffness[number])
         return phase_mesh(
             n_teeth=(pair.pinion.n_teeth, pair.wheel.n_teeth),
@@ -286,16 +293,16 @@ def _mesh(
             mirror=2.0 * pair.pitch_point / pair.base_pitch + 0.5,
             **common,
         )
-    common |= {"errors": own.errors, "start_teeth": own.start_teeth}
-    if own.start_phase is not None:
-        common["start_phase"] = own.start_phase
-    if isinstance(own.table, SlicedTable):
-        return sliced_pair_mesh(table=own.table, **common)
-    return pair_mesh(table=own.table, **common)
+    common |= {"errors": tabulated.errors, "start_teeth": tabulated.start_teeth}
+    if tabulated.start_phase is not None:
+        common["start_phase"] = tabulated.start_phase
+    if isinstance(tabulated.table, SlicedTable):
+        return sliced_pair_mesh(table=tabulated.table, **common)
+    return pair_mesh(table=tabulated.table, **common)
 
 
 def _dof(matrices: LineMatrices, number: int) -> int:
-    """Degree of freedom that a node, by its place in the line, turns with."""
+    """Degree of freedom that a node, by its index in the line, turns with."""
     return int(np.argmax(matrices.expand[number]))
 
 

@@ -55,14 +55,14 @@ class TableRow:
     headers: Mapping[str, str]  # bare name: as the header writes it
     cells: Mapping[str, str]
 
-    def place(self, column: str = "") -> str:
-        """Place of a cell, or of the row, for a message."""
-        place = f"{self.table}, row {self.line}"
+    def location(self, column: str = "") -> str:
+        """Location of a cell, or of the row, for a message."""
+        location = f"{self.table}, row {self.line}"
         if node := self.text("node"):
-            place += f" (node {node})"
+            location += f" (node {node})"
         if column:
-            place += f", column {self.headers.get(column, column)}"
-        return place
+            location += f", column {self.headers.get(column, column)}"
+        return location
 
     def text(self, column: str) -> str:
         """A cell as it is, empty where there is none."""
@@ -78,11 +78,11 @@ class TableRow:
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            raise ConfigError(f"{self.place(column)}: '{cell}' is no number")
+            raise ConfigError(f"{self.location(column)}: '{cell}' is no number")
         value = to_si(self.headers[column], value)
         if value != 0.0 and not LEAST <= abs(value) <= MOST:
             raise ConfigError(
-                f"{self.place(column)}: {cell} is beyond any machine; check its unit"
+                f"{self.location(column)}: {cell} is beyond any machine; check its unit"
             )
         return value
 
@@ -91,7 +91,7 @@ class TableRow:
         value = self.number(column)
         if value is not None and value <= 0.0:
             raise ConfigError(
-                f"{self.place(column)}: {self.text(column)} must be positive"
+                f"{self.location(column)}: {self.text(column)} must be positive"
             )
         return value
 
@@ -102,7 +102,7 @@ class TableRow:
             return default
         if value < 0.0:
             raise ConfigError(
-                f"{self.place(column)}: {self.text(column)} must not be negative"
+                f"{self.location(column)}: {self.text(column)} must not be negative"
             )
         return value
 
@@ -113,7 +113,7 @@ class TableRow:
             return None
         if value != round(value) or value < 1:
             raise ConfigError(
-                f"{self.place(column)}: {self.text(column)} must be a whole number of at least 1"
+                f"{self.location(column)}: {self.text(column)} must be a whole number of at least 1"
             )
         return round(value)
 
@@ -127,7 +127,7 @@ class TableRow:
     def given(self, column: str, value: float | None) -> float:
         """The value of a cell that must not be empty."""
         if value is None:
-            raise ConfigError(f"{self.place(column)}: it is empty; give a value")
+            raise ConfigError(f"{self.location(column)}: it is empty; give a value")
         return value
 
 
@@ -205,19 +205,19 @@ def _read(
     return rows
 
 
-def _cells(place: str, line: str) -> list[str]:
+def _cells(location: str, line: str) -> list[str]:
     try:
         (row,) = csv.reader([line], strict=True)
     except csv.Error:
         raise ConfigError(
-            f"{place}: a double quote is open or out of place; give cells between "
+            f"{location}: a double quote is open or out of place; give cells between "
             "commas, text with commas in quotes"
         ) from None
     return [cell.strip() for cell in row]
 
 
 def _header(
-    place: str,
+    location: str,
     header: list[str],
     columns: Mapping[str, str | None],
     needed: tuple[str, ...],
@@ -227,24 +227,24 @@ def _header(
     for written in header:
         names.append(
             _column(
-                f"{place}, column {written or '(without a name)'}", written, columns
+                f"{location}, column {written or '(without a name)'}", written, columns
             )
         )
         if names[-1] in names[:-1]:
-            raise ConfigError(f"{place}, column {written}: there are two of it")
+            raise ConfigError(f"{location}, column {written}: there are two of it")
     for name in needed:
         if name not in names:
             raise ConfigError(
-                f"{place}: there is no column {_suffixed(name, columns[name])}"
+                f"{location}: there is no column {_suffixed(name, columns[name])}"
             )
     return names
 
 
-def _column(place: str, written: str, columns: Mapping[str, str | None]) -> str:
+def _column(location: str, written: str, columns: Mapping[str, str | None]) -> str:
     if written in columns:
         if columns[written]:
             raise ConfigError(
-                f"{place}: its unit is missing; write {_choices(written, columns)}"
+                f"{location}: its unit is missing; write {_choices(written, columns)}"
             )
         return written
     if written.startswith(TEXT):
@@ -254,20 +254,20 @@ def _column(place: str, written: str, columns: Mapping[str, str | None]) -> str:
     if shown and suffix is not None:
         if UNITS[suffix][1] != UNITS[shown][1]:
             raise ConfigError(
-                f"{place}: {UNITS[suffix][1]}, not {UNITS[shown][1]}; write "
+                f"{location}: {UNITS[suffix][1]}, not {UNITS[shown][1]}; write "
                 f"{_choices(bare, columns)}"
             )
         return bare
     for name, unit in columns.items():  # a unit that there is not
         if unit and written.startswith(f"{name}_"):
             raise ConfigError(
-                f"{place}: no unit known here; write {_choices(name, columns)}"
+                f"{location}: no unit known here; write {_choices(name, columns)}"
             )
     close = difflib.get_close_matches(written, [*_shown(columns), *columns], n=1)
     hint = f"known: {', '.join(_shown(columns))}, and name or note for text"
     if close:
         hint = f"did you mean {close[0]}?"
-    raise ConfigError(f"{place}: unknown; {hint}")
+    raise ConfigError(f"{location}: unknown; {hint}")
 
 
 def _suffixed(name: str, unit: str | None) -> str:

@@ -107,7 +107,7 @@ def sweep_response(
     seconds: float,
     torque: float,
     *,
-    own: dict[int, TabulatedMesh],
+    tabulated: dict[int, TabulatedMesh],
     nodes: Sequence[int],
     n_orders: int,
 ) -> Sweep:
@@ -131,7 +131,7 @@ def sweep_response(
     course = sweep_course(low, high, seconds, torque)
     share = course.speed / machine.engine.reference.speed
     course = replace(course, torque=machine.load_at(torque, share))
-    line = running_line(machine, course, governor=GOVERNOR, own=own)
+    line = running_line(machine, course, governor=GOVERNOR, tabulated=tabulated)
     names = [(kind, line.dof(node)) for kind in ("angle", "speed") for node in nodes]
     names += [("mesh_force", number) for number in range(len(machine.mesh_names))]
     motion = line.run(

@@ -34,12 +34,14 @@ def rows_of_nodes(shafting: list[TableRow]) -> dict[int, TableRow]:
         if number is None:
             if row.text("inertia"):
                 raise ConfigError(
-                    f"{row.place('node')}: it is empty, but the row has an inertia; number the node"
+                    f"{row.location('node')}: it is empty, but the row has an inertia; "
+                    "number the node"
                 )
             continue
         if number in rows:
             raise ConfigError(
-                f"{row.place('node')}: node {number} is there already, in row {rows[number].line}"
+                f"{row.location('node')}: node {number} is there already, "
+                f"in row {rows[number].line}"
             )
         rows[number] = row
     if not rows:
@@ -51,7 +53,7 @@ def rows_of_nodes(shafting: list[TableRow]) -> dict[int, TableRow]:
 
 def node_of(
     row: TableRow,
-    place: int,
+    index: int,
     gears: list[LineGear],
     shapes: list[Gear],
     options: LineOptions,
@@ -61,17 +63,17 @@ def node_of(
     number = row.whole("node")
     inertia = row.positive("inertia")
     if inertia is None:
-        own = [
+        shapes_on_node = [
             shape
             for gear, shape in zip(gears, shapes, strict=True)
-            if gear.node == place
+            if gear.node == index
         ]
-        if not own:
+        if not shapes_on_node:
             raise ConfigError(
-                f"{row.place('inertia')}: it is empty and node {number} has no gear "
+                f"{row.location('inertia')}: it is empty and node {number} has no gear "
                 "to derive it from"
             )
-        inertia = sum(_disc(shape, material)[1] for shape in own)
+        inertia = sum(_disc(shape, material)[1] for shape in shapes_on_node)
     if number == options.viscous_damper_node:
         # Den Hartog, Mechanical Vibrations: at the best damping J + J_ring / 2 meets the fixed
         # point
@@ -79,7 +81,7 @@ def node_of(
     return Node(
         name=row.text("name") or f"node {number}",
         inertia=inertia,
-        place=row.place("inertia"),
+        location=row.location("inertia"),
     )
 
 
@@ -101,7 +103,8 @@ def gear_of(row: TableRow) -> Gear:
     row.given("face_width", row.positive("face_width"))
     if not module > 0.0 or not abs(helix) < 0.5 * math.pi:
         raise ConfigError(
-            f"{row.place('normal_module')}: module must be positive, helix angle below 90 degrees"
+            f"{row.location('normal_module')}: module must be positive, "
+            "helix angle below 90 degrees"
         )
     defaults = {
         "profile_shift": 0.0,
@@ -122,7 +125,7 @@ def gear_of(row: TableRow) -> Gear:
             **defaults | given,  # type: ignore[arg-type]
         )
     except GensigError as error:
-        raise row.error(error, f"{row.place()}: {error}") from None
+        raise row.error(error, f"{row.location()}: {error}") from None
 
 
 def line_gear(
@@ -138,12 +141,12 @@ def line_gear(
     number = round(row.given("node", row.whole("node")))
     if number not in numbers:
         raise ConfigError(
-            f"{row.place('node')}: {options.shafting_csv} has no node {number}"
+            f"{row.location('node')}: {options.shafting_csv} has no node {number}"
         )
     mass = row.positive("mass") or _disc(shape, material)[0]
     support = None
     if options.lateral:
-        support = options.support.under(mass, material)
+        support = options.support.for_gear(mass, material)
     return LineGear(
         name=shape.name,
         node=numbers.index(number),
@@ -162,12 +165,12 @@ def ends_of(row: TableRow, numbers: tuple[int, ...]) -> tuple[int, int] | None:
         for column in ("stiffness", "mesh_stiffness"):
             if row.text(column):
                 raise ConfigError(
-                    f"{row.place(column)}: a stiffness without edge_from, edge_to and edge_kind"
+                    f"{row.location(column)}: a stiffness without edge_from, edge_to and edge_kind"
                 )
         return None
     if kind not in EDGE_KINDS:
         raise ConfigError(
-            f"{row.place('edge_kind')}: '{kind}'; allowed: {', '.join(EDGE_KINDS)}"
+            f"{row.location('edge_kind')}: '{kind}'; allowed: {', '.join(EDGE_KINDS)}"
         )
     first, second = (
         round(row.given(key, end))
@@ -175,9 +178,11 @@ def ends_of(row: TableRow, numbers: tuple[int, ...]) -> tuple[int, int] | None:
     )
     for column, number in (("edge_from", first), ("edge_to", second)):
         if number not in numbers:
-            raise ConfigError(f"{row.place(column)}: there is no node {number}")
+            raise ConfigError(f"{row.location(column)}: there is no node {number}")
     if first == second:
-        raise ConfigError(f"{row.place('edge_to')}: node {first} is joined to itself")
+        raise ConfigError(
+            f"{row.location('edge_to')}: node {first} is joined to itself"
+        )
     return numbers.index(first), numbers.index(second)
 
 
@@ -187,7 +192,7 @@ def shaft_of(row: TableRow, ends: tuple[int, int], losses: LossFactors) -> Shaft
     for column in ("teeth_from", "teeth_to", "mesh_stiffness", "backlash"):
         if row.text(column):
             raise ConfigError(
-                f"{row.place(column)}: that is of a gear_mesh, and edge_kind is {kind}"
+                f"{row.location(column)}: that is of a gear_mesh, and edge_kind is {kind}"
             )
     stiffness = row.positive("stiffness")
     if kind != "rigid":
@@ -200,7 +205,7 @@ def shaft_of(row: TableRow, ends: tuple[int, int], losses: LossFactors) -> Shaft
         rigid=kind == "rigid",
         damping=row.not_negative("damping", 0.0),
         loss_factor=row.not_negative("loss_factor", usual),
-        place=row.place("edge_to"),
+        location=row.location("edge_to"),
     )
 
 
@@ -227,10 +232,10 @@ def mesh_of(
         stiffness = _mesh_stiffness(row, pair)
     except GensigError as error:
         names = f"{gears[driving].name} and {gears[driven].name}"
-        raise row.error(error, f"{row.place('edge_to')}: {names}: {error}") from None
+        raise row.error(error, f"{row.location('edge_to')}: {names}: {error}") from None
     if row.text("damping"):
         raise ConfigError(
-            f"{row.place('damping')}: torsional damping is of shafts; a gear_mesh has "
+            f"{row.location('damping')}: torsional damping is of shafts; a gear_mesh has "
             "its loss_factor"
         )
     return pair, GearMesh(
@@ -241,7 +246,7 @@ def mesh_of(
         backlash=backlash,
         center_line=row.number("center_line") or 0.0,
         pressure_angle=pair.working_pressure_angle,
-        place=row.place("edge_to"),
+        location=row.location("edge_to"),
     )
 
 
@@ -250,7 +255,7 @@ def _mesh_stiffness(row: TableRow, pair: GearPair) -> float:
     torsional, linear = row.positive("stiffness"), row.positive("mesh_stiffness")
     if torsional is not None and linear is not None:
         raise ConfigError(
-            f"{row.place('mesh_stiffness')}: the row has a torsional stiffness too; "
+            f"{row.location('mesh_stiffness')}: the row has a torsional stiffness too; "
             "give one of them"
         )
     if torsional is not None:
@@ -272,45 +277,48 @@ def _gear_at(
     gears: list[LineGear],
     options: LineOptions,
 ) -> int:
-    """Place of the gear on a node that the row means.
+    """Index of the gear on a node that the row means.
 
     ConfigError where the tables contradict each other.
     """
     n_teeth = row.whole(f"teeth_{end}")
-    there = [place for place, gear in enumerate(gears) if gear.node == node]
+    candidates = [index for index, gear in enumerate(gears) if gear.node == node]
     if options.gears_csv is None:
         raise ConfigError(
-            f"{row.place('edge_kind')}: gear_mesh needs a table of gears; give system.gears_csv"
+            f"{row.location('edge_kind')}: gear_mesh needs a table of gears; give system.gears_csv"
         )
-    if not there:
+    if not candidates:
         raise ConfigError(
-            f"{row.place(f'edge_{end}')}: system.gears_csv = {options.gears_csv} has "
+            f"{row.location(f'edge_{end}')}: system.gears_csv = {options.gears_csv} has "
             f"no gear on node {number}"
         )
-    meant = [place for place in there if n_teeth in (None, gears[place].n_teeth)]
-    if not meant:
+    matching = [
+        index for index in candidates if n_teeth in (None, gears[index].n_teeth)
+    ]
+    if not matching:
         has = ", ".join(
-            f"{gears[place].name} with {gears[place].n_teeth}" for place in there
+            f"{gears[index].name} with {gears[index].n_teeth}" for index in candidates
         )
         raise ConfigError(
-            f"{row.place(f'teeth_{end}')}: {n_teeth}, but on node {number} the gears "
+            f"{row.location(f'teeth_{end}')}: {n_teeth}, but on node {number} the gears "
             f"table has {has} teeth"
         )
-    if len(meant) > 1:
+    if len(matching) > 1:
         raise ConfigError(
-            f"{row.place(f'teeth_{end}')}: node {number} has {len(meant)} such gears; "
+            f"{row.location(f'teeth_{end}')}: node {number} has {len(matching)} such gears; "
             "say which by teeth"
         )
-    return meant[0]
+    return matching[0]
 
 
 def check_gears_in_mesh(rows: list[TableRow], line: ShaftLine) -> None:
     """Raise for a gear that no row of the line puts in mesh."""
-    meshing = {place for mesh in line.meshes for place in (mesh.driving, mesh.driven)}
-    for place, row in enumerate(rows):
-        if place not in meshing:
+    meshing = {index for mesh in line.meshes for index in (mesh.driving, mesh.driven)}
+    for index, row in enumerate(rows):
+        if index not in meshing:
             raise ConfigError(
-                f"{row.place('node')}: {line.gears[place].name} meshes with nothing; leave it out"
+                f"{row.location('node')}: {line.gears[index].name} meshes with nothing; "
+                "leave it out"
             )
 
 
@@ -325,7 +333,7 @@ def check_whole(
         )
         plural = "s" * (len(lost) > 1)
         raise ConfigError(
-            f"{rows[lost[0]].place('edge_from')}: nothing joins "
+            f"{rows[lost[0]].location('edge_from')}: nothing joins "
             f"node{plural} {named} to node "
             f"{numbers[0]}: the line falls into {len(line.parts)} parts with a rigid "
             "mode each; join them"
@@ -336,7 +344,7 @@ def check_whole(
             given, ratio, rel_tol=RATIO_TOLERANCE
         ):
             raise ConfigError(
-                f"{row.place('speed_ratio')}: {given:g} contradicts the tooth counts, "
+                f"{row.location('speed_ratio')}: {given:g} contradicts the tooth counts, "
                 f"by which node {number} turns at "
                 f"{ratio:.6g} of node {numbers[0]}"
             )

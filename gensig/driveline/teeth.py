@@ -92,7 +92,7 @@ def require_drive(pair: GearPair, slices: SliceOptions) -> None:
 def sound_meshes(
     machine: EngineLine, law: ToothLaw, forces: Array, *, left_out: Collection[int] = ()
 ) -> dict[int, TabulatedMesh]:
-    """Sound teeth of the meshes by their place, each under its mean force of ``forces`` (mesh,) N.
+    """Sound teeth of the meshes by their index, each under its mean force of ``forces`` (mesh,) N.
 
     Helical meshes only with ``system.helical_meshes=sliced``; those of ``left_out`` are left out.
     """
@@ -128,7 +128,7 @@ def _table_in_line(
 def neighbours(drive: DriveLine, number: int) -> dict[int, tuple[int, int]]:
     """Other meshes of the two gears of a mesh.
 
-    By place, the side of the gear in this mesh and in the other one.
+    By index, the side of the gear in this mesh and in the other one.
     """
     meshes_of = {}
     followed = drive.line.meshes[number]
@@ -152,7 +152,7 @@ def neighbour_meshes(
     turned: float,
 ) -> dict[int, TabulatedMesh]:
     """The other meshes of the two gears of a mesh with what these gears have, sound or not, by
-    their place.
+    their index.
 
     A gear that drives in both meshes, or is driven in both, is met on the same flanks: its faults
     and errors come along, but for misalignment, which is a pair's. Else its other flanks are met,
@@ -195,7 +195,7 @@ def tooth_there(
     """The tooth of a gear that is in place in another of its meshes when ``turned`` rad of the
     first node.
 
-    ``here``, ``there`` are the place of a mesh and the gear's side in it, 0 driving and 1 driven.
+    ``here``, ``there`` are the index of a mesh and the gear's side in it, 0 driving and 1 driven.
     """
     n_teeth = _gears(drive.pairs[here[0]])[here[1]].n_teeth
     angle = tooth_angle(
@@ -215,8 +215,8 @@ def tooth_there(
     number, pair = there[0], drive.pairs[there[0]]
     # where the line says that a tooth is; play and profile shift move it by some hundredths of a
     # pitch
-    in_place = float(start_rolls(drive, turned)[number]) / pair.base_pitch
-    return round(tooth + phase - in_place) % n_teeth
+    rolled = float(start_rolls(drive, turned)[number]) / pair.base_pitch
+    return round(tooth + phase - rolled) % n_teeth
 
 
 def _gears(pair: GearPair) -> tuple:

@@ -53,13 +53,13 @@ def life_map(
             )
     torque = np.unique(np.asarray(torques, dtype=np.float64))
     speed = np.unique(np.asarray(speeds, dtype=np.float64))
-    turns = np.array([_life_under(case, float(value)) for value in torque])
+    turns = np.array([_life_at(case, float(value)) for value in torque])
     return LifeMap(torque=torque, speed=speed, turns=turns)
 
 
-def _life_under(case: WearCase, torque: float) -> float:
+def _life_at(case: WearCase, torque: float) -> float:
     try:
-        return wear_life(case.under(torque)).life
+        return wear_life(case.with_torque(torque)).life
     except (ConfigError, SimulationError) as error:
         raise type(error)(f"at {torque:g} N m of the map: {error}") from None
 
@@ -67,7 +67,7 @@ def _life_under(case: WearCase, torque: float) -> float:
 def torque_exponent(case: WearCase) -> float:
     """Local exponent n of life ~ T^-n at the case's torque."""
     steps = (1.0 - EXPONENT_STEP, 1.0 + EXPONENT_STEP)
-    low, high = (wear_life(case.under(case.torque * step)).life for step in steps)
+    low, high = (wear_life(case.with_torque(case.torque * step)).life for step in steps)
     return -math.log(high / low) / math.log(steps[1] / steps[0])
 
 
@@ -164,16 +164,16 @@ def fitted_laws(lives: LifeMap, torque: float, speed: float) -> tuple[FittedLaw,
     constant, by_torque, by_speed = fit
     slope, level = np.polyfit(np.log(lives.torque), values[:, at_speed], 1)
     decay, start = np.polyfit(lives.speed, np.log(values[at_torque]), 1)
-    one_torque = replace(lives, torque=lives.torque[[at_torque]])
-    one_speed = replace(lives, speed=lives.speed[[at_speed]])
+    at_single_torque = replace(lives, torque=lives.torque[[at_torque]])
+    at_single_speed = replace(lives, speed=lives.speed[[at_speed]])
     power = (math.exp(constant), by_torque, by_speed)
     return (
         _law("power", power, lives, values),
-        _law("logarithm", (level, -slope, 0.0), one_speed, values[:, [at_speed]]),
+        _law("logarithm", (level, -slope, 0.0), at_single_speed, values[:, [at_speed]]),
         _law(
             "exponential",
             (math.exp(start), -decay, 0.0),
-            one_torque,
+            at_single_torque,
             values[[at_torque]],
         ),
     )

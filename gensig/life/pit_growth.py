@@ -69,9 +69,9 @@ class PitGrowth(GrowthLaw):
 
     Parameters
     ----------
-    torques : (torque,) N m         of the pinion, ascending, at which ``stress_at_one`` is known;
+    torques : (torque,) N m         of the pinion, ascending, at which ``unit_stress`` is known;
         one where it does not matter
-    stress_at_one : (torque,) Pa    contact stress at 1 N m; it goes with the root of the torque
+    unit_stress : (torque,) Pa    contact stress at 1 N m; it goes with the root of the torque
     first_diameter : float   median diameter of the first pits, m
     spread_area : float      mean area of a pit over that of one of median diameter
     area : float             of a flank, m2
@@ -81,17 +81,17 @@ class PitGrowth(GrowthLaw):
     sizes: Array
     meshes: float
     torques: Array
-    stress_at_one: Array
+    unit_stress: Array
     first_diameter: float
     spread_area: float
     area: float
 
     def rate(self, size: Array, torque: float) -> Array:
         """Damage a turn of the pinion, (size,): Miner's sum (ISO 6336-6)."""
-        at_one = float(
-            np.interp(math.log(torque), np.log(self.torques), self.stress_at_one)
+        unit_stress = float(
+            np.interp(math.log(torque), np.log(self.torques), self.unit_stress)
         )
-        stress = at_one * math.sqrt(torque)
+        stress = unit_stress * math.sqrt(torque)
         options = self.options
         lasting = options.cycles * (options.strength / stress) ** options.exponent
         return np.full(np.shape(size), self.meshes / lasting)
@@ -165,7 +165,7 @@ def pit_growth(
         sizes=np.array([0.0, 1.0]),
         meshes=pair.speed_ratio(pits.gear),
         torques=torques,
-        stress_at_one=stress / np.sqrt(torques),
+        unit_stress=stress / np.sqrt(torques),
         first_diameter=pits.pit_diameter * first,
         spread_area=math.exp(2.0 * pits.diameter_scatter**2),
         area=flank_area(pair.gears[pits.gear]),

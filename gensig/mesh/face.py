@@ -35,7 +35,7 @@ def slice_gaps(tooth: Tooth, curvature_radius: Array, relative_radius: Array) ->
     """
     base = tooth.gear.base_radius
     arc = tooth.profile.curvature_radius**2 / (2.0 * base)
-    different, first, place = np.unique(
+    different, first, inverse = np.unique(
         curvature_radius, return_index=True, return_inverse=True
     )
     center, relative_radius = different**2 / (2.0 * base), relative_radius[first]
@@ -55,7 +55,7 @@ def slice_gaps(tooth: Tooth, curvature_radius: Array, relative_radius: Array) ->
         beyond = np.maximum(np.maximum(center - arc[-1], arc[0] - center), 0.0)
         uneven = envelope(shapes) - beyond**2 / (2.0 * relative_radius)
         gap[~even] = uneven[which] + moved
-    return gap[:, place]
+    return gap[:, inverse]
 
 
 def _shapes(standing_back: Array) -> tuple[Array, NDArray[np.int64], Array]:
@@ -69,9 +69,9 @@ def _shapes(standing_back: Array) -> tuple[Array, NDArray[np.int64], Array]:
         known.setdefault(row.tobytes(), len(known))
         for row in np.round(standing_back - moved, SHAPE_DECIMALS)
     ]
-    place = np.array(which, dtype=np.int64)
-    first = np.unique(place, return_index=True)[1]
-    return standing_back[first] - moved[first], place, moved
+    shape_of_row = np.array(which, dtype=np.int64)
+    first = np.unique(shape_of_row, return_index=True)[1]
+    return standing_back[first] - moved[first], shape_of_row, moved
 
 
 def face_contact(

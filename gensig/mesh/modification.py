@@ -108,8 +108,9 @@ class FlankModification:
             depth += self.root_relief * share**power
         return depth
 
-    def lead(self, place: Array, face_width: float) -> Array:
-        """Depth across the face, (slice,) m; ``place`` (slice,) m from the end that enters first.
+    def lead(self, face_position: Array, face_width: float) -> Array:
+        """Depth across the face, (slice,) m; ``face_position`` (slice,) m counts from the
+        end that enters first.
 
         Raises
         ------
@@ -120,10 +121,13 @@ class FlankModification:
                 f"end_relief_width_mm = {self.end_relief_width * 1e3:g} at both ends overlaps on "
                 f"a face of {face_width * 1e3:g} mm; reduce it to at most half"
             )
-        from_middle = 2.0 * place / face_width - 1.0
-        depth = self.crowning * from_middle**2 + self.helix_slope * place / face_width
+        from_middle = 2.0 * face_position / face_width - 1.0
+        depth = (
+            self.crowning * from_middle**2
+            + self.helix_slope * face_position / face_width
+        )
         if self.end_relief:
-            from_end = np.minimum(place, face_width - place)
+            from_end = np.minimum(face_position, face_width - face_position)
             share = np.maximum(1.0 - from_end / self.end_relief_width, 0.0)
             depth = depth + self.end_relief * share
         return depth
@@ -154,19 +158,19 @@ class PairModification:
             for side in self.sides.values()
         )
 
-    def deviation(self, pair: GearPair, position: Array, place: Array) -> Array:
+    def deviation(self, pair: GearPair, position: Array, face_position: Array) -> Array:
         """Deviation of both flanks together where they meet, (slice, node) m, at least 0.
 
         Parameters
         ----------
         position : (node,) m    on the path of contact, from A; beyond it the nearest end counts
-        place : (slice,) m      from the end that enters first
+        face_position : (slice,) m    from the end that enters first
         """
         on_path = np.clip(position, 0.0, pair.path_of_contact)
         profiles = [
             self.profile(pair, side, pair.curvature(side, on_path)) for side in SIDES
         ]
-        return sum(profiles) + self.lead(pair, place)[:, None]
+        return sum(profiles) + self.lead(pair, face_position)[:, None]
 
     def profile(self, pair: GearPair, name: str, curvature_radius: Array) -> Array:
         """Depth over the profile of the gear of that name, (point,) m.
@@ -177,11 +181,13 @@ class PairModification:
         start = pair.curvature(name, lowest[name])
         return self.sides[name].profile(pair.gears[name], curvature_radius, start)
 
-    def lead(self, pair: GearPair, place: Array) -> Array:
+    def lead(self, pair: GearPair, face_position: Array) -> Array:
         """Depth of both gears together across the face, (slice,) m, at least 0."""
         width = pair.face_width
-        gears = self.pinion.lead(place, width) + self.wheel.lead(place, width)
-        lead = gears + self.misalignment * place / width
+        gears = self.pinion.lead(face_position, width) + self.wheel.lead(
+            face_position, width
+        )
+        lead = gears + self.misalignment * face_position / width
         return np.asarray(lead - min(float(lead.min()), 0.0))
 
 

@@ -170,8 +170,8 @@ def _structure_at_nodes(
 
     Most nodes are held at A or E.
     """
-    different, place = np.unique(curvature, return_inverse=True)
-    return structural_compliance(tooth, different, material, options)[place]
+    different, inverse = np.unique(curvature, return_inverse=True)
+    return structural_compliance(tooth, different, material, options)[inverse]
 
 
 def structural_compliance(
@@ -249,13 +249,13 @@ def slice_bending(
     if options.bending == "whole":
         return np.zeros_like(position)
     clipped = np.clip(position, 0.0, pair.path_of_contact)
-    on_path, place = np.unique(clipped, return_inverse=True)
+    on_path, inverse = np.unique(clipped, return_inverse=True)
     in_plane = material.in_plane(options.elasticity)
     both = np.zeros_like(on_path)
     for side, gear in pair.gears.items():
         tooth, curvature = healthy_tooth(gear), pair.curvature(side, on_path)
         both += tooth_compliance(tooth, curvature, in_plane, reach=options.tooth).total
-    return both[place]
+    return both[inverse]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -275,7 +275,7 @@ class FlankSide:
     load: Array
     base: Array
 
-    def under(self, load: Array | float) -> FlankSide:
+    def with_load(self, load: Array | float) -> FlankSide:
         """This flank under another load of a tooth pair in N, (phase,) or one number."""
         loads = np.empty_like(self.curvature)
         loads[:] = load
@@ -329,7 +329,7 @@ def flank_sides(
             share=share,
             load=np.empty(0),
             base=np.empty(0),
-        ).under(load)
+        ).with_load(load)
         for side, reach, share in zip(SIDES, beyond_tip, shares, strict=True)
     }
 
@@ -345,7 +345,7 @@ def _gear_table(
 
     Teeth that are one object share a row, equal structures are computed once.
     """
-    flank, options = sound.flanks[side].under(load), sound.options
+    flank, options = sound.flanks[side].with_load(load), sound.options
     distinct, kind = distinct_teeth(sound_tooth, teeth)
     structures = {_structure_key(sound_tooth): sound.structure[side]}
     compliance: Array = np.empty((len(distinct), len(sound.position)))

@@ -72,10 +72,10 @@ def _crack_compliance(
     through = intensity**2 / (material.youngs_modulus * gear.face_width)
     if len(depth) == 1:
         return through[0]
-    own = tooth_compliance(
+    compliance = tooth_compliance(
         tooth, curvature_radius, material, reach="to_centreline", papers_crack=False
     ).total
-    return _side_by_side(own, through)
+    return _side_by_side(compliance, through)
 
 
 def basis(depth: Array, angle: float, slope: float) -> Array:
@@ -125,7 +125,7 @@ def _require_checked(
         )
 
 
-def _side_by_side(own: Array, through: Array) -> Array:
+def _side_by_side(compliance: Array, through: Array) -> Array:
     """Compliance of parallel strips, each in series with its crack, less the sound tooth, (phase,).
 
     The strips share their deflection at the load as far as the tooth holds them together. Its
@@ -133,5 +133,5 @@ def _side_by_side(own: Array, through: Array) -> Array:
     three-dimensional finite elements of cracks over a quarter and half of the face
     (``tests/reference``), within 9 % of them.
     """
-    together = TOGETHER * own
+    together = TOGETHER * compliance
     return 1.0 / np.mean(1.0 / (together + through), axis=0) - together

@@ -121,13 +121,13 @@ def override_keys(overrides: Sequence[str]) -> dict[str, str]:
         if override.is_sweep_override():
             raise ConfigError(
                 f"{override.input_line}: several values need -m (one data set for "
-                f"each){_one_value(override)}"
+                f"each){_list_hint(override)}"
             )
         keys[str(override.key_or_group)] = override.get_value_element_as_str()
     return keys
 
 
-def _one_value(override: Any) -> str:
+def _list_hint(override: Any) -> str:
     """A hint where several values were meant as one: a decimal comma, a list without brackets."""
     key, text = str(override.key_or_group), str(override.input_line).partition("=")[2]
     parts = [part.strip() for part in text.split(",")]

@@ -21,7 +21,7 @@ from gensig.errors import ConfigError
 from gensig.units import split_unit
 
 PRIMARY = ("generate", "train")
-OWN = "configs"  # default folder of a user's options
+USER_FOLDER = "configs"  # default folder of a user's options
 # suffix of a key -> unit as engineers write it; other suffixes are units already
 WRITTEN = {
     "mpa_sqrt_m": "MPa sqrt(m)",
@@ -279,7 +279,7 @@ def option_keys(
     return list(result.values())
 
 
-def chosen_beside(
+def chosen_options(
     group: str, option: str, config_dir: str | Path | None = None
 ) -> dict[str, str]:
     """Options of other groups that an option chooses, with those that it builds on."""
@@ -287,7 +287,7 @@ def chosen_beside(
     result: dict[str, str] = {}
     for entry in file.defaults():
         if entry.group is None and entry.option != "_self_":
-            result |= chosen_beside(group, entry.option, config_dir)
+            result |= chosen_options(group, entry.option, config_dir)
     for entry in file.defaults():
         if entry.group is not None and entry.group.startswith("override /"):
             result[entry.group.removeprefix("override /")] = str(entry.option)
@@ -315,9 +315,12 @@ def _option_keys(
 
 def elsewhere(group: str, option: str) -> str | None:
     """Hint for an option in the folder where gensig new writes, which was not named."""
-    if not (Path(OWN) / group / f"{option}.yaml").is_file():
+    if not (Path(USER_FOLDER) / group / f"{option}.yaml").is_file():
         return None
-    return f"it is in ./{OWN}: add --config-dir {OWN}, in Python config_dir='{OWN}'"
+    return (
+        f"it is in ./{USER_FOLDER}: add --config-dir {USER_FOLDER}, "
+        f"in Python config_dir='{USER_FOLDER}'"
+    )
 
 
 def _find(group: str, option: str, config_dir: str | Path | None) -> _File:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dataset.distributions import Distribution
-from gensig.dataset.plan import Plan, record_ids, shard_places
+from gensig.dataset.plan import Plan, record_ids, shard_rows
 from gensig.dataset.schema import SCALES, SIGNALS
 from gensig.errors import ConfigError
 from gensig.faults.base import faulty_teeth
@@ -324,7 +324,7 @@ def _as_plan(config: Configuration, rows: list[dict[str, Any]]) -> Plan:
     A parameter that a record has not is NaN. The rows are emptied: nothing is held twice.
     """
     names = dict.fromkeys(itertools.chain(*rows))
-    shard, number = shard_places(len(rows), records_per_shard(config))
+    shard, number = shard_rows(len(rows), records_per_shard(config))
     columns: dict[str, Any] = {"record_id": record_ids(len(rows))}
     columns |= {"shard": shard, "row": number}
     for name in names:

@@ -104,9 +104,9 @@ class FaultPairs:
         """Speeds times torques."""
         return len(self.speeds_rpm) * len(self.torques_nm)
 
-    def cell(self, place: int) -> PairCell:
+    def cell(self, index: int) -> PairCell:
         """Simulate one cell; cells are numbered speed by speed, torques fastest."""
-        rows = self.rows[place * self.n_units : (place + 1) * self.n_units]
+        rows = self.rows[index * self.n_units : (index + 1) * self.n_units]
         sound, faulty = _contrasts(self.config, rows)
         motions = simulate_motions([*sound, *faulty])
         n_samples = round(self.duration * self.sampling_rate)

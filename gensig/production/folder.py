@@ -247,7 +247,7 @@ def write_shard(out: Path, shard_index: int) -> WrittenShard:
     with writer:
         for first in range(0, n_records, together):
             rows = plan.records(begin + first, min(together, n_records - first))
-            _check_places(out, rows, shard_index, first)
+            _check_rows(out, rows, shard_index, first)
             for row, record in enumerate(simulate_records(config, rows), start=first):
                 writer.write(row, record.signals, record.values)
     written = WrittenShard(
@@ -270,7 +270,7 @@ def _folder_inputs(
     )
 
 
-def _check_places(
+def _check_rows(
     out: Path, rows: Sequence[Mapping[str, Any]], shard_index: int, first: int
 ) -> None:
     if any(

@@ -20,7 +20,12 @@ from gensig.production.folder import block_length, open_shard
 from gensig.record.simulate import Record, forget_twins, simulate_records
 
 # Bytes of index, cards and configuration; more for each shard, record (splits) and class (figure).
-BESIDE, BESIDE_A_SHARD, BESIDE_A_RECORD, BESIDE_A_CLASS = 42_000, 3_000, 380, 40_000
+OTHER_BYTES, BYTES_PER_SHARD, BYTES_PER_RECORD, BYTES_PER_CLASS = (
+    42_000,
+    3_000,
+    380,
+    40_000,
+)
 
 CLOSING = 2.0  # s for index, cards and figures, most of it the import of matplotlib
 
@@ -88,9 +93,9 @@ def predict(
 
 def _warn_of_failed(records: Sequence[Record]) -> None:
     reasons = [
-        str(one.values["status_reason"])
-        for one in records
-        if one.values.get("status") == "failed"
+        str(record.values["status_reason"])
+        for record in records
+        if record.values.get("status") == "failed"
     ]
     if reasons:
         warnings.warn(
@@ -122,16 +127,16 @@ def _stored_bytes(config: Configuration, table: Plan, records: list[Record]) -> 
                 for row, record in enumerate(records[:n]):
                     writer.write(row, record.signals, record.values)
             sizes.append(writer.n_bytes)
-    one, many = sizes
-    per_record: float = one
+    single, many = sizes
+    per_record: float = single
     if len(records) > 1:
-        per_record = (many - one) / (len(records) - 1)
-    shards = table.n_shards * (one - per_record) + table.n_records * per_record
+        per_record = (many - single) / (len(records) - 1)
+    shards = table.n_shards * (single - per_record) + table.n_records * per_record
     n_classes = len(config["plan"]["classes"])
-    beside = (
-        BESIDE
-        + BESIDE_A_SHARD * table.n_shards
-        + BESIDE_A_RECORD * table.n_records
-        + BESIDE_A_CLASS * n_classes
+    other = (
+        OTHER_BYTES
+        + BYTES_PER_SHARD * table.n_shards
+        + BYTES_PER_RECORD * table.n_records
+        + BYTES_PER_CLASS * n_classes
     )
-    return round(shards + len(plan_text(table)) + beside)
+    return round(shards + len(plan_text(table)) + other)

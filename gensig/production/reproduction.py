@@ -165,27 +165,27 @@ def _difference(
     folder: Path, row: Mapping[str, Any], record: Record
 ) -> tuple[float, float]:
     """Largest difference of a sample over the RMS of its channel, and one count on that scale."""
-    path, place = shard_path(folder, int(row["shard"])), int(row["row"])
+    path, position = shard_path(folder, int(row["shard"])), int(row["row"])
     largest, count = 0.0, 0.0
     with open_shard(path, folder=folder) as file:
-        failed = str(read_rows(file["status"])[place]) == "failed"
+        failed = str(read_rows(file["status"])[position]) == "failed"
         if failed != (record.values.get("status") == "failed"):
             return np.inf, 0.0
         if failed:
             made_reason = without_numbers(stored_reason(record.values["status_reason"]))
-            reason = str(read_rows(file["status_reason"])[place])
+            reason = str(read_rows(file["status_reason"])[position])
             if made_reason != without_numbers(reason):
                 return np.inf, 0.0
             return 0.0, 0.0
         for name, scale_name in SCALES.items():
             if name not in file:
                 continue
-            stored, made = read_signal(file, name, place), record.signals[name]
+            stored, made = read_signal(file, name, position), record.signals[name]
             if file[name].dtype.kind == "i":
                 counts, scale = quantized(made)
                 wide = np.multiply(counts, scale[:, None], dtype=np.float64)
                 made = wide.astype(np.float32)
-                stored_scale = np.asarray(file[scale_name][place])
+                stored_scale = np.asarray(file[scale_name][position])
                 count = float(np.max(stored_scale / _rms(stored)))
             if _sha256(stored) != _sha256(made):
                 wide = stored.astype(np.float64)
@@ -193,7 +193,7 @@ def _difference(
                 largest = max(largest, float(difference))
         for name, values in record.signals.items():
             if name in file and name not in SCALES:
-                largest = max(largest, _other_difference(file[name][place], values))
+                largest = max(largest, _other_difference(file[name][position], values))
     return largest, count
 
 

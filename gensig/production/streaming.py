@@ -136,9 +136,9 @@ class RecordStream:
                 rows[subset].append((indices[name], float(start), float(stop)))
         return rows
 
-    def take(self, places: ArrayLike) -> RecordStream:
+    def take(self, records: ArrayLike) -> RecordStream:
         """Some records of this part: (record,) indices in it, or True for each chosen one."""
-        chosen = np.asarray(places)
+        chosen = np.asarray(records)
         if chosen.dtype != bool:
             chosen = chosen.astype(np.int64)
         return replace(self, numbers=self.numbers[chosen])
@@ -176,8 +176,8 @@ class RecordStream:
         for first in range(0, len(self), together):
             yield from self._records(self.numbers[first : first + together])
 
-    def __getitem__(self, place: int) -> Record:
-        return self._records([self.numbers[operator.index(place)]])[0]
+    def __getitem__(self, index: int) -> Record:
+        return self._records([self.numbers[operator.index(index)]])[0]
 
     def __repr__(self) -> str:
         share = f"{len(self)} of {self.plan.n_records} records"

@@ -157,7 +157,9 @@ class RecordInputs:
         noisy, clipped = self.instrument.record(
             clean, noise_power, self.stream(Stream.NOISE)
         )
-        received, dropped = self.instrument.sent(noisy, self.stream(Stream.DROPPED))
+        received, dropped = self.instrument.transmitted(
+            noisy, self.stream(Stream.DROPPED)
+        )
         sensor = self.instrument.sensing.sensor
         too_many = int(sensor is not None and clipped > sensor.max_clipped_fraction)
         return received, {
@@ -176,7 +178,7 @@ class RecordInputs:
         drift, noise, dropped = self.stream(Stream.HEALTHY_TWIN).spawn(3)
         drifted = clean * self.instrument.drift(clean.shape[1], drift)
         noisy, _ = self.instrument.record(drifted, noise_power, noise)
-        return self.instrument.sent(noisy, dropped)[0]
+        return self.instrument.transmitted(noisy, dropped)[0]
 
     def shaft_signals(self, record: CleanRecord | None) -> dict[str, NDArray[Any]]:
         """Signals of the sensors on the shafts, as far as they are stored.

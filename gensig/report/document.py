@@ -93,23 +93,23 @@ def report_text(data: Dataset, per_class: int | None) -> tuple[str, str]:
     chosen = choose(data, per_class)
     rotation = read_rotation(data)
     units = dict(zip(data.channel_names, tables.channel_units(data), strict=True))
-    own_units = [units[name] for name in chosen.channels]
+    channel_units = [units[name] for name in chosen.channels]
     drawn = some_records(data, MOST_ROWS)
     measured = measure(data, rotation, chosen.channels, _further)
-    compared = compare_with_measurements(data, measured, own_units)
-    content = _content(data, chosen, rotation, own_units, drawn, measured, compared)
+    compared = compare_with_measurements(data, measured, channel_units)
+    content = _content(data, chosen, rotation, channel_units, drawn, measured, compared)
     name = plain(data.folder.resolve().name)
     n_shown = sum(len(records) for records in chosen.records.values())
     sections = [
         *tables.contents(data),
         _signals(data, chosen, rotation, content["examples"]),
         _parameters(data, content["drawn"]),
-        _indicators(data, chosen, measured, content["measured"], own_units),
+        _indicators(data, chosen, measured, content["measured"], channel_units),
     ]
     if "lives" in content:
         sections.append(_lives(content["lives"]))
     sections += [
-        _beside(compared, own_units),
+        _comparisons(compared, channel_units),
         tables.splits(data),
         *tables.loading(data),
         *tables.provenance(data),
@@ -380,7 +380,7 @@ def _lives(table: dict[str, Any]) -> Section:
     )
 
 
-def _beside(compared: Sequence[Comparison], units: Sequence[str]) -> Section:
+def _comparisons(compared: Sequence[Comparison], units: Sequence[str]) -> Section:
     section = tables.measured_table(compared, units)
     if not compared:
         return section

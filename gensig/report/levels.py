@@ -96,11 +96,11 @@ def _medians(
         (
             name,
             channel,
-            float(np.nanmedian(rms[mine, place])),
-            float(np.nanmedian(velocity[mine, place])),
+            float(np.nanmedian(rms[mine, column])),
+            float(np.nanmedian(velocity[mine, column])),
         )
         for name in data.class_names
         if (mine := label == name).any()
-        for place, channel in enumerate(channels)
-        if units[place] == "m/s^2"
+        for column, channel in enumerate(channels)
+        if units[column] == "m/s^2"
     ]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dataset.reader import Dataset
-from gensig.report.realism import Comparison, Place, compare, read_ranges
+from gensig.report.realism import Comparison, RangeKey, compare, read_ranges
 from gensig.report.values import Measured
 from gensig.signals.indicators import kurtosis, rms
 from gensig.signals.resampling import rate_change
@@ -49,7 +49,7 @@ def compare_with_measurements(
         return []
     values = {name: of[:, shown] for name, of in measured.further.items()}
     label = data.column("label_name")[measured.records]
-    result: dict[Place, FloatArray] = {}
+    result: dict[RangeKey, FloatArray] = {}
     for name in data.class_names:
         mine = label == name
         for at in (ALL, ELSEWHERE):
@@ -57,16 +57,16 @@ def compare_with_measurements(
     result |= _ratios(data, measured, values)
     ranges = read_ranges()
     compared = [
-        compare(ranges[place], of)
-        for place, of in result.items()
-        if place in ranges and np.isfinite(of).any()
+        compare(ranges[key], of)
+        for key, of in result.items()
+        if key in ranges and np.isfinite(of).any()
     ]
-    return [one for one in compared if one.low is not None or one.high is not None]
+    return [row for row in compared if row.low is not None or row.high is not None]
 
 
 def _ratios(
     data: Dataset, measured: Measured, values: dict[str, FloatArray]
-) -> dict[Place, FloatArray]:
+) -> dict[RangeKey, FloatArray]:
     """Faulty record over sound one of another set of gears, in one gearbox at one set-point."""
     records = measured.records
     if "speed_set_rpm" not in data.column_names:
@@ -81,7 +81,7 @@ def _ratios(
     sound: dict[tuple[object, ...], list[int]] = defaultdict(list)
     for row in np.flatnonzero(label == "healthy").tolist():
         sound[condition[row]].append(row)
-    result: dict[Place, list[FloatArray]] = defaultdict(list)
+    result: dict[RangeKey, list[FloatArray]] = defaultdict(list)
     for row in np.flatnonzero(label != "healthy").tolist():
         for other in sound[condition[row]]:
             if specimen[row] != specimen[other]:

@@ -30,11 +30,11 @@ INSIDE, OVERLAPS, MISSES, WITHOUT, NOTHING = (
     "no range",
     "no value",
 )
-TOLD, NOT_TOLD = "told apart", "not told apart"
-VERDICTS = (INSIDE, OVERLAPS, MISSES, WITHOUT, NOTHING, TOLD, NOT_TOLD)
+APART, NOT_APART = "told apart", "not told apart"
+VERDICTS = (INSIDE, OVERLAPS, MISSES, WITHOUT, NOTHING, APART, NOT_APART)
 RECORDING = "recording"  # ids that begin so belong to the second table
 
-Place = tuple[str, str]  # id, at
+RangeKey = tuple[str, str]  # id, at
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,7 +78,7 @@ class Comparison(Range):
             )
 
     @property
-    def place(self) -> Place:
+    def key(self) -> RangeKey:
         """The key of a row: its id and its conditions."""
         return self.id, self.at
 
@@ -130,7 +130,7 @@ def compare(measured: Range, values: ArrayLike) -> Comparison:
     )
 
 
-def read_ranges(path: Path = RANGES) -> dict[Place, Range]:
+def read_ranges(path: Path = RANGES) -> dict[RangeKey, Range]:
     """The measured ranges, by id and conditions, in the order of the file."""
     with path.open(encoding="utf-8", newline="") as file:
         rows = [Range(**_read(line, ("low", "high"))) for line in csv.DictReader(file)]
@@ -139,9 +139,9 @@ def read_ranges(path: Path = RANGES) -> dict[Place, Range]:
 
 def write_results(path: Path, heading: str, rows: Sequence[Comparison]) -> None:
     """Store comparisons below a heading of one line; reasons of a former file stay."""
-    reasons: dict[Place, str] = {}
+    reasons: dict[RangeKey, str] = {}
     if path.exists():
-        reasons = {row.place: row.reason for row in read_results(path)[1]}
+        reasons = {row.key: row.reason for row in read_results(path)[1]}
     names = [field.name for field in fields(Comparison)]
     with path.open("w", encoding="utf-8", newline="") as file:
         file.write(f"# {' '.join(heading.split())}\n")
@@ -149,7 +149,7 @@ def write_results(path: Path, heading: str, rows: Sequence[Comparison]) -> None:
         writer.writeheader()
         for row in rows:
             values = asdict(row)
-            values["reason"] = row.reason or reasons.get(row.place, "")
+            values["reason"] = row.reason or reasons.get(row.key, "")
             writer.writerow({name: _written(value) for name, value in values.items()})
 
 

@@ -154,7 +154,7 @@ def splits(data: Dataset) -> Section:
     return Section(title="Splits", text=text, table=table, notes=left_out)
 
 
-def measured_table(found: Sequence[Comparison], units: Sequence[str]) -> Section:
+def measured_table(compared: Sequence[Comparison], units: Sequence[str]) -> Section:
     """Values of the set with measured ranges, or the reason why there are none."""
     text = [
         "Central 90 % of this set's values beside ranges of published recordings of a "
@@ -163,7 +163,7 @@ def measured_table(found: Sequence[Comparison], units: Sequence[str]) -> Section
         'those of the band up to 2.5 kHz; "elsewhere" is not slow and light, here all '
         "records."
     ]
-    if not found:
+    if not compared:
         reason = "it has none of their quantities"
         if "m/s^2" not in units:
             reason = "no channel is an acceleration in m/s^2"
@@ -179,7 +179,7 @@ def measured_table(found: Sequence[Comparison], units: Sequence[str]) -> Section
             f"{item.n}",
             item.verdict,
         )
-        for item in found
+        for item in compared
     ]
     head = (
         "quantity",
@@ -213,8 +213,8 @@ def provenance(data: Dataset) -> list[Section]:
         if value
     ]
     files = [
-        (f"shards/{plain(one.name)}", f"{one.rows}", one.sha256)
-        for one in manifest.shards[:MANY_SHARDS]
+        (f"shards/{plain(shard.name)}", f"{shard.rows}", shard.sha256)
+        for shard in manifest.shards[:MANY_SHARDS]
     ]
     files += [(plain(name), "", digest) for name, digest in manifest.files.items()]
     text = ["As the manifest has them; gensig verify compares them with the files."]

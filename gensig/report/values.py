@@ -192,7 +192,7 @@ def life_table(data: Dataset) -> dict[str, Any]:
     lives = names[np.sort(first)].tolist()
     n_each = data.n_records / max(len(lives), 1)
     shown = lives[: max(int(MOST_ROWS / max(n_each, 1.0)), 1)]
-    number = {name: place for place, name in enumerate(shown)}
+    number = {name: index for index, name in enumerate(shown)}
     usable = np.flatnonzero(data.usable & np.isin(names, shown))
     order = np.array([number[name] for name in names[usable].tolist()], dtype=float)
     usable = usable[np.lexsort((data.column("life_time_h")[usable], order))]

@@ -55,25 +55,25 @@ class Encoder:
 class Disc:
     """Disc of one gearbox.
 
-    ``index`` rad is the angle of the gear at which the encoder reads 0. ``places`` (line,) rad
-    are the angles after it at which the lines pass. Nominally they are 0, 1, 2, ... times the
-    spacing; errors may move them beyond either end of a turn.
+    ``index`` rad is the angle of the gear at which the encoder reads 0. ``line_angles`` (line,)
+    rad are the angles after it at which the lines pass. Nominally they are 0, 1, 2, ... times
+    the spacing; errors may move them beyond either end of a turn.
     """
 
     index: float
-    places: Array
+    line_angles: Array
 
     def read(self, angle: Array, *, quantised: bool) -> Array:
         """Reading, (sample,) rad from the index, at an angle of the gear, (sample,) rad."""
-        n_lines = len(self.places)
-        places = np.concatenate(
-            [self.places + turn * 2.0 * math.pi for turn in (-1.0, 0.0, 1.0)]
+        n_lines = len(self.line_angles)
+        line_angles = np.concatenate(
+            [self.line_angles + turn * 2.0 * math.pi for turn in (-1.0, 0.0, 1.0)]
         )
         turns = np.floor((angle - self.index) / (2.0 * math.pi))
         within = angle - self.index - 2.0 * math.pi * turns
-        number = np.searchsorted(places, within, side="right") - 1.0
+        number = np.searchsorted(line_angles, within, side="right") - 1.0
         if not quantised:
-            number = np.interp(within, places, np.arange(3.0 * n_lines))
+            number = np.interp(within, line_angles, np.arange(3.0 * n_lines))
         return 2.0 * math.pi * (turns + (number - n_lines) / n_lines)
 
 
@@ -99,5 +99,7 @@ def draw_lines(
     scatter = np.clip(rng.standard_normal(n_lines), -WIDEST, WIDEST)
     return Disc(
         index=float(index),
-        places=nominal + amplitude * np.sin(nominal + direction) + line_error * scatter,
+        line_angles=nominal
+        + amplitude * np.sin(nominal + direction)
+        + line_error * scatter,
     )

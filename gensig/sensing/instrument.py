@@ -109,7 +109,9 @@ class Instrument:
             noisy = noisy + self.sensors.offset[:, None]
         return sensor.digitised(noisy)
 
-    def sent(self, signal: Array, rng: np.random.Generator) -> tuple[Array, float]:
+    def transmitted(
+        self, signal: Array, rng: np.random.Generator
+    ) -> tuple[Array, float]:
         """Record as it reaches the file, (sensor, sample), and the share of lost samples.
 
         Losses are filled.

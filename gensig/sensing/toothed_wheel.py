@@ -85,9 +85,9 @@ def passage_times(
     first = math.floor((angle[0] - disc.index) / (2.0 * math.pi)) - 1
     last = math.ceil((angle[-1] - disc.index) / (2.0 * math.pi)) + 1
     turns = 2.0 * math.pi * np.arange(first, last + 1)
-    places = np.sort((disc.index + turns[:, None] + disc.places).ravel())
-    places = places[(places >= angle[0]) & (places <= angle[-1])]
-    times = CubicSpline(angle, np.arange(len(angle)) / sampling_rate)(places)
+    passages = np.sort((disc.index + turns[:, None] + disc.line_angles).ravel())
+    passages = passages[(passages >= angle[0]) & (passages <= angle[-1])]
+    times = CubicSpline(angle, np.arange(len(angle)) / sampling_rate)(passages)
     return np.floor(times * wheel.clock_frequency) / wheel.clock_frequency
 
 

@@ -61,7 +61,7 @@ def nuisance_acceleration(
     Parameters
     ----------
     dynamics : the machine that answers
-    shaft_angle : (sample,) rad    of the pinion from its nominal place at the first sample on,
+    shaft_angle : (sample,) rad    of the pinion from its nominal angle at the first sample on,
         as a record has it
 
     Returns
@@ -95,15 +95,15 @@ def nuisance_acceleration(
         for part in tones
     ]
     factors = np.concatenate(
-        [part for one in answers for part in (one.real, -one.imag)], axis=1
+        [part for answer in answers for part in (answer.real, -answer.imag)], axis=1
     )  # on cosines, sines
     fastest = max(
         float(
             np.max(
-                np.abs(_frequencies(dynamics, part, nominal.speed)) * one.any(axis=2)
+                np.abs(_frequencies(dynamics, part, nominal.speed)) * answer.any(axis=2)
             )
         )
-        for part, one in zip(tones, answers, strict=True)
+        for part, answer in zip(tones, answers, strict=True)
     )
     every = max(1, min(BLOCK, int(SPLINE_PHASE * rate / max(fastest, 1.0))))
     made = np.unique(np.append(np.arange(0, n_samples, every), n_samples - 1))
@@ -111,17 +111,17 @@ def nuisance_acceleration(
     coarse = np.empty((len(channels), len(made)))
     ends = np.searchsorted(made, edges)
     for block, (start, stop) in enumerate(pairwise(ends.tolist())):
-        own = made[start:stop]
+        samples = made[start:stop]
         ratio = {gear: shaft(dynamics, gear).speed_ratio for gear in SENSE}
         waves = _waves(
-            tones, {gear: first[gear] + ratio[gear] * turned[own] for gear in SENSE}
+            tones, {gear: first[gear] + ratio[gear] * turned[samples] for gear in SENSE}
         )
         # einsum, not @: its bits depend on no thread count
         coarse[:, start:stop] = np.einsum("tc,ts->cs", factors[block], waves)
         change = factors[block + 1] - factors[block]
         if change.any():
             coarse[:, start:stop] += (
-                (own - edges[block]) / BLOCK * np.einsum("tc,ts->cs", change, waves)
+                (samples - edges[block]) / BLOCK * np.einsum("tc,ts->cs", change, waves)
             )
     if every == 1 or len(made) < 4:
         return coarse
@@ -149,10 +149,10 @@ def _answers(
         "nothing": np.ones(len(frequency)),
     }
     force = np.zeros((*frequency.shape, len(dynamics.dofs)), dtype=np.complex128)
-    places = [
+    dofs = [
         dynamics.dofs.index(f"{tones.gear}_{axis}") for axis in ("x", "y", "rotation")
     ]
-    force[:, :, places] = growth[tones.follows][:, None, None] * tones.force
+    force[:, :, dofs] = growth[tones.follows][:, None, None] * tones.force
     answer = accelerations(
         dynamics, frequency.ravel(), force.reshape(-1, force.shape[2])
     ).reshape(force.shape)
@@ -178,11 +178,11 @@ def _waves(tones: Sequence[Tones], angle: Mapping[str, Array]) -> Array:
                     key = (part.gear, order)
                     if key not in powers:
                         powers[key] = _Powers(np.exp(1j * order * angle[part.gear]))
-                    one = powers[key](multiple)
+                    power = powers[key](multiple)
                     if phasor is None:
-                        phasor = one
+                        phasor = power
                     else:
-                        phasor = phasor * one
+                        phasor = phasor * power
             if phasor is None:
                 raise ValueError("a tone follows at least one angle")
             out[tone], out[tone + n_tones] = phasor.real, phasor.imag

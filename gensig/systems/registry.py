@@ -240,27 +240,27 @@ def _read_body(gear: Gear, values: Section, material: Material) -> Body:
 
     Mass and inertia that are null are those of a solid disc on the pitch circle less the bore.
     """
-    place, density = f"gear.{gear.name}", material.density_kg_per_m3
+    group, density = f"gear.{gear.name}", material.density_kg_per_m3
     disc = solid_disc(gear.pitch_radius, gear.bore_radius, gear.face_width, density)
     inertias = dict(zip(("mass_kg", "inertia_kg_m2"), disc, strict=True))
     for key in inertias:
         if values[key] is not None:
-            inertias[key] = _number(f"{place}.{key}", values[key])
+            inertias[key] = _number(f"{group}.{key}", values[key])
     for key, value in inertias.items():
         if not value > 0.0:
             raise ConfigError(
-                f"{place}.{key} = {value:g} must be positive, or null to derive it"
+                f"{group}.{key} = {value:g} must be positive, or null to derive it"
             )
     support = values.section("support")
     nulls = [key for key, value in support.items() if value is None]
     return Body(
         mass=inertias["mass_kg"],
         inertia=inertias["inertia_kg_m2"],
-        support=read(Support, support.without(*nulls), f"{place}.support"),
+        support=read(Support, support.without(*nulls), f"{group}.support"),
     )
 
 
-def _read_rotor(place: str, values: Any) -> Rotor | None:
+def _read_rotor(key: str, values: Any) -> Rotor | None:
     """A motor or a load; None if it is null, or its inertia."""
     if values is None:
         return None
@@ -269,7 +269,7 @@ def _read_rotor(place: str, values: Any) -> Rotor | None:
     try:
         return read(Rotor, values, "rotor")
     except ConfigError as error:
-        raise ConfigError(f"{place}{str(error).removeprefix('rotor')}") from None
+        raise ConfigError(f"{key}{str(error).removeprefix('rotor')}") from None
 
 
 def _number(key: str, value: Any) -> float:

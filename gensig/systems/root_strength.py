@@ -112,7 +112,7 @@ class RootStrength:
         per_force = self.factors[self.decisive].stress_per_force
         return stress / (per_force * self.strength.load_factor)
 
-    def under(self, stress: float) -> RootStrength:
+    def with_root_stress(self, stress: float) -> RootStrength:
         """The same pair with the torque for a sigma_F in Pa of the decisive gear."""
         return self._with_force(self.force_for(stress))
 

@@ -65,7 +65,7 @@ class CleanRecord:
     Parameters
     ----------
     acceleration : (channel, sample) m/s2; rad/s2 for rotations
-    shaft_angle : (sample,) rad    of the pinion, from its nominal place at the first sample on
+    shaft_angle : (sample,) rad    of the pinion, from its nominal angle at the first sample on
     mean_speed : rad/s
     integration_check : one of ``CHECKS``
     mesh : loads of the teeth, if the run asks for them

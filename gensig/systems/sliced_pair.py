@@ -24,7 +24,7 @@ from gensig.mesh.sliced.slices import (
     SlicedMesh,
     loaded_contact,
     single_pair_stiffness,
-    slice_places,
+    slice_middles,
     sliced_mesh,
 )
 from gensig.mesh.thermal.thermal_growth import PairGrowth
@@ -49,7 +49,7 @@ class TransmissionError:
     n_periods : mesh periods
     odd_pairs : numbers of the first and the last pair with a tooth unlike the others, or None
     slice_edges : (slice + 1,) m     from the end that enters first
-    slice_place : (slice,) m         middles
+    slice_middle : (slice,) m
     error : (phase,) m               approach along the transverse line of action
     harmonics : (order,) m           amplitudes of mesh orders 1, 2, ...
     pressure : (phase, pair, slice) Pa
@@ -61,7 +61,7 @@ class TransmissionError:
     n_periods: int
     odd_pairs: tuple[int, int] | None
     slice_edges: Array
-    slice_place: Array
+    slice_middle: Array
     error: Array
     harmonics: Array
     pressure: Array
@@ -101,7 +101,7 @@ class SlicedPair:
         if not self.modification.is_any and self.growth is None:
             return None
         position = node_positions(self.pair, self.mesh)
-        middles = slice_places(self.pair, self.slices)
+        middles = slice_middles(self.pair, self.slices)
         back = np.zeros((len(middles), len(position)))
         if self.modification.is_any:
             back = back + self.modification.deviation(self.pair, position, middles)
@@ -147,7 +147,7 @@ class SlicedPair:
             n_periods=n_periods,
             odd_pairs=odd_pairs,
             slice_edges=mesh.edges,
-            slice_place=mesh.slice_place,
+            slice_middle=mesh.slice_middle,
             error=contact.approach,
             harmonics=spectrum[n_periods::n_periods][:N_HARMONICS],
             pressure=contact_pressure(mesh, contact, self.material),

@@ -87,10 +87,10 @@ def _is_number(text: str) -> bool:
         return False
 
 
-def check_columns(key: str, file: str, found: list[str], wanted: list[str]) -> None:
+def check_columns(key: str, file: str, names: list[str], wanted: list[str]) -> None:
     """Raise ConfigError unless the file has exactly these columns, in any order."""
-    missing = [name for name in wanted if name not in found]
-    unknown = [name for name in found if name not in wanted]
+    missing = [name for name in wanted if name not in names]
+    unknown = [name for name in names if name not in wanted]
     problems = [f"no column {name}" for name in missing]
     problems += [f"unknown column {name}" for name in unknown]
     if problems:

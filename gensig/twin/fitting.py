@@ -123,7 +123,7 @@ def fit(
         sensors=recording.sensors,
         sampling_rate=recording.sampling_rate,
         motion=motion,
-        pitch_error_scatter=_own_scatter(records, model, teeth),
+        pitch_error_scatter=_grade_scatter(records, model, teeth),
         grade=grade,
         gain_frequency=frequency,
         gain=gain,
@@ -134,7 +134,9 @@ def fit(
     )
 
 
-def _own_scatter(records: Sequence[CleanRecord], model: Machine, teeth: Teeth) -> float:
+def _grade_scatter(
+    records: Sequence[CleanRecord], model: Machine, teeth: Teeth
+) -> float:
     speed_rpm = from_si("speed_rpm", model.operating.speed)
     scatters = []
     for record in records:

@@ -48,8 +48,8 @@ class Grade:
 def sideband_orders(teeth: Teeth, harmonic: int) -> Array:
     """Mesh orders of the sidebands of a harmonic, each once, (line,)."""
     steps = np.arange(1, N_SIDEBANDS + 1)
-    one_side = np.concatenate([steps / n for n in (teeth.driving, teeth.driven)])
-    offsets = np.concatenate([-one_side, one_side])
+    positive = np.concatenate([steps / n for n in (teeth.driving, teeth.driven)])
+    offsets = np.concatenate([-positive, positive])
     return harmonic + np.unique(np.round(offsets, 9))
 
 

@@ -27,7 +27,8 @@ VERDICTS = {True: "agrees", False: "NO"}
 def fitted_rows(fitted: Fit, n_driving: int) -> list[tuple[str, str]]:
     """Fitted values by name."""
     motion, grade = fitted.motion, fitted.grade
-    own = f"pitch errors of that grade make {100 * fitted.pitch_error_scatter:.4f} % by themselves"
+    share = f"{100 * fitted.pitch_error_scatter:.4f} %"
+    grade_text = f"pitch errors of that grade make {share} by themselves"
     drift = (
         "none written: one harmonic alone is heard, which does not tell it from noise"
     )
@@ -37,10 +38,10 @@ def fitted_rows(fitted: Fit, n_driving: int) -> list[tuple[str, str]]:
         fast = (
             f"; changes within {motion.followed_time:.2g} s are the gears' own or noise"
         )
-        drift = f"none written: {seen} {time}, {own}{fast}"
+        drift = f"none written: {seen} {time}, {grade_text}{fast}"
         if fitted.drift is not None:
             spread = f"{100 * fitted.drift:.4f} % (standard deviation)"
-            drift = f"{spread} {time}; {seen}, {own}"
+            drift = f"{spread} {time}; {seen}, {grade_text}"
     elif motion.detection_limit is not None:
         limit = f"{100 * motion.detection_limit:.4f} %"
         drift = f"none written: below the detection limit of {limit}"
@@ -56,8 +57,8 @@ def fitted_rows(fitted: Fit, n_driving: int) -> list[tuple[str, str]]:
         for name, row in zip(fitted.sensors, fitted.heard, strict=True)
     )
     snr = ", ".join(
-        f"{name} {one:.1f} dB"
-        for name, one in zip(fitted.sensors, fitted.snr, strict=True)
+        f"{name} {ratio:.1f} dB"
+        for name, ratio in zip(fitted.sensors, fitted.snr, strict=True)
     )
     return [
         ("speed", f"{speed:.4f} r/min, mesh {motion.mesh_frequency:.4f} Hz"),

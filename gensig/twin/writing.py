@@ -76,7 +76,7 @@ def write_options(
 
 def _sensing(out: Path, fitted: Fit) -> str:
     snr = float(np.median(fitted.snr))
-    offsets = ", ".join(f"{snr - one:.2f}" for one in fitted.snr)
+    offsets = ", ".join(f"{snr - sensor_snr:.2f}" for sensor_snr in fitted.snr)
     return f"""defaults:
   - bearing
   - _self_

@@ -194,7 +194,7 @@ class TestRecording:
         controls = dict(zip(sets.CONTROLS, made, strict=True))
         real = recording.indicators(healthy(1), RATE, TEETH, SPEED)
         result = recording.recording_comparisons(controls, real)
-        verdicts = {row.place: row.verdict for row in result}
+        verdicts = {row.key: row.verdict for row in result}
         assert verdicts["recording.mesh_share", "wrong teeth"] == "told apart"
         assert verdicts["recording.sideband_ratio", "errors / 3"] == "told apart"
         assert verdicts["recording.sideband_ratio", "errors x 3"] == "not told apart"

@@ -43,45 +43,45 @@ MARKED_ORDERS = (0.5, 1.0, 2.5, 5.0, 10.0)
 CYCLE_POINTS = 2880
 
 
-def plot_response(line: EngineLine, found: ResponseResult, path: Path) -> None:
+def plot_response(line: EngineLine, result: ResponseResult, path: Path) -> None:
     """Draw torques, speeds and spectra, and below them each result that was asked for."""
     n_linear = 0 if turns_evenly(line) else 1
-    n_rows = 1 + n_linear + bool(found.run) + bool(found.roots)
-    n_rows += 2 * (found.in_time is not None) + 3 * (found.sweep is not None)
+    n_rows = 1 + n_linear + bool(result.run) + bool(result.roots)
+    n_rows += 2 * (result.in_time is not None) + 3 * (result.sweep is not None)
     figure, axes = panels(n_rows, 2, 12, 3.7 * n_rows)
     if isinstance(line.engine, Engine):
-        _cycle(axes[0, 0], line.engine, found)
-        _orders(axes[0, 1], line, line.engine, found)
+        _cycle(axes[0, 0], line.engine, result)
+        _orders(axes[0, 1], line, line.engine, result)
     else:
-        motor_rows(axes[0], line, found)
+        motor_rows(axes[0], line, result)
     if n_linear:
-        _speeds(axes[1, 0], line, found)
-        _spectra(axes[1, 1], line, found)
+        _speeds(axes[1, 0], line, result)
+        _spectra(axes[1, 1], line, result)
     row = 1 + n_linear
-    if found.run:
-        _waterfalls(figure, axes[row], line, found)
+    if result.run:
+        _waterfalls(figure, axes[row], line, result)
         row += 1
-    if found.in_time is not None:
-        time_rows(axes[row : row + 2], line, found, found.in_time)
+    if result.in_time is not None:
+        time_rows(axes[row : row + 2], line, result, result.in_time)
         row += 2
-    if found.roots:
-        root_row(axes[row], line, found)
+    if result.roots:
+        root_row(axes[row], line, result)
         row += 1
-    if found.sweep is not None:
-        sweep_rows(figure, axes[row:], line, found, found.sweep)
-    speed, torque = RPM * found.response.speed, found.torques.brake_torque
+    if result.sweep is not None:
+        sweep_rows(figure, axes[row:], line, result, result.sweep)
+    speed, torque = RPM * result.response.speed, result.torques.brake_torque
     figure.suptitle(f"{line.drive.name}: {speed:g} r/min, {torque:.5g} N m")
     save(figure, path)
 
 
-def _cycle(axes: Any, engine: Engine, found: ResponseResult) -> None:
+def _cycle(axes: Any, engine: Engine, result: ResponseResult) -> None:
     """Pressure and torques of one cylinder from its own firing top dead center on."""
-    assert isinstance(found.torques, EngineTorques)
-    cylinder, pressure = engine.cylinder, found.torques.pressure
+    assert isinstance(result.torques, EngineTorques)
+    cylinder, pressure = engine.cylinder, result.torques.pressure
     angle = cycle_angles(len(pressure))
     degrees = np.degrees(angle)
     gas = gas_torque(cylinder, angle, pressure, engine.crankcase_pressure)
-    mass = inertia_torque(cylinder, angle, found.response.speed)
+    mass = inertia_torque(cylinder, angle, result.response.speed)
     curve(axes, degrees, gas / 1e3, SOUND, "gas")
     curve(axes, degrees, mass / 1e3, FAULTY, "reciprocating mass", style="--")
     abscissa = "crank angle after firing top dead center, degrees"
@@ -93,9 +93,11 @@ def _cycle(axes: Any, engine: Engine, found: ResponseResult) -> None:
     axes.legend(loc="upper center")
 
 
-def _orders(axes: Any, line: EngineLine, engine: Engine, found: ResponseResult) -> None:
+def _orders(
+    axes: Any, line: EngineLine, engine: Engine, result: ResponseResult
+) -> None:
     """Torques by orders: one throw, all throws, all plungers."""
-    torque = found.torques.on(line.drive.numbers)
+    torque = result.torques.on(line.drive.numbers)
     index = line.drive.numbers.index
     throws = [torque[index(node)] for node in engine.throw_nodes]
     plungers = [torque[index(node)] for node in engine.plunger_nodes.values()]
@@ -114,12 +116,12 @@ def _orders(axes: Any, line: EngineLine, engine: Engine, found: ResponseResult) 
     axes.legend()
 
 
-def _speeds(axes: Any, line: EngineLine, found: ResponseResult) -> None:
+def _speeds(axes: Any, line: EngineLine, result: ResponseResult) -> None:
     """Deviation of the speeds over one cycle."""
-    speeds = found.response.speed_over_cycle(CYCLE_POINTS)
+    speeds = result.response.speed_over_cycle(CYCLE_POINTS)
     angle = np.linspace(0.0, 720.0, CYCLE_POINTS, endpoint=False)
-    half = found.response.fluctuation()
-    for node, color in zip(found.nodes, COLORS, strict=False):
+    half = result.response.fluctuation()
+    for node, color in zip(result.nodes, COLORS, strict=False):
         index = line.drive.numbers.index(node)
         label = f"{node_name(line, node)}: +- {RPM * half[index]:.1f}"
         curve(axes, angle, RPM * speeds[index], color, label, width=1.1)
@@ -130,33 +132,33 @@ def _speeds(axes: Any, line: EngineLine, found: ResponseResult) -> None:
     axes.legend(loc="upper right", fontsize=SMALL)
 
 
-def _spectra(axes: Any, line: EngineLine, found: ResponseResult) -> None:
+def _spectra(axes: Any, line: EngineLine, result: ResponseResult) -> None:
     """Angular displacement by frequency, with the half orders as they fall."""
-    hz = found.response.orders * found.response.speed / (2.0 * np.pi)
+    hz = result.response.orders * result.response.speed / (2.0 * np.pi)
     shown = hz <= 2.0 * WATERFALL_HZ
-    for node, color, marker in zip(found.nodes, COLORS, "osD^v<", strict=False):
-        angle = found.response.angle[line.drive.numbers.index(node)]
+    for node, color, marker in zip(result.nodes, COLORS, "osD^v<", strict=False):
+        angle = result.response.angle[line.drive.numbers.index(node)]
         amplitude = np.degrees(np.abs(angle))[shown]
         axes.vlines(hz[shown], 1e-7, amplitude, color=color, linewidth=0.7)
         name = node_name(line, node)
         axes.plot(hz[shown], amplitude, marker, color=color, markersize=3, label=name)
     title = "Angular displacement"
     titles(axes, title, FREQUENCY, ANGLE_AMPLITUDE, yscale="log")
-    top = np.degrees(np.abs(found.response.angle[:, shown]).max())
+    top = np.degrees(np.abs(result.response.angle[:, shown]).max())
     axes.set_ylim(1e-5 * top, 30.0 * top)
     axes.legend(fontsize=SMALL)
 
 
 def _waterfalls(
-    figure: Any, axes: Any, line: EngineLine, found: ResponseResult
+    figure: Any, axes: Any, line: EngineLine, result: ResponseResult
 ) -> None:
     """Angular displacement over frequency and speed at the first two nodes, (2,) axes."""
-    runs = zip(axes, found.nodes, found.run, strict=False)
+    runs = zip(axes, result.nodes, result.run, strict=False)
     for panel, node, run in runs:
         _waterfall(figure, panel, run)
         title = f"Run of speeds, {node_name(line, node)}"
         titles(panel, title, FREQUENCY, f"speed of the {turner(line)}, r/min")
-    for panel in axes[len(found.run) :]:
+    for panel in axes[len(result.run) :]:
         panel.set_axis_off()
 
 
@@ -165,7 +167,7 @@ def _waterfall(figure: Any, axes: Any, run: Waterfall) -> None:
     rpm = RPM * run.speeds
     spectra = np.degrees(run.spectra(hz))
     # A spectral line is one bin wide. It is spread so that it shows in print.
-    beside = np.maximum(np.roll(spectra, 1, axis=1), np.roll(spectra, -1, axis=1))
-    spread = np.maximum(spectra, beside)
+    neighbours = np.maximum(np.roll(spectra, 1, axis=1), np.roll(spectra, -1, axis=1))
+    spread = np.maximum(spectra, neighbours)
     waterfall(figure, axes, hz, rpm, np.log10(np.maximum(spread, 1e-4 * spread.max())))
     mark_orders(axes, MARKED_ORDERS, rpm, WATERFALL_HZ)

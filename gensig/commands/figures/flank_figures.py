@@ -158,7 +158,7 @@ def _load_map(
     pitch, contact = system.pair.base_pitch, result.contact
     end = system.pair.transverse_contact_ratio
     edges = np.linspace(-0.15, end + 0.15, 121)
-    grid = np.zeros((len(edges) - 1, len(result.slice_place)))
+    grid = np.zeros((len(edges) - 1, len(result.slice_middle)))
     row = np.searchsorted(edges, contact.position / pitch) - 1
     column = np.broadcast_to(np.arange(grid.shape[1]), row.shape)
     inside = (row >= 0) & (row < len(grid))
@@ -174,7 +174,7 @@ def _load_map(
     image = axes.pcolormesh(across, edges, loaded, cmap="cividis", vmin=0.0)
     for limit in (0.0, end):
         axes.axhline(limit, color=GREY, linestyle=":")
-    abscissa = "place across the face from the end that enters first, mm"
+    abscissa = "position across the face from the end that enters first, mm"
     titles(axes, title, abscissa, "contact position, base pitches")
     figure.colorbar(image, ax=axes, label="N/mm")
 

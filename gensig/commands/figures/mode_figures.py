@@ -29,13 +29,13 @@ ENERGIES = "signed root of the kinetic energy share"
 ANGLES = "angle on the own shaft, largest 1 (dashed: gear meshes)"
 
 
-def plot_modes(line: DriveLine, found: Modes, path: Path) -> None:
+def plot_modes(line: DriveLine, modes: Modes, path: Path) -> None:
     """Draw the Campbell diagram and the lowest modes that deform something."""
     figure = empty_figure(13, 8.4)
-    last = min(found.n_rigid + N_SHAPES, len(found.frequency))
-    elastic = range(found.n_rigid, last)
+    last = min(modes.n_rigid + N_SHAPES, len(modes.frequency))
+    elastic = range(modes.n_rigid, last)
     grid = figure.add_gridspec(max(1, len(elastic)), 2, width_ratios=(1.0, 1.15))
-    _campbell(figure.add_subplot(grid[:, 0]), line, found)
+    _campbell(figure.add_subplot(grid[:, 0]), line, modes)
     draw, abscissa, what = _angles, "node", ANGLES
     if line.lateral:
         draw, what = _energies, ENERGIES
@@ -47,8 +47,8 @@ def plot_modes(line: DriveLine, found: Modes, path: Path) -> None:
         if axes is not None:
             axes.set_xticklabels([])
         axes = figure.add_subplot(grid[row, 1])
-        draw(axes, line, found, mode)
-        hz, damping = found.frequency[mode], found.damping_ratio[mode]
+        draw(axes, line, modes, mode)
+        hz, damping = modes.frequency[mode], modes.damping_ratio[mode]
         axes.set_title(f"mode {mode}: {hz:.2f} Hz, damping {damping:.3f}", fontsize=9)
         axes.axhline(0.0, color=GREY, linewidth=0.6)
         axes.set_ylim(-1.15, 1.15)
@@ -60,12 +60,12 @@ def plot_modes(line: DriveLine, found: Modes, path: Path) -> None:
     save(figure, path)
 
 
-def _campbell(axes: Any, line: DriveLine, found: Modes) -> None:
+def _campbell(axes: Any, line: DriveLine, modes: Modes) -> None:
     """Natural frequencies across the speeds, rays of the orders, dots where they meet."""
     low = from_si("speed_rpm", line.campbell.low_speed)
     high = from_si("speed_rpm", line.campbell.high_speed)
     top = 1.08 * max(line.campbell_orders) * high / 60.0
-    shown = [(mode, hz) for mode, hz in enumerate(found.frequency) if 0.0 < hz < top]
+    shown = [(mode, hz) for mode, hz in enumerate(modes.frequency) if 0.0 < hz < top]
     speeds = np.array([low, high])
     note = {"textcoords": "offset points", "fontsize": SMALL}
     for order in line.campbell_orders:
@@ -90,9 +90,9 @@ def _campbell(axes: Any, line: DriveLine, found: Modes) -> None:
     )
 
 
-def _angles(axes: Any, line: DriveLine, found: Modes, mode: int) -> None:
+def _angles(axes: Any, line: DriveLine, modes: Modes, mode: int) -> None:
     """Angle of every node, joined as the line joins them."""
-    angle = (line.matrices().expand @ found.shapes[mode])[: len(line.numbers)]
+    angle = (line.matrices().expand @ modes.shapes[mode])[: len(line.numbers)]
     angle = angle / np.abs(angle).max()
     number, gears = np.array(line.numbers), line.line.gears
     for shaft in line.line.shafts:
@@ -104,11 +104,11 @@ def _angles(axes: Any, line: DriveLine, found: Modes, mode: int) -> None:
     axes.plot(number, angle, ".", color=SOUND, markersize=4)
 
 
-def _energies(axes: Any, line: DriveLine, found: Modes, mode: int) -> None:
+def _energies(axes: Any, line: DriveLine, modes: Modes, mode: int) -> None:
     """Share of the kinetic energy of every coordinate, with the sign of its motion."""
     matrices = line.matrices()
-    motion = matrices.expand @ found.shapes[mode]
-    height = np.sign(motion) * np.sqrt(found.kinetic_share[mode])
+    motion = matrices.expand @ modes.shapes[mode]
+    height = np.sign(motion) * np.sqrt(modes.kinetic_share[mode])
     is_lateral = [name.endswith(LATERAL) for name in matrices.coordinate_names]
     index = np.arange(len(height))
     axes.bar(index, height, color=[(SOUND, THIRD)[lateral] for lateral in is_lateral])

@@ -29,16 +29,16 @@ def node_name(line: EngineLine, node: int) -> str:
     return f"{line.drive.line.nodes[line.drive.numbers.index(node)].name} ({node})"
 
 
-def motor_rows(axes: Any, line: EngineLine, found: ResponseResult) -> None:
+def motor_rows(axes: Any, line: EngineLine, result: ResponseResult) -> None:
     """Draw mean torques on the nodes and mean tooth forces of the meshes, (2,) axes."""
     torques, forces = axes
-    mean = found.torques.on(line.drive.numbers).mean(axis=1)
+    mean = result.torques.on(line.drive.numbers).mean(axis=1)
     colors = np.where(mean < 0.0, FAULTY, SOUND).tolist()
     torques.bar([str(number) for number in line.drive.numbers], mean, color=colors)
     zero_line(torques)
     title = "Mean torques: given (blue) and taken (red)"
     titles(torques, title, "node", "N m, on its own shaft")
-    force = found.response.element_forces(line.linear()[1])[0]
+    force = result.response.element_forces(line.linear()[1])[0]
     forces.bar(list(line.mesh_names), force / 1e3, color=SOUND, width=0.4)
     title = "Mean tooth force of the meshes"
     if turns_evenly(line):

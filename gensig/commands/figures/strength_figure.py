@@ -74,7 +74,7 @@ def _stress(
     axes.legend(handles=lines, loc="upper center", ncols=2, fontsize=SMALL)
 
 
-def _tooth(axes: Any, system: RootStrength, found: GearStress) -> None:
+def _tooth(axes: Any, system: RootStrength, stress: GearStress) -> None:
     """Outline in the normal section with the 30 degree tangents, the load and its lever arm.
 
     Millimetres from the centerline and above the root circle.
@@ -108,7 +108,7 @@ def _tooth(axes: Any, system: RootStrength, found: GearStress) -> None:
     )
     label = f"lever arm, {top - height:.3g} mm"
     curve(axes, [0.0, 0.0], [height, top], GREY, label, style="--")
-    factors, safety = found.factors, found.safety
+    factors, safety = stress.factors, stress.safety
     title = (
         f"Tooth of the {system.decisive}: Y_F {factors.form_factor:.3f}, "
         f"Y_S {factors.stress_correction_factor:.3f}\n"

@@ -46,26 +46,26 @@ ROOT_LOOKS = {
 
 
 def time_rows(
-    axes: Any, line: EngineLine, found: ResponseResult, response: TimeResponse
+    axes: Any, line: EngineLine, result: ResponseResult, response: TimeResponse
 ) -> None:
     """Draw speeds, spectra, loads of all meshes and the force of one, (2, 2) axes."""
-    _speeds(axes[0, 0], line, found, response)
-    _spectra(axes[0, 1], line, found, response)
-    mean, amplitudes = found.response.element_forces(line.linear()[1])
+    _speeds(axes[0, 0], line, result, response)
+    _spectra(axes[0, 1], line, result, response)
+    mean, amplitudes = result.response.element_forces(line.linear()[1])
     linear = mean[:, None] + over_cycle(amplitudes, CYCLE_POINTS)
     _loads(axes[1, 0], line, linear, response)
-    mesh = found.mesh
+    mesh = result.mesh
     if mesh is None:
         mesh = int(linear.max(axis=1).argmax())
     _force(axes[1, 1], line, mesh, linear[mesh], response)
 
 
-def root_row(axes: Any, line: EngineLine, found: ResponseResult) -> None:
+def root_row(axes: Any, line: EngineLine, result: ResponseResult) -> None:
     """Draw root stress over the roll, and the largest of each pair of a cycle, (2,) axes."""
-    assert found.mesh is not None
+    assert result.mesh is not None
     over_roll, over_pairs = axes
-    in_cycle = passes_of_a_cycle(line, found.mesh)
-    for name, root in found.roots.items():
+    in_cycle = passes_of_a_cycle(line, result.mesh)
+    for name, root in result.roots.items():
         color, style = ROOT_LOOKS[name]
         label = name.replace("_", " ")
         passes = root.passes[root.strength.decisive] * 1e-6
@@ -79,7 +79,7 @@ def root_row(axes: Any, line: EngineLine, found: ResponseResult) -> None:
         if whole > 1:
             low, high = by_pair.min(axis=0), by_pair.max(axis=0)
             band(over_pairs, pairs, low, high, color)
-    title = f"Root stress of the pair that bears most, {line.mesh_names[found.mesh]}"
+    title = f"Root stress of the pair that bears most, {line.mesh_names[result.mesh]}"
     titles(over_roll, title, "roll of the pinion, deg", "MPa")
     title = "Largest of each pair: median of the cycles, range"
     titles(over_pairs, title, "pair of the cycle", "MPa")
@@ -90,33 +90,33 @@ def root_row(axes: Any, line: EngineLine, found: ResponseResult) -> None:
 
 
 def sweep_rows(
-    figure: Any, axes: Any, line: EngineLine, found: ResponseResult, sweep: Sweep
+    figure: Any, axes: Any, line: EngineLine, result: ResponseResult, sweep: Sweep
 ) -> None:
     """Draw a sweep up, down and the difference at the first two nodes, (3, 2) axes."""
     ways = {"up": sweep.up, "down": sweep.down}
     speed = f"speed of the {turner(line)}, r/min"
-    for column, node in enumerate(found.nodes[:2]):
+    for column, node in enumerate(result.nodes[:2]):
         name = node_name(line, node)
         top = float(max(way.spectra[column].max() for way in ways.values()))
         for panel, (word, way) in zip(axes[:2, column], ways.items(), strict=True):
             _waterfall(figure, panel, way, column, top)
             titles(panel, f"In time, {word}, {name}", FREQUENCY, speed)
-        _both_ways(axes[2, column], found, sweep, column)
+        _both_ways(axes[2, column], result, sweep, column)
         title = f"Speed fluctuation in a cycle, {name}"
         titles(axes[2, column], title, speed, "plus or minus, r/min")
-    for panel in axes[:, len(found.nodes) :].flat:
+    for panel in axes[:, len(result.nodes) :].flat:
         panel.set_axis_off()
 
 
 def _speeds(
-    axes: Any, line: EngineLine, found: ResponseResult, response: TimeResponse
+    axes: Any, line: EngineLine, result: ResponseResult, response: TimeResponse
 ) -> None:
     angle = np.degrees(response.crank_angle)
     shown = angle < TRACE_CYCLES * 720.0
-    linear = RPM * found.response.speed_over_cycle(SPEED_POINTS)
+    linear = RPM * result.response.speed_over_cycle(SPEED_POINTS)
     n_points = SPEED_POINTS * TRACE_CYCLES
     cycle = np.linspace(0.0, 720.0 * TRACE_CYCLES, n_points, endpoint=False)
-    nodes = zip(found.nodes, response.speed, COLORS, strict=False)
+    nodes = zip(result.nodes, response.speed, COLORS, strict=False)
     for node, speed, color in nodes:
         repeated = np.tile(linear[line.drive.numbers.index(node)], TRACE_CYCLES)
         curve(axes, cycle, repeated, color, style=":", width=0.7)
@@ -129,13 +129,13 @@ def _speeds(
 
 
 def _spectra(
-    axes: Any, line: EngineLine, found: ResponseResult, response: TimeResponse
+    axes: Any, line: EngineLine, result: ResponseResult, response: TimeResponse
 ) -> None:
     """Angular displacement by frequency.
 
     Grey lines mark the half orders of an engine, or the mesh frequencies of a motor's line.
     """
-    rate = found.response.speed / (2.0 * np.pi)
+    rate = result.response.speed / (2.0 * np.pi)
     if turner(line) == "motor":
         orders = np.multiply.outer((1.0, 2.0), line.drive.mesh_orders).ravel()
         highest = min(1.1 * rate * float(orders.max()), FLAT_HZ)
@@ -149,7 +149,7 @@ def _spectra(
     for order in orders[orders * rate < highest]:
         style = ":" if order % 1.0 else "-"
         axes.axvline(order * rate, color=GREY, linewidth=0.3, linestyle=style)
-    for node, spectrum, color in zip(found.nodes, spectra, COLORS, strict=False):
+    for node, spectrum, color in zip(result.nodes, spectra, COLORS, strict=False):
         amplitude = np.degrees(spectrum[shown])
         name = node_name(line, node)
         curve(axes, frequencies[shown], amplitude, color, name, width=0.8)
@@ -218,15 +218,15 @@ def _waterfall(figure: Any, axes: Any, way: SweepWay, column: int, top: float) -
     mark_orders(axes, MARKED_ORDERS, rpm, way.frequencies[-1], lines=True)
 
 
-def _both_ways(axes: Any, found: ResponseResult, sweep: Sweep, column: int) -> None:
+def _both_ways(axes: Any, result: ResponseResult, sweep: Sweep, column: int) -> None:
     """Fluctuation up and down with three standard errors, and the linear one of a run."""
     for way, color, label in ((sweep.up, SOUND, "up"), (sweep.down, FAULTY, "down")):
         rpm, mean = RPM * way.speeds, RPM * way.fluctuation[column]
         error = 3.0 * (RPM * way.scatter[column])
         curve(axes, rpm, mean, color, f"{label}, in {sweep.seconds:g} s")
         band(axes, rpm, mean - error, mean + error, color)
-    if found.run:
-        run = found.run[column]
+    if result.run:
+        run = result.run[column]
         steady = RPM * run.fluctuation
         curve(axes, RPM * run.speeds, steady, GREY, "linear, steady", width=0.9)
     axes.set_ylim(0.0, None)

@@ -28,7 +28,7 @@ from gensig.life.wear.wear_life import WearLife
 Array = NDArray[np.float64]
 
 TALLEST = 1.6  # times the largest radius of new flanks; flatter and hollow points are left out
-POSITION = "place on the path of contact from A, mm (dotted: pitch point)"
+POSITION = "position on the path of contact from A, mm (dotted: pitch point)"
 ENDED_BY = {
     "depth": "",
     "transmission_error": ", limit of the transmission error",
@@ -127,7 +127,7 @@ def _history(axes: Any, content: Mapping[str, Any]) -> None:
     history, vibration = content["history"], content.get("vibration")
     for name, color in zip(SIDES, COLORS, strict=False):
         curve(axes, history["hours"], history[f"{name}_depth_um"], color, name)
-    titles(axes, "Deepest place over time", "hours", "um")
+    titles(axes, "Deepest point over time", "hours", "um")
     axes.legend(loc="upper left")
     error = history["transmission_error_peak_to_peak_um"]
     if vibration is not None:

@@ -92,7 +92,7 @@ def transmission_error_content(
         "load_share": result.load_share,
         "pair_index": contact.pair_index,
         "bearing_share_of_field": result.bearing,
-        "slice_place_mm": result.slice_place * 1e3,
+        "slice_place_mm": result.slice_middle * 1e3,
         "line_load_n_per_mm": contact.line_load * 1e-3,
         "contact_position": contact.position / pair.base_pitch,
     }

@@ -64,7 +64,7 @@ def root_stress(arguments: Namespace) -> int:
         )
     system = read_root_strength(config)
     if arguments.stress is not None:
-        system = system.under(arguments.stress * 1e6)
+        system = system.with_root_stress(arguments.stress * 1e6)
     gears, history = system.gears(), system.history()
     content = root_stress_content(system, gears, history)
     if arguments.stress is not None:

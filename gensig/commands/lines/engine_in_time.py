@@ -42,8 +42,10 @@ def simulate_time(
             f"--time {duration:g}: give seconds above 0, at most {LONGEST_TIME:g}"
         )
     speed, torque = torques.speed, torques.brake_torque
-    own = tabulated_meshes(line, config, speed, torque)
-    return time_response(line, speed, torque, own=own, nodes=nodes, duration=duration)
+    tabulated = tabulated_meshes(line, config, speed, torque)
+    return time_response(
+        line, speed, torque, tabulated=tabulated, nodes=nodes, duration=duration
+    )
 
 
 def simulate_sweep(
@@ -63,9 +65,16 @@ def simulate_sweep(
             f"--sweep {text}: give low and high speed in r/min "
             f"and the seconds from one to the other, at most {LONGEST_TIME:g}"
         )
-    own = tabulated_meshes(line, config, 0.5 * (low + high), torque)
+    tabulated = tabulated_meshes(line, config, 0.5 * (low + high), torque)
     return sweep_response(
-        line, low, high, seconds, torque, own=own, nodes=nodes, n_orders=n_orders
+        line,
+        low,
+        high,
+        seconds,
+        torque,
+        tabulated=tabulated,
+        nodes=nodes,
+        n_orders=n_orders,
     )
 
 

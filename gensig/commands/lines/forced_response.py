@@ -91,11 +91,11 @@ def forced_response(arguments: Namespace) -> int:
     return 0
 
 
-def response_content(line: EngineLine, found: ResponseResult) -> dict[str, Any]:
+def response_content(line: EngineLine, result: ResponseResult) -> dict[str, Any]:
     """The keys of ``gensig forced-response --json``."""
-    response, torques = found.response, found.torques
+    response, torques = result.response, result.torques
     numbers = line.drive.numbers
-    shown = [numbers.index(node) for node in found.nodes]
+    shown = [numbers.index(node) for node in result.nodes]
     linear, meshes = line.linear()
     mean, amplitudes = response.element_forces(meshes)
     forces = mean[:, None] + over_cycle(amplitudes, CYCLE_POINTS)
@@ -108,10 +108,10 @@ def response_content(line: EngineLine, found: ResponseResult) -> dict[str, Any]:
         "mean_speed_rpm": [line.ratios[number] * rpm for number in numbers],
         "speed_fluctuation_rpm": RPM * response.fluctuation()[: len(numbers)],
         "toothed_wheel_fluctuation_rpm": {
-            name: from_si("speed_rpm", value) for name, value in found.seen.items()
+            name: from_si("speed_rpm", value) for name, value in result.seen.items()
         },
         "orders": response.orders,
-        "shown_nodes": found.nodes,
+        "shown_nodes": result.nodes,
         "angle_deg": np.degrees(np.abs(response.angle[shown])),
         "meshes": line.mesh_names,
         "mean_tooth_force_n": mean,
@@ -132,46 +132,46 @@ def response_content(line: EngineLine, found: ResponseResult) -> dict[str, Any]:
             )
             content["disturbance_frequency_hz"] = hz
             content["disturbance_angle_deg"] = np.degrees(np.abs(moved[shown]))
-    if found.in_time is not None:
-        content |= time_content(found.in_time)
-    if found.sweep is not None:
-        content |= sweep_content(found.sweep)
-    if found.mesh is not None:
-        content["root_stress_mesh"] = line.mesh_names[found.mesh]
+    if result.in_time is not None:
+        content |= time_content(result.in_time)
+    if result.sweep is not None:
+        content |= sweep_content(result.sweep)
+    if result.mesh is not None:
+        content["root_stress_mesh"] = line.mesh_names[result.mesh]
         content["root_stress"] = {
-            name: root_content(line, found.mesh, root)
-            for name, root in found.roots.items()
+            name: root_content(line, result.mesh, root)
+            for name, root in result.roots.items()
         }
-    if found.run:
-        content["run_speeds_rpm"] = RPM * found.run[0].speeds
+    if result.run:
+        content["run_speeds_rpm"] = RPM * result.run[0].speeds
         content["run_speed_fluctuation_rpm"] = [
-            RPM * run.fluctuation for run in found.run
+            RPM * run.fluctuation for run in result.run
         ]
-        content["run_angle_deg"] = [np.degrees(run.angle) for run in found.run]
+        content["run_angle_deg"] = [np.degrees(run.angle) for run in result.run]
     return {key: plain(value) for key, value in content.items()}
 
 
 def _roots(
     line: EngineLine,
     config: Configuration,
-    found: ResponseResult,
+    result: ResponseResult,
     mesh: int,
     duration: float | None,
 ) -> dict[str, DynamicRootStress]:
     """Root stress of a mesh, and without the dampers too where there are any."""
     strength = read_mesh_strength(config, line, mesh)
-    load = tooth_load(line, mesh, found.response)
+    load = tooth_load(line, mesh, result.response)
     roots = {"linear": dynamic_root_stress(strength, line, mesh, load)}
-    if found.in_time is not None:
-        roots["in_time"] = root_stress_in_time(strength, line, mesh, found.in_time)
+    if result.in_time is not None:
+        roots["in_time"] = root_stress_in_time(strength, line, mesh, result.in_time)
     if not config["system"]["dampers"]:
         return roots
-    bare, torques = without_dampers(config), found.torques
+    bare, torques = without_dampers(config), result.torques
     load = tooth_load(bare, mesh, bare.response(torques.speed, torques.brake_torque))
     stress = dynamic_root_stress(strength, bare, mesh, load)
     roots["linear_without_dampers"] = stress
     if duration is not None:
-        undamped = simulate_time(bare, config, torques, found.nodes, duration)
+        undamped = simulate_time(bare, config, torques, result.nodes, duration)
         stress = root_stress_in_time(strength, bare, mesh, undamped)
         roots["in_time_without_dampers"] = stress
     return roots

@@ -54,11 +54,11 @@ def read_line(config: Configuration) -> DriveLine:
     return drive_line_of_pair(read_system(config), str(kind))
 
 
-def modes_content(line: DriveLine, found: Modes) -> dict[str, Any]:
+def modes_content(line: DriveLine, modes: Modes) -> dict[str, Any]:
     """The keys of ``gensig modes --json``."""
     matrices, tables = line.matrices(), line.line
-    by_node = np.zeros((len(found.frequency), len(tables.nodes)))
-    np.add.at(by_node.T, matrices.coordinate_node, found.kinetic_share.T)
+    by_node = np.zeros((len(modes.frequency), len(tables.nodes)))
+    np.add.at(by_node.T, matrices.coordinate_node, modes.kinetic_share.T)
     gears = tables.gears
     return {
         "system": line.name,
@@ -73,13 +73,13 @@ def modes_content(line: DriveLine, found: Modes) -> dict[str, Any]:
         ],
         "mesh_stiffness_n_per_m": matrices.mesh_stiffness,
         "mesh_orders": line.mesh_orders,
-        "n_rigid_modes": found.n_rigid,
+        "n_rigid_modes": modes.n_rigid,
         "n_loops": tables.n_loops,
-        "natural_frequencies_hz": found.frequency,
-        "damping_ratio": found.damping_ratio,
-        "shapes": found.shapes / np.abs(found.shapes).max(axis=1, keepdims=True),
+        "natural_frequencies_hz": modes.frequency,
+        "damping_ratio": modes.damping_ratio,
+        "shapes": modes.shapes / np.abs(modes.shapes).max(axis=1, keepdims=True),
         "kinetic_energy_share": by_node,
-        "mesh_strain_energy_share": found.mesh_strain_share,
+        "mesh_strain_energy_share": modes.mesh_strain_share,
     }
 
 
@@ -98,7 +98,7 @@ def _print_sizes(line: DriveLine, content: Mapping[str, Any]) -> None:
     print(f"{content['system']}: {sizes}")
 
 
-def _print_modes(line: DriveLine, found: Modes, content: Mapping[str, Any]) -> None:
+def _print_modes(line: DriveLine, modes: Modes, content: Mapping[str, Any]) -> None:
     """Print the lowest modes with the motions that have most of the kinetic energy."""
     motions, n_nodes = list(line.matrices().coordinate_names), len(line.line.nodes)
     if len(motions) > n_nodes:
@@ -106,7 +106,7 @@ def _print_modes(line: DriveLine, found: Modes, content: Mapping[str, Any]) -> N
     frequencies = content["natural_frequencies_hz"]
     print(f"{'mode':>4} {'Hz':>10} {'damping':>8}  kinetic energy")
     for mode, frequency in enumerate(frequencies[:SHOWN]):
-        share = found.kinetic_share[mode]
+        share = modes.kinetic_share[mode]
         largest = np.argsort(-share, kind="stable")[:MOST_MOTIONS]
         text = ", ".join(
             f"{share[index]:.0%} {motions[index]}"

@@ -141,8 +141,8 @@ def option_text(
         f"# {worst['before']:.0f} N without them, {worst['after']:.0f} N with them, "
         "of a mesh that never parts.\n"
     )
-    own = [*machine["dampers"], *(_keys(damper) for damper in dampers)]
-    values = {**machine, "dampers": own}
+    all_dampers = [*machine["dampers"], *(_keys(damper) for damper in dampers)]
+    values = {**machine, "dampers": all_dampers}
     return head + yaml.safe_dump(
         values, sort_keys=False, default_flow_style=None, width=110
     )

@@ -58,12 +58,12 @@ def generate(arguments: Namespace) -> int:
     if arguments.multirun:
         folders = [parent / name for name in job_folders(jobs)]
     return max(
-        _generate_one(request, folder, executor, arguments)
+        _generate(request, folder, executor, arguments)
         for request, folder, executor in zip(requests, folders, executors, strict=True)
     )
 
 
-def _generate_one(
+def _generate(
     request: Request, out: Path, executor: Executor, arguments: Namespace
 ) -> int:
     from gensig.plan.notes import plan_notes

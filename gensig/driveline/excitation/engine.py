@@ -17,7 +17,7 @@ from gensig.options.configuration import Section
 from gensig.sensing.toothed_wheel import ToothedWheel
 from gensig.units import read, to_si
 
-PLACE = "excitation"
+GROUP = "excitation"
 KEYS = (
     "kind",
     "reference",
@@ -43,26 +43,26 @@ def read_engine(values: Section) -> Engine:
     ------
     ConfigError    for unknown or missing keys, and values that make no engine
     """
-    check_group(PLACE, values)
+    check_group(GROUP, values)
     if values.get("kind", "engine") != "engine":
         raise ConfigError(
-            f"{PLACE}.kind = {values['kind']!r}; allowed: engine, motor_and_load"
+            f"{GROUP}.kind = {values['kind']!r}; allowed: engine, motor_and_load"
         )
     if "motor" in values:
         raise ConfigError(
-            f"{PLACE}.motor is of a motor, {PLACE}.kind = engine of an engine: a line "
+            f"{GROUP}.motor is of a motor, {GROUP}.kind = engine of an engine: a line "
             "is turned by one of them; take "
             "excitation=engine_v20 or excitation=motor_and_load"
         )
     check_keys(values, KEYS)
     plunger, plunger_nodes = _read_pump(values["injection_pump"])
     return Engine(
-        cylinder=read(Cylinder, values["cylinder"], f"{PLACE}.cylinder"),
-        layout=read(Layout, values["layout"], f"{PLACE}.layout"),
+        cylinder=read(Cylinder, values["cylinder"], f"{GROUP}.cylinder"),
+        layout=read(Layout, values["layout"], f"{GROUP}.layout"),
         pressure=_read_pressure(values["pressure"]),
         crankcase_pressure=_number("crankcase_pressure_mpa", values),
         friction_mean_pressure=_number("friction_mean_pressure_mpa", values),
-        reference=read(Reference, values["reference"], f"{PLACE}.reference"),
+        reference=read(Reference, values["reference"], f"{GROUP}.reference"),
         throw_nodes=_whole_numbers("throw_nodes", values["throw_nodes"]),
         valve_trains={
             name: _read_train(name, value)
@@ -78,7 +78,7 @@ def read_engine(values: Section) -> Engine:
             name: read_named(Load, value, f"loads.{name}", "load")
             for name, value in named_groups("loads", values["loads"])
         },
-        dynamometer=read(Dynamometer, values["dynamometer"], f"{PLACE}.dynamometer"),
+        dynamometer=read(Dynamometer, values["dynamometer"], f"{GROUP}.dynamometer"),
     )
 
 
@@ -86,14 +86,14 @@ def check_keys(values: Section, keys: tuple[str, ...]) -> None:
     """Raise for keys of the group ``excitation`` that are unknown or missing."""
     for key in values:
         if key not in keys:
-            raise ConfigError(f"{PLACE}: unknown key '{key}'; known: {', '.join(keys)}")
+            raise ConfigError(f"{GROUP}: unknown key '{key}'; known: {', '.join(keys)}")
     if missing := [key for key in keys if key not in values]:
-        raise ConfigError(f"{PLACE}: missing {', '.join(missing)}")
+        raise ConfigError(f"{GROUP}: missing {', '.join(missing)}")
 
 
 def read_wheels(values: Section) -> dict[str, ToothedWheel]:
     """The toothed wheels of the group ``excitation``, by their names; none where it is null."""
-    check_group(PLACE, values)
+    check_group(GROUP, values)
     return {
         name: read_named(ToothedWheel, value, f"toothed_wheels.{name}", "toothed_wheel")
         for name, value in named_groups("toothed_wheels", values.get("toothed_wheels"))
@@ -102,15 +102,15 @@ def read_wheels(values: Section) -> dict[str, ToothedWheel]:
 
 def _read_pressure(values: Any) -> WiebeCycle | PressureFile:
     """The cycle, or the file in its place where one is given."""
-    check_group(f"{PLACE}.pressure", values)
+    check_group(f"{GROUP}.pressure", values)
     cycle = read(
         WiebeCycle,
         {key: value for key, value in values.items() if key != "file"},
-        f"{PLACE}.pressure",
+        f"{GROUP}.pressure",
     )
     if values.get("file") is None:
         return cycle
-    return read(PressureFile, {"file": values["file"]}, f"{PLACE}.pressure")
+    return read(PressureFile, {"file": values["file"]}, f"{GROUP}.pressure")
 
 
 def _read_train(name: str, values: Any) -> ValveTrain:
@@ -119,13 +119,13 @@ def _read_train(name: str, values: Any) -> ValveTrain:
 
 
 def _read_with_cam(
-    cls: type[Any], values: Any, place: str, left_out: tuple[str, ...] = ()
+    cls: type[Any], values: Any, key: str, left_out: tuple[str, ...] = ()
 ) -> Any:
     """A dataclass with a cam; keys of ``left_out`` are read elsewhere."""
-    check_group(f"{PLACE}.{place}", values)
+    check_group(f"{GROUP}.{key}", values)
     given = {key: values[key] for key in values if key not in ("cam", *left_out)}
-    cam = read_named(Cam, values.get("cam"), f"{place}.cam", "cam")
-    return read(cls, given, f"{PLACE}.{place}", cam=cam)
+    cam = read_named(Cam, values.get("cam"), f"{key}.cam", "cam")
+    return read(cls, given, f"{GROUP}.{key}", cam=cam)
 
 
 def _read_pump(values: Any) -> tuple[Plunger | None, dict[str, int]]:
@@ -135,13 +135,13 @@ def _read_pump(values: Any) -> tuple[Plunger | None, dict[str, int]]:
     """
     if values is None:
         return None, {}
-    check_group(f"{PLACE}.injection_pump", values)
+    check_group(f"{GROUP}.injection_pump", values)
     nodes = _whole_numbers("injection_pump.nodes", values.get("nodes"))
     cylinders = values.get("cylinders")
     is_list = isinstance(cylinders, list | tuple)
     if not is_list or not len(set(cylinders)) == len(cylinders) == len(nodes):
         raise ConfigError(
-            f"{PLACE}.injection_pump.cylinders must name a different cylinder for "
+            f"{GROUP}.injection_pump.cylinders must name a different cylinder for "
             f"each of its {len(nodes)} nodes"
         )
     plunger = _read_with_cam(
@@ -150,41 +150,39 @@ def _read_pump(values: Any) -> tuple[Plunger | None, dict[str, int]]:
     return plunger, dict(zip(cylinders, nodes, strict=True))
 
 
-def read_named(cls: type[Any], values: Any, place: str, name: str) -> Any:
-    """A dataclass whose own errors begin with ``name``: with the whole place instead."""
-    check_group(f"{PLACE}.{place}", values)
+def read_named(cls: type[Any], values: Any, key: str, name: str) -> Any:
+    """A dataclass whose own errors begin with ``name``: with the whole key instead."""
+    check_group(f"{GROUP}.{key}", values)
     try:
         return read(cls, values, name)
     except ConfigError as error:
-        raise ConfigError(f"{PLACE}.{place}{str(error).removeprefix(name)}") from None
+        raise ConfigError(f"{GROUP}.{key}{str(error).removeprefix(name)}") from None
 
 
 def named_groups(key: str, values: Any) -> list[tuple[str, Any]]:
     """Names and values of a group that may be null."""
     if values is None:
         return []
-    check_group(f"{PLACE}.{key}", values)
+    check_group(f"{GROUP}.{key}", values)
     return [(str(name), value) for name, value in values.items()]
 
 
-def check_group(place: str, values: Any) -> None:
+def check_group(key: str, values: Any) -> None:
     """Raise for anything that is no group of keys."""
     if not isinstance(values, Mapping):
-        raise ConfigError(
-            f"{place} = {values!r} must be a group of keys, not one value"
-        )
+        raise ConfigError(f"{key} = {values!r} must be a group of keys, not one value")
 
 
 def _whole_numbers(key: str, values: Any) -> tuple[int, ...]:
     if not isinstance(values, list | tuple) or not all(
         type(value) is int for value in values
     ):
-        raise ConfigError(f"{PLACE}.{key} = {values!r} is not a list of whole numbers")
+        raise ConfigError(f"{GROUP}.{key} = {values!r} is not a list of whole numbers")
     return tuple(values)
 
 
 def _number(key: str, values: Section) -> float:
     value = values[key]
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ConfigError(f"{PLACE}.{key} = {value!r} is not a number")
+        raise ConfigError(f"{GROUP}.{key} = {value!r} is not a number")
     return to_si(key, float(value))

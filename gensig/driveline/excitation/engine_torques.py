@@ -301,10 +301,10 @@ def _valve_torques(
     firing, parts = engine.layout.firing_angles(), []
     for train in engine.valve_trains.values():
         angle = CAM_RATIO * (cycle_angles(n_points) - train.opening)
-        torque_of_one = cam_torque(train.cam, angle, CAM_RATIO * speed)
+        unshifted = cam_torque(train.cam, angle, CAM_RATIO * speed)
         for bank, nodes in engine.valve_nodes.items():
             parts += [
-                (node, delayed(torque_of_one, firing[f"{bank}{throw + 1}"]))
+                (node, delayed(unshifted, firing[f"{bank}{throw + 1}"]))
                 for throw, node in enumerate(nodes)
             ]
     return parts

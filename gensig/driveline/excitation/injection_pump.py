@@ -40,7 +40,7 @@ class Plunger:
     indicated_efficiency: float
 
     def __post_init__(self) -> None:
-        place = "excitation.injection_pump"
+        group = "excitation.injection_pump"
         for key, value in (
             ("diameter_mm", self.diameter),
             ("delivery_pressure_mpa", self.delivery_pressure),
@@ -50,20 +50,20 @@ class Plunger:
         ):
             if not value > 0.0:
                 raise ConfigError(
-                    f"{place}.{key} = {from_si(key, value):g} must be positive"
+                    f"{group}.{key} = {from_si(key, value):g} must be positive"
                 )
         if not 0.0 < self.ramp_share <= 0.5:
             raise ConfigError(
-                f"{place}.ramp_share = {self.ramp_share:g} must be above 0 and at most 0.5"
+                f"{group}.ramp_share = {self.ramp_share:g} must be above 0 and at most 0.5"
             )
         if not 0.0 < self.indicated_efficiency < 1.0:
             raise ConfigError(
-                f"{place}.indicated_efficiency = {self.indicated_efficiency:g} must "
+                f"{group}.indicated_efficiency = {self.indicated_efficiency:g} must "
                 "lie between 0 and 1"
             )
         if not 0.0 <= self.lift_at_delivery < self.cam.lift:
             raise ConfigError(
-                f"{place}.lift_at_delivery_mm = {self.lift_at_delivery * 1e3:g} must "
+                f"{group}.lift_at_delivery_mm = {self.lift_at_delivery * 1e3:g} must "
                 "be at least 0 and below the cam's "
                 f"lift of {self.cam.lift * 1e3:g} mm"
             )

@@ -8,14 +8,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gensig.driveline.drive_line import DriveLine
-from gensig.driveline.excitation.engine import KEYS as ENGINE_KEYS
 from gensig.driveline.excitation.engine import (
-    PLACE,
+    GROUP,
     check_group,
     check_keys,
     named_groups,
     read_named,
 )
+from gensig.driveline.excitation.engine import KEYS as ENGINE_KEYS
 from gensig.driveline.excitation.line_torques import Load, Reference
 from gensig.driveline.excitation.motor_torques import MotorDrive, TorqueRipple
 from gensig.errors import ConfigError
@@ -55,13 +55,13 @@ def read_motor(values: Section, drive: DriveLine) -> MotorDrive:
     """
     if both := [key for key in values if key in ENGINE_KEYS and key not in KEYS]:
         raise ConfigError(
-            f"{PLACE}.{both[0]} is of an engine, {PLACE}.kind = {KIND} of a motor: a "
+            f"{GROUP}.{both[0]} is of an engine, {GROUP}.kind = {KIND} of a motor: a "
             "line is turned by one of them; "
             "take excitation=motor_and_load or excitation=engine_v20"
         )
     check_keys(values, KEYS)
     given = values["motor"]
-    check_group(f"{PLACE}.motor", given)
+    check_group(f"{GROUP}.motor", given)
     ripple = given.get("torque_ripple")
     if ripple is not None:
         ripple = read_named(
@@ -70,25 +70,25 @@ def read_motor(values: Section, drive: DriveLine) -> MotorDrive:
     motor = read(
         _Motor,
         {key: value for key, value in given.items() if key != "torque_ripple"},
-        f"{PLACE}.motor",
+        f"{GROUP}.motor",
         torque_ripple=ripple,
     )
     loads = {
-        name: read_named(Load, one, f"loads.{name}", "load")
-        for name, one in named_groups("loads", values["loads"])
+        name: read_named(Load, value, f"loads.{name}", "load")
+        for name, value in named_groups("loads", values["loads"])
     }
     for name, load in loads.items():
         if load.node not in drive.numbers:
             raise ConfigError(
-                f"{PLACE}.loads.{name}.node: {_no_node(drive, load.node)}"
+                f"{GROUP}.loads.{name}.node: {_no_node(drive, load.node)}"
             )
     return MotorDrive(
-        reference=read(Reference, values["reference"], f"{PLACE}.reference"),
+        reference=read(Reference, values["reference"], f"{GROUP}.reference"),
         motor_node=_node(drive, "motor_node", "a motor", drive.motor_node),
         load_node=_node(drive, "load_node", "its load", drive.load_node),
         slip=motor.slip,
         ripple=motor.torque_ripple,
-        load_law=read(_Load, values["load"], f"{PLACE}.load").law,
+        load_law=read(_Load, values["load"], f"{GROUP}.load").law,
         loads=loads,
     )
 
@@ -98,7 +98,7 @@ def _node(drive: DriveLine, key: str, what: str, node: int | None) -> int:
     if node is None:
         numbers = ", ".join(map(str, drive.numbers))
         raise ConfigError(
-            f"system.{key} = null: {PLACE}={KIND} needs the node of {what}, one of "
+            f"system.{key} = null: {GROUP}={KIND} needs the node of {what}, one of "
             f"{numbers}; {TOGETHER}"
         )
     if node not in drive.numbers:

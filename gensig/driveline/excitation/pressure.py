@@ -52,14 +52,14 @@ class WiebeCycle:
     intake_closing: float = unit("deg")
 
     def __post_init__(self) -> None:
-        place = "excitation.pressure"
+        group = "excitation.pressure"
         if not 0.0 < self.ambient_pressure <= self.boost_pressure:
             given = ", ".join(
                 f"{value * 1e-6:g}"
                 for value in (self.ambient_pressure, self.boost_pressure)
             )
             raise ConfigError(
-                f"{place}: 0 < ambient_pressure_mpa <= boost_pressure_mpa is needed, not {given}"
+                f"{group}: 0 < ambient_pressure_mpa <= boost_pressure_mpa is needed, not {given}"
             )
         for key, value, low, high in (
             ("exhaust_share", self.exhaust_share, 0.0, 2.0),
@@ -78,7 +78,7 @@ class WiebeCycle:
         ):
             if not low - 1e-9 <= value <= high + 1e-9:
                 raise ConfigError(
-                    f"{place}.{key} = {value:g} must lie in {low:g}..{high:g}"
+                    f"{group}.{key} = {value:g} must lie in {low:g}..{high:g}"
                 )
         if (
             self.combustion_begin + self.combustion_duration
@@ -86,7 +86,7 @@ class WiebeCycle:
         ):
             end = math.degrees(self.combustion_begin + self.combustion_duration)
             raise ConfigError(
-                f"{place}: combustion ends {end:g} degrees after top dead center, "
+                f"{group}: combustion ends {end:g} degrees after top dead center, "
                 "past exhaust_opening_deg = "
                 f"{math.degrees(self.exhaust_opening):g}; shorten combustion_duration_deg"
             )

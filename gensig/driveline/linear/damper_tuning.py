@@ -46,13 +46,13 @@ class NodeResponse:
 
     Parameters
     ----------
-    nodes : (place,) numbers of the nodes
+    nodes : (damper node,) numbers of the nodes
     frequency : (speed, order) rad/s
     mean : (speed,) N or N m           mean force of the element
     force : (speed, order)             its complex amplitudes without dampers
-    angle : (speed, order, place) rad  of the nodes without dampers
-    receptance : (speed, order, place, place) rad/(N m)
-    transfer : (speed, order, place)   force of the element per torque on a node
+    angle : (speed, order, damper node) rad  of the nodes without dampers
+    receptance : (speed, order, damper node, damper node) rad/(N m)
+    transfer : (speed, order, damper node)   force of the element per torque on a node
     """
 
     nodes: tuple[int, ...]
@@ -94,7 +94,7 @@ def response_at_nodes(
     element: int,
     torques: Callable[[float], Array],
     speeds: Iterable[float],
-    places: dict[int, int],
+    dof_of_node: dict[int, int],
     *,
     n_orders: int,
 ) -> NodeResponse:
@@ -102,15 +102,15 @@ def response_at_nodes(
 
     Parameters
     ----------
-    element : place among ``elements``
+    element : index in ``elements``
     torques : gives the torques (dof, point) over the cycle at a speed in rad/s
     speeds : (speed,) rad/s
-    places : degree of freedom by node number
+    dof_of_node : degree of freedom by node number
     n_orders : half orders taken
     """
-    dofs = list(places.values())
+    dofs = list(dof_of_node.values())
     direction = elements.directions[element]
-    own = elements.stiffness[element] + 1j * elements.loss[element]
+    complex_stiffness = elements.stiffness[element] + 1j * elements.loss[element]
     frequency, mean, solved = [], [], []
     for speed in speeds:
         torque = torques(speed)
@@ -123,9 +123,9 @@ def response_at_nodes(
         loads[:, dofs, np.arange(1, 1 + len(dofs))] = 1.0
         solved.append(np.linalg.solve(line.dynamic_stiffness(frequency[-1]), loads))
     response = np.array(solved)  # (speed, order, dof, load)
-    carried = own * np.einsum("d,sodl->sol", direction, response)
+    carried = complex_stiffness * np.einsum("d,sodl->sol", direction, response)
     return NodeResponse(
-        nodes=tuple(places),
+        nodes=tuple(dof_of_node),
         frequency=np.array(frequency),
         mean=np.array(mean),
         force=carried[..., 0],
@@ -146,7 +146,8 @@ def tune_dampers(
 
     Parameters
     ----------
-    most_inertia : (place,) kg m2    largest ring on each node; the smallest is a twentieth of it
+    most_inertia : (damper node,) kg m2
+        largest ring on each node; the smallest is a twentieth of it
     viscous : rings that the fluid alone holds, else by a spring too
 
     Notes
@@ -163,7 +164,7 @@ def tune_dampers(
     from scipy.optimize import differential_evolution, minimize
 
     if len(most_inertia) != len(seen.nodes) or not all(
-        0.0 < one < math.inf for one in most_inertia
+        0.0 < inertia < math.inf for inertia in most_inertia
     ):
         raise ConfigError(
             f"largest inertias {list(most_inertia)} kg m2: give a positive one for each damper"

@@ -86,7 +86,7 @@ def with_dampers(
                 second=len(nodes),
                 stiffness=damper.stiffness,
                 damping=damper.damping,
-                place=name,
+                location=name,
             )
         )
         nodes.append(Node(name=name, inertia=damper.ring_inertia))

@@ -156,10 +156,10 @@ def _directions(line: ShaftLine, n_coordinates: int, *, lateral: bool) -> Array:
 
 
 def _join(matrix: Array, shaft: Shaft, value: float) -> None:
-    one, other = shaft.first, shaft.second
-    matrix[[one, other], [one, other]] += value
-    matrix[one, other] -= value
-    matrix[other, one] -= value
+    first, second = shaft.first, shaft.second
+    matrix[[first, second], [first, second]] += value
+    matrix[first, second] -= value
+    matrix[second, first] -= value
 
 
 def _line_of_action(line: ShaftLine, mesh: GearMesh) -> float:

@@ -125,14 +125,14 @@ def with_viscous_losses(matrices: LineMatrices) -> LineMatrices:
         _quadratic(modes.shapes[elastic], matrices.loss_stiffness) / omega[elastic]
     )
     momentum = modes.shapes @ matrices.mass
-    own = matrices.mesh_loss_factor * np.sqrt(
+    loss_damping = matrices.mesh_loss_factor * np.sqrt(
         matrices.mesh_stiffness * matrices.mesh_mass
     )
     return replace(
         matrices,
         damping=matrices.damping + (momentum.T * rate) @ momentum,
         loss_stiffness=np.zeros_like(matrices.loss_stiffness),
-        mesh_damping=matrices.mesh_damping + own,
+        mesh_damping=matrices.mesh_damping + loss_damping,
         mesh_loss_factor=np.zeros_like(matrices.mesh_loss_factor),
     )
 

@@ -30,12 +30,12 @@ class Node:
 
     name: str
     inertia: float
-    place: str = ""  # where it was read, for messages
+    location: str = ""  # where it was read, for messages
 
     def __post_init__(self) -> None:
         if not 0.0 < self.inertia < math.inf:
             raise ConfigError(
-                f"{self.place or self.name}: inertia {self.inertia:g} kg m2 must be positive"
+                f"{self.location or self.name}: inertia {self.inertia:g} kg m2 must be positive"
             )
 
 
@@ -54,24 +54,26 @@ class Shaft:
     rigid: bool = False
     damping: float = 0.0
     loss_factor: float = 0.0
-    place: str = ""
+    location: str = ""
 
     def __post_init__(self) -> None:
-        place = self.place or f"shaft between nodes {self.first} and {self.second}"
+        location = (
+            self.location or f"shaft between nodes {self.first} and {self.second}"
+        )
         if self.first == self.second:
-            raise ConfigError(f"{place}: it joins a node to itself")
+            raise ConfigError(f"{location}: it joins a node to itself")
         if self.stiffness is None and not self.rigid:
             raise ConfigError(
-                f"{place}: it has no stiffness; give one, or make it rigid"
+                f"{location}: it has no stiffness; give one, or make it rigid"
             )
         if self.stiffness is not None and not 0.0 <= self.stiffness < math.inf:
             raise ConfigError(
-                f"{place}: stiffness {self.stiffness:g} N m/rad must not be negative"
+                f"{location}: stiffness {self.stiffness:g} N m/rad must not be negative"
             )
-        _check_losses(place, self.damping, self.loss_factor)
+        _check_losses(location, self.damping, self.loss_factor)
         if self.stiffness == self.damping == 0.0:
             raise ConfigError(
-                f"{place}: it has neither stiffness nor damping; give one of both"
+                f"{location}: it has neither stiffness nor damping; give one of both"
             )
 
 
@@ -116,25 +118,25 @@ class GearMesh:
     backlash: float = 0.0
     center_line: float = 0.0
     pressure_angle: float = 0.0
-    place: str = ""
+    location: str = ""
 
     def __post_init__(self) -> None:
-        place = self.place or f"mesh of gears {self.driving} and {self.driven}"
+        location = self.location or f"mesh of gears {self.driving} and {self.driven}"
         if not 0.0 < self.stiffness < math.inf:
             raise ConfigError(
-                f"{place}: mesh stiffness {self.stiffness:g} N/m must be positive"
+                f"{location}: mesh stiffness {self.stiffness:g} N/m must be positive"
             )
         if not 0.0 <= self.backlash < math.inf:
             raise ConfigError(
-                f"{place}: backlash {self.backlash:g} m must not be negative"
+                f"{location}: backlash {self.backlash:g} m must not be negative"
             )
-        _check_losses(place, self.damping, self.loss_factor)
+        _check_losses(location, self.damping, self.loss_factor)
 
 
-def _check_losses(place: str, damping: float, loss_factor: float) -> None:
+def _check_losses(location: str, damping: float, loss_factor: float) -> None:
     for name, value in (("damping", damping), ("loss factor", loss_factor)):
         if not 0.0 <= value < math.inf:
-            raise ConfigError(f"{place}: {name} {value:g} must not be negative")
+            raise ConfigError(f"{location}: {name} {value:g} must not be negative")
 
 
 def _check_numbers(name: str, numbers: tuple[int, ...], count: int, kind: str) -> None:
@@ -165,25 +167,25 @@ class ShaftLine:
         n_nodes, n_gears = len(self.nodes), len(self.gears)
         for shaft in self.shafts:
             ends = shaft.first, shaft.second
-            _check_numbers(shaft.place or "a shaft", ends, n_nodes, "node")
+            _check_numbers(shaft.location or "a shaft", ends, n_nodes, "node")
         for gear in self.gears:
             _check_numbers(gear.name, (gear.node,), n_nodes, "node")
         for mesh in self.meshes:
-            place = mesh.place or "a mesh"
-            _check_numbers(place, (mesh.driving, mesh.driven), n_gears, "gear")
-            one, other = self.gears[mesh.driving], self.gears[mesh.driven]
-            if one.node == other.node:
+            location = mesh.location or "a mesh"
+            _check_numbers(location, (mesh.driving, mesh.driven), n_gears, "gear")
+            driving, driven = self.gears[mesh.driving], self.gears[mesh.driven]
+            if driving.node == driven.node:
                 raise ConfigError(
-                    f"{place}: {one.name} and {other.name} turn with the same node"
+                    f"{location}: {driving.name} and {driven.name} turn with the same node"
                 )
-            expected = one.base_radius * other.n_teeth
+            expected = driving.base_radius * driven.n_teeth
             if not math.isclose(
-                expected, other.base_radius * one.n_teeth, rel_tol=1e-9
+                expected, driven.base_radius * driving.n_teeth, rel_tol=1e-9
             ):
                 raise ConfigError(
-                    f"{place}: the base radii of {one.name} and {other.name} are not as their "
-                    f"teeth, {one.n_teeth} and {other.n_teeth}; they have another module, "
-                    "pressure angle or helix angle"
+                    f"{location}: the base radii of {driving.name} and {driven.name} are not as "
+                    f"their teeth, {driving.n_teeth} and {driven.n_teeth}; "
+                    "they have another module, pressure angle or helix angle"
                 )
         _ = self._speeds  # refuses loops that lock
 
@@ -192,13 +194,13 @@ class ShaftLine:
         """Signed speed of every node over that of the first of its part, exactly, (node,)."""
         joints: list[list[tuple[int, Fraction, str]]] = [[] for _ in self.nodes]
         for shaft in self.shafts:
-            joints[shaft.first].append((shaft.second, Fraction(1), shaft.place))
-            joints[shaft.second].append((shaft.first, Fraction(1), shaft.place))
+            joints[shaft.first].append((shaft.second, Fraction(1), shaft.location))
+            joints[shaft.second].append((shaft.first, Fraction(1), shaft.location))
         for mesh in self.meshes:
-            one, other = self.gears[mesh.driving], self.gears[mesh.driven]
-            ratio = Fraction(-one.n_teeth, other.n_teeth)
-            joints[one.node].append((other.node, ratio, mesh.place))
-            joints[other.node].append((one.node, 1 / ratio, mesh.place))
+            driving, driven = self.gears[mesh.driving], self.gears[mesh.driven]
+            ratio = Fraction(-driving.n_teeth, driven.n_teeth)
+            joints[driving.node].append((driven.node, ratio, mesh.location))
+            joints[driven.node].append((driving.node, 1 / ratio, mesh.location))
         speeds: dict[int, Fraction] = {}
         for first in range(len(self.nodes)):
             if first in speeds:
@@ -207,16 +209,17 @@ class ShaftLine:
             waiting = [first]
             while waiting:
                 node = waiting.pop()
-                for mate, ratio, place in joints[node]:
+                for mate, ratio, location in joints[node]:
                     speed = speeds[node] * ratio
                     if mate not in speeds:
                         speeds[mate] = speed
                         waiting.append(mate)
                     elif speeds[mate] != speed:
                         raise ConfigError(
-                            f"{place or 'a loop'}: this joint closes a loop that locks: it would "
-                            f"turn {self.nodes[mate].name} at {float(speed):g} of the first "
-                            f"node's speed, the rest of the loop at {float(speeds[mate]):g}; "
+                            f"{location or 'a loop'}: this joint closes a loop that locks: "
+                            f"it would turn {self.nodes[mate].name} at {float(speed):g} "
+                            f"of the first node's speed, "
+                            f"the rest of the loop at {float(speeds[mate]):g}; "
                             "change teeth or leave the joint out"
                         )
         return tuple(speeds[node] for node in range(len(self.nodes)))
@@ -239,8 +242,8 @@ class ShaftLine:
             ]
         leader = np.arange(len(self.nodes))
         for first, second in joints:
-            one, other = sorted((leader[first], leader[second]))
-            leader[leader == other] = one
+            kept, merged = sorted((leader[first], leader[second]))
+            leader[leader == merged] = kept
         return tuple(
             tuple(np.flatnonzero(leader == first).tolist())
             for first in np.unique(leader)

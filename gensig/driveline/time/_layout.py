@@ -15,7 +15,7 @@ from gensig.dynamics._vector import inlined
 (
     ROLL_DOF, N_PAIRS, FIRST, NODES, AT_TABLE, AT_ROWS, AT_COAST_ROWS, TEETH_A, TEETH_B,
     AT_KIND_A, AT_KIND_B, AT_ERROR_A, AT_ERROR_B, START_A, START_B, N_KINDS_B, N_SPRINGS,
-    AT_DEPTH, N_PLACES,
+    AT_DEPTH, N_INTEGERS,
 ) = range(19)  # fmt: skip
 # what is gathered of a pair: gap and stiffness of each of its springs, each with how fast it
 # grows as the mesh rolls on
@@ -41,13 +41,13 @@ def spring_column(spring):
 
 
 @inlined
-def node_place(place, row, n_cells, cell):
-    """Place in ``Meshes.table`` of the node before a cell of a row.
+def node_offset(integers, row, n_cells, cell):
+    """Offset in ``Meshes.table`` of the node before a cell of a row.
 
-    ``place`` are the whole numbers of the mesh.
+    ``integers`` are the whole numbers of the mesh.
     """
-    return place[AT_TABLE] + (row * (n_cells + 1) + cell) * spring_column(
-        place[N_SPRINGS]
+    return integers[AT_TABLE] + (row * (n_cells + 1) + cell) * spring_column(
+        integers[N_SPRINGS]
     )
 
 
@@ -90,8 +90,8 @@ class Factor(NamedTuple):
 
 
 class Meshes(NamedTuple):
-    """All meshes: ``number`` (mesh, N_NUMBERS), ``place`` (mesh, N_PLACES), and flat arrays for
-    all of them.
+    """All meshes: ``number`` (mesh, N_NUMBERS), ``integers`` (mesh, N_INTEGERS), and flat
+    arrays for all of them.
 
     ``table`` holds, node after node of row after row, the gap in m and the stiffness of every
     spring in N/m, each with its slope per cell; ``depth`` where its springs begin beyond the gap,
@@ -100,7 +100,7 @@ class Meshes(NamedTuple):
     """
 
     number: Any
-    place: Any
+    integers: Any
     table: Any
     depth: Any
     rows: Any
@@ -158,7 +158,7 @@ class Line(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Scratch of the core: (dof,), then (mesh,), then as their places say."""
+    """Scratch of the core: (dof,), then (mesh,), then of other shapes."""
 
     ahead_q: Any
     ahead_v: Any

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from gensig.driveline.time import _layout as layout
-from gensig.driveline.time._layout import COAST, DRIVE, node_place, spring_column
+from gensig.driveline.time._layout import COAST, DRIVE, node_offset, spring_column
 from gensig.dynamics._vector import compiled
 
 MOST_ROUNDS = 60
@@ -51,42 +51,42 @@ def gather(meshes, mesh, flank, turned, within, pairs):
     -------
     up to where what was gathered is all that touches, m
     """
-    place = meshes.place[mesh]
+    integers = meshes.integers[mesh]
     first, n_nodes, n_pairs = (
-        place[layout.FIRST],
-        place[layout.NODES],
-        place[layout.N_PAIRS],
+        integers[layout.FIRST],
+        integers[layout.NODES],
+        integers[layout.N_PAIRS],
     )
-    sense, at_rows = 1, place[layout.AT_ROWS]
+    sense, at_rows = 1, integers[layout.AT_ROWS]
     if flank == COAST:
-        sense, at_rows = -1, place[layout.AT_COAST_ROWS]
+        sense, at_rows = -1, integers[layout.AT_COAST_ROWS]
         turned = meshes.number[mesh, layout.MIRROR] - turned
     newest = math.floor(turned) - first
     n_cells = n_pairs * n_nodes
-    n_springs, at_depth = place[layout.N_SPRINGS], place[layout.AT_DEPTH]
+    n_springs, at_depth = integers[layout.N_SPRINGS], integers[layout.AT_DEPTH]
     n_columns, reach = spring_column(n_springs), np.inf
     if n_springs > 1:
         reach = within + meshes.depth[at_depth + 1]
     for j in range(n_pairs):
         index = newest - j
-        tooth_a = (place[layout.START_A] + sense * index) % place[layout.TEETH_A]
-        tooth_b = (place[layout.START_B] + sense * index) % place[layout.TEETH_B]
-        kind_a = meshes.kind[place[layout.AT_KIND_A] + tooth_a]
-        kind_b = meshes.kind[place[layout.AT_KIND_B] + tooth_b]
-        row = meshes.rows[at_rows + kind_a * place[layout.N_KINDS_B] + kind_b]
+        tooth_a = (integers[layout.START_A] + sense * index) % integers[layout.TEETH_A]
+        tooth_b = (integers[layout.START_B] + sense * index) % integers[layout.TEETH_B]
+        kind_a = meshes.kind[integers[layout.AT_KIND_A] + tooth_a]
+        kind_b = meshes.kind[integers[layout.AT_KIND_B] + tooth_b]
+        row = meshes.rows[at_rows + kind_a * integers[layout.N_KINDS_B] + kind_b]
         here = pairs[mesh, flank, j]
         if row < 0:
             here[layout.GAP] = np.inf
             continue
         x = (turned - (index + first)) * n_nodes
         cell = min(max(int(x), 0), n_cells - 1)
-        low = node_place(place, row, n_cells, cell)
+        low = node_offset(integers, row, n_cells, cell)
         high = low + n_columns
         between(meshes.table, low, high, x - cell, sense * n_nodes, here[layout.GAP :])
         if flank == DRIVE:
             here[layout.GAP] += (
-                meshes.error[place[layout.AT_ERROR_A] + tooth_a]
-                + meshes.error[place[layout.AT_ERROR_B] + tooth_b]
+                meshes.error[integers[layout.AT_ERROR_A] + tooth_a]
+                + meshes.error[integers[layout.AT_ERROR_B] + tooth_b]
             )
         for spring in range(n_springs):
             if here[layout.GAP] + meshes.depth[at_depth + spring] > reach:
@@ -163,9 +163,9 @@ def mesh_law(meshes, mesh, turned, roll_rate, approach, rate, law, work):
     ``work.reach`` (mesh, flank) says up to where ``work.pairs`` holds all that touches for this
     roll, -inf where it holds nothing yet; what is missing is gathered when it may touch.
     """
-    number, place, total = meshes.number[mesh], meshes.place[mesh], law[mesh]
-    n_pairs, at_depth = place[layout.N_PAIRS], place[layout.AT_DEPTH]
-    depth = meshes.depth[at_depth : at_depth + place[layout.N_SPRINGS]]
+    number, integers, total = meshes.number[mesh], meshes.integers[mesh], law[mesh]
+    n_pairs, at_depth = integers[layout.N_PAIRS], integers[layout.AT_DEPTH]
+    depth = meshes.depth[at_depth : at_depth + integers[layout.N_SPRINGS]]
     total[:] = 0.0
     for flank in range(layout.N_FLANKS):
         within, least, sense = approach, number[layout.LEAST_GAP], 1.0

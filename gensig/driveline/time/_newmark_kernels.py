@@ -76,16 +76,16 @@ def solve(factor, x):
             x[i] = 0.0
         add_full(factor.inverse, 1.0, factor.spare, x)
         return
-    for place in range(n):
-        i = factor.turn[place]
+    for k in range(n):
+        i = factor.turn[k]
         at, start, value = factor.first[i], i - factor.reach[i], x[i]
         for j in range(factor.reach[i]):
             value -= factor.lower[at + j] * x[start + j]
         x[i] = value
     for i in range(n):
         x[i] *= factor.inverse_pivot[i]
-    for place in range(n - 1, -1, -1):
-        i = factor.turn[place]
+    for k in range(n - 1, -1, -1):
+        i = factor.turn[k]
         at, start, value = factor.first[i], i - factor.reach[i], x[i]
         for j in range(factor.reach[i]):
             x[start + j] -= factor.lower[at + j] * value
@@ -192,7 +192,7 @@ def push(line, torques, angle, gain, knot, share, q, force):
 def roll(meshes, angle, speed, q, v, turned, roll_rate):
     """Roll of the meshes in pitches, and its rate, (mesh,) each."""
     for m in range(len(turned)):
-        number, dof = meshes.number[m], meshes.place[m, layout.ROLL_DOF]
+        number, dof = meshes.number[m], meshes.integers[m, layout.ROLL_DOF]
         per_angle, per_rad = (
             number[layout.NOMINAL_PITCHES],
             number[layout.PITCHES_PER_RAD],
@@ -268,9 +268,9 @@ def advance(
     )
     per_step, half = NEWMARK.damping / step, 0.5 * step
     angle, speed, gain, knot, share = nominal(course, first_step * step, 0)
-    for place in range(first_step, first_step + n_steps):
+    for step_index in range(first_step, first_step + n_steps):
         speed_0 = speed
-        angle, speed, gain, knot, share = nominal(course, (place + 1) * step, knot)
+        angle, speed, gain, knot, share = nominal(course, (step_index + 1) * step, knot)
         for i in range(n):
             ahead_v[i] = v[i] + step * mean[i]
             ahead_q[i] = q[i] + step * (v[i] + half * mean[i])
@@ -288,7 +288,7 @@ def advance(
                 meshes, m, turned[m], roll_rate[m], approach_1[m], rate_1, law_1, work
             )
             along = law[m, layout.ALONG] + law_1[m, layout.ALONG]
-            moved[meshes.place[m, layout.ROLL_DOF]] += (
+            moved[meshes.integers[m, layout.ROLL_DOF]] += (
                 along * meshes.number[m, layout.PITCHES_PER_RAD]
             )
             for p in range(line.direction.first[m], line.direction.first[m + 1]):
@@ -313,7 +313,7 @@ def advance(
             work,
         )
         if rounds < 0:
-            return place
+            return step_index
         sums[layout.ROUNDS] += rounds
         for m in range(n_meshes):
             grown = law_1[m, layout.FORCE] - law[m, layout.FORCE]
@@ -323,13 +323,15 @@ def advance(
             kind, i = channels[c]
             if kind == ANGLE:
                 # of the cubic through the angles and speeds at both ends
-                out[place - first_step, c] = q[i] + moved[i] / 3.0 + step * v[i] / 6.0
+                out[step_index - first_step, c] = (
+                    q[i] + moved[i] / 3.0 + step * v[i] / 6.0
+                )
             elif kind == SPEED:
-                out[place - first_step, c] = moved[i] / step
+                out[step_index - first_step, c] = moved[i] / step
             elif kind == ACCELERATION:
-                out[place - first_step, c] = per_step * (moved[i] / step - v[i])
+                out[step_index - first_step, c] = per_step * (moved[i] / step - v[i])
             else:
-                out[place - first_step, c] = 0.5 * (
+                out[step_index - first_step, c] = 0.5 * (
                     law[i, layout.FORCE] + law_1[i, layout.FORCE]
                 )
         put_in, lost = 0.0, 0.0

@@ -145,7 +145,7 @@ def elimination_order(line: GearedLine) -> Index:
 def pack_meshes(line: GearedLine, order: Index) -> Meshes:
     """All meshes of the line, its degrees of freedom in ``order``."""
     number = np.zeros((len(line.meshes), layout.N_NUMBERS))
-    place = np.zeros((len(line.meshes), layout.N_PLACES), dtype=np.int64)
+    integers = np.zeros((len(line.meshes), layout.N_INTEGERS), dtype=np.int64)
     numbers, indices = np.empty(0), np.empty(0, dtype=np.int64)
     parts: dict[str, list[NDArray]] = {
         "table": [numbers],
@@ -169,7 +169,7 @@ def pack_meshes(line: GearedLine, order: Index) -> Meshes:
             abs(turning) * per_rad, np.sign(turning) * per_rad, mesh.mirror,
             least_gap + sum(error.min() for error in mesh.errors), least_gap,
         )  # fmt: skip
-        place[m] = (
+        integers[m] = (
             at_of[mesh.roll_dof], mesh.n_pairs, mesh.first_pitch,
             (mesh.stiffness.shape[1] - 1) // mesh.n_pairs, put("table", _columns(mesh).ravel()),
             put("rows", mesh.rows.ravel()), put("rows", mesh.coast_rows.ravel()), n_a, n_b,
@@ -180,7 +180,7 @@ def pack_meshes(line: GearedLine, order: Index) -> Meshes:
         if mesh.rows.shape != mesh.coast_rows.shape:
             raise ConfigError(f"mesh '{mesh.name}': rows and coast_rows must be alike")
     flat = {name: np.concatenate(values) for name, values in parts.items()}
-    return Meshes(number=number, place=place, **flat)
+    return Meshes(number=number, integers=integers, **flat)
 
 
 def _columns(mesh: LineMesh) -> Array:

@@ -220,7 +220,7 @@ def pair_mesh(
     pair, kinds = table.pair, (table.pinion.kind, table.wheel.kind)
     n_kinds = len(table.pinion.compliance), len(table.wheel.compliance)
     n_nodes = len(table.position)
-    own = (
+    pair_compliance = (
         _summed(table.pinion.compliance, table.wheel.compliance)
         - table.shared_compliance
     )
@@ -231,7 +231,7 @@ def pair_mesh(
         name=name,
         direction=direction,
         roll_dof=roll_dof,
-        stiffness=(1.0 / own).reshape(-1, n_nodes),
+        stiffness=(1.0 / pair_compliance).reshape(-1, n_nodes),
         gap=gap.reshape(-1, n_nodes),
         rows=np.where(present, rows, -1),
         coast_rows=np.where(present, 0, -1),
@@ -314,6 +314,6 @@ def _quarter(drives: bool) -> float:
     return 0.5 * drives - 0.25
 
 
-def _summed(one: Array, other: Array) -> Array:
+def _summed(pinion: Array, wheel: Array) -> Array:
     """(kind, kind, node) of what both gears add."""
-    return one[:, None, :] + other[None, :, :]
+    return pinion[:, None, :] + wheel[None, :, :]

@@ -249,12 +249,12 @@ class _Run:
             row[:] = KINDS.index(kind), number
             if kind != "mesh_force":
                 row[1] = at_of[number]
-        self.place, self.n_steps, self.energy = 0, 0, 0.0
+        self.step_index, self.n_steps, self.energy = 0, 0, 0.0
 
-    def begin(self, place: int) -> None:
-        """Look at the start, ``place`` steps from time 0."""
-        self.place = place
-        time = place * self.solver.step
+    def begin(self, step_index: int) -> None:
+        """Look at the start, ``step_index`` steps from time 0."""
+        self.step_index = step_index
+        time = step_index * self.solver.step
         kernels.look(
             self.packed,
             self.meshes,
@@ -274,7 +274,7 @@ class _Run:
         """Integrate on, and give out the means of channels over every step, (step, column)."""
         failed = kernels.advance(
             *(self.packed, self.meshes, self.torques, self.course, self.state),
-            *(self.solver.step, self.place, n_steps, channels, out),
+            *(self.solver.step, self.step_index, n_steps, channels, out),
             *(self.tally, self.sums, self.work),
         )
         q, v, *_ = self.state
@@ -283,7 +283,7 @@ class _Run:
                 "line: the mesh forces do not converge at "
                 f"{failed * self.solver.step:.6g} s; raise the oversampling"
             )
-        self.place += n_steps
+        self.step_index += n_steps
         self.n_steps += n_steps
         if not max(np.abs(q).max(), np.abs(v).max()) < OUT_OF_BOUNDS:
             worst = self.line.names[
@@ -291,7 +291,7 @@ class _Run:
             ]
             raise SimulationError(
                 f"line: '{worst}' left all bounds before "
-                f"{self.place * self.solver.step:.6g} s; the torques are not "
+                f"{self.step_index * self.solver.step:.6g} s; the torques are not "
                 f"balanced, or the step is too long"
             )
 

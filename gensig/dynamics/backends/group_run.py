@@ -46,12 +46,12 @@ class GroupRun:
         self.center[lane], self.fresh[lane], self.lost[lane] = 0.0, 1.0, 0.0
 
     def take(self, other: GroupRun, lanes: NDArray[np.bool_]) -> None:
-        """Copy the state of some lanes, (lane,), from another run; ``again`` must follow."""
+        """Copy the state of some lanes, (lane,), from another run; ``restarted`` must follow."""
         self.state[:, :, lanes] = other.state[:, :, lanes]
         self.center[lanes] = other.center[lanes]
         self.fresh[lanes] = 1.0
 
-    def again(self) -> GroupRun:
+    def restarted(self) -> GroupRun:
         """A copy of the run that reads its tables anew, to continue at another step."""
         other = copy.deepcopy(self)
         other.lost[:], other.fresh[:] = 0.0, 1.0

@@ -163,7 +163,7 @@ def settled(
     careful = [(min(oversampling, max(CAREFUL, n)), until) for n, until in stages]
     if bounced.any() and careful != stages:
         run.take(run_stages(run, lanes, begins, careful, steps)[0], bounced)
-    return run.again()
+    return run.restarted()
 
 
 def run_stages(
@@ -187,7 +187,7 @@ def run_stages(
     """
     now, lost = min(begins), np.zeros(len(lanes))
     for n_steps, until in stages:
-        run, (group, step) = run.again(), steps.at(n_steps)
+        run, (group, step) = run.restarted(), steps.at(n_steps)
         for begin in sorted({begin for begin in begins if now <= begin < until}):
             run.advance(group, step, now * n_steps, (begin - now) * n_steps)
             for lane, dynamics in enumerate(lanes):
@@ -211,7 +211,7 @@ def recorded(
     fine, n_samples = integration.oversampling, integration.n_samples
     low_pass, (group, step) = decimator(fine), steps.at(fine)
     run.advance(group, step, end * fine, (-low_pass.margin - end) * fine - 1)
-    checking = run.again()
+    checking = run.restarted()
     run.lost[:] = 0.0
     acceleration, angle, seen = run.record(
         group, step, low_pass, n_samples, with_mesh_state=integration.with_mesh_state

@@ -82,13 +82,13 @@ class WearCase:
     @property
     def shape(self) -> tuple[int, int, int]:
         """Gears, slices and nodes of what is worn off."""
-        return 2, len(self.mesh.slice_place), len(self.path.position)
+        return 2, len(self.mesh.slice_middle), len(self.path.position)
 
     def new_flanks(self) -> Array:
         """No wear, (2, slice, node) m: pinion, wheel."""
         return np.zeros(self.shape)
 
-    def under(self, torque: float) -> WearCase:
+    def with_torque(self, torque: float) -> WearCase:
         """Same case with another torque in N m."""
         return replace(self, torque=torque)
 

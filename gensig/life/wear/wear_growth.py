@@ -52,7 +52,7 @@ def wear_table(case: WearCase, least: float, greatest: float) -> WearTable:
     torques = np.array([least])
     if least != greatest:
         torques = np.geomspace(least, greatest, N_TORQUES)
-    lives = tuple(wear_life(case.under(float(torque))) for torque in torques)
+    lives = tuple(wear_life(case.with_torque(float(torque))) for torque in torques)
     # a limit of the transmission error may end lives at unlike depths: the least of them ends all
     sizes = np.linspace(0.0, min(life.threshold for life in lives), N_DEPTHS)
     reached = tuple(
@@ -112,6 +112,6 @@ def _between(torques: Array, values: Array, torque: float) -> Array:
 
 
 def _row(values: Array, at: float) -> Array:
-    """Row of ``values`` (row, ...) at a place between rows, linear."""
+    """Row of ``values`` (row, ...) at a position between rows, linear."""
     low = min(int(at), len(values) - 2)
     return values[low] + (at - low) * (values[low + 1] - values[low])

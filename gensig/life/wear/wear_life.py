@@ -152,7 +152,7 @@ def worn_flanks(
         )
     depths = []
     for interval, load in zip(np.diff(turns, prepend=0.0), torque, strict=True):
-        loaded = case.under(float(load))
+        loaded = case.with_torque(float(load))
         depth = _depth_at(loaded, depth, np.array([interval]))[0]
         depths.append(depth)
     return np.stack(depths)

@@ -110,7 +110,7 @@ def path_loads(mesh: SlicedMesh, path: FlankPath) -> PathLoads:
 
     Phases at the nodes themselves for one slice, else equally spaced.
     """
-    n_slices, nodes = len(mesh.slice_place), path.position
+    n_slices, nodes = len(mesh.slice_middle), path.position
     roll = nodes
     if n_slices > 1:
         roll = (

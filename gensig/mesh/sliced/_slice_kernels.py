@@ -68,13 +68,13 @@ def solve_slices(
         np.zeros((n_pairs, n_slices), np.bool_),
     )
     lift, rest = np.empty((n_pairs, n_slices)), np.empty((n_pairs, n_slices))
-    own, between = np.empty((n_pairs, n_slices)), np.empty((n_pairs, n_slices))
+    support, between = np.empty((n_pairs, n_slices)), np.empty((n_pairs, n_slices))
     per_pivot = np.empty(n_slices)
     n_unsettled = 0
     for k in range(n_phases):
         first = np.inf
         for i in range(n_pairs):
-            _stiffen(structure[k, i], breadth, length_squared, own[i], between[i])
+            _stiffen(structure[k, i], breadth, length_squared, support[i], between[i])
             for j in range(n_slices):
                 contact[i, j] = factor * (constant[k, i, j] - log_weight * np.log(even))
                 bearing[i, j] = width[k, i, j] > 0.0 and gap[k, i, j] < np.inf
@@ -91,7 +91,7 @@ def solve_slices(
                 if not bearing[i].any():
                     continue
                 _deflections(
-                    own[i],
+                    support[i],
                     between[i],
                     breadth,
                     contact[i],
@@ -178,7 +178,11 @@ def bite_forces(
     n_nodes, n_slices = gap.shape
     contact, bearing = np.empty(n_slices), np.zeros(n_slices, np.bool_)
     lift, rest = np.empty(n_slices), np.empty(n_slices)
-    own, between, per_pivot = np.empty(n_slices), np.empty(n_slices), np.empty(n_slices)
+    support, between, per_pivot = (
+        np.empty(n_slices),
+        np.empty(n_slices),
+        np.empty(n_slices),
+    )
     light = np.log(LEAST_INTENSITY * even)
     n_unsettled = 0
     for k in range(n_nodes):
@@ -190,7 +194,7 @@ def bite_forces(
         if not first[k] <= reach:
             continue
         bearing[:] = False
-        _stiffen(structure[k], breadth, length_squared, own, between)
+        _stiffen(structure[k], breadth, length_squared, support, between)
         for knot in range(depth.shape[0]):
             for j in range(n_slices):
                 if not bearing[j]:
@@ -201,7 +205,7 @@ def bite_forces(
             last, settled = 0.0, False
             for _ in range(ROUNDS):
                 _deflections(
-                    own,
+                    support,
                     between,
                     breadth,
                     contact,
@@ -240,11 +244,11 @@ def bite_forces(
 
 
 @_compiled
-def _stiffen(structure, breadth, length_squared, own, between):
+def _stiffen(structure, breadth, length_squared, support, between):
     """Writes the stiffness of every slice's structure and of its tie to the next, (slice,) N/m."""
     n_slices = structure.shape[0]
     for j in range(n_slices):
-        own[j] = breadth[j] / structure[j]
+        support[j] = breadth[j] / structure[j]
         between[j] = 0.0
         if j < n_slices - 1:
             between[j] = (
@@ -256,7 +260,7 @@ def _stiffen(structure, breadth, length_squared, own, between):
 
 @_compiled
 def _deflections(
-    own, between, breadth, contact, gap, first, bearing, per_pivot, lift, rest
+    support, between, breadth, contact, gap, first, bearing, per_pivot, lift, rest
 ):
     """Writes the deflection of one pair's structure: lift x (approach - first gap) - rest,
     (slice,).
@@ -265,11 +269,11 @@ def _deflections(
     tridiagonal system, solved for the part proportional to the approach and for the rest (Thomas;
     the pivots are positive here).
     """
-    n_slices = own.shape[0]
+    n_slices = support.shape[0]
     before = 0.0
     for j in range(n_slices):
         pressed = breadth[j] / contact[j] if bearing[j] else 0.0
-        pivot = own[j] + before + between[j] + pressed
+        pivot = support[j] + before + between[j] + pressed
         lift[j] = pressed
         rest[j] = pressed * (gap[j] - first) if bearing[j] else 0.0
         if j > 0:

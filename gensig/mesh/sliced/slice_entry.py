@@ -36,12 +36,14 @@ def over_slice(
     least = np.lib.stride_tricks.sliding_window_view(first, n_looks + 1).min(axis=1)
     mean = np.zeros((n_left, len(depth)))
     for j in range(n_looks + 1):
-        own = begun[j : j + n_left]
+        forces = begun[j : j + n_left]
         bite = np.clip((least - first[j : j + n_left])[:, None] + depth, 0.0, depth[-1])
         chord = np.clip(
             np.searchsorted(knots, bite, side="right") - 1, 0, len(depth) - 1
         )
-        low, high = (np.take_along_axis(own, chord + more, axis=1) for more in (0, 1))
+        low, high = (
+            np.take_along_axis(forces, chord + more, axis=1) for more in (0, 1)
+        )
         share = (bite - knots[chord]) / np.diff(knots)[chord]
         mean += weight[j] / n_looks * (low + share * (high - low))
     return least, mean

@@ -158,7 +158,7 @@ def _softening(
     """Compliance above the sound tooth's per width, (slice, node) m2/N."""
     in_plane, gear = material.in_plane(options.elasticity), tooth.gear
     nodes = np.stack([flank.curvature, structure])
-    (curvature, rest), place = np.unique(nodes, axis=1, return_inverse=True)
+    (curvature, rest), inverse = np.unique(nodes, axis=1, return_inverse=True)
     softer = opened = np.zeros((1, len(curvature)))
     if tooth.material_loss.any():
         of_loss = _loss_compliance(tooth, curvature, in_plane, options)
@@ -174,7 +174,7 @@ def _softening(
         opened = _scaled(local, whole, rest / gear.face_width, np.diff(edges))
     softening = np.empty((len(edges) - 1, len(curvature)))
     softening[:] = gear.face_width * (softer + opened)
-    return softening[:, place.ravel()]
+    return softening[:, inverse.ravel()]
 
 
 def _loss_compliance(

@@ -80,7 +80,7 @@ class SlicedMesh:
         return np.diff(self.edges)
 
     @property
-    def slice_place(self) -> Array:
+    def slice_middle(self) -> Array:
         """Middle of each slice from the end that enters first, (slice,) m."""
         return 0.5 * (self.edges[1:] + self.edges[:-1])
 
@@ -96,8 +96,8 @@ class SlicedMesh:
     def lag(self) -> Array:
         """Lag of each slice's phase, (slice,) m along the path."""
         if self.slices.slices_in_phase:
-            return np.zeros_like(self.slice_place)
-        return self.slice_place * math.tan(self.pair.base_helix_angle)
+            return np.zeros_like(self.slice_middle)
+        return self.slice_middle * math.tan(self.pair.base_helix_angle)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -136,7 +136,7 @@ def sliced_mesh(
     Parameters
     ----------
     deviation : (slice, node) m    of both flanks of all teeth together from perfect flanks, at
-        the table's positions, in the middle of slices of equal width (`slice_places`)
+        the table's positions, in the middle of slices of equal width (`slice_middles`)
     teeth : the faulty teeth by (gear, tooth), from ``faulty_teeth``
 
     Raises
@@ -146,17 +146,17 @@ def sliced_mesh(
     teeth = teeth or {}
     check_independent(teeth.values(), slices)
     edges = merged_edges(pair, slices.n_slices, teeth.values())
-    place = 0.5 * (edges[1:] + edges[:-1])
+    middles = 0.5 * (edges[1:] + edges[:-1])
     position = node_positions(pair, options)
     structure, shared = _structure(pair, material, options)
     on_path = np.clip(position, 0.0, pair.path_of_contact)
     law = contact_law(pair, on_path, material, options)
-    gap = np.zeros((len(place), len(position)))
+    gap = np.zeros((len(middles), len(position)))
     if options.law != "paper":  # there the edge of the field of action ends contact
         gap += corner_gap_by_pinion(pair, position)
     if deviation is not None:
         even = np.broadcast_to(deviation, (slices.n_slices, len(position)))
-        gap += _across(slice_places(pair, slices), even, place)
+        gap += _across(slice_middles(pair, slices), even, middles)
     sides = slices_of_gears(pair, material, options, teeth, edges, structure)
     return SlicedMesh(
         pair=pair,
@@ -175,18 +175,18 @@ def sliced_mesh(
     )
 
 
-def _across(known: Array, values: Array, place: Array) -> Array:
+def _across(known: Array, values: Array, middles: Array) -> Array:
     """Values (slice, node) interpolated across the face, linear beyond the outer two positions."""
-    if len(place) == len(known):
+    if len(middles) == len(known):
         return values
     if len(known) == 1:
-        return np.repeat(values, len(place), axis=0)
-    left = np.clip(np.searchsorted(known, place) - 1, 0, len(known) - 2)
-    part = ((place - known[left]) / (known[left + 1] - known[left]))[:, None]
+        return np.repeat(values, len(middles), axis=0)
+    left = np.clip(np.searchsorted(known, middles) - 1, 0, len(known) - 2)
+    part = ((middles - known[left]) / (known[left + 1] - known[left]))[:, None]
     return (1.0 - part) * values[left] + part * values[left + 1]
 
 
-def slice_places(pair: GearPair, slices: SliceOptions) -> Array:
+def slice_middles(pair: GearPair, slices: SliceOptions) -> Array:
     """Middle of every slice from the end that enters first, (slice,) m."""
     edges = np.linspace(0.0, pair.face_width, slices.n_slices + 1)
     return 0.5 * (edges[1:] + edges[:-1])
@@ -198,7 +198,7 @@ def _structure(
 ) -> tuple[Array, float]:
     """Unshared compliance of sound teeth and bodies per width (node,) m2/N, and shared, m/N."""
     clipped = np.clip(node_positions(pair, options), 0.0, pair.path_of_contact)
-    on_path, place = np.unique(clipped, return_inverse=True)
+    on_path, inverse = np.unique(clipped, return_inverse=True)
     in_plane = material.in_plane(options.elasticity)
     whole = np.zeros_like(on_path)
     for side, gear in pair.gears.items():
@@ -213,7 +213,7 @@ def _structure(
             f"{whole.min() / pair.face_width:.3g} m/N; use a larger bore_radius_mm or "
             "mesh.pair_coupling=sum"
         )
-    return left[place], shared
+    return left[inverse], shared
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

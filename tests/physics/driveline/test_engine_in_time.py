@@ -38,7 +38,7 @@ def passage():
     """Sweep through the second mode, which order 5 meets at 825 r/min; teeth do not part."""
     line = engine("system.backlash_um=0", "system.loss_factor.gear_mesh=0")
     return line, sweep_response(
-        line, LOW, HIGH, SECONDS, 0.0, own={}, nodes=(FLYWHEEL,), n_orders=20
+        line, LOW, HIGH, SECONDS, 0.0, tabulated={}, nodes=(FLYWHEEL,), n_orders=20
     )
 
 
@@ -95,7 +95,7 @@ def test_speeds_that_make_no_sweep_are_refused(low, high, seconds, message):
             high * RPM,
             seconds,
             0.0,
-            own={},
+            tabulated={},
             nodes=(FLYWHEEL,),
             n_orders=10,
         )

@@ -64,7 +64,7 @@ def running(lateral, teeth):
     engine = read_engine_line(config)
     own = tabulated_meshes(engine, config, SPEED, TORQUE)
     course = steady_course(SPEED, TORQUE)
-    line = running_line(engine, course, governor=GOVERNOR, own=own)
+    line = running_line(engine, course, governor=GOVERNOR, tabulated=own)
     channels = [("speed", line.dof(14))]
     motion = line.run(SOLVER, duration=0.15, channels=channels, settling=0.2)
     return line, motion, own

@@ -167,7 +167,7 @@ def test_pits_of_a_helical_pair_come_by_their_slices(helical):
     ratio = even.rate(np.zeros(1), 200.0) / even.rate(np.zeros(1), 50.0)
     exponent = math.log(ratio[0]) / math.log(4.0)
     assert exponent == pytest.approx(0.5 * options.exponent, rel=0.02)
-    assert tilted.stress_at_one[0] > tilted.stress_at_one[2] > even.stress_at_one[2]
+    assert tilted.unit_stress[0] > tilted.unit_stress[2] > even.unit_stress[2]
 
 
 def test_a_spectrum_grows_at_the_mean_of_its_rates(helical):

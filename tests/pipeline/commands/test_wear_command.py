@@ -73,7 +73,7 @@ def test_worn_flanks_are_described_and_drawn(written, drawn, capsys):
     assert labels(pressure) == ["new flanks", "at the end of the life"]
     assert_allclose(pressure.lines[0].get_ydata(), content["contact_pressure_mpa"])
     assert len(panels["Worn off at each quarter of the life"].lines) == 2 * 4 + 1
-    assert labels(panels["Deepest place over time"]) == ["pinion", "wheel"]
+    assert labels(panels["Deepest point over time"]) == ["pinion", "wheel"]
 
 
 def test_a_map_and_its_laws(written, drawn, capsys):

@@ -9,7 +9,7 @@ from gensig.dataset.folder.beginning import create_folder
 from gensig.dataset.folder.layout import shard_path
 from gensig.dataset.folder.manifest import finalize, identity_hash, record_shard
 from gensig.dataset.folder.verify import verify
-from gensig.dataset.plan import Plan, record_ids, shard_places
+from gensig.dataset.plan import Plan, record_ids, shard_rows
 from gensig.dataset.splitting.splits import SUBSETS
 from gensig.dataset.storage.atomic import sha256_file
 from gensig.dataset.storage.checksums import accept_edits
@@ -49,7 +49,7 @@ def make_plan(
     n_units=6,
     n_classes=3,
 ):
-    shard, row = shard_places(n_records, records_per_shard)
+    shard, row = shard_rows(n_records, records_per_shard)
     index = np.arange(n_records)
     label = index % n_classes
     unit = (index // n_classes) % n_units

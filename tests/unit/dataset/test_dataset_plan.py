@@ -17,14 +17,14 @@ from gensig.dataset.plan import (
     plan_text,
     read_plan,
     record_ids,
-    shard_places,
+    shard_rows,
 )
 from gensig.errors import DatasetError
 
 
 def _plan(**columns):
     n = len(next(iter(columns.values())))
-    shard, row = shard_places(n, 3)
+    shard, row = shard_rows(n, 3)
     return Plan(
         columns={"record_id": record_ids(n), "shard": shard, "row": row, **columns}
     )

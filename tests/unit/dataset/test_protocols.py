@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from dataset_samples import sides
 
-from gensig.dataset.plan import Plan, record_ids, shard_places
+from gensig.dataset.plan import Plan, record_ids, shard_rows
 from gensig.dataset.splitting.protocols import PROTOCOLS, make_splits, why_left_out
 from gensig.dataset.splitting.split_check import split_problems
 from gensig.dataset.splitting.splits import SUBSETS, SplitTable
@@ -31,7 +31,7 @@ def random_plan(seed, **fixed):
     unit = condition % n_units
     classes = np.tile(np.arange(n_classes), (condition[-1] + 1, 1))
     label = rng.permuted(classes, axis=1).ravel()[:n]
-    shard, row = shard_places(n, 50)
+    shard, row = shard_rows(n, 50)
 
     def draw(low, high):
         values = rng.uniform(low, high, size=n)

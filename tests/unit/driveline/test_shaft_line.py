@@ -90,7 +90,7 @@ def test_a_loop_that_turns_is_counted_and_one_that_locks_is_refused():
     nodes = tuple(Node(name=name, inertia=1.0) for name in ("in", "out"))
     meshes = (
         GearMesh(driving=0, driven=1, stiffness=1e8),
-        GearMesh(driving=2, driven=3, stiffness=1e8, place="row 7"),
+        GearMesh(driving=2, driven=3, stiffness=1e8, location="row 7"),
     )
     gears = (gear("a", 0, 20), gear("b", 1, 40), gear("c", 0, 30), gear("d", 1, 60))
     assert ShaftLine(nodes=nodes, gears=gears, meshes=meshes).n_loops == 1
@@ -217,7 +217,7 @@ def test_what_joins_nothing_is_refused(changes, message):
     ("make", "message"),
     [
         (
-            lambda: Node(name="a", inertia=0.0, place="row 3"),
+            lambda: Node(name="a", inertia=0.0, location="row 3"),
             "row 3: inertia 0 kg m2 must be positive",
         ),
         (lambda: Node(name="a", inertia=float("nan")), "a: inertia nan"),

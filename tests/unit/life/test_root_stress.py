@@ -39,7 +39,7 @@ def pair(*words):
 def test_a_force_gives_the_stress_it_was_asked_for():
     loaded = case(
         PUMP, "strength.application_factor=1.25", "strength.face_load_factor=1.2"
-    ).under(349.39e6)
+    ).with_root_stress(349.39e6)
     result = loaded.gears()["wheel"]
     assert result.stress == pytest.approx(349.39e6, rel=1e-12)
     assert result.nominal == pytest.approx(349.39e6 / 1.5, rel=1e-12)

@@ -191,7 +191,7 @@ def test_a_crack_is_felt_where_it_is():
         "fault=crack", "fault.crack_depth_mm=1.5", "fault.crack_width_mm=7.5"
     )
     cracked, sound = system.transmission_error(faults), system.transmission_error()
-    first_half = sound.slice_place < 6.5e-3
+    first_half = sound.slice_middle < 6.5e-3
     tile = np.tile(sound.contact.line_load, (cracked.n_periods, 1, 1))
     of_fault = cracked.contact.pair_index == 0
     before, after = tile[of_fault], cracked.contact.line_load[of_fault]
@@ -207,11 +207,11 @@ def test_flank_that_is_gone_bears_nothing():
         "fault.pit_depth_mm=0.3",
     )
     result = system.transmission_error(faults)
-    contact, place = result.contact, result.slice_place
-    inside = (contact.pair_index == 0)[..., None] & (np.abs(place - 7e-3) < 2.3e-3)
+    contact, middle = result.contact, result.slice_middle
+    inside = (contact.pair_index == 0)[..., None] & (np.abs(middle - 7e-3) < 2.3e-3)
     pitch_point = np.abs(contact.position - system.pair.pitch_point) < 0.03e-3
     assert contact.line_load[inside & pitch_point].max() == 0.0
-    beside = (contact.pair_index == 0)[..., None] & (np.abs(place - 2e-3) < 1e-3)
+    beside = (contact.pair_index == 0)[..., None] & (np.abs(middle - 2e-3) < 1e-3)
     assert contact.line_load[beside & pitch_point].min() > 0.0
 
 

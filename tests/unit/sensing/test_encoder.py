@@ -78,7 +78,7 @@ def test_the_pattern_repeats_every_turn_and_is_each_discs_own():
     first, later = error(encoder, 3, turn), error(encoder, 3, turn + 6.0 * np.pi)
     assert_allclose(first, later, atol=1e-9)
     assert abs(np.corrcoef(first, error(encoder, 4, turn))[0, 1]) < 0.1
-    off = disc_of(encoder).places - encoder.spacing * np.arange(1000)
+    off = disc_of(encoder).line_angles - encoder.spacing * np.arange(1000)
     assert_allclose(np.std(off), np.radians(0.02), rtol=0.1)
 
 
@@ -87,12 +87,12 @@ def test_lines_pass_in_order_at_the_largest_errors():
         PERFECT, eccentricity_error=np.radians(5.0), line_error=0.1 * PERFECT.spacing
     )
     for seed in range(50):
-        places = disc_of(encoder, seed).places
-        assert np.all(np.diff([*places, places[0] + 2.0 * np.pi]) > 0.0)
+        line_angles = disc_of(encoder, seed).line_angles
+        assert np.all(np.diff([*line_angles, line_angles[0] + 2.0 * np.pi]) > 0.0)
 
 
 def test_a_line_is_read_where_it_passes():
-    disc = Disc(index=0.5, places=np.array([0.1, np.pi / 2, np.pi, 3 * np.pi / 2]))
+    disc = Disc(index=0.5, line_angles=np.array([0.1, np.pi / 2, np.pi, 3 * np.pi / 2]))
     turned = [0.0, 0.05, 0.11, np.pi - 0.01, np.pi + 0.01, 2 * np.pi + 0.05]
     angle = 0.5 + np.array([*turned, 2 * np.pi + 0.11])
     expected = np.pi / 2 * np.array([-1, -1, 0, 1, 2, 3, 4])

@@ -82,11 +82,13 @@ def test_teeth_out_of_place_show_orders_that_the_shaft_has_not():
 
 
 def test_passages_are_where_the_teeth_are():
-    disc = Disc(index=0.3, places=np.radians([0.0, 91.0, 180.0, 270.0]))
+    disc = Disc(index=0.3, line_angles=np.radians([0.0, 91.0, 180.0, 270.0]))
     wheel = replace(PERFECT, n_teeth=4)
     times = passage_times(wheel, disc, np.linspace(0.0, 10.0, 1001), 100.0)
     expected = [
-        0.3 + turn * 2 * np.pi + place for turn in (-1, 0, 1) for place in disc.places
+        0.3 + turn * 2 * np.pi + place
+        for turn in (-1, 0, 1)
+        for place in disc.line_angles
     ]
     assert_allclose(times, [one for one in expected if 0.0 <= one <= 10.0], atol=2e-9)
 

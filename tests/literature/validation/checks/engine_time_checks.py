@@ -65,7 +65,7 @@ class TimeCase:
         )
         own = tabulated_meshes(self.line, self.config, speed, torque)
         return time_response(
-            self.line, speed, torque, own=own, nodes=NODES, duration=DURATION
+            self.line, speed, torque, tabulated=own, nodes=NODES, duration=DURATION
         )
 
     @property

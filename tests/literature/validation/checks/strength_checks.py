@@ -37,7 +37,7 @@ def _stress_factor(case: RootStrength, at: str) -> float:
 
 def _under(case: RootStrength, at: str) -> RootStrength:
     """``at`` is a root stress in MPa."""
-    return case.under(float(at) * 1e6)
+    return case.with_root_stress(float(at) * 1e6)
 
 
 def _safety(convention: str) -> StrengthCheck:
