@@ -1,4 +1,4 @@
-"""How fast records are made on this machine: ``python -m benchmarks``.
+"""Rates of making records on this machine: ``python -m benchmarks``.
 
 Rates count CPU seconds of one core, the least of several runs; only the lines that say so count
 wall time. Ratios are what compares between machines, and only those of one run. ``--json FILE``
@@ -102,7 +102,7 @@ def start_up(runs: int) -> dict[str, float]:
 def ratios(
     rates: dict[str, float], ends: dict[str, dict[str, float]]
 ) -> dict[str, float]:
-    """What compares between machines."""
+    """Ratios of rates, which compare between machines."""
     result = {
         f"kernel {precision} over scalar Numba": rates[KERNEL.format(precision)]
         for precision in PRECISIONS
@@ -130,9 +130,12 @@ def ratios(
 
 def _goal(name: str, value: float) -> str:
     goal = GOALS.get(name)
-    return (
-        "" if goal is None else f"{'reached' if value >= goal else 'missed'}: {goal:g}"
-    )
+    if goal is None:
+        return ""
+    verdict = "reached"
+    if not value >= goal:
+        verdict = "missed"
+    return f"{verdict}: {goal:g}"
 
 
 def main() -> None:

@@ -30,7 +30,7 @@ _compiled: Any = functools.partial(njit, cache=True, error_model="numpy")()
 
 
 class Mesh(NamedTuple):
-    """What a pair of a pinion tooth and a sound wheel tooth does, by the kind of the pinion tooth.
+    """Law of a pinion tooth with a sound wheel tooth, by the kind of the pinion tooth.
 
     ``compliance`` and ``slope``, its change over position, are (kind, load, node), without the
     part that all pairs

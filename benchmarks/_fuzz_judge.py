@@ -1,6 +1,6 @@
-"""What becomes of a mutant.
+"""Verdict on a mutant.
 
-Everything that reads is tried, in a process whose death, delay and hunger are seen.
+Every reader is tried, in a process whose death, delay and hunger are seen.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def _read_all(folder: Path) -> None:
 
 
 def _meaning(folder: Path) -> dict[str, Any]:
-    """What a manifest says, less what decides nothing."""
+    """Keys of a manifest that decide what is read, with their values."""
     content = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
     known = set(read_manifest(folder).__slots__) - {"environment", "configuration"}
     return {name: value for name, value in content.items() if name in known}

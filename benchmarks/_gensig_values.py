@@ -84,7 +84,7 @@ def phases() -> list[tuple[str, float]]:
 
 
 def job(system: SpurPair) -> dict[str, Any]:
-    """What ``_ross_values`` needs to know of a pair, SI."""
+    """Values of a pair that ``_ross_values`` needs, SI."""
     pair, material = system.pair, system.material
 
     def contact(position: float, point: str = "") -> dict[str, Any]:
@@ -327,7 +327,7 @@ def _with_ross_rounding(gear: Gear) -> Gear:
 
 
 def _stand_in(gear: Gear, **changes: Any) -> Any:
-    """What the body term asks of a gear, with derived quantities replaced."""
+    """Quantities of a gear that the body term reads, derived ones replaced by ``changes``."""
     asked = (
         "name",
         "root_radius",

@@ -1,6 +1,6 @@
-"""What all benchmarks share.
+"""Parts that all benchmarks share.
 
-The machine by name, the least of several runs, and where figures go.
+Name of the machine, least of several runs, file for the figures.
 """
 
 from __future__ import annotations

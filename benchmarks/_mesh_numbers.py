@@ -11,7 +11,7 @@ from gensig.dynamics.pair import PairDynamics
 
 
 class MeshNumbers(NamedTuple):
-    """What a law asks of a gear mesh, in SI units; the names are those of ``gensig.dynamics``."""
+    """Numbers of a gear mesh that a law reads, SI; named as in ``gensig.dynamics``."""
 
     pinion_radius: float
     wheel_radius: float

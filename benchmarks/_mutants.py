@@ -22,7 +22,7 @@ Shard = Callable[[h5py.File, Path], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mutant:
-    """What was done to a folder.
+    """A change of a folder.
 
     ``forged``: sha256 and size in the manifest were made to fit, as only a stranger would.
     ``refused``: reading must raise, and not only ``verify``.

@@ -51,7 +51,7 @@ CONTROLS = ("right", "wrong teeth", "errors / 3", "errors x 3")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Size:
-    """How much is simulated; speeds and torques as shares of the rated ones.
+    """Extent of the simulation; speeds and torques as shares of the rated ones.
 
     The first speed and torque are the slow and light corner: at 1800 r/min and 20 N m rated,
     600 r/min and 2 N m.

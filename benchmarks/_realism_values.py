@@ -201,7 +201,7 @@ RATIOS = {
 
 
 def harmonic_decades(mesh: FloatArray) -> FloatArray:
-    """How far the harmonic ratios of one unit differ between its sensors and conditions.
+    """Spread of the harmonic ratios of one unit over its sensors and conditions.
 
     Parameters
     ----------

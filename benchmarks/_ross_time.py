@@ -1,6 +1,6 @@
-"""What ROSS's time response of the 23/84 pair takes, stored so that it can be shown where ROSS is
-not installed.
+"""Time of ROSS's response of the 23/84 pair.
 
+It is stored, so that it can be shown where ROSS is not installed.
 Stored with it is the rate of the scalar Numba code in the same run: the quotient of both is
 what carries over to another machine.
 """
@@ -30,7 +30,7 @@ OVERSAMPLING = 5  # of the scalar code; ROSS takes one step a sample
 
 
 def job() -> dict[str, Any]:
-    """What ``_ross_time_response`` needs to know of the pair, SI."""
+    """Values of the pair that ``_ross_time_response`` needs, SI."""
     system = ours.machine(PAIR)
     bodies = {"pinion": system.pinion.support, "wheel": system.wheel.support}
     supports = {
@@ -73,7 +73,7 @@ def store(told: dict[str, Any]) -> None:
 
 
 def stored() -> dict[str, Any] | None:
-    """What was stored last."""
+    """Latest stored result, None where there is none."""
     return json.loads(STORED.read_text(encoding="utf-8")) if STORED.exists() else None
 
 
@@ -89,7 +89,7 @@ def stored_rate() -> float | None:
 
 
 def lines() -> list[str]:
-    """What is stored, in words."""
+    """Stored result in words."""
     result = stored()
     if result is None:
         return ["ROSS's time response was never timed here."]

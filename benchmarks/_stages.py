@@ -1,6 +1,6 @@
-"""Where the CPU time of ``gensig generate`` goes.
+"""CPU time of ``gensig generate`` by stage.
 
-The product's own functions, each with a clock around it.
+The functions of the product run with a clock around each.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class Stages:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
-        """What runs inside belongs to this stage."""
+        """Counts the time of the block for a stage."""
         self._turn()
         self._open.append(name)
         try:

@@ -350,7 +350,7 @@ def dynamic_rows() -> Iterator[Sequence[str]]:
 
 
 def check_rows() -> Iterator[Sequence[str]]:
-    """How far the reference itself can be trusted: relative differences that should be none."""
+    """Checks of the reference: relative differences that should be 0."""
     for fault in FAULTS:
         own = [case(torque, fault) for torque in TORQUES]
         gensigs = [

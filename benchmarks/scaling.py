@@ -1,4 +1,4 @@
-"""What cost and memory grow with: ``python -m benchmarks.scaling``.
+"""Growth of cost and memory: ``python -m benchmarks.scaling``.
 
 CPU seconds of one core, the least of several runs, against the duration of records, their
 number, the number of distinct teeth, and the degrees of freedom; peak memory of the processes

@@ -1,7 +1,7 @@
-"""What each way to store a data set costs: ``python -m benchmarks.storage``.
+"""Cost of each way to store a data set: ``python -m benchmarks.storage``.
 
 Records of the quickstart machines with 10 % noise (20 dB) are written as shards with every
-compression and sample type, and read back as users read them. Beside them stands plain h5py:
+compression and sample type, and read back as users read them. They are compared with plain h5py:
 one contiguous float32 data set, no checks, no labels. MB count the samples as float32, whatever
 is stored. Times are the least of several runs, in CPU time of one core, from a warm cache;
 ``--folder`` chooses the disk, whose own speed is not in them. ``--json FILE`` writes the

@@ -196,7 +196,7 @@ def test_no_file_is_too_long_to_hold() -> None:
 
 
 def is_kernel(path: Path) -> bool:
-    """Whether a module holds compiled code, which is long where its formulas are."""
+    """True for a module of compiled code, which is long where its formulas are."""
     return path.stem.startswith("_") and "kernel" in path.stem
 
 

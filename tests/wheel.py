@@ -80,7 +80,7 @@ def build_wheel(source: Path, folder: Path) -> Path:
 
 
 def build(kind: str, source: Path, folder: Path) -> Path:
-    """What setuptools, that of this environment, makes of a source tree."""
+    """Build a source tree with the setuptools of this environment and return the file."""
     command = [sys.executable, "-c", BACKEND, kind, str(folder)]
     done = subprocess.run(
         command, cwd=source, capture_output=True, text=True, check=False
@@ -130,7 +130,7 @@ def lend_compiled(python: Path) -> None:
 
 
 def site_packages(python: Path) -> Path:
-    """Where an interpreter's environment has its packages."""
+    """Folder of the packages of an interpreter's environment."""
     code = "import sysconfig; print(sysconfig.get_paths()['purelib'])"
     return Path(
         subprocess.run(

@@ -1,5 +1,4 @@
-"""What ``mkdocs build`` does beside its plugins: equations as MathML, and links to files that lie
-outside ``docs``.
+"""Hooks of ``mkdocs build``: equations as MathML, and links to files outside ``docs``.
 
 Pages are written for two readers, a code forge and the site. So equations are fenced blocks of
 ``math`` with a ``\\tag``, and links go to files of the repository; here both become something
@@ -20,9 +19,9 @@ from mkdocs.structure.files import File, Files
 from pymdownx.slugs import slugify
 
 ROOT = Path(__file__).resolve().parents[2]
-BESIDE = {
+ROOT_PAGES = {
     name.lower(): name for name in ("CHANGELOG.md", "CONTRIBUTING.md", "THIRD-PARTY.md")
-}  # beside README.md
+}  # next to README.md
 SOURCE = "source"  # folder of the site for linked files that are no pages
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)\s#]+)(#[^)\s]*)?\)")
 TAG = re.compile(r"\\tag\{([^}]*)\}")
@@ -31,7 +30,7 @@ TAG = re.compile(r"\\tag\{([^}]*)\}")
 def on_config(config: Any) -> Any:
     """Set what YAML cannot say plainly.
 
-    How equations are written, anchors as code forges make them, more pages.
+    The format of equations, anchors as code forges make them, more pages.
     """
     config.mdx_configs["pymdownx.superfences"] = {
         "custom_fences": [{"name": "math", "class": "equation", "format": equation}]
@@ -40,14 +39,14 @@ def on_config(config: Any) -> Any:
         **config.mdx_configs.get("toc", {}),
         "slugify": slugify(case="lower"),
     }
-    if pages := [page for page, name in BESIDE.items() if (ROOT / name).is_file()]:
+    if pages := [page for page, name in ROOT_PAGES.items() if (ROOT / name).is_file()]:
         config.nav = [*config.nav, {"Project": pages}]
     return config
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add the pages beside README.md, and every file outside ``docs`` that a page links to."""
-    for page, name in BESIDE.items():
+    """Add the pages next to README.md, and every file outside ``docs`` that a page links to."""
+    for page, name in ROOT_PAGES.items():
         if (ROOT / name).is_file():
             files.append(
                 File.generated(config, page, content=(ROOT / name).read_text("utf-8"))
@@ -59,9 +58,11 @@ def on_files(files: Files, config: Any) -> Files:
             for _, target, _ in LINK.findall(page.content_string)
         }
     for path in sorted(filter(None, linked)):
-        if (place := _place(path)) and place.startswith(f"{SOURCE}/"):
+        if (site_path := _site_path(path)) and site_path.startswith(f"{SOURCE}/"):
             files.append(
-                File.generated(config, place, content=(ROOT / path).read_text("utf-8"))
+                File.generated(
+                    config, site_path, content=(ROOT / path).read_text("utf-8")
+                )
             )
     return files
 
@@ -76,11 +77,11 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
         text, target, anchor = found.groups(default="")
         here = page.file.src_uri
         path = _path(here, target)
-        if path is None or (path.startswith("docs/") and here not in BESIDE):
+        if path is None or (path.startswith("docs/") and here not in ROOT_PAGES):
             return found[0]
-        if (place := _place(path)) is None:
+        if (site_path := _site_path(path)) is None:
             return text if path in text else f"{text} (`{path}`)"
-        return f"[{text}]({posixpath.relpath(place, posixpath.dirname(here) or '.')}{anchor})"
+        return f"[{text}]({posixpath.relpath(site_path, posixpath.dirname(here) or '.')}{anchor})"
 
     return LINK.sub(renewed, markdown)
 
@@ -110,14 +111,16 @@ def _path(page: str, target: str) -> str | None:
     """
     if "://" in target or target.startswith(("mailto:", "/")):
         return None
-    folder = "" if page in BESIDE else posixpath.join("docs", posixpath.dirname(page))
+    folder = (
+        "" if page in ROOT_PAGES else posixpath.join("docs", posixpath.dirname(page))
+    )
     return posixpath.normpath(posixpath.join(folder, target))
 
 
-def _place(path: str) -> str | None:
-    """Where the site has a file of the repository, if it is one."""
+def _site_path(path: str) -> str | None:
+    """Path on the site of a file of the repository, None where there is no such file."""
     if path.startswith("docs/"):
         return path.removeprefix("docs/")
-    if path.lower() in BESIDE:
+    if path.lower() in ROOT_PAGES:
         return path.lower()
     return f"{SOURCE}/{path}.txt" if (ROOT / path).is_file() else None

@@ -90,7 +90,7 @@ def test_back_flanks_are_modified_too(xiamen):
 
 
 def test_a_fault_comes_on_top(xiamen):
-    """What a pitch error adds to relieved teeth is the pitch error."""
+    """A pitch error adds itself to the gap of relieved teeth."""
     system = relieved(xiamen, tip_relief=10 * UM, tip_relief_height=0.6 * MM)
     side = system.mesh_table(
         (one("pitch_error", gear="wheel", tooth=5, pitch_error_um=7),)
@@ -101,8 +101,8 @@ def test_a_fault_comes_on_top(xiamen):
 
 
 def test_relief_of_the_deflection_takes_most_ripple_off(xiamen, machine):
-    """Where one pair leaves as the next one enters, reliefs that sum to the deflection leave it
-    even (Harris's map).
+    """Reliefs that sum to the deflection leave it even while one pair leaves and the next
+    enters (Harris's map).
     """
     for system in (xiamen, machine({"operating.torque_nm": 60.0})):
         best = replace(system, modification=system.long_relief())

@@ -1,6 +1,4 @@
-"""What every fault must do to compliance and contact: nothing at severity zero, more with every
-step.
-"""
+"""Laws of every fault on compliance and contact: nothing at severity zero, more with every step."""
 
 from dataclasses import replace
 from functools import cache
@@ -60,7 +58,7 @@ def steps(found):
 
 
 def falls(found, slack):
-    """Where the deflection falls by more than the slack, (step, node)."""
+    """True where the deflection falls by more than the slack, (step, node)."""
     return steps(found) < -slack * found[:-1].clip(max=1.0)
 
 
@@ -99,7 +97,7 @@ class TestTheChecksCanFail:
         assert falls(result[::-1], 1e-9).all()
 
     def test_proud_teeth_touch_earlier(self, series):
-        """Why the deflection may fall for them."""
+        """The deflection may fall for them."""
         assert falls(series("pitch_error_proud", "pinion")[0], 1e-9).all()
         assert falls(series("profile_slope", "pinion")[0], 1e-9).any()
 

@@ -19,7 +19,7 @@ MAIN = {"gensig": gensig.cli.main, "diagnose": diagnose.cli.main}
 
 
 class _Parsed(Exception):
-    """What a verb's parser made of its words, on the way out before the verb runs."""
+    """Carries the parsed words of a verb out before the verb runs."""
 
 
 @pytest.fixture
