@@ -115,17 +115,19 @@ def environment_with(wheel: Path, folder: Path) -> Path:
 
 def lend_compiled(python: Path) -> None:
     """Copy the compiled kernels of this environment to the wheel, whose files are the same."""
+    from gensig.driveline.time._newmark_kernels import advance
     from gensig.dynamics._kernels import integrate
     from gensig.mesh._kernels import lower_envelope
+    from gensig.mesh.sliced._slice_kernels import solve_slices
 
-    for part, one in (("dynamics", integrate), ("mesh", lower_envelope)):
-        package = site_packages(python) / "gensig" / part
-        for source in (ROOT / "gensig" / part).glob("*.py"):
-            shutil.copystat(
-                source, package / source.name
-            )  # the cache knows a file by its time and size
+    for kernel in (advance, integrate, lower_envelope, solve_slices):
+        original = Path(kernel.__code__.co_filename).parent
+        package = site_packages(python) / original.relative_to(ROOT)
+        for source in original.glob("*.py"):
+            # the cache knows a file by its time and size
+            shutil.copystat(source, package / source.name)
         (package / "__pycache__").mkdir(exist_ok=True)
-        for compiled in Path(one.stats.cache_path).glob("*.nb[ci]"):
+        for compiled in Path(kernel.stats.cache_path).glob("*.nb[ci]"):
             shutil.copy(compiled, package / "__pycache__")
 
 

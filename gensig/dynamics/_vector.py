@@ -37,7 +37,7 @@ _OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False
 def source_stamp(folder: Path) -> str:
     """Hash of all private modules below a folder, whose compiled functions call each other."""
     digest = hashlib.sha256()
-    for path in sorted(folder.rglob("_*.py")):
+    for path in sorted(folder.rglob("_[!_]*.py")):
         name = str(path.relative_to(folder))
         digest.update(name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()

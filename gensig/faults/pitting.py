@@ -202,8 +202,10 @@ class DistributedPitting(Fault):
         heights = np.gradient(sliced.profile.flank_abscissa)
         cell_area = np.outer(sliced.slice_width, heights) / flank_area(gear)
         loss = np.zeros_like(cell_area)
+        ends = flank_ends(gear)
         for _ in range(MOST_PITS):
-            loss = np.maximum(loss, patch_loss(sliced, self._draw(rng, gear)))
+            pit = self._draw(rng, ends, gear.face_width)
+            loss = np.maximum(loss, patch_loss(sliced, pit))
             if float(cell_area[loss > 0.0].sum()) >= self.pitted_share:
                 return sliced.with_loss(loss)
         raise FaultError(
@@ -211,8 +213,10 @@ class DistributedPitting(Fault):
             f"{self.pitted_share:g}; increase fault.pit_diameter_mm"
         )
 
-    def _draw(self, rng: np.random.Generator, gear: Gear) -> Patch:
-        low, high = flank_ends(gear)
+    def _draw(
+        self, rng: np.random.Generator, ends: tuple[float, float], face_width: float
+    ) -> Patch:
+        low, high = ends
         scatter = math.exp(self.diameter_scatter * rng.standard_normal())
         diameter = self.pit_diameter * scatter
         share = self.region_low + (self.region_high - self.region_low) * rng.random()
@@ -222,5 +226,5 @@ class DistributedPitting(Fault):
             width=diameter,
             depth=self.depth_ratio * diameter,
             abscissa=low + share * (high - low),
-            face_position=gear.face_width * rng.random(),
+            face_position=face_width * rng.random(),
         )

@@ -1,22 +1,9 @@
 """The section of docs/validation.md on simulated records and measured ranges."""
 
+from measured_range import measured
 from validation.realism_section import realism_lines
 
-from gensig.report.realism import Range, compare, write_results
-
-
-def measured(**changes) -> Range:
-    return Range(
-        **{
-            "id": "a.b",
-            "at": "here",
-            "unit": "ms",
-            "low": 1.0,
-            "high": 2.0,
-            "source": "rig",
-            **changes,
-        }
-    )
+from gensig.report.realism import compare, write_results
 
 
 def test_section(tmp_path):

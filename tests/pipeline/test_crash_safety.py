@@ -15,13 +15,12 @@ from pathlib import Path
 import pytest
 from small_sets import TINY, contents, make
 
+from benchmarks.kill_campaign import campaign, n_kills_of
 from gensig.cli import main
 from gensig.dataset.folder import beginning
 from gensig.dataset.folder.layout import read_manifest, shard_path
 from gensig.dataset.folder.verify import verify
 from gensig.dataset.storage.receipts import receipt_path, write_receipt
-
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -55,11 +54,11 @@ def resume(out, *words):
     return main(["resume", "--quiet", str(out), *words, *own])
 
 
-def test_killed_at_random_moments_it_ends_byte_equal():
-    words = f"-m benchmarks.kill_campaign --kills 3 --seed {time.time_ns()}".split()
-    command = [sys.executable, *words]
-    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
-    assert result.returncode == 0, f"{command}\n{result.stdout}{result.stderr}"
+def test_killed_at_random_moments_it_ends_byte_equal(tmp_path):
+    seed = time.time_ns()
+    outcome, problems = campaign(3, seed, tmp_path)
+    assert problems == [], seed
+    assert n_kills_of(outcome) >= 3, (outcome, seed)
 
 
 def alive_in_group(group):

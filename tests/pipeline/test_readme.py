@@ -10,7 +10,7 @@ import gensig.cli
 
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 MAIN = {"gensig": gensig.cli.main, "diagnose": diagnose.cli.main}
-SMALLER = {"plan.n_records=80": ["plan.n_records=40", "executor.n_workers=1"]}
+SMALLER = {"plan.n_records=80": ["plan.n_records=24", "executor.n_workers=1"]}
 WRITTEN = (
     "crack.png",
     "crack.json",

@@ -201,6 +201,10 @@ REFUSED = {
     f"{DETECT} --plot map.txt": "--plot map.txt: the name must end in .png",
     f"{DETECT} plan.n_gearboxes=0": "plan.n_gearboxes = 0",
     # drive lines
+    (
+        f"gensig forced-response {TRAIN} ~excitation operating.speed_rpm=1688 "
+        "operating.torque_nm=100"
+    ): "no excitation is chosen; take excitation=engine_v20",
     "gensig modes system=shaft_line": (
         "system.shafting_csv is required: give a path, or one of engine_gears.csv"
     ),

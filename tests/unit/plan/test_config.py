@@ -1,5 +1,6 @@
 """Requests: typed overrides, derived values, and every mistake in one line."""
 
+import functools
 import re
 import warnings
 
@@ -9,7 +10,7 @@ from fault_cases import option
 from gensig.errors import ConfigError, GensigError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import read_faults
-from gensig.options.compose import options, override_keys, sweep
+from gensig.options.compose import _composed, compose, options, override_keys, sweep
 from gensig.plan.request import DerivedValueWarning, read_request
 from gensig.systems.pair_machine import severity
 from gensig.systems.registry import read_system
@@ -51,6 +52,36 @@ def test_overrides_are_kept_as_typed():
     request = read_request(words)
     assert request.overrides == tuple(words)
     assert request.config["operating"]["speed_rpm"] == 1500
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "seed=3",
+        "fault=crack operating.speed_rpm=1500 life/law=wear",
+        "plan.classes=[crack] plan.classes=[wear] out='a b'",
+        "operating={speed_rpm: 900} operating.speed_rpm=800",
+        "operating.speed_rpm=800 operating={speed_rpm: 900}",
+        "seed=${plan.n_records}",
+        "~heat",
+        "+new.key=3",
+        "++seed=4",
+        "seed=1,2",
+        "heat=null",
+        "operatng.speed_rpm=1",
+        "gear@other=xiamen_23_84",
+        "fault=none",
+    ],
+)
+def test_values_set_in_kept_options_are_those_of_a_whole_composition(words):
+    def content(compose):
+        try:
+            return compose("generate", tuple(re.split(r" (?=\S+=|~)", words))).plain()
+        except ConfigError as error:
+            return str(error)
+
+    whole = functools.partial(_composed, config_dir=None)
+    assert repr(content(compose)) == repr(content(whole))
 
 
 def test_own_options_are_found(tmp_path):

@@ -8,11 +8,11 @@ import math
 from dataclasses import replace
 
 import pytest
+from measured_range import measured
 
 from gensig.errors import ConfigError
 from gensig.report import realism
 from gensig.report.realism import (
-    Range,
     compare,
     judge,
     read_ranges,
@@ -21,20 +21,6 @@ from gensig.report.realism import (
 )
 
 NAN = math.nan
-
-
-def measured(**changes) -> Range:
-    return Range(
-        **{
-            "id": "a.b",
-            "at": "here",
-            "unit": "ms",
-            "low": 1.0,
-            "high": 2.0,
-            "source": "rig",
-            **changes,
-        }
-    )
 
 
 @pytest.mark.parametrize(
