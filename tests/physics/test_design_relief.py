@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closeness import assert_close
 from fault_cases import one
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_array_equal
 
 from gensig.dynamics.lanes import tooth_rows
 from gensig.errors import GeometryError
@@ -18,7 +19,8 @@ from gensig.systems.base import simulate_together
 from gensig.systems.registry import read_system
 from gensig.systems.run import Run
 
-UM, MM = 1e-6, 1e-3
+UM = 1e-6
+MM = 1e-3
 SIDES = ("pinion", "wheel")
 
 
@@ -57,7 +59,8 @@ def test_the_gaps_are_those_of_the_fault_of_the_same_relief(xiamen, shape):
     """The fault falls off along the line of action, the modification over the radius: 4 % of the
     depth between them.
     """
-    depth, height = 10 * UM, 0.6 * MM
+    depth = 10 * UM
+    height = 0.6 * MM
     system = relieved(
         xiamen, tip_relief=depth, tip_relief_height=height, profile_shape=shape
     )
@@ -73,12 +76,14 @@ def test_the_gaps_are_those_of_the_fault_of_the_same_relief(xiamen, shape):
             "relief_curve": shape,
         }
         faults.append(one("tip_relief", gear=name, tooth="all", **words))
-    mine, theirs = system.mesh_table(), xiamen.mesh_table(faults)
+    mine = system.mesh_table()
+    theirs = xiamen.mesh_table(faults)
     for name in SIDES:
-        own, fault = getattr(mine, name), getattr(theirs, name)
+        own = getattr(mine, name)
+        fault = getattr(theirs, name)
         assert set(own.kind) == {0}
         assert own.gap[0].max() > 0.9 * depth
-        assert_allclose(own.gap[0], fault.gap[fault.kind[0]], rtol=0, atol=0.04 * depth)
+        assert_close(own.gap[0], fault.gap[fault.kind[0]], atol=0.04 * depth)
 
 
 def test_back_flanks_are_modified_too(xiamen):
@@ -95,9 +100,7 @@ def test_a_fault_comes_on_top(xiamen):
     side = system.mesh_table(
         (one("pitch_error", gear="wheel", tooth=5, pitch_error_um=7),)
     ).wheel
-    assert_allclose(
-        side.gap[side.kind[5]], side.gap[0] + 7 * UM, rtol=0, atol=1e-3 * UM
-    )
+    assert_close(side.gap[side.kind[5]], side.gap[0] + 7 * UM, atol=1e-3 * UM)
 
 
 def test_relief_of_the_deflection_takes_most_ripple_off(xiamen, machine):
@@ -147,12 +150,13 @@ def test_leads_are_those_of_the_sliced_pair(config_with, lead, share):
         sliced, flanks=replace(sliced.flanks, modification=spur.modification)
     )
     roll = spur.pair.base_pitch * (np.arange(64) + 0.5) / 64
-    table, slices = spur.mesh_table(), sliced.mesh_table()
+    table = spur.mesh_table()
+    slices = sliced.mesh_table()
     own = static_mesh(table, pair_states(table, roll), spur.mesh_force).approach.mean()
     theirs = chord_equilibrium(
         slices, chord_states(slices, roll), spur.mesh_force
     ).approach.mean()
-    assert own == pytest.approx(theirs, rel=share)
+    assert_close(own, theirs, share)
 
 
 def test_opposite_slopes_leave_an_aligned_pair(xiamen):
@@ -162,7 +166,7 @@ def test_opposite_slopes_leave_an_aligned_pair(xiamen):
     }
     askew = replace(xiamen, modification=PairModification(**slope)).mesh_table()
     for mine, theirs in zip(columns(askew), columns(xiamen.mesh_table()), strict=True):
-        assert_allclose(mine, theirs, rtol=1e-9, atol=1e-15)
+        assert_close(mine, theirs, 1e-9, atol=1e-15)
 
 
 def test_relieved_gears_shake_less_along_the_line_of_action(machine):

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from closeness import assert_close
 from fault_cases import CASES, GEARS, KINDS, deflection, one, side_of
 from numpy.testing import assert_allclose
 
@@ -25,12 +26,15 @@ def test_the_cases_are_all_faults():
 @pytest.mark.parametrize("name", CASES)
 def test_severity_zero_is_healthy(xiamen, name, gear):
     fault = CASES[name].fault(CASES[name].nothing, gear)
-    assert fault.severity(getattr(xiamen.pair, gear)) == pytest.approx(0.0, abs=0.0)
-    table, sound = xiamen.mesh_table((fault,)), xiamen.mesh_table()
-    side, sound_side = side_of(table, gear), side_of(sound, gear)
+    assert_close(fault.severity(getattr(xiamen.pair, gear)), 0.0)
+    table = xiamen.mesh_table((fault,))
+    sound = xiamen.mesh_table()
+    side = side_of(table, gear)
+    sound_side = side_of(sound, gear)
     row = side.kind[0]
     for key in ("compliance", "gap", "compliance_slope", "gap_slope"):
-        result, expected = getattr(side, key)[row], getattr(sound_side, key)[0]
+        result = getattr(side, key)[row]
+        expected = getattr(sound_side, key)[0]
         assert_allclose(result, expected, rtol=0, atol=0, err_msg=key)
     assert side.present.all()
 
@@ -41,7 +45,8 @@ def series(xiamen):
 
     @cache
     def make(name, gear):
-        case, body = CASES[name], getattr(xiamen.pair, gear)
+        case = CASES[name]
+        body = getattr(xiamen.pair, gear)
         faults = [case.fault(value, gear) for value in (case.nothing, *case.rising)]
         deflections = np.array([deflection(xiamen, fault) for fault in faults])
         return deflections, np.array([fault.severity(body) for fault in faults])
@@ -85,7 +90,7 @@ def test_more_of_it_shows(series, name, gear):
 @pytest.mark.parametrize("name", CASES)
 def test_severity_rises_within_0_and_1(series, name, gear):
     _, severity = series(name, gear)
-    assert severity[0] == pytest.approx(0.0, abs=0.0)
+    assert_close(severity[0], 0.0)
     assert severity.max() <= 1.0
     rises = np.diff(severity)
     assert rises[0] > 0
@@ -107,10 +112,8 @@ class TestTheChecksCanFail:
         """The paper's law narrows the face by the whole pit, however short; over gaps the mate
         rides on its edges.
         """
-        narrow, short = (
-            replace(xiamen, mesh=replace(xiamen.mesh, law="paper")),
-            one("pitting", pit_length_mm=0.05),
-        )
+        narrow = replace(xiamen, mesh=replace(xiamen.mesh, law="paper"))
+        short = one("pitting", pit_length_mm=0.05)
         by_gap, by_width = (
             (deflection(system, short) - deflection(system)).max()
             for system in (xiamen, narrow)
@@ -128,7 +131,7 @@ class TestWhoseFacesBear:
         pressed = {"crack_side": "compression", "crack_faces": "breathing"}
         crack = one("crack", gear=gear, tooth=0, **pressed)
         result = deflection(xiamen, crack)
-        assert_allclose(result, deflection(xiamen), rtol=1e-12, atol=0)
+        assert_close(result, deflection(xiamen), 1e-12)
         assert crack.severity(getattr(xiamen.pair, gear)) > 0.2
 
     def test_on_the_tension_side_it_is_open(self, xiamen, gear):
@@ -136,7 +139,7 @@ class TestWhoseFacesBear:
             deflection(xiamen, one("crack", gear=gear, tooth=0, crack_faces=faces))
             for faces in ("breathing", "open")
         )
-        assert_allclose(breathing, kept_open, rtol=1e-12, atol=0)
+        assert_close(breathing, kept_open, 1e-12)
         assert (kept_open / deflection(xiamen)).max() > 1.02
 
 
@@ -174,7 +177,7 @@ class TestThePapersCrack:
         # spur reference (docs/validation.md), section 2.3: loss of pair stiffness at the pitch
         # point, 1 mm
         result = lost_at_pitch_point(paper_machine, one("crack", crack_start=start))
-        assert_allclose(result, loss, rtol=0, atol=2e-4)
+        assert_close(result, loss, atol=2e-4)
 
 
 def lost_at_pitch_point(system, fault):
@@ -187,7 +190,7 @@ def lost_at_pitch_point(system, fault):
 class TestThePapersPit:
     def test_it_costs_what_its_formula_says(self, paper_machine):
         result = lost_at_pitch_point(paper_machine, one("pitting"))
-        assert_allclose(result, 0.0574, rtol=0, atol=2e-4)
+        assert_close(result, 0.0574, atol=2e-4)
 
     def test_slices_cost_the_same_where_the_pit_is_deeper_than_the_load(
         self, machine, paper_machine
@@ -208,7 +211,7 @@ class TestThePapersPit:
             lost_at_pitch_point(system, one("pitting"))
             for system in (sliced, paper_machine)
         )
-        assert_allclose(result, expected, rtol=1e-3, atol=0)
+        assert_close(result, expected, 1e-3)
         bridged = lost_at_pitch_point(sliced, one("pitting", pit_length_mm=0.02))
         assert bridged < 0.1 * result
 
@@ -231,7 +234,7 @@ class TestTwoFaultsOnOneTooth:
         one_way, other_way = (
             deflection(xiamen, *faults) for faults in (pair, pair[::-1])
         )
-        assert_allclose(one_way, other_way, rtol=0.005, atol=0)
+        assert_close(one_way, other_way, 0.005)
         assert np.abs(one_way / deflection(xiamen) - 1).max() > 0.005
 
     @pytest.mark.parametrize("order", [1, -1])

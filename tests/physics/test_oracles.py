@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from closeness import assert_close
 from fault_cases import one
 from lane_tools import trajectory
-from numpy.testing import assert_allclose
 from plain_motion import at_rest, equations, solved
 from scipy.linalg import expm
 
@@ -49,7 +49,8 @@ class TestFourMilliseconds:
 
         def measured(system, oversampling):
             dynamics = dynamics_of(system, phase=PHASE)
-            start, step = at_rest(dynamics), 1 / (SAMPLING_RATE * oversampling)
+            start = at_rest(dynamics)
+            step = 1 / (SAMPLING_RATE * oversampling)
             _, v = trajectory(
                 dynamics, start[:6], start[6:], step, cls.N_SAMPLES * oversampling
             )
@@ -122,11 +123,9 @@ def periodic_motion(dynamics, period, n_points):
     that what is periodic turns at the set speed, and the period is known.
     """
     slope, free = equations(dynamics)
-    stiffness, direction, mass = (
-        dynamics.mean_mesh_stiffness,
-        dynamics.approach_direction(),
-        dynamics.system().mass,
-    )
+    stiffness = dynamics.mean_mesh_stiffness
+    direction = dynamics.approach_direction()
+    mass = dynamics.system().mass
     damping = (
         2
         * dynamics.table.options.damping_ratio
@@ -137,7 +136,8 @@ def periodic_motion(dynamics, period, n_points):
         direction / mass, np.concatenate([stiffness * direction, damping * direction])
     )
     returns = expm(held * period) - np.eye(12)
-    start, times = at_rest(dynamics), np.linspace(0.0, period, n_points + 1)
+    start = at_rest(dynamics)
+    times = np.linspace(0.0, period, n_points + 1)
     for rtol in (1e-5, 1e-5, 1e-6, 1e-8):
         start = start - np.linalg.solve(
             returns, solved(slope, start, times, "LSODA", rtol)[-1] - start
@@ -208,7 +208,7 @@ class TestPeriodicMotion:
 
     def test_the_tile_closes(self, tile):
         moved = np.ptp(tile, axis=0)
-        assert_allclose((tile[-1] - tile[0]) / moved, 0.0, rtol=0, atol=5e-4)
+        assert_close((tile[-1] - tile[0]) / moved, 0.0, atol=5e-4)
 
     def test_it_turns_at_the_set_speed(self, case, tile):
         assert abs(tile[:-1, 8].mean()) < 1e-8 * 2 * np.pi * case.speed_rpm / 60
@@ -237,7 +237,7 @@ class TestPeriodicMotion:
     def test_another_start_would_show(self, case, compared):
         """One that lies 5e-4 mesh periods further on is early by as much, and nothing else."""
         late, error = compared(10, {}, PHASE + 5e-4)
-        assert_allclose(late * case.mesh_frequency, -5e-4, rtol=0, atol=1e-4)
+        assert_close(late * case.mesh_frequency, -5e-4, atol=1e-4)
         assert error < 2e-4
 
 

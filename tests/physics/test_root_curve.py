@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from closeness import assert_close
 
 from gensig.geometry.tooth_profile import involute_point, root_curve
 
@@ -27,11 +27,9 @@ def rack_clearance(gear, x, y):
     """Smallest distance of a tooth point from the rack while it rolls by; 0 on the cut outline,
     (point,) m.
     """
-    m, alpha, rounding = (
-        gear.normal_module,
-        gear.pressure_angle,
-        gear.cutter_tip_radius_coefficient * gear.normal_module,
-    )
+    m = gear.normal_module
+    alpha = gear.pressure_angle
+    rounding = gear.cutter_tip_radius_coefficient * gear.normal_module
     below_datum = (
         gear.addendum_coefficient + gear.clearance_coefficient
     ) * m - rounding
@@ -39,22 +37,19 @@ def rack_clearance(gear, x, y):
     center_offset = (
         math.pi * m / 4 + below_datum * math.tan(alpha) + rounding / math.cos(alpha)
     )
-    radius, polar, pitch_radius = (
-        np.hypot(x, y)[:, None],
-        np.arctan2(y, x)[:, None],
-        gear.normal_module * gear.n_teeth / 2,
-    )
+    radius = np.hypot(x, y)[:, None]
+    polar = np.arctan2(y, x)[:, None]
+    pitch_radius = gear.normal_module * gear.n_teeth / 2
 
     def distance(roll):
         along = radius * np.sin(polar - roll) + pitch_radius * roll - center_offset
         deep = pitch_radius - radius * np.cos(polar - roll) - center_depth
         # the rack's tooth is the wedge right of its flank and above its tip line, grown by the
         # rounding
-        from_tip, from_flank = deep, -along * math.cos(alpha) + deep * math.sin(alpha)
-        on_tip, on_flank = (
-            along > 0,
-            -along * math.sin(alpha) - deep * math.cos(alpha) > 0,
-        )
+        from_tip = deep
+        from_flank = -along * math.cos(alpha) + deep * math.sin(alpha)
+        on_tip = along > 0
+        on_flank = -along * math.sin(alpha) - deep * math.cos(alpha) > 0
         outside = np.where(
             on_tip & (from_tip > 0),
             from_tip,
@@ -64,16 +59,12 @@ def rack_clearance(gear, x, y):
         return np.where(inside, np.maximum(from_tip, from_flank), outside) - rounding
 
     span = np.linspace(-1.0, 1.0, 801) * 6 * m / pitch_radius
-    best, step = (
-        np.take(span, distance(span[None, :]).argmin(axis=1)),
-        span[1] - span[0],
-    )
+    best = np.take(span, distance(span[None, :]).argmin(axis=1))
+    step = span[1] - span[0]
     for _ in range(3):
         fine = best[:, None] + step * np.linspace(-1, 1, 101)
-        best, step = (
-            fine[np.arange(len(best)), distance(fine).argmin(axis=1)],
-            step / 50,
-        )
+        best = fine[np.arange(len(best)), distance(fine).argmin(axis=1)]
+        step = step / 50
     return distance(best[:, None])[:, 0]
 
 
@@ -88,7 +79,7 @@ def outline(gear):
 
 
 def test_a_rolling_rack_cuts_this_outline(gear):
-    assert_allclose(rack_clearance(gear, *outline(gear)), 0.0, rtol=0, atol=0.05e-6)
+    assert_close(rack_clearance(gear, *outline(gear)), 0.0, atol=0.05e-6)
 
 
 def test_the_rack_tells_another_cutter(gear):
@@ -100,20 +91,21 @@ def test_the_rack_tells_another_cutter(gear):
 
 def test_root_end_lies_on_the_root_circle_at_theta_f(gear):
     x, y = (value[0] for value in root_curve(gear, np.array([math.pi / 2])))
-    assert_allclose(math.hypot(x, y), gear.root_radius, rtol=1e-12, atol=0)
-    assert_allclose(math.atan2(y, x), gear.root_half_angle, rtol=1e-10, atol=0)
+    assert_close(math.hypot(x, y), gear.root_radius, 1e-12)
+    assert_close(math.atan2(y, x), gear.root_half_angle, 1e-10)
 
 
 def test_involute_end_joins_in_place_and_slope(gear):
-    junction, h = gear.junction_curvature_radius, 1e-7
+    junction = gear.junction_curvature_radius
+    h = 1e-7
     root = np.array(root_curve(gear, gear.pressure_angle + np.array([0.0, h])))
     flank = np.array(involute_point(gear, junction + np.array([0.0, h])))
-    assert_allclose(root[:, 0], flank[:, 0], rtol=0, atol=1e-12)
+    assert_close(root[:, 0], flank[:, 0], atol=1e-12)
     angles = [
         math.atan2(*(curve[::-1, 1] - curve[::-1, 0])) % math.pi
         for curve in (root, flank)
     ]
-    assert_allclose(angles[0], angles[1], rtol=0, atol=1e-4)
+    assert_close(angles[0], angles[1], atol=1e-4)
 
 
 def test_a_moved_junction_shows_as_a_gap(gear):

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closeness import assert_close
 from fault_cases import GEARS, KINDS, one
-from numpy.testing import assert_allclose
 
 from gensig.mesh.load_distribution import PairStates, pair_states, static_mesh
 
@@ -88,12 +88,11 @@ class TestComplementarity:
 @pytest.mark.parametrize("kind", KINDS)
 def test_equilibrium_with_every_fault_over_a_turn(xiamen, kind, gear):
     """C F = approach - gap for every pair that carries; no pair pulls; all force is carried."""
-    faulty, force = (
-        xiamen.mesh_table((one(kind, gear=gear, tooth=3),)),
-        xiamen.mesh_force,
-    )
+    faulty = xiamen.mesh_table((one(kind, gear=gear, tooth=3),))
+    force = xiamen.mesh_force
     roll = xiamen.pair.base_pitch * np.linspace(0, 23, 23 * 20, endpoint=False)
-    states, shared = pair_states(faulty, roll), faulty.shared_compliance
+    states = pair_states(faulty, roll)
+    shared = faulty.shared_compliance
     static = static_mesh(faulty, states, force)
     assert violation(states, static, shared, force) < 1e-11
     sound = at(xiamen.mesh_table(), roll, force)
@@ -114,12 +113,12 @@ def test_approach_rises_with_force_and_stiffness_is_its_slope(table):
     slope = 2e-4 / (high.approach - low.approach)
     assert same.mean() > 0.9
     stiffness = static_mesh(table, states, 1000.0).stiffness
-    assert_allclose(stiffness[same], slope[same], rtol=1e-5, atol=0)
+    assert_close(stiffness[same], slope[same], 1e-5)
 
 
 def test_shares_of_the_stiffness_curves_sum_to_one(xiamen):
     curves = xiamen.stiffness_curves((fault("missing_tooth"),))
-    assert_allclose(curves.load_share.sum(axis=1), 1.0, rtol=1e-12, atol=0)
+    assert_close(curves.load_share.sum(axis=1), 1.0, 1e-12)
     assert curves.load_share.min() >= 0
 
 
@@ -128,7 +127,7 @@ class TestMeshPeriod:
     def test_sound_teeth_repeat_every_pitch(self, machine, law):
         curves = machine({"mesh.law": law}).stiffness_curves()
         teeth = curves.mesh_stiffness.reshape(23, -1)
-        assert_allclose(teeth, np.tile(teeth[0], (23, 1)), rtol=1e-8, atol=0)
+        assert_close(teeth, np.tile(teeth[0], (23, 1)), 1e-8)
         assert np.ptp(teeth[0]) > 0.1 * teeth.mean()
 
     @pytest.mark.parametrize("kind", FAULTS)
@@ -141,7 +140,9 @@ class TestMeshPeriod:
 @pytest.mark.parametrize("kind", FAULTS)
 def test_a_faulty_tooth_shows_once_a_turn_at_its_number(xiamen, gear, kind):
     """Tooth k enters contact at A after k pitches; corner contact starts a little earlier."""
-    points, tooth, n_teeth = 50, 9, getattr(xiamen.pair, gear).n_teeth
+    points = 50
+    tooth = 9
+    n_teeth = getattr(xiamen.pair, gear).n_teeth
     roll = xiamen.pair.base_pitch * (np.arange(2 * n_teeth * points) + 0.5) / points
     sound, faulty = (
         at(xiamen.mesh_table(faults), roll, xiamen.mesh_force).stiffness
@@ -162,7 +163,7 @@ def test_start_teeth_shift_the_fault(xiamen, gear):
     roll = xiamen.pair.base_pitch * np.linspace(0, 3, 60, endpoint=False)
     shifted = pair_states(table, roll, **{f"start_tooth_{gear}": 6}).compliance
     later = pair_states(table, roll + 6 * xiamen.pair.base_pitch).compliance
-    assert_allclose(shifted, later, rtol=1e-9, atol=0)
+    assert_close(shifted, later, 1e-9)
     assert np.abs(shifted - pair_states(table, roll).compliance).max() > 1e-10
 
 
@@ -183,12 +184,13 @@ def test_the_pair_of_a_missing_tooth_never_carries(machine, gear, law):
 
 class TestPaperLaw:
     def test_zones_match_the_contact_ratio(self, paper_machine):
-        table, pitch = paper_machine.mesh_table(), paper_machine.pair.base_pitch
+        table = paper_machine.mesh_table()
+        pitch = paper_machine.pair.base_pitch
         roll = pitch * (np.arange(20000) + 0.5) / 20000
         n_carrying = (at(table, roll, 925.0).load > 0).sum(axis=1)
         assert set(n_carrying.tolist()) == {1, 2}
         ratio = paper_machine.pair.transverse_contact_ratio
-        assert_allclose(n_carrying.mean(), ratio, rtol=0, atol=1e-4)
+        assert_close(n_carrying.mean(), ratio, atol=1e-4)
 
     def test_the_one_sided_law_keeps_pairs_longer(self, xiamen):
         roll = xiamen.pair.base_pitch * (np.arange(2000) + 0.5) / 2000
@@ -216,11 +218,11 @@ class TestPaperLaw:
             [*double, 3.6783, 2.0686, 2.0800, 2.0879, 2.0921, 2.0927, 2.0895]
         )
         curves = paper_machine.stiffness_curves(points_per_tooth=20)
-        assert_allclose(curves.mesh_stiffness[:20], expected, rtol=2e-3, atol=0)
+        assert_close(curves.mesh_stiffness[:20], expected, 2e-3)
 
     def test_no_pair_no_stiffness(self, paper_machine):
         missing = fault("missing_tooth", tooth=0)
         curves = paper_machine.stiffness_curves((missing,), points_per_tooth=200)
         lost = np.mean(curves.mesh_stiffness <= 0) * 23
         expected = 2 - paper_machine.pair.transverse_contact_ratio
-        assert_allclose(lost, expected, rtol=0, atol=0.01)
+        assert_close(lost, expected, atol=0.01)

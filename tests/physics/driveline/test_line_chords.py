@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from chord_tables import Slices, as_chords, with_table
+from closeness import assert_close
 from lane_tools import advance
 from line_tools import constant_torques, law_at, pair_line, state_after
-from numpy.testing import assert_allclose
 
 from gensig.driveline.time import _layout as layout
 from gensig.driveline.time.chords import sliced_pair_mesh
@@ -28,7 +28,8 @@ from gensig.systems.registry import read_sliced_pair
 HELIX = math.radians(20.0)
 DEPTH = np.array([0.0, 2.0, 5.0, 9.0, 14.0, 20.0]) * 1e-6
 DAMPING = 1e-3  # s/m
-STEPS, N_SAMPLES = 64, 205
+STEPS = 64
+N_SAMPLES = 205
 
 
 def placed(make, table, **more):
@@ -74,7 +75,7 @@ class TestLaw:
             law_at(mesh, turned, approach)[0]
             for turned, approach in zip(rolls, computed.approach, strict=True)
         ]
-        assert_allclose(forces, share * force, rtol=1e-3)
+        assert_close(forces, share * force, 1e-3)
 
     @pytest.mark.parametrize("approach", [2e-5, 6e-5, -1.5e-4])
     def test_force_and_torque_of_the_passing_teeth_are_slopes_of_one_potential(
@@ -87,25 +88,22 @@ class TestLaw:
                 law_at(mesh, turned + off, approach)[layout.STORED]
                 for off in (-1e-7, 1e-7)
             )
-            assert_allclose(
-                computed[layout.ALONG], -(above - below) / 2e-7, rtol=1e-3, atol=1e-6
+            assert_close(
+                computed[layout.ALONG], -(above - below) / 2e-7, 1e-3, atol=1e-6
             )
             below, above = (
                 law_at(mesh, turned, approach + off)[layout.STORED]
                 for off in (-1e-10, 1e-10)
             )
-            assert_allclose(computed[layout.FORCE], (above - below) / 2e-10, rtol=1e-4)
+            assert_close(computed[layout.FORCE], (above - below) / 2e-10, 1e-4)
 
     def test_all_springs_of_a_pair_are_damped_by_its_first_touch(self, mesh):
-        still, fast = law_at(mesh, 0.4, 3e-5), law_at(mesh, 0.4, 3e-5, rate=10.0)
-        assert_allclose(
-            fast[layout.FORCE],
-            (1.0 + 10.0 * DAMPING) * still[layout.FORCE],
-            rtol=1e-12,
+        still = law_at(mesh, 0.4, 3e-5)
+        fast = law_at(mesh, 0.4, 3e-5, rate=10.0)
+        assert_close(
+            fast[layout.FORCE], (1.0 + 10.0 * DAMPING) * still[layout.FORCE], 1e-12
         )
-        assert law_at(mesh, 0.4, 3e-5, rate=-1e4)[layout.FORCE] == pytest.approx(
-            0.0, abs=0.0
-        )
+        assert_close(law_at(mesh, 0.4, 3e-5, rate=-1e4)[layout.FORCE], 0.0)
 
     def test_the_missing_tooth_is_missing_on_both_flanks_once_a_turn(
         self, helical, mesh
@@ -134,7 +132,8 @@ class TestLaw:
         """
         table, _ = helical
         mesh = placed(sliced_pair_mesh, table)
-        pair, pitch = table.pair, table.pair.base_pitch
+        pair = table.pair
+        pitch = table.pair.base_pitch
         middle = 0.5 * pair.face_width * math.tan(pair.base_helix_angle)
         for position in (
             0.1,
@@ -143,11 +142,9 @@ class TestLaw:
         ):  # of the middle of the face, past the pitch point, pitches
             front = (pair.pitch_point + middle) / pitch + position
             back = (pair.pitch_point + middle) / pitch + 0.5 - position
-            one, other = (
-                law_at(mesh, front + 9.0, 3e-5)[0],
-                law_at(mesh, back + 9.0, -mesh.backlash - 3e-5)[0],
-            )
-            assert_allclose(other, -one, rtol=1e-9)
+            one = law_at(mesh, front + 9.0, 3e-5)[0]
+            other = law_at(mesh, back + 9.0, -mesh.backlash - 3e-5)[0]
+            assert_close(other, -one, 1e-9)
 
     def test_springs_begin_at_0_and_grow(self, mesh):
         with pytest.raises(ConfigError, match="must begin at 0 and grow"):
@@ -160,17 +157,15 @@ class TestZeroHelix:
     @pytest.mark.parametrize("n_chords", [1, 3])
     def test_a_spur_table_in_chords_is_the_spur_mesh(self, xiamen, n_chords):
         table = xiamen.mesh_table((MissingTooth(gear="pinion", tooth=1),))
-        one, other = (
-            placed(pair_mesh, table),
-            placed(sliced_pair_mesh, as_chords(table, n_chords)),
-        )
+        one = placed(pair_mesh, table)
+        other = placed(sliced_pair_mesh, as_chords(table, n_chords))
         for turned in (0.2, 1.7, 2.4, 23.9):
             for approach in (1e-5, 4e-5, -one.backlash - 2e-5):
                 expected = law_at(one, turned, approach, 1e-2, 1e3)
-                assert_allclose(
+                assert_close(
                     law_at(other, turned, approach, 1e-2, 1e3),
                     expected,
-                    rtol=1e-9,
+                    1e-9,
                     atol=1e-12,
                 )
 
@@ -179,15 +174,13 @@ class TestZeroHelix:
         docs/theory/helical_mesh.md.
         """
         spur = machine({"mesh.contact": "linear", "mesh.friction_coefficient": 0.0})
-        dynamics, slices = (
-            dynamics_of(spur),
-            SliceOptions(
-                n_slices=8,
-                slice_coupling="coupled",
-                coupling_modules=1.0,
-                slices_in_phase=False,
-                independent_faulty_slices=False,
-            ),
+        dynamics = dynamics_of(spur)
+        slices = SliceOptions(
+            n_slices=8,
+            slice_coupling="coupled",
+            coupling_modules=1.0,
+            slices_in_phase=False,
+            independent_faulty_slices=False,
         )
         force = spur.mesh_force
         own = loaded_pair_table(spur.pair, spur.material, spur.mesh, force=force)
@@ -205,10 +198,10 @@ class TestZeroHelix:
             )
         )
         assert max(one.energy_residual, other.energy_residual) < 1e-4
-        assert_allclose(
-            q_1 @ placement["direction"], q @ placement["direction"], rtol=0, atol=2e-8
+        assert_close(
+            q_1 @ placement["direction"], q @ placement["direction"], atol=2e-8
         )
-        assert_allclose(v_1, v, rtol=0, atol=5e-3 * np.abs(v).max())
+        assert_close(v_1, v, atol=5e-3 * np.abs(v).max())
 
 
 def moved(line, dynamics):
@@ -265,5 +258,5 @@ class TestAgainstThePair:
         q, v, _ = advance(dynamics, *start, 1 / (51200 * STEPS), 0, STEPS * N_SAMPLES)
         direction = dynamics.approach_direction()
         assert motion.energy_residual < 1e-4
-        assert_allclose(v_1, v, rtol=0, atol=2e-3 * np.abs(v).max())
-        assert_allclose(q_1 @ direction, q @ direction, rtol=0, atol=5e-8)
+        assert_close(v_1, v, atol=2e-3 * np.abs(v).max())
+        assert_close(q_1 @ direction, q @ direction, atol=5e-8)

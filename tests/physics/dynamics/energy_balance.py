@@ -37,7 +37,8 @@ def balance(dynamics, step, n_steps):
     system = dynamics.system()
     speeds = v + dynamics.operating.speed * system.rotation
     springs = [dof for dof in range(len(start)) if dof not in (2, 5)]
-    k, c = np.diag(system.stiffness), np.diag(system.damping)
+    k = np.diag(system.stiffness)
+    c = np.diag(system.damping)
     drive = system.force[2] - k[2] * q[:, 2] - c[2] * v[:, 2]
     elastic = q[:, springs] ** 2 @ k[springs]
     moments = moment_p * speeds[:, 2] + moment_w * speeds[:, 5]

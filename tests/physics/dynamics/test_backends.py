@@ -60,12 +60,16 @@ class Lsoda(Backend):
 
 def motion(machine, integration):
     """Accelerations (channel, sample), and angles of the pinion (sample + 1,), from rest."""
-    low_pass, rate = decimator(integration.oversampling), integration.sampling_rate
-    factor, margin = low_pass.oversampling, low_pass.margin
-    first, last = -margin * factor - 1, (integration.n_samples + margin) * factor
+    low_pass = decimator(integration.oversampling)
+    rate = integration.sampling_rate
+    factor = low_pass.oversampling
+    margin = low_pass.margin
+    first = -margin * factor - 1
+    last = (integration.n_samples + margin) * factor
     times = np.arange(first, last + 1) / (rate * factor)
     begin = times[0] - settling_time(machine)
-    slope, start = equations(machine)[0], at_rest(machine, begin)
+    slope = equations(machine)[0]
+    start = at_rest(machine, begin)
     states = solved(slope, start, np.append(begin, times), "LSODA", 1e-7)[1:]
     dofs = [machine.dofs.index(name) + 6 for name in integration.channels]
     means = np.diff(states[:, dofs], axis=0) * rate * factor
@@ -97,7 +101,8 @@ def record(machine):
 
 def test_both_backends_agree(record, lsoda):
     """As far as the compiled core is accurate; another machine would show."""
-    core, other = record(DEFAULT_BACKEND), record(lsoda)
+    core = record(DEFAULT_BACKEND)
+    other = record(lsoda)
     damped = record(DEFAULT_BACKEND, **MORE_DAMPED)
     exact = other.acceleration[None]
     error, shown = (

@@ -46,7 +46,8 @@ def equilibrium(bearing, load, *angles):
 class TestHertz:
     def test_two_spheres(self):
         """Circular contact has a closed form: K = 4/3 E* sqrt(R)."""
-        radius, modulus = 4e-3, STEEL.youngs_modulus / (2 * (1 - 0.3**2))
+        radius = 4e-3
+        modulus = STEEL.youngs_modulus / (2 * (1 - 0.3**2))
         expected = 4.0 / 3.0 * modulus * math.sqrt(radius / 2)
         curvatures = (1 / radius,) * 4
         assert_close(point_contact_coefficient(curvatures, STEEL), expected, 1e-9)
@@ -59,7 +60,8 @@ class TestHertz:
         """Brewe & Hamrock (1977): kappa and integrals as powers of Ry / Rx, within 3 %."""
         ball, _, along, across = bearing.groove_curvatures(race)
         ratio = (ball + along) / (ball + across)
-        kappa, second = 1.0339 * ratio**0.6360, 1.0003 + 0.5968 / ratio
+        kappa = 1.0339 * ratio**0.6360
+        second = 1.0003 + 0.5968 / ratio
         first = 1.5277 + 0.6023 * math.log(ratio)
         modulus = STEEL.youngs_modulus / (1 - 0.3**2)
         root = math.sqrt(second / (4.5 * (2 * ball + along + across) * first**3))
@@ -78,7 +80,8 @@ class TestEquilibrium:
     @pytest.mark.parametrize("bearing", [SMALL, LARGE, LOOSE, TIGHT])
     @LOADS
     def test_the_balls_carry_the_load(self, bearing, load):
-        state, balls = equilibrium(bearing, load), np.arange(bearing.n_balls)
+        state = equilibrium(bearing, load)
+        balls = np.arange(bearing.n_balls)
         angle = cage_positions(bearing)[:, None] + 2 * np.pi * balls / bearing.n_balls
         assert_close((state.ball_load * np.cos(angle)).sum(axis=1), load, 1e-9)
         across = (state.ball_load * np.sin(angle)).sum(axis=1)
@@ -120,7 +123,9 @@ class TestStiffness:
     @LOADS
     def test_palmgren_and_gargiulo(self, bearing, load):
         """Palmgren with Q = 5 F / Z, and Gargiulo (1980), 0.0325e6 (D F Z^2)^(1/3) lb/in."""
-        n, inch, pound = bearing.n_balls, 0.0254, 4.448222
+        n = bearing.n_balls
+        inch = 0.0254
+        pound = 4.448222
         product = bearing.ball_diameter / inch * load / pound * n**2
         gargiulo = 0.0325e6 * product ** (1 / 3) * pound / inch
         across, along = bearing_stiffness(bearing, STEEL, load)
@@ -159,7 +164,8 @@ class TestStiffness:
 
 @pytest.mark.parametrize("span", [1e-3, 80e-3, 0.6])
 def test_a_support_is_two_bearings_in_series_with_a_beam(span):
-    shaft, bearings = replace(SHAFT, span=span), bearing_stiffness(SMALL, STEEL, 460.0)
+    shaft = replace(SHAFT, span=span)
+    bearings = bearing_stiffness(SMALL, STEEL, 460.0)
     beam = 48 * 206e9 * math.pi * 18e-3**4 / 64 / span**3
     expected = [2 * k * beam / (2 * k + beam) for k in bearings]
     assert_close(support_stiffness(SMALL, shaft, STEEL, 920.0), expected, 1e-9)

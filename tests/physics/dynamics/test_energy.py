@@ -38,7 +38,8 @@ def case(faulty):
 
 def test_states_step_by_step_are_those_of_one_run(faulty):
     """Except for the reading of the tables at every call."""
-    dynamics, n_steps = faulty["consistent"], 2500
+    dynamics = faulty["consistent"]
+    n_steps = 2500
     start = dynamics.static_start(0.0), np.zeros(6)
     steps = trajectory(dynamics, *start, STEP, n_steps)
     whole = advance(dynamics, *start, STEP, 0, n_steps)[:2]
@@ -69,11 +70,11 @@ def test_coarse_tables_balance_too(machine, dynamics_of):
 
 
 def test_friction_of_rigid_gears_dissipates_at_every_position(xiamen, dynamics_of):
-    speed, pair, rng = xiamen.operating.speed, xiamen.pair, np.random.default_rng(1)
-    roll, approach = (
-        rng.uniform(0, 50, 500) * pair.base_pitch,
-        rng.uniform(0, 20e-6, 500),
-    )
+    speed = xiamen.operating.speed
+    pair = xiamen.pair
+    rng = np.random.default_rng(1)
+    roll = rng.uniform(0, 50, 500) * pair.base_pitch
+    approach = rng.uniform(0, 20e-6, 500)
     motions = roll, approach, rng.normal(0, 1e-3, 500), pair.pinion.base_radius * speed
     normal, _, moment_p, moment_w, _, _, lost, _ = laws(dynamics_of(xiamen), motions).T
     assert np.all(moment_p * speed + moment_w * speed / pair.ratio <= 1e-9)
@@ -83,11 +84,14 @@ def test_friction_of_rigid_gears_dissipates_at_every_position(xiamen, dynamics_o
 
 def test_action_equals_reaction(xiamen, dynamics_of):
     """The mesh puts opposite forces on the two gears: normal on y, friction on x."""
-    dynamics, rng = dynamics_of(xiamen), np.random.default_rng(3)
-    system, direction = dynamics.system(), dynamics.approach_direction()
+    dynamics = dynamics_of(xiamen)
+    rng = np.random.default_rng(3)
+    system = dynamics.system()
+    direction = dynamics.approach_direction()
     pinion, wheel = (gear.base_radius for gear in xiamen.pair.gears.values())
     for _ in range(50):
-        q, v = rng.normal(0, 1e-6, 6), rng.normal(0, 1e-3, 6)
+        q = rng.normal(0, 1e-6, 6)
+        v = rng.normal(0, 1e-3, 6)
         q[5] -= (rng.uniform(1e-6, 2e-5) - q @ direction) / wheel
         acceleration = right_hand_side(dynamics, 0.0, q, v)
         held = system.stiffness @ q + system.damping @ v

@@ -113,10 +113,12 @@ class TestForces:
             assert_close(approach, push @ (pinion - wheel), 1e-10, atol=1e-18)
 
     def test_action_equals_reaction_and_moments_balance(self, gears):
-        pair, options = gears.table.pair, gears.table.options
+        pair = gears.table.pair
+        options = gears.table.options
         simple = replace(options, friction_coefficient=0.0, roll_torque="classical")
         still = replace(gears, table=replace(gears.table, options=simple))
-        system, start = still.system(), gears.static_start(0.0)
+        system = still.system()
+        start = gears.static_start(0.0)
         acceleration = right_hand_side(still, 0.0, start, np.zeros(12))
         force = system.mass * acceleration - system.force + system.stiffness @ start
         at_pinion, at_wheel, push = contact(gears)
@@ -139,10 +141,8 @@ class TestForces:
 
     def test_the_thrust_of_a_driver_follows_its_hand(self, gears, hand):
         """Fingers of the hand of the helix along the rotation: the thumb is the thrust."""
-        start, held = (
-            gears.static_start(0.0),
-            (gears.pinion.support, gears.wheel.support),
-        )
+        start = gears.static_start(0.0)
+        held = (gears.pinion.support, gears.wheel.support)
         assert math.copysign(1.0, start[6]) == -hand
         thrust = start[6] * held[0].stiffness_z
         assert_close(thrust, -start[9] * held[1].stiffness_z, 1e-9)
@@ -151,7 +151,8 @@ class TestForces:
 class TestStatics:
     def test_chords_carry_the_load_of_the_slices(self, slices):
         """Against the slices, by bracketing; the error of chords is the depth of their sag."""
-        table, pitch = slices.table(DEPTH), slices.pair.base_pitch
+        table = slices.table(DEPTH)
+        pitch = slices.pair.base_pitch
         roll = pitch * (np.arange(12) + 0.4) / 4
         n_pairs = table.last_pitch - table.first_pitch
         for force in (300.0, slices.force, 2.0 * slices.force):
@@ -189,12 +190,14 @@ class TestStatics:
     def test_slow_gears_follow_their_statics(self, helical):
         """Approach at 30 r/min."""
         operating = replace(helical.operating, speed=helical.operating.speed / 60)
-        slow, step = replace(helical, operating=operating), 1e-5
+        slow = replace(helical, operating=operating)
+        step = 1e-5
         q, _ = moved(slow, 1500, step)
         late = slice(1000, None, 50)
         angle = (operating.speed * step * np.arange(len(q)) + q[:, 2])[late]
         roll = slow.start_roll + slow.table.pair.pinion.base_radius * angle
-        approach, states = (q @ slow.approach_direction())[late], slow.states(roll)
+        approach = (q @ slow.approach_direction())[late]
+        states = slow.states(roll)
         static, wrong = (
             slow.static(states, factor * slow.mesh_force).approach
             for factor in (1, 1.05)
@@ -218,7 +221,8 @@ class TestEnergy:
         approach = np.linspace(0.0, 2.5e-5, 2001)
         roll = 0.6 * helical.table.pair.base_pitch
         law = laws(helical, (roll, approach, 0.0, 0.0))
-        force, stored = law[:, 0], law[:, 5]
+        force = law[:, 0]
+        stored = law[:, 5]
         work = np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(approach))
         assert_close(stored, np.append(0.0, work), atol=2e-3 * work[-1])
 

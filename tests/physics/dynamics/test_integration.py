@@ -11,7 +11,8 @@ from gensig.faults.broken import MissingTooth
 
 RATE = 51200.0
 MISSING = MissingTooth(gear="pinion", tooth=3)
-DURATION, SPEED = "operating.duration_s", "operating.speed_rpm"
+DURATION = "operating.duration_s"
+SPEED = "operating.speed_rpm"
 
 
 def in_band(acceleration):
@@ -33,7 +34,8 @@ def test_the_error_falls_with_the_fourth_power_of_the_step(machine, composed_con
         }
         return in_band(machine(options).simulate().acceleration)
 
-    exact, errors = spectrum(64), {}
+    exact = spectrum(64)
+    errors = {}
     for steps in (4, 5, 8, 16):
         off = np.linalg.norm(spectrum(steps) - exact, axis=1)
         errors[steps] = (off / np.linalg.norm(exact, axis=1)).max()
@@ -85,15 +87,14 @@ def test_perfect_healthy_teeth_have_no_sidebands(machine, speed_rpm, turns):
         system = machine(
             {SPEED: speed_rpm, DURATION: turns * 60 / speed_rpm, **options}
         )
-        signal, n_teeth = (
-            system.simulate(faults).acceleration,
-            system.pair.pinion.n_teeth,
-        )
+        signal = system.simulate(faults).acceleration
+        n_teeth = system.pair.pinion.n_teeth
         amplitude = np.abs(np.fft.rfft(signal, axis=-1))[:, ::turns]
         order = np.arange(amplitude.shape[1])
         usable = (order > n_teeth // 2) & (order * speed_rpm / 60 <= 20e3)
         mesh = order % n_teeth == 0
-        sides, harmonics = amplitude[:, usable & ~mesh], amplitude[:, usable & mesh]
+        sides = amplitude[:, usable & ~mesh]
+        harmonics = amplitude[:, usable & mesh]
         return (sides.max(axis=1) / harmonics.max(axis=1)).max()
 
     assert sidebands() < 1e-4

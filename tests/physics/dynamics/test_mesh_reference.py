@@ -121,7 +121,8 @@ class Reference:
 
     def loads(self, compliance, gap, approach):
         """F >= 0 with C F = approach - gap where F > 0 and C F >= approach - gap elsewhere."""
-        n, squeezed = len(gap), approach - gap
+        n = len(gap)
+        squeezed = approach - gap
         flexibility = np.diag(compliance - self.shared) + self.shared
         sets = chain.from_iterable(
             combinations(range(n), size) for size in range(n + 1)
@@ -139,7 +140,8 @@ class Reference:
         """Normal, friction, moments on pinion and wheel, force along the roll, energy, power."""
         position, *values = self.pairs(roll)
         load, along, stored, lost = self.law(values, approach, rate, roll_rate)
-        pair, options = self.pair, self.table.options
+        pair = self.pair
+        options = self.table.options
         half_width = 0.5 * options.friction_transition * pair.base_pitch
         x = np.clip((position - pair.pitch_point) / half_width, -1, 1)
         sliding = options.friction_coefficient * load * x * (1.5 - 0.5 * x**2)
@@ -153,11 +155,9 @@ class Reference:
         The mirror image of a sound pair that turns backwards: the back flanks of a space are half
         a pitch further, teeth count down, missing ones stay missing; no errors, no friction.
         """
-        pitch, position, n = (
-            self.pair.base_pitch,
-            self.table.position,
-            np.arange(-40, 41),
-        )
+        pitch = self.pair.base_pitch
+        position = self.table.position
+        n = np.arange(-40, 41)
         at = 2 * self.pair.pitch_point + 0.5 * pitch - roll - n * pitch
         chosen = (at >= position[0]) & (at < position[-1]) & self.present(-n)
         values = sum(columns(side, 0, at[chosen], position) for side, _ in self.sides)
@@ -199,18 +199,18 @@ def dynamics(request, xiamen, dynamics_of):
 
 def random_states(dynamics, n, seed):
     """Roll, approach, its rate and the rate of the roll, (n, 4)."""
-    rng, pair = np.random.default_rng(seed), dynamics.table.pair
+    rng = np.random.default_rng(seed)
+    pair = dynamics.table.pair
     speed = dynamics.operating.speed * pair.pinion.base_radius
-    roll, approach = (
-        rng.uniform(0, 8, n) * pair.base_pitch,
-        rng.uniform(-2e-6, 40e-6, n),
-    )
+    roll = rng.uniform(0, 8, n) * pair.base_pitch
+    approach = rng.uniform(-2e-6, 40e-6, n)
     rates = rng.normal(0, 2e-2, n), rng.normal(speed, 0.01 * speed, n)
     return np.column_stack([roll, approach, *rates])
 
 
 def test_the_mesh_law_agrees(dynamics):
-    reference, states = Reference(dynamics), random_states(dynamics, 300, seed=7)
+    reference = Reference(dynamics)
+    states = random_states(dynamics, 300, seed=7)
     expected = np.array([reference.mesh(*state) for state in states])
     scale = SCALE * np.maximum(1.0, expected[:, :1])
     law = laws(dynamics, states)[:, :7]
@@ -220,8 +220,10 @@ def test_the_mesh_law_agrees(dynamics):
 
 def test_back_flanks_agree(dynamics):
     """Between half the backlash and the back flanks nothing touches."""
-    reference, states = Reference(dynamics), random_states(dynamics, 300, seed=17)
-    rng, backlash = np.random.default_rng(1), dynamics.table.pair.backlash
+    reference = Reference(dynamics)
+    states = random_states(dynamics, 300, seed=17)
+    rng = np.random.default_rng(1)
+    backlash = dynamics.table.pair.backlash
     states[:, 1] = -backlash - rng.uniform(0, 40e-6, 300)
     expected = np.array([reference.coast(*state) for state in states])
     scale = np.append(SCALE, 1) * np.maximum(1.0, -expected[:, :1])
@@ -232,7 +234,8 @@ def test_back_flanks_agree(dynamics):
 
 
 def test_another_shared_compliance_would_show(dynamics):
-    group, states = pack([dynamics], 1e-6), random_states(dynamics, 50, 7)
+    group = pack([dynamics], 1e-6)
+    states = random_states(dynamics, 50, 7)
     numbers = group.numbers.copy()
     numbers[SHARED * LANES : (SHARED + 1) * LANES] *= 1.001
     force = group_laws(group, states)[:, 0]
@@ -241,7 +244,8 @@ def test_another_shared_compliance_would_show(dynamics):
 
 
 def test_the_right_hand_side_agrees(dynamics):
-    reference, rng = Reference(dynamics), np.random.default_rng(11)
+    reference = Reference(dynamics)
+    rng = np.random.default_rng(11)
     size = np.array([1, 1, 20, 1, 1, 20])
     for time in rng.integers(0, 40_000, 40) * 1e-7:
         q = dynamics.static_start(time) + rng.normal(0, 1e-6, 6) * size
@@ -268,7 +272,8 @@ def test_a_motion_against_the_back_flanks(machine, dynamics_of):
     """Two teeth missing under a light load: the pinion runs ahead into the back flanks."""
     light = machine({"operating.torque_nm": 2})
     missing = [MissingTooth(gear="pinion", tooth=tooth) for tooth in (3, 4)]
-    dynamics, step = dynamics_of(light, missing), 1 / (51200 * 8)
+    dynamics = dynamics_of(light, missing)
+    step = 1 / (51200 * 8)
     q, v = trajectory(dynamics, dynamics.static_start(0.0), np.zeros(6), step, 5000)
     reference = Reference(dynamics, step)
     behind = np.flatnonzero(q @ dynamics.approach_direction() < -light.pair.backlash)
@@ -281,10 +286,12 @@ def test_a_motion_against_the_back_flanks(machine, dynamics_of):
 
 def test_one_millisecond_against_dop853(xiamen, dynamics_of):
     """Another method, over an entry and an exit of a pair, on the compiled mesh law."""
-    dynamics, oversampling = dynamics_of(xiamen), 64
+    dynamics = dynamics_of(xiamen)
+    oversampling = 64
     step = 1 / (51200 * oversampling)
     n_steps = round(1e-3 / (64 * step)) * 64
-    reference, law = Reference(dynamics, step), law_of(dynamics, step)
+    reference = Reference(dynamics, step)
+    law = law_of(dynamics, step)
     start = dynamics.static_start(0.0) + 1e-6 * np.array([1, 1, 0, -1, 1, 0])
     means = advance(dynamics, start, np.zeros(6), step, 0, n_steps, tuple(range(6)))[2]
 
@@ -326,7 +333,8 @@ def test_a_step_with_an_entry_or_exit_is_taken_in_parts(
     """
     dynamics = dynamics_of(machine({"mesh.contact": "linear"}))
     step = 1 / (51200 * oversampling)
-    reference, law = Reference(dynamics, step), law_of(dynamics, step)
+    reference = Reference(dynamics, step)
+    law = law_of(dynamics, step)
     n_steps = round(2 / dynamics.mesh_frequency / step)
     q, v = trajectory(dynamics, dynamics.static_start(0.0), np.zeros(6), step, n_steps)
     states = np.hstack([q, v])

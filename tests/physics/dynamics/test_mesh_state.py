@@ -17,7 +17,8 @@ from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.run import Run
 
 RATE = 51200.0
-DURATION, SPEED = "operating.duration_s", "operating.speed_rpm"
+DURATION = "operating.duration_s"
+SPEED = "operating.speed_rpm"
 QUICK = {DURATION: 0.1, "solver.max_error": None}
 MISSING = (MissingTooth(gear="pinion", tooth=3),)
 CRACK = (one("crack", gear="wheel", tooth=5),)
@@ -73,7 +74,8 @@ def test_teeth_follow_one_another_and_keep_their_row(mesh):
 
 def test_slow_gears_have_the_static_shares(run, record):
     slow = {SPEED: 60, DURATION: 0.05}
-    result, dynamics = record(slow), pair_dynamics(run(slow))
+    result = record(slow)
+    dynamics = pair_dynamics(run(slow))
     radius = dynamics.table.pair.pinion.base_radius
     states = dynamics.states(dynamics.start_roll + radius * result.shaft_angle)
     load = dynamics.static(states, dynamics.mesh_force).load
@@ -123,7 +125,8 @@ def test_detectability_is_that_of_a_matched_filter():
     residual = np.array([[3.0, 0.0, 4.0], [0.0, 2.0, 0.0]])
     assert_close(detectability(residual, np.array([25.0, 1.0])), math.sqrt(5.0), 1e-12)
     assert math.isnan(detectability(np.ones((1, 4)), np.zeros(1)))
-    rng, noise = np.random.default_rng(3), np.array([0.5, 2.0])
+    rng = np.random.default_rng(3)
+    noise = np.array([0.5, 2.0])
     residual = 0.05 * rng.standard_normal((2, 400))
     template = residual / noise[:, None]
     energy = (template * residual).sum()

@@ -15,7 +15,8 @@ from gensig.systems.nuisances import nuisance_acceleration
 from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.run import Run, Start
 
-RATE, DURATION = 51200.0, 0.2
+RATE = 51200.0
+DURATION = 0.2
 TIMES = np.arange(round(DURATION * RATE)) / RATE
 RATIO = {"pinion": 1.0, "wheel": 23 / 84}
 UNBALANCE = {
@@ -83,7 +84,8 @@ def at(machine):
 @pytest.mark.parametrize("gear", SENSE)
 def test_unbalance_grows_with_the_square_of_the_speed(at, gear):
     """m e w^2 times the response of the machine, at every speed."""
-    run, rated = at(), 1800 * 2 * np.pi / 60
+    run = at()
+    rated = 1800 * 2 * np.pi / 60
     mass = getattr(run.system, gear).mass
     expected = mass * 6.3e-3 / (rated * RATIO[gear])
     axes = [0, 1] if gear == "pinion" else [2, 3]
@@ -125,7 +127,8 @@ def test_its_angle_is_fixed_to_tooth_0(at, gear):
 
 def test_a_neighbour_has_its_orders_on_a_shaft_with_wobble(at):
     run = at()
-    tones, speed = tones_of(run, MESH), run.system.operating.speed
+    tones = tones_of(run, MESH)
+    speed = run.system.operating.speed
     angle = speed * TIMES + 0.02 * np.sin(2 * np.pi * 11.0 * TIMES)
     signal = response(run, tones, angle)[2:].T
     sides = np.array([25, 26, 24, 25 + 25 / 72, 25 - 25 / 72])
@@ -142,16 +145,15 @@ def test_a_neighbour_has_its_orders_on_a_shaft_with_wobble(at):
 def test_on_a_ramp_it_is_the_response_in_time(at):
     """m e w(t)^2 cos(angle(t)) on the pinion's x, one mass on its support, solved in time."""
     run = at(3600.0, speed_profile=Profile(times=(0.0, DURATION), factors=(0.5, 1.5)))
-    tones, body, operating = (
-        tones_of(run, UNBALANCE),
-        run.system.pinion,
-        run.system.operating,
-    )
+    tones = tones_of(run, UNBALANCE)
+    body = run.system.pinion
+    operating = run.system.operating
     times = np.arange(-2000, len(TIMES)) / RATE
     nominal = operating.nominal(times)
     wave = np.real(tones[0].force[0, 0] * np.exp(1j * nominal.angle))
     force = wave * (nominal.speed / operating.speed) ** 2
-    c, k = body.support.damping_x / body.mass, body.support.stiffness_x / body.mass
+    c = body.support.damping_x / body.mass
+    k = body.support.stiffness_x / body.mass
     system = [1.0 / body.mass, 0.0, 0.0], [1.0, c, k]
     expected = lsim(system, force, times - times[0])[1][2000:]
     # from 30 to 90 turns a second in 0.2 s, on a support that follows in 11 ms
@@ -172,16 +174,19 @@ def test_only_loads_follow_torque_courses(at):
 
 def test_a_lead_in_continues_into_the_record(at):
     run = at(low_cutoff_hz=5.0)
-    tones, n_lead = tones_of(run, MESH), run.system.sensing.n_lead
+    tones = tones_of(run, MESH)
+    n_lead = run.system.sensing.n_lead
     assert n_lead > 1000
-    operating, times = run.system.operating, np.arange(-n_lead, len(TIMES)) / RATE
+    operating = run.system.operating
+    times = np.arange(-n_lead, len(TIMES)) / RATE
     led = response(run, tones, operating.nominal(TIMES).angle + 0.003)
     assert led.shape == (4, len(times))
     assert_same(led, response(at(), tones, operating.nominal(times).angle + 0.003))
 
 
 def test_tones_above_the_usable_band_are_left_out(at):
-    run, highest = at(), 20000.0 / 30.0
+    run = at()
+    highest = 20000.0 / 30.0
     for order, is_kept in ((1.01 * highest, False), (0.99 * highest, True)):
         tone = Tones(
             gear="pinion",

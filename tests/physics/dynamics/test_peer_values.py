@@ -92,7 +92,8 @@ def body(gear, curvature, material, *, half_angle=None, to_contact=False):
 
 def pair_stiffness(peer, *curvatures):
     """Single pair with both of ROSS's body choices, (phase,) N/m."""
-    material, width = peer.system.material, peer.system.pair.pinion.face_width
+    material = peer.system.material
+    width = peer.system.pair.pinion.face_width
     modulus = math.pi * material.youngs_modulus * width
     total = 4 * (1 - material.poisson_ratio**2) / modulus
     for side, curvature in zip(("pinion", "wheel"), curvatures, strict=True):
@@ -110,7 +111,8 @@ def ross_path(peer, share):
 
     Even steps of the pinion's pressure angle from its root curve to its tip; the wheel's by ratio.
     """
-    pinion, wheel = peer.gear("pinion"), peer.gear("wheel")
+    pinion = peer.gear("pinion")
+    wheel = peer.gear("wheel")
     start = math.atan(pinion.junction_curvature_radius / pinion.base_radius)
     advance = share * (math.acos(pinion.base_radius / pinion.tip_radius) - start)
     wheel_advance = advance * pinion.n_teeth / wheel.n_teeth
@@ -148,7 +150,8 @@ def test_the_line_of_action_agrees(peer):
 @EACH_SIDE
 def test_tooth_terms_agree(peer, side):
     """With another root or reach they would not."""
-    gear, curvature = getattr(peer.system.pair, side), peer.curvature(side)
+    gear = getattr(peer.system.pair, side)
+    curvature = peer.curvature(side)
     material = peer.system.material
     terms = tooth_compliance(healthy_tooth(gear), curvature, material)
     for term in ("bending", "shear", "axial"):
@@ -192,10 +195,12 @@ def test_the_body_fit_agrees_at_the_same_half_angle(peer, side):
 
 @EACH_SIDE
 def test_the_body_term_differs_by_two_choices(peer, side):
-    gear, material = peer.gear(side), peer.system.material
+    gear = peer.gear(side)
+    material = peer.system.material
     given = gear, peer.curvature(side), material
     ross = peer.ross(f"{side}_foundation_compliance")
-    angle, height = {"half_angle": ross_half_angle(gear)}, {"to_contact": True}
+    angle = {"half_angle": ross_half_angle(gear)}
+    height = {"to_contact": True}
     assert_close(body(*given, **angle, **height), ross, 1e-8)
     ours = body(*given) / ross
     assert 0.81 < ours.min() < 0.92 < ours.max() < 0.97
@@ -205,7 +210,8 @@ def test_the_body_term_differs_by_two_choices(peer, side):
 
 
 def test_a_single_pair_differs_only_by_the_body_term(peer):
-    ross, pair = peer.ross("pair_stiffness"), peer.system.pair
+    ross = peer.ross("pair_stiffness")
+    pair = peer.system.pair
     curvatures = peer.curvature("pinion"), peer.curvature("wheel")
     assert_close(pair_stiffness(peer, *curvatures), ross, OF_A_PAIR)
     curves = peer.system.stiffness_curves(n_positions=401)
@@ -217,8 +223,10 @@ def test_a_single_pair_differs_only_by_the_body_term(peer):
 def test_the_mesh_differs_by_the_body_term_and_the_contacts(peer):
     pair = peer.system.pair
     curves = peer.system.stiffness_curves(points_per_tooth=N_PHASES)
-    ours, pitch = curves.mesh_stiffness[:N_PHASES], pair.base_pitch
-    on_line, on_path = peer.ross("mesh_stiffness"), peer.ross("mesh_stiffness_own_path")
+    ours = curves.mesh_stiffness[:N_PHASES]
+    pitch = pair.base_pitch
+    on_line = peer.ross("mesh_stiffness")
+    on_path = peer.ross("mesh_stiffness_own_path")
     assert np.all((ours / on_line > 1.06) & (ours / on_line < 1.10))
     assert np.all((ours / on_path > 1.02) & (ours / on_path < 1.05))
     for index, newest in enumerate((np.arange(N_PHASES) + 0.5) / N_PHASES):
@@ -246,7 +254,8 @@ def test_the_document_shows_the_stored_values(stored):
         (row["pair"], row["quantity"], row["point"]): float(row["value"])
         for row in stored
     }
-    pair, n_lines = "", 0
+    pair = ""
+    n_lines = 0
     text = (ROOT / "docs" / "peers.md").read_text(encoding="utf-8")
     assert f"ROSS {stored[0]['ross_version']}" in text
     for line in text.splitlines():

@@ -89,7 +89,8 @@ def test_a_row_keeps_its_record_in_a_longer_plan(config, rows, in_order):
 class TestNoise:
     def test_its_level_leaves_the_clean_signal(self, config, rows, in_order):
         louder = {**rows[3], "params/sensing.snr_db": 0.0, "snr_db": 0.0}
-        loud, quiet = simulate_record(config, louder), in_order[3]
+        loud = simulate_record(config, louder)
+        quiet = in_order[3]
         assert clean(loud).tobytes() == clean(quiet).tobytes()
         noisy = loud.signals["acceleration"]
         assert noisy.tobytes() != quiet.signals["acceleration"].tobytes()

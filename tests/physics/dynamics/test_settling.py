@@ -37,8 +37,11 @@ def run(machine):
 
     def make(changes, faults=()):
         options = {"operating.duration_s": 0.1, "solver.max_error": None, **changes}
-        system, rng = machine(options), np.random.default_rng(1)
-        pair, quality, sensing = system.pair, system.quality, system.sensing
+        system = machine(options)
+        rng = np.random.default_rng(1)
+        pair = system.pair
+        quality = system.quality
+        sensing = system.sensing
         specimen = draw_specimen(rng, pair.pinion, pair.wheel, quality)
         gearbox = draw_gearbox(
             rng, len(sensing.channels), quality, sensing.gain_scatter
@@ -121,7 +124,8 @@ def test_hard_landings_settle_in_finer_steps(run, runs, monkeypatch):
 
 @pytest.mark.filterwarnings("ignore::gensig.dynamics.integrator.CoarseStepWarning")
 def test_stages_become_finer_within_stability(dynamics_of, xiamen):
-    dynamics, oversampling = dynamics_of(xiamen), xiamen.solver.oversampling
+    dynamics = dynamics_of(xiamen)
+    oversampling = xiamen.solver.oversampling
 
     def steps(limit, rate):
         return [steps for steps, _ in settling_stages(dynamics, limit, rate)]

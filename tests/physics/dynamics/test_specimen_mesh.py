@@ -59,7 +59,8 @@ class TestEccentricity:
     @pytest.mark.parametrize("most", [0, 7.3])
     def test_the_gear_turns_off_its_axis(self, xiamen, perfect, name, most):
         """The flank recess is e cos(rotation since the tooth of the largest recess was at C)."""
-        pair, gear = xiamen.pair, getattr(xiamen.pair, name)
+        pair = xiamen.pair
+        gear = getattr(xiamen.pair, name)
         turned = (rolls(xiamen) - pair.pitch_point) / gear.base_radius
         expected = SIZE * np.cos(turned - 2 * np.pi / gear.n_teeth * most)
         error = late(xiamen, eccentric(xiamen, perfect, name, most))
@@ -108,8 +109,10 @@ class TestProfile:
         return back
 
     def test_in_single_contact_the_wheel_lags_by_the_deviation(self, xiamen, perfect):
-        pair, specimen = xiamen.pair, replace(perfect, forms=self.FORMS)
-        position, pitch = rolls(xiamen) % pair.base_pitch, pair.base_pitch
+        pair = xiamen.pair
+        specimen = replace(perfect, forms=self.FORMS)
+        position = rolls(xiamen) % pair.base_pitch
+        pitch = pair.base_pitch
         alone = (position > pair.path_of_contact - 0.9 * pitch) & (
             position < 0.9 * pitch
         )
@@ -174,7 +177,8 @@ def test_misalignment_softens_the_mesh(xiamen, perfect, misalignment):
 def test_only_faults_of_the_record_engage(machine):
     """Though every tooth of a graded gear differs from the nominal one."""
     system = machine({"operating.duration_s": 0.1})
-    pair, rng = system.pair, np.random.default_rng(3)
+    pair = system.pair
+    rng = np.random.default_rng(3)
     specimen = draw_specimen(rng, pair.pinion, pair.wheel, system.quality)
     assert len(specimen.forms) == 2
     fault = one("pitch_error", tooth=3, pitch_error_um=5)
@@ -190,8 +194,10 @@ def test_only_faults_of_the_record_engage(machine):
 
 
 def test_small_errors_of_the_teeth_move_the_motion_in_proportion(machine, perfect):
-    system, rng = machine({"operating.duration_s": 0.1}), np.random.default_rng(3)
-    pinion, wheel = rng.normal(0, 1e-8, 23), rng.normal(0, 1e-8, 84)
+    system = machine({"operating.duration_s": 0.1})
+    rng = np.random.default_rng(3)
+    pinion = rng.normal(0, 1e-8, 23)
+    wheel = rng.normal(0, 1e-8, 84)
     plain, small, twice = (
         system.simulate(
             specimen=replace(

@@ -21,7 +21,8 @@ PLAIN = {
     "mesh.friction_coefficient": 0,
     "quality.iso1328_grade": None,
 }
-SPEED, TORQUE = "operating.speed_profile", "operating.torque_profile"
+SPEED = "operating.speed_profile"
+TORQUE = "operating.torque_profile"
 DURATION = "operating.duration_s"
 WALK = {"kind": "random_walk", "scatter": 0.02, "correlation_time_s": 0.2}
 
@@ -70,7 +71,8 @@ def test_the_mean_speed_is_that_of_the_course(run):
 
 def test_the_shaft_follows_a_slow_walk(run):
     walking = run({SPEED: {**WALK, "correlation_time_s": 4.0}, DURATION: 0.4})
-    angle, operating = record(walking).shaft_angle, walking.system.operating
+    angle = record(walking).shaft_angle
+    operating = walking.system.operating
     nominal = operating.nominal(np.arange(len(angle)) / RATE)
     assert np.ptp(nominal.speed) > 2e-3 * operating.speed
     walked = np.sum(nominal.speed - operating.speed) / RATE
@@ -81,7 +83,8 @@ def test_the_shaft_follows_a_slow_walk(run):
     ("ripple", "frequency"), [({"order": 1}, 30.0), ({"frequency_hz": 10}, 10.0)]
 )
 def test_the_drive_transmits_a_part_of_a_speed_ripple(run, ripple, frequency):
-    share, still = 0.01, run({DURATION: 0.2})
+    share = 0.01
+    still = run({DURATION: 0.2})
     rippled = run({"operating.speed_ripple": {"share": share, **ripple}, DURATION: 0.2})
     moved = record(rippled).shaft_angle - record(still).shaft_angle
     speed = np.gradient(moved, 1 / RATE, edge_order=2) / still.system.operating.speed
@@ -148,10 +151,8 @@ class TestStored:
             for name in ("shaft_speed", "torque_set"):
                 assert result.signals[name].shape == (5120,)
                 assert result.signals[name].dtype == np.float32
-            speed, angle = (
-                result.signals["shaft_speed"].astype(float),
-                result.signals["shaft_angle"],
-            )
+            speed = result.signals["shaft_speed"].astype(float)
+            angle = result.signals["shaft_angle"]
             grown = np.cumsum(0.5 * (speed[1:] + speed[:-1])) / RATE
             assert_close(np.append(0.0, grown), angle - angle[0], atol=2e-4)
             mean = result.values["speed_rpm"]

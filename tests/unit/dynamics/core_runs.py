@@ -45,7 +45,8 @@ class CoreRun(GroupRun):
     def means(self, n_steps: int) -> np.ndarray:
         """Mean accelerations over each of the next steps, (step, channel, lane)."""
         shape = n_steps, len(self.channels), self.n_lanes
-        means, nothing = np.empty(shape, dtype=self.precision), np.empty(0)
+        means = np.empty(shape, dtype=self.precision)
+        nothing = np.empty(0)
         _kernels.integrate(
             self.group,
             self.state.ravel(),

@@ -13,7 +13,9 @@ from gensig.dynamics._vector import LANES
 from gensig.dynamics.decimation import decimator
 from gensig.faults.broken import MissingTooth
 
-STEP, N_STEPS, FACTOR = 1 / (51200 * 5), 3000, 5
+STEP = 1 / (51200 * 5)
+N_STEPS = 3000
+FACTOR = 5
 PAPER = {"mesh.law": "paper", "mesh.pair_coupling": "sum", "mesh.contact": "linear"}
 SPEEDS = 1800, 2500, 1300, 900, 3600, 1800, 600, 5000
 TORQUES = 20, 2, 5, 60, 20, 1, 30, 8
@@ -40,7 +42,8 @@ def machines(request, machine, dynamics_of):
 
 def motion(machines, pieces, begins=(0,) * LANES, fresh=False):
     """State, means over the steps, lost steps; ``begins`` are the steps at which lanes begin."""
-    run, means = CoreRun(machines, STEP), []
+    run = CoreRun(machines, STEP)
+    means = []
     for n_steps in pieces:
         for lane, begin in enumerate(begins):
             if begin == run.now:
@@ -102,7 +105,8 @@ class TestRecentring:
         """Whole states (step, 2, dof) and rotations in the state (step,), from ``turn`` on."""
         run = CoreRun([dynamics], STEP, first_step=first_step)
         run.state[0] += turn * run.group.rotation.reshape(-1, LANES)
-        whole, bare = [], []
+        whole = []
+        bare = []
         for _ in range(n_steps):
             run.means(1)
             whole.append(run.whole[..., 0])
@@ -115,7 +119,8 @@ class TestRecentring:
         level = np.abs(here).max(axis=0)
         assert_close(here / level, there / level, atol=1e-11)
         assert bare_here.tolist() != bare_there.tolist()
-        jump, turns = RECENTER - self.SHIFT, there[:, 0, PINION_TURN]
+        jump = RECENTER - self.SHIFT
+        turns = there[:, 0, PINION_TURN]
         assert_close(bare_there[: jump - 1], turns[: jump - 1])
         assert abs(bare_there[jump] - bare_there[jump - 1]) > 0.5e-3
         assert np.abs(np.diff(turns, 2)).max() < 1e-6
@@ -154,7 +159,8 @@ class TestRecord:
 
     def test_angles_are_those_at_the_begin_of_every_sample(self, machines):
         """The first at time 0: set speed times time, and the deviation of the pinion."""
-        n_samples, walk = 70, self.run(machines)
+        n_samples = 70
+        walk = self.run(machines)
         angle = self.record(machines, n_samples)[1]
         speed = np.array([machine.operating.speed for machine in machines])
         walk.means(1 + self.LOW_PASS.margin * FACTOR)

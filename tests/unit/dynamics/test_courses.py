@@ -14,7 +14,8 @@ from gensig.systems.base import simulate_together
 from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.run import Run
 
-RATE, DRIVE = 51200.0, 20.0
+RATE = 51200.0
+DRIVE = 20.0
 DRIVE_HZ = "operating.drive_frequency_hz"
 QUICK = {
     "operating.duration_s": 0.03,
@@ -23,7 +24,8 @@ QUICK = {
     "gear.pinion.support.damping_x_ns_per_m": 100,
     "gear.wheel.support.damping_x_ns_per_m": 500,
 }
-SPEED, TORQUE = "operating.speed_profile", "operating.torque_profile"
+SPEED = "operating.speed_profile"
+TORQUE = "operating.torque_profile"
 RAMP = [[-0.4, 0.4], [0.4, 1.6]]
 SET_SPEED = 60 * math.pi
 MISSING = (MissingTooth(gear="pinion", tooth=3),)
@@ -97,7 +99,8 @@ class TestRamp:
     def test_the_shaft_lags(self, run, record, rotors):
         """By the inertia torque over the drive's stiffness; without friction, which would grow."""
         changes = {**rotors, "mesh.friction_coefficient": 0, SPEED: RAMP}
-        ramp, still = run(changes), {**changes, SPEED: [[0, 1], [1, 1]]}
+        ramp = run(changes)
+        still = {**changes, SPEED: [[0, 1], [1, 1]]}
         n = len(record(changes).shaft_angle)
         deviation = turned(ramp, n) - record(changes).shaft_angle
         lag = deviation - (turned(run(still), n) - record(still).shaft_angle)
@@ -188,17 +191,16 @@ def assert_independent(runs, orders):
 
 class TestNeighbours:
     def test_steady_and_changing_records_are_independent(self, run):
-        kinked, both = {SPEED: [[0.0, 1.0], [0.01, 1.3]]}, {SPEED: RAMP, TORQUE: RAMP}
+        kinked = {SPEED: [[0.0, 1.0], [0.01, 1.3]]}
+        both = {SPEED: RAMP, TORQUE: RAMP}
         plain = [run(), run({SPEED: RAMP}), run({TORQUE: RAMP}), run(both)]
         runs = [*plain, run({}, MISSING), run(kinked, MISSING)]
         assert_independent(runs, [range(6), (5, 4, 3, 2, 1, 0)])
 
     def test_next_to_longer_settling(self, run):
         """The course of all is tabled from the begin of the slowest."""
-        speed, torque = (
-            [[-0.1, 0.8], [0.01, 0.9], [0.03, 1.2]],
-            [[0.0, 1.0], [0.02, 1.1]],
-        )
+        speed = [[-0.1, 0.8], [0.01, 0.9], [0.03, 1.2]]
+        torque = [[0.0, 1.0], [0.02, 1.1]]
         changing = {SPEED: speed, TORQUE: torque}
         runs = [run({**changing, DRIVE_HZ: rate}) for rate in (20, 5, 7.3)]
         assert_independent(runs, list(permutations(range(3)))[::2])

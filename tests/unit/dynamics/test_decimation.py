@@ -25,7 +25,8 @@ N_SAMPLES = 2048
 
 def decimated(frequency, factor, phase=0.4):
     """A sine as means over internal steps through the decimator, and sampled at the output rate."""
-    low_pass, turn = decimator(factor), 2 * np.pi * frequency
+    low_pass = decimator(factor)
+    turn = 2 * np.pi * frequency
     steps = np.arange(
         -low_pass.margin * factor - 1, (N_SAMPLES + low_pass.margin) * factor + 1
     )
@@ -61,7 +62,8 @@ def test_aliases_are_78_db_down(factor):
 @pytest.mark.parametrize("n_samples", [1, 37])
 def test_channels_and_lanes_are_filtered_alone(n_samples, factor):
     """Against the plain sum of taps times means, for any remainder of the taps by four."""
-    low_pass, rng = decimator(factor), np.random.default_rng(2)
+    low_pass = decimator(factor)
+    rng = np.random.default_rng(2)
     n_steps = (n_samples + 2 * low_pass.margin) * factor + 1
     for n_cut in (0, 1, 3):
         taps = low_pass.taps[: len(low_pass.taps) - n_cut]
@@ -71,7 +73,8 @@ def test_channels_and_lanes_are_filtered_alone(n_samples, factor):
         samples = replace(low_pass, taps=taps).apply(means)
         assert_close(samples, expected, atol=1e-14)
     means[7:, :, 2] = np.nan
-    spoilt, others = replace(low_pass, taps=taps).apply(means), np.arange(LANES) != 2
+    spoilt = replace(low_pass, taps=taps).apply(means)
+    others = np.arange(LANES) != 2
     assert spoilt[others].tobytes() == samples[others].tobytes()
     assert np.isnan(spoilt[2]).all()
 
@@ -79,7 +82,8 @@ def test_channels_and_lanes_are_filtered_alone(n_samples, factor):
 @pytest.mark.parametrize("factor", FACTORS)
 def test_float32_keeps_six_digits(factor):
     """Sixteen lanes; the samples are float64."""
-    low_pass, n = decimator(factor), n_lanes("float32")
+    low_pass = decimator(factor)
+    n = n_lanes("float32")
     n_steps = (20 + 2 * low_pass.margin) * factor + 1
     means = np.random.default_rng(5).standard_normal((n_steps, 2, n))
     samples = low_pass.apply(means.astype(np.float32))
@@ -101,7 +105,8 @@ def test_stored_taps_are_those_of_the_design(composed_config):
     default = composed_config["solver"]["oversampling"]
     assert stored == {default, 2 * default}
     for factor in stored:
-        low_pass, designed = decimator(factor), design(factor)
+        low_pass = decimator(factor)
+        designed = design(factor)
         assert low_pass.margin == designed.margin
         assert_close(low_pass.taps, designed.taps, atol=1e-15)
 
@@ -109,9 +114,11 @@ def test_stored_taps_are_those_of_the_design(composed_config):
 @pytest.mark.parametrize("finest", [2, 5, 64, 256])
 def test_every_allowed_step_and_its_half_have_a_low_pass(finest):
     """That of half the step, for the error, must not be longer."""
-    fine, factor = decimator(2 * finest), 2 * finest
+    fine = decimator(2 * finest)
+    factor = 2 * finest
     assert fine.margin <= decimator(finest).margin
-    band, folding = usable_band(RATE)[1], (0.5 * factor - 0.3) * RATE
+    band = usable_band(RATE)[1]
+    folding = (0.5 * factor - 0.3) * RATE
     frequency = np.array([0.0, band, 0.5 * RATE, 0.7 * RATE, folding]) / (factor * RATE)
     turn = np.exp(-2j * np.pi * np.outer(frequency, np.arange(len(fine.taps))))
     gain = np.abs(turn @ fine.taps) * np.sinc(frequency)

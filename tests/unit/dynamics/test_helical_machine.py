@@ -67,7 +67,8 @@ def test_impossible_axial_keys_are_refused(keys, text):
 def test_masses_and_supports_of_the_axial_motions(helical):
     system = helical.system()
     for name in AXIAL_DOFS:
-        dof, gear = helical.dofs.index(name), getattr(helical, name.partition("_")[0])
+        dof = helical.dofs.index(name)
+        gear = getattr(helical, name.partition("_")[0])
         held = gear.support
         expected = gear.mass, held.stiffness_z, held.damping_z
         if "tilt" in name:
@@ -88,7 +89,8 @@ def test_motor_and_load_follow_the_gears(helical, machine):
 
 
 def test_supports_hold_the_mesh_force_at_rest(helical):
-    force, rest = helical.mesh_force, helical.rest()
+    force = helical.mesh_force
+    rest = helical.rest()
     held = helical.system().stiffness @ rest + force * helical.approach_direction()
     moving = [not name.endswith("rotation") for name in helical.dofs]
     assert_close(held[moving], 0.0, atol=1e-9 * force)
@@ -97,7 +99,8 @@ def test_supports_hold_the_mesh_force_at_rest(helical):
 
 @pytest.mark.parametrize("key", ["stiffness_z", "stiffness_tilt", "tilt_inertia"])
 def test_a_gear_without_axial_support_is_refused(helical, key):
-    body, support = helical.wheel, helical.wheel.support
+    body = helical.wheel
+    support = helical.wheel.support
     if key == "tilt_inertia":
         loose = replace(body, tilt_inertia=0.0)
     else:
@@ -150,7 +153,8 @@ def test_pairs_and_lag_follow_the_table(helical, spur):
 
 
 def test_sliding_turns_with_the_middle_of_the_face_at_the_pitch_point(helical):
-    table, lag = helical.table, half_lag(helical.table)
+    table = helical.table
+    lag = half_lag(helical.table)
     position = table.pair.pitch_point + lag + np.linspace(-0.3, 0.3, 7) * lag
     arms = loss_arm(table, position)
     assert_close(arms, arms[::-1], 1e-9)
@@ -163,7 +167,8 @@ def test_unused_kinds_of_teeth_are_not_stored(spur):
     table = as_chords(spur.table, 2)
     names = "compliance", "compliance_slope", "gap", "gap_slope"
     three = {name: np.concatenate([getattr(table, name)] * 3) for name in names}
-    kind, present = np.full_like(table.pinion_kind, 2), np.array([True, True, False])
+    kind = np.full_like(table.pinion_kind, 2)
+    present = np.array([True, True, False])
     odd = replace(table, **three, pinion_kind=kind, pinion_present=present)
     missing, sound = (pack([with_table(spur, each)], 1e-6) for each in (odd, table))
     assert missing.table.size == 2 * sound.table.size

@@ -25,11 +25,9 @@ LAWS = {
     "paper": PAPER,
     "paper_classical": {**PAPER, **CLASSICAL},
 }
-SPEED, TORQUE, BACKLASH = (
-    "operating.speed_rpm",
-    "operating.torque_nm",
-    "gear.backlash_um",
-)
+SPEED = "operating.speed_rpm"
+TORQUE = "operating.torque_nm"
+BACKLASH = "gear.backlash_um"
 PINION_STIFFNESS = "gear.pinion.support.stiffness_y_n_per_m"
 MISSING = (MissingTooth(gear="pinion", tooth=3),)
 TWO_MISSING = (*MISSING, MissingTooth(gear="pinion", tooth=4))
@@ -199,7 +197,8 @@ class TestBitsAlone:
     @pytest.mark.parametrize("seed", range(2))
     def test_where_contact_is_lost_and_regained(self, run, seed):
         """Bouncing pairs are integrated in parts, in some lanes and not in others."""
-        rng, runs = np.random.default_rng(seed), []
+        rng = np.random.default_rng(seed)
+        runs = []
         for _ in range(LANES):
             changes = {
                 TORQUE: float(rng.choice([1, 5, 60])),
@@ -269,7 +268,8 @@ class TestError:
     Not where teeth bounce: there, equal levels are enough.
     """
 
-    COARSE, BOUNCING = (1, 3), 4
+    COARSE = (1, 3)
+    BOUNCING = 4
 
     @pytest.fixture(scope="class")
     @classmethod
@@ -281,7 +281,8 @@ class TestError:
             "solver.max_error": LIMIT,
             "operating.duration_s": 0.1,
         }
-        calm, light = {**fast, SPEED: 1200}, {**fast, TORQUE: 5}
+        calm = {**fast, SPEED: 1200}
+        light = {**fast, TORQUE: 5}
         changes = (calm, ()), (fast, MISSING), (calm, MISSING), (fast, ())
         return [run(*each) for each in (*changes, (light, TWO_MISSING))]
 

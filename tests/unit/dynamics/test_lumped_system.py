@@ -70,7 +70,8 @@ def test_slowest_decay_of_an_oscillator():
 def test_a_group_holds_the_matrices_of_each_machine(machine, dynamics_of, kinds):
     """Also where a machine lacks an entry of its neighbour; empty lanes repeat the first."""
     machines = [dynamics_of(machine(changes)) for changes in kinds]
-    group, n = pack(machines, 1e-6), len(machines[0].dofs)
+    group = pack(machines, 1e-6)
+    n = len(machines[0].dofs)
     assert len(group.other_column) == (0 if n == 6 else 4)
     row = np.repeat(np.arange(n), np.diff(group.other_first))
     for lane, dynamics in enumerate([*machines, machines[0]]):
@@ -109,9 +110,13 @@ def test_the_compiled_right_hand_side_is_that_of_the_matrices(
     machine, dynamics_of, changes, time
 ):
     """M q'' = f - K q - C v + mesh forces, also in a step that recentres the rotations."""
-    dynamics, rng = dynamics_of(machine(changes)), np.random.default_rng(6)
-    system, n, pair = dynamics.system(), len(dynamics.dofs), dynamics.table.pair
-    radius_p, radius_w = pair.pinion.base_radius, pair.wheel.base_radius
+    dynamics = dynamics_of(machine(changes))
+    rng = np.random.default_rng(6)
+    system = dynamics.system()
+    n = len(dynamics.dofs)
+    pair = dynamics.table.pair
+    radius_p = pair.pinion.base_radius
+    radius_w = pair.wheel.base_radius
     for _ in range(10):
         q = rng.uniform(0.8, 1.5) * dynamics.static_start(0.0)
         q += 1e-3 * rng.standard_normal() * system.rotation
@@ -124,7 +129,8 @@ def test_the_compiled_right_hand_side_is_that_of_the_matrices(
         mesh = np.zeros(n)
         mesh[:3] = friction, normal, radius_p * (along - normal) + moment_p
         mesh[3:6] = -friction, -normal, radius_w * normal + moment_w
-        springs, dampers = system.stiffness @ q, system.damping @ v
+        springs = system.stiffness @ q
+        dampers = system.damping @ v
         expected = (system.force - springs - dampers + mesh) / system.mass
         off = right_hand_side(dynamics, time, q, v) - expected
         terms = (
@@ -139,7 +145,8 @@ def modes(xiamen, dynamics_of):
 
     def frequencies(mesh_stiffness, drive=False):
         dynamics = dynamics_of(xiamen)
-        system, direction = dynamics.system(), dynamics.approach_direction()
+        system = dynamics.system()
+        direction = dynamics.approach_direction()
         k = system.stiffness + mesh_stiffness * np.outer(direction, direction)
         if not drive:
             k[2, 2] -= system.stiffness[2, 2]

@@ -40,7 +40,8 @@ def recorded(system, dynamics, **changes):
 @pytest.mark.parametrize("phase", [0.0, 0.4, 0.9])
 def test_static_start_is_in_equilibrium(xiamen, dynamics_of, phase):
     dynamics = dynamics_of(xiamen, phase=phase)
-    q, stiffness = dynamics.static_start(0.0), dynamics.system().stiffness
+    q = dynamics.static_start(0.0)
+    stiffness = dynamics.system().stiffness
     approach = q @ dynamics.approach_direction()
     force = laws(dynamics, [(dynamics.start_roll, approach, 0.0, 0.0)])[0, 0]
     assert_close(force, dynamics.mesh_force, 1e-6)
@@ -63,9 +64,11 @@ def test_friction_torque_is_the_imbalance_of_drive_and_load(
     xiamen, dynamics_of, machine
 ):
     dynamics = dynamics_of(xiamen)
-    torque, force = dynamics.friction_torque(), dynamics.system().force
+    torque = dynamics.friction_torque()
+    force = dynamics.system().force
     # Niemann & Winter: loss factor of a constant load over the path of contact
-    pair, pitch = xiamen.pair, xiamen.pair.base_pitch
+    pair = xiamen.pair
+    pitch = xiamen.pair.base_pitch
     recess = (pair.path_of_contact - pair.pitch_point) / pitch
     shares = (
         1 - pair.path_of_contact / pitch + recess**2 + (pair.pitch_point / pitch) ** 2
@@ -235,7 +238,8 @@ class TestRecord:
 
     def test_the_start_phase_moves_the_signal(self, short):
         """Half a mesh period later by phase is half a mesh period later in time."""
-        period, samples = RATE / 690, np.arange(200, 400)
+        period = RATE / 690
+        samples = np.arange(200, 400)
         first = short.simulate().acceleration[1]
         second = short.simulate(start=Start(phase=0.5)).acceleration[1]
         shifted = np.interp(samples + 1.5 * period, np.arange(2560), first)

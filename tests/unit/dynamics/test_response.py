@@ -26,9 +26,11 @@ def responses(dynamics, frequencies, dof):
 def test_across_the_line_of_action_a_gear_is_one_mass_on_its_support(
     xiamen, dynamics_of
 ):
-    w, body = np.array([10.0, 1e3, 1e5]), xiamen.pinion
+    w = np.array([10.0, 1e3, 1e5])
+    body = xiamen.pinion
     response = responses(dynamics_of(xiamen), w, PINION_X)
-    stiffness, damping = body.support.stiffness_x, body.support.damping_x
+    stiffness = body.support.stiffness_x
+    damping = body.support.damping_x
     expected = -(w**2) / (stiffness - w**2 * body.mass + 1j * w * damping)
     assert_close(response[:, PINION_X], expected, 1e-9)
     assert np.all(np.delete(response, PINION_X, axis=1) == 0.0)
@@ -45,9 +47,13 @@ def test_a_mass_is_free_above_every_mode_and_on_a_spring_below(xiamen, dynamics_
 def test_it_is_the_steady_motion_in_time(xiamen, dynamics_of, rotors, name):
     """A solution in time that begins in the steady state stays in it."""
     dynamics = replace(dynamics_of(xiamen), **rotors)
-    system, direction = dynamics.system(), dynamics.approach_direction()
-    n, dof, w = len(dynamics.dofs), dynamics.dofs.index(name), 2.0 * np.pi * 240.0
-    mesh, mass = np.outer(direction, direction), system.mass[:, None]
+    system = dynamics.system()
+    direction = dynamics.approach_direction()
+    n = len(dynamics.dofs)
+    dof = dynamics.dofs.index(name)
+    w = 2.0 * np.pi * 240.0
+    mesh = np.outer(direction, direction)
+    mass = system.mass[:, None]
     stiffness = (system.stiffness + dynamics.mean_mesh_stiffness * mesh) / mass
     damping = (system.damping + dynamics.mesh_damping * mesh) / mass
     state = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]])

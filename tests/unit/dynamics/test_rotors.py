@@ -81,7 +81,8 @@ def ends(dynamics):
 
 def drive_matrices(dynamics):
     """Spring and damper of the drive alone, (dof, dof) each."""
-    system, operating = dynamics.system(), dynamics.operating
+    system = dynamics.system()
+    operating = dynamics.operating
     unit = np.zeros(system.stiffness.shape)
     unit[ends(dynamics)[0], ends(dynamics)[0]] = 1.0
     rate = 2 * math.pi * operating.drive_frequency
@@ -92,11 +93,10 @@ def drive_matrices(dynamics):
 
 def residual(dynamics, time, q):
     """Remaining forces and torques at a state at rest in the rotating frame, (dof,)."""
-    system, nominal = dynamics.system(), dynamics.nominal(np.array([time]))
-    radius, direction = (
-        dynamics.table.pair.pinion.base_radius,
-        dynamics.approach_direction(),
-    )
+    system = dynamics.system()
+    nominal = dynamics.nominal(np.array([time]))
+    radius = dynamics.table.pair.pinion.base_radius
+    direction = dynamics.approach_direction()
     states = dynamics.states(dynamics.start_roll + radius * (nominal.angle + q[2]))
 
     def excess(force):
@@ -110,7 +110,8 @@ def residual(dynamics, time, q):
 
 class TestEquations:
     def test_degrees_of_freedom(self, dynamics, rotors):
-        system, direction = dynamics.system(), dynamics.approach_direction()
+        system = dynamics.system()
+        direction = dynamics.approach_direction()
         names = (*PAIR_DOFS, *[f"{name}_rotation" for name in rotors])
         assert dynamics.dofs == system.names == names
         assert set(dynamics.dofs) <= set(DOFS)
@@ -136,7 +137,8 @@ class TestEquations:
         assert_close(approach, 0, atol=1e-15)
 
     def test_a_wrong_ratio_would_strain_the_coupling(self, whole):
-        system, drive_k = whole.system(), drive_matrices(whole)[0]
+        system = whole.system()
+        drive_k = drive_matrices(whole)[0]
         is_load = np.array(system.names) == "load_rotation"
         wrong = np.where(is_load, 1.0, system.rotation)
         strain = np.abs((system.stiffness - drive_k) @ wrong).max()
@@ -144,7 +146,8 @@ class TestEquations:
 
     def test_the_drive_holds_all_that_rotates(self, dynamics, smooth):
         """At its frequency and damping ratio for every machine."""
-        system, operating = dynamics.system(), smooth.operating
+        system = dynamics.system()
+        operating = smooth.operating
         rotation = system.rotation
         inertia = rotation @ np.diag(system.mass) @ rotation
         rate = math.sqrt(rotation @ system.stiffness @ rotation / inertia)
@@ -155,7 +158,8 @@ class TestEquations:
         )
 
     def test_torques_act_at_the_ends_and_balance(self, dynamics, smooth):
-        system, lead = dynamics.system(), np.zeros(len(dynamics.dofs))
+        system = dynamics.system()
+        lead = np.zeros(len(dynamics.dofs))
         if dynamics.motor:
             lead[6] = smooth.operating.torque / MOTOR.coupling_stiffness
         driving = system.force - drive_matrices(dynamics)[0] @ lead
@@ -191,15 +195,19 @@ class TestTorsion:
         assert (np.abs(rates) < 1e-6 * expected).sum() == 2
 
     def test_three_inertias_with_rigid_teeth_and_bearings(self, whole):
-        system, direction = whole.system(), whole.approach_direction()
+        system = whole.system()
+        direction = whole.approach_direction()
         rigid = np.diag([1e13, 1e13, 0, 1e13, 1e13, 0, 0, 0])
         rigid = rigid + 1e13 * np.outer(direction, direction)
         matrix = system.stiffness - drive_matrices(whole)[0] + rigid
         root = np.sqrt(np.outer(system.mass, system.mass))
         squares = np.sort(np.abs(np.linalg.eigvalsh(matrix / root)))[:3]
         middle = system.mass[2] + system.mass[5] / RATIO**2
-        j1, j2, j3 = MOTOR.inertia, middle, LOAD.inertia / RATIO**2
-        k1, k2 = MOTOR.coupling_stiffness, LOAD.coupling_stiffness / RATIO**2
+        j1 = MOTOR.inertia
+        j2 = middle
+        j3 = LOAD.inertia / RATIO**2
+        k1 = MOTOR.coupling_stiffness
+        k2 = LOAD.coupling_stiffness / RATIO**2
         total = k1 * (1 / j1 + 1 / j2) + k2 * (1 / j2 + 1 / j3)
         product = k1 * k2 * (j1 + j2 + j3) / (j1 * j2 * j3)
         root = math.sqrt(total**2 - 4 * product)
@@ -252,14 +260,17 @@ class TestStart:
 def test_power_is_stored_and_dissipated_on_a_ramp(whole):
     """The inertia force of the rotating frame, with energies in the frame at rest."""
     moving = on_course(whole, "ramp")
-    system, direction = moving.system(), moving.approach_direction()
+    system = moving.system()
+    direction = moving.approach_direction()
     drive_k, drive_c = drive_matrices(moving)
-    n, end = len(system.mass), 0.01
+    n = len(system.mass)
+    end = 0.01
     stiffness = system.stiffness - drive_k + 2.5e8 * np.outer(direction, direction)
     damping = system.damping - drive_c
 
     def slope(time, state):
-        q, v = state[:n], state[n : 2 * n]
+        q = state[:n]
+        v = state[n : 2 * n]
         nominal = moving.nominal(np.array([time]))
         outside = system.force * nominal.torque_factor - drive_k @ q - drive_c @ v
         inertia = system.mass * system.rotation * nominal.acceleration
@@ -369,7 +380,8 @@ class TestMeanStiffness:
         assert lighter.mean_mesh_stiffness < first
 
     def test_it_is_that_of_the_commonest_teeth(self, smooth):
-        table, force = smooth.mesh_table(), smooth.mesh_force
+        table = smooth.mesh_table()
+        force = smooth.mesh_force
         sound = mesh_statics.mean_mesh_stiffness(table, force)
         pinion = table.pinion
         names = "gap", "gap_slope", "present", "compliance", "compliance_slope"

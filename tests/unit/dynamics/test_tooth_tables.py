@@ -40,9 +40,11 @@ def dynamics(request, machine, dynamics_of):
 @pytest.fixture(scope="module")
 def motions(dynamics):
     """Instants over more turns than a wheel has, driven and coasting."""
-    rng, n = np.random.default_rng(9), 4000
+    rng = np.random.default_rng(9)
+    n = 4000
     roll = dynamics.table.pair.base_pitch * rng.uniform(-200, 200, n)
-    approach, rate = rng.uniform(-4e-5, 4e-5, n), 1e-3 * rng.standard_normal(n)
+    approach = rng.uniform(-4e-5, 4e-5, n)
+    rate = 1e-3 * rng.standard_normal(n)
     return np.column_stack([roll, approach, rate, rng.uniform(2, 6, n)])
 
 

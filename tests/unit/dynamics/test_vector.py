@@ -42,9 +42,13 @@ def lane_by_lane(read, per_row, n):
     def every(rows, numbers, out, above):
         """``rows`` holds groups of four vectors; ``above`` takes any_above of a and b."""
         for k in range(len(above)):
-            here, there, x = k * 4 * per_row, k * N_RESULTS * n, numbers[k]
-            a, b = read(rows, here), read(rows, here + per_row)
-            yes, no = read(rows, here + 2 * per_row), read(rows, here + 3 * per_row)
+            here = k * 4 * per_row
+            there = k * N_RESULTS * n
+            x = numbers[k]
+            a = read(rows, here)
+            b = read(rows, here + per_row)
+            yes = read(rows, here + 2 * per_row)
+            no = read(rows, here + 3 * per_row)
             results = (
                 a + b,
                 a - b,
@@ -90,8 +94,10 @@ def move_four(values, source, target, out):
 @COMPILED
 def transposed(rows, columns, picked):
     for k in range(0, len(rows), FOUR * FOUR):
-        a, b = load_four(rows, k), load_four(rows, k + FOUR)
-        c, d = load_four(rows, k + 2 * FOUR), load_four(rows, k + 3 * FOUR)
+        a = load_four(rows, k)
+        b = load_four(rows, k + FOUR)
+        c = load_four(rows, k + 2 * FOUR)
+        d = load_four(rows, k + 3 * FOUR)
         results = transpose(a, b, c, d)
         for row in range(FOUR):
             store(columns, k + row * FOUR, results[row])
@@ -111,7 +117,8 @@ def precision(request):
 
 def draw(precision, *size):
     """Random numbers, a third of them special."""
-    rng, reach = np.random.default_rng(4), EXPONENTS[precision]
+    rng = np.random.default_rng(4)
+    reach = EXPONENTS[precision]
     values = rng.standard_normal(size) * 10.0 ** rng.integers(-reach, reach, size)
     return np.where(rng.random(size) < 0.3, rng.choice(ODD[precision], size), values)
 
@@ -135,10 +142,8 @@ def assert_same(numbers, expected):
 def test_operations_lane_by_lane(precision, shape):
     kind = precision, shape
     n = SHAPES[kind][1]
-    rows, scalars = (
-        draw(precision, N_GROUPS, 4, n).astype(precision),
-        draw(precision, N_GROUPS),
-    )
+    rows = draw(precision, N_GROUPS, 4, n).astype(precision)
+    scalars = draw(precision, N_GROUPS)
     rows[::5, 1] = rows[::5, 0]
     results, above = compute(kind, rows, scalars)
     a, b, yes, no = rows.swapaxes(0, 1)
@@ -169,7 +174,8 @@ def test_operations_lane_by_lane(precision, shape):
 
 def test_rows_of_four_are_transposed(precision):
     rows = draw(precision, N_GROUPS, FOUR, FOUR).astype(precision)
-    columns, picked = np.empty_like(rows), np.empty_like(rows[:, 0])
+    columns = np.empty_like(rows)
+    picked = np.empty_like(rows[:, 0])
     transposed(rows.ravel(), columns.ravel(), picked.ravel())
     assert_same(columns, rows.transpose(0, 2, 1))
     assert_same(picked, rows[:, 0, [1, 1, 3, 3]])
@@ -192,7 +198,8 @@ def test_rows_move_anywhere(precision, move):
 
 def test_a_vector_needs_an_array_of_its_kind(precision):
     (other,) = (name for name in PRECISIONS if name != precision)
-    values, out = np.zeros(16, dtype=precision), np.full(16, 7.0, dtype=other)
+    values = np.zeros(16, dtype=precision)
+    out = np.full(16, 7.0, dtype=other)
     n = n_lanes(precision)
     for move, text in (
         (move_row, f"{precision}x{n} is no row of an array of {other}"),

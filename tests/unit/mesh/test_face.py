@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closeness import assert_close
 from fault_cases import GEARS, on_path, one, side_of
-from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
 from gensig.faults.base import faulty_teeth
@@ -34,7 +34,8 @@ class TestLowerEnvelope:
     @classmethod
     def flank(cls, request):
         """Random deviations (slice, profile) on uneven nodes; contacts and their radii."""
-        name, rng = request.param, np.random.default_rng(3)
+        name = request.param
+        rng = np.random.default_rng(3)
         arc = np.sort(rng.uniform(0.0, 6e-3, 80))
         height = {"rough": 60, "smooth": 5, "steps": 0.1, "broken": 30}[name] * UM
         back = rng.uniform(0.0, height, (5, len(arc)))
@@ -72,7 +73,7 @@ class TestLowerEnvelope:
         atol = coarsest**2 / (8 * flank[3].min())
         result = self.brute(*flank, 401)
         assert np.all(exact <= result + 1e-18)
-        assert_allclose(exact, result, rtol=0, atol=atol + 1e-15)
+        assert_close(exact, result, atol=atol + 1e-15)
 
     def test_nodes_alone_are_not(self, flank):
         """A minimum over the nodes alone misses far more than the tolerance."""
@@ -84,7 +85,7 @@ class TestLowerEnvelope:
         _, arc, center, radius = flank
         gap = self.compiled(np.zeros((1, len(arc))), arc, center, radius)[0]
         beyond = np.maximum(np.maximum(arc[0] - center, center - arc[-1]), 0.0)
-        assert_allclose(gap, beyond**2 / (2 * radius), rtol=1e-12, atol=1e-18)
+        assert_close(gap, beyond**2 / (2 * radius), 1e-12, atol=1e-18)
 
     def test_nothing_left_touches_nowhere(self, flank):
         _, arc, center, radius = flank
@@ -105,9 +106,9 @@ class TestRigidFlanks:
         pit = one("pitting", tooth=0, pit_width_mm=20, pit_depth_mm=depth_mm)
         gap, table = gap_rows(xiamen, pit)
         largest = gap[on_path(table)].max()
-        assert_allclose(largest, gap_um * UM, rtol=0, atol=atol_um * UM)
+        assert_close(largest, gap_um * UM, atol=atol_um * UM)
         middle = table.position[gap > (1 - 1e-9) * largest].mean()
-        assert_allclose(middle, xiamen.pair.pitch_point, rtol=0, atol=0.1e-3)
+        assert_close(middle, xiamen.pair.pitch_point, atol=0.1e-3)
 
     @pytest.mark.parametrize(
         ("gear", "height_mm"),
@@ -129,7 +130,7 @@ class TestRigidFlanks:
         most, rtol = {"pinion": (np.inf, 0.02), "wheel": (5 * UM, 0.07)}[gear]
         seen = (exact > 0.5 * UM) & (exact < most)
         assert seen.any()
-        assert_allclose(result[seen], exact[seen], rtol=rtol, atol=0)
+        assert_close(result[seen], exact[seen], rtol)
 
     @staticmethod
     def corner(system, gear, height_mm):
@@ -155,19 +156,20 @@ class TestRigidFlanks:
         assert is_nominal(tooth)
         tip = tooth.profile.curvature_radius[-1]
         at = np.linspace(0.5 * tip, 1.2 * tip, 50)
-        assert_allclose(slice_gaps(tooth, at, np.full(50, 5e-3)), 0.0, rtol=0, atol=0)
+        assert_close(slice_gaps(tooth, at, np.full(50, 5e-3)), 0.0)
 
     def test_a_gap_everywhere_is_that_gap_beyond_the_tip_too(self, xiamen):
         tooth = healthy_tooth(xiamen.pair.pinion).with_deviation(np.array([-7 * UM]))
         assert not is_nominal(tooth)
         at = tooth.profile.curvature_radius[-1] * np.linspace(0.5, 1.2, 50)
         gaps = slice_gaps(tooth, at, np.full(50, 5e-3))
-        assert_allclose(gaps, -7 * UM, rtol=1e-12, atol=0)
+        assert_close(gaps, -7 * UM, 1e-12)
 
 
 def shared(law: ContactLaw, slice_gap, width, load, bending):
     """Gap and compliance of the compiled sharing, (node,) each."""
-    gap, compliance = np.empty_like(load), np.empty_like(load)
+    gap = np.empty_like(load)
+    compliance = np.empty_like(load)
     terms = law.factor, law.constant, law.log_weight, np.full_like(load, bending)
     share_over_slices(slice_gap, width, load, *terms, gap, compliance)
     return gap, compliance
@@ -235,31 +237,32 @@ class TestShareOverSlices:
         _, width, load = random_face
         for even in (0.0, 3 * UM, -4 * UM):
             gap, compliance = shared(law, np.full((12, 10), even), width, load, bending)
-            assert_allclose(gap, even, rtol=0, atol=0)
+            assert_close(gap, even)
             expected = law.compliance(width.sum(), load)
-            assert_allclose(compliance, expected, rtol=1e-9, atol=0)
+            assert_close(compliance, expected, 1e-9)
 
     def test_half_a_face_is_the_law_of_half_the_width(self, law, bending):
-        width, load = np.full(8, 2.5e-3), np.full(10, 925.0)
+        width = np.full(8, 2.5e-3)
+        load = np.full(10, 925.0)
         expected = law.compliance(10e-3, load) + bending * (1 / 10e-3 - 1 / 20e-3)
         for lost in (np.inf, 1e-3):
             slice_gap = np.tile([[UM], [lost]], (4, 10))
             gap, compliance = shared(law, slice_gap, width, load, bending)
-            assert_allclose(gap, UM, rtol=0, atol=0)
-            assert_allclose(compliance, expected, rtol=1e-9, atol=0)
+            assert_close(gap, UM)
+            assert_close(compliance, expected, 1e-9)
             assert np.abs(compliance / law.compliance(20e-3, load) - 1).min() > 0.5
 
     def test_random_gaps_by_root_finding(self, law, bending, random_face):
         slice_gap, width, load = random_face
         gap, _ = shared(law, slice_gap, width, load, bending)
-        assert_allclose(gap, slice_gap.min(axis=0), rtol=0, atol=0)
+        assert_close(gap, slice_gap.min(axis=0))
         approach = approach_of(law, slice_gap, width, load, bending)
         expected = [
             approach_by_root_finding(law, bending, k, slice_gap[:, k], width, load[k])
             for k in range(10)
         ]
         rtol = {0.0: 1e-9, 1.0: 1e-6}[law.log_weight]
-        assert_allclose(approach, expected, rtol=rtol, atol=0)
+        assert_close(approach, expected, rtol)
         lifted = (np.isfinite(slice_gap) & (slice_gap >= approach)).sum(axis=0)
         assert lifted.min() == 0
         assert lifted.max() >= 3
@@ -285,7 +288,7 @@ class TestShareOverSlices:
             shared(law, slice_gap, width, load, bending),
             strict=True,
         ):
-            assert_allclose(result, expected, rtol=1e-9, atol=0)
+            assert_close(result, expected, 1e-9)
 
     def test_more_load_or_softer_slices_bring_more_into_contact(self, law, random_face):
         slice_gap, width, load = random_face
@@ -302,4 +305,4 @@ def test_bearing_width_narrows_as_the_paper_has_it(xiamen):
     tooth = faulty_teeth(xiamen.pair, [fault])["pinion", 0]
     pair = xiamen.pair
     at = pair.pinion_curvature(np.array([0.0, pair.pitch_point, pair.path_of_contact]))
-    assert_allclose(bearing_width(tooth, at), [20e-3, 14e-3, 20e-3], rtol=1e-12, atol=0)
+    assert_close(bearing_width(tooth, at), [20e-3, 14e-3, 20e-3], 1e-12)

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from closeness import assert_close
 
 from gensig.errors import FaultError
 from gensig.faults.registry import read_faults
@@ -48,7 +49,8 @@ def at_rest(table, roll, force, errors=None):
         low, high = (values[kinds[0], kinds[1], :, cell + k] for k in (0, 1))
         return (1.0 - part) * low + part * high
 
-    own, gap = read(table.compliance) - table.shared_compliance, read(table.gap)
+    own = read(table.compliance) - table.shared_compliance
+    gap = read(table.gap)
     if errors is not None:
         middle = position - table.middle_lag - table.pair.pitch_point
         for side, n in zip(("pinion", "wheel"), n_teeth, strict=True):
@@ -65,7 +67,8 @@ def at_rest(table, roll, force, errors=None):
     for _ in range(60):
         middle = 0.5 * (low + high)
         enough = load(middle).sum(axis=1) > force
-        low, high = np.where(enough, low, middle), np.where(enough, middle, high)
+        low = np.where(enough, low, middle)
+        high = np.where(enough, middle, high)
     return low + table.shared_compliance * force, load(low)
 
 
@@ -90,22 +93,24 @@ def test_equilibrium_is_that_of_the_slices(words):
     for part in (0.5, 1.0, 2.5):
         exact = loaded_contact(mesh, roll, part * system.mesh_force)
         approach, load = at_rest(table, roll, part * system.mesh_force)
-        np.testing.assert_allclose(approach, exact.approach, rtol=5e-3 / min(part, 1.0))
+        assert_close(approach, exact.approach, 5e-3 / min(part, 1.0))
         ripple = np.ptp(exact.approach)
         most = 0.1 * ripple + 2e-3 * exact.approach.mean()
         assert np.ptp(approach - exact.approach) < most
         expected = (exact.line_load * mesh.slice_width).sum(axis=2)
         # newest first in both; the table may have fewer pairs
         behind = max(load.shape[1] - expected.shape[1], 0)
-        expected, atol = expected[:, : load.shape[1]], 0.012 * part * system.mesh_force
-        np.testing.assert_allclose(load[:, behind:], expected, atol=atol)
+        expected = expected[:, : load.shape[1]]
+        atol = 0.012 * part * system.mesh_force
+        assert_close(load[:, behind:], expected, atol=atol)
 
 
 @pytest.mark.parametrize(("n_slices", "share"), [(6, 0.5), (20, 0.1)])
 def test_few_slices_that_enter_over_their_width_are_many(n_slices, share):
     """The table has the ripple of 160 slices; as few slices that enter whole do not."""
     system, table, few = table_of(f"mesh.n_slices={n_slices}")
-    roll, force = system.phases(32), system.mesh_force
+    roll = system.phases(32)
+    force = system.mesh_force
     many = loaded_contact(table_of("mesh.n_slices=160")[2], roll, force).approach
     error, whole = (
         np.ptp(approach - many)
@@ -131,7 +136,8 @@ def test_chords_err_by_less_than_a_hundredth_of_the_set_force(words):
     constant = np.interp(position, mesh.position, mesh.contact_constant)
     pairs = zip(position.T, mesh.gap, strict=True)
     gap = np.stack([np.interp(at, mesh.position, row) for at, row in pairs], axis=1)
-    first, exact = np.empty(40), np.empty((40, 60))
+    first = np.empty(40)
+    exact = np.empty((40, 60))
     depth = table.depth[-1] * np.arange(1, 61) / 60
     bite_forces(
         structure,
@@ -157,7 +163,7 @@ def test_chords_err_by_less_than_a_hundredth_of_the_set_force(words):
     deflection = first[:, None, None] + depth[:, None] - far[:, None]
     result = np.maximum((deflection / own[:, None]).max(axis=2), 0.0)
     assert exact.max() > system.mesh_force
-    np.testing.assert_allclose(result, exact, atol=0.01 * system.mesh_force)
+    assert_close(result, exact, atol=0.01 * system.mesh_force)
 
 
 @pytest.mark.parametrize(
@@ -175,12 +181,13 @@ def test_chords_err_by_less_than_a_hundredth_of_the_set_force(words):
 )
 def test_faulty_teeth_have_their_own_chords(fault, share):
     """Over the mesh periods in which tooth 0 meets sound teeth."""
-    system, faults = table_of()[0], faults_of(*fault)
+    system = table_of()[0]
+    faults = faults_of(*fault)
     table = system.mesh_table(faults)
     roll = system.phases(16, first_period=-2, n_periods=8)
     exact = loaded_contact(system.sliced_mesh(faults), roll, system.mesh_force)
     approach, _ = at_rest(table, roll, system.mesh_force)
-    np.testing.assert_allclose(approach, exact.approach, rtol=share)
+    assert_close(approach, exact.approach, share)
     assert len(table.pinion_present) == 2
     assert len(table.wheel_present) == 1
     sound = at_rest(system.mesh_table(), roll, system.mesh_force)[0]
@@ -200,7 +207,7 @@ def test_errors_of_single_teeth_open_all_chords():
     roll = system.phases(16, n_periods=20)
     exact = loaded_contact(mesh, roll, system.mesh_force, errors).approach
     result = at_rest(table, roll, system.mesh_force, errors)[0]
-    np.testing.assert_allclose(result, exact, rtol=5e-3)
+    assert_close(result, exact, 5e-3)
     assert np.ptp(exact) > 1e-6
 
 
@@ -230,13 +237,15 @@ def test_chords_are_convex_and_meet():
     system, table, _ = table_of()
     assert len(table.depth) == N_CHORDS
     assert table.depth[0] == 0.0
-    own, gap = table.compliance[0, 0] - table.shared_compliance, table.gap[0, 0]
+    own = table.compliance[0, 0] - table.shared_compliance
+    gap = table.gap[0, 0]
     near = gap[0] < 20e-6
     assert (np.diff(own[:, near], axis=0) < 1e-4 * own[1:, near]).all()
     met = gap[0] + table.depth[1:, None]
-    before, after = (met - gap[:-1]) / own[:-1], (met - gap[1:]) / own[1:]
+    before = (met - gap[:-1]) / own[:-1]
+    after = (met - gap[1:]) / own[1:]
     atol = 2e-3 * system.mesh_force
-    np.testing.assert_allclose(before[:, near], after[:, near], atol=atol)
+    assert_close(before[:, near], after[:, near], atol=atol)
     # deep enough for three times the load, and the set chord holds the mean load
     contact = loaded_contact(system.sliced_mesh(), system.phases(64), system.mesh_force)
     static = contact.approach.max() - table.shared_compliance * system.mesh_force
@@ -248,8 +257,8 @@ def test_ends_are_out_of_reach():
     for words in ((), ("gear=xiamen_23_84",), ("gear=chongqing_40_162",)):
         _, table, _ = table_of(*words)
         pitch = table.pair.base_pitch
-        assert table.position[0] == pytest.approx(table.first_pitch * pitch)
-        assert table.position[-1] == pytest.approx(table.last_pitch * pitch)
+        assert_close(table.position[0], table.first_pitch * pitch, 1e-6)
+        assert_close(table.position[-1], table.last_pitch * pitch, 1e-6)
         assert table.gap[0, 0, 0, [0, -1]].min() > 90e-6
         assert np.isfinite(table.compliance).all()
         assert np.isfinite(table.gap).all()
@@ -264,7 +273,7 @@ def test_slopes_are_those_of_the_values():
     ):
         step = 0.5 * distance * (slopes[..., 1:] + slopes[..., :-1])
         atol = 1e-9 * np.abs(values).max()
-        np.testing.assert_allclose(np.diff(values, axis=3), step, atol=atol)
+        assert_close(np.diff(values, axis=3), step, atol=atol)
 
 
 # the spur table's contact is a secant at the load of sound pairs
@@ -278,7 +287,7 @@ def test_zero_helix_is_the_spur_pair_s_table(contact, rtol):
     roll = system.phases(128)
     exact = static_mesh(spur, pair_states(spur, roll), force)
     approach, _ = at_rest(table, roll, force)
-    np.testing.assert_allclose(approach, exact.approach, rtol=rtol)
+    assert_close(approach, exact.approach, rtol)
 
 
 def test_the_papers_law_has_one_chord():
@@ -291,5 +300,5 @@ def test_the_papers_law_has_one_chord():
     result = 1.0 / np.interp(inside, table.position, table.compliance[0, 0, 0])
     # slices that bend each other are stiffer where only a part of the face is loaded
     assert (result > 0.999 * exact).all()
-    np.testing.assert_allclose(result, exact, rtol=0.15)
+    assert_close(result, exact, 0.15)
     np.testing.assert_array_equal(table.gap[0, 0, 0], 0.0)
