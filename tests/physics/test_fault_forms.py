@@ -265,18 +265,3 @@ class TestMisalignment:
         for sign in (1, -1):
             result, _ = self.approach(system, sign * tilt / UM, gear)
             assert_close(result, expected, 0.015)
-
-    def test_slices_that_bend_by_themselves_are_softer(self, machine):
-        by_slice, whole = (
-            self.approach(machine({"mesh.bending": how}), 15.0)
-            for how in ("by_slice", "whole")
-        )
-        assert by_slice[0] > whole[0] * 1.2
-        assert by_slice[1] > whole[1] * 1.2
-
-    def test_either_end_of_the_face_is_the_same(self, xiamen):
-        one_end, other_end = (
-            rows(xiamen, one("misalignment", tooth=0, misalignment_um=d))
-            for d in (15, -15)
-        )
-        assert_close(one_end, other_end, 1e-9, atol=1e-15)

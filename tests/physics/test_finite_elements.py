@@ -139,13 +139,6 @@ def test_crack_on_the_compression_side(strain):
     assert_close(increments(strain, rows, faces="breathing"), 0.0)
 
 
-def test_breathing_on_the_tension_side_stays_open(strain):
-    rows = next(
-        rows for key, rows in groups("crack", *CRACKS).items() if key[1] == "tension"
-    )
-    assert_close(increments(strain, rows, faces="breathing"), increments(strain, rows))
-
-
 @pytest.mark.parametrize(("depth", "angle"), [(0.85, 45.0), (0.3, 80.0), (0.3, 20.0)])
 def test_outside_what_was_checked(strain, depth, angle):
     rows = next(iter(groups("crack", *CRACKS).values()))

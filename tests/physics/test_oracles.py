@@ -73,9 +73,6 @@ class TestFourMilliseconds:
         """
         assert math.log2(error(xiamen, 5) / error(xiamen, 20)) / 2 > 1.7
 
-    def test_another_machine_would_show(self, machine, error):
-        assert error(machine(MORE_DAMPED), 20) > 1e-3
-
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
@@ -231,9 +228,6 @@ class TestPeriodicMotion:
     def test_a_record_at_ten_steps(self, compared):
         assert compared(10)[1] < 2e-4
 
-    def test_another_machine_would_show(self, compared):
-        assert compared(10, MORE_DAMPED)[1] > 1e-2
-
     def test_another_start_would_show(self, case, compared):
         """One that lies 5e-4 mesh periods further on is early by as much, and nothing else."""
         late, error = compared(10, {}, PHASE + 5e-4)
@@ -270,7 +264,3 @@ class TestOutOfContact:
     def test_five_steps_agree_with_twenty(self, records):
         coarse, fine, _ = (record.acceleration[None] for record in records)
         assert agreement(coarse, fine, SAMPLING_RATE).agrees[0]
-
-    def test_another_torque_does_not(self, records):
-        _, fine, other = (record.acceleration[None] for record in records)
-        assert not agreement(other, fine, SAMPLING_RATE).agrees[0]

@@ -13,7 +13,6 @@ from engine_cases import (
     SPEED,
     engine_line,
     option,
-    ratio_of_teeth,
     ratios,
     response_of,
     torques_of,
@@ -116,31 +115,6 @@ def test_mean_power_in_is_what_the_damping_takes():
     assert_close(power_in, power_lost, 1e-9)
 
 
-def test_integration_in_time_stays_on_the_steady_response():
-    from scipy.integrate import solve_ivp
-
-    line, _ = chain(damping=4e-4)
-    torque, amplitudes = cycle_torque()
-    speed = 100.0
-    steady = steady_response(line, torque, speed, n_orders=12)
-    rates = 1j * steady.orders * speed
-    inverse = np.linalg.inv(line.mass)
-
-    def slope(t, state):
-        force = np.real(amplitudes @ np.exp(rates * t))
-        rest = force - line.stiffness @ state[:3] - line.damping @ state[3:]
-        return np.concatenate([state[3:], inverse @ rest])
-
-    cycle = 4 * np.pi / speed
-    times = np.arange(64) * cycle / 64
-    start = np.real([steady.angle.sum(axis=1), steady.speed_deviation.sum(axis=1)])
-    run = solve_ivp(
-        slope, (0.0, cycle), start.ravel(), t_eval=times, rtol=1e-8, atol=1e-11
-    )
-    speeds = steady.speed_over_cycle(64)
-    assert_close(run.y[3:], speeds, atol=1e-5 * np.ptp(speeds))
-
-
 def test_slow_torques_bend_the_line_statically_and_fast_ones_move_the_masses():
     line, springs = chain()
     torque, amplitudes = cycle_torque(n_orders=2)
@@ -174,16 +148,6 @@ def test_mean_torques_are_carried_through_and_must_balance():
         match=r"the mean torques leave 0.5774 N m on a line that nothing holds",
     ):
         steady_response(line, torque, 60.0, n_orders=12)
-
-
-def test_a_free_line_turns_as_one_under_slow_torques():
-    line, elements, _ = engine_line()
-    ratio = np.array(list(ratio_of_teeth().values()))
-    assert_close(elements.directions @ ratio, 0.0, atol=1e-12)
-    force = np.zeros((1, 67), dtype=complex)
-    force[0, 7] = 1.0
-    moved = line.response(force, np.array([0.3]))[0]
-    assert_close(moved / moved[0], ratio, 1e-3)
 
 
 def test_fluctuation_is_half_the_peak_to_peak():

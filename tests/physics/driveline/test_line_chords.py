@@ -18,10 +18,7 @@ from gensig.driveline.time.course import constant_speed
 from gensig.driveline.time.line_mesh import pair_mesh
 from gensig.errors import ConfigError
 from gensig.faults.broken import MissingTooth
-from gensig.mesh.load_distribution import loaded_pair_table
-from gensig.mesh.options import SliceOptions
 from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
-from gensig.mesh.sliced.sliced_table import sliced_table
 from gensig.plan.request import read_request
 from gensig.systems.registry import read_sliced_pair
 
@@ -168,40 +165,6 @@ class TestZeroHelix:
                     1e-9,
                     atol=1e-12,
                 )
-
-    def test_spur_teeth_in_slices_move_as_the_spur_mesh(self, machine, dynamics_of):
-        """As their statics, to 1e-4 of the approach with linear contact:
-        docs/theory/helical_mesh.md.
-        """
-        spur = machine({"mesh.contact": "linear", "mesh.friction_coefficient": 0.0})
-        dynamics = dynamics_of(spur)
-        slices = SliceOptions(
-            n_slices=8,
-            slice_coupling="coupled",
-            coupling_modules=1.0,
-            slices_in_phase=False,
-            independent_faulty_slices=False,
-        )
-        force = spur.mesh_force
-        own = loaded_pair_table(spur.pair, spur.material, spur.mesh, force=force)
-        cut = sliced_table(spur.pair, spur.material, spur.mesh, slices, force=force)
-        placement = {
-            "direction": dynamics.approach_direction(),
-            "roll_dof": 2,
-            "damping": DAMPING,
-        }
-        (q, v, one), (q_1, v_1, other) = (
-            moved(pair_line(dynamics, mesh), dynamics)
-            for mesh in (
-                pair_mesh("m", own, **placement),
-                sliced_pair_mesh("m", cut, **placement),
-            )
-        )
-        assert max(one.energy_residual, other.energy_residual) < 1e-4
-        assert_close(
-            q_1 @ placement["direction"], q @ placement["direction"], atol=2e-8
-        )
-        assert_close(v_1, v, atol=5e-3 * np.abs(v).max())
 
 
 def moved(line, dynamics):

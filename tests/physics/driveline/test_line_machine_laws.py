@@ -9,7 +9,7 @@ import numpy as np
 from closeness import assert_close
 
 from gensig.driveline.engine_line import read_engine_line
-from gensig.driveline.running import EngineCourse, Governor, running_line, steady_course
+from gensig.driveline.running import Governor, running_line, steady_course
 from gensig.driveline.time.newmark import LineSolver
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
@@ -97,20 +97,6 @@ def test_the_crank_turns_by_the_pitch_of_the_camshaft_to_the_next_tooth():
         for tooth in (4, 5)
     ]
     assert_close(np.diff(angles) % (4 * np.pi), 4 * np.pi / 54, 1e-9)
-
-
-def test_a_run_up_follows_its_course_and_drives_its_own_inertia():
-    time = np.arange(-0.6, 0.5, 5e-3)
-    course = EngineCourse(
-        time=time, speed=SPEED * (0.8 + 0.2 * time), torque=np.full(len(time), 3000.0)
-    )
-    line = running_line(engine(), course, governor=GOVERNOR)
-    motion = line.run(
-        SOLVER, duration=0.2, channels=[("angle", line.dof(17))], settling=0.3
-    )
-    assert_close(np.gradient(motion.nominal_speed, 1 / 10240.0), 0.2 * SPEED, 1e-6)
-    # the governor, 1 Hz soft, would lag by a / omega^2 = 0.9 rad if nothing else sped the line up
-    assert np.abs(motion.signals["angle", line.dof(17)]).max() < 0.1
 
 
 def test_a_record_is_repeatable_and_turns_with_the_gear_ratio():

@@ -194,25 +194,6 @@ def test_a_geared_line_has_the_frequencies_of_the_line_referred_to_one_shaft():
     assert_close(one.kinetic_share, other.kinetic_share, atol=1e-9)
 
 
-def test_frequencies_do_not_depend_on_the_order_of_the_nodes(lines):
-    line = lines["engine"].line
-    order = np.random.default_rng(1).permutation(len(line.nodes))
-    place = {int(old): new for new, old in enumerate(order)}
-    mixed = ShaftLine(
-        nodes=tuple(line.nodes[old] for old in order),
-        shafts=tuple(
-            replace(shaft, first=place[shaft.first], second=place[shaft.second])
-            for shaft in line.shafts
-        ),
-        gears=tuple(replace(gear, node=place[gear.node]) for gear in line.gears),
-        meshes=line.meshes,
-    )
-    one, other = (
-        natural_modes(line_matrices(each)).frequency for each in (line, mixed)
-    )
-    assert_close(one[1:], other[1:], 1e-7)
-
-
 def test_merging_compounds_takes_only_what_they_alone_do(lines):
     """The printed 1000 MN m/rad stand for rigid: merged, all modes below 5 kHz stay and the
     highest are gone.
@@ -251,24 +232,6 @@ def test_stiff_supports_leave_the_torsional_line(lines):
     assert apart[0] > 0.02
     assert apart[1] < 0.02 * 0.2
     assert apart[2] < 1e-4
-
-
-def test_softer_meshes_and_heavier_discs_lower_every_mode(lines):
-    line = lines["gearbox"].line
-    before = natural_modes(line_matrices(line)).frequency
-    softer = replace(
-        line,
-        meshes=tuple(
-            replace(mesh, stiffness=0.5 * mesh.stiffness) for mesh in line.meshes
-        ),
-    )
-    heavier = replace(
-        line, nodes=(*line.nodes[:-1], replace(line.nodes[-1], inertia=0.06))
-    )
-    for changed in (softer, heavier):
-        after = natural_modes(line_matrices(changed)).frequency
-        assert np.all(after <= before * (1 + 1e-9))
-        assert after[1:].min() < before[1:].min()
 
 
 @pytest.mark.parametrize("rotors", [{}, ROTORS], ids=["pair", "with_rotors"])

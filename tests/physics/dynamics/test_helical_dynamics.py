@@ -187,24 +187,6 @@ class TestStatics:
         slope = 2e-6 * force / (high.approach - low.approach)
         assert (np.abs(static.stiffness / slope - 1) < 1e-4).mean() > 0.9
 
-    def test_slow_gears_follow_their_statics(self, helical):
-        """Approach at 30 r/min."""
-        operating = replace(helical.operating, speed=helical.operating.speed / 60)
-        slow = replace(helical, operating=operating)
-        step = 1e-5
-        q, _ = moved(slow, 1500, step)
-        late = slice(1000, None, 50)
-        angle = (operating.speed * step * np.arange(len(q)) + q[:, 2])[late]
-        roll = slow.start_roll + slow.table.pair.pinion.base_radius * angle
-        approach = (q @ slow.approach_direction())[late]
-        states = slow.states(roll)
-        static, wrong = (
-            slow.static(states, factor * slow.mesh_force).approach
-            for factor in (1, 1.05)
-        )
-        assert_close(approach, static, 0.01)
-        assert np.abs(approach / wrong - 1).max() > 0.01
-
 
 class TestEnergy:
     def test_power_is_stored_and_dissipated(self, helical, monkeypatch):

@@ -7,19 +7,13 @@ import pytest
 from closeness import assert_close
 from fault_cases import one
 from lane_tools import (
-    advance,
-    group_laws,
-    law_of,
     laws,
     motion_of,
     right_hand_side,
-    trajectory,
 )
-from scipy.integrate import solve_ivp
 
-from gensig.dynamics._layout import DAMPING, SHARED
-from gensig.dynamics._vector import LANES
-from gensig.dynamics.lanes import mesh_numbers, pack
+from gensig.dynamics._layout import DAMPING
+from gensig.dynamics.lanes import mesh_numbers
 from gensig.faults.broken import MissingTooth
 
 CRACK = one("crack", tooth=2, crack_depth_mm=2)
@@ -233,16 +227,6 @@ def test_back_flanks_agree(dynamics):
     assert np.all(laws(dynamics, states) == 0.0)
 
 
-def test_another_shared_compliance_would_show(dynamics):
-    group = pack([dynamics], 1e-6)
-    states = random_states(dynamics, 50, 7)
-    numbers = group.numbers.copy()
-    numbers[SHARED * LANES : (SHARED + 1) * LANES] *= 1.001
-    force = group_laws(group, states)[:, 0]
-    other = group_laws(group._replace(numbers=numbers), states)[:, 0]
-    assert np.abs(force / np.maximum(other, 1e-9) - 1)[force > 100].max() > 1e-6
-
-
 def test_the_right_hand_side_agrees(dynamics):
     reference = Reference(dynamics)
     rng = np.random.default_rng(11)
@@ -266,96 +250,3 @@ def test_only_the_consistent_law_has_a_force_along_the_roll(
     states[1::2, 1] = -dynamics.table.pair.backlash - states[1::2, 1]
     along = laws(dynamics, states)[:, 4]
     assert np.any(along != 0) == (roll_torque == "consistent")
-
-
-def test_a_motion_against_the_back_flanks(machine, dynamics_of):
-    """Two teeth missing under a light load: the pinion runs ahead into the back flanks."""
-    light = machine({"operating.torque_nm": 2})
-    missing = [MissingTooth(gear="pinion", tooth=tooth) for tooth in (3, 4)]
-    dynamics = dynamics_of(light, missing)
-    step = 1 / (51200 * 8)
-    q, v = trajectory(dynamics, dynamics.static_start(0.0), np.zeros(6), step, 5000)
-    reference = Reference(dynamics, step)
-    behind = np.flatnonzero(q @ dynamics.approach_direction() < -light.pair.backlash)
-    assert len(behind) > 10
-    for n in behind[:40]:
-        expected = reference.acceleration(n * step, q[n], v[n], reference.coast)
-        acceleration = right_hand_side(dynamics, n * step, q[n], v[n])
-        assert_close(acceleration, expected, 1e-9, atol=1e-9 * np.abs(expected).max())
-
-
-def test_one_millisecond_against_dop853(xiamen, dynamics_of):
-    """Another method, over an entry and an exit of a pair, on the compiled mesh law."""
-    dynamics = dynamics_of(xiamen)
-    oversampling = 64
-    step = 1 / (51200 * oversampling)
-    n_steps = round(1e-3 / (64 * step)) * 64
-    reference = Reference(dynamics, step)
-    law = law_of(dynamics, step)
-    start = dynamics.static_start(0.0) + 1e-6 * np.array([1, 1, 0, -1, 1, 0])
-    means = advance(dynamics, start, np.zeros(6), step, 0, n_steps, tuple(range(6)))[2]
-
-    def slope(t, y):
-        return np.concatenate([y[6:], reference.acceleration(t, y[:6], y[6:], law)])
-
-    edges = np.arange(0, n_steps + 1, 64) * step
-    begin = np.concatenate([start, np.zeros(6)])
-    options = {"rtol": 1e-10, "atol": 1e-14, "t_eval": edges, "max_step": 2e-5}
-    motion = solve_ivp(slope, edges[[0, -1]], begin, method="DOP853", **options)
-    # means over 64 steps are differences of velocity
-    expected = np.diff(motion.y[6:], axis=1).T / (64 * step)
-    acceleration = means.reshape(6, -1, 64).mean(axis=2).T
-    scale = np.sqrt(np.mean(expected**2, axis=0))
-    assert_close(acceleration / scale, expected / scale, atol=1e-4)
-
-
-def runge_kutta(slope, time, y, step, n_parts):
-    """The classical formula in ``n_parts``."""
-    h = step / n_parts
-    for part in range(n_parts):
-        t = time + part * h
-        k1 = slope(t, y)
-        k2 = slope(t + 0.5 * h, y + 0.5 * h * k1)
-        k3 = slope(t + 0.5 * h, y + 0.5 * h * k2)
-        k4 = slope(t + h, y + h * k3)
-        y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-    return y
-
-
-@pytest.mark.parametrize("oversampling", [5, 16])
-def test_a_step_with_an_entry_or_exit_is_taken_in_parts(
-    machine, dynamics_of, oversampling
-):
-    """Every step of two mesh periods is one of Runge and Kutta's, or two that meet at the event.
-
-    With linear contact: the load-dependent term has a cusp where the load of a pair falls to 0,
-    where the cubic in the middle of a step is less accurate.
-    """
-    dynamics = dynamics_of(machine({"mesh.contact": "linear"}))
-    step = 1 / (51200 * oversampling)
-    reference = Reference(dynamics, step)
-    law = law_of(dynamics, step)
-    n_steps = round(2 / dynamics.mesh_frequency / step)
-    q, v = trajectory(dynamics, dynamics.static_start(0.0), np.zeros(6), step, n_steps)
-    states = np.hstack([q, v])
-    motions = motion_of(dynamics, np.arange(n_steps + 1) * step, q, v)
-    events = np.flatnonzero(np.diff(laws(dynamics, motions, step)[:, 7]))
-    assert 3 <= len(events) <= 6
-    near = np.concatenate([events - 1, events, events + 1])
-    plain = np.setdiff1d(np.arange(0, n_steps, 6), near)
-    scale = np.abs(np.diff(states, axis=0)).max(axis=0)
-
-    def slope(t, y):
-        return np.concatenate([y[6:], reference.acceleration(t, y[:6], y[6:], law)])
-
-    def off(steps, n_parts):
-        expected = [
-            runge_kutta(slope, n * step, states[n], step, n_parts) for n in steps
-        ]
-        return np.abs((states[steps + 1] - expected) / scale).max(axis=1)
-
-    in_parts = off(events, 64)
-    assert np.all(in_parts < 0.15 * off(events, 1))
-    assert in_parts.max() < 3e-4
-    # elsewhere the error is that of tables read once a step, at the kinks of the path's ends
-    assert off(plain, 1).max() < 3e-4

@@ -82,20 +82,6 @@ def test_nothing_of_the_start_is_left(runs, steady):
     assert np.all(left(runs, steady) < LEFT)
 
 
-@pytest.mark.parametrize(
-    ("module", "name", "value"),
-    [
-        (step_limits, "COARSE", ((1, 0.02),)),
-        (runge_kutta, "settling_time", lambda _: 0.2),
-    ],
-)
-def test_coarser_or_shorter_settling_would_leave_more(
-    runs, steady, monkeypatch, module, name, value
-):
-    monkeypatch.setattr(module, name, value)
-    assert left(runs, steady).max() > 10 * LEFT
-
-
 def assert_independent(runs):
     together = simulate_together(runs)
     for run, record in zip(runs, together, strict=True):

@@ -139,11 +139,6 @@ def test_slices_of_a_spur_pair_wear_alike_and_as_the_whole():
     assert_close(six.life, wear_life(case).life, 0.01)
 
 
-def test_slices_of_a_helical_pair_converge():
-    lives = [wear_life(case_of(*HELICAL, f"mesh.n_slices={n}")).life for n in (20, 40)]
-    assert_close(lives[0], lives[1], 0.04)
-
-
 @pytest.mark.parametrize(
     "words",
     [FULL, ("wear.threshold_um=100",), HELICAL],

@@ -65,27 +65,6 @@ def test_pieces_make_the_whole(machines, whole, pieces):
     assert [part.tobytes() for part in parts] == [part.tobytes() for part in whole]
 
 
-def test_a_lane_begins_anew_while_others_continue(machines, whole):
-    begins = (0, 801, 0, 2000, 0, 0, 801, 0)
-    state, means, _ = motion(machines, (801, 1199, 1000), begins)
-    others = [0, 2, 4, 5, 7]
-    assert state[..., others].tobytes() == whole[0][..., others].tobytes()
-    assert means[..., others].tobytes() == whole[1][..., others].tobytes()
-    for lane, begin in ((1, 801), (3, 2000)):
-        pieces = begin, N_STEPS - begin
-        alone = motion([machines[lane]] * LANES, pieces, (begin,) * LANES)
-        assert state[..., lane].tobytes() == alone[0][..., 0].tobytes()
-        assert means[begin:, :, lane].tobytes() == alone[1][begin:, :, 0].tobytes()
-
-
-def test_tables_read_anew_change_the_last_bits(machines, whole):
-    halves = motion(machines, (1500, 1500), fresh=True)[1]
-    assert halves[:1500].tobytes() == whole[1][:1500].tobytes()
-    assert halves.tobytes() != whole[1].tobytes()
-    level = whole[1].std(axis=0, keepdims=True)
-    assert_close(halves / level, whole[1] / level, atol=1e-5)
-
-
 class TestRecentring:
     """Every 256 steps the pinion's rotation is moved out of all rotations of the state."""
 

@@ -79,10 +79,6 @@ class TestSteady:
         assert_same_signal(factor, expected, 1e-6)
         assert_close(factor.mean_speed, expected.mean_speed, 1e-9)
 
-    def test_the_shaft_rotates_at_the_set_speed(self, steady):
-        assert_close(np.diff(steady.shaft_angle) * RATE, SET_SPEED, 1e-2)
-        assert abs(steady.shaft_angle[0]) < 0.1 * SET_SPEED / RATE
-
     def test_mean_speed_is_that_of_the_shaft(self, record):
         """To the sample after the last, which a longer record has."""
         short = record({SPEED: RAMP})
@@ -160,11 +156,6 @@ class TestTorque:
         dynamics = pair_dynamics(run({TORQUE: [[-1, 1], [0.01, 1], [0.02, factor]]}))
         before = 0.01 - 4 / dynamics.mesh_frequency
         assert_close(self.carried(dynamics, before, 0.03), [1.0, factor], 2e-2)
-
-    @WITH_ROTORS
-    def test_the_start_has_the_share_of_the_torque(self, run, rotors):
-        dynamics = pair_dynamics(run({**rotors, TORQUE: [[0, 0.3], [1, 0.3]]}))
-        assert_close(self.carried(dynamics, 0.0, 0.02), [0.3, 0.3], 2e-2)
 
     def test_without_torque_nothing_touches(self, record):
         free = record({TORQUE: [[0, 0], [1, 0]]})

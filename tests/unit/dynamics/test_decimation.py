@@ -92,14 +92,6 @@ def test_float32_keeps_six_digits(factor):
     assert_close(samples, np.concatenate(halves), atol=1e-6)
 
 
-@pytest.mark.parametrize("factor", FACTORS)
-def test_taps_are_symmetric_and_reach_the_margin(factor):
-    low_pass = decimator(factor)
-    assert len(low_pass.taps) == 2 * low_pass.margin * factor
-    assert_close(low_pass.taps, low_pass.taps[::-1], atol=1e-13)
-    assert_close(low_pass.taps.sum(), 1.0, 5e-4)
-
-
 def test_stored_taps_are_those_of_the_design(composed_config):
     stored = {int(factor) for factor in json.loads(STORED.read_text())}
     default = composed_config["solver"]["oversampling"]

@@ -1,14 +1,10 @@
 """Single precision: agreement with double, and sixteen independent records."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from closeness import assert_close
-from core_runs import CoreRun
 from fault_cases import one
 
-from gensig.dynamics._kernels import RECENTER
 from gensig.dynamics._vector import n_lanes
 from gensig.dynamics.decimation import in_band_error
 from gensig.errors import SimulationError
@@ -125,23 +121,3 @@ class TestBits:
         assert isinstance(together.pop(1), SimulationError)
         assert [bits(together.pop(1))] == alone([double])
         assert [bits(record) for record in together] == expected
-
-    def test_the_paper_law(self, run):
-        law = {**PAPER, **BRIEF}
-        runs = [run(law), run(law, MISSING), run({**law, "mesh.points_per_pitch": 64})]
-        together = [bits(record) for record in simulate_together(runs[::-1])]
-        assert together == alone(runs)[::-1]
-
-
-def test_recentring_keeps_the_rotation(xiamen, dynamics_of):
-    """The pinion begins 10 mrad ahead, which moves from float32 to float64 without a jump."""
-    dynamics = replace(dynamics_of(xiamen), start_phase=0.3)
-    core = CoreRun([dynamics], 1 / (51200 * 5), precision="float32", first_step=1)
-    core.state[0] += 1e-2 * core.group.rotation.reshape(-1, LANES)
-    turns = []
-    for _ in range(2 * RECENTER):
-        core.means(1)
-        turns.append(core.whole[0, 2, 0])
-    assert_close(turns[0], 1e-2, 1e-3)
-    assert core.center[0] > 0.9e-2
-    assert np.abs(np.diff(turns, 2)).max() < 1e-6

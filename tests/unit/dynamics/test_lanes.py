@@ -8,9 +8,8 @@ from fault_cases import one
 
 from gensig.dynamics._vector import LANES
 from gensig.dynamics.backends.base import Integration, Motions
-from gensig.dynamics.backends.runge_kutta import integrate_group, lane_groups
+from gensig.dynamics.backends.runge_kutta import lane_groups
 from gensig.dynamics.integrator import Solver, integrate
-from gensig.dynamics.lanes import pack
 from gensig.errors import SimulationError
 from gensig.faults.broken import MissingTooth
 from gensig.sensing.manufacturing import Gearbox, Specimen
@@ -146,13 +145,6 @@ def assert_same(records, expected):
     assert [bits(record) for record in records] == [bits(record) for record in expected]
 
 
-def assert_same_in_orders(runs, orders):
-    expected = alone(runs)
-    for order in orders:
-        together = simulate_together([runs[k] for k in order])
-        assert_same(together, [expected[k] for k in order])
-
-
 class TestBitsAlone:
     @pytest.mark.parametrize("law", LAWS)
     def test_in_every_lane(self, mixed, law):
@@ -181,17 +173,6 @@ class TestBitsAlone:
             {"system.load.inertia_kg_m2": 5e-3},
         ]
         runs = [*map(run, changes), run(PAPER, MISSING)]
-        assert_same(simulate_together(runs), alone(runs))
-
-    def test_next_to_longer_settling(self, run):
-        frequency = "operating.drive_frequency_hz"
-        soft = {"gear.wheel.support.damping_y_ns_per_m": 400, frequency: 12}
-        runs = [run(), run({frequency: 5}), run(soft), run({frequency: 9}, MISSING)]
-        assert_same_in_orders(runs, [(0, 1, 2, 3), (1, 0, 3, 2), (3, 2, 1, 0), (0, 1)])
-
-    @COARSE_STEP
-    def test_next_to_settling_in_fine_steps(self, run):
-        runs = [run(), run({PINION_STIFFNESS: 2e10}), run({SPEED: 1200})]
         assert_same(simulate_together(runs), alone(runs))
 
     @pytest.mark.parametrize("seed", range(2))
@@ -333,13 +314,6 @@ BRIEF = Integration(**RECORD, **SOLVER, with_mesh_state=False)
 
 
 class TestMotions:
-    def test_lanes_without_a_machine_repeat_the_first(self, xiamen, dynamics_of):
-        machines = [dynamics_of(xiamen), dynamics_of(xiamen, phase=0.8)]
-        first, second, *rest = integrate_group(machines, BRIEF).acceleration
-        assert first.tobytes() != second.tobytes()
-        assert len(rest) == LANES - 2
-        assert all(lane.tobytes() == first.tobytes() for lane in rest)
-
     @COARSE_STEP
     def test_any_number_of_machines_in_order(self, machine, dynamics_of):
         """More than a group, of two kinds of settling; motions are those of machines alone."""
@@ -358,14 +332,3 @@ class TestMotions:
                 of_all = getattr(together, field.name)[k]
                 of_one = getattr(single, field.name)[0]
                 assert of_all.tobytes() == of_one.tobytes(), field.name
-
-
-def test_a_group_takes_teeth_of_different_numbers(machine, dynamics_of):
-    """The indices of every lane point at its tables."""
-    changes = {}, GEOMETRY, {"mesh.points_per_pitch": 64}
-    machines = [dynamics_of(machine(each)) for each in changes]
-    group = pack(machines, 1e-6)
-    n_teeth = 107 + 92 + 107 * (LANES - 2)
-    assert len(group.tooth_row) == len(group.tooth_error) == n_teeth
-    nodes = [each.table.position.size for each in machines]
-    assert len(group.table) == 4 * (sum(nodes) + nodes[0] * (LANES - 3))

@@ -9,7 +9,6 @@ from fault_cases import GEARS, KINDS, on_path, one, side_of
 
 from gensig.errors import ConfigError, ExtrapolationError
 from gensig.faults.base import faulty_teeth
-from gensig.faults.crack import Crack
 from gensig.geometry.contact import corner_gap_by_pinion
 from gensig.geometry.tooth import healthy_tooth
 from gensig.mesh import pair_table as module
@@ -56,16 +55,6 @@ def test_slopes_are_those_of_the_tables(xiamen):
         expected = values[:, 1:] - values[:, :1]
         atol = 1e-12 * np.ptp(values)
         assert_close(climbed, expected, atol=atol)
-
-
-def test_only_the_faulty_tooth_has_its_own_row(xiamen):
-    fault = Crack(
-        gear="wheel", tooth=7, crack_depth=1e-3, crack_angle=0.8, crack_start="arc_mid"
-    )
-    table = xiamen.mesh_table((fault,))
-    assert np.flatnonzero(table.wheel.kind).tolist() == [7]
-    assert not table.pinion.kind.any()
-    assert len(table.wheel.compliance) == 2
 
 
 class TestFlankSides:

@@ -12,7 +12,6 @@ from closeness import assert_close
 from gensig.errors import FaultError
 from gensig.faults.registry import read_faults
 from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
-from gensig.mesh.sliced._slice_kernels import bite_forces
 from gensig.mesh.sliced.sliced_table import DEEPEST, N_CHORDS
 from gensig.mesh.sliced.slices import Meeting, loaded_contact, single_pair_stiffness
 from gensig.plan.request import read_request
@@ -121,49 +120,6 @@ def test_few_slices_that_enter_over_their_width_are_many(n_slices, share):
     )
     assert error < share * np.ptp(many)
     assert error < 0.4 * whole
-
-
-@pytest.mark.parametrize(
-    "words", [(), ("gear=chongqing_40_162",), ("gear=xiamen_23_84",)]
-)
-def test_chords_err_by_less_than_a_hundredth_of_the_set_force(words):
-    """One tooth pair at 60 depths, up to three times that of the set torque, between the nodes."""
-    system, table, mesh = table_of(*words)
-    end = system.pair.path_of_contact + mesh.lag[-1]
-    place = np.random.default_rng(0).uniform(-0.02, 1.02, 40) * end
-    position = place[:, None] - mesh.lag
-    structure = np.interp(position, mesh.position, mesh.structure)
-    constant = np.interp(position, mesh.position, mesh.contact_constant)
-    pairs = zip(position.T, mesh.gap, strict=True)
-    gap = np.stack([np.interp(at, mesh.position, row) for at, row in pairs], axis=1)
-    first = np.empty(40)
-    exact = np.empty((40, 60))
-    depth = table.depth[-1] * np.arange(1, 61) / 60
-    bite_forces(
-        structure,
-        mesh.contact_factor,
-        constant,
-        mesh.log_weight,
-        gap,
-        np.tile(mesh.slice_width, (40, 1)),
-        mesh.slice_width,
-        mesh.coupling_length_squared,
-        system.mesh_force / system.pair.face_width,
-        depth,
-        1.0,
-        first,
-        exact,
-    )
-    own, far = (
-        np.stack(
-            [np.interp(place, table.position, row) for row in values[0, 0]], axis=1
-        )
-        for values in (table.compliance - table.shared_compliance, table.gap)
-    )
-    deflection = first[:, None, None] + depth[:, None] - far[:, None]
-    result = np.maximum((deflection / own[:, None]).max(axis=2), 0.0)
-    assert exact.max() > system.mesh_force
-    assert_close(result, exact, atol=0.01 * system.mesh_force)
 
 
 @pytest.mark.parametrize(

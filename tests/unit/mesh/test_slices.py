@@ -2,7 +2,6 @@
 of both papers.
 """
 
-import dataclasses
 import itertools
 import math
 
@@ -333,10 +332,3 @@ def test_no_contact_is_refused(mesh_keys):
 def test_slices_that_make_no_sense_are_refused(mesh_keys, key, value):
     with pytest.raises(ConfigError, match=f"mesh.{key} = "):
         read_slice_options(mesh_keys | {key: value})
-
-
-def test_the_pair_is_left_as_it_was(mesh_keys):
-    pair = gears("beihang_61_132")
-    before = dataclasses.asdict(pair)
-    solved(pair, 178.0, mesh_keys)
-    assert dataclasses.asdict(pair) == before
