@@ -69,32 +69,25 @@ def falls(found, slack):
 
 
 @pytest.mark.parametrize("gear", GEARS)
-@pytest.mark.parametrize("name", [name for name, case in CASES.items() if case.grows])
-def test_the_deflection_never_falls_with_severity(series, name, gear):
-    result, _ = series(name, gear)
-    assert not falls(result, CASES[name].slack).any()
-
-
-@pytest.mark.parametrize("gear", GEARS)
 @pytest.mark.parametrize("name", CASES)
-def test_more_of_it_shows(series, name, gear):
-    """Every step is seen somewhere, and each of at least a nanometre is 1000 times above the
-    rounding.
-    """
-    change = np.abs(steps(series(name, gear)[0])).max(axis=1)
+def test_more_of_it_shows_and_never_stiffens(series, name, gear):
+    """Each step is seen somewhere: a nanometre is 1000 times above the rounding."""
+    deflections, severity = series(name, gear)
+
+    change = np.abs(steps(deflections)).max(axis=1)
     assert np.all(change > 1e-9), change
+    if CASES[name].grows:
+        assert not falls(deflections, CASES[name].slack).any()
 
-
-@pytest.mark.parametrize("gear", GEARS)
-@pytest.mark.parametrize("name", CASES)
-def test_severity_rises_within_0_and_1(series, name, gear):
-    _, severity = series(name, gear)
-    assert_close(severity[0], 0.0)
+    assert severity[0] == 0.0
     assert severity.max() <= 1.0
     rises = np.diff(severity)
     assert rises[0] > 0
     # the depth of a pit is no part of the pitted share
-    assert np.all(rises >= 0 if name == "pit_depth" else rises > 0)
+    if name == "pit_depth":
+        assert np.all(rises >= 0)
+    else:
+        assert np.all(rises > 0)
 
 
 @pytest.mark.parametrize("gear", GEARS)
@@ -139,12 +132,6 @@ class TestThePapersCrack:
         result = np.array([deflection(cut, fault) for fault in faults])
         assert not falls(result, 1e-9).any()
         assert np.all(steps(result).max(axis=1) > 1e-3 * result.min())
-
-    def test_rises_with_angle(self, cut):
-        angles = (15, 30, 45, 60, 90)
-        faults = [one("crack", tooth=0, crack_angle_deg=angle) for angle in angles]
-        result = np.array([deflection(cut, fault) for fault in faults])
-        assert not falls(result, 1e-9).any()
 
     @pytest.mark.parametrize(
         ("start", "loss"), [("gamma_mid", 0.0281), ("arc_mid", 0.0403)]

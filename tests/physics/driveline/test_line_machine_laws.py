@@ -14,7 +14,7 @@ from gensig.driveline.time.newmark import LineSolver
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
 from gensig.sensing.manufacturing import nominal_gearbox
-from gensig.systems.run import Run, Start
+from gensig.systems.run import Run
 
 RPM = np.pi / 30.0
 SPEED = 1688.0 * RPM
@@ -88,15 +88,6 @@ def test_with_play_its_teeth_part_and_its_energies_balance():
     assert np.std(computed[1]) > 1.3 * np.std(
         linear[1]
     )  # a pump gear that is let go does
-
-
-def test_the_crank_turns_by_the_pitch_of_the_camshaft_to_the_next_tooth():
-    record = machine()
-    angles = [
-        record.crank_angle(Start(tooth_pinion=tooth, tooth_wheel=0, phase=0.0))
-        for tooth in (4, 5)
-    ]
-    assert_close(np.diff(angles) % (4 * np.pi), 4 * np.pi / 54, 1e-9)
 
 
 def test_a_record_is_repeatable_and_turns_with_the_gear_ratio():

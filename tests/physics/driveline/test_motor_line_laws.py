@@ -10,7 +10,6 @@ import pytest
 from closeness import assert_close
 
 from gensig.driveline.engine_line import read_engine_line
-from gensig.driveline.mesh_phase import start_rolls
 from gensig.driveline.running import Governor
 from gensig.driveline.time.newmark import LineSolver, integrate_line
 from gensig.errors import StepError
@@ -157,20 +156,6 @@ def test_a_missing_tooth_is_evident_once_a_turn_of_its_gear(name):
         assert by_tooth[5:9].sum() > 0.6 * by_tooth.sum()
         peaks = [np.abs(computed.acceleration[2]).max() for computed in (gone, sound)]
         assert peaks[0] ** 2 > 2.0 * peaks[1] ** 2
-
-
-def test_the_other_stage_stands_where_the_teeth_allow():
-    """The gears of the idler are on one shaft: its angle, as the record mesh says it, holds for
-    the other mesh.
-    """
-    record = machine("system.record_mesh=[5,6]")
-    drive = record.engine.drive
-    start = Start(tooth_pinion=7, tooth_wheel=3, phase=0.25)
-    turned = record.crank_angle(start)
-    roll = start_rolls(drive, turned)[record.mesh_number] / record.pair.base_pitch
-    assert_close(roll, start.phase, atol=1e-9)
-    later = record.crank_angle(Start(tooth_pinion=8, tooth_wheel=3, phase=0.25))
-    assert_close(later - turned, 2.0 * np.pi / 48.0 * 3.0, 1e-9)
 
 
 @pytest.mark.parametrize(

@@ -236,32 +236,26 @@ def test_stiff_supports_leave_the_torsional_line(lines):
 
 @pytest.mark.parametrize("rotors", [{}, ROTORS], ids=["pair", "with_rotors"])
 def test_the_single_pair_is_the_same_code_with_two_nodes(machine, dynamics_of, rotors):
-    """Matrices and frequencies of the line are those of the pair without its soft drive."""
+    """Matrices of the line are those of the pair without its soft drive."""
     system = machine(rotors)
     dynamics = dynamics_of(system)
-    line = drive_line_of_pair(system, "pair")
     own = dynamics.system()
-    matrices = line.matrices()
+    matrices = drive_line_of_pair(system, "pair").matrices()
     order = []
     for name in matrices.names:
         gear, _, axis = name.partition(" ")
         order.append(own.names.index(f"{gear}_{axis or 'rotation'}"))
-    stiffness = own.stiffness.copy()
+    both = np.ix_(order, order)
     driver = own.names.index("motor_rotation" if rotors else "pinion_rotation")
+
+    stiffness = own.stiffness.copy()
     stiffness[driver, driver] -= dynamics.drive_stiffness
-    expected = np.ix_(order, order)
     assert_close(np.diag(matrices.mass), own.mass[order], 1e-14)
-    assert_close(
-        matrices.stiffness, stiffness[expected], 1e-9, atol=1e-9 * stiffness.max()
-    )
-    without_driver = ~(np.equal.outer(order, order) & np.equal(order, driver))
-    damping = own.damping[expected]
-    assert_close(matrices.damping[without_driver], damping[without_driver], 1e-12)
+    assert_close(matrices.stiffness, stiffness[both], 1e-9, atol=1e-9 * stiffness.max())
+    damping = matrices.damping - own.damping[both]
+    damping[order.index(driver), order.index(driver)] = 0.0
+    assert_close(damping, 0.0, atol=1e-12 * own.damping.max())
     direction = dynamics.approach_direction()
     assert_close(matrices.directions[0], direction[order], 1e-12, atol=1e-15)
     assert matrices.mesh_stiffness == [dynamics.mean_mesh_stiffness]
     assert matrices.mesh_damping == [dynamics.mesh_damping]
-    mesh = dynamics.mean_mesh_stiffness * np.outer(direction, direction)
-    square = np.sort(np.abs(np.linalg.eigvals((stiffness + mesh) / own.mass[:, None])))
-    frequency = np.sqrt(square[1:]) / (2.0 * np.pi)
-    assert_close(line.modes().frequency[1:], frequency, 1e-6)

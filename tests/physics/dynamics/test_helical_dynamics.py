@@ -91,18 +91,6 @@ class TestForces:
     def gears(self, spur, xiamen, hand):
         return with_table(spur, Slices(xiamen, hand * HELIX, n_slices=6).table(DEPTH))
 
-    def test_gears_moved_together_do_not_approach(self, gears):
-        """Shifted, and turned about the centre of the pinion."""
-        direction, (at_pinion, at_wheel, _) = gears.approach_direction(), contact(gears)
-        for unit in np.eye(3):
-            shifted, turned = np.zeros((2, 12))
-            shifted[PINION] = shifted[WHEEL] = unit
-            turned[WHEEL] = np.cross(unit, at_pinion - at_wheel)
-            turned[[7, 8]] = turned[[10, 11]] = unit[:2]
-            turned[[2, 5]] = -unit[2], unit[2]  # the pinion turns about -z
-            tolerance = 1e-14 * np.abs(direction).max()
-            assert_close([direction @ shifted, direction @ turned], 0.0, atol=tolerance)
-
     def test_the_approach_is_the_penetration_of_the_flanks(self, gears):
         """From the displacement of the two bodies at the pitch point."""
         at_pinion, at_wheel, push = contact(gears)
@@ -168,15 +156,6 @@ class TestStatics:
                 assert_close(approach, exact, atol=3e-7)
             assert_close(static.load.sum(axis=1), force, 1e-12)
 
-    def test_more_chords_converge(self, slices):
-        roll = slices.pair.base_pitch * (np.arange(24) + 0.4) / 8
-        *coarse, fine = (
-            chord_equilibrium(table, chord_states(table, roll), slices.force).approach
-            for table in (slices.table(np.linspace(0, 2e-5, n)) for n in (3, 5, 9, 65))
-        )
-        errors = [np.abs(approach - fine).max() for approach in coarse]
-        assert errors[0] > 2 * errors[1] > 4 * errors[2]
-
     def test_the_tangent_stiffness_is_the_slope_of_the_force(self, helical):
         force = helical.mesh_force
         roll = helical.table.pair.base_pitch * (np.arange(20) + 0.3) / 20
@@ -225,20 +204,6 @@ class TestChords:
         for column, size in ((0, 1e-3), (4, 1e-6)):
             steps = np.abs(np.diff(law[:, column]))
             assert steps.max() < 20 * np.median(steps) + size * helical.mesh_force
-
-    def test_shorter_steps_converge(self, helical):
-        """A chord that lags costs the square of the step: only the slope of the force jumps."""
-
-        def rates(oversampling):
-            _, v = moved(helical, 64 * oversampling, 1 / (51200.0 * oversampling))
-            return v[::oversampling] @ helical.approach_direction()
-
-        exact = rates(64)
-        coarse, fine = (
-            np.linalg.norm(rates(n) - exact) / np.linalg.norm(exact) for n in (5, 20)
-        )
-        assert coarse < 1e-2
-        assert fine < coarse / 8
 
     def test_back_flanks_use_the_chord_of_the_set_load(self, helical):
         table = helical.table

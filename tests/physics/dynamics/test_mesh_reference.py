@@ -168,9 +168,9 @@ class Reference:
             -float(np.sum(load > 0)),
         )
 
-    def acceleration(self, time, q, v, mesh=None):
-        """q'' at one instant; ``mesh`` may replace the reference's mesh law."""
-        law = (mesh or self.mesh)(*motion_of(self.d, time, q, v))
+    def acceleration(self, time, q, v):
+        """q'' at one instant."""
+        law = self.mesh(*motion_of(self.d, time, q, v))
         normal, friction, moment_p, moment_w, along = law[:5]
         system = self.system
         force = system.force - system.stiffness @ q - system.damping @ v

@@ -51,14 +51,6 @@ def followed(frequency, drive=5.0, damping=0.7):
     return abs((2 * damping * s + 1) / (s * s + 2 * damping * s + 1))
 
 
-def test_a_walk_without_scatter_is_constant(run):
-    still = record(run({DURATION: 0.05}))
-    walk = record(run({DURATION: 0.05, SPEED: {**WALK, "scatter": 0.0}}))
-    level = still.acceleration.std()
-    assert_close(walk.acceleration, still.acceleration, atol=1e-9 * level)
-    assert_close(walk.mean_speed, still.mean_speed, 1e-12)
-
-
 def test_the_shaft_follows_a_slow_walk(run):
     walking = run({SPEED: {**WALK, "correlation_time_s": 4.0}, DURATION: 0.4})
     angle = record(walking).shaft_angle

@@ -216,22 +216,23 @@ def test_looks_are_in_order_and_reach_from_new_to_the_end(law, spacing):
     rng = np.random.default_rng(3)
     history = draw_history(DRAWN, np.full(3, SPEED), torque, 500 * HOUR, rng)
     course = grow(law.sizes, law.turns(torque), history, 6e-4)
+
     times = snapshot_times(course, spacing, 21)
-    sizes = np.array([course.value("size", course.at(t)) for t in times])
-    assert len(times) == 21
-    assert times[0] == 0.0
-    assert times[-1] == course.running[-1]
+    sizes = np.array([course.value("size", course.at(time)) for time in times])
+
+    assert_close(times[[0, -1]], [0.0, course.running[-1]])
+    assert_close(sizes[[0, -1]], [6e-4, law.sizes[-1]], 1e-6)
     assert (np.diff(times) > 0.0).all()
     assert (np.diff(sizes) >= 0.0).all()
-    assert sizes[0] == 6e-4
-    assert_close(sizes[-1], law.sizes[-1], 1e-6)
-    if spacing == "adaptive":
-        assert_close(np.diff(sizes), (sizes[-1] - sizes[0]) / 20, 1e-6)
-    if spacing == "logarithmic":
-        left = times[-1] - times[:-1]
-        assert_close(left[1:] / left[:-1], left[1] / left[0], 1e-9)
-    if spacing == "linear":
-        assert_close(np.diff(times), times[-1] / 20, 1e-9)
+    left = times[-1] - times[:-1]
+    even = {
+        "linear": np.diff(times),
+        "logarithmic": left[1:] / left[:-1],
+        "adaptive": np.diff(sizes),
+    }
+    steps = even[spacing]
+    assert_close(steps, steps.mean(), 1e-6)
+    assert len(times) == 21
 
 
 def test_looks_every_so_often_do_not_tell_how_long_a_life_is(law):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closeness import assert_close
-from core_runs import CoreRun
+from core_runs import PAPER, CoreRun
 
 from gensig.dynamics._kernels import RECENTER
 from gensig.dynamics._record_kernels import BLOCK
@@ -16,13 +16,11 @@ from gensig.faults.broken import MissingTooth
 STEP = 1 / (51200 * 5)
 N_STEPS = 3000
 FACTOR = 5
-PAPER = {"mesh.law": "paper", "mesh.pair_coupling": "sum", "mesh.contact": "linear"}
 SPEEDS = 1800, 2500, 1300, 900, 3600, 1800, 600, 5000
 TORQUES = 20, 2, 5, 60, 20, 1, 30, 8
 CUTS = [
     (1, 2, 997, 2000),
-    (0, 1500, 0, 1500),
-    (7,) * 428 + (4,),
+    (1500, 0, 1500),
     (255, 1, 1, 254, 1, 1, 1, 254, 2232),
 ]
 PINION_TURN = 2
@@ -40,16 +38,10 @@ def machines(request, machine, dynamics_of):
     return made
 
 
-def motion(machines, pieces, begins=(0,) * LANES, fresh=False):
-    """State, means over the steps, lost steps; ``begins`` are the steps at which lanes begin."""
+def motion(machines, pieces):
+    """State, means over the steps, lost steps."""
     run = CoreRun(machines, STEP)
-    means = []
-    for n_steps in pieces:
-        for lane, begin in enumerate(begins):
-            if begin == run.now:
-                run.restart(lane)
-        means.append(run.means(n_steps))
-        run.fresh[:] = float(fresh)
+    means = [run.means(n_steps) for n_steps in pieces]
     return run.whole, np.concatenate(means), run.lost
 
 

@@ -6,10 +6,9 @@ from itertools import permutations
 import numpy as np
 import pytest
 from closeness import assert_close
-from core_runs import CoreRun
+from core_runs import MISSING, QUICK, ROTORS, CoreRun, assert_independent
 
 from gensig.dynamics.pair import PINION_Y
-from gensig.faults.broken import MissingTooth
 from gensig.systems.base import simulate_together
 from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.run import Run
@@ -17,20 +16,12 @@ from gensig.systems.run import Run
 RATE = 51200.0
 DRIVE = 20.0
 DRIVE_HZ = "operating.drive_frequency_hz"
-QUICK = {
-    "operating.duration_s": 0.03,
-    "solver.max_error": None,
-    DRIVE_HZ: DRIVE,
-    "gear.pinion.support.damping_x_ns_per_m": 100,
-    "gear.wheel.support.damping_x_ns_per_m": 500,
-}
+BRIEF = {**QUICK, "operating.duration_s": 0.03}
 SPEED = "operating.speed_profile"
 TORQUE = "operating.torque_profile"
 RAMP = [[-0.4, 0.4], [0.4, 1.6]]
 SET_SPEED = 60 * math.pi
-MISSING = (MissingTooth(gear="pinion", tooth=3),)
 ROTATIONS = {"sensing.channels": ["pinion_rotation", "wheel_rotation"]}
-ROTORS = {"system.motor.inertia_kg_m2": 5e-4, "system.load.inertia_kg_m2": 5e-3}
 WITH_ROTORS = pytest.mark.parametrize(
     "rotors", [{}, ROTORS], ids=["pair", "motor_and_load"]
 )
@@ -39,7 +30,7 @@ WITH_ROTORS = pytest.mark.parametrize(
 @pytest.fixture(scope="module")
 def run(machine):
     def make(changes=None, faults=()):
-        system = machine({**QUICK, **(changes or {})})
+        system = machine({**BRIEF, **(changes or {})})
         return Run(system=system, faults=tuple(faults))
 
     return make
@@ -162,22 +153,6 @@ class TestTorque:
         assert free.contact_loss_fraction == 1.0
         assert_close(free.acceleration, 0, atol=1e-9)
         assert_close(free.mean_speed, SET_SPEED, 1e-12)
-
-
-def bits(record):
-    return (
-        record.acceleration.tobytes(),
-        record.shaft_angle.tobytes(),
-        record.mean_speed,
-    )
-
-
-def assert_independent(runs, orders):
-    expected = [bits(simulate_together([single])[0]) for single in runs]
-    assert len(set(expected)) == len(runs)
-    for order in orders:
-        together = simulate_together([runs[k] for k in order])
-        assert [bits(record) for record in together] == [expected[k] for k in order]
 
 
 class TestNeighbours:

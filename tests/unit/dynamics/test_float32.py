@@ -3,29 +3,19 @@
 import numpy as np
 import pytest
 from closeness import assert_close
+from core_runs import MISSING, PAPER, QUICK, ROTORS, alone, assert_same, bits
 from fault_cases import one
 
 from gensig.dynamics._vector import n_lanes
 from gensig.dynamics.decimation import in_band_error
 from gensig.errors import SimulationError
-from gensig.faults.broken import MissingTooth
 from gensig.sensing.manufacturing import Specimen
 from gensig.systems.base import simulate_together
 from gensig.systems.run import Run, Start
 
 LANES = n_lanes("float32")
 RATE = 51200.0
-QUICK = {
-    "operating.duration_s": 0.05,
-    "solver.max_error": None,
-    "operating.drive_frequency_hz": 20,
-    "gear.pinion.support.damping_x_ns_per_m": 100,
-    "gear.wheel.support.damping_x_ns_per_m": 500,
-}
 BRIEF = {"operating.duration_s": 0.01}
-PAPER = {"mesh.law": "paper", "mesh.pair_coupling": "sum", "mesh.contact": "linear"}
-MISSING = (MissingTooth(gear="pinion", tooth=3),)
-ROTORS = {"system.motor.inertia_kg_m2": 5e-4, "system.load.inertia_kg_m2": 5e-3}
 LIGHT = {"operating.torque_nm": 2, "operating.speed_rpm": 2500, "gear.backlash_um": 4}
 CASES = {
     "crack": ({}, (one("crack"),)),
@@ -41,19 +31,11 @@ CASES = {
 @pytest.fixture(scope="module")
 def run(machine):
     def make(changes=None, faults=(), precision="float32", **values):
-        system = machine({**QUICK, **(changes or {}), "solver.precision": precision})
+        usual = {**QUICK, "operating.duration_s": 0.05, "solver.precision": precision}
+        system = machine({**usual, **(changes or {})})
         return Run(system=system, faults=tuple(faults), **values)
 
     return make
-
-
-def bits(record):
-    numbers = record.mean_speed, record.contact_loss_fraction
-    return record.acceleration.tobytes(), record.shaft_angle.tobytes(), numbers
-
-
-def alone(runs):
-    return [bits(simulate_together([single])[0]) for single in runs]
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -109,8 +91,8 @@ class TestBits:
         """Seventeen: one more than a group."""
         order = [(first + k) % len(runs) for k in range(LANES + 1)]
         together = simulate_together([runs[k] for k in order])
-        assert [bits(record) for record in together] == [expected[k] for k in order]
-        assert len(set(expected)) == len(runs)
+        assert_same(together, [expected[k] for k in order])
+        assert len(set(map(bits, expected))) == len(runs)
 
     def test_next_to_a_failure_and_to_records_in_double(self, run, runs, expected):
         proud = np.where(np.arange(23) % 2, -0.03, 0.0)
@@ -119,5 +101,5 @@ class TestBits:
         mixed = [runs[0], run(BRIEF, specimen=specimen), double, *runs[1:]]
         together = simulate_together(mixed)
         assert isinstance(together.pop(1), SimulationError)
-        assert [bits(together.pop(1))] == alone([double])
-        assert [bits(record) for record in together] == expected
+        assert_same([together.pop(1)], alone([double]))
+        assert_same(together, expected)

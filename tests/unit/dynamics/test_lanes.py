@@ -4,6 +4,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from core_runs import CLASSICAL, MISSING, PAPER, QUICK, alone, assert_same, bits
 from fault_cases import one
 
 from gensig.dynamics._vector import LANES
@@ -14,10 +15,8 @@ from gensig.errors import SimulationError
 from gensig.faults.broken import MissingTooth
 from gensig.sensing.manufacturing import Gearbox, Specimen
 from gensig.systems.base import simulate_together
-from gensig.systems.run import CleanRecord, Run, Start
+from gensig.systems.run import Run, Start
 
-CLASSICAL = {"mesh.roll_torque": "classical"}
-PAPER = {"mesh.law": "paper", "mesh.pair_coupling": "sum", "mesh.contact": "linear"}
 LAWS = {
     "one_sided": {},
     "classical": CLASSICAL,
@@ -28,7 +27,6 @@ SPEED = "operating.speed_rpm"
 TORQUE = "operating.torque_nm"
 BACKLASH = "gear.backlash_um"
 PINION_STIFFNESS = "gear.pinion.support.stiffness_y_n_per_m"
-MISSING = (MissingTooth(gear="pinion", tooth=3),)
 TWO_MISSING = (*MISSING, MissingTooth(gear="pinion", tooth=4))
 # so many distinct teeth on both gears that the table stores them one by one
 MANY_PITS = tuple(
@@ -36,15 +34,7 @@ MANY_PITS = tuple(
     for gear, n_teeth in (("pinion", 5), ("wheel", 6))
     for tooth in range(n_teeth)
 )
-# one well-damped drive for all: the same short settling
-QUICK = {
-    "operating.duration_s": 0.02,
-    "solver.max_error": None,
-    "solver.oversampling": 8,
-    "operating.drive_frequency_hz": 20,
-    "gear.pinion.support.damping_x_ns_per_m": 100,
-    "gear.wheel.support.damping_x_ns_per_m": 500,
-}
+BRIEF = {**QUICK, "operating.duration_s": 0.02, "solver.oversampling": 8}
 GEOMETRY = {
     "gear.pinion.n_teeth": 31,
     "gear.pinion.bore_radius_mm": 12,
@@ -65,7 +55,7 @@ def run(machine):
     """A run of the quick machine with keys replaced."""
 
     def make(changes=None, faults=(), **values):
-        system = machine({**QUICK, **(changes or {})})
+        system = machine({**BRIEF, **(changes or {})})
         return Run(system=system, faults=tuple(faults), **values)
 
     return make
@@ -130,21 +120,6 @@ def diverging(run):
     return replace(run, specimen=specimen)
 
 
-def bits(record):
-    assert isinstance(record, CleanRecord), record
-    check = record.integration_error, record.integration_check
-    numbers = repr((record.mean_speed, record.contact_loss_fraction, *check))
-    return record.acceleration.tobytes(), record.shaft_angle.tobytes(), numbers
-
-
-def alone(runs):
-    return [simulate_together([single])[0] for single in runs]
-
-
-def assert_same(records, expected):
-    assert [bits(record) for record in records] == [bits(record) for record in expected]
-
-
 class TestBitsAlone:
     @pytest.mark.parametrize("law", LAWS)
     def test_in_every_lane(self, mixed, law):
@@ -175,10 +150,9 @@ class TestBitsAlone:
         runs = [*map(run, changes), run(PAPER, MISSING)]
         assert_same(simulate_together(runs), alone(runs))
 
-    @pytest.mark.parametrize("seed", range(2))
-    def test_where_contact_is_lost_and_regained(self, run, seed):
+    def test_where_contact_is_lost_and_regained(self, run):
         """Bouncing pairs are integrated in parts, in some lanes and not in others."""
-        rng = np.random.default_rng(seed)
+        rng = np.random.default_rng(0)
         runs = []
         for _ in range(LANES):
             changes = {
@@ -198,7 +172,7 @@ class TestBitsAlone:
 
 class TestFailures:
     @COARSE_STEP
-    @pytest.mark.parametrize("lane", [0, 3, 7])
+    @pytest.mark.parametrize("lane", [0, 7])
     @pytest.mark.parametrize("law", ["one_sided", "paper"])
     def test_divergence_leaves_the_neighbours(self, run, mixed, law, lane):
         runs, expected = mixed(law)
@@ -310,7 +284,7 @@ RECORD = {
     "channels": ("wheel_y", "pinion_rotation"),
 }
 SOLVER = {"oversampling": 4, "precision": "float64", "max_error": None}
-BRIEF = Integration(**RECORD, **SOLVER, with_mesh_state=False)
+INTEGRATION = Integration(**RECORD, **SOLVER, with_mesh_state=False)
 
 
 class TestMotions:
@@ -321,7 +295,7 @@ class TestMotions:
         machines = [
             dynamics_of(systems[k % 3], phase=0.05 * k) for k in range(LANES + 3)
         ]
-        assert [len(group) for group in lane_groups(machines, BRIEF)] == [7, 4]
+        assert [len(group) for group in lane_groups(machines, INTEGRATION)] == [7, 4]
         together = integrate(machines, Solver(**SOLVER), **RECORD)
         assert together.acceleration.shape == (LANES + 3, 2, 256)
         assert together.check.shape == (LANES + 3, 2, 0)

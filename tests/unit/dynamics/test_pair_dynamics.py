@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closeness import assert_close
+from core_runs import MISSING, QUICK
 from lane_tools import laws
 
 from gensig.dynamics.integrator import (
@@ -20,10 +21,8 @@ from gensig.dynamics.integrator import (
 )
 from gensig.dynamics.pair import solid_disc
 from gensig.errors import ConfigError, SimulationError
-from gensig.faults.broken import MissingTooth
 
 RATE = 51200.0
-MISSING = (MissingTooth(gear="pinion", tooth=3),)
 
 
 def recorded(system, dynamics, **changes):
@@ -80,16 +79,11 @@ def test_friction_torque_is_the_imbalance_of_drive_and_load(
 
 
 def test_settling_follows_the_slowest_motion_up_to_a_limit(machine, dynamics_of):
-    quick = {
-        "operating.drive_frequency_hz": 20,
-        "gear.pinion.support.damping_x_ns_per_m": 100,
-        "gear.wheel.support.damping_x_ns_per_m": 500,
-    }
     decay = math.log(1e4) / (2 * math.pi * 0.7)
     for changes, expected in (
         ({}, decay / 5),
         ({"operating.drive_frequency_hz": 1}, 0.45),
-        (quick, decay / 20),
+        (QUICK, decay / 20),
     ):
         assert_close(settling_time(dynamics_of(machine(changes))), expected, 0.02)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from closeness import assert_close
-from core_runs import CoreRun
+from core_runs import CLASSICAL, PAPER, CoreRun
 from fault_cases import one
 from lane_tools import laws
 
@@ -14,12 +14,8 @@ from gensig.faults.broken import MissingTooth
 
 LAWS = {
     "one_sided": {},
-    "classical": {"mesh.roll_torque": "classical"},
-    "paper": {
-        "mesh.law": "paper",
-        "mesh.pair_coupling": "sum",
-        "mesh.contact": "linear",
-    },
+    "classical": CLASSICAL,
+    "paper": PAPER,
 }
 PITS = tuple(
     one("pitting", gear=gear, tooth=tooth, pit_width_mm=3.0 + 2.0 * tooth)

@@ -12,6 +12,7 @@ from closeness import assert_close
 from gensig.errors import FaultError
 from gensig.faults.registry import read_faults
 from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
+from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
 from gensig.mesh.sliced.sliced_table import DEEPEST, N_CHORDS
 from gensig.mesh.sliced.slices import Meeting, loaded_contact, single_pair_stiffness
 from gensig.plan.request import read_request
@@ -29,46 +30,10 @@ def faults_of(*words):
     return read_faults(read_request(["system=helical_pair", *words]).config["fault"])
 
 
-def at_rest(table, roll, force, errors=None):
-    """Approach, and load (phase, pair) of the chords under a total force, by bisection.
-
-    ``errors`` by tooth as in ``Meeting``, tilts at the middle of the face.
-    """
-    pitch = table.pair.base_pitch
-    index = np.floor(roll / pitch).astype(int)[:, None] - table.first_pitch
-    index = index - np.arange(table.last_pitch - table.first_pitch)
-    position = roll[:, None] - index * pitch
-    n_teeth = len(table.pinion_kind), len(table.wheel_kind)
-    kinds = table.pinion_kind[index % n_teeth[0]], table.wheel_kind[index % n_teeth[1]]
-    place = (position - table.position[0]) / (table.position[1] - table.position[0])
-    cell = np.clip(place.astype(int), 0, len(table.position) - 2)
-    part = (place - cell)[:, :, None]
-
-    def read(values):
-        low, high = (values[kinds[0], kinds[1], :, cell + k] for k in (0, 1))
-        return (1.0 - part) * low + part * high
-
-    own = read(table.compliance) - table.shared_compliance
-    gap = read(table.gap)
-    if errors is not None:
-        middle = position - table.middle_lag - table.pair.pitch_point
-        for side, n in zip(("pinion", "wheel"), n_teeth, strict=True):
-            error = getattr(errors, f"{side}_error")[index % n]
-            tilt = getattr(errors, f"{side}_tilt")[index % n]
-            gap += (error + tilt * middle)[:, :, None]
-    gap[~(table.pinion_present[kinds[0]] & table.wheel_present[kinds[1]])] = np.inf
-
-    def load(within):
-        return np.maximum(((within[:, None, None] - gap) / own).max(axis=2), 0.0)
-
-    low = gap.min(axis=(1, 2))
-    high = low + 1e-3
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        enough = load(middle).sum(axis=1) > force
-        low = np.where(enough, low, middle)
-        high = np.where(enough, middle, high)
-    return low + table.shared_compliance * force, load(low)
+def at_rest(table, roll, force, **errors):
+    """Approach and load (phase, pair) of the chords under a total force."""
+    static = chord_equilibrium(table, chord_states(table, roll, **errors), force)
+    return static.approach, static.load
 
 
 @pytest.mark.parametrize(
@@ -86,40 +51,42 @@ def at_rest(table, roll, force, errors=None):
         ("mesh.n_slices=160",),
     ],
 )
-def test_equilibrium_is_that_of_the_slices(words):
+@pytest.mark.parametrize("part", [0.5, 1.0, 2.5])
+def test_equilibrium_is_that_of_the_slices(words, part):
+    """Under a part of the set force."""
     system, table, mesh = table_of(*words)
     roll = system.phases(32)
-    for part in (0.5, 1.0, 2.5):
-        exact = loaded_contact(mesh, roll, part * system.mesh_force)
-        approach, load = at_rest(table, roll, part * system.mesh_force)
-        assert_close(approach, exact.approach, 5e-3 / min(part, 1.0))
-        ripple = np.ptp(exact.approach)
-        most = 0.1 * ripple + 2e-3 * exact.approach.mean()
-        assert np.ptp(approach - exact.approach) < most
-        expected = (exact.line_load * mesh.slice_width).sum(axis=2)
-        # newest first in both; the table may have fewer pairs
-        behind = max(load.shape[1] - expected.shape[1], 0)
-        expected = expected[:, : load.shape[1]]
-        atol = 0.012 * part * system.mesh_force
-        assert_close(load[:, behind:], expected, atol=atol)
+    force = part * system.mesh_force
+
+    exact = loaded_contact(mesh, roll, force)
+    approach, load = at_rest(table, roll, force)
+
+    assert_close(approach, exact.approach, 5e-3 / min(part, 1.0))
+    ripple = np.ptp(exact.approach)
+    most = 0.1 * ripple + 2e-3 * exact.approach.mean()
+    assert np.ptp(approach - exact.approach) < most
+    # newest first in both; the table may have fewer pairs
+    expected = (exact.line_load * mesh.slice_width).sum(axis=2)
+    behind = max(load.shape[1] - expected.shape[1], 0)
+    expected = expected[:, : load.shape[1]]
+    assert_close(load[:, behind:], expected, atol=0.012 * force)
 
 
 @pytest.mark.parametrize(("n_slices", "share"), [(6, 0.5), (20, 0.1)])
 def test_few_slices_that_enter_over_their_width_are_many(n_slices, share):
     """The table has the ripple of 160 slices; as few slices that enter whole do not."""
     system, table, few = table_of(f"mesh.n_slices={n_slices}")
+    _, _, finest = table_of("mesh.n_slices=160")
     roll = system.phases(32)
     force = system.mesh_force
-    many = loaded_contact(table_of("mesh.n_slices=160")[2], roll, force).approach
-    error, whole = (
-        np.ptp(approach - many)
-        for approach in (
-            at_rest(table, roll, force)[0],
-            loaded_contact(few, roll, force).approach,
-        )
-    )
+
+    many = loaded_contact(finest, roll, force).approach
+    chords, _ = at_rest(table, roll, force)
+    whole = loaded_contact(few, roll, force).approach
+
+    error = np.ptp(chords - many)
     assert error < share * np.ptp(many)
-    assert error < 0.4 * whole
+    assert error < 0.4 * np.ptp(whole - many)
 
 
 @pytest.mark.parametrize(
@@ -154,15 +121,17 @@ def test_errors_of_single_teeth_open_all_chords():
     """Pitch errors and tilts of a grade 5 gear; the table takes tilts at mid-face."""
     system, table, mesh = table_of()
     rng = np.random.default_rng(2)
-    of_teeth = {
+    errors = {
         f"{side}_{kind}": rng.uniform(-most, most, n)
         for side, n in (("pinion", 61), ("wheel", 132))
         for kind, most in (("error", 2e-6), ("tilt", 1e-4))
     }
-    errors = Meeting(**of_teeth)
     roll = system.phases(16, n_periods=20)
-    exact = loaded_contact(mesh, roll, system.mesh_force, errors).approach
-    result = at_rest(table, roll, system.mesh_force, errors)[0]
+    force = system.mesh_force
+
+    exact = loaded_contact(mesh, roll, force, Meeting(**errors)).approach
+    result, _ = at_rest(table, roll, force, **errors)
+
     assert_close(result, exact, 5e-3)
     assert np.ptp(exact) > 1e-6
 
@@ -191,6 +160,7 @@ def test_too_many_different_teeth_are_refused():
 
 def test_chords_are_convex_and_meet():
     system, table, _ = table_of()
+    force = system.mesh_force
     assert len(table.depth) == N_CHORDS
     assert table.depth[0] == 0.0
     own = table.compliance[0, 0] - table.shared_compliance
@@ -200,11 +170,11 @@ def test_chords_are_convex_and_meet():
     met = gap[0] + table.depth[1:, None]
     before = (met - gap[:-1]) / own[:-1]
     after = (met - gap[1:]) / own[1:]
-    atol = 2e-3 * system.mesh_force
-    assert_close(before[:, near], after[:, near], atol=atol)
+    assert_close(before[:, near], after[:, near], atol=2e-3 * force)
+
     # deep enough for three times the load, and the set chord holds the mean load
-    contact = loaded_contact(system.sliced_mesh(), system.phases(64), system.mesh_force)
-    static = contact.approach.max() - table.shared_compliance * system.mesh_force
+    contact = loaded_contact(system.sliced_mesh(), system.phases(64), force)
+    static = contact.approach.max() - table.shared_compliance * force
     assert 0.6 * DEEPEST * static < table.depth[-1] < DEEPEST * static
     assert 0 < table.set_chord < N_CHORDS
 
