@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from energy_balance import balance
 from fault_cases import one
-from lane_tools import laws
 
 from gensig.faults.broken import MissingTooth
 
@@ -54,26 +53,3 @@ def test_damping_and_friction_dissipate(case):
 def test_coarse_tables_balance_too(machine, dynamics_of):
     coarse = dynamics_of(machine({"mesh.points_per_pitch": 128}))
     assert balance(coarse, STEP, N_STEPS).residual < 2e-4
-
-
-def test_friction_of_rigid_gears_dissipates_at_every_position(xiamen, dynamics_of):
-    speed = xiamen.operating.speed
-    pair = xiamen.pair
-    rng = np.random.default_rng(1)
-    roll = rng.uniform(0, 50, 500) * pair.base_pitch
-    approach = rng.uniform(0, 20e-6, 500)
-    motions = roll, approach, rng.normal(0, 1e-3, 500), pair.pinion.base_radius * speed
-    normal, _, moment_p, moment_w, _, _, lost, _ = laws(dynamics_of(xiamen), motions).T
-    assert np.all(moment_p * speed + moment_w * speed / pair.ratio <= 1e-9)
-    assert np.all(lost >= 0)
-    assert np.all(normal >= 0)
-
-
-def test_the_force_rises_with_the_approach(xiamen, dynamics_of):
-    dynamics = dynamics_of(xiamen)
-    approach = np.append(np.linspace(-20e-6, 20e-6, 41), -xiamen.pair.backlash - 5e-6)
-    for roll in np.linspace(0.01, 0.99, 9) * xiamen.pair.base_pitch:
-        *force, coast = laws(dynamics, (roll, approach, 0.0, 4.0))[:, 0]
-        assert np.all(np.diff(force) >= 0)
-        assert force[0] == 0.0
-        assert coast < -100

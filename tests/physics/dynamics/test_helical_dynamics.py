@@ -187,24 +187,8 @@ class TestEnergy:
         work = np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(approach))
         assert_close(stored, np.append(0.0, work), atol=2e-3 * work[-1])
 
-    def test_the_roll_torque_is_the_slope_of_that_energy(self, helical):
-        roll = np.linspace(0.2, 0.25, 400) * helical.table.pair.base_pitch
-        law = laws(helical, (roll, 8e-6, 0.0, 0.0))
-        slope = np.gradient(law[:, 5], roll)[1:-1]
-        assert_close(-law[1:-1, 4], slope, atol=0.02 * np.abs(slope).max())
-
 
 class TestChords:
-    @pytest.mark.parametrize("rate", [0.0, 0.01, -0.01])
-    def test_forces_are_continuous_between_chords(self, helical, rate):
-        """Pressed ever deeper at one position, with damping and rolling."""
-        approach = np.linspace(0.0, 2.5e-5, 3001)
-        roll = 0.6 * helical.table.pair.base_pitch
-        law = laws(helical, (roll, approach, rate, 4.0))
-        for column, size in ((0, 1e-3), (4, 1e-6)):
-            steps = np.abs(np.diff(law[:, column]))
-            assert steps.max() < 20 * np.median(steps) + size * helical.mesh_force
-
     def test_back_flanks_use_the_chord_of_the_set_load(self, helical):
         table = helical.table
         approach = -table.pair.backlash - np.linspace(0.0, 1e-5, 11)

@@ -239,14 +239,3 @@ def test_the_right_hand_side_agrees(dynamics):
         tolerance = 1e-6 * np.abs(expected).max()
         acceleration = right_hand_side(dynamics, time, q, v)
         assert_close(acceleration, expected, 1e-9, atol=tolerance)
-
-
-@pytest.mark.parametrize("roll_torque", ["consistent", "classical"])
-def test_only_the_consistent_law_has_a_force_along_the_roll(
-    machine, dynamics_of, roll_torque
-):
-    dynamics = dynamics_of(machine({"mesh.roll_torque": roll_torque}), (CRACK,))
-    states = random_states(dynamics, 40, seed=19)
-    states[1::2, 1] = -dynamics.table.pair.backlash - states[1::2, 1]
-    along = laws(dynamics, states)[:, 4]
-    assert np.any(along != 0) == (roll_torque == "consistent")

@@ -51,16 +51,6 @@ def followed(frequency, drive=5.0, damping=0.7):
     return abs((2 * damping * s + 1) / (s * s + 2 * damping * s + 1))
 
 
-def test_the_shaft_follows_a_slow_walk(run):
-    walking = run({SPEED: {**WALK, "correlation_time_s": 4.0}, DURATION: 0.4})
-    angle = record(walking).shaft_angle
-    operating = walking.system.operating
-    nominal = operating.nominal(np.arange(len(angle)) / RATE)
-    assert np.ptp(nominal.speed) > 2e-3 * operating.speed
-    walked = np.sum(nominal.speed - operating.speed) / RATE
-    assert np.ptp(angle - nominal.angle) < 0.2 * abs(walked)
-
-
 @pytest.mark.parametrize(
     ("ripple", "frequency"), [({"order": 1}, 30.0), ({"frequency_hz": 10}, 10.0)]
 )

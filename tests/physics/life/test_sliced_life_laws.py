@@ -136,14 +136,15 @@ def test_the_energy_of_slices_is_half_the_work_of_their_loads(length):
     width = rng.uniform(1e-3, 2e-3, 7)
     structure = rng.uniform(1e-11, 3e-11, (3, 7))
     load = rng.uniform(0.0, 1e5, (3, 7))
+    steps = np.diff(np.eye(7), axis=0)
+
     energies = structure_energy(structure, load, width, length**2)
+
     for soft, pressed, energy in zip(structure, load * width, energies, strict=True):
-        matrix = np.diag(width / soft)
-        for j in range(6):
-            between = 0.25 * (soft[j] + soft[j + 1]) * (width[j] + width[j + 1])
-            tie = length**2 / between
-            matrix[j : j + 2, j : j + 2] += tie * np.array([[1.0, -1.0], [-1.0, 1.0]])
-        work = 0.5 * pressed @ np.linalg.solve(matrix, pressed)
+        between = 0.25 * (soft[1:] + soft[:-1]) * (width[1:] + width[:-1])
+        ties = steps.T @ np.diag(length**2 / between) @ steps
+        stiffness = np.diag(width / soft) + ties
+        work = 0.5 * pressed @ np.linalg.solve(stiffness, pressed)
         assert_close(energy, work, 1e-9)
 
 

@@ -137,29 +137,3 @@ def test_the_compiled_right_hand_side_is_that_of_the_matrices(
             np.abs(system.force) + np.abs(system.stiffness) @ np.abs(q) + np.abs(mesh)
         )
         assert np.abs(off * system.mass / terms).max() < 1e-9
-
-
-@pytest.fixture(scope="module")
-def modes(xiamen, dynamics_of):
-    """Undamped frequencies of a pair with its mesh held, Hz, sorted; with or without the drive."""
-
-    def frequencies(mesh_stiffness, drive=False):
-        dynamics = dynamics_of(xiamen)
-        system = dynamics.system()
-        direction = dynamics.approach_direction()
-        k = system.stiffness + mesh_stiffness * np.outer(direction, direction)
-        if not drive:
-            k[2, 2] -= system.stiffness[2, 2]
-        root = np.sqrt(np.outer(system.mass, system.mass))
-        return np.sqrt(np.maximum(np.linalg.eigvalsh(k / root), 0)) / (2 * np.pi)
-
-    return frequencies
-
-
-def test_modes_of_the_pair(modes, xiamen):
-    """Spur reference (docs/validation.md), section 5.1, mesh 3.28e8 N/m."""
-    free = modes(3.28e8)
-    assert_close(free[1:], [60.8, 178.6, 269.4, 690.2, 11704], 3e-3)
-    # one rigid mode with the mesh, two without
-    assert [(free < 1e-2).sum(), (modes(0.0) < 1e-2).sum()] == [1, 2]
-    assert_close(modes(3.28e8, drive=True)[0], xiamen.operating.drive_frequency, 2e-3)
