@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from closeness import assert_close
+from engine_cases import SPEED, TORQUE
 from numpy.testing import assert_allclose
 
 from gensig.driveline.engine_dampers import (
@@ -20,9 +21,6 @@ from gensig.errors import ConfigError
 from gensig.options.compose import compose
 
 ENGINE = ("system=engine_gear_train", "excitation=engine_v20")
-RPM = np.pi / 30.0
-SPEED = 1688 * RPM
-TORQUE = 12680.0
 DAMPERS = (
     TorsionalDamper(node=21, ring_inertia=0.0118, damping=0.45, stiffness=172700.0),
     TorsionalDamper(node=45, ring_inertia=0.01138, damping=6.0, stiffness=143500.0),

@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from closeness import assert_close
+from engine_cases import RPM, SPEED
 
 from gensig.driveline.engine_dampers import (
     ToothLoad,
@@ -23,7 +24,6 @@ from gensig.errors import ConfigError
 from gensig.options.compose import compose
 
 ENGINE = ("system=engine_gear_train", "excitation=engine_v20")
-RPM = np.pi / 30.0
 LOW = 770.0 * RPM
 HIGH = 880.0 * RPM
 SECONDS = 2.5
@@ -147,7 +147,7 @@ def pump_drive():
 def test_root_stress_in_time_of_a_force_that_repeats_is_that_of_one_cycle(pump_drive):
     line, mesh, strength = pump_drive
     force = 1500.0 + 4000.0 * np.cos(4.0 * np.pi * np.arange(5760) / 5760)
-    load = ToothLoad(speed=1688 * RPM, force=force)
+    load = ToothLoad(speed=SPEED, force=force)
     once = dynamic_root_stress(strength, line, mesh, load)
     response = motion(load.speed, force, 4.1)
     computed = root_stress_in_time(strength, line, mesh, response)
@@ -174,6 +174,6 @@ def test_root_stress_in_time_of_a_force_that_repeats_is_that_of_one_cycle(pump_d
 )
 def test_a_run_without_root_stress_is_refused(pump_drive, force, n_cycles, message):
     line, mesh, strength = pump_drive
-    response = motion(1688 * RPM, np.full(64, force), n_cycles)
+    response = motion(SPEED, np.full(64, force), n_cycles)
     with pytest.raises(ConfigError, match=message):
         root_stress_in_time(strength, line, mesh, response)

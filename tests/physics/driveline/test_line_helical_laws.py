@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from closeness import assert_close
+from engine_cases import SPEED, TORQUE
 
 from gensig.driveline.engine_line import read_engine_line
 from gensig.driveline.in_time import tabulated_meshes
@@ -22,9 +23,6 @@ from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
 from gensig.systems.run import Run, Start
 
-RPM = math.pi / 30.0
-SPEED = 1688.0 * RPM
-TORQUE = 12680.0
 GOVERNOR = Governor(frequency=1.0, damping_ratio=0.7)
 SOLVER = LineSolver(sampling_rate=10240.0, oversampling=10, max_energy_residual=1e-3)
 RECORDS = (

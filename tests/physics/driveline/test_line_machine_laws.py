@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 from closeness import assert_close
+from engine_cases import SPEED, TORQUE
 
 from gensig.driveline.engine_line import read_engine_line
 from gensig.driveline.running import Governor, running_line, steady_course
@@ -16,9 +17,6 @@ from gensig.record.machines import read_machine
 from gensig.sensing.manufacturing import nominal_gearbox
 from gensig.systems.run import Run
 
-RPM = np.pi / 30.0
-SPEED = 1688.0 * RPM
-TORQUE = 12680.0
 GOVERNOR = Governor(frequency=1.0, damping_ratio=0.7)
 SOLVER = LineSolver(sampling_rate=10240.0, oversampling=10, max_energy_residual=1e-3)
 ENGINE = ("system=engine_gear_train", "excitation=engine_v20")

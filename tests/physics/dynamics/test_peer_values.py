@@ -148,22 +148,12 @@ def test_the_line_of_action_agrees(peer):
 
 
 @EACH_SIDE
-def test_tooth_terms_agree(peer, side):
-    """With another root or reach they would not."""
-    gear = getattr(peer.system.pair, side)
-    curvature = peer.curvature(side)
-    material = peer.system.material
-    terms = tooth_compliance(healthy_tooth(gear), curvature, material)
-    for term in ("bending", "shear", "axial"):
-        ross = peer.ross(f"{side}_{term}_compliance")
-        assert_close(getattr(terms, term), ross, QUADRATURE)
-    ross = peer.ross(f"{side}_shear_compliance")
-    sharp = healthy_tooth(replace(gear, cutter_tip_radius_coefficient=0.3))
-    off = tooth_compliance(sharp, curvature, material).shear / ross - 1
-    assert np.all(np.abs(off) > 5 * QUADRATURE)
-    whole = healthy_tooth(gear)
-    short = tooth_compliance(whole, curvature, material, reach="to_centreline").shear
-    assert np.all(short / ross < 0.97)
+@pytest.mark.parametrize("term", ["bending", "shear", "axial"])
+def test_tooth_terms_agree(peer, side, term):
+    tooth = healthy_tooth(getattr(peer.system.pair, side))
+    terms = tooth_compliance(tooth, peer.curvature(side), peer.system.material)
+    ross = peer.ross(f"{side}_{term}_compliance")
+    assert_close(getattr(terms, term), ross, QUADRATURE)
 
 
 def test_the_contact_term_agrees(peer):
@@ -207,17 +197,6 @@ def test_the_body_term_differs_by_two_choices(peer, side):
     for choice in (angle, height):
         half_way = body(*given, **choice) / ross
         assert np.all((ours + 1e-3 < half_way) & (half_way < 1 - 5e-3))
-
-
-def test_a_single_pair_differs_only_by_the_body_term(peer):
-    ross = peer.ross("pair_stiffness")
-    pair = peer.system.pair
-    curvatures = peer.curvature("pinion"), peer.curvature("wheel")
-    assert_close(pair_stiffness(peer, *curvatures), ross, OF_A_PAIR)
-    curves = peer.system.stiffness_curves(n_positions=401)
-    position = (curvatures[0] - pair.start_curvature_radius) / pair.base_pitch
-    ours = np.interp(position, curves.contact_position, curves.single_pair_stiffness)
-    assert np.all((ours / ross > 1.04) & (ours / ross < 1.10))
 
 
 def test_the_mesh_differs_by_the_body_term_and_the_contacts(peer):

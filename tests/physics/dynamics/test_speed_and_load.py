@@ -84,16 +84,16 @@ def test_a_lead_in_changes_neither_walk_nor_ripple(run):
     led = run({**courses, "sensing.sensor.low_cutoff_hz": 5.0})
     n_lead = led.system.sensing.n_lead
     assert n_lead > 4000
+
     (long,) = simulate_with_lead_in([led])
     expected = record(run(courses))
+
     speed, wanted = (
         np.gradient(each.shaft_angle, 1 / RATE) for each in (long, expected)
     )
     assert_close(speed, wanted, atol=0.02 * wanted.std())
     assert_close(long.mean_speed, expected.mean_speed, 2e-6)
-    other = record(run({**courses, "operating.course_seed": 1})).mean_speed
-    for speed in (other, led.system.operating.speed):
-        assert abs(speed / expected.mean_speed - 1) > 1e-4
+    assert abs(led.system.operating.speed / expected.mean_speed - 1) > 1e-4
     off = long.acceleration[:, n_lead:] - expected.acceleration
     assert np.all(off.std(axis=1) <= 0.02 * expected.acceleration.std(axis=1))
 

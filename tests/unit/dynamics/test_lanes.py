@@ -187,14 +187,6 @@ class TestFailures:
         assert_same(together, expected)
         assert str(alone([runs[lane]])[0]) == str(failed)
 
-    def test_all_but_one_with_checked_errors(self, run):
-        checked = run({"solver.max_error": 1e-3})
-        runs = [diverging(checked), diverging(checked), checked, diverging(checked)]
-        together = simulate_together(runs)
-        failed = [isinstance(record, SimulationError) for record in together]
-        assert failed == [True, True, False, True]
-        assert_same(together[2:3], alone([checked]))
-
     @pytest.mark.parametrize("lane", [0, 2])
     def test_a_machine_too_stiff_for_its_step(self, run, lane):
         """Refused before the integration: its error, and the records of its neighbours."""

@@ -11,7 +11,6 @@ from gensig.errors import ConfigError, ExtrapolationError
 from gensig.faults.base import faulty_teeth
 from gensig.geometry.contact import corner_gap_by_pinion
 from gensig.geometry.tooth import healthy_tooth
-from gensig.mesh import pair_table as module
 from gensig.mesh.fillet_foundation import ExtrapolationWarning
 from gensig.mesh.local_contact import contact_law
 from gensig.mesh.pair_table import (
@@ -102,38 +101,6 @@ class TestFlankSides:
 
 
 class TestRows:
-    def test_equal_structures_are_computed_once(self, xiamen, monkeypatch):
-        """Flanks with deviations only bend as the sound one; teeth of one object are one row."""
-        computed = []
-        original = module.structural_compliance
-        monkeypatch.setattr(
-            module,
-            "structural_compliance",
-            lambda *own: computed.append(1) or original(*own),
-        )
-        for faults, n_rows, n_structures in (
-            ((one("runout", gear="wheel"),), 85, 0),
-            ((one("wear", gear="wheel", tooth="all"),), 2, 1),
-            (
-                (
-                    one("crack", gear="wheel", tooth=[1, 2]),
-                    one("pitch_error", gear="wheel", tooth=[2, 3]),
-                ),
-                4,
-                1,
-            ),
-            ((one("misalignment", gear="wheel", tooth="all"),), 2, 1),
-        ):
-            mesh = (xiamen.pair, xiamen.material, xiamen.mesh)
-            load = xiamen.mesh_force
-            pair_table(*mesh, load=load)  # computes the structures of the sound gears
-            computed.clear()
-            teeth = faulty_teeth(xiamen.pair, faults)
-            table = pair_table(*mesh, teeth, load=load)
-            counts = len(table.wheel.compliance), len(computed)
-            assert counts == (n_rows, n_structures)
-            assert len(table.wheel.present) == n_rows
-
     @pytest.mark.parametrize("gear", GEARS)
     @pytest.mark.parametrize("kind", KINDS)
     def test_curves_and_tables_agree(self, xiamen, kind, gear):
