@@ -159,16 +159,6 @@ def test_leads_are_those_of_the_sliced_pair(config_with, lead, share):
     assert_close(own, theirs, share)
 
 
-def test_opposite_slopes_leave_an_aligned_pair(xiamen):
-    slope = {
-        "pinion": FlankModification(helix_slope=8 * UM),
-        "wheel": FlankModification(helix_slope=-8 * UM),
-    }
-    askew = replace(xiamen, modification=PairModification(**slope)).mesh_table()
-    for mine, theirs in zip(columns(askew), columns(xiamen.mesh_table()), strict=True):
-        assert_close(mine, theirs, 1e-9, atol=1e-15)
-
-
 def test_relieved_gears_shake_less_along_the_line_of_action(machine):
     """Tips that do not strike: a quarter of the acceleration along the line of action at the rated
     point.

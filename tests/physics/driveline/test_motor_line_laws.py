@@ -10,7 +10,6 @@ import pytest
 from closeness import assert_close
 
 from gensig.driveline.engine_line import read_engine_line
-from gensig.driveline.running import Governor
 from gensig.driveline.time.newmark import LineSolver, integrate_line
 from gensig.errors import StepError
 from gensig.faults.registry import read_faults
@@ -21,7 +20,6 @@ from gensig.systems.run import Run, Start
 RPM = np.pi / 30.0
 SPEED = 1746.0 * RPM
 TORQUE = 60.0
-GOVERNOR = Governor(frequency=1.0, damping_ratio=0.7)
 SOLVER = LineSolver(sampling_rate=10240.0, oversampling=12, max_energy_residual=1e-3)
 MOTOR = ("system=two_stage_gearbox", "excitation=motor_and_load")
 RECORDS = ("experiment=two_stage", "operating.duration_s=0.2", "sensing.snr_db=null")

@@ -242,7 +242,7 @@ def test_looks_every_so_often_do_not_tell_how_long_a_life_is(law):
     assert times[-1] <= course.running[-1] < times[-1] + 600.0
 
 
-def test_a_drift_settles(law):
+def test_a_drift_settles():
     drift = Drift(change=0.5, time=100 * HOUR, scatter=0.0)
     assert drift.factor(0.0, 1.0) == 1.0
     assert_close(

@@ -129,13 +129,13 @@ class TestTorque:
     def carried(self, dynamics, *begins):
         """Mean bearing force over four mesh periods, as shares of the set mesh force."""
         core = CoreRun([dynamics], self.STEP, span=(0.0, 0.04))
-        duration = 4 / dynamics.mesh_frequency
+        n_steps = round(4 / dynamics.mesh_frequency / self.STEP)
         stiffness = dynamics.pinion.support.stiffness_y
         shares = []
         for begin in begins:
             core.means(round(begin / self.STEP) - core.now)
             deflection = []
-            while core.now < round((begin + duration) / self.STEP):
+            for _ in range(n_steps):
                 core.means(1)
                 deflection.append(core.whole[0, PINION_Y, 0])
             shares.append(np.mean(deflection) * stiffness / dynamics.mesh_force)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from closeness import assert_close
 
-from gensig.dynamics._vector import LANES, n_lanes
+from gensig.dynamics._vector import LANES
 from gensig.dynamics.decimation import (
     ATTENUATION_DB,
     STORED,
@@ -79,19 +79,6 @@ def test_channels_and_lanes_are_filtered_alone(n_samples, factor):
     assert np.isnan(spoilt[2]).all()
 
 
-@pytest.mark.parametrize("factor", FACTORS)
-def test_float32_keeps_six_digits(factor):
-    """Sixteen lanes; the samples are float64."""
-    low_pass = decimator(factor)
-    n = n_lanes("float32")
-    n_steps = (20 + 2 * low_pass.margin) * factor + 1
-    means = np.random.default_rng(5).standard_normal((n_steps, 2, n))
-    samples = low_pass.apply(means.astype(np.float32))
-    halves = [low_pass.apply(half.copy()) for half in np.split(means, 2, axis=2)]
-    assert samples.dtype == np.float64
-    assert_close(samples, np.concatenate(halves), atol=1e-6)
-
-
 def test_stored_taps_are_those_of_the_design(composed_config):
     stored = {int(factor) for factor in json.loads(STORED.read_text())}
     default = composed_config["solver"]["oversampling"]
@@ -145,15 +132,3 @@ class TestInBandError:
         exact = np.array([[self.tone(1000)]])
         assert in_band_error(exact + self.tone(22_000, 0.5), exact, RATE) < 1e-4
         assert in_band_error(exact + self.tone(19_000, 0.5), exact, RATE) > 0.4
-
-    @pytest.mark.parametrize("n_channels", [1, 2])
-    def test_records_are_independent(self, n_channels):
-        rng = np.random.default_rng(0)
-        exact = rng.standard_normal((8, n_channels, 1536))
-        signal = exact + 1e-4 * rng.standard_normal(exact.shape)
-        together = in_band_error(signal, exact, RATE)
-        for n in (1, 2, 3):
-            assert np.array_equal(
-                in_band_error(signal[:n], exact[:n], RATE), together[:n]
-            )
-        assert np.unique(together).size == 8

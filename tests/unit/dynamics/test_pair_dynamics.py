@@ -219,11 +219,6 @@ class TestRefusals:
 
 
 class TestRecord:
-    @pytest.fixture(scope="class")
-    @classmethod
-    def short(cls, machine):
-        return machine({"operating.duration_s": 0.05})
-
     def test_the_reference_rise_of_a_missing_tooth(self, machine):
         """Spur reference (docs/validation.md), table 5.2, "gap" rows: pairs not coupled."""
         system = machine(

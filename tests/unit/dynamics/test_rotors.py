@@ -14,7 +14,6 @@ from gensig.dynamics.lanes import near_positions
 from gensig.dynamics.pair import DOFS, PAIR_DOFS, Rotor
 from gensig.dynamics.system import eigenvalues
 from gensig.errors import ConfigError
-from gensig.mesh.load_distribution import static_mesh
 from gensig.operation.courses import Profile
 from gensig.systems.registry import read_system
 
@@ -280,23 +279,6 @@ class TestConfiguration:
 
 
 class TestMeanStiffness:
-    def test_it_is_computed_once_a_machine(self, smooth, dynamics_of, monkeypatch):
-        calls = []
-
-        def counted(*arguments):
-            calls.append(arguments)
-            return static_mesh(*arguments)
-
-        fresh = replace(dynamics_of(smooth), table=replace(smooth.mesh_table()))
-        monkeypatch.setattr(mesh_statics, "static_mesh", counted)
-        first = fresh.mean_mesh_stiffness
-        assert fresh.mean_mesh_stiffness == first
-        assert len(calls) == 1
-        other = replace(fresh, start_phase=0.9, **MACHINES["both"])
-        assert other.mean_mesh_stiffness.hex() == first.hex()
-        lighter = replace(fresh, operating=replace(fresh.operating, torque=2.0))
-        assert lighter.mean_mesh_stiffness < first
-
     def test_it_is_that_of_the_commonest_teeth(self, smooth):
         table = smooth.mesh_table()
         force = smooth.mesh_force

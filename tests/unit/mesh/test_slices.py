@@ -33,10 +33,6 @@ REFERENCE = {
     "law": "paper",
     "allow_extrapolation": True,
 }
-# The reference takes the involute down to the root circle. So does a rack with a sharp tip; a root
-# that a rounded one
-# cuts makes the pair up to 10 % stiffer.
-SHARP = {"cutter_tip_radius_coefficient": 0.02}
 BODY = ("mass_kg", "inertia_kg_m2", "support", "bearing", "shaft")
 
 
