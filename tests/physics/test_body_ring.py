@@ -28,8 +28,18 @@ HARMONICS = {
     ("wheel", 10): (77.1281, 19.9814, 77.1281),
 }
 SELF = {
-    "pinion": (3.092345e-10, 2.369060e-8, -1.163667e-6, 5.880031e-5),
-    "wheel": (6.006637e-10, 3.235829e-7, -3.990314e-6, 4.953859e-5),
+    "pinion": (
+        3.092345e-10,
+        2.369060e-8,
+        -1.163667e-6,
+        5.880031e-5,
+    ),
+    "wheel": (
+        6.006637e-10,
+        3.235829e-7,
+        -3.990314e-6,
+        4.953859e-5,
+    ),
 }
 NEIGHBOR = {
     "pinion": (
@@ -54,7 +64,15 @@ NEIGHBOR = {
 S_MM = (0.0, 0.700, 1.401, 2.101, 2.802, 3.502, 4.203)
 CROSS_FE = {
     "pinion": (477.8, 475.7, 472.9, 469.4, 465.1, 460.0, 454.0),
-    "wheel": (1862.8, 1869.0, 1875.0, 1880.7, 1886.4, 1892.1, 1898.1),
+    "wheel": (
+        1862.8,
+        1869.0,
+        1875.0,
+        1880.7,
+        1886.4,
+        1892.1,
+        1898.1,
+    ),
 }
 SIDES = ("pinion", "wheel")
 MIRROR = np.diag([1.0, -1.0, -1.0])
@@ -96,8 +114,16 @@ def test_own_flexibility(gear, side, xiamen):
 
 def test_flexibility_of_the_neighbor(gear, side, xiamen):
     c = arc_flexibility(gear, xiamen.material, neighbor(gear))
-    assert_close(c[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]], NEIGHBOR[side], 1e-6)
-    assert_close([c[1, 0], c[2, 0], c[2, 1]], [-c[0, 1], -c[0, 2], c[1, 2]], 1e-8)
+    assert_close(
+        c[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]],
+        NEIGHBOR[side],
+        1e-6,
+    )
+    assert_close(
+        [c[1, 0], c[2, 0], c[2, 1]],
+        [-c[0, 1], -c[0, 2], c[1, 2]],
+        1e-8,
+    )
 
 
 @pytest.mark.parametrize("k", [1, 2, 5])
@@ -108,8 +134,13 @@ def test_reciprocity_and_mirror_symmetry(gear, xiamen, k):
     )
     size = np.sqrt(np.diag(own))
     scale = np.outer(size, size)
+
     assert_close(behind / scale, ahead.T / scale, atol=1e-10)
-    assert_close(behind / scale, MIRROR @ ahead @ MIRROR / scale, atol=1e-10)
+    assert_close(
+        behind / scale,
+        MIRROR @ ahead @ MIRROR / scale,
+        atol=1e-10,
+    )
     # symmetric by itself, reciprocity would show nothing
     assert np.abs((ahead - ahead.T) / scale).max() > 1e-5
 
@@ -117,10 +148,16 @@ def test_reciprocity_and_mirror_symmetry(gear, xiamen, k):
 def test_body_under_the_loaded_tooth_at_the_pitch_point(gear, side, xiamen):
     rho = xiamen.pair.pinion_curvature(xiamen.pair.pitch_point)
     angle = load_angle(
-        gear, np.array([rho if side == "pinion" else xiamen.pair.tangent_length - rho])
+        gear,
+        np.array([rho if side == "pinion" else xiamen.pair.tangent_length - rho]),
     )
     result = cross_compliance(gear, xiamen.material, angle, angle, pitches=0)
-    assert_close(result, {"pinion": 1031.22e-12, "wheel": 2372.06e-12}[side], 1e-5)
+
+    assert_close(
+        result,
+        {"pinion": 1031.22e-12, "wheel": 2372.06e-12}[side],
+        1e-5,
+    )
 
 
 def cross_over_the_zone(pair, material, side, pitches):
@@ -135,11 +172,20 @@ def cross_over_the_zone(pair, material, side, pitches):
 
 def test_cross_compliance_against_finite_elements(side, xiamen):
     result = cross_over_the_zone(
-        xiamen.pair, xiamen.material, side, 1 if side == "pinion" else -1
+        xiamen.pair,
+        xiamen.material,
+        side,
+        1 if side == "pinion" else -1,
     )
     assert_close(result, np.array(CROSS_FE[side]) * 1e-12, 0.01)
 
 
-def test_shared_compliance_is_the_mean_of_both_gears_over_the_double_zone(xiamen):
+def test_shared_compliance_is_the_mean_of_both_gears_over_the_double_zone(
+    xiamen,
+):
     expected = sum(np.mean(CROSS_FE[side]) for side in SIDES) * 1e-12
-    assert_close(shared_body_compliance(xiamen.pair, xiamen.material), expected, 0.005)
+    assert_close(
+        shared_body_compliance(xiamen.pair, xiamen.material),
+        expected,
+        0.005,
+    )

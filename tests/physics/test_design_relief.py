@@ -13,8 +13,15 @@ from numpy.testing import assert_array_equal
 from gensig.dynamics.lanes import tooth_rows
 from gensig.errors import GeometryError
 from gensig.mesh.load_distribution import pair_states, static_mesh
-from gensig.mesh.modification import PLAIN, FlankModification, PairModification
-from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
+from gensig.mesh.modification import (
+    PLAIN,
+    FlankModification,
+    PairModification,
+)
+from gensig.mesh.sliced.sliced_statics import (
+    chord_equilibrium,
+    chord_states,
+)
 from gensig.systems.base import simulate_together
 from gensig.systems.registry import read_system
 from gensig.systems.run import Run
@@ -26,7 +33,10 @@ SIDES = ("pinion", "wheel")
 
 def relieved(system, **values):
     side = FlankModification(**values)
-    return replace(system, modification=PairModification(pinion=side, wheel=side))
+    return replace(
+        system,
+        modification=PairModification(pinion=side, wheel=side),
+    )
 
 
 def ripple(system, faults=()):
@@ -47,9 +57,16 @@ def columns(table):
 
 def test_no_depth_is_no_relief_bit_for_bit(xiamen, machine):
     heights = {f"modification.{side}.tip_relief_height_mm": 0.6 for side in SIDES}
-    plain = machine({**heights, "modification.wheel.profile_shape": "parabolic"})
+    plain = machine(
+        {
+            **heights,
+            "modification.wheel.profile_shape": "parabolic",
+        }
+    )
     for mine, theirs in zip(
-        columns(plain.mesh_table()), columns(xiamen.mesh_table()), strict=True
+        columns(plain.mesh_table()),
+        columns(xiamen.mesh_table()),
+        strict=True,
     ):
         assert_array_equal(mine, theirs)
 
@@ -62,7 +79,10 @@ def test_the_gaps_are_those_of_the_fault_of_the_same_relief(xiamen, shape):
     depth = 10 * UM
     height = 0.6 * MM
     system = relieved(
-        xiamen, tip_relief=depth, tip_relief_height=height, profile_shape=shape
+        xiamen,
+        tip_relief=depth,
+        tip_relief_height=height,
+        profile_shape=shape,
     )
     faults = []
     for name in SIDES:
@@ -83,7 +103,11 @@ def test_the_gaps_are_those_of_the_fault_of_the_same_relief(xiamen, shape):
         fault = getattr(theirs, name)
         assert set(own.kind) == {0}
         assert own.gap[0].max() > 0.9 * depth
-        assert_close(own.gap[0], fault.gap[fault.kind[0]], atol=0.04 * depth)
+        assert_close(
+            own.gap[0],
+            fault.gap[fault.kind[0]],
+            atol=0.04 * depth,
+        )
 
 
 def test_back_flanks_are_modified_too(xiamen):
@@ -98,16 +122,30 @@ def test_a_fault_comes_on_top(xiamen):
     """What a pitch error adds to relieved teeth is the pitch error."""
     system = relieved(xiamen, tip_relief=10 * UM, tip_relief_height=0.6 * MM)
     side = system.mesh_table(
-        (one("pitch_error", gear="wheel", tooth=5, pitch_error_um=7),)
+        (
+            one(
+                "pitch_error",
+                gear="wheel",
+                tooth=5,
+                pitch_error_um=7,
+            ),
+        )
     ).wheel
-    assert_close(side.gap[side.kind[5]], side.gap[0] + 7 * UM, atol=1e-3 * UM)
+    assert_close(
+        side.gap[side.kind[5]],
+        side.gap[0] + 7 * UM,
+        atol=1e-3 * UM,
+    )
 
 
 def test_relief_of_the_deflection_takes_most_ripple_off(xiamen, machine):
     """Where one pair leaves as the next one enters, reliefs that sum to the deflection leave it
     even (Harris's map).
     """
-    for system in (xiamen, machine({"operating.torque_nm": 60.0})):
+    for system in (
+        xiamen,
+        machine({"operating.torque_nm": 60.0}),
+    ):
         best = replace(system, modification=system.long_relief())
         assert ripple(best) < 0.2 * ripple(system)
         twice = {
@@ -120,7 +158,10 @@ def test_relief_of_the_deflection_takes_most_ripple_off(xiamen, machine):
         assert (
             best.long_relief() == best.modification
         )  # of teeth as cut, whatever is ground off
-    with pytest.raises(GeometryError, match=r"contact ratio 0.9\d+ lies outside 1..2"):
+    with pytest.raises(
+        GeometryError,
+        match=r"contact ratio 0.9\d+ lies outside 1..2",
+    ):
         machine({"gear.addendum_coefficient": 0.5}).long_relief()
 
 
@@ -132,7 +173,10 @@ def sides(system):
     ("lead", "share"),
     [
         ({"crowning": 3 * UM}, 0.03),
-        ({"end_relief": 10 * UM, "end_relief_width": 3 * MM}, 0.03),
+        (
+            {"end_relief": 10 * UM, "end_relief_width": 3 * MM},
+            0.03,
+        ),
         (
             {"helix_slope": 5 * UM},
             0.08,
@@ -147,7 +191,8 @@ def test_leads_are_those_of_the_sliced_pair(config_with, lead, share):
     spur = relieved(read_system(config), **lead)
     sliced = read_system(config.with_keys("system", kind="helical_pair"))
     sliced = replace(
-        sliced, flanks=replace(sliced.flanks, modification=spur.modification)
+        sliced,
+        flanks=replace(sliced.flanks, modification=spur.modification),
     )
     roll = spur.pair.base_pitch * (np.arange(64) + 0.5) / 64
     table = spur.mesh_table()
@@ -156,22 +201,32 @@ def test_leads_are_those_of_the_sliced_pair(config_with, lead, share):
     theirs = chord_equilibrium(
         slices, chord_states(slices, roll), spur.mesh_force
     ).approach.mean()
+
     assert_close(own, theirs, share)
 
 
-def test_relieved_gears_shake_less_along_the_line_of_action(machine):
+def test_relieved_gears_shake_less_along_the_line_of_action(
+    machine,
+):
     """Tips that do not strike: a quarter of the acceleration along the line of action at the rated
     point.
     """
     system = machine(
-        {"operating.duration_s": 0.2, "sensing.channels": ["pinion_y", "wheel_y"]}
+        {
+            "operating.duration_s": 0.2,
+            "sensing.channels": ["pinion_y", "wheel_y"],
+        }
     )
     runs = [
-        Run(system=replace(system, modification=modification), faults=())
+        Run(
+            system=replace(system, modification=modification),
+            faults=(),
+        )
         for modification in (PLAIN, system.long_relief())
     ]
     plain, quiet = (
         np.sqrt((record.acceleration**2).mean(axis=1))
         for record in simulate_together(runs)
     )
+
     assert (quiet < 0.5 * plain).all()

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 from closeness import assert_close
-from fault_cases import FULL, GEARS, heavy_table, on_path, one, side_of
+from fault_cases import (
+    FULL,
+    GEARS,
+    heavy_table,
+    on_path,
+    one,
+    side_of,
+)
 
 from gensig.faults.base import faulty_teeth
 from gensig.faults.broken import tooth_height
@@ -43,27 +50,40 @@ def along_flank(system, gear):
 class TestOneIsTheOther:
     def test_broken_at_full_height_is_missing(self, xiamen, gear):
         height_mm = 1e3 * tooth_height(getattr(xiamen.pair, gear))
-        broken = one("broken", gear=gear, tooth=2, broken_height_mm=height_mm)
+        broken = one(
+            "broken",
+            gear=gear,
+            tooth=2,
+            broken_height_mm=height_mm,
+        )
         missing = one("missing_tooth", gear=gear, tooth=2)
         roll = xiamen.pair.base_pitch * np.linspace(0.0, 6.0, 601)
         result, expected = (
             pair_states(xiamen.mesh_table((fault,)), roll)
             for fault in (broken, missing)
         )
+
         assert_close(result.gap, expected.gap)
+
         there = np.isfinite(expected.gap)
         assert not there.all()
+
         compliance = expected.compliance[there]
         assert_close(result.compliance[there], compliance, 1e-12)
 
     @pytest.mark.parametrize("height_mm", [0.5, 2.0])
     def test_chipped_over_the_whole_face_is_broken(self, xiamen, gear, height_mm):
-        whole = {"chip_width_mm": FULL, "chip_shape": "rectangular"}
+        whole = {
+            "chip_width_mm": FULL,
+            "chip_shape": "rectangular",
+        }
         on = {"gear": gear, "tooth": 0}
         chip = one("chipped", **on, chip_height_mm=height_mm, **whole)
         broken = one("broken", **on, broken_height_mm=height_mm)
         expected = rows(xiamen, broken)
+
         assert_close(rows(xiamen, chip), expected, 1e-12)
+
         body = getattr(xiamen.pair, gear)
         assert_close(chip.severity(body), broken.severity(body), 1e-6)
 
@@ -71,8 +91,10 @@ class TestOneIsTheOther:
         pit = patch("pitting", "pit", gear)
         spall = patch("spalling", "spall", gear, spall_shape="rectangular")
         assert_close(rows(xiamen, spall), rows(xiamen, pit))
+
         body = getattr(xiamen.pair, gear)
         assert_close(spall.severity(body), pit.severity(body), 1e-6)
+
         ellipse = patch("spalling", "spall", gear).severity(body)
         assert_close(ellipse, 0.25 * np.pi * pit.severity(body), 1e-6)
 
@@ -103,7 +125,9 @@ def test_a_broken_tooth_bends_as_the_sound_one_up_to_its_corner(
     side = side_of(heavy_table(xiamen, fault), gear)
     sound, broken = (row[path(xiamen)[0]] for row in side.compliance)
     below = curvature(xiamen, gear) <= corner
+
     assert_close(broken[below], sound[below], 1e-3)
+
     at_corner = sound[below][{"pinion": -1, "wheel": 0}[gear]]
     # the contact term varies with the position
     assert_close(broken[~below], at_corner, 0.05)
@@ -114,7 +138,11 @@ def test_a_broken_tooth_bends_as_the_sound_one_up_to_its_corner(
 class TestGapsInClosedForm:
     @pytest.mark.parametrize("depth_um", [5.0, 80.0])
     def test_uniform_wear_is_a_gap_of_its_depth(self, xiamen, gear, depth_um):
-        wear = {"gear": gear, "tooth": 0, "wear_depth_um": depth_um}
+        wear = {
+            "gear": gear,
+            "tooth": 0,
+            "wear_depth_um": depth_um,
+        }
         even, uneven = (
             rows(xiamen, one("wear", **wear, **shape))[0][path(xiamen)[0]]
             for shape in ({"wear_profile": None}, {})
@@ -124,39 +152,65 @@ class TestGapsInClosedForm:
 
     @pytest.mark.parametrize("error_um", [20.0, -20.0, 0.5])
     def test_a_pitch_error_is_its_value_everywhere(self, xiamen, gear, error_um):
-        error = one("pitch_error", gear=gear, tooth=0, pitch_error_um=error_um)
+        error = one(
+            "pitch_error",
+            gear=gear,
+            tooth=0,
+            pitch_error_um=error_um,
+        )
         gap, compliance = rows(xiamen, error)
         # far off the path the corner gap is millimetres, whose rounding remains
         assert_close(gap, error_um * UM, 1e-9, atol=1e-16)
+
         sound = side_of(xiamen.mesh_table(), gear).compliance[0]
         assert_close(compliance, sound, 1e-12)
 
     @pytest.mark.parametrize("slope_um", [20.0, -20.0])
     def test_a_profile_slope_is_straight_in_roll(self, xiamen, gear, slope_um):
-        slope = {"profile_slope_um": slope_um, "profile_form_um": 0}
-        gap, _ = rows(xiamen, one("profile_error", gear=gear, tooth=0, **slope))
+        slope = {
+            "profile_slope_um": slope_um,
+            "profile_form_um": 0,
+        }
+        gap, _ = rows(
+            xiamen,
+            one("profile_error", gear=gear, tooth=0, **slope),
+        )
         expected = slope_um * UM * (along_flank(xiamen, gear) - 0.5)
         within_second_order(xiamen, gear, gap, expected)
         # half of it stands back at one end of the flank, as much stands proud at the other
         tip, low = {"pinion": (-1, 0), "wheel": (0, -1)}[gear]
         ends = gap[path(xiamen)[0]] * np.sign(slope_um)
+
         assert ends[low] < 0 < ends[tip]
 
     @pytest.mark.parametrize("waves", [1.0, 2.0])
     def test_a_profile_form_is_waves(self, xiamen, gear, waves):
-        form = {"profile_form_um": 2, "profile_waves": waves, "profile_slope_um": 0}
+        form = {
+            "profile_form_um": 2,
+            "profile_waves": waves,
+            "profile_slope_um": 0,
+        }
         fault = one("profile_error", gear=gear, tooth=0, **form)
         expected = 2 * UM * np.sin(np.pi * waves * along_flank(xiamen, gear)) ** 2
         within_second_order(xiamen, gear, rows(xiamen, fault)[0], expected)
 
     @pytest.mark.parametrize(("curve", "power"), [("linear", 1), ("parabolic", 2)])
     def test_tip_relief_falls_off_from_the_tip(self, xiamen, gear, curve, power):
-        relief = {"relief_um": 10, "relief_length_mm": 3, "relief_curve": curve}
+        relief = {
+            "relief_um": 10,
+            "relief_length_mm": 3,
+            "relief_curve": curve,
+        }
         fault = one("tip_relief", gear=gear, tooth=0, **relief)
-        tip = {"pinion": xiamen.pair.path_of_contact, "wheel": 0.0}[gear]
+        tip = {
+            "pinion": xiamen.pair.path_of_contact,
+            "wheel": 0.0,
+        }[gear]
         from_tip = np.abs(path(xiamen)[1] - tip)
         expected = 10 * UM * np.maximum(1 - from_tip / 3e-3, 0.0) ** power
+
         assert expected.max() > 9.9 * UM
+
         within_second_order(xiamen, gear, rows(xiamen, fault)[0], expected)
 
 
@@ -202,6 +256,7 @@ class TestRunout:
         # slope of the deviation along the flank, at most
         slope = 40 * UM / curvature(xiamen, gear)
         radius = relative_radius(xiamen.pair, path(xiamen)[1])
+
         assert jumps[0] < 1.25 * (slope**2 * radius / 2).max()
         assert jumps[1] > 2 * UM
 
@@ -218,7 +273,12 @@ class TestMisalignment:
     @staticmethod
     def approach(system, misalignment_um, gear="pinion"):
         """Approach of contact and slices at C, and what it would be on an even face, m."""
-        fault = one("misalignment", gear=gear, tooth=0, misalignment_um=misalignment_um)
+        fault = one(
+            "misalignment",
+            gear=gear,
+            tooth=0,
+            misalignment_um=misalignment_um,
+        )
         tooth = faulty_teeth(system.pair, (fault,))[gear, 0]
         at = np.array([system.pair.pitch_point])
         force = system.mesh_force

@@ -7,7 +7,14 @@ from functools import cache
 import numpy as np
 import pytest
 from closeness import assert_close
-from fault_cases import CASES, GEARS, KINDS, deflection, one, side_of
+from fault_cases import (
+    CASES,
+    GEARS,
+    KINDS,
+    deflection,
+    one,
+    side_of,
+)
 from numpy.testing import assert_allclose
 
 from gensig.faults.base import faulty_teeth
@@ -26,15 +33,22 @@ def test_the_cases_are_all_faults():
 def test_severity_zero_is_healthy(xiamen, name, gear):
     fault = CASES[name].fault(CASES[name].nothing, gear)
     assert_close(fault.severity(getattr(xiamen.pair, gear)), 0.0)
+
     table = xiamen.mesh_table((fault,))
     sound = xiamen.mesh_table()
     side = side_of(table, gear)
     sound_side = side_of(sound, gear)
     row = side.kind[0]
-    for key in ("compliance", "gap", "compliance_slope", "gap_slope"):
+    for key in (
+        "compliance",
+        "gap",
+        "compliance_slope",
+        "gap_slope",
+    ):
         result = getattr(side, key)[row]
         expected = getattr(sound_side, key)[0]
         assert_allclose(result, expected, rtol=0, atol=0, err_msg=key)
+
     assert side.present.all()
 
 
@@ -59,7 +73,10 @@ def steps(found):
     """
     with np.errstate(invalid="ignore"):
         return np.nan_to_num(
-            np.diff(found, axis=0), nan=0.0, posinf=np.inf, neginf=-np.inf
+            np.diff(found, axis=0),
+            nan=0.0,
+            posinf=np.inf,
+            neginf=-np.inf,
         )
 
 
@@ -76,13 +93,16 @@ def test_more_of_it_shows_and_never_stiffens(series, name, gear):
 
     change = np.abs(steps(deflections)).max(axis=1)
     assert np.all(change > 1e-9), change
+
     if CASES[name].grows:
         assert not falls(deflections, CASES[name].slack).any()
 
     assert severity[0] == 0.0
     assert severity.max() <= 1.0
+
     rises = np.diff(severity)
     assert rises[0] > 0
+
     # the depth of a pit is no part of the pitted share
     if name == "pit_depth":
         assert np.all(rises >= 0)
@@ -97,7 +117,10 @@ class TestWhoseFacesBear:
     """
 
     def test_a_pressed_crack_that_breathes_costs_nothing(self, xiamen, gear):
-        pressed = {"crack_side": "compression", "crack_faces": "breathing"}
+        pressed = {
+            "crack_side": "compression",
+            "crack_faces": "breathing",
+        }
         crack = one("crack", gear=gear, tooth=0, **pressed)
         result = deflection(xiamen, crack)
         assert_close(result, deflection(xiamen), 1e-12)
@@ -105,7 +128,10 @@ class TestWhoseFacesBear:
 
     def test_on_the_tension_side_it_is_open(self, xiamen, gear):
         breathing, kept_open = (
-            deflection(xiamen, one("crack", gear=gear, tooth=0, crack_faces=faces))
+            deflection(
+                xiamen,
+                one("crack", gear=gear, tooth=0, crack_faces=faces),
+            )
             for faces in ("breathing", "open")
         )
         assert_close(breathing, kept_open, 1e-12)
@@ -126,7 +152,13 @@ class TestThePapersCrack:
     @pytest.mark.parametrize("start", ["arc_mid", "gamma_mid"])
     def test_rises_with_depth(self, cut, gear, start):
         faults = [
-            one("crack", gear=gear, tooth=0, crack_depth_mm=depth, crack_start=start)
+            one(
+                "crack",
+                gear=gear,
+                tooth=0,
+                crack_depth_mm=depth,
+                crack_start=start,
+            )
             for depth in (0.0, 0.3, 0.5, 1.0, 1.5, 2.0, 2.5)
         ]
         result = np.array([deflection(cut, fault) for fault in faults])
@@ -157,11 +189,13 @@ class TestThePapersPit:
         }
         sliced = machine({f"mesh.{key}": value for key, value in terms.items()})
         assert sliced.mesh.law == "one_sided"
+
         result, expected = (
             lost_at_pitch_point(system, one("pitting"))
             for system in (sliced, paper_machine)
         )
         assert_close(result, expected, 1e-3)
+
         bridged = lost_at_pitch_point(sliced, one("pitting", pit_length_mm=0.02))
         assert bridged < 0.1 * result
 
@@ -170,7 +204,9 @@ class TestTwoFaultsOnOneTooth:
     CRACK, PIT = (one(kind, tooth=0) for kind in ("crack", "pitting"))
 
     @pytest.mark.parametrize(
-        "faults", [(CRACK, PIT), (PIT, CRACK)], ids=["crack_pit", "pit_crack"]
+        "faults",
+        [(CRACK, PIT), (PIT, CRACK)],
+        ids=["crack_pit", "pit_crack"],
     )
     def test_softer_than_either(self, xiamen, faults):
         both = deflection(xiamen, *faults)
@@ -193,7 +229,12 @@ class TestTwoFaultsOnOneTooth:
         system = machine({"mesh.crack": "paper"})
         faults = (
             one("crack", tooth=0, crack_depth_mm=2.5),
-            one("pitting", tooth=0, pit_width_mm=16, pit_length_mm=1.5),
+            one(
+                "pitting",
+                tooth=0,
+                pit_width_mm=16,
+                pit_length_mm=1.5,
+            ),
         )
         tooth = faulty_teeth(system.pair, faults[::order])["pinion", 0]
         sound = sections(healthy_tooth(system.pair.pinion), papers_crack=True)

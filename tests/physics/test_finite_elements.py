@@ -12,7 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from closeness import assert_close
-from reference.calibrate_crack import MODULE, WIDTH, reference_gear
+from reference.calibrate_crack import (
+    MODULE,
+    WIDTH,
+    reference_gear,
+)
 
 from gensig.errors import ExtrapolationError
 from gensig.faults.crack import Crack
@@ -113,7 +117,13 @@ def increments(strain, rows, *, faces="open"):
     return crack_compliance(tooth, curvature, strain) * YOUNG * WIDTH
 
 
-CRACKS = ("case", "side", "start", "crack_angle_deg", "depth_over_chord")
+CRACKS = (
+    "case",
+    "side",
+    "start",
+    "crack_angle_deg",
+    "depth_over_chord",
+)
 BORES = ("gear", "elasticity", "bore_radius_over_module")
 
 
@@ -123,12 +133,16 @@ def test_cracks_of_many_gears(strain):
     at_45 = []
     for key, rows in groups("crack", *CRACKS).items():
         case, side, _, angle, _ = key
-        if side != "tension" or (case, float(angle)) == ("z84", 75.0):
+        if side != "tension" or (case, float(angle)) == (
+            "z84",
+            75.0,
+        ):
             continue
         result = increments(strain, rows) / column(rows, "increment") - 1.0
         errors.append(result)
         if float(angle) == 45.0:
             at_45.append(result)
+
     assert len(errors) > 150
     assert np.sqrt(np.mean(np.concatenate(errors) ** 2)) < 0.045
     assert np.abs(np.concatenate(errors)).max() < 0.20
@@ -154,9 +168,14 @@ def test_outside_what_was_checked(strain, depth, angle):
     rows = next(iter(groups("crack", *CRACKS).values()))
     chord = float(rows[0]["depth_over_module"]) / float(rows[0]["depth_over_chord"])
     odd = [
-        {**row, "depth_over_module": str(depth * chord), "crack_angle_deg": str(angle)}
+        {
+            **row,
+            "depth_over_module": str(depth * chord),
+            "crack_angle_deg": str(angle),
+        }
         for row in rows
     ]
+
     with pytest.raises(ExtrapolationError, match="calibrated crack was checked"):
         increments(strain, odd)
 
@@ -181,7 +200,12 @@ def test_ring_over_bores(xiamen, strain, stress, key):
     tolerance = 0.05
     if round(bore_radius * 1e3, 9) in (9.0, 15.0):
         tolerance = 0.02
-    assert_close(result * YOUNG * WIDTH, column(rows, "compliance"), tolerance)
+
+    assert_close(
+        result * YOUNG * WIDTH,
+        column(rows, "compliance"),
+        tolerance,
+    )
 
 
 def three_d(fault, depth, extent, point, quantity, loaded="1"):
@@ -189,9 +213,16 @@ def three_d(fault, depth, extent, point, quantity, loaded="1"):
     (row,) = (
         row
         for row in groups("three_d", "fault")[fault,]
-        if (row["crack_depth_over_module"], row["crack_extent_over_width"])
+        if (
+            row["crack_depth_over_module"],
+            row["crack_extent_over_width"],
+        )
         == (depth, extent)
-        and (row["point"], row["quantity"], row["loaded_over_width"])
+        and (
+            row["point"],
+            row["quantity"],
+            row["loaded_over_width"],
+        )
         == (point, quantity, loaded)
     )
     return float(row["compliance"]), float(row["curvature_radius_over_module"]) * MODULE
@@ -203,7 +234,10 @@ def test_partial_width_crack_in_three_dimensions(xiamen, strain, depth, extent):
     """Increment at the pitch point where the mate keeps the contact line straight, within 15 %."""
     (cracked, radius), (sound, _) = (
         three_d(*case, "C", "rigid")
-        for case in (("crack", depth, extent), ("sound", "0", "0"))
+        for case in (
+            ("crack", depth, extent),
+            ("sound", "0", "0"),
+        )
     )
     crack = Crack(
         gear="pinion",
@@ -215,6 +249,7 @@ def test_partial_width_crack_in_three_dimensions(xiamen, strain, depth, extent):
     )
     tooth = crack.apply(healthy_tooth(xiamen.pair.pinion), 0)
     result = crack_compliance(tooth, np.array([radius]), strain)[0] * YOUNG * WIDTH
+
     assert_close(result, cracked - sound, 0.15)
 
 
@@ -225,7 +260,12 @@ def test_partial_width_load_in_three_dimensions(machine):
     pitted, radius = three_d("pit", "0", "0", "C", "rigid", "0.5")
     ratio = {}
     for bending, share in (("by_slice", 1.0), ("whole", 0.0)):
-        system = machine({"mesh.bending": bending, "gear.pinion.bore_radius_mm": 9})
+        system = machine(
+            {
+                "mesh.bending": bending,
+                "gear.pinion.bore_radius_mm": 9,
+            }
+        )
         pair = system.pair
         material = system.material.in_plane("plane_strain")
         curvature = np.array([radius])
@@ -235,7 +275,10 @@ def test_partial_width_load_in_three_dimensions(machine):
             tooth_compliance(tooth, at, material, reach="to_centreline").total
             for tooth, at in (
                 (pinion, curvature),
-                (healthy_tooth(pair.wheel), np.asarray(pair.wheel_curvature(position))),
+                (
+                    healthy_tooth(pair.wheel),
+                    np.asarray(pair.wheel_curvature(position)),
+                ),
             )
         ]
         own = slice_bending(pair, position, system.material, system.mesh)
@@ -244,5 +287,6 @@ def test_partial_width_load_in_three_dimensions(machine):
         whole = structural_terms(pinion, curvature, material, system.mesh)
         structure = sum(whole.values()) + share * teeth[0]
         ratio[bending] = structure[0] * YOUNG * WIDTH / pitted
+
     assert_close(ratio["by_slice"], 1.0, 0.15)
     assert ratio["whole"] < 0.85

@@ -7,7 +7,10 @@ import pytest
 from closeness import assert_close
 
 from gensig.mesh.load_distribution import pair_states, static_mesh
-from gensig.mesh.local_contact import linear_contact, weber_contact
+from gensig.mesh.local_contact import (
+    linear_contact,
+    weber_contact,
+)
 
 # spur reference, section 3.4: named points by pinion curvature radius (mm), pair in plane strain at
 # 20 N m (1e8 N/m)
@@ -21,7 +24,16 @@ CURVATURE_MM = (
     10.46381,
     12.56508,
 )
-FINITE_ELEMENTS = (1.5067, 1.7595, 1.9036, 1.9262, 1.9291, 1.9264, 1.8218, 1.5706)
+FINITE_ELEMENTS = (
+    1.5067,
+    1.7595,
+    1.9036,
+    1.9262,
+    1.9291,
+    1.9264,
+    1.8218,
+    1.5706,
+)
 LOCAL_PART = (
     1251.0,
     1177.5,
@@ -58,7 +70,11 @@ def single_pair(system):
 
 
 def test_single_pair_against_finite_elements(physical):
-    assert_close(single_pair(physical), np.array(FINITE_ELEMENTS) * 1e8, 0.015)
+    assert_close(
+        single_pair(physical),
+        np.array(FINITE_ELEMENTS) * 1e8,
+        0.015,
+    )
 
 
 def test_local_part_against_finite_elements(physical):
@@ -66,6 +82,7 @@ def test_local_part_against_finite_elements(physical):
     width = physical.pair.pinion.face_width
     load = physical.mesh_force
     result = weber_contact(physical.pair, at, physical.material).compliance(width, load)
+
     assert np.all(
         (result / (np.array(LOCAL_PART) * 1e-12) > 0.90)
         & (result / (np.array(LOCAL_PART) * 1e-12) < 0.95)
@@ -82,14 +99,19 @@ def test_coupled_double_zone_against_finite_elements(physical):
     expected = np.array([2.355, 2.386, 2.403, 2.408, 2.401, 2.381, 2.347]) * 1e8 * 1.04
     table = physical.mesh_table()
     result = static_mesh(
-        table, pair_states(table, along_mm * 1e-3), physical.mesh_force
+        table,
+        pair_states(table, along_mm * 1e-3),
+        physical.mesh_force,
     ).stiffness
+
     assert_close(result, expected, 0.01)
 
 
 def test_local_compliance_falls_with_load_and_width(physical):
     law = weber_contact(
-        physical.pair, np.full(4, physical.pair.pitch_point), physical.material
+        physical.pair,
+        np.full(4, physical.pair.pitch_point),
+        physical.material,
     )
     width = physical.pair.pinion.face_width
     assert np.all(
@@ -126,12 +148,17 @@ def test_load_sharing_and_compliance_agree(physical):
         curves.contact_position,
         curves.single_pair_stiffness,
     )
+
     assert_close(own - contact, alone - full, 2e-3)
 
 
 def test_plane_strain_is_plane_stress_of_another_material(xiamen):
     material = xiamen.material
     inside = material.in_plane("plane_strain")
-    assert_close(inside.youngs_modulus, material.youngs_modulus / 0.91, 1e-12)
+    assert_close(
+        inside.youngs_modulus,
+        material.youngs_modulus / 0.91,
+        1e-12,
+    )
     assert_close(inside.shear_modulus, material.shear_modulus, 1e-12)
     assert material.in_plane("plane_stress") is material

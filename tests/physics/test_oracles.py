@@ -58,7 +58,8 @@ class TestFourMilliseconds:
         return measured
 
     @pytest.mark.parametrize(
-        ("oversampling", "limit"), [(5, 2e-4), (10, 4e-5), (20, 1e-5)]
+        ("oversampling", "limit"),
+        [(5, 2e-4), (10, 4e-5), (20, 1e-5)],
     )
     def test_error(self, error, oversampling, limit):
         assert error(oversampling) < limit
@@ -100,9 +101,17 @@ class Case:
 
 
 CASES = {
-    "healthy": Case(speed_rpm=1800, faults=(), period=60 / 1800 / 23, n_periods=69),
+    "healthy": Case(
+        speed_rpm=1800,
+        faults=(),
+        period=60 / 1800 / 23,
+        n_periods=69,
+    ),
     "crack": Case(
-        speed_rpm=6000, faults=(one("crack", tooth=3),), period=60 / 6000, n_periods=10
+        speed_rpm=6000,
+        faults=(one("crack", tooth=3),),
+        period=60 / 6000,
+        n_periods=10,
     ),
 }
 
@@ -154,7 +163,10 @@ class TestPeriodicMotion:
         """Complex amplitudes of a record's whole spectrum, (channel, line)."""
 
         def amplitudes(oversampling, phase=PHASE):
-            steps = {"solver.oversampling": oversampling, "solver.max_error": None}
+            steps = {
+                "solver.oversampling": oversampling,
+                "solver.max_error": None,
+            }
             system = machine({**case.changes, **steps})
             start = Start(tooth_pinion=0, tooth_wheel=0, phase=phase)
             record = system.simulate(case.faults, start=start)
@@ -196,6 +208,7 @@ class TestPeriodicMotion:
         between = result.copy()
         between[:, case.n_periods - 1 :: case.n_periods] = 0
         level = np.linalg.norm(result, axis=1)
+
         assert np.all(np.linalg.norm(between, axis=1) < 5e-4 * level)
 
     def test_a_record_at_the_default_oversampling(self, case, compared, default):

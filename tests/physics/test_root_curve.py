@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from closeness import assert_close
 
-from gensig.geometry.tooth_profile import involute_point, root_curve
+from gensig.geometry.tooth_profile import (
+    involute_point,
+    root_curve,
+)
 
 CASES = {
     "z23": {},
@@ -52,7 +55,11 @@ def rack_clearance(gear, x, y):
         outside = np.where(
             on_tip & (from_tip > 0),
             from_tip,
-            np.where(on_flank & (from_flank > 0), from_flank, np.hypot(along, deep)),
+            np.where(
+                on_flank & (from_flank > 0),
+                from_flank,
+                np.hypot(along, deep),
+            ),
         )
         inside = (from_tip <= 0) & (from_flank <= 0)
         return np.where(inside, np.maximum(from_tip, from_flank), outside) - rounding
@@ -92,7 +99,9 @@ def test_involute_end_joins_in_place_and_slope(gear):
     h = 1e-7
     root = np.array(root_curve(gear, gear.pressure_angle + np.array([0.0, h])))
     flank = np.array(involute_point(gear, junction + np.array([0.0, h])))
+
     assert_close(root[:, 0], flank[:, 0], atol=1e-12)
+
     angles = [
         math.atan2(*(curve[::-1, 1] - curve[::-1, 0])) % math.pi
         for curve in (root, flank)

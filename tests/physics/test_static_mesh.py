@@ -7,7 +7,11 @@ import pytest
 from closeness import assert_close
 from fault_cases import GEARS, KINDS, one
 
-from gensig.mesh.load_distribution import PairStates, pair_states, static_mesh
+from gensig.mesh.load_distribution import (
+    PairStates,
+    pair_states,
+    static_mesh,
+)
 
 
 def fault(kind, gear="pinion", tooth=5):
@@ -82,21 +86,28 @@ def test_equilibrium_with_every_fault_over_a_turn(xiamen, kind, gear):
     static = static_mesh(faulty, states, force)
 
     assert violation(states, static, faulty.shared_compliance, force) < 1e-11
+
     sound = at(xiamen.mesh_table(), roll, force)
     assert np.abs(static.load - sound.load).max() > 1e-3 * force
 
 
-def test_approach_rises_with_force_and_stiffness_is_its_slope(table):
+def test_approach_rises_with_force_and_stiffness_is_its_slope(
+    table,
+):
     states = random_states(table)
     forces = np.geomspace(1, 1e5, 60)
     approach = [static_mesh(table, states, force).approach for force in forces]
+
     assert np.all(np.diff(approach, axis=0) > 0)
+
     low, high = (
         static_mesh(table, states, 1000.0 * (1 + sign * 1e-7)) for sign in (-1, 1)
     )
     same = ((low.load > 0) == (high.load > 0)).all(axis=1)
     slope = 2e-4 / (high.approach - low.approach)
+
     assert same.mean() > 0.9
+
     stiffness = static_mesh(table, states, 1000.0).stiffness
     assert_close(stiffness[same], slope[same], 1e-5)
 
@@ -129,7 +140,9 @@ def test_a_faulty_tooth_shows_once_a_turn_at_its_number(xiamen, gear, kind):
         for faults in ((), (fault(kind, gear, tooth),))
     )
     touched = (np.abs(faulty / sound - 1) > 1e-9).reshape(2, n_teeth, points)
+
     assert (touched[0] == touched[1]).all()
+
     pitches = np.flatnonzero(touched[0].any(axis=1)) - tooth
     pitches = np.sort((pitches + n_teeth // 2) % n_teeth - n_teeth // 2)
     assert 1 <= len(pitches) <= 3
@@ -143,7 +156,9 @@ class TestPaperLaw:
         pitch = paper_machine.pair.base_pitch
         roll = pitch * (np.arange(20000) + 0.5) / 20000
         n_carrying = (at(table, roll, 925.0).load > 0).sum(axis=1)
+
         assert set(n_carrying.tolist()) == {1, 2}
+
         ratio = paper_machine.pair.transverse_contact_ratio
         assert_close(n_carrying.mean(), ratio, atol=1e-4)
 

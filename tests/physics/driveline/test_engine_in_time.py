@@ -18,8 +18,15 @@ from gensig.driveline.engine_dampers import (
 from gensig.driveline.engine_line import read_engine_line
 from gensig.driveline.in_time import RATE, TimeResponse
 from gensig.driveline.linear.forced import run_of_speeds
-from gensig.driveline.sweep import amplitude_spectra, sweep_course, sweep_response
-from gensig.driveline.time_root_stress import root_stress_in_time, typical_largest
+from gensig.driveline.sweep import (
+    amplitude_spectra,
+    sweep_course,
+    sweep_response,
+)
+from gensig.driveline.time_root_stress import (
+    root_stress_in_time,
+    typical_largest,
+)
 from gensig.errors import ConfigError
 from gensig.options.compose import compose
 
@@ -41,11 +48,20 @@ def passage():
     """Sweep through the second mode, which order 5 meets at 825 r/min; teeth do not part."""
     line = engine("system.backlash_um=0", "system.loss_factor.gear_mesh=0")
     return line, sweep_response(
-        line, LOW, HIGH, SECONDS, 0.0, own={}, nodes=(FLYWHEEL,), n_orders=20
+        line,
+        LOW,
+        HIGH,
+        SECONDS,
+        0.0,
+        own={},
+        nodes=(FLYWHEEL,),
+        n_orders=20,
     )
 
 
-def test_a_sweep_of_a_line_without_play_is_the_linear_line(passage):
+def test_a_sweep_of_a_line_without_play_is_the_linear_line(
+    passage,
+):
     line, sweep = passage
     torques = [line.on_line(line.torques(speed, 0.0)) for speed in sweep.up.speeds]
     (steady,) = run_of_speeds(
@@ -56,6 +72,7 @@ def test_a_sweep_of_a_line_without_play_is_the_linear_line(passage):
         n_orders=20,
     )
     both = 0.5 * (sweep.up.angle + sweep.down.angle)[0, :, ORDER_5]
+
     assert_close(both, steady.angle[:, ORDER_5], 0.15)  # the bins are 18 r/min wide
     assert sweep.energy_residual < 1e-3
     assert_close(sweep.up.speeds, sweep.down.speeds, 1e-7)
@@ -68,6 +85,7 @@ def test_a_resonance_is_met_late_either_way(passage):
         for way in (sweep.up, sweep.down)
     )
     assert up > down + 0.5 * RPM
+
     at = sweep.difference[0]
     assert at[0] < 0.0 < at[-1]  # below the resonance it is already more going down
 
@@ -75,7 +93,11 @@ def test_a_resonance_is_met_late_either_way(passage):
 def test_the_course_goes_up_and_comes_back():
     course = sweep_course(70.0, 180.0, 3.0, 500.0)
     assert_close(
-        np.interp([-1.0, 0.0, 1.5, 3.0, 4.5, 6.0, 7.0], course.time, course.speed),
+        np.interp(
+            [-1.0, 0.0, 1.5, 3.0, 4.5, 6.0, 7.0],
+            course.time,
+            course.speed,
+        ),
         [70, 70, 125, 180, 125, 70, 70],
         1e-7,
     )
@@ -85,8 +107,18 @@ def test_the_course_goes_up_and_comes_back():
 @pytest.mark.parametrize(
     ("low", "high", "seconds", "message"),
     [
-        (650, 1750, 0.2, r"too few cycles at its low end; give 0\.81 s or more"),
-        (1750, 650, 5.0, "from a positive speed up to a higher one"),
+        (
+            650,
+            1750,
+            0.2,
+            r"too few cycles at its low end; give 0\.81 s or more",
+        ),
+        (
+            1750,
+            650,
+            5.0,
+            "from a positive speed up to a higher one",
+        ),
     ],
 )
 def test_speeds_that_make_no_sweep_are_refused(low, high, seconds, message):
@@ -141,27 +173,41 @@ def motion(speed, force, n_cycles):
 def pump_drive():
     line = engine()
     mesh = mesh_between(line, (21, 45))
-    return line, mesh, read_mesh_strength(compose("generate", ENGINE), line, mesh)
+    return (
+        line,
+        mesh,
+        read_mesh_strength(compose("generate", ENGINE), line, mesh),
+    )
 
 
-def test_root_stress_in_time_of_a_force_that_repeats_is_that_of_one_cycle(pump_drive):
+def test_root_stress_in_time_of_a_force_that_repeats_is_that_of_one_cycle(
+    pump_drive,
+):
     line, mesh, strength = pump_drive
     force = 1500.0 + 4000.0 * np.cos(4.0 * np.pi * np.arange(5760) / 5760)
     load = ToothLoad(speed=SPEED, force=force)
     once = dynamic_root_stress(strength, line, mesh, load)
     response = motion(load.speed, force, 4.1)
     computed = root_stress_in_time(strength, line, mesh, response)
-    assert_close(computed.gears["wheel"].stress, once.gears["wheel"].stress, 1e-4)
+
+    assert_close(
+        computed.gears["wheel"].stress,
+        once.gears["wheel"].stress,
+        1e-4,
+    )
+
     passes = computed.passes["wheel"]
     one = once.passes["wheel"]
     assert 3 * 54 <= len(passes) <= 4 * 54
     assert_close(passes[54:108].max(), one.max(), 2e-3)
     assert_close(typical_largest(passes, 54), one.max(), 2e-3)
+
     atol = 0.01 * one.max()
     shifted = [np.roll(one, -shift, axis=0) for shift in range(54)]
     (alike, *_) = [
         turn for turn in shifted if np.allclose(turn[:50], passes[:50], atol=atol)
     ]
+
     assert_close(alike, passes[54:108], atol=atol)
 
 
@@ -169,7 +215,11 @@ def test_root_stress_in_time_of_a_force_that_repeats_is_that_of_one_cycle(pump_d
     ("force", "n_cycles", "message"),
     [
         (1000.0, 1.02, "two cycles of the crank at least"),
-        (-1000.0, 3.0, "nothing closes its driving flanks in time"),
+        (
+            -1000.0,
+            3.0,
+            "nothing closes its driving flanks in time",
+        ),
     ],
 )
 def test_a_run_without_root_stress_is_refused(pump_drive, force, n_cycles, message):

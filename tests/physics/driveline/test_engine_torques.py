@@ -7,11 +7,24 @@ import re
 import numpy as np
 import pytest
 from closeness import assert_close
-from engine_cases import RPM, SPEED, TORQUE, option, ratio_of_teeth, ratios, torques_of
+from engine_cases import (
+    RPM,
+    SPEED,
+    TORQUE,
+    option,
+    ratio_of_teeth,
+    ratios,
+    torques_of,
+)
 
 from gensig.driveline.excitation.cycle import CYCLE
-from gensig.driveline.excitation.engine import read_engine, read_wheels
-from gensig.driveline.excitation.engine_torques import engine_torques
+from gensig.driveline.excitation.engine import (
+    read_engine,
+    read_wheels,
+)
+from gensig.driveline.excitation.engine_torques import (
+    engine_torques,
+)
 from gensig.driveline.linear.forced import cycle_orders
 from gensig.errors import ConfigError
 
@@ -30,7 +43,13 @@ def changed(path, value):
 
 
 @pytest.mark.parametrize(
-    ("rpm", "torque"), [(650, 0.0), (1200, 3000.0), (1688, 12680.0), (1750, 13600.0)]
+    ("rpm", "torque"),
+    [
+        (650, 0.0),
+        (1200, 3000.0),
+        (1688, 12680.0),
+        (1750, 13600.0),
+    ],
 )
 def test_power_of_the_gas_is_that_of_all_it_drives(rpm, torque):
     computed = torques_of(option(), rpm * RPM, torque)
@@ -50,6 +69,7 @@ def test_reference_point_is_that_of_the_class():
     assert_close(
         computed.indicated_torque / 20, 697.0, 0.02
     )  # the independent estimate with the same sizes
+
     consumption = (
         computed.fuel_volume * 840 * 20 / CYCLE * SPEED / (TORQUE * SPEED)
     )  # kg/J
@@ -70,8 +90,22 @@ def test_harmonics_of_one_cylinder_are_as_estimated_independently():
     values["loads"] = None
     computed = torques_of(values, torque=TORQUE / 20)
     mean, amplitude = cycle_orders(computed.on(NODES)[12], 20)
-    estimated = [2.33, 3.44, 2.89, 2.70, 2.22, 1.86, 1.56, 1.27, 1.01, 0.81, 0.65, 0.53]
+    estimated = [
+        2.33,
+        3.44,
+        2.89,
+        2.70,
+        2.22,
+        1.86,
+        1.56,
+        1.27,
+        1.01,
+        0.81,
+        0.65,
+        0.53,
+    ]
     gas = computed.indicated_torque
+
     assert_close(np.abs(amplitude[:12]) / gas, estimated, 0.08)
     assert (
         0.05 < abs(amplitude[19]) / gas < 0.15
@@ -84,6 +118,7 @@ def test_even_firing_leaves_only_multiples_of_the_tenth_order_of_all_cylinders()
     _, together = cycle_orders(throws.sum(axis=0), 80)
     _, alone = cycle_orders(throws[0], 80)
     others = np.arange(1, 81) % 20 != 0
+
     assert np.abs(together[others]).max() < 1e-6 * np.abs(together).max()
     assert np.abs(together[19]) > 100.0
     assert np.abs(alone[others]).max() > 1000.0  # of one throw all half orders
@@ -94,6 +129,7 @@ def test_uneven_firing_has_other_orders():
     values["layout"]["bank_angles_deg"] = [0, 90]
     throws = torques_of(values).on(NODES)[list(THROWS)]
     _, together = cycle_orders(throws.sum(axis=0), 80)
+
     assert (
         np.abs(together[4]) > 1000.0
     )  # order 2.5: the bank's own, no longer cancelled
@@ -105,6 +141,7 @@ def test_pump_pulses_follow_the_firing_and_the_load():
     pump = full.on(NODES)[45:65]
     _, together = cycle_orders(pump.sum(axis=0), 80)
     others = np.arange(1, 81) % 20 != 0
+
     assert np.abs(together[others]).max() < 1e-6 * np.abs(together).max()
     assert (
         pump.sum(axis=0).mean() < 1.5 * half.on(NODES)[45:65].sum(axis=0).mean() < 0.0
@@ -131,7 +168,10 @@ def pressure_file(folder, scale=1.0):
     computed = torques_of(option())
     path = folder / "measured.csv"
     table = np.column_stack(
-        [np.degrees(computed.angle), scale * computed.pressure * 1e-6]
+        [
+            np.degrees(computed.angle),
+            scale * computed.pressure * 1e-6,
+        ]
     )
     header = "crank_angle_deg,pressure_mpa"
     np.savetxt(path, table, delimiter=",", header=header, comments="")
@@ -145,18 +185,36 @@ def test_a_measured_pressure_gives_the_torque_back(tmp_path):
     assert_close(computed.on(NODES), burned.on(NODES), atol=1.0)
 
 
-def test_torques_that_contradict_the_pressure_are_refused(tmp_path):
+def test_torques_that_contradict_the_pressure_are_refused(
+    tmp_path,
+):
     measured, _ = pressure_file(tmp_path)
     (tmp_path / "weak").mkdir()
     weak, _ = pressure_file(tmp_path / "weak", scale=0.02)
     idle = changed("friction_mean_pressure_mpa", 0.0)
     idle.update(loads=None, injection_pump=None, valves=None)
     for values, torque, message in (
-        (weak, None, r"gives 281 N m, below the .* N m of friction and drives"),
-        (measured, 100.0, "which decides it; leave the torque out"),
+        (
+            weak,
+            None,
+            r"gives 281 N m, below the .* N m of friction and drives",
+        ),
+        (
+            measured,
+            100.0,
+            "which decides it; leave the torque out",
+        ),
         (option(), None, "a Wiebe cycle needs the brake torque"),
-        (option(), -10.0, r"the brake torque -10 N m is below the friction"),
-        (idle, 0.0, r"the torque of the gas, 0 N m with .* drives, is below the 2.4"),
+        (
+            option(),
+            -10.0,
+            r"the brake torque -10 N m is below the friction",
+        ),
+        (
+            idle,
+            0.0,
+            r"the torque of the gas, 0 N m with .* drives, is below the 2.4",
+        ),
     ):
         with pytest.raises(ConfigError, match=message):
             torques_of(values, torque=torque)
@@ -185,13 +243,21 @@ def test_torques_that_contradict_the_pressure_are_refused(tmp_path):
             [1.5],
             "excitation.throw_nodes = [1.5] is not a list of whole numbers",
         ),
-        ("valve_nodes.A", [1, 2], "excitation.valve_nodes.A has 2 nodes for 10 throws"),
+        (
+            "valve_nodes.A",
+            [1, 2],
+            "excitation.valve_nodes.A has 2 nodes for 10 throws",
+        ),
         (
             "valve_nodes.A",
             [67] * 10,
             "node 67 turns 1.475 times as fast as the crank; it needs 0.5",
         ),
-        ("valve_nodes.C", [], "excitation.valve_nodes: no bank 'C'; there are A, B"),
+        (
+            "valve_nodes.C",
+            [],
+            "excitation.valve_nodes: no bank 'C'; there are A, B",
+        ),
         (
             "valves.intake.cam.lift_mm",
             0,
@@ -272,14 +338,26 @@ def test_torques_that_contradict_the_pressure_are_refused(tmp_path):
             "much",
             "excitation.friction_mean_pressure_mpa = 'much' is not a number",
         ),
-        ("pressure.file", 3, "excitation.pressure.file = 3 is not text"),
-        ("pressure.kind", "otto", "excitation.pressure: unknown key 'kind'"),
+        (
+            "pressure.file",
+            3,
+            "excitation.pressure.file = 3 is not text",
+        ),
+        (
+            "pressure.kind",
+            "otto",
+            "excitation.pressure: unknown key 'kind'",
+        ),
         (
             "pressure.boost_pressure",
             1,
             "'boost_pressure' has the wrong unit; write it as 'boost_pressure_mpa'",
         ),
-        ("kind", "motor", "excitation.kind = 'motor'; allowed: engine"),
+        (
+            "kind",
+            "motor",
+            "excitation.kind = 'motor'; allowed: engine",
+        ),
         ("sound", 1, "excitation: unknown key 'sound'"),
         (
             "cylinder.bore_mm",
@@ -304,6 +382,7 @@ def test_toothed_wheels_are_read_by_name():
     nodes = {name: wheel.node for name, wheel in wheels.items()}
     assert nodes == {"flywheel": 14, "pump_end": 45}
     assert read_wheels(option(toothed_wheels=None)) == {}
+
     without_node = option()
     del without_node["toothed_wheels"]["flywheel"]["node"]
     for values, message in (
@@ -323,7 +402,10 @@ def test_missing_keys_are_named():
     del values["loads"]
     with pytest.raises(ConfigError, match="excitation: missing loads"):
         read_engine(values)
-    with pytest.raises(ConfigError, match="excitation = 3 must be a group of keys"):
+    with pytest.raises(
+        ConfigError,
+        match="excitation = 3 must be a group of keys",
+    ):
         read_engine(3)
 
 
@@ -335,4 +417,5 @@ def test_finer_cycles_give_the_same_torques():
     )
     _, one = cycle_orders(coarse.on(NODES), 40)
     _, other = cycle_orders(fine.on(NODES), 40)
+
     assert np.max(np.abs(one - other)) < 2e-3 * np.max(np.abs(other))

@@ -10,7 +10,12 @@ import pytest
 from chord_tables import Slices, as_chords, with_table
 from closeness import assert_close
 from lane_tools import advance
-from line_tools import constant_torques, law_at, pair_line, state_after
+from line_tools import (
+    constant_torques,
+    law_at,
+    pair_line,
+    state_after,
+)
 
 from gensig.driveline.time import _layout as layout
 from gensig.driveline.time.chords import sliced_pair_mesh
@@ -18,7 +23,10 @@ from gensig.driveline.time.course import constant_speed
 from gensig.driveline.time.line_mesh import pair_mesh
 from gensig.errors import ConfigError
 from gensig.faults.broken import MissingTooth
-from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
+from gensig.mesh.sliced.sliced_statics import (
+    chord_equilibrium,
+    chord_states,
+)
 from gensig.plan.request import read_request
 from gensig.systems.registry import read_sliced_pair
 
@@ -32,7 +40,14 @@ N_SAMPLES = 205
 def placed(make, table, **more):
     pair = table.pair
     direction = np.array([pair.pinion.base_radius, -pair.wheel.base_radius])
-    return make("m", table, direction=direction, roll_dof=0, damping=DAMPING, **more)
+    return make(
+        "m",
+        table,
+        direction=direction,
+        roll_dof=0,
+        damping=DAMPING,
+        **more,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +65,9 @@ def mesh(helical):
     rng = np.random.default_rng(4)
     counts = table.pair.pinion.n_teeth, table.pair.wheel.n_teeth
     return placed(
-        sliced_pair_mesh, table, errors=tuple(rng.normal(0, 2e-6, n) for n in counts)
+        sliced_pair_mesh,
+        table,
+        errors=tuple(rng.normal(0, 2e-6, n) for n in counts),
     )
 
 
@@ -62,7 +79,13 @@ class TestLaw:
         """
         table, force = helical
         rolls = np.linspace(0.05, 30.05, 61)
-        errors = dict(zip(("pinion_error", "wheel_error"), mesh.errors, strict=True))
+        errors = dict(
+            zip(
+                ("pinion_error", "wheel_error"),
+                mesh.errors,
+                strict=True,
+            )
+        )
         computed = chord_equilibrium(
             table,
             chord_states(table, rolls * table.pair.base_pitch, **errors),
@@ -72,6 +95,7 @@ class TestLaw:
             law_at(mesh, turned, approach)[0]
             for turned, approach in zip(rolls, computed.approach, strict=True)
         ]
+
         assert_close(forces, share * force, 1e-3)
 
     @pytest.mark.parametrize("approach", [2e-5, 6e-5, -1.5e-4])
@@ -86,19 +110,28 @@ class TestLaw:
                 for off in (-1e-7, 1e-7)
             )
             assert_close(
-                computed[layout.ALONG], -(above - below) / 2e-7, 1e-3, atol=1e-6
+                computed[layout.ALONG],
+                -(above - below) / 2e-7,
+                1e-3,
+                atol=1e-6,
             )
             below, above = (
                 law_at(mesh, turned, approach + off)[layout.STORED]
                 for off in (-1e-10, 1e-10)
             )
-            assert_close(computed[layout.FORCE], (above - below) / 2e-10, 1e-4)
+            assert_close(
+                computed[layout.FORCE],
+                (above - below) / 2e-10,
+                1e-4,
+            )
 
     def test_all_springs_of_a_pair_are_damped_by_its_first_touch(self, mesh):
         still = law_at(mesh, 0.4, 3e-5)
         fast = law_at(mesh, 0.4, 3e-5, rate=10.0)
         assert_close(
-            fast[layout.FORCE], (1.0 + 10.0 * DAMPING) * still[layout.FORCE], 1e-12
+            fast[layout.FORCE],
+            (1.0 + 10.0 * DAMPING) * still[layout.FORCE],
+            1e-12,
         )
         assert_close(law_at(mesh, 0.4, 3e-5, rate=-1e4)[layout.FORCE], 0.0)
 
@@ -187,7 +220,10 @@ class TestAgainstThePair:
     @classmethod
     def dynamics(cls, request, machine, dynamics_of):
         spur = machine(
-            {"mesh.friction_coefficient": 0.0, "mesh.points_per_pitch": 2048}
+            {
+                "mesh.friction_coefficient": 0.0,
+                "mesh.points_per_pitch": 2048,
+            }
         )
         table = Slices(spur, HELIX).table(DEPTH)
         if request.param == "missing tooth":
@@ -195,10 +231,20 @@ class TestAgainstThePair:
             kind[2] = 1
             doubled = {
                 name: np.concatenate(2 * [getattr(table, name)])
-                for name in ("compliance", "compliance_slope", "gap", "gap_slope")
+                for name in (
+                    "compliance",
+                    "compliance_slope",
+                    "gap",
+                    "gap_slope",
+                )
             }
             present = np.array([True, False])
-            table = replace(table, pinion_kind=kind, pinion_present=present, **doubled)
+            table = replace(
+                table,
+                pinion_kind=kind,
+                pinion_present=present,
+                **doubled,
+            )
         rng = np.random.default_rng(1)
         errors = {
             "pinion_error": rng.normal(0, 2e-6, 23),
@@ -217,9 +263,19 @@ class TestAgainstThePair:
             errors=(dynamics.pinion_error, dynamics.wheel_error),
         )
         q_1, v_1, motion = moved(pair_line(dynamics, mesh), dynamics)
-        start = dynamics.static_start(0.0), np.zeros(len(dynamics.dofs))
-        q, v, _ = advance(dynamics, *start, 1 / (51200 * STEPS), 0, STEPS * N_SAMPLES)
+        start = (
+            dynamics.static_start(0.0),
+            np.zeros(len(dynamics.dofs)),
+        )
+        q, v, _ = advance(
+            dynamics,
+            *start,
+            1 / (51200 * STEPS),
+            0,
+            STEPS * N_SAMPLES,
+        )
         direction = dynamics.approach_direction()
+
         assert motion.energy_residual < 1e-4
         assert_close(v_1, v, atol=2e-3 * np.abs(v).max())
         assert_close(q_1 @ direction, q @ direction, atol=5e-8)

@@ -12,9 +12,21 @@ from engine_cases import SPEED, TORQUE
 
 from gensig.driveline.engine_line import read_engine_line
 from gensig.driveline.in_time import tabulated_meshes
-from gensig.driveline.mesh_phase import first_slice_lead, start_phase, start_rolls
-from gensig.driveline.running import Governor, running_line, steady_course
-from gensig.driveline.teeth import ToothStart, neighbours, tooth_there
+from gensig.driveline.mesh_phase import (
+    first_slice_lead,
+    start_phase,
+    start_rolls,
+)
+from gensig.driveline.running import (
+    Governor,
+    running_line,
+    steady_course,
+)
+from gensig.driveline.teeth import (
+    ToothStart,
+    neighbours,
+    tooth_there,
+)
 from gensig.driveline.time.newmark import LineSolver
 from gensig.dynamics.mesh_statics import mean_mesh_stiffness
 from gensig.errors import ConfigError
@@ -24,7 +36,11 @@ from gensig.record.machines import read_machine
 from gensig.systems.run import Run, Start
 
 GOVERNOR = Governor(frequency=1.0, damping_ratio=0.7)
-SOLVER = LineSolver(sampling_rate=10240.0, oversampling=10, max_energy_residual=1e-3)
+SOLVER = LineSolver(
+    sampling_rate=10240.0,
+    oversampling=10,
+    max_energy_residual=1e-3,
+)
 RECORDS = (
     "experiment=engine_broken_tooth",
     "operating.duration_s=0.05",
@@ -48,17 +64,25 @@ def line_with(fault, *words):
 def simulated(record, *faults):
     applied = tuple(one for fault in faults for one in read_faults(fault))
     return record.simulate(
-        applied, start=Start(tooth_pinion=0, tooth_wheel=0, phase=0.0)
+        applied,
+        start=Start(tooth_pinion=0, tooth_wheel=0, phase=0.0),
     )
 
 
 @lru_cache(maxsize=4)
 def running(lateral, teeth):
     """Line of the engine at its rated point, and its motion over 0.15 s."""
-    words = f"system.lateral={lateral}", f"system.helical_meshes={teeth}"
+    words = (
+        f"system.lateral={lateral}",
+        f"system.helical_meshes={teeth}",
+    )
     words = *words, "mesh.n_slices=20"
     config = read_request(
-        ["system=engine_gear_train", "excitation=engine_v20", *words]
+        [
+            "system=engine_gear_train",
+            "excitation=engine_v20",
+            *words,
+        ]
     ).config
     engine = read_engine_line(config)
     own = tabulated_meshes(engine, config, SPEED, TORQUE)
@@ -83,6 +107,7 @@ def test_the_flywheel_hardly_feels_constant_stiffness():
         running("false", teeth) for teeth in ("constant", "sliced")
     )
     assert all(len(mesh.depth) == 1 for mesh in line.line.meshes)
+
     speed = motion.signals["speed", line.dof(14)]
     change = np.std(speed - sliced.signals["speed", line.dof(14)]) / np.std(speed)
     assert 1e-6 < change < 0.05
@@ -100,6 +125,7 @@ def test_our_stiffness_is_of_the_size_of_the_tables():
         for place, force in enumerate(line.mesh_force)
     ]
     odd = ratio.pop(line.machine.mesh_names.index("19/32"))
+
     assert_close(odd, 0.97, atol=0.05)
     assert 1.25 < min(ratio) < max(ratio) < 1.85
 
@@ -108,10 +134,15 @@ def test_a_fault_that_vanishes_is_the_sound_machine_and_a_missing_tooth_is_not()
     record = machine("system.record_mesh=[3,66]")
     fault = {"gear": "wheel", "tooth": 10}
     sound = simulated(record)
-    tiny = simulated(record, {"kind": "broken", "broken_height_mm": 0.0, **fault})
+    tiny = simulated(
+        record,
+        {"kind": "broken", "broken_height_mm": 0.0, **fault},
+    )
     gone = simulated(record, {"kind": "missing_tooth", **fault})
     atol = 1e-9 * np.abs(sound.acceleration).max()
+
     assert_close(tiny.acceleration, sound.acceleration, 1e-9, atol=atol)
+
     change = gone.acceleration[1] - sound.acceleration[1]
     assert np.std(change) > 0.01 * np.std(sound.acceleration[1])
     assert max(sound.integration_error, gone.integration_error) < 1e-3
@@ -133,7 +164,10 @@ def test_the_faulty_tooth_is_on_its_gear_in_all_its_meshes_and_nowhere_else(
     fault = {"kind": "missing_tooth", "gear": gear, "tooth": 10}
     record, line = line_with(fault, f"system.record_mesh={mesh}")
     names = record.engine.mesh_names
-    faulty = {names[record.mesh_number]: SIDES.index(gear), **others}
+    faulty = {
+        names[record.mesh_number]: SIDES.index(gear),
+        **others,
+    }
     for name, one in zip(names, line.meshes, strict=True):
         odd = {
             side: np.flatnonzero(kinds != np.bincount(kinds).argmax()).tolist()
@@ -147,22 +181,35 @@ def test_the_faulty_tooth_is_on_its_gear_in_all_its_meshes_and_nowhere_else(
 
 
 @pytest.mark.parametrize(
-    ("kind", "same", "other"), [("pitting", True, False), ("crack", True, True)]
+    ("kind", "same", "other"),
+    [("pitting", True, False), ("crack", True, True)],
 )
 def test_pits_stay_on_their_flank_and_cracks_are_felt_from_behind(kind, same, other):
     """Both mates of the crank gear meet one flank of it; the idler is driven on one and drives
     with the other.
     """
     faults = {
-        "pitting": {"pit_depth_mm": 0.2, "pit_width_mm": 5.0, "pit_length_mm": 1.0},
+        "pitting": {
+            "pit_depth_mm": 0.2,
+            "pit_width_mm": 5.0,
+            "pit_length_mm": 1.0,
+        },
         "crack": {
             "crack_depth_mm": 2.0,
             "crack_angle_deg": 70.0,
             "crack_start": "arc_mid",
         },
     }
-    for gear, name, expected in (("pinion", "3/18", same), ("wheel", "66/67", other)):
-        fault = {"kind": kind, "gear": gear, "tooth": 10, **faults[kind]}
+    for gear, name, expected in (
+        ("pinion", "3/18", same),
+        ("wheel", "66/67", other),
+    ):
+        fault = {
+            "kind": kind,
+            "gear": gear,
+            "tooth": 10,
+            **faults[kind],
+        }
         record, line = line_with(fault, "system.record_mesh=[3,66]")
         mesh = line.meshes[record.engine.mesh_names.index(name)]
         assert mesh.kinds[0].any() == expected
@@ -183,7 +230,8 @@ def test_a_tooth_comes_to_its_mates_when_the_gear_has_turned_from_one_to_the_oth
     meshes = drive.line.meshes
     teeth = 7, 5
     start = ToothStart(
-        teeth=teeth, phase=start_rolls(drive, turned)[place] / pairs[place].base_pitch
+        teeth=teeth,
+        phase=start_rolls(drive, turned)[place] / pairs[place].base_pitch,
     )
     for other, (here, there) in neighbours(drive, place).items():
         gear = (pairs[place].pinion, pairs[place].wheel)[here]
@@ -236,7 +284,11 @@ def test_meshes_stand_where_the_crank_puts_them():
 def test_slices_in_phase_are_refused():
     record = read_machine(
         read_request(
-            [*RECORDS, "system.record_mesh=[3,66]", "mesh.slices_in_phase=true"]
+            [
+                *RECORDS,
+                "system.record_mesh=[3,66]",
+                "mesh.slices_in_phase=true",
+            ]
         ).config
     )
     with pytest.raises(ConfigError, match="a line has the helix in"):

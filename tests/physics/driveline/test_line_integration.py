@@ -6,10 +6,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closeness import assert_close
-from line_tools import chain, constant_torques, order_of, state_after, steps
+from line_tools import (
+    chain,
+    constant_torques,
+    order_of,
+    state_after,
+    steps,
+)
 from scipy.linalg import eigh, expm
 
-from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
+from gensig.driveline.time.course import (
+    LineCourse,
+    ShaftTorque,
+    constant_speed,
+)
 from gensig.driveline.time.geared_line import GearedLine
 from gensig.driveline.time.newmark import integrate_line
 from gensig.dynamics.decimation import decimator
@@ -65,7 +75,11 @@ class TestLinear:
     def error(cls, line, start, torques, exact):
         def measured(n_steps):
             q, v, _ = state_after(
-                line, start, cls.DURATION, n_steps, torques=constant_torques(torques)
+                line,
+                start,
+                cls.DURATION,
+                n_steps,
+                torques=constant_torques(torques),
             )
             return np.linalg.norm(np.concatenate([q, v]) - exact) / np.linalg.norm(
                 exact
@@ -77,10 +91,15 @@ class TestLinear:
         assert error(40000) < 2e-6
 
     def test_order_two(self, error):
-        assert_close(order_of([error(n) for n in (2000, 4000, 8000)]), 2.0, atol=0.02)
+        assert_close(
+            order_of([error(n) for n in (2000, 4000, 8000)]),
+            2.0,
+            atol=0.02,
+        )
 
     @pytest.mark.parametrize(
-        ("is_damped", "n_steps"), [(False, 50), (False, 5000), (True, 5000)]
+        ("is_damped", "n_steps"),
+        [(False, 50), (False, 5000), (True, 5000)],
     )
     def test_energy_is_kept_without_damping_whatever_the_step(
         self, line, start, is_damped, n_steps
@@ -92,7 +111,9 @@ class TestLinear:
             0.5 * (speed @ line.mass @ speed + angle @ line.stiffness @ angle)
             for angle, speed in (start, (q, v))
         )
+
         assert motion.energy_residual < 1e-11
+
         if is_damped:
             assert last < 0.9 * first
         else:
@@ -114,6 +135,7 @@ class TestLinear:
         moved = tuple(np.linalg.solve(turn, part) for part in start)
         q, v, _ = state_after(line, start, self.DURATION, 3000)
         q_1, v_1, _ = state_after(other, moved, self.DURATION, 3000)
+
         assert_close(turn @ q_1, q, atol=1e-9 * np.abs(q).max())
         assert_close(turn @ v_1, v, atol=1e-9 * np.abs(v).max())
 
@@ -143,7 +165,11 @@ class TestTorquesAndCourse:
             steps(4000.0, 10),
             duration=2 * np.pi / SPEED * 10,
             lead_in=1.0,
-            channels=[("angle", 0), ("speed", 0), ("acceleration", 0)],
+            channels=[
+                ("angle", 0),
+                ("speed", 0),
+                ("acceleration", 0),
+            ],
         )
         rate = 2 * SPEED
         response = amplitude / (spring - inertia * rate**2 + 1j * damper * rate)
@@ -151,7 +177,11 @@ class TestTorquesAndCourse:
         for power, name in enumerate(("angle", "speed", "acceleration")):
             expected = ((1j * rate) ** power * response * np.exp(2j * angle)).real
             computed = motion.signals[name, 0]
-            assert_close(computed, expected, atol=5e-4 * np.abs(expected).max())
+            assert_close(
+                computed,
+                expected,
+                atol=5e-4 * np.abs(expected).max(),
+            )
 
     def test_the_twist_shifts_the_torque(self):
         """A table over the angle sees the angle itself, not the nominal one: a restoring slope is
@@ -178,6 +208,7 @@ class TestTorquesAndCourse:
             4000,
             torques=[ShaftTorque(dof=0, table=table)],
         )
+
         assert_close(q / start, 0.0, atol=1e-5)
         assert_close(v / start, -math.sqrt(slope / inertia), 1e-5)
 
@@ -185,21 +216,34 @@ class TestTorquesAndCourse:
     def test_a_run_up_needs_the_torque_of_the_inertias_and_no_more(self, given):
         """Without that torque the line stays behind at rest."""
         line = chain(5)
-        course = LineCourse(time=np.array([0.0, 0.2]), speed=np.array([50.0, 90.0]))
+        course = LineCourse(
+            time=np.array([0.0, 0.2]),
+            speed=np.array([50.0, 90.0]),
+        )
         torques = constant_torques(given * np.diag(line.mass) * 200.0)
         rest = np.zeros(5), np.zeros(5)
         q, v, _ = state_after(line, rest, 0.1, 2000, torques=torques, course=course)
         behind = (given - 1.0) * 200.0
+
         assert_close(v, behind * 0.1, 1e-9, atol=1e-12)
         assert_close(q, 0.5 * behind * 0.1**2, 1e-9, atol=1e-15)
 
     def test_a_factor_over_the_knots_is_a_torque_over_time(self):
         line = chain(1)
-        course = LineCourse(time=np.array([0.0, 0.1]), speed=np.array([50.0, 50.0]))
+        course = LineCourse(
+            time=np.array([0.0, 0.1]),
+            speed=np.array([50.0, 50.0]),
+        )
         ramp = ShaftTorque(dof=0, table=np.ones(1), factor=np.array([0.0, 3.0]))
         _, v, _ = state_after(
-            line, (np.zeros(1), np.zeros(1)), 0.1, 500, torques=[ramp], course=course
+            line,
+            (np.zeros(1), np.zeros(1)),
+            0.1,
+            500,
+            torques=[ramp],
+            course=course,
         )
+
         assert_close(v, 0.5 * 3.0 * 0.1 / line.mass[0, 0], 1e-9)
 
     def test_signals_are_low_passed_states(self):
@@ -227,5 +271,7 @@ class TestTorquesAndCourse:
                 atol=1e-5 * np.abs(start[0]).max(),
             )
             assert_close(
-                motion.signals["speed", 3][sample], v[3], atol=1e-4 * np.abs(v).max()
+                motion.signals["speed", 3][sample],
+                v[3],
+                atol=1e-4 * np.abs(v).max(),
             )

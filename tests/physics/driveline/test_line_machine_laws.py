@@ -10,7 +10,11 @@ from closeness import assert_close
 from engine_cases import SPEED, TORQUE
 
 from gensig.driveline.engine_line import read_engine_line
-from gensig.driveline.running import Governor, running_line, steady_course
+from gensig.driveline.running import (
+    Governor,
+    running_line,
+    steady_course,
+)
 from gensig.driveline.time.newmark import LineSolver
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
@@ -18,14 +22,21 @@ from gensig.sensing.manufacturing import nominal_gearbox
 from gensig.systems.run import Run
 
 GOVERNOR = Governor(frequency=1.0, damping_ratio=0.7)
-SOLVER = LineSolver(sampling_rate=10240.0, oversampling=10, max_energy_residual=1e-3)
+SOLVER = LineSolver(
+    sampling_rate=10240.0,
+    oversampling=10,
+    max_energy_residual=1e-3,
+)
 ENGINE = ("system=engine_gear_train", "excitation=engine_v20")
 RECORDS = (
     "experiment=engine_broken_tooth",
     "operating.duration_s=0.08",
     "sensing.snr_db=null",
 )
-CLOSED = ("system.backlash_um=0", "system.loss_factor.gear_mesh=0")
+CLOSED = (
+    "system.backlash_um=0",
+    "system.loss_factor.gear_mesh=0",
+)
 
 
 @lru_cache(maxsize=4)
@@ -39,7 +50,12 @@ def machine(*words):
 
 def deviations(line, nodes, settling, duration=0.15):
     channels = [("speed", line.dof(node)) for node in nodes]
-    motion = line.run(SOLVER, duration=duration, channels=channels, settling=settling)
+    motion = line.run(
+        SOLVER,
+        duration=duration,
+        channels=channels,
+        settling=settling,
+    )
     at = line.linear.orders * (line.turned + motion.nominal_angle[:, None])
     linear = [
         np.real(np.exp(1j * at) @ line.linear.speed_deviation[dof])
@@ -59,7 +75,10 @@ def test_without_play_it_is_the_linear_line():
     From the first sample on: it starts in the linear vibration, so that little has to settle.
     """
     whole = running_line(
-        engine(*CLOSED), steady_course(SPEED, TORQUE), governor=GOVERNOR, turned=2.0
+        engine(*CLOSED),
+        steady_course(SPEED, TORQUE),
+        governor=GOVERNOR,
+        turned=2.0,
     )
     for share, most in ((1.0, 0.15), (0.01, 0.003)):
         torques = tuple(replace(one, table=share * one.table) for one in whole.torques)
@@ -78,6 +97,7 @@ def test_with_play_its_teeth_part_and_its_energies_balance():
     line = running_line(engine(), steady_course(SPEED, TORQUE), governor=GOVERNOR)
     motion, computed, linear = deviations(line, (14, 45), settling=0.3)
     drive = line.machine.mesh_names.index("21/45")
+
     assert motion.contact_loss[drive] > 0.1
     assert motion.energy_residual < 1e-3
     assert_close(
@@ -103,25 +123,36 @@ def test_a_record_is_repeatable_and_turns_with_the_gear_ratio():
 def test_a_fine_wheel_without_errors_shows_the_shaft():
     words = [
         f"excitation.toothed_wheels.flywheel.{key}"
-        for key in ("eccentricity_error_deg=0", "tooth_error_deg=0")
+        for key in (
+            "eccentricity_error_deg=0",
+            "tooth_error_deg=0",
+        )
     ]
     record = machine(*words, "sensing.channels=[flywheel_speed]")
     line = record.line(Run(system=record, faults=()))
     motion = line.run(
-        SOLVER, duration=0.08, channels=[("speed", line.dof(14))], settling=0.3
+        SOLVER,
+        duration=0.08,
+        channels=[("speed", line.dof(14))],
+        settling=0.3,
     )
     seen = record.simulate().acceleration[0]
     exact = motion.signals["speed", line.dof(14)]
     inner = slice(20, -20)
+
     assert np.std(seen[inner] - exact[inner]) < 0.1 * np.std(exact)
 
 
 def test_supports_of_a_gearbox_reach_the_lateral_line():
-    record = machine("system.lateral=true", "sensing.channels=[wheel_x, wheel_y]")
+    record = machine(
+        "system.lateral=true",
+        "sensing.channels=[wheel_x, wheel_y]",
+    )
     run = Run(system=record, faults=())
     nominal = record.line(run)
     stiffer = replace(
-        nominal_gearbox(2), stiffness_factor=np.array([1.0, 1.0, 2.0, 1.0])
+        nominal_gearbox(2),
+        stiffness_factor=np.array([1.0, 1.0, 2.0, 1.0]),
     )
     scattered = record.line(replace(run, gearbox=stiffer))
     name = record.engine.drive.line.gears[
@@ -129,4 +160,5 @@ def test_supports_of_a_gearbox_reach_the_lateral_line():
     ].name
     at = nominal.matrices.names.index(f"{name} x")
     ratio = scattered.matrices.stiffness[at, at] / nominal.matrices.stiffness[at, at]
+
     assert_close(ratio, 2.0, 1e-6)

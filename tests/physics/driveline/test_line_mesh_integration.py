@@ -24,7 +24,10 @@ from scipy.integrate import solve_ivp
 from benchmarks._engine_line import engine_line, engine_torques
 from gensig.driveline.time.course import constant_speed
 from gensig.driveline.time.line_mesh import pair_mesh
-from gensig.driveline.time.newmark import integrate_line, static_start
+from gensig.driveline.time.newmark import (
+    integrate_line,
+    static_start,
+)
 from gensig.faults.broken import MissingTooth
 
 
@@ -49,7 +52,12 @@ class TestRippledMesh:
         course = constant_speed(400.0)
         start = static_start(line, course, torques), np.zeros(2)
         return lambda n_steps: state_after(
-            line, start, 0.02, n_steps, torques=torques, course=course
+            line,
+            start,
+            0.02,
+            n_steps,
+            torques=torques,
+            course=course,
         )
 
     def test_order_two(self, run):
@@ -70,7 +78,11 @@ class TestBacklash:
     DURATION = 0.02
     START = np.array([0.0, 0.0]), np.array([4.0, -1.0])
 
-    @pytest.fixture(scope="class", params=[0.0, 0.02], ids=["elastic", "damped"])
+    @pytest.fixture(
+        scope="class",
+        params=[0.0, 0.02],
+        ids=["elastic", "damped"],
+    )
     @classmethod
     def damping(cls, request):
         return request.param
@@ -85,14 +97,22 @@ class TestBacklash:
             rate = direction @ y[2:]
             force = 0.0
             if approach > 0:
-                force = max(0.0, STIFFNESS * approach * (1 + damping * rate))
+                force = max(
+                    0.0,
+                    STIFFNESS * approach * (1 + damping * rate),
+                )
             elif approach < -cls.BACKLASH:
                 behind = STIFFNESS * (-approach - cls.BACKLASH)
                 force = -max(0.0, behind * (1 - damping * rate))
             return np.concatenate([y[2:], -direction * force / INERTIAS])
 
         start = np.concatenate(cls.START)
-        options = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-15, "max_step": 5e-6}
+        options = {
+            "method": "DOP853",
+            "rtol": 1e-11,
+            "atol": 1e-15,
+            "max_step": 5e-6,
+        }
         return solve_ivp(slope, (0, cls.DURATION), start, **options).y[:, -1]
 
     @pytest.fixture(scope="class")
@@ -138,13 +158,19 @@ class TestAgainstThePair:
     STEPS = 64
     N_SAMPLES = 410
 
-    @pytest.fixture(scope="class", params=[(), (MissingTooth(gear="pinion", tooth=2),)])
+    @pytest.fixture(
+        scope="class",
+        params=[(), (MissingTooth(gear="pinion", tooth=2),)],
+    )
     @classmethod
     def dynamics(cls, request, machine, dynamics_of):
         rng = np.random.default_rng(1)
         faults = request.param
         pair = machine(
-            {"mesh.friction_coefficient": 0.0, "mesh.points_per_pitch": 2048}
+            {
+                "mesh.friction_coefficient": 0.0,
+                "mesh.points_per_pitch": 2048,
+            }
         )
         errors = {
             "pinion_error": rng.normal(0, 3e-6, 23),
@@ -181,6 +207,7 @@ class TestAgainstThePair:
         )
         direction = dynamics.approach_direction()
         scale = np.abs(v).max()
+
         assert_close(v_1, v, atol=2e-4 * scale)
         assert_close(q_1 @ direction, q @ direction, atol=2e-8)
         assert motion.energy_residual < 1e-4
@@ -227,6 +254,7 @@ class TestLowRank:
         (q, v, motion), (q_1, v_1, _) = (
             state_after(line, start, duration, n_steps) for line in (engine, welded)
         )
+
         assert_close(q, q_1, atol=1e-8 * np.abs(q_1).max())
         assert_close(v, v_1, atol=1e-8 * np.abs(v_1).max())
         assert motion.energy_residual < 1e-6
@@ -245,7 +273,11 @@ class TestEngine:
                 engine_torques(),
                 steps(10240.0, oversampling),
                 duration=duration,
-                channels=[("speed", 13), ("speed", 42), ("mesh_force", 5)],
+                channels=[
+                    ("speed", 13),
+                    ("speed", 42),
+                    ("mesh_force", 5),
+                ],
             )
 
         return run

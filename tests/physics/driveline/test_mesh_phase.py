@@ -40,7 +40,10 @@ def train(config, tmp_path):
             f"{place + 1},{z},2,20,0,20,{x}"
             for place, (z, x) in enumerate(zip(teeth, shifts, strict=True))
         ]
-        for name, lines in (("line.csv", rows), ("gears.csv", gears)):
+        for name, lines in (
+            ("line.csv", rows),
+            ("gears.csv", gears),
+        ):
             (tmp_path / name).write_text("\n".join(lines), encoding="utf-8")
         files = {
             "shafting_csv": str(tmp_path / "line.csv"),
@@ -62,7 +65,8 @@ def misfit(line, turned=0.0):
     computed = []
     for mesh, pair in zip(line.line.meshes, line.pairs, strict=True):
         sense = math.copysign(
-            1.0, line.line.speed_ratio[line.line.gears[mesh.driving].node]
+            1.0,
+            line.line.speed_ratio[line.line.gears[mesh.driving].node],
         )
         tilt = sense * pair.working_pressure_angle
         one = (
@@ -87,7 +91,11 @@ def from_whole(value):
 TRAINS = [
     ((20, 33), (0.0,), None),
     ((21, 34, 27), (15.0, -70.0), None),
-    ((20, 33, 24, 41), (200.0, 95.0, 10.0), (0.3, 0.1, -0.05, 0.2)),
+    (
+        (20, 33, 24, 41),
+        (200.0, 95.0, 10.0),
+        (0.3, 0.1, -0.05, 0.2),
+    ),
 ]
 
 
@@ -105,7 +113,17 @@ def test_flanks_touch_in_every_mesh(
 def test_the_engine_touches_everywhere_too():
     line = read_drive_line(read_request(["system=engine_gear_train"]).config)
     assert_close(from_whole(misfit(line, 1.0)), 0.0, atol=1e-9)
-    assert len(set(np.round(start_rolls(line) / line.pairs[0].base_pitch, 3))) > 4
+    assert (
+        len(
+            set(
+                np.round(
+                    start_rolls(line) / line.pairs[0].base_pitch,
+                    3,
+                )
+            )
+        )
+        > 4
+    )
 
 
 @pytest.mark.parametrize(("z", "expected"), [(33, 0.0), (34, 0.5), (35, 0.0)])
@@ -124,6 +142,7 @@ def test_rolls_advance_as_the_meshing_frequencies_say(train):
     line = train(*TRAINS[2])
     pitch = np.array([pair.base_pitch for pair in line.pairs])
     gone = (start_rolls(line, 0.1) - start_rolls(line)) / pitch
+
     assert_close(
         from_whole(gone - 0.1 / (2.0 * math.pi) * np.array(line.mesh_orders)),
         0.0,
@@ -136,7 +155,11 @@ def test_rolls_advance_as_the_meshing_frequencies_say(train):
 def test_gears_on_one_shaft_have_a_tooth_at_one_angle():
     line = read_drive_line(read_request(["system=two_stage_gearbox"]).config)
     angles = dict(
-        zip((gear.name for gear in line.line.gears), tooth_angles(line), strict=True)
+        zip(
+            (gear.name for gear in line.line.gears),
+            tooth_angles(line),
+            strict=True,
+        )
     )
     assert angles["Input pinion"] == 0.0
     assert angles["Idler gear 1"] == angles["Idler gear 2"]

@@ -10,7 +10,10 @@ import pytest
 from closeness import assert_close
 
 from gensig.driveline.engine_line import read_engine_line
-from gensig.driveline.time.newmark import LineSolver, integrate_line
+from gensig.driveline.time.newmark import (
+    LineSolver,
+    integrate_line,
+)
 from gensig.errors import StepError
 from gensig.faults.registry import read_faults
 from gensig.plan.request import read_request
@@ -20,11 +23,22 @@ from gensig.systems.run import Run, Start
 RPM = np.pi / 30.0
 SPEED = 1746.0 * RPM
 TORQUE = 60.0
-SOLVER = LineSolver(sampling_rate=10240.0, oversampling=12, max_energy_residual=1e-3)
+SOLVER = LineSolver(
+    sampling_rate=10240.0,
+    oversampling=12,
+    max_energy_residual=1e-3,
+)
 MOTOR = ("system=two_stage_gearbox", "excitation=motor_and_load")
-RECORDS = ("experiment=two_stage", "operating.duration_s=0.2", "sensing.snr_db=null")
+RECORDS = (
+    "experiment=two_stage",
+    "operating.duration_s=0.2",
+    "sensing.snr_db=null",
+)
 TEETH = {"3/4": (32, 96), "5/6": (48, 80)}
-RATIO = {"3/4": 1.0, "5/6": 1.0 / 3.0}  # of the driving gear's speed to the motor's
+RATIO = {
+    "3/4": 1.0,
+    "5/6": 1.0 / 3.0,
+}  # of the driving gear's speed to the motor's
 RIPPLE = "excitation.motor.torque_ripple={share: 0.1, order: 6}"
 FAN = "excitation.loads={fan: {node: 4, law: quadratic, torque_nm: 9}}"
 
@@ -40,7 +54,8 @@ def machine(*words):
 
 def simulated(record, *faults, start=None):
     return record.simulate(
-        tuple(one for fault in faults for one in read_faults(fault)), start=start
+        tuple(one for fault in faults for one in read_faults(fault)),
+        start=start,
     )
 
 
@@ -56,6 +71,7 @@ def test_an_even_line_has_the_static_torques_of_its_ratios():
     for place, name in enumerate(line.mesh_names):
         radius = line.drive.pairs[place].pinion.base_radius
         assert_close(force[place] * radius, TORQUE / RATIO[name], 1e-9)
+
     assert np.abs(amplitudes).max() < 1e-9 * force.max()
     assert response.fluctuation().max() < 1e-9
 
@@ -70,7 +86,11 @@ def test_power_in_is_power_out_and_losses():
             for place, number in enumerate(line.drive.numbers)
         }
         assert_close(power[8], -TORQUE * speed, 1e-12)
-        assert_close(power[4], -9.0 * (speed / SPEED) ** 2 * speed / 3.0, 1e-12)
+        assert_close(
+            power[4],
+            -9.0 * (speed / SPEED) ** 2 * speed / 3.0,
+            1e-12,
+        )
         assert_close(power[1], -power[8] - power[4], 1e-12)
 
 
@@ -88,33 +108,53 @@ def test_in_time_the_mean_forces_stay_and_the_energies_balance():
         force = motion.signals["mesh_force", place]
         radius = line.machine.drive.pairs[place].pinion.base_radius
         assert_close(force.mean() * radius, TORQUE / RATIO[name], 0.01)
+
     assert np.abs(motion.signals["speed", line.dof(8)]).max() < 0.01 * SPEED / 5.0
     assert not motion.contact_loss.any()  # it does not rattle
     assert motion.energy_residual < 1e-3
 
 
 @pytest.mark.parametrize("speed_rpm", [900.0, 1500.0])
-def test_energies_balance_where_steps_meet_every_pitch_at_the_same_places(speed_rpm):
+def test_energies_balance_where_steps_meet_every_pitch_at_the_same_places(
+    speed_rpm,
+):
     """Steps in a pitch: 256 and 153.6, of 512 cells each; an even line rests on such a
     speed.
     """
-    record = machine("operating.duration_s=0.3", f"operating.speed_rpm={speed_rpm}")
+    record = machine(
+        "operating.duration_s=0.3",
+        f"operating.speed_rpm={speed_rpm}",
+    )
     motion = record.line(Run(system=record, faults=())).run(
-        SOLVER, duration=0.3, channels=[("mesh_force", 0)], settling=0.3
+        SOLVER,
+        duration=0.3,
+        channels=[("mesh_force", 0)],
+        settling=0.3,
     )
     assert motion.energy_residual < 3e-4
 
 
 def test_a_record_whose_steps_are_too_long_is_made_with_half_of_them():
-    words = ["operating.speed_rpm=2400", "operating.duration_s=0.05"]
+    words = [
+        "operating.speed_rpm=2400",
+        "operating.duration_s=0.05",
+    ]
     short, long = (machine(*words, f"solver.oversampling={steps}") for steps in (8, 4))
     line = long.line(Run(system=long, faults=()))
     as_told = (
         replace(SOLVER, oversampling=4),
         {"duration": 0.05, "channels": [("speed", 0)]},
     )
+
     with pytest.raises(StepError, match="the energy balance misses"):
-        integrate_line(line.line, line.course, line.torques, as_told[0], **as_told[1])
+        integrate_line(
+            line.line,
+            line.course,
+            line.torques,
+            as_told[0],
+            **as_told[1],
+        )
+
     computed = simulated(long)
     assert computed.integration_error < 1e-3
     np.testing.assert_array_equal(computed.acceleration, simulated(short).acceleration)
@@ -124,7 +164,8 @@ def test_a_record_whose_steps_are_too_long_is_made_with_half_of_them():
 def test_a_missing_tooth_is_evident_once_a_turn_of_its_gear(name):
     """The record less its sound twin is large near the tooth and nowhere else, turn by turn."""
     record = machine(
-        "operating.duration_s=1", f"system.record_mesh=[{name.replace('/', ',')}]"
+        "operating.duration_s=1",
+        f"system.record_mesh=[{name.replace('/', ',')}]",
     )
     start = Start(tooth_pinion=0, tooth_wheel=0, phase=0.0)
     sound = simulated(record, start=start)
@@ -140,7 +181,8 @@ def test_a_missing_tooth_is_evident_once_a_turn_of_its_gear(name):
 
 
 @pytest.mark.parametrize(
-    ("law", "exponent"), [("constant", 0), ("linear", 1), ("quadratic", 2)]
+    ("law", "exponent"),
+    [("constant", 0), ("linear", 1), ("quadratic", 2)],
 )
 def test_a_run_up_follows_its_course_and_its_load_the_law(law, exponent):
     record = machine(
@@ -164,6 +206,7 @@ def test_a_run_up_follows_its_course_and_its_load_the_law(law, exponent):
     given = motion.signals["mesh_force", 0] * record.pair.pinion.base_radius
     for part in (slice(500, 1500), slice(-1500, -500)):
         assert_close(given[part].mean(), taken[part].mean(), 0.02)
+
     assert np.abs(motion.signals[load]).max() < 0.2
 
 
@@ -176,9 +219,11 @@ def test_slip_damps_the_rigid_motion_and_ripple_shakes_at_its_order():
         slope[1],
         1e-6,
     )
+
     response = line.response(SPEED, TORQUE)
     lines = np.abs(response.angle[0])
     assert response.orders[int(lines.argmax())] == 6.0
     assert np.sort(lines)[-2] < 1e-9 * lines.max()
+
     stiff = driven(RIPPLE, "excitation.motor.slip=0.001").response(SPEED, TORQUE)
     assert stiff.fluctuation()[0] < 0.7 * response.fluctuation()[0]

@@ -6,9 +6,15 @@ import numpy as np
 import pytest
 from closeness import assert_close
 
-from gensig.driveline.drive_line import drive_line_of_pair, read_drive_line
+from gensig.driveline.drive_line import (
+    drive_line_of_pair,
+    read_drive_line,
+)
 from gensig.driveline.linear.matrices import line_matrices
-from gensig.driveline.linear.modal import natural_modes, with_viscous_losses
+from gensig.driveline.linear.modal import (
+    natural_modes,
+    with_viscous_losses,
+)
 from gensig.driveline.linear.shaft_line import (
     GearMesh,
     LineGear,
@@ -26,7 +32,10 @@ LINES = (
     "pair",
     "pair_with_rotors",
 )
-ROTORS = {"system.motor.inertia_kg_m2": 0.01, "system.load.inertia_kg_m2": 0.03}
+ROTORS = {
+    "system.motor.inertia_kg_m2": 0.01,
+    "system.load.inertia_kg_m2": 0.03,
+}
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +43,12 @@ def lines(machine):
     engine, gearbox = (
         [
             read_drive_line(
-                read_request([f"system={name}", f"system.lateral={lateral}"]).config
+                read_request(
+                    [
+                        f"system={name}",
+                        f"system.lateral={lateral}",
+                    ]
+                ).config
             )
             for lateral in ("false", "true")
         ]
@@ -55,28 +69,44 @@ def test_a_free_line_has_one_rigid_mode_in_the_gear_ratios(line):
     assert computed.n_rigid == 1
     assert computed.frequency[0] == 0.0
     assert np.all(np.diff(computed.frequency) >= 0.0)
+
     turning = (matrices.expand @ computed.shapes[0])[: len(line.numbers)]
     assert_close(turning / turning[0], np.abs(line.line.speed_ratio), 1e-12)
+
     scale = (
         np.abs(matrices.whole_stiffness).sum(axis=1) * np.abs(computed.shapes[0]).max()
     )
     assert np.all(np.abs(matrices.whole_stiffness @ computed.shapes[0]) < 1e-12 * scale)
+
     wrong = computed.shapes[0].copy()
     wrong[1] *= 1.01
     assert not np.all(np.abs(matrices.whole_stiffness @ wrong) < 1e-6 * scale)
 
 
-def test_matrices_are_symmetric_and_store_no_negative_energy(line):
+def test_matrices_are_symmetric_and_store_no_negative_energy(
+    line,
+):
     for merge in (False, True):
         one = with_viscous_losses(line.matrices(merge_rigid=merge))
-        for matrix in (one.mass, one.stiffness, one.damping, one.whole_stiffness):
-            assert_close(matrix, matrix.T, atol=1e-12 * max(1.0, np.abs(matrix).max()))
+        for matrix in (
+            one.mass,
+            one.stiffness,
+            one.damping,
+            one.whole_stiffness,
+        ):
+            assert_close(
+                matrix,
+                matrix.T,
+                atol=1e-12 * max(1.0, np.abs(matrix).max()),
+            )
             assert np.linalg.eigvalsh(matrix).min() > -1e-10 * max(
                 1.0, np.abs(matrix).max()
             )
 
 
-def test_modes_are_orthogonal_and_hold_as_much_strain_as_kinetic_energy(line):
+def test_modes_are_orthogonal_and_hold_as_much_strain_as_kinetic_energy(
+    line,
+):
     computed = line.modes()
     matrices = line.matrices()
     assert_close(
@@ -84,6 +114,7 @@ def test_modes_are_orthogonal_and_hold_as_much_strain_as_kinetic_energy(line):
         np.eye(len(computed.shapes)),
         atol=1e-8,
     )
+
     square = (2.0 * np.pi * computed.frequency) ** 2
     strain = computed.shapes @ matrices.whole_stiffness @ computed.shapes.T
     assert_close(strain, np.diag(square), atol=1e-8 * square.max())
@@ -100,14 +131,18 @@ def test_equal_loss_factors_damp_every_mode_by_half_of_it(lines):
         mesh_loss_factor=np.full_like(matrices.mesh_stiffness, 0.06),
     )
     computed = natural_modes(uniform)
+
     assert_close(computed.damping_ratio[1:], 0.03, 1e-5)
     assert computed.damping_ratio[0] == 0.0
 
 
-def test_viscous_losses_damp_each_mode_as_its_loss_factors_do(lines):
+def test_viscous_losses_damp_each_mode_as_its_loss_factors_do(
+    lines,
+):
     matrices = lines["gearbox"].matrices(merge_rigid=True)
     shafts_only = replace(
-        matrices, mesh_loss_factor=np.zeros_like(matrices.mesh_stiffness)
+        matrices,
+        mesh_loss_factor=np.zeros_like(matrices.mesh_stiffness),
     )
     ratio = natural_modes(shafts_only).damping_ratio
     viscous = with_viscous_losses(shafts_only)
@@ -119,6 +154,7 @@ def test_viscous_losses_damp_each_mode_as_its_loss_factors_do(lines):
     rates = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-k, -c]]))
     ringing = rates[rates.imag > 1.0]
     ringing = ringing[np.argsort(np.abs(ringing))]
+
     assert_close(-ringing.real / np.abs(ringing), ratio[1:], 1e-6)
     assert_close(
         viscous.damping @ matrices.rigid.T,
@@ -136,13 +172,28 @@ def test_a_mesh_on_its_own_gets_half_of_its_loss_factor():
 
 def two_discs(loss_factor=0.0):
     gears = [
-        LineGear(name=name, node=node, n_teeth=count, base_radius=0.47 * 2e-3 * count)
+        LineGear(
+            name=name,
+            node=node,
+            n_teeth=count,
+            base_radius=0.47 * 2e-3 * count,
+        )
         for node, (name, count) in enumerate((("a", 20), ("b", 50)))
     ]
     return ShaftLine(
-        nodes=(Node(name="a", inertia=1e-3), Node(name="b", inertia=2e-2)),
+        nodes=(
+            Node(name="a", inertia=1e-3),
+            Node(name="b", inertia=2e-2),
+        ),
         gears=tuple(gears),
-        meshes=(GearMesh(driving=0, driven=1, stiffness=2e8, loss_factor=loss_factor),),
+        meshes=(
+            GearMesh(
+                driving=0,
+                driven=1,
+                stiffness=2e8,
+                loss_factor=loss_factor,
+            ),
+        ),
     )
 
 
@@ -153,8 +204,11 @@ def test_two_discs_in_mesh_have_the_textbook_frequency():
         for gear, node in zip(line.gears, line.nodes, strict=True)
     )
     computed = natural_modes(line_matrices(line))
+
     assert_close(
-        computed.frequency, [0.0, np.sqrt(2e8 / equivalent) / (2.0 * np.pi)], 1e-12
+        computed.frequency,
+        [0.0, np.sqrt(2e8 / equivalent) / (2.0 * np.pi)],
+        1e-12,
     )
 
 
@@ -185,11 +239,16 @@ def test_a_geared_line_has_the_frequencies_of_the_line_referred_to_one_shaft():
         shafts=tuple(
             Shaft(first=place, second=place + 1, stiffness=value)
             for place, value in enumerate(
-                (springs[0], springs[1] * a.base_radius**2, springs[2] * ratio**2)
+                (
+                    springs[0],
+                    springs[1] * a.base_radius**2,
+                    springs[2] * ratio**2,
+                )
             )
         ),
     )
     one, other = (natural_modes(line_matrices(line)) for line in (geared, referred))
+
     assert_close(one.frequency, other.frequency, 1e-9)
     assert_close(one.kinetic_share, other.kinetic_share, atol=1e-9)
 
@@ -202,6 +261,7 @@ def test_merging_compounds_takes_only_what_they_alone_do(lines):
     as_printed, merged = (natural_modes(one).frequency for one in matrices)
     assert len(as_printed) == 67
     assert len(merged) == 65
+
     low = as_printed < 5e3
     assert_close(merged[: low.sum()], as_printed[low], 1e-3)
     assert as_printed[-1] > 8e4
@@ -229,6 +289,7 @@ def test_stiff_supports_leave_the_torsional_line(lines):
             line_matrices(replace(lateral, gears=gears), lateral=True)
         ).frequency[:12]
         apart.append(np.abs(computed[1:] / torsion[1:] - 1.0).max())
+
     assert apart[0] > 0.02
     assert apart[1] < 0.02 * 0.2
     assert apart[2] < 1e-4
@@ -250,12 +311,25 @@ def test_the_single_pair_is_the_same_code_with_two_nodes(machine, dynamics_of, r
 
     stiffness = own.stiffness.copy()
     stiffness[driver, driver] -= dynamics.drive_stiffness
+
     assert_close(np.diag(matrices.mass), own.mass[order], 1e-14)
-    assert_close(matrices.stiffness, stiffness[both], 1e-9, atol=1e-9 * stiffness.max())
+    assert_close(
+        matrices.stiffness,
+        stiffness[both],
+        1e-9,
+        atol=1e-9 * stiffness.max(),
+    )
+
     damping = matrices.damping - own.damping[both]
     damping[order.index(driver), order.index(driver)] = 0.0
     assert_close(damping, 0.0, atol=1e-12 * own.damping.max())
+
     direction = dynamics.approach_direction()
-    assert_close(matrices.directions[0], direction[order], 1e-12, atol=1e-15)
+    assert_close(
+        matrices.directions[0],
+        direction[order],
+        1e-12,
+        atol=1e-15,
+    )
     assert matrices.mesh_stiffness == [dynamics.mean_mesh_stiffness]
     assert matrices.mesh_damping == [dynamics.mesh_damping]

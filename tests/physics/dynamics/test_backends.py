@@ -6,8 +6,15 @@ import numpy as np
 import pytest
 from plain_motion import at_rest, equations, solved
 
-from gensig.dynamics.backends.base import Backend, Integration, Motions
-from gensig.dynamics.backends.registry import BACKENDS, DEFAULT_BACKEND
+from gensig.dynamics.backends.base import (
+    Backend,
+    Integration,
+    Motions,
+)
+from gensig.dynamics.backends.registry import (
+    BACKENDS,
+    DEFAULT_BACKEND,
+)
 from gensig.dynamics.decimation import decimator, in_band_error
 from gensig.dynamics.integrator import (
     Solver,
@@ -93,7 +100,13 @@ def record(machine):
         system = machine({**QUICK, **changes})
         system = replace(system, solver=replace(system.solver, backend=backend))
         return simulate_together(
-            [Run(system=system, faults=(), start=Start(phase=0.3))]
+            [
+                Run(
+                    system=system,
+                    faults=(),
+                    start=Start(phase=0.3),
+                )
+            ]
         )[0]
 
     return simulated
@@ -109,6 +122,7 @@ def test_both_backends_agree(record, lsoda):
         in_band_error(each.acceleration[None], exact, 51200.0)[0]
         for each in (core, damped)
     )
+
     assert 0.0 < error < ACCURACY < 0.2 * shown
     assert np.abs(core.shaft_angle - other.shaft_angle).max() < 1e-6
     assert abs(core.mean_speed - other.mean_speed) < 1e-5 * core.mean_speed
@@ -119,13 +133,21 @@ def test_limits_are_those_of_the_backend(machine, dynamics_of, record, lsoda):
     dynamics = dynamics_of(machine())
     core = Solver(oversampling=2, precision="float64")
     other = replace(core, backend=lsoda)
+
     with pytest.raises(SimulationError, match="makes internal steps of"):
         check_machine(dynamics, core, 1e4)
+
     check_machine(dynamics, other, 1e4)
     with pytest.raises(SimulationError, match="lsoda: 100 Hz is too slow"):
         check_machine(dynamics, other, 100.0)
+
     solvers = core, replace(core, precision="float32"), other
-    assert [records_together(solver) for solver in solvers] == [8, 16, 1]
+    assert [records_together(solver) for solver in solvers] == [
+        8,
+        16,
+        1,
+    ]
+
     failed = record(lsoda, **{"sensing.sampling_rate_hz": 8000})
     assert str(failed) == "lsoda: 8000 Hz is too slow"
 

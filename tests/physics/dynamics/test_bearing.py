@@ -21,7 +21,11 @@ from gensig.dynamics.bearing import (
 from gensig.errors import ConfigError
 from gensig.material import Material
 
-STEEL = Material(youngs_modulus=206e9, poisson_ratio=0.3, density_kg_per_m3=7850)
+STEEL = Material(
+    youngs_modulus=206e9,
+    poisson_ratio=0.3,
+    density_kg_per_m3=7850,
+)
 SMALL = BallBearing(
     n_balls=8,
     ball_diameter=6.746e-3,
@@ -30,7 +34,12 @@ SMALL = BallBearing(
     outer_groove_conformity=0.52,
     radial_clearance=0.0,
 )
-LARGE = replace(SMALL, n_balls=9, ball_diameter=7.94e-3, pitch_diameter=39.04e-3)
+LARGE = replace(
+    SMALL,
+    n_balls=9,
+    ball_diameter=7.94e-3,
+    pitch_diameter=39.04e-3,
+)
 LOOSE = replace(SMALL, radial_clearance=10e-6)
 TIGHT = replace(SMALL, radial_clearance=-5e-6)
 SHAFT = Shaft(diameter=18e-3, span=80e-3)
@@ -50,9 +59,19 @@ class TestHertz:
         modulus = STEEL.youngs_modulus / (2 * (1 - 0.3**2))
         expected = 4.0 / 3.0 * modulus * math.sqrt(radius / 2)
         curvatures = (1 / radius,) * 4
-        assert_close(point_contact_coefficient(curvatures, STEEL), expected, 1e-9)
+
+        assert_close(
+            point_contact_coefficient(curvatures, STEEL),
+            expected,
+            1e-9,
+        )
+
         nearly = (*curvatures[:3], 1.001 / radius)
-        assert_close(point_contact_coefficient(nearly, STEEL), expected, 1e-3)
+        assert_close(
+            point_contact_coefficient(nearly, STEEL),
+            expected,
+            1e-3,
+        )
 
     @BOTH
     @pytest.mark.parametrize("race", ["inner", "outer"])
@@ -66,6 +85,7 @@ class TestHertz:
         modulus = STEEL.youngs_modulus / (1 - 0.3**2)
         root = math.sqrt(second / (4.5 * (2 * ball + along + across) * first**3))
         coefficient = point_contact_coefficient((ball, ball, along, across), STEEL)
+
         assert ratio > 10
         assert_close(coefficient, math.pi * kappa * modulus * root, 0.03)
 
@@ -83,10 +103,17 @@ class TestEquilibrium:
         state = equilibrium(bearing, load)
         balls = np.arange(bearing.n_balls)
         angle = cage_positions(bearing)[:, None] + 2 * np.pi * balls / bearing.n_balls
-        assert_close((state.ball_load * np.cos(angle)).sum(axis=1), load, 1e-9)
+
+        assert_close(
+            (state.ball_load * np.cos(angle)).sum(axis=1),
+            load,
+            1e-9,
+        )
+
         across = (state.ball_load * np.sin(angle)).sum(axis=1)
         assert_close(across, 0.0, atol=1e-9 * load)
         assert np.all(state.ball_load >= 0.0)
+
         if bearing is not TIGHT:
             assert np.all(state.ball_load[np.cos(angle) < -0.2] == 0.0)
 
@@ -95,15 +122,28 @@ class TestEquilibrium:
         low, here, high = (equilibrium(bearing, 460.0 + d) for d in (-0.01, 0.0, 0.01))
         compliance = np.linalg.inv(here.stiffness)[:, :, 1]
         moved = (high.displacement - low.displacement) / 0.02
-        assert_close(moved, compliance, 1e-3, atol=1e-4 * np.abs(compliance).max())
+        assert_close(
+            moved,
+            compliance,
+            1e-3,
+            atol=1e-4 * np.abs(compliance).max(),
+        )
 
     def test_stribeck(self):
         """A ball on the load's line carries 4.37 F / Z without clearance, about 5 F / Z with it."""
-        for n_balls, tolerance in ((8, 0.02), (9, 0.02), (20, 0.005)):
+        for n_balls, tolerance in (
+            (8, 0.02),
+            (9, 0.02),
+            (20, 0.005),
+        ):
             bearing = replace(SMALL, n_balls=n_balls, pitch_diameter=80e-3)
             largest = equilibrium(bearing, 500.0, 0.0).ball_load.max()
             assert_close(largest * n_balls / 500.0, 4.37, tolerance)
-        assert_close(equilibrium(LOOSE, 500.0, 0.0).ball_load.max() * 8 / 500.0, 5, 0.1)
+        assert_close(
+            equilibrium(LOOSE, 500.0, 0.0).ball_load.max() * 8 / 500.0,
+            5,
+            0.1,
+        )
 
 
 class TestStiffness:
@@ -117,8 +157,14 @@ class TestStiffness:
         product = bearing.ball_diameter / inch * load / pound * n**2
         gargiulo = 0.0325e6 * product ** (1 / 3) * pound / inch
         across, along = bearing_stiffness(bearing, STEEL, load)
+
         assert_close(along, gargiulo, 0.1)
-        assert_close(along, 1.5 * load / palmgren(5 * load / n, bearing), 0.1)
+        assert_close(
+            along,
+            1.5 * load / palmgren(5 * load / n, bearing),
+            0.1,
+        )
+
         deflection = (load / ball_coefficient(bearing, STEEL)) ** (2 / 3)
         assert_close(deflection, palmgren(load, bearing), 0.1)
         assert 0.0 < across < along
@@ -129,6 +175,7 @@ class TestStiffness:
             np.array(bearing_stiffness(bearing, STEEL, load)) for load in (50.0, 400.0)
         )
         assert_close(high / low, 2.0, 1e-6)
+
         loose = replace(bearing, radial_clearance=10e-6)
         low, high = (bearing_stiffness(loose, STEEL, load)[0] for load in (50.0, 400.0))
         assert high / low > 2.2
@@ -139,12 +186,16 @@ class TestStiffness:
         across, along = bearing_stiffness(many, STEEL, 460.0)
         assert_close(across / along, 2 / 3, 2e-3)
 
-    def test_strong_preload_is_isotropic_and_clearance_softens(self):
+    def test_strong_preload_is_isotropic_and_clearance_softens(
+        self,
+    ):
         tight = replace(SMALL, radial_clearance=-20e-6)
         across, along = bearing_stiffness(tight, STEEL, 1.0)
         assert_close(across, along, 1e-4)
+
         across, along = bearing_stiffness(tight, STEEL, 3000.0)
         assert abs(along / across - 1) > 0.02
+
         clearances = [replace(SMALL, radial_clearance=p) for p in (0.0, 5e-6, 20e-6)]
         softer = [bearing_stiffness(bearing, STEEL, 460.0)[0] for bearing in clearances]
         assert softer[0] > softer[1] > softer[2]
@@ -156,13 +207,21 @@ def test_a_support_is_two_bearings_in_series_with_a_beam(span):
     bearings = bearing_stiffness(SMALL, STEEL, 460.0)
     beam = 48 * 206e9 * math.pi * 18e-3**4 / 64 / span**3
     expected = [2 * k * beam / (2 * k + beam) for k in bearings]
-    assert_close(support_stiffness(SMALL, shaft, STEEL, 920.0), expected, 1e-9)
+    assert_close(
+        support_stiffness(SMALL, shaft, STEEL, 920.0),
+        expected,
+        1e-9,
+    )
 
 
 @pytest.mark.parametrize(
     ("part", "changes", "text"),
     [
-        (SMALL, {"n_balls": 3}, "bearing.n_balls = 3 must lie in 5..60"),
+        (
+            SMALL,
+            {"n_balls": 3},
+            "bearing.n_balls = 3 must lie in 5..60",
+        ),
         (
             SMALL,
             {"ball_diameter": 0.0},
@@ -183,9 +242,21 @@ def test_a_support_is_two_bearings_in_series_with_a_beam(span):
             {"outer_groove_conformity": 0.7},
             "conformity = 0.7 must lie in 0.505..0.6",
         ),
-        (SMALL, {"radial_clearance": 2e-4}, "clearance_um = 200 must lie in -20..100"),
-        (SHAFT, {"diameter": 0.0}, "shaft.diameter_mm = 0 must be positive"),
-        (SHAFT, {"span": 0.0}, "shaft.span_mm = 0 must be positive"),
+        (
+            SMALL,
+            {"radial_clearance": 2e-4},
+            "clearance_um = 200 must lie in -20..100",
+        ),
+        (
+            SHAFT,
+            {"diameter": 0.0},
+            "shaft.diameter_mm = 0 must be positive",
+        ),
+        (
+            SHAFT,
+            {"span": 0.0},
+            "shaft.span_mm = 0 must be positive",
+        ),
     ],
 )
 def test_impossible_sizes_are_refused(part, changes, text):

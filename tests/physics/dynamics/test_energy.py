@@ -24,7 +24,10 @@ FAULTS = {
 @pytest.fixture(scope="module", params=FAULTS)
 def faulty(request, machine, dynamics_of):
     return {
-        law: dynamics_of(machine({"mesh.roll_torque": law}), FAULTS[request.param])
+        law: dynamics_of(
+            machine({"mesh.roll_torque": law}),
+            FAULTS[request.param],
+        )
         for law in ("consistent", "classical")
     }
 

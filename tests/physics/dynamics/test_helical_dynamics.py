@@ -18,7 +18,10 @@ from gensig.dynamics.integrator import Solver, integrate
 from gensig.dynamics.mesh_state import NO_TOOTH, mesh_state
 from gensig.dynamics.pair import PAIR_DOFS
 from gensig.faults.broken import MissingTooth
-from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
+from gensig.mesh.sliced.sliced_statics import (
+    chord_equilibrium,
+    chord_states,
+)
 
 HELIX = math.radians(20.0)
 DEPTH = np.array([0.0, 2.0, 5.0, 9.0, 14.0, 20.0]) * 1e-6
@@ -57,6 +60,7 @@ class TestZeroHelix:
         spur = dynamics_of(xiamen, faults)
         chords = with_table(spur, as_chords(spur.table, n_chords))
         assert chords.dofs == (*PAIR_DOFS, *AXIAL_DOFS)
+
         for values, others in zip(moved(spur, 300), moved(chords, 300), strict=True):
             assert np.array_equal(values, others[:, :N_PLANE])
             assert np.all(others[:, N_PLANE:] == 0.0)
@@ -70,9 +74,19 @@ class TestZeroHelix:
             for name in ("approach", "load", "stiffness"):
                 exact = getattr(expected, name)
                 tolerance = 1e-12 * np.abs(exact).max()
-                assert_close(getattr(static, name), exact, 1e-9, atol=tolerance)
+                assert_close(
+                    getattr(static, name),
+                    exact,
+                    1e-9,
+                    atol=tolerance,
+                )
+
         assert_close(chords.friction_torque(), spur.friction_torque(), 1e-9)
-        assert_close(chords.mean_mesh_stiffness, spur.mean_mesh_stiffness, 1e-9)
+        assert_close(
+            chords.mean_mesh_stiffness,
+            spur.mean_mesh_stiffness,
+            1e-9,
+        )
 
 
 def contact(dynamics):
@@ -89,7 +103,10 @@ def contact(dynamics):
 class TestForces:
     @pytest.fixture
     def gears(self, spur, xiamen, hand):
-        return with_table(spur, Slices(xiamen, hand * HELIX, n_slices=6).table(DEPTH))
+        return with_table(
+            spur,
+            Slices(xiamen, hand * HELIX, n_slices=6).table(DEPTH),
+        )
 
     def test_the_approach_is_the_penetration_of_the_flanks(self, gears):
         """From the displacement of the two bodies at the pitch point."""
@@ -98,12 +115,21 @@ class TestForces:
             pinion = q[PINION] + np.cross([q[7], q[8], -q[2]], at_pinion)
             wheel = q[WHEEL] + np.cross([q[10], q[11], q[5]], at_wheel)
             approach = gears.approach_direction() @ q
-            assert_close(approach, push @ (pinion - wheel), 1e-10, atol=1e-18)
+            assert_close(
+                approach,
+                push @ (pinion - wheel),
+                1e-10,
+                atol=1e-18,
+            )
 
     def test_action_equals_reaction_and_moments_balance(self, gears):
         pair = gears.table.pair
         options = gears.table.options
-        simple = replace(options, friction_coefficient=0.0, roll_torque="classical")
+        simple = replace(
+            options,
+            friction_coefficient=0.0,
+            roll_torque="classical",
+        )
         still = replace(gears, table=replace(gears.table, options=simple))
         system = still.system()
         start = gears.static_start(0.0)
@@ -111,19 +137,32 @@ class TestForces:
         force = system.mass * acceleration - system.force + system.stiffness @ start
         at_pinion, at_wheel, push = contact(gears)
         normal = force[1]
+
         assert normal > 0.5 * gears.mesh_force
-        assert_close(force[PINION], -normal * push, 1e-6, atol=1e-6 * normal)
+        assert_close(
+            force[PINION],
+            -normal * push,
+            1e-6,
+            atol=1e-6 * normal,
+        )
         assert_close(force[WHEEL], normal * push, 1e-6, atol=1e-6 * normal)
+
         # the axial force over the tangential one is the tangent of the helix angle
         working_radius = pair.center_distance / (1 + pair.ratio)
         tangential = normal * pair.pinion.base_radius / working_radius
         lead = math.tan(pair.base_helix_angle) / math.cos(pair.working_pressure_angle)
+
         assert_close(abs(force[6]) / tangential, lead, 1e-6)
+
         for arm, forces, moments, sign in (
             (at_pinion, PINION, [7, 8, 2], -1.0),
             (at_wheel, WHEEL, [10, 11, 5], 1.0),
         ):
-            expected = np.cross(arm, force[forces]) * [1.0, 1.0, sign]
+            expected = np.cross(arm, force[forces]) * [
+                1.0,
+                1.0,
+                sign,
+            ]
             tolerance = 1e-6 * np.abs(expected).max()
             assert_close(force[moments], expected, 1e-6, atol=tolerance)
 
@@ -164,6 +203,7 @@ class TestStatics:
             helical.static(states, force * (1 + s * 1e-6)) for s in (-1, 0, 1)
         )
         slope = 2e-6 * force / (high.approach - low.approach)
+
         assert (np.abs(static.stiffness / slope - 1) < 1e-4).mean() > 0.9
 
 
@@ -173,8 +213,13 @@ class TestEnergy:
         motion = balance(helical, STEP, 4000)
         assert motion.stored.min() > 0.0
         assert motion.residual < 5e-4
+
         nothing = np.zeros_like(helical.table.gap)
-        monkeypatch.setattr(lanes, "left_out_energy", lambda table: (nothing, nothing))
+        monkeypatch.setattr(
+            lanes,
+            "left_out_energy",
+            lambda table: (nothing, nothing),
+        )
         assert balance(helical, STEP, 4000).residual > 5e-3
 
     def test_the_stored_energy_is_the_work_of_the_force(self, helical):
@@ -185,6 +230,7 @@ class TestEnergy:
         force = law[:, 0]
         stored = law[:, 5]
         work = np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(approach))
+
         assert_close(stored, np.append(0.0, work), atol=2e-3 * work[-1])
 
 
@@ -193,19 +239,27 @@ class TestChords:
         table = helical.table
         approach = -table.pair.backlash - np.linspace(0.0, 1e-5, 11)
         motions = 0.3 * table.pair.base_pitch, approach, 0.0, 0.0
-        names = "compliance", "compliance_slope", "gap", "gap_slope"
+        names = (
+            "compliance",
+            "compliance_slope",
+            "gap",
+            "gap_slope",
+        )
         chords = {name: getattr(table, name) for name in names}
         for name, values in chords.items():
             single = values[:, :, table.set_chord, None]
             chords[name] = np.repeat(single, len(table.depth), axis=2)
         alone = replace(helical, table=replace(table, **chords))
         force = laws(helical, motions)[:, 0]
+
         assert force[-1] < -100.0
         assert_close(force, laws(alone, motions)[:, 0], 1e-12, atol=1e-9)
 
 
 @pytest.mark.parametrize("speed_rpm", [620, 1480])
-def test_a_record_is_independent_of_the_number_of_slices(speed_rpm):
+def test_a_record_is_independent_of_the_number_of_slices(
+    speed_rpm,
+):
     """Slices entering whole would strike at their own frequency, up to 10 times as loud."""
 
     def level(n_slices):
@@ -228,7 +282,11 @@ class TestRecords:
     def motions(self, machines, precision="float64", with_mesh_state=False):
         return integrate(
             machines,
-            Solver(oversampling=8, precision=precision, max_error=None),
+            Solver(
+                oversampling=8,
+                precision=precision,
+                max_error=None,
+            ),
             sampling_rate=51200.0,
             duration=0.02,
             channels=("pinion_y", "pinion_z", "wheel_z"),
@@ -251,17 +309,24 @@ class TestRecords:
                 assert alone.tobytes() == signal.tobytes()
             signals[precision] = together[0]
         wide = signals["float64"]
+
         assert (wide.std(axis=1) > 1e-3).all()
-        assert_close(signals["float32"], wide, atol=2e-3 * np.abs(wide).max())
+        assert_close(
+            signals["float32"],
+            wide,
+            atol=2e-3 * np.abs(wide).max(),
+        )
 
     def test_the_loads_of_the_teeth(self, helical):
         motions = self.motions([helical], with_mesh_state=True)
         mesh = mesh_state(helical, motions.seen[0], motions.shaft_angle[0])
         n_pairs = helical.table.last_pitch - helical.table.first_pitch
+
         assert mesh.load_share.shape == (n_pairs, 1024)
         assert n_pairs > 4
         assert_close(mesh.load_share.sum(axis=0), 1.0, atol=1e-12)
         assert ((mesh.pinion_tooth == NO_TOOTH) == (mesh.load_share == 0.0)).all()
         assert_close(mesh.force.mean(), helical.mesh_force, 0.02)
+
         n_loaded = (mesh.pinion_tooth != NO_TOOTH).sum(axis=0)
         assert 2 <= n_loaded.min() <= n_loaded.max() <= n_pairs

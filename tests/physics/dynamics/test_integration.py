@@ -38,6 +38,7 @@ def test_the_error_falls_with_the_fourth_power_of_the_step(machine, composed_con
     for steps in (4, 5, 8, 16):
         off = np.linalg.norm(spectrum(steps) - exact, axis=1)
         errors[steps] = (off / np.linalg.norm(exact, axis=1)).max()
+
     assert 3.0 < math.log2(errors[4] / errors[16]) / 2 < 4.5
     assert 3e-4 < errors[4] < 1e-3
     assert errors[composed_config["solver"]["oversampling"]] < 2e-4
@@ -46,7 +47,15 @@ def test_the_error_falls_with_the_fourth_power_of_the_step(machine, composed_con
 
 @pytest.mark.parametrize(("speed_rpm", "torque_nm"), [(1800, 100), (900, 5)])
 def test_the_mean_speed_is_the_set_speed_with_any_fault(machine, speed_rpm, torque_nm):
-    condition = {SPEED: speed_rpm, "operating.torque_nm": torque_nm, DURATION: 0.4}
+    condition = {
+        SPEED: speed_rpm,
+        "operating.torque_nm": torque_nm,
+        DURATION: 0.4,
+    }
     system = machine(condition)
     for faults in ((), (MISSING,)):
-        assert_close(system.simulate(faults).mean_speed, system.operating.speed, 1e-5)
+        assert_close(
+            system.simulate(faults).mean_speed,
+            system.operating.speed,
+            1e-5,
+        )

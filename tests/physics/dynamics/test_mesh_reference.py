@@ -40,7 +40,11 @@ SCALE = np.array([1, 1, 0.1, 0.1, 1, 1e-5, 1e-2])
 def bent(at, position, values, slopes):
     """Values between nodes on the parabola that follows the growth of the slopes, (phase,)."""
     distance = position[1] - position[0]
-    cell = np.clip(((at - position[0]) / distance).astype(int), 0, len(position) - 2)
+    cell = np.clip(
+        ((at - position[0]) / distance).astype(int),
+        0,
+        len(position) - 2,
+    )
     part = (at - position[cell]) / distance
     bend = 0.5 * distance * part * (1 - part) * (slopes[cell + 1] - slopes[cell])
     return values[cell] + part * (values[cell + 1] - values[cell]) - bend
@@ -63,8 +67,15 @@ class Reference:
     """Six equations of a pair, as the theory writes them; one-sided law."""
 
     def __init__(self, dynamics, step=1e-6):
-        self.d, self.table, self.pair = dynamics, dynamics.table, dynamics.table.pair
-        self.system, self.shared = dynamics.system(), self.table.shared_compliance
+        self.d, self.table, self.pair = (
+            dynamics,
+            dynamics.table,
+            dynamics.table.pair,
+        )
+        self.system, self.shared = (
+            dynamics.system(),
+            self.table.shared_compliance,
+        )
         self.damping = mesh_numbers(dynamics, step, dynamics.rest())[DAMPING]
         self.sides = (
             (self.table.pinion, dynamics.start_tooth_pinion),
@@ -94,7 +105,10 @@ class Reference:
             for k, tooth in enumerate((index + start) % len(side.kind)):
                 at = position[k : k + 1]
                 values[:, k] += columns(
-                    side, side.kind[tooth], at, self.table.position
+                    side,
+                    side.kind[tooth],
+                    at,
+                    self.table.position,
                 )[:, 0]
                 values[2, k] += error[tooth] + tilt[tooth] * (
                     at[0] - self.pair.pitch_point
@@ -140,8 +154,18 @@ class Reference:
         x = np.clip((position - pair.pitch_point) / half_width, -1, 1)
         sliding = options.friction_coefficient * load * x * (1.5 - 0.5 * x**2)
         arm = pair.start_curvature_radius + np.clip(position, 0, pair.path_of_contact)
-        moments = -(sliding @ arm), sliding @ (pair.tangent_length - arm)
-        return load.sum(), sliding.sum(), *moments, along, stored, lost
+        moments = (
+            -(sliding @ arm),
+            sliding @ (pair.tangent_length - arm),
+        )
+        return (
+            load.sum(),
+            sliding.sum(),
+            *moments,
+            along,
+            stored,
+            lost,
+        )
 
     def coast(self, roll, approach, rate, roll_rate):
         """The same where the back flanks touch, and the number of loaded pairs, negative.
@@ -198,7 +222,10 @@ def random_states(dynamics, n, seed):
     speed = dynamics.operating.speed * pair.pinion.base_radius
     roll = rng.uniform(0, 8, n) * pair.base_pitch
     approach = rng.uniform(-2e-6, 40e-6, n)
-    rates = rng.normal(0, 2e-2, n), rng.normal(speed, 0.01 * speed, n)
+    rates = (
+        rng.normal(0, 2e-2, n),
+        rng.normal(speed, 0.01 * speed, n),
+    )
     return np.column_stack([roll, approach, *rates])
 
 
@@ -208,6 +235,7 @@ def test_the_mesh_law_agrees(dynamics):
     expected = np.array([reference.mesh(*state) for state in states])
     scale = SCALE * np.maximum(1.0, expected[:, :1])
     law = laws(dynamics, states)[:, :7]
+
     assert_close(law / scale, expected / scale, 1e-9, atol=1e-9)
     assert (expected[:, 0] > 0).sum() > 200
 
@@ -221,8 +249,15 @@ def test_back_flanks_agree(dynamics):
     states[:, 1] = -backlash - rng.uniform(0, 40e-6, 300)
     expected = np.array([reference.coast(*state) for state in states])
     scale = np.append(SCALE, 1) * np.maximum(1.0, -expected[:, :1])
-    assert_close(laws(dynamics, states) / scale, expected / scale, 1e-9, atol=1e-9)
+
+    assert_close(
+        laws(dynamics, states) / scale,
+        expected / scale,
+        1e-9,
+        atol=1e-9,
+    )
     assert (expected[:, 7] == -2).sum() > 50
+
     states[:, 1] = -backlash * rng.uniform(0.5, 1.0, 300)
     assert np.all(laws(dynamics, states) == 0.0)
 

@@ -52,6 +52,7 @@ def test_shares_of_the_loaded_teeth_sum_to_one(mesh, xiamen):
         == shape
     )
     assert_close(mesh.load_share.sum(axis=0), 1.0, atol=1e-12)
+
     for teeth in (mesh.pinion_tooth, mesh.wheel_tooth):
         assert ((teeth == NO_TOOTH) == (mesh.load_share == 0.0)).all()
     assert not mesh.contact_lost.any()
@@ -61,7 +62,10 @@ def test_shares_of_the_loaded_teeth_sum_to_one(mesh, xiamen):
 
 
 def test_teeth_follow_one_another_and_keep_their_row(mesh):
-    for rows, n_teeth in ((mesh.pinion_tooth, 23), (mesh.wheel_tooth, 84)):
+    for rows, n_teeth in (
+        (mesh.pinion_tooth, 23),
+        (mesh.wheel_tooth, 84),
+    ):
         begins = (rows[:, 1:] != NO_TOOTH) & (rows[:, :-1] == NO_TOOTH)
         sample, row = np.nonzero(begins.T)
         teeth = rows[row, sample + 1]
@@ -81,6 +85,7 @@ def test_slow_gears_have_the_static_shares(run, record):
     load = dynamics.static(states, dynamics.mesh_force).load
     expected = np.sort(load / load.sum(axis=1, keepdims=True), axis=1).T
     shares = np.sort(result.mesh.load_share, axis=0)
+
     assert_close(shares.mean(axis=1), expected.mean(axis=1), atol=3e-3)
     assert np.quantile(np.abs(shares - expected).max(axis=0), 0.95) < 0.03
 
@@ -88,8 +93,10 @@ def test_slow_gears_have_the_static_shares(run, record):
 def test_a_missing_tooth_carries_nothing_and_is_engaged(record, xiamen):
     mesh = record({}, MISSING).mesh
     assert 3 not in mesh.pinion_tooth
+
     begins = np.flatnonzero(np.diff(mesh.fault_engaged.astype(int)) == 1)
     assert_close(np.diff(begins) / RATE, 60 / 1800, 2e-3)
+
     # from A to E: the contact ratio in base pitches
     ratio = xiamen.pair.transverse_contact_ratio
     assert_close(mesh.fault_engaged.mean() * 23, ratio, 0.05)
@@ -123,5 +130,9 @@ def test_the_loads_do_not_change_the_record(run, precision):
 def test_detectability_is_that_of_a_matched_filter():
     """Root of the energy of the residual over the noise of every channel."""
     residual = np.array([[3.0, 0.0, 4.0], [0.0, 2.0, 0.0]])
-    assert_close(detectability(residual, np.array([25.0, 1.0])), math.sqrt(5.0), 1e-12)
+    assert_close(
+        detectability(residual, np.array([25.0, 1.0])),
+        math.sqrt(5.0),
+        1e-12,
+    )
     assert math.isnan(detectability(np.ones((1, 4)), np.zeros(1)))

@@ -67,7 +67,12 @@ def remainder(signal, waves):
 def at(machine):
     """A run at a speed, with courses if they are given."""
 
-    def make(speed_rpm=1800.0, start=None, low_cutoff_hz=None, **courses):
+    def make(
+        speed_rpm=1800.0,
+        start=None,
+        low_cutoff_hz=None,
+        **courses,
+    ):
         system = machine(
             {
                 "operating.speed_rpm": speed_rpm,
@@ -76,7 +81,11 @@ def at(machine):
             }
         )
         operating = replace(system.operating, **courses)
-        return Run(system=replace(system, operating=operating), faults=(), start=start)
+        return Run(
+            system=replace(system, operating=operating),
+            faults=(),
+            start=start,
+        )
 
     return make
 
@@ -102,6 +111,7 @@ def test_unbalance_grows_with_the_square_of_the_speed(at, gear, speed_rpm):
     amplitude = 2.0 * np.linalg.lstsq(waves, signal.T.astype(complex), rcond=None)[0][0]
     rated = 1800 * 2 * np.pi / 60 * RATIO[gear]
     expected = getattr(run.system, gear).mass * 6.3e-3 / rated
+
     assert_close(np.abs(amplitude / unit) / w**2, expected, 1e-4)
 
 
@@ -118,7 +128,9 @@ def test_its_angle_is_fixed_to_tooth_0(at, gear):
     angle = run.system.operating.speed * TIMES[:4096]
     first = response(started(3, 5), tones, angle)
     turned = response(started(3, 5), tones, angle + 2 * np.pi / 23)
+
     assert_same(response(started(4, 6), tones, angle), turned)
+
     other = started(3, 6) if gear == "pinion" else started(4, 5)
     assert_close(response(other, tones, angle), first)
     assert_same(response(started(3 + 23, 5 + 84), tones, angle), first)
@@ -134,7 +146,9 @@ def test_a_neighbour_has_its_orders_on_a_shaft_with_wobble(at):
     orders = (sides[:, None] + [0, 25, 50]).ravel()
     phase = np.outer(angle * RATIO["wheel"], orders)
     waves = np.hstack([np.ones((len(TIMES), 1)), np.cos(phase), np.sin(phase)])
+
     assert remainder(signal, waves).std() < 1e-4 * signal.std()
+
     # over time the wobble smears the lines: order 75 swings by 0.4 rad
     steady = np.outer(speed * RATIO["wheel"] * TIMES, [25, 50, 75])
     by_time = np.hstack([np.cos(steady), np.cos(steady + 1.5)])
@@ -143,7 +157,10 @@ def test_a_neighbour_has_its_orders_on_a_shaft_with_wobble(at):
 
 def test_on_a_ramp_it_is_the_response_in_time(at):
     """m e w(t)^2 cos(angle(t)) on the pinion's x, one mass on its support, solved in time."""
-    run = at(3600.0, speed_profile=Profile(times=(0.0, DURATION), factors=(0.5, 1.5)))
+    run = at(
+        3600.0,
+        speed_profile=Profile(times=(0.0, DURATION), factors=(0.5, 1.5)),
+    )
     tones = tones_of(run, UNBALANCE)
     body = run.system.pinion
     operating = run.system.operating
@@ -155,8 +172,10 @@ def test_on_a_ramp_it_is_the_response_in_time(at):
     k = body.support.stiffness_x / body.mass
     system = [1.0 / body.mass, 0.0, 0.0], [1.0, c, k]
     expected = lsim(system, force, times - times[0])[1][2000:]
+
     # from 30 to 90 turns a second in 0.2 s, on a support that follows in 11 ms
     assert np.std(response(run, tones)[0] - expected) < 0.04 * expected.std()
+
     # the amplitude of the mean speed would be another
     constant = response(at(3600.0), tones, nominal.angle[2000:])[0]
     assert np.std(constant - expected) > 0.2 * expected.std()
@@ -167,7 +186,8 @@ def test_only_loads_follow_torque_courses(at):
     for part, factor in ((MESH, 0.5), (UNBALANCE, 1.0)):
         tones = tones_of(at(), part)
         assert_same(
-            response(at(torque_profile=half), tones), factor * response(at(), tones)
+            response(at(torque_profile=half), tones),
+            factor * response(at(), tones),
         )
 
 
@@ -175,18 +195,27 @@ def test_a_lead_in_continues_into_the_record(at):
     run = at(low_cutoff_hz=5.0)
     tones = tones_of(run, MESH)
     n_lead = run.system.sensing.n_lead
+
     assert n_lead > 1000
+
     operating = run.system.operating
     times = np.arange(-n_lead, len(TIMES)) / RATE
     led = response(run, tones, operating.nominal(TIMES).angle + 0.003)
+
     assert led.shape == (4, len(times))
-    assert_same(led, response(at(), tones, operating.nominal(times).angle + 0.003))
+    assert_same(
+        led,
+        response(at(), tones, operating.nominal(times).angle + 0.003),
+    )
 
 
 def test_tones_above_the_usable_band_are_left_out(at):
     run = at()
     highest = 20000.0 / 30.0
-    for order, is_kept in ((1.01 * highest, False), (0.99 * highest, True)):
+    for order, is_kept in (
+        (1.01 * highest, False),
+        (0.99 * highest, True),
+    ):
         tone = Tones(
             gear="pinion",
             base=np.array([order]),

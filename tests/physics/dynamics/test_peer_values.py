@@ -17,7 +17,10 @@ import pytest
 from closeness import assert_close
 
 from gensig.geometry.tooth import healthy_tooth
-from gensig.geometry.tooth_profile import involute_point, load_angle
+from gensig.geometry.tooth_profile import (
+    involute_point,
+    load_angle,
+)
 from gensig.mesh.compliance import tooth_compliance
 from gensig.mesh.fillet_foundation import (
     body_coefficients,
@@ -26,7 +29,11 @@ from gensig.mesh.fillet_foundation import (
 from gensig.systems.spur_pair import SpurPair
 
 ROOT = Path(__file__).resolve().parents[3]
-PAPER = {"mesh.law": "paper", "mesh.pair_coupling": "sum", "mesh.contact": "linear"}
+PAPER = {
+    "mesh.law": "paper",
+    "mesh.pair_coupling": "sum",
+    "mesh.contact": "linear",
+}
 PAIRS = {
     "23/84": {},
     "25/50": {
@@ -77,9 +84,22 @@ def ross_half_angle(gear):
     return gear.root_half_angle - clearance / gear.n_teeth
 
 
-def body(gear, curvature, material, *, half_angle=None, to_contact=False):
+def body(
+    gear,
+    curvature,
+    material,
+    *,
+    half_angle=None,
+    to_contact=False,
+):
     """gensig's body term, with ROSS's half angle or ROSS's height to the contact."""
-    names = "name", "root_radius", "bore_radius", "face_width", "base_radius"
+    names = (
+        "name",
+        "root_radius",
+        "bore_radius",
+        "face_width",
+        "base_radius",
+    )
     other = SimpleNamespace(**{name: getattr(gear, name) for name in names})
     other.root_half_angle = half_angle or gear.root_half_angle
     angle = load_angle(gear, curvature)
@@ -101,7 +121,11 @@ def pair_stiffness(peer, *curvatures):
         angle = ross_half_angle(gear)
         total = total + tooth_compliance(healthy_tooth(gear), curvature, material).total
         total = total + body(
-            gear, curvature, material, half_angle=angle, to_contact=True
+            gear,
+            curvature,
+            material,
+            half_angle=angle,
+            to_contact=True,
         )
     return 1 / total
 
@@ -133,7 +157,10 @@ def stored():
 @pytest.fixture(params=PAIRS, scope="module")
 def peer(request, machine, stored):
     rows = tuple(row for row in stored if row["pair"] == request.param)
-    return Peer(system=machine({**PAPER, **PAIRS[request.param]}), rows=rows)
+    return Peer(
+        system=machine({**PAPER, **PAIRS[request.param]}),
+        rows=rows,
+    )
 
 
 def test_every_stored_pair_is_compared(stored):
@@ -143,7 +170,9 @@ def test_every_stored_pair_is_compared(stored):
 
 def test_the_line_of_action_agrees(peer):
     assert_close(
-        peer.ross("contact_ratio"), peer.system.pair.transverse_contact_ratio, 1e-8
+        peer.ross("contact_ratio"),
+        peer.system.pair.transverse_contact_ratio,
+        1e-8,
     )
 
 
@@ -168,9 +197,11 @@ def test_the_body_fit_agrees_at_the_same_half_angle(peer, side):
     gear = peer.gear(side)
     curve = peer.ross(f"{side}_root_curve_half_angle")[0]
     half_angle = peer.ross(f"{side}_root_half_angle")[0]
+
     assert_close(gear.root_half_angle, curve, 1e-8)
     assert_close(ross_half_angle(gear), half_angle, 1e-8)
     assert_close(curve / half_angle, 1.0643, 1e-4)
+
     names = "name", "root_radius", "bore_radius"
     same = SimpleNamespace(**{key: getattr(gear, key) for key in names})
     same.root_half_angle = half_angle
@@ -191,9 +222,12 @@ def test_the_body_term_differs_by_two_choices(peer, side):
     ross = peer.ross(f"{side}_foundation_compliance")
     angle = {"half_angle": ross_half_angle(gear)}
     height = {"to_contact": True}
+
     assert_close(body(*given, **angle, **height), ross, 1e-8)
+
     ours = body(*given) / ross
     assert 0.81 < ours.min() < 0.92 < ours.max() < 0.97
+
     for choice in (angle, height):
         half_way = body(*given, **choice) / ross
         assert np.all((ours + 1e-3 < half_way) & (half_way < 1 - 5e-3))
@@ -206,8 +240,10 @@ def test_the_mesh_differs_by_the_body_term_and_the_contacts(peer):
     pitch = pair.base_pitch
     on_line = peer.ross("mesh_stiffness")
     on_path = peer.ross("mesh_stiffness_own_path")
+
     assert np.all((ours / on_line > 1.06) & (ours / on_line < 1.10))
     assert np.all((ours / on_path > 1.02) & (ours / on_path < 1.05))
+
     for index, newest in enumerate((np.arange(N_PHASES) + 0.5) / N_PHASES):
         pitches = np.array([newest, newest + 1])
         pitches = pitches[pitches <= pair.transverse_contact_ratio]
@@ -215,12 +251,21 @@ def test_the_mesh_differs_by_the_body_term_and_the_contacts(peer):
         stiffness = pair_stiffness(peer, pinion, pair.tangent_length - pinion).sum()
         assert_close(stiffness, on_line[index], OF_A_PAIR)
         curvatures = ross_path(peer, pitches / pair.transverse_contact_ratio)
-        assert_close(pair_stiffness(peer, *curvatures).sum(), on_path[index], OF_A_PAIR)
+        assert_close(
+            pair_stiffness(peer, *curvatures).sum(),
+            on_path[index],
+            OF_A_PAIR,
+        )
 
 
 def test_the_document_shows_the_stored_values(stored):
     """Every line of docs/peers.md has ROSS's stored value to the digits shown."""
-    scales = {"1e-12 m/N": 1e12, "1e8 N/m": 1e-8, "rad": 1.0, "": 1.0}
+    scales = {
+        "1e-12 m/N": 1e12,
+        "1e8 N/m": 1e-8,
+        "rad": 1.0,
+        "": 1.0,
+    }
     known = {
         (row["pair"], row["quantity"], row["point"]): float(row["value"])
         for row in stored
@@ -228,13 +273,19 @@ def test_the_document_shows_the_stored_values(stored):
     pair = ""
     n_lines = 0
     text = (ROOT / "docs" / "peers.md").read_text(encoding="utf-8")
+
     assert f"ROSS {stored[0]['ross_version']}" in text
+
     for line in text.splitlines():
         if line.startswith("### "):
             pair = line.removeprefix("### ")
         cells = [cell.strip() for cell in line.strip("|").split("|")]
         key = (pair, *cells[:2])
         if len(cells) > 4 and key in known and re.fullmatch(r"[\d.]+", cells[3]):
-            assert_close(float(cells[3]), known[key] * scales[cells[2]], 6e-5)
+            assert_close(
+                float(cells[3]),
+                known[key] * scales[cells[2]],
+                6e-5,
+            )
             n_lines += 1
     assert n_lines >= 20

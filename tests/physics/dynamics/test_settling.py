@@ -17,7 +17,10 @@ from gensig.dynamics.backends.step_limits import (
 from gensig.dynamics.decimation import in_band_error
 from gensig.errors import SimulationError
 from gensig.faults.broken import MissingTooth
-from gensig.sensing.manufacturing import draw_gearbox, draw_specimen
+from gensig.sensing.manufacturing import (
+    draw_gearbox,
+    draw_specimen,
+)
 from gensig.systems.base import simulate_together
 from gensig.systems.run import Run
 
@@ -36,7 +39,11 @@ def run(machine):
     """One record of gears with errors, in a gearbox of its own."""
 
     def make(changes, faults=()):
-        options = {"operating.duration_s": 0.1, "solver.max_error": None, **changes}
+        options = {
+            "operating.duration_s": 0.1,
+            "solver.max_error": None,
+            **changes,
+        }
         system = machine(options)
         rng = np.random.default_rng(1)
         pair = system.pair
@@ -44,10 +51,16 @@ def run(machine):
         sensing = system.sensing
         specimen = draw_specimen(rng, pair.pinion, pair.wheel, quality)
         gearbox = draw_gearbox(
-            rng, len(sensing.channels), quality, sensing.gain_scatter
+            rng,
+            len(sensing.channels),
+            quality,
+            sensing.gain_scatter,
         )
         return Run(
-            system=system, faults=tuple(faults), specimen=specimen, gearbox=gearbox
+            system=system,
+            faults=tuple(faults),
+            specimen=specimen,
+            gearbox=gearbox,
         )
 
     return make
@@ -57,7 +70,12 @@ def run(machine):
 def runs(run):
     """Slow, usual with a fault, fast, and with motor and load."""
     crack = one("crack", tooth=3, crack_depth_mm=1)
-    return [run({SPEED: 600}), run({}, [crack]), run({SPEED: 6000}), run(LINE)]
+    return [
+        run({SPEED: 600}),
+        run({}, [crack]),
+        run({SPEED: 6000}),
+        run(LINE),
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -103,7 +121,9 @@ def test_hard_landings_settle_in_finer_steps(run, runs, monkeypatch):
     bouncing = run({"operating.torque_nm": 1.1, SPEED: 3600}, missing)
     bouncing = replace(bouncing, specimen=None, gearbox=None)
     together = assert_independent([runs[0], bouncing, runs[1]])
+
     assert together[1].contact_loss_fraction > BOUNCING
+
     monkeypatch.setattr(runge_kutta, "CAREFUL", 1)
     assert isinstance(simulate_together([bouncing])[0], SimulationError)
 
@@ -117,6 +137,7 @@ def test_stages_become_finer_within_stability(dynamics_of, xiamen):
         return [steps for steps, _ in settling_stages(dynamics, limit, rate)]
 
     ends = [end for _, end in settling_stages(dynamics, oversampling, RATE)]
+
     assert all(first > second > 0 for first, second in pairwise(ends))
     assert coarsest_oversampling(dynamics, oversampling, RATE) == 1
     assert steps(oversampling, RATE) == [n for n, _ in COARSE]

@@ -10,7 +10,10 @@ from fault_cases import GEARS, on_path, one
 from gensig.dynamics._layout import BACKLASH
 from gensig.dynamics.lanes import mesh_numbers
 from gensig.faults.flank_form import ProfileError
-from gensig.sensing.manufacturing import draw_specimen, perfect_specimen
+from gensig.sensing.manufacturing import (
+    draw_specimen,
+    perfect_specimen,
+)
 from gensig.systems.base import simulate_together
 from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.run import Run
@@ -30,7 +33,11 @@ def eccentric(xiamen, perfect, name, most, *, smooth=True):
     turn = 2 * np.pi / gear.n_teeth * (np.arange(gear.n_teeth) - most)
     tilt = -SIZE / gear.base_radius * np.sin(turn) * smooth
     return replace(
-        perfect, **{f"{name}_error": SIZE * np.cos(turn), f"{name}_tilt": tilt}
+        perfect,
+        **{
+            f"{name}_error": SIZE * np.cos(turn),
+            f"{name}_tilt": tilt,
+        },
     )
 
 
@@ -64,21 +71,33 @@ class TestEccentricity:
         turned = (rolls(xiamen) - pair.pitch_point) / gear.base_radius
         expected = SIZE * np.cos(turned - 2 * np.pi / gear.n_teeth * most)
         error = late(xiamen, eccentric(xiamen, perfect, name, most))
+
         assert_close(error, expected, atol=0.03 * SIZE)  # second order: 2.5 % at A
+
         # without the tilt of the offsets the error would step from tooth to tooth
-        stepped = late(xiamen, eccentric(xiamen, perfect, name, most, smooth=False))
+        stepped = late(
+            xiamen,
+            eccentric(xiamen, perfect, name, most, smooth=False),
+        )
         turn = np.diff(rolls(xiamen))[0] / gear.base_radius
         assert np.abs(np.diff(error)).max() < 2.5 * SIZE * turn
         assert np.abs(np.diff(stepped)).max() > 4 * SIZE * turn
 
 
 def profile(gear, slope, form=0.0):
-    shape = {"profile_slope": slope, "profile_form": form, "profile_waves": 1}
+    shape = {
+        "profile_slope": slope,
+        "profile_form": form,
+        "profile_waves": 1,
+    }
     return ProfileError(gear=gear, tooth="all", limit=1.0, **shape)
 
 
 class TestProfile:
-    FORMS = profile("pinion", 3 * UM, 2 * UM), profile("wheel", -4 * UM)
+    FORMS = (
+        profile("pinion", 3 * UM, 2 * UM),
+        profile("wheel", -4 * UM),
+    )
 
     def involute(self, gear):
         """Least and greatest curvature radius of the flank, m."""
@@ -105,9 +124,15 @@ class TestProfile:
         alone = (position > pair.path_of_contact - 0.9 * pitch) & (
             position < 0.9 * pitch
         )
+
         assert alone.mean() > 0.09
+
         error = late(xiamen, specimen)[alone]
-        assert_close(error, self.deviation(pair, position[alone]), atol=0.02 * UM)
+        assert_close(
+            error,
+            self.deviation(pair, position[alone]),
+            atol=0.02 * UM,
+        )
         assert np.abs(error).max() > 0.5 * UM
 
     @pytest.mark.parametrize(("name", "to_tip"), [("pinion", 1.0), ("wheel", -1.0)])
@@ -115,11 +140,18 @@ class TestProfile:
         self, xiamen, perfect, name, to_tip
     ):
         """The tooth-to-tooth part: a slope about the pitch point, here the same on all teeth."""
-        slope, (low, high) = 3 * UM, self.involute(getattr(xiamen.pair, name))
+        slope, (low, high) = (
+            3 * UM,
+            self.involute(getattr(xiamen.pair, name)),
+        )
         tilt = {f"{name}_tilt": to_tip * slope / (high - low)}
         error = late(xiamen, replace(perfect, **tilt))
-        expected = late(xiamen, replace(perfect, forms=(profile(name, slope),)))
+        expected = late(
+            xiamen,
+            replace(perfect, forms=(profile(name, slope),)),
+        )
         centred = expected - expected.mean()
+
         assert_close(error - error.mean(), centred, atol=0.02 * slope)
         assert np.ptp(expected) > 0.1 * slope
 
@@ -130,8 +162,13 @@ class TestProfile:
             xiamen.mesh_table(forms) for forms in (self.FORMS, (*self.FORMS, fault))
         )
         gaps = faulty.pinion.gap[faulty.pinion.kind]
+
         assert np.array_equal(gaps[3], sound.pinion.gap[1])
-        assert_close((gaps[4] - sound.pinion.gap[1])[on_path(sound)], 12 * UM, 1e-9)
+        assert_close(
+            (gaps[4] - sound.pinion.gap[1])[on_path(sound)],
+            12 * UM,
+            1e-9,
+        )
 
 
 def test_drawn_backlash_needs_no_further_tables(xiamen, perfect):
@@ -148,14 +185,22 @@ def test_only_faults_of_the_record_engage(machine):
     pair = system.pair
     rng = np.random.default_rng(3)
     specimen = draw_specimen(rng, pair.pinion, pair.wheel, system.quality)
+
     assert len(specimen.forms) == 2
+
     fault = one("pitch_error", tooth=3, pitch_error_um=5)
     sound, faulty = simulate_together(
         [
-            Run(system=system, faults=faults, specimen=specimen, with_mesh_state=True)
+            Run(
+                system=system,
+                faults=faults,
+                specimen=specimen,
+                with_mesh_state=True,
+            )
             for faults in ((), (fault,))
         ]
     )
     assert not sound.mesh.fault_engaged.any()
+
     share = pair.transverse_contact_ratio / 23
     assert_close(faulty.mesh.fault_engaged.mean(), share, 0.15)

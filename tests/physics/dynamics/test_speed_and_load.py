@@ -24,13 +24,21 @@ PLAIN = {
 SPEED = "operating.speed_profile"
 TORQUE = "operating.torque_profile"
 DURATION = "operating.duration_s"
-WALK = {"kind": "random_walk", "scatter": 0.02, "correlation_time_s": 0.2}
+WALK = {
+    "kind": "random_walk",
+    "scatter": 0.02,
+    "correlation_time_s": 0.2,
+}
 
 
 @pytest.fixture(scope="module")
 def run(machine):
     def make(changes, **more):
-        return Run(system=machine({**PLAIN, **changes}), faults=(), **more)
+        return Run(
+            system=machine({**PLAIN, **changes}),
+            faults=(),
+            **more,
+        )
 
     return make
 
@@ -52,20 +60,30 @@ def followed(frequency, drive=5.0, damping=0.7):
 
 
 @pytest.mark.parametrize(
-    ("ripple", "frequency"), [({"order": 1}, 30.0), ({"frequency_hz": 10}, 10.0)]
+    ("ripple", "frequency"),
+    [({"order": 1}, 30.0), ({"frequency_hz": 10}, 10.0)],
 )
 def test_the_drive_transmits_a_part_of_a_speed_ripple(run, ripple, frequency):
     share = 0.01
     still = run({DURATION: 0.2})
-    rippled = run({"operating.speed_ripple": {"share": share, **ripple}, DURATION: 0.2})
+    rippled = run(
+        {
+            "operating.speed_ripple": {"share": share, **ripple},
+            DURATION: 0.2,
+        }
+    )
     moved = record(rippled).shaft_angle - record(still).shaft_angle
     speed = np.gradient(moved, 1 / RATE, edge_order=2) / still.system.operating.speed
+
     assert_close(wave(speed, frequency), share * followed(frequency), 0.03)
     assert followed(frequency) < 0.95
 
 
 def test_a_torque_ripple_is_in_the_force_on_the_teeth(run):
-    ripple = {"operating.torque_ripple": {"share": 0.1, "order": 2}, DURATION: 0.2}
+    ripple = {
+        "operating.torque_ripple": {"share": 0.1, "order": 2},
+        DURATION: 0.2,
+    }
     rippled = run(ripple, with_mesh_state=True)
     force = record(rippled).mesh.force / pair_dynamics(rippled).mesh_force
     assert_close(wave(force, 60.0), 0.1, 0.05)
@@ -83,6 +101,7 @@ def test_a_lead_in_changes_neither_walk_nor_ripple(run):
     }
     led = run({**courses, "sensing.sensor.low_cutoff_hz": 5.0})
     n_lead = led.system.sensing.n_lead
+
     assert n_lead > 4000
 
     (long,) = simulate_with_lead_in([led])
@@ -91,9 +110,11 @@ def test_a_lead_in_changes_neither_walk_nor_ripple(run):
     speed, wanted = (
         np.gradient(each.shaft_angle, 1 / RATE) for each in (long, expected)
     )
+
     assert_close(speed, wanted, atol=0.02 * wanted.std())
     assert_close(long.mean_speed, expected.mean_speed, 2e-6)
     assert abs(led.system.operating.speed / expected.mean_speed - 1) > 1e-4
+
     off = long.acceleration[:, n_lead:] - expected.acceleration
     assert np.all(off.std(axis=1) <= 0.02 * expected.acceleration.std(axis=1))
 
@@ -140,6 +161,7 @@ class TestStored:
             relative = torque.astype(float) / row["torque_nm"]
             assert_close(wave(relative, 60.0), 0.02, 0.15)
         (first, same_first), (second, same_second) = torques.values()
+
         assert first.tobytes() == same_first.tobytes()
         assert second.tobytes() == same_second.tobytes()
         assert np.abs(first - second).max() > 0.1

@@ -16,7 +16,11 @@ from gensig.life.crack_growth import crack_growth
 from gensig.life.drift import Drift
 from gensig.life.growth import grow
 from gensig.life.life_options import read_life
-from gensig.life.load_history import DrawnBlocks, draw_history, given_history
+from gensig.life.load_history import (
+    DrawnBlocks,
+    draw_history,
+    given_history,
+)
 from gensig.life.pit_growth import contact_stress, pit_growth
 from gensig.life.snapshots import snapshot_times
 from gensig.mesh.root_crack import crack_compliance
@@ -56,7 +60,12 @@ def crack(config):
 
 @pytest.fixture(scope="module")
 def law(machine, options, crack):
-    return crack_growth(machine.pair, machine.material, crack, options.laws["crack"])
+    return crack_growth(
+        machine.pair,
+        machine.material,
+        crack,
+        options.laws["crack"],
+    )
 
 
 @pytest.fixture(scope="module")
@@ -75,13 +84,19 @@ def steady(torque, hours, speed=SPEED):
 
 
 def life_turns(law, torque, start):
-    course = grow(law.sizes, law.turns(np.array([torque])), steady(torque, 1e6), start)
+    course = grow(
+        law.sizes,
+        law.turns(np.array([torque])),
+        steady(torque, 1e6),
+        start,
+    )
     assert course.has_failed
     return course.turns[-1]
 
 
 @pytest.mark.parametrize(
-    ("torque", "low", "high"), [(20.0, 1.5, 1.8), (100.0, 7.6, 9.0)]
+    ("torque", "low", "high"),
+    [(20.0, 1.5, 1.8), (100.0, 7.6, 9.0)],
 )
 def test_the_stress_intensity_range_is_that_of_the_reference(law, torque, low, high):
     """A crack of 1 mm on the 23/84 pair, increments of the reference's finite elements."""
@@ -95,19 +110,27 @@ def test_the_stress_intensity_range_is_irwins(law, machine, crack):
     tooth = healthy_tooth(pair.pinion)
     place = np.array([pair.pinion_curvature(pair.base_pitch)])
     low, high = (
-        crack_compliance(replace(crack, crack_depth=a).apply(tooth, 0), place, strain)
+        crack_compliance(
+            replace(crack, crack_depth=a).apply(tooth, 0),
+            place,
+            strain,
+        )
         for a in (0.999e-3, 1.001e-3)
     )
     force = 100.0 / pair.pinion.base_radius
     release = force**2 / (2.0 * pair.face_width) * (high[0] - low[0]) / 2e-6
     expected = math.sqrt(release * strain.youngs_modulus) / 1e6
     result = law.measures(1e-3, 100.0)["stress_intensity_range_mpa_sqrt_m"]
+
     assert_close(result, expected, 2e-3)
 
 
 @pytest.mark.parametrize("exponent", [2.25, 3.0])
 def test_the_life_falls_with_the_load_to_the_paris_exponent(law, exponent):
-    law = replace(law, options=replace(law.options, exponent=exponent, threshold=0.0))
+    law = replace(
+        law,
+        options=replace(law.options, exponent=exponent, threshold=0.0),
+    )
     torques = np.array([50.0, 100.0, 200.0])
     lives = [life_turns(law, torque, 0.5e-3) for torque in torques]
     slope = np.diff(np.log(lives)) / np.diff(np.log(torques))
@@ -147,10 +170,16 @@ def test_a_crack_over_part_of_the_face_grows_both_ways_and_becomes_a_through_one
     assert "crack_width_mm" not in whole.fault(1e-3)
 
 
-def test_a_nearly_through_crack_grows_as_a_through_one(law_of_share):
+def test_a_nearly_through_crack_grows_as_a_through_one(
+    law_of_share,
+):
     whole = law_of_share(1.0)
     nearly = law_of_share(0.999999)
-    assert_close(nearly.intensity[0, 20:-8], whole.intensity[0, 20:-8], 0.02)
+    assert_close(
+        nearly.intensity[0, 20:-8],
+        whole.intensity[0, 20:-8],
+        0.02,
+    )
 
 
 def test_pits_come_after_the_first_life_and_go_with_the_load_to_the_exponent(
@@ -159,13 +188,16 @@ def test_pits_come_after_the_first_life_and_go_with_the_load_to_the_exponent(
     assert pits.n_pits(0.99) == 0.0
     assert pits.share(1.0) == 0.0
     assert_close(pits.n_pits(2.0), pits.options.pits_per_life, 1e-12)
+
     ratio = life_turns(pits, 100.0, 0.0) / life_turns(pits, 200.0, 0.0)
     assert_close(math.log2(ratio), 0.5 * pits.options.exponent, 1e-9)
     assert_close(pits.share(pits.sizes[-1]), pits.options.end_share, 1e-9)
+
     # Hertz: the knee of the line is reached at the torque whose stress is the strength
     stress = contact_stress(machine.pair, machine.material, 1.0)
     torque = (pits.options.strength / stress) ** 2
     rate = pits.rate(np.array([0.5]), torque)
+
     assert_close(rate, 1.0 / pits.options.cycles, 1e-9)
 
 
@@ -190,9 +222,11 @@ def test_a_standstill_costs_clock_time_and_nothing_else(law):
         history = given_history(((0.0, HOUR, SPEED, 90.0), later), math.inf)
         courses.append(grow(law.sizes, turns, history, 5e-4))
     near, far = courses
+
     assert_array_equal(near.size[-1], far.size[-1])
     assert_array_equal(near.turns[-1], far.turns[-1])
     assert_close(far.clock[-1] - near.clock[-1], 8 * HOUR, 1e-6)
+
     # no look falls into the gap
     times = snapshot_times(far, "linear", 9)
     looks = np.array([far.value("clock", far.at(time)) for time in times]) / HOUR
@@ -203,7 +237,13 @@ def test_a_standstill_costs_clock_time_and_nothing_else(law):
 def test_what_has_not_failed_at_the_horizon_is_censored(law):
     turns = law.turns(np.array([90.0]))
     whole = grow(law.sizes, turns, steady(90.0, 1e6), 5e-4)
-    cut = grow(law.sizes, turns, steady(90.0, whole.clock[-1] / HOUR * 0.5), 5e-4)
+    cut = grow(
+        law.sizes,
+        turns,
+        steady(90.0, whole.clock[-1] / HOUR * 0.5),
+        5e-4,
+    )
+
     assert whole.has_failed
     assert not cut.has_failed
     assert_close(cut.clock[-1], 0.5 * whole.clock[-1], 1e-6)
@@ -224,6 +264,7 @@ def test_looks_are_in_order_and_reach_from_new_to_the_end(law, spacing):
     assert_close(sizes[[0, -1]], [6e-4, law.sizes[-1]], 1e-6)
     assert (np.diff(times) > 0.0).all()
     assert (np.diff(sizes) >= 0.0).all()
+
     left = times[-1] - times[:-1]
     even = {
         "linear": np.diff(times),
@@ -231,12 +272,18 @@ def test_looks_are_in_order_and_reach_from_new_to_the_end(law, spacing):
         "adaptive": np.diff(sizes),
     }
     steps = even[spacing]
+
     assert_close(steps, steps.mean(), 1e-6)
     assert len(times) == 21
 
 
 def test_looks_every_so_often_do_not_tell_how_long_a_life_is(law):
-    course = grow(law.sizes, law.turns(np.array([100.0])), steady(100.0, 1e6), 5e-4)
+    course = grow(
+        law.sizes,
+        law.turns(np.array([100.0])),
+        steady(100.0, 1e6),
+        5e-4,
+    )
     times = snapshot_times(course, "linear", 1000, every=600.0)
     assert_close(np.diff(times), 600.0, 1e-7)
     assert times[-1] <= course.running[-1] < times[-1] + 600.0
@@ -246,7 +293,9 @@ def test_a_drift_settles():
     drift = Drift(change=0.5, time=100 * HOUR, scatter=0.0)
     assert drift.factor(0.0, 1.0) == 1.0
     assert_close(
-        drift.factor(100 * HOUR, 1.0), 1.0 + 0.5 * (1.0 - math.exp(-1.0)), 1e-7
+        drift.factor(100 * HOUR, 1.0),
+        1.0 + 0.5 * (1.0 - math.exp(-1.0)),
+        1e-7,
     )
     assert_close(drift.factor(1e9 * HOUR, 2.0), 2.0, 1e-7)
 
@@ -284,6 +333,7 @@ def test_a_drawn_history_keeps_to_its_limits():
     for values in (length, real):
         assert values.min() >= HOUR - 1e-6
         assert values.max() <= 4 * HOUR + 1e-6
+
     assert history.end[-1] <= 1000 * HOUR
     assert 0.4 < len(real) / len(gap) < 0.6
     assert set(history.setpoint.tolist()) == {0, 1}

@@ -13,7 +13,16 @@ from reference.calibrate_crack import reference_gear
 from gensig.life.root.tooth_root import root_loading
 
 FILE = Path(__file__).parents[2] / "reference" / "data" / "root_stress.csv"
-CASES = ("z17_x03", "z23", "z25_sharp", "z30_alpha25", "z30_long", "z40", "z54", "z84")
+CASES = (
+    "z17_x03",
+    "z23",
+    "z25_sharp",
+    "z30_alpha25",
+    "z30_long",
+    "z40",
+    "z54",
+    "z84",
+)
 
 
 def compared(case):
@@ -24,7 +33,10 @@ def compared(case):
     gear = reference_gear(rows[0])
     place, exact = (
         np.array([float(row[key]) for row in rows])
-        for key in ("tip_distance_over_base_pitch", "stress_factor")
+        for key in (
+            "tip_distance_over_base_pitch",
+            "stress_factor",
+        )
     )
     ours = root_loading(gear, place * gear.base_pitch).stress_factor * math.cos(
         gear.pressure_angle
@@ -33,7 +45,9 @@ def compared(case):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_iso_is_near_finite_elements_where_it_takes_the_load(case):
+def test_iso_is_near_finite_elements_where_it_takes_the_load(
+    case,
+):
     """Between the tip and the outer point of single contact; lower down its fixed section sees too
     little."""
     place, ours, exact, _ = compared(case)
@@ -46,7 +60,11 @@ def test_iso_is_near_finite_elements_where_it_takes_the_load(case):
 
 def test_the_pump_drives_gear_at_isos_load_point():
     place, ours, exact, _ = compared("z54")
-    assert_close(np.interp(0.768, place, ours), np.interp(0.768, place, exact), 0.04)
+    assert_close(
+        np.interp(0.768, place, ours),
+        np.interp(0.768, place, exact),
+        0.04,
+    )
 
 
 def test_the_critical_section_is_where_the_tension_is_largest_under_a_high_load():

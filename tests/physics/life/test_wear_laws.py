@@ -19,9 +19,21 @@ from gensig.options.compose import compose
 from gensig.systems.registry import read_sliced_pair
 from gensig.systems.wear import read_wear_case
 
-PAPER = ("gear=harbin_38_55", "wear.sharing=one_pair", "wear.geometry=unworn")
-FULL = ("gear=harbin_38_55", "gear.addendum_coefficient=1", "wear.threshold_um=30")
-HELICAL = ("system=helical_pair", "wear.threshold_um=10", "mesh.n_slices=20")
+PAPER = (
+    "gear=harbin_38_55",
+    "wear.sharing=one_pair",
+    "wear.geometry=unworn",
+)
+FULL = (
+    "gear=harbin_38_55",
+    "gear.addendum_coefficient=1",
+    "wear.threshold_um=30",
+)
+HELICAL = (
+    "system=helical_pair",
+    "wear.threshold_um=10",
+    "mesh.n_slices=20",
+)
 
 
 def case_of(*words):
@@ -30,7 +42,10 @@ def case_of(*words):
 
 def changed(case, **options):
     return wear_case(
-        case.mesh, case.material, replace(case.options, **options), case.torque
+        case.mesh,
+        case.material,
+        replace(case.options, **options),
+        case.torque,
     )
 
 
@@ -60,14 +75,18 @@ def test_the_band_rule_is_the_integral_over_the_passing_contact():
 
 @pytest.mark.parametrize("rule", ["band", "fixed_intervals"])
 @pytest.mark.parametrize(
-    "words", [PAPER, FULL, HELICAL], ids=["paper", "own mesh", "helical"]
+    "words",
+    [PAPER, FULL, HELICAL],
+    ids=["paper", "own mesh", "helical"],
 )
 def test_nothing_wears_at_the_pitch_point_and_both_flanks_do_elsewhere(rule, words):
     case = case_of(*words, f"wear.rule={rule}")
     depth = case.wear_per_mesh(case.new_flanks())
     pitch = at_pitch(case)
+
     assert_close(depth[:, :, pitch], 0.0, atol=1e-12 * depth.max())
     assert depth[:, :, : pitch - 1].min() > 1e-3 * depth.max()
+
     sliding = case.path.sliding
     assert (sliding[:pitch] > 0.0).all()
     assert (sliding[pitch + 1 :] < 0.0).all()
@@ -81,6 +100,7 @@ def test_archard_is_linear_in_coefficient_and_hardness_of_each_gear():
     wheel = FlankMaterial(coefficient=None, hardness=2.0 * options.hardness)
     other = changed(case, pinion=pinion, wheel=wheel).wear_per_mesh(new)
     factors = np.array([3.0, 0.5])[:, None, None]
+
     assert_close(other, factors * case.wear_per_mesh(new), 1e-12)
 
 
@@ -88,10 +108,13 @@ def test_life_goes_with_threshold_and_the_wheel_meshes_less_often():
     case = case_of(*PAPER)
     life = wear_life(case)
     half = changed(case, threshold=0.5 * case.options.threshold)
+
     assert_close(wear_life(half).life, 0.5 * life.life, 1e-6)
+
     ratio = life.depth[-1] / (case.wear_per_mesh(case.new_flanks()) * life.life + 1e-30)
     shares = meshes_per_turn(case.pair)
     assert_close(shares, [1.0, 38.0 / 55.0], 1e-7)
+
     for result, share in zip(ratio, shares, strict=True):
         assert_close(result[0, :10], share, 1e-9)
 
@@ -107,7 +130,9 @@ def test_the_mesh_shares_the_load():
     whole = case.force / case.pair.face_width
     double = (place > 0.02 * pitch) & (place < end - 1.02 * pitch)
     both = load[double] + np.interp(place[double] + pitch, place, load)
+
     assert_close(both, whole, 2e-3)
+
     single = (place > end - 0.98 * pitch) & (place < 0.98 * pitch)
     assert_close(load[single], whole, 1e-9)
     assert load[double].max() < 0.7 * whole
@@ -134,6 +159,7 @@ def test_slices_of_a_spur_pair_wear_alike_and_as_the_whole():
     slices = replace(system.slices, n_slices=6)
     sliced = replace(system, slices=slices).sliced_mesh()
     six = wear_life(wear_case(sliced, case.material, case.options, case.torque))
+
     assert np.ptp(six.depth[-1], axis=1).max() < 1e-9 * six.depth.max()
     # six slices are looked at 24 phases of a pitch, one slice at every node
     assert_close(six.life, wear_life(case).life, 0.01)
@@ -161,6 +187,7 @@ def test_worn_places_give_their_load_away():
     life = wear_life(case)
     new = case.line_load(case.new_flanks())[0]
     worn = case.line_load(life.depth[-1])[0]
+
     assert worn[0] < 0.7 * new[0]
     assert life.life > 1.5 * wear_life(changed(case, geometry="unworn")).life
     # the pinion no longer wears most at its root
@@ -175,7 +202,11 @@ def test_a_path_has_the_pitch_point_for_a_node():
         assert len(path.position) == n_nodes
         assert np.abs(path.position - pair.pitch_point).min() < 1e-15
         assert (np.diff(path.position) > 0.0).all()
-        assert_close(path.position[[0, -1]], [0.0, pair.path_of_contact], 1e-6)
+        assert_close(
+            path.position[[0, -1]],
+            [0.0, pair.path_of_contact],
+            1e-6,
+        )
 
 
 @pytest.mark.parametrize("rule", ["band", "fixed_intervals"])
@@ -185,14 +216,18 @@ def test_a_history_is_the_same_in_one_go_or_many(rule):
     turns = life.turns[[0, 4, 4, 20, 40]]
     at_once = worn_flanks(case, turns)
     tolerance = 2e-3 * life.depth.max()
+
     assert_close(at_once[-1], life.depth[-1], atol=tolerance)
     assert_close(at_once[1], at_once[2])
     assert not at_once[0].any()
     assert (np.diff(at_once, axis=0) >= -1e-12).all()
+
     steady = worn_flanks(case, turns, torque=np.full(5, case.torque))
     assert_close(steady, at_once, atol=tolerance)
+
     later = worn_flanks(case, turns[3:] - turns[2], start=at_once[2])
     assert_close(later, at_once[3:], atol=tolerance)
+
     course = case.torque * np.array([1.0, 1.0, 1.0, 2.0, 1.0])
     heavier = worn_flanks(case, turns, torque=course)
     assert heavier[3].max() > 1.2 * at_once[3].max()

@@ -18,9 +18,16 @@ QUICK = {
     "gear.pinion.support.damping_x_ns_per_m": 100,
     "gear.wheel.support.damping_x_ns_per_m": 500,
 }
-PAPER = {"mesh.law": "paper", "mesh.pair_coupling": "sum", "mesh.contact": "linear"}
+PAPER = {
+    "mesh.law": "paper",
+    "mesh.pair_coupling": "sum",
+    "mesh.contact": "linear",
+}
 CLASSICAL = {"mesh.roll_torque": "classical"}
-ROTORS = {"system.motor.inertia_kg_m2": 5e-4, "system.load.inertia_kg_m2": 5e-3}
+ROTORS = {
+    "system.motor.inertia_kg_m2": 5e-4,
+    "system.load.inertia_kg_m2": 5e-3,
+}
 MISSING = (MissingTooth(gear="pinion", tooth=3),)
 
 
@@ -33,7 +40,11 @@ def bits(record):
         record.integration_error,
         record.integration_check,
     )
-    return record.acceleration.tobytes(), record.shaft_angle.tobytes(), repr(numbers)
+    return (
+        record.acceleration.tobytes(),
+        record.shaft_angle.tobytes(),
+        repr(numbers),
+    )
 
 
 def alone(runs):
@@ -78,7 +89,12 @@ class CoreRun(GroupRun):
     def whole(self) -> np.ndarray:
         """q and v with the rest and the rotation of ``center``, (2, dof, lane)."""
         turned = self.group.rotation.reshape(-1, self.n_lanes) * self.center
-        return np.stack([self.state[0] + self.group.rest + turned, self.state[1]])
+        return np.stack(
+            [
+                self.state[0] + self.group.rest + turned,
+                self.state[1],
+            ]
+        )
 
     def restart(self, lane: int) -> None:
         """Put one lane at rest in its equilibrium at the current time."""

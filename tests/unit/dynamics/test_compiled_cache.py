@@ -7,7 +7,10 @@ import sys
 from pathlib import Path
 
 import gensig
-from gensig.driveline.time import _line_mesh_kernels, _newmark_kernels
+from gensig.driveline.time import (
+    _line_mesh_kernels,
+    _newmark_kernels,
+)
 from gensig.dynamics._vector import source_stamp
 
 PACKAGE = Path(gensig.__file__).parent
@@ -37,19 +40,28 @@ def test_all_functions_have_the_stamp_of_all_files() -> None:
         assert stamp == source_stamp(PACKAGE)
 
 
-def test_a_change_of_a_called_function_is_noticed(tmp_path: Path) -> None:
+def test_a_change_of_a_called_function_is_noticed(
+    tmp_path: Path,
+) -> None:
     package = tmp_path / "gensig" / "dynamics"
     package.mkdir(parents=True)
     for folder in (package, package.parent):
         (folder / "__init__.py").write_text("")
     shutil.copy(PACKAGE / "dynamics" / "_vector.py", package)
     (package / "_calling.py").write_text(CALLING)
-    paths = {"PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    paths = {
+        "PYTHONPATH": str(tmp_path),
+        "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+    }
 
     def output(called: str) -> list[str]:
         (package / "_called.py").write_text(called)
         command = [sys.executable, "-c", PROGRAM]
-        options = {"env": {**os.environ, **paths}, "cwd": tmp_path, "text": True}
+        options = {
+            "env": {**os.environ, **paths},
+            "cwd": tmp_path,
+            "text": True,
+        }
         return subprocess.check_output(command, **options).split()
 
     assert output(CALLED) == ["4.0", "0"]

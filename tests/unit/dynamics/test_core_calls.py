@@ -31,7 +31,10 @@ def machines(request, machine, dynamics_of):
     """Eight machines of one law: sound and with a missing tooth, of many speeds and torques."""
     made = []
     for k, (speed, torque) in enumerate(zip(SPEEDS, TORQUES, strict=True)):
-        condition = {"operating.speed_rpm": speed, "operating.torque_nm": torque}
+        condition = {
+            "operating.speed_rpm": speed,
+            "operating.torque_nm": torque,
+        }
         faults = [MissingTooth(gear="pinion", tooth=1)] * (k % 2)
         system = machine({**request.param, **condition})
         made.append(dynamics_of(system, faults, phase=0.1 * k))
@@ -88,8 +91,10 @@ class TestRecentring:
         here, bare_here = self.walk(twins[0], 0)
         there, bare_there = self.walk(twins[1], self.SHIFT)
         level = np.abs(here).max(axis=0)
+
         assert_close(here / level, there / level, atol=1e-11)
         assert bare_here.tolist() != bare_there.tolist()
+
         jump = RECENTER - self.SHIFT
         turns = there[:, 0, PINION_TURN]
         assert_close(bare_there[: jump - 1], turns[: jump - 1])
@@ -111,7 +116,12 @@ class TestRecord:
     FIRST = -LOW_PASS.margin * FACTOR - 1
 
     def run(self, machines, channels=(0, 1, 5)):
-        return CoreRun(machines, STEP, first_step=self.FIRST, channels=channels)
+        return CoreRun(
+            machines,
+            STEP,
+            first_step=self.FIRST,
+            channels=channels,
+        )
 
     def record(self, machines, n_samples, channels=(0, 1, 5)):
         run = self.run(machines, channels)
@@ -122,8 +132,10 @@ class TestRecord:
         n_steps = (n_samples + 2 * self.LOW_PASS.margin) * FACTOR + 1
         samples = self.record(machines, n_samples)[0]
         expected = self.LOW_PASS.apply(self.run(machines).means(n_steps))
+
         assert samples.tobytes() == expected.tobytes()
         assert np.isfinite(samples).all()
+
         if n_samples == BLOCK + 1:
             alone = self.record(machines, n_samples, (5,))[0]
             assert alone[:, 0].tobytes() == samples[:, 2].tobytes()
@@ -139,4 +151,5 @@ class TestRecord:
             turned = walk.whole[0, PINION_TURN] + sample / 51200 * speed
             assert_close(angle[:, sample], turned, atol=1e-14)
             walk.means(FACTOR)
+
         assert (np.abs(angle[:, 0]) < 0.5 * speed / 51200).all()

@@ -6,7 +6,13 @@ from itertools import permutations
 import numpy as np
 import pytest
 from closeness import assert_close
-from core_runs import MISSING, QUICK, ROTORS, CoreRun, assert_independent
+from core_runs import (
+    MISSING,
+    QUICK,
+    ROTORS,
+    CoreRun,
+    assert_independent,
+)
 
 from gensig.dynamics.pair import PINION_Y
 from gensig.systems.base import simulate_together
@@ -53,7 +59,11 @@ def turned(run, n_samples):
 
 def assert_same_signal(record, expected, atol):
     level = expected.acceleration.std(axis=1, keepdims=True)
-    assert_close(record.acceleration / level, expected.acceleration / level, atol=atol)
+    assert_close(
+        record.acceleration / level,
+        expected.acceleration / level,
+        atol=atol,
+    )
 
 
 class TestSteady:
@@ -85,7 +95,11 @@ class TestRamp:
     @WITH_ROTORS
     def test_the_shaft_lags(self, run, record, rotors):
         """By the inertia torque over the drive's stiffness; without friction, which would grow."""
-        changes = {**rotors, "mesh.friction_coefficient": 0, SPEED: RAMP}
+        changes = {
+            **rotors,
+            "mesh.friction_coefficient": 0,
+            SPEED: RAMP,
+        }
         ramp = run(changes)
         still = {**changes, SPEED: [[0, 1], [1, 1]]}
         n = len(record(changes).shaft_angle)
@@ -100,7 +114,12 @@ class TestRamp:
             driven = dynamics.reduced_inertia - motor.inertia
             twist += self.ACCELERATION * driven / motor.coupling_stiffness
         else:
-            assert_close(twist, self.ACCELERATION / (2 * math.pi * DRIVE) ** 2, 1e-12)
+            assert_close(
+                twist,
+                self.ACCELERATION / (2 * math.pi * DRIVE) ** 2,
+                1e-12,
+            )
+
         assert_close(lag.mean(), twist, 2e-3)
         assert np.ptp(lag) < 0.05 * twist
 
@@ -115,10 +134,20 @@ class TestRamp:
     @pytest.mark.parametrize("kink", [0.01, 0.0105])
     def test_a_kink_of_the_course_is_no_jump_of_the_shaft(self, run, kink):
         """On and between the instants at which the course is tabled."""
-        changed = run({SPEED: [[-0.4, 1], [kink, 1], [kink + 0.005, 1.3], [1, 1.3]]})
+        changed = run(
+            {
+                SPEED: [
+                    [-0.4, 1],
+                    [kink, 1],
+                    [kink + 0.005, 1.3],
+                    [1, 1.3],
+                ]
+            }
+        )
         (record,) = simulate_together([changed])
         off = record.shaft_angle - turned(changed, len(record.shaft_angle))
         most = 0.3 * SET_SPEED / RATE  # of a shaft that keeps its speed
+
         assert np.abs(np.diff(off)).max() < most
         assert np.abs(np.diff(off, 2)).max() < 0.03 * most
 
@@ -146,7 +175,11 @@ class TestTorque:
         """Before and after the torque has changed."""
         dynamics = pair_dynamics(run({TORQUE: [[-1, 1], [0.01, 1], [0.02, factor]]}))
         before = 0.01 - 4 / dynamics.mesh_frequency
-        assert_close(self.carried(dynamics, before, 0.03), [1.0, factor], 2e-2)
+        assert_close(
+            self.carried(dynamics, before, 0.03),
+            [1.0, factor],
+            2e-2,
+        )
 
     def test_without_torque_nothing_touches(self, record):
         free = record({TORQUE: [[0, 0], [1, 0]]})
@@ -159,7 +192,12 @@ class TestNeighbours:
     def test_steady_and_changing_records_are_independent(self, run):
         kinked = {SPEED: [[0.0, 1.0], [0.01, 1.3]]}
         both = {SPEED: RAMP, TORQUE: RAMP}
-        plain = [run(), run({SPEED: RAMP}), run({TORQUE: RAMP}), run(both)]
+        plain = [
+            run(),
+            run({SPEED: RAMP}),
+            run({TORQUE: RAMP}),
+            run(both),
+        ]
         runs = [*plain, run({}, MISSING), run(kinked, MISSING)]
         assert_independent(runs, [range(6), (5, 4, 3, 2, 1, 0)])
 
@@ -177,7 +215,13 @@ def test_machines_with_rotors_move_in_every_channel(run):
     ends = [f"{name}_rotation" for name in ("pinion", "wheel", "motor", "load")]
     channels = {"sensing.channels": ["pinion_y", *ends]}
     (record,) = simulate_together(
-        [run({**ROTORS, SPEED: RAMP, TORQUE: RAMP, **channels}, MISSING)]
+        [
+            run(
+                {**ROTORS, SPEED: RAMP, TORQUE: RAMP, **channels},
+                MISSING,
+            )
+        ]
     )
+
     assert record.acceleration.shape == (5, 1536)
     assert (record.acceleration.std(axis=-1) > 1.0).all()

@@ -28,7 +28,8 @@ def decimated(frequency, factor, phase=0.4):
     low_pass = decimator(factor)
     turn = 2 * np.pi * frequency
     steps = np.arange(
-        -low_pass.margin * factor - 1, (N_SAMPLES + low_pass.margin) * factor + 1
+        -low_pass.margin * factor - 1,
+        (N_SAMPLES + low_pass.margin) * factor + 1,
     )
     edge = steps / (RATE * factor)
     integral = (
@@ -49,7 +50,11 @@ def test_the_pass_band_is_flat_and_keeps_the_phase(frequency, factor):
 @pytest.mark.parametrize("factor", FACTORS)
 def test_aliases_are_78_db_down(factor):
     for alias in (25.0, 690.0, 12_000.0, 19_990.0, 25_500.0):
-        for frequency in (RATE - alias, RATE + alias, 2 * RATE - alias):
+        for frequency in (
+            RATE - alias,
+            RATE + alias,
+            2 * RATE - alias,
+        ):
             if frequency < 0.5 * factor * RATE:
                 assert np.abs(decimated(frequency, factor)[0]).max() < 10 ** (-78 / 20)
     times = np.arange(N_SAMPLES) / RATE
@@ -75,6 +80,7 @@ def test_channels_and_lanes_are_filtered_alone(n_samples, factor):
     means[7:, :, 2] = np.nan
     spoilt = replace(low_pass, taps=taps).apply(means)
     others = np.arange(LANES) != 2
+
     assert spoilt[others].tobytes() == samples[others].tobytes()
     assert np.isnan(spoilt[2]).all()
 
@@ -83,6 +89,7 @@ def test_stored_taps_are_those_of_the_design(composed_config):
     stored = {int(factor) for factor in json.loads(STORED.read_text())}
     default = composed_config["solver"]["oversampling"]
     assert stored == {default, 2 * default}
+
     for factor in stored:
         low_pass = decimator(factor)
         designed = design(factor)
@@ -96,11 +103,13 @@ def test_every_allowed_step_and_its_half_have_a_low_pass(finest):
     fine = decimator(2 * finest)
     factor = 2 * finest
     assert fine.margin <= decimator(finest).margin
+
     band = usable_band(RATE)[1]
     folding = (0.5 * factor - 0.3) * RATE
     frequency = np.array([0.0, band, 0.5 * RATE, 0.7 * RATE, folding]) / (factor * RATE)
     turn = np.exp(-2j * np.pi * np.outer(frequency, np.arange(len(fine.taps))))
     gain = np.abs(turn @ fine.taps) * np.sinc(frequency)
+
     assert_close(gain[:2], 1.0, atol=FLAT)
     assert gain[2:].max() < 10 ** ((3 - ATTENUATION_DB) / 20)
 
@@ -117,14 +126,23 @@ class TestInBandError:
     def tone(self, frequency, amplitude=1.0):
         return amplitude * np.sin(2 * np.pi * frequency * self.TIME + 0.3)
 
-    def test_it_is_relative_to_the_level_of_the_worst_channel(self):
+    def test_it_is_relative_to_the_level_of_the_worst_channel(
+        self,
+    ):
         exact = np.array([[self.tone(1000), self.tone(3000, 200.0)]] * 2)
         off = np.zeros_like(exact)
         off[0] = self.tone(5000, 1e-3), self.tone(5000, 1e-2)
         off[1, 0] = self.tone(5000, 2e-5)
-        assert_close(in_band_error(exact + off, exact, RATE), [1e-3, 2e-5], 1e-2)
+
+        assert_close(
+            in_band_error(exact + off, exact, RATE),
+            [1e-3, 2e-5],
+            1e-2,
+        )
+
         scaled = exact[:1] * [[[1.001], [1.02]]]
         assert_close(in_band_error(scaled, exact[:1], RATE), [0.02], 1e-9)
+
         still = np.zeros((1, 1, 256))
         assert in_band_error(still, still, RATE).tolist() == [0.0]
 

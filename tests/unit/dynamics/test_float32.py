@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 from closeness import assert_close
-from core_runs import MISSING, PAPER, QUICK, ROTORS, alone, assert_same, bits
+from core_runs import (
+    MISSING,
+    PAPER,
+    QUICK,
+    ROTORS,
+    alone,
+    assert_same,
+    bits,
+)
 from fault_cases import one
 
 from gensig.dynamics._vector import n_lanes
@@ -16,13 +24,23 @@ from gensig.systems.run import Run, Start
 LANES = n_lanes("float32")
 RATE = 51200.0
 BRIEF = {"operating.duration_s": 0.01}
-LIGHT = {"operating.torque_nm": 2, "operating.speed_rpm": 2500, "gear.backlash_um": 4}
+LIGHT = {
+    "operating.torque_nm": 2,
+    "operating.speed_rpm": 2500,
+    "gear.backlash_um": 4,
+}
 CASES = {
     "crack": ({}, (one("crack"),)),
     "missing": ({"operating.torque_nm": 5}, MISSING),
     "slow": ({"operating.speed_rpm": 600}, ()),
-    "fast": ({"operating.speed_rpm": 6000, "operating.torque_nm": 60}, ()),
-    "ramp": ({"operating.speed_profile": [[-0.4, 0.4], [0.4, 1.6]]}, ()),
+    "fast": (
+        {"operating.speed_rpm": 6000, "operating.torque_nm": 60},
+        (),
+    ),
+    "ramp": (
+        {"operating.speed_profile": [[-0.4, 0.4], [0.4, 1.6]]},
+        (),
+    ),
     "rotors": (ROTORS, ()),
     "paper": (PAPER, ()),
 }
@@ -31,7 +49,11 @@ CASES = {
 @pytest.fixture(scope="module")
 def run(machine):
     def make(changes=None, faults=(), precision="float32", **values):
-        usual = {**QUICK, "operating.duration_s": 0.05, "solver.precision": precision}
+        usual = {
+            **QUICK,
+            "operating.duration_s": 0.05,
+            "solver.precision": precision,
+        }
         system = machine({**usual, **(changes or {})})
         return Run(system=system, faults=tuple(faults), **values)
 
@@ -49,7 +71,11 @@ def test_records_agree_with_double(run, name):
     assert 1e-8 < in_band_error(*signals, RATE)[0] < 2.5e-5
     assert single.acceleration.dtype == double.acceleration.dtype == np.float64
     assert_close(single.mean_speed, double.mean_speed, 1e-8)
-    assert_close(single.contact_loss_fraction, double.contact_loss_fraction, 1e-3)
+    assert_close(
+        single.contact_loss_fraction,
+        double.contact_loss_fraction,
+        1e-3,
+    )
     assert_close(single.shaft_angle, double.shaft_angle, atol=1e-7)
 
 
@@ -61,6 +87,7 @@ def test_the_shaft_does_not_drift(run):
         for name in ("float32", "float64")
     )
     off = np.abs(single - double).reshape(10, -1)
+
     assert double[-1] > 20 * 2 * np.pi
     assert off.max() < 1e-7
     assert off[-1].max() < 10 * off[0].max()
@@ -73,7 +100,10 @@ class TestBits:
         errors = np.random.default_rng(8).normal(0, 3e-6, (2, 84))
         specimen = Specimen(pinion_error=errors[0, :23], wheel_error=errors[1])
         start = Start(tooth_pinion=5, tooth_wheel=60, phase=0.7)
-        coarse = {"mesh.points_per_pitch": 64, "operating.drive_frequency_hz": 9}
+        coarse = {
+            "mesh.points_per_pitch": 64,
+            "operating.drive_frequency_hz": 9,
+        }
         return [
             run(BRIEF, start=start),
             run({**BRIEF, **LIGHT}, MISSING),
@@ -98,8 +128,14 @@ class TestBits:
         proud = np.where(np.arange(23) % 2, -0.03, 0.0)
         specimen = Specimen(pinion_error=proud, wheel_error=np.zeros(84))
         double = run(BRIEF, (), "float64")
-        mixed = [runs[0], run(BRIEF, specimen=specimen), double, *runs[1:]]
+        mixed = [
+            runs[0],
+            run(BRIEF, specimen=specimen),
+            double,
+            *runs[1:],
+        ]
         together = simulate_together(mixed)
+
         assert isinstance(together.pop(1), SimulationError)
         assert_same([together.pop(1)], alone([double]))
         assert_same(together, expected)

@@ -4,7 +4,15 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from core_runs import CLASSICAL, MISSING, PAPER, QUICK, alone, assert_same, bits
+from core_runs import (
+    CLASSICAL,
+    MISSING,
+    PAPER,
+    QUICK,
+    alone,
+    assert_same,
+    bits,
+)
 from fault_cases import one
 
 from gensig.dynamics._vector import LANES
@@ -30,11 +38,20 @@ PINION_STIFFNESS = "gear.pinion.support.stiffness_y_n_per_m"
 TWO_MISSING = (*MISSING, MissingTooth(gear="pinion", tooth=4))
 # so many distinct teeth on both gears that the table stores them one by one
 MANY_PITS = tuple(
-    one("pitting", gear=gear, tooth=tooth, pit_width_mm=4.0 + tooth)
+    one(
+        "pitting",
+        gear=gear,
+        tooth=tooth,
+        pit_width_mm=4.0 + tooth,
+    )
     for gear, n_teeth in (("pinion", 5), ("wheel", 6))
     for tooth in range(n_teeth)
 )
-BRIEF = {**QUICK, "operating.duration_s": 0.02, "solver.oversampling": 8}
+BRIEF = {
+    **QUICK,
+    "operating.duration_s": 0.02,
+    "solver.oversampling": 8,
+}
 GEOMETRY = {
     "gear.pinion.n_teeth": 31,
     "gear.pinion.bore_radius_mm": 12,
@@ -44,7 +61,10 @@ GEOMETRY = {
     "mesh.damping_ratio": 0.03,
 }
 # a damper across the mesh that the light pinion overshoots in a step
-OVERDAMPED = {"mesh.damping_ratio": 1.0, "gear.pinion.mass_kg": 0.006}
+OVERDAMPED = {
+    "mesh.damping_ratio": 1.0,
+    "gear.pinion.mass_kg": 0.006,
+}
 COARSE_STEP = pytest.mark.filterwarnings(
     "ignore::gensig.dynamics.integrator.CoarseStepWarning"
 )
@@ -65,20 +85,36 @@ def mix(run, law):
     """Eight runs that share only their law."""
     gaps = law.get("mesh.law") != "paper"
     pinion, wheel = np.random.default_rng(8).normal(0, 3e-6, (2, 84))
-    tilts = {"pinion_tilt": 100.0 * wheel[:23], "wheel_tilt": 100.0 * pinion}
+    tilts = {
+        "pinion_tilt": 100.0 * wheel[:23],
+        "wheel_tilt": 100.0 * pinion,
+    }
     specimen = Specimen(pinion_error=pinion[:23], wheel_error=wheel, **tilts)
     factors = np.array([1.1, 0.9, 1.0, 1.2])
     gearbox = Gearbox(
-        stiffness_factor=factors, damping_factor=np.full(4, 0.9), gain=np.ones(4)
+        stiffness_factor=factors,
+        damping_factor=np.full(4, 0.9),
+        gain=np.ones(4),
     )
-    odd = one("crack", tooth=4), one("pitch_error", gear="wheel", tooth=3)
+    odd = (
+        one("crack", tooth=4),
+        one("pitch_error", gear="wheel", tooth=3),
+    )
     cracks = [one("crack", gear="wheel", tooth=k) for k in range(2)]
     light = {TORQUE: 0.5, BACKLASH: 3, SPEED: 3000}
     coarse = {**GEOMETRY, "mesh.points_per_pitch": 64}
-    smooth = {"mesh.friction_coefficient": 0, SPEED: 6000, TORQUE: 100}
+    smooth = {
+        "mesh.friction_coefficient": 0,
+        SPEED: 6000,
+        TORQUE: 100,
+    }
 
     def start(pinion_tooth, wheel_tooth, phase):
-        return Start(tooth_pinion=pinion_tooth, tooth_wheel=wheel_tooth, phase=phase)
+        return Start(
+            tooth_pinion=pinion_tooth,
+            tooth_wheel=wheel_tooth,
+            phase=phase,
+        )
 
     def made(changes, faults=(), **values):
         return run({**law, **changes}, faults, **values)
@@ -125,9 +161,14 @@ class TestBitsAlone:
     def test_in_every_lane(self, mixed, law):
         runs, expected = mixed(law)
         assert len({bits(record) for record in expected}) == LANES
+
         rng = np.random.default_rng(1)
         orders = [np.roll(range(LANES), -first) for first in range(LANES)]
-        for order in (*orders, rng.permutation(LANES), rng.permutation(LANES)):
+        for order in (
+            *orders,
+            rng.permutation(LANES),
+            rng.permutation(LANES),
+        ):
             together = simulate_together([runs[k] for k in order])
             assert_same(together, [expected[k] for k in order])
 
@@ -163,9 +204,13 @@ class TestBitsAlone:
                 BACKLASH: float(rng.choice([5, 80])),
             }
             faults = (MISSING, TWO_MISSING)[rng.integers(2)]
-            start = Start(tooth_pinion=int(rng.integers(23)), phase=float(rng.random()))
+            start = Start(
+                tooth_pinion=int(rng.integers(23)),
+                phase=float(rng.random()),
+            )
             runs.append(run(changes, faults, start=start))
         expected = alone(runs)
+
         assert max(record.contact_loss_fraction for record in expected) > 0.005
         assert_same(simulate_together(runs), expected)
 
@@ -181,8 +226,10 @@ class TestFailures:
         )
         together = simulate_together(runs)
         failed = together.pop(lane)
+
         assert isinstance(failed, SimulationError)
         assert "the motion stopped being finite" in str(failed)
+
         del expected[lane]
         assert_same(together, expected)
         assert str(alone([runs[lane]])[0]) == str(failed)
@@ -194,13 +241,18 @@ class TestFailures:
         expected = alone(runs)
         runs.insert(lane, run({PINION_STIFFNESS: 1e13}))
         together = simulate_together(runs)
+
         assert "raise solver.oversampling" in str(together.pop(lane))
         assert_same(together, expected)
 
     def test_a_single_run_raises(self, run):
         single = diverging(run())
-        with pytest.raises(SimulationError, match="the motion stopped being finite"):
+        with pytest.raises(
+            SimulationError,
+            match="the motion stopped being finite",
+        ):
             single.system.simulate(specimen=single.specimen)
+
         text = r"raise solver\.oversampling to at least \d+$"
         with pytest.raises(SimulationError, match=text):
             run({PINION_STIFFNESS: 1e13}).system.simulate()
@@ -230,7 +282,12 @@ class TestError:
         }
         calm = {**fast, SPEED: 1200}
         light = {**fast, TORQUE: 5}
-        changes = (calm, ()), (fast, MISSING), (calm, MISSING), (fast, ())
+        changes = (
+            (calm, ()),
+            (fast, MISSING),
+            (calm, MISSING),
+            (fast, ()),
+        )
         return [run(*each) for each in (*changes, (light, TWO_MISSING))]
 
     @pytest.fixture(scope="class")
@@ -250,7 +307,11 @@ class TestError:
             is_same = bits(first)[0] == bits(records[k])[0]
             assert is_same == (k not in self.COARSE)
         finer = [with_solver(runs[k], oversampling=10) for k in self.COARSE]
-        assert_same(simulate_together(finer), [records[k] for k in self.COARSE])
+
+        assert_same(
+            simulate_together(finer),
+            [records[k] for k in self.COARSE],
+        )
 
     def test_errors_end_below_the_limit(self, records):
         calm = [record for k, record in enumerate(records) if k != self.BOUNCING]
@@ -275,7 +336,11 @@ RECORD = {
     "duration": 0.005,
     "channels": ("wheel_y", "pinion_rotation"),
 }
-SOLVER = {"oversampling": 4, "precision": "float64", "max_error": None}
+SOLVER = {
+    "oversampling": 4,
+    "precision": "float64",
+    "max_error": None,
+}
 INTEGRATION = Integration(**RECORD, **SOLVER, with_mesh_state=False)
 
 
@@ -283,15 +348,21 @@ class TestMotions:
     @COARSE_STEP
     def test_any_number_of_machines_in_order(self, machine, dynamics_of):
         """More than a group, of two kinds of settling; motions are those of machines alone."""
-        systems = [machine(), machine({PINION_STIFFNESS: 2e9}), machine()]
+        systems = [
+            machine(),
+            machine({PINION_STIFFNESS: 2e9}),
+            machine(),
+        ]
         machines = [
             dynamics_of(systems[k % 3], phase=0.05 * k) for k in range(LANES + 3)
         ]
         assert [len(group) for group in lane_groups(machines, INTEGRATION)] == [7, 4]
+
         together = integrate(machines, Solver(**SOLVER), **RECORD)
         assert together.acceleration.shape == (LANES + 3, 2, 256)
         assert together.check.shape == (LANES + 3, 2, 0)
         assert together.finite.all()
+
         for k in (0, 1, 2, LANES + 2):
             single = integrate([machines[k]], Solver(**SOLVER), **RECORD)
             for field in fields(Motions):

@@ -25,8 +25,14 @@ SOFT = {
     "gear.pinion.support.stiffness_x_n_per_m": 0.0,
     "gear.wheel.support.damping_y_ns_per_m": 0.0,
 }
-STIFF = {"gear.pinion.support.stiffness_x_n_per_m": 9e5, "operating.torque_nm": 31.0}
-ROTORS = {"system.motor.inertia_kg_m2": 2e-3, "system.load.inertia_kg_m2": 5e-2}
+STIFF = {
+    "gear.pinion.support.stiffness_x_n_per_m": 9e5,
+    "operating.torque_nm": 31.0,
+}
+ROTORS = {
+    "system.motor.inertia_kg_m2": 2e-3,
+    "system.load.inertia_kg_m2": 5e-2,
+}
 LIGHT = {
     **ROTORS,
     "system.motor.coupling_stiffness_nm_per_rad": 500,
@@ -37,7 +43,10 @@ LIGHT = {
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"mass": np.array([1.0, 0.0])}, "mass or inertia of 'b' must be positive"),
+        (
+            {"mass": np.array([1.0, 0.0])},
+            "mass or inertia of 'b' must be positive",
+        ),
         (
             {"stiffness": np.array([[5.0, -5.0], [0.0, 5.0]])},
             "stiffness matrix is not symmetric",
@@ -46,8 +55,14 @@ LIGHT = {
             {"damping": np.array([[0.0, 1.0], [-1.0, 0.0]])},
             "damping matrix is not symmetric",
         ),
-        ({"damping": np.diag([-1.0, 0.0])}, "damping matrix would feed energy in"),
-        ({"stiffness": np.diag([1.0, -1.0])}, "stiffness matrix would feed energy in"),
+        (
+            {"damping": np.diag([-1.0, 0.0])},
+            "damping matrix would feed energy in",
+        ),
+        (
+            {"stiffness": np.diag([1.0, -1.0])},
+            "stiffness matrix would feed energy in",
+        ),
     ],
 )
 def test_impossible_systems_are_refused(changes, text):
@@ -73,7 +88,9 @@ def test_a_group_holds_the_matrices_of_each_machine(machine, dynamics_of, kinds,
     machines = [dynamics_of(machine(changes)) for changes in kinds]
     group = pack(machines, 1e-6)
     n = len(machines[0].dofs)
+
     assert len(group.other_column) == {6: 0, 8: 4}[n]
+
     row = np.repeat(np.arange(n), np.diff(group.other_first))
     diagonal = getattr(group, name)
     others = getattr(group, f"other_{name}")
@@ -91,10 +108,14 @@ def test_one_compiled_program_takes_every_machine(machine, dynamics_of):
 
 
 @pytest.mark.parametrize(
-    "time", [0.0, (10**8 + 6) * BRIEF], ids=["recentred", "as_it_is"]
+    "time",
+    [0.0, (10**8 + 6) * BRIEF],
+    ids=["recentred", "as_it_is"],
 )
 @pytest.mark.parametrize(
-    "changes", [{}, ROTORS, LIGHT], ids=["pair", "rotors", "light"]
+    "changes",
+    [{}, ROTORS, LIGHT],
+    ids=["pair", "rotors", "light"],
 )
 def test_the_compiled_right_hand_side_is_that_of_the_matrices(
     machine, dynamics_of, changes, time
@@ -115,7 +136,11 @@ def test_the_compiled_right_hand_side_is_that_of_the_matrices(
         (law,) = laws(dynamics, motion_of(dynamics, time, q, v))
         normal, friction, moment_p, moment_w, along = law[:5]
         mesh = np.zeros(n)
-        mesh[:3] = friction, normal, pinion * (along - normal) + moment_p
+        mesh[:3] = (
+            friction,
+            normal,
+            pinion * (along - normal) + moment_p,
+        )
         mesh[3:6] = -friction, -normal, wheel * normal + moment_w
         held = system.stiffness @ q + system.damping @ v
         expected = system.force - held + mesh

@@ -42,8 +42,13 @@ def test_static_start_is_in_equilibrium(xiamen, dynamics_of, phase):
     stiffness = dynamics.system().stiffness
     approach = q @ dynamics.approach_direction()
     force = laws(dynamics, [(dynamics.start_roll, approach, 0.0, 0.0)])[0, 0]
+
     assert_close(force, dynamics.mesh_force, 1e-6)
-    assert_close(stiffness[[1, 4], [1, 4]] * q[[1, 4]], [force, -force], 1e-6)
+    assert_close(
+        stiffness[[1, 4], [1, 4]] * q[[1, 4]],
+        [force, -force],
+        1e-6,
+    )
 
 
 def test_reduced_values(xiamen, dynamics_of):
@@ -51,11 +56,17 @@ def test_reduced_values(xiamen, dynamics_of):
     # spur reference (docs/validation.md), section 3.4
     assert_close(dynamics.mesh_force, 925.37, 1e-5)
     assert_close(dynamics.mesh_frequency, 690.0, 1e-12)
+
     inverse = 21.61293e-3**2 / 4.858e-5 + 78.93418e-3**2 / 3.509e-3
     assert_close(dynamics.equivalent_mass, 1 / inverse, 1e-5)
+
     faulty = dynamics_of(xiamen, MISSING).mean_mesh_stiffness
     assert_close(faulty, dynamics.mean_mesh_stiffness, 1e-9)
-    assert_close(faulty, xiamen.stiffness_curves().mesh_stiffness.mean(), 1e-3)
+    assert_close(
+        faulty,
+        xiamen.stiffness_curves().mesh_stiffness.mean(),
+        1e-3,
+    )
 
 
 def test_friction_torque_is_the_imbalance_of_drive_and_load(
@@ -72,7 +83,9 @@ def test_friction_torque_is_the_imbalance_of_drive_and_load(
         1 - pair.path_of_contact / pitch + recess**2 + (pair.pitch_point / pitch) ** 2
     )
     loss = 0.05 * math.pi * (1 / 23 + 1 / 84) * shares
+
     assert_close(torque / xiamen.operating.torque, loss, 0.05)
+
     rough = dynamics_of(machine({"mesh.friction_coefficient": 0.1}))
     assert_close(rough.friction_torque(), 2 * torque, 1e-9)
     assert_close(force[2] + force[5] / xiamen.pair.ratio, torque, 1e-9)
@@ -85,7 +98,11 @@ def test_settling_follows_the_slowest_motion_up_to_a_limit(machine, dynamics_of)
         ({"operating.drive_frequency_hz": 1}, 0.45),
         (QUICK, decay / 20),
     ):
-        assert_close(settling_time(dynamics_of(machine(changes))), expected, 0.02)
+        assert_close(
+            settling_time(dynamics_of(machine(changes))),
+            expected,
+            0.02,
+        )
 
 
 def test_solid_disc():
@@ -97,7 +114,8 @@ def test_solid_disc():
 class TestRefusals:
     @pytest.mark.filterwarnings("ignore::gensig.dynamics.integrator.CoarseStepWarning")
     @pytest.mark.parametrize(
-        ("rate", "steps"), [(6e3, 2), (6e3, 3), (1e3, 17), (10.0, 2)]
+        ("rate", "steps"),
+        [(6e3, 2), (6e3, 3), (1e3, 17), (10.0, 2)],
     )
     def test_an_unstable_step_names_the_longest_stable_one(
         self, xiamen, dynamics_of, rate, steps
@@ -105,11 +123,13 @@ class TestRefusals:
         dynamics = dynamics_of(xiamen)
         with pytest.raises(SimulationError) as caught:
             check_step(dynamics, rate, steps)
+
         text = str(caught.value)
         assert text.startswith(
             f"solver.oversampling = {steps} makes internal steps of "
         )
         assert "\n" not in text
+
         enough = int(re.search(r"to at least (\d+)$", text)[1])
         check_step(dynamics, rate, enough)
         with pytest.raises(SimulationError, match=f"to at least {enough}$"):
@@ -120,13 +140,17 @@ class TestRefusals:
         text = r"internal steps to a period of the mesh mode .* raise solver"
         with pytest.warns(CoarseStepWarning, match=text) as warned:
             check_step(dynamics, RATE, 2)
-        result = re.search(r"solver.oversampling to (\d+)", str(warned[0].message))
+        result = re.search(
+            r"solver.oversampling to (\d+)",
+            str(warned[0].message),
+        )
         enough = int(result[1])
         with pytest.warns(CoarseStepWarning):
             check_step(dynamics, RATE, enough - 1)
         recwarn.clear()
         check_step(dynamics, RATE, enough)
         check_step(dynamics, RATE, 2, max_error=1e-3)
+
         assert not recwarn.list
 
     @pytest.mark.parametrize(("precision", "lanes"), [("float64", 8), ("float32", 16)])
@@ -134,13 +158,16 @@ class TestRefusals:
         solver = Solver(oversampling=5, precision=precision)
         with pytest.raises(ConfigError) as caught:
             check_memory(1e4, RATE, 4, solver)
+
         text = str(caught.value)
         assert text.startswith(
             f"operating.duration_s = 10000: {lanes} records side by side with 4 channels at "
             "51200 Hz"
         )
+
         longest = float(re.search(r"at most (.+) s at a time$", text)[1])
         assert_close(longest, MOST_BYTES / (51200 * 4 * 8 * lanes), 5e-3)
+
         check_memory(0.99 * longest, RATE, 4, solver)
         with pytest.raises(ConfigError, match="record at most"):
             check_memory(1.01 * longest, RATE, 4, solver)
@@ -149,7 +176,11 @@ class TestRefusals:
         machine().check()
         with pytest.raises(ConfigError, match="side by side with 4 channels"):
             machine({"operating.duration_s": 2000.0}).check()
-        coarse = {"solver.oversampling": 2, "sensing.sampling_rate_hz": 6000}
+
+        coarse = {
+            "solver.oversampling": 2,
+            "sensing.sampling_rate_hz": 6000,
+        }
         with pytest.raises(SimulationError, match=r"= 2 makes internal steps of"):
             machine(coarse).check()
 
@@ -160,7 +191,10 @@ class TestRefusals:
                 {"channels": ("housing",)},
                 "no channel housing; allowed: pinion_x, pinion_y",
             ),
-            ({"duration": 1e-6}, "operating.duration_s = 1e-06 holds no sample"),
+            (
+                {"duration": 1e-6},
+                "operating.duration_s = 1e-06 holds no sample",
+            ),
         ):
             with pytest.raises(ConfigError, match=re.escape(text)):
                 recorded(xiamen, dynamics, **changes)
@@ -183,7 +217,11 @@ class TestRefusals:
                 {"precision": "float16"},
                 "'float16'; allowed: float64, float32",
             ),
-            ("solver", {"max_error": 0.0}, "= 0 must lie in 1e-6..1, or be null"),
+            (
+                "solver",
+                {"max_error": 0.0},
+                "= 0 must lie in 1e-6..1, or be null",
+            ),
             (
                 "support",
                 {"stiffness_x": -1.0},
@@ -194,7 +232,11 @@ class TestRefusals:
                 {"damping_y": -1.0},
                 "damping_y_ns_per_m = -1 must not be negative",
             ),
-            ("operating", {"speed": 0.0}, "operating.speed_rpm = 0 must be positive"),
+            (
+                "operating",
+                {"speed": 0.0},
+                "operating.speed_rpm = 0 must be positive",
+            ),
             (
                 "operating",
                 {"torque": -5.0},
@@ -235,5 +277,6 @@ class TestRecord:
             system.simulate(faults).acceleration[1] for faults in ((), MISSING)
         )
         assert_close([healthy.std(), missing.std()], [158.2, 183.9], 0.05)
+
         rise = np.abs(missing).max() / np.abs(healthy).max()
         assert_close(rise, 2404 / 694, 0.15)

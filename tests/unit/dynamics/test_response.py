@@ -10,8 +10,16 @@ from gensig.dynamics.pair import PINION_X, Rotor
 from gensig.dynamics.response import accelerations
 
 ROTORS = {
-    "motor": Rotor(inertia=2e-3, coupling_stiffness=3e3, coupling_damping_ratio=0.05),
-    "load": Rotor(inertia=8e-2, coupling_stiffness=1e4, coupling_damping_ratio=0.03),
+    "motor": Rotor(
+        inertia=2e-3,
+        coupling_stiffness=3e3,
+        coupling_damping_ratio=0.05,
+    ),
+    "load": Rotor(
+        inertia=8e-2,
+        coupling_stiffness=1e4,
+        coupling_damping_ratio=0.03,
+    ),
 }
 
 
@@ -31,6 +39,7 @@ def test_across_the_line_of_action_a_gear_is_one_mass_on_its_support(
     stiffness = body.support.stiffness_x
     damping = body.support.damping_x
     expected = -(w**2) / (stiffness - w**2 * body.mass + 1j * w * damping)
+
     assert_close(response[:, PINION_X], expected, 1e-9)
     assert np.all(np.delete(response, PINION_X, axis=1) == 0.0)
 
@@ -52,4 +61,5 @@ def test_it_solves_the_equations_of_motion(xiamen, dynamics_of, rotors, name):
     mesh = dynamics.mean_mesh_stiffness * moved + dynamics.mesh_damping * speed
     held = system.stiffness @ moved + system.damping @ speed
     force = system.mass * acceleration + held + direction * (direction @ mesh)
+
     assert_close(force, np.eye(len(force))[dof], atol=1e-9)

@@ -17,8 +17,16 @@ from gensig.errors import ConfigError
 from gensig.operation.courses import Profile
 from gensig.systems.registry import read_system
 
-MOTOR = Rotor(inertia=2e-3, coupling_stiffness=3e3, coupling_damping_ratio=0.05)
-LOAD = Rotor(inertia=8e-2, coupling_stiffness=1e4, coupling_damping_ratio=0.03)
+MOTOR = Rotor(
+    inertia=2e-3,
+    coupling_stiffness=3e3,
+    coupling_damping_ratio=0.05,
+)
+LOAD = Rotor(
+    inertia=8e-2,
+    coupling_stiffness=1e4,
+    coupling_damping_ratio=0.03,
+)
 MACHINES = {
     "pair": {},
     "motor": {"motor": MOTOR},
@@ -67,7 +75,10 @@ def whole(smooth, dynamics_of):
 
 
 def on_course(dynamics, name):
-    return replace(dynamics, operating=replace(dynamics.operating, **COURSES[name]))
+    return replace(
+        dynamics,
+        operating=replace(dynamics.operating, **COURSES[name]),
+    )
 
 
 def ends(dynamics):
@@ -110,12 +121,17 @@ class TestEquations:
     def test_degrees_of_freedom(self, dynamics, rotors):
         system = dynamics.system()
         direction = dynamics.approach_direction()
-        names = (*PAIR_DOFS, *[f"{name}_rotation" for name in rotors])
+        names = (
+            *PAIR_DOFS,
+            *[f"{name}_rotation" for name in rotors],
+        )
+
         assert dynamics.dofs == system.names == names
         assert set(dynamics.dofs) <= set(DOFS)
         assert system.mass[6:].tolist() == [rotor.inertia for rotor in rotors.values()]
         assert direction.shape == (len(dynamics.dofs),)
         assert np.all(direction[6:] == 0)
+
         turning = {
             "pinion_rotation": 1,
             "motor_rotation": 1,
@@ -126,12 +142,19 @@ class TestEquations:
         assert_close(system.rotation, expected, 1e-15)
 
     def test_a_common_rotation_strains_only_the_drive(self, dynamics):
-        system, (drive_k, drive_c) = dynamics.system(), drive_matrices(dynamics)
-        matrices = (system.stiffness, drive_k), (system.damping, drive_c)
+        system, (drive_k, drive_c) = (
+            dynamics.system(),
+            drive_matrices(dynamics),
+        )
+        matrices = (
+            (system.stiffness, drive_k),
+            (system.damping, drive_c),
+        )
         for matrix, drive in matrices:
             strain = (matrix - drive) @ system.rotation
             assert_close(strain, 0, atol=1e-12 * np.abs(matrix).max())
         approach = dynamics.approach_direction() @ system.rotation
+
         assert_close(approach, 0, atol=1e-15)
 
     def test_the_drive_holds_all_that_rotates(self, dynamics, smooth):
@@ -142,9 +165,12 @@ class TestEquations:
         inertia = rotation @ np.diag(system.mass) @ rotation
         rate = math.sqrt(rotation @ system.stiffness @ rotation / inertia)
         damping = rotation @ system.damping @ rotation
+
         assert_close(rate / (2 * math.pi), operating.drive_frequency, 1e-12)
         assert_close(
-            damping / (2 * inertia * rate), operating.drive_damping_ratio, 1e-12
+            damping / (2 * inertia * rate),
+            operating.drive_damping_ratio,
+            1e-12,
         )
 
     def test_torques_act_at_the_ends_and_balance(self, dynamics, smooth):
@@ -153,8 +179,13 @@ class TestEquations:
         if dynamics.motor:
             lead[6] = smooth.operating.torque / MOTOR.coupling_stiffness
         driving = system.force - drive_matrices(dynamics)[0] @ lead
+
         assert np.flatnonzero(driving).tolist() == sorted(ends(dynamics))
-        assert_close(driving[list(ends(dynamics))], [20, -20 * RATIO], 1e-12)
+        assert_close(
+            driving[list(ends(dynamics))],
+            [20, -20 * RATIO],
+            1e-12,
+        )
         assert_close(driving @ system.rotation, 0, atol=1e-12)
 
 
@@ -162,10 +193,14 @@ class TestTorsion:
     """Frequencies of the shafts against closed forms, without the drive."""
 
     @pytest.mark.parametrize(
-        ("rotor", "gear", "end"), [(MOTOR, "pinion", "motor"), (LOAD, "wheel", "load")]
+        ("rotor", "gear", "end"),
+        [(MOTOR, "pinion", "motor"), (LOAD, "wheel", "load")],
     )
     def test_two_inertias_on_a_spring(self, whole, rotor, gear, end):
-        system, (drive_k, drive_c) = whole.system(), drive_matrices(whole)
+        system, (drive_k, drive_c) = (
+            whole.system(),
+            drive_matrices(whole),
+        )
         names = f"{gear}_rotation", f"{end}_rotation"
         index = [system.names.index(name) for name in names]
         block = np.ix_(index, index)
@@ -180,6 +215,7 @@ class TestTorsion:
         turning = rates[np.imag(rates) > 1.0]
         expected = math.sqrt(rotor.coupling_stiffness * sum(1 / free.mass))
         ratio = -np.real(turning) / np.abs(turning)
+
         assert_close(np.abs(turning), [expected], 1e-9)
         assert_close(ratio, [rotor.coupling_damping_ratio], 1e-9)
         assert (np.abs(rates) < 1e-6 * expected).sum() == 2
@@ -215,7 +251,11 @@ class TestStart:
         assert np.all(replace(dynamics, operating=idle).static_start(-0.2) == 0)
 
 
-KEYS = ("inertia_kg_m2", "coupling_stiffness_nm_per_rad", "coupling_damping_ratio")
+KEYS = (
+    "inertia_kg_m2",
+    "coupling_stiffness_nm_per_rad",
+    "coupling_damping_ratio",
+)
 REFUSALS = [
     (
         {f"system.{side}.{key}": value for key, value in values.items()},
@@ -224,26 +264,44 @@ REFUSALS = [
     for side in ("motor", "load")
     for values, text in [
         ({KEYS[0]: 0}, ".inertia_kg_m2 = 0 must be positive"),
-        ({KEYS[0]: -1e-3}, ".inertia_kg_m2 = -0.001 must be positive"),
-        ({KEYS[0]: "big"}, ".inertia_kg_m2 = 'big' is not a number"),
-        ({KEYS[0]: math.nan}, ".inertia_kg_m2 = nan is not finite"),
+        (
+            {KEYS[0]: -1e-3},
+            ".inertia_kg_m2 = -0.001 must be positive",
+        ),
+        (
+            {KEYS[0]: "big"},
+            ".inertia_kg_m2 = 'big' is not a number",
+        ),
+        (
+            {KEYS[0]: math.nan},
+            ".inertia_kg_m2 = nan is not finite",
+        ),
         (
             {KEYS[0]: 1, KEYS[1]: 0},
             ".coupling_stiffness_nm_per_rad = 0 must be positive",
         ),
-        ({KEYS[0]: 1, KEYS[1]: None}, ".coupling_stiffness_nm_per_rad is null"),
+        (
+            {KEYS[0]: 1, KEYS[1]: None},
+            ".coupling_stiffness_nm_per_rad is null",
+        ),
         (
             {KEYS[0]: 1, KEYS[2]: -0.1},
             ".coupling_damping_ratio = -0.1 must be positive",
         ),
     ]
 ] + [
-    ({"system.motor": 5}, "system.motor = 5 must be a group of keys"),
+    (
+        {"system.motor": 5},
+        "system.motor = 5 must be a group of keys",
+    ),
     (
         {"system.load": {"inertia": 1}},
         "system.load: 'inertia' has the wrong unit; write it as 'inertia_kg_m2'",
     ),
-    ({"system.motor": {KEYS[0]: 1.0}}, f"system.motor: missing {KEYS[1]}"),
+    (
+        {"system.motor": {KEYS[0]: 1.0}},
+        f"system.motor: missing {KEYS[1]}",
+    ),
 ]
 
 
@@ -253,17 +311,23 @@ class TestConfiguration:
     ):
         assert xiamen.motor is xiamen.load is None
         assert dynamics_of(xiamen).dofs == PAIR_DOFS
+
         config = config_with({"system.motor": None})
         section = config["system"].without("load")
         system = read_system(config.with_entries(system=section))
+
         assert system.motor is system.load is None
+
         load = {
             f"system.load.{key}": value
             for key, value in zip(KEYS, (0.5, 2.5e4, 0.2), strict=True)
         }
         system = machine({"system.motor.inertia_kg_m2": 2e-3, **load})
         assert system.motor == MOTOR
-        assert [system.load.inertia, system.load.coupling_stiffness] == [0.5, 2.5e4]
+        assert [
+            system.load.inertia,
+            system.load.coupling_stiffness,
+        ] == [0.5, 2.5e4]
         assert system.load.coupling_damping_ratio == 0.2
 
     @pytest.mark.parametrize(("changes", "text"), REFUSALS)
@@ -284,7 +348,13 @@ class TestMeanStiffness:
         force = smooth.mesh_force
         sound = mesh_statics.mean_mesh_stiffness(table, force)
         pinion = table.pinion
-        names = "gap", "gap_slope", "present", "compliance", "compliance_slope"
+        names = (
+            "gap",
+            "gap_slope",
+            "present",
+            "compliance",
+            "compliance_slope",
+        )
         rows = {name: np.repeat(getattr(pinion, name), 2, axis=0) for name in names}
         rows["compliance"] = rows["compliance"] * [[1.0], [2.0]]
 

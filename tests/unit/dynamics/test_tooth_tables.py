@@ -18,7 +18,12 @@ LAWS = {
     "paper": PAPER,
 }
 PITS = tuple(
-    one("pitting", gear=gear, tooth=tooth, pit_width_mm=3.0 + 2.0 * tooth)
+    one(
+        "pitting",
+        gear=gear,
+        tooth=tooth,
+        pit_width_mm=3.0 + 2.0 * tooth,
+    )
     for gear, n_teeth in (("pinion", 5), ("wheel", 6))
     for tooth in range(n_teeth)
 )
@@ -30,7 +35,12 @@ N_PINION, N_WHEEL = 6, 8  # distinct teeth with the sound ones
 def dynamics(request, machine, dynamics_of):
     errors = np.random.default_rng(3).normal(0, 2e-6, 84)
     system = machine({**LAWS[request.param], "gear.backlash_um": 10})
-    return dynamics_of(system, FAULTS, pinion_error=errors[:23], wheel_error=errors)
+    return dynamics_of(
+        system,
+        FAULTS,
+        pinion_error=errors[:23],
+        wheel_error=errors,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -67,8 +77,14 @@ def test_both_layouts_give_one_law_and_motion(dynamics, motions, monkeypatch):
 
     by_pair, by_tooth = both_layouts(walk, monkeypatch)
     for column, expected in zip(by_tooth[0].T, by_pair[0].T, strict=True):
-        assert_close(column, expected, 1e-12, atol=1e-12 * np.abs(expected).max())
+        assert_close(
+            column,
+            expected,
+            1e-12,
+            atol=1e-12 * np.abs(expected).max(),
+        )
     for values, expected in zip(by_tooth[1:], by_pair[1:], strict=True):
         assert_close(values, expected, atol=1e-9 * np.abs(expected).max())
+
     assert (by_pair[0][:, 0] > 0).mean() > 0.2
     assert (by_pair[0][:, 0] < 0).mean() > 0.2

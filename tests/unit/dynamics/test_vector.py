@@ -30,7 +30,12 @@ ODD = {
     "float32": [*SPECIAL, 1e-45, -1e-40, 3.4e38],
 }
 EXPONENTS = {"float64": 200, "float32": 25}
-OPERATIONS = operator.add, operator.sub, operator.mul, operator.truediv
+OPERATIONS = (
+    operator.add,
+    operator.sub,
+    operator.mul,
+    operator.truediv,
+)
 N_RESULTS = 13
 COMPILED = njit(error_model="numpy")
 
@@ -120,7 +125,11 @@ def draw(precision, *size):
     rng = np.random.default_rng(4)
     reach = EXPONENTS[precision]
     values = rng.standard_normal(size) * 10.0 ** rng.integers(-reach, reach, size)
-    return np.where(rng.random(size) < 0.3, rng.choice(ODD[precision], size), values)
+    return np.where(
+        rng.random(size) < 0.3,
+        rng.choice(ODD[precision], size),
+        values,
+    )
 
 
 def compute(kind, rows, scalars):
@@ -152,13 +161,17 @@ def test_operations_lane_by_lane(precision, shape):
     with np.errstate(all="ignore"):
         expected = [apply(*pair) for pair in operands for apply in OPERATIONS]
     for values, wanted in zip(
-        results, [*expected, np.where(a > b, yes, no)], strict=True
+        results,
+        [*expected, np.where(a > b, yes, no)],
+        strict=True,
     ):
         assert_same(values, wanted)
+
     assert all(np.isnan(values).any() for values in (*expected, x))
     assert 0.2 < (a > b).mean() < 0.8
     assert above.tolist() == (a > b).any(axis=1).tolist()
     assert 0 < above.sum() < N_GROUPS
+
     tiniest = np.finfo(precision).smallest_subnormal
     for lane in range(n):
         others = np.delete(np.arange(n), lane)
@@ -169,7 +182,10 @@ def test_operations_lane_by_lane(precision, shape):
             assert beside[..., others].tobytes() == results[..., others].tobytes()
         pair = np.zeros((2, 4, n), dtype=precision)
         pair[0, 0, lane], pair[1, 1, lane] = tiniest, 1.0
-        assert compute(kind, pair, np.ones(2))[1].tolist() == [True, False]
+        assert compute(kind, pair, np.ones(2))[1].tolist() == [
+            True,
+            False,
+        ]
 
 
 def test_rows_of_four_are_transposed(precision):
@@ -177,6 +193,7 @@ def test_rows_of_four_are_transposed(precision):
     columns = np.empty_like(rows)
     picked = np.empty_like(rows[:, 0])
     transposed(rows.ravel(), columns.ravel(), picked.ravel())
+
     assert_same(columns, rows.transpose(0, 2, 1))
     assert_same(picked, rows[:, 0, [1, 1, 3, 3]])
 
@@ -202,11 +219,18 @@ def test_a_vector_needs_an_array_of_its_kind(precision):
     out = np.full(16, 7.0, dtype=other)
     n = n_lanes(precision)
     for move, text in (
-        (move_row, f"{precision}x{n} is no row of an array of {other}"),
-        (move_four, f"{precision}x{FOUR} does not fit an array of {other}"),
+        (
+            move_row,
+            f"{precision}x{n} is no row of an array of {other}",
+        ),
+        (
+            move_four,
+            f"{precision}x{FOUR} does not fit an array of {other}",
+        ),
     ):
         with pytest.raises(TypeError, match=text):
             move(values, 0, 0, out)
+
     assert (out == 7.0).all()
 
 
@@ -215,4 +239,7 @@ def test_a_number_is_spread_over_a_group_of_64_bytes(precision):
     for value in ODD[precision]:
         out = np.full(n + 2, 7.0, dtype=precision)
         assert spread_over(value, out) == (n, 3 * 7 + 2)
-        assert_same(out, np.array([7.0, *[value] * n, 7.0], dtype=precision))
+        assert_same(
+            out,
+            np.array([7.0, *[value] * n, 7.0], dtype=precision),
+        )

@@ -18,7 +18,11 @@ from gensig.mesh.thermal.body_heat import (
 from gensig.options.compose import compose
 from gensig.systems.registry import read_heat, read_pair
 
-WORDS = ["system=helical_pair", "gear=chongqing_40_162", "heat=chongqing_rated"]
+WORDS = [
+    "system=helical_pair",
+    "gear=chongqing_40_162",
+    "heat=chongqing_rated",
+]
 
 
 @pytest.fixture(scope="module")
@@ -44,8 +48,10 @@ def test_what_goes_in_comes_out(gear, heat, bore, convection):
     teeth = cooled.tooth_convection * tooth_surface(gear) * rise[-1]
     # with the largest, the fin's length is 6 mm, and points are 0.6 mm apart
     tolerance = 0.1 if convection > 1e4 else 2e-4
+
     assert_close(faces + teeth + body.to_bore, 6000.0, tolerance)
     assert_close(body.to_oil, 6000.0 - body.to_bore, 1e-6)
+
     if bore is None:
         assert_close(body.to_bore, 0.0, atol=1e-6)
     else:
@@ -61,18 +67,23 @@ def test_the_disc_obeys_its_equation(gear, heat):
     )
     cooling = 2.0 * heat.face_convection / (heat.conductivity * gear.face_width)
     lost = cooling * (body.temperature[1:-1] - heat.oil_temperature)
+
     assert_close(flow, lost, 1e-4, atol=1e-4 * lost.max())
 
 
 def test_without_convection_at_the_faces_it_is_the_paper_s_equation_4(gear, heat):
     body = solved_body(
-        gear, 6000.0, replace(heat, face_convection=0.0), bore_temperature=50.0
+        gear,
+        6000.0,
+        replace(heat, face_convection=0.0),
+        bore_temperature=50.0,
     )
     radius = body.radius
     ends = body.temperature[[0, -1]]
     expected = ends[0] + (ends[1] - ends[0]) * np.log(radius / radius[0]) / np.log(
         radius[-1] / radius[0]
     )
+
     assert_close(body.temperature, expected, 1e-10)
     assert ends[1] > ends[0] + 5.0
 
@@ -82,7 +93,12 @@ def test_a_good_conductor_is_evenly_warm(gear, heat):
     body = solved_body(
         gear,
         6000.0,
-        replace(heat, conductivity=500.0, face_convection=3.0, tooth_convection=3.0),
+        replace(
+            heat,
+            conductivity=500.0,
+            face_convection=3.0,
+            tooth_convection=3.0,
+        ),
         bore_temperature=None,
     )
     expected = 6000.0 / (3.0 * (face_surface(gear) + tooth_surface(gear)))
@@ -95,14 +111,21 @@ def test_surfaces_are_of_the_right_size(gear):
     m2 in all.
     """
     profile = tooth_profile(gear)
-    side = np.sum(np.hypot(np.diff(profile.abscissa), np.diff(profile.half_thickness)))
+    side = np.sum(
+        np.hypot(
+            np.diff(profile.abscissa),
+            np.diff(profile.half_thickness),
+        )
+    )
     lands = 2.0 * (gear.half_tooth_angle_at(gear.tip_radius) * gear.tip_radius)
     lands += 2.0 * (math.pi / gear.n_teeth - gear.root_half_angle) * gear.root_radius
     outline = (2.0 * side + lands) * gear.face_width / math.cos(gear.helix_angle)
     ends = 4.0 * np.trapezoid(profile.half_thickness, profile.abscissa)
     expected = gear.n_teeth * (outline + ends)
+
     assert_close(tooth_surface(gear), expected, 0.04)
     assert_close(face_surface(gear) + tooth_surface(gear), 0.73, 0.2)
+
     wide = replace(gear, face_width=2.0 * gear.face_width)
     ends = 2.0 * tooth_surface(gear) - tooth_surface(wide)
     assert 0.0 < ends < 2.0 * math.pi * (gear.tip_radius**2 - gear.root_radius**2)
@@ -120,5 +143,6 @@ def test_a_gear_that_nothing_cools_is_refused(gear, heat):
         match=r"^pinion: nothing cools it; give heat.face_convection_w_per_m2k",
     ):
         solved_body(gear, 6000.0, closed, bore_temperature=None)
+
     held = solved_body(gear, 6000.0, closed, bore_temperature=60.0)
     assert_close(held.to_bore, 6000.0, 1e-6)

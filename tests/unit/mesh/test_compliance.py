@@ -11,7 +11,11 @@ from scipy.integrate import quad
 
 from gensig.errors import ExtrapolationError
 from gensig.geometry.tooth import healthy_tooth
-from gensig.geometry.tooth_profile import involute_point, load_angle, tooth_profile
+from gensig.geometry.tooth_profile import (
+    involute_point,
+    load_angle,
+    tooth_profile,
+)
 from gensig.mesh.compliance import tooth_compliance
 from gensig.mesh.fillet_foundation import (
     ExtrapolationWarning,
@@ -43,8 +47,11 @@ def test_running_sums_equal_direct_quadrature(xiamen):
         quad(integrand, *ends, limit=200)[0]
         for ends in ((fine.abscissa[0], knee), (knee, x_load))
     )
+
     assert_close(
-        tooth_compliance(healthy_tooth(gear), rho, material).bending, expected, 1e-4
+        tooth_compliance(healthy_tooth(gear), rho, material).bending,
+        expected,
+        1e-4,
     )
 
 
@@ -56,7 +63,12 @@ def test_quadrature_is_converged(xiamen, term):
         getattr(
             tooth_compliance(
                 healthy_tooth(
-                    gear, tooth_profile(gear, n_root_cells=n, n_flank_cells=3 * n // 2)
+                    gear,
+                    tooth_profile(
+                        gear,
+                        n_root_cells=n,
+                        n_flank_cells=3 * n // 2,
+                    ),
                 ),
                 rho,
                 xiamen.material,
@@ -65,6 +77,7 @@ def test_quadrature_is_converged(xiamen, term):
         )
         for n in (256, 1024)
     )
+
     assert_close(coarse, fine, 2e-4, atol=1e-4 * fine.max())
 
 
@@ -75,13 +88,16 @@ def test_compliance_scales_with_modulus_and_width(xiamen, factor):
     base = tooth_compliance(healthy_tooth(gear), CURVATURE, material).total
     stiff = replace(material, youngs_modulus=factor * material.youngs_modulus)
     wide = healthy_tooth(replace(gear, face_width=factor * gear.face_width))
+
     assert_close(
         tooth_compliance(healthy_tooth(gear), CURVATURE, stiff).total,
         base / factor,
         1e-12,
     )
     assert_close(
-        tooth_compliance(wide, CURVATURE, material).total, base / factor, 1e-12
+        tooth_compliance(wide, CURVATURE, material).total,
+        base / factor,
+        1e-12,
     )
 
 

@@ -15,7 +15,11 @@ from gensig.geometry.contact import corner_gap_by_pinion
 from gensig.geometry.tooth import healthy_tooth
 from gensig.mesh._kernels import lower_envelope, share_over_slices
 from gensig.mesh.face import bearing_width, is_nominal, slice_gaps
-from gensig.mesh.local_contact import ContactLaw, linear_contact, weber_contact
+from gensig.mesh.local_contact import (
+    ContactLaw,
+    linear_contact,
+    weber_contact,
+)
 
 UM = 1e-6
 
@@ -30,14 +34,22 @@ def gap_rows(system, *faults):
 
 
 class TestLowerEnvelope:
-    @pytest.fixture(scope="class", params=["rough", "smooth", "steps", "broken"])
+    @pytest.fixture(
+        scope="class",
+        params=["rough", "smooth", "steps", "broken"],
+    )
     @classmethod
     def flank(cls, request):
         """Random deviations (slice, profile) on uneven nodes; contacts and their radii."""
         name = request.param
         rng = np.random.default_rng(3)
         arc = np.sort(rng.uniform(0.0, 6e-3, 80))
-        height = {"rough": 60, "smooth": 5, "steps": 0.1, "broken": 30}[name] * UM
+        height = {
+            "rough": 60,
+            "smooth": 5,
+            "steps": 0.1,
+            "broken": 30,
+        }[name] * UM
         back = rng.uniform(0.0, height, (5, len(arc)))
         if name == "smooth":
             back = np.cumsum(back - back.mean(axis=1, keepdims=True), axis=1)
@@ -47,7 +59,12 @@ class TestLowerEnvelope:
             back[:, 60:] = np.inf
             back[:2, :15] = np.inf
         center = np.sort(rng.uniform(-0.5e-3, 6.5e-3, 60))
-        return back, arc, center, rng.uniform(2e-3, 12e-3, len(center))
+        return (
+            back,
+            arc,
+            center,
+            rng.uniform(2e-3, 12e-3, len(center)),
+        )
 
     @staticmethod
     def compiled(back, arc, center, radius):
@@ -62,7 +79,11 @@ class TestLowerEnvelope:
         at = (arc[:-1, None] + np.diff(arc)[:, None] * share).ravel()
         with np.errstate(invalid="ignore"):
             height = back[:, :-1, None] + np.diff(back, axis=1)[..., None] * share
-        flat = np.nan_to_num(height.reshape(len(back), -1), nan=np.inf, posinf=np.inf)
+        flat = np.nan_to_num(
+            height.reshape(len(back), -1),
+            nan=np.inf,
+            posinf=np.inf,
+        )
         rise = (at - center[:, None]) ** 2 / (2 * radius[:, None])
         return (flat[:, None] + rise).min(axis=2)
 
@@ -72,6 +93,7 @@ class TestLowerEnvelope:
         coarsest = np.diff(flank[1]).max() / 400
         atol = coarsest**2 / (8 * flank[3].min())
         result = self.brute(*flank, 401)
+
         assert np.all(exact <= result + 1e-18)
         assert_close(exact, result, atol=atol + 1e-15)
 
@@ -84,7 +106,12 @@ class TestLowerEnvelope:
     def test_nothing_left_touches_nowhere(self, flank):
         _, arc, center, radius = flank
         assert np.isinf(
-            self.compiled(np.full((1, len(arc)), np.inf), arc, center, radius)
+            self.compiled(
+                np.full((1, len(arc)), np.inf),
+                arc,
+                center,
+                radius,
+            )
         ).all()
 
 
@@ -97,10 +124,17 @@ class TestRigidFlanks:
         self, xiamen, depth_mm, gap_um, atol_um
     ):
         """The mate rides on its edges, 0.52 mm to either side: x^2 / (2 rho), rho 6.2 mm at C."""
-        pit = one("pitting", tooth=0, pit_width_mm=20, pit_depth_mm=depth_mm)
+        pit = one(
+            "pitting",
+            tooth=0,
+            pit_width_mm=20,
+            pit_depth_mm=depth_mm,
+        )
         gap, table = gap_rows(xiamen, pit)
         largest = gap[on_path(table)].max()
+
         assert_close(largest, gap_um * UM, atol=atol_um * UM)
+
         middle = table.position[gap > (1 - 1e-9) * largest].mean()
         assert_close(middle, xiamen.pair.pitch_point, atol=0.1e-3)
 
@@ -121,7 +155,10 @@ class TestRigidFlanks:
         fast: third order counts.
         """
         result, exact = self.corner(xiamen, gear, height_mm)
-        most, rtol = {"pinion": (np.inf, 0.02), "wheel": (5 * UM, 0.07)}[gear]
+        most, rtol = {
+            "pinion": (np.inf, 0.02),
+            "wheel": (5 * UM, 0.07),
+        }[gear]
         seen = (exact > 0.5 * UM) & (exact < most)
         assert seen.any()
         assert_close(result[seen], exact[seen], rtol)
@@ -129,13 +166,21 @@ class TestRigidFlanks:
     @staticmethod
     def corner(system, gear, height_mm):
         """Gap of the broken tooth on the path, and that of a gear whose teeth all end there."""
-        fault = one("broken", gear=gear, tooth=0, broken_height_mm=height_mm)
+        fault = one(
+            "broken",
+            gear=gear,
+            tooth=0,
+            broken_height_mm=height_mm,
+        )
         tooth = faulty_teeth(system.pair, [fault])[gear, 0]
         body = tooth.gear
         tip = np.hypot(body.base_radius, tooth.tip_curvature_radius)
         addendum = (tip - body.pitch_radius) / body.normal_module - body.profile_shift
         clearance = body.clearance_coefficient + body.addendum_coefficient - addendum
-        heights = {"addendum_coefficient": addendum, "clearance_coefficient": clearance}
+        heights = {
+            "addendum_coefficient": addendum,
+            "clearance_coefficient": clearance,
+        }
         pair = replace(system.pair, **{gear: replace(body, **heights)})
         gap, table = gap_rows(system, fault)
         later = system.pair.start_curvature_radius - pair.start_curvature_radius
@@ -148,6 +193,7 @@ class TestRigidFlanks:
         body = getattr(xiamen.pair, gear)
         tooth = healthy_tooth(body).split(np.linspace(0, 20e-3, 8))
         assert is_nominal(tooth)
+
         tip = tooth.profile.curvature_radius[-1]
         at = np.linspace(0.5 * tip, 1.2 * tip, 50)
         assert_close(slice_gaps(tooth, at, np.full(50, 5e-3)), 0.0)
@@ -164,7 +210,12 @@ def shared(law: ContactLaw, slice_gap, width, load, bending):
     """Gap and compliance of the compiled sharing, (node,) each."""
     gap = np.empty_like(load)
     compliance = np.empty_like(load)
-    terms = law.factor, law.constant, law.log_weight, np.full_like(load, bending)
+    terms = (
+        law.factor,
+        law.constant,
+        law.log_weight,
+        np.full_like(load, bending),
+    )
     share_over_slices(slice_gap, width, load, *terms, gap, compliance)
     return gap, compliance
 
@@ -195,7 +246,11 @@ def random_face():
     rng = np.random.default_rng(8)
     gap = rng.uniform(-10 * UM, 10 * UM, (12, 10)) * np.geomspace(0.01, 3, 10)
     gap[rng.random(gap.shape) < 0.1] = np.inf
-    return gap, rng.uniform(0.5e-3, 2.5e-3, 12), rng.uniform(200.0, 3000.0, 10)
+    return (
+        gap,
+        rng.uniform(0.5e-3, 2.5e-3, 12),
+        rng.uniform(200.0, 3000.0, 10),
+    )
 
 
 def approach_by_root_finding(law, bending, node, slice_gap, width, load):
@@ -250,13 +305,16 @@ class TestShareOverSlices:
         slice_gap, width, load = random_face
         gap, _ = shared(law, slice_gap, width, load, bending)
         assert_close(gap, slice_gap.min(axis=0))
+
         approach = approach_of(law, slice_gap, width, load, bending)
         expected = [
             approach_by_root_finding(law, bending, k, slice_gap[:, k], width, load[k])
             for k in range(10)
         ]
         rtol = {0.0: 1e-9, 1.0: 1e-6}[law.log_weight]
+
         assert_close(approach, expected, rtol)
+
         lifted = (np.isfinite(slice_gap) & (slice_gap >= approach)).sum(axis=0)
         assert lifted.min() == 0
         assert lifted.max() >= 3

@@ -28,7 +28,11 @@ def duty():
     return read_duty(
         compose(
             "generate",
-            ["system=helical_pair", "gear=chongqing_40_162", "heat=chongqing_rated"],
+            [
+                "system=helical_pair",
+                "gear=chongqing_40_162",
+                "heat=chongqing_rated",
+            ],
         )
     )
 
@@ -52,7 +56,12 @@ def test_friction_heat_is_friction_times_load_times_sliding(duty):
     n = 4000
     position = (np.arange(n) + 0.5)[None, None] / n * pair.path_of_contact
     result = friction_heat(
-        pair, position, np.ones_like(position), force=force, friction=0.04, speed=SPEED
+        pair,
+        position,
+        np.ones_like(position),
+        force=force,
+        friction=0.04,
+        speed=SPEED,
     )
     before = pair.pitch_point
     after = pair.path_of_contact - pair.pitch_point
@@ -63,13 +72,19 @@ def test_friction_heat_is_friction_times_load_times_sliding(duty):
         * SPEED
         * (1.0 + 1.0 / pair.ratio)
     )
-    assert_close(result, 0.04 * force / math.cos(pair.base_helix_angle) * mean, 1e-6)
+
+    assert_close(
+        result,
+        0.04 * force / math.cos(pair.base_helix_angle) * mean,
+        1e-6,
+    )
 
 
 def test_sliding_vanishes_at_the_pitch_point_alone(duty):
     pair = duty.system.pair
     position = np.array([0.0, pair.pitch_point, pair.path_of_contact])
     pinion, wheel = rolling_speeds(pair, position, SPEED)
+
     assert_close(pinion[1], wheel[1], 1e-12)
     assert pinion[0] < wheel[0]
     assert pinion[2] > wheel[2]
@@ -84,7 +99,11 @@ def test_flash_scales_as_blok_says(duty):
     one = flash(duty, position, 3e5)
     assert_close(flash(duty, position, 3e5, friction=0.1), 2.0 * one, 1e-12)
     assert_close(flash(duty, position, 6e5), 2.0**0.75 * one, 1e-12)
-    assert_close(flash(duty, position, 3e5, speed=4 * SPEED), 2.0 * one, 1e-12)
+    assert_close(
+        flash(duty, position, 3e5, speed=4 * SPEED),
+        2.0 * one,
+        1e-12,
+    )
     assert flash(duty, position, np.zeros(9)).max() == 0.0
 
 
@@ -99,15 +118,22 @@ def test_half_width_is_the_one_of_the_pressure(duty):
     contact = loaded_contact(system.sliced_mesh(), system.phases(4), system.mesh_force)
     pressure = contact_pressure(system.sliced_mesh(), contact, system.material)
     half = contact_half_width(
-        system.pair, contact.position, contact.line_load, system.material
+        system.pair,
+        contact.position,
+        contact.line_load,
+        system.material,
     )
     bearing = contact.line_load > 0.0
+
     assert bearing.any()
+
     expected = 2.0 * contact.line_load[bearing] / (math.pi * half[bearing])
     assert_close(pressure[bearing], expected, 1e-12)
 
 
-def test_modulus_falls_by_three_per_cent_in_a_hundred_kelvin(duty):
+def test_modulus_falls_by_three_per_cent_in_a_hundred_kelvin(
+    duty,
+):
     assert_close(duty.heat.modulus_ratio(20.0), 1.0, atol=1e-15)
     assert 0.960 < duty.heat.modulus_ratio(120.0) < 0.975
     assert_close(
@@ -161,12 +187,18 @@ def test_modulus_falls_by_three_per_cent_in_a_hundred_kelvin(duty):
             "has 7 and heat.modulus_gpa 2 values",
         ),
         (
-            ["heat.modulus_temperature_degc=[20,10]", "heat.modulus_gpa=[1,2]"],
+            [
+                "heat.modulus_temperature_degc=[20,10]",
+                "heat.modulus_gpa=[1,2]",
+            ],
             ConfigError,
             "temperatures that rise",
         ),
         (
-            ["heat.modulus_temperature_degc=[10,20]", "heat.modulus_gpa=[-1,2]"],
+            [
+                "heat.modulus_temperature_degc=[10,20]",
+                "heat.modulus_gpa=[-1,2]",
+            ],
             ConfigError,
             "= -1 must be positive",
         ),
@@ -175,7 +207,11 @@ def test_modulus_falls_by_three_per_cent_in_a_hundred_kelvin(duty):
             ConfigError,
             "heat.growth = 'yes_please' is not true or false",
         ),
-        (["+heat.oil_temperature_k=300"], ConfigError, "'oil_temperature_k'"),
+        (
+            ["+heat.oil_temperature_k=300"],
+            ConfigError,
+            "'oil_temperature_k'",
+        ),
         (
             ["heat.oil_temperature_degc=null"],
             ConfigError,
@@ -191,6 +227,13 @@ def test_inputs_that_make_no_heat_are_refused(words, error, message):
 
 
 def test_a_pair_that_stands_still_is_not_heated():
-    words = ["system=helical_pair", "heat=chongqing_rated", "operating.speed_rpm=0"]
-    with pytest.raises(ConfigError, match=r"operating.speed_rpm = 0 must be positive"):
+    words = [
+        "system=helical_pair",
+        "heat=chongqing_rated",
+        "operating.speed_rpm=0",
+    ]
+    with pytest.raises(
+        ConfigError,
+        match=r"operating.speed_rpm = 0 must be positive",
+    ):
         read_duty(compose("generate", words))

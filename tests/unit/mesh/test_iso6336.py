@@ -32,6 +32,7 @@ def test_load_matters_below_100_n_per_mm_only(pair):
     stiff = iso6336.single_stiffness(pair)
     loads = (1e3, 5e4, 0.999e5, 1e5, 5e5)
     result = [iso6336.single_stiffness(pair, line_load=load) / stiff for load in loads]
+
     assert result == sorted(result)
     assert result[2] < 1.0
     assert_close(result[3:], 1.0, 1e-12)
@@ -51,14 +52,19 @@ def test_profile_shift_follows_the_series(pair):
 
 def test_basic_rack_factor_is_the_mean_of_both_gears(pair):
     flat = replace(
-        pair.wheel, clearance_coefficient=0.2, cutter_tip_radius_coefficient=0.3
+        pair.wheel,
+        clearance_coefficient=0.2,
+        cutter_tip_radius_coefficient=0.3,
     )
     mixed = GearPair(pinion=pair.pinion, wheel=flat, backlash=0.0)
     ratio = iso6336.single_stiffness(mixed) / iso6336.single_stiffness(pair)
+
     assert_close(ratio, 0.5 * (0.975 + 1.0) / 0.975, 1e-12)
 
 
-def test_a_larger_pressure_angle_stiffens_by_2_percent_a_degree(pair):
+def test_a_larger_pressure_angle_stiffens_by_2_percent_a_degree(
+    pair,
+):
     steep = replace(
         pair.pinion,
         pressure_angle=math.radians(25.0),
@@ -75,9 +81,14 @@ def test_stiffness_scales_with_the_modulus(pair):
 @pytest.mark.parametrize(("pinion", "wheel"), [(0.0, 0.1), (-0.25, -0.3), (1.2, 0.9)])
 def test_shifts_outside_the_series_are_refused(pair, pinion, wheel):
     # many teeth and a low wheel, so that such shifts exist without interference
-    low = replace(pair.wheel, addendum_coefficient=0.9, clearance_coefficient=0.35)
+    low = replace(
+        pair.wheel,
+        addendum_coefficient=0.9,
+        clearance_coefficient=0.35,
+    )
     teeth = replace(pair, pinion=replace(pair.pinion, n_teeth=80), wheel=low)
     outside = shifted(teeth, pinion, wheel)
+
     with pytest.raises(ExtrapolationError, match="x1 >= x2"):
         iso6336.single_stiffness(outside)
     assert iso6336.single_stiffness(outside, allow_extrapolation=True) > 0.0
@@ -96,7 +107,8 @@ def test_small_contact_ratio_is_refused(pair):
 
 
 @pytest.mark.parametrize(
-    "argument", ["line_load", "correction_factor", "youngs_modulus"]
+    "argument",
+    ["line_load", "correction_factor", "youngs_modulus"],
 )
 def test_what_is_not_positive_is_refused(pair, argument):
     with pytest.raises(ConfigError, match=argument):

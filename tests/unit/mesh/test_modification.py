@@ -7,7 +7,10 @@ import pytest
 from closeness import assert_close
 
 from gensig.errors import ConfigError
-from gensig.mesh.modification import FlankModification, PairModification
+from gensig.mesh.modification import (
+    FlankModification,
+    PairModification,
+)
 from gensig.options.compose import compose
 from gensig.systems.registry import read_modification, read_pair
 
@@ -21,7 +24,10 @@ def pair():
 
 
 def of_pair(**sides):
-    plain = {"pinion": FlankModification(), "wheel": FlankModification()}
+    plain = {
+        "pinion": FlankModification(),
+        "wheel": FlankModification(),
+    }
     return PairModification(**{**plain, **sides})
 
 
@@ -29,7 +35,11 @@ def at(pair, modification, n_slices=5):
     """Deviation (slice, node) with its positions and places."""
     position = np.linspace(-0.5, 1.5, 401) * pair.path_of_contact
     place = (np.arange(n_slices) + 0.5) * pair.face_width / n_slices
-    return position, place, modification.deviation(pair, position, place)
+    return (
+        position,
+        place,
+        modification.deviation(pair, position, place),
+    )
 
 
 @pytest.mark.parametrize("shape", ["linear", "parabolic"])
@@ -45,15 +55,22 @@ def test_reliefs_have_their_depth_at_the_ends_and_run_out_over_their_height(
     )
     position, _, deviation = at(pair, of_pair(pinion=side))
     # the pinion's tip leaves at E, its lowest point enters at A; beyond both the end counts
-    assert_close(deviation[:, position >= pair.path_of_contact], 8 * MICRO, 1e-12)
+    assert_close(
+        deviation[:, position >= pair.path_of_contact],
+        8 * MICRO,
+        1e-12,
+    )
     assert_close(deviation[:, position <= 0.0], 3 * MICRO, 1e-12)
+
     radius = np.hypot(pair.pinion.base_radius, pair.pinion_curvature(position))
     begin = (
         radius > pair.pinion.tip_radius - 0.25 * MILLI
     )  # the upper half of the relief
     inside = begin & (position < pair.path_of_contact)
     least = {"linear": 4, "parabolic": 2}[shape]
+
     assert_close(deviation[0, inside].min(), least * MICRO, 0.15)
+
     lowest = math.hypot(pair.pinion.base_radius, pair.pinion_curvature(0.0))
     between = (radius < pair.pinion.tip_radius - 0.5 * MILLI) & (
         radius > lowest + 0.4 * MILLI
@@ -73,9 +90,12 @@ def test_crowning_slope_and_end_relief_across_the_face(pair):
     width = pair.face_width
     place = np.array([0.0, 0.25, 0.5, 0.75, 1.0]) * width
     crowned = FlankModification(crowning=4 * MICRO).lead(place, width)
+
     assert_close(crowned, np.array([4, 1, 0, 1, 4]) * MICRO, atol=1e-18)
+
     sloped = FlankModification(helix_slope=-4 * MICRO).lead(place, width)
     assert_close(sloped, np.array([0, -1, -2, -3, -4]) * MICRO, atol=1e-18)
+
     ended = FlankModification(end_relief=6 * MICRO, end_relief_width=0.5 * width).lead(
         place, width
     )
@@ -88,8 +108,11 @@ def test_two_slopes_of_opposite_sign_leave_an_aligned_pair(pair):
     other = FlankModification(helix_slope=-5 * MICRO)
     assert np.abs(at(pair, of_pair(pinion=one, wheel=other))[2]).max() < 1e-18
     assert at(pair, of_pair(pinion=other))[2].min() == 0.0
+
     askew = PairModification(
-        pinion=FlankModification(), wheel=other, misalignment=5 * MICRO
+        pinion=FlankModification(),
+        wheel=other,
+        misalignment=5 * MICRO,
     )
     assert np.abs(at(pair, askew)[2]).max() < 1e-18
 
@@ -116,8 +139,14 @@ def test_nothing_is_nothing(pair):
             ["modification.wheel.profile_shape=round"],
             "modification.wheel.profile_shape = 'round'; allowed: linear",
         ),
-        (["+modification.wheel.tip=1"], "modification.wheel: unknown key 'tip'"),
-        (["+modification.helix=1"], "modification: unknown key 'helix'"),
+        (
+            ["+modification.wheel.tip=1"],
+            "modification.wheel: unknown key 'tip'",
+        ),
+        (
+            ["+modification.helix=1"],
+            "modification: unknown key 'helix'",
+        ),
     ],
 )
 def test_keys_that_make_no_flank_are_refused(changes, message):
@@ -138,7 +167,10 @@ def test_reliefs_that_overlap_are_refused(pair):
         match=r"tip_relief_height_mm = 2 and root_relief_height_mm = 2 overlap",
     ):
         at(pair, of_pair(pinion=tall))
-    with pytest.raises(ConfigError, match="at both ends overlaps on a face of 14 mm"):
+    with pytest.raises(
+        ConfigError,
+        match="at both ends overlaps on a face of 14 mm",
+    ):
         at(
             pair,
             of_pair(

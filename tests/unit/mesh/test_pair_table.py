@@ -26,6 +26,7 @@ def test_sound_teeth_have_the_corner_gap_and_nothing_else(xiamen):
     near = expected < 1e-4
     # the parabolas of the table cut that much off where the gap begins
     gap = table.pinion.gap[0] + table.wheel.gap[0]
+
     assert_close(gap[near], expected[near], atol=5e-9)
     assert table.pinion.kind.tolist() == [0] * 23
     assert table.wheel.kind.tolist() == [0] * 84
@@ -72,7 +73,11 @@ class TestFlankSides:
     @pytest.mark.parametrize("bending", ["whole", "by_slice"])
     def test_the_split_is_nothing_for_faulty_ones(self, machine, gear, bending):
         system = machine({"mesh.bending": bending})
-        chip = {"chip_width_mm": 10, "chip_shape": "rectangular", "chip_height_mm": 3}
+        chip = {
+            "chip_width_mm": 10,
+            "chip_shape": "rectangular",
+            "chip_height_mm": 3,
+        }
         fault = {gear: one("chipped", gear=gear, **chip)}
         totals = [self.contact(system, share, **fault)[0] for share in (0.0, 0.5, 1.0)]
         for total in totals[1:]:
@@ -82,6 +87,7 @@ class TestFlankSides:
         at = np.linspace(0.0, system.pair.path_of_contact, 9)
         more = slice_bending(system.pair, at, system.material, system.mesh)
         most = law.compliance(10e-3, system.mesh_force) + more
+
         assert np.all(totals[0] <= most * (1 + 1e-4))
         assert_close((totals[0] / most).max(), 1.0, 1e-3)
         assert_close((totals[0] / sound).min(), 1.0, 1e-9)
@@ -89,13 +95,20 @@ class TestFlankSides:
     def test_the_flank_goes_on_beyond_its_tip(self, xiamen):
         at = xiamen.pair.path_of_contact * np.array([-0.2, 0.5, 1.2])
         sides = flank_sides(xiamen.pair, at, xiamen.material, xiamen.mesh, 900.0)
-        for name, low, high in (("pinion", 0, 2), ("wheel", 2, 0)):
+        for name, low, high in (
+            ("pinion", 0, 2),
+            ("wheel", 2, 0),
+        ):
             side = sides[name]
             tip = healthy_tooth(side.gear).profile.curvature_radius[-1]
             assert_close(side.curvature.max(), tip, 1e-9)
             assert side.flank_curvature[high] > tip * 1.05
             result, expected = (
-                values[[low, 1]] for values in (side.flank_curvature, side.curvature)
+                values[[low, 1]]
+                for values in (
+                    side.flank_curvature,
+                    side.curvature,
+                )
             )
             assert_close(result, expected, 1e-12)
 
@@ -110,9 +123,14 @@ class TestRows:
         curves = xiamen.stiffness_curves((fault,), points_per_tooth=1)
         side = side_of(table, gear)
         at = curves.contact_position * xiamen.pair.base_pitch
-        expected = np.interp(at, table.position, side.gap[side.kind[0]] - side.gap[0])
+        expected = np.interp(
+            at,
+            table.position,
+            side.gap[side.kind[0]] - side.gap[0],
+        )
         # linear between nodes, whose parabolas round off steps, against the value itself
         atol = 2e-9 + 3e-3 * np.abs(expected).max()
+
         assert_close(curves.faulty_pair_gap, expected, atol=atol)
         assert np.all(np.isfinite(side.compliance))
         assert side.compliance.min() > 0
@@ -120,10 +138,16 @@ class TestRows:
 
 
 def test_the_bodies_cannot_share_more_than_a_pair_has(xiamen):
-    small = replace(xiamen.pair, pinion=replace(xiamen.pair.pinion, bore_radius=1e-3))
+    small = replace(
+        xiamen.pair,
+        pinion=replace(xiamen.pair.pinion, bore_radius=1e-3),
+    )
     options = replace(xiamen.mesh, body="sainsot", allow_extrapolation=True)
     with (
-        pytest.raises(ExtrapolationError, match=r"share .* of the stiffest pair's"),
+        pytest.raises(
+            ExtrapolationError,
+            match=r"share .* of the stiffest pair's",
+        ),
         pytest.warns(ExtrapolationWarning),
     ):
         pair_table(small, xiamen.material, options, load=1000.0)
@@ -137,12 +161,36 @@ def test_shared_compliance_only_when_coupled(xiamen, paper_machine):
 @pytest.mark.parametrize(
     ("key", "value", "text"),
     [
-        ("law", "papr", "mesh.law = 'papr'; allowed: one_sided, paper"),
-        ("pair_coupling", "x", "mesh.pair_coupling = 'x'; allowed: coupled, sum"),
-        ("crack", "x", "mesh.crack = 'x'; allowed: calibrated, paper"),
-        ("bending", "x", "mesh.bending = 'x'; allowed: by_slice, whole"),
-        ("roll_torque", "", "mesh.roll_torque = ''; allowed: consistent, classical"),
-        ("damping_ratio", -0.1, "mesh.damping_ratio = -0.1 must lie in 0..1"),
+        (
+            "law",
+            "papr",
+            "mesh.law = 'papr'; allowed: one_sided, paper",
+        ),
+        (
+            "pair_coupling",
+            "x",
+            "mesh.pair_coupling = 'x'; allowed: coupled, sum",
+        ),
+        (
+            "crack",
+            "x",
+            "mesh.crack = 'x'; allowed: calibrated, paper",
+        ),
+        (
+            "bending",
+            "x",
+            "mesh.bending = 'x'; allowed: by_slice, whole",
+        ),
+        (
+            "roll_torque",
+            "",
+            "mesh.roll_torque = ''; allowed: consistent, classical",
+        ),
+        (
+            "damping_ratio",
+            -0.1,
+            "mesh.damping_ratio = -0.1 must lie in 0..1",
+        ),
         (
             "friction_coefficient",
             0.9,
@@ -153,7 +201,11 @@ def test_shared_compliance_only_when_coupled(xiamen, paper_machine):
             0.0,
             "mesh.friction_transition = 0 must lie in 0.001..0.5",
         ),
-        ("points_per_pitch", 3, "mesh.points_per_pitch = 3 must lie in 32..8192"),
+        (
+            "points_per_pitch",
+            3,
+            "mesh.points_per_pitch = 3 must lie in 32..8192",
+        ),
     ],
 )
 def test_options_out_of_range(xiamen, key, value, text):

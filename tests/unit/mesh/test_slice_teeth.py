@@ -11,7 +11,11 @@ from closeness import assert_close
 from gensig.errors import ConfigError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import read_faults
-from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
+from gensig.mesh.load_distribution import (
+    loaded_pair_table,
+    pair_states,
+    static_mesh,
+)
 from gensig.mesh.sliced.slice_teeth import merged_edges
 from gensig.mesh.sliced.slices import Meeting, loaded_contact
 from gensig.plan.request import read_request
@@ -43,7 +47,11 @@ def spur_approach(system, teeth, roll, **meeting):
     """Approach of the spur pair's table."""
     force = system.mesh_force
     table = loaded_pair_table(
-        system.pair, system.material, system.mesh, teeth, force=force
+        system.pair,
+        system.material,
+        system.mesh,
+        teeth,
+        force=force,
     )
     return static_mesh(table, pair_states(table, roll, **meeting), force).approach
 
@@ -61,8 +69,16 @@ def spur_approach(system, teeth, roll, **meeting):
         ("pitch_error", 5e-4, 2.0),
         ("runout", 5e-4, 2.0),
         # over part of the width bodies deflect by slices here, as a whole in the spur table
-        ("crack fault.crack_depth_mm=2 fault.crack_width_mm=10", 3e-3, 2.0),
-        ("crack fault.crack_depth_mm=2 fault.crack_width_mm=5", 3e-3, 2.0),
+        (
+            "crack fault.crack_depth_mm=2 fault.crack_width_mm=10",
+            3e-3,
+            2.0,
+        ),
+        (
+            "crack fault.crack_depth_mm=2 fault.crack_width_mm=5",
+            3e-3,
+            2.0,
+        ),
         (
             "crack fault.crack_depth_mm=2 fault.crack_width_mm=15 fault.crack_front=parabolic",
             3e-3,
@@ -96,16 +112,21 @@ def test_errors_of_single_teeth_are_those_of_the_spur_pair():
         *SPUR, n_periods=30, meeting=Meeting(**meeting)
     )
     exact = spur_approach(system, teeth, roll, **meeting)
+
     assert_close(approach, exact, 1e-3)
     assert np.ptp(exact) > 5e-6
 
 
 @pytest.mark.parametrize("misalignment", [2, 10])
-def test_misalignment_is_the_spur_pair_s_while_the_whole_face_bears(misalignment):
+def test_misalignment_is_the_spur_pair_s_while_the_whole_face_bears(
+    misalignment,
+):
     spur = ("gear=xiamen_23_84", "operating.torque_nm=100")
     fault = f"fault=misalignment fault.misalignment_um={misalignment}"
     *of_spur, approach = approach_of(*spur, fault, n_periods=1)
+
     assert_close(approach, spur_approach(*of_spur), 0.01)
+
     aligned = approach_of(*spur, n_periods=1)[3]
     assert approach.mean() > aligned.mean() + 0.4e-6 * misalignment
 
@@ -127,13 +148,21 @@ def added(*words):
     ("fault", "key", "values"),
     [
         ("crack", "crack_depth_mm", (0.1, 0.5, 1.6)),
-        ("crack fault.crack_depth_mm=1", "crack_width_mm", (1, 4, 15)),
+        (
+            "crack fault.crack_depth_mm=1",
+            "crack_width_mm",
+            (1, 4, 15),
+        ),
         (
             "pitting fault.pit_length_mm=0.6 fault.pit_width_mm=5",
             "pit_depth_mm",
             (1e-3, 1e-2, 0.1),
         ),
-        ("pitting fault.pit_length_mm=0.6", "pit_width_mm", (1, 4, 14)),
+        (
+            "pitting fault.pit_length_mm=0.6",
+            "pit_width_mm",
+            (1, 4, 14),
+        ),
         ("chipped", "chip_height_mm", (0.2, 0.6, 2.0)),
         ("broken", "broken_height_mm", (0.2, 0.8, 2.5)),
         ("wear", "wear_depth_um", (1, 5, 15)),
@@ -189,7 +218,9 @@ def test_a_small_fault_is_nearly_none(fault):
 def test_a_crack_is_felt_where_it_is():
     """The cracked half of the face takes less load than the same half of a sound tooth pair."""
     system, faults = case(
-        "fault=crack", "fault.crack_depth_mm=1.5", "fault.crack_width_mm=7.5"
+        "fault=crack",
+        "fault.crack_depth_mm=1.5",
+        "fault.crack_width_mm=7.5",
     )
     cracked = system.transmission_error(faults)
     sound = system.transmission_error()
@@ -198,6 +229,7 @@ def test_a_crack_is_felt_where_it_is():
     of_fault = cracked.contact.pair_index == 0
     before = tile[of_fault]
     after = cracked.contact.line_load[of_fault]
+
     assert after[:, first_half].sum() < 0.95 * before[:, first_half].sum()
     assert after[:, ~first_half].sum() > 0.99 * before[:, ~first_half].sum()
 
@@ -214,7 +246,9 @@ def test_flank_that_is_gone_bears_nothing():
     place = result.slice_place
     inside = (contact.pair_index == 0)[..., None] & (np.abs(place - 7e-3) < 2.3e-3)
     pitch_point = np.abs(contact.position - system.pair.pitch_point) < 0.03e-3
+
     assert contact.line_load[inside & pitch_point].max() == 0.0
+
     beside = (contact.pair_index == 0)[..., None] & (np.abs(place - 2e-3) < 1e-3)
     assert contact.line_load[beside & pitch_point].min() > 0.0
 
@@ -232,6 +266,7 @@ def test_as_many_periods_as_see_the_fault():
     result = system.transmission_error(faults)
     sound = system.transmission_error()
     more = (result.error - np.tile(sound.error, result.n_periods)).reshape(-1, 64)
+
     assert more.max() > 0.5e-6
     # two sound periods before, save corner contact, and what is left of the second after
     assert np.abs(more[0]).max() < 1e-12
@@ -251,8 +286,10 @@ def test_slices_converge_with_a_fault():
     coarse, fine, finest = (
         most_added(crack, f"mesh.n_slices={n}") for n in (5, 40, 120)
     )
+
     assert abs(fine - finest) < 0.5 * abs(coarse - finest) + 1e-3 * finest
     assert abs(fine - finest) < 0.02 * finest
+
     pit = "fault=pitting fault.pit_length_mm=0.6 fault.pit_width_mm=5"
     fine, finest = (most_added(pit, f"mesh.points_per_pitch={n}") for n in (512, 1024))
     assert abs(fine - finest) < 0.01 * finest
@@ -260,9 +297,15 @@ def test_slices_converge_with_a_fault():
 
 def test_slices_end_where_a_fault_does():
     system, faults = case(
-        "fault=pitting", "fault.pit_length_mm=0.6", "fault.pit_width_mm=5"
+        "fault=pitting",
+        "fault.pit_length_mm=0.6",
+        "fault.pit_width_mm=5",
     )
-    edges = merged_edges(system.pair, 40, faulty_teeth(system.pair, faults).values())
+    edges = merged_edges(
+        system.pair,
+        40,
+        faulty_teeth(system.pair, faults).values(),
+    )
     assert len(edges) == 43
     # the pinion is 15 mm wide, the wheel 14: the pit lies in the middle of both
     assert np.isin([4.5e-3, 9.5e-3], np.round(edges, 9)).all()
@@ -279,9 +322,12 @@ def test_independent_slices_refuse_a_fault_over_part_of_the_face():
     )
     with pytest.raises(ConfigError, match=r"mesh\.independent_faulty_slices=true"):
         approach_of(*words)
+
     approach_of(*words, "mesh.independent_faulty_slices=true")
     approach_of(
-        "mesh.slice_coupling=independent", "fault=crack", "fault.crack_depth_mm=1"
+        "mesh.slice_coupling=independent",
+        "fault=crack",
+        "fault.crack_depth_mm=1",
     )
     with pytest.raises(ConfigError, match="over part of the face"):
         approach_of("mesh.slice_coupling=independent", "fault=chipped")

@@ -11,10 +11,21 @@ from closeness import assert_close
 
 from gensig.errors import FaultError
 from gensig.faults.registry import read_faults
-from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
-from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
+from gensig.mesh.load_distribution import (
+    loaded_pair_table,
+    pair_states,
+    static_mesh,
+)
+from gensig.mesh.sliced.sliced_statics import (
+    chord_equilibrium,
+    chord_states,
+)
 from gensig.mesh.sliced.sliced_table import DEEPEST, N_CHORDS
-from gensig.mesh.sliced.slices import Meeting, loaded_contact, single_pair_stiffness
+from gensig.mesh.sliced.slices import (
+    Meeting,
+    loaded_contact,
+    single_pair_stiffness,
+)
 from gensig.plan.request import read_request
 from gensig.systems.registry import read_sliced_pair
 
@@ -46,7 +57,10 @@ def at_rest(table, roll, force, **errors):
             "mesh.slice_coupling=independent",
             "mesh.pair_coupling=sum",
         ),
-        ("modification=beihang_both", "modification.misalignment_um=15"),
+        (
+            "modification=beihang_both",
+            "modification.misalignment_um=15",
+        ),
         ("gear=xiamen_23_84",),
         ("mesh.n_slices=160",),
     ],
@@ -62,13 +76,16 @@ def test_equilibrium_is_that_of_the_slices(words, part):
     approach, load = at_rest(table, roll, force)
 
     assert_close(approach, exact.approach, 5e-3 / min(part, 1.0))
+
     ripple = np.ptp(exact.approach)
     most = 0.1 * ripple + 2e-3 * exact.approach.mean()
     assert np.ptp(approach - exact.approach) < most
+
     # newest first in both; the table may have fewer pairs
     expected = (exact.line_load * mesh.slice_width).sum(axis=2)
     behind = max(load.shape[1] - expected.shape[1], 0)
     expected = expected[:, : load.shape[1]]
+
     assert_close(load[:, behind:], expected, atol=0.012 * force)
 
 
@@ -85,6 +102,7 @@ def test_few_slices_that_enter_over_their_width_are_many(n_slices, share):
     whole = loaded_contact(few, roll, force).approach
 
     error = np.ptp(chords - many)
+
     assert error < share * np.ptp(many)
     assert error < 0.4 * np.ptp(whole - many)
 
@@ -92,8 +110,22 @@ def test_few_slices_that_enter_over_their_width_are_many(n_slices, share):
 @pytest.mark.parametrize(
     ("fault", "share"),
     [
-        (("fault=crack", "fault.crack_depth_mm=1", "fault.crack_width_mm=5"), 2e-3),
-        (("fault=pitting", "fault.pit_length_mm=0.6", "fault.pit_width_mm=5"), 2e-3),
+        (
+            (
+                "fault=crack",
+                "fault.crack_depth_mm=1",
+                "fault.crack_width_mm=5",
+            ),
+            2e-3,
+        ),
+        (
+            (
+                "fault=pitting",
+                "fault.pit_length_mm=0.6",
+                "fault.pit_width_mm=5",
+            ),
+            2e-3,
+        ),
         (("fault=chipped",), 2e-3),
         (("fault=broken", "fault.broken_height_mm=1"), 3e-3),
         (("fault=missing_tooth",), 2e-3),
@@ -110,9 +142,11 @@ def test_faulty_teeth_have_their_own_chords(fault, share):
     roll = system.phases(16, first_period=-2, n_periods=8)
     exact = loaded_contact(system.sliced_mesh(faults), roll, system.mesh_force)
     approach, _ = at_rest(table, roll, system.mesh_force)
+
     assert_close(approach, exact.approach, share)
     assert len(table.pinion_present) == 2
     assert len(table.wheel_present) == 1
+
     sound = at_rest(system.mesh_table(), roll, system.mesh_force)[0]
     assert np.abs(exact.approach - sound).max() > 2.0 * share * sound.max()
 
@@ -142,9 +176,11 @@ def test_teeth_that_all_share_a_form_are_computed_once():
     form = replace(faults_of("fault=profile_error")[0], tooth="all")
     crack = faults_of("fault=crack", "fault.crack_depth_mm=1", "fault.tooth=3")
     table = system.mesh_table((form, *crack))
+
     assert table.compliance.shape[:2] == (3, 1)
     assert table.pinion_kind[3] == 2
     assert np.bincount(table.pinion_kind).tolist() == [0, 60, 1]
+
     again = system.mesh_table((form,))
     np.testing.assert_array_equal(again.compliance[1, 0], table.compliance[1, 0])
     np.testing.assert_array_equal(again.depth, table.depth)
@@ -163,13 +199,17 @@ def test_chords_are_convex_and_meet():
     force = system.mesh_force
     assert len(table.depth) == N_CHORDS
     assert table.depth[0] == 0.0
+
     own = table.compliance[0, 0] - table.shared_compliance
     gap = table.gap[0, 0]
     near = gap[0] < 20e-6
+
     assert (np.diff(own[:, near], axis=0) < 1e-4 * own[1:, near]).all()
+
     met = gap[0] + table.depth[1:, None]
     before = (met - gap[:-1]) / own[:-1]
     after = (met - gap[1:]) / own[1:]
+
     assert_close(before[:, near], after[:, near], atol=2e-3 * force)
 
     # deep enough for three times the load, and the set chord holds the mean load
@@ -180,7 +220,11 @@ def test_chords_are_convex_and_meet():
 
 
 def test_ends_are_out_of_reach():
-    for words in ((), ("gear=xiamen_23_84",), ("gear=chongqing_40_162",)):
+    for words in (
+        (),
+        ("gear=xiamen_23_84",),
+        ("gear=chongqing_40_162",),
+    ):
         _, table, _ = table_of(*words)
         pitch = table.pair.base_pitch
         assert_close(table.position[0], table.first_pitch * pitch, 1e-6)
@@ -206,24 +250,31 @@ def test_slopes_are_those_of_the_values():
 @pytest.mark.parametrize(("contact", "rtol"), [("linear", 3e-4), ("weber", 2e-3)])
 def test_zero_helix_is_the_spur_pair_s_table(contact, rtol):
     system, table, _ = table_of(
-        "gear=xiamen_23_84", f"mesh.contact={contact}", "mesh.n_slices=5"
+        "gear=xiamen_23_84",
+        f"mesh.contact={contact}",
+        "mesh.n_slices=5",
     )
     force = system.mesh_force
     spur = loaded_pair_table(system.pair, system.material, system.mesh, force=force)
     roll = system.phases(128)
     exact = static_mesh(spur, pair_states(spur, roll), force)
     approach, _ = at_rest(table, roll, force)
+
     assert_close(approach, exact.approach, rtol)
 
 
 def test_the_papers_law_has_one_chord():
     system, table, mesh = table_of(
-        "mesh.law=paper", "mesh.allow_extrapolation=true", "mesh.contact=linear"
+        "mesh.law=paper",
+        "mesh.allow_extrapolation=true",
+        "mesh.contact=linear",
     )
     assert table.compliance.shape[2] == 1
+
     inside = np.linspace(0.1, 0.9, 17) * (system.pair.path_of_contact + mesh.lag[-1])
     exact = single_pair_stiffness(mesh, inside, system.mesh_force)
     result = 1.0 / np.interp(inside, table.position, table.compliance[0, 0, 0])
+
     # slices that bend each other are stiffer where only a part of the face is loaded
     assert (result > 0.999 * exact).all()
     assert_close(result, exact, 0.15)

@@ -17,8 +17,15 @@ from gensig.geometry.tooth import healthy_tooth
 from gensig.geometry.tooth_profile import load_angle
 from gensig.material import Material
 from gensig.mesh.body_coupling import cross_compliance
-from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
-from gensig.mesh.options import read_mesh_options, read_slice_options
+from gensig.mesh.load_distribution import (
+    loaded_pair_table,
+    pair_states,
+    static_mesh,
+)
+from gensig.mesh.options import (
+    read_mesh_options,
+    read_slice_options,
+)
 from gensig.mesh.pair_table import structural_compliance
 from gensig.mesh.sliced._slice_kernels import bite_forces
 from gensig.mesh.sliced.slice_pressure import contact_pressure
@@ -26,7 +33,11 @@ from gensig.mesh.sliced.slices import loaded_contact, sliced_mesh
 from gensig.options.compose import compose
 from gensig.units import read, to_si
 
-STEEL = Material(youngs_modulus=210e9, poisson_ratio=0.3, density_kg_per_m3=7850.0)
+STEEL = Material(
+    youngs_modulus=210e9,
+    poisson_ratio=0.3,
+    density_kg_per_m3=7850.0,
+)
 REFERENCE = {
     "pair_coupling": "sum",
     "contact": "linear",
@@ -61,7 +72,10 @@ def gears(name, **changes):
             for key, value in changes.items()
         }
         sides[side] = read(Gear, values, side, name=side)
-    return GearPair(**sides, backlash=to_si("backlash_um", config["backlash_um"]))
+    return GearPair(
+        **sides,
+        backlash=to_si("backlash_um", config["backlash_um"]),
+    )
 
 
 def solved(pair, torque, keys, *, n_phases=64, deviation=None, **changes):
@@ -81,19 +95,28 @@ def solved(pair, torque, keys, *, n_phases=64, deviation=None, **changes):
 @pytest.mark.parametrize("coupling", ["independent", "coupled"])
 @pytest.mark.parametrize(
     "changes",
-    [{"contact": "linear", "pair_coupling": "sum"}, {"contact": "linear"}, {}],
+    [
+        {"contact": "linear", "pair_coupling": "sum"},
+        {"contact": "linear"},
+        {},
+    ],
 )
 def test_spur_is_the_same_code_with_zero_helix(mesh_keys, coupling, changes):
     pair = gears("xiamen_23_84")
     options = read_mesh_options(mesh_keys | changes)
     _, contact = solved(
-        pair, 20.0, mesh_keys | changes, slice_coupling=coupling, n_slices=7
+        pair,
+        20.0,
+        mesh_keys | changes,
+        slice_coupling=coupling,
+        n_slices=7,
     )
     force = 20.0 / pair.pinion.base_radius
     table = loaded_pair_table(pair, STEEL, options, force=force)
     static = static_mesh(table, pair_states(table, contact.roll), force)
     # the spur table takes its secant at a load found in rounds, and smooths its nodes
     share = 1e-4 if "contact" in changes else 2e-3
+
     assert_close(contact.approach, static.approach, share)
     assert_close(contact.stiffness, static.stiffness, share)
     assert np.ptp(contact.line_load, axis=2).max() < 1e-6 * contact.line_load.max()
@@ -139,7 +162,11 @@ def test_equilibrium_is_that_of_an_independent_solver(mesh_keys, length):
         within = contact.approach[k] - mesh.shared_compliance * force
         reach = within - np.transpose(gap).ravel()
         load, _ = nnls(root * 1e6, np.linalg.solve(root.T, reach) * 1e6)
-        assert_close(contact.line_load[k].ravel(), load, atol=2e-6 * load.max())
+        assert_close(
+            contact.line_load[k].ravel(),
+            load,
+            atol=2e-6 * load.max(),
+        )
 
 
 @pytest.mark.parametrize(
@@ -200,6 +227,7 @@ def test_coupling_length_is_that_of_finite_elements(
         force,
     )
     softer = (depth[0] / force[0, 0] + shared) / whole
+
     assert_close(softer, finite_elements, 0.03)
 
 
@@ -207,7 +235,9 @@ def test_an_overlap_of_one_has_no_ripple(mesh_keys):
     pair = gears("beihang_61_132")
     width = math.pi * pair.pinion.normal_module / math.sin(abs(pair.pinion.helix_angle))
     pair = gears("beihang_61_132", face_width_mm=width * 1e3)
+
     assert_close(pair.overlap_ratio, 1.0, atol=1e-12)
+
     for keys in (mesh_keys, mesh_keys | REFERENCE):
         assert np.ptp(solved(pair, 178.0, keys)[1].approach) < 1e-8
 
@@ -228,7 +258,9 @@ def test_results_settle_with_more_slices(mesh_keys):
             ) + 1e-9 * abs(of(finest))
 
 
-def test_contact_pressure_is_that_of_a_cylinder_on_a_cylinder(mesh_keys):
+def test_contact_pressure_is_that_of_a_cylinder_on_a_cylinder(
+    mesh_keys,
+):
     """Textbook: p = sqrt(F E' / (2 pi rho L)), all in the normal section."""
     pair = gears("beihang_61_132")
     mesh, contact = solved(pair, 178.0, mesh_keys | REFERENCE)
@@ -247,6 +279,7 @@ def test_contact_pressure_is_that_of_a_cylinder_on_a_cylinder(mesh_keys):
     expected = math.sqrt(
         normal_load_per_length * 210e9 / (1 - 0.3**2) / (2 * math.pi * radius)
     )
+
     assert_close(pressure[k, i, j], expected, 1e-12)
 
 
@@ -255,12 +288,21 @@ def test_no_contact_is_refused(mesh_keys):
     with pytest.raises(ConfigError, match="must be positive"):
         solved(pair, 0.0, mesh_keys)
     with pytest.raises(GeometryError, match="no contact"):
-        solved(pair, 178.0, mesh_keys, deviation=np.full((40, 1), np.inf))
+        solved(
+            pair,
+            178.0,
+            mesh_keys,
+            deviation=np.full((40, 1), np.inf),
+        )
 
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [("n_slices", 0), ("coupling_modules", -1.0), ("slice_coupling", "glued")],
+    [
+        ("n_slices", 0),
+        ("coupling_modules", -1.0),
+        ("slice_coupling", "glued"),
+    ],
 )
 def test_slices_that_make_no_sense_are_refused(mesh_keys, key, value):
     with pytest.raises(ConfigError, match=f"mesh.{key} = "):

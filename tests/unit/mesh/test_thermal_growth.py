@@ -6,13 +6,23 @@ import numpy as np
 import pytest
 from closeness import assert_close
 
-from gensig.geometry.tooth_profile import involute_point, load_angle
+from gensig.geometry.tooth_profile import (
+    involute_point,
+    load_angle,
+)
 from gensig.mesh.thermal.body_heat import solved_body
-from gensig.mesh.thermal.thermal_growth import GearGrowth, PairGrowth
+from gensig.mesh.thermal.thermal_growth import (
+    GearGrowth,
+    PairGrowth,
+)
 from gensig.options.compose import compose
 from gensig.systems.registry import read_heat, read_pair
 
-WORDS = ["system=helical_pair", "gear=chongqing_40_162", "heat=chongqing_rated"]
+WORDS = [
+    "system=helical_pair",
+    "gear=chongqing_40_162",
+    "heat=chongqing_rated",
+]
 
 
 @pytest.fixture(scope="module")
@@ -38,13 +48,18 @@ def test_uniform_heat_moves_the_flank_to_the_grown_involute(pair, name):
     strain = 1e-3
     curvature = flank(pair, gear)
     moved = GearGrowth(tooth=strain, body=strain).along_action(gear, curvature)
+
     assert_close(moved, strain * curvature, 1e-12)
+
     grown = replace(gear, normal_module=gear.normal_module * (1.0 + strain))
     x, y = involute_point(gear, curvature)
     x_grown, y_grown = involute_point(grown, curvature * (1.0 + strain))
     angle = load_angle(gear, curvature)
+
     assert_close(
-        (x_grown - x) * np.sin(angle) + (y_grown - y) * np.cos(angle), moved, 1e-9
+        (x_grown - x) * np.sin(angle) + (y_grown - y) * np.cos(angle),
+        moved,
+        1e-9,
     )
 
 
@@ -60,10 +75,14 @@ def test_uneven_heat_moves_every_point_of_the_flank(pair, tooth, body):
     angle = load_angle(gear, curvature)
     expected = x_moved * np.sin(angle) + y * tooth * np.cos(angle)
     growth = GearGrowth(tooth=tooth, body=body)
+
     assert_close(growth.along_action(gear, curvature), expected, 1e-9)
+
     if body == 0.0:
         assert_close(
-            growth.of_tooth_alone.along_action(gear, curvature), expected, 1e-9
+            growth.of_tooth_alone.along_action(gear, curvature),
+            expected,
+            1e-9,
         )
 
 
@@ -72,7 +91,10 @@ def test_the_rim_grows_as_the_paper_s_equations_5_and_9_say(pair):
     gear = pair.pinion
     heat = read_heat(compose("generate", WORDS))
     body = solved_body(
-        gear, 6000.0, replace(heat, face_convection=0.0), bore_temperature=50.0
+        gear,
+        6000.0,
+        replace(heat, face_convection=0.0),
+        bore_temperature=50.0,
     )
     inner = gear.bore_radius
     outer = gear.root_radius
@@ -100,6 +122,7 @@ def test_the_rim_grows_as_the_paper_s_equations_5_and_9_say(pair):
         )
     )
     ours = expansion * (body.mean - 20.0) * outer
+
     assert_close(ours, equation_5, 1e-12)
     assert_close(ours, equation_9, 1e-5)
 
@@ -108,10 +131,15 @@ def test_gears_equally_hot_stay_conjugate(pair):
     same = GearGrowth(tooth=1e-3, body=1e-3)
     growth = PairGrowth(pinion=same, wheel=same)
     position = np.linspace(-0.2, 1.2, 101) * pair.path_of_contact
+
     assert np.abs(growth.deviation(pair, position)).max() < 1e-15
     assert_close(growth.strain(pair), 1e-3, 1e-6)
     assert_close(growth.closing(pair, 1e-3), 0.0, atol=1e-15)
-    assert_close(growth.closing(pair, 0.0), 2e-3 * pair.tangent_length, 1e-6)
+    assert_close(
+        growth.closing(pair, 0.0),
+        2e-3 * pair.tangent_length,
+        1e-6,
+    )
 
 
 def test_a_hotter_pinion_makes_the_entering_pair_late(pair):
@@ -121,21 +149,35 @@ def test_a_hotter_pinion_makes_the_entering_pair_late(pair):
     position = np.linspace(-0.2, 1.2, 141) * pair.path_of_contact
     gap = PairGrowth(pinion=hot, wheel=cold).deviation(pair, position)
     on_path = (position >= 0.0) & (position <= pair.path_of_contact)
-    assert_close(np.diff(gap[on_path]), -1e-3 * np.diff(position[on_path]), 1e-6)
-    assert_close(np.interp(pair.pitch_point, position, gap), 0.0, atol=1e-12)
+
+    assert_close(
+        np.diff(gap[on_path]),
+        -1e-3 * np.diff(position[on_path]),
+        1e-6,
+    )
+    assert_close(
+        np.interp(pair.pitch_point, position, gap),
+        0.0,
+        atol=1e-12,
+    )
     assert_close(gap[position < 0.0], 1e-3 * pair.pitch_point, 1e-9)
+
     other = PairGrowth(pinion=cold, wheel=hot).deviation(pair, position)
     assert_close(other, -gap, atol=1e-15)
+
     strains = PairGrowth(pinion=hot, wheel=cold).pitch_strains(pair)
     assert_close(strains, (1e-3, 0.0), atol=1e-12)
 
 
-def test_hot_teeth_on_a_cold_body_hardly_lengthen_the_base_pitch(pair):
+def test_hot_teeth_on_a_cold_body_hardly_lengthen_the_base_pitch(
+    pair,
+):
     """Pitches are angles times the body's radius: the teeth's own growth makes them thicker, not
     farther apart.
     """
     growth = PairGrowth(
-        pinion=GearGrowth(tooth=1e-3, body=0.0), wheel=GearGrowth(tooth=0.0, body=0.0)
+        pinion=GearGrowth(tooth=1e-3, body=0.0),
+        wheel=GearGrowth(tooth=0.0, body=0.0),
     )
     assert abs(growth.pitch_strains(pair)[0]) < 2e-4
     assert 0.1e-3 * pair.base_pitch < growth.teeth_alone(pair) < pair.base_pitch * 1e-3
