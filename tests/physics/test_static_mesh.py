@@ -34,16 +34,18 @@ def table(request, machine):
     return machine({"mesh.pair_coupling": request.param}).mesh_table()
 
 
-def random_states(table, n=400, seed=0):
+def random_states(table, n=400):
     """Pairs with random compliances, gaps and absences, to leave nothing to the geometry's good
     nature.
     """
-    rng = np.random.default_rng(seed)
-    compliance = rng.uniform(4e-9, 9e-9, (n, 4)) - table.shared_compliance
-    gap = rng.uniform(0, 30e-6, (n, 4)) * rng.integers(0, 2, (n, 4))
-    gap[rng.random((n, 4)) < 0.2] = np.inf
-    gap[np.all(np.isinf(gap), axis=1), 0] = 1e-6
-    return PairStates(compliance=compliance, gap=gap, position=np.zeros((n, 4)))
+    rng = np.random.default_rng(0)
+    size = (n, 4)
+    compliance = rng.uniform(4e-9, 9e-9, size) - table.shared_compliance
+    gap = rng.uniform(0, 30e-6, size)
+    gap[rng.random(size) < 0.5] = 0.0
+    gap[rng.random(size) < 0.2] = np.inf
+    gap[np.isinf(gap).all(axis=1), 0] = 1e-6
+    return PairStates(compliance=compliance, gap=gap, position=np.zeros(size))
 
 
 def violation(states, static, shared, force):
@@ -53,25 +55,25 @@ def violation(states, static, shared, force):
     C is the full flexibility matrix, own compliances on the diagonal and the shared body compliance
     everywhere.
     """
-    flexibility = np.einsum("ij,jk->ijk", states.compliance, np.eye(4)) + shared
-    deflection = np.einsum("ijk,ik->ij", flexibility, static.load)
+    load = static.load
+    deflection = states.compliance * load + shared * load.sum(axis=1, keepdims=True)
     slack = states.gap + deflection - static.approach[:, None]
-    scale = static.approach.max()
-    carrying = static.load > 0
-    return max(
-        np.abs(slack[carrying]).max() / scale,
-        max(0.0, -slack[~carrying].min(initial=0.0)) / scale,
-        max(0.0, -static.load.min()) / force,
-        np.abs(static.load.sum(axis=1) / force - 1).max(),
-    )
+    slack = slack / static.approach.max()
+    carrying = load > 0
+    breaches = [
+        np.abs(slack[carrying]).max(),
+        -slack[~carrying].min(initial=0.0),
+        -load.min() / force,
+        np.abs(load.sum(axis=1) / force - 1).max(),
+    ]
+    return max(breaches)
 
 
 @pytest.mark.parametrize("force", [1.0, 925.0, 2e4])
-class TestComplementarity:
-    def test_random_pairs(self, table, force):
-        states = random_states(table)
-        static = static_mesh(table, states, force)
-        assert violation(states, static, table.shared_compliance, force) < 1e-11
+def test_random_pairs_are_in_equilibrium(table, force):
+    states = random_states(table)
+    static = static_mesh(table, states, force)
+    assert violation(states, static, table.shared_compliance, force) < 1e-11
 
 
 @pytest.mark.parametrize("gear", GEARS)
@@ -127,27 +129,27 @@ class TestMeshPeriod:
         assert np.ptp(teeth[0]) > 0.1 * teeth.mean()
 
 
-@pytest.mark.parametrize("gear", ["pinion", "wheel"])
+@pytest.mark.parametrize("gear", GEARS)
 @pytest.mark.parametrize("kind", FAULTS)
 def test_a_faulty_tooth_shows_once_a_turn_at_its_number(xiamen, gear, kind):
     """Tooth k enters contact at A after k pitches; corner contact starts a little earlier."""
     points = 50
     tooth = 9
     n_teeth = getattr(xiamen.pair, gear).n_teeth
-    roll = xiamen.pair.base_pitch * (np.arange(2 * n_teeth * points) + 0.5) / points
+    pitches = (np.arange(2 * n_teeth * points) + 0.5) / points
+    roll = xiamen.pair.base_pitch * pitches
     sound, faulty = (
         at(xiamen.mesh_table(faults), roll, xiamen.mesh_force).stiffness
         for faults in ((), (fault(kind, gear, tooth),))
     )
-    touched = (np.abs(faulty / sound - 1) > 1e-9).reshape(2, n_teeth, points)
 
-    assert (touched[0] == touched[1]).all()
+    differs = np.abs(faulty / sound - 1) > 1e-9
+    first, second = differs.reshape(2, n_teeth, points)
+    assert (first == second).all()
 
-    pitches = np.flatnonzero(touched[0].any(axis=1)) - tooth
-    pitches = np.sort((pitches + n_teeth // 2) % n_teeth - n_teeth // 2)
-    assert 1 <= len(pitches) <= 3
-    assert {0, 1} & set(pitches.tolist())
-    assert set(pitches.tolist()) <= {-1, 0, 1}
+    shown = np.flatnonzero(first.any(axis=1)) - tooth
+    assert set(shown.tolist()) <= {-1, 0, 1}
+    assert {0, 1} & set(shown.tolist())
 
 
 class TestPaperLaw:

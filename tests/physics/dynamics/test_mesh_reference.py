@@ -52,43 +52,36 @@ def bent(at, position, values, slopes):
 
 def columns(side, kind, at, position):
     """Compliance, its slope, gap and its slope of one kind of tooth, (4, phase)."""
-    slopes = side.compliance_slope[kind], side.gap_slope[kind]
-    return np.array(
-        [
-            bent(at, position, side.compliance[kind], slopes[0]),
-            np.interp(at, position, slopes[0]),
-            bent(at, position, side.gap[kind], slopes[1]),
-            np.interp(at, position, slopes[1]),
-        ]
-    )
+    result = []
+    for name in ("compliance", "gap"):
+        values = getattr(side, name)[kind]
+        slopes = getattr(side, f"{name}_slope")[kind]
+        result.append(bent(at, position, values, slopes))
+        result.append(np.interp(at, position, slopes))
+    return np.array(result)
+
+
+def tooth_at(values, index):
+    """Values by tooth for the pairs of an index, (pair,)."""
+    return values[index % len(values)]
 
 
 class Reference:
     """Six equations of a pair, as the theory writes them; one-sided law."""
 
-    def __init__(self, dynamics, step=1e-6):
-        self.d, self.table, self.pair = (
-            dynamics,
-            dynamics.table,
-            dynamics.table.pair,
-        )
-        self.system, self.shared = (
-            dynamics.system(),
-            self.table.shared_compliance,
-        )
-        self.damping = mesh_numbers(dynamics, step, dynamics.rest())[DAMPING]
-        self.sides = (
-            (self.table.pinion, dynamics.start_tooth_pinion),
-            (self.table.wheel, dynamics.start_tooth_wheel),
-        )
+    def __init__(self, dynamics):
+        self.d = dynamics
+        self.table = dynamics.table
+        self.pair = dynamics.table.pair
+        self.system = dynamics.system()
+        self.shared = self.table.shared_compliance
+        self.damping = mesh_numbers(dynamics, 1e-6, dynamics.rest())[DAMPING]
 
     def present(self, index):
         """Pairs whose teeth exist, (pair,)."""
-        there = [
-            side.present[side.kind[(index + start) % len(side.kind)]]
-            for side, start in self.sides
-        ]
-        return np.all(there, axis=0)
+        pinion = tooth_at(self.table.pinion.present[self.table.pinion.kind], index)
+        wheel = tooth_at(self.table.wheel.present[self.table.wheel.kind], index)
+        return pinion & wheel
 
     def pairs(self, roll):
         """Position, compliance, its slope, gap and its slope of existing pairs, (pair,) each."""
@@ -97,23 +90,16 @@ class Reference:
         index = index[self.present(index)]
         position = roll - index * self.pair.base_pitch
         values = np.zeros((4, len(index)))
-        errors = (
-            (self.d.pinion_error, self.d.pinion_tilt),
-            (self.d.wheel_error, self.d.wheel_tilt),
-        )
-        for (side, start), (error, tilt) in zip(self.sides, errors, strict=True):
-            for k, tooth in enumerate((index + start) % len(side.kind)):
-                at = position[k : k + 1]
-                values[:, k] += columns(
-                    side,
-                    side.kind[tooth],
-                    at,
-                    self.table.position,
-                )[:, 0]
-                values[2, k] += error[tooth] + tilt[tooth] * (
-                    at[0] - self.pair.pitch_point
-                )
-                values[3, k] += tilt[tooth]
+        for name in ("pinion", "wheel"):
+            side = getattr(self.table, name)
+            kinds = tooth_at(side.kind, index)
+            for k, kind in enumerate(kinds):
+                place = position[k : k + 1]
+                values[:, k] += columns(side, kind, place, self.table.position)[:, 0]
+            error = tooth_at(getattr(self.d, f"{name}_error"), index)
+            tilt = tooth_at(getattr(self.d, f"{name}_tilt"), index)
+            values[2] += error + tilt * (position - self.pair.pitch_point)
+            values[3] += tilt
         return position, *values
 
     def law(self, values, approach, rate, roll_rate):
@@ -125,16 +111,16 @@ class Reference:
         energy = elastic @ (approach - gap) - 0.5 * (c - self.shared) @ elastic**2
         stored = energy - 0.5 * self.shared * elastic.sum() ** 2
         along = load @ gap_slope + 0.5 * elastic**2 @ c_slope
-        return load, along, stored, (load - elastic) @ pair_rate
+        lost = (load - elastic) @ pair_rate
+        return load, along, stored, lost
 
     def loads(self, compliance, gap, approach):
         """F >= 0 with C F = approach - gap where F > 0 and C F >= approach - gap elsewhere."""
         n = len(gap)
         squeezed = approach - gap
         flexibility = np.diag(compliance - self.shared) + self.shared
-        sets = chain.from_iterable(
-            combinations(range(n), size) for size in range(n + 1)
-        )
+        sizes = range(n + 1)
+        sets = chain.from_iterable(combinations(range(n), size) for size in sizes)
         for chosen in map(list, sets):
             force = np.zeros(n)
             block = flexibility[np.ix_(chosen, chosen)]
@@ -154,18 +140,10 @@ class Reference:
         x = np.clip((position - pair.pitch_point) / half_width, -1, 1)
         sliding = options.friction_coefficient * load * x * (1.5 - 0.5 * x**2)
         arm = pair.start_curvature_radius + np.clip(position, 0, pair.path_of_contact)
-        moments = (
-            -(sliding @ arm),
-            sliding @ (pair.tangent_length - arm),
-        )
-        return (
-            load.sum(),
-            sliding.sum(),
-            *moments,
-            along,
-            stored,
-            lost,
-        )
+        moment_p = -(sliding @ arm)
+        moment_w = sliding @ (pair.tangent_length - arm)
+        normal = load.sum()
+        return normal, sliding.sum(), moment_p, moment_w, along, stored, lost
 
     def coast(self, roll, approach, rate, roll_rate):
         """The same where the back flanks touch, and the number of loaded pairs, negative.
@@ -176,32 +154,25 @@ class Reference:
         pitch = self.pair.base_pitch
         position = self.table.position
         n = np.arange(-40, 41)
-        at = 2 * self.pair.pitch_point + 0.5 * pitch - roll - n * pitch
+        at = 2 * self.pair.pitch_point + (0.5 - n) * pitch - roll
         chosen = (at >= position[0]) & (at < position[-1]) & self.present(-n)
-        values = sum(columns(side, 0, at[chosen], position) for side, _ in self.sides)
+        sides = self.table.pinion, self.table.wheel
+        values = sum(columns(side, 0, at[chosen], position) for side in sides)
         squeezed = -approach - self.pair.backlash
         load, along, stored, lost = self.law(values, squeezed, -rate, -roll_rate)
-        return (
-            -load.sum(),
-            0.0,
-            0.0,
-            0.0,
-            -along,
-            stored,
-            lost,
-            -float(np.sum(load > 0)),
-        )
+        n_loaded = float(np.sum(load > 0))
+        return -load.sum(), 0.0, 0.0, 0.0, -along, stored, lost, -n_loaded
 
     def acceleration(self, time, q, v):
         """q'' at one instant."""
         law = self.mesh(*motion_of(self.d, time, q, v))
         normal, friction, moment_p, moment_w, along = law[:5]
         system = self.system
-        force = system.force - system.stiffness @ q - system.damping @ v
-        force = force - normal * self.d.approach_direction()
         turning = moment_p + self.pair.pinion.base_radius * along
-        mesh = np.array([friction, 0, turning, -friction, 0, moment_w])
-        return (force + mesh) / system.mass
+        force = np.array([friction, 0, turning, -friction, 0, moment_w])
+        force += system.force - normal * self.d.approach_direction()
+        force -= system.stiffness @ q + system.damping @ v
+        return force / system.mass
 
 
 @pytest.fixture(scope="module", params=FAULTS)

@@ -27,17 +27,17 @@ def decimated(frequency, factor, phase=0.4):
     """A sine as means over internal steps through the decimator, and sampled at the output rate."""
     low_pass = decimator(factor)
     turn = 2 * np.pi * frequency
-    steps = np.arange(
-        -low_pass.margin * factor - 1,
-        (N_SAMPLES + low_pass.margin) * factor + 1,
-    )
-    edge = steps / (RATE * factor)
-    integral = (
-        -np.cos(turn * edge + phase) / turn if frequency else edge * np.sin(phase)
-    )
+    first = -low_pass.margin * factor - 1
+    last = (N_SAMPLES + low_pass.margin) * factor
+    edge = np.arange(first, last + 1) / (RATE * factor)
+    if frequency:
+        integral = -np.cos(turn * edge + phase) / turn
+    else:
+        integral = edge * np.sin(phase)
     means = np.diff(integral) * RATE * factor
     samples = low_pass.apply_to_columns(means[:, None])[:, 0]
-    return samples, np.sin(turn * np.arange(N_SAMPLES) / RATE + phase)
+    times = np.arange(N_SAMPLES) / RATE
+    return samples, np.sin(turn * times + phase)
 
 
 @pytest.mark.parametrize("factor", FACTORS)
@@ -48,19 +48,12 @@ def test_the_pass_band_is_flat_and_keeps_the_phase(frequency, factor):
 
 
 @pytest.mark.parametrize("factor", FACTORS)
-def test_aliases_are_78_db_down(factor):
-    for alias in (25.0, 690.0, 12_000.0, 19_990.0, 25_500.0):
-        for frequency in (
-            RATE - alias,
-            RATE + alias,
-            2 * RATE - alias,
-        ):
-            if frequency < 0.5 * factor * RATE:
-                assert np.abs(decimated(frequency, factor)[0]).max() < 10 ** (-78 / 20)
-    times = np.arange(N_SAMPLES) / RATE
-    assert (
-        np.abs(np.sin(2 * np.pi * (RATE - 690.0) * times)).max() > 0.9
-    )  # without the filter
+@pytest.mark.parametrize("alias", [25.0, 690.0, 12_000.0, 19_990.0, 25_500.0])
+def test_aliases_are_78_db_down(factor, alias):
+    for frequency in (RATE - alias, RATE + alias, 2 * RATE - alias):
+        if frequency < 0.5 * factor * RATE:
+            samples, _ = decimated(frequency, factor)
+            assert np.abs(samples).max() < 10 ** (-78 / 20)
 
 
 @pytest.mark.parametrize("factor", FACTORS)
