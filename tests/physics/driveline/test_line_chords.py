@@ -99,31 +99,20 @@ class TestLaw:
         assert_close(forces, share * force, 1e-3)
 
     @pytest.mark.parametrize("approach", [2e-5, 6e-5, -1.5e-4])
+    @pytest.mark.parametrize("turned", [0.313, 2.711, 9.173])
     def test_force_and_torque_of_the_passing_teeth_are_slopes_of_one_potential(
-        self, mesh, approach
+        self, mesh, approach, turned
     ):
         mesh = replace(mesh, backlash=1e-4)
-        for turned in (0.313, 2.711, 9.173):
-            computed = law_at(mesh, turned, approach)
-            below, above = (
-                law_at(mesh, turned + off, approach)[layout.STORED]
-                for off in (-1e-7, 1e-7)
-            )
-            assert_close(
-                computed[layout.ALONG],
-                -(above - below) / 2e-7,
-                1e-3,
-                atol=1e-6,
-            )
-            below, above = (
-                law_at(mesh, turned, approach + off)[layout.STORED]
-                for off in (-1e-10, 1e-10)
-            )
-            assert_close(
-                computed[layout.FORCE],
-                (above - below) / 2e-10,
-                1e-4,
-            )
+
+        def stored(turned, approach):
+            return law_at(mesh, turned, approach)[layout.STORED]
+
+        law = law_at(mesh, turned, approach)
+        further = stored(turned + 1e-7, approach) - stored(turned - 1e-7, approach)
+        deeper = stored(turned, approach + 1e-10) - stored(turned, approach - 1e-10)
+        assert_close(law[layout.ALONG], -further / 2e-7, 1e-3, atol=1e-6)
+        assert_close(law[layout.FORCE], deeper / 2e-10, 1e-4)
 
     def test_all_springs_of_a_pair_are_damped_by_its_first_touch(self, mesh):
         still = law_at(mesh, 0.4, 3e-5)
@@ -139,42 +128,33 @@ class TestLaw:
         self, helical, mesh
     ):
         n_teeth = helical[0].pair.pinion.n_teeth
-        sound = replace(
-            mesh,
-            rows=np.maximum(mesh.rows, 0),
-            coast_rows=np.zeros_like(mesh.coast_rows),
-        )
+        rows = np.maximum(mesh.rows, 0)
+        sound = replace(mesh, rows=rows, coast_rows=np.zeros_like(mesh.coast_rows))
+        turned = np.arange(0.5, n_teeth + 0.5, 0.25)
         for approach in (3e-5, -mesh.backlash - 3e-5):
-            ratio = np.array(
-                [
-                    law_at(mesh, turned, approach)[0]
-                    / law_at(sound, turned, approach)[0]
-                    for turned in np.arange(0.5, n_teeth + 0.5, 0.25)
-                ]
+            force, whole = (
+                np.array([law_at(each, at, approach)[0] for at in turned])
+                for each in (mesh, sound)
             )
-            lost = ratio < 0.999
-            assert 0 < lost.sum() < 5 * 4
+            ratio = force / whole
+            assert 0 < (ratio < 0.999).sum() < 5 * 4
             assert ratio.min() < 0.8
 
-    def test_slices_enter_from_the_other_end_on_the_back_flanks(self, helical):
-        """The middle of the face meets the mate half a pitch from where it does on the front,
-        about the pitch point.
+    @pytest.mark.parametrize("position", [0.1, 0.35, 0.8])
+    def test_slices_enter_from_the_other_end_on_the_back_flanks(
+        self, helical, position
+    ):
+        """The middle of the face, past the pitch point in pitches, meets the mate half a pitch from
+        where it does on the front.
         """
         table, _ = helical
         mesh = placed(sliced_pair_mesh, table)
         pair = table.pair
-        pitch = table.pair.base_pitch
         middle = 0.5 * pair.face_width * math.tan(pair.base_helix_angle)
-        for position in (
-            0.1,
-            0.35,
-            0.8,
-        ):  # of the middle of the face, past the pitch point, pitches
-            front = (pair.pitch_point + middle) / pitch + position
-            back = (pair.pitch_point + middle) / pitch + 0.5 - position
-            one = law_at(mesh, front + 9.0, 3e-5)[0]
-            other = law_at(mesh, back + 9.0, -mesh.backlash - 3e-5)[0]
-            assert_close(other, -one, 1e-9)
+        start = (pair.pitch_point + middle) / pair.base_pitch + 9.0
+        front = law_at(mesh, start + position, 3e-5)[0]
+        back = law_at(mesh, start + 0.5 - position, -mesh.backlash - 3e-5)[0]
+        assert_close(back, -front, 1e-9)
 
     def test_springs_begin_at_0_and_grow(self, mesh):
         with pytest.raises(ConfigError, match="must begin at 0 and grow"):
