@@ -136,23 +136,23 @@ def test_uneven_firing_has_other_orders():
 
 
 def test_pump_pulses_follow_the_firing_and_the_load():
-    full = torques_of(option())
-    half = torques_of(option(), torque=0.5 * TORQUE)
-    pump = full.on(NODES)[45:65]
-    _, together = cycle_orders(pump.sum(axis=0), 80)
-    others = np.arange(1, 81) % 20 != 0
-
-    assert np.abs(together[others]).max() < 1e-6 * np.abs(together).max()
-    assert (
-        pump.sum(axis=0).mean() < 1.5 * half.on(NODES)[45:65].sum(axis=0).mean() < 0.0
+    full, half = (
+        torques_of(option(), torque=share * TORQUE).on(NODES)[45:65].sum(axis=0)
+        for share in (1.0, 0.5)
     )
+    _, orders = cycle_orders(full, 80)
+    others = np.arange(1, 81) % 20 != 0
+    assert np.abs(orders[others]).max() < 1e-6 * np.abs(orders).max()
+    assert full.mean() < 1.5 * half.mean() < 0.0
 
 
 def test_quadratic_loads_follow_the_speed_and_constant_ones_do_not():
-    slow = torques_of(option(), 800 * RPM, 0.0).on(NODES)
-    fast = torques_of(option(), 1600 * RPM, 0.0).on(NODES)
-    assert_close(fast[42].mean(), 4.0 * slow[42].mean(), 1e-12)
-    assert_close(fast[66].mean(), slow[66].mean(), 1e-12)
+    slow, fast = (
+        torques_of(option(), rpm * RPM, 0.0).on(NODES).mean(axis=1)
+        for rpm in (800, 1600)
+    )
+    assert_close(fast[42], 4.0 * slow[42], 1e-12)
+    assert_close(fast[66], slow[66], 1e-12)
 
 
 def test_a_disturbance_of_the_dynamometer_is_given_apart():

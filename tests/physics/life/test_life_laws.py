@@ -201,28 +201,34 @@ def test_pits_come_after_the_first_life_and_go_with_the_load_to_the_exponent(
     assert_close(rate, 1.0 / pits.options.cycles, 1e-9)
 
 
-def test_damage_adds_up_by_miner_whatever_the_order(pits):
-    hours = np.array([10.0, 5.0, 12.0])
-    torques = np.array([100.0, 80.0, 110.0])
+@pytest.mark.parametrize("order", [[0, 1, 2], [2, 0, 1]])
+def test_damage_adds_up_by_miner_whatever_the_order(pits, order):
+    hours = np.array([10.0, 5.0, 12.0])[order]
+    torques = np.array([100.0, 80.0, 110.0])[order]
+    end = np.cumsum(hours) * HOUR
+    begin = end - hours * HOUR
+    speed = np.full(3, SPEED)
+    blocks = tuple(zip(begin, end, speed, torques, strict=True))
+    history = given_history(blocks, math.inf)
+
+    course = grow(pits.sizes, pits.turns(history.torque), history, 0.0)
+
     rates = [pits.rate(np.array([0.0]), torque)[0] for torque in torques]
-    for order in ([0, 1, 2], [2, 0, 1]):
-        end = np.cumsum(hours[order]) * HOUR
-        begin = np.append(0.0, end[:-1])
-        blocks = zip(begin, end, [SPEED] * 3, torques[order], strict=True)
-        history = given_history(tuple(blocks), math.inf)
-        course = grow(pits.sizes, pits.turns(history.torque), history, 0.0)
-        assert_close(course.size[-1], 108_000.0 * hours @ rates, 1e-12)
+    assert_close(course.size[-1], 108_000.0 * hours @ rates, 1e-12)
 
 
 def test_a_standstill_costs_clock_time_and_nothing_else(law):
     turns = law.turns(np.array([90.0]))
-    courses = []
-    for begin in (1.0, 9.0):
-        later = (begin * HOUR, (begin + 1.0) * HOUR, SPEED, 90.0)
-        history = given_history(((0.0, HOUR, SPEED, 90.0), later), math.inf)
-        courses.append(grow(law.sizes, turns, history, 5e-4))
-    near, far = courses
 
+    def interrupted(until):
+        """Course of one hour's work, a standstill until some hour, and one more hour."""
+        first = (0.0, HOUR, SPEED, 90.0)
+        later = (until * HOUR, (until + 1.0) * HOUR, SPEED, 90.0)
+        history = given_history((first, later), math.inf)
+        return grow(law.sizes, turns, history, 5e-4)
+
+    near = interrupted(1.0)
+    far = interrupted(9.0)
     assert_array_equal(near.size[-1], far.size[-1])
     assert_array_equal(near.turns[-1], far.turns[-1])
     assert_close(far.clock[-1] - near.clock[-1], 8 * HOUR, 1e-6)
@@ -314,12 +320,10 @@ def test_a_drift_settles():
     ],
 )
 def test_a_history_that_cannot_be_is_refused(config, blocks, said):
-    def history():
-        options = read_life({**config["life"], "blocks": blocks})
-        return given_history(options.blocks, options.horizon)
-
-    with pytest.raises(ConfigError, match=said):
-        history()
+    keys = {**config["life"], "blocks": blocks}
+    with pytest.raises(ConfigError, match=said):  # noqa: PT012
+        options = read_life(keys)
+        given_history(options.blocks, options.horizon)
 
 
 def test_a_drawn_history_keeps_to_its_limits():
@@ -330,10 +334,10 @@ def test_a_drawn_history_keeps_to_its_limits():
     length = (history.end - history.begin)[:-1]
     gap = history.begin[1:] - history.end[:-1]
     real = gap[gap > 1.0]
+
     for values in (length, real):
         assert values.min() >= HOUR - 1e-6
         assert values.max() <= 4 * HOUR + 1e-6
-
     assert history.end[-1] <= 1000 * HOUR
     assert 0.4 < len(real) / len(gap) < 0.6
     assert set(history.setpoint.tolist()) == {0, 1}
