@@ -180,9 +180,7 @@ def test_cross_compliance_against_finite_elements(side, xiamen):
     assert_close(result, np.array(CROSS_FE[side]) * 1e-12, 0.01)
 
 
-def test_shared_compliance_is_the_mean_of_both_gears_over_the_double_zone(
-    xiamen,
-):
+def test_shared_compliance_is_the_mean_of_both_gears_over_the_double_zone(xiamen):
     expected = sum(np.mean(CROSS_FE[side]) for side in SIDES) * 1e-12
     assert_close(
         shared_body_compliance(xiamen.pair, xiamen.material),

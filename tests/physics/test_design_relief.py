@@ -13,15 +13,8 @@ from numpy.testing import assert_array_equal
 from gensig.dynamics.lanes import tooth_rows
 from gensig.errors import GeometryError
 from gensig.mesh.load_distribution import pair_states, static_mesh
-from gensig.mesh.modification import (
-    PLAIN,
-    FlankModification,
-    PairModification,
-)
-from gensig.mesh.sliced.sliced_statics import (
-    chord_equilibrium,
-    chord_states,
-)
+from gensig.mesh.modification import PLAIN, FlankModification, PairModification
+from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
 from gensig.systems.base import simulate_together
 from gensig.systems.registry import read_system
 from gensig.systems.run import Run
@@ -205,9 +198,7 @@ def test_leads_are_those_of_the_sliced_pair(config_with, lead, share):
     assert_close(own, theirs, share)
 
 
-def test_relieved_gears_shake_less_along_the_line_of_action(
-    machine,
-):
+def test_relieved_gears_shake_less_along_the_line_of_action(machine):
     """Tips that do not strike: a quarter of the acceleration along the line of action at the rated
     point.
     """

@@ -123,6 +123,7 @@ class TestWhoseFacesBear:
         }
         crack = one("crack", gear=gear, tooth=0, **pressed)
         result = deflection(xiamen, crack)
+
         assert_close(result, deflection(xiamen), 1e-12)
         assert crack.severity(getattr(xiamen.pair, gear)) > 0.2
 
@@ -130,7 +131,12 @@ class TestWhoseFacesBear:
         breathing, kept_open = (
             deflection(
                 xiamen,
-                one("crack", gear=gear, tooth=0, crack_faces=faces),
+                one(
+                    "crack",
+                    gear=gear,
+                    tooth=0,
+                    crack_faces=faces,
+                ),
             )
             for faces in ("breathing", "open")
         )
@@ -214,7 +220,10 @@ class TestTwoFaultsOnOneTooth:
             assert np.all(both >= deflection(xiamen, fault) * (1 - 1e-9))
             assert (both / deflection(xiamen, fault)).max() > 1.01
 
-    @pytest.mark.parametrize("other", sorted(set(KINDS) - {"missing_tooth", "pitting"}))
+    @pytest.mark.parametrize(
+        "other",
+        sorted(set(KINDS) - {"missing_tooth", "pitting"}),
+    )
     def test_order_hardly_matters(self, xiamen, other):
         pair = (self.PIT, one(other, tooth=0))
         one_way, other_way = (
@@ -239,7 +248,9 @@ class TestTwoFaultsOnOneTooth:
         tooth = faulty_teeth(system.pair, faults[::order])["pinion", 0]
         sound = sections(healthy_tooth(system.pair.pinion), papers_crack=True)
         for result, whole in zip(
-            sections(tooth, papers_crack=True), sound, strict=True
+            sections(tooth, papers_crack=True),
+            sound,
+            strict=True,
         ):
             assert np.all(result > 0)
             assert np.all(result <= whole)

@@ -12,11 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from closeness import assert_close
-from reference.calibrate_crack import (
-    MODULE,
-    WIDTH,
-    reference_gear,
-)
+from reference.calibrate_crack import MODULE, WIDTH, reference_gear
 
 from gensig.errors import ExtrapolationError
 from gensig.faults.crack import Crack

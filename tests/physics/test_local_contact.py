@@ -7,10 +7,7 @@ import pytest
 from closeness import assert_close
 
 from gensig.mesh.load_distribution import pair_states, static_mesh
-from gensig.mesh.local_contact import (
-    linear_contact,
-    weber_contact,
-)
+from gensig.mesh.local_contact import linear_contact, weber_contact
 
 # spur reference, section 3.4: named points by pinion curvature radius (mm), pair in plane strain at
 # 20 N m (1e8 N/m)

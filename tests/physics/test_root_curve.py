@@ -6,10 +6,7 @@ import numpy as np
 import pytest
 from closeness import assert_close
 
-from gensig.geometry.tooth_profile import (
-    involute_point,
-    root_curve,
-)
+from gensig.geometry.tooth_profile import involute_point, root_curve
 
 CASES = {
     "z23": {},
@@ -62,7 +59,14 @@ def rack_clearance(gear, x, y):
             ),
         )
         inside = (from_tip <= 0) & (from_flank <= 0)
-        return np.where(inside, np.maximum(from_tip, from_flank), outside) - rounding
+        return (
+            np.where(
+                inside,
+                np.maximum(from_tip, from_flank),
+                outside,
+            )
+            - rounding
+        )
 
     span = np.linspace(-1.0, 1.0, 801) * 6 * m / pitch_radius
     best = np.take(span, distance(span[None, :]).argmin(axis=1))
@@ -77,7 +81,10 @@ def rack_clearance(gear, x, y):
 def outline(gear):
     gamma = np.linspace(math.pi / 2, gear.pressure_angle, 32)
     tip = math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
-    flank = involute_point(gear, np.linspace(gear.junction_curvature_radius, tip, 16))
+    flank = involute_point(
+        gear,
+        np.linspace(gear.junction_curvature_radius, tip, 16),
+    )
     return [
         np.concatenate(parts)
         for parts in zip(root_curve(gear, gamma), flank, strict=True)

@@ -7,11 +7,7 @@ import pytest
 from closeness import assert_close
 from fault_cases import GEARS, KINDS, one
 
-from gensig.mesh.load_distribution import (
-    PairStates,
-    pair_states,
-    static_mesh,
-)
+from gensig.mesh.load_distribution import PairStates, pair_states, static_mesh
 
 
 def fault(kind, gear="pinion", tooth=5):
@@ -93,9 +89,7 @@ def test_equilibrium_with_every_fault_over_a_turn(xiamen, kind, gear):
     assert np.abs(static.load - sound.load).max() > 1e-3 * force
 
 
-def test_approach_rises_with_force_and_stiffness_is_its_slope(
-    table,
-):
+def test_approach_rises_with_force_and_stiffness_is_its_slope(table):
     states = random_states(table)
     forces = np.geomspace(1, 1e5, 60)
     approach = [static_mesh(table, states, force).approach for force in forces]
@@ -145,6 +139,7 @@ def test_a_faulty_tooth_shows_once_a_turn_at_its_number(xiamen, gear, kind):
 
     differs = np.abs(faulty / sound - 1) > 1e-9
     first, second = differs.reshape(2, n_teeth, points)
+
     assert (first == second).all()
 
     shown = np.flatnonzero(first.any(axis=1)) - tooth

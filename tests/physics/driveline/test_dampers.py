@@ -6,14 +6,8 @@ import numpy as np
 import pytest
 from closeness import assert_close
 
-from gensig.driveline.linear.damper_tuning import (
-    response_at_nodes,
-    tune_dampers,
-)
-from gensig.driveline.linear.dampers import (
-    TorsionalDamper,
-    with_dampers,
-)
+from gensig.driveline.linear.damper_tuning import response_at_nodes, tune_dampers
+from gensig.driveline.linear.dampers import TorsionalDamper, with_dampers
 from gensig.driveline.linear.forced import (
     Elements,
     LinearLine,
@@ -22,11 +16,7 @@ from gensig.driveline.linear.forced import (
 )
 from gensig.driveline.linear.matrices import line_matrices
 from gensig.driveline.linear.modal import natural_modes
-from gensig.driveline.linear.shaft_line import (
-    Node,
-    Shaft,
-    ShaftLine,
-)
+from gensig.driveline.linear.shaft_line import Node, Shaft, ShaftLine
 
 # of the spring that holds the one disc, whose inertia is 1: its frequency is 1 rad/s
 STIFFNESS = 1.0

@@ -62,9 +62,7 @@ def load(line):
     )
 
 
-def test_dampers_of_the_configuration_are_those_added_and_those_tuned_with(
-    line,
-):
+def test_dampers_of_the_configuration_are_those_added_and_those_tuned_with(line):
     damped = with_further_dampers(line, DAMPERS)
     read = read_engine_line(compose("generate", (*ENGINE, AS_KEYS)))
     assert read.drive.numbers == damped.drive.numbers == (*range(1, 68), 68, 69)
@@ -147,6 +145,7 @@ def test_a_force_that_never_closes_the_mesh_is_refused(config, line):
     mesh = mesh_between(line, (21, 45))
     strength = read_mesh_strength(config, line, mesh)
     load = ToothLoad(speed=SPEED, force=np.full(8, -1.0))
+
     with pytest.raises(
         ConfigError,
         match="its force never closes the driving flanks",

@@ -18,15 +18,8 @@ from gensig.driveline.engine_dampers import (
 from gensig.driveline.engine_line import read_engine_line
 from gensig.driveline.in_time import RATE, TimeResponse
 from gensig.driveline.linear.forced import run_of_speeds
-from gensig.driveline.sweep import (
-    amplitude_spectra,
-    sweep_course,
-    sweep_response,
-)
-from gensig.driveline.time_root_stress import (
-    root_stress_in_time,
-    typical_largest,
-)
+from gensig.driveline.sweep import amplitude_spectra, sweep_course, sweep_response
+from gensig.driveline.time_root_stress import root_stress_in_time, typical_largest
 from gensig.errors import ConfigError
 from gensig.options.compose import compose
 
@@ -59,9 +52,7 @@ def passage():
     )
 
 
-def test_a_sweep_of_a_line_without_play_is_the_linear_line(
-    passage,
-):
+def test_a_sweep_of_a_line_without_play_is_the_linear_line(passage):
     line, sweep = passage
     torques = [line.on_line(line.torques(speed, 0.0)) for speed in sweep.up.speeds]
     (steady,) = run_of_speeds(
@@ -180,9 +171,7 @@ def pump_drive():
     )
 
 
-def test_root_stress_in_time_of_a_force_that_repeats_is_that_of_one_cycle(
-    pump_drive,
-):
+def test_root_stress_in_time_of_a_force_that_repeats_is_that_of_one_cycle(pump_drive):
     line, mesh, strength = pump_drive
     force = 1500.0 + 4000.0 * np.cos(4.0 * np.pi * np.arange(5760) / 5760)
     load = ToothLoad(speed=SPEED, force=force)

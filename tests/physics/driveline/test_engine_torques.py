@@ -18,13 +18,8 @@ from engine_cases import (
 )
 
 from gensig.driveline.excitation.cycle import CYCLE
-from gensig.driveline.excitation.engine import (
-    read_engine,
-    read_wheels,
-)
-from gensig.driveline.excitation.engine_torques import (
-    engine_torques,
-)
+from gensig.driveline.excitation.engine import read_engine, read_wheels
+from gensig.driveline.excitation.engine_torques import engine_torques
 from gensig.driveline.linear.forced import cycle_orders
 from gensig.errors import ConfigError
 
@@ -85,7 +80,8 @@ def test_harmonics_of_one_cylinder_are_as_estimated_independently():
         "throw_angles_deg": [0],
         "firing_order": ["A1"],
     }
-    values["throw_nodes"], values["valve_nodes"] = [13], {"A": []}
+    values["throw_nodes"] = [13]
+    values["valve_nodes"] = {"A": []}
     values["reference"]["torque_nm"] = TORQUE / 20
     values["loads"] = None
     computed = torques_of(values, torque=TORQUE / 20)
@@ -142,6 +138,7 @@ def test_pump_pulses_follow_the_firing_and_the_load():
     )
     _, orders = cycle_orders(full, 80)
     others = np.arange(1, 81) % 20 != 0
+
     assert np.abs(orders[others]).max() < 1e-6 * np.abs(orders).max()
     assert full.mean() < 1.5 * half.mean() < 0.0
 
@@ -185,9 +182,7 @@ def test_a_measured_pressure_gives_the_torque_back(tmp_path):
     assert_close(computed.on(NODES), burned.on(NODES), atol=1.0)
 
 
-def test_torques_that_contradict_the_pressure_are_refused(
-    tmp_path,
-):
+def test_torques_that_contradict_the_pressure_are_refused(tmp_path):
     measured, _ = pressure_file(tmp_path)
     (tmp_path / "weak").mkdir()
     weak, _ = pressure_file(tmp_path / "weak", scale=0.02)
@@ -204,7 +199,11 @@ def test_torques_that_contradict_the_pressure_are_refused(
             100.0,
             "which decides it; leave the torque out",
         ),
-        (option(), None, "a Wiebe cycle needs the brake torque"),
+        (
+            option(),
+            None,
+            "a Wiebe cycle needs the brake torque",
+        ),
         (
             option(),
             -10.0,

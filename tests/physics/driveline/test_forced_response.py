@@ -75,9 +75,7 @@ def test_orders_of_a_torque_give_it_back():
 
 
 @pytest.mark.parametrize("damper", ["as_printed", "half_ring"])
-def test_response_here_to_a_torque_there_is_that_there_to_one_here(
-    damper,
-):
+def test_response_here_to_a_torque_there_is_that_there_to_one_here(damper):
     line, _, _ = engine_line(damper)
     frequencies = 2 * np.pi * np.array([14.0, 28.3, 162.0, 563.0])
     receptance = np.linalg.inv(line.dynamic_stiffness(frequencies))
@@ -176,7 +174,11 @@ def test_mean_torques_are_carried_through_and_must_balance():
 def test_fluctuation_is_half_the_peak_to_peak():
     computed = response_of(option())
     speeds = computed.speed_over_cycle(28_800)
-    assert_close(computed.fluctuation(), 0.5 * np.ptp(speeds, axis=1), 2e-3)
+    assert_close(
+        computed.fluctuation(),
+        0.5 * np.ptp(speeds, axis=1),
+        2e-3,
+    )
     assert_close(speeds.mean(axis=1), 0.0, atol=1e-9)
 
 
@@ -284,5 +286,8 @@ def test_matrices_and_orders_that_make_no_line_are_refused():
     zero = np.zeros((1, 1))
     undamped = LinearLine(mass=one, stiffness=one, loss=zero, damping=zero)
 
-    with pytest.raises(SimulationError, match="excited at its natural frequency"):
+    with pytest.raises(
+        SimulationError,
+        match="excited at its natural frequency",
+    ):
         undamped.response(np.ones((1, 1), dtype=complex), np.array([1.0]))

@@ -23,10 +23,7 @@ from gensig.driveline.time.course import constant_speed
 from gensig.driveline.time.line_mesh import pair_mesh
 from gensig.errors import ConfigError
 from gensig.faults.broken import MissingTooth
-from gensig.mesh.sliced.sliced_statics import (
-    chord_equilibrium,
-    chord_states,
-)
+from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
 from gensig.plan.request import read_request
 from gensig.systems.registry import read_sliced_pair
 
@@ -111,6 +108,7 @@ class TestLaw:
         law = law_at(mesh, turned, approach)
         further = stored(turned + 1e-7, approach) - stored(turned - 1e-7, approach)
         deeper = stored(turned, approach + 1e-10) - stored(turned, approach - 1e-10)
+
         assert_close(law[layout.ALONG], -further / 2e-7, 1e-3, atol=1e-6)
         assert_close(law[layout.FORCE], deeper / 2e-10, 1e-4)
 
@@ -122,14 +120,21 @@ class TestLaw:
             (1.0 + 10.0 * DAMPING) * still[layout.FORCE],
             1e-12,
         )
-        assert_close(law_at(mesh, 0.4, 3e-5, rate=-1e4)[layout.FORCE], 0.0)
+        assert_close(
+            law_at(mesh, 0.4, 3e-5, rate=-1e4)[layout.FORCE],
+            0.0,
+        )
 
     def test_the_missing_tooth_is_missing_on_both_flanks_once_a_turn(
         self, helical, mesh
     ):
         n_teeth = helical[0].pair.pinion.n_teeth
         rows = np.maximum(mesh.rows, 0)
-        sound = replace(mesh, rows=rows, coast_rows=np.zeros_like(mesh.coast_rows))
+        sound = replace(
+            mesh,
+            rows=rows,
+            coast_rows=np.zeros_like(mesh.coast_rows),
+        )
         turned = np.arange(0.5, n_teeth + 0.5, 0.25)
         for approach in (3e-5, -mesh.backlash - 3e-5):
             force, whole = (
@@ -154,6 +159,7 @@ class TestLaw:
         start = (pair.pitch_point + middle) / pair.base_pitch + 9.0
         front = law_at(mesh, start + position, 3e-5)[0]
         back = law_at(mesh, start + 0.5 - position, -mesh.backlash - 3e-5)[0]
+
         assert_close(back, -front, 1e-9)
 
     def test_springs_begin_at_0_and_grow(self, mesh):
@@ -181,7 +187,10 @@ class TestZeroHelix:
 
 
 def moved(line, dynamics):
-    start = dynamics.static_start(0.0), np.zeros(len(line.names))
+    start = (
+        dynamics.static_start(0.0),
+        np.zeros(len(line.names)),
+    )
     n_steps = STEPS * N_SAMPLES
     return state_after(
         line,
@@ -240,7 +249,10 @@ class TestAgainstThePair:
             roll_dof=2,
             damping=dynamics.mesh_damping / dynamics.mesh_force,
             start_phase=dynamics.start_phase,
-            errors=(dynamics.pinion_error, dynamics.wheel_error),
+            errors=(
+                dynamics.pinion_error,
+                dynamics.wheel_error,
+            ),
         )
         q_1, v_1, motion = moved(pair_line(dynamics, mesh), dynamics)
         start = (

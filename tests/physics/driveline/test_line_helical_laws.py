@@ -12,21 +12,9 @@ from engine_cases import SPEED, TORQUE
 
 from gensig.driveline.engine_line import read_engine_line
 from gensig.driveline.in_time import tabulated_meshes
-from gensig.driveline.mesh_phase import (
-    first_slice_lead,
-    start_phase,
-    start_rolls,
-)
-from gensig.driveline.running import (
-    Governor,
-    running_line,
-    steady_course,
-)
-from gensig.driveline.teeth import (
-    ToothStart,
-    neighbours,
-    tooth_there,
-)
+from gensig.driveline.mesh_phase import first_slice_lead, start_phase, start_rolls
+from gensig.driveline.running import Governor, running_line, steady_course
+from gensig.driveline.teeth import ToothStart, neighbours, tooth_there
 from gensig.driveline.time.newmark import LineSolver
 from gensig.dynamics.mesh_statics import mean_mesh_stiffness
 from gensig.errors import ConfigError
@@ -164,7 +152,10 @@ def test_the_faulty_tooth_is_on_its_gear_in_all_its_meshes_and_nowhere_else(
     fault = {"kind": "missing_tooth", "gear": gear, "tooth": 10}
     record, line = line_with(fault, f"system.record_mesh={mesh}")
     names = record.engine.mesh_names
-    expected = {(names[record.mesh_number], SIDES.index(gear)), *others.items()}
+    expected = {
+        (names[record.mesh_number], SIDES.index(gear)),
+        *others.items(),
+    }
 
     odd = set()
     for name, one in zip(names, line.meshes, strict=True):
@@ -174,6 +165,7 @@ def test_the_faulty_tooth_is_on_its_gear_in_all_its_meshes_and_nowhere_else(
                 assert teeth.tolist() == [10]
                 odd.add((name, side))
         assert (one.rows == -1).any() == (name in dict(expected))
+
     assert odd == expected
 
 
@@ -258,6 +250,7 @@ def test_meshes_stand_where_the_crank_puts_them(tooth, phase):
     for mesh, pair, roll in zip(line.meshes, drive.pairs, rolls, strict=True):
         expected = (roll + first_slice_lead(pair)) / pair.base_pitch
         off.append(mesh.start_phase - expected)
+
     assert_close(off, np.round(off), atol=1e-9)
 
 

@@ -15,11 +15,7 @@ from line_tools import (
 )
 from scipy.linalg import eigh, expm
 
-from gensig.driveline.time.course import (
-    LineCourse,
-    ShaftTorque,
-    constant_speed,
-)
+from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
 from gensig.driveline.time.geared_line import GearedLine
 from gensig.driveline.time.newmark import integrate_line
 from gensig.dynamics.decimation import decimator
@@ -63,10 +59,8 @@ class TestLinear:
         inverse = np.linalg.inv(line.mass)
         system = np.zeros((2 * n + 1, 2 * n + 1))
         system[:n, n : 2 * n] = np.eye(n)
-        system[n : 2 * n, :n], system[n : 2 * n, n : 2 * n] = (
-            -inverse @ line.stiffness,
-            -inverse @ line.damping,
-        )
+        system[n : 2 * n, :n] = -inverse @ line.stiffness
+        system[n : 2 * n, n : 2 * n] = -inverse @ line.damping
         system[n : 2 * n, -1] = inverse @ torques
         return (expm(system * cls.DURATION) @ np.concatenate([*start, [1.0]]))[: 2 * n]
 
@@ -222,7 +216,14 @@ class TestTorquesAndCourse:
         )
         torques = constant_torques(given * np.diag(line.mass) * 200.0)
         rest = np.zeros(5), np.zeros(5)
-        q, v, _ = state_after(line, rest, 0.1, 2000, torques=torques, course=course)
+        q, v, _ = state_after(
+            line,
+            rest,
+            0.1,
+            2000,
+            torques=torques,
+            course=course,
+        )
         behind = (given - 1.0) * 200.0
 
         assert_close(v, behind * 0.1, 1e-9, atol=1e-12)

@@ -10,11 +10,7 @@ from closeness import assert_close
 from engine_cases import SPEED, TORQUE
 
 from gensig.driveline.engine_line import read_engine_line
-from gensig.driveline.running import (
-    Governor,
-    running_line,
-    steady_course,
-)
+from gensig.driveline.running import Governor, running_line, steady_course
 from gensig.driveline.time.newmark import LineSolver
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
@@ -94,7 +90,11 @@ def test_without_play_it_is_the_linear_line():
 
 
 def test_with_play_its_teeth_part_and_its_energies_balance():
-    line = running_line(engine(), steady_course(SPEED, TORQUE), governor=GOVERNOR)
+    line = running_line(
+        engine(),
+        steady_course(SPEED, TORQUE),
+        governor=GOVERNOR,
+    )
     motion, computed, linear = deviations(line, (14, 45), settling=0.3)
     drive = line.machine.mesh_names.index("21/45")
 

@@ -24,10 +24,7 @@ from scipy.integrate import solve_ivp
 from benchmarks._engine_line import engine_line, engine_torques
 from gensig.driveline.time.course import constant_speed
 from gensig.driveline.time.line_mesh import pair_mesh
-from gensig.driveline.time.newmark import (
-    integrate_line,
-    static_start,
-)
+from gensig.driveline.time.newmark import integrate_line, static_start
 from gensig.faults.broken import MissingTooth
 
 
@@ -188,7 +185,10 @@ class TestAgainstThePair:
             roll_dof=2,
             damping=dynamics.mesh_damping / dynamics.mesh_force,
             start_phase=dynamics.start_phase,
-            errors=(dynamics.pinion_error, dynamics.wheel_error),
+            errors=(
+                dynamics.pinion_error,
+                dynamics.wheel_error,
+            ),
         )
         return pair_line(dynamics, mesh)
 
@@ -220,7 +220,11 @@ class TestAgainstThePair:
             time=0.0,
         )
         expected = dynamics.static_start(0.0)
-        assert_close(computed, expected, atol=1e-6 * np.abs(expected).max())
+        assert_close(
+            computed,
+            expected,
+            atol=1e-6 * np.abs(expected).max(),
+        )
 
 
 class TestLowRank:

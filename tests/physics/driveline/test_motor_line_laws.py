@@ -10,10 +10,7 @@ import pytest
 from closeness import assert_close
 
 from gensig.driveline.engine_line import read_engine_line
-from gensig.driveline.time.newmark import (
-    LineSolver,
-    integrate_line,
-)
+from gensig.driveline.time.newmark import LineSolver, integrate_line
 from gensig.errors import StepError
 from gensig.faults.registry import read_faults
 from gensig.plan.request import read_request
@@ -28,7 +25,10 @@ SOLVER = LineSolver(
     oversampling=12,
     max_energy_residual=1e-3,
 )
-MOTOR = ("system=two_stage_gearbox", "excitation=motor_and_load")
+MOTOR = (
+    "system=two_stage_gearbox",
+    "excitation=motor_and_load",
+)
 RECORDS = (
     "experiment=two_stage",
     "operating.duration_s=0.2",
@@ -60,7 +60,11 @@ def simulated(record, *faults, start=None):
 
 
 def missing(gear, tooth=5):
-    return {"kind": "missing_tooth", "gear": gear, "tooth": tooth}
+    return {
+        "kind": "missing_tooth",
+        "gear": gear,
+        "tooth": tooth,
+    }
 
 
 def test_an_even_line_has_the_static_torques_of_its_ratios():
@@ -112,9 +116,7 @@ def test_in_time_the_mean_forces_stay_and_the_energies_balance():
 
 
 @pytest.mark.parametrize("speed_rpm", [900.0, 1500.0])
-def test_energies_balance_where_steps_meet_every_pitch_at_the_same_places(
-    speed_rpm,
-):
+def test_energies_balance_where_steps_meet_every_pitch_at_the_same_places(speed_rpm):
     """Steps in a pitch: 256 and 153.6, of 512 cells each; an even line rests on such a
     speed.
     """

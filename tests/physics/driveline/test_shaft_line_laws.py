@@ -6,15 +6,9 @@ import numpy as np
 import pytest
 from closeness import assert_close
 
-from gensig.driveline.drive_line import (
-    drive_line_of_pair,
-    read_drive_line,
-)
+from gensig.driveline.drive_line import drive_line_of_pair, read_drive_line
 from gensig.driveline.linear.matrices import line_matrices
-from gensig.driveline.linear.modal import (
-    natural_modes,
-    with_viscous_losses,
-)
+from gensig.driveline.linear.modal import natural_modes, with_viscous_losses
 from gensig.driveline.linear.shaft_line import (
     GearMesh,
     LineGear,
@@ -71,7 +65,11 @@ def test_a_free_line_has_one_rigid_mode_in_the_gear_ratios(line):
     assert np.all(np.diff(computed.frequency) >= 0.0)
 
     turning = (matrices.expand @ computed.shapes[0])[: len(line.numbers)]
-    assert_close(turning / turning[0], np.abs(line.line.speed_ratio), 1e-12)
+    assert_close(
+        turning / turning[0],
+        np.abs(line.line.speed_ratio),
+        1e-12,
+    )
 
     scale = (
         np.abs(matrices.whole_stiffness).sum(axis=1) * np.abs(computed.shapes[0]).max()
@@ -83,9 +81,7 @@ def test_a_free_line_has_one_rigid_mode_in_the_gear_ratios(line):
     assert not np.all(np.abs(matrices.whole_stiffness @ wrong) < 1e-6 * scale)
 
 
-def test_matrices_are_symmetric_and_store_no_negative_energy(
-    line,
-):
+def test_matrices_are_symmetric_and_store_no_negative_energy(line):
     for merge in (False, True):
         one = with_viscous_losses(line.matrices(merge_rigid=merge))
         for matrix in (
@@ -104,9 +100,7 @@ def test_matrices_are_symmetric_and_store_no_negative_energy(
             )
 
 
-def test_modes_are_orthogonal_and_hold_as_much_strain_as_kinetic_energy(
-    line,
-):
+def test_modes_are_orthogonal_and_hold_as_much_strain_as_kinetic_energy(line):
     computed = line.modes()
     matrices = line.matrices()
     assert_close(
@@ -136,9 +130,7 @@ def test_equal_loss_factors_damp_every_mode_by_half_of_it(lines):
     assert computed.damping_ratio[0] == 0.0
 
 
-def test_viscous_losses_damp_each_mode_as_its_loss_factors_do(
-    lines,
-):
+def test_viscous_losses_damp_each_mode_as_its_loss_factors_do(lines):
     matrices = lines["gearbox"].matrices(merge_rigid=True)
     shafts_only = replace(
         matrices,
@@ -216,7 +208,8 @@ def test_a_geared_line_has_the_frequencies_of_the_line_referred_to_one_shaft():
     """Inertias and stiffnesses behind a ratio count times its square: the classical equivalent
     shaft.
     """
-    ratio, (a, b) = 20 / 50, two_discs().gears
+    ratio = 20 / 50
+    (a, b) = two_discs().gears
     inertia = (0.3, 1e-3, 2e-2, 0.5)
     springs = (1e4, 2e8, 3e4)
     geared = ShaftLine(

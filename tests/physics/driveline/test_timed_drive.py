@@ -16,9 +16,7 @@ def engine():
     return read_request(["experiment=engine_broken_tooth"]).config
 
 
-def test_the_pump_gear_meets_the_same_tooth_at_the_same_firing(
-    engine,
-):
+def test_the_pump_gear_meets_the_same_tooth_at_the_same_firing(engine):
     machine = read_machine(engine)
     assert [machine.driven_tooth(tooth, 30) for tooth in (0, 7, 53)] == [0, 7, 53]
     start = draw_start(machine, stream(engine.seed, Stream.TWIN, 3))
@@ -30,9 +28,7 @@ def test_a_pair_without_timing_is_put_on_anew():
     assert machine.driven_tooth(7, 30) == 30
 
 
-def test_every_row_of_the_plan_starts_in_time_and_faults_sit_on_any_tooth(
-    engine,
-):
+def test_every_row_of_the_plan_starts_in_time_and_faults_sit_on_any_tooth(engine):
     columns = make_plan(engine).columns
     assert (columns["start_tooth_pinion"] == columns["start_tooth_wheel"]).all()
     assert len(set(columns["start_tooth_wheel"].tolist())) > 20

@@ -6,15 +6,8 @@ import numpy as np
 import pytest
 from plain_motion import at_rest, equations, solved
 
-from gensig.dynamics.backends.base import (
-    Backend,
-    Integration,
-    Motions,
-)
-from gensig.dynamics.backends.registry import (
-    BACKENDS,
-    DEFAULT_BACKEND,
-)
+from gensig.dynamics.backends.base import Backend, Integration, Motions
+from gensig.dynamics.backends.registry import BACKENDS, DEFAULT_BACKEND
 from gensig.dynamics.decimation import decimator, in_band_error
 from gensig.dynamics.integrator import (
     Solver,
@@ -98,7 +91,10 @@ def record(machine):
 
     def simulated(backend, **changes):
         system = machine({**QUICK, **changes})
-        system = replace(system, solver=replace(system.solver, backend=backend))
+        system = replace(
+            system,
+            solver=replace(system.solver, backend=backend),
+        )
         return simulate_together(
             [
                 Run(

@@ -122,6 +122,7 @@ class TestEquilibrium:
         low, here, high = (equilibrium(bearing, 460.0 + d) for d in (-0.01, 0.0, 0.01))
         compliance = np.linalg.inv(here.stiffness)[:, :, 1]
         moved = (high.displacement - low.displacement) / 0.02
+
         assert_close(
             moved,
             compliance,
@@ -186,9 +187,7 @@ class TestStiffness:
         across, along = bearing_stiffness(many, STEEL, 460.0)
         assert_close(across / along, 2 / 3, 2e-3)
 
-    def test_strong_preload_is_isotropic_and_clearance_softens(
-        self,
-    ):
+    def test_strong_preload_is_isotropic_and_clearance_softens(self):
         tight = replace(SMALL, radial_clearance=-20e-6)
         across, along = bearing_stiffness(tight, STEEL, 1.0)
         assert_close(across, along, 1e-4)
@@ -207,6 +206,7 @@ def test_a_support_is_two_bearings_in_series_with_a_beam(span):
     bearings = bearing_stiffness(SMALL, STEEL, 460.0)
     beam = 48 * 206e9 * math.pi * 18e-3**4 / 64 / span**3
     expected = [2 * k * beam / (2 * k + beam) for k in bearings]
+
     assert_close(
         support_stiffness(SMALL, shaft, STEEL, 920.0),
         expected,

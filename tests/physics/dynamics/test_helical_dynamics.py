@@ -18,16 +18,16 @@ from gensig.dynamics.integrator import Solver, integrate
 from gensig.dynamics.mesh_state import NO_TOOTH, mesh_state
 from gensig.dynamics.pair import PAIR_DOFS
 from gensig.faults.broken import MissingTooth
-from gensig.mesh.sliced.sliced_statics import (
-    chord_equilibrium,
-    chord_states,
-)
+from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
 
 HELIX = math.radians(20.0)
 DEPTH = np.array([0.0, 2.0, 5.0, 9.0, 14.0, 20.0]) * 1e-6
 STEP = 1 / (51200.0 * 32)
 N_PLANE = len(PAIR_DOFS)
-PINION, WHEEL = [0, 1, 6], [3, 4, 9]  # translations of the gears
+PINION, WHEEL = (
+    [0, 1, 6],
+    [3, 4, 9],
+)  # translations of the gears
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +81,11 @@ class TestZeroHelix:
                     atol=tolerance,
                 )
 
-        assert_close(chords.friction_torque(), spur.friction_torque(), 1e-9)
+        assert_close(
+            chords.friction_torque(),
+            spur.friction_torque(),
+            1e-9,
+        )
         assert_close(
             chords.mean_mesh_stiffness,
             spur.mean_mesh_stiffness,
@@ -124,7 +128,10 @@ class TestForces:
 
     def test_action_equals_reaction_and_moments_balance(self, gears):
         pair = gears.table.pair
-        plain = {"friction_coefficient": 0.0, "roll_torque": "classical"}
+        plain = {
+            "friction_coefficient": 0.0,
+            "roll_torque": "classical",
+        }
         options = replace(gears.table.options, **plain)
         still = replace(gears, table=replace(gears.table, options=options))
         system = still.system()
@@ -137,26 +144,42 @@ class TestForces:
         assert normal > 0.5 * gears.mesh_force
         assert_close(force[PINION], -normal * push, atol=1e-6 * normal)
         assert_close(force[WHEEL], normal * push, atol=1e-6 * normal)
+
         # the axial force over the tangential one is the tangent of the helix angle
         working_radius = pair.center_distance / (1 + pair.ratio)
         tangential = normal * pair.pinion.base_radius / working_radius
         lead = math.tan(pair.base_helix_angle) / math.cos(pair.working_pressure_angle)
+
         assert_close(abs(force[6]) / tangential, lead, 1e-6)
+
         # the pinion turns about -z
-        on_pinion = np.cross(at_pinion, force[PINION]) * [1.0, 1.0, -1.0]
+        on_pinion = np.cross(at_pinion, force[PINION]) * [
+            1.0,
+            1.0,
+            -1.0,
+        ]
         on_wheel = np.cross(at_wheel, force[WHEEL])
         for moments, expected in (
             (force[[7, 8, 2]], on_pinion),
             (force[[10, 11, 5]], on_wheel),
         ):
-            assert_close(moments, expected, atol=1e-6 * np.abs(expected).max())
+            assert_close(
+                moments,
+                expected,
+                atol=1e-6 * np.abs(expected).max(),
+            )
 
     def test_the_thrust_of_a_driver_follows_its_hand(self, gears, hand):
         """Fingers of the hand of the helix along the rotation: the thumb is the thrust."""
         start = gears.static_start(0.0)
         assert math.copysign(1.0, start[6]) == -hand
+
         thrust = start[6] * gears.pinion.support.stiffness_z
-        assert_close(thrust, -start[9] * gears.wheel.support.stiffness_z, 1e-9)
+        assert_close(
+            thrust,
+            -start[9] * gears.wheel.support.stiffness_z,
+            1e-9,
+        )
 
 
 class TestStatics:
@@ -172,6 +195,7 @@ class TestStatics:
         static = chord_equilibrium(table, chord_states(table, roll), force)
 
         assert_close(static.load.sum(axis=1), force, 1e-12)
+
         for phase, approach in zip(roll, static.approach, strict=True):
             newest = math.floor(phase / pitch) - table.first_pitch
             position = phase - (newest - older) * pitch
@@ -225,7 +249,12 @@ class TestChords:
     def test_back_flanks_use_the_chord_of_the_set_load(self, helical):
         table = helical.table
         approach = -table.pair.backlash - np.linspace(0.0, 1e-5, 11)
-        motions = 0.3 * table.pair.base_pitch, approach, 0.0, 0.0
+        motions = (
+            0.3 * table.pair.base_pitch,
+            approach,
+            0.0,
+            0.0,
+        )
         names = (
             "compliance",
             "compliance_slope",
@@ -244,9 +273,7 @@ class TestChords:
 
 
 @pytest.mark.parametrize("speed_rpm", [620, 1480])
-def test_a_record_is_independent_of_the_number_of_slices(
-    speed_rpm,
-):
+def test_a_record_is_independent_of_the_number_of_slices(speed_rpm):
     """Slices entering whole would strike at their own frequency, up to 10 times as loud."""
 
     def level(n_slices):
@@ -266,7 +293,12 @@ def test_a_record_is_independent_of_the_number_of_slices(
 
 
 class TestRecords:
-    def motions(self, machines, precision="float64", with_mesh_state=False):
+    def motions(
+        self,
+        machines,
+        precision="float64",
+        with_mesh_state=False,
+    ):
         return integrate(
             machines,
             Solver(

@@ -6,11 +6,7 @@ import numpy as np
 import pytest
 from closeness import assert_close
 from fault_cases import one
-from lane_tools import (
-    laws,
-    motion_of,
-    right_hand_side,
-)
+from lane_tools import laws, motion_of, right_hand_side
 
 from gensig.dynamics._layout import DAMPING
 from gensig.dynamics.lanes import mesh_numbers
@@ -79,8 +75,14 @@ class Reference:
 
     def present(self, index):
         """Pairs whose teeth exist, (pair,)."""
-        pinion = tooth_at(self.table.pinion.present[self.table.pinion.kind], index)
-        wheel = tooth_at(self.table.wheel.present[self.table.wheel.kind], index)
+        pinion = tooth_at(
+            self.table.pinion.present[self.table.pinion.kind],
+            index,
+        )
+        wheel = tooth_at(
+            self.table.wheel.present[self.table.wheel.kind],
+            index,
+        )
         return pinion & wheel
 
     def pairs(self, roll):
@@ -143,7 +145,15 @@ class Reference:
         moment_p = -(sliding @ arm)
         moment_w = sliding @ (pair.tangent_length - arm)
         normal = load.sum()
-        return normal, sliding.sum(), moment_p, moment_w, along, stored, lost
+        return (
+            normal,
+            sliding.sum(),
+            moment_p,
+            moment_w,
+            along,
+            stored,
+            lost,
+        )
 
     def coast(self, roll, approach, rate, roll_rate):
         """The same where the back flanks touch, and the number of loaded pairs, negative.
@@ -161,7 +171,16 @@ class Reference:
         squeezed = -approach - self.pair.backlash
         load, along, stored, lost = self.law(values, squeezed, -rate, -roll_rate)
         n_loaded = float(np.sum(load > 0))
-        return -load.sum(), 0.0, 0.0, 0.0, -along, stored, lost, -n_loaded
+        return (
+            -load.sum(),
+            0.0,
+            0.0,
+            0.0,
+            -along,
+            stored,
+            lost,
+            -n_loaded,
+        )
 
     def acceleration(self, time, q, v):
         """q'' at one instant."""

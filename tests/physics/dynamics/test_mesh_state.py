@@ -62,7 +62,10 @@ def test_shares_of_the_loaded_teeth_sum_to_one(mesh, xiamen):
 
 
 def test_teeth_follow_one_another_and_keep_their_row(mesh):
-    for rows, n_teeth in ((mesh.pinion_tooth, 23), (mesh.wheel_tooth, 84)):
+    for rows, n_teeth in (
+        (mesh.pinion_tooth, 23),
+        (mesh.wheel_tooth, 84),
+    ):
         carries = rows != NO_TOOTH
         begins = carries[:, 1:] & ~carries[:, :-1]
         sample, row = np.nonzero(begins.T)
@@ -85,6 +88,7 @@ def test_slow_gears_have_the_static_shares(run, record):
     shares = np.sort(result.mesh.load_share, axis=0)
 
     assert_close(shares.mean(axis=1), expected.mean(axis=1), atol=3e-3)
+
     off = np.abs(shares - expected).max(axis=0)
     assert np.quantile(off, 0.95) < 0.03
 

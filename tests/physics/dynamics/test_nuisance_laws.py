@@ -44,7 +44,12 @@ MESH = {
 def tones_of(run, part):
     rng = [np.random.default_rng([7, k]) for k in range(3)]
     units = {"gearbox": rng[0], "specimen": rng[1]}
-    return draw_tones(read_nuisances([part]), pair_dynamics(run), units, rng[2])
+    return draw_tones(
+        read_nuisances([part]),
+        pair_dynamics(run),
+        units,
+        rng[2],
+    )
 
 
 def response(run, tones, angle=None):
@@ -62,12 +67,7 @@ def assert_same(signal, expected):
 def at(machine):
     """A run at a speed, with courses if they are given."""
 
-    def make(
-        speed_rpm=1800.0,
-        start=None,
-        low_cutoff_hz=None,
-        **courses,
-    ):
+    def make(speed_rpm=1800.0, start=None, low_cutoff_hz=None, **courses):
         system = machine(
             {
                 "operating.speed_rpm": speed_rpm,
@@ -147,6 +147,7 @@ def test_a_neighbour_has_its_orders_on_a_shaft_with_wobble(at):
 
     sides = np.array([25, 26, 24, 25 + 25 / 72, 25 - 25 / 72])
     orders = (sides[:, None] + [0, 25, 50]).ravel()
+
     assert left(angle, orders) < 1e-4
     # over time the wobble smears the lines: order 75 swings by 0.4 rad
     assert left(steady, orders) > 1e-2

@@ -17,10 +17,7 @@ import pytest
 from closeness import assert_close
 
 from gensig.geometry.tooth import healthy_tooth
-from gensig.geometry.tooth_profile import (
-    involute_point,
-    load_angle,
-)
+from gensig.geometry.tooth_profile import involute_point, load_angle
 from gensig.mesh.compliance import tooth_compliance
 from gensig.mesh.fillet_foundation import (
     body_coefficients,

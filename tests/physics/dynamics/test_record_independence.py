@@ -8,10 +8,7 @@ from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.record import simulate as records
 from gensig.record.inputs import InputReader
-from gensig.record.simulate import (
-    simulate_record,
-    simulate_records,
-)
+from gensig.record.simulate import simulate_record, simulate_records
 
 ORDER = (5, 0, 3, 6, 1, 7, 2, 4)
 WORDS = [
@@ -132,7 +129,10 @@ class TestNoise:
             "label": 0,
             "faults_json": "[]",
         }
-        result = simulate_record(config.with_keys("operating", duration_s=0.5), healthy)
+        result = simulate_record(
+            config.with_keys("operating", duration_s=0.5),
+            healthy,
+        )
         noise = result.signals["acceleration"].astype(float) - clean(result)
         power = np.var(noise, axis=1)
 

@@ -17,10 +17,7 @@ from gensig.dynamics.backends.step_limits import (
 from gensig.dynamics.decimation import in_band_error
 from gensig.errors import SimulationError
 from gensig.faults.broken import MissingTooth
-from gensig.sensing.manufacturing import (
-    draw_gearbox,
-    draw_specimen,
-)
+from gensig.sensing.manufacturing import draw_gearbox, draw_specimen
 from gensig.systems.base import simulate_together
 from gensig.systems.run import Run
 

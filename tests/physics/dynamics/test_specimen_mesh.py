@@ -10,10 +10,7 @@ from fault_cases import GEARS, on_path, one
 from gensig.dynamics._layout import BACKLASH
 from gensig.dynamics.lanes import mesh_numbers
 from gensig.faults.flank_form import ProfileError
-from gensig.sensing.manufacturing import (
-    draw_specimen,
-    perfect_specimen,
-)
+from gensig.sensing.manufacturing import draw_specimen, perfect_specimen
 from gensig.systems.base import simulate_together
 from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.run import Run
@@ -140,10 +137,8 @@ class TestProfile:
         self, xiamen, perfect, name, to_tip
     ):
         """The tooth-to-tooth part: a slope about the pitch point, here the same on all teeth."""
-        slope, (low, high) = (
-            3 * UM,
-            self.involute(getattr(xiamen.pair, name)),
-        )
+        slope = 3 * UM
+        (low, high) = self.involute(getattr(xiamen.pair, name))
         tilt = {f"{name}_tilt": to_tip * slope / (high - low)}
         error = late(xiamen, replace(perfect, **tilt))
         expected = late(

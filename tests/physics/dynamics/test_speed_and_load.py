@@ -68,14 +68,21 @@ def test_the_drive_transmits_a_part_of_a_speed_ripple(run, ripple, frequency):
     still = run({DURATION: 0.2})
     rippled = run(
         {
-            "operating.speed_ripple": {"share": share, **ripple},
+            "operating.speed_ripple": {
+                "share": share,
+                **ripple,
+            },
             DURATION: 0.2,
         }
     )
     moved = record(rippled).shaft_angle - record(still).shaft_angle
     speed = np.gradient(moved, 1 / RATE, edge_order=2) / still.system.operating.speed
 
-    assert_close(wave(speed, frequency), share * followed(frequency), 0.03)
+    assert_close(
+        wave(speed, frequency),
+        share * followed(frequency),
+        0.03,
+    )
     assert followed(frequency) < 0.95
 
 
@@ -86,6 +93,7 @@ def test_a_torque_ripple_is_in_the_force_on_the_teeth(run):
     }
     rippled = run(ripple, with_mesh_state=True)
     force = record(rippled).mesh.force / pair_dynamics(rippled).mesh_force
+
     assert_close(wave(force, 60.0), 0.1, 0.05)
     assert wave(force, 50.0) < 0.01
 
@@ -136,7 +144,13 @@ class TestStored:
         config = read_request(words).config
         plan = make_plan(config)
         rows = [plan.record(index) for index in range(plan.n_records)]
-        return list(zip(rows, simulate_records(config, rows), strict=True))
+        return list(
+            zip(
+                rows,
+                simulate_records(config, rows),
+                strict=True,
+            )
+        )
 
     def test_the_speed_is_that_of_the_shaft(self, stored):
         """Its integral is the growth of the angle, and its mean the record's."""
@@ -147,7 +161,11 @@ class TestStored:
             speed = result.signals["shaft_speed"].astype(float)
             angle = result.signals["shaft_angle"]
             grown = np.cumsum(0.5 * (speed[1:] + speed[:-1])) / RATE
-            assert_close(np.append(0.0, grown), angle - angle[0], atol=2e-4)
+            assert_close(
+                np.append(0.0, grown),
+                angle - angle[0],
+                atol=2e-4,
+            )
             mean = result.values["speed_rpm"]
             assert_close(speed.mean() * 30 / math.pi, mean, 2e-5)
             assert abs(mean / row["speed_set_rpm"] - 1) > 1e-5

@@ -16,11 +16,7 @@ from gensig.life.crack_growth import crack_growth
 from gensig.life.drift import Drift
 from gensig.life.growth import grow
 from gensig.life.life_options import read_life
-from gensig.life.load_history import (
-    DrawnBlocks,
-    draw_history,
-    given_history,
-)
+from gensig.life.load_history import DrawnBlocks, draw_history, given_history
 from gensig.life.pit_growth import contact_stress, pit_growth
 from gensig.life.snapshots import snapshot_times
 from gensig.mesh.root_crack import crack_compliance
@@ -134,14 +130,20 @@ def test_the_life_falls_with_the_load_to_the_paris_exponent(law, exponent):
     torques = np.array([50.0, 100.0, 200.0])
     lives = [life_turns(law, torque, 0.5e-3) for torque in torques]
     slope = np.diff(np.log(lives)) / np.diff(np.log(torques))
+
     assert_close(slope, -exponent, 1e-9)
 
 
 def test_the_course_converges_with_the_cells(law):
     """Half as many cells move the life by less than 0.1 %."""
     start = law.sizes[20]
-    half = replace(law, sizes=law.sizes[::2], intensity=law.intensity[:, ::2])
+    half = replace(
+        law,
+        sizes=law.sizes[::2],
+        intensity=law.intensity[:, ::2],
+    )
     fine, coarse = (life_turns(one, 120.0, start) for one in (law, half))
+
     assert_close(coarse, fine, 1e-3)
 
 
@@ -170,9 +172,7 @@ def test_a_crack_over_part_of_the_face_grows_both_ways_and_becomes_a_through_one
     assert "crack_width_mm" not in whole.fault(1e-3)
 
 
-def test_a_nearly_through_crack_grows_as_a_through_one(
-    law_of_share,
-):
+def test_a_nearly_through_crack_grows_as_a_through_one(law_of_share):
     whole = law_of_share(1.0)
     nearly = law_of_share(0.999999)
     assert_close(
@@ -214,6 +214,7 @@ def test_damage_adds_up_by_miner_whatever_the_order(pits, order):
     course = grow(pits.sizes, pits.turns(history.torque), history, 0.0)
 
     rates = [pits.rate(np.array([0.0]), torque)[0] for torque in torques]
+
     assert_close(course.size[-1], 108_000.0 * hours @ rates, 1e-12)
 
 
@@ -223,12 +224,18 @@ def test_a_standstill_costs_clock_time_and_nothing_else(law):
     def interrupted(until):
         """Course of one hour's work, a standstill until some hour, and one more hour."""
         first = (0.0, HOUR, SPEED, 90.0)
-        later = (until * HOUR, (until + 1.0) * HOUR, SPEED, 90.0)
+        later = (
+            until * HOUR,
+            (until + 1.0) * HOUR,
+            SPEED,
+            90.0,
+        )
         history = given_history((first, later), math.inf)
         return grow(law.sizes, turns, history, 5e-4)
 
     near = interrupted(1.0)
     far = interrupted(9.0)
+
     assert_array_equal(near.size[-1], far.size[-1])
     assert_array_equal(near.turns[-1], far.turns[-1])
     assert_close(far.clock[-1] - near.clock[-1], 8 * HOUR, 1e-6)
@@ -338,6 +345,7 @@ def test_a_drawn_history_keeps_to_its_limits():
     for values in (length, real):
         assert values.min() >= HOUR - 1e-6
         assert values.max() <= 4 * HOUR + 1e-6
+
     assert history.end[-1] <= 1000 * HOUR
     assert 0.4 < len(real) / len(gap) < 0.6
     assert set(history.setpoint.tolist()) == {0, 1}

@@ -45,9 +45,7 @@ def compared(case):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_iso_is_near_finite_elements_where_it_takes_the_load(
-    case,
-):
+def test_iso_is_near_finite_elements_where_it_takes_the_load(case):
     """Between the tip and the outer point of single contact; lower down its fixed section sees too
     little."""
     place, ours, exact, _ = compared(case)

@@ -9,11 +9,7 @@ import pytest
 from closeness import assert_close
 from numpy.testing import assert_array_equal
 
-from gensig.driveline.loads import (
-    LEAST_TORQUE,
-    SHARED,
-    greatest_loads,
-)
+from gensig.driveline.loads import LEAST_TORQUE, SHARED, greatest_loads
 from gensig.errors import ConfigError
 from gensig.faults.registry import read_faults
 from gensig.life.crack_growth import crack_growth
@@ -26,11 +22,7 @@ from gensig.life.sliced_stress import sliced_contact_stress
 from gensig.mesh.sliced.slice_energy import structure_energy
 from gensig.mesh.sliced.slices import loaded_contact
 from gensig.plan.request import read_request
-from gensig.systems.growth_laws import (
-    _for_lives,
-    crack_law,
-    pit_law,
-)
+from gensig.systems.growth_laws import _for_lives, crack_law, pit_law
 from gensig.systems.registry import read_system
 
 SPUR = (
@@ -77,16 +69,19 @@ def test_without_a_helix_a_crack_lives_as_on_the_spur_pair(spur, gear):
     history = given_history(((0.0, 1e9, 200.0, 100.0),), math.inf)
     lives = []
     for law in (whole, cut):
-        course = grow(law.sizes, law.turns(np.array([100.0])), history, 5e-4)
+        course = grow(
+            law.sizes,
+            law.turns(np.array([100.0])),
+            history,
+            5e-4,
+        )
         assert course.has_failed
         lives.append(course.turns[-1])
 
     assert_close(lives[1], lives[0], 1e-3)
 
 
-def test_without_a_helix_a_crack_over_part_of_the_face_grows_as_on_the_spur_pair(
-    spur,
-):
+def test_without_a_helix_a_crack_over_part_of_the_face_grows_as_on_the_spur_pair(spur):
     machine, laws, crack = spur
     options = replace(laws["crack"], width_share=0.25)
     whole = crack_growth(machine.pair, machine.material, crack, options)
@@ -97,9 +92,7 @@ def test_without_a_helix_a_crack_over_part_of_the_face_grows_as_on_the_spur_pair
     assert (np.diff(cut.width) >= 0.0).all()
 
 
-def test_the_release_rate_is_the_change_of_the_energy_at_constant_load(
-    helical,
-):
+def test_the_release_rate_is_the_change_of_the_energy_at_constant_load(helical):
     """Against the approach of the whole mesh, solved anew: with a linear contact U = F approach /
     2."""
     machine, laws, crack = helical
@@ -135,9 +128,7 @@ def test_the_release_rate_is_the_change_of_the_energy_at_constant_load(
     assert_close(result, math.sqrt(release * modulus) / 1e6, 2e-3)
 
 
-def test_below_the_threshold_a_crack_of_a_helical_pair_does_not_grow(
-    helical,
-):
+def test_below_the_threshold_a_crack_of_a_helical_pair_does_not_grow(helical):
     machine, laws, crack = helical
     law = sliced(machine, crack, laws["crack"], (20.0, 300.0))
     assert_array_equal(law.rate(law.sizes, 20.0), 0.0)
@@ -154,9 +145,7 @@ def test_finer_slices_leave_the_stress_intensity(helical):
 
 
 @pytest.mark.parametrize("length", [0.0, 3e-3])
-def test_the_energy_of_slices_is_half_the_work_of_their_loads(
-    length,
-):
+def test_the_energy_of_slices_is_half_the_work_of_their_loads(length):
     rng = np.random.default_rng(0)
     width = rng.uniform(1e-3, 2e-3, 7)
     structure = rng.uniform(1e-11, 3e-11, (3, 7))
@@ -173,9 +162,7 @@ def test_the_energy_of_slices_is_half_the_work_of_their_loads(
         assert_close(energy, work, 1e-9)
 
 
-def test_the_contact_stress_of_slices_is_the_nominal_one_without_a_helix(
-    spur,
-):
+def test_the_contact_stress_of_slices_is_the_nominal_one_without_a_helix(spur):
     machine, laws, _ = spur
     torques = np.array([20.0, 100.0, 300.0])
     mesh = _for_lives(machine.flanks).sliced_mesh()
@@ -215,24 +202,33 @@ def test_a_spectrum_grows_at_the_mean_of_its_rates(helical):
     assert_close(1.0 / both, 0.5 * (1.0 / alone).sum(axis=0), 1e-12)
 
 
-def test_the_loads_of_a_mesh_are_the_greatest_of_each_pair_of_teeth(
-    spur,
-):
+def test_the_loads_of_a_mesh_are_the_greatest_of_each_pair_of_teeth(spur):
     pair = spur[0].pair
     pitch = pair.base_pitch
     radius = pair.pinion.base_radius
     angle = np.linspace(0.0, 12.0 * pitch / radius, 24001)
     steady = np.full(24001, 70.0)
 
-    assert_close(greatest_loads(pair, angle, steady), 70.0 * radius, 1e-12)
+    assert_close(
+        greatest_loads(pair, angle, steady),
+        70.0 * radius,
+        1e-12,
+    )
     assert_array_equal(greatest_loads(pair, angle, -steady), LEAST_TORQUE)
 
     # an impact while two pairs carry is shared; alone, one has all of it
-    for place, shares in ((0.1, [SHARED, SHARED]), (0.9, [1.0])):
+    for place, shares in (
+        (0.1, [SHARED, SHARED]),
+        (0.9, [1.0]),
+    ):
         distance = np.abs(angle * radius - (5.0 + place) * pitch)
         loads = greatest_loads(pair, angle, np.where(distance < 1e-5, 500.0, 0.0))
         expected = np.array(shares) * 500.0 * radius
-        assert_close(np.sort(loads[loads > LEAST_TORQUE]), expected, 1e-12)
+        assert_close(
+            np.sort(loads[loads > LEAST_TORQUE]),
+            expected,
+            1e-12,
+        )
 
 
 def test_what_slices_cannot_do_is_refused(spur):

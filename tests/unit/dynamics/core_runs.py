@@ -79,7 +79,8 @@ class CoreRun(GroupRun):
         span=(0.0, 0.0),
     ):
         self.machines = fill_lanes(machines, precision)
-        self.step, self.now = step, first_step
+        self.step = step
+        self.now = first_step
         self.group = pack(machines, step, precision, span)
         super().__init__(self.machines, np.array(channels), precision)
         for lane in range(self.n_lanes):

@@ -7,10 +7,7 @@ import sys
 from pathlib import Path
 
 import gensig
-from gensig.driveline.time import (
-    _line_mesh_kernels,
-    _newmark_kernels,
-)
+from gensig.driveline.time import _line_mesh_kernels, _newmark_kernels
 from gensig.dynamics._vector import source_stamp
 
 PACKAGE = Path(gensig.__file__).parent
@@ -40,9 +37,7 @@ def test_all_functions_have_the_stamp_of_all_files() -> None:
         assert stamp == source_stamp(PACKAGE)
 
 
-def test_a_change_of_a_called_function_is_noticed(
-    tmp_path: Path,
-) -> None:
+def test_a_change_of_a_called_function_is_noticed(tmp_path: Path) -> None:
     package = tmp_path / "gensig" / "dynamics"
     package.mkdir(parents=True)
     for folder in (package, package.parent):

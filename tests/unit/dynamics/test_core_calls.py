@@ -26,7 +26,11 @@ CUTS = [
 PINION_TURN = 2
 
 
-@pytest.fixture(scope="module", params=[{}, PAPER], ids=["one_sided", "paper"])
+@pytest.fixture(
+    scope="module",
+    params=[{}, PAPER],
+    ids=["one_sided", "paper"],
+)
 def machines(request, machine, dynamics_of):
     """Eight machines of one law: sound and with a missing tooth, of many speeds and torques."""
     made = []

@@ -85,8 +85,13 @@ class TestSteady:
         short = record({SPEED: RAMP})
         long = record({SPEED: RAMP, "operating.duration_s": 0.06}).shaft_angle
         n = len(short.shaft_angle)
+
         assert_close(long[:n], short.shaft_angle, atol=1e-9)
-        assert_close(short.mean_speed, (long[n] - long[0]) * RATE / n, 1e-9)
+        assert_close(
+            short.mean_speed,
+            (long[n] - long[0]) * RATE / n,
+            1e-9,
+        )
 
 
 class TestRamp:
@@ -129,7 +134,11 @@ class TestRamp:
             record({**ROTATIONS, **course}).acceleration[1].mean()
             for course in ({SPEED: RAMP}, {})
         ]
-        assert_close(means[0] - means[1], self.ACCELERATION * 23 / 84, 5e-2)
+        assert_close(
+            means[0] - means[1],
+            self.ACCELERATION * 23 / 84,
+            5e-2,
+        )
 
     @pytest.mark.parametrize("kink", [0.01, 0.0105])
     def test_a_kink_of_the_course_is_no_jump_of_the_shaft(self, run, kink):
@@ -199,6 +208,7 @@ class TestNeighbours:
             run(both),
         ]
         runs = [*plain, run({}, MISSING), run(kinked, MISSING)]
+
         assert_independent(runs, [range(6), (5, 4, 3, 2, 1, 0)])
 
     def test_next_to_longer_settling(self, run):
@@ -217,7 +227,12 @@ def test_machines_with_rotors_move_in_every_channel(run):
     (record,) = simulate_together(
         [
             run(
-                {**ROTORS, SPEED: RAMP, TORQUE: RAMP, **channels},
+                {
+                    **ROTORS,
+                    SPEED: RAMP,
+                    TORQUE: RAMP,
+                    **channels,
+                },
                 MISSING,
             )
         ]

@@ -50,7 +50,11 @@ def test_the_pass_band_is_flat_and_keeps_the_phase(frequency, factor):
 @pytest.mark.parametrize("factor", FACTORS)
 @pytest.mark.parametrize("alias", [25.0, 690.0, 12_000.0, 19_990.0, 25_500.0])
 def test_aliases_are_78_db_down(factor, alias):
-    for frequency in (RATE - alias, RATE + alias, 2 * RATE - alias):
+    for frequency in (
+        RATE - alias,
+        RATE + alias,
+        2 * RATE - alias,
+    ):
         if frequency < 0.5 * factor * RATE:
             samples, _ = decimated(frequency, factor)
             assert np.abs(samples).max() < 10 ** (-78 / 20)
@@ -119,9 +123,7 @@ class TestInBandError:
     def tone(self, frequency, amplitude=1.0):
         return amplitude * np.sin(2 * np.pi * frequency * self.TIME + 0.3)
 
-    def test_it_is_relative_to_the_level_of_the_worst_channel(
-        self,
-    ):
+    def test_it_is_relative_to_the_level_of_the_worst_channel(self):
         exact = np.array([[self.tone(1000), self.tone(3000, 200.0)]] * 2)
         off = np.zeros_like(exact)
         off[0] = self.tone(5000, 1e-3), self.tone(5000, 1e-2)

@@ -34,7 +34,10 @@ CASES = {
     "missing": ({"operating.torque_nm": 5}, MISSING),
     "slow": ({"operating.speed_rpm": 600}, ()),
     "fast": (
-        {"operating.speed_rpm": 6000, "operating.torque_nm": 60},
+        {
+            "operating.speed_rpm": 6000,
+            "operating.torque_nm": 60,
+        },
         (),
     ),
     "ramp": (
@@ -67,7 +70,10 @@ def test_records_agree_with_double(run, name):
         simulate_together([run(*CASES[name], precision)])[0]
         for precision in ("float32", "float64")
     )
-    signals = single.acceleration[None], double.acceleration[None]
+    signals = (
+        single.acceleration[None],
+        double.acceleration[None],
+    )
     assert 1e-8 < in_band_error(*signals, RATE)[0] < 2.5e-5
     assert single.acceleration.dtype == double.acceleration.dtype == np.float64
     assert_close(single.mean_speed, double.mean_speed, 1e-8)
@@ -108,7 +114,11 @@ class TestBits:
             run(BRIEF, start=start),
             run({**BRIEF, **LIGHT}, MISSING),
             run({**BRIEF, **coarse}),
-            run(BRIEF, [one("crack", tooth=4)], specimen=specimen),
+            run(
+                BRIEF,
+                [one("crack", tooth=4)],
+                specimen=specimen,
+            ),
         ]
 
     @pytest.fixture(scope="class")

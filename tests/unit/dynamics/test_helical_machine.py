@@ -50,6 +50,7 @@ def helical(xiamen, spur):
 
 def test_a_support_takes_axial_keys_or_none():
     assert read(Support, SUPPORT, "support").stiffness_z == 0.0
+
     held = read(Support, {**SUPPORT, **AXIAL}, "support")
     axial = (
         held.stiffness_z,
@@ -96,7 +97,11 @@ def test_masses_and_supports_of_the_axial_motions(helical):
             np.diag(system.stiffness),
             np.diag(system.damping),
         )
-        assert_close([values[dof] for values in diagonals], expected, 1e-12)
+        assert_close(
+            [values[dof] for values in diagonals],
+            expected,
+            1e-12,
+        )
         assert np.count_nonzero(system.stiffness[dof]) == 1
         assert system.rotation[dof] == 0.0
 
@@ -142,7 +147,10 @@ def test_a_gear_without_axial_support_is_refused(helical, key):
 def test_too_many_pairs_are_refused(helical):
     last = helical.table.first_pitch + MOST_PAIRS + 1
     with pytest.raises(ConfigError, match=f"{MOST_PAIRS + 1} pairs of teeth"):
-        replace(helical, table=replace(helical.table, last_pitch=last))
+        replace(
+            helical,
+            table=replace(helical.table, last_pitch=last),
+        )
 
 
 def test_axial_channels_are_those_of_helical_gears(helical, spur):
@@ -199,9 +207,7 @@ def test_pairs_and_lag_follow_the_table(helical, spur):
     )
 
 
-def test_sliding_turns_with_the_middle_of_the_face_at_the_pitch_point(
-    helical,
-):
+def test_sliding_turns_with_the_middle_of_the_face_at_the_pitch_point(helical):
     table = helical.table
     lag = half_lag(helical.table)
     position = table.pair.pitch_point + lag + np.linspace(-0.3, 0.3, 7) * lag

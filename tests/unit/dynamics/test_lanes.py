@@ -359,7 +359,11 @@ class TestMotions:
         assert [len(group) for group in lane_groups(machines, INTEGRATION)] == [7, 4]
 
         together = integrate(machines, Solver(**SOLVER), **RECORD)
-        assert together.acceleration.shape == (LANES + 3, 2, 256)
+        assert together.acceleration.shape == (
+            LANES + 3,
+            2,
+            256,
+        )
         assert together.check.shape == (LANES + 3, 2, 0)
         assert together.finite.all()
 

@@ -141,7 +141,11 @@ def test_the_compiled_right_hand_side_is_that_of_the_matrices(
             normal,
             pinion * (along - normal) + moment_p,
         )
-        mesh[3:6] = -friction, -normal, wheel * normal + moment_w
+        mesh[3:6] = (
+            -friction,
+            -normal,
+            wheel * normal + moment_w,
+        )
         held = system.stiffness @ q + system.damping @ v
         expected = system.force - held + mesh
 

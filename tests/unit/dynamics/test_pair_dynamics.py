@@ -32,7 +32,11 @@ def recorded(system, dynamics, **changes):
         "channels": ("pinion_y",),
         **changes,
     }
-    return integrate([dynamics], values.pop("solver", system.solver), **values)
+    return integrate(
+        [dynamics],
+        values.pop("solver", system.solver),
+        **values,
+    )
 
 
 @pytest.mark.parametrize("phase", [0.0, 0.4, 0.9])
@@ -153,7 +157,10 @@ class TestRefusals:
 
         assert not recwarn.list
 
-    @pytest.mark.parametrize(("precision", "lanes"), [("float64", 8), ("float32", 16)])
+    @pytest.mark.parametrize(
+        ("precision", "lanes"),
+        [("float64", 8), ("float32", 16)],
+    )
     def test_a_record_beyond_memory_names_the_longest(self, precision, lanes):
         solver = Solver(oversampling=5, precision=precision)
         with pytest.raises(ConfigError) as caught:
@@ -181,7 +188,10 @@ class TestRefusals:
             "solver.oversampling": 2,
             "sensing.sampling_rate_hz": 6000,
         }
-        with pytest.raises(SimulationError, match=r"= 2 makes internal steps of"):
+        with pytest.raises(
+            SimulationError,
+            match=r"= 2 makes internal steps of",
+        ):
             machine(coarse).check()
 
     def test_integrations(self, xiamen, dynamics_of):

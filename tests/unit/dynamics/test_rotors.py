@@ -166,7 +166,11 @@ class TestEquations:
         rate = math.sqrt(rotation @ system.stiffness @ rotation / inertia)
         damping = rotation @ system.damping @ rotation
 
-        assert_close(rate / (2 * math.pi), operating.drive_frequency, 1e-12)
+        assert_close(
+            rate / (2 * math.pi),
+            operating.drive_frequency,
+            1e-12,
+        )
         assert_close(
             damping / (2 * inertia * rate),
             operating.drive_damping_ratio,
@@ -242,7 +246,12 @@ class TestStart:
 
     def test_the_start_follows_the_nominal_angle(self, dynamics):
         start = on_course(dynamics, "slower").static_start(-0.4)
-        assert_close(start, dynamics.static_start(-0.12), 1e-12, atol=1e-18)
+        assert_close(
+            start,
+            dynamics.static_start(-0.12),
+            1e-12,
+            atol=1e-18,
+        )
         assert np.abs(start - dynamics.static_start(-0.4)).max() > 1e-8
 
     def test_without_torque_everything_is_at_rest(self, dynamics):

@@ -52,10 +52,8 @@ def test_the_classical_scheme_is_of_fourth_order() -> None:
 
 
 def test_the_middle_of_a_cubic_is_exact() -> None:
-    cubic, (begin, end) = (
-        np.polynomial.Polynomial([0.3, -1.2, 0.7, 2.1]),
-        (-0.4, 0.9),
-    )
+    cubic = np.polynomial.Polynomial([0.3, -1.2, 0.7, 2.1])
+    (begin, end) = (-0.4, 0.9)
     values = cubic(np.array([begin, end]))
     slopes = cubic.deriv()(np.array([begin, end]))
     middle = 0.5 * (begin + end)
@@ -95,7 +93,10 @@ def test_newmark_keeps_the_energy_of_an_oscillator() -> None:
     )
 
 
-@pytest.mark.parametrize(("beta", "gamma"), [(1 / 6, 0.5), (0.25, 0.6), (0.3025, 0.6)])
+@pytest.mark.parametrize(
+    ("beta", "gamma"),
+    [(1 / 6, 0.5), (0.25, 0.6), (0.3025, 0.6)],
+)
 def test_other_newmark_schemes_are_refused(beta: float, gamma: float) -> None:
     text = "written for the average acceleration, 1/4, 1/2"
     with pytest.raises(ValueError, match=text):

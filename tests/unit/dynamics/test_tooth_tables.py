@@ -73,7 +73,11 @@ def test_many_products_are_stored_tooth_by_tooth(xiamen, dynamics_of, dynamics):
 def test_both_layouts_give_one_law_and_motion(dynamics, motions, monkeypatch):
     def walk():
         run = CoreRun([dynamics], 1 / (51200 * 5))
-        return laws(dynamics, motions), run.means(1500), run.whole
+        return (
+            laws(dynamics, motions),
+            run.means(1500),
+            run.whole,
+        )
 
     by_pair, by_tooth = both_layouts(walk, monkeypatch)
     for column, expected in zip(by_tooth[0].T, by_pair[0].T, strict=True):

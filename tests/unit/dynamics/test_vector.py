@@ -181,7 +181,8 @@ def test_operations_lane_by_lane(precision, shape):
             beside = compute(kind, changed, scalars)[0]
             assert beside[..., others].tobytes() == results[..., others].tobytes()
         pair = np.zeros((2, 4, n), dtype=precision)
-        pair[0, 0, lane], pair[1, 1, lane] = tiniest, 1.0
+        pair[0, 0, lane] = tiniest
+        pair[1, 1, lane] = 1.0
         assert compute(kind, pair, np.ones(2))[1].tolist() == [
             True,
             False,

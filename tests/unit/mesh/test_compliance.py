@@ -17,10 +17,7 @@ from gensig.geometry.tooth_profile import (
     tooth_profile,
 )
 from gensig.mesh.compliance import tooth_compliance
-from gensig.mesh.fillet_foundation import (
-    ExtrapolationWarning,
-    body_coefficients,
-)
+from gensig.mesh.fillet_foundation import ExtrapolationWarning, body_coefficients
 
 # pinion at B, C and E, 1e-12 m/N (spur reference (docs/validation.md), table 2.2)
 CURVATURE = np.array([6.66082e-3, 7.86646e-3, 12.56508e-3])
@@ -42,8 +39,15 @@ def test_running_sums_equal_direct_quadrature(xiamen):
         return moment**2 / (material.youngs_modulus * section)
 
     knee = fine.abscissa[fine.n_root_cells]
-    expected, _ = quad(integrand, fine.abscissa[0], x_load, points=[knee], limit=400)
+    expected, _ = quad(
+        integrand,
+        fine.abscissa[0],
+        x_load,
+        points=[knee],
+        limit=400,
+    )
     result = tooth_compliance(healthy_tooth(gear), rho, material).bending
+
     assert_close(result, expected, 1e-4)
 
 
@@ -58,6 +62,7 @@ def test_quadrature_is_converged(xiamen, term):
         return getattr(tooth_compliance(tooth, rho, xiamen.material), term)
 
     fine = computed(1024)
+
     assert_close(computed(256), fine, 2e-4, atol=1e-4 * fine.max())
 
 
@@ -69,8 +74,13 @@ def test_compliance_scales_with_modulus_and_width(xiamen, factor):
     wide = replace(gear, face_width=factor * gear.face_width)
     base, stiffer, wider = (
         tooth_compliance(healthy_tooth(body), CURVATURE, steel).total
-        for body, steel in ((gear, material), (gear, stiff), (wide, material))
+        for body, steel in (
+            (gear, material),
+            (gear, stiff),
+            (wide, material),
+        )
     )
+
     assert_close(stiffer, base / factor, 1e-12)
     assert_close(wider, base / factor, 1e-12)
 

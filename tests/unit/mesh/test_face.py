@@ -15,11 +15,7 @@ from gensig.geometry.contact import corner_gap_by_pinion
 from gensig.geometry.tooth import healthy_tooth
 from gensig.mesh._kernels import lower_envelope, share_over_slices
 from gensig.mesh.face import bearing_width, is_nominal, slice_gaps
-from gensig.mesh.local_contact import (
-    ContactLaw,
-    linear_contact,
-    weber_contact,
-)
+from gensig.mesh.local_contact import ContactLaw, linear_contact, weber_contact
 
 UM = 1e-6
 
@@ -160,6 +156,7 @@ class TestRigidFlanks:
             "wheel": (5 * UM, 0.07),
         }[gear]
         seen = (exact > 0.5 * UM) & (exact < most)
+
         assert seen.any()
         assert_close(result[seen], exact[seen], rtol)
 

@@ -131,9 +131,7 @@ def test_half_width_is_the_one_of_the_pressure(duty):
     assert_close(pressure[bearing], expected, 1e-12)
 
 
-def test_modulus_falls_by_three_per_cent_in_a_hundred_kelvin(
-    duty,
-):
+def test_modulus_falls_by_three_per_cent_in_a_hundred_kelvin(duty):
     assert_close(duty.heat.modulus_ratio(20.0), 1.0, atol=1e-15)
     assert 0.960 < duty.heat.modulus_ratio(120.0) < 0.975
     assert_close(

@@ -62,9 +62,7 @@ def test_basic_rack_factor_is_the_mean_of_both_gears(pair):
     assert_close(ratio, 0.5 * (0.975 + 1.0) / 0.975, 1e-12)
 
 
-def test_a_larger_pressure_angle_stiffens_by_2_percent_a_degree(
-    pair,
-):
+def test_a_larger_pressure_angle_stiffens_by_2_percent_a_degree(pair):
     steep = replace(
         pair.pinion,
         pressure_angle=math.radians(25.0),

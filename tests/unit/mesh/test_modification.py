@@ -7,10 +7,7 @@ import pytest
 from closeness import assert_close
 
 from gensig.errors import ConfigError
-from gensig.mesh.modification import (
-    FlankModification,
-    PairModification,
-)
+from gensig.mesh.modification import FlankModification, PairModification
 from gensig.options.compose import compose
 from gensig.systems.registry import read_modification, read_pair
 

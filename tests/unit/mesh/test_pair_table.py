@@ -13,11 +13,7 @@ from gensig.geometry.contact import corner_gap_by_pinion
 from gensig.geometry.tooth import healthy_tooth
 from gensig.mesh.fillet_foundation import ExtrapolationWarning
 from gensig.mesh.local_contact import contact_law
-from gensig.mesh.pair_table import (
-    flank_sides,
-    pair_table,
-    slice_bending,
-)
+from gensig.mesh.pair_table import flank_sides, pair_table, slice_bending
 
 
 def test_sound_teeth_have_the_corner_gap_and_nothing_else(xiamen):

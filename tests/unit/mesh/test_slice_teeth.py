@@ -118,9 +118,7 @@ def test_errors_of_single_teeth_are_those_of_the_spur_pair():
 
 
 @pytest.mark.parametrize("misalignment", [2, 10])
-def test_misalignment_is_the_spur_pair_s_while_the_whole_face_bears(
-    misalignment,
-):
+def test_misalignment_is_the_spur_pair_s_while_the_whole_face_bears(misalignment):
     spur = ("gear=xiamen_23_84", "operating.torque_nm=100")
     fault = f"fault=misalignment fault.misalignment_um={misalignment}"
     *of_spur, approach = approach_of(*spur, fault, n_periods=1)

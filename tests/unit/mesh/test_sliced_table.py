@@ -16,10 +16,7 @@ from gensig.mesh.load_distribution import (
     pair_states,
     static_mesh,
 )
-from gensig.mesh.sliced.sliced_statics import (
-    chord_equilibrium,
-    chord_states,
-)
+from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
 from gensig.mesh.sliced.sliced_table import DEEPEST, N_CHORDS
 from gensig.mesh.sliced.slices import (
     Meeting,
@@ -188,7 +185,8 @@ def test_teeth_that_all_share_a_form_are_computed_once():
 
 
 def test_too_many_different_teeth_are_refused():
-    system, (runout,) = table_of()[0], faults_of("fault=runout")
+    system = table_of()[0]
+    (runout,) = faults_of("fault=runout")
     message = "62 different teeth of the pinion and 133 of the wheel make 8246 pairs"
     with pytest.raises(FaultError, match=message):
         system.mesh_table((runout, replace(runout, gear="wheel")))

@@ -22,10 +22,7 @@ from gensig.mesh.load_distribution import (
     pair_states,
     static_mesh,
 )
-from gensig.mesh.options import (
-    read_mesh_options,
-    read_slice_options,
-)
+from gensig.mesh.options import read_mesh_options, read_slice_options
 from gensig.mesh.pair_table import structural_compliance
 from gensig.mesh.sliced._slice_kernels import bite_forces
 from gensig.mesh.sliced.slice_pressure import contact_pressure
@@ -258,9 +255,7 @@ def test_results_settle_with_more_slices(mesh_keys):
             ) + 1e-9 * abs(of(finest))
 
 
-def test_contact_pressure_is_that_of_a_cylinder_on_a_cylinder(
-    mesh_keys,
-):
+def test_contact_pressure_is_that_of_a_cylinder_on_a_cylinder(mesh_keys):
     """Textbook: p = sqrt(F E' / (2 pi rho L)), all in the normal section."""
     pair = gears("beihang_61_132")
     mesh, contact = solved(pair, 178.0, mesh_keys | REFERENCE)

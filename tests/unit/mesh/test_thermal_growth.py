@@ -6,15 +6,9 @@ import numpy as np
 import pytest
 from closeness import assert_close
 
-from gensig.geometry.tooth_profile import (
-    involute_point,
-    load_angle,
-)
+from gensig.geometry.tooth_profile import involute_point, load_angle
 from gensig.mesh.thermal.body_heat import solved_body
-from gensig.mesh.thermal.thermal_growth import (
-    GearGrowth,
-    PairGrowth,
-)
+from gensig.mesh.thermal.thermal_growth import GearGrowth, PairGrowth
 from gensig.options.compose import compose
 from gensig.systems.registry import read_heat, read_pair
 
@@ -105,6 +99,7 @@ def test_the_rim_grows_as_the_paper_s_equations_5_and_9_say(pair):
     equation_9 = outer * (rise[0] + mean)
 
     growth = (body.mean - 20.0) * outer
+
     assert_close(growth, equation_5, 1e-12)
     assert_close(growth, equation_9, 1e-5)
 
@@ -151,9 +146,7 @@ def test_a_hotter_pinion_makes_the_entering_pair_late(pair):
     assert_close(strains, (1e-3, 0.0), atol=1e-12)
 
 
-def test_hot_teeth_on_a_cold_body_hardly_lengthen_the_base_pitch(
-    pair,
-):
+def test_hot_teeth_on_a_cold_body_hardly_lengthen_the_base_pitch(pair):
     """Pitches are angles times the body's radius: the teeth's own growth makes them thicker, not
     farther apart.
     """
