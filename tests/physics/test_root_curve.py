@@ -28,54 +28,40 @@ def rack_clearance(gear, x, y):
     """
     m = gear.normal_module
     alpha = gear.pressure_angle
-    rounding = gear.cutter_tip_radius_coefficient * gear.normal_module
-    below_datum = (
-        gear.addendum_coefficient + gear.clearance_coefficient
-    ) * m - rounding
+    rounding = gear.cutter_tip_radius_coefficient * m
+    height = gear.addendum_coefficient + gear.clearance_coefficient
+    below_datum = height * m - rounding
     center_depth = below_datum - gear.profile_shift * m
-    center_offset = (
-        math.pi * m / 4 + below_datum * math.tan(alpha) + rounding / math.cos(alpha)
-    )
+    center_offset = math.pi * m / 4 + below_datum * math.tan(alpha)
+    center_offset += rounding / math.cos(alpha)
+    pitch_radius = m * gear.n_teeth / 2
     radius = np.hypot(x, y)[:, None]
     polar = np.arctan2(y, x)[:, None]
-    pitch_radius = gear.normal_module * gear.n_teeth / 2
 
     def distance(roll):
+        """The rack's tooth is the wedge right of its flank and above its tip line, grown by the
+        rounding.
+        """
         along = radius * np.sin(polar - roll) + pitch_radius * roll - center_offset
         deep = pitch_radius - radius * np.cos(polar - roll) - center_depth
-        # the rack's tooth is the wedge right of its flank and above its tip line, grown by the
-        # rounding
-        from_tip = deep
-        from_flank = -along * math.cos(alpha) + deep * math.sin(alpha)
-        on_tip = along > 0
-        on_flank = -along * math.sin(alpha) - deep * math.cos(alpha) > 0
-        outside = np.where(
-            on_tip & (from_tip > 0),
-            from_tip,
-            np.where(
-                on_flank & (from_flank > 0),
-                from_flank,
-                np.hypot(along, deep),
-            ),
-        )
-        inside = (from_tip <= 0) & (from_flank <= 0)
-        return (
-            np.where(
-                inside,
-                np.maximum(from_tip, from_flank),
-                outside,
-            )
-            - rounding
-        )
+        from_flank = deep * math.sin(alpha) - along * math.cos(alpha)
+        beyond = along * math.sin(alpha) + deep * math.cos(alpha)
+        on_tip = (along > 0) & (deep > 0)
+        on_flank = (beyond < 0) & (from_flank > 0)
+        inside = (deep <= 0) & (from_flank <= 0)
+        cases = [inside, on_tip, on_flank]
+        values = [np.maximum(deep, from_flank), deep, from_flank]
+        return np.select(cases, values, np.hypot(along, deep)) - rounding
 
     span = np.linspace(-1.0, 1.0, 801) * 6 * m / pitch_radius
-    best = np.take(span, distance(span[None, :]).argmin(axis=1))
+    best = span[distance(span[None, :]).argmin(axis=1)][:, None]
     step = span[1] - span[0]
     for _ in range(3):
-        fine = best[:, None] + step * np.linspace(-1, 1, 101)
-        best = fine[np.arange(len(best)), distance(fine).argmin(axis=1)]
+        fine = best + step * np.linspace(-1, 1, 101)
+        nearest = distance(fine).argmin(axis=1)[:, None]
+        best = np.take_along_axis(fine, nearest, axis=1)
         step = step / 50
-    return distance(best[:, None])[:, 0]
+    return distance(best)[:, 0]
 
 
 def outline(gear):
@@ -102,18 +88,13 @@ def test_root_end_lies_on_the_root_circle_at_theta_f(gear):
 
 
 def test_involute_end_joins_in_place_and_slope(gear):
-    junction = gear.junction_curvature_radius
-    h = 1e-7
-    root = np.array(root_curve(gear, gear.pressure_angle + np.array([0.0, h])))
-    flank = np.array(involute_point(gear, junction + np.array([0.0, h])))
-
+    step = np.array([0.0, 1e-7])
+    root = np.array(root_curve(gear, gear.pressure_angle + step))
+    flank = np.array(involute_point(gear, gear.junction_curvature_radius + step))
     assert_close(root[:, 0], flank[:, 0], atol=1e-12)
-
-    angles = [
-        math.atan2(*(curve[::-1, 1] - curve[::-1, 0])) % math.pi
-        for curve in (root, flank)
-    ]
-    assert_close(angles[0], angles[1], atol=1e-4)
+    (x_root, y_root), (x_flank, y_flank) = np.diff(root), np.diff(flank)
+    slopes = np.arctan2([y_root, y_flank], [x_root, x_flank]) % math.pi
+    assert_close(slopes[0], slopes[1], atol=1e-4)
 
 
 def test_the_outline_rises_from_root_to_tip(gear):

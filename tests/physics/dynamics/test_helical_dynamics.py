@@ -206,16 +206,6 @@ class TestStatics:
             exact = brentq(excess, 0.0, 1e-4, xtol=1e-14) + slices.shared * force
             assert_close(approach, exact, atol=3e-7)
 
-    def test_the_tangent_stiffness_is_the_slope_of_the_force(self, helical):
-        force = helical.mesh_force
-        roll = helical.table.pair.base_pitch * (np.arange(20) + 0.3) / 20
-        states = helical.states(roll)
-        low, static, high = (
-            helical.static(states, force * (1 + s * 1e-6)) for s in (-1, 0, 1)
-        )
-        slope = 2e-6 * force / (high.approach - low.approach)
-
-        assert (np.abs(static.stiffness / slope - 1) < 1e-4).mean() > 0.9
 
 
 class TestEnergy:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closeness import assert_close
-from fault_cases import GEARS, on_path, one
+from fault_cases import GEARS, one
 
 from gensig.dynamics._layout import BACKLASH
 from gensig.dynamics.lanes import mesh_numbers
@@ -150,20 +150,6 @@ class TestProfile:
         assert_close(error - error.mean(), centred, atol=0.02 * slope)
         assert np.ptp(expected) > 0.1 * slope
 
-    def test_faults_are_added(self, xiamen):
-        """The recess of a faulty flank is the sum of both; sound teeth have the specimen's form."""
-        fault = one("pitch_error", tooth=4, pitch_error_um=12)
-        sound, faulty = (
-            xiamen.mesh_table(forms) for forms in (self.FORMS, (*self.FORMS, fault))
-        )
-        gaps = faulty.pinion.gap[faulty.pinion.kind]
-
-        assert np.array_equal(gaps[3], sound.pinion.gap[1])
-        assert_close(
-            (gaps[4] - sound.pinion.gap[1])[on_path(sound)],
-            12 * UM,
-            1e-9,
-        )
 
 
 def test_drawn_backlash_needs_no_further_tables(xiamen, perfect):
