@@ -96,20 +96,38 @@ def neighbor(gear, k=1):
 def test_ring_harmonics(xiamen, side, n):
     result = ring_harmonic(getattr(xiamen.pair, side), xiamen.material, n)
     expected = np.array(HARMONICS[side, n]) * 1e-15
-    assert_close(result[[0, 0, 1], [0, 1, 1]], expected, 5e-6, atol=6e-20)
+    assert_close(
+        result[[0, 0, 1], [0, 1, 1]],
+        expected,
+        5e-6,
+        atol=6e-20,
+    )
 
 
 @pytest.mark.parametrize("n", [1, 2, 7, 60, 300])
 def test_ring_harmonics_are_symmetric_and_positive(gear, xiamen, n):
     h = ring_harmonic(gear, xiamen.material, n)
-    assert_close(h[0, 1], h[1, 0], 1e-9, atol=1e-12 * np.abs(h).max())
+    assert_close(
+        h[0, 1],
+        h[1, 0],
+        1e-9,
+        atol=1e-12 * np.abs(h).max(),
+    )
     assert np.linalg.eigvalsh(0.5 * (h + h.T)).min() > 0
 
 
 def test_own_flexibility(gear, side, xiamen):
     c = arc_flexibility(gear, xiamen.material, 0.0)
-    assert_close([c[0, 0], c[1, 1], c[1, 2], c[2, 2]], SELF[side], 1e-6)
-    assert_close(c[0, 1:], 0.0, atol=1e-9 * np.abs(c[1, 1:]).max())
+    assert_close(
+        [c[0, 0], c[1, 1], c[1, 2], c[2, 2]],
+        SELF[side],
+        1e-6,
+    )
+    assert_close(
+        c[0, 1:],
+        0.0,
+        atol=1e-9 * np.abs(c[1, 1:]).max(),
+    )
 
 
 def test_flexibility_of_the_neighbor(gear, side, xiamen):

@@ -264,7 +264,11 @@ class TestRunout:
     def test_the_amplitude_is_the_eccentricity(self, xiamen, gear):
         gap = self.gaps(xiamen, gear, xiamen.pair.pitch_point)
         turn = 2 * np.pi * (np.arange(len(gap)) - 5) / len(gap)
-        assert_close(gap, 40 * UM * np.cos(turn), atol=0.1 * UM)
+        assert_close(
+            gap,
+            40 * UM * np.cos(turn),
+            atol=0.1 * UM,
+        )
         assert gap.argmax() == 5
 
 

@@ -51,7 +51,13 @@ class TestFourMilliseconds:
             start = at_rest(dynamics)
             step = 1 / (SAMPLING_RATE * oversampling)
             n_steps = cls.N_SAMPLES * oversampling
-            _, v = trajectory(dynamics, start[:6], start[6:], step, n_steps)
+            _, v = trajectory(
+                dynamics,
+                start[:6],
+                start[6:],
+                step,
+                n_steps,
+            )
             off = np.linalg.norm(v[::oversampling] - exact, axis=0)
             return (off / np.linalg.norm(exact, axis=0)).max()
 
@@ -181,7 +187,11 @@ class TestPeriodicMotion:
 
         The drive is soft: a torque of 1e-7 of the set one turns the pinion on by what 1e-8 s do.
         """
-        velocity = np.fft.rfft(tile[:-1, 6:], axis=0, norm="forward")
+        velocity = np.fft.rfft(
+            tile[:-1, 6:],
+            axis=0,
+            norm="forward",
+        )
         turn = 2j * np.pi * case.lines / case.period
         exact = turn * velocity[case.lines][:, RECORDED].T
         jerk = turn * exact
@@ -197,7 +207,11 @@ class TestPeriodicMotion:
 
     def test_the_tile_closes(self, tile):
         moved = np.ptp(tile, axis=0)
-        assert_close((tile[-1] - tile[0]) / moved, 0.0, atol=5e-4)
+        assert_close(
+            (tile[-1] - tile[0]) / moved,
+            0.0,
+            atol=5e-4,
+        )
 
     def test_it_turns_at_the_set_speed(self, case, tile):
         assert abs(tile[:-1, 8].mean()) < 1e-8 * 2 * np.pi * case.speed_rpm / 60

@@ -119,7 +119,11 @@ class TestMeshPeriod:
     def test_sound_teeth_repeat_every_pitch(self, machine, law):
         curves = machine({"mesh.law": law}).stiffness_curves()
         teeth = curves.mesh_stiffness.reshape(23, -1)
-        assert_close(teeth, np.tile(teeth[0], (23, 1)), 1e-8)
+        assert_close(
+            teeth,
+            np.tile(teeth[0], (23, 1)),
+            1e-8,
+        )
         assert np.ptp(teeth[0]) > 0.1 * teeth.mean()
 
 

@@ -63,7 +63,11 @@ def test_the_tuned_damper_of_one_disc_is_den_hartogs(ratio):
     seen = one_disc()
     (computed,) = tune_dampers(seen, [ratio])
     assert_close(computed.ring_inertia, ratio, 1e-3)  # the larger the better
-    assert_close(peak(seen, computed), np.sqrt(1.0 + 2.0 / ratio), 0.02)
+    assert_close(
+        peak(seen, computed),
+        np.sqrt(1.0 + 2.0 / ratio),
+        0.02,
+    )
 
     own = np.sqrt(computed.stiffness / computed.ring_inertia)
     assert_close(own, 1.0 / (1.0 + ratio), 0.01)

@@ -188,7 +188,11 @@ def test_root_stress_in_time_of_a_force_that_repeats_is_that_of_one_cycle(pump_d
     passes = computed.passes["wheel"]
     one = once.passes["wheel"]
     assert 3 * 54 <= len(passes) <= 4 * 54
-    assert_close(passes[54:108].max(), one.max(), 2e-3)
+    assert_close(
+        passes[54:108].max(),
+        one.max(),
+        2e-3,
+    )
     assert_close(typical_largest(passes, 54), one.max(), 2e-3)
 
     atol = 0.01 * one.max()

@@ -55,7 +55,11 @@ def test_power_of_the_gas_is_that_of_all_it_drives(rpm, torque):
     )
     assert computed.brake_torque == torque
     assert computed.indicated_torque > torque + 1000.0
-    assert_close(computed.on(NODES)[16].mean(), -torque, atol=1e-9)
+    assert_close(
+        computed.on(NODES)[16].mean(),
+        -torque,
+        atol=1e-9,
+    )
 
 
 def test_reference_point_is_that_of_the_class():

@@ -103,7 +103,11 @@ def test_one_disc_on_a_shaft_is_the_closed_form():
     w = np.array([5.0, 20.0, 70.0])
     computed = one.response(np.ones((3, 1), dtype=complex), w)[:, 0]
 
-    assert_close(computed, 1.0 / (800 + 40j + 3j * w - 2 * w**2), 1e-12)
+    assert_close(
+        computed,
+        1.0 / (800 + 40j + 3j * w - 2 * w**2),
+        1e-12,
+    )
 
 
 def test_mean_power_in_is_what_the_damping_takes():
@@ -190,8 +194,16 @@ def test_more_orders_than_usual_change_little():
         for n in (60, 200, 400)
     )
 
-    assert_close(few[[2, 13]], many[[2, 13]], 0.02)
-    assert_close(usual[[2, 13, 44, 64]], many[[2, 13, 44, 64]], 0.03)
+    assert_close(
+        few[[2, 13]],
+        many[[2, 13]],
+        0.02,
+    )
+    assert_close(
+        usual[[2, 13, 44, 64]],
+        many[[2, 13, 44, 64]],
+        0.03,
+    )
 
 
 def test_waterfall_lines_rise_with_the_speed_and_resonate_at_the_modes():
@@ -201,7 +213,13 @@ def test_waterfall_lines_rise_with_the_speed_and_resonate_at_the_modes():
     def torques(speed):
         return torques_of(option(), speed, 0.0).on(NODES)
 
-    flywheel, pump_gear = run_of_speeds(line, torques, speeds, [13, 44], n_orders=60)
+    flywheel, pump_gear = run_of_speeds(
+        line,
+        torques,
+        speeds,
+        [13, 44],
+        n_orders=60,
+    )
 
     assert flywheel.angle.shape == (len(speeds), 60)
 

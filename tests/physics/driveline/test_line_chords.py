@@ -269,5 +269,9 @@ class TestAgainstThePair:
         direction = dynamics.approach_direction()
 
         assert motion.energy_residual < 1e-4
-        assert_close(v_1, v, atol=2e-3 * np.abs(v).max())
+        assert_close(
+            v_1,
+            v,
+            atol=2e-3 * np.abs(v).max(),
+        )
         assert_close(q_1 @ direction, q @ direction, atol=5e-8)

@@ -227,7 +227,13 @@ def test_a_tooth_comes_to_its_mates_when_the_gear_has_turned_from_one_to_the_oth
     for other, (here, there) in neighbours(drive, place).items():
         gear = drive.line.gears[(meshes[place].driving, meshes[place].driven)[here]]
         n_teeth = gear.n_teeth
-        tooth = tooth_there(drive, (place, here), (other, there), start, turned)
+        tooth = tooth_there(
+            drive,
+            (place, here),
+            (other, there),
+            start,
+            turned,
+        )
         gone = past[other] + tooth - past[place] - teeth[here]
         sense = math.copysign(1.0, drive.line.speed_ratio[gear.node])
         angle = meshes[place].center_line - meshes[other].center_line

@@ -130,8 +130,16 @@ class TestLinear:
         q, v, _ = state_after(line, start, self.DURATION, 3000)
         q_1, v_1, _ = state_after(other, moved, self.DURATION, 3000)
 
-        assert_close(turn @ q_1, q, atol=1e-9 * np.abs(q).max())
-        assert_close(turn @ v_1, v, atol=1e-9 * np.abs(v).max())
+        assert_close(
+            turn @ q_1,
+            q,
+            atol=1e-9 * np.abs(q).max(),
+        )
+        assert_close(
+            turn @ v_1,
+            v,
+            atol=1e-9 * np.abs(v).max(),
+        )
 
 
 class TestTorquesAndCourse:
@@ -235,7 +243,11 @@ class TestTorquesAndCourse:
             time=np.array([0.0, 0.1]),
             speed=np.array([50.0, 50.0]),
         )
-        ramp = ShaftTorque(dof=0, table=np.ones(1), factor=np.array([0.0, 3.0]))
+        ramp = ShaftTorque(
+            dof=0,
+            table=np.ones(1),
+            factor=np.array([0.0, 3.0]),
+        )
         _, v, _ = state_after(
             line,
             (np.zeros(1), np.zeros(1)),
@@ -245,7 +257,11 @@ class TestTorquesAndCourse:
             course=course,
         )
 
-        assert_close(v, 0.5 * 3.0 * 0.1 / line.mass[0, 0], 1e-9)
+        assert_close(
+            v,
+            0.5 * 3.0 * 0.1 / line.mass[0, 0],
+            1e-9,
+        )
 
     def test_signals_are_low_passed_states(self):
         """A sample is the state of the line at its time."""

@@ -84,7 +84,11 @@ def test_without_play_it_is_the_linear_line():
             twist=share * whole.linear.twist,
         )
         line = replace(whole, torques=torques, linear=linear)
-        _, computed, exact = deviations(line, (14, 17, 13), settling=0.0)
+        _, computed, exact = deviations(
+            line,
+            (14, 17, 13),
+            settling=0.0,
+        )
         for one, other in zip(computed, exact, strict=True):
             assert np.std(one - one.mean() - other) < most * np.std(other)
 

@@ -259,8 +259,16 @@ class TestLowRank:
             state_after(line, start, duration, n_steps) for line in (engine, welded)
         )
 
-        assert_close(q, q_1, atol=1e-8 * np.abs(q_1).max())
-        assert_close(v, v_1, atol=1e-8 * np.abs(v_1).max())
+        assert_close(
+            q,
+            q_1,
+            atol=1e-8 * np.abs(q_1).max(),
+        )
+        assert_close(
+            v,
+            v_1,
+            atol=1e-8 * np.abs(v_1).max(),
+        )
         assert motion.energy_residual < 1e-6
 
 

@@ -135,7 +135,11 @@ def test_an_idler_between_two_gears_in_line(train, z, expected):
     pitch = line.pairs[0].base_pitch
     pitch_points = np.array([pair.pitch_point for pair in line.pairs])
     past = (start_rolls(line) - pitch_points) / pitch
-    assert_close(from_whole(past[1] - past[0] - expected), 0.0, atol=1e-9)
+    assert_close(
+        from_whole(past[1] - past[0] - expected),
+        0.0,
+        atol=1e-9,
+    )
 
 
 def test_rolls_advance_as_the_meshing_frequencies_say(train):

@@ -204,7 +204,11 @@ def test_a_run_up_follows_its_course_and_its_load_the_law(law, exponent):
     taken += behind * np.gradient(speed, 1.0 / 10240.0)
     given = motion.signals["mesh_force", 0] * record.pair.pinion.base_radius
     for part in (slice(500, 1500), slice(-1500, -500)):
-        assert_close(given[part].mean(), taken[part].mean(), 0.02)
+        assert_close(
+            given[part].mean(),
+            taken[part].mean(),
+            0.02,
+        )
 
     assert np.abs(motion.signals[load]).max() < 0.2
 

@@ -111,7 +111,11 @@ def test_modes_are_orthogonal_and_hold_as_much_strain_as_kinetic_energy(line):
 
     square = (2.0 * np.pi * computed.frequency) ** 2
     strain = computed.shapes @ matrices.whole_stiffness @ computed.shapes.T
-    assert_close(strain, np.diag(square), atol=1e-8 * square.max())
+    assert_close(
+        strain,
+        np.diag(square),
+        atol=1e-8 * square.max(),
+    )
     assert_close(computed.kinetic_share.sum(axis=1), 1.0, 1e-12)
     assert np.all(computed.mesh_strain_share >= 0.0)
     assert np.all(computed.mesh_strain_share.sum(axis=1) <= 1.0 + 1e-9)
@@ -147,7 +151,11 @@ def test_viscous_losses_damp_each_mode_as_its_loss_factors_do(lines):
     ringing = rates[rates.imag > 1.0]
     ringing = ringing[np.argsort(np.abs(ringing))]
 
-    assert_close(-ringing.real / np.abs(ringing), ratio[1:], 1e-6)
+    assert_close(
+        -ringing.real / np.abs(ringing),
+        ratio[1:],
+        1e-6,
+    )
     assert_close(
         viscous.damping @ matrices.rigid.T,
         0.0,

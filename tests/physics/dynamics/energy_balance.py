@@ -29,8 +29,19 @@ class Balance(NamedTuple):
 def balance(dynamics, step, n_steps):
     """Balance of a motion from static equilibrium."""
     start = dynamics.static_start(0.0)
-    q, v = trajectory(dynamics, start, np.zeros(len(start)), step, n_steps)
-    motions = motion_of(dynamics, step * np.arange(len(q)), q, v)
+    q, v = trajectory(
+        dynamics,
+        start,
+        np.zeros(len(start)),
+        step,
+        n_steps,
+    )
+    motions = motion_of(
+        dynamics,
+        step * np.arange(len(q)),
+        q,
+        v,
+    )
     law = laws(dynamics, motions, step)
     _, friction, moment_p, moment_w, _, stored, lost, _ = law.T
     system = dynamics.system()

@@ -43,7 +43,11 @@ LARGE = replace(
 LOOSE = replace(SMALL, radial_clearance=10e-6)
 TIGHT = replace(SMALL, radial_clearance=-5e-6)
 SHAFT = Shaft(diameter=18e-3, span=80e-3)
-BOTH = pytest.mark.parametrize("bearing", [SMALL, LARGE], ids=["6203", "6205"])
+BOTH = pytest.mark.parametrize(
+    "bearing",
+    [SMALL, LARGE],
+    ids=["6203", "6205"],
+)
 LOADS = pytest.mark.parametrize("load", [20.0, 460.0, 5000.0])
 
 

@@ -48,7 +48,13 @@ def helical(spur, slices):
 def moved(dynamics, n_steps, step=STEP):
     """States from static equilibrium on, q and v."""
     start = dynamics.static_start(0.0)
-    return trajectory(dynamics, start, np.zeros(len(start)), step, n_steps)
+    return trajectory(
+        dynamics,
+        start,
+        np.zeros(len(start)),
+        step,
+        n_steps,
+    )
 
 
 class TestZeroHelix:
@@ -207,7 +213,6 @@ class TestStatics:
             assert_close(approach, exact, atol=3e-7)
 
 
-
 class TestEnergy:
     def test_power_is_stored_and_dissipated(self, helical, monkeypatch):
         """Chords store the work of the curve that they follow, and return it along the roll."""
@@ -232,7 +237,11 @@ class TestEnergy:
         stored = law[:, 5]
         work = np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(approach))
 
-        assert_close(stored, np.append(0.0, work), atol=2e-3 * work[-1])
+        assert_close(
+            stored,
+            np.append(0.0, work),
+            atol=2e-3 * work[-1],
+        )
 
 
 class TestChords:
@@ -254,12 +263,21 @@ class TestChords:
         chords = {name: getattr(table, name) for name in names}
         for name, values in chords.items():
             single = values[:, :, table.set_chord, None]
-            chords[name] = np.repeat(single, len(table.depth), axis=2)
+            chords[name] = np.repeat(
+                single,
+                len(table.depth),
+                axis=2,
+            )
         alone = replace(helical, table=replace(table, **chords))
         force = laws(helical, motions)[:, 0]
 
         assert force[-1] < -100.0
-        assert_close(force, laws(alone, motions)[:, 0], 1e-12, atol=1e-9)
+        assert_close(
+            force,
+            laws(alone, motions)[:, 0],
+            1e-12,
+            atol=1e-9,
+        )
 
 
 @pytest.mark.parametrize("speed_rpm", [620, 1480])

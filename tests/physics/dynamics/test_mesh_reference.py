@@ -139,7 +139,11 @@ class Reference:
         pair = self.pair
         options = self.table.options
         half_width = 0.5 * options.friction_transition * pair.base_pitch
-        x = np.clip((position - pair.pitch_point) / half_width, -1, 1)
+        x = np.clip(
+            (position - pair.pitch_point) / half_width,
+            -1,
+            1,
+        )
         sliding = options.friction_coefficient * load * x * (1.5 - 0.5 * x**2)
         arm = pair.start_curvature_radius + np.clip(position, 0, pair.path_of_contact)
         moment_p = -(sliding @ arm)
@@ -169,7 +173,12 @@ class Reference:
         sides = self.table.pinion, self.table.wheel
         values = sum(columns(side, 0, at[chosen], position) for side in sides)
         squeezed = -approach - self.pair.backlash
-        load, along, stored, lost = self.law(values, squeezed, -rate, -roll_rate)
+        load, along, stored, lost = self.law(
+            values,
+            squeezed,
+            -rate,
+            -roll_rate,
+        )
         n_loaded = float(np.sum(load > 0))
         return (
             -load.sum(),

@@ -87,7 +87,11 @@ def test_slow_gears_have_the_static_shares(run, record):
     expected = np.sort(load / dynamics.mesh_force, axis=1).T
     shares = np.sort(result.mesh.load_share, axis=0)
 
-    assert_close(shares.mean(axis=1), expected.mean(axis=1), atol=3e-3)
+    assert_close(
+        shares.mean(axis=1),
+        expected.mean(axis=1),
+        atol=3e-3,
+    )
 
     off = np.abs(shares - expected).max(axis=0)
     assert np.quantile(off, 0.95) < 0.03

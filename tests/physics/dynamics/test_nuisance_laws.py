@@ -60,7 +60,11 @@ def response(run, tones, angle=None):
 
 
 def assert_same(signal, expected):
-    assert_close(signal, expected, atol=1e-9 * np.abs(expected).max())
+    assert_close(
+        signal,
+        expected,
+        atol=1e-9 * np.abs(expected).max(),
+    )
 
 
 @pytest.fixture(scope="module")

@@ -151,7 +151,6 @@ class TestProfile:
         assert np.ptp(expected) > 0.1 * slope
 
 
-
 def test_drawn_backlash_needs_no_further_tables(xiamen, perfect):
     for factor in (1.0, 1.2):
         dynamics = dynamics_with(xiamen, replace(perfect, backlash_factor=factor))

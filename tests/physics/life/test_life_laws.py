@@ -191,7 +191,11 @@ def test_pits_come_after_the_first_life_and_go_with_the_load_to_the_exponent(
 
     ratio = life_turns(pits, 100.0, 0.0) / life_turns(pits, 200.0, 0.0)
     assert_close(math.log2(ratio), 0.5 * pits.options.exponent, 1e-9)
-    assert_close(pits.share(pits.sizes[-1]), pits.options.end_share, 1e-9)
+    assert_close(
+        pits.share(pits.sizes[-1]),
+        pits.options.end_share,
+        1e-9,
+    )
 
     # Hertz: the knee of the line is reached at the torque whose stress is the strength
     stress = contact_stress(machine.pair, machine.material, 1.0)
@@ -211,7 +215,12 @@ def test_damage_adds_up_by_miner_whatever_the_order(pits, order):
     blocks = tuple(zip(begin, end, speed, torques, strict=True))
     history = given_history(blocks, math.inf)
 
-    course = grow(pits.sizes, pits.turns(history.torque), history, 0.0)
+    course = grow(
+        pits.sizes,
+        pits.turns(history.torque),
+        history,
+        0.0,
+    )
 
     rates = [pits.rate(np.array([0.0]), torque)[0] for torque in torques]
 
@@ -238,7 +247,11 @@ def test_a_standstill_costs_clock_time_and_nothing_else(law):
 
     assert_array_equal(near.size[-1], far.size[-1])
     assert_array_equal(near.turns[-1], far.turns[-1])
-    assert_close(far.clock[-1] - near.clock[-1], 8 * HOUR, 1e-6)
+    assert_close(
+        far.clock[-1] - near.clock[-1],
+        8 * HOUR,
+        1e-6,
+    )
 
     # no look falls into the gap
     times = snapshot_times(far, "linear", 9)
@@ -259,7 +272,11 @@ def test_what_has_not_failed_at_the_horizon_is_censored(law):
 
     assert whole.has_failed
     assert not cut.has_failed
-    assert_close(cut.clock[-1], 0.5 * whole.clock[-1], 1e-6)
+    assert_close(
+        cut.clock[-1],
+        0.5 * whole.clock[-1],
+        1e-6,
+    )
     assert cut.size[-1] < law.sizes[-1]
 
 
@@ -267,14 +284,24 @@ def test_what_has_not_failed_at_the_horizon_is_censored(law):
 def test_looks_are_in_order_and_reach_from_new_to_the_end(law, spacing):
     torque = np.array([60.0, 110.0, 90.0])
     rng = np.random.default_rng(3)
-    history = draw_history(DRAWN, np.full(3, SPEED), torque, 500 * HOUR, rng)
+    history = draw_history(
+        DRAWN,
+        np.full(3, SPEED),
+        torque,
+        500 * HOUR,
+        rng,
+    )
     course = grow(law.sizes, law.turns(torque), history, 6e-4)
 
     times = snapshot_times(course, spacing, 21)
     sizes = np.array([course.value("size", course.at(time)) for time in times])
 
     assert_close(times[[0, -1]], [0.0, course.running[-1]])
-    assert_close(sizes[[0, -1]], [6e-4, law.sizes[-1]], 1e-6)
+    assert_close(
+        sizes[[0, -1]],
+        [6e-4, law.sizes[-1]],
+        1e-6,
+    )
     assert (np.diff(times) > 0.0).all()
     assert (np.diff(sizes) >= 0.0).all()
 

@@ -199,7 +199,11 @@ def test_a_spectrum_grows_at_the_mean_of_its_rates(helical):
     assert_close(steady, alone, 1e-12)
 
     both = law.turns([np.array([150.0, 300.0])])[0]
-    assert_close(1.0 / both, 0.5 * (1.0 / alone).sum(axis=0), 1e-12)
+    assert_close(
+        1.0 / both,
+        0.5 * (1.0 / alone).sum(axis=0),
+        1e-12,
+    )
 
 
 def test_the_loads_of_a_mesh_are_the_greatest_of_each_pair_of_teeth(spur):
@@ -222,7 +226,11 @@ def test_the_loads_of_a_mesh_are_the_greatest_of_each_pair_of_teeth(spur):
         (0.9, [1.0]),
     ):
         distance = np.abs(angle * radius - (5.0 + place) * pitch)
-        loads = greatest_loads(pair, angle, np.where(distance < 1e-5, 500.0, 0.0))
+        loads = greatest_loads(
+            pair,
+            angle,
+            np.where(distance < 1e-5, 500.0, 0.0),
+        )
         expected = np.array(shares) * 500.0 * radius
         assert_close(
             np.sort(loads[loads > LEAST_TORQUE]),

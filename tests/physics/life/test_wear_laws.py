@@ -148,7 +148,11 @@ def test_pressure_of_new_flanks_is_that_of_the_loaded_mesh():
     for j in (0, 4, 7):
         place = contact.position[..., j]
         inside = (place > 0.0) & (place < case.pair.path_of_contact)
-        ours = np.interp(place[inside], case.path.position, result[j])
+        ours = np.interp(
+            place[inside],
+            case.path.position,
+            result[j],
+        )
         assert_close(ours, pressure[..., j][inside], 0.02)
 
 
@@ -223,10 +227,18 @@ def test_a_history_is_the_same_in_one_go_or_many(rule):
     assert not at_once[0].any()
     assert (np.diff(at_once, axis=0) >= -1e-12).all()
 
-    steady = worn_flanks(case, turns, torque=np.full(5, case.torque))
+    steady = worn_flanks(
+        case,
+        turns,
+        torque=np.full(5, case.torque),
+    )
     assert_close(steady, at_once, atol=tolerance)
 
-    later = worn_flanks(case, turns[3:] - turns[2], start=at_once[2])
+    later = worn_flanks(
+        case,
+        turns[3:] - turns[2],
+        start=at_once[2],
+    )
     assert_close(later, at_once[3:], atol=tolerance)
 
     course = case.torque * np.array([1.0, 1.0, 1.0, 2.0, 1.0])

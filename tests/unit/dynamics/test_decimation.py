@@ -70,8 +70,16 @@ def test_channels_and_lanes_are_filtered_alone(n_samples, factor):
     for n_cut in (0, 1, 3):
         taps = low_pass.taps[: len(low_pass.taps) - n_cut]
         means = rng.standard_normal((n_steps, 3, LANES))
-        windows = np.lib.stride_tricks.sliding_window_view(means[1:], len(taps), axis=0)
-        expected = (windows[::factor][:n_samples] @ taps).transpose(2, 1, 0)
+        windows = np.lib.stride_tricks.sliding_window_view(
+            means[1:],
+            len(taps),
+            axis=0,
+        )
+        expected = (windows[::factor][:n_samples] @ taps).transpose(
+            2,
+            1,
+            0,
+        )
         samples = replace(low_pass, taps=taps).apply(means)
         assert_close(samples, expected, atol=1e-14)
     means[7:, :, 2] = np.nan

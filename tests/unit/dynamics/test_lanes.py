@@ -84,7 +84,11 @@ def run(machine):
 def mix(run, law):
     """Eight runs that share only their law."""
     gaps = law.get("mesh.law") != "paper"
-    pinion, wheel = np.random.default_rng(8).normal(0, 3e-6, (2, 84))
+    pinion, wheel = np.random.default_rng(8).normal(
+        0,
+        3e-6,
+        (2, 84),
+    )
     tilts = {
         "pinion_tilt": 100.0 * wheel[:23],
         "wheel_tilt": 100.0 * pinion,

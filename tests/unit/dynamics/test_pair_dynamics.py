@@ -286,7 +286,11 @@ class TestRecord:
         healthy, missing = (
             system.simulate(faults).acceleration[1] for faults in ((), MISSING)
         )
-        assert_close([healthy.std(), missing.std()], [158.2, 183.9], 0.05)
+        assert_close(
+            [healthy.std(), missing.std()],
+            [158.2, 183.9],
+            0.05,
+        )
 
         rise = np.abs(missing).max() / np.abs(healthy).max()
         assert_close(rise, 2404 / 694, 0.15)

@@ -135,7 +135,12 @@ def draw(precision, *size):
 def compute(kind, rows, scalars):
     out = np.empty((len(rows), N_RESULTS, rows.shape[2]), dtype=kind[0])
     above = np.empty(len(rows), dtype=np.bool_)
-    SHAPES[kind][0](rows.ravel(), scalars, out.ravel(), above)
+    SHAPES[kind][0](
+        rows.ravel(),
+        scalars,
+        out.ravel(),
+        above,
+    )
     return out.swapaxes(0, 1), above
 
 
