@@ -203,5 +203,5 @@ def test_shared_compliance_is_the_mean_of_both_gears_over_the_double_zone(xiamen
     assert_close(
         shared_body_compliance(xiamen.pair, xiamen.material),
         expected,
-        0.005,
+        1e-3,
     )

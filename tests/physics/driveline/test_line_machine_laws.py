@@ -105,7 +105,7 @@ def test_with_play_its_teeth_part_and_its_energies_balance():
     assert motion.contact_loss[drive] > 0.1
     assert motion.energy_residual < 1e-3
     assert_close(
-        np.std(computed[0]), np.std(linear[0]), 0.1
+        np.std(computed[0]), np.std(linear[0]), 2e-3
     )  # the flywheel hardly feels the gears
     assert np.std(computed[1]) > 1.3 * np.std(
         linear[1]
@@ -117,7 +117,7 @@ def test_a_record_is_repeatable_and_turns_with_the_gear_ratio():
     record = machine()
     computed = record.simulate()
     assert_close(record.operating.speed, 0.5 * SPEED, 1e-6)
-    assert_close(computed.mean_speed, 0.5 * SPEED, 0.02)
+    assert_close(computed.mean_speed, 0.5 * SPEED, 1e-4)
     assert np.all(np.diff(computed.shaft_angle) > 0.0)
     assert computed.integration_check == "energy"
     assert computed.integration_error < 1e-3

@@ -147,7 +147,7 @@ class TestEquilibrium:
         assert_close(
             equilibrium(LOOSE, 500.0, 0.0).ball_load.max() * 8 / 500.0,
             5,
-            0.1,
+            0.02,
         )
 
 

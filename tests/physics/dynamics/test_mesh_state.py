@@ -106,7 +106,7 @@ def test_a_missing_tooth_carries_nothing_and_is_engaged(record, xiamen):
 
     # from A to E: the contact ratio in base pitches
     ratio = xiamen.pair.transverse_contact_ratio
-    assert_close(mesh.fault_engaged.mean() * 23, ratio, 0.05)
+    assert_close(mesh.fault_engaged.mean() * 23, ratio, 1e-3)
 
 
 def test_a_fault_is_engaged_when_its_tooth_carries(record):

@@ -136,7 +136,7 @@ class TestNoise:
         noise = result.signals["acceleration"].astype(float) - clean(result)
         power = np.var(noise, axis=1)
 
-        assert_close(power, result.signals["noise_power"], 0.04)
+        assert_close(power, result.signals["noise_power"], 0.02)
 
         decibels = 10 * np.log10(result.signals["signal_power"] / power)
         assert_close(decibels.mean(), 12.0, atol=0.1)

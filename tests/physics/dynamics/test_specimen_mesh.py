@@ -183,4 +183,4 @@ def test_only_faults_of_the_record_engage(machine):
     assert not sound.mesh.fault_engaged.any()
 
     share = pair.transverse_contact_ratio / 23
-    assert_close(faulty.mesh.fault_engaged.mean(), share, 0.15)
+    assert_close(faulty.mesh.fault_engaged.mean(), share, 0.03)

@@ -81,7 +81,7 @@ def test_the_drive_transmits_a_part_of_a_speed_ripple(run, ripple, frequency):
     assert_close(
         wave(speed, frequency),
         share * followed(frequency),
-        0.03,
+        0.02,
     )
     assert followed(frequency) < 0.95
 
@@ -94,7 +94,7 @@ def test_a_torque_ripple_is_in_the_force_on_the_teeth(run):
     rippled = run(ripple, with_mesh_state=True)
     force = record(rippled).mesh.force / pair_dynamics(rippled).mesh_force
 
-    assert_close(wave(force, 60.0), 0.1, 0.05)
+    assert_close(wave(force, 60.0), 0.1, 0.02)
     assert wave(force, 50.0) < 0.01
 
 

@@ -178,7 +178,7 @@ def test_a_nearly_through_crack_grows_as_a_through_one(law_of_share):
     assert_close(
         nearly.intensity[0, 20:-8],
         whole.intensity[0, 20:-8],
-        0.02,
+        1e-4,
     )
 
 

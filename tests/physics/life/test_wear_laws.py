@@ -153,7 +153,7 @@ def test_pressure_of_new_flanks_is_that_of_the_loaded_mesh():
             case.path.position,
             result[j],
         )
-        assert_close(ours, pressure[..., j][inside], 0.02)
+        assert_close(ours, pressure[..., j][inside], 0.008)
 
 
 def test_slices_of_a_spur_pair_wear_alike_and_as_the_whole():
@@ -166,7 +166,7 @@ def test_slices_of_a_spur_pair_wear_alike_and_as_the_whole():
 
     assert np.ptp(six.depth[-1], axis=1).max() < 1e-9 * six.depth.max()
     # six slices are looked at 24 phases of a pitch, one slice at every node
-    assert_close(six.life, wear_life(case).life, 0.01)
+    assert_close(six.life, wear_life(case).life, 1e-3)
 
 
 @pytest.mark.parametrize(

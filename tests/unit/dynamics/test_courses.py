@@ -187,7 +187,7 @@ class TestTorque:
         assert_close(
             self.carried(dynamics, before, 0.03),
             [1.0, factor],
-            2e-2,
+            1e-2,
         )
 
     def test_without_torque_nothing_touches(self, record):

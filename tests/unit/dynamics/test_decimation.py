@@ -140,7 +140,7 @@ class TestInBandError:
         assert_close(
             in_band_error(exact + off, exact, RATE),
             [1e-3, 2e-5],
-            1e-2,
+            1e-4,
         )
 
         scaled = exact[:1] * [[[1.001], [1.02]]]
