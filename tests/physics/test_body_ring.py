@@ -146,11 +146,11 @@ def test_flexibility_of_the_neighbor(gear, side, xiamen):
 
 @pytest.mark.parametrize("k", [1, 2, 5])
 def test_reciprocity_and_mirror_symmetry(gear, xiamen, k):
-    own, ahead, behind = (
+    below, ahead, behind = (
         arc_flexibility(gear, xiamen.material, neighbor(gear, pitches))
         for pitches in (0, k, -k)
     )
-    size = np.sqrt(np.diag(own))
+    size = np.sqrt(np.diag(below))
     scale = np.outer(size, size)
 
     assert_close(behind / scale, ahead.T / scale, atol=1e-10)

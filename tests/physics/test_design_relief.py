@@ -92,12 +92,12 @@ def test_the_gaps_are_those_of_the_fault_of_the_same_relief(xiamen, shape):
     mine = system.mesh_table()
     theirs = xiamen.mesh_table(faults)
     for name in SIDES:
-        own = getattr(mine, name)
+        relieved_side = getattr(mine, name)
         fault = getattr(theirs, name)
-        assert set(own.kind) == {0}
-        assert own.gap[0].max() > 0.9 * depth
+        assert set(relieved_side.kind) == {0}
+        assert relieved_side.gap[0].max() > 0.9 * depth
         assert_close(
-            own.gap[0],
+            relieved_side.gap[0],
             fault.gap[fault.kind[0]],
             atol=0.04 * depth,
         )
@@ -112,7 +112,7 @@ def test_back_flanks_are_modified_too(xiamen):
 
 
 def test_a_fault_comes_on_top(xiamen):
-    """What a pitch error adds to relieved teeth is the pitch error."""
+    """A pitch error adds itself to the relief."""
     system = relieved(xiamen, tip_relief=10 * UM, tip_relief_height=0.6 * MM)
     side = system.mesh_table(
         (
@@ -132,7 +132,7 @@ def test_a_fault_comes_on_top(xiamen):
 
 
 def test_relief_of_the_deflection_takes_most_ripple_off(xiamen, machine):
-    """Where one pair leaves as the next one enters, reliefs that sum to the deflection leave it
+    """One pair leaves as the next one enters: reliefs that sum to the deflection leave it
     even (Harris's map).
     """
     for system in (
@@ -190,12 +190,14 @@ def test_leads_are_those_of_the_sliced_pair(config_with, lead, share):
     roll = spur.pair.base_pitch * (np.arange(64) + 0.5) / 64
     table = spur.mesh_table()
     slices = sliced.mesh_table()
-    own = static_mesh(table, pair_states(table, roll), spur.mesh_force).approach.mean()
+    spur_approach = static_mesh(
+        table, pair_states(table, roll), spur.mesh_force
+    ).approach.mean()
     theirs = chord_equilibrium(
         slices, chord_states(slices, roll), spur.mesh_force
     ).approach.mean()
 
-    assert_close(own, theirs, share)
+    assert_close(spur_approach, theirs, share)
 
 
 def test_relieved_gears_shake_less_along_the_line_of_action(machine):

@@ -283,8 +283,8 @@ def test_misalignment_is_a_tilted_winkler_strip(machine, gear, bending, ratio):
     mesh = system.pair, at, system.material, system.mesh
     share = {"pinion": 1.0, "wheel": 0.0}[gear]
     side = flank_sides(*mesh, force, pinion_share=share)[gear]
-    own = slice_bending(*mesh)
-    even = (side.law.compliance(FULL * 1e-3, force) + own).item() * force
+    bending_compliance = slice_bending(*mesh)
+    even = (side.law.compliance(FULL * 1e-3, force) + bending_compliance).item() * force
     tilt = ratio * even
     expected = np.sqrt(2 * even * tilt)  # part of the face bears
     if ratio < 2:
@@ -294,6 +294,6 @@ def test_misalignment_is_a_tilted_winkler_strip(machine, gear, bending, ratio):
         size = {"misalignment_um": misalignment}
         fault = one("misalignment", gear=gear, tooth=0, **size)
         tooth = faulty_teeth(system.pair, (fault,))[gear, 0]
-        gap, compliance = side.contact(tooth, own, system.mesh)
-        approach = gap + (compliance + own) * force
+        gap, compliance = side.contact(tooth, bending_compliance, system.mesh)
+        approach = gap + (compliance + bending_compliance) * force
         assert_close(approach, expected, 1e-3)

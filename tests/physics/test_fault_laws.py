@@ -1,4 +1,4 @@
-"""What every fault must do to compliance and contact: nothing at severity zero, more with every
+"""Laws of every fault for compliance and contact: nothing at severity zero, more with every
 step.
 """
 
@@ -81,7 +81,7 @@ def steps(found):
 
 
 def falls(found, slack):
-    """Where the deflection falls by more than the slack, (step, node)."""
+    """True at places at which the deflection falls by more than the slack, (step, node)."""
     return steps(found) < -slack * found[:-1].clip(max=1.0)
 
 

@@ -277,8 +277,8 @@ def test_partial_width_load_in_three_dimensions(machine):
                 ),
             )
         ]
-        own = slice_bending(pair, position, system.material, system.mesh)
-        assert_close(own, share * sum(teeth), 1e-9)
+        of_slices = slice_bending(pair, position, system.material, system.mesh)
+        assert_close(of_slices, share * sum(teeth), 1e-9)
         # half of the slices bear: what is theirs counts twice
         whole = structural_terms(pinion, curvature, material, system.mesh)
         structure = sum(whole.values()) + share * teeth[0]

@@ -135,7 +135,7 @@ def test_load_sharing_and_compliance_agree(physical):
     )
     at = states.position[inside]
     width = physical.pair.pinion.face_width
-    own = states.compliance[inside] + table.shared_compliance
+    of_pairs = states.compliance[inside] + table.shared_compliance
     law = weber_contact(physical.pair, at, physical.material)
     contact = law.compliance(width, load[inside])
     full = law.compliance(width, force)
@@ -146,7 +146,7 @@ def test_load_sharing_and_compliance_agree(physical):
         curves.single_pair_stiffness,
     )
 
-    assert_close(own - contact, alone - full, 2e-3)
+    assert_close(of_pairs - contact, alone - full, 2e-3)
 
 
 def test_plane_strain_is_plane_stress_of_another_material(xiamen):

@@ -182,8 +182,8 @@ class TestPeriodicMotion:
 
     @pytest.fixture
     def compared(self, case, tile, spectrum):
-        """How late a record is against the tile, s, and the largest relative error of a channel's
-        lines besides.
+        """Delay of a record against the tile, s, and the largest relative error of a channel's
+        lines without it.
 
         The drive is soft: a torque of 1e-7 of the set one turns the pinion on by what 1e-8 s do.
         """

@@ -69,10 +69,10 @@ def test_the_tuned_damper_of_one_disc_is_den_hartogs(ratio):
         0.02,
     )
 
-    own = np.sqrt(computed.stiffness / computed.ring_inertia)
-    assert_close(own, 1.0 / (1.0 + ratio), 0.005)
+    rate = np.sqrt(computed.stiffness / computed.ring_inertia)
+    assert_close(rate, 1.0 / (1.0 + ratio), 0.005)
 
-    damping_ratio = computed.damping / (2.0 * computed.ring_inertia * own)
+    damping_ratio = computed.damping / (2.0 * computed.ring_inertia * rate)
     assert_close(
         damping_ratio,
         np.sqrt(3.0 * ratio / (8.0 * (1.0 + ratio))),

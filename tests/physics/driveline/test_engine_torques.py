@@ -374,7 +374,7 @@ def test_torques_that_contradict_the_pressure_are_refused(tmp_path):
         ),
     ],
 )
-def test_what_makes_no_engine_is_refused_in_one_line(path, value, message):
+def test_impossible_engines_are_refused_in_one_line(path, value, message):
     with pytest.raises(ConfigError, match=re.escape(message)) as caught:
         torques_of(changed(path, value))
     assert "\n" not in str(caught.value)

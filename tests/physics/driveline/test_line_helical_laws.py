@@ -73,12 +73,12 @@ def running(lateral, teeth):
         ]
     ).config
     engine = read_engine_line(config)
-    own = tabulated_meshes(engine, config, SPEED, TORQUE)
+    tabulated = tabulated_meshes(engine, config, SPEED, TORQUE)
     course = steady_course(SPEED, TORQUE)
-    line = running_line(engine, course, governor=GOVERNOR, own=own)
+    line = running_line(engine, course, governor=GOVERNOR, own=tabulated)
     channels = [("speed", line.dof(14))]
     motion = line.run(SOLVER, duration=0.15, channels=channels, settling=0.2)
-    return line, motion, own
+    return line, motion, tabulated
 
 
 @pytest.mark.parametrize("lateral", ["false", "true"])
@@ -106,10 +106,11 @@ def test_our_stiffness_is_of_the_size_of_the_tables():
 
     docs/theory/shaft_line_records.md.
     """
-    line, _, own = running("false", "sliced")
+    line, _, tabulated = running("false", "sliced")
     meshes = line.machine.drive.line.meshes
     ratio = [
-        mean_mesh_stiffness(own[place].table, abs(force)) / meshes[place].stiffness
+        mean_mesh_stiffness(tabulated[place].table, abs(force))
+        / meshes[place].stiffness
         for place, force in enumerate(line.mesh_force)
     ]
     odd = ratio.pop(line.machine.mesh_names.index("19/32"))

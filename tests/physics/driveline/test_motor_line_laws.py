@@ -140,18 +140,16 @@ def test_a_record_whose_steps_are_too_long_is_made_with_half_of_them():
     ]
     short, long = (machine(*words, f"solver.oversampling={steps}") for steps in (8, 4))
     line = long.line(Run(system=long, faults=()))
-    as_told = (
-        replace(SOLVER, oversampling=4),
-        {"duration": 0.05, "channels": [("speed", 0)]},
-    )
+    coarse = replace(SOLVER, oversampling=4)
+    record = {"duration": 0.05, "channels": [("speed", 0)]}
 
     with pytest.raises(StepError, match="the energy balance misses"):
         integrate_line(
             line.line,
             line.course,
             line.torques,
-            as_told[0],
-            **as_told[1],
+            coarse,
+            **record,
         )
 
     computed = simulated(long)

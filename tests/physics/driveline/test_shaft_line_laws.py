@@ -301,19 +301,19 @@ def test_the_single_pair_is_the_same_code_with_two_nodes(machine, dynamics_of, r
     """Matrices of the line are those of the pair without its soft drive."""
     system = machine(rotors)
     dynamics = dynamics_of(system)
-    own = dynamics.system()
+    pair_system = dynamics.system()
     matrices = drive_line_of_pair(system, "pair").matrices()
     order = []
     for name in matrices.names:
         gear, _, axis = name.partition(" ")
-        order.append(own.names.index(f"{gear}_{axis or 'rotation'}"))
+        order.append(pair_system.names.index(f"{gear}_{axis or 'rotation'}"))
     both = np.ix_(order, order)
-    driver = own.names.index("motor_rotation" if rotors else "pinion_rotation")
+    driver = pair_system.names.index("motor_rotation" if rotors else "pinion_rotation")
 
-    stiffness = own.stiffness.copy()
+    stiffness = pair_system.stiffness.copy()
     stiffness[driver, driver] -= dynamics.drive_stiffness
 
-    assert_close(np.diag(matrices.mass), own.mass[order], 1e-14)
+    assert_close(np.diag(matrices.mass), pair_system.mass[order], 1e-14)
     assert_close(
         matrices.stiffness,
         stiffness[both],
@@ -321,9 +321,9 @@ def test_the_single_pair_is_the_same_code_with_two_nodes(machine, dynamics_of, r
         atol=1e-9 * stiffness.max(),
     )
 
-    damping = matrices.damping - own.damping[both]
+    damping = matrices.damping - pair_system.damping[both]
     damping[order.index(driver), order.index(driver)] = 0.0
-    assert_close(damping, 0.0, atol=1e-12 * own.damping.max())
+    assert_close(damping, 0.0, atol=1e-12 * pair_system.damping.max())
 
     direction = dynamics.approach_direction()
     assert_close(

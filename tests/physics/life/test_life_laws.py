@@ -260,7 +260,7 @@ def test_a_standstill_costs_clock_time_and_nothing_else(law):
     assert_close(looks[-1], 10.0, 1e-6)
 
 
-def test_what_has_not_failed_at_the_horizon_is_censored(law):
+def test_courses_that_have_not_failed_at_the_horizon_are_censored(law):
     turns = law.turns(np.array([90.0]))
     whole = grow(law.sizes, turns, steady(90.0, 1e6), 5e-4)
     cut = grow(

@@ -239,7 +239,7 @@ def test_the_loads_of_a_mesh_are_the_greatest_of_each_pair_of_teeth(spur):
         )
 
 
-def test_what_slices_cannot_do_is_refused(spur):
+def test_cracks_that_slices_cannot_have_are_refused(spur):
     machine, laws, crack = spur
     with pytest.raises(ConfigError, match="compression"):
         sliced(

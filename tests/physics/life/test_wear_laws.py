@@ -63,12 +63,12 @@ def test_the_band_rule_is_the_integral_over_the_passing_contact():
     half = 2.0 * load[0] / (math.pi * peak)
     factor = case.options.wear_factor("pinion")
     speed = 12.5
-    own, other = case.path.rolling * speed
+    pinion, wheel = case.path.rolling * speed
     for node in (0, 30, 100):
-        time = np.linspace(-half[node], half[node], 20001) / own[node]
-        place = time * own[node] / half[node]
+        time = np.linspace(-half[node], half[node], 20001) / pinion[node]
+        place = time * pinion[node] / half[node]
         pressure = peak[node] * np.sqrt(np.maximum(1.0 - place**2, 0.0))
-        sliding = abs(own[node] - other[node])
+        sliding = abs(pinion[node] - wheel[node])
         depth = np.trapezoid(factor * pressure * sliding, time)
         assert_close(result[node], depth, 1e-4)
 

@@ -195,7 +195,7 @@ class TestBitsAlone:
         runs = [*map(run, changes), run(PAPER, MISSING)]
         assert_same(simulate_together(runs), alone(runs))
 
-    def test_where_contact_is_lost_and_regained(self, run):
+    def test_while_contact_is_lost_and_regained(self, run):
         """Bouncing pairs are integrated in parts, in some lanes and not in others."""
         rng = np.random.default_rng(0)
         runs = []

@@ -37,7 +37,7 @@ def heat():
 
 @pytest.mark.parametrize("bore", [None, 65.0, 90.0])
 @pytest.mark.parametrize("convection", [0.0, 40.0, 300.0, 1e5])
-def test_what_goes_in_comes_out(gear, heat, bore, convection):
+def test_heat_in_is_heat_out(gear, heat, bore, convection):
     cooled = replace(heat, face_convection=convection)
     body = solved_body(gear, 6000.0, cooled, bore_temperature=bore)
     rise = body.temperature - cooled.oil_temperature

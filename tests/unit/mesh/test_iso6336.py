@@ -108,6 +108,6 @@ def test_small_contact_ratio_is_refused(pair):
     "argument",
     ["line_load", "correction_factor", "youngs_modulus"],
 )
-def test_what_is_not_positive_is_refused(pair, argument):
+def test_values_that_are_not_positive_are_refused(pair, argument):
     with pytest.raises(ConfigError, match=argument):
         iso6336.single_stiffness(pair, **{argument: 0.0})

@@ -198,15 +198,15 @@ def test_chords_are_convex_and_meet():
     assert len(table.depth) == N_CHORDS
     assert table.depth[0] == 0.0
 
-    own = table.compliance[0, 0] - table.shared_compliance
+    compliance = table.compliance[0, 0] - table.shared_compliance
     gap = table.gap[0, 0]
     near = gap[0] < 20e-6
 
-    assert (np.diff(own[:, near], axis=0) < 1e-4 * own[1:, near]).all()
+    assert (np.diff(compliance[:, near], axis=0) < 1e-4 * compliance[1:, near]).all()
 
     met = gap[0] + table.depth[1:, None]
-    before = (met - gap[:-1]) / own[:-1]
-    after = (met - gap[1:]) / own[1:]
+    before = (met - gap[:-1]) / compliance[:-1]
+    after = (met - gap[1:]) / compliance[1:]
 
     assert_close(before[:, near], after[:, near], atol=2e-3 * force)
 

@@ -54,7 +54,7 @@ def gears(name, **changes):
     config = compose("generate", [f"gear={name}"])["gear"]
     sides = {}
     for side, hand in (("pinion", 1.0), ("wheel", -1.0)):
-        own = {key: value for key, value in config[side].items() if key not in BODY}
+        keys = {key: value for key, value in config[side].items() if key not in BODY}
         for key in (
             "normal_module_mm",
             "pressure_angle_deg",
@@ -62,9 +62,9 @@ def gears(name, **changes):
             "clearance_coefficient",
             "cutter_tip_radius_coefficient",
         ):
-            own[key] = config[key]
-        own["helix_angle_deg"] = hand * config["helix_angle_deg"]
-        values = own | {
+            keys[key] = config[key]
+        keys["helix_angle_deg"] = hand * config["helix_angle_deg"]
+        values = keys | {
             key: hand * value if key == "helix_angle_deg" else value
             for key, value in changes.items()
         }
@@ -151,8 +151,8 @@ def test_equilibrium_is_that_of_an_independent_solver(mesh_keys, length):
             for at, row in zip(position.T, mesh.gap, strict=True)
         ]
         blocks = [
-            flexibility(own, coupling, soft)
-            for own, soft in zip(structure, local, strict=True)
+            flexibility(structural, coupling, soft)
+            for structural, soft in zip(structure, local, strict=True)
         ]
         # min 1/2 p'Cp - (approach - gap)'p over p >= 0, as least squares with the root of C
         root = np.linalg.cholesky(block_diag(*blocks)).T
