@@ -3,11 +3,10 @@ reciprocity.
 """
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from closeness import assert_close
 
 from gensig.geometry.tooth_profile import load_angle
 from gensig.mesh.body_coupling import (
@@ -29,8 +28,18 @@ HARMONICS = {
     ("wheel", 10): (77.1281, 19.9814, 77.1281),
 }
 SELF = {
-    "pinion": (3.092345e-10, 2.369060e-8, -1.163667e-6, 5.880031e-5),
-    "wheel": (6.006637e-10, 3.235829e-7, -3.990314e-6, 4.953859e-5),
+    "pinion": (
+        3.092345e-10,
+        2.369060e-8,
+        -1.163667e-6,
+        5.880031e-5,
+    ),
+    "wheel": (
+        6.006637e-10,
+        3.235829e-7,
+        -3.990314e-6,
+        4.953859e-5,
+    ),
 }
 NEIGHBOR = {
     "pinion": (
@@ -55,7 +64,15 @@ NEIGHBOR = {
 S_MM = (0.0, 0.700, 1.401, 2.101, 2.802, 3.502, 4.203)
 CROSS_FE = {
     "pinion": (477.8, 475.7, 472.9, 469.4, 465.1, 460.0, 454.0),
-    "wheel": (1862.8, 1869.0, 1875.0, 1880.7, 1886.4, 1892.1, 1898.1),
+    "wheel": (
+        1862.8,
+        1869.0,
+        1875.0,
+        1880.7,
+        1886.4,
+        1892.1,
+        1898.1,
+    ),
 }
 SIDES = ("pinion", "wheel")
 MIRROR = np.diag([1.0, -1.0, -1.0])
@@ -79,65 +96,92 @@ def neighbor(gear, k=1):
 def test_ring_harmonics(xiamen, side, n):
     result = ring_harmonic(getattr(xiamen.pair, side), xiamen.material, n)
     expected = np.array(HARMONICS[side, n]) * 1e-15
-    assert_allclose(result[[0, 0, 1], [0, 1, 1]], expected, rtol=5e-6, atol=6e-20)
+    assert_close(
+        result[[0, 0, 1], [0, 1, 1]],
+        expected,
+        5e-6,
+        atol=6e-20,
+    )
 
 
 @pytest.mark.parametrize("n", [1, 2, 7, 60, 300])
 def test_ring_harmonics_are_symmetric_and_positive(gear, xiamen, n):
     h = ring_harmonic(gear, xiamen.material, n)
-    assert_allclose(h[0, 1], h[1, 0], rtol=1e-9, atol=1e-12 * np.abs(h).max())
+    assert_close(
+        h[0, 1],
+        h[1, 0],
+        1e-9,
+        atol=1e-12 * np.abs(h).max(),
+    )
     assert np.linalg.eigvalsh(0.5 * (h + h.T)).min() > 0
 
 
 def test_own_flexibility(gear, side, xiamen):
     c = arc_flexibility(gear, xiamen.material, 0.0)
-    assert_allclose([c[0, 0], c[1, 1], c[1, 2], c[2, 2]], SELF[side], rtol=1e-6, atol=0)
-    assert_allclose(c[0, 1:], 0.0, rtol=0, atol=1e-9 * np.abs(c[1, 1:]).max())
+    assert_close(
+        [c[0, 0], c[1, 1], c[1, 2], c[2, 2]],
+        SELF[side],
+        1e-6,
+    )
+    assert_close(
+        c[0, 1:],
+        0.0,
+        atol=1e-9 * np.abs(c[1, 1:]).max(),
+    )
 
 
 def test_flexibility_of_the_neighbor(gear, side, xiamen):
     c = arc_flexibility(gear, xiamen.material, neighbor(gear))
-    assert_allclose(
-        c[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]], NEIGHBOR[side], rtol=1e-6, atol=0
+    assert_close(
+        c[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]],
+        NEIGHBOR[side],
+        1e-6,
     )
-    assert_allclose(
-        [c[1, 0], c[2, 0], c[2, 1]], [-c[0, 1], -c[0, 2], c[1, 2]], rtol=1e-8, atol=0
+    assert_close(
+        [c[1, 0], c[2, 0], c[2, 1]],
+        [-c[0, 1], -c[0, 2], c[1, 2]],
+        1e-8,
     )
 
 
 @pytest.mark.parametrize("k", [1, 2, 5])
 def test_reciprocity_and_mirror_symmetry(gear, xiamen, k):
-    ahead, behind = (
-        arc_flexibility(gear, xiamen.material, neighbor(gear, sign * k))
-        for sign in (1, -1)
+    below, ahead, behind = (
+        arc_flexibility(gear, xiamen.material, neighbor(gear, pitches))
+        for pitches in (0, k, -k)
     )
-    scale = np.sqrt(
-        np.outer(
-            np.diag(ahead0 := arc_flexibility(gear, xiamen.material, 0.0)),
-            np.diag(ahead0),
-        )
+    size = np.sqrt(np.diag(below))
+    scale = np.outer(size, size)
+
+    assert_close(behind / scale, ahead.T / scale, atol=1e-10)
+    assert_close(
+        behind / scale,
+        MIRROR @ ahead @ MIRROR / scale,
+        atol=1e-10,
     )
-    assert_allclose((behind - ahead.T) / scale, 0.0, rtol=0, atol=1e-10)
-    assert_allclose((behind - MIRROR @ ahead @ MIRROR) / scale, 0.0, rtol=0, atol=1e-10)
-    assert np.abs((ahead - ahead.T) / scale).max() > 1e-5, (
-        "symmetric by itself: reciprocity would show nothing"
-    )
+    # symmetric by itself, reciprocity would show nothing
+    assert np.abs((ahead - ahead.T) / scale).max() > 1e-5
 
 
 def test_body_under_the_loaded_tooth_at_the_pitch_point(gear, side, xiamen):
     rho = xiamen.pair.pinion_curvature(xiamen.pair.pitch_point)
     angle = load_angle(
-        gear, np.array([rho if side == "pinion" else xiamen.pair.tangent_length - rho])
+        gear,
+        np.array([rho if side == "pinion" else xiamen.pair.tangent_length - rho]),
     )
     result = cross_compliance(gear, xiamen.material, angle, angle, pitches=0)
-    assert_allclose(
-        result, {"pinion": 1031.22e-12, "wheel": 2372.06e-12}[side], rtol=1e-5, atol=0
+
+    assert_close(
+        result,
+        {"pinion": 1031.22e-12, "wheel": 2372.06e-12}[side],
+        1e-5,
     )
 
 
 def cross_over_the_zone(pair, material, side, pitches):
     s = np.array(S_MM) * 1e-3
-    gear, curvature = getattr(pair, side), getattr(pair, f"{side}_curvature")
+    gear = getattr(pair, side)
+    curvature = getattr(pair, f"{side}_curvature")
     loaded, probed = (
         load_angle(gear, np.asarray(curvature(s + k * pair.base_pitch))) for k in (0, 1)
     )
@@ -146,46 +190,18 @@ def cross_over_the_zone(pair, material, side, pitches):
 
 def test_cross_compliance_against_finite_elements(side, xiamen):
     result = cross_over_the_zone(
-        xiamen.pair, xiamen.material, side, 1 if side == "pinion" else -1
+        xiamen.pair,
+        xiamen.material,
+        side,
+        1 if side == "pinion" else -1,
     )
-    assert_allclose(result, np.array(CROSS_FE[side]) * 1e-12, rtol=0.01, atol=0)
-
-
-def test_the_wrong_neighbor_misses_the_finite_elements(side, xiamen):
-    result = cross_over_the_zone(
-        xiamen.pair, xiamen.material, side, -1 if side == "pinion" else 1
-    )
-    assert np.abs(result / (np.array(CROSS_FE[side]) * 1e-12) - 1).max() > 0.01
+    assert_close(result, np.array(CROSS_FE[side]) * 1e-12, 0.01)
 
 
 def test_shared_compliance_is_the_mean_of_both_gears_over_the_double_zone(xiamen):
     expected = sum(np.mean(CROSS_FE[side]) for side in SIDES) * 1e-12
-    assert_allclose(
+    assert_close(
         shared_body_compliance(xiamen.pair, xiamen.material),
         expected,
-        rtol=0.005,
-        atol=0,
+        1e-3,
     )
-
-
-def test_cross_compliance_follows_the_bore(gear, xiamen):
-    """Rigid twist of the body about the bore: a larger bore couples less, by more than the change
-    in radius.
-    """
-    cross = [
-        arc_flexibility(
-            replace(gear, bore_radius=bore * gear.root_radius),
-            xiamen.material,
-            neighbor(gear),
-        )[2, 2]
-        for bore in (0.2, 0.4, 0.6)
-    ]
-    assert np.all(np.diff(np.abs(cross)) != 0)
-    shared = [
-        shared_body_compliance(
-            replace(xiamen.pair, pinion=replace(xiamen.pair.pinion, bore_radius=bore)),
-            xiamen.material,
-        )
-        for bore in (7e-3, 9e-3, 12e-3)
-    ]
-    assert np.all(np.diff(shared) < 0)

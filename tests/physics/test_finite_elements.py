@@ -5,12 +5,13 @@ cracks.
 import csv
 import math
 from collections import defaultdict
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from closeness import assert_close
 from reference.calibrate_crack import MODULE, WIDTH, reference_gear
 
 from gensig.errors import ExtrapolationError
@@ -50,51 +51,54 @@ def stress(xiamen):
     return xiamen.material
 
 
-@pytest.mark.parametrize("case", groups("tooth", "case"))
-def test_tooth_and_body_of_many_gears(strain, case):
-    """The shear factor 1 was read off 23 and 84 teeth; the other gears are its proof."""
-    rows = groups("tooth", "case")[case]
-    gear, curvature = (
-        reference_gear(rows[0]),
-        column(rows, "curvature_radius_over_module") * MODULE,
-    )
-    tooth = tooth_compliance(
-        healthy_tooth(gear), curvature, strain, reach="to_centreline"
-    )
-    angle = load_angle(gear, curvature)
-    body = cross_compliance(gear, strain, angle, angle, pitches=0)
-    scale = YOUNG * WIDTH
-    ratio = tooth.total * scale / column(rows, "tooth")
-    assert_allclose(ratio[4:], 1.0, rtol=0.04, atol=0)
-    assert np.all((ratio[:4] > 0.99) & (ratio[:4] < 1.27))
-    assert_allclose(body * scale / column(rows, "body"), 1.0, rtol=0.05, atol=0)
-    assert_allclose(
-        (tooth.total + body) * scale / column(rows, "total"), 1.0, rtol=0.08, atol=0
-    )
-    # the long beam's shear is what the paper's form has too much
-    long_beam = (tooth.total + 0.2 * tooth.shear) * scale / column(rows, "tooth")
-    assert np.all(long_beam > 1.07)
+@pytest.fixture(scope="module")
+def computed(strain):
+    """Tooth and body compliance of one stored case, over its columns `tooth`, `body`, `total`."""
 
-
-def test_tooth_and_body_over_all_gears(strain):
-    errors = []
-    for rows in groups("tooth", "case").values():
-        gear, curvature = (
-            reference_gear(rows[0]),
-            column(rows, "curvature_radius_over_module") * MODULE,
-        )
+    def ratios(case):
+        rows = groups("tooth", "case")[case,]
+        gear = reference_gear(rows[0])
+        curvature = column(rows, "curvature_radius_over_module") * MODULE
         angle = load_angle(gear, curvature)
-        own = tooth_compliance(
-            healthy_tooth(gear), curvature, strain, reach="to_centreline"
-        ).total
         body = cross_compliance(gear, strain, angle, angle, pitches=0)
-        errors.append((own + body) * YOUNG * WIDTH / column(rows, "total") - 1.0)
-    assert np.sqrt(np.mean(np.concatenate(errors) ** 2)) < 0.03
+        reach = {"reach": "to_centreline"}
+        tooth = tooth_compliance(healthy_tooth(gear), curvature, strain, **reach)
+        # the long beam's shear is what the paper's form has too much
+        values = {
+            "tooth": tooth.total,
+            "body": body,
+            "total": tooth.total + body,
+            "long_beam": tooth.total + 0.2 * tooth.shear,
+        }
+        over = {"long_beam": "tooth"}
+        return {
+            name: value * YOUNG * WIDTH / column(rows, over.get(name, name))
+            for name, value in values.items()
+        }
+
+    return {case: ratios(case) for (case,) in groups("tooth", "case")}
+
+
+@pytest.mark.parametrize("case", [case for (case,) in groups("tooth", "case")])
+def test_tooth_and_body_of_many_gears(computed, case):
+    """The shear factor 1 was read off 23 and 84 teeth; the other gears are its proof."""
+    ratio = computed[case]
+    assert_close(ratio["tooth"][4:], 1.0, 0.04)
+    assert np.all((ratio["tooth"][:4] > 0.99) & (ratio["tooth"][:4] < 1.27))
+    assert_close(ratio["body"], 1.0, 0.05)
+    assert_close(ratio["total"], 1.0, 0.08)
+    assert np.all(ratio["long_beam"] > 1.07)
+
+
+def test_tooth_and_body_over_all_gears(computed):
+    errors = np.concatenate([ratio["total"] - 1.0 for ratio in computed.values()])
+    assert np.sqrt(np.mean(errors**2)) < 0.03
 
 
 def increments(strain, rows, *, faces="open"):
     """Computed increments of one crack, as ``E W`` times compliance."""
-    first, gear = rows[0], reference_gear(rows[0])
+    first = rows[0]
+    gear = reference_gear(rows[0])
     crack = Crack(
         gear="pinion",
         tooth=0,
@@ -109,20 +113,32 @@ def increments(strain, rows, *, faces="open"):
     return crack_compliance(tooth, curvature, strain) * YOUNG * WIDTH
 
 
-CRACKS = ("case", "side", "start", "crack_angle_deg", "depth_over_chord")
+CRACKS = (
+    "case",
+    "side",
+    "start",
+    "crack_angle_deg",
+    "depth_over_chord",
+)
+BORES = ("gear", "elasticity", "bore_radius_over_module")
 
 
 def test_cracks_of_many_gears(strain):
     """Depths of 5 to 70 % of the chord, four angles, both starts, six gears."""
-    errors, at_45 = [], []
+    errors = []
+    at_45 = []
     for key, rows in groups("crack", *CRACKS).items():
         case, side, _, angle, _ = key
-        if side != "tension" or (case, float(angle)) == ("z84", 75.0):
+        if side != "tension" or (case, float(angle)) == (
+            "z84",
+            75.0,
+        ):
             continue
         result = increments(strain, rows) / column(rows, "increment") - 1.0
         errors.append(result)
         if float(angle) == 45.0:
             at_45.append(result)
+
     assert len(errors) > 150
     assert np.sqrt(np.mean(np.concatenate(errors) ** 2)) < 0.045
     assert np.abs(np.concatenate(errors)).max() < 0.20
@@ -140,19 +156,7 @@ def test_crack_on_the_compression_side(strain):
     )
     ratio = increments(strain, rows) / column(rows, "increment")
     assert np.all((ratio > 0.8) & (ratio < 1.45))
-    assert_allclose(increments(strain, rows, faces="breathing"), 0.0, rtol=0, atol=0)
-
-
-def test_breathing_on_the_tension_side_stays_open(strain):
-    rows = next(
-        rows for key, rows in groups("crack", *CRACKS).items() if key[1] == "tension"
-    )
-    assert_allclose(
-        increments(strain, rows, faces="breathing"),
-        increments(strain, rows),
-        rtol=0,
-        atol=0,
-    )
+    assert_close(increments(strain, rows, faces="breathing"), 0.0)
 
 
 @pytest.mark.parametrize(("depth", "angle"), [(0.85, 45.0), (0.3, 80.0), (0.3, 20.0)])
@@ -160,43 +164,43 @@ def test_outside_what_was_checked(strain, depth, angle):
     rows = next(iter(groups("crack", *CRACKS).values()))
     chord = float(rows[0]["depth_over_module"]) / float(rows[0]["depth_over_chord"])
     odd = [
-        {**row, "depth_over_module": str(depth * chord), "crack_angle_deg": str(angle)}
+        {
+            **row,
+            "depth_over_module": str(depth * chord),
+            "crack_angle_deg": str(angle),
+        }
         for row in rows
     ]
+
     with pytest.raises(ExtrapolationError, match="calibrated crack was checked"):
         increments(strain, odd)
 
 
-@pytest.mark.parametrize(
-    "key",
-    [key for key in groups("bores", "gear", "elasticity", "bore_radius_over_module")],
-)
+@pytest.mark.parametrize("key", groups("bores", *BORES))
 def test_ring_over_bores(xiamen, strain, stress, key):
-    """Self within 5 %, cross within 5 % (2 % for the bores of the paper's pair as we take them)."""
+    """Cross compliance within 5 %, and 2 % for the bores of the paper's pair as we take them."""
     name, elasticity, bore = key
-    material = strain if elasticity == "plane_strain" else stress
-    pair, gear = xiamen.pair, getattr(xiamen.pair, name)
-    own = type(gear)(
-        **{field: getattr(gear, field) for field in gear.__dataclass_fields__}
-        | {"bore_radius": float(bore) * MODULE}
-    )
-    rows = groups("bores", "gear", "elasticity", "bore_radius_over_module")[key]
-    cross = [row for row in rows if row["kind"] == "cross"]
-    entering = column(cross, "position_over_module") * MODULE
-    curvature = pair.pinion_curvature if name == "pinion" else pair.wheel_curvature
-    angles = [
-        load_angle(own, np.asarray(curvature(entering + shift)))
-        for shift in (0.0, pair.base_pitch)
-    ]
-    result = cross_compliance(
-        own, material, angles[0], angles[1], pitches=1 if name == "pinion" else -1
-    )
-    tolerance = 0.02 if float(bore) * MODULE * 1e3 in (9.0, 15.0) else 0.05
-    assert_allclose(
-        result * YOUNG * WIDTH / column(cross, "compliance"),
-        1.0,
-        rtol=tolerance,
-        atol=0,
+    pair = xiamen.pair
+    bore_radius = float(bore) * MODULE
+    gear = replace(getattr(pair, name), bore_radius=bore_radius)
+    rows = [row for row in groups("bores", *BORES)[key] if row["kind"] == "cross"]
+    entering = column(rows, "position_over_module") * MODULE
+    curvature = getattr(pair, f"{name}_curvature")
+    loaded = load_angle(gear, np.asarray(curvature(entering)))
+    probed = load_angle(gear, np.asarray(curvature(entering + pair.base_pitch)))
+    material = {"plane_strain": strain, "plane_stress": stress}[elasticity]
+    pitches = {"pinion": 1, "wheel": -1}[name]
+
+    result = cross_compliance(gear, material, loaded, probed, pitches=pitches)
+
+    tolerance = 0.05
+    if round(bore_radius * 1e3, 9) in (9.0, 15.0):
+        tolerance = 0.02
+
+    assert_close(
+        result * YOUNG * WIDTH,
+        column(rows, "compliance"),
+        tolerance,
     )
 
 
@@ -205,9 +209,16 @@ def three_d(fault, depth, extent, point, quantity, loaded="1"):
     (row,) = (
         row
         for row in groups("three_d", "fault")[fault,]
-        if (row["crack_depth_over_module"], row["crack_extent_over_width"])
+        if (
+            row["crack_depth_over_module"],
+            row["crack_extent_over_width"],
+        )
         == (depth, extent)
-        and (row["point"], row["quantity"], row["loaded_over_width"])
+        and (
+            row["point"],
+            row["quantity"],
+            row["loaded_over_width"],
+        )
         == (point, quantity, loaded)
     )
     return float(row["compliance"]), float(row["curvature_radius_over_module"]) * MODULE
@@ -219,7 +230,10 @@ def test_partial_width_crack_in_three_dimensions(xiamen, strain, depth, extent):
     """Increment at the pitch point where the mate keeps the contact line straight, within 15 %."""
     (cracked, radius), (sound, _) = (
         three_d(*case, "C", "rigid")
-        for case in (("crack", depth, extent), ("sound", "0", "0"))
+        for case in (
+            ("crack", depth, extent),
+            ("sound", "0", "0"),
+        )
     )
     crack = Crack(
         gear="pinion",
@@ -231,41 +245,44 @@ def test_partial_width_crack_in_three_dimensions(xiamen, strain, depth, extent):
     )
     tooth = crack.apply(healthy_tooth(xiamen.pair.pinion), 0)
     result = crack_compliance(tooth, np.array([radius]), strain)[0] * YOUNG * WIDTH
-    assert_allclose(result, cracked - sound, rtol=0.15, atol=0)
+
+    assert_close(result, cracked - sound, 0.15)
 
 
 def test_partial_width_load_in_three_dimensions(machine):
-    """A pit over half of the face: the pinion's structure within 15 % of three dimensions, and not
+    """A pit over half of the face: the pinion's structure within 8 % of three dimensions, and not
     if bent as one.
     """
-    result = {}
-    for bending in ("by_slice", "whole"):
-        system = machine({"mesh.bending": bending, "gear.pinion.bore_radius_mm": 9})
-        pinion, wheel = system.pair.pinion, system.pair.wheel
-        (pitted, radius), _ = three_d("pit", "0", "0", "C", "rigid", "0.5"), None
-        position = np.array([radius - system.pair.start_curvature_radius])
+    pitted, radius = three_d("pit", "0", "0", "C", "rigid", "0.5")
+    ratio = {}
+    for bending, share in (("by_slice", 1.0), ("whole", 0.0)):
+        system = machine(
+            {
+                "mesh.bending": bending,
+                "gear.pinion.bore_radius_mm": 9,
+            }
+        )
+        pair = system.pair
         material = system.material.in_plane("plane_strain")
-        whole = sum(
-            structural_terms(
-                healthy_tooth(pinion), np.array([radius]), material, system.mesh
-            ).values()
-        )
-        share = tooth_compliance(
-            healthy_tooth(pinion), np.array([radius]), material, reach="to_centreline"
-        ).total
-        own = slice_bending(system.pair, position, system.material, system.mesh)
-        mate = tooth_compliance(
-            healthy_tooth(wheel),
-            np.asarray(system.pair.wheel_curvature(position)),
-            material,
-            reach="to_centreline",
-        ).total
-        # half of the slices bear: what is theirs counts twice; the wheel's part is not in this
-        # reference
-        extra = own - mate if bending == "by_slice" else own
-        assert_allclose(
-            extra, share if bending == "by_slice" else 0.0, rtol=1e-9, atol=0
-        )
-        result[bending] = (whole + extra)[0] * YOUNG * WIDTH / pitted
-    assert_allclose(result["by_slice"], 1.0, rtol=0.15, atol=0)
-    assert result["whole"] < 0.85
+        curvature = np.array([radius])
+        position = curvature - pair.start_curvature_radius
+        pinion = healthy_tooth(pair.pinion)
+        teeth = [
+            tooth_compliance(tooth, at, material, reach="to_centreline").total
+            for tooth, at in (
+                (pinion, curvature),
+                (
+                    healthy_tooth(pair.wheel),
+                    np.asarray(pair.wheel_curvature(position)),
+                ),
+            )
+        ]
+        of_slices = slice_bending(pair, position, system.material, system.mesh)
+        assert_close(of_slices, share * sum(teeth), 1e-9)
+        # half of the slices bear: what is theirs counts twice
+        whole = structural_terms(pinion, curvature, material, system.mesh)
+        structure = sum(whole.values()) + share * teeth[0]
+        ratio[bending] = structure[0] * YOUNG * WIDTH / pitted
+
+    assert_close(ratio["by_slice"], 1.0, 0.08)
+    assert ratio["whole"] < 0.85

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from closeness import assert_close
 
 from gensig.driveline.linear.damper_tuning import response_at_nodes, tune_dampers
 from gensig.driveline.linear.dampers import TorsionalDamper, with_dampers
@@ -25,13 +25,29 @@ RATIOS = (0.1, 0.3)
 
 def one_disc():
     """A disc on a spring to the ground under one harmonic torque of 1 N m at half the speed."""
-    one, zero = np.eye(1), np.zeros((1, 1))
-    line = LinearLine(mass=one, stiffness=STIFFNESS * one, loss=zero, damping=zero)
-    spring = Elements(directions=one, stiffness=np.array([STIFFNESS]), loss=np.zeros(1))
+    one = np.eye(1)
+    zero = np.zeros((1, 1))
+    line = LinearLine(
+        mass=one,
+        stiffness=STIFFNESS * one,
+        loss=zero,
+        damping=zero,
+    )
+    spring = Elements(
+        directions=one,
+        stiffness=np.array([STIFFNESS]),
+        loss=np.zeros(1),
+    )
     torque = np.cos(2.0 * np.pi * np.arange(64) / 64)[None]
     speeds = 2.0 * np.linspace(0.5, 1.6, 441) + 1e-4
     return response_at_nodes(
-        line, spring, 0, lambda _: torque, speeds, {1: 0}, n_orders=1
+        line,
+        spring,
+        0,
+        lambda _: torque,
+        speeds,
+        {1: 0},
+        n_orders=1,
     )
 
 
@@ -46,14 +62,23 @@ def test_the_tuned_damper_of_one_disc_is_den_hartogs(ratio):
     """
     seen = one_disc()
     (computed,) = tune_dampers(seen, [ratio])
-    assert_allclose(computed.ring_inertia, ratio, rtol=1e-3)  # the larger the better
-    assert_allclose(peak(seen, computed), np.sqrt(1.0 + 2.0 / ratio), rtol=0.02)
-    own = np.sqrt(computed.stiffness / computed.ring_inertia)
-    assert_allclose(own, 1.0 / (1.0 + ratio), rtol=0.01)
-    damping_ratio = computed.damping / (2.0 * computed.ring_inertia * own)
-    assert_allclose(
-        damping_ratio, np.sqrt(3.0 * ratio / (8.0 * (1.0 + ratio))), rtol=0.1
+    assert_close(computed.ring_inertia, ratio, 1e-3)  # the larger the better
+    assert_close(
+        peak(seen, computed),
+        np.sqrt(1.0 + 2.0 / ratio),
+        0.02,
     )
+
+    rate = np.sqrt(computed.stiffness / computed.ring_inertia)
+    assert_close(rate, 1.0 / (1.0 + ratio), 0.005)
+
+    damping_ratio = computed.damping / (2.0 * computed.ring_inertia * rate)
+    assert_close(
+        damping_ratio,
+        np.sqrt(3.0 * ratio / (8.0 * (1.0 + ratio))),
+        0.02,
+    )
+
     other = replace(computed, stiffness=1.2 * computed.stiffness)
     assert peak(seen, other) > 1.1 * peak(seen, computed)
 
@@ -66,11 +91,11 @@ def test_the_viscous_damper_of_one_disc_is_den_hartogs(ratio):
     seen = one_disc()
     (computed,) = tune_dampers(seen, [ratio], viscous=True)
     assert computed.stiffness == 0.0
-    assert_allclose(peak(seen, computed), 1.0 + 2.0 / ratio, rtol=2e-3)
-    assert_allclose(
+    assert_close(peak(seen, computed), 1.0 + 2.0 / ratio, 2e-3)
+    assert_close(
         computed.damping,
         2.0 * ratio / np.sqrt(2.0 * (1.0 + ratio) * (2.0 + ratio)),
-        rtol=0.02,
+        0.02,
     )
 
 
@@ -82,10 +107,19 @@ def chain(*dampers):
     )
     stiffness = (9e3, 2e4, 5e3)
     shafts = tuple(
-        Shaft(first=place, second=place + 1, stiffness=one, loss_factor=0.03)
+        Shaft(
+            first=place,
+            second=place + 1,
+            stiffness=one,
+            loss_factor=0.03,
+        )
         for place, one in enumerate(stiffness)
     )
-    return with_dampers(ShaftLine(nodes=nodes, shafts=shafts), (1, 2, 3, 4), dampers)
+    return with_dampers(
+        ShaftLine(nodes=nodes, shafts=shafts),
+        (1, 2, 3, 4),
+        dampers,
+    )
 
 
 DAMPERS = (
@@ -102,13 +136,23 @@ def test_dampers_on_top_of_a_solution_are_the_line_solved_again():
     speeds = (60.0, 180.0, 400.0)
     bare, _ = closed_line(line_matrices(chain()[0]))
     elements = Elements(
-        directions=SPRING, stiffness=np.array([2e4]), loss=np.array([600.0])
+        directions=SPRING,
+        stiffness=np.array([2e4]),
+        loss=np.array([600.0]),
     )
     seen = response_at_nodes(
-        bare, elements, 0, lambda speed: torque, speeds, {2: 1, 3: 2}, n_orders=20
+        bare,
+        elements,
+        0,
+        lambda speed: torque,
+        speeds,
+        {2: 1, 3: 2},
+        n_orders=20,
     )
     damped, numbers = chain(*DAMPERS)
+
     assert numbers == (1, 2, 3, 4, 5, 6)
+
     whole, _ = closed_line(line_matrices(damped))
     loads = np.vstack([torque, np.zeros((2, 64))])
     longer = Elements(
@@ -120,40 +164,22 @@ def test_dampers_on_top_of_a_solution_are_the_line_solved_again():
         steady_response(whole, loads, speed, n_orders=20).element_forces(longer)[1][0]
         for speed in speeds
     ]
-    assert_allclose(seen.force_with(DAMPERS), again, rtol=1e-9)
+
+    assert_close(seen.force_with(DAMPERS), again, 1e-9)
     assert not np.allclose(seen.force_with(()), again, rtol=1e-2)
 
 
-def test_a_ring_held_hard_or_not_at_all_is_inertia_or_nothing():
-    frequency = np.linspace(10.0, 500.0, 20)
-    locked = TorsionalDamper(node=1, ring_inertia=0.2, damping=0.0, stiffness=1e12)
-    assert_allclose(locked.dynamic_stiffness(frequency), -0.2 * frequency**2, rtol=1e-6)
-    loose = TorsionalDamper(node=1, ring_inertia=0.2, damping=1e-9, stiffness=0.0)
-    assert np.all(
-        np.abs(loose.dynamic_stiffness(frequency)) < 1e-9 * 0.2 * frequency**2
-    )
-
-
-def test_a_damper_only_takes_energy():
-    """The imaginary part of what it adds is positive, and is the loss of its ring's motion against
-    the node.
-    """
-    frequency = np.linspace(5.0, 2000.0, 50)
-    for damper in DAMPERS:
-        assert np.all(damper.dynamic_stiffness(frequency).imag > 0.0)
-
-
 def test_a_ring_that_a_fluid_holds_turns_freely_and_shifts_no_mode():
-    bare, damped = (
-        natural_modes(line_matrices(chain()[0])),
-        natural_modes(line_matrices(chain(DAMPERS[0])[0])),
-    )
+    bare = natural_modes(line_matrices(chain()[0]))
+    damped = natural_modes(line_matrices(chain(DAMPERS[0])[0]))
     assert (bare.n_rigid, damped.n_rigid) == (1, 2)
-    assert_allclose(damped.frequency[2:], bare.frequency[1:], rtol=1e-9)
+    assert_close(damped.frequency[2:], bare.frequency[1:], 1e-9)
     assert np.all(damped.damping_ratio[2:] > bare.damping_ratio[1:])
+
     line, _ = chain(DAMPERS[0])
     assert len(line.parts) == 1  # in the mean the ring turns with its node
-    assert_allclose(line.speed_ratio, 1.0)
+    assert_close(line.speed_ratio, 1.0, 1e-7)
+
     sprung = natural_modes(line_matrices(chain(DAMPERS[1])[0]))
     assert sprung.n_rigid == 1
     assert len(sprung.frequency) == len(bare.frequency) + 1

@@ -6,8 +6,16 @@ import re
 
 import numpy as np
 import pytest
-from engine_cases import RPM, SPEED, TORQUE, option, ratio_of_teeth, ratios, torques_of
-from numpy.testing import assert_allclose
+from closeness import assert_close
+from engine_cases import (
+    RPM,
+    SPEED,
+    TORQUE,
+    option,
+    ratio_of_teeth,
+    ratios,
+    torques_of,
+)
 
 from gensig.driveline.excitation.cycle import CYCLE
 from gensig.driveline.excitation.engine import read_engine, read_wheels
@@ -30,7 +38,13 @@ def changed(path, value):
 
 
 @pytest.mark.parametrize(
-    ("rpm", "torque"), [(650, 0.0), (1200, 3000.0), (1688, 12680.0), (1750, 13600.0)]
+    ("rpm", "torque"),
+    [
+        (650, 0.0),
+        (1200, 3000.0),
+        (1688, 12680.0),
+        (1750, 13600.0),
+    ],
 )
 def test_power_of_the_gas_is_that_of_all_it_drives(rpm, torque):
     computed = torques_of(option(), rpm * RPM, torque)
@@ -41,15 +55,20 @@ def test_power_of_the_gas_is_that_of_all_it_drives(rpm, torque):
     )
     assert computed.brake_torque == torque
     assert computed.indicated_torque > torque + 1000.0
-    assert_allclose(computed.on(NODES)[16].mean(), -torque, atol=1e-9)
+    assert_close(
+        computed.on(NODES)[16].mean(),
+        -torque,
+        atol=1e-9,
+    )
 
 
 def test_reference_point_is_that_of_the_class():
     computed = torques_of(option())
-    assert_allclose(computed.pressure.max() * 1e-6, 17.0, rtol=0.01)
-    assert_allclose(
-        computed.indicated_torque / 20, 697.0, rtol=0.02
+    assert_close(computed.pressure.max() * 1e-6, 17.0, 0.01)
+    assert_close(
+        computed.indicated_torque / 20, 697.0, 0.02
     )  # the independent estimate with the same sizes
+
     consumption = (
         computed.fuel_volume * 840 * 20 / CYCLE * SPEED / (TORQUE * SPEED)
     )  # kg/J
@@ -65,14 +84,29 @@ def test_harmonics_of_one_cylinder_are_as_estimated_independently():
         "throw_angles_deg": [0],
         "firing_order": ["A1"],
     }
-    values["throw_nodes"], values["valve_nodes"] = [13], {"A": []}
+    values["throw_nodes"] = [13]
+    values["valve_nodes"] = {"A": []}
     values["reference"]["torque_nm"] = TORQUE / 20
     values["loads"] = None
     computed = torques_of(values, torque=TORQUE / 20)
     mean, amplitude = cycle_orders(computed.on(NODES)[12], 20)
-    estimated = [2.33, 3.44, 2.89, 2.70, 2.22, 1.86, 1.56, 1.27, 1.01, 0.81, 0.65, 0.53]
+    estimated = [
+        2.33,
+        3.44,
+        2.89,
+        2.70,
+        2.22,
+        1.86,
+        1.56,
+        1.27,
+        1.01,
+        0.81,
+        0.65,
+        0.53,
+    ]
     gas = computed.indicated_torque
-    assert_allclose(np.abs(amplitude[:12]) / gas, estimated, rtol=0.08)
+
+    assert_close(np.abs(amplitude[:12]) / gas, estimated, 0.08)
     assert (
         0.05 < abs(amplitude[19]) / gas < 0.15
     )  # 0.08 estimated: the steepness of combustion decides it
@@ -84,6 +118,7 @@ def test_even_firing_leaves_only_multiples_of_the_tenth_order_of_all_cylinders()
     _, together = cycle_orders(throws.sum(axis=0), 80)
     _, alone = cycle_orders(throws[0], 80)
     others = np.arange(1, 81) % 20 != 0
+
     assert np.abs(together[others]).max() < 1e-6 * np.abs(together).max()
     assert np.abs(together[19]) > 100.0
     assert np.abs(alone[others]).max() > 1000.0  # of one throw all half orders
@@ -94,45 +129,50 @@ def test_uneven_firing_has_other_orders():
     values["layout"]["bank_angles_deg"] = [0, 90]
     throws = torques_of(values).on(NODES)[list(THROWS)]
     _, together = cycle_orders(throws.sum(axis=0), 80)
+
     assert (
         np.abs(together[4]) > 1000.0
     )  # order 2.5: the bank's own, no longer cancelled
 
 
 def test_pump_pulses_follow_the_firing_and_the_load():
-    full, half = torques_of(option()), torques_of(option(), torque=0.5 * TORQUE)
-    pump = full.on(NODES)[45:65]
-    _, together = cycle_orders(pump.sum(axis=0), 80)
-    others = np.arange(1, 81) % 20 != 0
-    assert np.abs(together[others]).max() < 1e-6 * np.abs(together).max()
-    assert (
-        pump.sum(axis=0).mean() < 1.5 * half.on(NODES)[45:65].sum(axis=0).mean() < 0.0
+    full, half = (
+        torques_of(option(), torque=share * TORQUE).on(NODES)[45:65].sum(axis=0)
+        for share in (1.0, 0.5)
     )
+    _, orders = cycle_orders(full, 80)
+    others = np.arange(1, 81) % 20 != 0
+
+    assert np.abs(orders[others]).max() < 1e-6 * np.abs(orders).max()
+    assert full.mean() < 1.5 * half.mean() < 0.0
 
 
 def test_quadratic_loads_follow_the_speed_and_constant_ones_do_not():
     slow, fast = (
-        torques_of(option(), 800 * RPM, 0.0).on(NODES),
-        torques_of(option(), 1600 * RPM, 0.0).on(NODES),
+        torques_of(option(), rpm * RPM, 0.0).on(NODES).mean(axis=1)
+        for rpm in (800, 1600)
     )
-    assert_allclose(fast[42].mean(), 4.0 * slow[42].mean(), rtol=1e-12)
-    assert_allclose(fast[66].mean(), slow[66].mean(), rtol=1e-12)
+    assert_close(fast[42], 4.0 * slow[42], 1e-12)
+    assert_close(fast[66], slow[66], 1e-12)
 
 
 def test_a_disturbance_of_the_dynamometer_is_given_apart():
     values = changed("dynamometer.disturbance_share", 0.05)
     computed = torques_of(values)
     assert computed.disturbance_node == 17
-    assert_allclose(computed.disturbance_torque, 0.05 * TORQUE)
-    assert_allclose(computed.disturbance_frequency, 5.0)
-    assert_allclose(computed.on(NODES), torques_of(option()).on(NODES), rtol=0)
+    assert_close(computed.disturbance_torque, 0.05 * TORQUE, 1e-7)
+    assert_close(computed.disturbance_frequency, 5.0, 1e-7)
+    assert_close(computed.on(NODES), torques_of(option()).on(NODES))
 
 
 def pressure_file(folder, scale=1.0):
     computed = torques_of(option())
     path = folder / "measured.csv"
     table = np.column_stack(
-        [np.degrees(computed.angle), scale * computed.pressure * 1e-6]
+        [
+            np.degrees(computed.angle),
+            scale * computed.pressure * 1e-6,
+        ]
     )
     header = "crank_angle_deg,pressure_mpa"
     np.savetxt(path, table, delimiter=",", header=header, comments="")
@@ -142,8 +182,8 @@ def pressure_file(folder, scale=1.0):
 def test_a_measured_pressure_gives_the_torque_back(tmp_path):
     values, burned = pressure_file(tmp_path)
     computed = torques_of(values, torque=None)
-    assert_allclose(computed.brake_torque, TORQUE, rtol=1e-4)
-    assert_allclose(computed.on(NODES), burned.on(NODES), rtol=0, atol=1.0)
+    assert_close(computed.brake_torque, TORQUE, 1e-4)
+    assert_close(computed.on(NODES), burned.on(NODES), atol=1.0)
 
 
 def test_torques_that_contradict_the_pressure_are_refused(tmp_path):
@@ -153,11 +193,31 @@ def test_torques_that_contradict_the_pressure_are_refused(tmp_path):
     idle = changed("friction_mean_pressure_mpa", 0.0)
     idle.update(loads=None, injection_pump=None, valves=None)
     for values, torque, message in (
-        (weak, None, r"gives 281 N m, below the .* N m of friction and drives"),
-        (measured, 100.0, "which decides it; leave the torque out"),
-        (option(), None, "a Wiebe cycle needs the brake torque"),
-        (option(), -10.0, r"the brake torque -10 N m is below the friction"),
-        (idle, 0.0, r"the torque of the gas, 0 N m with .* drives, is below the 2.4"),
+        (
+            weak,
+            None,
+            r"gives 281 N m, below the .* N m of friction and drives",
+        ),
+        (
+            measured,
+            100.0,
+            "which decides it; leave the torque out",
+        ),
+        (
+            option(),
+            None,
+            "a Wiebe cycle needs the brake torque",
+        ),
+        (
+            option(),
+            -10.0,
+            r"the brake torque -10 N m is below the friction",
+        ),
+        (
+            idle,
+            0.0,
+            r"the torque of the gas, 0 N m with .* drives, is below the 2.4",
+        ),
     ):
         with pytest.raises(ConfigError, match=message):
             torques_of(values, torque=torque)
@@ -186,13 +246,21 @@ def test_torques_that_contradict_the_pressure_are_refused(tmp_path):
             [1.5],
             "excitation.throw_nodes = [1.5] is not a list of whole numbers",
         ),
-        ("valve_nodes.A", [1, 2], "excitation.valve_nodes.A has 2 nodes for 10 throws"),
+        (
+            "valve_nodes.A",
+            [1, 2],
+            "excitation.valve_nodes.A has 2 nodes for 10 throws",
+        ),
         (
             "valve_nodes.A",
             [67] * 10,
             "node 67 turns 1.475 times as fast as the crank; it needs 0.5",
         ),
-        ("valve_nodes.C", [], "excitation.valve_nodes: no bank 'C'; there are A, B"),
+        (
+            "valve_nodes.C",
+            [],
+            "excitation.valve_nodes: no bank 'C'; there are A, B",
+        ),
         (
             "valves.intake.cam.lift_mm",
             0,
@@ -273,14 +341,26 @@ def test_torques_that_contradict_the_pressure_are_refused(tmp_path):
             "much",
             "excitation.friction_mean_pressure_mpa = 'much' is not a number",
         ),
-        ("pressure.file", 3, "excitation.pressure.file = 3 is not text"),
-        ("pressure.kind", "otto", "excitation.pressure: unknown key 'kind'"),
+        (
+            "pressure.file",
+            3,
+            "excitation.pressure.file = 3 is not text",
+        ),
+        (
+            "pressure.kind",
+            "otto",
+            "excitation.pressure: unknown key 'kind'",
+        ),
         (
             "pressure.boost_pressure",
             1,
             "'boost_pressure' has the wrong unit; write it as 'boost_pressure_mpa'",
         ),
-        ("kind", "motor", "excitation.kind = 'motor'; allowed: engine"),
+        (
+            "kind",
+            "motor",
+            "excitation.kind = 'motor'; allowed: engine",
+        ),
         ("sound", 1, "excitation: unknown key 'sound'"),
         (
             "cylinder.bore_mm",
@@ -294,7 +374,7 @@ def test_torques_that_contradict_the_pressure_are_refused(tmp_path):
         ),
     ],
 )
-def test_what_makes_no_engine_is_refused_in_one_line(path, value, message):
+def test_impossible_engines_are_refused_in_one_line(path, value, message):
     with pytest.raises(ConfigError, match=re.escape(message)) as caught:
         torques_of(changed(path, value))
     assert "\n" not in str(caught.value)
@@ -305,6 +385,7 @@ def test_toothed_wheels_are_read_by_name():
     nodes = {name: wheel.node for name, wheel in wheels.items()}
     assert nodes == {"flywheel": 14, "pump_end": 45}
     assert read_wheels(option(toothed_wheels=None)) == {}
+
     without_node = option()
     del without_node["toothed_wheels"]["flywheel"]["node"]
     for values, message in (
@@ -324,7 +405,10 @@ def test_missing_keys_are_named():
     del values["loads"]
     with pytest.raises(ConfigError, match="excitation: missing loads"):
         read_engine(values)
-    with pytest.raises(ConfigError, match="excitation = 3 must be a group of keys"):
+    with pytest.raises(
+        ConfigError,
+        match="excitation = 3 must be a group of keys",
+    ):
         read_engine(3)
 
 
@@ -336,4 +420,5 @@ def test_finer_cycles_give_the_same_torques():
     )
     _, one = cycle_orders(coarse.on(NODES), 40)
     _, other = cycle_orders(fine.on(NODES), 40)
+
     assert np.max(np.abs(one - other)) < 2e-3 * np.max(np.abs(other))

@@ -7,17 +7,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from closeness import assert_close
 from engine_cases import (
     RPM,
     SPEED,
     engine_line,
     option,
-    ratio_of_teeth,
     ratios,
     response_of,
     torques_of,
 )
-from numpy.testing import assert_allclose
 
 from gensig.driveline.excitation.cycle import cycle_angles
 from gensig.driveline.linear.forced import (
@@ -42,7 +41,9 @@ def chain(loss_factor=0.0, damping=0.0, grounded=True):
     directions = np.array([[1.0, 0, 0], [1, -1, 0], [0, 1, -1]])[used]
     stiffness = np.array([3e4, 2e4, 1e4])[used]
     springs = Elements(
-        directions=directions, stiffness=stiffness, loss=loss_factor * stiffness
+        directions=directions,
+        stiffness=stiffness,
+        loss=loss_factor * stiffness,
     )
     line = LinearLine(
         mass=np.diag([0.5, 0.3, 0.2]),
@@ -62,14 +63,15 @@ def cycle_torque(seed=0, n_orders=12, n_dofs=3):
 def test_orders_of_a_torque_give_it_back():
     torque, amplitudes = cycle_torque()
     mean, computed = cycle_orders(torque + 3.0, 12)
-    assert_allclose(mean, 3.0, rtol=1e-12)
-    assert_allclose(computed, amplitudes, rtol=1e-9)
+    assert_close(mean, 3.0, 1e-12)
+    assert_close(computed, amplitudes, 1e-9)
+
     angle = cycle_angles(N)
     by_hand = sum(
         np.real(c * np.exp(0.5j * k * angle))
         for k, c in enumerate(amplitudes[0], start=1)
     )
-    assert_allclose(torque[0], by_hand, atol=1e-9)
+    assert_close(torque[0], by_hand, atol=1e-9)
 
 
 @pytest.mark.parametrize("damper", ["as_printed", "half_ring"])
@@ -78,13 +80,15 @@ def test_response_here_to_a_torque_there_is_that_there_to_one_here(damper):
     frequencies = 2 * np.pi * np.array([14.0, 28.3, 162.0, 563.0])
     receptance = np.linalg.inv(line.dynamic_stiffness(frequencies))
     scale = np.abs(receptance).max(axis=(1, 2), keepdims=True)
+
     assert np.max(np.abs(receptance - np.swapaxes(receptance, 1, 2)) / scale) < 1e-9
+
     force = np.zeros((4, 67), dtype=complex)
     force[:, 13] = 1.0
-    assert_allclose(
+    assert_close(
         line.response(force, frequencies),
         receptance[:, :, 13],
-        rtol=1e-6,
+        1e-6,
         atol=1e-9 * scale.max(),
     )
 
@@ -98,7 +102,12 @@ def test_one_disc_on_a_shaft_is_the_closed_form():
     )
     w = np.array([5.0, 20.0, 70.0])
     computed = one.response(np.ones((3, 1), dtype=complex), w)[:, 0]
-    assert_allclose(computed, 1.0 / (800 + 40j + 3j * w - 2 * w**2), rtol=1e-12)
+
+    assert_close(
+        computed,
+        1.0 / (800 + 40j + 3j * w - 2 * w**2),
+        1e-12,
+    )
 
 
 def test_mean_power_in_is_what_the_damping_takes():
@@ -110,52 +119,40 @@ def test_mean_power_in_is_what_the_damping_takes():
     w = speed * computed.orders
     lost = line.loss[..., None] * w + line.damping[..., None] * w**2
     power_lost = 0.5 * np.real(
-        np.einsum("io,ijo,jo->", np.conj(computed.angle), lost, computed.angle)
+        np.einsum(
+            "io,ijo,jo->",
+            np.conj(computed.angle),
+            lost,
+            computed.angle,
+        )
     )
+
     assert power_in > 0.0
-    assert_allclose(power_in, power_lost, rtol=1e-9)
-
-
-def test_integration_in_time_stays_on_the_steady_response():
-    from scipy.integrate import solve_ivp
-
-    line, _ = chain(damping=4e-4)
-    torque, amplitudes = cycle_torque()
-    speed = 100.0
-    steady = steady_response(line, torque, speed, n_orders=12)
-    rates = 1j * steady.orders * speed
-    inverse = np.linalg.inv(line.mass)
-
-    def slope(t, state):
-        force = np.real(amplitudes @ np.exp(rates * t))
-        rest = force - line.stiffness @ state[:3] - line.damping @ state[3:]
-        return np.concatenate([state[3:], inverse @ rest])
-
-    cycle = 4 * np.pi / speed
-    times = np.arange(64) * cycle / 64
-    start = np.real([steady.angle.sum(axis=1), steady.speed_deviation.sum(axis=1)])
-    run = solve_ivp(
-        slope, (0.0, cycle), start.ravel(), t_eval=times, rtol=1e-8, atol=1e-11
-    )
-    speeds = steady.speed_over_cycle(64)
-    assert_allclose(run.y[3:], speeds, rtol=0, atol=1e-5 * np.ptp(speeds))
+    assert_close(power_in, power_lost, 1e-9)
 
 
 def test_slow_torques_bend_the_line_statically_and_fast_ones_move_the_masses():
     line, springs = chain()
     torque, amplitudes = cycle_torque(n_orders=2)
     slow = steady_response(line, torque, 1e-3, n_orders=2)
-    assert_allclose(slow.angle, np.linalg.solve(line.stiffness, amplitudes), rtol=1e-6)
+
+    assert_close(
+        slow.angle,
+        np.linalg.solve(line.stiffness, amplitudes),
+        1e-6,
+    )
+
     fast = steady_response(line, torque, 1e6, n_orders=2)
-    assert_allclose(
+    assert_close(
         fast.angle,
         -np.linalg.solve(line.mass, amplitudes) / np.square(1e6 * fast.orders),
-        rtol=1e-4,
+        1e-4,
     )
+
     mean, carried = slow.element_forces(springs)
-    assert_allclose(mean, 0.0, atol=1e-9)
-    assert_allclose(
-        carried[2], -amplitudes[2], rtol=1e-4
+    assert_close(mean, 0.0, atol=1e-9)
+    assert_close(
+        carried[2], -amplitudes[2], 1e-4
     )  # the last shaft carries what acts on the last disc
 
 
@@ -166,8 +163,10 @@ def test_mean_torques_are_carried_through_and_must_balance():
     torque[2] -= 50.0
     computed = steady_response(line, torque, 60.0, n_orders=12)
     mean, _ = computed.element_forces(springs)
-    assert_allclose(mean, [50.0, 50.0], rtol=1e-9)
+
+    assert_close(mean, [50.0, 50.0], 1e-9)
     assert abs(np.sum(np.diag(line.mass) * computed.twist)) < 1e-12
+
     torque[2] += 1.0
     with pytest.raises(
         SimulationError,
@@ -176,21 +175,15 @@ def test_mean_torques_are_carried_through_and_must_balance():
         steady_response(line, torque, 60.0, n_orders=12)
 
 
-def test_a_free_line_turns_as_one_under_slow_torques():
-    line, elements, _ = engine_line()
-    ratio = np.array(list(ratio_of_teeth().values()))
-    assert_allclose(elements.directions @ ratio, 0.0, atol=1e-12)
-    force = np.zeros((1, 67), dtype=complex)
-    force[0, 7] = 1.0
-    moved = line.response(force, np.array([0.3]))[0]
-    assert_allclose(moved / moved[0], ratio, rtol=1e-3)
-
-
 def test_fluctuation_is_half_the_peak_to_peak():
     computed = response_of(option())
     speeds = computed.speed_over_cycle(28_800)
-    assert_allclose(computed.fluctuation(), 0.5 * np.ptp(speeds, axis=1), rtol=2e-3)
-    assert_allclose(speeds.mean(axis=1), 0.0, atol=1e-9)
+    assert_close(
+        computed.fluctuation(),
+        0.5 * np.ptp(speeds, axis=1),
+        2e-3,
+    )
+    assert_close(speeds.mean(axis=1), 0.0, atol=1e-9)
 
 
 def test_more_orders_than_usual_change_little():
@@ -200,8 +193,17 @@ def test_more_orders_than_usual_change_little():
         steady_response(line, torque, SPEED, n_orders=n).fluctuation()
         for n in (60, 200, 400)
     )
-    assert_allclose(few[[2, 13]], many[[2, 13]], rtol=0.02)
-    assert_allclose(usual[[2, 13, 44, 64]], many[[2, 13, 44, 64]], rtol=0.03)
+
+    assert_close(
+        few[[2, 13]],
+        many[[2, 13]],
+        0.01,
+    )
+    assert_close(
+        usual[[2, 13, 44, 64]],
+        many[[2, 13, 44, 64]],
+        0.005,
+    )
 
 
 def test_waterfall_lines_rise_with_the_speed_and_resonate_at_the_modes():
@@ -211,30 +213,42 @@ def test_waterfall_lines_rise_with_the_speed_and_resonate_at_the_modes():
     def torques(speed):
         return torques_of(option(), speed, 0.0).on(NODES)
 
-    flywheel, pump_gear = run_of_speeds(line, torques, speeds, [13, 44], n_orders=60)
+    flywheel, pump_gear = run_of_speeds(
+        line,
+        torques,
+        speeds,
+        [13, 44],
+        n_orders=60,
+    )
+
     assert flywheel.angle.shape == (len(speeds), 60)
+
     fifth = flywheel.angle[:, 9]  # order 5 meets the second mode, 68.7 Hz, at 825 r/min
     assert abs(speeds[np.argmax(fifth)] / RPM - 825.0) <= 50.0
     assert fifth.max() > 3.0 * fifth[0]
+
     frequencies = np.arange(0.0, 400.0, 0.5)
     spectra = pump_gear.spectra(frequencies)
     assert spectra.shape == (len(speeds), len(frequencies))
+
     for row, speed in zip(spectra, speeds, strict=True):
         bins = np.rint(np.arange(1, 61) * 0.5 * speed / (2 * np.pi) / 0.5).astype(int)
         assert set(np.flatnonzero(row)) <= set(bins)
     at_once = response_of(option(), speed=speeds[3], torque=0.0)
-    assert_allclose(flywheel.fluctuation[3], at_once.fluctuation()[13], rtol=0.02)
+    assert_close(flywheel.fluctuation[3], at_once.fluctuation()[13], 5e-4)
 
 
 def test_a_disturbance_at_5_hz_moves_the_flywheel_more_than_its_own_turns():
     line, _, _ = engine_line()
     moved = disturbance_response(line, 16, 0.05 * 12680.0, 2 * np.pi * 5.0)
     turning = response_of(option())
+
     assert (
         np.abs(moved[13]) > np.abs(turning.angle[13]).max()
     )  # as the paper's figure 12 has it
+
     doubled = disturbance_response(line, 16, 0.10 * 12680.0, 2 * np.pi * 5.0)
-    assert_allclose(doubled, 2.0 * moved, rtol=1e-12)
+    assert_close(doubled, 2.0 * moved, 1e-12)
 
 
 def test_meshes_given_apart_are_springs_of_the_line():
@@ -253,8 +267,9 @@ def test_meshes_given_apart_are_springs_of_the_line():
     )
     line, meshes = closed_line(apart)
     for name in ("mass", "damping", "stiffness", "loss"):
-        assert_allclose(getattr(line, name), getattr(whole, name), atol=1e-9)
-    assert_allclose(meshes.loss, [500.0])
+        assert_close(getattr(line, name), getattr(whole, name), atol=1e-9)
+
+    assert_close(meshes.loss, [500.0], 1e-7)
 
 
 def test_matrices_and_orders_that_make_no_line_are_refused():
@@ -262,21 +277,35 @@ def test_matrices_and_orders_that_make_no_line_are_refused():
     skew = line.stiffness + np.eye(3, k=1)
     torque = np.zeros((3, 64))
     for refused, message in (
-        (lambda: replace(line, stiffness=skew), "stiffness must be symmetric"),
+        (
+            lambda: replace(line, stiffness=skew),
+            "stiffness must be symmetric",
+        ),
         (
             lambda: replace(line, loss=np.zeros((2, 2))),
             r"loss \(2, 2\) must be a finite matrix \(3, 3\)",
         ),
-        (lambda: cycle_orders(torque, 40), r"n_orders = 40 must lie in 1\.\.31"),
+        (
+            lambda: cycle_orders(torque, 40),
+            r"n_orders = 40 must lie in 1\.\.31",
+        ),
         (
             lambda: over_cycle(np.zeros((3, 12), dtype=complex), 24),
             "24 points of a cycle cannot hold 12 orders",
         ),
-        (lambda: steady_response(line, torque, 0.0, n_orders=4), "must be positive"),
+        (
+            lambda: steady_response(line, torque, 0.0, n_orders=4),
+            "must be positive",
+        ),
     ):
         with pytest.raises(ValueError, match=message):
             refused()
-    one, zero = np.eye(1), np.zeros((1, 1))
+    one = np.eye(1)
+    zero = np.zeros((1, 1))
     undamped = LinearLine(mass=one, stiffness=one, loss=zero, damping=zero)
-    with pytest.raises(SimulationError, match="excited at its natural frequency"):
+
+    with pytest.raises(
+        SimulationError,
+        match="excited at its natural frequency",
+    ):
         undamped.response(np.ones((1, 1), dtype=complex), np.array([1.0]))

@@ -6,28 +6,33 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-import pytest
-from numpy.testing import assert_allclose
+from closeness import assert_close
+from engine_cases import SPEED, TORQUE
 
 from gensig.driveline.engine_line import read_engine_line
-from gensig.driveline.running import EngineCourse, Governor, running_line, steady_course
+from gensig.driveline.running import Governor, running_line, steady_course
 from gensig.driveline.time.newmark import LineSolver
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
 from gensig.sensing.manufacturing import nominal_gearbox
-from gensig.systems.run import Run, Start
+from gensig.systems.run import Run
 
-RPM = np.pi / 30.0
-SPEED, TORQUE = 1688.0 * RPM, 12680.0
 GOVERNOR = Governor(frequency=1.0, damping_ratio=0.7)
-SOLVER = LineSolver(sampling_rate=10240.0, oversampling=10, max_energy_residual=1e-3)
+SOLVER = LineSolver(
+    sampling_rate=10240.0,
+    oversampling=10,
+    max_energy_residual=1e-3,
+)
 ENGINE = ("system=engine_gear_train", "excitation=engine_v20")
 RECORDS = (
     "experiment=engine_broken_tooth",
     "operating.duration_s=0.08",
     "sensing.snr_db=null",
 )
-CLOSED = ("system.backlash_um=0", "system.loss_factor.gear_mesh=0")
+CLOSED = (
+    "system.backlash_um=0",
+    "system.loss_factor.gear_mesh=0",
+)
 
 
 @lru_cache(maxsize=4)
@@ -41,7 +46,12 @@ def machine(*words):
 
 def deviations(line, nodes, settling, duration=0.15):
     channels = [("speed", line.dof(node)) for node in nodes]
-    motion = line.run(SOLVER, duration=duration, channels=channels, settling=settling)
+    motion = line.run(
+        SOLVER,
+        duration=duration,
+        channels=channels,
+        settling=settling,
+    )
     at = line.linear.orders * (line.turned + motion.nominal_angle[:, None])
     linear = [
         np.real(np.exp(1j * at) @ line.linear.speed_deviation[dof])
@@ -61,7 +71,10 @@ def test_without_play_it_is_the_linear_line():
     From the first sample on: it starts in the linear vibration, so that little has to settle.
     """
     whole = running_line(
-        engine(*CLOSED), steady_course(SPEED, TORQUE), governor=GOVERNOR, turned=2.0
+        engine(*CLOSED),
+        steady_course(SPEED, TORQUE),
+        governor=GOVERNOR,
+        turned=2.0,
     )
     for share, most in ((1.0, 0.15), (0.01, 0.003)):
         torques = tuple(replace(one, table=share * one.table) for one in whole.torques)
@@ -71,56 +84,40 @@ def test_without_play_it_is_the_linear_line():
             twist=share * whole.linear.twist,
         )
         line = replace(whole, torques=torques, linear=linear)
-        _, computed, exact = deviations(line, (14, 17, 13), settling=0.0)
+        _, computed, exact = deviations(
+            line,
+            (14, 17, 13),
+            settling=0.0,
+        )
         for one, other in zip(computed, exact, strict=True):
             assert np.std(one - one.mean() - other) < most * np.std(other)
 
 
 def test_with_play_its_teeth_part_and_its_energies_balance():
-    line = running_line(engine(), steady_course(SPEED, TORQUE), governor=GOVERNOR)
+    line = running_line(
+        engine(),
+        steady_course(SPEED, TORQUE),
+        governor=GOVERNOR,
+    )
     motion, computed, linear = deviations(line, (14, 45), settling=0.3)
     drive = line.machine.mesh_names.index("21/45")
+
     assert motion.contact_loss[drive] > 0.1
     assert motion.energy_residual < 1e-3
-    assert np.std(computed[0]) == pytest.approx(
-        np.std(linear[0]), rel=0.1
+    assert_close(
+        np.std(computed[0]), np.std(linear[0]), 2e-3
     )  # the flywheel hardly feels the gears
     assert np.std(computed[1]) > 1.3 * np.std(
         linear[1]
     )  # a pump gear that is let go does
 
 
-def test_the_crank_turns_by_the_pitch_of_the_camshaft_to_the_next_tooth():
-    record = machine()
-    angles = [
-        record.crank_angle(Start(tooth_pinion=tooth, tooth_wheel=0, phase=0.0))
-        for tooth in (4, 5)
-    ]
-    assert_allclose(np.diff(angles) % (4 * np.pi), 4 * np.pi / 54, rtol=1e-9)
-
-
-def test_a_run_up_follows_its_course_and_drives_its_own_inertia():
-    time = np.arange(-0.6, 0.5, 5e-3)
-    course = EngineCourse(
-        time=time, speed=SPEED * (0.8 + 0.2 * time), torque=np.full(len(time), 3000.0)
-    )
-    line = running_line(engine(), course, governor=GOVERNOR)
-    motion = line.run(
-        SOLVER, duration=0.2, channels=[("angle", line.dof(17))], settling=0.3
-    )
-    assert_allclose(
-        np.gradient(motion.nominal_speed, 1 / 10240.0), 0.2 * SPEED, rtol=1e-6
-    )
-    # the governor, 1 Hz soft, would lag by a / omega^2 = 0.9 rad if nothing else sped the line up
-    assert np.abs(motion.signals["angle", line.dof(17)]).max() < 0.1
-
-
 def test_a_record_is_repeatable_and_turns_with_the_gear_ratio():
     """The driving gear's shaft has half the crank's speed."""
     record = machine()
     computed = record.simulate()
-    assert record.operating.speed == pytest.approx(0.5 * SPEED)
-    assert computed.mean_speed == pytest.approx(0.5 * SPEED, rel=0.02)
+    assert_close(record.operating.speed, 0.5 * SPEED, 1e-6)
+    assert_close(computed.mean_speed, 0.5 * SPEED, 1e-4)
     assert np.all(np.diff(computed.shaft_angle) > 0.0)
     assert computed.integration_check == "energy"
     assert computed.integration_error < 1e-3
@@ -130,27 +127,36 @@ def test_a_record_is_repeatable_and_turns_with_the_gear_ratio():
 def test_a_fine_wheel_without_errors_shows_the_shaft():
     words = [
         f"excitation.toothed_wheels.flywheel.{key}"
-        for key in ("eccentricity_error_deg=0", "tooth_error_deg=0")
+        for key in (
+            "eccentricity_error_deg=0",
+            "tooth_error_deg=0",
+        )
     ]
     record = machine(*words, "sensing.channels=[flywheel_speed]")
     line = record.line(Run(system=record, faults=()))
     motion = line.run(
-        SOLVER, duration=0.08, channels=[("speed", line.dof(14))], settling=0.3
+        SOLVER,
+        duration=0.08,
+        channels=[("speed", line.dof(14))],
+        settling=0.3,
     )
-    seen, exact = (
-        record.simulate().acceleration[0],
-        motion.signals["speed", line.dof(14)],
-    )
+    seen = record.simulate().acceleration[0]
+    exact = motion.signals["speed", line.dof(14)]
     inner = slice(20, -20)
+
     assert np.std(seen[inner] - exact[inner]) < 0.1 * np.std(exact)
 
 
 def test_supports_of_a_gearbox_reach_the_lateral_line():
-    record = machine("system.lateral=true", "sensing.channels=[wheel_x, wheel_y]")
+    record = machine(
+        "system.lateral=true",
+        "sensing.channels=[wheel_x, wheel_y]",
+    )
     run = Run(system=record, faults=())
     nominal = record.line(run)
     stiffer = replace(
-        nominal_gearbox(2), stiffness_factor=np.array([1.0, 1.0, 2.0, 1.0])
+        nominal_gearbox(2),
+        stiffness_factor=np.array([1.0, 1.0, 2.0, 1.0]),
     )
     scattered = record.line(replace(run, gearbox=stiffer))
     name = record.engine.drive.line.gears[
@@ -158,4 +164,5 @@ def test_supports_of_a_gearbox_reach_the_lateral_line():
     ].name
     at = nominal.matrices.names.index(f"{name} x")
     ratio = scattered.matrices.stiffness[at, at] / nominal.matrices.stiffness[at, at]
-    assert ratio == pytest.approx(2.0)
+
+    assert_close(ratio, 2.0, 1e-6)

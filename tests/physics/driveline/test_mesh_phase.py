@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from closeness import assert_close
 
 from gensig.driveline.drive_line import read_drive_line
 from gensig.driveline.mesh_phase import start_rolls, tooth_angles
@@ -40,7 +40,10 @@ def train(config, tmp_path):
             f"{place + 1},{z},2,20,0,20,{x}"
             for place, (z, x) in enumerate(zip(teeth, shifts, strict=True))
         ]
-        for name, lines in (("line.csv", rows), ("gears.csv", gears)):
+        for name, lines in (
+            ("line.csv", rows),
+            ("gears.csv", gears),
+        ):
             (tmp_path / name).write_text("\n".join(lines), encoding="utf-8")
         files = {
             "shafting_csv": str(tmp_path / "line.csv"),
@@ -58,10 +61,12 @@ def misfit(line, turned=0.0):
     The driving flank stands rho_1 from its tangent point, the driven one rho_2 from its own;
     they touch where both add up to the distance of the tangent points, less whole pitches.
     """
-    angles, computed = tooth_angles(line, turned), []
+    angles = tooth_angles(line, turned)
+    computed = []
     for mesh, pair in zip(line.line.meshes, line.pairs, strict=True):
         sense = math.copysign(
-            1.0, line.line.speed_ratio[line.line.gears[mesh.driving].node]
+            1.0,
+            line.line.speed_ratio[line.line.gears[mesh.driving].node],
         )
         tilt = sense * pair.working_pressure_angle
         one = (
@@ -86,7 +91,11 @@ def from_whole(value):
 TRAINS = [
     ((20, 33), (0.0,), None),
     ((21, 34, 27), (15.0, -70.0), None),
-    ((20, 33, 24, 41), (200.0, 95.0, 10.0), (0.3, 0.1, -0.05, 0.2)),
+    (
+        (20, 33, 24, 41),
+        (200.0, 95.0, 10.0),
+        (0.3, 0.1, -0.05, 0.2),
+    ),
 ]
 
 
@@ -97,14 +106,24 @@ def test_flanks_touch_in_every_mesh(
     train, teeth, center_lines, shifts, driven_first, turned
 ):
     gaps = misfit(train(teeth, center_lines, shifts, driven_first), turned)
-    assert_allclose(from_whole(gaps), 0.0, atol=1e-9)
+    assert_close(from_whole(gaps), 0.0, atol=1e-9)
     assert np.all(from_whole(gaps + 0.01) > 0.005)
 
 
 def test_the_engine_touches_everywhere_too():
     line = read_drive_line(read_request(["system=engine_gear_train"]).config)
-    assert_allclose(from_whole(misfit(line, 1.0)), 0.0, atol=1e-9)
-    assert len(set(np.round(start_rolls(line) / line.pairs[0].base_pitch, 3))) > 4
+    assert_close(from_whole(misfit(line, 1.0)), 0.0, atol=1e-9)
+    assert (
+        len(
+            set(
+                np.round(
+                    start_rolls(line) / line.pairs[0].base_pitch,
+                    3,
+                )
+            )
+        )
+        > 4
+    )
 
 
 @pytest.mark.parametrize(("z", "expected"), [(33, 0.0), (34, 0.5), (35, 0.0)])
@@ -116,14 +135,19 @@ def test_an_idler_between_two_gears_in_line(train, z, expected):
     pitch = line.pairs[0].base_pitch
     pitch_points = np.array([pair.pitch_point for pair in line.pairs])
     past = (start_rolls(line) - pitch_points) / pitch
-    assert_allclose(from_whole(past[1] - past[0] - expected), 0.0, atol=1e-9)
+    assert_close(
+        from_whole(past[1] - past[0] - expected),
+        0.0,
+        atol=1e-9,
+    )
 
 
 def test_rolls_advance_as_the_meshing_frequencies_say(train):
     line = train(*TRAINS[2])
     pitch = np.array([pair.base_pitch for pair in line.pairs])
     gone = (start_rolls(line, 0.1) - start_rolls(line)) / pitch
-    assert_allclose(
+
+    assert_close(
         from_whole(gone - 0.1 / (2.0 * math.pi) * np.array(line.mesh_orders)),
         0.0,
         atol=1e-9,
@@ -135,7 +159,11 @@ def test_rolls_advance_as_the_meshing_frequencies_say(train):
 def test_gears_on_one_shaft_have_a_tooth_at_one_angle():
     line = read_drive_line(read_request(["system=two_stage_gearbox"]).config)
     angles = dict(
-        zip((gear.name for gear in line.line.gears), tooth_angles(line), strict=True)
+        zip(
+            (gear.name for gear in line.line.gears),
+            tooth_angles(line),
+            strict=True,
+        )
     )
     assert angles["Input pinion"] == 0.0
     assert angles["Idler gear 1"] == angles["Idler gear 2"]

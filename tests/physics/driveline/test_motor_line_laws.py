@@ -7,11 +7,9 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from closeness import assert_close
 
 from gensig.driveline.engine_line import read_engine_line
-from gensig.driveline.mesh_phase import start_rolls
-from gensig.driveline.running import Governor, running_line, steady_course
 from gensig.driveline.time.newmark import LineSolver, integrate_line
 from gensig.errors import StepError
 from gensig.faults.registry import read_faults
@@ -20,13 +18,27 @@ from gensig.record.machines import read_machine
 from gensig.systems.run import Run, Start
 
 RPM = np.pi / 30.0
-SPEED, TORQUE = 1746.0 * RPM, 60.0
-GOVERNOR = Governor(frequency=1.0, damping_ratio=0.7)
-SOLVER = LineSolver(sampling_rate=10240.0, oversampling=12, max_energy_residual=1e-3)
-MOTOR = ("system=two_stage_gearbox", "excitation=motor_and_load")
-RECORDS = ("experiment=two_stage", "operating.duration_s=0.2", "sensing.snr_db=null")
+SPEED = 1746.0 * RPM
+TORQUE = 60.0
+SOLVER = LineSolver(
+    sampling_rate=10240.0,
+    oversampling=12,
+    max_energy_residual=1e-3,
+)
+MOTOR = (
+    "system=two_stage_gearbox",
+    "excitation=motor_and_load",
+)
+RECORDS = (
+    "experiment=two_stage",
+    "operating.duration_s=0.2",
+    "sensing.snr_db=null",
+)
 TEETH = {"3/4": (32, 96), "5/6": (48, 80)}
-RATIO = {"3/4": 1.0, "5/6": 1.0 / 3.0}  # of the driving gear's speed to the motor's
+RATIO = {
+    "3/4": 1.0,
+    "5/6": 1.0 / 3.0,
+}  # of the driving gear's speed to the motor's
 RIPPLE = "excitation.motor.torque_ripple={share: 0.1, order: 6}"
 FAN = "excitation.loads={fan: {node: 4, law: quadratic, torque_nm: 9}}"
 
@@ -42,12 +54,17 @@ def machine(*words):
 
 def simulated(record, *faults, start=None):
     return record.simulate(
-        tuple(one for fault in faults for one in read_faults(fault)), start=start
+        tuple(one for fault in faults for one in read_faults(fault)),
+        start=start,
     )
 
 
 def missing(gear, tooth=5):
-    return {"kind": "missing_tooth", "gear": gear, "tooth": tooth}
+    return {
+        "kind": "missing_tooth",
+        "gear": gear,
+        "tooth": tooth,
+    }
 
 
 def test_an_even_line_has_the_static_torques_of_its_ratios():
@@ -57,23 +74,25 @@ def test_an_even_line_has_the_static_torques_of_its_ratios():
     force, amplitudes = response.element_forces(elements)
     for place, name in enumerate(line.mesh_names):
         radius = line.drive.pairs[place].pinion.base_radius
-        assert_allclose(force[place] * radius, TORQUE / RATIO[name], rtol=1e-9)
+        assert_close(force[place] * radius, TORQUE / RATIO[name], 1e-9)
+
     assert np.abs(amplitudes).max() < 1e-9 * force.max()
     assert response.fluctuation().max() < 1e-9
 
 
-def test_power_in_is_power_out_and_losses():
+@pytest.mark.parametrize("share", [1.0, 0.5])
+def test_power_in_is_power_out_and_losses(share):
     line = driven(FAN)
-    for speed in (SPEED, 0.5 * SPEED):
-        torques = line.torques(speed, TORQUE)
-        mean = torques.on(line.drive.numbers).mean(axis=1)
-        power = {
-            number: mean[place] * line.ratios[number] * speed
-            for place, number in enumerate(line.drive.numbers)
-        }
-        assert_allclose(power[8], -TORQUE * speed, rtol=1e-12)
-        assert_allclose(power[4], -9.0 * (speed / SPEED) ** 2 * speed / 3.0, rtol=1e-12)
-        assert_allclose(power[1], -power[8] - power[4], rtol=1e-12)
+    speed = share * SPEED
+    numbers = list(line.drive.numbers)
+    mean = line.torques(speed, TORQUE).on(line.drive.numbers).mean(axis=1)
+
+    def power(node):
+        return mean[numbers.index(node)] * line.ratios[node] * speed
+
+    assert_close(power(8), -TORQUE * speed, 1e-12)
+    assert_close(power(4), -9.0 * share**2 * speed / 3.0, 1e-12)
+    assert_close(power(1), -power(8) - power(4), 1e-12)
 
 
 def test_in_time_the_mean_forces_stay_and_the_energies_balance():
@@ -89,7 +108,8 @@ def test_in_time_the_mean_forces_stay_and_the_energies_balance():
     for place, name in enumerate(line.machine.mesh_names):
         force = motion.signals["mesh_force", place]
         radius = line.machine.drive.pairs[place].pinion.base_radius
-        assert_allclose(force.mean() * radius, TORQUE / RATIO[name], rtol=0.01)
+        assert_close(force.mean() * radius, TORQUE / RATIO[name], 1e-4)
+
     assert np.abs(motion.signals["speed", line.dof(8)]).max() < 0.01 * SPEED / 5.0
     assert not motion.contact_loss.any()  # it does not rattle
     assert motion.energy_residual < 1e-3
@@ -100,50 +120,49 @@ def test_energies_balance_where_steps_meet_every_pitch_at_the_same_places(speed_
     """Steps in a pitch: 256 and 153.6, of 512 cells each; an even line rests on such a
     speed.
     """
-    record = machine("operating.duration_s=0.3", f"operating.speed_rpm={speed_rpm}")
+    record = machine(
+        "operating.duration_s=0.3",
+        f"operating.speed_rpm={speed_rpm}",
+    )
     motion = record.line(Run(system=record, faults=())).run(
-        SOLVER, duration=0.3, channels=[("mesh_force", 0)], settling=0.3
+        SOLVER,
+        duration=0.3,
+        channels=[("mesh_force", 0)],
+        settling=0.3,
     )
     assert motion.energy_residual < 3e-4
 
 
 def test_a_record_whose_steps_are_too_long_is_made_with_half_of_them():
-    words = ["operating.speed_rpm=2400", "operating.duration_s=0.05"]
+    words = [
+        "operating.speed_rpm=2400",
+        "operating.duration_s=0.05",
+    ]
     short, long = (machine(*words, f"solver.oversampling={steps}") for steps in (8, 4))
     line = long.line(Run(system=long, faults=()))
-    as_told = (
-        replace(SOLVER, oversampling=4),
-        {"duration": 0.05, "channels": [("speed", 0)]},
-    )
+    coarse = replace(SOLVER, oversampling=4)
+    record = {"duration": 0.05, "channels": [("speed", 0)]}
+
     with pytest.raises(StepError, match="the energy balance misses"):
-        integrate_line(line.line, line.course, line.torques, as_told[0], **as_told[1])
+        integrate_line(
+            line.line,
+            line.course,
+            line.torques,
+            coarse,
+            **record,
+        )
+
     computed = simulated(long)
     assert computed.integration_error < 1e-3
     np.testing.assert_array_equal(computed.acceleration, simulated(short).acceleration)
 
 
 @pytest.mark.parametrize("name", list(TEETH))
-def test_both_stages_sound_at_their_mesh_frequencies(name):
-    record = machine(f"system.record_mesh=[{name.replace('/', ',')}]")
-    line = record.line(Run(system=record, faults=()))
-    channel = "mesh_force", line.machine.mesh_names.index(name)
-    motion = line.run(SOLVER, duration=1.0, channels=[channel], settling=0.3)
-    force = motion.signals[channel]
-    spectrum = np.abs(np.fft.rfft((force - force.mean()) * np.hanning(len(force))))
-    mesh_frequency = TEETH[name][0] * RATIO[name] * SPEED / (2.0 * np.pi)
-    assert record.operating.speed == pytest.approx(RATIO[name] * SPEED)
-    at = round(mesh_frequency)  # one second: lines are 1 Hz apart
-    largest = spectrum[at - 1 : at + 2].max()
-    assert largest > 20.0 * np.median(spectrum[:4000])
-    between = spectrum[int(1.1 * mesh_frequency) + 1 : int(1.4 * mesh_frequency)]
-    assert largest > 10.0 * between.max()
-
-
-@pytest.mark.parametrize("name", list(TEETH))
 def test_a_missing_tooth_is_evident_once_a_turn_of_its_gear(name):
     """The record less its sound twin is large near the tooth and nowhere else, turn by turn."""
     record = machine(
-        "operating.duration_s=1", f"system.record_mesh=[{name.replace('/', ',')}]"
+        "operating.duration_s=1",
+        f"system.record_mesh=[{name.replace('/', ',')}]",
     )
     start = Start(tooth_pinion=0, tooth_wheel=0, phase=0.0)
     sound = simulated(record, start=start)
@@ -158,46 +177,9 @@ def test_a_missing_tooth_is_evident_once_a_turn_of_its_gear(name):
         assert peaks[0] ** 2 > 2.0 * peaks[1] ** 2
 
 
-def test_a_broken_height_of_nothing_is_the_sound_machine():
-    record = machine()
-    fault = {"gear": "pinion", "tooth": 5}
-    sound = simulated(record).acceleration
-    tiny = simulated(record, {"kind": "broken", "broken_height_mm": 0.0, **fault})
-    gone = simulated(record, {"kind": "missing_tooth", **fault})
-    scale = np.abs(sound).max()
-    assert_allclose(tiny.acceleration, sound, rtol=1e-9, atol=1e-9 * scale)
-    assert np.abs(gone.acceleration - sound).max() > 0.1 * scale
-
-
-def test_helical_stages_are_recorded_too(tmp_path):
-    gears = tmp_path / "helical.csv"
-    gears.write_text(
-        "node,name,n_teeth,normal_module_mm,pressure_angle_deg,helix_angle_deg,face_width_mm\n"
-        "3,in,32,2,20,15,20\n4,idler,96,2,20,15,20\n5,idler 2,48,2,20,15,20\n6,out,80,2,20,15,20\n"
-    )
-    record = machine(f"system.gears_csv={gears}", "mesh.n_slices=8")
-    sound, gone = simulated(record), simulated(record, missing("wheel", 3))
-    assert sound.integration_error < 1e-3
-    assert np.std(gone.acceleration - sound.acceleration) > 0.01 * np.std(
-        sound.acceleration
-    )
-
-
-def test_the_other_stage_stands_where_the_teeth_allow():
-    """The gears of the idler are on one shaft: its angle, as the record mesh says it, holds for
-    the other mesh.
-    """
-    record = machine("system.record_mesh=[5,6]")
-    drive, start = record.engine.drive, Start(tooth_pinion=7, tooth_wheel=3, phase=0.25)
-    turned = record.crank_angle(start)
-    roll = start_rolls(drive, turned)[record.mesh_number] / record.pair.base_pitch
-    assert_allclose(roll, start.phase, atol=1e-9)
-    later = record.crank_angle(Start(tooth_pinion=8, tooth_wheel=3, phase=0.25))
-    assert_allclose(later - turned, 2.0 * np.pi / 48.0 * 3.0, rtol=1e-9)
-
-
 @pytest.mark.parametrize(
-    ("law", "exponent"), [("constant", 0), ("linear", 1), ("quadratic", 2)]
+    ("law", "exponent"),
+    [("constant", 0), ("linear", 1), ("quadratic", 2)],
 )
 def test_a_run_up_follows_its_course_and_its_load_the_law(law, exponent):
     record = machine(
@@ -220,32 +202,29 @@ def test_a_run_up_follows_its_course_and_its_load_the_law(law, exponent):
     taken += behind * np.gradient(speed, 1.0 / 10240.0)
     given = motion.signals["mesh_force", 0] * record.pair.pinion.base_radius
     for part in (slice(500, 1500), slice(-1500, -500)):
-        assert_allclose(given[part].mean(), taken[part].mean(), rtol=0.02)
+        assert_close(
+            given[part].mean(),
+            taken[part].mean(),
+            0.01,
+        )
+
     assert np.abs(motion.signals[load]).max() < 0.2
 
 
 def test_slip_damps_the_rigid_motion_and_ripple_shakes_at_its_order():
     line = driven(RIPPLE)
     slope = line.engine.dampers(line.ratios)
-    assert_allclose(slope[1], 60.0 * 0.97 / (0.03 * SPEED), rtol=1e-12)
-    assert line.matrices().damping[0, 0] - line.drive.matrices().damping[
-        0, 0
-    ] == pytest.approx(slope[1])
+    assert_close(slope[1], 60.0 * 0.97 / (0.03 * SPEED), 1e-12)
+    assert_close(
+        line.matrices().damping[0, 0] - line.drive.matrices().damping[0, 0],
+        slope[1],
+        1e-6,
+    )
+
     response = line.response(SPEED, TORQUE)
     lines = np.abs(response.angle[0])
     assert response.orders[int(lines.argmax())] == 6.0
     assert np.sort(lines)[-2] < 1e-9 * lines.max()
+
     stiff = driven(RIPPLE, "excitation.motor.slip=0.001").response(SPEED, TORQUE)
     assert stiff.fluctuation()[0] < 0.7 * response.fluctuation()[0]
-
-
-def test_ripple_in_time_is_that_of_the_linear_line():
-    """But for the governor, which the linear line has not, and what is left of the start."""
-    words = (RIPPLE, "system.backlash_um=0", "system.loss_factor.gear_mesh=0")
-    line = running_line(driven(*words), steady_course(SPEED, TORQUE), governor=GOVERNOR)
-    dof = line.dof(8)
-    motion = line.run(SOLVER, duration=0.2, channels=[("speed", dof)], settling=0.3)
-    at = line.linear.orders * (line.turned + motion.nominal_angle[:, None])
-    linear = np.real(np.exp(1j * at) @ line.linear.speed_deviation[dof])
-    computed = motion.signals["speed", dof]
-    assert np.std(computed - computed.mean() - linear) < 0.1 * np.std(linear)

@@ -29,22 +29,34 @@ class Balance(NamedTuple):
 def balance(dynamics, step, n_steps):
     """Balance of a motion from static equilibrium."""
     start = dynamics.static_start(0.0)
-    q, v = trajectory(dynamics, start, np.zeros(len(start)), step, n_steps)
-    motions = motion_of(dynamics, step * np.arange(len(q)), q, v)
-    _, friction, moment_p, moment_w, _, stored, lost, _ = laws(
-        dynamics, motions, step
-    ).T
+    q, v = trajectory(
+        dynamics,
+        start,
+        np.zeros(len(start)),
+        step,
+        n_steps,
+    )
+    motions = motion_of(
+        dynamics,
+        step * np.arange(len(q)),
+        q,
+        v,
+    )
+    law = laws(dynamics, motions, step)
+    _, friction, moment_p, moment_w, _, stored, lost, _ = law.T
     system = dynamics.system()
+    turning = np.isin(np.arange(len(start)), (2, 5))
+    k = np.diag(system.stiffness)
+    c = np.diag(system.damping)
     speeds = v + dynamics.operating.speed * system.rotation
-    springs = [dof for dof in range(len(start)) if dof not in (2, 5)]
-    k, c = np.diag(system.stiffness), np.diag(system.damping)
+    kinetic = 0.5 * speeds**2 @ system.mass
+    elastic = 0.5 * q**2 @ np.where(turning, 0.0, k)
     drive = system.force[2] - k[2] * q[:, 2] - c[2] * v[:, 2]
-    elastic = q[:, springs] ** 2 @ k[springs]
     moments = moment_p * speeds[:, 2] + moment_w * speeds[:, 5]
     return Balance(
-        energy=0.5 * (speeds**2 @ system.mass + elastic) + stored,
+        energy=kinetic + elastic + stored,
         supplied=drive * speeds[:, 2] + system.force[5] * speeds[:, 5],
-        supports=v[:, springs] ** 2 @ c[springs],
+        supports=v**2 @ np.where(turning, 0.0, c),
         mesh_damping=lost,
         friction=friction * (v[:, 0] - v[:, 3]) + moments,
         stored=stored,

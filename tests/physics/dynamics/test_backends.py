@@ -60,12 +60,16 @@ class Lsoda(Backend):
 
 def motion(machine, integration):
     """Accelerations (channel, sample), and angles of the pinion (sample + 1,), from rest."""
-    low_pass, rate = decimator(integration.oversampling), integration.sampling_rate
-    factor, margin = low_pass.oversampling, low_pass.margin
-    first, last = -margin * factor - 1, (integration.n_samples + margin) * factor
+    low_pass = decimator(integration.oversampling)
+    rate = integration.sampling_rate
+    factor = low_pass.oversampling
+    margin = low_pass.margin
+    first = -margin * factor - 1
+    last = (integration.n_samples + margin) * factor
     times = np.arange(first, last + 1) / (rate * factor)
     begin = times[0] - settling_time(machine)
-    slope, start = equations(machine)[0], at_rest(machine, begin)
+    slope = equations(machine)[0]
+    start = at_rest(machine, begin)
     states = solved(slope, start, np.append(begin, times), "LSODA", 1e-7)[1:]
     dofs = [machine.dofs.index(name) + 6 for name in integration.channels]
     means = np.diff(states[:, dofs], axis=0) * rate * factor
@@ -87,9 +91,18 @@ def record(machine):
 
     def simulated(backend, **changes):
         system = machine({**QUICK, **changes})
-        system = replace(system, solver=replace(system.solver, backend=backend))
+        system = replace(
+            system,
+            solver=replace(system.solver, backend=backend),
+        )
         return simulate_together(
-            [Run(system=system, faults=(), start=Start(phase=0.3))]
+            [
+                Run(
+                    system=system,
+                    faults=(),
+                    start=Start(phase=0.3),
+                )
+            ]
         )[0]
 
     return simulated
@@ -97,13 +110,15 @@ def record(machine):
 
 def test_both_backends_agree(record, lsoda):
     """As far as the compiled core is accurate; another machine would show."""
-    core, other = record(DEFAULT_BACKEND), record(lsoda)
+    core = record(DEFAULT_BACKEND)
+    other = record(lsoda)
     damped = record(DEFAULT_BACKEND, **MORE_DAMPED)
     exact = other.acceleration[None]
     error, shown = (
         in_band_error(each.acceleration[None], exact, 51200.0)[0]
         for each in (core, damped)
     )
+
     assert 0.0 < error < ACCURACY < 0.2 * shown
     assert np.abs(core.shaft_angle - other.shaft_angle).max() < 1e-6
     assert abs(core.mean_speed - other.mean_speed) < 1e-5 * core.mean_speed
@@ -114,13 +129,21 @@ def test_limits_are_those_of_the_backend(machine, dynamics_of, record, lsoda):
     dynamics = dynamics_of(machine())
     core = Solver(oversampling=2, precision="float64")
     other = replace(core, backend=lsoda)
+
     with pytest.raises(SimulationError, match="makes internal steps of"):
         check_machine(dynamics, core, 1e4)
+
     check_machine(dynamics, other, 1e4)
     with pytest.raises(SimulationError, match="lsoda: 100 Hz is too slow"):
         check_machine(dynamics, other, 100.0)
+
     solvers = core, replace(core, precision="float32"), other
-    assert [records_together(solver) for solver in solvers] == [8, 16, 1]
+    assert [records_together(solver) for solver in solvers] == [
+        8,
+        16,
+        1,
+    ]
+
     failed = record(lsoda, **{"sensing.sampling_rate_hz": 8000})
     assert str(failed) == "lsoda: 8000 Hz is too slow"
 

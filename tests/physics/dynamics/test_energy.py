@@ -2,10 +2,8 @@
 
 import numpy as np
 import pytest
-from closeness import assert_close
 from energy_balance import balance
 from fault_cases import one
-from lane_tools import advance, laws, right_hand_side, trajectory
 
 from gensig.faults.broken import MissingTooth
 
@@ -26,7 +24,10 @@ FAULTS = {
 @pytest.fixture(scope="module", params=FAULTS)
 def faulty(request, machine, dynamics_of):
     return {
-        law: dynamics_of(machine({"mesh.roll_torque": law}), FAULTS[request.param])
+        law: dynamics_of(
+            machine({"mesh.roll_torque": law}),
+            FAULTS[request.param],
+        )
         for law in ("consistent", "classical")
     }
 
@@ -34,17 +35,6 @@ def faulty(request, machine, dynamics_of):
 @pytest.fixture(scope="module")
 def case(faulty):
     return {law: balance(dynamics, STEP, N_STEPS) for law, dynamics in faulty.items()}
-
-
-def test_states_step_by_step_are_those_of_one_run(faulty):
-    """Except for the reading of the tables at every call."""
-    dynamics, n_steps = faulty["consistent"], 2500
-    start = dynamics.static_start(0.0), np.zeros(6)
-    steps = trajectory(dynamics, *start, STEP, n_steps)
-    whole = advance(dynamics, *start, STEP, 0, n_steps)[:2]
-    for values, last in zip(steps, whole, strict=True):
-        scale = np.abs(values).max(axis=0)
-        assert_close(last / scale, values[-1] / scale, atol=1e-7)
 
 
 def test_power_is_stored_and_dissipated(case):
@@ -66,45 +56,3 @@ def test_damping_and_friction_dissipate(case):
 def test_coarse_tables_balance_too(machine, dynamics_of):
     coarse = dynamics_of(machine({"mesh.points_per_pitch": 128}))
     assert balance(coarse, STEP, N_STEPS).residual < 2e-4
-
-
-def test_friction_of_rigid_gears_dissipates_at_every_position(xiamen, dynamics_of):
-    speed, pair, rng = xiamen.operating.speed, xiamen.pair, np.random.default_rng(1)
-    roll, approach = (
-        rng.uniform(0, 50, 500) * pair.base_pitch,
-        rng.uniform(0, 20e-6, 500),
-    )
-    motions = roll, approach, rng.normal(0, 1e-3, 500), pair.pinion.base_radius * speed
-    normal, _, moment_p, moment_w, _, _, lost, _ = laws(dynamics_of(xiamen), motions).T
-    assert np.all(moment_p * speed + moment_w * speed / pair.ratio <= 1e-9)
-    assert np.all(lost >= 0)
-    assert np.all(normal >= 0)
-
-
-def test_action_equals_reaction(xiamen, dynamics_of):
-    """The mesh puts opposite forces on the two gears: normal on y, friction on x."""
-    dynamics, rng = dynamics_of(xiamen), np.random.default_rng(3)
-    system, direction = dynamics.system(), dynamics.approach_direction()
-    pinion, wheel = (gear.base_radius for gear in xiamen.pair.gears.values())
-    for _ in range(50):
-        q, v = rng.normal(0, 1e-6, 6), rng.normal(0, 1e-3, 6)
-        q[5] -= (rng.uniform(1e-6, 2e-5) - q @ direction) / wheel
-        acceleration = right_hand_side(dynamics, 0.0, q, v)
-        held = system.stiffness @ q + system.damping @ v
-        force = system.mass * acceleration - system.force + held
-        assert force[1] > 0
-        assert_close(force[:2], -force[3:5], 1e-9, atol=1e-6)
-        assert abs(force[0]) <= 0.05 * force[1] * (1 + 1e-9)
-        # it drives the wheel and brakes the pinion, up to friction and the roll torque
-        assert_close(force[5], force[1] * wheel, 0.03)
-        assert_close(force[2], -force[1] * pinion, 0.1)
-
-
-def test_the_force_rises_with_the_approach(xiamen, dynamics_of):
-    dynamics = dynamics_of(xiamen)
-    approach = np.append(np.linspace(-20e-6, 20e-6, 41), -xiamen.pair.backlash - 5e-6)
-    for roll in np.linspace(0.01, 0.99, 9) * xiamen.pair.base_pitch:
-        *force, coast = laws(dynamics, (roll, approach, 0.0, 4.0))[:, 0]
-        assert np.all(np.diff(force) >= 0)
-        assert force[0] == 0.0
-        assert coast < -100

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 from closeness import assert_close
-from fault_cases import one
 
 from gensig.faults.broken import MissingTooth
 
 RATE = 51200.0
 MISSING = MissingTooth(gear="pinion", tooth=3)
-DURATION, SPEED = "operating.duration_s", "operating.speed_rpm"
+DURATION = "operating.duration_s"
+SPEED = "operating.speed_rpm"
 
 
 def in_band(acceleration):
@@ -33,69 +33,29 @@ def test_the_error_falls_with_the_fourth_power_of_the_step(machine, composed_con
         }
         return in_band(machine(options).simulate().acceleration)
 
-    exact, errors = spectrum(64), {}
+    exact = spectrum(64)
+    errors = {}
     for steps in (4, 5, 8, 16):
         off = np.linalg.norm(spectrum(steps) - exact, axis=1)
         errors[steps] = (off / np.linalg.norm(exact, axis=1)).max()
+
     assert 3.0 < math.log2(errors[4] / errors[16]) / 2 < 4.5
     assert 3e-4 < errors[4] < 1e-3
     assert errors[composed_config["solver"]["oversampling"]] < 2e-4
     assert errors[8] < 5e-5
 
 
-@pytest.mark.parametrize(("speed_rpm", "per_turn"), [(1500, 2048), (1200, 2560)])
-def test_settled_turns_agree(machine, speed_rpm, per_turn):
-    signal = (
-        machine({SPEED: speed_rpm, DURATION: 4 * per_turn / RATE})
-        .simulate()
-        .acceleration
-    )
-    level = signal.std(axis=1)
-    turns = np.diff(signal.reshape(4, 4, per_turn), axis=1)
-    assert np.all(np.sqrt(np.mean(turns**2, axis=-1)).max(axis=1) < 1e-3 * level)
-    shift = per_turn - 7  # not a turn
-    change = signal[:, shift : 2 * shift] - signal[:, :shift]
-    assert np.all(change.std(axis=1) > 0.1 * level)
-
-
 @pytest.mark.parametrize(("speed_rpm", "torque_nm"), [(1800, 100), (900, 5)])
 def test_the_mean_speed_is_the_set_speed_with_any_fault(machine, speed_rpm, torque_nm):
-    condition = {SPEED: speed_rpm, "operating.torque_nm": torque_nm, DURATION: 0.4}
+    condition = {
+        SPEED: speed_rpm,
+        "operating.torque_nm": torque_nm,
+        DURATION: 0.4,
+    }
     system = machine(condition)
     for faults in ((), (MISSING,)):
-        assert_close(system.simulate(faults).mean_speed, system.operating.speed, 1e-5)
-
-
-def test_a_too_soft_source_would_change_the_mean_speed(machine):
-    system = machine({DURATION: 0.4, "operating.drive_frequency_hz": 0.2})
-    ratio = system.simulate((MISSING,)).mean_speed / system.operating.speed
-    assert abs(ratio - 1) > 1e-5
-
-
-@pytest.mark.parametrize(("speed_rpm", "turns"), [(1800, 15), (1500, 10)])
-def test_perfect_healthy_teeth_have_no_sidebands(machine, speed_rpm, turns):
-    """See docs/theory/spur_dynamics.md; a small crack has some."""
-
-    def sidebands(faults=(), **solver):
-        """Strongest line at mesh +- n x shaft over the strongest mesh harmonic, up to 20 kHz.
-
-        Order spectrum over whole turns, no window; below half the mesh order is the drive.
-        """
-        options = {f"solver.{key}": value for key, value in solver.items()}
-        system = machine(
-            {SPEED: speed_rpm, DURATION: turns * 60 / speed_rpm, **options}
+        assert_close(
+            system.simulate(faults).mean_speed,
+            system.operating.speed,
+            1e-5,
         )
-        signal, n_teeth = (
-            system.simulate(faults).acceleration,
-            system.pair.pinion.n_teeth,
-        )
-        amplitude = np.abs(np.fft.rfft(signal, axis=-1))[:, ::turns]
-        order = np.arange(amplitude.shape[1])
-        usable = (order > n_teeth // 2) & (order * speed_rpm / 60 <= 20e3)
-        mesh = order % n_teeth == 0
-        sides, harmonics = amplitude[:, usable & ~mesh], amplitude[:, usable & mesh]
-        return (sides.max(axis=1) / harmonics.max(axis=1)).max()
-
-    assert sidebands() < 1e-4
-    assert sidebands(oversampling=16) < 1e-5
-    assert sidebands((one("crack", tooth=3, crack_depth_mm=0.5),)) > 5e-4

@@ -6,20 +6,10 @@ import numpy as np
 import pytest
 from closeness import assert_close
 from fault_cases import one
-from lane_tools import (
-    advance,
-    group_laws,
-    law_of,
-    laws,
-    motion_of,
-    right_hand_side,
-    trajectory,
-)
-from scipy.integrate import solve_ivp
+from lane_tools import laws, motion_of, right_hand_side
 
-from gensig.dynamics._layout import DAMPING, SHARED
-from gensig.dynamics._vector import LANES
-from gensig.dynamics.lanes import mesh_numbers, pack
+from gensig.dynamics._layout import DAMPING
+from gensig.dynamics.lanes import mesh_numbers
 from gensig.faults.broken import MissingTooth
 
 CRACK = one("crack", tooth=2, crack_depth_mm=2)
@@ -46,7 +36,11 @@ SCALE = np.array([1, 1, 0.1, 0.1, 1, 1e-5, 1e-2])
 def bent(at, position, values, slopes):
     """Values between nodes on the parabola that follows the growth of the slopes, (phase,)."""
     distance = position[1] - position[0]
-    cell = np.clip(((at - position[0]) / distance).astype(int), 0, len(position) - 2)
+    cell = np.clip(
+        ((at - position[0]) / distance).astype(int),
+        0,
+        len(position) - 2,
+    )
     part = (at - position[cell]) / distance
     bend = 0.5 * distance * part * (1 - part) * (slopes[cell + 1] - slopes[cell])
     return values[cell] + part * (values[cell + 1] - values[cell]) - bend
@@ -54,36 +48,42 @@ def bent(at, position, values, slopes):
 
 def columns(side, kind, at, position):
     """Compliance, its slope, gap and its slope of one kind of tooth, (4, phase)."""
-    slopes = side.compliance_slope[kind], side.gap_slope[kind]
-    return np.array(
-        [
-            bent(at, position, side.compliance[kind], slopes[0]),
-            np.interp(at, position, slopes[0]),
-            bent(at, position, side.gap[kind], slopes[1]),
-            np.interp(at, position, slopes[1]),
-        ]
-    )
+    result = []
+    for name in ("compliance", "gap"):
+        values = getattr(side, name)[kind]
+        slopes = getattr(side, f"{name}_slope")[kind]
+        result.append(bent(at, position, values, slopes))
+        result.append(np.interp(at, position, slopes))
+    return np.array(result)
+
+
+def tooth_at(values, index):
+    """Values by tooth for the pairs of an index, (pair,)."""
+    return values[index % len(values)]
 
 
 class Reference:
     """Six equations of a pair, as the theory writes them; one-sided law."""
 
-    def __init__(self, dynamics, step=1e-6):
-        self.d, self.table, self.pair = dynamics, dynamics.table, dynamics.table.pair
-        self.system, self.shared = dynamics.system(), self.table.shared_compliance
-        self.damping = mesh_numbers(dynamics, step, dynamics.rest())[DAMPING]
-        self.sides = (
-            (self.table.pinion, dynamics.start_tooth_pinion),
-            (self.table.wheel, dynamics.start_tooth_wheel),
-        )
+    def __init__(self, dynamics):
+        self.d = dynamics
+        self.table = dynamics.table
+        self.pair = dynamics.table.pair
+        self.system = dynamics.system()
+        self.shared = self.table.shared_compliance
+        self.damping = mesh_numbers(dynamics, 1e-6, dynamics.rest())[DAMPING]
 
     def present(self, index):
         """Pairs whose teeth exist, (pair,)."""
-        there = [
-            side.present[side.kind[(index + start) % len(side.kind)]]
-            for side, start in self.sides
-        ]
-        return np.all(there, axis=0)
+        pinion = tooth_at(
+            self.table.pinion.present[self.table.pinion.kind],
+            index,
+        )
+        wheel = tooth_at(
+            self.table.wheel.present[self.table.wheel.kind],
+            index,
+        )
+        return pinion & wheel
 
     def pairs(self, roll):
         """Position, compliance, its slope, gap and its slope of existing pairs, (pair,) each."""
@@ -92,20 +92,16 @@ class Reference:
         index = index[self.present(index)]
         position = roll - index * self.pair.base_pitch
         values = np.zeros((4, len(index)))
-        errors = (
-            (self.d.pinion_error, self.d.pinion_tilt),
-            (self.d.wheel_error, self.d.wheel_tilt),
-        )
-        for (side, start), (error, tilt) in zip(self.sides, errors, strict=True):
-            for k, tooth in enumerate((index + start) % len(side.kind)):
-                at = position[k : k + 1]
-                values[:, k] += columns(
-                    side, side.kind[tooth], at, self.table.position
-                )[:, 0]
-                values[2, k] += error[tooth] + tilt[tooth] * (
-                    at[0] - self.pair.pitch_point
-                )
-                values[3, k] += tilt[tooth]
+        for name in ("pinion", "wheel"):
+            side = getattr(self.table, name)
+            kinds = tooth_at(side.kind, index)
+            for k, kind in enumerate(kinds):
+                place = position[k : k + 1]
+                values[:, k] += columns(side, kind, place, self.table.position)[:, 0]
+            error = tooth_at(getattr(self.d, f"{name}_error"), index)
+            tilt = tooth_at(getattr(self.d, f"{name}_tilt"), index)
+            values[2] += error + tilt * (position - self.pair.pitch_point)
+            values[3] += tilt
         return position, *values
 
     def law(self, values, approach, rate, roll_rate):
@@ -117,15 +113,16 @@ class Reference:
         energy = elastic @ (approach - gap) - 0.5 * (c - self.shared) @ elastic**2
         stored = energy - 0.5 * self.shared * elastic.sum() ** 2
         along = load @ gap_slope + 0.5 * elastic**2 @ c_slope
-        return load, along, stored, (load - elastic) @ pair_rate
+        lost = (load - elastic) @ pair_rate
+        return load, along, stored, lost
 
     def loads(self, compliance, gap, approach):
         """F >= 0 with C F = approach - gap where F > 0 and C F >= approach - gap elsewhere."""
-        n, squeezed = len(gap), approach - gap
+        n = len(gap)
+        squeezed = approach - gap
         flexibility = np.diag(compliance - self.shared) + self.shared
-        sets = chain.from_iterable(
-            combinations(range(n), size) for size in range(n + 1)
-        )
+        sizes = range(n + 1)
+        sets = chain.from_iterable(combinations(range(n), size) for size in sizes)
         for chosen in map(list, sets):
             force = np.zeros(n)
             block = flexibility[np.ix_(chosen, chosen)]
@@ -139,13 +136,28 @@ class Reference:
         """Normal, friction, moments on pinion and wheel, force along the roll, energy, power."""
         position, *values = self.pairs(roll)
         load, along, stored, lost = self.law(values, approach, rate, roll_rate)
-        pair, options = self.pair, self.table.options
+        pair = self.pair
+        options = self.table.options
         half_width = 0.5 * options.friction_transition * pair.base_pitch
-        x = np.clip((position - pair.pitch_point) / half_width, -1, 1)
+        x = np.clip(
+            (position - pair.pitch_point) / half_width,
+            -1,
+            1,
+        )
         sliding = options.friction_coefficient * load * x * (1.5 - 0.5 * x**2)
         arm = pair.start_curvature_radius + np.clip(position, 0, pair.path_of_contact)
-        moments = -(sliding @ arm), sliding @ (pair.tangent_length - arm)
-        return load.sum(), sliding.sum(), *moments, along, stored, lost
+        moment_p = -(sliding @ arm)
+        moment_w = sliding @ (pair.tangent_length - arm)
+        normal = load.sum()
+        return (
+            normal,
+            sliding.sum(),
+            moment_p,
+            moment_w,
+            along,
+            stored,
+            lost,
+        )
 
     def coast(self, roll, approach, rate, roll_rate):
         """The same where the back flanks touch, and the number of loaded pairs, negative.
@@ -153,16 +165,21 @@ class Reference:
         The mirror image of a sound pair that turns backwards: the back flanks of a space are half
         a pitch further, teeth count down, missing ones stay missing; no errors, no friction.
         """
-        pitch, position, n = (
-            self.pair.base_pitch,
-            self.table.position,
-            np.arange(-40, 41),
-        )
-        at = 2 * self.pair.pitch_point + 0.5 * pitch - roll - n * pitch
+        pitch = self.pair.base_pitch
+        position = self.table.position
+        n = np.arange(-40, 41)
+        at = 2 * self.pair.pitch_point + (0.5 - n) * pitch - roll
         chosen = (at >= position[0]) & (at < position[-1]) & self.present(-n)
-        values = sum(columns(side, 0, at[chosen], position) for side, _ in self.sides)
+        sides = self.table.pinion, self.table.wheel
+        values = sum(columns(side, 0, at[chosen], position) for side in sides)
         squeezed = -approach - self.pair.backlash
-        load, along, stored, lost = self.law(values, squeezed, -rate, -roll_rate)
+        load, along, stored, lost = self.law(
+            values,
+            squeezed,
+            -rate,
+            -roll_rate,
+        )
+        n_loaded = float(np.sum(load > 0))
         return (
             -load.sum(),
             0.0,
@@ -171,19 +188,19 @@ class Reference:
             -along,
             stored,
             lost,
-            -float(np.sum(load > 0)),
+            -n_loaded,
         )
 
-    def acceleration(self, time, q, v, mesh=None):
-        """q'' at one instant; ``mesh`` may replace the reference's mesh law."""
-        law = (mesh or self.mesh)(*motion_of(self.d, time, q, v))
+    def acceleration(self, time, q, v):
+        """q'' at one instant."""
+        law = self.mesh(*motion_of(self.d, time, q, v))
         normal, friction, moment_p, moment_w, along = law[:5]
         system = self.system
-        force = system.force - system.stiffness @ q - system.damping @ v
-        force = force - normal * self.d.approach_direction()
         turning = moment_p + self.pair.pinion.base_radius * along
-        mesh = np.array([friction, 0, turning, -friction, 0, moment_w])
-        return (force + mesh) / system.mass
+        force = np.array([friction, 0, turning, -friction, 0, moment_w])
+        force += system.force - normal * self.d.approach_direction()
+        force -= system.stiffness @ q + system.damping @ v
+        return force / system.mass
 
 
 @pytest.fixture(scope="module", params=FAULTS)
@@ -199,49 +216,54 @@ def dynamics(request, xiamen, dynamics_of):
 
 def random_states(dynamics, n, seed):
     """Roll, approach, its rate and the rate of the roll, (n, 4)."""
-    rng, pair = np.random.default_rng(seed), dynamics.table.pair
+    rng = np.random.default_rng(seed)
+    pair = dynamics.table.pair
     speed = dynamics.operating.speed * pair.pinion.base_radius
-    roll, approach = (
-        rng.uniform(0, 8, n) * pair.base_pitch,
-        rng.uniform(-2e-6, 40e-6, n),
+    roll = rng.uniform(0, 8, n) * pair.base_pitch
+    approach = rng.uniform(-2e-6, 40e-6, n)
+    rates = (
+        rng.normal(0, 2e-2, n),
+        rng.normal(speed, 0.01 * speed, n),
     )
-    rates = rng.normal(0, 2e-2, n), rng.normal(speed, 0.01 * speed, n)
     return np.column_stack([roll, approach, *rates])
 
 
 def test_the_mesh_law_agrees(dynamics):
-    reference, states = Reference(dynamics), random_states(dynamics, 300, seed=7)
+    reference = Reference(dynamics)
+    states = random_states(dynamics, 300, seed=7)
     expected = np.array([reference.mesh(*state) for state in states])
     scale = SCALE * np.maximum(1.0, expected[:, :1])
     law = laws(dynamics, states)[:, :7]
+
     assert_close(law / scale, expected / scale, 1e-9, atol=1e-9)
     assert (expected[:, 0] > 0).sum() > 200
 
 
 def test_back_flanks_agree(dynamics):
     """Between half the backlash and the back flanks nothing touches."""
-    reference, states = Reference(dynamics), random_states(dynamics, 300, seed=17)
-    rng, backlash = np.random.default_rng(1), dynamics.table.pair.backlash
+    reference = Reference(dynamics)
+    states = random_states(dynamics, 300, seed=17)
+    rng = np.random.default_rng(1)
+    backlash = dynamics.table.pair.backlash
     states[:, 1] = -backlash - rng.uniform(0, 40e-6, 300)
     expected = np.array([reference.coast(*state) for state in states])
     scale = np.append(SCALE, 1) * np.maximum(1.0, -expected[:, :1])
-    assert_close(laws(dynamics, states) / scale, expected / scale, 1e-9, atol=1e-9)
+
+    assert_close(
+        laws(dynamics, states) / scale,
+        expected / scale,
+        1e-9,
+        atol=1e-9,
+    )
     assert (expected[:, 7] == -2).sum() > 50
+
     states[:, 1] = -backlash * rng.uniform(0.5, 1.0, 300)
     assert np.all(laws(dynamics, states) == 0.0)
 
 
-def test_another_shared_compliance_would_show(dynamics):
-    group, states = pack([dynamics], 1e-6), random_states(dynamics, 50, 7)
-    numbers = group.numbers.copy()
-    numbers[SHARED * LANES : (SHARED + 1) * LANES] *= 1.001
-    force = group_laws(group, states)[:, 0]
-    other = group_laws(group._replace(numbers=numbers), states)[:, 0]
-    assert np.abs(force / np.maximum(other, 1e-9) - 1)[force > 100].max() > 1e-6
-
-
 def test_the_right_hand_side_agrees(dynamics):
-    reference, rng = Reference(dynamics), np.random.default_rng(11)
+    reference = Reference(dynamics)
+    rng = np.random.default_rng(11)
     size = np.array([1, 1, 20, 1, 1, 20])
     for time in rng.integers(0, 40_000, 40) * 1e-7:
         q = dynamics.static_start(time) + rng.normal(0, 1e-6, 6) * size
@@ -251,103 +273,3 @@ def test_the_right_hand_side_agrees(dynamics):
         tolerance = 1e-6 * np.abs(expected).max()
         acceleration = right_hand_side(dynamics, time, q, v)
         assert_close(acceleration, expected, 1e-9, atol=tolerance)
-
-
-@pytest.mark.parametrize("roll_torque", ["consistent", "classical"])
-def test_only_the_consistent_law_has_a_force_along_the_roll(
-    machine, dynamics_of, roll_torque
-):
-    dynamics = dynamics_of(machine({"mesh.roll_torque": roll_torque}), (CRACK,))
-    states = random_states(dynamics, 40, seed=19)
-    states[1::2, 1] = -dynamics.table.pair.backlash - states[1::2, 1]
-    along = laws(dynamics, states)[:, 4]
-    assert np.any(along != 0) == (roll_torque == "consistent")
-
-
-def test_a_motion_against_the_back_flanks(machine, dynamics_of):
-    """Two teeth missing under a light load: the pinion runs ahead into the back flanks."""
-    light = machine({"operating.torque_nm": 2})
-    missing = [MissingTooth(gear="pinion", tooth=tooth) for tooth in (3, 4)]
-    dynamics, step = dynamics_of(light, missing), 1 / (51200 * 8)
-    q, v = trajectory(dynamics, dynamics.static_start(0.0), np.zeros(6), step, 5000)
-    reference = Reference(dynamics, step)
-    behind = np.flatnonzero(q @ dynamics.approach_direction() < -light.pair.backlash)
-    assert len(behind) > 10
-    for n in behind[:40]:
-        expected = reference.acceleration(n * step, q[n], v[n], reference.coast)
-        acceleration = right_hand_side(dynamics, n * step, q[n], v[n])
-        assert_close(acceleration, expected, 1e-9, atol=1e-9 * np.abs(expected).max())
-
-
-def test_one_millisecond_against_dop853(xiamen, dynamics_of):
-    """Another method, over an entry and an exit of a pair, on the compiled mesh law."""
-    dynamics, oversampling = dynamics_of(xiamen), 64
-    step = 1 / (51200 * oversampling)
-    n_steps = round(1e-3 / (64 * step)) * 64
-    reference, law = Reference(dynamics, step), law_of(dynamics, step)
-    start = dynamics.static_start(0.0) + 1e-6 * np.array([1, 1, 0, -1, 1, 0])
-    means = advance(dynamics, start, np.zeros(6), step, 0, n_steps, tuple(range(6)))[2]
-
-    def slope(t, y):
-        return np.concatenate([y[6:], reference.acceleration(t, y[:6], y[6:], law)])
-
-    edges = np.arange(0, n_steps + 1, 64) * step
-    begin = np.concatenate([start, np.zeros(6)])
-    options = {"rtol": 1e-10, "atol": 1e-14, "t_eval": edges, "max_step": 2e-5}
-    motion = solve_ivp(slope, edges[[0, -1]], begin, method="DOP853", **options)
-    # means over 64 steps are differences of velocity
-    expected = np.diff(motion.y[6:], axis=1).T / (64 * step)
-    acceleration = means.reshape(6, -1, 64).mean(axis=2).T
-    scale = np.sqrt(np.mean(expected**2, axis=0))
-    assert_close(acceleration / scale, expected / scale, atol=1e-4)
-
-
-def runge_kutta(slope, time, y, step, n_parts):
-    """The classical formula in ``n_parts``."""
-    h = step / n_parts
-    for part in range(n_parts):
-        t = time + part * h
-        k1 = slope(t, y)
-        k2 = slope(t + 0.5 * h, y + 0.5 * h * k1)
-        k3 = slope(t + 0.5 * h, y + 0.5 * h * k2)
-        k4 = slope(t + h, y + h * k3)
-        y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-    return y
-
-
-@pytest.mark.parametrize("oversampling", [5, 16])
-def test_a_step_with_an_entry_or_exit_is_taken_in_parts(
-    machine, dynamics_of, oversampling
-):
-    """Every step of two mesh periods is one of Runge and Kutta's, or two that meet at the event.
-
-    With linear contact: the load-dependent term has a cusp where the load of a pair falls to 0,
-    where the cubic in the middle of a step is less accurate.
-    """
-    dynamics = dynamics_of(machine({"mesh.contact": "linear"}))
-    step = 1 / (51200 * oversampling)
-    reference, law = Reference(dynamics, step), law_of(dynamics, step)
-    n_steps = round(2 / dynamics.mesh_frequency / step)
-    q, v = trajectory(dynamics, dynamics.static_start(0.0), np.zeros(6), step, n_steps)
-    states = np.hstack([q, v])
-    motions = motion_of(dynamics, np.arange(n_steps + 1) * step, q, v)
-    events = np.flatnonzero(np.diff(laws(dynamics, motions, step)[:, 7]))
-    assert 3 <= len(events) <= 6
-    near = np.concatenate([events - 1, events, events + 1])
-    plain = np.setdiff1d(np.arange(0, n_steps, 6), near)
-    scale = np.abs(np.diff(states, axis=0)).max(axis=0)
-
-    def slope(t, y):
-        return np.concatenate([y[6:], reference.acceleration(t, y[:6], y[6:], law)])
-
-    def off(steps, n_parts):
-        expected = [
-            runge_kutta(slope, n * step, states[n], step, n_parts) for n in steps
-        ]
-        return np.abs((states[steps + 1] - expected) / scale).max(axis=1)
-
-    in_parts = off(events, 64)
-    assert np.all(in_parts < 0.15 * off(events, 1))
-    assert in_parts.max() < 3e-4
-    # elsewhere the error is that of tables read once a step, at the kinks of the path's ends
-    assert off(plain, 1).max() < 3e-4

@@ -17,7 +17,8 @@ from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.run import Run
 
 RATE = 51200.0
-DURATION, SPEED = "operating.duration_s", "operating.speed_rpm"
+DURATION = "operating.duration_s"
+SPEED = "operating.speed_rpm"
 QUICK = {DURATION: 0.1, "solver.max_error": None}
 MISSING = (MissingTooth(gear="pinion", tooth=3),)
 CRACK = (one("crack", gear="wheel", tooth=5),)
@@ -51,6 +52,7 @@ def test_shares_of_the_loaded_teeth_sum_to_one(mesh, xiamen):
         == shape
     )
     assert_close(mesh.load_share.sum(axis=0), 1.0, atol=1e-12)
+
     for teeth in (mesh.pinion_tooth, mesh.wheel_tooth):
         assert ((teeth == NO_TOOTH) == (mesh.load_share == 0.0)).all()
     assert not mesh.contact_lost.any()
@@ -60,37 +62,51 @@ def test_shares_of_the_loaded_teeth_sum_to_one(mesh, xiamen):
 
 
 def test_teeth_follow_one_another_and_keep_their_row(mesh):
-    for rows, n_teeth in ((mesh.pinion_tooth, 23), (mesh.wheel_tooth, 84)):
-        begins = (rows[:, 1:] != NO_TOOTH) & (rows[:, :-1] == NO_TOOTH)
+    for rows, n_teeth in (
+        (mesh.pinion_tooth, 23),
+        (mesh.wheel_tooth, 84),
+    ):
+        carries = rows != NO_TOOTH
+        begins = carries[:, 1:] & ~carries[:, :-1]
         sample, row = np.nonzero(begins.T)
         teeth = rows[row, sample + 1]
         assert len(teeth) > 23
         assert (np.diff(teeth) % n_teeth == 1).all()
         assert (np.diff(row) % N_PAIRS == 1).all()
-    sample = np.flatnonzero(mesh.pinion_tooth[0] != NO_TOOTH)[0]
+    sample = np.argmax(mesh.pinion_tooth[0] != NO_TOOTH)
     assert mesh.pinion_tooth[0, sample] == mesh.wheel_tooth[0, sample] % 23
 
 
 def test_slow_gears_have_the_static_shares(run, record):
     slow = {SPEED: 60, DURATION: 0.05}
-    result, dynamics = record(slow), pair_dynamics(run(slow))
+    result = record(slow)
+    dynamics = pair_dynamics(run(slow))
     radius = dynamics.table.pair.pinion.base_radius
-    states = dynamics.states(dynamics.start_roll + radius * result.shaft_angle)
-    load = dynamics.static(states, dynamics.mesh_force).load
-    expected = np.sort(load / load.sum(axis=1, keepdims=True), axis=1).T
+    roll = dynamics.start_roll + radius * result.shaft_angle
+    load = dynamics.static(dynamics.states(roll), dynamics.mesh_force).load
+    expected = np.sort(load / dynamics.mesh_force, axis=1).T
     shares = np.sort(result.mesh.load_share, axis=0)
-    assert_close(shares.mean(axis=1), expected.mean(axis=1), atol=3e-3)
-    assert np.quantile(np.abs(shares - expected).max(axis=0), 0.95) < 0.03
+
+    assert_close(
+        shares.mean(axis=1),
+        expected.mean(axis=1),
+        atol=3e-3,
+    )
+
+    off = np.abs(shares - expected).max(axis=0)
+    assert np.quantile(off, 0.95) < 0.03
 
 
 def test_a_missing_tooth_carries_nothing_and_is_engaged(record, xiamen):
     mesh = record({}, MISSING).mesh
     assert 3 not in mesh.pinion_tooth
+
     begins = np.flatnonzero(np.diff(mesh.fault_engaged.astype(int)) == 1)
     assert_close(np.diff(begins) / RATE, 60 / 1800, 2e-3)
+
     # from A to E: the contact ratio in base pitches
     ratio = xiamen.pair.transverse_contact_ratio
-    assert_close(mesh.fault_engaged.mean() * 23, ratio, 0.05)
+    assert_close(mesh.fault_engaged.mean() * 23, ratio, 1e-3)
 
 
 def test_a_fault_is_engaged_when_its_tooth_carries(record):
@@ -119,16 +135,11 @@ def test_the_loads_do_not_change_the_record(run, precision):
 
 
 def test_detectability_is_that_of_a_matched_filter():
-    """Root of energy over noise, and the share of right answers of the best detector."""
+    """Root of the energy of the residual over the noise of every channel."""
     residual = np.array([[3.0, 0.0, 4.0], [0.0, 2.0, 0.0]])
-    assert_close(detectability(residual, np.array([25.0, 1.0])), math.sqrt(5.0), 1e-12)
+    assert_close(
+        detectability(residual, np.array([25.0, 1.0])),
+        math.sqrt(5.0),
+        1e-12,
+    )
     assert math.isnan(detectability(np.ones((1, 4)), np.zeros(1)))
-    rng, noise = np.random.default_rng(3), np.array([0.5, 2.0])
-    residual = 0.05 * rng.standard_normal((2, 400))
-    template = residual / noise[:, None]
-    energy = (template * residual).sum()
-    signals = np.sqrt(noise)[:, None] * rng.standard_normal((4000, 2, 400))
-    scores = (signals * template).sum(axis=(1, 2))
-    right = 0.5 * (np.mean(scores < 0.5 * energy) + np.mean(scores > -0.5 * energy))
-    half = 0.5 * detectability(residual, noise)
-    assert_close(right, 0.5 * (1.0 + math.erf(half / math.sqrt(2.0))), atol=0.02)

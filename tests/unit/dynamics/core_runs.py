@@ -1,4 +1,4 @@
-"""Machines side by side in the compiled core, step by step, in calls of any length."""
+"""Settings of quick records, and machines side by side in the compiled core, step by step."""
 
 from __future__ import annotations
 
@@ -7,6 +7,62 @@ import numpy as np
 from gensig.dynamics import _kernels
 from gensig.dynamics.backends.group_run import GroupRun
 from gensig.dynamics.lanes import fill_lanes, pack
+from gensig.faults.broken import MissingTooth
+from gensig.systems.base import simulate_together
+from gensig.systems.run import CleanRecord
+
+# one well-damped drive for all: the same short settling
+QUICK = {
+    "solver.max_error": None,
+    "operating.drive_frequency_hz": 20,
+    "gear.pinion.support.damping_x_ns_per_m": 100,
+    "gear.wheel.support.damping_x_ns_per_m": 500,
+}
+PAPER = {
+    "mesh.law": "paper",
+    "mesh.pair_coupling": "sum",
+    "mesh.contact": "linear",
+}
+CLASSICAL = {"mesh.roll_torque": "classical"}
+ROTORS = {
+    "system.motor.inertia_kg_m2": 5e-4,
+    "system.load.inertia_kg_m2": 5e-3,
+}
+MISSING = (MissingTooth(gear="pinion", tooth=3),)
+
+
+def bits(record):
+    """Every bit of the signals of a record, and its numbers."""
+    assert isinstance(record, CleanRecord), record
+    numbers = (
+        record.mean_speed,
+        record.contact_loss_fraction,
+        record.integration_error,
+        record.integration_check,
+    )
+    return (
+        record.acceleration.tobytes(),
+        record.shaft_angle.tobytes(),
+        repr(numbers),
+    )
+
+
+def alone(runs):
+    """Records of runs, each simulated on its own."""
+    return [simulate_together([single])[0] for single in runs]
+
+
+def assert_same(records, expected):
+    """Raise AssertionError unless all records have the same bits."""
+    assert list(map(bits, records)) == list(map(bits, expected))
+
+
+def assert_independent(runs, orders):
+    """Raise AssertionError unless runs in any order have the bits of each alone."""
+    expected = alone(runs)
+    for order in orders:
+        together = simulate_together([runs[k] for k in order])
+        assert_same(together, [expected[k] for k in order])
 
 
 class CoreRun(GroupRun):
@@ -23,7 +79,8 @@ class CoreRun(GroupRun):
         span=(0.0, 0.0),
     ):
         self.machines = fill_lanes(machines, precision)
-        self.step, self.now = step, first_step
+        self.step = step
+        self.now = first_step
         self.group = pack(machines, step, precision, span)
         super().__init__(self.machines, np.array(channels), precision)
         for lane in range(self.n_lanes):
@@ -33,7 +90,12 @@ class CoreRun(GroupRun):
     def whole(self) -> np.ndarray:
         """q and v with the rest and the rotation of ``center``, (2, dof, lane)."""
         turned = self.group.rotation.reshape(-1, self.n_lanes) * self.center
-        return np.stack([self.state[0] + self.group.rest + turned, self.state[1]])
+        return np.stack(
+            [
+                self.state[0] + self.group.rest + turned,
+                self.state[1],
+            ]
+        )
 
     def restart(self, lane: int) -> None:
         """Put one lane at rest in its equilibrium at the current time."""
@@ -45,7 +107,8 @@ class CoreRun(GroupRun):
     def means(self, n_steps: int) -> np.ndarray:
         """Mean accelerations over each of the next steps, (step, channel, lane)."""
         shape = n_steps, len(self.channels), self.n_lanes
-        means, nothing = np.empty(shape, dtype=self.precision), np.empty(0)
+        means = np.empty(shape, dtype=self.precision)
+        nothing = np.empty(0)
         _kernels.integrate(
             self.group,
             self.state.ravel(),

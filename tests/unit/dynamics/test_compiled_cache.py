@@ -44,12 +44,19 @@ def test_a_change_of_a_called_function_is_noticed(tmp_path: Path) -> None:
         (folder / "__init__.py").write_text("")
     shutil.copy(PACKAGE / "dynamics" / "_vector.py", package)
     (package / "_calling.py").write_text(CALLING)
-    paths = {"PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    paths = {
+        "PYTHONPATH": str(tmp_path),
+        "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+    }
 
     def output(called: str) -> list[str]:
         (package / "_called.py").write_text(called)
         command = [sys.executable, "-c", PROGRAM]
-        options = {"env": {**os.environ, **paths}, "cwd": tmp_path, "text": True}
+        options = {
+            "env": {**os.environ, **paths},
+            "cwd": tmp_path,
+            "text": True,
+        }
         return subprocess.check_output(command, **options).split()
 
     assert output(CALLED) == ["4.0", "0"]

@@ -6,29 +6,28 @@ from itertools import permutations
 import numpy as np
 import pytest
 from closeness import assert_close
-from core_runs import CoreRun
+from core_runs import (
+    MISSING,
+    QUICK,
+    ROTORS,
+    CoreRun,
+    assert_independent,
+)
 
 from gensig.dynamics.pair import PINION_Y
-from gensig.faults.broken import MissingTooth
 from gensig.systems.base import simulate_together
 from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.run import Run
 
-RATE, DRIVE = 51200.0, 20.0
+RATE = 51200.0
+DRIVE = 20.0
 DRIVE_HZ = "operating.drive_frequency_hz"
-QUICK = {
-    "operating.duration_s": 0.03,
-    "solver.max_error": None,
-    DRIVE_HZ: DRIVE,
-    "gear.pinion.support.damping_x_ns_per_m": 100,
-    "gear.wheel.support.damping_x_ns_per_m": 500,
-}
-SPEED, TORQUE = "operating.speed_profile", "operating.torque_profile"
+BRIEF = {**QUICK, "operating.duration_s": 0.03}
+SPEED = "operating.speed_profile"
+TORQUE = "operating.torque_profile"
 RAMP = [[-0.4, 0.4], [0.4, 1.6]]
 SET_SPEED = 60 * math.pi
-MISSING = (MissingTooth(gear="pinion", tooth=3),)
 ROTATIONS = {"sensing.channels": ["pinion_rotation", "wheel_rotation"]}
-ROTORS = {"system.motor.inertia_kg_m2": 5e-4, "system.load.inertia_kg_m2": 5e-3}
 WITH_ROTORS = pytest.mark.parametrize(
     "rotors", [{}, ROTORS], ids=["pair", "motor_and_load"]
 )
@@ -37,7 +36,7 @@ WITH_ROTORS = pytest.mark.parametrize(
 @pytest.fixture(scope="module")
 def run(machine):
     def make(changes=None, faults=()):
-        system = machine({**QUICK, **(changes or {})})
+        system = machine({**BRIEF, **(changes or {})})
         return Run(system=system, faults=tuple(faults))
 
     return make
@@ -60,7 +59,11 @@ def turned(run, n_samples):
 
 def assert_same_signal(record, expected, atol):
     level = expected.acceleration.std(axis=1, keepdims=True)
-    assert_close(record.acceleration / level, expected.acceleration / level, atol=atol)
+    assert_close(
+        record.acceleration / level,
+        expected.acceleration / level,
+        atol=atol,
+    )
 
 
 class TestSteady:
@@ -77,17 +80,18 @@ class TestSteady:
         assert_same_signal(factor, expected, 1e-6)
         assert_close(factor.mean_speed, expected.mean_speed, 1e-9)
 
-    def test_the_shaft_rotates_at_the_set_speed(self, steady):
-        assert_close(np.diff(steady.shaft_angle) * RATE, SET_SPEED, 1e-2)
-        assert abs(steady.shaft_angle[0]) < 0.1 * SET_SPEED / RATE
-
     def test_mean_speed_is_that_of_the_shaft(self, record):
         """To the sample after the last, which a longer record has."""
         short = record({SPEED: RAMP})
         long = record({SPEED: RAMP, "operating.duration_s": 0.06}).shaft_angle
         n = len(short.shaft_angle)
+
         assert_close(long[:n], short.shaft_angle, atol=1e-9)
-        assert_close(short.mean_speed, (long[n] - long[0]) * RATE / n, 1e-9)
+        assert_close(
+            short.mean_speed,
+            (long[n] - long[0]) * RATE / n,
+            1e-9,
+        )
 
 
 class TestRamp:
@@ -96,8 +100,13 @@ class TestRamp:
     @WITH_ROTORS
     def test_the_shaft_lags(self, run, record, rotors):
         """By the inertia torque over the drive's stiffness; without friction, which would grow."""
-        changes = {**rotors, "mesh.friction_coefficient": 0, SPEED: RAMP}
-        ramp, still = run(changes), {**changes, SPEED: [[0, 1], [1, 1]]}
+        changes = {
+            **rotors,
+            "mesh.friction_coefficient": 0,
+            SPEED: RAMP,
+        }
+        ramp = run(changes)
+        still = {**changes, SPEED: [[0, 1], [1, 1]]}
         n = len(record(changes).shaft_angle)
         deviation = turned(ramp, n) - record(changes).shaft_angle
         lag = deviation - (turned(run(still), n) - record(still).shaft_angle)
@@ -110,7 +119,12 @@ class TestRamp:
             driven = dynamics.reduced_inertia - motor.inertia
             twist += self.ACCELERATION * driven / motor.coupling_stiffness
         else:
-            assert_close(twist, self.ACCELERATION / (2 * math.pi * DRIVE) ** 2, 1e-12)
+            assert_close(
+                twist,
+                self.ACCELERATION / (2 * math.pi * DRIVE) ** 2,
+                1e-12,
+            )
+
         assert_close(lag.mean(), twist, 2e-3)
         assert np.ptp(lag) < 0.05 * twist
 
@@ -120,15 +134,29 @@ class TestRamp:
             record({**ROTATIONS, **course}).acceleration[1].mean()
             for course in ({SPEED: RAMP}, {})
         ]
-        assert_close(means[0] - means[1], self.ACCELERATION * 23 / 84, 5e-2)
+        assert_close(
+            means[0] - means[1],
+            self.ACCELERATION * 23 / 84,
+            5e-2,
+        )
 
     @pytest.mark.parametrize("kink", [0.01, 0.0105])
     def test_a_kink_of_the_course_is_no_jump_of_the_shaft(self, run, kink):
         """On and between the instants at which the course is tabled."""
-        changed = run({SPEED: [[-0.4, 1], [kink, 1], [kink + 0.005, 1.3], [1, 1.3]]})
+        changed = run(
+            {
+                SPEED: [
+                    [-0.4, 1],
+                    [kink, 1],
+                    [kink + 0.005, 1.3],
+                    [1, 1.3],
+                ]
+            }
+        )
         (record,) = simulate_together([changed])
         off = record.shaft_angle - turned(changed, len(record.shaft_angle))
         most = 0.3 * SET_SPEED / RATE  # of a shaft that keeps its speed
+
         assert np.abs(np.diff(off)).max() < most
         assert np.abs(np.diff(off, 2)).max() < 0.03 * most
 
@@ -139,13 +167,13 @@ class TestTorque:
     def carried(self, dynamics, *begins):
         """Mean bearing force over four mesh periods, as shares of the set mesh force."""
         core = CoreRun([dynamics], self.STEP, span=(0.0, 0.04))
-        duration = 4 / dynamics.mesh_frequency
+        n_steps = round(4 / dynamics.mesh_frequency / self.STEP)
         stiffness = dynamics.pinion.support.stiffness_y
         shares = []
         for begin in begins:
             core.means(round(begin / self.STEP) - core.now)
             deflection = []
-            while core.now < round((begin + duration) / self.STEP):
+            for _ in range(n_steps):
                 core.means(1)
                 deflection.append(core.whole[0, PINION_Y, 0])
             shares.append(np.mean(deflection) * stiffness / dynamics.mesh_force)
@@ -156,12 +184,11 @@ class TestTorque:
         """Before and after the torque has changed."""
         dynamics = pair_dynamics(run({TORQUE: [[-1, 1], [0.01, 1], [0.02, factor]]}))
         before = 0.01 - 4 / dynamics.mesh_frequency
-        assert_close(self.carried(dynamics, before, 0.03), [1.0, factor], 2e-2)
-
-    @WITH_ROTORS
-    def test_the_start_has_the_share_of_the_torque(self, run, rotors):
-        dynamics = pair_dynamics(run({**rotors, TORQUE: [[0, 0.3], [1, 0.3]]}))
-        assert_close(self.carried(dynamics, 0.0, 0.02), [0.3, 0.3], 2e-2)
+        assert_close(
+            self.carried(dynamics, before, 0.03),
+            [1.0, factor],
+            1e-2,
+        )
 
     def test_without_torque_nothing_touches(self, record):
         free = record({TORQUE: [[0, 0], [1, 0]]})
@@ -170,35 +197,24 @@ class TestTorque:
         assert_close(free.mean_speed, SET_SPEED, 1e-12)
 
 
-def bits(record):
-    return (
-        record.acceleration.tobytes(),
-        record.shaft_angle.tobytes(),
-        record.mean_speed,
-    )
-
-
-def assert_independent(runs, orders):
-    expected = [bits(simulate_together([single])[0]) for single in runs]
-    assert len(set(expected)) == len(runs)
-    for order in orders:
-        together = simulate_together([runs[k] for k in order])
-        assert [bits(record) for record in together] == [expected[k] for k in order]
-
-
 class TestNeighbours:
     def test_steady_and_changing_records_are_independent(self, run):
-        kinked, both = {SPEED: [[0.0, 1.0], [0.01, 1.3]]}, {SPEED: RAMP, TORQUE: RAMP}
-        plain = [run(), run({SPEED: RAMP}), run({TORQUE: RAMP}), run(both)]
+        kinked = {SPEED: [[0.0, 1.0], [0.01, 1.3]]}
+        both = {SPEED: RAMP, TORQUE: RAMP}
+        plain = [
+            run(),
+            run({SPEED: RAMP}),
+            run({TORQUE: RAMP}),
+            run(both),
+        ]
         runs = [*plain, run({}, MISSING), run(kinked, MISSING)]
+
         assert_independent(runs, [range(6), (5, 4, 3, 2, 1, 0)])
 
     def test_next_to_longer_settling(self, run):
         """The course of all is tabled from the begin of the slowest."""
-        speed, torque = (
-            [[-0.1, 0.8], [0.01, 0.9], [0.03, 1.2]],
-            [[0.0, 1.0], [0.02, 1.1]],
-        )
+        speed = [[-0.1, 0.8], [0.01, 0.9], [0.03, 1.2]]
+        torque = [[0.0, 1.0], [0.02, 1.1]]
         changing = {SPEED: speed, TORQUE: torque}
         runs = [run({**changing, DRIVE_HZ: rate}) for rate in (20, 5, 7.3)]
         assert_independent(runs, list(permutations(range(3)))[::2])
@@ -209,7 +225,18 @@ def test_machines_with_rotors_move_in_every_channel(run):
     ends = [f"{name}_rotation" for name in ("pinion", "wheel", "motor", "load")]
     channels = {"sensing.channels": ["pinion_y", *ends]}
     (record,) = simulate_together(
-        [run({**ROTORS, SPEED: RAMP, TORQUE: RAMP, **channels}, MISSING)]
+        [
+            run(
+                {
+                    **ROTORS,
+                    SPEED: RAMP,
+                    TORQUE: RAMP,
+                    **channels,
+                },
+                MISSING,
+            )
+        ]
     )
+
     assert record.acceleration.shape == (5, 1536)
     assert (record.acceleration.std(axis=-1) > 1.0).all()

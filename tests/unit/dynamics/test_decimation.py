@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from closeness import assert_close
 
-from gensig.dynamics._vector import LANES, n_lanes
+from gensig.dynamics._vector import LANES
 from gensig.dynamics.decimation import (
     ATTENUATION_DB,
     STORED,
@@ -25,17 +25,19 @@ N_SAMPLES = 2048
 
 def decimated(frequency, factor, phase=0.4):
     """A sine as means over internal steps through the decimator, and sampled at the output rate."""
-    low_pass, turn = decimator(factor), 2 * np.pi * frequency
-    steps = np.arange(
-        -low_pass.margin * factor - 1, (N_SAMPLES + low_pass.margin) * factor + 1
-    )
-    edge = steps / (RATE * factor)
-    integral = (
-        -np.cos(turn * edge + phase) / turn if frequency else edge * np.sin(phase)
-    )
+    low_pass = decimator(factor)
+    turn = 2 * np.pi * frequency
+    first = -low_pass.margin * factor - 1
+    last = (N_SAMPLES + low_pass.margin) * factor
+    edge = np.arange(first, last + 1) / (RATE * factor)
+    if frequency:
+        integral = -np.cos(turn * edge + phase) / turn
+    else:
+        integral = edge * np.sin(phase)
     means = np.diff(integral) * RATE * factor
     samples = low_pass.apply_to_columns(means[:, None])[:, 0]
-    return samples, np.sin(turn * np.arange(N_SAMPLES) / RATE + phase)
+    times = np.arange(N_SAMPLES) / RATE
+    return samples, np.sin(turn * times + phase)
 
 
 @pytest.mark.parametrize("factor", FACTORS)
@@ -46,62 +48,56 @@ def test_the_pass_band_is_flat_and_keeps_the_phase(frequency, factor):
 
 
 @pytest.mark.parametrize("factor", FACTORS)
-def test_aliases_are_78_db_down(factor):
-    for alias in (25.0, 690.0, 12_000.0, 19_990.0, 25_500.0):
-        for frequency in (RATE - alias, RATE + alias, 2 * RATE - alias):
-            if frequency < 0.5 * factor * RATE:
-                assert np.abs(decimated(frequency, factor)[0]).max() < 10 ** (-78 / 20)
-    times = np.arange(N_SAMPLES) / RATE
-    assert (
-        np.abs(np.sin(2 * np.pi * (RATE - 690.0) * times)).max() > 0.9
-    )  # without the filter
+@pytest.mark.parametrize("alias", [25.0, 690.0, 12_000.0, 19_990.0, 25_500.0])
+def test_aliases_are_78_db_down(factor, alias):
+    for frequency in (
+        RATE - alias,
+        RATE + alias,
+        2 * RATE - alias,
+    ):
+        if frequency < 0.5 * factor * RATE:
+            samples, _ = decimated(frequency, factor)
+            assert np.abs(samples).max() < 10 ** (-78 / 20)
 
 
 @pytest.mark.parametrize("factor", FACTORS)
 @pytest.mark.parametrize("n_samples", [1, 37])
 def test_channels_and_lanes_are_filtered_alone(n_samples, factor):
     """Against the plain sum of taps times means, for any remainder of the taps by four."""
-    low_pass, rng = decimator(factor), np.random.default_rng(2)
+    low_pass = decimator(factor)
+    rng = np.random.default_rng(2)
     n_steps = (n_samples + 2 * low_pass.margin) * factor + 1
     for n_cut in (0, 1, 3):
         taps = low_pass.taps[: len(low_pass.taps) - n_cut]
         means = rng.standard_normal((n_steps, 3, LANES))
-        windows = np.lib.stride_tricks.sliding_window_view(means[1:], len(taps), axis=0)
-        expected = (windows[::factor][:n_samples] @ taps).transpose(2, 1, 0)
+        windows = np.lib.stride_tricks.sliding_window_view(
+            means[1:],
+            len(taps),
+            axis=0,
+        )
+        expected = (windows[::factor][:n_samples] @ taps).transpose(
+            2,
+            1,
+            0,
+        )
         samples = replace(low_pass, taps=taps).apply(means)
         assert_close(samples, expected, atol=1e-14)
     means[7:, :, 2] = np.nan
-    spoilt, others = replace(low_pass, taps=taps).apply(means), np.arange(LANES) != 2
+    spoilt = replace(low_pass, taps=taps).apply(means)
+    others = np.arange(LANES) != 2
+
     assert spoilt[others].tobytes() == samples[others].tobytes()
     assert np.isnan(spoilt[2]).all()
-
-
-@pytest.mark.parametrize("factor", FACTORS)
-def test_float32_keeps_six_digits(factor):
-    """Sixteen lanes; the samples are float64."""
-    low_pass, n = decimator(factor), n_lanes("float32")
-    n_steps = (20 + 2 * low_pass.margin) * factor + 1
-    means = np.random.default_rng(5).standard_normal((n_steps, 2, n))
-    samples = low_pass.apply(means.astype(np.float32))
-    halves = [low_pass.apply(half.copy()) for half in np.split(means, 2, axis=2)]
-    assert samples.dtype == np.float64
-    assert_close(samples, np.concatenate(halves), atol=1e-6)
-
-
-@pytest.mark.parametrize("factor", FACTORS)
-def test_taps_are_symmetric_and_reach_the_margin(factor):
-    low_pass = decimator(factor)
-    assert len(low_pass.taps) == 2 * low_pass.margin * factor
-    assert_close(low_pass.taps, low_pass.taps[::-1], atol=1e-13)
-    assert_close(low_pass.taps.sum(), 1.0, 5e-4)
 
 
 def test_stored_taps_are_those_of_the_design(composed_config):
     stored = {int(factor) for factor in json.loads(STORED.read_text())}
     default = composed_config["solver"]["oversampling"]
     assert stored == {default, 2 * default}
+
     for factor in stored:
-        low_pass, designed = decimator(factor), design(factor)
+        low_pass = decimator(factor)
+        designed = design(factor)
         assert low_pass.margin == designed.margin
         assert_close(low_pass.taps, designed.taps, atol=1e-15)
 
@@ -109,12 +105,16 @@ def test_stored_taps_are_those_of_the_design(composed_config):
 @pytest.mark.parametrize("finest", [2, 5, 64, 256])
 def test_every_allowed_step_and_its_half_have_a_low_pass(finest):
     """That of half the step, for the error, must not be longer."""
-    fine, factor = decimator(2 * finest), 2 * finest
+    fine = decimator(2 * finest)
+    factor = 2 * finest
     assert fine.margin <= decimator(finest).margin
-    band, folding = usable_band(RATE)[1], (0.5 * factor - 0.3) * RATE
+
+    band = usable_band(RATE)[1]
+    folding = (0.5 * factor - 0.3) * RATE
     frequency = np.array([0.0, band, 0.5 * RATE, 0.7 * RATE, folding]) / (factor * RATE)
     turn = np.exp(-2j * np.pi * np.outer(frequency, np.arange(len(fine.taps))))
     gain = np.abs(turn @ fine.taps) * np.sinc(frequency)
+
     assert_close(gain[:2], 1.0, atol=FLAT)
     assert gain[2:].max() < 10 ** ((3 - ATTENUATION_DB) / 20)
 
@@ -136,9 +136,16 @@ class TestInBandError:
         off = np.zeros_like(exact)
         off[0] = self.tone(5000, 1e-3), self.tone(5000, 1e-2)
         off[1, 0] = self.tone(5000, 2e-5)
-        assert_close(in_band_error(exact + off, exact, RATE), [1e-3, 2e-5], 1e-2)
+
+        assert_close(
+            in_band_error(exact + off, exact, RATE),
+            [1e-3, 2e-5],
+            1e-4,
+        )
+
         scaled = exact[:1] * [[[1.001], [1.02]]]
         assert_close(in_band_error(scaled, exact[:1], RATE), [0.02], 1e-9)
+
         still = np.zeros((1, 1, 256))
         assert in_band_error(still, still, RATE).tolist() == [0.0]
 
@@ -146,15 +153,3 @@ class TestInBandError:
         exact = np.array([[self.tone(1000)]])
         assert in_band_error(exact + self.tone(22_000, 0.5), exact, RATE) < 1e-4
         assert in_band_error(exact + self.tone(19_000, 0.5), exact, RATE) > 0.4
-
-    @pytest.mark.parametrize("n_channels", [1, 2])
-    def test_records_are_independent(self, n_channels):
-        rng = np.random.default_rng(0)
-        exact = rng.standard_normal((8, n_channels, 1536))
-        signal = exact + 1e-4 * rng.standard_normal(exact.shape)
-        together = in_band_error(signal, exact, RATE)
-        for n in (1, 2, 3):
-            assert np.array_equal(
-                in_band_error(signal[:n], exact[:n], RATE), together[:n]
-            )
-        assert np.unique(together).size == 8

@@ -1,42 +1,49 @@
 """Single precision: agreement with double, and sixteen independent records."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from closeness import assert_close
-from core_runs import CoreRun
+from core_runs import (
+    MISSING,
+    PAPER,
+    QUICK,
+    ROTORS,
+    alone,
+    assert_same,
+    bits,
+)
 from fault_cases import one
 
-from gensig.dynamics._kernels import RECENTER
 from gensig.dynamics._vector import n_lanes
 from gensig.dynamics.decimation import in_band_error
 from gensig.errors import SimulationError
-from gensig.faults.broken import MissingTooth
 from gensig.sensing.manufacturing import Specimen
 from gensig.systems.base import simulate_together
 from gensig.systems.run import Run, Start
 
 LANES = n_lanes("float32")
 RATE = 51200.0
-QUICK = {
-    "operating.duration_s": 0.05,
-    "solver.max_error": None,
-    "operating.drive_frequency_hz": 20,
-    "gear.pinion.support.damping_x_ns_per_m": 100,
-    "gear.wheel.support.damping_x_ns_per_m": 500,
-}
 BRIEF = {"operating.duration_s": 0.01}
-PAPER = {"mesh.law": "paper", "mesh.pair_coupling": "sum", "mesh.contact": "linear"}
-MISSING = (MissingTooth(gear="pinion", tooth=3),)
-ROTORS = {"system.motor.inertia_kg_m2": 5e-4, "system.load.inertia_kg_m2": 5e-3}
-LIGHT = {"operating.torque_nm": 2, "operating.speed_rpm": 2500, "gear.backlash_um": 4}
+LIGHT = {
+    "operating.torque_nm": 2,
+    "operating.speed_rpm": 2500,
+    "gear.backlash_um": 4,
+}
 CASES = {
     "crack": ({}, (one("crack"),)),
     "missing": ({"operating.torque_nm": 5}, MISSING),
     "slow": ({"operating.speed_rpm": 600}, ()),
-    "fast": ({"operating.speed_rpm": 6000, "operating.torque_nm": 60}, ()),
-    "ramp": ({"operating.speed_profile": [[-0.4, 0.4], [0.4, 1.6]]}, ()),
+    "fast": (
+        {
+            "operating.speed_rpm": 6000,
+            "operating.torque_nm": 60,
+        },
+        (),
+    ),
+    "ramp": (
+        {"operating.speed_profile": [[-0.4, 0.4], [0.4, 1.6]]},
+        (),
+    ),
     "rotors": (ROTORS, ()),
     "paper": (PAPER, ()),
 }
@@ -45,19 +52,15 @@ CASES = {
 @pytest.fixture(scope="module")
 def run(machine):
     def make(changes=None, faults=(), precision="float32", **values):
-        system = machine({**QUICK, **(changes or {}), "solver.precision": precision})
+        usual = {
+            **QUICK,
+            "operating.duration_s": 0.05,
+            "solver.precision": precision,
+        }
+        system = machine({**usual, **(changes or {})})
         return Run(system=system, faults=tuple(faults), **values)
 
     return make
-
-
-def bits(record):
-    numbers = record.mean_speed, record.contact_loss_fraction
-    return record.acceleration.tobytes(), record.shaft_angle.tobytes(), numbers
-
-
-def alone(runs):
-    return [bits(simulate_together([single])[0]) for single in runs]
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -67,11 +70,18 @@ def test_records_agree_with_double(run, name):
         simulate_together([run(*CASES[name], precision)])[0]
         for precision in ("float32", "float64")
     )
-    signals = single.acceleration[None], double.acceleration[None]
+    signals = (
+        single.acceleration[None],
+        double.acceleration[None],
+    )
     assert 1e-8 < in_band_error(*signals, RATE)[0] < 2.5e-5
     assert single.acceleration.dtype == double.acceleration.dtype == np.float64
     assert_close(single.mean_speed, double.mean_speed, 1e-8)
-    assert_close(single.contact_loss_fraction, double.contact_loss_fraction, 1e-3)
+    assert_close(
+        single.contact_loss_fraction,
+        double.contact_loss_fraction,
+        1e-3,
+    )
     assert_close(single.shaft_angle, double.shaft_angle, atol=1e-7)
 
 
@@ -83,6 +93,7 @@ def test_the_shaft_does_not_drift(run):
         for name in ("float32", "float64")
     )
     off = np.abs(single - double).reshape(10, -1)
+
     assert double[-1] > 20 * 2 * np.pi
     assert off.max() < 1e-7
     assert off[-1].max() < 10 * off[0].max()
@@ -95,12 +106,19 @@ class TestBits:
         errors = np.random.default_rng(8).normal(0, 3e-6, (2, 84))
         specimen = Specimen(pinion_error=errors[0, :23], wheel_error=errors[1])
         start = Start(tooth_pinion=5, tooth_wheel=60, phase=0.7)
-        coarse = {"mesh.points_per_pitch": 64, "operating.drive_frequency_hz": 9}
+        coarse = {
+            "mesh.points_per_pitch": 64,
+            "operating.drive_frequency_hz": 9,
+        }
         return [
             run(BRIEF, start=start),
             run({**BRIEF, **LIGHT}, MISSING),
             run({**BRIEF, **coarse}),
-            run(BRIEF, [one("crack", tooth=4)], specimen=specimen),
+            run(
+                BRIEF,
+                [one("crack", tooth=4)],
+                specimen=specimen,
+            ),
         ]
 
     @pytest.fixture(scope="class")
@@ -113,35 +131,21 @@ class TestBits:
         """Seventeen: one more than a group."""
         order = [(first + k) % len(runs) for k in range(LANES + 1)]
         together = simulate_together([runs[k] for k in order])
-        assert [bits(record) for record in together] == [expected[k] for k in order]
-        assert len(set(expected)) == len(runs)
+        assert_same(together, [expected[k] for k in order])
+        assert len(set(map(bits, expected))) == len(runs)
 
     def test_next_to_a_failure_and_to_records_in_double(self, run, runs, expected):
         proud = np.where(np.arange(23) % 2, -0.03, 0.0)
         specimen = Specimen(pinion_error=proud, wheel_error=np.zeros(84))
         double = run(BRIEF, (), "float64")
-        mixed = [runs[0], run(BRIEF, specimen=specimen), double, *runs[1:]]
+        mixed = [
+            runs[0],
+            run(BRIEF, specimen=specimen),
+            double,
+            *runs[1:],
+        ]
         together = simulate_together(mixed)
+
         assert isinstance(together.pop(1), SimulationError)
-        assert [bits(together.pop(1))] == alone([double])
-        assert [bits(record) for record in together] == expected
-
-    def test_the_paper_law(self, run):
-        law = {**PAPER, **BRIEF}
-        runs = [run(law), run(law, MISSING), run({**law, "mesh.points_per_pitch": 64})]
-        together = [bits(record) for record in simulate_together(runs[::-1])]
-        assert together == alone(runs)[::-1]
-
-
-def test_recentring_keeps_the_rotation(xiamen, dynamics_of):
-    """The pinion begins 10 mrad ahead, which moves from float32 to float64 without a jump."""
-    dynamics = replace(dynamics_of(xiamen), start_phase=0.3)
-    core = CoreRun([dynamics], 1 / (51200 * 5), precision="float32", first_step=1)
-    core.state[0] += 1e-2 * core.group.rotation.reshape(-1, LANES)
-    turns = []
-    for _ in range(2 * RECENTER):
-        core.means(1)
-        turns.append(core.whole[0, 2, 0])
-    assert_close(turns[0], 1e-2, 1e-3)
-    assert core.center[0] > 0.9e-2
-    assert np.abs(np.diff(turns, 2)).max() < 1e-6
+        assert_same([together.pop(1)], alone([double]))
+        assert_same(together, expected)

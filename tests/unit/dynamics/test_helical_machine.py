@@ -31,7 +31,10 @@ AXIAL = {
     "damping_z_ns_per_m": 5.0,
     "damping_tilt_nms_per_rad": 0.1,
 }
-ROTORS = {"system.motor.inertia_kg_m2": 2e-3, "system.load.inertia_kg_m2": 0.05}
+ROTORS = {
+    "system.motor.inertia_kg_m2": 2e-3,
+    "system.load.inertia_kg_m2": 0.05,
+}
 
 
 @pytest.fixture(scope="module")
@@ -47,15 +50,27 @@ def helical(xiamen, spur):
 
 def test_a_support_takes_axial_keys_or_none():
     assert read(Support, SUPPORT, "support").stiffness_z == 0.0
+
     held = read(Support, {**SUPPORT, **AXIAL}, "support")
-    axial = held.stiffness_z, held.stiffness_tilt, held.damping_z, held.damping_tilt
+    axial = (
+        held.stiffness_z,
+        held.stiffness_tilt,
+        held.damping_z,
+        held.damping_tilt,
+    )
     assert_close(axial, [2e7, 3e4, 5.0, 0.1], 1e-12)
 
 
 @pytest.mark.parametrize(
     ("keys", "text"),
     [
-        *[({key: -1.0}, f"support.{key} = -1 must not be negative") for key in AXIAL],
+        *[
+            (
+                {key: -1.0},
+                f"support.{key} = -1 must not be negative",
+            )
+            for key in AXIAL
+        ],
         ({"stiffness_tilt_n_per_m": 1.0}, "has the wrong unit"),
     ],
 )
@@ -67,13 +82,26 @@ def test_impossible_axial_keys_are_refused(keys, text):
 def test_masses_and_supports_of_the_axial_motions(helical):
     system = helical.system()
     for name in AXIAL_DOFS:
-        dof, gear = helical.dofs.index(name), getattr(helical, name.partition("_")[0])
+        dof = helical.dofs.index(name)
+        gear = getattr(helical, name.partition("_")[0])
         held = gear.support
         expected = gear.mass, held.stiffness_z, held.damping_z
         if "tilt" in name:
-            expected = gear.tilt_inertia, held.stiffness_tilt, held.damping_tilt
-        diagonals = system.mass, np.diag(system.stiffness), np.diag(system.damping)
-        assert_close([values[dof] for values in diagonals], expected, 1e-12)
+            expected = (
+                gear.tilt_inertia,
+                held.stiffness_tilt,
+                held.damping_tilt,
+            )
+        diagonals = (
+            system.mass,
+            np.diag(system.stiffness),
+            np.diag(system.damping),
+        )
+        assert_close(
+            [values[dof] for values in diagonals],
+            expected,
+            1e-12,
+        )
         assert np.count_nonzero(system.stiffness[dof]) == 1
         assert system.rotation[dof] == 0.0
 
@@ -81,27 +109,37 @@ def test_masses_and_supports_of_the_axial_motions(helical):
 def test_motor_and_load_follow_the_gears(helical, machine):
     driven = machine(ROTORS)
     whole = replace(helical, motor=driven.motor, load=driven.load)
-    assert whole.dofs == (*PAIR_DOFS, *AXIAL_DOFS, "motor_rotation", "load_rotation")
+    assert whole.dofs == (
+        *PAIR_DOFS,
+        *AXIAL_DOFS,
+        "motor_rotation",
+        "load_rotation",
+    )
+
     approach = whole.approach_direction() @ whole.system().rotation
     assert_close(approach, 0.0, atol=1e-15)
     assert isinstance(pack([whole], 1e-6), HelicalGroup)
 
 
 def test_supports_hold_the_mesh_force_at_rest(helical):
-    force, rest = helical.mesh_force, helical.rest()
+    force = helical.mesh_force
+    rest = helical.rest()
     held = helical.system().stiffness @ rest + force * helical.approach_direction()
     moving = [not name.endswith("rotation") for name in helical.dofs]
+
     assert_close(held[moving], 0.0, atol=1e-9 * force)
     assert rest[2] == 0.0
 
 
 @pytest.mark.parametrize("key", ["stiffness_z", "stiffness_tilt", "tilt_inertia"])
 def test_a_gear_without_axial_support_is_refused(helical, key):
-    body, support = helical.wheel, helical.wheel.support
+    body = helical.wheel
+    support = helical.wheel.support
     if key == "tilt_inertia":
         loose = replace(body, tilt_inertia=0.0)
     else:
         loose = replace(body, support=replace(support, **{key: 0.0}))
+
     with pytest.raises(ConfigError, match=r"gear\.wheel: a helical pair needs"):
         replace(helical, wheel=loose)
 
@@ -109,7 +147,10 @@ def test_a_gear_without_axial_support_is_refused(helical, key):
 def test_too_many_pairs_are_refused(helical):
     last = helical.table.first_pitch + MOST_PAIRS + 1
     with pytest.raises(ConfigError, match=f"{MOST_PAIRS + 1} pairs of teeth"):
-        replace(helical, table=replace(helical.table, last_pitch=last))
+        replace(
+            helical,
+            table=replace(helical.table, last_pitch=last),
+        )
 
 
 def test_axial_channels_are_those_of_helical_gears(helical, spur):
@@ -117,9 +158,14 @@ def test_axial_channels_are_those_of_helical_gears(helical, spur):
     text = r"sensing\.channels: no channel pinion_z; allowed: pinion_x"
     with pytest.raises(ConfigError, match=text):
         check_channels(("pinion_z",), spur.dofs)
+
     turning = [name for name in helical.dofs if is_turning(name)]
     tilts = [name for name in AXIAL_DOFS if "tilt" in name]
-    assert turning == ["pinion_rotation", "wheel_rotation", *tilts]
+    assert turning == [
+        "pinion_rotation",
+        "wheel_rotation",
+        *tilts,
+    ]
 
 
 def test_a_gearbox_keeps_the_axial_support(xiamen):
@@ -127,32 +173,46 @@ def test_a_gearbox_keeps_the_axial_support(xiamen):
     body = Body(mass=2.0, inertia=1e-3, support=held, tilt_inertia=6e-4)
 
     def mounted(low, high):
-        limits = {"support_damping_ratio_low": low, "support_damping_ratio_high": high}
+        limits = {
+            "support_damping_ratio_low": low,
+            "support_damping_ratio_high": high,
+        }
         quality = replace(xiamen.quality, **limits)
         return in_gearbox(body, nominal_gearbox(4), slice(0, 2), quality).support
 
     assert mounted(None, None) == held
+
     drawn = mounted(0.02, 0.04)
     twice_ratio = drawn.damping_x / np.sqrt(1e8 * 2.0)
     assert_close(drawn.damping_z, twice_ratio * np.sqrt(2e7 * 2.0), 1e-12)
-    assert_close(drawn.damping_tilt, twice_ratio * np.sqrt(3e4 * 6e-4), 1e-12)
+    assert_close(
+        drawn.damping_tilt,
+        twice_ratio * np.sqrt(3e4 * 6e-4),
+        1e-12,
+    )
 
 
 def test_pairs_and_lag_follow_the_table(helical, spur):
     assert pitches(spur.table) == (-1, 3)
     assert half_lag(spur.table) == 0.0
+
     first, last = pitches(helical.table)
     assert pack([helical], 1e-6).n_pairs == last - first > 4
+
     pair = helical.table.pair
     assert_close(
-        2.0 * half_lag(helical.table), pair.overlap_ratio * pair.base_pitch, 1e-12
+        2.0 * half_lag(helical.table),
+        pair.overlap_ratio * pair.base_pitch,
+        1e-12,
     )
 
 
 def test_sliding_turns_with_the_middle_of_the_face_at_the_pitch_point(helical):
-    table, lag = helical.table, half_lag(helical.table)
+    table = helical.table
+    lag = half_lag(helical.table)
     position = table.pair.pitch_point + lag + np.linspace(-0.3, 0.3, 7) * lag
     arms = loss_arm(table, position)
+
     assert_close(arms, arms[::-1], 1e-9)
     assert (arms[:3] > 0).all()
     assert abs(arms[3]) < 1e-12
@@ -163,9 +223,11 @@ def test_unused_kinds_of_teeth_are_not_stored(spur):
     table = as_chords(spur.table, 2)
     names = "compliance", "compliance_slope", "gap", "gap_slope"
     three = {name: np.concatenate([getattr(table, name)] * 3) for name in names}
-    kind, present = np.full_like(table.pinion_kind, 2), np.array([True, True, False])
+    kind = np.full_like(table.pinion_kind, 2)
+    present = np.array([True, True, False])
     odd = replace(table, **three, pinion_kind=kind, pinion_present=present)
     missing, sound = (pack([with_table(spur, each)], 1e-6) for each in (odd, table))
+
     assert missing.table.size == 2 * sound.table.size
     assert (missing.tooth_row[: len(kind)] == -1).all()
 

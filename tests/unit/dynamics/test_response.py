@@ -5,14 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closeness import assert_close
-from scipy.signal import lsim
 
-from gensig.dynamics.pair import PINION_X, WHEEL_Y, Rotor
+from gensig.dynamics.pair import PINION_X, Rotor
 from gensig.dynamics.response import accelerations
 
 ROTORS = {
-    "motor": Rotor(inertia=2e-3, coupling_stiffness=3e3, coupling_damping_ratio=0.05),
-    "load": Rotor(inertia=8e-2, coupling_stiffness=1e4, coupling_damping_ratio=0.03),
+    "motor": Rotor(
+        inertia=2e-3,
+        coupling_stiffness=3e3,
+        coupling_damping_ratio=0.05,
+    ),
+    "load": Rotor(
+        inertia=8e-2,
+        coupling_stiffness=1e4,
+        coupling_damping_ratio=0.03,
+    ),
 }
 
 
@@ -26,39 +33,33 @@ def responses(dynamics, frequencies, dof):
 def test_across_the_line_of_action_a_gear_is_one_mass_on_its_support(
     xiamen, dynamics_of
 ):
-    w, body = np.array([10.0, 1e3, 1e5]), xiamen.pinion
+    w = np.array([10.0, 1e3, 1e5])
+    body = xiamen.pinion
     response = responses(dynamics_of(xiamen), w, PINION_X)
-    stiffness, damping = body.support.stiffness_x, body.support.damping_x
+    stiffness = body.support.stiffness_x
+    damping = body.support.damping_x
     expected = -(w**2) / (stiffness - w**2 * body.mass + 1j * w * damping)
+
     assert_close(response[:, PINION_X], expected, 1e-9)
     assert np.all(np.delete(response, PINION_X, axis=1) == 0.0)
 
 
-def test_a_mass_is_free_above_every_mode_and_on_a_spring_below(xiamen, dynamics_of):
-    low, high = responses(dynamics_of(xiamen), [1e-3, 1e9], WHEEL_Y)[:, WHEEL_Y]
-    assert_close(high, 1.0 / xiamen.wheel.mass, 1e-3)
-    assert_close(low / 1e-6, -1.0 / xiamen.wheel.support.stiffness_y, 1e-3)
-
-
 @pytest.mark.parametrize("rotors", [{}, ROTORS], ids=["pair", "motor and load"])
 @pytest.mark.parametrize("name", ["pinion_y", "wheel_rotation"])
-def test_it_is_the_steady_motion_in_time(xiamen, dynamics_of, rotors, name):
-    """A solution in time that begins in the steady state stays in it."""
+def test_it_solves_the_equations_of_motion(xiamen, dynamics_of, rotors, name):
+    """M x'' + C x' + K x = F with the mesh as a spring and a damper."""
     dynamics = replace(dynamics_of(xiamen), **rotors)
-    system, direction = dynamics.system(), dynamics.approach_direction()
-    n, dof, w = len(dynamics.dofs), dynamics.dofs.index(name), 2.0 * np.pi * 240.0
-    mesh, mass = np.outer(direction, direction), system.mass[:, None]
-    stiffness = (system.stiffness + dynamics.mean_mesh_stiffness * mesh) / mass
-    damping = (system.damping + dynamics.mesh_damping * mesh) / mass
-    state = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]])
-    push = np.zeros((2 * n, 1))
-    push[n + dof] = 1.0 / system.mass[dof]
-    steady = np.linalg.solve(1j * w * np.eye(2 * n) - state, push[:, 0])
-    times = np.arange(4000) * 2e-6
-    force = np.cos(w * times)
-    outputs = np.eye(2 * n), np.zeros((2 * n, 1))
-    _, _, motion = lsim((state, push, *outputs), force, times, X0=steady.real)
-    acceleration = motion @ state[n:].T + push[n:, 0] * force[:, None]
-    response = responses(dynamics, [w], dof)[0]
-    expected = np.real(response * np.exp(1j * w * times)[:, None])
-    assert_close(acceleration, expected, atol=1e-4 * np.abs(expected).max())
+    system = dynamics.system()
+    direction = dynamics.approach_direction()
+    dof = dynamics.dofs.index(name)
+    w = 2.0 * np.pi * 240.0
+
+    acceleration = responses(dynamics, [w], dof)[0]
+
+    speed = acceleration / (1j * w)
+    moved = speed / (1j * w)
+    mesh = dynamics.mean_mesh_stiffness * moved + dynamics.mesh_damping * speed
+    held = system.stiffness @ moved + system.damping @ speed
+    force = system.mass * acceleration + held + direction * (direction @ mesh)
+
+    assert_close(force, np.eye(len(force))[dof], atol=1e-9)

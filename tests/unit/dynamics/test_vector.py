@@ -30,7 +30,12 @@ ODD = {
     "float32": [*SPECIAL, 1e-45, -1e-40, 3.4e38],
 }
 EXPONENTS = {"float64": 200, "float32": 25}
-OPERATIONS = operator.add, operator.sub, operator.mul, operator.truediv
+OPERATIONS = (
+    operator.add,
+    operator.sub,
+    operator.mul,
+    operator.truediv,
+)
 N_RESULTS = 13
 COMPILED = njit(error_model="numpy")
 
@@ -42,9 +47,13 @@ def lane_by_lane(read, per_row, n):
     def every(rows, numbers, out, above):
         """``rows`` holds groups of four vectors; ``above`` takes any_above of a and b."""
         for k in range(len(above)):
-            here, there, x = k * 4 * per_row, k * N_RESULTS * n, numbers[k]
-            a, b = read(rows, here), read(rows, here + per_row)
-            yes, no = read(rows, here + 2 * per_row), read(rows, here + 3 * per_row)
+            here = k * 4 * per_row
+            there = k * N_RESULTS * n
+            x = numbers[k]
+            a = read(rows, here)
+            b = read(rows, here + per_row)
+            yes = read(rows, here + 2 * per_row)
+            no = read(rows, here + 3 * per_row)
             results = (
                 a + b,
                 a - b,
@@ -90,8 +99,10 @@ def move_four(values, source, target, out):
 @COMPILED
 def transposed(rows, columns, picked):
     for k in range(0, len(rows), FOUR * FOUR):
-        a, b = load_four(rows, k), load_four(rows, k + FOUR)
-        c, d = load_four(rows, k + 2 * FOUR), load_four(rows, k + 3 * FOUR)
+        a = load_four(rows, k)
+        b = load_four(rows, k + FOUR)
+        c = load_four(rows, k + 2 * FOUR)
+        d = load_four(rows, k + 3 * FOUR)
         results = transpose(a, b, c, d)
         for row in range(FOUR):
             store(columns, k + row * FOUR, results[row])
@@ -111,15 +122,25 @@ def precision(request):
 
 def draw(precision, *size):
     """Random numbers, a third of them special."""
-    rng, reach = np.random.default_rng(4), EXPONENTS[precision]
+    rng = np.random.default_rng(4)
+    reach = EXPONENTS[precision]
     values = rng.standard_normal(size) * 10.0 ** rng.integers(-reach, reach, size)
-    return np.where(rng.random(size) < 0.3, rng.choice(ODD[precision], size), values)
+    return np.where(
+        rng.random(size) < 0.3,
+        rng.choice(ODD[precision], size),
+        values,
+    )
 
 
 def compute(kind, rows, scalars):
     out = np.empty((len(rows), N_RESULTS, rows.shape[2]), dtype=kind[0])
     above = np.empty(len(rows), dtype=np.bool_)
-    SHAPES[kind][0](rows.ravel(), scalars, out.ravel(), above)
+    SHAPES[kind][0](
+        rows.ravel(),
+        scalars,
+        out.ravel(),
+        above,
+    )
     return out.swapaxes(0, 1), above
 
 
@@ -135,10 +156,8 @@ def assert_same(numbers, expected):
 def test_operations_lane_by_lane(precision, shape):
     kind = precision, shape
     n = SHAPES[kind][1]
-    rows, scalars = (
-        draw(precision, N_GROUPS, 4, n).astype(precision),
-        draw(precision, N_GROUPS),
-    )
+    rows = draw(precision, N_GROUPS, 4, n).astype(precision)
+    scalars = draw(precision, N_GROUPS)
     rows[::5, 1] = rows[::5, 0]
     results, above = compute(kind, rows, scalars)
     a, b, yes, no = rows.swapaxes(0, 1)
@@ -147,13 +166,17 @@ def test_operations_lane_by_lane(precision, shape):
     with np.errstate(all="ignore"):
         expected = [apply(*pair) for pair in operands for apply in OPERATIONS]
     for values, wanted in zip(
-        results, [*expected, np.where(a > b, yes, no)], strict=True
+        results,
+        [*expected, np.where(a > b, yes, no)],
+        strict=True,
     ):
         assert_same(values, wanted)
+
     assert all(np.isnan(values).any() for values in (*expected, x))
     assert 0.2 < (a > b).mean() < 0.8
     assert above.tolist() == (a > b).any(axis=1).tolist()
     assert 0 < above.sum() < N_GROUPS
+
     tiniest = np.finfo(precision).smallest_subnormal
     for lane in range(n):
         others = np.delete(np.arange(n), lane)
@@ -163,14 +186,20 @@ def test_operations_lane_by_lane(precision, shape):
             beside = compute(kind, changed, scalars)[0]
             assert beside[..., others].tobytes() == results[..., others].tobytes()
         pair = np.zeros((2, 4, n), dtype=precision)
-        pair[0, 0, lane], pair[1, 1, lane] = tiniest, 1.0
-        assert compute(kind, pair, np.ones(2))[1].tolist() == [True, False]
+        pair[0, 0, lane] = tiniest
+        pair[1, 1, lane] = 1.0
+        assert compute(kind, pair, np.ones(2))[1].tolist() == [
+            True,
+            False,
+        ]
 
 
 def test_rows_of_four_are_transposed(precision):
     rows = draw(precision, N_GROUPS, FOUR, FOUR).astype(precision)
-    columns, picked = np.empty_like(rows), np.empty_like(rows[:, 0])
+    columns = np.empty_like(rows)
+    picked = np.empty_like(rows[:, 0])
     transposed(rows.ravel(), columns.ravel(), picked.ravel())
+
     assert_same(columns, rows.transpose(0, 2, 1))
     assert_same(picked, rows[:, 0, [1, 1, 3, 3]])
 
@@ -192,14 +221,22 @@ def test_rows_move_anywhere(precision, move):
 
 def test_a_vector_needs_an_array_of_its_kind(precision):
     (other,) = (name for name in PRECISIONS if name != precision)
-    values, out = np.zeros(16, dtype=precision), np.full(16, 7.0, dtype=other)
+    values = np.zeros(16, dtype=precision)
+    out = np.full(16, 7.0, dtype=other)
     n = n_lanes(precision)
     for move, text in (
-        (move_row, f"{precision}x{n} is no row of an array of {other}"),
-        (move_four, f"{precision}x{FOUR} does not fit an array of {other}"),
+        (
+            move_row,
+            f"{precision}x{n} is no row of an array of {other}",
+        ),
+        (
+            move_four,
+            f"{precision}x{FOUR} does not fit an array of {other}",
+        ),
     ):
         with pytest.raises(TypeError, match=text):
             move(values, 0, 0, out)
+
     assert (out == 7.0).all()
 
 
@@ -208,4 +245,7 @@ def test_a_number_is_spread_over_a_group_of_64_bytes(precision):
     for value in ODD[precision]:
         out = np.full(n + 2, 7.0, dtype=precision)
         assert spread_over(value, out) == (n, 3 * 7 + 2)
-        assert_same(out, np.array([7.0, *[value] * n, 7.0], dtype=precision))
+        assert_same(
+            out,
+            np.array([7.0, *[value] * n, 7.0], dtype=precision),
+        )

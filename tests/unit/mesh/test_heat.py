@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closeness import assert_close
 
 from gensig.errors import ConfigError, ExtrapolationError
 from gensig.mesh.sliced.slice_pressure import contact_pressure
@@ -27,7 +28,11 @@ def duty():
     return read_duty(
         compose(
             "generate",
-            ["system=helical_pair", "gear=chongqing_40_162", "heat=chongqing_rated"],
+            [
+                "system=helical_pair",
+                "gear=chongqing_40_162",
+                "heat=chongqing_rated",
+            ],
         )
     )
 
@@ -46,12 +51,20 @@ def flash(duty, position, load, *, friction=0.05, speed=SPEED):
 
 def test_friction_heat_is_friction_times_load_times_sliding(duty):
     """Even loads along the path: the mean of |v1 - v2| has a closed form."""
-    pair, force, n = duty.system.pair, 1e5, 4000
+    pair = duty.system.pair
+    force = 1e5
+    n = 4000
     position = (np.arange(n) + 0.5)[None, None] / n * pair.path_of_contact
     result = friction_heat(
-        pair, position, np.ones_like(position), force=force, friction=0.04, speed=SPEED
+        pair,
+        position,
+        np.ones_like(position),
+        force=force,
+        friction=0.04,
+        speed=SPEED,
     )
-    before, after = pair.pitch_point, pair.path_of_contact - pair.pitch_point
+    before = pair.pitch_point
+    after = pair.path_of_contact - pair.pitch_point
     mean = (
         0.5
         * (before**2 + after**2)
@@ -59,8 +72,11 @@ def test_friction_heat_is_friction_times_load_times_sliding(duty):
         * SPEED
         * (1.0 + 1.0 / pair.ratio)
     )
-    assert result == pytest.approx(
-        0.04 * force / math.cos(pair.base_helix_angle) * mean, rel=1e-6
+
+    assert_close(
+        result,
+        0.04 * force / math.cos(pair.base_helix_angle) * mean,
+        1e-6,
     )
 
 
@@ -68,10 +84,11 @@ def test_sliding_vanishes_at_the_pitch_point_alone(duty):
     pair = duty.system.pair
     position = np.array([0.0, pair.pitch_point, pair.path_of_contact])
     pinion, wheel = rolling_speeds(pair, position, SPEED)
-    assert pinion[1] == pytest.approx(wheel[1], rel=1e-12)
+
+    assert_close(pinion[1], wheel[1], 1e-12)
     assert pinion[0] < wheel[0]
     assert pinion[2] > wheel[2]
-    assert flash(duty, position, 3e5)[1] == pytest.approx(0.0, abs=1e-9)
+    assert_close(flash(duty, position, 3e5)[1], 0.0, atol=1e-9)
 
 
 def test_flash_scales_as_blok_says(duty):
@@ -80,19 +97,19 @@ def test_flash_scales_as_blok_says(duty):
     """
     position = np.linspace(0.0, duty.system.pair.path_of_contact, 9)
     one = flash(duty, position, 3e5)
-    np.testing.assert_allclose(
-        flash(duty, position, 3e5, friction=0.1), 2.0 * one, rtol=1e-12
-    )
-    np.testing.assert_allclose(flash(duty, position, 6e5), 2.0**0.75 * one, rtol=1e-12)
-    np.testing.assert_allclose(
-        flash(duty, position, 3e5, speed=4 * SPEED), 2.0 * one, rtol=1e-12
+    assert_close(flash(duty, position, 3e5, friction=0.1), 2.0 * one, 1e-12)
+    assert_close(flash(duty, position, 6e5), 2.0**0.75 * one, 1e-12)
+    assert_close(
+        flash(duty, position, 3e5, speed=4 * SPEED),
+        2.0 * one,
+        1e-12,
     )
     assert flash(duty, position, np.zeros(9)).max() == 0.0
 
 
 def test_blok_s_constants_belong_to_two_widths():
     """1.11 with the full width is 0.785 with half of it."""
-    assert BLOK_SEMI_WIDTH * math.sqrt(2.0) == pytest.approx(1.11, rel=1e-3)
+    assert_close(BLOK_SEMI_WIDTH * math.sqrt(2.0), 1.11, 1e-3)
 
 
 def test_half_width_is_the_one_of_the_pressure(duty):
@@ -101,20 +118,27 @@ def test_half_width_is_the_one_of_the_pressure(duty):
     contact = loaded_contact(system.sliced_mesh(), system.phases(4), system.mesh_force)
     pressure = contact_pressure(system.sliced_mesh(), contact, system.material)
     half = contact_half_width(
-        system.pair, contact.position, contact.line_load, system.material
+        system.pair,
+        contact.position,
+        contact.line_load,
+        system.material,
     )
     bearing = contact.line_load > 0.0
+
     assert bearing.any()
+
     expected = 2.0 * contact.line_load[bearing] / (math.pi * half[bearing])
-    np.testing.assert_allclose(pressure[bearing], expected, rtol=1e-12)
+    assert_close(pressure[bearing], expected, 1e-12)
 
 
 def test_modulus_falls_by_three_per_cent_in_a_hundred_kelvin(duty):
-    assert duty.heat.modulus_ratio(20.0) == pytest.approx(1.0, abs=1e-15)
+    assert_close(duty.heat.modulus_ratio(20.0), 1.0, atol=1e-15)
     assert 0.960 < duty.heat.modulus_ratio(120.0) < 0.975
-    assert replace(duty.heat, reference_temperature=100.0).modulus_ratio(
-        100.0
-    ) == pytest.approx(1.0, abs=1e-15)
+    assert_close(
+        replace(duty.heat, reference_temperature=100.0).modulus_ratio(100.0),
+        1.0,
+        atol=1e-15,
+    )
 
 
 @pytest.mark.parametrize(
@@ -161,12 +185,18 @@ def test_modulus_falls_by_three_per_cent_in_a_hundred_kelvin(duty):
             "has 7 and heat.modulus_gpa 2 values",
         ),
         (
-            ["heat.modulus_temperature_degc=[20,10]", "heat.modulus_gpa=[1,2]"],
+            [
+                "heat.modulus_temperature_degc=[20,10]",
+                "heat.modulus_gpa=[1,2]",
+            ],
             ConfigError,
             "temperatures that rise",
         ),
         (
-            ["heat.modulus_temperature_degc=[10,20]", "heat.modulus_gpa=[-1,2]"],
+            [
+                "heat.modulus_temperature_degc=[10,20]",
+                "heat.modulus_gpa=[-1,2]",
+            ],
             ConfigError,
             "= -1 must be positive",
         ),
@@ -175,7 +205,11 @@ def test_modulus_falls_by_three_per_cent_in_a_hundred_kelvin(duty):
             ConfigError,
             "heat.growth = 'yes_please' is not true or false",
         ),
-        (["+heat.oil_temperature_k=300"], ConfigError, "'oil_temperature_k'"),
+        (
+            ["+heat.oil_temperature_k=300"],
+            ConfigError,
+            "'oil_temperature_k'",
+        ),
         (
             ["heat.oil_temperature_degc=null"],
             ConfigError,
@@ -191,6 +225,13 @@ def test_inputs_that_make_no_heat_are_refused(words, error, message):
 
 
 def test_a_pair_that_stands_still_is_not_heated():
-    words = ["system=helical_pair", "heat=chongqing_rated", "operating.speed_rpm=0"]
-    with pytest.raises(ConfigError, match=r"operating.speed_rpm = 0 must be positive"):
+    words = [
+        "system=helical_pair",
+        "heat=chongqing_rated",
+        "operating.speed_rpm=0",
+    ]
+    with pytest.raises(
+        ConfigError,
+        match=r"operating.speed_rpm = 0 must be positive",
+    ):
         read_duty(compose("generate", words))

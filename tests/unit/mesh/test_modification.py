@@ -4,13 +4,15 @@ import math
 
 import numpy as np
 import pytest
+from closeness import assert_close
 
 from gensig.errors import ConfigError
 from gensig.mesh.modification import FlankModification, PairModification
 from gensig.options.compose import compose
 from gensig.systems.registry import read_modification, read_pair
 
-MICRO, MILLI = 1e-6, 1e-3
+MICRO = 1e-6
+MILLI = 1e-3
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +21,10 @@ def pair():
 
 
 def of_pair(**sides):
-    plain = {"pinion": FlankModification(), "wheel": FlankModification()}
+    plain = {
+        "pinion": FlankModification(),
+        "wheel": FlankModification(),
+    }
     return PairModification(**{**plain, **sides})
 
 
@@ -27,7 +32,11 @@ def at(pair, modification, n_slices=5):
     """Deviation (slice, node) with its positions and places."""
     position = np.linspace(-0.5, 1.5, 401) * pair.path_of_contact
     place = (np.arange(n_slices) + 0.5) * pair.face_width / n_slices
-    return position, place, modification.deviation(pair, position, place)
+    return (
+        position,
+        place,
+        modification.deviation(pair, position, place),
+    )
 
 
 @pytest.mark.parametrize("shape", ["linear", "parabolic"])
@@ -43,17 +52,22 @@ def test_reliefs_have_their_depth_at_the_ends_and_run_out_over_their_height(
     )
     position, _, deviation = at(pair, of_pair(pinion=side))
     # the pinion's tip leaves at E, its lowest point enters at A; beyond both the end counts
-    np.testing.assert_allclose(
-        deviation[:, position >= pair.path_of_contact], 8 * MICRO, rtol=1e-12
+    assert_close(
+        deviation[:, position >= pair.path_of_contact],
+        8 * MICRO,
+        1e-12,
     )
-    np.testing.assert_allclose(deviation[:, position <= 0.0], 3 * MICRO, rtol=1e-12)
+    assert_close(deviation[:, position <= 0.0], 3 * MICRO, 1e-12)
+
     radius = np.hypot(pair.pinion.base_radius, pair.pinion_curvature(position))
     begin = (
         radius > pair.pinion.tip_radius - 0.25 * MILLI
     )  # the upper half of the relief
     inside = begin & (position < pair.path_of_contact)
     least = {"linear": 4, "parabolic": 2}[shape]
-    assert deviation[0, inside].min() == pytest.approx(least * MICRO, rel=0.15)
+
+    assert_close(deviation[0, inside].min(), least * MICRO, 0.15)
+
     lowest = math.hypot(pair.pinion.base_radius, pair.pinion_curvature(0.0))
     between = (radius < pair.pinion.tip_radius - 0.5 * MILLI) & (
         radius > lowest + 0.4 * MILLI
@@ -65,7 +79,7 @@ def test_reliefs_have_their_depth_at_the_ends_and_run_out_over_their_height(
 def test_the_wheel_s_tip_enters_where_the_pinion_s_leaves(pair):
     relief = FlankModification(tip_relief=5 * MICRO, tip_relief_height=0.3 * MILLI)
     position, _, deviation = at(pair, of_pair(wheel=relief))
-    np.testing.assert_allclose(deviation[:, position <= 0.0], 5 * MICRO, rtol=1e-12)
+    assert_close(deviation[:, position <= 0.0], 5 * MICRO, 1e-12)
     assert (deviation[:, position >= pair.path_of_contact] == 0.0).all()
 
 
@@ -73,27 +87,29 @@ def test_crowning_slope_and_end_relief_across_the_face(pair):
     width = pair.face_width
     place = np.array([0.0, 0.25, 0.5, 0.75, 1.0]) * width
     crowned = FlankModification(crowning=4 * MICRO).lead(place, width)
-    np.testing.assert_allclose(crowned, np.array([4, 1, 0, 1, 4]) * MICRO, atol=1e-18)
+
+    assert_close(crowned, np.array([4, 1, 0, 1, 4]) * MICRO, atol=1e-18)
+
     sloped = FlankModification(helix_slope=-4 * MICRO).lead(place, width)
-    np.testing.assert_allclose(
-        sloped, np.array([0, -1, -2, -3, -4]) * MICRO, atol=1e-18
-    )
+    assert_close(sloped, np.array([0, -1, -2, -3, -4]) * MICRO, atol=1e-18)
+
     ended = FlankModification(end_relief=6 * MICRO, end_relief_width=0.5 * width).lead(
         place, width
     )
-    np.testing.assert_allclose(ended, np.array([6, 3, 0, 3, 6]) * MICRO, atol=1e-18)
+    assert_close(ended, np.array([6, 3, 0, 3, 6]) * MICRO, atol=1e-18)
 
 
 def test_two_slopes_of_opposite_sign_leave_an_aligned_pair(pair):
     """A slope on one gear is taken back by the other's; nothing ever stands proud."""
-    one, other = (
-        FlankModification(helix_slope=5 * MICRO),
-        FlankModification(helix_slope=-5 * MICRO),
-    )
+    one = FlankModification(helix_slope=5 * MICRO)
+    other = FlankModification(helix_slope=-5 * MICRO)
     assert np.abs(at(pair, of_pair(pinion=one, wheel=other))[2]).max() < 1e-18
     assert at(pair, of_pair(pinion=other))[2].min() == 0.0
+
     askew = PairModification(
-        pinion=FlankModification(), wheel=other, misalignment=5 * MICRO
+        pinion=FlankModification(),
+        wheel=other,
+        misalignment=5 * MICRO,
     )
     assert np.abs(at(pair, askew)[2]).max() < 1e-18
 
@@ -120,8 +136,14 @@ def test_nothing_is_nothing(pair):
             ["modification.wheel.profile_shape=round"],
             "modification.wheel.profile_shape = 'round'; allowed: linear",
         ),
-        (["+modification.wheel.tip=1"], "modification.wheel: unknown key 'tip'"),
-        (["+modification.helix=1"], "modification: unknown key 'helix'"),
+        (
+            ["+modification.wheel.tip=1"],
+            "modification.wheel: unknown key 'tip'",
+        ),
+        (
+            ["+modification.helix=1"],
+            "modification: unknown key 'helix'",
+        ),
     ],
 )
 def test_keys_that_make_no_flank_are_refused(changes, message):
@@ -142,7 +164,10 @@ def test_reliefs_that_overlap_are_refused(pair):
         match=r"tip_relief_height_mm = 2 and root_relief_height_mm = 2 overlap",
     ):
         at(pair, of_pair(pinion=tall))
-    with pytest.raises(ConfigError, match="at both ends overlaps on a face of 14 mm"):
+    with pytest.raises(
+        ConfigError,
+        match="at both ends overlaps on a face of 14 mm",
+    ):
         at(
             pair,
             of_pair(

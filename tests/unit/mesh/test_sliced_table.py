@@ -7,13 +7,22 @@ from functools import cache
 
 import numpy as np
 import pytest
+from closeness import assert_close
 
 from gensig.errors import FaultError
 from gensig.faults.registry import read_faults
-from gensig.mesh.load_distribution import loaded_pair_table, pair_states, static_mesh
-from gensig.mesh.sliced._slice_kernels import bite_forces
+from gensig.mesh.load_distribution import (
+    loaded_pair_table,
+    pair_states,
+    static_mesh,
+)
+from gensig.mesh.sliced.sliced_statics import chord_equilibrium, chord_states
 from gensig.mesh.sliced.sliced_table import DEEPEST, N_CHORDS
-from gensig.mesh.sliced.slices import Meeting, loaded_contact, single_pair_stiffness
+from gensig.mesh.sliced.slices import (
+    Meeting,
+    loaded_contact,
+    single_pair_stiffness,
+)
 from gensig.plan.request import read_request
 from gensig.systems.registry import read_sliced_pair
 
@@ -29,44 +38,10 @@ def faults_of(*words):
     return read_faults(read_request(["system=helical_pair", *words]).config["fault"])
 
 
-def at_rest(table, roll, force, errors=None):
-    """Approach, and load (phase, pair) of the chords under a total force, by bisection.
-
-    ``errors`` by tooth as in ``Meeting``, tilts at the middle of the face.
-    """
-    pitch = table.pair.base_pitch
-    index = np.floor(roll / pitch).astype(int)[:, None] - table.first_pitch
-    index = index - np.arange(table.last_pitch - table.first_pitch)
-    position = roll[:, None] - index * pitch
-    n_teeth = len(table.pinion_kind), len(table.wheel_kind)
-    kinds = table.pinion_kind[index % n_teeth[0]], table.wheel_kind[index % n_teeth[1]]
-    place = (position - table.position[0]) / (table.position[1] - table.position[0])
-    cell = np.clip(place.astype(int), 0, len(table.position) - 2)
-    part = (place - cell)[:, :, None]
-
-    def read(values):
-        low, high = (values[kinds[0], kinds[1], :, cell + k] for k in (0, 1))
-        return (1.0 - part) * low + part * high
-
-    own, gap = read(table.compliance) - table.shared_compliance, read(table.gap)
-    if errors is not None:
-        middle = position - table.middle_lag - table.pair.pitch_point
-        for side, n in zip(("pinion", "wheel"), n_teeth, strict=True):
-            error = getattr(errors, f"{side}_error")[index % n]
-            tilt = getattr(errors, f"{side}_tilt")[index % n]
-            gap += (error + tilt * middle)[:, :, None]
-    gap[~(table.pinion_present[kinds[0]] & table.wheel_present[kinds[1]])] = np.inf
-
-    def load(within):
-        return np.maximum(((within[:, None, None] - gap) / own).max(axis=2), 0.0)
-
-    low = gap.min(axis=(1, 2))
-    high = low + 1e-3
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        enough = load(middle).sum(axis=1) > force
-        low, high = np.where(enough, low, middle), np.where(enough, middle, high)
-    return low + table.shared_compliance * force, load(low)
+def at_rest(table, roll, force, **errors):
+    """Approach and load (phase, pair) of the chords under a total force."""
+    static = chord_equilibrium(table, chord_states(table, roll, **errors), force)
+    return static.approach, static.load
 
 
 @pytest.mark.parametrize(
@@ -79,92 +54,75 @@ def at_rest(table, roll, force, errors=None):
             "mesh.slice_coupling=independent",
             "mesh.pair_coupling=sum",
         ),
-        ("modification=beihang_both", "modification.misalignment_um=15"),
+        (
+            "modification=beihang_both",
+            "modification.misalignment_um=15",
+        ),
         ("gear=xiamen_23_84",),
         ("mesh.n_slices=160",),
     ],
 )
-def test_equilibrium_is_that_of_the_slices(words):
+@pytest.mark.parametrize("part", [0.5, 1.0, 2.5])
+def test_equilibrium_is_that_of_the_slices(words, part):
+    """Under a part of the set force."""
     system, table, mesh = table_of(*words)
     roll = system.phases(32)
-    for part in (0.5, 1.0, 2.5):
-        exact = loaded_contact(mesh, roll, part * system.mesh_force)
-        approach, load = at_rest(table, roll, part * system.mesh_force)
-        np.testing.assert_allclose(approach, exact.approach, rtol=5e-3 / min(part, 1.0))
-        ripple = np.ptp(exact.approach)
-        most = 0.1 * ripple + 2e-3 * exact.approach.mean()
-        assert np.ptp(approach - exact.approach) < most
-        expected = (exact.line_load * mesh.slice_width).sum(axis=2)
-        # newest first in both; the table may have fewer pairs
-        behind = max(load.shape[1] - expected.shape[1], 0)
-        expected, atol = expected[:, : load.shape[1]], 0.012 * part * system.mesh_force
-        np.testing.assert_allclose(load[:, behind:], expected, atol=atol)
+    force = part * system.mesh_force
+
+    exact = loaded_contact(mesh, roll, force)
+    approach, load = at_rest(table, roll, force)
+
+    assert_close(approach, exact.approach, 5e-3 / min(part, 1.0))
+
+    ripple = np.ptp(exact.approach)
+    most = 0.1 * ripple + 2e-3 * exact.approach.mean()
+    assert np.ptp(approach - exact.approach) < most
+
+    # newest first in both; the table may have fewer pairs
+    expected = (exact.line_load * mesh.slice_width).sum(axis=2)
+    behind = max(load.shape[1] - expected.shape[1], 0)
+    expected = expected[:, : load.shape[1]]
+
+    assert_close(load[:, behind:], expected, atol=0.012 * force)
 
 
 @pytest.mark.parametrize(("n_slices", "share"), [(6, 0.5), (20, 0.1)])
 def test_few_slices_that_enter_over_their_width_are_many(n_slices, share):
     """The table has the ripple of 160 slices; as few slices that enter whole do not."""
     system, table, few = table_of(f"mesh.n_slices={n_slices}")
-    roll, force = system.phases(32), system.mesh_force
-    many = loaded_contact(table_of("mesh.n_slices=160")[2], roll, force).approach
-    error, whole = (
-        np.ptp(approach - many)
-        for approach in (
-            at_rest(table, roll, force)[0],
-            loaded_contact(few, roll, force).approach,
-        )
-    )
+    _, _, finest = table_of("mesh.n_slices=160")
+    roll = system.phases(32)
+    force = system.mesh_force
+
+    many = loaded_contact(finest, roll, force).approach
+    chords, _ = at_rest(table, roll, force)
+    whole = loaded_contact(few, roll, force).approach
+
+    error = np.ptp(chords - many)
+
     assert error < share * np.ptp(many)
-    assert error < 0.4 * whole
-
-
-@pytest.mark.parametrize(
-    "words", [(), ("gear=chongqing_40_162",), ("gear=xiamen_23_84",)]
-)
-def test_chords_err_by_less_than_a_hundredth_of_the_set_force(words):
-    """One tooth pair at 60 depths, up to three times that of the set torque, between the nodes."""
-    system, table, mesh = table_of(*words)
-    end = system.pair.path_of_contact + mesh.lag[-1]
-    place = np.random.default_rng(0).uniform(-0.02, 1.02, 40) * end
-    position = place[:, None] - mesh.lag
-    structure = np.interp(position, mesh.position, mesh.structure)
-    constant = np.interp(position, mesh.position, mesh.contact_constant)
-    pairs = zip(position.T, mesh.gap, strict=True)
-    gap = np.stack([np.interp(at, mesh.position, row) for at, row in pairs], axis=1)
-    first, exact = np.empty(40), np.empty((40, 60))
-    depth = table.depth[-1] * np.arange(1, 61) / 60
-    bite_forces(
-        structure,
-        mesh.contact_factor,
-        constant,
-        mesh.log_weight,
-        gap,
-        np.tile(mesh.slice_width, (40, 1)),
-        mesh.slice_width,
-        mesh.coupling_length_squared,
-        system.mesh_force / system.pair.face_width,
-        depth,
-        1.0,
-        first,
-        exact,
-    )
-    own, far = (
-        np.stack(
-            [np.interp(place, table.position, row) for row in values[0, 0]], axis=1
-        )
-        for values in (table.compliance - table.shared_compliance, table.gap)
-    )
-    deflection = first[:, None, None] + depth[:, None] - far[:, None]
-    result = np.maximum((deflection / own[:, None]).max(axis=2), 0.0)
-    assert exact.max() > system.mesh_force
-    np.testing.assert_allclose(result, exact, atol=0.01 * system.mesh_force)
+    assert error < 0.4 * np.ptp(whole - many)
 
 
 @pytest.mark.parametrize(
     ("fault", "share"),
     [
-        (("fault=crack", "fault.crack_depth_mm=1", "fault.crack_width_mm=5"), 2e-3),
-        (("fault=pitting", "fault.pit_length_mm=0.6", "fault.pit_width_mm=5"), 2e-3),
+        (
+            (
+                "fault=crack",
+                "fault.crack_depth_mm=1",
+                "fault.crack_width_mm=5",
+            ),
+            2e-3,
+        ),
+        (
+            (
+                "fault=pitting",
+                "fault.pit_length_mm=0.6",
+                "fault.pit_width_mm=5",
+            ),
+            2e-3,
+        ),
         (("fault=chipped",), 2e-3),
         (("fault=broken", "fault.broken_height_mm=1"), 3e-3),
         (("fault=missing_tooth",), 2e-3),
@@ -175,14 +133,17 @@ def test_chords_err_by_less_than_a_hundredth_of_the_set_force(words):
 )
 def test_faulty_teeth_have_their_own_chords(fault, share):
     """Over the mesh periods in which tooth 0 meets sound teeth."""
-    system, faults = table_of()[0], faults_of(*fault)
+    system = table_of()[0]
+    faults = faults_of(*fault)
     table = system.mesh_table(faults)
     roll = system.phases(16, first_period=-2, n_periods=8)
     exact = loaded_contact(system.sliced_mesh(faults), roll, system.mesh_force)
     approach, _ = at_rest(table, roll, system.mesh_force)
-    np.testing.assert_allclose(approach, exact.approach, rtol=share)
+
+    assert_close(approach, exact.approach, share)
     assert len(table.pinion_present) == 2
     assert len(table.wheel_present) == 1
+
     sound = at_rest(system.mesh_table(), roll, system.mesh_force)[0]
     assert np.abs(exact.approach - sound).max() > 2.0 * share * sound.max()
 
@@ -191,16 +152,18 @@ def test_errors_of_single_teeth_open_all_chords():
     """Pitch errors and tilts of a grade 5 gear; the table takes tilts at mid-face."""
     system, table, mesh = table_of()
     rng = np.random.default_rng(2)
-    of_teeth = {
+    errors = {
         f"{side}_{kind}": rng.uniform(-most, most, n)
         for side, n in (("pinion", 61), ("wheel", 132))
         for kind, most in (("error", 2e-6), ("tilt", 1e-4))
     }
-    errors = Meeting(**of_teeth)
     roll = system.phases(16, n_periods=20)
-    exact = loaded_contact(mesh, roll, system.mesh_force, errors).approach
-    result = at_rest(table, roll, system.mesh_force, errors)[0]
-    np.testing.assert_allclose(result, exact, rtol=5e-3)
+    force = system.mesh_force
+
+    exact = loaded_contact(mesh, roll, force, Meeting(**errors)).approach
+    result, _ = at_rest(table, roll, force, **errors)
+
+    assert_close(result, exact, 5e-3)
     assert np.ptp(exact) > 1e-6
 
 
@@ -210,9 +173,11 @@ def test_teeth_that_all_share_a_form_are_computed_once():
     form = replace(faults_of("fault=profile_error")[0], tooth="all")
     crack = faults_of("fault=crack", "fault.crack_depth_mm=1", "fault.tooth=3")
     table = system.mesh_table((form, *crack))
+
     assert table.compliance.shape[:2] == (3, 1)
     assert table.pinion_kind[3] == 2
     assert np.bincount(table.pinion_kind).tolist() == [0, 60, 1]
+
     again = system.mesh_table((form,))
     np.testing.assert_array_equal(again.compliance[1, 0], table.compliance[1, 0])
     np.testing.assert_array_equal(again.depth, table.depth)
@@ -220,7 +185,8 @@ def test_teeth_that_all_share_a_form_are_computed_once():
 
 
 def test_too_many_different_teeth_are_refused():
-    system, (runout,) = table_of()[0], faults_of("fault=runout")
+    system = table_of()[0]
+    (runout,) = faults_of("fault=runout")
     message = "62 different teeth of the pinion and 133 of the wheel make 8246 pairs"
     with pytest.raises(FaultError, match=message):
         system.mesh_table((runout, replace(runout, gear="wheel")))
@@ -228,28 +194,39 @@ def test_too_many_different_teeth_are_refused():
 
 def test_chords_are_convex_and_meet():
     system, table, _ = table_of()
+    force = system.mesh_force
     assert len(table.depth) == N_CHORDS
     assert table.depth[0] == 0.0
-    own, gap = table.compliance[0, 0] - table.shared_compliance, table.gap[0, 0]
+
+    compliance = table.compliance[0, 0] - table.shared_compliance
+    gap = table.gap[0, 0]
     near = gap[0] < 20e-6
-    assert (np.diff(own[:, near], axis=0) < 1e-4 * own[1:, near]).all()
+
+    assert (np.diff(compliance[:, near], axis=0) < 1e-4 * compliance[1:, near]).all()
+
     met = gap[0] + table.depth[1:, None]
-    before, after = (met - gap[:-1]) / own[:-1], (met - gap[1:]) / own[1:]
-    atol = 2e-3 * system.mesh_force
-    np.testing.assert_allclose(before[:, near], after[:, near], atol=atol)
+    before = (met - gap[:-1]) / compliance[:-1]
+    after = (met - gap[1:]) / compliance[1:]
+
+    assert_close(before[:, near], after[:, near], atol=2e-3 * force)
+
     # deep enough for three times the load, and the set chord holds the mean load
-    contact = loaded_contact(system.sliced_mesh(), system.phases(64), system.mesh_force)
-    static = contact.approach.max() - table.shared_compliance * system.mesh_force
+    contact = loaded_contact(system.sliced_mesh(), system.phases(64), force)
+    static = contact.approach.max() - table.shared_compliance * force
     assert 0.6 * DEEPEST * static < table.depth[-1] < DEEPEST * static
     assert 0 < table.set_chord < N_CHORDS
 
 
 def test_ends_are_out_of_reach():
-    for words in ((), ("gear=xiamen_23_84",), ("gear=chongqing_40_162",)):
+    for words in (
+        (),
+        ("gear=xiamen_23_84",),
+        ("gear=chongqing_40_162",),
+    ):
         _, table, _ = table_of(*words)
         pitch = table.pair.base_pitch
-        assert table.position[0] == pytest.approx(table.first_pitch * pitch)
-        assert table.position[-1] == pytest.approx(table.last_pitch * pitch)
+        assert_close(table.position[0], table.first_pitch * pitch, 1e-6)
+        assert_close(table.position[-1], table.last_pitch * pitch, 1e-6)
         assert table.gap[0, 0, 0, [0, -1]].min() > 90e-6
         assert np.isfinite(table.compliance).all()
         assert np.isfinite(table.gap).all()
@@ -264,32 +241,39 @@ def test_slopes_are_those_of_the_values():
     ):
         step = 0.5 * distance * (slopes[..., 1:] + slopes[..., :-1])
         atol = 1e-9 * np.abs(values).max()
-        np.testing.assert_allclose(np.diff(values, axis=3), step, atol=atol)
+        assert_close(np.diff(values, axis=3), step, atol=atol)
 
 
 # the spur table's contact is a secant at the load of sound pairs
 @pytest.mark.parametrize(("contact", "rtol"), [("linear", 3e-4), ("weber", 2e-3)])
 def test_zero_helix_is_the_spur_pair_s_table(contact, rtol):
     system, table, _ = table_of(
-        "gear=xiamen_23_84", f"mesh.contact={contact}", "mesh.n_slices=5"
+        "gear=xiamen_23_84",
+        f"mesh.contact={contact}",
+        "mesh.n_slices=5",
     )
     force = system.mesh_force
     spur = loaded_pair_table(system.pair, system.material, system.mesh, force=force)
     roll = system.phases(128)
     exact = static_mesh(spur, pair_states(spur, roll), force)
     approach, _ = at_rest(table, roll, force)
-    np.testing.assert_allclose(approach, exact.approach, rtol=rtol)
+
+    assert_close(approach, exact.approach, rtol)
 
 
 def test_the_papers_law_has_one_chord():
     system, table, mesh = table_of(
-        "mesh.law=paper", "mesh.allow_extrapolation=true", "mesh.contact=linear"
+        "mesh.law=paper",
+        "mesh.allow_extrapolation=true",
+        "mesh.contact=linear",
     )
     assert table.compliance.shape[2] == 1
+
     inside = np.linspace(0.1, 0.9, 17) * (system.pair.path_of_contact + mesh.lag[-1])
     exact = single_pair_stiffness(mesh, inside, system.mesh_force)
     result = 1.0 / np.interp(inside, table.position, table.compliance[0, 0, 0])
+
     # slices that bend each other are stiffer where only a part of the face is loaded
     assert (result > 0.999 * exact).all()
-    np.testing.assert_allclose(result, exact, rtol=0.15)
+    assert_close(result, exact, 0.15)
     np.testing.assert_array_equal(table.gap[0, 0, 0], 0.0)
