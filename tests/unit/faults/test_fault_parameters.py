@@ -271,7 +271,7 @@ class TestSeverity:
         radii = [math.hypot(21.61293e-3, r) for r in (12.56508e-3, 2.019e-3)]
         tip, low = (r * math.cos(pinion.half_tooth_angle_at(r)) for r in radii)
         result = severity([one("pitting")], xiamen.pair)
-        assert_allclose(result, 1e-5 / ((tip - low) * 20e-3), rtol=1e-5, atol=0)
+        assert_allclose(result, 1e-5 / ((tip - low) * 20e-3), rtol=1e-5)
 
     @pytest.mark.parametrize(
         ("words", "expected"),
@@ -299,7 +299,7 @@ class TestSeverity:
     )
     def test_declared_measures(self, xiamen, words, expected):
         result = severity([typed(words)], xiamen.pair)
-        assert_allclose(result, expected, rtol=1e-4, atol=0)
+        assert_allclose(result, expected, rtol=1e-4)
 
     def test_the_largest_of_several(self, xiamen):
         assert severity([], xiamen.pair) == 0.0

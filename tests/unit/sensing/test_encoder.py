@@ -1,6 +1,7 @@
 """An encoder: steps of one line, an error once a turn, a pattern of its own."""
 
 from dataclasses import replace
+from math import tau
 
 import numpy as np
 import pytest
@@ -74,7 +75,7 @@ def test_eccentricity_errs_once_a_turn():
 
 def test_the_pattern_repeats_every_turn_and_is_each_discs_own():
     encoder = replace(PERFECT, line_error=np.radians(0.02), quantised=False)
-    turn = np.linspace(0.0, 2.0 * np.pi, 5000, endpoint=False)
+    turn = np.linspace(0.0, tau, 5000, endpoint=False)
     first, later = error(encoder, 3, turn), error(encoder, 3, turn + 6.0 * np.pi)
     assert_allclose(first, later, atol=1e-9)
     assert abs(np.corrcoef(first, error(encoder, 4, turn))[0, 1]) < 0.1
@@ -88,12 +89,12 @@ def test_lines_pass_in_order_at_the_largest_errors():
     )
     for seed in range(50):
         places = disc_of(encoder, seed).places
-        assert np.all(np.diff([*places, places[0] + 2.0 * np.pi]) > 0.0)
+        assert np.all(np.diff([*places, places[0] + tau]) > 0.0)
 
 
 def test_a_line_is_read_where_it_passes():
     disc = Disc(index=0.5, places=np.array([0.1, np.pi / 2, np.pi, 3 * np.pi / 2]))
-    turned = [0.0, 0.05, 0.11, np.pi - 0.01, np.pi + 0.01, 2 * np.pi + 0.05]
-    angle = 0.5 + np.array([*turned, 2 * np.pi + 0.11])
+    turned = [0.0, 0.05, 0.11, np.pi - 0.01, np.pi + 0.01, tau + 0.05]
+    angle = 0.5 + np.array([*turned, tau + 0.11])
     expected = np.pi / 2 * np.array([-1, -1, 0, 1, 2, 3, 4])
     assert_allclose(disc.read(angle, quantised=True), expected, atol=1e-12)

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from math import tau
 
 import numpy as np
 import pytest
@@ -35,8 +36,8 @@ def disc_of(wheel, seed=0):
 
 def amplitude(signal, order):
     """Of one order of the shaft, over whole turns of it."""
-    n_turns = int(TIME[-1] * MEAN / (2 * np.pi)) - 1
-    n = round(n_turns * 2 * np.pi / MEAN * RATE)
+    n_turns = int(TIME[-1] * MEAN / (tau)) - 1
+    n = round(n_turns * tau / MEAN * RATE)
     window = np.hanning(n)
     wave = np.exp(-1j * order * MEAN * TIME[:n])
     part = window * (signal[:n] - signal[:n].mean()) @ wave
@@ -86,7 +87,7 @@ def test_passages_are_where_the_teeth_are():
     wheel = replace(PERFECT, n_teeth=4)
     times = passage_times(wheel, disc, np.linspace(0.0, 10.0, 1001), 100.0)
     expected = [
-        0.3 + turn * 2 * np.pi + place for turn in (-1, 0, 1) for place in disc.places
+        0.3 + turn * tau + place for turn in (-1, 0, 1) for place in disc.places
     ]
     assert_allclose(times, [one for one in expected if 0.0 <= one <= 10.0], atol=2e-9)
 

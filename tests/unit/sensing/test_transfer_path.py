@@ -3,6 +3,7 @@ states."""
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from gensig.sensing.transfer_path import ModalPath, draw_housing, mode_section
@@ -17,11 +18,11 @@ RANGES = {
 
 def housing(seed=0, **changes):
     path = ModalPath(**{**RANGES, "transmissibility": 0.2, **changes})
-    return draw_housing(np.random.default_rng(seed), path, 4, 3)
+    return draw_housing(default_rng(seed), path, 4, 3)
 
 
 def signals(*shape):
-    return np.random.default_rng(7).standard_normal(shape)
+    return default_rng(7).standard_normal(shape)
 
 
 def test_causal():

@@ -1,5 +1,7 @@
 """Impacts that are known: one, two or none a turn, with a ring-down of a known time."""
 
+from math import tau
+
 import numpy as np
 import pytest
 
@@ -17,10 +19,10 @@ def rings(decay, places=(100,), size=20.0, noise=1.0, seed=0):
     for turn in turns:
         for place in places:
             late = time - place / RATE
-            phase = rng.uniform(0, 2 * np.pi)
+            phase = rng.uniform(0, tau)
             turn += size * np.where(
                 late >= 0,
-                np.exp(-late / decay) * np.cos(2 * np.pi * 1200 * late + phase),
+                np.exp(-late / decay) * np.cos(tau * 1200 * late + phase),
                 0.0,
             )
     return turns

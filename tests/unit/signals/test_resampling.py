@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 
 from gensig.dynamics.decimation import PASS_SHARE as RECORDER_SHARE
@@ -37,7 +38,7 @@ def test_tones_above_half_the_new_rate_do_not_fold(found, wanted):
 
 @pytest.mark.parametrize(("found", "wanted"), PAIRS)
 def test_a_part_has_the_samples_of_the_whole(found, wanted):
-    signal = np.random.default_rng(0).standard_normal((2, 20_000))
+    signal = default_rng(0).standard_normal((2, 20_000))
     change = rate_change(found, wanted)
     whole = change.apply(signal)
     n_samples = whole.shape[1]
@@ -49,7 +50,7 @@ def test_a_part_has_the_samples_of_the_whole(found, wanted):
 
 
 def test_the_same_rate_changes_nothing():
-    signal = np.random.default_rng(0).standard_normal(100)
+    signal = default_rng(0).standard_normal(100)
     change = rate_change(25_600.0, 25_600.0)
     assert change.is_none
     assert_array_equal(change.apply(signal), signal)

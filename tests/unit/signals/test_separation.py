@@ -1,6 +1,8 @@
 """Taking a mesh apart by the teeth of both gears: each gear gets its own part, whatever the other
 does."""
 
+from math import tau
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -24,7 +26,7 @@ def a_pair(n_passages, *, teeth=TEETH, noise=0.0, seed=0):
     def shape(per_passage):
         t = np.arange(per_passage) / per_passage
         bump = np.sin(np.pi * t) ** 2
-        return np.stack([bump * np.sin(2 * np.pi * order * t) for order in (1, 2, 3)])
+        return np.stack([bump * np.sin(tau * order * t) for order in (1, 2, 3)])
 
     passage = np.arange(n_passages)
     size = mesh + sizes[0][passage % teeth[0]] + sizes[1][passage % teeth[1]]
@@ -71,7 +73,7 @@ def test_noise_falls_with_the_passages_of_a_tooth():
 def test_what_lies_above_half_the_samples_is_taken_away_and_does_not_alias():
     t = np.arange(64 * 100)
     is_loud = t // 64 % TEETH[0] == 2
-    high = np.sin(2 * np.pi * 24 * t / 64)[None] * is_loud
+    high = np.sin(tau * 24 * t / 64)[None] * is_loud
     assert rms(separate(high).driving).max() < 0.1 * rms(high).min()
 
 

@@ -1,8 +1,11 @@
 """The mesh of a wandering speed is followed to a fraction of a tooth; noise and other speeds are
 not followed."""
 
+from math import tau
+
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 from gensig.errors import ConfigError
 from gensig.signals.mesh_motion import Teeth
@@ -19,17 +22,17 @@ ORDERS = {0.0: 1.0, 1.0: 0.15, -1.0: 0.15, RATIO: 0.15, -RATIO: 0.15}
 def recording(depth, *, noise=1.0, duration=3.0, seed=0):
     """Mesh of four harmonics with sidebands of both shafts, and its cycles, at a speed that swings
     by a share."""
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     time = np.arange(round(duration * RATE)) / RATE
-    swing = 2 * np.pi * 0.7
+    swing = tau * 0.7
     turned = SPEED / 60 * (time + depth / swing * (1 - np.cos(swing * time)))
     cycles = TEETH.driving * turned
     signal = np.zeros((2, time.size))
     for harmonic in range(1, 5):
         for orders, share in ORDERS.items():
             height = share / harmonic * rng.uniform(0.5, 1.5, (2, 1))
-            phase = rng.uniform(0, 2 * np.pi, (2, 1))
-            angle = 2 * np.pi * (harmonic * cycles + orders * turned)
+            phase = rng.uniform(0, tau, (2, 1))
+            angle = tau * (harmonic * cycles + orders * turned)
             signal += height * np.cos(angle + phase)
     signal += noise * rng.standard_normal(signal.shape)
     return Recording(
@@ -60,7 +63,7 @@ def test_cycles_are_found_to_a_fraction_of_a_tooth(depth, stated):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_noise_is_not_followed(seed):
-    noise = np.random.default_rng(seed).standard_normal(
+    noise = default_rng(seed).standard_normal(
         (1 + seed % 3, round((0.6 + seed % 4) * RATE))
     )
     made = Recording(sensors=("a",), acceleration=noise, sampling_rate=RATE)

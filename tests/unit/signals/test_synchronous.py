@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 
 from gensig.signals.averaging import residual_signal
@@ -29,7 +30,7 @@ def test_harmonics_beyond_the_band_are_unknown():
 
 @pytest.mark.parametrize("n_turns", [2, 5, 30])
 def test_share_is_right_on_the_average_for_any_number_of_turns(n_turns):
-    rng = np.random.default_rng(n_turns)
+    rng = default_rng(n_turns)
     power = 4.5 + 0.125 + 0.02
     deviation = np.sqrt(power / 3)  # a quarter of the whole
     result = [
@@ -44,7 +45,7 @@ def test_share_is_right_on_the_average_for_any_number_of_turns(n_turns):
 def test_share_of_pure_turns_noise_silence_and_one_turn():
     assert nonsynchronous_share(TURNS + 7.0) == pytest.approx(0.0, abs=1e-12)
     assert nonsynchronous_share(
-        np.random.default_rng(0).standard_normal((30, 400))
+        default_rng(0).standard_normal((30, 400))
     ) == pytest.approx(1.0, abs=0.03)
     assert np.isnan(nonsynchronous_share(np.ones((3, 8))))
     with pytest.raises(ValueError, match="one turn"):
@@ -52,7 +53,7 @@ def test_share_of_pure_turns_noise_silence_and_one_turn():
 
 
 def test_residual_of_turns_is_that_of_the_average_and_what_does_not_repeat():
-    noise = np.random.default_rng(1).standard_normal(TURNS.shape)
+    noise = default_rng(1).standard_normal(TURNS.shape)
     residual = residual_turns(TURNS + noise, 23)
     assert_allclose(
         residual.mean(axis=0),

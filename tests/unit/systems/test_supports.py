@@ -2,6 +2,7 @@
 
 import math
 import re
+from math import tau
 from pathlib import Path
 
 import numpy as np
@@ -94,7 +95,7 @@ class TestStiffness:
         for torque, side, *printed in rows:
             body = getattr(machine({**BEARINGS, TORQUE: float(torque)}), side)
             stiffness = stiffness_of(body)
-            frequency = np.sqrt(stiffness / body.mass) / (2 * math.pi)
+            frequency = np.sqrt(stiffness / body.mass) / (tau)
             values = [float(value) for value in printed[-4:]]
             assert_close(values, [*(1e-6 * stiffness), *frequency], 5e-3)
 
@@ -189,7 +190,7 @@ class TestRecords:
         for _, run in runs:
             operating = run.system.operating
             decay = operating.drive_frequency * operating.drive_damping_ratio
-            expected = math.log(1e4) / (2 * math.pi * decay)
+            expected = math.log(1e4) / (tau * decay)
             assert_close(settling_time(pair_dynamics(run)), expected, 1e-3)
 
 
