@@ -76,7 +76,7 @@ def profile_of(pair, specimen, name):
 
 
 def used(pair, specimen, grade):
-    """Shares of the limits f_p, F_p, f_Halpha, f_falpha and F_r that pinion and wheel use."""
+    """Shares of the limits f_p, F_p, f_Halpha, f_falpha and F_r, (gear, limit)."""
     shares = []
     for name in GEARS:
         gear = getattr(pair, name)
@@ -91,27 +91,25 @@ def used(pair, specimen, grade):
             profile_form_limit: form,
             runout_limit: 2.0 * once_per_turn(error)[0],
         }
-        used_shares = [size / limit(gear, grade) for limit, size in sizes.items()]
-        shares.append(np.array(used_shares))
-    return shares
+        shares.append([size / limit(gear, grade) for limit, size in sizes.items()])
+    return np.array(shares)
 
 
 @pytest.fixture(scope="module")
 def pairs(xiamen, gear_with):
     """Pairs of gears from small to large, by name; what is drawn asks for no mesh."""
 
-    def pair(pinion, wheel):
+    def pair(pinion, wheel, **both):
         gears = {
-            "pinion": gear_with(**pinion),
-            "wheel": replace(gear_with(**wheel), name="wheel"),
+            "pinion": gear_with(**pinion, **both),
+            "wheel": gear_with(**wheel, **both, name="wheel"),
         }
         return SimpleNamespace(gears=gears, **gears)
 
-    small, large = {"normal_module": 0.5e-3}, {"normal_module": 20e-3}
     return {
         "xiamen": xiamen.pair,
-        "small": pair({"n_teeth": 18, **small}, {"n_teeth": 25, **small}),
-        "large": pair({"n_teeth": 30, **large}, {"n_teeth": 300, **large}),
+        "small": pair({"n_teeth": 18}, {"n_teeth": 25}, normal_module=0.5e-3),
+        "large": pair({"n_teeth": 30}, {"n_teeth": 300}, normal_module=20e-3),
         # too few teeth for the runout that the standard allows at this single pitch deviation
         "few": pair({"n_teeth": 10, "profile_shift": 0.45}, {"n_teeth": 60}),
     }
@@ -120,31 +118,34 @@ def pairs(xiamen, gear_with):
 @pytest.mark.parametrize("name", ["xiamen", "small", "large", "few"])
 @pytest.mark.parametrize("grade", [1, 5, 6.5, 9, 11])
 class TestLimits:
-    def test_every_gear_keeps_to_its_grade(self, pairs, quality, name, grade):
-        full = quality(
-            iso1328_grade=grade,
-            used_share_low=0.8,
-            used_share_high=1.0,
-            undulation_share=0.3,
-        )
-        for seed in range(25):
-            specimen = draw(pairs[name], full, seed)
-            for shares in used(pairs[name], specimen, grade):
-                assert (shares <= 1.0 + 1e-6).all(), seed
+    @pytest.fixture
+    def used_by(self, pairs, quality, name, grade):
+        """Shares of the limits that specimens use, (seed and gear, limit)."""
+
+        def make(n_seeds, low, high, **changes):
+            changed = quality(
+                iso1328_grade=grade,
+                used_share_low=low,
+                used_share_high=high,
+                **changes,
+            )
+            pair = pairs[name]
+            specimens = [draw(pair, changed, seed) for seed in range(n_seeds)]
+            return np.concatenate([used(pair, each, grade) for each in specimens])
+
+        return make
+
+    def test_every_gear_keeps_to_its_grade(self, used_by):
+        assert np.all(used_by(25, 0.8, 1.0, undulation_share=0.3) <= 1.0 + 1e-6)
 
     @pytest.mark.parametrize("share", [0.3, 0.9])
-    def test_it_uses_the_drawn_share(self, pairs, quality, name, grade, share):
+    def test_it_uses_the_drawn_share(self, used_by, share):
         """Of the single pitch and the profile form to the last digit, of nothing more."""
-        exact = quality(
-            iso1328_grade=grade, used_share_low=share, used_share_high=share
-        )
-        for seed in range(8):
-            specimen = draw(pairs[name], exact, seed)
-            for shares in used(pairs[name], specimen, grade):
-                assert_allclose(shares[0], share)
-                # the trace is read at points
-                assert_allclose(shares[3], share, rtol=2e-3)
-                assert (shares <= share * (1.0 + 1e-6)).all()
+        shares = used_by(8, share, share)
+        assert_allclose(shares[:, 0], share)
+        # the trace is read at points
+        assert_allclose(shares[:, 3], share, rtol=2e-3)
+        assert np.all(shares <= share * (1.0 + 1e-6))
 
 
 @pytest.fixture
@@ -160,7 +161,7 @@ def drawn(xiamen, quality):
 
 class TestWhatIsDrawn:
     def test_the_used_share_lies_in_its_range(self, xiamen, drawn):
-        single_pitch = [used(xiamen.pair, one, 5)[0][0] for one in drawn(60)]
+        single_pitch = [used(xiamen.pair, each, 5)[0, 0] for each in drawn(60)]
         assert min(single_pitch) >= 0.3
         assert max(single_pitch) <= 0.9
         assert np.ptp(single_pitch) > 0.4
@@ -177,21 +178,21 @@ class TestWhatIsDrawn:
 
     def test_eccentricities_phases_and_signs_scatter(self, xiamen, drawn):
         specimens = drawn(80)
-        size, most = np.transpose([once_per_turn(one.wheel_error) for one in specimens])
+        waves = [once_per_turn(each.wheel_error) for each in specimens]
+        size, most = np.transpose(waves)
         assert size.min() < 1.0 * UM
         assert 5.0 * UM < size.max() <= 0.5 * 0.9 * runout_limit(xiamen.pair.wheel, 5)
         assert len(np.unique(np.floor(most % 84 / 21))) == 4
-        is_positive = [one.forms[0].profile_slope > 0.0 for one in specimens]
+        is_positive = [each.forms[0].profile_slope > 0.0 for each in specimens]
         assert 25 <= np.sum(is_positive) <= 55
 
     def test_teeth_differ_by_their_share_of_the_slope(self, xiamen, drawn):
-        (*_, specimen) = drawn(
-            6, used_share_low=0.5, used_share_high=0.5, tooth_share=0.4
-        )
+        half = {"used_share_low": 0.5, "used_share_high": 0.5}
+        specimen = drawn(6, **half, tooth_share=0.4)[-1]
         slopes, _ = profile_of(xiamen.pair, specimen, "wheel")
-        limit = profile_slope_limit(xiamen.pair.wheel, 5)
-        assert_allclose(np.abs(slopes).max(), 0.5 * limit, rtol=0.03)
-        assert_allclose(np.ptp(slopes), 2 * 0.4 * 0.5 * limit, rtol=0.1)
+        limit = 0.5 * profile_slope_limit(xiamen.pair.wheel, 5)
+        assert_allclose(np.abs(slopes).max(), limit, rtol=0.03)
+        assert_allclose(np.ptp(slopes), 2 * 0.4 * limit, rtol=0.1)
 
     @pytest.mark.parametrize("share", [0.0, 0.25, 1.0])
     def test_undulation_is_part_of_the_form(self, drawn, share):
@@ -204,12 +205,13 @@ class TestWhatIsDrawn:
 
     def test_misalignment_and_backlash_keep_to_their_range(self, drawn):
         specimens = drawn(60, misalignment=8 * UM, backlash_scatter=0.3)
-        assert all(isinstance(one.forms[-1], Misalignment) for one in specimens)
-        tilts = np.array([one.forms[-1].misalignment for one in specimens])
-        backlash = np.array([one.backlash_factor for one in specimens])
-        for values, reach in ((tilts, 8 * UM), (backlash - 1.0, 0.3)):
-            assert 0.85 * reach < np.abs(values).max() <= reach
-            assert values.min() < 0.0 < values.max()
+        mountings = [each.forms[-1] for each in specimens]
+        assert {type(form) for form in mountings} == {Misalignment}
+        tilts = [form.misalignment / (8 * UM) for form in mountings]
+        backlash = [(each.backlash_factor - 1.0) / 0.3 for each in specimens]
+        for values in (tilts, backlash):
+            assert 0.85 < np.abs(values).max() <= 1.0 + 1e-9
+            assert min(values) < 0.0 < max(values)
 
     @pytest.mark.parametrize(
         "changes",
@@ -222,24 +224,19 @@ class TestWhatIsDrawn:
         ],
     )
     def test_one_key_leaves_the_rest_alone(self, drawn, changes):
-        (one,), (other,) = drawn(1), drawn(1, **changes)
-        assert_array_equal(one.pinion_error, other.pinion_error)
-        assert_array_equal(one.wheel_error, other.wheel_error)
-        assert repr(one) != repr(other)
+        (default,), (other,) = drawn(1), drawn(1, **changes)
+        assert_array_equal(default.pinion_error, other.pinion_error)
+        assert_array_equal(default.wheel_error, other.wheel_error)
+        assert repr(default) != repr(other)
 
     def test_no_grade_is_perfect(self, xiamen, drawn):
-        (specimen,) = drawn(
-            1,
-            iso1328_grade=None,
-            misalignment=9 * UM,
-            backlash_scatter=0.9,
-            undulation_share=0.5,
-        )
+        scatter = {"misalignment": 9 * UM, "backlash_scatter": 0.9}
+        words = {"iso1328_grade": None, "undulation_share": 0.5, **scatter}
+        (specimen,) = drawn(1, **words)
         perfect = perfect_specimen(xiamen.pair.pinion, xiamen.pair.wheel)
         assert repr(specimen) == repr(perfect)
         assert specimen.backlash_factor == 1.0
-        for values in astuple(specimen)[:-1]:
-            assert not np.any(values)
+        assert not any(np.any(values) for values in astuple(specimen)[:-1])
 
     def test_a_gear_outside_the_standard_needs_no_grade(self, machine):
         tiny = {
