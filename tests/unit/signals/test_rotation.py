@@ -17,9 +17,8 @@ from gensig.signals.spectrum import spectrum_of_turns
 
 RATE, TEETH = 10_000.0, 23
 TIME = np.arange(40_000) / RATE
-TURNS = 20.0 * TIME + 0.16 / (tau * 0.4) * np.sin(
-    tau * 0.4 * TIME
-)  # 20 Hz, 0.8 % up and down
+# 20 Hz, 0.8 % up and down
+TURNS = 20.0 * TIME + 0.16 / (tau * 0.4) * np.sin(tau * 0.4 * TIME)
 
 
 def mesh(turns, *harmonics):
@@ -46,16 +45,18 @@ def test_a_turn_gets_the_samples_of_the_slowest_by_itself_and_orders_stay_sharp(
 
 
 @pytest.mark.parametrize(
-    "angle", [np.zeros(100), -np.arange(100.0), np.arange(99.0), np.full(100, np.nan)]
+    ("angle", "message"),
+    [
+        (np.zeros(100), "must rise"),
+        (-np.arange(100.0), "must rise"),
+        (np.arange(99.0), "must rise"),
+        (np.full(100, np.nan), "must rise"),
+        (np.linspace(0, np.pi, 100), r"0\.5 turns"),
+    ],
 )
-def test_an_angle_that_does_not_rise_is_refused(angle):
-    with pytest.raises(ValueError, match="must rise"):
+def test_angles_that_do_not_rise_by_a_turn_are_refused(angle, message):
+    with pytest.raises(ValueError, match=message):
         resample_by_angle(np.ones(100), angle, 10)
-
-
-def test_less_than_a_turn_is_refused():
-    with pytest.raises(ValueError, match=r"0\.5 turns"):
-        resample_by_angle(np.ones(101), np.linspace(0, np.pi, 101), 10)
 
 
 @pytest.fixture

@@ -23,20 +23,18 @@ def a_pair(n_passages, *, teeth=TEETH, noise=0.0, seed=0):
     sizes = [size - size.mean(axis=0) for size in sizes]
     mesh = rng.standard_normal((2, 3))
 
-    def shape(per_passage):
+    def waves(size, per_passage):
+        """Passages of given sizes, (passage, channel, order), one after the other."""
         t = np.arange(per_passage) / per_passage
-        bump = np.sin(np.pi * t) ** 2
-        return np.stack([bump * np.sin(tau * order * t) for order in (1, 2, 3)])
+        orders = np.arange(1, 4)[:, None]
+        shape = np.sin(np.pi * t) ** 2 * np.sin(2 * np.pi * orders * t)
+        return np.einsum("pco,os->cps", size, shape).reshape(2, -1)
 
     passage = np.arange(n_passages)
-    size = mesh + sizes[0][passage % teeth[0]] + sizes[1][passage % teeth[1]]
-    signal = np.einsum("pco,os->cps", size, shape(64)).reshape(2, -1)
-    signal = signal + noise * rng.standard_normal(signal.shape)
-    parts = [
-        np.einsum("pco,os->cps", part, shape(SAMPLES)).reshape(2, -1)
-        for part in (*sizes, mesh[None])
-    ]
-    return signal, parts
+    driving, driven = (size[passage % z] for size, z in zip(sizes, teeth, strict=True))
+    signal = waves(mesh + driving + driven, 64)
+    signal += noise * rng.standard_normal(signal.shape)
+    return signal, [waves(size, SAMPLES) for size in (*sizes, mesh[None])]
 
 
 def separate(signal, **changes):

@@ -19,6 +19,11 @@ RATIO = TEETH.driving / TEETH.driven
 ORDERS = {0.0: 1.0, 1.0: 0.15, -1.0: 0.15, RATIO: 0.15, -RATIO: 0.15}
 
 
+def recording_of(signal):
+    names = tuple("abc"[: len(signal)])
+    return Recording(sensors=names, acceleration=signal, sampling_rate=RATE)
+
+
 def recording(depth, *, noise=1.0, duration=3.0, seed=0):
     """Mesh of four harmonics with sidebands of both shafts, and its cycles, at a speed that swings
     by a share."""
@@ -35,9 +40,7 @@ def recording(depth, *, noise=1.0, duration=3.0, seed=0):
             angle = tau * (harmonic * cycles + orders * turned)
             signal += height * np.cos(angle + phase)
     signal += noise * rng.standard_normal(signal.shape)
-    return Recording(
-        sensors=("a", "b"), acceleration=signal, sampling_rate=RATE
-    ), cycles
+    return recording_of(signal), cycles
 
 
 def followed(made, speed_rpm=SPEED):
@@ -63,12 +66,10 @@ def test_cycles_are_found_to_a_fraction_of_a_tooth(depth, stated):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_noise_is_not_followed(seed):
-    noise = default_rng(seed).standard_normal(
-        (1 + seed % 3, round((0.6 + seed % 4) * RATE))
-    )
-    made = Recording(sensors=("a",), acceleration=noise, sampling_rate=RATE)
+    shape = 1 + seed % 3, round((0.6 + seed) * RATE)
+    noise = np.random.default_rng(seed).standard_normal(shape)
     with pytest.raises(ConfigError, match="sign of the mesh"):
-        followed(made)
+        followed(recording_of(noise))
 
 
 def test_a_speed_beyond_the_search_is_refused():
@@ -80,13 +81,14 @@ def test_the_course_is_the_frequency_over_time():
     made, cycles = recording(0.02)
     mesh = SPEED / 60 * TEETH.driving
 
-    def course(search=0.03, highest=10_000.0):
+    def course(**changes):
+        options = {"search": 0.03, "highest": 10_000.0} | changes
         signal, teeth = made.acceleration, TEETH.driving
-        options = {"search": search, "highest": highest}
         return mesh_frequency_course(signal, RATE, teeth, mesh, **options)
 
     time, result = course()
-    true = np.interp(time, np.arange(cycles.size) / RATE, np.gradient(cycles) * RATE)
+    frequency = np.gradient(cycles) * RATE
+    true = np.interp(time, np.arange(cycles.size) / RATE, frequency)
     error = result / true - 1
     assert np.abs(error).max() < 6e-3
     assert np.std(error) < 2e-3

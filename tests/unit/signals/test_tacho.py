@@ -43,29 +43,33 @@ def test_orders_stay_sharp_where_the_speed_changes():
     smear."""
     time, turns, instants = ramp()
     signal = np.cos(tau * 7.0 * turns)
+
+    def spectrum(resampled):
+        return 2.0 * np.abs(np.fft.rfft(resampled.ravel())) / resampled.size
+
     tracked = resample_by_pulses(signal, RATE, instants)
     assert tracked.shape[0] == len(instants) - 1
-    spectrum = 2.0 * np.abs(np.fft.rfft(tracked.ravel())) / tracked.size
-    line = 7 * tracked.shape[0]
-    assert_allclose(spectrum[line], 1.0, rtol=1e-3)
-    assert np.delete(spectrum, line).max() < 1e-3
+    lines, order = spectrum(tracked), 7 * tracked.shape[0]
+    assert_allclose(lines[order], 1.0, rtol=1e-3)
+    assert np.delete(lines, order).max() < 1e-3
     plain = resample_to_angle(signal, RATE, turns[-1] / time[-1])
-    smeared = 2.0 * np.abs(np.fft.rfft(plain.ravel())) / plain.size
-    assert smeared[7 * plain.shape[0]] < 0.5
+    assert spectrum(plain)[7 * plain.shape[0]] < 0.5
 
 
 def test_several_pulses_a_turn_and_several_channels():
     _, turns, _ = ramp()
     quarters = np.arange(1, int(4 * turns[-1])) / 4.0
     marks = np.interp(quarters, turns, np.arange(len(turns)) / RATE)
-    angle = tau * 3.0 * turns
-    signals = np.stack([np.cos(angle), np.sin(angle)])
+
+    def waves(turns):
+        angle = tau * 3.0 * turns
+        return np.stack([np.cos(angle), np.sin(angle)])
+
     options = {"pulses_per_turn": 4, "samples_per_turn": 64}
-    result = resample_by_pulses(signals, RATE, marks, **options)
+    result = resample_by_pulses(waves(turns), RATE, marks, **options)
     assert result.shape == (2, (len(marks) - 1) // 4, 64)
     # the first pulse is a quarter turn after the start
-    angle = tau * 3.0 * (0.25 + np.arange(64) / 64.0)
-    expected = np.stack([np.cos(angle), np.sin(angle)])[:, None]
+    expected = waves(0.25 + np.arange(64) / 64.0)[:, None]
     assert np.abs(result - expected).max() < 2e-3
 
 
