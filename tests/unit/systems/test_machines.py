@@ -2,7 +2,8 @@
 
 import inspect
 from dataclasses import dataclass, fields, is_dataclass, replace
-from itertools import pairwise
+from functools import cache
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ KNOWN_CHANNELS = {*DOFS, "crank_speed", "motor_speed"}
 pytestmark = pytest.mark.filterwarnings("ignore:.*mean tooth forces:UserWarning")
 
 
+@cache
 def read(name, *more):
     words = f"experiment={MACHINES[name]}", "operating.duration_s=0.02"
     return read_machine(read_request([*words, *more]).config)
@@ -51,15 +53,13 @@ def kinds():
 
 def overridden(kind):
     """Concrete members of a base of ``kind`` that a class below it defines again."""
+    machines = [each for each in kind.__mro__ if issubclass(each, Machine)]
     result = []
-    for number, lower in enumerate(kind.__mro__):
-        for base in filter(
-            lambda base: issubclass(base, Machine), kind.__mro__[number + 1 :]
-        ):
-            for name in vars(lower).keys() & vars(base).keys():
-                is_abstract = getattr(vars(base)[name], "__isabstractmethod__", False)
-                if not (is_abstract or name.startswith("__") or name == "_abc_impl"):
-                    result.append(f"{lower.__name__}.{name} of {base.__name__}")
+    for lower, base in combinations(machines, 2):
+        for name in vars(lower).keys() & vars(base).keys():
+            is_abstract = getattr(vars(base)[name], "__isabstractmethod__", False)
+            if not (is_abstract or name.startswith("__") or name == "_abc_impl"):
+                result.append(f"{lower.__name__}.{name} of {base.__name__}")
     return result
 
 
@@ -111,11 +111,9 @@ def test_each_gear_of_a_line_rotates_as_its_meshes_say():
     machine = read("engine_line")
     line, speed = machine.engine.drive.line, {}
     for mesh, of_line in zip(machine.meshes, line.meshes, strict=True):
-        driving = abs(line.speed_ratio[line.gears[of_line.driving].node])
-        speed.setdefault(mesh.driving, driving)
-        driven = (
-            speed[mesh.driving] * mesh.pair.pinion.n_teeth / mesh.pair.wheel.n_teeth
-        )
+        node = line.gears[of_line.driving].node
+        driving = speed.setdefault(mesh.driving, abs(line.speed_ratio[node]))
+        driven = driving * mesh.pair.pinion.n_teeth / mesh.pair.wheel.n_teeth
         assert_close(speed.setdefault(mesh.driven, driven), driven, 1e-9)
     assert len(speed) == len(line.gears) == len(machine.gears)
 
@@ -156,15 +154,17 @@ def parts(table):
 
 
 def test_the_table_without_faults_is_the_sound_one(any_machine):
-    pair, sound = any_machine.pair, parts(any_machine.mesh_table())
+    pair, table = any_machine.pair, any_machine.mesh_table()
     specimen = perfect_specimen(pair.pinion, pair.wheel)
-    same = parts(any_machine.mesh_table(specimen.forms))
-    assert all(np.array_equal(same[key], sound[key]) for key in sound)
-    assert not any(np.any(sound[key]) for key in sound if key.endswith("kind."))
-    assert any_machine.mesh_table().pair == pair
     faults = read_faults({"kind": "missing_tooth", "gear": "pinion", "tooth": 0})
-    missing = parts(any_machine.mesh_table(faults))
+    of_specimen, of_faults = (
+        any_machine.mesh_table(forms) for forms in (specimen.forms, faults)
+    )
+    sound, same, missing = map(parts, (table, of_specimen, of_faults))
+    assert all(np.array_equal(same[key], sound[key]) for key in sound)
     assert not all(np.array_equal(missing[key], sound[key]) for key in sound)
+    assert not any(np.any(sound[key]) for key in sound if key.endswith("kind."))
+    assert table.pair == pair
 
 
 def test_a_record_starts_perfect_and_nominal(any_machine):

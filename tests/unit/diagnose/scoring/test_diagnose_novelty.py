@@ -7,7 +7,9 @@ import pytest
 import torch
 from novelty_sets import OpenDataset
 from numpy.random import default_rng
-from numpy.testing import assert_allclose, assert_array_equal, assert_equal
+from numpy.testing import assert_allclose, assert_array_equal
+from runs import rows_of
+from scipy.special import log_softmax
 from scipy.stats import norm
 from small_studies import LEARNS, TINY_CNN, run, study_of, train, windows_of
 
@@ -66,17 +68,18 @@ def test_a_visible_fault_is_found_by_methods_that_know_only_healthy_records(stud
 def test_a_visible_new_class_is_noticed_and_the_known_ones_are_told_apart(studies):
     result = studies["plain"]["open_set"]
     assert result["novel_classes"] == ["missing_tooth"]
-    assert result["methods"]["nearest_band_levels"]["auroc"]["low"] > 0.8
+    methods, known = result["methods"], result["known"]
+    assert methods["nearest_band_levels"]["auroc"]["low"] > 0.8
     for name in ("largest_probability", "energy", "nearest_features"):
-        rate = result["methods"][name]["fpr95"]
+        rate = methods[name]["fpr95"]
         assert 0 <= rate["low"] <= rate["mean"] <= rate["high"] <= 1
-    for method in result["methods"].values():
+    for method in methods.values():
         # the classes have the same number of records
         parts = [area["mean"] for area in method["auroc_by_known_class"].values()]
         assert len(parts) == 3
         assert method["auroc"]["mean"] == pytest.approx(np.mean(parts))
-    known = result["known"]
-    assert known["balanced_accuracy"]["mean"] > known["chance"] == pytest.approx(1 / 3)
+    assert known["chance"] == pytest.approx(1 / 3)
+    assert known["balanced_accuracy"]["mean"] > known["chance"]
 
 
 @pytest.mark.parametrize("protocol", ["healthy_only", "open_set"])
@@ -96,22 +99,20 @@ def labelled():
     task, _ = study_of(OpenDataset(n_units=16))
     record = np.unique(subset_segments(task, "healthy_only", "test").record)
     novel = task.labels()[record] > 0
+    same = {
+        "protocol": "healthy_only",
+        "method": "m",
+        "detail": "",
+        "record": record,
+        "validation_score": np.linspace(0, 1, 40),
+    }
 
     def judge(*scores, predicted=None):
         runs = [
-            NoveltyRun(
-                protocol="healthy_only",
-                method="m",
-                seed=seed,
-                detail="",
-                record=record,
-                score=score,
-                validation_score=np.linspace(0, 1, 40),
-                predicted=predicted,
-            )
+            NoveltyRun(seed=seed, score=score, predicted=predicted, **same)
             for seed, score in enumerate(scores)
         ]
-        return novelty_result(task, runs, [0], 100, default_rng(0))
+        return novelty_result(task, runs, [0], 100, np.random.default_rng(0))
 
     return judge, novel, task, record
 
@@ -180,16 +181,14 @@ def open_study():
 def test_features_and_outputs_are_those_of_the_last_layer(open_study):
     task, settings = open_study
     train_set, validation = windows_of(task, "train", "validation")
-    target = Classes(n_classes=4)
-    training = train_network(
-        train_set, validation, target=target, settings=settings, seed=0
-    )
-    model = training.model
-    features, logits = network_outputs(model, validation, np.arange(len(validation)))
+    options = {"target": Classes(n_classes=4), "settings": settings, "seed": 0}
+    model = train_network(train_set, validation, **options).model
+    every = np.arange(len(validation))
+    features, logits = network_outputs(model, validation, every)
     layer = model.head[-1]
-    weight, bias = layer.weight.detach().numpy(), layer.bias.detach().numpy()
+    weight, bias = (part.detach().numpy() for part in (layer.weight, layer.bias))
     assert_allclose(logits, features @ weight.T + bias, rtol=1e-4, atol=1e-5)
-    scaled = logits - np.logaddexp.reduce(logits, axis=1, keepdims=True)
+    scaled = log_softmax(logits, axis=1)
     expected = predict_windows(model, validation)
     assert_allclose(expected, scaled, rtol=1e-4, atol=1e-5)
 
@@ -230,63 +229,52 @@ def test_the_autoencoder_learns_and_shows_a_moment_that_it_cannot_rebuild(
 ):
     _, validation = healthy
     windows = torch.from_numpy(validation.cut(np.arange(9)))
-
-    def fitted(n_epochs):
-        epochs = {"epochs": n_epochs, "patience": 30}
-        settings = dataclasses.replace(open_study[1], **epochs)
-        return fit_autoencoder(*healthy, settings=settings, seed=0)
-
-    short, long = fitted(1), fitted(30)
-    mean = [part.model(windows).mean().item() for part in (short, long)]
-    assert mean[1] < 0.7 * mean[0]
+    short, long = (
+        fit_autoencoder(
+            *healthy,
+            settings=dataclasses.replace(open_study[1], epochs=n, patience=30),
+            seed=0,
+        )
+        for n in (1, 30)
+    )
+    few, many = (part.model(windows).mean().item() for part in (short, long))
+    assert many < 0.7 * few
     signals = tuple(signal.copy() for signal in validation.signals)
     for signal in signals:
         signal[:, 1100:1164] += 3 * np.sin(np.arange(64))
     burst = dataclasses.replace(validation, signals=signals)
-    with_burst, without = (
-        reconstruction_error(long, part) for part in (burst, validation)
-    )
+    ratio = reconstruction_error(long, burst) / reconstruction_error(long, validation)
     whole = validation.start <= 1000  # windows that hold the whole burst
-    assert (with_burst > 1.5 * without)[whole].all()
+    assert (ratio[whole] > 1.5).all()
 
 
 def test_two_processes_give_the_results_of_one(open_study):
-    """Of all kinds of jobs: novelty with and without a network, classes, shuffled labels."""
+    """Of all kinds of jobs: novelty with and without a network, classes of shuffled labels."""
     task, settings = open_study
     settings = dataclasses.replace(settings, epochs=1)
-    jobs = [Job(protocols=("healthy_only",), seed=seed) for seed in (None, 3)]
-    jobs.append(Job(protocols=("open_set",), seed=3))
-    jobs += [
-        Job(protocols=("by_unit",), seed=5, shuffled=shuffled)
-        for shuffled in (False, True)
-    ]
-    one, two = (run(task, settings, *jobs, n_workers=n) for n in (1, 2))
-    assert len([result for result in one if isinstance(result, NoveltyRun)]) == 9
-    for first, second in zip(one, two, strict=True):
-        assert_equal(*map(dataclasses.asdict, (first, second)))
+    kinds = [("healthy_only", None), ("healthy_only", 3), ("open_set", 3)]
+    jobs = [Job(protocols=(protocol,), seed=seed) for protocol, seed in kinds]
+    jobs.append(Job(protocols=("by_unit",), seed=5, shuffled=True))
+    serial, parallel = (run(task, settings, *jobs, n_workers=n) for n in (1, 2))
+    assert sum(isinstance(result, NoveltyRun) for result in serial) == 9
+    for first, second in zip(serial, parallel, strict=True):
+        np.testing.assert_equal(*map(dataclasses.asdict, (first, second)))
 
 
-@pytest.mark.parametrize(
-    ("overrides", "message"),
-    [
-        (["protocols=[healthy_only]", "window_samples=100"], "at least 128"),
-        (
-            ["protocols=[open_set]", "classes=[healthy,crack,pitting]"],
-            "it needs known and new ones",
-        ),
-        (
-            ["protocols=[open_set]", "classes=[healthy,missing_tooth]"],
-            "one known class only",
-        ),
-        (
-            ["protocols=[healthy_only]", "classes=[crack,pitting]"],
-            "its train part is empty",
-        ),
-    ],
-)
-def test_studies_without_known_or_new_classes_are_refused(overrides, message):
+REFUSED = [
+    ("healthy_only window_samples=100", "at least 128"),
+    ("open_set classes=[healthy,crack,pitting]", "it needs known and new ones"),
+    ("open_set classes=[healthy,missing_tooth]", "one known class only"),
+    ("healthy_only classes=[crack,pitting]", "its train part is empty"),
+]
+
+
+@pytest.mark.parametrize(("typed", "message"), REFUSED)
+def test_studies_without_known_or_new_classes_are_refused(typed, message):
+    protocol, word = typed.split()
+    words = [*TINY_CNN, f"protocols=[{protocol}]", word]
     with pytest.raises(ConfigError, match=message):
-        plan_study(*study_of(OpenDataset(), *TINY_CNN, *overrides))
+        plan_study(*study_of(OpenDataset(), *words))
 
 
 def test_the_command_reports_novelty_alone(tmp_path, capsys):
@@ -307,14 +295,20 @@ def test_the_command_reports_novelty_alone(tmp_path, capsys):
     ):
         assert text in page, text
     assert not any(text in page for text in ("LEAKY", "In short", "nan ["))
-    head, *lines = (tmp_path / "novelty.csv").read_text().splitlines()
-    assert head == "protocol,method,seed,record_id,unit_id,label,score,threshold"
-    rows = [line.split(",") for line in lines]
-    kind = ["healthy_only", "autoencoder", "missing_tooth"]
-    scores = np.array([row[6:] for row in rows if [*row[:2], row[5]] == kind], float)
+
+    path = tmp_path / "novelty.csv"
+    head = "protocol,method,seed,record_id,unit_id,label,score,threshold"
+    assert path.read_text().startswith(f"{head}\n")
+    found = [
+        float(row["score"]) > float(row["threshold"])
+        for row in rows_of(path)
+        if row["protocol"] == "healthy_only"
+        and row["method"] == "autoencoder"
+        and row["label"] == "missing_tooth"
+    ]
     method = metrics["novelty"]["healthy_only"]["methods"]["autoencoder"]
-    share = np.mean(scores[:, 0] > scores[:, 1])
-    assert share == pytest.approx(method["found"]["missing_tooth"]["mean"])
+    share = method["found"]["missing_tooth"]["mean"]
+    assert np.mean(found) == pytest.approx(share)
 
 
 def test_null_runs_all_protocols_and_both_kinds_share_a_report(tmp_path):
