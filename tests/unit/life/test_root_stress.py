@@ -38,16 +38,14 @@ def pair(*words):
 
 
 def test_a_force_gives_the_stress_it_was_asked_for():
-    loaded = case(
-        PUMP, "strength.application_factor=1.25", "strength.face_load_factor=1.2"
-    ).under(349.39e6)
+    factors = "strength.application_factor=1.25", "strength.face_load_factor=1.2"
+    loaded = case(PUMP, *factors).under(349.39e6)
     result = loaded.gears()["wheel"]
     assert result.stress == pytest.approx(349.39e6)
     assert result.nominal == pytest.approx(349.39e6 / 1.5)
     assert result.safety.paper == pytest.approx(1.353, abs=5e-4)
-    assert loaded.tangential_force == pytest.approx(
-        case(PUMP).force_for(349.39e6) / 1.5
-    )
+    force = case(PUMP).force_for(349.39e6)
+    assert loaded.tangential_force == pytest.approx(force / 1.5)
 
 
 @pytest.mark.parametrize(
@@ -83,11 +81,10 @@ def test_no_helix_is_a_spur_gear(edition):
 
 
 def with_width(pair, width):
-    gears = {
-        name: replace(getattr(pair, name), face_width=width)
-        for name in ("pinion", "wheel")
-    }
-    return replace(pair, **gears)
+    pinion, wheel = (
+        replace(gear, face_width=width) for gear in (pair.pinion, pair.wheel)
+    )
+    return replace(pair, pinion=pinion, wheel=wheel)
 
 
 def test_load_distribution_goes_on_at_its_bounds():
@@ -95,13 +92,15 @@ def test_load_distribution_goes_on_at_its_bounds():
     few, many = (pair("system=helical_pair", words) for words in (short, long))
     assert normal_contact_ratio(few) < 2.0 < normal_contact_ratio(many)
     for result, without_overlap in ((few, 1.0), (many, math.sqrt(0.5))):
-        widths = np.array([1e-9, 0.5, 0.999999, 1.5])
-        widths *= result.face_width / result.overlap_ratio
-        values = [load_distribution_factor(with_width(result, w)) for w in widths]
-        assert values[0] == pytest.approx(without_overlap)
-        assert values[2] == pytest.approx(values[3], rel=1e-5)
-        assert values[3] == pytest.approx(normal_contact_ratio(result) ** -0.5)
-        assert values[0] > values[1] > values[2]
+        width = result.face_width / result.overlap_ratio
+        none, half, most, more = (
+            load_distribution_factor(with_width(result, share * width))
+            for share in (1e-9, 0.5, 0.999999, 1.5)
+        )
+        assert none == pytest.approx(without_overlap)
+        assert more == pytest.approx(normal_contact_ratio(result) ** -0.5)
+        assert most == pytest.approx(more, rel=1e-5)
+        assert none > half > most
     assert load_distribution_factor(pair(PUMP)) == 1.0
     teeth = ("gear.addendum_coefficient=1.25", "gear.cutter_tip_radius_coefficient=0.2")
     deep = pair(PUMP, *teeth)
@@ -110,14 +109,17 @@ def test_load_distribution_goes_on_at_its_bounds():
 
 
 def test_helix_factor():
-    result = pair("system=helical_pair")  # 18 degrees, overlap above 1
-    assert helix_factor(result, edition=2006) == pytest.approx(1.0 - 18.0 / 120.0)
-    assert helix_factor(result, edition=2019) == pytest.approx(
-        0.85 / math.cos(math.radians(18.0)) ** 3
-    )
+    helical, spur = pair("system=helical_pair"), pair(PUMP)
     steep = pair("system=helical_pair", "gear.helix_angle_deg=38")
-    assert helix_factor(steep, edition=2006) == pytest.approx(0.75)
-    assert helix_factor(pair(PUMP), edition=2019) == 1.0
+    # 18 degrees, overlap above 1
+    of_2019 = 0.85 / math.cos(math.radians(18.0)) ** 3
+    for gears, edition, expected in (
+        (helical, 2006, 1.0 - 18.0 / 120.0),
+        (helical, 2019, of_2019),
+        (steep, 2006, 0.75),
+        (spur, 2019, 1.0),
+    ):
+        assert helix_factor(gears, edition=edition) == pytest.approx(expected)
 
 
 def test_rim_and_deep_teeth():
@@ -144,9 +146,8 @@ def test_light_loads_come_near_it_and_heavy_ones_share_more():
     shares = []
     for torque in (1.0, 130.0, 680.0):
         loaded = case(PUMP, f"operating.torque_nm={torque}")
-        shares.append(
-            loaded.history().stress["wheel"].max() / loaded.gears()["wheel"].stress
-        )
+        largest = loaded.history().stress["wheel"].max()
+        shares.append(largest / loaded.gears()["wheel"].stress)
     assert 1.0 >= shares[0] > shares[1] > shares[2]
     assert shares[0] == pytest.approx(1.0, abs=0.01)
 
@@ -180,19 +181,19 @@ def test_slices_of_a_spur_pair_are_the_pair_itself(coupling, law):
 
 def test_spreading_keeps_the_sum_and_evens_out():
     rng = np.random.default_rng(1)
-    load = rng.random((3, 2, 40)) * (rng.random((3, 2, 40)) > 0.5)
-    structure = 1.0 + rng.random((3, 2, 40))
+    shape = (3, 2, 40)
+    load = rng.random(shape) * (rng.random(shape) > 0.5)
+    structure = 1.0 + rng.random(shape)
     spread = spread_along_face(load, structure, 9.0)
     assert_allclose(spread.sum(axis=2), load.sum(axis=2))
     assert spread.min() > 0.0
     assert spread.max() < load.max()
     assert_allclose(spread_along_face(load, structure, 0.0), load)
-    even = np.ones((1, 40))
+    even = np.ones((1, 401))
     assert_allclose(spread_along_face(even, 2 * even, 9.0), even)
     # one loaded slice: exponential to either side, over the root of the coupling
-    one = np.zeros((1, 401))
-    one[0, 200] = 1.0
-    tail = spread_along_face(one, np.ones((1, 401)), 100.0)[0]
+    single = np.eye(401)[200:201]
+    tail = spread_along_face(single, even, 100.0)[0]
     assert tail[230] / tail[220] == pytest.approx(math.exp(-1.0), rel=2e-3)
 
 
@@ -220,18 +221,15 @@ def test_every_gear_option_has_a_root_stress(name):
 
 
 def test_the_force_over_the_mesh_gives_its_stress():
-    loaded = case(PUMP)
+    loaded, exact = case(PUMP), case(PUMP, *PAPER_LAW)
     force = loaded.force_over_mesh_for(200e6)
+    assert force > loaded.force_for(200e6)
     torque = force * loaded.pair.pinion.pitch_radius
     result = case(PUMP, f"operating.torque_nm={torque!r}").history().stress
-    assert max(values.max() for values in result.values()) == pytest.approx(
-        200e6, rel=1e-5
-    )
-    assert force > loaded.force_for(200e6)
-    exact = case(PUMP, *PAPER_LAW)
-    assert exact.force_over_mesh_for(200e6) == pytest.approx(
-        exact.force_for(200e6), rel=1e-5
-    )
+    largest = max(values.max() for values in result.values())
+    assert largest == pytest.approx(200e6, rel=1e-5)
+    force = exact.force_for(200e6)
+    assert exact.force_over_mesh_for(200e6) == pytest.approx(force, rel=1e-5)
 
 
 def test_mistakes():

@@ -36,6 +36,11 @@ def full():
     return case_of(*FULL)
 
 
+@pytest.fixture(scope="module")
+def worn_out(full):
+    return wear_life(full)
+
+
 def test_curvature_of_a_parabola_and_of_a_straight_wear(full):
     arc = full.path.arc
     middle = arc.mean(axis=1, keepdims=True)
@@ -60,46 +65,51 @@ def test_hollow_flanks_press_no_less_than_nearly_flat_ones(full):
     assert_allclose(worn[0, 10:-10], new[0, 10:-10] * LEAST_CURVATURE_SHARE**0.5)
 
 
-def test_radii_of_new_and_worn_flanks(full):
-    nothing = np.zeros((2, len(full.path.position)))
+def test_radii_of_new_and_worn_flanks(full, worn_out):
     load = full.line_load(full.new_flanks())[0]
-    radii = flank_radii(full.path, nothing, load, full.material)
-    assert_allclose(radii["worn"], radii["new"])
-    assert_allclose(radii["by_eq_22"], radii["new"])
-    depth = wear_life(full).depth[-1][:, 0]
-    worn = flank_radii(full.path, depth, load, full.material)
+    depth = worn_out.depth[-1][:, 0]
+    new, worn = (
+        flank_radii(full.path, loss, load, full.material) for loss in (0 * depth, depth)
+    )
+    for key in ("worn", "by_eq_22"):
+        assert_allclose(new[key], new["new"])
     # a shift of some um on radii of mm; the profile itself does more
-    assert_allclose(worn["by_eq_22"], radii["new"], rtol=3e-3)
-    assert np.abs(worn["worn"] / radii["new"] - 1.0).max() > 0.2
+    assert_allclose(worn["by_eq_22"], new["new"], rtol=3e-3)
+    assert np.abs(worn["worn"] / new["new"] - 1.0).max() > 0.2
 
 
 def test_a_limit_of_the_transmission_error_finds_the_threshold(full):
-    new = full.error_range(full.new_flanks())
-    limit = new + 5e-6
+    limit = full.error_range(full.new_flanks()) + 5e-6
     words = (*FULL, f"wear.transmission_error_limit_um={limit * 1e6}")
-    life = wear_life(case_of(*words))
-    assert life.ended_by == "transmission_error"
+    life, by_depth = (
+        wear_life(case_of(*words, *more)) for more in ((), ["wear.threshold_um=1"])
+    )
+    assert (life.ended_by, by_depth.ended_by) == ("transmission_error", "depth")
     assert life.threshold < full.options.threshold
     assert full.error_range(life.depth[-1]) == pytest.approx(limit, rel=1e-3)
-    by_depth = wear_life(case_of(*words, "wear.threshold_um=1"))
-    assert by_depth.ended_by == "depth"
     assert by_depth.threshold == pytest.approx(1e-6)
     with pytest.raises(ConfigError, match="is reached by new flanks already"):
         wear_life(case_of(*FULL, "wear.transmission_error_limit_um=0.5"))
 
 
-def test_sum_adds_both_flanks_and_the_local_exponent_is_near_one(full):
+def test_sum_adds_both_flanks_and_the_local_exponent_is_near_one(full, worn_out):
     life = wear_life(case_of(*FULL, "wear.criterion=sum"))
     assert life.depth[-1].sum(axis=0).max() == pytest.approx(20e-6)
-    assert life.life < 0.8 * wear_life(full).life
+    assert life.life < 0.8 * worn_out.life
     assert torque_exponent(full) == pytest.approx(1.0, abs=0.15)
 
 
-def test_sharing_follows_the_contact_ratio():
-    assert case_of("gear=harbin_38_55").loads is None
-    assert case_of("gear=harbin_38_55", "wear.sharing=mesh").loads is not None
-    assert case_of().loads is not None
-    assert case_of("wear.sharing=one_pair").loads is None
+@pytest.mark.parametrize(
+    ("words", "shares"),
+    [
+        (["gear=harbin_38_55"], False),
+        (["gear=harbin_38_55", "wear.sharing=mesh"], True),
+        ([], True),
+        (["wear.sharing=one_pair"], False),
+    ],
+)
+def test_sharing_follows_the_contact_ratio(words, shares):
+    assert (case_of(*words).loads is not None) == shares
 
 
 @pytest.fixture(scope="module")

@@ -64,10 +64,13 @@ def test_the_first_packet_begins_anywhere():
     assert ends == set(range(8))
 
 
-def test_filling():
-    signal = np.arange(1.0, 9.0)[None] * [[1.0], [10.0]]
+@pytest.mark.parametrize(
+    ("fill", "expected"),
+    [("zero", [0, 2, 3, 0, 0, 6, 0, 8]), ("hold", [2, 2, 3, 3, 3, 6, 6, 8])],
+)
+def test_filling(fill, expected):
+    signal = np.outer([1.0, 10.0], np.arange(1, 9))
     dropped = np.array([1, 0, 0, 1, 1, 0, 1, 0], dtype=bool)
-    expected = {"zero": [0, 2, 3, 0, 0, 6, 0, 8], "hold": [2, 2, 3, 3, 3, 6, 6, 8]}
-    for fill, row in expected.items():
-        assert_array_equal(filled(signal, dropped, fill), np.outer([1, 10], row))
-        assert not filled(signal, np.ones(8, dtype=bool), fill).any()
+    result = filled(signal, dropped, fill)
+    assert_array_equal(result, np.outer([1, 10], expected))
+    assert not filled(signal, np.ones(8, dtype=bool), fill).any()

@@ -46,18 +46,14 @@ def test_without_quantisation_a_perfect_one_is_exact():
 
 @pytest.mark.parametrize("quantised", [True, False])
 def test_errors_are_bounded_by_line_and_errors(quantised):
-    encoder = replace(
-        PERFECT,
-        eccentricity_error=np.radians(1.0),
-        line_error=np.radians(0.03),
-        quantised=quantised,
-    )
-    for seed in range(20):
-        off = error(encoder, seed)
-        most = np.radians(1.0) + 4.0 * np.radians(0.03)
-        assert off.max() <= most * (1 + 1e-9)
-        assert off.min() >= -most - (encoder.spacing if quantised else 0.0) - 1e-9
-        assert np.all(np.diff(off + ANGLE) >= -1e-12)  # never backwards
+    eccentricity, line = np.radians([1.0, 0.03])
+    errors = {"eccentricity_error": eccentricity, "line_error": line}
+    encoder = replace(PERFECT, quantised=quantised, **errors)
+    most = (eccentricity + 4.0 * line) * (1 + 1e-9)
+    off = np.array([error(encoder, seed) for seed in range(20)])
+    assert off.max() <= most
+    assert off.min() >= -most - quantised * encoder.spacing
+    assert np.all(np.diff(off + ANGLE) >= -1e-12)  # never backwards
 
 
 def test_eccentricity_errs_once_a_turn():
@@ -94,7 +90,6 @@ def test_lines_pass_in_order_at_the_largest_errors():
 
 def test_a_line_is_read_where_it_passes():
     disc = Disc(index=0.5, places=np.array([0.1, np.pi / 2, np.pi, 3 * np.pi / 2]))
-    turned = [0.0, 0.05, 0.11, np.pi - 0.01, np.pi + 0.01, tau + 0.05]
-    angle = 0.5 + np.array([*turned, tau + 0.11])
-    expected = np.pi / 2 * np.array([-1, -1, 0, 1, 2, 3, 4])
-    assert_allclose(disc.read(angle, quantised=True), expected, atol=1e-12)
+    turned = [0.0, 0.05, 0.11, np.pi - 0.01, np.pi + 0.01, tau + 0.05, tau + 0.11]
+    read = disc.read(0.5 + np.array(turned), quantised=True)
+    assert_allclose(read / (np.pi / 2), [-1, -1, 0, 1, 2, 3, 4], atol=1e-12)

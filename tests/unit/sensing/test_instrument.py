@@ -6,7 +6,7 @@ from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from sensing_groups import BEARING, HOUSING, changed, instrument, source
 
-from gensig.sensing.chain import power
+from gensig.sensing.chain import add_noise, power
 
 
 @pytest.mark.parametrize("group", [BEARING, HOUSING], ids=["bearing", "housing"])
@@ -35,19 +35,17 @@ def test_measuring_is_linear_and_names_the_sensors():
     assert_allclose(together, 2.0 * one.measure(first) - one.measure(second), atol=1e-9)
 
 
-@pytest.mark.parametrize("n_lead", [0, None])
-def test_filters_have_settled_at_the_first_sample(n_lead, monkeypatch):
-    one = instrument(HOUSING)
-    long = source(one.sensing, 60_000)
-    reference = one.measure(long)[:, -5000:]
-    given = one.sensing.n_lead if n_lead is None else n_lead
-    monkeypatch.setattr(type(one.sensing), "n_lead", property(lambda _: given))
-    error = one.measure(long[:, -5000 - given :]) - reference
-    level = 10.0 * np.log10(np.max(power(error[:, :2560]) / power(reference)))
-    if n_lead is None:
-        assert level < -50.0
-    else:
-        assert level > -30.0  # without a lead-in it shows
+@pytest.mark.parametrize("has_lead", [False, True])
+def test_filters_have_settled_at_the_first_sample(has_lead, monkeypatch):
+    housing = instrument(HOUSING)
+    long = source(housing.sensing, 60_000)
+    reference = housing.measure(long)[:, -5000:]
+    n_lead = has_lead * housing.sensing.n_lead
+    monkeypatch.setattr(type(housing.sensing), "n_lead", n_lead)
+    error = housing.measure(long[:, -5000 - n_lead :]) - reference
+    ratio = np.max(power(error[:, :2560]) / power(reference))
+    assert (ratio < 1e-5) == has_lead
+    assert (ratio > 1e-3) != has_lead  # without a lead-in it shows
 
 
 def test_noise_of_the_path_has_the_resonances_of_the_path():
@@ -56,8 +54,9 @@ def test_noise_of_the_path_has_the_resonances_of_the_path():
         "path.n_modes": [1, 1],
         "path.natural_frequency_hz": [2000, 2000],
     }
-    one = instrument(changed(HOUSING, one_mode))
-    noise = one.record(np.zeros((3, 51_200)), np.ones(3), default_rng(4))[0]
+    housing = instrument(changed(HOUSING, one_mode))
+    clean, rng = np.zeros((3, 51_200)), default_rng(4)
+    noise, *_ = housing.record(clean, np.ones(3), rng)
     lines = np.abs(np.fft.rfft(noise, axis=1)) ** 2
     near, far = lines[:, 1900:2100], lines[:, 9000:10_000]
     assert np.all(near.mean(axis=1) > 100.0 * far.mean(axis=1))
@@ -70,13 +69,22 @@ def test_no_noise_leaves_converter_and_offset():
     assert_allclose(result[:, 0], one.sensors.offset, atol=0.5 * 2000 / 2**23)
 
 
+def test_added_noise_is_white_and_power_ignores_the_mean():
+    clean = np.full((1, 65_536), 3.0)
+    (noise,) = add_noise(clean, np.array([2.0]), default_rng(2)) - clean
+    assert_allclose(noise.var(), 2.0, rtol=0.02)
+    assert_allclose(power(noise + 5.0), noise.var())
+    bands = (np.abs(np.fft.rfft(noise)[1:]) ** 2).reshape(8, -1).mean(axis=1)
+    assert_allclose(bands / bands.mean(), 1.0, atol=0.08)
+
+
 def test_transverse_motion_of_a_bearing_sensor():
-    one = instrument(changed(BEARING, {"sensor.transverse_sensitivity": 0.05}))
+    bearing = instrument(changed(BEARING, {"sensor.transverse_sensitivity": 0.05}))
     still = np.zeros((4, 300))
     still[0] = default_rng(1).standard_normal(300)  # pinion_x alone
-    result = one.measure(still)
-    assert_allclose(result[1], one.sensors.transverse[1] * still[0])
-    assert abs(one.sensors.transverse[1]) > 1e-4
+    result, share = bearing.measure(still), bearing.sensors.transverse[1]
+    assert_allclose(result[1], share * still[0])
+    assert abs(share) > 1e-4
     assert not result[2:].any()
 
 

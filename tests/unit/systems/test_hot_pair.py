@@ -31,6 +31,7 @@ MESH = [
     "mesh.n_slices=20",
 ]
 FRICTION = "mesh.friction_coefficient"
+UNCOOLED = ["heat.face_convection_w_per_m2k=0", "heat.tooth_convection_w_per_m2k=0"]
 
 
 def at(pinion, wheel=None, housing=None):
@@ -91,25 +92,22 @@ def test_gears_hotter_than_the_housing_have_a_longer_path_of_contact(pinion, whe
     """Against the path of gears that are each grown, at the housing's centre distance."""
     duty = duty_of(*at(pinion, wheel, 30), "gear.backlash_um=2000")
     cold, expansion = duty.system.pair, duty.heat.expansion
-    pair = heated_by(duty, growth=True, center_distance=True).pair
-    gears = (
-        (cold.pinion, 1 + (pinion - 20) * expansion),
-        (cold.wheel, 1 + (wheel - 20) * expansion),
-    )
-    base = sum(gear.base_radius * growth for gear, growth in gears)
+    hot = heated_by(duty, growth=True, center_distance=True).pair
     distance = cold.center_distance * (1 + 10 * expansion)
-    assert_close(pair.center_distance, distance, 1e-9)
-    flanks = sum(
-        growth * math.sqrt(gear.tip_radius**2 - gear.base_radius**2)
-        for gear, growth in gears
-    )
-    path = flanks - math.sqrt(distance**2 - base**2)
-    exact = path / (2 * math.pi * base / (cold.pinion.n_teeth + cold.wheel.n_teeth))
+    assert_close(hot.center_distance, distance, 1e-9)
+
+    growth = 1 + expansion * np.array([pinion - 20, wheel - 20])
+    gears = cold.pinion, cold.wheel
+    base = growth @ [gear.base_radius for gear in gears]
+    tips = [math.sqrt(gear.tip_radius**2 - gear.base_radius**2) for gear in gears]
+    path = growth @ tips - math.sqrt(distance**2 - base**2)
+    pitch = math.tau * base / sum(gear.n_teeth for gear in gears)
+    exact = path / pitch
     assert exact > cold.transverse_contact_ratio + 0.01
     # tips grow by the common strain: an error of the difference of strains times the curvature
     tolerance = 1e-6 if pinion == wheel else 0.006
-    assert_close(pair.transverse_contact_ratio, exact, atol=tolerance)
-    assert pair.backlash < cold.backlash
+    assert_close(hot.transverse_contact_ratio, exact, atol=tolerance)
+    assert hot.backlash < cold.backlash
 
 
 def test_a_hotter_pinion_loads_the_leaving_pair():
@@ -140,13 +138,12 @@ def test_sweeps():
     duty = duty_of("heat.softening=false")
     cool, hot = sweep(duty, "friction", [0.03, 0.07])
     assert np.array_equal(cool["cold"].mesh, hot["cold"].mesh)
-    ratios = [each["contact_ratio"].transverse_contact_ratio for each in (cool, hot)]
-    assert ratios[1] > ratios[0]
+    cool, hot = (each["contact_ratio"].transverse_contact_ratio for each in (cool, hot))
+    assert hot > cool
     slow, fast = (hot_state(replace(duty, speed=speed)) for speed in (60.0, 120.0))
     assert_close(fast.friction_heat, 2.0 * slow.friction_heat, 1e-12)
-    light, heavy = (
-        each["cold"].approach.mean() for each in sweep(duty, "torque", [12e3, 24e3])
-    )
+    torques = sweep(duty, "torque", [12e3, 24e3])
+    light, heavy = (each["cold"].approach.mean() for each in torques)
     assert_close(light, 0.5 * heavy, 1e-9)
     text = "a sweep over 'oil'; allowed: friction, torque, speed"
     with pytest.raises(ConfigError, match=text):
@@ -154,22 +151,23 @@ def test_sweeps():
 
 
 @pytest.mark.parametrize(
-    ("known_at", "power", "rtol"), [("null", 1.0, 1e-9), ("600", 0.5, 0.02)]
+    ("known_at", "power", "rtol"),
+    [("null", 1.0, 1e-9), ("600", 0.5, 0.02)],
 )
 def test_cooling_grows_with_the_root_of_the_speed(known_at, power, rtol):
     """Friction heat grows with the speed; with weak cooling the temperature keeps its shape."""
     words = f"heat.convection_speed_rpm={known_at}", "heat.conductivity_w_per_mk=500"
     duty = duty_of(*words)
 
-    def tooth(duty, speed):
-        return hot_state(replace(duty, speed=speed)).pinion.tooth
+    def rise(heat, speed):
+        state = hot_state(replace(duty, heat=heat, speed=speed))
+        return state.pinion.tooth - heat.oil_temperature
 
-    slow, fast = (
-        tooth(duty, speed) - duty.heat.oil_temperature for speed in (60.0, 240.0)
-    )
+    slow, fast = (rise(duty.heat, speed) for speed in (60.0, 240.0))
     assert_close(fast / slow, 4.0**power, rtol)
-    fixed = replace(duty, heat=replace(duty.heat, convection_speed=None))
-    assert_close(tooth(fixed, 20.0 * math.pi), tooth(duty, 20.0 * math.pi), 1e-12)
+    fixed = replace(duty.heat, convection_speed=None)
+    at_600_rpm = (rise(heat, 20.0 * math.pi) for heat in (fixed, duty.heat))
+    assert_close(*at_600_rpm, 1e-9)
 
 
 def test_heat_is_shared_and_the_flash_lifts_a_flank_by_less_than_a_tenth_of_a_micrometre():
@@ -200,11 +198,7 @@ def test_modification_and_growth_of_flanks_add():
     [
         (at(120), GeometryError, "the gears jam: heat makes them grow"),
         ([f"{FRICTION}=0.5"], ExtrapolationError, "pinion: a temperature of"),
-        (
-            ["heat.face_convection_w_per_m2k=0", "heat.tooth_convection_w_per_m2k=0"],
-            ConfigError,
-            "pinion: nothing cools it",
-        ),
+        (UNCOOLED, ConfigError, "pinion: nothing cools it"),
         (
             [*at(150), "gear.backlash_um=9000"],
             GeometryError,
