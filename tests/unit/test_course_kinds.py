@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from refusals import refused
 
 from gensig.errors import ConfigError
 from gensig.operation.courses import (
@@ -60,13 +61,13 @@ class TestRandomWalk:
     def test_it_stays_above_its_least_factor(self):
         wide = RandomWalk(scatter=0.2, correlation_time=0.02)
         factors = np.array(walk(0, wide, duration=60.0).factors)
-        assert wide.least == pytest.approx(0.2)
+        assert_allclose(wide.least, 0.2)
         assert factors.min() >= wide.least
         share = np.mean(np.abs(factors - 1.0) > 0.999 * WALK_LIMIT * 0.2)
         assert share < 1e-3
 
     def test_too_short_a_correlation_time(self):
-        with pytest.raises(ConfigError, match=r"= 0.01 must lie in 0.02..1e\+06"):
+        with refused(ConfigError, "= 0.01 must lie in 0.02..1e+06"):
             replace(WALK, correlation_time=0.01)
 
     def test_too_many_points(self):
@@ -93,5 +94,5 @@ class TestRandomWalk:
     ],
 )
 def test_ripples_that_cannot_be(values, text):
-    with pytest.raises(ConfigError, match=re.escape(text)):
+    with refused(ConfigError, text):
         Ripple(**values)

@@ -1,11 +1,11 @@
 """The group ``operating``: courses as configurations give them, users' files, and mistakes."""
 
 import math
-import re
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from refusals import refused
 
 from gensig.errors import ConfigError
 from gensig.operation.courses import MOST_POINTS, Profile
@@ -106,10 +106,9 @@ class TestKinds:
 
 
 def check_refused(config, start, text):
-    with pytest.raises(ConfigError, match=re.escape(text)) as caught:
+    with refused(ConfigError, text) as caught:
         read_system(config)
     assert str(caught.value).startswith(start)
-    assert "\n" not in str(caught.value)
 
 
 PROFILES = [
@@ -170,7 +169,7 @@ class TestRefusals:
     def test_an_order_is_judged_at_the_fastest(self, operating):
         ripple = {SPEED_RIPPLE: {"share": 0.1, "order": 4}}
         assert operating(ripple).speed_ripple.order == 4
-        with pytest.raises(ConfigError, match="order 4 makes up to 180 Hz"):
+        with refused(ConfigError, "order 4 makes up to 180 Hz"):
             operating({**ripple, SPEED: [[0, 1], [1, 1.5]]})
 
     @pytest.mark.parametrize(

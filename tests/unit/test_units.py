@@ -1,13 +1,13 @@
 """Names with units at the boundary, SI inside."""
 
 import math
-import re
 from dataclasses import dataclass, field, replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from refusals import refused
 
 from gensig.errors import ConfigError
 from gensig.units import (
@@ -101,9 +101,9 @@ def test_the_longest_suffix_wins(name, parts):
 
 def test_read_converts_and_fills():
     result = shaft(labels=["a", "b"], seats_mm=[1, 2.5], width_mm=4)
-    assert (result.length, result.inertia) == pytest.approx((12.5e-3, 2.0))
-    assert (result.angle, result.width) == pytest.approx((math.pi / 2, 4e-3))
-    assert result.seats == pytest.approx((1e-3, 2.5e-3))
+    assert_allclose((result.length, result.inertia), (12.5e-3, 2.0))
+    assert_allclose((result.angle, result.width), (math.pi / 2, 4e-3))
+    assert_allclose(result.seats, (1e-3, 2.5e-3))
     assert (result.name, result.n_keys, result.hollow) == ("shaft", 2, True)
     assert result.labels == ("a", "b")
     empty = shaft(angle_deg=None, seats_mm=None)
@@ -156,13 +156,13 @@ MISTAKES = [
 
 @pytest.mark.parametrize(("key", "value", "text"), MISTAKES)
 def test_mistakes_are_answered(key, value, text):
-    with pytest.raises(ConfigError, match=re.escape(f"gear.shaft{text}")):
+    with refused(ConfigError, f"gear.shaft{text}"):
         shaft(**{key: value})
 
 
 def test_missing_keys_are_named():
     values = {key: GOOD[key] for key in GOOD if key not in ("length_mm", "n_keys")}
-    with pytest.raises(ConfigError, match=r"gear.shaft: missing length_mm, n_keys"):
+    with refused(ConfigError, "gear.shaft: missing length_mm, n_keys"):
         read(Shaft, values, "gear.shaft", name="shaft")
 
 
@@ -179,14 +179,14 @@ LIMITS = {"length": (1e-3, 0.1), "share": (0.0, 1.0), "seats": (0.0, 0.1)}
 @pytest.mark.parametrize(("check", "changes", "text"), FAULTS)
 def test_checks_name_the_field_in_its_unit(check, changes, text):
     limits = {name: LIMITS[name] for name in changes}
-    with pytest.raises(ConfigError, match=re.escape(text)):
+    with refused(ConfigError, text):
         check(replace(shaft(), **changes), "gear.", **limits)
 
 
 def test_positive_fields_and_choices_are_named():
-    with pytest.raises(ConfigError, match=r"gear.length_mm = 0 must be positive"):
+    with refused(ConfigError, "gear.length_mm = 0 must be positive"):
         check_positive(replace(shaft(), length=0.0), "gear.", "share", "length")
-    with pytest.raises(ConfigError, match=r"gear.name = 'shaft'; allowed: a, 1"):
+    with refused(ConfigError, "gear.name = 'shaft'; allowed: a, 1"):
         check_choice("gear.name", "shaft", ("a", 1))
 
 
@@ -214,9 +214,9 @@ def test_a_kind_is_read_by_its_name(values, text):
         return read_kind({"shaft": Shaft}, part, "gear.part")
 
     assert read_part(given) == replace(shaft(), name="a")
-    with pytest.raises(ConfigError, match=re.escape(text)):
+    with refused(ConfigError, text):
         read_part({**GOOD, **values})
-    with pytest.raises(ConfigError, match="kind = None"):
+    with refused(ConfigError, "kind = None"):
         read_part("shaft")
 
 

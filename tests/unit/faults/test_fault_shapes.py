@@ -216,7 +216,7 @@ class TestHoles:
         area = 0.25 * np.pi * 1.5e-3 * 8e-3
         assert_allclose(lost_area(tooth), area, rtol=0.02)
         longest = (tooth.material_loss > 0).sum(axis=1)
-        assert longest.argmax() == pytest.approx(len(longest) // 2, abs=1)
+        assert_allclose(longest.argmax(), len(longest) // 2, atol=1)
         assert_allclose(longest, longest[::-1], atol=1)
 
     def test_holes_do_not_add_up_where_they_overlap(self, tooth_of):
@@ -225,7 +225,7 @@ class TestHoles:
         one_way, other = tooth_of(pit, spall), tooth_of(spall, pit)
         assert_allclose(one_way.slice_edges, other.slice_edges, atol=1e-15)
         assert_array_equal(one_way.material_loss, other.material_loss)
-        assert one_way.material_loss.max() == pytest.approx(0.5e-3)
+        assert_allclose(one_way.material_loss.max(), 0.5e-3)
 
     def test_wear_takes_what_is_left_of_the_flank(self, tooth_of):
         wear = one("wear", wear_depth_um=30, wear_profile=[0, 1, 0.5])

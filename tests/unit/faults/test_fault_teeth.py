@@ -141,7 +141,7 @@ class TestCompound:
         table = table_of(wear, one("pitch_error", tooth=2))
         gap = rows(table, "pinion", 2)[1]
         result = np.interp(xiamen.pair.pitch_point, table.position, gap)
-        assert result == pytest.approx(30e-6)
+        assert_allclose(result, 30e-6)
 
     @pytest.mark.parametrize(
         "kinds",

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.random import default_rng
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from gensig.errors import ConfigError
 from gensig.sensing.accelerometer import LIMITS, Accelerometer, draw_sensors
@@ -40,7 +40,7 @@ def gain(sensor, frequency):
 def test_ideal_changes_no_bit():
     signal = default_rng(0).standard_normal((2, 300))
     assert IDEAL.is_ideal
-    assert np.array_equal(IDEAL.filtered(signal, RATE), signal)
+    assert_array_equal(IDEAL.filtered(signal, RATE), signal)
     same, clipped = IDEAL.digitised(signal)
     assert same is signal
     assert clipped == 0.0

@@ -16,7 +16,7 @@ def test_without_drift_and_loss_no_bit_changes(group):
     signal = one.measure(emitted)
     assert (signal is emitted) == (group is BEARING)
     rng = default_rng(0)
-    assert np.array_equal(signal * one.drift(300, rng), signal)
+    assert_array_equal(signal * one.drift(300, rng), signal)
     same, share = one.sent(signal, rng)
     assert same is signal
     assert share == 0.0

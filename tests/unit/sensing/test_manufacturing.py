@@ -1,6 +1,5 @@
 """Draws of specimens and gearboxes."""
 
-import re
 from dataclasses import astuple, replace
 from math import tau
 from types import SimpleNamespace
@@ -8,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from refusals import refused
 
 from gensig.errors import ConfigError
 from gensig.faults.base import faulty_teeth
@@ -244,7 +244,7 @@ class TestWhatIsDrawn:
             "gear.pinion.bore_radius_mm": 1.5,
             "gear.wheel.bore_radius_mm": 5,
         }
-        with pytest.raises(ConfigError, match=r"module, the pinion has 0\.4"):
+        with refused(ConfigError, "module, the pinion has 0.4"):
             machine(tiny).check()
         machine({**tiny, "quality.iso1328_grade": None}).check()
 
@@ -271,5 +271,5 @@ def test_gearbox_factors_scatter_as_the_quality_says(quality):
     ],
 )
 def test_values_out_of_range(quality, key, value, text):
-    with pytest.raises(ConfigError, match=re.escape(key + text)):
+    with refused(ConfigError, key + text):
         quality(**{key: value})

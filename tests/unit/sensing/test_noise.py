@@ -1,12 +1,12 @@
 """Noise of every kind at its level, and with the spectrum that its name says."""
 
 import math
-import re
 
 import numpy as np
 import pytest
 from numpy.random import default_rng
 from numpy.testing import assert_allclose
+from refusals import refused
 from scipy.signal import butter, sosfilt
 from sensing_groups import MACHINE
 
@@ -195,9 +195,8 @@ def test_refused_files(tmp_path):
         "too short: 900 rows, at least 1000": of_file("h", long[:, :900]),
     }
     for text, part in cases.items():
-        with pytest.raises(ConfigError, match=re.escape(text)) as caught:
+        with refused(ConfigError, text):
             made([part], n_samples=1000)
-        assert "\n" not in str(caught.value)
 
 
 def test_offsets_make_a_sensor_louder(machine, xiamen):
@@ -207,5 +206,5 @@ def test_offsets_make_a_sensor_louder(machine, xiamen):
     levels = 10.0 * np.log10(sensing.noise_factor(20.0))
     assert_allclose(levels, [-17.0, -27.0])
     assert np.all(xiamen.sensing.noise_factor(13.7) == 10.0 ** (-13.7 / 10.0))
-    with pytest.raises(ConfigError, match="has 2 values for 4 sensors"):
+    with refused(ConfigError, "has 2 values for 4 sensors"):
         machine(offset)

@@ -1,11 +1,10 @@
 """Every format of a recording says the same; what cannot be used is refused with one line."""
 
-import re
-
 import h5py
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from refusals import refused
 from scipy import io
 from scipy.io import wavfile
 
@@ -80,7 +79,7 @@ def test_whole_numbers_of_a_wav_file_keep_their_shape_and_have_no_level(tmp_path
     source = read_file(str(tmp_path / "i.wav"))
     result = recording_of(source, needs_level=False).acceleration
     assert np.corrcoef(result[0], SIGNAL[0])[0, 1] > 0.99999
-    with pytest.raises(ConfigError, match="no level in m/s2"):
+    with refused(ConfigError, "no level in m/s2"):
         recording_of(source)
 
 
@@ -134,9 +133,8 @@ REFUSED = [
 
 @pytest.mark.parametrize(("text", "name", "options"), REFUSED)
 def test_refused(broken_files, name, options, text):
-    with pytest.raises(ConfigError, match=re.escape(text)) as caught:
+    with refused(ConfigError, text):
         recording_of(read_file(str(broken_files / name), **options))
-    assert "\n" not in str(caught.value)
 
 
 @pytest.fixture(scope="module")

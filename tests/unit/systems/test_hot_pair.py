@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closeness import assert_close
+from numpy.testing import assert_array_equal
 
 from gensig.errors import ConfigError, ExtrapolationError, GeometryError
 from gensig.mesh.modification import FlankModification
@@ -137,7 +138,7 @@ def test_sweeps():
     """Friction heats the gears and leaves the cold load; heat is proportional to speed."""
     duty = duty_of("heat.softening=false")
     cool, hot = sweep(duty, "friction", [0.03, 0.07])
-    assert np.array_equal(cool["cold"].mesh, hot["cold"].mesh)
+    assert_array_equal(cool["cold"].mesh, hot["cold"].mesh)
     cool, hot = (each["contact_ratio"].transverse_contact_ratio for each in (cool, hot))
     assert hot > cool
     slow, fast = (hot_state(replace(duty, speed=speed)) for speed in (60.0, 120.0))

@@ -8,6 +8,7 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 from closeness import assert_close
+from numpy.testing import assert_array_equal
 
 from gensig.dynamics.pair import DOFS
 from gensig.errors import ConfigError
@@ -175,7 +176,7 @@ def test_a_record_starts_perfect_and_nominal(any_machine):
         specimen=perfect_specimen(pair.pinion, pair.wheel),
         gearbox=nominal_gearbox(len(channels)),
     )
-    assert np.array_equal(plain.acceleration, perfect.acceleration)
+    assert_array_equal(plain.acceleration, perfect.acceleration)
     assert plain.acceleration.shape[0] == len(channels)
     assert plain.integration_check in CHECKS
     later = any_machine.simulate(start=Start(phase=0.3))
@@ -186,7 +187,7 @@ def test_kinds_are_simulated_together_in_the_order_given():
     machines = [read(name) for name in MACHINES]
     runs = [Run(system=machines[number], faults=()) for number in (3, 0, 1, 0)]
     for run, record in zip(runs, simulate_together(runs), strict=True):
-        assert np.array_equal(record.acceleration, run.system.simulate().acceleration)
+        assert_array_equal(record.acceleration, run.system.simulate().acceleration)
 
 
 def test_set_points_teeth_and_discs(any_machine):

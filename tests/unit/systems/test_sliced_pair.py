@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closeness import assert_close
+from refusals import refused
 
 from gensig.errors import ConfigError
 from gensig.mesh.modification import FlankModification
@@ -127,5 +128,5 @@ def test_refusals_of_a_spur_pair(words, message):
 
 
 def test_cases_need_positive_torques():
-    with pytest.raises(ConfigError, match="must be positive"):
+    with refused(ConfigError, "must be positive"):
         Cases(torques=(0.0,), misalignments=(0.0,))

@@ -9,6 +9,7 @@ import pytest
 import torch
 from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
+from refusals import refused
 from runs import refuses, says
 from safetensors.numpy import load_file, save_file
 from small_studies import settings_of, task_on, two_channels, windows_of
@@ -160,11 +161,11 @@ def test_coral_keeps_directions_without_scatter_in_the_windows(healthy):
 
 
 def test_coral_needs_linear_scores_and_adabn_batch_normalisation(healthy):
-    with pytest.raises(ConfigError, match="take coral"):
+    with refused(ConfigError, "take coral"):
         adapt_network(Levels(), statistics_of(Levels(), healthy), healthy, "adabn")
     bent = Levels()
     bent.head = torch.nn.Tanh()
-    with pytest.raises(ConfigError, match="not linear"):
+    with refused(ConfigError, "not linear"):
         statistics_of(bent, healthy)
 
 
@@ -193,22 +194,22 @@ def test_statistics_are_those_of_healthy_windows_and_can_be_stored(windows):
         assert_array_equal(loaded[name], tensor)
     assert healthy_statistics(model, windows, ("sound", *names[1:])) is None
     assert statistics_from(weights) is None
-    with pytest.raises(DatasetError, match="no statistic"):
+    with refused(DatasetError, "no statistic"):
         statistics_from(tensors | {"adaptation.levels": np.array([np.nan])})
     del tensors["adaptation.features"]
-    with pytest.raises(DatasetError, match="not whole"):
+    with refused(DatasetError, "not whole"):
         statistics_from(tensors)
 
 
 def test_statistics_of_another_network_are_refused(windows, healthy):
     model, other = network("cnn"), statistics_of(network("spectrum"), healthy)
     for method in METHODS:
-        with pytest.raises(DatasetError, match="another network"):
+        with refused(DatasetError, "another network"):
             adapt_network(model, other, healthy, method)
-    with pytest.raises(ConfigError, match="there is adabn, coral"):
+    with refused(ConfigError, "there is adabn, coral"):
         adapt_network(model, other, healthy, "magic")
     few = replace(other, levels=other.levels[:3])
-    with pytest.raises(DatasetError, match="another out-of-distribution flag"):
+    with refused(DatasetError, "another out-of-distribution flag"):
         adapt_domain(fit_domain(windows, windows), few, healthy)
 
 
