@@ -22,7 +22,10 @@ WALK = RandomWalk(scatter=0.02, correlation_time=0.4)
 
 
 def walk(seed, one=WALK, duration=1.0):
-    return one.profile(duration, np.random.Generator(np.random.SFC64(seed)))
+    return one.profile(
+        duration,
+        np.random.Generator(np.random.SFC64(seed)),
+    )
 
 
 class TestRamp:
@@ -31,8 +34,15 @@ class TestRamp:
         whole = ramp.profile(4.0).curve()
         early = replace(ramp, begin=-1.0, end=1.0).profile(4.0).curve()
         times = [-1, 0, 2, 4, 9]
-        assert_allclose(whole(times), [0.5, 0.5, 0.75, 1, 1])
-        assert_allclose(early([-2, 0, 2]), [0.5, 0.75, 1])
+
+        assert_allclose(
+            whole(times),
+            [0.5, 0.5, 0.75, 1, 1],
+        )
+        assert_allclose(
+            early([-2, 0, 2]),
+            [0.5, 0.75, 1],
+        )
 
 
 class TestRandomWalk:
@@ -52,17 +62,31 @@ class TestRandomWalk:
         draws = np.array([walk(seed, duration=0.1).factors for seed in range(4000)])
         normed = (draws - 1.0) / WALK.scatter
         most = 4.5 / math.sqrt(len(draws))
-        assert_allclose(normed.mean(axis=0), 0.0, atol=most)
-        assert_allclose(normed.std(axis=0), 1.0, rtol=most / math.sqrt(2))
+
+        assert_allclose(
+            normed.mean(axis=0),
+            0.0,
+            atol=most,
+        )
+        assert_allclose(
+            normed.std(axis=0),
+            1.0,
+            rtol=most / math.sqrt(2),
+        )
         for lag in (1, 20, 40, 100):  # twentieths of the correlation time
             correlation = (normed[:, 0] * normed[:, lag]).mean()
-            assert_allclose(correlation, math.exp(-lag / 20), atol=most)
+            assert_allclose(
+                correlation,
+                math.exp(-lag / 20),
+                atol=most,
+            )
 
     def test_it_stays_above_its_least_factor(self):
         wide = RandomWalk(scatter=0.2, correlation_time=0.02)
         factors = np.array(walk(0, wide, duration=60.0).factors)
         assert_allclose(wide.least, 0.2)
         assert factors.min() >= wide.least
+
         share = np.mean(np.abs(factors - 1.0) > 0.999 * WALK_LIMIT * 0.2)
         assert share < 1e-3
 
@@ -75,8 +99,13 @@ class TestRandomWalk:
         message = "correlation_time_s = 0.02 needs 1002002 points for 1000 s"
         with pytest.raises(ConfigError, match=message) as caught:
             walk(0, quick, duration=1000.0)
+
         least = float(re.search(r"give ([\d.]+) or more", str(caught.value))[1])
-        allowed = walk(0, replace(WALK, correlation_time=least), duration=1000.0)
+        allowed = walk(
+            0,
+            replace(WALK, correlation_time=least),
+            duration=1000.0,
+        )
         assert len(allowed.times) > 90_000
 
 

@@ -41,6 +41,7 @@ class TestKinds:
         factors = [both.speed_profile.factors, both.torque_profile.factors]
         assert abs(np.corrcoef(factors)[0, 1]) < 0.5
         assert operating({SPEED: WALK}).speed_profile == both.speed_profile
+
         other = operating({SPEED: WALK, "operating.course_seed": 1})
         assert other.speed_profile != both.speed_profile
 
@@ -59,7 +60,11 @@ class TestKinds:
         words = [f"{SPEED}=[[0,0.5],[1,1]]", f"{TORQUE}=[[0.1,0],[0.2,1.5],[1,1]]"]
         result = read_system(read_request(words).config).operating
         assert result.speed_profile == Profile(times=(0.0, 1.0), factors=(0.5, 1.0))
-        torque = Profile(times=(0.1, 0.2, 1.0), factors=(0.0, 1.5, 1.0))
+
+        torque = Profile(
+            times=(0.1, 0.2, 1.0),
+            factors=(0.0, 1.5, 1.0),
+        )
         assert result.torque_profile == torque
 
     def test_a_drawn_speed_scales_the_profile(self, config_with):
@@ -93,6 +98,7 @@ class TestKinds:
             "torque_nm": nominal.torque_factor * result.torque,
         }
         (name,) = values.keys() & set(text.split("\n")[0].split(","))
+
         assert_allclose(values[name], expected)
 
     def test_a_file_may_end_one_step_early(self, operating, tmp_path):
@@ -158,8 +164,15 @@ class TestRefusals:
 
     @pytest.mark.parametrize("table", FILES)
     def test_of_files(self, config_with, tmp_path, table):
-        course = saved(tmp_path, table.replace(" ", "\n") + "\n")
-        check_refused(config_with({SPEED: course}), SPEED, FILES[table])
+        course = saved(
+            tmp_path,
+            table.replace(" ", "\n") + "\n",
+        )
+        check_refused(
+            config_with({SPEED: course}),
+            SPEED,
+            FILES[table],
+        )
 
     @pytest.mark.parametrize(("value", "text"), RIPPLES)
     @pytest.mark.parametrize("key", [SPEED_RIPPLE, TORQUE_RIPPLE])
@@ -187,12 +200,16 @@ class TestRefusals:
 
 
 class TestRipple:
-    @pytest.mark.parametrize("rate", [{"order": 1}, {"frequency_hz": 30}])
+    @pytest.mark.parametrize(
+        "rate",
+        [{"order": 1}, {"frequency_hz": 30}],
+    )
     def test_of_a_constant_speed(self, operating, rate):
         ripple = {"share": 0.1, "phase_deg": 90, **rate}
         result = operating({SPEED_RIPPLE: ripple})
         nominal = result.nominal(np.array([0.0, 0.25, 0.5]) / 30)
         share = nominal.speed / result.speed
+
         assert_allclose(share, [1.1, 1.0, 0.9])
         assert_array_equal(nominal.torque_factor, 1.0)
 
@@ -201,10 +218,14 @@ class TestRipple:
         [{"share": 0.1, "order": 2}, {"share": 0.2, "frequency_hz": 9}],
     )
     def test_speed_and_slopes_are_derivatives(self, operating, ripple):
-        rippled = {SPEED_RIPPLE: ripple, TORQUE_RIPPLE: {**ripple, "phase_deg": 30}}
+        rippled = {
+            SPEED_RIPPLE: ripple,
+            TORQUE_RIPPLE: {**ripple, "phase_deg": 30},
+        }
         result = operating({SPEED: WALK, TORQUE: RAMP, **rippled})
         times, h = np.array([-0.2512, 0.1013, 0.5017, 0.9123]), 1e-6
         before, at, after = (result.nominal(times + shift) for shift in (-h, 0.0, h))
+
         assert result.nominal(np.zeros(1)).angle == 0.0
         for slope, name in (
             ("speed", "angle"),
@@ -212,7 +233,12 @@ class TestRipple:
             ("torque_slope", "torque_factor"),
         ):
             expected = (getattr(after, name) - getattr(before, name)) / (2 * h)
-            assert_allclose(getattr(at, slope), expected, rtol=1e-5, atol=1e-5)
+            assert_allclose(
+                getattr(at, slope),
+                expected,
+                rtol=1e-5,
+                atol=1e-5,
+            )
 
     def test_the_order_follows_the_set_angle_of_both_shafts_courses(self, operating):
         """On a ramp a torque ripple of order 2 has two periods a turn of the pinion, whatever the
@@ -228,14 +254,29 @@ class TestRipple:
     [{"share": 0.02, "order": 2}, {"share": 0.02, "frequency_hz": 50, "phase_deg": 20}],
 )
 def test_a_lead_in_shifts_all_courses_alike(machine, ripple):
-    courses = {SPEED: WALK, TORQUE: WALK, SPEED_RIPPLE: ripple, TORQUE_RIPPLE: ripple}
+    courses = {
+        SPEED: WALK,
+        TORQUE: WALK,
+        SPEED_RIPPLE: ripple,
+        TORQUE_RIPPLE: ripple,
+    }
     filtered = {"sensing.sensor.low_cutoff_hz": 2.0}
-    run = Run(system=machine(courses | filtered), faults=())
+    run = Run(
+        system=machine(courses | filtered),
+        faults=(),
+    )
     lead = run.system.sensing.n_lead / run.system.sensing.sampling_rate
+
     assert lead > 0.05
+
     longer = earlier(run).system.operating
     there, here = longer.nominal(TIMES + lead), run.system.operating.nominal(TIMES)
     for name in ("speed", "acceleration", "torque_factor", "torque_slope"):
-        assert_allclose(getattr(there, name), getattr(here, name), atol=1e-6)
+        assert_allclose(
+            getattr(there, name),
+            getattr(here, name),
+            atol=1e-6,
+        )
+
     at_begin = longer.nominal(np.array([lead])).angle
     assert_allclose(there.angle - at_begin, here.angle, atol=1e-8)

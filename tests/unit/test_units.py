@@ -52,18 +52,33 @@ GOOD = {
 
 
 def shaft(**changes):
-    return read(Shaft, {**GOOD, **changes}, "gear.shaft", name="shaft")
+    return read(
+        Shaft,
+        {**GOOD, **changes},
+        "gear.shaft",
+        name="shaft",
+    )
 
 
-@given(st.sampled_from(sorted(UNITS)), st.floats(-1e9, 1e9))
+@given(
+    st.sampled_from(sorted(UNITS)),
+    st.floats(-1e9, 1e9),
+)
 def test_there_and_back(suffix, value):
     name = f"quantity_{suffix}"
-    assert_allclose(from_si(name, to_si(name, value)), value, atol=1e-300)
+    assert_allclose(
+        from_si(name, to_si(name, value)),
+        value,
+        atol=1e-300,
+    )
 
 
 @given(st.floats(-1e9, 1e9))
 def test_a_name_without_unit_is_taken_as_it_is(value):
-    assert_array_equal([to_si("share", value), from_si("share", value)], value)
+    assert_array_equal(
+        [to_si("share", value), from_si("share", value)],
+        value,
+    )
 
 
 @pytest.mark.parametrize(
@@ -100,12 +115,23 @@ def test_the_longest_suffix_wins(name, parts):
 
 
 def test_read_converts_and_fills():
-    result = shaft(labels=["a", "b"], seats_mm=[1, 2.5], width_mm=4)
-    assert_allclose((result.length, result.inertia), (12.5e-3, 2.0))
-    assert_allclose((result.angle, result.width), (math.pi / 2, 4e-3))
+    result = shaft(
+        labels=["a", "b"],
+        seats_mm=[1, 2.5],
+        width_mm=4,
+    )
+    assert_allclose(
+        (result.length, result.inertia),
+        (12.5e-3, 2.0),
+    )
+    assert_allclose(
+        (result.angle, result.width),
+        (math.pi / 2, 4e-3),
+    )
     assert_allclose(result.seats, (1e-3, 2.5e-3))
     assert (result.name, result.n_keys, result.hollow) == ("shaft", 2, True)
     assert result.labels == ("a", "b")
+
     empty = shaft(angle_deg=None, seats_mm=None)
     assert empty.angle is empty.seats is empty.width is shaft().seats is None
 
@@ -154,7 +180,10 @@ MISTAKES = [
 ]
 
 
-@pytest.mark.parametrize(("key", "value", "text"), MISTAKES)
+@pytest.mark.parametrize(
+    ("key", "value", "text"),
+    MISTAKES,
+)
 def test_mistakes_are_answered(key, value, text):
     with refused(ConfigError, f"gear.shaft{text}"):
         shaft(**{key: value})
@@ -173,27 +202,52 @@ FAULTS = [
     (check_ranges, {"seats": (0.05, 0.02)}, "ordered numbers, [low, high], in 0..100"),
     (check_ranges, {"seats": (0.05,)}, "two ordered"),
 ]
-LIMITS = {"length": (1e-3, 0.1), "share": (0.0, 1.0), "seats": (0.0, 0.1)}
+LIMITS = {
+    "length": (1e-3, 0.1),
+    "share": (0.0, 1.0),
+    "seats": (0.0, 0.1),
+}
 
 
-@pytest.mark.parametrize(("check", "changes", "text"), FAULTS)
+@pytest.mark.parametrize(
+    ("check", "changes", "text"),
+    FAULTS,
+)
 def test_checks_name_the_field_in_its_unit(check, changes, text):
     limits = {name: LIMITS[name] for name in changes}
     with refused(ConfigError, text):
-        check(replace(shaft(), **changes), "gear.", **limits)
+        check(
+            replace(shaft(), **changes),
+            "gear.",
+            **limits,
+        )
 
 
 def test_positive_fields_and_choices_are_named():
     with refused(ConfigError, "gear.length_mm = 0 must be positive"):
-        check_positive(replace(shaft(), length=0.0), "gear.", "share", "length")
+        check_positive(
+            replace(shaft(), length=0.0),
+            "gear.",
+            "share",
+            "length",
+        )
     with refused(ConfigError, "gear.name = 'shaft'; allowed: a, 1"):
         check_choice("gear.name", "shaft", ("a", 1))
 
 
 def test_checks_pass_what_is_allowed():
-    one = replace(shaft(), seats=(0.0, 0.1), angle=None)
+    one = replace(
+        shaft(),
+        seats=(0.0, 0.1),
+        angle=None,
+    )
     check_positive(one, "", "length", "angle")
-    check_limits(one, "", length=(one.length, one.length), angle=(0.0, 1.0))
+    check_limits(
+        one,
+        "",
+        length=(one.length, one.length),
+        angle=(0.0, 1.0),
+    )
     check_ranges(one, "", seats=(0.0, 0.1))
     check_choice("name", one.name, ("shaft",))
 

@@ -22,13 +22,17 @@ CRACK, PIT, MISSING = (
 def typed(words):
     """A fault from its kind and the keys typed after it."""
     kind, *pairs = words.split()
-    return one(kind, **{k: yaml.safe_load(v) for k, v in (p.split("=") for p in pairs)})
+    return one(
+        kind,
+        **{k: yaml.safe_load(v) for k, v in (p.split("=") for p in pairs)},
+    )
 
 
 class TestReading:
     def test_units_are_converted(self):
         crack = one("crack")
         assert type(crack) is FAULTS["crack"]
+
         angle = pytest.approx(math.pi / 4)
         assert (crack.crack_depth, crack.crack_angle) == (pytest.approx(1e-3), angle)
         assert one("pitting").pit_position is None
@@ -43,10 +47,16 @@ class TestReading:
 
     def test_healthy_and_vary_are_no_fault(self):
         assert read_faults({"kind": "healthy", "vary": {}}) == ()
-        varied = {**CRACK, "vary": {"tooth": {"distribution": "tooth"}}}
+        varied = {
+            **CRACK,
+            "vary": {"tooth": {"distribution": "tooth"}},
+        }
         assert read_faults(varied) == read_faults(CRACK)
 
-    @pytest.mark.parametrize("kind", ["crak", None, 3])
+    @pytest.mark.parametrize(
+        "kind",
+        ["crak", None, 3],
+    )
     def test_unknown_kinds_list_the_known(self, kind):
         with pytest.raises(FaultError) as caught:
             read_faults({"kind": kind})
@@ -270,7 +280,12 @@ class TestSeverity:
         radii = [math.hypot(21.61293e-3, r) for r in (12.56508e-3, 2.019e-3)]
         tip, low = (r * math.cos(pinion.half_tooth_angle_at(r)) for r in radii)
         result = severity([one("pitting")], xiamen.pair)
-        assert_allclose(result, 1e-5 / ((tip - low) * 20e-3), rtol=1e-5)
+
+        assert_allclose(
+            result,
+            1e-5 / ((tip - low) * 20e-3),
+            rtol=1e-5,
+        )
 
     @pytest.mark.parametrize(
         ("words", "expected"),

@@ -16,7 +16,10 @@ KEYS = ("compliance", "gap", "compliance_slope", "gap_slope", "present")
 
 
 def some(kind, **changes):
-    return one(kind, **{**FEW.get(kind, {}), **changes})
+    return one(
+        kind,
+        **{**FEW.get(kind, {}), **changes},
+    )
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +34,11 @@ def rows(table, gear, tooth):
 
 
 def assert_same_tooth(table, other, gear, tooth):
-    pairs = zip(rows(table, gear, tooth), rows(other, gear, tooth), strict=True)
+    pairs = zip(
+        rows(table, gear, tooth),
+        rows(other, gear, tooth),
+        strict=True,
+    )
     for key, (result, expected) in zip(KEYS, pairs, strict=True):
         name = f"{key} of tooth {tooth}"
         assert_allclose(result, expected, rtol=1e-12, atol=1e-18, err_msg=name)
@@ -48,6 +55,7 @@ class TestSeveralTeeth:
         table = table_of(one(kind, gear="wheel", tooth=[1, 5]))
         assert changed(table.wheel) == [1, 5]
         assert len(table.wheel.compliance) == 2
+
         alone = table_of(one(kind, gear="wheel", tooth=5))
         assert_same_tooth(table, alone, "wheel", 5)
         assert not table.pinion.kind.any()
@@ -66,12 +74,14 @@ class TestSeveralTeeth:
         )
         assert np.unique(side_of(both, gear).kind).tolist() == [0, 1, 2]
         assert_same_tooth(both, alone, gear, 5)
+
         first, fifth = (rows(both, gear, tooth)[0] for tooth in (1, 5))
         assert np.abs(first - fifth).max() > 1e-12
 
     def test_runout_moves_every_tooth_differently(self, xiamen, table_of):
         table = table_of(one("runout", tooth=4))
         assert sorted(table.pinion.kind.tolist()) == list(range(1, 24))
+
         nothing = one("runout", tooth=4, eccentricity_um=0)
         tooth = faulty_teeth(xiamen.pair, [nothing])["pinion", 0]
         assert tooth is healthy_tooth(xiamen.pair.pinion)
@@ -130,6 +140,7 @@ class TestCompound:
         )
         kinds = table.pinion.kind.tolist()
         assert len(set(kinds)) == 4
+
         worn, *others = kinds[2:6]
         assert len({worn, *others}) == 4
         assert kinds == [worn] * 3 + others + [worn] * 17
@@ -140,7 +151,12 @@ class TestCompound:
         wear = one("wear", tooth=2, wear_profile=None, wear_depth_um=10)
         table = table_of(wear, one("pitch_error", tooth=2))
         gap = rows(table, "pinion", 2)[1]
-        result = np.interp(xiamen.pair.pitch_point, table.position, gap)
+        result = np.interp(
+            xiamen.pair.pitch_point,
+            table.position,
+            gap,
+        )
+
         assert_allclose(result, 30e-6)
 
     @pytest.mark.parametrize(
@@ -166,9 +182,17 @@ class TestCompound:
             assert np.all(two > single)
 
     def test_the_configuration_says_the_same(self, table_of):
-        missing = {"kind": "missing_tooth", "gear": "wheel", "tooth": [7]}
-        parts = [{**option("crack"), "tooth": 2}, missing]
+        missing = {
+            "kind": "missing_tooth",
+            "gear": "wheel",
+            "tooth": [7],
+        }
+        parts = [
+            {**option("crack"), "tooth": 2},
+            missing,
+        ]
         table = table_of(*read_faults({"kind": "compound", "parts": parts}))
+
         assert changed(table.pinion) == [2]
         assert changed(table.wheel) == [7]
         assert table.wheel.present.tolist() == [True, False]

@@ -42,9 +42,11 @@ def test_a_force_gives_the_stress_it_was_asked_for():
     factors = "strength.application_factor=1.25", "strength.face_load_factor=1.2"
     loaded = case(PUMP, *factors).under(349.39e6)
     result = loaded.gears()["wheel"]
+
     assert_allclose(result.stress, 349.39e6)
     assert_allclose(result.nominal, 349.39e6 / 1.5)
     assert_allclose(result.safety.paper, 1.353, atol=5e-4)
+
     force = case(PUMP).force_for(349.39e6)
     assert_allclose(loaded.tangential_force, force / 1.5)
 
@@ -67,6 +69,7 @@ def test_a_wider_gear_is_helped_by_a_module_at_either_end():
     result = pair(PUMP)
     assert_allclose(root_width(result, result.wheel), 20e-3)
     assert_allclose(root_width(result, result.pinion), 26e-3)
+
     result = pair(PUMP, "gear.pinion.face_width_mm=22")
     assert_allclose(root_width(result, result.pinion), 22e-3)
 
@@ -103,6 +106,7 @@ def test_load_distribution_goes_on_at_its_bounds():
         assert_allclose(most, more, rtol=1e-5)
         assert none > half > most
     assert load_distribution_factor(pair(PUMP)) == 1.0
+
     teeth = ("gear.addendum_coefficient=1.25", "gear.cutter_tip_radius_coefficient=0.2")
     deep = pair(PUMP, *teeth)
     assert normal_contact_ratio(deep) > 2.0
@@ -114,6 +118,7 @@ def test_helix_factor():
     steep = pair("system=helical_pair", "gear.helix_angle_deg=38")
     # 18 degrees, overlap above 1
     of_2019 = 0.85 / math.cos(math.radians(18.0)) ** 3
+
     for gears, edition, expected in (
         (helical, 2006, 1.0 - 18.0 / 120.0),
         (helical, 2019, of_2019),
@@ -132,7 +137,10 @@ def test_rim_and_deep_teeth():
         return rim_thickness_factor(replace(wheel, bore_radius=bore_radius))
 
     assert factor(3.0) == factor(1.2) == 1.0
-    assert_allclose(factor(0.8), 1.6 * math.log(2.242 / 0.8))
+    assert_allclose(
+        factor(0.8),
+        1.6 * math.log(2.242 / 0.8),
+    )
     assert factor(0.51) > factor(0.8) > 1.6
     with refused(GeometryError, "reduce bore_radius_mm"):
         factor(0.4)
@@ -160,6 +168,7 @@ def test_equal_gears_see_the_same_from_either_end():
     inside = np.linspace(0.01, 0.99, 60) * path
     seen = np.interp(inside, history.roll, pinion)
     mirrored = np.interp(path - inside, history.roll, wheel)
+
     assert_allclose(seen, mirrored, rtol=5e-3)
     assert_allclose(pinion.max(), wheel.max())
 
@@ -172,12 +181,18 @@ def test_slices_of_a_spur_pair_are_the_pair_itself(coupling, law):
     whole = case(*words).history()
     sliced = case(*words, "system=helical_pair", PUMP, *slices).history()
     inside = np.linspace(0.02, 0.98, 200) * whole.roll[-2]
+
     for name in ("pinion", "wheel"):
         exact, result = (
             np.interp(inside, history.roll, history.stress[name])
             for history in (whole, sliced)
         )
-        assert_allclose(result, exact, rtol=2e-3, atol=2e-3 * exact.max())
+        assert_allclose(
+            result,
+            exact,
+            rtol=2e-3,
+            atol=2e-3 * exact.max(),
+        )
 
 
 def test_spreading_keeps_the_sum_and_evens_out():
@@ -186,16 +201,26 @@ def test_spreading_keeps_the_sum_and_evens_out():
     load = rng.random(shape) * (rng.random(shape) > 0.5)
     structure = 1.0 + rng.random(shape)
     spread = spread_along_face(load, structure, 9.0)
-    assert_allclose(spread.sum(axis=2), load.sum(axis=2))
+
+    assert_allclose(
+        spread.sum(axis=2),
+        load.sum(axis=2),
+    )
     assert spread.min() > 0.0
     assert spread.max() < load.max()
     assert_allclose(spread_along_face(load, structure, 0.0), load)
+
     even = np.ones((1, 401))
     assert_allclose(spread_along_face(even, 2 * even, 9.0), even)
+
     # one loaded slice: exponential to either side, over the root of the coupling
     single = np.eye(401)[200:201]
     tail = spread_along_face(single, even, 100.0)[0]
-    assert_allclose(tail[230] / tail[220], math.exp(-1.0), rtol=2e-3)
+    assert_allclose(
+        tail[230] / tail[220],
+        math.exp(-1.0),
+        rtol=2e-3,
+    )
 
 
 def test_misalignment_raises_the_stress():
@@ -207,16 +232,21 @@ def test_misalignment_raises_the_stress():
     assert crooked.max() > 1.1 * straight.max()
 
 
-@pytest.mark.parametrize("name", sorted(options("gear")))
+@pytest.mark.parametrize(
+    "name",
+    sorted(options("gear")),
+)
 def test_every_gear_option_has_a_root_stress(name):
     words = [f"gear={name}"]
     if compose("generate", words)["gear"]["helix_angle_deg"]:
         words = ["system=helical_pair", *words]
     loaded = case(*words)
     history = loaded.history(n_phases=40)
+
     for gear, result in loaded.gears().items():
         assert 5e6 < result.stress < 2e9
         assert 0.4 * result.stress < history.stress[gear].max() < 1.5 * result.stress
+
     shares_throughout = loaded.pair.total_contact_ratio > 1.2
     assert shares_throughout or 0.99 < history.share.max() <= 1.0 + 1e-9
 
@@ -225,10 +255,12 @@ def test_the_force_over_the_mesh_gives_its_stress():
     loaded, exact = case(PUMP), case(PUMP, *PAPER_LAW)
     force = loaded.force_over_mesh_for(200e6)
     assert force > loaded.force_for(200e6)
+
     torque = force * loaded.pair.pinion.pitch_radius
     result = case(PUMP, f"operating.torque_nm={torque!r}").history().stress
     largest = max(values.max() for values in result.values())
     assert_allclose(largest, 200e6, rtol=1e-5)
+
     force = exact.force_for(200e6)
     assert_allclose(exact.force_over_mesh_for(200e6), force, rtol=1e-5)
 

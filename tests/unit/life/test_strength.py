@@ -22,7 +22,11 @@ from gensig.units import read
 
 @pytest.fixture(scope="module")
 def strength():
-    return read(Strength, compose("generate", [])["strength"], "strength")
+    return read(
+        Strength,
+        compose("generate", [])["strength"],
+        "strength",
+    )
 
 
 def safe(strength, stress=349.39e6, **changes):
@@ -44,7 +48,10 @@ def safe(strength, stress=349.39e6, **changes):
 )
 def test_every_factor_is_a_factor(strength, key):
     base = safe(strength, **{key: 1.0})
-    assert_allclose(safe(strength, **{key: 0.8}).iso, 0.8 * base.iso)
+    assert_allclose(
+        safe(strength, **{key: 0.8}).iso,
+        0.8 * base.iso,
+    )
     assert safe(strength, **{key: 0.8}).paper == base.paper
 
 
@@ -52,20 +59,36 @@ def test_life_factor():
     ends = [life_factor(n) for n in (1e2, 1e3, 3e6, 1e10, 1e12)]
     assert_allclose(ends, [2.5, 2.5, 1.0, 0.85, 0.85])
     # its lines as the standard writes them
-    assert_allclose(life_factor(1e5), (3e6 / 1e5) ** 0.115, rtol=5e-3)
-    assert_allclose(life_factor(3.6e8), (3e6 / 3.6e8) ** 0.02, rtol=5e-3)
+    assert_allclose(
+        life_factor(1e5),
+        (3e6 / 1e5) ** 0.115,
+        rtol=5e-3,
+    )
+    assert_allclose(
+        life_factor(3.6e8),
+        (3e6 / 3.6e8) ** 0.02,
+        rtol=5e-3,
+    )
     assert_allclose(life_factor(3.6e8), 0.9, rtol=0.02)  # the paper's K_FN there
 
 
 def test_notch_and_size():
-    sharp, reference, blunt = map(relative_notch_sensitivity, (1.5, 2.5, 4.0))
+    sharp, reference, blunt = map(
+        relative_notch_sensitivity,
+        (1.5, 2.5, 4.0),
+    )
     assert 0.98 < sharp < reference == 1.0 < blunt < 1.02
     factors = [size_factor(module) for module in (1e-3, 5e-3, 12e-3, 25e-3, 40e-3)]
     assert_allclose(factors, [1.0, 1.0, 0.93, 0.8, 0.8])
 
 
 def test_reliability_classes():
-    classes = {2.0: "high", 1.6: "higher", 1.25: "general", 1.0: "low"}
+    classes = {
+        2.0: "high",
+        1.6: "higher",
+        1.25: "general",
+        1.0: "low",
+    }
     assert {least: reliability(least) for least in classes} == classes
     assert [reliability(value) for value in (1.59, 0.99)] == ["general", "below low"]
 

@@ -47,8 +47,18 @@ def test_curvature_of_a_parabola_and_of_a_straight_wear(full):
     middle = arc.mean(axis=1, keepdims=True)
     reach = np.full(arc.shape[1], 1.5e-4)
     depth = 4.0 * (arc - middle) ** 2
-    assert_allclose(worn_curvature(full.path, depth, reach)[:, 8:-8], 8.0, rtol=0.1)
-    assert_allclose(worn_curvature(full.path, 3e-3 * arc, reach), 0.0, atol=1e-6)
+
+    assert_allclose(
+        worn_curvature(full.path, depth, reach)[:, 8:-8],
+        8.0,
+        rtol=0.1,
+    )
+    assert_allclose(
+        worn_curvature(full.path, 3e-3 * arc, reach),
+        0.0,
+        atol=1e-6,
+    )
+
     # a wave as long as the half width, to which its second difference over the half width alone is
     # blind
     wave = 1e-6 * np.cos(tau * (arc - arc[:, :1]) / 6e-4)
@@ -62,8 +72,17 @@ def test_hollow_flanks_press_no_less_than_nearly_flat_ones(full):
     arc = full.path.arc
     hollow = -1e3 * (arc - arc.mean(axis=1, keepdims=True))[:, None] ** 2
     new = hertz_pressure(full.path, load, full.material)
-    worn = hertz_pressure(full.path, load, full.material, hollow - hollow.min())
-    assert_allclose(worn[0, 10:-10], new[0, 10:-10] * LEAST_CURVATURE_SHARE**0.5)
+    worn = hertz_pressure(
+        full.path,
+        load,
+        full.material,
+        hollow - hollow.min(),
+    )
+
+    assert_allclose(
+        worn[0, 10:-10],
+        new[0, 10:-10] * LEAST_CURVATURE_SHARE**0.5,
+    )
 
 
 def test_radii_of_new_and_worn_flanks(full, worn_out):
@@ -72,6 +91,7 @@ def test_radii_of_new_and_worn_flanks(full, worn_out):
     new, worn = (
         flank_radii(full.path, loss, load, full.material) for loss in (0 * depth, depth)
     )
+
     for key in ("worn", "by_eq_22"):
         assert_allclose(new[key], new["new"])
     # a shift of some um on radii of mm; the profile itself does more
@@ -85,9 +105,14 @@ def test_a_limit_of_the_transmission_error_finds_the_threshold(full):
     life, by_depth = (
         wear_life(case_of(*words, *more)) for more in ((), ["wear.threshold_um=1"])
     )
+
     assert (life.ended_by, by_depth.ended_by) == ("transmission_error", "depth")
     assert life.threshold < full.options.threshold
-    assert_allclose(full.error_range(life.depth[-1]), limit, rtol=1e-3)
+    assert_allclose(
+        full.error_range(life.depth[-1]),
+        limit,
+        rtol=1e-3,
+    )
     assert_allclose(by_depth.threshold, 1e-6)
     with refused(ConfigError, "is reached by new flanks already"):
         wear_life(case_of(*FULL, "wear.transmission_error_limit_um=0.5"))
@@ -95,7 +120,10 @@ def test_a_limit_of_the_transmission_error_finds_the_threshold(full):
 
 def test_sum_adds_both_flanks_and_the_local_exponent_is_near_one(full, worn_out):
     life = wear_life(case_of(*FULL, "wear.criterion=sum"))
-    assert_allclose(life.depth[-1].sum(axis=0).max(), 20e-6)
+    assert_allclose(
+        life.depth[-1].sum(axis=0).max(),
+        20e-6,
+    )
     assert life.life < 0.8 * worn_out.life
     assert_allclose(torque_exponent(full), 1.0, atol=0.15)
 
@@ -116,7 +144,11 @@ def test_sharing_follows_the_contact_ratio(words, shares):
 @pytest.fixture(scope="module")
 def lives():
     case = case_of("gear=harbin_38_55")
-    return life_map(case, [50.0, 100.0, 200.0, 400.0], [3.0, 6.0, 12.0])
+    return life_map(
+        case,
+        [50.0, 100.0, 200.0, 400.0],
+        [3.0, 6.0, 12.0],
+    )
 
 
 @pytest.fixture(scope="module")
@@ -137,7 +169,13 @@ class TestLaws:
         power, logarithm, _ = laws
         with refused(SimulationError, "gives a life of -"):
             logarithm.life(900.0, 12.0, allow_extrapolation=True)
-        printed = replace(logarithm, a=709.3, b=127.3, torque=(10.0, 300.0))
+
+        printed = replace(
+            logarithm,
+            a=709.3,
+            b=127.3,
+            torque=(10.0, 300.0),
+        )
         with refused(SimulationError, "gives a life of -"):
             printed.life(265.0, 12.0)  # inside its range
         assert_allclose(printed.no_life_from, 263.0, atol=0.5)
@@ -151,7 +189,11 @@ class TestLaws:
 def test_what_is_worn_off_is_a_fault(words):
     case = case_of(*words)
     depth = wear_life(case).depth[-1]
-    teeth = faulty_teeth(case.pair, read_faults(wear_fault(case, depth)))
+    teeth = faulty_teeth(
+        case.pair,
+        read_faults(wear_fault(case, depth)),
+    )
+
     assert len(teeth) == case.pair.pinion.n_teeth + case.pair.wheel.n_teeth
     for side, name in enumerate(("pinion", "wheel")):
         tooth = teeth[name, 0]
@@ -161,7 +203,11 @@ def test_what_is_worn_off_is_a_fault(words):
         mean = depth[side].mean(axis=0) / np.cos(case.pair.base_helix_angle)
         inside = (curvature > low + 4e-4) & (curvature < high - 4e-4)
         lost = np.interp(curvature, radius, loss)
-        assert_allclose(lost[inside], mean[inside], atol=0.05 * mean.max())
+        assert_allclose(
+            lost[inside],
+            mean[inside],
+            atol=0.05 * mean.max(),
+        )
         assert not loss[radius < low - 4e-4].any()
 
 
@@ -197,6 +243,13 @@ def test_values_of_a_gear_override_those_of_both():
     words = ["wear.pinion.coefficient=1e-6", "wear.wheel.hardness_hbs=200"]
     options = read_wear_options(compose("generate", words)["wear"])
     hbs = 9.80665e6
-    assert_allclose(options.wear_factor("pinion"), 1e-6 / (187 * hbs))
-    assert_allclose(options.wear_factor("wheel"), 6.25e-6 / (200 * hbs))
+
+    assert_allclose(
+        options.wear_factor("pinion"),
+        1e-6 / (187 * hbs),
+    )
+    assert_allclose(
+        options.wear_factor("wheel"),
+        6.25e-6 / (200 * hbs),
+    )
     assert_allclose(options.hardness_of("pinion"), 187 * hbs)

@@ -41,13 +41,20 @@ def test_ideal_changes_no_bit():
     signal = default_rng(0).standard_normal((2, 300))
     assert IDEAL.is_ideal
     assert_array_equal(IDEAL.filtered(signal, RATE), signal)
+
     same, clipped = IDEAL.digitised(signal)
     assert same is signal
     assert clipped == 0.0
 
 
-@pytest.mark.parametrize("frequency", [1000.0, 8000.0, 18_000.0])
-@pytest.mark.parametrize("resonance", [12_000.0, 25_000.0, 40_000.0])
+@pytest.mark.parametrize(
+    "frequency",
+    [1000.0, 8000.0, 18_000.0],
+)
+@pytest.mark.parametrize(
+    "resonance",
+    [12_000.0, 25_000.0, 40_000.0],
+)
 def test_mounted_resonance_also_above_half_the_rate(resonance, frequency):
     sensor = replace(IDEAL, mounted_resonance=resonance)
     ratio = frequency / resonance
@@ -55,22 +62,46 @@ def test_mounted_resonance_also_above_half_the_rate(resonance, frequency):
     assert_allclose(gain(sensor, frequency), exact, rtol=2e-3)
 
 
-@pytest.mark.parametrize("frequency", [2.0, 5.0, 10.0, 20.0, 200.0])
+@pytest.mark.parametrize(
+    "frequency",
+    [2.0, 5.0, 10.0, 20.0, 200.0],
+)
 def test_low_cut_off_is_of_first_order(frequency):
     exact = 1.0 / np.sqrt(1.0 + (10.0 / frequency) ** 2)
-    assert_allclose(gain(replace(IDEAL, low_cutoff=10.0), frequency), exact, rtol=0.01)
+    assert_allclose(
+        gain(replace(IDEAL, low_cutoff=10.0), frequency),
+        exact,
+        rtol=0.01,
+    )
 
 
-@pytest.mark.parametrize("bits", [8, 12, 16])
+@pytest.mark.parametrize(
+    "bits",
+    [8, 12, 16],
+)
 def test_converter_steps_and_range(bits):
     sensor = replace(IDEAL, adc_range_m_per_s2=10.0, adc_bits=bits)
     signal = np.linspace(-11.0, 11.0, 100_001)[None]
     result, clipped = sensor.digitised(signal)
     step = 10.0 / 2 ** (bits - 1)
-    assert_allclose(result / step, np.rint(result / step), atol=1e-9)
+
+    assert_allclose(
+        result / step,
+        np.rint(result / step),
+        atol=1e-9,
+    )
+
     limited = signal.clip(-10.0, 10.0 - step)
-    assert_allclose(result, limited, rtol=0, atol=0.5 * step * (1 + 1e-9))
-    assert_allclose([result.min(), result.max()], [-10.0, 10.0 - step])
+    assert_allclose(
+        result,
+        limited,
+        rtol=0,
+        atol=0.5 * step * (1 + 1e-9),
+    )
+    assert_allclose(
+        [result.min(), result.max()],
+        [-10.0, 10.0 - step],
+    )
     assert_allclose(clipped, 2.0 / 22.0, atol=step)
 
 
@@ -83,6 +114,7 @@ def test_scatter_stays_within_the_data_sheet():
         dc_offset_m_per_s2=sheet["offset"],
     )
     drawn = [draw_sensors(default_rng(seed), sensor, 3) for seed in range(300)]
+
     for name, most in sheet.items():
         values = np.array([getattr(sensors, name) for sensors in drawn])
         share = (values - (name == "gain")) / most
@@ -97,4 +129,7 @@ def test_limits(name):
         with pytest.raises(
             ConfigError, match=rf"sensing\.sensor\.{name}.* must lie in"
         ):
-            replace(IDEAL, **{"adc_range_m_per_s2": 1.0, "adc_bits": 12, name: value})
+            replace(
+                IDEAL,
+                **{"adc_range_m_per_s2": 1.0, "adc_bits": 12, name: value},
+            )

@@ -42,14 +42,22 @@ class TestBands:
         lower, upper = third_octave_bands(N_SAMPLES, RATE)
         middle = np.sqrt(lower * upper)[:-1]
         assert_allclose(middle, MIDDLES[:-1])
-        assert_allclose(middle[[0, -1]], [20.0, 16_000.0], rtol=0.01)
+        assert_allclose(
+            middle[[0, -1]],
+            [20.0, 16_000.0],
+            rtol=0.01,
+        )
 
     @pytest.mark.parametrize(
         ("n_samples", "lowest"), [(51_200, 20), (10_240, 100), (2560, 400), (512, 2000)]
     )
     def test_short_signals_resolve_the_upper_ones(self, n_samples, lowest):
         lower, upper = third_octave_bands(n_samples, RATE)
-        assert_allclose(np.sqrt(lower[0] * upper[0]), lowest, rtol=0.01)
+        assert_allclose(
+            np.sqrt(lower[0] * upper[0]),
+            lowest,
+            rtol=0.01,
+        )
         assert np.all(upper - lower >= 4 * RATE / n_samples)
 
     def test_too_short(self):
@@ -60,7 +68,10 @@ class TestBands:
 
 
 class TestPower:
-    @pytest.mark.parametrize("band", [0, 5, 17, 29])
+    @pytest.mark.parametrize(
+        "band",
+        [0, 5, 17, 29],
+    )
     def test_a_tone_is_in_its_band(self, band):
         result = third_octave_power(3.0 * tone(MIDDLES[band]), RATE)
         assert_allclose(result[band], 4.5, rtol=2e-3)
@@ -72,12 +83,24 @@ class TestPower:
         lower, upper = third_octave_bands(N_SAMPLES, RATE)
         result = third_octave_power(noise(60), RATE).mean(axis=0)
         expected = (upper - lower) / (RATE / 2)
-        assert_allclose(result[10:], expected[10:], rtol=0.1)
-        assert_allclose(10 * np.log10(result[18:29] / result[17:28]), 1.0, atol=0.1)
+
+        assert_allclose(
+            result[10:],
+            expected[10:],
+            rtol=0.1,
+        )
+        assert_allclose(
+            10 * np.log10(result[18:29] / result[17:28]),
+            1.0,
+            atol=0.1,
+        )
 
 
 class TestThirdOctaves:
-    @pytest.mark.parametrize("moved", [-3.0, -0.3, 0.5, 2.0])
+    @pytest.mark.parametrize(
+        "moved",
+        [-3.0, -0.3, 0.5, 2.0],
+    )
     def test_a_tone_moved_in_level(self, moved):
         """In one band of one channel of one lane; the other bands hold tones of their own."""
         others = tone(MIDDLES[8]) + tone(MIDDLES[24], -30)
@@ -85,7 +108,12 @@ class TestThirdOctaves:
         solution = exact.copy()
         solution[1, 1] = tone(MIDDLES[17], moved) + others
         difference = third_octave_difference(solution, exact, RATE)
-        assert_allclose(difference, [0.0, abs(moved)], atol=2e-3)
+
+        assert_allclose(
+            difference,
+            [0.0, abs(moved)],
+            atol=2e-3,
+        )
 
     @pytest.mark.parametrize(
         ("level", "expected"),
@@ -139,6 +167,7 @@ class TestAgreement:
         exact = one_lane(tone(10_000))
         late = one_lane(np.sin(tau * 10_000 * (TIME - 6.25e-6) + 0.7))
         assert np.linalg.norm(late - exact) > 0.3 * np.linalg.norm(exact)
+
         result = agreement(late, exact, RATE)
         assert result.third_octave_db[0] < 1e-3
         assert result.agrees[0]
@@ -180,6 +209,10 @@ class TestAgreement:
         lower, upper = third_octave_bands(N_SAMPLES, RATE)
         middle = np.sqrt(lower * upper)[:-1]
         assert_allclose(middle, MIDDLES[:-1])
-        assert_allclose(middle[[0, -1]], [20.0, 16_000.0], rtol=0.01)
+        assert_allclose(
+            middle[[0, -1]],
+            [20.0, 16_000.0],
+            rtol=0.01,
+        )
         assert_allclose(lower[1:], upper[:-1])
         assert_allclose(upper[-1], 20_000)

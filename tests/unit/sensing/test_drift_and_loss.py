@@ -23,11 +23,23 @@ def logarithms(seeds, *, scatter=0.1, time=0.5, n_samples=501, rate=500.0):
 def test_drift_is_stationary_and_forgets_itself():
     walk = logarithms(range(2000))  # 4000 of 1 s
     points = walk[:, ::25]  # every 50 ms is a point of the walk at 25 ms
-    assert_allclose(points.std(axis=0), 0.1, rtol=0.06)
-    assert_allclose(points.mean(axis=0), 0.0, atol=0.006)
+    assert_allclose(
+        points.std(axis=0),
+        0.1,
+        rtol=0.06,
+    )
+    assert_allclose(
+        points.mean(axis=0),
+        0.0,
+        atol=0.006,
+    )
     for lag in (0, 125, 250, 500):  # samples
         result = np.mean(walk[:, 0] * walk[:, lag]) / 0.1**2
-        assert_allclose(result, np.exp(-lag / 500.0 / 0.5), atol=0.06)
+        assert_allclose(
+            result,
+            np.exp(-lag / 500.0 / 0.5),
+            atol=0.06,
+        )
 
 
 def test_drift_is_slow_and_each_sensors_own():
@@ -48,6 +60,7 @@ def test_the_asked_share_is_lost_in_whole_packets(run):
     streams = map(default_rng, range(200))
     lost = np.array([draw_dropped(rng, 0.1, run, N) for rng in streams])
     assert lost.shape == (200, N)
+
     spread = np.sqrt(0.09 * run / lost.size)
     assert_allclose(lost.mean(), 0.1, atol=4.0 * spread)
     for one in lost:
@@ -69,8 +82,18 @@ def test_the_first_packet_begins_anywhere():
     [("zero", [0, 2, 3, 0, 0, 6, 0, 8]), ("hold", [2, 2, 3, 3, 3, 6, 6, 8])],
 )
 def test_filling(fill, expected):
-    signal = np.outer([1.0, 10.0], np.arange(1, 9))
-    dropped = np.array([1, 0, 0, 1, 1, 0, 1, 0], dtype=bool)
+    signal = np.outer(
+        [1.0, 10.0],
+        np.arange(1, 9),
+    )
+    dropped = np.array(
+        [1, 0, 0, 1, 1, 0, 1, 0],
+        dtype=bool,
+    )
     result = filled(signal, dropped, fill)
-    assert_array_equal(result, np.outer([1, 10], expected))
+
+    assert_array_equal(
+        result,
+        np.outer([1, 10], expected),
+    )
     assert not filled(signal, np.ones(8, dtype=bool), fill).any()

@@ -36,14 +36,24 @@ def test_grade_5_by_hand(xiamen, limit):
     for gear, expected in zip(
         (xiamen.pair.pinion, xiamen.pair.wheel), BY_HAND[limit], strict=True
     ):
-        assert_allclose(limit(gear, 5), expected * UM, rtol=1e-6)
+        assert_allclose(
+            limit(gear, 5),
+            expected * UM,
+            rtol=1e-6,
+        )
 
 
 @pytest.mark.parametrize("limit", LIMITS)
 def test_two_grades_are_a_factor_of_two(xiamen, limit):
     for gear in (xiamen.pair.pinion, xiamen.pair.wheel):
-        assert_allclose(limit(gear, 7), 2 * limit(gear, 5))
-        assert_allclose(limit(gear, 5.5) ** 2, limit(gear, 5) * limit(gear, 6))
+        assert_allclose(
+            limit(gear, 7),
+            2 * limit(gear, 5),
+        )
+        assert_allclose(
+            limit(gear, 5.5) ** 2,
+            limit(gear, 5) * limit(gear, 6),
+        )
 
 
 @pytest.mark.parametrize("limit", LIMITS)

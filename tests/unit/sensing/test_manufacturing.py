@@ -40,7 +40,12 @@ def quality(xiamen):
 
 
 def draw(pair, quality, seed=0):
-    return draw_specimen(rng(seed), pair.pinion, pair.wheel, quality)
+    return draw_specimen(
+        rng(seed),
+        pair.pinion,
+        pair.wheel,
+        quality,
+    )
 
 
 def once_per_turn(error):
@@ -65,9 +70,17 @@ def profile_of(pair, specimen, name):
     if tooth is None:
         return np.zeros(gear.n_teeth), 0.0
     at, back = tooth.profile.curvature_radius, tooth.flank_deviation[0]
-    even = np.linspace(at[0], at[-1], 4001)
+    even = np.linspace(
+        at[0],
+        at[-1],
+        4001,
+    )
     trace = np.interp(even, at, back)
-    rate, mean = np.polyfit(even - even.mean(), trace, 1)
+    rate, mean = np.polyfit(
+        even - even.mean(),
+        trace,
+        1,
+    )
     tilt = getattr(specimen, f"{name}_tilt")
     slope = tilt - eccentric_tilt(gear, getattr(specimen, f"{name}_error"))
     towards_tip = 1.0 if name == "pinion" else -1.0
@@ -173,16 +186,22 @@ class TestWhatIsDrawn:
                 error = getattr(specimen, f"{name}_error")
                 tilt = getattr(specimen, f"{name}_tilt")
                 expected = eccentric_tilt(getattr(xiamen.pair, name), error)
-                assert_allclose(tilt, expected, atol=1e-9 * np.abs(tilt).max())
+                assert_allclose(
+                    tilt,
+                    expected,
+                    atol=1e-9 * np.abs(tilt).max(),
+                )
                 assert_allclose(error.mean(), 0.0, atol=1e-15)
 
     def test_eccentricities_phases_and_signs_scatter(self, xiamen, drawn):
         specimens = drawn(80)
         waves = [once_per_turn(each.wheel_error) for each in specimens]
         size, most = np.transpose(waves)
+
         assert size.min() < 1.0 * UM
         assert 5.0 * UM < size.max() <= 0.5 * 0.9 * runout_limit(xiamen.pair.wheel, 5)
         assert len(np.unique(np.floor(most % 84 / 21))) == 4
+
         is_positive = [each.forms[0].profile_slope > 0.0 for each in specimens]
         assert 25 <= np.sum(is_positive) <= 55
 
@@ -191,22 +210,36 @@ class TestWhatIsDrawn:
         specimen = drawn(6, **half, tooth_share=0.4)[-1]
         slopes, _ = profile_of(xiamen.pair, specimen, "wheel")
         limit = 0.5 * profile_slope_limit(xiamen.pair.wheel, 5)
-        assert_allclose(np.abs(slopes).max(), limit, rtol=0.03)
-        assert_allclose(np.ptp(slopes), 2 * 0.4 * limit, rtol=0.1)
 
-    @pytest.mark.parametrize("share", [0.0, 0.25, 1.0])
+        assert_allclose(
+            np.abs(slopes).max(),
+            limit,
+            rtol=0.03,
+        )
+        assert_allclose(
+            np.ptp(slopes),
+            2 * 0.4 * limit,
+            rtol=0.1,
+        )
+
+    @pytest.mark.parametrize(
+        "share",
+        [0.0, 0.25, 1.0],
+    )
     def test_undulation_is_part_of_the_form(self, drawn, share):
         (specimen,) = drawn(1, undulation_share=share, undulation_waves=11)
         forms = [form for form in specimen.forms if form.gear == "pinion"]
         heights = np.array([form.profile_form for form in forms])
         is_wave = np.array([form.profile_waves == 11 for form in forms])
         part = heights[is_wave].sum() / heights.sum()
+
         assert_allclose(part, share, atol=1e-15)
 
     def test_misalignment_and_backlash_keep_to_their_range(self, drawn):
         specimens = drawn(60, misalignment=8 * UM, backlash_scatter=0.3)
         mountings = [each.forms[-1] for each in specimens]
         assert {type(form) for form in mountings} == {Misalignment}
+
         tilts = [form.misalignment / (8 * UM) for form in mountings]
         backlash = [(each.backlash_factor - 1.0) / 0.3 for each in specimens]
         for values in (tilts, backlash):
@@ -234,6 +267,7 @@ class TestWhatIsDrawn:
         words = {"iso1328_grade": None, "undulation_share": 0.5, **scatter}
         (specimen,) = drawn(1, **words)
         perfect = perfect_specimen(xiamen.pair.pinion, xiamen.pair.wheel)
+
         assert repr(specimen) == repr(perfect)
         assert specimen.backlash_factor == 1.0
         assert not any(np.any(values) for values in astuple(specimen)[:-1])

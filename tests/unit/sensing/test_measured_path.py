@@ -16,12 +16,23 @@ PAIRS = ("pinion_y_to_housing", "wheel_y_to_housing")
 
 def write(path, names, columns):
     table = np.column_stack(columns)
-    np.savetxt(path, table, "%.12g", ",", header=",".join(names), comments="")
+    np.savetxt(
+        path,
+        table,
+        "%.12g",
+        ",",
+        header=",".join(names),
+        comments="",
+    )
     return str(path)
 
 
 def impulse_file(path, taps, *, rate=RATE, names=PAIRS):
-    return write(path, ["time_s", *names], [np.arange(len(taps[0])) / rate, *taps])
+    return write(
+        path,
+        ["time_s", *names],
+        [np.arange(len(taps[0])) / rate, *taps],
+    )
 
 
 def frequency_file(path, response, *, low=0.0, high=25_600.0, step=10.0):
@@ -29,7 +40,11 @@ def frequency_file(path, response, *, low=0.0, high=25_600.0, step=10.0):
     values = [response(frequency), 0.5 * response(frequency)]
     names = [f"{pair}_{part}" for pair in PAIRS for part in ("real", "imaginary")]
     columns = [part for value in values for part in (value.real, value.imag)]
-    return write(path, ["frequency_hz", *names], [frequency, *columns])
+    return write(
+        path,
+        ["frequency_hz", *names],
+        [frequency, *columns],
+    )
 
 
 def read(file):
@@ -46,6 +61,7 @@ def test_impulse_response_is_a_convolution(tmp_path):
     taps, source = rng.standard_normal((2, 64)), rng.standard_normal((2, 500))
     result = read(impulse_file(tmp_path / "h.csv", taps)).apply(source, RATE)
     expected = fftconvolve(source, taps, axes=1).sum(axis=0)[:500]
+
     assert_allclose(result, [expected], atol=1e-9)
 
 
@@ -55,12 +71,21 @@ def test_frequency_response_of_a_mode_rings_as_the_mode_does(tmp_path):
     smooth = np.exp(-0.5 * ((time - 0.02) / 1e-4) ** 2)
     result = path.apply(np.stack([smooth, 0.0 * smooth]), RATE)[0]
     expected = sosfilt(mode_section(2000.0, 0.03, RATE), smooth)
-    assert_allclose(result, expected, atol=0.01 * np.abs(expected).max())
+
+    assert_allclose(
+        result,
+        expected,
+        atol=0.01 * np.abs(expected).max(),
+    )
 
 
 def test_refused_files(tmp_path):
     taps = np.ones((2, 32))
-    late_nan = np.where(np.arange(32) == 2, np.nan, 1.0)
+    late_nan = np.where(
+        np.arange(32) == 2,
+        np.nan,
+        1.0,
+    )
     falling = [-np.arange(32) / RATE, *taps]
     names, more = ["time_s", *PAIRS], (*PAIRS, "wheel_z_to_housing")
     (tmp_path / "words").write_text("time_s,a\n1,two\n" * 20)
@@ -87,6 +112,7 @@ def test_refused_files(tmp_path):
         "time_s must rise in even steps": write(tmp_path / "h", names, falling),
         "give numbers under one header": tmp_path / "words",
     }
+
     for text, file in cases.items():
         with refused(ConfigError, text) as caught:
             read(str(file))

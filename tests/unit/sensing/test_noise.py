@@ -35,7 +35,10 @@ KINDS = {
 
 
 def through_path(rng):
-    return np.cumsum(rng.standard_normal((2, 51_200)), axis=1)
+    return np.cumsum(
+        rng.standard_normal((2, 51_200)),
+        axis=1,
+    )
 
 
 def made(parts, *, power=(1.0, 1.0), seed=1, n_samples=51_200, band=None):
@@ -47,11 +50,18 @@ def made(parts, *, power=(1.0, 1.0), seed=1, n_samples=51_200, band=None):
         through_path=lambda rng: through_path(rng)[:, :n_samples],
     )
     noise = read_noise({"parts": parts, "band_hz": band})
-    return noise.make(np.array(power), default_rng(seed), receiver)
+    return noise.make(
+        np.array(power),
+        default_rng(seed),
+        receiver,
+    )
 
 
 def of_kinds(*kinds, **options):
-    return made([KINDS[kind] for kind in kinds], **options)
+    return made(
+        [KINDS[kind] for kind in kinds],
+        **options,
+    )
 
 
 def write(kind, path, axis, columns, names):
@@ -59,12 +69,22 @@ def write(kind, path, axis, columns, names):
     header = ",".join([axis, *names])
     table = np.column_stack(columns)
     np.savetxt(path, table, "%.9g", ",", header=header, comments="")
-    return {"kind": kind, "share": 1.0, "file": str(path)}
+    return {
+        "kind": kind,
+        "share": 1.0,
+        "file": str(path),
+    }
 
 
 def background(path, columns, *, rate=RATE, names=("background",)):
     time = np.arange(len(columns[0])) / rate
-    return write("file", path, "time_s", [time, *columns], names)
+    return write(
+        "file",
+        path,
+        "time_s",
+        [time, *columns],
+        names,
+    )
 
 
 def spectrum(path, columns, *, names=("background",)):
@@ -88,7 +108,11 @@ def test_every_kind_is_tested():
 def test_power_is_exact(kinds, n_samples):
     noise = of_kinds(*kinds, power=POWER, n_samples=n_samples)
     assert_allclose(np.var(noise, axis=1), POWER)
-    assert_allclose(noise.mean(axis=1), 0.0, atol=1e-9)
+    assert_allclose(
+        noise.mean(axis=1),
+        0.0,
+        atol=1e-9,
+    )
 
 
 @pytest.mark.parametrize(
@@ -101,7 +125,12 @@ def test_power_in_a_band(kinds):
     noise = of_kinds(*kinds, power=POWER, band=band)
     sections = butter(8, band, "bandpass", fs=RATE, output="sos")
     within = sosfilt(sections, noise, axis=1)
-    assert_allclose(np.var(within, axis=1), POWER, rtol=0.04)
+
+    assert_allclose(
+        np.var(within, axis=1),
+        POWER,
+        rtol=0.04,
+    )
     assert np.all(np.var(noise, axis=1) > 1.02 * POWER)
 
 
@@ -112,20 +141,36 @@ def test_power_in_a_band(kinds):
 def test_band_power_of_a_tone(band, expected):
     time = np.arange(51_200) / RATE
     tone = 3.0 * np.sin(math.tau * 1000.0 * time)[None] + 5.0
-    assert_allclose(band_power(tone, RATE, band), expected, atol=1e-9)
+    assert_allclose(
+        band_power(tone, RATE, band),
+        expected,
+        atol=1e-9,
+    )
 
 
 def test_shares_are_of_the_power():
     noise = made([KINDS["white"] | {"share": 3.0}, KINDS["hum"]])
     lines = 2.0 * density(noise)[:, [50, 100, 150]] / 51_200**2
-    assert_allclose(lines.sum(axis=1), 0.25, rtol=0.02)
-    assert_allclose(lines[:, 1] / lines[:, 0], 0.25, rtol=0.1)
+    assert_allclose(
+        lines.sum(axis=1),
+        0.25,
+        rtol=0.02,
+    )
+    assert_allclose(
+        lines[:, 1] / lines[:, 0],
+        0.25,
+        rtol=0.1,
+    )
 
 
 def test_pink_falls_by_three_decibel_an_octave():
     lines = density(of_kinds("pink"))
     octaves = [lines[:, low : 2 * low].mean() for low in (64, 256, 1024, 4096)]
-    assert_allclose(np.diff(np.log(octaves)), np.log(0.25), atol=0.15)
+    assert_allclose(
+        np.diff(np.log(octaves)),
+        np.log(0.25),
+        atol=0.15,
+    )
 
 
 def test_impulsive_has_a_high_kurtosis_and_rings_where_it_says():
@@ -141,15 +186,21 @@ def test_another_machine_has_its_orders_and_nothing_else():
         orders += [3.6 * k + side for k in range(1, 5)]
         orders += [31 * k + side for k in range(1, 4)]
     ours = lines[[round(25 * order) for order in orders]]
+
     assert np.all(ours > 0.0)
     assert_allclose(ours.sum(), lines.sum())
 
 
 def test_background_takes_a_stretch(tmp_path):
     recording = default_rng(6).standard_normal((2, 5000))
-    part = background(tmp_path / "two.csv", recording, names=("a", "b"))
+    part = background(
+        tmp_path / "two.csv",
+        recording,
+        names=("a", "b"),
+    )
     noise = made([part], n_samples=1000)
     starts = []
+
     for whole, stretch in zip(recording, noise, strict=True):
         start = int(np.argmax(np.correlate(whole, stretch, "valid")))
         cut = whole[start : start + 1000]
@@ -159,10 +210,20 @@ def test_background_takes_a_stretch(tmp_path):
 
 
 def test_spectrum_has_the_density_of_its_file(tmp_path):
-    columns = [[100.0, 1000.0, 2000.0], [1.0, 1.0, 9.0], [4.0, 1.0, 1.0]]
-    part = spectrum(tmp_path / "s.csv", columns, names=("a", "b"))
+    columns = [
+        [100.0, 1000.0, 2000.0],
+        [1.0, 1.0, 9.0],
+        [4.0, 1.0, 1.0],
+    ]
+    part = spectrum(
+        tmp_path / "s.csv",
+        columns,
+        names=("a", "b"),
+    )
     noise, other = (made([part], power=POWER, seed=seed) for seed in (3, 4))
+
     assert_allclose(np.var(noise, axis=1), POWER)
+
     lines = density(noise)[0]
     flat, middle, high = (
         lines[low:stop].mean() for low, stop in ((200, 900), (1400, 1600), (3000, 9000))
@@ -194,6 +255,7 @@ def test_refused_files(tmp_path):
         "one value throughout": of_file("g", np.ones((1, 2000))),
         "too short: 900 rows, at least 1000": of_file("h", long[:, :900]),
     }
+
     for text, part in cases.items():
         with refused(ConfigError, text):
             made([part], n_samples=1000)
@@ -204,6 +266,7 @@ def test_offsets_make_a_sensor_louder(machine, xiamen):
     offset = {"sensing.noise.offsets_db": [3.0, -7.0]}
     sensing = machine(changes | offset).sensing
     levels = 10.0 * np.log10(sensing.noise_factor(20.0))
+
     assert_allclose(levels, [-17.0, -27.0])
     assert np.all(xiamen.sensing.noise_factor(13.7) == 10.0 ** (-13.7 / 10.0))
     with refused(ConfigError, "has 2 values for 4 sensors"):

@@ -64,7 +64,12 @@ def draw(dynamics):
             "specimen": default_rng([1, specimen]),
         }
         nuisances = read_nuisances(list(parts))
-        return draw_tones(nuisances, dynamics, units, default_rng([2, record]))
+        return draw_tones(
+            nuisances,
+            dynamics,
+            units,
+            default_rng([2, record]),
+        )
 
     return make
 
@@ -74,7 +79,10 @@ def tones_of(draw):
     """Function that draws the tones of one kind, with keys of its part replaced."""
 
     def make(kind, changes=None, **numbers):
-        (tones,) = draw(PARTS[kind] | (changes or {}), **numbers)
+        (tones,) = draw(
+            PARTS[kind] | (changes or {}),
+            **numbers,
+        )
         return tones
 
     return make
@@ -86,11 +94,24 @@ def test_every_kind_is_tested():
 
 def test_bearing_orders_are_those_of_the_textbook():
     result = bearing_orders(*BEARING, 0.0)
-    assert_allclose([result.outer_race, result.inner_race], [3.585, 5.415], atol=5e-4)
-    assert_allclose([result.cage, result.ball], [0.3983, 2.357], atol=5e-4)
+    assert_allclose(
+        [result.outer_race, result.inner_race],
+        [3.585, 5.415],
+        atol=5e-4,
+    )
+    assert_allclose(
+        [result.cage, result.ball],
+        [0.3983, 2.357],
+        atol=5e-4,
+    )
+
     ratio = 7.94 / 39.04 * math.cos(0.3)
     tilted = bearing_orders(*BEARING, 0.3)
-    assert_allclose(tilted.ball, 39.04 / (2 * 7.94) * (1 - ratio**2))
+    assert_allclose(
+        tilted.ball,
+        39.04 / (2 * 7.94) * (1 - ratio**2),
+    )
+
     slipping = bearing_orders(*BEARING, 0.0, slip=0.02)
     assert_allclose(slipping.outer_race, 0.98 * result.outer_race)
     assert_allclose(slipping.inner_race + slipping.outer_race, 9.0)
@@ -101,36 +122,61 @@ def test_the_force_of_an_unbalance_of_grade_g2_5(tones_of):
     rad/s)^2 = 0.5655 N."""
     tones = tones_of("unbalance")
     assert tones.follows == "speed_squared"
-    assert_allclose(np.abs(tones.force), [[0.5655, 0.5655, 0.0]], rtol=1e-4)
+    assert_allclose(
+        np.abs(tones.force),
+        [[0.5655, 0.5655, 0.0]],
+        rtol=1e-4,
+    )
     assert_array_equal(tones.order, [1.0])
+
     wheel = tones_of("unbalance", {"gear": "wheel"})
     # the wheel turns slower by 23 / 84 in service and at the rated speed: e grows, w^2 falls
-    assert_allclose(np.abs(wheel.force), np.abs(tones.force) * 23 / 84)
+    assert_allclose(
+        np.abs(wheel.force),
+        np.abs(tones.force) * 23 / 84,
+    )
 
 
-@pytest.mark.parametrize(("gear", "sense"), [("pinion", -1.0), ("wheel", 1.0)])
+@pytest.mark.parametrize(
+    ("gear", "sense"),
+    [("pinion", -1.0), ("wheel", 1.0)],
+)
 def test_an_unbalance_turns_by_the_sense_of_its_gear(tones_of, gear, sense):
     force = tones_of("unbalance", {"gear": gear}).force[0, :2]
     before, after = (np.real(force * np.exp(1j * angle)) for angle in (0.0, 0.1))
     crossed = before[0] * after[1] - before[1] * after[0]
     turned = np.arctan2(crossed, before @ after)
+
     assert_allclose(turned, 0.1 * sense)
 
 
 def test_orders_and_sizes_of_a_coupling(dynamics, tones_of):
     tones = tones_of("coupling_misalignment")
     assert_array_equal(tones.order, [2, 1, 2, 3])
+
     torque, force = tones.force[0], tones.force[1:]
-    assert_allclose(np.abs(torque), [0.0, 0.0, 1e-3 * 20.0])
+    assert_allclose(
+        np.abs(torque),
+        [0.0, 0.0, 1e-3 * 20.0],
+    )
+
     sizes = 0.01 * dynamics.mesh_force * np.array([0.5, 1.0, 0.3])
-    assert_allclose(np.linalg.norm(force[:, :2], axis=1), sizes)
+    assert_allclose(
+        np.linalg.norm(force[:, :2], axis=1),
+        sizes,
+    )
+
     direction = force[:, 1] / force[:, 0]
     assert_allclose(direction, direction[0].real)
 
 
 def test_orders_and_sizes_of_looseness(dynamics, tones_of):
     tones = tones_of("looseness")
-    assert_array_equal(tones.order, np.arange(1, 7) / 2)
+    assert_array_equal(
+        tones.order,
+        np.arange(1, 7) / 2,
+    )
+
     shares = np.array([0.5, 1.0, 0.5 / 1.5, 0.5, 0.5 / 2.5, 1 / 3])
     sizes = np.linalg.norm(tones.force, axis=1)
     assert_allclose(sizes, 0.01 * dynamics.mesh_force * shares)
@@ -145,12 +191,17 @@ def test_orders_and_sizes_of_a_bearing(dynamics, tones_of):
         for side in (1, -1):
             expected.append(k * orders.inner_race + side)
             expected.append(2 * k * orders.ball + side * orders.cage)
+
     assert_allclose(sorted(tones.order), sorted(expected))
+
     support = dynamics.pinion.support
     force = 1e-7 * np.array([support.stiffness_x, support.stiffness_y, 0.0])
     sizes = np.abs(tones.force)
     assert_allclose(sizes[0], force)
-    assert_allclose(sizes[6:], 0.5 * sizes[1:6])
+    assert_allclose(
+        sizes[6:],
+        0.5 * sizes[1:6],
+    )
     assert np.all(tones.force[:, 2] == 0.0)
 
 
@@ -158,7 +209,12 @@ def test_orders_and_sizes_of_a_neighbour(tones_of):
     tones = tones_of("neighbour_mesh")
     sides = np.array([0.0, 1.0, -1.0, 25 / 72, -25 / 72])
     expected = np.concatenate([25 + sides, 50 + sides])
-    assert_allclose(np.sort(tones.order), np.sort(expected))
+
+    assert_allclose(
+        np.sort(tones.order),
+        np.sort(expected),
+    )
+
     level = 0.01 * 20.0 * 84 / 23 / 29.4e-3
     direction = np.array([0.5, math.sqrt(0.75), 29.4e-3])
     for order, share in ((25.0, 1.0), (26.0, 0.2), (50.0, 0.5), (51.0, 0.1)):
@@ -170,7 +226,11 @@ def test_orders_and_sizes_of_a_neighbour(tones_of):
 def test_a_unit_keeps_its_sizes_from_record_to_record(tones_of, kind):
     forces = np.array([tones_of(kind, record=k).force for k in range(8)])
     sizes = np.abs(forces)
-    assert_allclose(sizes, sizes[:1].repeat(8, axis=0))
+    assert_allclose(
+        sizes,
+        sizes[:1].repeat(8, axis=0),
+    )
+
     differs = kind in ("looseness", "bearing", "neighbour_mesh")
     assert np.any(forces != forces[0]) == differs
 
@@ -196,8 +256,10 @@ def test_ranges_are_filled_and_kept(tones_of):
     share, slip = {"used_share": [0.2, 0.8]}, {"slip": [0.0, 0.02]}
     drawn = [tones_of("unbalance", share, specimen=k) for k in range(200)]
     result = [abs(tones.force[0, 0]) / 0.5655 for tones in drawn]
+
     assert 0.2 <= min(result) < 0.23
     assert 0.77 < max(result) <= 0.8001
+
     cages = [tones_of("bearing", slip, record=k).base[1] for k in range(100)]
     free = bearing_orders(*BEARING, 0.0).cage
     assert free * 0.98 <= min(cages) < max(cages) <= free

@@ -91,8 +91,10 @@ def test_a_mistake_is_one_line(typed):
     for word in re.split(r" (?=[\w.]+=)", words):
         key, value = word.split("=", 1)
         changes[key] = yaml.safe_load(value)
+
     with refused(ConfigError, REFUSED[typed]) as caught:
         read_sensing(changed(OPTIONS[option], changes))
+
     text = str(caught.value)
     assert text.startswith("sensing")
     assert "\n" not in text

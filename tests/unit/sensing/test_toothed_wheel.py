@@ -54,13 +54,17 @@ def test_a_steady_shaft_shows_its_speed():
     assert_allclose(speed, MEAN, rtol=1e-4)
 
 
-@pytest.mark.parametrize(("n_teeth", "order"), [(16, 2.0), (16, 5.0), (160, 5.0)])
+@pytest.mark.parametrize(
+    ("n_teeth", "order"),
+    [(16, 2.0), (16, 5.0), (160, 5.0)],
+)
 def test_few_teeth_hold_low_orders_only(n_teeth, order):
     """A mean over one spacing: sinc of order over teeth."""
     wheel = replace(PERFECT, n_teeth=n_teeth)
     speed = speed_of(wheel, angle_of(order))
     # once by the mean over a spacing, once more by the straight lines between
     expected = SHARE * MEAN * np.sinc(order / n_teeth) ** 3
+
     assert_allclose(amplitude(speed, order), expected, rtol=0.02)
     assert_allclose(speed.mean(), MEAN, rtol=1e-3)
 
@@ -69,9 +73,20 @@ def test_a_slow_clock_makes_steps_of_one_tick():
     wheel = replace(PERFECT, clock_frequency=1e6)
     tick = 1e-6 * MEAN / wheel.spacing
     error = np.abs(speed_of(wheel) / MEAN - 1.0).max()
+
     assert 0.3 * tick < error < 1.7 * tick
-    times = passage_times(wheel, disc_of(wheel), MEAN * TIME, RATE)
-    assert_allclose(times * 1e6, np.rint(times * 1e6), atol=1e-6)
+
+    times = passage_times(
+        wheel,
+        disc_of(wheel),
+        MEAN * TIME,
+        RATE,
+    )
+    assert_allclose(
+        times * 1e6,
+        np.rint(times * 1e6),
+        atol=1e-6,
+    )
 
 
 def test_teeth_out_of_place_show_orders_that_the_shaft_has_not():
@@ -81,18 +96,28 @@ def test_teeth_out_of_place_show_orders_that_the_shaft_has_not():
     first, seventh = (
         np.array([amplitude(speed, order) for speed in speeds]) for order in (1.0, 7.0)
     )
+
     assert np.all(seventh < 0.02 * np.maximum(first, 1e-3))
     # a place that errs by e sin(a) errs by e cos(a) of the speed
     assert 0.5 * error < first.max() <= 1.01 * error
 
 
 def test_passages_are_where_the_teeth_are():
-    disc = Disc(index=0.3, places=np.radians([0.0, 91.0, 180.0, 270.0]))
+    disc = Disc(
+        index=0.3,
+        places=np.radians([0.0, 91.0, 180.0, 270.0]),
+    )
     wheel = replace(PERFECT, n_teeth=4)
-    times = passage_times(wheel, disc, np.linspace(0.0, 10.0, 1001), 100.0)
+    times = passage_times(
+        wheel,
+        disc,
+        np.linspace(0.0, 10.0, 1001),
+        100.0,
+    )
     turns = tau * np.arange(-1, 2)[:, None]
     expected = (0.3 + turns + disc.places).ravel()
     inside = (expected >= 0.0) & (expected <= 10.0)
+
     assert_allclose(times, expected[inside], atol=2e-9)
 
 

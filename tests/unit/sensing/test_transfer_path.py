@@ -31,17 +31,26 @@ def test_causal():
     changed = source.copy()
     changed[:, 1000:] = 0.0
     difference = path.apply(source, RATE) - path.apply(changed, RATE)
+
     assert not difference[:, :1000].any()
     assert np.abs(difference).max() > 0.1
 
 
-@pytest.mark.parametrize("frequency", [100.0, 800.0, 1000.0, 1250.0, 3000.0])
+@pytest.mark.parametrize(
+    "frequency",
+    [100.0, 800.0, 1000.0, 1250.0, 3000.0],
+)
 def test_a_mode_answers_a_tone_as_its_formula_says(frequency):
     section = mode_section(1000.0, 0.03, RATE)
-    _, (result,) = sosfreqz(section, [frequency], fs=RATE)
+    _, (result,) = sosfreqz(
+        section,
+        [frequency],
+        fs=RATE,
+    )
     ratio = frequency / 1000.0
     # the input goes straight from sample to sample, which takes the square of a sinc
     exact = np.sinc(frequency / RATE) ** 2 / (1.0 - ratio**2 + 0.06j * ratio)
+
     assert_allclose(abs(result), abs(exact), rtol=2e-3)
     assert abs(np.angle(result / exact)) < 0.01
 
@@ -51,7 +60,11 @@ def test_gain_at_rest_has_the_stated_size():
     for seed in range(300):
         path = housing(seed)
         squares.append(np.mean((path.to_sensors @ path.from_bearings) ** 2))
-    assert_allclose(np.sqrt(np.mean(squares)), 0.2, rtol=0.05)
+    assert_allclose(
+        np.sqrt(np.mean(squares)),
+        0.2,
+        rtol=0.05,
+    )
 
 
 def test_ranges_are_kept_and_used():
@@ -74,4 +87,5 @@ def test_memory_is_when_the_slowest_mode_has_died_out():
     impulse[:, 0] = 1.0
     answer = np.abs(path.apply(impulse, RATE)[0])
     late = answer[round(path.memory * RATE) :].max() / answer.max()
+
     assert 0.5 * np.exp(-5.0) < late < 1.5 * np.exp(-5.0)

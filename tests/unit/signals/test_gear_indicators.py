@@ -38,7 +38,12 @@ every = pytest.mark.parametrize("name", OF_ONE_TURN)
 def gear(turn=TURN):
     """A mesh with sidebands, unbalance, and orders that do not belong to it; all below a sixteenth
     of the samples."""
-    lines = {23: (5, 1), 46: (2, 0), 24: (1, 0), 1: (1, 0)}
+    lines = {
+        23: (5, 1),
+        46: (2, 0),
+        24: (1, 0),
+        1: (1, 0),
+    }
     lines |= {order: (0.3, order) for order in (7, 31, 40, 41, 55)}
     return sum(a * np.cos(order * turn + phase) for order, (a, phase) in lines.items())
 
@@ -49,6 +54,7 @@ def test_gain_sign_and_start_tooth_change_nothing(name):
     turn = gear()
     turn[900] += 3.0
     known = indicator(turn, TEETH)
+
     assert np.isfinite(known)
     assert_allclose(indicator(-1e-3 * turn, TEETH), known)
     for tooth in (1, 9, 22):
@@ -68,7 +74,9 @@ def test_leading_axes_are_kept_and_too_few_turns_are_nan(name):
     noise = default_rng(0).standard_normal((2, 3, 20, PER_TURN))
     turns = gear() + noise
     values = indicator(average_turn(turns), TEETH)
+
     assert values.shape == (2, 3)
+
     alone = indicator(average_turn(turns[1, 2]), TEETH)
     assert_allclose(values[1, 2], alone)
     assert np.isnan(indicator(average_turn(turns[..., :19, :]), TEETH)).all()
@@ -77,9 +85,20 @@ def test_leading_axes_are_kept_and_too_few_turns_are_nan(name):
 def test_average_of_few_turns_is_nan_unless_asked_for():
     turns = default_rng(1).standard_normal((2, 19, 50))
     assert np.isnan(average_turn(turns)).all()
-    assert_allclose(average_turn(turns, min_turns=1), turns.mean(axis=1))
-    signal = np.tile(np.cos(tau * np.arange(100) / 100), 19)
-    assert_allclose(averaged(signal, 100.0, 1.0), signal[:100], atol=1e-12)
+    assert_allclose(
+        average_turn(turns, min_turns=1),
+        turns.mean(axis=1),
+    )
+
+    signal = np.tile(
+        np.cos(tau * np.arange(100) / 100),
+        19,
+    )
+    assert_allclose(
+        averaged(signal, 100.0, 1.0),
+        signal[:100],
+        atol=1e-12,
+    )
     assert np.isnan(averaged(signal, 100.0, 1.0, min_turns=20)).all()
 
 
@@ -89,11 +108,24 @@ def test_a_turn_is_its_regular_part_what_is_left_and_the_shaft():
     other = 0.3 * np.cos(31 * TURN)
     turn = MESH + shaft + sideband + other
     regular = regular_signal(turn, TEETH)
+
     assert_allclose(regular, MESH + sideband, atol=1e-9)
-    assert_allclose(regular_signal(turn, TEETH, n_sidebands=0), MESH, atol=1e-9)
-    assert_allclose(residual_signal(turn, TEETH), sideband + other, atol=1e-9)
+    assert_allclose(
+        regular_signal(turn, TEETH, n_sidebands=0),
+        MESH,
+        atol=1e-9,
+    )
+    assert_allclose(
+        residual_signal(turn, TEETH),
+        sideband + other,
+        atol=1e-9,
+    )
     assert_allclose(difference_signal(turn, TEETH), other, atol=1e-9)
-    assert_allclose(remove_orders(other, [31, 5000]), 0.0, atol=1e-9)
+    assert_allclose(
+        remove_orders(other, [31, 5000]),
+        0.0,
+        atol=1e-9,
+    )
 
 
 def test_a_mesh_tone_alone_leaves_nothing_to_judge():
@@ -108,7 +140,11 @@ def test_fm0_and_nb4_of_amplitude_modulation():
     depth = 0.4
     turn = (1 + depth * np.cos(TURN)) * np.cos(TEETH * TURN)
     # the lowest value lies half a tooth away
-    assert_allclose(fm0(turn, TEETH), 2 * (1 + depth), rtol=5e-3)
+    assert_allclose(
+        fm0(turn, TEETH),
+        2 * (1 + depth),
+        rtol=5e-3,
+    )
     assert_allclose(OF_ONE_TURN["nb4"](turn, TEETH), 1.5)
 
 
@@ -123,20 +159,29 @@ def test_moments_of_one_order_and_of_gaussian_noise_outside_the_mesh():
     rng = default_rng(2)
     noisy = rng.standard_normal((400, PER_TURN)) + MESH
     one_order = MESH + 0.1 * np.cos(30 * TURN)
+
     for moment, of_order, of_noise in (
         (fm4, 1.5, 3),
         (m6a, 2.5, 15),
         (m8a, 4.375, 105),
     ):
         assert_allclose(moment(one_order, TEETH), of_order, rtol=1e-6)
-        assert_allclose(moment(noisy, TEETH).mean(), of_noise, rtol=0.05)
+        assert_allclose(
+            moment(noisy, TEETH).mean(),
+            of_noise,
+            rtol=0.05,
+        )
 
 
 def test_energy_ratio_of_known_amplitudes():
     other = np.cos(30 * TURN)
     mesh = 5 * np.cos(TEETH * TURN) + 3 * np.cos((TEETH - 1) * TURN)
     turn = mesh + 2 * other + 9 * np.cos(TURN)
-    assert_allclose(energy_ratio(turn, TEETH), 2 / np.hypot(5, 3))
+
+    assert_allclose(
+        energy_ratio(turn, TEETH),
+        2 / np.hypot(5, 3),
+    )
     assert np.isnan(energy_ratio(other, TEETH))
 
 
@@ -144,9 +189,18 @@ def test_envelope_is_of_its_band_only():
     other = 7 * np.cos(2 * TEETH * TURN) + np.cos(TURN) + 3.0
     modulation = 1 + 0.2 * np.cos(5 * TURN)
     turn = modulation * np.cos(TEETH * TURN) + other
+
     assert_allclose(mesh_envelope(turn, TEETH), modulation, atol=1e-9)
-    assert_allclose(mesh_envelope(turn, TEETH, n_sidebands=4), 1.0, atol=1e-9)
-    assert_allclose(mesh_envelope(turn, TEETH, harmonic=2), 7.0, atol=1e-9)
+    assert_allclose(
+        mesh_envelope(turn, TEETH, n_sidebands=4),
+        1.0,
+        atol=1e-9,
+    )
+    assert_allclose(
+        mesh_envelope(turn, TEETH, harmonic=2),
+        7.0,
+        atol=1e-9,
+    )
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,11 @@ def test_na4_is_its_formula():
     averages = history(1.0, 2.0, 0.5, 3.0)
     residual = averages - MESH
     mean_variance = np.cumsum(residual.var(axis=1)) / np.arange(1, 5)
-    moment = np.mean((residual - residual.mean(axis=1)[:, None]) ** 4, axis=1)
+    moment = np.mean(
+        (residual - residual.mean(axis=1)[:, None]) ** 4,
+        axis=1,
+    )
+
     assert_allclose(na4(averages, TEETH), moment / mean_variance**2)
 
 
@@ -31,18 +35,29 @@ def test_nb4_of_a_modulation_that_deepens():
     averages = (1 + depth[:, None] * np.cos(2 * TURN)) * np.cos(TEETH * TURN)
     mean_variance = np.cumsum(depth**2 / 2) / np.arange(1, 5)
     expected = 3 / 8 * depth**4 / mean_variance**2
+
     assert_allclose(nb4(averages, TEETH), expected)
 
 
 def test_a_record_of_too_few_turns_is_passed_over():
     averages = history(1.0, 2.0, 3.0)
-    values = na4(np.insert(averages, 1, np.nan, axis=0), TEETH)
+    values = na4(
+        np.insert(averages, 1, np.nan, axis=0),
+        TEETH,
+    )
     assert np.isnan(values).tolist() == [False, True, False, False]
-    assert_allclose(values[[0, 2, 3]], na4(averages, TEETH))
+    assert_allclose(
+        values[[0, 2, 3]],
+        na4(averages, TEETH),
+    )
 
 
 def test_records_without_residual_and_the_first_that_has_one():
     averages = np.stack([MESH, MESH, MESH + 0.1 * np.cos(7 * TURN)])
     values = na4(averages, TEETH)
     assert np.isnan(values[:2]).all()
-    assert_allclose(values[2], 1.5 * 3**2, rtol=1e-6)  # its variance counts a third
+    assert_allclose(
+        values[2],
+        1.5 * 3**2,
+        rtol=1e-6,
+    )  # its variance counts a third

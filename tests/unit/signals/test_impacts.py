@@ -24,7 +24,10 @@ def rings(decay, places=(100,), size=20.0, noise=1.0, seed=0):
     return turns
 
 
-@pytest.mark.parametrize("places", [(), (100,), (100, 300), (20, 160, 400)])
+@pytest.mark.parametrize(
+    "places",
+    [(), (100,), (100, 300), (20, 160, 400)],
+)
 def test_impacts_are_counted(places):
     count = impacts_per_turn(rings(1e-3, places), TEETH)
     assert_allclose(count, len(places), atol=0.1)
@@ -37,12 +40,19 @@ def test_threshold_is_in_deviations_of_what_lies_between():
     assert impacts_per_turn(50.0 * turns, TEETH) == impacts_per_turn(turns, TEETH)
 
 
-@pytest.mark.parametrize("decay", [0.7e-3, 1.4e-3, 3e-3])
+@pytest.mark.parametrize(
+    "decay",
+    [0.7e-3, 1.4e-3, 3e-3],
+)
 @pytest.mark.parametrize("noise", [0.01, 2.0])
 def test_decay_is_recovered(decay, noise):
     signals = (rings(decay, noise=noise, seed=seed) for seed in range(8))
     result = [impact_decay(turns, DURATION) for turns in signals]
-    assert_allclose(np.mean(result), decay, rtol=0.15 + 0.1 * (decay < 1e-3))
+    assert_allclose(
+        np.mean(result),
+        decay,
+        rtol=0.15 + 0.1 * (decay < 1e-3),
+    )
 
 
 def test_no_impact_no_decay():
@@ -52,10 +62,17 @@ def test_no_impact_no_decay():
 
 
 def test_peak_over_rms_is_the_usual_peak_not_the_rarest():
-    turns = np.tile([2.0, -2.0, 0.0, 0.0], (9, 25))
+    turns = np.tile(
+        [2.0, -2.0, 0.0, 0.0],
+        (9, 25),
+    )
     assert_allclose(peak_over_rms(turns), np.sqrt(2))
+
     turns[4, 7] = 100.0
-    assert_allclose(peak_over_rms(turns), 2 / np.sqrt(np.mean(turns**2)))
+    assert_allclose(
+        peak_over_rms(turns),
+        2 / np.sqrt(np.mean(turns**2)),
+    )
     assert np.isnan(peak_over_rms(np.zeros((2, 8))))
 
 

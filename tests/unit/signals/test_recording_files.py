@@ -37,8 +37,19 @@ def files(tmp_path_factory):
     """The same recording in every format that tells its rate."""
     folder = tmp_path_factory.mktemp("recordings")
     table = np.column_stack([np.arange(SIGNAL.shape[1]) / RATE, *SIGNAL])
-    np.savetxt(folder / "r.csv", table, "%.17g", ",", header="time_s,a,b", comments="")
-    wavfile.write(folder / "r.wav", int(RATE), SIGNAL.T)
+    np.savetxt(
+        folder / "r.csv",
+        table,
+        "%.17g",
+        ",",
+        header="time_s,a,b",
+        comments="",
+    )
+    wavfile.write(
+        folder / "r.wav",
+        int(RATE),
+        SIGNAL.T,
+    )
     content = {"acceleration": SIGNAL, "sampling_rate_hz": RATE}
     tall = content | {"acceleration": SIGNAL.T}
     np.savez(folder / "r.npz", **content)
@@ -46,7 +57,10 @@ def files(tmp_path_factory):
     write_hdf5(folder / "r.hdf5", content)
     io.savemat(folder / "r.mat", content)
     io.savemat(folder / "tall.mat", tall, do_compression=True)
-    write_mat73(folder / "r73.mat", tall | {"sampling_rate_hz": [[RATE]]})
+    write_mat73(
+        folder / "r73.mat",
+        tall | {"sampling_rate_hz": [[RATE]]},
+    )
     return folder
 
 
@@ -66,11 +80,23 @@ def test_all_formats_say_the_same(files, name):
     [("c.mat", "X097_DE_time"), ("c.h5", "run/one"), ("c.npy", None)],
 )
 def test_an_array_by_its_name(tmp_path, name, array):
-    io.savemat(tmp_path / "c.mat", {"X097_DE_time": SIGNAL[:1].T, "X097RPM": 1796.0})
+    io.savemat(
+        tmp_path / "c.mat",
+        {"X097_DE_time": SIGNAL[:1].T, "X097RPM": 1796.0},
+    )
     write_hdf5(tmp_path / "c.h5", {"run/one": SIGNAL[0]})
     np.save(tmp_path / "c.npy", SIGNAL[0])
-    source = read_file(str(tmp_path / name), rate=RATE, array=array)
-    assert_allclose(recording_of(source).acceleration, CENTRED[:1], atol=1e-12)
+    source = read_file(
+        str(tmp_path / name),
+        rate=RATE,
+        array=array,
+    )
+
+    assert_allclose(
+        recording_of(source).acceleration,
+        CENTRED[:1],
+        atol=1e-12,
+    )
 
 
 def test_whole_numbers_of_a_wav_file_keep_their_shape_and_have_no_level(tmp_path):
@@ -78,6 +104,7 @@ def test_whole_numbers_of_a_wav_file_keep_their_shape_and_have_no_level(tmp_path
     wavfile.write(tmp_path / "i.wav", int(RATE), whole)
     source = read_file(str(tmp_path / "i.wav"))
     result = recording_of(source, needs_level=False).acceleration
+
     assert np.corrcoef(result[0], SIGNAL[0])[0, 1] > 0.99999
     with refused(ConfigError, "no level in m/s2"):
         recording_of(source)
@@ -131,7 +158,10 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("text", "name", "options"), REFUSED)
+@pytest.mark.parametrize(
+    ("text", "name", "options"),
+    REFUSED,
+)
 def test_refused(broken_files, name, options, text):
     with refused(ConfigError, text):
         recording_of(read_file(str(broken_files / name), **options))
@@ -155,8 +185,15 @@ def broken_files(tmp_path_factory):
         io.savemat(folder / f"{name}.mat", arrays)
     for ending in ("wav", "mat", "h5", "npz"):
         (folder / f"garbage.{ending}").write_bytes(b"no recording at all " * 40)
-    np.savez(folder / "objects.npz", acceleration=np.array([Payload()], dtype=object))
-    shapes = {"shard": SIGNAL[None], "tall": SIGNAL.T, "target": SIGNAL}
+    np.savez(
+        folder / "objects.npz",
+        acceleration=np.array([Payload()], dtype=object),
+    )
+    shapes = {
+        "shard": SIGNAL[None],
+        "tall": SIGNAL.T,
+        "target": SIGNAL,
+    }
     for name, values in shapes.items():
         write_hdf5(
             folder / f"{name}.h5",
@@ -167,12 +204,25 @@ def broken_files(tmp_path_factory):
     link = h5py.ExternalLink(str(target), "/acceleration")
     write_hdf5(folder / "link.h5", {"acceleration": link})
     layout = h5py.VirtualLayout(SIGNAL.shape, float)
-    layout[:] = h5py.VirtualSource(str(target), "acceleration", SIGNAL.shape)
+    layout[:] = h5py.VirtualSource(
+        str(target),
+        "acceleration",
+        SIGNAL.shape,
+    )
     with h5py.File(folder / "virtual.h5", "w") as file:
         file.create_virtual_dataset("acceleration", layout)
     with h5py.File(folder / "huge.h5", "w") as file:
-        file.create_dataset("acceleration", (2, 10**9), "f8", chunks=(1, 10**6))
-    wavfile.write(folder / "r.wav", int(RATE), SIGNAL.T)
+        file.create_dataset(
+            "acceleration",
+            (2, 10**9),
+            "f8",
+            chunks=(1, 10**6),
+        )
+    wavfile.write(
+        folder / "r.wav",
+        int(RATE),
+        SIGNAL.T,
+    )
     whole = target.read_bytes()
     (folder / "cut.h5").write_bytes(whole[: len(whole) // 2])
     return folder

@@ -8,7 +8,13 @@ from gensig.dynamics.decimation import PASS_SHARE as RECORDER_SHARE
 from gensig.signals.resampling import PASS_SHARE, RateChange, rate_change
 
 SIGNAL = np.random.default_rng(0).standard_normal((2, 20_000))
-PAIRS = [(51200, 12800), (51200, 5000), (51200, 25600), (44100, 12800), (12000, 12800)]
+PAIRS = [
+    (51200, 12800),
+    (51200, 5000),
+    (51200, 25600),
+    (44100, 12800),
+    (12000, 12800),
+]
 
 
 def tone(frequency, rate, n_samples):
@@ -20,9 +26,14 @@ def test_tones_in_the_band_are_those_of_the_other_rate(found, wanted):
     frequency = 0.38 * min(found, wanted)
     made = rate_change(found, wanted).apply(tone(frequency, found, found))
     assert made.size == wanted
+
     edge = wanted // 10
     expected = tone(frequency, wanted, wanted)
-    assert_allclose(made[edge:-edge], expected[edge:-edge], atol=1e-3)
+    assert_allclose(
+        made[edge:-edge],
+        expected[edge:-edge],
+        atol=1e-3,
+    )
 
 
 @pytest.mark.parametrize(("found", "wanted"), PAIRS)
@@ -41,6 +52,7 @@ def test_a_part_has_the_samples_of_the_whole(found, wanted):
     change = rate_change(found, wanted)
     whole = change.apply(signal)
     n_samples = whole.shape[1]
+
     assert n_samples == change.n_samples(20_000)
     for start, stop in (
         (0, n_samples),
@@ -48,8 +60,17 @@ def test_a_part_has_the_samples_of_the_whole(found, wanted):
         (777, 1234),
         (n_samples - 3, n_samples),
     ):
-        part = change.apply_to_part(lambda a, b: signal[:, a:b], 20_000, start, stop)
-        assert_allclose(part, whole[:, start:stop], atol=1e-12)
+        part = change.apply_to_part(
+            lambda a, b: signal[:, a:b],
+            20_000,
+            start,
+            stop,
+        )
+        assert_allclose(
+            part,
+            whole[:, start:stop],
+            atol=1e-12,
+        )
 
 
 def test_the_same_rate_changes_nothing():
@@ -62,7 +83,10 @@ def test_the_band_is_that_of_the_simulated_recorder():
     assert PASS_SHARE == RECORDER_SHARE
 
 
-@pytest.mark.parametrize(("up", "down"), [(0, 1), (2, 4)])
+@pytest.mark.parametrize(
+    ("up", "down"),
+    [(0, 1), (2, 4)],
+)
 def test_no_ratio_is_refused(up, down):
     with pytest.raises(ValueError, match="no ratio"):
         RateChange(up=up, down=down)

@@ -31,16 +31,29 @@ def test_a_steady_angle_gives_what_a_steady_speed_gives():
     x = default_rng(0).standard_normal((2, TIME.size)).cumsum(axis=-1)
     by_angle = resample_by_angle(x, tau * 17.3 * TIME, 578)
     by_speed = resample_to_angle(x, RATE, 17.3, 578)
+
     assert by_angle.shape == by_speed.shape
-    assert_allclose(by_angle, by_speed, atol=1e-9 * np.abs(x).max())
+    assert_allclose(
+        by_angle,
+        by_speed,
+        atol=1e-9 * np.abs(x).max(),
+    )
 
 
 def test_a_turn_gets_the_samples_of_the_slowest_by_itself_and_orders_stay_sharp():
-    turns = resample_by_angle(mesh(TURNS, 1.0, 0.5), tau * TURNS)
+    turns = resample_by_angle(
+        mesh(TURNS, 1.0, 0.5),
+        tau * TURNS,
+    )
     assert turns.shape[-1] == 506  # even, at 19.84 Hz 504.03
+
     order, amplitude = spectrum_of_turns(turns)
     is_mesh = np.isin(order, [TEETH, 2 * TEETH])
-    assert_allclose(amplitude[is_mesh], [1.0, 0.5], rtol=2e-3)
+    assert_allclose(
+        amplitude[is_mesh],
+        [1.0, 0.5],
+        rtol=2e-3,
+    )
     assert amplitude[~is_mesh].max() < 2e-3
 
 
@@ -69,7 +82,10 @@ def rotation():
     return search
 
 
-@pytest.mark.parametrize("true", [19.71, 20.0, 20.33])
+@pytest.mark.parametrize(
+    "true",
+    [19.71, 20.0, 20.33],
+)
 def test_mesh_frequency_is_found_through_noise_and_sidebands(rotation, true):
     turns = true * TIME
     modulated = (1 + 0.8 * np.cos(tau * turns)) * mesh(turns, 1.0, 0.3, 0.5)
@@ -81,7 +97,11 @@ def test_a_foreign_tone_near_one_harmonic_is_not_taken_for_the_mesh(rotation):
     x = mesh(20.1 * TIME, 0.2, 0.1, 0.2, 0.1) + mesh(19.8 * TIME, 2.0)
     x += 0.5 * default_rng(4).standard_normal(TIME.size)
     assert_allclose(rotation(x), 20.1, rtol=1e-4)
-    assert_allclose(rotation(x, n_harmonics=1), 19.8, rtol=1e-4)
+    assert_allclose(
+        rotation(x, n_harmonics=1),
+        19.8,
+        rtol=1e-4,
+    )
 
 
 def test_channels_are_searched_together(rotation):
@@ -101,10 +121,18 @@ def test_angle_from_the_mesh_phase():
     x = (1 + 0.5 * np.cos(tau * TURNS)) * mesh(TURNS, 1.0, 0.4)
     x += 0.3 * default_rng(3).standard_normal(TIME.size)
     inner = slice(500, -500)  # a turn at either end is averaged over fewer samples
+
     for harmonic in (1, 2):
-        angle = mesh_phase_angle(x, RATE, TEETH, TEETH * 20.0, harmonic=harmonic)
+        angle = mesh_phase_angle(
+            x,
+            RATE,
+            TEETH,
+            TEETH * 20.0,
+            harmonic=harmonic,
+        )
         error = (angle - tau * TURNS)[inner]
         assert np.ptp(error) < np.radians(1.0)  # noise in the band
+
     steady = (tau * 20.0 * TIME - tau * TURNS)[inner]
     assert np.ptp(steady) > np.radians(40)
 
@@ -113,4 +141,9 @@ def test_no_line_no_angle():
     noise = default_rng(5).standard_normal(TIME.size)
     with pytest.raises(ValueError, match="no steady line stands out at 460 Hz"):
         mesh_phase_angle(noise, RATE, TEETH, TEETH * 20.0)
-    mesh_phase_angle(noise + mesh(20.0 * TIME, 0.5), RATE, TEETH, TEETH * 20.0)
+    mesh_phase_angle(
+        noise + mesh(20.0 * TIME, 0.5),
+        RATE,
+        TEETH,
+        TEETH * 20.0,
+    )

@@ -48,7 +48,11 @@ def test_every_part_comes_back():
     for name, expected in zip(PARTS, parts, strict=True):
         part = getattr(result, name)
         assert part.shape == expected.shape
-        assert_allclose(part, expected, atol=0.03 * np.abs(signal).max())
+        assert_allclose(
+            part,
+            expected,
+            atol=0.03 * np.abs(signal).max(),
+        )
 
 
 def test_it_is_linear_and_blind_to_what_is_constant():
@@ -65,7 +69,11 @@ def test_noise_falls_with_the_passages_of_a_tooth():
         clean, _ = a_pair(n_passages)
         noisy, _ = a_pair(n_passages, noise=1.0)
         errors.append(np.std(separate(noisy).driving - separate(clean).driving))
-    assert_allclose(errors[0] / errors[1], 2.0, rtol=0.15)
+    assert_allclose(
+        errors[0] / errors[1],
+        2.0,
+        rtol=0.15,
+    )
 
 
 def test_what_lies_above_half_the_samples_is_taken_away_and_does_not_alias():
@@ -79,4 +87,10 @@ def test_less_than_a_turn_and_odd_samples_are_refused():
     with pytest.raises(ValueError, match="4 passages of a tooth, less than 5"):
         separate(np.zeros((1, 64 * 4)))
     with pytest.raises(ValueError, match="even and at least 2, not 31"):
-        separate_gears(np.zeros((1, 6400)), RATE, MESH_HZ, TEETH, samples_per_tooth=31)
+        separate_gears(
+            np.zeros((1, 6400)),
+            RATE,
+            MESH_HZ,
+            TEETH,
+            samples_per_tooth=31,
+        )

@@ -20,16 +20,26 @@ def kurtosis_of(signal, window=WINDOW):
 
 @pytest.mark.parametrize("window", [65, 500])
 def test_gaussian_noise_is_zero_in_every_line_and_scatters_as_stated(window):
-    frequency, kurtosis = kurtosis_of(noise(shape=(20,)), window)
+    frequency, kurtosis = kurtosis_of(
+        noise(shape=(20,)),
+        window,
+    )
     assert kurtosis.shape == (20, frequency.size)
+
     line = RATE / window
     assert frequency[0] >= 1.998 * line
     assert frequency[-1] <= RATE / 2 - 1.998 * line
+
     spread = 1.2 * np.sqrt(window / N_SAMPLES)
     assert_allclose(np.std(kurtosis), spread, rtol=0.15)
+
     bias = -1.5 * window / N_SAMPLES
     most = 5 * spread / np.sqrt(20)
-    assert_allclose(kurtosis.mean(axis=0), bias, atol=most)
+    assert_allclose(
+        kurtosis.mean(axis=0),
+        bias,
+        atol=most,
+    )
 
 
 def test_a_tone_is_minus_one():
@@ -43,7 +53,11 @@ def test_noise_switched_on_for_a_share_of_the_time():
     share, period = 0.2, 5000
     is_on = np.arange(N_SAMPLES) % period < share * period
     _, kurtosis = kurtosis_of(noise(1) * is_on)
-    assert_allclose(kurtosis.mean(), 2 / share - 2, rtol=0.05)
+    assert_allclose(
+        kurtosis.mean(),
+        2 / share - 2,
+        rtol=0.05,
+    )
 
 
 def test_gain_does_not_matter_and_silence_is_nan():
@@ -52,7 +66,10 @@ def test_gain_does_not_matter_and_silence_is_nan():
     assert np.isnan(silent).all()
 
 
-@pytest.mark.parametrize(("n_samples", "window"), [(100, 7), (199, 100)])
+@pytest.mark.parametrize(
+    ("n_samples", "window"),
+    [(100, 7), (199, 100)],
+)
 def test_windows_that_do_not_suit_are_refused(n_samples, window):
     with pytest.raises(ValueError, match="does not suit"):
         spectral_kurtosis(np.ones(n_samples), RATE, window)

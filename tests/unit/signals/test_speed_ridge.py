@@ -17,7 +17,13 @@ RATE = 25600.0
 TEETH = Teeth(driving=23, driven=57)
 SPEED = 1500.0  # r/min
 RATIO = TEETH.driving / TEETH.driven
-ORDERS = {0.0: 1.0, 1.0: 0.15, -1.0: 0.15, RATIO: 0.15, -RATIO: 0.15}
+ORDERS = {
+    0.0: 1.0,
+    1.0: 0.15,
+    -1.0: 0.15,
+    RATIO: 0.15,
+    -RATIO: 0.15,
+}
 
 
 def recording_of(signal):
@@ -89,8 +95,13 @@ def test_the_course_is_the_frequency_over_time():
 
     time, result = course()
     frequency = np.gradient(cycles) * RATE
-    true = np.interp(time, np.arange(cycles.size) / RATE, frequency)
+    true = np.interp(
+        time,
+        np.arange(cycles.size) / RATE,
+        frequency,
+    )
     error = result / true - 1
+
     assert np.abs(error).max() < 6e-3
     assert np.std(error) < 2e-3
     for wrong in ({"search": 0.05}, {"highest": 500.0}):

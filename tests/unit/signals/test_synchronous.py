@@ -13,12 +13,19 @@ from gensig.signals.synchronous import (
 
 TURN = np.arange(400) / 400 * 2 * np.pi
 MESH = 3 * np.cos(23 * TURN + 1) + 0.5 * np.cos(46 * TURN)
-TURNS = np.tile(MESH + 0.2 * np.cos(24 * TURN), (30, 1))
+TURNS = np.tile(
+    MESH + 0.2 * np.cos(24 * TURN),
+    (30, 1),
+)
 NOISE = np.random.default_rng(0).standard_normal(TURNS.shape)
 
 
 def test_amplitudes_by_order():
-    assert_allclose(mesh_harmonics(TURNS[0], 23, 3), [3.0, 0.5, 0.0], atol=1e-12)
+    assert_allclose(
+        mesh_harmonics(TURNS[0], 23, 3),
+        [3.0, 0.5, 0.0],
+        atol=1e-12,
+    )
     assert mesh_harmonics(TURNS.reshape(5, 6, 400), 23, 2).shape == (5, 6, 2)
 
 
@@ -26,13 +33,17 @@ def test_harmonics_beyond_the_band_are_unknown():
     assert np.isnan(mesh_harmonics(TURNS[0], 23, 9)).tolist() == [False] * 8 + [True]
 
 
-@pytest.mark.parametrize("n_turns", [2, 5, 30])
+@pytest.mark.parametrize(
+    "n_turns",
+    [2, 5, 30],
+)
 def test_share_is_right_on_the_average_for_any_number_of_turns(n_turns):
     rng = np.random.default_rng(n_turns)
     power = 4.5 + 0.125 + 0.02
     deviation = np.sqrt(power / 3)  # a quarter of the whole
     noise = deviation * rng.standard_normal((200, n_turns, 400))
     result = [nonsynchronous_share(TURNS[:n_turns] + each) for each in noise]
+
     assert_allclose(np.mean(result), 0.25, atol=0.01)
 
 
@@ -48,6 +59,15 @@ def test_residual_of_turns_is_that_of_the_average_and_what_does_not_repeat():
     turns = TURNS + NOISE
     residual = residual_turns(turns, 23)
     expected = residual_signal(turns.mean(axis=0), 23)
-    assert_allclose(residual.mean(axis=0), expected, atol=1e-12)
-    assert_allclose(residual_turns(TURNS, 23)[3], 0.2 * np.cos(24 * TURN), atol=1e-12)
+
+    assert_allclose(
+        residual.mean(axis=0),
+        expected,
+        atol=1e-12,
+    )
+    assert_allclose(
+        residual_turns(TURNS, 23)[3],
+        0.2 * np.cos(24 * TURN),
+        atol=1e-12,
+    )
     assert np.var(residual) > 0.9

@@ -88,6 +88,7 @@ def test_gears_have_their_names_and_bodies(any_machine):
     assert [gear.name for gear in gears.values()] == list(gears)
     assert set(bodies) == set(gears)
     assert all(body.inertia > 0.0 for body in bodies.values())
+
     followed = any_machine.pair.gears
     assert list(gears)[:2] == list(followed)
     for name, gear in followed.items():
@@ -101,8 +102,10 @@ def test_meshes_connect_existing_gears(any_machine):
         assert mesh.driving != mesh.driven
         assert gears[mesh.driving].n_teeth == mesh.pair.pinion.n_teeth
         assert gears[mesh.driven].n_teeth == mesh.pair.wheel.n_teeth
+
     (followed,) = [mesh for mesh in meshes if mesh.followed]
     assert followed.pair == any_machine.pair
+
     names = {name for mesh in meshes for name in (mesh.driving, mesh.driven)}
     assert names == set(gears)
 
@@ -113,14 +116,26 @@ def test_each_gear_of_a_line_rotates_as_its_meshes_say():
     line, speed = machine.engine.drive.line, {}
     for mesh, of_line in zip(machine.meshes, line.meshes, strict=True):
         node = line.gears[of_line.driving].node
-        driving = speed.setdefault(mesh.driving, abs(line.speed_ratio[node]))
+        driving = speed.setdefault(
+            mesh.driving,
+            abs(line.speed_ratio[node]),
+        )
         driven = driving * mesh.pair.pinion.n_teeth / mesh.pair.wheel.n_teeth
-        assert_close(speed.setdefault(mesh.driven, driven), driven, 1e-9)
+        assert_close(
+            speed.setdefault(mesh.driven, driven),
+            driven,
+            1e-9,
+        )
     assert len(speed) == len(line.gears) == len(machine.gears)
 
 
 def test_the_declared_channels_are_those_that_check_takes(any_machine):
-    plain = replace(any_machine.sensing, path=None, sensors=None, nuisances=())
+    plain = replace(
+        any_machine.sensing,
+        path=None,
+        sensors=None,
+        nuisances=(),
+    )
 
     def check(*channels):
         sensing = replace(plain, channels=channels)
@@ -128,6 +143,7 @@ def test_the_declared_channels_are_those_that_check_takes(any_machine):
 
     check(*any_machine.channels)
     others = KNOWN_CHANNELS - set(any_machine.channels)
+
     assert others
     for name in others:
         with pytest.raises(ConfigError, match=rf"sensing\.channels: no channel {name}"):
@@ -140,6 +156,7 @@ def test_the_channels_of_a_pair_are_its_degrees_of_freedom(name, is_driven):
     keys = "inertia_kg_m2: 0.01, coupling_stiffness_nm_per_rad: 1e4, coupling_damping_ratio: 0.1"
     words = [f"system.{end}={{{keys}}}" for end in ("motor", "load") if is_driven]
     machine = read(name, *words)
+
     assert machine.channels == pair_dynamics(Run(system=machine, faults=())).dofs
     assert ("motor_rotation" in machine.channels) == is_driven
 
@@ -161,7 +178,11 @@ def test_the_table_without_faults_is_the_sound_one(any_machine):
     of_specimen, of_faults = (
         any_machine.mesh_table(forms) for forms in (specimen.forms, faults)
     )
-    sound, same, missing = map(parts, (table, of_specimen, of_faults))
+    sound, same, missing = map(
+        parts,
+        (table, of_specimen, of_faults),
+    )
+
     assert all(np.array_equal(same[key], sound[key]) for key in sound)
     assert not all(np.array_equal(missing[key], sound[key]) for key in sound)
     assert not any(np.any(sound[key]) for key in sound if key.endswith("kind."))
@@ -176,9 +197,11 @@ def test_a_record_starts_perfect_and_nominal(any_machine):
         specimen=perfect_specimen(pair.pinion, pair.wheel),
         gearbox=nominal_gearbox(len(channels)),
     )
+
     assert_array_equal(plain.acceleration, perfect.acceleration)
     assert plain.acceleration.shape[0] == len(channels)
     assert plain.integration_check in CHECKS
+
     later = any_machine.simulate(start=Start(phase=0.3))
     assert not np.array_equal(plain.acceleration, later.acceleration)
 
@@ -198,6 +221,7 @@ def test_set_points_teeth_and_discs(any_machine):
     assert isinstance(machine.torque_of, str)
     for tooth, drawn in pairwise(range(0, n_teeth, 5)):
         assert 0 <= machine.driven_tooth(tooth, drawn) < n_teeth
+
     wheels = [name for name in machine.channels if name.endswith(SPEED)]
     assert len(machine.draw_discs(np.random.default_rng(0))) == len(wheels)
 

@@ -14,7 +14,10 @@ from gensig.systems.flank_optimum import N_VARIABLES, Cases, judge, optimise, un
 from gensig.systems.registry import read_sliced_pair, read_system
 
 COUPLING = ["mesh.contact=linear", "mesh.slice_coupling=independent"]
-ALIGNED = Cases(torques=(178.0,), misalignments=(0.0,))
+ALIGNED = Cases(
+    torques=(178.0,),
+    misalignments=(0.0,),
+)
 
 
 def pair_of(*words):
@@ -30,8 +33,13 @@ def test_harmonics_and_shares_are_those_of_the_curve(helical):
     result = helical.transmission_error()
     phase = np.arange(64) / 64
     first = 2 * np.abs(np.mean(result.error * np.exp(-2j * np.pi * phase)))
+
     assert_close(result.harmonics[0], first, 1e-9)
-    assert_close(result.load_share.sum(axis=1), 1.0, 1e-9)
+    assert_close(
+        result.load_share.sum(axis=1),
+        1.0,
+        1e-9,
+    )
     assert 0.9 < result.bearing <= 1.0
 
 
@@ -51,6 +59,7 @@ def test_the_modifications_of_the_paper_lower_the_ripple():
         "beihang_even_load": (171.2e3, 0.89),
         "beihang_both": (172.1e3, 0.84),
     }
+
     for name, (line_load, ratio) in expected.items():
         modification = pair_of(f"modification={name}").modification
         judged = judge(system, modification, ALIGNED)
@@ -59,7 +68,10 @@ def test_the_modifications_of_the_paper_lower_the_ripple():
 
 
 def test_the_worst_case_counts(helical):
-    wide = Cases(torques=(60.0, 178.0), misalignments=(-5e-6, 0.0, 5e-6))
+    wide = Cases(
+        torques=(60.0, 178.0),
+        misalignments=(-5e-6, 0.0, 5e-6),
+    )
     cases = [
         Cases(torques=(torque,), misalignments=(askew,))
         for torque in wide.torques
@@ -67,6 +79,7 @@ def test_the_worst_case_counts(helical):
     ]
     single = [judge(helical, helical.modification, case) for case in cases]
     worst = judge(helical, helical.modification, wide)
+
     assert worst.ripple == max(each.ripple for each in single)
     assert worst.line_load == max(each.line_load for each in single)
 
@@ -82,9 +95,13 @@ def test_a_short_search_beats_plain_flanks_and_repeats(helical):
 
 
 def test_a_front_trades_ripple_for_load(helical):
-    askew = Cases(torques=(178.0,), misalignments=(5.2e-6,))
+    askew = Cases(
+        torques=(178.0,),
+        misalignments=(5.2e-6,),
+    )
     front = optimise(helical, askew, n_front=3, seed=0, generations=3)
     values = np.array([(each.ripple, each.line_load) for each in front])
+
     assert len(front) >= 2
     assert np.all(np.diff(values[:, 0]) > 0)
     assert np.all(np.diff(values[:, 1]) < 0)

@@ -53,7 +53,10 @@ def supports(run):
     sides = dynamics.pinion, dynamics.wheel
     stiffness = np.concatenate([stiffness_of(side) for side in sides])
     damping = np.concatenate([damping_of(side) for side in sides])
-    mass = np.repeat([side.mass for side in sides], 2)
+    mass = np.repeat(
+        [side.mass for side in sides],
+        2,
+    )
     return stiffness, damping, damping / (2 * np.sqrt(stiffness * mass))
 
 
@@ -89,15 +92,26 @@ class TestStiffness:
         rows = [line for line in lines if len(line) > 5 and line[1] in SIDES]
         assert len(rows) == 2
         for torque, side, *printed in rows:
-            body = getattr(machine({**BEARINGS, TORQUE: float(torque)}), side)
+            body = getattr(
+                machine({**BEARINGS, TORQUE: float(torque)}),
+                side,
+            )
             stiffness = stiffness_of(body)
             frequency = np.sqrt(stiffness / body.mass) / (tau)
             values = [float(value) for value in printed[-4:]]
-            assert_close(values, [*(1e-6 * stiffness), *frequency], 5e-3)
+            assert_close(
+                values,
+                [*(1e-6 * stiffness), *frequency],
+                5e-3,
+            )
 
 
 class TestDamping:
-    @pytest.mark.parametrize("keys", [BEARINGS, RATIOS], ids=["bearings", "as_given"])
+    @pytest.mark.parametrize(
+        "keys",
+        [BEARINGS, RATIOS],
+        ids=["bearings", "as_given"],
+    )
     def test_nominal_is_the_middle_of_the_range(self, machine, keys):
         stiffness, _, ratio = supports_of(machine(keys))
         assert_close(ratio, math.sqrt(0.01 * 0.1), 1e-12)
@@ -106,10 +120,20 @@ class TestDamping:
 
     def test_a_gearbox_has_the_ratios_that_it_drew(self, machine):
         system = machine(BEARINGS)
-        box = draw_gearbox(stream(0, Stream.GEARBOX), 4, system.quality, 0.0)
-        box = with_damping_ratio(box, stream(0, Stream.SUPPORT), system.quality)
+        box = draw_gearbox(
+            stream(0, Stream.GEARBOX),
+            4,
+            system.quality,
+            0.0,
+        )
+        box = with_damping_ratio(
+            box,
+            stream(0, Stream.SUPPORT),
+            system.quality,
+        )
         stiffness, _, ratio = supports_of(system, box)
         nominal = supports_of(system, nominal_gearbox(4))[0]
+
         assert_close(stiffness, nominal * box.stiffness_factor, 1e-12)
         assert_close(ratio, box.damping_ratio, 1e-12)
         assert len(set(box.damping_ratio)) == 4
@@ -119,9 +143,18 @@ class TestDamping:
         streams = [stream(0, Stream.SUPPORT, number) for number in range(1000)]
         boxes = [with_damping_ratio(box, rng, quality) for rng in streams]
         drawn = np.array([each.damping_ratio for each in boxes])
+
         assert 0.01 <= drawn.min() < drawn.max() <= 0.1
-        quarters = np.quantile(np.log10(drawn), [0.25, 0.5, 0.75])
-        assert_close(quarters, [-1.75, -1.5, -1.25], atol=0.02)
+
+        quarters = np.quantile(
+            np.log10(drawn),
+            [0.25, 0.5, 0.75],
+        )
+        assert_close(
+            quarters,
+            [-1.75, -1.5, -1.25],
+            atol=0.02,
+        )
 
 
 def supports_of(system, gearbox=None):
@@ -132,8 +165,15 @@ def test_as_given_supports_are_those_of_the_option(machine, config_with):
     """To the bit: bearings and shafts change neither supports nor the draws of a gearbox."""
     keys = [f"gear.{side}.{key}" for side in SIDES for key in ("bearing", "shaft")]
     plain, gears = machine(), config_with()["gear"]
-    box = draw_gearbox(stream(0, Stream.GEARBOX), 4, plain.quality, 0.05)
+    box = draw_gearbox(
+        stream(0, Stream.GEARBOX),
+        4,
+        plain.quality,
+        0.05,
+    )
+
     assert with_damping_ratio(box, stream(0, Stream.SUPPORT), plain.quality) is box
+
     factors = box.stiffness_factor, box.damping_factor
     for system in (plain, machine(dict.fromkeys(keys))):
         held = supports_of(system, box)
@@ -168,6 +208,7 @@ class TestRecords:
             classes[box].add(row["label_name"])
             conditions[condition].add(np.concatenate(supports(run)).tobytes())
         (first,), (second,) = ratios.values()
+
         assert not set(first) & set(second)
         assert list(classes.values()) == [set(realistic["plan"]["classes"])] * 2
         assert list(n_records.values()) == [5] * 4
@@ -177,6 +218,7 @@ class TestRecords:
         short = realistic.with_keys("operating", duration_s=0.1)
         row = next(row for row, _ in runs if row["label_name"] == "missing_tooth")
         record = simulate_record(short, row)
+
         assert record.signals["acceleration"].shape == (3, 5120)
         assert np.isfinite(record.signals["acceleration"]).all()
         assert record.values["integration_check"] == "error"

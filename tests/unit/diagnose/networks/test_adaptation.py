@@ -71,14 +71,22 @@ def through_a_path(name, method, windows, healthy, gain):
     """Log-probabilities as trained, and through a path before and after adaptation."""
     model = network(name)
     source = statistics_of(model, healthy)
-    adapted = adapt_network(model, source, moved(healthy, gain), method)
+    adapted = adapt_network(
+        model,
+        source,
+        moved(healthy, gain),
+        method,
+    )
     far = moved(windows, gain)
     pairs = ((model, windows), (model, far), (adapted, far))
     return tuple(predict_windows(net, part) for net, part in pairs)
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("name", ["cnn", "wdcnn", "spectrum"])
+@pytest.mark.parametrize(
+    "name",
+    ["cnn", "wdcnn", "spectrum"],
+)
 def test_the_windows_of_the_training_change_nothing(name, method, windows, healthy):
     trained, _, adapted = through_a_path(name, method, windows, healthy, 1.0)
     assert_allclose(adapted, trained, atol=1e-3)
@@ -111,10 +119,21 @@ def test_a_mixture_taken_for_healthy_is_adabn_as_published(windows, healthy):
         for source in (mixture, target)
     )
     mean = target.mean[first]
-    assert_allclose(naive.running_mean, mean, atol=1e-4 * np.abs(mean).max())
+
+    assert_allclose(
+        naive.running_mean,
+        mean,
+        atol=1e-4 * np.abs(mean).max(),
+    )
     assert_allclose(right.running_mean, trained.running_mean, atol=1e-6)
     assert_allclose(right.running_var, trained.running_var, rtol=1e-4)
-    same = np.isclose(naive.running_var, trained.running_var, rtol=0.02, atol=0)
+
+    same = np.isclose(
+        naive.running_var,
+        trained.running_var,
+        rtol=0.02,
+        atol=0,
+    )
     assert not same.all()
 
 
@@ -141,28 +160,53 @@ def scores(model, windows):
 def test_coral_gives_healthy_features_the_moments_of_the_training(healthy, monkeypatch):
     monkeypatch.setattr(adaptation, "RIDGE", 1e-9)
     model, target = Levels(), moved(healthy, 2.0)
-    adapted = adapt_network(model, statistics_of(model, healthy), target, "coral")
+    adapted = adapt_network(
+        model,
+        statistics_of(model, healthy),
+        target,
+        "coral",
+    )
     pairs = ((model, healthy), (model, target), (adapted, target))
     features = np.array([scores(*pair) for pair in pairs])
     features /= features[0].std(axis=0)
     expected, before, after = features.mean(axis=1)
+
     assert np.abs(before - expected).max() > 1.0
     assert_allclose(after, expected, atol=1e-3)
-    assert_allclose(np.cov(features[2].T), np.cov(features[0].T), atol=1e-2)
+    assert_allclose(
+        np.cov(features[2].T),
+        np.cov(features[0].T),
+        atol=1e-2,
+    )
 
 
 def test_coral_keeps_directions_without_scatter_in_the_windows(healthy):
     """With the published ridge, features of almost no scatter are shifted and not amplified."""
     model, equal = Levels(), healthy.subset(np.zeros(9, dtype=int))
-    adapted = adapt_network(model, statistics_of(model, healthy), equal, "coral")
+    adapted = adapt_network(
+        model,
+        statistics_of(model, healthy),
+        equal,
+        "coral",
+    )
     assert np.abs(adapted.head.weight.detach().numpy()).max() < 20.0
+
     expected = scores(model, healthy).mean(axis=0)
-    assert_allclose(scores(adapted, equal).mean(axis=0), expected, atol=1e-3)
+    assert_allclose(
+        scores(adapted, equal).mean(axis=0),
+        expected,
+        atol=1e-3,
+    )
 
 
 def test_coral_needs_linear_scores_and_adabn_batch_normalisation(healthy):
     with refused(ConfigError, "take coral"):
-        adapt_network(Levels(), statistics_of(Levels(), healthy), healthy, "adabn")
+        adapt_network(
+            Levels(),
+            statistics_of(Levels(), healthy),
+            healthy,
+            "adabn",
+        )
     bent = Levels()
     bent.head = torch.nn.Tanh()
     with refused(ConfigError, "not linear"):
@@ -173,11 +217,13 @@ def test_the_domain_moves_with_healthy_windows_and_no_farther(windows, healthy):
     domain = fit_domain(windows, windows)
     far = moved(windows, 10.0)
     assert (distances(domain, far) > domain.threshold).all()
+
     statistics = statistics_of(network("cnn"), healthy)
     shifted = adapt_domain(domain, statistics, moved(healthy, 10.0))
     expected = distances(domain, windows)
     assert_allclose(distances(shifted, far), expected, atol=1e-3)
     assert shifted.threshold == domain.threshold
+
     rng = default_rng(0)
     noise = tuple(rng.standard_normal(x.shape).astype(np.float32) for x in far.signals)
     noisy = distances(shifted, replace(far, signals=noise))
@@ -188,6 +234,7 @@ def test_statistics_are_those_of_healthy_windows_and_can_be_stored(windows):
     model, names = network("cnn"), two_channels().class_names
     statistics = healthy_statistics(model, windows, names)
     assert len(statistics.features) == (windows.label == 0).sum()
+
     tensors, weights = statistics.tensors(), {"blocks.0.weight": np.zeros(3)}
     loaded = statistics_from(tensors | weights).tensors()
     for name, tensor in tensors.items():
@@ -196,6 +243,7 @@ def test_statistics_are_those_of_healthy_windows_and_can_be_stored(windows):
     assert statistics_from(weights) is None
     with refused(DatasetError, "no statistic"):
         statistics_from(tensors | {"adaptation.levels": np.array([np.nan])})
+
     del tensors["adaptation.features"]
     with refused(DatasetError, "not whole"):
         statistics_from(tensors)
@@ -208,6 +256,7 @@ def test_statistics_of_another_network_are_refused(windows, healthy):
             adapt_network(model, other, healthy, method)
     with refused(ConfigError, "there is adabn, coral"):
         adapt_network(model, other, healthy, "magic")
+
     few = replace(other, levels=other.levels[:3])
     with refused(DatasetError, "another out-of-distribution flag"):
         adapt_domain(fit_domain(windows, windows), few, healthy)
@@ -221,7 +270,11 @@ def recordings(tmp_path):
         signal = dataset.signals(record)
         rolled = signal + 0.7 * np.roll(signal, 3, axis=-1)
         files.append(str(tmp_path / f"r{record}.npz"))
-        np.savez(files[-1], acceleration=rolled, sampling_rate_hz=RATE)
+        np.savez(
+            files[-1],
+            acceleration=rolled,
+            sampling_rate_hz=RATE,
+        )
     return files
 
 
@@ -233,11 +286,13 @@ def test_the_command_writes_a_described_model_for_predict(
     *mine, faulty = recordings
     words = ["--healthy", *mine, "--method", method, "--out", out]
     text = says(capsys, "adapt", "--model", model, *words)
+
     assert "2 healthy recording(s)" in text
     assert "docs/howto/bridge.md" in text
 
     facts = json.loads((out / "model.json").read_text())["adaptation"]
     assert (facts["method"], facts["matched"]) == (method, "healthy")
+
     rows = facts["recordings"]
     assert [row["file"] for row in rows] == [Path(file).name for file in mine]
     assert {len(row["sha256"]) for row in rows} == {64}
@@ -261,7 +316,14 @@ def models(two_channel_model, recordings, tmp_path, capsys):
     """Folders of a trained model, an adapted one and one without healthy statistics."""
     model = Path(two_channel_model)
     adapted, old = tmp_path / "adapted", tmp_path / "old"
-    words = ["--healthy", *recordings[:2], "--method", "coral", "--out", adapted]
+    words = [
+        "--healthy",
+        *recordings[:2],
+        "--method",
+        "coral",
+        "--out",
+        adapted,
+    ]
     says(capsys, "adapt", "--model", model, *words)
     old.mkdir()
     (old / "model.json").write_bytes((model / "model.json").read_bytes())
@@ -288,8 +350,20 @@ def test_refusals_are_one_line(models, recordings, tmp_path, monkeypatch, capsys
     np.savez("short.npz", acceleration=signal, sampling_rate_hz=RATE)
     Path("full").mkdir()
     Path("full/x").write_text("mine")
-    given = ["--healthy", *recordings[:2], "--method", "adabn", "--out", "new"]
+    given = [
+        "--healthy",
+        *recordings[:2],
+        "--method",
+        "adabn",
+        "--out",
+        "new",
+    ]
+
     for typed, message in REFUSED:
         name, *words = typed.split()
-        refuses(capsys, ["adapt", "--model", models[name], *given, *words], message)
+        refuses(
+            capsys,
+            ["adapt", "--model", models[name], *given, *words],
+            message,
+        )
         assert not Path("new").exists()

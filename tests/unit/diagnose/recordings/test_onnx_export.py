@@ -31,7 +31,15 @@ DESCRIBED = (
 
 
 def exporting(model, file):
-    return ["export", "--to", "onnx", "--model", str(model), "--out", str(file)]
+    return [
+        "export",
+        "--to",
+        "onnx",
+        "--model",
+        str(model),
+        "--out",
+        str(file),
+    ]
 
 
 def session_of(file):
@@ -53,7 +61,10 @@ def check_metadata(session, description):
     assert given.shape[1:] == [2, 1200]
 
 
-@pytest.mark.parametrize("network", ["levels_model", "model=wdcnn", "model=spectrum"])
+@pytest.mark.parametrize(
+    "network",
+    ["levels_model", "model=wdcnn", "model=spectrum"],
+)
 def test_the_file_answers_like_torch(
     network, two_channels, train_network, request, tmp_path, capsys
 ):
@@ -69,7 +80,10 @@ def test_the_file_answers_like_torch(
     task = task_on(two_channels, 1200, 1000, description.normalise)
     record, start = np.array([90]), np.array([0])
     stop = np.array([two_channels.n_samples])
-    windows = load_windows(task, Segments(record=record, start=start, stop=stop))
+    windows = load_windows(
+        task,
+        Segments(record=record, start=start, stop=stop),
+    )
     signal = two_channels.signals(90)
     raw = np.stack([signal[:, start : start + 1200] for start in windows.start])
     # an offset counts for nothing
@@ -77,6 +91,7 @@ def test_the_file_answers_like_torch(
     session = session_of(file)
     (result,) = session.run(None, inputs)
     assert_allclose(result, predict_windows(model, windows), atol=1e-4)
+
     check_metadata(session, description)
 
 
@@ -87,6 +102,7 @@ def test_a_file_that_answers_otherwise_is_removed(model, tmp_path, capsys, monke
 
     monkeypatch.setattr(onnx_export, "RawWindows", Louder)
     file = tmp_path / "m.onnx"
+
     refuses(capsys, exporting(model, file), "answered unlike torch by 0.001")
     assert not file.exists()
 
@@ -100,6 +116,7 @@ def test_a_failed_export_leaves_no_file(model, tmp_path, capsys, monkeypatch):
 
     monkeypatch.setattr(torch.onnx, "export", stopped)
     message = "cannot be written as ONNX: no such operator"
+
     refuses(capsys, exporting(model, file), message)
     assert not file.exists()
 

@@ -79,7 +79,11 @@ def test_every_life_counts_the_same():
     )
     values = {name: row[None] for name, row in by_life(snapshots).items()}
     assert set(values) == set(MEASURES)
-    drawn = {"n_bootstrap": 100, "rng": np.random.default_rng(0)}
+
+    drawn = {
+        "n_bootstrap": 100,
+        "rng": np.random.default_rng(0),
+    }
     scores = life_scores(values, **drawn)
     phm = (np.expm1(6 / 13) + np.expm1(2 / 10)) / 2
     expected = {
@@ -94,7 +98,12 @@ def test_every_life_counts_the_same():
     means = {name: score["mean"] for name, score in scores.items()}
     assert means == pytest.approx(expected)
     assert (scores["mae_h"]["low"], scores["mae_h"]["high"]) == (2, 6)
-    better = gain(values["rmse_h"], 4 * values["rmse_h"], **drawn)
+
+    better = gain(
+        values["rmse_h"],
+        4 * values["rmse_h"],
+        **drawn,
+    )
     assert_allclose(better["mean"], np.sqrt(20))
     assert better["low"] > 0
 
@@ -106,8 +115,12 @@ def test_the_half_width_is_a_rank_of_lives():
     assert conformal_half_width(error, life, 0.6) == 3.0
     # three lives cannot promise 80 %
     assert conformal_half_width(error[:3], life[:3], 0.8) == np.inf
+
     # fifty snapshots of one life are one life
-    many = np.repeat(np.arange(4), [50, 1, 1, 1])
+    many = np.repeat(
+        np.arange(4),
+        [50, 1, 1, 1],
+    )
     assert conformal_half_width(error[many], life[many], 0.6) == 3.0
 
 
@@ -116,11 +129,15 @@ def test_intervals_hold_for_new_lives_where_pooled_ones_do_not():
     life = np.repeat(np.arange(5), 20)
     held, pooled = [], []
     for _ in range(1000):
-        spread = rng.lognormal(sigma=1.0, size=(6, 1))  # of the errors of a life
+        spread = rng.lognormal(
+            sigma=1.0,
+            size=(6, 1),
+        )  # of the errors of a life
         error = spread * rng.uniform(0.8, 1.2, size=(6, 20))
         known, new = error[:5].ravel(), rng.choice(error[5])
         held.append(new <= conformal_half_width(known, life, 0.8))
         pooled.append(new <= np.quantile(known, 0.8))
+
     assert np.mean(held) >= 0.8 - 3 * np.sqrt(0.16 / 1000)
     assert np.mean(pooled) < 0.78
 
@@ -132,6 +149,7 @@ def test_a_bound_above_the_early_level_is_known_and_one_below_is_not():
     lives = lives_of(settled(FakeLives(n_lives=12, n_censored=4))[0])
     censored = ~lives.failed
     known = lives.known(60.0)
+
     assert known[lives.failed].all()
     assert_array_equal(known[censored], lives.remaining[censored] >= 60.0)
     assert set(known[censored]) == {True, False}
@@ -142,17 +160,24 @@ def test_the_early_level_is_of_training_lives_that_failed():
     lives = lives_of(task)
     record = np.flatnonzero(np.char.startswith(lives.name, "u0"))
     failed = record[lives.failed[record]]
-    _, first = np.unique(lives.name[failed], return_index=True)
+    _, first = np.unique(
+        lives.name[failed],
+        return_index=True,
+    )
     lengths = (lives.age + lives.remaining)[failed[first]]
     share = settings.remaining_life.early_life_share
     level = early_level(lives, record, level_h=None, share=share)
+
     assert_allclose(level, 0.6 * np.median(lengths))
     assert early_level(lives, record, level_h=42, share=share) == 42
 
 
 def test_weights_of_a_life_do_not_grow_with_its_snapshots():
     weight = balanced_weights(np.array(["a", "b", "b", "b"]))
-    assert_allclose(weight, [2, 2 / 3, 2 / 3, 2 / 3])
+    assert_allclose(
+        weight,
+        [2, 2 / 3, 2 / 3, 2 / 3],
+    )
 
 
 def test_a_split_that_cuts_lives_is_left_out():
@@ -160,10 +185,16 @@ def test_a_split_that_cuts_lives_is_left_out():
     task, settings = settled(dataset)
     result = choose_life_protocols(task, lives_of(task), settings.protocols)
     reason = "life u00 is in its train and its validation part"
+
     assert result[0] == ("by_unit",)
     assert result[1]["random_window_leaky"] == reason
+
     life = dataset.columns["life_id"]
-    dataset.columns["life_id"] = np.where(life == "u11", "u00", life)
+    dataset.columns["life_id"] = np.where(
+        life == "u11",
+        "u00",
+        life,
+    )
     for protocol in ("random_window_leaky", "by_unit"):
         with refused(ConfigError, "life u00 is in its train"):
             planned(dataset, f"protocols=[{protocol}]")
@@ -242,6 +273,7 @@ def test_vibration_that_tells_the_life_beats_the_age(life_study):
     assert set(methods) == {"constant", "age_only", "cnn"} | by_vibration
     for name in by_vibration:
         assert methods[name]["gain_over_age_only_h"]["low"] > 0, name
+
     indicators, age = (methods[name] for name in ("indicators", "age_only"))
     assert indicators["rmse_h"]["mean"] < 0.6 * age["rmse_h"]["mean"]
     assert indicators["horizon_h"]["mean"] > age["horizon_h"]["mean"]
@@ -259,8 +291,10 @@ def test_censored_lives_are_counted_and_never_scored(life_study):
     assert sum(result["n_lives"].values()) == 18
     assert sum(result["n_lives_censored"].values()) == 6
     assert [row["scored"] for row in rows] == [row["life_failed"] for row in rows]
+
     scored = {row["life_id"] for row in rows if row["scored"] == "1"}
     assert len(scored) == result["n_lives"]["test"]
+
     ends = [[float(row[name]) for row in rows] for name in ENDS]
     assert np.min(ends) >= 0
     assert np.all(np.diff(ends, axis=0) >= 0)
@@ -271,10 +305,12 @@ def test_the_report_is_whole(life_study):
     tables = {"metrics.json", "predictions.csv", "scores.csv"}
     pages = {"report.html", "remaining_life_by_unit.png", "models"}
     assert {path.name for path in life_study.iterdir()} == tables | pages
+
     page = (life_study / "report.html").read_text()
     heads = ("How long the machines still run", "age only", "PHM score")
     for text in (*heads, "random_window_leaky is left out"):
         assert text in page
+
     methods = by_unit(life_study)["methods"]
     for row in rows_of(life_study / "scores.csv"):
         expected = mean_of(methods, row["method"], row["measure"])
@@ -287,6 +323,7 @@ def test_a_job_that_is_sent_to_another_process_gives_the_same_bits(life_study, l
     job = plan_life_study(task, settings).jobs[-1]
     task, settings, job = pickle.loads(pickle.dumps((task, settings, job)))
     rows = rows_of(life_study / "predictions.csv")
+
     for run in run_life_job(task, settings, job):
         expected = [row["predicted_h"] for row in rows if row["method"] == run.method]
         assert [f"{hours:.6g}" for hours in run.predicted] == expected
@@ -294,8 +331,15 @@ def test_a_job_that_is_sent_to_another_process_gives_the_same_bits(life_study, l
 
 def test_too_few_validation_lives_give_intervals_that_say_nothing(tmp_path):
     words = ("remaining_life.coverage=0.9", "remaining_life.with_age=false")
-    out = train(tmp_path / "out", FakeLives(n_lives=8), *LIFE, "epochs=1", *words)
+    out = train(
+        tmp_path / "out",
+        FakeLives(n_lives=8),
+        *LIFE,
+        "epochs=1",
+        *words,
+    )
     result = by_unit(out)
+
     assert not result["intervals_hold"]
     assert set(result["methods"]) == {"constant", "age_only", "indicators", "cnn"}
     assert mean_of(result["methods"], "cnn", "coverage") == 1

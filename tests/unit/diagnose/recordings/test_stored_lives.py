@@ -45,6 +45,7 @@ def test_every_network_is_stored_without_pickle(life_study, models):
     for folder in folders:
         names = {path.name for path in folder.iterdir()}
         assert names == {"model.json", "model.safetensors"}
+
     facts = load_life_model(folders[1])[2]
     assert facts.told == ("speed_rpm", "torque_nm", "life_time_h")
     assert facts.told_range["torque_nm"] == (20.0, 20.0)
@@ -68,9 +69,14 @@ def test_evaluate_on_its_test_part_repeats_the_report(
     result = metrics_of(out)
     reported = metrics_of(life_study)["protocols"]["by_unit"]
     expected = reported["methods"][method]
+
     for measure in MEASURES:
         assert measure in printed
-        score = pytest.approx(expected[measure], rel=1e-5, abs=1e-9)
+        score = pytest.approx(
+            expected[measure],
+            rel=1e-5,
+            abs=1e-9,
+        )
         assert result[measure] == score, measure
     assert result["n_lives"] == reported["n_lives"]["test"]
     assert f"{result['n_lives']} lives that failed" in printed
@@ -79,7 +85,11 @@ def test_evaluate_on_its_test_part_repeats_the_report(
     for before, after in zip(rows[method], repeated, strict=True):
         assert after["record_id"] == before["record_id"]
         for end in ("predicted_h", "low_h", "high_h"):
-            hours = pytest.approx(float(before[end]), rel=1e-4, abs=1e-4)
+            hours = pytest.approx(
+                float(before[end]),
+                rel=1e-4,
+                abs=1e-4,
+            )
             assert float(after[end]) == hours
     assert (out / "remaining_life.png").is_file()
 
@@ -90,14 +100,27 @@ def test_predict_says_of_a_file_what_the_report_says_of_its_record(
 ):
     row = rows[method][11]
     record = int(row["record_id"][1:])
-    words = ["predict", "--model", models[method], recorded(lives.signals(record))]
+    words = [
+        "predict",
+        "--model",
+        models[method],
+        recorded(lives.signals(record)),
+    ]
     words += conditions(lives, record, method)
     result = json.loads(says(capsys, *words, "--json"))
+
     for key in ("remaining_life_h", "low_h", "high_h"):
         expected = float(row[key.replace("remaining_life", "predicted")])
-        assert_allclose(result[key], expected, rtol=1e-4, atol=1e-3)
+        assert_allclose(
+            result[key],
+            expected,
+            rtol=1e-4,
+            atol=1e-3,
+        )
+
     mean = np.mean([window["remaining_life_h"] for window in result["windows"]])
     assert result["low_h"] <= mean <= result["early_life_h"]
+
     line = says(capsys, *words).strip()
     assert re.fullmatch(
         r".*mine\.npz: .* h (left|or longer), 80% interval .* to .* h.*",
@@ -108,11 +131,25 @@ def test_predict_says_of_a_file_what_the_report_says_of_its_record(
 def test_a_load_or_an_age_that_was_never_trained_raises_the_flag(
     models, lives, recorded, capsys
 ):
-    words = ["predict", "--model", models["cnn_and_age"], recorded(lives.signals(0))]
+    words = [
+        "predict",
+        "--model",
+        models["cnn_and_age"],
+        recorded(lives.signals(0)),
+    ]
     words += ["--speed-rpm", "1800", "--torque-nm"]
-    line = says(capsys, *words, "80", "--life-time-h", "9000", status=3)
+    line = says(
+        capsys,
+        *words,
+        "80",
+        "--life-time-h",
+        "9000",
+        status=3,
+    )
+
     assert "80 N m is outside the 20 to 20 N m of the training" in line
     assert "9000 h is outside" in line
+
     says(capsys, *words, "20", "--life-time-h", "10")
 
 
@@ -130,9 +167,20 @@ def test_what_the_network_must_know_and_does_not_take_is_said_in_one_line(
 ):
     file = recorded(lives.signals(0))
     for options, message in REFUSED:
-        words = ["--model", models["cnn_and_age"], file, *options.split()]
+        words = [
+            "--model",
+            models["cnn_and_age"],
+            file,
+            *options.split(),
+        ]
         refuses(capsys, ["predict", *words], message)
-    words = ["--model", models["cnn"], file, *conditions(lives, 0, "cnn_and_age")]
+
+    words = [
+        "--model",
+        models["cnn"],
+        file,
+        *conditions(lives, 0, "cnn_and_age"),
+    ]
     message = "--life-time-h: cnn is not told life_time_h"
     refuses(capsys, ["predict", *words], message)
 
@@ -144,7 +192,9 @@ def test_another_data_set_is_judged_whole_and_one_without_lives_or_classes_refus
     serve(monkeypatch, offered)
     words = ["evaluate", "data=other", f"model_dir={models['cnn']}"]
     printed = says(capsys, *words)
+
     assert "48 records of 6 lives that failed (and 0 censored): all records" in printed
+
     refused = {
         "has no column life_id": FakeDataset(),
         "its classes are healthy, crack, the model was trained on missing": FakeDataset(
@@ -167,9 +217,22 @@ def test_classifiers_and_networks_of_lives_are_not_confused(
         load_model(models["cnn"])
     with refused(DatasetError, "is a classifier and says no remaining"):
         load_life_model(model)
+
     file, out = recorded(lives.signals(0)), tmp_path / "moved"
-    words = ["--model", models["cnn"], "--healthy", file, "--out", out]
-    refuses(capsys, ["adapt", *words, "--method", "adabn"], "is no classifier")
+    words = [
+        "--model",
+        models["cnn"],
+        "--healthy",
+        file,
+        "--out",
+        out,
+    ]
+    refuses(
+        capsys,
+        ["adapt", *words, "--method", "adabn"],
+        "is no classifier",
+    )
+
     words = ["predict", "--model", model, file, "--torque-nm", "20"]
     refuses(capsys, words, "--torque-nm is for models of remaining life")
 
@@ -208,21 +271,37 @@ def test_the_onnx_file_gives_the_same_hours(models, lives, recorded, capsys, tmp
     onnxruntime = pytest.importorskip("onnxruntime", reason="extra onnx")
     record, file, model = 5, str(tmp_path / "life.onnx"), models["cnn_and_age"]
     words = ["export", "--to", "onnx", "--model", model, "--out", file]
+
     assert "of the early level of torch's" in says(capsys, *words)
 
     signal = lives.signals(record)
     words = ["predict", "--model", model, recorded(signal), "--json"]
-    answer = says(capsys, *words, *conditions(lives, record, "cnn_and_age"))
+    answer = says(
+        capsys,
+        *words,
+        *conditions(lives, record, "cnn_and_age"),
+    )
     expected = json.loads(answer)["remaining_life_h"]
 
     session = onnxruntime.InferenceSession(file, providers=["CPUExecutionProvider"])
     stored = session.get_modelmeta().custom_metadata_map
     columns = json.loads(stored["told"])
     assert columns == ["speed_rpm", "torque_nm", "life_time_h"]
+
     windows = signal.reshape(-1, 1, 1600)
-    values = np.array([lives.columns[name][record] for name in columns], np.float32)
-    told = values[None].repeat(len(windows), axis=0)
+    values = np.array(
+        [lives.columns[name][record] for name in columns],
+        np.float32,
+    )
+    told = values[None].repeat(
+        len(windows),
+        axis=0,
+    )
     inputs = {"acceleration": windows, "told": told}
     (hours,) = session.run(["remaining_life_h"], inputs)
     level = json.loads(stored["early_life_h"])
-    assert_allclose(np.clip(hours.mean(), 0, level), expected, atol=1e-3 * level)
+    assert_allclose(
+        np.clip(hours.mean(), 0, level),
+        expected,
+        atol=1e-3 * level,
+    )

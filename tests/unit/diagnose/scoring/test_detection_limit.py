@@ -81,7 +81,10 @@ def test_the_score_ranks_by_the_odds_of_any_fault_without_offset(offset):
     assert_allclose(detection_score(logs, 0), expected, atol=1e-12)
 
 
-@pytest.mark.parametrize("n_records", [19, 20, 57, 400])
+@pytest.mark.parametrize(
+    "n_records",
+    [19, 20, 57, 400],
+)
 def test_at_most_one_in_twenty_new_healthy_records_is_an_alarm(n_records):
     rng = default_rng(n_records)
     known, new = rng.normal(size=(300, n_records)), rng.normal(size=(300, 200))
@@ -91,6 +94,7 @@ def test_at_most_one_in_twenty_new_healthy_records_is_an_alarm(n_records):
         return alarm_threshold(scores, once, new=is_new)[0]
 
     alarms = new > np.array([[threshold(scores, True)] for scores in known])
+
     assert 0.02 < np.mean(alarms) < 0.055
     assert np.mean(known[0] > threshold(known[0], False)) <= 0.05
 
@@ -106,24 +110,40 @@ def test_curves_are_those_of_ordinary_logistic_regression():
     size = rng.uniform(0.1, 0.9, 400)
     hit = rng.uniform(size=400) < expit(3 * np.log(size / 0.4))
     weight = rng.integers(0, 3, (3, 400)).astype(float)
-    curves = fit_curves(size, np.tile(hit, (3, 1)).astype(float), weight)
+    curves = fit_curves(
+        size,
+        np.tile(hit, (3, 1)).astype(float),
+        weight,
+    )
     scaled = zscore(np.log(size))[:, None]
+
     for row, drawn in zip(curves, weight, strict=True):
         model = LogisticRegression(C=1e6).fit(scaled, hit, drawn)
-        expected = [model.intercept_[0], model.coef_[0, 0]]
+        expected = [
+            model.intercept_[0],
+            model.coef_[0, 0],
+        ]
         assert_allclose(row, expected, rtol=0.02, atol=0.02)
     for share in (0.5, 0.9):
         at = limits(curves, size, share)
         reached = np.diag(curve_at(curves, at, size))
         assert_allclose(reached, share, rtol=1e-6)
-    assert_allclose(limits(curves, size, 0.5), 0.4, rtol=0.2)
+    assert_allclose(
+        limits(curves, size, 0.5),
+        0.4,
+        rtol=0.2,
+    )
 
 
 def test_limits_stay_within_the_tested_sizes_and_curves_never_fall():
     size = np.linspace(0.2, 0.8, 40)
 
     def fitted(hits):
-        return fit_curves(size, (hits + 0.0 * size)[None], np.ones((1, 40)))
+        return fit_curves(
+            size,
+            (hits + 0.0 * size)[None],
+            np.ones((1, 40)),
+        )
 
     def limit(hits, share=0.5):
         return limits(fitted(hits), size, share)[0]
@@ -131,7 +151,12 @@ def test_limits_stay_within_the_tested_sizes_and_curves_never_fall():
     assert np.isinf(limit(0.0))
     assert limit(1.0, 0.9) == 0.2
     assert_allclose(limit(size > 0.5), 0.5, rtol=0.03)
-    level = curve_at(fitted(size < 0.5), np.array([0.2, 0.8]), size)
+
+    level = curve_at(
+        fitted(size < 0.5),
+        np.array([0.2, 0.8]),
+        size,
+    )
     assert_allclose(level, 0.5)
 
 
@@ -141,12 +166,18 @@ def test_a_known_limit_lies_in_the_interval(cracks, validation):
     assert result["threshold_from"] == "healthy validation records"
     assert result["false_alarms"]["low"] < 0.06
     assert not result["too_many_false_alarms"]
+
     crack = result["classes"]["crack"]
     half, most, depth, _ = crack["limits"]
     assert (half["quantity"], depth["quantity"]) == ("severity", "crack_depth_mm")
     assert half["low"] < (4 + 1.645) / 12 < half["high"]
     assert half["value"] < most["value"] < 0.75
-    assert_allclose(depth["value"], 4 * half["value"], rtol=1e-6)
+    assert_allclose(
+        depth["value"],
+        4 * half["value"],
+        rtol=1e-6,
+    )
+
     shares = [row["share_found"]["mean"] for row in crack["by_severity"]]
     assert shares == sorted(shares)
     assert "crack_depth_mm" in crack["summary"]
@@ -156,13 +187,19 @@ def test_perfect_blind_and_equal_scores(cracks):
     label = cracks[0].label
     perfect = crack_with(100.0 * label, cracks)
     share = perfect["share_found"]
+
     assert perfect["auroc"]["mean"] == share["mean"] == 1
     assert share["low"] < 0.9
-    blind = crack_with(default_rng(3).normal(size=label.size), cracks)
+
+    blind = crack_with(
+        default_rng(3).normal(size=label.size),
+        cracks,
+    )
     assert blind["auroc"]["low"] < 0.5 < blind["auroc"]["high"]
     assert "at no severity" in blind["summary"]
     for result, expected in ((perfect, "at_smallest_tested"), (blind, "not_reached")):
         assert {row["status"] for row in result["limits"]} == {expected}
+
     equal = crack_with(np.zeros(label.size), cracks)
     assert (equal["auroc"]["mean"], equal["share_found"]["mean"]) == (0.5, 0.0)
 
@@ -181,7 +218,11 @@ def test_too_many_false_alarms_are_reported(validation):
 
 def test_few_healthy_validation_records_are_not_used(cracks):
     test, severity = cracks
-    result = answer(test, study(n_units=2, per_unit=18)[0], severity)
+    result = answer(
+        test,
+        study(n_units=2, per_unit=18)[0],
+        severity,
+    )
     assert result["threshold_from"] == "healthy test records"
     assert result["false_alarms"]["mean"] <= 0.05
 
@@ -190,17 +231,32 @@ def test_one_unit_has_no_interval_and_one_severity_no_curve():
     test, severity = study(n_units=1, per_unit=60)
     crack = answer(test, None, severity)["classes"]["crack"]
     scores = (crack["auroc"], crack["share_found"], *crack["limits"])
+
     assert all(score["low"] is None for score in scores)
+
     flat = answer(test, None, np.ones_like(severity))["classes"]["crack"]
     assert flat["by_severity"] == flat["limits"] == flat["curve"]["severity"] == []
 
 
 def test_all_of_few_units_do_not_prove_a_share_of_one():
     interval = share_with_interval(1.0, np.ones(50), 8)
-    assert_allclose(interval["low"], 0.025 ** (1 / 8), rtol=1e-6)
+    assert_allclose(
+        interval["low"],
+        0.025 ** (1 / 8),
+        rtol=1e-6,
+    )
     assert interval["high"] == 1
-    half = share_with_interval(0.5, np.linspace(0.3, 0.7, 101), 8)
-    assert_allclose([half["low"], half["high"]], [0.31, 0.69], rtol=0.01)
+
+    half = share_with_interval(
+        0.5,
+        np.linspace(0.3, 0.7, 101),
+        8,
+    )
+    assert_allclose(
+        [half["low"], half["high"]],
+        [0.31, 0.69],
+        rtol=0.01,
+    )
 
 
 def test_only_parameters_that_grow_with_the_severity_are_sizes():
@@ -215,5 +271,9 @@ def test_only_parameters_that_grow_with_the_severity_are_sizes():
         "params/fault.two_values_mm": np.round(severity) + 1,
         "params/operating.speed_rpm": severity,
     }
-    dataset = SimpleNamespace(column_names=list(columns), column=columns.get)
+    dataset = SimpleNamespace(
+        column_names=list(columns),
+        column=columns.get,
+    )
+
     assert list(size_columns(dataset, np.arange(40), severity)) == ["crack_depth_mm"]
