@@ -21,7 +21,13 @@ from gensig.signals.indicators import energy_ratio, fm0, fm4, m6a, m8a, sideband
 
 TEETH, PER_TURN = 23, 2300  # a hundred samples a tooth
 TURN = np.arange(PER_TURN) / PER_TURN * tau
-MESH = 5 * np.cos(TEETH * TURN + 1) + 2 * np.cos(2 * TEETH * TURN)
+
+
+def wave(order):
+    return np.cos(order * TURN)
+
+
+MESH = 5 * np.cos(TEETH * TURN + 1) + 2 * wave(2 * TEETH)
 OF_ONE_TURN = {
     "fm0": fm0,
     "fm4": fm4,
@@ -103,9 +109,9 @@ def test_average_of_few_turns_is_nan_unless_asked_for():
 
 
 def test_a_turn_is_its_regular_part_what_is_left_and_the_shaft():
-    shaft = 0.7 + np.cos(TURN)
-    sideband = np.cos((TEETH + 1) * TURN)
-    other = 0.3 * np.cos(31 * TURN)
+    shaft = 0.7 + wave(1)
+    sideband = wave(TEETH + 1)
+    other = 0.3 * wave(31)
     turn = MESH + shaft + sideband + other
     regular = regular_signal(turn, TEETH)
 
@@ -129,7 +135,7 @@ def test_a_turn_is_its_regular_part_what_is_left_and_the_shaft():
 
 
 def test_a_mesh_tone_alone_leaves_nothing_to_judge():
-    tone = 4 * np.cos(TEETH * TURN)
+    tone = 4 * wave(TEETH)
     assert energy_ratio(tone, TEETH) == 0.0
     assert_allclose(sideband_ratio(tone, TEETH), 0.0, atol=1e-12)
     for name in ("fm4", "m6a", "m8a", "na4", "nb4"):
@@ -138,7 +144,7 @@ def test_a_mesh_tone_alone_leaves_nothing_to_judge():
 
 def test_fm0_and_nb4_of_amplitude_modulation():
     depth = 0.4
-    turn = (1 + depth * np.cos(TURN)) * np.cos(TEETH * TURN)
+    turn = (1 + depth * wave(1)) * wave(TEETH)
     # the lowest value lies half a tooth away
     assert_allclose(
         fm0(turn, TEETH),
@@ -149,7 +155,7 @@ def test_fm0_and_nb4_of_amplitude_modulation():
 
 
 def test_fm0_counts_the_chosen_harmonics():
-    turn = np.cos(TEETH * TURN) + 0.5 * np.cos(2 * TEETH * TURN)
+    turn = wave(TEETH) + 0.5 * wave(2 * TEETH)
     span = np.ptp(turn)
     assert_allclose(fm0(turn, TEETH, n_harmonics=1), span)
     assert_allclose(fm0(turn, TEETH), span / 1.5)
@@ -158,7 +164,7 @@ def test_fm0_counts_the_chosen_harmonics():
 def test_moments_of_one_order_and_of_gaussian_noise_outside_the_mesh():
     rng = default_rng(2)
     noisy = rng.standard_normal((400, PER_TURN)) + MESH
-    one_order = MESH + 0.1 * np.cos(30 * TURN)
+    one_order = MESH + 0.1 * wave(30)
 
     for moment, of_order, of_noise in (
         (fm4, 1.5, 3),
@@ -174,9 +180,9 @@ def test_moments_of_one_order_and_of_gaussian_noise_outside_the_mesh():
 
 
 def test_energy_ratio_of_known_amplitudes():
-    other = np.cos(30 * TURN)
-    mesh = 5 * np.cos(TEETH * TURN) + 3 * np.cos((TEETH - 1) * TURN)
-    turn = mesh + 2 * other + 9 * np.cos(TURN)
+    other = wave(30)
+    mesh = 5 * wave(TEETH) + 3 * wave(TEETH - 1)
+    turn = mesh + 2 * other + 9 * wave(1)
 
     assert_allclose(
         energy_ratio(turn, TEETH),
@@ -186,9 +192,9 @@ def test_energy_ratio_of_known_amplitudes():
 
 
 def test_envelope_is_of_its_band_only():
-    other = 7 * np.cos(2 * TEETH * TURN) + np.cos(TURN) + 3.0
-    modulation = 1 + 0.2 * np.cos(5 * TURN)
-    turn = modulation * np.cos(TEETH * TURN) + other
+    other = 7 * wave(2 * TEETH) + wave(1) + 3.0
+    modulation = 1 + 0.2 * wave(5)
+    turn = modulation * wave(TEETH) + other
 
     assert_allclose(mesh_envelope(turn, TEETH), modulation, atol=1e-9)
     assert_allclose(

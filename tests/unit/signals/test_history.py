@@ -7,7 +7,13 @@ from gensig.signals.history import na4, nb4
 
 TEETH, PER_TURN = 20, 1000
 TURN = np.arange(PER_TURN) / PER_TURN * 2 * np.pi
-MESH = 4 * np.cos(TEETH * TURN) + np.cos(2 * TEETH * TURN)
+
+
+def wave(order):
+    return np.cos(order * TURN)
+
+
+MESH = 4 * wave(TEETH) + wave(2 * TEETH)
 
 
 def history(*sizes):
@@ -32,7 +38,7 @@ def test_na4_is_its_formula():
 
 def test_nb4_of_a_modulation_that_deepens():
     depth = np.array([0.1, 0.1, 0.1, 0.3])
-    averages = (1 + depth[:, None] * np.cos(2 * TURN)) * np.cos(TEETH * TURN)
+    averages = (1 + depth[:, None] * wave(2)) * wave(TEETH)
     mean_variance = np.cumsum(depth**2 / 2) / np.arange(1, 5)
     expected = 3 / 8 * depth**4 / mean_variance**2
 
@@ -53,7 +59,7 @@ def test_a_record_of_too_few_turns_is_passed_over():
 
 
 def test_records_without_residual_and_the_first_that_has_one():
-    averages = np.stack([MESH, MESH, MESH + 0.1 * np.cos(7 * TURN)])
+    averages = np.stack([MESH, MESH, MESH + 0.1 * wave(7)])
     values = na4(averages, TEETH)
     assert np.isnan(values[:2]).all()
     assert_allclose(
