@@ -135,16 +135,7 @@ WITH_LIMIT = (
 # (what is typed, words of the message); keys that are not typed are those of the kind's option
 REFUSED = [
     ("crack crack_depht_mm=1", "unknown key 'crack_depht_mm'; did you mean 'crack_d"),
-    ("crack crack_depth_deg=1", "has the wrong unit; write it as 'crack_depth_mm'"),
-    ("crack crack_width_um=1", "has the wrong unit; write it as 'crack_width_mm'"),
-    ("crack crack_depth_mm=deep", "fault.crack_depth_mm = 'deep' is not a number"),
     ("crack crack_depth_mm=null", "fault.crack_depth_mm is null; give a value"),
-    ("crack crack_start=null", "fault.crack_start is null; give a value"),
-    ("crack tooth=1.5", "= 1.5 is not a whole number or text or a list of whole num"),
-    ("crack tooth=true", "fault.tooth = True is not a whole number"),
-    ("crack tooth=[1,2.5]", "fault.tooth = [1, 2.5] is not a whole number or text or"),
-    ("crack tooth=[true]", "fault.tooth = [True] is not a whole number"),
-    ("crack tooth=null", "fault.tooth is null; give a value"),
     ("crack tooth=-1", "fault.tooth = -1 must be at least 0"),
     ("crack tooth=[4,-2]", "fault.tooth = -2 must be at least 0"),
     ("crack tooth=[1,5,1]", "= [1, 5, 1] must name one tooth or more, each once"),
@@ -204,7 +195,6 @@ REFUSED = [
     ("distributed_pitting pit_diameter_mm=0", "pit_diameter_mm = 0 must be positive"),
     ("distributed_pitting depth_ratio=0.6", "depth_ratio = 0.6 must lie in 0..0.5"),
     ("distributed_pitting diameter_scatter=1.1", "= 1.1 must lie in 0..1"),
-    ("distributed_pitting pit_seed=1.5", "fault.pit_seed = 1.5 is not a whole number"),
     (
         "distributed_pitting pit_diameter_mm=0.001",
         "pits of 0.001 mm do not make fault.pitted_share = 0.1",
@@ -216,8 +206,6 @@ REFUSED = [
     ("wear wear_profile=[1.0]", "(1.0,) must hold two depths or more, none negative"),
     ("wear wear_profile=[]", "fault.wear_profile = () must hold two depths or more"),
     ("wear wear_profile=[1.0,-0.1]", "= (1.0, -0.1) must hold two depths or more, no"),
-    ("wear wear_profile=even", "= 'even' is not a list of numbers or null"),
-    ("wear wear_profile=[1,x]", "fault.wear_profile = [1, 'x'] is not a list of numb"),
     ("runout tooth=all", "= 'all' must be the one tooth that stands back most"),
     ("runout tooth=[1,2]", "= (1, 2) must be the one tooth that stands back most"),
     ("tip_relief relief_length_mm=11", "11 must not be above 10.55 mm, the involute"),
