@@ -84,8 +84,8 @@ class TestNominal:
         assert_array_equal(result.torque_slope, 0)
 
     def test_whole_numbers_are_times_too(self, operating, xiamen):
-        for one in (operating, xiamen.operating):
-            whole, floats = (one.nominal(np.arange(3, dtype=t)) for t in (int, float))
+        for each in (operating, xiamen.operating):
+            whole, floats = (each.nominal(np.arange(3, dtype=t)) for t in (int, float))
             assert_array_equal(whole.angle, floats.angle)
             assert whole.torque_factor.dtype == np.float64
 

@@ -69,6 +69,7 @@ def test_there_and_back(suffix, value):
     assert_allclose(
         from_si(name, to_si(name, value)),
         value,
+        rtol=1e-14,
         atol=1e-300,
     )
 
@@ -94,7 +95,7 @@ def test_a_name_without_unit_is_taken_as_it_is(value):
     ],
 )
 def test_factors(name, value, expected):
-    assert_allclose(to_si(name, value), expected)
+    assert_allclose(to_si(name, value), expected, rtol=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -185,13 +186,13 @@ MISTAKES = [
     MISTAKES,
 )
 def test_mistakes_are_answered(key, value, text):
-    with refused(ConfigError, f"gear.shaft{text}"):
+    with refused(f"gear.shaft{text}"):
         shaft(**{key: value})
 
 
 def test_missing_keys_are_named():
     values = {key: GOOD[key] for key in GOOD if key not in ("length_mm", "n_keys")}
-    with refused(ConfigError, "gear.shaft: missing length_mm, n_keys"):
+    with refused("gear.shaft: missing length_mm, n_keys"):
         read(Shaft, values, "gear.shaft", name="shaft")
 
 
@@ -215,7 +216,7 @@ LIMITS = {
 )
 def test_checks_name_the_field_in_its_unit(check, changes, text):
     limits = {name: LIMITS[name] for name in changes}
-    with refused(ConfigError, text):
+    with refused(text):
         check(
             replace(shaft(), **changes),
             "gear.",
@@ -224,32 +225,32 @@ def test_checks_name_the_field_in_its_unit(check, changes, text):
 
 
 def test_positive_fields_and_choices_are_named():
-    with refused(ConfigError, "gear.length_mm = 0 must be positive"):
+    with refused("gear.length_mm = 0 must be positive"):
         check_positive(
             replace(shaft(), length=0.0),
             "gear.",
             "share",
             "length",
         )
-    with refused(ConfigError, "gear.name = 'shaft'; allowed: a, 1"):
+    with refused("gear.name = 'shaft'; allowed: a, 1"):
         check_choice("gear.name", "shaft", ("a", 1))
 
 
 def test_checks_pass_what_is_allowed():
-    one = replace(
+    allowed = replace(
         shaft(),
         seats=(0.0, 0.1),
         angle=None,
     )
-    check_positive(one, "", "length", "angle")
+    check_positive(allowed, "", "length", "angle")
     check_limits(
-        one,
+        allowed,
         "",
-        length=(one.length, one.length),
+        length=(allowed.length, allowed.length),
         angle=(0.0, 1.0),
     )
-    check_ranges(one, "", seats=(0.0, 0.1))
-    check_choice("name", one.name, ("shaft",))
+    check_ranges(allowed, "", seats=(0.0, 0.1))
+    check_choice("name", allowed.name, ("shaft",))
 
 
 @pytest.mark.parametrize(
@@ -268,9 +269,9 @@ def test_a_kind_is_read_by_its_name(values, text):
         return read_kind({"shaft": Shaft}, part, "gear.part")
 
     assert read_part(given) == replace(shaft(), name="a")
-    with refused(ConfigError, text):
+    with refused(text):
         read_part({**GOOD, **values})
-    with refused(ConfigError, "kind = None"):
+    with refused("kind = None"):
         read_part("shaft")
 
 

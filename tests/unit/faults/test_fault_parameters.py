@@ -108,7 +108,7 @@ class TestCompound:
         ],
     )
     def test_mistakes(self, values, text):
-        with refused(GensigError, text):
+        with refused(text, GensigError):
             read_faults({"kind": "compound", **values})
 
 
@@ -227,7 +227,7 @@ def test_refusals(xiamen, monkeypatch, words, text):
     monkeypatch.setattr("gensig.faults.pitting.MOST_PITS", 200)
     if "do not make" in text:
         text = "200 " + text
-    with refused(GensigError, text):
+    with refused(text, GensigError):
         faulty_teeth(xiamen.pair, [typed(words)])
 
 
@@ -312,5 +312,5 @@ class TestSeverity:
         ["pitting pit_length_mm=90", "wear wear_depth_um=101", "runout limit_um=19"],
     )
     def test_larger_than_its_measure_is_refused(self, xiamen, words):
-        with refused(FaultError, "above 1"):
+        with refused("above 1", FaultError):
             severity([typed(words)], xiamen.pair)

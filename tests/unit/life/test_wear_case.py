@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from refusals import refused
 
-from gensig.errors import ConfigError, ExtrapolationError, SimulationError
+from gensig.errors import ExtrapolationError, SimulationError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import read_faults
 from gensig.life.life_laws import fitted_laws, life_map, torque_exponent
@@ -114,7 +114,7 @@ def test_a_limit_of_the_transmission_error_finds_the_threshold(full):
         rtol=1e-3,
     )
     assert_allclose(by_depth.threshold, 1e-6)
-    with refused(ConfigError, "is reached by new flanks already"):
+    with refused("is reached by new flanks already"):
         wear_life(case_of(*FULL, "wear.transmission_error_limit_um=0.5"))
 
 
@@ -161,13 +161,13 @@ class TestLaws:
         power, logarithm, _ = laws
         outside = ((power, 500, 6), (power, 100, 2), (logarithm, 100, 3))
         for law, torque, speed in outside:
-            with refused(ExtrapolationError, "was fitted for a"):
+            with refused("was fitted for a", ExtrapolationError):
                 law.life(float(torque), float(speed))
         assert power.life(500.0, 6.0, allow_extrapolation=True) > 0.0
 
     def test_a_negative_life_is_refused(self, laws):
         power, logarithm, _ = laws
-        with refused(SimulationError, "gives a life of -"):
+        with refused("gives a life of -", SimulationError):
             logarithm.life(900.0, 12.0, allow_extrapolation=True)
 
         printed = replace(
@@ -176,7 +176,7 @@ class TestLaws:
             b=127.3,
             torque=(10.0, 300.0),
         )
-        with refused(SimulationError, "gives a life of -"):
+        with refused("gives a life of -", SimulationError):
             printed.life(265.0, 12.0)  # inside its range
         assert_allclose(printed.no_life_from, 263.0, atol=0.5)
         assert printed.formula(0.999 * printed.no_life_from, 12.0) > 0.0
@@ -233,10 +233,8 @@ LIMIT = "wear.transmission_error_limit_um=9"
     ],
 )
 def test_bad_input_is_one_line(words, message):
-    with pytest.raises(ConfigError) as caught:
+    with refused(message):
         case_of(*words)
-    assert message in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def test_values_of_a_gear_override_those_of_both():

@@ -63,8 +63,8 @@ def test_the_asked_share_is_lost_in_whole_packets(run):
 
     spread = np.sqrt(0.09 * run / lost.size)
     assert_allclose(lost.mean(), 0.1, atol=4.0 * spread)
-    for one in lost:
-        edges = np.flatnonzero(np.diff(one.astype(int)))
+    for record in lost:
+        edges = np.flatnonzero(np.diff(record.astype(int)))
         assert len(edges) > 5
         assert np.all(np.diff(edges) % run == 0)
 

@@ -15,34 +15,34 @@ from gensig.sensing.chain import add_noise, power
     ids=["bearing", "housing"],
 )
 def test_without_drift_and_loss_no_bit_changes(group):
-    one = instrument(group)
-    emitted = source(one.sensing, 300)
-    signal = one.measure(emitted)
+    chain = instrument(group)
+    emitted = source(chain.sensing, 300)
+    signal = chain.measure(emitted)
 
     assert (signal is emitted) == (group is BEARING)
 
     rng = default_rng(0)
-    assert_array_equal(signal * one.drift(300, rng), signal)
+    assert_array_equal(signal * chain.drift(300, rng), signal)
 
-    same, share = one.sent(signal, rng)
+    same, share = chain.sent(signal, rng)
     assert same is signal
     assert share == 0.0
 
 
 def test_measuring_is_linear_and_names_the_sensors():
-    one = instrument(HOUSING)
-    first, second = source(one.sensing, 2000), source(one.sensing, 2000)[::-1]
-    assert one.sensing.channel_names == (
+    chain = instrument(HOUSING)
+    first, second = source(chain.sensing, 2000), source(chain.sensing, 2000)[::-1]
+    assert chain.sensing.channel_names == (
         "housing_input",
         "housing_output",
         "housing_top",
     )
 
-    together = one.measure(2.0 * first - second)
+    together = chain.measure(2.0 * first - second)
     assert together.shape == (3, 2000)
     assert_allclose(
         together,
-        2.0 * one.measure(first) - one.measure(second),
+        2.0 * chain.measure(first) - chain.measure(second),
         atol=1e-9,
     )
 
@@ -81,12 +81,12 @@ def test_noise_of_the_path_has_the_resonances_of_the_path():
 
 
 def test_no_noise_leaves_converter_and_offset():
-    one = instrument(HOUSING)
-    result = one.record(np.zeros((3, 100)), np.zeros(3), default_rng(0))[0]
+    chain = instrument(HOUSING)
+    result = chain.record(np.zeros((3, 100)), np.zeros(3), default_rng(0))[0]
     assert np.all(np.ptp(result, axis=1) == 0.0)
     assert_allclose(
         result[:, 0],
-        one.sensors.offset,
+        chain.sensors.offset,
         atol=0.5 * 2000 / 2**23,
     )
 

@@ -9,7 +9,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from refusals import refused
 
-from gensig.errors import ConfigError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.flank_form import Misalignment
 from gensig.sensing.gear_tolerances import (
@@ -155,7 +154,7 @@ class TestLimits:
     def test_it_uses_the_drawn_share(self, used_by, share):
         """Of the single pitch and the profile form to the last digit, of nothing more."""
         shares = used_by(8, share, share)
-        assert_allclose(shares[:, 0], share)
+        assert_allclose(shares[:, 0], share, rtol=1e-9)
         # the trace is read at points
         assert_allclose(shares[:, 3], share, rtol=2e-3)
         assert np.all(shares <= share * (1.0 + 1e-6))
@@ -278,7 +277,7 @@ class TestWhatIsDrawn:
             "gear.pinion.bore_radius_mm": 1.5,
             "gear.wheel.bore_radius_mm": 5,
         }
-        with refused(ConfigError, "module, the pinion has 0.4"):
+        with refused("module, the pinion has 0.4"):
             machine(tiny).check()
         machine({**tiny, "quality.iso1328_grade": None}).check()
 
@@ -305,5 +304,5 @@ def test_gearbox_factors_scatter_as_the_quality_says(quality):
     ],
 )
 def test_values_out_of_range(quality, key, value, text):
-    with refused(ConfigError, key + text):
+    with refused(key + text):
         quality(**{key: value})

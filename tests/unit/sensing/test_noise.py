@@ -10,7 +10,6 @@ from refusals import refused
 from scipy.signal import butter, sosfilt
 from sensing_groups import MACHINE
 
-from gensig.errors import ConfigError
 from gensig.sensing.noise import PARTS, Receiver, band_power, read_noise
 
 RATE = 51200.0
@@ -257,7 +256,7 @@ def test_refused_files(tmp_path):
     }
 
     for text, part in cases.items():
-        with refused(ConfigError, text):
+        with refused(text):
             made([part], n_samples=1000)
 
 
@@ -269,5 +268,5 @@ def test_offsets_make_a_sensor_louder(machine, xiamen):
 
     assert_allclose(levels, [-17.0, -27.0])
     assert np.all(xiamen.sensing.noise_factor(13.7) == 10.0 ** (-13.7 / 10.0))
-    with refused(ConfigError, "has 2 values for 4 sensors"):
+    with refused("has 2 values for 4 sensors"):
         machine(offset)

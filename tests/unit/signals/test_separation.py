@@ -57,9 +57,9 @@ def test_every_part_comes_back():
 
 def test_it_is_linear_and_blind_to_what_is_constant():
     (a, _), (b, _) = a_pair(100, seed=1), a_pair(100, seed=2)
-    both, one, other = (separate(x) for x in (a + 2 * b - 3.0, a, b))
+    both, first, second = (separate(x) for x in (a + 2 * b - 3.0, a, b))
     for name in PARTS:
-        expected = getattr(one, name) + 2 * getattr(other, name)
+        expected = getattr(first, name) + 2 * getattr(second, name)
         assert_allclose(getattr(both, name), expected, atol=1e-9)
 
 

@@ -7,7 +7,6 @@ import pytest
 from closeness import assert_close
 from refusals import refused
 
-from gensig.errors import ConfigError
 from gensig.mesh.modification import FlankModification
 from gensig.plan.request import read_request
 from gensig.systems.flank_optimum import N_VARIABLES, Cases, judge, optimise, unpacked
@@ -127,7 +126,7 @@ RELIEF, HEIGHT = "tip_relief_um=3", "tip_relief_height_mm"
                 "operating.torque_nm=0",
                 "gear.helix_angle_deg=10",
             ],
-            rf"^modification.wheel.{HEIGHT} = 0: a relief of 3 um needs a length",
+            f"modification.wheel.{HEIGHT} = 0: a relief of 3 um needs a length",
         ),
         (
             [f"modification.pinion.{RELIEF}", f"modification.pinion.{HEIGHT}=9"],
@@ -140,10 +139,10 @@ RELIEF, HEIGHT = "tip_relief_um=3", "tip_relief_height_mm"
     ],
 )
 def test_refusals_of_a_spur_pair(words, message):
-    with pytest.raises(ConfigError, match=message):
+    with refused(message):
         read_system(read_request(words).config)
 
 
 def test_cases_need_positive_torques():
-    with refused(ConfigError, "must be positive"):
+    with refused("must be positive"):
         Cases(torques=(0.0,), misalignments=(0.0,))

@@ -213,9 +213,9 @@ def test_another_data_set_is_judged_whole_and_one_without_lives_or_classes_refus
 def test_classifiers_and_networks_of_lives_are_not_confused(
     models, model, lives, recorded, capsys, tmp_path
 ):
-    with refused(DatasetError, "says remaining lives and is no classifier"):
+    with refused("says remaining lives and is no classifier", DatasetError):
         load_model(models["cnn"])
-    with refused(DatasetError, "is a classifier and says no remaining"):
+    with refused("is a classifier and says no remaining", DatasetError):
         load_life_model(model)
 
     file, out = recorded(lives.signals(0)), tmp_path / "moved"
@@ -252,7 +252,7 @@ def test_a_wrong_description_is_refused(change, models, tmp_path):
     content = description_of(models["cnn"])
     content["remaining_life"] |= change
     (tmp_path / "model.json").write_text(json.dumps(content))
-    with refused(DatasetError, "does not describe a model of remaining lives"):
+    with refused("does not describe a model of remaining lives", DatasetError):
         load_life_model(tmp_path)
 
 
@@ -261,7 +261,7 @@ def test_weights_of_another_network_are_refused(life_study, tmp_path):
     for method, name in zip(METHODS, ("model.json", "model.safetensors"), strict=True):
         content = (folders / f"by_unit-{method}-seed0" / name).read_bytes()
         (tmp_path / name).write_bytes(content)
-    with refused(DatasetError, "does not fit"):
+    with refused("does not fit", DatasetError):
         load_life_model(tmp_path)
 
 
