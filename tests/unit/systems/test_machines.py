@@ -34,7 +34,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*mean tooth forces:UserWarning"
 
 @cache
 def read(name, *more):
-    words = f"experiment={MACHINES[name]}", "operating.duration_s=0.02"
+    words = f"experiment={MACHINES[name]}", "operating.duration_s=0.01"
     return read_machine(read_request([*words, *more]).config)
 
 

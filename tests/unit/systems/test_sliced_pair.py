@@ -25,7 +25,7 @@ def pair_of(*words):
 
 @pytest.fixture(scope="module")
 def helical():
-    return pair_of("mesh.n_slices=12", *COUPLING)
+    return pair_of("mesh.n_slices=8", *COUPLING)
 
 
 def test_harmonics_and_shares_are_those_of_the_curve(helical):
@@ -86,7 +86,7 @@ def test_the_worst_case_counts(helical):
 def test_a_short_search_beats_plain_flanks_and_repeats(helical):
     plain = judge(helical, helical.modification, ALIGNED)
     first, second = (
-        optimise(helical, ALIGNED, n_front=1, seed=3, generations=4) for _ in range(2)
+        optimise(helical, ALIGNED, n_front=1, seed=3, generations=2) for _ in range(2)
     )
     assert first == second
     assert len(first) == 1
@@ -98,7 +98,7 @@ def test_a_front_trades_ripple_for_load(helical):
         torques=(178.0,),
         misalignments=(5.2e-6,),
     )
-    front = optimise(helical, askew, n_front=3, seed=0, generations=3)
+    front = optimise(helical, askew, n_front=3, seed=0, generations=2)
     values = np.array([(each.ripple, each.line_load) for each in front])
 
     assert len(front) >= 2
