@@ -305,16 +305,20 @@ def test_the_autoencoder_learns_and_shows_a_moment_that_it_cannot_rebuild(
 
 
 def test_two_processes_give_the_results_of_one(open_study):
-    """Of all kinds of jobs: novelty with and without a network, classes of shuffled labels."""
+    """Of all kinds of jobs: novelty with and without a network, classes, shuffled labels."""
     task, settings = open_study
     settings = dataclasses.replace(settings, epochs=1)
     kinds = [
-        ("healthy_only", None),
-        ("healthy_only", 3),
-        ("open_set", 3),
+        ("healthy_only", None, False),
+        ("healthy_only", 3, False),
+        ("open_set", 3, False),
+        ("by_unit", 5, False),
+        ("by_unit", 5, True),
     ]
-    jobs = [Job(protocols=(protocol,), seed=seed) for protocol, seed in kinds]
-    jobs.append(Job(protocols=("by_unit",), seed=5, shuffled=True))
+    jobs = [
+        Job(protocols=(protocol,), seed=seed, shuffled=shuffled)
+        for protocol, seed, shuffled in kinds
+    ]
     serial, parallel = (run(task, settings, *jobs, n_workers=n) for n in (1, 2))
 
     assert sum(isinstance(result, NoveltyRun) for result in serial) == 9
