@@ -13,5 +13,8 @@ def test_runs_are_counted(config_with):
     config = config_with({"plan.n_records": 2, "operating.duration_s": 0.02})
     plan, stages = make_plan(config), Stages()
     with stages.watching(1024):
-        simulate_records(config, [plan.record(0), plan.record(1)])
+        simulate_records(
+            config,
+            [plan.record(0), plan.record(1)],
+        )
     assert stages.n_runs >= 2

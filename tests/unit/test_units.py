@@ -1,13 +1,13 @@
 """Names with units at the boundary, SI inside."""
 
 import math
-import re
 from dataclasses import dataclass, field, replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
+from refusals import refused
 
 from gensig.errors import ConfigError
 from gensig.units import (
@@ -52,19 +52,33 @@ GOOD = {
 
 
 def shaft(**changes):
-    return read(Shaft, {**GOOD, **changes}, "gear.shaft", name="shaft")
+    return read(
+        Shaft,
+        {**GOOD, **changes},
+        "gear.shaft",
+        name="shaft",
+    )
 
 
-@given(st.sampled_from(sorted(UNITS)), st.floats(-1e9, 1e9))
+@given(
+    st.sampled_from(sorted(UNITS)),
+    st.floats(-1e9, 1e9),
+)
 def test_there_and_back(suffix, value):
     name = f"quantity_{suffix}"
-    assert_allclose(from_si(name, to_si(name, value)), value, rtol=1e-14, atol=1e-300)
+    assert_allclose(
+        from_si(name, to_si(name, value)),
+        value,
+        rtol=1e-14,
+        atol=1e-300,
+    )
 
 
 @given(st.floats(-1e9, 1e9))
 def test_a_name_without_unit_is_taken_as_it_is(value):
-    assert_allclose(
-        [to_si("share", value), from_si("share", value)], value, rtol=0, atol=0
+    assert_array_equal(
+        [to_si("share", value), from_si("share", value)],
+        value,
     )
 
 
@@ -102,12 +116,23 @@ def test_the_longest_suffix_wins(name, parts):
 
 
 def test_read_converts_and_fills():
-    result = shaft(labels=["a", "b"], seats_mm=[1, 2.5], width_mm=4)
-    assert (result.length, result.inertia) == pytest.approx((12.5e-3, 2.0))
-    assert (result.angle, result.width) == pytest.approx((math.pi / 2, 4e-3))
-    assert result.seats == pytest.approx((1e-3, 2.5e-3))
+    result = shaft(
+        labels=["a", "b"],
+        seats_mm=[1, 2.5],
+        width_mm=4,
+    )
+    assert_allclose(
+        (result.length, result.inertia),
+        (12.5e-3, 2.0),
+    )
+    assert_allclose(
+        (result.angle, result.width),
+        (math.pi / 2, 4e-3),
+    )
+    assert_allclose(result.seats, (1e-3, 2.5e-3))
     assert (result.name, result.n_keys, result.hollow) == ("shaft", 2, True)
     assert result.labels == ("a", "b")
+
     empty = shaft(angle_deg=None, seats_mm=None)
     assert empty.angle is empty.seats is empty.width is shaft().seats is None
 
@@ -156,15 +181,18 @@ MISTAKES = [
 ]
 
 
-@pytest.mark.parametrize(("key", "value", "text"), MISTAKES)
+@pytest.mark.parametrize(
+    ("key", "value", "text"),
+    MISTAKES,
+)
 def test_mistakes_are_answered(key, value, text):
-    with pytest.raises(ConfigError, match=re.escape(f"gear.shaft{text}")):
+    with refused(f"gear.shaft{text}"):
         shaft(**{key: value})
 
 
 def test_missing_keys_are_named():
     values = {key: GOOD[key] for key in GOOD if key not in ("length_mm", "n_keys")}
-    with pytest.raises(ConfigError, match=r"gear.shaft: missing length_mm, n_keys"):
+    with refused("gear.shaft: missing length_mm, n_keys"):
         read(Shaft, values, "gear.shaft", name="shaft")
 
 
@@ -175,50 +203,82 @@ FAULTS = [
     (check_ranges, {"seats": (0.05, 0.02)}, "ordered numbers, [low, high], in 0..100"),
     (check_ranges, {"seats": (0.05,)}, "two ordered"),
 ]
-LIMITS = {"length": (1e-3, 0.1), "share": (0.0, 1.0), "seats": (0.0, 0.1)}
+LIMITS = {
+    "length": (1e-3, 0.1),
+    "share": (0.0, 1.0),
+    "seats": (0.0, 0.1),
+}
 
 
-@pytest.mark.parametrize(("check", "changes", "text"), FAULTS)
+@pytest.mark.parametrize(
+    ("check", "changes", "text"),
+    FAULTS,
+)
 def test_checks_name_the_field_in_its_unit(check, changes, text):
     limits = {name: LIMITS[name] for name in changes}
-    with pytest.raises(ConfigError, match=re.escape(text)):
-        check(replace(shaft(), **changes), "gear.", **limits)
+    with refused(text):
+        check(
+            replace(shaft(), **changes),
+            "gear.",
+            **limits,
+        )
 
 
 def test_positive_fields_and_choices_are_named():
-    with pytest.raises(ConfigError, match=r"gear.length_mm = 0 must be positive"):
-        check_positive(replace(shaft(), length=0.0), "gear.", "share", "length")
-    with pytest.raises(ConfigError, match=r"gear.name = 'shaft'; allowed: a, 1"):
+    with refused("gear.length_mm = 0 must be positive"):
+        check_positive(
+            replace(shaft(), length=0.0),
+            "gear.",
+            "share",
+            "length",
+        )
+    with refused("gear.name = 'shaft'; allowed: a, 1"):
         check_choice("gear.name", "shaft", ("a", 1))
 
 
 def test_checks_pass_what_is_allowed():
-    one = replace(shaft(), seats=(0.0, 0.1), angle=None)
-    check_positive(one, "", "length", "angle")
-    check_limits(one, "", length=(one.length, one.length), angle=(0.0, 1.0))
-    check_ranges(one, "", seats=(0.0, 0.1))
-    check_choice("name", one.name, ("shaft",))
+    allowed = replace(
+        shaft(),
+        seats=(0.0, 0.1),
+        angle=None,
+    )
+    check_positive(allowed, "", "length", "angle")
+    check_limits(
+        allowed,
+        "",
+        length=(allowed.length, allowed.length),
+        angle=(0.0, 1.0),
+    )
+    check_ranges(allowed, "", seats=(0.0, 0.1))
+    check_choice("name", allowed.name, ("shaft",))
 
 
 @pytest.mark.parametrize(
     ("values", "text"),
     [
-        ({**GOOD, "kind": "x"}, "gear.part: kind = 'x'; allowed: shaft"),
-        ("shaft", "gear.part: kind = None"),
-        ({**GOOD, "kind": ["shaft"]}, "gear.part: kind = ['shaft']"),
-        ({**GOOD, "kind": "shaft", "name": 3}, "gear.part.name = 3 is not text"),
+        ({"kind": "x"}, "gear.part: kind = 'x'; allowed: shaft"),
+        ({"kind": None}, "gear.part: kind = None"),
+        ({"kind": ["shaft"]}, "gear.part: kind = ['shaft']"),
+        ({"kind": "shaft", "name": 3}, "gear.part.name = 3 is not text"),
     ],
 )
 def test_a_kind_is_read_by_its_name(values, text):
-    kinds = {"shaft": Shaft}
     given = {**GOOD, "name": "a", "kind": "shaft"}
-    assert read_kind(kinds, given, "gear.part") == replace(shaft(), name="a")
-    with pytest.raises(ConfigError, match=re.escape(text)):
-        read_kind(kinds, values, "gear.part")
+
+    def read_part(part):
+        return read_kind({"shaft": Shaft}, part, "gear.part")
+
+    assert read_part(given) == replace(shaft(), name="a")
+    with refused(text):
+        read_part({**GOOD, **values})
+    with refused("kind = None"):
+        read_part("shaft")
 
 
-def test_an_error_without_its_group_gets_a_name():
-    for text, named in (("low", "gear.part: low"), ("gear.x: low", "gear.x: low")):
-        with pytest.raises(ConfigError) as caught, naming("gear.part: "):
-            raise ConfigError(text)
-        assert str(caught.value) == named
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [("low", "gear.part: low"), ("gear.x: low", "gear.x: low")],
+)
+def test_an_error_without_its_group_gets_a_name(text, named):
+    with pytest.raises(ConfigError, match=f"^{named}$"), naming("gear.part: "):
+        raise ConfigError(text)

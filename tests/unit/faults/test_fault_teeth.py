@@ -16,7 +16,16 @@ KEYS = ("compliance", "gap", "compliance_slope", "gap_slope", "present")
 
 
 def some(kind, **changes):
-    return one(kind, **{**FEW.get(kind, {}), **changes})
+    return one(
+        kind,
+        **{**FEW.get(kind, {}), **changes},
+    )
+
+
+@pytest.fixture(scope="module")
+def table_of(xiamen):
+    """Function that returns the mesh table of faults."""
+    return lambda *faults: xiamen.mesh_table(faults)
 
 
 def rows(table, gear, tooth):
@@ -25,47 +34,57 @@ def rows(table, gear, tooth):
 
 
 def assert_same_tooth(table, other, gear, tooth):
-    for key, result, expected in zip(
-        KEYS, rows(table, gear, tooth), rows(other, gear, tooth), strict=True
-    ):
-        assert_allclose(
-            result, expected, rtol=1e-12, atol=1e-18, err_msg=f"{key} of tooth {tooth}"
-        )
+    pairs = zip(
+        rows(table, gear, tooth),
+        rows(other, gear, tooth),
+        strict=True,
+    )
+    for key, (result, expected) in zip(KEYS, pairs, strict=True):
+        name = f"{key} of tooth {tooth}"
+        assert_allclose(result, expected, rtol=1e-12, atol=1e-18, err_msg=name)
+
+
+def changed(side):
+    """Numbers of the teeth that are not sound."""
+    return np.flatnonzero(side.kind).tolist()
 
 
 class TestSeveralTeeth:
     @pytest.mark.parametrize("kind", ALIKE)
-    def test_teeth_alike_share_a_row(self, xiamen, kind):
-        table = xiamen.mesh_table((one(kind, gear="wheel", tooth=[1, 5]),))
-        assert np.flatnonzero(table.wheel.kind).tolist() == [1, 5]
+    def test_teeth_alike_share_a_row(self, table_of, kind):
+        table = table_of(one(kind, gear="wheel", tooth=[1, 5]))
+        assert changed(table.wheel) == [1, 5]
         assert len(table.wheel.compliance) == 2
-        assert_same_tooth(
-            table, xiamen.mesh_table((one(kind, gear="wheel", tooth=5),)), "wheel", 5
-        )
+
+        alone = table_of(one(kind, gear="wheel", tooth=5))
+        assert_same_tooth(table, alone, "wheel", 5)
         assert not table.pinion.kind.any()
 
     @pytest.mark.parametrize("kind", ALIKE)
-    def test_all_is_every_tooth(self, xiamen, kind):
-        table = xiamen.mesh_table((one(kind, tooth="all"),))
-        assert table.pinion.kind.tolist() == [1] * 23
-        assert one(kind, tooth="all").teeth(xiamen.pair.wheel) == tuple(range(84))
+    def test_all_is_every_tooth(self, xiamen, table_of, kind):
+        fault = one(kind, tooth="all")
+        assert table_of(fault).pinion.kind.tolist() == [1] * 23
+        assert fault.teeth(xiamen.pair.wheel) == tuple(range(84))
 
     @pytest.mark.parametrize("gear", GEARS)
-    def test_pits_are_drawn_for_each_tooth(self, xiamen, gear):
-        table = xiamen.mesh_table(
-            (some("distributed_pitting", gear=gear, tooth=[1, 5]),)
+    def test_pits_are_drawn_for_each_tooth(self, table_of, gear):
+        both, alone = (
+            table_of(some("distributed_pitting", gear=gear, tooth=teeth))
+            for teeth in ([1, 5], 5)
         )
-        assert np.unique(side_of(table, gear).kind).tolist() == [0, 1, 2]
-        alone = xiamen.mesh_table((some("distributed_pitting", gear=gear, tooth=5),))
-        assert_same_tooth(table, alone, gear, 5)
-        assert np.abs(rows(table, gear, 1)[0] - rows(table, gear, 5)[0]).max() > 1e-12
+        assert np.unique(side_of(both, gear).kind).tolist() == [0, 1, 2]
+        assert_same_tooth(both, alone, gear, 5)
 
-    def test_runout_moves_every_tooth_differently(self, xiamen):
-        table = xiamen.mesh_table((one("runout", tooth=4),))
+        first, fifth = (rows(both, gear, tooth)[0] for tooth in (1, 5))
+        assert np.abs(first - fifth).max() > 1e-12
+
+    def test_runout_moves_every_tooth_differently(self, xiamen, table_of):
+        table = table_of(one("runout", tooth=4))
         assert sorted(table.pinion.kind.tolist()) == list(range(1, 24))
-        assert faulty_teeth(xiamen.pair, [one("runout", tooth=4, eccentricity_um=0)])[
-            "pinion", 0
-        ] is healthy_tooth(xiamen.pair.pinion)
+
+        nothing = one("runout", tooth=4, eccentricity_um=0)
+        tooth = faulty_teeth(xiamen.pair, [nothing])["pinion", 0]
+        assert tooth is healthy_tooth(xiamen.pair.pinion)
 
     @pytest.mark.parametrize(
         ("tooth", "first", "teeth"),
@@ -89,79 +108,91 @@ class TestSeveralTeeth:
 
 class TestCompound:
     @pytest.mark.parametrize("kind", KINDS)
-    def test_on_different_teeth_each_is_itself(self, xiamen, kind):
+    def test_on_different_teeth_each_is_itself(self, table_of, kind):
         crack, other = one("crack", tooth=2), some(kind, tooth=9)
-        both = xiamen.mesh_table((crack, other))
-        assert_same_tooth(both, xiamen.mesh_table((other,)), "pinion", 9)
+        both = table_of(crack, other)
+        assert_same_tooth(both, table_of(other), "pinion", 9)
         if kind != "runout":  # which is on tooth 2 as well
-            assert_same_tooth(both, xiamen.mesh_table((crack,)), "pinion", 2)
-            assert np.flatnonzero(both.pinion.kind).tolist() == [2, 9]
+            assert_same_tooth(both, table_of(crack), "pinion", 2)
+            assert changed(both.pinion) == [2, 9]
 
     @pytest.mark.parametrize("kind", KINDS)
-    def test_on_both_gears_each_is_itself(self, xiamen, kind):
+    def test_on_both_gears_each_is_itself(self, table_of, kind):
         here, there = one("spalling", tooth=2), some(kind, gear="wheel", tooth=30)
-        both = xiamen.mesh_table((here, there))
-        assert_same_tooth(both, xiamen.mesh_table((here,)), "pinion", 2)
-        assert_same_tooth(both, xiamen.mesh_table((there,)), "wheel", 30)
-        assert np.flatnonzero(both.pinion.kind).tolist() == [2]
+        both = table_of(here, there)
+        assert_same_tooth(both, table_of(here), "pinion", 2)
+        assert_same_tooth(both, table_of(there), "wheel", 30)
+        assert changed(both.pinion) == [2]
 
-    def test_order_on_different_teeth_is_nothing(self, xiamen):
-        faults = (
-            one("crack", tooth=2),
-            one("pitting", tooth=9),
-            one("wear", gear="wheel", tooth="all"),
-        )
-        one_way, other = xiamen.mesh_table(faults), xiamen.mesh_table(faults[::-1])
+    def test_order_on_different_teeth_is_nothing(self, table_of):
+        worn = one("wear", gear="wheel", tooth="all")
+        faults = one("crack", tooth=2), one("pitting", tooth=9), worn
+        one_way, other = table_of(*faults), table_of(*faults[::-1])
         for gear, tooth in (("pinion", 2), ("pinion", 9), ("pinion", 0), ("wheel", 3)):
             assert_same_tooth(one_way, other, gear, tooth)
 
-    def test_a_fault_on_some_of_the_worn_teeth(self, xiamen):
+    def test_a_fault_on_some_of_the_worn_teeth(self, table_of):
         """Teeth to which the same has happened stay one object, whatever came before."""
-        faults = (
+        table = table_of(
             one("wear", tooth="all"),
             one("crack", tooth=[3, 4]),
             one("wear", tooth=[4, 5], wear_depth_um=3),
         )
-        table = xiamen.mesh_table(faults)
-        kind = table.pinion.kind
-        assert len(set(kind.tolist())) == 4
-        assert kind[3] != kind[4] != kind[5]
-        assert len({int(kind[k]) for k in range(23) if k not in (3, 4, 5)}) == 1
-        assert (kind > 0).all()
+        kinds = table.pinion.kind.tolist()
+        assert len(set(kinds)) == 4
 
-    def test_loss_and_deviation_add_to_one_gap(self, xiamen):
+        worn, *others = kinds[2:6]
+        assert len({worn, *others}) == 4
+        assert kinds == [worn] * 3 + others + [worn] * 17
+        assert min(kinds) > 0
+
+    def test_loss_and_deviation_add_to_one_gap(self, xiamen, table_of):
         """Even wear of a misplaced tooth: the gaps add."""
         wear = one("wear", tooth=2, wear_profile=None, wear_depth_um=10)
-        table = xiamen.mesh_table((wear, one("pitch_error", tooth=2)))
+        table = table_of(wear, one("pitch_error", tooth=2))
         gap = rows(table, "pinion", 2)[1]
-        result = np.interp(xiamen.pair.pitch_point, table.position, gap)
-        assert result == pytest.approx(30e-6, rel=1e-9)
+        result = np.interp(
+            xiamen.pair.pitch_point,
+            table.position,
+            gap,
+        )
 
-    def test_a_cracked_missing_tooth_is_missing(self, xiamen):
-        for faults in (
-            (one("missing_tooth"), one("crack")),
-            (one("pitting"), one("missing_tooth")),
-        ):
-            table = xiamen.mesh_table(faults)
-            assert not table.pinion.present[table.pinion.kind[0]]
+        assert_allclose(result, 30e-6)
+
+    @pytest.mark.parametrize(
+        "kinds",
+        [("missing_tooth", "crack"), ("pitting", "missing_tooth")],
+    )
+    def test_a_cracked_missing_tooth_is_missing(self, table_of, kinds):
+        pinion = table_of(*map(one, kinds)).pinion
+        assert not pinion.present[pinion.kind[0]]
 
     def test_two_cracks_on_one_tooth(self, xiamen, machine):
-        tension, compression = (
-            one("crack", crack_depth_mm=0.8),
-            one("crack", crack_depth_mm=0.8, crack_side="compression"),
+        cracks = tuple(
+            one("crack", crack_depth_mm=0.8, crack_side=side)
+            for side in ("tension", "compression")
         )
-        both = faulty_teeth(xiamen.pair, (tension, compression))["pinion", 0]
+        both = faulty_teeth(xiamen.pair, cracks)["pinion", 0]
         assert [crack.side for crack in both.cracks] == ["tension", "compression"]
         for system in (xiamen, machine({"mesh.crack": "paper"})):
             two, single = (
-                system.mesh_table(own) for own in ((tension, compression), (tension,))
+                rows(system.mesh_table(faults), "pinion", 0)[0]
+                for faults in (cracks, cracks[:1])
             )
-            assert np.all(rows(two, "pinion", 0)[0] > rows(single, "pinion", 0)[0])
+            assert np.all(two > single)
 
-    def test_the_configuration_says_the_same(self, xiamen):
-        missing = {"kind": "missing_tooth", "gear": "wheel", "tooth": [7]}
-        parts = [{**option("crack"), "tooth": 2}, missing]
-        table = xiamen.mesh_table(read_faults({"kind": "compound", "parts": parts}))
-        assert np.flatnonzero(table.pinion.kind).tolist() == [2]
-        assert np.flatnonzero(table.wheel.kind).tolist() == [7]
+    def test_the_configuration_says_the_same(self, table_of):
+        missing = {
+            "kind": "missing_tooth",
+            "gear": "wheel",
+            "tooth": [7],
+        }
+        parts = [
+            {**option("crack"), "tooth": 2},
+            missing,
+        ]
+        table = table_of(*read_faults({"kind": "compound", "parts": parts}))
+
+        assert changed(table.pinion) == [2]
+        assert changed(table.wheel) == [7]
         assert table.wheel.present.tolist() == [True, False]

@@ -4,8 +4,9 @@ classes."""
 from dataclasses import replace
 
 import pytest
+from numpy.testing import assert_allclose
+from refusals import refused
 
-from gensig.errors import ConfigError
 from gensig.life.root.strength import (
     Strength,
     life_factor,
@@ -20,7 +21,11 @@ from gensig.units import read
 
 @pytest.fixture(scope="module")
 def strength():
-    return read(Strength, compose("generate", [])["strength"], "strength")
+    return read(
+        Strength,
+        compose("generate", [])["strength"],
+        "strength",
+    )
 
 
 def safe(strength, stress=349.39e6, **changes):
@@ -42,28 +47,47 @@ def safe(strength, stress=349.39e6, **changes):
 )
 def test_every_factor_is_a_factor(strength, key):
     base = safe(strength, **{key: 1.0})
-    assert safe(strength, **{key: 0.8}).iso == pytest.approx(0.8 * base.iso, rel=1e-12)
+    assert_allclose(
+        safe(strength, **{key: 0.8}).iso,
+        0.8 * base.iso,
+    )
     assert safe(strength, **{key: 0.8}).paper == base.paper
 
 
 def test_life_factor():
     ends = [life_factor(n) for n in (1e2, 1e3, 3e6, 1e10, 1e12)]
-    assert ends == pytest.approx([2.5, 2.5, 1.0, 0.85, 0.85])
+    assert_allclose(ends, [2.5, 2.5, 1.0, 0.85, 0.85])
     # its lines as the standard writes them
-    assert life_factor(1e5) == pytest.approx((3e6 / 1e5) ** 0.115, rel=5e-3)
-    assert life_factor(3.6e8) == pytest.approx((3e6 / 3.6e8) ** 0.02, rel=5e-3)
-    assert life_factor(3.6e8) == pytest.approx(0.9, rel=0.02)  # the paper's K_FN there
+    assert_allclose(
+        life_factor(1e5),
+        (3e6 / 1e5) ** 0.115,
+        rtol=5e-3,
+    )
+    assert_allclose(
+        life_factor(3.6e8),
+        (3e6 / 3.6e8) ** 0.02,
+        rtol=5e-3,
+    )
+    assert_allclose(life_factor(3.6e8), 0.9, rtol=0.02)  # the paper's K_FN there
 
 
 def test_notch_and_size():
-    sharp, reference, blunt = map(relative_notch_sensitivity, (1.5, 2.5, 4.0))
+    sharp, reference, blunt = map(
+        relative_notch_sensitivity,
+        (1.5, 2.5, 4.0),
+    )
     assert 0.98 < sharp < reference == 1.0 < blunt < 1.02
     factors = [size_factor(module) for module in (1e-3, 5e-3, 12e-3, 25e-3, 40e-3)]
-    assert factors == pytest.approx([1.0, 1.0, 0.93, 0.8, 0.8])
+    assert_allclose(factors, [1.0, 1.0, 0.93, 0.8, 0.8])
 
 
 def test_reliability_classes():
-    classes = {2.0: "high", 1.6: "higher", 1.25: "general", 1.0: "low"}
+    classes = {
+        2.0: "high",
+        1.6: "higher",
+        1.25: "general",
+        1.0: "low",
+    }
     assert {least: reliability(least) for least in classes} == classes
     assert [reliability(value) for value in (1.59, 0.99)] == ["general", "below low"]
 
@@ -73,8 +97,8 @@ def test_load_factors(strength):
         strength, application_factor=1.25, dynamic_factor=1.1, face_load_factor=1.3
     )
     assert strength.load_factor == strength.force_factor == 1.0
-    assert loaded.force_factor == pytest.approx(1.375)
-    assert loaded.load_factor == pytest.approx(1.7875)
+    assert_allclose(loaded.force_factor, 1.375)
+    assert_allclose(loaded.load_factor, 1.7875)
 
 
 def test_every_option_is_a_strength():
@@ -85,7 +109,7 @@ def test_every_option_is_a_strength():
 
 
 def test_factors_and_stresses_must_be_positive(strength):
-    with pytest.raises(ConfigError, match=r"life_factor = -1 must be positive"):
+    with refused("life_factor = -1 must be positive"):
         replace(strength, life_factor=-1)
-    with pytest.raises(ConfigError, match="must be positive"):
+    with refused("must be positive"):
         safe(strength, 0.0)

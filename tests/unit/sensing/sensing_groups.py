@@ -2,7 +2,7 @@
 
 import copy
 
-import numpy as np
+from numpy.random import default_rng
 
 from gensig.plan.request import read_request
 from gensig.sensing.instrument import draw_instrument
@@ -27,10 +27,10 @@ def changed(group, changes):
 
 
 def instrument(group, seed=0):
-    streams = [np.random.default_rng(seed + k) for k in range(2)]
+    streams = [default_rng(seed + k) for k in range(2)]
     return draw_instrument(read_sensing(group), *streams)
 
 
 def source(sensing, n_samples=51_200):
-    rng = np.random.default_rng(9)
+    rng = default_rng(9)
     return rng.standard_normal((len(sensing.channels), sensing.n_lead + n_samples))

@@ -1,6 +1,7 @@
 """An encoder: steps of one line, an error once a turn, a pattern of its own."""
 
 from dataclasses import replace
+from math import tau
 
 import numpy as np
 import pytest
@@ -32,37 +33,57 @@ def test_a_perfect_one_is_behind_by_at_most_a_line():
     disc = disc_of(PERFECT)
     read = disc.read(ANGLE, quantised=True)
     off = error(PERFECT)
+
     assert off.max() <= 1e-9
     assert off.min() > -PERFECT.spacing * (1.0 + 1e-9)
-    assert_allclose(read / PERFECT.spacing, np.rint(read / PERFECT.spacing), atol=1e-8)
+    assert_allclose(
+        read / PERFECT.spacing,
+        np.rint(read / PERFECT.spacing),
+        atol=1e-8,
+    )
     assert np.all(np.diff(read) >= -1e-12)
-    assert_allclose(off.std(), PERFECT.spacing / np.sqrt(12.0), rtol=0.02)
+    assert_allclose(
+        off.std(),
+        PERFECT.spacing / np.sqrt(12.0),
+        rtol=0.02,
+    )
 
 
 def test_without_quantisation_a_perfect_one_is_exact():
-    assert_allclose(error(replace(PERFECT, quantised=False)), 0.0, atol=1e-9)
+    assert_allclose(
+        error(replace(PERFECT, quantised=False)),
+        0.0,
+        atol=1e-9,
+    )
 
 
 @pytest.mark.parametrize("quantised", [True, False])
 def test_errors_are_bounded_by_line_and_errors(quantised):
-    encoder = replace(
-        PERFECT,
-        eccentricity_error=np.radians(1.0),
-        line_error=np.radians(0.03),
-        quantised=quantised,
-    )
-    for seed in range(20):
-        off = error(encoder, seed)
-        most = np.radians(1.0) + 4.0 * np.radians(0.03)
-        assert off.max() <= most * (1 + 1e-9)
-        assert off.min() >= -most - (encoder.spacing if quantised else 0.0) - 1e-9
-        assert np.all(np.diff(off + ANGLE) >= -1e-12)  # never backwards
+    eccentricity, line = np.radians([1.0, 0.03])
+    errors = {"eccentricity_error": eccentricity, "line_error": line}
+    encoder = replace(PERFECT, quantised=quantised, **errors)
+    most = (eccentricity + 4.0 * line) * (1 + 1e-9)
+    off = np.array([error(encoder, seed) for seed in range(20)])
+
+    assert off.max() <= most
+    assert off.min() >= -most - quantised * encoder.spacing
+    assert np.all(np.diff(off + ANGLE) >= -1e-12)  # never backwards
 
 
 def test_eccentricity_errs_once_a_turn():
-    encoder = replace(PERFECT, eccentricity_error=np.radians(1.0), quantised=False)
-    turn = np.linspace(0.0, 6.0 * np.pi, 6000, endpoint=False)  # three turns
+    encoder = replace(
+        PERFECT,
+        eccentricity_error=np.radians(1.0),
+        quantised=False,
+    )
+    turn = np.linspace(
+        0.0,
+        6.0 * np.pi,
+        6000,
+        endpoint=False,
+    )  # three turns
     largest = []
+
     for seed in range(60):
         spectrum = 2.0 * np.abs(np.fft.rfft(error(encoder, seed, turn))) / len(turn)
         # (e/R)^2: reading and place are not the same
@@ -73,13 +94,23 @@ def test_eccentricity_errs_once_a_turn():
 
 
 def test_the_pattern_repeats_every_turn_and_is_each_discs_own():
-    encoder = replace(PERFECT, line_error=np.radians(0.02), quantised=False)
-    turn = np.linspace(0.0, 2.0 * np.pi, 5000, endpoint=False)
+    encoder = replace(
+        PERFECT,
+        line_error=np.radians(0.02),
+        quantised=False,
+    )
+    turn = np.linspace(0.0, tau, 5000, endpoint=False)
     first, later = error(encoder, 3, turn), error(encoder, 3, turn + 6.0 * np.pi)
+
     assert_allclose(first, later, atol=1e-9)
     assert abs(np.corrcoef(first, error(encoder, 4, turn))[0, 1]) < 0.1
+
     off = disc_of(encoder).line_angles - encoder.spacing * np.arange(1000)
-    assert_allclose(np.std(off), np.radians(0.02), rtol=0.1)
+    assert_allclose(
+        np.std(off),
+        np.radians(0.02),
+        rtol=0.1,
+    )
 
 
 def test_lines_pass_in_order_at_the_largest_errors():
@@ -88,12 +119,29 @@ def test_lines_pass_in_order_at_the_largest_errors():
     )
     for seed in range(50):
         line_angles = disc_of(encoder, seed).line_angles
-        assert np.all(np.diff([*line_angles, line_angles[0] + 2.0 * np.pi]) > 0.0)
+        assert np.all(np.diff([*line_angles, line_angles[0] + tau]) > 0.0)
 
 
 def test_a_line_is_read_where_it_passes():
-    disc = Disc(index=0.5, line_angles=np.array([0.1, np.pi / 2, np.pi, 3 * np.pi / 2]))
-    turned = [0.0, 0.05, 0.11, np.pi - 0.01, np.pi + 0.01, 2 * np.pi + 0.05]
-    angle = 0.5 + np.array([*turned, 2 * np.pi + 0.11])
-    expected = np.pi / 2 * np.array([-1, -1, 0, 1, 2, 3, 4])
-    assert_allclose(disc.read(angle, quantised=True), expected, atol=1e-12)
+    disc = Disc(
+        index=0.5,
+        line_angles=np.array([0.1, np.pi / 2, np.pi, 3 * np.pi / 2]),
+    )
+    turned = [
+        0.0,
+        0.05,
+        0.11,
+        np.pi - 0.01,
+        np.pi + 0.01,
+        tau + 0.05,
+        tau + 0.11,
+    ]
+    read = disc.read(
+        0.5 + np.array(turned),
+        quantised=True,
+    )
+    assert_allclose(
+        read / (np.pi / 2),
+        [-1, -1, 0, 1, 2, 3, 4],
+        atol=1e-12,
+    )

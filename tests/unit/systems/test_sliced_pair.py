@@ -5,15 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closeness import assert_close
+from refusals import refused
 
-from gensig.errors import ConfigError
 from gensig.mesh.modification import FlankModification
 from gensig.plan.request import read_request
 from gensig.systems.flank_optimum import N_VARIABLES, Cases, judge, optimise, unpacked
 from gensig.systems.registry import read_sliced_pair, read_system
 
 COUPLING = ["mesh.contact=linear", "mesh.slice_coupling=independent"]
-ALIGNED = Cases(torques=(178.0,), misalignments=(0.0,))
+ALIGNED = Cases(
+    torques=(178.0,),
+    misalignments=(0.0,),
+)
 
 
 def pair_of(*words):
@@ -22,15 +25,20 @@ def pair_of(*words):
 
 @pytest.fixture(scope="module")
 def helical():
-    return pair_of("mesh.n_slices=12", *COUPLING)
+    return pair_of("mesh.n_slices=8", *COUPLING)
 
 
 def test_harmonics_and_shares_are_those_of_the_curve(helical):
     result = helical.transmission_error()
     phase = np.arange(64) / 64
     first = 2 * np.abs(np.mean(result.error * np.exp(-2j * np.pi * phase)))
+
     assert_close(result.harmonics[0], first, 1e-9)
-    assert_close(result.load_share.sum(axis=1), 1.0, 1e-9)
+    assert_close(
+        result.load_share.sum(axis=1),
+        1.0,
+        1e-9,
+    )
     assert 0.9 < result.bearing <= 1.0
 
 
@@ -50,6 +58,7 @@ def test_the_modifications_of_the_paper_lower_the_ripple():
         "beihang_even_load": (171.2e3, 0.89),
         "beihang_both": (172.1e3, 0.84),
     }
+
     for name, (line_load, ratio) in expected.items():
         modification = pair_of(f"modification={name}").modification
         judged = judge(system, modification, ALIGNED)
@@ -58,7 +67,10 @@ def test_the_modifications_of_the_paper_lower_the_ripple():
 
 
 def test_the_worst_case_counts(helical):
-    wide = Cases(torques=(60.0, 178.0), misalignments=(-5e-6, 0.0, 5e-6))
+    wide = Cases(
+        torques=(60.0, 178.0),
+        misalignments=(-5e-6, 0.0, 5e-6),
+    )
     cases = [
         Cases(torques=(torque,), misalignments=(askew,))
         for torque in wide.torques
@@ -66,6 +78,7 @@ def test_the_worst_case_counts(helical):
     ]
     single = [judge(helical, helical.modification, case) for case in cases]
     worst = judge(helical, helical.modification, wide)
+
     assert worst.ripple == max(each.ripple for each in single)
     assert worst.line_load == max(each.line_load for each in single)
 
@@ -73,7 +86,7 @@ def test_the_worst_case_counts(helical):
 def test_a_short_search_beats_plain_flanks_and_repeats(helical):
     plain = judge(helical, helical.modification, ALIGNED)
     first, second = (
-        optimise(helical, ALIGNED, n_front=1, seed=3, generations=4) for _ in range(2)
+        optimise(helical, ALIGNED, n_front=1, seed=3, generations=2) for _ in range(2)
     )
     assert first == second
     assert len(first) == 1
@@ -81,9 +94,13 @@ def test_a_short_search_beats_plain_flanks_and_repeats(helical):
 
 
 def test_a_front_trades_ripple_for_load(helical):
-    askew = Cases(torques=(178.0,), misalignments=(5.2e-6,))
-    front = optimise(helical, askew, n_front=3, seed=0, generations=3)
+    askew = Cases(
+        torques=(178.0,),
+        misalignments=(5.2e-6,),
+    )
+    front = optimise(helical, askew, n_front=3, seed=0, generations=2)
     values = np.array([(each.ripple, each.line_load) for each in front])
+
     assert len(front) >= 2
     assert np.all(np.diff(values[:, 0]) > 0)
     assert np.all(np.diff(values[:, 1]) < 0)
@@ -109,7 +126,7 @@ RELIEF, HEIGHT = "tip_relief_um=3", "tip_relief_height_mm"
                 "operating.torque_nm=0",
                 "gear.helix_angle_deg=10",
             ],
-            rf"^modification.wheel.{HEIGHT} = 0: a relief of 3 um needs a length",
+            f"modification.wheel.{HEIGHT} = 0: a relief of 3 um needs a length",
         ),
         (
             [f"modification.pinion.{RELIEF}", f"modification.pinion.{HEIGHT}=9"],
@@ -122,10 +139,10 @@ RELIEF, HEIGHT = "tip_relief_um=3", "tip_relief_height_mm"
     ],
 )
 def test_refusals_of_a_spur_pair(words, message):
-    with pytest.raises(ConfigError, match=message):
+    with refused(message):
         read_system(read_request(words).config)
 
 
 def test_cases_need_positive_torques():
-    with pytest.raises(ConfigError, match="must be positive"):
+    with refused("must be positive"):
         Cases(torques=(0.0,), misalignments=(0.0,))

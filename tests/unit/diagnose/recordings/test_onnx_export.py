@@ -20,29 +20,51 @@ onnxruntime = pytest.importorskip("onnxruntime", reason="extra onnx")
 pytest.importorskip("onnxscript", reason="extra onnx")
 
 
+DESCRIBED = (
+    "temperature",
+    "sampling_rate_hz",
+    "window_samples",
+    "stride_samples",
+    "class_names",
+    "channel_names",
+)
+
+
 def exporting(model, file):
-    return ["export", "--to", "onnx", "--model", str(model), "--out", str(file)]
+    return [
+        "export",
+        "--to",
+        "onnx",
+        "--model",
+        str(model),
+        "--out",
+        str(file),
+    ]
 
 
 def session_of(file):
     return onnxruntime.InferenceSession(str(file), providers=["CPUExecutionProvider"])
 
 
-def check_metadata(file, description):
+def check_metadata(session, description):
     """The file describes the network and takes any number of windows."""
-    stored = session_of(file).get_modelmeta().custom_metadata_map
+    stored = session.get_modelmeta().custom_metadata_map
     assert stored.pop("normalise").startswith(description.normalise)
-    for name in ("temperature", "sampling_rate_hz", "window_samples", "stride_samples"):
-        assert json.loads(stored[name]) == getattr(description, name)
-    for name in ("class_names", "channel_names"):
-        assert json.loads(stored[name]) == list(getattr(description, name))
+    for name in DESCRIBED:
+        expected = getattr(description, name)
+        if isinstance(expected, tuple):
+            expected = list(expected)
+        assert json.loads(stored[name]) == expected
     assert json.loads(stored["n_teeth"]) == [23, 84]
-    (given,) = onnx.load(file).graph.input
-    sizes = [size.dim_value for size in given.type.tensor_type.shape.dim]
-    assert sizes == [0, 2, 1200]
+    (given,) = session.get_inputs()
+    assert isinstance(given.shape[0], str)
+    assert given.shape[1:] == [2, 1200]
 
 
-@pytest.mark.parametrize("network", ["levels_model", "model=wdcnn", "model=spectrum"])
+@pytest.mark.parametrize(
+    "network",
+    ["levels_model", "model=wdcnn", "model=spectrum"],
+)
 def test_the_file_answers_like_torch(
     network, two_channels, train_network, request, tmp_path, capsys
 ):
@@ -52,19 +74,25 @@ def test_the_file_answers_like_torch(
         folder = request.getfixturevalue(network)
     file = tmp_path / "m.onnx"
     assert len(says(capsys, *exporting(folder, file)).strip().splitlines()) == 1
-    assert [path.name for path in tmp_path.iterdir()] == ["m.onnx"]
+    assert list(tmp_path.iterdir()) == [file]
+
     model, description = load_model(folder)
     task = task_on(two_channels, 1200, 1000, description.normalise)
+    record, start = np.array([90]), np.array([0])
     stop = np.array([two_channels.n_samples])
-    whole = Segments(record=np.array([90]), start=np.array([0]), stop=stop)
-    windows = load_windows(task, whole)
+    windows = load_windows(
+        task,
+        Segments(record=record, start=start, stop=stop),
+    )
     signal = two_channels.signals(90)
     raw = np.stack([signal[:, start : start + 1200] for start in windows.start])
     # an offset counts for nothing
     inputs = {"acceleration": raw + np.float32(0.25)}
-    (result,) = session_of(file).run(None, inputs)
-    assert_allclose(result, predict_windows(model, windows), rtol=0, atol=1e-4)
-    check_metadata(file, description)
+    session = session_of(file)
+    (result,) = session.run(None, inputs)
+    assert_allclose(result, predict_windows(model, windows), atol=1e-4)
+
+    check_metadata(session, description)
 
 
 def test_a_file_that_answers_otherwise_is_removed(model, tmp_path, capsys, monkeypatch):
@@ -74,6 +102,7 @@ def test_a_file_that_answers_otherwise_is_removed(model, tmp_path, capsys, monke
 
     monkeypatch.setattr(onnx_export, "RawWindows", Louder)
     file = tmp_path / "m.onnx"
+
     refuses(capsys, exporting(model, file), "answered unlike torch by 0.001")
     assert not file.exists()
 
@@ -87,6 +116,7 @@ def test_a_failed_export_leaves_no_file(model, tmp_path, capsys, monkeypatch):
 
     monkeypatch.setattr(torch.onnx, "export", stopped)
     message = "cannot be written as ONNX: no such operator"
+
     refuses(capsys, exporting(model, file), message)
     assert not file.exists()
 
@@ -94,14 +124,14 @@ def test_a_failed_export_leaves_no_file(model, tmp_path, capsys, monkeypatch):
 def test_mistakes_are_one_line(model, tmp_path, capsys):
     there = tmp_path / "there.onnx"
     there.write_text("mine")
-    for words, message in [
-        (exporting(model, tmp_path / "m.pt"), "the name must end in .onnx"),
-        (exporting(model, there), "exists; choose another"),
-        (exporting(model, tmp_path / "none" / "m.onnx"), "there is no folder"),
-        (exporting(tmp_path, tmp_path / "m.onnx"), "holds no model.json"),
-        (["export", "--to", "tflite"], "tflite is not one of onnx"),
-    ]:
-        refuses(capsys, words, message)
+    for folder, name, message in (
+        (model, "m.pt", "the name must end in .onnx"),
+        (model, there, "exists; choose another"),
+        (model, "none/m.onnx", "there is no folder"),
+        (tmp_path, "m.onnx", "holds no model.json"),
+    ):
+        refuses(capsys, exporting(folder, tmp_path / name), message)
+    refuses(capsys, ["export", "--to", "tflite"], "tflite is not one of onnx")
     assert there.read_text() == "mine"
 
 

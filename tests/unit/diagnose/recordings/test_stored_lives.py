@@ -8,6 +8,7 @@ import pytest
 from fake_dataset import FakeDataset
 from fake_lives import FakeLives
 from numpy.testing import assert_allclose
+from refusals import refused
 from runs import metrics_of, model_of, refuses, rows_of, says, serve
 
 from diagnose.scoring.life_scores import MEASURES
@@ -44,14 +45,22 @@ def test_every_network_is_stored_without_pickle(life_study, models):
     for folder in folders:
         names = {path.name for path in folder.iterdir()}
         assert names == {"model.json", "model.safetensors"}
+
     facts = load_life_model(folders[1])[2]
     assert facts.told == ("speed_rpm", "torque_nm", "life_time_h")
     assert facts.told_range["torque_nm"] == (20.0, 20.0)
 
 
+@pytest.fixture(scope="module")
+def rows(life_study):
+    """Rows of the report's predictions by method."""
+    stored = rows_of(life_study / "predictions.csv")
+    return {name: [row for row in stored if row["method"] == name] for name in METHODS}
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_evaluate_on_its_test_part_repeats_the_report(
-    method, life_study, models, lives, monkeypatch, capsys, tmp_path
+    method, life_study, rows, models, lives, monkeypatch, capsys, tmp_path
 ):
     serve(monkeypatch, {"lives": lives})
     out = tmp_path / "judged"
@@ -59,97 +68,144 @@ def test_evaluate_on_its_test_part_repeats_the_report(
     printed = says(capsys, "evaluate", *words)
     result = metrics_of(out)
     reported = metrics_of(life_study)["protocols"]["by_unit"]
+    expected = reported["methods"][method]
+
     for measure in MEASURES:
-        expected = reported["methods"][method][measure]
-        assert result[measure] == pytest.approx(expected, rel=1e-5, abs=1e-9), measure
         assert measure in printed
+        score = pytest.approx(
+            expected[measure],
+            rel=1e-5,
+            abs=1e-9,
+        )
+        assert result[measure] == score, measure
     assert result["n_lives"] == reported["n_lives"]["test"]
     assert f"{result['n_lives']} lives that failed" in printed
-    rows = rows_of(life_study / "predictions.csv")
-    rows = [row for row in rows if row["method"] == method]
+
     repeated = rows_of(out / "predictions.csv")
-    assert [row["record_id"] for row in repeated] == [row["record_id"] for row in rows]
-    for end in ("predicted_h", "low_h", "high_h"):
-        found, expected = (
-            [float(row[end]) for row in these] for these in (repeated, rows)
-        )
-        assert_allclose(found, expected, rtol=1e-4, atol=1e-4)
+    for before, after in zip(rows[method], repeated, strict=True):
+        assert after["record_id"] == before["record_id"]
+        for end in ("predicted_h", "low_h", "high_h"):
+            hours = pytest.approx(
+                float(before[end]),
+                rel=1e-4,
+                abs=1e-4,
+            )
+            assert float(after[end]) == hours
     assert (out / "remaining_life.png").is_file()
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_predict_says_of_a_file_what_the_report_says_of_its_record(
-    method, life_study, models, lives, recorded, capsys
+    method, rows, models, lives, recorded, capsys
 ):
-    rows = rows_of(life_study / "predictions.csv")
-    row = [row for row in rows if row["method"] == method][11]
+    row = rows[method][11]
     record = int(row["record_id"][1:])
-    file = recorded(lives.signals(record))
-    words = ["predict", "--model", models[method], file]
+    words = [
+        "predict",
+        "--model",
+        models[method],
+        recorded(lives.signals(record)),
+    ]
     words += conditions(lives, record, method)
     result = json.loads(says(capsys, *words, "--json"))
+
     for key in ("remaining_life_h", "low_h", "high_h"):
         expected = float(row[key.replace("remaining_life", "predicted")])
-        assert_allclose(result[key], expected, rtol=1e-4, atol=1e-3)
+        assert_allclose(
+            result[key],
+            expected,
+            rtol=1e-4,
+            atol=1e-3,
+        )
+
     mean = np.mean([window["remaining_life_h"] for window in result["windows"]])
     assert result["low_h"] <= mean <= result["early_life_h"]
-    (line,) = says(capsys, *words).strip().splitlines()
-    answer = r"mine\.npz: .* h (left|or longer), 80% interval .* to .* h"
-    assert re.search(answer, line), line
+
+    line = says(capsys, *words).strip()
+    assert re.fullmatch(
+        r".*mine\.npz: .* h (left|or longer), 80% interval .* to .* h.*",
+        line,
+    )
 
 
 def test_a_load_or_an_age_that_was_never_trained_raises_the_flag(
     models, lives, recorded, capsys
 ):
-    words = ["predict", "--model", models["cnn_and_age"], recorded(lives.signals(0))]
+    words = [
+        "predict",
+        "--model",
+        models["cnn_and_age"],
+        recorded(lives.signals(0)),
+    ]
     words += ["--speed-rpm", "1800", "--torque-nm"]
-    line = says(capsys, *words, "80", "--life-time-h", "9000", status=3)
+    line = says(
+        capsys,
+        *words,
+        "80",
+        "--life-time-h",
+        "9000",
+        status=3,
+    )
+
     assert "80 N m is outside the 20 to 20 N m of the training" in line
     assert "9000 h is outside" in line
+
     says(capsys, *words, "20", "--life-time-h", "10")
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ("--speed-rpm 1800 --torque-nm 20", "must know life_time_h of "),
-        ("--speed-rpm 1800 --life-time-h 9", "must know torque_nm of "),
-        ("--torque-nm 20 --life-time-h 9", "must know the speed of "),
-        ("--speed-rpm 1800 --torque-nm -1", "--torque-nm -1 must be 0 or above"),
-        ("--speed-rpm 1800 --torque-nm nan", "--torque-nm nan must be 0 or above"),
-    ],
-)
-def test_what_the_network_must_know_is_asked_in_one_line(
-    options, message, models, lives, recorded, capsys
+REFUSED = [
+    ("--speed-rpm 1800 --torque-nm 20", "must know life_time_h of "),
+    ("--speed-rpm 1800 --life-time-h 9", "must know torque_nm of "),
+    ("--torque-nm 20 --life-time-h 9", "must know the speed of "),
+    ("--speed-rpm 1800 --torque-nm -1", "--torque-nm -1 must be 0 or above"),
+    ("--speed-rpm 1800 --torque-nm nan", "--torque-nm nan must be 0 or above"),
+]
+
+
+def test_what_the_network_must_know_and_does_not_take_is_said_in_one_line(
+    models, lives, recorded, capsys
 ):
     file = recorded(lives.signals(0))
-    words = ["predict", "--model", models["cnn_and_age"], file, *options.split()]
-    refuses(capsys, words, message)
+    for options, message in REFUSED:
+        words = [
+            "--model",
+            models["cnn_and_age"],
+            file,
+            *options.split(),
+        ]
+        refuses(capsys, ["predict", *words], message)
 
-
-def test_what_the_network_does_not_take_is_refused(models, lives, recorded, capsys):
-    words = ["predict", "--model", models["cnn"], recorded(lives.signals(0))]
-    words += conditions(lives, 0, "cnn_and_age")
-    refuses(capsys, words, "--life-time-h: cnn is not told life_time_h")
+    words = [
+        "--model",
+        models["cnn"],
+        file,
+        *conditions(lives, 0, "cnn_and_age"),
+    ]
+    message = "--life-time-h: cnn is not told life_time_h"
+    refuses(capsys, ["predict", *words], message)
 
 
 def test_another_data_set_is_judged_whole_and_one_without_lives_or_classes_refused(
     models, monkeypatch, capsys
 ):
-    offered = {}
+    offered = {"other": FakeLives(n_lives=6, seed=5)}
     serve(monkeypatch, offered)
     words = ["evaluate", "data=other", f"model_dir={models['cnn']}"]
-    offered["other"] = FakeLives(n_lives=6, seed=5)
     printed = says(capsys, *words)
+
     assert "48 records of 6 lives that failed (and 0 censored): all records" in printed
-    two = FakeDataset(classes=("healthy", "crack"))
-    without = FakeLives(n_lives=6).without("torque_nm")
-    for dataset, message in (
-        (FakeDataset(), "has no column life_id"),
-        (two, "its classes are healthy, crack, the model was trained on missing"),
-        (without, "which is told torque_nm: it has no such column"),
-        (FakeLives(n_lives=6, n_censored=6), "no life failed"),
-    ):
+
+    refused = {
+        "has no column life_id": FakeDataset(),
+        "its classes are healthy, crack, the model was trained on missing": FakeDataset(
+            classes=("healthy", "crack")
+        ),
+        "which is told torque_nm: it has no such column": FakeLives(n_lives=6).without(
+            "torque_nm"
+        ),
+        "no life failed": FakeLives(n_lives=6, n_censored=6),
+    }
+    for message, dataset in refused.items():
         offered["other"] = dataset
         refuses(capsys, words, message)
 
@@ -157,15 +213,26 @@ def test_another_data_set_is_judged_whole_and_one_without_lives_or_classes_refus
 def test_classifiers_and_networks_of_lives_are_not_confused(
     models, model, lives, recorded, capsys, tmp_path
 ):
-    with pytest.raises(DatasetError, match="says remaining lives and is no classifier"):
+    with refused("says remaining lives and is no classifier", DatasetError):
         load_model(models["cnn"])
-    with pytest.raises(
-        DatasetError, match="is a classifier and says no remaining life"
-    ):
+    with refused("is a classifier and says no remaining", DatasetError):
         load_life_model(model)
-    file = recorded(lives.signals(0))
-    words = ["adapt", "--model", models["cnn"], "--healthy", file, "--method", "adabn"]
-    refuses(capsys, [*words, "--out", str(tmp_path / "moved")], "is no classifier")
+
+    file, out = recorded(lives.signals(0)), tmp_path / "moved"
+    words = [
+        "--model",
+        models["cnn"],
+        "--healthy",
+        file,
+        "--out",
+        out,
+    ]
+    refuses(
+        capsys,
+        ["adapt", *words, "--method", "adabn"],
+        "is no classifier",
+    )
+
     words = ["predict", "--model", model, file, "--torque-nm", "20"]
     refuses(capsys, words, "--torque-nm is for models of remaining life")
 
@@ -185,9 +252,7 @@ def test_a_wrong_description_is_refused(change, models, tmp_path):
     content = description_of(models["cnn"])
     content["remaining_life"] |= change
     (tmp_path / "model.json").write_text(json.dumps(content))
-    with pytest.raises(
-        DatasetError, match="does not describe a model of remaining lives"
-    ):
+    with refused("does not describe a model of remaining lives", DatasetError):
         load_life_model(tmp_path)
 
 
@@ -196,7 +261,7 @@ def test_weights_of_another_network_are_refused(life_study, tmp_path):
     for method, name in zip(METHODS, ("model.json", "model.safetensors"), strict=True):
         content = (folders / f"by_unit-{method}-seed0" / name).read_bytes()
         (tmp_path / name).write_bytes(content)
-    with pytest.raises(DatasetError, match="does not fit"):
+    with refused("does not fit", DatasetError):
         load_life_model(tmp_path)
 
 
@@ -206,17 +271,37 @@ def test_the_onnx_file_gives_the_same_hours(models, lives, recorded, capsys, tmp
     onnxruntime = pytest.importorskip("onnxruntime", reason="extra onnx")
     record, file, model = 5, str(tmp_path / "life.onnx"), models["cnn_and_age"]
     words = ["export", "--to", "onnx", "--model", model, "--out", file]
+
     assert "of the early level of torch's" in says(capsys, *words)
-    words = ["predict", "--model", model, recorded(lives.signals(record)), "--json"]
-    answer = says(capsys, *words, *conditions(lives, record, "cnn_and_age"))
+
+    signal = lives.signals(record)
+    words = ["predict", "--model", model, recorded(signal), "--json"]
+    answer = says(
+        capsys,
+        *words,
+        *conditions(lives, record, "cnn_and_age"),
+    )
+    expected = json.loads(answer)["remaining_life_h"]
+
     session = onnxruntime.InferenceSession(file, providers=["CPUExecutionProvider"])
     stored = session.get_modelmeta().custom_metadata_map
     columns = json.loads(stored["told"])
     assert columns == ["speed_rpm", "torque_nm", "life_time_h"]
-    windows = lives.signals(record).reshape(1, -1, 1600).swapaxes(0, 1)
-    values = np.array([lives.columns[name][record] for name in columns], np.float32)
-    inputs = {"acceleration": windows, "told": np.tile(values, (len(windows), 1))}
+
+    windows = signal.reshape(-1, 1, 1600)
+    values = np.array(
+        [lives.columns[name][record] for name in columns],
+        np.float32,
+    )
+    told = values[None].repeat(
+        len(windows),
+        axis=0,
+    )
+    inputs = {"acceleration": windows, "told": told}
     (hours,) = session.run(["remaining_life_h"], inputs)
     level = json.loads(stored["early_life_h"])
-    expected = json.loads(answer)["remaining_life_h"]
-    assert np.clip(hours.mean(), 0, level) == pytest.approx(expected, abs=1e-3 * level)
+    assert_allclose(
+        np.clip(hours.mean(), 0, level),
+        expected,
+        atol=1e-3 * level,
+    )

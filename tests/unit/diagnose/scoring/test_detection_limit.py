@@ -4,8 +4,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.random import default_rng
 from numpy.testing import assert_allclose
 from scipy.special import expit
+from scipy.stats import zscore
 from sklearn.linear_model import LogisticRegression
 from sklearn.metrics import roc_auc_score
 
@@ -36,7 +38,7 @@ def study(n_units=20, per_unit=20, shift=0.0, seed=0):
 
     Half of the cracks are found at 5 % alarms near 0.47.
     """
-    rng = np.random.default_rng(seed)
+    rng = default_rng(seed)
     unit = np.repeat(np.arange(n_units), per_unit)
     label = np.arange(unit.size) % 2
     severity = rng.uniform(0.1, 0.9, unit.size)
@@ -61,7 +63,7 @@ def answer(test, validation, severity):
         class_names=("healthy", "crack"),
         sizes={"crack": {"severity": severity, "crack_depth_mm": 4 * severity}},
         n_bootstrap=200,
-        rng=np.random.default_rng(1),
+        rng=default_rng(1),
     )
 
 
@@ -76,21 +78,25 @@ def crack_with(score, cracks):
 def test_the_score_ranks_by_the_odds_of_any_fault_without_offset(offset):
     logs = np.log(np.array([[0.5, 0.3, 0.2], [0.2, 0.4, 0.4]])) + offset
     expected = np.log([1.0, 4.0])
-    assert_allclose(detection_score(logs, 0), expected, rtol=1e-12, atol=1e-12)
+    assert_allclose(detection_score(logs, 0), expected, atol=1e-12)
 
 
-@pytest.mark.parametrize("n_records", [19, 20, 57, 400])
+@pytest.mark.parametrize(
+    "n_records",
+    [19, 20, 57, 400],
+)
 def test_at_most_one_in_twenty_new_healthy_records_is_an_alarm(n_records):
-    rng = np.random.default_rng(n_records)
+    rng = default_rng(n_records)
+    known, new = rng.normal(size=(300, n_records)), rng.normal(size=(300, 200))
     once = np.ones((1, n_records), dtype=int)
-    alarms = []
-    for _ in range(300):
-        new = rng.normal(size=200)
-        threshold = alarm_threshold(rng.normal(size=n_records), once, new=True)
-        alarms.append(np.mean(new > threshold[0]))
+
+    def threshold(scores, is_new):
+        return alarm_threshold(scores, once, new=is_new)[0]
+
+    alarms = new > np.array([[threshold(scores, True)] for scores in known])
+
     assert 0.02 < np.mean(alarms) < 0.055
-    scores = rng.normal(size=n_records)
-    assert np.mean(scores > alarm_threshold(scores, once, new=False)[0]) <= 0.05
+    assert np.mean(known[0] > threshold(known[0], False)) <= 0.05
 
 
 def test_a_repeated_record_counts_as_often_as_it_was_drawn():
@@ -100,33 +106,58 @@ def test_a_repeated_record_counts_as_often_as_it_was_drawn():
 
 
 def test_curves_are_those_of_ordinary_logistic_regression():
-    rng = np.random.default_rng(2)
+    rng = default_rng(2)
     size = rng.uniform(0.1, 0.9, 400)
     hit = rng.uniform(size=400) < expit(3 * np.log(size / 0.4))
     weight = rng.integers(0, 3, (3, 400)).astype(float)
-    curves = fit_curves(size, np.tile(hit, (3, 1)).astype(float), weight)
-    scaled = (np.log(size) - np.log(size).mean()) / np.log(size).std()
+    curves = fit_curves(
+        size,
+        np.tile(hit, (3, 1)).astype(float),
+        weight,
+    )
+    scaled = zscore(np.log(size))[:, None]
+
     for row, drawn in zip(curves, weight, strict=True):
-        model = LogisticRegression(C=1e6).fit(scaled[:, None], hit, drawn)
-        expected = [model.intercept_[0], model.coef_[0, 0]]
+        model = LogisticRegression(C=1e6).fit(scaled, hit, drawn)
+        expected = [
+            model.intercept_[0],
+            model.coef_[0, 0],
+        ]
         assert_allclose(row, expected, rtol=0.02, atol=0.02)
     for share in (0.5, 0.9):
         at = limits(curves, size, share)
-        assert_allclose(np.diag(curve_at(curves, at, size)), share, rtol=1e-6, atol=0)
-    assert_allclose(limits(curves, size, 0.5), 0.4, rtol=0.2, atol=0)
+        reached = np.diag(curve_at(curves, at, size))
+        assert_allclose(reached, share, rtol=1e-6)
+    assert_allclose(
+        limits(curves, size, 0.5),
+        0.4,
+        rtol=0.2,
+    )
 
 
 def test_limits_stay_within_the_tested_sizes_and_curves_never_fall():
     size = np.linspace(0.2, 0.8, 40)
 
     def fitted(hits):
-        return fit_curves(size, np.broadcast_to(hits, (1, 40)) * 1.0, np.ones((1, 40)))
+        return fit_curves(
+            size,
+            (hits + 0.0 * size)[None],
+            np.ones((1, 40)),
+        )
 
-    assert np.isinf(limits(fitted(0.0), size, 0.5)[0])
-    assert limits(fitted(1.0), size, 0.9)[0] == 0.2
-    level = curve_at(fitted(size < 0.5), np.array([0.2, 0.8]), size)
-    assert_allclose(level, 0.5, rtol=1e-9, atol=0)
-    assert_allclose(limits(fitted(size > 0.5), size, 0.5), 0.5, rtol=0.03, atol=0)
+    def limit(hits, share=0.5):
+        return limits(fitted(hits), size, share)[0]
+
+    assert np.isinf(limit(0.0))
+    assert limit(1.0, 0.9) == 0.2
+    assert_allclose(limit(size > 0.5), 0.5, rtol=0.03)
+
+    level = curve_at(
+        fitted(size < 0.5),
+        np.array([0.2, 0.8]),
+        size,
+    )
+    assert_allclose(level, 0.5)
 
 
 def test_a_known_limit_lies_in_the_interval(cracks, validation):
@@ -135,12 +166,18 @@ def test_a_known_limit_lies_in_the_interval(cracks, validation):
     assert result["threshold_from"] == "healthy validation records"
     assert result["false_alarms"]["low"] < 0.06
     assert not result["too_many_false_alarms"]
+
     crack = result["classes"]["crack"]
     half, most, depth, _ = crack["limits"]
     assert (half["quantity"], depth["quantity"]) == ("severity", "crack_depth_mm")
     assert half["low"] < (4 + 1.645) / 12 < half["high"]
     assert half["value"] < most["value"] < 0.75
-    assert_allclose(depth["value"], 4 * half["value"], rtol=1e-6, atol=0)
+    assert_allclose(
+        depth["value"],
+        4 * half["value"],
+        rtol=1e-6,
+    )
+
     shares = [row["share_found"]["mean"] for row in crack["by_severity"]]
     assert shares == sorted(shares)
     assert "crack_depth_mm" in crack["summary"]
@@ -149,14 +186,20 @@ def test_a_known_limit_lies_in_the_interval(cracks, validation):
 def test_perfect_blind_and_equal_scores(cracks):
     label = cracks[0].label
     perfect = crack_with(100.0 * label, cracks)
-    assert perfect["auroc"]["mean"] == 1
-    assert perfect["share_found"]["mean"] == 1
-    assert perfect["share_found"]["low"] < 0.9
-    assert {row["status"] for row in perfect["limits"]} == {"at_smallest_tested"}
-    blind = crack_with(np.random.default_rng(3).normal(size=label.size), cracks)
+    share = perfect["share_found"]
+
+    assert perfect["auroc"]["mean"] == share["mean"] == 1
+    assert share["low"] < 0.9
+
+    blind = crack_with(
+        default_rng(3).normal(size=label.size),
+        cracks,
+    )
     assert blind["auroc"]["low"] < 0.5 < blind["auroc"]["high"]
-    assert {row["status"] for row in blind["limits"]} == {"not_reached"}
     assert "at no severity" in blind["summary"]
+    for result, expected in ((perfect, "at_smallest_tested"), (blind, "not_reached")):
+        assert {row["status"] for row in result["limits"]} == {expected}
+
     equal = crack_with(np.zeros(label.size), cracks)
     assert (equal["auroc"]["mean"], equal["share_found"]["mean"]) == (0.5, 0.0)
 
@@ -165,7 +208,7 @@ def test_the_area_is_that_of_scikit_learn(cracks):
     test, _ = cracks
     rounded = np.round(test.log_probability[0, :, 1])
     area = crack_with(rounded, cracks)["auroc"]["mean"]
-    assert_allclose(area, roc_auc_score(test.label, rounded), rtol=1e-12, atol=0)
+    assert_allclose(area, roc_auc_score(test.label, rounded))
 
 
 def test_too_many_false_alarms_are_reported(validation):
@@ -175,7 +218,11 @@ def test_too_many_false_alarms_are_reported(validation):
 
 def test_few_healthy_validation_records_are_not_used(cracks):
     test, severity = cracks
-    result = answer(test, study(n_units=2, per_unit=18)[0], severity)
+    result = answer(
+        test,
+        study(n_units=2, per_unit=18)[0],
+        severity,
+    )
     assert result["threshold_from"] == "healthy test records"
     assert result["false_alarms"]["mean"] <= 0.05
 
@@ -184,21 +231,36 @@ def test_one_unit_has_no_interval_and_one_severity_no_curve():
     test, severity = study(n_units=1, per_unit=60)
     crack = answer(test, None, severity)["classes"]["crack"]
     scores = (crack["auroc"], crack["share_found"], *crack["limits"])
+
     assert all(score["low"] is None for score in scores)
+
     flat = answer(test, None, np.ones_like(severity))["classes"]["crack"]
     assert flat["by_severity"] == flat["limits"] == flat["curve"]["severity"] == []
 
 
 def test_all_of_few_units_do_not_prove_a_share_of_one():
     interval = share_with_interval(1.0, np.ones(50), 8)
-    assert_allclose(interval["low"], 0.025 ** (1 / 8), rtol=1e-6, atol=0)
+    assert_allclose(
+        interval["low"],
+        0.025 ** (1 / 8),
+        rtol=1e-6,
+    )
     assert interval["high"] == 1
-    half = share_with_interval(0.5, np.linspace(0.3, 0.7, 101), 8)
-    assert_allclose([half["low"], half["high"]], [0.31, 0.69], rtol=0.01, atol=0)
+
+    half = share_with_interval(
+        0.5,
+        np.linspace(0.3, 0.7, 101),
+        8,
+    )
+    assert_allclose(
+        [half["low"], half["high"]],
+        [0.31, 0.69],
+        rtol=0.01,
+    )
 
 
 def test_only_parameters_that_grow_with_the_severity_are_sizes():
-    rng = np.random.default_rng(4)
+    rng = default_rng(4)
     severity = rng.uniform(0.2, 0.8, 40)
     columns = {
         "params/fault.crack_depth_mm": 4 * severity,
@@ -209,5 +271,9 @@ def test_only_parameters_that_grow_with_the_severity_are_sizes():
         "params/fault.two_values_mm": np.round(severity) + 1,
         "params/operating.speed_rpm": severity,
     }
-    dataset = SimpleNamespace(column_names=list(columns), column=columns.get)
+    dataset = SimpleNamespace(
+        column_names=list(columns),
+        column=columns.get,
+    )
+
     assert list(size_columns(dataset, np.arange(40), severity)) == ["crack_depth_mm"]
