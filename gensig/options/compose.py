@@ -271,8 +271,6 @@ def _explain(
         if match := re.search(pattern, text):
             context = _Failure(match.group(1), config_name, words, config_dir)
             return explanation(context)
-    if re.search("mismatched input|extraneous input|no viable alternative", text):
-        return f"cannot read the override: {text}"
     if match := re.search(r"Missing mandatory value: (\S+)", text):
         key = getattr(error, "full_key", None) or match.group(1)
         return f"{key} is required: give {key}=..."
@@ -318,8 +316,6 @@ def _unknown_group(failure: _Failure) -> str:
 
 def _unknown_option(failure: _Failure) -> str:
     group, _, wanted = failure.name.rpartition("/")
-    if not group:
-        return f"no option '{wanted}' of the configuration; {nearest.hint(wanted, [])}"
     names = [option.name for option in option_files.options(group, failure.config_dir)]
     hint = option_files.elsewhere(group, wanted) or nearest.hint(wanted, names)
     return f"no option '{wanted}' of {group}; {hint}"

@@ -152,8 +152,6 @@ def heated(
     if growth:
         pair = _grown(cold, state.growth, strain)
         system = replace(system, pair=pair, growth=state.growth)
-    elif center_distance:
-        system = replace(system, growth=None)
     if center_distance:
         rise = heat.housing_temperature - heat.reference_temperature
         housing = heat.expansion * rise

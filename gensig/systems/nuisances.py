@@ -5,8 +5,10 @@ Their forces follow its shafts' angles, its linear machine answers, bearings hea
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import reduce
 from itertools import pairwise
 
 import numpy as np
@@ -172,19 +174,14 @@ def _waves(tones: Sequence[Tones], angle: Mapping[str, Array]) -> Array:
     for part in tones:
         n_tones = len(part.multiple)
         for tone, multiples in enumerate(part.multiple.tolist(), start=row):
-            phasor: Complex | None = None
+            factors = []
             for order, multiple in zip(part.base.tolist(), multiples, strict=True):
                 if multiple:
                     key = (part.gear, order)
                     if key not in powers:
                         powers[key] = _Powers(np.exp(1j * order * angle[part.gear]))
-                    power = powers[key](multiple)
-                    if phasor is None:
-                        phasor = power
-                    else:
-                        phasor = phasor * power
-            if phasor is None:
-                raise ValueError("a tone follows at least one angle")
+                    factors.append(powers[key](multiple))
+            phasor = reduce(operator.mul, factors)
             out[tone], out[tone + n_tones] = phasor.real, phasor.imag
         row += 2 * n_tones
     return out

@@ -24,7 +24,11 @@ class TestMistakes:
         [
             ("gear=foo", "foo|xiamen_23_84"),
             ("excitation=null", "excitation=null: a group takes one of its options"),
-            ("gear=3", "gear=3: a group|xiamen_23_84"),
+            ("seed=1 gear=3", "gear=3: a group|xiamen_23_84"),
+            ("model=cnn", "the group 'model' is one of train.yaml, not of generate"),
+            ("low_cutoff=1", "did you mean 'sensing.sensor.low_cutoff_hz'?"),
+            ("+zzz=1", "unknown key 'zzz'; the configuration has system, gear"),
+            ("fault.vary=3", "fault.vary must be a mapping, for instance"),
             ("fault=crack fault.pit_width_mm=1", "fault=crack|crack_depth_mm|pitting"),
             ("fault.crack_depth_mm=1", "fault.crack_depth_mm|fault=healthy|crack"),
             ("plan.classes=[crack,crack]", "plan.classes|different fault options"),
@@ -41,6 +45,10 @@ class TestMistakes:
         text = str(caught.value)
         assert "\n" not in text
         assert all(needle in text for needle in needles.split("|")), text
+
+    def test_a_key_like_no_other_gets_no_hint(self):
+        with pytest.raises(ConfigError, match=r"^unknown key 'qqq\.www'$"):
+            read_request(["qqq.www=1"])
 
     def test_a_missing_folder_of_own_options(self, tmp_path):
         with pytest.raises(ConfigError, match="is not a folder"):

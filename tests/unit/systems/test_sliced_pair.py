@@ -7,9 +7,17 @@ import pytest
 from closeness import assert_close
 from refusals import refused
 
-from gensig.mesh.modification import FlankModification
+from gensig.mesh.modification import FlankModification, PairModification
 from gensig.plan.request import read_request
-from gensig.systems.flank_optimum import N_VARIABLES, Cases, judge, optimise, unpacked
+from gensig.systems.flank_optimum import (
+    N_VARIABLES,
+    Cases,
+    Optimum,
+    _not_dominated,
+    judge,
+    optimise,
+    unpacked,
+)
 from gensig.systems.registry import read_sliced_pair, read_system
 
 COUPLING = ["mesh.contact=linear", "mesh.slice_coupling=independent"]
@@ -106,6 +114,13 @@ def test_a_front_trades_ripple_for_load(helical):
     assert np.all(np.diff(values[:, 1]) < 0)
 
 
+def test_dominated_optima_are_left_out():
+    plain = PairModification()
+    points = [(2.0, 5.0), (1.0, 6.0), (3.0, 5.5), (1.0, 7.0), (4.0, 4.0)]
+    optima = [Optimum(modification=plain, ripple=a, line_load=b) for a, b in points]
+    assert _not_dominated(optima) == [optima[1], optima[0], optima[4]]
+
+
 def test_points_of_the_box_are_modifications(helical):
     assert not unpacked(np.zeros(N_VARIABLES), helical).is_any
     largest = unpacked(np.ones(N_VARIABLES), helical)
@@ -143,6 +158,10 @@ def test_refusals_of_a_spur_pair(words, message):
         read_system(read_request(words).config)
 
 
-def test_cases_need_positive_torques():
-    with refused("must be positive"):
-        Cases(torques=(0.0,), misalignments=(0.0,))
+@pytest.mark.parametrize(
+    ("torques", "misalignments", "message"),
+    [((0.0,), (0.0,), "must be positive"), ((1.0,), (), "misalignments: give at least")],
+)
+def test_cases_that_are_refused(torques, misalignments, message):
+    with refused(message):
+        Cases(torques=torques, misalignments=misalignments)

@@ -231,7 +231,37 @@ class TestRecords:
             assert_close(settling_time(pair_dynamics(run)), expected, 1e-3)
 
 
+def test_axial_and_tilt_supports_are_as_given_where_they_are(config_with):
+    given = {
+        "stiffness_z_n_per_m": 2e7,
+        "damping_z_ns_per_m": 300.0,
+        "stiffness_tilt_nm_per_rad": 4e4,
+        "damping_tilt_nms_per_rad": 5.0,
+    }
+    keys = {f"{WHEEL}.support.{key}": value for key, value in given.items()}
+    changes = {"system.kind": "helical_pair", **keys}
+    held = read_system(config_with(changes)).wheel.support
+    found = held.stiffness_z, held.damping_z, held.stiffness_tilt, held.damping_tilt
+    assert found == tuple(given.values())
+
+
+HELICAL = {"system.kind": "helical_pair"}
 REFUSED = [
+    ({"system.kind": "belt"}, "system.kind = 'belt'; allowed: spur_pair, helical_pair"),
+    ({f"{WHEEL}.mass_kg": 0}, f"{WHEEL}.mass_kg = 0 must be positive, or null"),
+    ({"gear.backlash_um": True}, "gear.backlash_um = True is not a number"),
+    (
+        {**HELICAL, **{f"{WHEEL}.support.stiffness_{axis}_n_per_m": 0 for axis in "xy"}},
+        f"{WHEEL}.support: a helical pair needs a radial stiffness above 0",
+    ),
+    (
+        {**HELICAL, f"{WHEEL}.shaft": None},
+        "stiffness_tilt_nm_per_rad = null is derived from shaft.span_mm",
+    ),
+    (
+        {**HELICAL, "gear.addendum_coefficient": 0.5},
+        "the total contact ratio 0.9",
+    ),
     ({"system.supports": "springs"}, "'springs'; allowed: as_given, bearings"),
     (
         {"system.supports": "bearings"},
