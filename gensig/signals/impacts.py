@@ -83,8 +83,7 @@ def impact_decay(turns: ArrayLike, turn_duration: float) -> FloatArray:
 
     Returns
     -------
-    (...) s; NaN where nothing stands out of the rest of the turn by a factor of two in power, or
-    it never falls so far
+    (...) s; NaN where nothing stands out of the rest of the turn by a factor of two in power
 
     Notes
     -----
@@ -104,14 +103,15 @@ def impact_decay(turns: ArrayLike, turn_duration: float) -> FloatArray:
 
 
 def _fall(power: FloatArray, floor: float) -> float:
-    """Samples from the peak to 1/e of the amplitude above the floor."""
+    """Samples from the peak to 1/e of the amplitude above the floor.
+
+    The floor is the median, so that half of the turn lies below that.
+    """
     row = np.roll(power, -int(np.argmax(power)))
     if not row[0] > 2.0 * floor:
         return math.nan
     share = (row - floor) / (row[0] - floor)
     below = np.flatnonzero(share <= math.exp(-2.0))
-    if below.size == 0:
-        return math.nan
     last = int(below[0])
     high, low = share[last - 1], share[last]
     return last - 1 + float((high - math.exp(-2.0)) / (high - low))

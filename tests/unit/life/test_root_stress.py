@@ -265,6 +265,18 @@ def test_the_force_over_the_mesh_gives_its_stress():
     assert_allclose(exact.force_over_mesh_for(200e6), force, rtol=1e-5)
 
 
+def test_the_force_over_a_misaligned_mesh_is_below_that_of_the_standard():
+    words = ("system=helical_pair", "mesh.n_slices=6", "modification.misalignment_um=10")
+    loaded = case(*words)
+    force = loaded.force_over_mesh_for(100e6)
+    assert force < 0.9 * loaded.force_for(100e6)
+
+    torque = force * loaded.pair.pinion.pitch_radius
+    result = case(*words, f"operating.torque_nm={torque!r}").history().stress
+    largest = max(values.max() for values in result.values())
+    assert_allclose(largest, 100e6, rtol=1e-5)
+
+
 def test_mistakes():
     """Those that are typed are in tests/pipeline/commands/test_refusals.py."""
     with refused("strength.load_point"):

@@ -75,6 +75,18 @@ def test_all_formats_say_the_same(files, name):
 
 
 @pytest.mark.parametrize(
+    ("stored", "given", "rate"),
+    [(5120.001, None, 5120.0), (5120.5, None, 5120.5), (5120.5, 5121.0, 5121.0)],
+)
+def test_the_rate_of_a_table_is_rounded_or_as_given(tmp_path, stored, given, rate):
+    table = np.column_stack([np.arange(2000) / stored, SIGNAL[0]])
+    file = tmp_path / "r.csv"
+    np.savetxt(file, table, "%.17g", ",", header="time_s,a", comments="")
+    result = read_file(str(file), rate=given).sampling_rate
+    assert_allclose(result, rate, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
     ("name", "array"),
     [("c.mat", "X097_DE_time"), ("c.h5", "run/one"), ("c.npy", None)],
 )
@@ -151,6 +163,11 @@ REFUSED = [
         {"rate": 6000.0},
     ),
     ("--array is for .npz", "r.wav", {"array": "x"}),
+    ("--array is for .npz", "back.csv", {"array": "x"}),
+    ("time_s must rise in even steps", "back.csv", {}),
+    ("there is no column beside time_s", "times.csv", {}),
+    ("it is no plain array", "archive.npy", RATED),
+    ("it is no plain array", "array.npz", RATED),
     ("no array acceleration; it has nothing", "link.h5", RATED),
     ("no array acceleration; it has nothing", "virtual.h5", RATED),
     ("is larger than 500 MB", "huge.h5", RATED),
@@ -182,6 +199,16 @@ def broken_files(tmp_path_factory):
     }
     for name, arrays in matlab.items():
         io.savemat(folder / f"{name}.mat", arrays)
+    time = np.arange(300) / RATE
+    tables = {"back": (-time, time), "times": (time,)}
+    for name, columns in tables.items():
+        header = ",".join(["time_s", "a"][: len(columns)])
+        path = folder / f"{name}.csv"
+        np.savetxt(path, np.transpose(columns), "%.9g", ",", header=header, comments="")
+    with open(folder / "archive.npy", "wb") as file:
+        np.savez(file, acceleration=SIGNAL)
+    with open(folder / "array.npz", "wb") as file:
+        np.save(file, SIGNAL)
     for ending in ("wav", "mat", "h5", "npz"):
         (folder / f"garbage.{ending}").write_bytes(b"no recording at all " * 40)
     np.savez(

@@ -12,13 +12,19 @@ from numpy.testing import assert_array_equal
 from refusals import refused
 
 from gensig.dynamics.pair import DOFS
+from gensig.errors import GeometryError
 from gensig.faults.registry import read_faults
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
 from gensig.sensing.manufacturing import nominal_gearbox, perfect_specimen
 from gensig.systems.base import Machine, simulate_together
 from gensig.systems.mesh_signals import mesh_signals
-from gensig.systems.pair_machine import GearPairMachine, PairMachine, pair_dynamics
+from gensig.systems.pair_machine import (
+    GearPairMachine,
+    PairMachine,
+    _is_too_coarse,
+    pair_dynamics,
+)
 from gensig.systems.run import CHECKS, Run, Start
 from gensig.units import SPEED
 
@@ -204,6 +210,37 @@ def test_a_record_starts_perfect_and_nominal(any_machine):
 
     later = any_machine.simulate(start=Start(phase=0.3))
     assert not np.array_equal(plain.acceleration, later.acceleration)
+
+
+def test_wheels_that_cannot_mesh_and_drives_that_stop_are_refused():
+    same_hand = "gear.helix_angle_deg=5", "+gear.wheel.helix_angle_deg=5"
+    with refused("must be equal and of opposite hand", GeometryError):
+        read("helical_pair", *same_hand)
+    short = "gear.helix_angle_deg=0", "gear.addendum_coefficient=0.45"
+    with refused("the total contact ratio 0.9", GeometryError):
+        read("helical_pair", *short).require_drive()
+
+
+@pytest.mark.parametrize(
+    ("contact_loss", "steps", "is_too_coarse"),
+    [(0.0, 32, True), (0.0, 33, False), (0.02, 10, True), (0.02, 11, False)],
+)
+def test_bouncing_records_are_refined_less(contact_loss, steps, is_too_coarse):
+    machine = read("spur_pair")
+    solver = replace(machine.solver, oversampling=steps)
+    run = Run(system=replace(machine, solver=solver), faults=())
+    record = replace(
+        read_record(),
+        integration_check="unresolved",
+        contact_loss_fraction=contact_loss,
+    )
+    assert _is_too_coarse(run, record) == is_too_coarse
+    assert not _is_too_coarse(run, replace(record, integration_check="error"))
+
+
+@cache
+def read_record():
+    return read("spur_pair").simulate()
 
 
 def test_kinds_are_simulated_together_in_the_order_given():

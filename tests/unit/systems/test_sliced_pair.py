@@ -115,7 +115,7 @@ def test_a_front_trades_ripple_for_load(helical):
 
 
 def test_dominated_optima_are_left_out():
-    plain = PairModification()
+    plain = PairModification(pinion=FlankModification(), wheel=FlankModification())
     points = [(2.0, 5.0), (1.0, 6.0), (3.0, 5.5), (1.0, 7.0), (4.0, 4.0)]
     optima = [Optimum(modification=plain, ripple=a, line_load=b) for a, b in points]
     assert _not_dominated(optima) == [optima[1], optima[0], optima[4]]

@@ -258,10 +258,6 @@ REFUSED = [
         {**HELICAL, f"{WHEEL}.shaft": None},
         "stiffness_tilt_nm_per_rad = null is derived from shaft.span_mm",
     ),
-    (
-        {**HELICAL, "gear.addendum_coefficient": 0.5},
-        "the total contact ratio 0.9",
-    ),
     ({"system.supports": "springs"}, "'springs'; allowed: as_given, bearings"),
     (
         {"system.supports": "bearings"},
