@@ -266,7 +266,11 @@ def test_the_force_over_the_mesh_gives_its_stress():
 
 
 def test_the_force_over_a_misaligned_mesh_is_below_that_of_the_standard():
-    words = ("system=helical_pair", "mesh.n_slices=6", "modification.misalignment_um=10")
+    words = (
+        "system=helical_pair",
+        "mesh.n_slices=6",
+        "modification.misalignment_um=10",
+    )
     loaded = case(*words)
     force = loaded.force_over_mesh_for(100e6)
     assert force < 0.9 * loaded.force_for(100e6)

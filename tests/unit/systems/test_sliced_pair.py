@@ -160,7 +160,10 @@ def test_refusals_of_a_spur_pair(words, message):
 
 @pytest.mark.parametrize(
     ("torques", "misalignments", "message"),
-    [((0.0,), (0.0,), "must be positive"), ((1.0,), (), "misalignments: give at least")],
+    [
+        ((0.0,), (0.0,), "must be positive"),
+        ((1.0,), (), "misalignments: give at least"),
+    ],
 )
 def test_cases_that_are_refused(torques, misalignments, message):
     with refused(message):

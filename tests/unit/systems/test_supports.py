@@ -251,7 +251,10 @@ REFUSED = [
     ({f"{WHEEL}.mass_kg": 0}, f"{WHEEL}.mass_kg = 0 must be positive, or null"),
     ({"gear.backlash_um": True}, "gear.backlash_um = True is not a number"),
     (
-        {**HELICAL, **{f"{WHEEL}.support.stiffness_{axis}_n_per_m": 0 for axis in "xy"}},
+        {
+            **HELICAL,
+            **{f"{WHEEL}.support.stiffness_{axis}_n_per_m": 0 for axis in "xy"},
+        },
         f"{WHEEL}.support: a helical pair needs a radial stiffness above 0",
     ),
     (
