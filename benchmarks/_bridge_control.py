@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks._bridge_worlds import CROSSED
 from benchmarks._realism_recording import VARIABLE
 from diagnose.data.windows import Segments, WindowSet, plan_windows
 from diagnose.networks.adaptation import HEALTHY, METHODS, adapt_domain, adapt_network
@@ -122,6 +123,7 @@ def training_sets(file: Path, twin: Path) -> dict[str, tuple[list[str], Path | N
     housings = [
         "experiment=quickstart",
         "sensing=housing",
+        *CROSSED,
         *common,
         "plan.n_gearboxes=20",
         f"plan.vary={{{torque}, sensing.snr_db: {{distribution: uniform, low: 10, high: 30}}}}",

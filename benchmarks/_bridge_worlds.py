@@ -39,7 +39,19 @@ from gensig.dataset.reader import Dataset
 FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
 
-BASE = ("experiment=quickstart", "plan.n_gearboxes=8", "operating.duration_s=0.5")
+# The plan of quickstart in version 0.9.
+CROSSED = (
+    "plan.n_units=40",
+    "plan.machines=crossed",
+    "plan.fault_gear=as_given",
+    "plan.n_reference=0",
+)
+BASE = (
+    "experiment=quickstart",
+    *CROSSED,
+    "plan.n_gearboxes=8",
+    "operating.duration_s=0.5",
+)
 SOURCE = (*BASE, "sensing=housing")
 OTHER_SENSORS = (
     "sensing.path.natural_frequency_hz=[150,6000]",

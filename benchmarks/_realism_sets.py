@@ -49,6 +49,10 @@ GRADE_STEPS = 2.0 * math.log2(
 CONTROLS = ("right", "wrong teeth", "errors / 3", "errors x 3")
 
 
+# Gears that run in every gearbox, with faults where their option says, whatever the base plans.
+CROSSED = ("plan.machines=crossed", "plan.fault_gear=as_given", "plan.n_reference=0")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Size:
     """Extent of the simulation; speeds and torques as shares of the rated ones.
@@ -102,6 +106,7 @@ def yardstick_words(base: Sequence[str], size: Size) -> list[str]:
         f"plan.classes=[{','.join(CLASSES)}]",
         f"plan.n_units={size.n_units}",
         f"plan.n_gearboxes={size.n_gearboxes}",
+        *CROSSED,
         f"plan.vary={_flow(vary)}",
         f"fault.vary={_flow(cracks)}",
         "dataset.store_shaft_angle=true",
@@ -126,6 +131,7 @@ def recording_words(base: Sequence[str], size: Size, control: str) -> list[str]:
         "plan.classes=[healthy]",
         f"plan.n_units={size.n_units}",
         f"plan.n_gearboxes={size.n_gearboxes}",
+        *CROSSED,
         f"gear.pinion.n_teeth={teeth[0]}",
         f"gear.wheel.n_teeth={teeth[1]}",
         *(

@@ -28,7 +28,12 @@ from benchmarks._realism_recording import VARIABLE
 from diagnose.cli import main as diagnose_main
 from gensig.errors import ConfigError, GensigError
 
-TRAINING = ("protocols=[by_unit]", "baselines=false", "shuffle_control=false")
+TRAINING = (
+    "model=cnn",
+    "protocols=[by_unit]",
+    "baselines=false",
+    "shuffle_control=false",
+)
 SEEDS = (0, 1, 2)
 TOLD = (
     "cpu_model",

@@ -13,24 +13,45 @@ from diagnose.baselines.minirocket import KERNELS
 from diagnose.baselines.registry import baseline_names
 from gensig.errors import ConfigError
 from gensig.options.configuration import Configuration, Section
+from gensig.text.nearest import hint
 
 DEVICES = ("auto", "cpu", "cuda")
 HEADS = ("severity", "gear")
+REFERENCES = ("auto", "none", "other_condition", "same_condition")
 TASKS = ("classes", "remaining_life")
 BOTH = (
     "both"  # value of normalise: one training without the level, a second one with it
 )
 # Least values of whole numbers.
 LEAST = {
-    "epochs": 1,
-    "patience": 1,
     "n_seeds_control": 1,
     "n_bootstrap": 1,
     "batch_size": 2,
     "minirocket_features": len(KERNELS),
 }
+OWN = "training"  # section of a network's file that gives a `Schedule`
 LISTS = ("protocols", "classes", "channels", "test_channels", "seeds")
 CHOICES = ("baselines", "heads")  # lists that may be false or empty
+
+
+def _check_whole(name: str, value: Any, *, least: int) -> None:
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        raise ConfigError(
+            f"{name} must be a whole number of at least {least}, not {value!r}"
+        )
+
+
+def _check_share(name: str, value: Any) -> None:
+    if not (_is_number(value) and 0 <= value <= 1):
+        raise ConfigError(f"{name} must be a number from 0 to 1, not {value!r}")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _is_positive(value: Any, *, below: float = float("inf")) -> bool:
+    return _is_number(value) and 0 < value < below
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,6 +83,31 @@ class LifeSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Schedule:
+    """Length of a training.
+
+    Attributes
+    ----------
+    epochs : most epochs
+    patience : epochs without a better validation loss before stopping; 0 never stops, and keeps
+        the weights of the last epoch
+    epoch_fraction : share of the training signal that is drawn as windows in one epoch
+    """
+
+    epochs: int
+    patience: int
+    epoch_fraction: float
+
+    def __post_init__(self) -> None:
+        _check_whole("epochs", self.epochs, least=1)
+        _check_whole("patience", self.patience, least=0)
+        _check_share("epoch_fraction", self.epoch_fraction)
+
+
+USUAL = Schedule(epochs=14, patience=5, epoch_fraction=0.25)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TrainSettings:
     """Settings of ``diagnose train``; each key is explained in ``configs/train.yaml``."""
 
@@ -78,17 +124,18 @@ class TrainSettings:
     window_samples: int | None  # None: see `diagnose.data.window_choice`
     stride_samples: int | None  # None: as long as a window
     normalise: str
-    epochs: int
-    patience: int
+    epochs: int | None  # None, as of the next two: see `schedule`
+    patience: int | None
+    epoch_fraction: float | None
     batch_size: int
     learning_rate: float
     weight_decay: float
-    epoch_fraction: float
     heads: tuple[str, ...]
     shuffle_control: bool
     n_seeds_control: int
     metadata_probe: bool
     oracle: str | bool
+    reference: str
     sham: str | None
     baselines: tuple[str, ...]
     features: str
@@ -112,10 +159,9 @@ class TrainSettings:
                 "sampling_rate_hz must be null or a number of samples a second, "
                 f"not {self.sampling_rate_hz!r}"
             )
-        for name in ("learning_rate", "weight_decay", "epoch_fraction"):
-            value = getattr(self, name)
-            if not (_is_number(value) and 0 <= value <= 1):
-                raise ConfigError(f"{name} must be a number from 0 to 1, not {value!r}")
+        for name in ("learning_rate", "weight_decay"):
+            _check_share(name, getattr(self, name))
+        _ = self.schedule  # refuses what is no length of a training
         for name in LISTS:
             values = getattr(self, name)
             if values is not None and (not values or len(set(values)) < len(values)):
@@ -137,9 +183,35 @@ class TrainSettings:
         self._check_list("baselines", baseline_names(Role.RIVAL))
         self._check_list("heads", HEADS)
         self._check_one("task", TASKS, f"one of {', '.join(TASKS)}")
+        self._check_one("reference", REFERENCES, f"one of {', '.join(REFERENCES)}")
         self._check_one("oracle", ("auto", False), "auto or false")
         self._check_one("features", tuple(FEATURES), " or ".join(FEATURES))
         self._check_one("device", DEVICES, f"one of {', '.join(DEVICES)}")
+
+    @property
+    def schedule(self) -> Schedule:
+        """Length of the network's training: as given, else of its file, else `USUAL`."""
+        own = self.model.get(OWN) or {}
+        known = [field.name for field in dataclasses.fields(Schedule)]
+        if not isinstance(own, Mapping) or not set(own) <= set(known):
+            raise ConfigError(
+                f"model.{OWN} must hold keys out of {', '.join(known)} and nothing else"
+            )
+        return self._given(dataclasses.replace(USUAL, **own))
+
+    @property
+    def usual_schedule(self) -> Schedule:
+        """Length of a training of another network: as given, else `USUAL`."""
+        return self._given(USUAL)
+
+    def _given(self, otherwise: Schedule) -> Schedule:
+        """The keys of a schedule that are given, the others of another one."""
+        names = [field.name for field in dataclasses.fields(Schedule)]
+        given = {name: getattr(self, name) for name in names}
+        return dataclasses.replace(
+            otherwise,
+            **{name: value for name, value in given.items() if value is not None},
+        )
 
     def _check_one(self, key: str, allowed: Sequence[Any], text: str) -> None:
         """Refuse a value that is not allowed."""
@@ -149,6 +221,10 @@ class TrainSettings:
     def _check_list(self, key: str, allowed: Sequence[str]) -> None:
         """Refuse a list with a name twice or one that is not allowed."""
         names = getattr(self, key)
+        unknown = [name for name in names if name not in allowed]
+        if unknown and isinstance(unknown[0], str):
+            one = key.removesuffix("s")
+            raise ConfigError(f"no {one} '{unknown[0]}'; {hint(unknown[0], allowed)}")
         if len(set(names)) < len(names) or not set(names) <= set(allowed):
             raise ConfigError(
                 f"{key} must be false or a list of different names "
@@ -199,18 +275,3 @@ def _as_tuple(name: str, value: Any) -> tuple[Any, ...] | None:
     if isinstance(value, list):
         return tuple(value)
     return (value,)
-
-
-def _check_whole(name: str, value: Any, *, least: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        raise ConfigError(
-            f"{name} must be a whole number of at least {least}, not {value!r}"
-        )
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _is_positive(value: Any, *, below: float = float("inf")) -> bool:
-    return _is_number(value) and 0 < value < below

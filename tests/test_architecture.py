@@ -103,7 +103,7 @@ DIAGNOSE = {
     "commands": "data detectability progress recordings report settings studies training workers",
     "detectability": "workers",
     "networks": "data",
-    "recordings": "data networks report scoring studies training",
+    "recordings": "baselines data networks report scoring studies training",
     "report": "baselines data scoring studies training",
     "scoring": "data networks",
     "settings": "baselines",

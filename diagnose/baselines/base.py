@@ -6,9 +6,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnose.baselines.features import Cache, FeatureTable
 from diagnose.data.windows import (
@@ -107,6 +108,11 @@ class Parts:
         )
 
 
+def always_made(task: Task, protocol: str) -> str | None:
+    """None: an input that every data set has."""
+    return None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Input:
     """Kind of tables that baselines read; a study makes each once a protocol.
@@ -115,10 +121,13 @@ class Input:
     ----------
     name : for the caches
     make : returns the tables of a protocol
+    why_not : returns the reason in one line why a task has no such tables of a protocol, or None;
+        a study leaves the baseline out there
     """
 
     name: str
     make: Callable[[Source], Parts]
+    why_not: Callable[[Task, str], str | None] = always_made
 
 
 class Baseline(ABC):
@@ -144,3 +153,16 @@ class Baseline(ABC):
     @abstractmethod
     def predict_proba(self, table: FeatureTable) -> FloatArray:
         """Probabilities (row, class), each row with sum 1."""
+
+
+class StorableBaseline(Baseline):
+    """Baseline that is stored as arrays, which `diagnose.recordings` reads."""
+
+    @abstractmethod
+    def tensors(self) -> dict[str, NDArray[np.float32]]:
+        """Name -> array of the fit."""
+
+    @classmethod
+    @abstractmethod
+    def description(cls, task: Task) -> dict[str, Any]:
+        """Kind and parameters, `model` of ``model.json``."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnose.baselines.features import FeatureTable
 from diagnose.data.windows import FloatArray, IntArray
@@ -65,6 +66,66 @@ def choose_model(
 def boosted_trees(train: FeatureTable, n_classes: int) -> FittedModel:
     """Gradient boosting on all columns with values."""
     return _fitted(BOOSTING, train, known_columns(train.values), n_classes)
+
+
+def logistic_regression(
+    train: FeatureTable, n_classes: int, strength: float
+) -> FittedModel:
+    """Logistic regression on all columns with values; strength is the inverse of the penalty."""
+    columns = known_columns(train.values)
+    name, model = f"logistic regression, C={strength:g}", _logistic(strength)
+    model.fit(train.values[:, columns], train.label)
+    return FittedModel(name=name, model=model, columns=columns, n_classes=n_classes)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinearModel:
+    """Logistic regression as arrays; it reads all columns of a table.
+
+    Attributes
+    ----------
+    fill, mean, scale : (column,) value of unknown entries, and what is taken off and divided by
+    weight, bias : (class, column) and (class,) of the scores; -inf for classes never trained on
+    """
+
+    fill: FloatArray
+    mean: FloatArray
+    scale: FloatArray
+    weight: FloatArray
+    bias: FloatArray
+
+    def scores(self, values: FloatArray) -> FloatArray:
+        """(row, class) unnormalised log-probabilities of (row, column) values."""
+        known = np.where(np.isfinite(values), values, self.fill)
+        return (known - self.mean) / self.scale @ self.weight.T + self.bias
+
+    def tensors(self) -> dict[str, NDArray[np.float32]]:
+        """Name of each array -> the array."""
+        return {
+            field.name: np.asarray(getattr(self, field.name), dtype=np.float32)
+            for field in fields(self)
+        }
+
+
+def linear_model(fitted: FittedModel, n_columns: int) -> LinearModel:
+    """Arrays of a `logistic_regression` on some of the columns of a table."""
+    imputer, scaler, regression = (step for _, step in fitted.model.steps)
+    arrays = {"fill": np.zeros(n_columns), "mean": np.zeros(n_columns)}
+    arrays["scale"] = np.ones(n_columns)
+    values = {"fill": imputer.statistics_, "mean": scaler.mean_, "scale": scaler.scale_}
+    for name, of_columns in values.items():
+        arrays[name][fitted.columns] = of_columns
+    weight = np.zeros((fitted.n_classes, n_columns))
+    bias = np.full(fitted.n_classes, -np.inf)
+    coefficients, intercepts = regression.coef_, regression.intercept_
+    if len(coefficients) == 1:  # two classes have one score, that of the second
+        coefficients = np.concatenate([np.zeros_like(coefficients), coefficients])
+        intercepts = np.concatenate([np.zeros_like(intercepts), intercepts])
+    for label, row, intercept in zip(
+        regression.classes_, coefficients, intercepts, strict=True
+    ):
+        weight[label, fitted.columns], bias[label] = row, intercept
+    return LinearModel(**arrays, weight=weight, bias=bias)
 
 
 def known_columns(values: FloatArray) -> list[int]:

@@ -10,10 +10,10 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from diagnose.data.teeth import GEARS, missing_teeth, teeth_of_records
 from diagnose.data.windows import FloatArray, IntArray, Segments, Task, read_signal
 from gensig.errors import DatasetError
 from gensig.signals.averaging import MIN_TURNS, time_synchronous_average
@@ -31,7 +31,6 @@ from gensig.signals.indicators import (
 )
 from gensig.signals.spectral_kurtosis import spectral_kurtosis
 
-GEARS = ("pinion", "wheel")
 LEVEL = "log_rms"  # at the end of the names of columns
 
 
@@ -165,12 +164,17 @@ def feature_table(
     """
     if cache is None:
         cache = {}
-    speed, n_teeth = known_rotation(task)
+    rotation = known_rotation(task)
     rate = task.dataset.sampling_rate
 
     def compute(key: Key) -> FloatArray:
-        signal, frequency = signals[key], frequencies_at(speed, key[1])
-        return indicators(signal, rate, frequency, n_teeth, features=features).ravel()
+        return indicators(
+            signals[key],
+            rate,
+            rotation.frequencies(key[1]),
+            rotation.n_teeth(key[1]),
+            features=features,
+        ).ravel()
 
     keys = keys_of(task, segments)
     missing = [key for key in keys if key not in cache]
@@ -203,24 +207,45 @@ def table_of(
     )
 
 
-def frequencies_at(speed: Mapping[str, FloatArray], record: int) -> dict[str, float]:
-    """Rotation frequency of each of `GEARS` in one record, from those of `known_rotation`."""
-    return {gear: values[record] for gear, values in speed.items()}
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rotation:
+    """Rotation and teeth of the gears of every record.
+
+    Attributes
+    ----------
+    pinion_frequency : (record,) Hz
+    teeth : (record, gear) of `GEARS`
+    """
+
+    pinion_frequency: FloatArray
+    teeth: IntArray
+
+    def n_teeth(self, record: int) -> dict[str, int]:
+        """Teeth of each of `GEARS` in one record."""
+        return dict(zip(GEARS, self.teeth[record].tolist(), strict=True))
+
+    def frequencies(self, record: int) -> dict[str, float]:
+        """Rotation frequency in Hz of each of `GEARS` in one record."""
+        pinion, mesh = self.pinion_frequency[record], self.mesh_frequency(record)
+        return {GEARS[0]: float(pinion), GEARS[1]: mesh / int(self.teeth[record, 1])}
+
+    def mesh_frequency(self, record: int) -> float:
+        """Passages of a tooth per second in one record."""
+        return float(self.pinion_frequency[record] * self.teeth[record, 0])
 
 
-def known_rotation(task: Task) -> tuple[dict[str, FloatArray], dict[str, int]]:
-    """Rotation frequency in Hz, (record,), and number of teeth of each of `GEARS`."""
-    pinion = np.asarray(task.dataset.column("speed_rpm"), dtype=float) / 60
-    n_teeth = {gear: _n_teeth(task.dataset.attributes, gear) for gear in GEARS}
-    wheel = pinion * n_teeth["pinion"] / n_teeth["wheel"]
-    return {"pinion": pinion, "wheel": wheel}, n_teeth
+def known_rotation(task: Task) -> Rotation:
+    """Rotation of the records of a task.
 
-
-def _n_teeth(attributes: Mapping[str, Any], gear: str) -> int:
-    try:
-        return int(attributes[f"n_teeth_{gear}"])
-    except KeyError:
+    Raises
+    ------
+    DatasetError    for a data set that does not say the teeth
+    """
+    if name := missing_teeth(task.dataset):
         raise DatasetError(
-            f"the data set does not say n_teeth_{gear}; "
-            "indicators need it (baselines=false)"
-        ) from None
+            f"the data set does not say {name}; indicators need it (baselines=false)"
+        )
+    return Rotation(
+        pinion_frequency=np.asarray(task.dataset.column("speed_rpm"), dtype=float) / 60,
+        teeth=teeth_of_records(task.dataset),
+    )

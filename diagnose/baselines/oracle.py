@@ -14,7 +14,6 @@ from diagnose.baselines.features import (
     INDICATORS,
     Cache,
     FeatureTable,
-    frequencies_at,
     indicators,
     keys_of,
     known_rotation,
@@ -69,7 +68,7 @@ def oracle_table(task: Task, segments: Segments, cache: Cache) -> FeatureTable:
     difference, and those of the record over the twin's. ``cache`` is filled and used, so that
     protocols share common values.
     """
-    speed, n_teeth = known_rotation(task)
+    rotation = known_rotation(task)
     rate = task.dataset.sampling_rate
     keys = keys_of(task, segments)
     for key in keys:
@@ -78,7 +77,7 @@ def oracle_table(task: Task, segments: Segments, cache: Cache) -> FeatureTable:
         signal = read_signal(task, *key[1:]).astype(float)
         twin = read_signal(task, *key[1:], name=TWIN).astype(float)
         three = (signal, twin, signal - twin)
-        frequency = frequencies_at(speed, key[1])
+        frequency, n_teeth = rotation.frequencies(key[1]), rotation.n_teeth(key[1])
         columns = [indicators(part, rate, frequency, n_teeth) for part in three]
         faulty, sound, rest = (band_levels(part) for part in three)
         cache[key] = np.concatenate([*columns, rest, faulty - sound], axis=1).ravel()

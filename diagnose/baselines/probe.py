@@ -1,6 +1,6 @@
 """Probes: prediction of the class from the row of a record and its position, without its signal.
 
-They must be at chance.
+Where only what was set is read, they must be at chance.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from diagnose.baselines.features import FeatureTable
 from diagnose.data.windows import FloatArray
 from gensig.dataset.columns import COLUMNS
 from gensig.dataset.schema import SIGNALS
+from gensig.errors import ConfigError
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
@@ -38,15 +39,16 @@ EXCLUDED = {
     "acceleration_clean_scale": "the peak of the signal itself",
     "healthy_twin_scale": "the peak of a signal",
 }
-# Results that are measured on a machine. All others are known to the simulation only: they are read
-# by `ResultProbe` alone.
-READ_OFF = ("speed_rpm", "mesh_frequency_hz")
+# Results that are measured on a machine, which `RotationProbe` reads alone. All results, of which
+# the others are known to the simulation only, are read by `ResultProbe`.
+ROTATION = ("speed_rpm", "mesh_frequency_hz")
+SET_SPEED = "speed_set_rpm"
 
 
 def probed_columns(dataset: Dataset, *, results: bool) -> list[str]:
     """Names of the columns that describe a record without its signal.
 
-    `results` adds those that only the simulation knows.
+    They are those that were set; `results` adds those that came out.
     """
     return [name for name in dataset.column_names if _is_probed(name, results)]
 
@@ -56,7 +58,7 @@ def _is_probed(name: str, results: bool) -> bool:
     role = known.role if known else "condition"
     if name in EXCLUDED or role in LABELS or name.startswith(FAULT_PARAMETERS):
         return False
-    return results or role != "result" or name in READ_OFF
+    return results or role != "result"
 
 
 def probe_values(
@@ -88,6 +90,31 @@ def probe_values(
     return values, tuple(parts)
 
 
+def rotation_values(dataset: Dataset) -> tuple[FloatArray, tuple[str, ...]]:
+    """Values (record, feature) of the actual rotation, and their names.
+
+    They are the columns `ROTATION` and the actual speed over the set one.
+
+    Raises
+    ------
+    ConfigError    for a data set without these columns
+    """
+    parts = {
+        name: np.asarray(dataset.column(name), dtype=float)
+        for name in ROTATION
+        if name in dataset.column_names
+    }
+    if not parts:
+        raise ConfigError(
+            f"the data set has no column {ROTATION[0]}, which the rotation probe reads; "
+            "give metadata_probe=false"
+        )
+    if {ROTATION[0], SET_SPEED} <= set(dataset.column_names):
+        set_speed = np.asarray(dataset.column(SET_SPEED), dtype=float)
+        parts[f"{ROTATION[0]}/set"] = parts[ROTATION[0]] / set_speed
+    return np.stack([*parts.values()], axis=1), tuple(parts)
+
+
 def _count_before(names: NDArray[Any]) -> NDArray[np.integer]:
     """Number of earlier entries that are the same, for each entry."""
     order = np.argsort(names, kind="stable")
@@ -97,12 +124,22 @@ def _count_before(names: NDArray[Any]) -> NDArray[np.integer]:
     return count
 
 
-def _probe_tables(source: Source, *, results: bool) -> Parts:
-    """Rows of the records of every subset."""
-    task = source.task
-    n_classes = len(task.class_names)
-    values, names = probe_values(task.dataset, n_classes, results=results)
-    labels = task.labels()
+def _row_tables(source: Source, *, results: bool) -> Parts:
+    """Rows and places of the records of every subset."""
+    n_classes = len(source.task.class_names)
+    return _tables(
+        source, *probe_values(source.task.dataset, n_classes, results=results)
+    )
+
+
+def _rotation_tables(source: Source) -> Parts:
+    """Actual rotation of the records of every subset."""
+    return _tables(source, *rotation_values(source.task.dataset))
+
+
+def _tables(source: Source, values: FloatArray, names: tuple[str, ...]) -> Parts:
+    """Values (record, feature) of all records, as tables of every subset."""
+    labels = source.task.labels()
 
     def table(subset: str) -> FeatureTable:
         record = np.unique(source.segments(subset).record)
@@ -113,8 +150,9 @@ def _probe_tables(source: Source, *, results: bool) -> Parts:
     return Parts.of(table)
 
 
-METADATA_INPUT = Input(name="metadata", make=partial(_probe_tables, results=False))
-RESULT_INPUT = Input(name="results", make=partial(_probe_tables, results=True))
+METADATA_INPUT = Input(name="metadata", make=partial(_row_tables, results=False))
+ROTATION_INPUT = Input(name="rotation", make=_rotation_tables)
+RESULT_INPUT = Input(name="results", make=partial(_row_tables, results=True))
 
 
 class _Probe(Baseline):
@@ -141,16 +179,31 @@ class MetadataProbe(_Probe):
         label="metadata probe",
         card_label="metadata",
         meaning="gradient boosting on what row and place of a record tell without its signal: set "
-        "speed and torque, actual speed, noise, unit, start, order in the file. Above chance: "
-        "something leaks.",
+        "speed and torque, noise, unit, start, order in the file. Above chance: something leaks.",
     )
     role = Role.AT_CHANCE
     reads = METADATA_INPUT
 
 
 @final
+class RotationProbe(_Probe):
+    """The same on the actual rotation alone, which a fault may change."""
+
+    text = MethodText(
+        name="rotation_probe",
+        label="rotation probe",
+        card_label=None,
+        meaning="gradient boosting on the actual mean speed and mesh frequency of a record alone. "
+        "A fault changes the mean speed a little; a classifier that is given the speed may read "
+        "this.",
+    )
+    role = Role.FOLLOWER
+    reads = ROTATION_INPUT
+
+
+@final
 class ResultProbe(_Probe):
-    """The same with results that only the simulation knows, such as the integration error.
+    """The metadata probe with all results, such as the actual speed and the integration error.
 
     A fault changes the motion and may change these: such a column is no input of a classifier.
     """
@@ -159,9 +212,9 @@ class ResultProbe(_Probe):
         name="result_probe",
         label="result probe",
         card_label=None,
-        meaning="the same with what only the simulation knows of a record, such as its integration "
-        "error. A fault changes the motion and may so change these: they are no input of a "
-        "classifier.",
+        meaning="the metadata probe with all that came out of the simulation of a record, such as "
+        "its integration error. A fault changes the motion and may so change these: they are no "
+        "input of a classifier.",
     )
     role = Role.FOLLOWER
     reads = RESULT_INPUT

@@ -17,7 +17,7 @@ are moved alike: docs/howto/bridge.md says what was gained and lost where it cou
 Speeds and loads should be those of the training."""
 EXAMPLE = """\
 example:
-  diagnose adapt --model runs/report/models/by_unit-seed0 --healthy a.csv --method adabn --out mine
+  diagnose adapt --model report/models/new_machine-seed0 --healthy a.csv --method adabn --out mine
   diagnose predict --model mine today.csv"""
 
 

@@ -26,8 +26,8 @@ records elsewhere."""
 EXAMPLE = """\
 examples:
   diagnose evaluate data=runs/lives2 model_dir=runs/hours/models/by_unit-cnn-seed0
-  diagnose evaluate data=runs/other model_dir=runs/report/models/by_unit-seed0
-  diagnose evaluate data=runs/other model_dir=runs/report/models/by_unit-seed0 channels=wheel_x"""
+  diagnose evaluate data=runs/other model_dir=report/models/new_machine-seed0
+  diagnose evaluate data=runs/other model_dir=report/models/new_machine-seed0 channels=wheel_x"""
 KEYS = ("data", "model_dir", "out", "protocol", "subset", "channels")
 
 

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from diagnose.commands.parser import add_model, add_recording_options
+from gensig.errors import ConfigError
+
+if TYPE_CHECKING:
+    from diagnose.recordings.source import Source
+    from diagnose.recordings.stored_network import StoredNetwork
 
 HELP = """\
 Class probabilities of one recording, or how long the machine still runs, with a flag for
@@ -18,9 +23,9 @@ of the driving shaft, with --teeth and --speed-rpm by the mesh. A model of remai
 speed and torque too."""
 EXAMPLE = """\
 examples:
-  diagnose predict --model runs/report/models/by_unit-seed0 a.wav --channels left --speed-rpm 1500
-  diagnose predict --model runs/report/models/by_unit-seed0 runup.csv --tacho pulses
-  diagnose predict --model runs/report/models/by_unit-seed0 bench.csv --teeth 23 84 --speed-rpm 1500
+  diagnose predict --model report/models/new_machine-seed0 a.wav --channels left --speed-rpm 1500
+  diagnose predict --model report/models/new_machine-seed0 runup.csv --tacho pulses
+  diagnose predict --model report/models/new_machine-seed0 bench.csv --teeth 23 84 --speed-rpm 1500
   diagnose predict --model runs/hours/models/by_unit-cnn-seed0 a.csv --speed-rpm 90 --torque-nm 9"""
 OUT_OF_DISTRIBUTION = 3
 EXITS = {
@@ -40,6 +45,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_model(parser)
     _add_rotation(parser)
     add_recording_options(parser)
+    _add_healthy(parser)
     parser.add_argument(
         "--torque-nm",
         type=float,
@@ -53,9 +59,31 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="since new, for remaining lives with the age",
     )
     parser.add_argument(
+        "--plot",
+        metavar="FILE",
+        help="picture of the most suspicious tooth (.png); of one recording",
+    )
+    parser.add_argument(
         "--json",
         action="store_true",
         help="print everything, window by window, as JSON",
+    )
+
+
+def _add_healthy(parser: ArgumentParser) -> None:
+    """Add the arguments on healthy recordings of the same machine."""
+    parser.add_argument(
+        "--healthy",
+        metavar="FILE",
+        nargs="+",
+        default=[],
+        help="of the same machine when sound, for models with_reference",
+    )
+    parser.add_argument(
+        "--healthy-speed-rpm",
+        type=float,
+        metavar="RPM",
+        help="of the healthy recordings (default: --speed-rpm)",
     )
 
 
@@ -107,12 +135,14 @@ def _add_rotation(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Print the answers; exit status 3 if a recording is unlike the training data."""
+    from dataclasses import replace
+
     from diagnose.recordings.predict import predict_recording
     from diagnose.recordings.registry import open_network
     from diagnose.recordings.source import Source
     from diagnose.training.store import load_domain
 
-    sources = [
+    described = [
         Source(
             file=recording,
             sampling_rate=arguments.sampling_rate,
@@ -130,8 +160,25 @@ def run(arguments: Namespace) -> int:
         )
         for recording in arguments.recording
     ]
+    speed = arguments.healthy_speed_rpm or arguments.speed_rpm
+    sources = [
+        replace(
+            source,
+            healthy=tuple(
+                replace(source, file=file, speed_rpm=speed)
+                for file in arguments.healthy
+            ),
+        )
+        for source in described
+    ]
+    if arguments.plot and len(sources) > 1:
+        raise ConfigError("--plot is the picture of one recording; give one")
+    if arguments.plot and not arguments.plot.endswith(".png"):
+        raise ConfigError(f"--plot {arguments.plot} must end in .png")
     network = open_network(arguments.model)
     domain = load_domain(arguments.model, network.description)
+    if arguments.plot:
+        _plot(arguments.plot, network, sources[0])
     results = []
     for source in sources:
         result = predict_recording(network, domain, source)
@@ -148,3 +195,15 @@ def run(arguments: Namespace) -> int:
     if any(result["out_of_distribution"] for result in results):
         return OUT_OF_DISTRIBUTION
     return 0
+
+
+def _plot(file: str, network: StoredNetwork, source: Source) -> None:
+    """Write the picture of the most suspicious tooth of a recording."""
+    from pathlib import Path
+
+    from diagnose.recordings.accused import accused_tooth
+    from diagnose.report.tooth_figure import tooth_figure
+
+    accused = accused_tooth(network, source)
+    title = f"{Path(source.file).name}: {accused.gear}, tooth {accused.tooth}"
+    tooth_figure(Path(file), accused, title)

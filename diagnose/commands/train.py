@@ -6,6 +6,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 HELP = """\
 Train a network and its baselines on splits of a data set and write a report. Default protocols:
-by_unit, cross_specimen and the leaky one, as far as the data set has them. task=remaining_life
+new_machine, by_unit and cross_specimen, as far as the data set has them. task=remaining_life
 predicts how long each machine still runs, on data sets that run to failure.
 
   data=DIR    data set made by gensig generate
@@ -30,7 +31,7 @@ Every other key=value overrides configs/train.yaml, model=NAME chooses a file of
 EXAMPLE = """\
 examples:
   diagnose train data=runs/quickstart out=runs/report
-  diagnose train data=runs/quickstart out=runs/report protocols=[by_unit] seeds=[0,1,2,3,4]
+  diagnose train data=runs/quickstart out=runs/report protocols=[new_machine] seeds=[0,1,2]
   diagnose train data=runs/quickstart out=runs/cross protocols=[cross_speed,unseen_severity_outer]
   diagnose train data=runs/quickstart out=runs/novelty protocols=[healthy_only,open_set]
   diagnose train data=runs/lives out=runs/hours task=remaining_life normalise=none
@@ -111,19 +112,30 @@ def _train_one(config: Configuration) -> None:
 def _study_classes(settings: TrainSettings, out: Path) -> tuple[Path, list[str]]:
     """Page and tables of a study that tells classes apart."""
     from diagnose.data.protocols import choose_protocols
+    from diagnose.recordings.found_faults import found_fault_pictures
+    from diagnose.report.headlines import headline_protocol, headlines
     from diagnose.report.novelty_report import novelty_tables
     from diagnose.report.page import result_table, without_interval, write_report
-    from diagnose.studies.study import plan_study, run_study
+    from diagnose.studies.study import baselines_left_out, plan_study, run_study
 
     task, settings = _opened(settings)
     protocols, jobs = plan_study(task, settings)
     left_out = choose_protocols(task, settings.protocols)[1]
+    for name, reason in baselines_left_out(task, settings, protocols).items():
+        _note(f"baseline {name} is left out of {reason}")
     with _started(out, len(jobs), left_out) as on_done:
         metrics = run_study(
             task, settings, out, protocols=protocols, jobs=jobs, on_done=on_done
         )
-    page = write_report(out, metrics)
-    tables = [*result_table(metrics), *novelty_tables(metrics["novelty"])]
+    shown: list[tuple[str, str]] = []
+    if protocol := headline_protocol(metrics):
+        shown = found_fault_pictures(out, task, protocol, metrics["model"])
+    page = write_report(out, metrics, shown)
+    tables = [
+        *headlines(metrics),
+        *result_table(metrics),
+        *novelty_tables(metrics["novelty"]),
+    ]
     return page, tables + without_interval(metrics)
 
 
@@ -155,15 +167,21 @@ STUDIES = {"classes": _study_classes, "remaining_life": _study_lives}
 def _opened(settings: TrainSettings) -> tuple[Task, TrainSettings]:
     """Task on the data set, and the settings with what the data set decides.
 
-    A line on stderr says where windows get another length than usual.
+    Lines on stderr say where windows get another length than usual, and where another network is
+    trained than asked for.
     """
-    from diagnose.studies.study import settings_for, task_from, window_note
+    from diagnose.studies.network_choice import settings_for
+    from diagnose.studies.study import task_from, window_note
     from gensig.dataset.reader import open_dataset
 
     task = task_from(open_dataset(settings.data), settings)
-    if note := window_note(task.dataset, settings):
+    chosen, instead = settings_for(task, settings)
+    if instead:
+        _note(instead)
+    given = replace(chosen, window_samples=settings.window_samples)
+    if note := window_note(task.dataset, given):
         _note(note)
-    return task, settings_for(task.dataset, settings)
+    return task, chosen
 
 
 def _started(

@@ -3,15 +3,31 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.windows import Read, Segments, Task, WindowSet, read_signal
 from gensig.options.configuration import Section
+
+if TYPE_CHECKING:
+    from gensig.dataset.reader import Dataset
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SoundSignal:
+    """A healthy recording of the machine of another recording, at the rate of a network.
+
+    Attributes
+    ----------
+    signal : (channel, sample) m/s^2
+    speed_rpm : of the driving shaft
+    """
+
+    signal: NDArray[np.float32]
+    speed_rpm: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,8 +39,10 @@ class RecordedSignal:
     signal : (channel, sample) m/s^2
     sampling_rate : Hz
     speed_rpm : of the driving shaft; None if it is not known
+    n_teeth : of the driving and the driven gear; None if they are not known
     file : name of the recording, for messages
     window_samples, stride_samples, normalise : as in `diagnose.data.windows.Task`
+    healthy : healthy recordings of the same machine, for a network that compares with them
     """
 
     signal: NDArray[np.float32]
@@ -34,6 +52,8 @@ class RecordedSignal:
     window_samples: int
     stride_samples: int
     normalise: str
+    n_teeth: tuple[int, int] | None = None
+    healthy: tuple[SoundSignal, ...] = ()
 
 
 class NetworkInput(ABC):
@@ -56,7 +76,7 @@ class NetworkInput(ABC):
     def completed(
         cls,
         model_config: Section,
-        attributes: Mapping[str, Any],
+        dataset: Dataset,
     ) -> Section:
         """Configuration of a network with the values that its input takes of a data set.
 
@@ -80,8 +100,8 @@ class NetworkInput(ABC):
         """
 
     @abstractmethod
-    def n_points(self, window_samples: int) -> int:
-        """Points of one input along its last axis, for windows of a study's length."""
+    def example(self, n_channels: int, window_samples: int) -> NDArray[np.float32]:
+        """An input (1, channel, point) without vibration, for windows of a study's length."""
 
     @abstractmethod
     def load(

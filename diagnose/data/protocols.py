@@ -6,7 +6,10 @@ import itertools
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from diagnose.data.windows import CROSS_SENSOR, check_names, n_samples
+from gensig.dataset.splitting.protocols import MACHINE_COLUMNS, NEW_MACHINE
 from gensig.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -16,7 +19,13 @@ if TYPE_CHECKING:
 # over classes.
 HEALTHY_ONLY = "healthy_only"
 OPEN_PROTOCOLS = (HEALTHY_ONLY, "open_set")
+# What these say, `NEW_MACHINE` says where no two units share gears or a gearbox.
+BY_PART = ("by_unit", "cross_specimen", "cross_gearbox")
+SAID_ALREADY = (
+    f"says what {NEW_MACHINE} says where every unit has gears and a gearbox of its own"
+)
 MEANING = {
+    NEW_MACHINE: "on machines never seen, neither their gears nor their gearbox",
     "by_unit": "tested on machines (unit = one set of gears in one gearbox) never seen in training",
     "cross_specimen": "on sets of gears never seen",
     "cross_gearbox": "on gearboxes never seen; their sets of gears may be known",
@@ -41,7 +50,7 @@ def choose_protocols(
     ----------
     task : of an open data set
     wanted : names, or None for every protocol that the set has, with `OPEN_PROTOCOLS` and
-        `CROSS_SENSOR`
+        `CROSS_SENSOR`; beside `NEW_MACHINE` those `BY_PART` are left out where they say the same
 
     Raises
     ------
@@ -60,6 +69,9 @@ def choose_protocols(
         if name in offered and (reason := _why_no_window(task, name)):
             left_out[name] = reason
     absent = {name: left_out[name] for name in wanted if name in left_out}
+    if NEW_MACHINE in wanted and NEW_MACHINE not in absent and _has_own_parts(task):
+        said = [name for name in wanted if name in BY_PART and name not in absent]
+        absent |= dict.fromkeys(said, SAID_ALREADY)
     chosen = tuple(name for name in wanted if name not in absent)
     if not chosen:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in absent.items())
@@ -68,6 +80,13 @@ def choose_protocols(
             f"({reasons or 'it has no splits'})"
         )
     return chosen, absent
+
+
+def _has_own_parts(task: Task) -> bool:
+    """True where every unit has gears and a gearbox that no other unit has."""
+    columns = [np.asarray(task.dataset.column(name)) for name in MACHINE_COLUMNS]
+    machines = np.unique(np.stack(columns), axis=1).shape[1]
+    return all(len(np.unique(names)) == machines for names in columns)
 
 
 def channels_to_cross(

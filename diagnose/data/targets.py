@@ -24,10 +24,11 @@ GEARS = ("none", "pinion", "wheel")  # the gear that has the fault
 # Base pitches before and after a tooth comes into mesh, in which its fault may show; assumed.
 BEFORE, AFTER = 0.3, 2.2
 NEVER = -30.0  # log-probability of positions that are not the fault's
+START = "start_phase"  # share of a passage that the first tooth has already moved
 TOOTH_COLUMNS = (
     "fault_gear",
     "fault_tooth",
-    "start_phase",
+    START,
     "start_tooth_pinion",
     "start_tooth_wheel",
 )
@@ -56,7 +57,7 @@ def fault_positions(
     dataset: Dataset,
     record: IntArray,
     passages: FloatArray,
-    n_teeth: Sequence[int],
+    n_teeth: IntArray,
 ) -> FloatArray:
     """Positions on a gear's turn at which the fault comes into mesh.
 
@@ -66,7 +67,7 @@ def fault_positions(
     ----------
     dataset, record : (window,) record of each window
     passages : (window,) passages of a tooth from the record's first sample to the window's
-    n_teeth : of pinion and wheel
+    n_teeth : (window, gear) of pinion and wheel
 
     Returns
     -------
@@ -77,11 +78,32 @@ def fault_positions(
     if not set(TOOTH_COLUMNS) <= set(dataset.column_names):
         return position
     column = {name: np.asarray(dataset.column(name))[record] for name in TOOTH_COLUMNS}
-    for gear, teeth in zip(GEARS[1:], n_teeth, strict=True):
+    for gear, teeth in zip(GEARS[1:], n_teeth.T, strict=True):
         on_gear = (column["fault_gear"] == gear) & (column["fault_tooth"] >= 0)
         first = column[f"start_tooth_{gear}"] + column["start_phase"] + passages
         position[on_gear] = np.mod(column["fault_tooth"] - first, teeth)[on_gear]
     return position
+
+
+def tooth_entries(
+    dataset: Dataset, record: IntArray, passages: FloatArray
+) -> NDArray[np.float32]:
+    """Places in a passage at which a tooth comes into mesh, the same for both gears.
+
+    Parameters
+    ----------
+    dataset, record : (window,) record of each window
+    passages : (window,) passages of a tooth from the record's first sample to the window's
+
+    Returns
+    -------
+    (window,) share of a passage from the first sample of the window to the next entry; NaN if
+    the data set does not say the start
+    """
+    if START not in dataset.column_names:
+        return np.full(len(record), np.nan, dtype=np.float32)
+    phase = np.asarray(dataset.column(START), dtype=float)[record]
+    return np.mod(-phase - passages, 1.0).astype(np.float32)
 
 
 def further_loss(

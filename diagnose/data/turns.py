@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self, final
+import functools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Self, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.inputs import NetworkInput, RecordedSignal
-from diagnose.data.targets import fault_positions, record_targets
+from diagnose.data.packed_turns import HEADER, n_points, packed, turns_of
+from diagnose.data.references import reference_kind, references
+from diagnose.data.targets import GEARS, fault_positions, record_targets, tooth_entries
+from diagnose.data.teeth import common_teeth, missing_teeth, teeth_of_records
+from diagnose.data.turn_levels import turn_levels
 from diagnose.data.windows import (
     FloatArray,
     Read,
@@ -21,9 +26,27 @@ from diagnose.data.windows import (
 )
 from gensig.errors import ConfigError, DatasetError
 from gensig.options.configuration import Section
-from gensig.signals.separation import separate_gears
+from gensig.signals.alignment import aligned_turns
+from gensig.signals.separation import GearTurns, separate_gears
+from gensig.signals.unexplained_teeth import unexplained_teeth
 
-N_TEETH, PER_TOOTH = "n_teeth", "samples_per_tooth"  # of a network's configuration
+if TYPE_CHECKING:
+    from gensig.dataset.reader import Dataset
+
+# Keys of a network's configuration.
+N_TEETH, PER_TOOTH, HALVES = "n_teeth", "samples_per_tooth", "halves"
+REFERENCE, NO_REFERENCE, UNEXPLAINED = "reference", "none", "unexplained"
+EACH_CHANNEL = "each_channel"
+LEAST_HARMONICS = 3  # of the mesh that a recording must hold; assumed
+EXAMPLE_TEETH = (11, 13)  # of an input that is tried on a network; any numbers serve
+
+HEALTHY_NEEDED = (
+    "this model compares with healthy recordings of the machine: say --healthy FILE"
+)
+NO_HEALTHY = (
+    "this model takes no healthy recording: leave --healthy out, "
+    "or train one with reference=other_condition"
+)
 
 
 @final
@@ -31,14 +54,28 @@ N_TEETH, PER_TOOTH = "n_teeth", "samples_per_tooth"  # of a network's configurat
 class Turns(NetworkInput):
     """Turns of the driving and the driven gear and the mean passage of a tooth, end to end.
 
+    `diagnose.data.packed_turns` says how they lie in an array. Records may differ in their
+    numbers of teeth.
+
     Attributes
     ----------
-    n_teeth : of the driving and the driven gear
     samples_per_tooth : of the turns
+    n_teeth : of the driving and the driven gear, for a network that reads no others; else None
+    halves : True if a training takes either half of a stretch as a further example
+    unexplained : True if the turns of what no other tooth explains stand behind the record, see
+        `gensig.signals.unexplained_teeth`
+    reference : kind of `diagnose.data.references.references`, whose turns stand behind all
+        others, rotated to them; or ``"none"``
+    each_channel : True if every channel is an input of its own, so that a network takes
+        recordings of any number of channels
     """
 
-    n_teeth: tuple[int, int]
     samples_per_tooth: int
+    n_teeth: tuple[int, int] | None = None
+    halves: bool = True
+    unexplained: bool = False
+    reference: str = NO_REFERENCE
+    each_channel: bool = False
 
     has_window_length: ClassVar[bool] = False
     why_not_exported: ClassVar[str | None] = (
@@ -47,26 +84,48 @@ class Turns(NetworkInput):
     )
 
     @classmethod
-    def completed(
-        cls,
-        model_config: Section,
-        attributes: Mapping[str, Any],
-    ) -> Section:
-        """The configuration with the tooth counts of the data set."""
-        try:
-            teeth = [int(attributes[f"n_teeth_{gear}"]) for gear in ("pinion", "wheel")]
-        except KeyError as error:
+    def completed(cls, model_config: Section, dataset: Dataset) -> Section:
+        """The configuration, with the tooth counts of the data set if it has a key for them.
+
+        Raises
+        ------
+        ConfigError    for a data set that does not say them, or has several where the network
+            reads one pair
+        """
+        if name := missing_teeth(dataset):
             raise ConfigError(
-                f"the data set does not say {error.args[0]}, "
-                "which this model needs: model=cnn"
-            ) from None
-        return model_config | {N_TEETH: teeth}
+                f"the data set does not say {name}, which this model needs: model=cnn"
+            )
+        if N_TEETH not in model_config:
+            return model_config
+        teeth = common_teeth(dataset)
+        if teeth is None:
+            raise ConfigError(
+                "the records differ in their numbers of teeth, and this model reads one pair "
+                "of gears: model=tooth reads any"
+            )
+        return model_config | {N_TEETH: list(teeth)}
 
     @classmethod
     def of(cls, model_config: Section) -> Self:
-        """Turns of the tooth counts and the samples a tooth that the configuration gives."""
-        driving, driven = model_config[N_TEETH]
-        return cls(n_teeth=(driving, driven), samples_per_tooth=model_config[PER_TOOTH])
+        """Turns as the configuration of a network says."""
+        n_teeth = None
+        if model_config.get(N_TEETH) is not None:
+            driving, driven = model_config[N_TEETH]
+            n_teeth = (int(driving), int(driven))
+        return cls(
+            samples_per_tooth=model_config[PER_TOOTH],
+            n_teeth=n_teeth,
+            halves=model_config.get(HALVES, True),
+            unexplained=model_config.get(UNEXPLAINED, False),
+            reference=model_config.get(REFERENCE, NO_REFERENCE),
+            each_channel=model_config.get(EACH_CHANNEL, False),
+        )
+
+    @property
+    def n_kinds(self) -> int:
+        """Number of turns of either gear in an input."""
+        return 1 + self.unexplained + (self.reference != NO_REFERENCE)
 
     def check(self, task: Task, segments: Segments, network: str) -> None:
         """Refuse stretches that hold no turn of the driving gear, with the shortest one."""
@@ -80,9 +139,14 @@ class Turns(NetworkInput):
                 "make longer records or choose another model"
             )
 
-    def n_points(self, window_samples: int) -> int:
-        """Points of the packed turns, whatever the length of a window."""
-        return int(self.samples_per_tooth * (sum(self.n_teeth) + 1))
+    def example(self, n_channels: int, window_samples: int) -> NDArray[np.float32]:
+        """Silent turns, whatever the length of a window."""
+        n_teeth = self.n_teeth or EXAMPLE_TEETH
+        length = n_points(n_teeth, self.samples_per_tooth, self.n_kinds)
+        shape = (1, 1 if self.each_channel else n_channels, length)
+        silent = np.zeros(shape, dtype=np.float32)
+        silent[..., :HEADER] = n_teeth
+        return silent
 
     def load(
         self,
@@ -92,40 +156,42 @@ class Turns(NetworkInput):
         training: bool = False,
         read: Read = read_signal,
     ) -> WindowSet:
-        """Turns of each stretch; in training also of either half: the same teeth, other noise.
+        """Turns of each stretch; with `halves` a training has those of either half too.
+
+        A half has the same teeth and other noise.
 
         Raises
         ------
         DatasetError    for a stretch without a whole turn
         """
         rate = task.dataset.sampling_rate
-        speed_rpm = _speed_rpm(task).tolist()
-        turns: list[NDArray[np.float32]] = []
-        records: list[int] = []
-        passages: list[float] = []
+        speed_rpm, teeth = _speed_rpm(task).tolist(), teeth_of_records(task.dataset)
+        sound_turns = self._sound_turns(task, read)
+        gathered = _Gathered()
         for row in segments.rows():
             record, start, _ = row
             signal = read(task, *row)
-            speed = speed_rpm[record]
-            passages_per_sample = speed / 60 * self.n_teeth[0] / rate
-            for first, part in _parts(signal, halves=training):
+            speed, n_teeth = speed_rpm[record], tuple(teeth[record].tolist())
+            passages_per_sample = speed / 60 * n_teeth[0] / rate
+            for first, part in _parts(signal, halves=training and self.halves):
                 try:
-                    turns.append(self.packed(part, rate, speed))
+                    of_part = self.turns(part, rate, speed, n_teeth)
                 except ValueError as error:
                     if part is signal:
                         raise DatasetError(
                             f"record {record}: {error}; this model needs longer records"
                         ) from None
                     continue  # half a stretch may be too short
-                records.append(record)
-                passages.append((start + first) * passages_per_sample)
-        record_of, passage = np.array(records), np.array(passages)
+                passages = (start + first) * passages_per_sample
+                for turns, sound in self.inputs_of(of_part, sound_turns(record)):
+                    gathered.add(self, turns, sound, record, passages)
+        record_of, passage = np.array(gathered.record), np.array(gathered.passages)
         targets = record_targets(task.dataset, record_of)
         targets["position"] = fault_positions(
-            task.dataset, record_of, passage, self.n_teeth
+            task.dataset, record_of, passage, teeth[record_of]
         )
-        label = task.labels()[record_of]
-        windows = _turn_set(tuple(turns), label, record_of, task.normalise)
+        targets["entry"] = tooth_entries(task.dataset, record_of, passage)
+        windows = gathered.windows(task.labels()[record_of], task.normalise)
         return replace(windows, targets=targets)
 
     def of_recording(self, recording: RecordedSignal) -> WindowSet:
@@ -133,56 +199,217 @@ class Turns(NetworkInput):
 
         Raises
         ------
-        ConfigError    for an unknown speed, or less than a turn
+        ConfigError    for an unknown speed or unknown teeth, less than a turn, and healthy
+            recordings that are missing or that the network does not take
         """
         file, speed_rpm = recording.file, recording.speed_rpm
+        n_teeth = self.n_teeth or recording.n_teeth
         if speed_rpm is None:
             raise ConfigError(
                 "this model looks at turns and must know the speed: "
                 f"say --speed-rpm of {file}"
             )
+        if n_teeth is None:
+            raise ConfigError(
+                "this model looks at turns and must know the teeth of both gears: "
+                f"say --teeth of {file}, of the driving gear first"
+            )
+        if (self.reference != NO_REFERENCE) != bool(recording.healthy):
+            raise ConfigError(
+                HEALTHY_NEEDED if self.reference != NO_REFERENCE else NO_HEALTHY
+            )
+        rate, mesh = recording.sampling_rate, speed_rpm / 60 * n_teeth[0]
+        if 0.5 * rate < LEAST_HARMONICS * mesh:
+            raise ConfigError(
+                f"{file}: {rate:.5g} samples a second hold {0.5 * rate / mesh:.1f} harmonics of "
+                f"the mesh at {mesh:.5g} Hz, and this model needs {LEAST_HARMONICS}: measure at "
+                f"{2 * LEAST_HARMONICS * mesh:.5g} or more, or at a lower speed"
+            )
         try:
-            turns = self.packed(recording.signal, recording.sampling_rate, speed_rpm)
+            whole = self.turns(recording.signal, rate, speed_rpm, n_teeth)
+            healthy = [
+                self.turns(other.signal, rate, other.speed_rpm, n_teeth)
+                for other in recording.healthy
+            ]
         except ValueError as error:
             raise ConfigError(f"{file}: {error}") from None
-        nothing = np.zeros(1, dtype=np.int64)
-        return _turn_set((turns,), nothing, nothing, recording.normalise)
+        gathered = _Gathered()
+        for turns, sound in self.inputs_of(whole, healthy):
+            gathered.add(self, turns, sound, 0, 0.0)
+        nothing = np.zeros(len(gathered.record), dtype=np.int64)
+        return gathered.windows(nothing, recording.normalise)
 
     def seconds(self, *, window: float, recording: float) -> float:
         """Seconds of the whole recording."""
         return recording
 
-    def packed(
+    def turns(
         self,
         signal: FloatArray,
         sampling_rate: float,
         speed_rpm: float,
-    ) -> NDArray[np.float32]:
-        """Turns of both gears and the mean passage of one recording, one after the other.
+        n_teeth: tuple[int, int],
+    ) -> GearTurns:
+        """Turns of both gears and the mean passage of one recording.
 
         Parameters
         ----------
         signal : (channel, sample) m/s^2
         sampling_rate : Hz
         speed_rpm : of the driving gear, constant
-
-        Returns
-        -------
-        (channel, point) float32 in the signal's unit, `n_points` of them
+        n_teeth : of the driving and the driven gear
 
         Raises
         ------
         ValueError    for less than a turn of the driving gear
         """
-        gears = separate_gears(
+        return separate_gears(
             signal,
             sampling_rate,
-            speed_rpm / 60 * self.n_teeth[0],
-            self.n_teeth,
+            speed_rpm / 60 * n_teeth[0],
+            n_teeth,
             samples_per_tooth=self.samples_per_tooth,
         )
-        packed = np.concatenate([gears.driving, gears.driven, gears.mesh], axis=-1)
-        return packed.astype(np.float32)
+
+    def packed(
+        self, turns: GearTurns, sound: Sequence[GearTurns] = ()
+    ) -> NDArray[np.float32]:
+        """Turns of both gears and the mean passage of a recording, one after the other.
+
+        Those of what no other tooth explains and of a sound recording follow, where the input has
+        them.
+
+        Parameters
+        ----------
+        turns : of the recording
+        sound : of sound recordings of the same machine, which are rotated to it and averaged
+
+        Returns
+        -------
+        (channel, point) float32 in the signal's unit, see `diagnose.data.packed_turns`
+        """
+        gears = [self._teeth(turns.driving), self._teeth(turns.driven)]
+        further: list[FloatArray] = []
+        if self.unexplained:
+            further += [gear.rest for gear in unexplained_teeth(*gears)]
+        if sound:
+            rotated = [aligned_turns(other, turns) for other in sound]
+            driving = np.mean([other.driving for other in rotated], axis=0)
+            driven = np.mean([other.driven for other in rotated], axis=0)
+            further += [self._teeth(driving), self._teeth(driven)]
+        return packed(gears, turns.mesh, further)
+
+    def levels(self, turns: GearTurns) -> NDArray[np.float32]:
+        """(feature,) of `diagnose.data.turn_levels`."""
+        driving, driven = self._teeth(turns.driving), self._teeth(turns.driven)
+        return turn_levels(driving, driven, turns.mesh)
+
+    def of_gear(self, array: NDArray[np.float32], gear: str, entry: int) -> FloatArray:
+        """(channel, tooth, sample) mean turn of a gear, with the mean passage of the mesh.
+
+        Parameters
+        ----------
+        array : (channel, point) of `packed`
+        gear : of `diagnose.data.targets.GEARS`
+        entry : sample of a passage from which teeth begin
+        """
+        driving, driven, mesh = turns_of(array, self.samples_per_tooth)
+        turn = {GEARS[1]: driving, GEARS[2]: driven}[gear]
+        whole = turn + mesh[:, None]
+        return self._teeth(np.roll(whole.reshape(len(turn), -1), -entry, axis=-1))
+
+    def _teeth(self, turn: FloatArray) -> FloatArray:
+        """(channel, tooth, sample) of a turn (channel, sample)."""
+        return turn.reshape(len(turn), -1, self.samples_per_tooth)
+
+    def inputs_of(
+        self, turns: GearTurns, sound: Sequence[GearTurns]
+    ) -> list[tuple[GearTurns, list[GearTurns]]]:
+        """Turns and those of sound recordings, for every input of a recording."""
+        if not self.each_channel:
+            return [(turns, list(sound))]
+        return [
+            (_channel(turns, index), [_channel(other, index) for other in sound])
+            for index in range(len(turns.mesh))
+        ]
+
+    def _sound_turns(self, task: Task, read: Read) -> Callable[[int], list[GearTurns]]:
+        """Function that returns the turns of the reference of a record; none without references.
+
+        Raises
+        ------
+        ConfigError    for a record without a reference
+        """
+        if self.reference == NO_REFERENCE:
+            return lambda record: []
+        chosen = references(task, reference_kind(self.reference))
+        n_samples, rate = int(task.dataset.n_samples), task.dataset.sampling_rate
+        speed_rpm, teeth = _speed_rpm(task), teeth_of_records(task.dataset)
+
+        @functools.cache
+        def turns(other: int) -> GearTurns:
+            signal = read(task, other, 0, n_samples)
+            driving, driven = teeth[other].tolist()
+            return self.turns(signal, rate, float(speed_rpm[other]), (driving, driven))
+
+        def of_record(record: int) -> list[GearTurns]:
+            other = int(chosen[record])
+            if other < 0:
+                raise ConfigError(
+                    f"record {record} has no sound record of its machine to compare with: "
+                    "make the data set with plan.n_reference=1, or leave reference=none"
+                )
+            return [turns(other)]
+
+        return of_record
+
+
+@dataclass(slots=True, kw_only=True)
+class _Gathered:
+    """Inputs that are gathered one by one, with their records and the passages before them."""
+
+    signals: list[NDArray[np.float32]] = field(default_factory=list)
+    levels: list[NDArray[np.float32]] = field(default_factory=list)
+    record: list[int] = field(default_factory=list)
+    passages: list[float] = field(default_factory=list)
+
+    def add(
+        self,
+        inputs: Turns,
+        turns: GearTurns,
+        sound: Sequence[GearTurns],
+        record: int,
+        passages: float,
+    ) -> None:
+        """Take one input in."""
+        self.signals.append(inputs.packed(turns, sound))
+        self.levels.append(inputs.levels(turns))
+        self.record.append(record)
+        self.passages.append(passages)
+
+    def windows(self, label: NDArray[Any], normalise: str) -> WindowSet:
+        """All inputs as windows that fill their signals."""
+        return WindowSet(
+            signals=tuple(self.signals),
+            segment=np.arange(len(self.signals)),
+            start=np.zeros(len(self.signals), dtype=np.int64),
+            label=label,
+            record=np.array(self.record),
+            window_samples=max(signal.shape[-1] for signal in self.signals),
+            normalise=normalise,
+            n_header=HEADER,
+            levels=np.stack(self.levels),
+        )
+
+
+def _channel(turns: GearTurns, index: int) -> GearTurns:
+    """Turns of one channel, which keeps its axis."""
+    chosen = slice(index, index + 1)
+    return GearTurns(
+        driving=turns.driving[chosen],
+        driven=turns.driven[chosen],
+        mesh=turns.mesh[chosen],
+    )
 
 
 def _speed_rpm(task: Task) -> FloatArray:
@@ -199,21 +426,3 @@ def _parts(
         middle = signal.shape[-1] // 2
         parts += [(0, signal[:, :middle]), (middle, signal[:, middle : 2 * middle])]
     return parts
-
-
-def _turn_set(
-    turns: tuple[NDArray[np.float32], ...],
-    label: NDArray[Any],
-    record: NDArray[Any],
-    normalise: str,
-) -> WindowSet:
-    """Packed turns as windows that fill their signal."""
-    return WindowSet(
-        signals=turns,
-        segment=np.arange(len(turns)),
-        start=np.zeros(len(turns), dtype=np.int64),
-        label=label,
-        record=record,
-        window_samples=turns[0].shape[-1],
-        normalise=normalise,
-    )

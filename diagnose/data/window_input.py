@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self, final
+from typing import TYPE_CHECKING, ClassVar, Self, final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnose.data.inputs import NetworkInput, RecordedSignal
 from diagnose.data.targets import record_targets
@@ -22,6 +22,9 @@ from diagnose.data.windows import (
 from gensig.errors import ConfigError
 from gensig.options.configuration import Section
 
+if TYPE_CHECKING:
+    from gensig.dataset.reader import Dataset
+
 
 @final
 @dataclass(frozen=True, slots=True)
@@ -35,7 +38,7 @@ class Windows(NetworkInput):
     def completed(
         cls,
         model_config: Section,
-        attributes: Mapping[str, Any],
+        dataset: Dataset,
     ) -> Section:
         """The configuration as it is."""
         return model_config
@@ -49,9 +52,9 @@ class Windows(NetworkInput):
         """Refuse stretches that are all shorter than a window."""
         plan_windows(segments, task.window_samples, task.stride_samples)
 
-    def n_points(self, window_samples: int) -> int:
-        """Samples of a window."""
-        return window_samples
+    def example(self, n_channels: int, window_samples: int) -> NDArray[np.float32]:
+        """A silent window."""
+        return np.zeros((1, n_channels, window_samples), dtype=np.float32)
 
     def load(
         self,

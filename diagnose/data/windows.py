@@ -23,6 +23,7 @@ FloatArray = NDArray[np.floating]
 SUBSETS = ("train", "validation", "test")
 NORMALISATIONS = ("rms", "none")
 CROSS_SENSOR = "cross_sensor"  # the units of by_unit, tested on other channels
+IS_REFERENCE = "is_reference"  # 1: an extra sound record, neither example nor scored
 ROUNDING = 1e-6  # of a sample
 
 
@@ -85,14 +86,22 @@ class Task:
         return replace(self, channel_names=tested if subset == "test" else trained)
 
     def labels(self) -> IntArray:
-        """(record,) index into `class_names`; -1 for another class and for a record that failed."""
+        """(record,) index into `class_names`; -1 for a record that is no example.
+
+        That is one of another class, one that failed, and one that others are compared with.
+        """
         order = {name: index for index, name in enumerate(self.class_names)}
         names = [
             self.dataset.class_names[int(label)]
             for label in self.dataset.column("label")
         ]
         labels = np.array([order.get(name, -1) for name in names], dtype=np.int64)
-        return np.where(np.asarray(self.dataset.usable, dtype=bool), labels, -1)
+        is_example = np.asarray(self.dataset.usable, dtype=bool)
+        # a stream has examples alone, and no list of its columns
+        if IS_REFERENCE in getattr(self.dataset, "column_names", ()):
+            marked = np.asarray(self.dataset.column(IS_REFERENCE)) == 1
+            is_example = is_example & ~marked
+        return np.where(is_example, labels, -1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -218,8 +227,12 @@ class WindowSet:
     signals : one (channel, sample) float32 array in m/s^2 per segment
     segment, start : (window,) segment of each window, and its first sample in that segment
     label, record : (window,)
-    window_samples, normalise : as in `Task`
+    window_samples, normalise : as in `Task`; a signal that is shorter than a window is one, with
+        zeros behind it
     targets : further (window,) values to learn; see `diagnose.data.targets`
+    n_header : points at the beginning of each signal that are no vibration and stay as they are
+    levels : (window, feature) of the domain, see `diagnose.networks.domain`; None for the levels
+        of the windows in bands
     """
 
     signals: tuple[NDArray[np.float32], ...]
@@ -230,6 +243,8 @@ class WindowSet:
     window_samples: int
     normalise: str
     targets: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    n_header: int = 0
+    levels: FloatArray | None = None
 
     def __len__(self) -> int:
         return int(self.segment.size)
@@ -241,8 +256,12 @@ class WindowSet:
     def subset(self, chosen: IntArray) -> WindowSet:
         """The chosen windows, on the same signals."""
         targets = {name: values[chosen] for name, values in self.targets.items()}
+        levels = self.levels
+        if levels is not None:
+            levels = levels[chosen]
         return replace(
             self,
+            levels=levels,
             segment=self.segment[chosen],
             start=self.start[chosen],
             label=self.label[chosen],
@@ -259,15 +278,32 @@ class WindowSet:
         -------
         (window, channel, sample) float32, normalised
         """
-        n_channels, length = self.signals[0].shape[0], self.window_samples
-        chosen = np.empty((len(windows), n_channels, length), dtype=np.float32)
-        for row, window in enumerate(windows):
+        lengths = [self._length(window) for window in windows]
+        shape = (len(windows), self.signals[0].shape[0], max(lengths, default=0))
+        chosen = np.zeros(shape, dtype=np.float32)
+        for row, (window, length) in enumerate(zip(windows, lengths, strict=True)):
             signal = self.signals[self.segment[window]]
             start = int(self.start[window])
             if rng is not None:
                 start = int(rng.integers(signal.shape[-1] - length + 1))
-            chosen[row] = signal[:, start : start + length]
-        return normalised(chosen, self.normalise)
+            chosen[row, :, :length] = signal[:, start : start + length]
+        self._normalise(chosen, lengths)
+        return chosen
+
+    def _length(self, window: int) -> int:
+        """Points of a window: those of its signal, if that is shorter."""
+        signal = self.signals[self.segment[window]]
+        return min(self.window_samples, signal.shape[-1])
+
+    def _normalise(self, windows: NDArray[np.float32], lengths: Sequence[int]) -> None:
+        """Normalise windows (window, channel, point) in place, without what fills them up."""
+        if len(set(lengths)) == 1:
+            vibration = windows[..., self.n_header :]
+            vibration[...] = normalised(vibration, self.normalise)
+            return
+        for window, length in zip(windows, lengths, strict=True):
+            vibration = window[:, self.n_header : length]
+            vibration[...] = normalised(vibration, self.normalise)
 
 
 Read = Callable[["Task", int, int, int], NDArray[np.float32]]
@@ -333,7 +369,8 @@ def input_scale(windows: WindowSet) -> list[float]:
     """RMS of each channel over the signals; 1 for a silent one, and under ``"rms"``."""
     if windows.normalise == "rms":
         return [1.0] * windows.signals[0].shape[0]
-    power = np.mean([np.var(signal, axis=-1) for signal in windows.signals], axis=0)
+    signals = [signal[:, windows.n_header :] for signal in windows.signals]
+    power = np.mean([np.var(signal, axis=-1) for signal in signals], axis=0)
     return [float(value) for value in np.where(power > 0, np.sqrt(power), 1.0)]
 
 

@@ -30,7 +30,9 @@ if TYPE_CHECKING:
 
 HEALTHY = "healthy"
 PREFIX = "adaptation."
-MOST_WINDOWS = 500  # of the training, evenly spaced, whose features are stored
+MOST_WINDOWS = (
+    500  # of the training, evenly spaced; of their features as many rows are stored
+)
 LEAST_WINDOWS = (
     8  # assumed; a second at the default length, for moments that are typical
 )
@@ -47,7 +49,7 @@ class Statistics:
     ----------
     mean, variance : batch-normalisation layer -> (channel,) of its input, over windows and
         positions
-    features : (window, feature) that the class scores are linear in
+    features : (row, feature) that the class scores are linear in; rows are windows, or their sites
     levels : (level,) mean of `diagnose.networks.domain.window_levels`
     """
 
@@ -120,10 +122,11 @@ def statistics_of(model: nn.Module, windows: WindowSet) -> Statistics:
     """Statistics of windows of any class, at their planned starts."""
     names = [name for name, _ in _norms(model)]
     moments, features = _observe(model, windows, names)
+    kept = evenly_spaced(len(features), MOST_WINDOWS)
     return Statistics(
         mean={name: moments[name][0] for name in names},
         variance={name: moments[name][1] for name in names},
-        features=features,
+        features=features[kept],
         levels=window_levels(windows).mean(axis=0),
     )
 
@@ -265,7 +268,10 @@ def _head(model: nn.Module) -> nn.Linear:
 def _observe(
     model: nn.Module, windows: WindowSet, names: list[str], *, batch_size: int = 32
 ) -> tuple[dict[str, tuple[FloatArray, FloatArray]], FloatArray]:
-    """Mean and variance of the input of the named layers, and (window, feature) of the head's."""
+    """Mean and variance of the input of the named layers, and (row, feature) of the head's.
+
+    Rows are windows, or all sites of all windows for a network that scores sites.
+    """
     sums: dict[str, Any] = dict.fromkeys(names, 0.0)
     squares: dict[str, Any] = dict.fromkeys(names, 0.0)
     counts = dict.fromkeys(names, 0)
@@ -278,7 +284,7 @@ def _observe(
         counts[name] += by_channel.shape[1]
 
     def add_features(_: nn.Module, inputs: tuple[torch.Tensor, ...]) -> None:
-        features.append(inputs[0].double().numpy())
+        features.append(inputs[0].double().flatten(0, -2).numpy())
 
     layers = dict(model.named_modules())
     hooks = [_head(model).register_forward_pre_hook(add_features)]

@@ -30,7 +30,7 @@ class Domain:
 
     Attributes
     ----------
-    levels : (window, feature) of training windows, the bands of the first channel first
+    levels : (window, feature) of training windows, of `window_levels`
     threshold : distance that the share `QUANTILE` of the validation windows does not exceed
     n_validation_windows : number of windows behind the threshold
     """
@@ -135,7 +135,9 @@ def distances(domain: Domain, windows: WindowSet) -> FloatArray:
 
 
 def window_levels(windows: WindowSet, *, batch_size: int = 64) -> FloatArray:
-    """(window, feature) `band_levels` at the planned starts, the first channel first."""
+    """(window, feature) of the windows, or their `band_levels`, the first channel first."""
+    if windows.levels is not None:
+        return windows.levels
     levels = [band_levels(windows.cut(block)) for block in windows.blocks(batch_size)]
     return np.concatenate(levels).reshape(len(windows), -1)
 

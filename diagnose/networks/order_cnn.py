@@ -10,17 +10,18 @@ from torch import nn
 from torch.nn.functional import pad, relu
 
 from diagnose.data.inputs import NetworkInput
+from diagnose.data.packed_turns import HEADER
 from diagnose.data.targets import GEARS
 from diagnose.data.turns import Turns
-from diagnose.networks.network import Network, check_blocks
+from diagnose.networks.network import FeatureNetwork, check_blocks
 from gensig.errors import ConfigError
 
 
-class OrderCnn(Network):
+class OrderCnn(FeatureNetwork):
     """Convolutions around the turn of either gear, compared with the gear's mean; maximum over
     its teeth.
 
-    The input is `diagnose.data.turns.Turns.packed`: the difference of each tooth from the mean
+    The input is `diagnose.data.packed_turns`: the difference of each tooth from the mean
     passage, gear by gear, and that passage. It is the same at every speed, except for the
     frequency response. Responses of the first filters are compressed by the inverse hyperbolic
     sine: impacts of tooth engagement are 30 dB above the effects of cracks and pits between them.
@@ -64,7 +65,7 @@ class OrderCnn(Network):
             raise ConfigError(
                 "model: kernels must be odd, so that a turn stays as long as it is"
             )
-        self.n_points = [teeth * samples_per_tooth for teeth in (*n_teeth, 1)]
+        self.n_points = [HEADER, *(z * samples_per_tooth for z in (*n_teeth, 1))]
         self.n_teeth = list(n_teeth)
         known, named = set(GEARS[1:]), set(gears)
         if not named or not named <= known or len(named) < len(gears):
@@ -91,7 +92,7 @@ class OrderCnn(Network):
 
     def look(self, windows: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Maximum over each gear's turn, one gear after the other, and the maps of all turns."""
-        *turns, mesh = windows.split(self.n_points, dim=-1)
+        _, *turns, mesh = windows.split(self.n_points, dim=-1)
         parts = []
         for gear in self.gears:
             mean_passage = mesh.repeat(1, 1, self.n_teeth[gear])

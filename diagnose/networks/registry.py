@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import nn
 
 from diagnose.data.inputs import NetworkInput
@@ -13,9 +15,13 @@ from diagnose.networks.network import Network
 from diagnose.networks.order_cnn import OrderCnn
 from diagnose.networks.small_cnn import SmallCnn
 from diagnose.networks.spectrum import SpectrumCnn
+from diagnose.networks.tooth_network import ToothNetwork
 from diagnose.networks.wdcnn import Wdcnn
 from gensig.errors import ConfigError
 from gensig.options.configuration import Section
+
+if TYPE_CHECKING:
+    from gensig.dataset.reader import Dataset
 
 # Kind in a configuration -> network; each declares what it reads as its ``inputs``.
 MODELS: dict[str, type[Network]] = {
@@ -23,7 +29,13 @@ MODELS: dict[str, type[Network]] = {
     "wdcnn": Wdcnn,
     "spectrum_cnn": SpectrumCnn,
     "order_cnn": OrderCnn,
+    "tooth_network": ToothNetwork,
 }
+
+# Keys of a network's file that its class does not take: its name, its schedule, its input and
+# the network that is trained where it cannot be.
+OTHERWISE = "otherwise"
+NOT_OF_NETWORK = ("name", "kind", "training", "halves", "each_channel", OTHERWISE)
 
 
 def build_model(
@@ -37,7 +49,7 @@ def build_model(
 
     Parameters
     ----------
-    config : parameters, ``kind``, and ``name``, which is only shown
+    config : parameters, ``kind``, and keys of `NOT_OF_NETWORK`
     n_channels, n_classes : of the data
     input_scale : (channel,) divisor of the inputs; 1 if None
 
@@ -46,9 +58,7 @@ def build_model(
     ConfigError    for an unknown kind or parameters that it does not take
     """
     make: Callable[..., Network] = _network_class(config)
-    parameters = dict(config)
-    del parameters["kind"]
-    parameters.pop("name", None)
+    parameters = {key: config[key] for key in config if key not in NOT_OF_NETWORK}
     if input_scale is None:
         input_scale = [1.0] * n_channels
     try:
@@ -83,24 +93,34 @@ def has_window_length(config: Section) -> bool:
     return _network_class(config).inputs.has_window_length
 
 
+def takes_reference(config: Section) -> bool:
+    """True if the network of a configuration can compare with a sound record of the machine.
+
+    Raises
+    ------
+    ConfigError    for an unknown kind
+    """
+    return _network_class(config).takes_reference
+
+
 def completed(
     config: Section,
-    attributes: Mapping[str, Any],
+    dataset: Dataset,
     heads: Sequence[str],
 ) -> Section:
     """Configuration with its further heads, and the values that its input takes of a data set.
 
     Raises
     ------
-    ConfigError    for an unknown kind, or a data set whose attributes lack what the input needs
+    ConfigError    for an unknown kind, or a data set that lacks what the input needs
     """
     if heads:
         config = config | {"heads": list(heads)}
-    return _network_class(config).inputs.completed(config, attributes)
+    return _network_class(config).inputs.completed(config, dataset)
 
 
-def check_window(model: nn.Module, n_channels: int, window_samples: int) -> None:
-    """Refuse a window that the network cannot take, before anything is trained.
+def check_example(model: nn.Module, example: NDArray[np.float32]) -> None:
+    """Refuse an input (1, channel, point) that the network cannot take, before it is trained.
 
     Raises
     ------
@@ -108,12 +128,22 @@ def check_window(model: nn.Module, n_channels: int, window_samples: int) -> None
     """
     try:
         with torch.inference_mode():
-            model.eval()(torch.zeros(1, n_channels, window_samples))
+            model.eval()(torch.from_numpy(example))
     except RuntimeError:
         raise ConfigError(
-            f"window_samples={window_samples} is too short for this network; "
+            f"window_samples={example.shape[-1]} is too short for this network; "
             "make it longer or choose another model"
         ) from None
+
+
+def check_window(model: nn.Module, n_channels: int, window_samples: int) -> None:
+    """Refuse windows of a length that the network cannot take.
+
+    Raises
+    ------
+    ConfigError    if they are too short
+    """
+    check_example(model, np.zeros((1, n_channels, window_samples), dtype=np.float32))
 
 
 def _network_class(config: Section) -> type[Network]:

@@ -1,4 +1,4 @@
-"""A small convolutional network on windows of time: the network that a study trains by default."""
+"""A small convolutional network on windows of time, for records without turns too."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from torch import nn
 
 from diagnose.data.inputs import NetworkInput
 from diagnose.data.window_input import Windows
-from diagnose.networks.network import Network, convolution_blocks
+from diagnose.networks.network import FeatureNetwork, convolution_blocks
 
 
-class SmallCnn(Network):
+class SmallCnn(FeatureNetwork):
     """One-dimensional convolutional network with a wide, strided first kernel.
 
     The first kernel spans a mesh period rather than a few samples. Pooling over the window takes

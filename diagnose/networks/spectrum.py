@@ -11,7 +11,7 @@ from torch import nn
 
 from diagnose.data.inputs import NetworkInput
 from diagnose.data.window_input import Windows
-from diagnose.networks.network import Network, convolution_blocks
+from diagnose.networks.network import FeatureNetwork, convolution_blocks
 from gensig.errors import ConfigError
 
 
@@ -35,7 +35,7 @@ def log_spectrum(windows: torch.Tensor, floor: float) -> torch.Tensor:
     return torch.log(magnitude + floor)
 
 
-class SpectrumCnn(Network):
+class SpectrumCnn(FeatureNetwork):
     """Small convolutional network on the log-magnitude spectrum of the window.
 
     It is blind to phase and to position in time. The mean over the bins is subtracted from the

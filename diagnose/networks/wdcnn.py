@@ -10,12 +10,12 @@ from torch import nn
 
 from diagnose.data.inputs import NetworkInput
 from diagnose.data.window_input import Windows
-from diagnose.networks.network import Network
+from diagnose.networks.network import FeatureNetwork
 
 FIRST_KERNEL, FIRST_STRIDE, FIRST_PADDING = 64, 16, 24
 
 
-class Wdcnn(Network):
+class Wdcnn(FeatureNetwork):
     """Deep convolutional network with a wide first kernel, as published, for several channels.
 
     A first convolution of 64 samples with stride 16, then convolutions of 3 samples, the last one

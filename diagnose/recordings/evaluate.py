@@ -91,9 +91,15 @@ def _matching_task(
 ) -> Task:
     """Task as the network was trained for, on this data set; refuses what does not fit."""
     description = network.description
-    wanted = fitting_channels(description, dataset, channels)
+    reads_any_rate = not network.inputs().has_window_length
+    wanted = fitting_channels(
+        description, dataset, channels, reads_any_rate=reads_any_rate
+    )
+    rate = description.sampling_rate_hz
+    if reads_any_rate:
+        rate = min(rate, float(dataset.sampling_rate))
     task = task_of(
-        at_rate(dataset, description.sampling_rate_hz),
+        at_rate(dataset, rate),
         window_samples=description.window_samples,
         stride_samples=description.stride_samples,
         normalise=description.normalise,
@@ -113,34 +119,49 @@ def fitting_channels(
     description: ModelDescription,
     dataset: Dataset,
     channels: Sequence[str] | None,
+    *,
+    reads_any_rate: bool = False,
 ) -> tuple[str, ...]:
     """Channels of a data set for those of a network.
 
-    Refuses another format, a lower rate and channels that it has not.
+    Refuses another format, a lower rate than that of the training unless the network
+    ``reads_any_rate``, and channels that it has not.
     """
     where = f"{dataset.folder} does not fit the model"
-    if schema_version(dataset) != description.data_schema_version:
+    trained_on = description.data_schema_version
+    if trained_on is not None and schema_version(dataset) != trained_on:
         raise DatasetError(
             f"{where}: data schema {schema_version(dataset)}, trained on schema "
-            f"{description.data_schema_version}",
+            f"{trained_on}",
         )
-    if dataset.sampling_rate < description.sampling_rate_hz * (1 - 1e-9):
+    is_slower = dataset.sampling_rate < description.sampling_rate_hz * (1 - 1e-9)
+    if is_slower and not reads_any_rate:
         raise DatasetError(
             f"{where}: sampled at {dataset.sampling_rate:g} Hz, trained at "
             f"{description.sampling_rate_hz:g} Hz",
         )
-    if channels is not None and len(channels) != len(description.channel_names):
-        raise ConfigError(
-            f"channels={','.join(channels)}: the model takes {len(description.channel_names)}, in "
-            f"the order of {', '.join(description.channel_names)}"
-        )
-    wanted = tuple(channels or description.channel_names)
+    wanted = _wanted_channels(description, dataset, channels)
     if missing := [name for name in wanted if name not in dataset.channel_names]:
         raise DatasetError(
             f"{where}: it has no channel {', '.join(missing)} "
             f"(it has {', '.join(dataset.channel_names)})",
         )
     return wanted
+
+
+def _wanted_channels(
+    description: ModelDescription, dataset: Dataset, channels: Sequence[str] | None
+) -> tuple[str, ...]:
+    """Channels that are asked for, else those of the training; all for a network of any."""
+    if description.takes_each_channel:
+        return tuple(channels or dataset.channel_names)
+    n_channels = len(description.channel_names)
+    if channels is not None and len(channels) != n_channels:
+        raise ConfigError(
+            f"channels={','.join(channels)}: the model takes {n_channels}, in "
+            f"the order of {', '.join(description.channel_names)}"
+        )
+    return tuple(channels or description.channel_names)
 
 
 def chosen_segments(

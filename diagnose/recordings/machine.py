@@ -12,6 +12,7 @@ import numpy as np
 from diagnose.data.windows import WindowSet
 from diagnose.networks.adaptation import HEALTHY, adapt_domain, adapt_network
 from diagnose.networks.domain import distances
+from diagnose.networks.registry import input_of
 from diagnose.recordings.source import Source, prepare_recording, trained_at
 from diagnose.studies.result_files import sha256
 from diagnose.training.classes import predict_windows
@@ -62,7 +63,10 @@ def adapt_model(
         )
     for source in sources:
         _check_speed(source, description)
-    parts = [prepare_recording(description, source).windows for source in sources]
+    inputs = input_of(description.network)
+    parts = [
+        prepare_recording(description, inputs, source).windows for source in sources
+    ]
     windows = together(parts)
     adapted = adapt_network(model, statistics, windows, method)
     weights = {name: value.numpy() for name, value in adapted.state_dict().items()}

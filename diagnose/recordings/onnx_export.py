@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from torch import nn
 
 from diagnose.data.windows import normalised
-from diagnose.networks.registry import input_of
 from diagnose.recordings.raw_windows import RawWindows, raw_examples, with_fixed_pooling
 from diagnose.recordings.stored_network import StoredNetwork
 from gensig.errors import ConfigError, GensigError
@@ -58,7 +57,7 @@ def export_onnx(network: StoredNetwork, file: Path) -> str:
         no file is left
     """
     description = network.description
-    if reason := input_of(description.network).why_not_exported:
+    if reason := network.inputs().why_not_exported:
         raise ConfigError(reason)
     need_packages()
     graph = network.graph()

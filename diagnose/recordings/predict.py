@@ -52,7 +52,7 @@ def predict_recording(
     """
     description = network.description
     network.check(source)
-    prepared = prepare_recording(description, source)
+    prepared = prepare_recording(description, network.inputs(), source)
     windows, tracked = prepared.windows, prepared.tracked
     answer = network.answer(source, prepared)
     rate, n_teeth = description.sampling_rate_hz, description.n_teeth
@@ -80,9 +80,7 @@ def predict_recording(
         "distance_threshold": threshold,
         "window_duration_s": prepared.duration_s,
         "windows": rows,
-        "channels": dict(
-            zip(description.channel_names, prepared.channels, strict=True)
-        ),
+        "channels": _channels(description, prepared.channels),
         "sampling_rate_hz": prepared.recording.sampling_rate,
         "model_sampling_rate_hz": rate,
         **answer.conditions,
@@ -90,6 +88,15 @@ def predict_recording(
         "trained_n_teeth": n_teeth and list(n_teeth),
         **answer.training,
     }
+
+
+def _channels(
+    description: ModelDescription, in_file: tuple[str, ...]
+) -> dict[str, str]:
+    """Name in the file of each channel of the network."""
+    if description.takes_each_channel:
+        return dict(zip(in_file, in_file, strict=True))
+    return dict(zip(description.channel_names, in_file, strict=True))
 
 
 def _with_distances(
@@ -139,4 +146,13 @@ def reasons_unlike(
             f"the gears have {given[0]}/{given[1]} teeth, "
             f"those of the training {known[0]}/{known[1]}"
         )
+    if given and description.n_teeth_range:
+        gears = zip(
+            given, description.n_teeth_range, ("driving", "driven"), strict=True
+        )
+        reasons += [
+            f"the {name} gear has {teeth} teeth, those of the training {low} to {high}"
+            for teeth, (low, high), name in gears
+            if not low <= teeth <= high
+        ]
     return reasons

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,16 +10,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.data.inputs import RecordedSignal
+from diagnose.data.inputs import NetworkInput, RecordedSignal, SoundSignal
+from diagnose.data.turns import Turns
 from diagnose.data.windows import WindowSet
-from diagnose.networks.registry import input_of
+from diagnose.recordings.channels import chosen_channels
+from diagnose.recordings.plausible import (
+    Statement,
+    check_level,
+    check_mesh,
+    check_place,
+    check_turns,
+)
 from gensig.errors import ConfigError
 from gensig.signals.recording import (
     Recording,
-    RecordingFile,
     read_file,
     recording_of,
-    without_unit,
 )
 from gensig.signals.resampling import rate_change
 
@@ -28,6 +34,7 @@ if TYPE_CHECKING:
     from diagnose.training.store import ModelDescription
 
 RATE_OPTION = "--sampling-rate"
+SPEED_OPTION, HEALTHY_SPEED_OPTION = "--speed-rpm", "--healthy-speed-rpm"
 RATE_TOLERANCE = 1e-3
 SPEED_TOLERANCE = 0.02  # assumed: how well a user knows the speed
 
@@ -49,6 +56,7 @@ class Source:
     channels : names in the file, in the order of the network's
     unit : m/s2 or g
     array : name in a .npz, HDF5 or MATLAB file
+    healthy : recordings of the same machine when it was sound, described in the same way
     torque_nm : N m of the driving shaft, for remaining lives
     life_time_h : h since the machine was new, for remaining lives with the age
     """
@@ -64,6 +72,7 @@ class Source:
     channels: tuple[str, ...] | None = None
     unit: str = "m/s2"
     array: str | None = None
+    healthy: tuple[Source, ...] = ()
     torque_nm: float | None = None
     life_time_h: float | None = None
 
@@ -119,42 +128,208 @@ class PreparedRecording:
 
 
 def prepare_recording(
-    description: ModelDescription, source: Source
+    description: ModelDescription, inputs: NetworkInput, source: Source
 ) -> PreparedRecording:
-    """Inputs of a recording for a network.
+    """Inputs of a recording for a network, of the kind that it reads.
 
     Raises
     ------
     ConfigError    for a recording that cannot be read, is too short or too slowly sampled, or
         whose channels do not fit
     """
-    recording, channels, tacho = _read(description, source)
-    tracked, speed, rate = None, source.speed_rpm, description.sampling_rate_hz
-    if source.is_tracked:
-        tracked = _tracked(recording, tacho, source)
-        speed = _played_at(tracked, source)
+    played = _played(description, inputs, source, SPEED_OPTION)
+    recording = played.recording
+    sound = [
+        _played(description, inputs, other, HEALTHY_SPEED_OPTION, played.sampling_rate)
+        for other in source.healthy
+    ]
+    if isinstance(inputs, Turns):
+        for other, described in zip(sound, source.healthy, strict=True):
+            check_level(played.signal, other.signal, source.file, described.file)
     recorded = RecordedSignal(
-        signal=_in_domain(recording, tracked, description, source),
-        sampling_rate=rate,
-        speed_rpm=speed,
+        signal=played.signal,
+        sampling_rate=played.sampling_rate,
+        speed_rpm=played.speed_rpm,
+        n_teeth=source.teeth or description.n_teeth,
         file=source.file,
         window_samples=description.window_samples,
         stride_samples=description.stride_samples,
         normalise=description.normalise,
+        healthy=tuple(
+            _sound_signal(other, described.file)
+            for other, described in zip(sound, source.healthy, strict=True)
+        ),
     )
-    inputs = input_of(description.network)
     n_recorded = recording.acceleration.shape[-1]
     return PreparedRecording(
         windows=inputs.of_recording(recorded),
         recording=recording,
-        channels=channels,
-        tracked=tracked,
-        speed_rpm=speed,
+        channels=played.channels,
+        tracked=played.tracked,
+        speed_rpm=played.speed_rpm,
         duration_s=inputs.seconds(
-            window=description.window_samples / rate,
+            window=description.window_samples / description.sampling_rate_hz,
             recording=float(n_recorded / recording.sampling_rate),
         ),
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Played:
+    """A recording at the rate that a network takes it at, and at one speed.
+
+    Attributes
+    ----------
+    signal : (channel, sample)
+    sampling_rate : Hz, of the signal
+    others : of `PreparedRecording`
+    """
+
+    signal: NDArray[np.float32]
+    sampling_rate: float
+    recording: Recording
+    channels: tuple[str, ...]
+    tracked: Tracked | None
+    speed_rpm: float | None
+
+
+def _played(
+    description: ModelDescription,
+    inputs: NetworkInput,
+    source: Source,
+    speed_option: str,
+    sampling_rate: float | None = None,
+) -> _Played:
+    """A recording at one speed, whose mesh is where the turns of the network need it.
+
+    ``sampling_rate`` is that of the signal; None for that which the network takes it at.
+
+    Raises
+    ------
+    ConfigError    as `prepare_recording`
+    """
+    recording, channels, tacho = _read(description, source)
+    tracked = None
+    if isinstance(inputs, Turns):
+        teeth = _teeth(description, inputs, source)
+        _check_as_recorded(recording, teeth, source, speed_option)
+    if source.is_tracked:
+        tracked = _tracked(recording, tacho, source)
+    speed = _speed(tracked, source)
+    rate = sampling_rate or _rate(recording, tracked, description, inputs, source)
+    signal = _in_domain(recording, tracked, description, source, rate)
+    if isinstance(inputs, Turns) and speed is not None:
+        statement = _statement(teeth, source, speed, speed_option)
+        check_turns(signal.shape[-1] / rate, statement)
+        check_mesh(signal, rate, statement)
+    return _Played(
+        signal=signal,
+        sampling_rate=rate,
+        recording=recording,
+        channels=channels,
+        tracked=tracked,
+        speed_rpm=speed,
+    )
+
+
+def _rate(
+    recording: Recording,
+    tracked: Tracked | None,
+    description: ModelDescription,
+    inputs: NetworkInput,
+    source: Source,
+) -> float:
+    """Samples a second at which a network takes a recording.
+
+    Windows are at the rate of the training. Turns may be of a recording of fewer samples.
+    """
+    trained = description.sampling_rate_hz
+    if inputs.has_window_length:
+        return trained
+    available = float(recording.sampling_rate)
+    if tracked is not None:
+        available *= _played_at(tracked, source) / tracked.speed_rpm
+    return min(trained, available)
+
+
+def _teeth(
+    description: ModelDescription, inputs: Turns, source: Source
+) -> tuple[int, int]:
+    """Teeth of the driving and the driven gear: as stated, or those of the training.
+
+    Raises
+    ------
+    ConfigError    for a network of any gears, where nothing says them
+    """
+    teeth = source.teeth or inputs.n_teeth or description.n_teeth
+    if teeth is None:
+        raise ConfigError(
+            f"{source.file}: this model reads turns of any gears and must know theirs: "
+            "give --teeth DRIVING DRIVEN"
+        )
+    return teeth
+
+
+def _check_as_recorded(
+    recording: Recording, teeth: tuple[int, int], source: Source, speed_option: str
+) -> None:
+    """Refuse a recording without speed, and one whose mesh is found elsewhere before it is tracked.
+
+    Raises
+    ------
+    ConfigError    with what to give
+    """
+    if source.tacho is not None:
+        return
+    if source.speed_rpm is None:
+        raise ConfigError(
+            f"{source.file}: this model reads turns and must know the speed, which nothing tells: "
+            f"give {speed_option} and --teeth {teeth[0]} {teeth[1]}, or --tacho CHANNEL"
+        )
+    if source.is_tracked:
+        statement = _statement(teeth, source, source.speed_rpm, speed_option)
+        check_place(recording.acceleration, recording.sampling_rate, statement)
+
+
+def _statement(
+    teeth: tuple[int, int], source: Source, speed_rpm: float, speed_option: str
+) -> Statement:
+    """Speed and teeth as the user, or the training, states them."""
+    options = f"--teeth and {speed_option}"
+    said = f"{teeth[0]} teeth, those of the training, at {speed_rpm:.5g} r/min"
+    if source.teeth is not None:
+        said = f"--teeth {teeth[0]} {teeth[1]} at {speed_rpm:.5g} r/min"
+    if source.tacho is not None:
+        options = "--teeth and --pulses-per-turn"
+    return Statement(
+        file=source.file,
+        speed_rpm=speed_rpm,
+        teeth=teeth,
+        said=said,
+        options=options,
+        followed=source.is_tracked,
+    )
+
+
+def _sound_signal(played: _Played, file: str) -> SoundSignal:
+    """A healthy recording, as a network takes it.
+
+    Raises
+    ------
+    ConfigError    for an unknown speed
+    """
+    if played.speed_rpm is None:
+        raise ConfigError(
+            f"the speed of {file} is not known: say {HEALTHY_SPEED_OPTION}"
+        )
+    return SoundSignal(signal=played.signal, speed_rpm=played.speed_rpm)
+
+
+def _speed(tracked: Tracked | None, source: Source) -> float | None:
+    """Speed of the driving shaft in r/min at which a recording is played; None if not known."""
+    if tracked is None:
+        return source.speed_rpm
+    return _played_at(tracked, source)
 
 
 def tracking_facts(tracked: Tracked, source: Source) -> dict[str, Any]:
@@ -248,7 +423,9 @@ def _read(
             )
         others = np.delete(content.values, index, axis=0)
         content = replace(content, channels=names, values=others)
-    chosen = _channels(content, description.channel_names, source.channels)
+    chosen = source.channels or content.channels
+    if not description.takes_each_channel:
+        chosen = chosen_channels(content, description.channel_names, source.channels)
     recording = recording_of(
         content,
         unit=source.unit,
@@ -258,48 +435,18 @@ def _read(
     return recording, chosen, tacho
 
 
-def _channels(
-    content: RecordingFile,
-    wanted: Sequence[str],
-    given: Sequence[str] | None,
-) -> tuple[str, ...]:
-    """Channels of the file for those of the network.
-
-    As given, by name, or in order where no name says otherwise.
-    """
-    needs = f"the model takes {len(wanted)}, {', '.join(wanted)}"
-    if given is not None:
-        if len(given) != len(wanted):
-            raise ConfigError(
-                f"--channels names {len(given)} channel(s); {needs}: name as many, in this order",
-            )
-        return tuple(given)
-    by_name = {without_unit(name): name for name in content.channels}
-    if all(name in by_name for name in wanted):
-        return tuple(by_name[name] for name in wanted)
-    names = ", ".join(content.channels)
-    has = f"{content.file} has {len(content.channels)} channel(s), {names}"
-    if len(content.channels) != len(wanted):
-        raise ConfigError(f"{has}; {needs}: choose with --channels, in this order")
-    if content.named and len(wanted) > 1:
-        raise ConfigError(
-            f"{has}; {needs}: say which is which with --channels, in this order"
-        )
-    return content.channels
-
-
 def _in_domain(
     recording: Recording,
     tracked: Tracked | None,
     description: ModelDescription,
     source: Source,
+    rate: float,
 ) -> NDArray[np.float32]:
-    """(channel, sample) at the network's rate and one speed.
+    """(channel, sample) at a rate and one speed.
 
     Refuses a recording with less bandwidth than that.
     """
-    result, rate = recording.sampling_rate, description.sampling_rate_hz
-    file = source.file
+    result, file = recording.sampling_rate, source.file
     if result < rate * (1 - RATE_TOLERANCE):
         raise ConfigError(
             f"{file} has {result:g} samples a second and so nothing above {result / 2:g} Hz; the "

@@ -9,37 +9,63 @@ from typing import TYPE_CHECKING, Any, Self, final
 from torch.nn.functional import log_softmax
 
 from diagnose.data.targets import GEARS
+from diagnose.data.turns import Turns
 from diagnose.networks.calibration import calibration_scores, probabilities
-from diagnose.networks.network import Network
+from diagnose.networks.network import Network, SiteNetwork
 from diagnose.networks.registry import input_of
 from diagnose.recordings.source import PreparedRecording, Source, tracking_text
 from diagnose.recordings.stored_network import Answer, Graph, Scores, StoredNetwork
+from diagnose.recordings.tooth_classifier import (
+    TOOTH_KIND,
+    ToothClassifier,
+    load_tooth_classifier,
+)
 from diagnose.recordings.verdict import class_text, score_text, verdict
+from diagnose.scoring.judged import spread_text
+from diagnose.scoring.machines import machines_of
 from diagnose.scoring.metrics import over_records
 from diagnose.studies.result_files import Content
 from diagnose.training.classes import predict_windows
-from diagnose.training.heads import predict_heads
-from diagnose.training.store import ModelDescription, data_fingerprint, load_model
+from diagnose.training.heads import fault_site, predict_heads
+from diagnose.training.store import (
+    ModelDescription,
+    data_fingerprint,
+    load_model,
+    read_description,
+)
 from gensig.errors import ConfigError, DatasetError
 
 if TYPE_CHECKING:
+    from diagnose.data.inputs import NetworkInput
     from diagnose.data.windows import Segments, Task
     from gensig.dataset.reader import Dataset
+
+NO_FLAG = "no out-of-distribution flag: the model stores none, train it again"
+NO_FLAG_OF_TEETH = "of a speed and teeth of the training; its spectrum is not compared"
 
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StoredClassifier(StoredNetwork):
-    """A network that tells classes apart."""
+    """A network or a baseline that tells classes apart."""
 
-    model: Network
+    model: Network | ToothClassifier
     description: ModelDescription
 
     @classmethod
     def load(cls, folder: str | Path) -> Self:
         """Classifier of a folder."""
+        description = read_description(folder)
+        if description.model.get("kind") == TOOTH_KIND:
+            return cls(model=load_tooth_classifier(folder), description=description)
         model, description = load_model(folder)
         return cls(model=model, description=description)
+
+    def inputs(self) -> NetworkInput:
+        """Kind of input that the network reads."""
+        if self.description.model.get("kind") == TOOTH_KIND:
+            return Turns.of(self.description.network)
+        return input_of(self.description.network)
 
     def check(self, source: Source) -> None:
         """Refuse torque and age, which no classifier takes."""
@@ -57,12 +83,19 @@ class StoredClassifier(StoredNetwork):
         _, by_record = over_records(log_probability, windows.record)
         overall = probabilities(by_record, description.temperature)[0]
         by_class = self._by_class(overall)
-        heads = predict_heads(self.model, windows)
+        heads = {}
+        if isinstance(self.model, Network):
+            heads = predict_heads(self.model, windows)
         severity = gear = None
         if "severity" in heads:
             severity = float(heads["severity"][0, overall.argmax()])
         if "gear" in heads:
             gear = GEARS[int(heads["gear"][0].argmax())]
+        tooth = tooth_share = None
+        if isinstance(self.model, SiteNetwork):
+            gear, tooth, tooth_share = fault_site(
+                self.model, windows, int(overall.argmax())
+            )
         by_window = probabilities(log_probability)
         speeds = description.speed_rpm_range
         return Answer(
@@ -71,6 +104,8 @@ class StoredClassifier(StoredNetwork):
                 "probabilities": by_class,
                 "severity": severity,
                 "gear": gear,
+                "tooth": tooth,
+                "tooth_share": tooth_share,
             },
             windows=[{"probabilities": self._by_class(row)} for row in by_window],
             conditions={
@@ -90,6 +125,8 @@ class StoredClassifier(StoredNetwork):
         is_faulty = result["gear"] not in (None, "none")
         if result["severity"] is not None and is_faulty and not result["undecided"]:
             text += f", severity {result['severity']:.2f} on the {result['gear']}"
+            if result["tooth"] is not None and result["tooth"] >= 0:
+                text += f", tooth {result['tooth']} after the first in mesh"
         text += tracking_text(result["order_tracking"])
         if result["out_of_distribution"]:
             reasons = "; ".join(result["reasons"])
@@ -97,7 +134,9 @@ class StoredClassifier(StoredNetwork):
         beyond = result["n_windows_beyond"]
         flag = f"like the training data ({beyond} of {result['n_windows']} windows beyond it)"
         if beyond is None:
-            flag = "no out-of-distribution flag: the model stores none, train it again"
+            flag = NO_FLAG
+            if isinstance(self.model, ToothClassifier):
+                flag = NO_FLAG_OF_TEETH
         return f"{text}; {flag}; {score_text(result)}"
 
     def classes_of(self, dataset: Dataset) -> tuple[str, ...]:
@@ -112,12 +151,12 @@ class StoredClassifier(StoredNetwork):
         return known
 
     def scores(self, task: Task, segments: Segments, part: str) -> Scores:
-        """Scores by record with intervals over units, confusion, recall and calibration."""
+        """Scores by record with intervals over machines, confusion, recall and calibration."""
         from diagnose.studies.counts import n_different, unit_ids
         from diagnose.studies.protocol_results import score_predictions
 
         description = self.description
-        windows = input_of(description.network).load(task, segments)
+        windows = self.inputs().load(task, segments)
         by_window = predict_windows(self.model, windows)
         record, log_probability = over_records(by_window, windows.record)
         calibration = calibration_scores(
@@ -131,6 +170,7 @@ class StoredClassifier(StoredNetwork):
             },
             method={},
             values={
+                "resampled": machines_of(task.dataset, record).counts(),
                 "calibration": calibration,
                 **score_predictions(task, predicted, description.n_bootstrap),
             },
@@ -144,10 +184,8 @@ class StoredClassifier(StoredNetwork):
             f"channels {', '.join(result['channel_names'])}",
         ]
         for name in ("balanced_accuracy", "macro_f1"):
-            mean, low, high = (result[name][key] for key in ("mean", "low", "high"))
-            spread = "no 95 % interval: too few machines"
-            if low is not None:
-                spread = f"95 % interval over units {low:.3f} to {high:.3f}"
+            mean = result[name]["mean"]
+            spread = spread_text(result[name], result["resampled"], ".3f")
             lines.append(f"{name} {mean:.3f}, {spread}")
         for name, share in result["recall"].items():
             lines.append(f"recall {name} {share:.3f}")

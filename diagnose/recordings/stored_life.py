@@ -14,7 +14,15 @@ from diagnose.networks.registry import input_of
 from diagnose.recordings.raw_windows import N_CHECKED
 from diagnose.recordings.source import SPEED_TOLERANCE, PreparedRecording, Source
 from diagnose.recordings.stored_network import Answer, Graph, Scores, StoredNetwork
-from diagnose.scoring.life_scores import MEASURES, by_life, interval, life_scores
+from diagnose.scoring.judged import spread_text
+from diagnose.scoring.life_scores import (
+    MEASURES,
+    Snapshots,
+    by_life,
+    interval,
+    life_scores,
+)
+from diagnose.scoring.machines import Machines
 from diagnose.studies.result_files import Content
 from diagnose.training.life_store import AGE, LifeFacts, load_life_model
 from diagnose.training.remaining_life import (
@@ -26,6 +34,7 @@ from diagnose.training.store import ModelDescription
 from gensig.errors import ConfigError, DatasetError
 
 if TYPE_CHECKING:
+    from diagnose.data.inputs import NetworkInput
     from diagnose.data.windows import Segments, Task
     from gensig.dataset.reader import Dataset
 
@@ -48,6 +57,10 @@ class StoredLife(StoredNetwork):
         """Network of remaining lives of a folder."""
         model, description, facts = load_life_model(folder)
         return cls(model=model, description=description, facts=facts)
+
+    def inputs(self) -> NetworkInput:
+        """Kind of input that the network reads."""
+        return input_of(self.description.network)
 
     def check(self, source: Source) -> None:
         """Refuse a torque or an age that is missing, not taken or below 0."""
@@ -145,10 +158,10 @@ class StoredLife(StoredNetwork):
         from diagnose.studies.life_study import (
             below_bound,
             count_lives,
+            machines_of_lives,
             scored_snapshots,
             write_life_predictions,
         )
-        from diagnose.studies.protocol_results import BOOTSTRAP_SEED
 
         facts, dataset, description = self.facts, task.dataset, self.description
         lives = lives_of(task)
@@ -159,7 +172,7 @@ class StoredLife(StoredNetwork):
                 f"{dataset.folder}, {part}: no life failed, so that there is nothing to score",
             )
         columns = [np.asarray(dataset.column(name), dtype=float) for name in facts.told]
-        windows = input_of(description.network).load(task, segments)
+        windows = self.inputs().load(task, segments)
         conditions = np.stack(columns, axis=1)
         record, share = shares_of_records(self.model, windows, conditions)
         prediction = LifePrediction(
@@ -172,9 +185,8 @@ class StoredLife(StoredNetwork):
             early_life=facts.early_life_h,
             detail=part,
         )
-        by_measure = by_life(scored_snapshots(lives, prediction))
-        table = {name: row[None] for name, row in by_measure.items()}
-        rng = np.random.default_rng(BOOTSTRAP_SEED)
+        snapshots = scored_snapshots(lives, prediction)
+        machines = machines_of_lives(task, lives, record)
 
         def write(folder: Path, result: dict[str, Any]) -> None:
             from diagnose.report.life_report import life_figure
@@ -196,7 +208,8 @@ class StoredLife(StoredNetwork):
                 "coverage_wanted": facts.coverage,
                 "intervals_hold": facts.intervals_hold,
                 "censored_below_bound": below_bound(lives, prediction),
-                **life_scores(table, n_bootstrap=description.n_bootstrap, rng=rng),
+                "resampled": machines.counts(),
+                **_scores(snapshots, machines, description.n_bootstrap),
             },
             write=write,
         )
@@ -220,10 +233,8 @@ class StoredLife(StoredNetwork):
             f"channels {channels}; remaining life cut at {level:.4g} h",
         ]
         for name in MEASURES:
-            mean, low, high = (result[name][key] for key in ("mean", "low", "high"))
-            lines.append(
-                f"{name} {mean:.4g}, 95 % interval over lives {low:.4g} to {high:.4g}"
-            )
+            spread = spread_text(result[name], result["resampled"], ".4g")
+            lines.append(f"{name} {result[name]['mean']:.4g}, {spread}")
         wanted = f"coverage wanted {result['coverage_wanted']:.0%}"
         if not result["intervals_hold"]:
             wanted += ": too few validation lives for such intervals"
@@ -275,3 +286,14 @@ def _outside(facts: LifeFacts, values: Mapping[str, float]) -> list[str]:
                 f"{value:g} {unit} is outside the {low:.4g} to {high:.4g} {unit} of the training"
             )
     return reasons
+
+
+def _scores(
+    snapshots: Snapshots, machines: Machines, n_bootstrap: int
+) -> dict[str, Any]:
+    """Scores of the predictions of one network."""
+    from diagnose.studies.protocol_results import BOOTSTRAP_SEED
+
+    table = {name: row[None] for name, row in by_life(snapshots).items()}
+    rng = np.random.default_rng(BOOTSTRAP_SEED)
+    return life_scores(table, machines=machines, n_bootstrap=n_bootstrap, rng=rng)

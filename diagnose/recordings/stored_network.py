@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import torch
     from torch import nn
 
+    from diagnose.data.inputs import NetworkInput
     from diagnose.data.windows import Segments, Task
     from diagnose.recordings.source import PreparedRecording, Source
     from diagnose.training.store import ModelDescription
@@ -104,6 +105,10 @@ class StoredNetwork(ABC):
         ------
         DatasetError    for a folder that holds no such network
         """
+
+    @abstractmethod
+    def inputs(self) -> NetworkInput:
+        """Kind of input that the network reads."""
 
     @abstractmethod
     def check(self, source: Source) -> None:

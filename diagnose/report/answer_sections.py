@@ -122,8 +122,9 @@ def _comparisons_section(answers: Content) -> Section:
     return Section(
         title="Is the network better than the baselines",
         text=[
-            "Difference of balanced accuracy on the same test units [95 % interval]; p-value of "
-            "swapping both methods unit by unit, corrected for the number of baselines (Holm)."
+            "Difference of balanced accuracy on the same test records [95 % interval]; p-value of "
+            "swapping both methods machine by machine, or for all machines that share gears or a "
+            "gearbox together, corrected for the number of baselines (Holm)."
         ],
         notes=[
             (protocol, f"{row['summary']}.")

@@ -78,7 +78,7 @@ def _condition_rows(answers: Content) -> Iterator[Entry]:
                 "group_high": row["high"],
                 "method": method,
                 "measure": row["measure"],
-                **score,
+                **_chosen(score, "mean", "low", "high"),
                 **_chosen(row, "n_records", "n_units"),
                 **difference,
             }

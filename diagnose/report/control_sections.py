@@ -10,7 +10,7 @@ from diagnose.report.methods import (
     oracle_labels,
 )
 from diagnose.report.text import score_cell
-from diagnose.scoring.judged import interval_text
+from diagnose.scoring.judged import interval_text, too_few_text
 from diagnose.scoring.metrics import is_above
 from diagnose.studies.result_files import Content
 from gensig.text.page import Section, Table
@@ -24,7 +24,7 @@ def verdict(method: Content, chance: float) -> str:
     """Verdict on a control that must be at chance."""
     score = method["balanced_accuracy"]
     if score["low"] is None:
-        return "no verdict: too few machines"
+        return f"no verdict: {too_few_text(score)}"
     if score["low"] > chance:
         return "ABOVE chance: look for a leak"
     if score["high"] < chance:

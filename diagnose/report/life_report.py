@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,15 @@ from diagnose.data.lives import Lives
 from diagnose.data.protocols import MEANING
 from diagnose.report.markdown import table_lines
 from diagnose.report.panels import COLORS, panels, save, spaced
-from diagnose.report.text import data_line, files_section, level_text, made_by
+from diagnose.report.text import (
+    data_line,
+    few_groups,
+    fewest,
+    files_section,
+    level_text,
+    made_by,
+)
+from diagnose.scoring.judged import drawn_text, interval_text, too_few_text
 from diagnose.scoring.life_scores import BAND, MEASURES
 from diagnose.studies.life_jobs import AGE_ONLY, AND_AGE, CONSTANT, LifePrediction
 from diagnose.studies.result_files import Content, write_metrics, write_rows
@@ -34,7 +42,7 @@ MEANINGS = {
     "Remaining life": "is cut at the early level: long before its failure a machine shows nothing "
     "of it. A prediction at that level says 'that long or longer'.",
     "Scores": "are means over the snapshots of a life, then over lives, so that every life counts "
-    "the same; of the test lives that failed. In brackets 95 % over lives and seeds.",
+    "the same; of the test lives that failed. In brackets the 95 % interval.",
     "PHM score": "exp(-d/13) - 1 for too short a prediction, exp(d/10) - 1 for too long a one, d "
     "in units of 1/125 of the early level; smaller is better. 'last': of the last snapshot before "
     "the failure alone.",
@@ -180,7 +188,9 @@ def _card(name: str, result: Content, model: str) -> Card:
     network, by_age = methods[model], methods[AGE_ONLY]["rmse_h"]["mean"]
     score, better = network["rmse_h"], network["gain_over_age_only_h"]
     found, mark = "not told from", "bad"
-    if better["low"] > 0:
+    if better["low"] is None:
+        found = f"{too_few_text(better)} to compare it with"
+    elif better["low"] > 0:
         found, mark = "better than", "good"
     elif better["high"] < 0:
         found = "worse than"
@@ -188,7 +198,7 @@ def _card(name: str, result: Content, model: str) -> Card:
     return Card(
         title=name,
         value=f"{score['mean']:.3g} h",
-        spread=f"{score['low']:.3g} to {score['high']:.3g}",
+        spread=_spread(score),
         verdict=f"{found} the age alone ({by_age:.3g} h); "
         f"indicators {methods['indicators']['rmse_h']['mean']:.3g} h; "
         f"intervals hold {network['coverage']['mean']:.0%} "
@@ -204,13 +214,17 @@ def _lives_sentence(result: Content) -> str:
         f"{lives['train']} training, {lives['validation']} validation and {lives['test']} test "
         f"lives that failed (and {', '.join(map(str, censored.values()))} censored); remaining "
         f"life cut at {result['early_life_h']:.4g} h; "
-        f"intervals for {result['coverage_wanted']:.0%}."
+        f"prediction intervals for {result['coverage_wanted']:.0%}; "
+        f"brackets 95 % over {drawn_text(result['resampled'])} and seeds."
     )
 
 
 def _caveats(name: str, result: Content) -> list[str]:
     lines, lives = [], result["n_lives"]
-    if lives["test"] < FEW_LIVES:
+    support = fewest(result)
+    if support.too_few:
+        lines.append(f"{name}: {few_groups(support.kind, support.n_groups)}")
+    elif lives["test"] < FEW_LIVES:
         lines.append(
             f"{name}: only {lives['test']} test lives failed. The brackets are too narrow for new "
             f"ones; at least {FEW_LIVES} are advisable."
@@ -238,18 +252,30 @@ def _lead(metrics: Content) -> list[str]:
     ]
 
 
-def _cell(score: Mapping[str, float]) -> str:
-    return f"{score['mean']:.3g} [{score['low']:.3g}, {score['high']:.3g}]"
+def _cell(score: Content) -> str:
+    return interval_text(score, ".3g")
+
+
+def _spread(score: Content) -> str:
+    if score["low"] is None:
+        return too_few_text(score)
+    return f"{score['low']:.3g} to {score['high']:.3g}"
 
 
 def _score_rows(metrics: Content) -> Iterator[dict[str, str]]:
+    """Scores as a table; without an interval its ends are empty."""
     for protocol, result in metrics["protocols"].items():
         for name, method in result["methods"].items():
             for measure in (*MEASURES, "gain_over_age_only_h"):
-                score = method[measure]
+                known = {
+                    key: f"{method[measure][key]:.6g}"
+                    for key in ("mean", "low", "high")
+                    if method[measure][key] is not None
+                }
                 yield {
                     "protocol": protocol,
                     "method": name,
                     "measure": measure,
-                    **{key: f"{score[key]:.6g}" for key in ("mean", "low", "high")},
+                    **dict.fromkeys(("mean", "low", "high"), ""),
+                    **known,
                 }

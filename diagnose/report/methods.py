@@ -12,6 +12,7 @@ from diagnose.studies.jobs import (
     ORACLE,
     ORACLE_NETWORK,
     SHAM,
+    WITH_REFERENCE,
 )
 from diagnose.training.sham import sham_method
 
@@ -23,11 +24,18 @@ LEVEL_TEXT = MethodText(
     card_label=None,
     meaning="the same network on windows in m/s^2, their level not removed.",
 )
+REFERENCE_TEXT = MethodText(
+    name=WITH_REFERENCE,
+    label="network with a sound record",
+    card_label="with a sound record",
+    meaning="the same network that also sees the turns of a sound record of the same machine; "
+    "which one, no class decides.",
+)
 ORACLE_TEXT = MethodText(
     name=ORACLE,
     label="oracle",
     card_label=None,
-    meaning="the better of two models that are given each record's healthy twin; see Controls.",
+    meaning="the best of the models that are given each record's healthy twin; see Controls.",
 )
 SHAM_TEXT = MethodText(
     name=SHAM,
@@ -40,8 +48,9 @@ SHUFFLE_TEXT = MethodText(
     name=LABEL_SHUFFLE,
     label="label shuffle",
     card_label="label shuffle",
-    meaning="the same training on shuffled labels. Chance must lie in its interval, which covers "
-    "the units and the luck of the shuffle; if it lies below, something leaks.",
+    meaning="the same training on shuffled labels, to its last epoch. Chance must lie in its "
+    "interval, which covers the machines and the luck of the shuffle; if it lies below, "
+    "something leaks.",
 )
 # Notes of the section Controls, where they say more than the sentences above.
 SHAM_NOTE = (
@@ -49,10 +58,10 @@ SHAM_NOTE = (
     "something other than the fault tells the class."
 )
 ORACLE_NOTE = (
-    "the better, on validation units, of the same network and of a model on indicators, both given "
-    "the record's healthy twin in as much noise. What it finds is in the signal; it is a bound for "
-    "those who do not know how this machine sounds when healthy, as far as these two can learn, "
-    "not of what any detector could find."
+    "the best, on validation units, of the same network and of models on indicators and on teeth, "
+    "all given the record's healthy twin in as much noise. What it finds is in the signal; it is a "
+    "reference for those who do not know how this machine sounds when healthy, as far as these "
+    "can learn, not a bound of what any detector could find."
 )
 
 
@@ -64,15 +73,15 @@ def baseline_texts(*roles: Role) -> list[MethodText]:
 def score_columns(model: str) -> dict[str, str]:
     """Headings of the table of scores by name of the method; the network first."""
     controls = (LEVEL_TEXT, ORACLE_TEXT, SHUFFLE_TEXT, SHAM_TEXT)
-    texts = [*baseline_texts(Role.RIVAL), *controls]
+    texts = [REFERENCE_TEXT, *baseline_texts(Role.RIVAL), *controls]
     labels = {text.name: text.label for text in texts}
-    return {model: model.upper(), **labels, CHANCE: CHANCE}
+    return {model: f"{model} network", **labels, CHANCE: CHANCE}
 
 
 def explained_methods() -> list[MethodText]:
     """Methods that the page explains beside its table of scores."""
     controls = (LEVEL_TEXT, ORACLE_TEXT, SHAM_TEXT, SHUFFLE_TEXT)
-    return [*baseline_texts(Role.RIVAL), *controls]
+    return [REFERENCE_TEXT, *baseline_texts(Role.RIVAL), *controls]
 
 
 def rivals_on_cards() -> dict[str, str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from diagnose.report.markdown import table_lines
-from diagnose.scoring.judged import interval_text
+from diagnose.scoring.judged import drawn_text, interval_text
 from diagnose.studies.novelty import SCORE_LABELS
 from diagnose.studies.novelty_metrics import (
     FALSE_ALARMS,
@@ -56,9 +56,11 @@ def novelty_caveats(novelty: Content, few_units: int) -> list[str]:
     """Weaknesses of the numbers, one line each."""
     lines = []
     for name, result in novelty.items():
-        if (n_units := result["n_units"]["test"]) < few_units:
+        kind, n_groups = min(result["resampled"].items(), key=lambda item: item[1])
+        if n_groups < few_units:
             lines.append(
-                f"{name}: only {n_units} test unit(s); at least {few_units} are advisable."
+                f"{name}: only {n_groups} {kind} in the test part; at least {few_units} are "
+                "advisable."
             )
         if (n_records := result["n_records"]["validation"]) < LEAST_VALIDATION:
             lines.append(
@@ -77,7 +79,8 @@ def _parts_sentence(result: Content) -> str:
         f"of {units['train']} units, "
         f"threshold from {counts['validation']} of {units['validation']}, "
         f"tested on {counts['test']} of {units['test']}; "
-        f"new there: {', '.join(result['novel_classes'])}."
+        f"new there: {', '.join(result['novel_classes'])}. "
+        f"In brackets 95 % over {drawn_text(result['resampled'])} and seeds."
     )
 
 

@@ -11,6 +11,7 @@ from diagnose.report.answer_sections import answer_sections
 from diagnose.report.answer_tables import write_tables
 from diagnose.report.control_sections import controls_section
 from diagnose.report.figures import confusion_figure, reliability_figure, scores_figure
+from diagnose.report.headlines import headlines
 from diagnose.report.markdown import table_lines
 from diagnose.report.methods import explained_methods, score_columns
 from diagnose.report.novelty_report import novelty_sections
@@ -19,24 +20,28 @@ from diagnose.report.text import (
     caveats,
     confusions,
     data_line,
-    few_machines,
+    few_groups,
+    fewest,
     files_section,
     level_text,
     made_by,
     recall_table,
+    resampled_sentence,
     score_cell,
     trust_table,
 )
-from diagnose.scoring.metrics import LEAST_UNITS
 from diagnose.studies.result_files import Content, write_metrics
+from diagnose.training.entries import entry_notes
 from diagnose.training.heads import heads_notes
 from gensig.text.page import Section, Table, write_page
 
+TITLE = "Which faults can be told apart"
 LEAKY_MEANING = (
     "windows of one record on both sides of the split, as in many papers. It shows how much a "
     "careless split flatters; it is no measure of diagnosis"
 )
 FILES = {
+    "report.md": "the first figures and the table of scores as text.",
     "metrics.json": "everything in numbers, with macro-F1, recall, calibration, settings and "
     "versions.",
     "predictions.csv": "the prediction of each method for each test record.",
@@ -47,18 +52,46 @@ FILES = {
 Entries = Sequence[tuple[str, Any]]
 
 
-def write_report(folder: Path, metrics: Content) -> Path:
-    """Write ``metrics.json``, the figures and ``report.html`` and return the page."""
+def write_report(
+    folder: Path, metrics: Content, pictures: Sequence[tuple[str, str]] = ()
+) -> Path:
+    """Write ``metrics.json``, the figures, ``report.md`` and ``report.html``; return the page.
+
+    Parameters
+    ----------
+    pictures : (file in the folder, caption) of accused teeth
+    """
     write_metrics(folder, metrics)
     write_tables(folder, metrics)
     page = folder / "report.html"
-    write_page(
-        page,
-        title="Which faults can be told apart",
-        lead=_lead(metrics),
-        sections=_sections(folder, metrics),
-    )
+    sections = _sections(folder, metrics)
+    if pictures:
+        sections.insert(1, _pictures_section(pictures))
+    write_page(page, title=TITLE, lead=_lead(metrics), sections=sections)
+    text = "\n".join(_markdown(metrics, pictures))
+    (folder / "report.md").write_text(text, encoding="utf-8")
     return page
+
+
+def _markdown(metrics: Content, pictures: Sequence[tuple[str, str]]) -> list[str]:
+    """Lines of ``report.md``: the first figures, the table of scores and the pictures."""
+    first = [f"- **{line}**" for line in headlines(metrics)]
+    shown = [f"![{caption}]({picture})\n" for picture, caption in pictures]
+    lines = [f"# {TITLE}", "", *first, "", data_line(metrics), ""]
+    return [*lines, *result_table(metrics), "", *shown, *without_interval(metrics), ""]
+
+
+def _pictures_section(pictures: Sequence[tuple[str, str]]) -> Section:
+    """Accused teeth of test records."""
+    return Section(
+        title="What the network saw",
+        text=[
+            "The first found fault of each class and the first wrong answer among the test "
+            "records: the mean turn with the most suspicious tooth, the passage of that tooth "
+            "over those of its sisters, and the log-odds of a fault of every tooth."
+        ],
+        figures=pictures,
+    )
 
 
 def result_table(metrics: Content) -> list[str]:
@@ -79,13 +112,17 @@ def result_table(metrics: Content) -> list[str]:
 
 
 def without_interval(metrics: Content) -> list[str]:
-    """Line on the protocols whose scores have no interval; empty where all have one."""
+    """Lines on the protocols whose scores have no interval; empty where all have one."""
     results = metrics["protocols"] | metrics["novelty"]
-    units = {name: result["n_units"]["test"] for name, result in results.items()}
-    few = {name: n_units for name, n_units in units.items() if n_units < LEAST_UNITS}
-    if not few:
-        return []
-    return [f"{', '.join(few)}: {few_machines(min(few.values()))}"]
+    few: dict[str, dict[str, int]] = {}
+    for name, result in results.items():
+        support = fewest(result)
+        if support.too_few:
+            few.setdefault(support.kind, {})[name] = support.n_groups
+    return [
+        f"{', '.join(protocols)}: {few_groups(kind, min(protocols.values()))}"
+        for kind, protocols in few.items()
+    ]
 
 
 def _ordered(metrics: Content) -> Entries:
@@ -119,6 +156,7 @@ def _lead(metrics: Content) -> list[str]:
     samples = metrics["settings"]["window_samples"]
     window_ms = 1e3 * samples / metrics["sampling_rate_hz"]
     return [
+        *headlines(metrics),
         data_line(metrics),
         f"Network: {metrics['model']} on windows of {window_ms:.0f} ms, {level_text(metrics)}, "
         f"{made_by(metrics)}",
@@ -177,8 +215,8 @@ def _score_sections(folder: Path, metrics: Content, ordered: Entries) -> list[Se
         Section(
             title="Network, baselines and controls",
             text=[
-                "Mean over the seeds [95 % interval over test units, so over machines, not "
-                "windows]."
+                "Mean over the seeds [95 % interval]. "
+                f"{resampled_sentence(metrics['protocols'])}"
             ],
             table=_score_table(metrics),
             figures=[("scores.png", "scores and intervals; dotted: chance")],
@@ -223,7 +261,7 @@ def _fault_section(clean: Content, metrics: Content) -> Section:
         title="Which faults are found",
         text=[f"Share of the test records of each class that {model} recognises."],
         table=recall_table(clean, model, names),
-        notes=[*notes, *heads_notes(clean)],
+        notes=[*notes, *heads_notes(clean), *entry_notes(clean)],
     )
 
 

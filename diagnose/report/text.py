@@ -8,8 +8,9 @@ import numpy as np
 
 from diagnose.report.methods import controls_on_cards, rivals_on_cards
 from diagnose.report.novelty_report import novelty_caveats
-from diagnose.scoring.judged import interval_text
-from diagnose.scoring.metrics import LEAST_UNITS, is_above
+from diagnose.scoring.judged import drawn_text, interval_text, too_few_text
+from diagnose.scoring.machines import LEAST_UNITS, MACHINES, Support
+from diagnose.scoring.metrics import is_above
 from diagnose.studies.result_files import Content
 from gensig.text.page import Card, Section, Table
 
@@ -94,7 +95,8 @@ def _verdict(result: Content, score: Content, chance: float) -> tuple[list[str],
     """Verdicts on a score, and True if a control is above chance."""
     methods = result["methods"]
     if score["low"] is None:
-        lines = [f"no verdict against chance ({chance:.2f}): too few machines"]
+        reason = too_few_text(score)
+        lines = [f"no verdict against chance ({chance:.2f}): {reason}"]
     elif is_above(score, chance):
         lines = [f"above chance ({chance:.2f})"]
     else:
@@ -142,7 +144,7 @@ def _best_rival(methods: Content, score: Content) -> list[str]:
 
 def _spread(score: Content) -> str:
     if score["low"] is None:
-        return "too few machines"
+        return too_few_text(score)
     return f"{score['low']:.2f} to {score['high']:.2f}"
 
 
@@ -199,12 +201,37 @@ def trust_table(clean: Content) -> Table:
     return Table(head=TRUST_HEAD, rows=rows)
 
 
-def few_machines(n_units: int) -> str:
+def fewest(result: Content) -> Support:
+    """Groups that the intervals of a protocol resample; of two kinds the one with fewer."""
+    counts = [Support(kind=kind, n_groups=n) for kind, n in result["resampled"].items()]
+    return min(counts, key=lambda support: support.n_groups)
+
+
+def few_groups(kind: str, n_groups: int) -> str:
     """Reason why there is no interval."""
     return (
-        f"{n_units} test unit(s) are too few machines for an interval, {LEAST_UNITS} are the "
+        f"too few {kind} ({n_groups}) in the test part for an interval; {LEAST_UNITS} are the "
         f"least and {FEW_UNITS} advisable: a score of so few says little of others."
     )
+
+
+def resampled_sentence(results: Content) -> str:
+    """Sentence on what the intervals of protocols resample; machines alone need no more words."""
+    drawn = {name: drawn_text(result["resampled"]) for name, result in results.items()}
+    each = [*dict.fromkeys(drawn.values())]
+    texts = [
+        f"{what} ({', '.join(name for name in drawn if drawn[name] == what)})"
+        for what in each
+    ]
+    if len(each) == 1:
+        texts = each
+    sentence = (
+        f"The interval resamples {'; '.join(texts)}: windows of one machine are not "
+        "independent"
+    )
+    if each == [MACHINES]:
+        return f"{sentence}."
+    return f"{sentence}, nor are machines that share gears or a gearbox."
 
 
 def caveats(metrics: Content) -> list[str]:
@@ -213,13 +240,14 @@ def caveats(metrics: Content) -> list[str]:
         "Simulated vibration. A score here says nothing yet about measured machines."
     ]
     for name, result in metrics["protocols"].items():
-        n_units = result["n_units"]["test"]
-        if n_units < LEAST_UNITS:
-            lines.append(f"{name}: {few_machines(n_units)}")
-        elif n_units < FEW_UNITS and not result["leaky"]:
+        support = fewest(result)
+        kind, n_groups = support.kind, support.n_groups
+        if support.too_few:
+            lines.append(f"{name}: {few_groups(kind, n_groups)}")
+        elif n_groups < FEW_UNITS and not result["leaky"]:
             lines.append(
-                f"{name}: only {n_units} test unit(s). The interval shows the spread of these "
-                f"units and is too narrow for new ones; at least {FEW_UNITS} are advisable."
+                f"{name}: only {n_groups} {kind} in the test part. The interval shows the spread "
+                f"of these and is too narrow for new ones; at least {FEW_UNITS} are advisable."
             )
     lines += novelty_caveats(metrics["novelty"], FEW_UNITS)
     if metrics["settings"]["normalise"] == "rms":
@@ -229,6 +257,8 @@ def caveats(metrics: Content) -> list[str]:
         )
     for name, reason in metrics["protocols_left_out"].items():
         lines.append(f"{name} is left out: {reason}.")
+    for name, reason in metrics["baselines_left_out"].items():
+        lines.append(f"The baseline {name} is left out of {reason}.")
     if n_failed := metrics["n_records_unusable"]:
         lines.append(f"{n_failed} record(s) failed in simulation and are left out.")
     return lines

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from diagnose.scoring.judged import (
     score,
     with_interval,
 )
-from diagnose.scoring.metrics import CountArray, units_drawn
+from diagnose.scoring.machines import CountArray, Support
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
@@ -28,7 +29,6 @@ RECORDS_A_GROUP = 20  # fewer say little of four classes
 MOST_GROUPS = 5
 MOST_NAMES = 12  # more gearboxes than this are units, not a condition to compare
 LEAST_A_CLASS = 5  # records of each class that balanced accuracy needs in each group
-LEAST_UNITS_TESTED = 4  # on both sides of a comparison, for an estimate of the spread
 
 
 def condition_columns(dataset: Dataset, record: IntArray) -> dict[str, NDArray[Any]]:
@@ -74,7 +74,7 @@ def by_condition(
     ----------
     columns : of `condition_columns`
     methods : the network first; the same records in each
-    n_bootstrap : resamples of the units
+    n_bootstrap : resamples of the machines
     rng : source of the resamples
 
     Returns
@@ -92,15 +92,15 @@ def by_condition(
     The standard error is that of the resamples, and no smaller than that of independent records
     which are as often right as all are. A group that is low by luck shows too small a spread.
 
-    Source: standard error of resampled units with Student's t of as many degrees of freedom as
-    the group has units, less one, as Cameron, Gelbach & Miller (2008), "Bootstrap-based
-    improvements for inference with clustered errors", Review of Economics and Statistics 90 (3),
-    discuss for few clusters; Bonferroni's correction over the groups.
+    Source: standard error of resampled machines with Student's t of as many degrees of freedom as
+    the group has machines (or what is drawn of them), less one, as Cameron, Gelbach & Miller
+    (2008), "Bootstrap-based improvements for inference with clustered errors", Review of Economics
+    and Statistics 90 (3), discuss for few clusters; Bonferroni's correction over the groups.
     """
     network = methods[0]
-    drawn = units_drawn(network.n_units, n_bootstrap, rng)
+    drawn = network.machines.drawn(n_bootstrap, rng)
     rows: list[dict[str, Any]] = []
-    tested: list[tuple[dict[str, Any], FloatArray]] = []
+    tested: list[_Compared] = []
     n_groups = int(np.clip(network.label.size // RECORDS_A_GROUP, 1, MOST_GROUPS))
     for column, values in columns.items():
         groups = groups_of(values, most=n_groups)
@@ -108,15 +108,17 @@ def by_condition(
             continue
         measure = _measure(network.label, groups)
         for group in groups:
-            row, differences = _row(column, group, measure, methods, drawn, rng)
-            rows.append(row)
-            if row["difference_from_rest"] is not None:
-                tested.append((row, differences))
-    for row, differences in tested:
-        spread = _standard_error(network, row, differences)
-        factor = _factor(len(tested), row["n_units"])
+            compared = _compared(column, group, measure, methods, drawn, rng)
+            rows.append(compared.row)
+            if compared.row["difference_from_rest"] is not None:
+                tested.append(compared)
+    for compared in tested:
+        row, spread = compared.row, _standard_error(network, compared)
+        factor = _factor(len(tested), compared.support.n_groups)
         row["difference_at_most"] = row["difference_from_rest"] + factor * spread
-    weak = [row for row, _ in tested if row["difference_at_most"] < 0]
+    weak = [
+        compared.row for compared in tested if compared.row["difference_at_most"] < 0
+    ]
     weak.sort(key=lambda row: row["difference_at_most"])
     return {
         "rows": rows,
@@ -126,27 +128,43 @@ def by_condition(
     }
 
 
-def _row(
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Compared:
+    """One group of records against the rest.
+
+    Attributes
+    ----------
+    row : of ``metrics.json``
+    differences : (resample,) of the first method, group less rest
+    support : groups of machines behind the score of the group
+    """
+
+    row: dict[str, Any]
+    differences: FloatArray
+    support: Support
+
+
+def _compared(
     column: str,
     group: Group,
     measure: str,
     methods: Sequence[Judged],
     drawn: CountArray,
     rng: np.random.Generator,
-) -> tuple[dict[str, Any], FloatArray]:
-    """Row of one group, and the resampled differences of the first method from the rest."""
+) -> _Compared:
+    """One group of records against the rest."""
     network = methods[0]
     scores, resampled = {}, []
-    n_units = int(np.unique(network.unit[group.member]).size)
+    support = network.of(group.member).support
     for method in methods:
         part = method.of(group.member)
         values = resampled_score(part, measure, drawn, rng)
-        scores[method.method] = with_interval(score(part, measure), values, n_units)
+        scores[method.method] = with_interval(score(part, measure), values, support)
         resampled.append(values)
     rest = network.of(~group.member)
     differences = resampled[0] - resampled_score(rest, measure, drawn, rng)
     difference = None
-    if min(n_units, np.unique(rest.unit).size) >= LEAST_UNITS_TESTED:
+    if support.too_few is None and rest.support.too_few is None:
         inside = score(network.of(group.member), measure)
         difference = finite(inside - score(rest, measure))
     row = {
@@ -155,13 +173,13 @@ def _row(
         "low": group.low,
         "high": group.high,
         "n_records": int(group.member.sum()),
-        "n_units": n_units,
+        "n_units": int(np.unique(network.unit[group.member]).size),
         "measure": measure,
         "scores": scores,
         "difference_from_rest": difference,
         "difference_at_most": None,
     }
-    return row, differences
+    return _Compared(row=row, differences=differences, support=support)
 
 
 def _measure(label: IntArray, groups: Sequence[Group]) -> str:
@@ -173,28 +191,27 @@ def _measure(label: IntArray, groups: Sequence[Group]) -> str:
     return "balanced_accuracy"
 
 
-def _standard_error(
-    network: Judged, row: Mapping[str, Any], differences: FloatArray
-) -> float:
-    """Standard error of the difference between the group of a row and the rest."""
-    overall = score(network, row["measure"])
-    n_inside, n_units = row["n_records"], row["n_units"]
+def _standard_error(network: Judged, compared: _Compared) -> float:
+    """Standard error of the difference between a group and the rest."""
+    overall = score(network, compared.row["measure"])
+    n_inside, n_groups = compared.row["n_records"], compared.support.n_groups
     n_outside = network.label.size - n_inside
     of_records = np.sqrt(overall * (1 - overall) * (1 / n_inside + 1 / n_outside))
-    of_units = np.nanstd(differences) * np.sqrt(n_units / (n_units - 1))
-    return float(max(of_units, of_records))
+    spread = np.nanstd(compared.differences)
+    of_machines = spread * np.sqrt(n_groups / (n_groups - 1))
+    return float(max(of_machines, of_records))
 
 
-def _factor(n_compared: int, n_units: int) -> float:
+def _factor(n_compared: int, n_groups: int) -> float:
     """Distance of the ends in standard errors, for 95 % confidence in all of them together."""
     from scipy.stats import t
 
-    return float(t.ppf(1 - 0.05 / n_compared, n_units - 1))
+    return float(t.ppf(1 - 0.05 / n_compared, n_groups - 1))
 
 
 def _sentence(method: str, weak: Sequence[Mapping[str, Any]], n_tested: int) -> str:
     if not n_tested:
-        return "Too few test records or units to compare conditions."
+        return "Too few test records or machines to compare conditions."
     if not weak:
         return (
             f"No condition stands out: none of {n_tested} groups "

@@ -26,7 +26,8 @@ from diagnose.scoring.judged import (
     share_with_interval,
     with_interval,
 )
-from diagnose.scoring.metrics import CountArray, is_above, units_drawn
+from diagnose.scoring.machines import CountArray, Support
+from diagnose.scoring.metrics import is_above
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
@@ -113,7 +114,7 @@ def size_columns(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Alarms:
-    """Alarms of one method on all units, then on resampled units and trainings.
+    """Alarms of one method on all machines, then on resampled machines and trainings.
 
     Attributes
     ----------
@@ -138,12 +139,16 @@ class _Alarms:
         """Number of units of some records."""
         return int(np.unique(self.judged.unit[member]).size)
 
+    def support(self, member: BoolArray) -> Support:
+        """Groups of machines behind some records."""
+        return self.judged.of(member).support
+
     def share(self, member: BoolArray) -> Interval:
         """Share of some records that raise an alarm."""
         weight = self.weight[:, member]
         alarms = (weight * self.detected[:, member]).sum(axis=1)
         shares = _ratio(alarms, weight.sum(axis=1))
-        return share_with_interval(float(shares[0]), shares[1:], self.n_units(member))
+        return share_with_interval(float(shares[0]), shares[1:], self.support(member))
 
     def area(self, faulty: BoolArray) -> Interval:
         """Area under the ROC curve, mean over the trainings drawn.
@@ -168,7 +173,7 @@ class _Alarms:
                 won[index] = np.bincount(unit[faulty], below, judged.n_units)
             areas[:, seed] = _ratio(self._over_pairs(won), n_pairs)
         area = np.take_along_axis(areas, self.seeds, axis=1).mean(axis=1)
-        return with_interval(area[0], area[1:], self.n_units(faulty))
+        return with_interval(area[0], area[1:], self.support(faulty))
 
     def _over_pairs(self, pairs: FloatArray) -> FloatArray:
         """(1 + resample,) sum of a table of pairs of units."""
@@ -176,15 +181,15 @@ class _Alarms:
 
     def of_class(self, member: BoolArray, sizes: Sizes) -> dict[str, Any]:
         """Results of one class, without its summary."""
-        n_units = self.n_units(member)
+        support = self.support(member)
         detected, weight = self.detected[:, member], self.weight[:, member]
         severity = sizes.get("severity")
         limit_rows: list[dict[str, Any]] = []
         for quantity, size in sizes.items():
-            limit_rows += _limit_rows(quantity, size, detected, weight, n_units)
+            limit_rows += _limit_rows(quantity, size, detected, weight, support)
         return {
             "n_records": int(member.sum()),
-            "n_units": n_units,
+            "n_units": self.n_units(member),
             "auroc": self.area(member),
             "share_found": self.share(member),
             "by_severity": self.by_severity(severity, member),
@@ -246,7 +251,7 @@ def detection(
     validation : the same on the validation records; None if they were not predicted
     class_names : one of them "healthy"
     sizes : for each class, sizes (record,) of its test records in their order, by name
-    n_bootstrap : resamples of the units of both parts, so that the intervals include the
+    n_bootstrap : resamples of the machines of both parts, so that the intervals include the
         uncertainty of the threshold
     rng : source of the resamples
     """
@@ -284,9 +289,9 @@ def detection(
 
 
 def _drawn(judged: Judged, n_bootstrap: int, rng: np.random.Generator) -> CountArray:
-    """All units once, then the resamples: (1 + resample, unit)."""
+    """All machines once, then the resamples: (1 + resample, unit)."""
     once = np.ones((1, judged.n_units), dtype=np.int64)
-    return np.concatenate([once, units_drawn(judged.n_units, n_bootstrap, rng)])
+    return np.concatenate([once, judged.machines.drawn(n_bootstrap, rng)])
 
 
 def _thresholds(
@@ -332,7 +337,7 @@ def _limit_rows(
     size: FloatArray,
     detected: FloatArray,
     weight: FloatArray,
-    n_units: int,
+    support: Support,
 ) -> list[dict[str, Any]]:
     """Detection limits of one class in one quantity, one row for each of `SHARES`."""
     if not _has_curve(size):
@@ -341,7 +346,7 @@ def _limit_rows(
     rows = []
     for share in SHARES:
         values = limits(coefficients, size, share)
-        interval = with_interval(values[0], values[1:], n_units)
+        interval = with_interval(values[0], values[1:], support)
         status = "reached"
         if values[0] == size.min():
             status = "at_smallest_tested"

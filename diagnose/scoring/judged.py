@@ -1,25 +1,26 @@
-"""Predictions of a method for the test records of a protocol, and scores on resampled units."""
+"""Predictions of a method for the test records of a protocol, and scores on resamples."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.windows import FloatArray, IntArray
-from diagnose.scoring.metrics import (
-    LEAST_UNITS,
-    CountArray,
-    balanced_accuracy,
-    over_drawn_seeds,
-)
+from diagnose.scoring.machines import MACHINES, CountArray, Machines, Support
+from diagnose.scoring.metrics import balanced_accuracy, over_drawn_seeds
 
-Interval = dict[str, float | None]
 
-NO_INTERVAL = "[too few machines]"
+class Interval(TypedDict):
+    """Value with its 95 % interval; ``too_few`` names the groups that are too few for one."""
+
+    mean: float | None
+    low: float | None
+    high: float | None
+    too_few: str | None
 
 
 def share_right(confusion: CountArray) -> FloatArray:
@@ -47,7 +48,7 @@ class Judged:
     method : its name
     label : (record,) true class
     unit : (record,) 0 to n_units - 1, the unit of each record
-    n_units : of the whole test part
+    machines : the units of the whole test part
     log_probability : (seed, record, class), or scores that rank in the same order; one seed for a
         method without seeds
     """
@@ -55,13 +56,23 @@ class Judged:
     method: str
     label: IntArray
     unit: IntArray
-    n_units: int
+    machines: Machines
     log_probability: FloatArray
 
     @property
     def predicted(self) -> IntArray:
         """(seed, record) the most probable class."""
         return self.log_probability.argmax(axis=-1)
+
+    @property
+    def n_units(self) -> int:
+        """Number of units of the whole test part."""
+        return self.machines.n_units
+
+    @property
+    def support(self) -> Support:
+        """Groups of machines behind a score of these records."""
+        return self.machines.support(np.unique(self.unit))
 
     @property
     def n_seeds(self) -> int:
@@ -97,8 +108,8 @@ def resampled_score(
     ----------
     judged : the method on the records to score
     measure : key of `MEASURES`
-    drawn : (resample, unit) of `diagnose.scoring.metrics.units_drawn`, the same for all scores of
-        a comparison
+    drawn : (resample, unit) of `diagnose.scoring.machines.Machines.drawn`, the same for all scores
+        of a comparison
     rng : draws the seeds
     """
     counts = np.einsum("bu,sutp->bstp", drawn, judged.confusion())
@@ -110,39 +121,46 @@ def score(judged: Judged, measure: str) -> float:
     return float(MEASURES[measure](judged.confusion().sum(axis=1)).mean())
 
 
-def with_interval(value: float, resampled: FloatArray, n_units: int) -> Interval:
-    """Value with its 95 % percentile interval, which is None for few units.
+def with_interval(value: float, resampled: FloatArray, support: Support) -> Interval:
+    """Value with its 95 % percentile interval, which is None for few groups of machines.
 
     Parameters
     ----------
-    value : of all units
-    resampled : (resample,) values of resampled units; NaN if a resample has none
-    n_units : number of units behind the value; `diagnose.scoring.metrics.LEAST_UNITS` are needed
+    value : of all machines
+    resampled : (resample,) values of resampled machines; NaN if a resample has none
+    support : groups behind the value; `diagnose.scoring.machines.LEAST_UNITS` are needed
 
     Source: Efron & Tibshirani (1993), section 13.3.
     """
     known = resampled[~np.isnan(resampled)]
     low, high = np.nan, np.nan
-    if n_units >= LEAST_UNITS and known.size:
+    if support.too_few is None and known.size:
         low, high = np.quantile(known, [0.025, 0.975], method="inverted_cdf")
-    return {"mean": finite(value), "low": finite(low), "high": finite(high)}
+    return {
+        "mean": finite(value),
+        "low": finite(low),
+        "high": finite(high),
+        "too_few": support.too_few,
+    }
 
 
-def share_with_interval(value: float, resampled: FloatArray, n_units: int) -> Interval:
+def share_with_interval(
+    value: float, resampled: FloatArray, support: Support
+) -> Interval:
     """A share with its interval, also for 0 or 1.
 
     As `with_interval`. All resamples of a share of 0 or 1 are the same. Its interval is therefore
-    extended to that of as many independent trials as there are units.
+    extended to that of as many independent trials as there are groups of machines.
 
     Source: Clopper & Pearson (1934), "The use of confidence or fiducial limits illustrated in the
     case of the binomial", Biometrika 26 (4).
     """
     from scipy.stats import binomtest
 
-    interval = with_interval(value, resampled, n_units)
+    interval = with_interval(value, resampled, support)
     low, high = interval["low"], interval["high"]
     if value in (0.0, 1.0) and low is not None and high is not None:
-        trials = binomtest(round(value * n_units), n_units)
+        trials = binomtest(round(value * support.n_groups), support.n_groups)
         exact = trials.proportion_ci(0.95, method="exact")
         interval["low"] = min(low, float(exact.low))
         interval["high"] = max(high, float(exact.high))
@@ -155,11 +173,31 @@ def finite(value: float) -> float | None:
 
 
 def interval_text(scored: Mapping[str, Any], form: str = ".2f") -> str:
-    """Value and interval in words, as ``0.53 [0.46, 0.59]``, or with `NO_INTERVAL`."""
+    """Value and interval in words, as ``0.53 [0.46, 0.59]``, or with `too_few_text`."""
     mean, low, high = (scored[key] for key in ("mean", "low", "high"))
     if mean is None:
         return "unknown"
     if low is None and high is None:
-        return f"{mean:{form}} {NO_INTERVAL}"
+        return f"{mean:{form}} [{too_few_text(scored)}]"
     ends = ["?" if end is None else f"{end:{form}}" for end in (low, high)]
     return f"{mean:{form}} [{ends[0]}, {ends[1]}]"
+
+
+def too_few_text(scored: Mapping[str, Any]) -> str:
+    """Reason why a score has no interval, as ``too few sets of gears``."""
+    return f"too few {scored.get('too_few') or MACHINES}"
+
+
+def drawn_text(resampled: Mapping[str, int]) -> str:
+    """Names of what an interval resamples, of `diagnose.scoring.machines.Machines.counts`."""
+    return " and ".join(resampled)
+
+
+def spread_text(
+    scored: Mapping[str, Any], resampled: Mapping[str, int], form: str
+) -> str:
+    """Interval of a score in words, with what it resamples, or why there is none."""
+    low, high = scored["low"], scored["high"]
+    if low is None or high is None:
+        return f"no 95 % interval: {too_few_text(scored)}"
+    return f"95 % interval over {drawn_text(resampled)} {low:{form}} to {high:{form}}"

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.windows import FloatArray
-from diagnose.scoring.metrics import units_drawn
+from diagnose.scoring.judged import Interval
+from diagnose.scoring.machines import Machines, Support
+from diagnose.scoring.metrics import percentile_interval
 
 EARLY, LATE = 13.0, 10.0  # units of error in which the score grows e-fold, of PHM 2008
 UNITS = 125.0  # of the score in the early level: cycles at which C-MAPSS studies usually cut
@@ -162,22 +164,28 @@ def by_life(snapshots: Snapshots) -> dict[str, NDArray[Any]]:
 
 
 def life_scores(
-    values: Mapping[str, FloatArray], *, n_bootstrap: int, rng: np.random.Generator
+    values: Mapping[str, FloatArray],
+    *,
+    machines: Machines,
+    n_bootstrap: int,
+    rng: np.random.Generator,
 ) -> dict[str, Any]:
-    """Scores with 95 % intervals over lives.
+    """Scores with 95 % intervals over lives, or over what their machines share.
 
     Parameters
     ----------
     values : measure -> (seed, life) of `by_life`; the same seeds and lives for every measure
+    machines : of the lives
     n_bootstrap : resamples of the lives, with all their snapshots, and of the seeds
     rng : source of the resamples, the same draws for every measure
     """
-    n_seeds, n_lives = next(iter(values.values())).shape
-    lives, seeds = drawn(n_seeds, n_lives, n_bootstrap, rng)
+    n_seeds = next(iter(values.values())).shape[0]
+    lives, seeds = drawn(n_seeds, machines, n_bootstrap, rng)
     scores = {}
     for name, table in values.items():
         mean = _finished(name, table.mean(axis=1)).mean()
-        scores[name] = _interval(mean, _over_drawn(name, table, lives, seeds))
+        resampled = _over_drawn(name, table, lives, seeds)
+        scores[name] = _interval(mean, resampled, machines.support())
     return scores
 
 
@@ -185,43 +193,51 @@ def gain(
     values: FloatArray,
     against: FloatArray,
     *,
+    machines: Machines,
     n_bootstrap: int,
     rng: np.random.Generator,
-) -> dict[str, float]:
+) -> Interval:
     """RMSE of ``against`` less that of ``values``, in h: above 0 is better.
 
     Both are (seed, life) squared errors, scored on the same resamples of the lives. `low` and
     `high` are the 95 % interval.
     """
-    n_seeds, n_lives = values.shape
-    lives, seeds = drawn(n_seeds, n_lives, n_bootstrap, rng)
+    lives, seeds = drawn(values.shape[0], machines, n_bootstrap, rng)
     other_seeds = rng.integers(against.shape[0], size=(n_bootstrap, against.shape[0]))
     of_other = _over_drawn("rmse_h", against, lives, other_seeds)
     of_values = _over_drawn("rmse_h", values, lives, seeds)
     mean = np.sqrt(against.mean(axis=1)).mean() - np.sqrt(values.mean(axis=1)).mean()
-    return _interval(mean, of_other - of_values)
+    return _interval(mean, of_other - of_values, machines.support())
 
 
 def drawn(
-    n_seeds: int, n_lives: int, n_bootstrap: int, rng: np.random.Generator
+    n_seeds: int, machines: Machines, n_bootstrap: int, rng: np.random.Generator
 ) -> tuple[Any, Any]:
     """Counts of each life in each resample, (draw, life), and drawn seeds, (draw, seed).
 
     Source: percentile interval of Efron & Tibshirani (1993), "An introduction to the bootstrap",
     section 13.3.
     """
-    lives = units_drawn(n_lives, n_bootstrap, rng)
+    lives = machines.drawn(n_bootstrap, rng)
     return lives, rng.integers(n_seeds, size=(n_bootstrap, n_seeds))
 
 
-def _interval(mean: float, resampled: FloatArray) -> dict[str, float]:
-    low, high = np.quantile(resampled, [0.025, 0.975])
-    return {"mean": float(mean), "low": float(low), "high": float(high)}
+def _interval(mean: float, resampled: FloatArray, support: Support) -> Interval:
+    low, high = percentile_interval(resampled, support)
+    return {
+        "mean": float(mean),
+        "low": low,
+        "high": high,
+        "too_few": support.too_few,
+    }
 
 
 def _over_drawn(name: str, table: FloatArray, lives: Any, seeds: Any) -> FloatArray:
     """(draw,) the measure of resampled lives, mean over the seeds drawn."""
-    by_seed = _finished(name, lives @ table.T / table.shape[1])
+    total = lives.sum(axis=1, keepdims=True)
+    nothing = np.full((len(lives), table.shape[0]), np.nan)
+    means = np.divide(lives @ table.T, total, out=nothing, where=total > 0)
+    by_seed = _finished(name, means)
     return np.take_along_axis(by_seed, seeds, axis=1).mean(axis=1)
 
 

@@ -1,4 +1,4 @@
-"""Scores over records with intervals over units: windows of one machine are not independent."""
+"""Scores over records with intervals over machines: windows of one are not independent."""
 
 from __future__ import annotations
 
@@ -11,25 +11,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.windows import FloatArray, IntArray
-
-CountArray = NDArray[np.int64]
-
-# Of n units one resample in n^n holds the worst alone. For three or fewer that is more than
-# 2.5 %, and a 95 % interval would end at the worst and the best unit.
-LEAST_UNITS = 4
+from diagnose.scoring.machines import CountArray, Machines, Support
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Score:
-    """Mean over seeds, the value of each seed, and the 95 % interval over units.
+    """Mean over seeds, the value of each seed, and the 95 % interval over machines.
 
-    The interval is None for fewer units than `LEAST_UNITS`.
+    Attributes
+    ----------
+    low, high : None for fewer groups than `diagnose.scoring.machines.LEAST_UNITS`
+    too_few : kind of these groups then
     """
 
     mean: float
     low: float | None
     high: float | None
     per_seed: tuple[float, ...]
+    too_few: str | None = None
 
 
 def over_records(
@@ -92,58 +91,54 @@ def macro_f1(confusion: CountArray) -> FloatArray:
 SCORES = {"balanced_accuracy": balanced_accuracy, "macro_f1": macro_f1}
 
 
-def units_drawn(n_units: int, n_bootstrap: int, rng: np.random.Generator) -> CountArray:
-    """Number of times that each resample holds each unit, (resample, unit).
-
-    A resample has as many draws with replacement as there are units.
-
-    Source: Efron & Tibshirani (1993), "An introduction to the bootstrap", section 8.3 (units, not
-    records, are drawn).
-    """
-    return rng.multinomial(n_units, np.full(n_units, 1 / n_units), size=n_bootstrap)
-
-
 def score_with_interval(
     name: str,
     confusion: CountArray,
     *,
     n_bootstrap: int,
     rng: np.random.Generator,
+    machines: Machines | None = None,
     shuffled: bool = False,
 ) -> Score:
-    """Score with a 95 % interval by bootstrap over units.
+    """Score with a 95 % interval by bootstrap over machines, or over what they share.
 
     Parameters
     ----------
     name : key of `SCORES`
     confusion : (seed, unit, true class, predicted class) counts of records
-    n_bootstrap : resamples of the units, with all their records, and of the seeds
+    n_bootstrap : resamples of the machines, with all their records, and of the seeds
     rng : source of the resamples
+    machines : of the units, in their order; None for units that share nothing
     shuffled : True for shuffled training labels; the interval then covers the luck of the shuffle
 
     Source: percentile interval of Efron & Tibshirani (1993), "An introduction to the bootstrap",
-    section 13.3. With few units it is too narrow: it is no wider than what the units at hand
-    show. Fewer than `LEAST_UNITS` give none.
+    section 13.3. With few groups it is too narrow: it is no wider than what those at hand show.
+    Fewer than `diagnose.scoring.machines.LEAST_UNITS` give none.
     """
     score = SCORES[name]
     per_seed = score(confusion.sum(axis=1))
-    n_units = confusion.shape[1]
-    drawn = units_drawn(n_units, n_bootstrap, rng)
+    machines = machines or Machines.alone(confusion.shape[1])
+    support, drawn = machines.support(), machines.drawn(n_bootstrap, rng)
     resampled = score(np.einsum("bu,sutp->bstp", drawn, confusion))
     if shuffled:
         luck = _renaming_luck(name, confusion.sum(axis=1), n_bootstrap, rng)
         resampled = resampled + luck
     values = np.clip(over_drawn_seeds(resampled, rng), 0, 1)
-    low, high = percentile_interval(values, n_units)
-    mean, by_seed = float(np.mean(per_seed)), tuple(per_seed.tolist())
-    return Score(mean=mean, low=low, high=high, per_seed=by_seed)
+    low, high = percentile_interval(values, support)
+    return Score(
+        mean=float(np.mean(per_seed)),
+        low=low,
+        high=high,
+        per_seed=tuple(per_seed.tolist()),
+        too_few=support.too_few,
+    )
 
 
 def percentile_interval(
-    resampled: FloatArray, n_units: int
+    resampled: FloatArray, support: Support
 ) -> tuple[float, float] | tuple[None, None]:
-    """95 % interval of (resample,) values, NaN left out; None for fewer than `LEAST_UNITS`."""
-    if n_units < LEAST_UNITS:
+    """95 % interval of (resample,) values, NaN left out; None for too few groups."""
+    if support.too_few:
         return None, None
     low, high = np.nanquantile(resampled, [0.025, 0.975])
     return float(low), float(high)
@@ -161,7 +156,8 @@ def ratio_with_interval(
     *,
     n_bootstrap: int,
     rng: np.random.Generator,
-) -> dict[str, float | None]:
+    machines: Machines | None = None,
+) -> dict[str, float | str | None]:
     """Ratio of a score to that of a reference on the same units, with a 95 % interval.
 
     Parameters
@@ -169,15 +165,16 @@ def ratio_with_interval(
     name : key of `SCORES`
     confusion, reference : (seed, unit, true class, predicted class) counts of records; the same
         units in the same order. Both scores are means over their seeds
-    n_bootstrap : resamples; each draws the units once for both, and the seeds of each
+    n_bootstrap : resamples; each draws the machines once for both, and the seeds of each
     rng : source of the resamples
+    machines : of the units, in their order; None for units that share nothing
 
     Returns
     -------
-    ``mean``, ``low``, ``high``; the last two None for fewer than `LEAST_UNITS`
+    ``mean``, ``low``, ``high``, ``too_few``, as in `Score`
     """
-    score, n_units = SCORES[name], confusion.shape[1]
-    drawn = units_drawn(n_units, n_bootstrap, rng)
+    score, machines = SCORES[name], machines or Machines.alone(confusion.shape[1])
+    support, drawn = machines.support(), machines.drawn(n_bootstrap, rng)
     means, resampled = [], []
     for counts in (confusion, reference):
         values = score(np.einsum("bu,sutp->bstp", drawn, counts))
@@ -185,8 +182,13 @@ def ratio_with_interval(
         means.append(np.mean(score(counts.sum(axis=1))))
     least = np.finfo(float).tiny  # for a reference that finds nothing in a resample
     ratios = resampled[0] / np.maximum(resampled[1], least)
-    low, high = percentile_interval(ratios, n_units)
-    return {"mean": float(means[0] / max(means[1], least)), "low": low, "high": high}
+    low, high = percentile_interval(ratios, support)
+    return {
+        "mean": float(means[0] / max(means[1], least)),
+        "low": low,
+        "high": high,
+        "too_few": support.too_few,
+    }
 
 
 def over_drawn_seeds(resampled: FloatArray, rng: np.random.Generator) -> FloatArray:

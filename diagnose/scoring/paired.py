@@ -1,4 +1,4 @@
-"""Paired comparison of two methods on the same units."""
+"""Paired comparison of two methods on the same machines."""
 
 from __future__ import annotations
 
@@ -8,8 +8,13 @@ from typing import Any
 import numpy as np
 
 from diagnose.data.windows import FloatArray
-from diagnose.scoring.judged import Judged, resampled_score, score, with_interval
-from diagnose.scoring.metrics import units_drawn
+from diagnose.scoring.judged import (
+    Judged,
+    resampled_score,
+    score,
+    too_few_text,
+    with_interval,
+)
 
 ACCURACY = "balanced_accuracy"
 N_PERMUTATIONS = 9999  # all of them if there are fewer
@@ -24,15 +29,17 @@ def compare(
 ) -> list[dict[str, Any]]:
     """Difference of balanced accuracy, network less another method, one row a method.
 
-    The interval is that of resampled units (the same for both) and seeds. The p-value is that of
-    a permutation test over units: for equal methods, swapping their predictions for all records
-    of a unit changes nothing. McNemar's test would treat the records of a unit as independent.
+    The interval is that of resampled machines (the same for both) and seeds. The p-value is that
+    of a permutation test: for equal methods, swapping their predictions for all records of a
+    machine, or of all machines that share gears or a gearbox, changes nothing. Where machines
+    share both, the one with fewer groups is swapped. McNemar's test would treat the records of a
+    machine as independent.
     The p-values are those of the trainings at hand, corrected for the number of rows.
 
     Parameters
     ----------
     network, others : on the same records
-    n_bootstrap : resamples of the units
+    n_bootstrap : resamples of the machines
     rng : source of the resamples and of the permutations
 
     Source: paired bootstrap as Efron & Tibshirani (1993), section 8.3; permutation test as in
@@ -40,7 +47,7 @@ def compare(
     inference", Statistical Science 19 (4); correction Holm (1979), "A simple sequentially
     rejective multiple test procedure", Scandinavian Journal of Statistics 6 (2).
     """
-    drawn = units_drawn(network.n_units, n_bootstrap, rng)
+    drawn, support = network.machines.drawn(n_bootstrap, rng), network.support
     of_network = resampled_score(network, ACCURACY, drawn, rng)
     rows: list[dict[str, Any]] = []
     for other in others:
@@ -51,7 +58,9 @@ def compare(
                 "method": network.method,
                 "against": other.method,
                 "n_units": network.n_units,
-                "difference": with_interval(difference, resampled, network.n_units),
+                "n_swapped": support.n_groups,
+                "swapped": support.kind,
+                "difference": with_interval(difference, resampled, support),
                 "p_value": permutation_p_value(network, other, rng),
             }
         )
@@ -64,18 +73,18 @@ def compare(
 def permutation_p_value(
     first: Judged, second: Judged, rng: np.random.Generator
 ) -> float:
-    """Two-sided p-value of equal balanced accuracy; 1 for a single unit.
+    """Two-sided p-value of equal balanced accuracy; 1 for a single group of machines.
 
-    Balanced accuracy is a sum over units (each class counts by its records in the whole test
-    part). Swapping two methods in a unit therefore changes the sign of the unit's part of the
+    Balanced accuracy is a sum over groups (each class counts by its records in the whole test
+    part). Swapping two methods in a group therefore changes the sign of the group's part of the
     difference.
     """
     from scipy.stats import permutation_test
 
-    if first.n_units < 2:
+    if first.support.n_groups < 2:
         return 1.0
     result = permutation_test(
-        (_part_of_unit(first), _part_of_unit(second)),
+        (_part_of_group(first), _part_of_group(second)),
         lambda a, b, axis: np.sum(a - b, axis=axis),
         permutation_type="samples",
         vectorized=True,
@@ -97,19 +106,24 @@ def holm(p_values: Sequence[float]) -> list[float]:
     return values.tolist()
 
 
-def _part_of_unit(judged: Judged) -> FloatArray:
-    """(unit,) contribution of each unit to the balanced accuracy, mean over the seeds."""
+def _part_of_group(judged: Judged) -> FloatArray:
+    """(group,) contribution of each group to the balanced accuracy, mean over the seeds."""
     hits = np.diagonal(judged.confusion(), axis1=-2, axis2=-1).mean(axis=0)
     totals = np.bincount(judged.label, minlength=hits.shape[1])
     present = totals > 0
-    return (hits[:, present] / totals[present]).sum(axis=1) / present.sum()
+    of_unit = (hits[:, present] / totals[present]).sum(axis=1) / present.sum()
+    group = judged.machines.coarsest().group
+    parts = np.zeros(int(group.max()) + 1)
+    np.add.at(parts, group, of_unit)
+    return parts
 
 
 def _sentence(row: dict[str, Any]) -> str:
     mean, low, high = (row["difference"][key] for key in ("mean", "low", "high"))
     methods = f"{row['method']} against {row['against'].replace('_', ' ')}: {mean:+.2f}"
     if low is None:
-        return f"{methods}; one unit shows no spread, so that nothing can be said"
+        reason = too_few_text(row["difference"])
+        return f"{methods}; {reason}, so that nothing can be said"
     p_value = f"p = {row['p_value_holm']:.3f}"
     if row["p_value_holm"] < 0.001:
         p_value = "p < 0.001"
@@ -118,5 +132,5 @@ def _sentence(row: dict[str, Any]) -> str:
         verdict = "better" if mean > 0 else "worse"
     return (
         f"{methods} [{low:+.2f}, {high:+.2f}] balanced accuracy, "
-        f"{p_value} (permutation of {row['n_units']} units, Holm): {verdict}"
+        f"{p_value} (permutation of {row['n_swapped']} {row['swapped']}, Holm): {verdict}"
     )

@@ -52,6 +52,7 @@ class Prediction:
         networks only; `temperature` as in `diagnose.networks.calibration`, `last_predicted`
         (record,) the labels by the weights of the last epoch
     heads : of a network that has them, `diagnose.training.heads.predict_heads`
+    entries : of a network on teeth, `diagnose.training.entries.predict_entries`
     """
 
     protocol: str
@@ -70,6 +71,7 @@ class Prediction:
     temperature: float = 1.0
     last_predicted: IntArray | None = None
     heads: Mapping[str, FloatArray] = field(default_factory=dict)
+    entries: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @property
     def predicted(self) -> IntArray:

@@ -10,13 +10,14 @@ import numpy as np
 
 from diagnose.data.windows import FloatArray, IntArray
 from diagnose.scoring.judged import (
+    Interval,
     Judged,
     interval_text,
     resampled_score,
     score,
     with_interval,
 )
-from diagnose.scoring.metrics import over_records, units_drawn
+from diagnose.scoring.metrics import over_records
 
 
 def by_window_length(
@@ -36,7 +37,7 @@ def by_window_length(
     windows : for each seed, record (window,) and log-probabilities (window, class), windows of a
         record in time order
     window_seconds, step_seconds : length of a window and step to the next one, s
-    n_bootstrap, rng : resamples of the units and their source
+    n_bootstrap, rng : resamples of the machines and their source
 
     Returns
     -------
@@ -47,7 +48,7 @@ def by_window_length(
     positions = [_position_in_record(record) for record, _ in windows]
     longest = int(max(position.max() for position in positions)) + 1
     counts = [1 << power for power in range((longest - 1).bit_length())] + [longest]
-    drawn = units_drawn(judged.n_units, n_bootstrap, rng)
+    drawn, support = judged.machines.drawn(n_bootstrap, rng), judged.support
     rows, resampled, scores = [], [], []
     for count in counts:
         by_record = []
@@ -63,13 +64,13 @@ def by_window_length(
             {
                 "n_windows": count,
                 "seconds": window_seconds + (count - 1) * step_seconds,
-                "balanced_accuracy": with_interval(mean, values, judged.n_units),
+                "balanced_accuracy": with_interval(mean, values, support),
             }
         )
         resampled.append(values)
         scores.append(mean)
     differences = resampled[-1] - resampled[0]
-    gain = with_interval(scores[-1] - scores[0], differences, judged.n_units)
+    gain = with_interval(scores[-1] - scores[0], differences, support)
     return {
         "method": judged.method,
         "rows": rows,
@@ -87,9 +88,7 @@ def _position_in_record(record: IntArray) -> IntArray:
     return position
 
 
-def _sentence(
-    method: str, rows: Sequence[dict[str, Any]], gain: dict[str, float | None]
-) -> str:
+def _sentence(method: str, rows: Sequence[dict[str, Any]], gain: Interval) -> str:
     first, last = rows[0], rows[-1]
     if len(rows) == 1:
         seconds = f"{first['seconds']:.3g} s"

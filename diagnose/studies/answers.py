@@ -17,6 +17,7 @@ from diagnose.data.windows import Task
 from diagnose.scoring.conditions import by_condition, condition_columns
 from diagnose.scoring.detection_limit import HEALTHY, detection, size_columns
 from diagnose.scoring.judged import Judged
+from diagnose.scoring.machines import machines_of
 from diagnose.scoring.metrics import balanced_accuracy
 from diagnose.scoring.paired import compare
 from diagnose.scoring.predictions import Prediction
@@ -140,12 +141,12 @@ def _validation(task: Task, method: str, runs: Sequence[Prediction]) -> Judged |
 def _of_records(
     task: Task, method: str, record: IntArray, scores: FloatArray
 ) -> Judged:
-    names, unit = np.unique(unit_ids(task)[record], return_inverse=True)
+    unit = np.unique(unit_ids(task)[record], return_inverse=True)[1]
     return Judged(
         method=method,
         label=task.labels()[record],
         unit=unit,
-        n_units=int(names.size),
+        machines=machines_of(task.dataset, record),
         log_probability=scores,
     )
 

@@ -10,12 +10,21 @@ import numpy as np
 from diagnose.baselines.base import Role
 from diagnose.baselines.oracle import has_twin
 from diagnose.baselines.registry import baseline_names
+from diagnose.data.turns import NO_REFERENCE
 from diagnose.data.windows import CROSS_SENSOR, Task
 from diagnose.scoring.metrics import balanced_accuracy, confusion_by_unit
 from diagnose.scoring.predictions import Prediction
 from diagnose.settings import BOTH, TrainSettings
 from diagnose.studies.counts import by_method, run_notes
-from diagnose.studies.jobs import LEVEL_KEPT, ORACLE, ORACLE_NETWORK, PROBE, SHAM, Job
+from diagnose.studies.jobs import (
+    LEVEL_KEPT,
+    ORACLE,
+    ORACLE_NETWORK,
+    PROBE,
+    SHAM,
+    WITH_REFERENCE,
+    Job,
+)
 from diagnose.studies.result_files import Entry
 from diagnose.training import sham
 
@@ -58,6 +67,8 @@ def control_jobs(
         seeds: dict[str, Sequence[int]] = {}
         if settings.normalise == BOTH:
             seeds[LEVEL_KEPT] = settings.seeds
+        if settings.reference != NO_REFERENCE:
+            seeds[WITH_REFERENCE] = settings.seeds
         if protocol in with_oracle:
             seeds[ORACLE] = few
         if protocol in shams:

@@ -15,10 +15,12 @@ from diagnose.baselines.oracle import oracle_windows
 from diagnose.baselines.registry import baseline_names
 from diagnose.data.inputs import NetworkInput
 from diagnose.data.protocols import HEALTHY_ONLY, OPEN_PROTOCOLS
+from diagnose.data.turns import REFERENCE
 from diagnose.data.window_input import Windows
 from diagnose.data.windows import SUBSETS, Task, WindowSet, subset_segments
 from diagnose.networks.adaptation import healthy_statistics
 from diagnose.networks.domain import Domain, fit_domain
+from diagnose.networks.network import Network
 from diagnose.networks.registry import input_of
 from diagnose.scoring.metrics import over_records
 from diagnose.scoring.predictions import Prediction, Rows
@@ -32,14 +34,17 @@ from diagnose.studies.novelty import (
 )
 from diagnose.studies.result_files import network_name
 from diagnose.training.classes import Classes, predict_windows, with_shuffled_labels
+from diagnose.training.entries import predict_entries
 from diagnose.training.heads import predict_heads
 from diagnose.training.sham import sham_method, sham_task
 from diagnose.training.tensorboard import epoch_log
-from diagnose.training.train import train_network
+from diagnose.training.train import Training, train_network
 from diagnose.workers import call_all
 
 # Controls of a job beside the label shuffle, and the network that sees the level.
 PROBE, ORACLE, SHAM, LEVEL_KEPT = "probe", "oracle", "sham", "level_kept"
+# The network that also sees a sound record of the machine.
+WITH_REFERENCE = "with_reference"
 WINDOWS = Windows()
 # Names of trained controls in metrics.json; those of `SHAM` and `LEVEL_KEPT` are the same.
 LABEL_SHUFFLE, ORACLE_NETWORK = "label_shuffle", "oracle_network"
@@ -54,7 +59,8 @@ class Job:
 
     Attributes
     ----------
-    shuffled : training with shuffled labels
+    shuffled : training with shuffled labels, without early stopping, which would end it in its
+        first epochs, before the network could show a leak
     control : "" or one of the controls, which replaces the training or the baselines
     """
 
@@ -138,11 +144,14 @@ def _run_training(
     control: str,
 ) -> Prediction:
     n_classes = len(task.class_names)
+    if control == WITH_REFERENCE:
+        settings = with_reference(settings)
     sets = _windows(task, protocol, control, input_of(settings.model))
     train, validation, test = (sets[subset] for subset in SUBSETS)
     variant, method = control, _method(settings, control)
     if shuffled:
         variant = method = LABEL_SHUFFLE
+        settings = replace(settings, patience=0)
         rng = np.random.default_rng([seed, 2])
         train = with_shuffled_labels(train, n_classes, rng)
         validation = with_shuffled_labels(validation, n_classes, rng)
@@ -175,18 +184,33 @@ def _run_training(
     )
     if shuffled:
         return prediction
+    prediction = replace(
+        _with_further_answers(prediction, training, test),
+        healthy=healthy_statistics(model, train, task.class_names),
+    )
+    if control not in ("", WITH_REFERENCE):
+        return prediction
+    domain = _domain(protocol, control, train, validation)
+    return replace(prediction, weights=training.weights(), domain=domain)
+
+
+def _with_further_answers(
+    prediction: Prediction, training: Training[Network], test: WindowSet
+) -> Prediction:
+    """The prediction with those of the last epoch, of further heads and of other entries."""
     if training.last_model is not None:
         last = rows_of_records(training.last_model, test).log_probability
         prediction = replace(prediction, last_predicted=last.argmax(axis=1))
-    prediction = replace(
+    return replace(
         prediction,
-        healthy=healthy_statistics(model, train, task.class_names),
-        heads=predict_heads(model, test),
+        heads=predict_heads(training.model, test),
+        entries=predict_entries(training.model, test),
     )
-    if control:
-        return prediction
-    domain = _domain(protocol, train, validation)
-    return replace(prediction, weights=training.weights(), domain=domain)
+
+
+def with_reference(settings: TrainSettings) -> TrainSettings:
+    """Settings of the network that also sees a sound record of the machine."""
+    return replace(settings, model=settings.model | {REFERENCE: settings.reference})
 
 
 def _method(settings: TrainSettings, control: str) -> str:
@@ -230,7 +254,7 @@ def _names_of_baselines(settings: TrainSettings, control: str) -> tuple[str, ...
 
 # Inputs of the protocol that a process works on; jobs come protocol by protocol.
 _loaded: dict[tuple[str, str, bool, NetworkInput], dict[str, WindowSet]] = {}
-_domains: dict[str, Domain] = {}
+_domains: dict[tuple[str, str], Domain] = {}
 _shams: dict[str, Task] = {}
 
 
@@ -269,9 +293,12 @@ def _sham(task: Task, settings: TrainSettings) -> Task:
     return _shams[folder]
 
 
-def _domain(protocol: str, train: WindowSet, validation: WindowSet) -> Domain:
+def _domain(
+    protocol: str, control: str, train: WindowSet, validation: WindowSet
+) -> Domain:
     """Region of the training windows, the same for every seed."""
-    if protocol not in _domains:
+    key = (protocol, control)
+    if key not in _domains:
         _domains.clear()
-        _domains[protocol] = fit_domain(train, validation)
-    return _domains[protocol]
+        _domains[key] = fit_domain(train, validation)
+    return _domains[key]

@@ -26,6 +26,7 @@ from diagnose.scoring.life_scores import (
     intervals_hold,
     life_scores,
 )
+from diagnose.scoring.machines import LIVES, Machines, machines_of
 from diagnose.settings import BOTH, TrainSettings
 from diagnose.studies.counts import by_method, n_different, run_notes
 from diagnose.studies.jobs import Job, run_jobs
@@ -176,14 +177,18 @@ def _result(
         tables[name] = {
             measure: np.stack([row[measure] for row in rows]) for measure in rows[0]
         }
+    machines = machines_of_lives(task, lives, runs[AGE_ONLY][0].record)
     n_bootstrap = settings.n_bootstrap
     methods = {}
     for name, of_seeds in runs.items():
         rng = np.random.default_rng(BOOTSTRAP_SEED)
-        scores = life_scores(tables[name], n_bootstrap=n_bootstrap, rng=rng)
+        scores = life_scores(
+            tables[name], machines=machines, n_bootstrap=n_bootstrap, rng=rng
+        )
         scores["gain_over_age_only_h"] = gain(
             tables[name]["rmse_h"],
             tables[AGE_ONLY]["rmse_h"],
+            machines=machines,
             n_bootstrap=n_bootstrap,
             rng=np.random.default_rng(BOOTSTRAP_SEED),
         )
@@ -219,8 +224,15 @@ def _result(
         "coverage_wanted": coverage,
         "intervals_hold": intervals_hold(counts["n_lives"]["validation"], coverage),
         **counts,
+        "resampled": machines.counts(),
         "methods": methods,
     }
+
+
+def machines_of_lives(task: Task, lives: Lives, record: IntArray) -> Machines:
+    """Machines of the lives of some records that failed; each life is a unit."""
+    scored = record[lives.failed[record]]
+    return machines_of(task.dataset, scored, unit=lives.name[scored], kind=LIVES)
 
 
 def below_bound(lives: Lives, prediction: LifePrediction) -> float:

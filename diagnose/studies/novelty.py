@@ -33,6 +33,7 @@ from diagnose.training.train import train_network
 
 FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
+SITES = 3  # axes (window, site, feature) of the features of a network that scores sites
 # Names of the scores in metrics.json, and their labels on the page.
 SCORE_LABELS = {
     "nearest_indicators": "5th neighbour, indicators",
@@ -266,8 +267,10 @@ def rows_of_records(model: nn.Module, windows: WindowSet) -> Rows:
 def network_outputs(
     model: nn.Module, windows: WindowSet, chosen: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Features (window, feature) that the last layer of the class scores reads, and its output
+    """Features (window, feature) that the last layer of the class scores reads, and the scores
     (window, class).
+
+    Of a network that scores sites they are the largest of each feature over the sites.
     """
     heads = [
         part
@@ -275,20 +278,19 @@ def network_outputs(
         if name == "head" or name.startswith("head.")
     ]
     layer = [part for part in heads if isinstance(part, nn.Linear)][-1]
-    seen: list[tuple[torch.Tensor, torch.Tensor]] = []
-    hook = layer.register_forward_hook(
-        lambda _, inputs, output: seen.append((inputs[0], output))
-    )
+    seen: list[torch.Tensor] = []
+    scores: list[torch.Tensor] = []
+    hook = layer.register_forward_hook(lambda _, inputs, output: seen.append(inputs[0]))
     try:
         with torch.inference_mode():
             for block in np.array_split(chosen, -(-chosen.size // 64)):
-                model(torch.from_numpy(windows.cut(block)))
+                scores.append(model(torch.from_numpy(windows.cut(block))))
     finally:
         hook.remove()
-    features, logits = (
-        torch.cat(parts).numpy().astype(float) for parts in zip(*seen, strict=True)
-    )
-    return features, logits
+    features = torch.cat(seen)
+    if features.ndim == SITES:
+        features = features.amax(dim=1)
+    return features.numpy().astype(float), torch.cat(scores).numpy().astype(float)
 
 
 def _unit_length(features: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Scores of novelty: AUROC, FPR95 and alarms, with intervals over units."""
+"""Scores of novelty: AUROC, FPR95 and alarms, with intervals over machines."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.windows import Task
+from diagnose.scoring.machines import Machines, machines_of
 from diagnose.scoring.metrics import Score, percentile_interval, score_with_interval
 from diagnose.studies.counts import (
     by_method,
@@ -120,6 +121,7 @@ def novelty_protocol_result(
         "known_classes": [task.class_names[index] for index in known],
         "novel_classes": [task.class_names[index] for index in novel],
         **part_sizes(task, parts),
+        "resampled": machines_of(task.dataset, parts["test"]).counts(),
         "false_alarms_wanted": FALSE_ALARMS,
         "methods": {},
     }
@@ -150,7 +152,11 @@ def _accuracy_on_known(
     pairs = [(record, run.predicted[mine]) for run in runs if run.predicted is not None]
     confusion = confusion_counts(task, pairs)
     score = score_with_interval(
-        "balanced_accuracy", confusion, n_bootstrap=n_bootstrap, rng=rng
+        "balanced_accuracy",
+        confusion,
+        n_bootstrap=n_bootstrap,
+        rng=rng,
+        machines=machines_of(task.dataset, record),
     )
     chance = 1 / n_different(task.labels()[record])
     return {"balanced_accuracy": asdict(score), "chance": chance}
@@ -181,16 +187,18 @@ def _rows(task: Task, runs: Sequence[NoveltyRun]) -> Iterator[Entry]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Resamples:
-    """Units and seeds drawn with replacement.
+    """Machines and seeds drawn with replacement.
 
     Attributes
     ----------
     unit : (record,) index of the unit of each test record
+    machines : the units
     drawn : (resample, unit) how often a resample holds each unit
     seeds : (resample, draw) seeds
     """
 
     unit: IntArray
+    machines: Machines
     drawn: IntArray
     seeds: IntArray
 
@@ -205,9 +213,16 @@ class _Resamples:
     def score(self, per_seed: Sequence[float], resampled: FloatArray) -> Entry:
         """Mean and percentile interval of (resample, seed) values over drawn seeds."""
         means = np.take_along_axis(resampled, self.seeds, axis=1).mean(axis=1)
-        low, high = percentile_interval(means, self.n_units)
-        mean = float(np.mean(per_seed))
-        return asdict(Score(mean=mean, low=low, high=high, per_seed=tuple(per_seed)))
+        support = self.machines.support()
+        low, high = percentile_interval(means, support)
+        score = Score(
+            mean=float(np.mean(per_seed)),
+            low=low,
+            high=high,
+            per_seed=tuple(per_seed),
+            too_few=support.too_few,
+        )
+        return asdict(score)
 
 
 def novelty_result(
@@ -217,14 +232,14 @@ def novelty_result(
     n_bootstrap: int,
     rng: np.random.Generator,
 ) -> Entry:
-    """Scores of one method on one protocol, with intervals by bootstrap over units and seeds.
+    """Scores of one method on one protocol, with intervals by bootstrap over machines and seeds.
 
     Parameters
     ----------
-    task : gives labels and units
+    task : gives labels and machines
     runs : one a seed, of the same records
     known : labels that were trained on
-    n_bootstrap : resamples of the units
+    n_bootstrap : resamples of the machines
     rng : source of the resamples
 
     Returns
@@ -240,10 +255,10 @@ def novelty_result(
     record = runs[0].record
     label = task.labels()[record]
     unit = np.unique(unit_ids(task)[record], return_inverse=True)[1]
-    n_units = int(unit.max()) + 1
-    drawn = rng.multinomial(n_units, np.full(n_units, 1 / n_units), size=n_bootstrap)
+    machines = machines_of(task.dataset, record)
+    drawn = machines.drawn(n_bootstrap, rng)
     seeds = rng.integers(len(runs), size=(n_bootstrap, len(runs)))
-    resamples = _Resamples(unit=unit, drawn=drawn, seeds=seeds)
+    resamples = _Resamples(unit=unit, machines=machines, drawn=drawn, seeds=seeds)
     novel = ~np.isin(label, known)
     scores = np.stack([run.score for run in runs])
     threshold = np.array([alarm_threshold(run.validation_score) for run in runs])

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnose.data.windows import Task
 from diagnose.networks.calibration import calibration_scores
+from diagnose.scoring.machines import machines_of
 from diagnose.scoring.metrics import (
     SCORES,
     ratio_with_interval,
@@ -31,6 +33,7 @@ from diagnose.studies.counts import (
 )
 from diagnose.studies.jobs import LABEL_SHUFFLE, ORACLE
 from diagnose.studies.result_files import Entry, network_name
+from diagnose.training.entries import entry_scores
 from diagnose.training.heads import head_scores
 
 BOOTSTRAP_SEED = 20240607
@@ -48,21 +51,27 @@ def is_leaky(protocol: str) -> bool:
 def score_predictions(
     task: Task, runs: Pairs, n_bootstrap: int, *, shuffled: bool = False
 ) -> Entry:
-    """Scores of one method with intervals over units, confusion counts and recall.
+    """Scores of one method with intervals over machines, confusion counts and recall.
 
     Parameters
     ----------
-    task : gives labels and units
+    task : gives labels and machines
     runs : for each seed, records (record,) and predicted labels (record,); the same records in each
-    n_bootstrap : resamples of the units
+    n_bootstrap : resamples of the machines
     shuffled : see `diagnose.scoring.metrics.score_with_interval`
     """
     confusion = confusion_counts(task, runs)
+    machines = machines_of(task.dataset, runs[0][0])
     rng = np.random.default_rng(BOOTSTRAP_SEED)
     result: Entry = {}
     for name in SCORES:
         score = score_with_interval(
-            name, confusion, n_bootstrap=n_bootstrap, rng=rng, shuffled=shuffled
+            name,
+            confusion,
+            n_bootstrap=n_bootstrap,
+            rng=rng,
+            machines=machines,
+            shuffled=shuffled,
         )
         result[name] = asdict(score)
     total = confusion.sum(axis=(0, 1))
@@ -81,7 +90,9 @@ def test_score(task: Task, prediction: Prediction, n_bootstrap: int) -> Entry:
     scores = score_predictions(task, [(record, prediction.predicted)], n_bootstrap)
     accuracy = scores["balanced_accuracy"]
     return {
-        "balanced_accuracy": {key: accuracy[key] for key in ("mean", "low", "high")},
+        "balanced_accuracy": {
+            key: accuracy[key] for key in ("mean", "low", "high", "too_few")
+        },
         "chance": 1.0 / n_different(task.labels()[record]),
         "n_records": int(record.size),
         "n_units": n_different(unit_ids(task)[record]),
@@ -125,6 +136,7 @@ def protocol_result(
             for subset in ("train", "test")
         },
         **part_sizes(task, parts),
+        "resampled": machines_of(task.dataset, parts["test"]).counts(),
         "methods": methods,
         "over_oracle": over_oracle,
         "validation_loss": [list(run.validation_loss) for run in network],
@@ -134,8 +146,16 @@ def protocol_result(
         "heads": head_scores(
             task, parts["train"], network, n_bootstrap=settings.n_bootstrap
         ),
+        "entry": _entry(task, settings, network),
         "answers": answers,
     }
+
+
+def _entry(task: Task, settings: TrainSettings, network: Sequence[Prediction]) -> Entry:
+    """Scores of `diagnose.training.entries.entry_scores`."""
+    return entry_scores(
+        network, partial(score_predictions, task, n_bootstrap=settings.n_bootstrap)
+    )
 
 
 def _method_result(
@@ -168,11 +188,16 @@ def _over_oracle(
         confusion_counts(task, [(run.record, run.predicted) for run in runs])
         for runs in (network, oracle)
     )
+    machines = machines_of(task.dataset, network[0].record)
     ratios = {}
     for name in SCORES:
-        rng = np.random.default_rng(BOOTSTRAP_SEED)
         ratios[name] = ratio_with_interval(
-            name, above, below, n_bootstrap=settings.n_bootstrap, rng=rng
+            name,
+            above,
+            below,
+            n_bootstrap=settings.n_bootstrap,
+            rng=np.random.default_rng(BOOTSTRAP_SEED),
+            machines=machines,
         )
     return ratios
 

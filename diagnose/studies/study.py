@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from diagnose.baselines.base import StorableBaseline
+from diagnose.baselines.registry import BASELINES
 from diagnose.data.at_rate import at_rate
 from diagnose.data.protocols import OPEN_PROTOCOLS, channels_to_cross, choose_protocols
 from diagnose.data.window_choice import chosen_window
@@ -25,15 +27,21 @@ from diagnose.data.windows import (
 )
 from diagnose.networks.registry import (
     build_model,
-    check_window,
-    completed,
+    check_example,
     has_window_length,
     input_of,
 )
 from diagnose.scoring.predictions import Prediction, write_predictions
 from diagnose.settings import BOTH, TrainSettings
+from diagnose.studies.baseline_runs import reasons_left_out
 from diagnose.studies.controls import control_jobs, sham_methods, without_sham
-from diagnose.studies.jobs import Job, Outcome, run_jobs
+from diagnose.studies.jobs import (
+    WITH_REFERENCE,
+    Job,
+    Outcome,
+    run_jobs,
+    with_reference,
+)
 from diagnose.studies.novelty import NoveltyRun
 from diagnose.studies.novelty_metrics import (
     check_open_protocol,
@@ -53,6 +61,7 @@ from diagnose.training.tensorboard import need_tensorboard, write_scores
 from diagnose.training.train import device_of
 from diagnose.workers import n_cores
 from gensig.errors import ConfigError
+from gensig.options.configuration import Section
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
@@ -130,14 +139,16 @@ def check_network(
     ------
     ConfigError    for parameters, stretches or windows that do not fit, and a missing device
     """
-    n_channels = len(task.channel_names)
-    model = build_model(
-        settings.model, n_channels=n_channels, n_classes=len(task.class_names)
-    )
     inputs = input_of(settings.model)
     for segments in parts:
         inputs.check(task, segments, network_name(settings))
-    check_window(model, n_channels, inputs.n_points(task.window_samples))
+    example = inputs.example(len(task.channel_names), task.window_samples)
+    model = build_model(
+        settings.model,
+        n_channels=example.shape[1],
+        n_classes=len(task.class_names),
+    )
+    check_example(model, example)
     device_of(settings.device)
 
 
@@ -176,19 +187,6 @@ def window_note(dataset: Dataset, settings: TrainSettings) -> str | None:
     return chosen_window(dataset)[1]
 
 
-def settings_for(dataset: Any, settings: TrainSettings) -> TrainSettings:
-    """Settings with what an open data set decides: the window, and inputs of the network."""
-    window = settings.window_samples
-    if not window:
-        window = chosen_window(at_rate(dataset, settings.sampling_rate_hz))[0]
-    return replace(
-        settings,
-        model=completed(settings.model, dataset.attributes, settings.heads),
-        window_samples=window,
-        stride_samples=settings.stride_samples or window,
-    )
-
-
 def run_study(
     task: Task,
     settings: TrainSettings,
@@ -217,10 +215,10 @@ def run_study(
     )
     predictions = [run for run in outcomes if isinstance(run, Prediction)]
     novelty = [run for run in outcomes if isinstance(run, NoveltyRun)]
-    for prediction in predictions:
+    on_data = without_sham(predictions)
+    for prediction in on_data:
         if prediction.weights is not None:
             _save(folder, task, settings, prediction)
-    on_data = without_sham(predictions)
     write_predictions(folder / "predictions.csv", task, on_data)
     if novelty:
         write_novelty(folder / "novelty.csv", task, novelty)
@@ -246,8 +244,17 @@ def run_study(
         "protocols": results,
         "novelty": novelty_results,
         "protocols_left_out": choose_protocols(task, settings.protocols)[1],
+        "baselines_left_out": baselines_left_out(task, settings, protocols),
         "duration_s": round(time.perf_counter() - started, 1),
     }
+
+
+def baselines_left_out(
+    task: Task, settings: TrainSettings, protocols: Sequence[str]
+) -> dict[str, str]:
+    """Baseline of the settings -> protocols that it is left out of, and why."""
+    closed = [name for name in protocols if name not in OPEN_PROTOCOLS]
+    return reasons_left_out(task, closed, settings.baselines)
 
 
 def _progress_line(runs: Sequence[Outcome]) -> str:
@@ -261,15 +268,21 @@ def _progress_line(runs: Sequence[Outcome]) -> str:
 def _save(
     folder: Path, task: Task, settings: TrainSettings, prediction: Prediction
 ) -> None:
-    """Write the network of a prediction, with its domain, its statistics and its score."""
+    """Write the model of a prediction, with its score; a network's also with its domain."""
     tensors = dict(prediction.weights or {})
     for part in (prediction.domain, prediction.healthy):
         if part is not None:
             tensors |= part.tensors()
     score = test_score(task, prediction, settings.n_bootstrap)
+    name, baseline = prediction.protocol, BASELINES.get(prediction.method)
+    if prediction.method == WITH_REFERENCE:
+        settings, name = with_reference(settings), f"{name}-{WITH_REFERENCE}"
+    if baseline is not None and issubclass(baseline, StorableBaseline):
+        name = f"{name}-{prediction.method}"
+        settings = replace(settings, model=Section("model", baseline.description(task)))
     save_network(
         folder,
-        prediction.protocol,
+        name,
         task,
         settings,
         prediction,

@@ -103,6 +103,8 @@ def fit_autoencoder(
 ) -> Autoencoder:
     """Train on windows of known kind, up to the least error on other units of that kind.
 
+    With patience 0 all epochs run and the weights of the last one are kept.
+
     Parameters
     ----------
     train, validation : of different units; training windows start anywhere in their stretch, at
@@ -113,7 +115,7 @@ def fit_autoencoder(
 
     Raises
     ------
-    SimulationError    if the training diverges from its first epoch
+    SimulationError    if no epoch has weights to keep, because the training diverges
     """
     device = device_of(settings.device)
     rng = np.random.default_rng([seed, 3])
@@ -124,8 +126,9 @@ def fit_autoencoder(
         torch.manual_seed(seed)
         model = WindowAutoencoder(input_scale(train)).to(device)
         optimizer = torch.optim.Adam(model.parameters(), lr=settings.learning_rate)
+        schedule = settings.usual_schedule
         best, best_epoch, best_weights = np.inf, 0, model.state_dict()
-        for epoch in range(1, settings.epochs + 1):
+        for epoch in range(1, schedule.epochs + 1):
             model.train()
             drawn = rng.permutation(len(train))[:n_drawn]
             for batch in np.array_split(drawn, n_batches):
@@ -134,14 +137,18 @@ def fit_autoencoder(
                 model(windows).mean().backward()
                 optimizer.step()
             loss = float(_errors(model, held_out).mean())
-            if loss < best:
+            if loss < best or (schedule.patience == 0 and np.isfinite(loss)):
                 best, best_epoch = loss, epoch
                 best_weights = copy.deepcopy(model.state_dict())
-            if epoch - best_epoch >= settings.patience:
+            if 0 < schedule.patience <= epoch - best_epoch:
                 break
     if best_epoch == 0:
         raise SimulationError(
             "the autoencoder diverged from its first epoch; reduce learning_rate"
+        )
+    if schedule.patience == 0 and best_epoch < schedule.epochs:
+        raise SimulationError(
+            "the autoencoder diverged before its last epoch; reduce learning_rate"
         )
     model.load_state_dict(best_weights)
     return Autoencoder(model=model.cpu().eval(), best_epoch=best_epoch)

@@ -10,18 +10,17 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import nn
-from torch.nn.functional import cross_entropy, log_softmax
+from torch.nn.functional import log_softmax
 
-from diagnose.data.targets import further_loss, position_loss
 from diagnose.data.windows import FloatArray, IntArray, WindowSet
 from diagnose.networks.calibration import fit_temperature
 from diagnose.networks.network import Network
 from diagnose.networks.registry import build_model
 from diagnose.scoring.metrics import over_records
-from diagnose.training.target import LearningTarget
+from diagnose.training.target import LearningTarget, batch_targets
 from gensig.options.configuration import Section
 
-HEADS_WEIGHT = 0.3  # of each further head against the classes; assumed
+ENTRY = ("entry",)  # targets that are the same for every class
 CACHED = 16  # windows that stay in the cache of a processor
 
 
@@ -59,29 +58,17 @@ class Classes(LearningTarget[Network]):
         windows: WindowSet,
         batch: IntArray,
     ) -> torch.Tensor:
-        """Cross-entropy of the classes, and losses of further heads and of the fault's tooth."""
+        """Loss of the network, see `diagnose.networks.network.Network.loss`."""
         device = signals.device
         label = torch.from_numpy(windows.label[batch]).to(device)
         weights = _class_weights(windows.label, self.n_classes)
-        weight = torch.from_numpy(weights).to(device)
-        targets = {
-            name: torch.from_numpy(values[batch]).to(device)
-            for name, values in windows.targets.items()
-        }
         with _mixed_precision(device):
-            answers = model.answers(signals)
-            loss = cross_entropy(answers["classes"], label, weight=weight)
-            if model.further:
-                loss = loss + HEADS_WEIGHT * further_loss(answers, label, targets)
-            if "places" in answers and {"gear", "position"} <= set(targets):
-                loss = loss + position_loss(
-                    answers["places"],
-                    label,
-                    targets["gear"],
-                    targets["position"],
-                    model.turns,
-                )
-        return loss
+            return model.loss(
+                signals,
+                label,
+                batch_targets(windows, batch, device),
+                torch.from_numpy(weights).to(device),
+            )
 
     def answers(
         self, model: Network, signals: torch.Tensor, windows: WindowSet
@@ -142,7 +129,9 @@ def with_shuffled_labels(
     n_classes: int,
     rng: np.random.Generator,
 ) -> WindowSet:
-    """Windows whose labels do not depend on the class, one label a record; no other targets.
+    """Windows whose labels do not depend on the class, one label a record.
+
+    Of the other targets only the entry of a tooth is kept, which tells nothing of a fault.
 
     Within each true class all labels have the same shares, in random order. A plain permutation
     leaves every class a majority label by chance, and a network that finds the classes then
@@ -161,7 +150,8 @@ def with_shuffled_labels(
         n_missing = members.size - labels.size
         extra = rng.permutation(np.flatnonzero(share > 0))[:n_missing]
         shuffled[members] = rng.permutation(np.concatenate([labels, extra]))
-    return replace(windows, label=shuffled[position], targets={})
+    kept = {name: windows.targets[name] for name in ENTRY if name in windows.targets}
+    return replace(windows, label=shuffled[position], targets=kept)
 
 
 def _mixed_precision(device: torch.device) -> torch.autocast:

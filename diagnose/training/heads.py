@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch.nn.functional import log_softmax
 
+from diagnose.data.packed_turns import tooth_counts
 from diagnose.data.targets import GEARS, record_targets
 from diagnose.data.windows import FloatArray, IntArray, Task, WindowSet
-from diagnose.networks.network import Network
+from diagnose.networks.network import Network, SiteNetwork
 from diagnose.scoring.judged import interval_text
+from diagnose.scoring.machines import machines_of
 from diagnose.scoring.metrics import (
     confusion_by_unit,
     over_records,
     percentile_interval,
     score_with_interval,
-    units_drawn,
 )
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def predict_heads(
     severity : (record, class) from 0 to 1, mean over the windows, for a record of that class
     gear : (record, gear) mean log-probability of `diagnose.data.targets.GEARS`
     """
-    if not model.further:
+    if not model.head_names:
         return {}
     model.eval()
     blocks = windows.blocks(batch_size)
@@ -50,12 +50,31 @@ def predict_heads(
             model.answers(torch.from_numpy(windows.cut(block))) for block in blocks
         ]
     predictions = {}
-    for name in model.further:
+    for name in model.head_names:
         output = torch.cat([answer[name] for answer in answers])
         output = output.sigmoid() if name == "severity" else log_softmax(output, dim=1)
         by_window = output.numpy().astype(float)
         predictions[name] = over_records(by_window, windows.record)[1]
     return predictions
+
+
+def fault_site(
+    model: SiteNetwork, windows: WindowSet, label: int
+) -> tuple[str, int, float]:
+    """Most probable site of a fault of a class in the record of some windows.
+
+    Returns
+    -------
+    gear of `diagnose.data.targets.GEARS`, tooth (-1 for no single one), and the share of the class
+    that this site has
+    """
+    cut = torch.from_numpy(windows.cut(np.arange(len(windows))))
+    with torch.inference_mode():
+        scores = model.site_scores(cut)
+    share = torch.softmax(scores.mean(dim=0)[:, label], dim=0)
+    best = int(share.argmax())
+    site = model.sites(tooth_counts(windows.signals[0]))[best]
+    return *site, float(share[best])
 
 
 def head_scores(
@@ -65,10 +84,10 @@ def head_scores(
 
     Parameters
     ----------
-    task : gives severities, gears and units
+    task : gives severities, gears and machines
     trained_on : records of the training part
     runs : one a seed, of one protocol
-    n_bootstrap : resamples of the units
+    n_bootstrap : resamples of the machines
 
     Returns
     -------
@@ -92,10 +111,11 @@ def head_scores(
             chosen = (label == index) & ~np.isnan(truth["severity"])
             if chosen.any():
                 scores["severity_mae"][name] = _severity_error(
+                    task,
+                    record[chosen],
                     predicted[:, chosen],
                     truth["severity"][chosen],
                     known["severity"][labels[trained_on] == index],
-                    unit[chosen],
                     n_bootstrap=n_bootstrap,
                     rng=rng,
                 )
@@ -105,7 +125,11 @@ def head_scores(
             confusion_by_unit(truth["gear"], gear, unit, len(GEARS)) for gear in gears
         ]
         score = score_with_interval(
-            "balanced_accuracy", np.stack(counts), n_bootstrap=n_bootstrap, rng=rng
+            "balanced_accuracy",
+            np.stack(counts),
+            n_bootstrap=n_bootstrap,
+            rng=rng,
+            machines=machines_of(task.dataset, record),
         )
         scores["faulted_gear"] = {
             "balanced_accuracy": asdict(score),
@@ -116,21 +140,29 @@ def head_scores(
 
 
 def _severity_error(
+    task: Task,
+    record: IntArray,
     predicted: FloatArray,
     truth: FloatArray,
     in_training: FloatArray,
-    unit: NDArray[Any],
     *,
     n_bootstrap: int,
     rng: np.random.Generator,
 ) -> dict[str, Any]:
     """Error of one class: ``predicted`` is (seed, record), all else (record,)."""
     error = np.abs(predicted - truth).mean(axis=0)
-    names, position = np.unique(unit, return_inverse=True)
-    counts = np.bincount(position)
-    drawn = units_drawn(names.size, n_bootstrap, rng)
-    means = (drawn @ np.bincount(position, weights=error)) / (drawn @ counts)
-    low, high = percentile_interval(means, names.size)
+    unit = np.asarray(task.dataset.column("unit_id"))[record]
+    position = np.unique(unit, return_inverse=True)[1]
+    machines = machines_of(task.dataset, record)
+    support, drawn = machines.support(), machines.drawn(n_bootstrap, rng)
+    total, n_drawn = (
+        drawn @ np.bincount(position, weights=error),
+        drawn @ np.bincount(position),
+    )
+    means = np.divide(
+        total, n_drawn, out=np.full(total.shape, np.nan), where=n_drawn > 0
+    )
+    low, high = percentile_interval(means, support)
     known = in_training[~np.isnan(in_training)]
     constant = None
     if known.size:
@@ -139,6 +171,7 @@ def _severity_error(
         "mean": float(error.mean()),
         "low": low,
         "high": high,
+        "too_few": support.too_few,
         "constant": constant,
         "n_records": int(truth.size),
     }

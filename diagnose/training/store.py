@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from diagnose.data.teeth import common_teeth, teeth_range
 from diagnose.data.windows import Task, subset_segments
 from diagnose.settings import TrainSettings
 from gensig.errors import DatasetError
@@ -40,6 +41,8 @@ class ModelDescription:
         models
     out_of_distribution : `diagnose.networks.domain.Domain.facts`; None in older models
     n_teeth : of the driving and the driven gear; None if unknown or not the same for all records
+    n_teeth_range : fewest and most teeth of the driving and of the driven gears; None where
+        `n_teeth` says them
     temperature : see `diagnose.networks.calibration`; 1 in older models
     test_channel_names : of protocol cross_sensor
     adaptation : see `diagnose.recordings.machine`; None as trained
@@ -64,6 +67,7 @@ class ModelDescription:
     speed_rpm_range: tuple[float, float] | None = None
     out_of_distribution: dict[str, Any] | None = None
     n_teeth: tuple[int, int] | None = None
+    n_teeth_range: tuple[tuple[int, int], tuple[int, int]] | None = None
     temperature: float = 1.0
     test_channel_names: tuple[str, ...] | None = None
     adaptation: dict[str, Any] | None = None
@@ -74,6 +78,16 @@ class ModelDescription:
     def network(self) -> Section:
         """Kind and parameters of the network, for `diagnose.networks.registry.build_model`."""
         return Section("model", self.model)
+
+    @property
+    def takes_each_channel(self) -> bool:
+        """True if the network looks at every channel by itself, whatever their number."""
+        return bool(self.model.get("each_channel", False))
+
+    @property
+    def n_channels(self) -> int:
+        """Channels of an input of the network."""
+        return 1 if self.takes_each_channel else len(self.channel_names)
 
     @property
     def task(self) -> str:
@@ -140,21 +154,12 @@ def model_description(
         best_epoch=prediction.best_epoch,
         n_bootstrap=settings.n_bootstrap,
         speed_rpm_range=(float(speed.min()), float(speed.max())),
-        n_teeth=_n_teeth(task.dataset),
+        n_teeth=common_teeth(task.dataset),
+        n_teeth_range=teeth_range(task.dataset),
         out_of_distribution=facts,
         temperature=prediction.temperature,
         test_channel_names=None if tested == channels else tested,
     )
-
-
-def _n_teeth(dataset: Dataset) -> tuple[int, int] | None:
-    """Teeth of the data set's pinion, which drives, and of its wheel."""
-    pinion, wheel = (
-        dataset.attributes.get(f"n_teeth_{gear}") for gear in ("pinion", "wheel")
-    )
-    if pinion is None or wheel is None:
-        return None
-    return int(pinion), int(wheel)
 
 
 def save_model(
@@ -189,7 +194,7 @@ def load_model(folder: str | Path) -> tuple[Network, ModelDescription]:
         )
     model = build_model(
         description.network,
-        n_channels=len(description.channel_names),
+        n_channels=description.n_channels,
         n_classes=len(description.class_names),
     )
     load_weights(model, folder)
@@ -341,10 +346,16 @@ def _teeth(values: Sequence[Any]) -> tuple[int, int]:
     return int(driving), int(driven)
 
 
+def _teeth_range(values: Sequence[Any]) -> tuple[tuple[int, int], tuple[int, int]]:
+    driving, driven = values
+    return _teeth(driving), _teeth(driven)
+
+
 _OPTIONAL: dict[str, Callable[[Any], Any]] = {
     "test_channel_names": lambda names: tuple(map(str, names)),
     "speed_rpm_range": _range,
     "n_teeth": _teeth,
+    "n_teeth_range": _teeth_range,
     "out_of_distribution": dict,
     "adaptation": dict,
     "remaining_life": dict,

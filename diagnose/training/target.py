@@ -69,3 +69,13 @@ class LearningTarget(ABC, Generic[Model]):
     @abstractmethod
     def temperature(self, answers: FloatArray, windows: WindowSet) -> float:
         """Temperature of the probabilities of records; 1 for a target without them."""
+
+
+def batch_targets(
+    windows: WindowSet, batch: IntArray, device: torch.device
+) -> dict[str, torch.Tensor]:
+    """Further targets of the windows of a batch, on a device."""
+    return {
+        name: torch.from_numpy(values[batch]).to(device)
+        for name, values in windows.targets.items()
+    }

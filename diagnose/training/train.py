@@ -1,4 +1,4 @@
-"""Training of one network: reproducible by its seed, stopped by validation units only."""
+"""Training of one network: reproducible by its seed, stopped by validation units or never."""
 
 from __future__ import annotations
 
@@ -22,6 +22,9 @@ OnEpoch = Callable[[int, float, float], None]
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Training(Generic[Model]):
     """A trained network and the course of its training.
+
+    The best epoch is the one whose weights are kept: that with the least validation loss, or
+    without early stopping the last one.
 
     Attributes
     ----------
@@ -57,15 +60,16 @@ def train_network(
     seed: int,
     on_epoch: OnEpoch = lambda epoch, training, validation: None,
 ) -> Training[Model]:
-    """Train with early stopping on the validation units' loss.
+    """Train with early stopping on the validation units' loss, or without for patience 0.
+
+    Without early stopping all epochs run and the weights of the last one are kept.
 
     Parameters
     ----------
     train, validation : windows of different units; training windows start anywhere in their
         stretch, at other samples each epoch
     target : gives the head, the loss and the answers for records
-    settings : model, epochs, patience, batch size, learning rate, weight decay, share drawn an
-        epoch, device
+    settings : model, schedule, batch size, learning rate, weight decay, device
     seed : decides initial weights, order, window starts and dropout; same seed, threads and
         machine, same weights
     on_epoch : called with number, mean training loss and validation loss of each epoch
@@ -73,7 +77,7 @@ def train_network(
     Raises
     ------
     ConfigError    for a device that does not exist
-    SimulationError    if the first epoch diverges
+    SimulationError    if no epoch has weights to keep, because the training diverges
     """
     device = device_of(settings.device)
     rng = np.random.default_rng([seed, target.stream])
@@ -83,26 +87,32 @@ def train_network(
         model.to(
             device
         )  # weights are drawn on the processor: the same for every device
-        n_drawn = windows_an_epoch(train, settings.epoch_fraction)
+        schedule = settings.schedule
+        n_drawn = windows_an_epoch(train, schedule.epoch_fraction)
         n_batches = max(n_drawn // settings.batch_size, 1)
         descent = _Descent(model, settings, n_batches)
         held_out = torch.from_numpy(validation.cut(np.arange(len(validation))))
         losses: list[float] = []
         best_weights, best_epoch = copy.deepcopy(model.state_dict()), 0
-        for epoch in range(1, settings.epochs + 1):
+        for epoch in range(1, schedule.epochs + 1):
             batches = np.array_split(rng.permutation(len(train))[:n_drawn], n_batches)
             training_loss = _epoch(target, model, train, batches, rng, descent)
             answers = target.answers(model, held_out, validation)
             losses.append(target.record_loss(answers, validation))
             on_epoch(epoch, training_loss, losses[-1])
-            if np.isfinite(losses[-1]) and losses[-1] <= min(losses):
+            is_kept = schedule.patience == 0 or losses[-1] <= min(losses)
+            if np.isfinite(losses[-1]) and is_kept:
                 best_weights, best_epoch = copy.deepcopy(model.state_dict()), epoch
                 best_answers = answers
-            if epoch - best_epoch >= settings.patience:
+            if 0 < schedule.patience <= epoch - best_epoch:
                 break
     if best_epoch == 0:
         raise SimulationError(
             "the training diverged from its first epoch; reduce learning_rate"
+        )
+    if schedule.patience == 0 and best_epoch < len(losses):
+        raise SimulationError(
+            "the training diverged before its last epoch; reduce learning_rate"
         )
     last_model = None
     if best_epoch < len(losses):
@@ -130,7 +140,7 @@ class _Descent:
         self.schedule = torch.optim.lr_scheduler.OneCycleLR(
             self.optimizer,
             max_lr=rate,
-            total_steps=settings.epochs * n_batches,
+            total_steps=settings.schedule.epochs * n_batches,
             pct_start=0.15,
         )
 
@@ -182,5 +192,6 @@ def device_of(name: str) -> torch.device:
 
 def windows_an_epoch(windows: WindowSet, fraction: float) -> int:
     """Windows that hold the given share of the signal, at most as many as are planned."""
-    length = sum(signal.shape[-1] for signal in windows.signals)
+    lengths = [signal.shape[-1] for signal in windows.signals]
+    length = sum(max(length, windows.window_samples) for length in lengths)
     return max(min(round(fraction * length / windows.window_samples), len(windows)), 1)

@@ -194,6 +194,14 @@ COLUMNS = columns_of_axes(
         "number among the records of the same condition_id and class, from 0",
     ),
     (
+        "is_reference",
+        "int8",
+        "1",
+        "id",
+        "1: a sound record that shows its unit, no example and in no split; 0: an example (only "
+        "where plan.n_reference is above 0)",
+    ),
+    (
         "status",
         "str16",
         "",
@@ -303,6 +311,52 @@ COLUMNS = columns_of_axes(
         "fault",
         "1 where the damage grows at this record's load, 0 where not (likewise)",
     ),
+    (
+        "n_teeth_pinion",
+        "int32",
+        "1",
+        "unit",
+        "teeth of the pinion (only where units differ in their gears; else a root attribute)",
+    ),
+    ("n_teeth_wheel", "int32", "1", "unit", "teeth of the wheel (likewise)"),
+    ("normal_module_mm", "float64", "mm", "unit", "normal module (likewise)"),
+    (
+        "pressure_angle_deg",
+        "float64",
+        "deg",
+        "unit",
+        "pressure angle of the basic rack (likewise)",
+    ),
+    (
+        "helix_angle_deg",
+        "float64",
+        "deg",
+        "unit",
+        "helix angle of the pinion (likewise)",
+    ),
+    (
+        "face_width_pinion_mm",
+        "float64",
+        "mm",
+        "unit",
+        "face width of the pinion (likewise)",
+    ),
+    (
+        "face_width_wheel_mm",
+        "float64",
+        "mm",
+        "unit",
+        "face width of the wheel (likewise)",
+    ),
+    ("center_distance_mm", "float64", "mm", "unit", "centre distance (likewise)"),
+    (
+        "transverse_contact_ratio",
+        "float64",
+        "1",
+        "unit",
+        "transverse contact ratio (likewise)",
+    ),
+    ("overlap_ratio", "float64", "1", "unit", "overlap ratio (likewise)"),
 )
 
 # Columns that only the snapshots of lives have.
@@ -314,3 +368,18 @@ LIFE_COLUMNS = (
     "life_failed",
     "life_growing",
 )
+# Columns that only sets of version 2 have, whose units differ in their gears.
+GEAR_COLUMNS = (
+    "n_teeth_pinion",
+    "n_teeth_wheel",
+    "normal_module_mm",
+    "pressure_angle_deg",
+    "helix_angle_deg",
+    "face_width_pinion_mm",
+    "face_width_wheel_mm",
+    "center_distance_mm",
+    "transverse_contact_ratio",
+    "overlap_ratio",
+)
+# Column that only sets with reference records have.
+IS_REFERENCE = "is_reference"

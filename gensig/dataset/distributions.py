@@ -15,8 +15,8 @@ from gensig.errors import ConfigError
 
 Array = NDArray[np.float64]
 
-GRID = "grid"
-DESIGNS = ("latin_hypercube", "sobol", GRID)
+LATIN_HYPERCUBE, GRID = "latin_hypercube", "grid"
+DESIGNS = (LATIN_HYPERCUBE, "sobol", GRID)
 LEVELS = "levels"  # any distribution may have it; only a grid reads it
 CHOICE = "choice"
 

@@ -9,8 +9,9 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gensig.dataset.columns import COLUMNS
+from gensig.dataset.columns import COLUMNS, IS_REFERENCE
 from gensig.dataset.schema import kind_of
 from gensig.dataset.storage.atomic import read_text
 from gensig.errors import DatasetError
@@ -76,6 +77,22 @@ class Plan:
     def n_shards(self) -> int:
         """Number of shards."""
         return int(self.columns["shard"][-1]) + 1
+
+    @property
+    def is_reference(self) -> NDArray[np.bool_]:
+        """(record,) True for reference records, which are no examples."""
+        if IS_REFERENCE not in self.columns:
+            return np.zeros(self.n_records, dtype=bool)
+        return self.columns[IS_REFERENCE] == 1
+
+    def examples(self) -> "Plan":
+        """The plan without its reference records, as one shard; itself where it has none."""
+        kept = np.flatnonzero(~self.is_reference)
+        if len(kept) in (0, self.n_records):
+            return self
+        columns = {name: values[kept] for name, values in self.columns.items()}
+        shard, row = shard_rows(len(kept), len(kept))
+        return Plan(columns={**columns, "shard": shard, "row": row})
 
     def shard_sizes(self) -> list[int]:
         """Number of records of each shard."""

@@ -9,6 +9,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from gensig.dataset.columns import IS_REFERENCE
 from gensig.dataset.folder.layout import (
     PLAN,
     SPLITS,
@@ -19,7 +20,7 @@ from gensig.dataset.folder.layout import (
 from gensig.dataset.plan import Plan, read_plan
 from gensig.dataset.schema import SCALES, SIGNALS
 from gensig.dataset.selection import Selection, StoredRecord, structured, unknown_name
-from gensig.dataset.splitting.protocols import PROTOCOLS, why_left_out
+from gensig.dataset.splitting.protocols import NEW_MACHINE, PROTOCOLS, why_left_out
 from gensig.dataset.splitting.splits import SUBSETS, read_split
 from gensig.dataset.storage.attributes import HDF5_ERRORS, read_attributes
 from gensig.dataset.storage.compression import compression_of
@@ -78,6 +79,7 @@ class Dataset:
         'gzip', 'lzf' or 'blosc2'
     column_names, signal_names, protocols : list of text
     usable : (record,) bool          False for failed records and those of missing shards
+    is_reference : (record,) bool    True for reference records, which are no examples
     """
 
     def __init__(self, folder: Path, manifest: Manifest) -> None:
@@ -97,6 +99,12 @@ class Dataset:
         self._pid = os.getpid()
         first = self._file(done[0])
         self.attributes: dict[str, Any] = read_attributes(first)
+        version = self.attributes["schema_version"]
+        if version != manifest.schema_version:
+            raise DatasetError(
+                f"{folder}: the shards have format version {version}, the manifest says "
+                f"{manifest.schema_version}; run `gensig verify {folder}`"
+            )
         self.sampling_rate = float(self.attributes["sampling_rate_hz"])
         self.channel_names: list[str] = list(self.attributes["channel_names"])
         self.class_names: list[str] = list(self.attributes["class_names"])
@@ -128,6 +136,31 @@ class Dataset:
         return self.column("status") == "ok"
 
     @property
+    def is_reference(self) -> np.ndarray:
+        """(record,) bool: True for reference records, which are no examples."""
+        if IS_REFERENCE not in self._types:
+            return np.zeros(self.n_records, dtype=bool)
+        return self.column(IS_REFERENCE) == 1
+
+    def n_teeth(self, gear: str) -> np.ndarray:
+        """Teeth of 'pinion' or 'wheel', (record,) int64: of each unit's gear, or of the one design.
+
+        Raises
+        ------
+        DatasetError    where the data set does not say
+        """
+        name = f"n_teeth_{gear}"
+        if name in self._types:
+            return self.column(name).astype(np.int64)
+        number = self.attributes.get(name)
+        if not isinstance(number, int | np.integer):
+            raise DatasetError(
+                f"{self.folder} has neither a column nor an attribute {name}; gensig writes it "
+                "for 'pinion' and 'wheel'"
+            )
+        return np.full(self.n_records, number, dtype=np.int64)
+
+    @property
     def plan(self) -> Plan:
         """The plan, read once."""
         if self._plan is None:
@@ -146,9 +179,10 @@ class Dataset:
 
     @property
     def protocols(self) -> list[str]:
-        """Names that `split` takes."""
+        """Names that `split` takes, in order; `new_machine`, the hardest, comes first."""
         files = map(Path, self.manifest.files)
-        return sorted(path.stem for path in files if path.parent.name == SPLITS)
+        names = (path.stem for path in files if path.parent.name == SPLITS)
+        return sorted(names, key=lambda name: (name != NEW_MACHINE, name))
 
     def column(self, name: str) -> np.ndarray:
         """One value (or short vector) a record, (record, ...), read-only; text as numpy strings.

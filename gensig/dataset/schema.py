@@ -1,14 +1,18 @@
-"""The data sets of a shard, version 1.
+"""The data sets of a shard, versions 1 and 2.
 
 `docs/format.md` describes these tables.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
-from gensig.dataset.columns import COLUMNS, Column, columns_of_axes
+from gensig.dataset.columns import COLUMNS, GEAR_COLUMNS, Column, columns_of_axes
 
 SCHEMA_VERSION = 1
+# of sets whose units differ in their gears: readers of version 1 would take the attributes of one
+# design for those of all records
+GEARS_VERSION = 2
+READABLE_VERSIONS = (SCHEMA_VERSION, GEARS_VERSION)
 
 SIGNALS = (
     columns_of_axes(
@@ -190,7 +194,7 @@ SCALES = {
     "healthy_twin": "healthy_twin_scale",
 }
 
-# What a reader of version 1 may rely on; this list never grows, so that adding a column is no new
+# What a reader may rely on; this list never grows, so that adding a column is no new
 # version.
 REQUIRED = (
     "acceleration",
@@ -229,6 +233,13 @@ DEFAULTS: dict[str, str | float] = {
 
 PARAMS = "params"
 ACCELERATION = "m/s^2"
+
+
+def version_of(columns: Collection[str]) -> int:
+    """Version of a data set that has these columns."""
+    if GEAR_COLUMNS[0] in columns:
+        return GEARS_VERSION
+    return SCHEMA_VERSION
 
 
 def kind_of(name: str) -> str | None:

@@ -61,7 +61,7 @@ def bearing_for(shaft_mm: float) -> BearingSize:
     if not fitting:
         raise ConfigError(
             f"a shaft of {shaft_mm:g} mm is thinner than any bearing of ISO 15 series 02, "
-            f"{SERIES_02[0][0]} mm; give --bores"
+            f"{SERIES_02[0][0]} mm; give a larger bore"
         )
     bore, outside, width = fitting[-1]
     ball, pitch = BALL_SHARE * (outside - bore), 0.5 * (outside + bore)

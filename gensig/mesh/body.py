@@ -37,6 +37,12 @@ def body_compliance(
         return fillet_foundation_compliance(
             gear, load_angle, material, allow_extrapolation=options.allow_extrapolation
         )
+    check_rim(gear, options)
+    return cross_compliance(gear, material, load_angle, load_angle, pitches=0)
+
+
+def check_rim(gear: Gear, options: MeshOptions) -> None:
+    """Raise ExtrapolationError, or warn, for a rim too thin for the elastic ring."""
     rim = (gear.root_radius - gear.bore_radius) / gear.normal_module
     if rim < THINNEST_RIM and not options.allow_extrapolation:
         raise ExtrapolationError(
@@ -49,6 +55,5 @@ def body_compliance(
             f"{gear.name}: the rim between bore and root is {rim:.3g} modules thick; the elastic "
             f"ring was checked down to {CHECKED_RIM:g}",
             ExtrapolationWarning,
-            stacklevel=4,
+            stacklevel=5,
         )
-    return cross_compliance(gear, material, load_angle, load_angle, pitches=0)

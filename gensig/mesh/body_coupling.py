@@ -80,7 +80,7 @@ def arc_flexibility(gear: Gear, material: Material, angle: float) -> Array:
     kernel = theta_f / math.pi * weights * np.exp(-1j * theta_f * np.outer(n, nodes))
     kernel[0] *= 0.5
     s, t = kernel @ normal.T, kernel @ shear.T  # (harmonic, shape)
-    ring = np.stack([ring_harmonic(gear, material, int(k)) for k in n])
+    ring = ring_harmonics(gear, material, len(n))
     u = ring[:, 0, 0, None] * s + 1j * ring[:, 0, 1, None] * t
     v = -1j * ring[:, 1, 0, None] * s + ring[:, 1, 1, None] * t
     weight = math.pi * r_f * np.exp(1j * n * angle)
@@ -91,6 +91,14 @@ def arc_flexibility(gear: Gear, material: Material, angle: float) -> Array:
     )
     inverse = np.linalg.inv(resultants)
     return inverse.T @ work @ inverse / gear.face_width
+
+
+@lru_cache(maxsize=64)  # the arcs of a gear share it
+def ring_harmonics(gear: Gear, material: Material, n_harmonics: int) -> Array:
+    """The first harmonics of ``ring_harmonic``, (harmonic, 2, 2) m/Pa, read-only."""
+    ring = np.stack([ring_harmonic(gear, material, n) for n in range(n_harmonics)])
+    ring.flags.writeable = False
+    return ring
 
 
 def ring_harmonic(gear: Gear, material: Material, n: int) -> Array:

@@ -15,7 +15,7 @@ from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth, healthy_tooth
 from gensig.geometry.tooth_profile import load_angle
 from gensig.material import Material
-from gensig.mesh.body import body_compliance
+from gensig.mesh.body import body_compliance, check_rim
 from gensig.mesh.body_coupling import shared_body_compliance
 from gensig.mesh.compliance import tooth_compliance
 from gensig.mesh.face import bearing_width, face_contact, is_nominal
@@ -204,7 +204,12 @@ def check_teeth(
             continue
         curvature = np.array([pair.curvature(side, pair.pitch_point)])
         reached = np.minimum(curvature, tooth.tip_curvature_radius)
-        structural_terms(tooth, reached, in_plane, options)
+        tooth_terms(tooth, reached, in_plane, options)
+        if options.body == "sainsot":
+            angle = load_angle(tooth.gear, reached)
+            body_compliance(tooth.gear, angle, in_plane, options)
+        else:
+            check_rim(tooth.gear, options)
         if options.law == "paper" and not is_nominal(tooth):
             bearing_width(tooth, curvature)
 
@@ -212,7 +217,20 @@ def check_teeth(
 def structural_terms(
     tooth: Tooth, curvature: Array, material: Material, options: MeshOptions
 ) -> dict[str, Array]:
-    """Terms of the structural compliance: bending, shear, axial, foundation, crack.
+    """Terms of the structural compliance: those of the tooth, and that of the body."""
+    terms = tooth_terms(tooth, curvature, material, options)
+    opened = terms.pop(
+        "crack"
+    )  # last: the order of the terms decides the bits of their sum
+    angle = load_angle(tooth.gear, curvature)
+    body = body_compliance(tooth.gear, angle, material, options)
+    return {**terms, "foundation": body, "crack": opened}
+
+
+def tooth_terms(
+    tooth: Tooth, curvature: Array, material: Material, options: MeshOptions
+) -> dict[str, Array]:
+    """Terms of the tooth's own compliance: bending, shear, axial, crack.
 
     The last is 0 where cracks cut sections (``mesh.crack=paper``).
     """
@@ -220,7 +238,6 @@ def structural_terms(
     parts = tooth_compliance(
         tooth, curvature, material, reach=options.tooth, papers_crack=papers_crack
     )
-    angle = load_angle(tooth.gear, curvature)
     opened = np.zeros_like(curvature)
     if tooth.cracks and not papers_crack:
         opened = crack_compliance(
@@ -230,7 +247,6 @@ def structural_terms(
         "bending": parts.bending,
         "shear": parts.shear,
         "axial": parts.axial,
-        "foundation": body_compliance(tooth.gear, angle, material, options),
         "crack": opened,
     }
 

@@ -18,7 +18,7 @@ T = TypeVar("T")
 
 # Keys of one value for a whole data set; several values need several data sets.
 FIXED_KEYS = (
-    "gear.",
+    "gear.rated_",
     "system.",
     "modification.",
     "strength.",

@@ -8,6 +8,7 @@ from collections.abc import Collection
 from gensig.dataset.distributions import read_distribution
 from gensig.errors import ConfigError
 from gensig.faults.registry import fault_parts
+from gensig.geometry.contact import SIDES
 from gensig.operation.courses import RandomWalk
 from gensig.operation.options import (
     QUANTITIES,
@@ -19,6 +20,7 @@ from gensig.operation.options import (
 )
 from gensig.options.configuration import Configuration
 from gensig.record.machines import read_machine
+from gensig.record.options import DRAWN, GEAR_KEYS
 from gensig.units import to_si
 
 SEED_KEY = "operating.course_seed"
@@ -67,12 +69,24 @@ def settle_courses(config: Configuration, typed: Collection[str]) -> Configurati
     turning = {schedule.turns_of}
     if schedule.turns_of == "faulted":
         turning = _faulted(config) & set(pair.gears)
+    if turning - {"pinion"}:
+        _refuse_varied_teeth(vary)
     counts = [pair.gears[gear].n_teeth for gear in turning]
     slowdown = max(counts, default=pair.pinion.n_teeth) / pair.pinion.n_teeth
     seconds = schedule.turns * slowdown * 2.0 * math.pi / least
     rate = system.sensing.sampling_rate
     duration = math.ceil(seconds * rate * (1.0 - 1e-12)) / rate
     return config.with_keys("operating", duration_s=duration)
+
+
+def _refuse_varied_teeth(vary: Collection[str]) -> None:
+    """Raise ConfigError where the turns of the wheel last longer in some units than in others."""
+    for key in vary:
+        if key.startswith(GEAR_KEYS) and key.endswith("n_teeth"):
+            raise ConfigError(
+                f"operating.turns: the plan draws {key}, so the turns of the wheel take another "
+                "time in every unit; give operating.turns_of=pinion, or duration_s"
+            )
 
 
 def least_speed(config: Configuration, set_speed: float) -> float:
@@ -108,9 +122,12 @@ def least_speed(config: Configuration, set_speed: float) -> float:
 
 
 def _faulted(config: Configuration) -> set[str]:
-    """Gears that carry a fault in any class."""
-    return {
+    """Gears that carry a fault in any class; both where the plan draws the gear."""
+    named = {
         str(part.get("gear"))
         for fault in config["classes"].values()
         for part in fault_parts(fault)
     }
+    if named and config["plan"].get("fault_gear") == DRAWN:
+        return set(SIDES)
+    return named

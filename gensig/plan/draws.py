@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,10 +18,13 @@ from gensig.dataset.distributions import (
 )
 from gensig.errors import ConfigError
 from gensig.faults.registry import COMPOUND, fault_parts, read_faults
+from gensig.geometry.contact import SIDES
 from gensig.geometry.tooth_profile import root_curve_point
 from gensig.options.configuration import Configuration
 from gensig.record.machines import read_machine
-from gensig.systems.registry import LINE, read_pair
+from gensig.record.options import DRAWN, read_plan_options
+from gensig.record.streams import Stream, stream
+from gensig.systems.registry import LINE, read_gear_group, read_pair
 from gensig.units import from_si, split_unit, to_si
 
 # Keys of a distribution that are multiplied by a size where they are shares of it.
@@ -28,28 +33,64 @@ SCALED = ("low", "high", "mean", "std", "values")
 CEILING = "at_most_of_root_chord"
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrawnPoints:
+    """Points of varied keys before they are values of their distributions, (condition,) each.
+
+    Attributes
+    ----------
+    shares : points of the unit interval of the keys that are drawn
+    levels : numbers of the levels of the keys that a grid crosses
+    """
+
+    shares: Mapping[str, NDArray[np.float64]]
+    levels: Mapping[str, NDArray[np.int64]]
+
+    def values(
+        self, vary: Mapping[str, Distribution], conditions: slice = slice(None)
+    ) -> dict[str, list[Any]]:
+        """Values of every key at the points of some conditions."""
+        values: dict[str, list[Any]] = {}
+        for key, distribution in vary.items():
+            if key in self.shares:
+                values[key] = distribution.values_at(self.shares[key][conditions])
+                continue
+            levels = distribution.level_values()
+            values[key] = [levels[k] for k in self.levels[key][conditions].tolist()]
+        return values
+
+
+def draw_points(
+    design: str,
+    vary: Mapping[str, Distribution],
+    points: NDArray[np.int64],
+    rng: np.random.Generator,
+) -> DrawnPoints:
+    """Points of every varied key.
+
+    In a grid a key with levels has that of the condition's point, the first key slowest. All others
+    are drawn together from one space-filling design.
+    """
+    crossed = [key for key in vary if design == GRID and vary[key].levels]
+    drawn = [key for key in vary if key not in crossed]
+    shares = design_points(design, len(points), len(drawn), rng)
+    levels, step = {}, 1
+    for key in reversed(crossed):
+        levels[key] = points // step % vary[key].levels
+        step *= vary[key].levels
+    return DrawnPoints(
+        shares={key: shares[:, k] for k, key in enumerate(drawn)}, levels=levels
+    )
+
+
 def draw_values(
     config: Configuration,
     vary: Mapping[str, Distribution],
     points: NDArray[np.int64],
     rng: np.random.Generator,
 ) -> dict[str, list[Any]]:
-    """Values of every varied key, (condition,) each.
-
-    In a grid a key with levels has that of the condition's point, the first key slowest. All others
-    are drawn together from one space-filling design.
-    """
-    design = config["plan"]["design"]
-    crossed = [key for key in vary if design == GRID and vary[key].levels]
-    drawn = [key for key in vary if key not in crossed]
-    unit = design_points(design, len(points), len(drawn), rng)
-    values = {key: vary[key].values_at(unit[:, k]) for k, key in enumerate(drawn)}
-    step = 1
-    for key in reversed(crossed):
-        levels = vary[key].level_values()
-        values[key] = [levels[point // step % len(levels)] for point in points.tolist()]
-        step *= len(levels)
-    return {key: values[key] for key in vary}
+    """Values of every varied key, (condition,) each; see ``draw_points``."""
+    return draw_points(config["plan"]["design"], vary, points, rng).values(vary)
 
 
 def fault_sizes(fault: Mapping[str, Any]) -> dict[str, float]:
@@ -85,20 +126,78 @@ def fault_specs(
     return specs, parts
 
 
-def draw_faults(
+def draw_class_faults(
     config: Configuration,
+    points: NDArray[np.int64],
+    of_units: Sequence[Configuration] = (),
+) -> dict[str, list[dict[str, Any]]]:
+    """Faults of every class by its name, one a condition.
+
+    ``of_units`` are the configurations of the units, which the conditions take in turn, where
+    units differ. Where the plan draws the gear, a condition has the fault of the option as if that
+    gear were given: the sizes of either gear are at the same points of their distributions.
+    """
+    of_units = of_units or (config,)
+    gear_is_drawn = read_plan_options(config).fault_gear == DRAWN
+    faults = {}
+    for index, (name, fault) in enumerate(config["classes"].items()):
+        rng = stream(config.seed, Stream.FAULT, index)
+        if not gear_is_drawn:
+            faults[name] = draw_faults(of_units, fault, points, rng)
+            continue
+        of_gear = [
+            draw_faults(of_units, _on_gear(fault, gear), points, copy.deepcopy(rng))
+            for gear in SIDES
+        ]
+        side = stream(config.seed, Stream.FAULT_GEAR, index).integers(
+            len(SIDES), size=len(points)
+        )
+        faults[name] = [of_gear[k][i] for i, k in enumerate(side.tolist())]
+    return faults
+
+
+def _on_gear(fault: Mapping[str, Any], gear: str) -> dict[str, Any]:
+    """The fault, or all parts of a compound one, on a gear."""
+    parts = [{**part, "gear": gear} for part in fault_parts(fault)]
+    if fault["kind"] == COMPOUND:
+        return {**fault, "parts": parts}
+    return parts[0] if parts else dict(fault)
+
+
+def draw_faults(
+    of_units: Sequence[Configuration],
     fault: Mapping[str, Any],
     points: NDArray[np.int64],
     rng: np.random.Generator,
 ) -> list[dict[str, Any]]:
     """One complete fault a condition, its severity distribution drawn.
 
-    One design for all parts of a compound fault.
+    One design for all parts of a compound fault and all units: the sizes of each unit's gears
+    decide only what the points mean.
     """
-    specs, part_keys = fault_specs(config, fault)
-    drawn = draw_values(config, specs, points, rng)
+    drawn: DrawnPoints | None = None
+    faults: list[dict[str, Any]] = [{}] * len(points)
+    for unit, config in enumerate(of_units):
+        specs, part_keys = fault_specs(config, fault)
+        if drawn is None:
+            drawn = draw_points(config["plan"]["design"], specs, points, rng)
+        conditions = slice(unit, None, len(of_units))
+        values = drawn.values(specs, conditions)
+        faults[conditions] = _whole_faults(
+            fault, values, part_keys, len(points[conditions])
+        )
+    return faults
+
+
+def _whole_faults(
+    fault: Mapping[str, Any],
+    drawn: Mapping[str, list[Any]],
+    part_keys: Mapping[str, tuple[int, str]],
+    n_faults: int,
+) -> list[dict[str, Any]]:
+    """Complete faults, each with its drawn values."""
     faults: list[dict[str, Any]] = []
-    for condition in range(len(points)):
+    for condition in range(n_faults):
         parts = [dict(part) for part in fault_parts(fault)]
         for part in parts:
             part.pop("vary", None)
@@ -115,9 +214,10 @@ def draw_faults(
 def _gear_sizes(config: Configuration, gear: str) -> tuple[int, dict[str, float]]:
     """Teeth of a gear, and the sizes in mm that a fault may be a share of."""
     if config["system"]["kind"] != LINE:
-        values = config["gear"][gear]
-        module, width = config["gear"]["normal_module_mm"], values["face_width_mm"]
-        return values["n_teeth"], {"normal_module": module, "face_width": width}
+        group = read_gear_group(config)
+        module, values = group["normal_module_mm"], group[gear]
+        sizes = {"normal_module": module, "face_width": values["face_width_mm"]}
+        return values["n_teeth"], sizes
     in_table = getattr(read_machine(config).pair, gear)
     return in_table.n_teeth, {
         name: from_si("size_mm", getattr(in_table, name))

@@ -17,10 +17,15 @@ from gensig.life.life_options import LifeOptions, read_life
 from gensig.life.load_history import History, draw_history, given_history
 from gensig.life.snapshots import snapshot_times
 from gensig.options.configuration import Configuration, whole_number
-from gensig.plan.draws import draw_faults, draw_values
+from gensig.plan.draws import draw_class_faults, draw_values
 from gensig.plan.growth_table import LAWS, PAIRS_ONLY, LifeGears
 from gensig.record.machines import read_machine
-from gensig.record.options import read_plan_options
+from gensig.record.options import (
+    GEAR_KEYS,
+    UNIT_LOAD,
+    draws_unit_load,
+    read_plan_options,
+)
 from gensig.record.streams import Stream, stream
 from gensig.systems.base import Machine
 from gensig.systems.registry import LINE
@@ -71,11 +76,7 @@ def snapshots(config: Configuration) -> Iterator[Snapshot]:
     points = _setpoints(config, options, n_units)
     n_setpoints = len(points) // n_units
     speed, torque = _speed_and_torque(machine, points, n_units)
-    faults = []
-    for index, name in enumerate(names):
-        rng = stream(seed, Stream.FAULT, index)
-        units = np.arange(n_units)
-        faults.append(draw_faults(config, config["classes"][name], units, rng))
+    faults = draw_class_faults(config, np.arange(n_units))
     gears = LifeGears(config, machine, (float(torque.min()), float(torque.max())))
     number = 0
     for unit in range(n_units):
@@ -85,7 +86,7 @@ def snapshots(config: Configuration) -> Iterator[Snapshot]:
         past = stream(seed, Stream.LIFE_HISTORY, unit)
         history = _history(options, speed[unit], torque[unit], past)
         history = replace(history, speed=history.speed * machine.ratio)
-        life = _life(gears, options, faults[label][unit], history, rng)
+        life = _life(gears, options, faults[names[label]][unit], history, rng)
         factors = {
             key: float(np.exp(drift.scatter * rng.standard_normal()))
             for key, drift in options.drift.items()
@@ -194,6 +195,11 @@ def _checked_units(config: Configuration, options: LifeOptions) -> int:
         raise ConfigError(
             "a plan of lives has plan.n_repeats=1 and draws its set-points: plan.design is no grid"
         )
+    if plan.get("n_reference"):
+        raise ConfigError(
+            f"plan.n_reference = {plan['n_reference']!r}: lives have no reference records; a "
+            "unit is new at its first snapshot: give 0"
+        )
     for name, fault in config["classes"].items():
         kinds = {part["kind"] for part in fault_parts(fault)}
         if kinds - options.laws.keys() or len(fault_parts(fault)) > 1:
@@ -208,6 +214,7 @@ def _checked_units(config: Configuration, options: LifeOptions) -> int:
                 f"plan.classes: {name}: {unfollowed[0]} is not followed on a drive line; "
                 f"take life=crack_growth or life=pit_growth"
             )
+    _refuse_designs(config, options)
     for key in options.drift:
         config.with_values({key: 0.0})  # refuses keys that cannot drift
         if key in plan["vary"] or key in (SPEED, TORQUE):
@@ -215,6 +222,20 @@ def _checked_units(config: Configuration, options: LifeOptions) -> int:
                 f"life.drift: '{key}' is drawn for each set-point already; let one of the two go"
             )
     return whole_number("plan.n_units", plan["n_units"], at_least=1)
+
+
+def _refuse_designs(config: Configuration, options: LifeOptions) -> None:
+    """Raise ConfigError for gears that differ between lives or in the course of one."""
+    for key in (*config["plan"]["vary"], *options.drift):
+        if key.startswith(GEAR_KEYS):
+            raise ConfigError(
+                f"'{key}': every life has the gears of the configuration; make a set for each "
+                "design with -m"
+            )
+    if draws_unit_load(config):
+        raise ConfigError(
+            f"plan.vary.{TORQUE}: of = '{UNIT_LOAD}': lives draw the torque itself; leave of out"
+        )
 
 
 def _setpoints(

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dataset.distributions import Distribution
+from gensig.dataset.columns import IS_REFERENCE
+from gensig.dataset.distributions import LATIN_HYPERCUBE, Distribution
 from gensig.dataset.plan import Plan, record_ids, shard_rows
 from gensig.dataset.schema import SCALES, SIGNALS
 from gensig.errors import ConfigError
@@ -22,8 +23,10 @@ from gensig.life.life_options import runs_to_failure
 from gensig.life.options import read_wear_options
 from gensig.mesh.pair_table import check_teeth
 from gensig.options.configuration import Configuration
-from gensig.plan.draws import draw_faults, draw_values, fault_sizes, fault_specs
+from gensig.plan.draws import draw_class_faults, draw_values, fault_sizes, fault_specs
 from gensig.plan.lives import snapshots
+from gensig.plan.unit_designs import UnitDesigns, check_designs, draw_designs
+from gensig.record.gear_columns import gear_columns
 from gensig.record.inputs import MISSING, InputReader, draw_start
 from gensig.record.machines import read_machine
 from gensig.record.options import PlanOptions, read_dataset_options, read_plan_options
@@ -40,7 +43,7 @@ COUNT_BYTES = 2  # of a sample stored as an int16 count
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Counts:
-    """Numbers of records, units, gearboxes, repeats and conditions of a plan.
+    """Numbers of records, units, repeats and conditions of a plan.
 
     Attributes
     ----------
@@ -54,7 +57,6 @@ class Counts:
 
     n_records: int
     n_units: int
-    n_gearboxes: int
     n_repeats: int
     n_conditions: int
     condition_points: NDArray[np.int64]
@@ -80,26 +82,33 @@ def make_plan(config: Configuration) -> Plan:
         read_wear_options(config["wear"])
     if runs_to_failure(config):
         return _plan_of_lives(config, options)
+    check_designs(config, options)
     seed, names = config.seed, options.classes
     counts = read_counts(config)
     reader = InputReader(config)
     machine = read_machine(config)
     machine.check()
     signal_shapes(config, machine)  # refuses what the machine does not tell
-    rng = stream(seed, Stream.CONDITION)
-    conditions = draw_values(config, options.vary, counts.condition_points, rng)
-    faults = {}
-    for index, (name, fault) in enumerate(config["classes"].items()):
-        rng = stream(seed, Stream.FAULT, index)
-        faults[name] = draw_faults(config, fault, counts.fault_points, rng)
     sound = [name for name in names if not fault_parts(config["classes"][name])]
+    if options.n_reference and not sound:
+        raise ConfigError(
+            f"plan.n_reference = {options.n_reference}: reference records are sound, but no "
+            f"class of plan.classes [{', '.join(names)}] is; add healthy, or give 0"
+        )
+    rng = stream(seed, Stream.CONDITION)
+    vary = options.condition_vary
+    conditions = draw_values(config, vary, counts.condition_points, rng)
+    designs = draw_designs(config, min(counts.n_units, counts.n_conditions))
+    of_units = designs.configurations(config)
+    faults = draw_class_faults(config, counts.fault_points, of_units)
     rows: list[dict[str, Any]] = []
     for condition, repeat in itertools.product(
         range(counts.n_conditions), range(counts.n_repeats)
     ):
         unit = condition % counts.n_units
-        specimen, gearbox = divmod(unit, counts.n_gearboxes)
-        values = {key: drawn[condition] for key, drawn in conditions.items()}
+        specimen, gearbox = _parts_of_unit(options, unit)
+        drawn = {key: of_key[condition] for key, of_key in conditions.items()}
+        values = designs.of(unit, drawn)
         if repeat == 0:
             machine = reader.machine(values)
             machine.pair.require_continuous_drive()
@@ -114,8 +123,55 @@ def make_plan(config: Configuration) -> Plan:
             ids = _ids(options, label, unit, gearbox, specimen, condition, repeat)
             fault = faults[names[label]][condition]
             drawn_columns = _row(machine, fault, values, start, sham=options.sham)
-            rows.append(ids | drawn_columns)
+            rows.append(ids | drawn_columns | _gear_columns(options, machine))
+    if options.n_reference:
+        rows = [row | {IS_REFERENCE: 0} for row in rows]
+        label = names.index(sound[0])
+        rows += _reference_rows(config, reader, counts, designs, label)
     return _as_plan(config, rows)
+
+
+def _reference_rows(
+    config: Configuration,
+    reader: InputReader,
+    counts: Counts,
+    designs: UnitDesigns,
+    label: int,
+) -> list[dict[str, Any]]:
+    """Sound records of every unit with an example, each at a condition of its own.
+
+    Their conditions are drawn as those of the examples, by a stream of their own; where those are
+    a grid, as a Latin hypercube. Like a sound example, each is the twin that sets its noise.
+    """
+    options = read_plan_options(config)
+    n_units = min(counts.n_units, counts.n_conditions)
+    numbers = np.arange(n_units * options.n_reference)
+    if options.is_grid:
+        config = config.with_keys("plan", design=LATIN_HYPERCUBE)
+    rng = stream(config.seed, Stream.REFERENCE)
+    drawn = draw_values(config, options.condition_vary, numbers, rng)
+    fault = config["classes"][options.classes[label]]
+    rows = []
+    for number in numbers.tolist():
+        unit, condition = number % n_units, counts.n_conditions + number
+        specimen, gearbox = _parts_of_unit(options, unit)
+        of_condition = {key: of_key[number] for key, of_key in drawn.items()}
+        values = designs.of(unit, of_condition)
+        machine = reader.machine(values)
+        machine.pair.require_continuous_drive()
+        start = stream(config.seed, Stream.TWIN, condition)
+        ids = _ids(options, label, unit, gearbox, specimen, condition, 0)
+        row = _row(machine, fault, values, start, sham=options.sham)
+        gears = _gear_columns(options, machine)
+        rows.append(ids | row | gears | {IS_REFERENCE: 1})
+    return rows
+
+
+def _gear_columns(options: PlanOptions, machine: Machine) -> dict[str, int | float]:
+    """Teeth and geometry of a record's gears, where units differ in them."""
+    if not options.varies_gears:
+        return {}
+    return gear_columns(machine.pair)
 
 
 def _plan_of_lives(config: Configuration, options: PlanOptions) -> Plan:
@@ -123,7 +179,7 @@ def _plan_of_lives(config: Configuration, options: PlanOptions) -> Plan:
     machine = read_machine(config)
     machine.check()
     machine.pair.require_continuous_drive()
-    n_gearboxes = count_gearboxes(options)
+    n_gearboxes = _count_gearboxes(options)
     reader = InputReader(config)
     rows: list[dict[str, Any]] = []
     for look in snapshots(config):
@@ -162,11 +218,21 @@ def _ids(
     }
 
 
-def count_gearboxes(options: PlanOptions) -> int:
+def _parts_of_unit(options: PlanOptions, unit: int) -> tuple[int, int]:
+    """Numbers of the set of gears and of the gearbox of a unit."""
+    if options.has_separate_machines:
+        return unit, unit
+    return divmod(unit, _count_gearboxes(options))
+
+
+def _count_gearboxes(options: PlanOptions) -> int:
     """Number of gearboxes, at most one a unit.
 
-    About the square root of the units where it is not given.
+    One a unit where machines are separate; else about the square root of the units where it is
+    not given.
     """
+    if options.has_separate_machines:
+        return options.n_units
     if options.n_gearboxes is None:
         return min(options.n_units, round(math.sqrt(options.n_units)))
     return min(options.n_units, options.n_gearboxes)
@@ -206,7 +272,6 @@ def read_counts(config: Configuration) -> Counts:
     return Counts(
         n_records=n_records,
         n_units=plan.n_units,
-        n_gearboxes=count_gearboxes(plan),
         n_repeats=plan.n_repeats,
         n_conditions=n_conditions,
         condition_points=points // n_faults,
@@ -216,14 +281,14 @@ def read_counts(config: Configuration) -> Counts:
 
 def _grid_size(config: Configuration, plan: PlanOptions) -> tuple[int, int]:
     """Points of the grid over the conditions, and the least common multiple of those of faults."""
-    for key, distribution in plan.vary.items():
+    for key, distribution in plan.condition_vary.items():
         if not (distribution.levels or distribution.names_levels):
             raise ConfigError(
                 f"plan.vary.{key}: a grid needs its levels: give levels: 4 or so, distribution: "
                 "choice, or levels: null to draw it all the same"
             )
     n_faults = [_n_points(vary) for vary in _fault_varies(config).values()]
-    return _n_points(plan.vary), math.lcm(*n_faults)
+    return _n_points(plan.condition_vary), math.lcm(*n_faults)
 
 
 def _n_points(vary: Mapping[str, Distribution]) -> int:
@@ -245,7 +310,9 @@ def describe_design(config: Configuration) -> str:
     plan = read_plan_options(config)
     if not plan.is_grid:
         return plan.design
-    levels = {key: distribution.levels for key, distribution in plan.vary.items()}
+    vary = plan.condition_vary
+    levels = {key: distribution.levels for key, distribution in vary.items()}
+    levels |= dict.fromkeys(plan.unit_vary, 0)
     for name, vary in _fault_varies(config).items():
         levels |= {f"{name}.{key}": vary[key].levels for key in vary}
     crossed = " x ".join(f"{key} {n}" for key, n in levels.items() if n)

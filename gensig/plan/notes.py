@@ -16,7 +16,8 @@ BY_MACHINE = {
 
 def plan_notes(config: Configuration, plan: Plan) -> list[str]:
     """At most one line: units without records, and splits by machine that are not possible."""
-    parts = (_units_left_out(config, plan), _splits_left_out(plan, config.seed))
+    examples = plan.examples()
+    parts = (_units_left_out(config, examples), _splits_left_out(examples, config.seed))
     note = "; ".join(filter(None, parts))
     return [note] * bool(note)
 

@@ -75,6 +75,8 @@ def read_request(
         notes.append(
             f"fault={names[0]} replaces plan.classes [{', '.join(map(str, listed))}]"
         )
+        if "plan.n_reference" not in words.keys and fault_parts(selected.option):
+            base["plan"]["n_reference"] = 0  # no class of the plan is sound
     base["plan"]["classes"] = names
     pinned = dict.fromkeys(
         key for fault in (selected, *faults.values()) for key in fault.pinned

@@ -24,7 +24,7 @@ from gensig.record.inputs import (
     draw_start,
     simulate_motions,
 )
-from gensig.record.options import read_plan_options
+from gensig.record.options import AS_GIVEN, CROSSED, read_plan_options
 from gensig.record.streams import Stream, stream
 from gensig.sensing.instrument import Instrument
 from gensig.systems.registry import read_system
@@ -264,6 +264,9 @@ def _planned(
         n_records=None,
         n_units=n_units,
         n_gearboxes=1,
+        machines=CROSSED,
+        fault_gear=AS_GIVEN,
+        n_reference=0,
         conditions_per_unit=None,
         n_repeats=1,
         classes=list(config["classes"]),

@@ -38,11 +38,16 @@ from gensig.execution.base import Executor, ShardFailure
 from gensig.life.life_options import runs_to_failure
 from gensig.options.configuration import Configuration
 from gensig.plan.make import make_plan
+from gensig.record.gear_columns import gear_columns
 from gensig.record.machines import read_machine
-from gensig.record.options import DatasetOptions, read_dataset_options
+from gensig.record.options import (
+    DatasetOptions,
+    read_dataset_options,
+    read_plan_options,
+)
 from gensig.record.simulate import signal_shapes, simulate_records
 from gensig.systems.base import Machine
-from gensig.units import channel_unit, from_si
+from gensig.units import channel_unit
 from gensig.version import __version__
 
 
@@ -299,6 +304,7 @@ def open_shard(
 ) -> ShardWriter:
     """Writer for records of one configuration."""
     system, dataset = read_machine(config), read_dataset_options(config)
+    plan = read_plan_options(config)
     return ShardWriter(
         path,
         n_records=n_records,
@@ -308,6 +314,8 @@ def open_shard(
         compression=dataset.compression,
         sample_type=dataset.sample_type,
         lives=runs_to_failure(config),
+        references=plan.n_reference > 0,
+        gears=plan.varies_gears,
     )
 
 
@@ -330,8 +338,9 @@ def _shaft_sensors(dataset: DatasetOptions, system: Machine) -> dict[str, Any]:
 
 def root_attributes(config: Configuration, system: Machine) -> dict[str, Any]:
     """Attributes that hold for every record of a data set."""
-    pair = system.pair
-    torque_of = {}
+    geometry, torque_of = {}, {}
+    if not read_plan_options(config).varies_gears:
+        geometry = gear_columns(system.pair)
     if system.torque_of:
         torque_of = {"torque_of": system.torque_of}
     return {
@@ -344,16 +353,7 @@ def root_attributes(config: Configuration, system: Machine) -> dict[str, Any]:
         **_shaft_sensors(read_dataset_options(config), system),
         **torque_of,
         "class_names": list(config["plan"]["classes"]),
-        "n_teeth_pinion": pair.pinion.n_teeth,
-        "n_teeth_wheel": pair.wheel.n_teeth,
-        "normal_module_mm": from_si("normal_module_mm", pair.pinion.normal_module),
-        "pressure_angle_deg": from_si("pressure_angle_deg", pair.pinion.pressure_angle),
-        "helix_angle_deg": from_si("helix_angle_deg", pair.pinion.helix_angle),
-        "face_width_pinion_mm": from_si("face_width_mm", pair.pinion.face_width),
-        "face_width_wheel_mm": from_si("face_width_mm", pair.wheel.face_width),
-        "center_distance_mm": from_si("center_distance_mm", pair.center_distance),
-        "transverse_contact_ratio": pair.transverse_contact_ratio,
-        "overlap_ratio": pair.overlap_ratio,
+        **geometry,
         "config_json": json.dumps(
             config.with_entries(out=None, executor=None).plain(), sort_keys=True
         ),

@@ -10,6 +10,8 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from gensig.dataset.folder.failures import commonest
 from gensig.dataset.plan import Plan, plan_text
 from gensig.execution.base import read_n_workers
@@ -74,14 +76,16 @@ def predict(
     if rounds >= 2 * spread:
         rounds = spread
     total = start_up + CLOSING + whole * rounds
-    classes = Counter(str(name) for name in table.columns["label_name"])
+    examples = table.examples()
+    classes = Counter(str(name) for name in examples.columns["label_name"])
     return {
-        "records": f"{table.n_records}",
+        "records": f"{examples.n_records}",
+        **_references(table),
         "classes": ", ".join(f"{name} {count}" for name, count in classes.items()),
         "units": f"{n_different(table, 'unit_id')}",
         "specimens": f"{n_different(table, 'specimen_id')} (sets of gears)",
         "gearboxes": f"{n_different(table, 'gearbox_id')}",
-        "conditions": f"{n_different(table, 'condition_id')}",
+        "conditions": f"{n_different(examples, 'condition_id')}",
         "design": describe_design(config),
         "repeats": f"{config['plan']['n_repeats']}",
         "shards": f"{table.n_shards} of at most {max(table.shard_sizes())} records",
@@ -89,6 +93,15 @@ def predict(
         "time": f"about {max(1, round(total))} s on {workers} worker(s), "
         f"from {seconds / len(probe):.3g} s a record measured now",
     }
+
+
+def _references(table: Plan) -> dict[str, str]:
+    """Number of reference records, where there are any."""
+    n_reference = int(np.count_nonzero(table.is_reference))
+    if not n_reference:
+        return {}
+    each = n_reference // n_different(table, "unit_id")
+    return {"references": f"{n_reference} more ({each} a unit, sound, in no split)"}
 
 
 def _warn_of_failed(records: Sequence[Record]) -> None:

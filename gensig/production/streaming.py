@@ -21,6 +21,7 @@ from gensig.dynamics.integrator import Solver, records_together
 from gensig.errors import ConfigError, DatasetError
 from gensig.options.configuration import Configuration, whole_number
 from gensig.plan.make import make_plan
+from gensig.record.machines import read_machine
 from gensig.record.options import read_dataset_options
 from gensig.record.simulate import Record, simulate_records
 
@@ -102,6 +103,18 @@ class RecordStream:
                 f"the plan has no column {name!r}; it has {', '.join(self.column_names)}"
             )
         return self.plan.columns[name][self.numbers]
+
+    def n_teeth(self, gear: str) -> NDArray[np.int64]:
+        """Teeth of 'pinion' or 'wheel', (record,): of each unit's gear, or of the one design."""
+        name = f"n_teeth_{gear}"
+        if name in self.plan.columns:
+            return self.column(name)
+        gears = read_machine(self.config).pair.gears
+        if gear not in gears:
+            raise DatasetError(
+                f"gear {gear!r} does not exist; there are {', '.join(gears)}"
+            )
+        return np.full(len(self), gears[gear].n_teeth, dtype=np.int64)
 
     @property
     def protocols(self) -> list[str]:
@@ -189,7 +202,7 @@ class RecordStream:
 
 
 def open_stream(config: Configuration, *, epoch: int = 0) -> RecordStream:
-    """All records of a composed configuration.
+    """All examples of a composed configuration; reference records are left out.
 
     ``out``, ``executor`` and the storage of samples change nothing.
 
@@ -201,7 +214,10 @@ def open_stream(config: Configuration, *, epoch: int = 0) -> RecordStream:
     read_dataset_options(config)  # refuses what no data set has
     plan = make_plan(_at_epoch(config, epoch))
     return RecordStream(
-        config=config, epoch=epoch, plan=plan, numbers=np.arange(plan.n_records)
+        config=config,
+        epoch=epoch,
+        plan=plan,
+        numbers=np.flatnonzero(~plan.is_reference),
     )
 
 

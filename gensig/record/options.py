@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import MISSING, dataclass, fields
+from typing import Any
 
 from gensig.dataset.distributions import GRID, Distribution, read_distribution
 from gensig.errors import ConfigError
 from gensig.options.configuration import Configuration, Section, whole_number
 from gensig.systems.shaft_sensors import SWITCHES
+from gensig.units import check_choice
 
 PREFIX = "store_"
+CROSSED, SEPARATE = "crossed", "separate"  # values of plan.machines
+AS_GIVEN, DRAWN = "as_given", "drawn"  # values of plan.fault_gear
+GEAR_KEYS = "gear."  # begin of varied keys that are drawn once a unit, ...
+WITH_GEAR_KEYS = ("quality.",)  # ... and of those that are then drawn with them
+TORQUE_KEY, UNIT_LOAD = "operating.torque_nm", "unit_load"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,10 +80,15 @@ class PlanOptions:
     Attributes
     ----------
     n_records, conditions_per_unit : None where the other counts decide
-    n_gearboxes : None for about the square root of the units
+    n_gearboxes : None for about the square root of the units, or where every unit has its own
     classes : names of the classes, by label
     vary : distribution of each varied key of the configuration
     sham : whether severities are zero while labels are kept
+    machines : ``crossed``: every set of gears runs in every gearbox; ``separate``: every unit has
+        gears and a gearbox of its own
+    fault_gear : ``as_given``: faults are on the gear that their option names; ``drawn``: on
+        either gear, with equal chance for each condition
+    n_reference : further sound records of every unit, which are no examples
     """
 
     n_records: int | None
@@ -88,14 +100,45 @@ class PlanOptions:
     design: str
     vary: Mapping[str, Distribution]
     sham: bool
+    # Keys that came after 0.9.0 have defaults: configurations of earlier data sets lack them.
+    machines: str = CROSSED
+    fault_gear: str = AS_GIVEN
+    n_reference: int = 0
 
     @property
     def is_grid(self) -> bool:
         """True where every unit runs every combination of levels."""
         return self.design == GRID
 
+    @property
+    def varies_gears(self) -> bool:
+        """True where units differ in the design of their gears."""
+        return any(key.startswith(GEAR_KEYS) for key in self.vary)
+
+    @property
+    def unit_vary(self) -> dict[str, Distribution]:
+        """Distributions of the keys that are drawn once a unit; none without those of gears."""
+        if not self.varies_gears:
+            return {}
+        begins = (GEAR_KEYS, *WITH_GEAR_KEYS)
+        return {key: self.vary[key] for key in self.vary if key.startswith(begins)}
+
+    @property
+    def condition_vary(self) -> dict[str, Distribution]:
+        """Distributions of the keys that are drawn for each condition."""
+        of_unit = self.unit_vary
+        return {key: self.vary[key] for key in self.vary if key not in of_unit}
+
+    @property
+    def has_separate_machines(self) -> bool:
+        """True where no two units share gears or a gearbox."""
+        return self.machines == SEPARATE
+
 
 KEYS = tuple(field.name for field in fields(PlanOptions))
+REQUIRED = tuple(
+    field.name for field in fields(PlanOptions) if field.default is MISSING
+)
 
 
 def read_plan_options(config: Configuration) -> PlanOptions:
@@ -114,17 +157,46 @@ def read_plan_options(config: Configuration) -> PlanOptions:
     for key in ("n_gearboxes", "conditions_per_unit"):
         if plan[key] is not None:
             whole_number(f"plan.{key}", plan[key], at_least=1)
+    _check_machines(plan)
+    fault_gear = plan.get("fault_gear", AS_GIVEN)
+    check_choice("plan.fault_gear", fault_gear, (AS_GIVEN, DRAWN))
+    whole_number("plan.n_reference", plan.get("n_reference", 0), at_least=0)
     if plan["n_records"] is not None:
         whole_number("plan.n_records", plan["n_records"], at_least=len(plan["classes"]))
-    vary = {
-        key: read_distribution(f"plan.vary.{key}", spec)
-        for key, spec in plan["vary"].items()
-    }
+    vary = {key: _read_varied(key, spec) for key, spec in plan["vary"].items()}
     return plan.without("vary").read(PlanOptions, vary=vary)
 
 
+def _read_varied(key: str, spec: Any) -> Distribution:
+    """Distribution of a key of ``plan.vary``; ``of: unit_load`` of the torque is left out."""
+    if isinstance(spec, Mapping) and "of" in spec:
+        if key != TORQUE_KEY or spec["of"] != UNIT_LOAD:
+            raise ConfigError(
+                f"plan.vary.{key}: of = {spec['of']!r}; only {TORQUE_KEY} may be drawn of "
+                f"another size, {UNIT_LOAD}, in N/mm2"
+            )
+        spec = {name: value for name, value in spec.items() if name != "of"}
+    return read_distribution(f"plan.vary.{key}", spec)
+
+
+def draws_unit_load(config: Configuration) -> bool:
+    """True where the plan draws the unit load of the teeth in place of the torque."""
+    spec = config["plan"]["vary"].get(TORQUE_KEY)
+    return isinstance(spec, Mapping) and spec.get("of") == UNIT_LOAD
+
+
 def _check_keys(plan: Section) -> None:
-    odd = sorted(set(plan).symmetric_difference(KEYS))
+    odd = sorted(set(plan).difference(KEYS) | set(REQUIRED).difference(plan))
     if odd:
         state = "unknown" if odd[0] in plan else "missing"
         raise ConfigError(f"plan: {state} key '{odd[0]}'; it has {', '.join(KEYS)}")
+
+
+def _check_machines(plan: Section) -> None:
+    machines = plan.get("machines", CROSSED)
+    check_choice("plan.machines", machines, (CROSSED, SEPARATE))
+    if machines == SEPARATE and plan["n_gearboxes"] is not None:
+        raise ConfigError(
+            f"plan.n_gearboxes = {plan['n_gearboxes']!r}: with plan.machines={SEPARATE} every "
+            "unit has a gearbox of its own; give plan.n_gearboxes=null"
+        )

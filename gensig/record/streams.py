@@ -34,6 +34,9 @@ class Stream(IntEnum):
     LIFE = 18
     LIFE_HISTORY = 19
     TOOTHED_WHEEL = 20
+    FAULT_GEAR = 21
+    REFERENCE = 22
+    GEAR_DESIGN = 23
 
 
 def stream(seed: int, cause: Stream, index: int = 0) -> np.random.Generator:

@@ -149,7 +149,6 @@ def _content(
         "channels": [
             {"name": plain(name), "unit": plain(unit)} for name, unit in channels
         ],
-        "teeth": rotation.n_teeth,
         "top": usable_top(data),
         "examples": [
             example(data, index, chosen.channels, rotation) for index in indices

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dataset.reader import Dataset
+from gensig.errors import DatasetError
 
 GEARS = ("pinion", "wheel")
 SAME = 1e-3  # relative difference below which two shafts turn alike
@@ -21,14 +23,14 @@ class Rotation:
     ----------
     mesh : (record,)      of the mesh
     drive : (record,)     turns of the driving shaft a second
-    n_teeth : by gear of `GEARS`, those that are known
+    n_teeth : (record,) by gear of `GEARS`, those that are known
     gear : (record,)      gear with whose turn a fault repeats; "" without a fault, or where every
                           tooth has it
     """
 
     mesh: NDArray[np.floating]
     drive: NDArray[np.floating]
-    n_teeth: dict[str, int]
+    n_teeth: dict[str, NDArray[np.int64]]
     gear: NDArray[np.str_]
 
     def turns(self, gear: str) -> NDArray[np.floating]:
@@ -38,7 +40,7 @@ class Rotation:
     def of(self, index: int) -> dict[str, float | None]:
         """Frequencies of a record by name: mesh, drive and gears; None where unknown."""
         values = {"mesh": self.mesh[index], "drive": self.drive[index]}
-        values |= {gear: self.mesh[index] / self.n_teeth[gear] for gear in self.n_teeth}
+        values |= {gear: self.turns(gear)[index] for gear in self.n_teeth}
         known = {
             name: float(value)
             for name, value in values.items()
@@ -73,9 +75,10 @@ def read_rotation(data: Dataset) -> Rotation:
     """The frequencies of a data set's records."""
     n_teeth = {}
     for gear in GEARS:
-        number = data.attributes.get(f"n_teeth_{gear}")
-        if isinstance(number, (int, np.integer)) and number > 0:
-            n_teeth[gear] = int(number)
+        with suppress(DatasetError):
+            number = data.n_teeth(gear)
+            if (number > 0).all():
+                n_teeth[gear] = number
     names = data.column_names
     mesh, faulty = np.full(data.n_records, np.nan), np.full(data.n_records, "")
     if "mesh_frequency_hz" in names:

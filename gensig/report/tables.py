@@ -11,12 +11,10 @@ import numpy as np
 
 from gensig.dataset.cards.card import (
     CAVEATS,
-    GEOMETRY,
     plain,
-    rounded,
     torque_words,
-    value_range,
 )
+from gensig.dataset.cards.facts import geometry_facts, rounded, value_range
 from gensig.dataset.folder.layout import CONFIG, CONFIG_BYTES_LIMIT, OVERRIDES
 from gensig.dataset.reader import Dataset
 from gensig.dataset.splitting.protocols import PROTOCOLS
@@ -50,7 +48,9 @@ def channel_units(data: Dataset) -> list[str]:
 def contents(data: Dataset) -> list[Section]:
     """Facts of the data set, and its classes."""
     n_failed = int(np.count_nonzero(~data.usable))
-    records = f"{data.n_records}"
+    records, n_reference = f"{data.n_records}", int(np.count_nonzero(data.is_reference))
+    if n_reference:
+        records += f", of which {n_reference} are reference records in no split"
     if n_failed:
         records += f", of which {n_failed} failed and are left out here"
     duration = data.n_samples / data.sampling_rate
@@ -65,9 +65,8 @@ def contents(data: Dataset) -> list[Section]:
         ("further signals", ", ".join(further) or "none"),
     ]
     rows += [
-        (IN_WORDS.get(name, name), _shown(data.attributes[name]))
-        for name in GEOMETRY
-        if name in data.attributes
+        (IN_WORDS.get(name, name), _shown(value))
+        for name, value in geometry_facts(data).items()
     ]
     counted = {
         "units": "unit_id",
@@ -94,12 +93,15 @@ def contents(data: Dataset) -> list[Section]:
 
 
 def _classes(data: Dataset) -> Table:
-    label, unit = data.column("label_name"), data.column("unit_id")
+    is_example = ~data.is_reference
+    label = data.column("label_name")[is_example]
+    unit = data.column("unit_id")[is_example]
+    all_severities = data.column("severity")[is_example]
     order = [*data.class_names, *sorted(set(label.tolist()) - set(data.class_names))]
     rows = []
     for name in order:
         is_class = label == name
-        severity, median = data.column("severity")[is_class], "none"
+        severity, median = all_severities[is_class], "none"
         if np.isfinite(severity).any():
             median = f"{np.nanmedian(severity):.3g}"
         n_units = len(np.unique(unit[is_class]))

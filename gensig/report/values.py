@@ -167,7 +167,8 @@ def _rows(
             if gear in turns and turns[gear][index] > 0.0:
                 # A record without a whole turn keeps NaN.
                 with suppress(ValueError):
-                    rate, n_teeth = float(turns[gear][index]), rotation.n_teeth[gear]
+                    rate = float(turns[gear][index])
+                    n_teeth = int(rotation.n_teeth[gear][index])
                     average = time_synchronous_average(x, data.sampling_rate, rate)
                     fourth, sidebands = (
                         fm4(average, n_teeth),

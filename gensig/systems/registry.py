@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from gensig.dynamics.integrator import Solver
@@ -18,6 +19,7 @@ from gensig.operation.options import read_operating
 from gensig.options.configuration import Configuration, Section
 from gensig.sensing.manufacturing import Quality
 from gensig.sensing.options import read_sensing
+from gensig.systems.derived_sizes import completed, least_backlash
 from gensig.systems.helical_pair import HelicalPair
 from gensig.systems.hot_pair import Duty, as_configured
 from gensig.systems.pair_machine import GearPairMachine
@@ -30,7 +32,7 @@ from gensig.systems.supports import (
     put_on_bearings,
     read_holding,
 )
-from gensig.units import read, to_si
+from gensig.units import from_si, read, to_si
 
 COMMON_GEAR_KEYS = (
     "normal_module_mm",
@@ -38,6 +40,12 @@ COMMON_GEAR_KEYS = (
     "addendum_coefficient",
     "clearance_coefficient",
     "cutter_tip_radius_coefficient",
+)
+PLANE_SUPPORT = (
+    "stiffness_x_n_per_m",
+    "stiffness_y_n_per_m",
+    "damping_x_ns_per_m",
+    "damping_y_ns_per_m",
 )
 BODY_KEYS = ("mass_kg", "inertia_kg_m2", "support", "bearing", "shaft")
 SLICED = "helical_pair"
@@ -75,7 +83,7 @@ def read_helical_pair(config: Configuration) -> HelicalPair:
     flanks = read_sliced_pair(config)
     machine = _read_machine(config, flanks.pair)
     bodies = {
-        name: held_axially(machine[name], gear, config.section("gear", name))
+        name: held_axially(machine[name], gear, read_gear_group(config).section(name))
         for name, gear in flanks.pair.gears.items()
     }
     return HelicalPair(pair=flanks.pair, flanks=flanks, **{**machine, **bodies})
@@ -91,12 +99,13 @@ def _read_machine(config: Configuration, pair: GearPair) -> dict[str, Any]:
             raise ConfigError(f"system: unknown key '{key}'; known: {known}")
     operating = read_operating(config.section("operating"))
     quality = read(Quality, config.section("quality"), "quality")
-    bodies, holdings = {}, {}
+    is_on_bearings = on_bearings(machine.get("supports", AS_GIVEN), quality)
+    sizes, bodies, holdings = read_gear_group(config), {}, {}
     for name, gear in pair.gears.items():
-        side = config.section("gear", name)
-        bodies[name] = _read_body(gear, side, material)
+        side = sizes.section(name)
+        bodies[name] = _read_body(gear, side, material, is_on_bearings)
         holdings[name] = read_holding(gear, side)
-    if on_bearings(machine.get("supports", AS_GIVEN), quality):
+    if is_on_bearings:
         force = operating.torque / pair.pinion.base_radius
         for name, gear in pair.gears.items():
             bodies[name] = put_on_bearings(
@@ -145,19 +154,29 @@ def read_cold_pair(config: Configuration) -> SlicedPair:
     )
 
 
+def read_gear_group(config: Configuration) -> Section:
+    """The group ``gear`` of a configuration, sizes that are null filled."""
+    return completed(config.section("gear"))
+
+
 def read_pair(config: Configuration) -> GearPair:
-    """The two gears of a configuration; by default the wheel has the opposite hand."""
-    gear = config.section("gear")
+    """The two gears of a configuration; by default the wheel has the opposite hand.
+
+    A backlash that is null is the recommended one.
+    """
+    gear = read_gear_group(config)
     helix = _number("gear.helix_angle_deg", gear["helix_angle_deg"])
     pinion, wheel = (
         _read_gear(name, gear, hand * helix)
         for name, hand in zip(SIDES, (1.0, -1.0), strict=True)
     )
-    return GearPair(
-        pinion=pinion,
-        wheel=wheel,
-        backlash=_number("gear.backlash_um", gear["backlash_um"]),
-    )
+    if gear["backlash_um"] is not None:
+        backlash = _number("gear.backlash_um", gear["backlash_um"])
+        return GearPair(pinion=pinion, wheel=wheel, backlash=backlash)
+    pair = GearPair(pinion=pinion, wheel=wheel, backlash=0.0)
+    distance = from_si("center_distance_mm", pair.center_distance)
+    recommended = least_backlash(distance, gear["normal_module_mm"])
+    return replace(pair, backlash=to_si("backlash_um", recommended))
 
 
 def read_material(config: Configuration) -> Material:
@@ -235,10 +254,13 @@ def _read_gear(name: str, gear: Section, helix_angle: float) -> Gear:
     return read(Gear, values, f"gear.{name}", name=name, helix_angle=helix_angle)
 
 
-def _read_body(gear: Gear, values: Section, material: Material) -> Body:
+def _read_body(
+    gear: Gear, values: Section, material: Material, is_on_bearings: bool
+) -> Body:
     """Mass, inertia and support of a gear.
 
-    Mass and inertia that are null are those of a solid disc on the pitch circle less the bore.
+    Mass and inertia that are null are those of a solid disc on the pitch circle less the bore. A
+    support on bearings may be null: it follows from them.
     """
     group, density = f"gear.{gear.name}", material.density_kg_per_m3
     disc = solid_disc(gear.pitch_radius, gear.bore_radius, gear.face_width, density)
@@ -253,10 +275,17 @@ def _read_body(gear: Gear, values: Section, material: Material) -> Body:
             )
     support = values.section("support")
     nulls = [key for key, value in support.items() if value is None]
+    derived = [key for key in nulls if key in PLANE_SUPPORT]
+    if derived and not is_on_bearings:
+        raise ConfigError(
+            f"{group}.support.{derived[0]} = null follows from bearings: take "
+            "system.supports=bearings, or give it"
+        )
+    support = support.without(*nulls) | dict.fromkeys(derived, 0.0)
     return Body(
         mass=inertias["mass_kg"],
         inertia=inertias["inertia_kg_m2"],
-        support=read(Support, support.without(*nulls), f"{group}.support"),
+        support=read(Support, support, f"{group}.support"),
     )
 
 

@@ -15,12 +15,12 @@ from torch import nn
 
 from diagnose.data.inputs import NetworkInput
 from diagnose.data.window_input import Windows
-from diagnose.networks.network import Network
+from diagnose.networks.network import FeatureNetwork
 
 CONFIG = {"name": "envelope", "kind": "envelope_cnn", "kernel": 16, "width": 8}
 
 
-class EnvelopeCnn(Network):
+class EnvelopeCnn(FeatureNetwork):
     """Learned band-pass filters, with the mean and the maximum of their outputs.
 
     Parameters

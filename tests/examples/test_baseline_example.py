@@ -57,5 +57,5 @@ def test_it_runs_in_a_study_and_is_on_the_page(train, monkeypatch, tmp_path):
 
 def test_without_its_line_in_the_registry_it_is_refused(train, tmp_path, capsys):
     assert train(tmp_path / "out") == 2
-    message = "baselines must be false or a list of different names"
+    message = "no baseline 'nearest_crest'; did you mean 'nearest_spectrum'?"
     assert message in capsys.readouterr().err

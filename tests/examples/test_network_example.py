@@ -65,7 +65,7 @@ def test_it_is_deterministic_and_reads_the_declared_input(data):
     model = EnvelopeCnn(n_channels=1, n_classes=4, input_scale=[1.0], **sizes).eval()
     inputs = input_of(CONFIG)
     assert isinstance(inputs, EnvelopeCnn.inputs)
-    assert inputs.n_points(1200) == 1200
+    assert inputs.example(1, 1200).shape == (1, 1, 1200)
     x = torch.randn(3, 1, 1200, generator=torch.Generator().manual_seed(0))
     with torch.inference_mode():
         assert_allclose(model(x), model(x.clone()), rtol=0, atol=0)

@@ -18,6 +18,7 @@ from gensig.plan.request import read_request
 from gensig.production.folder import open_shard
 from gensig.production.reproduction import recorded_row, simulate_twin
 from gensig.record.machines import read_machine
+from gensig.record.options import AS_GIVEN, CROSSED
 from gensig.record.simulate import Record, simulate_record
 from gensig.signals.indicators import crest_factor, kurtosis, rms
 from gensig.systems.base import Machine
@@ -47,6 +48,9 @@ def simulate(arguments: Namespace) -> int:
         n_records=1,
         n_units=1,
         n_gearboxes=1,
+        machines=CROSSED,
+        fault_gear=AS_GIVEN,
+        n_reference=0,
         conditions_per_unit=None,
         n_repeats=1,
         classes=[name],

@@ -11,21 +11,34 @@ from gensig.dynamics.bearing_sizes import BearingSize, bearing_for
 from gensig.errors import ConfigError, GensigError
 from gensig.geometry.contact import GearPair
 from gensig.life.root.root_stress import root_factors
-from gensig.options.configuration import Configuration
+from gensig.options.configuration import Configuration, Section
 from gensig.plan.request import read_request
+from gensig.systems.derived_sizes import (
+    ADDENDUM,
+    BORE_SHARE,
+    CLEARANCE,
+    WIDTH_IN_MODULES,
+    completed,
+    least_backlash,
+)
 from gensig.systems.pair_machine import GearPairMachine
 from gensig.systems.registry import SIDES, read_pair, read_system
 from gensig.text.option_writing import option_lines
 from gensig.units import to_si
 
-WIDTH_IN_MODULES = 10.0
-BORE_SHARE = 0.4  # of the pinion's pitch diameter
 DAMPING_RATIO = 0.03  # of each gear on its support
-LARGEST_ROUNDING = 0.38  # of the rack's tip, ISO 53-A
-PRESSURE_ANGLE, ADDENDUM, CLEARANCE = 20.0, 1.0, 0.25
+PRESSURE_ANGLE = 20.0
 MODULES = (0.1, 50.0)  # mm
 GIVEN = "given"
-# keys of a support before it is derived
+# keys of a bearing and of a support before they are derived
+BEARING = (
+    "n_balls",
+    "ball_diameter_mm",
+    "pitch_diameter_mm",
+    "inner_groove_conformity",
+    "outer_groove_conformity",
+    "radial_clearance_um",
+)
 PLANE_SUPPORT = (
     "stiffness_x_n_per_m",
     "stiffness_y_n_per_m",
@@ -183,72 +196,41 @@ def gear_option(sheet: DataSheet) -> GearOption:
         "helix_angle_deg": sheet.helix_angle,
         "addendum_coefficient": addendum,
         "clearance_coefficient": CLEARANCE,
-        "cutter_tip_radius_coefficient": tip_rounding(pressure_angle, addendum),
+        "cutter_tip_radius_coefficient": None,
         "backlash_um": 0.0,
     }
-    widths = sheet.widths or (WIDTH_IN_MODULES * sheet.module,) * 2
-    bores = sheet.bores or _bores(sheet)
-    bearings = [bearing_for(bore) for bore in bores]
-    span = round(max(widths) * 2.0 + max(bores), 1)
+    widths = sheet.widths or (None, None)
+    radii: list[float | None] = [None, None]
+    if sheet.bores is not None:
+        radii = [round(0.5 * bore, 4) for bore in sheet.bores]
     shifts = sheet.profile_shifts or (0.0, 0.0)
     for index, side in enumerate(SIDES):
         gear[side] = {
             "n_teeth": sheet.teeth[index],
             "profile_shift": shifts[index],
             "face_width_mm": widths[index],
-            "bore_radius_mm": round(0.5 * bores[index], 4),
+            "bore_radius_mm": radii[index],
             "mass_kg": None,
             "inertia_kg_m2": None,
             "support": dict.fromkeys(PLANE_SUPPORT, 1.0),
-            "bearing": _bearing(bearings[index]),
-            "shaft": {"diameter_mm": None, "span_mm": span},
+            "bearing": dict.fromkeys(BEARING),
+            "shaft": {"diameter_mm": None, "span_mm": None},
         }
         if sheet.is_helical:
             gear[side]["support"] |= dict.fromkeys(AXIAL_SUPPORT)
+    gear = completed(Section("gear", gear)).plain()
     center_distance = read_pair(Configuration({"gear": gear})).center_distance * 1e3
     gear["backlash_um"] = least_backlash(center_distance, sheet.module)
     for side, support in zip(SIDES, _supports(sheet, gear), strict=True):
         gear[side]["support"] |= support
     machine = read_system(_config(sheet, gear, supports="as_given"))
+    bearings = [bearing_for(2.0 * gear[side]["bore_radius_mm"]) for side in SIDES]
     return GearOption(
         gear=gear,
         remarks=_remarks(sheet, machine, bearings),
         machine=machine,
         is_helical=sheet.is_helical,
     )
-
-
-def least_backlash(center_distance_mm: float, module_mm: float) -> float:
-    """Recommended least normal backlash of industrial gears, micrometres, rounded.
-
-    Source: ISO/TR 10064-2:1996, j_bn = 2/3 (0.06 + 0.0005 a + 0.03 m_n) mm, for steel gears in
-    ferrous housings. That it holds below 15 m/s and for modules of 1.5 to 18 mm is from memory of
-    the report, not checked against its text; for others it is an assumption.
-    """
-    return round(2e3 / 3.0 * (0.06 + 0.0005 * center_distance_mm + 0.03 * module_mm), 1)
-
-
-def tip_rounding(pressure_angle_deg: float, addendum: float = ADDENDUM) -> float:
-    """Rounding of the rack's tip over the module: that of ISO 53-A, or what its tip has room for.
-
-    The circle may reach neither the working flank, c / (1 - sin(alpha)), nor over the middle of
-    the rack's tip, (pi / 4 - (h_a + c) tan(alpha)) cos(alpha) / (1 - sin(alpha)).
-    """
-    alpha = math.radians(pressure_angle_deg)
-    if not 10.0 <= pressure_angle_deg <= 35.0:  # the geometry refuses it
-        return LARGEST_ROUNDING
-    room = 1.0 - math.sin(alpha)
-    half_tip = math.pi / 4.0 - (addendum + CLEARANCE) * math.tan(alpha)
-    middle = half_tip * math.cos(alpha) / room
-    largest = math.floor(100.1 * min(CLEARANCE / room, middle)) / 100.0
-    return max(0.01, min(LARGEST_ROUNDING, largest))
-
-
-def _bores(sheet: DataSheet) -> tuple[float, float]:
-    """Diameters of two shafts that are twisted to the same stress, mm."""
-    pinion = BORE_SHARE * sheet.module * sheet.teeth[0]
-    wheel = pinion * (sheet.teeth[1] / sheet.teeth[0]) ** (1.0 / 3.0)
-    return round(pinion, 1), round(wheel, 1)
 
 
 def _supports(sheet: DataSheet, gear: Mapping[str, Any]) -> list[dict[str, float]]:
@@ -269,17 +251,6 @@ def _supports(sheet: DataSheet, gear: Mapping[str, Any]) -> list[dict[str, float
             support[f"damping_{axis}_ns_per_m"] = _short(damping)
         supports.append(support)
     return supports
-
-
-def _bearing(size: BearingSize) -> dict[str, Any]:
-    return {
-        "n_balls": size.n_balls,
-        "ball_diameter_mm": size.ball_diameter,
-        "pitch_diameter_mm": size.pitch_diameter,
-        "inner_groove_conformity": 0.52,
-        "outer_groove_conformity": 0.52,
-        "radial_clearance_um": size.clearance_um,
-    }
 
 
 def _config(
@@ -337,12 +308,12 @@ def _remarks(
         sheet.supports, "derived from bearing and shaft at the rated torque"
     )
     width = _origin(sheet.widths, f"assumed: {WIDTH_IN_MODULES:g} modules")
-    shafts = (
-        f"assumed: a shaft of {BORE_SHARE:g} pitch diameters of the pinion",
-        "assumed: a shaft twisted to the same stress as the pinion's",
+    shaft = (
+        f"assumed: the smaller gear's shaft has {BORE_SHARE:g} pitch diameters; both are "
+        "twisted to the same stress"
     )
     bodies = (machine.pinion, machine.wheel)
-    for side, body, bearing, shaft in zip(SIDES, bodies, bearings, shafts, strict=True):
+    for side, body, bearing in zip(SIDES, bodies, bearings, strict=True):
         of_side = {
             "n_teeth": GIVEN,
             "profile_shift": _origin(sheet.profile_shifts, "assumed"),

@@ -10,24 +10,11 @@ import yaml
 
 from gensig.dataset.cards.class_figures import write_class_figures
 from gensig.dataset.cards.croissant import croissant_text
+from gensig.dataset.cards.facts import geometry_facts, value_range
 from gensig.dataset.folder.layout import CARD, CROISSANT, SHARDS
 from gensig.dataset.reader import Dataset, open_dataset
 from gensig.dataset.splitting.splits import SUBSETS
 from gensig.dataset.storage.atomic import write_text
-
-GEOMETRY = (
-    "n_teeth_pinion",
-    "n_teeth_wheel",
-    "normal_module_mm",
-    "pressure_angle_deg",
-    "helix_angle_deg",
-    "face_width_pinion_mm",
-    "face_width_wheel_mm",
-    "center_distance_mm",
-    "transverse_contact_ratio",
-    "overlap_ratio",
-    "usable_band_hz",
-)
 
 LOAD = """```python
 import gensig
@@ -167,7 +154,13 @@ def _table(header: tuple[str, ...], rows: list[tuple[object, ...]]) -> str:
 def _facts(data: Dataset) -> list[tuple[object, ...]]:
     units = data.attributes.get("channel_units", ["m/s^2"] * len(data.channel_names))
     pairs = zip(data.channel_names, units, strict=False)
+    n_reference = int(np.count_nonzero(data.is_reference))
     records, n_failed = str(data.n_records), int(np.count_nonzero(~data.usable))
+    if n_reference:
+        n_examples = data.n_records - n_reference
+        records += (
+            f": {n_examples} examples, {n_reference} reference records in no split"
+        )
     if n_failed:
         records += f", of which {n_failed} failed"
     seconds = data.n_samples / data.sampling_rate
@@ -177,9 +170,7 @@ def _facts(data: Dataset) -> list[tuple[object, ...]]:
         "sampling rate": f"{data.sampling_rate:g} Hz",
         "channels": ", ".join(f"{name} ({unit})" for name, unit in pairs),
     }
-    for name in GEOMETRY:
-        if name in data.attributes:
-            facts[name] = rounded(data.attributes[name])
+    facts |= geometry_facts(data)
     for part in ("unit", "specimen", "gearbox"):
         plural = f"{part}{'e' * part.endswith('x')}s"
         facts[plural] = len(np.unique(data.column(f"{part}_id")))
@@ -200,7 +191,9 @@ def _facts(data: Dataset) -> list[tuple[object, ...]]:
 
 
 def _classes(data: Dataset) -> list[tuple[object, ...]]:
-    names, severity = data.column("label_name"), data.column("severity")
+    is_example = ~data.is_reference
+    names = data.column("label_name")[is_example]
+    severity = data.column("severity")[is_example]
     order = [name for name in data.class_names if (names == name).any()]
     order += sorted(set(names.tolist()) - set(order))
     return [
@@ -223,17 +216,3 @@ def _splits(data: Dataset) -> list[tuple[object, ...]]:
 def torque_words(data: Dataset) -> str:
     """Name of the quantity in `torque_nm`, which for a drive line is the torque of its load."""
     return f"torque of the {plain(data.attributes.get('torque_of', 'driving shaft'))}"
-
-
-def rounded(value: object) -> object:
-    """A number to the fourth decimal, anything else as it is."""
-    return round(value, 4) if isinstance(value, float) else value
-
-
-def value_range(values: np.ndarray, unit: str) -> str:
-    """'1200 to 1800 r/min', over the finite values."""
-    finite = values[np.isfinite(values)]
-    if not finite.size:
-        return "none"
-    ends = dict.fromkeys((f"{finite.min():.6g}", f"{finite.max():.6g}"))
-    return f"{' to '.join(ends)} {unit}".rstrip()

@@ -88,7 +88,8 @@ def example_records(data: Dataset) -> dict[str, int]:
     label, severity = data.column("label_name"), data.column("severity")
     chosen = {}
     for name in data.class_names:
-        records = np.flatnonzero((label == name) & data.usable)
+        mine = (label == name) & data.usable & ~data.is_reference
+        records = np.flatnonzero(mine)
         if records.size:
             order = np.argsort(severity[records], kind="stable")
             chosen[name] = int(records[order[records.size // 2]])

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from gensig.dataset.cards.facts import kind_of_machine
 from gensig.dataset.columns import COLUMNS
 from gensig.dataset.folder.layout import MANIFEST, PLAN, SHARDS, SPLITS
 from gensig.dataset.plan import Plan
@@ -97,7 +98,8 @@ def croissant_text(data: Dataset, caveats: str) -> str:
 
 def _responsible_ai(data: Dataset, facts: str, caveats: str) -> dict[str, Any]:
     """Fields on the origin of the data and the limits of their use."""
-    names, counts = np.unique(data.column("label_name"), return_counts=True)
+    of_examples = data.column("label_name")[~data.is_reference]
+    names, counts = np.unique(of_examples, return_counts=True)
     pairs = zip(names.tolist(), counts.tolist(), strict=True)
     classes = ", ".join(f"{name} {count}" for name, count in pairs)
     failed = int(np.count_nonzero(~data.usable))
@@ -122,8 +124,7 @@ def _responsible_ai(data: Dataset, facts: str, caveats: str) -> dict[str, Any]:
         "rai:dataLimitations": limits,
         "rai:dataBiases": [
             f"Records per class: {classes}; real machines are nearly always healthy.",
-            f"One kind of machine: {data.attributes.get('n_teeth_pinion', '?')} and "
-            f"{data.attributes.get('n_teeth_wheel', '?')} teeth, "
+            f"{kind_of_machine(data)}, "
             f"{len(np.unique(data.column('unit_id')))} units drawn from assumed scatter.",
             f"{failed} records failed and are marked so.",
         ],

@@ -24,6 +24,7 @@ from gensig.dataset.folder.layout import (
 )
 from gensig.dataset.folder.manifest import deciding, identity_hash, stored_config
 from gensig.dataset.plan import Plan, plan_text
+from gensig.dataset.schema import version_of
 from gensig.dataset.splitting.protocols import make_splits
 from gensig.dataset.storage.atomic import (
     TEMPORARY_SUFFIX,
@@ -81,6 +82,7 @@ def create_folder(
         texts[f"{SPLITS}/{name}.csv"] = table.to_csv()
     note = {BEGINNING: "This folder is being made by gensig.\n"}
     manifest = Manifest(
+        schema_version=version_of(plan.columns),
         generator_version=generator_version,
         identity=identity,
         seed=seed,

@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from gensig.dataset.schema import SCHEMA_VERSION
+from gensig.dataset.schema import READABLE_VERSIONS, SCHEMA_VERSION
 from gensig.dataset.storage.atomic import read_text, write_text
 from gensig.errors import DatasetError
 
@@ -147,10 +147,10 @@ def read_manifest(folder: Path) -> Manifest:
     try:
         content = json.loads(read_text(path, limit=TEXT_BYTES_LIMIT))
         version = _get(content, "schema_version", int)
-        if version != SCHEMA_VERSION:
+        if version not in READABLE_VERSIONS:
+            known = " and ".join(map(str, READABLE_VERSIONS))
             raise DatasetError(
-                f"format version {version}; this gensig reads {SCHEMA_VERSION}, install a "
-                "matching one"
+                f"format version {version}; this gensig reads {known}, install a matching one"
             )
         entries = enumerate(_get(content, "shards", list))
         files = _get(content, "files", dict)

@@ -46,7 +46,12 @@ __all__ = [
 NOT_IDENTITY = ("out", "executor", "verbosity")
 # Keys that came after 0.9.0 and their values where they are missing. At that value they are not
 # stored and no part of the identity: a folder that was begun without the key is the same data set.
-SINCE_0_9 = {"solver.backend": "runge_kutta"}
+SINCE_0_9 = {
+    "solver.backend": "runge_kutta",
+    "plan.machines": "crossed",
+    "plan.fault_gear": "as_given",
+    "plan.n_reference": 0,
+}
 RECEIPT_SUFFIX = ".done"
 
 

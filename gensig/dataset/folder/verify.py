@@ -100,6 +100,7 @@ def verify(folder: Path, *, quick: bool = False) -> VerifyResult:
         try:
             with open_shard(path, folder=folder) as file:
                 if not damage:
+                    problems += _version_differs(file, entry, manifest)
                     reference = reference or _description(file, path)
                     problems += _description_differs(file, path, reference)
                 lines = _rows_differ(file, entry, plan, int(starts[i]))
@@ -265,6 +266,17 @@ def _description_differs(file: h5py.File, path: Path, reference: dict) -> list[s
                 "other shards"
             )
     return problems
+
+
+def _version_differs(
+    file: h5py.File, entry: ShardEntry, manifest: Manifest
+) -> list[str]:
+    version = read_attributes(file)["schema_version"]
+    if version == manifest.schema_version:
+        return []
+    return [
+        f"{entry.name} has format version {version}, the manifest says {manifest.schema_version}"
+    ]
 
 
 def _rows_differ(

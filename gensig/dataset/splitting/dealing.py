@@ -22,11 +22,14 @@ class Deal:
     Parameters
     ----------
     column : text                         plan column of the groups; none of them is on two sides
+    groups : (record,) or None            the groups, where no column holds them; ``column`` is
+        then their name in a reason
     usable : (subset, record) bool        whether a record is used if its group is dealt to that
         subset
     min_groups : int                      fewer groups are no deal
     test_share : float                    of the groups; `MIN_TESTED` where that is no more than
         `MAX_FOR_TESTS`
+    validation_share : float              of the groups
     for_test : (record,) float or None    groups of the largest sum are tested on, as long as all
         classes are there
     every_class : bool                    whether a subset needs every class of the plan, or only
@@ -35,8 +38,10 @@ class Deal:
 
     column: str
     usable: NDArray[np.bool_]
+    groups: NDArray[np.int64] | None = None
     min_groups: int = len(SUBSETS)
     test_share: float = 0.2
+    validation_share: float = VALIDATION_SHARE
     for_test: NDArray[np.float64] | None = None
     every_class: bool = True
 
@@ -47,7 +52,10 @@ def deal_groups(plan: Plan, deal: Deal, rng: np.random.Generator) -> SplitTable 
     One line with the reason where there is none. A record that its group's side may not use is in
     no subset. Of the groups at least one is dealt to each side.
     """
-    names, group = np.unique(plan.columns[deal.column], return_inverse=True)
+    groups = deal.groups
+    if groups is None:
+        groups = plan.columns[deal.column]
+    names, group = np.unique(groups, return_inverse=True)
     if len(names) < deal.min_groups:
         return f"{len(names)} {deal.column} in the plan, and at least {deal.min_groups} are needed"
     classes, label = np.unique(plan.columns["label"], return_inverse=True)
@@ -58,7 +66,7 @@ def deal_groups(plan: Plan, deal: Deal, rng: np.random.Generator) -> SplitTable 
     for name, usable_classes in zip(SUBSETS, holds.any(axis=1) >= needed, strict=True):
         if not usable_classes.all():
             return f"a class has no record that may be used for {name}"
-    n_validation = max(1, round(VALIDATION_SHARE * len(names)))
+    n_validation = max(1, round(deal.validation_share * len(names)))
     n_test = max(1, round(deal.test_share * len(names)))
     if MAX_FOR_TESTS * len(names) >= MIN_TESTED:
         n_test = max(n_test, MIN_TESTED)

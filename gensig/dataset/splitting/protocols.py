@@ -16,7 +16,10 @@ from gensig.dataset.plan import Plan
 from gensig.dataset.splitting.dealing import Deal, deal_groups
 from gensig.dataset.splitting.splits import SUBSETS, SplitTable
 
+NEW_MACHINE = "new_machine"
 N_WINDOWS = 8
+MIN_MACHINES = 5  # groups that share neither gears nor gearbox
+MACHINE_VALIDATION_SHARE = 0.1  # of them: 70 / 10 / 20
 MIN_SPECIMENS = 4
 HELD_OUT = (
     0.25  # share of the records, or of a fault's records, whose values are held out
@@ -28,6 +31,8 @@ SEVERITY_TEST_SHARE = (
     0.4  # of the units, because a test uses a quarter of their faults only
 )
 
+# Ids of a machine and of what it is made of.
+MACHINE_COLUMNS = ("specimen_id", "gearbox_id", "unit_id")
 Mask = NDArray[np.bool_]
 Outcome = SplitTable | str
 HEALTHY = "[]"  # `faults_json` of a record without fault
@@ -53,12 +58,14 @@ class Protocol:
     every_class: bool = True
 
     def outcome(self, plan: Plan, seed: int) -> Outcome:
-        """Table of a plan, or one line with the reason why it cannot have one."""
+        """Table of a plan's examples, or one line with the reason why it cannot have one."""
         for column in ("label", *self.apart, *self.needs):
             if column not in plan.columns and self.apart:
                 return f"the plan has no column {column}"
         sequence = np.random.SeedSequence(seed, spawn_key=(self.stream,))
-        return self.make(plan, np.random.Generator(np.random.Philox(sequence)))
+        return self.make(
+            plan.examples(), np.random.Generator(np.random.Philox(sequence))
+        )
 
 
 def make_splits(plan: Plan, seed: int) -> dict[str, SplitTable]:
@@ -127,6 +134,49 @@ def _by_group(
     usable = np.ones((len(SUBSETS), plan.n_records), dtype=bool)
     deal = Deal(column=column, usable=usable, min_groups=min_groups)
     return deal_groups(plan, deal, rng)
+
+
+def _new_machine(plan: Plan, rng: np.random.Generator) -> Outcome:
+    """Machines dealt 70 / 10 / 20, none with gears or a gearbox of another subset."""
+    machine = _connected_machines(plan)
+    n_machines = len(np.unique(machine))
+    if n_machines < MIN_MACHINES:
+        remedy = "plan.machines=separate"
+        if n_machines == len(np.unique(plan.columns["unit_id"])):
+            remedy = f"plan.n_units={MIN_MACHINES} or more"
+        return (
+            f"the plan has {n_machines} group{'s' * (n_machines != 1)} of machines that share "
+            f"neither gears nor gearbox, and {MIN_MACHINES} are needed: {remedy}"
+        )
+    deal = Deal(
+        column="groups of machines",
+        groups=machine,
+        usable=np.ones((len(SUBSETS), plan.n_records), dtype=bool),
+        min_groups=MIN_MACHINES,
+        validation_share=MACHINE_VALIDATION_SHARE,
+    )
+    return deal_groups(plan, deal, rng)
+
+
+def _connected_machines(plan: Plan) -> NDArray[np.int64]:
+    """(record,) Number of the connected component of the record's machine.
+
+    Units are connected that share a set of gears or a gearbox, also through others.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    numbers, n_nodes = [], 0
+    for column in MACHINE_COLUMNS:
+        names, number = np.unique(plan.columns[column], return_inverse=True)
+        numbers.append(n_nodes + number)
+        n_nodes += len(names)
+    first, *others = numbers
+    ends = np.concatenate(others)
+    begins = np.tile(first, len(others))
+    edges = coo_array((np.ones(len(ends)), (begins, ends)), shape=(n_nodes, n_nodes))
+    component = connected_components(edges, directed=False)[1]
+    return component[first].astype(np.int64)
 
 
 def _cross_range(
@@ -257,6 +307,7 @@ def _partly_trained(
 
 
 PROTOCOLS = {
+    NEW_MACHINE: Protocol(stream=9012, make=_new_machine, apart=MACHINE_COLUMNS),
     "random_window_leaky": Protocol(stream=9001, make=_random_windows, apart=()),
     "by_unit": _by("unit_id", len(SUBSETS), 9002),
     "cross_specimen": _by("specimen_id", MIN_SPECIMENS, 9003),

@@ -26,6 +26,11 @@ def split_problems(protocol: str, table: SplitTable, plan: Plan) -> list[str]:
     problems = []
     if twice := _overlapping(record, table):
         problems.append(f"{protocol}: a part of record {ids[twice[0]]} is given twice")
+    references = ids[record[plan.is_reference[record]]]
+    if references.size:
+        problems.append(
+            f"{protocol}: record {references[0]} is a reference record, which no subset may have"
+        )
     known = PROTOCOLS.get(protocol)
     if known is None or not known.apart:
         return problems

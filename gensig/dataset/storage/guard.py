@@ -8,11 +8,11 @@ import numpy as np
 
 from gensig.dataset.columns import COLUMNS
 from gensig.dataset.schema import (
+    READABLE_VERSIONS,
     REQUIRED,
     REQUIRED_ATTRIBUTES,
     SAMPLE_TYPES,
     SCALES,
-    SCHEMA_VERSION,
     SIGNALS,
 )
 from gensig.dataset.storage.attributes import HDF5_ERRORS, decoded, read_attributes
@@ -247,10 +247,10 @@ def _check_attributes(file: h5py.File, path: Path) -> None:
             f"{path} has no root attribute {', '.join(missing)}; it is no gensig shard"
         )
     version, rate = attributes["schema_version"], attributes["sampling_rate_hz"]
-    if version != SCHEMA_VERSION:
+    if version not in READABLE_VERSIONS:
+        known = " and ".join(map(str, READABLE_VERSIONS))
         raise DatasetError(
-            f"{path} has format version {version}; this gensig reads {SCHEMA_VERSION}, get a "
-            "matching one"
+            f"{path} has format version {version}; this gensig reads {known}, get a matching one"
         )
     if not isinstance(rate, int | float) or not 0 < rate < float("inf"):
         raise DatasetError(

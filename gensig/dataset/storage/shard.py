@@ -13,17 +13,23 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from gensig.dataset.columns import COLUMNS, LIFE_COLUMNS, Column
+from gensig.dataset.columns import (
+    COLUMNS,
+    GEAR_COLUMNS,
+    IS_REFERENCE,
+    LIFE_COLUMNS,
+    Column,
+)
 from gensig.dataset.schema import (
     DEFAULTS,
     PARAMS,
     REQUIRED_ATTRIBUTES,
     SAMPLE_TYPES,
     SCALES,
-    SCHEMA_VERSION,
     SIGNALS,
     stored_reason,
     unit_in_file,
+    version_of,
 )
 from gensig.dataset.storage.attributes import Attribute, set_attribute
 from gensig.dataset.storage.compression import (
@@ -56,6 +62,8 @@ class ShardWriter:
     sample_type : str    'float32', or 'int16': accelerations become counts, and the writer adds
                          their scales
     lives : bool         whether records are snapshots of lives, with `LIFE_COLUMNS`
+    references : bool    whether some records are references, with `IS_REFERENCE`
+    gears : bool         whether records differ in their gears, with `GEAR_COLUMNS`
 
     Attributes
     ----------
@@ -82,11 +90,12 @@ class ShardWriter:
         compression: str = "none",
         sample_type: str = "float32",
         lives: bool = False,
+        references: bool = False,
+        gears: bool = False,
     ) -> None:
         self.path = Path(path)
         self.n_records = n_records
         self.signals = {name: tuple(shape) for name, shape in signals.items()}
-        self.attributes = {"schema_version": SCHEMA_VERSION, **attributes}
         self.compression = compression
         self.sample_type = sample_type
         self.scales: dict[str, str] = {}
@@ -96,6 +105,13 @@ class ShardWriter:
         if not lives:
             for name in LIFE_COLUMNS:
                 del self.columns[name]
+        if not references:
+            del self.columns[IS_REFERENCE]
+        if not gears:
+            for name in GEAR_COLUMNS:
+                del self.columns[name]
+        self.version = version_of(self.columns)
+        self.attributes = {"schema_version": self.version, **attributes}
         for name in params:
             full_name = f"{PARAMS}/{name}"
             self.columns[full_name] = Column(
@@ -316,10 +332,10 @@ def _check_declaration(writer: ShardWriter, params: Sequence[str]) -> None:
             f"{name}: root attributes missing: {missing or 'none'}; they and the signal "
             "acceleration are required"
         )
-    if writer.attributes["schema_version"] != SCHEMA_VERSION:
+    if writer.attributes["schema_version"] != writer.version:
         raise DatasetError(
             f"{name}: schema_version {writer.attributes['schema_version']}, this writer makes "
-            f"{SCHEMA_VERSION}"
+            f"{writer.version}"
         )
     channels = writer.attributes["channel_names"]
     n_channels = writer.signals["acceleration"][0]

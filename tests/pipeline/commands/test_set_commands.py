@@ -46,7 +46,7 @@ def test_plan_predicts_without_writing(gensig, tmp_path):
     said, notes = gensig(f"{line} out=x")
     assert "records    400" in said
     assert "healthy 100" in said
-    assert re.fullmatch(r"making \d+ of 400 records to time them\n", notes)
+    assert re.fullmatch(r"making \d+ of 500 records to time them\n", notes)
     assert not list(tmp_path.iterdir())
     said, notes = gensig(f"{line} fault=crack")
     assert "crack 400" in said

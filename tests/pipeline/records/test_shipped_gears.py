@@ -11,6 +11,10 @@ from gensig.plan.request import read_request
 from gensig.systems.registry import read_pair
 
 INTERRUPTED = "harbin_38_55"  # contact ratio below 1, as its paper prints it
+DAMPING = (
+    "quality.support_damping_ratio_low=0.03",
+    "quality.support_damping_ratio_high=0.03",
+)
 LINES = {
     "two_stage_gearbox": (32, 96, 48, 80),
     "uconn_two_stage": (32, 80, 48, 64),
@@ -21,7 +25,10 @@ LINES = {
 def words_for(name):
     """The gears with the system that takes them."""
     words = [f"gear={name}"]
-    if read_request(words).config["gear"]["helix_angle_deg"]:
+    gear = read_request(words).config["gear"]
+    if gear["pinion"]["support"]["stiffness_x_n_per_m"] is None:
+        words += ["system.supports=bearings", *DAMPING]
+    if gear["helix_angle_deg"]:
         words += ["system=helical_pair", "mesh.n_slices=8"]
     return words
 

@@ -8,15 +8,21 @@ import pytest
 from dataset_samples import build, row_of
 from numpy.testing import assert_allclose
 
-from gensig.dataset.columns import COLUMNS, LIFE_COLUMNS, Column
+from gensig.dataset.columns import (
+    COLUMNS,
+    GEAR_COLUMNS,
+    IS_REFERENCE,
+    LIFE_COLUMNS,
+    Column,
+)
 from gensig.dataset.folder.layout import read_manifest
 from gensig.dataset.reader import open_dataset
 from gensig.dataset.schema import (
+    READABLE_VERSIONS,
     REQUIRED,
     REQUIRED_ATTRIBUTES,
     SAMPLE_TYPES,
     SCALES,
-    SCHEMA_VERSION,
     SIGNALS,
 )
 from gensig.errors import DatasetError
@@ -39,7 +45,8 @@ def test_every_data_set_is_described_in_a_row_of_its_own():
         r"<!-- columns:.*?-->\n.*?\n.*?\n(.*)\n.*?\n<!-- end", TEXT, re.DOTALL
     )
     assert result[1].splitlines() == rows
-    assert f"version {SCHEMA_VERSION}\n" in TEXT.splitlines(keepends=True)[0]
+    known = " and ".join(map(str, READABLE_VERSIONS))
+    assert f"versions {known}\n" in TEXT.splitlines(keepends=True)[0]
 
 
 def test_attributes_keys_and_protocols_are_named(folder):
@@ -54,8 +61,9 @@ def test_attributes_keys_and_protocols_are_named(folder):
 def test_shards_are_as_described(folder):
     with h5py.File(folder / "shards" / "shard-00000.h5") as file:
         for name, column in COLUMNS.items():
-            assert (name in file) == (name not in LIFE_COLUMNS)
-            assert name in LIFE_COLUMNS or file[name].dtype == column.storage_dtype
+            is_optional = name in (*LIFE_COLUMNS, *GEAR_COLUMNS, IS_REFERENCE)
+            assert (name in file) == (not is_optional)
+            assert is_optional or file[name].dtype == column.storage_dtype
         for name in REQUIRED:
             assert file[name].shape[0] == 10
         assert h5py.check_string_dtype(file["record_id"].dtype).encoding == "ascii"

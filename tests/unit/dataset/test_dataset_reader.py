@@ -18,7 +18,13 @@ def test_facts(data):
     assert data.channel_names == ["pinion_y", "wheel_ü"]
     assert data.class_names == CLASSES
     assert data.attributes["n_teeth_wheel"] == 84
-    names = ("by_unit", "cross_gearbox", "cross_specimen", "random_window_leaky")
+    names = (
+        "new_machine",
+        "by_unit",
+        "cross_gearbox",
+        "cross_specimen",
+        "random_window_leaky",
+    )
     assert data.protocols == list(names)
     columns = {"label", "params/crack_depth_mm", "noise_power"}
     assert columns <= set(data.column_names)

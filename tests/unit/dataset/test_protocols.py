@@ -41,6 +41,12 @@ def random_plan(seed, **fixed):
     severity = np.select([label == 0, label == 3], [0.0, 1.0], draw(0.1, 0.8))
     speed, torque = draw(1000.0, 2000.0)[condition], draw(10.0, 40.0)[condition]
     snr = draw(0.0, 30.0)[condition] if rng.random() < 0.8 else np.full(n, np.nan)
+    specimen, gearbox = unit // n_gearboxes, unit % n_gearboxes
+    machines = fixed.get("machines", rng.choice(["crossed", "paired", "separate"]))
+    if machines == "paired":  # two units share their gears
+        specimen, gearbox = unit // 2, unit
+    elif machines == "separate":
+        specimen, gearbox = unit, unit
     return Plan(
         columns={
             "record_id": record_ids(n),
@@ -48,8 +54,8 @@ def random_plan(seed, **fixed):
             "row": row,
             "label": label,
             "unit_id": np.char.add("unit-", unit.astype(str)),
-            "gearbox_id": np.char.add("gearbox-", (unit % n_gearboxes).astype(str)),
-            "specimen_id": np.char.add("specimen-", (unit // n_gearboxes).astype(str)),
+            "gearbox_id": np.char.add("gearbox-", gearbox.astype(str)),
+            "specimen_id": np.char.add("specimen-", specimen.astype(str)),
             "faults_json": np.where(label == 0, "[]", '[{"kind": "crack"}]'),
             "severity": severity,
             "speed_set_rpm": speed,

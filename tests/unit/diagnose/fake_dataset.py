@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from gensig.errors import DatasetError
+
 N_TEETH = {"n_teeth_pinion": 23, "n_teeth_wheel": 84}
 CLASSES = ("healthy", "crack", "pitting", "missing_tooth")
 NAMES = (*CLASSES, "wear")
@@ -44,7 +46,7 @@ class FakeDataset:
         self.signal_names = ["acceleration", "healthy_twin"][: 1 + twins]
         self.protocols = ("by_unit", "random_window_leaky")
         few = "1 specimen_id in the plan, and at least 4 are needed"
-        self.left_out = {"cross_specimen": few}
+        self.left_out = {"cross_specimen": few, "new_machine": few}
         self.usable = np.ones(n, dtype=bool)
         self.sham, self.strength, self.noise, self.seed = sham, strength, noise, seed
         self.n_samples = round(duration * sampling_rate)
@@ -67,6 +69,14 @@ class FakeDataset:
 
     def column(self, name):
         return self.columns[name]
+
+    def n_teeth(self, gear):
+        name = f"n_teeth_{gear}"
+        if name in self.columns:
+            return np.asarray(self.columns[name])
+        if name not in self.attributes:
+            raise DatasetError(f"neither column nor attribute {name}")
+        return np.full(self.n_records, self.attributes[name])
 
     def signals(
         self, record_index, start=0, stop=None, channels=None, *, name="acceleration"
@@ -124,4 +134,6 @@ class CompleteDataset(FakeDataset):
             "start_tooth_wheel": rng.integers(N_TEETH["n_teeth_wheel"], size=n),
             "start_phase": rng.uniform(size=n),
             "integration_error": rng.uniform(1e-5, 1e-4, n),
+            "condition_id": np.char.add("c", (np.arange(n) // 4).astype(str)),
+            "speed_set_rpm": np.repeat(rng.uniform(1000, 2000, -(-n // 4)), 4)[:n],
         }

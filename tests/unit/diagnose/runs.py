@@ -11,8 +11,15 @@ from diagnose.settings import settings_from
 from gensig.errors import DatasetError
 from gensig.options.compose import compose
 
-SMALL_CNN = ("model.widths=[8,16]", "model.kernels=[32,5]", "model.strides=[8,4]")
+SMALL_CNN = (
+    "model=cnn",
+    "model.widths=[8,16]",
+    "model.kernels=[32,5]",
+    "model.strides=[8,4]",
+)
+PROTOCOLS = "protocols=[by_unit,cross_specimen,random_window_leaky]"
 QUICK = (
+    PROTOCOLS,
     "window_samples=1200",
     "stride_samples=1000",
     "n_threads=1",
@@ -23,6 +30,7 @@ QUICK = (
 FAST = (*QUICK, *SMALL_CNN)
 LIFE = (
     "task=remaining_life",
+    PROTOCOLS,
     "window_samples=1600",
     "stride_samples=1600",
     "epochs=5",

@@ -9,7 +9,8 @@ from diagnose.cli import main
 from diagnose.data.windows import load_windows, subset_segments, task_of
 from diagnose.scoring.metrics import balanced_accuracy, confusion_by_unit
 from diagnose.studies.jobs import Job, run_jobs
-from diagnose.studies.study import settings_for, task_from
+from diagnose.studies.network_choice import settings_for
+from diagnose.studies.study import task_from
 
 SMALL = [
     "window_samples=1200",
@@ -36,8 +37,9 @@ def task_on(dataset, window=1200, stride=None, normalise="rms", **chosen):
 
 def study_of(dataset, *overrides):
     """Task and settings of a study."""
-    settings = settings_for(dataset, settings_of(*overrides))
-    return task_from(dataset, settings), settings
+    settings = settings_of(*overrides)
+    task = task_from(dataset, settings)
+    return task, settings_for(task, settings)[0]
 
 
 def two_channels(**changes):

@@ -59,7 +59,7 @@ def test_train_writes_what_it_promises(trained, by_unit):
         "by_severity.csv comparisons.csv confusion_by_unit.csv confusion_by_unit.png "
         "confusion_random_window_leaky.csv confusion_random_window_leaky.png "
         "detection_by_unit.png metrics.json models predictions.csv reliability.png "
-        "report.html scores.csv scores.png window_length.png"
+        "report.html report.md scores.csv scores.png window_length.png"
     )
     metrics = metrics_of(trained)
     assert list(metrics["protocols"]) == ["by_unit", "random_window_leaky"]
@@ -68,8 +68,14 @@ def test_train_writes_what_it_promises(trained, by_unit):
     page = (trained / "report.html").read_text()
     assert "cross_specimen is left out: 1 specimen" in page
     methods = by_unit["methods"]
-    judged = {"cnn", "label_shuffle", "indicators", "rms_threshold"}
-    probes = {"indicators_without_level", "metadata_probe", "result_probe", "chance"}
+    judged = {"cnn", "label_shuffle", "indicators", "rms_threshold", "tooth_logistic"}
+    probes = {
+        "indicators_without_level",
+        "metadata_probe",
+        "result_probe",
+        "rotation_probe",
+        "chance",
+    }
     assert set(methods) == judged | probes
     for name in judged:
         value = methods[name]["balanced_accuracy"]
@@ -119,8 +125,8 @@ def visible_text(page):
 def test_the_page_stands_alone_and_says_what_matters(trained):
     page = (trained / "report.html").read_text()
     text = visible_text(page)
-    methods = ("CNN", "indicators", "RMS threshold", "label shuffle", "chance")
-    for word in (*methods, "Caveats", "4 test unit(s)"):
+    methods = ("cnn network", "indicators", "RMS threshold", "label shuffle", "chance")
+    for word in (*methods, "Caveats", "only 4 machines in the test part"):
         assert word in text
     order = ("by_unit", "random_window_leaky (LEAKY)", "Which faults are found")
     assert sorted(order, key=text.index) == [*order]
@@ -229,7 +235,7 @@ TRAIN = "train data=good out=OUT"
         (f"{TRAIN} epoch=3", "epochs"),
         (f"{TRAIN} model=cnnn", "cnn"),
         (f"{TRAIN} normalise=rms,none", "-m"),
-        (f"{TRAIN} window_samples=100000", "longest stretch"),
+        (f"{TRAIN} model=cnn window_samples=100000", "longest stretch"),
         ("train --fast", "no flag '--fast'"),
         ("evaluate data=good", "model_dir is required"),
         ("evaluate data=good modeldir=x", "did you mean model_dir"),

@@ -11,7 +11,13 @@ from small_studies import task_on
 
 from diagnose.baselines.base import Source
 from diagnose.baselines.oracle import oracle_table, oracle_windows
-from diagnose.baselines.probe import EXCLUDED, LABELS, probe_values, probed_columns
+from diagnose.baselines.probe import (
+    EXCLUDED,
+    LABELS,
+    probe_values,
+    probed_columns,
+    rotation_values,
+)
 from diagnose.cli import main
 from diagnose.data.window_input import Windows
 from diagnose.data.windows import load_windows, subset_segments
@@ -23,6 +29,7 @@ from diagnose.studies.controls import chosen_oracle, control_jobs
 from diagnose.studies.study import task_from
 from gensig.dataset.columns import COLUMNS
 from gensig.dataset.schema import SIGNALS
+from gensig.errors import ConfigError
 
 FAST = (*QUICK, "protocols=[by_unit]", "baselines=[rms_threshold]")
 HOWTO = Path(__file__).parents[3] / "docs" / "howto" / "controls.md"
@@ -115,7 +122,7 @@ def test_a_method_over_itself_is_one_and_the_interval_grows_with_the_units_sprea
         return ratio_with_interval("balanced_accuracy", one, other, **resampling)
 
     same = ratio(counts[:1], counts[:1])
-    assert same == {"mean": 1.0, "low": 1.0, "high": 1.0}
+    assert same == {"mean": 1.0, "low": 1.0, "high": 1.0, "too_few": None}
     result = ratio(counts, perfect)
     assert result["low"] < result["mean"] < result["high"] < 1
     assert result["mean"] == pytest.approx(hits.mean() / 10)
@@ -135,8 +142,9 @@ def test_nothing_that_is_a_label_is_probed(results):
     labels = {"label", "label_name", "faults_json", "severity", "fault_gear"}
     hidden = {"fault_tooth", "detectability", "params/fault.depth_mm", *EXCLUDED}
     assert not probed & (labels | hidden)
-    assert {"speed_rpm", "snr_db", "unit_id", "start_phase", "torque_nm"} <= probed
-    assert ("integration_error" in probed) == ("clipped" in probed) == results
+    assert {"speed_set_rpm", "snr_db", "unit_id", "start_phase", "torque_nm"} <= probed
+    for name in ("integration_error", "clipped", "speed_rpm", "mesh_frequency_hz"):
+        assert (name in probed) == results
 
 
 def test_what_is_left_out_has_a_role_of_its_own():
@@ -160,9 +168,8 @@ def test_the_place_in_the_file_is_probed():
     np.testing.assert_array_equal(in_condition, place % 4)
 
 
-def test_a_leak_is_found_and_where_there_is_none_the_probe_is_at_chance():
-    """Classes come in turn: the index gives the class; shuffled, it does not."""
-    dataset = small(n_units=24, records_per_unit=8)
+def share_right(dataset, name):
+    """Share of the test records that a probe recognises."""
     task = task_on(dataset)
     source = Source(
         task=task,
@@ -172,11 +179,17 @@ def test_a_leak_is_found_and_where_there_is_none_the_probe_is_at_chance():
         windows=dict,
         caches={},
     )
+    (result,) = baseline_predictions(source, [name])
+    assert result.method == name
+    return np.mean(result.predicted == task.labels()[result.record])
+
+
+def test_a_leak_is_found_and_where_there_is_none_the_probe_is_at_chance():
+    """Classes come in turn: the index gives the class; shuffled, it does not."""
+    dataset = small(n_units=24, records_per_unit=8)
 
     def share(name):
-        (result,) = baseline_predictions(source, [name])
-        assert result.method == name
-        return np.mean(result.predicted == task.labels()[result.record])
+        return share_right(dataset, name)
 
     assert share("metadata_probe") == 1.0
     label = np.random.default_rng(3).permutation(dataset.columns["label"])
@@ -187,18 +200,41 @@ def test_a_leak_is_found_and_where_there_is_none_the_probe_is_at_chance():
     assert share("result_probe") == 1.0
 
 
+def test_a_speed_that_follows_the_fault_is_read_by_the_rotation_probe_alone():
+    """Set-points vary by far more than what a fault takes of the actual speed."""
+    dataset = small(n_units=24, records_per_unit=8)
+    rng, n = np.random.default_rng(3), dataset.n_records
+    label = rng.permutation(dataset.columns["label"])
+    set_speed = rng.uniform(1200, 2400, n)
+    dataset.columns |= {"label": label, "speed_set_rpm": set_speed}
+    dataset.columns["speed_rpm"] = set_speed
+    assert share_right(dataset, "rotation_probe") < 0.45
+    dataset.columns["speed_rpm"] = set_speed * (1 - 1e-4 * label)
+    assert share_right(dataset, "rotation_probe") > 0.9
+    assert share_right(dataset, "metadata_probe") < 0.45
+
+
+def test_the_rotation_probe_names_what_it_misses():
+    dataset = small()
+    del dataset.columns["speed_rpm"]
+    with pytest.raises(ConfigError, match=r"no column speed_rpm.*metadata_probe=false"):
+        rotation_values(dataset)
+
+
 # ---- the jobs
 
 
 def test_every_control_has_its_jobs_and_only_on_clean_protocols():
-    settings = settings_of(*FAST, "normalise=both", "seeds=[3,4]", "protocols=null")
+    settings = settings_of(
+        *FAST, "reference=none", "normalise=both", "seeds=[3,4]", "protocols=null"
+    )
     task = task_from(small(twins=True), settings)
     jobs = control_jobs(task, settings, ["by_unit"])
     networks = [("level_kept", 3), ("level_kept", 4), ("oracle", 3)]
     expected = [("probe", None), ("oracle", None), *networks]
     assert [(job.control, job.seed) for job in jobs] == expected
     assert control_jobs(task, settings, []) == []
-    off = settings_of(*FAST, "oracle=false", "metadata_probe=false")
+    off = settings_of(*FAST, "reference=none", "oracle=false", "metadata_probe=false")
     assert control_jobs(task, off, ["by_unit"]) == []
     without = task_from(small(), settings)
     jobs = control_jobs(without, settings, ["by_unit"])
@@ -247,8 +283,9 @@ def by_unit(out):
 def test_a_study_with_all_of_them(complete):
     result = by_unit(complete)
     methods = result["methods"]
-    oracles = {"oracle_network", "oracle_indicators"}
-    others = {"label_shuffle", "metadata_probe", "result_probe", "level_kept"}
+    oracles = {"oracle_network", "oracle_indicators", "oracle_teeth"}
+    others = {"label_shuffle", "metadata_probe", "level_kept"}
+    others |= {"rotation_probe", "result_probe"}
     shams = {"sham", "sham_rms_threshold"}
     rest = {"cnn", "rms_threshold", "oracle", "chance"}
     assert set(methods) == oracles | others | shams | rest

@@ -12,6 +12,7 @@ WHOLE = "must be a whole number of at least 1"
 LIST = "must be false or a list of different names"
 REFUSALS = [
     ("epochs=0", f"epochs {WHOLE}"),
+    ("patience=-1", "patience must be a whole number of at least 0"),
     ("n_threads=0", f"n_threads {WHOLE}"),
     ("window_samples=0", f"window_samples {WHOLE}"),
     ("window_samples=1.5", WHOLE),
@@ -33,10 +34,11 @@ REFUSALS = [
     ("oracle=true", "oracle must be auto or false"),
     ("sham=3", "sham must be the folder of a data set made with plan.sham=true"),
     ("features=some", "features must be basic or all"),
-    ("baselines=[minirockets]", f"baselines {LIST}"),
+    ("baselines=[minirockets]", "no baseline 'minirockets'; did you mean 'minirocket'"),
+    ("baselines=[reference]", "no baseline 'reference'; there is .*, sound_record"),
     ("baselines=[minirocket,minirocket]", f"baselines {LIST}"),
     ("baselines=true", f"baselines {LIST}"),
-    ("heads=[tooth]", f"heads {LIST} out of severity, gear"),
+    ("heads=[tooth]", "no head 'tooth'; there is severity, gear"),
     ("heads=[gear,gear]", f"heads {LIST}"),
     ("classes={a: 1}", r"classes must be a list, for instance classes=\[a,b\]"),
     *(

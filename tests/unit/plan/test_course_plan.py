@@ -46,8 +46,11 @@ class TestTurns:
                 "fault=compound fault.parts=[{kind:crack},{kind:wear,gear:wheel}]",
                 OF_THE_WHEEL,
             ),
-            ("experiment=quickstart", 0.5),
-            ("experiment=quickstart operating.speed_rpm=600", 1.0),
+            (
+                "experiment=quickstart",
+                10 / 20 * 84 / 23,
+            ),  # the wheel may have the fault
+            ("experiment=quickstart operating.speed_rpm=600", 84 / 23),
             (
                 "plan.vary={operating.speed_rpm:{distribution:choice,values:[1800,900]}}",
                 10 / 15,

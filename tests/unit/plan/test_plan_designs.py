@@ -6,6 +6,7 @@ from collections import Counter, defaultdict
 
 import numpy as np
 import pytest
+from crossed_plan import CROSSED
 from numpy.testing import assert_allclose, assert_array_equal
 
 from gensig.dataset.plan import plan_text
@@ -29,7 +30,7 @@ VARY = {"operating.speed_rpm": SPEED, "operating.torque_nm": TORQUE}
 
 @pytest.fixture(scope="module")
 def quickstart():
-    return read_request(["experiment=quickstart"]).config
+    return read_request(["experiment=quickstart", *CROSSED]).config
 
 
 @pytest.fixture(scope="module")

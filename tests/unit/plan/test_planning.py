@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+from crossed_plan import CROSSED
 from numpy.testing import assert_allclose, assert_array_equal
 
 from gensig.dataset.plan import plan_text
@@ -29,7 +30,7 @@ SHARED = (
 
 @pytest.fixture(scope="module")
 def quickstart():
-    return read_request(["experiment=quickstart"]).config
+    return read_request(["experiment=quickstart", *CROSSED]).config
 
 
 @pytest.fixture(scope="module")
@@ -160,7 +161,7 @@ class TestRefusals:
         [
             (
                 [
-                    "gear.pinion.n_teeth",
+                    "gear.rated_torque_nm",
                     "seed",
                     "operating.turns",
                     "plan.n_records",

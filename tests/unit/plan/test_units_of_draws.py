@@ -44,6 +44,14 @@ NUMBERS = {
     "dropped_run_samples",
     "course_seed",
     "drift_scatter",
+    "addendum_coefficient",
+    "clearance_coefficient",
+    "cutter_tip_radius_coefficient",
+    "n_teeth",
+    "profile_shift",
+    "n_balls",
+    "inner_groove_conformity",
+    "outer_groove_conformity",
 }
 
 

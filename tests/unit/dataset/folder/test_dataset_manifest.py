@@ -88,7 +88,13 @@ def test_folder_holds_what_is_needed(folder, plan):
         "index.h5",
         "README.md",
     )
-    protocols = ("by_unit", "cross_gearbox", "cross_specimen", "random_window_leaky")
+    protocols = (
+        "new_machine",
+        "by_unit",
+        "cross_gearbox",
+        "cross_specimen",
+        "random_window_leaky",
+    )
     assert set(_tree(folder)) == {
         *files,
         "croissant.json",
@@ -226,7 +232,7 @@ def test_index_sources_are_relative(folder):
         (["shards", 0, "state"], "planned", "not every shard"),
         (["shards", 0, "n_failed"], 11, "failed of"),
         (["shards"], {}, "no list"),
-        (["schema_version"], 2, "format version 2"),
+        (["schema_version"], 3, "format version 3"),
     ],
 )
 def test_forged_manifest_is_refused_in_one_line(folder, path, value, message):

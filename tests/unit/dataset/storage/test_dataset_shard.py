@@ -195,7 +195,7 @@ def _samples(kind, **more):
         (_samples("u2"), "wants float32 or int16"),
         (_samples("i2"), "no data set acceleration_scale"),
         (_samples("f8", scaleoffset=2), "allowed are gzip, lzf and blosc2"),
-        (lambda file: file.attrs.update(schema_version=2), "format version 2"),
+        (lambda file: file.attrs.update(schema_version=3), "format version 3"),
         (lambda file: file.attrs.update(sampling_rate_hz=np.nan), "positive"),
         (lambda file: file.attrs.update(channel_names=3), "list of text"),
         (lambda file: file.pop("status"), "no data set status"),

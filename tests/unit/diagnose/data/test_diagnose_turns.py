@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 import torch
 from fake_dataset import FakeDataset
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from small_studies import LEARNS, accuracy, run, study_of
 
+from diagnose.data.packed_turns import HEADER
 from diagnose.data.targets import (
     fault_positions,
     further_loss,
@@ -57,7 +58,13 @@ def dataset():
 
 @pytest.fixture(scope="module")
 def turns():
-    return torch.randn(3, 1, 32 * 108, generator=torch.Generator().manual_seed(0))
+    random = torch.randn(3, 1, 32 * 108, generator=torch.Generator().manual_seed(0))
+    return torch.cat([header(), random], dim=-1)
+
+
+def header():
+    """Tooth counts before the turns of three windows."""
+    return torch.tensor(TEETH, dtype=torch.float32).expand(3, 1, HEADER)
 
 
 def test_a_record_is_one_input_and_in_training_its_halves_too(dataset):
@@ -68,27 +75,29 @@ def test_a_record_is_one_input_and_in_training_its_halves_too(dataset):
     more = inputs.load(task, segments, training=True)
     assert settings.model["n_teeth"] == list(TEETH)
     assert len(more) == 3 * len(whole) == 3 * len(segments.record)
-    assert inputs.n_points(1) == 32 * 108
+    assert inputs.example(1, 1).shape == (1, 1, HEADER + 32 * 108)
     packed = whole.cut(np.arange(5))
-    assert packed.shape == (5, 1, 32 * 108)
-    assert_allclose(np.mean(packed**2, axis=-1), 1.0, rtol=1e-4)
+    assert packed.shape == (5, 1, HEADER + 32 * 108)
+    assert_array_equal(packed[:, 0, :HEADER], [TEETH] * 5)
+    assert_allclose(np.mean(packed[..., HEADER:] ** 2, axis=-1), 1.0, rtol=1e-4)
     assert set(np.unique(more.record)) == set(segments.record)
 
 
 def test_scores_do_not_depend_on_which_tooth_comes_first(dataset, turns):
     model = make_model(dataset, "model.gears=[pinion,wheel]")
-    driving, driven, mesh = turns.split([32 * 23, 32 * 84, 32], dim=-1)
+    lengths = [HEADER, 32 * 23, 32 * 84, 32]
+    _, driving, driven, mesh = turns.split(lengths, dim=-1)
     rolled = [driving.roll(5 * 32, -1), driven.roll(-9 * 32, -1), mesh]
     other = driving.reshape(3, 1, 23, 32)[:, :, torch.randperm(23)].reshape(3, 1, -1)
     for parts, same in ((rolled, True), ([other, driven, mesh], False)):
-        scores = model(torch.cat(parts, dim=-1))
+        scores = model(torch.cat([header(), *parts], dim=-1))
         assert torch.allclose(scores, model(turns), rtol=1e-4, atol=1e-5) == same
 
 
 @pytest.mark.parametrize(("gears", "same"), [("pinion", True), ("wheel", False)])
 def test_a_gear_that_is_left_out_has_no_effect(dataset, turns, gears, same):
     changed = turns.clone()
-    changed[..., 32 * 23 : -32] += 1.0
+    changed[..., HEADER + 32 * 23 : -32] += 1.0
     model = make_model(dataset, f"model.gears=[{gears}]")
     assert torch.allclose(model(turns), model(changed)) == same
 
@@ -105,7 +114,9 @@ def test_the_position_of_a_fault_moves_with_the_window():
 
     def positions(passages):
         dataset = SimpleNamespace(column_names=list(columns), column=columns.get)
-        return fault_positions(dataset, np.arange(4), np.array(passages), TEETH)
+        return fault_positions(
+            dataset, np.arange(4), np.array(passages), np.tile(TEETH, (4, 1))
+        )
 
     first = positions([0.0] * 4)
     assert_allclose(first, [22.75, 77.5, np.nan, np.nan])
@@ -170,7 +181,7 @@ def test_a_visible_fault_is_learnt_stored_evaluated_and_predicted(dataset, tmp_p
     severity = prediction.heads["severity"][0, label]
     assert_allclose(result["severity"], severity, rtol=1e-3)
     assert (result["gear"] != "none") == (", severity" in network.line(result))
-    with pytest.raises(ConfigError, match="say --speed-rpm"):
+    with pytest.raises(ConfigError, match="give --speed-rpm"):
         predict_recording(network, None, replace(source, speed_rpm=None))
 
 

@@ -7,7 +7,8 @@ from small_studies import settings_of
 
 from diagnose.data.protocols import choose_protocols
 from diagnose.data.window_choice import LEAST, TURNS, chosen_window
-from diagnose.studies.study import plan_study, settings_for, task_from
+from diagnose.studies.network_choice import settings_for
+from diagnose.studies.study import plan_study, task_from
 from gensig.errors import ConfigError
 
 DEFAULTS = ["window_samples=null", "stride_samples=null"]
@@ -63,7 +64,8 @@ def test_a_window_is_never_longer_than_a_record():
 def test_task_and_settings_agree_and_a_given_length_stays(window, words):
     dataset = at_speed(300, gear="pinion", duration=1.0)
     settings = settings_of(*DEFAULTS, *words)
-    for made in (task_from(dataset, settings), settings_for(dataset, settings)):
+    task = task_from(dataset, settings)
+    for made in (task, settings_for(task, settings)[0]):
         assert (made.window_samples, made.stride_samples) == (window, window)
 
 
@@ -80,6 +82,6 @@ def test_a_split_that_cuts_records_shorter_is_left_out_with_the_reason():
     protocols, left_out = choose_protocols(task, settings.protocols)
     assert protocols == ("by_unit",)
     assert "hold no window of" in left_out["random_window_leaky"]
-    assert plan_study(task, settings_for(dataset, settings))[0] == ("by_unit",)
+    assert plan_study(task, settings_for(task, settings)[0])[0] == ("by_unit",)
     with pytest.raises(ConfigError, match="hold no window of"):
         choose_protocols(task, ("random_window_leaky",))

@@ -9,12 +9,12 @@ from fake_dataset import FakeDataset
 from numpy.testing import assert_allclose
 from small_studies import LEARNS, accuracy, run, settings_of, study_of, windows_of
 
-from diagnose.networks.registry import build_model, check_window
+from diagnose.networks.registry import build_model, check_example, input_of
 from diagnose.networks.spectrum import log_spectrum
 from diagnose.studies.study import plan_study
 from diagnose.training.classes import Classes, predict_windows
 from diagnose.training.train import device_of, train_network
-from gensig.errors import ConfigError
+from gensig.errors import ConfigError, SimulationError
 from gensig.options.compose import compose
 
 NAMES = ("cnn", "wdcnn", "spectrum")
@@ -56,13 +56,13 @@ def test_wdcnn_has_the_published_sizes():
 @pytest.mark.parametrize("shape", [(1, 1024), (4, 6400), (2, 5001)])
 def test_scores_have_their_shape_for_any_window(name, shape):
     model = make_model(name, n_channels=shape[0])
-    check_window(model, *shape)
+    check_example(model, np.zeros((1, *shape), dtype=np.float32))
     assert model(torch.zeros(3, *shape)).shape == (3, 4)
 
 
 def test_a_window_too_short_for_the_network_is_refused_before_training(dataset):
     with pytest.raises(ConfigError, match="window_samples=1023 is too short"):
-        check_window(make_model("wdcnn"), 1, 1023)
+        check_example(make_model("wdcnn"), np.zeros((1, 1, 1023), dtype=np.float32))
     with pytest.raises(ConfigError, match="window_samples=500 is too short"):
         plan_study(*study_of(dataset, "model=wdcnn", "window_samples=500"))
 
@@ -100,7 +100,7 @@ def test_a_visible_fault_is_learnt(name, dataset):
 
 def test_the_last_epoch_is_kept_with_the_best_one(dataset):
     """With wrong validation labels learning increases the loss, and an early epoch is the best."""
-    task, settings = study_of(dataset, *LEARNS, "epochs=5", "patience=5")
+    task, settings = study_of(dataset, "model=cnn", *LEARNS, "epochs=5", "patience=5")
     train, validation = windows_of(task, "train", "validation")
     wrong = dataclasses.replace(validation, label=1 - validation.label)
     target = Classes(n_classes=2)
@@ -118,6 +118,42 @@ def test_the_last_epoch_is_kept_with_the_best_one(dataset):
     training = trained(validation)
     is_last = training.best_epoch == len(training.validation_loss)
     assert (training.last_model is None) == is_last
+
+
+def test_without_patience_every_epoch_runs_and_the_last_weights_are_kept(dataset):
+    """With wrong validation labels the loss rises, so that early stopping would end at once."""
+    task, settings = study_of(dataset, "model=cnn", *LEARNS, "epochs=5", "patience=1")
+    train, validation = windows_of(task, "train", "validation")
+    wrong = dataclasses.replace(validation, label=1 - validation.label)
+    stopped, whole = (
+        train_network(
+            train,
+            wrong,
+            target=Classes(n_classes=2),
+            settings=dataclasses.replace(settings, patience=patience),
+            seed=0,
+        )
+        for patience in (1, 0)
+    )
+    assert len(stopped.validation_loss) < 5
+    assert whole.best_epoch == len(whole.validation_loss) == 5
+    assert whole.last_model is None
+    assert whole.validation_loss[-1] > min(whole.validation_loss)
+
+
+def test_a_last_epoch_that_diverges_is_refused_without_patience(dataset, monkeypatch):
+    task, settings = study_of(dataset, "model=cnn", *LEARNS, "epochs=2", "patience=0")
+    train, validation = windows_of(task, "train", "validation")
+    losses = iter([0.5, np.nan])
+    monkeypatch.setattr(Classes, "record_loss", lambda *_: next(losses))
+    with pytest.raises(SimulationError, match="diverged before its last epoch; reduce"):
+        train_network(
+            train,
+            validation,
+            target=Classes(n_classes=2),
+            settings=settings,
+            seed=0,
+        )
 
 
 @pytest.mark.parametrize(
@@ -144,10 +180,11 @@ def test_networks_refuse(name, changes, message):
 
 
 def test_the_default_network_is_small():
-    config = compose("train", ["data=x", "out=y"])["model"]
+    config = compose("train", ["data=x", "out=y"]).section("model")
     model = build_model(config, n_channels=4, n_classes=4)
     assert sum(parameter.numel() for parameter in model.parameters()) < 100_000
-    assert model(torch.zeros(2, 4, 6400)).shape == (2, 4)
+    example = torch.from_numpy(input_of(config).example(4, 1))
+    assert model(example).shape == (1, 4)
 
 
 @pytest.mark.parametrize("present", [False, True])

@@ -10,7 +10,12 @@ from diagnose.studies.study import plan_study, score_predictions
 from diagnose.training.classes import with_shuffled_labels
 from gensig.errors import ConfigError
 
-MODEL = ["model.widths=[12,24]", "model.kernels=[32,5]", "model.strides=[8,4]"]
+MODEL = [
+    "model=cnn",
+    "model.widths=[12,24]",
+    "model.kernels=[32,5]",
+    "model.strides=[8,4]",
+]
 BY_UNIT = ("by_unit",)
 
 
@@ -40,6 +45,15 @@ def test_a_visible_fault_is_learnt_above_chance(study):
 def test_shuffled_labels_stay_at_chance_within_their_interval(study):
     result = score(study, "label_shuffle")
     assert result["low"] <= 0.5 <= result["high"]
+
+
+def test_the_shuffle_judges_a_network_that_learnt_its_labels(study):
+    """All epochs run; a network of the first ones would name one class and could show no leak."""
+    _, settings, predictions = study
+    for trained in predictions:
+        if trained.method == "label_shuffle":
+            assert trained.best_epoch == len(trained.validation_loss) == settings.epochs
+            assert np.unique(trained.predicted).size == 2
 
 
 def test_shuffled_labels_say_nothing_and_keep_records_whole(study):

@@ -10,7 +10,7 @@ from small_studies import run, study_of
 
 from diagnose.data.inputs import RecordedSignal
 from diagnose.data.windows import subset_segments
-from diagnose.networks.registry import MODELS, build_model, check_window, input_of
+from diagnose.networks.registry import MODELS, build_model, check_example, input_of
 from diagnose.training.classes import predict_windows
 from diagnose.training.store import load_model, model_description, save_model
 
@@ -19,6 +19,7 @@ OPTIONS = {
     "wdcnn": ["model=wdcnn"],
     "spectrum_cnn": ["model=spectrum"],
     "order_cnn": ["model=order", "model.samples_per_tooth=16", "model.kernels=[9,5,5]"],
+    "tooth_network": ["model=tooth", "model.samples_per_tooth=16"],
 }
 QUICK = ["epochs=1", "epoch_fraction=0.2"]
 
@@ -34,14 +35,14 @@ def study(request, dataset):
     network = MODELS[request.param]
     task, settings = study_of(dataset, *QUICK, *OPTIONS[request.param])
     shapes = set()
-    look = network.look
+    loss = network.loss
 
-    def watched(self, windows):
+    def watched(self, windows, *targets):
         shapes.add(tuple(windows.shape[1:]))
-        return look(self, windows)
+        return loss(self, windows, *targets)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(network, "look", watched)
+        patch.setattr(network, "loss", watched)
         (prediction,) = run(task, settings)
     return task, settings, prediction, shapes
 
@@ -51,11 +52,11 @@ def test_scores_have_their_shape_for_the_declared_input(study):
     torch.manual_seed(0)
     model = build_model(settings.model, n_channels=2, n_classes=4).eval()
     inputs = input_of(settings.model)
-    n_points = inputs.n_points(task.window_samples)
-    check_window(model, 2, n_points)
+    example = inputs.example(2, task.window_samples)
+    check_example(model, example)
     windows = inputs.load(task, subset_segments(task, "by_unit", "test"))
     batch = torch.from_numpy(windows.cut(np.arange(3)))
-    assert batch.shape == (3, 2, n_points)
+    assert batch.shape[:2] == (3, example.shape[1])
     with torch.inference_mode():
         assert model(batch).shape == (3, 4)
         assert model.answers(batch)["classes"].equal(model(batch))
@@ -63,7 +64,9 @@ def test_scores_have_their_shape_for_the_declared_input(study):
 
 def test_a_training_feeds_the_declared_input(study):
     task, settings, _, shapes = study
-    assert shapes == {(2, input_of(settings.model).n_points(task.window_samples))}
+    inputs = input_of(settings.model)
+    windows = inputs.load(task, subset_segments(task, "by_unit", "test"))
+    assert shapes == {windows.cut(np.arange(1)).shape[1:]}
 
 
 def test_stored_and_loaded_it_predicts_the_same(study, tmp_path):
@@ -87,6 +90,7 @@ def test_stored_and_loaded_it_predicts_the_same(study, tmp_path):
         window_samples=description.window_samples,
         stride_samples=description.stride_samples,
         normalise=description.normalise,
+        n_teeth=description.n_teeth,
     )
     stored = windows.cut(np.flatnonzero(windows.record == record))
     of_recording = inputs.of_recording(recorded).cut(np.arange(len(stored)))

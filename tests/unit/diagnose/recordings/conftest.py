@@ -49,6 +49,26 @@ def life_study(tmp_path_factory, lives):
     return train(out, lives, *LIFE, "normalise=none")
 
 
+@pytest.fixture(scope="session")
+def known_machines():
+    """Records at two conditions a unit, with sound ones at both."""
+    dataset = two_channels(duration=0.3)
+    row = np.arange(dataset.n_records)
+    dataset.columns["condition_id"] = np.array([f"c{k:03d}" for k in row // 4])
+    dataset.columns["speed_set_rpm"] = 1000.0 + row // 4
+    dataset.columns["fault_gear"] = np.where(dataset.columns["label"] > 0, "pinion", "")
+    return dataset
+
+
+@pytest.fixture(scope="session")
+def tooth_study(tmp_path_factory, known_machines):
+    """Folder of a study of networks on teeth, without and with a sound record."""
+    out = tmp_path_factory.mktemp("teeth") / "out"
+    small = ("model=tooth", "model.samples_per_tooth=16", "model.widths=[8,4]")
+    words = (*QUICK, *small, *NETWORK_ONLY, "reference=other_condition")
+    return train(out, known_machines, *words, "epochs=1", "oracle=false")
+
+
 @pytest.fixture
 def recorded(tmp_path):
     """Function that writes signals as a file that a user has."""

@@ -16,6 +16,7 @@ from diagnose.data.lives import (
     early_level,
     lives_of,
 )
+from diagnose.scoring.judged import interval_text
 from diagnose.scoring.life_scores import (
     MEASURES,
     Snapshots,
@@ -26,6 +27,7 @@ from diagnose.scoring.life_scores import (
     phm_score,
     prognostic_horizon,
 )
+from diagnose.scoring.machines import Machines
 from diagnose.studies.life_jobs import run_life_job
 from diagnose.studies.life_study import plan_life_study
 from diagnose.studies.study import task_from
@@ -81,7 +83,8 @@ def test_every_life_counts_the_same():
     assert set(values) == set(MEASURES)
 
     drawn = {
-        "n_bootstrap": 100,
+        "machines": Machines.alone(2, "lives"),
+        "n_bootstrap": 1000,
         "rng": np.random.default_rng(0),
     }
     scores = life_scores(values, **drawn)
@@ -97,11 +100,17 @@ def test_every_life_counts_the_same():
     }
     means = {name: score["mean"] for name, score in scores.items()}
     assert means == pytest.approx(expected)
+    assert scores["mae_h"]["low"] is scores["mae_h"]["high"] is None
+    assert interval_text(scores["mae_h"], ".3g") == "4 [too few lives]"
+    four = {name: np.tile(row, 2) for name, row in values.items()}
+    drawn["machines"] = Machines.alone(4, "lives")
+    scores = life_scores(four, **drawn)
+    assert scores["mae_h"]["mean"] == 4
     assert (scores["mae_h"]["low"], scores["mae_h"]["high"]) == (2, 6)
 
     better = gain(
-        values["rmse_h"],
-        4 * values["rmse_h"],
+        four["rmse_h"],
+        4 * four["rmse_h"],
         **drawn,
     )
     assert_allclose(better["mean"], np.sqrt(20))
@@ -280,7 +289,7 @@ def test_vibration_that_tells_the_life_beats_the_age(life_study):
 
 
 def test_vibration_that_tells_nothing_does_not(tmp_path):
-    dataset = FakeLives(n_lives=12, seed=1, strength=0.0)
+    dataset = FakeLives(n_lives=16, seed=1, strength=0.0)
     methods = by_unit(train(tmp_path / "out", dataset, *LIFE, "epochs=1"))["methods"]
     for name in ("indicators", "cnn"):
         assert methods[name]["gain_over_age_only_h"]["low"] <= 0, name

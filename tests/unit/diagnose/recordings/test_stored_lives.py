@@ -72,12 +72,10 @@ def test_evaluate_on_its_test_part_repeats_the_report(
 
     for measure in MEASURES:
         assert measure in printed
-        score = pytest.approx(
-            expected[measure],
-            rel=1e-5,
-            abs=1e-9,
-        )
-        assert result[measure] == score, measure
+        for key in ("mean", "low", "high"):
+            value = pytest.approx(expected[measure][key], rel=1e-5, abs=1e-9)
+            assert result[measure][key] == value, measure
+    assert printed.count("95 % interval over lives") == len(MEASURES)
     assert result["n_lives"] == reported["n_lives"]["test"]
     assert f"{result['n_lives']} lives that failed" in printed
 

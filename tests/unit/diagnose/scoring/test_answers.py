@@ -21,6 +21,7 @@ from diagnose.report.answer_figures import (
 from diagnose.report.answer_tables import write_tables
 from diagnose.scoring.conditions import by_condition, condition_columns
 from diagnose.scoring.judged import Judged, with_interval
+from diagnose.scoring.machines import Machines, Support
 from diagnose.scoring.paired import compare, holm, permutation_p_value
 from diagnose.scoring.predictions import Prediction, Rows
 from diagnose.scoring.window_length import by_window_length
@@ -41,7 +42,7 @@ def judged(predicted, label, unit, method="cnn"):
         method=method,
         label=label,
         unit=unit,
-        n_units=int(unit.max()) + 1,
+        machines=Machines.alone(int(unit.max()) + 1),
         log_probability=scores_of(np.atleast_2d(predicted)),
     )
 
@@ -143,7 +144,7 @@ def test_equal_methods_are_not_told_apart_and_better_ones_are():
     bad = judged(rng.integers(0, N_CLASSES, label.size), label, unit, "guess")
     others = [dataclasses.replace(good, method="same"), bad]
     same, worse = compare(good, others, n_bootstrap=300, rng=rng)
-    assert same["difference"] == {"mean": 0, "low": 0, "high": 0}
+    assert same["difference"] == {"mean": 0, "low": 0, "high": 0, "too_few": None}
     assert same["p_value"] == 1
     assert "not told apart" in same["summary"]
     assert worse["difference"]["low"] > 0.5
@@ -183,13 +184,15 @@ def test_one_unit_has_no_interval():
     rng = np.random.default_rng(6)
     (row,) = compare(network, [guess], n_bootstrap=50, rng=rng)
     assert (row["difference"]["low"], row["p_value"]) == (None, 1.0)
-    assert "one unit" in row["summary"]
+    assert "too few machines, so that nothing can be said" in row["summary"]
     result = conditions_of({"snr_db": np.arange(40.0)}, label, label, unit, rng)
     assert all(row["scores"]["cnn"]["low"] is None for row in result["rows"])
     assert result["weakest"] == []
-    assert "Too few test records or units" in result["summary"]
-    unknown = with_interval(0.5, np.full(10, np.nan), 9)
-    assert unknown == {"mean": 0.5, "low": None, "high": None}
+    assert "Too few test records or machines" in result["summary"]
+    unknown = with_interval(
+        0.5, np.full(10, np.nan), Support(kind="machines", n_groups=9)
+    )
+    assert unknown == {"mean": 0.5, "low": None, "high": None, "too_few": None}
 
 
 @pytest.mark.parametrize(
@@ -248,7 +251,7 @@ def study():
         )
 
     trained = (("cnn", 0, 0.9), ("cnn", 1, 0.9), ("indicators", 0, 0.5))
-    settings = settings_of("n_bootstrap=100")
+    settings = settings_of("model=cnn", "n_bootstrap=100")
     return task, settings, [prediction(*values) for values in trained]
 
 

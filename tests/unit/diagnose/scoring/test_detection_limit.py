@@ -19,6 +19,7 @@ from diagnose.scoring.detection_limit import (
     size_columns,
 )
 from diagnose.scoring.judged import Judged, share_with_interval
+from diagnose.scoring.machines import Machines, Support
 
 
 def judged(score, label, unit):
@@ -28,7 +29,7 @@ def judged(score, label, unit):
         method="cnn",
         label=label,
         unit=unit,
-        n_units=int(unit.max()) + 1,
+        machines=Machines.alone(int(unit.max()) + 1),
         log_probability=np.stack([np.zeros_like(score), score], axis=-1),
     )
 
@@ -239,7 +240,8 @@ def test_one_unit_has_no_interval_and_one_severity_no_curve():
 
 
 def test_all_of_few_units_do_not_prove_a_share_of_one():
-    interval = share_with_interval(1.0, np.ones(50), 8)
+    eight = Support(kind="machines", n_groups=8)
+    interval = share_with_interval(1.0, np.ones(50), eight)
     assert_allclose(
         interval["low"],
         0.025 ** (1 / 8),
@@ -250,7 +252,7 @@ def test_all_of_few_units_do_not_prove_a_share_of_one():
     half = share_with_interval(
         0.5,
         np.linspace(0.3, 0.7, 101),
-        8,
+        eight,
     )
     assert_allclose(
         [half["low"], half["high"]],

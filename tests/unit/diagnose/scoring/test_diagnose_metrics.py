@@ -25,8 +25,8 @@ from diagnose.baselines.rms_threshold import RmsThreshold
 from diagnose.data.windows import subset_segments, task_of
 from diagnose.report.page import without_interval
 from diagnose.report.text import score_cell
+from diagnose.scoring.machines import LEAST_UNITS
 from diagnose.scoring.metrics import (
-    LEAST_UNITS,
     balanced_accuracy,
     is_above,
     macro_f1,
@@ -88,13 +88,15 @@ def test_few_units_have_no_interval(n_units):
 
 
 def test_the_reason_for_a_missing_interval_is_given_once():
-    few, many = ({"n_units": {"test": n}} for n in (2, 12))
+    few, many = ({"resampled": {"machines": n}} for n in (2, 12))
+    gears = {"resampled": {"sets of gears": 2, "gearboxes": 4}}
     protocols = {"by_unit": few, "cross_speed": few, "cross_snr": many}
-    (line,) = without_interval({"protocols": protocols, "novelty": {}})
-    assert line.startswith(
-        "by_unit, cross_speed: 2 test unit(s) are too few machines for an interval, "
-        "4 are the least"
-    )
+    protocols["cross_specimen"] = gears
+    lines = without_interval({"protocols": protocols, "novelty": {}})
+    begin = "in the test part for an interval; 4 are the least"
+    assert lines[0].startswith(f"by_unit, cross_speed: too few machines (2) {begin}")
+    assert lines[1].startswith(f"cross_specimen: too few sets of gears (2) {begin}")
+    assert len(lines) == 2
     assert without_interval({"protocols": {"by_unit": many}, "novelty": {}}) == []
 
 

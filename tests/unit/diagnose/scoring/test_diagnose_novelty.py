@@ -24,6 +24,7 @@ from diagnose.studies.novelty_metrics import (
     novelty_result,
 )
 from diagnose.studies.study import plan_study
+from diagnose.training import autoencoder
 from diagnose.training.autoencoder import (
     WindowAutoencoder,
     fit_autoencoder,
@@ -31,6 +32,7 @@ from diagnose.training.autoencoder import (
 )
 from diagnose.training.classes import Classes, predict_windows
 from diagnose.training.train import train_network
+from gensig.errors import SimulationError
 
 BOTH = "protocols=[healthy_only,open_set]"
 
@@ -278,6 +280,30 @@ def test_the_autoencoder_is_the_same_for_the_same_seed(healthy, open_study):
     assert not np.array_equal(error, reconstruction_error(other, validation))
 
 
+@pytest.mark.parametrize(("patience", "kept"), [(1, 1), (0, 3)])
+def test_without_patience_the_autoencoder_runs_every_epoch(
+    patience, kept, healthy, open_study, monkeypatch
+):
+    rising = iter([1.0, 2.0, 3.0])
+    monkeypatch.setattr(
+        autoencoder, "_errors", lambda *_: torch.full((1, 1), next(rising))
+    )
+    settings = dataclasses.replace(open_study[1], epochs=3, patience=patience)
+    assert fit_autoencoder(*healthy, settings=settings, seed=0).best_epoch == kept
+
+
+def test_an_autoencoder_that_diverges_at_its_end_is_refused_without_patience(
+    healthy, open_study, monkeypatch
+):
+    errors = iter([1.0, np.nan])
+    monkeypatch.setattr(
+        autoencoder, "_errors", lambda *_: torch.full((1, 1), next(errors))
+    )
+    settings = dataclasses.replace(open_study[1], epochs=2, patience=0)
+    with pytest.raises(SimulationError, match="diverged before its last epoch"):
+        fit_autoencoder(*healthy, settings=settings, seed=0)
+
+
 def test_the_autoencoder_learns_and_shows_a_moment_that_it_cannot_rebuild(
     healthy, open_study
 ):
@@ -354,7 +380,7 @@ def test_the_command_reports_novelty_alone(tmp_path, capsys):
         "noticed by who knows health alone (healthy_only)",
         "</th>".join(f'<th scope="col">{head}' for head in heads),
         "Balanced accuracy of the network on the known classes",
-        "healthy_only: only 3 test unit(s)",
+        "healthy_only: only 3 machines in the test part",
         "Caveats",
         "<b>AUROC of energy</b>: against healthy ",
         "validation record(s); with fewer than 19",

@@ -19,6 +19,7 @@ from diagnose.baselines.features import (
     keys_of,
     known_rotation,
 )
+from diagnose.data.references import ReferenceKind, references
 from diagnose.data.windows import FloatArray, IntArray, Segments, Task, read_signal
 from gensig.errors import ConfigError
 from gensig.signals.resampling import PASS_SHARE
@@ -32,39 +33,35 @@ OF_CHANNEL = ("rise", "fall")
 # Log ratio of the largest tooth and the median one, of the channels' mean square changes.
 OF_ALL = "outstanding"
 START = ("start_phase", "start_tooth_pinion", "start_tooth_wheel")
-NEEDED = ("unit_id", "fault_gear", *START)
 Levels = dict[Key, dict[str, FloatArray]]
 
 
-def references(task: Task) -> IntArray:
-    """(record,) another sound record of the same unit, nearest in speed.
+def chosen_references(task: Task) -> IntArray:
+    """(record,) the sound record that each is compared with, by one rule for all classes.
 
-    It is -1 in units with fewer than two sound records. With only one, that record alone would
-    have no reference, which would reveal its class.
+    It is one at another condition of the same unit. Data sets with one condition a unit give the
+    next repeat at the same condition; see `diagnose.data.references.references`.
 
     Raises
     ------
-    ConfigError    for a data set without the units or the positions of the teeth
+    ConfigError    for a data set that has neither, or not the positions of the teeth
     """
-    if missing := [name for name in NEEDED if name not in task.dataset.column_names]:
+    if missing := [name for name in START if name not in task.dataset.column_names]:
         raise ConfigError(
-            f"baseline reference: the data set does not say {missing[0]}; "
+            f"baseline sound_record: the data set does not say {missing[0]}; "
             "leave that baseline out"
         )
-    unit = np.asarray(task.dataset.column("unit_id"))
-    speed = np.asarray(task.dataset.column("speed_rpm"), dtype=float)
-    usable = np.asarray(task.dataset.usable, dtype=bool)
-    sound = (np.asarray(task.dataset.column("fault_gear")) == "") & usable
-    nearest = np.full(unit.size, -1)
-    for record in range(unit.size):
-        of_unit = np.flatnonzero(sound & (unit == unit[record]))
-        if of_unit.size >= 2:
-            others = of_unit[of_unit != record]
-            nearest[record] = others[np.argmin(np.abs(speed[others] - speed[record]))]
-    return nearest
+    reasons = []
+    for kind in (ReferenceKind.OTHER_CONDITION, ReferenceKind.SAME_CONDITION):
+        try:
+            return references(task, kind)
+        except ConfigError as reason:
+            reasons.append(str(reason))
+    text = "; and ".join(dict.fromkeys(reasons))
+    raise ConfigError(f"baseline sound_record: {text}, or leave that baseline out")
 
 
-def reference_table(task: Task, segments: Segments, known: Levels) -> FeatureTable:
+def sound_record_table(task: Task, segments: Segments, known: Levels) -> FeatureTable:
     """Changes of the teeth of both gears, stretch by stretch, with the columns `_names`.
 
     The reference is the whole sound record, also for a stretch that is part of a record.
@@ -72,13 +69,13 @@ def reference_table(task: Task, segments: Segments, known: Levels) -> FeatureTab
 
     Raises
     ------
-    ConfigError    as `references`, and where no unit has a second sound record
+    ConfigError    as `chosen_references`, and for records that all have none
     """
-    reference = references(task)
+    reference = chosen_references(task)
     if (reference[segments.record] < 0).all():
         raise ConfigError(
-            "baseline reference: no machine has a sound record beside the one that is "
-            "judged; make the data set with plan.n_repeats=2, or leave that baseline out"
+            "baseline sound_record: no record of a part has a sound record to compare with; "
+            "leave that baseline out"
         )
     names = _names(task)
     values = np.full((segments.record.size, len(names)), np.nan)
@@ -98,29 +95,30 @@ def reference_table(task: Task, segments: Segments, known: Levels) -> FeatureTab
     )
 
 
-def reference_tables(source: Source) -> Parts:
+def sound_record_tables(source: Source) -> Parts:
     """Changes of the teeth in every subset."""
     known: Levels = {}
 
     def table(subset: str) -> FeatureTable:
-        return reference_table(source.part(subset), source.segments(subset), known)
+        return sound_record_table(source.part(subset), source.segments(subset), known)
 
     return Parts.of(table)
 
 
-TOOTH_INPUT = Input(name="tooth_changes", make=reference_tables)
+TOOTH_INPUT = Input(name="tooth_changes", make=sound_record_tables)
 
 
 @final
-class Reference(ChosenModelBaseline):
+class SoundRecord(ChosenModelBaseline):
     """Logistic regression or gradient boosting on changes of teeth against a sound record."""
 
     text = MethodText(
-        name="reference",
+        name="sound_record",
         label="against a sound record",
         card_label=None,
         meaning="logistic regression or gradient boosting (chosen on validation units) on which "
-        "tooth is louder or quieter than in a sound record of the same machine; it is given that "
+        "tooth is louder or quieter than in a sound record of the same machine at another "
+        "condition (at the same one where the data set has one a machine); it is given that "
         "record, which the others are not.",
     )
     role = Role.RIVAL
@@ -160,15 +158,17 @@ def _levels(task: Task, known: Levels, key: Key) -> dict[str, FloatArray]:
     if key not in known:
         _, record, start, _ = key
         column = {name: float(task.dataset.column(name)[record]) for name in START}
-        speed, n_teeth = known_rotation(task)
+        rotation = known_rotation(task)
+        n_teeth, frequency = rotation.n_teeth(record), rotation.frequencies(record)
         rate, signal = float(task.dataset.sampling_rate), read_signal(task, *key[1:])
-        passages = start / rate * float(speed["pinion"][record]) * n_teeth["pinion"]
+        passages = start / rate * rotation.mesh_frequency(record)
         passed = column["start_phase"] + passages
         known[key] = {}
         for gear in GEARS:
             first = column[f"start_tooth_{gear}"] + passed
-            rotation = float(speed[gear][record])
-            known[key][gear] = _of_gear(signal, rate, rotation, n_teeth[gear], first)
+            known[key][gear] = _of_gear(
+                signal, rate, frequency[gear], n_teeth[gear], first
+            )
     return known[key]
 
 

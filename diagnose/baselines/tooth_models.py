@@ -1,0 +1,191 @@
+"""Simple models on the teeth of both gears that their sisters do not explain."""
+
+from __future__ import annotations
+
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnose.baselines.base import (
+    Baseline,
+    Input,
+    MethodText,
+    Parts,
+    Role,
+    Source,
+    StorableBaseline,
+)
+from diagnose.baselines.estimators import (
+    FittedModel,
+    boosted_trees,
+    linear_model,
+    logistic_regression,
+)
+from diagnose.baselines.features import (
+    GEARS,
+    Cache,
+    FeatureTable,
+    Key,
+    keys_of,
+    known_rotation,
+)
+from diagnose.baselines.tooth_features import GEAR_FEATURES, tooth_features
+from diagnose.data.teeth import missing_teeth
+from diagnose.data.windows import (
+    SUBSETS,
+    FloatArray,
+    Segments,
+    Task,
+    read_signal,
+    subset_segments,
+)
+from gensig.signals.separation import separate_gears
+
+SAMPLES_PER_TOOTH = 64
+NAMES = tuple(f"{gear}/{name}" for gear in GEARS for name in GEAR_FEATURES)
+STRENGTH = (
+    0.03  # inverse of the penalty, chosen by cross-validation over training machines
+)
+
+
+def why_no_turns(task: Task, protocol: str) -> str | None:
+    """Reason in one line why stretches of a protocol hold no turns that are known; else None."""
+    dataset = task.dataset
+    missing = missing_teeth(dataset)
+    if "speed_rpm" not in dataset.column_names:
+        missing = missing or "speed_rpm"
+    if missing:
+        return f"the data set does not say {missing}"
+    speed = np.asarray(dataset.column("speed_rpm"), dtype=float)
+    turns = []
+    for subset in SUBSETS:
+        segments = subset_segments(task, protocol, subset)
+        seconds = (segments.stop - segments.start) / dataset.sampling_rate
+        turns.append(np.min(seconds * speed[segments.record] / 60))
+    if min(turns) < 1:
+        return f"a stretch holds {min(turns):.2g} turns of the pinion, and it needs a whole one"
+    return None
+
+
+def tooth_table(task: Task, segments: Segments, cache: Cache) -> FeatureTable:
+    """`tooth_features` of both gears in every stretch; ``cache`` is filled and used."""
+    rotation = known_rotation(task)
+    rate = float(task.dataset.sampling_rate)
+
+    def features(key: Key) -> FloatArray:
+        mesh_frequency = rotation.mesh_frequency(key[1])
+        driving, driven = rotation.n_teeth(key[1]).values()
+        signal = read_signal(task, *key[1:])
+        turns = turns_of(signal, rate, mesh_frequency, (driving, driven))
+        return tooth_features(*turns)
+
+    keys = keys_of(task, segments)
+    for key in keys:
+        if key not in cache:
+            cache[key] = features(key)
+    return FeatureTable(
+        values=np.stack([cache[key] for key in keys]),
+        names=NAMES,
+        label=task.labels()[segments.record],
+        record=segments.record,
+    )
+
+
+def turns_of(
+    signal: FloatArray,
+    sampling_rate: float,
+    mesh_frequency: float,
+    n_teeth: tuple[int, int],
+) -> tuple[FloatArray, FloatArray]:
+    """Deviations (channel, tooth, sample) of both gears from the mean passage, at constant speed.
+
+    Raises
+    ------
+    ValueError    for less than a turn of the driving gear
+    """
+    turns = separate_gears(
+        signal,
+        sampling_rate,
+        mesh_frequency,
+        n_teeth,
+        samples_per_tooth=SAMPLES_PER_TOOTH,
+    )
+    shape = (len(signal), -1, SAMPLES_PER_TOOTH)
+    return turns.driving.reshape(shape), turns.driven.reshape(shape)
+
+
+def tooth_tables(source: Source) -> Parts:
+    """Features of the teeth in every subset."""
+    cache = source.caches.setdefault(TEETH_INPUT.name, {})
+
+    def table(subset: str) -> FeatureTable:
+        return tooth_table(source.part(subset), source.segments(subset), cache)
+
+    return Parts.of(table)
+
+
+TEETH_INPUT = Input(name="teeth", make=tooth_tables, why_not=why_no_turns)
+
+
+@final
+class ToothLogistic(StorableBaseline):
+    """Logistic regression on `tooth_features`."""
+
+    text = MethodText(
+        name="tooth_logistic",
+        label="teeth, logistic",
+        card_label="teeth",
+        meaning="logistic regression on the tooth of either gear that the other teeth explain "
+        "least: its distance from them, and its levels in bands and places of the passage; it "
+        "knows the speed and the tooth counts, and sees no level.",
+    )
+    role = Role.RIVAL
+    reads = TEETH_INPUT
+    _model: FittedModel
+
+    def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:
+        """Fit to the training rows; there is no choice."""
+        self._model = logistic_regression(train, n_classes, STRENGTH)
+        return self._model.name
+
+    def predict_proba(self, table: FeatureTable) -> FloatArray:
+        """Probabilities (row, class) of the regression."""
+        return self._model.probability(table)
+
+    def tensors(self) -> dict[str, NDArray[np.float32]]:
+        """Arrays of `diagnose.baselines.estimators.LinearModel`."""
+        return linear_model(self._model, len(NAMES)).tensors()
+
+    @classmethod
+    def description(cls, task: Task) -> dict[str, Any]:
+        """Kind, and the turns that the features are made of."""
+        return {
+            "name": cls.text.name,
+            "kind": cls.text.name,
+            "samples_per_tooth": SAMPLES_PER_TOOTH,
+        }
+
+
+@final
+class ToothTrees(Baseline):
+    """Gradient boosting on `tooth_features`."""
+
+    text = MethodText(
+        name="tooth_trees",
+        label="teeth, boosted trees",
+        card_label=None,
+        meaning="gradient boosting on the same table of teeth.",
+    )
+    role = Role.RIVAL
+    reads = TEETH_INPUT
+    _model: FittedModel
+
+    def fit(self, train: FeatureTable, validation: FeatureTable, n_classes: int) -> str:
+        """Fit to the training rows; there is no choice."""
+        self._model = boosted_trees(train, n_classes)
+        return f"gradient boosting on {len(self._model.columns)} columns"
+
+    def predict_proba(self, table: FeatureTable) -> FloatArray:
+        """Probabilities (row, class) of the boosted trees."""
+        return self._model.probability(table)

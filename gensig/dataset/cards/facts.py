@@ -1,0 +1,61 @@
+"""Facts of a data set that its cards and its page state in words."""
+
+from contextlib import suppress
+
+import numpy as np
+
+from gensig.dataset.columns import GEAR_COLUMNS
+from gensig.dataset.reader import Dataset
+from gensig.errors import DatasetError
+
+GEOMETRY = (*GEAR_COLUMNS, "usable_band_hz")
+
+
+def n_designs(data: Dataset) -> int:
+    """Number of different gear designs; 1 where they are in the root attributes."""
+    varied = [name for name in GEAR_COLUMNS if name in data.column_names]
+    if not varied:
+        return 1
+    designs = np.stack([data.column(name) for name in varied], axis=1)
+    return len(np.unique(designs, axis=0))
+
+
+def geometry_facts(data: Dataset) -> dict[str, object]:
+    """Geometry of the gears by name; the number of designs and ranges where units differ."""
+    facts: dict[str, object] = {}
+    if GEAR_COLUMNS[0] in data.column_names:
+        facts["designs of gears"] = n_designs(data)
+    for name in GEOMETRY:
+        if name in data.column_names:
+            facts[name] = value_range(data.column(name), "")
+        elif name in data.attributes:
+            facts[name] = rounded(data.attributes[name])
+    return facts
+
+
+def kind_of_machine(data: Dataset) -> str:
+    """Designs and teeth of a data set in words."""
+    numbers = []
+    for gear in ("pinion", "wheel"):
+        number = "?"
+        with suppress(DatasetError):
+            number = value_range(data.n_teeth(gear), "")
+        numbers.append(number)
+    teeth = f"{' and '.join(numbers)} teeth"
+    if GEAR_COLUMNS[0] in data.column_names:
+        return f"One kind of machine in {n_designs(data)} designs: {teeth}"
+    return f"One kind of machine: {teeth}"
+
+
+def rounded(value: object) -> object:
+    """A number to the fourth decimal, anything else as it is."""
+    return round(value, 4) if isinstance(value, float) else value
+
+
+def value_range(values: np.ndarray, unit: str) -> str:
+    """'1200 to 1800 r/min', over the finite values."""
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return "none"
+    ends = dict.fromkeys((f"{finite.min():.6g}", f"{finite.max():.6g}"))
+    return f"{' to '.join(ends)} {unit}".rstrip()

@@ -1,0 +1,149 @@
+"""Designs of a plan's units: values of gears that are drawn once a unit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from gensig.errors import ConfigError, GeometryError
+from gensig.geometry.contact import GearPair
+from gensig.mesh.modification import sound_teeth
+from gensig.options.configuration import Configuration
+from gensig.record.options import (
+    CROSSED,
+    GEAR_KEYS,
+    SEPARATE,
+    TORQUE_KEY,
+    UNIT_LOAD,
+    PlanOptions,
+    draws_unit_load,
+    read_plan_options,
+)
+from gensig.record.streams import Stream, stream
+from gensig.systems.registry import (
+    LINE,
+    SLICED,
+    read_gear_group,
+    read_modification,
+    read_pair,
+)
+
+MOST_DRAWS = 100  # of one unit, until its gears can be made
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnitDesigns:
+    """Designs of the units of a plan; units take them in turn.
+
+    Attributes
+    ----------
+    values : drawn values by configuration key, one mapping a design; one empty mapping where the
+        plan draws none
+    torques : torque of the pinion in N m at a unit load of 1 N/mm2, one a design; empty where the
+        plan draws the torque itself
+    """
+
+    values: tuple[Mapping[str, float], ...]
+    torques: tuple[float, ...]
+
+    def of(self, unit: int, drawn: Mapping[str, float]) -> dict[str, float]:
+        """All values of a condition of a unit: those of its design, and those drawn for it."""
+        design = unit % len(self.values)
+        values = {**self.values[design], **drawn}
+        if self.torques:
+            values[TORQUE_KEY] *= self.torques[design]
+        return values
+
+    def configurations(self, config: Configuration) -> list[Configuration]:
+        """Configurations of the designs, with the sizes of their gears."""
+        drawn = [config.with_values(values) for values in self.values]
+        if len(drawn) == 1:
+            return drawn
+        return [each.with_entries(gear=read_gear_group(each)) for each in drawn]
+
+
+def draw_designs(config: Configuration, n_units: int) -> UnitDesigns:
+    """Draw the design of every unit, each from a stream of its own.
+
+    A unit whose gears cannot be made or cannot mesh is drawn again from its stream.
+
+    Raises
+    ------
+    ConfigError    for a unit whose gears can never be made
+    """
+    options = read_plan_options(config)
+    values: tuple[Mapping[str, float], ...] = ({},)
+    if options.varies_gears:
+        values = tuple(_draw_design(config, options, unit) for unit in range(n_units))
+    torques: tuple[float, ...] = ()
+    if draws_unit_load(config):
+        pairs = (read_pair(config.with_values(design)) for design in values)
+        torques = tuple(unit_load_torque(pair) for pair in pairs)
+    return UnitDesigns(values=values, torques=torques)
+
+
+def check_designs(config: Configuration, options: PlanOptions) -> None:
+    """Raise ConfigError for plans whose gears cannot differ, or have no unit load."""
+    kind = config["system"]["kind"]
+    if kind == LINE and draws_unit_load(config):
+        raise ConfigError(
+            f"plan.vary.{TORQUE_KEY}: of = '{UNIT_LOAD}' is the load of one gear pair, and a "
+            "drive line has several; draw the torque itself"
+        )
+    if not options.varies_gears:
+        return
+    key = next(key for key in options.vary if key.startswith(GEAR_KEYS))
+    if not options.has_separate_machines:
+        raise ConfigError(
+            f"plan.vary: '{key}' is drawn once a unit, but with plan.machines={CROSSED} units "
+            f"share their gears; give plan.machines={SEPARATE}, or sets of one design with -m"
+        )
+    if kind == LINE:
+        raise ConfigError(
+            f"plan.vary: '{key}': a drive line has its gears from tables; take "
+            "system=spur_pair or helical_pair, or make a set for each table"
+        )
+    if kind == SLICED and config["dataset"]["store_mesh_state"]:
+        raise ConfigError(
+            f"plan.vary: '{key}': the arrays of dataset.store_mesh_state differ with the gears "
+            f"of system={SLICED}; give dataset.store_mesh_state=false, or take system=spur_pair"
+        )
+
+
+def _draw_design(
+    config: Configuration, options: PlanOptions, unit: int
+) -> dict[str, float]:
+    """Values of the first design of a unit's stream that can be made."""
+    rng = stream(config.seed, Stream.GEAR_DESIGN, unit)
+    reason = ""
+    for _ in range(MOST_DRAWS):
+        values = {
+            key: distribution.values_at(rng.random(1))[0]
+            for key, distribution in options.unit_vary.items()
+        }
+        drawn = config.with_values(values)
+        try:
+            pair = read_pair(drawn)
+            pair.require_continuous_drive()
+            sound_teeth(pair, read_modification(drawn))
+        except GeometryError as error:
+            reason = str(error)
+        else:
+            return values
+    raise ConfigError(
+        f"plan.vary: none of {MOST_DRAWS} designs drawn for unit {unit} can be made; narrow the "
+        f"distributions of {GEAR_KEYS}*. The last: {reason}"
+    )
+
+
+def unit_load_torque(pair: GearPair) -> float:
+    """Torque of the pinion at a unit load of 1 N/mm2, N m.
+
+    The unit load is F_t / (b m_n), with the tangential force at the reference circle and the
+    smaller face width.
+
+    Source: Dudley's unit load (Dudley, Handbook of Practical Gear Design).
+    """
+    width = min(gear.face_width for gear in pair.gears.values())
+    area = width * pair.pinion.normal_module
+    return 1e6 * area * pair.pinion.pitch_radius

@@ -1,0 +1,93 @@
+"""What a reader of a study sees first: scores on unknown machines, and pictures of teeth."""
+
+import pytest
+from runs import NETWORK_ONLY, QUICK, metrics_of, train
+from small_studies import two_channels
+
+from diagnose.recordings.found_faults import MOST_PICTURES, Answered, shown
+from diagnose.report.headlines import headline_protocol, headlines
+
+
+def score(mean):
+    interval = {"mean": mean, "low": mean - 0.1, "high": mean + 0.1, "too_few": None}
+    return {"balanced_accuracy": interval}
+
+
+def metrics_with(protocol, **methods):
+    chance = {"balanced_accuracy": 0.25}
+    result = {"leaky": False, "methods": {"tooth": score(0.8), "chance": chance}}
+    result["methods"] |= methods
+    settings = {"reference": "other_condition"}
+    return {"model": "tooth", "protocols": {protocol: result}, "settings": settings}
+
+
+def test_the_score_on_new_machines_comes_first():
+    alone = metrics_with("new_machine")
+    line = "unknown machine: balanced accuracy 0.80 [0.70, 0.90], chance 0.25"
+    assert headlines(alone) == [line]
+    both = metrics_with("new_machine", with_reference=score(0.85))
+    assert headlines(both) == [
+        line,
+        "unknown machine with one sound record of its own from another condition: "
+        "balanced accuracy 0.85 [0.75, 0.95], chance 0.25",
+    ]
+
+
+def test_a_study_without_new_machines_has_no_headline():
+    other = metrics_with("by_unit")
+    assert headlines(other) == []
+    assert headline_protocol(other) == "by_unit"
+    other["protocols"]["by_unit"]["leaky"] = True
+    assert headline_protocol(other) is None
+
+
+def answers(*pairs):
+    return [
+        Answered(record_id=f"r{index}", truth=truth, answer=answer)
+        for index, (truth, answer) in enumerate(pairs)
+    ]
+
+
+def test_the_first_found_fault_of_each_class_and_a_wrong_answer_are_shown():
+    given = answers(
+        ("healthy", "healthy"),
+        ("crack", "pitting"),
+        ("crack", "crack"),
+        ("crack", "crack"),
+        ("pitting", "healthy"),
+        ("broken", "broken"),
+    )
+    assert [answer.record_id for answer in shown(given)] == ["r2", "r5", "r1"]
+    many = answers(*((f"c{k}", f"c{k}") for k in range(9)), ("crack", "healthy"))
+    assert len(shown(many)) == MOST_PICTURES
+    assert shown(many)[-1].truth == "crack"
+
+
+def test_pictures_lie_beside_the_report(tooth_study):
+    pictures = sorted(tooth_study.glob("tooth_*.png"))
+    assert 1 <= len(pictures) <= MOST_PICTURES
+    text = (tooth_study / "report.md").read_text()
+    page = (tooth_study / "report.html").read_text()
+    assert "What the network saw" in page
+    for picture in pictures:
+        assert picture.read_bytes().startswith(b"\x89PNG")
+        assert f"]({picture.name})" in text
+
+
+@pytest.mark.parametrize("page", ["report.md", "report.html"])
+def test_a_caption_says_record_truth_and_answer(tooth_study, page):
+    text = (tooth_study / page).read_text()
+    assert ", truth " in text
+    assert ", answer " in text
+
+
+def test_the_sham_control_runs_on_the_network_of_teeth(known_machines, tmp_path):
+    sham = two_channels(duration=0.3, sham=True)
+    sham.columns = known_machines.columns
+    datasets = {"good": known_machines, "sham": sham}
+    small = ("model=tooth", "model.samples_per_tooth=16", "model.widths=[8,4]")
+    words = (*QUICK, *small, *NETWORK_ONLY, "oracle=false", "sham=sham", "epochs=1")
+    out = train(tmp_path / "out", datasets, *words, "reference=other_condition")
+    methods = metrics_of(out)["protocols"]["by_unit"]["methods"]
+    assert {"tooth", "with_reference", "sham"} <= set(methods)
+    assert methods["sham"]["balanced_accuracy"]["mean"] is not None
