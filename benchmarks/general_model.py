@@ -43,9 +43,10 @@ from diagnose.training.train import Training, train_network
 from gensig.options.compose import compose
 
 EXPERIMENT = "experiment=many_machines"
-N_RECORDS, N_VALIDATION, N_TEST = 20_000, 800, 800
-RECORDS_A_UNIT = 8
+N_RECORDS, N_VALIDATION, N_TEST = 20_000, 800, 400
+RECORDS_A_UNIT = 4
 SEED, VALIDATION_SEED, TEST_SEED = 1, 2, 3
+TORQUE = "operating.torque_nm"
 FAST = ("solver.precision=float32", "operating.duration_s=0.8")
 N_BOOTSTRAP = 2000
 # Each epoch draws a third of the inputs: about one of the three sensors of a record.
@@ -69,8 +70,14 @@ class TestSet:
     words: Words
 
 
-def _varied(key: str, distribution: str, low: float, high: float) -> str:
-    return f"plan.vary={{{key}: {{distribution: {distribution}, low: {low}, high: {high}}}}}"
+def _varied(
+    key: str, distribution: str, low: float, high: float, of: str | None = None
+) -> str:
+    """The override that draws a key from another range."""
+    spec = f"distribution: {distribution}, low: {low}, high: {high}"
+    if of is not None:
+        spec += f", of: {of}"
+    return f"plan.vary={{{key}: {{{spec}}}}}"
 
 
 TEST_SETS = (
@@ -80,8 +87,8 @@ TEST_SETS = (
         words=(_varied("gear.pinion.n_teeth", "integers", 61, 90),),
     ),
     TestSet(
-        title="modules of 7 to 12 mm (trained to 6)",
-        words=(_varied("gear.normal_module_mm", "uniform", 7, 12),),
+        title="modules of 9 to 14 mm (trained to 8)",
+        words=(_varied("gear.normal_module_mm", "uniform", 9, 14),),
     ),
     TestSet(
         title="3,600 to 6,000 r/min (trained to 3,600)",
@@ -92,8 +99,12 @@ TEST_SETS = (
         words=("sensing=bearing",),
     ),
     TestSet(
-        title="noise at 0 dB (trained from 5)",
-        words=("sensing.snr_db=0",),
+        title="unit loads of 3 to 10 N/mm2 (trained from 10)",
+        words=(_varied(TORQUE, "log_uniform", 3, 10, "unit_load"),),
+    ),
+    TestSet(
+        title="noise at 0 to 10 dB (trained from 10)",
+        words=(_varied("sensing.snr_db", "uniform", 0, 10),),
     ),
     TestSet(
         title="helical gears of 15 degrees (trained on spur gears)",

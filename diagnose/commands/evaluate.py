@@ -14,7 +14,8 @@ HELP = """\
 Evaluate a trained network on a data set.
 
   data=DIR         data set made by gensig generate
-  model_dir=DIR    one of the folders that diagnose train wrote below models/
+  model_dir=DIR    optional: one of the folders that diagnose train wrote below models/; default the
+                   network for any pair of gears that comes with gensig
   out=DIR          optional: receives metrics.json and confusion.png, of remaining lives also
                    predictions.csv; must not exist or be empty
   protocol=NAME    optional: judge on a part of this split of the data set
@@ -25,6 +26,7 @@ Without protocol: the test part of the network's split on the data set that it w
 records elsewhere."""
 EXAMPLE = """\
 examples:
+  diagnose evaluate data=runs/other
   diagnose evaluate data=runs/lives2 model_dir=runs/hours/models/by_unit-cnn-seed0
   diagnose evaluate data=runs/other model_dir=report/models/new_machine-seed0
   diagnose evaluate data=runs/other model_dir=report/models/new_machine-seed0 channels=wheel_x"""
@@ -43,13 +45,13 @@ def run(arguments: Namespace) -> int:
     if out is not None:
         refuse_existing(Path(out))
     from diagnose.recordings.evaluate import evaluate_network
-    from diagnose.recordings.registry import open_network
+    from diagnose.recordings.registry import open_network, shipped_network
     from gensig.dataset.reader import open_dataset
 
     channels = None
     if "channels" in values:
         channels = values["channels"].strip("[]").split(",")
-    network = open_network(values["model_dir"])
+    network = open_network(values.get("model_dir", shipped_network()))
     evaluation = evaluate_network(
         network,
         open_dataset(values["data"]),
@@ -82,7 +84,6 @@ def _key_values(words: Sequence[str]) -> dict[str, str]:
         if key in values:
             raise ConfigError(f"{key} is given twice")
         values[key] = value
-    for key in ("data", "model_dir"):
-        if key not in values:
-            raise ConfigError(f"{key} is required: give {key}=DIR")
+    if "data" not in values:
+        raise ConfigError("data is required: give data=DIR")
     return values

@@ -13,14 +13,12 @@ def add_overrides(parser: ArgumentParser, metavar: str = "key=value") -> None:
     parser.add_argument("overrides", nargs="*", metavar=metavar, help="see above")
 
 
-def add_model(parser: ArgumentParser) -> None:
-    """Add the folder of a network."""
-    parser.add_argument(
-        "--model",
-        required=True,
-        metavar="DIR",
-        help="folder that diagnose train wrote below models/",
-    )
+def add_model(parser: ArgumentParser, *, required: bool = True) -> None:
+    """Add the folder of a network; where it is not required, one comes with gensig."""
+    text = "folder that diagnose train wrote below models/"
+    if not required:
+        text += " (default: the network for any pair of gears that comes with gensig)"
+    parser.add_argument("--model", required=required, metavar="DIR", help=text)
 
 
 def add_recording_options(parser: ArgumentParser) -> None:

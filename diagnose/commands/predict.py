@@ -23,6 +23,7 @@ of the driving shaft, with --teeth and --speed-rpm by the mesh. A model of remai
 speed and torque too."""
 EXAMPLE = """\
 examples:
+  diagnose predict mine.wav --teeth 23 46 --speed-rpm 1800
   diagnose predict --model report/models/new_machine-seed0 a.wav --channels left --speed-rpm 1500
   diagnose predict --model report/models/new_machine-seed0 runup.csv --tacho pulses
   diagnose predict --model report/models/new_machine-seed0 bench.csv --teeth 23 84 --speed-rpm 1500
@@ -42,7 +43,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         nargs="+",
         help="one or more: .csv, .wav, .npy, .npz, .h5, .hdf5 or .mat",
     )
-    add_model(parser)
+    add_model(parser, required=False)
     _add_rotation(parser)
     add_recording_options(parser)
     _add_healthy(parser)
@@ -138,7 +139,7 @@ def run(arguments: Namespace) -> int:
     from dataclasses import replace
 
     from diagnose.recordings.predict import predict_recording
-    from diagnose.recordings.registry import open_network
+    from diagnose.recordings.registry import open_network, shipped_network
     from diagnose.recordings.source import Source
     from diagnose.training.store import load_domain
 
@@ -175,14 +176,15 @@ def run(arguments: Namespace) -> int:
         raise ConfigError("--plot is the picture of one recording; give one")
     if arguments.plot and not arguments.plot.endswith(".png"):
         raise ConfigError(f"--plot {arguments.plot} must end in .png")
-    network = open_network(arguments.model)
-    domain = load_domain(arguments.model, network.description)
+    folder = arguments.model or shipped_network()
+    network = open_network(folder)
+    domain = load_domain(folder, network.description)
     if arguments.plot:
         _plot(arguments.plot, network, sources[0])
     results = []
     for source in sources:
         result = predict_recording(network, domain, source)
-        results.append({"model": arguments.model, **result})
+        results.append({"model": str(folder), **result})
         if not arguments.json:
             print(network.line(result), flush=True)
     if arguments.json:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from diagnose.data.teeth import missing_teeth, teeth_of_records
 from gensig.errors import DatasetError
 
 if TYPE_CHECKING:
@@ -54,19 +55,18 @@ def _slowest_turn(dataset: Dataset) -> tuple[str, float]:
             "which the length of windows follows from"
         )
     usable = np.asarray(dataset.usable, dtype=bool)
-    speed = np.asarray(dataset.column("speed_rpm"), dtype=float)[usable]
-    of_pinion = 0.0
-    if speed.size and speed.min() > 0:
-        of_pinion = 60.0 / float(speed.min())
+    turning = usable & (np.asarray(dataset.column("speed_rpm"), dtype=float) > 0)
+    if not turning.any():
+        return NO_FAULT, 0.0
+    turns = 60.0 / np.asarray(dataset.column("speed_rpm"), dtype=float)[turning]
+    of_pinion = float(turns.max())
     faulty = set()
     if "fault_gear" in names:
         faulty = {str(name) for name in dataset.column("fault_gear")}
-    n_pinion, n_wheel = (
-        dataset.attributes.get(f"n_teeth_{gear}") for gear in ("pinion", "wheel")
-    )
-    if "wheel" not in faulty or not (n_pinion and n_wheel):
+    if "wheel" not in faulty or missing_teeth(dataset):
         return NO_FAULT, of_pinion
-    of_wheel = of_pinion * float(n_wheel) / float(n_pinion)
+    teeth = teeth_of_records(dataset)[turning]
+    of_wheel = float((turns * teeth[:, 1] / teeth[:, 0]).max())
     if "pinion" in faulty and of_pinion > of_wheel:
         return "pinion", of_pinion
     return "wheel", of_wheel

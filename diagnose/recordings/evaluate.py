@@ -12,6 +12,7 @@ from diagnose.data.windows import Segments, Task, all_segments, subset_segments,
 from diagnose.recordings.stored_network import Scores, StoredNetwork
 from diagnose.studies.result_files import write_metrics
 from diagnose.training.store import ModelDescription, data_fingerprint, schema_version
+from gensig.dataset.schema import READABLE_VERSIONS
 from gensig.errors import ConfigError, DatasetError
 
 if TYPE_CHECKING:
@@ -124,15 +125,16 @@ def fitting_channels(
 ) -> tuple[str, ...]:
     """Channels of a data set for those of a network.
 
-    Refuses another format, a lower rate than that of the training unless the network
+    Refuses a format that this version does not read, a lower rate than that of the training unless the network
     ``reads_any_rate``, and channels that it has not.
     """
     where = f"{dataset.folder} does not fit the model"
-    trained_on = description.data_schema_version
-    if trained_on is not None and schema_version(dataset) != trained_on:
+    trained_on, found = description.data_schema_version, schema_version(dataset)
+    if trained_on is not None and not {trained_on, found} <= set(READABLE_VERSIONS):
+        readable = " and ".join(map(str, READABLE_VERSIONS))
         raise DatasetError(
-            f"{where}: data schema {schema_version(dataset)}, trained on schema "
-            f"{trained_on}",
+            f"{where}: data schema {found}, trained on schema {trained_on}, and this version "
+            f"reads {readable}",
         )
     is_slower = dataset.sampling_rate < description.sampling_rate_hz * (1 - 1e-9)
     if is_slower and not reads_any_rate:

@@ -1,7 +1,11 @@
-"""Stored networks by what they learned: each answers, is judged and is exported in its own way."""
+"""Stored networks by what they learned: each answers, is judged and is exported in its own way.
+
+One comes with gensig: that for any pair of gears.
+"""
 
 from __future__ import annotations
 
+from importlib.resources import files
 from pathlib import Path
 
 from diagnose.recordings.stored_classifier import StoredClassifier
@@ -14,6 +18,11 @@ STORED: dict[str, type[StoredNetwork]] = {
     "classes": StoredClassifier,
     "remaining_life": StoredLife,
 }
+
+
+def shipped_network() -> Path:
+    """Folder of the network for any pair of gears, which comes with gensig."""
+    return Path(str(files("diagnose"))) / "shipped" / "any_pair"
 
 
 def open_network(folder: str | Path) -> StoredNetwork:

@@ -184,7 +184,7 @@ OTHER_CLASSES = ("healthy", "crack", "pitting", "broken")
         ({"sampling_rate": 6400.0}, {}, "sampled at 6400 Hz, trained at 12800 Hz"),
         ({"classes": OTHER_CLASSES}, {}, "are healthy, crack, pitting, broken"),
         ({"classes": OTHER_CLASSES[:2]}, {}, "are healthy, crack, the model knows"),
-        ({}, {"schema_version": 2}, "data schema 2, trained on schema 1"),
+        ({}, {"schema_version": 3}, "data schema 3, trained on schema 1, and this version reads"),
     ],
 )
 def test_evaluate_refuses_what_does_not_fit(
@@ -195,6 +195,12 @@ def test_evaluate_refuses_what_does_not_fit(
     data["other"] = fake(**changes)
     data["other"].attributes.update(attributes)
     refuses(capsys, evaluating(trained), message)
+
+
+def test_evaluate_reads_every_readable_format(trained, data, capsys):
+    data["other"] = fake()
+    data["other"].attributes["schema_version"] = 2
+    says(capsys, *evaluating(trained))
 
 
 def test_evaluate_refuses_other_channels(trained, data, capsys):
@@ -237,7 +243,7 @@ TRAIN = "train data=good out=OUT"
         (f"{TRAIN} normalise=rms,none", "-m"),
         (f"{TRAIN} model=cnn window_samples=100000", "longest stretch"),
         ("train --fast", "no flag '--fast'"),
-        ("evaluate data=good", "model_dir is required"),
+        ("evaluate model_dir=good", "data is required"),
         ("evaluate data=good modeldir=x", "did you mean model_dir"),
         ("evaluate data=good x", "not of the form key=value"),
         ("learn", "no command 'learn'"),

@@ -38,6 +38,16 @@ def test_slow_gears_get_turns_of_the_one_with_the_fault(gear, ratio):
     assert "\n" not in why
 
 
+def test_the_slowest_wheel_of_different_pairs_counts():
+    dataset = at_speed(300, gear="wheel", duration=5.0)
+    wheel = np.full(dataset.n_records, 30)
+    wheel[3] = 92
+    dataset.n_teeth = {"pinion": np.full(dataset.n_records, 23), "wheel": wheel}.get
+    window, _ = chosen_window(dataset)
+    expected = TURNS * 92 / 23 * 60 / 300 * dataset.sampling_rate
+    assert window == pytest.approx(expected, rel=1e-3)
+
+
 def test_the_slowest_usable_record_counts():
     dataset = at_speed(1800, gear="pinion", duration=2.0)
     dataset.columns["speed_rpm"][3] = 300.0
