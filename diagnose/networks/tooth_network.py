@@ -8,18 +8,19 @@ from typing import ClassVar, final
 
 import torch
 from torch import nn
-from torch.nn.functional import cross_entropy, log_softmax, relu
+from torch.nn.functional import avg_pool1d, cross_entropy, log_softmax, relu
 
 from diagnose.data.inputs import NetworkInput
 from diagnose.data.packed_turns import HEADER
 from diagnose.data.targets import GEARS, further_loss
 from diagnose.data.turns import NO_REFERENCE, Turns
 from diagnose.networks.network import SiteNetwork, check_blocks
-from diagnose.networks.tooth_batch import ToothBatch
+from diagnose.networks.tooth_batch import TINY, ToothBatch
 from diagnose.networks.tooth_entry import EntryEstimator, sample_of
 from gensig.errors import ConfigError
 
 SPREAD_FLOOR = 0.1  # of a response over the teeth, beside responses of about unit variance; assumed
+LEVEL_FLOOR = 0.02  # of the mean square of a turn, under the logarithm; assumed
 JITTER = 1  # samples by which entries known in training are moved at random; assumed
 SEVERITY_WEIGHT = 0.3  # of the severity beside the class; assumed
 NEVER = -1e4  # score of a site that a window does not have
@@ -50,6 +51,8 @@ class ToothNetwork(SiteNetwork):
         training
     entry_width : filters of the estimate of the entry
     dropout : share of the numbers of a site dropped in training
+    level_samples : samples over which a response is squared and averaged, odd; the logarithms of
+        these levels are further maps of the first convolution. 0: no such maps
     unexplained : True if the turns of what no other tooth explains follow in the input
     reference : ``"none"``, or another word where the turns of a sound record follow
     """
@@ -72,6 +75,7 @@ class ToothNetwork(SiteNetwork):
         compression: float,
         entry_width: int,
         dropout: float,
+        level_samples: int = 0,
         unexplained: bool = False,
         reference: str = NO_REFERENCE,
     ) -> None:
@@ -83,7 +87,9 @@ class ToothNetwork(SiteNetwork):
         self.of_mesh = nn.Conv1d(
             n_channels, widths[0], kernels[0], strides[0], bias=False
         )
-        inputs = (self.n_kinds * n_channels, *widths[:-1])
+        self.level_samples = _checked_level(level_samples)
+        first = widths[0] * (2 if level_samples else 1)
+        inputs = (self.n_kinds * n_channels, first, *widths[1:-1])
         self.convolutions = nn.ModuleList(
             nn.Conv1d(n_in, n_out, kernel, stride, bias=False)
             for n_in, n_out, kernel, stride in zip(
@@ -91,7 +97,9 @@ class ToothNetwork(SiteNetwork):
             )
         )
         self.margins = [kernel // 2 for kernel in kernels]
-        self.norms = nn.ModuleList(nn.BatchNorm1d(width) for width in widths)
+        self.norms = nn.ModuleList(
+            nn.BatchNorm1d(width) for width in (first, *widths[1:])
+        )
         self.compression = nn.Parameter(torch.full((widths[0], 1), float(compression)))
         n_responses = widths[-1] * self.n_positions
         self.of_tooth = nn.Conv1d(
@@ -267,18 +275,38 @@ class ToothNetwork(SiteNetwork):
         usual = self.of_mesh(passages / self.input_scale)
         samples = batch.samples(windows, start, n_samples, margin, self.n_kinds)
         scale = self.input_scale.repeat(self.n_kinds, 1)
-        teeth = self.convolutions[0](samples / scale) + usual.index_select(
+        responses = self.convolutions[0](samples / scale) + usual.index_select(
             0, batch.window
         )
         teeth = batch.against_sisters(
-            _compressed(self.compression * teeth), SPREAD_FLOOR
+            _compressed(self.compression * responses), SPREAD_FLOOR
         )
+        if self.level_samples:
+            levels = self._levels(responses, batch)
+            levels = batch.against_sisters(levels, SPREAD_FLOOR)
+            teeth = torch.cat([teeth, levels], dim=1)
         for index, norm in enumerate(self.norms):
             if index:
                 wide = batch.with_margins(teeth, self.margins[index])
                 teeth = self.convolutions[index](wide)
             teeth = relu(norm(teeth))
         return teeth
+
+    def _levels(self, responses: torch.Tensor, batch: ToothBatch) -> torch.Tensor:
+        """Logarithms of the mean squares of responses (tooth, map, position) about each place.
+
+        They tell how loud a tooth is, whatever the frequency at which the machine rings.
+        """
+        square = responses.square()
+        usual = batch.of_teeth(batch.means(square).mean(dim=-1, keepdim=True))
+        about = avg_pool1d(
+            square,
+            self.level_samples,
+            stride=1,
+            padding=self.level_samples // 2,
+            count_include_pad=False,
+        )
+        return torch.log(about / (usual + TINY) + LEVEL_FLOOR)
 
     def _known_site(
         self, targets: Mapping[str, torch.Tensor], n_teeth: torch.Tensor
@@ -351,6 +379,15 @@ def _positions(
             )
         length //= stride
     return length
+
+
+def _checked_level(level_samples: int) -> int:
+    """The number of samples, which must be odd or 0."""
+    if level_samples < 0 or (level_samples and level_samples % 2 == 0):
+        raise ConfigError(
+            f"model: level_samples must be odd, or 0 for none, not {level_samples}"
+        )
+    return level_samples
 
 
 def _compressed(responses: torch.Tensor) -> torch.Tensor:

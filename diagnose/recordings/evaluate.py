@@ -125,8 +125,8 @@ def fitting_channels(
 ) -> tuple[str, ...]:
     """Channels of a data set for those of a network.
 
-    Refuses a format that this version does not read, a lower rate than that of the training unless the network
-    ``reads_any_rate``, and channels that it has not.
+    Refuses a format that this version does not read, a lower rate than that of the training
+    unless the network ``reads_any_rate``, and channels that it has not.
     """
     where = f"{dataset.folder} does not fit the model"
     trained_on, found = description.data_schema_version, schema_version(dataset)

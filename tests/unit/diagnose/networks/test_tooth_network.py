@@ -9,6 +9,7 @@ from torch.nn.functional import pad
 from diagnose.data.packed_turns import HEADER
 from diagnose.data.targets import GEARS
 from diagnose.networks.registry import build_model
+from diagnose.networks.tooth_batch import ToothBatch
 from diagnose.networks.tooth_entry import EntryEstimator, rolled, sample_of
 from diagnose.networks.tooth_network import NEVER
 from gensig.errors import ConfigError
@@ -56,10 +57,12 @@ def test_a_site_is_no_gear_a_whole_gear_or_a_tooth(scores):
     assert [gear for gear, _ in sites].count("wheel") == 1 + TEETH[1]
 
 
-@pytest.mark.parametrize("passages", [1, 3])
-def test_sites_turn_with_the_gears(scores, passages):
+@pytest.mark.parametrize(("passages", "level_samples"), [(1, 0), (3, 0), (3, 3)])
+def test_sites_turn_with_the_gears(passages, level_samples):
+    model = network(level_samples=level_samples)
     with torch.inference_mode():
-        later = network().site_scores(turned(windows(), passages * PER_TOOTH))
+        scores = model.site_scores(windows())
+        later = model.site_scores(turned(windows(), passages * PER_TOOTH))
     whole, pinion, wheel = scores.split((len(GEARS), *TEETH), dim=1)
     expected = [whole, pinion.roll(-passages, 1), wheel.roll(-passages, 1)]
     torch.testing.assert_close(later, torch.cat(expected, dim=1), rtol=1e-4, atol=1e-5)
@@ -160,6 +163,7 @@ def test_an_unknown_entry_is_no_target():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
+        ({"level_samples": 4}, "level_samples must be odd, or 0 for none, not 4"),
         ({"strides": [3, 2]}, "6 samples one, which does not divide the 16"),
         ({"kernels": [16, 9]}, "kernels must be odd"),
         ({"kernels": [9]}, "lists of the same length"),
@@ -169,6 +173,19 @@ def test_an_unknown_entry_is_no_target():
 def test_lists_that_do_not_fit_are_refused(changes, message):
     with pytest.raises(ConfigError, match=message):
         network(**changes)
+
+
+def test_levels_know_neither_sign_nor_loudness_of_a_turn():
+    model, batch = network(level_samples=3), ToothBatch.of(windows())
+    responses = torch.randn(4 * sum(TEETH), 8, 6)
+    levels = model._levels(responses, batch)
+    torch.testing.assert_close(model._levels(-30.0 * responses, batch), levels)
+    louder = responses.clone()
+    louder[5] *= 10.0
+    change = model._levels(louder, batch) - levels
+    assert change[5].min() > 1.0
+    others = change[batch.turn == batch.turn[5]].flatten(1).mean(dim=1)
+    assert (others < 0).sum() == TEETH[0] - 1
 
 
 OTHER = (5, 17)
