@@ -43,7 +43,7 @@ from diagnose.training.train import Training, train_network
 from gensig.options.compose import compose
 
 EXPERIMENT = "experiment=many_machines"
-N_RECORDS, N_VALIDATION, N_TEST = 20_000, 800, 400
+N_RECORDS, N_VALIDATION, N_TEST = 20_000, 400, 400
 RECORDS_A_UNIT = 4
 SEED, VALIDATION_SEED, TEST_SEED = 1, 2, 3
 TORQUE = "operating.torque_nm"
@@ -53,7 +53,9 @@ N_BOOTSTRAP = 2000
 TRAINING = (
     "model=tooth",
     "model.each_channel=true",
-    "epochs=10",
+    "model.whitened=true",
+    "model.level_samples=5",
+    "epochs=9",
     "epoch_fraction=0.34",
     "batch_size=32",
     "reference=none",
@@ -151,17 +153,43 @@ class Judged:
         return f"| {' | '.join(cells)} |"
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Maker:
+    """Makes inputs of streams.
+
+    Attributes
+    ----------
+    inputs : of the network
+    n_workers : processes
+    kept : folder that keeps the turns for another training, or None
+    """
+
+    inputs: Turns
+    n_workers: int
+    kept: Path | None
+
+    def windows(self, title: str, words: Words) -> WindowSet:
+        """Inputs of a stream, with a line for each tenth of its blocks."""
+
+        def on_block(done: int, total: int) -> None:
+            if done * 10 // total > (done - 1) * 10 // total:
+                say(f"{title}: {done} of {total} blocks")
+
+        return windows_of(
+            words,
+            self.inputs,
+            n_workers=self.n_workers,
+            kept=self.kept,
+            on_block=on_block,
+        )
+
+
 def judge(
-    test: TestSet,
-    n_records: int,
-    inputs: Turns,
-    training: Training[Any],
-    domain: Any,
-    n_workers: int,
+    test: TestSet, n_records: int, maker: Maker, training: Training[Any], domain: Any
 ) -> Judged:
     """Scores on new machines of a test set."""
     words = words_of(n_records, TEST_SEED, test.words)
-    windows, stream = windows_of(words, inputs, n_workers=n_workers), stream_of(words)
+    windows, stream = maker.windows(test.title, words), stream_of(words)
     record, answers = over_records(
         predict_windows(training.model, windows), windows.record
     )
@@ -275,7 +303,7 @@ def card(words: Words, settings: TrainSettings, judged: Sequence[Judged]) -> str
             "answers are averaged.",
             "",
             f"Trained on {len(stream):,} simulated records of {n_units:,} machines, streamed and",
-            f"not stored: 1 s, {len(stream.channel_names)} sensors on the housing. No recording",
+            f"not stored: 0.8 s, {len(stream.channel_names)} sensors on the housing. No recording",
             "of a real machine was used. Drawn for every machine or condition:",
             "",
             *ranges,
@@ -319,38 +347,28 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--records", type=int, default=N_RECORDS)
     parser.add_argument("--test-records", type=int, default=N_TEST)
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--turns", type=Path, help="keeps turns for another training")
     given = parser.parse_args(arguments)
     settings = settings_from(compose("train", list(TRAINING)))
     inputs = input_of(settings.model)
     assert isinstance(inputs, Turns)
+    maker = Maker(inputs=inputs, n_workers=given.workers, kept=given.turns)
 
     words = words_of(given.records, SEED)
-    windows = _windows("training", words, inputs, given.workers)
+    windows = maker.windows("training", words)
     held_out = words_of(min(given.records, N_VALIDATION), VALIDATION_SEED)
-    validation = _windows("validation", held_out, inputs, given.workers)
+    validation = maker.windows("validation", held_out)
     training = train(windows, validation, settings, len(stream_of(words).class_names))
     domain = fit_domain(windows, validation)
     judged = []
     for test in TEST_SETS:
-        result = judge(
-            test, given.test_records, inputs, training, domain, given.workers
-        )
+        result = judge(test, given.test_records, maker, training, domain)
         judged.append(result)
         say(result.row())
     description = describe(settings, words, training, domain, judged[0])
     save_model(given.folder, training.weights() | domain.tensors(), description)
     (given.folder / "README.md").write_text(card(words, settings, judged))
     say(f"{given.folder}: network and card")
-
-
-def _windows(title: str, words: Words, inputs: Turns, n_workers: int) -> WindowSet:
-    """Inputs of a stream, with a line for each tenth of its blocks."""
-
-    def on_block(done: int, total: int) -> None:
-        if done * 10 // total > (done - 1) * 10 // total:
-            say(f"{title}: {done} of {total} blocks")
-
-    return windows_of(words, inputs, n_workers=n_workers, on_block=on_block)
 
 
 if __name__ == "__main__":

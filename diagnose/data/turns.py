@@ -29,6 +29,7 @@ from gensig.options.configuration import Section
 from gensig.signals.alignment import aligned_turns
 from gensig.signals.separation import GearTurns, separate_gears
 from gensig.signals.unexplained_teeth import unexplained_teeth
+from gensig.signals.whitening import whitened_turns
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 # Keys of a network's configuration.
 N_TEETH, PER_TOOTH, HALVES = "n_teeth", "samples_per_tooth", "halves"
 REFERENCE, NO_REFERENCE, UNEXPLAINED = "reference", "none", "unexplained"
-EACH_CHANNEL = "each_channel"
+EACH_CHANNEL, WHITENED = "each_channel", "whitened"
 LEAST_HARMONICS = 3  # of the mesh that a recording must hold; assumed
 EXAMPLE_TEETH = (11, 13)  # of an input that is tried on a network; any numbers serve
 
@@ -68,6 +69,8 @@ class Turns(NetworkInput):
         others, rotated to them; or ``"none"``
     each_channel : True if every channel is an input of its own, so that a network takes
         recordings of any number of channels
+    whitened : True if the resonances of the machine are taken from the turns, see
+        `gensig.signals.whitening`
     """
 
     samples_per_tooth: int
@@ -76,6 +79,7 @@ class Turns(NetworkInput):
     unexplained: bool = False
     reference: str = NO_REFERENCE
     each_channel: bool = False
+    whitened: bool = False
 
     has_window_length: ClassVar[bool] = False
     why_not_exported: ClassVar[str | None] = (
@@ -120,6 +124,7 @@ class Turns(NetworkInput):
             unexplained=model_config.get(UNEXPLAINED, False),
             reference=model_config.get(REFERENCE, NO_REFERENCE),
             each_channel=model_config.get(EACH_CHANNEL, False),
+            whitened=model_config.get(WHITENED, False),
         )
 
     @property
@@ -263,13 +268,20 @@ class Turns(NetworkInput):
         ------
         ValueError    for less than a turn of the driving gear
         """
-        return separate_gears(
+        turns = separate_gears(
             signal,
             sampling_rate,
             speed_rpm / 60 * n_teeth[0],
             n_teeth,
             samples_per_tooth=self.samples_per_tooth,
         )
+        return self.prepared(turns)
+
+    def prepared(self, turns: GearTurns) -> GearTurns:
+        """Turns as the network looks at them: whitened, if the input says so."""
+        if self.whitened:
+            return whitened_turns(turns)
+        return turns
 
     def packed(
         self, turns: GearTurns, sound: Sequence[GearTurns] = ()

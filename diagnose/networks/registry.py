@@ -35,7 +35,8 @@ MODELS: dict[str, type[Network]] = {
 # Keys of a network's file that its class does not take: its name, its schedule, its input and
 # the network that is trained where it cannot be.
 OTHERWISE = "otherwise"
-NOT_OF_NETWORK = ("name", "kind", "training", "halves", "each_channel", OTHERWISE)
+INPUT_KEYS = ("halves", "each_channel", "whitened")  # of the input alone
+NOT_OF_NETWORK = ("name", "kind", "training", OTHERWISE, *INPUT_KEYS)
 
 
 def build_model(
