@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 import gensig
 from diagnose.data.packed_turns import HEADER, packed, turns_of
@@ -104,6 +105,7 @@ _source: dict[str, Any] = {}  # stream and input of a process
 
 
 def _begin(stream: RecordStream, inputs: Turns) -> None:
+    threadpool_limits(1)  # as many threads as processes already
     # The turns are kept as they are recorded; each training prepares them in its own way.
     recorded = replace(inputs, whitened=False)
     _source.update(

@@ -184,7 +184,11 @@ OTHER_CLASSES = ("healthy", "crack", "pitting", "broken")
         ({"sampling_rate": 6400.0}, {}, "sampled at 6400 Hz, trained at 12800 Hz"),
         ({"classes": OTHER_CLASSES}, {}, "are healthy, crack, pitting, broken"),
         ({"classes": OTHER_CLASSES[:2]}, {}, "are healthy, crack, the model knows"),
-        ({}, {"schema_version": 3}, "data schema 3, trained on schema 1, and this version reads"),
+        (
+            {},
+            {"schema_version": 3},
+            "data schema 3, trained on schema 1, and this version reads",
+        ),
     ],
 )
 def test_evaluate_refuses_what_does_not_fit(
