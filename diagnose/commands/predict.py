@@ -136,42 +136,11 @@ def _add_rotation(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Print the answers; exit status 3 if a recording is unlike the training data."""
-    from dataclasses import replace
-
     from diagnose.recordings.predict import predict_recording
     from diagnose.recordings.registry import open_network, shipped_network
-    from diagnose.recordings.source import Source
     from diagnose.training.store import load_domain
 
-    described = [
-        Source(
-            file=recording,
-            sampling_rate=arguments.sampling_rate,
-            speed_rpm=arguments.speed_rpm,
-            teeth=arguments.teeth and tuple(arguments.teeth),
-            tacho=arguments.tacho,
-            pulses_per_turn=arguments.pulses_per_turn,
-            as_recorded=arguments.as_recorded,
-            to_speed_rpm=arguments.to_speed,
-            channels=arguments.channels and tuple(arguments.channels),
-            unit=arguments.unit,
-            array=arguments.array,
-            torque_nm=arguments.torque_nm,
-            life_time_h=arguments.life_time_h,
-        )
-        for recording in arguments.recording
-    ]
-    speed = arguments.healthy_speed_rpm or arguments.speed_rpm
-    sources = [
-        replace(
-            source,
-            healthy=tuple(
-                replace(source, file=file, speed_rpm=speed)
-                for file in arguments.healthy
-            ),
-        )
-        for source in described
-    ]
+    sources = _sources(arguments)
     if arguments.plot and len(sources) > 1:
         raise ConfigError("--plot is the picture of one recording; give one")
     if arguments.plot and not arguments.plot.endswith(".png"):
@@ -197,6 +166,43 @@ def run(arguments: Namespace) -> int:
     if any(result["out_of_distribution"] for result in results):
         return OUT_OF_DISTRIBUTION
     return 0
+
+
+def _sources(arguments: Namespace) -> list[Source]:
+    """Recordings as they are described, with the healthy ones of the same machine."""
+    from dataclasses import replace
+
+    from diagnose.recordings.source import Source
+
+    described = [
+        Source(
+            file=recording,
+            sampling_rate=arguments.sampling_rate,
+            speed_rpm=arguments.speed_rpm,
+            teeth=arguments.teeth and tuple(arguments.teeth),
+            tacho=arguments.tacho,
+            pulses_per_turn=arguments.pulses_per_turn,
+            as_recorded=arguments.as_recorded,
+            to_speed_rpm=arguments.to_speed,
+            channels=arguments.channels and tuple(arguments.channels),
+            unit=arguments.unit,
+            array=arguments.array,
+            torque_nm=arguments.torque_nm,
+            life_time_h=arguments.life_time_h,
+        )
+        for recording in arguments.recording
+    ]
+    speed = arguments.healthy_speed_rpm or arguments.speed_rpm
+    return [
+        replace(
+            source,
+            healthy=tuple(
+                replace(source, file=file, speed_rpm=speed)
+                for file in arguments.healthy
+            ),
+        )
+        for source in described
+    ]
 
 
 def _plot(file: str, network: StoredNetwork, source: Source) -> None:

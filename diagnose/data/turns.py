@@ -16,6 +16,7 @@ from diagnose.data.references import reference_kind, references
 from diagnose.data.targets import GEARS, fault_positions, record_targets, tooth_entries
 from diagnose.data.teeth import common_teeth, missing_teeth, teeth_of_records
 from diagnose.data.turn_levels import turn_levels
+from diagnose.data.whitening import whitened_turns
 from diagnose.data.windows import (
     FloatArray,
     Read,
@@ -29,7 +30,6 @@ from gensig.options.configuration import Section
 from gensig.signals.alignment import aligned_turns
 from gensig.signals.separation import GearTurns, separate_gears
 from gensig.signals.unexplained_teeth import unexplained_teeth
-from gensig.signals.whitening import whitened_turns
 
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
@@ -70,7 +70,7 @@ class Turns(NetworkInput):
     each_channel : True if every channel is an input of its own, so that a network takes
         recordings of any number of channels
     whitened : True if the resonances of the machine are taken from the turns, see
-        `gensig.signals.whitening`
+        `diagnose.data.whitening`
     """
 
     samples_per_tooth: int

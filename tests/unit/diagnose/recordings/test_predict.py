@@ -268,7 +268,7 @@ def test_recordings_that_do_not_fit_are_refused(
     for name, options, message in FITS:
         words = ["predict", "--model", model, str(tmp_path / name), *options.split()]
         refuses(capsys, words, message)
-    refuses(capsys, ["predict", str(tmp_path / "good.npz")], "--model")
+    refuses(capsys, ["predict", str(tmp_path / "good.npz")], "--teeth DRIVING DRIVEN")
     refuses(capsys, ["predict", "--model", model], "RECORDING")
     whole = tmp_path / "whole.wav"
     wavfile.write(whole, RATE, np.round(3000 * good.T).astype(np.int16))

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from diagnose.data.whitening import whitened_turns
 from gensig.signals.separation import GearTurns
-from gensig.signals.whitening import whitened_turns
 
 TEETH, PER_TOOTH = (23, 57), 64
 
