@@ -32,7 +32,9 @@ def page_faults(mode: str) -> int:
     return int(done.stdout)
 
 
-@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="the C library is not glibc")
+@pytest.mark.skipif(
+    platform.libc_ver()[0] != "glibc", reason="the C library is not glibc"
+)
 def test_a_freed_large_array_is_used_again_without_new_pages() -> None:
     assert page_faults("keep") < 50
     assert page_faults("return") > 500
