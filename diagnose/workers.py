@@ -94,7 +94,7 @@ def one_thread() -> Iterator[None]:
 
 
 def keep_freed_memory() -> bool:
-    """Whether this process now keeps the memory that it frees, for its next arrays.
+    """True if this process now keeps the memory that it frees, for its next arrays.
 
     A training step frees its large arrays and asks for the same ones in the next step. glibc
     gives such blocks back to the system, which then hands out every page anew: a fifth of the
