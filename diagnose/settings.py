@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -89,6 +90,8 @@ class Schedule:
     Attributes
     ----------
     epochs : most epochs
+    examples : examples after which no further epoch begins once `LEAST_EPOCHS` are done; None sets
+        no such end
     patience : epochs without a better validation loss before stopping; 0 never stops, and keeps
         the weights of the last epoch
     epoch_fraction : share of the training signal that is drawn as windows in one epoch
@@ -97,13 +100,29 @@ class Schedule:
     epochs: int
     patience: int
     epoch_fraction: float
+    examples: int | None = None
 
     def __post_init__(self) -> None:
         _check_whole("epochs", self.epochs, least=1)
+        if self.examples is not None:
+            _check_whole("examples", self.examples, least=1)
         _check_whole("patience", self.patience, least=0)
         _check_share("epoch_fraction", self.epoch_fraction)
 
+    def epochs_of(self, n_drawn: int) -> int:
+        """Most epochs of a training that draws so many examples in each."""
+        if self.examples is None:
+            return self.epochs
+        enough = max(math.ceil(self.examples / n_drawn), LEAST_EPOCHS)
+        return min(self.epochs, enough)
 
+
+LEAST_EPOCHS = 8  # of a training that has shown its network enough examples; assumed
+GIVEN = (
+    "epochs",
+    "patience",
+    "epoch_fraction",
+)  # keys of a schedule in ``configs/train.yaml``
 USUAL = Schedule(epochs=14, patience=5, epoch_fraction=0.25)
 
 
@@ -205,13 +224,15 @@ class TrainSettings:
         return self._given(USUAL)
 
     def _given(self, otherwise: Schedule) -> Schedule:
-        """The keys of a schedule that are given, the others of another one."""
-        names = [field.name for field in dataclasses.fields(Schedule)]
-        given = {name: getattr(self, name) for name in names}
-        return dataclasses.replace(
-            otherwise,
-            **{name: value for name, value in given.items() if value is not None},
-        )
+        """The keys of a schedule that are given, the others of another one.
+
+        A given number of epochs takes the place of a number of examples.
+        """
+        given = {name: getattr(self, name) for name in GIVEN}
+        given = {name: value for name, value in given.items() if value is not None}
+        if "epochs" in given:
+            given["examples"] = None
+        return dataclasses.replace(otherwise, **given)
 
     def _check_one(self, key: str, allowed: Sequence[Any], text: str) -> None:
         """Refuse a value that is not allowed."""

@@ -27,7 +27,7 @@ from diagnose.data.windows import (
 )
 from gensig.errors import ConfigError, DatasetError
 from gensig.options.configuration import Section
-from gensig.signals.alignment import aligned_turns
+from gensig.signals.alignment import changed_turns
 from gensig.signals.separation import GearTurns, separate_gears
 from gensig.signals.unexplained_teeth import unexplained_teeth
 
@@ -65,8 +65,8 @@ class Turns(NetworkInput):
     halves : True if a training takes either half of a stretch as a further example
     unexplained : True if the turns of what no other tooth explains stand behind the record, see
         `gensig.signals.unexplained_teeth`
-    reference : kind of `diagnose.data.references.references`, whose turns stand behind all
-        others, rotated to them; or ``"none"``
+    reference : kind of `diagnose.data.references.references`; what these do not explain of the
+        turns stands behind all others, see `gensig.signals.alignment.changed_turns`; or ``"none"``
     each_channel : True if every channel is an input of its own, so that a network takes
         recordings of any number of channels
     whitened : True if the resonances of the machine are taken from the turns, see
@@ -288,13 +288,14 @@ class Turns(NetworkInput):
     ) -> NDArray[np.float32]:
         """Turns of both gears and the mean passage of a recording, one after the other.
 
-        Those of what no other tooth explains and of a sound recording follow, where the input has
-        them.
+        Those of what no other tooth explains, and of what sound recordings do not explain, follow
+        where the input has them.
 
         Parameters
         ----------
         turns : of the recording
-        sound : of sound recordings of the same machine, which are rotated to it and averaged
+        sound : of sound recordings of the same machine, see
+            `gensig.signals.alignment.changed_turns`
 
         Returns
         -------
@@ -305,10 +306,8 @@ class Turns(NetworkInput):
         if self.unexplained:
             further += [gear.rest for gear in unexplained_teeth(*gears)]
         if sound:
-            rotated = [aligned_turns(other, turns) for other in sound]
-            driving = np.mean([other.driving for other in rotated], axis=0)
-            driven = np.mean([other.driven for other in rotated], axis=0)
-            further += [self._teeth(driving), self._teeth(driven)]
+            changed = changed_turns(turns, sound)
+            further += [self._teeth(changed.driving), self._teeth(changed.driven)]
         return packed(gears, turns.mesh, further)
 
     def levels(self, turns: GearTurns) -> NDArray[np.float32]:

@@ -9,8 +9,7 @@ from typing import Self, final
 import torch
 
 from diagnose.data.packed_turns import HEADER
-
-TINY = 1e-12  # under a root, for its gradient at 0
+from diagnose.networks.sisters import TINY, permuted, standardised
 
 
 @final
@@ -52,6 +51,12 @@ class ToothBatch:
             number=place - first,
             first=first,
         )
+
+    @property
+    def counts(self) -> list[int]:
+        """Teeth of each turn, the driving gears of all windows first."""
+        counts: list[int] = self.n_teeth.T.flatten().tolist()
+        return counts
 
     @property
     def turn(self) -> torch.Tensor:
@@ -130,8 +135,7 @@ class ToothBatch:
 
         ``floor`` is added to the spread of the teeth.
         """
-        apart = teeth - self.of_teeth(self.means(teeth))
-        return apart / self.of_teeth(self.spreads(apart) + floor)
+        return standardised(teeth, self.counts, floor)
 
     def of_teeth(self, turns: torch.Tensor) -> torch.Tensor:
         """Values (tooth, ...) of the turn of every tooth, of values (turn, ...)."""
@@ -141,8 +145,9 @@ class ToothBatch:
         """Values (tooth, map, place) with the last and first places of the neighbors beside."""
         if margin == 0:
             return teeth
-        before = teeth[..., -margin:].index_select(0, self.neighbor(-1))
-        behind = teeth[..., :margin].index_select(0, self.neighbor(1))
+        last, next_ = self.neighbor(-1), self.neighbor(1)
+        before = permuted(teeth[..., -margin:], last, next_)
+        behind = permuted(teeth[..., :margin], next_, last)
         return torch.cat([before, teeth, behind], dim=-1)
 
 

@@ -8,7 +8,7 @@ from typing import ClassVar, final
 
 import torch
 from torch import nn
-from torch.nn.functional import avg_pool1d, cross_entropy, log_softmax, relu
+from torch.nn.functional import cross_entropy, log_softmax, relu, relu_
 
 from diagnose.data.inputs import NetworkInput
 from diagnose.data.packed_turns import HEADER
@@ -54,9 +54,10 @@ class ToothNetwork(SiteNetwork):
     level_samples : samples over which a response is squared and averaged, odd; the logarithms of
         these levels are further maps of the first convolution. 0: no such maps
     unexplained : True if the turns of what no other tooth explains follow in the input
-    reference : ``"none"``, or another word where the turns of a sound record follow
+    reference : ``"none"``, or another word where what a sound record does not explain follows
     """
 
+    about: torch.Tensor
     inputs: ClassVar[type[NetworkInput]] = Turns
     takes_reference: ClassVar[bool] = True
 
@@ -88,18 +89,19 @@ class ToothNetwork(SiteNetwork):
             n_channels, widths[0], kernels[0], strides[0], bias=False
         )
         self.level_samples = _checked_level(level_samples)
+        about = _means_about(samples_per_tooth // strides[0], level_samples)
+        self.register_buffer("about", about, persistent=False)
         first = widths[0] * (2 if level_samples else 1)
         inputs = (self.n_kinds * n_channels, first, *widths[1:-1])
+        # The responses of the first filters are standardised before `threshold` is added.
         self.convolutions = nn.ModuleList(
-            nn.Conv1d(n_in, n_out, kernel, stride, bias=False)
-            for n_in, n_out, kernel, stride in zip(
-                inputs, widths, kernels, strides, strict=True
+            nn.Conv1d(n_in, n_out, kernel, stride, bias=index > 0)
+            for index, (n_in, n_out, kernel, stride) in enumerate(
+                zip(inputs, widths, kernels, strides, strict=True)
             )
         )
+        self.threshold = nn.Parameter(torch.zeros(first, 1))
         self.margins = [kernel // 2 for kernel in kernels]
-        self.norms = nn.ModuleList(
-            nn.BatchNorm1d(width) for width in (first, *widths[1:])
-        )
         self.compression = nn.Parameter(torch.full((widths[0], 1), float(compression)))
         n_responses = widths[-1] * self.n_positions
         self.of_tooth = nn.Conv1d(
@@ -285,11 +287,11 @@ class ToothNetwork(SiteNetwork):
             levels = self._levels(responses, batch)
             levels = batch.against_sisters(levels, SPREAD_FLOOR)
             teeth = torch.cat([teeth, levels], dim=1)
-        for index, norm in enumerate(self.norms):
-            if index:
-                wide = batch.with_margins(teeth, self.margins[index])
-                teeth = self.convolutions[index](wide)
-            teeth = relu(norm(teeth))
+        teeth = relu_(teeth + self.threshold)
+        for convolution, margin in zip(
+            self.convolutions[1:], self.margins[1:], strict=True
+        ):
+            teeth = relu_(convolution(batch.with_margins(teeth, margin)))
         return teeth
 
     def _levels(self, responses: torch.Tensor, batch: ToothBatch) -> torch.Tensor:
@@ -299,13 +301,7 @@ class ToothNetwork(SiteNetwork):
         """
         square = responses.square()
         usual = batch.of_teeth(batch.means(square).mean(dim=-1, keepdim=True))
-        about = avg_pool1d(
-            square,
-            self.level_samples,
-            stride=1,
-            padding=self.level_samples // 2,
-            count_include_pad=False,
-        )
+        about = square @ self.about
         return torch.log(about / (usual + TINY) + LEVEL_FLOOR)
 
     def _known_site(
@@ -388,6 +384,13 @@ def _checked_level(level_samples: int) -> int:
             f"model: level_samples must be odd, or 0 for none, not {level_samples}"
         )
     return level_samples
+
+
+def _means_about(n_places: int, n_samples: int) -> torch.Tensor:
+    """(place, place) weights of the mean over so many places about each, fewer at the ends."""
+    place = torch.arange(n_places)
+    near = (place - place[:, None]).abs() <= n_samples // 2
+    return near / near.sum(dim=0)
 
 
 def _compressed(responses: torch.Tensor) -> torch.Tensor:

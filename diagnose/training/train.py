@@ -90,11 +90,12 @@ def train_network(
         schedule = settings.schedule
         n_drawn = windows_an_epoch(train, schedule.epoch_fraction)
         n_batches = max(n_drawn // settings.batch_size, 1)
-        descent = _Descent(model, settings, n_batches)
+        n_epochs = schedule.epochs_of(n_drawn)
+        descent = _Descent(model, settings, n_epochs * n_batches)
         held_out = torch.from_numpy(validation.cut(np.arange(len(validation))))
         losses: list[float] = []
         best_weights, best_epoch = copy.deepcopy(model.state_dict()), 0
-        for epoch in range(1, schedule.epochs + 1):
+        for epoch in range(1, n_epochs + 1):
             batches = np.array_split(rng.permutation(len(train))[:n_drawn], n_batches)
             training_loss = _epoch(target, model, train, batches, rng, descent)
             answers = target.answers(model, held_out, validation)
@@ -131,7 +132,7 @@ class _Descent:
     """AdamW with a learning rate that rises and falls once over all epochs."""
 
     def __init__(
-        self, model: torch.nn.Module, settings: TrainSettings, n_batches: int
+        self, model: torch.nn.Module, settings: TrainSettings, n_steps: int
     ) -> None:
         rate, decay = settings.learning_rate, settings.weight_decay
         self.optimizer = torch.optim.AdamW(
@@ -140,7 +141,7 @@ class _Descent:
         self.schedule = torch.optim.lr_scheduler.OneCycleLR(
             self.optimizer,
             max_lr=rate,
-            total_steps=settings.schedule.epochs * n_batches,
+            total_steps=n_steps,
             pct_start=0.15,
         )
 

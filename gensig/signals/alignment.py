@@ -1,14 +1,29 @@
-"""Rotation of the turns of one recording to those of another one of the same machine.
+"""Turns of two recordings of one machine: rotated to each other, and what is new in one of them.
 
 Two recordings begin at different teeth. The deviations of the teeth from their mean passage are a
 property of the gears, at any speed and load, and tell by how many teeth.
+
+The errors of the gears excite a machine by the angle. Between two recordings only the transfer to
+the sensor differs, which is smooth over the orders. What a smooth transfer cannot make of a sound
+recording is new.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import fftconvolve
+from scipy.signal.windows import hann
 
 from gensig.signals.separation import FloatArray, GearTurns
+
+SpectrumArray = NDArray[np.complexfloating]
+
+BAND = 1.0  # mesh orders over which the transfer is smoothed; assumed
+RIDGE = 1e-3  # of the mean power of a sound turn, beside that at every order; assumed
+TINY = 1e-300
 
 
 def aligned_turns(turns: GearTurns, to: GearTurns) -> GearTurns:
@@ -41,6 +56,66 @@ def rotation(turn: FloatArray, to: FloatArray) -> int:
     spectrum, other = np.fft.rfft(_of_unit_power(turn)), np.fft.rfft(_of_unit_power(to))
     correlation = np.fft.irfft(spectrum * other.conj(), n=turn.shape[-1])
     return int(correlation.sum(axis=0).argmax())
+
+
+def changed_turns(turns: GearTurns, sound: Sequence[GearTurns]) -> GearTurns:
+    """Turns less what sound recordings of the machine predict of them.
+
+    Parameters
+    ----------
+    turns : of a recording
+    sound : of one or more sound recordings, begun anywhere, with as many channels, and samples a
+        tooth
+
+    Returns
+    -------
+    GearTurns; the mean passage is that of the recording
+
+    Notes
+    -----
+    The spectra of all sound turns, rotated to the recording, predict the spectrum of its turn by
+    least squares over a Hann window of `BAND` mesh orders about each order. This is the conditioned
+    spectrum of Bendat & Piersol (2010), "Random data", chapter 7, with shaft orders in place of
+    averages.
+    """
+    samples_per_tooth = turns.mesh.shape[-1]
+    rotated = [aligned_turns(other, turns) for other in sound]
+    return GearTurns(
+        driving=_changed(
+            turns.driving, [other.driving for other in rotated], samples_per_tooth
+        ),
+        driven=_changed(
+            turns.driven, [other.driven for other in rotated], samples_per_tooth
+        ),
+        mesh=turns.mesh,
+    )
+
+
+def _changed(
+    turn: FloatArray, sound: Sequence[FloatArray], samples_per_tooth: int
+) -> FloatArray:
+    """Part of a turn (channel, sample) that other turns of the gear do not predict."""
+    spectrum = np.fft.rfft(turn)
+    known = np.fft.rfft(np.stack(sound, axis=1))  # (channel, recording, order)
+    n_teeth = turn.shape[-1] // samples_per_tooth
+    window = hann(2 * round(BAND * n_teeth / 2) + 3)[1:-1]
+    cross = _smooth(known.conj() * spectrum[:, None], window)
+    power = _smooth(known.conj()[:, :, None] * known[:, None], window)
+    own = np.trace(power.mean(axis=-1).real, axis1=1, axis2=2) / len(sound)
+    ridge = RIDGE * own[:, None, None, None] + TINY
+    normal = np.moveaxis(power, -1, 1) + ridge * np.eye(len(sound))
+    transfer = np.linalg.solve(normal, np.moveaxis(cross, -1, 1)[..., None])[..., 0]
+    predicted = np.einsum("cok,cko->co", transfer, known)
+    return np.fft.irfft(spectrum - predicted, n=turn.shape[-1])
+
+
+def _smooth(values: SpectrumArray, window: FloatArray) -> SpectrumArray:
+    """Weighted sums over neighboring orders, the last axis; spectra are mirrored at their ends."""
+    half = len(window) // 2
+    width = [(0, 0)] * (values.ndim - 1) + [(half, half)]
+    mirrored = np.pad(values, width, mode="reflect")
+    kernel = window.reshape((1,) * (values.ndim - 1) + (-1,))
+    return fftconvolve(mirrored, kernel, mode="valid", axes=-1)
 
 
 def _of_unit_power(turn: FloatArray) -> FloatArray:

@@ -12,6 +12,7 @@ WHOLE = "must be a whole number of at least 1"
 LIST = "must be false or a list of different names"
 REFUSALS = [
     ("epochs=0", f"epochs {WHOLE}"),
+    ("model.training.examples=0.5", f"examples {WHOLE}"),
     ("patience=-1", "patience must be a whole number of at least 0"),
     ("n_threads=0", f"n_threads {WHOLE}"),
     ("window_samples=0", f"window_samples {WHOLE}"),
@@ -76,3 +77,20 @@ def test_settings_are_refused_without_loading_torch():
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
     assert shown.stdout.strip() == "set()"
+
+
+@pytest.mark.parametrize(
+    ("n_drawn", "words", "epochs"),
+    [
+        (280, (), 30),
+        (1000, (), 10),
+        (50_000, (), 8),
+        (1000, ("epochs=30",), 30),
+        (1000, ("model=cnn",), 14),
+        (1000, ("model.training.epochs=3",), 3),
+    ],
+)
+def test_many_examples_need_fewer_epochs_unless_epochs_are_given(
+    n_drawn, words, epochs
+):
+    assert settings_of(*words).schedule.epochs_of(n_drawn) == epochs

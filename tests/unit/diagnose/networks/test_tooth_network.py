@@ -177,7 +177,7 @@ def test_lists_that_do_not_fit_are_refused(changes, message):
 
 def test_levels_know_neither_sign_nor_loudness_of_a_turn():
     model, batch = network(level_samples=3), ToothBatch.of(windows())
-    responses = torch.randn(4 * sum(TEETH), 8, 6)
+    responses = torch.randn(4 * sum(TEETH), 8, PER_TOOTH // 4)
     levels = model._levels(responses, batch)
     torch.testing.assert_close(model._levels(-30.0 * responses, batch), levels)
     louder = responses.clone()
