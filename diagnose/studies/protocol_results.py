@@ -37,6 +37,8 @@ from diagnose.training.entries import entry_scores
 from diagnose.training.heads import head_scores
 
 BOOTSTRAP_SEED = 20240607
+FAULT_GEAR = "fault_gear"  # column; "" for sound records
+ACCURACY = "balanced_accuracy"
 Pairs = Sequence[tuple[NDArray[np.integer], NDArray[np.integer]]]
 
 
@@ -147,6 +149,7 @@ def protocol_result(
             task, parts["train"], network, n_bootstrap=settings.n_bootstrap
         ),
         "entry": _entry(task, settings, network),
+        "by_gear": _by_gear(task, settings, network),
         "answers": answers,
     }
 
@@ -156,6 +159,27 @@ def _entry(task: Task, settings: TrainSettings, network: Sequence[Prediction]) -
     return entry_scores(
         network, partial(score_predictions, task, n_bootstrap=settings.n_bootstrap)
     )
+
+
+def _by_gear(
+    task: Task, settings: TrainSettings, network: Sequence[Prediction]
+) -> dict[str, Entry]:
+    """Balanced accuracy of the sound records and the faults of one gear, for each gear.
+
+    Empty where the faults of the test records are on one gear.
+    """
+    if FAULT_GEAR not in task.dataset.column_names:
+        return {}
+    gear = np.asarray(task.dataset.column(FAULT_GEAR))[network[0].record]
+    named = sorted(set(gear.tolist()) - {""})
+    if len(named) < 2:
+        return {}
+    scores = {}
+    for name in named:
+        judged = np.isin(gear, ["", name])
+        pairs = [(run.record[judged], run.predicted[judged]) for run in network]
+        scores[name] = score_predictions(task, pairs, settings.n_bootstrap)[ACCURACY]
+    return scores
 
 
 def _method_result(

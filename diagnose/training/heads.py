@@ -194,6 +194,11 @@ def heads_notes(clean: Mapping[str, Any]) -> list[tuple[str, str]]:
             gear = result["heads"]["faulted_gear"]
             accuracy = interval_text(gear["balanced_accuracy"], ".2f")
             phrases.append(f"faulted gear {accuracy}, {gear['chance']:.2f} by chance")
+        for name_of_gear, row in result.get("by_gear", {}).items():
+            accuracy = interval_text(row, ".2f")
+            phrases.append(
+                f"balanced accuracy with faults on the {name_of_gear} {accuracy}"
+            )
         if phrases:
             notes.append((f"{name}, severity and gear", "; ".join(phrases) + "."))
     return notes
