@@ -17,7 +17,7 @@ are moved alike: docs/howto/bridge.md says what was gained and lost where it cou
 Speeds and loads should be those of the training."""
 EXAMPLE = """\
 example:
-  diagnose adapt --model report/models/new_machine-seed0 --healthy a.csv --method adabn --out mine
+  diagnose adapt --model report/models/new_machine-seed0 --healthy a.csv --method coral --out mine
   diagnose predict --model mine today.csv"""
 
 
@@ -35,7 +35,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--method",
         required=True,
         choices=("adabn", "coral"),
-        help="see docs/howto/bridge.md",
+        help="adabn for networks with batch normalisations, coral for any",
     )
     parser.add_argument(
         "--out",
