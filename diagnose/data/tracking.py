@@ -109,23 +109,37 @@ def track_by_mesh(recording: Recording, teeth: Teeth, speed_rpm: float) -> Track
     return _tracked("mesh", turns, float(mean), 60.0 / np.diff(passed))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConstantSpeed:
+    """Signal that the machine would give at constant speed, if it held the gears' orders alone.
+
+    Attributes
+    ----------
+    signal : (channel, sample) m/s2
+    speed_rpm : r/min, exact. Rates change by ratios of whole numbers, so that it is up to 0.05 %
+        from the one that was asked for: half a tooth in a second
+    """
+
+    signal: FloatArray
+    speed_rpm: float
+
+
 def at_constant_speed(
     tracked: Tracked, sampling_rate: float, speed_rpm: float
-) -> FloatArray:
-    """Signal that the machine would give at constant speed, if it held the gears' orders alone.
+) -> ConstantSpeed:
+    """The tracked recording, played at a constant speed.
 
     Parameters
     ----------
     sampling_rate : Hz     of the signal made
-    speed_rpm : r/min      constant speed of the result; all frequencies are scaled by its ratio
-        to the true one, those of resonances too
-
-    Returns
-    -------
-    (channel, sample) m/s2
+    speed_rpm : r/min      wanted; all frequencies are scaled by its ratio to the true one, those
+        of resonances too
     """
-    per_turn = sampling_rate * 60.0 / speed_rpm
-    return rate_change(tracked.samples_per_turn, per_turn).apply(tracked.signal)
+    change = rate_change(tracked.samples_per_turn, sampling_rate * 60.0 / speed_rpm)
+    per_turn = tracked.samples_per_turn * change.ratio
+    return ConstantSpeed(
+        signal=change.apply(tracked.signal), speed_rpm=sampling_rate * 60.0 / per_turn
+    )
 
 
 def _finer(recording: Recording) -> FloatArray:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from diagnose.data.inputs import NetworkInput, RecordedSignal, SoundSignal
 from diagnose.data.turns import Turns
-from diagnose.data.windows import WindowSet
+from diagnose.data.windows import FloatArray, WindowSet
 from diagnose.recordings.channels import chosen_channels
 from diagnose.recordings.plausible import (
     Statement,
@@ -30,7 +30,7 @@ from gensig.signals.recording import (
 from gensig.signals.resampling import rate_change
 
 if TYPE_CHECKING:
-    from diagnose.data.tracking import Tracked
+    from diagnose.data.tracking import ConstantSpeed, Tracked
     from diagnose.training.store import ModelDescription
 
 RATE_OPTION = "--sampling-rate"
@@ -156,7 +156,7 @@ def prepare_recording(
         stride_samples=description.stride_samples,
         normalise=description.normalise,
         healthy=tuple(
-            _sound_signal(other, described.file)
+            _sound_signal(other, described.file, played.sampling_rate)
             for other, described in zip(sound, source.healthy, strict=True)
         ),
     )
@@ -215,15 +215,19 @@ def _played(
         _check_as_recorded(recording, teeth, source, speed_option)
     if source.is_tracked:
         tracked = _tracked(recording, tacho, source)
-    speed = _speed(tracked, source)
-    rate = sampling_rate or _rate(recording, tracked, description, inputs, source)
-    signal = _in_domain(recording, tracked, description, source, rate)
+    wanted = sampling_rate or _rate(recording, tracked, description, inputs, source)
+    if tracked is None:
+        signal, rate = _at_rate(recording, source, wanted)
+        speed = source.speed_rpm
+    else:
+        constant = _at_speed(recording, tracked, description, source, wanted)
+        signal, speed, rate = constant.signal, constant.speed_rpm, wanted
     if isinstance(inputs, Turns) and speed is not None:
         statement = _statement(teeth, source, speed, speed_option)
         check_turns(signal.shape[-1] / rate, statement)
         check_mesh(signal, rate, statement)
     return _Played(
-        signal=signal,
+        signal=signal.astype(np.float32),
         sampling_rate=rate,
         recording=recording,
         channels=channels,
@@ -311,8 +315,10 @@ def _statement(
     )
 
 
-def _sound_signal(played: _Played, file: str) -> SoundSignal:
-    """A healthy recording, as a network takes it.
+def _sound_signal(played: _Played, file: str, sampling_rate: float) -> SoundSignal:
+    """A healthy recording, as a network takes it beside a recording of a sampling rate.
+
+    The speed is the one at which its samples would be at that very rate.
 
     Raises
     ------
@@ -322,14 +328,8 @@ def _sound_signal(played: _Played, file: str) -> SoundSignal:
         raise ConfigError(
             f"the speed of {file} is not known: say {HEALTHY_SPEED_OPTION}"
         )
-    return SoundSignal(signal=played.signal, speed_rpm=played.speed_rpm)
-
-
-def _speed(tracked: Tracked | None, source: Source) -> float | None:
-    """Speed of the driving shaft in r/min at which a recording is played; None if not known."""
-    if tracked is None:
-        return source.speed_rpm
-    return _played_at(tracked, source)
+    speed = played.speed_rpm * sampling_rate / played.sampling_rate
+    return SoundSignal(signal=played.signal, speed_rpm=speed)
 
 
 def tracking_facts(tracked: Tracked, source: Source) -> dict[str, Any]:
@@ -435,30 +435,34 @@ def _read(
     return recording, chosen, tacho
 
 
-def _in_domain(
+def _at_rate(
+    recording: Recording, source: Source, rate: float
+) -> tuple[FloatArray, float]:
+    """(channel, sample) as recorded, at the nearest rate that a ratio of whole numbers gives.
+
+    Also that rate. Refuses a recording with less bandwidth.
+    """
+    given = recording.sampling_rate
+    _check_bandwidth(given, source, rate)
+    change = rate_change(given, rate)
+    return change.apply(recording.acceleration), given * change.ratio
+
+
+def _at_speed(
     recording: Recording,
-    tracked: Tracked | None,
+    tracked: Tracked,
     description: ModelDescription,
     source: Source,
     rate: float,
-) -> NDArray[np.float32]:
-    """(channel, sample) at a rate and one speed.
+) -> ConstantSpeed:
+    """The tracked recording at a rate and one speed.
 
-    Refuses a recording with less bandwidth than that.
+    Refuses a recording with less bandwidth than that, and a speed outside the training.
     """
-    result, file = recording.sampling_rate, source.file
-    if result < rate * (1 - RATE_TOLERANCE):
-        raise ConfigError(
-            f"{file} has {result:g} samples a second and so nothing above {result / 2:g} Hz; the "
-            f"model was trained at {rate:g}: measure faster, or train a model with "
-            f"sampling_rate_hz={result:g} or below"
-        )
-    if tracked is None:
-        return (
-            rate_change(result, rate).apply(recording.acceleration).astype(np.float32)
-        )
     from diagnose.data.tracking import at_constant_speed
 
+    given, file = recording.sampling_rate, source.file
+    _check_bandwidth(given, source, rate)
     speed, played = tracked.speed_rpm, _played_at(tracked, source)
     if description.speed_rpm_range is not None and source.to_speed_rpm is not None:
         low, high = description.speed_rpm_range
@@ -467,11 +471,21 @@ def _in_domain(
                 f"--to-speed {played:g} must lie in the {low:.0f} to {high:.0f} r/min of the "
                 "training",
             )
-    as_fast = result * played / speed
+    as_fast = given * played / speed
     if as_fast < rate * (1 - RATE_TOLERANCE):
         raise ConfigError(
-            f"{file}: {result:g} samples a second at {speed:.4g} r/min, played at {played:g}, are "
+            f"{file}: {given:g} samples a second at {speed:.4g} r/min, played at {played:g}, are "
             f"{as_fast:.5g}; the model was trained at {rate:g}: give a --to-speed of "
-            f"{speed * rate / result:.4g} or more"
+            f"{speed * rate / given:.4g} or more"
         )
-    return at_constant_speed(tracked, rate, played).astype(np.float32)
+    return at_constant_speed(tracked, rate, played)
+
+
+def _check_bandwidth(given: float, source: Source, rate: float) -> None:
+    """Refuse a recording of fewer samples a second than a rate."""
+    if given < rate * (1 - RATE_TOLERANCE):
+        raise ConfigError(
+            f"{source.file} has {given:g} samples a second and so nothing above {given / 2:g} Hz; "
+            f"the model was trained at {rate:g}: measure faster, or train a model with "
+            f"sampling_rate_hz={given:g} or below"
+        )

@@ -41,6 +41,11 @@ class RateChange:
             )
 
     @property
+    def ratio(self) -> float:
+        """New rate over old rate."""
+        return self.up / self.down
+
+    @property
     def is_none(self) -> bool:
         """True where both rates are the same."""
         return self.up == self.down

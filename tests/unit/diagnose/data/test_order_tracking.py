@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from fake_dataset import N_TEETH
 from numpy.testing import assert_allclose
-from scipy.signal import resample
+from scipy.signal import hilbert, resample
 from small_studies import command, two_channels
 
-from diagnose.data.tracking import at_constant_speed, track_by_tacho
+from diagnose.data.tracking import Tracked, at_constant_speed, track_by_tacho
 from diagnose.training.store import load_model
 from gensig.signals.recording import Recording
 
@@ -74,7 +74,7 @@ def tracked_by_tacho(signal, pulse):
         sensors=sensors, acceleration=signal, sampling_rate=float(RATE)
     )
     tracked = track_by_tacho(recording, pulse, "pulses", pulses_per_turn=1)
-    return tracked, at_constant_speed(tracked, RATE, 1800.0)
+    return tracked, at_constant_speed(tracked, RATE, 1800.0).signal
 
 
 def test_a_tachometer_undoes_a_run_from_slow_to_fast(run_up):
@@ -104,6 +104,27 @@ def test_nothing_is_aliased_while_the_run_is_slow(run_up):
     _, played = tracked_by_tacho(high[None], pulse)
     inner = played[0, 500 : round(10.0 / 30.0 * RATE)]
     assert np.sqrt(np.mean(inner**2)) < 1e-2
+
+
+@pytest.mark.parametrize("speed_rpm", [1800.0, 1234.3, 2222.2])
+def test_the_speed_of_the_result_is_exact_to_a_hundredth_of_a_tooth(speed_rpm):
+    """Rates are ratios of whole numbers; teeth would drift if the wanted speed were believed."""
+    per_turn, n_turns, teeth = 2488, 40, 23
+    angle = 2 * np.pi * np.arange(n_turns * per_turn) / per_turn
+    tracked = Tracked(
+        by="mesh",
+        signal=np.sin(teeth * angle)[None],
+        samples_per_turn=per_turn,
+        speed_rpm=speed_rpm,
+        speed_range_rpm=(speed_rpm, speed_rpm),
+    )
+    played = at_constant_speed(tracked, 51200.0, speed_rpm)
+    time = np.arange(played.signal.shape[-1]) / 51200.0
+    passages = teeth * played.speed_rpm / 60.0 * time
+    inner = slice(2000, -2000)
+    phase = np.unwrap(np.angle(hilbert(played.signal[0]))) / (2 * np.pi) + 0.25
+    assert np.abs(phase - passages)[inner].max() < 0.01
+    assert played.speed_rpm == pytest.approx(speed_rpm, rel=5e-4)
 
 
 @pytest.mark.parametrize(("record", "depth"), [(80, 0.0), (80, 0.02), (83, 0.02)])
