@@ -15,6 +15,10 @@ class ConfigError(GensigError):
     """A configuration key, option or value that cannot be used."""
 
 
+class TooShortError(ConfigError):
+    """A recording that is too short for what is asked of it."""
+
+
 class GeometryError(GensigError):
     """Gears that cannot exist or cannot mesh."""
 

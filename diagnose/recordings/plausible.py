@@ -39,6 +39,7 @@ class Statement:
     said : speed and tooth counts in words
     options : to check where they are wrong
     followed : True if the speed was followed, by mesh or tachometer
+    can_follow : True if it could be, by the mesh
     """
 
     file: str
@@ -47,6 +48,7 @@ class Statement:
     said: str
     options: str
     followed: bool
+    can_follow: bool = True
 
     @property
     def mesh_frequency(self) -> float:
@@ -115,11 +117,13 @@ def check_mesh(signal: FloatArray, sampling_rate: float, statement: Statement) -
     """
     comb = check_place(signal, sampling_rate, statement)
     stated, (driving, driven) = statement.mesh_frequency, statement.teeth
-    follow = f"--teeth {driving} {driven} without --as-recorded, to follow the speed"
+    follow = (
+        f"give --teeth {driving} {driven} without --as-recorded, to follow the speed"
+    )
     if comb.near < LEAST_NEAR:
         remedy = f"check {statement.options}"
-        if not statement.followed:
-            remedy += f"; if the speed wanders, give {follow}"
+        if statement.can_follow and not statement.followed:
+            remedy += f"; if the speed wanders, {follow}"
         raise ConfigError(
             f"{statement.file}: no sign of the mesh near {stated:.5g} Hz, where {statement.said} "
             f"puts it: {remedy}"
@@ -127,11 +131,12 @@ def check_mesh(signal: FloatArray, sampling_rate: float, statement: Statement) -
     duration = signal.shape[-1] / sampling_rate
     drift = abs(comb.near_frequency - stated) * duration
     if not statement.followed and drift > MOST_DRIFT:
-        exact = comb.near_frequency / driving * 60.0
+        remedy = f"say {comb.near_frequency / driving * 60.0:.5g} r/min"
+        if statement.can_follow:
+            remedy = f"{follow}, or {remedy}"
         raise ConfigError(
             f"{statement.file}: the mesh is at {comb.near_frequency:.5g} Hz, not at {stated:.5g} "
-            f"Hz as of {statement.said}, so that the turns drift by {drift:.1f} teeth; "
-            f"give {follow}, or say {exact:.5g} r/min"
+            f"Hz as of {statement.said}, so that the turns drift by {drift:.1f} teeth; {remedy}"
         )
 
 

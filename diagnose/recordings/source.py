@@ -21,7 +21,7 @@ from diagnose.recordings.plausible import (
     check_place,
     check_turns,
 )
-from gensig.errors import ConfigError
+from gensig.errors import ConfigError, TooShortError
 from gensig.signals.recording import (
     Recording,
     read_file,
@@ -214,7 +214,7 @@ def _played(
         teeth = _teeth(description, inputs, source)
         _check_as_recorded(recording, teeth, source, speed_option)
     if source.is_tracked:
-        tracked = _tracked(recording, tacho, source)
+        tracked = _tracked_if_long(recording, tacho, source, inputs)
     wanted = sampling_rate or _rate(recording, tracked, description, inputs, source)
     if tracked is None:
         signal, rate = _at_rate(recording, source, wanted)
@@ -223,7 +223,11 @@ def _played(
         constant = _at_speed(recording, tracked, description, source, wanted)
         signal, speed, rate = constant.signal, constant.speed_rpm, wanted
     if isinstance(inputs, Turns) and speed is not None:
-        statement = _statement(teeth, source, speed, speed_option)
+        statement = replace(
+            _statement(teeth, source, speed, speed_option),
+            followed=tracked is not None,
+            can_follow=tracked is not None or not source.is_tracked,
+        )
         check_turns(signal.shape[-1] / rate, statement)
         check_mesh(signal, rate, statement)
     return _Played(
@@ -364,6 +368,25 @@ def tracking_text(tracking: Mapping[str, Any] | None) -> str:
         f" (speed by {tracking['by']}, {low:.5g} to {high:.5g} r/min, "
         f"played at {tracking['played_at_rpm']:.5g})"
     )
+
+
+def _tracked_if_long(
+    recording: Recording,
+    tacho: NDArray[np.floating] | None,
+    source: Source,
+    inputs: NetworkInput,
+) -> Tracked | None:
+    """The recording over the shaft's angle; None for turns of too few to follow the speed.
+
+    Turns need one of the slower gear. The speed of such a short recording counts as steady, as
+    stated.
+    """
+    try:
+        return _tracked(recording, tacho, source)
+    except TooShortError:
+        if not isinstance(inputs, Turns):
+            raise
+    return None
 
 
 def _tracked(

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.errors import ConfigError
+from gensig.errors import ConfigError, TooShortError
 from gensig.signals.recording import Recording
 
 Array = NDArray[np.float64]
@@ -77,40 +77,43 @@ def find_motion(
     options: str,
     least_turns: float = LEAST_TURNS,
     longer: str = "record longer",
+    search: float = SEARCH,
 ) -> Motion:
     """Speed and its drift in a recording, from the harmonics of the mesh.
 
     Parameters
     ----------
-    speed_rpm : r/min    of the driving gear, known within `SEARCH`
+    speed_rpm : r/min    of the driving gear, known within `search`
     highest : Hz         end of the band in which the recording can be trusted
     options : what the user's command calls teeth, speed and rate, for the line that a mistake gets
     least_turns : of the slower gear; more for a motion without doubt
     longer : what the user can do about a short recording
+    search : share of the mesh frequency, looked at on either side
 
     Raises
     ------
-    ConfigError    where the recording is too short or there is no sign of the mesh
+    TooShortError    for a recording that is too short
+    ConfigError    where there is no sign of the mesh
     """
     nominal = speed_rpm / 60.0 * teeth.driving
-    if nominal * (1.0 + SEARCH) > highest:
+    if nominal * (1.0 + search) > highest:
         raise ConfigError(
             f"the mesh frequency of {nominal:.5g} Hz lies above the usable band of "
             f"{highest:.5g} Hz of this recording; record faster, or check {options}"
         )
     turns = recording.duration * nominal / teeth.most
     if turns < least_turns:
-        raise ConfigError(
+        raise TooShortError(
             f"too short: {recording.duration:.3g} s are {turns:.1f} turns of the slower gear, "
             f"at least {least_turns:g} are needed; {longer}{in_hertz(speed_rpm)}"
         )
-    mesh, line_db = _search(recording, teeth, nominal, highest)
+    mesh, line_db = _search(recording, teeth, nominal, highest, search)
     least = _least_line_db(turns)
     visible = np.flatnonzero(line_db >= least) + 1
     if not np.any(visible <= FIRST_HARMONICS):
         raise ConfigError(
             f"no sign of the mesh: none of its first {FIRST_HARMONICS} harmonics within "
-            f"{100 * SEARCH:g} % of {nominal:.5g} Hz stands {least:.1f} dB above its "
+            f"{100 * search:.2g} % of {nominal:.5g} Hz stands {least:.1f} dB above its "
             f"surroundings; check {options}{in_hertz(speed_rpm)}"
         )
     return _follow(recording, teeth, mesh, visible, line_db)
@@ -136,7 +139,7 @@ def _least_line_db(turns: float) -> float:
 
 
 def _search(
-    recording: Recording, teeth: Teeth, nominal: float, highest: float
+    recording: Recording, teeth: Teeth, nominal: float, highest: float, search: float
 ) -> tuple[float, Array]:
     """Mesh frequency to a fraction of a line, and height of its harmonics, (harmonic,) dB."""
     from scipy.ndimage import median_filter
@@ -152,8 +155,8 @@ def _search(
         density, size=(1, 8 * 4 * TURNS_A_SEGMENT + 1), mode="nearest"
     )
     standing = np.max(density / np.maximum(floor, 1e-300), axis=0)
-    n_harmonics = max(1, min(MOST_HARMONICS, int(highest / (nominal * (1.0 + SEARCH)))))
-    candidates = np.linspace(1.0 - SEARCH, 1.0 + SEARCH, 4001) * nominal
+    n_harmonics = max(1, min(MOST_HARMONICS, int(highest / (nominal * (1.0 + search)))))
+    candidates = np.linspace(1.0 - search, 1.0 + search, 4001) * nominal
     harmonics = np.arange(1, n_harmonics + 1)
     at_lines = np.interp(harmonics[:, None] * candidates, frequency, standing)
     best = int(np.argmax(np.log10(np.maximum(at_lines, 1.0)).sum(axis=0)))

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gensig.errors import ConfigError
+from gensig.errors import ConfigError, TooShortError
 from gensig.signals.mesh_motion import SEARCH, Teeth, find_motion, in_hertz
 from gensig.signals.recording import Recording
 
@@ -31,6 +31,9 @@ FIRST_HARMONICS = 5
 FINE = 0.25  # candidates lie this share of a bin apart at the highest harmonic
 # assumed: standard deviation of the relative change of speed from one frame to the next
 STEP_SHARE = 0.003
+# of the distance from the mesh to its next sideband, one turn of the faster gear away: farther
+# off a sideband could be taken for the mesh
+TO_SIDEBANDS = 0.8
 
 
 def wandering_mesh_cycles(
@@ -47,12 +50,13 @@ def wandering_mesh_cycles(
     Parameters
     ----------
     speed_rpm : r/min    of the driving gear; the speed lies within `mesh_motion.SEARCH` of it
-        throughout
+        throughout, and for many teeth within `TO_SIDEBANDS` of the distance to the next sideband
     highest, options, longer : see `gensig.signals.mesh_motion.find_motion`
 
     Raises
     ------
-    ConfigError    where the recording is too short or there is no sign of the mesh
+    TooShortError    for a recording that is too short
+    ConfigError    where there is no sign of the mesh
 
     Notes
     -----
@@ -63,24 +67,20 @@ def wandering_mesh_cycles(
     rate, n_samples = recording.sampling_rate, recording.acceleration.shape[1]
     mesh = speed_rpm / 60.0 * teeth.driving
     fewest = min(teeth.driving, teeth.driven)
-    if mesh * (1.0 + SEARCH) > highest:
+    search = min(SEARCH, TO_SIDEBANDS / fewest)
+    if mesh * (1.0 + search) > highest:
         raise ConfigError(
             f"the mesh frequency of {mesh:.5g} Hz lies above {highest:.5g} Hz; check {options}"
         )
-    if SEARCH * fewest >= 1.0:
-        raise ConfigError(
-            f"{fewest} teeth: within {100 * SEARCH:g} % of the speed sidebands look like the "
-            "mesh; give a tachometer"
-        )
     turns = recording.duration * mesh / teeth.most
     if turns < LEAST_TURNS:
-        raise ConfigError(
+        raise TooShortError(
             f"too short: {recording.duration:.3g} s are {turns:.1f} turns of the slower gear, at "
             f"least {LEAST_TURNS} "
             f"are needed; {longer}{in_hertz(speed_rpm)}"
         )
     time, course = mesh_frequency_course(
-        recording.acceleration, rate, fewest, mesh, search=SEARCH, highest=highest
+        recording.acceleration, rate, fewest, mesh, search=search, highest=highest
     )
     samples = np.arange(n_samples)
     frequency = np.interp(samples / rate, time, course)
@@ -95,7 +95,8 @@ def wandering_mesh_cycles(
         mean / teeth.driving * 60.0,
         highest=highest,
         options=options,
-        least_turns=LEAST_TURNS * (1.0 - SEARCH),
+        least_turns=LEAST_TURNS * (1.0 - search),
+        search=search,
         longer=longer,
     )
     first = motion.line_db[:FIRST_HARMONICS]

@@ -195,7 +195,6 @@ PULSES = [
 ]
 NOISE = [
     ([*TEETH, "--speed-rpm", "1500"], "sign of the mesh"),
-    (["--teeth", "40", "84", "--speed-rpm", "1500"], "sidebands look like the mesh"),
     ([*TEETH, "--speed-rpm", "15000"], "lies above 5000 Hz"),
 ]
 SHORT = [

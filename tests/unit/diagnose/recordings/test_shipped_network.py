@@ -42,7 +42,7 @@ def test_it_names_missing_teeth_of_machines_it_never_saw(stream, recorded, capsy
         (record,) = stream.take([number])
         teeth = [int(stream.n_teeth(gear)[number]) for gear in ("pinion", "wheel")]
         file = recorded(record.signals["acceleration"], stream.sampling_rate)
-        words = ["predict", file, "--teeth", *teeth, "--json", "--as-recorded"]
+        words = ["predict", file, "--teeth", *teeth, "--json"]
         speed = record.values["speed_rpm"]
         answer = answer_of([*words, "--speed-rpm", speed], capsys)
         answers.append(max(answer["probabilities"], key=answer["probabilities"].get))
