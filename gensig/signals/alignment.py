@@ -14,8 +14,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import fftconvolve
-from scipy.signal.windows import hann
 
 from gensig.signals.separation import FloatArray, GearTurns
 
@@ -98,7 +96,7 @@ def _changed(
     spectrum = np.fft.rfft(turn)
     known = np.fft.rfft(np.stack(sound, axis=1))  # (channel, recording, order)
     n_teeth = turn.shape[-1] // samples_per_tooth
-    window = hann(2 * round(BAND * n_teeth / 2) + 3)[1:-1]
+    window = np.hanning(2 * round(BAND * n_teeth / 2) + 3)[1:-1]
     cross = _smooth(known.conj() * spectrum[:, None], window)
     power = _smooth(known.conj()[:, :, None] * known[:, None], window)
     own = np.trace(power.mean(axis=-1).real, axis1=1, axis2=2) / len(sound)
@@ -111,11 +109,9 @@ def _changed(
 
 def _smooth(values: SpectrumArray, window: FloatArray) -> SpectrumArray:
     """Weighted sums over neighboring orders, the last axis; spectra are mirrored at their ends."""
-    half = len(window) // 2
-    width = [(0, 0)] * (values.ndim - 1) + [(half, half)]
-    mirrored = np.pad(values, width, mode="reflect")
-    kernel = window.reshape((1,) * (values.ndim - 1) + (-1,))
-    return fftconvolve(mirrored, kernel, mode="valid", axes=-1)
+    from scipy.ndimage import convolve1d
+
+    return convolve1d(values, window, axis=-1, mode="mirror")
 
 
 def _of_unit_power(turn: FloatArray) -> FloatArray:
