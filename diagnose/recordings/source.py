@@ -12,8 +12,15 @@ from numpy.typing import NDArray
 
 from diagnose.data.inputs import NetworkInput, RecordedSignal, SoundSignal
 from diagnose.data.turns import Turns
-from diagnose.data.windows import FloatArray, WindowSet
+from diagnose.data.windows import WindowSet
 from diagnose.recordings.channels import chosen_channels
+from diagnose.recordings.followed import (
+    SPEED_TOLERANCE,
+    at_nearest_rate,
+    at_one_speed,
+    played_at,
+    tracked_if_long,
+)
 from diagnose.recordings.plausible import (
     Statement,
     check_level,
@@ -21,22 +28,19 @@ from diagnose.recordings.plausible import (
     check_place,
     check_turns,
 )
-from gensig.errors import ConfigError, TooShortError
+from gensig.errors import ConfigError
 from gensig.signals.recording import (
     Recording,
     read_file,
     recording_of,
 )
-from gensig.signals.resampling import rate_change
 
 if TYPE_CHECKING:
-    from diagnose.data.tracking import ConstantSpeed, Tracked
+    from diagnose.data.tracking import Tracked
     from diagnose.training.store import ModelDescription
 
 RATE_OPTION = "--sampling-rate"
 SPEED_OPTION, HEALTHY_SPEED_OPTION = "--speed-rpm", "--healthy-speed-rpm"
-RATE_TOLERANCE = 1e-3
-SPEED_TOLERANCE = 0.02  # assumed: how well a user knows the speed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -214,13 +218,13 @@ def _played(
         teeth = _teeth(description, inputs, source)
         _check_as_recorded(recording, teeth, source, speed_option)
     if source.is_tracked:
-        tracked = _tracked_if_long(recording, tacho, source, inputs)
+        tracked = tracked_if_long(recording, tacho, source, inputs)
     wanted = sampling_rate or _rate(recording, tracked, description, inputs, source)
     if tracked is None:
-        signal, rate = _at_rate(recording, source, wanted)
+        signal, rate = at_nearest_rate(recording, source, wanted)
         speed = source.speed_rpm
     else:
-        constant = _at_speed(recording, tracked, description, source, wanted)
+        constant = at_one_speed(recording, tracked, description, source, wanted)
         signal, speed, rate = constant.signal, constant.speed_rpm, wanted
     if isinstance(inputs, Turns) and speed is not None:
         statement = replace(
@@ -256,7 +260,7 @@ def _rate(
         return trained
     available = float(recording.sampling_rate)
     if tracked is not None:
-        available *= _played_at(tracked, source) / tracked.speed_rpm
+        available *= played_at(tracked, source) / tracked.speed_rpm
     return min(trained, available)
 
 
@@ -342,13 +346,8 @@ def tracking_facts(tracked: Tracked, source: Source) -> dict[str, Any]:
         "by": tracked.by,
         "speed_rpm": tracked.speed_rpm,
         "speed_range_rpm": list(tracked.speed_range_rpm),
-        "played_at_rpm": _played_at(tracked, source),
+        "played_at_rpm": played_at(tracked, source),
     }
-
-
-def _played_at(tracked: Tracked, source: Source) -> float:
-    """Speed in r/min of an order-tracked recording."""
-    return source.to_speed_rpm or tracked.speed_rpm
 
 
 def trained_at(description: ModelDescription, speed_rpm: float) -> bool:
@@ -368,56 +367,6 @@ def tracking_text(tracking: Mapping[str, Any] | None) -> str:
         f" (speed by {tracking['by']}, {low:.5g} to {high:.5g} r/min, "
         f"played at {tracking['played_at_rpm']:.5g})"
     )
-
-
-def _tracked_if_long(
-    recording: Recording,
-    tacho: NDArray[np.floating] | None,
-    source: Source,
-    inputs: NetworkInput,
-) -> Tracked | None:
-    """The recording over the shaft's angle; None for turns of too few to follow the speed.
-
-    Turns need one of the slower gear. The speed of such a short recording counts as steady, as
-    stated.
-    """
-    try:
-        return _tracked(recording, tacho, source)
-    except TooShortError:
-        if not isinstance(inputs, Turns):
-            raise
-    return None
-
-
-def _tracked(
-    recording: Recording, tacho: NDArray[np.floating] | None, source: Source
-) -> Tracked:
-    """The recording over the angle of the driving shaft."""
-    from diagnose.data.tracking import track_by_mesh, track_by_tacho
-    from gensig.signals.mesh_motion import Teeth
-
-    if tacho is None or source.tacho is None:
-        assert source.teeth is not None
-        assert source.speed_rpm is not None
-        return track_by_mesh(
-            recording,
-            Teeth(driving=source.teeth[0], driven=source.teeth[1]),
-            source.speed_rpm,
-        )
-    tracked = track_by_tacho(
-        recording,
-        tacho,
-        source.tacho,
-        pulses_per_turn=source.pulses_per_turn,
-    )
-    speed, (least, greatest) = source.speed_rpm, tracked.speed_range_rpm
-    low, high = (1 - SPEED_TOLERANCE) * least, (1 + SPEED_TOLERANCE) * greatest
-    if speed is not None and not low <= speed <= high:
-        raise ConfigError(
-            f"--tacho {source.tacho} gives {tracked.speed_rpm:.5g} r/min, --speed-rpm says "
-            f"{speed:g}; check --pulses-per-turn, or leave --speed-rpm out"
-        )
-    return tracked
 
 
 def _read(
@@ -456,59 +405,3 @@ def _read(
         needs_level=description.normalise == "none",
     )
     return recording, chosen, tacho
-
-
-def _at_rate(
-    recording: Recording, source: Source, rate: float
-) -> tuple[FloatArray, float]:
-    """(channel, sample) as recorded, at the nearest rate that a ratio of whole numbers gives.
-
-    Also that rate. Refuses a recording with less bandwidth.
-    """
-    given = recording.sampling_rate
-    _check_bandwidth(given, source, rate)
-    change = rate_change(given, rate)
-    return change.apply(recording.acceleration), given * change.ratio
-
-
-def _at_speed(
-    recording: Recording,
-    tracked: Tracked,
-    description: ModelDescription,
-    source: Source,
-    rate: float,
-) -> ConstantSpeed:
-    """The tracked recording at a rate and one speed.
-
-    Refuses a recording with less bandwidth than that, and a speed outside the training.
-    """
-    from diagnose.data.tracking import at_constant_speed
-
-    given, file = recording.sampling_rate, source.file
-    _check_bandwidth(given, source, rate)
-    speed, played = tracked.speed_rpm, _played_at(tracked, source)
-    if description.speed_rpm_range is not None and source.to_speed_rpm is not None:
-        low, high = description.speed_rpm_range
-        if not low <= played <= high:
-            raise ConfigError(
-                f"--to-speed {played:g} must lie in the {low:.0f} to {high:.0f} r/min of the "
-                "training",
-            )
-    as_fast = given * played / speed
-    if as_fast < rate * (1 - RATE_TOLERANCE):
-        raise ConfigError(
-            f"{file}: {given:g} samples a second at {speed:.4g} r/min, played at {played:g}, are "
-            f"{as_fast:.5g}; the model was trained at {rate:g}: give a --to-speed of "
-            f"{speed * rate / given:.4g} or more"
-        )
-    return at_constant_speed(tracked, rate, played)
-
-
-def _check_bandwidth(given: float, source: Source, rate: float) -> None:
-    """Refuse a recording of fewer samples a second than a rate."""
-    if given < rate * (1 - RATE_TOLERANCE):
-        raise ConfigError(
-            f"{source.file} has {given:g} samples a second and so nothing above {given / 2:g} Hz; "
-            f"the model was trained at {rate:g}: measure faster, or train a model with "
-            f"sampling_rate_hz={given:g} or below"
-        )
