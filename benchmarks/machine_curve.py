@@ -85,15 +85,21 @@ class Row:
         )
 
 
-CASES = tuple(
-    Case(title=title, share=share, with_sound_record=sound, n_machines=number)
-    for title, share, sound in (
-        ("whole records", 1.0, False),
-        ("half records", 0.5, False),
-        ("with a sound record", 1.0, True),
-    )
-    for number in reversed(MACHINES)
-)
+INPUTS = {"whole": (1.0, False), "half": (0.5, False), "sound_record": (1.0, True)}
+
+
+def cases(inputs: Sequence[str], machines: Sequence[int]) -> list[Case]:
+    """Trainings of some inputs on some numbers of machines, the longest first."""
+    return [
+        Case(
+            title=name,
+            share=INPUTS[name][0],
+            with_sound_record=INPUTS[name][1],
+            n_machines=number,
+        )
+        for name in inputs
+        for number in sorted(machines, reverse=True)
+    ]
 
 
 def begins(task: Task, share: float) -> Segments:
@@ -174,6 +180,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path, help="gets the data set")
     parser.add_argument("--workers", type=int, default=n_cores())
+    parser.add_argument(
+        "--inputs",
+        nargs="+",
+        default=list(INPUTS),
+        choices=list(INPUTS),
+        metavar="NAME",
+    )
+    parser.add_argument("--machines", nargs="+", type=int, default=list(MACHINES))
     given = parser.parse_args(arguments)
     n_units = max(MACHINES) + N_VALIDATION + N_TEST
     if not given.folder.exists():
@@ -188,7 +202,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     call_all(
         run_case,
         (str(given.folder),),
-        CASES,
+        cases(given.inputs, given.machines),
         n_workers=given.workers,
         on_done=lambda case, row: say(row.text()),
         remedy="use fewer workers",
