@@ -14,7 +14,8 @@ from diagnose.data.turns import Turns
 from diagnose.data.windows import FloatArray
 from diagnose.networks.adaptation import HEALTHY
 from diagnose.networks.network import SiteNetwork
-from diagnose.recordings.source import Source, prepare_recording
+from diagnose.recordings.prepared import prepare_recording
+from diagnose.recordings.source import Source
 from diagnose.report.tooth_figure import AccusedTooth
 from gensig.errors import ConfigError
 

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from diagnose.data.inputs import NetworkInput
 from diagnose.data.turns import Turns
 from diagnose.data.windows import FloatArray
+from diagnose.recordings.source import Source
 from gensig.errors import ConfigError, TooShortError
 from gensig.signals.recording import Recording
 from gensig.signals.resampling import rate_change
 
 if TYPE_CHECKING:
     from diagnose.data.tracking import ConstantSpeed, Tracked
-    from diagnose.recordings.source import Source
     from diagnose.training.store import ModelDescription
 
 RATE_TOLERANCE = 1e-3

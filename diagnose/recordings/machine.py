@@ -13,7 +13,8 @@ from diagnose.data.windows import WindowSet
 from diagnose.networks.adaptation import HEALTHY, adapt_domain, adapt_network
 from diagnose.networks.domain import distances
 from diagnose.networks.registry import input_of
-from diagnose.recordings.source import Source, prepare_recording, trained_at
+from diagnose.recordings.prepared import prepare_recording, trained_at
+from diagnose.recordings.source import Source
 from diagnose.studies.result_files import sha256
 from diagnose.training.classes import predict_windows
 from diagnose.training.store import (

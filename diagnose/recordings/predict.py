@@ -7,12 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnose.recordings.source import (
-    Source,
-    prepare_recording,
-    tracking_facts,
-    trained_at,
-)
+from diagnose.recordings.prepared import prepare_recording, tracking_facts, trained_at
+from diagnose.recordings.source import Source
 from diagnose.recordings.stored_network import StoredNetwork
 from gensig.signals.mesh_motion import in_hertz
 

@@ -13,7 +13,8 @@ from diagnose.data.turns import Turns
 from diagnose.networks.calibration import calibration_scores, probabilities
 from diagnose.networks.network import Network, SiteNetwork
 from diagnose.networks.registry import input_of
-from diagnose.recordings.source import PreparedRecording, Source, tracking_text
+from diagnose.recordings.prepared import PreparedRecording, tracking_text
+from diagnose.recordings.source import Source
 from diagnose.recordings.stored_network import Answer, Graph, Scores, StoredNetwork
 from diagnose.recordings.tooth_classifier import (
     TOOTH_KIND,

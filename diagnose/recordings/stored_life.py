@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from diagnose.networks.registry import input_of
 from diagnose.recordings.followed import SPEED_TOLERANCE
+from diagnose.recordings.prepared import PreparedRecording
 from diagnose.recordings.raw_windows import N_CHECKED
-from diagnose.recordings.source import PreparedRecording, Source
+from diagnose.recordings.source import Source
 from diagnose.recordings.stored_network import Answer, Graph, Scores, StoredNetwork
 from diagnose.scoring.judged import spread_text
 from diagnose.scoring.life_scores import (

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
     from diagnose.data.inputs import NetworkInput
     from diagnose.data.windows import Segments, Task
-    from diagnose.recordings.source import PreparedRecording, Source
+    from diagnose.recordings.prepared import PreparedRecording
+    from diagnose.recordings.source import Source
     from diagnose.training.store import ModelDescription
     from gensig.dataset.reader import Dataset
 
