@@ -74,13 +74,13 @@ def integrate(
     n_dof = len(group.force) // n
     n_channels = len(channels) if out_row >= 0 else 0
     zero, one = spread(work, 0.0), spread(work, 1.0)
-    q, v = block(rows.Q, n_dof), block(rows.V, n_dof)
-    middle_q, middle_v = block(rows.MIDDLE_Q, n_dof), block(rows.MIDDLE_V, n_dof)
-    end_q, end_v = block(rows.END_Q, n_dof), block(rows.END_V, n_dof)
+    q, v = block(rows.Q), block(rows.V)
+    middle_q, middle_v = block(rows.MIDDLE_Q), block(rows.MIDDLE_V)
+    end_q, end_v = block(rows.END_Q), block(rows.END_V)
     now, forces, mean = (
-        block(rows.NOW, n_dof),
-        block(rows.FORCES, n_dof),
-        block(rows.MEAN, n_dof),
+        block(rows.NOW),
+        block(rows.FORCES),
+        block(rows.MEAN),
     )
     radius = get_row(group.numbers, layout.PINION_RADIUS)
     changing = len(group.profile) > layout.N_PROFILE * n
@@ -92,8 +92,9 @@ def integrate(
         work[at(rows.BEND, lane, n)] = bend
     turn = 1.0 / get_row(group.numbers, layout.PER_FRICTION_WIDTH)
     set_row(work, rows.FRICTION_WIDTH, turn)
-    for i in range(2 * n_dof):
-        set_row(work, q + i, get_row(state, i))
+    for d in range(n_dof):
+        set_row(work, q + d, get_row(state, d))
+        set_row(work, v + d, get_row(state, n_dof + d))
     for number in range(first_step, first_step + n_steps):
         is_recentred = number % RECENTER == 0
         if is_recentred:
@@ -182,8 +183,9 @@ def integrate(
             carried = gain * get_row(group.rotation, channels[c])
             value = get_row(work, mean + channels[c]) + carried
             set_row(out, out_first + c, value)
-    for i in range(2 * n_dof):
-        set_row(state, i, get_row(work, q + i))
+    for d in range(n_dof):
+        set_row(state, d, get_row(work, q + d))
+        set_row(state, n_dof + d, get_row(work, v + d))
     return angle_row
 
 
@@ -209,8 +211,8 @@ def start(group, fresh, by_tooth, work, wide):
     """Set what the step remembers in the lanes that are fresh, from one evaluation there."""
     n = width(work)
     n_dof = len(group.force) // n
-    q, v = block(rows.Q, n_dof), block(rows.V, n_dof)
-    mean, forces = block(rows.MEAN, n_dof), block(rows.FORCES, n_dof)
+    q, v = block(rows.Q), block(rows.V)
+    mean, forces = block(rows.MEAN), block(rows.FORCES)
     zero, radius = spread(work, 0.0), get_row(group.numbers, layout.PINION_RADIUS)
     first_pairs(group, fresh, work, wide)
     for j in range(FOLLOWED):
@@ -240,9 +242,9 @@ def start(group, fresh, by_tooth, work, wide):
     flags = get_row(work, rows.FRESH)
     for d in range(n_dof):
         a = get_row(work, mean + d)
-        choose(flags, block(rows.NOW, n_dof) + d, a, work)
-        choose(flags, block(rows.HALFWAY, n_dof) + d, a, work)
-        choose(flags, block(rows.BEFORE, n_dof) + d, a, work)
+        choose(flags, block(rows.NOW) + d, a, work)
+        choose(flags, block(rows.HALFWAY) + d, a, work)
+        choose(flags, block(rows.BEFORE) + d, a, work)
     choose(flags, rows.NORMAL, law.normal, work)
     for j in range(FOLLOWED):
         margin = get_row(work, rows.MARGIN + rows.END_AT * FOLLOWED + j)

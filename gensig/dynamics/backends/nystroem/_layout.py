@@ -42,7 +42,9 @@ SHORT = FRESH + 1
 EARLY = SHORT + FOLLOWED
 DRIVE = EARLY + FOLLOWED
 N_FIXED = DRIVE + layout.N_DRIVE
-# blocks of rows per degree of freedom behind them
+# blocks of rows per degree of freedom behind them, two gears and two rotors at most: constants
+# are faster than the number of a machine
+MOST_DOFS = 8
 Q, V, MIDDLE_Q, MIDDLE_V, END_Q, END_V = range(6)
 # accelerations at begin and middle of the last step and at its end, other forces, means
 BEFORE, HALFWAY, NOW, FORCES, MEAN, N_BLOCKS = range(6, 12)
@@ -66,13 +68,13 @@ class NystroemGroup(Group):
 
 
 @inlined
-def block(name, n_dof):
+def block(name):
     """First row of a block of the machine."""
-    return N_FIXED + name * n_dof
+    return N_FIXED + name * MOST_DOFS
 
 
 def scratch(n_dof, n_channels, precision="float64"):
     """Work rows, float64 rows and integer rows of ``integrate``."""
     n = n_lanes(precision)
-    work = np.zeros((N_FIXED + N_BLOCKS * n_dof) * n, dtype=precision)
+    work = np.zeros((N_FIXED + N_BLOCKS * MOST_DOFS) * n, dtype=precision)
     return work, np.zeros(N_WIDE * n), np.zeros(1, dtype=np.int64)

@@ -33,10 +33,10 @@ V_NOW, V_HALFWAY, V_BEFORE = 23.0 / 24.0, -16.0 / 24.0, 5.0 / 24.0
 @inlined
 def go_to_middle(step, n_dof, work):
     """Set the state in the middle of the step from the accelerations that are known."""
-    q, v = block(rows.Q, n_dof), block(rows.V, n_dof)
-    middle_q, middle_v = block(rows.MIDDLE_Q, n_dof), block(rows.MIDDLE_V, n_dof)
-    now, before = block(rows.NOW, n_dof), block(rows.BEFORE, n_dof)
-    halfway = block(rows.HALFWAY, n_dof)
+    q, v = block(rows.Q), block(rows.V)
+    middle_q, middle_v = block(rows.MIDDLE_Q), block(rows.MIDDLE_V)
+    now, before = block(rows.NOW), block(rows.BEFORE)
+    halfway = block(rows.HALFWAY)
     for d in range(n_dof):
         a, last_m = get_row(work, now + d), get_row(work, halfway + d)
         last_a, rate = get_row(work, before + d), get_row(work, v + d)
@@ -51,28 +51,28 @@ def go_to_middle(step, n_dof, work):
 def go_to_end(group, law, torque, step, n_dof, work):
     """Set the accelerations in the middle and the predicted state at the end of the step."""
     on_x, on_y, on_p, on_w = _on_gears(group, law, torque)
-    _predict(group, P_X, on_x, step, n_dof, work)
-    _predict(group, P_Y, on_y, step, n_dof, work)
-    _predict(group, P_TURN, on_p, step, n_dof, work)
-    _predict(group, W_X, 0.0 - on_x, step, n_dof, work)
-    _predict(group, W_Y, 0.0 - on_y, step, n_dof, work)
-    _predict(group, W_TURN, on_w, step, n_dof, work)
+    _predict(group, P_X, on_x, step, work)
+    _predict(group, P_Y, on_y, step, work)
+    _predict(group, P_TURN, on_p, step, work)
+    _predict(group, W_X, 0.0 - on_x, step, work)
+    _predict(group, W_Y, 0.0 - on_y, step, work)
+    _predict(group, W_TURN, on_w, step, work)
     for d in range(N_IN_PLANE, n_dof):
-        _predict(group, d, spread(work, 0.0), step, n_dof, work)
+        _predict(group, d, spread(work, 0.0), step, work)
 
 
 @inlined
 def finish(group, law, torque, step, n_dof, work):
     """Set accelerations and state at the end of the step, and the mean accelerations."""
     on_x, on_y, on_p, on_w = _on_gears(group, law, torque)
-    _finish(group, P_X, on_x, step, n_dof, work)
-    _finish(group, P_Y, on_y, step, n_dof, work)
-    _finish(group, P_TURN, on_p, step, n_dof, work)
-    _finish(group, W_X, 0.0 - on_x, step, n_dof, work)
-    _finish(group, W_Y, 0.0 - on_y, step, n_dof, work)
-    _finish(group, W_TURN, on_w, step, n_dof, work)
+    _finish(group, P_X, on_x, step, work)
+    _finish(group, P_Y, on_y, step, work)
+    _finish(group, P_TURN, on_p, step, work)
+    _finish(group, W_X, 0.0 - on_x, step, work)
+    _finish(group, W_Y, 0.0 - on_y, step, work)
+    _finish(group, W_TURN, on_w, step, work)
     for d in range(N_IN_PLANE, n_dof):
-        _finish(group, d, spread(work, 0.0), step, n_dof, work)
+        _finish(group, d, spread(work, 0.0), step, work)
 
 
 @inlined
@@ -87,45 +87,47 @@ def _on_gears(group, law, torque):
 
 
 @inlined
-def _acceleration(group, d, on_it, q, v, n_dof, work):
+def _acceleration(group, d, on_it, q, v, work):
     """Acceleration of a degree of freedom under a force of the mesh, with states in rows."""
     spring = get_row(group.stiffness, d) * get_row(work, q + d)
     spring = fused(get_row(group.damping, d), get_row(work, v + d), spring)
-    pull = get_row(work, block(rows.FORCES, n_dof) + d) + (on_it - spring)
-    for k in range(group.other_first[d], group.other_first[d + 1]):
-        other = group.other_column[k]
-        pull = pull - get_row(group.other_stiffness, k) * get_row(work, q + other)
-        pull = pull - get_row(group.other_damping, k) * get_row(work, v + other)
+    pull = get_row(work, block(rows.FORCES) + d) + (on_it - spring)
+    if len(group.other_column) > 0:
+        for k in range(group.other_first[d], group.other_first[d + 1]):
+            other = group.other_column[k]
+            moved, rate = get_row(work, q + other), get_row(work, v + other)
+            pull = pull - get_row(group.other_stiffness, k) * moved
+            pull = pull - get_row(group.other_damping, k) * rate
     return pull * get_row(group.inverse_mass, d)
 
 
 @inlined
-def _predict(group, d, on_it, step, n_dof, work):
+def _predict(group, d, on_it, step, work):
     """Acceleration in the middle and predicted state at the end, of one degree of freedom."""
-    middle_q, middle_v = block(rows.MIDDLE_Q, n_dof), block(rows.MIDDLE_V, n_dof)
-    m = _acceleration(group, d, on_it, middle_q, middle_v, n_dof, work)
-    halfway = block(rows.HALFWAY, n_dof) + d
-    a, last_m = get_row(work, block(rows.NOW, n_dof) + d), get_row(work, halfway)
+    middle_q, middle_v = block(rows.MIDDLE_Q), block(rows.MIDDLE_V)
+    m = _acceleration(group, d, on_it, middle_q, middle_v, work)
+    halfway = block(rows.HALFWAY) + d
+    a, last_m = get_row(work, block(rows.NOW) + d), get_row(work, halfway)
     set_row(work, halfway, m)
-    rate = get_row(work, block(rows.V, n_dof) + d)
+    rate = get_row(work, block(rows.V) + d)
     moved = fused(step * SIXTH, fused(2.0, m, a), rate)
-    moved = fused(step, moved, get_row(work, block(rows.Q, n_dof) + d))
-    set_row(work, block(rows.END_Q, n_dof) + d, moved)
+    moved = fused(step, moved, get_row(work, block(rows.Q) + d))
+    set_row(work, block(rows.END_Q) + d, moved)
     # a + 4 m + b with b = [m] - 3 a + 3 m
     gained = fused(7.0, m, fused(-2.0, a, last_m))
-    set_row(work, block(rows.END_V, n_dof) + d, fused(step * SIXTH, gained, rate))
+    set_row(work, block(rows.END_V) + d, fused(step * SIXTH, gained, rate))
 
 
 @inlined
-def _finish(group, d, on_it, step, n_dof, work):
+def _finish(group, d, on_it, step, work):
     """Acceleration, state at the end, and mean acceleration of one degree of freedom."""
-    end_q, end_v = block(rows.END_Q, n_dof), block(rows.END_V, n_dof)
-    b = _acceleration(group, d, on_it, end_q, end_v, n_dof, work)
-    now, v = block(rows.NOW, n_dof) + d, block(rows.V, n_dof) + d
-    a, m = get_row(work, now), get_row(work, block(rows.HALFWAY, n_dof) + d)
+    end_q, end_v = block(rows.END_Q), block(rows.END_V)
+    b = _acceleration(group, d, on_it, end_q, end_v, work)
+    now, v = block(rows.NOW) + d, block(rows.V) + d
+    a, m = get_row(work, now), get_row(work, block(rows.HALFWAY) + d)
     mean = SIXTH * fused(4.0, m, a + b)
     set_row(work, now, b)
-    set_row(work, block(rows.BEFORE, n_dof) + d, a)
-    set_row(work, block(rows.MEAN, n_dof) + d, mean)
+    set_row(work, block(rows.BEFORE) + d, a)
+    set_row(work, block(rows.MEAN) + d, mean)
     set_row(work, v, fused(step, mean, get_row(work, v)))
-    set_row(work, block(rows.Q, n_dof) + d, get_row(work, end_q + d))
+    set_row(work, block(rows.Q) + d, get_row(work, end_q + d))
