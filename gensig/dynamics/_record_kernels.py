@@ -36,7 +36,8 @@ def integrates(function, *kinds):
             return None
         return lambda group, *arguments: function(group, *arguments)
 
-    _overload(integrate, jit_options=OPTIONS)(choose)
+    # its own cache would not notice changes of ``function``; that of the caller does
+    _overload(integrate, jit_options={**OPTIONS, "cache": False})(choose)
 
 
 @compiled
