@@ -18,9 +18,11 @@ from benchmarks._measure import begin, print_figures, write_json
 from benchmarks._peak import roof
 from benchmarks._ross_time import stored_rate
 from gensig.dynamics._vector import LANES, PRECISIONS
+from gensig.dynamics.backends.nystroem.method import CORE as NYSTROEM_CORE
 
 RECORD = "import gensig; gensig.load_system('solver.precision={}').simulate()"
 PER_CORE = "simulated s per core-s"
+NYSTROEM = "two-evaluation core {} x5"
 SCALAR, RK45 = (
     "scalar Numba RK4 x5, the same law",
     "solve_ivp RK45, right-hand side compiled",
@@ -52,6 +54,10 @@ def kernels(runs: int) -> dict[str, float]:
         eight[:1], 5
     )
     works[KERNEL.format("float32")] = _rates.kernel(lanes, 5, "float32")
+    for precision, machines in (("float64", eight), ("float32", lanes)):
+        works[NYSTROEM.format(precision)] = _rates.kernel(
+            machines, 5, precision, NYSTROEM_CORE
+        )
     works[SCALAR] = _rates.scalar(eight, 5)
     works |= _rates.scipy_works(eight[0])
     result = _rates.rates(
@@ -108,6 +114,10 @@ def ratios(
         for precision in PRECISIONS
     }
     result = {name: value / rates[SCALAR] for name, value in result.items()}
+    for precision in PRECISIONS:
+        result[f"two-evaluation core over compiled core, {precision}"] = (
+            rates[NYSTROEM.format(precision)] / rates[KERNEL.format(precision)]
+        )
     end = ends["float64"][RECORDS]
     result["float32 over float64, end to end"] = ends["float32"][RECORDS] / end
     result["end to end over solve_ivp RK45, right-hand side compiled"] = (

@@ -17,7 +17,8 @@ from benchmarks._measure import in_turn
 from gensig.dynamics import _kernels
 from gensig.dynamics._layout import N_LAW
 from gensig.dynamics._vector import LANES, n_lanes
-from gensig.dynamics.backends.group_run import GroupRun
+from gensig.dynamics.backends.group_run import Core, GroupRun
+from gensig.dynamics.backends.runge_kutta import CORE
 from gensig.dynamics.decimation import decimator, in_band_error
 from gensig.dynamics.lanes import fill_lanes, pack
 from gensig.dynamics.pair import PairDynamics
@@ -72,14 +73,18 @@ def rates(works: dict[str, Work], runs: int) -> dict[str, float]:
 
 
 def kernel(
-    lanes: list[PairDynamics], oversampling: int, precision: str = "float64"
+    lanes: list[PairDynamics],
+    oversampling: int,
+    precision: str = "float64",
+    core: Core = CORE,
 ) -> Work:
     """The product's integrator with the mean accelerations of four channels, tables already
     packed.
     """
     step = 1.0 / (SAMPLING_RATE * oversampling)
-    group, n_settling = pack(lanes, step, precision), round(SETTLING / step)
-    settled = GroupRun(fill_lanes(lanes, precision), CHANNELS, precision)
+    group = core.pack(lanes, step, precision, (0.0, 0.0))
+    n_settling = round(SETTLING / step)
+    settled = GroupRun(fill_lanes(lanes, precision), CHANNELS, precision, core)
     for lane, dynamics in enumerate(fill_lanes(lanes, precision)):
         settled.begin(group, lane, dynamics.static_start(0.0))
     settled.advance(group, step, 0, n_settling)
@@ -93,7 +98,7 @@ def kernel(
         run = settled.restarted()
         state = run.state.ravel()
         for call in range(n_calls):
-            _kernels.integrate(
+            core.integrate(
                 group,
                 state,
                 run.lost,
@@ -163,7 +168,7 @@ def difference(all_of: list[PairDynamics], oversampling: int) -> float:
     """
     step, low_pass = 1.0 / (SAMPLING_RATE * oversampling), decimator(oversampling)
     n_steps = (round(SETTLING * SAMPLING_RATE) + 2 * low_pass.margin) * oversampling + 1
-    group, run = pack(all_of, step), GroupRun(all_of, CHANNELS, "float64")
+    group, run = pack(all_of, step), GroupRun(all_of, CHANNELS, "float64", CORE)
     for lane, dynamics in enumerate(all_of):
         run.begin(group, lane, dynamics.static_start(0.0))
     ours = np.empty((n_steps, len(CHANNELS), LANES))

@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks._measure import least
 from gensig.dataset.storage.shard import ShardWriter
 from gensig.dynamics import _kernels
-from gensig.dynamics.backends import runge_kutta
+from gensig.dynamics.backends import group_motions
 from gensig.dynamics.backends.group_run import GroupRun
 from gensig.dynamics.decimation import Decimator, decimator
 from gensig.production import folder as generation
@@ -48,9 +48,9 @@ CLOCKED: tuple[tuple[Any, str, str], ...] = (
     (spur_pair, "_mesh_table", TABLES),
     (pair_machine, "pair_dynamics", EQUATIONS),
     (pair_machine, "check_machine", EQUATIONS),
-    (runge_kutta, "settling_time", EQUATIONS),
-    (runge_kutta, "pack", EQUATIONS),
-    (runge_kutta.PairDynamics, "static_start", EQUATIONS),
+    (group_motions, "settling_time", EQUATIONS),
+    (group_motions, "pack_group", EQUATIONS),
+    (group_motions.PairDynamics, "static_start", EQUATIONS),
     (GroupRun, "advance", SETTLING),
     (GroupRun, "record", RECORDING),
     (pair_machine, "_checks", CHECKING),

@@ -27,6 +27,8 @@ from gensig.dynamics._layout import (
     ODD,
     PART,
     ROLL,
+    Group,
+    HelicalGroup,
     chord_rows,
     is_helical,
     machine_rows,
@@ -34,6 +36,7 @@ from gensig.dynamics._layout import (
     span_index,
 )
 from gensig.dynamics._mesh_kernels import mesh_law
+from gensig.dynamics._record_kernels import integrates
 from gensig.dynamics._tableau import RK4
 from gensig.dynamics._tables import between, chords_between, cover, gather
 from gensig.dynamics._vector import (
@@ -297,6 +300,9 @@ def integrate(
     for i in range(2 * n_dof):
         set_row(state, i, get_row(work, now + i))
     return angle_row
+
+
+integrates(integrate, Group, HelicalGroup)
 
 
 @inlined

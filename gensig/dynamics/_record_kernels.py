@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from gensig.dynamics._kernels import integrate
+from typing import Any
+
+from numba.extending import overload
+
 from gensig.dynamics._vector import (
+    OPTIONS,
     at,
     compiled,
     get_row,
@@ -15,6 +19,25 @@ from gensig.dynamics._vector import (
 
 BLOCK = 64  # output samples between two passes of the low-pass, whose input is still in the cache
 TOGETHER = 4  # samples of the low-pass that are summed side by side; divides BLOCK
+
+_overload: Any = overload
+
+
+def integrate(group, *arguments):
+    """Advance a group by the method of its type; arguments are those of ``_kernels.integrate``."""
+    raise NotImplementedError("only compiled functions can call it")
+
+
+def integrates(function, *kinds):
+    """Let a compiled function advance the groups of some types."""
+
+    def choose(group, *arguments):
+        if group.instance_class not in kinds:
+            return None
+        return lambda group, *arguments: function(group, *arguments)
+
+    # its own cache would not notice changes of ``function``; that of the caller does
+    _overload(integrate, jit_options={**OPTIONS, "cache": False})(choose)
 
 
 @compiled

@@ -3,32 +3,67 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics import _kernels, _record_kernels
+from gensig.dynamics import _record_kernels
 from gensig.dynamics._layout import CENTER, N_SEEN, Group
+from gensig.dynamics._vector import aligned
 from gensig.dynamics.decimation import Decimator
 from gensig.dynamics.pair import PairDynamics
 
 Array = NDArray[np.float64]
 
 
+class Pack(Protocol):
+    """Gear pairs of one mesh law as one group; arguments are those of ``lanes.pack``."""
+
+    def __call__(
+        self,
+        dynamics: Sequence[PairDynamics],
+        step: float,
+        precision: str,
+        span: tuple[float, float],
+    ) -> Group:
+        """The group."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Core:
+    """A method in compiled functions, with the arguments of those of ``_kernels``.
+
+    ``coarsest_oversampling`` is the least stable number of steps per sample of a machine, at most
+    a given one, at a sampling rate.
+    """
+
+    pack: Pack
+    scratch: Callable[[int, int, str], tuple[NDArray[Any], Array, NDArray[np.int64]]]
+    integrate: Any
+    coarsest_oversampling: Callable[[PairDynamics, int, float], int]
+
+
 class GroupRun:
     """State (2, dof, lane) of machines, their lost steps (lane,), and scratch of the core."""
 
     def __init__(
-        self, lanes: Sequence[PairDynamics], channels: NDArray[np.int64], precision: str
+        self,
+        lanes: Sequence[PairDynamics],
+        channels: NDArray[np.int64],
+        precision: str,
+        core: Core,
     ) -> None:
         n_dof = len(lanes[0].dofs)
         self.n_lanes, self.channels, self.precision = len(lanes), channels, precision
-        self.state = np.zeros((2, n_dof, self.n_lanes), dtype=precision)
-        self.lost = np.zeros(self.n_lanes, dtype=precision)
+        self.core = core
+        self.state = aligned(np.zeros((2, n_dof, self.n_lanes), dtype=precision))
+        self.lost = aligned(np.zeros(self.n_lanes, dtype=precision))
         self.fresh = np.ones(self.n_lanes, dtype=precision)
-        scratch = _kernels.scratch(n_dof, len(channels), precision)
-        self.work, self.wide, self.near = scratch
+        scratch = core.scratch(n_dof, len(channels), precision)
+        self.work, self.wide, self.near = map(aligned, scratch)
 
     @property
     def center(self) -> Array:
@@ -53,14 +88,16 @@ class GroupRun:
 
     def restarted(self) -> GroupRun:
         """A copy of the run that reads its tables anew, to continue at another step."""
-        other = copy.deepcopy(self)
+        other = copy.copy(self)
+        for name in ("state", "lost", "fresh", "work", "wide", "near"):
+            setattr(other, name, aligned(getattr(self, name)))
         other.lost[:], other.fresh[:] = 0.0, 1.0
         return other
 
     def advance(self, group: Group, step: float, first_step: int, n_steps: int) -> None:
         """Integrate; the next call continues from there unless lanes are marked as fresh."""
         nothing = np.empty(0)
-        _kernels.integrate(
+        self.core.integrate(
             group,
             self.state.ravel(),
             self.lost,
@@ -118,7 +155,7 @@ class GroupRun:
             out.ravel(),
             angle.ravel(),
             seen.ravel(),
-            np.empty(n_means * self.n_lanes, dtype=self.precision),
+            aligned(np.empty(n_means * self.n_lanes, dtype=self.precision)),
             self.work,
             self.wide,
             self.near,

@@ -2,41 +2,24 @@
 
 from __future__ import annotations
 
-import dataclasses
-import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import TypeAlias, final
+from collections.abc import Sequence
+from typing import final
 
-import numpy as np
-from numpy.typing import NDArray
-
-from gensig.dynamics._layout import Group
+from gensig.dynamics import _kernels
 from gensig.dynamics._vector import n_lanes
-from gensig.dynamics.backends.base import (
-    BOUNCING,
-    OUT_OF_BOUNDS,
-    Backend,
-    Integration,
-    Motions,
-)
-from gensig.dynamics.backends.group_run import GroupRun
-from gensig.dynamics.backends.step_limits import (
-    check_step,
-    coarsest_oversampling,
-    settling_stages,
-    settling_time,
-)
-from gensig.dynamics.decimation import decimator
-from gensig.dynamics.lanes import at_step, fill_lanes, pack
+from gensig.dynamics.backends.base import Backend, Integration, Motions
+from gensig.dynamics.backends.group_motions import integrate_machines
+from gensig.dynamics.backends.group_run import Core
+from gensig.dynamics.backends.step_limits import check_step, coarsest_oversampling
+from gensig.dynamics.lanes import pack
 from gensig.dynamics.pair import PairDynamics
 
-Array = NDArray[np.float64]
-Stages: TypeAlias = Sequence[tuple[int, int]]
-
-# steps per sample of the repeated settling of a machine that bounced: hard landings are stiff
-CAREFUL = 3
-CHECKED = 0.03  # s at the beginning of a record, integrated again at half the step
+CORE = Core(
+    pack=pack,
+    scratch=_kernels.scratch,
+    integrate=_kernels.integrate,
+    coarsest_oversampling=coarsest_oversampling,
+)
 
 
 @final
@@ -61,185 +44,4 @@ class RungeKutta(Backend):
         self, machines: Sequence[PairDynamics], integration: Integration
     ) -> Motions:
         """Motions of machines, integrated in groups that settle in the same stages."""
-        groups = lane_groups(machines, integration)
-        motions = (
-            (group, integrate_group([machines[i] for i in group], integration))
-            for group in groups
-        )
-        return in_order(motions, len(machines))
-
-
-def lane_groups(
-    machines: Sequence[PairDynamics], integration: Integration
-) -> list[list[int]]:
-    """Indices of the machines of each group; machines of one group settle in the same steps."""
-    by_steps: dict[int, list[int]] = {}
-    for index, machine in enumerate(machines):
-        steps = coarsest_oversampling(
-            machine, integration.oversampling, integration.sampling_rate
-        )
-        by_steps.setdefault(steps, []).append(index)
-    n = n_lanes(integration.precision)
-    return [
-        same[first : first + n]
-        for same in by_steps.values()
-        for first in range(0, len(same), n)
-    ]
-
-
-def in_order(groups: Iterable[tuple[list[int], Motions]], n_machines: int) -> Motions:
-    """Motions of all machines, from the motions of groups and the indices of their machines."""
-    rows: dict[str, NDArray[np.generic]] = {}
-    for indices, motions in groups:
-        for field in dataclasses.fields(Motions):
-            values = getattr(motions, field.name)
-            if field.name not in rows:
-                shape = n_machines, *values.shape[1:]
-                rows[field.name] = np.empty(shape, dtype=values.dtype)
-            rows[field.name][indices] = values[: len(indices)]
-    return Motions(**rows)  # type: ignore[arg-type]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GroupSteps:
-    """The numbers of a group of machines at any number of steps per sample.
-
-    ``packed`` is ``group`` as it was packed, for a step of ``packed_step`` s.
-    """
-
-    packed: Group
-    packed_step: float
-    sampling_rate: float
-
-    def at(self, oversampling: int) -> tuple[Group, float]:
-        """The group at so many steps per sample, and the step in s."""
-        step = 1.0 / (self.sampling_rate * oversampling)
-        return at_step(self.packed, self.packed_step, step), step
-
-
-def integrate_group(
-    machines: Sequence[PairDynamics], integration: Integration
-) -> Motions:
-    """Motions of machines in one group, from time 0 on, after they have settled.
-
-    One row a lane: lanes without a machine repeat the first.
-    """
-    rate, oversampling = integration.sampling_rate, integration.oversampling
-    precision = integration.precision
-    low_pass, lanes = decimator(oversampling), fill_lanes(machines, precision)
-    # output samples; time 0 is the first recorded one
-    settling = settling_stages(machines[0], oversampling, rate)
-    stages = [(n_steps, -low_pass.margin - before) for n_steps, before in settling]
-    end = stages[-1][1]
-    # every lane begins at a time of its own; its motion before is not used
-    durations = [math.ceil(settling_time(machine) * rate) for machine in lanes]
-    begins = [min(end - 1, -low_pass.margin - n) for n in durations]
-    span = min(begins) / rate, integration.duration + low_pass.margin / rate
-    packed_step = 1.0 / (rate * oversampling)
-    steps = GroupSteps(
-        packed=pack(machines, packed_step, precision, span),
-        packed_step=packed_step,
-        sampling_rate=rate,
-    )
-    channels = [machines[0].dofs.index(name) for name in integration.channels]
-    run = GroupRun(lanes, np.array(channels, dtype=np.int64), precision)
-    run = settled(run, lanes, begins, stages, steps, oversampling)
-    return recorded(run, steps, integration, end)
-
-
-def settled(
-    run: GroupRun,
-    lanes: Sequence[PairDynamics],
-    begins: Sequence[int],
-    stages: Stages,
-    steps: GroupSteps,
-    oversampling: int,
-) -> GroupRun:
-    """Machines at the end of the last stage.
-
-    Those that bounced have settled in finer steps.
-    """
-    run, bounced = run_stages(run, lanes, begins, stages, steps)
-    careful = [(min(oversampling, max(CAREFUL, n)), until) for n, until in stages]
-    if bounced.any() and careful != stages:
-        run.take(run_stages(run, lanes, begins, careful, steps)[0], bounced)
-    return run.restarted()
-
-
-def run_stages(
-    run: GroupRun,
-    lanes: Sequence[PairDynamics],
-    begins: Sequence[int],
-    stages: Stages,
-    steps: GroupSteps,
-) -> tuple[GroupRun, NDArray[np.bool_]]:
-    """Integrate machines through the stages of the settling.
-
-    Parameters
-    ----------
-    begins : output sample at which each lane begins, at rest
-    stages : steps per sample, and the output sample at which the stage ends
-
-    Returns
-    -------
-    the machines at the end of the last stage, and flags of those that bounced or went out of
-    bounds, (lane,)
-    """
-    now, lost = min(begins), np.zeros(len(lanes))
-    for n_steps, until in stages:
-        run, (group, step) = run.restarted(), steps.at(n_steps)
-        for begin in sorted({begin for begin in begins if now <= begin < until}):
-            run.advance(group, step, now * n_steps, (begin - now) * n_steps)
-            for lane, dynamics in enumerate(lanes):
-                if begins[lane] == begin:
-                    start = dynamics.static_start(begin * n_steps * step)
-                    run.begin(group, lane, start)
-                    lost[lane] = 0.0
-            now = begin
-        if now < until:
-            run.advance(group, step, now * n_steps, (until - now) * n_steps)
-            now = until
-        lost += run.lost / n_steps
-    bounced = lost > BOUNCING * (now - np.array(begins))
-    return run, ~run.is_within(OUT_OF_BOUNDS) | bounced
-
-
-def recorded(
-    run: GroupRun, steps: GroupSteps, integration: Integration, end: int
-) -> Motions:
-    """Motions of settled machines, which are at output sample ``end``."""
-    fine, n_samples = integration.oversampling, integration.n_samples
-    low_pass, (group, step) = decimator(fine), steps.at(fine)
-    run.advance(group, step, end * fine, (-low_pass.margin - end) * fine - 1)
-    checking = run.restarted()
-    run.lost[:] = 0.0
-    acceleration, angle, seen = run.record(
-        group, step, low_pass, n_samples, with_mesh_state=integration.with_mesh_state
-    )
-    check = np.empty((*acceleration.shape[:2], 0))
-    if integration.max_error is not None:
-        check = half_step(checking, steps, integration)
-    turned = angle[:, -1] - angle[:, 0]
-    n_steps = (n_samples + 2 * low_pass.margin - 1) * fine + 1
-    return Motions(
-        acceleration=acceleration,
-        check=check,
-        shaft_angle=angle[:, :-1],
-        seen=seen,
-        mean_speed=turned * integration.sampling_rate / n_samples,
-        contact_loss_fraction=run.lost / n_steps,
-        finite=run.is_within(OUT_OF_BOUNDS),
-    )
-
-
-def half_step(run: GroupRun, steps: GroupSteps, integration: Integration) -> Array:
-    """The beginning of the record at half the step, (lane, channel, sample)."""
-    fine = integration.oversampling
-    low_pass, finer_low_pass = decimator(fine), decimator(2 * fine)
-    group, step = steps.at(2 * fine)
-    # the settled state is before the step that is the first here; the finer low-pass may be shorter
-    first = -2 * (low_pass.margin * fine + 1)
-    wait = -2 * finer_low_pass.margin * fine - 1 - first
-    run.advance(group, step, first, wait)
-    n_check = min(integration.n_samples, math.ceil(CHECKED * integration.sampling_rate))
-    return run.record(group, step, finer_low_pass, n_check)[0]
+        return integrate_machines(machines, integration, CORE)

@@ -47,10 +47,12 @@ def coarsest_oversampling(
 
 
 def settling_stages(
-    dynamics: PairDynamics, oversampling: int, sampling_rate: float
+    least: int, oversampling: int, sampling_rate: float
 ) -> list[tuple[int, int]]:
-    """Stages of the settling: steps per sample, and samples from the stage's end to the record."""
-    least = coarsest_oversampling(dynamics, oversampling, sampling_rate)
+    """Stages of the settling: steps per sample, and samples from the stage's end to the record.
+
+    ``least`` is the number of steps per sample from which the method is stable.
+    """
     return [
         (min(max(steps, least), oversampling), math.ceil(before * sampling_rate))
         for steps, before in COARSE
@@ -76,8 +78,17 @@ def check_step(
             "solver.oversampling to at least "
             f"{math.ceil(oversampling * fastest * step / STABILITY_LIMIT)}"
         )
-    oscillating = float(np.abs(np.imag(rates)).max())
-    if max_error is None and oscillating * step > LONG_STEP:
+    if max_error is None:
+        warn_of_coarse_step(dynamics, sampling_rate, oversampling)
+
+
+def warn_of_coarse_step(
+    dynamics: PairDynamics, sampling_rate: float, oversampling: int
+) -> None:
+    """Warn of a step that is long for the mesh mode."""
+    step = 1.0 / (sampling_rate * oversampling)
+    oscillating = float(np.abs(np.imag(dynamics.stiff_rates)).max())
+    if oscillating * step > LONG_STEP:
         warnings.warn(
             f"{2 * math.pi / (oscillating * step):.1f} internal steps to a period of the mesh mode "
             f"at {oscillating / (2 * math.pi):.4g} Hz, and solver.max_error = null looks at no "
@@ -85,5 +96,5 @@ def check_step(
             f"{math.ceil(oversampling * oscillating * step / LONG_STEP)}, or give "
             "solver.max_error=1e-3",
             CoarseStepWarning,
-            stacklevel=2,
+            stacklevel=3,
         )

@@ -155,5 +155,7 @@ def test_an_unknown_backend_is_refused_and_none_is_the_default(config_with, lsod
     assert read(Solver, options, "solver").backend == DEFAULT_BACKEND == "runge_kutta"
     with pytest.raises(ConfigError) as caught:
         read(Solver, options | {"backend": "euler"}, "solver")
-    assert str(caught.value) == "solver.backend = 'euler'; allowed: runge_kutta, lsoda"
+    assert str(caught.value) == (
+        "solver.backend = 'euler'; allowed: runge_kutta, nystroem, lsoda"
+    )
     assert section.without("backend").read(Solver).backend == DEFAULT_BACKEND

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from fault_cases import one
 
-from gensig.dynamics.backends import runge_kutta, step_limits
+from gensig.dynamics.backends import group_motions, step_limits
 from gensig.dynamics.backends.base import BOUNCING
 from gensig.dynamics.backends.step_limits import (
     COARSE,
@@ -80,7 +80,7 @@ def steady(runs):
     """The same after 1.2 s of settling in fine steps."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(step_limits, "COARSE", ((16, 0.02),))
-        patch.setattr(runge_kutta, "settling_time", lambda _: 1.2)
+        patch.setattr(group_motions, "settling_time", lambda _: 1.2)
         return simulate_together(runs)
 
 
@@ -121,7 +121,7 @@ def test_hard_landings_settle_in_finer_steps(run, runs, monkeypatch):
 
     assert together[1].contact_loss_fraction > BOUNCING
 
-    monkeypatch.setattr(runge_kutta, "CAREFUL", 1)
+    monkeypatch.setattr(group_motions, "CAREFUL", 1)
     assert isinstance(simulate_together([bouncing])[0], SimulationError)
 
 
@@ -131,9 +131,10 @@ def test_stages_become_finer_within_stability(dynamics_of, xiamen):
     oversampling = xiamen.solver.oversampling
 
     def steps(limit, rate):
-        return [steps for steps, _ in settling_stages(dynamics, limit, rate)]
+        least = coarsest_oversampling(dynamics, limit, rate)
+        return [steps for steps, _ in settling_stages(least, limit, rate)]
 
-    ends = [end for _, end in settling_stages(dynamics, oversampling, RATE)]
+    ends = [end for _, end in settling_stages(1, oversampling, RATE)]
 
     assert all(first > second > 0 for first, second in pairwise(ends))
     assert coarsest_oversampling(dynamics, oversampling, RATE) == 1

@@ -131,7 +131,10 @@ def test_a_toothed_wheel_and_the_torque_of_the_load_are_stored(tmp_path):
         (["system.record_mesh=[18,3]"], "no such mesh; there are 3/18, 19/20"),
         (["system.helical_meshes=rigid"], "allowed: sliced, constant"),
         (["sensing.channels=[crank_speed]"], "allowed: pinion_rotation, wheel_rot"),
-        (["solver.backend=euler"], "solver.backend = 'euler'; allowed: runge_kutta"),
+        (
+            ["solver.backend=euler"],
+            "solver.backend = 'euler'; allowed: runge_kutta, nystroem",
+        ),
         (["solver.backend=other"], "take solver.backend=runge_kutta"),
         (["operating.torque_nm=-5"], "must be positive"),
         (["fault.tooth=60"], "whose teeth are 0..53"),

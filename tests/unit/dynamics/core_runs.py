@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gensig.dynamics import _kernels
 from gensig.dynamics.backends.group_run import GroupRun
-from gensig.dynamics.lanes import fill_lanes, pack
+from gensig.dynamics.backends.runge_kutta import CORE
+from gensig.dynamics.lanes import fill_lanes
 from gensig.faults.broken import MissingTooth
 from gensig.systems.base import simulate_together
 from gensig.systems.run import CleanRecord
@@ -77,12 +77,13 @@ class CoreRun(GroupRun):
         precision="float64",
         first_step=0,
         span=(0.0, 0.0),
+        core=CORE,
     ):
         self.machines = fill_lanes(machines, precision)
         self.step = step
         self.now = first_step
-        self.group = pack(machines, step, precision, span)
-        super().__init__(self.machines, np.array(channels), precision)
+        self.group = core.pack(machines, step, precision, span)
+        super().__init__(self.machines, np.array(channels), precision, core)
         for lane in range(self.n_lanes):
             self.restart(lane)
 
@@ -109,7 +110,7 @@ class CoreRun(GroupRun):
         shape = n_steps, len(self.channels), self.n_lanes
         means = np.empty(shape, dtype=self.precision)
         nothing = np.empty(0)
-        _kernels.integrate(
+        self.core.integrate(
             self.group,
             self.state.ravel(),
             self.lost,

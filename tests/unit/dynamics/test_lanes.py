@@ -17,7 +17,8 @@ from fault_cases import one
 
 from gensig.dynamics._vector import LANES
 from gensig.dynamics.backends.base import Integration, Motions
-from gensig.dynamics.backends.runge_kutta import lane_groups
+from gensig.dynamics.backends.group_motions import lane_groups
+from gensig.dynamics.backends.runge_kutta import CORE
 from gensig.dynamics.integrator import Solver, integrate
 from gensig.errors import SimulationError
 from gensig.faults.broken import MissingTooth
@@ -360,7 +361,10 @@ class TestMotions:
         machines = [
             dynamics_of(systems[k % 3], phase=0.05 * k) for k in range(LANES + 3)
         ]
-        assert [len(group) for group in lane_groups(machines, INTEGRATION)] == [7, 4]
+        assert [len(group) for group in lane_groups(machines, INTEGRATION, CORE)] == [
+            7,
+            4,
+        ]
 
         together = integrate(machines, Solver(**SOLVER), **RECORD)
         assert together.acceleration.shape == (

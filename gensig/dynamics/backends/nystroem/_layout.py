@@ -1,0 +1,80 @@
+"""Row names of the scratch of the two-evaluation core.
+
+The scratch begins with the rows of ``gensig.dynamics._layout``, of which the back flanks use
+some. Rows follow for the pairs, for what the step remembers, and for the machine.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gensig.dynamics import _layout as layout
+from gensig.dynamics._layout import Group
+from gensig.dynamics._vector import inlined, n_lanes
+
+# N/m: rows hold compliances times this number, which are about 1
+PER_COMPLIANCE = 2.0**27
+FOLLOWED = 3  # pairs within one and a half base pitches of the middle of the path
+
+# rows of a pair at one instant: own compliance, its slope, gap, its slope, direction of sliding,
+# position, integral of the direction
+COMPLIANCE, SOFTENING, GAP, GAP_SLOPE, SLIDING, PLACE, SLID, N_NODE = range(8)
+
+# rows behind those of the mesh
+NODES = layout.N_MESH  # of every pair: at the end of the last step
+MIDDLE = NODES + FOLLOWED * N_NODE  # of every pair: in the middle of the step
+# of every pair at the begin, in the middle and at the end of a step: force it has, negative where
+# it does not touch, stiffness, and factor of its damping
+BEGIN_AT, MIDDLE_AT, END_AT, N_INSTANTS = range(4)
+MARGIN = MIDDLE + FOLLOWED * N_NODE
+SPRING = MARGIN + N_INSTANTS * FOLLOWED
+DAMPED = SPRING + N_INSTANTS * FOLLOWED
+PAIR_FORCE = DAMPED + N_INSTANTS * FOLLOWED
+NORMAL = PAIR_FORCE + FOLLOWED  # force of all pairs
+# roll at which the nodes at the begin of the step were read, less the true one
+BEHIND = NORMAL + 1
+# half a table cell, and half the length over which sliding turns, m
+BEND, FRICTION_WIDTH = BEHIND + 1, BEHIND + 2
+FRESH = FRICTION_WIDTH + 1  # 1 where rows are being set anew
+# corrections of every pair's force by a kink: of its mean, and of its mean weighted by what is
+# left of the step
+SHORT = FRESH + 1
+EARLY = SHORT + FOLLOWED
+DRIVE = EARLY + FOLLOWED
+N_FIXED = DRIVE + layout.N_DRIVE
+# blocks of rows per degree of freedom behind them, two gears and two rotors at most: constants
+# are faster than the number of a machine
+MOST_DOFS = 8
+Q, V, MIDDLE_Q, MIDDLE_V, END_Q, END_V = range(6)
+# accelerations at begin and middle of the last step and at its end, other forces, means
+BEFORE, HALFWAY, NOW, FORCES, MEAN, N_BLOCKS = range(6, 12)
+
+# float64 rows behind those of ``gensig.dynamics._layout``: position and number of every pair,
+# its tables' first indices, and numbers of the tables
+POSITION = layout.N_WIDE
+NUMBER = POSITION + FOLLOWED
+AT_PINION, AT_WHEEL = NUMBER + FOLLOWED, NUMBER + 2 * FOLLOWED
+PER_CELL = AT_WHEEL + FOLLOWED  # 0 where the pair lacks a tooth
+PER_WHEEL_CELL = PER_CELL + FOLLOWED
+LAST_CELL = PER_WHEEL_CELL + FOLLOWED
+N_WIDE = LAST_CELL + 1
+
+
+class NystroemGroup(Group):
+    """Spur gears of the one-sided law, for the two-evaluation core.
+
+    The table ends with one cell of a missing pair and one cell of zeros.
+    """
+
+
+@inlined
+def block(name):
+    """First row of a block of the machine."""
+    return N_FIXED + name * MOST_DOFS
+
+
+def scratch(n_dof, n_channels, precision="float64"):
+    """Work rows, float64 rows and integer rows of ``integrate``."""
+    n = n_lanes(precision)
+    work = np.zeros((N_FIXED + N_BLOCKS * MOST_DOFS) * n, dtype=precision)
+    return work, np.zeros(N_WIDE * n), np.zeros(1, dtype=np.int64)
