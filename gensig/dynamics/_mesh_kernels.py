@@ -124,16 +124,13 @@ def one_sided_law(
     middle = ahead
     if helical:
         middle = ahead - get_row(numbers, layout.HALF_LAG)
-    # beyond half the backlash only the back flanks can touch
-    driven = approach + 0.5 * get_row(numbers, BACKLASH)
     for k in range(first, last):
         pair = pair_rows(slot, k)
         grown = ahead * get_row(work, pair + GAP_SLOPE)
         bite = approach - (get_row(work, pair + GAP) + grown)
         if margin >= 0:
             set_row(work, margin + k, bite)
-        bite = where_above(bite, zero, bite, zero)
-        set_row(work, BITE + k, where_above(driven, zero, bite, zero))
+        set_row(work, BITE + k, where_above(bite, zero, bite, zero))
     rounds = MOST_PAIRS if helical else N_PAIRS
     total, stiffness = _total_load(numbers, rounds, first, last, slot, work)
     normal, along, lost, loaded = zero, zero, zero, zero

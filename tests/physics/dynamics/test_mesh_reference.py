@@ -273,3 +273,21 @@ def test_the_right_hand_side_agrees(dynamics):
         tolerance = 1e-6 * np.abs(expected).max()
         acceleration = right_hand_side(dynamics, time, q, v)
         assert_close(acceleration, expected, 1e-9, atol=tolerance)
+
+
+def test_a_tooth_that_stands_proud_carries_up_to_its_gap(xiamen, dynamics_of):
+    """The force fades out where the flanks part, even beyond half the backlash."""
+    eccentric = dynamics_of(xiamen, (one("runout", tooth=0, eccentricity_um=80),))
+    speed = eccentric.operating.speed * eccentric.table.pair.pinion.base_radius
+    pitch, step = eccentric.table.pair.base_pitch, 0.05e-6
+    parting = 0
+    for roll in (np.arange(23) + 0.5) * pitch:
+        approach = np.arange(-100e-6, 20e-6, step)
+        states = np.zeros((len(approach), 4))
+        states[:, 0], states[:, 1], states[:, 3] = roll, approach, speed
+        states = states[approach > -eccentric.table.pair.backlash]
+        force = laws(eccentric, states)[:, 0]
+        assert np.abs(np.diff(force)).max() < 1e9 * step
+        first = int(np.argmax(force > 0.0))
+        parting += states[first, 1] < -0.5 * eccentric.table.pair.backlash
+    assert parting > 0

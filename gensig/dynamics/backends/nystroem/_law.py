@@ -28,12 +28,11 @@ def _greater(a, b):
 
 
 @inlined
-def _bite(nodes, j, ahead, approach, most, work):
+def _bite(nodes, j, ahead, approach, work):
     """Penetration of a pair into the body that no other pair deflects; negative without."""
     pair = nodes + j * N_NODE
     gap, rise = get_row(work, pair + rows.GAP), get_row(work, pair + rows.GAP_SLOPE)
-    bite = approach - fused(ahead, rise, gap)
-    return where_above(most, bite, bite, most)
+    return approach - fused(ahead, rise, gap)
 
 
 @inlined
@@ -118,13 +117,10 @@ def mesh_law(
     numbers = group.numbers
     zero = spread(work, 0.0)
     scaled = PER_COMPLIANCE * get_row(numbers, layout.SHARED)
-    # beyond half the backlash only the back flanks can touch
     play = get_row(numbers, layout.BACKLASH)
-    driven = approach + 0.5 * play
-    most = where_above(driven, zero, spread(work, layout.FAR), zero)
-    b_0 = _bite(nodes, 0, ahead, approach, most, work)
-    b_1 = _bite(nodes, 1, ahead, approach, most, work)
-    b_2 = _bite(nodes, 2, ahead, approach, most, work)
+    b_0 = _bite(nodes, 0, ahead, approach, work)
+    b_1 = _bite(nodes, 1, ahead, approach, work)
+    b_2 = _bite(nodes, 2, ahead, approach, work)
     load, springs = shared_load(
         get_row(work, nodes),
         get_row(work, nodes + N_NODE),
