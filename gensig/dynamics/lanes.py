@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,10 @@ from gensig.mesh.sliced.sliced_table import SlicedTable
 Array = NDArray[np.float64]
 
 CELLS_PER_SECOND = 1000.0  # speed and torque are linear in each cell
+
+
+MachineT = TypeVar("MachineT")
+GroupT = TypeVar("GroupT", bound=Any)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +48,7 @@ class ToothRows:
     wheel_first: int
 
 
-def fill_lanes(dynamics: Sequence[PairDynamics], precision: str) -> list[PairDynamics]:
+def fill_lanes(dynamics: Sequence[MachineT], precision: str) -> list[MachineT]:
     """One machine a lane; lanes without one repeat the first."""
     return [*dynamics, *[dynamics[0]] * (n_lanes(precision) - len(dynamics))]
 
@@ -144,8 +149,10 @@ def pack(
     )
 
 
-def at_step(group: Group, before: float, after: float) -> Group:
-    """The same group for another step, s."""
+def at_step(group: GroupT, before: float, after: float) -> GroupT:
+    """The same group for another step, s; only the paper's law depends on it."""
+    if group.one_sided:
+        return group
     numbers = group.numbers.copy().reshape(layout.N_NUMBERS, -1)
     numbers[layout.PER_SWITCH_WIDTH] *= before / after
     return group._replace(numbers=numbers.ravel())

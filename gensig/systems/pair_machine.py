@@ -266,7 +266,7 @@ def _checks(
     signal = motions.acceleration[:, :, : exact.shape[2]]
     errors[finite] = in_band_error(signal[finite], exact[finite], sampling_rate)
     checks = np.where(errors <= solver.max_error, "error", "unresolved").tolist()
-    bouncing = motions.contact_loss_fraction > BOUNCING
+    bouncing = motions.contact_loss.max(axis=1) > BOUNCING
     for index in np.flatnonzero(finite & bouncing & ~(errors <= solver.max_error)):
         row = slice(index, index + 1)
         if agreement(signal[row], exact[row], sampling_rate).agrees[0]:
@@ -293,7 +293,7 @@ def _side_by_side(
         if not motions.finite[index]:
             records.append(_not_finite(run))
             continue
-        acceleration, angle = motions.acceleration[index], motions.shaft_angle[index]
+        acceleration, angle = motions.acceleration[index], motions.angle[index, 0]
         if run.gearbox is not None:
             acceleration = acceleration * run.gearbox.gain[:, None]
         mesh = None
@@ -305,7 +305,7 @@ def _side_by_side(
                 acceleration=acceleration,
                 shaft_angle=angle,
                 mean_speed=float(motions.mean_speed[index]),
-                contact_loss_fraction=float(motions.contact_loss_fraction[index]),
+                contact_loss_fraction=float(motions.contact_loss[index, 0]),
                 integration_error=float(errors[index]),
                 integration_check=checks[index],
                 mesh=mesh,

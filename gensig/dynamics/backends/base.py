@@ -62,20 +62,20 @@ class Motions:
     acceleration : (machine, channel, sample) m/s2 or rad/s2
     check : (machine, channel, sample)    the beginning of the same at half the step; no sample
         without ``max_error``
-    shaft_angle : (machine, sample) rad   of the pinion since time 0
-    seen : (machine, row, sample)         the mesh, rows of ``_layout``; none without
-        ``with_mesh_state``
-    mean_speed : (machine,) rad/s
-    contact_loss_fraction : (machine,)    share of the time without contact
+    angle : (machine, angle, sample) rad  since time 0, of the pinion or of what a line names
+    seen : (machine, row, sample)         the meshes, ``N_SEEN`` rows of ``_layout`` each; none
+        without ``with_mesh_state``
+    mean_speed : (machine,) rad/s         of the first angle
+    contact_loss : (machine, mesh)        share of the time without contact
     finite : (machine,)                   the motion stayed within bounds
     """
 
     acceleration: Array
     check: Array
-    shaft_angle: Array
+    angle: Array
     seen: Array
     mean_speed: Array
-    contact_loss_fraction: Array
+    contact_loss: Array
     finite: NDArray[np.bool_]
 
 

@@ -6,12 +6,11 @@ import dataclasses
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics._layout import Group
 from gensig.dynamics._vector import n_lanes
 from gensig.dynamics.backends.base import (
     BOUNCING,
@@ -19,11 +18,10 @@ from gensig.dynamics.backends.base import (
     Integration,
     Motions,
 )
-from gensig.dynamics.backends.group_run import Core, GroupRun
-from gensig.dynamics.backends.step_limits import settling_stages, settling_time
+from gensig.dynamics.backends.group_run import Core, Dynamics, DynamicsT, GroupRun
+from gensig.dynamics.backends.step_limits import settling_stages
 from gensig.dynamics.decimation import decimator
 from gensig.dynamics.lanes import at_step, fill_lanes
-from gensig.dynamics.pair import PairDynamics
 
 Array = NDArray[np.float64]
 Stages: TypeAlias = Sequence[tuple[int, int]]
@@ -34,7 +32,7 @@ CHECKED = 0.03  # s at the beginning of a record, integrated again at half the s
 
 
 def integrate_machines(
-    machines: Sequence[PairDynamics], integration: Integration, core: Core
+    machines: Sequence[DynamicsT], integration: Integration, core: Core[DynamicsT]
 ) -> Motions:
     """Motions of machines, integrated in groups that settle in the same stages."""
     groups = lane_groups(machines, integration, core)
@@ -46,7 +44,7 @@ def integrate_machines(
 
 
 def lane_groups(
-    machines: Sequence[PairDynamics], integration: Integration, core: Core
+    machines: Sequence[DynamicsT], integration: Integration, core: Core[DynamicsT]
 ) -> list[list[int]]:
     """Indices of the machines of each group; machines of one group settle in the same steps."""
     by_steps: dict[int, list[int]] = {}
@@ -83,18 +81,18 @@ class GroupSteps:
     ``packed`` is ``group`` as it was packed, for a step of ``packed_step`` s.
     """
 
-    packed: Group
+    packed: Any
     packed_step: float
     sampling_rate: float
 
-    def at(self, oversampling: int) -> tuple[Group, float]:
+    def at(self, oversampling: int) -> tuple[Any, float]:
         """The group at so many steps per sample, and the step in s."""
         step = 1.0 / (self.sampling_rate * oversampling)
         return at_step(self.packed, self.packed_step, step), step
 
 
 def integrate_group(
-    machines: Sequence[PairDynamics], integration: Integration, core: Core
+    machines: Sequence[DynamicsT], integration: Integration, core: Core[DynamicsT]
 ) -> Motions:
     """Motions of machines in one group, from time 0 on, after they have settled.
 
@@ -109,7 +107,7 @@ def integrate_group(
     stages = [(n_steps, -low_pass.margin - before) for n_steps, before in settling]
     end = stages[-1][1]
     # every lane begins at a time of its own; its motion before is not used
-    durations = [math.ceil(settling_time(machine) * rate) for machine in lanes]
+    durations = [math.ceil(core.settling_time(machine) * rate) for machine in lanes]
     begins = [min(end - 1, -low_pass.margin - n) for n in durations]
     span = min(begins) / rate, integration.duration + low_pass.margin / rate
     packed_step = 1.0 / (rate * oversampling)
@@ -125,19 +123,19 @@ def integrate_group(
 
 
 def pack_group(
-    machines: Sequence[PairDynamics],
+    machines: Sequence[DynamicsT],
     step: float,
     precision: str,
     span: tuple[float, float],
-    core: Core,
-) -> Group:
+    core: Core[DynamicsT],
+) -> Any:
     """Machines as a group of a compiled core."""
     return core.pack(machines, step, precision, span)
 
 
 def settled(
     run: GroupRun,
-    lanes: Sequence[PairDynamics],
+    lanes: Sequence[Dynamics],
     begins: Sequence[int],
     stages: Stages,
     steps: GroupSteps,
@@ -156,7 +154,7 @@ def settled(
 
 def run_stages(
     run: GroupRun,
-    lanes: Sequence[PairDynamics],
+    lanes: Sequence[Dynamics],
     begins: Sequence[int],
     stages: Stages,
     steps: GroupSteps,
@@ -187,7 +185,7 @@ def run_stages(
         if now < until:
             run.advance(group, step, now * n_steps, (until - now) * n_steps)
             now = until
-        lost += run.lost / n_steps
+        lost += run.lost.max(axis=0) / n_steps
     bounced = lost > BOUNCING * (now - np.array(begins))
     return run, ~run.is_within(OUT_OF_BOUNDS) | bounced
 
@@ -207,15 +205,15 @@ def recorded(
     check = np.empty((*acceleration.shape[:2], 0))
     if integration.max_error is not None:
         check = half_step(checking, steps, integration)
-    turned = angle[:, -1] - angle[:, 0]
+    turned = angle[:, 0, -1] - angle[:, 0, 0]
     n_steps = (n_samples + 2 * low_pass.margin - 1) * fine + 1
     return Motions(
         acceleration=acceleration,
         check=check,
-        shaft_angle=angle[:, :-1],
+        angle=angle[:, :, :-1],
         seen=seen,
         mean_speed=turned * integration.sampling_rate / n_samples,
-        contact_loss_fraction=run.lost / n_steps,
+        contact_loss=run.lost.T / n_steps,
         finite=run.is_within(OUT_OF_BOUNDS),
     )
 

@@ -5,62 +5,71 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics import _record_kernels
-from gensig.dynamics._layout import CENTER, N_SEEN, Group
+from gensig.dynamics._layout import CENTER, N_SEEN
 from gensig.dynamics._vector import aligned
 from gensig.dynamics.decimation import Decimator
-from gensig.dynamics.pair import PairDynamics
 
 Array = NDArray[np.float64]
 
 
-class Pack(Protocol):
-    """Gear pairs of one mesh law as one group; arguments are those of ``lanes.pack``."""
+class Dynamics(Protocol):
+    """A machine that can be integrated: a gear pair, or a line of several meshes."""
 
-    def __call__(
-        self,
-        dynamics: Sequence[PairDynamics],
-        step: float,
-        precision: str,
-        span: tuple[float, float],
-    ) -> Group:
-        """The group."""
+    @property
+    def dofs(self) -> tuple[str, ...]:
+        """Names of the degrees of freedom."""
+
+    def static_start(self, time: float) -> Array:
+        """Deflection at rest at a nominal time, (dof,)."""
+
+
+DynamicsT = TypeVar("DynamicsT", bound=Dynamics)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Core:
+class Core(Generic[DynamicsT]):
     """A method in compiled functions, with the arguments of those of ``_kernels``.
 
-    ``coarsest_oversampling`` is the least stable number of steps per sample of a machine, at most
-    a given one, at a sampling rate.
+    Parameters
+    ----------
+    pack : machines of one kind as one group; arguments are those of ``lanes.pack``
+    scratch : work rows, float64 rows and integers for degrees of freedom, channels and precision
+    coarsest_oversampling : the least stable number of steps per sample of a machine, at most a
+        given one, at a sampling rate
+    settling_time : after which a start from rest has settled, s
+    n_meshes, n_angles : meshes of a machine, and angles that are given out
     """
 
-    pack: Pack
+    pack: Callable[[Sequence[DynamicsT], float, str, tuple[float, float]], Any]
     scratch: Callable[[int, int, str], tuple[NDArray[Any], Array, NDArray[np.int64]]]
     integrate: Any
-    coarsest_oversampling: Callable[[PairDynamics, int, float], int]
+    coarsest_oversampling: Callable[[DynamicsT, int, float], int]
+    settling_time: Callable[[DynamicsT], float]
+    n_meshes: int = 1
+    n_angles: int = 1
 
 
 class GroupRun:
-    """State (2, dof, lane) of machines, their lost steps (lane,), and scratch of the core."""
+    """State (2, dof, lane) of machines, their lost steps (mesh, lane), and scratch of the core."""
 
     def __init__(
         self,
-        lanes: Sequence[PairDynamics],
+        lanes: Sequence[Dynamics],
         channels: NDArray[np.int64],
         precision: str,
-        core: Core,
+        core: Core[Any],
     ) -> None:
         n_dof = len(lanes[0].dofs)
         self.n_lanes, self.channels, self.precision = len(lanes), channels, precision
         self.core = core
         self.state = aligned(np.zeros((2, n_dof, self.n_lanes), dtype=precision))
-        self.lost = aligned(np.zeros(self.n_lanes, dtype=precision))
+        self.lost = aligned(np.zeros((core.n_meshes, self.n_lanes), dtype=precision))
         self.fresh = np.ones(self.n_lanes, dtype=precision)
         scratch = core.scratch(n_dof, len(channels), precision)
         self.work, self.wide, self.near = map(aligned, scratch)
@@ -74,11 +83,11 @@ class GroupRun:
         """Lanes whose state is finite and below a bound, (lane,)."""
         return np.asarray((np.abs(self.state) < bound).all(axis=(0, 1)))
 
-    def begin(self, group: Group, lane: int, deflection: Array) -> None:
+    def begin(self, group: Any, lane: int, deflection: Array) -> None:
         """Put one lane at rest at a deflection (dof,)."""
         self.state[:, :, lane] = 0.0
         self.state[0, :, lane] = deflection - group.rest[:, lane]
-        self.center[lane], self.fresh[lane], self.lost[lane] = 0.0, 1.0, 0.0
+        self.center[lane], self.fresh[lane], self.lost[:, lane] = 0.0, 1.0, 0.0
 
     def take(self, other: GroupRun, lanes: NDArray[np.bool_]) -> None:
         """Copy the state of some lanes, (lane,), from another run; ``restarted`` must follow."""
@@ -94,13 +103,13 @@ class GroupRun:
         other.lost[:], other.fresh[:] = 0.0, 1.0
         return other
 
-    def advance(self, group: Group, step: float, first_step: int, n_steps: int) -> None:
+    def advance(self, group: Any, step: float, first_step: int, n_steps: int) -> None:
         """Integrate; the next call continues from there unless lanes are marked as fresh."""
         nothing = np.empty(0)
         self.core.integrate(
             group,
             self.state.ravel(),
-            self.lost,
+            self.lost.ravel(),
             self.fresh,
             step,
             first_step,
@@ -120,7 +129,7 @@ class GroupRun:
 
     def record(
         self,
-        group: Group,
+        group: Any,
         step: float,
         low_pass: Decimator,
         n_samples: int,
@@ -131,20 +140,23 @@ class GroupRun:
 
         Returns
         -------
-        accelerations (lane, channel, sample), angles of the pinions (lane, sample + 1), and
-        ``N_SEEN`` rows of the mesh (lane, row, sample); no row unless ``with_mesh_state``
+        accelerations (lane, channel, sample), angles (lane, angle, sample + 1), and ``N_SEEN``
+        rows of every mesh (lane, row, sample); no row unless ``with_mesh_state``
         """
         factor, margin = low_pass.oversampling, low_pass.margin
-        n_channels, n_seen = len(self.channels), N_SEEN if with_mesh_state else 0
+        n_channels, n_seen = len(self.channels), 0
+        if with_mesh_state:
+            n_seen = N_SEEN * self.core.n_meshes
         out = np.empty((self.n_lanes, n_channels, n_samples))
-        angle = np.empty((n_samples + 2 * margin, self.n_lanes))
+        n_rows = n_samples + 2 * margin
+        angle = np.empty((n_rows, self.core.n_angles, self.n_lanes))
         seen = np.empty((len(angle), n_seen, self.n_lanes))
         taps = low_pass.padded(self.precision)
         n_means = _record_kernels.mean_rows(len(taps), factor) * n_channels
         _record_kernels.record(
             group,
             self.state.ravel(),
-            self.lost,
+            self.lost.ravel(),
             self.fresh,
             step,
             -margin * factor - 1,
@@ -161,5 +173,5 @@ class GroupRun:
             self.near,
         )
         end = margin + n_samples
-        angle = np.ascontiguousarray(angle[margin : end + 1].T)
+        angle = np.ascontiguousarray(angle[margin : end + 1].transpose(2, 1, 0))
         return out, angle, np.ascontiguousarray(seen[margin:end].transpose(2, 1, 0))

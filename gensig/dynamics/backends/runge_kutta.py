@@ -10,7 +10,11 @@ from gensig.dynamics._vector import n_lanes
 from gensig.dynamics.backends.base import Backend, Integration, Motions
 from gensig.dynamics.backends.group_motions import integrate_machines
 from gensig.dynamics.backends.group_run import Core
-from gensig.dynamics.backends.step_limits import check_step, coarsest_oversampling
+from gensig.dynamics.backends.step_limits import (
+    check_step,
+    coarsest_oversampling,
+    settling_time,
+)
 from gensig.dynamics.lanes import pack
 from gensig.dynamics.pair import PairDynamics
 
@@ -19,6 +23,7 @@ CORE = Core(
     scratch=_kernels.scratch,
     integrate=_kernels.integrate,
     coarsest_oversampling=coarsest_oversampling,
+    settling_time=settling_time,
 )
 
 

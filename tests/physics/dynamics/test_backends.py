@@ -50,10 +50,10 @@ class Lsoda(Backend):
         return Motions(
             acceleration=acceleration,
             check=acceleration,
-            shaft_angle=angle[:, :-1],
+            angle=angle[:, None, :-1],
             seen=np.empty((n, 0, integration.n_samples)),
             mean_speed=(angle[:, -1] - angle[:, 0]) / integration.duration,
-            contact_loss_fraction=np.zeros(n),
+            contact_loss=np.zeros((n, 1)),
             finite=np.isfinite(acceleration).all(axis=(1, 2)),
         )
 

@@ -32,7 +32,12 @@ from gensig.dynamics._vector import (
 from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem._kinks import correct, kinked
 from gensig.dynamics.backends.nystroem._law import mesh_law
-from gensig.dynamics.backends.nystroem._layout import FOLLOWED, NystroemGroup, block
+from gensig.dynamics.backends.nystroem._layout import (
+    FOLLOWED,
+    MOST_DOFS,
+    NystroemGroup,
+    block,
+)
 from gensig.dynamics.backends.nystroem._motion import finish, go_to_end, go_to_middle
 from gensig.dynamics.backends.nystroem._pairs import (
     first_pairs,
@@ -131,7 +136,7 @@ def integrate(
             read_step(group, by_tooth, j, ahead, span, per_span, work, wide)
         # the middle of the step
         q_0 = get_row(work, q + P_TURN)
-        go_to_middle(step, n_dof, work)
+        go_to_middle(step, n_dof, MOST_DOFS, work)
         approach, rate = motion(group, middle_q, middle_v, work)
         turned = (0.5 * step) * (speed + (0.25 * step) * gain)
         turned = radius * (turned + (get_row(work, middle_q + P_TURN) - q_0))

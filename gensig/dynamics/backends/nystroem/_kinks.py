@@ -154,13 +154,12 @@ def _give(j, changed, shared, work):
         set_row(work, rows.EARLY + i, get_row(work, rows.EARLY + i) + more)
 
 
-@compiled
-def correct(group, h, changed, mean, v, q, work):
-    """Add to the end of the step what its kinks change, in the lanes with any.
+@inlined
+def miss(numbers, changed, work):
+    """Set what Simpson's rule misses of the force of every pair; other loaded pairs give way.
 
-    ``changed`` holds for every pair 1 where it has a kink. Other loaded pairs give way.
+    ``changed`` holds for every pair 1 where it has a kink.
     """
-    numbers = group.numbers
     zero, shared = spread(work, 0.0), get_row(numbers, layout.SHARED)
     for j in range(FOLLOWED):
         set_row(work, rows.SHORT + j, zero)
@@ -168,15 +167,11 @@ def correct(group, h, changed, mean, v, q, work):
     for j in range(FOLLOWED):
         if any_above(changed[j], zero):
             _give(j, changed[j], shared, work)
-    any_changed = changed[0] + changed[1] + changed[2]
-    _push(group, rows.SHORT, 1.0, any_changed, mean, work)
-    _push(group, rows.SHORT, h, any_changed, v, work)
-    _push(group, rows.EARLY, h * h, any_changed, q, work)
 
 
 @inlined
-def _push(group, forces, by, changed, target, work):
-    """Add accelerations by pair forces, times a number, to rows of the plane motions."""
+def missed_law(group, forces, work):
+    """The law of pair forces in the middle of the step, of which nothing is damped or stored."""
     numbers = group.numbers
     zero = spread(work, 0.0)
     normal, rubbed, turned, along = zero, zero, zero, zero
@@ -190,19 +185,43 @@ def _push(group, forces, by, changed, target, work):
         along = zero
     coefficient = get_row(numbers, layout.FRICTION)
     friction, moment = coefficient * rubbed, coefficient * turned
-    radius_p = get_row(numbers, layout.PINION_RADIUS)
-    radius_w = get_row(numbers, layout.WHEEL_RADIUS)
     moment_w = get_row(numbers, layout.TANGENT_LENGTH) * friction - moment
-    _add(group, P_X, friction, by, changed, target, work)
-    _add(group, P_Y, normal, by, changed, target, work)
-    _add(group, P_TURN, radius_p * (along - normal) - moment, by, changed, target, work)
-    _add(group, W_X, 0.0 - friction, by, changed, target, work)
-    _add(group, W_Y, 0.0 - normal, by, changed, target, work)
-    _add(group, W_TURN, radius_w * normal + moment_w, by, changed, target, work)
+    return layout.Law(normal, friction, 0.0 - moment, moment_w, along, zero, zero, zero)
+
+
+@compiled
+def correct(group, h, changed, mean, v, q, work):
+    """Add to the end of the step what its kinks change, in the lanes with any.
+
+    ``changed`` holds for every pair 1 where it has a kink. Other loaded pairs give way.
+    """
+    miss(group.numbers, changed, work)
+    any_changed = changed[0] + changed[1] + changed[2]
+    _push(group, rows.SHORT, 1.0, any_changed, mean, work)
+    _push(group, rows.SHORT, h, any_changed, v, work)
+    _push(group, rows.EARLY, h * h, any_changed, q, work)
 
 
 @inlined
-def _add(group, d, force, by, changed, target, work):
+def _push(group, forces, by, changed, target, work):
+    """Add accelerations by pair forces, times a number, to rows of the plane motions."""
+    numbers = group.numbers
+    law = missed_law(group, forces, work)
+    radius_p = get_row(numbers, layout.PINION_RADIUS)
+    radius_w = get_row(numbers, layout.WHEEL_RADIUS)
+    on_p = radius_p * (law.along - law.normal) + law.moment_p
+    on_w = radius_w * law.normal + law.moment_w
+    add_force(group, P_X, law.friction, by, changed, target, work)
+    add_force(group, P_Y, law.normal, by, changed, target, work)
+    add_force(group, P_TURN, on_p, by, changed, target, work)
+    add_force(group, W_X, 0.0 - law.friction, by, changed, target, work)
+    add_force(group, W_Y, 0.0 - law.normal, by, changed, target, work)
+    add_force(group, W_TURN, on_w, by, changed, target, work)
+
+
+@inlined
+def add_force(group, d, force, by, changed, target, work):
+    """Add the acceleration of a degree of freedom by a force, times a number, to a row."""
     zero, old = spread(work, 0.0), get_row(work, target + d)
     new = old + by * (force * get_row(group.inverse_mass, d))
     set_row(work, target + d, where_above(changed, zero, new, old))

@@ -68,9 +68,9 @@ class NystroemGroup(Group):
 
 
 @inlined
-def block(name):
-    """First row of a block of the machine."""
-    return N_FIXED + name * MOST_DOFS
+def block(name, n_dofs=MOST_DOFS):
+    """First row of a block of the machine, in blocks of so many rows."""
+    return N_FIXED + name * n_dofs
 
 
 def scratch(n_dof, n_channels, precision="float64"):

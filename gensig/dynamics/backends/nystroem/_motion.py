@@ -23,7 +23,7 @@ from gensig.dynamics._equations import (
 )
 from gensig.dynamics._vector import fused, get_row, inlined, set_row, spread
 from gensig.dynamics.backends.nystroem import _layout as rows
-from gensig.dynamics.backends.nystroem._layout import block
+from gensig.dynamics.backends.nystroem._layout import MOST_DOFS, block
 
 SIXTH = 1.0 / 6.0
 Q_NOW, Q_HALFWAY, Q_BEFORE = 19.0 / 96.0, -10.0 / 96.0, 3.0 / 96.0
@@ -31,12 +31,15 @@ V_NOW, V_HALFWAY, V_BEFORE = 23.0 / 24.0, -16.0 / 24.0, 5.0 / 24.0
 
 
 @inlined
-def go_to_middle(step, n_dof, work):
-    """Set the state in the middle of the step from the accelerations that are known."""
-    q, v = block(rows.Q), block(rows.V)
-    middle_q, middle_v = block(rows.MIDDLE_Q), block(rows.MIDDLE_V)
-    now, before = block(rows.NOW), block(rows.BEFORE)
-    halfway = block(rows.HALFWAY)
+def go_to_middle(step, n_dof, n_rows, work):
+    """Set the state in the middle of the step from the accelerations that are known.
+
+    Blocks have ``n_rows`` rows each.
+    """
+    q, v = block(rows.Q, n_rows), block(rows.V, n_rows)
+    middle_q, middle_v = block(rows.MIDDLE_Q, n_rows), block(rows.MIDDLE_V, n_rows)
+    now, before = block(rows.NOW, n_rows), block(rows.BEFORE, n_rows)
+    halfway = block(rows.HALFWAY, n_rows)
     for d in range(n_dof):
         a, last_m = get_row(work, now + d), get_row(work, halfway + d)
         last_a, rate = get_row(work, before + d), get_row(work, v + d)
@@ -51,28 +54,28 @@ def go_to_middle(step, n_dof, work):
 def go_to_end(group, law, torque, step, n_dof, work):
     """Set the accelerations in the middle and the predicted state at the end of the step."""
     on_x, on_y, on_p, on_w = _on_gears(group, law, torque)
-    _predict(group, P_X, on_x, step, work)
-    _predict(group, P_Y, on_y, step, work)
-    _predict(group, P_TURN, on_p, step, work)
-    _predict(group, W_X, 0.0 - on_x, step, work)
-    _predict(group, W_Y, 0.0 - on_y, step, work)
-    _predict(group, W_TURN, on_w, step, work)
+    predict(group, P_X, on_x, step, MOST_DOFS, work)
+    predict(group, P_Y, on_y, step, MOST_DOFS, work)
+    predict(group, P_TURN, on_p, step, MOST_DOFS, work)
+    predict(group, W_X, 0.0 - on_x, step, MOST_DOFS, work)
+    predict(group, W_Y, 0.0 - on_y, step, MOST_DOFS, work)
+    predict(group, W_TURN, on_w, step, MOST_DOFS, work)
     for d in range(N_IN_PLANE, n_dof):
-        _predict(group, d, spread(work, 0.0), step, work)
+        predict(group, d, spread(work, 0.0), step, MOST_DOFS, work)
 
 
 @inlined
 def finish(group, law, torque, step, n_dof, work):
     """Set accelerations and state at the end of the step, and the mean accelerations."""
     on_x, on_y, on_p, on_w = _on_gears(group, law, torque)
-    _finish(group, P_X, on_x, step, work)
-    _finish(group, P_Y, on_y, step, work)
-    _finish(group, P_TURN, on_p, step, work)
-    _finish(group, W_X, 0.0 - on_x, step, work)
-    _finish(group, W_Y, 0.0 - on_y, step, work)
-    _finish(group, W_TURN, on_w, step, work)
+    conclude(group, P_X, on_x, step, MOST_DOFS, work)
+    conclude(group, P_Y, on_y, step, MOST_DOFS, work)
+    conclude(group, P_TURN, on_p, step, MOST_DOFS, work)
+    conclude(group, W_X, 0.0 - on_x, step, MOST_DOFS, work)
+    conclude(group, W_Y, 0.0 - on_y, step, MOST_DOFS, work)
+    conclude(group, W_TURN, on_w, step, MOST_DOFS, work)
     for d in range(N_IN_PLANE, n_dof):
-        _finish(group, d, spread(work, 0.0), step, work)
+        conclude(group, d, spread(work, 0.0), step, MOST_DOFS, work)
 
 
 @inlined
@@ -87,11 +90,11 @@ def _on_gears(group, law, torque):
 
 
 @inlined
-def _acceleration(group, d, on_it, q, v, work):
+def acceleration(group, d, on_it, q, v, forces, work):
     """Acceleration of a degree of freedom under a force of the mesh, with states in rows."""
     spring = get_row(group.stiffness, d) * get_row(work, q + d)
     spring = fused(get_row(group.damping, d), get_row(work, v + d), spring)
-    pull = get_row(work, block(rows.FORCES) + d) + (on_it - spring)
+    pull = get_row(work, forces + d) + (on_it - spring)
     if len(group.other_column) > 0:
         for k in range(group.other_first[d], group.other_first[d + 1]):
             other = group.other_column[k]
@@ -102,32 +105,33 @@ def _acceleration(group, d, on_it, q, v, work):
 
 
 @inlined
-def _predict(group, d, on_it, step, work):
+def predict(group, d, on_it, step, n_rows, work):
     """Acceleration in the middle and predicted state at the end, of one degree of freedom."""
-    middle_q, middle_v = block(rows.MIDDLE_Q), block(rows.MIDDLE_V)
-    m = _acceleration(group, d, on_it, middle_q, middle_v, work)
-    halfway = block(rows.HALFWAY) + d
-    a, last_m = get_row(work, block(rows.NOW) + d), get_row(work, halfway)
+    middle_q, middle_v = block(rows.MIDDLE_Q, n_rows), block(rows.MIDDLE_V, n_rows)
+    forces = block(rows.FORCES, n_rows)
+    m = acceleration(group, d, on_it, middle_q, middle_v, forces, work)
+    halfway = block(rows.HALFWAY, n_rows) + d
+    a, last_m = get_row(work, block(rows.NOW, n_rows) + d), get_row(work, halfway)
     set_row(work, halfway, m)
-    rate = get_row(work, block(rows.V) + d)
+    rate = get_row(work, block(rows.V, n_rows) + d)
     moved = fused(step * SIXTH, fused(2.0, m, a), rate)
-    moved = fused(step, moved, get_row(work, block(rows.Q) + d))
-    set_row(work, block(rows.END_Q) + d, moved)
+    moved = fused(step, moved, get_row(work, block(rows.Q, n_rows) + d))
+    set_row(work, block(rows.END_Q, n_rows) + d, moved)
     # a + 4 m + b with b = [m] - 3 a + 3 m
     gained = fused(7.0, m, fused(-2.0, a, last_m))
-    set_row(work, block(rows.END_V) + d, fused(step * SIXTH, gained, rate))
+    set_row(work, block(rows.END_V, n_rows) + d, fused(step * SIXTH, gained, rate))
 
 
 @inlined
-def _finish(group, d, on_it, step, work):
+def conclude(group, d, on_it, step, n_rows, work):
     """Acceleration, state at the end, and mean acceleration of one degree of freedom."""
-    end_q, end_v = block(rows.END_Q), block(rows.END_V)
-    b = _acceleration(group, d, on_it, end_q, end_v, work)
-    now, v = block(rows.NOW) + d, block(rows.V) + d
-    a, m = get_row(work, now), get_row(work, block(rows.HALFWAY) + d)
+    end_q, end_v = block(rows.END_Q, n_rows), block(rows.END_V, n_rows)
+    b = acceleration(group, d, on_it, end_q, end_v, block(rows.FORCES, n_rows), work)
+    now, v = block(rows.NOW, n_rows) + d, block(rows.V, n_rows) + d
+    a, m = get_row(work, now), get_row(work, block(rows.HALFWAY, n_rows) + d)
     mean = SIXTH * fused(4.0, m, a + b)
     set_row(work, now, b)
-    set_row(work, block(rows.BEFORE) + d, a)
-    set_row(work, block(rows.MEAN) + d, mean)
+    set_row(work, block(rows.BEFORE, n_rows) + d, a)
+    set_row(work, block(rows.MEAN, n_rows) + d, mean)
     set_row(work, v, fused(step, mean, get_row(work, v)))
-    set_row(work, block(rows.Q) + d, get_row(work, end_q + d))
+    set_row(work, block(rows.Q, n_rows) + d, get_row(work, end_q + d))

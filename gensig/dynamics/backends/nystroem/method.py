@@ -25,6 +25,7 @@ from gensig.dynamics.backends.nystroem._pairs import (
 from gensig.dynamics.backends.nystroem.stability import stable_rate
 from gensig.dynamics.backends.step_limits import (
     COARSE_STABILITY,
+    settling_time,
     warn_of_coarse_step,
 )
 from gensig.dynamics.lanes import pack
@@ -57,7 +58,7 @@ def coarsest_oversampling(
     dynamics: PairDynamics, oversampling: int, sampling_rate: float
 ) -> int:
     """Least stable number of steps per sample of the settling, at most that of the record."""
-    least = stable_rate(dynamics) / (COARSE_STABILITY * sampling_rate)
+    least = stable_rate(dynamics.stiff_rates) / (COARSE_STABILITY * sampling_rate)
     return min(oversampling, math.ceil(least))
 
 
@@ -66,6 +67,7 @@ CORE = Core(
     scratch=scratch,
     integrate=_kernels.integrate,
     coarsest_oversampling=coarsest_oversampling,
+    settling_time=settling_time,
 )
 
 
@@ -82,7 +84,7 @@ class Nystroem(Backend):
     ) -> None:
         """Raise SimulationError for an unstable step or what the method does not cover."""
         refuse(machine)
-        needed = math.ceil(stable_rate(machine) / sampling_rate)
+        needed = math.ceil(stable_rate(machine.stiff_rates) / sampling_rate)
         if needed > oversampling:
             raise SimulationError(
                 f"solver.oversampling = {oversampling} makes too long steps for "

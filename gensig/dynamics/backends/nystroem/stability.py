@@ -8,17 +8,14 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics.pair import PairDynamics
-
 Array = NDArray[np.float64]
 
 LONGEST = 4.0  # |lambda| h beyond which no step is stable
 RATIO_STEPS = 64  # damping ratios from 0 to 1 at which the limit is computed
 
 
-def stable_rate(dynamics: PairDynamics) -> float:
-    """Least stable number of steps per second of a machine with a mesh of mean stiffness."""
-    rates = dynamics.stiff_rates
+def stable_rate(rates: NDArray[np.complex128]) -> float:
+    """Least stable number of steps per second of a machine with eigenvalues in 1/s."""
     size = np.abs(rates)
     moving = size > 0.0
     ratios = -np.real(rates[moving]) / size[moving]

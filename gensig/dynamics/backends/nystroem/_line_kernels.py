@@ -1,0 +1,535 @@
+"""Two-evaluation core for machines of several meshes: loops over meshes and degrees of freedom.
+
+The law of a mesh, its tables and its kinks are those of the core for one pair.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gensig.dynamics import _layout as layout
+from gensig.dynamics._record_kernels import integrates
+from gensig.dynamics._vector import (
+    EIGHT,
+    any_above,
+    at,
+    compiled,
+    fused,
+    get_row,
+    inlined,
+    joined,
+    load_wide,
+    set_row,
+    spread,
+    store_wide,
+    where_above,
+    width,
+)
+from gensig.dynamics.backends.nystroem import _layout as rows
+from gensig.dynamics.backends.nystroem import _line_layout as lines
+from gensig.dynamics.backends.nystroem._kernels import RECENTER, choose, write_mesh
+from gensig.dynamics.backends.nystroem._kinks import (
+    add_force,
+    kinked,
+    miss,
+    missed_law,
+)
+from gensig.dynamics.backends.nystroem._law import mesh_law
+from gensig.dynamics.backends.nystroem._layout import FOLLOWED, block
+from gensig.dynamics.backends.nystroem._line_layout import (
+    LineGroup,
+    machine_rows,
+    mesh_of,
+    mesh_rows,
+    wide_rows,
+)
+from gensig.dynamics.backends.nystroem._motion import (
+    acceleration,
+    conclude,
+    go_to_middle,
+    predict,
+)
+from gensig.dynamics.backends.nystroem._pairs import (
+    first_pairs,
+    locate,
+    read_begin,
+    read_step,
+    take_pairs,
+)
+
+
+@compiled
+def integrate(
+    group,
+    state,
+    lost,
+    fresh,
+    step,
+    first_step,
+    n_steps,
+    channels,
+    out,
+    out_row,
+    angle,
+    angle_row,
+    per_angle,
+    seen,
+    work,
+    wide,
+    near,
+):
+    """Advance every lane by ``n_steps``; parameters are those of ``gensig.dynamics._kernels``.
+
+    ``lost`` has one row for every mesh. ``angle`` takes as many rows a sample as the group has
+    angles, ``seen`` the rows of every mesh.
+    """
+    n = width(work)
+    n_dof, n_meshes = len(group.force) // n, group.n_meshes
+    n_channels = len(channels) if out_row >= 0 else 0
+    machine = machine_rows(work, n_meshes, n)
+    q, v = block(rows.Q, n_dof), block(rows.V, n_dof)
+    mean = block(rows.MEAN, n_dof)
+    begin(group, state, work)
+    by_tooth, starting = False, False
+    for lane in range(n):
+        starting = starting or fresh[lane] > 0.0
+        for m in range(n_meshes):
+            wheel_rows = at(m * layout.N_INDICES + layout.WHEEL_ROWS, lane, n)
+            by_tooth = by_tooth or group.indices[wheel_rows] > 0
+    for number in range(first_step, first_step + n_steps):
+        if number % RECENTER == 0:
+            recenter(group, machine, wide)
+        set_out(group, number * step, machine, work, wide)
+        if starting and number == first_step:
+            start(group, fresh, by_tooth, work, wide)
+        if angle_row >= 0 and number % per_angle == 0:
+            write_angles(group, angle, angle_row, machine, wide)
+            if len(seen) > 0:
+                for m in range(n_meshes):
+                    write_mesh(
+                        mesh_of(group, m, n),
+                        seen,
+                        angle_row * n_meshes + m,
+                        mesh_rows(work, m, n),
+                        wide_rows(wide, m, n),
+                    )
+            angle_row += 1
+        for m in range(n_meshes):
+            read_mesh(group, m, step, by_tooth, lost, machine, work, wide)
+        go_to_middle(step, n_dof, n_dof, machine)
+        clear(n_dof, machine)
+        for m in range(n_meshes):
+            push_middle(group, m, step, machine, work, wide)
+        for d in range(n_dof):
+            on_it = get_row(machine, block(lines.ON, n_dof) + d)
+            predict(group, d, on_it, step, n_dof, machine)
+        clear(n_dof, machine)
+        for m in range(n_meshes):
+            push_end(group, m, step, machine, work, wide)
+        for d in range(n_dof):
+            on_it = get_row(machine, block(lines.ON, n_dof) + d)
+            conclude(group, d, on_it, step, n_dof, machine)
+        for m in range(n_meshes):
+            end_mesh(group, m, step, machine, work)
+        gain = get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
+        out_first = (out_row + number - first_step) * n_channels
+        for c in range(n_channels):
+            carried = gain * get_row(group.rotation, channels[c])
+            value = get_row(machine, mean + channels[c]) + carried
+            set_row(out, out_first + c, value)
+    for d in range(n_dof):
+        set_row(state, d, get_row(machine, q + d))
+        set_row(state, n_dof + d, get_row(machine, v + d))
+    return angle_row
+
+
+integrates(integrate, LineGroup)
+
+
+@inlined
+def begin(group, state, work):
+    """Set the rows that stay as they are, and those of the state."""
+    n = width(work)
+    n_dof, n_meshes = len(group.force) // n, group.n_meshes
+    machine = machine_rows(work, n_meshes, n)
+    for d in range(n_dof):
+        set_row(machine, block(rows.Q, n_dof) + d, get_row(state, d))
+        set_row(machine, block(rows.V, n_dof) + d, get_row(state, n_dof + d))
+    for m in range(n_meshes):
+        mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
+        turn = 1.0 / get_row(mesh.numbers, layout.PER_FRICTION_WIDTH)
+        set_row(own, rows.FRICTION_WIDTH, turn)
+        for lane in range(n):
+            own[at(rows.BEND, lane, n)] = mesh.bend[lane * layout.COLUMNS]
+
+
+@inlined
+def recenter(group, machine, wide):
+    """Move the turn of the reference from all rotations of the state into ``CENTER``.
+
+    Only the governor's spring depends on a common rotation.
+    """
+    n = width(machine)
+    n_dof = len(group.force) // n
+    q = block(rows.Q, n_dof)
+    turn = get_row(machine, q + group.reference)
+    for first in range(0, n, EIGHT):
+        turned = load_wide(machine, at(q + group.reference, first, n))
+        center = load_wide(wide, at(layout.CENTER, first, n))
+        store_wide(wide, at(layout.CENTER, first, n), center + turned)
+    for d in range(n_dof):
+        moved = turn * get_row(group.rotation, d)
+        set_row(machine, q + d, get_row(machine, q + d) - moved)
+
+
+@inlined
+def set_out(group, time, machine, work, wide):
+    """Set what stays constant over a step: nominal motion, forces, and the roll of every mesh."""
+    n = width(machine)
+    n_dof, n_meshes = len(group.force) // n, group.n_meshes
+    profile, n_rows = group.profile, lines.N_PROFILE + 2 * n_dof
+    n_cells = len(profile) // (n_rows * n)
+    cell = int(np.floor(time * group.cells_per_second)) - group.profile_first
+    cell = min(max(cell, 0), n_cells - 1)
+    since = time - (group.profile_first + cell) / group.cells_per_second
+    first_row = cell * n_rows
+    for first in range(0, n, EIGHT):
+        speed = load_wide(profile, at(first_row + lines.SPEED, first, n))
+        gain = load_wide(profile, at(first_row + lines.GAIN, first, n))
+        turned = since * (speed + (0.5 * since) * gain)
+        turned = load_wide(profile, at(first_row + lines.ANGLE, first, n)) + turned
+        turned = turned + load_wide(wide, at(layout.CENTER, first, n))
+        store_wide(wide, at(layout.NOMINAL, first, n), turned)
+        for m in range(n_meshes):
+            turn = lines.N_TOUCHED * m + lines.A_TURN
+            own = block(rows.Q, n_dof) + group.touched[turn]
+            roll = turned * load_wide(group.turning, at(m, first, n))
+            roll = roll + load_wide(machine, at(own, first, n))
+            exact = m * layout.N_EXACT
+            radius = load_wide(group.exact, at(exact + layout.EXACT_RADIUS, first, n))
+            roll = radius * roll
+            begun = load_wide(group.exact, at(exact + layout.START_ROLL, first, n))
+            base = m * rows.N_WIDE + layout.BASE
+            store_wide(wide, at(base, first, n), begun + roll)
+    speed = _in_row(profile, first_row + lines.SPEED, machine)
+    gain = _in_row(profile, first_row + lines.GAIN, machine)
+    center = _in_row(wide, layout.CENTER, machine)
+    set_row(machine, rows.DRIVE + layout.DRIVE_SPEED, speed + since * gain)
+    set_row(machine, rows.DRIVE + layout.DRIVE_GAIN, gain)
+    forces = block(rows.FORCES, n_dof)
+    for d in range(n_dof):
+        held = center * get_row(group.held, d) + gain * get_row(group.carried, d)
+        given = get_row(group.force, d) - held
+        if n_cells > 1:
+            row = first_row + lines.N_PROFILE + 2 * d
+            given = given + _in_row(profile, row, machine)
+            given = given + since * _in_row(profile, row + 1, machine)
+        set_row(machine, forces + d, given)
+
+
+@inlined
+def _in_row(exact, row, work):
+    """A float64 row as one of the precision of the scratch."""
+    n = width(work)
+    low = load_wide(exact, at(row, 0, n))
+    high = load_wide(exact, at(row, n - EIGHT, n))
+    return joined(work, low, high)
+
+
+@compiled
+def start(group, fresh, by_tooth, work, wide):
+    """Set what the step remembers in the lanes that are fresh, from one evaluation there."""
+    n = width(work)
+    n_dof, n_meshes = len(group.force) // n, group.n_meshes
+    machine = machine_rows(work, n_meshes, n)
+    clear(n_dof, machine)
+    zero = spread(work, 0.0)
+    for m in range(n_meshes):
+        mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
+        own_wide = wide_rows(wide, m, n)
+        first_pairs(mesh, fresh, own, own_wide)
+        for j in range(FOLLOWED):
+            read_begin(mesh, by_tooth, j, own, own_wide)
+        q, v = block(rows.Q, n_dof), block(rows.V, n_dof)
+        approach, rate = motion(group, m, q, v, machine)
+        speed = turning_speed(group, m, v, zero, machine)
+        kept = (
+            get_row(own, rows.PAIR_FORCE),
+            get_row(own, rows.PAIR_FORCE + 1),
+            get_row(own, rows.PAIR_FORCE + 2),
+        )
+        law = mesh_law(
+            mesh,
+            rows.NODES,
+            rows.END_AT,
+            0.0 - get_row(own, rows.BEHIND),
+            zero,
+            approach,
+            rate,
+            get_row(mesh.numbers, layout.PINION_RADIUS) * speed,
+            own,
+            own_wide,
+        )
+        push(group, m, law, machine)
+        flags = get_row(own, rows.FRESH)
+        choose(flags, rows.NORMAL, law.normal, own)
+        for j in range(FOLLOWED):
+            margin = get_row(own, rows.MARGIN + rows.END_AT * FOLLOWED + j)
+            choose(flags, rows.MARGIN + j, margin, own)
+        for j in range(FOLLOWED):
+            force = get_row(own, rows.PAIR_FORCE + j)
+            force = where_above(flags, zero, force, kept[j])
+            set_row(own, rows.PAIR_FORCE + j, force)
+    flags = get_row(machine, rows.FRESH)
+    q, v = block(rows.Q, n_dof), block(rows.V, n_dof)
+    for d in range(n_dof):
+        on_it = get_row(machine, block(lines.ON, n_dof) + d)
+        forces = block(rows.FORCES, n_dof)
+        a = acceleration(group, d, on_it, q, v, forces, machine)
+        choose(flags, block(rows.NOW, n_dof) + d, a, machine)
+        choose(flags, block(rows.HALFWAY, n_dof) + d, a, machine)
+        choose(flags, block(rows.BEFORE, n_dof) + d, a, machine)
+
+
+@inlined
+def write_angles(group, angle, row, machine, wide):
+    """Write the angles of a group at the begin of a step."""
+    n = width(machine)
+    n_dof = len(group.force) // n
+    n_angles = len(group.angles)
+    for k in range(n_angles):
+        d = group.angles[k]
+        own = block(rows.Q, n_dof) + d
+        for first in range(0, n, EIGHT):
+            turned = load_wide(wide, at(layout.NOMINAL, first, n))
+            turned = turned * load_wide(group.exact_rotation, at(d, first, n))
+            turned = turned + load_wide(machine, at(own, first, n))
+            store_wide(angle, at(row * n_angles + k, first, n), turned)
+
+
+@inlined
+def clear(n_dof, machine):
+    """Set the forces of all meshes to 0."""
+    zero = spread(machine, 0.0)
+    for d in range(n_dof):
+        set_row(machine, block(lines.ON, n_dof) + d, zero)
+
+
+@inlined
+def motion(group, m, q, v, machine):
+    """Approach of a mesh and its rate, from the rows of a state."""
+    approach = _rest_approach(group, m, machine)
+    rate = spread(machine, 0.0)
+    for k in range(lines.N_TOUCHED):
+        place = m * lines.N_TOUCHED + k
+        d = group.touched[place]
+        if d >= 0:
+            reach = get_row(group.reach, place)
+            approach = fused(reach, get_row(machine, q + d), approach)
+            rate = fused(reach, get_row(machine, v + d), rate)
+    return approach, rate
+
+
+@inlined
+def _rest_approach(group, m, machine):
+    row = m * layout.N_NUMBERS + layout.REST_APPROACH
+    return get_row(group.numbers, row)
+
+
+@inlined
+def turning_speed(group, m, v, since, machine):
+    """Speed of gear a of a mesh, ``since`` s after the begin of the step, rad/s."""
+    turning = _turning(group, m, machine)
+    speed = get_row(machine, rows.DRIVE + layout.DRIVE_SPEED)
+    speed = speed + since * get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
+    d = group.touched[m * lines.N_TOUCHED + lines.A_TURN]
+    return fused(turning, speed, get_row(machine, v + d))
+
+
+@inlined
+def _turning(group, m, machine):
+    """Rotation of gear a of a mesh with the reference."""
+    return get_row(group.rotation, group.touched[m * lines.N_TOUCHED + lines.A_TURN])
+
+
+@inlined
+def push(group, m, law, machine):
+    """Add the forces of a mesh to the rows ``ON``."""
+    n_dof = len(group.force) // width(machine)
+    on = block(lines.ON, n_dof)
+    mesh = mesh_of(group, m, width(machine))
+    normal = law.normal - get_row(mesh.numbers, layout.MEAN_FORCE)
+    law = layout.Law(
+        normal,
+        law.friction,
+        law.moment_p,
+        law.moment_w,
+        law.along,
+        law.stored,
+        law.lost,
+        law.loaded,
+    )
+    for k in range(lines.N_TOUCHED):
+        place = m * lines.N_TOUCHED + k
+        d = group.touched[place]
+        if d >= 0:
+            force = _on_body(group, mesh, place, k, law)
+            set_row(machine, on + d, get_row(machine, on + d) + force)
+
+
+@inlined
+def read_mesh(group, m, step, by_tooth, lost, machine, work, wide):
+    """Read the tables of a mesh at the end of the step and set its nodes."""
+    n = width(work)
+    n_dof = len(group.force) // n
+    mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
+    own_wide = wide_rows(wide, m, n)
+    zero, one = spread(work, 0.0), spread(work, 1.0)
+    normal = get_row(own, rows.NORMAL)
+    apart = where_above(normal * normal, zero, zero, one)
+    set_row(lost, m, get_row(lost, m) + apart)
+    if locate(mesh, own, own_wide):
+        take_pairs(mesh, by_tooth, own, own_wide)
+    # the roll at the end of the step, with every force in it
+    now, v = block(rows.NOW, n_dof), block(rows.V, n_dof)
+    d = group.touched[m * lines.N_TOUCHED + lines.A_TURN]
+    turning = _turning(group, m, machine)
+    gain = turning * get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
+    gain = gain + get_row(machine, now + d)
+    speed = turning_speed(group, m, v, zero, machine) + (0.5 * step) * gain
+    radius = get_row(mesh.numbers, layout.PINION_RADIUS)
+    ahead, behind = step * radius * speed, get_row(own, rows.BEHIND)
+    span = ahead - behind
+    per_span = 1.0 / span
+    for j in range(FOLLOWED):
+        read_step(mesh, by_tooth, j, ahead, span, per_span, own, own_wide)
+    set_row(own, lines.AHEAD, ahead)
+    set_row(own, lines.BEGUN, get_row(machine, block(rows.Q, n_dof) + d))
+
+
+@inlined
+def rolled(group, m, since, q, machine, own):
+    """Roll of a mesh since the begin of the step, ``since`` s after it, m."""
+    d = group.touched[m * lines.N_TOUCHED + lines.A_TURN]
+    speed = get_row(machine, rows.DRIVE + layout.DRIVE_SPEED)
+    gain = get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
+    turned = since * (speed + (0.5 * since) * gain) * _turning(group, m, machine)
+    moved = get_row(machine, q + d) - get_row(own, lines.BEGUN)
+    row = m * layout.N_NUMBERS + layout.PINION_RADIUS
+    return get_row(group.numbers, row) * (turned + moved)
+
+
+@inlined
+def push_middle(group, m, step, machine, work, wide):
+    """Evaluate the law of a mesh in the middle of the step and add its forces."""
+    n = width(work)
+    n_dof = len(group.force) // n
+    q, v = block(rows.MIDDLE_Q, n_dof), block(rows.MIDDLE_V, n_dof)
+    own = mesh_rows(work, m, n)
+    turned = rolled(group, m, 0.5 * step, q, machine, own)
+    ahead = get_row(own, lines.AHEAD)
+    off = turned - 0.5 * (ahead + get_row(own, rows.BEHIND))
+    since = spread(work, 0.5 * step)
+    law = _law(
+        group,
+        m,
+        rows.MIDDLE,
+        rows.MIDDLE_AT,
+        off,
+        turned,
+        since,
+        q,
+        v,
+        machine,
+        work,
+        wide,
+    )
+    push(group, m, law, machine)
+
+
+@inlined
+def push_end(group, m, step, machine, work, wide):
+    """Evaluate the law of a mesh at the end of the step and add its forces."""
+    n = width(work)
+    n_dof = len(group.force) // n
+    q, v = block(rows.END_Q, n_dof), block(rows.END_V, n_dof)
+    own = mesh_rows(work, m, n)
+    turned = rolled(group, m, step, q, machine, own)
+    off = turned - get_row(own, lines.AHEAD)
+    since = spread(work, step)
+    law = _law(
+        group, m, rows.NODES, rows.END_AT, off, turned, since, q, v, machine, work, wide
+    )
+    push(group, m, law, machine)
+    set_row(own, rows.NORMAL, law.normal)
+
+
+@inlined
+def _law(group, m, nodes, instant, off, turned, since, q, v, machine, work, wide):
+    """Law of a mesh at a state, ``off`` m after its nodes and ``turned`` m after the begin."""
+    n = width(work)
+    mesh = mesh_of(group, m, n)
+    approach, rate = motion(group, m, q, v, machine)
+    speed = turning_speed(group, m, v, since, machine)
+    roll_rate = get_row(mesh.numbers, layout.PINION_RADIUS) * speed
+    return mesh_law(
+        mesh,
+        nodes,
+        instant,
+        off,
+        turned,
+        approach,
+        rate,
+        roll_rate,
+        mesh_rows(work, m, n),
+        wide_rows(wide, m, n),
+    )
+
+
+@inlined
+def end_mesh(group, m, step, machine, work):
+    """Correct the end of the step for the kinks of a mesh, and shift what it remembers."""
+    n = width(work)
+    n_dof = len(group.force) // n
+    mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
+    changed = kinked(0, own), kinked(1, own), kinked(2, own)
+    if any_above(changed[0] + changed[1] + changed[2], spread(work, 0.0)):
+        correct(group, mesh, m, step, changed, machine, own)
+    turned = rolled(group, m, step, block(rows.Q, n_dof), machine, own)
+    set_row(own, rows.BEHIND, get_row(own, lines.AHEAD) - turned)
+    for j in range(FOLLOWED):
+        margin = get_row(own, rows.MARGIN + rows.END_AT * FOLLOWED + j)
+        set_row(own, rows.MARGIN + j, margin)
+
+
+@compiled
+def correct(group, mesh, m, step, changed, machine, own):
+    """Add to the end of the step what the kinks of a mesh change, in the lanes with any."""
+    n_dof = len(group.force) // width(machine)
+    miss(mesh.numbers, changed, own)
+    any_changed = changed[0] + changed[1] + changed[2]
+    short, early = missed_law(mesh, rows.SHORT, own), missed_law(mesh, rows.EARLY, own)
+    for k in range(lines.N_TOUCHED):
+        place = m * lines.N_TOUCHED + k
+        d = group.touched[place]
+        if d >= 0:
+            force = _on_body(group, mesh, place, k, short)
+            mean, v = block(rows.MEAN, n_dof), block(rows.V, n_dof)
+            add_force(group, d, force, 1.0, any_changed, mean, machine)
+            add_force(group, d, force, step, any_changed, v, machine)
+            force = _on_body(group, mesh, place, k, early)
+            q = block(rows.Q, n_dof)
+            add_force(group, d, force, step * step, any_changed, q, machine)
+
+
+@inlined
+def _on_body(group, mesh, place, k, law):
+    """Force of a mesh law on one of the degrees of freedom that the mesh touches."""
+    force = get_row(group.slide, place) * law.friction
+    force = force - get_row(group.reach, place) * law.normal
+    if k == lines.A_TURN:
+        arm = get_row(mesh.numbers, layout.PINION_RADIUS)
+        force = force + (arm * law.along + law.moment_p)
+    if k == lines.B_TURN:
+        force = force + law.moment_w
+    return force

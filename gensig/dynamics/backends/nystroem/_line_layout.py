@@ -1,0 +1,142 @@
+"""Row names of the two-evaluation core for machines of several meshes.
+
+The scratch holds the rows of every mesh, ``N_FIXED`` each, and then blocks of the machine with one
+row per degree of freedom. Rows of the drive are those of the last mesh.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gensig.dynamics import _layout as layout
+from gensig.dynamics._layout import COLUMNS
+from gensig.dynamics._vector import inlined, n_lanes
+from gensig.dynamics.backends.nystroem import _layout as rows
+
+# block behind those of a pair: forces of all meshes on the machine
+ON = rows.N_BLOCKS
+N_BLOCKS = ON + 1
+# rows of a mesh, which one pair holds in registers: roll over the step at whose end the nodes were
+# read, and rotation of gear a at its begin
+AHEAD, BEGUN = layout.AHEAD, layout.AHEAD + 1
+# degrees of freedom that a mesh acts on: x, y and rotation of its driving gear a and its driven
+# gear b; NONE for a gear that does not move so
+A_X, A_Y, A_TURN, B_X, B_Y, B_TURN, N_TOUCHED = range(7)
+NONE = -1
+# rows of a cell of ``LineGroup.profile``; behind them follow force and its slope of every degree of
+# freedom
+ANGLE, SPEED, GAIN, N_PROFILE = range(4)
+
+
+class LineGroup(NamedTuple):
+    """Machines of several spur meshes side by side, all of the same bodies and meshes.
+
+    ``numbers``, ``exact`` and ``indices`` (mesh, row, lane), ``bend`` (mesh, lane, 4) and all that
+    belongs to teeth are those of ``gensig.dynamics._layout.Group``, mesh after mesh; the table
+    ends with one cell of a missing pair and one cell of zeros.
+
+    The machine is M q'' + C q' + K q = f + mesh forces; q is the deviation from nominal rotation.
+    The state is q less ``rest`` (dof, lane). ``touched`` (mesh, 6) are the degrees of freedom of a
+    mesh, ``reach`` (mesh, 6, lane) is the gradient of its approach along them, ``slide``
+    (mesh, 6, lane) the direction of its friction. ``turning`` (mesh, lane) is the rotation of gear
+    a with the reference, in float64 like ``exact_rotation`` (dof, lane). ``force`` (dof, lane) is
+    what holds neither rest nor mean mesh forces; ``profile`` (cell, row, lane) holds the nominal
+    motion of the reference and the forces that come with it. ``reference`` is the degree of
+    freedom whose rotation is 1, ``angles`` those whose angles are given out. Other fields are
+    those of ``Group``.
+    """
+
+    n_meshes: int
+    numbers: Any
+    exact: Any
+    indices: Any
+    table: Any
+    bend: Any
+    tooth_row: Any
+    tooth_error: Any
+    tooth_tilt: Any
+    one_sided: bool
+    consistent: bool
+    touched: Any
+    reach: Any
+    slide: Any
+    turning: Any
+    inverse_mass: Any
+    stiffness: Any
+    damping: Any
+    other_first: Any
+    other_column: Any
+    other_stiffness: Any
+    other_damping: Any
+    force: Any
+    rest: Any
+    rotation: Any
+    exact_rotation: Any
+    held: Any
+    carried: Any
+    profile: Any
+    profile_first: int
+    cells_per_second: float
+    reference: int
+    angles: Any
+
+
+class Mesh(NamedTuple):
+    """One mesh of a ``LineGroup``, for the functions that know one mesh."""
+
+    numbers: Any
+    exact: Any
+    indices: Any
+    table: Any
+    bend: Any
+    tooth_row: Any
+    tooth_error: Any
+    tooth_tilt: Any
+    one_sided: bool
+    consistent: bool
+
+
+@inlined
+def mesh_of(group, m, n):
+    """Mesh ``m`` of a group of ``n`` lanes; views, not copies."""
+    numbers, exact = m * layout.N_NUMBERS * n, m * layout.N_EXACT * n
+    indices, bend = m * layout.N_INDICES * n, m * COLUMNS * n
+    return Mesh(
+        group.numbers[numbers : numbers + layout.N_NUMBERS * n],
+        group.exact[exact : exact + layout.N_EXACT * n],
+        group.indices[indices : indices + layout.N_INDICES * n],
+        group.table,
+        group.bend[bend : bend + COLUMNS * n],
+        group.tooth_row,
+        group.tooth_error,
+        group.tooth_tilt,
+        group.one_sided,
+        group.consistent,
+    )
+
+
+@inlined
+def mesh_rows(work, m, n):
+    """Rows of one mesh in the scratch; a view."""
+    return work[m * rows.N_FIXED * n : (m + 1) * rows.N_FIXED * n]
+
+
+@inlined
+def wide_rows(wide, m, n):
+    """Rows of one mesh in the float64 scratch; a view."""
+    return wide[m * rows.N_WIDE * n : (m + 1) * rows.N_WIDE * n]
+
+
+@inlined
+def machine_rows(work, n_meshes, n):
+    """Rows of the machine: ``N_FIXED`` of its last mesh, and its blocks; a view."""
+    return work[(n_meshes - 1) * rows.N_FIXED * n :]
+
+
+def line_scratch(n_meshes, n_dof, precision="float64"):
+    """Work rows, float64 rows and integer rows of ``integrate`` for so many meshes."""
+    n = n_lanes(precision)
+    work = np.zeros((n_meshes * rows.N_FIXED + N_BLOCKS * n_dof) * n, dtype=precision)
+    return work, np.zeros(n_meshes * rows.N_WIDE * n), np.zeros(1, dtype=np.int64)
