@@ -123,6 +123,27 @@ class RunningLine:
     linear: SteadyResponse
     mesh_force: Array
     turned: float
+    tabulated: Mapping[int, TabulatedMesh]
+
+    def touched(self, mesh: int) -> list[int]:
+        """Degrees of freedom of x, y and rotation of both gears of a mesh; -1: does not move so."""
+        line = self.machine.drive.line
+        driving, driven = line.meshes[mesh].driving, line.meshes[mesh].driven
+        dofs = []
+        for gear in (line.gears[driving], line.gears[driven]):
+            for axis in "xy":
+                name = f"{gear.name} {axis}"
+                dofs.append(-1)
+                if name in self.matrices.names:
+                    dofs[-1] = self.matrices.names.index(name)
+            dofs.append(_dof(self.matrices, gear.node))
+        return dofs
+
+    def sense(self, mesh: int) -> float:
+        """1 where the driving gear of a mesh turns from x to y, else -1."""
+        line = self.machine.drive.line
+        gear = line.gears[line.meshes[mesh].driving]
+        return math.copysign(1.0, line.speed_ratio[gear.node])
 
     def dof(self, node: int) -> int:
         """Index of the degree of freedom that a node, by its number, turns with."""
@@ -205,6 +226,7 @@ def running_line(
         linear=linear,
         mesh_force=mesh_force,
         turned=turned,
+        tabulated=tabulated or {},
     )
 
 

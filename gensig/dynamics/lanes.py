@@ -79,7 +79,7 @@ def pack(
         ]
     )
     exact = np.array([exact_numbers(machine) for machine in lanes])
-    indices = _indices(lanes, teeth)
+    indices = mesh_indices(lanes, teeth)
     depth = _depths(lanes)
     bend = np.outer(0.5 / exact[:, layout.NODES_PER_METER], [1.0, 0.0, 1.0, 0.0])
 
@@ -227,7 +227,7 @@ def near_positions(dynamics: PairDynamics) -> tuple[float, float]:
     return float(table.position[first]), float(table.position[last])
 
 
-def _indices(
+def mesh_indices(
     lanes: Sequence[PairDynamics], teeth: Sequence[ToothRows]
 ) -> NDArray[np.int64]:
     """Indices of every lane into the tables, (lane, row of ``Group.indices``)."""

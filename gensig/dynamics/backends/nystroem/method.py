@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gensig.dynamics._vector import aligned, n_lanes
 from gensig.dynamics.backends.base import Backend, Integration, Motions
@@ -44,14 +45,18 @@ def pack_pairs(
 ) -> NystroemGroup:
     """Gear pairs as one group; its table ends with a missing pair and a cell of zeros."""
     group = pack(dynamics, step, precision, span)
-    node = MISSING_COMPLIANCE, 0.0, MISSING_GAP, 0.0
-    added = np.array([*node, *node, *np.zeros(2 * len(node))], dtype=precision)
-    table = np.concatenate([group.table, added])
+    table = np.concatenate([group.table, missing_cells().astype(precision)])
     fields = group._replace(table=table)._asdict()
     for name, values in fields.items():
         if isinstance(values, np.ndarray):
             fields[name] = aligned(values)
     return NystroemGroup(**fields)
+
+
+def missing_cells() -> NDArray[np.float64]:
+    """The end of a table: a cell of a missing pair, and a cell of zeros."""
+    node = MISSING_COMPLIANCE, 0.0, MISSING_GAP, 0.0
+    return np.array([*node, *node, *np.zeros(2 * len(node))])
 
 
 def coarsest_oversampling(
