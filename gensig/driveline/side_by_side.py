@@ -397,7 +397,9 @@ class _MeshRows:
             numbers=numbers,
             exact=exact,
             indices=mesh_indices(pairs, teeth),
-            table=np.concatenate([rows.values[..., :COLUMNS].ravel() for rows in teeth]),
+            table=np.concatenate(
+                [rows.values[..., :COLUMNS].ravel() for rows in teeth]
+            ),
             bend=bend,
             tooth_row=np.concatenate([rows.row for rows in teeth]),
             tooth_error=of_teeth("error"),
@@ -432,4 +434,3 @@ def _profile(
         slopes = np.diff(forces, axis=0) * CELLS_PER_SECOND
         profile[:, lines.N_PROFILE + 1 :: 2, number] = slopes
     return profile.ravel(), first, CELLS_PER_SECOND, np.zeros((len(lanes), n_dof))
-

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics.decimation import in_band_error
 from gensig.dynamics.integrator import (
-    BOUNCING,
-    FINEST,
-    Motions,
-    Solver,
     check_channels,
     check_machine,
     check_memory,
@@ -27,19 +22,20 @@ from gensig.errors import FaultError, SimulationError
 from gensig.faults.base import Fault, faulty_teeth
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
-from gensig.sensing.agreement import agreement
 from gensig.sensing.encoder import Disc
 from gensig.sensing.manufacturing import nominal_gearbox, perfect_specimen
 from gensig.systems.base import Machine, MachineMesh, simulate_together, specimen_table
+from gensig.systems.integration_checks import (
+    checks,
+    finer,
+    is_too_coarse,
+    not_finite,
+)
 from gensig.systems.run import CleanRecord, Run, Start
 from gensig.systems.supports import in_gearbox
-from gensig.units import from_si
 
 Array = NDArray[np.float64]
 
-FINEST_BOUNCING = (
-    20  # steps per sample above which bouncing records do not converge further
-)
 PairMachine = Machine  # the name of version 0.9
 
 __all__ = [
@@ -210,13 +206,6 @@ def _kind(run: PairRun) -> tuple[object, ...]:
     )
 
 
-def _finer(run: PairRun) -> PairRun:
-    """The same run at half the step."""
-    solver = run.system.solver
-    finer = replace(solver, oversampling=2 * solver.oversampling)
-    return replace(run, system=replace(run.system, solver=finer))
-
-
 def simulate_pairs(runs: Sequence[PairRun]) -> list[CleanRecord | SimulationError]:
     """Records of runs, in the order of the runs.
 
@@ -239,39 +228,11 @@ def simulate_pairs(runs: Sequence[PairRun]) -> list[CleanRecord | SimulationErro
     for kind in kinds.values():
         records = _side_by_side([runs[i] for i in kind], [machines[i] for i in kind])
         results.update(zip(kind, records, strict=True))
-    coarse = [i for i, record in results.items() if _is_too_coarse(runs[i], record)]
+    coarse = [i for i, record in results.items() if is_too_coarse(runs[i], record)]
     if coarse:
-        finer = simulate_pairs([_finer(runs[i]) for i in coarse])
+        finer = simulate_pairs([finer(runs[i]) for i in coarse])
         results.update(zip(coarse, finer, strict=True))
     return [results[index] for index in range(len(runs))]
-
-
-def _is_too_coarse(run: PairRun, record: CleanRecord | SimulationError) -> bool:
-    if isinstance(record, SimulationError) or record.integration_check != "unresolved":
-        return False
-    finest = FINEST
-    if record.contact_loss_fraction > BOUNCING:
-        finest = FINEST_BOUNCING
-    return 2 * run.system.solver.oversampling <= finest
-
-
-def _checks(
-    motions: Motions, solver: Solver, sampling_rate: float
-) -> tuple[Array, list[str]]:
-    """Relative error in the band of every motion, and the result of its check."""
-    exact, finite = motions.check, motions.finite
-    errors = np.full(len(exact), np.nan)
-    if solver.max_error is None:
-        return errors, ["none"] * len(exact)
-    signal = motions.acceleration[:, :, : exact.shape[2]]
-    errors[finite] = in_band_error(signal[finite], exact[finite], sampling_rate)
-    checks = np.where(errors <= solver.max_error, "error", "unresolved").tolist()
-    bouncing = motions.contact_loss.max(axis=1) > BOUNCING
-    for index in np.flatnonzero(finite & bouncing & ~(errors <= solver.max_error)):
-        row = slice(index, index + 1)
-        if agreement(signal[row], exact[row], sampling_rate).agrees[0]:
-            checks[index] = "levels"
-    return errors, checks
 
 
 def _side_by_side(
@@ -287,11 +248,11 @@ def _side_by_side(
         channels=system.sensing.channels,
         with_mesh_state=runs[0].with_mesh_state,
     )
-    errors, checks = _checks(motions, system.solver, rate)
+    errors, verdicts = checks(motions, system.solver, rate)
     records: list[CleanRecord | SimulationError] = []
     for index, run in enumerate(runs):
         if not motions.finite[index]:
-            records.append(_not_finite(run))
+            records.append(not_finite(run))
             continue
         acceleration, angle = motions.acceleration[index], motions.angle[index, 0]
         if run.gearbox is not None:
@@ -307,17 +268,8 @@ def _side_by_side(
                 mean_speed=float(motions.mean_speed[index]),
                 contact_loss_fraction=float(motions.contact_loss[index, 0]),
                 integration_error=float(errors[index]),
-                integration_check=checks[index],
+                integration_check=verdicts[index],
                 mesh=mesh,
             )
         )
     return records
-
-
-def _not_finite(run: PairRun) -> SimulationError:
-    operating = run.system.operating
-    return SimulationError(
-        f"the motion stopped being finite (speed {from_si('speed_rpm', operating.speed):g} "
-        f"r/min, torque {operating.torque:g} N m); raise solver.oversampling above "
-        f"{run.system.solver.oversampling}"
-    )
