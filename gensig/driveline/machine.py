@@ -18,7 +18,14 @@ from numpy.typing import NDArray
 from gensig.driveline import loads
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.engine_torques import Engine
-from gensig.driveline.line_gears import line_bodies, line_gears, line_meshes
+from gensig.driveline.gear_motion import gear_channels, gear_dof
+from gensig.driveline.line_gears import (
+    gear_names,
+    line_bodies,
+    line_gears,
+    line_meshes,
+)
+from gensig.driveline.linear_drive_line import LinearDriveLine
 from gensig.driveline.machine_checks import (
     check_sensing,
     check_solver,
@@ -61,7 +68,7 @@ from gensig.sensing.encoder import Disc
 from gensig.sensing.manufacturing import perfect_specimen
 from gensig.sensing.toothed_wheel import ToothedWheel, draw_wheel, instantaneous_speed
 from gensig.systems.base import Machine, MachineMesh, specimen_table
-from gensig.systems.run import CleanRecord, Run, Start
+from gensig.systems.run import CleanRecord, Run, Start, angle_from_tooth_0
 from gensig.systems.stiffness_curves import StiffnessCurves, stiffness_curves
 from gensig.systems.supports import in_gearbox
 from gensig.units import SPEED
@@ -73,7 +80,6 @@ SETTLING = 0.3
 MOST_ENERGY_RESIDUAL = 1e-3
 KNOT = 5e-3  # s between the knots of a course that changes
 AFTER = 0.2  # s that a course goes on after a record: the low-pass looks ahead
-AXES = ("x", "y")
 
 
 @final
@@ -141,16 +147,9 @@ class LineMachine(Machine):
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Rotation of both gears of the followed mesh, speeds of the toothed wheels.
-
-        With lateral motion also the bearings of both gears.
-        """
-        rotations = [f"{side}_rotation" for side in SIDES]
-        bearings = [f"{side}_{axis}" for side in SIDES for axis in AXES]
+        """Rotations of all gears, with lateral motion their bearings, speeds of toothed wheels."""
         speeds = [f"{name}{SPEED}" for name in self.engine.wheels]
-        if not self.engine.drive.lateral:
-            return (*rotations, *speeds)
-        return (*rotations, *bearings, *speeds)
+        return (*gear_channels(self.engine.drive, self.mesh_number), *speeds)
 
     @property
     def most_pairs(self) -> int:
@@ -228,7 +227,7 @@ class LineMachine(Machine):
     def check(self) -> None:
         """Raise for what would stop every record."""
         self.require_drive()
-        check_sensing(self.sensing, self.channels, self.engine)
+        check_sensing(self, lateral=self.engine.drive.lateral)
         check_solver(self.mesh, self.solver)
         warn_of_supports(self.engine, self.mesh_forces)
         self.quality.check_covered(self.pair.pinion, self.pair.wheel)
@@ -257,6 +256,32 @@ class LineMachine(Machine):
     def draw_discs(self, rng: np.random.Generator) -> tuple[Disc, ...]:
         """The toothed wheels of one gearbox with their errors."""
         return tuple(draw_wheel(rng, wheel) for wheel in self.engine.wheels.values())
+
+    def gear_angle(self, gear: str, start: Start, shaft_angle: Array) -> Array:
+        """As ``Machine.gear_angle``."""
+        if gear in SIDES:
+            return angle_from_tooth_0(self.pair, gear, start, shaft_angle)
+        drive = self.engine.drive
+        number = gear_names(drive, self.mesh_number).index(gear)
+        ratio = self.engine.ratios[drive.numbers[drive.line.gears[number].node]]
+        return ratio * (self.crank_angle(start) + shaft_angle / self.ratio)
+
+    def line_angle(self, start: Start) -> float:
+        """Angle of the crank or the motor, rad."""
+        return self.crank_angle(start)
+
+    def linear_machine(self, run: Run[Self]) -> LinearDriveLine:
+        """The sound line in the gearbox of a run, at the set-point."""
+        speed, torque = self.operating.speed / self.ratio, self.operating.torque
+        running = running_line(
+            self._in_gearbox(run), steady_course(speed, torque), governor=self._governor
+        )
+        return LinearDriveLine(
+            running=running,
+            followed=self.mesh_number,
+            speed=speed,
+            mesh_forces=running.mesh_force,
+        )
 
     def mesh_torques(self, speed: float, torque: float) -> Array:
         """Loads that a tooth of the record mesh meets at a set-point, one a mesh, as torques of
@@ -353,14 +378,7 @@ class LineMachine(Machine):
         """The line of one run, ready to be integrated."""
         specimen = run.specimen or perfect_specimen(self.pair.pinion, self.pair.wheel)
         start = run.start or Start()
-        engine = self.engine
-        if run.gearbox is not None and engine.drive.lateral:
-            bodies = (self.pinion, slice(0, 2)), (self.wheel, slice(2, 4))
-            held = [
-                in_gearbox(body, run.gearbox, axes, self.quality).support
-                for body, axes in bodies
-            ]
-            engine = with_supports(engine, self.mesh_number, held)
+        engine = self._in_gearbox(run)
         turned, forces = self.crank_angle(start), self.mesh_forces
         teeth = start.tooth_pinion, start.tooth_wheel
         neighbours = neighbour_meshes(
@@ -382,17 +400,33 @@ class LineMachine(Machine):
         sound = sound_meshes(
             engine, self.law, forces, left_out={self.mesh_number, *neighbours}
         )
-        governor = Governor(
-            frequency=self.operating.drive_frequency,
-            damping_ratio=self.operating.drive_damping_ratio,
-        )
         return running_line(
             engine,
             self._course(),
-            governor=governor,
+            governor=self._governor,
             tabulated={**sound, **neighbours, self.mesh_number: recorded},
             turned=turned,
         )
+
+    @property
+    def _governor(self) -> Governor:
+        """What holds the mean speed."""
+        return Governor(
+            frequency=self.operating.drive_frequency,
+            damping_ratio=self.operating.drive_damping_ratio,
+        )
+
+    def _in_gearbox(self, run: Run[Self]) -> EngineLine:
+        """The line with the supports of a run's gearbox under the gears of the followed mesh."""
+        engine = self.engine
+        if run.gearbox is None or not engine.drive.lateral:
+            return engine
+        bodies = (self.pinion, slice(0, 2)), (self.wheel, slice(2, 4))
+        held = [
+            in_gearbox(body, run.gearbox, axes, self.quality).support
+            for body, axes in bodies
+        ]
+        return with_supports(engine, self.mesh_number, held)
 
     def crank_angle(self, start: Start) -> float:
         """Angle of the crank in its cycle when given teeth of the mesh are at a phase, rad.
@@ -400,8 +434,10 @@ class LineMachine(Machine):
         The driving gear's teeth are tied to the crank: the same tooth meets the same cylinder's
         firing in every record. Where its shaft turns more than once a cycle, the driven gear's
         tooth chooses the turn. A motor has no cycle: its turns are counted on, so that the other
-        meshes stand as the teeth allow.
+        meshes stand as the teeth allow. A lead-in gives the angle, as much earlier.
         """
+        if start.line_angle is not None:
+            return start.line_angle
         pitches = (
             start.tooth_pinion
             + start.phase
@@ -430,14 +466,7 @@ class LineMachine(Machine):
         """Signal of the integration for a channel: a kind and a degree of freedom."""
         if name.endswith(SPEED):
             return "angle", line.dof(self._wheel(name)[1].node)
-        side, _, quantity = name.rpartition("_")
-        drive = self.engine.drive
-        mesh = drive.line.meshes[self.mesh_number]
-        number = {"pinion": mesh.driving, "wheel": mesh.driven}[side]
-        gear = drive.line.gears[number]
-        if quantity in AXES:
-            return "acceleration", line.matrices.names.index(f"{gear.name} {quantity}")
-        return "acceleration", line.dof(drive.numbers[gear.node])
+        return "acceleration", gear_dof(line, self.mesh_number, name)
 
     def _wheel(self, name: str) -> tuple[int, ToothedWheel]:
         """Number of a toothed wheel among those of the line, and the wheel, by its channel."""

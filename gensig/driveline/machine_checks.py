@@ -12,7 +12,7 @@ from gensig.dynamics.backends.registry import DEFAULT_BACKEND
 from gensig.dynamics.integrator import Solver
 from gensig.errors import ConfigError
 from gensig.mesh.options import MeshOptions
-from gensig.sensing.chain import Sensing
+from gensig.systems.base import Machine
 
 Array = NDArray[np.float64]
 
@@ -39,26 +39,27 @@ def check_solver(mesh: MeshOptions, solver: Solver) -> None:
         )
 
 
-def check_sensing(
-    sensing: Sensing, channels: tuple[str, ...], engine: EngineLine
-) -> None:
-    """Raise for channels and sensors that a drive line does not have."""
+def check_sensing(machine: Machine, *, lateral: bool) -> None:
+    """Raise for channels and gears that a drive line does not have, and files that do not fit.
+
+    ``lateral`` says whether its gears move on their bearings.
+    """
+    sensing, channels = machine.sensing, machine.channels
     if unknown := [name for name in sensing.channels if name not in channels]:
         more = ""
-        if not engine.drive.lateral:
+        if not lateral:
             more = "; with system.lateral=true also pinion_x and the like"
         raise ConfigError(
             f"sensing.channels: no channel {', '.join(unknown)}; "
             f"allowed: {', '.join(channels)}{more}"
         )
-    if sensing.path is not None or sensing.n_lead or sensing.nuisances:
-        option = "geared_line"
-        if engine.wheels:
-            option = "shaft_line"
+    sensing.check_gears(machine.gears)
+    if sensing.nuisances and not lateral:
         raise ConfigError(
-            "sensing: records of a drive line have no transfer path, nuisances or sensor "
-            f"dynamics; take sensing={option}"
+            "sensing.nuisances push gears on their bearings, which system.lateral = false holds "
+            "still; take system.lateral=true"
         )
+    sensing.check(machine.operating.duration)
 
 
 def warn_of_supports(engine: EngineLine, mesh_forces: Array) -> None:
