@@ -146,8 +146,9 @@ REFUSED = [
     (
         "two_stage_gearbox",
         [
-            "sensing=geared_line_machine",
-            "sensing.channels=[pinion_y]",
+            "sensing.channels=[pinion_rotation]",
+            "sensing.nuisances=[{kind: looseness, gear: output_gear, n_orders: 3,"
+            " force_share: [0.01, 0.01], half_share: [0, 0], harmonic_exponent: 1}]",
             "system.lateral=false",
         ],
         "sensing.nuisances push gears on their bearings",
