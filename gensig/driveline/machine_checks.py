@@ -53,6 +53,12 @@ def check_sensing(machine: Machine, *, lateral: bool) -> None:
             f"sensing.channels: no channel {', '.join(unknown)}; "
             f"allowed: {', '.join(channels)}{more}"
         )
+    for name in machine.gears:
+        if name.endswith("tilt"):
+            raise ConfigError(
+                f"system.gears_csv: a gear named {name} makes channels that read as tilts; "
+                "give it another name"
+            )
     sensing.check_gears(machine.gears)
     if sensing.nuisances and not lateral:
         raise ConfigError(

@@ -151,6 +151,20 @@ def linear(system):
     return system.linear_machine(Run(system=system, faults=()))
 
 
+def test_a_toothed_wheel_answers_with_the_speed_of_its_shaft():
+    errors = "eccentricity_error_deg: 0, tooth_error_deg: 0, clock_frequency_hz: 1e8"
+    wheel = f"excitation.toothed_wheels={{input: {{node: 3, n_teeth: 60, {errors}}}}}"
+    answering = linear(
+        machine(*MOTOR, wheel, "sensing.channels=[pinion_y,input_speed]")
+    )
+    w = np.array([300.0, -900.0])
+    force = np.array([[0.0, 0.0, 1.0], [3.0, 2.0, 1.0j]], dtype=complex)
+    channels = ["input_speed", "pinion_rotation"]
+    speed, acceleration = answering.accelerations("wheel", w, force, channels).T
+    assert np.abs(acceleration).min() > 0.0
+    assert_close(1j * w * speed, acceleration, 1e-9)
+
+
 def test_shafts_of_the_line_have_its_speeds_and_torques():
     shafts = {
         gear: linear(machine(*MOTOR, "operating.torque_nm=60")).shaft(gear)
