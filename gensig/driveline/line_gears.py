@@ -1,11 +1,12 @@
 """Gears, bodies and meshes of a drive line by name, for the machine that records are made of.
 
 The two gears of the mesh that records follow are named by their side of it. All others have their
-names of the tables.
+names of the tables, in small letters with underscores.
 """
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 from gensig.driveline.drive_line import DriveLine
@@ -18,15 +19,20 @@ from gensig.systems.base import MachineMesh
 STILL = Support(stiffness_x=0.0, stiffness_y=0.0, damping_x=0.0, damping_y=0.0)
 
 
+def slug(name: str) -> str:
+    """A name of a table as configurations write it: ``Idler gear 2`` is ``idler_gear_2``."""
+    return re.sub("[^a-z0-9]+", "_", name.lower()).strip("_")
+
+
 def gear_names(drive: DriveLine, followed: int) -> tuple[str, ...]:
     """Name of every gear of a line, (gear,), each once; ``followed`` is the number of the mesh."""
     mesh = drive.line.meshes[followed]
     sides = dict(zip((mesh.driving, mesh.driven), SIDES, strict=True))
     names: list[str] = []
     for number, gear in enumerate(drive.line.gears):
-        name = sides.get(number, gear.name)
-        if number not in sides and name in (*SIDES, *names):
-            name = f"{name} (gear {number + 1})"
+        name = sides.get(number, slug(gear.name))
+        if number not in sides and name in ("", *SIDES, *names):
+            name = slug(f"{name} gear {number + 1}")
         names.append(name)
     return tuple(names)
 

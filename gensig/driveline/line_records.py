@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.driveline.running import RunningLine
 from gensig.driveline.side_by_side import (
     LineDynamics,
     check_line,
@@ -16,7 +16,7 @@ from gensig.driveline.side_by_side import (
     line_dynamics,
 )
 from gensig.dynamics._layout import N_SEEN
-from gensig.dynamics.backends.base import Integration
+from gensig.dynamics.backends.base import Integration, Motions
 from gensig.dynamics.mesh_state import mesh_state
 from gensig.errors import SimulationError
 from gensig.faults.base import faulty_teeth
@@ -27,3 +27,148 @@ from gensig.systems.integration_checks import (
     not_finite,
 )
 from gensig.systems.run import CleanRecord, Run
+
+Array = NDArray[np.float64]
+LineRun = Run[Any]  # of a ``LineMachine``, whose module imports this one
+Channel = tuple[str, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LineSignals:
+    """Signals of a line by channel, (sample,), and the nominal motion of its reference.
+
+    A channel is a kind, ``acceleration`` or ``angle``, and a degree of freedom; signals are
+    deviations from nominal rotation in m/s2, rad/s2 or rad.
+    """
+
+    signals: dict[Channel, Array]
+    nominal_angle: Array
+    nominal_speed: Array
+
+
+def simulate_lines(runs: Sequence[LineRun]) -> list[CleanRecord | SimulationError]:
+    """Records of runs, in the order of the runs; lines of the same bodies are integrated together.
+
+    A record's bits do not depend on the other runs. A motion that does not stay finite, or a
+    machine that the core does not cover, gives its error in place of its record.
+    """
+    results: dict[int, CleanRecord | SimulationError] = {}
+    machines: dict[int, LineDynamics] = {}
+    kinds: dict[tuple[object, ...], list[int]] = {}
+    for index, run in enumerate(runs):
+        try:
+            machines[index] = dynamics_of(run)
+            check_line(machines[index], run.system.solver, _rate(run))
+        except SimulationError as error:
+            results[index] = error
+        else:
+            kinds.setdefault(_kind(run, machines[index]), []).append(index)
+    for same in kinds.values():
+        records = _together([runs[i] for i in same], [machines[i] for i in same])
+        results.update(zip(same, records, strict=True))
+    coarse = [i for i, record in results.items() if is_too_coarse(runs[i], record)]
+    if coarse:
+        again = simulate_lines([finer(runs[i]) for i in coarse])
+        results.update(zip(coarse, again, strict=True))
+    return [results[index] for index in range(len(runs))]
+
+
+def dynamics_of(run: LineRun) -> LineDynamics:
+    """The motion of one run; its first angle is that of the followed mesh's driving gear."""
+    machine = run.system
+    engine = machine.engine
+    return line_dynamics(
+        machine.line(run),
+        machine.operating,
+        drive=engine.engine.driving_nodes[0],
+        angles=(
+            machine.driving_node,
+            *(wheel.node for wheel in engine.wheels.values()),
+        ),
+    )
+
+
+def _rate(run: LineRun) -> float:
+    return float(run.system.sensing.sampling_rate)
+
+
+def _kind(run: LineRun, line: LineDynamics) -> tuple[object, ...]:
+    """All values that runs must share to be integrated in one call."""
+    machine = run.system
+    return (
+        machine.sensing.sampling_rate,
+        machine.sensing.channels,
+        machine.operating.duration,
+        machine.operating.is_steady,
+        machine.mesh_number,
+        run.with_mesh_state,
+        machine.solver,
+        machine.mesh.roll_torque,
+        line.dofs,
+        line.touched.tobytes(),
+        line.angles,
+    )
+
+
+def _together(
+    runs: Sequence[LineRun], machines: Sequence[LineDynamics]
+) -> list[CleanRecord | SimulationError]:
+    machine, first = runs[0].system, machines[0]
+    rate, solver = _rate(runs[0]), machine.solver
+    kinds = [machine.channel(first.running, name) for name in machine.sensing.channels]
+    dofs = [dof for kind, dof in kinds if kind == "acceleration"]
+    integration = Integration(
+        sampling_rate=rate,
+        duration=machine.operating.duration,
+        # a line without an acceleration has one all the same, by which its steps are checked
+        channels=tuple(first.dofs[dof] for dof in dofs or [first.angles[0]]),
+        with_mesh_state=runs[0].with_mesh_state,
+        oversampling=solver.oversampling,
+        precision=solver.precision,
+        max_error=solver.max_error,
+    )
+    motions = integrate_lines(machines, integration)
+    errors, verdicts = checks(motions, solver, rate)
+    records: list[CleanRecord | SimulationError] = []
+    for index, (run, line) in enumerate(zip(runs, machines, strict=True)):
+        if not motions.finite[index]:
+            records.append(not_finite(run))
+            continue
+        signals = _signals(line, motions, index, dofs, rate)
+        number, mesh = run.system.mesh_number, None
+        if run.with_mesh_state:
+            seen = motions.seen[index, number * N_SEEN : (number + 1) * N_SEEN]
+            faulty = faulty_teeth(run.system.pair, run.faults)
+            angle = motions.angle[index, 0]
+            mesh = mesh_state(line.pairs[number], seen, angle, faulty)
+        records.append(
+            CleanRecord(
+                acceleration=run.system.rows(run, line.running, signals),
+                shaft_angle=motions.angle[index, 0],
+                mean_speed=float(motions.mean_speed[index]),
+                contact_loss_fraction=float(motions.contact_loss[index, number]),
+                integration_error=float(errors[index]),
+                integration_check=verdicts[index],
+                mesh=mesh,
+            )
+        )
+    return records
+
+
+def _signals(
+    line: LineDynamics, motions: Motions, index: int, dofs: Sequence[int], rate: float
+) -> LineSignals:
+    """Signals of one of some motions by channel; angles are deviations."""
+    angles = motions.angle[index]
+    times = np.arange(angles.shape[1]) / rate
+    nominal_angle, nominal_speed = line.running.course.nominal(times)
+    rotation = line.running.line.rotation
+    signals: dict[Channel, Array] = {
+        ("acceleration", dof): motions.acceleration[index, row]
+        for row, dof in enumerate(dofs)
+    }
+    for dof, angle in zip(line.angles, angles, strict=True):
+        signals["angle", dof] = angle - rotation[dof] * nominal_angle
+    return LineSignals(
+        signals=signals, nominal_angle=nominal_angle, nominal_speed=nominal_speed
+    )

@@ -18,7 +18,15 @@ from numpy.typing import NDArray
 from gensig.driveline import loads
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.engine_torques import Engine
-from gensig.driveline.line_gears import line_bodies, line_gears, line_meshes
+from gensig.driveline.gear_motion import gear_channels, gear_dof
+from gensig.driveline.line_gears import (
+    gear_names,
+    line_bodies,
+    line_gears,
+    line_meshes,
+)
+from gensig.driveline.line_records import LineSignals, simulate_lines
+from gensig.driveline.linear_drive_line import LinearDriveLine
 from gensig.driveline.machine_checks import (
     check_sensing,
     check_solver,
@@ -47,6 +55,7 @@ from gensig.driveline.teeth import (
     tooth_table,
 )
 from gensig.driveline.time.newmark import LineMotion, LineSolver
+from gensig.driveline.wheel_channels import wheel_of, wheel_speed
 from gensig.dynamics.integrator import check_memory
 from gensig.dynamics.pair import Body
 from gensig.errors import ConfigError, SimulationError
@@ -55,13 +64,13 @@ from gensig.geometry.contact import SIDES, GearPair
 from gensig.geometry.gear import Gear
 from gensig.mesh.modification import PLAIN, sound_teeth
 from gensig.mesh.options import SliceOptions
-from gensig.mesh.pair_table import PairTable
+from gensig.mesh.pair_table import N_PAIRS, PairTable
 from gensig.mesh.sliced.sliced_table import SlicedTable
 from gensig.sensing.encoder import Disc
 from gensig.sensing.manufacturing import perfect_specimen
-from gensig.sensing.toothed_wheel import ToothedWheel, draw_wheel, instantaneous_speed
+from gensig.sensing.toothed_wheel import draw_wheel
 from gensig.systems.base import Machine, MachineMesh, specimen_table
-from gensig.systems.run import CleanRecord, Run, Start
+from gensig.systems.run import CleanRecord, Run, Start, angle_from_tooth_0
 from gensig.systems.stiffness_curves import StiffnessCurves, stiffness_curves
 from gensig.systems.supports import in_gearbox
 from gensig.units import SPEED
@@ -72,8 +81,8 @@ Array = NDArray[np.float64]
 SETTLING = 0.3
 MOST_ENERGY_RESIDUAL = 1e-3
 KNOT = 5e-3  # s between the knots of a course that changes
+SIDE_BY_SIDE = "nystroem"  # solver.backend
 AFTER = 0.2  # s that a course goes on after a record: the low-pass looks ahead
-AXES = ("x", "y")
 
 
 @final
@@ -141,20 +150,20 @@ class LineMachine(Machine):
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Rotation of both gears of the followed mesh, speeds of the toothed wheels.
-
-        With lateral motion also the bearings of both gears.
-        """
-        rotations = [f"{side}_rotation" for side in SIDES]
-        bearings = [f"{side}_{axis}" for side in SIDES for axis in AXES]
+        """Rotations of all gears, with lateral motion their bearings, speeds of toothed wheels."""
         speeds = [f"{name}{SPEED}" for name in self.engine.wheels]
-        if not self.engine.drive.lateral:
-            return (*rotations, *speeds)
-        return (*rotations, *bearings, *speeds)
+        return (*gear_channels(self.engine.drive, self.mesh_number), *speeds)
+
+    @property
+    def side_by_side(self) -> bool:
+        """True where the two-evaluation core integrates the line, several records at once."""
+        return self.solver.backend == SIDE_BY_SIDE
 
     @property
     def most_pairs(self) -> int:
-        """0: the loads of teeth are not known."""
+        """Pairs of teeth of the followed mesh whose loads are known at once."""
+        if self.side_by_side:
+            return N_PAIRS
         return 0
 
     @property
@@ -228,7 +237,7 @@ class LineMachine(Machine):
     def check(self) -> None:
         """Raise for what would stop every record."""
         self.require_drive()
-        check_sensing(self.sensing, self.channels, self.engine)
+        check_sensing(self, lateral=self.engine.drive.lateral)
         check_solver(self.mesh, self.solver)
         warn_of_supports(self.engine, self.mesh_forces)
         self.quality.check_covered(self.pair.pinion, self.pair.wheel)
@@ -257,6 +266,32 @@ class LineMachine(Machine):
     def draw_discs(self, rng: np.random.Generator) -> tuple[Disc, ...]:
         """The toothed wheels of one gearbox with their errors."""
         return tuple(draw_wheel(rng, wheel) for wheel in self.engine.wheels.values())
+
+    def gear_angle(self, gear: str, start: Start, shaft_angle: Array) -> Array:
+        """As ``Machine.gear_angle``."""
+        if gear in SIDES:
+            return angle_from_tooth_0(self.pair, gear, start, shaft_angle)
+        drive = self.engine.drive
+        number = gear_names(drive, self.mesh_number).index(gear)
+        ratio = self.engine.ratios[drive.numbers[drive.line.gears[number].node]]
+        return ratio * (self.crank_angle(start) + shaft_angle / self.ratio)
+
+    def line_angle(self, start: Start) -> float:
+        """Angle of the crank or the motor, rad."""
+        return self.crank_angle(start)
+
+    def linear_machine(self, run: Run[Self]) -> LinearDriveLine:
+        """The sound line in the gearbox of a run, at the set-point."""
+        speed, torque = self.operating.speed / self.ratio, self.operating.torque
+        running = running_line(
+            self._in_gearbox(run), steady_course(speed, torque), governor=self._governor
+        )
+        return LinearDriveLine(
+            running=running,
+            followed=self.mesh_number,
+            speed=speed,
+            mesh_forces=running.mesh_force,
+        )
 
     def mesh_torques(self, speed: float, torque: float) -> Array:
         """Loads that a tooth of the record mesh meets at a set-point, one a mesh, as torques of
@@ -301,34 +336,27 @@ class LineMachine(Machine):
     def simulate_runs(
         cls, runs: Sequence[Run[Self]]
     ) -> list[CleanRecord | SimulationError]:
-        """Simulate runs one after the other, in the order given."""
-        records: list[CleanRecord | SimulationError] = []
-        for run in runs:
-            try:
-                records.append(run.system._record(run))
-            except SimulationError as error:
-                records.append(error)
-        return records
+        """Simulate runs side by side or one after the other, as their solver says."""
+        results: dict[int, CleanRecord | SimulationError] = {}
+        together = [n for n, run in enumerate(runs) if run.system.side_by_side]
+        records = simulate_lines([runs[n] for n in together])
+        results.update(zip(together, records, strict=True))
+        for number, run in enumerate(runs):
+            if number not in results:
+                try:
+                    results[number] = run.system._record(run)
+                except SimulationError as error:
+                    results[number] = error
+        return [results[number] for number in range(len(runs))]
 
     @single_thread
     def _record(self, run: Run[LineMachine]) -> CleanRecord:
         line = self.line(run)
-        kinds = {name: self._channel(line, name) for name in self.sensing.channels}
-        motion, angle = self._integrate(
-            line, self.operating.duration, list(kinds.values())
-        )
-        gains = np.ones(len(kinds))
-        if run.gearbox is not None:
-            gains = run.gearbox.gain
-        rows = []
-        for (name, kind), gain in zip(kinds.items(), gains, strict=True):
-            if kind[0] == "angle":
-                rows.append(self._wheel_speed(run, line, motion, name, kind))
-            else:
-                rows.append(gain * motion.signals[kind])
+        kinds = [self.channel(line, name) for name in self.sensing.channels]
+        motion, angle = self._integrate(line, self.operating.duration, kinds)
         turned = float(angle[-1] - angle[0])
         return CleanRecord(
-            acceleration=np.array(rows),
+            acceleration=self.rows(run, line, motion),
             shaft_angle=angle,
             mean_speed=turned * self.sensing.sampling_rate / max(len(angle) - 1, 1),
             contact_loss_fraction=float(motion.contact_loss[self.mesh_number]),
@@ -353,14 +381,7 @@ class LineMachine(Machine):
         """The line of one run, ready to be integrated."""
         specimen = run.specimen or perfect_specimen(self.pair.pinion, self.pair.wheel)
         start = run.start or Start()
-        engine = self.engine
-        if run.gearbox is not None and engine.drive.lateral:
-            bodies = (self.pinion, slice(0, 2)), (self.wheel, slice(2, 4))
-            held = [
-                in_gearbox(body, run.gearbox, axes, self.quality).support
-                for body, axes in bodies
-            ]
-            engine = with_supports(engine, self.mesh_number, held)
+        engine = self._in_gearbox(run)
         turned, forces = self.crank_angle(start), self.mesh_forces
         teeth = start.tooth_pinion, start.tooth_wheel
         neighbours = neighbour_meshes(
@@ -382,17 +403,33 @@ class LineMachine(Machine):
         sound = sound_meshes(
             engine, self.law, forces, left_out={self.mesh_number, *neighbours}
         )
-        governor = Governor(
-            frequency=self.operating.drive_frequency,
-            damping_ratio=self.operating.drive_damping_ratio,
-        )
         return running_line(
             engine,
             self._course(),
-            governor=governor,
+            governor=self._governor,
             tabulated={**sound, **neighbours, self.mesh_number: recorded},
             turned=turned,
         )
+
+    @property
+    def _governor(self) -> Governor:
+        """What holds the mean speed."""
+        return Governor(
+            frequency=self.operating.drive_frequency,
+            damping_ratio=self.operating.drive_damping_ratio,
+        )
+
+    def _in_gearbox(self, run: Run[Self]) -> EngineLine:
+        """The line with the supports of a run's gearbox under the gears of the followed mesh."""
+        engine = self.engine
+        if run.gearbox is None or not engine.drive.lateral:
+            return engine
+        bodies = (self.pinion, slice(0, 2)), (self.wheel, slice(2, 4))
+        held = [
+            in_gearbox(body, run.gearbox, axes, self.quality).support
+            for body, axes in bodies
+        ]
+        return with_supports(engine, self.mesh_number, held)
 
     def crank_angle(self, start: Start) -> float:
         """Angle of the crank in its cycle when given teeth of the mesh are at a phase, rad.
@@ -400,8 +437,10 @@ class LineMachine(Machine):
         The driving gear's teeth are tied to the crank: the same tooth meets the same cylinder's
         firing in every record. Where its shaft turns more than once a cycle, the driven gear's
         tooth chooses the turn. A motor has no cycle: its turns are counted on, so that the other
-        meshes stand as the teeth allow.
+        meshes stand as the teeth allow. A lead-in gives the angle, as much earlier.
         """
+        if start.line_angle is not None:
+            return start.line_angle
         pitches = (
             start.tooth_pinion
             + start.phase
@@ -426,41 +465,26 @@ class LineMachine(Machine):
             torque=load * nominal.torque_factor,
         )
 
-    def _channel(self, line: RunningLine, name: str) -> tuple[str, int]:
+    def rows(
+        self, run: Run[Self], line: RunningLine, motion: LineMotion | LineSignals
+    ) -> Array:
+        """Signals of the channels with the gains of a run's gearbox, (channel, sample)."""
+        names = self.sensing.channels
+        gains = np.ones(len(names))
+        if run.gearbox is not None:
+            gains = run.gearbox.gain
+        rows = []
+        for name, gain in zip(names, gains, strict=True):
+            kind = self.channel(line, name)
+            if kind[0] == "angle":
+                rate = self.sensing.sampling_rate
+                rows.append(wheel_speed(run.discs, line, motion, name, rate))
+            else:
+                rows.append(gain * motion.signals[kind])
+        return np.array(rows)
+
+    def channel(self, line: RunningLine, name: str) -> tuple[str, int]:
         """Signal of the integration for a channel: a kind and a degree of freedom."""
         if name.endswith(SPEED):
-            return "angle", line.dof(self._wheel(name)[1].node)
-        side, _, quantity = name.rpartition("_")
-        drive = self.engine.drive
-        mesh = drive.line.meshes[self.mesh_number]
-        number = {"pinion": mesh.driving, "wheel": mesh.driven}[side]
-        gear = drive.line.gears[number]
-        if quantity in AXES:
-            return "acceleration", line.matrices.names.index(f"{gear.name} {quantity}")
-        return "acceleration", line.dof(drive.numbers[gear.node])
-
-    def _wheel(self, name: str) -> tuple[int, ToothedWheel]:
-        """Number of a toothed wheel among those of the line, and the wheel, by its channel."""
-        wheels = self.engine.wheels
-        wanted = name.removesuffix(SPEED)
-        return list(wheels).index(wanted), wheels[wanted]
-
-    def _wheel_speed(
-        self,
-        run: Run[LineMachine],
-        line: RunningLine,
-        motion: LineMotion,
-        name: str,
-        kind: tuple[str, int],
-    ) -> Array:
-        """Deviation from the nominal speed that a toothed wheel measures, (sample,) rad/s."""
-        number, wheel = self._wheel(name)
-        disc = Disc(
-            index=0.0, line_angles=wheel.spacing * np.arange(float(wheel.n_teeth))
-        )
-        if run.discs:
-            disc = run.discs[number]
-        ratio = self.engine.ratios[wheel.node]
-        angle = ratio * (line.turned + motion.nominal_angle) + motion.signals[kind]
-        speed = instantaneous_speed(wheel, disc, angle, self.sensing.sampling_rate)
-        return speed - ratio * motion.nominal_speed
+            return "angle", line.dof(wheel_of(self.engine, name)[1].node)
+        return "acceleration", gear_dof(line, self.mesh_number, name)

@@ -12,9 +12,12 @@ from gensig.dynamics.backends.registry import DEFAULT_BACKEND
 from gensig.dynamics.integrator import Solver
 from gensig.errors import ConfigError
 from gensig.mesh.options import MeshOptions
-from gensig.sensing.chain import Sensing
+from gensig.systems.base import Machine
 
 Array = NDArray[np.float64]
+
+# by the default an implicit method integrates a line, record by record
+LINE_BACKENDS = (DEFAULT_BACKEND, "nystroem")
 
 # times the force of the supports; the stiffness of a ball bearing follows its third root
 FAR_ABOVE = 3.0
@@ -27,38 +30,45 @@ def check_solver(mesh: MeshOptions, solver: Solver) -> None:
             f"mesh.law = {mesh.law}: the meshes of a drive line are one-sided; "
             "take mesh.law=one_sided"
         )
-    if solver.precision != "float64":
+    if solver.backend not in LINE_BACKENDS:
+        raise ConfigError(
+            f"solver.backend = {solver.backend}: a drive line takes "
+            f"{' or '.join(LINE_BACKENDS)}"
+        )
+    if solver.backend == DEFAULT_BACKEND and solver.precision != "float64":
         raise ConfigError(
             f"solver.precision = {solver.precision}: a drive line is integrated in "
-            "float64; take solver.precision=float64"
-        )
-    if solver.backend != DEFAULT_BACKEND:
-        raise ConfigError(
-            f"solver.backend = {solver.backend}: a drive line has an integrator of "
-            f"its own; take solver.backend={DEFAULT_BACKEND}"
+            "float64; take solver.precision=float64, or solver.backend=nystroem"
         )
 
 
-def check_sensing(
-    sensing: Sensing, channels: tuple[str, ...], engine: EngineLine
-) -> None:
-    """Raise for channels and sensors that a drive line does not have."""
+def check_sensing(machine: Machine, *, lateral: bool) -> None:
+    """Raise for channels and gears that a drive line does not have, and files that do not fit.
+
+    ``lateral`` says whether its gears move on their bearings.
+    """
+    sensing, channels = machine.sensing, machine.channels
     if unknown := [name for name in sensing.channels if name not in channels]:
         more = ""
-        if not engine.drive.lateral:
+        if not lateral:
             more = "; with system.lateral=true also pinion_x and the like"
         raise ConfigError(
             f"sensing.channels: no channel {', '.join(unknown)}; "
             f"allowed: {', '.join(channels)}{more}"
         )
-    if sensing.path is not None or sensing.n_lead or sensing.nuisances:
-        option = "geared_line"
-        if engine.wheels:
-            option = "shaft_line"
+    for name in machine.gears:
+        if name.endswith("tilt"):
+            raise ConfigError(
+                f"system.gears_csv: a gear named {name} makes channels that read as tilts; "
+                "give it another name"
+            )
+    sensing.check_gears(machine.gears)
+    if sensing.nuisances and not lateral:
         raise ConfigError(
-            "sensing: records of a drive line have no transfer path, nuisances or sensor "
-            f"dynamics; take sensing={option}"
+            "sensing.nuisances push gears on their bearings, which system.lateral = false holds "
+            "still; take system.lateral=true"
         )
+    sensing.check(machine.operating.duration)
 
 
 def warn_of_supports(engine: EngineLine, mesh_forces: Array) -> None:

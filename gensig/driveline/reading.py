@@ -11,6 +11,7 @@ from gensig.errors import ConfigError
 from gensig.mesh.options import read_mesh_options, read_slice_options
 from gensig.operation.options import read_operating
 from gensig.options.configuration import Configuration
+from gensig.sensing.chain import EVERY_BEARING
 from gensig.sensing.manufacturing import Quality
 from gensig.sensing.options import read_sensing
 from gensig.systems.registry import read_heat, read_material, read_modification
@@ -47,16 +48,20 @@ def read_line_machine(config: Configuration) -> LineMachine:
         slices=read_slice_options(config.section("mesh")),
     )
     return replace(
-        machine, operating=replace(operating, speed=operating.speed * machine.ratio)
+        machine,
+        operating=replace(operating, speed=operating.speed * machine.ratio),
+        sensing=machine.sensing.of_machine(machine.channels),
     )
 
 
 def _with_lateral_motion(config: Configuration) -> Configuration:
-    """A configuration whose ``system.lateral`` null is true where a channel needs that motion."""
+    """A configuration whose ``system.lateral`` null is true where channels or nuisances need it."""
     if config.section("system").get("lateral") is not None:
         return config
-    channels = config.section("sensing").get("channels")
-    needed = any(str(name).endswith(("_x", "_y")) for name in channels or ())
+    sensing = config.section("sensing")
+    names = [str(name) for name in sensing.get("channels") or ()]
+    has_bearing = any(name.endswith(("_x", "_y")) for name in names)
+    needed = has_bearing or names == [EVERY_BEARING] or bool(sensing.get("nuisances"))
     return config.with_keys("system", lateral=needed)
 
 

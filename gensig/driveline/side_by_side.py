@@ -23,13 +23,18 @@ from gensig.dynamics.backends.nystroem import _line_kernels
 from gensig.dynamics.backends.nystroem import _line_layout as lines
 from gensig.dynamics.backends.nystroem._line_layout import LineGroup, line_scratch
 from gensig.dynamics.backends.nystroem._pairs import CELL
-from gensig.dynamics.backends.nystroem.method import missing_cells
+from gensig.dynamics.backends.nystroem.method import (
+    OTHER_BACKEND,
+    missing_cells,
+    refuse,
+)
 from gensig.dynamics.backends.nystroem.stability import stable_rate
 from gensig.dynamics.backends.step_limits import (
     COARSE_STABILITY,
     LONGEST_SETTLING,
     SETTLED,
 )
+from gensig.dynamics.integrator import Solver
 from gensig.dynamics.lanes import (
     CELLS_PER_SECOND,
     exact_numbers,
@@ -39,12 +44,16 @@ from gensig.dynamics.lanes import (
     tooth_rows,
 )
 from gensig.dynamics.pair import Body, PairDynamics
+from gensig.errors import SimulationError
 from gensig.mesh.pair_table import PairTable
 from gensig.operation.setpoint import Operating
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+ROUNDED = (
+    1e-12  # of the diagonals, at most, are entries of damping that rounding leaves
+)
 STIFFER = 1.2  # than their mean stiffness are meshes taken for the longest step
 
 
@@ -193,13 +202,35 @@ def line_dynamics(
     )
 
 
+def check_line(line: LineDynamics, solver: Solver, sampling_rate: float) -> None:
+    """Raise SimulationError for an unstable step or a line that the core does not cover."""
+    for pair in line.pairs:
+        refuse(pair)
+    for torque in line.running.torques:
+        if len(torque.table) > 1:
+            raise SimulationError(
+                f"solver.backend = nystroem takes torques that do not follow an angle, but that "
+                f"on '{line.dofs[torque.dof]}' does; {OTHER_BACKEND}"
+            )
+    needed = math.ceil(stable_rate(line.stiff_rates) / sampling_rate)
+    if needed > solver.oversampling:
+        raise SimulationError(
+            f"solver.oversampling = {solver.oversampling} makes too long steps for "
+            f"solver.backend=nystroem; raise solver.oversampling to at least {needed}"
+        )
+
+
 def _pair(
     running: RunningLine, m: int, operating: Operating, speed: float
 ) -> PairDynamics:
     """The teeth of a mesh under its mean force, on bodies that are not read."""
-    mesh, tabulated = running.line.meshes[m], running.tabulated[m]
+    mesh, tabulated = running.line.meshes[m], running.tabulated.get(m)
+    if tabulated is None or not isinstance(tabulated.table, PairTable):
+        raise SimulationError(
+            f"solver.backend = nystroem takes meshes of spur teeth, but mesh {mesh.name} has "
+            f"helical ones; {OTHER_BACKEND}"
+        )
     table = tabulated.table
-    assert isinstance(table, PairTable)
     pair, force = table.pair, float(running.mesh_force[m])
     force = reference_force(running.machine, m, force)
     point = replace(
@@ -296,9 +327,7 @@ def pack_lines(
     damping = np.stack([line.damping for line in lines_of])
     rotation = np.stack([line.rotation for line in lines_of])
     dofs = np.arange(mass.shape[1])
-    coupled = np.any((stiffness != 0.0) | (damping != 0.0), axis=0)
-    coupled[dofs, dofs] = False
-    of, column = np.nonzero(coupled)
+    sprung, damped = _couplings(stiffness), _couplings(damping)
     mean = np.stack([lane.running.mesh_force for lane in lanes])
     held = np.einsum("lij,lj->li", stiffness, rests)
     for row, lane, forces in zip(held, lanes, mean, strict=True):
@@ -329,10 +358,12 @@ def pack_lines(
         inverse_mass=side_by_side(1.0 / mass),
         stiffness=side_by_side(stiffness[:, dofs, dofs]),
         damping=side_by_side(damping[:, dofs, dofs]),
-        other_first=np.searchsorted(of, np.arange(len(dofs) + 1)),
-        other_column=np.ascontiguousarray(column),
-        other_stiffness=side_by_side(stiffness[:, of, column]),
-        other_damping=side_by_side(damping[:, of, column]),
+        sprung_first=sprung.first,
+        sprung_column=sprung.column,
+        sprung=side_by_side(sprung.value),
+        damped_first=damped.first,
+        damped_column=damped.column,
+        damped=side_by_side(damped.value),
         force=side_by_side(steady - held),
         rest=np.ascontiguousarray(rests.T),
         rotation=side_by_side(rotation),
@@ -350,6 +381,31 @@ def pack_lines(
         if isinstance(values, np.ndarray):
             fields[name] = aligned(np.ascontiguousarray(values))
     return LineGroup(**fields)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Couplings:
+    """Entries of matrices beside their diagonals, row after row.
+
+    ``first`` (row + 1,), ``column`` (entry,), ``value`` (lane, entry).
+    """
+
+    first: Index
+    column: Index
+    value: Array
+
+
+def _couplings(matrices: Array) -> _Couplings:
+    """Entries beside the diagonals of matrices (lane, row, column), but for what is rounded."""
+    diagonal = np.sqrt(np.abs(np.einsum("lii->li", matrices)))
+    least = ROUNDED * diagonal[:, :, None] * diagonal[:, None, :]
+    is_entry = np.any(np.abs(matrices) > least, axis=0)
+    np.fill_diagonal(is_entry, False)
+    row, column = np.nonzero(is_entry)
+    first = np.searchsorted(row, np.arange(matrices.shape[1] + 1))
+    return _Couplings(
+        first=first, column=column, value=np.ascontiguousarray(matrices[:, row, column])
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

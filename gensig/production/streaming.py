@@ -24,6 +24,7 @@ from gensig.plan.make import make_plan
 from gensig.record.machines import read_machine
 from gensig.record.options import read_dataset_options
 from gensig.record.simulate import Record, simulate_records
+from gensig.sensing.chain import EVERY_BEARING
 
 # Spawn key of the seeds of later epochs. The causes of a record and the splits have others.
 EPOCH_STREAM = 9100
@@ -68,6 +69,8 @@ class RecordStream:
     def channels(self) -> list[str]:
         """Names along the channel axis."""
         sensing = self.config["sensing"]
+        if sensing["channels"] == [EVERY_BEARING]:
+            return list(read_machine(self.config).sensing.channel_names)
         if sensing["sensors"] is None:
             return list(sensing["channels"])
         return list(sensing["sensors"])

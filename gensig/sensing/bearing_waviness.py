@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from gensig.dynamics.pair import PairDynamics
 from gensig.errors import ConfigError
+from gensig.sensing.linear_machine import LinearMachine
 from gensig.sensing.tones import (
     MOST_HARMONICS,
     TURN,
@@ -101,7 +101,7 @@ class Bearing(Nuisance):
         self,
         unit_rng: np.random.Generator,
         record_rng: np.random.Generator,
-        dynamics: PairDynamics,
+        machine: LinearMachine,
     ) -> Tones:
         """As ``Nuisance.draw``."""
         n = self.n_balls
@@ -116,7 +116,8 @@ class Bearing(Nuisance):
         orders = bearing_orders(
             n, self.ball_diameter, self.pitch_diameter, self.contact_angle, slip
         )
-        forward = turning(self.gear)
+        turned = machine.shaft(self.gear)
+        forward = turning(turned.sense)
         backward = forward.conj()
         multiples, forces = [(0, 1, 0)], [cage * np.exp(1j * phases[0, 0]) * forward]
         for k in range(1, self.n_harmonics + 1):
@@ -138,7 +139,7 @@ class Bearing(Nuisance):
         begin = np.exp(
             1j * np.array(multiples) @ np.array([0.0, cage_angle, ball_angle])
         )
-        support = getattr(dynamics, self.gear).support
+        support = turned.body.support
         stiffness = np.array([support.stiffness_x, support.stiffness_y, 0.0])
         return make_tones(
             self.gear,

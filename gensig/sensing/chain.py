@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,14 @@ from gensig.sensing.noise import Noise, Receiver, ThroughPath
 from gensig.sensing.tachometer import Tachometer
 from gensig.sensing.tones import Nuisance
 from gensig.sensing.transfer_path import ModalPath
-from gensig.units import TURNING, check_choice, check_limits, is_turning, unit
+from gensig.units import (
+    TURNING,
+    channel_unit,
+    check_choice,
+    check_limits,
+    is_turning,
+    unit,
+)
 
 Array = NDArray[np.float64]
 
@@ -26,15 +34,17 @@ SNR_REFERENCES = ("healthy_twin", "record")
 LONGEST_LEAD = 0.5  # s
 SENSOR_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
 CROSSED = {"x": "y", "y": "x"}
+EVERY_BEARING = "bearings"  # in place of the channels: x and y of every gear
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sensing:
     """Simulated channels, the chain from them to the record, its rate and its noise.
 
-    ``channels`` are the simulated accelerations. Without a ``path`` the sensors feel these; a
-    path leads from them to the ``sensors``. ``snr`` in dB; None records without noise. Its
-    reference is the power of the same unit at the same condition without the fault
+    ``channels`` are the simulated accelerations; ``EVERY_BEARING`` alone stands for x and y of
+    every gear until the machine is known (``of_machine``). Without a ``path`` the sensors feel
+    these; a path leads from them to the ``sensors``. ``snr`` in dB; None records without noise.
+    Its reference is the power of the same unit at the same condition without the fault
     (``healthy_twin``), so the floor does not reveal the class. None for ``sensor`` is an ideal
     one, None for ``noise`` is white noise over the whole band. ``nuisances`` shake the bearings
     of every class.
@@ -113,6 +123,34 @@ class Sensing:
             path, self.channels, self.channel_names, self.sampling_rate
         )
 
+    def of_machine(self, channels: Sequence[str]) -> Sensing:
+        """The same with the channels of a machine in place of ``EVERY_BEARING``.
+
+        Raises
+        ------
+        ConfigError    for a machine without bearing channels
+        """
+        if self.channels != (EVERY_BEARING,):
+            return self
+        bearings = [
+            name
+            for name in channels
+            if transverse_channel(name) in channels and not is_turning(name)
+        ]
+        if not bearings:
+            raise ConfigError(
+                f"sensing.channels = [{EVERY_BEARING}]: no gear of this machine moves on "
+                "bearings; take system.lateral=true"
+            )
+        return replace(self, channels=tuple(bearings))
+
+    def check_gears(self, gears: Collection[str]) -> None:
+        """Raise ConfigError for shaft sensors and nuisances of a gear that is none of ``gears``."""
+        check_choice("sensing.tacho.shaft", self.tacho.shaft, gears)
+        check_choice("sensing.encoder.shaft", self.encoder.shaft, gears)
+        for index, part in enumerate(self.nuisances):
+            check_choice(f"sensing.nuisances[{index}].gear", part.gear, gears)
+
     def check(self, duration: float) -> None:
         """Read the files of users; ConfigError where they do not fit."""
         if isinstance(self.path, MeasuredPath):
@@ -145,7 +183,8 @@ class Sensing:
                     f"sensing.sensors: {name!r}; give letters, digits and _, at most 32, "
                     f"not ending in {', '.join(map(repr, TURNING))}"
                 )
-        if turning := [name for name in self.channels if is_turning(name)]:
+        turning = [name for name in self.channels if channel_unit(name) != "m/s^2"]
+        if turning:
             raise ConfigError(
                 f"sensing.channels: {turning[0]} is no bearing; "
                 "a transfer path takes bearing channels"
@@ -183,7 +222,8 @@ class Sensing:
                 "a measured path tells no transverse motion; give 0"
             )
         for name in self.channels:
-            if self.path is None and transverse_channel(name) not in self.channels:
+            is_alone = transverse_channel(name) not in self.channels
+            if self.path is None and name != EVERY_BEARING and is_alone:
                 raise ConfigError(
                     f"sensing.sensor.transverse_sensitivity: sensing.channels has {name} "
                     "without the other axis; add it, or give 0"

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.sensing.tachometer import check_shaft
 from gensig.units import check_limits, unit
 
 Array = NDArray[np.float64]
@@ -22,7 +21,7 @@ WIDEST = 4.0  # standard deviations
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Encoder:
-    """A disc with lines on a gear's shaft.
+    """A disc with lines on the shaft of the gear that ``shaft`` names.
 
     ``eccentricity_error`` is the largest amplitude of the once-per-turn error and ``line_error``
     the standard deviation of the position of each line, both in rad. ``quantised`` reads the last
@@ -36,7 +35,6 @@ class Encoder:
     quantised: bool
 
     def __post_init__(self) -> None:
-        check_shaft("encoder", self.shaft)
         check_limits(self, "sensing.encoder.", lines_per_turn=(4, MOST_LINES))
         check_limits(
             self,

@@ -12,12 +12,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gensig.dynamics.pair import PairDynamics
 from gensig.errors import ConfigError
 from gensig.sensing.bearing_waviness import Bearing
+from gensig.sensing.linear_machine import LinearMachine
 from gensig.sensing.tones import (
     MOST_HARMONICS,
-    SENSE,
     TURN,
     Limits,
     Nuisance,
@@ -25,7 +24,6 @@ from gensig.sensing.tones import (
     fixed,
     logarithmic,
     make_tones,
-    shaft,
     turning,
     uniform,
 )
@@ -37,7 +35,8 @@ class Unbalance(Nuisance):
     """Residual unbalance that turns with the shaft, at a fixed angle from tooth 0 of its gear.
 
     The residual is a share, uniform in ``used_share``, of what the grade permits at
-    ``rated_speed`` of the pinion. ``rotor_mass`` is the mass of all that turns with the gear;
+    ``rated_speed`` of the shaft whose speed the configuration gives: the pinion's, a drive
+    line's motor or crank. ``rotor_mass`` is the mass of all that turns with the gear;
     None takes the gear's mass.
 
     Source: ISO 21940-11, 4.4: e w = G mm/s at the highest speed of service; the force is m e w^2.
@@ -60,19 +59,19 @@ class Unbalance(Nuisance):
         self,
         unit_rng: np.random.Generator,
         record_rng: np.random.Generator,
-        dynamics: PairDynamics,
+        machine: LinearMachine,
     ) -> Tones:
         """As ``Nuisance.draw``."""
         share, angle = uniform(unit_rng, self.used_share), TURN * unit_rng.random()
-        turned = shaft(dynamics, self.gear)
+        turned = machine.shaft(self.gear)
         eccentricity = (
-            share * 1e-3 * self.iso21940_grade / (self.rated_speed * turned.speed_ratio)
+            share * 1e-3 * self.iso21940_grade / (self.rated_speed * turned.set_ratio)
         )
         mass = self.rotor_mass
         if mass is None:
-            mass = getattr(dynamics, self.gear).mass
+            mass = turned.body.mass
         force = mass * eccentricity * turned.speed**2
-        rotating = np.exp(1j * angle) * force * turning(self.gear)
+        rotating = np.exp(1j * angle) * force * turning(turned.sense)
         return make_tones(self.gear, [1.0], [[1]], [rotating], "speed_squared")
 
 
@@ -109,12 +108,13 @@ class CouplingMisalignment(Nuisance):
         self,
         unit_rng: np.random.Generator,
         record_rng: np.random.Generator,
-        dynamics: PairDynamics,
+        machine: LinearMachine,
     ) -> Tones:
         """As ``Nuisance.draw``."""
-        radial = logarithmic(unit_rng, self.force_share) * dynamics.mesh_force
+        turned = machine.shaft(self.gear)
+        radial = logarithmic(unit_rng, self.force_share) * turned.mesh_force
         torque = uniform(unit_rng, self.torque_share)
-        torque *= shaft(dynamics, self.gear).torque
+        torque *= turned.torque
         along = fixed(TURN * unit_rng.random())
         twist = np.array([0.0, 0.0, 1.0])
         twisting = torque * np.exp(1j * TURN * unit_rng.random()) * twist
@@ -156,10 +156,11 @@ class Looseness(Nuisance):
         self,
         unit_rng: np.random.Generator,
         record_rng: np.random.Generator,
-        dynamics: PairDynamics,
+        machine: LinearMachine,
     ) -> Tones:
         """As ``Nuisance.draw``."""
-        level = logarithmic(unit_rng, self.force_share) * dynamics.mesh_force
+        mesh_force = machine.shaft(self.gear).mesh_force
+        level = logarithmic(unit_rng, self.force_share) * mesh_force
         half_share = uniform(unit_rng, self.half_share)
         along = fixed(TURN * unit_rng.random())
         halves = np.arange(1, 2 * self.n_orders + 1)
@@ -208,19 +209,22 @@ class NeighbourMesh(Nuisance):
         self,
         unit_rng: np.random.Generator,
         record_rng: np.random.Generator,
-        dynamics: PairDynamics,
+        machine: LinearMachine,
     ) -> Tones:
         """As ``Nuisance.draw``."""
+        turned = machine.shaft(self.gear)
         level = logarithmic(unit_rng, self.dynamic_share)
-        level *= shaft(dynamics, self.gear).torque
+        level *= turned.torque
         level /= self.base_radius
         sideband = uniform(unit_rng, self.sideband_share)
         phases = TURN * unit_rng.random((5, MOST_HARMONICS))
         mate_angle = TURN * record_rng.random()
         along = fixed(self.line_of_action)
-        # the next stage's force holds the wheel's shaft back, that of the stage before drives the
-        # pinion's
-        along[2] = -SENSE[self.gear] * self.base_radius
+        # the next stage's force holds the shaft of a driven gear back, that of the stage before
+        # drives the shaft of a driving one
+        along[2] = -self.base_radius
+        if turned.drives:
+            along[2] = self.base_radius
         offsets = np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)])
         weight = np.array([1.0, sideband, sideband, sideband, sideband])
         harmonic = np.arange(1, self.n_harmonics + 1)
@@ -258,7 +262,7 @@ def read_nuisances(values: Any) -> tuple[Nuisance, ...]:
 
 def draw_tones(
     nuisances: tuple[Nuisance, ...],
-    dynamics: PairDynamics,
+    machine: LinearMachine,
     units: Mapping[str, np.random.Generator],
     record_rng: np.random.Generator,
 ) -> list[Tones]:
@@ -271,6 +275,6 @@ def draw_tones(
     of_units = {level: rng.spawn(count) for level, rng in units.items()}
     of_record = record_rng.spawn(count)
     return [
-        part.draw(of_units[part.level][index], of_record[index], dynamics)
+        part.draw(of_units[part.level][index], of_record[index], machine)
         for index, part in enumerate(nuisances)
     ]

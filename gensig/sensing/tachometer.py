@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.errors import ConfigError
-from gensig.units import check_choice, check_limits, from_si, unit
+from gensig.units import check_limits, from_si, unit
 
 Array = NDArray[np.float64]
 
-SHAFTS = ("pinion", "wheel")
 MOST_PULSES = 1000  # a turn
 # standard deviations that fit into a pulse or a gap, so that no edge overtakes another
 JITTERS_IN_A_WIDTH = 8.0
@@ -21,10 +20,10 @@ JITTERS_IN_A_WIDTH = 8.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tachometer:
-    """Evenly spaced marks on a gear's shaft, each ``pulse_width_share`` of their spacing wide.
+    """Evenly spaced marks on a shaft, each ``pulse_width_share`` of their spacing wide.
 
-    ``jitter`` in rad is the standard deviation of the angle at which a pulse begins. It is drawn
-    anew for every pulse, which ends a width later.
+    ``shaft`` names a gear on it. ``jitter`` in rad is the standard deviation of the angle at
+    which a pulse begins. It is drawn anew for every pulse, which ends a width later.
     """
 
     shaft: str
@@ -33,7 +32,6 @@ class Tachometer:
     jitter: float = unit("deg")
 
     def __post_init__(self) -> None:
-        check_shaft("tacho", self.shaft)
         if not 1 <= self.pulses_per_turn <= MOST_PULSES:
             raise ConfigError(
                 f"sensing.tacho.pulses_per_turn = {self.pulses_per_turn} must lie in "
@@ -53,11 +51,6 @@ class Tachometer:
     def spacing(self) -> float:
         """Angle from the beginning of a pulse to that of the next, rad."""
         return 2.0 * math.pi / self.pulses_per_turn
-
-
-def check_shaft(group: str, shaft: str) -> None:
-    """Raise ConfigError for a shaft on which no sensor can sit."""
-    check_choice(f"sensing.{group}.shaft", shaft, SHAFTS)
 
 
 def draw_mark(rng: np.random.Generator) -> float:

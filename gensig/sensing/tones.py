@@ -10,15 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics.pair import PairDynamics
-from gensig.units import check_choice, check_limits, check_ranges
+from gensig.sensing.linear_machine import LinearMachine
+from gensig.units import check_limits, check_ranges
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-# From x to y is +1. The pinion turns the other way: its friction moment is -rho F_f for a force
-# +F_f along its x.
-SENSE = {"pinion": -1.0, "wheel": 1.0}
 TURN = 2.0 * math.pi
 Limits = dict[str, tuple[float, float]]
 MOST_HARMONICS = 50
@@ -49,7 +46,7 @@ class Tones:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Nuisance(ABC):
-    """One cause of vibration at one gear's shaft.
+    """One cause of vibration at the shaft of one gear of the machine, ``gear`` its name.
 
     Ranges are [low, high]; equal ends give one value. ``level`` is the unit for which the
     machine's part is drawn: the gearbox, or the specimen, a set of gears. ``limits`` and
@@ -62,7 +59,6 @@ class Nuisance(ABC):
     gear: str
 
     def __post_init__(self) -> None:
-        check_choice("gear", self.gear, SENSE)
         check_limits(self, "", **self.limits)
         check_ranges(self, "", **self.ranges)
 
@@ -71,34 +67,9 @@ class Nuisance(ABC):
         self,
         unit_rng: np.random.Generator,
         record_rng: np.random.Generator,
-        dynamics: PairDynamics,
+        machine: LinearMachine,
     ) -> Tones:
         """Forces of one unit, with the angles that differ between its records."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Shaft:
-    """Shaft of one gear at the set point.
-
-    Speed in rad/s, its share of the pinion's speed, and torque in N m.
-    """
-
-    speed: float
-    speed_ratio: float
-    torque: float
-
-
-def shaft(dynamics: PairDynamics, gear: str) -> Shaft:
-    """Shaft of one gear at the set point."""
-    ratio = 1.0
-    if gear != "pinion":
-        ratio = 1.0 / dynamics.table.pair.ratio
-    operating = dynamics.operating
-    return Shaft(
-        speed=ratio * operating.speed,
-        speed_ratio=ratio,
-        torque=operating.torque / ratio,
-    )
 
 
 def make_tones(
@@ -114,12 +85,12 @@ def make_tones(
     )
 
 
-def turning(gear: str) -> Complex:
+def turning(sense: float) -> Complex:
     """Unit force that turns with the shaft.
 
-    It acts along x first, a quarter of a turn later along y by the gear's sense.
+    It acts along x first, a quarter of a turn later along y, by the sense of its gear.
     """
-    return np.array([1.0, -1j * SENSE[gear], 0.0])
+    return np.array([1.0, -1j * sense, 0.0])
 
 
 def fixed(angle: float) -> Array:

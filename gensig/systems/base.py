@@ -26,6 +26,7 @@ from gensig.mesh.sliced.sliced_table import SlicedTable
 from gensig.operation.setpoint import Operating
 from gensig.sensing.chain import Sensing
 from gensig.sensing.encoder import Disc
+from gensig.sensing.linear_machine import LinearMachine
 from gensig.sensing.manufacturing import Gearbox, Quality, Specimen
 from gensig.systems.run import CleanRecord, Run, Start
 from gensig.systems.stiffness_curves import StiffnessCurves
@@ -148,6 +149,31 @@ class Machine(ABC):
     @abstractmethod
     def draw_discs(self, rng: np.random.Generator) -> tuple[Disc, ...]:
         """Toothed wheels of one gearbox with their errors, drawn at random."""
+
+    @abstractmethod
+    def gear_angle(self, gear: str, start: Start, shaft_angle: Array) -> Array:
+        """Angle of a gear in its sense of rotation, (sample,) rad.
+
+        Of the gears of the followed mesh it is 0 where tooth 0 enters contact, of another gear
+        where it stands when the angle of the line is 0. It follows the pinion by the ratio of
+        their speeds: lag under load and vibration of its own are left out.
+
+        Parameters
+        ----------
+        shaft_angle : (sample,) rad    of the pinion since the record's start, as ``CleanRecord``
+            has it
+        """
+
+    @abstractmethod
+    def line_angle(self, start: Start) -> float | None:
+        """Angle of the shaft whose speed the configuration gives, rad.
+
+        It decides how all meshes stand. None where the teeth of the one mesh say that.
+        """
+
+    @abstractmethod
+    def linear_machine(self, run: Run[Self]) -> LinearMachine:
+        """The sound machine of a run, in its gearbox, as nuisances meet it."""
 
     @abstractmethod
     def check(self) -> None:

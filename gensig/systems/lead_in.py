@@ -31,7 +31,7 @@ def simulate_with_lead_in(
 def earlier(run: Run[Machine]) -> Run[Machine]:
     """The same motion from ``sensing.n_lead`` samples before its first one.
 
-    Teeth and phase are turned back.
+    Teeth and phase are turned back, and with them the shaft that turns a drive line.
     """
     n_lead, rate = run.system.sensing.n_lead, run.system.sensing.sampling_rate
     if n_lead == 0:
@@ -43,6 +43,9 @@ def earlier(run: Run[Machine]) -> Run[Machine]:
     teeth = math.floor(pitches)
     n_samples = round(operating.duration * rate) + n_lead
     longer = operating.earlier(lead, n_samples / rate)
+    line_angle = run.system.line_angle(start)
+    if line_angle is not None:
+        line_angle += turned / run.system.ratio
     return replace(
         run,
         system=replace(run.system, operating=longer),
@@ -50,6 +53,7 @@ def earlier(run: Run[Machine]) -> Run[Machine]:
             tooth_pinion=(start.tooth_pinion + teeth) % pair.pinion.n_teeth,
             tooth_wheel=(start.tooth_wheel + teeth) % pair.wheel.n_teeth,
             phase=pitches - teeth,
+            line_angle=line_angle,
         ),
     )
 

@@ -15,14 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics.decimation import usable_band
-from gensig.dynamics.pair import PairDynamics
-from gensig.dynamics.response import accelerations
 from gensig.operation.setpoint import Nominal
+from gensig.sensing.linear_machine import LinearMachine
 from gensig.sensing.nuisance import draw_tones
-from gensig.sensing.tones import SENSE, TURN, Tones, shaft
-from gensig.systems.pair_machine import PairRun, pair_dynamics
-from gensig.systems.run import CleanRecord, Start
-from gensig.systems.shaft_sensors import gear_angle
+from gensig.sensing.tones import TURN, Tones
+from gensig.systems.base import Machine
+from gensig.systems.run import CleanRecord, Run, Start
+from gensig.units import SPEED
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -33,7 +32,7 @@ BLOCK = 2048  # samples over which amplitudes go straight: 40 ms at 51.2 kHz
 
 
 def with_nuisances(
-    run: PairRun,
+    run: Run[Machine],
     record: CleanRecord,
     units: Mapping[str, np.random.Generator],
     record_rng: np.random.Generator,
@@ -48,27 +47,34 @@ def with_nuisances(
     nuisances = run.system.sensing.nuisances
     if not nuisances:
         return record
-    dynamics = pair_dynamics(replace(run, faults=(), specimen=None))
-    tones = draw_tones(nuisances, dynamics, units, record_rng)
-    gain = 1.0 if run.gearbox is None else run.gearbox.gain[:, None]
-    heard = nuisance_acceleration(run, dynamics, tones, record.shaft_angle)
+    machine = run.system.linear_machine(run)
+    tones = draw_tones(nuisances, machine, units, record_rng)
+    gain = np.ones((len(record.acceleration), 1))
+    if run.gearbox is not None:
+        # a toothed wheel counts time: it has no gain
+        counted = [name.endswith(SPEED) for name in run.system.sensing.channels]
+        gain = np.where(counted, 1.0, run.gearbox.gain)[:, None]
+    heard = nuisance_acceleration(run, machine, tones, record.shaft_angle)
     return replace(record, acceleration=record.acceleration + gain * heard)
 
 
 def nuisance_acceleration(
-    run: PairRun, dynamics: PairDynamics, tones: Sequence[Tones], shaft_angle: Array
+    run: Run[Machine],
+    machine: LinearMachine,
+    tones: Sequence[Tones],
+    shaft_angle: Array,
 ) -> Array:
     """Accelerations of a run's channels under some tones, ``n_lead`` samples before the record too.
 
     Parameters
     ----------
-    dynamics : the machine that answers
+    machine : the one that answers
     shaft_angle : (sample,) rad    of the pinion from its nominal angle at the first sample on,
         as a record has it
 
     Returns
     -------
-    (channel, n_lead + sample) m/s2, or rad/s2 for a rotation
+    (channel, n_lead + sample) m/s2, rad/s2 for a rotation, rad/s for a toothed wheel
 
     Every tone has the amplitude and phase lag of steady turning at the nominal speed of the
     instant (assumed; taken once a block, straight in between) and the phase of the shaft's actual
@@ -83,17 +89,19 @@ def nuisance_acceleration(
     before = operating.nominal(np.arange(-n_lead, 0) / rate).angle + shaft_angle[0]
     turned = np.concatenate([before, shaft_angle])
     begin_at = run.start or Start()
+    gears = list(dict.fromkeys(part.gear for part in tones))
     first = {
-        gear: float(gear_angle(run.system, gear, begin_at, np.zeros(1))[0])
-        for gear in SENSE
+        gear: float(run.system.gear_angle(gear, begin_at, np.zeros(1))[0])
+        for gear in gears
     }
-    channels = [dynamics.dofs.index(name) for name in sensing.channels]
+    ratio = {gear: machine.shaft(gear).speed_ratio for gear in gears}
+    channels = sensing.channels
 
     n_samples = len(turned)
     edges = np.arange(0, n_samples + BLOCK, BLOCK)
     nominal = operating.nominal((edges - n_lead) / rate)
     answers = [
-        _answers(dynamics, part, nominal, TURN * usable_band(rate)[1])[:, :, channels]
+        _answers(run, machine, part, nominal, TURN * usable_band(rate)[1])
         for part in tones
     ]
     factors = np.concatenate(
@@ -102,7 +110,7 @@ def nuisance_acceleration(
     fastest = max(
         float(
             np.max(
-                np.abs(_frequencies(dynamics, part, nominal.speed)) * answer.any(axis=2)
+                np.abs(_frequencies(machine, part, nominal.speed)) * answer.any(axis=2)
             )
         )
         for part, answer in zip(tones, answers, strict=True)
@@ -114,9 +122,8 @@ def nuisance_acceleration(
     ends = np.searchsorted(made, edges)
     for block, (start, stop) in enumerate(pairwise(ends.tolist())):
         samples = made[start:stop]
-        ratio = {gear: shaft(dynamics, gear).speed_ratio for gear in SENSE}
         waves = _waves(
-            tones, {gear: first[gear] + ratio[gear] * turned[samples] for gear in SENSE}
+            tones, {gear: first[gear] + ratio[gear] * turned[samples] for gear in gears}
         )
         # einsum, not @: its bits depend on no thread count
         coarse[:, start:stop] = np.einsum("tc,ts->cs", factors[block], waves)
@@ -130,34 +137,39 @@ def nuisance_acceleration(
     return np.asarray(CubicSpline(made, coarse, axis=1)(np.arange(n_samples)))
 
 
-def _frequencies(dynamics: PairDynamics, tones: Tones, speed: Array) -> Array:
+def _frequencies(machine: LinearMachine, tones: Tones, speed: Array) -> Array:
     """Circular frequencies at speeds of the pinion in rad/s, (speed, tone) rad/s.
 
     Below 0 against the shaft's sense.
     """
     return np.asarray(
-        speed[:, None] * shaft(dynamics, tones.gear).speed_ratio * tones.order
+        speed[:, None] * machine.shaft(tones.gear).speed_ratio * tones.order
     )
 
 
 def _answers(
-    dynamics: PairDynamics, tones: Tones, nominal: Nominal, highest: float
+    run: Run[Machine],
+    machine: LinearMachine,
+    tones: Tones,
+    nominal: Nominal,
+    highest: float,
 ) -> Complex:
-    """Accelerations (time, tone, dof) of steady turning; 0 for tones above ``highest`` in rad/s."""
-    frequency = _frequencies(dynamics, tones, nominal.speed)
+    """Answers of the channels to steady turning, (time, tone, channel).
+
+    0 for tones above ``highest`` in rad/s.
+    """
+    frequency = _frequencies(machine, tones, nominal.speed)
+    share = nominal.speed / run.system.operating.speed
     growth = {
-        "speed_squared": (nominal.speed / dynamics.operating.speed) ** 2,
-        "torque": nominal.torque_factor,
+        "speed_squared": share**2,
+        "torque": nominal.torque_factor * share**run.system.load_exponent,
         "nothing": np.ones(len(frequency)),
     }
-    force = np.zeros((*frequency.shape, len(dynamics.dofs)), dtype=np.complex128)
-    dofs = [
-        dynamics.dofs.index(f"{tones.gear}_{axis}") for axis in ("x", "y", "rotation")
-    ]
-    force[:, :, dofs] = growth[tones.follows][:, None, None] * tones.force
-    answer = accelerations(
-        dynamics, frequency.ravel(), force.reshape(-1, force.shape[2])
-    ).reshape(force.shape)
+    force = growth[tones.follows][:, None, None] * tones.force
+    channels = run.system.sensing.channels
+    answer = machine.accelerations(
+        tones.gear, frequency.ravel(), force.reshape(-1, 3), channels
+    ).reshape(*frequency.shape, len(channels))
     return answer * (np.abs(frequency) <= highest)[:, :, None]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
@@ -31,7 +31,8 @@ from gensig.systems.integration_checks import (
     is_too_coarse,
     not_finite,
 )
-from gensig.systems.run import CleanRecord, Run, Start
+from gensig.systems.linear_pair import LinearPair
+from gensig.systems.run import CleanRecord, Run, Start, angle_from_tooth_0
 from gensig.systems.supports import in_gearbox
 
 Array = NDArray[np.float64]
@@ -129,6 +130,20 @@ class GearPairMachine(Machine):
         """None: a pair has no toothed wheels."""
         return ()
 
+    def gear_angle(self, gear: str, start: Start, shaft_angle: Array) -> Array:
+        """As ``Machine.gear_angle``."""
+        return angle_from_tooth_0(self.pair, gear, start, shaft_angle)
+
+    def line_angle(self, start: Start) -> None:
+        """None: the teeth say how the one mesh stands."""
+        return
+
+    def linear_machine(self, run: Run[Self]) -> LinearPair:
+        """The sound pair in the gearbox of a run."""
+        return LinearPair(
+            dynamics=pair_dynamics(replace(run, faults=(), specimen=None))
+        )
+
     def check(self) -> None:
         """Raise for errors of every record: drive, fits out of range, channels, step length."""
         self.require_drive()
@@ -139,6 +154,7 @@ class GearPairMachine(Machine):
         check_memory(operating.duration, rate, n_channels, self.solver)
         nominal = pair_dynamics(Run(system=self, faults=()))
         check_channels(sensing.channels, self.channels)
+        sensing.check_gears(self.gears)
         sensing.check(operating.duration)
         check_machine(nominal, self.solver, rate)
 

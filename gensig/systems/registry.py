@@ -232,7 +232,8 @@ def read_system(config: Configuration) -> GearPairMachine:
     if kind not in SYSTEMS:
         allowed = ", ".join((*SYSTEMS, LINE))
         raise ConfigError(f"system.kind = {kind!r}; allowed: {allowed}")
-    return SYSTEMS[kind](config)
+    machine = SYSTEMS[kind](config)
+    return replace(machine, sensing=machine.sensing.of_machine(machine.channels))
 
 
 def _refuse_line(config: Configuration) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from gensig.dynamics.mesh_state import MeshState
 from gensig.faults.base import Fault
-from gensig.geometry.contact import SIDES
+from gensig.geometry.contact import SIDES, GearPair
 from gensig.sensing.encoder import Disc
 from gensig.sensing.manufacturing import Gearbox, Specimen
 
@@ -28,16 +29,34 @@ CHECKS = ("error", "levels", "unresolved", "none", "energy")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
-    """Start of a record: the teeth that enter contact at roll 0, and the roll in base pitches."""
+    """Start of a record: the teeth that enter contact at roll 0, and the roll in base pitches.
+
+    ``line_angle`` rad is the angle of the shaft that turns a drive line, from which its other
+    meshes follow. None: it follows from the teeth, as in every record; a lead-in sets it, so that
+    all meshes begin as much earlier.
+    """
 
     tooth_pinion: int = 0
     tooth_wheel: int = 0
     phase: float = 0.0
+    line_angle: float | None = None
 
     @property
     def teeth(self) -> dict[str, int]:
         """The tooth of each gear, by its side of the pair."""
         return dict(zip(SIDES, (self.tooth_pinion, self.tooth_wheel), strict=True))
+
+
+def angle_from_tooth_0(
+    pair: GearPair, side: str, start: Start, shaft_angle: Array
+) -> Array:
+    """Angle of a gear of a pair, 0 where its tooth 0 enters contact, (sample,) rad.
+
+    ``shaft_angle`` (sample,) rad is that of the pinion since the start.
+    """
+    turned = shaft_angle * pair.pinion.n_teeth
+    turned = turned + 2.0 * math.pi * (start.teeth[side] + start.phase)
+    return turned / pair.gears[side].n_teeth
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

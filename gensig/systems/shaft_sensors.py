@@ -1,4 +1,4 @@
-"""Signals of sensors on the gears' shafts; angles are counted from tooth 0 of each gear."""
+"""Signals of sensors on the gears' shafts."""
 
 from __future__ import annotations
 
@@ -20,21 +20,6 @@ SWITCHES = {
     "store_encoder": "encoder_angle",
     "store_shaft_angle": "shaft_angle",
 }
-
-
-def gear_angle(system: Machine, shaft: str, start: Start, shaft_angle: Array) -> Array:
-    """Angle of a gear in its sense of rotation, 0 where its tooth 0 enters contact, (sample,) rad.
-
-    The wheel's is that of the pinion over the ratio: its lag under load and its vibration are left
-    out.
-
-    Parameters
-    ----------
-    shaft_angle : (sample,) rad    of the pinion since the record's start, as ``CleanRecord`` has it
-    """
-    pair, first = system.pair, start.teeth[shaft]
-    turned = shaft_angle * pair.pinion.n_teeth + 2.0 * math.pi * (first + start.phase)
-    return turned / pair.gears[shaft].n_teeth
 
 
 def shaft_signals(
@@ -61,11 +46,11 @@ def shaft_signals(
     mark = draw_mark(gearbox_rng)
     signals = {"shaft_angle": record.shaft_angle}
     if "tacho" in names:
-        angle = gear_angle(system, sensing.tacho.shaft, start, record.shaft_angle)
+        angle = system.gear_angle(sensing.tacho.shaft, start, record.shaft_angle)
         rate = sensing.sampling_rate
         signals["tacho"] = pulse_train(sensing.tacho, mark, angle, rate, record_rng)
     if "encoder_angle" in names:
-        angle = gear_angle(system, sensing.encoder.shaft, start, record.shaft_angle)
+        angle = system.gear_angle(sensing.encoder.shaft, start, record.shaft_angle)
         disc = draw_disc(gearbox_rng, sensing.encoder)
         # whole turns before the record are not counted
         n_turns = math.floor((angle[0] - disc.index) / (2.0 * math.pi))

@@ -10,7 +10,8 @@ from scipy.signal import lsim
 from gensig.dynamics.response import accelerations
 from gensig.operation.setpoint import Profile
 from gensig.sensing.nuisance import draw_tones, read_nuisances
-from gensig.sensing.tones import SENSE, Tones
+from gensig.sensing.tones import Tones
+from gensig.systems.linear_pair import SENSE, LinearPair
 from gensig.systems.nuisances import nuisance_acceleration
 from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.run import Run, Start
@@ -46,7 +47,7 @@ def tones_of(run, part):
     units = {"gearbox": rng[0], "specimen": rng[1]}
     return draw_tones(
         read_nuisances([part]),
-        pair_dynamics(run),
+        LinearPair(dynamics=pair_dynamics(run)),
         units,
         rng[2],
     )
@@ -56,7 +57,8 @@ def response(run, tones, angle=None):
     """Accelerations of the channels; by default at the nominal angle of the run."""
     if angle is None:
         angle = run.system.operating.nominal(TIMES).angle
-    return nuisance_acceleration(run, pair_dynamics(run), tones, angle)
+    machine = LinearPair(dynamics=pair_dynamics(run))
+    return nuisance_acceleration(run, machine, tones, angle)
 
 
 def assert_same(signal, expected):

@@ -12,6 +12,7 @@ from sensing_groups import MACHINE
 from gensig.errors import ConfigError
 from gensig.sensing.bearing_waviness import bearing_orders
 from gensig.sensing.nuisance import KINDS, draw_tones, read_nuisances
+from gensig.systems.linear_pair import LinearPair
 
 FIXED = {
     "unbalance": {
@@ -66,7 +67,7 @@ def draw(dynamics):
         nuisances = read_nuisances(list(parts))
         return draw_tones(
             nuisances,
-            dynamics,
+            LinearPair(dynamics=dynamics),
             units,
             default_rng([2, record]),
         )

@@ -44,7 +44,6 @@ from gensig.dynamics.backends.nystroem._line_layout import (
     wide_rows,
 )
 from gensig.dynamics.backends.nystroem._motion import (
-    acceleration,
     conclude,
     go_to_middle,
     predict,
@@ -121,14 +120,16 @@ def integrate(
         for m in range(n_meshes):
             push_middle(group, m, step, machine, work, wide)
         for d in range(n_dof):
-            on_it = get_row(machine, block(lines.ON, n_dof) + d)
-            predict(group, d, on_it, step, n_dof, machine)
+            middle = block(rows.MIDDLE_Q, n_dof), block(rows.MIDDLE_V, n_dof)
+            a = acceleration(group, d, middle[0], middle[1], machine)
+            predict(d, a, step, n_dof, machine)
         clear(n_dof, machine)
         for m in range(n_meshes):
             push_end(group, m, step, machine, work, wide)
         for d in range(n_dof):
-            on_it = get_row(machine, block(lines.ON, n_dof) + d)
-            conclude(group, d, on_it, step, n_dof, machine)
+            end = block(rows.END_Q, n_dof), block(rows.END_V, n_dof)
+            a = acceleration(group, d, end[0], end[1], machine)
+            conclude(d, a, step, n_dof, machine)
         for m in range(n_meshes):
             end_mesh(group, m, step, machine, work)
         gain = get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
@@ -283,12 +284,27 @@ def start(group, fresh, by_tooth, work, wide):
     flags = get_row(machine, rows.FRESH)
     q, v = block(rows.Q, n_dof), block(rows.V, n_dof)
     for d in range(n_dof):
-        on_it = get_row(machine, block(lines.ON, n_dof) + d)
-        forces = block(rows.FORCES, n_dof)
-        a = acceleration(group, d, on_it, q, v, forces, machine)
+        a = acceleration(group, d, q, v, machine)
         choose(flags, block(rows.NOW, n_dof) + d, a, machine)
         choose(flags, block(rows.HALFWAY, n_dof) + d, a, machine)
         choose(flags, block(rows.BEFORE, n_dof) + d, a, machine)
+
+
+@inlined
+def acceleration(group, d, q, v, machine):
+    """Acceleration of a degree of freedom under the forces of all meshes, with states in rows."""
+    n_dof = len(group.force) // width(machine)
+    spring = get_row(group.stiffness, d) * get_row(machine, q + d)
+    spring = fused(get_row(group.damping, d), get_row(machine, v + d), spring)
+    for k in range(group.sprung_first[d], group.sprung_first[d + 1]):
+        moved = get_row(machine, q + group.sprung_column[k])
+        spring = fused(get_row(group.sprung, k), moved, spring)
+    for k in range(group.damped_first[d], group.damped_first[d + 1]):
+        rate = get_row(machine, v + group.damped_column[k])
+        spring = fused(get_row(group.damped, k), rate, spring)
+    on_it = get_row(machine, block(lines.ON, n_dof) + d)
+    pull = get_row(machine, block(rows.FORCES, n_dof) + d) + (on_it - spring)
+    return pull * get_row(group.inverse_mass, d)
 
 
 @inlined

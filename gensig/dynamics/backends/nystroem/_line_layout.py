@@ -44,8 +44,10 @@ class LineGroup(NamedTuple):
     a with the reference, in float64 like ``exact_rotation`` (dof, lane). ``force`` (dof, lane) is
     what holds neither rest nor mean mesh forces; ``profile`` (cell, row, lane) holds the nominal
     motion of the reference and the forces that come with it. ``reference`` is the degree of
-    freedom whose rotation is 1, ``angles`` those whose angles are given out. Other fields are
-    those of ``Group``.
+    freedom whose rotation is 1, ``angles`` those whose angles are given out. ``stiffness`` and
+    ``damping`` are diagonals; their other entries (entry, lane) are ``sprung`` and ``damped``, row
+    after row as ``sprung_first`` (dof + 1,) and ``sprung_column`` say, and alike. Other fields
+    are those of ``Group``.
     """
 
     n_meshes: int
@@ -66,10 +68,12 @@ class LineGroup(NamedTuple):
     inverse_mass: Any
     stiffness: Any
     damping: Any
-    other_first: Any
-    other_column: Any
-    other_stiffness: Any
-    other_damping: Any
+    sprung_first: Any
+    sprung_column: Any
+    sprung: Any
+    damped_first: Any
+    damped_column: Any
+    damped: Any
     force: Any
     rest: Any
     rotation: Any

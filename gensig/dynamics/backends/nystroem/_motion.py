@@ -54,28 +54,28 @@ def go_to_middle(step, n_dof, n_rows, work):
 def go_to_end(group, law, torque, step, n_dof, work):
     """Set the accelerations in the middle and the predicted state at the end of the step."""
     on_x, on_y, on_p, on_w = _on_gears(group, law, torque)
-    predict(group, P_X, on_x, step, MOST_DOFS, work)
-    predict(group, P_Y, on_y, step, MOST_DOFS, work)
-    predict(group, P_TURN, on_p, step, MOST_DOFS, work)
-    predict(group, W_X, 0.0 - on_x, step, MOST_DOFS, work)
-    predict(group, W_Y, 0.0 - on_y, step, MOST_DOFS, work)
-    predict(group, W_TURN, on_w, step, MOST_DOFS, work)
+    _predict(group, P_X, on_x, step, work)
+    _predict(group, P_Y, on_y, step, work)
+    _predict(group, P_TURN, on_p, step, work)
+    _predict(group, W_X, 0.0 - on_x, step, work)
+    _predict(group, W_Y, 0.0 - on_y, step, work)
+    _predict(group, W_TURN, on_w, step, work)
     for d in range(N_IN_PLANE, n_dof):
-        predict(group, d, spread(work, 0.0), step, MOST_DOFS, work)
+        _predict(group, d, spread(work, 0.0), step, work)
 
 
 @inlined
 def finish(group, law, torque, step, n_dof, work):
     """Set accelerations and state at the end of the step, and the mean accelerations."""
     on_x, on_y, on_p, on_w = _on_gears(group, law, torque)
-    conclude(group, P_X, on_x, step, MOST_DOFS, work)
-    conclude(group, P_Y, on_y, step, MOST_DOFS, work)
-    conclude(group, P_TURN, on_p, step, MOST_DOFS, work)
-    conclude(group, W_X, 0.0 - on_x, step, MOST_DOFS, work)
-    conclude(group, W_Y, 0.0 - on_y, step, MOST_DOFS, work)
-    conclude(group, W_TURN, on_w, step, MOST_DOFS, work)
+    _conclude(group, P_X, on_x, step, work)
+    _conclude(group, P_Y, on_y, step, work)
+    _conclude(group, P_TURN, on_p, step, work)
+    _conclude(group, W_X, 0.0 - on_x, step, work)
+    _conclude(group, W_Y, 0.0 - on_y, step, work)
+    _conclude(group, W_TURN, on_w, step, work)
     for d in range(N_IN_PLANE, n_dof):
-        conclude(group, d, spread(work, 0.0), step, MOST_DOFS, work)
+        _conclude(group, d, spread(work, 0.0), step, work)
 
 
 @inlined
@@ -105,11 +105,22 @@ def acceleration(group, d, on_it, q, v, forces, work):
 
 
 @inlined
-def predict(group, d, on_it, step, n_rows, work):
-    """Acceleration in the middle and predicted state at the end, of one degree of freedom."""
-    middle_q, middle_v = block(rows.MIDDLE_Q, n_rows), block(rows.MIDDLE_V, n_rows)
-    forces = block(rows.FORCES, n_rows)
-    m = acceleration(group, d, on_it, middle_q, middle_v, forces, work)
+def _predict(group, d, on_it, step, work):
+    q, v, forces = block(rows.MIDDLE_Q), block(rows.MIDDLE_V), block(rows.FORCES)
+    m = acceleration(group, d, on_it, q, v, forces, work)
+    predict(d, m, step, MOST_DOFS, work)
+
+
+@inlined
+def _conclude(group, d, on_it, step, work):
+    q, v, forces = block(rows.END_Q), block(rows.END_V), block(rows.FORCES)
+    b = acceleration(group, d, on_it, q, v, forces, work)
+    conclude(d, b, step, MOST_DOFS, work)
+
+
+@inlined
+def predict(d, m, step, n_rows, work):
+    """Keep the acceleration in the middle, and predict the end, of one degree of freedom."""
     halfway = block(rows.HALFWAY, n_rows) + d
     a, last_m = get_row(work, block(rows.NOW, n_rows) + d), get_row(work, halfway)
     set_row(work, halfway, m)
@@ -123,10 +134,9 @@ def predict(group, d, on_it, step, n_rows, work):
 
 
 @inlined
-def conclude(group, d, on_it, step, n_rows, work):
-    """Acceleration, state at the end, and mean acceleration of one degree of freedom."""
-    end_q, end_v = block(rows.END_Q, n_rows), block(rows.END_V, n_rows)
-    b = acceleration(group, d, on_it, end_q, end_v, block(rows.FORCES, n_rows), work)
+def conclude(d, b, step, n_rows, work):
+    """Keep the acceleration at the end, and set state and mean acceleration, of one degree."""
+    end_q = block(rows.END_Q, n_rows)
     now, v = block(rows.NOW, n_rows) + d, block(rows.V, n_rows) + d
     a, m = get_row(work, now), get_row(work, block(rows.HALFWAY, n_rows) + d)
     mean = SIXTH * fused(4.0, m, a + b)

@@ -33,6 +33,7 @@ from gensig.dynamics.lanes import pack
 from gensig.dynamics.pair import PairDynamics
 from gensig.errors import SimulationError
 
+OTHER_BACKEND = "take solver.backend=runge_kutta"
 # beyond it a pair may carry outside of the path that the core follows
 MOST_CONTACT_RATIO = 2.5
 
@@ -111,21 +112,20 @@ class Nystroem(Backend):
 
 def refuse(machine: PairDynamics) -> None:
     """Raise SimulationError for a machine that the method does not cover."""
-    other = "take solver.backend=runge_kutta"
     if machine.is_helical:
         raise SimulationError(
             "solver.backend = nystroem takes spur gears; for gear.helix_angle_deg other than 0 "
-            f"{other}"
+            f"{OTHER_BACKEND}"
         )
     law = machine.table.options.law
     if law != "one_sided":
         raise SimulationError(
-            f"mesh.law = {law} is not covered by solver.backend = nystroem; {other}"
+            f"mesh.law = {law} is not covered by solver.backend = nystroem; {OTHER_BACKEND}"
         )
     pair = machine.table.pair
     contact_ratio = pair.path_of_contact / pair.base_pitch
     if contact_ratio > MOST_CONTACT_RATIO:
         raise SimulationError(
             f"solver.backend = nystroem follows {FOLLOWED} pairs of teeth, too few for a contact "
-            f"ratio of {contact_ratio:.3g} (at most {MOST_CONTACT_RATIO}); {other}"
+            f"ratio of {contact_ratio:.3g} (at most {MOST_CONTACT_RATIO}); {OTHER_BACKEND}"
         )

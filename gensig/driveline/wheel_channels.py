@@ -1,0 +1,49 @@
+"""Speeds that toothed wheels on a line measure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.driveline.engine_line import EngineLine
+from gensig.driveline.line_records import LineSignals
+from gensig.driveline.running import RunningLine
+from gensig.driveline.time.newmark import LineMotion
+from gensig.sensing.encoder import Disc
+from gensig.sensing.toothed_wheel import ToothedWheel, instantaneous_speed
+from gensig.units import SPEED
+
+Array = NDArray[np.float64]
+
+
+def wheel_of(engine: EngineLine, name: str) -> tuple[int, ToothedWheel]:
+    """Number of a toothed wheel among those of the line, and the wheel, by its channel."""
+    wanted = name.removesuffix(SPEED)
+    return list(engine.wheels).index(wanted), engine.wheels[wanted]
+
+
+def wheel_speed(
+    discs: Sequence[Disc],
+    line: RunningLine,
+    motion: LineMotion | LineSignals,
+    name: str,
+    sampling_rate: float,
+) -> Array:
+    """Deviation from the nominal speed that a toothed wheel measures, (sample,) rad/s.
+
+    Parameters
+    ----------
+    discs : the toothed wheels with their errors; perfect ones if there is none
+    name : of the channel
+    """
+    number, wheel = wheel_of(line.machine, name)
+    disc = Disc(index=0.0, line_angles=wheel.spacing * np.arange(float(wheel.n_teeth)))
+    if discs:
+        disc = discs[number]
+    ratio = line.machine.ratios[wheel.node]
+    deviation = motion.signals["angle", line.dof(wheel.node)]
+    angle = ratio * (line.turned + motion.nominal_angle) + deviation
+    speed = instantaneous_speed(wheel, disc, angle, sampling_rate)
+    return np.asarray(speed - ratio * motion.nominal_speed)
