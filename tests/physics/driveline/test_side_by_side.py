@@ -1,0 +1,213 @@
+"""Lines in the two-evaluation core: a pair as a line, two stages, and what they agree with."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from fault_cases import one
+
+from gensig.driveline.reading import read_line_machine
+from gensig.driveline.side_by_side import LineDynamics, integrate_lines
+from gensig.driveline.time.course import ShaftTorque, constant_speed
+from gensig.driveline.time.geared_line import GearedLine
+from gensig.driveline.time.line_mesh import pair_mesh
+from gensig.dynamics.backends.base import Integration
+from gensig.dynamics.decimation import in_band_error
+from gensig.dynamics.integrator import Solver, integrate
+from gensig.dynamics.pair import PINION_ROTATION, WHEEL_ROTATION
+from gensig.errors import SimulationError
+from gensig.faults.broken import MissingTooth
+from gensig.plan.request import read_request
+from gensig.systems.base import simulate_together
+from gensig.systems.run import CleanRecord, Run, Start
+
+RATE = 51200.0
+CHANNELS = ("pinion_x", "pinion_y", "wheel_x", "wheel_y", "wheel_rotation")
+QUICK = {
+    "operating.drive_frequency_hz": 20,
+    "gear.pinion.support.damping_x_ns_per_m": 100,
+    "gear.wheel.support.damping_x_ns_per_m": 500,
+}
+BOUNCING = {"operating.torque_nm": 2}
+MISSING = (MissingTooth(gear="pinion", tooth=3),)
+TWO_STAGE = (
+    "experiment=two_stage",
+    "solver.backend=nystroem",
+    "solver.oversampling=5",
+    "sensing.sampling_rate_hz=51200",
+    "operating.duration_s=0.1",
+    "operating.drive_frequency_hz=5",
+)
+
+
+def as_line(pair):
+    """A gear pair without rotors as a line of one mesh."""
+    system, damping = pair.system(), pair.mesh_damping / pair.mesh_force
+    teeth = pair.start_tooth_pinion, pair.start_tooth_wheel
+    mesh = pair_mesh(
+        "pair",
+        pair.table,
+        direction=pair.approach_direction(),
+        roll_dof=PINION_ROTATION,
+        damping=damping,
+        errors=(pair.pinion_error, pair.wheel_error),
+        start_teeth=teeth,
+        start_phase=pair.start_phase,
+    )
+    line = GearedLine(
+        names=system.names,
+        mass=np.diag(system.mass),
+        damping=system.damping,
+        stiffness=system.stiffness,
+        rotation=system.rotation,
+        meshes=(mesh,),
+    )
+    torque = pair.operating.torque
+    driven = np.array([-torque * pair.table.pair.ratio])
+    running = SimpleNamespace(
+        line=line,
+        course=constant_speed(pair.operating.speed),
+        torques=(
+            ShaftTorque(dof=PINION_ROTATION, table=np.array([torque])),
+            ShaftTorque(dof=WHEEL_ROTATION, table=driven),
+        ),
+        mesh_force=np.array([pair.mesh_force]),
+    )
+    return LineDynamics(
+        running=running,
+        pairs=(pair,),
+        touched=np.arange(6)[None],
+        senses=np.array([-1.0]),
+        drive=PINION_ROTATION,
+        angles=(PINION_ROTATION,),
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "faults"),
+    [({}, (one("crack", tooth=4),)), ({}, MISSING), (BOUNCING, MISSING)],
+    ids=["crack", "missing", "bouncing"],
+)
+def test_a_pair_as_a_line_moves_as_the_pair(machine, dynamics_of, changes, faults):
+    """Other loops, the same law: friction, back flanks, kinks and the start of teeth agree."""
+    errors = np.random.default_rng(3).normal(0.0, 2e-6, (2, 84))
+    teeth = {"pinion_error": errors[0, :23], "wheel_error": errors[1]}
+    pair = dynamics_of(machine({**QUICK, **changes}), faults, **teeth)
+    solver = Solver(oversampling=5, precision="float64", backend="nystroem")
+    record = {"sampling_rate": RATE, "duration": 0.05, "channels": CHANNELS}
+    expected = integrate([pair], solver, **record)
+    integration = Integration(
+        **record,
+        with_mesh_state=False,
+        oversampling=5,
+        precision="float64",
+        max_error=None,
+    )
+    found = integrate_lines([as_line(pair)], integration)
+
+    assert in_band_error(found.acceleration, expected.acceleration, RATE)[0] < 1e-5
+    assert np.abs(found.angle - expected.angle).max() < 1e-7
+    assert np.abs(found.contact_loss - expected.contact_loss).max() < 1e-3
+
+
+@pytest.fixture(scope="module")
+def two_stage():
+    """A two-stage gearbox with lateral motion, as its experiment has it."""
+    return read_line_machine(read_request(list(TWO_STAGE)).config)
+
+
+def run_of(machine, faults=(), **changes):
+    """A run that begins between teeth."""
+    start = Start(tooth_pinion=3, tooth_wheel=5, phase=0.3)
+    return Run(system=machine, faults=tuple(faults), start=start, **changes)
+
+
+def recorded(*runs):
+    """Records of runs, none of which fails."""
+    records = simulate_together(runs)
+    assert all(isinstance(record, CleanRecord) for record in records), records
+    return records
+
+
+def with_solver(machine, **changes):
+    """The machine with other options of its solver."""
+    return replace(machine, solver=replace(machine.solver, **changes))
+
+
+def test_two_stages_are_accurate_to_a_thousandth(two_stage):
+    exact = with_solver(two_stage, oversampling=40, max_error=None)
+    crack = (one("crack", tooth=4),)
+    runs = [run_of(machine, crack) for machine in (two_stage, exact)]
+    found, expected = (record.acceleration[None] for record in recorded(*runs))
+    error = in_band_error(found, expected, RATE)[0]
+    assert 0.0 < error < 1e-3
+
+
+def test_two_stages_agree_with_the_implicit_method(two_stage):
+    """Without friction and roll torque, which that method leaves out, and below the mesh modes."""
+    mesh = replace(two_stage.mesh, friction_coefficient=0.0, roll_torque="classical")
+    machine = replace(two_stage, mesh=mesh)
+    slow = with_solver(machine, backend="runge_kutta", oversampling=40)
+    found, expected = recorded(run_of(machine), run_of(slow))
+    names = machine.sensing.channels
+    for name in ("pinion_y", "wheel_y"):
+        row = names.index(name)
+        spectra = [
+            np.fft.rfft(record.acceleration[row] * np.hanning(len(record.shaft_angle)))
+            for record in (found, expected)
+        ]
+        band = slice(50, 1500)  # 500 Hz to 15 kHz, ten hertz apart
+        off = np.linalg.norm(spectra[0][band] - spectra[1][band])
+        assert off < 0.05 * np.linalg.norm(spectra[1][band])
+
+
+def test_a_record_does_not_depend_on_its_neighbours(two_stage):
+    runs = [
+        run_of(two_stage),
+        run_of(two_stage, (one("crack", tooth=4),)),
+        run_of(two_stage, (MissingTooth(gear="wheel", tooth=7),)),
+    ]
+    together = recorded(*runs)
+    for run, record in zip(runs, together, strict=True):
+        (alone,) = recorded(run)
+        assert alone.acceleration.tobytes() == record.acceleration.tobytes()
+        assert alone.shaft_angle.tobytes() == record.shaft_angle.tobytes()
+    assert together[0].acceleration.tobytes() != together[1].acceleration.tobytes()
+
+
+def test_single_precision_is_as_accurate(two_stage):
+    runs = [run_of(two_stage), run_of(with_solver(two_stage, precision="float32"))]
+    double, single = (record.acceleration[None] for record in recorded(*runs))
+    assert in_band_error(single, double, RATE)[0] < 1e-3
+
+
+def test_the_loads_of_the_teeth_are_known(two_stage):
+    """The mean force of the followed mesh is the set torque's, and shares add up to 1."""
+    (record,) = recorded(run_of(two_stage, with_mesh_state=True))
+    mesh = record.mesh
+    expected = two_stage.operating.torque / two_stage.pair.pinion.base_radius
+    assert abs(mesh.force.mean() / expected - 1.0) < 0.03
+    assert np.allclose(mesh.load_share.sum(axis=0)[~mesh.contact_lost], 1.0)
+    assert mesh.load_share.shape[0] == two_stage.most_pairs
+
+
+def test_a_missing_tooth_is_felt_by_its_shaft_mates_too(two_stage):
+    """It unloads the first mesh, and the second one follows through the shaft."""
+    sound, missing = recorded(run_of(two_stage), run_of(two_stage, MISSING))
+    assert missing.contact_loss_fraction >= sound.contact_loss_fraction
+    change = (missing.acceleration - sound.acceleration).std(axis=1)
+    assert np.all(change > 0.05 * sound.acceleration.std(axis=1))
+
+
+def test_what_the_core_does_not_cover_is_refused():
+    words = [
+        "system=phm09_helical_two_stage",
+        "sensing=geared_line",
+        "solver.backend=nystroem",
+    ]
+    machine = read_line_machine(read_request(words).config)
+    (error,) = simulate_together([run_of(machine)])
+    assert isinstance(error, SimulationError)
+    assert "helical" in str(error)
+    assert "solver.backend=runge_kutta" in str(error)
