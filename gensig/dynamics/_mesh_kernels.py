@@ -236,7 +236,7 @@ def papers_law(
 
 @compiled
 def coast_law(group, lane, work, wide):
-    """Contact on the back flanks of one lane, written over its drive law.
+    """Contact on the back flanks of one lane, added to its drive law.
 
     Sound teeth without errors, no friction. Teeth count backwards along the mirrored roll. The
     pairs are kept in slot ``COAST`` and in the bites.
@@ -319,7 +319,7 @@ def coast_law(group, lane, work, wide):
         mirrored_along = -along
     law = Law(-normal, 0.0, 0.0, 0.0, mirrored_along, stored, lost, -loaded)
     for row in range(N_LAW):
-        rows[LAW + row] = law[row]
+        rows[LAW + row] += law[row]
 
 
 @inlined

@@ -122,7 +122,7 @@ def test_loads_of_the_teeth_are_those_of_the_classical_scheme(pairs, exact):
 
 def test_back_flanks_carry(machine, dynamics_of):
     """Light load, little play: the teeth fall back to the other flank."""
-    changes = {SPEED: 3000, TORQUE: 0.5, "gear.backlash_um": 3}
+    changes = {SPEED: 3000, TORQUE: 0.5, "gear.backlash_um": 10}
     errors = np.random.default_rng(8).normal(0, 3e-6, (2, 84))
     teeth = {"pinion_error": errors[0, :23], "wheel_error": errors[1]}
     machines = [dynamics_of(machine({**QUICK, **changes}), **teeth)]
