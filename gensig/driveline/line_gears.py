@@ -1,4 +1,4 @@
-"""Gears, bodies and meshes of a drive line by name, for the machine that records are made of.
+"""Gears, bodies, meshes and channels of a drive line by name, for its machine.
 
 The two gears of the mesh that records follow are named by their side of it. All others have their
 names of the tables, in small letters with underscores.
@@ -7,15 +7,18 @@ names of the tables, in small letters with underscores.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 
 from gensig.driveline.drive_line import DriveLine
-from gensig.driveline.running import named_by_side
+from gensig.driveline.running import RunningLine, named_by_side
 from gensig.dynamics.pair import Body, Support
 from gensig.geometry.contact import SIDES
 from gensig.geometry.gear import Gear
 from gensig.systems.base import MachineMesh
 
+AXES = ("x", "y")
+ROTATION = "rotation"
 STILL = Support(stiffness_x=0.0, stiffness_y=0.0, damping_x=0.0, damping_y=0.0)
 
 
@@ -76,3 +79,31 @@ def line_meshes(drive: DriveLine, followed: int) -> tuple[MachineMesh, ...]:
             zip(drive.line.meshes, pairs, strict=True)
         )
     )
+
+
+def gear_channels(drive: DriveLine, followed: int) -> tuple[str, ...]:
+    """Rotations of all gears, then x and y of all gears that move; the followed mesh's first."""
+    names = list(line_gears(drive, followed))
+    rotations = [f"{name}_{ROTATION}" for name in names]
+    if not drive.lateral:
+        return tuple(rotations)
+    return (*rotations, *(f"{name}_{axis}" for name in names for axis in AXES))
+
+
+def gear_dof(line: RunningLine, followed: int, channel: str) -> int:
+    """Degree of freedom of a gear's channel, such as ``idler_gear_2_y``."""
+    name, _, motion = channel.rpartition("_")
+    drive = line.machine.drive
+    number = gear_names(drive, followed).index(name)
+    gears = drive.line.gears
+    if motion == ROTATION:
+        return line.dof(drive.numbers[gears[number].node])
+    # x and y of all gears follow the rotations
+    first = len(line.matrices.names) - len(AXES) * len(gears)
+    return first + len(AXES) * number + AXES.index(motion)
+
+
+def meshes_of(drive: DriveLine, number: int) -> Sequence[int]:
+    """Numbers of the meshes of a gear."""
+    meshes = enumerate(drive.line.meshes)
+    return [m for m, mesh in meshes if number in (mesh.driving, mesh.driven)]

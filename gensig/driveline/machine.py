@@ -18,15 +18,16 @@ from numpy.typing import NDArray
 from gensig.driveline import loads
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.engine_torques import Engine
-from gensig.driveline.gear_motion import gear_channels, gear_dof
 from gensig.driveline.line_gears import (
+    gear_channels,
+    gear_dof,
     gear_names,
     line_bodies,
     line_gears,
     line_meshes,
 )
 from gensig.driveline.line_records import LineSignals, simulate_lines
-from gensig.driveline.linear_drive_line import LinearDriveLine
+from gensig.driveline.linear.linear_drive_line import LinearDriveLine
 from gensig.driveline.machine_checks import (
     check_sensing,
     check_solver,
@@ -413,7 +414,7 @@ class LineMachine(Machine):
 
     @property
     def _governor(self) -> Governor:
-        """What holds the mean speed."""
+        """Speed control, or governor, that holds the mean speed."""
         return Governor(
             frequency=self.operating.drive_frequency,
             damping_ratio=self.operating.drive_damping_ratio,

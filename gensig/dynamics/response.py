@@ -1,14 +1,79 @@
-"""Linear frequency response of a gear pair to small forces."""
+"""A machine as nuisances meet it: shafts of its gears, and its answer to small forces.
+
+Here are the interface and the gear pair; ``gensig.driveline.linear.linear_drive_line`` is a line.
+"""
 
 from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.dynamics.pair import PairDynamics
+from gensig.dynamics.pair import Body, PairDynamics
+from gensig.units import check_choice
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+
+# motions of a gear that forces act on, in the order of every (..., 3) force
+GEAR_AXES = ("x", "y", "rotation")
+# From x to y is +1. The pinion turns the other way: its friction moment is -rho F_f for a force
+# +F_f along its x.
+SENSE = {"pinion": -1.0, "wheel": 1.0}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GearShaft:
+    """Shaft of one gear at the set-point.
+
+    Parameters
+    ----------
+    speed : rad/s
+    speed_ratio : its speed over that of the pinion, the driving gear of the followed mesh
+    set_ratio : its speed over that which the configuration gives
+    torque : N m    largest mean torque that a mesh of the gear puts on it
+    mesh_force : N    largest mean normal force of the gear's meshes
+    sense : +1 where the gear turns from its x to its y, -1 where it turns from y to x
+    drives : True for a gear that drives its mesh, False for a driven one
+    body : mass, inertia and support of the gear
+    """
+
+    speed: float
+    speed_ratio: float
+    set_ratio: float
+    torque: float
+    mesh_force: float
+    sense: float
+    drives: bool
+    body: Body
+
+
+class LinearMachine(ABC):
+    """A sound machine whose meshes are held at their mean stiffness and damping."""
+
+    @abstractmethod
+    def shaft(self, gear: str) -> GearShaft:
+        """Shaft of a gear of the machine, by its name."""
+
+    @abstractmethod
+    def accelerations(
+        self, gear: str, frequency: Array, force: Complex, channels: Sequence[str]
+    ) -> Complex:
+        """Steady answers of channels to harmonic forces on one gear.
+
+        Parameters
+        ----------
+        frequency : (line,) rad/s    not 0; below 0 against the shaft's sense
+        force : (line, 3)    on x and y in N, on the rotation in N m; a force is Re(F e^(i w t))
+
+        Returns
+        -------
+        (line, channel) in the unit of each channel, complex
+        """
 
 
 def accelerations(dynamics: PairDynamics, frequency: Array, force: Complex) -> Complex:
@@ -34,3 +99,38 @@ def accelerations(dynamics: PairDynamics, frequency: Array, force: Complex) -> C
     dynamic = stiffness - w**2 * np.diag(system.mass) + 1j * w * damping
     displacement = np.linalg.solve(dynamic, force[:, :, None])[:, :, 0]
     return np.asarray(-(w[:, :, 0] ** 2) * displacement)
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinearPair(LinearMachine):
+    """A gear pair whose mesh is held at its mean stiffness and damping."""
+
+    dynamics: PairDynamics
+
+    def shaft(self, gear: str) -> GearShaft:
+        """As ``LinearMachine.shaft``, of the pinion or the wheel."""
+        check_choice("gear", gear, SENSE)
+        dynamics, operating, ratio = self.dynamics, self.dynamics.operating, 1.0
+        if gear != "pinion":
+            ratio = 1.0 / dynamics.table.pair.ratio
+        return GearShaft(
+            speed=ratio * operating.speed,
+            speed_ratio=ratio,
+            set_ratio=ratio,
+            torque=operating.torque / ratio,
+            mesh_force=dynamics.mesh_force,
+            sense=SENSE[gear],
+            drives=gear == "pinion",
+            body={"pinion": dynamics.pinion, "wheel": dynamics.wheel}[gear],
+        )
+
+    def accelerations(
+        self, gear: str, frequency: Array, force: Complex, channels: Sequence[str]
+    ) -> Complex:
+        """As ``LinearMachine.accelerations``, by ``accelerations``."""
+        dofs = self.dynamics.dofs
+        on_dofs = np.zeros((len(frequency), len(dofs)), dtype=np.complex128)
+        on_dofs[:, [dofs.index(f"{gear}_{axis}") for axis in GEAR_AXES]] = force
+        answer = accelerations(self.dynamics, frequency, on_dofs)
+        return answer[:, [dofs.index(name) for name in channels]]

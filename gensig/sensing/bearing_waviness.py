@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from gensig.dynamics.response import LinearMachine
 from gensig.errors import ConfigError
-from gensig.sensing.linear_machine import LinearMachine
 from gensig.sensing.tones import (
     MOST_HARMONICS,
     TURN,

@@ -12,9 +12,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from gensig.dynamics.response import LinearMachine
 from gensig.errors import ConfigError
 from gensig.sensing.bearing_waviness import Bearing
-from gensig.sensing.linear_machine import LinearMachine
 from gensig.sensing.tones import (
     MOST_HARMONICS,
     TURN,

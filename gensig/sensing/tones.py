@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.sensing.linear_machine import LinearMachine
+from gensig.dynamics.response import LinearMachine
 from gensig.units import check_limits, check_ranges
 
 Array = NDArray[np.float64]

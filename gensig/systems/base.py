@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from gensig.dynamics.integrator import Solver
 from gensig.dynamics.pair import Body
+from gensig.dynamics.response import LinearMachine
 from gensig.errors import SimulationError
 from gensig.faults.base import Fault
 from gensig.geometry.contact import GearPair
@@ -26,7 +27,6 @@ from gensig.mesh.sliced.sliced_table import SlicedTable
 from gensig.operation.setpoint import Operating
 from gensig.sensing.chain import Sensing
 from gensig.sensing.encoder import Disc
-from gensig.sensing.linear_machine import LinearMachine
 from gensig.sensing.manufacturing import Gearbox, Quality, Specimen
 from gensig.systems.run import CleanRecord, Run, Start
 from gensig.systems.stiffness_curves import StiffnessCurves

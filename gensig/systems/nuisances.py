@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dynamics.decimation import usable_band
+from gensig.dynamics.response import LinearMachine
 from gensig.operation.setpoint import Nominal
-from gensig.sensing.linear_machine import LinearMachine
 from gensig.sensing.nuisance import draw_tones
 from gensig.sensing.tones import TURN, Tones
 from gensig.systems.base import Machine

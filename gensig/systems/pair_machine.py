@@ -18,6 +18,7 @@ from gensig.dynamics.integrator import (
 )
 from gensig.dynamics.mesh_state import mesh_state
 from gensig.dynamics.pair import Body, PairDynamics, Rotor
+from gensig.dynamics.response import LinearPair
 from gensig.errors import FaultError, SimulationError
 from gensig.faults.base import Fault, faulty_teeth
 from gensig.geometry.contact import GearPair
@@ -31,7 +32,6 @@ from gensig.systems.integration_checks import (
     is_too_coarse,
     not_finite,
 )
-from gensig.systems.linear_pair import LinearPair
 from gensig.systems.run import CleanRecord, Run, Start, angle_from_tooth_0
 from gensig.systems.supports import in_gearbox
 

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from closeness import assert_close
 
-from gensig.driveline.gear_motion import gear_dof
+from gensig.driveline.line_gears import gear_dof
 from gensig.driveline.mesh_phase import start_phase
 from gensig.driveline.running import Governor, running_line, steady_course
 from gensig.driveline.time.course import LineCourse, ShaftTorque
 from gensig.driveline.time.newmark import LineSolver
+from gensig.dynamics.response import GEAR_AXES
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
-from gensig.sensing.linear_machine import GEAR_AXES
 from gensig.systems.lead_in import earlier, simulate_with_lead_in
 from gensig.systems.run import Run, Start
 

@@ -7,11 +7,10 @@ import pytest
 from closeness import assert_close
 from scipy.signal import lsim
 
-from gensig.dynamics.response import accelerations
+from gensig.dynamics.response import SENSE, LinearPair, accelerations
 from gensig.operation.setpoint import Profile
 from gensig.sensing.nuisance import draw_tones, read_nuisances
 from gensig.sensing.tones import Tones
-from gensig.systems.linear_pair import SENSE, LinearPair
 from gensig.systems.nuisances import nuisance_acceleration
 from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.run import Run, Start

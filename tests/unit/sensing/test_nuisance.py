@@ -9,10 +9,10 @@ from numpy.random import default_rng
 from numpy.testing import assert_allclose, assert_array_equal
 from sensing_groups import MACHINE
 
+from gensig.dynamics.response import LinearPair
 from gensig.errors import ConfigError
 from gensig.sensing.bearing_waviness import bearing_orders
 from gensig.sensing.nuisance import KINDS, draw_tones, read_nuisances
-from gensig.systems.linear_pair import LinearPair
 
 FIXED = {
     "unbalance": {

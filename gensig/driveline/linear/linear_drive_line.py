@@ -11,11 +11,10 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.driveline.gear_motion import gear_dof, meshes_of
-from gensig.driveline.line_gears import gear_names, line_bodies
+from gensig.driveline.line_gears import gear_dof, gear_names, line_bodies, meshes_of
 from gensig.driveline.linear.forced import LinearLine
 from gensig.driveline.running import RunningLine, single_thread
-from gensig.sensing.linear_machine import GEAR_AXES, GearShaft, LinearMachine
+from gensig.dynamics.response import GEAR_AXES, GearShaft, LinearMachine
 from gensig.units import SPEED, check_choice
 
 Array = NDArray[np.float64]
