@@ -26,7 +26,6 @@ from gensig.driveline.line_gears import (
     line_gears,
     line_meshes,
 )
-from gensig.driveline.line_records import LineSignals, simulate_lines
 from gensig.driveline.linear.linear_drive_line import LinearDriveLine
 from gensig.driveline.machine_checks import (
     check_sensing,
@@ -47,6 +46,7 @@ from gensig.driveline.running import (
     steady_course,
     with_supports,
 )
+from gensig.driveline.side_by_side.line_records import LineSignals, simulate_lines
 from gensig.driveline.teeth import (
     ToothLaw,
     neighbour_meshes,

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.driveline.engine_line import EngineLine
-from gensig.driveline.line_records import LineSignals
 from gensig.driveline.running import RunningLine
+from gensig.driveline.side_by_side.line_records import LineSignals
 from gensig.driveline.time.newmark import LineMotion
 from gensig.sensing.encoder import Disc
 from gensig.sensing.toothed_wheel import ToothedWheel, instantaneous_speed

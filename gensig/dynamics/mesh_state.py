@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from gensig.dynamics._layout import N_SEEN, SEEN_FORCE, SEEN_NEWEST, SEEN_PAIRS
 from gensig.dynamics.helical import half_lag, pitches
 from gensig.dynamics.pair import PairDynamics
+from gensig.errors import ConfigError
 
 Array = NDArray[np.float64]
 
@@ -85,3 +87,39 @@ def mesh_state(
         contact_lost=force == 0.0,
         fault_engaged=np.asarray((near & odd).any(axis=0)),
     )
+
+
+def mesh_signals(
+    mesh: MeshState | None, n_samples: int, n_pairs: int
+) -> dict[str, NDArray[Any]]:
+    """Signals of a mesh state with ``n_pairs`` rows of pairs; without values for a failed record.
+
+    Raises
+    ------
+    ConfigError    for a machine without loads of its teeth: no pairs
+    """
+    if n_pairs == 0:
+        raise ConfigError(
+            "dataset.store_mesh_state: the loads of the teeth of a drive line are known with "
+            "solver.backend=nystroem alone; take it, or dataset.store_mesh_state=false"
+        )
+    if mesh is None:
+        teeth = np.full((n_pairs, n_samples), NO_TOOTH, dtype=np.int16)
+        unknown, no = np.full(n_samples, np.nan), np.zeros(n_samples, dtype=np.bool_)
+        mesh = MeshState(
+            pinion_tooth=teeth,
+            wheel_tooth=teeth,
+            load_share=np.full((n_pairs, n_samples), np.nan),
+            force=unknown,
+            contact_lost=no,
+            fault_engaged=no,
+        )
+    free = ((0, n_pairs - len(mesh.load_share)), (0, 0))
+    return {
+        "mesh_pinion_tooth": np.pad(mesh.pinion_tooth, free, constant_values=NO_TOOTH),
+        "mesh_wheel_tooth": np.pad(mesh.wheel_tooth, free, constant_values=NO_TOOTH),
+        "mesh_load_share": np.pad(mesh.load_share.astype(np.float32), free),
+        "mesh_force": mesh.force.astype(np.float32),
+        "contact_lost": mesh.contact_lost.astype(np.int8),
+        "fault_engaged": mesh.fault_engaged.astype(np.int8),
+    }

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dataset.folder.manifest import identity_hash
+from gensig.dynamics.mesh_state import mesh_signals
 from gensig.errors import SimulationError
 from gensig.operation.options import operating_signals
 from gensig.options.configuration import Configuration
@@ -24,7 +25,6 @@ from gensig.record.inputs import (
 from gensig.record.options import read_dataset_options
 from gensig.sensing.chain import detectability
 from gensig.systems.base import Machine
-from gensig.systems.mesh_signals import mesh_signals
 from gensig.systems.run import CleanRecord
 from gensig.units import from_si
 from gensig.version import __version__

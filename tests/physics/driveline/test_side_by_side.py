@@ -8,7 +8,8 @@ import pytest
 from fault_cases import one
 
 from gensig.driveline.reading import read_line_machine
-from gensig.driveline.side_by_side import LineDynamics, integrate_lines
+from gensig.driveline.side_by_side.line_dynamics import LineDynamics
+from gensig.driveline.side_by_side.line_integration import integrate_lines
 from gensig.driveline.time.course import ShaftTorque, constant_speed
 from gensig.driveline.time.geared_line import GearedLine
 from gensig.driveline.time.line_mesh import pair_mesh

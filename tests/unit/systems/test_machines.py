@@ -11,6 +11,7 @@ from closeness import assert_close
 from numpy.testing import assert_array_equal
 from refusals import refused
 
+from gensig.dynamics.mesh_state import mesh_signals
 from gensig.dynamics.pair import DOFS
 from gensig.errors import GeometryError
 from gensig.faults.registry import read_faults
@@ -18,7 +19,6 @@ from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
 from gensig.sensing.manufacturing import nominal_gearbox, perfect_specimen
 from gensig.systems.base import Machine, simulate_together
-from gensig.systems.mesh_signals import mesh_signals
 from gensig.systems.pair_machine import (
     GearPairMachine,
     PairMachine,

@@ -14,7 +14,6 @@ from gensig.dynamics._vector import (
     any_above,
     at,
     compiled,
-    fused,
     get_row,
     inlined,
     joined,
@@ -29,10 +28,7 @@ from gensig.dynamics.backends.nystroem import _layout as rows
 from gensig.dynamics.backends.nystroem import _line_layout as lines
 from gensig.dynamics.backends.nystroem._kernels import RECENTER, choose, write_mesh
 from gensig.dynamics.backends.nystroem._kinks import (
-    add_force,
     kinked,
-    miss,
-    missed_law,
 )
 from gensig.dynamics.backends.nystroem._law import mesh_law
 from gensig.dynamics.backends.nystroem._layout import FOLLOWED, block
@@ -42,6 +38,16 @@ from gensig.dynamics.backends.nystroem._line_layout import (
     mesh_of,
     mesh_rows,
     wide_rows,
+)
+from gensig.dynamics.backends.nystroem._line_meshes import (
+    acceleration,
+    correct,
+    law_at,
+    motion,
+    push,
+    ratio,
+    rolled,
+    turning_speed,
 )
 from gensig.dynamics.backends.nystroem._motion import (
     conclude,
@@ -291,23 +297,6 @@ def start(group, fresh, by_tooth, work, wide):
 
 
 @inlined
-def acceleration(group, d, q, v, machine):
-    """Acceleration of a degree of freedom under the forces of all meshes, with states in rows."""
-    n_dof = len(group.force) // width(machine)
-    spring = get_row(group.stiffness, d) * get_row(machine, q + d)
-    spring = fused(get_row(group.damping, d), get_row(machine, v + d), spring)
-    for k in range(group.sprung_first[d], group.sprung_first[d + 1]):
-        moved = get_row(machine, q + group.sprung_column[k])
-        spring = fused(get_row(group.sprung, k), moved, spring)
-    for k in range(group.damped_first[d], group.damped_first[d + 1]):
-        rate = get_row(machine, v + group.damped_column[k])
-        spring = fused(get_row(group.damped, k), rate, spring)
-    on_it = get_row(machine, block(lines.ON, n_dof) + d)
-    pull = get_row(machine, block(rows.FORCES, n_dof) + d) + (on_it - spring)
-    return pull * get_row(group.inverse_mass, d)
-
-
-@inlined
 def write_angles(group, angle, row, machine, wide):
     """Write the angles of a group at the begin of a step."""
     n = width(machine)
@@ -332,68 +321,6 @@ def clear(n_dof, machine):
 
 
 @inlined
-def motion(group, m, q, v, machine):
-    """Approach of a mesh and its rate, from the rows of a state."""
-    approach = _rest_approach(group, m, machine)
-    rate = spread(machine, 0.0)
-    for k in range(lines.N_TOUCHED):
-        place = m * lines.N_TOUCHED + k
-        d = group.touched[place]
-        if d >= 0:
-            reach = get_row(group.reach, place)
-            approach = fused(reach, get_row(machine, q + d), approach)
-            rate = fused(reach, get_row(machine, v + d), rate)
-    return approach, rate
-
-
-@inlined
-def _rest_approach(group, m, machine):
-    row = m * layout.N_NUMBERS + layout.REST_APPROACH
-    return get_row(group.numbers, row)
-
-
-@inlined
-def turning_speed(group, m, v, since, machine):
-    """Speed of gear a of a mesh, ``since`` s after the begin of the step, rad/s."""
-    turning = _turning(group, m, machine)
-    speed = get_row(machine, rows.DRIVE + layout.DRIVE_SPEED)
-    speed = speed + since * get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
-    d = group.touched[m * lines.N_TOUCHED + lines.A_TURN]
-    return fused(turning, speed, get_row(machine, v + d))
-
-
-@inlined
-def _turning(group, m, machine):
-    """Rotation of gear a of a mesh with the reference."""
-    return get_row(group.rotation, group.touched[m * lines.N_TOUCHED + lines.A_TURN])
-
-
-@inlined
-def push(group, m, law, machine):
-    """Add the forces of a mesh to the rows ``ON``."""
-    n_dof = len(group.force) // width(machine)
-    on = block(lines.ON, n_dof)
-    mesh = mesh_of(group, m, width(machine))
-    normal = law.normal - get_row(mesh.numbers, layout.MEAN_FORCE)
-    law = layout.Law(
-        normal,
-        law.friction,
-        law.moment_p,
-        law.moment_w,
-        law.along,
-        law.stored,
-        law.lost,
-        law.loaded,
-    )
-    for k in range(lines.N_TOUCHED):
-        place = m * lines.N_TOUCHED + k
-        d = group.touched[place]
-        if d >= 0:
-            force = _on_body(group, mesh, place, k, law)
-            set_row(machine, on + d, get_row(machine, on + d) + force)
-
-
-@inlined
 def read_mesh(group, m, step, by_tooth, lost, machine, work, wide):
     """Read the tables of a mesh at the end of the step and set its nodes."""
     n = width(work)
@@ -409,8 +336,7 @@ def read_mesh(group, m, step, by_tooth, lost, machine, work, wide):
     # the roll at the end of the step, with every force in it
     now, v = block(rows.NOW, n_dof), block(rows.V, n_dof)
     d = group.touched[m * lines.N_TOUCHED + lines.A_TURN]
-    turning = _turning(group, m, machine)
-    gain = turning * get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
+    gain = ratio(group, m, machine) * get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
     gain = gain + get_row(machine, now + d)
     speed = turning_speed(group, m, v, zero, machine) + (0.5 * step) * gain
     radius = get_row(mesh.numbers, layout.PINION_RADIUS)
@@ -424,18 +350,6 @@ def read_mesh(group, m, step, by_tooth, lost, machine, work, wide):
 
 
 @inlined
-def rolled(group, m, since, q, machine, own):
-    """Roll of a mesh since the begin of the step, ``since`` s after it, m."""
-    d = group.touched[m * lines.N_TOUCHED + lines.A_TURN]
-    speed = get_row(machine, rows.DRIVE + layout.DRIVE_SPEED)
-    gain = get_row(machine, rows.DRIVE + layout.DRIVE_GAIN)
-    turned = since * (speed + (0.5 * since) * gain) * _turning(group, m, machine)
-    moved = get_row(machine, q + d) - get_row(own, lines.BEGUN)
-    row = m * layout.N_NUMBERS + layout.PINION_RADIUS
-    return get_row(group.numbers, row) * (turned + moved)
-
-
-@inlined
 def push_middle(group, m, step, machine, work, wide):
     """Evaluate the law of a mesh in the middle of the step and add its forces."""
     n = width(work)
@@ -446,7 +360,7 @@ def push_middle(group, m, step, machine, work, wide):
     ahead = get_row(own, lines.AHEAD)
     off = turned - 0.5 * (ahead + get_row(own, rows.BEHIND))
     since = spread(work, 0.5 * step)
-    law = _law(
+    law = law_at(
         group,
         m,
         rows.MIDDLE,
@@ -473,33 +387,11 @@ def push_end(group, m, step, machine, work, wide):
     turned = rolled(group, m, step, q, machine, own)
     off = turned - get_row(own, lines.AHEAD)
     since = spread(work, step)
-    law = _law(
+    law = law_at(
         group, m, rows.NODES, rows.END_AT, off, turned, since, q, v, machine, work, wide
     )
     push(group, m, law, machine)
     set_row(own, rows.NORMAL, law.normal)
-
-
-@inlined
-def _law(group, m, nodes, instant, off, turned, since, q, v, machine, work, wide):
-    """Law of a mesh at a state, ``off`` m after its nodes and ``turned`` m after the begin."""
-    n = width(work)
-    mesh = mesh_of(group, m, n)
-    approach, rate = motion(group, m, q, v, machine)
-    speed = turning_speed(group, m, v, since, machine)
-    roll_rate = get_row(mesh.numbers, layout.PINION_RADIUS) * speed
-    return mesh_law(
-        mesh,
-        nodes,
-        instant,
-        off,
-        turned,
-        approach,
-        rate,
-        roll_rate,
-        mesh_rows(work, m, n),
-        wide_rows(wide, m, n),
-    )
 
 
 @inlined
@@ -516,36 +408,3 @@ def end_mesh(group, m, step, machine, work):
     for j in range(FOLLOWED):
         margin = get_row(own, rows.MARGIN + rows.END_AT * FOLLOWED + j)
         set_row(own, rows.MARGIN + j, margin)
-
-
-@compiled
-def correct(group, mesh, m, step, changed, machine, own):
-    """Add to the end of the step what the kinks of a mesh change, in the lanes with any."""
-    n_dof = len(group.force) // width(machine)
-    miss(mesh.numbers, changed, own)
-    any_changed = changed[0] + changed[1] + changed[2]
-    short, early = missed_law(mesh, rows.SHORT, own), missed_law(mesh, rows.EARLY, own)
-    for k in range(lines.N_TOUCHED):
-        place = m * lines.N_TOUCHED + k
-        d = group.touched[place]
-        if d >= 0:
-            force = _on_body(group, mesh, place, k, short)
-            mean, v = block(rows.MEAN, n_dof), block(rows.V, n_dof)
-            add_force(group, d, force, 1.0, any_changed, mean, machine)
-            add_force(group, d, force, step, any_changed, v, machine)
-            force = _on_body(group, mesh, place, k, early)
-            q = block(rows.Q, n_dof)
-            add_force(group, d, force, step * step, any_changed, q, machine)
-
-
-@inlined
-def _on_body(group, mesh, place, k, law):
-    """Force of a mesh law on one of the degrees of freedom that the mesh touches."""
-    force = get_row(group.slide, place) * law.friction
-    force = force - get_row(group.reach, place) * law.normal
-    if k == lines.A_TURN:
-        arm = get_row(mesh.numbers, layout.PINION_RADIUS)
-        force = force + (arm * law.along + law.moment_p)
-    if k == lines.B_TURN:
-        force = force + law.moment_w
-    return force

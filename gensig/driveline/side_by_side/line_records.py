@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.driveline.side_by_side import (
+from gensig.driveline.side_by_side.line_dynamics import (
     LineDynamics,
     check_line,
-    integrate_lines,
     line_dynamics,
 )
+from gensig.driveline.side_by_side.line_integration import integrate_lines
 from gensig.dynamics._layout import N_SEEN
 from gensig.dynamics.backends.base import Integration, Motions
 from gensig.dynamics.mesh_state import mesh_state

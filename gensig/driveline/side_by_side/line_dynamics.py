@@ -1,0 +1,228 @@
+"""The motion of one line of spur meshes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gensig.driveline.line_gears import STILL
+from gensig.driveline.running import RunningLine, reference_force
+from gensig.driveline.time.newmark import static_start
+from gensig.dynamics.backends.nystroem import _line_layout as lines
+from gensig.dynamics.backends.nystroem.method import OTHER_BACKEND, refuse
+from gensig.dynamics.backends.nystroem.stability import stable_rate
+from gensig.dynamics.backends.step_limits import LONGEST_SETTLING, SETTLED
+from gensig.dynamics.integrator import Solver
+from gensig.dynamics.pair import Body, PairDynamics
+from gensig.errors import SimulationError
+from gensig.mesh.pair_table import PairTable
+from gensig.operation.setpoint import Operating
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+STIFFER = 1.2  # than their mean stiffness are meshes taken for the longest step
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LineDynamics:
+    """All parameters of the motion of one line of spur meshes.
+
+    No slots: what follows from them is cached.
+
+    Parameters
+    ----------
+    running : the line with its course, torques and mean mesh forces
+    pairs : the teeth of every mesh with their law; their supports are not read
+    touched : (mesh, 6) degrees of freedom of x, y and rotation of gear a and of gear b, -1 for a
+        gear that does not move so
+    senses : (mesh,) 1 where gear a turns from x to y, else -1
+    drive : degree of freedom that makes up for the mean friction
+    angles : degrees of freedom whose angles are given out
+    """
+
+    running: RunningLine
+    pairs: tuple[PairDynamics, ...]
+    touched: Index
+    senses: Array
+    drive: int
+    angles: tuple[int, ...]
+
+    @property
+    def dofs(self) -> tuple[str, ...]:
+        """Names of the degrees of freedom."""
+        return self.running.line.names
+
+    @cached_property
+    def reach(self) -> Array:
+        """Gradient of the approach along the degrees of freedom of every mesh, (mesh, 6)."""
+        reach = np.zeros(self.touched.shape)
+        for row, mesh, dofs in zip(
+            reach, self.running.line.meshes, self.touched, strict=True
+        ):
+            row[dofs >= 0] = mesh.direction[dofs[dofs >= 0]]
+        return reach
+
+    @property
+    def slide(self) -> Array:
+        """Direction of friction along the degrees of freedom of every mesh, (mesh, 6).
+
+        Gear a of a pair that turns against its frame feels it along x, which is y turned back by a
+        right angle; a mirrored pair feels it the other way.
+        """
+        slide = np.zeros_like(self.reach)
+        # the gradient is -y of the frame on gear a and y on gear b, and so is friction along x
+        for first in (lines.A_X, lines.B_X):
+            slide[:, first] = self.senses * self.reach[:, first + 1]
+            slide[:, first + 1] = -self.senses * self.reach[:, first]
+        return slide
+
+    @cached_property
+    def friction_torque(self) -> float:
+        """Mean friction torque of all meshes, reduced to the drive, N m."""
+        rotation = self.running.line.rotation
+        lost = [
+            pair.friction_torque() * rotation[dofs[lines.A_TURN]]
+            for pair, dofs in zip(self.pairs, self.touched, strict=True)
+        ]
+        return float(sum(lost) / rotation[self.drive])
+
+    @cached_property
+    def stiff_rates(self) -> NDArray[np.complex128]:
+        """Eigenvalues with the meshes held at 1.2 times their mean stiffness, 1/s."""
+        return self._rates(STIFFER)
+
+    @property
+    def settling_time(self) -> float:
+        """Time after which the start's transient has fallen to 1e-4 (longest 0.45 s), s."""
+        rates = -np.real(self._rates(1.0))
+        slowest = float(rates[rates > 1e-3].min(initial=np.inf))
+        return min(LONGEST_SETTLING, math.log(1.0 / SETTLED) / slowest)
+
+    def _rates(self, stiffer: float) -> NDArray[np.complex128]:
+        line = self.running.line
+        stiffness, n = line.stiffness.copy(), len(line.names)
+        for mesh, pair in zip(line.meshes, self.pairs, strict=True):
+            held = stiffer * pair.mean_mesh_stiffness
+            stiffness += held * np.outer(mesh.direction, mesh.direction)
+        per_mass = 1.0 / np.diag(line.mass)[:, None]
+        state = np.block(
+            [
+                [np.zeros((n, n)), np.eye(n)],
+                [-stiffness * per_mass, -line.damping * per_mass],
+            ]
+        )
+        return np.linalg.eigvals(state).astype(np.complex128)
+
+    @cached_property
+    def rest(self) -> Array:
+        """Deflection about which the line moves, its reference not turned, (dof,)."""
+        start, rotation = self.static_start(0.0), self.running.line.rotation
+        return np.asarray(start - rotation * start[self.reference])
+
+    @property
+    def reference(self) -> int:
+        """Degree of freedom that turns with the reference."""
+        return int(np.argmin(np.abs(self.running.line.rotation - 1.0)))
+
+    def static_start(self, time: float) -> Array:
+        """Deflection under the mean torques at a nominal time, (dof,)."""
+        running = self.running
+        return static_start(running.line, running.course, running.torques, time=time)
+
+    def forces(self, times: Array) -> Array:
+        """Torques and forces on the degrees of freedom at times in s, (time, dof)."""
+        forces = np.zeros((len(times), len(self.dofs)))
+        for torque in self.running.torques:
+            factor: Array | float = 1.0
+            if torque.factor is not None:
+                factor = np.interp(times, self.running.course.time, torque.factor)
+            forces[:, torque.dof] += float(torque.table.mean()) * factor
+        forces[:, self.drive] += self.friction_torque
+        return forces
+
+
+def line_dynamics(
+    running: RunningLine,
+    operating: Operating,
+    *,
+    drive: int,
+    angles: Sequence[int],
+) -> LineDynamics:
+    """The motion of a line whose meshes all have tables of spur teeth.
+
+    Parameters
+    ----------
+    operating : options of the set-point; its speed and torque are not read
+    drive : number of the node that turns the line
+    angles : numbers of the nodes whose angles are given out
+    """
+    speed = float(running.course.speed[0])
+    meshes = range(len(running.line.meshes))
+    return LineDynamics(
+        running=running,
+        pairs=tuple(_pair(running, m, operating, speed) for m in meshes),
+        touched=np.array([running.touched(m) for m in meshes], dtype=np.int64),
+        senses=np.array([running.sense(m) for m in meshes]),
+        drive=running.dof(drive),
+        angles=tuple(running.dof(node) for node in angles),
+    )
+
+
+def check_line(line: LineDynamics, solver: Solver, sampling_rate: float) -> None:
+    """Raise SimulationError for an unstable step or a line that the core does not cover."""
+    for pair in line.pairs:
+        refuse(pair)
+    for torque in line.running.torques:
+        if len(torque.table) > 1:
+            raise SimulationError(
+                f"solver.backend = nystroem takes torques that do not follow an angle, but that "
+                f"on '{line.dofs[torque.dof]}' does; {OTHER_BACKEND}"
+            )
+    needed = math.ceil(stable_rate(line.stiff_rates) / sampling_rate)
+    if needed > solver.oversampling:
+        raise SimulationError(
+            f"solver.oversampling = {solver.oversampling} makes too long steps for "
+            f"solver.backend=nystroem; raise solver.oversampling to at least {needed}"
+        )
+
+
+def _pair(
+    running: RunningLine, m: int, operating: Operating, speed: float
+) -> PairDynamics:
+    """The teeth of a mesh under its mean force, on bodies that are not read."""
+    mesh, tabulated = running.line.meshes[m], running.tabulated.get(m)
+    if tabulated is None or not isinstance(tabulated.table, PairTable):
+        raise SimulationError(
+            f"solver.backend = nystroem takes meshes of spur teeth, but mesh {mesh.name} has "
+            f"helical ones; {OTHER_BACKEND}"
+        )
+    table = tabulated.table
+    pair, force = table.pair, float(running.mesh_force[m])
+    force = reference_force(running.machine, m, force)
+    point = replace(
+        operating,
+        speed=speed * float(running.line.rotation[mesh.roll_dof]),
+        torque=force * pair.pinion.base_radius,
+    )
+    n_teeth = pair.pinion.n_teeth, pair.wheel.n_teeth
+    errors = tabulated.errors or (np.zeros(n_teeth[0]), np.zeros(n_teeth[1]))
+    body = Body(mass=1.0, inertia=1.0, support=STILL)
+    return PairDynamics(
+        table=table,
+        pinion=body,
+        wheel=body,
+        operating=point,
+        pinion_error=errors[0],
+        wheel_error=errors[1],
+        pinion_tilt=np.zeros(n_teeth[0]),
+        wheel_tilt=np.zeros(n_teeth[1]),
+        start_tooth_pinion=mesh.start_teeth[0],
+        start_tooth_wheel=mesh.start_teeth[1],
+        start_phase=mesh.start_phase,
+    )
