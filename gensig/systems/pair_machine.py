@@ -246,8 +246,8 @@ def simulate_pairs(runs: Sequence[PairRun]) -> list[CleanRecord | SimulationErro
         results.update(zip(kind, records, strict=True))
     coarse = [i for i, record in results.items() if is_too_coarse(runs[i], record)]
     if coarse:
-        finer = simulate_pairs([finer(runs[i]) for i in coarse])
-        results.update(zip(coarse, finer, strict=True))
+        again = simulate_pairs([finer(runs[i]) for i in coarse])
+        results.update(zip(coarse, again, strict=True))
     return [results[index] for index in range(len(runs))]
 
 

@@ -22,7 +22,6 @@ from gensig.systems.base import Machine, simulate_together
 from gensig.systems.pair_machine import (
     GearPairMachine,
     PairMachine,
-    _is_too_coarse,
     pair_dynamics,
 )
 from gensig.systems.run import CHECKS, Run, Start
@@ -222,10 +221,10 @@ def test_wheels_that_cannot_mesh_and_drives_that_stop_are_refused():
 
 
 @pytest.mark.parametrize(
-    ("contact_loss", "steps", "is_too_coarse"),
+    ("contact_loss", "steps", "coarse"),
     [(0.0, 32, True), (0.0, 33, False), (0.02, 10, True), (0.02, 11, False)],
 )
-def test_bouncing_records_are_refined_less(contact_loss, steps, is_too_coarse):
+def test_bouncing_records_are_refined_less(contact_loss, steps, coarse):
     machine = read("spur_pair")
     solver = replace(machine.solver, oversampling=steps)
     run = Run(system=replace(machine, solver=solver), faults=())
@@ -234,8 +233,8 @@ def test_bouncing_records_are_refined_less(contact_loss, steps, is_too_coarse):
         integration_check="unresolved",
         contact_loss_fraction=contact_loss,
     )
-    assert _is_too_coarse(run, record) == is_too_coarse
-    assert not _is_too_coarse(run, replace(record, integration_check="error"))
+    assert is_too_coarse(run, record) == coarse
+    assert not is_too_coarse(run, replace(record, integration_check="error"))
 
 
 @cache
@@ -268,5 +267,5 @@ def test_loads_of_teeth_are_recorded_where_they_are_known(any_machine):
     if n_pairs:
         assert mesh_signals(None, 5, n_pairs)["mesh_load_share"].shape == (n_pairs, 5)
         return
-    with refused("dataset.store_mesh_state: a drive line does not know"):
+    with refused("dataset.store_mesh_state: the loads of the teeth of a drive line"):
         mesh_signals(None, 5, n_pairs)
