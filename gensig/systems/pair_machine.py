@@ -21,9 +21,10 @@ from gensig.dynamics.integrator import (
     check_memory,
     integrate,
 )
+from gensig.dynamics.lanes import nearest_gaps
 from gensig.dynamics.mesh_state import mesh_state
 from gensig.dynamics.pair import Body, PairDynamics, Rotor
-from gensig.errors import FaultError, SimulationError
+from gensig.errors import FaultError, SimulationError, StepError
 from gensig.faults.base import Fault, faulty_teeth
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
@@ -247,12 +248,19 @@ def simulate_pairs(runs: Sequence[PairRun]) -> list[CleanRecord | SimulationErro
 
 
 def _is_too_coarse(run: PairRun, record: CleanRecord | SimulationError) -> bool:
-    if isinstance(record, SimulationError) or record.integration_check != "unresolved":
+    """True if a record should be made again at half the step; never without ``max_error``."""
+    solver = run.system.solver
+    if solver.max_error is None:
         return False
     finest = FINEST
-    if record.contact_loss_fraction > BOUNCING:
-        finest = FINEST_BOUNCING
-    return 2 * run.system.solver.oversampling <= finest
+    if isinstance(record, CleanRecord):
+        if record.integration_check != "unresolved":
+            return False
+        if record.contact_loss_fraction > BOUNCING:
+            finest = FINEST_BOUNCING
+    elif not isinstance(record, StepError):
+        return False
+    return 2 * solver.oversampling <= finest
 
 
 def _checks(
@@ -291,7 +299,7 @@ def _side_by_side(
     records: list[CleanRecord | SimulationError] = []
     for index, run in enumerate(runs):
         if not motions.finite[index]:
-            records.append(_not_finite(run))
+            records.append(_not_finite(run, machines[index]))
             continue
         acceleration, angle = motions.acceleration[index], motions.shaft_angle[index]
         if run.gearbox is not None:
@@ -314,10 +322,34 @@ def _side_by_side(
     return records
 
 
-def _not_finite(run: PairRun) -> SimulationError:
-    operating = run.system.operating
-    return SimulationError(
-        f"the motion stopped being finite (speed {from_si('speed_rpm', operating.speed):g} "
-        f"r/min, torque {operating.torque:g} N m); raise solver.oversampling above "
-        f"{run.system.solver.oversampling}"
+def _not_finite(run: PairRun, machine: PairDynamics) -> StepError:
+    """The error of a motion that left all bounds: what may have driven it there, and a remedy."""
+    operating, solver = run.system.operating, run.system.solver
+    speed_rpm = from_si("speed_rpm", operating.speed)
+    step = 1.0 / (run.system.sensing.sampling_rate * solver.oversampling)
+    failed = (
+        f"the motion stopped being finite (speed {speed_rpm:g} r/min, torque "
+        f"{operating.torque:g} N m, steps of {step:.3g} s)"
+    )
+    finer = f"raise solver.oversampling above {solver.oversampling}"
+    if solver.max_error is None:
+        finer += ", or give solver.max_error=1e-3, which tries finer steps by itself"
+    if run.system.mesh.law != "one_sided":
+        return StepError(f"{failed}; {finer}")
+    backlash_um = from_si("backlash_um", run.system.pair.backlash)
+    overlap_um = -from_si("gap_um", float(nearest_gaps(machine).min()))
+    if overlap_um > backlash_um:
+        return StepError(
+            f"{failed}: teeth stand out by up to {overlap_um:.3g} um along the line of action, "
+            f"more than the backlash of {backlash_um:.3g} um, and jam; make the errors of the "
+            "gears (quality, fault) smaller or gear.backlash_um larger"
+        )
+    if solver.max_error is not None:
+        finer = (
+            "raise operating.torque_nm, or make the errors of the gears (quality, fault) "
+            "smaller"
+        )
+    return StepError(
+        f"{failed}: teeth that part land harder than such steps can follow, the more so the "
+        f"lighter the load; {finer}"
     )
