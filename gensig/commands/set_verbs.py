@@ -28,11 +28,19 @@ ENDS = ("LOW", "HIGH")
 NEW_GEARBOX = (
     Argument(("what",), {"choices": ("gearbox",), "help": "what to make"}),
     text("name", "NAME", "of the options that are written"),
-    counts("--teeth", ("PINION", "WHEEL"), "needed; teeth of both gears"),
-    number("--module", "MM", "needed; normal module"),
-    number("--speed", "RPM", "needed; rated speed of the pinion"),
-    number("--torque", "NM", "needed; rated torque of the pinion"),
-    numbers("--widths", "MM", "face width of both or each (default: 10 modules)"),
+    counts(
+        "--teeth",
+        "N",
+        "needed; teeth of pinion and wheel, of each stage in turn: two, four or six",
+    ),
+    numbers("--module", "MM", "needed; normal module, one or one a stage"),
+    number("--speed", "RPM", "needed; rated speed of the pinion, of the first stage"),
+    number("--torque", "NM", "needed; rated torque of the same"),
+    numbers(
+        "--widths",
+        "MM",
+        "face width of both or each, of several stages one a stage (default: 10 modules)",
+    ),
     numbers("--bores", "MM", "bore diameters (default: by the torque)"),
     number("--helix", "DEG", "helix angle of the pinion (default: 0, spur)"),
     number("--pressure-angle", "DEG", "of the basic rack (default: 20)"),
@@ -158,6 +166,8 @@ SET_VERBS = {
         summary="options of a gearbox of your own, from its data sheet",
         examples=(
             "gensig new gearbox mine --teeth 20 45 --module 3 --speed 1500 --torque 60",
+            "gensig new gearbox mine --teeth 29 100 36 90 --module 1.5 2"
+            " --speed 1500 --torque 10",
         ),
         runs="gensig.commands.new.gearbox:new",
         arguments=NEW_GEARBOX,

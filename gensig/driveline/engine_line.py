@@ -28,6 +28,7 @@ from gensig.driveline.linear.forced import (
     steady_response,
 )
 from gensig.driveline.linear.matrices import LineMatrices
+from gensig.driveline.stiffness_range import check_stiffness_range
 from gensig.errors import ConfigError
 from gensig.options.configuration import Configuration
 from gensig.sensing.toothed_wheel import ToothedWheel, draw_wheel, instantaneous_speed
@@ -135,8 +136,9 @@ def read_engine_line(config: Configuration) -> EngineLine:
 
     Raises
     ------
-    ConfigError    for a system that is no drive line, none or an ill excitation, nodes that the
-        tables have not
+    ConfigError        for a system that is no drive line, none or an ill excitation, nodes that
+        the tables have not, joints too unlike in stiffness
+    SimulationError    for inertias and joints that natural modes cannot be computed from
     """
     kind = config.section("system").get("kind")
     if kind != LINE:
@@ -152,6 +154,7 @@ def read_engine_line(config: Configuration) -> EngineLine:
     values = config["excitation"]
     check_group("excitation", values)
     drive = read_drive_line(config)
+    check_stiffness_range(drive)
     engine: Engine | MotorDrive
     if values.get("kind") == KIND:
         engine = read_motor(values, drive)

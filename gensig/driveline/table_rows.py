@@ -23,6 +23,7 @@ from gensig.geometry.gear import Gear
 from gensig.material import Material
 from gensig.mesh.iso6336 import mesh_stiffness
 
+MOST_NODES_TOLD = 12  # in a message
 RATIO_TOLERANCE = 1e-3  # relative, of a speed ratio that a table gives beside its teeth
 
 
@@ -141,7 +142,8 @@ def line_gear(
     number = round(row.given("node", row.whole("node")))
     if number not in numbers:
         raise ConfigError(
-            f"{row.location('node')}: {options.shafting_csv} has no node {number}"
+            f"{row.location('node')}: {options.shafting_csv} has no node {number}; "
+            f"{_nodes(numbers)}"
         )
     mass = row.positive("mass") or _disc(shape, material)[0]
     support = None
@@ -155,6 +157,13 @@ def line_gear(
         mass=mass,
         support=support,
     )
+
+
+def _nodes(numbers: tuple[int, ...]) -> str:
+    """The nodes of a table, for a message: all of them, or the first and how many."""
+    if len(numbers) <= MOST_NODES_TOLD:
+        return f"the table has {', '.join(map(str, numbers))}"
+    return f"the table has {len(numbers)} nodes, {min(numbers)} to {max(numbers)}"
 
 
 def ends_of(row: TableRow, numbers: tuple[int, ...]) -> tuple[int, int] | None:
@@ -178,7 +187,9 @@ def ends_of(row: TableRow, numbers: tuple[int, ...]) -> tuple[int, int] | None:
     )
     for column, number in (("edge_from", first), ("edge_to", second)):
         if number not in numbers:
-            raise ConfigError(f"{row.location(column)}: there is no node {number}")
+            raise ConfigError(
+                f"{row.location(column)}: there is no node {number}; {_nodes(numbers)}"
+            )
     if first == second:
         raise ConfigError(
             f"{row.location('edge_to')}: node {first} is joined to itself"
@@ -226,6 +237,7 @@ def mesh_of(
         for node, end in zip(ends, ("from", "to"), strict=True)
     )
     backlash = row.not_negative("backlash", options.backlash)
+    _check_fit(row, shapes[driving], shapes[driven])
     try:
         wheel = replace(shapes[driven], helix_angle=-shapes[driven].helix_angle)
         pair = GearPair(pinion=shapes[driving], wheel=wheel, backlash=backlash)
@@ -248,6 +260,29 @@ def mesh_of(
         pressure_angle=pair.working_pressure_angle,
         location=row.location("edge_to"),
     )
+
+
+def _check_fit(row: TableRow, driving: Gear, driven: Gear) -> None:
+    """Raise for two gears of unlike teeth, with the sizes of both as the gears table has them."""
+    sizes = {
+        "normal_module_mm": (1e3 * driving.normal_module, 1e3 * driven.normal_module),
+        "pressure_angle_deg": _degrees(driving.pressure_angle, driven.pressure_angle),
+        "helix_angle_deg": _degrees(driving.helix_angle, driven.helix_angle),
+    }
+    unlike = [
+        f"{name} {first:g} and {second:g}"
+        for name, (first, second) in sizes.items()
+        if not math.isclose(first, second, rel_tol=1e-9, abs_tol=1e-9)
+    ]
+    if unlike:
+        raise ConfigError(
+            f"{row.location('edge_to')}: {driving.name} and {driven.name} cannot mesh: they "
+            f"have {', '.join(unlike)}; give both the same, or join other nodes"
+        )
+
+
+def _degrees(*angles: float) -> tuple[float, ...]:
+    return tuple(map(math.degrees, angles))
 
 
 def _mesh_stiffness(row: TableRow, pair: GearPair) -> float:

@@ -210,6 +210,16 @@ def exact_numbers(dynamics: PairDynamics) -> tuple[float, ...]:
 
 def near_positions(dynamics: PairDynamics) -> tuple[float, float]:
     """Positions s outside of which no pair comes within ``FAR_NEAR`` of touching, m."""
+    position = dynamics.table.position
+    near = np.flatnonzero(nearest_gaps(dynamics) < FAR_NEAR)
+    first, last = 0, len(position) - 1
+    if len(near) > 0:  # else every pair may be as near as any other
+        first, last = max(near[0] - 1, first), min(near[-1] + 1, last)
+    return float(position[first]), float(position[last])
+
+
+def nearest_gaps(dynamics: PairDynamics) -> Array:
+    """No less than these are the gaps of any pair of teeth, with their errors, (node,) m."""
     table = dynamics.table
     beyond = table.position - table.pair.pitch_point - half_lag(table)
     teeth = (
@@ -220,11 +230,7 @@ def near_positions(dynamics: PairDynamics) -> tuple[float, float]:
         flank + error.min() + np.minimum(tilt.min() * beyond, tilt.max() * beyond)
         for flank, (error, tilt) in zip(least_gaps(table), teeth, strict=True)
     ]
-    near = np.flatnonzero(nearest[0] + nearest[1] < FAR_NEAR)
-    first, last = 0, len(table.position) - 1
-    if len(near) > 0:  # else every pair may be as near as any other
-        first, last = max(near[0] - 1, first), min(near[-1] + 1, last)
-    return float(table.position[first]), float(table.position[last])
+    return np.asarray(nearest[0] + nearest[1])
 
 
 def mesh_indices(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeVar
 
@@ -10,7 +11,9 @@ from numpy.typing import NDArray
 
 from gensig.dynamics.decimation import in_band_error
 from gensig.dynamics.integrator import BOUNCING, FINEST, Motions, Solver
-from gensig.errors import SimulationError
+from gensig.dynamics.lanes import nearest_gaps
+from gensig.dynamics.pair import PairDynamics
+from gensig.errors import SimulationError, StepError
 from gensig.sensing.agreement import agreement
 from gensig.systems.base import Machine
 from gensig.systems.run import CleanRecord, Run
@@ -43,13 +46,19 @@ def checks(
 
 
 def is_too_coarse(run: Run[MachineT], record: CleanRecord | SimulationError) -> bool:
-    """True for a record whose check failed and that can be made with twice the steps."""
-    if isinstance(record, SimulationError) or record.integration_check != "unresolved":
+    """True if a record should be made again at half the step; never without ``max_error``."""
+    solver = run.system.solver
+    if solver.max_error is None:
         return False
     finest = FINEST
-    if record.contact_loss_fraction > BOUNCING:
-        finest = FINEST_BOUNCING
-    return 2 * run.system.solver.oversampling <= finest
+    if isinstance(record, CleanRecord):
+        if record.integration_check != "unresolved":
+            return False
+        if record.contact_loss_fraction > BOUNCING:
+            finest = FINEST_BOUNCING
+    elif not isinstance(record, StepError):
+        return False
+    return 2 * solver.oversampling <= finest
 
 
 def finer(run: Run[MachineT]) -> Run[MachineT]:
@@ -59,11 +68,35 @@ def finer(run: Run[MachineT]) -> Run[MachineT]:
     return replace(run, system=replace(run.system, solver=halved))
 
 
-def not_finite(run: Run[MachineT]) -> SimulationError:
-    """The error of a motion that did not stay finite."""
-    operating = run.system.operating
-    return SimulationError(
-        f"the motion stopped being finite (speed {from_si('speed_rpm', operating.speed):g} "
-        f"r/min, torque {operating.torque:g} N m); raise solver.oversampling above "
-        f"{run.system.solver.oversampling}"
+def not_finite(run: Run[MachineT], meshes: Sequence[PairDynamics]) -> StepError:
+    """The error of a motion that left all bounds: what may have driven it there, and a remedy."""
+    operating, solver = run.system.operating, run.system.solver
+    speed_rpm = from_si("speed_rpm", operating.speed)
+    step = 1.0 / (run.system.sensing.sampling_rate * solver.oversampling)
+    failed = (
+        f"the motion stopped being finite (speed {speed_rpm:g} r/min, torque "
+        f"{operating.torque:g} N m, steps of {step:.3g} s)"
+    )
+    remedy = f"raise solver.oversampling above {solver.oversampling}"
+    if solver.max_error is None:
+        remedy += ", or give solver.max_error=1e-3, which tries finer steps by itself"
+    if run.system.mesh.law != "one_sided":
+        return StepError(f"{failed}; {remedy}")
+    for mesh in meshes:
+        backlash_um = from_si("backlash_um", mesh.table.pair.backlash)
+        overlap_um = -from_si("gap_um", float(nearest_gaps(mesh).min()))
+        if overlap_um > backlash_um:
+            return StepError(
+                f"{failed}: teeth stand out by up to {overlap_um:.3g} um along the line of "
+                f"action, more than the backlash of {backlash_um:.3g} um, and jam; make the "
+                "errors of the gears (quality, fault) smaller or gear.backlash_um larger"
+            )
+    if solver.max_error is not None:
+        remedy = (
+            "raise operating.torque_nm, or make the errors of the gears (quality, fault) "
+            "smaller"
+        )
+    return StepError(
+        f"{failed}: teeth that part land harder than such steps can follow, the more so the "
+        f"lighter the load; {remedy}"
     )

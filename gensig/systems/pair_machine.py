@@ -268,7 +268,7 @@ def _side_by_side(
     records: list[CleanRecord | SimulationError] = []
     for index, run in enumerate(runs):
         if not motions.finite[index]:
-            records.append(not_finite(run))
+            records.append(not_finite(run, [machines[index]]))
             continue
         acceleration, angle = motions.acceleration[index], motions.angle[index, 0]
         if run.gearbox is not None:

@@ -77,7 +77,7 @@ def read_wishes(arguments: Namespace) -> Wishes:
 
 def experiment_text(option: GearOption, wishes: Wishes) -> str:
     """The file of the experiment, with the origin of each value."""
-    _check_rate(option, wishes)
+    check_rate(option, wishes)
     name = option.gear["name"]
     classes = list(wishes.classes or CLASSES)
     n_records = N_UNITS * len(classes)
@@ -97,26 +97,28 @@ def experiment_text(option: GearOption, wishes: Wishes) -> str:
     if option.is_helical:
         defaults.append("  - override /system: helical_pair")
     lines += ["defaults:", *defaults, f"  - override /gear: {name}", "  - _self_", ""]
-    lines += _operating(option, wishes)
+    lines += operating_lines(option, wishes)
     if wishes.grade is not None:
-        lines += _quality(wishes, wishes.grade)
+        lines += quality_lines(wishes, wishes.grade)
     if wishes.is_realistic:
         lines += [*_couplings(option), *_housing(wishes)]
     else:
         lines += _bearings(option, wishes)
-    lines += _plan(option, wishes, classes, n_records)
+    lines += plan_lines(option, wishes, classes, n_records)
     return "\n".join(lines) + "\n"
 
 
-def _line(text: str, remark: str) -> str:
+def remarked(text: str, remark: str) -> str:
+    """A line of YAML with a remark behind it."""
     return f"{text:<32} # {remark}"
 
 
-def _short(value: float) -> str:
+def short_text(value: float) -> str:
+    """A number in three digits."""
     return f"{float(f'{value:.3g}'):g}"
 
 
-def _check_rate(option: GearOption, wishes: Wishes) -> None:
+def check_rate(option: GearOption, wishes: Wishes) -> None:
     """Raise ConfigError where the mesh frequency lies above the usable band."""
     fastest = wishes.speed_shares[1] * option.gear["rated_speed_rpm"] / 60.0
     mesh = fastest * option.pair.pinion.n_teeth
@@ -128,13 +130,15 @@ def _check_rate(option: GearOption, wishes: Wishes) -> None:
         )
 
 
-def _origin(given: object) -> str:
+def origin_of(given: object) -> str:
+    """The origin of a value that a flag may give."""
     if given is None:
         return "assumed"
     return "given"
 
 
-def _operating(option: GearOption, wishes: Wishes) -> list[str]:
+def operating_lines(option: GearOption, wishes: Wishes) -> list[str]:
+    """The group ``operating``: the duration of a record."""
     duration, remark = wishes.duration, "given"
     if duration is None:
         slowest = wishes.speed_shares[0] * option.gear["rated_speed_rpm"]
@@ -142,11 +146,12 @@ def _operating(option: GearOption, wishes: Wishes) -> list[str]:
         duration = max(1.0, math.ceil(10.0 * least) / 10.0)
         turns = f"{LEAST_TURNS} turns of the pinion"
         remark = f"derived: at least {turns} at the slowest speed"
-    return ["operating:", _line(f"  duration_s: {duration:g}", remark)]
+    return ["operating:", remarked(f"  duration_s: {duration:g}", remark)]
 
 
-def _quality(wishes: Wishes, grade: int) -> list[str]:
-    lines = ["quality:", _line(f"  iso1328_grade: {grade}", "given")]
+def quality_lines(wishes: Wishes, grade: int) -> list[str]:
+    """The group ``quality`` for a grade of ISO 1328."""
+    lines = ["quality:", remarked(f"  iso1328_grade: {grade}", "given")]
     if wishes.is_realistic:
         base = _realistic()["quality"]
         base_grade, base_tilt = base["iso1328_grade"], base["misalignment_um"]
@@ -155,32 +160,65 @@ def _quality(wishes: Wishes, grade: int) -> list[str]:
             f"assumed: {base_tilt:g} at grade {base_grade}, "
             "a factor of sqrt(2) a grade as in ISO 1328-1"
         )
-        lines.append(_line(f"  misalignment_um: {tilt:.3g}", remark))
+        lines.append(remarked(f"  misalignment_um: {tilt:.3g}", remark))
     return lines
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScaledRotor:
+    """Motor or load of the realistic experiment, scaled to a torque as bodies of one shape.
+
+    ``inertia`` kg m2 and ``stiffness`` N m/rad of its coupling; ``base_inertia``,
+    ``base_stiffness`` are those at ``base_torque`` N m. An inertia goes with torque^(5/3), a
+    coupling with the torque.
+    """
+
+    inertia: float
+    stiffness: float
+    base_inertia: float
+    base_stiffness: float
+    base_torque: float
+
+    @property
+    def origin(self) -> str:
+        """The origin of the inertia, for a remark."""
+        return f"{self.base_inertia:g} kg m2 at {self.base_torque:.3g} N m, times torque^(5/3)"
+
+
+def scaled_rotor(name: str, torque: float) -> ScaledRotor:
+    """The ``motor`` or the ``load`` of the realistic experiment for a torque of its shaft, N m."""
+    base = _realistic()
+    body, gear = base["system"][name], base["gear"]
+    base_torque = gear["rated_torque_nm"]
+    if name == "load":
+        base_torque *= _ratio(gear)
+    size = torque / base_torque
+    inertia, stiffness = body["inertia_kg_m2"], body["coupling_stiffness_nm_per_rad"]
+    return ScaledRotor(
+        inertia=float(short_text(inertia * size ** (5 / 3))),
+        stiffness=float(short_text(stiffness * size)),
+        base_inertia=inertia,
+        base_stiffness=stiffness,
+        base_torque=base_torque,
+    )
 
 
 def _couplings(option: GearOption) -> list[str]:
     """Motor and load of the realistic experiment, scaled as bodies of one shape."""
-    base = _realistic()
-    gear, base_gear = option.gear, base["gear"]
-    ratios = {"motor": (1.0, 1.0), "load": (_ratio(gear), _ratio(base_gear))}
-    lines = ["system:"]
-    for name, (ratio, base_ratio) in ratios.items():
-        body = base["system"][name]
-        base_torque = base_gear["rated_torque_nm"] * base_ratio
-        size = gear["rated_torque_nm"] * ratio / base_torque
-        inertia = body["inertia_kg_m2"]
-        stiffness = body["coupling_stiffness_nm_per_rad"]
+    gear, lines = option.gear, ["system:"]
+    torque = gear["rated_torque_nm"]
+    for name, of_rotor in (("motor", torque), ("load", torque * _ratio(gear))):
+        rotor = scaled_rotor(name, of_rotor)
         lines += [
             f"  {name}:",
-            _line(
-                f"    inertia_kg_m2: {_short(inertia * size ** (5 / 3))}",
-                f"assumed: {inertia:g} at {base_torque:.3g} N m, times torque^(5/3), "
-                "bodies of one shape",
+            remarked(
+                f"    inertia_kg_m2: {rotor.inertia:g}",
+                f"assumed: {rotor.base_inertia:g} at {rotor.base_torque:.3g} N m, "
+                "times torque^(5/3), bodies of one shape",
             ),
-            _line(
-                f"    coupling_stiffness_nm_per_rad: {_short(stiffness * size)}",
-                f"assumed: {stiffness:g} there, likewise",
+            remarked(
+                f"    coupling_stiffness_nm_per_rad: {rotor.stiffness:g}",
+                f"assumed: {rotor.base_stiffness:g} there, likewise",
             ),
         ]
     return lines
@@ -195,20 +233,23 @@ def _housing(wishes: Wishes) -> list[str]:
     sensing, rate = _realistic()["sensing"], wishes.rate
     if rate is None:
         rate = sensing["sampling_rate_hz"]
-    lines = ["sensing:", _line(f"  sampling_rate_hz: {rate:g}", _origin(wishes.rate))]
+    lines = [
+        "sensing:",
+        remarked(f"  sampling_rate_hz: {rate:g}", origin_of(wishes.rate)),
+    ]
     if wishes.sensors is not None:
-        lines.append(_line(f"  sensors: [{', '.join(wishes.sensors)}]", "given"))
+        lines.append(remarked(f"  sensors: [{', '.join(wishes.sensors)}]", "given"))
     lowest, highest = sensing["path"]["natural_frequency_hz"]
     usable = usable_band(rate)[1]
     if highest > usable:
         low = min(lowest, 0.5 * usable)
         band = f"    natural_frequency_hz: [{low:g}, {usable:g}]"
         remark = f"assumed, {highest:g} cut to the usable band of the rate"
-        lines += ["  path:", _line(band, remark)]
+        lines += ["  path:", remarked(band, remark)]
     low, high = sensing["noise"]["band_hz"]
     if high > 0.5 * rate:
         band = f"    band_hz: [{low:g}, {0.5 * rate:g}]"
-        lines += ["  noise:", _line(band, f"assumed, {high:g} cut to half the rate")]
+        lines += ["  noise:", remarked(band, f"assumed, {high:g} cut to half the rate")]
     return lines
 
 
@@ -219,40 +260,44 @@ def _bearings(option: GearOption, wishes: Wishes) -> list[str]:
     channels = [f"{gear}_{axis}" for gear in ("pinion", "wheel") for axis in axes]
     lines = ["sensing:"]
     if wishes.rate is not None:
-        lines.append(_line(f"  sampling_rate_hz: {wishes.rate:g}", "given"))
-    lines.append(_line(f"  channels: [{', '.join(channels)}]", "at the bearings"))
+        lines.append(remarked(f"  sampling_rate_hz: {wishes.rate:g}", "given"))
+    lines.append(remarked(f"  channels: [{', '.join(channels)}]", "at the bearings"))
     return lines
 
 
-def _plan(
+def plan_lines(
     option: GearOption, wishes: Wishes, classes: list[str], n_records: int
 ) -> list[str]:
+    """The group ``plan``: counts, classes, and ranges of the rated speed and torque."""
     speed, torque = option.gear["rated_speed_rpm"], option.gear["rated_torque_nm"]
     torque_shares = wishes.torque_range or TORQUE_SHARES
     lowest = LOWEST_SNR[wishes.base]
     lines = [
         "plan:",
-        _line(f"  n_records: {n_records}", "assumed: one of each class and unit"),
-        _line(
+        remarked(f"  n_records: {n_records}", "assumed: one of each class and unit"),
+        remarked(
             f"  n_units: {N_UNITS}",
             "assumed; a unit is one set of gears in one housing",
         ),
-        _line(
+        remarked(
             "  n_gearboxes: null",
             "about the square root of n_units; 1: all sets of gears in one housing, yours",
         ),
-        _line(f"  classes: [{', '.join(classes)}]", _origin(wishes.classes)),
+        remarked(f"  classes: [{', '.join(classes)}]", origin_of(wishes.classes)),
         "  vary:",
         _drawn("speed_rpm", speed, wishes.speed_shares, wishes.speed_range),
         _drawn("torque_nm", torque, torque_shares, wishes.torque_range),
-        _line(
+        remarked(
             f"    sensing.snr_db: {{distribution: uniform, low: {lowest}, high: 30}}",
             "assumed",
         ),
     ]
     if wishes.is_realistic:
         remark = "whole groups; small shards keep two workers busy to the end"
-        lines += ["dataset:", _line(f"  records_per_shard: {4 * len(classes)}", remark)]
+        lines += [
+            "dataset:",
+            remarked(f"  records_per_shard: {4 * len(classes)}", remark),
+        ]
     return lines
 
 
@@ -260,9 +305,9 @@ def _drawn(key: str, rated: float, shares: Sequence[float], given: object) -> st
     """A line of ``plan.vary`` for a range of shares of a rated value."""
     low, high = shares
     ends = f"low: {low * rated:.6g}, high: {high * rated:.6g}"
-    return _line(
+    return remarked(
         f"    operating.{key}: {{distribution: uniform, {ends}}}",
-        f"{_origin(given)}: {low:g} to {high:g} of the rated",
+        f"{origin_of(given)}: {low:g} to {high:g} of the rated",
     )
 
 

@@ -82,10 +82,18 @@ def read_motor(values: Section, drive: DriveLine) -> MotorDrive:
             raise ConfigError(
                 f"{GROUP}.loads.{name}.node: {_no_node(drive, load.node)}"
             )
+    motor_node = _node(drive, "motor_node", "a motor", drive.motor_node)
+    load_node = _node(drive, "load_node", "its load", drive.load_node)
+    if motor_node == load_node and not loads:
+        raise ConfigError(
+            f"system.motor_node and system.load_node are both {motor_node}: the load would take "
+            "the torque where the motor gives it, and no gear would carry any; put the load on "
+            "another node"
+        )
     return MotorDrive(
         reference=read(Reference, values["reference"], f"{GROUP}.reference"),
-        motor_node=_node(drive, "motor_node", "a motor", drive.motor_node),
-        load_node=_node(drive, "load_node", "its load", drive.load_node),
+        motor_node=motor_node,
+        load_node=load_node,
         slip=motor.slip,
         ripple=motor.torque_ripple,
         load_law=read(_Load, values["load"], f"{GROUP}.load").law,

@@ -67,8 +67,13 @@ def natural_modes(matrices: LineMatrices) -> Modes:
     n_rigid = len(matrices.rigid)
     frequency = np.sqrt(np.maximum(square, 0.0)) / (2.0 * math.pi)
     if np.count_nonzero(frequency <= RIGID_SHARE * frequency[-1]) > n_rigid:
+        softest, fastest = (
+            matrices.names[int(np.abs(shapes[mode]).argmax())] for mode in (n_rigid, -1)
+        )
         raise SimulationError(
-            "some degree of freedom has no restoring force; check supports and joints"
+            f"{softest} has next to no restoring force beside {fastest}, which vibrates at "
+            f"{frequency[-1]:.3g} Hz: over {1.0 / RIGID_SHARE:g} times the lowest natural "
+            "frequency; check inertias and stiffnesses of both and their units"
         )
     frequency[:n_rigid] = 0.0
     # rotations of the parts do not couple through the mass, so each is a mode of its own

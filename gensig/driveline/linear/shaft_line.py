@@ -9,7 +9,7 @@ stiffnesses are those of their own shaft, none is referred to another one.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -139,6 +139,26 @@ def _check_losses(location: str, damping: float, loss_factor: float) -> None:
             raise ConfigError(f"{location}: {name} {value:g} must not be negative")
 
 
+def _loop(
+    reached_from: Mapping[int, int | None], first: int, last: int
+) -> tuple[int, ...]:
+    """Nodes from one to another along the tree that reached both."""
+    ways = []
+    for node in (first, last):
+        way: list[int] = []
+        step: int | None = node
+        while step is not None:
+            way.append(step)
+            step = reached_from[step]
+        ways.append(way)
+    there, back = ways
+    meeting = next(node for node in there if node in back)
+    return (
+        *there[: there.index(meeting) + 1],
+        *reversed(back[: back.index(meeting)]),
+    )
+
+
 def _check_numbers(name: str, numbers: tuple[int, ...], count: int, kind: str) -> None:
     for number in numbers:
         if not 0 <= number < count:
@@ -202,25 +222,27 @@ class ShaftLine:
             joints[driving.node].append((driven.node, ratio, mesh.location))
             joints[driven.node].append((driving.node, 1 / ratio, mesh.location))
         speeds: dict[int, Fraction] = {}
+        reached_from: dict[int, int | None] = {}
         for first in range(len(self.nodes)):
             if first in speeds:
                 continue
-            speeds[first] = Fraction(1)
+            speeds[first], reached_from[first] = Fraction(1), None
             waiting = [first]
             while waiting:
                 node = waiting.pop()
                 for mate, ratio, location in joints[node]:
                     speed = speeds[node] * ratio
                     if mate not in speeds:
-                        speeds[mate] = speed
+                        speeds[mate], reached_from[mate] = speed, node
                         waiting.append(mate)
                     elif speeds[mate] != speed:
+                        loop = _loop(reached_from, node, mate)
+                        names = " - ".join(self.nodes[n].name for n in loop)
                         raise ConfigError(
-                            f"{location or 'a loop'}: this joint closes a loop that locks: "
-                            f"it would turn {self.nodes[mate].name} at {float(speed):g} "
-                            f"of the first node's speed, "
-                            f"the rest of the loop at {float(speeds[mate]):g}; "
-                            "change teeth or leave the joint out"
+                            f"{location or 'a loop'}: this joint closes a loop that locks, "
+                            f"{names}: it would turn {self.nodes[mate].name} at "
+                            f"{float(speed):g} of the first node's speed, the rest of the loop "
+                            f"at {float(speeds[mate]):g}; change teeth or leave a joint out"
                         )
         return tuple(speeds[node] for node in range(len(self.nodes)))
 

@@ -132,7 +132,7 @@ def _together(
     records: list[CleanRecord | SimulationError] = []
     for index, (run, line) in enumerate(zip(runs, machines, strict=True)):
         if not motions.finite[index]:
-            records.append(not_finite(run))
+            records.append(not_finite(run, line.pairs))
             continue
         signals = _signals(line, motions, index, dofs, rate)
         number, mesh = run.system.mesh_number, None

@@ -143,12 +143,18 @@ def settled(
 ) -> GroupRun:
     """Machines at the end of the last stage.
 
-    Those that bounced have settled in finer steps.
+    Those that bounced have settled in finer steps. Those that went out of bounds even so have
+    settled in the steps of the record: the stiffness of a hard landing has no bound, so that no
+    step can be known to be stable in it.
     """
     run, bounced = run_stages(run, lanes, begins, stages, steps)
     careful = [(min(oversampling, max(CAREFUL, n)), until) for n, until in stages]
     if bounced.any() and careful != stages:
         run.take(run_stages(run, lanes, begins, careful, steps)[0], bounced)
+    diverged = ~run.is_within(OUT_OF_BOUNDS)
+    finest = [(oversampling, until) for _, until in stages]
+    if diverged.any() and finest != careful:
+        run.take(run_stages(run, lanes, begins, finest, steps)[0], diverged)
     return run.restarted()
 
 

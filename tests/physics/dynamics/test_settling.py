@@ -1,5 +1,6 @@
 """A record begins settled, after settling in coarse steps."""
 
+import re
 from dataclasses import replace
 from itertools import pairwise
 
@@ -15,7 +16,7 @@ from gensig.dynamics.backends.step_limits import (
     settling_stages,
 )
 from gensig.dynamics.decimation import in_band_error
-from gensig.errors import SimulationError
+from gensig.errors import SimulationError, StepError
 from gensig.faults.broken import MissingTooth
 from gensig.sensing.manufacturing import draw_gearbox, draw_specimen
 from gensig.systems.base import simulate_together
@@ -121,8 +122,83 @@ def test_hard_landings_settle_in_finer_steps(run, runs, monkeypatch):
 
     assert together[1].contact_loss_fraction > BOUNCING
 
+    step = solver_steps(bouncing)
+    assert settling_steps([bouncing], monkeypatch) == [1, 3]
+
     monkeypatch.setattr(group_motions, "CAREFUL", 1)
-    assert isinstance(simulate_together([bouncing])[0], SimulationError)
+    assert settling_steps([bouncing], monkeypatch) == [1, step]
+
+
+def solver_steps(run):
+    return run.system.solver.oversampling
+
+
+def settling_steps(runs, monkeypatch):
+    """Steps per sample of the first stage, in the order in which settling was tried."""
+    tried = []
+    run_stages = group_motions.run_stages
+
+    def noted(run, lanes, begins, stages, steps):
+        tried.append(stages[0][0])
+        return run_stages(run, lanes, begins, stages, steps)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(group_motions, "run_stages", noted)
+        (record,) = simulate_together(runs)
+    assert not isinstance(record, SimulationError)
+    return tried
+
+
+@pytest.fixture(scope="module")
+def landing(run):
+    """Two teeth missing under 0.2 N m at 3600 r/min, recorded at 5120 Hz, without noise."""
+    missing = [MissingTooth(gear="pinion", tooth=tooth) for tooth in (3, 4)]
+
+    def make(oversampling, max_error=None):
+        changes = {
+            "operating.torque_nm": 0.2,
+            SPEED: 3600,
+            "sensing.sampling_rate_hz": 5120,
+            "solver.oversampling": oversampling,
+            "solver.max_error": max_error,
+        }
+        single = run(changes, missing)
+        return replace(single, specimen=None, gearbox=None)
+
+    return make
+
+
+@pytest.mark.filterwarnings("ignore::gensig.dynamics.integrator.CoarseStepWarning")
+class TestLandingsTooHardForTheSettling:
+    """A landing is as stiff as it is hard; the least stable step is that of the mean force."""
+
+    def test_they_settle_in_the_steps_of_the_record(self, landing, runs, monkeypatch):
+        single = landing(16)
+        (record,) = simulate_together([single])
+        assert settling_steps([single], monkeypatch) == [9, 16]
+        assert record.contact_loss_fraction > BOUNCING
+
+        stages = tuple((16, before) for _, before in COARSE)
+        monkeypatch.setattr(step_limits, "COARSE", stages)
+        (finer,) = simulate_together([single])
+        assert record.acceleration.tobytes() == finer.acceleration.tobytes()
+
+    def test_neighbours_keep_their_bits(self, landing, run):
+        rate = {"sensing.sampling_rate_hz": 5120, "solver.oversampling": 16}
+        assert_independent([run(rate), landing(16), run({**rate, SPEED: 900})])
+
+    def test_too_long_steps_of_the_record_are_halved(self, landing):
+        """With a limit of the error; without one the error says what to raise."""
+        (failed,) = simulate_together([landing(9)])
+        assert isinstance(failed, StepError)
+        told = (
+            "land harder than such steps can follow.*raise solver.oversampling above 9"
+        )
+        assert re.search(told, str(failed))
+
+        (record,) = simulate_together([landing(9, max_error=1.0)])
+        (finer,) = simulate_together([landing(18, max_error=1.0)])
+        assert record.acceleration.tobytes() == finer.acceleration.tobytes()
 
 
 @pytest.mark.filterwarnings("ignore::gensig.dynamics.integrator.CoarseStepWarning")

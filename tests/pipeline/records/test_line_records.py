@@ -168,6 +168,10 @@ FAN = "excitation.loads={{fan: {{node: {}, law: {}, torque_nm: 1}}}}"
             ["system.load_node=99"],
             "system.motor_node, system.load_node and, for records",
         ),
+        (
+            ["system.load_node=1"],
+            "system.motor_node and system.load_node are both 1: the load would take",
+        ),
         ([FAN.format(99, "linear")], "excitation.loads.fan.node: the shaft line"),
         ([FAN.format(2, "cubic")], "excitation.loads.fan.law = 'cubic'"),
         (["+excitation.cylinder={bore_mm: 100}"], "a line is turned by one of them"),

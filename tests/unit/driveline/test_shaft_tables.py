@@ -8,7 +8,8 @@ from numpy.testing import assert_allclose
 
 from gensig.driveline.drive_line import read_drive_line
 from gensig.driveline.shaft_tables import read_shafting, shipped_tables
-from gensig.errors import ConfigError
+from gensig.driveline.stiffness_range import check_stiffness_range
+from gensig.errors import ConfigError, SimulationError
 from gensig.plan.request import read_request
 
 SHAFTING = """# a motor, two gears and a fan
@@ -162,7 +163,7 @@ def test_shafts_alone_need_no_gears(line_of):
         (
             "3,4,shaft",
             "3,7,shaft",
-            r"row 5 \(node 3\), column edge_to: there is no node 7",
+            r"row 5 \(node 3\), column edge_to: there is no node 7; the table has 1, 2, 3, 4$",
         ),
         ("3,4,shaft", "3,3,shaft", "column edge_to: node 3 is joined to itself"),
         ("3,4,shaft", "3,,shaft", "column edge_to: it is empty"),
@@ -289,9 +290,18 @@ def test_a_mistake_in_the_line_names_row_and_column(line_of, old, new, message):
         (
             "3,wheel,40",
             "9,wheel,40",
-            r"gears.csv, row 3 .*column node: .* has no node 9",
+            r"gears.csv, row 3 .*column node: .* has no node 9; the table has 1, 2, 3, 4$",
         ),
-        ("3,wheel,40,2", "3,wheel,40,3", "pinion and wheel: .*normal_module differs"),
+        (
+            "3,wheel,40,2",
+            "3,wheel,40,3",
+            "edge_to: pinion and wheel cannot mesh: they have normal_module_mm 2 and 3; give",
+        ),
+        (
+            "3,wheel,40,2,20,0",
+            "3,wheel,40,2,21,15",
+            "they have pressure_angle_deg 20 and 21, helix_angle_deg 0 and 15; give both",
+        ),
         (
             "3,wheel,40,2,20",
             "3,wheel,40,2,60",
@@ -348,9 +358,56 @@ def test_gears_that_lock_are_named(line_of):
     ring = SHAFTING + ",,,,900,3,2,gear_mesh,39,19,\n"
     gears = GEARS + "3,second,39,2,20,0,20\n2,other,19,2,20,0,20\n"
     with pytest.raises(
-        ConfigError, match=r"row 7, column edge_to: this joint closes a loop that locks"
+        ConfigError,
+        match=r"row 7, column edge_to: this joint closes a loop that locks, pinion - wheel: it",
     ):
         line_of(ring, gears)
+
+
+def test_a_loop_that_locks_names_its_nodes(line_of):
+    shaft = SHAFTING + ",,,,20,4,1,shaft,,,\n"
+    with pytest.raises(
+        ConfigError, match=r"a loop that locks, .*: it would turn"
+    ) as told:
+        line_of(shaft)
+    loop = str(told.value).split("locks, ")[1].split(":")[0].split(" - ")
+    assert sorted(loop) == ["fan", "motor", "pinion", "wheel"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "named"),
+    [
+        (
+            "10,1,2",
+            "1e12,1,2",
+            "motor - pinion with 1e.15 N m/rad and wheel - fan with",
+        ),
+        (
+            "1500,2,3",
+            "1e10,2,3",
+            "pinion - wheel with 1e.13 N m/rad and motor - pinion",
+        ),
+        (
+            "10,1,2",
+            "1e-9,1,2",
+            "pinion - wheel with 1.5e.06 N m/rad and motor - pinion",
+        ),
+    ],
+)
+def test_joints_that_rounding_cannot_tell_apart_are_named(line_of, old, new, named):
+    """A unit that is wrong: records and forced vibration need the twist of every joint."""
+    check_stiffness_range(line_of())
+    with pytest.raises(ConfigError, match=f"edge_to: {named}.*too unlike.*1e.09"):
+        check_stiffness_range(line_of(SHAFTING.replace(old, new)))
+
+
+def test_an_inertia_that_rounding_hides_is_named(line_of):
+    light = SHAFTING.replace("pinion,1e-3", "pinion,1e-12")
+    stiff = light.replace("10,1,2", "1e5,1,2").replace("1500,2,3", "1e5,2,3")
+    with pytest.raises(
+        SimulationError, match=r"no restoring force beside pinion, .* at .*e.\d+ Hz"
+    ):
+        check_stiffness_range(line_of(stiff))
 
 
 @pytest.mark.parametrize(

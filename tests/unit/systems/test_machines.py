@@ -19,6 +19,7 @@ from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
 from gensig.sensing.manufacturing import nominal_gearbox, perfect_specimen
 from gensig.systems.base import Machine, simulate_together
+from gensig.systems.integration_checks import is_too_coarse
 from gensig.systems.pair_machine import (
     GearPairMachine,
     PairMachine,

@@ -1,0 +1,171 @@
+"""The system and the experiment of a gearbox of several stages, as options."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from gensig.commands.new.data_sheet import GearOption
+from gensig.commands.new.experiment import (
+    CLASSES,
+    N_UNITS,
+    TORQUE_SHARES,
+    Wishes,
+    check_rate,
+    operating_lines,
+    plan_lines,
+    quality_lines,
+    remarked,
+)
+from gensig.commands.new.line_tables import LineNodes
+from gensig.commands.new.stages import (
+    StagedSheet,
+    mesh_forces,
+    shaft_diameters,
+    support_force,
+)
+from gensig.driveline.machine_checks import FAR_ABOVE
+from gensig.dynamics.bearing_sizes import bearing_for
+from gensig.dynamics.decimation import usable_band
+from gensig.systems.derived_sizes import bearing_values
+
+LOWEST_RATE = 10240.0  # Hz, of sensing=geared_line
+HARMONICS = 4  # of the fastest mesh in the usable band
+SUPPORT_SHAFT = (
+    1  # the shaft whose bearing and thickness hold all gears: the first idler's
+)
+
+
+def system_text(
+    sheet: StagedSheet,
+    stages: Sequence[GearOption],
+    wishes: Wishes,
+    tables: dict[str, Path],
+) -> str:
+    """The option of the system; ``tables`` are files by their key of the group."""
+    nodes = LineNodes(n_stages=sheet.n_stages)
+    named = ", ".join(
+        f"{list(mesh)} stage {number}"
+        for number, mesh in enumerate(nodes.meshes, start=1)
+    )
+    lines = [
+        "# @package _global_",
+        f"# A gearbox of {sheet.n_stages} stages, {sheet.written_teeth} teeth, between a motor "
+        "and a brake.",
+        "# Written by gensig new gearbox. The heads of both tables say where sizes are from; put "
+        "in what",
+        "# you know. docs/howto/your_drive_line.md",
+        "defaults: [shaft_line, _self_]",
+        "",
+        "system:",
+        f"  name: {sheet.name}",
+        "  # tables: from the folder in which gensig is called, or a full path",
+        *[f"  {key}: {file.as_posix()}" for key, file in tables.items()],
+        remarked(
+            f"  record_mesh: {list(nodes.meshes[0])}", f"{named}: nodes of its gears"
+        ),
+        remarked("  motor_node: 1", "Motor"),
+        remarked(f"  load_node: {nodes.load}", "Brake"),
+        *_support_lines(sheet, stages, wishes),
+        "  campbell:",
+        remarked(
+            f"    high_speed_rpm: {1.5 * sheet.speed:g}", "assumed: 1.5 of the rated"
+        ),
+        "excitation:",
+        "  reference:",
+        remarked(f"    speed_rpm: {sheet.speed:g}", "given; of the motor"),
+        remarked(
+            f"    torque_nm: {sheet.torque:g}",
+            "given; of the load, as the motor feels it",
+        ),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _support_lines(
+    sheet: StagedSheet, stages: Sequence[GearOption], wishes: Wishes
+) -> list[str]:
+    """The one support of all gears: its force, and bearing and shaft of the first idler."""
+    share = (wishes.torque_range or TORQUE_SHARES)[1]
+    force = support_force(stages, share, FAR_ABOVE)
+    forces = ", ".join(f"{value:.0f}" for value in mesh_forces(stages))
+    diameter = shaft_diameters(sheet)[SUPPORT_SHAFT]
+    width = max(option.gear["pinion"]["face_width_mm"] for option in stages[:2])
+    lines = [
+        "  support:                       # one for all gears",
+        remarked(
+            f"    force_n: {force:g}",
+            f"assumed: for the mesh forces of all stages, {forces} N at the rated torque",
+        ),
+        remarked(
+            "    bearing:",
+            f"assumed: of the first idler, {bearing_for(diameter).describes}",
+        ),
+    ]
+    values = bearing_values(diameter)
+    lines += [f"      {key}: {value:g}" for key, value in values.items()]
+    return [
+        *lines,
+        "    shaft:",
+        remarked(f"      diameter_mm: {diameter:g}", "derived: of the first idler"),
+        remarked(
+            f"      span_mm: {2.0 * width + diameter:.4g}",
+            "assumed: two face widths and a shaft diameter, the gear in the middle",
+        ),
+    ]
+
+
+def staged_experiment_text(
+    sheet: StagedSheet, stages: Sequence[GearOption], wishes: Wishes
+) -> str:
+    """The experiment, with the origin of each value."""
+    for option in stages:
+        check_rate(option, wishes)
+    classes = list(wishes.classes or CLASSES)
+    n_records = N_UNITS * len(classes)
+    lines = [
+        "# @package _global_",
+        f"# Written by gensig new gearbox: {n_records} records of {sheet.name}, "
+        f"{len(classes)} classes from {N_UNITS} units. Faults are",
+        "# drawn in shares of a tooth, on the driving gear of system.record_mesh; "
+        "fault.gear=wheel: the driven one.",
+        "defaults:",
+        f"  - override /system: {sheet.name}",
+        "  - _self_",
+        "",
+        *operating_lines(stages[0], wishes),
+    ]
+    if wishes.grade is not None:
+        lines += quality_lines(wishes, wishes.grade)
+    lines += [
+        "sensing:",
+        _rate_line(stages, wishes),
+        remarked(
+            "  channels: [pinion_y, wheel_y]",
+            "bearings of the followed gears, along the line of action; lines have no friction",
+        ),
+        *plan_lines(stages[0], wishes, classes, n_records),
+        "dataset:",
+        remarked(
+            f"  records_per_shard: {4 * len(classes)}",
+            "whole groups; small shards keep two workers busy to the end",
+        ),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _rate_line(stages: Sequence[GearOption], wishes: Wishes) -> str:
+    """The sampling rate: as given, or enough for some harmonics of the fastest mesh."""
+    if wishes.rate is not None:
+        return remarked(f"  sampling_rate_hz: {wishes.rate:g}", "given")
+    fastest = max(
+        option.gear["rated_speed_rpm"] / 60.0 * option.pair.pinion.n_teeth
+        for option in stages
+    )
+    needed = HARMONICS * wishes.speed_shares[1] * fastest
+    doublings = math.ceil(math.log2(needed / usable_band(LOWEST_RATE)[1]))
+    return remarked(
+        f"  sampling_rate_hz: {LOWEST_RATE * 2.0 ** max(0, doublings):g}",
+        f"derived: {HARMONICS} harmonics of the fastest mesh, at least {LOWEST_RATE:g}",
+    )

@@ -1,0 +1,80 @@
+"""Files of new options: their names, a check that they compose, and the commands that follow."""
+
+from __future__ import annotations
+
+import shlex
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from gensig.errors import ConfigError
+from gensig.faults.registry import read_faults
+from gensig.options.compose import options
+from gensig.plan.request import read_request
+from gensig.record.machines import read_machine
+from gensig.text.option_writing import is_option_name
+
+
+def check_name(name: str, groups: Iterable[str], files: Iterable[Path]) -> None:
+    """Raise ConfigError for a name that no option can have, that is shipped, or taken."""
+    if not is_option_name(name):
+        raise ConfigError(
+            f"'{name}' cannot be the name of a gearbox: "
+            "use a letter, then letters, digits, _ and -, at most 64"
+        )
+    for group in groups:
+        if name in options(group):
+            raise ConfigError(
+                f"{group}={name} comes with gensig and would hide yours; "
+                "choose another name"
+            )
+    for file in files:
+        if file.exists():
+            raise ConfigError(
+                f"{file} is there already; choose another name or --dir, or edit it"
+            )
+
+
+def check_texts(
+    name: str, texts: Mapping[str, str], tables: Mapping[str, str] | None = None
+) -> None:
+    """Raise for an experiment that makes no machine, before anything is written.
+
+    Parameters
+    ----------
+    texts : group -> text of its option ``name``
+    tables : key of ``system`` -> text of the table that it names
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        words = [f"experiment={name}"]
+        for group, text in texts.items():
+            _write(Path(folder) / group / f"{name}.yaml", text)
+        for key, text in (tables or {}).items():
+            file = Path(folder) / f"{key}.csv"
+            _write(file, text)
+            words.append(f"system.{key}={file}")
+        config = read_request(words, config_dir=folder).config
+        for fault in config["classes"].values():
+            read_faults(fault)
+        read_machine(config)
+
+
+def write_all(files: Mapping[Path, str]) -> None:
+    """Write texts to files, with the folders that they need."""
+    for file, text in files.items():
+        _write(file, text)
+
+
+def _write(file: Path, text: str) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(text, encoding="utf-8")
+
+
+def next_commands(folder: Path, name: str) -> Sequence[str]:
+    """Commands on a new gearbox, as they are typed."""
+    words = f"--config-dir {shlex.quote(str(folder))} experiment={name}"
+    return [
+        f"gensig simulate {words} fault=missing_tooth --plot {name}.png",
+        f"gensig generate {words} out=runs/{name}",
+        f"gensig report runs/{name}",
+    ]

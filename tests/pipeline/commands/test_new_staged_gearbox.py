@@ -1,0 +1,229 @@
+"""gensig new gearbox of several stages: tables that close, options that run as printed."""
+
+import itertools
+import json
+import math
+import re
+import shlex
+import sys
+
+import pytest
+import yaml
+from docs_pages import ROOT, blocks, command_lines
+from numpy.testing import assert_allclose
+
+from gensig.cli import main
+from gensig.commands.new.data_sheet import DataSheet, gear_option
+from gensig.commands.new.line_tables import torsional_stiffness
+from gensig.commands.new.stages import (
+    StagedSheet,
+    shaft_diameters,
+    stage_options,
+    support_force,
+)
+from gensig.driveline.machine_checks import FAR_ABOVE
+from gensig.driveline.reading import read_line_machine
+from gensig.errors import GensigError
+from gensig.plan.request import read_request
+from gensig.systems.derived_sizes import bores
+
+SHEET = "--teeth 29 100 36 90 --module 1.5 2 --speed 1500 --torque 10"
+NEW = f"new gearbox mine {SHEET} --dir ."
+
+
+def sheet(**changes):
+    values = {
+        "teeth": ((29, 100), (36, 90)),
+        "modules": (1.5, 2.0),
+        "speed": 1500.0,
+        "torque": 10.0,
+    }
+    return StagedSheet(**{"name": "a", **values, **changes})
+
+
+def test_one_stage_has_the_shafts_of_the_single_pair():
+    single = sheet(teeth=((29, 100),), modules=(1.5,))
+    assert shaft_diameters(single) == bores((29, 100), 1.5)
+
+
+def test_a_stage_is_the_pair_of_its_own_speed_torque_and_bores():
+    stages = stage_options(sheet())
+    slowdown = sheet().slowdowns[1]
+    assert slowdown == pytest.approx(100 / 29, rel=1e-15)
+    second = DataSheet(
+        name="a",
+        teeth=(36, 90),
+        module=2.0,
+        speed=1500.0 / slowdown,
+        torque=10.0 * slowdown,
+        bores=tuple(shaft_diameters(sheet())[1:]),
+    )
+    assert stages[1].gear == gear_option(second).gear
+    power = [option.derived()["power_kw"] for option in stages]
+    assert_allclose(*power, rtol=1e-12)
+
+
+def test_a_shaft_between_two_stages_suits_both():
+    thin = sheet(teeth=((29, 100), (20, 70)), modules=(1.5, 1.5))
+    first, between, last = shaft_diameters(thin)
+    assert between == bores((20, 70), 1.5)[0] < bores((29, 100), 1.5)[1]
+    assert (first, last) == (bores((29, 100), 1.5)[0], bores((20, 70), 1.5)[1])
+
+
+def test_a_shaft_of_steel_is_as_stiff_as_the_textbook_says():
+    """25 mm thick and 100 mm long at G = 79.6 GPa: 3.05e4, as in two_stage_shafting.csv."""
+    stiffness = torsional_stiffness(79.6e9, 25.0, 100.0)
+    assert stiffness == pytest.approx(3.05e4, rel=2e-3)
+
+
+def test_the_support_suits_all_stages_up_to_the_largest_torque():
+    far = sheet(teeth=((29, 100), (36, 90), (20, 70)), modules=(1.5, 1.5, 1.5))
+    for gears, share in itertools.product((sheet(), far), (1.0, 1.2, 3.0)):
+        stages = stage_options(gears)
+        forces = [option.machine.mesh_force for option in stages]
+        held = support_force(stages, share, FAR_ABOVE)
+        assert max(forces) * share <= FAR_ABOVE * held
+        assert held >= 0.99 * math.sqrt(min(forces) * max(forces))
+
+
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [
+        (SHEET, ["Input pinion", "Idler gear 1", "Idler gear 2", "Output gear"]),
+        (
+            f"{SHEET} --teeth 29 100 36 90 24 60 --module 2 --helix 15 --widths 18",
+            ["Input pinion", *[f"Idler gear {k}" for k in range(1, 5)], "Output gear"],
+        ),
+    ],
+)
+def test_the_tables_close_and_carry_the_given_torque(words, names, gensig, tmp_path):
+    said, _ = gensig(f"new gearbox mine {words} --dir . --json")
+    told = json.loads(said)
+    config = read_request(["experiment=mine"], config_dir=tmp_path).config
+    machine = read_line_machine(config)
+    drive = machine.engine.drive
+
+    assert [gear.name for gear in drive.line.gears] == names
+    assert_allclose(
+        abs(drive.line.speed_ratio[-1]), 1.0 / told["derived"]["ratio"], rtol=1e-12
+    )
+    assert_allclose(machine.mesh_forces, told["stages"]["mesh_force_n"], rtol=1e-6)
+    assert machine.operating.torque == 10.0
+    for side, key in (("driving", "pinion"), ("driven", "wheel")):
+        gears = [
+            drive.line.gears[getattr(mesh, side)].mass for mesh in drive.line.meshes
+        ]
+        assert_allclose(gears, told["stages"][f"{key}_mass_kg"], rtol=1e-9)
+    backlash = [1e6 * mesh.backlash for mesh in drive.line.meshes]
+    assert_allclose(backlash, told["stages"]["backlash_um"], rtol=1e-9)
+
+
+def test_every_value_says_where_it_is_from(gensig, tmp_path):
+    gensig(f"{NEW} --profile-shifts 0.1 --grade 7 --rate 25600")
+    for group in ("system", "experiment"):
+        text = (tmp_path / group / "mine.yaml").read_text()
+        values = re.findall(r"^ +[^#\s-][^:]*: \S.*$", text, re.MULTILINE)
+        bare = [line.split(":")[0].strip() for line in values if "#" not in line]
+        of_bearing = ["n_balls", "ball_diameter_mm", "pitch_diameter_mm"]
+        of_bearing += ["inner_groove_conformity", "outer_groove_conformity"]
+        of_tables = ["name", "shafting_csv", "gears_csv", "radial_clearance_um"]
+        assert set(bare) <= {*of_bearing, *of_tables}
+    for table in ("gears", "shafting"):
+        head = (tmp_path / "tables" / f"mine_{table}.csv").read_text()
+        assert all(word in head for word in ("Given: ", "Assumed: ", "Derived: "))
+        assert max(map(len, head.split("node,")[0].splitlines())) <= 100
+    experiment = yaml.safe_load((tmp_path / "experiment" / "mine.yaml").read_text())
+    assert experiment["quality"]["iso1328_grade"] == 7
+    assert experiment["sensing"]["sampling_rate_hz"] == 25600
+
+
+def test_the_printed_commands_work_as_printed_and_without_a_warning(gensig, tmp_path):
+    said, _ = gensig(f"new gearbox mine {SHEET}")
+    lines = said.partition("next:\n")[2].splitlines()
+    simulate, generate, report = (shlex.join(shlex.split(line)[1:]) for line in lines)
+    cheap = "operating.duration_s=0.1"
+    said, warned = gensig(f"{simulate} {cheap} operating.torque_nm=12")
+    assert "note" not in warned
+    assert float(re.search(r"mesh frequency (\S+)", said)[1]) == pytest.approx(
+        725.0, rel=1e-3
+    )
+    few = "plan.n_records=4 plan.n_units=2 plan.classes=[healthy,missing_tooth]"
+    gensig(f"{generate} {cheap} {few} executor.n_workers=1")
+    gensig(report)
+    gensig("verify runs/mine")
+    second = f"{simulate.split(' --plot')[0]} {cheap} system.record_mesh=[5,6]"
+    said, _ = gensig(f"{second} fault.gear=wheel")
+    assert float(re.search(r"mesh frequency (\S+)", said)[1]) == pytest.approx(
+        261.0, rel=1e-3
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("--teeth 29 100 36", "--teeth takes 2, 4 or 6 numbers, .* not 3"),
+        ("--teeth 29 100 0 90", "--teeth 0 must be positive"),
+        ("--teeth 29 100 36 9", "stage 2, 36/9: wheel: 9 teeth .* undercut"),
+        ("--teeth 29 100", "--module takes one number for a pair of gears, not 2"),
+        ("--module 1 2 3", "--module takes one number for all stages, or 2"),
+        ("--module -2", "--module -2 must be positive"),
+        ("--widths 9 8 7", "--widths takes one number for all stages, or 2"),
+        ("--profile-shifts 0 1", "--profile-shifts takes one .* or 4: one a gear"),
+        ("--bores 20", "--bores is for one pair of gears; edit bore_radius_mm"),
+        ("--supports 1e8", "--supports is for one pair of gears; edit system.support"),
+        ("--sensors housing", "--sensors is for one pair of gears; records of a"),
+        ("--experiment realistic", "records of a drive line have no housing"),
+        ("--rate 1000", "--rate 1000: the mesh frequency reaches 870 Hz"),
+        ("--speed 0", "--speed 0 must be positive"),
+    ],
+)
+def test_a_mistake_is_one_line_and_writes_nothing(
+    words, message, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    assert main(f"{NEW} {words}".split()) == 2
+    said = capsys.readouterr().err.strip()
+    assert re.search(message, said)
+    assert "\n" not in said
+    assert not list(tmp_path.rglob("*.*"))
+
+
+def test_shipped_and_taken_names_are_refused(gensig, tmp_path, capsys):
+    assert main(NEW.replace("mine", "two_stage_gearbox").split()) == 2
+    assert "system=two_stage_gearbox comes with gensig" in capsys.readouterr().err
+    gensig(NEW)
+    (tmp_path / "experiment" / "mine.yaml").unlink()
+    assert main(NEW.split()) == 2
+    assert "mine.yaml is there already" in capsys.readouterr().err
+
+
+def test_stages_are_doubted_one_by_one(gensig):
+    _, warned = gensig(f"{NEW} --torque 100 --module 1.5")
+    assert "stage 2: a nominal root stress of" in warned
+    assert "stage 1" not in warned
+
+
+def test_on_a_terminal_it_asks_for_stages(gensig, tmp_path, monkeypatch):
+    answers = itertools.chain(
+        ["29 100 36", "29 100 36 90", "1.5, 2", "1500", "10"], [""]
+    )
+    monkeypatch.setattr("builtins.input", lambda question: next(answers))
+    terminal = type("Terminal", (), {"isatty": lambda self: True})
+    monkeypatch.setattr(sys, "stdin", terminal())
+    gensig("new gearbox mine --dir .")
+    assert (tmp_path / "tables" / "mine_gears.csv").exists()
+    assert list(answers) == []
+
+
+def test_an_error_of_a_stage_keeps_its_kind():
+    with pytest.raises(GensigError, match="stage 1, 29/100: --module 99 must lie in"):
+        stage_options(sheet(modules=(99.0, 2.0)))
+
+
+def test_the_howto_shows_what_the_command_prints(gensig):
+    page = (ROOT / "docs/howto/your_gearbox.md").read_text(encoding="utf-8")
+    code = [block.code for block in blocks(page)]
+    (typed,) = [text for text in code if text.startswith("gensig new gearbox reducer2")]
+    (shown,) = [text for text in code if "configs/tables/reducer2_gears.csv" in text]
+    ((_, words),) = command_lines(f"```sh\n{typed}\n```")
+    assert gensig("", *words[1:])[0].strip() == shown.strip()
