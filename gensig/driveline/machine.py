@@ -18,7 +18,13 @@ from numpy.typing import NDArray
 from gensig.driveline import loads
 from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.engine_torques import Engine
-from gensig.driveline.line_gears import line_bodies, line_gears, line_meshes
+from gensig.driveline.line_gears import (
+    line_bodies,
+    line_gears,
+    line_meshes,
+    pinion_turns,
+    with_supports,
+)
 from gensig.driveline.machine_checks import (
     check_sensing,
     check_solver,
@@ -36,13 +42,13 @@ from gensig.driveline.running import (
     running_line,
     single_thread,
     steady_course,
-    with_supports,
 )
 from gensig.driveline.teeth import (
     ToothLaw,
-    neighbour_meshes,
+    felt_there,
+    line_teeth,
     require_drive,
-    sound_meshes,
+    require_teeth,
     start_of,
     tooth_table,
 )
@@ -63,7 +69,7 @@ from gensig.sensing.toothed_wheel import ToothedWheel, draw_wheel, instantaneous
 from gensig.systems.base import Machine, MachineMesh, specimen_table
 from gensig.systems.run import CleanRecord, Run, Start
 from gensig.systems.stiffness_curves import StiffnessCurves, stiffness_curves
-from gensig.systems.supports import in_gearbox
+from gensig.systems.supports import supports_in_gearbox
 from gensig.units import SPEED
 
 Array = NDArray[np.float64]
@@ -117,6 +123,11 @@ class LineMachine(Machine):
     def meshes(self) -> tuple[MachineMesh, ...]:
         """All meshes of the line; records follow one of them."""
         return line_meshes(self.engine.drive, self.mesh_number)
+
+    @property
+    def pinion_turns(self) -> dict[str, float]:
+        """Turns of the pinion during one turn of every gear, by its name."""
+        return pinion_turns(self.engine.drive, self.mesh_number)
 
     @property
     def ratio(self) -> float:
@@ -189,8 +200,23 @@ class LineMachine(Machine):
         return ToothLaw(material=self.material, options=self.mesh, slices=self.slices)
 
     def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable | SlicedTable:
-        """Tables of the mesh with the given faults."""
-        return tooth_table(self.law, self.pair, tuple(faults), self.mesh_force)
+        """Tables of the followed mesh with those of the given faults that it feels."""
+        drive = self.engine.drive
+        require_teeth(drive, self.mesh_number, faults)
+        felt = felt_there(drive, self.mesh_number, self.mesh_number, faults)
+        return tooth_table(self.law, self.pair, felt, self.mesh_force)
+
+    def faulty_meshes(
+        self, faults: Sequence[Fault]
+    ) -> list[tuple[GearPair, tuple[Fault, ...]]]:
+        """The meshes that feel any of the faults."""
+        drive = self.engine.drive
+        require_teeth(drive, self.mesh_number, faults)
+        meshes = []
+        for number, pair in enumerate(drive.pairs):
+            if felt := felt_there(drive, self.mesh_number, number, faults):
+                meshes.append((named_by_side(pair), felt))
+        return meshes
 
     def stiffness_curves(
         self,
@@ -203,6 +229,13 @@ class LineMachine(Machine):
 
         ConfigError where its gears are helical.
         """
+        for fault in faults:
+            if fault.gear not in SIDES:
+                raise ConfigError(
+                    f"fault.gear = {fault.gear!r}: the stiffness is that of the mesh "
+                    f"system.record_mesh {self.engine.mesh_names[self.mesh_number]}; choose a "
+                    "mesh of that gear, where it is pinion or wheel"
+                )
         table = self.mesh_table(faults)
         if not isinstance(table, PairTable):
             raise ConfigError(
@@ -231,7 +264,7 @@ class LineMachine(Machine):
         check_sensing(self.sensing, self.channels, self.engine)
         check_solver(self.mesh, self.solver)
         warn_of_supports(self.engine, self.mesh_forces)
-        self.quality.check_covered(self.pair.pinion, self.pair.wheel)
+        self.quality.check_covered(*self.gears.values())
         check_memory(
             self.operating.duration,
             self.sensing.sampling_rate,
@@ -355,18 +388,15 @@ class LineMachine(Machine):
         start = run.start or Start()
         engine = self.engine
         if run.gearbox is not None and engine.drive.lateral:
-            bodies = (self.pinion, slice(0, 2)), (self.wheel, slice(2, 4))
-            held = [
-                in_gearbox(body, run.gearbox, axes, self.quality).support
-                for body, axes in bodies
-            ]
-            engine = with_supports(engine, self.mesh_number, held)
-        turned, forces = self.crank_angle(start), self.mesh_forces
+            supports = supports_in_gearbox(self.bodies, run.gearbox, self.quality)
+            held = with_supports(engine.drive, self.mesh_number, supports)
+            engine = replace(engine, drive=held)
+        turned = self.crank_angle(start)
         teeth = start.tooth_pinion, start.tooth_wheel
-        neighbours = neighbour_meshes(
+        others = line_teeth(
             engine,
             self.law,
-            forces,
+            self.mesh_forces,
             self.mesh_number,
             start_of(self.pair, teeth, start.phase),
             faults=run.faults,
@@ -379,9 +409,6 @@ class LineMachine(Machine):
             start_teeth=teeth,
             start_phase=start.phase,
         )
-        sound = sound_meshes(
-            engine, self.law, forces, left_out={self.mesh_number, *neighbours}
-        )
         governor = Governor(
             frequency=self.operating.drive_frequency,
             damping_ratio=self.operating.drive_damping_ratio,
@@ -390,7 +417,7 @@ class LineMachine(Machine):
             engine,
             self._course(),
             governor=governor,
-            tabulated={**sound, **neighbours, self.mesh_number: recorded},
+            tabulated={**others, self.mesh_number: recorded},
             turned=turned,
         )
 
@@ -400,18 +427,20 @@ class LineMachine(Machine):
         The driving gear's teeth are tied to the crank: the same tooth meets the same cylinder's
         firing in every record. Where its shaft turns more than once a cycle, the driven gear's
         tooth chooses the turn. A motor has no cycle: its turns are counted on, so that the other
-        meshes stand as the teeth allow.
+        meshes stand as the teeth allow. A lead-in turns back from there, beyond the cycle too, so
+        that all gears make the same motion.
         """
-        pitches = (
-            start.tooth_pinion
-            + start.phase
-            - start_phase(self.engine.drive, self.mesh_number)
-        )
-        turns = pitches / self.pair.pinion.n_teeth
+        pinion, wheel = self.pair.pinion.n_teeth, self.pair.wheel.n_teeth
+        back = start.turned_back
+        tooth = (start.tooth_pinion - back) % pinion
+        mate = (start.tooth_wheel - back) % wheel
+        drive, number = self.engine.drive, self.mesh_number
+        turns = (tooth + start.phase - start_phase(drive, number)) / pinion
+        per_turn = 2.0 * math.pi / self.ratio
         if not isinstance(self.engine.engine, Engine):
-            return 2.0 * math.pi * (turns + start.tooth_wheel) / self.ratio
-        turns += start.tooth_wheel % max(1, round(2.0 * self.ratio))
-        return 2.0 * math.pi * turns / self.ratio % (4.0 * math.pi)
+            return per_turn * (turns + mate + back / pinion)
+        turns += mate % max(1, round(2.0 * self.ratio))
+        return per_turn * turns % (4.0 * math.pi) + per_turn * back / pinion
 
     def _course(self) -> EngineCourse:
         operating = self.operating

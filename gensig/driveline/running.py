@@ -373,15 +373,3 @@ def _table_times(course: EngineCourse) -> Array:
         travelled, np.linspace(0.0, travelled[-1], n_tables)[1:-1]
     )
     return course.time[np.unique([0, *knots_at, len(travelled) - 1])]
-
-
-def with_supports(
-    machine: EngineLine, number: int, supports: Sequence[object]
-) -> EngineLine:
-    """The same with other supports of the two gears of a mesh, driving and driven."""
-    drive = machine.drive
-    mesh, gears = drive.line.meshes[number], list(drive.line.gears)
-    for gear, support in zip((mesh.driving, mesh.driven), supports, strict=True):
-        gears[gear] = replace(gears[gear], support=support)  # type: ignore[arg-type]
-    line = replace(drive.line, gears=tuple(gears))
-    return replace(machine, drive=replace(drive, line=line))

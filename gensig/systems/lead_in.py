@@ -50,6 +50,7 @@ def earlier(run: Run[Machine]) -> Run[Machine]:
             tooth_pinion=(start.tooth_pinion + teeth) % pair.pinion.n_teeth,
             tooth_wheel=(start.tooth_wheel + teeth) % pair.wheel.n_teeth,
             phase=pitches - teeth,
+            turned_back=start.turned_back + teeth,
         ),
     )
 

@@ -28,11 +28,16 @@ CHECKS = ("error", "levels", "unresolved", "none", "energy")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
-    """Start of a record: the teeth that enter contact at roll 0, and the roll in base pitches."""
+    """Start of a record: the teeth that enter contact at roll 0, and the roll in base pitches.
+
+    ``turned_back`` counts the teeth by which a lead-in has turned back both gears, 0 or less. The
+    other gears of a drive line turn back from where the record itself begins.
+    """
 
     tooth_pinion: int = 0
     tooth_wheel: int = 0
     phase: float = 0.0
+    turned_back: int = 0
 
     @property
     def teeth(self) -> dict[str, int]:
