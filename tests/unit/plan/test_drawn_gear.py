@@ -200,11 +200,18 @@ def test_the_gears_of_a_line_are_named_where_one_is_not_there():
     assert gears_of(*words, "fault.gear=output_gear") == {"output_gear"}
 
 
+def test_a_typed_gear_is_kept_where_an_option_draws_it():
+    words = ("experiment=two_stage", "fault.gear=output_gear")
+    request = read_request(list(words))
+    assert "fault.gear is given: plan.fault_gear = as_given" in request.notes
+    assert gears_of(*words) == {"output_gear"}
+    assert len(gears_of(*words, DRAWN)) == 4
+
+
 def test_a_compound_fault_has_several_gears():
     parts = "{kind: crack, gear: pinion}, {kind: missing_tooth, gear: output_gear}"
     words = (
         "experiment=two_stage",
-        "plan.fault_gear=as_given",
         "fault=compound",
         f"fault.parts=[{parts}]",
     )
