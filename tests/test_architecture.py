@@ -83,7 +83,7 @@ GENSIG = {
         "systems units version"
     ),
     "record": (
-        "dataset driveline errors faults geometry life operation options sensing "
+        "dataset driveline dynamics errors faults geometry life operation options sensing "
         "systems units version"
     ),
     "report": "dataset errors signals text",

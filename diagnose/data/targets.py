@@ -19,7 +19,8 @@ from diagnose.data.windows import FloatArray, IntArray
 if TYPE_CHECKING:
     from gensig.dataset.reader import Dataset
 
-GEARS = ("none", "pinion", "wheel")  # the gear that has the fault
+# The gear that has the fault; none: neither of the two whose turns networks look at.
+GEARS = ("none", "pinion", "wheel")
 
 # Base pitches before and after a tooth comes into mesh, in which its fault may show; assumed.
 BEFORE, AFTER = 0.3, 2.2
@@ -40,7 +41,8 @@ def record_targets(dataset: Dataset, record: IntArray) -> dict[str, NDArray[Any]
     Returns
     -------
     severity : (window,) from 0 to 1, NaN for a sound record
-    gear : (window,) index in `diagnose.data.targets.GEARS`
+    gear : (window,) index in `diagnose.data.targets.GEARS`; faults of the further gears of a
+        drive line are on none of them
     """
     targets: dict[str, NDArray[Any]] = {}
     if "severity" in dataset.column_names:
@@ -48,7 +50,8 @@ def record_targets(dataset: Dataset, record: IntArray) -> dict[str, NDArray[Any]
         targets["severity"] = np.where(severity > 0, severity, np.float32(np.nan))
     if "fault_gear" in dataset.column_names:
         names = np.asarray(dataset.column("fault_gear"))[record]
-        gears = [GEARS.index(str(name) or GEARS[0]) for name in names]
+        numbers = {gear: number for number, gear in enumerate(GEARS)}
+        gears = [numbers.get(str(name), 0) for name in names]
         targets["gear"] = np.array(gears, dtype=np.int64)
     return targets
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from diagnose.data.teeth import missing_teeth, teeth_of_records
+from gensig.dataset.cards.facts import gear_turns
 from gensig.errors import DatasetError
 
 if TYPE_CHECKING:
@@ -63,10 +64,16 @@ def _slowest_turn(dataset: Dataset) -> tuple[str, float]:
     faulty = set()
     if "fault_gear" in names:
         faulty = {str(name) for name in dataset.column("fault_gear")}
-    if "wheel" not in faulty or missing_teeth(dataset):
+    if missing_teeth(dataset):
         return NO_FAULT, of_pinion
     teeth = teeth_of_records(dataset)[turning]
     of_wheel = float((turns * teeth[:, 1] / teeth[:, 0]).max())
-    if "pinion" in faulty and of_pinion > of_wheel:
-        return "pinion", of_pinion
-    return "wheel", of_wheel
+    longest = {"wheel": of_wheel, "pinion": of_pinion}
+    longest |= {
+        gear: of_pinion * number
+        for gear, number in gear_turns(dataset).items()
+        if gear not in longest
+    }
+    slowest = [gear for gear in longest if gear in faulty] or [NO_FAULT]
+    gear = max(slowest, key=longest.__getitem__)
+    return gear, longest[gear]

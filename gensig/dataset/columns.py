@@ -368,6 +368,12 @@ LIFE_COLUMNS = (
     "life_failed",
     "life_growing",
 )
+# Root attributes of drive lines: names of all gears, their teeth, and the turns of the pinion
+# during one turn of each.
+GEAR_NAMES, GEAR_TEETH = "gear_names", "gear_teeth"
+GEAR_PINION_TURNS = "gear_pinion_turns"
+# Type of the column fault_gear in such sets, whose gears have names of their tables.
+LINE_FAULT_GEAR = "str64"
 # Columns that only sets of version 2 have, whose units differ in their gears.
 GEAR_COLUMNS = (
     "n_teeth_pinion",

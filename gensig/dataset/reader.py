@@ -9,7 +9,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from gensig.dataset.columns import IS_REFERENCE
+from gensig.dataset.columns import GEAR_NAMES, GEAR_TEETH, IS_REFERENCE
 from gensig.dataset.folder.layout import (
     PLAN,
     SPLITS,
@@ -143,7 +143,9 @@ class Dataset:
         return self.column(IS_REFERENCE) == 1
 
     def n_teeth(self, gear: str) -> np.ndarray:
-        """Teeth of 'pinion' or 'wheel', (record,) int64: of each unit's gear, or of the one design.
+        """Teeth of a gear, (record,) int64: of each unit's gear, or of the one design.
+
+        Gears are 'pinion' and 'wheel', in sets of drive lines all of the attribute gear_names.
 
         Raises
         ------
@@ -152,7 +154,10 @@ class Dataset:
         name = f"n_teeth_{gear}"
         if name in self._types:
             return self.column(name).astype(np.int64)
+        names = self.attributes.get(GEAR_NAMES, [])
         number = self.attributes.get(name)
+        if gear in names:
+            number = self.attributes[GEAR_TEETH][names.index(gear)]
         if not isinstance(number, int | np.integer):
             raise DatasetError(
                 f"{self.folder} has neither a column nor an attribute {name}; gensig writes it "

@@ -7,8 +7,10 @@ names of the tables, in small letters with underscores.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from gensig.driveline.drive_line import DriveLine
 from gensig.driveline.running import RunningLine, named_by_side
@@ -28,7 +30,10 @@ def slug(name: str) -> str:
 
 
 def gear_names(drive: DriveLine, followed: int) -> tuple[str, ...]:
-    """Name of every gear of a line, (gear,), each once; ``followed`` is the number of the mesh."""
+    """Name of every gear of a line, (gear,), each once; ``followed`` is the number of the mesh.
+
+    A name that is taken, or has no letter and no digit, ends in the gear's number in the table.
+    """
     mesh = drive.line.meshes[followed]
     sides = dict(zip((mesh.driving, mesh.driven), SIDES, strict=True))
     names: list[str] = []
@@ -51,15 +56,44 @@ def line_gears(drive: DriveLine, followed: int) -> dict[str, Gear]:
 
 
 def line_bodies(drive: DriveLine, followed: int) -> dict[str, Body]:
-    """Mass and support of every gear, and the inertia of its node, by its name, as in the table."""
+    """Mass and support of every gear, and the inertia of its node, by its name.
+
+    In the order of ``line_gears``.
+    """
     names, nodes = gear_names(drive, followed), drive.line.nodes
-    return {
+    bodies = {
         name: Body(
             mass=gear.mass or 0.0,
             inertia=nodes[gear.node].inertia,
             support=gear.support or STILL,
         )
         for name, gear in zip(names, drive.line.gears, strict=True)
+    }
+    return {name: bodies[name] for name in line_gears(drive, followed)}
+
+
+def with_supports(
+    drive: DriveLine, followed: int, supports: Mapping[str, Support]
+) -> DriveLine:
+    """The line with other supports of its gears, by their names.
+
+    Gears without lateral motion stay without a support.
+    """
+    gears = list(drive.line.gears)
+    for number, name in enumerate(gear_names(drive, followed)):
+        if gears[number].support is not None:
+            gears[number] = replace(gears[number], support=supports[name])
+    return replace(drive, line=replace(drive.line, gears=tuple(gears)))
+
+
+def pinion_turns(drive: DriveLine, followed: int) -> dict[str, float]:
+    """Turns of the pinion of the followed mesh during one turn of each gear, by its name."""
+    names, gears = gear_names(drive, followed), drive.line.gears
+    speed = np.abs(drive.line.speed_ratio)
+    of_pinion = speed[gears[drive.line.meshes[followed].driving].node]
+    return {
+        name: float(of_pinion / speed[gear.node])
+        for name, gear in zip(names, gears, strict=True)
     }
 
 

@@ -25,6 +25,8 @@ from gensig.driveline.line_gears import (
     line_bodies,
     line_gears,
     line_meshes,
+    pinion_turns,
+    with_supports,
 )
 from gensig.driveline.linear.linear_drive_line import LinearDriveLine
 from gensig.driveline.machine_checks import (
@@ -34,24 +36,24 @@ from gensig.driveline.machine_checks import (
 )
 from gensig.driveline.mesh_phase import start_phase
 from gensig.driveline.running import (
-    EngineCourse,
     Governor,
     RunningLine,
     TabulatedMesh,
     mesh_forces,
     named_by_side,
+    operating_course,
     reference_force,
     running_line,
     single_thread,
     steady_course,
-    with_supports,
 )
 from gensig.driveline.side_by_side.line_records import LineSignals, simulate_lines
 from gensig.driveline.teeth import (
     ToothLaw,
-    neighbour_meshes,
+    felt_there,
+    line_teeth,
     require_drive,
-    sound_meshes,
+    require_teeth,
     start_of,
     tooth_table,
 )
@@ -73,7 +75,7 @@ from gensig.sensing.toothed_wheel import draw_wheel
 from gensig.systems.base import Machine, MachineMesh, specimen_table
 from gensig.systems.run import CleanRecord, Run, Start, angle_from_tooth_0
 from gensig.systems.stiffness_curves import StiffnessCurves, stiffness_curves
-from gensig.systems.supports import in_gearbox
+from gensig.systems.supports import supports_in_gearbox
 from gensig.units import SPEED
 
 Array = NDArray[np.float64]
@@ -81,9 +83,7 @@ Array = NDArray[np.float64]
 # s before a record, until the start from the linear vibration has died away
 SETTLING = 0.3
 MOST_ENERGY_RESIDUAL = 1e-3
-KNOT = 5e-3  # s between the knots of a course that changes
 SIDE_BY_SIDE = "nystroem"  # solver.backend
-AFTER = 0.2  # s that a course goes on after a record: the low-pass looks ahead
 
 
 @final
@@ -127,6 +127,11 @@ class LineMachine(Machine):
     def meshes(self) -> tuple[MachineMesh, ...]:
         """All meshes of the line; records follow one of them."""
         return line_meshes(self.engine.drive, self.mesh_number)
+
+    @property
+    def pinion_turns(self) -> dict[str, float]:
+        """Turns of the pinion during one turn of every gear, by its name."""
+        return pinion_turns(self.engine.drive, self.mesh_number)
 
     @property
     def ratio(self) -> float:
@@ -199,8 +204,23 @@ class LineMachine(Machine):
         return ToothLaw(material=self.material, options=self.mesh, slices=self.slices)
 
     def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable | SlicedTable:
-        """Tables of the mesh with the given faults."""
-        return tooth_table(self.law, self.pair, tuple(faults), self.mesh_force)
+        """Tables of the followed mesh with those of the given faults that it feels."""
+        drive = self.engine.drive
+        require_teeth(drive, self.mesh_number, faults)
+        felt = felt_there(drive, self.mesh_number, self.mesh_number, faults)
+        return tooth_table(self.law, self.pair, felt, self.mesh_force)
+
+    def faulty_meshes(
+        self, faults: Sequence[Fault]
+    ) -> list[tuple[GearPair, tuple[Fault, ...]]]:
+        """The meshes that feel any of the faults."""
+        drive = self.engine.drive
+        require_teeth(drive, self.mesh_number, faults)
+        meshes = []
+        for number, pair in enumerate(drive.pairs):
+            if felt := felt_there(drive, self.mesh_number, number, faults):
+                meshes.append((named_by_side(pair), felt))
+        return meshes
 
     def stiffness_curves(
         self,
@@ -213,6 +233,13 @@ class LineMachine(Machine):
 
         ConfigError where its gears are helical.
         """
+        for fault in faults:
+            if fault.gear not in SIDES:
+                raise ConfigError(
+                    f"fault.gear = {fault.gear!r}: the stiffness is that of the mesh "
+                    f"system.record_mesh {self.engine.mesh_names[self.mesh_number]}; choose a "
+                    "mesh of that gear, where it is pinion or wheel"
+                )
         table = self.mesh_table(faults)
         if not isinstance(table, PairTable):
             raise ConfigError(
@@ -241,7 +268,7 @@ class LineMachine(Machine):
         check_sensing(self, lateral=self.engine.drive.lateral)
         check_solver(self.mesh, self.solver)
         warn_of_supports(self.engine, self.mesh_forces)
-        self.quality.check_covered(self.pair.pinion, self.pair.wheel)
+        self.quality.check_covered(*self.gears.values())
         check_memory(
             self.operating.duration,
             self.sensing.sampling_rate,
@@ -383,12 +410,12 @@ class LineMachine(Machine):
         specimen = run.specimen or perfect_specimen(self.pair.pinion, self.pair.wheel)
         start = run.start or Start()
         engine = self._in_gearbox(run)
-        turned, forces = self.crank_angle(start), self.mesh_forces
+        turned = self.crank_angle(start)
         teeth = start.tooth_pinion, start.tooth_wheel
-        neighbours = neighbour_meshes(
+        others = line_teeth(
             engine,
             self.law,
-            forces,
+            self.mesh_forces,
             self.mesh_number,
             start_of(self.pair, teeth, start.phase),
             faults=run.faults,
@@ -401,14 +428,11 @@ class LineMachine(Machine):
             start_teeth=teeth,
             start_phase=start.phase,
         )
-        sound = sound_meshes(
-            engine, self.law, forces, left_out={self.mesh_number, *neighbours}
-        )
         return running_line(
             engine,
-            self._course(),
+            operating_course(engine, self.operating, self.ratio, SETTLING),
             governor=self._governor,
-            tabulated={**sound, **neighbours, self.mesh_number: recorded},
+            tabulated={**others, self.mesh_number: recorded},
             turned=turned,
         )
 
@@ -421,16 +445,13 @@ class LineMachine(Machine):
         )
 
     def _in_gearbox(self, run: Run[Self]) -> EngineLine:
-        """The line with the supports of a run's gearbox under the gears of the followed mesh."""
+        """The line with the supports of a run's gearbox under its gears."""
         engine = self.engine
         if run.gearbox is None or not engine.drive.lateral:
             return engine
-        bodies = (self.pinion, slice(0, 2)), (self.wheel, slice(2, 4))
-        held = [
-            in_gearbox(body, run.gearbox, axes, self.quality).support
-            for body, axes in bodies
-        ]
-        return with_supports(engine, self.mesh_number, held)
+        supports = supports_in_gearbox(self.bodies, run.gearbox, self.quality)
+        held = with_supports(engine.drive, self.mesh_number, supports)
+        return replace(engine, drive=held)
 
     def crank_angle(self, start: Start) -> float:
         """Angle of the crank in its cycle when given teeth of the mesh are at a phase, rad.
@@ -452,19 +473,6 @@ class LineMachine(Machine):
             return 2.0 * math.pi * (turns + start.tooth_wheel) / self.ratio
         turns += start.tooth_wheel % max(1, round(2.0 * self.ratio))
         return 2.0 * math.pi * turns / self.ratio % (4.0 * math.pi)
-
-    def _course(self) -> EngineCourse:
-        operating = self.operating
-        if operating.is_steady:
-            return steady_course(operating.speed / self.ratio, operating.torque)
-        time = np.arange(-2.0 * SETTLING, operating.duration + AFTER, KNOT)
-        nominal = operating.nominal(time)
-        load = self.engine.load_at(operating.torque, nominal.speed / operating.speed)
-        return EngineCourse(
-            time=time,
-            speed=nominal.speed / self.ratio,
-            torque=load * nominal.torque_factor,
-        )
 
     def rows(
         self, run: Run[Self], line: RunningLine, motion: LineMotion | LineSignals

@@ -36,6 +36,7 @@ from gensig.errors import ConfigError, StepError
 from gensig.geometry.contact import GearPair
 from gensig.mesh.pair_table import PairTable
 from gensig.mesh.sliced.sliced_table import SlicedTable
+from gensig.operation.setpoint import Operating
 
 Array = NDArray[np.float64]
 
@@ -44,6 +45,8 @@ LEAST_APPROACH = 2e-6  # m, at which a mesh that carries next to nothing is take
 TABLE_STEP = 100.0 * math.pi / 30.0  # rad/s of the crank between tables of a run-up
 TABLE_SHARE = 0.1  # of the largest torque between them
 MOST_TABLES = 24
+KNOT = 5e-3  # s between the knots of a course that changes
+AFTER = 0.2  # s that a course goes on after a record: the low-pass looks ahead
 MOST_STEPS = 64  # per sample, that are tried where steps turn out to be too long
 LEAD_SAMPLES = 256  # before time 0: more than the low-pass looks back
 ROUNDED = 1e-12  # of the largest torque, below which a course of it over the cycle is constant
@@ -104,6 +107,23 @@ def steady_course(speed: float, torque: float) -> EngineCourse:
     """One speed (rad/s) and one brake torque (N m)."""
     return EngineCourse(
         time=np.zeros(1), speed=np.array([speed]), torque=np.array([torque])
+    )
+
+
+def operating_course(
+    machine: EngineLine, operating: Operating, ratio: float, before: float
+) -> EngineCourse:
+    """Speed of the crank and brake torque along a record, from ``before`` s before it and more.
+
+    ``ratio`` is the speed of the shaft that ``operating`` is of over the crank's.
+    """
+    if operating.is_steady:
+        return steady_course(operating.speed / ratio, operating.torque)
+    time = np.arange(-2.0 * before, operating.duration + AFTER, KNOT)
+    nominal = operating.nominal(time)
+    load = machine.load_at(operating.torque, nominal.speed / operating.speed)
+    return EngineCourse(
+        time=time, speed=nominal.speed / ratio, torque=load * nominal.torque_factor
     )
 
 
@@ -395,15 +415,3 @@ def _table_times(course: EngineCourse) -> Array:
         travelled, np.linspace(0.0, travelled[-1], n_tables)[1:-1]
     )
     return course.time[np.unique([0, *knots_at, len(travelled) - 1])]
-
-
-def with_supports(
-    machine: EngineLine, number: int, supports: Sequence[object]
-) -> EngineLine:
-    """The same with other supports of the two gears of a mesh, driving and driven."""
-    drive = machine.drive
-    mesh, gears = drive.line.meshes[number], list(drive.line.gears)
-    for gear, support in zip((mesh.driving, mesh.driven), supports, strict=True):
-        gears[gear] = replace(gears[gear], support=support)  # type: ignore[arg-type]
-    line = replace(drive.line, gears=tuple(gears))
-    return replace(machine, drive=replace(drive, line=line))

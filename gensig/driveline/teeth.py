@@ -7,7 +7,7 @@ along from mesh to mesh.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from gensig.driveline.drive_line import DriveLine
 from gensig.driveline.engine_line import EngineLine
-from gensig.driveline.mesh_phase import first_slice_lead, start_rolls
+from gensig.driveline.line_gears import gear_names, line_gears, line_meshes
+from gensig.driveline.mesh_phase import first_slice_lead, start_rolls, tooth_angles
 from gensig.driveline.running import TabulatedMesh, named_by_side, reference_force
 from gensig.driveline.time.line_mesh import mesh_start, tooth_angle
-from gensig.errors import ConfigError, GeometryError
-from gensig.faults.base import Fault, faulty_teeth
+from gensig.errors import ConfigError, FaultError, GeometryError
+from gensig.faults.base import Fault, faulty_teeth, require_gears
 from gensig.geometry.contact import SIDES, GearPair
 from gensig.material import Material
 from gensig.mesh.load_distribution import loaded_pair_table
@@ -28,6 +29,7 @@ from gensig.mesh.options import MeshOptions, SliceOptions
 from gensig.mesh.pair_table import PairTable
 from gensig.mesh.sliced.sliced_table import SlicedTable, sliced_table
 from gensig.sensing.manufacturing import Specimen
+from gensig.systems.base import home_meshes
 
 Array = NDArray[np.float64]
 
@@ -90,18 +92,18 @@ def require_drive(pair: GearPair, slices: SliceOptions) -> None:
 
 
 def sound_meshes(
-    machine: EngineLine, law: ToothLaw, forces: Array, *, left_out: Collection[int] = ()
+    machine: EngineLine, law: ToothLaw, forces: Array
 ) -> dict[int, TabulatedMesh]:
     """Sound teeth of the meshes by their index, each under its mean force of ``forces`` (mesh,) N.
 
-    Helical meshes only with ``system.helical_meshes=sliced``; those of ``left_out`` are left out.
+    Helical meshes only with ``system.helical_meshes=sliced``.
     """
     n_nodes = min(law.options.points_per_pitch, SOUND_NODES)
     thin = replace(law, options=replace(law.options, points_per_pitch=n_nodes))
     meshes = {}
     for number, pair in enumerate(machine.drive.pairs):
         is_helical = pair.pinion.helix_angle != 0.0
-        if number in left_out or (is_helical and not machine.drive.slices_helical):
+        if is_helical and not machine.drive.slices_helical:
             continue
         law_of_pair = (law, thin)[is_helical]
         table = _table_in_line(machine, law_of_pair, number, (), float(forces[number]))
@@ -140,49 +142,143 @@ def neighbours(drive: DriveLine, number: int) -> dict[int, tuple[int, int]]:
     return meshes_of
 
 
-def neighbour_meshes(
+def line_teeth(
     machine: EngineLine,
     law: ToothLaw,
     forces: Array,
-    number: int,
+    followed: int,
     start: ToothStart,
     *,
     faults: Sequence[Fault],
     specimen: Specimen,
     turned: float,
 ) -> dict[int, TabulatedMesh]:
-    """The other meshes of the two gears of a mesh with what these gears have, sound or not, by
-    their index.
+    """The teeth of all meshes but the followed one, by their index.
 
-    A gear that drives in both meshes, or is driven in both, is met on the same flanks: its faults
-    and errors come along, but for misalignment, which is a pair's. Else its other flanks are met,
-    which are without errors, and feel of the faults what ``Fault.on_other_flank`` says. Mates are
-    perfect.
+    Each mesh has what its two gears have there (``felt_there``), and its own mounting. Helical
+    meshes that ``is_tabulated`` leaves out keep the stiffness of the table.
+
+    Raises
+    ------
+    FaultError    for a fault that no teeth feel
     """
-    meshes_of = {}
-    for other, (here, there) in neighbours(machine.drive, number).items():
-        features = [
-            feature
-            for feature in (*specimen.forms, *faults)
-            if feature.gear == SIDES[here] and not feature.of_mounting
-        ]
-        errors = [np.zeros(gear.n_teeth) for gear in _gears(machine.drive.pairs[other])]
-        if here == there:
-            errors[there] = (specimen.pinion_error, specimen.wheel_error)[here]
-        else:
-            other_flanks = [feature.on_other_flank() for feature in features]
-            features = [flank for flank in other_flanks if flank is not None]
-        carried = tuple(replace(feature, gear=SIDES[there]) for feature in features)
-        teeth = [0, 0]
-        teeth[there] = tooth_there(
-            machine.drive, (number, here), (other, there), start, turned
+    drive = machine.drive
+    require_teeth(drive, followed, faults)
+    names, homes = gear_names(drive, followed), _homes(drive, followed)
+    features = (*specimen.gear_forms, *faults)
+    further = [number for number in range(len(drive.pairs)) if number != followed]
+    meshes = {}
+    for place, number in enumerate(further):
+        if not is_tabulated(drive, followed, number):
+            continue
+        mounting = specimen.mounting(place)
+        felt = felt_there(drive, followed, number, features)
+        table = _table_in_line(
+            machine,
+            law,
+            number,
+            (*felt, *mounting.forms(SIDES[0])),
+            float(forces[number]),
         )
-        meshes_of[other] = TabulatedMesh(
-            table=_table_in_line(machine, law, other, carried, float(forces[other])),
+        backlash = table.pair.backlash * mounting.backlash_factor
+        ends = _ends(drive, number)
+        errors = [np.zeros(gear.n_teeth) for gear in _gears(drive.pairs[number])]
+        for there, gear in enumerate(ends):
+            if ends[there] == _ends(drive, homes[gear])[there]:
+                errors[there] = specimen.errors_of(names[gear], len(errors[there]))
+        meshes[number] = TabulatedMesh(
+            table=replace(table, pair=replace(table.pair, backlash=backlash)),
             errors=(errors[0], errors[1]),
-            start_teeth=(teeth[0], teeth[1]),
+            start_teeth=start_teeth(drive, followed, number, start, turned),
         )
-    return meshes_of
+    return meshes
+
+
+def felt_there(
+    drive: DriveLine, followed: int, number: int, features: Iterable[Fault]
+) -> tuple[Fault, ...]:
+    """Faults and forms of gears as a mesh feels them, named by its sides.
+
+    A gear that drives there and in its home mesh (``home_meshes``), or is driven in both, is met
+    on the same flanks: all of it is felt, but for misalignment, which is of the mounting of the
+    home mesh. Else its other flanks are met, and ``Fault.on_other_flank`` says what they feel.
+    """
+    names, homes = gear_names(drive, followed), _homes(drive, followed)
+    sides = {names[gear]: side for side, gear in enumerate(_ends(drive, number))}
+    felt: list[Fault] = []
+    for feature in features:
+        side = sides.get(feature.gear)
+        if side is None:
+            continue
+        gear = _ends(drive, number)[side]
+        there: Fault | None = feature
+        if homes[gear] != number and feature.of_mounting:
+            there = None
+        elif _ends(drive, homes[gear])[side] != gear:
+            there = feature.on_other_flank()
+        if there is not None:
+            felt.append(replace(there, gear=SIDES[side]))
+    return tuple(felt)
+
+
+def is_tabulated(drive: DriveLine, followed: int, number: int) -> bool:
+    """Return whether a mesh of records is made of teeth, whatever its gears have.
+
+    Helical meshes are with ``system.helical_meshes=sliced``; the followed mesh and those that
+    share a gear with it always are.
+    """
+    is_helical = drive.pairs[number].pinion.helix_angle != 0.0
+    shares = set(_ends(drive, number)) & set(_ends(drive, followed))
+    return drive.slices_helical or not is_helical or bool(shares)
+
+
+def require_teeth(drive: DriveLine, followed: int, faults: Iterable[Fault]) -> None:
+    """Raise a FaultError for a fault on a gear that is not in the line, or without teeth."""
+    faults, names = tuple(faults), gear_names(drive, followed)
+    require_gears(faults, tuple(line_gears(drive, followed)))
+    for fault in faults:
+        home = _homes(drive, followed)[names.index(fault.gear)]
+        if not is_tabulated(drive, followed, home):
+            raise FaultError(
+                f"fault.gear = {fault.gear!r}: with system.helical_meshes=constant its mesh has "
+                "no teeth; take system.helical_meshes=sliced"
+            )
+
+
+def _homes(drive: DriveLine, followed: int) -> dict[int, int]:
+    """Home mesh of each gear, by their indices."""
+    names = gear_names(drive, followed)
+    of_name = home_meshes(line_meshes(drive, followed))
+    return {names.index(name): number for name, number in of_name.items()}
+
+
+def _ends(drive: DriveLine, number: int) -> tuple[int, int]:
+    """Indices of the driving and the driven gear of a mesh."""
+    mesh = drive.line.meshes[number]
+    return mesh.driving, mesh.driven
+
+
+def start_teeth(
+    drive: DriveLine, followed: int, number: int, start: ToothStart, turned: float
+) -> tuple[int, int]:
+    """Teeth of a mesh that are in place when the crank has turned by ``turned`` rad.
+
+    The gears of the followed mesh have there the teeth of its ``start``. Tooth 0 of any other
+    gear is the one that ``tooth_angles`` says where it is when the crank has not turned.
+    """
+    here = _ends(drive, followed)
+    angles = tooth_angles(drive, turned)
+    teeth = []
+    for side, gear in enumerate(_ends(drive, number)):
+        if gear in here:
+            place = (followed, here.index(gear))
+            tooth = tooth_there(drive, place, (number, side), start, turned)
+        else:
+            ratio = drive.line.speed_ratio[drive.line.gears[gear].node]
+            angle = math.copysign(1.0, ratio) * float(angles[gear])
+            tooth = _tooth_in_place(drive, (number, side), angle, turned)
+        teeth.append(tooth)
+    return teeth[0], teeth[1]
 
 
 def tooth_there(
@@ -197,22 +293,32 @@ def tooth_there(
 
     ``here``, ``there`` are the index of a mesh and the gear's side in it, 0 driving and 1 driven.
     """
-    n_teeth = _gears(drive.pairs[here[0]])[here[1]].n_teeth
     angle = tooth_angle(
-        n_teeth,
+        _gears(drive.pairs[here[0]])[here[1]].n_teeth,
         mate_angle=_mate_angle(drive, *here),
         drives=here[1] == 0,
         start=(start.teeth[here[1]], start.phase),
         pitch_point=_pitch_point(drive, here[0]),
     )
+    return _tooth_in_place(drive, there, angle, turned)
+
+
+def _tooth_in_place(
+    drive: DriveLine, there: tuple[int, int], angle: float, turned: float
+) -> int:
+    """The tooth of a gear that is in place in a mesh when the first node has turned by ``turned``
+    rad and the gear's tooth 0 is at ``angle`` rad, counted as the gear turns.
+    """
+    number, side = there
+    pair = drive.pairs[number]
+    n_teeth = _gears(pair)[side].n_teeth
     tooth, phase = mesh_start(
         n_teeth,
         mate_angle=_mate_angle(drive, *there),
-        drives=there[1] == 0,
+        drives=side == 0,
         tooth_angle=angle,
-        pitch_point=_pitch_point(drive, there[0]),
+        pitch_point=_pitch_point(drive, number),
     )
-    number, pair = there[0], drive.pairs[there[0]]
     # where the line says that a tooth is; play and profile shift move it by some hundredths of a
     # pitch
     rolled = float(start_rolls(drive, turned)[number]) / pair.base_pitch

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from gensig.errors import FaultError
-from gensig.geometry.contact import SIDES, GearPair
+from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.geometry.tooth import Tooth, healthy_tooth
 from gensig.units import from_si, split_unit
@@ -32,8 +32,9 @@ class Growth(Enum):
 class Fault(ABC):
     """A fault of one gear's teeth.
 
-    ``gear`` is ``"pinion"`` or ``"wheel"``; ``tooth`` counts from 0: one number, several, or
-    ``"all"``.
+    ``gear`` is one of ``Machine.gears``: ``"pinion"`` or ``"wheel"`` of a gear pair, any gear of
+    a drive line. Machines check it, see ``require_gears``. ``tooth`` counts from 0: one number,
+    several, or ``"all"``.
     """
 
     # name in configurations
@@ -48,7 +49,8 @@ class Fault(ABC):
     tooth: int | str | tuple[int, ...] = field()
 
     def __post_init__(self) -> None:
-        require_choice(self, "gear", SIDES)
+        if not isinstance(self.gear, str) or not self.gear:
+            raise FaultError(f"fault.gear = {self.gear!r} must be the name of a gear")
         if isinstance(self.tooth, str) and self.tooth != ALL:
             raise FaultError(
                 f"fault.tooth = {self.tooth!r}; give a number, a list of numbers, or {ALL}"
@@ -125,6 +127,12 @@ def require_choice(fault: Fault, key: str, allowed: Collection[str]) -> None:
         raise FaultError(f"fault.{key} = {value!r}; allowed: {', '.join(allowed)}")
 
 
+def require_gears(faults: Iterable[Fault], gears: Collection[str]) -> None:
+    """Raise a FaultError for a fault on a gear that is not among ``gears``."""
+    for fault in faults:
+        require_choice(fault, "gear", gears)
+
+
 def faulty_teeth(
     pair: GearPair,
     faults: Iterable[Fault],
@@ -138,9 +146,11 @@ def faulty_teeth(
 
     Raises
     ------
-    FaultError    for a tooth number that is not on the gear, or a fault that does not fit its tooth
+    FaultError    for a gear that is not of the pair, a tooth number that is not on the gear, or a
+        fault that does not fit its tooth
     """
-    gears = pair.gears
+    gears, faults = pair.gears, tuple(faults)
+    require_gears(faults, gears)
     teeth: dict[tuple[str, int], Tooth] = {}
     for fault in faults:
         gear = gears[fault.gear]

@@ -8,7 +8,6 @@ from collections.abc import Collection
 from gensig.dataset.distributions import read_distribution
 from gensig.errors import ConfigError
 from gensig.faults.registry import fault_parts
-from gensig.geometry.contact import SIDES
 from gensig.operation.courses import RandomWalk
 from gensig.operation.options import (
     QUANTITIES,
@@ -19,8 +18,9 @@ from gensig.operation.options import (
     read_schedule,
 )
 from gensig.options.configuration import Configuration
+from gensig.plan.draws import drawn_gears
 from gensig.record.machines import read_machine
-from gensig.record.options import DRAWN, GEAR_KEYS
+from gensig.record.options import GEAR_KEYS
 from gensig.units import to_si
 
 SEED_KEY = "operating.course_seed"
@@ -65,14 +65,12 @@ def settle_courses(config: Configuration, typed: Collection[str]) -> Configurati
     steady = dict.fromkeys((*QUANTITIES, *RIPPLES))
     system = read_machine(config.with_keys("operating", **steady))
     least = least_speed(config, system.operating.speed)
-    pair = system.pair
     turning = {schedule.turns_of}
     if schedule.turns_of == "faulted":
-        turning = _faulted(config) & set(pair.gears)
+        turning = _faulted(config) & set(system.gears)
     if turning - {"pinion"}:
         _refuse_varied_teeth(vary)
-    counts = [pair.gears[gear].n_teeth for gear in turning]
-    slowdown = max(counts, default=pair.pinion.n_teeth) / pair.pinion.n_teeth
+    slowdown = max([system.pinion_turns[gear] for gear in turning], default=1.0)
     seconds = schedule.turns * slowdown * 2.0 * math.pi / least
     rate = system.sensing.sampling_rate
     duration = math.ceil(seconds * rate * (1.0 - 1e-12)) / rate
@@ -122,12 +120,12 @@ def least_speed(config: Configuration, set_speed: float) -> float:
 
 
 def _faulted(config: Configuration) -> set[str]:
-    """Gears that carry a fault in any class; both where the plan draws the gear."""
+    """Gears that carry a fault in any class; all that the plan draws from where it draws."""
     named = {
         str(part.get("gear"))
         for fault in config["classes"].values()
         for part in fault_parts(fault)
     }
-    if named and config["plan"].get("fault_gear") == DRAWN:
-        return set(SIDES)
+    if named and (drawn := drawn_gears(config)):
+        return set(drawn)
     return named

@@ -17,12 +17,14 @@ from gensig.dataset.distributions import (
     read_distribution,
 )
 from gensig.errors import ConfigError
+from gensig.faults.base import require_gears
 from gensig.faults.registry import COMPOUND, fault_parts, read_faults
 from gensig.geometry.contact import SIDES
 from gensig.geometry.tooth_profile import root_curve_point
+from gensig.life.life_options import runs_to_failure
 from gensig.options.configuration import Configuration
 from gensig.record.machines import read_machine
-from gensig.record.options import DRAWN, read_plan_options
+from gensig.record.options import AS_GIVEN, DRAWN, read_plan_options
 from gensig.record.streams import Stream, stream
 from gensig.systems.registry import LINE, read_gear_group, read_pair
 from gensig.units import from_si, split_unit, to_si
@@ -109,12 +111,23 @@ def fault_sizes(fault: Mapping[str, Any]) -> dict[str, float]:
 def fault_specs(
     config: Configuration, fault: Mapping[str, Any]
 ) -> tuple[dict[str, Distribution], dict[str, tuple[int, str]]]:
-    """Distributions of a fault by name, and the part and key that each is of."""
-    read_faults(fault)
+    """Distributions of a fault by name, and the part and key that each is of.
+
+    Raises
+    ------
+    FaultError     for a gear that the machine does not have
+    ConfigError    for a key or a distribution that cannot be drawn
+    """
+    require_gears(read_faults(fault), machine_gears(config))
     specs: dict[str, Distribution] = {}
     parts: dict[str, tuple[int, str]] = {}
     for number, part in enumerate(fault_parts(fault)):
         for key, spec in (part.get("vary") or {}).items():
+            if key == "gear":
+                raise ConfigError(
+                    "fault.vary.gear: plans draw gears by plan.fault_gear: drawn, or a list such "
+                    "as [pinion,wheel]"
+                )
             if key not in part or key == "vary":
                 raise ConfigError(
                     f"fault.vary: '{key}' is no key of fault={part['kind']}"
@@ -135,25 +148,58 @@ def draw_class_faults(
 
     ``of_units`` are the configurations of the units, which the conditions take in turn, where
     units differ. Where the plan draws the gear, a condition has the fault of the option as if that
-    gear were given: the sizes of either gear are at the same points of their distributions.
+    gear were given: the sizes of all gears are at the same points of their distributions.
     """
     of_units = of_units or (config,)
-    gear_is_drawn = read_plan_options(config).fault_gear == DRAWN
+    gears = drawn_gears(config)
     faults = {}
     for index, (name, fault) in enumerate(config["classes"].items()):
         rng = stream(config.seed, Stream.FAULT, index)
-        if not gear_is_drawn:
+        if not gears:
             faults[name] = draw_faults(of_units, fault, points, rng)
             continue
         of_gear = [
             draw_faults(of_units, _on_gear(fault, gear), points, copy.deepcopy(rng))
-            for gear in SIDES
+            for gear in gears
         ]
-        side = stream(config.seed, Stream.FAULT_GEAR, index).integers(
-            len(SIDES), size=len(points)
+        drawn = stream(config.seed, Stream.FAULT_GEAR, index).integers(
+            len(gears), size=len(points)
         )
-        faults[name] = [of_gear[k][i] for i, k in enumerate(side.tolist())]
+        faults[name] = [of_gear[k][i] for i, k in enumerate(drawn.tolist())]
     return faults
+
+
+def drawn_gears(config: Configuration) -> tuple[str, ...]:
+    """Gears out of which a plan draws that of each condition's faults; none where it is given.
+
+    All gears of the machine, or those that ``plan.fault_gear`` lists. In lives damage grows in the
+    followed mesh: its two gears.
+
+    Raises
+    ------
+    ConfigError    for a listed gear that the machine does not have
+    """
+    chosen = read_plan_options(config).fault_gear
+    if chosen == AS_GIVEN:
+        return ()
+    allowed = machine_gears(config)
+    if runs_to_failure(config):
+        allowed = SIDES
+    if chosen == DRAWN:
+        return allowed
+    for gear in chosen:
+        if gear not in allowed:
+            raise ConfigError(
+                f"plan.fault_gear lists {gear!r}; allowed: {', '.join(allowed)}"
+            )
+    return tuple(chosen)
+
+
+def machine_gears(config: Configuration) -> tuple[str, ...]:
+    """Names of all gears of the machine of a configuration."""
+    if config["system"]["kind"] != LINE:
+        return SIDES
+    return tuple(read_machine(config).gears)
 
 
 def _on_gear(fault: Mapping[str, Any], gear: str) -> dict[str, Any]:
@@ -218,7 +264,7 @@ def _gear_sizes(config: Configuration, gear: str) -> tuple[int, dict[str, float]
         module, values = group["normal_module_mm"], group[gear]
         sizes = {"normal_module": module, "face_width": values["face_width_mm"]}
         return values["n_teeth"], sizes
-    in_table = getattr(read_machine(config).pair, gear)
+    in_table = read_machine(config).gears[gear]
     return in_table.n_teeth, {
         name: from_si("size_mm", getattr(in_table, name))
         for name in ("normal_module", "face_width")
@@ -228,10 +274,10 @@ def _gear_sizes(config: Configuration, gear: str) -> tuple[int, dict[str, float]
 def _root_chord(config: Configuration, gear: str) -> float:
     """Thickness of a gear's tooth in the middle of its root curve, where cracks begin, m."""
     if config["system"]["kind"] == LINE:
-        pair = read_machine(config).pair
+        gears = read_machine(config).gears
     else:
-        pair = read_pair(config)
-    return 2.0 * root_curve_point(getattr(pair, gear), "arc_mid")[1]
+        gears = read_pair(config).gears
+    return 2.0 * root_curve_point(gears[gear], "arc_mid")[1]
 
 
 def _for_gear(

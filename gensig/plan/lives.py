@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gensig.dataset.distributions import GRID
 from gensig.errors import ConfigError
 from gensig.faults.registry import FAULTS, fault_parts, read_faults
+from gensig.geometry.contact import SIDES
 from gensig.life.growth import Course, GrowthLaw, grow
 from gensig.life.life_options import LifeOptions, read_life
 from gensig.life.load_history import History, draw_history, given_history
@@ -175,6 +176,11 @@ def _life(
         return _Life(fault=fault, law=None, loads=(), course=course)
     rate, first = growth.draw(rng)
     (defect,) = read_faults(fault)
+    if defect.gear not in SIDES:
+        raise ConfigError(
+            f"fault.gear = {defect.gear!r}: damage grows on {' or '.join(SIDES)} of the followed "
+            "mesh; choose a system.record_mesh with that gear"
+        )
     unit = LAWS[defect.growth](gears, defect, growth, history, first)
     points = zip(history.speed.tolist(), history.torque.tolist(), strict=True)
     loads = tuple(gears.tooth_loads(*point) for point in points)

@@ -358,8 +358,9 @@ def _row(
     """
     faults = read_faults(fault)
     if is_checked:
-        teeth = faulty_teeth(machine.pair, faults)
-        check_teeth(machine.pair, machine.material, machine.mesh, teeth)
+        for pair, felt in machine.faulty_meshes(faults):
+            teeth = faulty_teeth(pair, felt)
+            check_teeth(pair, machine.material, machine.mesh, teeth)
     start = draw_start(machine, rng)
     row = {
         "faults_json": json.dumps(fault_parts(fault), separators=(",", ":")),
@@ -376,7 +377,7 @@ def _row(
     if row["snr_db"] is None:
         row["snr_db"] = MISSING
     if not sham:
-        row["severity"] = severity(faults, machine.pair)
+        row["severity"] = severity(faults, machine.gears)
     if faults:
         row["fault_gear"] = faults[0].gear
         row["fault_tooth"] = faults[0].first_tooth

@@ -17,6 +17,7 @@ from gensig.options import files as option_files
 from gensig.options.compose import compose, options, override_keys, typed_mapping
 from gensig.options.configuration import Configuration
 from gensig.plan.condition_courses import settle_courses
+from gensig.record.options import AS_GIVEN
 from gensig.systems.registry import SIDES
 
 CONFIG_NAME = "generate"
@@ -78,6 +79,7 @@ def read_request(
         if "plan.n_reference" not in words.keys and fault_parts(selected.option):
             base["plan"]["n_reference"] = 0  # no class of the plan is sound
     base["plan"]["classes"] = names
+    notes += _keep_typed_gear(words, base["plan"])
     pinned = dict.fromkeys(
         key for fault in (selected, *faults.values()) for key in fault.pinned
     )
@@ -290,6 +292,16 @@ def _pin_varied(words: _Words, plan: dict[str, Any]) -> list[str]:
         vary = {**(plan["vary"] or {}), **vary}
     plan["vary"] = {key: spec for key, spec in vary.items() if key not in words.keys}
     return [key for key in vary if key in words.keys]
+
+
+def _keep_typed_gear(words: _Words, plan: dict[str, Any]) -> list[str]:
+    """Leave faults on the gear that was typed, where an option draws it; returns the note."""
+    typed = [key for key in ("fault.gear", "fault.parts") if key in words.keys]
+    drawn = plan.get("fault_gear", AS_GIVEN) != AS_GIVEN
+    if not typed or not drawn or "plan.fault_gear" in words.keys:
+        return []
+    plan["fault_gear"] = AS_GIVEN
+    return [f"{typed[0]} is given: plan.fault_gear = {AS_GIVEN}"]
 
 
 SECTIONS = (

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gensig.dataset.columns import GEAR_NAMES, GEAR_PINION_TURNS, GEAR_TEETH
 from gensig.dataset.folder.beginning import create_folder
 from gensig.dataset.folder.failures import commonest, failure_reasons
 from gensig.dataset.folder.joining import joined_folder
@@ -336,6 +337,18 @@ def _shaft_sensors(dataset: DatasetOptions, system: Machine) -> dict[str, Any]:
     return attributes
 
 
+def _gears_of_line(system: Machine) -> dict[str, Any]:
+    """Names, teeth and turns of all gears; none for a gear pair, which has columns for them."""
+    if len(system.meshes) == 1:
+        return {}
+    turns = system.pinion_turns
+    return {
+        GEAR_NAMES: list(system.gears),
+        GEAR_TEETH: [gear.n_teeth for gear in system.gears.values()],
+        GEAR_PINION_TURNS: [turns[name] for name in system.gears],
+    }
+
+
 def root_attributes(config: Configuration, system: Machine) -> dict[str, Any]:
     """Attributes that hold for every record of a data set."""
     geometry, torque_of = {}, {}
@@ -354,6 +367,7 @@ def root_attributes(config: Configuration, system: Machine) -> dict[str, Any]:
         **torque_of,
         "class_names": list(config["plan"]["classes"]),
         **geometry,
+        **_gears_of_line(system),
         "config_json": json.dumps(
             config.with_entries(out=None, executor=None).plain(), sort_keys=True
         ),

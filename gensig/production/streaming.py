@@ -108,11 +108,11 @@ class RecordStream:
         return self.plan.columns[name][self.numbers]
 
     def n_teeth(self, gear: str) -> NDArray[np.int64]:
-        """Teeth of 'pinion' or 'wheel', (record,): of each unit's gear, or of the one design."""
+        """Teeth of a gear, (record,): of each unit's gear, or of the one design."""
         name = f"n_teeth_{gear}"
         if name in self.plan.columns:
             return self.column(name)
-        gears = read_machine(self.config).pair.gears
+        gears = read_machine(self.config).gears
         if gear not in gears:
             raise DatasetError(
                 f"gear {gear!r} does not exist; there are {', '.join(gears)}"

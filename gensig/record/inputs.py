@@ -29,6 +29,7 @@ from gensig.record.options import (
 from gensig.record.streams import Stream, stream
 from gensig.sensing.instrument import Instrument, draw_instrument
 from gensig.sensing.manufacturing import (
+    FurtherGear,
     Gearbox,
     Quality,
     Specimen,
@@ -36,7 +37,7 @@ from gensig.sensing.manufacturing import (
     draw_specimen,
     with_damping_ratio,
 )
-from gensig.systems.base import Machine
+from gensig.systems.base import Machine, further_gears
 from gensig.systems.lead_in import simulate_with_lead_in
 from gensig.systems.nuisances import with_nuisances
 from gensig.systems.run import CleanRecord, Run, Start
@@ -246,7 +247,13 @@ class InputReader:
             faults=faults,
             start=start,
             specimen=_specimen(
-                seed, numbers.specimen, pair.pinion, pair.wheel, machine.quality
+                seed,
+                numbers.specimen,
+                pair.pinion,
+                pair.wheel,
+                machine.quality,
+                further_gears(machine.gears, machine.meshes),
+                len(machine.meshes) - 1,
             ),
             gearbox=_gearbox(seed, gearbox, machine),
             with_mesh_state=self.dataset.store_mesh_state,
@@ -304,12 +311,27 @@ def _gearbox(seed: int, number: int, machine: Machine) -> Gearbox:
     """Supports and gains of a gearbox, drawn from its own streams."""
     sensing, quality = machine.sensing, machine.quality
     rng = stream(seed, Stream.GEARBOX, number)
-    gearbox = draw_gearbox(rng, len(sensing.channels), quality, sensing.gain_scatter)
+    gearbox = draw_gearbox(
+        rng,
+        len(sensing.channels),
+        quality,
+        sensing.gain_scatter,
+        n_gears=len(machine.gears),
+    )
     return with_damping_ratio(gearbox, stream(seed, Stream.SUPPORT, number), quality)
 
 
 @lru_cache(maxsize=32)  # the records of a unit share it
 def _specimen(
-    seed: int, number: int, pinion: Gear, wheel: Gear, quality: Quality
+    seed: int,
+    number: int,
+    pinion: Gear,
+    wheel: Gear,
+    quality: Quality,
+    others: tuple[FurtherGear, ...],
+    n_mountings: int,
 ) -> Specimen:
-    return draw_specimen(stream(seed, Stream.SPECIMEN, number), pinion, wheel, quality)
+    rng = stream(seed, Stream.SPECIMEN, number)
+    return draw_specimen(
+        rng, pinion, wheel, quality, others=others, n_mountings=n_mountings
+    )

@@ -14,7 +14,8 @@ from gensig.units import check_choice
 
 PREFIX = "store_"
 CROSSED, SEPARATE = "crossed", "separate"  # values of plan.machines
-AS_GIVEN, DRAWN = "as_given", "drawn"  # values of plan.fault_gear
+# values of plan.fault_gear; a list of gears is the third
+AS_GIVEN, DRAWN = "as_given", "drawn"
 GEAR_KEYS = "gear."  # begin of varied keys that are drawn once a unit, ...
 WITH_GEAR_KEYS = ("quality.",)  # ... and of those that are then drawn with them
 TORQUE_KEY, UNIT_LOAD = "operating.torque_nm", "unit_load"
@@ -87,7 +88,7 @@ class PlanOptions:
     machines : ``crossed``: every set of gears runs in every gearbox; ``separate``: every unit has
         gears and a gearbox of its own
     fault_gear : ``as_given``: faults are on the gear that their option names; ``drawn``: on
-        either gear, with equal chance for each condition
+        any gear of the machine, or on one of those listed, with equal chance for each condition
     n_reference : further sound records of every unit, which are no examples
     """
 
@@ -102,7 +103,7 @@ class PlanOptions:
     sham: bool
     # Keys that came after 0.9.0 have defaults: configurations of earlier data sets lack them.
     machines: str = CROSSED
-    fault_gear: str = AS_GIVEN
+    fault_gear: str | tuple[str, ...] = AS_GIVEN
     n_reference: int = 0
 
     @property
@@ -158,13 +159,29 @@ def read_plan_options(config: Configuration) -> PlanOptions:
         if plan[key] is not None:
             whole_number(f"plan.{key}", plan[key], at_least=1)
     _check_machines(plan)
-    fault_gear = plan.get("fault_gear", AS_GIVEN)
-    check_choice("plan.fault_gear", fault_gear, (AS_GIVEN, DRAWN))
+    fault_gear = _read_fault_gear(plan.get("fault_gear", AS_GIVEN))
     whole_number("plan.n_reference", plan.get("n_reference", 0), at_least=0)
     if plan["n_records"] is not None:
         whole_number("plan.n_records", plan["n_records"], at_least=len(plan["classes"]))
     vary = {key: _read_varied(key, spec) for key, spec in plan["vary"].items()}
-    return plan.without("vary").read(PlanOptions, vary=vary)
+    plain = plan.without("vary", "fault_gear")
+    return plain.read(PlanOptions, vary=vary, fault_gear=fault_gear)
+
+
+def _read_fault_gear(given: Any) -> str | tuple[str, ...]:
+    """Value of ``plan.fault_gear``: one of its words, or the names of gears."""
+    if isinstance(given, list | tuple):
+        names = tuple(given)
+        if not names or len(set(names)) < len(names):
+            raise ConfigError(
+                f"plan.fault_gear = {list(names)} must name one gear or more, each once"
+            )
+        return names
+    if given not in (AS_GIVEN, DRAWN):
+        raise ConfigError(
+            f"plan.fault_gear = {given!r}; allowed: {AS_GIVEN}, {DRAWN}, or a list of gears"
+        )
+    return str(given)
 
 
 def _read_varied(key: str, spec: Any) -> Distribution:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.dataset.cards.facts import gear_turns
 from gensig.dataset.reader import Dataset
 from gensig.errors import DatasetError
 
@@ -24,6 +25,7 @@ class Rotation:
     mesh : (record,)      of the mesh
     drive : (record,)     turns of the driving shaft a second
     n_teeth : (record,) by gear of `GEARS`, those that are known
+    further : turns of the driving shaft during one turn of each further gear of a drive line
     gear : (record,)      gear with whose turn a fault repeats; "" without a fault, or where every
                           tooth has it
     """
@@ -31,16 +33,20 @@ class Rotation:
     mesh: NDArray[np.floating]
     drive: NDArray[np.floating]
     n_teeth: dict[str, NDArray[np.int64]]
+    further: dict[str, float]
     gear: NDArray[np.str_]
 
     def turns(self, gear: str) -> NDArray[np.floating]:
         """(record,) turns of a gear a second."""
+        if gear in self.further:
+            return self.drive / self.further[gear]
         return self.mesh / self.n_teeth[gear]
 
     def of(self, index: int) -> dict[str, float | None]:
         """Frequencies of a record by name: mesh, drive and gears; None where unknown."""
         values = {"mesh": self.mesh[index], "drive": self.drive[index]}
-        values |= {gear: self.turns(gear)[index] for gear in self.n_teeth}
+        gears = (*self.n_teeth, *self.further)
+        values |= {gear: self.turns(gear)[index] for gear in gears}
         known = {
             name: float(value)
             for name, value in values.items()
@@ -51,7 +57,7 @@ class Rotation:
     def fault_gear(self, index: int) -> str:
         """Gear of a record's fault where its frequency is known, else ""."""
         gear = str(self.gear[index])
-        return gear * (gear in self.n_teeth)
+        return gear * (gear in self.n_teeth or gear in self.further)
 
     @property
     def references(self) -> list[tuple[str, str]]:
@@ -59,7 +65,8 @@ class Rotation:
         drive = ("drive", "turns of the driving shaft")
         if not np.any(np.isfinite(self.mesh) & (self.mesh > 0.0)):
             return [drive] * bool(np.any(self.drive > 0.0))
-        result = [(gear, f"turns of the {gear}") for gear in self.n_teeth]
+        gears = (*self.n_teeth, *self.further)
+        result = [(gear, f"turns of the {gear}") for gear in gears]
         turning = (self.mesh > 0.0) & (self.drive > 0.0)
         ratios = [
             self.turns(gear)[turning] / self.drive[turning] for gear in self.n_teeth
@@ -92,5 +99,10 @@ def read_rotation(data: Dataset) -> Rotation:
         mesh=mesh,
         drive=data.column("speed_rpm") / 60.0,
         n_teeth=n_teeth,
+        further={
+            gear: turns
+            for gear, turns in gear_turns(data).items()
+            if gear not in GEARS and turns > 0.0
+        },
         gear=faulty,
     )

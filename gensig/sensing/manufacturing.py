@@ -6,7 +6,8 @@ See ``docs/theory/manufacturing.md``.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,7 @@ Array = NDArray[np.float64]
 # most waves of the form deviation from end to end; whole ones have no slope
 FORM_WAVES = 3
 SUPPORT_SCATTERS = ("support_stiffness_scatter", "support_damping_scatter")
-# in which the eccentricity is made smaller until the index deviation fits its limit
+AXES = 2  # x and y of each support
 # in which the eccentricity is made smaller until the index deviation fits its limit
 RUNOUT_STEPS = 20
 
@@ -115,6 +116,55 @@ class Quality:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FurtherGear:
+    """A gear outside the followed mesh; ``drives`` is True where it drives in its home mesh."""
+
+    gear: Gear
+    drives: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GearErrors:
+    """Manufacturing errors of one gear.
+
+    Parameters
+    ----------
+    error : (tooth,) m    how far every tooth stands back at the pitch point, as a gap
+    tilt : (tooth,) m/m   how fast that grows with the contact's position along the path
+    forms : deviations that the flanks of all its teeth share
+    """
+
+    error: Array
+    tilt: Array
+    forms: tuple[FlankForm, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mounting:
+    """Errors of the mounting of one mesh.
+
+    ``backlash_factor`` is on the nominal backlash; ``misalignment`` in m is that of the driving
+    gear over its face width, within plus and minus ``limit`` in m.
+    """
+
+    backlash_factor: float = 1.0
+    misalignment: float = 0.0
+    limit: float = 1e-6
+
+    def forms(self, gear: str) -> tuple[FlankForm, ...]:
+        """The misalignment as a form of the teeth of ``gear``; none where it is 0."""
+        if self.misalignment == 0.0:
+            return ()
+        form = Misalignment(
+            gear=gear, tooth=ALL, misalignment=self.misalignment, limit=self.limit
+        )
+        return (form,)
+
+
+NOMINAL_MOUNTING = Mounting()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Specimen:
     """A set of gears.
 
@@ -126,6 +176,9 @@ class Specimen:
         the path; 0: nowhere
     forms : deviations that the flanks of all teeth share, as transforms before a record's faults
     backlash_factor : on the nominal backlash
+    others : errors of the gears outside the followed mesh, by their names; perfect without
+    mountings : of the meshes that are not followed, in the order of ``Machine.meshes``; nominal
+        without
     """
 
     pinion_error: Array
@@ -134,13 +187,36 @@ class Specimen:
     wheel_tilt: Array | float = 0.0
     forms: tuple[FlankForm, ...] = ()
     backlash_factor: float = 1.0
+    others: Mapping[str, GearErrors] = field(default_factory=dict)
+    mountings: tuple[Mounting, ...] = ()
+
+    @property
+    def gear_forms(self) -> tuple[FlankForm, ...]:
+        """Forms of all gears, those of the followed mesh first."""
+        further = [form for errors in self.others.values() for form in errors.forms]
+        return (*self.forms, *further)
+
+    def errors_of(self, name: str, n_teeth: int) -> Array:
+        """Distance that every tooth of a gear stands back, (tooth,) m; 0 without errors."""
+        followed = {"pinion": self.pinion_error, "wheel": self.wheel_error}
+        if name in followed:
+            return followed[name]
+        if name in self.others:
+            return self.others[name].error
+        return np.zeros(n_teeth)
+
+    def mounting(self, number: int) -> Mounting:
+        """Mounting of a mesh by its number among those that are not followed."""
+        if number < len(self.mountings):
+            return self.mountings[number]
+        return NOMINAL_MOUNTING
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gearbox:
-    """Housing, bearings and sensors: factors on the supports (pinion x, y, wheel x, y) and gains
-    of the channels.
+    """Housing, bearings and sensors: factors on the supports and gains of the channels.
 
+    Supports are x and y of pinion, wheel and the further gears in the order of ``Machine.gears``.
     ``damping_ratio`` (support,) of the gears on their supports; None leaves the damping that the
     supports are given.
     """
@@ -152,55 +228,67 @@ class Gearbox:
 
 
 def draw_specimen(
-    rng: np.random.Generator, pinion: Gear, wheel: Gear, quality: Quality
+    rng: np.random.Generator,
+    pinion: Gear,
+    wheel: Gear,
+    quality: Quality,
+    *,
+    others: Sequence[FurtherGear] = (),
+    n_mountings: int = 0,
 ) -> Specimen:
     """Draw a set of gears within its grade.
 
     What is drawn does not depend on what is switched on, so that one key leaves the other
-    deviations alone.
+    deviations alone. Pinion, wheel and their mounting come first, then the ``others``, then the
+    mountings of ``n_mountings`` further meshes.
 
     Raises
     ------
     ConfigError    for a gear that the standard does not cover
     """
-    drawn = [_draw_gear(rng, gear, quality) for gear in (pinion, wheel)]
-    tilted, play = rng.uniform(-1.0, 1.0, 2)
+    of_pinion = _draw_gear(rng, pinion, quality, drives=True)
+    of_wheel = _draw_gear(rng, wheel, quality, drives=False)
+    mounting = _draw_mounting(rng, quality)
+    further = {
+        other.gear.name: _draw_gear(rng, other.gear, quality, drives=other.drives)
+        for other in others
+    }
+    mountings = tuple(_draw_mounting(rng, quality) for _ in range(n_mountings))
     if quality.iso1328_grade is None:
         return perfect_specimen(pinion, wheel)
-    (
-        (pinion_error, pinion_tilt, pinion_forms),
-        (wheel_error, wheel_tilt, wheel_forms),
-    ) = drawn
-    forms = [*pinion_forms, *wheel_forms]
-    misalignment = tilted * quality.misalignment
-    if misalignment:
-        limit = max(quality.misalignment, 1e-6)
-        forms.append(
-            Misalignment(
-                gear=pinion.name, tooth=ALL, misalignment=misalignment, limit=limit
-            )
-        )
     return Specimen(
-        pinion_error=pinion_error,
-        wheel_error=wheel_error,
-        pinion_tilt=pinion_tilt,
-        wheel_tilt=wheel_tilt,
-        forms=tuple(forms),
+        pinion_error=of_pinion.error,
+        wheel_error=of_wheel.error,
+        pinion_tilt=of_pinion.tilt,
+        wheel_tilt=of_wheel.tilt,
+        forms=(*of_pinion.forms, *of_wheel.forms, *mounting.forms(pinion.name)),
+        backlash_factor=mounting.backlash_factor,
+        others=further,
+        mountings=mountings,
+    )
+
+
+def _draw_mounting(rng: np.random.Generator, quality: Quality) -> Mounting:
+    """Misalignment and backlash of one mesh."""
+    tilted, play = rng.uniform(-1.0, 1.0, 2)
+    return Mounting(
         backlash_factor=1.0 + play * quality.backlash_scatter,
+        misalignment=tilted * quality.misalignment,
+        limit=max(quality.misalignment, 1e-6),
     )
 
 
 def _draw_gear(
-    rng: np.random.Generator, gear: Gear, quality: Quality
-) -> tuple[Array, Array, tuple[FlankForm, ...]]:
-    """Errors (tooth,) m, tilts (tooth,) m/m and the common form of the flanks of one gear."""
+    rng: np.random.Generator, gear: Gear, quality: Quality, *, drives: bool
+) -> GearErrors:
+    """Errors of one gear; a driving gear's contact runs towards its tip, a driven one's away."""
     share = rng.uniform(quality.used_share_low, quality.used_share_high)
     runout_share, angle = rng.random(), rng.uniform(0.0, 2.0 * math.pi)
     shape = rng.standard_normal(gear.n_teeth)
     of_teeth = rng.uniform(-1.0, 1.0, gear.n_teeth)
     sign, waves = rng.choice((-1.0, 1.0)), int(rng.integers(1, FORM_WAVES + 1))
     if quality.iso1328_grade is None:
-        return np.zeros(gear.n_teeth), np.zeros(gear.n_teeth), ()
+        return GearErrors(error=np.zeros(gear.n_teeth), tilt=np.zeros(gear.n_teeth))
     eccentricity, pitch_error = _scaled_index(
         gear, quality.iso1328_grade, share, runout_share, angle, shape
     )
@@ -210,7 +298,7 @@ def _draw_gear(
     error = eccentricity * np.cos(turn) + pitch_error
     tilt = -eccentricity / gear.base_radius * np.sin(turn)
     if not quality.profile_errors:
-        return error, tilt, ()
+        return GearErrors(error=error, tilt=tilt)
     slope = share * profile_slope_limit(gear, quality.iso1328_grade)
     form = share * profile_form_limit(gear, quality.iso1328_grade)
     involute = (
@@ -219,7 +307,7 @@ def _draw_gear(
     )
     # as the contact runs along the path
     towards_tip = -1.0
-    if gear.name == "pinion":
+    if drives:
         towards_tip = 1.0
     tilt = tilt + towards_tip * quality.tooth_share * slope / involute * of_teeth
     common_slope = sign * (1.0 - quality.tooth_share) * slope
@@ -240,7 +328,7 @@ def _draw_gear(
         for part_slope, height, n_waves in parts
         if part_slope or height
     )
-    return error, tilt, forms
+    return GearErrors(error=error, tilt=tilt, forms=forms)
 
 
 def _scaled_index(
@@ -293,34 +381,50 @@ def perfect_specimen(pinion: Gear, wheel: Gear) -> Specimen:
 
 
 def draw_gearbox(
-    rng: np.random.Generator, n_channels: int, quality: Quality, gain_scatter: float
+    rng: np.random.Generator,
+    n_channels: int,
+    quality: Quality,
+    gain_scatter: float,
+    *,
+    n_gears: int = 2,
 ) -> Gearbox:
-    """Log-normal factors, so that none can turn negative."""
+    """Log-normal factors, so that none can turn negative.
+
+    Those of the supports of pinion and wheel and of the gains come first, then those of the
+    supports of further gears.
+    """
+    n_first, n_further = AXES * 2, AXES * (n_gears - 2)
+    stiffness, damping = rng.standard_normal(n_first), rng.standard_normal(n_first)
+    gain = np.exp(gain_scatter * rng.standard_normal(n_channels))
+    stiffness = np.append(stiffness, rng.standard_normal(n_further))
+    damping = np.append(damping, rng.standard_normal(n_further))
     return Gearbox(
-        stiffness_factor=np.exp(
-            quality.support_stiffness_scatter * rng.standard_normal(4)
-        ),
-        damping_factor=np.exp(quality.support_damping_scatter * rng.standard_normal(4)),
-        gain=np.exp(gain_scatter * rng.standard_normal(n_channels)),
+        stiffness_factor=np.exp(quality.support_stiffness_scatter * stiffness),
+        damping_factor=np.exp(quality.support_damping_scatter * damping),
+        gain=gain,
     )
 
 
-def nominal_gearbox(n_channels: int) -> Gearbox:
+def nominal_gearbox(n_channels: int, *, n_gears: int = 2) -> Gearbox:
     """The gearbox as configured: no scatter."""
+    n_supports = AXES * n_gears
     return Gearbox(
-        stiffness_factor=np.ones(4), damping_factor=np.ones(4), gain=np.ones(n_channels)
+        stiffness_factor=np.ones(n_supports),
+        damping_factor=np.ones(n_supports),
+        gain=np.ones(n_channels),
     )
 
 
 def with_damping_ratio(
     gearbox: Gearbox, rng: np.random.Generator, quality: Quality
 ) -> Gearbox:
-    """Gearbox with a log-uniform damping ratio for each of its four supports.
+    """Gearbox with a log-uniform damping ratio for each of its supports.
 
     Without a range in ``quality`` the gearbox stays as it is.
     """
     low, high = quality.support_damping_ratio_low, quality.support_damping_ratio_high
     if low is None or high is None:
         return gearbox
-    ratio = np.exp(rng.uniform(np.log(low), np.log(high), 4))
+    n_supports = len(gearbox.stiffness_factor)
+    ratio = np.exp(rng.uniform(np.log(low), np.log(high), n_supports))
     return replace(gearbox, damping_ratio=ratio)

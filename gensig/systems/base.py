@@ -27,7 +27,7 @@ from gensig.mesh.sliced.sliced_table import SlicedTable
 from gensig.operation.setpoint import Operating
 from gensig.sensing.chain import Sensing
 from gensig.sensing.encoder import Disc
-from gensig.sensing.manufacturing import Gearbox, Quality, Specimen
+from gensig.sensing.manufacturing import FurtherGear, Gearbox, Quality, Specimen
 from gensig.systems.run import CleanRecord, Run, Start
 from gensig.systems.stiffness_curves import StiffnessCurves
 
@@ -38,13 +38,44 @@ Array = NDArray[np.float64]
 class MachineMesh:
     """A mesh of a machine: the names of its driving and its driven gear, and their geometry.
 
-    ``followed`` is True for the mesh whose single teeth, with faults and errors, are in records.
+    ``followed`` is True for the mesh whose phase and teeth at the start records state.
     """
 
     driving: str
     driven: str
     pair: GearPair
     followed: bool
+
+    @property
+    def gears(self) -> tuple[str, str]:
+        """Names of the driving and the driven gear."""
+        return self.driving, self.driven
+
+
+def home_meshes(meshes: Sequence[MachineMesh]) -> dict[str, int]:
+    """Number of the home mesh of each gear, by its name.
+
+    Faults and errors of a gear are on the flanks that touch there. It is the followed mesh if
+    the gear is in it, else its first mesh in the order of ``meshes``.
+    """
+    numbers = sorted(range(len(meshes)), key=lambda k: not meshes[k].followed)
+    homes: dict[str, int] = {}
+    for number in numbers:
+        for gear in meshes[number].gears:
+            homes.setdefault(gear, number)
+    return homes
+
+
+def further_gears(
+    gears: Mapping[str, Gear], meshes: Sequence[MachineMesh]
+) -> tuple[FurtherGear, ...]:
+    """The gears outside the followed mesh, in the order of ``gears``."""
+    homes = home_meshes(meshes)
+    return tuple(
+        FurtherGear(gear=gear, drives=meshes[homes[name]].driving == name)
+        for name, gear in gears.items()
+        if not meshes[homes[name]].followed
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,6 +111,22 @@ class Machine(ABC):
     @abstractmethod
     def meshes(self) -> tuple[MachineMesh, ...]:
         """All meshes."""
+
+    @property
+    @abstractmethod
+    def pinion_turns(self) -> Mapping[str, float]:
+        """Turns of the pinion during one turn of every gear, by its name."""
+
+    @abstractmethod
+    def faulty_meshes(
+        self, faults: Sequence[Fault]
+    ) -> list[tuple[GearPair, tuple[Fault, ...]]]:
+        """Meshes that feel faults: the pair, and the faults named by its sides.
+
+        Raises
+        ------
+        FaultError    for a gear that the machine does not have
+        """
 
     @property
     @abstractmethod

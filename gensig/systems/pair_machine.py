@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Self
 
@@ -20,7 +20,7 @@ from gensig.dynamics.mesh_state import mesh_state
 from gensig.dynamics.pair import Body, PairDynamics, Rotor
 from gensig.dynamics.response import LinearPair
 from gensig.errors import FaultError, SimulationError
-from gensig.faults.base import Fault, faulty_teeth
+from gensig.faults.base import Fault, faulty_teeth, require_gears
 from gensig.geometry.contact import GearPair
 from gensig.geometry.gear import Gear
 from gensig.sensing.encoder import Disc
@@ -88,6 +88,19 @@ class GearPairMachine(Machine):
         return (
             MachineMesh(driving=driving, driven=driven, pair=self.pair, followed=True),
         )
+
+    @property
+    def pinion_turns(self) -> dict[str, float]:
+        """Turns of the pinion during one turn of pinion and wheel."""
+        n_teeth = self.pair.pinion.n_teeth
+        return {name: gear.n_teeth / n_teeth for name, gear in self.gears.items()}
+
+    def faulty_meshes(
+        self, faults: Sequence[Fault]
+    ) -> list[tuple[GearPair, tuple[Fault, ...]]]:
+        """The pair and its faults."""
+        require_gears(faults, self.gears)
+        return [(self.pair, tuple(faults))]
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -169,9 +182,9 @@ class GearPairMachine(Machine):
 PairRun = Run[GearPairMachine]
 
 
-def severity(faults: Sequence[Fault], pair: GearPair) -> float:
-    """Largest severity of the faults, 0 when there is none."""
-    gears = pair.gears
+def severity(faults: Sequence[Fault], gears: Mapping[str, Gear]) -> float:
+    """Largest severity of the faults, 0 when there is none; ``gears`` of the machine by name."""
+    require_gears(faults, gears)
     value = max((fault.severity(gears[fault.gear]) for fault in faults), default=0.0)
     if value > 1.0:
         raise FaultError(

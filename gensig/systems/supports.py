@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from gensig.dynamics.bearing import BallBearing, Shaft, support_stiffness
-from gensig.dynamics.pair import Body
+from gensig.dynamics.pair import Body, Support
 from gensig.errors import ConfigError
 from gensig.geometry.gear import Gear
 from gensig.material import Material
@@ -175,3 +175,33 @@ def in_gearbox(body: Body, gearbox: Gearbox, axes: slice, quality: Quality) -> B
             ratio = gearbox.damping_ratio[axes]
         scattered = scattered.damped(body, float(ratio[0]), float(ratio[1]))
     return replace(body, support=scattered)
+
+
+def supports_in_gearbox(
+    bodies: Mapping[str, Body], gearbox: Gearbox, quality: Quality
+) -> dict[str, Support]:
+    """Supports of all gears of a machine in one gearbox, by name.
+
+    ``bodies`` are in the order of ``Machine.gears``. Gears for which the gearbox has no factors
+    are nominal.
+    """
+    n_missing = 2 * len(bodies) - len(gearbox.stiffness_factor)
+    if n_missing > 0:
+        gearbox = _with_nominal_supports(gearbox, quality, n_missing)
+    return {
+        name: in_gearbox(body, gearbox, slice(2 * k, 2 * k + 2), quality).support
+        for k, (name, body) in enumerate(bodies.items())
+    }
+
+
+def _with_nominal_supports(gearbox: Gearbox, quality: Quality, n: int) -> Gearbox:
+    """The gearbox with ``n`` further supports without scatter."""
+    ratio = gearbox.damping_ratio
+    if ratio is not None:
+        ratio = np.append(ratio, np.full(n, quality.support_damping_ratio))
+    return replace(
+        gearbox,
+        stiffness_factor=np.append(gearbox.stiffness_factor, np.ones(n)),
+        damping_factor=np.append(gearbox.damping_factor, np.ones(n)),
+        damping_ratio=ratio,
+    )

@@ -74,7 +74,7 @@ def test_the_mesh_has_a_gap_over_the_groove_and_nowhere_else(xiamen):
 
 def test_its_severity_rises_with_its_length(xiamen):
     values = [
-        severity([notch(notch_length_mm=length)], xiamen.pair)
+        severity([notch(notch_length_mm=length)], xiamen.gears)
         for length in (0.0, 0.2, 0.4)
     ]
     assert values[0] == pytest.approx(0.0, abs=0.0)

@@ -4,7 +4,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from gensig.dataset.columns import GEAR_COLUMNS
+from gensig.dataset.columns import GEAR_COLUMNS, GEAR_NAMES, GEAR_PINION_TURNS
 from gensig.dataset.reader import Dataset
 from gensig.errors import DatasetError
 
@@ -20,6 +20,32 @@ def n_designs(data: Dataset) -> int:
     return len(np.unique(designs, axis=0))
 
 
+def gear_turns(data: Dataset) -> dict[str, float]:
+    """Turns of the driving shaft during one turn of each gear of a drive line; {} for a pair."""
+    names = data.attributes.get(GEAR_NAMES, [])
+    turns = data.attributes.get(GEAR_PINION_TURNS, [])
+    if not isinstance(names, list) or not isinstance(turns, list):
+        return {}
+    return dict(zip(map(str, names), map(float, turns), strict=False))
+
+
+def gear_facts(data: Dataset) -> dict[str, object]:
+    """All gears of a drive line with their teeth, and the records with faults of each."""
+    names = gear_turns(data)
+    if not names:
+        return {}
+    listed = [f"{name} {data.n_teeth(name)[0]}" for name in names]
+    facts: dict[str, object] = {"gears": f"{', '.join(listed)} teeth"}
+    if "fault_gear" in data.column_names:
+        faulty = data.column("fault_gear")
+        counts = {name: int(np.count_nonzero(faulty == name)) for name in names}
+        shown = [f"{name} {counts[name]}" for name in counts if counts[name]]
+        facts["faults on"] = "no gear"
+        if shown:
+            facts["faults on"] = f"{', '.join(shown)} records"
+    return facts
+
+
 def geometry_facts(data: Dataset) -> dict[str, object]:
     """Geometry of the gears by name; the number of designs and ranges where units differ."""
     facts: dict[str, object] = {}
@@ -30,7 +56,7 @@ def geometry_facts(data: Dataset) -> dict[str, object]:
             facts[name] = value_range(data.column(name), "")
         elif name in data.attributes:
             facts[name] = rounded(data.attributes[name])
-    return facts
+    return facts | gear_facts(data)
 
 
 def kind_of_machine(data: Dataset) -> str:

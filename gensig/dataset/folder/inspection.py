@@ -5,7 +5,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from gensig.dataset.cards.card import value_range
+from gensig.dataset.cards.facts import gear_facts, value_range
 from gensig.dataset.folder.layout import MANIFEST, Manifest, read_manifest
 from gensig.dataset.reader import Dataset, open_dataset
 from gensig.dataset.storage.attributes import HDF5_ERRORS, read_attributes
@@ -97,6 +97,8 @@ def _dataset_lines(data: Dataset) -> list[str]:
         ("states", "status"),
     ):
         lines.append(f"  {title:<12} {_counts(data.column(column))}")
+    for title, fact in gear_facts(data).items():
+        lines.append(f"  {title:<12} {_show(fact)}")
     lines.append("  columns      " + ", ".join(map(_show, data.column_names)))
     lines.append("  attributes")
     return lines + [

@@ -8,6 +8,7 @@ import math
 import operator
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -16,8 +17,10 @@ import numpy as np
 from gensig.dataset.columns import (
     COLUMNS,
     GEAR_COLUMNS,
+    GEAR_NAMES,
     IS_REFERENCE,
     LIFE_COLUMNS,
+    LINE_FAULT_GEAR,
     Column,
 )
 from gensig.dataset.schema import (
@@ -110,6 +113,9 @@ class ShardWriter:
         if not gears:
             for name in GEAR_COLUMNS:
                 del self.columns[name]
+        if GEAR_NAMES in attributes:
+            column = self.columns["fault_gear"]
+            self.columns["fault_gear"] = replace(column, dtype=LINE_FAULT_GEAR)
         self.version = version_of(self.columns)
         self.attributes = {"schema_version": self.version, **attributes}
         for name in params:

@@ -44,15 +44,20 @@ def texts(values):
 
 
 def check_labels(file, classes, n_teeth):
-    """One record of each class is there and ok; a faulty one names a tooth of the wheel."""
+    """One record of each class is there and ok; a faulty one names a gear and a tooth of it.
+
+    ``n_teeth`` of each gear that may be faulty, by name.
+    """
     names = texts(file["label_name"][:])
     assert set(texts(file["status"][:])) == {"ok"}
     assert set(names) == set(classes)
     assert np.all(file["integration_error"][:] < 1e-3)
     gears, teeth = texts(file["fault_gear"][:]), file["fault_tooth"][:]
     for name, gear, tooth in zip(names, gears, teeth, strict=True):
-        is_faulty = name != "healthy"
-        assert (gear == "wheel", 0 <= tooth < n_teeth) == (is_faulty, is_faulty)
+        if name == "healthy":
+            assert (gear, tooth) == ("", -1)
+        else:
+            assert 0 <= tooth < n_teeth[gear]
     signals = file["acceleration"][:]
     assert np.isfinite(signals).all()
     assert np.all(signals.std(axis=-1) > 0.0)

@@ -113,7 +113,7 @@ def test_a_toothed_wheel_and_the_torque_of_the_load_are_stored(tmp_path):
         "operating.speed_rpm=1746",
         "operating.torque_nm=30",
         "operating.duration_s=0.1",
-        "plan.n_records=4",
+        "plan.n_records=5",
         "plan.n_units=1",
     )
     out = tmp_path / "set"

@@ -10,8 +10,11 @@ from record_sets import check_labels, run, shard, texts
 
 from gensig.dataset.folder.layout import PLAN
 from gensig.dataset.plan import PlanRows
+from gensig.dataset.reader import open_dataset
+from gensig.errors import DatasetError
 from gensig.plan.request import read_request
 from gensig.record.simulate import simulate_record
+from gensig.report.rotation_frequencies import read_rotation
 
 ENGINE = (
     "experiment=engine_broken_tooth",
@@ -22,7 +25,7 @@ ENGINE = (
 TWO_STAGE = (
     "experiment=two_stage",
     "operating.duration_s=0.1",
-    "plan.n_records=8",
+    "plan.n_records=10",
     "plan.n_units=2",
     "plan.n_gearboxes=1",
 )
@@ -32,13 +35,15 @@ TWO_STAGE = (
 class Line:
     """Words of a set, and what its file must say.
 
-    ``teeth`` of the driving and the driven gear; ``ratio`` of the driving shaft's speed to the
-    set one; ``report`` is in the output of ``inspect``.
+    ``teeth`` of the driving and the driven gear; ``faulty`` those of the gears that may have a
+    fault, by name; ``ratio`` of the driving shaft's speed to the set one; ``report`` is in the
+    output of ``inspect``.
     """
 
     words: tuple[str, ...]
     classes: tuple[str, ...]
     teeth: tuple[int, int]
+    faulty: dict[str, int]
     ratio: float
     units: tuple[str, ...]
     report: str
@@ -50,6 +55,7 @@ LINES = {
         words=ENGINE,
         classes=("broken", "crack", "healthy", "missing_tooth"),
         teeth=(54, 54),
+        faulty={"wheel": 54},
         ratio=0.5,
         units=("rad/s", "rad/s", "rad/s^2", "rad/s^2"),
         report="flywheel_speed, pump_end_speed",
@@ -65,17 +71,43 @@ LINES = {
         ),
         classes=("broken", "chipped", "crack", "healthy"),
         teeth=(59, 68),
+        faulty={"wheel": 68},
         ratio=1.0,
         units=("rad/s", "rad/s", "rad/s^2", "rad/s^2"),
         report="flywheel_speed, pump_end_speed",
     ),
     "two_stage": Line(
         words=(*TWO_STAGE, "system.record_mesh=[5,6]", "fault.gear=wheel"),
-        classes=("broken", "crack", "healthy", "missing_tooth"),
+        classes=("broken", "crack", "healthy", "missing_tooth", "pitting"),
         teeth=(48, 80),
+        faulty={"wheel": 80},
         ratio=1.0 / 3.0,
         units=("rad/s^2", "rad/s^2", "m/s^2", "m/s^2"),
         report="of the load, as the motor feels it",
+    ),
+    "any_gear": Line(
+        words=TWO_STAGE,
+        classes=("broken", "crack", "healthy", "missing_tooth", "pitting"),
+        teeth=(32, 96),
+        faulty={"pinion": 32, "wheel": 96, "idler_gear_2": 48, "output_gear": 80},
+        ratio=1.0,
+        units=("rad/s^2", "rad/s^2", "m/s^2", "m/s^2"),
+        report="pinion 32, wheel 96, idler_gear_2 48, output_gear 80 teeth",
+    ),
+    # the gear's name has more than the 16 bytes that a gear pair's column has
+    "pump": Line(
+        words=(
+            *ENGINE,
+            "fault.gear=fresh_water_pump_gear",
+            "mesh.n_slices=12",
+            "mesh.points_per_pitch=128",
+        ),
+        classes=("broken", "crack", "healthy", "missing_tooth"),
+        teeth=(54, 54),
+        faulty={"fresh_water_pump_gear": 41},
+        ratio=0.5,
+        units=("rad/s", "rad/s", "rad/s^2", "rad/s^2"),
+        report="faults on    fresh_water_pump_gear 3 records",
     ),
 }
 
@@ -115,7 +147,7 @@ def test_a_set_is_whole_and_comes_again(made, capsys):
 def test_labels_units_and_columns_name_gear_tooth_and_shaft(made):
     line = made.line
     with shard(made.folder) as file:
-        check_labels(file, line.classes, line.teeth[1])
+        check_labels(file, line.classes, line.faulty)
         assert texts(file.attrs["channel_units"]) == list(line.units)
         assert set(texts(file["integration_check"][:])) == {"energy"}
         set_speed = file["params/operating.speed_rpm"][:]
@@ -138,3 +170,21 @@ def test_a_record_depends_on_its_row_alone_and_a_sham_has_no_fault(made):
         )
         for row in faulty
     )
+
+
+def test_readers_know_all_gears_of_a_line(made):
+    with open_dataset(made.folder) as data:
+        names = list(data.attributes["gear_names"])
+        for gear, n_teeth in made.line.faulty.items():
+            assert set(data.n_teeth(gear)) == {n_teeth}
+        assert set(data.column("fault_gear")) <= {"", *made.line.faulty}
+        rotation = read_rotation(data)
+        for gear, turns in zip(
+            names, data.attributes["gear_pinion_turns"], strict=True
+        ):
+            assert_allclose(rotation.turns(gear) * turns, rotation.drive, rtol=1e-9)
+        index = int(np.flatnonzero(data.column("fault_gear") != "")[0])
+        gear = rotation.fault_gear(index)
+        assert rotation.of(index)[gear] > 0.0
+        with pytest.raises(DatasetError, match="n_teeth_sun"):
+            data.n_teeth("sun")

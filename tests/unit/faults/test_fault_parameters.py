@@ -267,7 +267,7 @@ class TestSeverity:
         pinion = xiamen.pair.pinion
         radii = [math.hypot(21.61293e-3, r) for r in (12.56508e-3, 2.019e-3)]
         tip, low = (r * math.cos(pinion.half_tooth_angle_at(r)) for r in radii)
-        result = severity([one("pitting")], xiamen.pair)
+        result = severity([one("pitting")], xiamen.gears)
 
         assert_allclose(
             result,
@@ -300,12 +300,12 @@ class TestSeverity:
         ],
     )
     def test_declared_measures(self, xiamen, words, expected):
-        result = severity([typed(words)], xiamen.pair)
+        result = severity([typed(words)], xiamen.gears)
         assert_allclose(result, expected, rtol=1e-4)
 
     def test_the_largest_of_several(self, xiamen):
-        assert severity([], xiamen.pair) == 0.0
-        assert severity([one("crack"), one("missing_tooth")], xiamen.pair) == 1.0
+        assert severity([], xiamen.gears) == 0.0
+        assert severity([one("crack"), one("missing_tooth")], xiamen.gears) == 1.0
 
     @pytest.mark.parametrize(
         "words",
@@ -313,4 +313,4 @@ class TestSeverity:
     )
     def test_larger_than_its_measure_is_refused(self, xiamen, words):
         with refused("above 1", FaultError):
-            severity([typed(words)], xiamen.pair)
+            severity([typed(words)], xiamen.gears)

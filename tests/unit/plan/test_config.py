@@ -148,7 +148,7 @@ class TestEveryFaultOption:
         teeth = faulty_teeth(xiamen.pair, faults)
         assert bool(teeth) == (name != "healthy")
         assert {result for result, _ in teeth} <= {gear}
-        assert 0 <= severity(faults, xiamen.pair) <= 1
+        assert 0 <= severity(faults, xiamen.gears) <= 1
         xiamen.mesh_table(
             [fault for fault in faults if fault.alike or fault.kind == "runout"]
         )

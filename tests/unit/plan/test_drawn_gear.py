@@ -1,13 +1,15 @@
-"""``plan.fault_gear=drawn``: faults on either gear, with the teeth and sizes of that gear."""
+"""``plan.fault_gear``: faults on any gear, with the teeth and sizes of that gear."""
 
 import json
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from refusals import refused
 
 from gensig.dataset.plan import plan_text
-from gensig.errors import ConfigError
+from gensig.driveline import loads
+from gensig.errors import ConfigError, FaultError
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 
@@ -23,9 +25,10 @@ WORDS = (
 DRAWN = "plan.fault_gear=drawn"
 GEARS = ("pinion", "wheel")
 # Gears of another width weigh otherwise.
-pytestmark = pytest.mark.filterwarnings(
-    "ignore::gensig.plan.request.DerivedValueWarning"
-)
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::gensig.plan.request.DerivedValueWarning"),
+    pytest.mark.filterwarnings("ignore:.*mean tooth forces:UserWarning"),
+]
 
 
 def planned(*words):
@@ -111,12 +114,52 @@ def test_a_set_without_faults_is_as_before():
     assert plan_text(plain) == plan_text(other)
 
 
+def gears_of(*words):
+    plan = make_plan(read_request(list(words)).config)
+    return set(plan.columns["fault_gear"].tolist()) - {""}
+
+
+LIFE_OF_A_LINE = (
+    "experiment=two_stage",
+    "life=crack_growth",
+    "plan.classes=[healthy,crack]",
+    "plan.n_records=null",
+    "plan.n_repeats=1",
+    "plan.n_units=8",
+    "plan.vary={}",
+    "life.snapshot_count=3",
+    "life.n_setpoints=1",
+    "operating.torque_nm=150",
+)
+
+
 def test_lives_and_drive_lines_draw_the_gear_too():
-    for experiment in ("run_to_failure", "two_stage"):
-        words = [f"experiment={experiment}", DRAWN]
-        plan = make_plan(read_request(words).config)
-        gears = set(plan.columns["fault_gear"].tolist())
-        assert gears - {""} == set(GEARS), experiment
+    assert gears_of("experiment=run_to_failure", DRAWN) == set(GEARS)
+    assert gears_of("experiment=two_stage", DRAWN) == {
+        *GEARS,
+        "idler_gear_2",
+        "output_gear",
+    }
+
+
+def test_a_list_limits_the_gears():
+    two = ("idler_gear_2", "output_gear")
+    words = ("experiment=two_stage", f"plan.fault_gear=[{','.join(two)}]")
+    assert gears_of(*words) == set(two)
+    plan = make_plan(read_request(list(words)).config).columns
+    teeth = {gear: plan["fault_tooth"][plan["fault_gear"] == gear] for gear in two}
+    # 48 and 80 teeth
+    assert teeth["idler_gear_2"].max() < 48 <= teeth["output_gear"].max() < 80
+
+
+def test_a_life_of_a_line_grows_on_the_followed_mesh(monkeypatch):
+    monkeypatch.setattr(loads, "SECONDS", 0.1)
+    assert gears_of(*LIFE_OF_A_LINE, DRAWN) == set(GEARS)
+    given = "plan.fault_gear=as_given"
+    with pytest.raises(
+        ConfigError, match=r"'output_gear': .* choose a system\.record_m"
+    ):
+        gears_of(*LIFE_OF_A_LINE, given, "fault.gear=output_gear")
 
 
 def test_turns_of_the_faulted_gear_are_those_of_the_slower_one():
@@ -128,7 +171,50 @@ def test_turns_of_the_faulted_gear_are_those_of_the_slower_one():
     assert duration(DRAWN) == duration("fault.gear=wheel") > duration()
 
 
-def test_another_word_is_refused():
-    text = "plan.fault_gear = 'any'; allowed: as_given, drawn"
-    with pytest.raises(ConfigError, match=text):
-        planned("plan.fault_gear=any")
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (
+            "plan.fault_gear=any",
+            "= 'any'; allowed: as_given, drawn, or a list of gears",
+        ),
+        ("plan.fault_gear=[]", "= [] must name one gear or more, each once"),
+        ("plan.fault_gear=[wheel,wheel]", "must name one gear or more, each once"),
+        ("plan.fault_gear=[wheel,sun]", "lists 'sun'; allowed: pinion, wheel"),
+        (
+            "fault.vary={gear: {distribution: choice, values: [1]}}",
+            "fault.vary.gear: plans draw gears by plan.fault_gear: drawn, or a list",
+        ),
+    ],
+)
+def test_other_words_are_refused(words, text):
+    with refused(text):
+        planned(words)
+
+
+def test_the_gears_of_a_line_are_named_where_one_is_not_there():
+    words = "experiment=two_stage", "plan.fault_gear=as_given"
+    text = "fault.gear = 'sun'; allowed: pinion, wheel, idler_gear_2, output_gear"
+    with refused(text, FaultError):
+        gears_of(*words, "fault.gear=sun")
+    assert gears_of(*words, "fault.gear=output_gear") == {"output_gear"}
+
+
+def test_a_typed_gear_is_kept_where_an_option_draws_it():
+    words = ("experiment=two_stage", "fault.gear=output_gear")
+    request = read_request(list(words))
+    assert "fault.gear is given: plan.fault_gear = as_given" in request.notes
+    assert gears_of(*words) == {"output_gear"}
+    assert len(gears_of(*words, DRAWN)) == 4
+
+
+def test_a_compound_fault_has_several_gears():
+    parts = "{kind: crack, gear: pinion}, {kind: missing_tooth, gear: output_gear}"
+    words = (
+        "experiment=two_stage",
+        "fault=compound",
+        f"fault.parts=[{parts}]",
+    )
+    plan = make_plan(read_request(list(words)).config).columns
+    for text in plan["faults_json"]:
+        assert [part["gear"] for part in json.loads(text)] == ["pinion", "output_gear"]

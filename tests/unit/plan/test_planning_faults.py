@@ -106,7 +106,7 @@ class TestManyKindsOfFaults:
 
     def test_severity_is_the_largest_of_the_parts(self, mixed, xiamen):
         for record in self.of(mixed, "compound"):
-            parts = [severity([fault], xiamen.pair) for fault in row_faults(record)]
+            parts = [severity([fault], xiamen.gears) for fault in row_faults(record)]
             assert_allclose(record["severity"], max(parts), rtol=1e-12, atol=0)
         faulty = mixed.columns["label"] > 0
         assert (mixed.columns["severity"][faulty] > 0).all()

@@ -1,6 +1,6 @@
 """Draws of specimens and gearboxes."""
 
-from dataclasses import astuple, replace
+from dataclasses import asdict, replace
 from math import tau
 from types import SimpleNamespace
 
@@ -19,6 +19,7 @@ from gensig.sensing.gear_tolerances import (
     single_pitch_limit,
 )
 from gensig.sensing.manufacturing import (
+    FurtherGear,
     draw_gearbox,
     draw_specimen,
     perfect_specimen,
@@ -269,7 +270,9 @@ class TestWhatIsDrawn:
 
         assert repr(specimen) == repr(perfect)
         assert specimen.backlash_factor == 1.0
-        assert not any(np.any(values) for values in astuple(specimen)[:-1])
+        values = asdict(specimen)
+        del values["backlash_factor"]
+        assert not any(np.any(value) for value in values.values())
 
     def test_a_gear_outside_the_standard_needs_no_grade(self, machine):
         tiny = {
@@ -280,6 +283,80 @@ class TestWhatIsDrawn:
         with refused("module, the pinion has 0.4"):
             machine(tiny).check()
         machine({**tiny, "quality.iso1328_grade": None}).check()
+
+
+class TestFurtherGears:
+    """Gears outside the followed mesh are drawn after it."""
+
+    def drawn(self, pair, quality, others=(), n_mountings=0):
+        return draw_specimen(
+            rng(3),
+            pair.pinion,
+            pair.wheel,
+            quality,
+            others=others,
+            n_mountings=n_mountings,
+        )
+
+    def others(self, pair):
+        return tuple(
+            FurtherGear(gear=replace(pair.pinion, name=name), drives=drives)
+            for name, drives in (("sun", True), ("planet", False))
+        )
+
+    def test_they_leave_pinion_and_wheel_alone(self, xiamen, quality):
+        pair, grade = xiamen.pair, quality(misalignment=5 * UM, backlash_scatter=0.5)
+        alone = self.drawn(pair, grade)
+        more = self.drawn(pair, grade, self.others(pair), 2)
+        assert repr(replace(more, others={}, mountings=())) == repr(alone)
+        assert list(more.others) == ["sun", "planet"]
+
+    def test_each_has_errors_of_its_own(self, xiamen, quality):
+        pair, grade = xiamen.pair, quality(misalignment=5 * UM, backlash_scatter=0.5)
+        more = self.drawn(pair, grade, self.others(pair), 2)
+        sun, planet = more.others.values()
+        assert {form.gear for form in sun.forms} == {"sun"}
+        assert abs(np.corrcoef(sun.error, planet.error)[0, 1]) < 0.9
+        first, second = more.mountings
+        assert first.backlash_factor != second.backlash_factor
+        assert first.misalignment != second.misalignment
+        (form,) = first.forms("pinion")
+        assert (form.gear, form.misalignment) == ("pinion", first.misalignment)
+
+    def test_the_mountings_do_not_move_the_gears(self, xiamen, quality):
+        """One mesh more draws after all that was there."""
+        pair, grade = xiamen.pair, quality()
+        one, two = (self.drawn(pair, grade, self.others(pair), n) for n in (1, 2))
+        assert repr(replace(two, mountings=two.mountings[:1])) == repr(one)
+
+    def test_perfect_gears_have_none(self, xiamen, quality):
+        pair = xiamen.pair
+        none = self.drawn(pair, quality(iso1328_grade=None), self.others(pair), 2)
+        assert (none.others, none.mountings) == ({}, ())
+        assert not np.any(none.errors_of("sun", 7))
+        assert none.mounting(1).forms("pinion") == ()
+
+    def test_a_tooth_slope_turns_with_the_flank_that_touches(self, xiamen, quality):
+        """Contact runs to the tip of a driving gear, away from that of a driven one."""
+        pair, grade = xiamen.pair, quality(tooth_share=1.0)
+        tilts = {}
+        for drives in (True, False):
+            gear = FurtherGear(gear=replace(pair.pinion, name="sun"), drives=drives)
+            tilts[drives] = self.drawn(pair, grade, (gear,)).others["sun"].tilt
+        flat = replace(grade, profile_errors=False)
+        (round_only,) = self.drawn(pair, flat, self.others(pair)[:1]).others.values()
+        assert_allclose(tilts[True] + tilts[False], 2.0 * round_only.tilt, atol=1e-15)
+        assert np.abs(tilts[True] - tilts[False]).max() > 1e-6
+
+
+def test_supports_of_further_gears_are_drawn_after_the_first(quality):
+    scattered = quality(support_stiffness_scatter=0.2, support_damping_scatter=0.1)
+    two = draw_gearbox(rng(1), 4, scattered, 0.05)
+    four = draw_gearbox(rng(1), 4, scattered, 0.05, n_gears=4)
+    for key in ("stiffness_factor", "damping_factor"):
+        assert_array_equal(getattr(four, key)[:4], getattr(two, key))
+        assert len(set(getattr(four, key))) == 8
+    assert_array_equal(four.gain, two.gain)
 
 
 def test_gearbox_factors_scatter_as_the_quality_says(quality):

@@ -1,6 +1,7 @@
 """Networks on turns, and further heads: laws, a training, and predictions of a stored network."""
 
 import json
+from copy import copy
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -183,6 +184,19 @@ def test_a_visible_fault_is_learnt_stored_evaluated_and_predicted(dataset, tmp_p
     assert (result["gear"] != "none") == (", severity" in network.line(result))
     with pytest.raises(ConfigError, match="give --speed-rpm"):
         predict_recording(network, None, replace(source, speed_rpm=None))
+
+
+def test_faults_of_further_gears_are_on_neither_of_the_two(dataset):
+    columns = {**dataset.columns, "fault_gear": dataset.columns["fault_gear"].copy()}
+    record = np.flatnonzero(columns["fault_gear"] != "")[:2]
+    columns["fault_gear"] = columns["fault_gear"].astype("U16")
+    columns["fault_gear"][record] = "output_gear"
+    line = copy(dataset)
+    line.columns = columns
+    targets = record_targets(line, record)
+    assert targets["gear"].tolist() == [0, 0]
+    assert np.all(targets["severity"] > 0.0)
+    assert np.all(record_targets(dataset, record)["gear"] > 0)
 
 
 def test_heads_that_are_right_have_no_error(dataset):

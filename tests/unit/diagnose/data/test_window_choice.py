@@ -38,6 +38,18 @@ def test_slow_gears_get_turns_of_the_one_with_the_fault(gear, ratio):
     assert "\n" not in why
 
 
+def test_a_further_gear_of_a_drive_line_counts_as_slow_as_it_turns():
+    dataset = at_speed(300, gear="output_gear", duration=5.0)
+    names = {"gear_names": ["pinion", "wheel", "output_gear"]}
+    dataset.attributes |= {**names, "gear_pinion_turns": [1.0, 3.0, 5.0]}
+    window, why = chosen_window(dataset)
+    assert window == pytest.approx(TURNS * 5.0 * 0.2 * dataset.sampling_rate, rel=1e-3)
+    assert "output_gear" in why
+    sound = at_speed(300, gear="", duration=5.0)
+    sound.attributes |= dataset.attributes
+    assert chosen_window(sound)[0] == round(TURNS * 0.2 * sound.sampling_rate)
+
+
 def test_the_slowest_wheel_of_different_pairs_counts():
     dataset = at_speed(300, gear="wheel", duration=5.0)
     wheel = np.full(dataset.n_records, 30)

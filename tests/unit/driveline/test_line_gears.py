@@ -1,0 +1,83 @@
+"""Names of the gears of a drive line, their speeds and their home meshes."""
+
+from dataclasses import replace
+
+import pytest
+from closeness import assert_close
+
+from gensig.driveline.drive_line import read_drive_line
+from gensig.driveline.line_gears import gear_names, line_bodies, pinion_turns, slug
+from gensig.plan.request import read_request
+from gensig.record.machines import read_machine
+from gensig.systems.base import further_gears, home_meshes
+
+
+@pytest.fixture(scope="module")
+def drive():
+    return read_drive_line(read_request(["system=two_stage_gearbox"]).config)
+
+
+def named(drive, *names):
+    gears = tuple(
+        replace(gear, name=name)
+        for gear, name in zip(drive.line.gears, names, strict=True)
+    )
+    return replace(drive, line=replace(drive.line, gears=gears))
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("Idler gear 2", "idler_gear_2"),
+        ("Fresh-water pump gear", "fresh_water_pump_gear"),
+        ("  Z1 / (Ritzel) ", "z1_ritzel"),
+        ("Zahnräder", "zahnr_der"),
+        ("歯車", ""),
+    ],
+)
+def test_slugs_have_lower_case_letters_digits_and_underscores(name, expected):
+    assert slug(name) == expected
+
+
+def test_the_followed_mesh_names_its_gears_and_the_table_the_others(drive):
+    assert gear_names(drive, 0) == ("pinion", "wheel", "idler_gear_2", "output_gear")
+    assert gear_names(drive, 1) == ("input_pinion", "idler_gear_1", "pinion", "wheel")
+
+
+def test_every_gear_has_a_name_of_its_own(drive):
+    same = named(drive, "a", "b", "Gear", "gear")
+    assert gear_names(same, 0) == ("pinion", "wheel", "gear", "gear_gear_4")
+    sides = named(drive, "a", "b", "Pinion", "歯車")
+    assert gear_names(sides, 0) == ("pinion", "wheel", "pinion_gear_3", "gear_4")
+
+
+def test_turns_follow_the_shafts(drive):
+    assert_close(list(pinion_turns(drive, 0).values()), [1.0, 3.0, 3.0, 5.0], 1e-9)
+    turns = pinion_turns(drive, 1)
+    assert_close(turns["wheel"], 80 / 48, 1e-9)
+    assert_close(turns["input_pinion"], 1 / 3, 1e-9)
+
+
+def test_bodies_are_in_the_order_of_the_gears(drive):
+    assert list(line_bodies(drive, 1))[:2] == ["pinion", "wheel"]
+
+
+def test_a_gear_is_at_home_in_the_followed_mesh_or_in_its_first_one():
+    words = ["experiment=engine_test_point", "system.record_mesh=[20,43]"]
+    machine = read_machine(read_request(words).config)
+    names = machine.engine.mesh_names
+    homes = {
+        gear: names[number] for gear, number in home_meshes(machine.meshes).items()
+    }
+    assert set(homes) == set(machine.gears)
+    # driven in 19/20 before it drives in 20/43, which is followed here
+    assert homes["pinion"] == "20/43"
+    assert homes["idler_gear"] == "3/66"
+    assert homes["lube_oil_pump_gear"] == "66/67"
+    drives = {
+        each.gear.name: each.drives
+        for each in further_gears(machine.gears, machine.meshes)
+    }
+    assert set(drives) == set(machine.gears) - {"pinion", "wheel"}
+    assert drives["crankshaft_gear"]
+    assert not drives["idler_gear"]
