@@ -28,7 +28,7 @@ from gensig.driveline.linear.forced import (
     steady_response,
 )
 from gensig.driveline.linear.matrices import LineMatrices
-from gensig.driveline.stiffness_range import check_stiffness_range
+from gensig.driveline.linear.stiffness_range import check_stiffness_range
 from gensig.errors import ConfigError
 from gensig.options.configuration import Configuration
 from gensig.sensing.toothed_wheel import ToothedWheel, draw_wheel, instantaneous_speed

@@ -48,6 +48,25 @@ from gensig.errors import DatasetError
 _PARAM_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.\-]*")
 
 
+def _columns(
+    *, lives: bool, references: bool, gears: bool, names: bool
+) -> dict[str, Column]:
+    """Columns of a shard, by their names; ``names``: its gears may have any name."""
+    columns = dict(COLUMNS)
+    if not lives:
+        for name in LIFE_COLUMNS:
+            del columns[name]
+    if not references:
+        del columns[IS_REFERENCE]
+    if not gears:
+        for name in GEAR_COLUMNS:
+            del columns[name]
+    if names:
+        column = columns["fault_gear"]
+        columns["fault_gear"] = replace(column, dtype=LINE_FAULT_GEAR)
+    return columns
+
+
 class ShardWriter:
     """Context manager that writes one shard.
 
@@ -104,18 +123,12 @@ class ShardWriter:
         self.scales: dict[str, str] = {}
         if sample_type == "int16":
             self.scales = {name: SCALES[name] for name in SCALES if name in signals}
-        self.columns = dict(COLUMNS)
-        if not lives:
-            for name in LIFE_COLUMNS:
-                del self.columns[name]
-        if not references:
-            del self.columns[IS_REFERENCE]
-        if not gears:
-            for name in GEAR_COLUMNS:
-                del self.columns[name]
-        if GEAR_NAMES in attributes:
-            column = self.columns["fault_gear"]
-            self.columns["fault_gear"] = replace(column, dtype=LINE_FAULT_GEAR)
+        self.columns = _columns(
+            lives=lives,
+            references=references,
+            gears=gears,
+            names=GEAR_NAMES in attributes,
+        )
         self.version = version_of(self.columns)
         self.attributes = {"schema_version": self.version, **attributes}
         for name in params:

@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gensig.driveline.drive_line import read_drive_line
+from gensig.driveline.linear.stiffness_range import check_stiffness_range
 from gensig.driveline.shaft_tables import read_shafting, shipped_tables
-from gensig.driveline.stiffness_range import check_stiffness_range
 from gensig.errors import ConfigError, SimulationError
 from gensig.plan.request import read_request
 
