@@ -20,6 +20,7 @@ from gensig.dynamics import _kernels
 from gensig.dynamics.backends import group_motions
 from gensig.dynamics.backends.group_run import GroupRun
 from gensig.dynamics.decimation import Decimator, decimator
+from gensig.dynamics.pair import PairDynamics
 from gensig.production import folder as generation
 from gensig.record import simulate as records
 from gensig.record.inputs import InputReader
@@ -50,10 +51,10 @@ CLOCKED: tuple[tuple[Any, str, str], ...] = (
     (pair_machine, "check_machine", EQUATIONS),
     (group_motions, "settling_time", EQUATIONS),
     (group_motions, "pack_group", EQUATIONS),
-    (group_motions.PairDynamics, "static_start", EQUATIONS),
+    (PairDynamics, "static_start", EQUATIONS),
     (GroupRun, "advance", SETTLING),
     (GroupRun, "record", RECORDING),
-    (pair_machine, "_checks", CHECKING),
+    (pair_machine, "checks", CHECKING),
     (records, "_record", NOISE),
     (generation, "open_shard", WRITING),
     (ShardWriter, "__enter__", WRITING),

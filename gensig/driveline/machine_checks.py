@@ -32,8 +32,8 @@ def check_solver(mesh: MeshOptions, solver: Solver) -> None:
         )
     if solver.backend not in LINE_BACKENDS:
         raise ConfigError(
-            f"solver.backend = {solver.backend}: a drive line takes "
-            f"{' or '.join(LINE_BACKENDS)}"
+            f"solver.backend = {solver.backend}: a drive line has integrators of "
+            f"its own; take solver.backend={' or '.join(LINE_BACKENDS)}"
         )
     if solver.backend == DEFAULT_BACKEND and solver.precision != "float64":
         raise ConfigError(

@@ -101,7 +101,8 @@ def mesh_signals(
     if n_pairs == 0:
         raise ConfigError(
             "dataset.store_mesh_state: the loads of the teeth of a drive line are known with "
-            "solver.backend=nystroem alone; take it, or dataset.store_mesh_state=false"
+            "solver.backend=nystroem alone; take dataset.store_mesh_state=false, or that backend "
+            "where the line allows it"
         )
     if mesh is None:
         teeth = np.full((n_pairs, n_samples), NO_TOOTH, dtype=np.int16)

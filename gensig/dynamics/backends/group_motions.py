@@ -107,7 +107,7 @@ def integrate_group(
     stages = [(n_steps, -low_pass.margin - before) for n_steps, before in settling]
     end = stages[-1][1]
     # every lane begins at a time of its own; its motion before is not used
-    durations = [math.ceil(core.settling_time(machine) * rate) for machine in lanes]
+    durations = [math.ceil(settling_time(core, machine) * rate) for machine in lanes]
     begins = [min(end - 1, -low_pass.margin - n) for n in durations]
     span = min(begins) / rate, integration.duration + low_pass.margin / rate
     packed_step = 1.0 / (rate * oversampling)
@@ -120,6 +120,11 @@ def integrate_group(
     run = GroupRun(lanes, np.array(channels, dtype=np.int64), precision, core)
     run = settled(run, lanes, begins, stages, steps, oversampling)
     return recorded(run, steps, integration, end)
+
+
+def settling_time(core: Core[DynamicsT], machine: DynamicsT) -> float:
+    """Time after which a machine's start from rest has settled, s."""
+    return core.settling_time(machine)
 
 
 def pack_group(

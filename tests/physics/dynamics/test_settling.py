@@ -81,7 +81,7 @@ def steady(runs):
     """The same after 1.2 s of settling in fine steps."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(step_limits, "COARSE", ((16, 0.02),))
-        patch.setattr(group_motions, "settling_time", lambda _: 1.2)
+        patch.setattr(group_motions, "settling_time", lambda *_: 1.2)
         return simulate_together(runs)
 
 

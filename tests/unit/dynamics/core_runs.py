@@ -100,10 +100,10 @@ class CoreRun(GroupRun):
 
     def restart(self, lane: int) -> None:
         """Put one lane at rest in its equilibrium at the current time."""
-        lost = self.lost[lane]
+        lost = self.lost[:, lane].copy()
         start = self.machines[lane].static_start(self.now * self.step)
         self.begin(self.group, lane, start)
-        self.lost[lane] = lost
+        self.lost[:, lane] = lost
 
     def means(self, n_steps: int) -> np.ndarray:
         """Mean accelerations over each of the next steps, (step, channel, lane)."""
@@ -113,7 +113,7 @@ class CoreRun(GroupRun):
         self.core.integrate(
             self.group,
             self.state.ravel(),
-            self.lost,
+            self.lost.ravel(),
             self.fresh,
             self.step,
             self.now,

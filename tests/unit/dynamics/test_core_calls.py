@@ -153,7 +153,7 @@ class TestRecord:
         walk.means(1 + self.LOW_PASS.margin * FACTOR)
         for sample in range(n_samples + 1):
             turned = walk.whole[0, PINION_TURN] + sample / 51200 * speed
-            assert_close(angle[:, sample], turned, atol=1e-14)
+            assert_close(angle[:, 0, sample], turned, atol=1e-14)
             walk.means(FACTOR)
 
-        assert (np.abs(angle[:, 0]) < 0.5 * speed / 51200).all()
+        assert (np.abs(angle[:, 0, 0]) < 0.5 * speed / 51200).all()

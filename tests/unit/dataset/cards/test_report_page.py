@@ -247,6 +247,7 @@ def test_frequencies_of_a_geared_engine(drive, references):
         mesh=np.array([100.0, np.nan]),
         drive=np.array([drive, np.nan]),
         n_teeth={"pinion": 10, "wheel": 40},
+        further={},
         gear=np.array(["wheel", ""]),
     )
     expected = {"mesh": 100.0, "drive": drive, "pinion": 10.0, "wheel": 2.5}
