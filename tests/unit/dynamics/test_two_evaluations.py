@@ -65,7 +65,7 @@ class TestCalls:
         state, means, lost = motion([machines[lane]], (N_STEPS,))
         assert state[..., 0].tobytes() == whole[0][..., lane].tobytes()
         assert means[..., 0].tobytes() == whole[1][..., lane].tobytes()
-        assert lost[0] == whole[2][lane]
+        assert lost[0, 0] == whole[2][0, lane]
 
     def test_a_lane_that_begins_later_is_as_fresh(self, machines, whole):
         """Another lane restarts, which the first does not see; it moves as from the start."""
