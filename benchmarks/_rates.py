@@ -101,7 +101,7 @@ def kernel(
             core.integrate(
                 group,
                 state,
-                run.lost,
+                run.lost.ravel(),
                 run.fresh,
                 step,
                 n_settling + call * PER_CALL,

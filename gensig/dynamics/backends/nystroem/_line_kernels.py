@@ -94,6 +94,7 @@ def integrate(
     machine = machine_rows(work, n_meshes, n)
     q, v = block(rows.Q, n_dof), block(rows.V, n_dof)
     mean = block(rows.MEAN, n_dof)
+    changing = len(group.profile) > (lines.N_PROFILE + 2 * n_dof) * n
     begin(group, state, work)
     by_tooth, starting = False, False
     for lane in range(n):
@@ -102,9 +103,12 @@ def integrate(
             wheel_rows = at(m * layout.N_INDICES + layout.WHEEL_ROWS, lane, n)
             by_tooth = by_tooth or group.indices[wheel_rows] > 0
     for number in range(first_step, first_step + n_steps):
-        if number % RECENTER == 0:
+        is_recentred = number % RECENTER == 0
+        if is_recentred:
             recenter(group, machine, wide)
-        set_out(group, number * step, machine, work, wide)
+        set_rolls(group, number * step, machine, wide)
+        if changing or is_recentred or number == first_step:
+            set_forces(group, number * step, machine, wide)
         if starting and number == first_step:
             start(group, fresh, by_tooth, work, wide)
         if angle_row >= 0 and number % per_angle == 0:
@@ -190,21 +194,27 @@ def recenter(group, machine, wide):
 
 
 @inlined
-def set_out(group, time, machine, work, wide):
-    """Set what stays constant over a step: nominal motion, forces, and the roll of every mesh."""
-    n = width(machine)
-    n_dof, n_meshes = len(group.force) // n, group.n_meshes
-    profile, n_rows = group.profile, lines.N_PROFILE + 2 * n_dof
-    n_cells = len(profile) // (n_rows * n)
+def _cell(group, time, n_rows, n):
+    """First row of the profile's cell at a time, and the time since its begin."""
+    n_cells = len(group.profile) // (n_rows * n)
     cell = int(np.floor(time * group.cells_per_second)) - group.profile_first
     cell = min(max(cell, 0), n_cells - 1)
     since = time - (group.profile_first + cell) / group.cells_per_second
-    first_row = cell * n_rows
+    return cell * n_rows, since
+
+
+@inlined
+def set_rolls(group, time, machine, wide):
+    """Set the nominal angle and the roll of every mesh at the begin of a step."""
+    n = width(machine)
+    n_dof, n_meshes = len(group.force) // n, group.n_meshes
+    profile = group.profile
+    cell, since = _cell(group, time, lines.N_PROFILE + 2 * n_dof, n)
     for first in range(0, n, EIGHT):
-        speed = load_wide(profile, at(first_row + lines.SPEED, first, n))
-        gain = load_wide(profile, at(first_row + lines.GAIN, first, n))
+        speed = load_wide(profile, at(cell + lines.SPEED, first, n))
+        gain = load_wide(profile, at(cell + lines.GAIN, first, n))
         turned = since * (speed + (0.5 * since) * gain)
-        turned = load_wide(profile, at(first_row + lines.ANGLE, first, n)) + turned
+        turned = load_wide(profile, at(cell + lines.ANGLE, first, n)) + turned
         turned = turned + load_wide(wide, at(layout.CENTER, first, n))
         store_wide(wide, at(layout.NOMINAL, first, n), turned)
         for m in range(n_meshes):
@@ -218,8 +228,17 @@ def set_out(group, time, machine, work, wide):
             begun = load_wide(group.exact, at(exact + layout.START_ROLL, first, n))
             base = m * rows.N_WIDE + layout.BASE
             store_wide(wide, at(base, first, n), begun + roll)
-    speed = _in_row(profile, first_row + lines.SPEED, machine)
-    gain = _in_row(profile, first_row + lines.GAIN, machine)
+
+
+@inlined
+def set_forces(group, time, machine, wide):
+    """Set nominal speed and every force but those of meshes at the begin of a step."""
+    n = width(machine)
+    n_dof = len(group.force) // n
+    profile, n_rows = group.profile, lines.N_PROFILE + 2 * n_dof
+    cell, since = _cell(group, time, n_rows, n)
+    speed = _in_row(profile, cell + lines.SPEED, machine)
+    gain = _in_row(profile, cell + lines.GAIN, machine)
     center = _in_row(wide, layout.CENTER, machine)
     set_row(machine, rows.DRIVE + layout.DRIVE_SPEED, speed + since * gain)
     set_row(machine, rows.DRIVE + layout.DRIVE_GAIN, gain)
@@ -227,8 +246,8 @@ def set_out(group, time, machine, work, wide):
     for d in range(n_dof):
         held = center * get_row(group.held, d) + gain * get_row(group.carried, d)
         given = get_row(group.force, d) - held
-        if n_cells > 1:
-            row = first_row + lines.N_PROFILE + 2 * d
+        if len(profile) > n_rows * n:
+            row = cell + lines.N_PROFILE + 2 * d
             given = given + _in_row(profile, row, machine)
             given = given + since * _in_row(profile, row + 1, machine)
         set_row(machine, forces + d, given)
