@@ -434,6 +434,7 @@ class LineMachine(Machine):
             governor=self._governor,
             tabulated={**others, self.mesh_number: recorded},
             turned=turned,
+            local_losses=self.side_by_side,
         )
 
     @property

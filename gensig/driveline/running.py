@@ -20,7 +20,7 @@ from gensig.driveline.engine_line import EngineLine
 from gensig.driveline.excitation.cycle import CYCLE
 from gensig.driveline.linear.forced import SteadyResponse, closed_line, steady_response
 from gensig.driveline.linear.matrices import LineMatrices
-from gensig.driveline.linear.modal import with_viscous_losses
+from gensig.driveline.linear.modal import with_local_losses, with_viscous_losses
 from gensig.driveline.mesh_phase import first_slice_lead, start_rolls
 from gensig.driveline.time.chords import sliced_pair_mesh
 from gensig.driveline.time.course import LineCourse, ShaftTorque, constant_speed
@@ -216,6 +216,7 @@ def running_line(
     governor: Governor,
     tabulated: Mapping[int, TabulatedMesh] | None = None,
     turned: float = 0.0,
+    local_losses: bool = False,
 ) -> RunningLine:
     """The line of an engine with its torques along a course.
 
@@ -223,12 +224,16 @@ def running_line(
     ----------
     tabulated : teeth of meshes by the index of the mesh; all others hold the stiffness of the table
     turned : rad, angle of the crank in its cycle at time 0; all meshes and torques follow from it
+    local_losses : whether loss factors of shafts are dampers beside them, not of modes
 
     Raises
     ------
     ConfigError    for courses that the engine cannot run
     """
-    matrices = with_viscous_losses(machine.matrices(merge_rigid=True))
+    merged = machine.matrices(merge_rigid=True)
+    matrices = (
+        with_local_losses(merged) if local_losses else with_viscous_losses(merged)
+    )
     speed, torque = float(course.speed[0]), float(course.torque[0])
     first = _tables(machine, matrices, speed, torque)
     closed, elements = closed_line(matrices)
@@ -283,15 +288,18 @@ def _geared(
 ) -> GearedLine:
     rotation = matrices.rigid[0]
     momentum = matrices.mass @ rotation
-    rigid = np.outer(momentum, momentum) / float(rotation @ momentum)
     rate = 2.0 * math.pi * governor.frequency
-    phases = start_rolls(machine.drive, turned)
+    held = rate / math.sqrt(float(rotation @ momentum)) * momentum
+    slowed = 2.0 * governor.damping_ratio / rate
+    rigid, phases = np.outer(held, held), start_rolls(machine.drive, turned)
     return GearedLine(
         names=matrices.names,
         mass=matrices.mass,
-        damping=matrices.damping + 2.0 * governor.damping_ratio * rate * rigid,
-        stiffness=matrices.stiffness + rate**2 * rigid,
+        damping=matrices.damping + slowed * rigid,
+        stiffness=matrices.stiffness + rigid,
         rotation=rotation,
+        held=held,
+        held_damping=slowed,
         meshes=tuple(
             _mesh(
                 machine,

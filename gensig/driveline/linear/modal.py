@@ -130,12 +130,34 @@ def with_viscous_losses(matrices: LineMatrices) -> LineMatrices:
         _quadratic(modes.shapes[elastic], matrices.loss_stiffness) / omega[elastic]
     )
     momentum = modes.shapes @ matrices.mass
+    return _viscous(matrices, (momentum.T * rate) @ momentum)
+
+
+def with_local_losses(matrices: LineMatrices) -> LineMatrices:
+    """The same with a viscous damper beside every shaft and mesh that has a loss factor.
+
+    Shafts: c = eta sqrt(k J) with the inertia J1 J2 / (J1 + J2) of the two discs that it joins,
+    as for meshes: the ratio eta / 2 of both on their own. The damping matrix is as sparse as the
+    shafts are.
+    """
+    damping, mass = np.zeros_like(matrices.damping), np.diag(matrices.mass)
+    rows, columns = np.nonzero(np.triu(matrices.loss_stiffness, k=1))
+    for ends in zip(rows.tolist(), columns.tolist(), strict=True):
+        stiffness = -matrices.stiffness[ends]
+        joined = mass[ends[0]] * mass[ends[1]] / (mass[ends[0]] + mass[ends[1]])
+        damper = -matrices.loss_stiffness[ends] * math.sqrt(joined / stiffness)
+        damping[np.ix_(ends, ends)] += damper * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    return _viscous(matrices, damping)
+
+
+def _viscous(matrices: LineMatrices, damping: Array) -> LineMatrices:
+    """The same with a damping matrix in place of the loss factors of its shafts."""
     loss_damping = matrices.mesh_loss_factor * np.sqrt(
         matrices.mesh_stiffness * matrices.mesh_mass
     )
     return replace(
         matrices,
-        damping=matrices.damping + (momentum.T * rate) @ momentum,
+        damping=matrices.damping + damping,
         loss_stiffness=np.zeros_like(matrices.loss_stiffness),
         mesh_damping=matrices.mesh_damping + loss_damping,
         mesh_loss_factor=np.zeros_like(matrices.mesh_loss_factor),

@@ -108,12 +108,18 @@ def _machines(
     """Fields of the group that are of bodies, springs and dampers."""
     lines_of = [lane.running.line for lane in lanes]
     mass = np.stack([np.diag(line.mass) for line in lines_of])
-    stiffness = np.stack([line.stiffness for line in lines_of])
-    damping = np.stack([line.damping for line in lines_of])
     rotation = np.stack([line.rotation for line in lines_of])
+    held = np.zeros_like(mass)
+    for row, line in zip(held, lines_of, strict=True):
+        if line.held is not None:
+            row[:] = line.held
+    slowed = np.array([line.held_damping for line in lines_of])
+    rigid = held[:, :, None] * held[:, None, :]
+    stiffness = np.stack([line.stiffness for line in lines_of]) - rigid
+    damping = np.stack([line.damping for line in lines_of])
+    damping = damping - slowed[:, None, None] * rigid
     sprung, damped = _couplings(stiffness), _couplings(damping)
     turning = rotation[:, lanes[0].touched[:, lines.A_TURN]]
-    held = np.einsum("lij,lj->li", stiffness, rotation)
     rows = {
         "inverse_mass": 1.0 / mass,
         "stiffness": np.einsum("lii->li", stiffness),
@@ -122,6 +128,7 @@ def _machines(
         "damped": damped.value,
         "rotation": rotation,
         "held": held,
+        "held_damping": slowed[:, None],
         "carried": mass * rotation,
     }
     return {
@@ -131,6 +138,7 @@ def _machines(
         "damped_first": damped.first,
         "damped_column": damped.column,
         "turning": turning.T.ravel(),
+        "turning_dofs": np.flatnonzero(rotation.any(axis=0)),
         "exact_rotation": rotation.T.ravel(),
     }
 

@@ -34,6 +34,9 @@ class GearedLine:
     ``mass``, ``damping``, ``stiffness`` (dof, dof) without the meshes, SI; springs and dampers
     act on the deviation. ``rotation`` (dof,) is how far each turns with the reference, signed as
     its angle counts, 0 for a translation. ``names`` name the degrees of freedom.
+
+    A governor is part of both: its stiffness is ``held`` times ``held`` (dof,), its damping
+    ``held_damping`` s times as much. None without one.
     """
 
     names: tuple[str, ...]
@@ -42,6 +45,8 @@ class GearedLine:
     stiffness: Array
     rotation: Array
     meshes: tuple[LineMesh, ...]
+    held: Array | None = None
+    held_damping: float = 0.0
 
     def __post_init__(self) -> None:
         n = len(self.names)

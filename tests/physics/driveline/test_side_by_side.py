@@ -1,5 +1,6 @@
 """Lines in the two-evaluation core: a pair as a line, two stages, and what they agree with."""
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -56,6 +57,9 @@ def as_line(pair):
         start_teeth=teeth,
         start_phase=pair.start_phase,
     )
+    held = np.zeros(len(system.mass))
+    held[PINION_ROTATION] = math.sqrt(pair.drive_stiffness)
+    drive_damping = system.damping[PINION_ROTATION, PINION_ROTATION]
     line = GearedLine(
         names=system.names,
         mass=np.diag(system.mass),
@@ -63,6 +67,8 @@ def as_line(pair):
         stiffness=system.stiffness,
         rotation=system.rotation,
         meshes=(mesh,),
+        held=held,
+        held_damping=drive_damping / pair.drive_stiffness,
     )
     torque = pair.operating.torque
     driven = np.array([-torque * pair.table.pair.ratio])

@@ -42,6 +42,7 @@ from gensig.dynamics.backends.nystroem._line_layout import (
 from gensig.dynamics.backends.nystroem._line_meshes import (
     acceleration,
     correct,
+    govern,
     law_at,
     motion,
     push,
@@ -129,15 +130,17 @@ def integrate(
         clear(n_dof, machine)
         for m in range(n_meshes):
             push_middle(group, m, step, machine, work, wide)
+        middle = block(rows.MIDDLE_Q, n_dof), block(rows.MIDDLE_V, n_dof)
+        govern(group, middle[0], middle[1], machine)
         for d in range(n_dof):
-            middle = block(rows.MIDDLE_Q, n_dof), block(rows.MIDDLE_V, n_dof)
             a = acceleration(group, d, middle[0], middle[1], machine)
             predict(d, a, step, n_dof, machine)
         clear(n_dof, machine)
         for m in range(n_meshes):
             push_end(group, m, step, machine, work, wide)
+        end = block(rows.END_Q, n_dof), block(rows.END_V, n_dof)
+        govern(group, end[0], end[1], machine)
         for d in range(n_dof):
-            end = block(rows.END_Q, n_dof), block(rows.END_V, n_dof)
             a = acceleration(group, d, end[0], end[1], machine)
             conclude(d, a, step, n_dof, machine)
         for m in range(n_meshes):
@@ -240,12 +243,12 @@ def set_forces(group, time, machine, wide):
     speed = _in_row(profile, cell + lines.SPEED, machine)
     gain = _in_row(profile, cell + lines.GAIN, machine)
     center = _in_row(wide, layout.CENTER, machine)
+    set_row(machine, rows.DRIVE + layout.DRIVE_CENTER, center)
     set_row(machine, rows.DRIVE + layout.DRIVE_SPEED, speed + since * gain)
     set_row(machine, rows.DRIVE + layout.DRIVE_GAIN, gain)
     forces = block(rows.FORCES, n_dof)
     for d in range(n_dof):
-        held = center * get_row(group.held, d) + gain * get_row(group.carried, d)
-        given = get_row(group.force, d) - held
+        given = get_row(group.force, d) - gain * get_row(group.carried, d)
         if len(profile) > n_rows * n:
             row = cell + lines.N_PROFILE + 2 * d
             given = given + _in_row(profile, row, machine)
@@ -308,6 +311,7 @@ def start(group, fresh, by_tooth, work, wide):
             set_row(own, rows.PAIR_FORCE + j, force)
     flags = get_row(machine, rows.FRESH)
     q, v = block(rows.Q, n_dof), block(rows.V, n_dof)
+    govern(group, q, v, machine)
     for d in range(n_dof):
         a = acceleration(group, d, q, v, machine)
         choose(flags, block(rows.NOW, n_dof) + d, a, machine)

@@ -21,6 +21,7 @@ N_BLOCKS = ON + 1
 # rows of a mesh, which one pair holds in registers: roll over the step at whose end the nodes were
 # read, and rotation of gear a at its begin
 AHEAD, BEGUN = layout.AHEAD, layout.AHEAD + 1
+PULL = layout.AHEAD + 2  # of the machine: pull of the governor on each of ``held``
 # degrees of freedom that a mesh acts on: x, y and rotation of its driving gear a and its driven
 # gear b; NONE for a gear that does not move so
 A_X, A_Y, A_TURN, B_X, B_Y, B_TURN, N_TOUCHED = range(7)
@@ -46,8 +47,10 @@ class LineGroup(NamedTuple):
     motion of the reference and the forces that come with it. ``reference`` is the degree of
     freedom whose rotation is 1, ``angles`` those whose angles are given out. ``stiffness`` and
     ``damping`` are diagonals; their other entries (entry, lane) are ``sprung`` and ``damped``, row
-    after row as ``sprung_first`` (dof + 1,) and ``sprung_column`` say, and alike. Other fields
-    are those of ``Group``.
+    after row as ``sprung_first`` (dof + 1,) and ``sprung_column`` say, and alike. The governor is
+    no part of them: its stiffness is ``held`` (dof, lane) times ``held``, its damping
+    ``held_damping`` (lane,) s times as much, on ``turning_dofs``. Other fields are those of
+    ``Group``.
     """
 
     n_meshes: int
@@ -79,6 +82,8 @@ class LineGroup(NamedTuple):
     rotation: Any
     exact_rotation: Any
     held: Any
+    held_damping: Any
+    turning_dofs: Any
     carried: Any
     profile: Any
     profile_first: int

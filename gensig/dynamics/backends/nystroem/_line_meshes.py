@@ -153,11 +153,28 @@ def _on_body(group, mesh, place, k, law):
 
 
 @inlined
+def govern(group, q, v, machine):
+    """Set the pull of the governor, which feels the rigid motion alone, from a state.
+
+    ``CENTER`` is the rigid motion that the state does not hold.
+    """
+    center = get_row(machine, rows.DRIVE + layout.DRIVE_CENTER)
+    slowed, pull = get_row(group.held_damping, 0), spread(machine, 0.0)
+    for k in range(len(group.turning_dofs)):
+        d = group.turning_dofs[k]
+        moved = fused(center, get_row(group.rotation, d), get_row(machine, q + d))
+        moved = fused(slowed, get_row(machine, v + d), moved)
+        pull = fused(get_row(group.held, d), moved, pull)
+    set_row(machine, lines.PULL, pull)
+
+
+@inlined
 def acceleration(group, d, q, v, machine):
     """Acceleration of a degree of freedom under the forces of all meshes, with states in rows."""
     n_dof = len(group.force) // width(machine)
     spring = get_row(group.stiffness, d) * get_row(machine, q + d)
     spring = fused(get_row(group.damping, d), get_row(machine, v + d), spring)
+    spring = fused(get_row(group.held, d), get_row(machine, lines.PULL), spring)
     for k in range(group.sprung_first[d], group.sprung_first[d + 1]):
         moved = get_row(machine, q + group.sprung_column[k])
         spring = fused(get_row(group.sprung, k), moved, spring)
