@@ -11,7 +11,7 @@ from gensig.errors import ConfigError
 from gensig.mesh.options import read_mesh_options, read_slice_options
 from gensig.operation.options import read_operating
 from gensig.options.configuration import Configuration
-from gensig.sensing.chain import EVERY_BEARING
+from gensig.sensing.chain import stands_for_channels
 from gensig.sensing.manufacturing import Quality
 from gensig.sensing.options import read_sensing
 from gensig.systems.registry import read_heat, read_material, read_modification
@@ -61,7 +61,8 @@ def _with_lateral_motion(config: Configuration) -> Configuration:
     sensing = config.section("sensing")
     names = [str(name) for name in sensing.get("channels") or ()]
     has_bearing = any(name.endswith(("_x", "_y")) for name in names)
-    needed = has_bearing or names == [EVERY_BEARING] or bool(sensing.get("nuisances"))
+    every = stands_for_channels(names)
+    needed = has_bearing or every or bool(sensing.get("nuisances"))
     return config.with_keys("system", lateral=needed)
 
 

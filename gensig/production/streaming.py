@@ -24,7 +24,7 @@ from gensig.plan.make import make_plan
 from gensig.record.machines import read_machine
 from gensig.record.options import read_dataset_options
 from gensig.record.simulate import Record, simulate_records
-from gensig.sensing.chain import EVERY_BEARING
+from gensig.sensing.chain import stands_for_channels
 
 # Spawn key of the seeds of later epochs. The causes of a record and the splits have others.
 EPOCH_STREAM = 9100
@@ -69,7 +69,7 @@ class RecordStream:
     def channels(self) -> list[str]:
         """Names along the channel axis."""
         sensing = self.config["sensing"]
-        if sensing["channels"] == [EVERY_BEARING]:
+        if stands_for_channels(sensing["channels"]):
             return list(read_machine(self.config).sensing.channel_names)
         if sensing["sensors"] is None:
             return list(sensing["channels"])

@@ -35,14 +35,23 @@ LONGEST_LEAD = 0.5  # s
 SENSOR_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
 CROSSED = {"x": "y", "y": "x"}
 EVERY_BEARING = "bearings"  # in place of the channels: x and y of every gear
+EVERY_Y = (
+    "bearings_y"  # in place of the channels: y of every gear, along its line of action
+)
+IN_PLACE = {EVERY_BEARING: ("_x", "_y"), EVERY_Y: ("_y",)}
+
+
+def stands_for_channels(channels: Sequence[str]) -> bool:
+    """True for a single key of ``IN_PLACE``, which stands for channels of every gear."""
+    return len(channels) == 1 and channels[0] in IN_PLACE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sensing:
     """Simulated channels, the chain from them to the record, its rate and its noise.
 
-    ``channels`` are the simulated accelerations; ``EVERY_BEARING`` alone stands for x and y of
-    every gear until the machine is known (``of_machine``). Without a ``path`` the sensors feel
+    ``channels`` are the simulated accelerations; a key of ``IN_PLACE`` alone stands for such
+    of every gear until the machine is known (``of_machine``). Without a ``path`` the sensors feel
     these; a path leads from them to the ``sensors``. ``snr`` in dB; None records without noise.
     Its reference is the power of the same unit at the same condition without the fault
     (``healthy_twin``), so the floor does not reveal the class. None for ``sensor`` is an ideal
@@ -124,22 +133,25 @@ class Sensing:
         )
 
     def of_machine(self, channels: Sequence[str]) -> Sensing:
-        """The same with the channels of a machine in place of ``EVERY_BEARING``.
+        """The same with the channels of a machine in place of a key of ``IN_PLACE``.
 
         Raises
         ------
         ConfigError    for a machine without bearing channels
         """
-        if self.channels != (EVERY_BEARING,):
+        if not stands_for_channels(self.channels):
             return self
+        (key,) = self.channels
         bearings = [
             name
             for name in channels
-            if transverse_channel(name) in channels and not is_turning(name)
+            if transverse_channel(name) in channels
+            and not is_turning(name)
+            and name.endswith(IN_PLACE[key])
         ]
         if not bearings:
             raise ConfigError(
-                f"sensing.channels = [{EVERY_BEARING}]: no gear of this machine moves on "
+                f"sensing.channels = [{key}]: no gear of this machine moves on "
                 "bearings; take system.lateral=true"
             )
         return replace(self, channels=tuple(bearings))
