@@ -6,6 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from closeness import assert_close
+from line_words import IMPLICIT
 from refusals import refused
 
 from gensig.driveline.teeth import felt_there, is_tabulated
@@ -34,6 +35,7 @@ TWO_STAGE = (
     "quality.iso1328_grade=null",
     "sensing.snr_db=null",
     "operating.torque_nm=60",
+    *IMPLICIT,
 )
 ENGINE = ("experiment=engine_test_point", "mesh.n_slices=8", "mesh.points_per_pitch=64")
 SOLVER = LineSolver(sampling_rate=10240.0, oversampling=12, max_energy_residual=1e-3)

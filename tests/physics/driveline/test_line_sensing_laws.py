@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from closeness import assert_close
+from line_words import IMPLICIT
 
 from gensig.driveline.line_gears import gear_dof
 from gensig.driveline.mesh_phase import start_phase
@@ -22,7 +23,7 @@ from gensig.systems.lead_in import earlier, simulate_with_lead_in
 from gensig.systems.run import Run, Start
 
 TURN = 2.0 * math.pi
-MOTOR = ("experiment=two_stage", "operating.duration_s=0.2")
+MOTOR = ("experiment=two_stage", "operating.duration_s=0.2", *IMPLICIT)
 ENGINE = ("experiment=engine_broken_tooth", "operating.duration_s=0.05")
 BEARINGS = "sensing.channels=[pinion_y,wheel_y,idler_gear_2_y,output_gear_rotation]"
 UCONN = "system=uconn_two_stage"  # its second mesh does not come back with the first

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from closeness import assert_close
+from line_words import IMPLICIT
 
 from gensig.driveline.engine_line import read_engine_line
 from gensig.driveline.time.newmark import LineSolver, integrate_line
@@ -33,6 +34,7 @@ RECORDS = (
     "experiment=two_stage",
     "operating.duration_s=0.2",
     "sensing.snr_db=null",
+    *IMPLICIT,
 )
 TEETH = {"3/4": (32, 96), "5/6": (48, 80)}
 RATIO = {

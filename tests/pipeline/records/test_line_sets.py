@@ -82,7 +82,7 @@ LINES = {
         teeth=(48, 80),
         faulty={"wheel": 80},
         ratio=1.0 / 3.0,
-        units=("rad/s^2", "rad/s^2", "m/s^2", "m/s^2"),
+        units=("m/s^2",) * 4,
         report="of the load, as the motor feels it",
     ),
     "any_gear": Line(
@@ -91,7 +91,7 @@ LINES = {
         teeth=(32, 96),
         faulty={"pinion": 32, "wheel": 96, "idler_gear_2": 48, "output_gear": 80},
         ratio=1.0,
-        units=("rad/s^2", "rad/s^2", "m/s^2", "m/s^2"),
+        units=("m/s^2",) * 4,
         report="pinion 32, wheel 96, idler_gear_2 48, output_gear 80 teeth",
     ),
     # the gear's name has more than the 16 bytes that a gear pair's column has

@@ -1,0 +1,7 @@
+"""Words that give a two-stage set the implicit method, at a rate that suits it."""
+
+IMPLICIT = (
+    "sensing=geared_line",
+    "solver.backend=runge_kutta",
+    "solver.oversampling=12",
+)
