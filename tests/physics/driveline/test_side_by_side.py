@@ -204,7 +204,9 @@ def test_a_missing_tooth_is_felt_by_its_shaft_mates_too(two_stage):
     sound, missing = recorded(run_of(two_stage), run_of(two_stage, MISSING))
     assert missing.contact_loss_fraction >= sound.contact_loss_fraction
     change = (missing.acceleration - sound.acceleration).std(axis=1)
-    assert np.all(change > 0.05 * sound.acceleration.std(axis=1))
+    change /= sound.acceleration.std(axis=1)
+    assert change[:2].min() > 0.2
+    assert 0.01 < change[2:].min() < change[2:].max() < 0.2
 
 
 def test_what_the_core_does_not_cover_is_refused():

@@ -37,7 +37,7 @@ class Line:
 
     ``teeth`` of the driving and the driven gear; ``faulty`` those of the gears that may have a
     fault, by name; ``ratio`` of the driving shaft's speed to the set one; ``report`` is in the
-    output of ``inspect``.
+    output of ``inspect``, ``check`` that of the integration.
     """
 
     words: tuple[str, ...]
@@ -47,6 +47,7 @@ class Line:
     ratio: float
     units: tuple[str, ...]
     report: str
+    check: str = "energy"
 
 
 LINES = {
@@ -83,6 +84,7 @@ LINES = {
         faulty={"wheel": 80},
         ratio=1.0 / 3.0,
         units=("m/s^2",) * 4,
+        check="error",
         report="of the load, as the motor feels it",
     ),
     "any_gear": Line(
@@ -92,6 +94,7 @@ LINES = {
         faulty={"pinion": 32, "wheel": 96, "idler_gear_2": 48, "output_gear": 80},
         ratio=1.0,
         units=("m/s^2",) * 4,
+        check="error",
         report="pinion 32, wheel 96, idler_gear_2 48, output_gear 80 teeth",
     ),
     # the gear's name has more than the 16 bytes that a gear pair's column has
@@ -149,7 +152,7 @@ def test_labels_units_and_columns_name_gear_tooth_and_shaft(made):
     with shard(made.folder) as file:
         check_labels(file, line.classes, line.faulty)
         assert texts(file.attrs["channel_units"]) == list(line.units)
-        assert set(texts(file["integration_check"][:])) == {"energy"}
+        assert set(texts(file["integration_check"][:])) == {line.check}
         set_speed = file["params/operating.speed_rpm"][:]
         assert_allclose(file["speed_set_rpm"][:], line.ratio * set_speed)
         mesh = line.teeth[0] * file["speed_rpm"][:] / 60
