@@ -17,12 +17,14 @@ from benchmarks import _end_to_end, _rates
 from benchmarks._measure import begin, print_figures, write_json
 from benchmarks._peak import roof
 from benchmarks._ross_time import stored_rate
+from gensig.driveline.side_by_side.line_integration import line_core
 from gensig.dynamics._vector import LANES, PRECISIONS
 from gensig.dynamics.backends.nystroem.method import CORE as NYSTROEM_CORE
 
 RECORD = "import gensig; gensig.load_system('solver.precision={}').simulate()"
 PER_CORE = "simulated s per core-s"
 NYSTROEM = "two-evaluation core {} x5"
+TWO_STAGE = "two-stage box, two-evaluation core {} x5"
 SCALAR, RK45 = (
     "scalar Numba RK4 x5, the same law",
     "solve_ivp RK45, right-hand side compiled",
@@ -36,6 +38,7 @@ RK45_NUMPY, KERNEL, RECORDS = (
 GOALS = {
     "kernel float64 over scalar Numba": 2.3,
     "kernel float32 over scalar Numba": 4.0,
+    "two-stage box over scalar Numba of a pair, float64": 7.0,
     "end to end over solve_ivp RK45, NumPy around the law": 1000.0,
     "share of the kernel's rate reached, float64": 0.6,
     "two workers over one, float64": 1.8,
@@ -58,6 +61,10 @@ def kernels(runs: int) -> dict[str, float]:
         works[NYSTROEM.format(precision)] = _rates.kernel(
             machines, 5, precision, NYSTROEM_CORE
         )
+    boxes = _rates.two_stage_boxes()
+    core = line_core(len(boxes[0].pairs), len(boxes[0].angles))
+    for precision, machines in (("float64", boxes[:LANES]), ("float32", boxes)):
+        works[TWO_STAGE.format(precision)] = _rates.kernel(machines, 5, precision, core)
     works[SCALAR] = _rates.scalar(eight, 5)
     works |= _rates.scipy_works(eight[0])
     result = _rates.rates(
@@ -117,6 +124,13 @@ def ratios(
     for precision in PRECISIONS:
         result[f"two-evaluation core over compiled core, {precision}"] = (
             rates[NYSTROEM.format(precision)] / rates[KERNEL.format(precision)]
+        )
+        box = rates[TWO_STAGE.format(precision)]
+        result[f"two-stage box over scalar Numba of a pair, {precision}"] = (
+            box / rates[SCALAR]
+        )
+        result[f"pair over two-stage box, two-evaluation core, {precision}"] = (
+            rates[NYSTROEM.format(precision)] / box
         )
     end = ends["float64"][RECORDS]
     result["float32 over float64, end to end"] = ends["float32"][RECORDS] / end

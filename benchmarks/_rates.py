@@ -5,7 +5,7 @@ The compiled core, scalar Numba, and scipy on the same equations.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,12 @@ from scipy.integrate import solve_ivp
 
 from benchmarks import _scalar
 from benchmarks._measure import in_turn
+from gensig.driveline.side_by_side.line_dynamics import LineDynamics
+from gensig.driveline.side_by_side.line_records import dynamics_of
 from gensig.dynamics import _kernels
 from gensig.dynamics._layout import N_LAW
 from gensig.dynamics._vector import LANES, n_lanes
-from gensig.dynamics.backends.group_run import Core, GroupRun
+from gensig.dynamics.backends.group_run import Core, DynamicsT, GroupRun
 from gensig.dynamics.backends.runge_kutta import CORE
 from gensig.dynamics.decimation import decimator, in_band_error
 from gensig.dynamics.lanes import fill_lanes, pack
@@ -25,7 +27,9 @@ from gensig.dynamics.pair import PairDynamics
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.record.inputs import InputReader
+from gensig.record.machines import read_machine
 from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.run import Run, Start
 
 Array = NDArray[np.float64]
 Work = tuple[
@@ -66,6 +70,14 @@ def machines(*words: str, n: int = n_lanes("float32")) -> list[PairDynamics]:
     return [pair_dynamics(reader.inputs(row).run) for row in rows]
 
 
+def two_stage_boxes(n: int = n_lanes("float32")) -> list[LineDynamics]:
+    """Two-stage gearboxes of ``experiment=two_stage`` that begin at other teeth each."""
+    config = read_request(["experiment=two_stage"]).config
+    machine = read_machine(config)
+    starts = (Start(tooth_pinion=k, tooth_wheel=2 * k, phase=0.3) for k in range(n))
+    return [dynamics_of(Run(system=machine, faults=(), start=s)) for s in starts]
+
+
 def rates(works: dict[str, Work], runs: int) -> dict[str, float]:
     """Simulated seconds per CPU second of each work, which take turns."""
     spent = in_turn({name: work for name, (work, _) in works.items()}, runs)
@@ -73,10 +85,10 @@ def rates(works: dict[str, Work], runs: int) -> dict[str, float]:
 
 
 def kernel(
-    lanes: list[PairDynamics],
+    lanes: Sequence[DynamicsT],
     oversampling: int,
     precision: str = "float64",
-    core: Core = CORE,
+    core: Core[DynamicsT] = CORE,
 ) -> Work:
     """The product's integrator with the mean accelerations of four channels, tables already
     packed.
