@@ -40,6 +40,7 @@ def test_choices_of_an_experiment_with_those_that_it_builds_on(written):
     folder = written(base, group="experiment")
     assert chosen_options("experiment", MINE, folder) == {
         "system": "two_stage_gearbox",
+        "sensing": "geared_line_bearings",
         "heat": "chongqing_rated",
     }
 
