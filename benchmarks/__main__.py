@@ -19,7 +19,7 @@ from benchmarks._peak import roof
 from benchmarks._ross_time import stored_rate
 from gensig.driveline.side_by_side.line_integration import line_core
 from gensig.dynamics._vector import LANES, PRECISIONS
-from gensig.dynamics.backends.nystroem.method import CORE as NYSTROEM_CORE
+from gensig.dynamics.backends.nystroem.method import THREE_PAIRS as NYSTROEM_CORE
 
 RECORD = "import gensig; gensig.load_system('solver.precision={}').simulate()"
 PER_CORE = "simulated s per core-s"

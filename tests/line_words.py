@@ -2,6 +2,6 @@
 
 IMPLICIT = (
     "sensing=geared_line",
-    "solver.backend=runge_kutta",
+    "solver.backend=newmark",
     "solver.oversampling=12",
 )

@@ -30,6 +30,7 @@ from gensig.driveline.line_gears import (
 )
 from gensig.driveline.linear.linear_drive_line import LinearDriveLine
 from gensig.driveline.machine_checks import (
+    SIDE_BY_SIDE,
     check_sensing,
     check_solver,
     warn_of_supports,
@@ -83,7 +84,6 @@ Array = NDArray[np.float64]
 # s before a record, until the start from the linear vibration has died away
 SETTLING = 0.3
 MOST_ENERGY_RESIDUAL = 1e-3
-SIDE_BY_SIDE = "nystroem"  # solver.backend
 
 
 @final

@@ -8,16 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.driveline.engine_line import EngineLine
-from gensig.dynamics.backends.registry import DEFAULT_BACKEND
+from gensig.dynamics.backends.registry import IMPLICIT_BACKEND, UNNAMED_BACKEND
 from gensig.dynamics.integrator import Solver
 from gensig.errors import ConfigError
 from gensig.mesh.options import MeshOptions
 from gensig.systems.base import Machine
 
+SIDE_BY_SIDE = (
+    "nystroem"  # several records at once, by ``gensig.driveline.side_by_side``
+)
 Array = NDArray[np.float64]
 
-# by the default an implicit method integrates a line, record by record
-LINE_BACKENDS = (DEFAULT_BACKEND, "nystroem")
+LINE_BACKENDS = (SIDE_BY_SIDE, IMPLICIT_BACKEND)
 
 # times the force of the supports; the stiffness of a ball bearing follows its third root
 FAR_ABOVE = 3.0
@@ -30,12 +32,13 @@ def check_solver(mesh: MeshOptions, solver: Solver) -> None:
             f"mesh.law = {mesh.law}: the meshes of a drive line are one-sided; "
             "take mesh.law=one_sided"
         )
-    if solver.backend not in LINE_BACKENDS:
+    # lines of 0.9.0 name no method and have the implicit one
+    if solver.backend not in (*LINE_BACKENDS, UNNAMED_BACKEND):
         raise ConfigError(
             f"solver.backend = {solver.backend}: a drive line has integrators of "
             f"its own; take solver.backend={' or '.join(LINE_BACKENDS)}"
         )
-    if solver.backend == DEFAULT_BACKEND and solver.precision != "float64":
+    if solver.backend != SIDE_BY_SIDE and solver.precision != "float64":
         raise ConfigError(
             f"solver.precision = {solver.precision}: a drive line is integrated in "
             "float64; take solver.precision=float64, or solver.backend=nystroem"

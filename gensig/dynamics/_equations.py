@@ -27,7 +27,8 @@ EARLIEST, LATEST = 0.02, 0.98  # share of a step at which it may be cut in two
 
 
 @inlined
-def _n_gears(group):
+def dofs_of_gears(group):
+    """Degrees of freedom of the two gears, first in every machine."""
     return N_GEARS if is_helical(group) else N_IN_PLANE
 
 
@@ -44,7 +45,7 @@ def motion(group, q, v, work):
     deviation = approach - get_row(work, q + P_Y) + get_row(work, q + W_Y)
     approach = get_row(numbers, layout.REST_APPROACH) + deviation
     rate = rate - get_row(work, v + P_Y) + get_row(work, v + W_Y)
-    for d in range(N_IN_PLANE, _n_gears(group)):
+    for d in range(N_IN_PLANE, dofs_of_gears(group)):
         reach = get_row(group.reach, d)
         approach = approach + reach * get_row(work, q + d)
         rate = rate + reach * get_row(work, v + d)
@@ -107,7 +108,7 @@ def accelerate(group, law, q, v, torque, forces, a, work):
     set_row(work, a + W_X, 0.0 - law.friction)
     set_row(work, a + W_Y, 0.0 - normal)
     set_row(work, a + W_TURN, arm_w * normal + law.moment_w)
-    n_gears = _n_gears(group)
+    n_gears = dofs_of_gears(group)
     for d in range(N_IN_PLANE, n_gears):
         set_row(work, a + d, 0.0 - get_row(group.reach, d) * normal)
     for d in range(n_dof):

@@ -126,6 +126,7 @@ def integrate(
     part_mean = mean + n_channels
     margin = spread(work, layout.NEAR if group.one_sided else 2.0 * layout.FAR)
     radius = get_row(numbers, layout.PINION_RADIUS)
+    set_row(work, layout.MOST_DAMPER, spread(work, layout.UNLIMITED))
     begin, end = EVEN, ODD
     for i in range(2 * n_dof):
         set_row(work, now + i, get_row(state, i))
@@ -376,6 +377,7 @@ def law_at(group, motion, work, wide, near, law_rows):
     zero = spread(work, 0.0)
     set_row(work, AHEAD + EVEN, zero)
     set_row(work, layout.TOTAL, zero)
+    set_row(work, layout.MOST_DAMPER, spread(work, layout.UNLIMITED))
     helical = is_helical(group)
     for _ in range(ROUNDS):
         bent = get_row(group.numbers, layout.SHARED) * get_row(work, layout.TOTAL)

@@ -19,6 +19,7 @@ MOST_PAIRS = 8  # that may be followed at once; spur gears have 4
 # m: a pair is followed through a step if its gap exceeds the approach by less than this;
 # no pair approaches faster
 NEAR = 2e-5
+UNLIMITED = 1e30  # N s/m
 FAR, YIELDING = 1.0, 1e30  # gap in m and compliance in m/N of an absent pair
 FAR_NEAR = (
     1e-4  # m: approaches below need only the pairs between FIRST_NEAR and LAST_NEAR
@@ -115,7 +116,11 @@ LAST_TOTAL, LOCAL, RAW_CHORD = TOTAL + 1, TOTAL + 2, TOTAL + 3
 CHORD_DATA = RAW_CHORD + MOST_PAIRS * COLUMNS
 LEFT_OUT, LEFT_OUT_SLOPE, TOUCH, TOUCH_SLOPE = range(COLUMNS)
 CHORD_SLOT_ROWS = MOST_PAIRS * COLUMNS
-N_MESH = CHORD_DATA + N_SLOTS * CHORD_SLOT_ROWS
+PAIR_DAMPED = (
+    CHORD_DATA + N_SLOTS * CHORD_SLOT_ROWS
+)  # factor of the damping of every pair
+MOST_DAMPER = PAIR_DAMPED + MOST_PAIRS  # largest damper of a pair, N s/m
+N_MESH = MOST_DAMPER + 1
 # blocks of the machine behind the rows of the mesh, in rows per degree of freedom: five states,
 # each q and then v; the accelerations of a stage and their sums for q and v. Behind them follow
 # the rows of the drive, the forces, and the mean accelerations of a step and of its first part

@@ -59,7 +59,7 @@ def _sliding(numbers, position):
 
 
 @inlined
-def _rubbed(numbers, position, load):
+def rubbed(numbers, position, load):
     """Friction force of a pair, and its moments about pinion and wheel."""
     coefficient = get_row(numbers, layout.FRICTION)
     force = coefficient * load * _sliding(numbers, position)
@@ -95,6 +95,15 @@ def _total_load(numbers, rounds, first, last, slot, work):
         if not any_above(lifted, zero):
             break
     return total, stiffness
+
+
+@inlined
+def _followed_damping(damping, elastic, work):
+    """Damping over the elastic force of a pair, at most what ``MOST_DAMPER`` allows."""
+    most = get_row(work, layout.MOST_DAMPER)
+    if any_above(damping * elastic, most):
+        damping = where_above(damping * elastic, most, most / elastic, damping)
+    return damping
 
 
 @inlined
@@ -150,10 +159,12 @@ def one_sided_law(
         if helical:
             damped_slope = get_row(work, chord_rows(slot, k) + layout.TOUCH_SLOPE)
         rate = approach_rate - damped_slope * roll_rate
-        force = elastic * (1.0 + damping * rate)
+        damped = 1.0 + _followed_damping(damping, elastic, work) * rate
+        force = elastic * damped
         force = where_above(force, zero, force, zero)
         if margin >= 0:
             set_row(work, PAIR_FORCE + k, force)
+            set_row(work, layout.PAIR_DAMPED + k, damped)
         normal = normal + force
         loaded = loaded + where_above(force, zero, one, zero)
         compliance = get_row(work, pair + COMPLIANCE)
@@ -162,7 +173,7 @@ def one_sided_law(
         softening = 0.5 * elastic * elastic * get_row(work, pair + COMPLIANCE_SLOPE)
         along = along + force * slope + softening
         position = get_row(work, pair + POSITION) + middle
-        sliding, moment, reaction = _rubbed(numbers, position, force)
+        sliding, moment, reaction = rubbed(numbers, position, force)
         friction, moment_p = friction + sliding, moment_p + moment
         moment_w = moment_w + reaction
     if helical:
@@ -175,7 +186,8 @@ def one_sided_law(
             elastic = (bite - shared * total) * get_row(work, pair + STIFFNESS)
             damped_slope = get_row(work, chord + layout.TOUCH_SLOPE)
             rate = approach_rate - damped_slope * roll_rate
-            force = elastic * (1.0 + damping * rate)
+            followed = _followed_damping(damping, elastic, work)
+            force = elastic * (1.0 + followed * rate)
             damped = where_above(force, zero, force, zero) - elastic
             turned = damped * (damped_slope - get_row(work, pair + GAP_SLOPE)) - slope
             stored = stored + where_above(bite, zero, left_out, zero)
@@ -226,7 +238,7 @@ def papers_law(
         part = normal * get_row(work, BITE + k) * per_stiffness
         if margin >= 0:
             set_row(work, PAIR_FORCE + k, part)
-        sliding, moment, reaction = _rubbed(numbers, position, part)
+        sliding, moment, reaction = rubbed(numbers, position, part)
         friction, moment_p = friction + sliding, moment_p + moment
         moment_w = moment_w + reaction
     stored = 0.5 * together * approach * approach

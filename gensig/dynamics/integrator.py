@@ -7,14 +7,19 @@ from dataclasses import dataclass
 
 from gensig.dynamics._vector import PRECISIONS
 from gensig.dynamics.backends.base import BOUNCING, Integration, Motions, count_samples
-from gensig.dynamics.backends.registry import BACKENDS, DEFAULT_BACKEND
+from gensig.dynamics.backends.registry import (
+    BACKENDS,
+    IMPLICIT_BACKEND,
+    UNNAMED_BACKEND,
+    backend_names,
+)
 from gensig.dynamics.backends.step_limits import (
     CoarseStepWarning,
     check_step,
     settling_time,
 )
 from gensig.dynamics.pair import DOFS, PairDynamics
-from gensig.errors import ConfigError
+from gensig.errors import ConfigError, SimulationError
 
 __all__ = [
     "BOUNCING",
@@ -46,13 +51,14 @@ class Solver:
     precision : of the numbers, ``float64`` or ``float32``
     max_error : a record with a larger error is integrated again with twice as many steps, up to
         64; None does not compute the error
-    backend : the method, a name in ``BACKENDS``
+    backend : the method, a name of ``backend_names``; without it, as in version 0.9.0,
+        ``runge_kutta``
     """
 
     oversampling: int
     precision: str
     max_error: float | None = None
-    backend: str = DEFAULT_BACKEND
+    backend: str = UNNAMED_BACKEND
 
     def __post_init__(self) -> None:
         if not 2 <= self.oversampling <= 256:
@@ -67,9 +73,9 @@ class Solver:
             raise ConfigError(
                 f"solver.max_error = {self.max_error:g} must lie in 1e-6..1, or be null"
             )
-        if self.backend not in BACKENDS:
+        if self.backend not in backend_names():
             raise ConfigError(
-                f"solver.backend = {self.backend!r}; allowed: {', '.join(BACKENDS)}"
+                f"solver.backend = {self.backend!r}; allowed: {', '.join(backend_names())}"
             )
 
 
@@ -109,11 +115,18 @@ def integrate(
 
 def records_together(solver: Solver) -> int:
     """Least number of records that should be simulated in one call: fewer take as long."""
+    if solver.backend == IMPLICIT_BACKEND:
+        return 1
     return BACKENDS[solver.backend].records_together(solver.precision)
 
 
 def check_machine(dynamics: PairDynamics, solver: Solver, sampling_rate: float) -> None:
     """Raise SimulationError for a machine that the backend cannot integrate at this step."""
+    if solver.backend == IMPLICIT_BACKEND:
+        raise SimulationError(
+            f"solver.backend = {IMPLICIT_BACKEND} integrates drive lines; for a gear pair take "
+            f"solver.backend={' or '.join(BACKENDS)}"
+        )
     BACKENDS[solver.backend].check_step(
         dynamics, sampling_rate, solver.oversampling, solver.max_error
     )

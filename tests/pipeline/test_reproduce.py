@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from small_sets import TINY, make
 
 from gensig.cli import main
-from gensig.dynamics.backends.registry import DEFAULT_BACKEND
+from gensig.dynamics.backends.registry import UNNAMED_BACKEND
 
 SET = (
     "dataset.records_per_shard=4",
@@ -52,11 +52,13 @@ def edit_manifest(folder, change):
     file.write_text(json.dumps(content))
 
 
-def test_a_set_that_names_the_default_backend_goes_on(reference, tmp_path, reproduce):
+def test_a_set_that_names_the_backend_of_old_sets_goes_on(
+    reference, tmp_path, reproduce
+):
     """The missing key and its default are one configuration."""
     folder = shutil.copytree(reference, tmp_path / "data")
     config = yaml.safe_load((folder / "config.yaml").read_text())
-    config["solver"]["backend"] = DEFAULT_BACKEND
+    config["solver"]["backend"] = UNNAMED_BACKEND
     (folder / "config.yaml").write_text(yaml.safe_dump(config, sort_keys=False))
     equal = (0, "2 of 2 records have the same bits\n")
     assert reproduce(folder, "--records", "2") == equal

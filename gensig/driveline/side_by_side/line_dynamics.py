@@ -14,7 +14,11 @@ from gensig.driveline.line_gears import STILL
 from gensig.driveline.running import RunningLine, reference_force
 from gensig.driveline.time.newmark import static_start
 from gensig.dynamics.backends.nystroem import _line_layout as lines
-from gensig.dynamics.backends.nystroem.method import OTHER_BACKEND, refuse
+from gensig.dynamics.backends.nystroem._layout import FOLLOWED
+from gensig.dynamics.backends.nystroem.method import (
+    MOST_CONTACT_RATIO,
+    is_followed_by_three,
+)
 from gensig.dynamics.backends.nystroem.stability import stable_rate
 from gensig.dynamics.backends.step_limits import LONGEST_SETTLING, SETTLED
 from gensig.dynamics.integrator import Solver
@@ -26,6 +30,7 @@ from gensig.operation.setpoint import Operating
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+OTHER_BACKEND = "take solver.backend=newmark"
 STIFFER = 1.2  # than their mean stiffness are meshes taken for the longest step
 
 
@@ -177,7 +182,7 @@ def line_dynamics(
 def check_line(line: LineDynamics, solver: Solver, sampling_rate: float) -> None:
     """Raise SimulationError for an unstable step or a line that the core does not cover."""
     for pair in line.pairs:
-        refuse(pair)
+        _refuse(pair)
     for torque in line.running.torques:
         if len(torque.table) > 1:
             raise SimulationError(
@@ -189,6 +194,23 @@ def check_line(line: LineDynamics, solver: Solver, sampling_rate: float) -> None
         raise SimulationError(
             f"solver.oversampling = {solver.oversampling} makes too long steps for "
             f"solver.backend=nystroem; raise solver.oversampling to at least {needed}"
+        )
+
+
+def _refuse(pair: PairDynamics) -> None:
+    """Raise SimulationError for a mesh that the core of lines does not cover."""
+    law = pair.table.options.law
+    if law != "one_sided":
+        raise SimulationError(
+            f"mesh.law = {law} is not covered by solver.backend = nystroem on a drive line; "
+            f"{OTHER_BACKEND}"
+        )
+    if not is_followed_by_three(pair):
+        contact_ratio = pair.table.pair.path_of_contact / pair.table.pair.base_pitch
+        raise SimulationError(
+            f"solver.backend = nystroem follows {FOLLOWED} pairs of teeth on a drive line, too few "
+            f"for a contact ratio of {contact_ratio:.3g} (at most {MOST_CONTACT_RATIO}); "
+            f"{OTHER_BACKEND}"
         )
 
 

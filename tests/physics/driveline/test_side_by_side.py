@@ -155,7 +155,7 @@ def test_two_stages_agree_with_the_implicit_method(two_stage):
     """Without friction and roll torque, which that method leaves out, and below the mesh modes."""
     mesh = replace(two_stage.mesh, friction_coefficient=0.0, roll_torque="classical")
     machine = replace(two_stage, mesh=mesh)
-    slow = with_solver(machine, backend="runge_kutta", oversampling=40)
+    slow = with_solver(machine, backend="newmark", oversampling=40)
     found, expected = recorded(run_of(machine), run_of(slow))
     names = machine.sensing.channels
     for name in ("pinion_y", "wheel_y"):
@@ -219,4 +219,4 @@ def test_what_the_core_does_not_cover_is_refused():
     (error,) = simulate_together([run_of(machine)])
     assert isinstance(error, SimulationError)
     assert "helical" in str(error)
-    assert "solver.backend=runge_kutta" in str(error)
+    assert "solver.backend=newmark" in str(error)

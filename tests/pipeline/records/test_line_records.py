@@ -12,7 +12,7 @@ from test_line_sets import ENGINE, TWO_STAGE
 from gensig.commands.figures import engine_figures
 from gensig.driveline import in_time as line_time
 from gensig.driveline import loads as line_loads
-from gensig.dynamics.backends.registry import BACKENDS, DEFAULT_BACKEND
+from gensig.dynamics.backends.registry import BACKENDS, UNNAMED_BACKEND
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
@@ -133,15 +133,15 @@ def test_a_toothed_wheel_and_the_torque_of_the_load_are_stored(tmp_path):
         (["sensing.channels=[crank_speed]"], "allowed: pinion_rotation, wheel_rot"),
         (
             ["solver.backend=euler"],
-            "solver.backend = 'euler'; allowed: runge_kutta, nystroem",
+            "solver.backend = 'euler'; allowed: runge_kutta, nystroem, newmark",
         ),
-        (["solver.backend=other"], "take solver.backend=runge_kutta"),
+        (["solver.backend=other"], "take solver.backend=nystroem or newmark"),
         (["operating.torque_nm=-5"], "must be positive"),
         (["fault.tooth=60"], "whose teeth are 0..53"),
     ],
 )
 def test_refused_sets_of_an_engine(words, text, tmp_path, capsys, monkeypatch):
-    monkeypatch.setitem(BACKENDS, "other", BACKENDS[DEFAULT_BACKEND])
+    monkeypatch.setitem(BACKENDS, "other", BACKENDS[UNNAMED_BACKEND])
     out = tmp_path / "set"
     few = (*ENGINE, "plan.classes=[crack]")
     assert text in refused(capsys, "generate", *few, *words, f"out={out}")

@@ -62,10 +62,6 @@ GEOMETRY = {
     "mesh.damping_ratio": 0.03,
 }
 # a damper across the mesh that the light pinion overshoots in a step
-OVERDAMPED = {
-    "mesh.damping_ratio": 1.0,
-    "gear.pinion.mass_kg": 0.006,
-}
 COARSE_STEP = pytest.mark.filterwarnings(
     "ignore::gensig.dynamics.integrator.CoarseStepWarning"
 )
@@ -223,12 +219,9 @@ class TestBitsAlone:
 class TestFailures:
     @COARSE_STEP
     @pytest.mark.parametrize("lane", [0, 7])
-    @pytest.mark.parametrize("law", ["one_sided", "paper"])
-    def test_divergence_leaves_the_neighbours(self, run, mixed, law, lane):
-        runs, expected = mixed(law)
-        runs[lane] = (
-            diverging(run()) if law == "one_sided" else run({**PAPER, **OVERDAMPED})
-        )
+    def test_divergence_leaves_the_neighbours(self, run, mixed, lane):
+        runs, expected = mixed("one_sided")
+        runs[lane] = diverging(run())
         together = simulate_together(runs)
         failed = together.pop(lane)
 
@@ -261,7 +254,7 @@ class TestFailures:
             run({PINION_STIFFNESS: 1e13}).system.simulate()
 
 
-LIMIT = 5e-4
+LIMIT = 4e-4
 
 
 class TestError:
@@ -270,7 +263,7 @@ class TestError:
     Not where teeth bounce: there, equal levels are enough.
     """
 
-    COARSE = (1, 3)
+    COARSE = (1,)
     BOUNCING = 4
 
     @pytest.fixture(scope="class")

@@ -38,7 +38,13 @@ from gensig.dynamics.backends.nystroem._layout import (
     NystroemGroup,
     block,
 )
-from gensig.dynamics.backends.nystroem._motion import finish, go_to_end, go_to_middle
+from gensig.dynamics.backends.nystroem._motion import (
+    DAMPER_SHARE,
+    finish,
+    go_to_end,
+    go_to_middle,
+    mobility,
+)
 from gensig.dynamics.backends.nystroem._pairs import (
     first_pairs,
     locate,
@@ -97,6 +103,7 @@ def integrate(
         work[at(rows.BEND, lane, n)] = bend
     turn = 1.0 / get_row(group.numbers, layout.PER_FRICTION_WIDTH)
     set_row(work, rows.FRICTION_WIDTH, turn)
+    set_row(work, layout.MOST_DAMPER, DAMPER_SHARE / (step * mobility(group)))
     for d in range(n_dof):
         set_row(work, q + d, get_row(state, d))
         set_row(work, v + d, get_row(state, n_dof + d))

@@ -42,10 +42,19 @@ def margin(instant, j, work):
 @inlined
 def kinked(j, work):
     """1 where a pair takes up or releases its load in the step, else 0."""
+    return crosses_zero(
+        margin(BEGIN_AT, j, work),
+        margin(MIDDLE_AT, j, work),
+        margin(END_AT, j, work),
+        work,
+    )
+
+
+@inlined
+def crosses_zero(begin, middle, end, work):
+    """1 where the sign of a number changes in the step, else 0."""
     zero, one = spread(work, 0.0), spread(work, 1.0)
-    middle = margin(MIDDLE_AT, j, work)
-    first = middle * margin(BEGIN_AT, j, work)
-    second = middle * margin(END_AT, j, work)
+    first, second = middle * begin, middle * end
     lowest = where_above(first, second, second, first)
     return where_above(zero, lowest, one, zero)
 
@@ -119,16 +128,27 @@ def _missed(j, changed, shared, work):
     a = _lone_margin(BEGIN_AT, j, shared, work)
     b = _lone_margin(MIDDLE_AT, j, shared, work)
     c = _lone_margin(END_AT, j, shared, work)
+    short, early = missed_moments(a, b, c, work)
+    return (
+        where_above(changed, zero, short, zero),
+        where_above(changed, zero, early, zero),
+    )
+
+
+@inlined
+def missed_moments(a, b, c, work):
+    """Moments that Simpson's rule misses of the positive part of a parabola through three values.
+
+    Of its mean over the step, and of its mean weighted by what is left of the step.
+    """
+    zero = spread(work, 0.0)
     mean_1, late_1 = _half(a, b, c, 0.0, a, b, work)
     mean_2, late_2 = _half(a, b, c, 0.5, b, c, work)
     mean, late = mean_1 + mean_2, late_1 + late_2
     a, b, c = _positive(a, zero), _positive(b, zero), _positive(c, zero)
     short = mean - (a + 4.0 * b + c) * (1.0 / 6.0)
     early = mean - late - (a + 2.0 * b) * (1.0 / 6.0)
-    return (
-        where_above(changed, zero, short, zero),
-        where_above(changed, zero, early, zero),
-    )
+    return short, early
 
 
 @inlined
@@ -205,8 +225,14 @@ def correct(group, h, changed, mean, v, q, work):
 @inlined
 def _push(group, forces, by, changed, target, work):
     """Add accelerations by pair forces, times a number, to rows of the plane motions."""
-    numbers = group.numbers
     law = missed_law(group, forces, work)
+    push_gears(group, law, by, changed, target, work)
+
+
+@inlined
+def push_gears(group, law, by, changed, target, work):
+    """Add accelerations by a law, times a number, to rows of the plane motions."""
+    numbers = group.numbers
     radius_p = get_row(numbers, layout.PINION_RADIUS)
     radius_w = get_row(numbers, layout.WHEEL_RADIUS)
     on_p = radius_p * (law.along - law.normal) + law.moment_p

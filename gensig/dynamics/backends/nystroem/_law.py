@@ -89,12 +89,16 @@ def _pair(numbers, nodes, instant, j, bite, spring, bent, rate, roll_rate, work)
     slope, spring = get_row(work, pair + rows.GAP_SLOPE), PER_COMPLIANCE * spring
     deep = spring * (bite - bent)
     elastic = where_above(deep, zero, deep, zero)
-    growth = rate - slope * roll_rate
-    damped = fused(get_row(numbers, layout.DAMPING), growth, one)
+    growth, damping = rate - slope * roll_rate, get_row(numbers, layout.DAMPING)
+    damped = fused(damping, growth, one)
     damped = where_above(damped, zero, damped, zero)
-    force = elastic * damped
+    damper, most = damping * elastic, get_row(work, layout.MOST_DAMPER)
+    damper = where_above(damper, most, most, damper)
+    force = fused(damper, growth, elastic)
+    force = where_above(force, zero, force, zero)
     row = instant * rows.FOLLOWED + j
-    set_row(work, rows.MARGIN + row, deep * damped)
+    lacking = where_above(deep, zero, force, deep * damped)
+    set_row(work, rows.MARGIN + row, lacking)
     set_row(work, rows.SPRING + row, spring)
     set_row(work, rows.DAMPED + row, damped)
     set_row(work, rows.PAIR_FORCE + j, force)

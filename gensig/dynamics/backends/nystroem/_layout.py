@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from gensig.dynamics import _layout as layout
-from gensig.dynamics._layout import Group
+from gensig.dynamics._layout import Group, HelicalGroup, is_helical
 from gensig.dynamics._vector import inlined, n_lanes
 
 # N/m: rows hold compliances times this number, which are about 1
@@ -41,10 +41,16 @@ FRESH = FRICTION_WIDTH + 1  # 1 where rows are being set anew
 SHORT = FRESH + 1
 EARLY = SHORT + FOLLOWED
 DRIVE = EARLY + FOLLOWED
-N_FIXED = DRIVE + layout.N_DRIVE
+# of meshes of any law, blocks of a row per pair: margins at begin, middle and end of the step,
+# damping in its middle, and the corrections by kinks
+ANY_MARGIN = DRIVE + layout.N_DRIVE
+ANY_DAMPED = ANY_MARGIN + N_INSTANTS * layout.MOST_PAIRS
+ANY_SHORT = ANY_DAMPED + layout.MOST_PAIRS
+ANY_EARLY = ANY_SHORT + layout.MOST_PAIRS
+N_FIXED = ANY_EARLY + layout.MOST_PAIRS
 # blocks of rows per degree of freedom behind them, two gears and two rotors at most: constants
 # are faster than the number of a machine
-MOST_DOFS = 8
+MOST_DOFS, MOST_HELICAL_DOFS = 8, 14
 Q, V, MIDDLE_Q, MIDDLE_V, END_Q, END_V = range(6)
 # accelerations at begin and middle of the last step and at its end, other forces, means
 BEFORE, HALFWAY, NOW, FORCES, MEAN, N_BLOCKS = range(6, 12)
@@ -59,12 +65,30 @@ PER_WHEEL_CELL = PER_CELL + FOLLOWED
 LAST_CELL = PER_WHEEL_CELL + FOLLOWED
 N_WIDE = LAST_CELL + 1
 
+# integer rows behind those of ``gensig.dynamics._layout``: the newest pair at the last margins
+MARGINS_OF = layout.N_COUNTS
+N_COUNTS = MARGINS_OF + 1
+
 
 class NystroemGroup(Group):
     """Spur gears of the one-sided law, for the two-evaluation core.
 
     The table ends with one cell of a missing pair and one cell of zeros.
     """
+
+
+class AnyLawGroup(Group):
+    """Spur gears of any law and contact ratio, for the two-evaluation core."""
+
+
+class HelicalNystroemGroup(HelicalGroup):
+    """Helical gears, for the two-evaluation core."""
+
+
+@inlined
+def most_dofs(group):
+    """Rows of a block of the machine; a constant of the compiled code."""
+    return MOST_HELICAL_DOFS if is_helical(group) else MOST_DOFS
 
 
 @inlined
@@ -78,3 +102,12 @@ def scratch(n_dof, n_channels, precision="float64"):
     n = n_lanes(precision)
     work = np.zeros((N_FIXED + N_BLOCKS * MOST_DOFS) * n, dtype=precision)
     return work, np.zeros(N_WIDE * n), np.zeros(1, dtype=np.int64)
+
+
+def any_law_scratch(n_dof, n_channels, precision="float64"):
+    """Work rows, float64 rows and integer rows of ``_any_law_kernels.integrate``."""
+    n = n_lanes(precision)
+    n_blocks = N_BLOCKS * MOST_HELICAL_DOFS
+    work = np.zeros((N_FIXED + n_blocks) * n, dtype=precision)
+    near = np.zeros((N_COUNTS, n), dtype=np.int64)
+    return work, np.zeros(layout.N_WIDE * n), near.ravel()

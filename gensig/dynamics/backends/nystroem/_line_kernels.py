@@ -44,6 +44,7 @@ from gensig.dynamics.backends.nystroem._line_meshes import (
     correct,
     govern,
     law_at,
+    mesh_mobility,
     motion,
     push,
     ratio,
@@ -51,6 +52,7 @@ from gensig.dynamics.backends.nystroem._line_meshes import (
     turning_speed,
 )
 from gensig.dynamics.backends.nystroem._motion import (
+    DAMPER_SHARE,
     conclude,
     go_to_middle,
     predict,
@@ -96,7 +98,7 @@ def integrate(
     q, v = block(rows.Q, n_dof), block(rows.V, n_dof)
     mean = block(rows.MEAN, n_dof)
     changing = len(group.profile) > (lines.N_PROFILE + 2 * n_dof) * n
-    begin(group, state, work)
+    begin(group, step, state, work)
     by_tooth, starting = False, False
     for lane in range(n):
         starting = starting or fresh[lane] > 0.0
@@ -161,7 +163,7 @@ integrates(integrate, LineGroup)
 
 
 @inlined
-def begin(group, state, work):
+def begin(group, step, state, work):
     """Set the rows that stay as they are, and those of the state."""
     n = width(work)
     n_dof, n_meshes = len(group.force) // n, group.n_meshes
@@ -173,6 +175,8 @@ def begin(group, state, work):
         mesh, own = mesh_of(group, m, n), mesh_rows(work, m, n)
         turn = 1.0 / get_row(mesh.numbers, layout.PER_FRICTION_WIDTH)
         set_row(own, rows.FRICTION_WIDTH, turn)
+        most = DAMPER_SHARE / (step * mesh_mobility(group, m, work))
+        set_row(own, layout.MOST_DAMPER, most)
         for lane in range(n):
             own[at(rows.BEND, lane, n)] = mesh.bend[lane * layout.COLUMNS]
 

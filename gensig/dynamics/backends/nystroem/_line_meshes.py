@@ -40,6 +40,19 @@ def motion(group, m, q, v, machine):
 
 
 @inlined
+def mesh_mobility(group, m, machine):
+    """Acceleration of the approach of a mesh by its own force, 1/kg."""
+    moved = spread(machine, 0.0)
+    for k in range(lines.N_TOUCHED):
+        place = m * lines.N_TOUCHED + k
+        d = group.touched[place]
+        if d >= 0:
+            reach = get_row(group.reach, place)
+            moved = fused(reach * reach, get_row(group.inverse_mass, d), moved)
+    return moved
+
+
+@inlined
 def _rest_approach(group, m, machine):
     row = m * layout.N_NUMBERS + layout.REST_APPROACH
     return get_row(group.numbers, row)

@@ -20,14 +20,32 @@ from gensig.dynamics._equations import (
     W_TURN,
     W_X,
     W_Y,
+    dofs_of_gears,
 )
 from gensig.dynamics._vector import fused, get_row, inlined, set_row, spread
 from gensig.dynamics.backends.nystroem import _layout as rows
-from gensig.dynamics.backends.nystroem._layout import MOST_DOFS, block
+from gensig.dynamics.backends.nystroem._layout import block, most_dofs
 
+# of the largest damper, mass over step, that the scheme can follow: 0.56
+DAMPER_SHARE = 0.5
 SIXTH = 1.0 / 6.0
 Q_NOW, Q_HALFWAY, Q_BEFORE = 19.0 / 96.0, -10.0 / 96.0, 3.0 / 96.0
 V_NOW, V_HALFWAY, V_BEFORE = 23.0 / 24.0, -16.0 / 24.0, 5.0 / 24.0
+
+
+@inlined
+def mobility(group):
+    """Acceleration of the approach by a force of the mesh, 1/kg."""
+    numbers, mass = group.numbers, group.inverse_mass
+    radius_p = get_row(numbers, layout.PINION_RADIUS)
+    radius_w = get_row(numbers, layout.WHEEL_RADIUS)
+    turning = radius_p * radius_p * get_row(mass, P_TURN)
+    turning = turning + radius_w * radius_w * get_row(mass, W_TURN)
+    moved = turning + get_row(mass, P_Y) + get_row(mass, W_Y)
+    for d in range(N_IN_PLANE, dofs_of_gears(group)):
+        reach = get_row(group.reach, d)
+        moved = moved + reach * reach * get_row(mass, d)
+    return moved
 
 
 @inlined
@@ -60,7 +78,10 @@ def go_to_end(group, law, torque, step, n_dof, work):
     _predict(group, W_X, 0.0 - on_x, step, work)
     _predict(group, W_Y, 0.0 - on_y, step, work)
     _predict(group, W_TURN, on_w, step, work)
-    for d in range(N_IN_PLANE, n_dof):
+    n_gears = dofs_of_gears(group)
+    for d in range(N_IN_PLANE, n_gears):
+        _predict(group, d, _along_axes(group, d, on_y), step, work)
+    for d in range(n_gears, n_dof):
         _predict(group, d, spread(work, 0.0), step, work)
 
 
@@ -74,8 +95,17 @@ def finish(group, law, torque, step, n_dof, work):
     _conclude(group, W_X, 0.0 - on_x, step, work)
     _conclude(group, W_Y, 0.0 - on_y, step, work)
     _conclude(group, W_TURN, on_w, step, work)
-    for d in range(N_IN_PLANE, n_dof):
+    n_gears = dofs_of_gears(group)
+    for d in range(N_IN_PLANE, n_gears):
+        _conclude(group, d, _along_axes(group, d, on_y), step, work)
+    for d in range(n_gears, n_dof):
         _conclude(group, d, spread(work, 0.0), step, work)
+
+
+@inlined
+def _along_axes(group, d, normal):
+    """Force of the mesh on a motion of helical gears out of their plane."""
+    return 0.0 - get_row(group.reach, d) * normal
 
 
 @inlined
@@ -106,16 +136,20 @@ def acceleration(group, d, on_it, q, v, forces, work):
 
 @inlined
 def _predict(group, d, on_it, step, work):
-    q, v, forces = block(rows.MIDDLE_Q), block(rows.MIDDLE_V), block(rows.FORCES)
+    n_rows = most_dofs(group)
+    q, v = block(rows.MIDDLE_Q, n_rows), block(rows.MIDDLE_V, n_rows)
+    forces = block(rows.FORCES, n_rows)
     m = acceleration(group, d, on_it, q, v, forces, work)
-    predict(d, m, step, MOST_DOFS, work)
+    predict(d, m, step, n_rows, work)
 
 
 @inlined
 def _conclude(group, d, on_it, step, work):
-    q, v, forces = block(rows.END_Q), block(rows.END_V), block(rows.FORCES)
+    n_rows = most_dofs(group)
+    q, v = block(rows.END_Q, n_rows), block(rows.END_V, n_rows)
+    forces = block(rows.FORCES, n_rows)
     b = acceleration(group, d, on_it, q, v, forces, work)
-    conclude(d, b, step, MOST_DOFS, work)
+    conclude(d, b, step, n_rows, work)
 
 
 @inlined

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.dynamics._layout import Group
 from gensig.dynamics._vector import aligned, n_lanes
 from gensig.dynamics.backends.base import Backend, Integration, Motions
-from gensig.dynamics.backends.group_motions import integrate_machines
+from gensig.dynamics.backends.group_motions import in_order, integrate_machines
 from gensig.dynamics.backends.group_run import Core
-from gensig.dynamics.backends.nystroem import _kernels
+from gensig.dynamics.backends.nystroem import _any_law_kernels, _kernels
 from gensig.dynamics.backends.nystroem._layout import (
-    FOLLOWED,
+    AnyLawGroup,
+    HelicalNystroemGroup,
     NystroemGroup,
+    any_law_scratch,
     scratch,
 )
 from gensig.dynamics.backends.nystroem._pairs import (
@@ -33,7 +36,6 @@ from gensig.dynamics.lanes import pack
 from gensig.dynamics.pair import PairDynamics
 from gensig.errors import SimulationError
 
-OTHER_BACKEND = "take solver.backend=runge_kutta"
 # beyond it a pair may carry outside of the path that the core follows
 MOST_CONTACT_RATIO = 2.5
 
@@ -47,11 +49,29 @@ def pack_pairs(
     """Gear pairs as one group; its table ends with a missing pair and a cell of zeros."""
     group = pack(dynamics, step, precision, span)
     table = np.concatenate([group.table, missing_cells().astype(precision)])
-    fields = group._replace(table=table)._asdict()
+    return NystroemGroup(**aligned_fields(group._replace(table=table)))
+
+
+def pack_any_law(
+    dynamics: Sequence[PairDynamics],
+    step: float,
+    precision: str,
+    span: tuple[float, float],
+) -> AnyLawGroup | HelicalNystroemGroup:
+    """Gear pairs of any mesh law as one group."""
+    fields = aligned_fields(pack(dynamics, step, precision, span))
+    if dynamics[0].is_helical:
+        return HelicalNystroemGroup(**fields)
+    return AnyLawGroup(**fields)
+
+
+def aligned_fields(group: Group) -> dict[str, Any]:
+    """Fields of a group, with arrays at bounds of the vectors."""
+    fields = group._asdict()
     for name, values in fields.items():
         if isinstance(values, np.ndarray):
             fields[name] = aligned(values)
-    return NystroemGroup(**fields)
+    return fields
 
 
 def missing_cells() -> NDArray[np.float64]:
@@ -68,10 +88,17 @@ def coarsest_oversampling(
     return min(oversampling, math.ceil(least))
 
 
-CORE = Core(
+THREE_PAIRS = Core(
     pack=pack_pairs,
     scratch=scratch,
     integrate=_kernels.integrate,
+    coarsest_oversampling=coarsest_oversampling,
+    settling_time=settling_time,
+)
+ANY_LAW = Core(
+    pack=pack_any_law,
+    scratch=any_law_scratch,
+    integrate=_any_law_kernels.integrate,
     coarsest_oversampling=coarsest_oversampling,
     settling_time=settling_time,
 )
@@ -79,7 +106,7 @@ CORE = Core(
 
 @final
 class Nystroem(Backend):
-    """Two evaluations of the mesh law a step, for spur pairs with one-sided contact."""
+    """Two evaluations of the mesh law a step."""
 
     def check_step(
         self,
@@ -88,8 +115,7 @@ class Nystroem(Backend):
         oversampling: int,
         max_error: float | None,
     ) -> None:
-        """Raise SimulationError for an unstable step or what the method does not cover."""
-        refuse(machine)
+        """Raise SimulationError for an unstable step; warn of a coarse unchecked one."""
         needed = math.ceil(stable_rate(machine.stiff_rates) / sampling_rate)
         if needed > oversampling:
             raise SimulationError(
@@ -106,26 +132,29 @@ class Nystroem(Backend):
     def integrate(
         self, machines: Sequence[PairDynamics], integration: Integration
     ) -> Motions:
-        """Motions of machines, integrated in groups that settle in the same stages."""
-        return integrate_machines(machines, integration, CORE)
+        """Motions of machines, integrated in groups of the same core and settling stages."""
+        by_core: dict[bool, list[int]] = {}
+        for index, machine in enumerate(machines):
+            by_core.setdefault(is_followed_by_three(machine), []).append(index)
+        cores = {True: THREE_PAIRS, False: ANY_LAW}
+        motions = (
+            (
+                indices,
+                integrate_machines(
+                    [machines[i] for i in indices], integration, cores[three]
+                ),
+            )
+            for three, indices in by_core.items()
+        )
+        return in_order(motions, len(machines))
 
 
-def refuse(machine: PairDynamics) -> None:
-    """Raise SimulationError for a machine that the method does not cover."""
-    if machine.is_helical:
-        raise SimulationError(
-            "solver.backend = nystroem takes spur gears; for gear.helix_angle_deg other than 0 "
-            f"{OTHER_BACKEND}"
-        )
-    law = machine.table.options.law
-    if law != "one_sided":
-        raise SimulationError(
-            f"mesh.law = {law} is not covered by solver.backend = nystroem; {OTHER_BACKEND}"
-        )
-    pair = machine.table.pair
+def is_followed_by_three(machine: PairDynamics) -> bool:
+    """True for a pair that the core of three pairs of teeth covers."""
+    pair, options = machine.table.pair, machine.table.options
     contact_ratio = pair.path_of_contact / pair.base_pitch
-    if contact_ratio > MOST_CONTACT_RATIO:
-        raise SimulationError(
-            f"solver.backend = nystroem follows {FOLLOWED} pairs of teeth, too few for a contact "
-            f"ratio of {contact_ratio:.3g} (at most {MOST_CONTACT_RATIO}); {OTHER_BACKEND}"
-        )
+    return (
+        not machine.is_helical
+        and options.law == "one_sided"
+        and contact_ratio <= MOST_CONTACT_RATIO
+    )

@@ -1,0 +1,243 @@
+"""Two-evaluation core for any mesh law: steps in which a pair takes up or releases its load.
+
+The margin of a pair under the one-sided law is the force that it has or would have; under the
+paper's law it is the share of the pair in contact, whose part between 0 and 1 counts. What
+Simpson's rule misses of either is that of ``_kinks``.
+"""
+
+from __future__ import annotations
+
+from gensig.dynamics import _layout as layout
+from gensig.dynamics._equations import N_IN_PLANE, dofs_of_gears
+from gensig.dynamics._layout import MIDDLE, MOST_PAIRS, followed, pair_rows
+from gensig.dynamics._mesh_kernels import rubbed
+from gensig.dynamics._vector import (
+    any_above,
+    at,
+    compiled,
+    get_row,
+    inlined,
+    set_row,
+    spread,
+    where_above,
+    width,
+)
+from gensig.dynamics.backends.nystroem import _layout as rows
+from gensig.dynamics.backends.nystroem._kinks import (
+    LEAST_DAMPED,
+    add_force,
+    crosses_zero,
+    missed_moments,
+    push_gears,
+)
+from gensig.dynamics.backends.nystroem._layout import (
+    ANY_DAMPED,
+    ANY_EARLY,
+    ANY_MARGIN,
+    ANY_SHORT,
+    BEGIN_AT,
+    END_AT,
+    MIDDLE_AT,
+)
+from gensig.dynamics.backends.nystroem._pairs import OUT_OF_MESH
+
+
+@inlined
+def margin_row(instant, k):
+    """Row of the margin of a pair at an instant of the step."""
+    return ANY_MARGIN + instant * MOST_PAIRS + k
+
+
+@inlined
+def _margin(instant, k, work):
+    return get_row(work, margin_row(instant, k))
+
+
+@inlined
+def _spring(slot, k, work):
+    """Own stiffness of a pair at the instant of a slot."""
+    return get_row(work, pair_rows(slot, k) + layout.STIFFNESS)
+
+
+@inlined
+def keep_margins(group, instant, first, last, slot, work):
+    """Turn the margins that the law has left into those of an instant.
+
+    The one-sided law leaves penetrations into what the other pairs deflect.
+    """
+    zero = spread(work, 0.0)
+    if not group.one_sided:
+        for k in range(first, last):
+            set_row(work, margin_row(instant, k), get_row(work, layout.MARGIN + k))
+        return
+    shared, carrying = get_row(group.numbers, layout.SHARED), zero
+    for k in range(first, last):
+        deep, spring = get_row(work, layout.MARGIN + k), _spring(slot, k, work)
+        carrying = carrying + where_above(deep, zero, spring, zero)
+    for k in range(first, last):
+        deep, spring = get_row(work, layout.MARGIN + k), _spring(slot, k, work)
+        others = carrying - where_above(deep, zero, spring, zero)
+        lone = 1.0 + shared * others
+        damped = get_row(work, layout.PAIR_DAMPED + k)
+        damped = where_above(damped, zero, damped, zero)
+        force = deep * spring * (lone / (lone + shared * spring))
+        set_row(work, margin_row(instant, k), force * damped)
+        if instant == MIDDLE_AT:
+            least = spread(work, LEAST_DAMPED)
+            damped = where_above(damped, least, damped, least)
+            set_row(work, ANY_DAMPED + k, damped)
+
+
+@inlined
+def begin_again(group, first, last, work):
+    """Let the margins at the end of a step be those at the begin of the next one."""
+    for k in range(followed(group)):
+        margin = spread(work, OUT_OF_MESH)
+        if first <= k < last:
+            margin = _margin(END_AT, k, work)
+        set_row(work, margin_row(BEGIN_AT, k), margin)
+
+
+@compiled
+def count_anew(group, work, near):
+    """Move the margins of lanes whose newest pair has changed to the pairs' new places."""
+    n, n_pairs = width(work), followed(group)
+    for lane in range(n):
+        newest = near[at(layout.NEWEST, lane, n)]
+        before = near[at(rows.MARGINS_OF, lane, n)]
+        if newest == before:
+            continue
+        near[at(rows.MARGINS_OF, lane, n)] = newest
+        by = newest - before
+        for place in range(n_pairs):
+            k = place
+            if by > 0:  # from the last place on, so that none is overwritten
+                k = n_pairs - 1 - place
+            margin = OUT_OF_MESH
+            if 0 <= k - by < n_pairs:
+                margin = work[at(margin_row(BEGIN_AT, k - by), lane, n)]
+            work[at(margin_row(BEGIN_AT, k), lane, n)] = margin
+
+
+@inlined
+def kinked(group, k, work):
+    """1 where a pair takes up or releases its load in the step, else 0."""
+    begin, middle = _margin(BEGIN_AT, k, work), _margin(MIDDLE_AT, k, work)
+    end = _margin(END_AT, k, work)
+    changed = crosses_zero(begin, middle, end, work)
+    if not group.one_sided:
+        changed = changed + crosses_zero(begin - 1.0, middle - 1.0, end - 1.0, work)
+    return changed
+
+
+@inlined
+def _missed(group, k, work):
+    """The moments of the margin's part that counts which Simpson's rule misses."""
+    begin, middle = _margin(BEGIN_AT, k, work), _margin(MIDDLE_AT, k, work)
+    end = _margin(END_AT, k, work)
+    short, early = missed_moments(begin, middle, end, work)
+    if not group.one_sided:
+        over, over_early = missed_moments(begin - 1.0, middle - 1.0, end - 1.0, work)
+        short, early = short - over, early - over_early
+    return short, early
+
+
+@inlined
+def _add(k, part, short, early, changed, work):
+    """Add a part of what is missed to the corrections of a pair."""
+    zero = spread(work, 0.0)
+    more = where_above(changed, zero, part * short, zero)
+    set_row(work, ANY_SHORT + k, get_row(work, ANY_SHORT + k) + more)
+    more = where_above(changed, zero, part * early, zero)
+    set_row(work, ANY_EARLY + k, get_row(work, ANY_EARLY + k) + more)
+
+
+@inlined
+def _give(group, j, changed, first, last, work):
+    """Correct the force of a pair under the one-sided law; the other loaded pairs give way."""
+    zero, one = spread(work, 0.0), spread(work, 1.0)
+    shared, others = get_row(group.numbers, layout.SHARED), zero
+    for i in range(first, last):
+        if i != j:
+            loaded = _margin(MIDDLE_AT, i, work)
+            spring = _spring(MIDDLE, i, work)
+            others = others + where_above(loaded, zero, spring, zero)
+    short, early = _missed(group, j, work)
+    _add(j, one, short, early, changed, work)
+    given = shared / ((1.0 + shared * others) * get_row(work, ANY_DAMPED + j))
+    for i in range(first, last):
+        if i != j:
+            part = given * _spring(MIDDLE, i, work) * get_row(work, ANY_DAMPED + i)
+            loaded = _margin(MIDDLE_AT, i, work)
+            part = where_above(loaded, zero, 0.0 - part, zero)
+            _add(i, part, short, early, changed, work)
+
+
+@inlined
+def _switch(group, j, changed, approach, first, last, work):
+    """Correct the force of a pair under the paper's law, whose share of contact is missed."""
+    zero, one = spread(work, 0.0), spread(work, 1.0)
+    together = one
+    for i in range(first, last):
+        share = _margin(MIDDLE_AT, i, work)
+        share = where_above(share, zero, share, zero)
+        share = where_above(share, one, one, share)
+        spring = get_row(group.numbers, layout.SHARED) * _spring(MIDDLE, i, work)
+        together = together + share * spring
+    per_share = _spring(MIDDLE, j, work) * approach / (together * together)
+    short, early = _missed(group, j, work)
+    _add(j, per_share, short, early, changed, work)
+
+
+@compiled
+def correct(group, h, approach, first, last, mean, v, q, work):
+    """Add to the end of the step what its kinks change, in the lanes with any.
+
+    ``approach`` is that in the middle of the step.
+    """
+    zero = spread(work, 0.0)
+    any_changed = zero
+    for k in range(first, last):
+        set_row(work, ANY_SHORT + k, zero)
+        set_row(work, ANY_EARLY + k, zero)
+    for k in range(first, last):
+        changed = kinked(group, k, work)
+        if any_above(changed, zero):
+            any_changed = any_changed + changed
+            if group.one_sided:
+                _give(group, k, changed, first, last, work)
+            else:
+                _switch(group, k, changed, approach, first, last, work)
+    _push(group, ANY_SHORT, first, last, 1.0, any_changed, mean, work)
+    _push(group, ANY_SHORT, first, last, h, any_changed, v, work)
+    _push(group, ANY_EARLY, first, last, h * h, any_changed, q, work)
+
+
+@inlined
+def _push(group, forces, first, last, by, changed, target, work):
+    """Add accelerations by pair forces, times a number, to rows of the motions of the gears."""
+    law = _missed_law(group, forces, first, last, work)
+    push_gears(group, law, by, changed, target, work)
+    for d in range(N_IN_PLANE, dofs_of_gears(group)):
+        along = 0.0 - get_row(group.reach, d) * law.normal
+        add_force(group, d, along, by, changed, target, work)
+
+
+@inlined
+def _missed_law(group, forces, first, last, work):
+    """The law of pair forces in the middle of the step, of which nothing is damped or stored."""
+    numbers, zero = group.numbers, spread(work, 0.0)
+    normal, along = zero, zero
+    friction, moment_p, moment_w = zero, zero, zero
+    for k in range(first, last):
+        force, pair = get_row(work, forces + k), pair_rows(MIDDLE, k)
+        normal = normal + force
+        position = get_row(work, pair + layout.POSITION)
+        position = position - get_row(numbers, layout.HALF_LAG)
+        sliding, moment, reaction = rubbed(numbers, position, force)
+        friction, moment_p = friction + sliding, moment_p + moment
+        moment_w = moment_w + reaction
+        along = along + force * get_row(work, pair + layout.GAP_SLOPE)
+    if not (group.consistent and group.one_sided):
+        along = zero
+    return layout.Law(normal, friction, moment_p, moment_w, along, zero, zero, zero)

@@ -1,0 +1,156 @@
+"""Two evaluations of any mesh law a step: the motions are those of the classical scheme."""
+
+import math
+
+import numpy as np
+import pytest
+from fault_cases import one
+
+from gensig.dynamics.backends.nystroem import method
+from gensig.dynamics.decimation import in_band_error
+from gensig.dynamics.integrator import Solver, integrate
+from gensig.faults.broken import MissingTooth
+from gensig.plan.request import read_request
+from gensig.systems.pair_machine import pair_dynamics
+from gensig.systems.registry import read_system
+from gensig.systems.run import Run
+
+RATE = 51200.0
+RECORD = {"sampling_rate": RATE, "duration": 0.04}
+PLANE = ("pinion_y", "wheel_x", "wheel_y", "pinion_rotation")
+AXIAL = (*PLANE, "pinion_z", "wheel_tilt_x")
+SPEED, TORQUE = "operating.speed_rpm", "operating.torque_nm"
+MISSING = (MissingTooth(gear="pinion", tooth=3),)
+FINE = 64
+# one well-damped drive: a short settling
+QUICK = {
+    "operating.drive_frequency_hz": 20,
+    "gear.pinion.support.damping_x_ns_per_m": 100,
+    "gear.wheel.support.damping_x_ns_per_m": 500,
+}
+MORE_DAMPED = {"mesh.damping_ratio": 0.0735}  # by a twentieth
+PAPER = {
+    "mesh.law": "paper",
+    "mesh.pair_coupling": "sum",
+    "mesh.contact": "linear",
+}
+
+
+def motions(machines, backend, oversampling, channels=PLANE, precision="float64"):
+    """Motions of machines by a backend, with the forces of their teeth."""
+    solver = Solver(oversampling=oversampling, precision=precision, backend=backend)
+    return integrate(
+        machines, solver, channels=channels, with_mesh_state=True, **RECORD
+    )
+
+
+def error(found, exact):
+    """Largest error of the spectra of the first machine's channels."""
+    return in_band_error(found.acceleration, exact.acceleration, RATE)
+
+
+class TestSpurPairsOfAnyContactRatio:
+    """Pairs of which more than three may touch; here those of which fewer do."""
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def pairs(cls, machine, dynamics_of):
+        errors = np.random.default_rng(8).normal(0, 2e-6, (2, 84))
+        teeth = {"pinion_error": errors[0, :23], "wheel_error": errors[1]}
+        slow = machine({**QUICK, SPEED: 1200})
+        return [
+            dynamics_of(machine(QUICK), (one("crack", tooth=4),)),
+            dynamics_of(slow, MISSING, **teeth),
+        ]
+
+    @pytest.mark.parametrize("precision", ["float64", "float32"])
+    def test_motions(self, machine, dynamics_of, pairs, precision, monkeypatch):
+        monkeypatch.setattr(method, "MOST_CONTACT_RATIO", 0.0)
+        exact = motions(pairs, "runge_kutta", FINE)
+        found = motions(pairs, "nystroem", 5, precision=precision)
+        assert error(found, exact).max() < 1e-3
+        assert np.abs(found.angle - exact.angle).max() < 1e-5
+        other = dynamics_of(machine({**QUICK, **MORE_DAMPED}))
+        shown = motions([other], "nystroem", 5, precision=precision)
+        assert in_band_error(shown.acceleration, exact.acceleration[:1], RATE)[0] > 5e-3
+
+    def test_they_are_followed_by_that_core(self, pairs, monkeypatch):
+        three = motions(pairs, "nystroem", 8)
+        monkeypatch.setattr(method, "MOST_CONTACT_RATIO", 0.0)
+        more = motions(pairs, "nystroem", 8)
+        assert three.acceleration.tobytes() != more.acceleration.tobytes()
+        assert error(more, three).max() < 1e-3
+
+
+class TestHelicalPairs:
+    @pytest.fixture(scope="class")
+    @classmethod
+    def pairs(cls):
+        made = []
+        for speed, torque, faults in ((1500, 60, ()), (3000, 160, MISSING)):
+            words = [
+                f"{SPEED}={speed}",
+                f"{TORQUE}={torque}",
+                "operating.drive_frequency_hz=20",
+            ]
+            config = read_request(["experiment=helical", *words]).config
+            made.append(pair_dynamics(Run(system=read_system(config), faults=faults)))
+        return made
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def exact(cls, pairs):
+        return motions(pairs, "runge_kutta", FINE, AXIAL)
+
+    def test_motions(self, pairs, exact):
+        found = motions(pairs, "nystroem", 20, AXIAL)
+        assert error(found, exact).max() < 1e-3
+        assert error(found, motions(pairs[::-1], "nystroem", 20, AXIAL)).min() > 0.1
+
+    def test_the_error_falls_with_the_step(self, pairs, exact):
+        """By more than the step's square: chords change within steps."""
+        coarse, fine = (
+            error(motions(pairs, "nystroem", steps, AXIAL), exact).max()
+            for steps in (8, 16)
+        )
+        assert math.log2(coarse / fine) > 1.8
+
+    def test_no_larger_than_that_of_the_classical_scheme(self, pairs, exact):
+        found, classical = (
+            error(motions(pairs, backend, 8, AXIAL), exact).max()
+            for backend in ("nystroem", "runge_kutta")
+        )
+        assert found < 1.2 * classical
+
+    def test_loads_of_the_teeth(self, pairs, exact):
+        found = motions(pairs, "nystroem", 20, AXIAL)
+        for machine, seen, other in zip(pairs, found.seen, exact.seen, strict=True):
+            same = seen[0] == other[0]  # a pair enters a sample earlier or later
+            assert same.mean() > 0.98
+            off = np.abs(seen[1:] - other[1:])[:, same] / machine.mesh_force
+            assert np.sqrt((off**2).mean()) < 2e-3
+            assert np.abs(other[1:]).max() > 0.3 * machine.mesh_force
+
+
+class TestPapersLaw:
+    """A pair is switched over one step of the integration, so both schemes take the same."""
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def pairs(cls, machine, dynamics_of):
+        return [
+            dynamics_of(machine({**QUICK, **PAPER, SPEED: speed}), faults)
+            for speed, faults in ((1800, ()), (4000, (one("crack", tooth=4),)))
+        ]
+
+    def test_motions(self, machine, dynamics_of, pairs):
+        found, exact = (motions(pairs, name, 32) for name in method_names())
+        assert error(found, exact).max() < 1e-3
+        other = dynamics_of(machine({**QUICK, **PAPER, **MORE_DAMPED}))
+        shown = motions([other], "nystroem", 32)
+        assert in_band_error(shown.acceleration, exact.acceleration[:1], RATE)[0] > 5e-3
+
+
+def method_names():
+    """The two methods of gear pairs."""
+    return "nystroem", "runge_kutta"
