@@ -187,6 +187,19 @@ def test_a_data_set_that_differs_from_the_benchmark_is_not_compared(
     assert "shipped" not in text
 
 
+def test_of_benchmarks_with_one_plan_the_signals_choose(dataset, monkeypatch):
+    """Two methods of integration make the same plan with signals of their own."""
+    other = frozen(dataset, name="other", signal_rms={"r00003": [1.0]})
+    same = frozen(dataset, name="same")
+    elsewhere = frozen(dataset, name="elsewhere", plan_sha256="0" * 64)
+    module = diagnose.studies.benchmark
+    for order in ([other, same, elsewhere], [elsewhere, same, other]):
+        monkeypatch.setattr(module, "frozen_benchmarks", lambda order=order: order)
+        assert module.benchmark_of(dataset) is same
+    monkeypatch.setattr(module, "frozen_benchmarks", lambda: [elsewhere])
+    assert module.benchmark_of(dataset) is None
+
+
 def test_frozen_benchmarks_are_whole():
     folder = files("diagnose").joinpath("frozen")
     entries = [entry for entry in folder.iterdir() if entry.name.endswith(".json")]
