@@ -38,7 +38,6 @@ from gensig.driveline.mesh_phase import start_phase
 from gensig.driveline.running import (
     Governor,
     RunningLine,
-    TabulatedMesh,
     mesh_forces,
     named_by_side,
     operating_course,
@@ -51,6 +50,7 @@ from gensig.driveline.side_by_side.line_records import LineSignals, simulate_lin
 from gensig.driveline.teeth import (
     ToothLaw,
     felt_there,
+    followed_mesh,
     line_teeth,
     require_drive,
     require_teeth,
@@ -422,12 +422,8 @@ class LineMachine(Machine):
             specimen=specimen,
             turned=turned,
         )
-        recorded = TabulatedMesh(
-            table=specimen_table(self, run.faults, specimen),
-            errors=(specimen.pinion_error, specimen.wheel_error),
-            start_teeth=teeth,
-            start_phase=start.phase,
-        )
+        table = specimen_table(self, run.faults, specimen)
+        recorded = followed_mesh(table, specimen, start)
         return running_line(
             engine,
             operating_course(engine, self.operating, self.ratio, SETTLING),
