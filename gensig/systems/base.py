@@ -51,6 +51,11 @@ class MachineMesh:
         """Names of the driving and the driven gear."""
         return self.driving, self.driven
 
+    @property
+    def name(self) -> str:
+        """Names of both gears in one word, the driving one first."""
+        return f"{self.driving}_{self.driven}"
+
 
 def home_meshes(meshes: Sequence[MachineMesh]) -> dict[str, int]:
     """Number of the home mesh of each gear, by its name.

@@ -262,6 +262,76 @@ def test_the_loads_of_the_teeth_are_known(two_stage):
     assert mesh.load_share.shape[0] == two_stage.most_pairs
 
 
+def test_the_loads_of_every_mesh_are_known(two_stage):
+    """Mean forces are those of the torque that a mesh passes on, mesh by mesh."""
+    run = run_of(two_stage, with_mesh_state=True)
+    (record,) = recorded(run)
+    (second,) = record.further_meshes
+    first, torque = record.mesh, two_stage.operating.torque
+    for state, pair, slowed in (
+        (first, two_stage.pair, 1.0),
+        (second, two_stage.meshes[1].pair, two_stage.pair.ratio),
+    ):
+        expected = slowed * torque / pair.pinion.base_radius
+        assert abs(state.force.mean() / expected - 1.0) < 0.03
+        assert np.allclose(state.load_share.sum(axis=0)[~state.contact_lost], 1.0)
+        gears = zip(
+            (state.pinion_tooth, state.wheel_tooth), pair.gears.values(), strict=True
+        )
+        for teeth, gear in gears:
+            assert -1 <= teeth.min() < teeth.max() < gear.n_teeth
+    # the wheel and the second pinion turn together, tooth by tooth
+    entered = [
+        np.count_nonzero(np.diff(state.pinion_tooth)) for state in (first, second)
+    ]
+    passed = two_stage.meshes[1].pair.pinion.n_teeth / two_stage.pair.wheel.n_teeth
+    assert abs(entered[1] / entered[0] - passed) < 0.05
+    plain = recorded(replace(run, with_mesh_state=False))[0]
+    assert plain.acceleration.tobytes() == record.acceleration.tobytes()
+
+
+def test_the_loads_are_the_same_whichever_mesh_is_followed(two_stage):
+    """The second mesh of a record that follows the first one is that of one that follows it."""
+    other = read_line_machine(
+        read_request([*TWO_STAGE, "system.record_mesh=[5,6]"]).config
+    )
+    run = run_of(two_stage, with_mesh_state=True)
+    stage = two_stage.line(run).line.meshes[1]
+    start = Start(
+        tooth_pinion=stage.start_teeth[0],
+        tooth_wheel=stage.start_teeth[1],
+        phase=stage.start_phase,
+    )
+    (ours,), (theirs,) = (
+        recorded(run),
+        recorded(replace(run, system=other, start=start)),
+    )
+    (second,), (first,) = ours.further_meshes, theirs.further_meshes
+    for found, expected in ((second, theirs.mesh), (first, ours.mesh)):
+        off = np.abs(found.force - expected.force)
+        assert off.max() < 1e-3 * expected.force.mean()
+    # pairs of the other mesh count from elsewhere: they may have other rows
+    for name in ("pinion_tooth", "wheel_tooth"):
+        found, expected = (
+            np.sort(getattr(each, name), 0) for each in (second, theirs.mesh)
+        )
+        assert np.mean(found == expected) > 0.999
+
+
+def test_a_fault_is_engaged_in_the_mesh_that_feels_it(two_stage):
+    """A missing tooth of the output gear carries nothing where its turn comes."""
+    (sound,) = recorded(run_of(two_stage, with_mesh_state=True))
+    teeth = sound.further_meshes[0].wheel_tooth
+    tooth = int(teeth[:, teeth.shape[1] // 2].max())
+    missing = MissingTooth(gear="output_gear", tooth=tooth)
+    (record,) = recorded(run_of(two_stage, (missing,), with_mesh_state=True))
+    (second,) = record.further_meshes
+    assert not record.mesh.fault_engaged.any()
+    assert second.fault_engaged[teeth.shape[1] // 2]
+    assert 0.0 < second.fault_engaged.mean() < 0.1
+    assert not np.any(second.wheel_tooth == tooth)
+
+
 def test_a_missing_tooth_is_felt_by_its_shaft_mates_too(two_stage):
     """It unloads the first mesh, and the second one follows through the shaft."""
     sound, missing = recorded(run_of(two_stage), run_of(two_stage, MISSING))
