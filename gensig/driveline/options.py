@@ -71,9 +71,15 @@ class GearHolding:
     damping_ratio: float
 
     def __post_init__(self) -> None:
-        for key, value in (("force_n", self.force), ("torque_nm", self.torque)):
-            if value is not None and not value > 0.0:
-                raise ConfigError(f"system.support.{key} = {value:g} must be positive")
+        if self.force is not None and not self.force > 0.0:
+            raise ConfigError(
+                f"system.support.force_n = {self.force:g} must be positive"
+            )
+        if self.torque is not None and not self.torque > 0.0:
+            raise ConfigError(
+                f"system.support.torque_nm = {self.torque:g}, "
+                "excitation.reference.torque_nm unless given, must be positive"
+            )
         if self.force is None and self.torque is None:
             raise ConfigError(
                 "system.support.force_n = null follows from system.support.torque_nm, which is "

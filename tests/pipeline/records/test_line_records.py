@@ -60,16 +60,19 @@ def test_lives_grow_under_the_steady_loads_of_the_mesh(life, kind, monkeypatch):
 
 def test_gears_that_bear_far_more_than_their_support_is_for_are_named():
     words = ["experiment=two_stage", "operating.torque_nm=60"]
-    named = "meshes 3/4 1995 N, 5/6 3991 N, but every gear is on a support for .* 500 N"
-    with pytest.warns(UserWarning, match=named):
-        read_machine(read_request(words).config).check()
+    light = "system.support.force_n=500"
+    with pytest.warns(UserWarning, match="3/4 1995 N for 500 N, 5/6 3991 N for 500 N"):
+        read_machine(read_request([*words, light]).config).check()
+    heavy = ["experiment=two_stage", "operating.torque_nm=240"]
+    with pytest.warns(UserWarning, match="3/4 7981 N for 1995 N"):
+        read_machine(read_request(heavy).config).check()
     torsion = (
         "system.lateral=false",
         "sensing.channels=[pinion_rotation,wheel_rotation]",
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        for more in (["system.support.force_n=2000"], torsion):
+        for more in ([], ["system.support.force_n=2000"], [light, *torsion]):
             read_machine(read_request([*words, *more]).config).check()
 
 
@@ -193,7 +196,7 @@ FAN = "excitation.loads={{fan: {{node: {}, law: {}, torque_nm: 1}}}}"
         (["excitation.load.law=cubic"], "allowed: constant, linear, quadratic"),
         (
             ["excitation.reference.torque_nm=0"],
-            "speed_rpm and torque_nm must be positive",
+            "excitation.reference.torque_nm unless given, must be positive",
         ),
         ([f"{MOTOR_KEY}=3"], f"{MOTOR_KEY} = 3 must be a group of keys"),
         (
