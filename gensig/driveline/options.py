@@ -80,11 +80,6 @@ class GearHolding:
                 f"system.support.torque_nm = {self.torque:g}, "
                 "excitation.reference.torque_nm unless given, must be positive"
             )
-        if self.force is None and self.torque is None:
-            raise ConfigError(
-                "system.support.force_n = null follows from system.support.torque_nm, which is "
-                "null too; give one of them"
-            )
         if not 0.0 <= self.damping_ratio < 1.0:
             raise ConfigError(
                 f"system.support.damping_ratio = {self.damping_ratio:g} must lie in 0..1"
@@ -94,10 +89,15 @@ class GearHolding:
         """Static force in N of a gear that turns ``speed_ratio`` times as fast as the first node.
 
         All of the torque passes through its teeth, which push along the line of action.
+        ConfigError where neither force nor torque are given.
         """
         if self.force is not None:
             return self.force
-        assert self.torque is not None
+        if self.torque is None:
+            raise ConfigError(
+                "system.support.force_n = null follows from system.support.torque_nm, which is "
+                "null too; give one of them"
+            )
         return self.torque / (abs(speed_ratio) * base_radius)
 
     def for_gear(self, mass: float, force: float, material: Material) -> Support:

@@ -164,6 +164,13 @@ class Machine(ABC):
         """Normal force of the followed mesh at the set-point, N."""
 
     @abstractmethod
+    def at_gear(self, gear: str) -> tuple[Machine, str]:
+        """The machine as records that follow the home mesh of a gear have it, and the gear's side.
+
+        KeyError for a gear that the machine does not have.
+        """
+
+    @abstractmethod
     def mesh_torques(self, speed: float, torque: float) -> Array:
         """Loads of a tooth at a set-point, one for each mesh of the tooth, all equally likely.
 

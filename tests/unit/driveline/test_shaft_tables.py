@@ -466,4 +466,4 @@ def test_a_mistake_in_the_keys_is_one_line(line_of, keys, message):
 )
 def test_a_mistake_in_the_supports_is_one_line(line_of, config, key, value):
     with pytest.raises(ConfigError, match=f"system.support.{key}"):
-        line_of(support={**config["system"]["support"], key: value})
+        line_of(support={**config["system"]["support"], key: value}, lateral=True)
