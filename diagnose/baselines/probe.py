@@ -15,8 +15,7 @@ from diagnose.baselines.base import Baseline, Input, MethodText, Parts, Role, So
 from diagnose.baselines.estimators import FittedModel, boosted_trees
 from diagnose.baselines.features import FeatureTable
 from diagnose.data.windows import FloatArray
-from gensig.dataset.columns import COLUMNS
-from gensig.dataset.schema import SIGNALS
+from gensig.dataset.schema import known_column
 from gensig.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -54,7 +53,7 @@ def probed_columns(dataset: Dataset, *, results: bool) -> list[str]:
 
 
 def _is_probed(name: str, results: bool) -> bool:
-    known = COLUMNS.get(name) or SIGNALS.get(name)
+    known = known_column(name)
     role = known.role if known else "condition"
     if name in EXCLUDED or role in LABELS or name.startswith(FAULT_PARAMETERS):
         return False

@@ -18,7 +18,7 @@ from gensig.dataset.folder.layout import (
     shard_path,
 )
 from gensig.dataset.plan import Plan, read_plan
-from gensig.dataset.schema import SCALES, SIGNALS
+from gensig.dataset.schema import SCALES, bulk_signals, signal_column
 from gensig.dataset.selection import Selection, StoredRecord, structured, unknown_name
 from gensig.dataset.splitting.protocols import NEW_MACHINE, PROTOCOLS, why_left_out
 from gensig.dataset.splitting.splits import SUBSETS, read_split
@@ -112,9 +112,7 @@ class Dataset:
         self.compression = compression_of(first["acceleration"])
         self._shape: tuple[int, int] = first["acceleration"].shape[1:]
         contents = datasets(first, folder)
-        self.signal_names: list[str] = [
-            name for name in SIGNALS if SIGNALS[name].is_bulk and name in contents
-        ]
+        self.signal_names = bulk_signals(contents)
         columns = contents.keys() - self.signal_names
         self._types = {
             name: (contents[name].dtype, contents[name].shape[1:]) for name in columns
@@ -265,7 +263,7 @@ class Dataset:
 
         'tacho', 'encoder_angle', 'shaft_angle', 'mesh_force', 'contact_lost' and 'fault_engaged'
         are (sample,), 'mesh_pinion_tooth', 'mesh_wheel_tooth' and 'mesh_load_share' (pair,
-        sample).
+        sample). Those of a further mesh have the names of its gears before them.
         """
         traces = [known for known in self.signal_names if known not in SCALES]
         if name not in traces:
@@ -275,7 +273,7 @@ class Dataset:
             values = self._file(shard)[name][row, ..., start:stop]
         except HDF5_ERRORS as error:
             raise self._unreadable(shard, first_line(error)) from error
-        n_axes = len(SIGNALS[name].axes)
+        n_axes = len(signal_column(name).axes)
         if values.shape[-1:] != (stop - start,) or values.ndim != n_axes:
             raise self._another_shape(shard, name)
         return values

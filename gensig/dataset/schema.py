@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 from gensig.dataset.columns import COLUMNS, GEAR_COLUMNS, Column, columns_of_axes
+from gensig.errors import DatasetError
 
 SCHEMA_VERSION = 1
 # of sets whose units differ in their gears: readers of version 1 would take the attributes of one
@@ -186,6 +187,17 @@ SIGNALS = (
     )
 )
 
+# Signals of one mesh. Those of a mesh that records do not follow have the names of its driving and
+# its driven gear before the name, which then means them by pinion and wheel.
+OF_MESHES = (
+    "mesh_pinion_tooth",
+    "mesh_wheel_tooth",
+    "mesh_load_share",
+    "mesh_force",
+    "contact_lost",
+    "fault_engaged",
+)
+
 # How time signals with a scale may be stored, and the column that holds the scale of each.
 SAMPLE_TYPES = ("float32", "int16")
 SCALES = {
@@ -233,6 +245,34 @@ DEFAULTS: dict[str, str | float] = {
 
 PARAMS = "params"
 ACCELERATION = "m/s^2"
+
+
+def find_signal(name: str) -> Column | None:
+    """The column of a signal, of any mesh; None for a name that is no signal."""
+    for of_mesh in OF_MESHES:
+        if name.endswith(f"_{of_mesh}"):
+            return SIGNALS[of_mesh]
+    return SIGNALS.get(name)
+
+
+def signal_column(name: str) -> Column:
+    """The column of a signal, of any mesh; DatasetError for a name that is no signal."""
+    column = find_signal(name)
+    if column is None:
+        raise DatasetError(f"'{name}' is no signal of a data set")
+    return column
+
+
+def known_column(name: str) -> Column | None:
+    """The column of a signal, or of one value a record; None for an unknown name."""
+    return find_signal(name) or COLUMNS.get(name)
+
+
+def bulk_signals(names: Collection[str]) -> list[str]:
+    """Those of some names that are time signals, in the order of `SIGNALS`, further meshes last."""
+    known = [name for name in SIGNALS if SIGNALS[name].is_bulk and name in names]
+    further = sorted(set(names) - SIGNALS.keys())
+    return [*known, *(name for name in further if find_signal(name) is not None)]
 
 
 def version_of(columns: Collection[str]) -> int:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from gensig.driveline.linear.shaft_line import (
     Shaft,
     ShaftLine,
 )
-from gensig.driveline.options import Campbell, LineOptions, read_options
+from gensig.driveline.options import Campbell, GearHolding, LineOptions, read_options
 from gensig.driveline.shaft_tables import (
     TableRow,
     read_gears,
@@ -38,6 +39,7 @@ from gensig.dynamics.pair import Rotor
 from gensig.errors import ConfigError
 from gensig.geometry.contact import SIDES, GearPair
 from gensig.geometry.gear import Gear
+from gensig.material import Material
 from gensig.options.configuration import Configuration
 from gensig.systems.pair_machine import GearPairMachine, pair_dynamics
 from gensig.systems.registry import read_material
@@ -51,8 +53,8 @@ class DriveLine:
     ``numbers`` (node,) as the table counts them, rings of dampers on from there; ``pairs``
     (mesh,) the driving gear as pinion; ``record_mesh`` the numbers of the nodes whose mesh
     records are made of; ``slices_helical`` whether helical meshes in time are sliced teeth;
-    ``motor_node``, ``load_node`` those of a motor and its load; ``support_force`` N is that for
-    which the one support of all gears is taken, None without lateral motion.
+    ``motor_node``, ``load_node`` those of a motor and its load; ``support_forces`` (gear,) N are
+    those for which the supports of the gears are taken, empty without lateral motion.
     """
 
     name: str
@@ -65,7 +67,7 @@ class DriveLine:
     slices_helical: bool = False
     motor_node: int | None = None
     load_node: int | None = None
-    support_force: float | None = None
+    support_forces: tuple[float, ...] = ()
 
     def matrices(self, *, merge_rigid: bool = False) -> LineMatrices:
         """Mass, damping and stiffness, the meshes apart.
@@ -136,14 +138,15 @@ def read_drive_line(config: Configuration) -> DriveLine:
         for index, row in enumerate(node_rows.values())
     )
     shafts, meshes, pairs = _joints(shafting, numbers, gears, shapes, options)
-    support_force = None
-    if options.lateral:
-        support_force = options.support.force
     line = ShaftLine(
         nodes=nodes, shafts=tuple(shafts), gears=tuple(gears), meshes=tuple(meshes)
     )
     check_gears_in_mesh(gear_rows, line)
     check_whole(list(node_rows.values()), numbers, line)
+    forces: tuple[float, ...] = ()
+    if options.lateral:
+        forces = _support_forces(line, options.support)
+        line = _on_supports(line, forces, options.support, material)
     line, numbers = with_dampers(line, numbers, options.dampers)
     return DriveLine(
         name=options.name,
@@ -156,8 +159,32 @@ def read_drive_line(config: Configuration) -> DriveLine:
         slices_helical=options.helical_meshes == "sliced",
         motor_node=options.motor_node,
         load_node=options.load_node,
-        support_force=support_force,
+        support_forces=forces,
     )
+
+
+def _support_forces(line: ShaftLine, holding: GearHolding) -> tuple[float, ...]:
+    """Static force of every gear on its support, (gear,) N."""
+    ratios = line.speed_ratio
+    return tuple(
+        holding.force_on(gear.base_radius, float(ratios[gear.node]))
+        for gear in line.gears
+    )
+
+
+def _on_supports(
+    line: ShaftLine,
+    forces: Sequence[float],
+    holding: GearHolding,
+    material: Material,
+) -> ShaftLine:
+    """The line with its gears on supports for such forces, (gear,) N."""
+    gears = []
+    for gear, force in zip(line.gears, forces, strict=True):
+        assert gear.mass is not None
+        support = holding.for_gear(gear.mass, force, material)
+        gears.append(replace(gear, support=support))
+    return replace(line, gears=tuple(gears))
 
 
 def _joints(

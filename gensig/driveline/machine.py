@@ -39,7 +39,6 @@ from gensig.driveline.mesh_phase import start_phase
 from gensig.driveline.running import (
     Governor,
     RunningLine,
-    TabulatedMesh,
     mesh_forces,
     named_by_side,
     operating_course,
@@ -52,6 +51,7 @@ from gensig.driveline.side_by_side.line_records import LineSignals, simulate_lin
 from gensig.driveline.teeth import (
     ToothLaw,
     felt_there,
+    followed_mesh,
     line_teeth,
     require_drive,
     require_teeth,
@@ -73,7 +73,7 @@ from gensig.mesh.sliced.sliced_table import SlicedTable
 from gensig.sensing.encoder import Disc
 from gensig.sensing.manufacturing import perfect_specimen
 from gensig.sensing.toothed_wheel import draw_wheel
-from gensig.systems.base import Machine, MachineMesh, specimen_table
+from gensig.systems.base import Machine, MachineMesh, home_meshes, specimen_table
 from gensig.systems.run import CleanRecord, Run, Start, angle_from_tooth_0
 from gensig.systems.stiffness_curves import StiffnessCurves, stiffness_curves
 from gensig.systems.supports import supports_in_gearbox
@@ -321,18 +321,16 @@ class LineMachine(Machine):
             mesh_forces=running.mesh_force,
         )
 
+    def at_gear(self, gear: str) -> tuple[Machine, str]:
+        """As ``Machine.at_gear``."""
+        number = home_meshes(self.meshes)[gear]
+        side = SIDES[self.meshes[number].gears.index(gear)]
+        other = replace(self, mesh_number=number)
+        speed = self.operating.speed * other.ratio / self.ratio
+        return replace(other, operating=replace(self.operating, speed=speed)), side
+
     def mesh_torques(self, speed: float, torque: float) -> Array:
-        """Loads that a tooth of the record mesh meets at a set-point, one a mesh, as torques of
-        the pinion.
-
-        Parameters
-        ----------
-        speed : rad/s    of the pinion's shaft
-        torque : N m     brake torque at the crank
-
-        Returns
-        -------
-        (mesh,) N m      all equally likely
+        """As ``Machine.mesh_torques``; ``torque`` is that of the crank or the motor.
 
         The sound, nominal machine runs ``loads.SECONDS`` s at the set-point. Every pair of teeth
         that meets gives one load, as ISO 6336-6 counts damage. The mean load alone would miss the
@@ -340,13 +338,13 @@ class LineMachine(Machine):
 
         Raises
         ------
-        ConfigError        for helical record meshes and machines that do not run steadily
+        ConfigError        for helical meshes and machines that do not run steadily
         SimulationError    for a motion that cannot be integrated
         """
         if self.pair.pinion.helix_angle != 0.0:
             raise ConfigError(
-                "life: on a drive line damage grows in a spur record mesh; "
-                "choose one, system.record_mesh"
+                "life: on a drive line damage grows on spur gears, but mesh "
+                f"{self.engine.mesh_names[self.mesh_number]} is helical; choose another gear"
             )
         if not self.operating.is_steady:
             raise ConfigError(
@@ -422,12 +420,8 @@ class LineMachine(Machine):
             specimen=specimen,
             turned=turned,
         )
-        recorded = TabulatedMesh(
-            table=specimen_table(self, run.faults, specimen),
-            errors=(specimen.pinion_error, specimen.wheel_error),
-            start_teeth=teeth,
-            start_phase=start.phase,
-        )
+        table = specimen_table(self, run.faults, specimen)
+        recorded = followed_mesh(table, specimen, start)
         return running_line(
             engine,
             operating_course(engine, self.operating, self.ratio, SETTLING),

@@ -75,20 +75,22 @@ def check_sensing(machine: Machine, *, lateral: bool) -> None:
 
 
 def warn_of_supports(engine: EngineLine, mesh_forces: Array) -> None:
-    """Warn of mesh forces far above the force for which the support of all gears is taken."""
-    rated = engine.drive.support_force
-    if rated is None:
+    """Warn of mesh forces far above those for which the supports of their gears are taken."""
+    rated, line = engine.drive.support_forces, engine.drive.line
+    if not rated:
         return
-    forces = zip(engine.mesh_names, np.abs(mesh_forces), strict=True)
-    heavy = [
-        f"{name} {force:.0f} N" for name, force in forces if force > FAR_ABOVE * rated
-    ]
+    heavy = []
+    meshes = zip(engine.mesh_names, line.meshes, np.abs(mesh_forces), strict=True)
+    for name, mesh, force in meshes:
+        least = min(rated[mesh.driving], rated[mesh.driven])
+        if force > FAR_ABOVE * least:
+            heavy.append(f"{name} {force:.0f} N for {least:.0f} N")
     if heavy:
         warnings.warn(
-            f"{engine.drive.name}: mean tooth forces of meshes {', '.join(heavy)}, "
-            f"but every gear is on a support for system.support.force_n = {rated:g} N, "
-            "less stiff than bearings so loaded; set it, and bearing and shaft, to those of "
-            "the gears of system.record_mesh",
+            f"{engine.drive.name}: mean tooth forces of meshes, and those for which the supports "
+            f"of their gears are taken: {', '.join(heavy)}. Such supports are less stiff than "
+            "bearings so loaded; set excitation.reference.torque_nm to the rated torque, or "
+            "system.support.force_n",
             UserWarning,
             stacklevel=3,
         )

@@ -59,28 +59,50 @@ class Campbell:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GearHolding:
-    """Lateral support of every gear: two bearings, a shaft, a static force, a damping ratio."""
+    """Lateral support of every gear: two bearings, a shaft, a static force, a damping ratio.
+
+    ``force`` None is that on the teeth of each gear under ``torque`` of the first node.
+    """
 
     bearing: BallBearing
     shaft: BearingShaft
-    force: float = unit("n")
+    force: float | None = unit("n")
+    torque: float | None = unit("nm", default=None)
     damping_ratio: float
 
     def __post_init__(self) -> None:
-        if not self.force > 0.0:
+        if self.force is not None and not self.force > 0.0:
             raise ConfigError(
                 f"system.support.force_n = {self.force:g} must be positive"
+            )
+        if self.torque is not None and not self.torque > 0.0:
+            raise ConfigError(
+                f"system.support.torque_nm = {self.torque:g}, "
+                "excitation.reference.torque_nm unless given, must be positive"
             )
         if not 0.0 <= self.damping_ratio < 1.0:
             raise ConfigError(
                 f"system.support.damping_ratio = {self.damping_ratio:g} must lie in 0..1"
             )
 
-    def for_gear(self, mass: float, material: Material) -> Support:
-        """The support of a gear of ``mass`` in kg."""
-        across, along = support_stiffness(
-            self.bearing, self.shaft, material, self.force
-        )
+    def force_on(self, base_radius: float, speed_ratio: float) -> float:
+        """Static force in N of a gear that turns ``speed_ratio`` times as fast as the first node.
+
+        All of the torque passes through its teeth, which push along the line of action.
+        ConfigError where neither force nor torque are given.
+        """
+        if self.force is not None:
+            return self.force
+        if self.torque is None:
+            raise ConfigError(
+                "system.support.force_n = null follows from system.support.torque_nm, which is "
+                "null too; give one of them"
+            )
+        return self.torque / (abs(speed_ratio) * base_radius)
+
+    def for_gear(self, mass: float, force: float, material: Material) -> Support:
+        """The support of a gear of ``mass`` in kg under a static ``force`` in N."""
+        across, along = support_stiffness(self.bearing, self.shaft, material, force)
         rigid = Support(
             stiffness_x=across, stiffness_y=along, damping_x=0.0, damping_y=0.0
         )

@@ -37,6 +37,7 @@ from gensig.geometry.contact import GearPair
 from gensig.mesh.pair_table import PairTable
 from gensig.mesh.sliced.sliced_table import SlicedTable
 from gensig.operation.setpoint import Operating
+from gensig.sensing.manufacturing import GearErrors
 
 Array = NDArray[np.float64]
 
@@ -69,13 +70,14 @@ class Governor:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TabulatedMesh:
-    """A mesh with tabulated teeth: table, errors of the teeth (tooth,) m, teeth at the start.
+    """A mesh with tabulated teeth: table, errors of both gears, teeth at the start.
 
-    ``start_phase`` in pitches must agree with where the crank stands; None follows from it.
+    The forms of ``errors`` are in the table. ``start_phase`` in pitches must agree with where the
+    crank stands; None follows from it.
     """
 
     table: PairTable | SlicedTable
-    errors: tuple[Array, Array] | None = None
+    errors: tuple[GearErrors, GearErrors] | None = None
     start_teeth: tuple[int, int] = (0, 0)
     start_phase: float | None = None
 
@@ -343,7 +345,10 @@ def _mesh(
             mirror=2.0 * pair.pitch_point / pair.base_pitch + 0.5,
             **common,
         )
-    common |= {"errors": tabulated.errors, "start_teeth": tabulated.start_teeth}
+    if tabulated.errors is not None:
+        common["errors"] = tuple(teeth.error for teeth in tabulated.errors)
+        common["tilts"] = tuple(teeth.tilt for teeth in tabulated.errors)
+    common["start_teeth"] = tabulated.start_teeth
     if tabulated.start_phase is not None:
         common["start_phase"] = tabulated.start_phase
     if isinstance(tabulated.table, SlicedTable):

@@ -136,9 +136,7 @@ def line_gear(
     options: LineOptions,
     material: Material,
 ) -> LineGear:
-    """A gear on its node, with its mass (of a solid disc where it is empty) and, for lateral
-    motion, its support.
-    """
+    """A gear on its node, with its mass (of a solid disc where it is empty), without a support."""
     number = round(row.given("node", row.whole("node")))
     if number not in numbers:
         raise ConfigError(
@@ -146,16 +144,12 @@ def line_gear(
             f"{_nodes(numbers)}"
         )
     mass = row.positive("mass") or _disc(shape, material)[0]
-    support = None
-    if options.lateral:
-        support = options.support.for_gear(mass, material)
     return LineGear(
         name=shape.name,
         node=numbers.index(number),
         n_teeth=shape.n_teeth,
         base_radius=shape.base_radius,
         mass=mass,
-        support=support,
     )
 
 

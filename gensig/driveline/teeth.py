@@ -28,8 +28,9 @@ from gensig.mesh.load_distribution import loaded_pair_table
 from gensig.mesh.options import MeshOptions, SliceOptions
 from gensig.mesh.pair_table import PairTable
 from gensig.mesh.sliced.sliced_table import SlicedTable, sliced_table
-from gensig.sensing.manufacturing import Specimen
+from gensig.sensing.manufacturing import GearErrors, Specimen
 from gensig.systems.base import home_meshes
+from gensig.systems.run import Start
 
 Array = NDArray[np.float64]
 
@@ -182,16 +183,35 @@ def line_teeth(
         )
         backlash = table.pair.backlash * mounting.backlash_factor
         ends = _ends(drive, number)
-        errors = [np.zeros(gear.n_teeth) for gear in _gears(drive.pairs[number])]
+        errors = []
         for there, gear in enumerate(ends):
+            n_teeth = _gears(drive.pairs[number])[there].n_teeth
+            teeth = GearErrors(error=np.zeros(n_teeth), tilt=np.zeros(n_teeth))
             if ends[there] == _ends(drive, homes[gear])[there]:
-                errors[there] = specimen.errors_of(names[gear], len(errors[there]))
+                teeth = specimen.errors_of(names[gear], n_teeth)
+            errors.append(teeth)
         meshes[number] = TabulatedMesh(
             table=replace(table, pair=replace(table.pair, backlash=backlash)),
             errors=(errors[0], errors[1]),
             start_teeth=start_teeth(drive, followed, number, start, turned),
         )
     return meshes
+
+
+def followed_mesh(
+    table: PairTable | SlicedTable, specimen: Specimen, start: Start
+) -> TabulatedMesh:
+    """The teeth of the followed mesh, of a table that has the forms of its specimen."""
+    pinion, wheel = _gears(table.pair)
+    return TabulatedMesh(
+        table=table,
+        errors=(
+            specimen.errors_of(SIDES[0], pinion.n_teeth),
+            specimen.errors_of(SIDES[1], wheel.n_teeth),
+        ),
+        start_teeth=(start.tooth_pinion, start.tooth_wheel),
+        start_phase=start.phase,
+    )
 
 
 def felt_there(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -42,6 +42,14 @@ class MeshState:
     force: Array
     contact_lost: NDArray[np.bool_]
     fault_engaged: NDArray[np.bool_]
+
+    def since(self, sample: int) -> MeshState:
+        """The state from a sample on."""
+        later = {
+            field.name: getattr(self, field.name)[..., sample:]
+            for field in fields(MeshState)
+        }
+        return MeshState(**later)
 
 
 def mesh_state(
@@ -90,9 +98,11 @@ def mesh_state(
 
 
 def mesh_signals(
-    mesh: MeshState | None, n_samples: int, n_pairs: int
+    mesh: MeshState | None, n_samples: int, n_pairs: int, of_mesh: str = ""
 ) -> dict[str, NDArray[Any]]:
     """Signals of a mesh state with ``n_pairs`` rows of pairs; without values for a failed record.
+
+    ``of_mesh`` is what the name of a mesh that records do not follow puts before the names.
 
     Raises
     ------
@@ -116,7 +126,7 @@ def mesh_signals(
             fault_engaged=no,
         )
     free = ((0, n_pairs - len(mesh.load_share)), (0, 0))
-    return {
+    signals: dict[str, NDArray[Any]] = {
         "mesh_pinion_tooth": np.pad(mesh.pinion_tooth, free, constant_values=NO_TOOTH),
         "mesh_wheel_tooth": np.pad(mesh.wheel_tooth, free, constant_values=NO_TOOTH),
         "mesh_load_share": np.pad(mesh.load_share.astype(np.float32), free),
@@ -124,3 +134,4 @@ def mesh_signals(
         "contact_lost": mesh.contact_lost.astype(np.int8),
         "fault_engaged": mesh.fault_engaged.astype(np.int8),
     }
+    return {f"{of_mesh}{name}": values for name, values in signals.items()}

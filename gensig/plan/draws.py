@@ -172,8 +172,8 @@ def draw_class_faults(
 def drawn_gears(config: Configuration) -> tuple[str, ...]:
     """Gears out of which a plan draws that of each condition's faults; none where it is given.
 
-    All gears of the machine, or those that ``plan.fault_gear`` lists. In lives damage grows in the
-    followed mesh: its two gears.
+    All gears of the machine, or those that ``plan.fault_gear`` lists. In lives of a drive line
+    damage grows on its spur gears.
 
     Raises
     ------
@@ -183,8 +183,9 @@ def drawn_gears(config: Configuration) -> tuple[str, ...]:
     if chosen == AS_GIVEN:
         return ()
     allowed = machine_gears(config)
-    if runs_to_failure(config):
-        allowed = SIDES
+    if runs_to_failure(config) and config["system"]["kind"] == LINE:
+        gears = read_machine(config).gears
+        allowed = tuple(name for name in allowed if gears[name].helix_angle == 0.0)
     if chosen == DRAWN:
         return allowed
     for gear in chosen:

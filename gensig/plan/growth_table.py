@@ -17,6 +17,7 @@ from gensig.faults.base import Growth
 from gensig.faults.crack import Crack
 from gensig.faults.flank_form import Wear
 from gensig.faults.pitting import DistributedPitting
+from gensig.geometry.contact import SIDES
 from gensig.life.crack_growth import CrackGrowthOptions
 from gensig.life.growth import GrowthLaw
 from gensig.life.life_options import WearGrowthOptions
@@ -52,12 +53,22 @@ class LifeGears:
         self.machine, self.torques = machine, torques
         self._config = config
         self._loads: dict[tuple[float, float], Array] = {}
+        self._others: dict[str, tuple[LifeGears, str]] = {}
 
     def tooth_loads(self, speed: float, torque: float) -> Array:
         """Loads that a tooth meets at a set-point, (mesh,) N m."""
         if (speed, torque) not in self._loads:
             self._loads[speed, torque] = self.machine.mesh_torques(speed, torque)
         return self._loads[speed, torque]
+
+    def of_gear(self, gear: str) -> tuple[LifeGears, str]:
+        """The gears of the home mesh of a gear, and its side there."""
+        if gear in SIDES:
+            return self, gear
+        if gear not in self._others:
+            machine, side = self.machine.at_gear(gear)
+            self._others[gear] = LifeGears(self._config, machine, self.torques), side
+        return self._others[gear]
 
     @cached_property
     def wear(self) -> WearTable:

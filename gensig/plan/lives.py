@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from gensig.dataset.distributions import GRID
 from gensig.errors import ConfigError
+from gensig.faults.base import require_gears
 from gensig.faults.registry import FAULTS, fault_parts, read_faults
-from gensig.geometry.contact import SIDES
 from gensig.life.growth import Course, GrowthLaw, grow
 from gensig.life.life_options import LifeOptions, read_life
 from gensig.life.load_history import History, draw_history, given_history
@@ -175,16 +175,20 @@ def _life(
         course = grow(np.array([0.0, 1.0]), never, history, 0.0)
         return _Life(fault=fault, law=None, loads=(), course=course)
     rate, first = growth.draw(rng)
-    (defect,) = read_faults(fault)
-    if defect.gear not in SIDES:
-        raise ConfigError(
-            f"fault.gear = {defect.gear!r}: damage grows on {' or '.join(SIDES)} of the followed "
-            "mesh; choose a system.record_mesh with that gear"
-        )
-    unit = LAWS[defect.growth](gears, defect, growth, history, first)
-    points = zip(history.speed.tolist(), history.torque.tolist(), strict=True)
-    loads = tuple(gears.tooth_loads(*point) for point in points)
-    course = grow(unit.law.sizes, unit.law.turns(loads) / rate, history, unit.start)
+    defects = read_faults(fault)
+    require_gears(defects, tuple(gears.machine.gears))
+    (defect,) = defects
+    # the law is that of the mesh of the gear, and counts turns of the pinion there
+    there, side = gears.of_gear(defect.gear)
+    faster = there.machine.ratio / gears.machine.ratio
+    damage = replace(defect, gear=side)
+    unit = LAWS[defect.growth](there, damage, growth, history, first)
+    points = zip(
+        (history.speed * faster).tolist(), history.torque.tolist(), strict=True
+    )
+    loads = tuple(there.tooth_loads(*point) for point in points)
+    turns = unit.law.turns(loads) / (rate * faster)
+    course = grow(unit.law.sizes, turns, history, unit.start)
     return _Life(fault=fault, law=unit.law, loads=loads, course=course)
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gensig.dataset.columns import IS_REFERENCE
 from gensig.dataset.distributions import LATIN_HYPERCUBE, Distribution
 from gensig.dataset.plan import Plan, record_ids, shard_rows
-from gensig.dataset.schema import SCALES, SIGNALS
+from gensig.dataset.schema import SCALES, signal_column
 from gensig.errors import ConfigError
 from gensig.faults.base import faulty_teeth
 from gensig.faults.registry import fault_parts, read_faults
@@ -418,7 +418,7 @@ def record_bytes(config: Configuration, *, as_stored: bool = False) -> int:
         counts = set(SCALES)
     n_bytes = 0
     for name, shape in shapes.items():
-        column = SIGNALS[name]
+        column = signal_column(name)
         width = COUNT_BYTES if name in counts else column.n_bytes
         n_bytes += column.is_bulk * width * math.prod(shape)
     return n_bytes

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gensig.dataset.folder.manifest import identity_hash
-from gensig.dynamics.mesh_state import mesh_signals
+from gensig.dynamics.mesh_state import MeshState, mesh_signals
 from gensig.errors import SimulationError
 from gensig.operation.options import operating_signals
 from gensig.options.configuration import Configuration
@@ -132,10 +132,10 @@ def _record(config: Configuration, row: Row, measured: _Measured) -> Record:
         record = _failed(measured, error)
     dataset, machine = measured.inputs.dataset, measured.inputs.machine
     n_samples = _n_samples(machine)
-    motion, state, angle = None, None, np.full(n_samples, MISSING)
+    motion, angle = None, np.full(n_samples, MISSING)
     if isinstance(measured.motion, CleanRecord):
         motion = measured.motion
-        state, angle = motion.mesh, motion.shaft_angle
+        angle = motion.shaft_angle
     signals = {**record.signals, "fault_multihot": _multihot(config, row)}
     if dataset.store_operating:
         rate = machine.sensing.sampling_rate
@@ -144,7 +144,7 @@ def _record(config: Configuration, row: Row, measured: _Measured) -> Record:
         )
     signals |= measured.inputs.shaft_signals(motion)
     if dataset.store_mesh_state:
-        signals |= mesh_signals(state, n_samples, machine.most_pairs)
+        signals |= _mesh_signals(machine, motion)
     columns = {key: value for key, value in row.items() if key not in ("shard", "row")}
     return Record(signals=signals, values={**columns, **record.values})
 
@@ -248,9 +248,26 @@ def signal_shapes(
         shapes |= {"shaft_speed": samples, "torque_set": samples}
     shapes |= dict.fromkeys(dataset.shaft_signals, samples)
     if dataset.store_mesh_state:
-        state = mesh_signals(None, n_samples, machine.most_pairs)
+        state = _mesh_signals(machine, None)
         shapes |= {name: values.shape for name, values in state.items()}
     return shapes
+
+
+def _mesh_signals(machine: Machine, motion: CleanRecord | None) -> Signals:
+    """Loads of the teeth of all meshes, the followed one first.
+
+    Without values for a failed record, which has no motion.
+    """
+    n_samples, n_pairs = _n_samples(machine), machine.most_pairs
+    further = [mesh for mesh in machine.meshes if not mesh.followed]
+    state: MeshState | None = None
+    states: Sequence[MeshState | None] = [None] * len(further)
+    if motion is not None:
+        state, states = motion.mesh, motion.further_meshes
+    signals = mesh_signals(state, n_samples, n_pairs)
+    for mesh, state in zip(further, states, strict=True):
+        signals |= mesh_signals(state, n_samples, n_pairs, f"{mesh.name}_")
+    return signals
 
 
 def _multihot(config: Configuration, row: Row) -> NDArray[np.int8]:

@@ -196,14 +196,16 @@ class Specimen:
         further = [form for errors in self.others.values() for form in errors.forms]
         return (*self.forms, *further)
 
-    def errors_of(self, name: str, n_teeth: int) -> Array:
-        """Distance that every tooth of a gear stands back, (tooth,) m; 0 without errors."""
-        followed = {"pinion": self.pinion_error, "wheel": self.wheel_error}
-        if name in followed:
-            return followed[name]
+    def errors_of(self, name: str, n_teeth: int) -> GearErrors:
+        """Errors of the teeth of a gear, without forms of its flanks; 0 without errors."""
+        none = np.zeros(n_teeth)
+        if name == "pinion":
+            return GearErrors(error=self.pinion_error, tilt=self.pinion_tilt + none)
+        if name == "wheel":
+            return GearErrors(error=self.wheel_error, tilt=self.wheel_tilt + none)
         if name in self.others:
-            return self.others[name].error
-        return np.zeros(n_teeth)
+            return replace(self.others[name], forms=())
+        return GearErrors(error=none, tilt=none)
 
     def mounting(self, number: int) -> Mounting:
         """Mounting of a mesh by its number among those that are not followed."""

@@ -51,6 +51,11 @@ class MachineMesh:
         """Names of the driving and the driven gear."""
         return self.driving, self.driven
 
+    @property
+    def name(self) -> str:
+        """Names of both gears in one word, the driving one first."""
+        return f"{self.driving}_{self.driven}"
+
 
 def home_meshes(meshes: Sequence[MachineMesh]) -> dict[str, int]:
     """Number of the home mesh of each gear, by its name.
@@ -157,6 +162,13 @@ class Machine(ABC):
     @abstractmethod
     def mesh_force(self) -> float:
         """Normal force of the followed mesh at the set-point, N."""
+
+    @abstractmethod
+    def at_gear(self, gear: str) -> tuple[Machine, str]:
+        """The machine as records that follow the home mesh of a gear have it, and the gear's side.
+
+        KeyError for a gear that the machine does not have.
+        """
 
     @abstractmethod
     def mesh_torques(self, speed: float, torque: float) -> Array:

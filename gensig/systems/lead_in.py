@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 
-from gensig.dynamics.mesh_state import MeshState
 from gensig.errors import SimulationError
 from gensig.systems.base import Machine, simulate_together
 from gensig.systems.run import CleanRecord, Run, Start
@@ -64,19 +63,17 @@ def _cut(record: CleanRecord, run: Run[Machine]) -> CleanRecord:
     if n_lead == 0:
         return record
     n_samples = len(record.shaft_angle) - n_lead
-    operating, angle, mesh = run.system.operating, record.shaft_angle, record.mesh
+    operating, angle = run.system.operating, record.shaft_angle
     elapsed = float(operating.time_at_set_speed(np.array([-n_lead / rate]))[0])
     before = -operating.speed * elapsed
     end = angle[0] + record.mean_speed * (n_lead + n_samples) / rate
+    mesh = record.mesh
     if mesh is not None:
-        cut = {
-            field.name: getattr(mesh, field.name)[..., n_lead:]
-            for field in fields(MeshState)
-        }
-        mesh = MeshState(**cut)
+        mesh = mesh.since(n_lead)
     return replace(
         record,
         shaft_angle=angle[n_lead:] - before,
         mean_speed=float(end - angle[n_lead]) * rate / n_samples,
         mesh=mesh,
+        further_meshes=tuple(mesh.since(n_lead) for mesh in record.further_meshes),
     )

@@ -131,6 +131,10 @@ class GearPairMachine(Machine):
         """Normal force of the set torque, N."""
         return self.operating.torque / self.pair.pinion.base_radius
 
+    def at_gear(self, gear: str) -> tuple[Machine, str]:
+        """The machine itself: it has one mesh."""
+        return self, gear
+
     def mesh_torques(self, speed: float, torque: float) -> Array:
         """The set torque: every mesh of a tooth has the same load, (1,) N m."""
         return np.array([torque])

@@ -87,7 +87,8 @@ class CleanRecord:
     shaft_angle : (sample,) rad    of the pinion, from its nominal angle at the first sample on
     mean_speed : rad/s
     integration_check : one of ``CHECKS``
-    mesh : loads of the teeth, if the run asks for them
+    mesh : loads of the teeth of the followed mesh, if the run asks for them
+    further_meshes : the same of the other meshes, in the order of ``Machine.meshes``
     """
 
     acceleration: Array
@@ -97,3 +98,4 @@ class CleanRecord:
     integration_error: float
     integration_check: str
     mesh: MeshState | None = None
+    further_meshes: tuple[MeshState, ...] = ()

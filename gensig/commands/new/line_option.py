@@ -10,7 +10,6 @@ from gensig.commands.new.data_sheet import GearOption
 from gensig.commands.new.experiment import (
     CLASSES,
     N_UNITS,
-    TORQUE_SHARES,
     Wishes,
     check_rate,
     operating_lines,
@@ -23,14 +22,14 @@ from gensig.commands.new.stages import (
     StagedSheet,
     mesh_forces,
     shaft_diameters,
-    support_force,
 )
-from gensig.driveline.machine_checks import FAR_ABOVE
 from gensig.dynamics.bearing_sizes import bearing_for
 from gensig.dynamics.decimation import usable_band
 from gensig.systems.derived_sizes import bearing_values
 
-LOWEST_RATE = 10240.0  # Hz, of sensing=geared_line
+LINE_RATE = 51200.0  # Hz, of sensing=geared_line_bearings
+LEAST_STEPS = 5  # of a sample at that rate
+LOWEST_RATE = 10240.0  # Hz, of helical teeth, whose integration costs more
 HARMONICS = 4  # of the fastest mesh in the usable band
 SUPPORT_SHAFT = (
     1  # the shaft whose bearing and thickness hold all gears: the first idler's
@@ -38,10 +37,7 @@ SUPPORT_SHAFT = (
 
 
 def system_text(
-    sheet: StagedSheet,
-    stages: Sequence[GearOption],
-    wishes: Wishes,
-    tables: dict[str, Path],
+    sheet: StagedSheet, stages: Sequence[GearOption], tables: dict[str, Path]
 ) -> str:
     """The option of the system; ``tables`` are files by their key of the group."""
     nodes = LineNodes(n_stages=sheet.n_stages)
@@ -67,7 +63,7 @@ def system_text(
         ),
         remarked("  motor_node: 1", "Motor"),
         remarked(f"  load_node: {nodes.load}", "Brake"),
-        *_support_lines(sheet, stages, wishes),
+        *_support_lines(sheet, stages),
         "  campbell:",
         remarked(
             f"    high_speed_rpm: {1.5 * sheet.speed:g}", "assumed: 1.5 of the rated"
@@ -83,20 +79,16 @@ def system_text(
     return "\n".join(lines) + "\n"
 
 
-def _support_lines(
-    sheet: StagedSheet, stages: Sequence[GearOption], wishes: Wishes
-) -> list[str]:
-    """The one support of all gears: its force, and bearing and shaft of the first idler."""
-    share = (wishes.torque_range or TORQUE_SHARES)[1]
-    force = support_force(stages, share, FAR_ABOVE)
+def _support_lines(sheet: StagedSheet, stages: Sequence[GearOption]) -> list[str]:
+    """The supports of all gears: bearing and shaft of the first idler, each with its own force."""
     forces = ", ".join(f"{value:.0f}" for value in mesh_forces(stages))
     diameter = shaft_diameters(sheet)[SUPPORT_SHAFT]
     width = max(option.gear["pinion"]["face_width_mm"] for option in stages[:2])
     lines = [
-        "  support:                       # one for all gears",
+        "  support:                       # of every gear",
         remarked(
-            f"    force_n: {force:g}",
-            f"assumed: for the mesh forces of all stages, {forces} N at the rated torque",
+            "    force_n: null",
+            f"derived: tooth force of each gear at the rated torque, by stages {forces} N",
         ),
         remarked(
             "    bearing:",
@@ -128,24 +120,21 @@ def staged_experiment_text(
         "# @package _global_",
         f"# Written by gensig new gearbox: {n_records} records of {sheet.name}, "
         f"{len(classes)} classes from {N_UNITS} units. Faults are",
-        "# drawn in shares of a tooth, on the driving gear of system.record_mesh; "
-        "fault.gear=wheel: the driven one.",
+        "# drawn in shares of a tooth, on any gear. On one gear: "
+        "plan.fault_gear=as_given fault.gear=wheel",
         "defaults:",
         f"  - override /system: {sheet.name}",
+        "  - override /sensing: geared_line_bearings  # along y at the bearings of all gears",
         "  - _self_",
         "",
         *operating_lines(stages[0], wishes),
     ]
     if wishes.grade is not None:
         lines += quality_lines(wishes, wishes.grade)
+    lines += _integration_lines(stages, wishes)
     lines += [
-        "sensing:",
-        _rate_line(stages, wishes),
-        remarked(
-            "  channels: [pinion_y, wheel_y]",
-            "bearings of the followed gears, along the line of action; lines have no friction",
-        ),
         *plan_lines(stages[0], wishes, classes, n_records),
+        remarked("  fault_gear: drawn", "any gear, by equal chance"),
         "dataset:",
         remarked(
             f"  records_per_shard: {4 * len(classes)}",
@@ -153,6 +142,31 @@ def staged_experiment_text(
         ),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _integration_lines(stages: Sequence[GearOption], wishes: Wishes) -> list[str]:
+    """The groups ``solver`` and ``sensing``: method, steps and sampling rate.
+
+    Helical teeth have the implicit method of the system; spur teeth two evaluations a step.
+    """
+    if any(option.is_helical for option in stages):
+        return ["sensing:", _rate_line(stages, wishes)]
+    rate = wishes.rate or LINE_RATE
+    steps = max(LEAST_STEPS, math.ceil(LEAST_STEPS * LINE_RATE / rate))
+    lines = [
+        "solver:",
+        remarked(
+            "  backend: nystroem", "two evaluations a step, friction in every mesh"
+        ),
+        remarked(
+            f"  oversampling: {steps}",
+            f"derived: steps of 1/{steps * rate:.0f} s, errors of about 1e-4",
+        ),
+    ]
+    if wishes.rate is not None:
+        rate_line = remarked(f"  sampling_rate_hz: {wishes.rate:g}", "given")
+        lines += ["sensing:", rate_line]
+    return lines
 
 
 def _rate_line(stages: Sequence[GearOption], wishes: Wishes) -> str:

@@ -129,7 +129,7 @@ def new_staged(sheet: StagedSheet, arguments: Namespace) -> int:
         "gears_csv": gears_table(sheet, stages),
     }
     texts = {
-        "system": system_text(sheet, stages, wishes, tables),
+        "system": system_text(sheet, stages, tables),
         "experiment": staged_experiment_text(sheet, stages, wishes),
     }
     check_texts(name, texts, table_texts)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -125,17 +124,3 @@ def stage_options(sheet: StagedSheet) -> list[GearOption]:
 def mesh_forces(stages: Sequence[GearOption]) -> list[float]:
     """Normal force of each mesh at the rated torque, N."""
     return [option.machine.mesh_force for option in stages]
-
-
-def support_force(
-    stages: Sequence[GearOption], share: float, far_above: float
-) -> float:
-    """Force in N for which the one support of all gears is taken, rounded.
-
-    The geometric mean of the least and the greatest mesh force at the rated torque. It is raised
-    where the greatest force, at ``share`` of the rated torque, would exceed ``far_above`` times it.
-    """
-    forces = mesh_forces(stages)
-    middle = math.sqrt(min(forces) * max(forces))
-    least = share * max(forces) / far_above
-    return float(f"{1.005 * max(middle, least):.3g}")

@@ -9,7 +9,6 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from gensig.dataset.columns import COLUMNS
 from gensig.dataset.exports.export_tables import (
     attributes_json,
     column_names,
@@ -20,7 +19,7 @@ from gensig.dataset.exports.export_tables import (
     write_parquet,
 )
 from gensig.dataset.reader import Dataset, open_dataset
-from gensig.dataset.schema import SIGNALS
+from gensig.dataset.schema import known_column
 from gensig.dataset.storage.atomic import (
     publish,
     sync_file,
@@ -159,7 +158,7 @@ def _write_hdf5(data: Dataset, path: Path) -> None:
         for name, value in data.attributes.items():
             set_attribute(file, name, value)
         for name in column_names(data):
-            column = SIGNALS.get(name) or COLUMNS.get(name)
+            column = known_column(name)
             sample = data.shard_column(0, name)
             shape, dtype = (data.n_records, *sample.shape[1:]), sample.dtype
             if dtype.kind == "U":

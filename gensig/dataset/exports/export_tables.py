@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from gensig.dataset.columns import COLUMNS
 from gensig.dataset.reader import Dataset
-from gensig.dataset.schema import SCALES, SIGNALS, unit_in_file
+from gensig.dataset.schema import SCALES, known_column, unit_in_file
 from gensig.errors import DatasetError
 
 ROW_GROUP_BYTES = 16 * 1024**2
@@ -24,7 +23,7 @@ def column_names(data: Dataset) -> list[str]:
 
 def unit_of(data: Dataset, name: str) -> str:
     """Unit of a column or signal; '' where the schema does not know it."""
-    column = SIGNALS.get(name) or COLUMNS.get(name)
+    column = known_column(name)
     return unit_in_file(column, data.attributes) if column else ""
 
 

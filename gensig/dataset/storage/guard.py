@@ -6,14 +6,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from gensig.dataset.columns import COLUMNS
 from gensig.dataset.schema import (
     READABLE_VERSIONS,
     REQUIRED,
     REQUIRED_ATTRIBUTES,
     SAMPLE_TYPES,
     SCALES,
-    SIGNALS,
+    known_column,
 )
 from gensig.dataset.storage.attributes import HDF5_ERRORS, decoded, read_attributes
 from gensig.dataset.storage.compression import (
@@ -177,7 +176,7 @@ def _check_dataset(name: str, data: h5py.Dataset, n_records: int, path: Path) ->
             f"{label} declares {data.size * dtype.itemsize} bytes and stores "
             f"{data.id.get_storage_size()}; it was never written or is a bomb"
         )
-    column = SIGNALS.get(name) or COLUMNS.get(name)
+    column = known_column(name)
     if column is None:
         return
     wanted, n_axes = column.dtype, 1 + len(column.axes)

@@ -30,6 +30,8 @@ from gensig.dataset.schema import (
     SAMPLE_TYPES,
     SCALES,
     SIGNALS,
+    find_signal,
+    signal_column,
     stored_reason,
     unit_in_file,
     version_of,
@@ -150,8 +152,8 @@ class ShardWriter:
             for name, column in self.columns.items()
         }
         for name, shape in self.signals.items():
-            if not SIGNALS[name].is_bulk:
-                dtype = SIGNALS[name].storage_dtype
+            if not signal_column(name).is_bulk:
+                dtype = signal_column(name).storage_dtype
                 self._rows[name] = np.zeros((n_records, *shape), dtype)
         for name, scale in self.scales.items():
             self._rows[scale] = np.zeros((n_records, self.signals[name][0]), "<f8")
@@ -164,7 +166,7 @@ class ShardWriter:
             for name, value in self.attributes.items():
                 set_attribute(self._file, name, value)
             for name, shape in self.signals.items():
-                if SIGNALS[name].is_bulk:
+                if signal_column(name).is_bulk:
                     self._create_bulk(name, shape)
         except BaseException:
             self._close()
@@ -217,7 +219,7 @@ class ShardWriter:
         for name, array in arrays.items():
             if name in self.scales:
                 array, self._rows[self.scales[name]][row] = quantized(array)
-            if SIGNALS[name].is_bulk:
+            if signal_column(name).is_bulk:
                 with fixed_settings():
                     self._file[name][row] = array
             else:
@@ -229,7 +231,7 @@ class ShardWriter:
     def _signal(
         self, name: str, signals: Mapping[str, np.ndarray], *, failed: bool
     ) -> np.ndarray:
-        column, shape = SIGNALS[name], self.signals[name]
+        column, shape = signal_column(name), self.signals[name]
         if name not in signals:
             if failed and column.storage_dtype.kind == "f":
                 return np.full(shape, np.nan, column.storage_dtype)
@@ -253,7 +255,7 @@ class ShardWriter:
 
     def _create_bulk(self, name: str, shape: tuple[int, ...]) -> None:
         assert self._file is not None
-        column = SIGNALS[name]
+        column = signal_column(name)
         scale = self.scales.get(name)
         dtype, unit = column.storage_dtype, unit_in_file(column, self.attributes)
         if scale is not None:
@@ -298,7 +300,7 @@ class ShardWriter:
                 f"{self.path.name}: a record_id occurs twice; ids must be unique"
             )
         for name, rows in self._rows.items():
-            column = SIGNALS.get(name) or self.columns[name]
+            column = find_signal(name) or self.columns[name]
             data = self._file.create_dataset(
                 name, data=rows, dtype=column.storage_dtype, track_times=False
             )
@@ -328,18 +330,20 @@ def _check_declaration(writer: ShardWriter, params: Sequence[str]) -> None:
         raise DatasetError(
             f"{name}: {writer.n_records} records; a shard needs at least 1"
         )
+    axes = {
+        key: column.axes
+        for key, column in SIGNALS.items()
+        if key not in SCALES.values()
+    }
     for signal, shape in writer.signals.items():
-        axes = {
-            key: column.axes
-            for key, column in SIGNALS.items()
-            if key not in SCALES.values()
-        }
-        if len(shape) != len(axes.get(signal, ())) or min(shape) < 1:
+        column = find_signal(signal)
+        has_axes = column is not None and len(shape) == len(column.axes)
+        if not has_axes or signal in SCALES.values() or min(shape) < 1:
             allowed = ", ".join(f"{key} ({', '.join(axes[key])})" for key in axes)
             raise DatasetError(
                 f"{name}: signal {signal} of shape {shape} is not allowed; allowed are {allowed}"
             )
-        n_bytes = math.prod(shape) * SIGNALS[signal].n_bytes
+        n_bytes = math.prod(shape) * signal_column(signal).n_bytes
         if writer.compression == "blosc2" and n_bytes > BLOSC2_CHUNK_LIMIT:
             raise DatasetError(
                 f"{name}: a record's {signal} has {n_bytes} bytes, blosc2 takes "

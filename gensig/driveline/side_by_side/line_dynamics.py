@@ -26,6 +26,7 @@ from gensig.dynamics.pair import Body, PairDynamics
 from gensig.errors import SimulationError
 from gensig.mesh.pair_table import PairTable
 from gensig.operation.setpoint import Operating
+from gensig.sensing.manufacturing import GearErrors
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -233,17 +234,18 @@ def _pair(
         torque=force * pair.pinion.base_radius,
     )
     n_teeth = pair.pinion.n_teeth, pair.wheel.n_teeth
-    errors = tabulated.errors or (np.zeros(n_teeth[0]), np.zeros(n_teeth[1]))
+    perfect = [GearErrors(error=np.zeros(n), tilt=np.zeros(n)) for n in n_teeth]
+    driving, driven = tabulated.errors or perfect
     body = Body(mass=1.0, inertia=1.0, support=STILL)
     return PairDynamics(
         table=table,
         pinion=body,
         wheel=body,
         operating=point,
-        pinion_error=errors[0],
-        wheel_error=errors[1],
-        pinion_tilt=np.zeros(n_teeth[0]),
-        wheel_tilt=np.zeros(n_teeth[1]),
+        pinion_error=driving.error,
+        wheel_error=driven.error,
+        pinion_tilt=driving.tilt,
+        wheel_tilt=driven.tilt,
         start_tooth_pinion=mesh.start_teeth[0],
         start_tooth_wheel=mesh.start_teeth[1],
         start_phase=mesh.start_phase,

@@ -9,15 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gensig.driveline.running import named_by_side
 from gensig.driveline.side_by_side.line_dynamics import (
     LineDynamics,
     check_line,
     line_dynamics,
 )
 from gensig.driveline.side_by_side.line_integration import integrate_lines
+from gensig.driveline.teeth import felt_there
 from gensig.dynamics._layout import N_SEEN
 from gensig.dynamics.backends.base import Integration, Motions
-from gensig.dynamics.mesh_state import mesh_state
+from gensig.dynamics.backends.nystroem._line_layout import A_TURN
+from gensig.dynamics.mesh_state import MeshState, mesh_state
 from gensig.errors import SimulationError
 from gensig.faults.base import faulty_teeth
 from gensig.systems.integration_checks import (
@@ -74,17 +77,21 @@ def simulate_lines(runs: Sequence[LineRun]) -> list[CleanRecord | SimulationErro
 
 
 def dynamics_of(run: LineRun) -> LineDynamics:
-    """The motion of one run; its first angle is that of the followed mesh's driving gear."""
+    """The motion of one run; its first angle is that of the followed mesh's driving gear.
+
+    Where the run asks for the loads of the teeth, the driving gears of all meshes are among them.
+    """
     machine = run.system
-    engine = machine.engine
+    engine, line = machine.engine, machine.engine.drive.line
+    turned = [machine.driving_node, *(wheel.node for wheel in engine.wheels.values())]
+    if run.with_mesh_state:
+        nodes = [line.gears[mesh.driving].node for mesh in line.meshes]
+        turned += [engine.drive.numbers[node] for node in nodes]
     return line_dynamics(
         machine.line(run),
         machine.operating,
         drive=engine.engine.driving_nodes[0],
-        angles=(
-            machine.driving_node,
-            *(wheel.node for wheel in engine.wheels.values()),
-        ),
+        angles=turned,
     )
 
 
@@ -136,11 +143,13 @@ def _together(
             continue
         signals = _signals(line, motions, index, dofs, rate)
         number, mesh = run.system.mesh_number, None
+        further: list[MeshState] = []
         if run.with_mesh_state:
-            seen = motions.seen[index, number * N_SEEN : (number + 1) * N_SEEN]
-            faulty = faulty_teeth(run.system.pair, run.faults)
-            angle = motions.angle[index, 0]
-            mesh = mesh_state(line.pairs[number], seen, angle, faulty)
+            further = [
+                _mesh_state(run, line, motions, index, m)
+                for m in range(len(line.pairs))
+            ]
+            mesh = further.pop(number)
         records.append(
             CleanRecord(
                 acceleration=run.system.rows(run, line.running, signals),
@@ -150,9 +159,22 @@ def _together(
                 integration_error=float(errors[index]),
                 integration_check=verdicts[index],
                 mesh=mesh,
+                further_meshes=tuple(further),
             )
         )
     return records
+
+
+def _mesh_state(
+    run: LineRun, line: LineDynamics, motions: Motions, index: int, m: int
+) -> MeshState:
+    """Loads of the teeth of mesh ``m`` in one of some motions."""
+    machine, drive = run.system, run.system.engine.drive
+    seen = motions.seen[index, m * N_SEEN : (m + 1) * N_SEEN]
+    angle = motions.angle[index, line.angles.index(line.touched[m, A_TURN])]
+    felt = felt_there(drive, machine.mesh_number, m, run.faults)
+    faulty = faulty_teeth(named_by_side(drive.pairs[m]), felt)
+    return mesh_state(line.pairs[m], seen, angle, faulty)
 
 
 def _signals(

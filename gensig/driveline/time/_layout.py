@@ -8,9 +8,9 @@ from gensig.dynamics._vector import inlined
 
 # numbers of a mesh
 (
-    BACKLASH, DAMPING, SHARED, START, NOMINAL_PITCHES, PITCHES_PER_RAD, MIRROR,
+    BACKLASH, DAMPING, SHARED, START, NOMINAL_PITCHES, PITCHES_PER_RAD, MIRROR, UPRIGHT,
     LEAST_GAP, LEAST_COAST_GAP, N_NUMBERS,
-) = range(10)  # fmt: skip
+) = range(11)  # fmt: skip
 # whole numbers of a mesh; those called AT_ say where a flat array begins
 (
     ROLL_DOF, N_PAIRS, FIRST, NODES, AT_TABLE, AT_ROWS, AT_COAST_ROWS, TEETH_A, TEETH_B,
@@ -95,8 +95,8 @@ class Meshes(NamedTuple):
 
     ``table`` holds, node after node of row after row, the gap in m and the stiffness of every
     spring in N/m, each with its slope per cell; ``depth`` where its springs begin beyond the gap,
-    m; ``rows`` the row of every pair of kinds, -1 for a pair that never touches; ``kind`` and
-    ``error`` one number a tooth.
+    m; ``rows`` the row of every pair of kinds, -1 for a pair that never touches; ``kind``,
+    ``error`` and ``tilt`` one number a tooth, the last two where ``AT_ERROR_`` says.
     """
 
     number: Any
@@ -106,6 +106,7 @@ class Meshes(NamedTuple):
     rows: Any
     kind: Any
     error: Any
+    tilt: Any
 
 
 class Torques(NamedTuple):

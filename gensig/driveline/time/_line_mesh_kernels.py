@@ -84,10 +84,13 @@ def gather(meshes, mesh, flank, turned, within, pairs):
         high = low + n_columns
         between(meshes.table, low, high, x - cell, sense * n_nodes, here[layout.GAP :])
         if flank == DRIVE:
-            here[layout.GAP] += (
-                meshes.error[integers[layout.AT_ERROR_A] + tooth_a]
-                + meshes.error[integers[layout.AT_ERROR_B] + tooth_b]
-            )
+            at_a = integers[layout.AT_ERROR_A] + tooth_a
+            at_b = integers[layout.AT_ERROR_B] + tooth_b
+            tilt = meshes.tilt[at_a] + meshes.tilt[at_b]
+            beyond = turned - index - meshes.number[mesh, layout.UPRIGHT]
+            error = meshes.error[at_a] + meshes.error[at_b]
+            here[layout.GAP] += error + tilt * beyond
+            here[layout.GAP_SLOPE] += tilt
         for spring in range(n_springs):
             if here[layout.GAP] + meshes.depth[at_depth + spring] > reach:
                 break

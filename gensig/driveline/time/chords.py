@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gensig.driveline.time.line_mesh import LineMesh
+from gensig.driveline.time.line_mesh import LineMesh, tilts_a_pitch
 from gensig.mesh.sliced.sliced_table import SlicedTable
 
 Array = NDArray[np.float64]
@@ -22,13 +22,15 @@ def sliced_pair_mesh(
     roll_dof: int,
     damping: float,
     errors: tuple[Array, Array] | None = None,
+    tilts: tuple[Array, Array] | None = None,
     start_teeth: tuple[int, int] = (0, 0),
     start_phase: float = 0.0,
 ) -> LineMesh:
     """A helical mesh, or a spur one in slices; gear a is the pinion, ``direction`` that of the
     transverse force.
 
-    ``start_phase`` is that of the slice that enters first. What the teeth of a pair have in
+    ``start_phase`` is that of the slice that enters first, and ``tilts`` (tooth,) m/m are 0 where
+    the middle of the face is at the pitch point. What the teeth of a pair have in
     common is that of ``pair_mesh``; the back flanks are those of sound teeth, whose slices enter
     from the other end.
 
@@ -39,6 +41,7 @@ def sliced_pair_mesh(
     """
     pair, pitch = table.pair, table.pair.base_pitch
     n_nodes = len(table.position)
+    perfect = np.zeros(pair.pinion.n_teeth), np.zeros(pair.wheel.n_teeth)
     chords = 1.0 / (table.compliance - table.shared_compliance)
     springs = np.diff(np.maximum.accumulate(chords, axis=2), axis=2, prepend=0.0)
     rows = np.arange(springs.shape[0] * springs.shape[1]).reshape(springs.shape[:2])
@@ -53,7 +56,9 @@ def sliced_pair_mesh(
         rows=np.where(present, rows, -1),
         coast_rows=np.where(present, 0, -1),
         kinds=(table.pinion_kind, table.wheel_kind),
-        errors=errors or (np.zeros(pair.pinion.n_teeth), np.zeros(pair.wheel.n_teeth)),
+        errors=errors or perfect,
+        tilts=tilts_a_pitch(tilts or perfect, pitch),
+        upright=(pair.pitch_point + table.middle_lag) / pitch,
         n_pairs=table.last_pitch - table.first_pitch,
         first_pitch=table.first_pitch,
         start_teeth=start_teeth,

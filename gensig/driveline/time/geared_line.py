@@ -158,6 +158,7 @@ def pack_meshes(line: GearedLine, order: Index) -> Meshes:
         "rows": [indices],
         "kind": [indices],
         "error": [numbers],
+        "tilt": [numbers],
     }
     at_of = np.argsort(order)
 
@@ -168,11 +169,11 @@ def pack_meshes(line: GearedLine, order: Index) -> Meshes:
 
     for m, mesh in enumerate(line.meshes):
         turning, (n_a, n_b) = float(line.rotation[mesh.roll_dof]), mesh.n_teeth
-        per_rad, least_gap = n_a / (2.0 * np.pi), mesh.gap.min() - 0.25 * SMOOTHED_GAP
+        per_rad, smoothed = n_a / (2.0 * np.pi), 0.25 * SMOOTHED_GAP
         number[m] = (
             mesh.backlash, mesh.damping, mesh.shared_compliance, mesh.start_phase,
             abs(turning) * per_rad, np.sign(turning) * per_rad, mesh.mirror,
-            least_gap + sum(error.min() for error in mesh.errors), least_gap,
+            mesh.upright, mesh.least_gap - smoothed, mesh.gap.min() - smoothed,
         )  # fmt: skip
         integers[m] = (
             at_of[mesh.roll_dof], mesh.n_pairs, mesh.first_pitch,
@@ -182,6 +183,8 @@ def pack_meshes(line: GearedLine, order: Index) -> Meshes:
             put("error", mesh.errors[0]), put("error", mesh.errors[1]), *mesh.start_teeth,
             mesh.rows.shape[1], len(mesh.depth), put("depth", mesh.depth),
         )  # fmt: skip
+        for tilt in mesh.tilts:
+            put("tilt", tilt)
         if mesh.rows.shape != mesh.coast_rows.shape:
             raise ConfigError(f"mesh '{mesh.name}': rows and coast_rows must be alike")
     flat = {name: np.concatenate(values) for name, values in parts.items()}

@@ -39,6 +39,8 @@ class LineMesh:
                                        flank, -1 for a pair that never touches (a missing tooth)
     kinds : (tooth,) of a and of b     the kind of every tooth
     errors : (tooth,) of a and of b    m, open the gaps of their teeth on the drive flank
+    tilts : (tooth,) of a and of b     m a pitch, by which these gaps grow as a pair rolls on
+    upright : pitches                  where a pair stands as its tilts add nothing
     backlash : m                       along the line of action
     damping : s/m                      times the rate of a pair is the share by which it raises
         its elastic force
@@ -54,6 +56,8 @@ class LineMesh:
     coast_rows: Index
     kinds: tuple[Index, Index]
     errors: tuple[Array, Array]
+    tilts: tuple[Array, Array]
+    upright: float
     n_pairs: int
     first_pitch: int
     start_teeth: tuple[int, int]
@@ -103,7 +107,7 @@ class LineMesh:
             )
 
     def _check_teeth(self) -> None:
-        """Raise for kinds, errors and start teeth that do not fit the tables."""
+        """Raise for kinds, errors, tilts and start teeth that do not fit the tables."""
         counts = tuple(int(kind.max()) + 1 for kind in self.kinds)
         last = len(self.gap) - 1
         for rows, what in ((self.rows, "rows"), (self.coast_rows, "coast_rows")):
@@ -112,15 +116,30 @@ class LineMesh:
                 raise self._error(
                     f"{what} {rows.shape} must name rows -1..{last} for {counts} kinds"
                 )
-        teeth = zip(self.kinds, self.errors, self.start_teeth, strict=True)
-        for kind, error, start in teeth:
+        if not math.isfinite(self.upright):
+            raise self._error(f"upright {self.upright:g} must be finite")
+        teeth = zip(self.kinds, self.errors, self.tilts, self.start_teeth, strict=True)
+        for kind, error, tilt, start in teeth:
             n = len(kind)
-            if n != len(error) or kind.min() < 0 or not np.isfinite(error).all():
-                raise self._error(
-                    f"{n} teeth need as many kinds, and finite errors, not {len(error)}"
-                )
+            for values, what in ((error, "errors"), (tilt, "tilts")):
+                if n != len(values) or kind.min() < 0 or not np.isfinite(values).all():
+                    raise self._error(
+                        f"{n} teeth need as many kinds, and finite {what}, not {len(values)}"
+                    )
             if not 0 <= start < n:
                 raise self._error(f"start tooth {start} must lie in 0..{n - 1}")
+
+    @property
+    def least_gap(self) -> float:
+        """No less than this is the gap of any pair on the drive flank at a node, m."""
+        n_cells = self.gap.shape[1] - 1
+        rolled = np.arange(n_cells + 1) * (self.n_pairs / n_cells)
+        beyond = self.first_pitch + rolled - self.upright
+        least = self.gap.min(axis=0)
+        for error, tilt in zip(self.errors, self.tilts, strict=True):
+            turned = np.minimum(tilt.min() * beyond, tilt.max() * beyond)
+            least = least + error.min() + turned
+        return float(least.min())
 
     @property
     def n_teeth(self) -> tuple[int, int]:
@@ -180,6 +199,8 @@ def phase_mesh(
         coast_rows=backwards,
         kinds=(np.arange(n_teeth[0]) % n_rows, np.zeros(n_teeth[1], dtype=np.int64)),
         errors=(np.zeros(n_teeth[0]), np.zeros(n_teeth[1])),
+        tilts=(np.zeros(n_teeth[0]), np.zeros(n_teeth[1])),
+        upright=0.0,
         n_pairs=1,
         first_pitch=0,
         start_teeth=start_teeth,
@@ -208,16 +229,18 @@ def pair_mesh(
     roll_dof: int,
     damping: float,
     errors: tuple[Array, Array] | None = None,
+    tilts: tuple[Array, Array] | None = None,
     start_teeth: tuple[int, int] = (0, 0),
     start_phase: float = 0.0,
 ) -> LineMesh:
     """A spur mesh of our own tables; gear a is the pinion. The law is that of the pair dynamics,
-    without friction.
+    without friction. ``tilts`` (tooth,) are in m/m, as those of the pair.
 
     The back flanks are sound teeth without errors, mirrored as the pair dynamics mirrors them; a
     missing tooth is missing there too.
     """
     pair, kinds = table.pair, (table.pinion.kind, table.wheel.kind)
+    pitch, perfect = pair.base_pitch, (np.zeros(len(kinds[0])), np.zeros(len(kinds[1])))
     n_kinds = len(table.pinion.compliance), len(table.wheel.compliance)
     n_nodes = len(table.position)
     pair_compliance = (
@@ -236,16 +259,23 @@ def pair_mesh(
         rows=np.where(present, rows, -1),
         coast_rows=np.where(present, 0, -1),
         kinds=kinds,
-        errors=errors or (np.zeros(len(kinds[0])), np.zeros(len(kinds[1]))),
+        errors=errors or perfect,
+        tilts=tilts_a_pitch(tilts or perfect, pitch),
+        upright=pair.pitch_point / pitch,
         n_pairs=N_PAIRS,
         first_pitch=FIRST_PITCH,
         start_teeth=start_teeth,
         start_phase=start_phase,
-        mirror=2.0 * pair.pitch_point / pair.base_pitch + 0.5,
+        mirror=2.0 * pair.pitch_point / pitch + 0.5,
         backlash=pair.backlash,
         damping=damping,
         shared_compliance=table.shared_compliance,
     )
+
+
+def tilts_a_pitch(tilts: tuple[Array, Array], pitch: float) -> tuple[Array, Array]:
+    """Tilts of the teeth of both gears in m a pitch, from those in m/m and the pitch in m."""
+    return tilts[0] * pitch, tilts[1] * pitch
 
 
 def mesh_start(

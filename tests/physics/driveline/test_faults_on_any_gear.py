@@ -198,9 +198,12 @@ def test_every_gear_has_its_errors_in_its_mesh():
     line = record.line(Run(system=record, faults=(), specimen=specimen))
     stage = line.line.meshes[1]
     names = ("idler_gear_2", OUTPUT)
-    for error, name in zip(stage.errors, names, strict=True):
+    pitch = record.engine.drive.pairs[1].base_pitch
+    for error, tilt, name in zip(stage.errors, stage.tilts, names, strict=True):
         np.testing.assert_array_equal(error, specimen.others[name].error)
         assert np.ptp(error) > 1e-6
+        assert_close(tilt, specimen.others[name].tilt * pitch, 1e-12)
+        assert np.ptp(tilt) > 1e-7
     nominal = record.line(Run(system=record, faults=())).line.meshes[1]
     assert not np.any(nominal.errors[0])
     factor = specimen.mountings[0].backlash_factor
@@ -228,6 +231,13 @@ def test_errors_of_an_idler_stay_on_the_flanks_of_its_home_mesh():
     np.testing.assert_array_equal(errors["19/32"][0], error_of["small_idler_gear"])
     np.testing.assert_array_equal(errors["3/66"][1], error_of["idler_gear"])
     assert not np.any(errors["66/67"][0])
+    tilts = dict(zip(errors, (mesh.tilts for mesh in line.meshes), strict=True))
+    assert not np.any(tilts["66/67"][0])
+    assert np.any(tilts["66/67"][1])
+    pitches = dict(zip(errors, record.engine.drive.pairs, strict=True))
+    for mesh in ("19/20", "19/32"):
+        tilt = specimen.others["small_idler_gear"].tilt * pitches[mesh].base_pitch
+        assert_close(tilts[mesh][0], tilt, 1e-12)
     np.testing.assert_array_equal(errors["66/67"][1], error_of["lube_oil_pump_gear"])
     assert all(np.any(each[1]) for each in errors.values())
 

@@ -148,8 +148,8 @@ class TestBacklash:
 
 
 class TestAgainstThePair:
-    """The default spur pair on its supports without friction, with tooth errors, through both
-    integrators.
+    """The default spur pair on its supports without friction, with errors and tilts of its teeth,
+    through both integrators.
     """
 
     STEPS = 64
@@ -172,6 +172,8 @@ class TestAgainstThePair:
         errors = {
             "pinion_error": rng.normal(0, 3e-6, 23),
             "wheel_error": rng.normal(0, 3e-6, 84),
+            "pinion_tilt": rng.normal(0, 3e-4, 23),
+            "wheel_tilt": rng.normal(0, 3e-4, 84),
         }
         return dynamics_of(pair, faults, **errors)
 
@@ -188,6 +190,10 @@ class TestAgainstThePair:
             errors=(
                 dynamics.pinion_error,
                 dynamics.wheel_error,
+            ),
+            tilts=(
+                dynamics.pinion_tilt,
+                dynamics.wheel_tilt,
             ),
         )
         return pair_line(dynamics, mesh)

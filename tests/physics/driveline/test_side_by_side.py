@@ -21,7 +21,9 @@ from gensig.dynamics.pair import PINION_ROTATION, WHEEL_ROTATION
 from gensig.errors import SimulationError
 from gensig.faults.broken import MissingTooth
 from gensig.plan.request import read_request
-from gensig.systems.base import simulate_together
+from gensig.sensing.manufacturing import draw_specimen
+from gensig.systems.base import further_gears, simulate_together
+from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.run import CleanRecord, Run, Start
 
 RATE = 51200.0
@@ -54,6 +56,7 @@ def as_line(pair):
         roll_dof=PINION_ROTATION,
         damping=damping,
         errors=(pair.pinion_error, pair.wheel_error),
+        tilts=(pair.pinion_tilt, pair.wheel_tilt),
         start_teeth=teeth,
         start_phase=pair.start_phase,
     )
@@ -101,6 +104,20 @@ def test_a_pair_as_a_line_moves_as_the_pair(machine, dynamics_of, changes, fault
     errors = np.random.default_rng(3).normal(0.0, 2e-6, (2, 84))
     teeth = {"pinion_error": errors[0, :23], "wheel_error": errors[1]}
     pair = dynamics_of(machine({**QUICK, **changes}), faults, **teeth)
+    assert_moves_as_a_line(pair)
+
+
+def test_a_pair_with_errors_of_manufacture_moves_as_the_pair(machine):
+    """Runout, pitch errors and profile slopes that differ from tooth to tooth."""
+    system = machine({**QUICK, "quality.iso1328_grade": 6})
+    run = run_of(system, specimen=specimen_of(system))
+    pair = pair_dynamics(run)
+    assert np.ptp(pair.pinion_tilt) > 1e-5
+    assert_moves_as_a_line(pair)
+
+
+def assert_moves_as_a_line(pair):
+    """Check that a pair and the line of one mesh that is made of it have one motion."""
     solver = Solver(oversampling=5, precision="float64", backend="nystroem")
     record = {"sampling_rate": RATE, "duration": 0.05, "channels": CHANNELS}
     expected = integrate([pair], solver, **record)
@@ -116,6 +133,17 @@ def test_a_pair_as_a_line_moves_as_the_pair(machine, dynamics_of, changes, fault
     assert in_band_error(found.acceleration, expected.acceleration, RATE)[0] < 1e-5
     assert np.abs(found.angle - expected.angle).max() < 1e-7
     assert np.abs(found.contact_loss - expected.contact_loss).max() < 1e-3
+
+
+def specimen_of(machine):
+    """A set of gears within the grade of a machine."""
+    return draw_specimen(
+        np.random.default_rng(5),
+        *machine.pair.gears.values(),
+        machine.quality,
+        others=further_gears(machine.gears, machine.meshes),
+        n_mountings=len(machine.meshes) - 1,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -169,6 +197,41 @@ def test_two_stages_agree_with_the_implicit_method(two_stage):
         assert off < 0.05 * np.linalg.norm(spectra[1][band])
 
 
+def test_both_ways_to_integrate_add_the_same_by_tilts():
+    """What the tilts of the teeth of all four gears change, where shafts lose nothing."""
+    words = [
+        *TWO_STAGE,
+        "system.loss_factor.shaft=0",
+        "system.loss_factor.coupling=0",
+        "mesh.friction_coefficient=0",
+        "mesh.roll_torque=classical",
+        "quality.iso1328_grade=6",
+    ]
+    machine = read_line_machine(read_request(words).config)
+    tilted = specimen_of(machine)
+    others = {
+        name: replace(gear, tilt=np.zeros_like(gear.tilt))
+        for name, gear in tilted.others.items()
+    }
+    upright = replace(tilted, pinion_tilt=0.0, wheel_tilt=0.0, others=others)
+    slow = with_solver(machine, backend="runge_kutta", oversampling=12)
+    runs = [
+        run_of(each, specimen=specimen)
+        for each in (machine, slow)
+        for specimen in (tilted, upright)
+    ]
+    row = machine.sensing.channels.index("pinion_y")
+    spectra = [
+        np.fft.rfft(record.acceleration[row] * np.hanning(len(record.shaft_angle)))
+        for record in recorded(*runs)
+    ]
+    band = slice(50, 1500)  # 500 Hz to 15 kHz, ten hertz apart
+    found, expected = spectra[0] - spectra[1], spectra[2] - spectra[3]
+    off = np.linalg.norm(found[band] - expected[band])
+    assert off < 0.08 * np.linalg.norm(expected[band])
+    assert np.linalg.norm(expected[band]) > 0.3 * np.linalg.norm(spectra[2][band])
+
+
 def test_a_record_does_not_depend_on_its_neighbours(two_stage):
     runs = [
         run_of(two_stage),
@@ -197,6 +260,76 @@ def test_the_loads_of_the_teeth_are_known(two_stage):
     assert abs(mesh.force.mean() / expected - 1.0) < 0.03
     assert np.allclose(mesh.load_share.sum(axis=0)[~mesh.contact_lost], 1.0)
     assert mesh.load_share.shape[0] == two_stage.most_pairs
+
+
+def test_the_loads_of_every_mesh_are_known(two_stage):
+    """Mean forces are those of the torque that a mesh passes on, mesh by mesh."""
+    run = run_of(two_stage, with_mesh_state=True)
+    (record,) = recorded(run)
+    (second,) = record.further_meshes
+    first, torque = record.mesh, two_stage.operating.torque
+    for state, pair, slowed in (
+        (first, two_stage.pair, 1.0),
+        (second, two_stage.meshes[1].pair, two_stage.pair.ratio),
+    ):
+        expected = slowed * torque / pair.pinion.base_radius
+        assert abs(state.force.mean() / expected - 1.0) < 0.03
+        assert np.allclose(state.load_share.sum(axis=0)[~state.contact_lost], 1.0)
+        gears = zip(
+            (state.pinion_tooth, state.wheel_tooth), pair.gears.values(), strict=True
+        )
+        for teeth, gear in gears:
+            assert -1 <= teeth.min() < teeth.max() < gear.n_teeth
+    # the wheel and the second pinion turn together, tooth by tooth
+    entered = [
+        np.count_nonzero(np.diff(state.pinion_tooth)) for state in (first, second)
+    ]
+    passed = two_stage.meshes[1].pair.pinion.n_teeth / two_stage.pair.wheel.n_teeth
+    assert abs(entered[1] / entered[0] - passed) < 0.05
+    plain = recorded(replace(run, with_mesh_state=False))[0]
+    assert plain.acceleration.tobytes() == record.acceleration.tobytes()
+
+
+def test_the_loads_are_the_same_whichever_mesh_is_followed(two_stage):
+    """The second mesh of a record that follows the first one is that of one that follows it."""
+    other = read_line_machine(
+        read_request([*TWO_STAGE, "system.record_mesh=[5,6]"]).config
+    )
+    run = run_of(two_stage, with_mesh_state=True)
+    stage = two_stage.line(run).line.meshes[1]
+    start = Start(
+        tooth_pinion=stage.start_teeth[0],
+        tooth_wheel=stage.start_teeth[1],
+        phase=stage.start_phase,
+    )
+    (ours,), (theirs,) = (
+        recorded(run),
+        recorded(replace(run, system=other, start=start)),
+    )
+    (second,), (first,) = ours.further_meshes, theirs.further_meshes
+    for found, expected in ((second, theirs.mesh), (first, ours.mesh)):
+        off = np.abs(found.force - expected.force)
+        assert off.max() < 1e-3 * expected.force.mean()
+    # pairs of the other mesh count from elsewhere: they may have other rows
+    for name in ("pinion_tooth", "wheel_tooth"):
+        found, expected = (
+            np.sort(getattr(each, name), 0) for each in (second, theirs.mesh)
+        )
+        assert np.mean(found == expected) > 0.999
+
+
+def test_a_fault_is_engaged_in_the_mesh_that_feels_it(two_stage):
+    """A missing tooth of the output gear carries nothing where its turn comes."""
+    (sound,) = recorded(run_of(two_stage, with_mesh_state=True))
+    teeth = sound.further_meshes[0].wheel_tooth
+    tooth = int(teeth[:, teeth.shape[1] // 2].max())
+    missing = MissingTooth(gear="output_gear", tooth=tooth)
+    (record,) = recorded(run_of(two_stage, (missing,), with_mesh_state=True))
+    (second,) = record.further_meshes
+    assert not record.mesh.fault_engaged.any()
+    assert second.fault_engaged[teeth.shape[1] // 2]
+    assert 0.0 < second.fault_engaged.mean() < 0.1
+    assert not np.any(second.wheel_tooth == tooth)
 
 
 def test_a_missing_tooth_is_felt_by_its_shaft_mates_too(two_stage):

@@ -2,7 +2,6 @@
 
 import itertools
 import json
-import math
 import re
 import shlex
 import sys
@@ -12,6 +11,7 @@ import yaml
 from docs_pages import ROOT, blocks, command_lines
 from numpy.testing import assert_allclose
 
+from gensig import open_dataset
 from gensig.cli import main
 from gensig.commands.new.data_sheet import DataSheet, gear_option
 from gensig.commands.new.line_tables import torsional_stiffness
@@ -19,9 +19,7 @@ from gensig.commands.new.stages import (
     StagedSheet,
     shaft_diameters,
     stage_options,
-    support_force,
 )
-from gensig.driveline.machine_checks import FAR_ABOVE
 from gensig.driveline.reading import read_line_machine
 from gensig.errors import GensigError
 from gensig.plan.request import read_request
@@ -76,16 +74,6 @@ def test_a_shaft_of_steel_is_as_stiff_as_the_textbook_says():
     assert stiffness == pytest.approx(3.05e4, rel=2e-3)
 
 
-def test_the_support_suits_all_stages_up_to_the_largest_torque():
-    far = sheet(teeth=((29, 100), (36, 90), (20, 70)), modules=(1.5, 1.5, 1.5))
-    for gears, share in itertools.product((sheet(), far), (1.0, 1.2, 3.0)):
-        stages = stage_options(gears)
-        forces = [option.machine.mesh_force for option in stages]
-        held = support_force(stages, share, FAR_ABOVE)
-        assert max(forces) * share <= FAR_ABOVE * held
-        assert held >= 0.99 * math.sqrt(min(forces) * max(forces))
-
-
 @pytest.mark.parametrize(
     ("words", "names"),
     [
@@ -108,6 +96,11 @@ def test_the_tables_close_and_carry_the_given_torque(words, names, gensig, tmp_p
         abs(drive.line.speed_ratio[-1]), 1.0 / told["derived"]["ratio"], rtol=1e-12
     )
     assert_allclose(machine.mesh_forces, told["stages"]["mesh_force_n"], rtol=1e-6)
+    # each gear is on a support for the force of its own teeth
+    held = drive.support_forces
+    for mesh, force in zip(drive.line.meshes, machine.mesh_forces, strict=True):
+        ends = held[mesh.driving], held[mesh.driven]
+        assert_allclose(ends, force, rtol=1e-6)
     assert machine.operating.torque == 10.0
     for side, key in (("driving", "pinion"), ("driven", "wheel")):
         gears = [
@@ -148,7 +141,8 @@ def test_the_printed_commands_work_as_printed_and_without_a_warning(gensig, tmp_
         725.0, rel=1e-3
     )
     few = "plan.n_records=4 plan.n_units=2 plan.classes=[healthy,missing_tooth]"
-    gensig(f"{generate} {cheap} {few} executor.n_workers=1")
+    _, warned = gensig(f"{generate} {cheap} {few} executor.n_workers=1")
+    assert "mean tooth forces" not in warned
     gensig(report)
     gensig("verify runs/mine")
     second = f"{simulate.split(' --plot')[0]} {cheap} system.record_mesh=[5,6]"
@@ -156,6 +150,48 @@ def test_the_printed_commands_work_as_printed_and_without_a_warning(gensig, tmp_
     assert float(re.search(r"mesh frequency (\S+)", said)[1]) == pytest.approx(
         261.0, rel=1e-3
     )
+
+
+@pytest.mark.parametrize(
+    "words",
+    [SHEET, "--teeth 24 60 24 60 24 60 --module 1.5 2 3 --speed 3000 --torque 20"],
+    ids=["two stages", "three stages"],
+)
+def test_records_are_of_all_gears_and_of_the_two_evaluation_method(
+    words, gensig, tmp_path
+):
+    """Every gear has a channel, faults are on any gear, and steps are checked."""
+    gensig(f"new gearbox mine {words} --dir . --json")
+    few = (
+        "plan.n_records=6 plan.n_units=3 operating.duration_s=0.1 executor.n_workers=1"
+    )
+    classes = "plan.classes=[healthy,missing_tooth]"
+    gensig(f"generate --config-dir . experiment=mine {few} {classes} out=runs/mine")
+    with open_dataset(tmp_path / "runs" / "mine") as data:
+        gears = data.attributes["gear_names"]
+        assert data.channel_names == [f"{gear}_y" for gear in gears]
+        assert (data.sampling_rate, set(data.column("status"))) == (51200.0, {"ok"})
+        assert set(data.column("integration_check")) == {"error"}
+        assert data.column("integration_error").max() < 1e-3
+        assert set(data.column("fault_gear")) <= {"", *gears}
+
+
+@pytest.mark.parametrize(
+    ("rate", "steps"), [("", 5), ("--rate 102400", 5), ("--rate 12800", 20)]
+)
+def test_steps_are_as_short_at_any_rate(rate, steps, gensig, tmp_path):
+    gensig(f"{NEW} {rate}")
+    config = read_request(["experiment=mine"], config_dir=tmp_path).config
+    assert config["solver"]["oversampling"] == steps
+    step = 1.0 / (steps * config["sensing"]["sampling_rate_hz"])
+    assert step <= 1.0 / 256000.0
+
+
+def test_helical_stages_have_the_implicit_method(gensig, tmp_path):
+    gensig(f"{NEW} --helix 15")
+    experiment = yaml.safe_load((tmp_path / "experiment" / "mine.yaml").read_text())
+    assert "solver" not in experiment
+    assert experiment["plan"]["fault_gear"] == "drawn"
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from record_sets import run
@@ -61,6 +62,45 @@ def test_faults_can_be_stored_and_sound_gears_cannot(stored: Path) -> None:
         names, result = data.column("label_name"), data.column("detectability")
     assert (result[names == "healthy"] == 0.0).all()
     assert (result[names == "crack"] > 0.0).all()
+
+
+LINE = (
+    "experiment=two_stage",
+    "executor.n_workers=1",
+    "plan.n_records=4",
+    "plan.n_units=2",
+    "plan.n_gearboxes=1",
+    "plan.n_repeats=1",
+    "plan.classes=[healthy,missing_tooth]",
+    "plan.fault_gear=[output_gear]",
+    "operating.duration_s=0.2",
+    "dataset.store_mesh_state=true",
+)
+SECOND = "idler_gear_2_output_gear"
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_a_line_has_the_loads_of_every_mesh(tmp_path: Path) -> None:
+    """A tooth missing from the output gear is engaged in the second mesh alone."""
+    out = tmp_path / "set"
+    run("generate", "--quiet", *LINE, f"out={out}")
+    run("verify", out)
+    run("export", out, "--to", "hdf5", "--out", tmp_path / "out.h5")
+    with gensig.open_dataset(out) as data, h5py.File(tmp_path / "out.h5") as exported:
+        names = data.column("label_name")
+        for k in range(data.n_records):
+            for name, shape in TRACES.items():
+                trace = data.trace(k, f"{SECOND}_{name}")
+                assert trace.shape == (*shape, data.n_samples)
+                np.testing.assert_array_equal(exported[f"{SECOND}_{name}"][k], trace)
+            engaged = data.trace(k, f"{SECOND}_fault_engaged")
+            assert engaged.any() == (names[k] == "missing_tooth")
+            assert not data.trace(k, "fault_engaged").any()
+        force = data.trace(0, f"{SECOND}_mesh_force").mean()
+        assert 1.9 < force / data.trace(0, "mesh_force").mean() < 2.1
+        assert SECOND not in "".join(data.column_names)
+    with h5py.File(tmp_path / "out.h5") as exported:
+        assert exported[f"{SECOND}_mesh_force"].attrs["unit"] == b"N"
 
 
 @pytest.mark.parametrize("kind", ["npz", "parquet", "hdf5"])

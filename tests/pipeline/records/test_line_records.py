@@ -4,6 +4,7 @@ import json
 import warnings
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from record_sets import refused, run, shard
@@ -13,6 +14,7 @@ from gensig.commands.figures import engine_figures
 from gensig.driveline import in_time as line_time
 from gensig.driveline import loads as line_loads
 from gensig.dynamics.backends.registry import BACKENDS, UNNAMED_BACKEND
+from gensig.errors import GensigError
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
 from gensig.record.machines import read_machine
@@ -58,18 +60,60 @@ def test_lives_grow_under_the_steady_loads_of_the_mesh(life, kind, monkeypatch):
     assert (columns["severity"][~grown] == 0.0).all()
 
 
+@pytest.mark.filterwarnings("ignore:.*mean tooth forces:UserWarning")
+@pytest.mark.parametrize(
+    ("life", "kind"), [("crack_growth", "crack"), ("pit_growth", "distributed_pitting")]
+)
+def test_a_life_is_the_same_whichever_mesh_is_followed(life, kind, monkeypatch):
+    """A life of the output gear, followed at the first mesh and at its own, takes as many hours.
+
+    Turns of the driving gear are three times as many where that is the motor's.
+    """
+    monkeypatch.setattr(line_loads, "SECONDS", 0.1)
+    plans = []
+    for more in (
+        ["fault.gear=output_gear"],
+        ["fault.gear=wheel", "system.record_mesh=[5,6]"],
+    ):
+        words = [
+            *LIFE,
+            f"life={life}",
+            f"plan.classes=[{kind}]",
+            "operating.torque_nm=250",
+        ]
+        config = read_request([*words, "plan.fault_gear=as_given", *more]).config
+        plans.append(make_plan(config).columns)
+    first, second = plans
+    assert np.ptp(first["severity"]) > 0.0
+    assert set(first["fault_gear"]) == {"output_gear"}
+    for name in ("life_time_h", "remaining_life_h", "severity"):
+        assert_allclose(first[name], second[name], rtol=1e-6, atol=1e-9)
+    assert_allclose(first["life_cycles"], 3.0 * second["life_cycles"], rtol=1e-6)
+    assert set(first["life_failed"]) == set(second["life_failed"])
+
+
+def test_a_life_of_a_gear_that_is_not_there_names_those_that_are():
+    words = [*LIFE, "life=crack_growth", "plan.classes=[crack]", "fault.gear=sun"]
+    config = read_request([*words, "plan.fault_gear=as_given"]).config
+    with pytest.raises(GensigError, match="output_gear"):
+        make_plan(config)
+
+
 def test_gears_that_bear_far_more_than_their_support_is_for_are_named():
     words = ["experiment=two_stage", "operating.torque_nm=60"]
-    named = "meshes 3/4 1995 N, 5/6 3991 N, but every gear is on a support for .* 500 N"
-    with pytest.warns(UserWarning, match=named):
-        read_machine(read_request(words).config).check()
+    light = "system.support.force_n=500"
+    with pytest.warns(UserWarning, match="3/4 1995 N for 500 N, 5/6 3991 N for 500 N"):
+        read_machine(read_request([*words, light]).config).check()
+    heavy = ["experiment=two_stage", "operating.torque_nm=240"]
+    with pytest.warns(UserWarning, match="3/4 7981 N for 1995 N"):
+        read_machine(read_request(heavy).config).check()
     torsion = (
         "system.lateral=false",
         "sensing.channels=[pinion_rotation,wheel_rotation]",
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        for more in (["system.support.force_n=2000"], torsion):
+        for more in ([], ["system.support.force_n=2000"], [light, *torsion]):
             read_machine(read_request([*words, *more]).config).check()
 
 
@@ -193,7 +237,7 @@ FAN = "excitation.loads={{fan: {{node: {}, law: {}, torque_nm: 1}}}}"
         (["excitation.load.law=cubic"], "allowed: constant, linear, quadratic"),
         (
             ["excitation.reference.torque_nm=0"],
-            "speed_rpm and torque_nm must be positive",
+            "excitation.reference.torque_nm unless given, must be positive",
         ),
         ([f"{MOTOR_KEY}=3"], f"{MOTOR_KEY} = 3 must be a group of keys"),
         (

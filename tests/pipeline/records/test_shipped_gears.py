@@ -1,5 +1,7 @@
 """Records of shipped pairs have the mesh at its frequency; lines turn by their teeth."""
 
+import warnings
+
 import numpy as np
 import pytest
 from record_sets import records
@@ -8,6 +10,7 @@ from diagnose.baselines.features import indicators
 from gensig.driveline.drive_line import read_drive_line
 from gensig.options.compose import options
 from gensig.plan.request import read_request
+from gensig.record.machines import read_machine
 from gensig.systems.registry import read_pair
 
 INTERRUPTED = "harbin_38_55"  # contact ratio below 1, as its paper prints it
@@ -84,3 +87,27 @@ def test_two_stage_gearboxes_turn_by_their_teeth(name):
     ratios = np.abs(speeds / speeds[0])
     assert np.min(np.abs(ratios - first / second)) < 1e-6
     assert ratios[-1] == pytest.approx(first / second * third / fourth, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", LINES)
+def test_supports_of_two_stage_gearboxes_are_for_the_rated_load(name):
+    """Each gear for the force of its own teeth; no mesh is far above its supports."""
+    words = [f"system={name}", "sensing=geared_line_bearings"]
+    machine = read_machine(read_request(words).config)
+    drive = machine.engine.drive
+    for mesh, force in zip(drive.line.meshes, machine.mesh_forces, strict=True):
+        ends = (
+            drive.support_forces[mesh.driving],
+            drive.support_forces[mesh.driven],
+        )
+        assert ends == pytest.approx((force, force), rel=1e-3)
+    stiffness = {
+        force: drive.line.gears[number].support.stiffness_y
+        for number, force in enumerate(drive.support_forces)
+    }
+    least, greatest = min(stiffness), max(stiffness)
+    # shaft and bearing in series: less than by the third root of the force, which balls give
+    assert 1.0 < stiffness[greatest] / stiffness[least] < (greatest / least) ** (1 / 3)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        machine.check()

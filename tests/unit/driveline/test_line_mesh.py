@@ -47,11 +47,16 @@ def table(xiamen):
 
 @pytest.fixture
 def pairs(table):
-    """Spur pairs that share a body, with tooth errors."""
+    """Spur pairs that share a body, with tooth errors and tilts."""
     rng = np.random.default_rng(4)
-    errors = rng.normal(0, 2e-6, 23), rng.normal(0, 2e-6, 84)
     return pair_mesh(
-        "m", table, direction=DIRECTION, roll_dof=0, damping=1e-3, errors=errors
+        "m",
+        table,
+        direction=DIRECTION,
+        roll_dof=0,
+        damping=1e-3,
+        errors=(rng.normal(0, 2e-6, 23), rng.normal(0, 2e-6, 84)),
+        tilts=(rng.normal(0, 3e-4, 23), rng.normal(0, 3e-4, 84)),
     )
 
 
@@ -177,9 +182,12 @@ class TestPairs:
     def test_statics_agree(self, pairs, table):
         """Every pair with its own teeth, the missing one too, and the shared body."""
         rolls = np.linspace(0.05, 30.05, 61)
+        pitch = table.pair.base_pitch
         errors = dict(zip(("pinion_error", "wheel_error"), pairs.errors, strict=True))
+        for name, tilt in zip(("pinion_tilt", "wheel_tilt"), pairs.tilts, strict=True):
+            errors[name] = tilt / pitch
         computed = static_mesh(
-            table, pair_states(table, rolls * table.pair.base_pitch, **errors), 500.0
+            table, pair_states(table, rolls * pitch, **errors), 500.0
         )
         for turned, approach, load in zip(
             rolls, computed.approach, computed.load, strict=True
@@ -272,6 +280,8 @@ def test_bad_tables(changes, message):
         ({"n_pairs": 3}, "whole number of cells"),
         ({"rows": np.array([[7]])}, "must name rows"),
         ({"errors": (np.zeros(3), np.zeros(40))}, "need as many kinds"),
+        ({"tilts": (np.full(20, np.nan), np.zeros(40))}, "finite tilts"),
+        ({"upright": math.inf}, "upright inf must be finite"),
         ({"gap": np.zeros((1, 3))}, "must be alike"),
     ],
 )

@@ -455,8 +455,15 @@ def test_a_mistake_in_the_keys_is_one_line(line_of, keys, message):
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [("force_n", 0), ("damping_ratio", 1.5), ("bearing", 3), ("shaft", {})],
+    [
+        ("force_n", 0),
+        ("torque_nm", -1),
+        ("torque_nm", None),
+        ("damping_ratio", 1.5),
+        ("bearing", 3),
+        ("shaft", {}),
+    ],
 )
 def test_a_mistake_in_the_supports_is_one_line(line_of, config, key, value):
     with pytest.raises(ConfigError, match=f"system.support.{key}"):
-        line_of(support={**config["system"]["support"], key: value})
+        line_of(support={**config["system"]["support"], key: value}, lateral=True)

@@ -9,9 +9,11 @@ from refusals import refused
 
 from gensig.dataset.plan import plan_text
 from gensig.driveline import loads
-from gensig.errors import ConfigError, FaultError
+from gensig.errors import FaultError
+from gensig.plan.draws import drawn_gears
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
+from gensig.record.machines import read_machine
 
 CLASSES = ("crack", "pitting", "missing_tooth", "compound")
 WORDS = (
@@ -152,14 +154,23 @@ def test_a_list_limits_the_gears():
     assert teeth["idler_gear_2"].max() < 48 <= teeth["output_gear"].max() < 80
 
 
-def test_a_life_of_a_line_grows_on_the_followed_mesh(monkeypatch):
+def test_lives_of_a_line_grow_on_any_gear(monkeypatch):
     monkeypatch.setattr(loads, "SECONDS", 0.1)
-    assert gears_of(*LIFE_OF_A_LINE, DRAWN) == set(GEARS)
+    every = {*GEARS, "idler_gear_2", "output_gear"}
+    grown = gears_of(*LIFE_OF_A_LINE, "plan.n_units=12", DRAWN)
+    assert len(grown) > 2
+    assert grown <= every
     given = "plan.fault_gear=as_given"
-    with pytest.raises(
-        ConfigError, match=r"'output_gear': .* choose a system\.record_m"
-    ):
-        gears_of(*LIFE_OF_A_LINE, given, "fault.gear=output_gear")
+    output = gears_of(*LIFE_OF_A_LINE, given, "fault.gear=output_gear")
+    assert output == {"output_gear"}
+
+
+def test_lives_of_an_engine_grow_on_its_spur_gears():
+    words = ("experiment=engine_broken_tooth", "life=crack_growth", DRAWN)
+    config = read_request(list(words)).config
+    gears = read_machine(config).gears
+    assert all(gears[name].helix_angle == 0.0 for name in drawn_gears(config))
+    assert set(GEARS) <= set(drawn_gears(config)) < set(gears)
 
 
 def test_turns_of_the_faulted_gear_are_those_of_the_slower_one():

@@ -333,7 +333,8 @@ class TestFurtherGears:
         pair = xiamen.pair
         none = self.drawn(pair, quality(iso1328_grade=None), self.others(pair), 2)
         assert (none.others, none.mountings) == ({}, ())
-        assert not np.any(none.errors_of("sun", 7))
+        assert not np.any(none.errors_of("sun", 7).error)
+        assert not np.any(none.errors_of("sun", 7).tilt)
         assert none.mounting(1).forms("pinion") == ()
 
     def test_a_tooth_slope_turns_with_the_flank_that_touches(self, xiamen, quality):
