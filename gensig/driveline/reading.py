@@ -68,12 +68,13 @@ def _with_lateral_motion(config: Configuration) -> Configuration:
 
 def _record_mesh(engine: EngineLine) -> int:
     drive, names = engine.drive, engine.mesh_names
-    if drive.record_mesh is None:
+    if not names:
         raise ConfigError(
-            "system.record_mesh = null: records follow the teeth of one mesh; give "
-            "its two nodes, one of "
-            f"{', '.join(names) or 'none: this line has no mesh'}"
+            f"{drive.name} has no mesh, and records follow the teeth of one; give a line with a "
+            "row of edge_kind gear_mesh, and its gears in system.gears_csv"
         )
+    if drive.record_mesh is None:
+        return 0
     wanted = "/".join(str(node) for node in drive.record_mesh)
     if wanted not in names:
         raise ConfigError(
