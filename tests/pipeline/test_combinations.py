@@ -120,7 +120,6 @@ REFUSED = [
     ("spur_pair", ["heat=chongqing_rated"], "system=helical_pair takes heat"),
     ("spur_pair", ["excitation=engine_v20"], "leave excitation out"),
     ("spur_pair", ["sensing.sensor.adc_bits=16"], "give both adc_range_m_per_s2"),
-    ("spur_pair", ["system.supports=bearings"], "quality.support_damping_ratio_low"),
     ("spur_pair", ["operating.turns=1"], "leave one out"),
     ("spur_pair", ["life=mixed"], "leave it null"),
     ("spur_pair", ["sensing.tacho.shaft=motor"], "allowed: pinion, wheel"),
