@@ -27,10 +27,10 @@ def read_line_machine(config: Configuration) -> LineMachine:
     """
     engine = read_engine_line(_with_lateral_motion(config))
     mesh_number = _record_mesh(engine)
-    if read_heat(config).is_any or read_modification(config).is_any:
+    if read_heat(config).is_any:
         raise ConfigError(
-            "heat and modification are of a single gear pair; a drive line takes "
-            "heat=none and modification=none"
+            "heat: a drive line has gears as they are drawn; take heat=none, or "
+            "system=helical_pair with the gears of one of its meshes, spur gears too"
         )
     operating, quality = (
         read_operating(config.section("operating")),
@@ -46,6 +46,7 @@ def read_line_machine(config: Configuration) -> LineMachine:
         engine=engine,
         mesh_number=mesh_number,
         slices=read_slice_options(config.section("mesh")),
+        modification=read_modification(config),
     )
     return replace(
         machine,
