@@ -168,7 +168,7 @@ MACHINE_VERBS = {
             ),
         ),
         status_1="the record did not stay finite, or its solver gave up; nothing is written",
-        instead={"plan": "", "executor": "", "out": "--output"},
+        instead={"plan": "", "executor": "", "life": "", "out": "--output"},
     ),
     "stiffness": Verb(
         summary="mesh stiffness of sound and faulty teeth",

@@ -31,6 +31,7 @@ from gensig.driveline.table_rows import (
     gear_of,
     line_gear,
     mesh_of,
+    motor_and_load,
     node_of,
     rows_of_nodes,
     shaft_of,
@@ -52,9 +53,10 @@ class DriveLine:
 
     ``numbers`` (node,) as the table counts them, rings of dampers on from there; ``pairs``
     (mesh,) the driving gear as pinion; ``record_mesh`` the numbers of the nodes whose mesh
-    records are made of; ``slices_helical`` whether helical meshes in time are sliced teeth;
-    ``motor_node``, ``load_node`` those of a motor and its load; ``support_forces`` (gear,) N are
-    those for which the supports of the gears are taken, empty without lateral motion.
+    records are made of, None for the first; ``slices_helical`` whether helical meshes in time are
+    sliced teeth; ``motor_node``, ``load_node`` those of a motor and its load, None where a branched
+    line leaves them open; ``support_forces`` (gear,) N are those for which the supports of the
+    gears are taken, empty without lateral motion.
     """
 
     name: str
@@ -112,9 +114,10 @@ def read_drive_line(config: Configuration) -> DriveLine:
     options = read_options(config.section("system"))
     if options.shafting_csv is None:
         raise ConfigError(
-            "system.shafting_csv is required: give a path, or one of "
-            f"{', '.join(shipped_tables())}; "
-            "docs/howto/your_drive_line.md says what is in it"
+            "system.shafting_csv is required: give system.shafting_csv=FILE and "
+            "system.gears_csv=FILE, your own (docs/howto/your_drive_line.md; gensig new gearbox "
+            "writes both) or two of "
+            f"{', '.join(shipped_tables())}"
         )
     material = read_material(config)
     shafting = read_shafting("system.shafting_csv", options.shafting_csv)
@@ -147,6 +150,7 @@ def read_drive_line(config: Configuration) -> DriveLine:
     if options.lateral:
         forces = _support_forces(line, options.support)
         line = _on_supports(line, forces, options.support, material)
+    motor_node, load_node = motor_and_load(line, numbers, options)
     line, numbers = with_dampers(line, numbers, options.dampers)
     return DriveLine(
         name=options.name,
@@ -157,8 +161,8 @@ def read_drive_line(config: Configuration) -> DriveLine:
         campbell=options.campbell,
         record_mesh=options.record_mesh,
         slices_helical=options.helical_meshes == "sliced",
-        motor_node=options.motor_node,
-        load_node=options.load_node,
+        motor_node=motor_node,
+        load_node=load_node,
         support_forces=forces,
     )
 

@@ -29,6 +29,7 @@ from gensig.driveline.linear.forced import (
 )
 from gensig.driveline.linear.matrices import LineMatrices
 from gensig.driveline.linear.stiffness_range import check_stiffness_range
+from gensig.driveline.table_rows import told_nodes
 from gensig.errors import ConfigError
 from gensig.options.configuration import Configuration
 from gensig.sensing.toothed_wheel import ToothedWheel, draw_wheel, instantaneous_speed
@@ -160,4 +161,16 @@ def read_engine_line(config: Configuration) -> EngineLine:
         engine = read_motor(values, drive)
     else:
         engine = read_engine(values)
+        _check_throws(engine, drive)
     return EngineLine(drive=drive, engine=engine, wheels=read_wheels(values))
+
+
+def _check_throws(engine: Engine, drive: DriveLine) -> None:
+    """Raise for an engine whose crank is not on the line."""
+    missing = [node for node in engine.throw_nodes if node not in drive.numbers]
+    if missing:
+        raise ConfigError(
+            f"excitation.throw_nodes: the shaft line has no node {missing[0]}; {drive.name} has "
+            f"{told_nodes(drive.numbers)}: take excitation=motor_and_load, or the engine's own "
+            "line, system=engine_gear_train"
+        )

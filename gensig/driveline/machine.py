@@ -33,6 +33,8 @@ from gensig.driveline.machine_checks import (
     SIDE_BY_SIDE,
     check_sensing,
     check_solver,
+    require_followed,
+    spur_table,
     warn_of_supports,
 )
 from gensig.driveline.mesh_phase import start_phase
@@ -66,7 +68,7 @@ from gensig.errors import ConfigError, SimulationError
 from gensig.faults.base import Fault
 from gensig.geometry.contact import SIDES, GearPair
 from gensig.geometry.gear import Gear
-from gensig.mesh.modification import PLAIN, sound_teeth
+from gensig.mesh.modification import PLAIN, PairModification, sound_teeth
 from gensig.mesh.options import SliceOptions
 from gensig.mesh.pair_table import N_PAIRS, PairTable
 from gensig.mesh.sliced.sliced_table import SlicedTable
@@ -89,11 +91,14 @@ MOST_ENERGY_RESIDUAL = 1e-3
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LineMachine(Machine):
-    """An engine or a motor on its drive line; ``mesh_number`` that of the followed mesh."""
+    """An engine or a motor on its drive line; ``mesh_number`` that of the followed mesh, whose
+    gears have the ``modification``.
+    """
 
     engine: EngineLine
     mesh_number: int
     slices: SliceOptions
+    modification: PairModification = PLAIN
 
     @property
     def pair(self) -> GearPair:
@@ -201,7 +206,12 @@ class LineMachine(Machine):
     @property
     def law(self) -> ToothLaw:
         """Material, conventions and slices of all teeth."""
-        return ToothLaw(material=self.material, options=self.mesh, slices=self.slices)
+        return ToothLaw(
+            material=self.material,
+            options=self.mesh,
+            slices=self.slices,
+            modification=self.modification,
+        )
 
     def mesh_table(self, faults: Sequence[Fault] = ()) -> PairTable | SlicedTable:
         """Tables of the followed mesh with those of the given faults that it feels."""
@@ -233,27 +243,13 @@ class LineMachine(Machine):
 
         ConfigError where its gears are helical.
         """
-        for fault in faults:
-            if fault.gear not in SIDES:
-                raise ConfigError(
-                    f"fault.gear = {fault.gear!r}: the stiffness is that of the mesh "
-                    f"system.record_mesh {self.engine.mesh_names[self.mesh_number]}; choose a "
-                    "mesh of that gear, where it is pinion or wheel"
-                )
-        table = self.mesh_table(faults)
-        if not isinstance(table, PairTable):
-            raise ConfigError(
-                f"system.record_mesh {self.engine.mesh_names[self.mesh_number]} is of "
-                "helical gears, "
-                "which have their stiffness slice by slice; choose a spur mesh, or take its gears "
-                "with gensig stiffness system=helical_pair"
-            )
-        whole = sound_teeth(self.pair, PLAIN)
+        name = self.engine.mesh_names[self.mesh_number]
+        require_followed(name, faults)
         return stiffness_curves(
             self,
-            table,
+            spur_table(name, self.mesh_table(faults)),
             faults,
-            whole,
+            sound_teeth(self.pair, self.modification),
             n_positions=n_positions,
             points_per_tooth=points_per_tooth,
         )

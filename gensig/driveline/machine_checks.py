@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,11 @@ from gensig.driveline.engine_line import EngineLine
 from gensig.dynamics.backends.registry import IMPLICIT_BACKEND, UNNAMED_BACKEND
 from gensig.dynamics.integrator import Solver
 from gensig.errors import ConfigError
+from gensig.faults.base import Fault
+from gensig.geometry.contact import SIDES
 from gensig.mesh.options import MeshOptions
+from gensig.mesh.pair_table import PairTable
+from gensig.mesh.sliced.sliced_table import SlicedTable
 from gensig.systems.base import Machine
 
 SIDE_BY_SIDE = (
@@ -72,6 +77,27 @@ def check_sensing(machine: Machine, *, lateral: bool) -> None:
             "still; take system.lateral=true"
         )
     sensing.check(machine.operating.duration)
+
+
+def require_followed(name: str, faults: Iterable[Fault]) -> None:
+    """Raise for faults on gears that the followed mesh, named by its nodes, has not."""
+    for fault in faults:
+        if fault.gear not in SIDES:
+            raise ConfigError(
+                f"fault.gear = {fault.gear!r}: the stiffness is that of the mesh "
+                f"system.record_mesh {name}; choose a mesh of that gear, where it is pinion or "
+                "wheel"
+            )
+
+
+def spur_table(name: str, table: PairTable | SlicedTable) -> PairTable:
+    """The table of the followed mesh, named by its nodes; ConfigError for helical gears."""
+    if isinstance(table, PairTable):
+        return table
+    raise ConfigError(
+        f"system.record_mesh {name} is of helical gears, which have their stiffness slice by "
+        "slice; choose a spur mesh, or take its gears with gensig stiffness system=helical_pair"
+    )
 
 
 def warn_of_supports(engine: EngineLine, mesh_forces: Array) -> None:

@@ -27,10 +27,10 @@ def read_line_machine(config: Configuration) -> LineMachine:
     """
     engine = read_engine_line(_with_lateral_motion(config))
     mesh_number = _record_mesh(engine)
-    if read_heat(config).is_any or read_modification(config).is_any:
+    if read_heat(config).is_any:
         raise ConfigError(
-            "heat and modification are of a single gear pair; a drive line takes "
-            "heat=none and modification=none"
+            "heat: a drive line has gears as they are drawn; take heat=none, or "
+            "system=helical_pair with the gears of one of its meshes, spur gears too"
         )
     operating, quality = (
         read_operating(config.section("operating")),
@@ -46,6 +46,7 @@ def read_line_machine(config: Configuration) -> LineMachine:
         engine=engine,
         mesh_number=mesh_number,
         slices=read_slice_options(config.section("mesh")),
+        modification=read_modification(config),
     )
     return replace(
         machine,
@@ -68,12 +69,13 @@ def _with_lateral_motion(config: Configuration) -> Configuration:
 
 def _record_mesh(engine: EngineLine) -> int:
     drive, names = engine.drive, engine.mesh_names
-    if drive.record_mesh is None:
+    if not names:
         raise ConfigError(
-            "system.record_mesh = null: records follow the teeth of one mesh; give "
-            "its two nodes, one of "
-            f"{', '.join(names) or 'none: this line has no mesh'}"
+            f"{drive.name} has no mesh, and records follow the teeth of one; give a line with a "
+            "row of edge_kind gear_mesh, and its gears in system.gears_csv"
         )
+    if drive.record_mesh is None:
+        return 0
     wanted = "/".join(str(node) for node in drive.record_mesh)
     if wanted not in names:
         raise ConfigError(

@@ -70,9 +70,12 @@ def node_of(
             if gear.node == index
         ]
         if not shapes_on_node:
+            remedy = "give one"
+            if options.gears_csv is None:
+                remedy = "give one, or system.gears_csv with its gear"
             raise ConfigError(
                 f"{row.location('inertia')}: it is empty and node {number} has no gear "
-                "to derive it from"
+                f"to derive it from; {remedy}"
             )
         inertia = sum(_disc(shape, material)[1] for shape in shapes_on_node)
     if number == options.viscous_damper_node:
@@ -154,10 +157,14 @@ def line_gear(
 
 
 def _nodes(numbers: tuple[int, ...]) -> str:
+    return f"the table has {told_nodes(numbers)}"
+
+
+def told_nodes(numbers: tuple[int, ...]) -> str:
     """The nodes of a table, for a message: all of them, or the first and how many."""
     if len(numbers) <= MOST_NODES_TOLD:
-        return f"the table has {', '.join(map(str, numbers))}"
-    return f"the table has {len(numbers)} nodes, {min(numbers)} to {max(numbers)}"
+        return ", ".join(map(str, numbers))
+    return f"{len(numbers)} nodes, {min(numbers)} to {max(numbers)}"
 
 
 def ends_of(row: TableRow, numbers: tuple[int, ...]) -> tuple[int, int] | None:
@@ -377,3 +384,39 @@ def check_whole(
                 f"by which node {number} turns at "
                 f"{ratio:.6g} of node {numbers[0]}"
             )
+
+
+def motor_and_load(
+    line: ShaftLine, numbers: tuple[int, ...], options: LineOptions
+) -> tuple[int | None, int | None]:
+    """Numbers of the nodes of a motor and its load: as given, or the ends of the line.
+
+    A line without branches has two ends. The first node, if it is one, takes the motor; the other
+    end takes the load. None where a branched line leaves them open.
+    """
+    motor, load = options.motor_node, options.load_node
+    ends = [
+        number for number in line_ends(line, numbers) if number not in (motor, load)
+    ]
+    if motor is None and numbers[0] in ends:
+        motor = numbers[0]
+        ends.remove(motor)
+    if load is None and motor is not None and len(ends) == 1:
+        load = ends[0]
+    return motor, load
+
+
+def line_ends(line: ShaftLine, numbers: tuple[int, ...]) -> tuple[int, ...]:
+    """Numbers of the nodes that are joined to one other only, in the order of the table."""
+    joined: list[set[int]] = [set() for _ in numbers]
+    joints = [(shaft.first, shaft.second) for shaft in line.shafts]
+    joints += [
+        (line.gears[mesh.driving].node, line.gears[mesh.driven].node)
+        for mesh in line.meshes
+    ]
+    for first, second in joints:
+        joined[first].add(second)
+        joined[second].add(first)
+    return tuple(
+        number for number, mates in zip(numbers, joined, strict=True) if len(mates) == 1
+    )

@@ -25,9 +25,16 @@ from gensig.faults.base import Fault, faulty_teeth, require_gears
 from gensig.geometry.contact import SIDES, GearPair
 from gensig.material import Material
 from gensig.mesh.load_distribution import loaded_pair_table
+from gensig.mesh.modification import (
+    PLAIN,
+    FlankModification,
+    PairModification,
+    sound_teeth,
+)
 from gensig.mesh.options import MeshOptions, SliceOptions
-from gensig.mesh.pair_table import PairTable
+from gensig.mesh.pair_table import PairTable, node_positions
 from gensig.mesh.sliced.sliced_table import SlicedTable, sliced_table
+from gensig.mesh.sliced.slices import slice_middles
 from gensig.sensing.manufacturing import GearErrors, Specimen
 from gensig.systems.base import home_meshes
 from gensig.systems.run import Start
@@ -42,11 +49,15 @@ FORCES_PER_OCTAVE = 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ToothLaw:
-    """Material, conventions and slices of all teeth of a line."""
+    """Material, conventions and slices of all teeth of a line.
+
+    ``modification`` is that of the followed mesh, see ``modified_there``.
+    """
 
     material: Material
     options: MeshOptions
     slices: SliceOptions
+    modification: PairModification = PLAIN
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,10 +78,26 @@ def tooth_table(
 
     Of spur teeth as they are, of helical ones in slices.
     """
-    teeth = faulty_teeth(pair, faults)
+    cut = law.modification
     if pair.pinion.helix_angle == 0.0:
-        return loaded_pair_table(pair, law.material, law.options, teeth, force=force)
-    return sliced_table(pair, law.material, law.options, law.slices, teeth, force=force)
+        teeth = faulty_teeth(pair, faults, sound_teeth(pair, cut))
+        return loaded_pair_table(
+            pair, law.material, law.options, teeth, force=force, modification=cut
+        )
+    deviation = None
+    if cut.is_any:
+        position = node_positions(pair, law.options)
+        deviation = cut.deviation(pair, position, slice_middles(pair, law.slices))
+    teeth = faulty_teeth(pair, faults)
+    return sliced_table(
+        pair,
+        law.material,
+        law.options,
+        law.slices,
+        teeth,
+        force=force,
+        deviation=deviation,
+    )
 
 
 def require_drive(pair: GearPair, slices: SliceOptions) -> None:
@@ -174,9 +201,10 @@ def line_teeth(
             continue
         mounting = specimen.mounting(place)
         felt = felt_there(drive, followed, number, features)
+        cut = modified_there(drive, followed, number, law.modification)
         table = _table_in_line(
             machine,
-            law,
+            replace(law, modification=cut),
             number,
             (*felt, *mounting.forms(SIDES[0])),
             float(forces[number]),
@@ -239,6 +267,22 @@ def felt_there(
         if there is not None:
             felt.append(replace(there, gear=SIDES[side]))
     return tuple(felt)
+
+
+def modified_there(
+    drive: DriveLine, followed: int, number: int, modification: PairModification
+) -> PairModification:
+    """The modification of the followed mesh as another mesh meets it.
+
+    Pinion and wheel have it on the flanks that work in the followed mesh, so also where the pinion
+    drives and where the wheel is driven. The misalignment is of the mounting of the two.
+    """
+    here = zip(_ends(drive, followed), _ends(drive, number), SIDES, strict=True)
+    flanks = dict.fromkeys(SIDES, FlankModification())
+    for gear, there, side in here:
+        if gear == there:
+            flanks[side] = modification.sides[side]
+    return PairModification(pinion=flanks[SIDES[0]], wheel=flanks[SIDES[1]])
 
 
 def is_tabulated(drive: DriveLine, followed: int, number: int) -> bool:

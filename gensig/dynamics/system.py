@@ -68,3 +68,15 @@ def slowest_decay(
     """
     rates = -np.real(eigenvalues(system, direction, mesh_stiffness))
     return float(rates[rates > 1e-3].min(initial=np.inf))
+
+
+def stiffest_motion(
+    system: LumpedSystem, direction: Array, mesh_stiffness: float
+) -> str:
+    """Degree of freedom that springs, dampers and the mesh hold hardest for its mass.
+
+    ``direction`` (dof,) is the gradient of the approach.
+    """
+    held = np.diag(system.stiffness) + mesh_stiffness * direction**2
+    damped = np.diag(system.damping) / system.mass
+    return system.names[int(np.argmax(np.maximum(np.sqrt(held / system.mass), damped)))]

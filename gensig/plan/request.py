@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from gensig.errors import ConfigError
-from gensig.faults.registry import COMPOUND, fault_parts
+from gensig.faults.registry import COMPOUND, FAULTS, fault_parts
+from gensig.life.life_options import RUN_TO_FAILURE
 from gensig.options import files as option_files
 from gensig.options.compose import compose, options, override_keys, typed_mapping
 from gensig.options.configuration import Configuration
@@ -58,6 +59,7 @@ def read_request(
     words = _typed_words(overrides)
     base = compose(CONFIG_NAME, words.others, config_dir=config_dir).plain()
     _check_shape(base)
+    notes = _plan_of_life(words, base)
     listed = base["plan"]["classes"]
     names = _class_names(words, base)
     selected = _class_fault(words, words.keys.get("fault"), base["fault"], config_dir)
@@ -71,7 +73,6 @@ def read_request(
             for name, option in options_of.items()
         }
     _refuse_unused(words, [selected, *faults.values()])
-    notes = []
     if listed and listed != names:
         notes.append(
             f"fault={names[0]} replaces plan.classes [{', '.join(map(str, listed))}]"
@@ -138,6 +139,28 @@ def _typed_words(overrides: Sequence[str]) -> _Words:
         fault_words={word.lstrip("+").partition("=")[0]: word for word in of_fault},
         others=tuple(word for word in plain if word not in of_fault),
     )
+
+
+def _plan_of_life(words: _Words, base: dict[str, Any]) -> list[str]:
+    """Give lives the plan that they need, where none is typed; returns the note.
+
+    Lives and their snapshots say how many records there are, and their laws which faults grow.
+    """
+    life, plan = base["life"], base["plan"]
+    if life.get("kind") != RUN_TO_FAILURE:
+        return []
+    brought = []
+    if plan["n_records"] is not None and "plan.n_records" not in words.keys:
+        plan["n_records"] = None
+        brought.append("plan.n_records = null")
+    grown = [kind for kind in FAULTS if life.get(kind) is not None]
+    is_sound = not fault_parts(base["fault"]) and "fault" not in words.keys
+    if plan["classes"] is None and is_sound and grown:
+        plan["classes"] = grown
+        brought.append(f"plan.classes = [{', '.join(grown)}]")
+    if not brought:
+        return []
+    return [f"lives have {', '.join(brought)}"]
 
 
 def _class_names(words: _Words, base: Mapping[str, Any]) -> list[str]:

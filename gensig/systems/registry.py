@@ -27,12 +27,14 @@ from gensig.systems.sliced_pair import SlicedPair
 from gensig.systems.spur_pair import SpurPair
 from gensig.systems.supports import (
     AS_GIVEN,
+    DAMPING_RATIO,
+    RADIAL,
     held_axially,
     on_bearings,
     put_on_bearings,
     read_holding,
 )
-from gensig.units import from_si, read, to_si
+from gensig.units import from_si, read, split_unit, to_si
 
 COMMON_GEAR_KEYS = (
     "normal_module_mm",
@@ -40,12 +42,6 @@ COMMON_GEAR_KEYS = (
     "addendum_coefficient",
     "clearance_coefficient",
     "cutter_tip_radius_coefficient",
-)
-PLANE_SUPPORT = (
-    "stiffness_x_n_per_m",
-    "stiffness_y_n_per_m",
-    "damping_x_ns_per_m",
-    "damping_y_ns_per_m",
 )
 BODY_KEYS = ("mass_kg", "inertia_kg_m2", "support", "bearing", "shaft")
 SLICED = "helical_pair"
@@ -99,18 +95,7 @@ def _read_machine(config: Configuration, pair: GearPair) -> dict[str, Any]:
             raise ConfigError(f"system: unknown key '{key}'; known: {known}")
     operating = read_operating(config.section("operating"))
     quality = read(Quality, config.section("quality"), "quality")
-    is_on_bearings = on_bearings(machine.get("supports", AS_GIVEN), quality)
-    sizes, bodies, holdings = read_gear_group(config), {}, {}
-    for name, gear in pair.gears.items():
-        side = sizes.section(name)
-        bodies[name] = _read_body(gear, side, material, is_on_bearings)
-        holdings[name] = read_holding(gear, side)
-    if is_on_bearings:
-        force = operating.torque / pair.pinion.base_radius
-        for name, gear in pair.gears.items():
-            bodies[name] = put_on_bearings(
-                bodies[name], gear, holdings[name], material, force
-            )
+    bodies = _read_bodies(config, pair, material, operating.torque, quality)
     return {
         "material": material,
         "mesh": read_mesh_options(config.section("mesh")),
@@ -255,13 +240,50 @@ def _read_gear(name: str, gear: Section, helix_angle: float) -> Gear:
     return read(Gear, values, f"gear.{name}", name=name, helix_angle=helix_angle)
 
 
+def _read_bodies(
+    config: Configuration,
+    pair: GearPair,
+    material: Material,
+    torque: float,
+    quality: Quality,
+) -> dict[str, Body]:
+    """Both gears on their supports, by name.
+
+    With ``system.supports=bearings`` bearings carry ``torque`` in N m of the pinion. Without it
+    what is null of a support follows from bearings at the rated torque.
+    """
+    is_on_bearings = on_bearings(config.section("system").get("supports", AS_GIVEN))
+    sizes, bodies, ratio = read_gear_group(config), {}, DAMPING_RATIO
+    if is_on_bearings and quality.support_damping_ratio is not None:
+        ratio = 0.0  # drawn for each gearbox
+    for name, gear in pair.gears.items():
+        side = sizes.section(name)
+        bodies[name], derived = _read_body(gear, side, material)
+        holding = read_holding(gear, side)
+        if is_on_bearings:
+            derived = RADIAL
+        elif derived:
+            torque = _number("gear.rated_torque_nm", sizes["rated_torque_nm"])
+        if derived:
+            bodies[name] = put_on_bearings(
+                bodies[name],
+                gear,
+                holding,
+                material,
+                torque / pair.pinion.base_radius,
+                damping_ratio=ratio,
+                keys=derived,
+            )
+    return bodies
+
+
 def _read_body(
-    gear: Gear, values: Section, material: Material, is_on_bearings: bool
-) -> Body:
-    """Mass, inertia and support of a gear.
+    gear: Gear, values: Section, material: Material
+) -> tuple[Body, tuple[str, ...]]:
+    """Mass, inertia and support of a gear, and what of its radial support is null.
 
     Mass and inertia that are null are those of a solid disc on the pitch circle less the bore. A
-    support on bearings may be null: it follows from them.
+    radial support that is null, 0 here, follows from bearing and shaft.
     """
     group, density = f"gear.{gear.name}", material.density_kg_per_m3
     disc = solid_disc(gear.pitch_radius, gear.bore_radius, gear.face_width, density)
@@ -276,18 +298,14 @@ def _read_body(
             )
     support = values.section("support")
     nulls = [key for key, value in support.items() if value is None]
-    derived = [key for key in nulls if key in PLANE_SUPPORT]
-    if derived and not is_on_bearings:
-        raise ConfigError(
-            f"{group}.support.{derived[0]} = null follows from bearings: take "
-            "system.supports=bearings, or give it"
-        )
+    derived = [key for key in nulls if split_unit(key)[0] in RADIAL]
     support = support.without(*nulls) | dict.fromkeys(derived, 0.0)
-    return Body(
+    body = Body(
         mass=inertias["mass_kg"],
         inertia=inertias["inertia_kg_m2"],
         support=read(Support, support, f"{group}.support"),
     )
+    return body, tuple(split_unit(key)[0] for key in derived)
 
 
 def _read_rotor(key: str, values: Any) -> Rotor | None:

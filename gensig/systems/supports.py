@@ -5,7 +5,8 @@ Damping is as given, or from a ratio.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,6 +23,11 @@ from gensig.units import from_si, read, to_si
 
 AS_GIVEN = "as_given"
 KINDS = (AS_GIVEN, "bearings")
+# assumed: of each gear on its support, where nothing else is known of its damping
+DAMPING_RATIO = 0.03
+STIFFNESS = ("stiffness_x", "stiffness_y")  # across the line of action and along it
+DAMPING = ("damping_x", "damping_y")
+RADIAL = STIFFNESS + DAMPING
 # assumed: axial over radial stiffness of a gear between rolling bearings, one of which locates
 AXIAL_SHARE = 0.5
 
@@ -56,53 +62,66 @@ def read_holding(gear: Gear, values: Section) -> Holding:
         raise ConfigError(f"gear.{gear.name}.{error}") from None
 
 
-def on_bearings(kind: Any, quality: Quality) -> bool:
+def on_bearings(kind: Any) -> bool:
     """True if ``system.supports`` asks for stiffness from bearings.
 
-    ConfigError for an unknown kind, and for bearings without damping ratios.
+    ConfigError for an unknown kind.
     """
     if kind not in KINDS:
         raise ConfigError(f"system.supports = {kind!r}; allowed: {', '.join(KINDS)}")
-    if kind == AS_GIVEN:
-        return False
-    if quality.support_damping_ratio is None:
-        raise ConfigError(
-            "system.supports = bearings says nothing of damping; give "
-            "quality.support_damping_ratio_low and support_damping_ratio_high, for instance 0.01 "
-            "and 0.1"
-        )
-    return True
+    return bool(kind != AS_GIVEN)
 
 
 def put_on_bearings(
-    body: Body, gear: Gear, holding: Holding, material: Material, force: float
+    body: Body,
+    gear: Gear,
+    holding: Holding,
+    material: Material,
+    force: float,
+    *,
+    damping_ratio: float = DAMPING_RATIO,
+    keys: Sequence[str] = RADIAL,
 ) -> Body:
     """The gear on its shaft and bearings under the static mesh ``force`` in N.
 
-    Damping is left to a ratio. Axial and tilt stiffness are as given: radial contact does not
-    determine them.
+    ``keys`` are the stiffnesses and dampings that follow from them, others are as given. So are
+    axial and tilt stiffness: radial contact does not determine them. Damping is that of
+    ``damping_ratio`` of the gear alone on its support.
 
     Raises
     ------
     ConfigError    if bearing or shaft are not known
     """
+    support = body.support
+    if set(keys) & set(STIFFNESS):
+        stiffness = _stiffness(gear, holding, material, force)
+        derived = dict(zip(STIFFNESS, stiffness, strict=True))
+        support = replace(
+            support, **{key: derived[key] for key in STIFFNESS if key in keys}
+        )
+    held = (support.stiffness_x, support.stiffness_y)
+    dampers = {
+        key: 2.0 * damping_ratio * math.sqrt(stiffness * body.mass)
+        for key, stiffness in zip(DAMPING, held, strict=True)
+        if key in keys
+    }
+    return replace(body, support=replace(support, **dampers))
+
+
+def _stiffness(
+    gear: Gear, holding: Holding, material: Material, force: float
+) -> tuple[float, float]:
+    """Radial stiffness across and along the line of action, N/m."""
     for key in ("bearing", "shaft"):
         if getattr(holding, key) is None:
             raise ConfigError(
-                f"gear.{gear.name}.{key} = null: system.supports = bearings needs its sizes; give "
-                "them, or take system.supports=as_given"
+                f"gear.{gear.name}.{key} = null: system.supports = bearings, and a stiffness of "
+                f"gear.{gear.name}.support that is null, need its sizes; give them, or all of "
+                f"gear.{gear.name}.support with system.supports=as_given"
             )
     assert holding.bearing is not None
     assert holding.shaft is not None
-    across, along = support_stiffness(holding.bearing, holding.shaft, material, force)
-    held = replace(
-        body.support,
-        stiffness_x=across,
-        stiffness_y=along,
-        damping_x=0.0,
-        damping_y=0.0,
-    )
-    return replace(body, support=held)
+    return support_stiffness(holding.bearing, holding.shaft, material, force)
 
 
 def held_axially(body: Body, gear: Gear, values: Section) -> Body:

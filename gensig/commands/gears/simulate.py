@@ -12,6 +12,7 @@ from gensig.commands.figures.machine_figures import plot_record
 from gensig.commands.output import FIGURE_TYPES, check_file, check_new
 from gensig.errors import ConfigError
 from gensig.faults.registry import without_vary
+from gensig.life.life_options import NO_LIFE
 from gensig.options.configuration import Configuration
 from gensig.plan.make import make_plan
 from gensig.plan.request import read_request
@@ -57,7 +58,9 @@ def simulate(arguments: Namespace) -> int:
         design="latin_hypercube",
         vary={},
     )
-    config = config.with_entries(classes={name: without_vary(config["fault"])})
+    config = config.with_entries(
+        classes={name: without_vary(config["fault"])}, life={"kind": NO_LIFE}
+    )
     record = simulate_record(config, make_plan(config).record(0))
     return _show(config, record, arguments)
 

@@ -23,10 +23,10 @@ from gensig.systems.derived_sizes import (
 )
 from gensig.systems.pair_machine import GearPairMachine
 from gensig.systems.registry import SIDES, read_pair, read_system
+from gensig.systems.supports import DAMPING_RATIO
 from gensig.text.option_writing import option_lines
 from gensig.units import to_si
 
-DAMPING_RATIO = 0.03  # of each gear on its support
 PRESSURE_ANGLE = 20.0
 MODULES = (0.1, 50.0)  # mm
 GIVEN = "given"

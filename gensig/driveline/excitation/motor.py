@@ -18,6 +18,7 @@ from gensig.driveline.excitation.engine import (
 from gensig.driveline.excitation.engine import KEYS as ENGINE_KEYS
 from gensig.driveline.excitation.line_torques import Load, Reference
 from gensig.driveline.excitation.motor_torques import MotorDrive, TorqueRipple
+from gensig.driveline.table_rows import told_nodes
 from gensig.errors import ConfigError
 from gensig.options.configuration import Section
 from gensig.units import read
@@ -104,10 +105,9 @@ def read_motor(values: Section, drive: DriveLine) -> MotorDrive:
 def _node(drive: DriveLine, key: str, what: str, node: int | None) -> int:
     """A node of the line; the motor's turns as fast as the first one, to which all speeds refer."""
     if node is None:
-        numbers = ", ".join(map(str, drive.numbers))
         raise ConfigError(
-            f"system.{key} = null: {GROUP}={KIND} needs the node of {what}, one of "
-            f"{numbers}; {TOGETHER}"
+            f"system.{key} = null: {GROUP}={KIND} needs the node of {what}, and "
+            f"{drive.name} has branches: give one of {told_nodes(drive.numbers)}; {TOGETHER}"
         )
     if node not in drive.numbers:
         raise ConfigError(f"system.{key} = {node}: {_no_node(drive, node)}; {TOGETHER}")
@@ -122,4 +122,4 @@ def _node(drive: DriveLine, key: str, what: str, node: int | None) -> int:
 
 
 def _no_node(drive: DriveLine, node: int) -> str:
-    return f"the shaft line has no node {node}; it has {', '.join(map(str, drive.numbers))}"
+    return f"the shaft line has no node {node}; it has {told_nodes(drive.numbers)}"

@@ -8,7 +8,7 @@ import warnings
 import numpy as np
 
 from gensig.dynamics.pair import PairDynamics
-from gensig.dynamics.system import slowest_decay
+from gensig.dynamics.system import slowest_decay, stiffest_motion
 from gensig.errors import SimulationError
 
 LONGEST_SETTLING = 0.45  # s
@@ -16,6 +16,7 @@ SETTLED = 1e-4  # share of the start's transient that is left
 STABILITY_LIMIT = (
     2.6  # |lambda| h; RK4 has 2.83 on the imaginary axis, 2.79 on the real axis
 )
+FASTEST_GEARS = 1e6  # Hz, above which sizes are wrong rather than steps too long
 LONG_STEP = 0.5  # of the same, above which the error may exceed 1e-3
 COARSE_STABILITY = 0.6  # share of the limit: tables may be stiffer than their mean
 # Stages of the settling: steps per sample, and the time before the record at which the stage ends,
@@ -72,11 +73,19 @@ def check_step(
     rates, step = dynamics.stiff_rates, 1.0 / (sampling_rate * oversampling)
     fastest = float(np.abs(rates).max())
     if fastest * step > STABILITY_LIMIT:
+        needed = math.ceil(oversampling * fastest * step / STABILITY_LIMIT)
+        frequency = fastest / (2 * math.pi)
+        motion = stiffest_motion(
+            dynamics.system(),
+            dynamics.approach_direction(),
+            dynamics.mean_mesh_stiffness,
+        )
+        remedy = f"raise solver.oversampling to at least {needed}"
+        if frequency > FASTEST_GEARS:
+            remedy += f", or check mass, stiffness and damping of {motion}"
         raise SimulationError(
             f"solver.oversampling = {oversampling} makes internal steps of {step:.3g} s, too long "
-            f"for the stiffest motion at {fastest / (2 * math.pi):.4g} Hz; raise "
-            "solver.oversampling to at least "
-            f"{math.ceil(oversampling * fastest * step / STABILITY_LIMIT)}"
+            f"for the stiffest motion, {motion} at {frequency:.4g} Hz; {remedy}"
         )
     if max_error is None:
         warn_of_coarse_step(dynamics, sampling_rate, oversampling)

@@ -214,7 +214,7 @@ def test_both_ways_to_integrate_add_the_same_by_tilts():
         for name, gear in tilted.others.items()
     }
     upright = replace(tilted, pinion_tilt=0.0, wheel_tilt=0.0, others=others)
-    slow = with_solver(machine, backend="runge_kutta", oversampling=12)
+    slow = with_solver(machine, backend="newmark", oversampling=12)
     runs = [
         run_of(each, specimen=specimen)
         for each in (machine, slow)

@@ -206,7 +206,7 @@ REFUSED = {
         "operating.torque_nm=100"
     ): "no excitation is chosen; take excitation=engine_v20",
     "gensig modes system=shaft_line": (
-        "system.shafting_csv is required: give a path, or one of engine_gears.csv"
+        "system.shafting_csv is required: give system.shafting_csv=FILE and system.gears_csv=FILE"
     ),
     f"gensig modes {TRAIN} system.gears_csv=null": "needs a table of gears; give system.gears_csv",
     f"gensig modes {TRAIN} system.shafting_csv=engine_gears": "column face_width_mm: unknown",

@@ -171,7 +171,6 @@ def test_a_toothed_wheel_and_the_torque_of_the_load_are_stored(tmp_path):
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (["system.record_mesh=null"], "give its two nodes, one of 3/18, 19/20"),
         (["system.record_mesh=[18,3]"], "no such mesh; there are 3/18, 19/20"),
         (["system.helical_meshes=rigid"], "allowed: sliced, constant"),
         (["sensing.channels=[crank_speed]"], "allowed: pinion_rotation, wheel_rot"),
@@ -193,6 +192,11 @@ def test_refused_sets_of_an_engine(words, text, tmp_path, capsys, monkeypatch):
 
 
 MOTOR_KEY = "excitation.motor"
+BRANCHED = [
+    "system.shafting_csv=engine_shafting.csv",
+    "system.gears_csv=engine_gears.csv",
+    "system.load_node=null",
+]
 FAN = "excitation.loads={{fan: {{node: {}, law: {}, torque_nm: 1}}}}"
 
 
@@ -203,11 +207,11 @@ FAN = "excitation.loads={{fan: {{node: {}, law: {}, torque_nm: 1}}}}"
             ["system.motor_node=99"],
             "= 99: the shaft line has no node 99; it has 1, 2, 3",
         ),
-        (["system.motor_node=8"], "turns 0.2 times as fast as the first node"),
         (
-            ["system.load_node=null"],
-            "excitation=motor_and_load needs the node of its load",
+            BRANCHED,
+            "needs the node of its load, and two_stage_gearbox has branches: give one of 67 nodes",
         ),
+        (["system.motor_node=8"], "turns 0.2 times as fast as the first node"),
         (
             ["system.load_node=99"],
             "system.motor_node, system.load_node and, for records",

@@ -109,6 +109,36 @@ def test_the_ring_of_a_viscous_damper_counts_half(line_of):
         line_of(viscous_damper_node=9)
 
 
+BRANCH = "4,fan,0.2,0.5,10,4,5,shaft,,,\n5,pump,0.1,0.5,,,,,,,\n"
+FORK = "4,fan,0.2,0.5,10,3,5,shaft,,,\n5,pump,0.1,0.5,,,,,,,\n"
+
+
+@pytest.mark.parametrize(
+    ("fan", "given", "ends"),
+    [
+        ("4,fan,0.2,0.5,,,,,,,\n", {}, (1, 4)),
+        (BRANCH, {}, (1, 5)),
+        (BRANCH, {"load_node": 4}, (1, 4)),
+        (FORK, {}, (1, None)),  # 4 and 5 both end there
+        (FORK, {"load_node": 5}, (1, 5)),
+        (FORK, {"load_node": 1}, (None, 1)),
+        ("4,fan,0.2,0.5,,,,,,,\n", {"dampers": True}, (1, 4)),
+    ],
+)
+def test_motor_and_load_are_the_ends_of_an_unbranched_line(line_of, fan, given, ends):
+    keys = dict(given)
+    if keys.pop("dampers", False):
+        damper = {
+            "node": 4,
+            "ring_inertia_kg_m2": 0.01,
+            "damping_nms_per_rad": 1.0,
+            "stiffness_nm_per_rad": 100.0,
+        }
+        keys["dampers"] = [damper]
+    line = line_of(SHAFTING.replace("4,fan,0.2,0.5,,,,,,,\n", fan), **keys)
+    assert (line.motor_node, line.load_node) == ends
+
+
 def test_a_bare_name_is_a_shipped_table():
     assert (
         len(read_shafting("key", "engine_shafting"))
@@ -415,13 +445,16 @@ def test_an_inertia_that_rounding_hides_is_named(line_of):
     [
         (
             {"shafting_csv": None},
-            "system.shafting_csv is required: give a path, or one of engine_gears.csv",
+            "system.shafting_csv is required: give system.shafting_csv=FILE and system.gears_csv",
         ),
         (
             {"shafting_csv": "not_there.csv"},
             "not_there.csv cannot be read: No such file",
         ),
-        ({"gears_csv": None}, "node 3 has no gear to derive it from"),
+        (
+            {"gears_csv": None},
+            "node 3 has no gear to derive it from; give one, or system.gears_csv",
+        ),
         ({"backlash_um": -1}, "system.backlash_um = -1 must not be negative"),
         ({"lateral": 1}, "system.lateral = 1 is not true or false"),
         (

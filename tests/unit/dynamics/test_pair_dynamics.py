@@ -194,6 +194,19 @@ class TestRefusals:
         ):
             machine(coarse).check()
 
+    @pytest.mark.parametrize(
+        ("key", "value", "motion"),
+        [
+            ("gear.pinion.support.stiffness_y_n_per_m", 1e14, "pinion_y"),
+            ("gear.wheel.support.damping_x_ns_per_m", 1e9, "wheel_x"),
+            ("gear.wheel.inertia_kg_m2", 1e-12, "wheel_rotation"),
+        ],
+    )
+    def test_what_steps_cannot_follow_is_named(self, machine, key, value, motion):
+        text = rf"stiffest motion, {motion} at .* or check mass, stiffness and damping of {motion}$"
+        with pytest.raises(SimulationError, match=text):
+            machine({key: value}).check()
+
     def test_integrations(self, xiamen, dynamics_of):
         dynamics = dynamics_of(xiamen)
         for changes, text in (

@@ -362,3 +362,42 @@ def test_paper_experiment_means_every_convention_of_the_paper_and_no_noise():
     words = ["mesh.law=paper", "mesh.pair_coupling=sum", "mesh.contact=linear"]
     assert read_system(read_request(words).config).mesh == mesh
     assert read_system(read_request([]).config).mesh.elasticity == "plane_strain"
+
+
+@pytest.mark.parametrize(
+    ("words", "classes", "notes"),
+    [
+        (
+            ["life=mixed"],
+            ["crack", "distributed_pitting", "wear"],
+            [
+                "lives have plan.n_records = null, "
+                "plan.classes = [crack, distributed_pitting, wear]"
+            ],
+        ),
+        (["life=wear", "fault=wear"], ["wear"], ["lives have plan.n_records = null"]),
+        (
+            ["life=wear", "fault=healthy"],
+            ["healthy"],
+            ["lives have plan.n_records = null"],
+        ),
+        (["life=common"], ["healthy"], ["lives have plan.n_records = null"]),
+        (
+            ["life=crack_growth", "plan.n_records=null", "plan.classes=[crack]"],
+            ["crack"],
+            [],
+        ),
+    ],
+)
+def test_a_life_brings_its_plan(words, classes, notes):
+    request = read_request(words)
+    plan = request.config["plan"]
+    assert plan["n_records"] is None
+    assert plan["classes"] == classes == list(request.config["classes"])
+    assert list(request.notes) == notes
+
+
+def test_a_typed_number_of_records_stays():
+    assert (
+        read_request(["life=wear", "plan.n_records=9"]).config["plan"]["n_records"] == 9
+    )

@@ -26,7 +26,7 @@ from gensig.sensing.manufacturing import (
 from gensig.systems.pair_machine import pair_dynamics
 from gensig.systems.registry import read_system
 from gensig.systems.run import Run
-from gensig.systems.supports import read_holding
+from gensig.systems.supports import DAMPING_RATIO, read_holding
 
 LOW, HIGH = "quality.support_damping_ratio_low", "quality.support_damping_ratio_high"
 RATIOS = {LOW: 0.01, HIGH: 0.1}
@@ -35,6 +35,13 @@ TORQUE = "operating.torque_nm"
 SIDES = ("pinion", "wheel")
 WHEEL = "gear.wheel"
 FORMATS = ("stiffness_{}_n_per_m", "damping_{}_ns_per_m")
+HELICAL = {"system.kind": "helical_pair"}
+NULLS = {
+    f"gear.{side}.support.{name.format(axis)}": None
+    for side in SIDES
+    for name in FORMATS
+    for axis in "xy"
+}
 DOCS = Path(__file__).parents[3] / "docs" / "theory" / "supports.md"
 
 
@@ -156,6 +163,34 @@ class TestDamping:
         )
 
 
+@pytest.mark.parametrize(
+    "changes", [{"system.supports": "bearings"}, HELICAL | NULLS, NULLS]
+)
+def test_nothing_of_a_support_need_be_given(machine, changes):
+    """At the rated torque both ways are the same, and damping is that of 0.03."""
+    stiffness, _, ratio = supports_of(machine(changes))
+    assert_close(stiffness, supports_of(machine(BEARINGS))[0], 1e-12)
+    assert_close(ratio, DAMPING_RATIO, 1e-12)
+
+
+def test_what_is_given_of_a_support_stays(machine):
+    key = f"{WHEEL}.support.stiffness_x_n_per_m"
+    system = machine(NULLS | {key: 5e7})
+    derived = machine(BEARINGS).wheel.support.stiffness_y
+    assert system.wheel.support.stiffness_x == 5e7
+    assert_close(system.wheel.support.stiffness_y, derived, 1e-12)
+    # c = 2 zeta sqrt(k m) of the stiffness that it has
+    damping = 2.0 * DAMPING_RATIO * math.sqrt(5e7 * system.wheel.mass)
+    assert_close(system.wheel.support.damping_x, damping, 1e-12)
+
+
+def test_supports_that_are_null_are_those_of_the_rated_torque(machine):
+    doubled = machine(NULLS | {"operating.torque_nm": 40})
+    assert doubled.wheel.support == machine(NULLS).wheel.support
+    on_bearings = machine(BEARINGS | {"operating.torque_nm": 40})
+    assert on_bearings.wheel.support.stiffness_y > doubled.wheel.support.stiffness_y
+
+
 def supports_of(system, gearbox=None):
     return supports(Run(system=system, faults=(), gearbox=gearbox))
 
@@ -245,7 +280,6 @@ def test_axial_and_tilt_supports_are_as_given_where_they_are(config_with):
     assert found == tuple(given.values())
 
 
-HELICAL = {"system.kind": "helical_pair"}
 REFUSED = [
     ({"system.kind": "belt"}, "system.kind = 'belt'; allowed: spur_pair, helical_pair"),
     ({f"{WHEEL}.mass_kg": 0}, f"{WHEEL}.mass_kg = 0 must be positive, or null"),
@@ -262,10 +296,6 @@ REFUSED = [
         "stiffness_tilt_nm_per_rad = null is derived from shaft.span_mm",
     ),
     ({"system.supports": "springs"}, "'springs'; allowed: as_given, bearings"),
-    (
-        {"system.supports": "bearings"},
-        "= bearings says nothing of damping; give quality.",
-    ),
     (
         {**BEARINGS, LOW: 0.2},
         f"{LOW} = 0.2 and support_damping_ratio_high = 0.1 must be",

@@ -1,0 +1,120 @@
+"""Flank modifications of a drive line: those of a pair, on the flanks that work in its mesh."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from gensig.driveline.teeth import modified_there
+from gensig.mesh.load_distribution import pair_states, static_mesh
+from gensig.mesh.modification import FlankModification
+from gensig.mesh.pair_table import PairTable
+from gensig.plan.request import read_request
+from gensig.record.machines import read_machine
+from gensig.systems.sliced_pair import SlicedPair
+from gensig.systems.spur_pair import SpurPair
+
+SHORT = ("operating.duration_s=0.02", "mesh.points_per_pitch=64", "mesh.n_slices=6")
+RELIEF = (
+    "modification.pinion.tip_relief_um=12",
+    "modification.pinion.tip_relief_height_mm=1.5",
+    "modification.wheel.tip_relief_um=9",
+    "modification.wheel.tip_relief_height_mm=1.2",
+    "modification.wheel.crowning_um=4",
+)
+
+
+def line(*words):
+    return read_machine(read_request([*SHORT, *words]).config)
+
+
+def assert_same_tables(one, other):
+    assert_allclose(one.pinion.compliance, other.pinion.compliance, rtol=1e-12)
+    assert_allclose(one.pinion.gap, other.pinion.gap, atol=1e-18)
+    assert_allclose(one.wheel.gap, other.wheel.gap, atol=1e-18)
+
+
+def test_spur_teeth_are_those_of_a_pair():
+    machine = line("system=two_stage_gearbox", *RELIEF)
+    pair = read_machine(read_request([*SHORT]).config)
+    pair = replace(
+        pair,
+        pair=machine.pair,
+        material=machine.material,
+        mesh=machine.mesh,
+        modification=machine.modification,
+        operating=replace(
+            pair.operating,
+            torque=machine.mesh_force * machine.pair.pinion.base_radius,
+        ),
+    )
+    assert isinstance(pair, SpurPair)
+    assert_same_tables(machine.mesh_table(), pair.mesh_table())
+
+
+def test_helical_teeth_are_those_of_a_pair():
+    machine = line("system=phm09_helical_two_stage", *RELIEF)
+    pair = SlicedPair(
+        pair=machine.pair,
+        material=machine.material,
+        mesh=machine.mesh,
+        slices=machine.slices,
+        modification=machine.modification,
+        torque=machine.mesh_force * machine.pair.pinion.base_radius,
+    )
+    ours, theirs = machine.mesh_table(), pair.mesh_table()
+    assert_allclose(ours.gap, theirs.gap, atol=1e-18)
+    assert_allclose(ours.compliance, theirs.compliance, rtol=1e-12)
+
+
+def test_long_reliefs_of_a_stage_even_its_transmission_error():
+    """Welbourn's long reliefs for the force of the mesh, cut on the line's gears."""
+    plain = line("system=two_stage_gearbox")
+    pair = read_machine(read_request([*SHORT]).config)
+    torque = plain.mesh_force * plain.pair.pinion.base_radius
+    pair = replace(
+        pair, pair=plain.pair, operating=replace(pair.operating, torque=torque)
+    )
+    relieved = replace(plain, modification=pair.long_relief())
+    ripples = [
+        ripple(machine.mesh_table(), machine.mesh_force)
+        for machine in (plain, relieved)
+    ]
+    assert ripples[1] < 0.2 * ripples[0]
+
+
+def ripple(table, force):
+    """Static transmission error over a pitch, peak to peak in m."""
+    assert isinstance(table, PairTable)
+    roll = np.linspace(0.0, table.pair.base_pitch, 200, endpoint=False)
+    approach = static_mesh(table, pair_states(table, roll), force).approach
+    return float(np.ptp(approach))
+
+
+@pytest.mark.parametrize(
+    ("followed", "other", "pinion", "wheel"),
+    [
+        ("[3,18]", "3/66", True, False),  # the crankshaft's gear drives both
+        ("[19,20]", "19/32", True, False),
+        ("[19,20]", "20/43", False, False),  # an idler drives with its other flanks
+        ("[21,45]", "19/20", False, False),
+    ],
+)
+def test_other_meshes_meet_the_same_flanks_or_others(followed, other, pinion, wheel):
+    machine = line(
+        "system=engine_gear_train",
+        f"system.record_mesh={followed}",
+        "system.helical_meshes=constant",
+        *RELIEF,
+        "modification.misalignment_um=10",
+    )
+    number = machine.engine.mesh_names.index(other)
+    there = modified_there(
+        machine.engine.drive, machine.mesh_number, number, machine.modification
+    )
+    plain = FlankModification()
+    assert there.pinion == (machine.modification.pinion if pinion else plain)
+    assert there.wheel == (machine.modification.wheel if wheel else plain)
+    assert there.misalignment == 0.0
+    assert machine.modification.misalignment == pytest.approx(10e-6)
