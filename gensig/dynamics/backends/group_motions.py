@@ -49,16 +49,24 @@ def lane_groups(
     """Indices of the machines of each group; machines of one group settle in the same steps."""
     by_steps: dict[int, list[int]] = {}
     for index, machine in enumerate(machines):
-        steps = core.coarsest_oversampling(
-            machine, integration.oversampling, integration.sampling_rate
+        by_steps.setdefault(settling_steps(machine, integration, core), []).append(
+            index
         )
-        by_steps.setdefault(steps, []).append(index)
     n = n_lanes(integration.precision)
     return [
         same[first : first + n]
         for same in by_steps.values()
         for first in range(0, len(same), n)
     ]
+
+
+def settling_steps(
+    machine: DynamicsT, integration: Integration, core: Core[DynamicsT]
+) -> int:
+    """Least steps per sample in which a machine settles."""
+    fine = integration.oversampling
+    stable = core.coarsest_oversampling(machine, fine, integration.sampling_rate)
+    return max(stable, min(core.settling_steps, fine))
 
 
 def in_order(groups: Iterable[tuple[list[int], Motions]], n_machines: int) -> Motions:
@@ -102,7 +110,7 @@ def integrate_group(
     precision = integration.precision
     low_pass, lanes = decimator(oversampling), fill_lanes(machines, precision)
     # output samples; time 0 is the first recorded one
-    least = core.coarsest_oversampling(machines[0], oversampling, rate)
+    least = settling_steps(machines[0], integration, core)
     settling = settling_stages(least, oversampling, rate)
     stages = [(n_steps, -low_pass.margin - before) for n_steps, before in settling]
     end = stages[-1][1]

@@ -43,6 +43,8 @@ class Core(Generic[DynamicsT]):
     coarsest_oversampling : the least stable number of steps per sample of a machine, at most a
         given one, at a sampling rate
     settling_time : after which a start from rest has settled, s
+    settling_steps : least steps per sample of the settling. Machines that need more are groups
+        of their own, and each kind of group leaves lanes empty
     n_meshes, n_angles : meshes of a machine, and angles that are given out
     """
 
@@ -51,6 +53,7 @@ class Core(Generic[DynamicsT]):
     integrate: Any
     coarsest_oversampling: Callable[[DynamicsT, int, float], int]
     settling_time: Callable[[DynamicsT], float]
+    settling_steps: int = 3
     n_meshes: int = 1
     n_angles: int = 1
 
