@@ -170,17 +170,17 @@ def low_pass_seconds(
     product.
     """
     low_pass, block = decimator(oversampling), _record_kernels.BLOCK
-    width = n_channels * n_lanes(precision)
-    taps = low_pass.padded(precision)
-    means = np.zeros(
-        _record_kernels.mean_rows(len(taps), oversampling) * width, dtype=precision
-    )
-    out, again = np.empty(block * width, dtype=precision), 50
+    kind = _record_kernels.LOW_PASS_PRECISION
+    taps, width = low_pass.padded(kind), n_lanes(kind)
+    n_rows = _record_kernels.step_rows(n_channels * n_lanes(precision), width)
+    n_steps = _record_kernels.narrow_steps(len(taps), oversampling)
+    means = np.zeros(n_steps * n_rows * width, dtype=kind)
+    out, again = np.empty(block * n_rows * width, dtype=kind), 50
 
     def work() -> None:
         for _ in range(again):
             _record_kernels.low_pass(
-                means, 0, taps, oversampling, n_channels, block, out, 0
+                means, 0, taps, oversampling, n_rows, block, out, 0
             )
 
     work()
