@@ -137,14 +137,14 @@ def _together(
         signals = _signals(line, motions, index, dofs, rate)
         number, mesh = run.system.mesh_number, None
         if run.with_mesh_state:
-            seen = motions.seen[index, number * N_SEEN : (number + 1) * N_SEEN]
+            seen = motions.seen[index][number * N_SEEN : (number + 1) * N_SEEN]
             faulty = faulty_teeth(run.system.pair, run.faults)
-            angle = motions.angle[index, 0]
+            angle = motions.angle[index][0]
             mesh = mesh_state(line.pairs[number], seen, angle, faulty)
         records.append(
             CleanRecord(
                 acceleration=run.system.rows(run, line.running, signals),
-                shaft_angle=motions.angle[index, 0],
+                shaft_angle=motions.angle[index][0],
                 mean_speed=float(motions.mean_speed[index]),
                 contact_loss_fraction=float(motions.contact_loss[index, number]),
                 integration_error=float(errors[index]),
@@ -164,7 +164,7 @@ def _signals(
     nominal_angle, nominal_speed = line.running.course.nominal(times)
     rotation = line.running.line.rotation
     signals: dict[Channel, Array] = {
-        ("acceleration", dof): motions.acceleration[index, row]
+        ("acceleration", dof): motions.acceleration[index][row]
         for row, dof in enumerate(dofs)
     }
     for dof, angle in zip(line.angles, angles, strict=True):

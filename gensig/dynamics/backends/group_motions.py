@@ -28,6 +28,7 @@ Stages: TypeAlias = Sequence[tuple[int, int]]
 
 # steps per sample of the repeated settling of a machine that bounced: hard landings are stiff
 CAREFUL = 3
+SHORT_ROWS = "check", "mean_speed", "contact_loss", "finite"  # of ``Motions``
 CHECKED = 0.03  # s at the beginning of a record, integrated again at half the step
 
 
@@ -71,15 +72,19 @@ def settling_steps(
 
 def in_order(groups: Iterable[tuple[list[int], Motions]], n_machines: int) -> Motions:
     """Motions of all machines, from the motions of groups and the indices of their machines."""
-    rows: dict[str, NDArray[np.generic]] = {}
+    rows: dict[str, Any] = {
+        field.name: [None] * n_machines for field in dataclasses.fields(Motions)
+    }
     for indices, motions in groups:
-        for field in dataclasses.fields(Motions):
-            values = getattr(motions, field.name)
-            if field.name not in rows:
-                shape = n_machines, *values.shape[1:]
-                rows[field.name] = np.empty(shape, dtype=values.dtype)
-            rows[field.name][indices] = values[: len(indices)]
-    return Motions(**rows)  # type: ignore[arg-type]
+        for name, of_machine in rows.items():
+            values = getattr(motions, name)
+            if len(indices) < len(values):  # do not keep the lanes without a machine
+                values = np.array(values[: len(indices)])
+            for lane, index in enumerate(indices):
+                of_machine[index] = values[lane]
+    for name in SHORT_ROWS:
+        rows[name] = np.array(rows[name])
+    return Motions(**rows)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -227,10 +232,10 @@ def recorded(
     turned = angle[:, 0, -1] - angle[:, 0, 0]
     n_steps = (n_samples + 2 * low_pass.margin - 1) * fine + 1
     return Motions(
-        acceleration=acceleration,
+        acceleration=list(acceleration),
         check=check,
-        angle=angle[:, :, :-1],
-        seen=seen,
+        angle=list(angle[:, :, :-1]),
+        seen=list(seen),
         mean_speed=turned * integration.sampling_rate / n_samples,
         contact_loss=run.lost.T / n_steps,
         finite=run.is_within(OUT_OF_BOUNDS),
